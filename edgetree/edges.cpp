@@ -1,0 +1,1 @@
+#include "limn/edgetree/edge_sampler.h"

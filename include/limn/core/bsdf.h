@@ -1,0 +1,66 @@
+#pragma once
+// Scattering at a surface, seen from the front. All BSDFs are isotropic and opaque, so they are
+// functions of world-space directions and the shading normal alone: no tangent frame enters, and
+// nothing jumps where a frame would.
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "limn/core/dual.h"
+#include "limn/core/vec.h"
+
+namespace limn {
+
+class Properties;
+
+// A differentiable value that belongs to an object: "alpha", "reflectance", "radiance", ...
+// Colours are differentiated along grey (all channels move by the same amount): channels never mix,
+// so channel c of the derivative image is the derivative with respect to channel c.
+struct ParameterRef {
+  std::string name;
+  std::vector<Dual*> values;  // one, or the three channels
+};
+
+// What an edge sampler may know of a BSDF without seeing it.
+struct LobeSummary {
+  enum class Kind { kDiffuse, kGgx, kBeckmann };
+  Kind kind = Kind::kDiffuse;
+  double alpha = 1;   // roughness of the microfacet kinds
+  double albedo = 0;  // upper bound of the directional albedo over channels and directions
+};
+
+class Bsdf {
+ public:
+  virtual ~Bsdf() = default;
+
+  // Value times |cos(n, wo)| [1/sr]. n: unit shading normal; wi: unit, towards the viewer, n.wi >
+  // 0; wo: unit, towards the light. Zero if n.wo <= 0, and continuous there.
+  virtual Rgb<double> eval(const Vec3<double>& n, const Vec3<double>& wi,
+                           const Vec3<double>& wo) const = 0;
+  virtual Rgb<Dual> eval(const Vec3<Dual>& n, const Vec3<Dual>& wi, const Vec3<Dual>& wo) const = 0;
+
+  // Density of `sample` [1/sr], 0 if n.wo <= 0.
+  virtual double pdf_solid_angle(const Vec3d& n, const Vec3d& wi, const Vec3d& wo) const = 0;
+  // Draws wo from two numbers in [0, 1). Nothing if the draw falls below the surface (that
+  // probability is missing from the integral of pdf_solid_angle).
+  virtual std::optional<Vec3d> sample(const Vec3d& n, const Vec3d& wi, double u1,
+                                      double u2) const = 0;
+
+  // The BSDF that acts on the front or on the back; null if that side is black. The back is then
+  // treated as a front with reversed normals.
+  virtual const Bsdf* side(bool front) const { return front ? this : nullptr; }
+
+  virtual LobeSummary lobe() const = 0;
+  virtual std::vector<ParameterRef> parameters() = 0;
+  virtual std::shared_ptr<Bsdf> clone() const = 0;  // deep
+  // One line for `limn info`.
+  virtual std::string describe() const = 0;
+};
+
+// Makes the BSDF that an element describes; InputError for an unknown type (listing the known ones)
+// or bad values.
+std::shared_ptr<Bsdf> make_bsdf(Properties& properties);
+std::shared_ptr<Bsdf> make_diffuse(const Rgb<double>& reflectance);
+
+}  // namespace limn

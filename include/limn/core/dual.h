@@ -1,0 +1,146 @@
+#pragma once
+// Forward-mode derivatives: a value with its derivatives with respect to up to kLanes parameters.
+#include <algorithm>
+#include <cmath>
+#include <type_traits>
+
+#include "limn/core/vec.h"
+
+namespace limn {
+
+// Parameters that are differentiated in one pass: four doubles fill one AVX register.
+inline constexpr int kLanes = 4;
+
+// Derivatives of one value with respect to the parameters of a pass.
+struct Lanes {
+  double lane[kLanes] = {0, 0, 0, 0};
+
+  Lanes() = default;
+  Lanes(double a, double b, double c, double d) : lane{a, b, c, d} {}
+  double& operator[](int i) { return lane[i]; }
+  double operator[](int i) const { return lane[i]; }
+};
+
+inline Lanes operator+(const Lanes& a, const Lanes& b) {
+  Lanes r;
+  for (int i = 0; i < kLanes; ++i) r[i] = a[i] + b[i];
+  return r;
+}
+inline Lanes operator-(const Lanes& a, const Lanes& b) {
+  Lanes r;
+  for (int i = 0; i < kLanes; ++i) r[i] = a[i] - b[i];
+  return r;
+}
+inline Lanes operator-(const Lanes& a) {
+  Lanes r;
+  for (int i = 0; i < kLanes; ++i) r[i] = -a[i];
+  return r;
+}
+inline Lanes operator*(const Lanes& a, double s) {
+  Lanes r;
+  for (int i = 0; i < kLanes; ++i) r[i] = a[i] * s;
+  return r;
+}
+inline Lanes operator*(double s, const Lanes& a) { return a * s; }
+inline Lanes operator/(const Lanes& a, double s) { return a * (1 / s); }
+inline Lanes& operator+=(Lanes& a, const Lanes& b) { return a = a + b; }
+inline bool is_zero(const Lanes& a) { return a[0] == 0 && a[1] == 0 && a[2] == 0 && a[3] == 0; }
+
+struct Dual {
+  double v = 0;
+  Lanes d;
+
+  Dual() = default;
+  Dual(double value) : v(value) {}  // NOLINT: a constant is a dual number, implicitly
+  Dual(double value, const Lanes& derivative) : v(value), d(derivative) {}
+};
+
+inline Dual operator+(const Dual& a, const Dual& b) { return {a.v + b.v, a.d + b.d}; }
+inline Dual operator-(const Dual& a, const Dual& b) { return {a.v - b.v, a.d - b.d}; }
+inline Dual operator*(const Dual& a, const Dual& b) { return {a.v * b.v, a.d * b.v + b.d * a.v}; }
+inline Dual operator/(const Dual& a, const Dual& b) {
+  const double q = a.v / b.v;
+  return {q, (a.d - b.d * q) / b.v};
+}
+inline Dual operator+(const Dual& a, double b) { return {a.v + b, a.d}; }
+inline Dual operator+(double a, const Dual& b) { return {a + b.v, b.d}; }
+inline Dual operator-(const Dual& a, double b) { return {a.v - b, a.d}; }
+inline Dual operator-(double a, const Dual& b) { return {a - b.v, -b.d}; }
+inline Dual operator*(const Dual& a, double b) { return {a.v * b, a.d * b}; }
+inline Dual operator*(double a, const Dual& b) { return {a * b.v, b.d * a}; }
+inline Dual operator/(const Dual& a, double b) { return {a.v / b, a.d / b}; }
+inline Dual operator/(double a, const Dual& b) {
+  const double q = a / b.v;
+  return {q, -b.d * (q / b.v)};
+}
+inline Dual operator-(const Dual& a) { return {-a.v, -a.d}; }
+inline Dual& operator+=(Dual& a, const Dual& b) {
+  a.v += b.v;
+  a.d += b.d;
+  return a;
+}
+inline Dual& operator*=(Dual& a, const Dual& b) { return a = a * b; }
+
+// Comparisons look at the value alone.
+inline bool operator<(const Dual& a, const Dual& b) { return a.v < b.v; }
+inline bool operator>(const Dual& a, const Dual& b) { return a.v > b.v; }
+inline bool operator<=(const Dual& a, const Dual& b) { return a.v <= b.v; }
+inline bool operator>=(const Dual& a, const Dual& b) { return a.v >= b.v; }
+inline bool operator==(const Dual& a, const Dual& b) { return a.v == b.v; }
+
+// The derivative of sqrt at 0 is taken as 0.
+inline Dual sqrt(const Dual& a) {
+  const double r = std::sqrt(a.v);
+  return {r, r > 0 ? a.d * (0.5 / r) : Lanes{}};
+}
+inline Dual exp(const Dual& a) {
+  const double e = std::exp(a.v);
+  return {e, a.d * e};
+}
+inline Dual sin(const Dual& a) { return {std::sin(a.v), a.d * std::cos(a.v)}; }
+inline Dual cos(const Dual& a) { return {std::cos(a.v), a.d * -std::sin(a.v)}; }
+inline Dual tan(const Dual& a) {
+  const double t = std::tan(a.v);
+  return {t, a.d * (1 + t * t)};
+}
+inline Dual acos(const Dual& a) {
+  const double s = std::sqrt(std::max(0.0, 1 - a.v * a.v));
+  return {std::acos(a.v), s > 0 ? a.d * (-1 / s) : Lanes{}};
+}
+inline Dual atan2(const Dual& y, const Dual& x) {
+  const double r2 = x.v * x.v + y.v * y.v;
+  return {std::atan2(y.v, x.v), r2 > 0 ? (y.d * x.v - x.d * y.v) / r2 : Lanes{}};
+}
+inline Dual max(const Dual& a, const Dual& b) { return a.v >= b.v ? a : b; }
+inline Dual min(const Dual& a, const Dual& b) { return a.v <= b.v ? a : b; }
+
+inline double value(double a) { return a; }
+inline double value(const Dual& a) { return a.v; }
+template <class S>
+Vec3d value(const Vec3<S>& a) {
+  return {value(a.x), value(a.y), value(a.z)};
+}
+template <class S>
+Rgb<double> value(const Rgb<S>& a) {
+  return {value(a.r), value(a.g), value(a.b)};
+}
+
+// A stored dual number read as the scalar S that a computation carries.
+template <class S>
+S as(const Dual& a) {
+  if constexpr (std::is_same_v<S, double>) {
+    return a.v;
+  } else {
+    return a;
+  }
+}
+template <class S>
+Vec3<S> as(const Vec3<Dual>& a) {
+  return {as<S>(a.x), as<S>(a.y), as<S>(a.z)};
+}
+template <class S>
+Rgb<S> as(const Rgb<Dual>& a) {
+  return {as<S>(a.r), as<S>(a.g), as<S>(a.b)};
+}
+
+}  // namespace limn

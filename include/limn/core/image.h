@@ -1,0 +1,47 @@
+#pragma once
+// Images in memory and on disk.
+#include <string>
+#include <vector>
+
+namespace limn {
+
+// H rows of W pixels of C interleaved channels, row 0 on top, linear.
+struct Image {
+  int width = 0;
+  int height = 0;
+  int channels = 3;
+  std::vector<float> data;
+
+  Image() = default;
+  Image(int w, int h, int c)
+      : width(w), height(h), channels(c), data(static_cast<size_t>(w) * h * c) {}
+  float& at(int x, int y, int c) {
+    return data[(static_cast<size_t>(y) * width + x) * channels + c];
+  }
+  float at(int x, int y, int c) const {
+    return data[(static_cast<size_t>(y) * width + x) * channels + c];
+  }
+};
+
+// OpenEXR, scanline, ZIP. Channels R G B for three channels, Y for one. Attributes are written as
+// string attributes of the header. Files are written under a temporary name and renamed, so that a
+// crash never leaves half a file. Throw InputError with the file's name.
+struct ImageAttribute {
+  std::string name;
+  std::string value;
+};
+void write_exr(const std::string& file, const Image& image, bool half,
+               const std::vector<ImageAttribute>& attributes);
+// Any scanline or tiled EXR with R G B (or Y) channels of half or float, as three channels (or
+// one).
+Image read_exr(const std::string& file);
+
+// 8-bit sRGB picture of radiance: clamped to [0, 1] after multiplication with `exposure`.
+void write_png(const std::string& file, const Image& image, double exposure);
+// Blue-white-red picture of a signed image (mean over channels): white is 0, saturated is +-scale.
+void write_signed_png(const std::string& file, const Image& image, double scale);
+// The scale for write_signed_png: the 99.5th percentile of the non-zero |mean over channels|; 1 if
+// all are zero.
+double signed_scale(const Image& image);
+
+}  // namespace limn

@@ -1,0 +1,79 @@
+#pragma once
+// Triangle meshes: what the ray tracer, the shading and the edge samplers all read.
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "limn/core/dual.h"
+#include "limn/core/error.h"
+#include "limn/core/vec.h"
+
+namespace limn {
+
+using FaceIndices = std::array<uint32_t, 3>;  // counter-clockwise from outside
+
+enum class NormalSource {
+  kFace,      // flat shading: the shading normal is the geometric normal
+  kComputed,  // angle-weighted vertex normals over welded positions; they move with the vertices
+  kGiven,     // vertex normals from the file; they follow rigid motions and stay fixed otherwise
+};
+
+// One mesh in world space. Positions are stored as floats: Embree, shading and edges all see the
+// same vertices.
+struct Mesh {
+  std::vector<Vec3f> positions;    // V, scene units, as in the file (seam copies are kept)
+  std::vector<FaceIndices> faces;  // F by 3, into positions
+  std::vector<uint32_t> weld;      // V: the smallest index of a vertex at exactly the same position
+
+  NormalSource normal_source = NormalSource::kFace;
+  std::vector<Vec3d> normals;           // N unit vectors; empty for kFace
+  std::vector<FaceIndices> normal_ids;  // F by 3, into normals; empty for kFace
+  // V: sine of the largest tilt between shading and geometric normal over the faces around the
+  // vertex, the same for welded vertices; empty for kFace. Its interpolation bounds the tilt at any
+  // point (see shading.h).
+  std::vector<double> horizon;
+
+  // Derivatives of the above with respect to the parameters of the pass; empty where all are zero.
+  std::vector<Vec3<Lanes>> position_tangents;  // V
+  std::vector<Vec3<Lanes>> normal_tangents;    // N
+  std::vector<Lanes> horizon_tangents;         // V
+
+  // What the loader mended: faces that were left out because two of their corners coincide.
+  uint64_t collapsed_faces = 0;
+
+  Vec3<Dual> position(uint32_t vertex) const;
+};
+
+// Fills `weld` from the positions: vertices at bitwise equal coordinates (with -0 = 0) share the
+// smallest index.
+void weld_positions(Mesh& mesh);
+
+// Fills normals (if kComputed), horizon and their tangents from positions, faces, weld and
+// tangents. Called at load and after every change of positions or position_tangents. Angle-weighted
+// normals after Thuermer and Wuethrich 1998, over welded positions, so that texture seams leave no
+// crease.
+void update_shading_normals(Mesh& mesh);
+
+// Axis-aligned bounds of all positions referenced by faces.
+struct Bounds {
+  Vec3d lower{1e300, 1e300, 1e300};
+  Vec3d upper{-1e300, -1e300, -1e300};
+  void extend(const Vec3d& p);
+  Vec3d center() const { return (lower + upper) * 0.5; }
+  double diagonal() const { return length(upper - lower); }
+};
+Bounds bounds_of(const Mesh& mesh);
+
+// Mesh files. Both throw InputError (missing file, malformed line, index out of range, non-finite
+// position, no faces, non-triangle PLY face, ...) with the file and, where it can be known, the
+// line. Polygons of OBJ files are fanned from their first corner. Texture coordinates are read
+// past: nothing in limn uses them. `face_normals` ignores normals of the file.
+Mesh read_obj(const std::string& file, bool face_normals);
+Mesh read_ply(const std::string& file, bool face_normals);
+
+// Positions of a mesh file (obj or ply), or of a text file with "x y z" lines, in file order: a
+// velocity field.
+std::vector<Vec3d> read_vertex_vectors(const std::string& file);
+
+}  // namespace limn

@@ -1,0 +1,63 @@
+#pragma once
+// One element of a scene file with typed access to its properties. Every property that is never
+// asked for, and every nested object that is never taken, is an error that lists what is known
+// there.
+#include <map>
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "limn/core/dual.h"
+#include "limn/core/error.h"
+#include "limn/core/vec.h"
+
+namespace limn {
+
+class Bsdf;
+
+// Row-major affine or projective 4x4 matrix, acting on column vectors.
+struct Matrix4 {
+  double m[4][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}};
+  Vec3d point(const Vec3d& p) const;
+  Vec3d vector(const Vec3d& v) const;
+  // Inverse transpose: transforms normals; not normalised. The matrix must be invertible.
+  Vec3d normal(const Vec3d& n) const;
+  Matrix4 inverse() const;  // throws std::domain_error if singular
+  friend Matrix4 operator*(const Matrix4& a, const Matrix4& b);
+};
+
+class Properties {
+ public:
+  virtual ~Properties() = default;
+
+  virtual const std::string& tag() const = 0;   // "bsdf", "emitter", ...
+  virtual const std::string& type() const = 0;  // "diffuse", ...
+  virtual const std::string& id() const = 0;    // "" if none
+  virtual const SourceLocation& where() const = 0;
+  // Where the property `name` was written; the element itself if it was not.
+  virtual SourceLocation where(const std::string& name) const = 0;
+
+  virtual bool has(const std::string& name) const = 0;
+  // Each returns the default when the property is absent, throws InputError at its place when it
+  // has another type.
+  virtual double number(const std::string& name, double absent) = 0;
+  virtual int64_t integer(const std::string& name, int64_t absent) = 0;
+  virtual bool boolean(const std::string& name, bool absent) = 0;
+  virtual std::string string(const std::string& name, const std::string& absent) = 0;
+  virtual Vec3d point(const std::string& name, const Vec3d& absent) = 0;
+  // <rgb>, or <float> as grey.
+  virtual Rgb<double> rgb(const std::string& name, const Rgb<double>& absent) = 0;
+  virtual Matrix4 transform(const std::string& name) = 0;  // identity when absent
+  // The value of a string property resolved against the search path; InputError if absent or no
+  // such file.
+  virtual std::string file(const std::string& name) = 0;
+  // Nested bsdf elements and refs to bsdfs, in order.
+  virtual std::vector<std::shared_ptr<Bsdf>> bsdfs() = 0;
+
+  // An error at this element, or at one of its properties.
+  [[noreturn]] void fail(const std::string& message) const;
+  [[noreturn]] void fail(const std::string& property, const std::string& message) const;
+};
+
+}  // namespace limn

@@ -1,0 +1,49 @@
+#pragma once
+// Rays against the triangles of a scene.
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "limn/core/scene.h"
+
+namespace limn {
+
+struct FaceRef {
+  uint32_t shape = UINT32_MAX;
+  uint32_t face = UINT32_MAX;
+  bool operator==(const FaceRef&) const = default;
+};
+
+struct Ray {
+  Vec3d origin;
+  Vec3d direction;  // unit
+  double t_min = 0;
+  double t_max = 1e300;
+  // Faces that the ray never meets: the one it starts on, and those around an edge that it grazes.
+  // By id, never by distance.
+  FaceRef start;
+  uint32_t skip_shape = UINT32_MAX;
+  std::span<const uint32_t> skip_faces = {};
+  bool skip_emitters = false;  // hide_emitters, for camera rays
+};
+
+struct Hit {
+  FaceRef face;
+  double t = 0;
+};
+
+class RayTracer {
+ public:
+  virtual ~RayTracer() = default;
+  // The first hit in (t_min, t_max); false if none. Thread-safe.
+  virtual bool closest(const Ray& ray, Hit& hit) const = 0;
+  virtual bool occluded(const Ray& ray) const = 0;
+};
+
+// The scene must outlive the tracer.
+std::unique_ptr<RayTracer> make_embree_tracer(const Scene& scene, int threads);
+// Every face tested in double precision: the oracle for tests.
+std::unique_ptr<RayTracer> make_brute_force_tracer(const Scene& scene);
+
+}  // namespace limn

@@ -1,0 +1,61 @@
+#pragma once
+// A scene ready to render: plain data with checked values. Every differentiable number is stored as
+// a Dual whose derivative lanes are zero until a parameter is seeded (parameter.h).
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "limn/core/bsdf.h"
+#include "limn/core/camera.h"
+#include "limn/core/environment.h"
+#include "limn/core/error.h"
+#include "limn/core/film.h"
+#include "limn/core/mesh.h"
+
+namespace limn {
+
+// How interpolated normals enter the scattering function, see shading.h.
+enum class ShadingModel {
+  kContinuous,  // continuous in position and directions: gradients have no hidden jumps
+  kMitsuba,  // Mitsuba 3's convention, for comparing images; its jumps are missing from gradients
+};
+
+struct Shape {
+  std::string id;  // "" if the file gives none
+  SourceLocation where;
+  Mesh mesh;
+  std::shared_ptr<Bsdf> bsdf;  // never null; shared between shapes that refer to one element
+  bool is_emitter = false;
+  Rgb<Dual> radiance;      // of an area emitter: from the front of every face
+  std::string emitter_id;  // "" if none
+};
+
+struct Scene {
+  std::string file;
+  Camera camera;
+  Film film;
+  int max_depth = -1;  // as in Mitsuba: 1 emission only, 2 direct light, -1 no limit
+  int rr_depth = 5;    // Russian roulette from this depth on
+  bool hide_emitters = false;
+  int sample_count = 4;  // samples per pixel that the file asks for
+  uint64_t seed = 0;
+  ShadingModel shading = ShadingModel::kContinuous;
+
+  std::vector<Shape> shapes;
+  std::shared_ptr<Environment> environment;  // null if none
+  std::string environment_id;
+  std::map<std::string, std::shared_ptr<Bsdf>> bsdfs_by_id;  // every bsdf element with an id
+};
+
+// A copy that shares nothing mutable with the original.
+Scene deep_copy(const Scene& scene);
+
+// Reads the subset of Mitsuba 3's XML that scenes/README.md describes. `defines` are the -D
+// name=value pairs. Throws InputError with file:line:col. Warnings (for example about faces left
+// out of a mesh) are appended to `warnings`.
+Scene read_scene(const std::string& file, const std::map<std::string, std::string>& defines,
+                 std::vector<std::string>* warnings);
+
+}  // namespace limn

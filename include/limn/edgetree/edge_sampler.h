@@ -1,0 +1,85 @@
+#pragma once
+// Choosing an edge, and a point on it, for the boundary integral at a shading point:
+//   sum over e in E(p) of the integral over t in [0, 1] of dL(t) f_s(w_t) J(t) dt,   J = det(w_0,
+//   w_1, v) / |w|^3.
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "limn/core/bsdf.h"
+#include "limn/core/rng.h"
+#include "limn/edgetree/edges.h"
+
+namespace limn {
+
+struct EdgeId {
+  uint32_t object = UINT32_MAX;  // index of the EdgeMesh
+  uint32_t edge = UINT32_MAX;    // index in its edges
+  bool operator==(const EdgeId&) const = default;
+};
+
+// Everything about the shading point that a sampler may use.
+struct EdgeQuery {
+  Vec3d p;                 // world space
+  Vec3d n;                 // unit normal of the scattering function, n.wi > 0
+  Vec3d wi;                // unit, towards the viewer
+  LobeSummary lobe;        // bound of the scattering function
+  Vec3<Lanes> velocity{};  // of p, per parameter; an edge's velocity relative to p counts
+  // The face that p lies on: its edges lie on p's horizon, where the scattering function is zero,
+  // and are never drawn.
+  uint32_t object = UINT32_MAX;
+  uint32_t face = kNoFace;
+};
+
+struct EdgeSample {
+  EdgeId edge;
+  double t = 0;            // position on the edge: (1 - t) x_0 + t x_1
+  double probability = 0;  // P(e), of this edge for this query
+  double pdf_t = 0;        // density of t given the edge, per unit t
+};
+
+// A triangle of an emitter, wound counter-clockwise seen from where it shines.
+struct LightTriangle {
+  Vec3d corners[3];
+  double luminance = 0;
+};
+
+// What samplers are built from. It must outlive them.
+struct EdgeSamplerInput {
+  std::vector<EdgeMesh> objects;
+  std::vector<LightTriangle> lights;
+  double environment_luminance = 0;  // mean over the sphere
+};
+
+class EdgeSampler {
+ public:
+  virtual ~EdgeSampler() = default;
+
+  // Draws an edge of E(p) (never one of the query's own face) and a point on it. False if the draw
+  // ends without one; that happens with the probability that is missing from the sum of
+  // `probability` over all edges, and counts as a sample of value zero. Thread-safe, no allocation
+  // that grows per query.
+  virtual bool sample(const EdgeQuery& query, Rng& rng, EdgeSample& sample) const = 0;
+
+  // P(e) for this query, without sampling: what `sample` reports when it returns this edge. Zero
+  // only where the edge cannot contribute.
+  virtual double probability(const EdgeQuery& query, EdgeId edge) const = 0;
+  // Density of t given the edge.
+  virtual double pdf_t(const EdgeQuery& query, EdgeId edge, double t) const = 0;
+};
+
+// One row per sampler; tests and comparisons loop over them.
+struct EdgeSamplerType {
+  std::string name;
+  std::string description;
+  std::unique_ptr<EdgeSampler> (*make)(const EdgeSamplerInput& input, int threads);
+};
+std::span<const EdgeSamplerType> edge_sampler_types();
+
+// InputError that lists the known names if there is none of this name.
+std::unique_ptr<EdgeSampler> make_edge_sampler(const std::string& name,
+                                               const EdgeSamplerInput& input, int threads);
+
+}  // namespace limn

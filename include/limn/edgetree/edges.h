@@ -1,0 +1,74 @@
+#pragma once
+// The edges of a mesh, their classes, and the exact test whether radiance may jump across one as
+// seen from a point.
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "limn/core/dual.h"
+#include "limn/core/mesh.h"
+#include "limn/core/vec.h"
+
+namespace limn {
+
+enum class EdgeClass : uint8_t {
+  kSmooth,  // two faces, shading normals continuous: a jump only where it is a silhouette
+  kSharp,   // two faces, shading normals differ: a jump for every point that sees one of the faces
+  kBorder,  // one face: a jump for every point
+  kIrregular,  // more than two faces, or two that wind the same way: treated as a jump for every
+               // point
+  kFlat,  // two coplanar faces (exactly, or to rounding) with equal shading normals: never a jump
+          // but on their common plane
+};
+
+inline constexpr uint32_t kNoFace = UINT32_MAX;
+
+struct Edge {
+  std::array<uint32_t, 2>
+      vertices;  // welded vertex ids of the mesh; the first face runs from [0] to [1]
+  std::array<uint32_t, 2> faces;  // two of its faces; [1] is kNoFace for a border
+  EdgeClass edge_class = EdgeClass::kSmooth;
+  bool concave = false;  // two faces, each in front of the other's plane
+};
+
+// n . x + offset is the signed distance of x, positive in front; n is zero for a face without area.
+struct Plane {
+  Vec3d n;
+  double offset = 0;
+  double distance(const Vec3d& x) const { return dot(n, x) + offset; }
+};
+
+// The edges of one mesh (an object), with all that a query needs. Welded: copies of a vertex along
+// a texture seam are one vertex.
+struct EdgeMesh {
+  std::vector<Vec3d> positions;        // V, world space, the floats that Embree sees
+  std::vector<Vec3<Lanes>> tangents;   // V; empty where nothing moves
+  std::vector<Plane> planes;           // F, outward, double precision
+  std::vector<Edge> edges;             // E
+  std::vector<uint32_t> face_offsets;  // E + 1
+  std::vector<uint32_t>
+      incident_faces;  // the faces around edge e: [face_offsets[e], face_offsets[e + 1])
+  // The mesh is closed and its surfaces are black from behind: a point that sees only back faces
+  // sees no jump at a sharp edge, and concave edges are never silhouettes from outside.
+  bool one_sided_closed = false;
+
+  std::span<const uint32_t> faces_around(uint32_t edge) const {
+    return {incident_faces.data() + face_offsets[edge],
+            face_offsets[edge + 1] - face_offsets[edge]};
+  }
+  uint64_t count(EdgeClass edge_class) const;
+};
+
+// black_behind: the mesh's BSDF is black from behind. Faces without area stay in `planes` with a
+// zero normal.
+EdgeMesh build_edge_mesh(const Mesh& mesh, bool black_behind);
+
+// Whether incident radiance at p may jump across the edge: the set E(p), exactly, in double
+// precision, without regard to occlusion. Smooth edges: p lies in front of exactly one of the two
+// planes (a distance of exactly zero counts as either side, so that an edge is rather listed than
+// lost). Sharp: p is in front of at least one face, or the mesh is not one_sided_closed. Border,
+// irregular: always. Flat: as smooth.
+bool is_candidate(const EdgeMesh& mesh, uint32_t edge, const Vec3d& p);
+
+}  // namespace limn

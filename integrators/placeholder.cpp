@@ -1,0 +1,5 @@
+#include "limn/core/scene.h"
+#include "limn/core/parameter.h"
+#include "limn/core/ray_tracer.h"
+#include "limn/core/image.h"
+#include "limn/core/properties.h"
