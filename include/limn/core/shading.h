@@ -1,0 +1,197 @@
+#pragma once
+// A point on a surface and the scattering function there, over any scalar.
+//
+// The default scattering function is continuous in position and in both directions wherever normals
+// are interpolated, so that a gradient needs no edges but those of edges.h. With n_s the
+// interpolated and n_g the geometric normal:
+//  - the side of the surface follows n_g, which changes sides only at silhouettes;
+//  - where n_s turns away from the viewer (n_s.wi < e) the BSDF is evaluated with the normal n =
+//  normalize(n_s + (e - n_s.wi) wi), which
+//    meets n_s at n_s.wi = e and keeps n.wi > 0;
+//  - a factor reaches zero before wo does reach the geometric horizon n_g.wo = 0, below which the
+//  ray would start inside the mesh. The
+//    usual factors (Chiang, Li and Burley 2019) are functions of n_g and jump from triangle to
+//    triangle. Ours uses a bound instead: every vertex stores the sine of the largest tilt between
+//    n_s and n_g over the faces around it; s, its interpolation, is continuous and at any point at
+//    least the sine of the tilt there, so n_s.wo > s implies n_g.wo > 0. The factor is
+//    clamp((n_s.wo - s) / (s (1 - s)), 0, 1).
+// Flat-shaded meshes have n_s = n_g and s = 0, and are left as they are.
+#include <algorithm>
+#include <optional>
+
+#include "limn/core/ray_tracer.h"
+#include "limn/core/scene.h"
+
+namespace limn {
+
+template <class S>
+struct SurfacePoint {
+  const Shape* shape = nullptr;
+  FaceRef face;
+  Vec3<S> p;
+  Vec3d n_g;    // unit geometric normal, outward by the winding
+  Vec3<S> n_s;  // unit shading normal, on the side of n_g unless the file's normals say otherwise
+  S horizon{};  // s above; 0 for flat shading
+
+  // Radiance that the surface itself emits towards the unit direction wi.
+  Rgb<S> emission(const Vec3d& wi, ShadingModel model) const {
+    if (!shape->is_emitter) return {};
+    const double side = model == ShadingModel::kMitsuba ? dot(value(n_s), wi) : dot(n_g, wi);
+    return side > 0 ? as<S>(shape->radiance) : Rgb<S>{};
+  }
+};
+
+// Corners of a face as the scalar P.
+template <class P>
+std::array<Vec3<P>, 3> face_corners(const Mesh& mesh, uint32_t face) {
+  std::array<Vec3<P>, 3> corners;
+  for (int k = 0; k < 3; ++k) {
+    const uint32_t vertex = mesh.faces[face][k];
+    if constexpr (std::is_same_v<P, double>) {
+      corners[k] = cast<double>(mesh.positions[vertex]);
+    } else {
+      corners[k] = mesh.position(vertex);
+    }
+  }
+  return corners;
+}
+
+namespace detail {
+
+template <class S>
+S interpolate(const S& b0, const S& b1, const S& b2, const Dual& a0, const Dual& a1,
+              const Dual& a2) {
+  return b0 * as<S>(a0) + b1 * as<S>(a1) + b2 * as<S>(a2);
+}
+
+// Shading normal and horizon from the barycentric coordinates (b1, b2) of the second and third
+// corner.
+template <class S>
+void interpolate_shading(const Mesh& mesh, const S& b1, const S& b2, SurfacePoint<S>& point) {
+  const S b0 = 1.0 - b1 - b2;
+  const FaceIndices& ids = mesh.normal_ids[point.face.face];
+  const FaceIndices& vertices = mesh.faces[point.face.face];
+  Vec3<Dual> n[3];
+  Dual h[3];
+  for (int k = 0; k < 3; ++k) {
+    const Vec3d& a = mesh.normals[ids[k]];
+    n[k] = {a.x, a.y, a.z};
+    h[k] = mesh.horizon[vertices[k]];
+    if constexpr (!std::is_same_v<S, double>) {
+      if (!mesh.normal_tangents.empty()) {
+        const Vec3<Lanes>& d = mesh.normal_tangents[ids[k]];
+        n[k] = {{a.x, d.x}, {a.y, d.y}, {a.z, d.z}};
+      }
+      if (!mesh.horizon_tangents.empty()) h[k].d = mesh.horizon_tangents[vertices[k]];
+    }
+  }
+  point.n_s = normalize(Vec3<S>{interpolate(b0, b1, b2, n[0].x, n[1].x, n[2].x),
+                                interpolate(b0, b1, b2, n[0].y, n[1].y, n[2].y),
+                                interpolate(b0, b1, b2, n[0].z, n[1].z, n[2].z)});
+  point.horizon = interpolate(b0, b1, b2, h[0], h[1], h[2]);
+}
+
+template <class S, class P>
+void place_on_plane(const Mesh& mesh, const Vec3<S>& origin, const Vec3<S>& direction,
+                    SurfacePoint<S>& point) {
+  const auto corners = face_corners<P>(mesh, point.face.face);
+  const Vec3<P> e1 = corners[1] - corners[0];
+  const Vec3<P> e2 = corners[2] - corners[0];
+  const Vec3<P> n = cross(e1, e2);
+  const S t = dot(corners[0] - origin, n) / dot(n, direction);
+  point.p = origin + direction * t;
+  const P n_length = length(n);
+  point.n_g = value(n) / value(n_length);
+  if (mesh.normal_source == NormalSource::kFace) {
+    const Vec3<P> unit = n / n_length;
+    point.n_s = {S(unit.x), S(unit.y), S(unit.z)};
+    return;
+  }
+  const Vec3<S> q = point.p - corners[0];
+  const P inverse = 1.0 / dot(n, n);
+  interpolate_shading<S>(mesh, dot(cross(q, e2), n) * inverse, dot(cross(e1, q), n) * inverse,
+                         point);
+}
+
+}  // namespace detail
+
+// Where the line origin + t direction meets the plane of the face: the point that slides along the
+// ray while the face moves and the ray is held (or moves as its Dual says).
+template <class S>
+SurfacePoint<S> surface_on_ray(const Scene& scene, FaceRef face, const Vec3<S>& origin,
+                               const Vec3<S>& direction) {
+  SurfacePoint<S> point;
+  point.shape = &scene.shapes[face.shape];
+  point.face = face;
+  const Mesh& mesh = point.shape->mesh;
+  if constexpr (std::is_same_v<S, double>) {
+    detail::place_on_plane<S, double>(mesh, origin, direction, point);
+  } else if (mesh.position_tangents.empty()) {
+    detail::place_on_plane<S, double>(mesh, origin, direction, point);
+  } else {
+    detail::place_on_plane<S, Dual>(mesh, origin, direction, point);
+  }
+  return point;
+}
+
+// The point with barycentric coordinates (b1, b2) of the second and third corner.
+SurfacePoint<double> surface_at(const Scene& scene, FaceRef face, double b1, double b2);
+
+// The scattering function at a surface point for a fixed direction to the viewer.
+template <class S>
+class Scattering {
+ public:
+  // wi: unit, towards the viewer.
+  Scattering(const SurfacePoint<S>& point, const Vec3<S>& wi, ShadingModel model)
+      : wi_(wi), n_s_(point.n_s), horizon_(point.horizon) {
+    const bool mitsuba = model == ShadingModel::kMitsuba;
+    const bool front = dot(mitsuba ? value(point.n_s) : point.n_g, value(wi)) > 0;
+    bsdf_ = point.shape->bsdf->side(front);
+    if (!front) n_s_ = -n_s_;
+    n_ = n_s_;
+    limited_ = !mitsuba && point.shape->mesh.normal_source != NormalSource::kFace;
+    if (limited_) bend();
+  }
+
+  bool black() const { return bsdf_ == nullptr; }
+  const Bsdf& bsdf() const { return *bsdf_; }
+  const Vec3<S>& normal() const { return n_; }
+  const Vec3<S>& wi() const { return wi_; }
+
+  // Value times cosine [1/sr] for the unit direction wo towards the light, which is held fixed.
+  Rgb<S> eval(const Vec3d& wo) const {
+    const Vec3<S> w{wo.x, wo.y, wo.z};
+    if (!limited_) return bsdf_->eval(n_, wi_, w);
+    const S factor = horizon_factor(wo);
+    if (value(factor) == 0) return {};
+    return bsdf_->eval(n_, wi_, w) * factor;
+  }
+  double pdf_solid_angle(const Vec3d& wo) const {
+    return bsdf_->pdf_solid_angle(value(n_), value(wi_), wo);
+  }
+  std::optional<Vec3d> sample(double u1, double u2) const {
+    return bsdf_->sample(value(n_), value(wi_), u1, u2);
+  }
+
+ private:
+  void bend() {
+    const double limit = 0.01;  // e above: any small number defines a continuous function
+    const S c = dot(n_s_, wi_);
+    if (value(c) < limit) n_ = normalize(n_s_ + wi_ * (limit - c));
+  }
+  S horizon_factor(const Vec3d& wo) const {
+    const S c = dot(n_s_, wo);
+    if (value(c) <= value(horizon_)) return S(0.0);
+    const S width = horizon_ * (1.0 - horizon_);
+    const S above = c - horizon_;
+    if (value(above) >= value(width)) return S(1.0);
+    return above / width;
+  }
+
+  Vec3<S> wi_, n_s_, n_;
+  S horizon_;
+  const Bsdf* bsdf_ = nullptr;
+  bool limited_ = false;
+};
+
+}  // namespace limn
