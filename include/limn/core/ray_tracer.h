@@ -22,7 +22,7 @@ struct Ray {
   double t_max = 1e300;
   // Faces that the ray never meets: the one it starts on, and those around an edge that it grazes.
   // By id, never by distance.
-  FaceRef start;
+  FaceRef start = {};
   uint32_t skip_shape = UINT32_MAX;
   std::span<const uint32_t> skip_faces = {};
   bool skip_emitters = false;  // hide_emitters, for camera rays

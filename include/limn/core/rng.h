@@ -18,8 +18,7 @@ enum class Purpose : uint64_t {
   kEmitter,
   kRoulette,
   kEdge,
-  kEdgeFront,
-  kEdgeBack,
+  kEdgeSide,
   kCamera,
   kTest
 };

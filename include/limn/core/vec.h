@@ -17,17 +17,19 @@ struct Vec3 {
 using Vec3d = Vec3<double>;
 using Vec3f = Vec3<float>;
 
-// The scalar of an operation between scalars A and B (double with Dual gives Dual).
+// The scalars of a sum and of a product of scalars A and B (double with Dual gives Dual).
 template <class A, class B>
-using Promote = decltype(A{} * B{});
+using Sum = decltype(A{} + B{});
+template <class A, class B>
+using Product = decltype(A{} * B{});
 
 template <class A, class B>
 auto operator+(const Vec3<A>& a, const Vec3<B>& b) {
-  return Vec3<Promote<A, B>>{a.x + b.x, a.y + b.y, a.z + b.z};
+  return Vec3<Sum<A, B>>{a.x + b.x, a.y + b.y, a.z + b.z};
 }
 template <class A, class B>
 auto operator-(const Vec3<A>& a, const Vec3<B>& b) {
-  return Vec3<Promote<A, B>>{a.x - b.x, a.y - b.y, a.z - b.z};
+  return Vec3<Sum<A, B>>{a.x - b.x, a.y - b.y, a.z - b.z};
 }
 template <class S>
 Vec3<S> operator-(const Vec3<S>& a) {
@@ -35,7 +37,7 @@ Vec3<S> operator-(const Vec3<S>& a) {
 }
 template <class A, class B>
 auto operator*(const Vec3<A>& a, const B& s) {
-  return Vec3<Promote<A, B>>{a.x * s, a.y * s, a.z * s};
+  return Vec3<Product<A, B>>{a.x * s, a.y * s, a.z * s};
 }
 template <class A, class B>
 auto operator*(const B& s, const Vec3<A>& a) {
@@ -43,7 +45,7 @@ auto operator*(const B& s, const Vec3<A>& a) {
 }
 template <class A, class B>
 auto operator/(const Vec3<A>& a, const B& s) {
-  return Vec3<Promote<A, B>>{a.x / s, a.y / s, a.z / s};
+  return Vec3<Product<A, B>>{a.x / s, a.y / s, a.z / s};
 }
 template <class S>
 Vec3<S>& operator+=(Vec3<S>& a, const Vec3<S>& b) {
@@ -63,7 +65,7 @@ auto dot(const Vec3<A>& a, const Vec3<B>& b) {
 }
 template <class A, class B>
 auto cross(const Vec3<A>& a, const Vec3<B>& b) {
-  return Vec3<Promote<A, B>>{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+  return Vec3<Product<A, B>>{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 template <class S>
 S length_squared(const Vec3<S>& a) {
@@ -120,19 +122,19 @@ Rgb<S> grey(const S& v) {
 }
 template <class A, class B>
 auto operator+(const Rgb<A>& a, const Rgb<B>& b) {
-  return Rgb<Promote<A, B>>{a.r + b.r, a.g + b.g, a.b + b.b};
+  return Rgb<Sum<A, B>>{a.r + b.r, a.g + b.g, a.b + b.b};
 }
 template <class A, class B>
 auto operator-(const Rgb<A>& a, const Rgb<B>& b) {
-  return Rgb<Promote<A, B>>{a.r - b.r, a.g - b.g, a.b - b.b};
+  return Rgb<Sum<A, B>>{a.r - b.r, a.g - b.g, a.b - b.b};
 }
 template <class A, class B>
 auto operator*(const Rgb<A>& a, const Rgb<B>& b) {
-  return Rgb<Promote<A, B>>{a.r * b.r, a.g * b.g, a.b * b.b};
+  return Rgb<Product<A, B>>{a.r * b.r, a.g * b.g, a.b * b.b};
 }
 template <class A, class B>
 auto operator*(const Rgb<A>& a, const B& s) {
-  return Rgb<Promote<A, B>>{a.r * s, a.g * s, a.b * s};
+  return Rgb<Product<A, B>>{a.r * s, a.g * s, a.b * s};
 }
 template <class S>
 Rgb<S>& operator+=(Rgb<S>& a, const Rgb<S>& b) {

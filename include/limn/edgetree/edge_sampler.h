@@ -51,6 +51,9 @@ struct EdgeSamplerInput {
   std::vector<EdgeMesh> objects;
   std::vector<LightTriangle> lights;
   double environment_luminance = 0;  // mean over the sphere
+  // Weights that make the speeds of different parameters comparable (a metre, a radian), for
+  // importance only.
+  Lanes lane_scale = {1, 1, 1, 1};
 };
 
 class EdgeSampler {

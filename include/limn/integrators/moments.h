@@ -1,0 +1,43 @@
+#pragma once
+// Means and standard errors of images from independent batches.
+#include <cstdint>
+#include <vector>
+
+#include "limn/core/image.h"
+
+namespace limn {
+
+// Every value is an average over samples that come in batches. Batch b gives the sum S_b over its
+// n_b samples. With N = sum n_b and S = sum S_b the mean is S / N, and the variance of one sample
+// is estimated by (sum S_b^2 / n_b - S^2 / N) / (B - 1), which is unbiased for independent samples
+// and needs no equal batches.
+class Moments {
+ public:
+  Moments() = default;
+  explicit Moments(size_t size) : sums_(size), squares_(size) {}
+
+  size_t size() const { return sums_.size(); }
+  int batches() const { return batches_; }
+  int64_t samples() const { return samples_; }
+
+  // sums: one value per element, the sum over `samples` samples.
+  void add_batch(const std::vector<double>& sums, int64_t samples);
+  double mean(size_t i) const { return samples_ > 0 ? sums_[i] / samples_ : 0; }
+  // Of the mean; needs two batches.
+  double variance(size_t i) const;
+
+ private:
+  std::vector<double> sums_, squares_;
+  int batches_ = 0;
+  int64_t samples_ = 0;
+};
+
+// H by W by 3 images of the means and of the standard errors (NaN with fewer than two batches).
+Image mean_image(const Moments& moments, int width, int height);
+Image standard_error_image(const Moments& moments, int width, int height);
+
+// Sums over square blocks of pixels: H by W by 3 values become ceil(H / block) by ceil(W / block)
+// by 3.
+std::vector<double> sum_blocks(const std::vector<double>& values, int width, int height, int block);
+
+}  // namespace limn

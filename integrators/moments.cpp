@@ -1,0 +1,53 @@
+#include "limn/integrators/moments.h"
+
+#include <cmath>
+#include <limits>
+
+namespace limn {
+
+void Moments::add_batch(const std::vector<double>& sums, int64_t samples) {
+  for (size_t i = 0; i < sums.size(); ++i) {
+    sums_[i] += sums[i];
+    squares_[i] += sums[i] * sums[i] / samples;
+  }
+  samples_ += samples;
+  ++batches_;
+}
+
+double Moments::variance(size_t i) const {
+  if (batches_ < 2) return std::numeric_limits<double>::quiet_NaN();
+  const double between = squares_[i] - sums_[i] * sums_[i] / samples_;
+  return std::fmax(0.0, between) / (batches_ - 1) / samples_;
+}
+
+Image mean_image(const Moments& moments, int width, int height) {
+  Image image(width, height, 3);
+  for (size_t i = 0; i < moments.size(); ++i) image.data[i] = static_cast<float>(moments.mean(i));
+  return image;
+}
+
+Image standard_error_image(const Moments& moments, int width, int height) {
+  Image image(width, height, 3);
+  for (size_t i = 0; i < moments.size(); ++i) {
+    image.data[i] = static_cast<float>(std::sqrt(moments.variance(i)));
+  }
+  return image;
+}
+
+std::vector<double> sum_blocks(const std::vector<double>& values, int width, int height,
+                               int block) {
+  const int columns = (width + block - 1) / block;
+  const int rows = (height + block - 1) / block;
+  std::vector<double> sums(static_cast<size_t>(columns) * rows * 3);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      for (int c = 0; c < 3; ++c) {
+        sums[(static_cast<size_t>(y / block) * columns + x / block) * 3 + c] +=
+            values[(static_cast<size_t>(y) * width + x) * 3 + c];
+      }
+    }
+  }
+  return sums;
+}
+
+}  // namespace limn

@@ -1,0 +1,211 @@
+#pragma once
+// The path tracer, written once for any scalar: double gives radiance, Dual gives radiance and the
+// interior term of its derivative. Sampled directions, their densities and MIS weights are
+// constants while the parameters move (solid-angle measure, everywhere).
+#include <atomic>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "limn/core/lights.h"
+#include "limn/core/ray_tracer.h"
+#include "limn/core/rng.h"
+#include "limn/core/scene.h"
+#include "limn/core/shading.h"
+
+namespace limn {
+
+struct PathContext {
+  const Scene& scene;
+  const RayTracer& tracer;
+  const Lights& lights;
+};
+
+// Rays that were traced on behalf of one term.
+struct RayCount {
+  uint64_t closest = 0;
+  uint64_t shadow = 0;
+  uint64_t total() const { return closest + shadow; }
+};
+
+// A path that starts exactly on an edge, on one of the faces around it. Its first rays never meet
+// these faces by rounding: whether a face blocks its neighbour at their common edge is decided by
+// their directions alone.
+struct EdgeStart {
+  uint32_t shape = 0;
+  std::span<const uint32_t> faces;  // around the edge
+  Vec3d x0, x1;                     // its ends
+};
+
+// The unit vector across an edge that lies in the face and points into it. x0: a point of the edge,
+// along: its unit direction.
+Vec3d direction_into_face(const Mesh& mesh, uint32_t face, const Vec3d& x0, const Vec3d& along);
+
+// The face around the edge that a ray meets at once when it leaves `start` infinitely close to the
+// edge, if any.
+std::optional<uint32_t> blocked_at_edge(const Scene& scene, const EdgeStart& edge, uint32_t start,
+                                        const Vec3d& direction);
+
+// Does nothing at path vertices.
+struct NoVisitor {
+  template <class... A>
+  void operator()(const A&...) const {}
+};
+
+inline double mis_weight(double pdf, double other) {
+  // Power heuristic; written so that huge densities do not overflow.
+  const double ratio = other / pdf;
+  return 1 / (1 + ratio * ratio);
+}
+
+// Visitor: called as visitor(surface, scattering, throughput, bounces, key) at every vertex where
+// the path scatters.
+template <class S, class Visitor>
+class PathTracer {
+ public:
+  PathTracer(const PathContext& context, RayCount& rays, Visitor& visitor)
+      : c_(context), rays_(rays), visitor_(visitor) {}
+
+  // Radiance that arrives at the origin of a ray against its direction. `ray` is the primal ray
+  // with its skipped faces; bounces: how often the whole path has scattered before.
+  Rgb<S> from_ray(const Ray& ray, const Vec3<S>& origin, const Vec3<S>& direction, int bounces,
+                  const Rng& key) {
+    Hit hit;
+    ++rays_.closest;
+    if (!c_.tracer.closest(ray, hit)) return escaped(direction, bounces);
+    return from_surface(surface_on_ray<S>(c_.scene, hit.face, origin, direction), -direction,
+                        bounces, key, nullptr);
+  }
+
+  Rgb<S> escaped(const Vec3<S>& direction, int bounces) const {
+    const bool hidden = bounces == 0 && c_.scene.hide_emitters;
+    if (!c_.scene.environment || hidden) return {};
+    return c_.scene.environment->radiance(direction);
+  }
+
+  // Radiance that leaves the surface along wi: emission and everything scattered within the scene's
+  // depth.
+  Rgb<S> from_surface(SurfacePoint<S> surface, Vec3<S> wi, int bounces, const Rng& key,
+                      const EdgeStart* edge) {
+    Rgb<S> radiance = surface.emission(value(wi), c_.scene.shading);
+    Rgb<S> throughput = grey(S(1.0));
+    for (;; ++bounces) {
+      if (c_.scene.max_depth >= 0 && bounces + 1 >= c_.scene.max_depth) return radiance;
+      const Scattering<S> scattering(surface, wi, c_.scene.shading);
+      if (scattering.black()) return radiance;
+      visitor_(surface, scattering, throughput, bounces, key);
+      radiance += throughput * direct_light(surface, scattering, bounces, key, edge);
+      Rng rng = key.at(Purpose::kBsdf, bounces);
+      const double u1 = rng.uniform();
+      const double u2 = rng.uniform();
+      const auto wo = scattering.sample(u1, u2);
+      if (!wo) return radiance;
+      const Rgb<S> f = scattering.eval(*wo);
+      if (is_black(value(f))) return radiance;
+      const double pdf = scattering.pdf_solid_angle(*wo);
+      throughput = throughput * f * (1 / pdf);
+      Hit hit;
+      const bool found = next_hit(surface, *wo, edge, hit);
+      const Vec3<S> direction{wo->x, wo->y, wo->z};
+      if (!found) {
+        if (!c_.scene.environment) return radiance;
+        const double weight = mis_weight(pdf, c_.lights.pdf_environment(*wo));
+        radiance += throughput * c_.scene.environment->radiance(direction) * weight;
+        return radiance;
+      }
+      if (hit.t > 0) {
+        surface = surface_on_ray<S>(c_.scene, hit.face, surface.p, direction);
+        edge = nullptr;
+      } else {
+        move_along_edge(surface, hit.face);
+      }
+      wi = -direction;
+      radiance += throughput * emitted(surface, *wo, pdf, hit.t);
+      if (!survives_roulette(throughput, bounces + 1, key)) return radiance;
+    }
+  }
+
+ private:
+  // The next surface from a path vertex; hit.t = 0 for a neighbour that blocks at the edge itself.
+  bool next_hit(const SurfacePoint<S>& surface, const Vec3d& wo, const EdgeStart* edge, Hit& hit) {
+    Ray ray{value(surface.p), wo};
+    ray.start = surface.face;
+    if (edge) {
+      if (const auto face = blocked_at_edge(c_.scene, *edge, surface.face.face, wo)) {
+        hit = {{edge->shape, *face}, 0};
+        return true;
+      }
+      ray.skip_shape = edge->shape;
+      ray.skip_faces = edge->faces;
+    }
+    ++rays_.closest;
+    return c_.tracer.closest(ray, hit);
+  }
+
+  void move_along_edge(SurfacePoint<S>& surface, FaceRef face) const {
+    // Only primal paths start on edges, so the point itself does not change.
+    const Vec3<S> p = surface.p;
+    const auto corners = face_corners<double>(c_.scene.shapes[face.shape].mesh, face.face);
+    const Vec3d n = cross(corners[1] - corners[0], corners[2] - corners[0]);
+    surface = surface_on_ray<S>(c_.scene, face, p, Vec3<S>{n.x, n.y, n.z});
+  }
+
+  Rgb<S> emitted(const SurfacePoint<S>& surface, const Vec3d& wo, double pdf,
+                 double distance) const {
+    const Rgb<S> radiance = surface.emission(-wo, c_.scene.shading);
+    if (is_black(value(radiance))) return radiance;
+    // A face around an edge that is met at distance 0 is never drawn by light sampling.
+    const double other =
+        distance > 0 ? c_.lights.pdf_face(surface.face, surface.n_g, wo, distance) : 0;
+    return radiance * mis_weight(pdf, other);
+  }
+
+  Rgb<S> direct_light(const SurfacePoint<S>& surface, const Scattering<S>& scattering, int bounces,
+                      const Rng& key, const EdgeStart* edge) {
+    if (c_.lights.empty()) return {};
+    Rng rng = key.at(Purpose::kEmitter, bounces);
+    LightSample light;
+    const Vec3d p = value(surface.p);
+    if (!c_.lights.sample(p, rng, light)) return {};
+    const Rgb<S> f = scattering.eval(light.wo);
+    if (is_black(value(f)) || shadowed(p, surface.face, light, edge)) return {};
+    const double weight = mis_weight(light.pdf, scattering.pdf_solid_angle(light.wo)) / light.pdf;
+    const Rgb<S> radiance =
+        light.face.shape == UINT32_MAX
+            ? c_.scene.environment->radiance(Vec3<S>{light.wo.x, light.wo.y, light.wo.z})
+            : as<S>(c_.scene.shapes[light.face.shape].radiance);
+    return f * radiance * weight;
+  }
+
+  bool shadowed(const Vec3d& p, FaceRef start, const LightSample& light, const EdgeStart* edge) {
+    if (light.face == start) return true;
+    Ray ray{p, light.wo};
+    ray.start = start;
+    if (edge) {
+      if (blocked_at_edge(c_.scene, *edge, start.face, light.wo)) return true;
+      ray.skip_shape = edge->shape;
+      ray.skip_faces = edge->faces;
+    }
+    // Ends a float's rounding before the light, so that neighbours of the chosen face do not hide
+    // the point.
+    if (light.distance < 1e300) ray.t_max = light.distance * (1 - 0x1p-20);
+    ++rays_.shadow;
+    return c_.tracer.occluded(ray);
+  }
+
+  // As in Mitsuba: from rr_depth bounces on, survival with the largest throughput, at most 0.95.
+  bool survives_roulette(Rgb<S>& throughput, int bounces, const Rng& key) const {
+    if (bounces < c_.scene.rr_depth) return true;
+    const double survival = std::min(max_channel(value(throughput)), 0.95);
+    Rng rng = key.at(Purpose::kRoulette, bounces);
+    if (rng.uniform() >= survival) return false;
+    throughput = throughput * (1 / survival);
+    return true;
+  }
+
+  const PathContext& c_;
+  RayCount& rays_;
+  Visitor& visitor_;
+};
+
+}  // namespace limn

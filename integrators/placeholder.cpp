@@ -1,5 +1,0 @@
-#include "limn/core/scene.h"
-#include "limn/core/parameter.h"
-#include "limn/core/ray_tracer.h"
-#include "limn/core/image.h"
-#include "limn/core/properties.h"

@@ -1,0 +1,39 @@
+#pragma once
+// The boundary term of a shading point: the silhouettes that it sees.
+//   dL_o/dtheta  +=  sum over edges of the integral over t of dL(t) f_s(w_t) J(t) dt,   J(t) =
+//   det(w_0, w_1, v) / |w|^3,
+// one sample of it at every vertex of a path, weighed by the path's throughput.
+#include "edge_jump.h"
+#include "limn/integrators/gradient.h"
+
+namespace limn {
+
+// Edges of all shapes (object i is shape i), light polygons and the environment's mean, as an edge
+// sampler takes them.
+EdgeSamplerInput make_sampler_input(const Scene& scene);
+
+// Visitor of a PathTracer<Dual>.
+class ShadingBoundary {
+ public:
+  ShadingBoundary(const PathContext& context, const std::vector<EdgeMesh>& objects,
+                  const EdgeSampler& sampler, TermCost& cost)
+      : context_(context), objects_(objects), sampler_(sampler), cost_(cost) {}
+
+  void operator()(const SurfacePoint<Dual>& surface, const Scattering<Dual>& scattering,
+                  const Rgb<Dual>& throughput, int bounces, const Rng& key);
+
+  // Of all vertices so far.
+  const Rgb<Lanes>& sum() const { return sum_; }
+
+ private:
+  void add_sample(const SurfacePoint<Dual>& surface, const Scattering<Dual>& scattering,
+                  const Rgb<double>& throughput, int bounces, const Rng& key);
+
+  const PathContext& context_;
+  const std::vector<EdgeMesh>& objects_;
+  const EdgeSampler& sampler_;
+  TermCost& cost_;
+  Rgb<Lanes> sum_;
+};
+
+}  // namespace limn
