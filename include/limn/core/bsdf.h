@@ -4,6 +4,7 @@
 // nothing jumps where a frame would.
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,12 @@ struct LobeSummary {
   double albedo = 0;  // upper bound of the directional albedo over channels and directions
 };
 
+// A value and the density of `sample` at one pair of directions.
+struct BsdfValue {
+  Rgb<double> value;
+  double pdf = 0;  // [1/sr]
+};
+
 class Bsdf {
  public:
   virtual ~Bsdf() = default;
@@ -42,6 +49,8 @@ class Bsdf {
 
   // Density of `sample` [1/sr], 0 if n.wo <= 0.
   virtual double pdf_solid_angle(const Vec3d& n, const Vec3d& wi, const Vec3d& wo) const = 0;
+  // eval and pdf_solid_angle at the cost of little more than one of them.
+  virtual BsdfValue eval_with_pdf(const Vec3d& n, const Vec3d& wi, const Vec3d& wo) const = 0;
   // Draws wo from two numbers in [0, 1). Nothing if the draw falls below the surface (that
   // probability is missing from the integral of pdf_solid_angle).
   virtual std::optional<Vec3d> sample(const Vec3d& n, const Vec3d& wi, double u1,
@@ -54,6 +63,8 @@ class Bsdf {
   virtual LobeSummary lobe() const = 0;
   virtual std::vector<ParameterRef> parameters() = 0;
   virtual std::shared_ptr<Bsdf> clone() const = 0;  // deep
+  // The BSDFs inside this one, so that a copy of a scene can share what the original shares.
+  virtual std::span<std::shared_ptr<Bsdf>> nested() { return {}; }
   // One line for `limn info`.
   virtual std::string describe() const = 0;
 };
@@ -62,5 +73,16 @@ class Bsdf {
 // or bad values.
 std::shared_ptr<Bsdf> make_bsdf(Properties& properties);
 std::shared_ptr<Bsdf> make_diffuse(const Rgb<double>& reflectance);
+
+// A rough metal. The defaults are Mitsuba's: eta = 0, k = 1 reflects everything at every angle.
+struct RoughConductorValues {
+  enum class Distribution { kBeckmann, kGgx };
+  Distribution distribution = Distribution::kBeckmann;
+  double alpha = 0.1;  // the microfacet distribution's own parameter, not squared
+  Rgb<double> eta{0, 0, 0};
+  Rgb<double> k{1, 1, 1};
+  Rgb<double> specular_reflectance{1, 1, 1};
+};
+std::shared_ptr<Bsdf> make_roughconductor(const RoughConductorValues& values);
 
 }  // namespace limn

@@ -1,0 +1,19 @@
+#pragma once
+// The factories that the registry lists, one per BSDF type.
+#include <memory>
+
+#include "limn/core/bsdf.h"
+#include "limn/core/properties.h"
+
+namespace limn {
+
+std::shared_ptr<Bsdf> read_diffuse(Properties& properties);
+std::shared_ptr<Bsdf> read_roughconductor(Properties& properties);
+std::shared_ptr<Bsdf> read_twosided(Properties& properties);
+
+// A colour whose channels lie in [0, 1], as Mitsuba demands of reflectances.
+Rgb<double> read_reflectance(Properties& properties, const char* name, double absent);
+
+inline Rgb<Dual> constant(const Rgb<double>& c) { return {c.r, c.g, c.b}; }
+
+}  // namespace limn
