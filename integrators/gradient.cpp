@@ -261,6 +261,8 @@ void collect(const Pass::Output& output, int samples, int width, int height, int
       }
     }
     parameters[k].total.add_batch(total, samples);
+    parameters[k].image_sum.add_batch(sum_blocks(total, width, height, std::max(width, height)),
+                                      samples);
     if (block > 0) {
       parameters[k].total_blocks.add_batch(sum_blocks(total, width, height, block), samples);
     }
@@ -273,6 +275,7 @@ ParameterGradient empty_gradient(const std::string& name, const Film& film, int 
   const size_t size = static_cast<size_t>(film.crop_width) * film.crop_height * 3;
   g.total = Moments(size);
   g.terms.fill(Moments(size));
+  g.image_sum = Moments(1);
   if (block > 0) {
     const std::vector<double> zeros(size);
     const Moments blocks(sum_blocks(zeros, film.crop_width, film.crop_height, block).size());

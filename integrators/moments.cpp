@@ -38,11 +38,11 @@ std::vector<double> sum_blocks(const std::vector<double>& values, int width, int
                                int block) {
   const int columns = (width + block - 1) / block;
   const int rows = (height + block - 1) / block;
-  std::vector<double> sums(static_cast<size_t>(columns) * rows * 3);
+  std::vector<double> sums(static_cast<size_t>(columns) * rows);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       for (int c = 0; c < 3; ++c) {
-        sums[(static_cast<size_t>(y / block) * columns + x / block) * 3 + c] +=
+        sums[static_cast<size_t>(y / block) * columns + x / block] +=
             values[(static_cast<size_t>(y) * width + x) * 3 + c];
       }
     }

@@ -139,6 +139,7 @@ DifferenceResult finite_differences(const Scene& scene, const std::string& param
   result.at_step = result.at_double_step = result.extrapolated = Moments(size);
   result.blocks_at_step = result.blocks_at_double_step = result.blocks_extrapolated =
       Moments(block_size);
+  result.image_sum = Moments(1);
   const Batches batches(settings.spp);
   ProgressCounter progress(settings, make_tiles(scene.film).size() * batches.count * 4);
   for (int b = 0; b < batches.count; ++b) {
@@ -163,6 +164,7 @@ DifferenceResult finite_differences(const Scene& scene, const std::string& param
     result.blocks_at_step.add_batch(sum_blocks(single, width, height, block), n);
     result.blocks_at_double_step.add_batch(sum_blocks(twice, width, height, block), n);
     result.blocks_extrapolated.add_batch(sum_blocks(combined, width, height, block), n);
+    result.image_sum.add_batch(sum_blocks(combined, width, height, std::max(width, height)), n);
     for (const BatchOutput& o : output) {
       result.rays += o.rays;
       result.non_finite.merge(o.non_finite);

@@ -30,8 +30,10 @@ struct ParameterGradient {
   std::string name;
   Moments total;
   std::array<Moments, kTermCount> terms;
+  // One value per block: the sum over its pixels and channels. Empty unless asked for.
   Moments total_blocks;
   std::array<Moments, kTermCount> term_blocks;
+  Moments image_sum;  // one value: the sum over all pixels and channels
 };
 
 // What one term cost. Times are summed over threads.

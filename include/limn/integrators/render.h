@@ -21,8 +21,10 @@ RenderResult render(const Scene& scene, const RunSettings& settings);
 // bias is of order h^4. All from the same samples; standard errors from batches hold for each.
 struct DifferenceResult {
   Moments at_step, at_double_step, extrapolated;
-  // The same over sums of square blocks of pixels.
+  // The same over square blocks of pixels: one value per block, the sum over its pixels and
+  // channels.
   Moments blocks_at_step, blocks_at_double_step, blocks_extrapolated;
+  Moments image_sum;  // one value: the extrapolated difference summed over all pixels and channels
   int64_t spp = 0;
   uint64_t rays = 0;
   double seconds = 0;
