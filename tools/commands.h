@@ -1,0 +1,60 @@
+#pragma once
+// The commands of the program `limn`: each reads its scene, calls the library and prints.
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "limn/core/image.h"
+#include "limn/core/scene.h"
+#include "limn/integrators/run.h"
+
+namespace limn {
+
+struct CommonOptions {
+  std::string scene;
+  std::map<std::string, std::string> defines;
+  int spp = 0;  // 0: the scene's
+  std::optional<uint64_t> seed;
+  int threads = 0;  // 0: all cores
+  std::string json;
+  bool quiet = false;
+  std::string shading = "continuous";
+};
+
+struct GradientCommand {
+  std::vector<std::string> parameters;
+  std::string output;
+  std::string terms = "interior,camera,boundary";
+  std::string sampler;
+  double step = 0;
+  int block = 0;
+};
+
+// Exit statuses.
+enum Status { kSuccess = 0, kDisagree = 1, kBadInput = 2, kNonFinite = 3, kInterrupted = 130 };
+
+int run_info(const CommonOptions& common);
+int run_render(const CommonOptions& common, const std::string& output);
+int run_gradient(const CommonOptions& common, const GradientCommand& command);
+int run_check(const CommonOptions& common, const GradientCommand& command);
+
+// Shared by the commands.
+// The EXR's header says what made it.
+std::vector<ImageAttribute> provenance(const Scene& scene, const RunSettings& settings,
+                                       int64_t spp);
+// One channel (luminance) if the scene's film asks for it.
+Image film_channels(const Scene& scene, const Image& image);
+// output with another ending: "a/b.exr", "_stderr.exr" gives "a/b_stderr.exr".
+std::string with_ending(const std::string& output, const std::string& ending);
+// Made before long work starts: InputError if the file cannot be written.
+void check_output(const std::string& file);
+void write_json(const std::string& file, const std::string& text);
+Scene load_scene(const CommonOptions& common);
+RunSettings make_settings(const CommonOptions& common, const Scene& scene,
+                          const std::string& label);
+// Prints a warning about non-finite samples, and turns the status into kNonFinite or kInterrupted
+// where that is due.
+int finish_status(const NonFinite& non_finite, int64_t spp_done, int64_t spp_asked);
+
+}  // namespace limn

@@ -1,0 +1,122 @@
+// The program: reads the command line, calls a command.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+
+#include "commands.h"
+#include "limn/core/error.h"
+#include "limn/edgetree/edge_sampler.h"
+
+namespace {
+
+using limn::CommonOptions;
+using limn::GradientCommand;
+
+void add_common(CLI::App& command, CommonOptions& common, std::vector<std::string>& defines) {
+  command.add_option("scene", common.scene, "Scene file (Mitsuba 3 XML)")
+      ->required()
+      ->type_name("SCENE");
+  command.add_option("-D", defines, "Value of a $name in the scene")
+      ->type_name("NAME=VALUE")
+      ->allow_extra_args(false);
+  command.add_option("--spp", common.spp, "Samples per pixel (default: the scene's)")
+      ->check(CLI::Range(1, 1 << 30));
+  command.add_option("--seed", common.seed, "Seed of all random numbers (default: the scene's)");
+  command.add_option("--threads", common.threads, "Threads (default: all cores)")
+      ->check(CLI::Range(1, 4096));
+  command.add_option("--json", common.json, "Write the figures for machines to this file");
+  command.add_flag("--quiet", common.quiet, "Print nothing but errors and warnings");
+  command
+      .add_option("--shading", common.shading,
+                  "How interpolated normals shade: continuous, or as Mitsuba does (its jumps are "
+                  "missing from gradients)")
+      ->check(CLI::IsMember({"continuous", "mitsuba"}))
+      ->capture_default_str();
+}
+
+void add_gradient_options(CLI::App& command, GradientCommand& gradient) {
+  command.add_option("--wrt", gradient.parameters, "Parameter to differentiate (repeatable)")
+      ->required()
+      ->type_name("PARAM")
+      ->allow_extra_args(false);
+  command.add_option("--terms", gradient.terms, "Terms to compute: interior,camera,boundary")
+      ->capture_default_str();
+  std::string samplers;
+  for (const auto& type : limn::edge_sampler_types()) {
+    samplers += (samplers.empty() ? "" : ", ") + type.name;
+  }
+  command
+      .add_option("--sampler", gradient.sampler, "How shading points choose an edge: " + samplers)
+      ->capture_default_str();
+}
+
+std::map<std::string, std::string> parse_defines(const std::vector<std::string>& defines) {
+  std::map<std::string, std::string> parsed;
+  for (const std::string& define : defines) {
+    const size_t equals = define.find('=');
+    if (equals == std::string::npos || equals == 0) {
+      throw limn::InputError("-D " + define + ": expected NAME=VALUE");
+    }
+    parsed[define.substr(0, equals)] = define.substr(equals + 1);
+  }
+  return parsed;
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("limn: a path tracer that also computes how its image changes when the scene moves");
+  app.require_subcommand(1);
+  CommonOptions common;
+  GradientCommand command;
+  command.sampler = limn::edge_sampler_types().front().name;
+  std::vector<std::string> defines;
+
+  CLI::App* info =
+      app.add_subcommand("info", "What the scene holds, and what can be differentiated");
+  add_common(*info, common, defines);
+  CLI::App* render = app.add_subcommand("render", "Render the image");
+  add_common(*render, common, defines);
+  render
+      ->add_option("-o,--output", command.output, "Image to write (.exr; a .png is put beside it)")
+      ->required();
+  CLI::App* gradient = app.add_subcommand("gradient", "Derivative images, with standard errors");
+  add_common(*gradient, common, defines);
+  add_gradient_options(*gradient, command);
+  gradient
+      ->add_option("-o,--output", command.output,
+                   "Image to write (.exr; _stderr.exr and .png are put beside it)")
+      ->required();
+  CLI::App* check = app.add_subcommand("check", "Compare a gradient with finite differences");
+  add_common(*check, common, defines);
+  add_gradient_options(*check, command);
+  check
+      ->add_option("--step", command.step, "Step of the differences (default: the parameter's own)")
+      ->check(CLI::PositiveNumber);
+  check
+      ->add_option("--block", command.block,
+                   "Compare blocks of this many pixels (default: an eighth of the longer side)")
+      ->check(CLI::Range(1, 1 << 20));
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? limn::kSuccess : limn::kBadInput;
+  }
+  common.defines = parse_defines(defines);
+  if (info->parsed()) return limn::run_info(common);
+  if (render->parsed()) return limn::run_render(common, command.output);
+  if (gradient->parsed()) return limn::run_gradient(common, command);
+  return limn::run_check(common, command);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const limn::InputError& error) {
+    fmt::print(stderr, "{}\n", error.what());
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "error: {}\n", error.what());
+  }
+  return limn::kBadInput;
+}
