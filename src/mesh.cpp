@@ -1,0 +1,214 @@
+#include "limn/core/mesh.h"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+#include <tuple>
+
+namespace limn {
+
+Vec3<Dual> Mesh::position(uint32_t vertex) const {
+  const Vec3d p = cast<double>(positions[vertex]);
+  if (position_tangents.empty()) return {p.x, p.y, p.z};
+  const Vec3<Lanes>& t = position_tangents[vertex];
+  return {{p.x, t.x}, {p.y, t.y}, {p.z, t.z}};
+}
+
+void weld_positions(Mesh& mesh) {
+  std::vector<uint32_t> order(mesh.positions.size());
+  std::iota(order.begin(), order.end(), 0);
+  const auto key = [&](uint32_t i) {
+    const Vec3f& p = mesh.positions[i];
+    return std::make_tuple(p.x, p.y, p.z);  // compares -0 equal to 0
+  };
+  std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
+    return std::make_pair(key(a), a) < std::make_pair(key(b), b);
+  });
+  mesh.weld.resize(order.size());
+  uint32_t root = 0;
+  for (size_t i = 0; i < order.size(); ++i) {
+    if (i == 0 || key(order[i]) != key(order[i - 1])) root = order[i];
+    mesh.weld[order[i]] = root;
+  }
+}
+
+namespace {
+
+inline constexpr uint32_t kUnused = UINT32_MAX;
+
+template <class S>
+Vec3<S> position_as(const Mesh& mesh, uint32_t vertex) {
+  return as<S>(mesh.position(vertex));
+}
+
+// The unit normal of a face and the angles at its corners.
+template <class S>
+struct FaceShape {
+  bool has_area = false;
+  Vec3<S> normal;
+  std::array<S, 3> angles;
+};
+
+template <class S>
+FaceShape<S> face_shape(const Mesh& mesh, uint32_t face) {
+  using std::atan2;
+  const FaceIndices& f = mesh.faces[face];
+  // Copies of a vertex move together: the first one stands for all.
+  std::array<Vec3<S>, 3> p;
+  for (int i = 0; i < 3; ++i) p[i] = position_as<S>(mesh, mesh.weld[f[i]]);
+  const Vec3<S> a = p[1] - p[0], b = p[2] - p[0], c = p[2] - p[1];
+  const Vec3<S> doubled_area = cross(a, b);
+  const S size = length(doubled_area);
+  // Each product below is rounded once, each difference of products once more: what is no larger
+  // than that error is no area.
+  const double rounding = 4 * std::numeric_limits<double>::epsilon() *
+                          std::sqrt(length_squared(value(a)) * length_squared(value(b)));
+  FaceShape<S> shape;
+  shape.has_area = value(size) > rounding;
+  if (!shape.has_area) return shape;
+  shape.normal = doubled_area / size;
+  shape.angles = {S(atan2(size, dot(a, b))), S(atan2(size, -dot(a, c))), S(atan2(size, dot(b, c)))};
+  return shape;
+}
+
+// Shading normals as the scalar S carries them: N of them, and per vertex the horizon.
+template <class S>
+struct ShadingNormals {
+  std::vector<Vec3<S>> normals;
+  std::vector<S> horizon;
+};
+
+// Slots of the computed normals: one per welded vertex that a face uses.
+void assign_normal_ids(Mesh& mesh) {
+  std::vector<uint32_t> slot(mesh.positions.size(), kUnused);
+  mesh.normal_ids.resize(mesh.faces.size());
+  uint32_t count = 0;
+  for (size_t f = 0; f < mesh.faces.size(); ++f) {
+    for (int c = 0; c < 3; ++c) {
+      uint32_t& s = slot[mesh.weld[mesh.faces[f][c]]];
+      if (s == kUnused) s = count++;
+      mesh.normal_ids[f][c] = s;
+    }
+  }
+  mesh.normals.assign(count, Vec3d{});
+}
+
+// Sums of face normals weighted by corner angles (Thuermer and Wuethrich 1998), normalised. Where
+// they cancel (a sheet that is folded onto itself) any face's normal serves; a vertex of faces
+// without area alone gets +Z, which nothing ever reads.
+template <class S>
+std::vector<Vec3<S>> computed_normals(const Mesh& mesh, const std::vector<FaceShape<S>>& shapes) {
+  std::vector<Vec3<S>> normals(mesh.normals.size());
+  std::vector<uint32_t> any_face(mesh.normals.size(), kUnused);
+  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+    if (!shapes[f].has_area) continue;
+    for (int c = 0; c < 3; ++c) {
+      const uint32_t n = mesh.normal_ids[f][c];
+      normals[n] += shapes[f].normal * shapes[f].angles[c];
+      any_face[n] = f;
+    }
+  }
+  for (size_t n = 0; n < normals.size(); ++n) {
+    if (any_face[n] == kUnused) {
+      normals[n] = {S(0), S(0), S(1)};
+    } else if (value(length(normals[n])) > 64 * std::numeric_limits<double>::epsilon()) {
+      normals[n] = normalize(normals[n]);
+    } else {
+      normals[n] = shapes[any_face[n]].normal;
+    }
+  }
+  return normals;
+}
+
+template <class S>
+std::vector<Vec3<S>> stored_normals(const Mesh& mesh) {
+  std::vector<Vec3<S>> normals(mesh.normals.size());
+  for (size_t i = 0; i < normals.size(); ++i) {
+    for (int k = 0; k < 3; ++k) normals[i][k] = S(mesh.normals[i][k]);
+    if constexpr (std::is_same_v<S, Dual>) {
+      if (mesh.normal_tangents.empty()) continue;
+      for (int k = 0; k < 3; ++k) normals[i][k].d = mesh.normal_tangents[i][k];
+    }
+  }
+  return normals;
+}
+
+// Sine of the largest tilt of a face's corner normals against the face. The sine is the length of
+// the cross product, which is exact where sqrt(1 - cos^2) would lose all digits.
+template <class S>
+S face_tilt(const Mesh& mesh, uint32_t face, const Vec3<S>& face_normal,
+            const std::vector<Vec3<S>>& normals) {
+  S tilt(0);
+  for (uint32_t n : mesh.normal_ids[face]) {
+    if (value(dot(normals[n], face_normal)) <= 0) return S(1);
+    const S sine = length(cross(normals[n], face_normal));
+    if (sine > tilt) tilt = sine;
+  }
+  return tilt < 1.0 ? tilt : S(1);
+}
+
+template <class S>
+ShadingNormals<S> shading_normals(const Mesh& mesh) {
+  std::vector<FaceShape<S>> shapes(mesh.faces.size());
+  for (uint32_t f = 0; f < shapes.size(); ++f) shapes[f] = face_shape<S>(mesh, f);
+  ShadingNormals<S> result;
+  result.normals = mesh.normal_source == NormalSource::kComputed ? computed_normals(mesh, shapes)
+                                                                 : stored_normals<S>(mesh);
+  std::vector<S> at_root(mesh.positions.size(), S(0));
+  for (uint32_t f = 0; f < shapes.size(); ++f) {
+    if (!shapes[f].has_area) continue;
+    const S tilt = face_tilt(mesh, f, shapes[f].normal, result.normals);
+    for (uint32_t v : mesh.faces[f]) {
+      S& horizon = at_root[mesh.weld[v]];
+      if (tilt > horizon) horizon = tilt;
+    }
+  }
+  result.horizon.resize(at_root.size());
+  for (size_t v = 0; v < at_root.size(); ++v) result.horizon[v] = at_root[mesh.weld[v]];
+  return result;
+}
+
+void store_tangents(Mesh& mesh, const ShadingNormals<Dual>& from) {
+  mesh.normal_tangents.resize(from.normals.size());
+  for (size_t i = 0; i < from.normals.size(); ++i) {
+    const Vec3<Dual>& n = from.normals[i];
+    mesh.normal_tangents[i] = {n.x.d, n.y.d, n.z.d};
+  }
+  mesh.horizon_tangents.resize(from.horizon.size());
+  for (size_t i = 0; i < from.horizon.size(); ++i) mesh.horizon_tangents[i] = from.horizon[i].d;
+}
+
+}  // namespace
+
+void update_shading_normals(Mesh& mesh) {
+  if (mesh.normal_source == NormalSource::kFace) return;
+  const bool computed = mesh.normal_source == NormalSource::kComputed;
+  if (computed) assign_normal_ids(mesh);
+  ShadingNormals<double> values = shading_normals<double>(mesh);
+  mesh.normals = std::move(values.normals);
+  mesh.horizon = std::move(values.horizon);
+  const bool still = mesh.position_tangents.empty() && (computed || mesh.normal_tangents.empty());
+  if (still) {
+    mesh.normal_tangents.clear();
+    mesh.horizon_tangents.clear();
+  } else {
+    store_tangents(mesh, shading_normals<Dual>(mesh));
+  }
+}
+
+void Bounds::extend(const Vec3d& p) {
+  for (int k = 0; k < 3; ++k) {
+    lower[k] = std::min(lower[k], p[k]);
+    upper[k] = std::max(upper[k], p[k]);
+  }
+}
+
+Bounds bounds_of(const Mesh& mesh) {
+  Bounds bounds;
+  for (const FaceIndices& f : mesh.faces) {
+    for (uint32_t v : f) bounds.extend(cast<double>(mesh.positions[v]));
+  }
+  return bounds;
+}
+
+}  // namespace limn

@@ -1,0 +1,47 @@
+#pragma once
+// From what a mesh file says to a checked mesh in world space.
+#include <string>
+#include <vector>
+
+#include "limn/core/mesh.h"
+#include "limn/core/properties.h"
+
+namespace limn {
+
+inline constexpr uint32_t kNoNormal = UINT32_MAX;
+
+// A mesh as read: double precision, indices checked, polygons split into triangles.
+struct RawMesh {
+  std::string name;                     // the file, or the kind of shape: for messages
+  std::vector<Vec3d> positions;         // V, finite
+  std::vector<FaceIndices> faces;       // F by 3, into positions
+  std::vector<Vec3d> normals;           // N, finite, of any length
+  std::vector<FaceIndices> normal_ids;  // F by 3, into normals or kNoNormal; empty if no normals
+};
+
+struct MeshOptions {
+  Matrix4 to_world;           // invertible
+  bool face_normals = false;  // ignore normals, flat shading
+  bool flip_normals = false;  // reverse faces and normals
+};
+
+// The transform acts in double precision before positions are rounded to float. A reflecting
+// transform turns the winding, hence the geometric normals, inside out, as Mitsuba does up to 3.9.
+// Faces whose corners coincide are left out. What was mended is appended to `warnings` (may be
+// null). InputError if no face is left or a position does not fit a float.
+Mesh build_mesh(RawMesh raw, const MeshOptions& options, std::vector<std::string>* warnings);
+
+RawMesh parse_obj(const std::string& file);
+RawMesh parse_ply(const std::string& file);
+// Obj or ply, by the ending of the file's name.
+bool is_mesh_file(const std::string& file);
+RawMesh parse_mesh(const std::string& file);
+
+// Mitsuba's built-in shapes: the square [-1, 1]^2 and the unit disk in z = 0 facing +Z, the cube
+// [-1, 1]^3, the unit sphere.
+RawMesh make_rectangle();
+RawMesh make_cube();
+RawMesh make_disk();
+RawMesh make_sphere();
+
+}  // namespace limn

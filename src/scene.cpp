@@ -1,0 +1,32 @@
+#include "limn/core/scene.h"
+
+namespace limn {
+
+namespace {
+
+using BsdfCopies = std::map<const Bsdf*, std::shared_ptr<Bsdf>>;
+
+// The one copy of `original`: shared where the original is shared, nested BSDFs included.
+std::shared_ptr<Bsdf> copy_once(const std::shared_ptr<Bsdf>& original, BsdfCopies& copies) {
+  const auto found = copies.find(original.get());
+  if (found != copies.end()) return found->second;
+  std::shared_ptr<Bsdf> copy = original->clone();
+  const std::span<std::shared_ptr<Bsdf>> from = original->nested();
+  const std::span<std::shared_ptr<Bsdf>> to = copy->nested();
+  for (size_t i = 0; i < from.size(); ++i) to[i] = copy_once(from[i], copies);
+  copies[original.get()] = copy;
+  return copy;
+}
+
+}  // namespace
+
+Scene deep_copy(const Scene& scene) {
+  Scene copy = scene;
+  BsdfCopies copies;
+  for (Shape& shape : copy.shapes) shape.bsdf = copy_once(shape.bsdf, copies);
+  for (auto& [id, bsdf] : copy.bsdfs_by_id) bsdf = copy_once(bsdf, copies);
+  if (scene.environment) copy.environment = scene.environment->clone();
+  return copy;
+}
+
+}  // namespace limn
