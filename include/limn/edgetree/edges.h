@@ -25,8 +25,9 @@ enum class EdgeClass : uint8_t {
 inline constexpr uint32_t kNoFace = UINT32_MAX;
 
 struct Edge {
-  std::array<uint32_t, 2>
-      vertices;  // welded vertex ids of the mesh; the first face runs from [0] to [1]
+  // Welded vertex ids of the mesh; the first face runs from [0] to [1]. Where a face without area
+  // met a long side, an edge may be a part of that side.
+  std::array<uint32_t, 2> vertices;
   std::array<uint32_t, 2> faces;  // two of its faces; [1] is kNoFace for a border
   EdgeClass edge_class = EdgeClass::kSmooth;
   bool concave = false;  // two faces, each in front of the other's plane
@@ -51,7 +52,10 @@ struct EdgeMesh {
       incident_faces;  // the faces around edge e: [face_offsets[e], face_offsets[e + 1])
   // The mesh is closed and its surfaces are black from behind: a point that sees only back faces
   // sees no jump at a sharp edge, and concave edges are never silhouettes from outside.
+  // Holds if every connected part encloses positive volume (a part turned inside out, or the cavity
+  // of a hollow body, makes it false); parts that cross themselves are beyond this test.
   bool one_sided_closed = false;
+  double extent = 0;  // largest |x| of a position that a face uses
 
   std::span<const uint32_t> faces_around(uint32_t edge) const {
     return {incident_faces.data() + face_offsets[edge],
@@ -60,15 +64,21 @@ struct EdgeMesh {
   uint64_t count(EdgeClass edge_class) const;
 };
 
-// black_behind: the mesh's BSDF is black from behind. Faces without area stay in `planes` with a
-// zero normal.
+// mesh.weld must be filled. black_behind: the mesh's BSDF is black from behind. Faces without area
+// stay in `planes` with a zero normal and have no edges: their neighbours' sides are split at the
+// corners that lie on them, so that the neighbours meet. Copies of a vertex that move differently
+// tear the surface: both rims are borders.
 EdgeMesh build_edge_mesh(const Mesh& mesh, bool black_behind);
+
+// Bound of the rounding error of Plane::distance(p) for the planes of a mesh: within it of zero, p
+// counts as lying on either side.
+double distance_error(const EdgeMesh& mesh, const Vec3d& p);
 
 // Whether incident radiance at p may jump across the edge: the set E(p), exactly, in double
 // precision, without regard to occlusion. Smooth edges: p lies in front of exactly one of the two
-// planes (a distance of exactly zero counts as either side, so that an edge is rather listed than
-// lost). Sharp: p is in front of at least one face, or the mesh is not one_sided_closed. Border,
-// irregular: always. Flat: as smooth.
+// planes (a distance of zero, to rounding, counts as either side, so that an edge is rather listed
+// than lost). Sharp: p is in front of at least one face, or the mesh is not one_sided_closed.
+// Border, irregular: always. Flat: as smooth.
 bool is_candidate(const EdgeMesh& mesh, uint32_t edge, const Vec3d& p);
 
 }  // namespace limn

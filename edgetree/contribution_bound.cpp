@@ -1,0 +1,207 @@
+#include "limn/edgetree/contribution_bound.h"
+
+#include <algorithm>
+#include <cmath>
+
+// The Jacobian. With w(t) = w_0 + t e, the determinant det(w_0, w_1, v(t)) is linear in t because v
+// is, so its modulus is largest at an end. The rest has a closed form: with lengths l_a, l_b at the
+// ends of a part of the edge that is dt long, and the angle gamma between them at p,
+//   integral of dt / |w|^3 = dt (l_a + l_b) / (l_a^2 l_b^2 (1 + cos gamma)),
+// from the antiderivative (w.e) / (|w| |w x e|^2), with (u_b - u_a).(w_b - w_a) = (l_a + l_b)
+// (1 - cos gamma) and |w_a x w_b|^2 = l_a^2 l_b^2 (1 - cos gamma)(1 + cos gamma).
+//
+// The scattering function. Diffuse: albedo / pi * cos. Microfacets: f cos_o = F D(h) G / (4 cos_i).
+// With r the mirror image of wi about n, the turn from r to wo is the product of the reflections
+// about n and about h, a rotation by 2 theta_h, so the angle between r and wo is at most 2 theta_h:
+// D(theta_h) is at most the largest value of D from half that angle on. G is at most the smaller of
+// its two factors, and F at most the albedo bound.
+//
+// Along an arc the cosine to an axis is A cos(phi - phi_0): largest at an end, or A where it peaks
+// inside.
+
+namespace limn {
+namespace {
+
+// Largest cosine between an axis and the arc from u_a to u_b.
+double max_cosine(const Vec3d& axis, const Vec3d& u_a, const Vec3d& u_b) {
+  const double a = dot(axis, u_a), b = dot(axis, u_b), c = dot(u_a, u_b);
+  const double along_a = b - a * c, along_b = a - b * c;  // slopes into the arc, times sin gamma
+  if (along_a <= 0 || along_b <= 0) return std::max(a, b);
+  const double sin_squared = length_squared(cross(u_a, u_b));
+  const double peak = sin_squared > 0 ? std::sqrt(a * a + along_a * along_a / sin_squared) : 0;
+  return std::clamp(peak, std::max(a, b), 1.0);
+}
+
+Vec3<Lanes> relative_velocity(const EdgeMesh& mesh, uint32_t vertex, const EdgeQuery& query) {
+  if (mesh.tangents.empty()) return -query.velocity;
+  const Vec3<Lanes>& v = mesh.tangents[vertex];
+  return {v.x - query.velocity.x, v.y - query.velocity.y, v.z - query.velocity.z};
+}
+
+Lanes component_along(const Vec3<Lanes>& v, const Vec3d& c) {
+  return v.x * c.x + v.y * c.y + v.z * c.z;
+}
+
+}  // namespace
+
+EdgeSegment segment_of(const EdgeMesh& mesh, uint32_t edge, const EdgeQuery& query) {
+  const auto [a, b] = mesh.edges[edge].vertices;
+  return {mesh.positions[a] - query.p, mesh.positions[b] - query.p,
+          relative_velocity(mesh, a, query), relative_velocity(mesh, b, query)};
+}
+
+LobeBound::LobeBound(const Vec3d& n, const Vec3d& wi, const LobeSummary& lobe)
+    : n_(n), axis_(n), lobe_(lobe), width_(1), scale_(lobe.albedo / kPi) {
+  if (lobe.kind == LobeSummary::Kind::kDiffuse) return;
+  const double cos_i = dot(n, wi);
+  axis_ = normalize(n * (2 * cos_i) - wi);
+  width_ = std::min(1.0, lobe.alpha);
+  masking_wi_ = masking(cos_i);
+  scale_ = lobe.albedo / (4 * cos_i);
+}
+
+// Largest value of D at angles from theta on, cos_squared = cos^2 theta.
+double LobeBound::distribution(double cos_squared) const {
+  const double a2 = lobe_.alpha * lobe_.alpha;
+  if (lobe_.kind == LobeSummary::Kind::kGgx) {
+    const double k = cos_squared * a2 + (1 - cos_squared);
+    return a2 / (kPi * std::min(k * k, 1.0));  // falls with theta if alpha < 1, else rises to 1
+  }
+  const double c2 = std::min(cos_squared, 1 / (2 * a2));  // log D peaks at cos^2 = 1 / (2 alpha^2)
+  return c2 > 0 ? std::exp(-(1 - c2) / (c2 * a2)) / (kPi * a2 * c2 * c2) : 0;
+}
+
+// Upper bound of Smith's G1, increasing with the cosine. Beckmann: 1 / (1 + Lambda(a)) and its
+// rational fit by Walter et al. 2007 stay below 2 sqrt(pi) a, a = 1 / (alpha tan theta).
+double LobeBound::masking(double cos_theta) const {
+  if (cos_theta <= 0) return 0;
+  const double tan_theta = std::sqrt(std::max(0.0, 1 - cos_theta * cos_theta)) / cos_theta;
+  const double x = lobe_.alpha * tan_theta;
+  if (lobe_.kind == LobeSummary::Kind::kGgx) return 2 / (1 + std::sqrt(1 + x * x));
+  const double slope = 2 * std::sqrt(kPi);
+  return x <= slope ? 1 : slope / x;
+}
+
+double LobeBound::over_arc(const Vec3d& u_a, const Vec3d& u_b) const {
+  const double cos_o = max_cosine(n_, u_a, u_b);
+  if (cos_o <= 0) return 0;
+  if (lobe_.kind == LobeSummary::Kind::kDiffuse) return scale_ * cos_o;
+  const double cos_mirror = max_cosine(axis_, u_a, u_b);
+  return scale_ * distribution(0.5 * (1 + cos_mirror)) * std::min(masking_wi_, masking(cos_o));
+}
+
+EdgeBound::EdgeBound(const LobeBound& lobe, const EdgeSegment& segment) {
+  if (!clip_to_horizon(lobe, segment)) return;
+  cut(lobe);
+  cumulative_[0] = 0;
+  for (int i = 0; i < pieces_; ++i) {
+    weights_[i] = piece_bound(lobe, cuts_[i], cuts_[i + 1]);
+    cumulative_[i + 1] = cumulative_[i] + weights_[i];
+  }
+  if (std::isfinite(cumulative_[pieces_])) total_ = cumulative_[pieces_];
+}
+
+bool EdgeBound::clip_to_horizon(const LobeBound& lobe, const EdgeSegment& s) {
+  const double h_0 = dot(lobe.n(), s.w_0), h_1 = dot(lobe.n(), s.w_1);
+  if (h_0 <= 0 && h_1 <= 0) return false;
+  const Vec3d e = s.w_1 - s.w_0, c = cross(s.w_0, e);
+  const Lanes d_0 = component_along(s.v_0, c), d_1 = component_along(s.v_1, c);
+  if (is_zero(d_0) && is_zero(d_1)) return false;
+
+  if (h_0 < 0) t_begin_ = h_0 / (h_0 - h_1);
+  if (h_1 < 0) t_end_ = h_0 / (h_0 - h_1);
+  w_a_ = h_0 < 0 ? s.w_0 + e * t_begin_ : s.w_0;
+  w_b_ = h_1 < 0 ? s.w_0 + e * t_end_ : s.w_1;
+  determinant_a_ = d_0 * (1 - t_begin_) + d_1 * t_begin_;
+  determinant_b_ = d_0 * (1 - t_end_) + d_1 * t_end_;
+  length_a_ = length(w_a_);
+  length_b_ = length(w_b_);
+  u_a_ = w_a_ / length_a_;
+  u_b_ = w_b_ / length_b_;
+  sin_angle_ = length(c) * (t_end_ - t_begin_) / (length_a_ * length_b_);
+  return sin_angle_ > 0;
+}
+
+// Cuts at distances step * (2^k - 1) from where the arc comes closest to the lobe's axis; the step
+// is half the lobe's width, or half the sine of that closest angle if it is larger.
+void EdgeBound::cut(const LobeBound& lobe) {
+  angle_ = std::atan2(sin_angle_, dot(u_a_, u_b_));
+  cuts_[0] = 0;
+  cuts_[pieces_ = 1] = angle_;
+  const double peak_cosine = max_cosine(lobe.axis(), u_a_, u_b_);
+  const double sine = std::sqrt(std::max(0.0, 1 - peak_cosine * peak_cosine));
+  const double step = std::max({0.5 * lobe.width(), 0.5 * sine, 0x1.0p-26});
+  if (angle_ <= step) return;
+
+  tangent_ = normalize(cross(cross(u_a_, w_b_ - w_a_), u_a_));
+  const double a = dot(lobe.axis(), u_a_), b = dot(lobe.axis(), u_b_);
+  double peak = std::atan2(dot(lobe.axis(), tangent_), a);
+  if (peak < 0 || peak > angle_) peak = a > b ? 0 : angle_;
+  pieces_ = 0;
+  int k = 0;
+  while (peak - step * (std::exp2(k + 1) - 1) > 0) ++k;
+  for (; k > 0; --k) add_cut(peak - step * (std::exp2(k) - 1));
+  add_cut(peak);
+  for (k = 1; peak + step * (std::exp2(k) - 1) < angle_; ++k)
+    add_cut(peak + step * (std::exp2(k) - 1));
+  add_cut(angle_);
+}
+
+void EdgeBound::add_cut(double angle) {
+  if (angle > cuts_[pieces_]) cuts_[++pieces_] = angle;
+}
+
+// Fraction of the clipped segment (0 at w_a, 1 at w_b) that is seen at an angle from u_a.
+double EdgeBound::fraction_at(double angle) const {
+  if (angle >= angle_) return 1;
+  const double near = length_a_ * std::sin(angle);
+  return near / (near + length_b_ * std::sin(angle_ - angle));
+}
+
+double EdgeBound::piece_bound(const LobeBound& lobe, double begin, double end) const {
+  const bool whole = begin == 0 && end == angle_;
+  const double s_a = whole ? 0 : fraction_at(begin), s_b = whole ? 1 : fraction_at(end);
+  const auto direction = [&](double angle) {
+    return u_a_ * std::cos(angle) + tangent_ * std::sin(angle);
+  };
+  const Vec3d a = whole ? u_a_ : direction(begin), b = whole ? u_b_ : direction(end);
+  const auto length_at = [&](double s) { return length(w_a_ + (w_b_ - w_a_) * s); };
+  const double l_a = whole ? length_a_ : length_at(s_a), l_b = whole ? length_b_ : length_at(s_b);
+
+  double determinants = 0;
+  for (int i = 0; i < kLanes; ++i) {
+    const double difference = determinant_b_[i] - determinant_a_[i];
+    determinants += std::max(std::fabs(determinant_a_[i] + difference * s_a),
+                             std::fabs(determinant_a_[i] + difference * s_b));
+  }
+  const double one_plus_cosine = 0.5 * length_squared(a + b);
+  const double integral =
+      (t_end_ - t_begin_) * (s_b - s_a) * (l_a + l_b) / (l_a * l_a * l_b * l_b * one_plus_cosine);
+  return lobe.over_arc(a, b) * determinants * integral;
+}
+
+double EdgeBound::sample_t(double u_piece, double u_angle) const {
+  const double* first = cumulative_.data() + 1;
+  const double* found = std::upper_bound(first, first + pieces_, u_piece * total_);
+  const int i = static_cast<int>(std::min<long>(found - first, pieces_ - 1));
+  const double angle = cuts_[i] + (cuts_[i + 1] - cuts_[i]) * u_angle;
+  return t_begin_ + (t_end_ - t_begin_) * fraction_at(angle);
+}
+
+double EdgeBound::pdf_t(double t) const {
+  if (t < t_begin_ || t > t_end_) return 0;
+  const double s = (t - t_begin_) / (t_end_ - t_begin_);
+  const Vec3d w = w_a_ + (w_b_ - w_a_) * s;
+  const double sine = s * length_b_ * sin_angle_;  // |u_a x w|
+  const double angle = std::atan2(sine, dot(u_a_, w));
+  const double* first = cuts_.data() + 1;
+  const int i = static_cast<int>(
+      std::min<long>(std::upper_bound(first, first + pieces_, angle) - first, pieces_ - 1));
+  const double pdf_angle = weights_[i] / (total_ * (cuts_[i + 1] - cuts_[i]));
+  // d angle / ds = |w_a x w_b| / |w|^2
+  const double angle_per_t =
+      length_a_ * length_b_ * sin_angle_ / (length_squared(w) * (t_end_ - t_begin_));
+  return pdf_angle * angle_per_t;
+}
+
+}  // namespace limn

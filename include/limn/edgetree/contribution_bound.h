@@ -1,0 +1,83 @@
+#pragma once
+// How much one edge can contribute to the boundary integral at a shading point at most, visibility
+// and radiance aside, and a density for the point on it that follows this bound.
+#include <array>
+
+#include "limn/core/bsdf.h"
+#include "limn/edgetree/edge_sampler.h"
+
+namespace limn {
+
+// An edge as seen from p.
+struct EdgeSegment {
+  Vec3d w_0, w_1;        // ends minus p
+  Vec3<Lanes> v_0, v_1;  // velocities of the ends minus that of p
+};
+EdgeSegment segment_of(const EdgeMesh& mesh, uint32_t edge, const EdgeQuery& query);
+
+// Upper bound of the scattering function over an arc of directions.
+class LobeBound {
+ public:
+  // n: unit; wi: unit, n.wi > 0
+  LobeBound(const Vec3d& n, const Vec3d& wi, const LobeSummary& lobe);
+
+  // Over the shorter great arc from u_a to u_b (unit) [1/sr].
+  double over_arc(const Vec3d& u_a, const Vec3d& u_b) const;
+  // Where the lobe peaks, unit, and the angle at which it has fallen notably.
+  const Vec3d& axis() const { return axis_; }
+  double width() const { return width_; }
+  const Vec3d& n() const { return n_; }
+
+ private:
+  double distribution(double cos_squared) const;
+  double masking(double cos_theta) const;
+
+  Vec3d n_, axis_;
+  LobeSummary lobe_;
+  double width_;
+  double masking_wi_ = 1;
+  double scale_;
+};
+
+// The part of an edge above the horizon n.w > 0, cut into pieces that are short against the lobe.
+// A piece weighs max f_s * max |det(w_0, w_1, v)| * integral of dt / |w|^3, lanes added up; inside
+// a piece the density is uniform in the angle at p.
+class EdgeBound {
+ public:
+  EdgeBound(const LobeBound& lobe, const EdgeSegment& segment);
+
+  // Sum over lanes of a bound of the integral of f_s |J| over the edge [parameter unit^-1]; zero
+  // only where that integral is zero (or p lies on the edge's line).
+  double total() const { return total_; }
+  // The following need total() > 0.
+  // u_piece, u_angle in [0, 1)
+  double sample_t(double u_piece, double u_angle) const;
+  double pdf_t(double t) const;  // per unit t
+
+ private:
+  // Steps from the peak double from 2^-26 or more: 28 on either side exceed any arc.
+  static constexpr int kMaxPieces = 64;
+
+  bool clip_to_horizon(const LobeBound& lobe, const EdgeSegment& segment);
+  void cut(const LobeBound& lobe);
+  void add_cut(double angle);
+  double piece_bound(const LobeBound& lobe, double angle_begin, double angle_end) const;
+  double fraction_at(double angle) const;
+
+  // The clipped segment, from w_a = w(t_begin) to w_b = w(t_end).
+  Vec3d w_a_, w_b_, u_a_, u_b_;
+  double t_begin_ = 0, t_end_ = 1;
+  double length_a_ = 0, length_b_ = 0;
+  Lanes determinant_a_, determinant_b_;  // det(w_0, w_1, v) at the two ends; linear in t between
+  double sin_angle_ = 0;                 // of the whole arc
+  double angle_ = 0;
+  Vec3d tangent_{};  // unit, at u_a towards u_b
+
+  int pieces_ = 0;
+  std::array<double, kMaxPieces + 1> cuts_;  // angles from u_a, ascending
+  std::array<double, kMaxPieces> weights_;
+  std::array<double, kMaxPieces + 1> cumulative_;  // of the weights, from 0
+  double total_ = 0;
+};
+
+}  // namespace limn

@@ -1,0 +1,362 @@
+// Every edge sampler: what it draws against the probabilities it states, and the bounds behind
+// them.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "../support/chi_square.h"
+#include "../support/meshes.h"
+#include "../support/running_mean.h"
+#include "limn/core/error.h"
+#include "limn/edgetree/contribution_bound.h"
+#include "limn/edgetree/edge_sampler.h"
+
+namespace limn {
+namespace {
+
+// Fixed seeds: a p-value below this, or a z-score beyond +-5 (chance 6e-7), is an error, not luck.
+constexpr double kSignificance = 1e-6;
+
+using Kind = LobeSummary::Kind;
+
+// What the bounds are made for: Lambert, and microfacets with Smith's separable G and F = albedo.
+double scattering(const EdgeQuery& q, const Vec3d& wo) {
+  const double cos_o = dot(q.n, wo), cos_i = dot(q.n, q.wi), a = q.lobe.alpha;
+  if (cos_o <= 0) return 0;
+  if (q.lobe.kind == Kind::kDiffuse) return q.lobe.albedo / kPi * cos_o;
+  const double c = dot(q.n, normalize(q.wi + wo)), tan2 = (1 - c * c) / (c * c);
+  const auto masking = [&](double cosine) {
+    const double tangent = std::sqrt(1 - cosine * cosine) / cosine, x = 1 / (a * tangent);
+    if (q.lobe.kind == Kind::kGgx) return 2 / (1 + std::sqrt(1 + a * a * tangent * tangent));
+    return 1 / (1 + 0.5 * (std::erf(x) - 1) + std::exp(-x * x) / (2 * x * std::sqrt(kPi)));
+  };
+  const double d = q.lobe.kind == Kind::kGgx
+                       ? a * a / (kPi * std::pow(c * c * (a * a - 1) + 1, 2))
+                       : std::exp(-tan2 / (a * a)) / (kPi * a * a * std::pow(c, 4));
+  return q.lobe.albedo * d * masking(cos_o) * masking(cos_i) / (4 * cos_i);
+}
+
+// f_s times the sum over lanes of |J|.
+double integrand(const EdgeQuery& q, const EdgeSegment& s, double t) {
+  const Vec3d w = s.w_0 * (1 - t) + s.w_1 * t, c = cross(s.w_0, s.w_1);
+  double sum = 0;
+  for (int i = 0; i < kLanes; ++i) {
+    const auto v = [&](int k) { return s.v_0[k][i] * (1 - t) + s.v_1[k][i] * t; };
+    sum += std::fabs(v(0) * c.x + v(1) * c.y + v(2) * c.z);
+  }
+  return scattering(q, normalize(w)) * sum / std::pow(length(w), 3);
+}
+
+// Midpoint rule: stays below the exact integral's bound up to its own error, which `cells` halves.
+double integral(const EdgeQuery& q, const EdgeSegment& s, int cells) {
+  double sum = 0;
+  for (int i = 0; i < cells; ++i) sum += integrand(q, s, (i + 0.5) / cells);
+  return sum / cells;
+}
+
+LobeSummary random_lobe(Rng& rng) {
+  const double u = rng.uniform();
+  const Kind kind = u < 0.3 ? Kind::kDiffuse : u < 0.7 ? Kind::kGgx : Kind::kBeckmann;
+  const double alpha = std::exp(std::log(1e-3) * rng.uniform());
+  return {kind, alpha, 0.2 + 0.8 * rng.uniform()};
+}
+
+// A point around the origin at a distance of 1.1 to 4, looking about.
+EdgeQuery random_query(Rng& rng) {
+  EdgeQuery q;
+  q.p = random_direction(rng) * (1.1 + 3 * rng.uniform());
+  q.n = normalize(random_direction(rng) * 0.8 - normalize(q.p));
+  do q.wi = random_direction(rng);
+  while (dot(q.n, q.wi) <= 0);
+  q.lobe = random_lobe(rng);
+  q.velocity.y = Lanes{0, 0, 0, rng.uniform()};
+  return q;
+}
+
+// Two moving objects side by side.
+EdgeSamplerInput test_input(const Mesh& mesh) {
+  Vec3d identity[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  Mesh first = mesh, second = transformed(mesh, identity, 0.5, {1.2, 0.1, -0.4});
+  set_test_tangents(first);
+  set_test_tangents(second);
+  return {{build_edge_mesh(first, true), build_edge_mesh(second, true)}, {}, 1};
+}
+
+template <class F>
+void for_every_edge(const EdgeSamplerInput& input, F f) {
+  for (uint32_t o = 0; o < input.objects.size(); ++o)
+    for (uint32_t e = 0; e < input.objects[o].edges.size(); ++e) f(EdgeId{o, e});
+}
+
+TEST(LobeBound, BoundsTheScatteringFunctionOverArcs) {
+  Rng rng(11, 0, 0);
+  for (int i = 0; i < 20000; ++i) {
+    const EdgeQuery q = random_query(rng);
+    const LobeBound lobe(q.n, q.wi, q.lobe);
+    // Half of the arcs start near the mirror direction, where the lobe is steep.
+    const double spread = std::exp(-8 * rng.uniform());
+    const Vec3d a = rng.uniform() < 0.5 ? random_direction(rng)
+                                        : normalize(lobe.axis() + random_direction(rng) * spread);
+    const Vec3d b = normalize(a + random_direction(rng) * spread);
+    const double bound = lobe.over_arc(a, b);
+    for (int k = 0; k < 20; ++k) {
+      const double s = rng.uniform();
+      const Vec3d u = normalize(a * (1 - s) + b * s);
+      // Rounding: the cosines that enter D are right to 1e-16, and D(alpha) turns that into a
+      // relative error of 1e-16 / alpha^2.
+      const double rounding = 1e-14 / (q.lobe.alpha * q.lobe.alpha);
+      EXPECT_LE(scattering(q, u), bound * (1 + rounding)) << i;
+    }
+  }
+}
+
+TEST(EdgeBound, BoundsTheIntegralAndIsTightForShortEdges) {
+  Rng rng(12, 0, 0);
+  for (int i = 0; i < 3000; ++i) {
+    EdgeQuery q = random_query(rng);
+    q.lobe.alpha = std::max(q.lobe.alpha, 0.02);  // so that the midpoint rule resolves the lobe
+    EdgeSegment s;
+    s.w_0 = random_direction(rng);
+    const double size = std::exp(1 - 9 * rng.uniform());
+    s.w_1 = s.w_0 + random_direction(rng) * size;
+    for (int k = 0; k < 3; ++k)
+      for (int l = 0; l < kLanes; ++l)
+        s.v_0[k][l] = s.v_1[k][l] = l == 3 ? 0 : 2 * rng.uniform() - 1;
+    const EdgeBound bound(LobeBound(q.n, q.wi, q.lobe), s);
+    const double fine = integral(q, s, 2000), coarse = integral(q, s, 1000);
+    EXPECT_LE(fine, bound.total() + std::fabs(fine - coarse)) << i;
+    if (q.lobe.kind == Kind::kDiffuse && size < 0.01 && dot(q.n, s.w_0) > 0.1) {
+      EXPECT_GT(fine, 0.85 * bound.total()) << i;
+    }
+  }
+}
+
+TEST(EdgeBound, ScaleOfTheSceneDropsOut) {
+  Rng rng(13, 0, 0);
+  for (int i = 0; i < 200; ++i) {
+    const EdgeQuery q = random_query(rng);
+    EdgeSegment s;
+    s.w_0 = random_direction(rng);
+    s.w_1 = random_direction(rng);
+    s.v_0.x = s.v_1.x = Lanes{1, 0, 0, 0};
+    s.v_1.y = Lanes{0, 1, 0, 0};
+    const LobeBound lobe(q.n, q.wi, q.lobe);
+    const EdgeBound unit(lobe, s);
+    for (double scale : {0x1.0p-10, 0x1.0p13}) {  // J is of degree 0 if v scales along
+      EdgeSegment scaled{s.w_0 * scale, s.w_1 * scale, s.v_0, s.v_1};
+      const EdgeBound other(lobe, scaled);
+      EXPECT_DOUBLE_EQ(other.total() * scale, unit.total());
+      if (unit.total() > 0) {
+        EXPECT_DOUBLE_EQ(other.pdf_t(0.4), unit.pdf_t(0.4));
+      }
+    }
+  }
+}
+
+TEST(EdgeBound, StillEdgesAndEdgesBelowTheHorizonCount0) {
+  EdgeQuery q;
+  q.n = q.wi = {0, 0, 1};
+  q.lobe.albedo = 1;
+  const LobeBound lobe(q.n, q.wi, q.lobe);
+  EdgeSegment s{{1, 0, 1}, {0, 1, 1}, {}, {}};
+  EXPECT_EQ(EdgeBound(lobe, s).total(), 0);
+  s.v_0.z = Lanes{0, 0, 1, 0};
+  EXPECT_GT(EdgeBound(lobe, s).total(), 0);
+  s.w_0.z = s.w_1.z = -1;
+  EXPECT_EQ(EdgeBound(lobe, s).total(), 0);
+  s.w_0.z = 1;
+  EXPECT_GT(EdgeBound(lobe, s).total(), 0);
+  s.w_1 = s.w_0 * 2.0;  // seen end on
+  EXPECT_EQ(EdgeBound(lobe, s).total(), 0);
+}
+
+class EdgeSamplers : public testing::TestWithParam<std::string> {
+ protected:
+  std::unique_ptr<EdgeSampler> make(const EdgeSamplerInput& input) const {
+    return make_edge_sampler(GetParam(), input, 1);
+  }
+};
+
+TEST_P(EdgeSamplers, DrawAsTheyState) {
+  Rng rng(14, 0, 0);
+  for (const auto& [name, mesh] : test_meshes()) {
+    const EdgeSamplerInput input = test_input(mesh);
+    const auto sampler = make(input);
+    for (int i = 0; i < 6; ++i) {
+      const EdgeQuery q = random_query(rng);
+      constexpr int kDraws = 20000;
+      std::vector<double> expected, observed;
+      std::vector<size_t> begin;  // of an object's cells
+      double sum = 0;
+      for_every_edge(input, [&](EdgeId id) {
+        if (id.edge == 0) begin.push_back(expected.size());
+        const double probability = sampler->probability(q, id);
+        sum += probability;
+        expected.push_back(probability * kDraws);
+      });
+      EXPECT_LE(sum, 1 + 1e-12) << name;       // 1e3 terms of rounding 1e-16
+      if (GetParam() == "brute" && sum > 0) {  // nothing to draw if all is below the horizon
+        EXPECT_NEAR(sum, 1, 1e-12) << name;
+      }
+      expected.push_back((1 - sum) * kDraws);  // failures
+      if (expected.back() < 1e-6) expected.back() = 0;
+      observed.assign(expected.size(), 0);
+      for (int k = 0; k < kDraws; ++k) {
+        EdgeSample s;
+        if (!sampler->sample(q, rng, s)) {
+          ++observed.back();
+          continue;
+        }
+        ++observed[begin[s.edge.object] + s.edge.edge];
+        ASSERT_EQ(s.probability, sampler->probability(q, s.edge)) << name;
+        ASSERT_EQ(s.pdf_t, sampler->pdf_t(q, s.edge, s.t)) << name;
+        ASSERT_GT(s.pdf_t, 0) << name;
+      }
+      EXPECT_GT(test::chi_square_test(observed, expected).p_value, kSignificance) << name << " " << i;
+    }
+  }
+}
+
+TEST_P(EdgeSamplers, MissNoEdgeThatContributes) {
+  Rng rng(15, 0, 0);
+  for (const auto& [name, mesh] : test_meshes()) {
+    const EdgeSamplerInput input = test_input(mesh);
+    const auto sampler = make(input);
+    for (int i = 0; i < 10; ++i) {
+      const EdgeQuery q = random_query(rng);
+      for_every_edge(input, [&](EdgeId id) {
+        const EdgeMesh& edges = input.objects[id.object];
+        if (!is_candidate(edges, id.edge, q.p)) {
+          EXPECT_EQ(sampler->probability(q, id), 0) << name;
+          return;
+        }
+        const double t = rng.uniform();
+        if (integrand(q, segment_of(edges, id.edge, q), t) > 0) {
+          EXPECT_GT(sampler->probability(q, id), 0) << name;
+          EXPECT_GT(sampler->pdf_t(q, id, t), 0) << name;
+        }
+      });
+    }
+  }
+}
+
+TEST_P(EdgeSamplers, DensityAlongTheEdge) {
+  Rng rng(16, 0, 0);
+  const EdgeSamplerInput input = test_input(cube_mesh());
+  const auto sampler = make(input);
+  for (int i = 0; i < 40; ++i) {
+    const EdgeQuery q = random_query(rng);
+    EdgeSample s;
+    if (!sampler->sample(q, rng, s)) continue;
+    const EdgeId edge = s.edge;
+    constexpr int kBins = 20, kDraws = 20000, kFine = 500;
+    std::vector<double> expected(kBins), observed(kBins);
+    for (int b = 0; b < kBins * kFine; ++b)  // jittered: unbiased whatever the density's jumps
+      expected[b / kFine] +=
+          sampler->pdf_t(q, edge, (b + rng.uniform()) / (kBins * kFine)) / (kBins * kFine);
+    double count = 0;
+    for (int k = 0; k < 100 * kDraws && count < kDraws; ++k) {
+      if (!sampler->sample(q, rng, s) || !(s.edge == edge)) continue;
+      ++observed[std::min(kBins - 1, static_cast<int>(s.t * kBins))];
+      ++count;
+    }
+    for (double& e : expected) e *= count;
+    EXPECT_GT(test::chi_square_test(observed, expected).p_value, kSignificance) << i;
+  }
+}
+
+// The estimator f |J| / (P p) against the sum of all edges' integrals.
+TEST_P(EdgeSamplers, EstimateTheSumOverAllEdges) {
+  Rng rng(17, 0, 0);
+  for (const auto& [name, mesh] : test_meshes()) {
+    const EdgeSamplerInput input = test_input(mesh);
+    const auto sampler = make(input);
+    for (int i = 0; i < 6; ++i) {
+      EdgeQuery q = random_query(rng);
+      // Beckmann's tail spans hundreds of decades if it is narrow: no variance to speak of.
+      q.lobe.alpha = std::max(q.lobe.alpha, q.lobe.kind == Kind::kBeckmann ? 0.4 : 0.05);
+      double exact = 0;
+      for_every_edge(input, [&](EdgeId id) {
+        if (is_candidate(input.objects[id.object], id.edge, q.p))
+          exact += integral(q, segment_of(input.objects[id.object], id.edge, q), 400);
+      });
+      RunningMean estimate;
+      for (int k = 0; k < 20000; ++k) {
+        EdgeSample s;
+        const bool drawn = sampler->sample(q, rng, s);
+        const EdgeSegment segment =
+            drawn ? segment_of(input.objects[s.edge.object], s.edge.edge, q) : EdgeSegment{};
+        estimate.add(drawn ? integrand(q, segment, s.t) / (s.probability * s.pdf_t) : 0);
+      }
+      if (exact > 0) {
+        EXPECT_LT(std::fabs(estimate.z_score(exact)), 5) << name << " " << i;
+      }
+    }
+  }
+}
+
+TEST_P(EdgeSamplers, NeverDrawTheOwnFace) {
+  Rng rng(18, 0, 0);
+  const Mesh mesh = torus_mesh(12, 8);
+  const EdgeSamplerInput input = test_input(mesh);
+  const auto sampler = make(input);
+  for (uint32_t face = 0; face < mesh.faces.size(); face += 7) {
+    EdgeQuery q = random_query(rng);
+    q.object = 0;
+    q.face = face;
+    const EdgeMesh& edges = input.objects[0];
+    q.p = (edges.positions[mesh.faces[face][0]] + edges.positions[mesh.faces[face][1]] +
+           edges.positions[mesh.faces[face][2]]) /
+          3.0;
+    q.n = edges.planes[face].n;
+    q.wi = normalize(q.n + random_direction(rng) * 0.7);
+    const auto is_own = [&](EdgeId id) {
+      const auto around = edges.faces_around(id.edge);
+      return id.object == 0 && std::find(around.begin(), around.end(), face) != around.end();
+    };
+    for_every_edge(input, [&](EdgeId id) {
+      if (is_own(id)) {
+        EXPECT_EQ(sampler->probability(q, id), 0);
+      }
+    });
+    for (int k = 0; k < 200; ++k) {
+      EdgeSample s;
+      if (sampler->sample(q, rng, s)) {
+        EXPECT_FALSE(is_own(s.edge));
+      }
+    }
+  }
+}
+
+TEST_P(EdgeSamplers, HoldWithoutEdges) {
+  Rng rng(19, 0, 0);
+  const EdgeSamplerInput nothing;
+  const EdgeSamplerInput still{{build_edge_mesh(cube_mesh(), true)}, {}, 1};
+  EdgeQuery q = random_query(rng);
+  q.velocity = {};
+  EdgeSample s;
+  EXPECT_FALSE(make(nothing)->sample(q, rng, s));
+  if (GetParam() == "brute") {
+    EXPECT_FALSE(make(still)->sample(q, rng, s));
+  }
+}
+
+std::vector<std::string> sampler_names() {
+  std::vector<std::string> names;
+  for (const EdgeSamplerType& type : edge_sampler_types()) names.push_back(type.name);
+  return names;
+}
+INSTANTIATE_TEST_SUITE_P(All, EdgeSamplers, testing::ValuesIn(sampler_names()),
+                         [](const auto& param) { return param.param; });
+
+TEST(EdgeSamplerTable, UnknownNamesListTheKnown) {
+  try {
+    make_edge_sampler("forrest", {}, 1);
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_STREQ(error.what(), "error: unknown edge sampler \"forrest\" (known: brute, uniform)");
+  }
+}
+
+}  // namespace
+}  // namespace limn
