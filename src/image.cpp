@@ -93,7 +93,7 @@ Image read_open_file(Imf::InputFile& input, const std::string& file) {
     throw InputError(SourceLocation{file}, "the image is too large");
   }
   const std::vector<const char*> names = channels_to_read(input.header().channels(), file);
-  if (!input.isComplete()) throw InputError(SourceLocation{file}, "the EXR file is truncated");
+  if (!input.isComplete()) throw std::runtime_error("scanlines are missing");
   Image image(static_cast<int>(width), static_cast<int>(height), static_cast<int>(names.size()));
   input.setFrameBuffer(interleaved(image.data.data(), Imf::FLOAT, names, image.width, window.min));
   input.readPixels(window.min.y, window.max.y);
@@ -136,8 +136,9 @@ Image read_exr(const std::string& file) {
     return read_open_file(input, file);
   } catch (const InputError&) {
     throw;
-  } catch (const std::exception& e) {
-    throw InputError(SourceLocation{file}, std::string("the EXR file is damaged: ") + e.what());
+  } catch (const std::exception&) {
+    // OpenEXR's own words depend on where in the file it notices.
+    throw InputError(SourceLocation{file}, "the EXR file is truncated or damaged");
   }
 }
 

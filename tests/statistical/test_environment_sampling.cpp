@@ -1,0 +1,155 @@
+// Environment sampling against the density that it reports.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "limn/core/rng.h"
+#include "support/chi_square.h"
+#include "support/environment_maps.h"
+#include "support/quadrature.h"
+
+namespace limn {
+namespace {
+
+using test::MapCase;
+
+constexpr int kSamples = 100000;
+
+// Bins over the unit square (u, w): each cell between texels is cut in two by two. Texel columns
+// lie at half integers, so that cells begin at u = 1 / (2 W).
+struct Bins {
+  int columns, rows;
+  double shift;
+
+  explicit Bins(const Image& image)
+      : columns(2 * image.width),
+        rows(2 * std::max(1, image.height - 1)),
+        shift(0.5 / image.width) {}
+
+  size_t bin(const Vec3d& v) const {
+    double u = std::atan2(v.x, -v.z) / (2 * kPi) - shift;
+    u -= std::floor(u);
+    const double w = std::atan2(std::hypot(v.x, v.z), v.y) / kPi;
+    const int x = std::min(columns - 1, static_cast<int>(u * columns));
+    const int y = std::min(rows - 1, static_cast<int>(w * rows));
+    return static_cast<size_t>(y) * columns + x;
+  }
+  // Integral over solid angle of f, smooth within a bin, for each bin.
+  template <class F>
+  std::vector<double> integrate(F f) const {
+    std::vector<double> result;
+    for (int y = 0; y < rows; ++y) {
+      for (int x = 0; x < columns; ++x) {
+        const auto along_w = [&](double w) {
+          const auto along_u = [&](double u) { return f(test::map_direction(u, w)); };
+          return test::integrate(along_u, shift + static_cast<double>(x) / columns,
+                                 shift + (x + 1.0) / columns, 1) *
+                 std::sin(kPi * w) * 2 * kPi * kPi;
+        };
+        result.push_back(
+            test::integrate(along_w, static_cast<double>(y) / rows, (y + 1.0) / rows, 1));
+      }
+    }
+    return result;
+  }
+};
+
+Vec3d apply(const Matrix4& m, const Vec3d& v) {
+  return {m.m[0][0] * v.x + m.m[0][1] * v.y + m.m[0][2] * v.z,
+          m.m[1][0] * v.x + m.m[1][1] * v.y + m.m[1][2] * v.z,
+          m.m[2][0] * v.x + m.m[2][1] * v.y + m.m[2][2] * v.z};
+}
+Vec3d apply_transposed(const Matrix4& m, const Vec3d& v) {
+  Matrix4 t;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) t.m[i][j] = m.m[j][i];
+  }
+  return apply(t, v);
+}
+
+TEST(EnvironmentSampling, MatchesItsDensity) {
+  const Matrix4 turn = test::some_rotation();
+  const std::vector<MapCase> cases = test::map_cases();
+  const double threshold = test::sidak_threshold(0.01, static_cast<int>(cases.size()));
+  for (const MapCase& c : cases) {
+    const auto map = test::make_envmap(c.image, 3, turn);
+    const Bins bins(c.image);
+    std::vector<double> expected =
+        bins.integrate([&](const Vec3d& v) { return map->pdf_solid_angle(apply(turn, v)); });
+    double sum = 0;
+    for (double& e : expected) {
+      sum += e;
+      e *= kSamples;
+    }
+    EXPECT_NEAR(sum, 1, 1e-8) << c.name;
+    std::vector<double> observed(expected.size(), 0);
+    Rng rng(1, 2, 3);
+    for (int i = 0; i < kSamples; ++i) {
+      const double u1 = rng.uniform();
+      const double u2 = rng.uniform();
+      const Vec3d d = map->sample(u1, u2);
+      EXPECT_NEAR(length(d), 1, 1e-14);
+      ++observed[bins.bin(apply_transposed(turn, d))];
+    }
+    const test::ChiSquare result = test::chi_square_test(observed, expected);
+    EXPECT_GT(result.p_value, threshold)
+        << c.name << ": chi-square " << result.statistic << " with " << result.degrees_of_freedom
+        << " degrees of freedom";
+  }
+}
+
+// Sampling the map estimates its integral, and never misses radiance: the second moment is finite
+// and small, even where a cell is black on one side.
+TEST(EnvironmentSampling, EstimatesTheMean) {
+  for (const MapCase& c : test::map_cases()) {
+    const auto map = test::make_envmap(c.image, 3, test::some_rotation());
+    double sum = 0, sum2 = 0;
+    Rng rng(4, 5, 6);
+    for (int i = 0; i < kSamples; ++i) {
+      const double u1 = rng.uniform();
+      const double u2 = rng.uniform();
+      const Vec3d d = map->sample(u1, u2);
+      const double value = luminance(map->radiance(d)) / (map->pdf_solid_angle(d) * 4 * kPi);
+      sum += value;
+      sum2 += value * value;
+    }
+    const double mean = sum / kSamples;
+    const double deviation = std::sqrt(std::max(0.0, sum2 / kSamples - mean * mean));
+    EXPECT_NEAR(mean, map->mean_luminance(), 4.5 * deviation / std::sqrt(kSamples) + 1e-6 * mean)
+        << c.name;
+    if (c.name.find("negative") == std::string::npos) {
+      EXPECT_LE(deviation, map->mean_luminance()) << c.name;
+    }
+  }
+}
+
+TEST(EnvironmentSampling, DensityIsPositiveWhereRadianceIsNot0) {
+  Rng rng(7, 8, 9);
+  for (const MapCase& c : test::map_cases()) {
+    const auto map = test::make_envmap(c.image);
+    for (int i = 0; i < 20000; ++i) {
+      const double u1 = rng.uniform();
+      const double u2 = rng.uniform();
+      const Vec3d d = test::map_direction(u1, u2);
+      EXPECT_TRUE(is_black(map->radiance(d)) || map->pdf_solid_angle(d) > 0) << c.name;
+    }
+  }
+}
+
+TEST(EnvironmentSampling, ConstantIsUniform) {
+  const auto constant = make_constant_environment({1, 1, 1});
+  const Bins bins(Image(4, 5, 1));
+  std::vector<double> expected =
+      bins.integrate([&](const Vec3d& d) { return kSamples * constant->pdf_solid_angle(d); });
+  std::vector<double> observed(expected.size(), 0);
+  Rng rng(1, 1, 1);
+  for (int i = 0; i < kSamples; ++i) {
+    const double u1 = rng.uniform();
+    const double u2 = rng.uniform();
+    ++observed[bins.bin(constant->sample(u1, u2))];
+  }
+  EXPECT_GT(test::chi_square_test(observed, expected).p_value, 0.01);
+}
+
+}  // namespace
+}  // namespace limn

@@ -1,0 +1,185 @@
+// Image files: round trips, foreign files, broken files, pictures.
+#include "limn/core/image.h"
+
+#include <gtest/gtest.h>
+#include <png.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+
+#include "limn/core/error.h"
+#include "support/temporary_file.h"
+
+namespace limn {
+namespace {
+
+using test::TemporaryFile;
+
+Image ramp(int width, int height, int channels) {
+  Image image(width, height, channels);
+  for (size_t i = 0; i < image.data.size(); ++i) {
+    image.data[i] = (i % 2 ? -1.0f : 1.0f) * 0.37f * static_cast<float>(i);
+  }
+  return image;
+}
+
+std::string contents(const std::string& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+TEST(Image, FloatExrKeepsEveryBit) {
+  for (int channels : {1, 3}) {
+    const TemporaryFile file("float.exr");
+    const Image image = ramp(7, 5, channels);
+    write_exr(file.path(), image, false, {{"limn.seed", "seed 17 of the test"}});
+    const Image back = read_exr(file.path());
+    EXPECT_EQ(back.width, 7);
+    EXPECT_EQ(back.height, 5);
+    EXPECT_EQ(back.channels, channels);
+    EXPECT_EQ(back.data, image.data);
+    EXPECT_NE(contents(file.path()).find("seed 17 of the test"), std::string::npos);
+  }
+}
+
+TEST(Image, HalfExrRoundsAndStaysFinite) {
+  const TemporaryFile file("half.exr");
+  Image image = ramp(6, 4, 3);
+  image.data[5] = 1e9f;
+  image.data[6] = -1e9f;
+  image.data[7] = std::numeric_limits<float>::infinity();
+  write_exr(file.path(), image, true, {});
+  const Image back = read_exr(file.path());
+  EXPECT_EQ(back.data[5], 65504);
+  EXPECT_EQ(back.data[6], -65504);
+  EXPECT_TRUE(std::isinf(back.data[7]));
+  for (size_t i = 8; i < image.data.size(); ++i) {
+    EXPECT_NEAR(back.data[i], image.data[i], std::fabs(image.data[i]) / 2048);
+  }
+}
+
+TEST(Image, NothingIsLeftBesideTheFile) {
+  const std::filesystem::path folder = ::testing::TempDir() + "limn_image_folder";
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directory(folder);
+  write_exr(folder / "a.exr", ramp(3, 2, 3), true, {});
+  write_png(folder / "a.png", ramp(3, 2, 3), 1);
+  int files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    EXPECT_EQ(entry.path().stem(), "a");
+    ++files;
+  }
+  EXPECT_EQ(files, 2);
+  std::filesystem::remove_all(folder);
+}
+
+template <class F>
+std::string error_of(F f) {
+  try {
+    f();
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "no error";
+}
+
+TEST(Image, BrokenFilesAreExplained) {
+  const TemporaryFile file("broken.exr");
+  const std::string& path = file.path();
+  const auto read = [&] { read_exr(path); };
+  EXPECT_EQ(error_of(read), path + ": error: cannot read: No such file or directory");
+  std::ofstream(path).close();
+  EXPECT_EQ(error_of(read), path + ": error: cannot read: the file is empty");
+  std::ofstream(path) << "P6 not an exr";
+  EXPECT_EQ(error_of(read), path + ": error: is not an OpenEXR image");
+  write_exr(path, ramp(200, 100, 3), false, {});
+  const std::string whole = contents(path);
+  for (size_t size : {whole.size() * 9 / 10, whole.size() / 2, size_t{60}}) {
+    std::ofstream(path, std::ios::binary) << whole.substr(0, size);
+    EXPECT_EQ(error_of(read), path + ": error: the EXR file is truncated or damaged") << size;
+  }
+  EXPECT_EQ(error_of([&] { write_exr("/no/such/folder/a.exr", ramp(2, 2, 3), true, {}); }),
+            "/no/such/folder/a.exr: error: cannot write: no such folder");
+  EXPECT_EQ(error_of([&] { write_png("/no/such/folder/a.png", ramp(2, 2, 3), 1); }),
+            "/no/such/folder/a.png: error: cannot write: no such folder");
+}
+
+// Any prefix of a file is an error, never a crash or a picture.
+TEST(Image, EveryTruncationIsAnError) {
+  const TemporaryFile file("prefix.exr");
+  write_exr(file.path(), ramp(9, 40, 3), true, {});
+  const std::string whole = contents(file.path());
+  for (size_t size = 0; size < whole.size(); size += 13) {
+    std::ofstream(file.path(), std::ios::binary) << whole.substr(0, size);
+    EXPECT_NE(error_of([&] { read_exr(file.path()); }), "no error") << size;
+  }
+}
+
+// Debian's blender-data holds maps with DWA compression.
+TEST(Image, ReadsDwaCompression) {
+  const std::string file = "/usr/share/blender/datafiles/studiolights/world/sunset.exr";
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not installed";
+  const Image image = read_exr(file);
+  EXPECT_EQ(image.channels, 3);
+  EXPECT_EQ(image.width, 2 * image.height);
+  double sum = 0;
+  for (float v : image.data) {
+    ASSERT_TRUE(std::isfinite(v));
+    sum += v;
+  }
+  EXPECT_GT(sum / static_cast<double>(image.data.size()), 0.01);
+}
+
+struct Picture {
+  unsigned width, height;
+  std::vector<png_byte> rgb;
+};
+
+Picture read_picture(const std::string& file) {
+  png_image png{};
+  png.version = PNG_IMAGE_VERSION;
+  EXPECT_NE(png_image_begin_read_from_file(&png, file.c_str()), 0) << png.message;
+  png.format = PNG_FORMAT_RGB;
+  Picture picture{png.width, png.height, std::vector<png_byte>(PNG_IMAGE_SIZE(png))};
+  EXPECT_NE(png_image_finish_read(&png, nullptr, picture.rgb.data(), 0, nullptr), 0) << png.message;
+  return picture;
+}
+
+// sRGB: 0.5 is 188, 0.002 is 12.92 * 0.002 * 255 = 6.6.
+TEST(Image, PngIsSrgb) {
+  const TemporaryFile file("picture.png");
+  Image image(2, 2, 3);
+  image.data = {0, 0.25f, 0.001f, 7, -1, std::nanf(""), 0.5f, 0.5f, 0.5f, 0.1f, 0, 0};
+  write_png(file.path(), image, 2);
+  EXPECT_EQ(contents(file.path()).substr(0, 4), "\x89PNG");
+  const Picture picture = read_picture(file.path());
+  EXPECT_EQ(picture.width, 2u);
+  EXPECT_EQ(picture.height, 2u);
+  const std::vector<png_byte> expected = {0, 188, 7, 255, 0, 0, 255, 255, 255, 124, 0, 0};
+  EXPECT_EQ(picture.rgb, expected);
+}
+
+TEST(Image, SignedPngIsBlueWhiteRed) {
+  const TemporaryFile file("signed.png");
+  Image image(5, 1, 1);
+  image.data = {0, 2, -2, 1, -100};
+  write_signed_png(file.path(), image, 2);
+  const std::vector<png_byte> expected = {255, 255, 255, 255, 0, 0, 0,  0,
+                                          255, 255, 128, 128, 0, 0, 255};
+  EXPECT_EQ(read_picture(file.path()).rgb, expected);
+}
+
+TEST(Image, SignedScaleIgnoresZerosAndTheBrightest) {
+  Image image(1000, 3, 3);
+  EXPECT_EQ(signed_scale(image), 1);
+  for (int x = 0; x < 1000; ++x) {
+    for (int c = 0; c < 3; ++c) image.at(x, 1, c) = x < 998 ? -2.0f : 1e6f;
+  }
+  EXPECT_EQ(signed_scale(image), 2);
+}
+
+}  // namespace
+}  // namespace limn
