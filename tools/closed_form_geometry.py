@@ -1,0 +1,230 @@
+"""Geometry behind the closed-form references: shapes, camera, motions, clipping, quadrature.
+
+Conventions are limn's (and Mitsuba 3's): right-handed world, camera space with +X to the left of the
+image, +Y up, +Z along the view; film positions in pixels, row 0 on top. Everything is double.
+"""
+import copy
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass
+class Shape:
+    """A polygon mesh. vertices: V by 3; faces: planar convex loops, counter-clockwise from outside."""
+
+    vertices: np.ndarray
+    faces: list
+    bsdf: "Bsdf" = None
+    emitter_id: str = ""
+    radiance: np.ndarray = None  # 3, from the front of every face; None if no emitter
+    writer: str = "obj"  # "obj", "split" (24-vertex style with normals), "floor" (a rectangle)
+    face_normals: bool = True
+    hole: list = field(default_factory=list)  # loops that would close an open convex mesh
+
+    def face(self, k):
+        return self.vertices[self.faces[k]]
+
+    def center(self):
+        return (self.vertices.min(axis=0) + self.vertices.max(axis=0)) / 2
+
+
+@dataclass
+class Bsdf:
+    """kind: diffuse, ggx or beckmann (roughconductor with eta 0, k 1, so Fresnel = 1)."""
+
+    id: str
+    kind: str = "diffuse"
+    reflectance: np.ndarray = None
+    alpha: float = 0.0
+
+
+@dataclass
+class Camera:
+    origin: np.ndarray
+    target: np.ndarray
+    up_hint: np.ndarray
+    fov: float  # degrees, along x
+    width: int
+    height: int
+    turn: np.ndarray = field(default_factory=lambda: np.eye(3))  # applied to the axes after lookat
+    shift: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    filter: str = "box"
+
+    def axes(self):
+        """Rows: left, up, forward."""
+        forward = unit(self.target - self.origin)
+        left = unit(np.cross(self.up_hint, forward))
+        return np.stack([left, np.cross(forward, left), forward]) @ self.turn.T
+
+    def pinhole(self):
+        return self.origin + self.shift
+
+    def directions(self, film):
+        """film: N by 2 [pixels] -> N by 3 unit directions."""
+        t = np.tan(np.radians(self.fov) / 2)
+        x = (1 - 2 * film[:, 0] / self.width) * t
+        y = (1 - 2 * film[:, 1] / self.height) * t * self.height / self.width
+        return unit(np.stack([x, y, np.ones_like(x)], axis=1) @ self.axes())
+
+    def project(self, points):
+        """points: N by 3 in front of the pinhole -> N by 2 film positions [pixels]."""
+        local = (points - self.pinhole()) @ self.axes().T
+        t = np.tan(np.radians(self.fov) / 2)
+        xy = local[:, :2] / local[:, 2:] / t
+        xy[:, 1] *= self.width / self.height
+        return (1 - xy) / 2 * np.array([self.width, self.height])
+
+
+@dataclass
+class Scene:
+    """name: of the XML file; shapes by id; environment: radiance (3) or None."""
+
+    name: str
+    camera: Camera
+    shapes: dict
+    max_depth: int
+    environment: np.ndarray = None
+    velocities: dict = field(default_factory=dict)  # FILE -> V by 3 velocity field
+
+
+def unit(v):
+    return v / np.linalg.norm(v, axis=-1, keepdims=True)
+
+
+def rotation(axis, angle):
+    """Right-handed rotation by `angle` radians about world axis 0, 1 or 2."""
+    c, s = np.cos(angle), np.sin(angle)
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    m = np.eye(3)
+    m[i, i], m[i, j], m[j, i], m[j, j] = c, -s, s, c
+    return m
+
+
+def moved(scene, name, step):
+    """A copy of the scene with the parameter called `name` (limn's names) moved by `step`."""
+    scene = copy.deepcopy(scene)
+    owner, what, *rest = name.split(".", 2)
+    axis = "xyz".find(rest[0]) if rest else -1
+    if owner == "sensor":
+        move_camera(scene.camera, what, axis, step)
+    elif what in ("reflectance", "alpha"):
+        bsdf = next(s.bsdf for s in scene.shapes.values() if s.bsdf and s.bsdf.id == owner)
+        setattr(bsdf, what, getattr(bsdf, what) + step)
+    elif what == "radiance":
+        if owner == "environment":
+            scene.environment = scene.environment + step
+        for shape in scene.shapes.values():
+            if shape.emitter_id == owner:
+                shape.radiance = shape.radiance + step
+    else:
+        move_shape(scene, scene.shapes[owner], name.split(".", 1)[1], axis, step)
+    return scene
+
+
+def move_camera(camera, what, axis, step):
+    if what == "fov":
+        camera.fov += step
+    elif what == "translate":
+        camera.shift[axis] += step
+    elif what == "rotate":
+        camera.turn = rotation(axis, step) @ camera.turn
+    else:
+        raise ValueError(what)
+
+
+def move_shape(scene, shape, what, axis, step):
+    center = shape.center()
+    if what.startswith("vertex_positions:"):
+        shape.vertices = shape.vertices + step * scene.velocities[what.split(":")[1]]
+    elif what.startswith("translate"):
+        shape.vertices[:, axis] += step
+    elif what.startswith("rotate"):
+        shape.vertices = center + (shape.vertices - center) @ rotation(axis, step).T
+    elif what == "scale":
+        shape.vertices = center + (shape.vertices - center) * (1 + step)
+    else:
+        raise ValueError(what)
+
+
+def loop_normal(loop):
+    """Unit normal of a planar convex loop, towards the side from which it is counter-clockwise."""
+    return unit(np.cross(loop[1] - loop[0], loop[2] - loop[0]))
+
+
+def hit_plane(camera, film, loop):
+    """Where the camera's rays through `film` (N by 2) meet the plane of `loop`: N by 3."""
+    normal, origin, d = loop_normal(loop), camera.pinhole(), camera.directions(film)
+    t = np.dot(loop[0] - origin, normal) / (d @ normal)
+    assert np.all(t > 0)
+    return origin + t[:, None] * d
+
+
+def clip(polygon, normal, offset):
+    """The part of a convex polygon (K by D) where x.normal >= offset (Sutherland-Hodgman 1974)."""
+    if len(polygon) == 0:
+        return polygon
+    d = polygon @ normal - offset
+    out = []
+    for k in range(len(polygon)):
+        m = (k + 1) % len(polygon)
+        if d[k] >= 0:
+            out.append(polygon[k])
+        if (d[k] >= 0) != (d[m] >= 0):
+            out.append(polygon[k] + (polygon[m] - polygon[k]) * (d[k] / (d[k] - d[m])))
+    return np.array(out) if len(out) >= 3 else np.zeros((0, polygon.shape[1]))
+
+
+def clip_box(polygon, lower, upper):
+    """A convex planar polygon clipped to lower <= (x, y) <= upper."""
+    for axis in (0, 1):
+        normal = np.eye(2)[axis]
+        polygon = clip(clip(polygon, normal, lower[axis]), -normal, -upper[axis])
+    return polygon
+
+
+def clip_convex(polygon, clipper):
+    """The intersection of two convex planar polygons of any orientation."""
+    center = clipper.mean(axis=0)
+    for a, b in zip(clipper, np.roll(clipper, -1, axis=0)):
+        normal = np.array([a[1] - b[1], b[0] - a[0]])
+        normal = normal * np.sign(np.dot(center - a, normal))
+        polygon = clip(polygon, normal, np.dot(a, normal))
+    return polygon
+
+
+def gauss(n):
+    """Gauss-Legendre on [0, 1]: nodes and weights that sum to 1."""
+    x, w = np.polynomial.legendre.leggauss(n)
+    return (x + 1) / 2, w / 2
+
+
+def square_rule(n):
+    """Nodes (n^2 by 2) and weights of the tensor rule on the unit square."""
+    x, w = gauss(n)
+    u, v = np.meshgrid(x, x, indexing="ij")
+    return np.stack([u.ravel(), v.ravel()], axis=1), np.outer(w, w).ravel()
+
+
+def loop_rule(loop, n):
+    """Nodes (M by D) and weights with sum = area, over a planar convex loop (K by D, D = 2 or 3).
+
+    A parallelogram takes the tensor rule; any other loop is fanned into triangles, each with the
+    rule of the square collapsed at one corner (Duffy 1982).
+    """
+    uv, w = square_rule(n)
+    u, v = uv[:, :1], uv[:, 1:]
+    if len(loop) == 4 and np.allclose(loop[0] + loop[2], loop[1] + loop[3], rtol=0, atol=1e-12):
+        a, b = loop[1] - loop[0], loop[3] - loop[0]
+        return loop[0] + u * a + v * b, w * span(a, b)
+    nodes, weights = [], []
+    for k in range(1, len(loop) - 1):
+        a, b = loop[k] - loop[0], loop[k + 1] - loop[0]
+        nodes.append(loop[0] + u * (a + v * (b - a)))
+        weights.append(w * u[:, 0] * span(a, b))
+    return np.concatenate(nodes), np.concatenate(weights)
+
+
+def span(a, b):
+    """Area of the parallelogram of two vectors (2D or 3D)."""
+    return np.sqrt(max(np.dot(a, a) * np.dot(b, b) - np.dot(a, b) ** 2, 0.0))

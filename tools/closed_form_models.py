@@ -1,0 +1,191 @@
+"""What each kind of scene's picture is, in closed form, with the three terms kept apart.
+
+A model's image(domain, shade, outline, order) takes the scene three times, so that a parameter can
+be moved in one copy alone (directions omega are held fixed in solid angle while it moves):
+  domain   decides what the camera's rays meet first:            its derivative is the camera term,
+  shade    holds normals, directions to the viewer, BSDFs, radiances:             interior term,
+  outline  holds shading points and all outlines seen from them:                  boundary term.
+All three moved together give the picture of the moved scene, so the terms add up to its derivative.
+`order` is the number of Gauss nodes per axis. Images are height by width by 3.
+"""
+import numpy as np
+
+from closed_form_geometry import (clip, clip_box, clip_convex, hit_plane, loop_normal, loop_rule,
+                                  square_rule)
+from closed_form_radiance import (Filter, convex_vector, lobe_over_polygon, polygon_area,
+                                  polygon_vector)
+
+
+class FloorModel:
+    """The camera sees nothing but the face of shape "floor": a mean of radiance() over pixels."""
+
+    def image(self, domain, shade, outline, order):
+        camera = domain.camera
+        nodes, weights = square_rule(order)
+        result = np.zeros((camera.height, camera.width, 3))
+        for row in range(camera.height):
+            for column in range(camera.width):
+                film = nodes + [column, row]
+                p = hit_plane(outline.camera, film, outline.shapes["floor"].face(0))
+                viewer = -shade.camera.directions(film)
+                result[row, column] = weights @ self.radiance(shade, outline, p, viewer, order)
+        return result
+
+
+def floor_normal(scene):
+    return loop_normal(scene.shapes["floor"].face(0))
+
+
+class HiddenSky(FloorModel):
+    """A constant sky of radiance L_e partly hidden by a black convex mesh, over a diffuse plane.
+
+    L = rho / pi L_e (pi - n.Phi), Phi the mesh's outline by Lambert's formula.
+    """
+
+    def radiance(self, shade, outline, p, viewer, order):
+        n = floor_normal(shade)
+        hidden = convex_vector(p, outline.shapes["object"]) @ n
+        rho = shade.shapes["floor"].bsdf.reflectance
+        return (np.pi - hidden)[:, None] * rho / np.pi * shade.environment
+
+
+class LampOnFloor(FloorModel):
+    """A polygonal lamp over a diffuse plane: L = rho / pi L_e n.Phi."""
+
+    def radiance(self, shade, outline, p, viewer, order):
+        phi = polygon_vector(p, lamp_loop(outline, p))
+        lamp, floor = shade.shapes["lamp"], shade.shapes["floor"]
+        return (phi @ floor_normal(shade))[:, None] * floor.bsdf.reflectance / np.pi * lamp.radiance
+
+
+def lamp_loop(scene, p):
+    """The lamp's loop; all points p (N by 3) must be on its front."""
+    loop = scene.shapes["lamp"].face(0)
+    assert np.all((p - loop[0]) @ loop_normal(loop) > 0), "behind the lamp"
+    return loop
+
+
+class HalfHiddenLamp(FloorModel):
+    """The same with the lamp cut by the edge between corners 0 and 1 of shape "screen".
+
+    From p the screen hides all that lies on its side of the plane through p and that edge, so Phi
+    is that of the lamp's polygon clipped by the plane.
+    """
+
+    def radiance(self, shade, outline, p, viewer, order):
+        lamp, screen = lamp_loop(outline, p), outline.shapes["screen"].face(0)
+        phi, patterns = np.zeros_like(p), set()
+        for k, point in enumerate(p):
+            side = np.cross(screen[0] - point, screen[1] - point)
+            side = side * -np.sign(np.dot(screen[2] - point, side))
+            patterns.add(tuple((lamp - point) @ side > 0))
+            visible = clip(lamp, side, np.dot(point, side))
+            phi[k] = polygon_vector(point[None], visible)[0]
+        assert len(patterns) == 1, "the clipped outline changes within a pixel"
+        emitter, floor = shade.shapes["lamp"], shade.shapes["floor"]
+        irradiance = (phi @ floor_normal(shade))[:, None] * emitter.radiance
+        return irradiance * floor.bsdf.reflectance / np.pi
+
+
+class LampInGloss(FloorModel):
+    """A lamp over a rough conductor: L = L_e times the integral of f_s over the lamp's outline."""
+
+    def radiance(self, shade, outline, p, viewer, order):
+        emitted = shade.shapes["lamp"].radiance
+        return lobe_over_polygon(p, floor_normal(shade), viewer, shade.shapes["floor"].bsdf,
+                                 lamp_loop(outline, p), 4 * order, lambda x: emitted)
+
+
+class WedgeInGloss(FloorModel):
+    """Two diffuse faces that meet in a sharp edge, over a glossy floor; a lamp lights face 0 only.
+
+    Seen from p face 0 has L_A(x) = rho_A / pi L_e n_A.Phi_lamp(x) and face 1 is black, so the edge
+    between them, both seen from the front, carries the jump L_A(x). The floor sees the lamp's back.
+    """
+
+    def radiance(self, shade, outline, p, viewer, order):
+        wedge, lamp = outline.shapes["wedge"], outline.shapes["lamp"].face(0)
+        lit, dark = wedge.face(0), wedge.face(1)
+        assert np.all((p - lamp[0]) @ loop_normal(lamp) < 0), "the floor sees the lamp's front"
+        assert np.all((lamp - dark[0]) @ loop_normal(dark) < 0), "the dark face sees the lamp"
+        assert np.all((p - dark[0]) @ loop_normal(dark) > 0), "the dark face is not seen"
+        n = loop_normal(shade.shapes["wedge"].face(0))
+        rho, emitted = shade.shapes["wedge"].bsdf.reflectance, shade.shapes["lamp"].radiance
+
+        def reflected(x):
+            irradiance = polygon_vector(x, lamp_loop(outline, x)) @ n
+            return irradiance[:, None] * rho / np.pi * emitted
+
+        return lobe_over_polygon(p, floor_normal(shade), viewer, shade.shapes["floor"].bsdf, lit,
+                                 4 * order, reflected)
+
+
+def film_loop(scene, loop):
+    """A face as a polygon on the film [pixels]."""
+    return scene.camera.project(loop)
+
+
+class LampsInView:
+    """Shapes "near" and "far" emit, near hides part of far, before a constant sky.
+
+    I = L_sky + (L_near - L_sky) c(near) + (L_far - L_sky) (c(far) - c(near and far)), where c is
+    the integral of the reconstruction filter over a polygon on the film.
+    """
+
+    def image(self, domain, shade, outline, order):
+        camera, sky = domain.camera, shade.environment
+        near = film_loop(domain, domain.shapes["near"].face(0))
+        far = film_loop(domain, domain.shapes["far"].face(0))
+        both, cover = clip_convex(far, near), Filter(camera.filter).over_polygon
+        result = np.zeros((camera.height, camera.width, 3))
+        for row in range(camera.height):
+            for column in range(camera.width):
+                at = np.array([column + 0.5, row + 0.5])
+                shown = cover(far, at) - cover(both, at)
+                result[row, column] = (sky + (shade.shapes["near"].radiance - sky) * cover(near, at)
+                                       + (shade.shapes["far"].radiance - sky) * shown)
+        return result
+
+
+class ConvexInView:
+    """A convex diffuse mesh under a constant sky of radiance L_e, which is the background too.
+
+    No point of it sees anything but sky above its own plane: its radiance is rho L_e exactly, and
+    I = L_e + (rho - 1) L_e c(outline). The outline's part is summed over its front faces.
+    """
+
+    def image(self, domain, shade, outline, order):
+        camera, sky, shape = domain.camera, shade.environment, domain.shapes["object"]
+        front = [film_loop(domain, shape.vertices[f]) for f in shape.faces
+                 if np.dot(camera.pinhole() - shape.vertices[f][0],
+                           loop_normal(shape.vertices[f])) > 0]
+        rho = shade.shapes["object"].bsdf.reflectance
+        result = np.zeros((camera.height, camera.width, 3))
+        for row in range(camera.height):
+            for column in range(camera.width):
+                box = np.array([column, row])
+                covered = sum(polygon_area(clip_box(f, box, box + 1)) for f in front)
+                result[row, column] = sky + (rho - 1) * sky * covered
+        return result
+
+
+class ReceiverInView:
+    """A small diffuse face "receiver" before black, lit by a lamp: the mean over pixels of
+    rho / pi L_e n.Phi(p) inside the receiver's outline on the film, 0 outside."""
+
+    def image(self, domain, shade, outline, order):
+        camera = domain.camera
+        seen = film_loop(domain, domain.shapes["receiver"].face(0))
+        n = loop_normal(shade.shapes["receiver"].face(0))
+        scale = shade.shapes["receiver"].bsdf.reflectance / np.pi * shade.shapes["lamp"].radiance
+        result = np.zeros((camera.height, camera.width, 3))
+        for row in range(camera.height):
+            for column in range(camera.width):
+                box = np.array([column, row])
+                part = clip_box(seen, box, box + 1)
+                if len(part):
+                    film, weights = loop_rule(part, order)
+                    p = hit_plane(outline.camera, film, outline.shapes["receiver"].face(0))
+                    phi = polygon_vector(p, lamp_loop(outline, p))
+                    result[row, column] = np.dot(weights, phi @ n) * scale
+        return result

@@ -1,0 +1,209 @@
+"""The closed-form scenes: geometry, materials and the parameters to differentiate.
+
+Coordinates are dyadic fractions, exact in single precision.
+"""
+import numpy as np
+
+import closed_form_models as models
+from closed_form_geometry import Bsdf, Camera, Scene, Shape
+
+MOVES = ["translate.x", "translate.y", "translate.z", "rotate.x", "rotate.y", "rotate.z"]
+SENSOR = [f"sensor.{m}" for m in MOVES] + ["sensor.fov"]
+FLOOR_MOVES = ["floor.translate.y", "floor.rotate.x", "floor.rotate.z"]
+FLOOR_RHO = [0.75, 0.5, 0.25]
+
+
+def vector(*values):
+    return np.array(values, dtype=float)
+
+
+def moves_of(shape, *more):
+    return [f"{shape}.{m}" for m in MOVES + ["scale"] + list(more)]
+
+
+def parallelogram(corner, a, b):
+    """One face, counter-clockwise seen from the side of a x b."""
+    c, a, b = vector(*corner), vector(*a), vector(*b)
+    return Shape(np.stack([c, c + a, c + a + b, c + b]), [[0, 1, 2, 3]])
+
+
+def floor(kind="diffuse", alpha=0.0):
+    """The rectangle [-8, 8]^2 at y = 0, normal +y."""
+    shape = Shape(vector(-8, 0, 8, 8, 0, 8, 8, 0, -8, -8, 0, -8).reshape(4, 3), [[0, 1, 2, 3]])
+    shape.writer = "floor"
+    rho = vector(*FLOOR_RHO) if kind == "diffuse" else None
+    shape.bsdf = Bsdf("floor_bsdf", kind, rho, alpha)
+    return shape
+
+
+def lamp(shape, radiance, name="lamp"):
+    shape.emitter_id = f"{name}_emitter"
+    shape.radiance = vector(*radiance)
+    return shape
+
+
+def floor_camera(size=(2, 2)):
+    """Looks down at the floor around (0.75, 0, 0.25) and sees nothing else."""
+    return Camera(vector(3, 3, 0.5), vector(0.75, 0, 0.25), vector(0, 1, 0), 4.0, *size)
+
+
+def octahedron():
+    vertices = vector(0.75, 1.5, 0.125, -0.625, 1.625, 0, 0.125, 2.25, 0.125, 0, 0.875, -0.125,
+                      0.125, 1.5, 0.75, -0.125, 1.375, -0.625).reshape(6, 3)
+    faces = [[2, 4, 0], [2, 1, 4], [2, 5, 1], [2, 0, 5], [3, 0, 4], [3, 4, 1], [3, 1, 5], [3, 5, 0]]
+    return Shape(vertices, faces)
+
+
+BOX_FACES = {"-x": [0, 4, 6, 2], "+x": [1, 3, 7, 5], "-y": [0, 1, 5, 4], "+y": [2, 6, 7, 3],
+             "-z": [0, 2, 3, 1], "+z": [4, 5, 7, 6]}
+
+
+def box(lower, upper, missing=()):
+    """An axis-aligned box; corner k is upper along x, y, z where bits 0, 1, 2 of k are set."""
+    bits = np.array([[k & 1, k >> 1 & 1, k >> 2 & 1] for k in range(8)])
+    vertices = np.where(bits == 1, vector(*upper), vector(*lower))
+    shape = Shape(vertices, [f for name, f in BOX_FACES.items() if name not in missing])
+    shape.hole = [BOX_FACES[name] for name in missing]
+    return shape
+
+
+def hidden_sky(name, occluder, *more):
+    scene = Scene(f"{name}.xml", floor_camera(), {"floor": floor(), "object": occluder}, 2,
+                  vector(1, 0.5, 2))
+    names = moves_of("object") + FLOOR_MOVES + SENSOR
+    names += ["floor_bsdf.reflectance", "environment.radiance", *more]
+    return scene, models.HiddenSky(), names
+
+
+def convex_over_plane():
+    scene, model, names = hidden_sky("convex_over_plane", octahedron())
+    velocity = np.zeros((6, 3))
+    velocity[4] = [0.5, -0.25, 1]
+    scene.velocities["convex_over_plane_velocity.txt"] = velocity
+    names.append("object.vertex_positions:convex_over_plane_velocity.txt")
+    return scene, model, names
+
+
+def triangle_over_plane():
+    triangle = Shape(vector(-0.5, 1.25, -0.5, 0.25, 1.5, 0.75, 0.75, 1, -0.25).reshape(3, 3),
+                     [[0, 1, 2]])
+    triangle.hole = [[0, 2, 1]]
+    scene, model, names = hidden_sky("triangle_over_plane", triangle)
+    scene.velocities["triangle_over_plane_velocity.txt"] = vector(0, 0, 0, 1, 0.5, 0, 0, 0,
+                                                                  -1).reshape(3, 3)
+    names.append("object.vertex_positions:triangle_over_plane_velocity.txt")
+    return scene, model, names
+
+
+def open_box_over_plane():
+    return hidden_sky("open_box_over_plane",
+                      box((-0.5, 1, -0.25), (0.25, 1.75, 0.75), missing=["-y"]))
+
+
+def sideways_box_over_plane():
+    return hidden_sky("sideways_box_over_plane",
+                      box((-0.5, 1, -0.25), (0.25, 1.75, 0.75), missing=["+x"]))
+
+
+def tilted_lamp():
+    return lamp(parallelogram((-1, 2, -0.5), (1, 0.25, 0), (0, 0.125, 1)), (4, 2, 1))
+
+
+LAMP_NAMES = (moves_of("lamp") + FLOOR_MOVES + SENSOR
+              + ["floor_bsdf.reflectance", "lamp_emitter.radiance"])
+
+
+def lamp_over_plane():
+    scene = Scene("lamp_over_plane.xml", floor_camera(), {"floor": floor(), "lamp": tilted_lamp()},
+                  2)
+    return scene, models.LampOnFloor(), LAMP_NAMES
+
+
+def triangle_lamp_over_plane():
+    shape = lamp(Shape(vector(-1, 1.5, 0.75, -0.75, 2, -0.75, 0.25, 1.75, 0.25).reshape(3, 3),
+                       [[0, 1, 2]]), (4, 2, 1))
+    scene = Scene("triangle_lamp_over_plane.xml", floor_camera(), {"floor": floor(), "lamp": shape},
+                  2)
+    return scene, models.LampOnFloor(), LAMP_NAMES
+
+
+def half_hidden_lamp():
+    screen = parallelogram((0.25, 1, -4), (-0.25, 0, 8), (-2, 0, 0))
+    shapes = {"floor": floor(), "lamp": tilted_lamp(), "screen": screen}
+    scene = Scene("half_hidden_lamp.xml", floor_camera(), shapes, 2)
+    return scene, models.HalfHiddenLamp(), moves_of("screen") + LAMP_NAMES
+
+
+def lamps_in_view(kind):
+    camera = Camera(vector(0.25, 0.5, -4), vector(0.125, 0.25, 0), vector(0, 1, 0), 36, 4, 4,
+                    filter=kind)
+    near = lamp(parallelogram((-0.5, -0.75, -0.25), (0.25, 1.25, 0.25), (1, -0.25, 0.5)),
+                (3, 1, 0.5), "near")
+    far = lamp(parallelogram((0, -0.5, 1), (0.125, 1.25, 0), (1.25, 0.25, -0.25)), (0.5, 2, 4),
+               "far")
+    scene = Scene(f"lamps_in_view_{kind}.xml", camera, {"near": near, "far": far}, 1,
+                  vector(0.25, 0.5, 1))
+    names = SENSOR + moves_of("near") + moves_of("far")
+    names += ["near_emitter.radiance", "far_emitter.radiance", "environment.radiance"]
+    return scene, models.LampsInView(), names
+
+
+def lamp_in_gloss(kind, alpha):
+    scene = Scene(f"lamp_in_{kind}.xml", floor_camera(),
+                  {"floor": floor(kind, alpha), "lamp": tilted_lamp()}, 2)
+    names = [n for n in LAMP_NAMES if n != "floor_bsdf.reflectance"] + ["floor_bsdf.alpha"]
+    return scene, models.LampInGloss(), names
+
+
+def cube_in_sky(name, face_normals):
+    cube = box((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5))
+    cube.bsdf = Bsdf("object_bsdf", "diffuse", vector(0.6, 0.6, 0.6))
+    cube.writer, cube.face_normals = "split", face_normals
+    camera = Camera(vector(1.25, 1, -2.5), vector(0.0625, 0, 0), vector(0, 1, 0), 36, 4, 4)
+    scene = Scene(f"{name}.xml", camera, {"object": cube}, 2, vector(1, 1, 1))
+    names = moves_of("object") + SENSOR + ["object_bsdf.reflectance", "environment.radiance"]
+    return scene, models.ConvexInView(), names
+
+
+def receiver_in_view():
+    receiver = parallelogram((-0.5, 0, -0.5), (0.125, 0.25, 1), (1, 0.125, -0.125))
+    receiver.bsdf = Bsdf("receiver_bsdf", "diffuse", vector(0.875, 0.75, 0.5))
+    camera = Camera(vector(0.5, 2, -2.25), vector(0.0625, 0.125, 0), vector(0, 1, 0), 28, 4, 4)
+    shapes = {"receiver": receiver,
+              "lamp": lamp(parallelogram((-1, 2.5, -0.25), (1, 0.25, 0), (0, 0.125, 1)), (4, 2, 1))}
+    scene = Scene("receiver_in_view.xml", camera, shapes, 2)
+    names = moves_of("receiver") + moves_of("lamp") + SENSOR
+    names += ["receiver_bsdf.reflectance", "lamp_emitter.radiance"]
+    return scene, models.ReceiverInView(), names
+
+
+def wedge_in_gloss():
+    wedge = Shape(vector(-0.125, 2, -0.75, 0, 2.125, 0.75, -1, 2.75, -0.75, -0.875, 2.875, 0.75,
+                         0.75, 2.875, -0.75, 0.875, 3, 0.75).reshape(6, 3),
+                  [[0, 1, 3, 2], [0, 4, 5, 1]])
+    wedge.bsdf = Bsdf("wedge_bsdf", "diffuse", vector(0.75, 0.5, 1))
+    shapes = {"floor": floor("ggx", 0.375), "wedge": wedge,
+              "lamp": lamp(parallelogram((-3, 1, -0.5), (0, 0, 1), (0.75, -0.125, 0)), (16, 8, 4))}
+    scene = Scene("wedge_in_gloss.xml", floor_camera(), shapes, 3)
+    names = moves_of("wedge") + LAMP_NAMES + ["wedge_bsdf.reflectance", "floor_bsdf.alpha"]
+    return scene, models.WedgeInGloss(), [n for n in names if n != "floor_bsdf.reflectance"]
+
+
+SCENES = {
+    "convex_over_plane": convex_over_plane,
+    "lamp_over_plane": lamp_over_plane,
+    "triangle_lamp_over_plane": triangle_lamp_over_plane,
+    "half_hidden_lamp": half_hidden_lamp,
+    "lamps_in_view_box": lambda: lamps_in_view("box"),
+    "lamps_in_view_tent": lambda: lamps_in_view("tent"),
+    "lamps_in_view_gaussian": lambda: lamps_in_view("gaussian"),
+    "lamp_in_ggx": lambda: lamp_in_gloss("ggx", 0.1),
+    "lamp_in_beckmann": lambda: lamp_in_gloss("beckmann", 0.3),
+    "cube_in_sky": lambda: cube_in_sky("cube_in_sky", True),
+    "split_cube_in_sky": lambda: cube_in_sky("split_cube_in_sky", False),
+    "receiver_in_view": receiver_in_view,
+    "triangle_over_plane": triangle_over_plane,
+    "open_box_over_plane": open_box_over_plane,
+    "sideways_box_over_plane": sideways_box_over_plane,
+    "wedge_in_gloss": wedge_in_gloss,
+}
