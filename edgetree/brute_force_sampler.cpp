@@ -9,9 +9,13 @@
 namespace limn {
 namespace {
 
-// Planes of a mesh, one array per coefficient, so that eight are tested at once.
-struct PlaneArrays {
+// What listing needs of a mesh, packed. Planes: one array per coefficient, so that eight are tested
+// at once. Edges: the two faces, and the sides that p must be on, of either face, for the edge to
+// be a candidate (see is_candidate).
+struct Packed {
   std::vector<double> x, y, z, offset;
+  std::vector<std::array<uint32_t, 2>> faces;
+  std::vector<uint8_t> needed;
 };
 
 enum Side : uint8_t { kFront = 1, kBack = 2 };  // both bits: on the plane, to rounding
@@ -34,7 +38,8 @@ bool is_still(const Vec3<Lanes>& v) { return is_zero(v.x) && is_zero(v.y) && is_
 struct Listing {
   uint64_t sampler = 0;
   EdgeQuery query;
-  std::vector<uint8_t> sides;
+  std::vector<uint8_t> sides;   // of p, by face of one object
+  std::vector<uint32_t> found;  // candidates of one object
   std::vector<EdgeId> edges;
   std::vector<double> cumulative;  // of their weights
   double total() const { return cumulative.empty() ? 0 : cumulative.back(); }
@@ -43,15 +48,7 @@ struct Listing {
 class BruteForceSampler final : public EdgeSampler {
  public:
   explicit BruteForceSampler(const EdgeSamplerInput& input) : input_(input), serial_(++serials_) {
-    for (const EdgeMesh& mesh : input.objects) {
-      PlaneArrays& planes = planes_.emplace_back();
-      for (const Plane& plane : mesh.planes) {
-        planes.x.push_back(plane.n.x);
-        planes.y.push_back(plane.n.y);
-        planes.z.push_back(plane.n.z);
-        planes.offset.push_back(plane.offset);
-      }
-    }
+    for (const EdgeMesh& mesh : input.objects) packed_.push_back(pack(mesh));
   }
 
   bool sample(const EdgeQuery& query, Rng& rng, EdgeSample& sample) const override {
@@ -96,54 +93,81 @@ class BruteForceSampler final : public EdgeSampler {
     listing.cumulative.clear();
     for (uint32_t object = 0; object < input_.objects.size(); ++object) {
       if (input_.objects[object].tangents.empty() && is_still(query.velocity)) continue;
-      find_sides(object, query.p, listing.sides);
       list_object(object, query, listing);
     }
     return listing;
   }
 
-  void find_sides(uint32_t object, const Vec3d& p, std::vector<uint8_t>& sides) const {
-    const PlaneArrays& planes = planes_[object];
-    const size_t count = planes.x.size();
-    const double error = distance_error(input_.objects[object], p);
-    sides.resize(std::max(sides.size(), count));
-    uint8_t* out = sides.data();
-    const double *x = planes.x.data(), *y = planes.y.data(), *z = planes.z.data(),
-                 *offset = planes.offset.data();
+  static Packed pack(const EdgeMesh& mesh) {
+    Packed packed;
+    for (const Plane& plane : mesh.planes) {
+      packed.x.push_back(plane.n.x);
+      packed.y.push_back(plane.n.y);
+      packed.z.push_back(plane.n.z);
+      packed.offset.push_back(plane.offset);
+    }
+    for (const Edge& edge : mesh.edges) {
+      packed.faces.push_back({edge.faces[0], edge.faces[1] == kNoFace ? 0 : edge.faces[1]});
+      packed.needed.push_back(needed_sides(mesh, edge.edge_class));
+    }
+    return packed;
+  }
+
+  static uint8_t needed_sides(const EdgeMesh& mesh, EdgeClass edge_class) {
+    switch (edge_class) {
+      case EdgeClass::kSmooth:
+      case EdgeClass::kFlat:
+        return kFront | kBack;
+      case EdgeClass::kSharp:
+        return mesh.one_sided_closed ? kFront : 0;
+      default:
+        return 0;
+    }
+  }
+
+  static void find_sides(const Packed& packed, double error, const Vec3d& p, uint8_t* sides) {
+    const double *x = packed.x.data(), *y = packed.y.data(), *z = packed.z.data(),
+                 *offset = packed.offset.data();
+    const size_t count = packed.x.size();
     for (size_t f = 0; f < count; ++f) {
       const double d = x[f] * p.x + y[f] * p.y + z[f] * p.z + offset[f];
-      out[f] = static_cast<uint8_t>((d >= -error ? kFront : 0) | (d <= error ? kBack : 0));
+      sides[f] = static_cast<uint8_t>((d >= -error ? kFront : 0) | (d <= error ? kBack : 0));
     }
+  }
+
+  // Writes the candidates' indices and returns their number; no branch depends on the data.
+  static size_t find_candidates(const Packed& packed, const uint8_t* sides, uint32_t* found) {
+    size_t count = 0;
+    for (uint32_t e = 0; e < packed.faces.size(); ++e) {
+      const auto [a, b] = packed.faces[e];
+      found[count] = e;
+      count += ((sides[a] | sides[b]) & packed.needed[e]) == packed.needed[e];
+    }
+    return count;
   }
 
   void list_object(uint32_t object, const EdgeQuery& query, Listing& listing) const {
     const EdgeMesh& mesh = input_.objects[object];
+    const Packed& packed = packed_[object];
+    listing.sides.resize(std::max(listing.sides.size(), packed.x.size()));
+    listing.found.resize(std::max(listing.found.size(), packed.faces.size() + 1));
+    find_sides(packed, distance_error(mesh, query.p), query.p, listing.sides.data());
+    const size_t count = find_candidates(packed, listing.sides.data(), listing.found.data());
     const LobeBound lobe(query.n, query.wi, query.lobe);
-    for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
-      if (!is_listed(mesh, mesh.edges[e], listing.sides)) continue;
-      const EdgeId id{object, e};
+    for (size_t i = 0; i < count; ++i) {
+      const EdgeId id{object, listing.found[i]};
       if (is_own_edge(input_, query, id)) continue;
-      const EdgeBound bound(lobe, segment_of(mesh, e, query));
+      const EdgeBound bound(lobe, segment_of(mesh, id.edge, query));
       if (!(bound.total() > 0)) continue;
       listing.edges.push_back(id);
       listing.cumulative.push_back(listing.total() + bound.total());
     }
   }
 
-  // is_candidate, from the sides of all planes.
-  static bool is_listed(const EdgeMesh& mesh, const Edge& edge, const std::vector<uint8_t>& sides) {
-    if (edge.edge_class == EdgeClass::kBorder || edge.edge_class == EdgeClass::kIrregular)
-      return true;
-    const uint8_t a = sides[edge.faces[0]], b = sides[edge.faces[1]];
-    if (edge.edge_class == EdgeClass::kSharp)
-      return !mesh.one_sided_closed || ((a | b) & kFront) != 0;
-    return (a | b) == (kFront | kBack);
-  }
-
   static inline std::atomic<uint64_t> serials_{0};
   const EdgeSamplerInput& input_;
   uint64_t serial_;
-  std::vector<PlaneArrays> planes_;
+  std::vector<Packed> packed_;
 };
 
 }  // namespace

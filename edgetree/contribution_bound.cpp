@@ -95,7 +95,7 @@ EdgeBound::EdgeBound(const LobeBound& lobe, const EdgeSegment& segment) {
   cut(lobe);
   cumulative_[0] = 0;
   for (int i = 0; i < pieces_; ++i) {
-    weights_[i] = piece_bound(lobe, cuts_[i], cuts_[i + 1]);
+    weights_[i] = pieces_ == 1 ? whole_bound(lobe) : piece_bound(lobe, i);
     cumulative_[i + 1] = cumulative_[i] + weights_[i];
   }
   if (std::isfinite(cumulative_[pieces_])) total_ = cumulative_[pieces_];
@@ -125,67 +125,79 @@ bool EdgeBound::clip_to_horizon(const LobeBound& lobe, const EdgeSegment& s) {
 // Cuts at distances step * (2^k - 1) from where the arc comes closest to the lobe's axis; the step
 // is half the lobe's width, or half the sine of that closest angle if it is larger.
 void EdgeBound::cut(const LobeBound& lobe) {
-  angle_ = std::atan2(sin_angle_, dot(u_a_, u_b_));
   cuts_[0] = 0;
-  cuts_[pieces_ = 1] = angle_;
+  pieces_ = 1;
   const double peak_cosine = max_cosine(lobe.axis(), u_a_, u_b_);
   const double sine = std::sqrt(std::max(0.0, 1 - peak_cosine * peak_cosine));
   const double step = std::max({0.5 * lobe.width(), 0.5 * sine, 0x1.0p-26});
-  if (angle_ <= step) return;
+  if (length_squared(u_b_ - u_a_) <= step * step) return;
 
+  const double end = angle();
   tangent_ = normalize(cross(cross(u_a_, w_b_ - w_a_), u_a_));
   const double a = dot(lobe.axis(), u_a_), b = dot(lobe.axis(), u_b_);
   double peak = std::atan2(dot(lobe.axis(), tangent_), a);
-  if (peak < 0 || peak > angle_) peak = a > b ? 0 : angle_;
+  if (peak < 0 || peak > end) peak = a > b ? 0 : end;
   pieces_ = 0;
   int k = 0;
   while (peak - step * (std::exp2(k + 1) - 1) > 0) ++k;
   for (; k > 0; --k) add_cut(peak - step * (std::exp2(k) - 1));
   add_cut(peak);
-  for (k = 1; peak + step * (std::exp2(k) - 1) < angle_; ++k)
+  for (k = 1; peak + step * (std::exp2(k) - 1) < end; ++k)
     add_cut(peak + step * (std::exp2(k) - 1));
-  add_cut(angle_);
+  add_cut(end);
 }
 
 void EdgeBound::add_cut(double angle) {
   if (angle > cuts_[pieces_]) cuts_[++pieces_] = angle;
 }
 
-// Fraction of the clipped segment (0 at w_a, 1 at w_b) that is seen at an angle from u_a.
-double EdgeBound::fraction_at(double angle) const {
-  if (angle >= angle_) return 1;
+double EdgeBound::angle() const { return std::atan2(sin_angle_, dot(u_a_, u_b_)); }
+
+// A single piece has its end worked out only when it is needed: most bounds are never sampled.
+double EdgeBound::piece_end(int i) const { return pieces_ == 1 ? angle() : cuts_[i + 1]; }
+
+// Fraction of the clipped segment (0 at w_a, 1 at w_b) that is seen at an angle from u_a; end: the
+// angle of the whole arc.
+double EdgeBound::fraction_at(double angle, double end) const {
+  if (angle >= end) return 1;
   const double near = length_a_ * std::sin(angle);
-  return near / (near + length_b_ * std::sin(angle_ - angle));
+  return near / (near + length_b_ * std::sin(end - angle));
 }
 
-double EdgeBound::piece_bound(const LobeBound& lobe, double begin, double end) const {
-  const bool whole = begin == 0 && end == angle_;
-  const double s_a = whole ? 0 : fraction_at(begin), s_b = whole ? 1 : fraction_at(end);
-  const auto direction = [&](double angle) {
-    return u_a_ * std::cos(angle) + tangent_ * std::sin(angle);
-  };
-  const Vec3d a = whole ? u_a_ : direction(begin), b = whole ? u_b_ : direction(end);
-  const auto length_at = [&](double s) { return length(w_a_ + (w_b_ - w_a_) * s); };
-  const double l_a = whole ? length_a_ : length_at(s_a), l_b = whole ? length_b_ : length_at(s_b);
+double EdgeBound::whole_bound(const LobeBound& lobe) const {
+  return lobe.over_arc(u_a_, u_b_) * jacobian_bound({0, length_a_, u_a_}, {1, length_b_, u_b_});
+}
 
+double EdgeBound::piece_bound(const LobeBound& lobe, int i) const {
+  const auto point_at = [&](double angle) {
+    const double s = fraction_at(angle, cuts_[pieces_]);
+    return Point{s, length(w_a_ + (w_b_ - w_a_) * s),
+                 u_a_ * std::cos(angle) + tangent_ * std::sin(angle)};
+  };
+  const Point a = point_at(cuts_[i]), b = point_at(cuts_[i + 1]);
+  return lobe.over_arc(a.u, b.u) * jacobian_bound(a, b);
+}
+
+double EdgeBound::jacobian_bound(const Point& a, const Point& b) const {
   double determinants = 0;
   for (int i = 0; i < kLanes; ++i) {
     const double difference = determinant_b_[i] - determinant_a_[i];
-    determinants += std::max(std::fabs(determinant_a_[i] + difference * s_a),
-                             std::fabs(determinant_a_[i] + difference * s_b));
+    determinants += std::max(std::fabs(determinant_a_[i] + difference * a.s),
+                             std::fabs(determinant_a_[i] + difference * b.s));
   }
-  const double one_plus_cosine = 0.5 * length_squared(a + b);
+  const double one_plus_cosine = 0.5 * length_squared(a.u + b.u);
+  const double squares = a.length * a.length * b.length * b.length;
   const double integral =
-      (t_end_ - t_begin_) * (s_b - s_a) * (l_a + l_b) / (l_a * l_a * l_b * l_b * one_plus_cosine);
-  return lobe.over_arc(a, b) * determinants * integral;
+      (t_end_ - t_begin_) * (b.s - a.s) * (a.length + b.length) / (squares * one_plus_cosine);
+  return determinants * integral;
 }
 
 double EdgeBound::sample_t(double u_piece, double u_angle) const {
   const double* first = cumulative_.data() + 1;
   const double* found = std::upper_bound(first, first + pieces_, u_piece * total_);
   const int i = static_cast<int>(std::min<long>(found - first, pieces_ - 1));
-  const double angle = cuts_[i] + (cuts_[i + 1] - cuts_[i]) * u_angle;
-  return t_begin_ + (t_end_ - t_begin_) * fraction_at(angle);
+  const double angle_at = cuts_[i] + (piece_end(i) - cuts_[i]) * u_angle;
+  return t_begin_ + (t_end_ - t_begin_) * fraction_at(angle_at, angle());
 }
 
 double EdgeBound::pdf_t(double t) const {
@@ -193,11 +205,10 @@ double EdgeBound::pdf_t(double t) const {
   const double s = (t - t_begin_) / (t_end_ - t_begin_);
   const Vec3d w = w_a_ + (w_b_ - w_a_) * s;
   const double sine = s * length_b_ * sin_angle_;  // |u_a x w|
-  const double angle = std::atan2(sine, dot(u_a_, w));
-  const double* first = cuts_.data() + 1;
-  const int i = static_cast<int>(
-      std::min<long>(std::upper_bound(first, first + pieces_, angle) - first, pieces_ - 1));
-  const double pdf_angle = weights_[i] / (total_ * (cuts_[i + 1] - cuts_[i]));
+  const double angle_at = std::atan2(sine, dot(u_a_, w));
+  const double* inner = cuts_.data() + 1;
+  const int i = static_cast<int>(std::upper_bound(inner, inner + pieces_ - 1, angle_at) - inner);
+  const double pdf_angle = weights_[i] / (total_ * (piece_end(i) - cuts_[i]));
   // d angle / ds = |w_a x w_b| / |w|^2
   const double angle_per_t =
       length_a_ * length_b_ * sin_angle_ / (length_squared(w) * (t_end_ - t_begin_));

@@ -61,8 +61,17 @@ class EdgeBound {
   bool clip_to_horizon(const LobeBound& lobe, const EdgeSegment& segment);
   void cut(const LobeBound& lobe);
   void add_cut(double angle);
-  double piece_bound(const LobeBound& lobe, double angle_begin, double angle_end) const;
-  double fraction_at(double angle) const;
+  struct Point {
+    double s;  // fraction of the clipped segment
+    double length;
+    Vec3d u;  // direction from p
+  };
+  double whole_bound(const LobeBound& lobe) const;
+  double piece_bound(const LobeBound& lobe, int i) const;
+  double jacobian_bound(const Point& a, const Point& b) const;
+  double angle() const;  // of the whole arc
+  double piece_end(int i) const;
+  double fraction_at(double angle, double end) const;
 
   // The clipped segment, from w_a = w(t_begin) to w_b = w(t_end).
   Vec3d w_a_, w_b_, u_a_, u_b_;
@@ -70,11 +79,11 @@ class EdgeBound {
   double length_a_ = 0, length_b_ = 0;
   Lanes determinant_a_, determinant_b_;  // det(w_0, w_1, v) at the two ends; linear in t between
   double sin_angle_ = 0;                 // of the whole arc
-  double angle_ = 0;
-  Vec3d tangent_{};  // unit, at u_a towards u_b
+  Vec3d tangent_{};                      // unit, at u_a towards u_b
 
   int pieces_ = 0;
-  std::array<double, kMaxPieces + 1> cuts_;  // angles from u_a, ascending
+  std::array<double, kMaxPieces + 1>
+      cuts_;  // angles from u_a, ascending; the last only if there are several pieces
   std::array<double, kMaxPieces> weights_;
   std::array<double, kMaxPieces + 1> cumulative_;  // of the weights, from 0
   double total_ = 0;
