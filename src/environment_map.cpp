@@ -46,12 +46,6 @@ EnvironmentMap::EnvironmentMap(const Image& image)
   build_distribution();
 }
 
-double EnvironmentMap::cell_solid_angle(int row) const {
-  const double half = 0.5 * (polar_angle(row + 1) - polar_angle(row));
-  const double middle = 0.5 * (polar_angle(row + 1) + polar_angle(row));
-  return 2 * std::sin(middle) * std::sin(half) * (2 * kPi / width_);
-}
-
 EnvironmentMap::Corners EnvironmentMap::density_corners(int column, int row) const {
   Corners corners;
   double mean = 0;
@@ -70,6 +64,13 @@ EnvironmentMap::Corners EnvironmentMap::density_corners(int column, int row) con
 
 void EnvironmentMap::build_distribution() {
   const int rows = height_ - 1;
+  for (int row = 0; row <= rows; ++row) cos_theta_.push_back(std::cos(polar_angle(row)));
+  for (int row = 0; row < rows; ++row) {
+    // cos(a) - cos(b) without cancellation, times the cell's azimuth.
+    const double half = 0.5 * (polar_angle(row + 1) - polar_angle(row));
+    const double middle = 0.5 * (polar_angle(row + 1) + polar_angle(row));
+    cell_solid_angles_.push_back(2 * std::sin(middle) * std::sin(half) * (2 * kPi / width_));
+  }
   row_cdf_.assign(rows + 1, 0);
   column_cdf_.assign(static_cast<size_t>(rows) * (width_ + 1), 0);
   for (int row = 0; row < rows; ++row) {
@@ -81,10 +82,10 @@ void EnvironmentMap::build_distribution() {
             luminance(Rgb<double>{std::fabs(c[0]), std::fabs(c[1]), std::fabs(c[2])});
       }
     }
-    row_cdf_[row + 1] = accumulate(cdf, width_) * cell_solid_angle(row);
+    row_cdf_[row + 1] = accumulate(cdf, width_) * cell_solid_angles_[row];
   }
   if (*std::max_element(row_cdf_.begin(), row_cdf_.end()) == 0) {
-    for (int row = 0; row < rows; ++row) row_cdf_[row + 1] = cell_solid_angle(row);
+    for (int row = 0; row < rows; ++row) row_cdf_[row + 1] = cell_solid_angles_[row];
   }
   accumulate(row_cdf_.data(), rows);
 }
@@ -97,21 +98,21 @@ Vec3d EnvironmentMap::sample(double u1, double u2) const {
   p.t = sample_linear(c.v[0][0] + c.v[0][1], c.v[1][0] + c.v[1][1], u1);
   p.s = sample_linear(mix(c.v[0][0], c.v[1][0], p.t), mix(c.v[0][1], c.v[1][1], p.t), u2);
   const double phi = 2 * kPi * (p.column + 0.5 + p.s) / width_;
-  const double cos_theta = mix(std::cos(polar_angle(p.row)), std::cos(polar_angle(p.row + 1)), p.t);
+  const double cos_theta = mix(cos_theta_[p.row], cos_theta_[p.row + 1], p.t);
   const double sin_theta = std::sqrt(std::max(0.0, 1 - cos_theta * cos_theta));
   return {std::sin(phi) * sin_theta, cos_theta, -std::cos(phi) * sin_theta};
 }
 
 double EnvironmentMap::pdf_solid_angle(const Vec3d& d) const {
   const double x = std::atan2(d.x, -d.z) * (width_ / (2 * kPi)) - 0.5;
-  const double y = std::atan2(std::hypot(d.x, d.z), d.y) * ((height_ - 1) / kPi);
+  const double y = std::atan2(std::sqrt(d.x * d.x + d.z * d.z), d.y) * ((height_ - 1) / kPi);
   CellPoint p;
   const int left = static_cast<int>(std::floor(x));
   p.column = ((left % width_) + width_) % width_;
   p.row = std::clamp(static_cast<int>(y), 0, height_ - 2);
   p.s = x - left;
-  const double top = std::cos(polar_angle(p.row));
-  const double bottom = std::cos(polar_angle(p.row + 1));
+  const double top = cos_theta_[p.row];
+  const double bottom = cos_theta_[p.row + 1];
   p.t = std::clamp((top - d.y) / (top - bottom), 0.0, 1.0);
   const Corners c = density_corners(p.column, p.row);
   const double mean = 0.25 * (c.v[0][0] + c.v[0][1] + c.v[1][0] + c.v[1][1]);
@@ -119,7 +120,7 @@ double EnvironmentMap::pdf_solid_angle(const Vec3d& d) const {
   const double* cdf = &column_cdf_[static_cast<size_t>(p.row) * (width_ + 1)];
   const double probability =
       (row_cdf_[p.row + 1] - row_cdf_[p.row]) * (cdf[p.column + 1] - cdf[p.column]);
-  return probability * bilinear / (mean * cell_solid_angle(p.row));
+  return probability * bilinear / (mean * cell_solid_angles_[p.row]);
 }
 
 // Along the azimuth a row's mean is its texels' mean; between two rows it is linear in theta, and

@@ -59,7 +59,6 @@ class EnvironmentMap {
   }
   int next_column(int column) const { return column + 1 == width_ ? 0 : column + 1; }
   double polar_angle(int row) const { return kPi * row / (height_ - 1); }
-  double cell_solid_angle(int row) const;
   Corners density_corners(int column, int row) const;
   void build_distribution();
 
@@ -70,6 +69,8 @@ class EnvironmentMap {
   // times width_ + 1).
   std::vector<double> row_cdf_;
   std::vector<double> column_cdf_;
+  std::vector<double> cos_theta_;          // of each row of texels (height_)
+  std::vector<double> cell_solid_angles_;  // of one cell of each row of cells (height_ - 1) [sr]
 };
 
 template <class S>

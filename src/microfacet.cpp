@@ -46,7 +46,8 @@ double visible_slope(double c, double s, double u) {
     const double slope = 2 * kInverseSqrtPi * std::exp(-x * x) * (c - x * s);
     double next = x - error / slope;
     if (!(next > low && next < high)) next = 0.5 * (low + high);
-    if (std::fabs(next - x) <= 1e-14 * (1 + std::fabs(x))) return next;
+    // Newton's next error is about the square of this step.
+    if (std::fabs(next - x) <= 1e-8) return next;
     x = next;
   }
   return x;
