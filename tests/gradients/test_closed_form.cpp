@@ -1,0 +1,99 @@
+// Every sampler on every closed-form scene: image, each term and the total of each parameter's
+// derivative against their exact values, as z-scores.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "limn/edgetree/edge_sampler.h"
+#include "limn/integrators/gradient.h"
+#include "limn/integrators/statistics.h"
+
+namespace limn {
+namespace {
+
+using nlohmann::json;
+
+constexpr int kSamples = 4096;  // per pixel
+// Chance that one comparison of a right program fails; there are some hundreds of them.
+constexpr double kLevel = 1e-6;
+
+const std::string kFolder = std::string(LIMN_SOURCE_DIR) + "/scenes/closed_form/";
+
+json read_references() {
+  std::ifstream file(kFolder + "references.json");
+  return json::parse(file)["scenes"];
+}
+
+// z-scores of all values whose estimate varies; values without variance must be right to rounding:
+// to the accuracy of the reference.
+void compare(const Moments& estimate, const json& exact, double accuracy, const std::string& name) {
+  ASSERT_EQ(estimate.size(), exact.size()) << name;
+  std::vector<double> z;
+  for (size_t i = 0; i < estimate.size(); ++i) {
+    const double residual = estimate.mean(i) - exact[i].get<double>();
+    const double error = std::sqrt(estimate.variance(i));
+    // Below the accuracy of the reference no statistics are possible.
+    const double floor = accuracy * std::max(1.0, std::fabs(exact[i].get<double>()));
+    if (error <= floor) {
+      EXPECT_LE(std::fabs(residual), 8 * floor) << name << " value " << i;
+      continue;
+    }
+    z.push_back(normal_from_student(residual / error, estimate.batches() - 1));
+  }
+  if (z.empty()) return;
+  const ZSummary summary = summarize(z);
+  fmt::print("{:64} {:4} values, mean z {:6.2f}, largest |z| {:5.2f}\n", name, summary.count,
+             summary.mean, summary.largest);
+  EXPECT_GE(summary.p_largest, kLevel) << name << ": largest |z| " << summary.largest;
+}
+
+class ClosedForm : public testing::TestWithParam<std::tuple<std::string, json>> {};
+
+TEST_P(ClosedForm, GradientIsExact) {
+  const auto& [sampler, reference] = GetParam();
+  const Scene scene = read_scene(kFolder + reference["file"].get<std::string>(), {}, nullptr);
+  GradientOptions options;
+  options.sampler = sampler;
+  for (const json& p : reference["parameters"]) {
+    std::string name = p["name"];
+    const size_t colon = name.find(':');
+    if (colon != std::string::npos) name.insert(colon + 1, kFolder);
+    options.parameters.push_back(name);
+  }
+  RunSettings settings;
+  settings.spp = kSamples;
+  settings.seed = 7;
+  const GradientResult result = gradient(scene, options, settings);
+  EXPECT_EQ(result.non_finite.count, 0u) << result.non_finite.message();
+  const double accuracy = reference["accuracy"];
+  compare(result.radiance, reference["image"], accuracy, "image");
+  for (size_t k = 0; k < options.parameters.size(); ++k) {
+    const json& exact = reference["parameters"][k];
+    const ParameterGradient& g = result.parameters[k];
+    const std::string name = exact["name"];
+    compare(g.total, exact["total"], accuracy, name);
+    for (int term = 0; term < kTermCount; ++term) {
+      if (!exact.contains(term_name(term)) || exact[term_name(term)].is_null()) continue;
+      compare(g.terms[term], exact[term_name(term)], accuracy, name + " " + term_name(term));
+    }
+  }
+}
+
+std::vector<std::tuple<std::string, json>> all_cases() {
+  std::vector<std::tuple<std::string, json>> cases;
+  for (const auto& type : edge_sampler_types()) {
+    for (const json& reference : read_references()) cases.emplace_back(type.name, reference);
+  }
+  return cases;
+}
+
+INSTANTIATE_TEST_SUITE_P(, ClosedForm, testing::ValuesIn(all_cases()), [](const auto& test) {
+  const std::string file = std::get<1>(test.param)["file"];
+  return std::get<0>(test.param) + "_" + file.substr(0, file.find('.'));
+});
+
+}  // namespace
+}  // namespace limn
