@@ -53,7 +53,8 @@ double Filter::sample(double lower, double upper, Rng& rng) const {
     const double newton = x - excess / slope;
     const double next = slope > 0 && newton > a && newton < b ? newton : 0.5 * (a + b);
     if (next == x || next == a || next == b) break;
-    const bool converged = std::fabs(next - x) <= 0x1p-51 * radius;
+    // Newton's error squares with each step: after this one it is below rounding.
+    const bool converged = std::fabs(next - x) <= 0x1p-30 * radius;
     x = next;
     if (converged) break;
   }
