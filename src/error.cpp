@@ -2,7 +2,10 @@
 
 namespace limn {
 
-std::string format_error(const SourceLocation& where, const std::string& message) {
+namespace {
+
+std::string format(const SourceLocation& where, const std::string& kind,
+                   const std::string& message) {
   std::string text;
   if (!where.file.empty()) {
     text = where.file + ":";
@@ -12,7 +15,17 @@ std::string format_error(const SourceLocation& where, const std::string& message
     }
     text += " ";
   }
-  return text + "error: " + message;
+  return text + kind + ": " + message;
+}
+
+}  // namespace
+
+std::string format_error(const SourceLocation& where, const std::string& message) {
+  return format(where, "error", message);
+}
+
+std::string format_warning(const SourceLocation& where, const std::string& message) {
+  return format(where, "warning", message);
 }
 
 InputError::InputError(const SourceLocation& where, const std::string& message)

@@ -48,14 +48,16 @@ double Filter::sample(double lower, double upper, Rng& rng) const {
   double x = std::clamp(0.0, lower, upper);
   for (int i = 0; i < 200; ++i) {
     const double excess = integral(x) - target;
-    (excess > 0 ? b : a) = x;
     const double slope = eval(x);
     const double newton = x - excess / slope;
+    // Newton's error squares with each step: after a step this small it is below rounding.
+    if (slope > 0 && std::fabs(newton - x) <= 0x1p-30 * radius) {
+      return std::clamp(newton, lower, upper);
+    }
+    (excess > 0 ? b : a) = x;
     const double next = slope > 0 && newton > a && newton < b ? newton : 0.5 * (a + b);
-    if (next == x || next == a || next == b) break;
-    const bool converged = std::fabs(next - x) <= 0x1p-51 * radius;
+    if (next == a || next == b) break;
     x = next;
-    if (converged) break;
   }
   return x;
 }

@@ -7,8 +7,9 @@ namespace limn {
 
 namespace {
 
-void warn(std::vector<std::string>* warnings, const std::string& name, const std::string& text) {
-  if (warnings) warnings->push_back((name.empty() ? "" : name + ": ") + "warning: " + text);
+void warn(std::vector<std::string>* warnings, const SourceLocation& where,
+          const std::string& text) {
+  if (warnings) warnings->push_back(format_warning(where, text));
 }
 
 void set_positions(Mesh& mesh, const RawMesh& raw, const Matrix4& to_world) {
@@ -17,8 +18,8 @@ void set_positions(Mesh& mesh, const RawMesh& raw, const Matrix4& to_world) {
     const Vec3d p = to_world.point(raw.positions[i]);
     for (int k = 0; k < 3; ++k) {
       if (!(std::fabs(p[k]) <= std::numeric_limits<float>::max())) {
-        throw InputError(
-            {raw.name}, "vertex " + std::to_string(i) + ": position does not fit single precision");
+        throw InputError({raw.where}, "vertex " + std::to_string(i) +
+                                          ": position does not fit single precision");
       }
     }
     mesh.positions.push_back(cast<float>(p));
@@ -80,7 +81,7 @@ void set_given_normals(Mesh& mesh, const RawMesh& raw, const MeshOptions& option
     if (!usable[i]) mesh.normals[i] = {0, 0, 1};
   }
   if (mended > 0) {
-    warn(warnings, raw.name,
+    warn(warnings, raw.where,
          std::to_string(mended) +
              " faces have corners without a usable normal: the face's own "
              "normal is used there");
@@ -89,7 +90,7 @@ void set_given_normals(Mesh& mesh, const RawMesh& raw, const MeshOptions& option
 
 // Normals that point away from their faces make a surface black or transparent-looking: a file
 // whose winding and normals disagree is worth a word.
-void check_orientation(const Mesh& mesh, const std::string& name,
+void check_orientation(const Mesh& mesh, const SourceLocation& where,
                        std::vector<std::string>* warnings) {
   uint64_t opposed = 0, counted = 0;
   for (size_t f = 0; f < mesh.faces.size(); ++f) {
@@ -102,7 +103,7 @@ void check_orientation(const Mesh& mesh, const std::string& name,
   }
   if (opposed == 0) return;
   const bool nearly_all = opposed * 20 >= counted * 19;
-  warn(warnings, name,
+  warn(warnings, where,
        "the vertex normals oppose the winding of " +
            (nearly_all ? "(nearly) all faces; the file is inside out for one of the two, or its "
                          "transform mirrors it"
@@ -116,24 +117,24 @@ Mesh build_mesh(RawMesh raw, const MeshOptions& options, std::vector<std::string
   mesh.normal_source = options.face_normals     ? NormalSource::kFace
                        : raw.normal_ids.empty() ? NormalSource::kComputed
                                                 : NormalSource::kGiven;
-  if (raw.positions.empty()) throw InputError({raw.name}, "the mesh has no vertices");
-  if (raw.faces.empty()) throw InputError({raw.name}, "the mesh has no faces");
+  if (raw.positions.empty()) throw InputError(raw.where, "the mesh has no vertices");
+  if (raw.faces.empty()) throw InputError(raw.where, "the mesh has no faces");
   set_positions(mesh, raw, options.to_world);
   weld_positions(mesh);
   set_faces(mesh, raw, options.flip_normals);
   if (mesh.faces.empty()) {
-    throw InputError({raw.name}, "the mesh has no faces: each of its " +
-                                     std::to_string(raw.faces.size()) +
-                                     " faces has two corners at the same position");
+    throw InputError(raw.where, "the mesh has no faces: each of its " +
+                                    std::to_string(raw.faces.size()) +
+                                    " faces has two corners at the same position");
   }
   if (mesh.collapsed_faces > 0) {
-    warn(warnings, raw.name,
+    warn(warnings, raw.where,
          std::to_string(mesh.collapsed_faces) + " of " + std::to_string(raw.faces.size()) +
              " faces have two corners at the same position and are left out");
   }
   if (mesh.normal_source == NormalSource::kGiven) {
     set_given_normals(mesh, raw, options, warnings);
-    check_orientation(mesh, raw.name, warnings);
+    check_orientation(mesh, raw.where, warnings);
   }
   update_shading_normals(mesh);
   return mesh;

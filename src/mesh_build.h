@@ -12,7 +12,7 @@ inline constexpr uint32_t kNoNormal = UINT32_MAX;
 
 // A mesh as read: double precision, indices checked, polygons split into triangles.
 struct RawMesh {
-  std::string name;                     // the file, or the kind of shape: for messages
+  SourceLocation where;                 // the file, or the element of a built-in shape
   std::vector<Vec3d> positions;         // V, finite
   std::vector<FaceIndices> faces;       // F by 3, into positions
   std::vector<Vec3d> normals;           // N, finite, of any length

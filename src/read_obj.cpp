@@ -58,7 +58,7 @@ struct ObjReader {
   bool has_normals = false;
 
   [[noreturn]] void fail(const std::string& message) const {
-    throw InputError({mesh.name, lines.number()}, message);
+    throw InputError({mesh.where.file, lines.number()}, message);
   }
 
   // The three numbers after the keyword of the current line.
@@ -97,9 +97,9 @@ struct ObjReader {
 
   uint32_t checked(int64_t index, size_t count, const char* what, int line) const {
     if (index < 0 || index >= static_cast<int64_t>(count)) {
-      throw InputError({mesh.name, line}, "a face refers to " + std::string(what) + " " +
-                                              std::to_string(index + 1) + ", but there are " +
-                                              std::to_string(count));
+      throw InputError({mesh.where.file, line}, "a face refers to " + std::string(what) + " " +
+                                                    std::to_string(index + 1) + ", but there are " +
+                                                    std::to_string(count));
     }
     return static_cast<uint32_t>(index);
   }
@@ -129,7 +129,7 @@ RawMesh parse_obj(const std::string& file) {
   const std::optional<std::string> text = read_whole_file(file);
   if (!text) throw InputError({file}, "cannot read the file");
   ObjReader obj(*text);
-  obj.mesh.name = file;
+  obj.mesh.where = {file};
 
   using tinyobj::real_t;
   tinyobj::callback_t callback;

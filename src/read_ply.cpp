@@ -301,7 +301,7 @@ RawMesh parse_ply(const std::string& file) {
   const uint64_t vertex_count = vertices == elements.end() ? 0 : vertices->count;
   if (vertex_count >= UINT32_MAX) in.fail_at(vertices->line, "too many vertices");
   RawMesh mesh;
-  mesh.name = file;
+  mesh.where = {file};
   std::vector<std::vector<double>> skipped;
   for (const PlyElement& element : elements) {
     if (element.name == "vertex") {

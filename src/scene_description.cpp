@@ -134,9 +134,10 @@ class Describer {
     }
   }
 
-  // Aliases may name aliases that come later in the file; each is followed at most once.
+  // Aliases may name aliases that come later in the file.
   std::shared_ptr<ObjectDescription> find(std::string id, SourceLocation where) const {
-    for (size_t step = 0; step <= aliases_.size(); ++step) {
+    for (size_t step = 0;; ++step) {
+      if (step > aliases_.size()) throw InputError(where, "the alias \"" + id + "\" names itself");
       const auto found = by_id_.find(id);
       if (found != by_id_.end()) return found->second;
       const auto alias = aliases_.find(id);

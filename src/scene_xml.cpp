@@ -32,10 +32,10 @@ class SceneBuilder {
  private:
   void add(const ObjectDescription& object) {
     if (object.tag == "integrator") {
-      only_one(object, integrator_);
+      only_one(object, "integrator", integrator_);
       read_integrator(object);
     } else if (object.tag == "sensor") {
-      only_one(object, sensor_);
+      only_one(object, "sensor", sensor_);
       read_sensor(object, description_, scene_);
     } else if (object.tag == "shape") {
       add_shape(object);
@@ -44,9 +44,10 @@ class SceneBuilder {
     }
   }
 
-  static void only_one(const ObjectDescription& object, const ObjectDescription*& earlier) {
+  static void only_one(const ObjectDescription& object, const std::string& what,
+                       const ObjectDescription*& earlier) {
     if (earlier) {
-      throw InputError(object.where, "a second " + object.tag + ": the first is at " +
+      throw InputError(object.where, "a second " + what + ": the first is at " +
                                          earlier->where.file + ":" +
                                          std::to_string(earlier->where.line) + ":" +
                                          std::to_string(earlier->where.column));
@@ -89,7 +90,7 @@ class SceneBuilder {
     if (object.type == "area") {
       throw InputError(object.where, "an area emitter belongs inside a shape");
     }
-    only_one(object, environment_);
+    only_one(object, "environment", environment_);
     DescribedProperties p(object, description_, make_nested_);
     scene_.environment = make_environment(p);
     scene_.environment_id = object.id;
@@ -169,12 +170,13 @@ class SceneBuilder {
     shape.id = object.id;
     shape.where = object.where;
     MeshOptions options;
-    const RawMesh raw = read_geometry(p, options);
+    RawMesh raw = read_geometry(p, options);
+    if (raw.where.file.empty()) raw.where = object.where;
     const std::vector<std::shared_ptr<Bsdf>> bsdfs = p.bsdfs();
     if (bsdfs.size() > 1) p.fail("has " + std::to_string(bsdfs.size()) + " bsdfs (one at most)");
     if (const ObjectDescription* emitter = p.nested("emitter")) read_area_emitter(*emitter, shape);
     p.check_all_used();
-    shape.mesh = build_mesh(raw, options, warnings_);
+    shape.mesh = build_mesh(std::move(raw), options, warnings_);
     const double grey_value = shape.is_emitter ? 0.0 : 0.5;
     shape.bsdf = bsdfs.empty() ? make_diffuse(grey(grey_value)) : bsdfs[0];
     scene_.shapes.push_back(std::move(shape));

@@ -72,16 +72,12 @@ SphereBuilder icosahedron() {
 }  // namespace
 
 RawMesh make_rectangle() {
-  return {"rectangle",
-          {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}},
-          {{0, 1, 2}, {0, 2, 3}},
-          {},
-          {}};
+  return {{}, {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}, {}, {}};
 }
 
 // Vertex i has the coordinate +1 where bit k of i is set.
 RawMesh make_cube() {
-  RawMesh cube{"cube", {}, {}, {}, {}};
+  RawMesh cube{{}, {}, {}, {}, {}};
   for (int i = 0; i < 8; ++i) {
     cube.positions.push_back({i & 1 ? 1. : -1., i & 2 ? 1. : -1., i & 4 ? 1. : -1.});
   }
@@ -95,7 +91,7 @@ RawMesh make_cube() {
 }
 
 RawMesh make_disk() {
-  RawMesh disk{"disk", {{0, 0, 0}}, {}, {}, {}};
+  RawMesh disk{{}, {{0, 0, 0}}, {}, {}, {}};
   for (uint32_t i = 0; i < kDiskSides; ++i) {
     const double angle = 2 * kPi * i / kDiskSides;
     disk.positions.push_back({std::cos(angle), std::sin(angle), 0});
@@ -107,7 +103,7 @@ RawMesh make_disk() {
 RawMesh make_sphere() {
   SphereBuilder sphere = icosahedron();
   for (int i = 0; i < kSphereSplits; ++i) sphere.split();
-  return {"sphere", sphere.points, sphere.faces, sphere.points, sphere.faces};
+  return {{}, sphere.points, sphere.faces, sphere.points, sphere.faces};
 }
 
 }  // namespace limn

@@ -77,7 +77,8 @@ XmlElement convert(const pugi::xml_node& node, const TextPlaces& places, int dep
     if (child.type() == pugi::node_element) {
       element.children.push_back(convert(child, places, depth + 1));
     } else {
-      throw InputError(places.at(static_cast<size_t>(child.offset_debug())),
+      const size_t begin = static_cast<size_t>(child.offset_debug());
+      throw InputError(places.at(places.text().find_first_not_of(" \t\r\n", begin)),
                        "<" + element.name + ">: text between elements means nothing here");
     }
   }

@@ -14,6 +14,8 @@ struct SourceLocation {
 
 // "file:line:col: error: message"; the parts of the location that are unknown are left out.
 std::string format_error(const SourceLocation& where, const std::string& message);
+// The same with "warning".
+std::string format_warning(const SourceLocation& where, const std::string& message);
 
 // Bad input. what() is the whole line for the user.
 class InputError : public std::runtime_error {

@@ -1,0 +1,189 @@
+// Every parameter by name: its derivative against a small move of the scene.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "limn/core/parameter.h"
+#include "support/temp_files.h"
+
+namespace limn {
+namespace {
+
+// A smooth coarse mesh in a shape with given normals, one with computed normals, a shared BSDF, and
+// one of everything else that can move.
+class Parameters : public testing::Test {
+ protected:
+  Parameters() {
+    // A tent of four faces; the fifth vertex is a copy of the first, as along a texture seam.
+    files_.write("smooth.obj",
+                 "v 0 0 1\nv 1 0.1 0\nv 0 1.2 0.1\nv -1 -0.1 0\nv 0 0 1\nv 0.1 -0.9 0\n"
+                 "f 1 2 3\nf 1 3 4\nf 5 4 6\nf 5 6 2\n");
+    const std::string file = files_.write("s.xml", R"(<scene version="3.0.0">
+      <sensor type="perspective"><float name="fov" value="40"/><transform name="to_world">
+        <lookat origin="1,2,5" target="0,0.5,0" up="0,1,0"/></transform></sensor>
+      <bsdf type="roughconductor" id="metal"><float name="alpha" value="0.2"/></bsdf>
+      <bsdf type="twosided" id="both"><ref id="metal"/></bsdf>
+      <shape type="obj" id="tent"><string name="filename" value="smooth.obj"/><ref id="both"/>
+      </shape>
+      <shape type="sphere" id="ball"><point name="center" value="3,1,2"/><ref id="metal"/>
+        <emitter type="area" id="lamp"><rgb name="radiance" value="1,2,3"/></emitter></shape>
+      <shape type="cube"/>
+      <emitter type="constant" id="sky"><rgb name="radiance" value="0.5"/></emitter>
+      </scene>)");
+    scene_ = read_scene(file, {}, nullptr);
+    std::string field;
+    for (int i = 0; i < 6; ++i) field += i == 0 || i == 4 ? "0.5 1 2\n" : "0.1 -0.2 0.3\n";
+    field_ = files_.write("field.txt", field);
+  }
+
+  TempFiles files_;
+  Scene scene_;
+  std::string field_;
+};
+
+// All numbers of a scene that a parameter can move.
+std::vector<Dual> numbers(const Scene& scene) {
+  std::vector<Dual> all;
+  const auto add = [&](const Vec3<Dual>& v) { all.insert(all.end(), {v.x, v.y, v.z}); };
+  for (const Shape& shape : scene.shapes) {
+    const Mesh& m = shape.mesh;
+    for (uint32_t i = 0; i < m.positions.size(); ++i) add(m.position(i));
+    for (size_t i = 0; i < m.normals.size(); ++i) {
+      Vec3<Dual> n{m.normals[i].x, m.normals[i].y, m.normals[i].z};
+      for (int k = 0; k < 3 && !m.normal_tangents.empty(); ++k) n[k].d = m.normal_tangents[i][k];
+      add(n);
+    }
+    for (size_t i = 0; i < m.horizon.size(); ++i) {
+      all.emplace_back(m.horizon[i], m.horizon_tangents.empty() ? Lanes{} : m.horizon_tangents[i]);
+    }
+    all.insert(all.end(), {shape.radiance.r, shape.radiance.g, shape.radiance.b});
+    for (const ParameterRef& p : shape.bsdf->parameters()) {
+      for (const Dual* v : p.values) all.push_back(*v);
+    }
+  }
+  for (const ParameterRef& p : scene.environment->parameters()) {
+    for (const Dual* v : p.values) all.push_back(*v);
+  }
+  for (const Vec3<Dual>* v :
+       {&scene.camera.origin, &scene.camera.left, &scene.camera.up, &scene.camera.forward}) {
+    add(*v);
+  }
+  all.push_back(scene.camera.fov);
+  return all;
+}
+
+// Central differences with step h have an error of curvature times h^2, and of the rounding of
+// positions to float (magnitude up to 4) over h, which normals of the sphere's small faces
+// multiply by one over the face's size.
+void expect_derivative(const Scene& scene, const std::string& name) {
+  const double h = 0x1p-7;
+  const double bound = 8 * h * h + 16 * 0x1p-23 / h;
+  Scene seeded = deep_copy(scene);
+  seed_parameter(seeded, name, 2);
+  const std::vector<Dual> at = numbers(seeded);
+  const std::vector<Dual> up = numbers(perturbed(scene, name, h));
+  const std::vector<Dual> down = numbers(perturbed(scene, name, -h));
+  ASSERT_EQ(at.size(), up.size());
+  double motion = 0;
+  for (size_t i = 0; i < at.size(); ++i) {
+    const double difference = (up[i].v - down[i].v) / (2 * h);
+    EXPECT_NEAR(at[i].d[2], difference, bound) << name << " number " << i;
+    EXPECT_EQ(at[i].d[0], 0);
+    motion = std::max(motion, std::fabs(difference));
+  }
+  EXPECT_GT(motion, 0.05) << name << " moves nothing";
+}
+
+TEST_F(Parameters, DerivativesMatchMoves) {
+  for (const ParameterInfo& p : list_parameters(scene_)) {
+    if (!p.name.ends_with("FILE")) expect_derivative(scene_, p.name);
+  }
+  expect_derivative(scene_, "tent.vertex_positions:" + field_);
+}
+
+TEST_F(Parameters, AreListed) {
+  std::vector<std::string> names;
+  for (const ParameterInfo& p : list_parameters(scene_)) {
+    names.push_back(p.name);
+    EXPECT_GT(p.natural_step, 0) << p.name;
+  }
+  for (const char* name :
+       {"tent.translate.x", "ball.rotate.z", "ball.scale", "tent.vertex_positions:FILE",
+        "sensor.translate.y", "sensor.rotate.x", "sensor.fov", "metal.alpha", "both.alpha",
+        "lamp.radiance", "sky.radiance"}) {
+    EXPECT_EQ(std::count(names.begin(), names.end(), name), 1) << name;
+  }
+}
+
+TEST_F(Parameters, LanesAddUp) {
+  Scene both = deep_copy(scene_);
+  seed_parameter(both, "tent.rotate.x", 0);
+  seed_parameter(both, "tent.scale", 1);
+  Scene one = deep_copy(scene_);
+  seed_parameter(one, "tent.scale", 1);
+  const std::vector<Dual> a = numbers(both), b = numbers(one);
+  for (size_t i = 0; i < a.size(); ++i) EXPECT_EQ(a[i].d[1], b[i].d[1]);
+}
+
+TEST_F(Parameters, MovesAreExactForLargeSteps) {
+  const Mesh& before = scene_.shapes[0].mesh;
+  const Mesh after = perturbed(scene_, "tent.rotate.z", kPi).shapes[0].mesh;
+  const Vec3d c = bounds_of(before).center();
+  for (size_t i = 0; i < before.positions.size(); ++i) {
+    const Vec3d p = cast<double>(before.positions[i]), q = cast<double>(after.positions[i]);
+    EXPECT_NEAR(length(Vec3d{2 * c.x - p.x, 2 * c.y - p.y, p.z} - q), 0, 0x1p-22);
+  }
+}
+
+TEST_F(Parameters, CopiesShareNothingWithTheOriginalAndKeepSharing) {
+  const Scene moved = perturbed(scene_, "metal.alpha", 0.1);
+  const auto alpha = [](const Scene& s, size_t shape) {
+    for (const ParameterRef& p : s.shapes[shape].bsdf->parameters()) {
+      if (p.name == "alpha") return p.values[0]->v;
+    }
+    return -1.0;
+  };
+  EXPECT_DOUBLE_EQ(alpha(moved, 0), 0.3);  // through twosided
+  EXPECT_DOUBLE_EQ(alpha(moved, 1), 0.3);
+  EXPECT_DOUBLE_EQ(alpha(scene_, 0), 0.2);
+  EXPECT_EQ(moved.shapes[1].bsdf, moved.bsdfs_by_id.at("metal"));
+  EXPECT_NE(moved.shapes[1].bsdf, scene_.shapes[1].bsdf);
+}
+
+TEST_F(Parameters, UnknownNamesListTheNearest) {
+  try {
+    find_parameter(scene_, "tent.translate.w");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_EQ(error.what(),
+              files_.path("s.xml") +
+                  ": error: unknown parameter \"tent.translate.w\" (nearest: tent.translate.x, "
+                  "tent.translate.y, tent.translate.z, ball.translate.x, ball.translate.y); 1 "
+                  "of 3 shapes have no id and cannot be named");
+  }
+}
+
+std::string message_of(const Scene& scene, const std::string& name) {
+  try {
+    find_parameter(scene, name);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST_F(Parameters, VectorFilesMustFit) {
+  const std::string shorter = files_.write("short.txt", "0 0 1\n0 0 1\n");
+  EXPECT_EQ(message_of(scene_, "tent.vertex_positions:" + shorter),
+            shorter + ": error: the file has 2 vectors, but the mesh of \"tent\" has 6 vertices");
+  const std::string torn = files_.write("torn.txt", "0 0 1\n0 0 0\n0 0 0\n0 0 0\n0 0 2\n0 0 0\n");
+  EXPECT_EQ(message_of(scene_, "tent.vertex_positions:" + torn),
+            torn +
+                ": error: vertices 0 and 4 (counted from 0) of \"tent\" are at the same position "
+                "but move apart");
+  const double step = find_parameter(scene_, "tent.vertex_positions:" + field_).natural_step;
+  EXPECT_GT(step, 0);
+}
+
+}  // namespace
+}  // namespace limn
