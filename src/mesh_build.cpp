@@ -50,15 +50,15 @@ Vec3d doubled_area(const Mesh& mesh, size_t face) {
   return cross(cast<double>(mesh.positions[f[1]]) - p, cast<double>(mesh.positions[f[2]]) - p);
 }
 
-// Normals in world space. A corner without one (or with one of length zero) gets the normal of its
-// face.
+// Normals in world space. A corner without one (or with one that is zero or not finite) gets the
+// normal of its face.
 void set_given_normals(Mesh& mesh, const RawMesh& raw, const MeshOptions& options,
                        std::vector<std::string>* warnings) {
   std::vector<bool> usable(raw.normals.size());
   for (size_t i = 0; i < raw.normals.size(); ++i) {
     Vec3d n = options.to_world.normal(raw.normals[i]);
     const double size = length(n);
-    usable[i] = size > 0;
+    usable[i] = size > 0 && std::isfinite(size);
     if (usable[i]) n = n * ((options.flip_normals ? -1 : 1) / size);
     mesh.normals.push_back(n);
   }

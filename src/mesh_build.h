@@ -15,7 +15,7 @@ struct RawMesh {
   SourceLocation where;                 // the file, or the element of a built-in shape
   std::vector<Vec3d> positions;         // V, finite
   std::vector<FaceIndices> faces;       // F by 3, into positions
-  std::vector<Vec3d> normals;           // N, finite, of any length
+  std::vector<Vec3d> normals;           // N, of any length; not finite or zero: unusable
   std::vector<FaceIndices> normal_ids;  // F by 3, into normals or kNoNormal; empty if no normals
 };
 

@@ -69,7 +69,6 @@ struct ObjReader {
     for (int k = 0; k < 3; ++k) {
       const std::optional<double> number = parse_double(words[k + 1]);
       if (!number) fail("not a number: \"" + std::string(words[k + 1]) + "\"");
-      if (!std::isfinite(*number)) fail(std::string(what) + " is not finite");
       v[k] = *number;
     }
     return v;
@@ -134,7 +133,9 @@ RawMesh parse_obj(const std::string& file) {
   using tinyobj::real_t;
   tinyobj::callback_t callback;
   callback.vertex_cb = [](void* user, real_t, real_t, real_t, real_t) {
-    reader(user).mesh.positions.push_back(reader(user).three_numbers("vertex"));
+    const Vec3d p = reader(user).three_numbers("vertex");
+    if (!std::isfinite(p.x + p.y + p.z)) reader(user).fail("vertex is not finite");
+    reader(user).mesh.positions.push_back(p);
   };
   callback.normal_cb = [](void* user, real_t, real_t, real_t) {
     reader(user).mesh.normals.push_back(reader(user).three_numbers("normal"));

@@ -248,7 +248,6 @@ void read_vertices(PlyCursor& in, const PlyElement& element, RawMesh& mesh) {
       if (has_normals) normal[k] = values[*n[k]][0];
       const std::string what = "vertex " + std::to_string(i);
       if (!std::isfinite(position[k])) in.fail(what + ": the position is not finite");
-      if (!std::isfinite(normal[k])) in.fail(what + ": the normal is not finite");
     }
     mesh.positions.push_back(position);
     if (has_normals) mesh.normals.push_back(normal);

@@ -55,7 +55,7 @@ const std::vector<Mistake>& mistakes() {
        "a.obj:5: error: a face refers to normal 2, but there are 1"},
       {"ObjTwoCorners", "a.obj", kTriangle + "f 1 2\n",
        "a.obj:4: error: a face needs at least three corners"},
-      {"ObjNanNormal", "a.obj", kTriangle + "vn 0 0 nan\n", "a.obj:4: error: normal is not finite"},
+      {"ObjNormalWord", "a.obj", kTriangle + "vn 0 0 up\n", "a.obj:4: error: not a number: \"up\""},
       {"ObjAllCollapsed", "a.obj", kTriangle + "f 1 1 2\n",
        "a.obj: error: the mesh has no faces: each of its 1 faces has two corners at the same "
        "position"},
@@ -216,10 +216,12 @@ TEST(MendedMesh, WarnsOfNormalsAgainstTheWinding) {
 
 TEST(MendedMesh, WarnsOfMissingNormals) {
   const TempFiles files;
-  const std::string text = kTriangle + "v 1 1 0\nvn 0 0 1\nf 1//1 2//1 3//1\nf 2 4 3\n";
+  const std::string text = kTriangle +
+                           "v 1 1 0\nv 0 0 1\nvn 0 0 1\nvn 0 nan 0\n"
+                           "f 1//1 2//1 3//1\nf 2 4 3\nf 1//2 2//1 5//1\n";
   EXPECT_EQ(warnings_of(files, text).at(0),
             files.path("m.obj") +
-                ": warning: 1 faces have corners without a usable normal: the "
+                ": warning: 2 faces have corners without a usable normal: the "
                 "face's own normal is used there");
 }
 
