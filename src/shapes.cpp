@@ -11,7 +11,7 @@ namespace {
 
 // Sides of the polygon that stands for a disk: its area is 1e-4 less than the disk's.
 constexpr uint32_t kDiskSides = 256;
-// Times the icosahedron's faces are split in four: 5120 faces; the surface lies up to 8e-4 radii
+// Times the icosahedron's faces are split in four: 5120 faces; the surface lies up to 1.2e-3 radii
 // inside the sphere.
 constexpr int kSphereSplits = 4;
 
