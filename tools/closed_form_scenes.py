@@ -183,7 +183,7 @@ def wedge_in_gloss():
     wedge = Shape(vector(-0.125, 2, -0.75, 0, 2.125, 0.75, -1, 2.75, -0.75, -0.875, 2.875, 0.75,
                          0.75, 2.875, -0.75, 0.875, 3, 0.75).reshape(6, 3),
                   [[0, 1, 3, 2], [0, 4, 5, 1]])
-    wedge.bsdf = Bsdf("wedge_bsdf", "diffuse", vector(0.75, 0.5, 1))
+    wedge.bsdf = Bsdf("wedge_bsdf", "diffuse", vector(0.75, 0.5, 0.25))
     shapes = {"floor": floor("ggx", 0.375), "wedge": wedge,
               "lamp": lamp(parallelogram((-3, 1, -0.5), (0, 0, 1), (0.75, -0.125, 0)), (16, 8, 4))}
     scene = Scene("wedge_in_gloss.xml", floor_camera(), shapes, 3)
