@@ -19,6 +19,8 @@ from closed_form_radiance import (Filter, convex_vector, lobe_over_polygon, poly
 class FloorModel:
     """The camera sees nothing but the face of shape "floor": a mean of radiance() over pixels."""
 
+    outlines_in_view = False
+
     def image(self, domain, shade, outline, order):
         camera = domain.camera
         nodes, weights = square_rule(order)
@@ -132,6 +134,8 @@ class LampsInView:
     the integral of the reconstruction filter over a polygon on the film.
     """
 
+    outlines_in_view = True
+
     def image(self, domain, shade, outline, order):
         camera, sky = domain.camera, shade.environment
         near = film_loop(domain, domain.shapes["near"].face(0))
@@ -154,6 +158,8 @@ class ConvexInView:
     I = L_e + (rho - 1) L_e c(outline). The outline's part is summed over its front faces.
     """
 
+    outlines_in_view = True
+
     def image(self, domain, shade, outline, order):
         camera, sky, shape = domain.camera, shade.environment, domain.shapes["object"]
         front = [film_loop(domain, shape.vertices[f]) for f in shape.faces
@@ -172,6 +178,8 @@ class ConvexInView:
 class ReceiverInView:
     """A small diffuse face "receiver" before black, lit by a lamp: the mean over pixels of
     rho / pi L_e n.Phi(p) inside the receiver's outline on the film, 0 outside."""
+
+    outlines_in_view = True
 
     def image(self, domain, shade, outline, order):
         camera = domain.camera

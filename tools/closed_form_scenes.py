@@ -135,8 +135,8 @@ def half_hidden_lamp():
 
 
 def lamps_in_view(kind):
-    camera = Camera(vector(0.25, 0.5, -4), vector(0.125, 0.25, 0), vector(0, 1, 0), 36, 4, 4,
-                    filter=kind)
+    camera = Camera(vector(0.625, 0.625, -3.9375), vector(0.375, 0.125, -0.1875), vector(0, 1, 0), 30,
+                    4, 4, filter=kind)
     near = lamp(parallelogram((-0.5, -0.75, -0.25), (0.25, 1.25, 0.25), (1, -0.25, 0.5)),
                 (3, 1, 0.5), "near")
     far = lamp(parallelogram((0, -0.5, 1), (0.125, 1.25, 0), (1.25, 0.25, -0.25)), (0.5, 2, 4),
@@ -159,7 +159,8 @@ def cube_in_sky(name, face_normals):
     cube = box((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5))
     cube.bsdf = Bsdf("object_bsdf", "diffuse", vector(0.6, 0.6, 0.6))
     cube.writer, cube.face_normals = "split", face_normals
-    camera = Camera(vector(1.25, 1, -2.5), vector(0.0625, 0, 0), vector(0, 1, 0), 36, 4, 4)
+    camera = Camera(vector(1.6875, 0.9375, -2.9375), vector(0.3125, 0.125, 0.125), vector(0, 1, 0),
+                    38, 4, 4)
     scene = Scene(f"{name}.xml", camera, {"object": cube}, 2, vector(1, 1, 1))
     names = moves_of("object") + SENSOR + ["object_bsdf.reflectance", "environment.radiance"]
     return scene, models.ConvexInView(), names
@@ -168,7 +169,8 @@ def cube_in_sky(name, face_normals):
 def receiver_in_view():
     receiver = parallelogram((-0.5, 0, -0.5), (0.125, 0.25, 1), (1, 0.125, -0.125))
     receiver.bsdf = Bsdf("receiver_bsdf", "diffuse", vector(0.875, 0.75, 0.5))
-    camera = Camera(vector(0.5, 2, -2.25), vector(0.0625, 0.125, 0), vector(0, 1, 0), 28, 4, 4)
+    camera = Camera(vector(0.125, 2.5, -2.0625), vector(0.3125, -0.125, -0.25), vector(0, 1, 0), 39,
+                    4, 4)
     shapes = {"receiver": receiver,
               "lamp": lamp(parallelogram((-1, 2.5, -0.25), (1, 0.25, 0), (0, 0.125, 1)), (4, 2, 1))}
     scene = Scene("receiver_in_view.xml", camera, shapes, 2)
@@ -181,7 +183,7 @@ def wedge_in_gloss():
     wedge = Shape(vector(-0.125, 2, -0.75, 0, 2.125, 0.75, -1, 2.75, -0.75, -0.875, 2.875, 0.75,
                          0.75, 2.875, -0.75, 0.875, 3, 0.75).reshape(6, 3),
                   [[0, 1, 3, 2], [0, 4, 5, 1]])
-    wedge.bsdf = Bsdf("wedge_bsdf", "diffuse", vector(0.75, 0.5, 1))
+    wedge.bsdf = Bsdf("wedge_bsdf", "diffuse", vector(0.75, 0.5, 0.25))
     shapes = {"floor": floor("ggx", 0.375), "wedge": wedge,
               "lamp": lamp(parallelogram((-3, 1, -0.5), (0, 0, 1), (0.75, -0.125, 0)), (16, 8, 4))}
     scene = Scene("wedge_in_gloss.xml", floor_camera(), shapes, 3)
