@@ -354,7 +354,7 @@ TEST(EdgeSamplerTable, UnknownNamesListTheKnown) {
     make_edge_sampler("forrest", {}, 1);
     FAIL();
   } catch (const InputError& error) {
-    EXPECT_STREQ(error.what(), "error: unknown edge sampler \"forrest\" (known: brute, uniform)");
+    EXPECT_STREQ(error.what(), "error: unknown edge sampler \"forrest\" (known: brute, li2019, uniform)");
   }
 }
 
