@@ -18,7 +18,11 @@ struct Packed {
   std::vector<uint8_t> needed;
 };
 
-enum Side : uint8_t { kFront = 1, kBack = 2 };  // both bits: on the plane, to rounding
+enum Side : uint8_t {
+  kFront = 1,
+  kBack = 2,
+  kNever = 4
+};  // front and back: on the plane, to rounding
 
 bool same(const Vec3<Lanes>& a, const Vec3<Lanes>& b) {
   for (int k = 0; k < 3; ++k)
@@ -108,14 +112,15 @@ class BruteForceSampler final : public EdgeSampler {
     }
     for (const Edge& edge : mesh.edges) {
       packed.faces.push_back({edge.faces[0], edge.faces[1] == kNoFace ? 0 : edge.faces[1]});
-      packed.needed.push_back(needed_sides(mesh, edge.edge_class));
+      packed.needed.push_back(needed_sides(mesh, edge));
     }
     return packed;
   }
 
-  static uint8_t needed_sides(const EdgeMesh& mesh, EdgeClass edge_class) {
-    switch (edge_class) {
+  static uint8_t needed_sides(const EdgeMesh& mesh, const Edge& edge) {
+    switch (edge.edge_class) {
       case EdgeClass::kSmooth:
+        return edge.concave && mesh.one_sided_closed ? kNever : kFront | kBack;
       case EdgeClass::kFlat:
         return kFront | kBack;
       case EdgeClass::kSharp:

@@ -7,6 +7,7 @@ namespace limn {
 
 std::span<const EdgeSamplerType> edge_sampler_types() {
   static const EdgeSamplerType types[] = {
+      {"forest", "4-wide trees that reject what holds no silhouette", make_forest_sampler},
       {"brute", "lists every candidate and draws by a bound of its contribution (the oracle)",
        make_brute_force_sampler},
       {"li2019", "the tree of Li et al. 2018 over positions and Hough-transformed planes",

@@ -186,6 +186,7 @@ bool is_candidate(const EdgeMesh& mesh, uint32_t edge_index, const Vec3d& p) {
   if (edge.edge_class == EdgeClass::kBorder || edge.edge_class == EdgeClass::kIrregular)
     return true;
   if (edge.edge_class == EdgeClass::kSharp && !mesh.one_sided_closed) return true;
+  if (edge.edge_class == EdgeClass::kSmooth && edge.concave && mesh.one_sided_closed) return false;
   const double error = distance_error(mesh, p);
   const double d0 = mesh.planes[edge.faces[0]].distance(p);
   const double d1 = mesh.planes[edge.faces[1]].distance(p);

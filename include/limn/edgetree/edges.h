@@ -77,8 +77,9 @@ double distance_error(const EdgeMesh& mesh, const Vec3d& p);
 // Whether incident radiance at p may jump across the edge: the set E(p), exactly, in double
 // precision, without regard to occlusion. Smooth edges: p lies in front of exactly one of the two
 // planes (a distance of zero, to rounding, counts as either side, so that an edge is rather listed
-// than lost). Sharp: p is in front of at least one face, or the mesh is not one_sided_closed.
-// Border, irregular: always. Flat: as smooth.
+// than lost); never, if concave and one_sided_closed: the mesh itself hides such an edge from every
+// point that lies between its planes. Sharp: p is in front of at least one face, or the mesh is not
+// one_sided_closed. Border, irregular: always. Flat: as smooth.
 bool is_candidate(const EdgeMesh& mesh, uint32_t edge, const Vec3d& p);
 
 }  // namespace limn

@@ -1,0 +1,43 @@
+#pragma once
+// What a set of edges looks like in the space of planes: the dual box and the slab of a child.
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "limn/edgetree/edge_forest.h"
+#include "limn/edgetree/edges.h"
+
+namespace limn {
+
+// An edge as the build sees it.
+struct Wedge {
+  std::array<Plane, 2> planes;  // of its faces; both the same if only one matters
+  std::array<Vec3d, 2> ends;
+  double length = 0;
+  double angle = 0;  // exterior dihedral angle
+  double speed = 0;  // mean of the two ends, lanes added up
+  uint32_t edge = 0;
+};
+
+// The frame in which a node's children are described: x = ((p - center) / radius, 1).
+struct NodeFrame {
+  Vec3d center;  // representable as floats, as is the radius
+  double radius = 1;
+};
+
+// See ForestNode for the meaning of rows and slab.
+struct DualFit {
+  double rows[4][4];
+  double slab[7];
+  double cover[3];  // times radius^2
+  bool rejectable = false;
+  bool has_slab = false;
+};
+
+// Never rejects. cover: what a random plane crosses.
+DualFit unrejectable_fit(double cover);
+// Holds all planes of all wedges. In double precision: rounding to float moves rows by a relative
+// 2^-24.
+DualFit fit_dual(std::span<const Wedge> wedges, const NodeFrame& frame, const ForestConfig& config);
+
+}  // namespace limn
