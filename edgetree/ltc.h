@@ -40,15 +40,15 @@ class LtcLobe {
  private:
   void read_table(const LobeSummary& lobe, const Vec3d& wi);
   void prepare_boxes();
+  Float4 ltc_mean(const Float4x3& centre, const Float4x3& half) const;
 
   bool diffuse_;
   Vec3d n_;
   Vec3d rows_[3];
   double det_ = 1;
   double norm_ = 1;
-  // For boxes, in floats: n, the rows of M^-1, and what half extents squared contribute to the
-  // squared radius across the lobe's axis.
-  float n_f_[3], rows_f_[3][3], spread_f_[3], det_f_;
+  // For boxes: n, the rows of M^-1, det.
+  float n_f_[3], rows_f_[3][3], det_f_;
 };
 
 // The part of one edge above the horizon, and the density of points on it in proportion to
