@@ -62,7 +62,8 @@ class LtcEdge {
   // Integral of value(w_t) / |w_t|^3 over t in [0, 1]; zero only where no part of the edge is above
   // the horizon or p lies on the edge's line (where the Jacobian is zero). Always finite.
   double integral() const { return arcs_[0].integral + arcs_[1].integral; }
-  // The following need integral() > 0. u in [0, 1); the result is in [0, 1].
+  // The following need integral() > 0. u in [0, 1); the result is in [0, 1]. At the horizon itself
+  // the density is 0, which rounding may hit: such a draw counts as none.
   double sample_t(double u) const;
   double pdf_t(double t) const;
 
