@@ -4,7 +4,6 @@
 
 #include "forest_build.h"
 #include "forest_query.h"
-#include "limn/edgetree/contribution_bound.h"
 #include "samplers.h"
 
 namespace limn {
@@ -42,9 +41,13 @@ int choose(const Weights& weights, double& u) {
 struct EdgeForest::Impl {
   const EdgeSamplerInput& input;
   ForestConfig config;
+  LightClusters lights;
   Forest forest;
 
-  ForestQuery prepare(const EdgeQuery& query) const { return {forest, query, input.lane_scale}; }
+  ForestQuery prepare(const EdgeQuery& query) const {
+    const bool lit = config.light_term && !lights.empty();
+    return {forest, lit ? &lights : nullptr, query, input.lane_scale};
+  }
 
   // Both sampling and evaluating a probability ask here, and get the same bits.
   void weigh(uint32_t index, const ForestQuery& query, Weights& weights) const {
@@ -144,9 +147,10 @@ struct EdgeForest::Impl {
     return is_candidate(input.objects[id.object], id.edge, query.p) &&
            !is_own_edge(input, query, id);
   }
-  EdgeBound bound_of(const EdgeQuery& query, EdgeId id) const {
-    return {LobeBound(query.n, query.wi, query.lobe),
-            segment_of(input.objects[id.object], id.edge, query)};
+  LtcEdge seen_edge(const LtcLobe& lobe, const Vec3d& p, EdgeId id) const {
+    const EdgeMesh& mesh = input.objects[id.object];
+    const auto [a, b] = mesh.edges[id.edge].vertices;
+    return {lobe, mesh.positions[a] - p, mesh.positions[b] - p};
   }
 };
 
@@ -155,32 +159,36 @@ EdgeForest::~EdgeForest() = default;
 
 std::unique_ptr<EdgeForest> EdgeForest::build(const EdgeSamplerInput& input, int threads,
                                               const ForestConfig& config) {
-  auto impl = std::unique_ptr<Impl>(new Impl{input, config, build_forest(input, threads, config)});
+  auto impl = std::unique_ptr<Impl>(
+      new Impl{input, config, LightClusters(input.lights, input.environment_luminance),
+               build_forest(input, threads, config)});
   return std::unique_ptr<EdgeForest>(new EdgeForest(std::move(impl)));
 }
 
 bool EdgeForest::sample(const EdgeQuery& query, Rng& rng, EdgeSample& sample) const {
-  const double u_edge = rng.uniform(), u_piece = rng.uniform(), u_angle = rng.uniform();
-  if (!impl_->draw(impl_->prepare(query), u_edge, sample)) return false;
+  const double u_edge = rng.uniform(), u_t = rng.uniform();
+  const ForestQuery prepared = impl_->prepare(query);
+  if (!impl_->draw(prepared, u_edge, sample)) return false;
   if (!impl_->accepts(query, sample.edge)) return false;
-  const EdgeBound bound = impl_->bound_of(query, sample.edge);
-  if (!(bound.total() > 0)) return false;
-  sample.t = bound.sample_t(u_piece, u_angle);
-  sample.pdf_t = bound.pdf_t(sample.t);
+  const LtcEdge edge = impl_->seen_edge(prepared.lobe, query.p, sample.edge);
+  if (!(edge.integral() > 0)) return false;
+  sample.t = edge.sample_t(u_t);
+  sample.pdf_t = edge.pdf_t(sample.t);
   return true;
 }
 
 double EdgeForest::probability(const EdgeQuery& query, EdgeId id) const {
   const uint32_t slot = impl_->forest.slots[id.object][id.edge];
   if (slot == kNoParent || !impl_->accepts(query, id)) return 0;
-  if (!(impl_->bound_of(query, id).total() > 0)) return 0;
+  const ForestQuery prepared = impl_->prepare(query);
+  if (!(impl_->seen_edge(prepared.lobe, query.p, id).integral() > 0)) return 0;
   Weights weights;
-  return impl_->probability(slot, impl_->prepare(query), weights);
+  return impl_->probability(slot, prepared, weights);
 }
 
 double EdgeForest::pdf_t(const EdgeQuery& query, EdgeId id, double t) const {
-  const EdgeBound bound = impl_->bound_of(query, id);
-  return bound.total() > 0 ? bound.pdf_t(t) : 0;
+  const LtcEdge edge = impl_->seen_edge(LtcLobe(query.lobe, query.n, query.wi), query.p, id);
+  return edge.integral() > 0 ? edge.pdf_t(t) : 0;
 }
 
 uint64_t EdgeForest::list_silhouettes(const Vec3d& p, std::vector<EdgeId>& edges) const {

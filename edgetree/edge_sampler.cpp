@@ -10,6 +10,8 @@ std::span<const EdgeSamplerType> edge_sampler_types() {
       {"forest", "4-wide trees that reject what holds no silhouette", make_forest_sampler},
       {"brute", "lists every candidate and draws by a bound of its contribution (the oracle)",
        make_brute_force_sampler},
+      {"li2019", "the tree of Li et al. 2018 over positions and Hough-transformed planes",
+       make_li2019_sampler},
       {"uniform", "any edge of the scene, any point on it", make_uniform_sampler},
   };
   return types;

@@ -9,6 +9,8 @@ namespace {
 // A plane near a corner of a dual box is taken to meet this share of what one in the middle does,
 // at least.
 constexpr float kShallow = 0.1f;
+// Points in or near a box see its edges at this share of its squared radius at least.
+constexpr float kNear = 0.25f;
 
 // p in the frame of a node, and what rounding can add to row . x of all rows together: of the
 // entries of rows and of x by 2^-24 each, four roundings in a product and two in sums; rows have
@@ -71,8 +73,10 @@ ForestPoint point_of(const Forest& forest, const Vec3d& p) {
   return {p, distance_error(farthest, p)};
 }
 
-ForestQuery::ForestQuery(const Forest& forest, const EdgeQuery& query, const Lanes& lane_scale)
-    : point(point_of(forest, query.p)), lobe(query.n, query.wi, query.lobe) {
+ForestQuery::ForestQuery(const Forest& forest, const LightClusters* clusters,
+                         const EdgeQuery& query, const Lanes& lane_scale)
+    : point(point_of(forest, query.p)), lobe(query.lobe, query.n, query.wi) {
+  if (clusters) lights.emplace(*clusters, query.p);
   for (int k = 0; k < 3; ++k) n[k] = static_cast<float>(query.n[k]);
   const Vec3<Lanes>& v = query.velocity;
   double sum = 0;
@@ -112,10 +116,10 @@ Float4 weigh_children(const ForestNode& node, const ForestQuery& query, bool sof
     alive &= plane.g[0] + plane.half >= 0;
     if (soft) length *= clamp(0.5f + 0.5f * plane.g[0] / plane.half, splat(kShallow), splat(1.0f));
   }
-  const Float4 radius2 = e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
-  const Float4 distance2 = max(dot(d, d), 0.25f * radius2 + 1e-30f);
-  const Float4 mean = query.lobe.mean(d, sqrt(distance2), sqrt(radius2));
-  const Float4 weight = length * mean * speed / distance2;
+  const Float4x3 half{e[0], e[1], e[2]};
+  const Float4 distance2 = max(dot(d, d), kNear * dot(half, half) + 1e-30f);
+  Float4 weight = length * speed / distance2 * query.lobe.mean_over_boxes(d, half);
+  if (query.lights) weight *= query.lights->mean_over_boxes(d, half);
   return select(alive, max(weight, splat(std::numeric_limits<float>::min())), splat(0.0f));
 }
 

@@ -11,28 +11,51 @@ namespace {
 
 constexpr double kLevel = 1e-4;
 
-std::vector<double> z_scores(const Moments& gradient, const Moments& differences) {
+// The variance of a block's difference, with two lower limits that the batches may not show.
+// Under the hypothesis that the gradient is right, an edge gives events of size x [per sample] at
+// such a rate that their mean is the edge's part of the gradient: a variance of at least |mean| x /
+// spp, even where no event has come yet. And a difference of two images of radiance L over 2 h is
+// rounded to some hundred units in the last place of L / h.
+struct DifferenceVariance {
+  const ParameterGradient& gradient;
+  std::vector<double> radiance;  // of the blocks
+  double step;
+
+  double operator()(const Moments& differences, double event, size_t block) const {
+    const double edges = std::fabs(gradient.term_blocks[kCamera].mean(block)) +
+                         std::fabs(gradient.term_blocks[kBoundary].mean(block));
+    const double rounding = 0x1p-44 * radiance[block] / step;
+    return std::max(differences.variance(block), edges * event / differences.samples()) +
+           rounding * rounding;
+  }
+};
+
+std::vector<double> z_scores(const Moments& differences, double event,
+                             const DifferenceVariance& variance) {
+  const Moments& gradient = variance.gradient.total_blocks;
   std::vector<double> z;
   for (size_t b = 0; b < gradient.size(); ++b) {
     const double residual = gradient.mean(b) - differences.mean(b);
-    const double variance = gradient.variance(b) + differences.variance(b);
-    if (variance == 0 && residual == 0) continue;
-    const double t = residual / std::sqrt(variance);
-    z.push_back(normal_from_student(t, gradient.batches() - 1));
+    const double both = gradient.variance(b) + variance(differences, event, b);
+    if (both == 0 && residual == 0) continue;
+    z.push_back(normal_from_student(residual / std::sqrt(both), gradient.batches() - 1));
   }
   return z;
 }
 
-Suspicion regress(const Moments& term, const Moments& gradient, const Moments& differences) {
+Suspicion regress(const Moments& term, const DifferenceResult& differences,
+                  const DifferenceVariance& variance) {
+  const Moments& gradient = variance.gradient.total_blocks;
+  const Moments& blocks = differences.blocks_extrapolated;
   double product = 0;
   double square = 0;
   for (size_t b = 0; b < term.size(); ++b) {
-    const double variance = gradient.variance(b) + differences.variance(b);
-    if (variance == 0) continue;
+    const double both = gradient.variance(b) + variance(blocks, differences.event_extrapolated, b);
+    if (both == 0) continue;
     const double value = term.mean(b);
-    const double residual = differences.mean(b) - gradient.mean(b);
-    product += value * residual / variance;
-    square += value * value / variance;
+    const double residual = blocks.mean(b) - gradient.mean(b);
+    product += value * residual / both;
+    square += value * value / both;
   }
   if (square == 0) return {};
   return {product / square, product / std::sqrt(square)};
@@ -48,6 +71,20 @@ TotalComparison compare_totals(const Moments& gradient, const Moments& differenc
   const double error = std::hypot(total.gradient_error, total.difference_error);
   total.z = residual == 0 ? 0 : normal_from_student(residual / error, gradient.batches() - 1);
   return total;
+}
+
+std::vector<double> block_means(const CheckResult& result, const Film& film) {
+  const Moments& radiance = result.gradient.radiance;
+  std::vector<double> means(radiance.size());
+  for (size_t i = 0; i < means.size(); ++i) means[i] = radiance.mean(i);
+  return sum_blocks(means, film.crop_width, film.crop_height, result.block);
+}
+
+// The terms that the options leave out.
+GradientResult other_terms(const Scene& scene, GradientOptions options, RunSettings settings) {
+  for (bool& term : options.terms) term = !term;
+  settings.progress = nullptr;
+  return gradient(scene, options, settings);
 }
 
 }  // namespace
@@ -78,15 +115,20 @@ CheckResult check(const Scene& scene, const CheckOptions& options, const RunSett
 
   const ParameterGradient& g = result.gradient.parameters[0];
   const DifferenceResult& d = result.differences;
-  result.at_step = summarize(z_scores(g.total_blocks, d.blocks_at_step));
-  result.at_double_step = summarize(z_scores(g.total_blocks, d.blocks_at_double_step));
-  result.extrapolated = summarize(z_scores(g.total_blocks, d.blocks_extrapolated));
+  const DifferenceVariance variance{g, block_means(result, scene.film), result.step};
+  result.at_step = summarize(z_scores(d.blocks_at_step, d.event_at_step, variance));
+  result.at_double_step =
+      summarize(z_scores(d.blocks_at_double_step, d.event_at_double_step, variance));
+  result.extrapolated = summarize(z_scores(d.blocks_extrapolated, d.event_extrapolated, variance));
   result.total = compare_totals(g.image_sum, d.image_sum);
-  for (int term = 0; term < kTermCount; ++term) {
-    result.suspicions[term] = regress(g.term_blocks[term], g.total_blocks, d.blocks_extrapolated);
-  }
   result.agree = result.extrapolated.plausible(kLevel) && normal_p_value(result.total.z) >= kLevel;
   if (!result.agree) {
+    // A term that was left out may be the one that is missing.
+    const GradientResult others = other_terms(scene, gradient_options, first);
+    for (int term = 0; term < kTermCount; ++term) {
+      const auto& from = options.terms[term] ? result.gradient : others;
+      result.suspicions[term] = regress(from.parameters[0].term_blocks[term], d, variance);
+    }
     const auto worst = std::max_element(
         result.suspicions.begin(), result.suspicions.end(),
         [](const Suspicion& a, const Suspicion& b) { return std::fabs(a.z) < std::fabs(b.z); });

@@ -100,9 +100,8 @@ class PathTracer {
       const double u2 = rng.uniform();
       const auto wo = scattering.sample(u1, u2);
       if (!wo) return radiance;
-      const Rgb<S> f = scattering.eval(*wo);
+      const auto [f, pdf] = scattering.eval_with_pdf(*wo);
       if (is_black(value(f))) return radiance;
-      const double pdf = scattering.pdf_solid_angle(*wo);
       throughput = throughput * f * (1 / pdf);
       Hit hit;
       const bool found = next_hit(surface, *wo, edge, hit);
@@ -167,9 +166,9 @@ class PathTracer {
     LightSample light;
     const Vec3d p = value(surface.p);
     if (!c_.lights.sample(p, rng, light)) return {};
-    const Rgb<S> f = scattering.eval(light.wo);
+    const auto [f, bsdf_pdf] = scattering.eval_with_pdf(light.wo);
     if (is_black(value(f)) || shadowed(p, surface.face, light, edge)) return {};
-    const double weight = mis_weight(light.pdf, scattering.pdf_solid_angle(light.wo)) / light.pdf;
+    const double weight = mis_weight(light.pdf, bsdf_pdf) / light.pdf;
     const Rgb<S> radiance =
         light.face.shape == UINT32_MAX
             ? c_.scene.environment->radiance(Vec3<S>{light.wo.x, light.wo.y, light.wo.z})

@@ -96,6 +96,21 @@ bool render_batch(const PrimalRenderer& renderer, int first, int last, ProgressC
   return !progress.stopped();
 }
 
+// Sums behind DifferenceResult::event_*.
+struct EventSize {
+  double cubes = 0;
+  double squares = 0;
+  // Three channels per pixel.
+  void add(const std::vector<double>& sums) {
+    for (size_t i = 0; i < sums.size(); i += 3) {
+      const double x = std::fabs(sums[i] + sums[i + 1] + sums[i + 2]);
+      squares += x * x;
+      cubes += x * x * x;
+    }
+  }
+  double value() const { return squares > 0 ? cubes / squares : 0; }
+};
+
 }  // namespace
 
 RenderResult render(const Scene& scene, const RunSettings& settings) {
@@ -140,6 +155,7 @@ DifferenceResult finite_differences(const Scene& scene, const std::string& param
   result.blocks_at_step = result.blocks_at_double_step = result.blocks_extrapolated =
       Moments(block_size);
   result.image_sum = Moments(1);
+  EventSize events[3];
   const Batches batches(settings.spp);
   ProgressCounter progress(settings, make_tiles(scene.film).size() * batches.count * 4);
   for (int b = 0; b < batches.count; ++b) {
@@ -157,6 +173,9 @@ DifferenceResult finite_differences(const Scene& scene, const std::string& param
       twice[i] = (output[2].sums[i] - output[3].sums[i]) / (4 * step);
       combined[i] = (4 * single[i] - twice[i]) / 3;
     }
+    events[0].add(single);
+    events[1].add(twice);
+    events[2].add(combined);
     const int n = batches.samples(b);
     result.at_step.add_batch(single, n);
     result.at_double_step.add_batch(twice, n);
@@ -171,6 +190,9 @@ DifferenceResult finite_differences(const Scene& scene, const std::string& param
     }
     result.spp += n;
   }
+  result.event_at_step = events[0].value();
+  result.event_at_double_step = events[1].value();
+  result.event_extrapolated = events[2].value();
   result.seconds = watch.seconds();
   return result;
 }

@@ -106,7 +106,9 @@ class EmbreeTracer final : public RayTracer {
   Context make_context(const Ray& ray) const {
     Context context;
     rtcInitIntersectContext(&context.base);
-    context.base.filter = reject_skipped;
+    const bool skips =
+        ray.start.shape != UINT32_MAX || !ray.skip_faces.empty() || ray.skip_emitters;
+    if (skips) context.base.filter = reject_skipped;
     context.ray = &ray;
     context.scene = &scene_;
     return context;

@@ -1,5 +1,7 @@
 #include "environment_map.h"
 
+#include <limits>
+
 namespace limn {
 namespace {
 
@@ -10,54 +12,45 @@ double sample_linear(double a, double b, double u) {
   return std::min(1.0, u * (a + b) / (a + std::sqrt(a * a * (1 - u) + b * b * u)));
 }
 
+// Luminance of the absolute values; above zero wherever a channel is not zero.
+float importance(const std::array<float, 3>& c) {
+  const double v = luminance(Rgb<double>{std::fabs(c[0]), std::fabs(c[1]), std::fabs(c[2])});
+  return v > 0 ? std::max(static_cast<float>(v), std::numeric_limits<float>::min()) : 0;
+}
+
 double mix(double a, double b, double t) { return a + (b - a) * t; }
-
-// The interval of the cumulative distribution (from 0 to 1, n intervals) that holds u; u becomes
-// the position in it. Intervals of no width are never chosen.
-int choose(const double* cdf, int n, double& u) {
-  const int i = static_cast<int>(std::upper_bound(cdf, cdf + n, u) - cdf) - 1;
-  u = std::min(1.0, (u - cdf[i]) / (cdf[i + 1] - cdf[i]));
-  return i;
-}
-
-// Turns n weights stored in cdf[1..n] into a cumulative distribution; returns their sum. Equal
-// shares if all are zero.
-double accumulate(double* cdf, int n) {
-  cdf[0] = 0;
-  for (int i = 1; i <= n; ++i) cdf[i] += cdf[i - 1];
-  const double sum = cdf[n];
-  for (int i = 1; i <= n; ++i) cdf[i] = sum > 0 ? cdf[i] / sum : static_cast<double>(i) / n;
-  cdf[n] = 1;
-  return sum;
-}
 
 }  // namespace
 
 EnvironmentMap::EnvironmentMap(const Image& image)
     : width_(image.width), height_(std::max(2, image.height)) {
-  texels_.reserve(static_cast<size_t>(3) * width_ * height_);
+  texels_.reserve(static_cast<size_t>(width_) * height_);
+  bool black = true;
   for (int y = 0; y < height_; ++y) {
     for (int x = 0; x < width_; ++x) {
+      Texel texel;
       for (int c = 0; c < 3; ++c) {
-        texels_.push_back(image.at(x, std::min(y, image.height - 1), image.channels == 3 ? c : 0));
+        texel.rgb[c] = image.at(x, std::min(y, image.height - 1), image.channels == 3 ? c : 0);
       }
+      texel.importance = importance(texel.rgb);
+      black = black && texel.importance == 0;
+      texels_.push_back(texel);
     }
+  }
+  if (black) {
+    for (Texel& texel : texels_) texel.importance = 1;
   }
   build_distribution();
 }
 
 EnvironmentMap::Corners EnvironmentMap::density_corners(int column, int row) const {
-  Corners corners;
-  double mean = 0;
-  for (int i = 0; i < 2; ++i) {
-    for (int j = 0; j < 2; ++j) {
-      const float* c = texel(j == 0 ? column : next_column(column), row + i);
-      corners.v[i][j] = luminance(Rgb<double>{std::fabs(c[0]), std::fabs(c[1]), std::fabs(c[2])});
-      mean += 0.25 * corners.v[i][j];
-    }
-  }
+  const int next = next_column(column);
+  Corners corners = {{{texel(column, row).importance, texel(next, row).importance},
+                      {texel(column, row + 1).importance, texel(next, row + 1).importance}}};
+  const double mean =
+      0.25 * (corners.v[0][0] + corners.v[0][1] + corners.v[1][0] + corners.v[1][1]);
   for (auto& line : corners.v) {
-    for (double& v : line) v = mean > 0 ? mix(v, mean, kMeanShare) : 1;
+    for (double& v : line) v = mix(v, mean, kMeanShare);
   }
   return corners;
 }
@@ -65,35 +58,67 @@ EnvironmentMap::Corners EnvironmentMap::density_corners(int column, int row) con
 void EnvironmentMap::build_distribution() {
   const int rows = height_ - 1;
   for (int row = 0; row <= rows; ++row) cos_theta_.push_back(std::cos(polar_angle(row)));
+  std::vector<double> weights;
   for (int row = 0; row < rows; ++row) {
     // cos(a) - cos(b) without cancellation, times the cell's azimuth.
     const double half = 0.5 * (polar_angle(row + 1) - polar_angle(row));
     const double middle = 0.5 * (polar_angle(row + 1) + polar_angle(row));
-    cell_solid_angles_.push_back(2 * std::sin(middle) * std::sin(half) * (2 * kPi / width_));
-  }
-  row_cdf_.assign(rows + 1, 0);
-  column_cdf_.assign(static_cast<size_t>(rows) * (width_ + 1), 0);
-  for (int row = 0; row < rows; ++row) {
-    double* cdf = &column_cdf_[static_cast<size_t>(row) * (width_ + 1)];
+    const double solid_angle = 2 * std::sin(middle) * std::sin(half) * (2 * kPi / width_);
     for (int column = 0; column < width_; ++column) {
-      for (const float* c : {texel(column, row), texel(next_column(column), row),
-                             texel(column, row + 1), texel(next_column(column), row + 1)}) {
-        cdf[column + 1] +=
-            luminance(Rgb<double>{std::fabs(c[0]), std::fabs(c[1]), std::fabs(c[2])});
-      }
+      const Corners c = density_corners(column, row);
+      weights.push_back(0.25 * (c.v[0][0] + c.v[0][1] + c.v[1][0] + c.v[1][1]) * solid_angle);
     }
-    row_cdf_[row + 1] = accumulate(cdf, width_) * cell_solid_angles_[row];
   }
-  if (*std::max_element(row_cdf_.begin(), row_cdf_.end()) == 0) {
-    for (int row = 0; row < rows; ++row) row_cdf_[row + 1] = cell_solid_angles_[row];
+  double total = 0;
+  for (const double weight : weights) total += weight;
+  inverse_total_ = 1 / total;
+  build_aliases(weights);
+}
+
+// Vose 1991, "A linear algorithm for generating random numbers with a given distribution": every
+// slot holds an equal share of the probability, filled by its own cell and at most one other.
+void EnvironmentMap::build_aliases(const std::vector<double>& weights) {
+  const size_t count = weights.size();
+  slots_.resize(count);
+  std::vector<double> filled(count);
+  std::vector<uint32_t> small, large;
+  for (uint32_t i = 0; i < count; ++i) {
+    filled[i] = weights[i] * inverse_total_ * count;
+    (filled[i] < 1 ? small : large).push_back(i);
   }
-  accumulate(row_cdf_.data(), rows);
+  while (!small.empty() && !large.empty()) {
+    const uint32_t poor = small.back();
+    const uint32_t rich = large.back();
+    small.pop_back();
+    slots_[poor] = {static_cast<float>(filled[poor]), rich};
+    filled[rich] -= 1 - filled[poor];
+    if (filled[rich] < 1) {
+      large.pop_back();
+      small.push_back(rich);
+    }
+  }
+  // Slots left over are full but for rounding, which is far below one slot: so no cell without
+  // weight is among them.
+  for (const auto* rest : {&small, &large}) {
+    for (const uint32_t i : *rest) slots_[i] = {1, i};
+  }
 }
 
 Vec3d EnvironmentMap::sample(double u1, double u2) const {
   CellPoint p;
-  p.row = choose(row_cdf_.data(), height_ - 1, u1);
-  p.column = choose(&column_cdf_[static_cast<size_t>(p.row) * (width_ + 1)], width_, u2);
+  const double place = u1 * slots_.size();
+  auto cell =
+      static_cast<uint32_t>(std::min<size_t>(static_cast<size_t>(place), slots_.size() - 1));
+  u1 = place - cell;
+  const Slot slot = slots_[cell];
+  if (u1 < slot.share) {
+    u1 /= slot.share;
+  } else {
+    u1 = (u1 - slot.share) / (1 - slot.share);
+    cell = slot.alias;
+  }
+  p.row = static_cast<int>(cell) / width_;
+  p.column = static_cast<int>(cell) % width_;
   const Corners c = density_corners(p.column, p.row);
   p.t = sample_linear(c.v[0][0] + c.v[0][1], c.v[1][0] + c.v[1][1], u1);
   p.s = sample_linear(mix(c.v[0][0], c.v[1][0], p.t), mix(c.v[0][1], c.v[1][1], p.t), u2);
@@ -115,12 +140,7 @@ double EnvironmentMap::pdf_solid_angle(const Vec3d& d) const {
   const double bottom = cos_theta_[p.row + 1];
   p.t = std::clamp((top - d.y) / (top - bottom), 0.0, 1.0);
   const Corners c = density_corners(p.column, p.row);
-  const double mean = 0.25 * (c.v[0][0] + c.v[0][1] + c.v[1][0] + c.v[1][1]);
-  const double bilinear = mix(mix(c.v[0][0], c.v[0][1], p.s), mix(c.v[1][0], c.v[1][1], p.s), p.t);
-  const double* cdf = &column_cdf_[static_cast<size_t>(p.row) * (width_ + 1)];
-  const double probability =
-      (row_cdf_[p.row + 1] - row_cdf_[p.row]) * (cdf[p.column + 1] - cdf[p.column]);
-  return probability * bilinear / (mean * cell_solid_angles_[p.row]);
+  return mix(mix(c.v[0][0], c.v[0][1], p.s), mix(c.v[1][0], c.v[1][1], p.s), p.t) * inverse_total_;
 }
 
 // Along the azimuth a row's mean is its texels' mean; between two rows it is linear in theta, and
@@ -130,7 +150,7 @@ double EnvironmentMap::mean_luminance() const {
   const auto row_mean = [this](int row) {
     double sum = 0;
     for (int column = 0; column < width_; ++column) {
-      const float* c = texel(column, row);
+      const auto& c = texel(column, row).rgb;
       sum += luminance(Rgb<double>{c[0], c[1], c[2]});
     }
     return sum / width_;

@@ -2,7 +2,9 @@
 // A radiance map over the sphere in the direction space of the map itself (+Y up): look-up,
 // importance sampling, mean.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
 #include "limn/core/dual.h"
@@ -28,10 +30,11 @@ class EnvironmentMap {
 
   // The density follows the luminance of the absolute values of the texels: it is positive
   // wherever radiance is not zero, negative texels included. A cell is drawn in proportion to the
-  // mean of its corners times its solid angle; within it the density is bilinear in azimuth and
-  // cos(theta) through the corners' luminances, each mixed with a little of their mean (where one
-  // side of a cell is black, radiance falls to zero with theta but the density with cos(theta), and
-  // near a pole their ratio would grow without bound). An all-black map is sampled uniformly.
+  // mean of its corners times its solid angle (so the cell's probability drops out of the density);
+  // within it the density is bilinear in azimuth and cos(theta) through the corners' luminances,
+  // each mixed with a little of their mean (where one side of a cell is black, radiance falls to
+  // zero with theta but the density with cos(theta), and near a pole their ratio would grow without
+  // bound). An all-black map is sampled uniformly.
   Vec3d sample(double u1, double u2) const;
   double pdf_solid_angle(const Vec3d& d) const;  // [1/sr]
 
@@ -54,23 +57,33 @@ class EnvironmentMap {
     double v[2][2];
   };
 
-  const float* texel(int column, int row) const {
-    return &texels_[3 * (static_cast<size_t>(row) * width_ + column)];
+  // Radiance, and what the sampling density follows: together, as they are looked up together.
+  struct Texel {
+    std::array<float, 3> rgb;
+    float importance;
+  };
+  // One of as many equally likely slots as there are cells: its first `share` belongs to the cell
+  // of the slot's own index, the rest to `alias`.
+  struct Slot {
+    float share;
+    uint32_t alias;
+  };
+
+  const Texel& texel(int column, int row) const {
+    return texels_[static_cast<size_t>(row) * width_ + column];
   }
   int next_column(int column) const { return column + 1 == width_ ? 0 : column + 1; }
   double polar_angle(int row) const { return kPi * row / (height_ - 1); }
   Corners density_corners(int column, int row) const;
   void build_distribution();
+  void build_aliases(const std::vector<double>& weights);
 
   int width_ = 0;
-  int height_ = 0;             // at least 2
-  std::vector<float> texels_;  // height_ x width_ x 3
-  // Cumulative probabilities of rows of cells (height_), and of the cells of each row (height_ - 1
-  // times width_ + 1).
-  std::vector<double> row_cdf_;
-  std::vector<double> column_cdf_;
-  std::vector<double> cos_theta_;          // of each row of texels (height_)
-  std::vector<double> cell_solid_angles_;  // of one cell of each row of cells (height_ - 1) [sr]
+  int height_ = 0;                 // at least 2
+  std::vector<Texel> texels_;      // height_ x width_
+  std::vector<Slot> slots_;        // of cells, height_ - 1 x width_
+  double inverse_total_ = 0;       // 1 / integral over the sphere of what the density follows
+  std::vector<double> cos_theta_;  // of each row of texels (height_)
 };
 
 template <class S>
@@ -84,12 +97,14 @@ Rgb<S> EnvironmentMap::radiance(const Vec3<S>& d) const {
   const S s = x - static_cast<double>(left);
   const S t = y - static_cast<double>(row);
   const int column = ((left % width_) + width_) % width_;
-  const float* corners[4] = {texel(column, row), texel(next_column(column), row),
-                             texel(column, row + 1), texel(next_column(column), row + 1)};
+  const int next = next_column(column);
+  const std::array<float, 3>* corners[4] = {&texel(column, row).rgb, &texel(next, row).rgb,
+                                            &texel(column, row + 1).rgb, &texel(next, row + 1).rgb};
   Rgb<S> result;
   for (int c = 0; c < 3; ++c) {
-    const S top = corners[0][c] + s * static_cast<double>(corners[1][c] - corners[0][c]);
-    const S bottom = corners[2][c] + s * static_cast<double>(corners[3][c] - corners[2][c]);
+    const auto corner = [&](int i) { return static_cast<double>((*corners[i])[c]); };
+    const S top = corner(0) + s * (corner(1) - corner(0));
+    const S bottom = corner(2) + s * (corner(3) - corner(2));
     result[c] = top + t * (bottom - top);
   }
   return result;

@@ -59,9 +59,8 @@ std::array<Vec3<P>, 3> face_corners(const Mesh& mesh, uint32_t face) {
 namespace detail {
 
 template <class S>
-S interpolate(const S& b0, const S& b1, const S& b2, const Dual& a0, const Dual& a1,
-              const Dual& a2) {
-  return b0 * as<S>(a0) + b1 * as<S>(a1) + b2 * as<S>(a2);
+S interpolate(const S& b0, const S& b1, const S& b2, const S& a0, const S& a1, const S& a2) {
+  return b0 * a0 + b1 * a1 + b2 * a2;
 }
 
 // Shading normal and horizon from the barycentric coordinates (b1, b2) of the second and third
@@ -71,8 +70,8 @@ void interpolate_shading(const Mesh& mesh, const S& b1, const S& b2, SurfacePoin
   const S b0 = 1.0 - b1 - b2;
   const FaceIndices& ids = mesh.normal_ids[point.face.face];
   const FaceIndices& vertices = mesh.faces[point.face.face];
-  Vec3<Dual> n[3];
-  Dual h[3];
+  Vec3<S> n[3];
+  S h[3];
   for (int k = 0; k < 3; ++k) {
     const Vec3d& a = mesh.normals[ids[k]];
     n[k] = {a.x, a.y, a.z};
@@ -168,6 +167,20 @@ class Scattering {
   }
   double pdf_solid_angle(const Vec3d& wo) const {
     return bsdf_->pdf_solid_angle(value(n_), value(wi_), wo);
+  }
+  // Both at once.
+  struct Evaluation {
+    Rgb<S> value;
+    double pdf;
+  };
+  Evaluation eval_with_pdf(const Vec3d& wo) const {
+    if constexpr (std::is_same_v<S, double>) {
+      const S factor = limited_ ? horizon_factor(wo) : 1.0;
+      const BsdfValue f = bsdf_->eval_with_pdf(n_, wi_, wo);
+      return {f.value * factor, f.pdf};
+    } else {
+      return {eval(wo), pdf_solid_angle(wo)};
+    }
   }
   std::optional<Vec3d> sample(double u1, double u2) const {
     return bsdf_->sample(value(n_), value(wi_), u1, u2);

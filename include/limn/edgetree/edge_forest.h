@@ -18,6 +18,8 @@ struct ForestConfig {
   // Children weigh by how deep the query plane cuts their dual box; else all that are not rejected
   // weigh by length and distance alone.
   bool soft_weights = true;
+  // Children weigh by the light that may come from behind them.
+  bool light_term = true;
   // How many nodes a choice looks at: nodes of edges only are weighed by their edges, before one of
   // their siblings is drawn; or any node by its children (up to 16 at once), or none.
   enum class Lookahead { kNone, kEdges, kAll };

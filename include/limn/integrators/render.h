@@ -25,6 +25,9 @@ struct DifferenceResult {
   // channels.
   Moments blocks_at_step, blocks_at_double_step, blocks_extrapolated;
   Moments image_sum;  // one value: the extrapolated difference summed over all pixels and channels
+  // Moving edges make differences a sum of rare events: single samples that see the other side. The
+  // typical size of an event, sum |x|^3 / sum x^2 over the pixels' sums of a batch.
+  double event_at_step = 0, event_at_double_step = 0, event_extrapolated = 0;
   int64_t spp = 0;
   uint64_t rays = 0;
   double seconds = 0;

@@ -1,0 +1,250 @@
+// Gradients of small scenes that hold everything at once against finite differences: every kind of
+// parameter, every kind of edge.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "limn/integrators/check.h"
+#include "support/meshes.h"
+#include "support/scenes.h"
+
+namespace limn {
+namespace {
+
+CheckResult run_check(const Scene& scene, const std::string& parameter, int spp,
+                      std::array<bool, kTermCount> terms = {true, true, true}) {
+  CheckOptions options;
+  options.parameter = parameter;
+  options.terms = terms;
+  options.block = 4;
+  RunSettings settings;
+  settings.spp = spp;
+  settings.seed = 11;
+  const CheckResult r = check(scene, options, settings);
+  EXPECT_EQ(r.gradient.non_finite.count, 0u) << r.gradient.non_finite.message();
+  EXPECT_EQ(r.differences.non_finite.count, 0u) << r.differences.non_finite.message();
+  fmt::print(
+      "{:28} {:3} blocks, mean z {:6.2f}, sd {:5.2f}, max |z| {:6.2f}; image {:10.4g} +- "
+      "{:8.2g}, differences {:10.4g} +- {:8.2g}, z {:6.2f}\n",
+      parameter.substr(0, parameter.find(':')), r.extrapolated.count, r.extrapolated.mean,
+      r.extrapolated.deviation, r.extrapolated.largest, r.total.gradient, r.total.gradient_error,
+      r.total.difference, r.total.difference_error, r.total.z);
+  return r;
+}
+
+void expect_agreement(const Scene& scene, const std::string& parameter, int spp) {
+  const CheckResult r = run_check(scene, parameter, spp);
+  EXPECT_GT(r.extrapolated.count, 0) << parameter;
+  EXPECT_TRUE(r.agree) << parameter << ": suspect "
+                       << (r.suspect >= 0 ? term_name(r.suspect) : "nothing");
+}
+
+// A leaf of two triangles, bent, seen from both sides.
+Mesh leaf_mesh() {
+  return make_mesh({{-1, 0, 0}, {0, -0.5f, 0.3f}, {0, 0.5f, 0.3f}, {1, 0, 0}},
+                   {{0, 1, 2}, {2, 1, 3}});
+}
+
+// A sharp cube, a smooth ball and an open leaf over a glossy floor, under a lamp and a sky.
+SceneParts mixed_scene(const TempFiles& files) {
+  SceneParts parts;
+  parts.max_depth = 4;
+  parts.origin = {1, 2.5, 5};
+  parts.target = {0, 0.6, 0};
+  const std::string leaf =
+      R"(<bsdf type="twosided">)" + diffuse("green", "0.3, 0.6, 0.2") + "</bsdf>";
+  parts.body = square("floor", 2.5, -90, {0, 0, 0}, conductor("gloss", 0.2)) +
+               obj_shape("cube", write_mesh(files, "cube.obj", cube_mesh()), true, 0.4,
+                         {-0.8, 0.5, 0.2}, diffuse("clay", "0.7, 0.5, 0.3")) +
+               obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(1)), false, 0.5,
+                         {0.7, 0.6, 0.3}, diffuse("chalk", "0.8, 0.8, 0.8")) +
+               obj_shape("leaf", write_mesh(files, "leaf.obj", leaf_mesh()), true, 0.6,
+                         {0, 1.4, -0.2}, leaf) +
+               square("lamp", 0.4, 90, {0.3, 2.4, 0.5}, area_light("glow", "6, 5, 4")) +
+               make_sky(files, "sky");
+  return parts;
+}
+
+class MixedScene : public testing::TestWithParam<std::string> {};
+
+TEST_P(MixedScene, Agrees) {
+  const TempFiles files;
+  const Scene scene = make_scene(files, mixed_scene(files));
+  std::string parameter = GetParam();
+  if (parameter.ends_with(':')) {
+    std::string velocities;
+    for (const Vec3f& x : icosphere_mesh(1).positions) {
+      velocities += fmt::format("{} {} {}\n", x.y * x.y, x.x, x.z * x.x);
+    }
+    parameter += files.write("velocity.txt", velocities);
+  }
+  expect_agreement(scene, parameter, 128);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    , MixedScene,
+    testing::Values("cube.translate.x", "cube.rotate.y", "cube.scale", "ball.translate.y",
+                    "ball.rotate.x", "ball.scale", "ball.vertex_positions:", "leaf.rotate.z",
+                    "leaf.translate.y", "floor.translate.y", "floor.rotate.x", "lamp.translate.x",
+                    "lamp.rotate.z", "sensor.translate.x", "sensor.translate.z", "sensor.rotate.y",
+                    "sensor.fov", "gloss.alpha", "clay.reflectance", "glow.radiance", "sky.scale"),
+    [](const auto& test) {
+      std::string name = test.param;
+      for (char& c : name) {
+        if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
+      }
+      return name;
+    });
+
+// Each term alone left out must be noticed, and named.
+class MissingTerm : public testing::TestWithParam<int> {};
+
+TEST_P(MissingTerm, IsNoticedAndNamed) {
+  const int missing = GetParam();
+  const TempFiles files;
+  SceneParts parts;
+  parts.max_depth = 2;
+  parts.origin = {0, 3, 4};
+  parts.body = square("floor", 3, -90, {0, 0, 0}, diffuse("chalk", "0.8, 0.8, 0.8")) +
+               obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(1)), false, 0.8,
+                         {0, 1, 0}, diffuse("clay", "0.2, 0.2, 0.2")) +
+               square("lamp", 1, 90, {0, 2.5, 1}, area_light("glow", "5, 5, 5"));
+  const Scene scene = make_scene(files, parts);
+  std::array<bool, kTermCount> terms = {true, true, true};
+  terms[missing] = false;
+  const CheckResult r = run_check(scene, "ball.translate.y", 1024, terms);
+  EXPECT_FALSE(r.agree);
+  EXPECT_EQ(r.suspect, missing);
+  EXPECT_NEAR(r.suspicions[missing].factor, 1, 6 / std::fabs(r.suspicions[missing].z));
+  fmt::print("  {} missing: {:.3f} of it found, z = {:.1f}\n", term_name(missing),
+             r.suspicions[missing].factor, r.suspicions[missing].z);
+}
+
+INSTANTIATE_TEST_SUITE_P(, MissingTerm, testing::Values(kInterior, kCamera, kBoundary),
+                         [](const auto& test) { return term_name(test.param); });
+
+// A ball so coarse that its shading normals lie far from the geometric ones.
+class CoarseBall : public testing::TestWithParam<std::tuple<std::string, int>> {
+ protected:
+  Scene make(const TempFiles& files) const {
+    const auto& [surface, levels] = GetParam();
+    const std::string bsdf =
+        surface == "glossy" ? conductor("skin", 0.3) : diffuse("skin", "0.8, 0.8, 0.8");
+    SceneParts parts;
+    parts.origin = {0, 0.5, 4};
+    parts.target = {0, 0, 0};
+    parts.max_depth = 2;
+    parts.body = obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(levels)), false, 1,
+                           {0, 0, 0}, bsdf) +
+                 square("lamp", 0.5, 90, {0.5, 2, 0.5}, area_light("glow", "9, 9, 9")) +
+                 constant_light("sky", "0.5, 0.5, 0.5");
+    return make_scene(files, parts);
+  }
+};
+
+TEST_P(CoarseBall, AgreesByDefault) {
+  const TempFiles files;
+  expect_agreement(make(files), "ball.translate.x", 512);
+  expect_agreement(make(files), "ball.rotate.z", 512);
+}
+
+TEST_P(CoarseBall, DisagreesWhereShadingJumps) {
+  const TempFiles files;
+  Scene scene = make(files);
+  scene.shading = ShadingModel::kMitsuba;
+  const CheckResult r = run_check(scene, "ball.scale", 512);
+  EXPECT_FALSE(r.agree);
+  EXPECT_GT(std::max(std::fabs(r.total.z), r.extrapolated.largest), 6);
+  ASSERT_EQ(r.gradient.warnings.size(), 1u);
+  scene.shading = ShadingModel::kContinuous;
+  EXPECT_TRUE(run_check(scene, "ball.scale", 512).agree);
+}
+
+INSTANTIATE_TEST_SUITE_P(, CoarseBall,
+                         testing::Combine(testing::Values("diffuse", "glossy"),
+                                          testing::Values(0, 1)),
+                         [](const auto& test) {
+                           return std::get<0>(test.param) + std::to_string(std::get<1>(test.param));
+                         });
+
+// A room that is one mesh with a step in it: concave and convex sharp edges, seen from inside.
+Mesh room_mesh() {
+  // An L extruded along z: the outline counter-clockwise seen from +z, faces turned inwards.
+  const std::vector<std::array<float, 2>> outline{{-2, 0}, {2, 0},     {2, 3},
+                                                  {-1, 3}, {-1, 0.8f}, {-2, 0.8f}};
+  const std::array<FaceIndices, 4> cap{{{0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {0, 4, 5}}};
+  std::vector<Vec3f> x;
+  for (const float z : {-2.0f, 2.0f})
+    for (const auto& [a, b] : outline) x.push_back({a, b, z});
+  std::vector<FaceIndices> faces;
+  for (const auto& [a, b, c] : cap) {
+    faces.push_back({a, b, c});
+    faces.push_back({a + 6, c + 6, b + 6});
+  }
+  for (uint32_t i = 0; i < 6; ++i) {
+    const uint32_t j = (i + 1) % 6;
+    faces.push_back({i, j + 6, j});
+    faces.push_back({i, i + 6, j + 6});
+  }
+  return make_mesh(x, faces);
+}
+
+class Room : public testing::TestWithParam<std::string> {};
+
+TEST_P(Room, Agrees) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.max_depth = 4;
+  parts.origin = {0.6, 1.6, 1.8};
+  parts.target = {-0.2, 0.7, -1};
+  parts.fov = 80;
+  parts.body = obj_shape("room", write_mesh(files, "room.obj", room_mesh()), true, 1, {0, 0, 0},
+                         diffuse("wall", "0.7, 0.6, 0.5")) +
+               obj_shape("box", write_mesh(files, "box.obj", cube_mesh()), true, 0.4,
+                         {0.5, 0.45, -0.7}, diffuse("card", "0.3, 0.5, 0.7")) +
+               square("lamp", 0.5, 90, {0.5, 2.9, -0.3}, area_light("glow", "8, 8, 8"));
+  expect_agreement(make_scene(files, parts), GetParam(), 192);
+}
+
+INSTANTIATE_TEST_SUITE_P(, Room,
+                         testing::Values("box.translate.y", "box.rotate.y", "sensor.translate.x",
+                                         "sensor.rotate.x", "room.translate.x", "room.scale",
+                                         "lamp.translate.z", "wall.reflectance"),
+                         [](const auto& test) {
+                           std::string name = test.param;
+                           std::replace(name.begin(), name.end(), '.', '_');
+                           return name;
+                         });
+
+// Roulette and hidden emitters change the paths, not what they mean.
+TEST(Paths, RouletteAgrees) {
+  const TempFiles files;
+  SceneParts parts = mixed_scene(files);
+  parts.max_depth = -1;
+  parts.rr_depth = 2;
+  expect_agreement(make_scene(files, parts), "cube.translate.x", 128);
+}
+
+TEST(Paths, HiddenEmittersAgree) {
+  const TempFiles files;
+  SceneParts parts = mixed_scene(files);
+  parts.hide_emitters = true;
+  parts.origin = {0.3, 3.5, 4};  // the lamp stands before the floor
+  const Scene scene = make_scene(files, parts);
+  for (const char* name : {"lamp.translate.x", "cube.translate.x", "sensor.translate.y"}) {
+    expect_agreement(scene, name, 128);
+  }
+}
+
+TEST(Paths, FiltersAgree) {
+  const TempFiles files;
+  SceneParts parts = mixed_scene(files);
+  for (const char* film :
+       {R"(<rfilter type="gaussian"/>)",
+        R"(<rfilter type="tent"/><boolean name="sample_border" value="true"/>)"}) {
+    parts.film = film;
+    expect_agreement(make_scene(files, parts), "sensor.rotate.y", 128);
+  }
+}
+
+}  // namespace
+}  // namespace limn

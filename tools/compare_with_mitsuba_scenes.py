@@ -1,0 +1,146 @@
+"""One small scene per feature that limn and Mitsuba 3 share, for compare_with_mitsuba.py."""
+import itertools
+import os
+
+import mitsuba as mi
+import numpy as np
+
+SCENE = """<scene version="3.0.0">
+  <integrator type="path">{integrator}</integrator>
+  <sensor type="perspective">
+    {sensor}
+    <transform name="to_world"><lookat origin="1.5,3,6" target="0.1,0.7,0" up="0,1,0"/></transform>
+    <film type="hdrfilm"><string name="component_format" value="float32"/>
+      <string name="pixel_format" value="rgb"/>{film}</film>
+  </sensor>
+  <shape type="rectangle" id="floor">
+    <transform name="to_world"><rotate x="1" angle="-90"/><scale value="4"/></transform>
+    {floor}
+  </shape>
+  {objects}
+  {lights}
+</scene>
+"""
+
+DEPTH = '<integer name="max_depth" value="{}"/><integer name="rr_depth" value="{}"/>'
+FOV = '<float name="fov" value="40"/>'
+SIZE = '<integer name="width" value="{}"/><integer name="height" value="{}"/>'
+BOX = '<rfilter type="box"/>'
+GREY = '<bsdf type="diffuse"><rgb name="reflectance" value="0.7,0.5,0.3"/></bsdf>'
+CUBE = """<shape type="cube"><transform name="to_world"><scale value="0.6"/><rotate y="1" angle="30"/>
+    <translate x="-1" y="0.8"/></transform><bsdf type="diffuse"/></shape>"""
+LAMP = """<shape type="rectangle"><transform name="to_world"><rotate x="1" angle="{angle}"/>
+    <scale value="{size}"/><translate x="{x}" y="4"/></transform>
+    <emitter type="area"><rgb name="radiance" value="{radiance}"/></emitter></shape>"""
+ONE_LAMP = LAMP.format(angle=90, size=0.8, x=0, radiance="8,7,6")
+VISIBLE_LAMP = """<shape type="rectangle"><transform name="to_world"><scale value="0.7"/>
+    <translate x="1" y="1.2" z="-1"/></transform>
+    <emitter type="area"><rgb name="radiance" value="3,2,1"/></emitter></shape>"""
+CONSTANT = '<emitter type="constant"><rgb name="radiance" value="0.3,0.4,0.5"/></emitter>'
+CONDUCTOR = """<bsdf type="roughconductor"><string name="distribution" value="{distribution}"/>
+    <float name="alpha" value="{alpha}"/><rgb name="eta" value="0.2,0.92,1.1"/>
+    <rgb name="k" value="3.9,2.4,2.1"/></bsdf>"""
+MESH = """<shape type="obj"><string name="filename" value="{file}"/>
+    <boolean name="face_normals" value="{flat}"/><transform name="to_world"><scale value="{scale}"/>
+    <translate x="0.8" y="0.9"/></transform>{bsdf}</shape>"""
+
+
+def write_sphere(file, rings, columns):
+    """A coarse unit sphere without normals; the vertices are shared."""
+    lines = ["v 0 1 0"]
+    for i, j in itertools.product(range(1, rings), range(columns)):
+        a, b = np.pi * i / rings, 2 * np.pi * j / columns
+        lines.append(f"v {np.sin(a) * np.sin(b)} {np.cos(a)} {np.sin(a) * np.cos(b)}")
+    lines.append("v 0 -1 0")
+    last = 2 + (rings - 1) * columns
+    at = lambda i, j: 2 + (i - 1) * columns + j % columns
+    for j in range(columns):
+        lines += [f"f 1 {at(1, j)} {at(1, j + 1)}",
+                  f"f {last} {at(rings - 1, j + 1)} {at(rings - 1, j)}"]
+        for i in range(1, rings - 1):
+            lines += [f"f {at(i, j)} {at(i + 1, j)} {at(i + 1, j + 1)}",
+                      f"f {at(i, j)} {at(i + 1, j + 1)} {at(i, j + 1)}"]
+    with open(file, "w") as out:
+        out.write("\n".join(lines) + "\n")
+
+
+def write_sky(file, width, height):
+    """A smooth sky with one bright spot, different in every direction."""
+    y, x = np.mgrid[0:height, 0:width]
+    sky = np.stack([0.3 + 0.2 * np.sin(2 * np.pi * x / width), 0.4 + 0.3 * y / height,
+                    0.5 + 0.2 * np.cos(4 * np.pi * x / width)], axis=-1)
+    sky[height // 4, width // 3] = [40, 30, 20]
+    mi.Bitmap(sky.astype(np.float32)).write(file)
+
+
+def scene(folder, name, **parts):
+    defaults = {"integrator": DEPTH.format(3, 1000), "sensor": FOV, "film": SIZE.format(48, 48) + BOX,
+                "floor": GREY, "objects": CUBE, "lights": ONE_LAMP + CONSTANT}
+    file = os.path.join(folder, name.replace(" ", "_") + ".xml")
+    with open(file, "w") as out:
+        out.write(SCENE.format(**{**defaults, **parts}))
+    return file
+
+
+def cases(folder):
+    """(name, parts of the scene, options of limn)."""
+    sphere = os.path.join(folder, "sphere.obj")
+    sky = os.path.join(folder, "sky.exr")
+    write_sphere(sphere, 5, 8)
+    write_sky(sky, 32, 16)
+    envmap = f"""<emitter type="envmap"><string name="filename" value="{sky}"/>
+        <float name="scale" value="1.5"/><transform name="to_world"><rotate x="1" angle="50"/>
+        <rotate z="1" angle="25"/><rotate y="1" angle="20"/></transform></emitter>"""
+    yield "base", {}, []
+    for depth in (1, 2, 4, 5):
+        yield f"max_depth {depth}", {"integrator": DEPTH.format(depth, 1000),
+                                     "objects": CUBE + VISIBLE_LAMP}, []
+    yield "roulette", {"integrator": DEPTH.format(-1, 2)}, []
+    yield "roulette default", {"integrator": ""}, []
+    for text in ('<rfilter type="tent"/>', '<rfilter type="tent"><float name="radius" value="1.7"/></rfilter>',
+                 '<rfilter type="gaussian"/>',
+                 '<rfilter type="gaussian"><float name="stddev" value="0.8"/></rfilter>', BOX):
+        for border in ("true", "false"):
+            kind = text.split('"')[1] + (text.split('value="')[1][:3] if "value" in text else "")
+            film = SIZE.format(8, 8) + f'<boolean name="sample_border" value="{border}"/>' + text
+            yield f"filter {kind} border {border}", {"film": film}, []
+    crop = "".join(f'<integer name="crop_{n}" value="{v}"/>' for n, v in
+                   (("offset_x", 9), ("offset_y", 4), ("width", 24), ("height", 16)))
+    yield "crop", {"film": SIZE.format(64, 40) + crop + BOX}, []
+    yield "crop gaussian", {"film": SIZE.format(64, 40) + crop}, []
+    for axis, size in itertools.product(("x", "y", "diagonal", "smaller", "larger"),
+                                        ((56, 32), (32, 56))):
+        sensor = FOV + f'<string name="fov_axis" value="{axis}"/>'
+        yield f"fov_axis {axis} {size[0]}", {"sensor": sensor, "film": SIZE.format(*size) + BOX}, []
+    yield "principal point", {"sensor": FOV + '<float name="principal_point_offset_x" value="0.1"/>'
+                              '<float name="principal_point_offset_y" value="-0.2"/>'}, []
+    yield "focal length", {"sensor": '<string name="focal_length" value="40mm"/>'}, []
+    yield "clip planes", {"sensor": FOV + '<float name="near_clip" value="5.5"/>'
+                          '<float name="far_clip" value="7.5"/>'}, []
+    for distribution, alpha in itertools.product(("ggx", "beckmann"), (0.05, 0.2, 0.6)):
+        bsdf = CONDUCTOR.format(distribution=distribution, alpha=alpha)
+        yield f"{distribution} {alpha} envmap", {"floor": bsdf, "lights": envmap}, []
+        yield f"{distribution} {alpha} lamp", {"floor": bsdf, "lights": ONE_LAMP + CONSTANT,
+                                               "objects": CUBE + VISIBLE_LAMP}, []
+    yield "default conductor", {"floor": '<bsdf type="roughconductor"/>'}, []
+    yield "envmap diffuse", {"lights": envmap}, []
+    yield "twosided", {"objects": CUBE.replace("rotate y", "rotate x"), "floor":
+                       f'<bsdf type="twosided">{CONDUCTOR.format(distribution="ggx", alpha=0.3)}{GREY}</bsdf>',
+                       "sensor": FOV, "lights": VISIBLE_LAMP.replace('y="1.2"', 'y="-1.5"') + envmap}, []
+    yield "two lamps", {"lights": LAMP.format(angle=90, size=0.5, x=-1, radiance="8,1,1") +
+                        LAMP.format(angle=70, size=0.3, x=2, radiance="1,9,30")}, []
+    yield "hide_emitters", {"integrator": DEPTH.format(3, 1000) +
+                            '<boolean name="hide_emitters" value="true"/>',
+                            "objects": CUBE + VISIBLE_LAMP}, []
+    for kind, bsdf in (("diffuse", GREY), ("twosided", f'<bsdf type="twosided">{GREY}</bsdf>'),
+                       ("ggx", CONDUCTOR.format(distribution="ggx", alpha=0.15))):
+        mesh = MESH.format(file=sphere, flat="false", scale=0.8, bsdf=bsdf)
+        yield f"smooth {kind}", {"objects": CUBE + mesh, "lights": ONE_LAMP + envmap}, \
+            ["--shading", "mitsuba"]
+    flat = MESH.format(file=sphere, flat="true", scale=0.8, bsdf=GREY)
+    yield "flat sphere", {"objects": flat, "lights": envmap}, []
+
+
+def suite(folder):
+    for name, parts, options in cases(folder):
+        yield name, scene(folder, name, **parts), options
