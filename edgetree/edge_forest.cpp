@@ -5,6 +5,7 @@
 #include "forest_build.h"
 #include "forest_query.h"
 #include "samplers.h"
+#include "seen_edge.h"
 
 namespace limn {
 namespace {
@@ -84,31 +85,35 @@ struct EdgeForest::Impl {
     return total;
   }
 
-  // Draws a root by the uniform number u, leaves another one in it and the root's weights.
-  uint32_t choose_root(const ForestQuery& query, double root_total, double& u,
-                       Weights& weights) const {
-    double rest = u * root_total, total = 0;
+  // Draws a root by the uniform number u, leaves another one in it, and the root's weights. Returns
+  // kNoParent if no root has weight. total: root_total.
+  uint32_t choose_root(const ForestQuery& query, double& u, Weights& weights, double& total) const {
     uint32_t chosen = kNoParent;
     Weights next;
+    total = 0;
     for (uint32_t root : forest.roots) {
-      weigh(root, query, next);
-      if (!(next.total() > 0)) continue;
-      if (chosen != kNoParent) rest -= total;
-      chosen = root;
-      weights = next;
-      total = next.total();
-      if (rest < total) break;
+      weigh(root, query, chosen == kNoParent ? weights : next);
+      const double weight = (chosen == kNoParent ? weights : next).total();
+      total += weight;
+      const double share = weight > 0 ? weight / total : 0;
+      if (u < share) {
+        u = below_one(u / share);
+        if (chosen != kNoParent) weights = next;
+        chosen = root;
+      } else if (chosen != kNoParent) {
+        u = below_one((u - share) / (1 - share));
+      }
     }
-    u = below_one(rest / total);
     return chosen;
   }
 
   // Draws an edge without testing it.
   bool draw(const ForestQuery& query, double u, EdgeSample& sample) const {
-    double scale = root_total(query);
-    if (!(scale > 0)) return false;
+    double scale;
     Weights weights;
-    const ForestNode* node = &forest.nodes[choose_root(query, scale, u, weights)];
+    const uint32_t root = choose_root(query, u, weights, scale);
+    if (root == kNoParent) return false;
+    const ForestNode* node = &forest.nodes[root];
     sample.probability = 1;
     while (true) {
       const int lane = choose(weights, u);
@@ -147,7 +152,7 @@ struct EdgeForest::Impl {
     return is_candidate(input.objects[id.object], id.edge, query.p) &&
            !is_own_edge(input, query, id);
   }
-  LtcEdge seen_edge(const LtcLobe& lobe, const Vec3d& p, EdgeId id) const {
+  SeenEdge seen_edge(const LtcLobe& lobe, const Vec3d& p, EdgeId id) const {
     const EdgeMesh& mesh = input.objects[id.object];
     const auto [a, b] = mesh.edges[id.edge].vertices;
     return {lobe, mesh.positions[a] - p, mesh.positions[b] - p};
@@ -170,8 +175,8 @@ bool EdgeForest::sample(const EdgeQuery& query, Rng& rng, EdgeSample& sample) co
   const ForestQuery prepared = impl_->prepare(query);
   if (!impl_->draw(prepared, u_edge, sample)) return false;
   if (!impl_->accepts(query, sample.edge)) return false;
-  const LtcEdge edge = impl_->seen_edge(prepared.lobe, query.p, sample.edge);
-  if (!(edge.integral() > 0)) return false;
+  const SeenEdge edge = impl_->seen_edge(prepared.lobe, query.p, sample.edge);
+  if (!(edge.is_seen())) return false;
   sample.t = edge.sample_t(u_t);
   sample.pdf_t = edge.pdf_t(sample.t);
   return true;
@@ -181,14 +186,14 @@ double EdgeForest::probability(const EdgeQuery& query, EdgeId id) const {
   const uint32_t slot = impl_->forest.slots[id.object][id.edge];
   if (slot == kNoParent || !impl_->accepts(query, id)) return 0;
   const ForestQuery prepared = impl_->prepare(query);
-  if (!(impl_->seen_edge(prepared.lobe, query.p, id).integral() > 0)) return 0;
+  if (!(impl_->seen_edge(prepared.lobe, query.p, id).is_seen())) return 0;
   Weights weights;
   return impl_->probability(slot, prepared, weights);
 }
 
 double EdgeForest::pdf_t(const EdgeQuery& query, EdgeId id, double t) const {
-  const LtcEdge edge = impl_->seen_edge(LtcLobe(query.lobe, query.n, query.wi), query.p, id);
-  return edge.integral() > 0 ? edge.pdf_t(t) : 0;
+  const SeenEdge edge = impl_->seen_edge(LtcLobe(query.lobe, query.n, query.wi), query.p, id);
+  return edge.is_seen() ? edge.pdf_t(t) : 0;
 }
 
 uint64_t EdgeForest::list_silhouettes(const Vec3d& p, std::vector<EdgeId>& edges) const {
