@@ -38,7 +38,7 @@ class Program : public testing::Test {
     parts.width = parts.height = 8;
     parts.body = R"(  <default name="glow" value="6, 5, 4"/>
 )" + square("floor", 2.5, -90, {0, 0, 0}, diffuse("clay", "0.7, 0.5, 0.3")) +
-                 square("screen", 0.5, 0, {0.2, 0.7, 0}, diffuse("paper", "0.8, 0.8, 0.8")) +
+                 square("screen", 0.8, 50, {0.2, 0.9, 0}, diffuse("paper", "0.8, 0.8, 0.8")) +
                  square("lamp", 0.5, 90, {0.3, 2.4, 0.5}, area_light("blaze", "$glow"));
     scene_ = files_.write("scene.xml", scene_text(parts));
   }
@@ -70,7 +70,7 @@ TEST_F(Program, RendersAndDifferentiates) {
 }
 
 TEST_F(Program, ChecksBothWays) {
-  const std::string check = "check " + scene_ + " --spp 256 --block 4 --wrt screen.translate.y";
+  const std::string check = "check " + scene_ + " --spp 2048 --block 2 --wrt screen.translate.y";
   const Outcome right = run(check);
   EXPECT_EQ(right.status, 0) << right.text;
   EXPECT_NE(right.text.find("agree"), std::string::npos);
@@ -92,7 +92,7 @@ TEST_F(Program, UnknownNamesListTheKnown) {
   EXPECT_NE(refused(gradient + " --terms interior,border").find("boundary"), std::string::npos);
   EXPECT_NE(refused("render " + scene_ + " --shading phong -o " + out()).find("continuous"),
             std::string::npos);
-  EXPECT_NE(refused("paint " + scene_).find("render"), std::string::npos);
+  EXPECT_NE(refused("paint " + scene_).find("A subcommand is required"), std::string::npos);
 }
 
 TEST_F(Program, BadNumbers) {
@@ -104,12 +104,12 @@ TEST_F(Program, BadNumbers) {
   EXPECT_NE(refused("check " + scene_ + " --wrt screen.translate.x --step 0").find("--step"),
             std::string::npos);
   EXPECT_EQ(refused("check " + scene_ + " --wrt screen.translate.x --spp 1"),
-            "check needs --spp of at least 2, for standard errors\n");
+            "error: check needs --spp of at least 2, for standard errors\n");
 }
 
 TEST_F(Program, BadDefines) {
   const std::string render = "render " + scene_ + " -o " + out();
-  EXPECT_EQ(refused(render + " -D glow"), "-D glow: expected NAME=VALUE\n");
+  EXPECT_EQ(refused(render + " -D glow"), "error: -D glow: expected NAME=VALUE\n");
   EXPECT_NE(refused(render + " -D gloww=3").find("(known: glow)"), std::string::npos);
   EXPECT_NE(refused(render + " -D glow=bright").find("scene.xml:"), std::string::npos);
 }

@@ -141,7 +141,7 @@ TEST(NonFinite, IsCountedAndLocated) {
   const TempFiles files;
   SceneParts parts = small_scene(files);
   parts.width = parts.height = 8;
-  // Finite, but not what it lights.
+  // More than an image can hold.
   parts.body += square("blinding", 1, 90, {-1, 2.8, 0}, area_light("blaze", "1e308, 0, 0"));
   const Scene scene = make_scene(files, parts);
   const RenderResult r = render(scene, run_settings(16));
