@@ -1,6 +1,7 @@
 #include "forest_build.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -66,9 +67,16 @@ Box box_of(std::span<const Wedge> wedges) {
   return box;
 }
 
+// The 24 leading bits: a number that a float holds. Not by a cast to float and back, because GCC 12
+// drops such a pair of casts where it makes vectors of them.
+double truncated(double x) {
+  return std::bit_cast<double>(std::bit_cast<uint64_t>(x) & ~((uint64_t{1} << 29) - 1));
+}
+
 NodeFrame frame_of(const Box& box) {
-  const double radius = length(box.half());
-  return {cast<double>(cast<float>(box.center())), static_cast<double>(static_cast<float>(radius))};
+  const Vec3d center = box.center();
+  return {{truncated(center.x), truncated(center.y), truncated(center.z)},
+          truncated(length(box.half()))};
 }
 
 float rounded_up(double x) {
@@ -130,10 +138,10 @@ class TreeFiller {
     for (int k = 0; k < 3; ++k) put(node.cover[k], dual.cover[k] / squared);
     const Box box = box_of(wedges);
     for (int k = 0; k < 3; ++k) {
-      put(node.box_center[k], (box.center()[k] - frame.center[k]) / frame.radius);
+      const double center = truncated((box.center()[k] - frame.center[k]) / frame.radius);
+      put(node.box_center[k], center);
       const double low = (box.low[k] - frame.center[k]) / frame.radius;
       const double high = (box.high[k] - frame.center[k]) / frame.radius;
-      const double center = node.box_center[k][lane];
       node.box_half[k][lane] = rounded_up(std::max(high - center, center - low));
     }
     double length = 0, speed = 0;
