@@ -5,14 +5,15 @@
 
 #include "ltc_table.h"
 
-// Boxes. Where the lobe's axis z' is well above the box, map directions to slopes (x', y') / z'.
-// There the transformed cosine has the density 1 / (pi (1 + r^2)^2), which is the area measure of
-// the sphere under stereographic projection, and that maps discs to caps. So the mass of a disc of
-// radius rho around a slope at distance r from the origin is the area of a cap,
-//   mass = 2 rho^2 / (s (s + q)),   q = 1 + r^2 - rho^2,   s^2 = q^2 + 4 rho^2.
-// A box is taken for the disc with the same variance across the axis. Multiplying all lengths by
-// z' removes the division by it, and clipping z' to its mean above the lobe's own horizon keeps the
-// formula alive for boxes that cross it. rho = 0 gives the density of the box's centre.
+// Boxes. Map directions to slopes (x, y) / z of w' = M^-1 w. There the transformed cosine has the
+// density 1 / (pi (1 + r^2)^2). A box is taken for a rectangle of slopes with the variances that
+// its points have along the two axes, perspective to first order. The mass of the rectangle is
+// approximated by a product of the exact marginal of the coordinate that is farther out, x,
+//   integral over y = 1 / (2 (1 + x^2)^(3/2)) = d/dx of x / (2 sqrt(1 + x^2)),
+// and for the other, given the x closest to the axis, the same shape stretched by sqrt(1 + x^2)
+// (exact would be the power -2 for -3/2, which needs an arctangent).
+// Lengths stay multiplied by z; z is clipped to its mean above the lobe's own horizon, which keeps
+// all of it alive for boxes that cross that.
 
 namespace limn {
 namespace {
@@ -28,6 +29,28 @@ Float4 mean_above_zero(Float4 middle, Float4 reach) {
   const Float4 upper = max(middle + reach, splat(0.0f));
   return middle >= reach ? middle : upper * upper / max(4 * reach, splat(0x1p-126f));
 }
+
+// Mean of d/dx of x / sqrt(z^2 + x^2) over middle +- reach, middle >= 0, reach > 0.
+Float4 mean_slope(Float4 middle, Float4 reach, Float4 z) {
+  const Float4 x1 = middle - reach, x2 = middle + reach, z2 = z * z;
+  const Float4 s1 = sqrt(z2 + x1 * x1), s2 = sqrt(z2 + x2 * x2);
+  const Float4 a = x2 * s1, b = x1 * s2;
+  // Two forms of (a - b) / (2 reach): without cancellation for either sign of x1.
+  return (x1 > 0 ? 2 * middle * z2 / (a + b) : (a - b) / (2 * reach)) / (s1 * s2);
+}
+
+// Half width of the uniform distribution whose variance the box has along `row`, measured in the
+// slope to `axis` around the centre's slope, times z. A floor of 3 % of the lobe's width (which has
+// z for its unit) changes no mean and avoids 0 / 0.
+Float4 reach_across(const float row[3], const float axis[3], Float4 slope, const Float4x3& half,
+                    Float4 z) {
+  const Float4 a = (row[0] - slope * axis[0]) * half.x, b = (row[1] - slope * axis[1]) * half.y,
+               c = (row[2] - slope * axis[2]) * half.z;
+  return sqrt(a * a + b * b + c * c + 1e-3f * z * z);
+}
+
+constexpr float kInversePi = static_cast<float>(1 / kPi);
+constexpr float kSphere = static_cast<float>(4 * kPi);
 
 }  // namespace
 
@@ -64,15 +87,11 @@ void LtcLobe::read_table(const LobeSummary& lobe, const Vec3d& wi) {
   det_ = 1 / (shape.width_x * shape.width_y);
 }
 
-// The variance of a box along its axis i is half_i^2 / 3, that of a disc rho^2 / 4 along each of
-// its two axes: rho^2 = 2 / 3 sum over i, both rows, of (row_i half_i)^2.
 void LtcLobe::prepare_boxes() {
   det_f_ = static_cast<float>(det_);
   for (int i = 0; i < 3; ++i) {
     n_f_[i] = static_cast<float>(n_[i]);
     for (int k = 0; k < 3; ++k) rows_f_[k][i] = static_cast<float>(rows_[k][i]);
-    spread_f_[i] =
-        static_cast<float>((rows_[0][i] * rows_[0][i] + rows_[1][i] * rows_[1][i]) * (2.0 / 3));
   }
 }
 
@@ -91,37 +110,49 @@ double LtcLobe::value(const Vec3d& w) const {
 }
 
 Float4 LtcLobe::mean_over_boxes(Float4x3 centre, Float4x3 half) const {
-  constexpr float kInversePi = static_cast<float>(1 / kPi);
   // Lengths relative to one between the distance and the size of the box. The cosine's mean is then
   // about the mean height, from far away to a box around p.
   const Float4 size2 = dot(centre, centre) + dot(half, half);
   const Float4 scale = 1 / sqrt(max(size2, splat(0x1p-126f)));
   centre = centre * scale;
   half = half * scale;
-  const Float4 reach = abs_dot3(n_f_, half);
-  // Rounding above is below this.
+  // Rounding stays below what is added here.
   const Float4 middle = dot3(n_f_, centre) + 0x1p-21f;
-  const Float4 cosine = mean_above_zero(middle, reach + 0x1p-21f) * kInversePi;
+  const Float4 reach = abs_dot3(n_f_, half) + 0x1p-21f;
+  const Float4 cosine = mean_above_zero(middle, reach) * kInversePi;
   if (diffuse_) return cosine;
+  const Float4 mixed = static_cast<float>(1 - kLtcFloor) * ltc_mean(centre, half) +
+                       static_cast<float>(kLtcFloor) * cosine;
+  return select(middle + reach > 0, mixed, splat(0.0f));
+}
 
-  const Float4 z = mean_above_zero(dot3(rows_f_[2], centre), abs_dot3(rows_f_[2], half));
-  const Float4 x = dot3(rows_f_[0], centre), y = dot3(rows_f_[1], centre);
-  const Float4 half2_x = half.x * half.x, half2_y = half.y * half.y, half2_z = half.z * half.z;
-  const Float4 rho2 = half2_x * spread_f_[0] + half2_y * spread_f_[1] + half2_z * spread_f_[2];
-  const Float4 r2 = x * x + y * y, z2 = z * z;
-  const Float4 q = z2 + r2 - rho2;
-  const Float4 s = sqrt(q * q + 4 * rho2 * z2);
-  // 1 / (s + q), without cancellation for negative q.
-  const Float4 inverse = q > 0 ? 1 / (s + q) : (s - q) / (4 * rho2 * z2);
-  const Float4 d2 = dot(centre, centre), d3 = d2 * sqrt(d2);
-  const Float4 far = 2 * kInversePi * det_f_ * d3 * z * inverse / s;
-  // No mean exceeds the whole mass spread over the box's solid angle: 2 |half|^2 for a distant
+// Mean of `ltc` alone; |centre|^2 + |half|^2 = 1.
+Float4 LtcLobe::ltc_mean(const Float4x3& centre, const Float4x3& half) const {
+  const Float4 middle_z = dot3(rows_f_[2], centre), reach_z = abs_dot3(rows_f_[2], half);
+  const Float4 z = mean_above_zero(middle_z, reach_z);
+  // 1 / z for boxes that are far from the lobe's horizon, 0 for those that meet it.
+  const Float4 inverse_z =
+      max(middle_z - reach_z, splat(0.0f)) / max(middle_z * middle_z, splat(0x1p-126f));
+  const Float4 signed_x = dot3(rows_f_[0], centre), signed_y = dot3(rows_f_[1], centre);
+  const Float4 reach_x = reach_across(rows_f_[0], rows_f_[2], signed_x * inverse_z, half, z);
+  const Float4 reach_y = reach_across(rows_f_[1], rows_f_[2], signed_y * inverse_z, half, z);
+  const Float4 x = abs(signed_x), y = abs(signed_y);
+
+  const Int4 swap = y > x;
+  const Float4 far = select(swap, y, x), near = select(swap, x, y);
+  const Float4 reach_far = select(swap, reach_y, reach_x);
+  const Float4 reach_near = select(swap, reach_x, reach_y);
+  const Float4 closest = max(far - reach_far, splat(0.0f));
+  const Float4 density = 0.25f * mean_slope(far, reach_far, z) *
+                         mean_slope(near, reach_near, sqrt(z * z + closest * closest));
+  // From slopes to solid angle: det |w|^3 / z^3 for a distant box, the whole mass over 4 pi for one
+  // around p. No mean exceeds mass 1 over the box's solid angle: about 2 |half|^2 for a distant
   // cube, 4 pi around p.
-  const Float4 half2 = half2_x + half2_y + half2_z;
-  const Float4 solid_angle = half2 * (2 + (static_cast<float>(4 * kPi) - 2) * half2);
-  const Float4 above = min((middle + reach) / (2 * reach), splat(1.0f));
-  const Float4 lobe = z > 0 ? min(far, 1 / solid_angle) * max(above, splat(0.0f)) : splat(0.0f);
-  return static_cast<float>(1 - kLtcFloor) * lobe + static_cast<float>(kLtcFloor) * cosine;
+  const Float4 d2 = dot(centre, centre), half2 = dot(half, half);
+  const Float4 distant = density * d2 * sqrt(d2) * det_f_ / z;
+  const Float4 around = density * reach_far * reach_near * (4 / kSphere);
+  const Float4 solid_angle = half2 * (2 + (kSphere - 2) * half2);
+  return select(z > 0, min(distant + around, 1 / solid_angle), splat(0.0f));
 }
 
 }  // namespace limn

@@ -40,15 +40,15 @@ class LtcLobe {
  private:
   void read_table(const LobeSummary& lobe, const Vec3d& wi);
   void prepare_boxes();
+  Float4 ltc_mean(const Float4x3& centre, const Float4x3& half) const;
 
   bool diffuse_;
   Vec3d n_;
   Vec3d rows_[3];
   double det_ = 1;
   double norm_ = 1;
-  // For boxes, in floats: n, the rows of M^-1, and what half extents squared contribute to the
-  // squared radius across the lobe's axis.
-  float n_f_[3], rows_f_[3][3], spread_f_[3], det_f_;
+  // For boxes: n, the rows of M^-1, det.
+  float n_f_[3], rows_f_[3][3], det_f_;
 };
 
 // The part of one edge above the horizon, and the density of points on it in proportion to
@@ -62,7 +62,8 @@ class LtcEdge {
   // Integral of value(w_t) / |w_t|^3 over t in [0, 1]; zero only where no part of the edge is above
   // the horizon or p lies on the edge's line (where the Jacobian is zero). Always finite.
   double integral() const { return arcs_[0].integral + arcs_[1].integral; }
-  // The following need integral() > 0. u in [0, 1); the result is in [0, 1].
+  // The following need integral() > 0. u in [0, 1); the result is in [0, 1]. At the horizon itself
+  // the density is 0, which rounding may hit: such a draw counts as none.
   double sample_t(double u) const;
   double pdf_t(double t) const;
 

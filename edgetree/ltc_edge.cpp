@@ -12,6 +12,8 @@ namespace {
 // alone takes 48 halvings to this precision.
 constexpr double kPrecision = 0x1p-48;
 constexpr int kMaxSteps = 60;
+// Sine of the angle that a cross product of two vectors, each exact to rounding, cannot resolve.
+constexpr double kParallel = 0x1p-50;
 
 // psi - sin(psi) cos(psi), without cancellation.
 double angle_minus_product(double psi, double sine, double cosine) {
@@ -55,9 +57,11 @@ LtcEdge::LtcEdge(const LtcLobe& lobe, const Vec3d& w_0, const Vec3d& w_1) {
 void LtcEdge::Arc::set(const Vec3d& w_0, const Vec3d& w_along, double factor) {
   start = w_0 + w_along * t_begin;
   along = w_along * (t_end - t_begin);
-  const Vec3d normal = cross(start, along);
-  area = length(normal);
-  const double length_a = length(start), projection = dot(start, along) / length_a;
+  area = length(cross(start, along));
+  // On p's line to rounding: where the Jacobian is rounding, too.
+  const double length_a = length(start);
+  if (!(area > kParallel * length_a * length(along))) return;
+  const double projection = dot(start, along) / length_a;
   zeta_a = std::max(0.0, start.z) / length_a;
   zeta_t = (along.z - zeta_a * projection) * length_a / area;
   k_a = 1 / length_a;

@@ -198,7 +198,12 @@ struct Report {
   }
 };
 
-std::vector<LtcEntry> fit_table(bool ggx) {
+struct Table {
+  std::vector<LtcEntry> entries;
+  double worst = 0;  // L1 distance over entries and middles of cells
+};
+
+Table fit_table(bool ggx) {
   std::vector<LtcEntry> table(kLtcSize * kLtcSize);
   Report report;
   std::array<Point, kLtcSize> row;
@@ -215,11 +220,11 @@ std::vector<LtcEntry> fit_table(bool ggx) {
     }
   }
   report.print(ggx ? "ggx, nodes" : "beckmann, nodes");
-  return table;
+  return {table, report.worst.l1};
 }
 
 // The interpolated table at the middle of every cell, where it is worst.
-void report_cells(bool ggx, const std::vector<LtcEntry>& table) {
+void add_cells(bool ggx, Table& table) {
   Report all;
   for (int a = 0; a + 1 < kLtcSize; ++a) {
     Report row;
@@ -228,19 +233,21 @@ void report_cells(bool ggx, const std::vector<LtcEntry>& table) {
       const double cos_i = ltc_cosine((c + 0.5) / (kLtcSize - 1), alpha);
       const SampledLobe lobe = sample_lobe(ggx, alpha, cos_i);
       const Quality q =
-          quality(lobe, scaled(interpolate(table.data(), alpha, cos_i), alpha, cos_i));
+          quality(lobe, scaled(interpolate(table.entries.data(), alpha, cos_i), alpha, cos_i));
       row.add(q);
       all.add(q);
     }
     if (a % 4 == 0) row.print(fmt::format("  alpha {:.4f}", alpha));
   }
   all.print(ggx ? "ggx, middles of cells" : "beckmann, middles of cells");
+  table.worst = std::max(table.worst, all.worst.l1);
 }
 
-void write_table(std::FILE* file, const char* name, const std::vector<LtcEntry>& table) {
-  fmt::print(file, "constexpr LtcEntry {}[kLtcSize * kLtcSize] = {{\n", name);
-  for (size_t i = 0; i < table.size(); ++i) {
-    const LtcEntry& e = table[i];
+void write_table(std::FILE* file, const char* name, const Table& table) {
+  fmt::print(file, "constexpr double kLtcWorst{} = {:.3f};\n", name, table.worst);
+  fmt::print(file, "constexpr LtcEntry k{}Table[kLtcSize * kLtcSize] = {{\n", name);
+  for (size_t i = 0; i < table.entries.size(); ++i) {
+    const LtcEntry& e = table.entries[i];
     fmt::print(file, "{{{:.4g}, {:.4g}, {:.4g}, {:.4g}, {:.4g}}},{}", e.tilt, e.width_x, e.width_y,
                e.skew, e.norm, i % 2 == 1 ? "\n" : " ");
   }
@@ -256,17 +263,20 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "usage: fit_ltc OUTPUT.inc\n");
     return 2;
   }
-  const std::vector<LtcEntry> ggx = fit_table(true), beckmann = fit_table(false);
-  report_cells(true, ggx);
-  report_cells(false, beckmann);
+  Table ggx = fit_table(true), beckmann = fit_table(false);
+  add_cells(true, ggx);
+  add_cells(false, beckmann);
   std::FILE* file = std::fopen(argv[1], "w");
   if (!file) {
     fmt::print(stderr, "error: cannot write {}\n", argv[1]);
     return 1;
   }
-  fmt::print(file,
-             "// Written by tools/fit_ltc.cpp; meaning in ltc_table.h.\n// clang-format off\n");
-  write_table(file, "kGgxTable", ggx);
-  write_table(file, "kBeckmannTable", beckmann);
+  fmt::print(
+      file,
+      "// Written by tools/fit_ltc.cpp; meaning in ltc_table.h. kLtcWorst...: the largest L1 "
+      "distance of\n"
+      "// normalised lobe and LTC over entries and middles of cells.\n// clang-format off\n");
+  write_table(file, "Ggx", ggx);
+  write_table(file, "Beckmann", beckmann);
   return std::fclose(file) == 0 ? 0 : 1;
 }

@@ -3,10 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <vector>
 
 #include "../../edgetree/ltc.h"
 #include "../../edgetree/ltc_table.h"
-#include "../../src/microfacet.h"
 #include "../support/chi_square.h"
 #include "../support/quadrature.h"
 #include "../support/running_mean.h"
@@ -16,6 +17,8 @@ namespace limn {
 namespace {
 
 using Kind = LobeSummary::Kind;
+
+#include "../../edgetree/ltc_tables.inc"
 
 // Fixed seeds: a p-value below this is an error, not luck.
 constexpr double kSignificance = 1e-6;
@@ -97,6 +100,208 @@ TEST(LtcLobe, IntegratesToOne) {
   }
 }
 
+std::shared_ptr<Bsdf> bsdf_of(const Case& c) {
+  if (c.lobe.kind == Kind::kDiffuse) return make_diffuse({1, 1, 1});
+  RoughConductorValues v;
+  v.alpha = c.lobe.alpha;
+  v.distribution = c.lobe.kind == Kind::kGgx ? RoughConductorValues::Distribution::kGgx
+                                             : RoughConductorValues::Distribution::kBeckmann;
+  return make_roughconductor(v);
+}
+
+// L1 distance of f / norm and the LTC, 2 E_f[max(0, 1 - ltc norm / f)], with directions from the
+// BSDF's own sampling. Between the table's entries it may exceed the worst at entries and middles
+// of cells only by the sampling error.
+TEST(LtcLobe, FitsAsWellAsTheTableStates) {
+  Rng rng(5, 0, 0);
+  for (int i = 0; i < 400; ++i) {
+    Case c = random_case(rng);
+    c.lobe.alpha = std::clamp(c.lobe.alpha, kLtcMinAlpha, kLtcMaxAlpha);
+    const LtcLobe lobe = c.ltc();
+    const auto bsdf = bsdf_of(c);
+    RunningMean distance;
+    for (int k = 0; k < 2000; ++k) {
+      const double u1 = rng.uniform();
+      const auto w = bsdf->sample(c.n, c.wi, u1, rng.uniform());
+      if (!w) {
+        distance.add(0);
+        continue;
+      }
+      const BsdfValue f = bsdf->eval_with_pdf(c.n, c.wi, *w);
+      const double value = f.value.r / lobe.norm();
+      distance.add(f.pdf > 0 ? 2 * std::max(0.0, value - lobe.ltc(*w)) / f.pdf : 0);
+    }
+    const double worst = c.lobe.kind == Kind::kDiffuse ? 0
+                         : c.lobe.kind == Kind::kGgx   ? kLtcWorstGgx
+                                                       : kLtcWorstBeckmann;
+    // A diffuse lobe is matched exactly, up to rounding; norm is interpolated.
+    EXPECT_LT(distance.mean(), worst + 5 * distance.standard_error() + 1e-12)
+        << i << " alpha " << c.lobe.alpha << " cos " << dot(c.n, c.wi);
+  }
+}
+
+// Wherever the scattering function is positive, and along every edge there.
+TEST(LtcLobe, IsPositiveWhereTheLobeIs) {
+  Rng rng(6, 0, 0);
+  for (int i = 0; i < 20000; ++i) {
+    const Case c = random_case(rng);
+    const LtcLobe lobe = c.ltc();
+    const Segment s = random_segment(rng);
+    const double t = rng.uniform();
+    const Vec3d w = s.w_0 + (s.w_1 - s.w_0) * t;
+    const bool positive = bsdf_of(c)->eval(c.n, c.wi, normalize(w)).r > 0;
+    if (positive) {
+      EXPECT_GT(lobe.value(normalize(w)), 0) << i;
+      const LtcEdge edge(lobe, s.w_0, s.w_1);
+      EXPECT_GT(edge.integral(), 0) << i;
+      EXPECT_GT(edge.pdf_t(t), 0) << i;
+    }
+    if (dot(c.n, w) <= 0) {
+      EXPECT_EQ(lobe.value(normalize(w)), 0);
+    }
+  }
+}
+
+// Needles, edges through p, on the horizon, collinear with p, without length, huge, tiny.
+TEST(LtcEdge, StaysFiniteInExtremeGeometry) {
+  Rng rng(7, 0, 0);
+  for (int i = 0; i < 20000; ++i) {
+    const Case c = random_case(rng);
+    const LtcLobe lobe = c.ltc();
+    const double scale = std::exp(std::log(1e10) * (2 * rng.uniform() - 1));
+    const Vec3d a = random_direction(rng) * scale, b = random_direction(rng);
+    const double small = std::exp(-30 * rng.uniform());
+    const Frame frame(c.n);
+    const Segment s[] = {{a, a + b * (scale * small)},           // short
+                         {a, a * -small + b * (scale * 1e-12)},  // past p
+                         {a, a * -1.0},                          // through p
+                         {a, a * (1 + small)},                   // collinear
+                         {a, a},                                 // no length
+                         {{}, a},                                // p is an end
+                         {frame.s * scale, frame.t * scale},     // on the horizon
+                         {frame.s * scale, c.n * scale},
+                         {a, b * (scale / small)}};  // long
+    for (const Segment& e : s) {
+      const LtcEdge edge(lobe, e.w_0, e.w_1);
+      ASSERT_TRUE(std::isfinite(edge.integral()) && edge.integral() >= 0);
+      if (edge.integral() == 0) continue;
+      for (int k = 0; k < 4; ++k) {
+        const double t = edge.sample_t(k == 0 ? 0 : k == 1 ? 1 - 0x1p-53 : rng.uniform());
+        ASSERT_TRUE(t >= 0 && t <= 1);
+        ASSERT_TRUE(edge.pdf_t(t) >= 0);
+      }
+    }
+  }
+}
+
+// One box in the first lane.
+double box_mean(const LtcLobe& lobe, const Vec3d& centre, const Vec3d& half) {
+  const auto lane = [](double a) { return splat(static_cast<float>(a)); };
+  return lobe.mean_over_boxes({lane(centre.x), lane(centre.y), lane(centre.z)},
+                              {lane(half.x), lane(half.y), lane(half.z)})[0];
+}
+
+// Positive if any corner is above the horizon, zero if all are clearly below, the same at all
+// scales, never more than the peak allows.
+TEST(LtcBoxes, ArePositiveAboveTheHorizon) {
+  Rng rng(8, 0, 0);
+  for (int i = 0; i < 50000; ++i) {
+    const Case c = random_case(rng);
+    const LtcLobe lobe = c.ltc();
+    const double size = std::exp(std::log(1e6) * (rng.uniform() - 0.8));
+    const auto thin = [&] { return rng.uniform() < 0.2 ? 0 : rng.uniform() * size; };
+    const double x = thin(), y = thin(), z = thin();
+    const Vec3d half{x, y, z}, centre = rng.uniform() < 0.02 ? Vec3d{} : random_direction(rng);
+    const double top = dot(c.n, centre) + std::fabs(c.n.x) * half.x + std::fabs(c.n.y) * half.y +
+                       std::fabs(c.n.z) * half.z;
+    const double mean = box_mean(lobe, centre, half);
+    ASSERT_TRUE(std::isfinite(mean)) << i;
+    if (top > 0) {
+      EXPECT_GT(mean, 0) << i;
+    }
+    if (top < -1e-6 * (1 + size)) {
+      EXPECT_EQ(mean, 0) << i;
+    }
+    const double power = std::exp2(std::floor(30 * (rng.uniform() - 0.5)));
+    EXPECT_EQ(box_mean(lobe, centre * power, half * power), mean) << i;
+  }
+}
+
+bool hits(const Vec3d& centre, const Vec3d& half, const Vec3d& w) {
+  double near = 0, far = 1e300;
+  for (int i = 0; i < 3; ++i) {
+    const double a = (centre[i] - half[i]) / w[i], b = (centre[i] + half[i]) / w[i];
+    near = std::max(near, std::min(a, b));
+    far = std::min(far, std::max(a, b));
+  }
+  return near <= far;
+}
+
+// What a box outside of p receives of the lobe, from the BSDF's own directions, and its solid
+// angle, from uniform directions in the cone around it.
+struct BoxReference {
+  double mass = 0, solid_angle = 0;
+};
+BoxReference reference(const Case& c, const Vec3d& centre, const Vec3d& half, Rng& rng) {
+  const auto bsdf = bsdf_of(c);
+  const Frame frame(normalize(centre));
+  const double height = 1 - std::sqrt(1 - length_squared(half) / length_squared(centre));
+  constexpr int kDraws = 4000;
+  BoxReference r;
+  for (int k = 0; k < kDraws; ++k) {
+    const double z = 1 - rng.uniform() * height, phi = 2 * kPi * rng.uniform();
+    const double sine = std::sqrt(1 - z * z);
+    const Vec3d w = frame.to_world({sine * std::cos(phi), sine * std::sin(phi), z});
+    if (hits(centre, half, w)) r.solid_angle += 2 * kPi * height / kDraws;
+    const double u = rng.uniform();
+    const auto drawn = bsdf->sample(c.n, c.wi, u, rng.uniform());
+    if (!drawn || !hits(centre, half, *drawn)) continue;
+    const BsdfValue f = bsdf->eval_with_pdf(c.n, c.wi, *drawn);
+    if (f.pdf > 0) r.mass += f.value.r / f.pdf / kDraws;
+  }
+  return r;
+}
+
+// Log ratios of estimate and reference over boxes near the lobe, against those of the value at the
+// centre: a quarter of the second moment or less for microfacets, less for the smooth cosine.
+TEST(LtcBoxes, MeansBeatTheValueAtTheCentre) {
+  for (const Kind kind : {Kind::kDiffuse, Kind::kGgx, Kind::kBeckmann}) {
+    Rng rng(10, 0, 0);
+    double moment = 0, moment_centre = 0;
+    for (int i = 0; i < 250; ++i) {
+      Case c = random_case(rng);
+      c.lobe.kind = kind;
+      c.lobe.alpha = 0.02 + 0.2 * rng.uniform();
+      const double x = rng.uniform(), y = rng.uniform(), z = rng.uniform();
+      const Vec3d half = normalize(Vec3d{x, y, z}) * (0.1 + 0.8 * rng.uniform());
+      const auto drawn = bsdf_of(c)->sample(c.n, c.wi, rng.uniform(), 0.5);
+      if (!drawn) continue;
+      const Vec3d centre = normalize(*drawn + random_direction(rng) * length(half));
+      const LtcLobe lobe = c.ltc();
+      const BoxReference r = reference(c, centre, half, rng);
+      const double value = lobe.value(centre);
+      if (value == 0 || r.mass < 0.02) continue;
+      const double mean = r.mass / (r.solid_angle * lobe.norm());
+      moment += std::pow(std::log(box_mean(lobe, centre, half) / mean), 2);
+      moment_centre += std::pow(std::log(value / mean), 2);
+    }
+    EXPECT_LT(moment, (kind == Kind::kDiffuse ? 1 : 0.25) * moment_centre)
+        << static_cast<int>(kind);
+  }
+}
+
+// A box that shrinks to a point has the density of its direction.
+TEST(LtcBoxes, SmallBoxesHaveTheDensityOfTheirCentre) {
+  Rng rng(9, 0, 0);
+  for (int i = 0; i < 1000; ++i) {
+    Case c = random_case(rng);
+    c.lobe.kind = Kind::kDiffuse;
+    const Vec3d w = random_direction(rng);
+    const double mean = box_mean(c.ltc(), w, Vec3d{1, 1, 1} * 1e-9), value = c.ltc().value(w);
+    EXPECT_NEAR(mean, value, 0x1p-20);
+  }
+}
+
 TEST(LtcEdge, DensityIntegratesToOne) {
   Rng rng(2, 0, 0);
   for (int i = 0; i < 3000; ++i) {
@@ -123,6 +328,10 @@ TEST(LtcEdge, DensityFollowsTheLobe) {
     const double r = length(w);
     const double expected = lobe.value(w / r) / (r * r * r * edge.integral());
     EXPECT_NEAR(edge.pdf_t(t), expected, 1e-9 * expected) << i;
+    const double power = std::exp2(std::floor(40 * (rng.uniform() - 0.5)));
+    const LtcEdge scaled_edge(lobe, s.w_0 * power, s.w_1 * power);
+    EXPECT_EQ(scaled_edge.pdf_t(t), edge.pdf_t(t)) << i;
+    EXPECT_EQ(scaled_edge.sample_t(0.3), edge.sample_t(0.3)) << i;
   }
 }
 
