@@ -7,11 +7,8 @@
 namespace limn {
 
 std::unique_ptr<EdgeSampler> make_brute_force_sampler(const EdgeSamplerInput& input, int threads);
-<<<<<<< HEAD
 std::unique_ptr<EdgeSampler> make_li2019_sampler(const EdgeSamplerInput& input, int threads);
-=======
 std::unique_ptr<EdgeSampler> make_forest_sampler(const EdgeSamplerInput& input, int threads);
->>>>>>> 26232bb13446f87f6177f875adadbe5a43a09c9d
 std::unique_ptr<EdgeSampler> make_uniform_sampler(const EdgeSamplerInput& input, int threads);
 
 // Whether the query's own face is among those around the edge.
