@@ -4,32 +4,142 @@
 
 #include "forest_build.h"
 #include "forest_query.h"
-#include "limn/edgetree/contribution_bound.h"
 #include "samplers.h"
 
 namespace limn {
+namespace {
+
+using Lookahead = ForestConfig::Lookahead;
+
+// The weights of a node's children, and of theirs where those were looked at.
+struct Weights {
+  Float4 own;
+  Float4 ahead[kWidth];
+  double total() const {
+    return (static_cast<double>(own[0]) + own[1]) + (static_cast<double>(own[2]) + own[3]);
+  }
+};
+
+double below_one(double u) { return std::clamp(u, 0.0, 0x1.fffffffffffffp-1); }
+
+// Draws a lane by the uniform number u and leaves another one in it. Some weight is positive.
+int choose(const Weights& weights, double& u) {
+  double rest = u * weights.total();
+  int chosen = -1;
+  for (int lane = 0; lane < kWidth; ++lane) {
+    if (!(weights.own[lane] > 0)) continue;
+    if (chosen >= 0) rest -= weights.own[chosen];
+    chosen = lane;
+    if (rest < weights.own[lane]) break;
+  }
+  u = below_one(rest / weights.own[chosen]);
+  return chosen;
+}
+
+}  // namespace
 
 struct EdgeForest::Impl {
   const EdgeSamplerInput& input;
   ForestConfig config;
+  LightClusters lights;
   Forest forest;
 
-  Float4 weigh(uint32_t node, const ForestQuery& query) const {
-    return weigh_children(forest.nodes[node], query, config.soft_weights);
+  ForestQuery prepare(const EdgeQuery& query) const {
+    const bool lit = config.light_term && !lights.empty();
+    return {forest, lit ? &lights : nullptr, query, input.lane_scale};
   }
 
-  // Sum of a root's weights over those of all roots.
-  double root_weight(uint32_t root, const ForestQuery& query) const {
-    return total(weigh(root, query));
+  // Both sampling and evaluating a probability ask here, and get the same bits.
+  void weigh(uint32_t index, const ForestQuery& query, Weights& weights) const {
+    const ForestNode& node = forest.nodes[index];
+    weights.own = weigh_children(node, query, config.soft_weights);
+    if (config.lookahead == Lookahead::kNone) return;
+    for (int lane = 0; lane < kWidth; ++lane) {
+      if (!(weights.own[lane] > 0) || node.child[lane] <= 0) continue;
+      if (config.lookahead == Lookahead::kEdges && !is_twig(node, lane)) continue;
+      const ForestNode& child = forest.nodes[node.child[lane]];
+      weights.ahead[lane] = weigh_children(child, query, config.soft_weights);
+      weights.own[lane] = sum(weights.ahead[lane]);
+    }
   }
-  static double total(Float4 weights) {
-    return (static_cast<double>(weights[0]) + weights[1]) +
-           (static_cast<double>(weights[2]) + weights[3]);
+
+  // From `weights` of a node to those of a child.
+  void descend(const ForestNode& node, int lane, const ForestQuery& query, Weights& weights) const {
+    if (config.lookahead != Lookahead::kNone && is_twig(node, lane)) {
+      weights.own = weights.ahead[lane];
+    } else {
+      weigh(static_cast<uint32_t>(node.child[lane]), query, weights);
+    }
   }
+
+  static bool is_twig(const ForestNode& node, int lane) { return (node.twigs >> lane & 1) != 0; }
+
   double root_total(const ForestQuery& query) const {
-    double sum = 0;
-    for (uint32_t root : forest.roots) sum += root_weight(root, query);
-    return sum;
+    double total = 0;
+    Weights weights;
+    for (uint32_t root : forest.roots) {
+      weigh(root, query, weights);
+      total += weights.total();
+    }
+    return total;
+  }
+
+  // Draws a root by the uniform number u, leaves another one in it and the root's weights.
+  uint32_t choose_root(const ForestQuery& query, double root_total, double& u,
+                       Weights& weights) const {
+    double rest = u * root_total, total = 0;
+    uint32_t chosen = kNoParent;
+    Weights next;
+    for (uint32_t root : forest.roots) {
+      weigh(root, query, next);
+      if (!(next.total() > 0)) continue;
+      if (chosen != kNoParent) rest -= total;
+      chosen = root;
+      weights = next;
+      total = next.total();
+      if (rest < total) break;
+    }
+    u = below_one(rest / total);
+    return chosen;
+  }
+
+  // Draws an edge without testing it.
+  bool draw(const ForestQuery& query, double u, EdgeSample& sample) const {
+    double scale = root_total(query);
+    if (!(scale > 0)) return false;
+    Weights weights;
+    const ForestNode* node = &forest.nodes[choose_root(query, scale, u, weights)];
+    sample.probability = 1;
+    while (true) {
+      const int lane = choose(weights, u);
+      sample.probability *= weights.own[lane] / scale;
+      const int32_t child = node->child[lane];
+      if (child < 0) {
+        sample.edge = {node->object, static_cast<uint32_t>(~child)};
+        return true;
+      }
+      descend(*node, lane, query, weights);
+      node = &forest.nodes[child];
+      scale = weights.total();
+      if (!(scale > 0)) return false;
+    }
+  }
+
+  // Of drawing the child at a slot; multiplied from the root on, as `draw` does. Leaves the weights
+  // of the slot's node.
+  double probability(uint32_t slot, const ForestQuery& query, Weights& weights) const {
+    const ForestNode& node = forest.nodes[slot / kWidth];
+    double reach = 1, scale;
+    if (node.parent == kNoParent) {
+      scale = root_total(query);
+      weigh(slot / kWidth, query, weights);
+    } else {
+      reach = probability(node.parent, query, weights);
+      if (reach == 0) return 0;
+      descend(forest.nodes[node.parent / kWidth], node.parent % kWidth, query, weights);
+      scale = weights.total();
+    }
+    return scale > 0 ? reach * (weights.own[slot % kWidth] / scale) : 0;
   }
 
   // Exact test of a drawn edge.
@@ -37,111 +147,48 @@ struct EdgeForest::Impl {
     return is_candidate(input.objects[id.object], id.edge, query.p) &&
            !is_own_edge(input, query, id);
   }
-  EdgeBound bound_of(const EdgeQuery& query, EdgeId id) const {
-    return {LobeBound(query.n, query.wi, query.lobe),
-            segment_of(input.objects[id.object], id.edge, query)};
-  }
-
-  // Of reaching a node, up to the factor 1 / root_total; multiplied from the root on, as `sample`
-  // does.
-  double probability_of_node(uint32_t node, const ForestQuery& query) const {
-    const uint32_t parent = forest.nodes[node].parent;
-    return parent == kNoParent ? 1 : probability_of_slot(parent, query);
-  }
-  double probability_of_slot(uint32_t slot, const ForestQuery& query) const {
-    const uint32_t node = slot / kWidth;
-    const Float4 weights = weigh(node, query);
-    const double weight = weights[slot % kWidth];
-    if (!(weight > 0)) return 0;
-    if (forest.nodes[node].parent == kNoParent) return weight / root_total(query);
-    const double reach = probability_of_node(node, query);
-    return reach * (weight / total(weights));
+  LtcEdge seen_edge(const LtcLobe& lobe, const Vec3d& p, EdgeId id) const {
+    const EdgeMesh& mesh = input.objects[id.object];
+    const auto [a, b] = mesh.edges[id.edge].vertices;
+    return {lobe, mesh.positions[a] - p, mesh.positions[b] - p};
   }
 };
-
-namespace {
-
-// Draws a lane and leaves in u a new uniform number. weights: total > 0.
-int choose(Float4 weights, double total, double& u) {
-  double rest = u * total;
-  int lane = 0;
-  for (int i = 0; i < kWidth; ++i) {
-    if (!(weights[i] > 0)) continue;
-    lane = i;
-    if (rest < weights[i]) break;
-    if (i + 1 < kWidth) rest -= weights[i];
-  }
-  u = std::clamp(rest / weights[lane], 0.0, 0x1.fffffffffffffp-1);
-  return lane;
-}
-
-}  // namespace
 
 EdgeForest::EdgeForest(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 EdgeForest::~EdgeForest() = default;
 
 std::unique_ptr<EdgeForest> EdgeForest::build(const EdgeSamplerInput& input, int threads,
                                               const ForestConfig& config) {
-  auto impl = std::unique_ptr<Impl>(new Impl{input, config, build_forest(input, threads, config)});
+  auto impl = std::unique_ptr<Impl>(
+      new Impl{input, config, LightClusters(input.lights, input.environment_luminance),
+               build_forest(input, threads, config)});
   return std::unique_ptr<EdgeForest>(new EdgeForest(std::move(impl)));
 }
 
 bool EdgeForest::sample(const EdgeQuery& query, Rng& rng, EdgeSample& sample) const {
-  const Forest& forest = impl_->forest;
-  const ForestQuery prepared(forest, query, impl_->input.lane_scale);
-  const double u_edge = rng.uniform(), u_piece = rng.uniform(), u_angle = rng.uniform();
-
-  const double root_total = impl_->root_total(prepared);
-  if (!(root_total > 0)) return false;
-  double u = u_edge * root_total;
-  uint32_t node = kNoParent;
-  Float4 weights{};
-  double total = 0;
-  for (uint32_t root : forest.roots) {
-    const Float4 root_weights = impl_->weigh(root, prepared);
-    const double weight = Impl::total(root_weights);
-    if (!(weight > 0)) continue;
-    if (node != kNoParent) u -= total;
-    node = root;
-    weights = root_weights;
-    total = weight;
-    if (u < total) break;
-  }
-  u = std::clamp(u / total, 0.0, 0x1.fffffffffffffp-1);
-  double probability = 1;
-  for (double scale = root_total;; scale = total) {
-    const int lane = choose(weights, total, u);
-    probability *= weights[lane] / scale;
-    const int32_t child = forest.nodes[node].child[lane];
-    if (child < 0) {
-      sample.edge = {forest.nodes[node].object, static_cast<uint32_t>(~child)};
-      break;
-    }
-    node = static_cast<uint32_t>(child);
-    weights = impl_->weigh(node, prepared);
-    total = Impl::total(weights);
-    if (!(total > 0)) return false;
-  }
+  const double u_edge = rng.uniform(), u_t = rng.uniform();
+  const ForestQuery prepared = impl_->prepare(query);
+  if (!impl_->draw(prepared, u_edge, sample)) return false;
   if (!impl_->accepts(query, sample.edge)) return false;
-  const EdgeBound bound = impl_->bound_of(query, sample.edge);
-  if (!(bound.total() > 0)) return false;
-  sample.t = bound.sample_t(u_piece, u_angle);
-  sample.pdf_t = bound.pdf_t(sample.t);
-  sample.probability = probability;
+  const LtcEdge edge = impl_->seen_edge(prepared.lobe, query.p, sample.edge);
+  if (!(edge.integral() > 0)) return false;
+  sample.t = edge.sample_t(u_t);
+  sample.pdf_t = edge.pdf_t(sample.t);
   return true;
 }
 
 double EdgeForest::probability(const EdgeQuery& query, EdgeId id) const {
   const uint32_t slot = impl_->forest.slots[id.object][id.edge];
   if (slot == kNoParent || !impl_->accepts(query, id)) return 0;
-  if (!(impl_->bound_of(query, id).total() > 0)) return 0;
-  return impl_->probability_of_slot(slot,
-                                    ForestQuery(impl_->forest, query, impl_->input.lane_scale));
+  const ForestQuery prepared = impl_->prepare(query);
+  if (!(impl_->seen_edge(prepared.lobe, query.p, id).integral() > 0)) return 0;
+  Weights weights;
+  return impl_->probability(slot, prepared, weights);
 }
 
 double EdgeForest::pdf_t(const EdgeQuery& query, EdgeId id, double t) const {
-  const EdgeBound bound = impl_->bound_of(query, id);
-  return bound.total() > 0 ? bound.pdf_t(t) : 0;
+  const LtcEdge edge = impl_->seen_edge(LtcLobe(query.lobe, query.n, query.wi), query.p, id);
+  return edge.integral() > 0 ? edge.pdf_t(t) : 0;
 }
 
 uint64_t EdgeForest::list_silhouettes(const Vec3d& p, std::vector<EdgeId>& edges) const {

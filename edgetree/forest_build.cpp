@@ -105,6 +105,7 @@ class TreeFiller {
       const uint32_t child = split.children[lane];
       node.child[lane] = child != 0 ? static_cast<int32_t>(child + offset)
                                     : ~static_cast<int32_t>(wedges_[range.begin].edge);
+      if (child != 0 && has_edges_only(tree_.nodes[child])) node.twigs |= 1 << lane;
       fill_lane(edges(range), frame, lane, node);
     }
     return node;
@@ -115,13 +116,18 @@ class TreeFiller {
     return wedges_.subspan(range.begin, range.size());
   }
 
+  static bool has_edges_only(const SplitNode& node) {
+    return std::all_of(node.children.begin(), node.children.end(),
+                       [](uint32_t child) { return child == 0; });
+  }
+
   DualFit fit(std::span<const Wedge> wedges, const NodeFrame& frame) const {
     if (group_ == ForestGroup::kSilhouette) return fit_dual(wedges, frame, config_);
     double length = 0;
     for (const Wedge& wedge : wedges) length += wedge.length;
     if (group_ == ForestGroup::kAlways) return unrejectable_fit(length);
     DualFit fit = fit_dual(wedges, frame, config_);
-    std::fill_n(fit.cover, 3, length);
+    fit.cover[0] = length;
     return fit;
   }
 
@@ -133,7 +139,6 @@ class TreeFiller {
     };
     for (int i = 0; i < 4; ++i)
       for (int k = 0; k < 4; ++k) put(node.rows[i][k], dual.rows[i][k]);
-    for (int i = 0; i < 7; ++i) put(node.slab[i], dual.slab[i]);
     const double squared = frame.radius * frame.radius;
     for (int k = 0; k < 3; ++k) put(node.cover[k], dual.cover[k] / squared);
     const Box box = box_of(wedges);

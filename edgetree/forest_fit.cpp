@@ -5,7 +5,6 @@
 #include <cmath>
 #include <vector>
 
-#include "forest_node.h"
 #include "linear_program.h"
 
 // A plane is q = (n, signed distance of the frame's centre / radius), so that q . x is the signed
@@ -150,52 +149,6 @@ void fit_box(std::vector<Vector3d>& points, const Vector4d& z, const ForestConfi
   }
 }
 
-using Monomials = Matrix<double, 6, 1>;
-Monomials monomials(const Vector3d& u) {
-  Monomials m;
-  m << 1, u[0], u[1], u[0] * u[0], u[0] * u[1], u[1] * u[1];
-  return m;
-}
-
-// Least squares for u_2 = f(u_0, u_1), then the range of the rest over all wedges: along a wedge
-// it is a parabola.
-void fit_slab(const std::vector<Vector3d>& points, DualFit& fit) {
-  Matrix<double, 6, 6> matrix = Matrix<double, 6, 6>::Zero();
-  Monomials right = Monomials::Zero();
-  for (const Vector3d& u : points) {
-    const Monomials m = monomials(u);
-    matrix.noalias() += m * m.transpose();
-    right += m * u[2];
-  }
-  const Eigen::LDLT<Matrix<double, 6, 6>> solver(matrix);
-  Monomials f = solver.solve(right);
-  if (solver.info() != Eigen::Success || !f.allFinite()) return;
-  double low = 1e300, high = -1e300;
-  const auto rest = [&](const Vector3d& u) { return u[2] - f.dot(monomials(u)); };
-  const auto include = [&](double value) {
-    low = std::min(low, value);
-    high = std::max(high, value);
-  };
-  for (size_t i = 0; i < points.size(); i += 2) {
-    const double a = rest(points[i]), b = rest(points[i + 1]);
-    const double middle = rest(0.5 * (points[i] + points[i + 1]));
-    include(a);
-    include(b);
-    // a + linear s + square s^2
-    const double square = 2 * (a + b) - 4 * middle, linear = b - a - square;
-    const double s = -0.5 * linear / square;
-    if (s > 0 && s < 1) include(a + 0.5 * linear * s);
-  }
-  f[0] += 0.5 * (low + high);
-  const double width = 0.5 * (high - low);
-  // A slab as thick as the box rejects nothing more.
-  constexpr double kUseful = 0.8;
-  if (!(width < kUseful) || f.cwiseAbs().sum() > kMaxSlab) return;
-  Monomials::Map(fit.slab) = f;
-  fit.slab[6] = width;
-  fit.has_slab = true;
-}
-
 void sum_cover(std::span<const Wedge> wedges, const std::vector<Vector3d>& points, DualFit& fit) {
   for (int k = 0; k < 3; ++k) {
     fit.cover[k] = 0;
@@ -219,7 +172,6 @@ DualFit unrejectable_fit(double cover) {
   DualFit fit{};
   fit.cover[0] = cover;
   fit.rows[1][3] = 1;
-  fit.slab[6] = 1;
   return fit;
 }
 
@@ -235,7 +187,6 @@ DualFit fit_dual(std::span<const Wedge> wedges, const NodeFrame& frame,
   for (const Wedge& wedge : wedges) angles += wedge.length * std::max(wedge.angle / kPi, kFlat);
   DualFit fit = unrejectable_fit(angles);
   if (z.norm() == 0) return fit;
-  fit.rejectable = true;
   for (Vector4d& q : planes) q /= q.dot(z);
   if (wedges.size() == 1 && config.principal_axes) {
     fit_segment(planes[0], planes[1], fit);
@@ -246,7 +197,6 @@ DualFit fit_dual(std::span<const Wedge> wedges, const NodeFrame& frame,
     for (const Vector4d& q : planes) points.push_back(basis.transpose() * q);
     fit_box(points, z, config, fit);
     sum_cover(wedges, points, fit);
-    if (config.quadrics && wedges.size() > 1) fit_slab(points, fit);
   }
   scale_rows(fit);
   return fit;

@@ -1,5 +1,5 @@
 #pragma once
-// What a set of edges looks like in the space of planes: the dual box and the slab of a child.
+// What a set of edges looks like in the space of planes: the dual box of a child.
 #include <array>
 #include <cstdint>
 #include <span>
@@ -25,13 +25,10 @@ struct NodeFrame {
   double radius = 1;
 };
 
-// See ForestNode for the meaning of rows and slab.
+// See ForestNode for the meaning of rows and cover.
 struct DualFit {
   double rows[4][4];
-  double slab[7];
   double cover[3];  // times radius^2
-  bool rejectable = false;
-  bool has_slab = false;
 };
 
 // Never rejects. cover: what a random plane crosses.

@@ -19,18 +19,12 @@ inline constexpr int kForestGroups = 3;
 // A child: 0 none; positive: index of a node (node 0 is a root, nobody's child); negative: ~edge.
 inline constexpr int32_t kNoChild = 0;
 inline constexpr uint32_t kNoParent = UINT32_MAX;
-// Bounds what the rounding of a query can do to a slab.
-inline constexpr double kMaxSlab = 4;
 
 // In the frame of a node x = ((p - center) / radius, 1). Planes of a child that pass through p
 // satisfy  row_0 . x + sum over k of u_k (row_k . x) = 0  for some u in [-1, 1]^3: the dual box
 // (README.md). Rows are scaled so that their lengths add up to 1.
 struct ForestNode {
-  Float4 rows[4][4];  // [row][component of x]
-  // The planes also satisfy |u_2 - f(u_0, u_1)| <= slab[6], f = slab[0] + slab[1] u_0 + slab[2] u_1
-  // + slab[3] u_0^2 + slab[4] u_0 u_1 + slab[5] u_1^2, the |coefficients| of f adding up to
-  // kMaxSlab at most. f = 0, width 1: nothing beyond the box.
-  Float4 slab[7];
+  Float4 rows[4][4];     // [row][component of x]
   Float4 box_center[3];  // positions, in the frame
   Float4 box_half[3];    // not negative
   // Half the sum over edges of length / radius^2 times what their wedges cover of axis u_k: a plane
@@ -43,6 +37,7 @@ struct ForestNode {
   uint32_t parent;  // 4 * node + lane
   uint32_t object;
   ForestGroup group;
+  uint8_t twigs;  // bit per lane: the child is a node of edges only
 };
 
 struct Forest {

@@ -6,6 +6,12 @@
 namespace limn {
 namespace {
 
+// A plane near a corner of a dual box is taken to meet this share of what one in the middle does,
+// at least.
+constexpr float kShallow = 0.1f;
+// Points in or near a box see its edges at this share of its squared radius at least.
+constexpr float kNear = 0.25f;
+
 // p in the frame of a node, and what rounding can add to row . x of all rows together: of the
 // entries of rows and of x by 2^-24 each, four roundings in a product and two in sums; rows have
 // unit length together.
@@ -42,74 +48,21 @@ DualPlane dual_plane(const ForestNode& node, const FramePoint& at) {
   return plane;
 }
 
-struct Range {
-  Float4 low, high;
-};
-void include(Range& range, Float4 value) {
-  range.low = min(value, range.low);
-  range.high = max(value, range.high);
-}
-
-// Of c + b u + a u^2 over [-1, 1]; inverse: 1 / (4 a).
-Range parabola_range(Float4 c, Float4 b, Float4 a, Float4 inverse) {
-  const Float4 ends = c + a, size = abs(b);
-  Range range{ends - size, ends + size};
-  const Float4 vertex = select(size < 2 * abs(a), c - b * b * inverse, ends);
-  include(range, vertex);
-  return range;
-}
-
-// Of c[0] + c[1] u + c[2] v + c[3] u^2 + c[4] u v + c[5] v^2 over [-1, 1]^2: at a corner, at the
-// vertex of a side's parabola, or at the one critical point.
-Range quadratic_range(const Float4 (&c)[6]) {
-  const Float4 inverse_u = 0.25f / c[3], inverse_v = 0.25f / c[5];
-  Range range = parabola_range(c[0] + c[2] + c[5], c[1] + c[4], c[3], inverse_u);
-  const auto join = [&](const Range& side) {
-    range.low = min(range.low, side.low);
-    range.high = max(range.high, side.high);
-  };
-  join(parabola_range(c[0] - c[2] + c[5], c[1] - c[4], c[3], inverse_u));
-  join(parabola_range(c[0] + c[1] + c[3], c[2] + c[4], c[5], inverse_v));
-  join(parabola_range(c[0] - c[1] + c[3], c[2] - c[4], c[5], inverse_v));
-  const Float4 determinant = 4 * c[3] * c[5] - c[4] * c[4];
-  const Float4 inverse = 1 / determinant;
-  const Float4 u = (c[4] * c[2] - 2 * c[5] * c[1]) * inverse;
-  const Float4 v = (c[4] * c[1] - 2 * c[3] * c[2]) * inverse;
-  const Int4 inside = (determinant > 0) & (abs(u) < 1) & (abs(v) < 1);
-  const Float4 value = c[0] + u * (c[1] + c[3] * u + c[4] * v) + v * (c[2] + c[5] * v);
-  include(range, select(inside, value, range.low));
-  return range;
-}
-
-// With u_2 = f(u_0, u_1) + width t, |t| <= 1, the query plane is a quadratic in (u_0, u_1) plus
-// g[3] width t: does its range meet [-g[3] width, g[3] width]?
-struct SlabCut {
-  Range range;
-  Float4 half;
-};
-SlabCut slab_cut(const ForestNode& node, const DualPlane& plane, float error) {
-  const Float4 slope = plane.g[3];
-  const Float4 c[6] = {plane.g[0] + slope * node.slab[0],
-                       plane.g[1] + slope * node.slab[1],
-                       plane.g[2] + slope * node.slab[2],
-                       slope * node.slab[3],
-                       slope * node.slab[4],
-                       slope * node.slab[5]};
-  // Errors of g enter with at most 1 + |f|; as much again for what is computed from them.
-  constexpr auto kGrowth = static_cast<float>(2 * (1 + kMaxSlab));
-  return {quadratic_range(c), abs(slope) * node.slab[6] + kGrowth * error};
-}
-
-Int4 meets(const SlabCut& cut) {
-  return (cut.range.low <= cut.half) & (cut.range.high >= -cut.half);
-}
-
-// Share of the possible positions of the query plane, across box and slab, at which it would meet
-// as much as it does: 1 where it cuts the middle.
-Float4 box_depth(const DualPlane& plane) { return 1 - abs(plane.g[0]) / plane.half; }
-Float4 slab_depth(const SlabCut& cut) {
-  const Float4 overlap = min(cut.range.high, cut.half) - max(cut.range.low, -cut.half);
-  return overlap / min(cut.range.high - cut.range.low, 2 * cut.half);
+// The length of silhouettes that a child is expected to hold, given the query plane. With planes
+// spread evenly over the dual box, the values of g - g[0] have nearly the density of the sum of two
+// uniform numbers, one of half-width a = max |g[k]| and one of what is left of half: flat, with
+// ramps at both ends. A single edge that is met counts in full.
+Float4 expected_length(const ForestNode& node, const DualPlane& plane, float error, bool soft) {
+  const Float4 size[3] = {abs(plane.g[1]) + error, abs(plane.g[2]), abs(plane.g[3])};
+  const Float4 widest = max(size[0], max(size[1], size[2]));
+  const Float4 length =
+      (size[0] * node.cover[0] + size[1] * node.cover[1] + size[2] * node.cover[2]) / widest;
+  if (!soft) return length;
+  const Float4 rest = plane.half - widest;
+  const Float4 ramp = clamp(0.5f * (plane.half - abs(plane.g[0])) / max(rest, splat(1e-30f)),
+                            splat(kShallow), splat(1.0f));
+  // Not every box that is met holds a silhouette: the power makes up for part of that.
+  return length * select(node.child < 0, splat(1.0f), ramp * sqrt(ramp));
 }
 
 }  // namespace
@@ -120,8 +73,10 @@ ForestPoint point_of(const Forest& forest, const Vec3d& p) {
   return {p, distance_error(farthest, p)};
 }
 
-ForestQuery::ForestQuery(const Forest& forest, const EdgeQuery& query, const Lanes& lane_scale)
-    : point(point_of(forest, query.p)), lobe(query.n, query.wi, query.lobe) {
+ForestQuery::ForestQuery(const Forest& forest, const LightClusters* clusters,
+                         const EdgeQuery& query, const Lanes& lane_scale)
+    : point(point_of(forest, query.p)), lobe(query.lobe, query.n, query.wi) {
+  if (clusters) lights.emplace(*clusters, query.p);
   for (int k = 0; k < 3; ++k) n[k] = static_cast<float>(query.n[k]);
   const Vec3<Lanes>& v = query.velocity;
   double sum = 0;
@@ -136,7 +91,7 @@ Int4 may_hold_candidates(const ForestNode& node, const ForestPoint& point) {
   const FramePoint at = to_frame(node, point);
   const DualPlane plane = dual_plane(node, at);
   if (node.group == ForestGroup::kFront) return present & (plane.g[0] + plane.half >= 0);
-  return present & (abs(plane.g[0]) <= plane.half) & meets(slab_cut(node, plane, at.error));
+  return present & (abs(plane.g[0]) <= plane.half);
 }
 
 Float4 weigh_children(const ForestNode& node, const ForestQuery& query, bool soft) {
@@ -153,26 +108,18 @@ Float4 weigh_children(const ForestNode& node, const ForestQuery& query, bool sof
   alive &= speed > 0;
 
   const DualPlane plane = dual_plane(node, at);
-  constexpr float kShallow = 0.03f;  // a share that rounding or a bad guess may have missed
-  Float4 depth = splat(1.0f);
+  Float4 length = node.cover[0];
   if (node.group == ForestGroup::kSilhouette) {
-    const SlabCut cut = slab_cut(node, plane, at.error);
-    alive &= (abs(plane.g[0]) <= plane.half) & meets(cut);
-    // Edges are met or not.
-    if (soft) {
-      depth = max(box_depth(plane), splat(kShallow)) * max(slab_depth(cut), splat(kShallow));
-      depth = select(node.child < 0, splat(1.0f), depth);
-    }
+    alive &= abs(plane.g[0]) <= plane.half;
+    length = expected_length(node, plane, at.error, soft);
   } else if (node.group == ForestGroup::kFront) {
     alive &= plane.g[0] + plane.half >= 0;
-    if (soft) depth = clamp(0.5f + 0.5f * plane.g[0] / plane.half, splat(kShallow), splat(1.0f));
+    if (soft) length *= clamp(0.5f + 0.5f * plane.g[0] / plane.half, splat(kShallow), splat(1.0f));
   }
-  const Float4 cover = (abs(plane.g[1]) + at.error) * node.cover[0] +
-                       abs(plane.g[2]) * node.cover[1] + abs(plane.g[3]) * node.cover[2];
-  const Float4 radius2 = e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
-  const Float4 distance2 = max(dot(d, d), 0.25f * radius2 + 1e-30f);
-  const Float4 mean = query.lobe.mean(d, sqrt(distance2), sqrt(radius2));
-  const Float4 weight = cover / plane.half * depth * mean * speed / distance2;
+  const Float4x3 half{e[0], e[1], e[2]};
+  const Float4 distance2 = max(dot(d, d), kNear * dot(half, half) + 1e-30f);
+  Float4 weight = length * speed / distance2 * query.lobe.mean_over_boxes(d, half);
+  if (query.lights) weight *= query.lights->mean_over_boxes(d, half);
   return select(alive, max(weight, splat(std::numeric_limits<float>::min())), splat(0.0f));
 }
 

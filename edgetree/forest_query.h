@@ -1,8 +1,11 @@
 #pragma once
 // How the four children of a node are rejected and weighed for a query.
-#include "forest_lobe.h"
+#include <optional>
+
 #include "forest_node.h"
+#include "light_term.h"
 #include "limn/edgetree/edge_forest.h"
+#include "ltc.h"
 
 namespace limn {
 
@@ -15,9 +18,12 @@ ForestPoint point_of(const Forest& forest, const Vec3d& p);
 
 // All that does not depend on the node.
 struct ForestQuery {
-  ForestQuery(const Forest& forest, const EdgeQuery& query, const Lanes& lane_scale);
+  // lights: null if they are not to weigh.
+  ForestQuery(const Forest& forest, const LightClusters* lights, const EdgeQuery& query,
+              const Lanes& lane_scale);
   ForestPoint point;
-  ForestLobe lobe;
+  LtcLobe lobe;
+  std::optional<LightCones> lights;
   float n[3];
   float speed;  // of p
 };

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <ctime>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,15 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
+// Of one thread, so that other work on the machine hardly counts.
+class Stopwatch {
+ public:
+  double seconds() const { return static_cast<double>(std::clock() - start_) / CLOCKS_PER_SEC; }
+
+ private:
+  std::clock_t start_ = std::clock();
+};
+
 struct Variant {
   std::string name;
   ForestConfig config;
@@ -36,12 +46,16 @@ std::vector<Variant> variants() {
     list.push_back({name, config});
   };
   add("arbitrary axes", &ForestConfig::principal_axes);
-  add("no quadrics", &ForestConfig::quadrics);
   add("no soft weights", &ForestConfig::soft_weights);
   add("no concave culling", &ForestConfig::cull_concave);
-  ForestConfig plain;
-  plain.principal_axes = plain.quadrics = plain.soft_weights = false;
-  list.push_back({"boxes alone", plain});
+  ForestConfig config;
+  config.lookahead = ForestConfig::Lookahead::kNone;
+  list.push_back({"no lookahead", config});
+  config.principal_axes = config.soft_weights = false;
+  list.push_back({"boxes alone", config});
+  config = {};
+  config.lookahead = ForestConfig::Lookahead::kAll;
+  list.push_back({"16-wide choice", config});
   return list;
 }
 
@@ -107,14 +121,14 @@ struct Draws {
 Draws measure_draws(const EdgeForest& forest, const std::vector<EdgeQuery>& queries, int repeat) {
   uint64_t hits = 0;
   Rng rng(2, 0, 0);
-  const auto start = Clock::now();
+  const Stopwatch watch;
   for (int k = 0; k < repeat; ++k)
     for (const EdgeQuery& q : queries) {
       EdgeSample sample;
       hits += forest.sample(q, rng, sample);
     }
   const double draws = static_cast<double>(queries.size()) * repeat;
-  return {static_cast<double>(hits) / draws, seconds_since(start) * 1e9 / draws};
+  return {static_cast<double>(hits) / draws, watch.seconds() * 1e9 / draws};
 }
 
 // (sum b)^2 / sum of b^2 / P, b the bound of an edge's contribution: 1 if edges are drawn in
@@ -166,9 +180,9 @@ double ray_nanoseconds(const Mesh& mesh) {
   }
   Hit hit;
   uint64_t hits = 0;
-  const auto start = Clock::now();
+  const Stopwatch watch;
   for (const Ray& ray : rays) hits += tracer->closest(ray, hit);
-  const double time = seconds_since(start);
+  const double time = watch.seconds();
   return hits > 0 ? time * 1e9 / static_cast<double>(rays.size()) : 0;
 }
 

@@ -106,7 +106,6 @@ ForestConfig without(bool ForestConfig::*option) {
 }
 INSTANTIATE_TEST_SUITE_P(Variants, Forests,
                          testing::Values(ForestConfig{}, without(&ForestConfig::principal_axes),
-                                         without(&ForestConfig::quadrics),
                                          without(&ForestConfig::cull_concave)));
 
 TEST(Forest, DoesNotDependOnThreads) {

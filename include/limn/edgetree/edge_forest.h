@@ -15,11 +15,15 @@ namespace limn {
 struct ForestConfig {
   // Dual boxes along the principal axes of a node's planes; else along any axes.
   bool principal_axes = true;
-  // Quadric slabs beside the boxes.
-  bool quadrics = true;
-  // Children weigh by how deep the query plane cuts their box and slab; else all that are not
-  // rejected weigh by length and distance alone.
+  // Children weigh by how deep the query plane cuts their dual box; else all that are not rejected
+  // weigh by length and distance alone.
   bool soft_weights = true;
+  // Children weigh by the light that may come from behind them.
+  bool light_term = true;
+  // How many nodes a choice looks at: nodes of edges only are weighed by their edges, before one of
+  // their siblings is drawn; or any node by its children (up to 16 at once), or none.
+  enum class Lookahead { kNone, kEdges, kAll };
+  Lookahead lookahead = Lookahead::kEdges;
   // Concave smooth edges of closed one-sided meshes are left out.
   bool cull_concave = true;
 };
