@@ -39,7 +39,7 @@ struct Box {
 struct Node {
   Box positions;
   Box planes;                   // Hough points of all faces
-  bool always = false;          // holds an edge that may matter from everywhere
+  bool always = false;          // the planes say nothing: may matter from everywhere
   double length = 0;            // of all edges
   uint32_t begin = 0, end = 0;  // range of edges
   uint32_t right = 0;           // second child; the first follows its parent; 0 for a leaf
@@ -281,7 +281,6 @@ class Li2019Sampler final : public EdgeSampler {
     for (const uint32_t vertex : edge.vertices) node.positions.extend(mesh.positions[vertex]);
     node.planes = plane_box(mesh, id.edge);
     node.length = length(mesh.positions[edge.vertices[1]] - mesh.positions[edge.vertices[0]]);
-    node.always = edge.edge_class != EdgeClass::kSmooth && edge.edge_class != EdgeClass::kFlat;
   }
 
   int widest_axis(uint32_t begin, uint32_t end) const {

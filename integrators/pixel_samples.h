@@ -2,6 +2,7 @@
 // The loop over the pixels of a batch, shared by all jobs.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "limn/core/film.h"
 #include "limn/core/parallel.h"
@@ -40,8 +41,10 @@ inline Ray camera_ray(const Scene& scene, const CameraRay<double>& c) {
   return ray;
 }
 
+// Finite as far as images go, which hold floats; sums of such values cannot overflow either.
 inline bool is_finite(const Rgb<double>& c) {
-  return std::isfinite(c.r) && std::isfinite(c.g) && std::isfinite(c.b);
+  constexpr double kLargest = std::numeric_limits<float>::max();
+  return std::fabs(c.r) <= kLargest && std::fabs(c.g) <= kLargest && std::fabs(c.b) <= kLargest;
 }
 
 // Index of a pixel's first channel in crop-window arrays of three channels.

@@ -4,7 +4,7 @@
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <ctime>
 #include <vector>
 
 #include "limn/core/lights.h"
@@ -112,7 +112,8 @@ void add_render_benchmark(const Bench& bench) {
   })->Unit(benchmark::kMillisecond);
 }
 
-// Samples per second of one term; the terms' own clocks tell them apart.
+// Samples per second of one term: its share of the run, by the terms' own clocks, in processor
+// time.
 void add_term_benchmark(const Bench& bench, int term, const std::string& sampler,
                         const std::string& parameter) {
   std::string name = fmt::format("gradient/{}", term_name(term));

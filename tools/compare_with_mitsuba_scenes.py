@@ -102,7 +102,7 @@ def cases(folder):
                  '<rfilter type="gaussian"><float name="stddev" value="0.8"/></rfilter>', BOX):
         for border in ("true", "false"):
             kind = text.split('"')[1] + (text.split('value="')[1][:3] if "value" in text else "")
-            film = SIZE.format(8, 8) + f'<boolean name="sample_border" value="{border}"/>' + text
+            film = SIZE.format(24, 24) + f'<boolean name="sample_border" value="{border}"/>' + text
             yield f"filter {kind} border {border}", {"film": film}, []
     crop = "".join(f'<integer name="crop_{n}" value="{v}"/>' for n, v in
                    (("offset_x", 9), ("offset_y", 4), ("width", 24), ("height", 16)))

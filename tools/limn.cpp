@@ -21,7 +21,8 @@ void add_common(CLI::App& command, CommonOptions& common, std::vector<std::strin
       ->allow_extra_args(false);
   command.add_option("--spp", common.spp, "Samples per pixel (default: the scene's)")
       ->check(CLI::Range(1, 1 << 30));
-  command.add_option("--seed", common.seed, "Seed of all random numbers (default: the scene's)");
+  command.add_option("--seed", common.seed, "Seed of all random numbers (default: the scene's)")
+      ->check(CLI::NonNegativeNumber);
   command.add_option("--threads", common.threads, "Threads (default: all cores)")
       ->check(CLI::Range(1, 4096));
   command.add_option("--json", common.json, "Write the figures for machines to this file");

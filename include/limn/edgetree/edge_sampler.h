@@ -49,7 +49,7 @@ struct LightTriangle {
 // What samplers are built from. It must outlive them.
 struct EdgeSamplerInput {
   std::vector<EdgeMesh> objects;
-  std::vector<LightTriangle> lights;
+  std::vector<LightTriangle> lights = {};
   double environment_luminance = 0;  // mean over the sphere
   // Weights that make the speeds of different parameters comparable (a metre, a radian), for
   // importance only.

@@ -1,0 +1,173 @@
+// What must not change a gradient: texture seams, the unit of length, the depth limit beyond the
+// last path, a uniform surrounding.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "limn/integrators/check.h"
+#include "support/compare_moments.h"
+#include "support/meshes.h"
+#include "support/scenes.h"
+
+namespace limn {
+namespace {
+
+constexpr double kLevel = 1e-4;
+
+GradientResult run_gradient(const Scene& scene, const std::vector<std::string>& parameters, int spp,
+                            uint64_t seed) {
+  GradientOptions options;
+  options.parameters = parameters;
+  options.block = 4;
+  RunSettings settings;
+  settings.spp = spp;
+  settings.seed = seed;
+  GradientResult result = gradient(scene, options, settings);
+  EXPECT_EQ(result.non_finite.count, 0u) << result.non_finite.message();
+  return result;
+}
+
+// Blocks and the whole image; b times b_scale should be a.
+void expect_equal(const ParameterGradient& a, const ParameterGradient& b, double b_scale = 1) {
+  const ZSummary blocks = compare_moments(a.total_blocks, b.total_blocks, b_scale);
+  const ZSummary image = compare_moments(a.image_sum, b.image_sum, b_scale);
+  fmt::print(
+      "{:24} {:3} blocks, mean z {:5.2f}, sd {:4.2f}, max |z| {:5.2f}; image {:9.4g} +- "
+      "{:7.2g}, other {:9.4g}, z {:5.2f}\n",
+      a.name, blocks.count, blocks.mean, blocks.deviation, blocks.largest, a.image_sum.mean(0),
+      std::sqrt(a.image_sum.variance(0)), b_scale * b.image_sum.mean(0), image.mean);
+  EXPECT_GT(blocks.count, 0);
+  EXPECT_TRUE(blocks.plausible(kLevel)) << a.name;
+  EXPECT_TRUE(image.plausible(kLevel)) << a.name;
+}
+
+// A white body above a rough mirror.
+Scene white_body(const TempFiles& files, const Mesh& mesh, bool face_normals) {
+  SceneParts parts;
+  parts.max_depth = 3;
+  parts.origin = {0, 2.5, 4};
+  parts.target = {0, 0.4, 0};
+  parts.body = square("mirror", 2.5, -90, {0, 0, 0}, conductor("gloss", 0.15)) +
+               obj_shape("body", write_mesh(files, "body.obj", mesh), face_normals, 0.6,
+                         {0, 0.9, 0}, diffuse("white", "1, 1, 1")) +
+               square("lamp", 0.8, 90, {0.5, 3.5, 1}, area_light("glow", "6, 6, 6")) +
+               constant_light("sky", "0.5, 0.5, 0.5");
+  return make_scene(files, parts);
+}
+
+class Seams : public testing::TestWithParam<bool> {};
+
+TEST_P(Seams, ChangeNothing) {
+  const TempFiles files;
+  const Mesh mesh = torus_mesh(10, 6);
+  const Scene welded = white_body(files, mesh, GetParam());
+  const Scene split = white_body(files, seam_split(mesh), GetParam());
+  const std::vector<std::string> parameters = {"body.translate.y", "body.rotate.x"};
+  const GradientResult a = run_gradient(welded, parameters, 256, 1);
+  const GradientResult b = run_gradient(split, parameters, 256, 2);
+  for (size_t k = 0; k < parameters.size(); ++k) expect_equal(a.parameters[k], b.parameters[k]);
+  CheckOptions options;
+  options.parameter = "body.translate.y";
+  options.block = 4;
+  RunSettings settings;
+  settings.spp = 512;
+  EXPECT_TRUE(check(split, options, settings).agree);
+}
+
+INSTANTIATE_TEST_SUITE_P(, Seams, testing::Bool(),
+                         [](const auto& test) { return test.param ? "flat" : "smooth"; });
+
+Scene body_in_the_open(const TempFiles& files, const std::string& reflectance) {
+  SceneParts parts;
+  parts.max_depth = 64;
+  parts.origin = {0, 2.5, 3};
+  parts.body = obj_shape("body", write_mesh(files, "body.obj", seam_split(torus_mesh(10, 6))), true,
+                         1, {0, 0.5, 0}, diffuse("paint", reflectance)) +
+               constant_light("sky", "1, 1, 1");
+  return make_scene(files, parts);
+}
+
+// In a uniform surrounding a white body cannot be told from what is behind it, wherever it is; a
+// grey one can.
+TEST(Furnace, WhiteBodyIsInvisible) {
+  const TempFiles files;
+  const std::vector<std::string> parameters = {"body.translate.y", "body.rotate.x",
+                                               "sensor.translate.x", "body.scale"};
+  const GradientResult white = run_gradient(body_in_the_open(files, "1, 1, 1"), parameters, 256, 1);
+  const GradientResult grey =
+      run_gradient(body_in_the_open(files, "0.9, 0.9, 0.9"), parameters, 256, 1);
+  for (size_t k = 0; k < parameters.size(); ++k) {
+    const Moments& blocks = white.parameters[k].total_blocks;
+    const std::vector<double> zeros(blocks.size(), 0.0);
+    const ZSummary z = compare_moments(blocks, zeros);
+    const ZSummary z_grey = compare_moments(grey.parameters[k].total_blocks, zeros);
+    fmt::print("{:24} {:3} blocks, mean z {:5.2f}, sd {:4.2f}, max |z| {:5.2f}; grey {:5.2f}\n",
+               parameters[k], z.count, z.mean, z.deviation, z.largest, z_grey.largest);
+    EXPECT_TRUE(z.plausible(kLevel)) << parameters[k];
+    EXPECT_GT(z_grey.largest, 6) << parameters[k];
+  }
+}
+
+// Everything, with one unit of length drawn as `unit`.
+Scene scaled_scene(const TempFiles& files, double unit) {
+  SceneParts parts;
+  parts.unit = unit;
+  parts.max_depth = 3;
+  parts.origin = {0, 2.5, 4};
+  parts.body =
+      square("floor", 2.5 * unit, -90, {0, 0, 0}, conductor("gloss", 0.3)) +
+      obj_shape("cube", write_mesh(files, "cube.obj", cube_mesh()), true, 0.4 * unit,
+                Vec3d{-0.8, 0.5, 0.2} * unit, diffuse("clay", "0.7, 0.5, 0.3")) +
+      obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(1)), false, 0.5 * unit,
+                Vec3d{0.7, 0.6, 0.3} * unit, diffuse("chalk", "0.8, 0.8, 0.8")) +
+      square("lamp", 0.8 * unit, 90, Vec3d{0.3, 3, 0.5} * unit, area_light("glow", "6, 5, 4")) +
+      constant_light("sky", "0.3, 0.4, 0.5");
+  return make_scene(files, parts);
+}
+
+class UnitOfLength : public testing::TestWithParam<double> {};
+
+TEST_P(UnitOfLength, DoesNotMatter) {
+  const TempFiles files;
+  // Per unit of length, and per something that has none.
+  const std::vector<std::string> lengths = {"cube.translate.x", "ball.translate.y",
+                                            "sensor.translate.z", "lamp.translate.x"};
+  const std::vector<std::string> others = {"cube.rotate.y", "ball.scale", "sensor.rotate.x",
+                                           "gloss.alpha"};
+  std::vector<std::string> all = lengths;
+  all.insert(all.end(), others.begin(), others.end());
+  const GradientResult a = run_gradient(scaled_scene(files, 1), all, 96, 1);
+  const GradientResult b = run_gradient(scaled_scene(files, GetParam()), all, 96, 2);
+  for (size_t k = 0; k < all.size(); ++k) {
+    expect_equal(a.parameters[k], b.parameters[k], k < lengths.size() ? GetParam() : 1);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(, UnitOfLength, testing::Values(1e-3, 1e3, 1e4), [](const auto& test) {
+  return test.param < 1 ? "thousandth" : test.param < 1e4 ? "thousand" : "tenthousand";
+});
+
+// Convex bodies in the open: no path has more than three vertices that matter here, whether a limit
+// or roulette ends it.
+TEST(Depth, LimitAndRouletteAgree) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.origin = {0, 2.5, 4};
+  parts.body = square("floor", 2, -90, {0, 0, 0}, diffuse("dark", "0.2, 0.2, 0.2")) +
+               obj_shape("cube", write_mesh(files, "cube.obj", cube_mesh()), true, 0.5, {0, 0.8, 0},
+                         diffuse("clay", "0.5, 0.3, 0.2")) +
+               constant_light("sky", "0.3, 0.4, 0.5");
+  const std::vector<std::string> parameters = {"cube.translate.y", "cube.rotate.y"};
+  std::vector<GradientResult> results;
+  for (const auto& [depth, roulette] : {std::pair{24, 1000}, {-1, 1000}, {-1, 1}}) {
+    parts.max_depth = depth;
+    parts.rr_depth = roulette;
+    results.push_back(run_gradient(make_scene(files, parts), parameters, 192, results.size() + 1));
+  }
+  for (size_t k = 0; k < parameters.size(); ++k) {
+    expect_equal(results[0].parameters[k], results[1].parameters[k]);
+    expect_equal(results[0].parameters[k], results[2].parameters[k]);
+  }
+}
+
+}  // namespace
+}  // namespace limn

@@ -1,0 +1,139 @@
+// The program as a user meets it: exit statuses and messages.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <array>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "limn/core/image.h"
+#include "support/meshes.h"
+#include "support/scenes.h"
+
+namespace limn {
+namespace {
+
+struct Outcome {
+  int status;
+  std::string text;  // both streams
+};
+
+Outcome run(const std::string& arguments) {
+  FILE* pipe = popen((std::string(LIMN_PROGRAM) + " " + arguments + " 2>&1").c_str(), "r");
+  Outcome outcome{-1, ""};
+  if (!pipe) return outcome;
+  std::array<char, 4096> buffer;
+  while (const size_t size = fread(buffer.data(), 1, buffer.size(), pipe)) {
+    outcome.text.append(buffer.data(), size);
+  }
+  const int status = pclose(pipe);
+  outcome.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  return outcome;
+}
+
+class Program : public testing::Test {
+ protected:
+  Program() {
+    SceneParts parts;
+    parts.width = parts.height = 8;
+    parts.body = R"(  <default name="glow" value="6, 5, 4"/>
+)" + square("floor", 2.5, -90, {0, 0, 0}, diffuse("clay", "0.7, 0.5, 0.3")) +
+                 square("screen", 0.8, 50, {0.2, 0.9, 0}, diffuse("paper", "0.8, 0.8, 0.8")) +
+                 square("lamp", 0.5, 90, {0.3, 2.4, 0.5}, area_light("blaze", "$glow"));
+    scene_ = files_.write("scene.xml", scene_text(parts));
+  }
+  std::string out() const { return files_.path("out.exr"); }
+  // The message of a run that must fail for bad input.
+  std::string refused(const std::string& arguments) const {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.status, 2) << arguments << "\n" << outcome.text;
+    return outcome.text;
+  }
+
+  TempFiles files_;
+  std::string scene_;
+};
+
+TEST_F(Program, RendersAndDifferentiates) {
+  EXPECT_EQ(run("render " + scene_ + " --spp 2 --quiet -o " + out()).text, "");
+  EXPECT_EQ(read_exr(out()).width, 8);
+  const std::string figures = files_.path("figures.json");
+  const Outcome outcome = run("gradient " + scene_ + " --spp 8 --quiet --wrt screen.translate.x" +
+                              " --json " + figures + " -o " + out());
+  EXPECT_EQ(outcome.status, 0) << outcome.text;
+  EXPECT_EQ(outcome.text, "");
+  EXPECT_TRUE(std::filesystem::exists(files_.path("out_stderr.exr")));
+  EXPECT_TRUE(std::filesystem::exists(files_.path("out.png")));
+  std::ifstream stream(figures);
+  EXPECT_EQ(nlohmann::json::parse(stream)["spp"], 8);
+  EXPECT_EQ(run("info " + scene_).status, 0);
+}
+
+TEST_F(Program, ChecksBothWays) {
+  const std::string check = "check " + scene_ + " --spp 2048 --block 2 --wrt screen.translate.y";
+  const Outcome right = run(check);
+  EXPECT_EQ(right.status, 0) << right.text;
+  EXPECT_NE(right.text.find("agree"), std::string::npos);
+  const Outcome wrong = run(check + " --terms interior,camera");
+  EXPECT_EQ(wrong.status, 1) << wrong.text;
+  EXPECT_NE(wrong.text.find("suspect the boundary term"), std::string::npos) << wrong.text;
+}
+
+TEST_F(Program, UnknownParameterListsTheNearest) {
+  const std::string text = refused("gradient " + scene_ + " --wrt scren.translate.x -o " + out());
+  EXPECT_NE(text.find("\"scren.translate.x\""), std::string::npos) << text;
+  EXPECT_NE(text.find("screen.translate.x"), std::string::npos) << text;
+  EXPECT_FALSE(std::filesystem::exists(out()));
+}
+
+TEST_F(Program, UnknownNamesListTheKnown) {
+  const std::string gradient = "gradient " + scene_ + " --wrt screen.translate.x -o " + out();
+  EXPECT_NE(refused(gradient + " --sampler forrest").find("brute"), std::string::npos);
+  EXPECT_NE(refused(gradient + " --terms interior,border").find("boundary"), std::string::npos);
+  EXPECT_NE(refused("render " + scene_ + " --shading phong -o " + out()).find("continuous"),
+            std::string::npos);
+  EXPECT_NE(refused("paint " + scene_).find("A subcommand is required"), std::string::npos);
+}
+
+TEST_F(Program, BadNumbers) {
+  const std::string render = "render " + scene_ + " -o " + out();
+  EXPECT_NE(refused(render + " --spp 0").find("--spp"), std::string::npos);
+  EXPECT_NE(refused(render + " --spp many").find("--spp"), std::string::npos);
+  EXPECT_NE(refused(render + " --threads 0").find("--threads"), std::string::npos);
+  EXPECT_NE(refused(render + " --seed -1").find("--seed"), std::string::npos);
+  EXPECT_NE(refused("check " + scene_ + " --wrt screen.translate.x --step 0").find("--step"),
+            std::string::npos);
+  EXPECT_EQ(refused("check " + scene_ + " --wrt screen.translate.x --spp 1"),
+            "error: check needs --spp of at least 2, for standard errors\n");
+}
+
+TEST_F(Program, BadDefines) {
+  const std::string render = "render " + scene_ + " -o " + out();
+  EXPECT_EQ(refused(render + " -D glow"), "error: -D glow: expected NAME=VALUE\n");
+  EXPECT_NE(refused(render + " -D gloww=3").find("(known: glow)"), std::string::npos);
+  EXPECT_NE(refused(render + " -D glow=bright").find("scene.xml:"), std::string::npos);
+}
+
+TEST_F(Program, OutputsThatCannotBeWritten) {
+  const std::string text = refused("render " + scene_ + " -o /proc/no/such.exr");
+  EXPECT_NE(text.find("/proc/no/such.exr: error: cannot be written"), std::string::npos) << text;
+  EXPECT_NE(refused("render " + scene_ + " -o " + files_.path("out.jpg")).find(".exr"),
+            std::string::npos);
+}
+
+TEST_F(Program, NonFiniteSamplesAreAnError) {
+  const Outcome outcome = run("render " + scene_ + " --spp 16 --quiet -D glow=1e308 -o " + out());
+  EXPECT_EQ(outcome.status, 3) << outcome.text;
+  EXPECT_NE(outcome.text.find("non-finite sample"), std::string::npos) << outcome.text;
+  EXPECT_NE(outcome.text.find("(pixel "), std::string::npos) << outcome.text;
+  EXPECT_TRUE(std::filesystem::exists(out()));
+}
+
+TEST_F(Program, MissingSceneAndHelp) {
+  EXPECT_EQ(refused("info no/such.xml"), "no/such.xml: error: cannot read the file\n");
+  EXPECT_EQ(run("--help").status, 0);
+  EXPECT_EQ(run("gradient --help").status, 0);
+}
+
+}  // namespace
+}  // namespace limn

@@ -1,0 +1,95 @@
+// Embree against every face tested in double precision.
+#include <gtest/gtest.h>
+
+#include "limn/core/shading.h"
+#include "support/meshes.h"
+#include "support/scenes.h"
+
+namespace limn {
+namespace {
+
+Scene some_scene(double unit) {
+  Scene scene;
+  for (const NamedMesh& named : test_meshes()) {
+    scene.shapes.emplace_back();
+    const double k = static_cast<double>(scene.shapes.size());
+    const Vec3d rows[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    scene.shapes.back().mesh = transformed(named.mesh, rows, 0.6 * unit,
+                                           Vec3d{std::cos(k), std::sin(2 * k), 0.2 * k} * unit);
+  }
+  scene.shapes[1].is_emitter = true;
+  return scene;
+}
+
+// The smallest barycentric coordinate of the point where the ray meets the face's plane: how far
+// from its border it passes.
+double margin(const Scene& scene, const Ray& ray, FaceRef face) {
+  const auto c = face_corners<double>(scene.shapes[face.shape].mesh, face.face);
+  const Vec3d n = cross(c[1] - c[0], c[2] - c[0]);
+  const Vec3d p = ray.origin + ray.direction * (dot(c[0] - ray.origin, n) / dot(n, ray.direction));
+  const double b1 = dot(cross(p - c[0], c[2] - c[0]), n) / dot(n, n);
+  const double b2 = dot(cross(c[1] - c[0], p - c[0]), n) / dot(n, n);
+  return std::min({b1, b2, 1 - b1 - b2});
+}
+
+class RayTracers : public testing::TestWithParam<double> {};
+
+TEST_P(RayTracers, AgreeButForRounding) {
+  const double unit = GetParam();
+  const Scene scene = some_scene(unit);
+  const auto embree = make_embree_tracer(scene, 1);
+  const auto oracle = make_brute_force_tracer(scene);
+  Rng rng(4, 5, 6);
+  int hits = 0;
+  int skipped = 0;
+  int at_borders = 0;
+  constexpr int kRays = 4000;
+  for (int i = 0; i < kRays; ++i) {
+    // Floats, so that both see the same ray.
+    const auto exact = [](const Vec3d& v) { return cast<double>(cast<float>(v)); };
+    Ray ray{exact(random_direction(rng) * (2 * rng.uniform() * unit)),
+            exact(random_direction(rng))};
+    ray.skip_emitters = i % 3 == 0;
+    if (i % 5 == 0) ray.t_max = static_cast<float>(3 * rng.uniform() * unit);
+    if (i % 7 == 0) ray.t_min = static_cast<float>(rng.uniform() * unit);
+    std::vector<uint32_t> faces;
+    Hit a, b;
+    // Half of the rays pass through what they met first.
+    if (i % 2 == 0 && oracle->closest(ray, b)) {
+      ++skipped;
+      if (i % 4 == 0) {
+        ray.start = b.face;
+      } else {
+        faces = {b.face.face, 0};
+        ray.skip_shape = b.face.shape;
+        ray.skip_faces = faces;
+      }
+    }
+    const bool hit_a = embree->closest(ray, a);
+    const bool hit_b = oracle->closest(ray, b);
+    EXPECT_EQ(embree->occluded(ray), hit_a) << i;
+    hits += hit_b;
+    if (hit_a == hit_b && (!hit_a || (a.face == b.face && std::fabs(a.t - b.t) < 1e-4 * unit))) {
+      continue;
+    }
+    ++at_borders;
+    // They may only differ where the nearer of the two is met within rounding of its border or of
+    // the ray's end.
+    const bool embree_nearer = hit_a && (!hit_b || a.t < b.t);
+    const Hit& nearer = embree_nearer ? a : b;
+    const double to_end =
+        std::min(std::fabs(nearer.t - ray.t_max), std::fabs(nearer.t - ray.t_min));
+    EXPECT_TRUE(std::fabs(margin(scene, ray, nearer.face)) < 1e-4 || to_end < 1e-5 * unit)
+        << "ray " << i << ", margin " << margin(scene, ray, nearer.face);
+  }
+  EXPECT_GT(hits, kRays / 5);
+  EXPECT_GT(skipped, kRays / 10);
+  EXPECT_LT(at_borders, kRays / 500);
+}
+
+INSTANTIATE_TEST_SUITE_P(, RayTracers, testing::Values(1e-3, 1.0, 1e4), [](const auto& test) {
+  return test.param < 1 ? "small" : test.param > 1 ? "large" : "one";
+});
+
+}  // namespace
+}  // namespace limn

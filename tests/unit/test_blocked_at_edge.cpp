@@ -1,0 +1,84 @@
+// Which face around an edge a path meets that starts on the edge, against rays that start a tiny
+// distance away from it.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "integrators/path.h"
+#include "support/meshes.h"
+#include "support/scenes.h"
+
+namespace limn {
+namespace {
+
+// `wings` faces around the segment from (0, 0, -1) to (0, 0, 1), at random angles.
+Mesh fan(int wings, Rng& rng) {
+  std::vector<Vec3f> x{{0, 0, -1}, {0, 0, 1}};
+  std::vector<FaceIndices> faces;
+  for (int k = 0; k < wings; ++k) {
+    const double angle = 2 * kPi * rng.uniform();
+    const double reach = 0.5 + rng.uniform();
+    x.push_back(
+        cast<float>(Vec3d{reach * std::cos(angle), reach * std::sin(angle), rng.uniform() - 0.5}));
+    const uint32_t tip = 2 + k;
+    faces.push_back(rng.uniform() < 0.5 ? FaceIndices{0, 1, tip} : FaceIndices{1, 0, tip});
+  }
+  return make_mesh(x, faces);
+}
+
+TEST(BlockedAtEdge, AgreesWithRaysCloseBy) {
+  Rng rng(1, 2, 3);
+  int blocked = 0;
+  int free = 0;
+  for (int trial = 0; trial < 2000; ++trial) {
+    const int wings = 2 + trial % 3;
+    Scene scene;
+    scene.shapes.emplace_back();
+    scene.shapes[0].mesh = fan(wings, rng);
+    const Mesh& mesh = scene.shapes[0].mesh;
+    std::vector<uint32_t> faces(wings);
+    std::iota(faces.begin(), faces.end(), 0u);
+    const EdgeStart edge{0, faces, {0, 0, -1}, {0, 0, 1}};
+    const auto tracer = make_brute_force_tracer(scene);
+    for (int k = 0; k < 20; ++k) {
+      const auto start = static_cast<uint32_t>(rng.uniform() * wings);
+      const Vec3d direction = random_direction(rng);
+      const Vec3d into = direction_into_face(mesh, start, edge.x0, {0, 0, 1});
+      Ray ray{Vec3d{0, 0, rng.uniform() - 0.5} + into * 1e-12, direction};
+      ray.start = {0, start};
+      ray.t_max = 1e-3;
+      Hit hit;
+      const bool found = tracer->closest(ray, hit);
+      const auto face = blocked_at_edge(scene, edge, start, direction);
+      ASSERT_EQ(found, face.has_value()) << "trial " << trial << ", direction " << k;
+      if (found) {
+        EXPECT_EQ(hit.face.face, *face);
+      }
+      ++(found ? blocked : free);
+    }
+  }
+  // Both happen often, so both are under test.
+  EXPECT_GT(blocked, 5000);
+  EXPECT_GT(free, 5000);
+}
+
+// A dihedral angle of a right angle, seen from within: half of the directions that leave one face
+// meet the other.
+TEST(BlockedAtEdge, RightAngle) {
+  Scene scene;
+  scene.shapes.emplace_back();
+  scene.shapes[0].mesh =
+      make_mesh({{0, 0, -1}, {0, 0, 1}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {1, 0, 3}});
+  const std::array<uint32_t, 2> faces = {0, 1};
+  const EdgeStart edge{0, faces, {0, 0, -1}, {0, 0, 1}};
+  EXPECT_EQ(blocked_at_edge(scene, edge, 0, normalize(Vec3d{-1, 1, 0})), 1u);
+  EXPECT_EQ(blocked_at_edge(scene, edge, 0, normalize(Vec3d{-1, 1e-9, 0})), 1u);
+  EXPECT_EQ(blocked_at_edge(scene, edge, 0, normalize(Vec3d{1, 1, 0})), std::nullopt);
+  EXPECT_EQ(blocked_at_edge(scene, edge, 0, normalize(Vec3d{-1, -1, 0})), std::nullopt);
+  EXPECT_EQ(blocked_at_edge(scene, edge, 1, normalize(Vec3d{1, -1, 0})), 0u);
+  EXPECT_EQ(blocked_at_edge(scene, edge, 1, normalize(Vec3d{1, 1, 0})), std::nullopt);
+}
+
+}  // namespace
+}  // namespace limn

@@ -1,0 +1,197 @@
+// What every run promises: the same bits whatever the threads, crops that repeat the full image,
+// honest counts when it is stopped or a sample is not finite.
+#include <gtest/gtest.h>
+
+#include "limn/integrators/gradient.h"
+#include "limn/integrators/render.h"
+#include "support/compare_moments.h"
+#include "support/meshes.h"
+#include "support/scenes.h"
+
+namespace limn {
+namespace {
+
+SceneParts small_scene(const TempFiles& files) {
+  SceneParts parts;
+  parts.width = 40;
+  parts.height = 24;
+  parts.body = square("floor", 2.5, -90, {0, 0, 0}, conductor("gloss", 0.2)) +
+               obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(1)), false, 0.8,
+                         {0.2, 1, 0}, diffuse("clay", "0.7, 0.5, 0.3")) +
+               square("lamp", 0.5, 90, {0.3, 2.4, 0.5}, area_light("glow", "6, 5, 4")) +
+               make_sky(files, "sky");
+  return parts;
+}
+
+RunSettings run_settings(int spp, int threads = 1) {
+  RunSettings settings;
+  settings.spp = spp;
+  settings.seed = 3;
+  settings.threads = threads;
+  return settings;
+}
+
+GradientResult run_gradient(const Scene& scene, const RunSettings& settings) {
+  GradientOptions options;
+  options.parameters = {"ball.translate.x", "sensor.rotate.y"};
+  options.block = 8;
+  return gradient(scene, options, settings);
+}
+
+void expect_same(const Moments& a, const Moments& b) {
+  ASSERT_EQ(a.size(), b.size());
+  ASSERT_GT(a.size(), 0u);
+  for (size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a.mean(i), b.mean(i)) << i;
+    EXPECT_EQ(a.variance(i), b.variance(i)) << i;
+  }
+}
+
+class Threads : public testing::TestWithParam<int> {};
+
+TEST_P(Threads, SameBits) {
+  const TempFiles files;
+  const Scene scene = make_scene(files, small_scene(files));
+  expect_same(render(scene, run_settings(4)).radiance,
+              render(scene, run_settings(4, GetParam())).radiance);
+  const GradientResult a = run_gradient(scene, run_settings(4));
+  const GradientResult b = run_gradient(scene, run_settings(4, GetParam()));
+  expect_same(a.radiance, b.radiance);
+  for (size_t k = 0; k < a.parameters.size(); ++k) {
+    expect_same(a.parameters[k].total, b.parameters[k].total);
+    expect_same(a.parameters[k].total_blocks, b.parameters[k].total_blocks);
+    for (int t = 0; t < kTermCount; ++t) {
+      expect_same(a.parameters[k].terms[t], b.parameters[k].terms[t]);
+    }
+  }
+  const auto differences = [&](int threads) {
+    return finite_differences(scene, "ball.translate.x", 0.01, 8, run_settings(2, threads));
+  };
+  expect_same(differences(1).extrapolated, differences(GetParam()).extrapolated);
+}
+
+INSTANTIATE_TEST_SUITE_P(, Threads, testing::Values(2, 7));
+
+TEST(Seeds, Matter) {
+  const TempFiles files;
+  const Scene scene = make_scene(files, small_scene(files));
+  RunSettings other = run_settings(4);
+  other.seed = 4;
+  const Moments a = render(scene, run_settings(4)).radiance;
+  const Moments b = render(scene, other).radiance;
+  size_t equal = 0;
+  for (size_t i = 0; i < a.size(); ++i) equal += a.mean(i) == b.mean(i);
+  EXPECT_LT(equal, a.size() / 10);
+}
+
+class Crop : public testing::TestWithParam<std::string> {};
+
+TEST_P(Crop, IsAPartOfTheFullImage) {
+  const TempFiles files;
+  SceneParts parts = small_scene(files);
+  parts.film = GetParam();
+  const Scene full = make_scene(files, parts);
+  constexpr int kX = 13, kY = 5, kWidth = 19, kHeight = 15;
+  Scene crop = full;
+  crop.film.crop_x = kX;
+  crop.film.crop_y = kY;
+  crop.film.crop_width = kWidth;
+  crop.film.crop_height = kHeight;
+  const auto cut = [&](size_t i) {
+    const size_t x = i / 3 % kWidth + kX;
+    const size_t y = i / 3 / kWidth + kY;
+    return (y * parts.width + x) * 3 + i % 3;
+  };
+  const Moments image = render(full, run_settings(2)).radiance;
+  const Moments part = render(crop, run_settings(2)).radiance;
+  ASSERT_EQ(part.size(), size_t{3 * kWidth * kHeight});
+  for (size_t i = 0; i < part.size(); ++i) EXPECT_EQ(part.mean(i), image.mean(cut(i)));
+
+  // The camera term has samples of its own for every film, the others are repeated.
+  const GradientResult a = run_gradient(full, run_settings(64));
+  const GradientResult b = run_gradient(crop, run_settings(64));
+  for (size_t k = 0; k < a.parameters.size(); ++k) {
+    for (const int term : {kInterior, kBoundary}) {
+      const Moments& whole = a.parameters[k].terms[term];
+      const Moments& piece = b.parameters[k].terms[term];
+      for (size_t i = 0; i < piece.size(); ++i) EXPECT_EQ(piece.mean(i), whole.mean(cut(i)));
+    }
+    const Moments& whole = a.parameters[k].terms[kCamera];
+    const Moments& piece = b.parameters[k].terms[kCamera];
+    double difference = 0;
+    double variance = 0;
+    double magnitude = 0;
+    for (size_t i = 0; i < piece.size(); ++i) {
+      difference += piece.mean(i) - whole.mean(cut(i));
+      variance += piece.variance(i) + whole.variance(cut(i));
+      magnitude += std::fabs(piece.mean(i));
+    }
+    EXPECT_GT(magnitude, 0);
+    EXPECT_LT(std::fabs(difference) / std::sqrt(variance), 5);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    , Crop,
+    testing::Values(R"(<rfilter type="box"/>)",
+                    R"(<rfilter type="gaussian"/><boolean name="sample_border" value="true"/>)"),
+    [](const auto& test) { return test.index == 0 ? "box" : "gaussian"; });
+
+TEST(NonFinite, IsCountedAndLocated) {
+  const TempFiles files;
+  SceneParts parts = small_scene(files);
+  parts.width = parts.height = 8;
+  // More than an image can hold.
+  parts.body += square("blinding", 1, 90, {-1, 2.8, 0}, area_light("blaze", "1e308, 0, 0"));
+  const Scene scene = make_scene(files, parts);
+  const RenderResult r = render(scene, run_settings(16));
+  EXPECT_GT(r.non_finite.count, 0u);
+  ASSERT_FALSE(r.non_finite.first.empty());
+  const NonFinite::Place place = r.non_finite.first[0];
+  EXPECT_GE(place.x, 0);
+  EXPECT_LT(place.x, 8);
+  EXPECT_LT(place.sample, 16);
+  EXPECT_EQ(place.term, "radiance");
+  EXPECT_LE(r.non_finite.first.size(), 10u);
+  for (size_t i = 0; i < r.radiance.size(); ++i) EXPECT_TRUE(std::isfinite(r.radiance.mean(i)));
+
+  const GradientResult g = run_gradient(scene, run_settings(16));
+  EXPECT_GT(g.non_finite.count, 0u);
+  for (const ParameterGradient& p : g.parameters) {
+    for (size_t i = 0; i < p.total.size(); ++i) EXPECT_TRUE(std::isfinite(p.total.mean(i)));
+  }
+}
+
+// Stopped after some batches of one sample each: exactly the image of that many samples.
+TEST(Interruption, KeepsWhatIsDone) {
+  const TempFiles files;
+  const Scene scene = make_scene(files, small_scene(files));
+  std::atomic<bool> stop = false;
+  RunSettings settings = run_settings(64);
+  settings.interrupted = &stop;
+  settings.progress = [&](double done) { stop = done > 0.2; };
+  const RenderResult r = render(scene, settings);
+  EXPECT_GE(r.spp, 8);
+  EXPECT_LE(r.spp, 14);
+  EXPECT_EQ(r.radiance.samples(), r.spp);
+  expect_same(r.radiance, render(scene, run_settings(static_cast<int>(r.spp))).radiance);
+
+  stop = false;
+  const GradientResult g = run_gradient(scene, settings);
+  EXPECT_GE(g.spp, 8);
+  EXPECT_LE(g.spp, 14);
+  const GradientResult whole = run_gradient(scene, run_settings(static_cast<int>(g.spp)));
+  expect_same(g.parameters[0].total, whole.parameters[0].total);
+
+  stop = false;
+  const DifferenceResult d = finite_differences(scene, "ball.translate.x", 0.01, 8, settings);
+  EXPECT_GE(d.spp, 8);
+  EXPECT_LE(d.spp, 14);
+
+  stop = true;
+  settings.progress = nullptr;
+  EXPECT_EQ(render(scene, settings).spp, 0);
+}
+
+}  // namespace
+}  // namespace limn
