@@ -227,8 +227,4 @@ uint64_t EdgeForest::bytes() const {
 
 uint64_t EdgeForest::node_count() const { return impl_->forest.nodes.size(); }
 
-std::unique_ptr<EdgeSampler> make_forest_sampler(const EdgeSamplerInput& input, int threads) {
-  return EdgeForest::build(input, threads);
-}
-
 }  // namespace limn

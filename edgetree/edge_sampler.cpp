@@ -1,17 +1,40 @@
 #include "limn/edgetree/edge_sampler.h"
 
 #include "limn/core/error.h"
+#include "limn/edgetree/edge_forest.h"
 #include "samplers.h"
 
 namespace limn {
 
+namespace {
+
+template <ForestConfig kConfig>
+std::unique_ptr<EdgeSampler> make_forest(const EdgeSamplerInput& input, int threads) {
+  return EdgeForest::build(input, threads, kConfig);
+}
+
+}  // namespace
+
 std::span<const EdgeSamplerType> edge_sampler_types() {
   static const EdgeSamplerType types[] = {
-      {"forest", "4-wide trees that reject what holds no silhouette", make_forest_sampler},
+      {"forest", "4-wide trees that reject what holds no silhouette", make_forest<ForestConfig{}>},
       {"brute", "lists every candidate and draws by a bound of its contribution (the oracle)",
        make_brute_force_sampler},
       {"li2019", "the tree of Li et al. 2018 over positions and Hough-transformed planes",
        make_li2019_sampler},
+      {"forest-4",
+       "forest that chooses among the four children of a node, without a look at theirs",
+       make_forest<ForestConfig{.lookahead = ForestConfig::Lookahead::kNone}>},
+      {"forest-16", "forest that chooses among up to sixteen grandchildren",
+       make_forest<ForestConfig{.lookahead = ForestConfig::Lookahead::kAll}>},
+      {"forest-any-axes", "forest with dual boxes along any axes",
+       make_forest<ForestConfig{.principal_axes = false}>},
+      {"forest-hard", "forest whose children weigh by length and distance or are rejected",
+       make_forest<ForestConfig{.soft_weights = false}>},
+      {"forest-concave", "forest that keeps concave edges",
+       make_forest<ForestConfig{.cull_concave = false}>},
+      {"forest-no-lights", "forest whose weights ignore where the lights are",
+       make_forest<ForestConfig{.light_term = false}>},
       {"uniform", "any edge of the scene, any point on it", make_uniform_sampler},
   };
   return types;

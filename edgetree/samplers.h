@@ -8,7 +8,6 @@ namespace limn {
 
 std::unique_ptr<EdgeSampler> make_brute_force_sampler(const EdgeSamplerInput& input, int threads);
 std::unique_ptr<EdgeSampler> make_li2019_sampler(const EdgeSamplerInput& input, int threads);
-std::unique_ptr<EdgeSampler> make_forest_sampler(const EdgeSamplerInput& input, int threads);
 std::unique_ptr<EdgeSampler> make_uniform_sampler(const EdgeSamplerInput& input, int threads);
 
 // Whether the query's own face is among those around the edge.

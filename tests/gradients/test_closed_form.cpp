@@ -123,7 +123,9 @@ std::vector<std::tuple<std::string, std::string>> all_cases() {
 
 INSTANTIATE_TEST_SUITE_P(, ClosedForm, testing::ValuesIn(all_cases()), [](const auto& test) {
   const std::string file = std::get<1>(test.param);
-  return std::get<0>(test.param) + "_" + file.substr(0, file.find('.'));
+  std::string name = std::get<0>(test.param) + "_" + file.substr(0, file.find('.'));
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
 });
 
 }  // namespace
