@@ -184,7 +184,8 @@ bool EdgeForest::sample(const EdgeQuery& query, Rng& rng, EdgeSample& sample) co
   if (!(edge.is_seen())) return false;
   sample.t = edge.sample_t(u_t);
   sample.pdf_t = edge.pdf_t(sample.t);
-  return true;
+  // Nothing where the density is lost to rounding, on an edge that lies in the horizon.
+  return sample.pdf_t > 0;
 }
 
 double EdgeForest::probability(const EdgeQuery& query, EdgeId id) const {
