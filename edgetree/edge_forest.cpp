@@ -47,7 +47,9 @@ struct EdgeForest::Impl {
 
   ForestQuery prepare(const EdgeQuery& query) const {
     const bool lit = config.light_term && !lights.empty();
-    return {forest, lit ? &lights : nullptr, query, input.lane_scale};
+    const RadiancePyramid* environment =
+        config.environment_term ? input.environment.get() : nullptr;
+    return {forest, lit ? &lights : nullptr, environment, query, input.lane_scale};
   }
 
   // Both sampling and evaluating a probability ask here, and get the same bits.
@@ -174,9 +176,12 @@ EdgeForest::~EdgeForest() = default;
 
 std::unique_ptr<EdgeForest> EdgeForest::build(const EdgeSamplerInput& input, int threads,
                                               const ForestConfig& config) {
-  auto impl = std::unique_ptr<Impl>(
-      new Impl{input, config, LightClusters(input.lights, input.environment_luminance),
-               build_forest(input, threads, config)});
+  // What is spread over directions weighs by itself.
+  const bool spread = config.environment_term && input.environment;
+  const double uniform_luminance = spread ? 0 : input.environment_luminance;
+  auto impl =
+      std::unique_ptr<Impl>(new Impl{input, config, LightClusters(input.lights, uniform_luminance),
+                                     build_forest(input, threads, config)});
   return std::unique_ptr<EdgeForest>(new EdgeForest(std::move(impl)));
 }
 

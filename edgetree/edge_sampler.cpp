@@ -35,6 +35,8 @@ std::span<const EdgeSamplerType> edge_sampler_types() {
        make_forest<ForestConfig{.cull_concave = false}>},
       {"forest-no-lights", "forest whose weights ignore where the lights are",
        make_forest<ForestConfig{.light_term = false}>},
+      {"forest-no-environment", "forest whose weights take the environment for uniform",
+       make_forest<ForestConfig{.environment_term = false}>},
       {"uniform", "any edge of the scene, any point on it", make_uniform_sampler},
   };
   return types;

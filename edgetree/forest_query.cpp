@@ -11,6 +11,8 @@ namespace {
 constexpr float kShallow = 0.1f;
 // Points in or near a box see its edges at this share of its squared radius at least.
 constexpr float kNear = 0.25f;
+// Radiance of objects as a share of the mean of the environment that lights them.
+constexpr float kScattered = 0.25f;
 
 // p in the frame of a node, and what rounding can add to row . x of all rows together: of the
 // entries of rows and of x by 2^-24 each, four roundings in a product and two in sums; rows have
@@ -65,6 +67,20 @@ Float4 expected_length(const ForestNode& node, const DualPlane& plane, float err
   return length * select(node.child < 0, splat(1.0f), ramp * sqrt(ramp));
 }
 
+// Radiance that may come from behind the boxes, from lights and environment.
+Float4 brightness(const ForestQuery& query, const Float4x3& d, const Float4x3& half, Float4 tangent,
+                  Int4 alive) {
+  Float4 sum = splat(0.0f);
+  if (query.lights) sum = query.lights->mean_over_boxes(d, half);
+  if (!query.environment) return sum;
+  for (int lane = 0; lane < kWidth; ++lane) {
+    if (!alive[lane]) continue;
+    sum[lane] += query.environment->mean(d.x[lane], d.y[lane], d.z[lane], tangent[lane]);
+  }
+  // Where the environment is dark, edges still jump against the objects that it lights.
+  return sum + kScattered * query.environment->mean();
+}
+
 }  // namespace
 
 ForestPoint point_of(const Forest& forest, const Vec3d& p) {
@@ -74,8 +90,9 @@ ForestPoint point_of(const Forest& forest, const Vec3d& p) {
 }
 
 ForestQuery::ForestQuery(const Forest& forest, const LightClusters* clusters,
-                         const EdgeQuery& query, const Lanes& lane_scale)
-    : point(point_of(forest, query.p)), lobe(query.lobe, query.n, query.wi) {
+                         const RadiancePyramid* pyramid, const EdgeQuery& query,
+                         const Lanes& lane_scale)
+    : point(point_of(forest, query.p)), lobe(query.lobe, query.n, query.wi), environment(pyramid) {
   if (clusters) lights.emplace(*clusters, query.p);
   for (int k = 0; k < 3; ++k) n[k] = static_cast<float>(query.n[k]);
   const Vec3<Lanes>& v = query.velocity;
@@ -119,7 +136,9 @@ Float4 weigh_children(const ForestNode& node, const ForestQuery& query, bool sof
   const Float4x3 half{e[0], e[1], e[2]};
   const Float4 distance2 = max(dot(d, d), kNear * dot(half, half) + 1e-30f);
   Float4 weight = length * speed / distance2 * query.lobe.mean_over_boxes(d, half);
-  if (query.lights) weight *= query.lights->mean_over_boxes(d, half);
+  if (query.lights || query.environment) {
+    weight *= brightness(query, d, half, sqrt(dot(half, half) / distance2), alive);
+  }
   return select(alive, max(weight, splat(std::numeric_limits<float>::min())), splat(0.0f));
 }
 

@@ -18,12 +18,13 @@ ForestPoint point_of(const Forest& forest, const Vec3d& p);
 
 // All that does not depend on the node.
 struct ForestQuery {
-  // lights: null if they are not to weigh.
-  ForestQuery(const Forest& forest, const LightClusters* lights, const EdgeQuery& query,
-              const Lanes& lane_scale);
+  // lights, environment: null if they are not to weigh.
+  ForestQuery(const Forest& forest, const LightClusters* lights, const RadiancePyramid* environment,
+              const EdgeQuery& query, const Lanes& lane_scale);
   ForestPoint point;
   LtcLobe lobe;
   std::optional<LightCones> lights;
+  const RadiancePyramid* environment;
   float n[3];
   float speed;  // of p
 };

@@ -1,5 +1,7 @@
 #include "shading_boundary.h"
 
+#include <algorithm>
+
 namespace limn {
 namespace {
 
@@ -25,7 +27,15 @@ EdgeSamplerInput make_sampler_input(const Scene& scene) {
           {{corners[0], corners[1], corners[2]}, luminance(value(shape.radiance))});
     }
   }
-  if (scene.environment) input.environment_luminance = scene.environment->mean_luminance();
+  if (!scene.environment) return input;
+  const Environment& environment = *scene.environment;
+  input.environment_luminance = environment.mean_luminance();
+  if (!environment.is_uniform()) {
+    const auto brightness = [&](const Vec3d& d) {
+      return std::max(0.0, luminance(environment.radiance(d)));
+    };
+    input.environment = std::make_shared<RadiancePyramid>(brightness, 8, 2);
+  }
   return input;
 }
 
@@ -62,7 +72,9 @@ void ShadingBoundary::add_sample(const SurfacePoint<Dual>& surface,
   const Lanes weight =
       (v.x * view.side.x + v.y * view.side.y + v.z * view.side.z) *
       (1 / (view.distance * view.distance * view.distance * sample.probability * sample.pdf_t));
-  const Rgb<double> f = seen ? value(scattering.eval(view.omega)) : Rgb<double>{};
+  // A density may round to zero at the very horizon.
+  const Rgb<double> f =
+      seen && sample.pdf_t > 0 ? value(scattering.eval(view.omega)) : Rgb<double>{};
   if (is_zero(weight) || is_black(f)) {
     ++cost_.zero_weight;
     return;

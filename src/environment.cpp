@@ -22,6 +22,7 @@ class ConstantEnvironment final : public Environment {
     return {r * std::cos(2 * kPi * u2), r * std::sin(2 * kPi * u2), z};
   }
   double pdf_solid_angle(const Vec3d&) const override { return 1 / (4 * kPi); }
+  bool is_uniform() const override { return true; }
   double mean_luminance() const override { return luminance(value(radiance_)); }
 
   std::vector<ParameterRef> parameters() override {
@@ -62,6 +63,7 @@ class MapEnvironment final : public Environment {
   double pdf_solid_angle(const Vec3d& d) const override {
     return map_->pdf_solid_angle(map_from_world(d));
   }
+  bool is_uniform() const override { return false; }
   double mean_luminance() const override { return map_->mean_luminance() * scale_.v; }
 
   std::vector<ParameterRef> parameters() override { return {{"scale", {&scale_}}}; }

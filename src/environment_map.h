@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "huge_pages.h"
 #include "limn/core/dual.h"
 #include "limn/core/image.h"
 #include "limn/core/vec.h"
@@ -80,8 +81,8 @@ class EnvironmentMap {
 
   int width_ = 0;
   int height_ = 0;                 // at least 2
-  std::vector<Texel> texels_;      // height_ x width_
-  std::vector<Slot> slots_;        // of cells, height_ - 1 x width_
+  HugePageVector<Texel> texels_;   // height_ x width_
+  HugePageVector<Slot> slots_;     // of cells, height_ - 1 x width_
   double inverse_total_ = 0;       // 1 / integral over the sphere of what the density follows
   std::vector<double> cos_theta_;  // of each row of texels (height_)
 };

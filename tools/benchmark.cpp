@@ -107,7 +107,7 @@ RunSettings one_thread(int spp) {
 void add_render_benchmark(const Bench& bench) {
   benchmark::RegisterBenchmark("render", [&](benchmark::State& state) {
     uint64_t rays = 0;
-    for (auto _ : state) rays += render(bench.scene, one_thread(8)).rays;
+    for (auto _ : state) rays += render(bench.scene, one_thread(32)).rays;
     state.counters["rays"] = rate(static_cast<double>(rays));
   })->Unit(benchmark::kMillisecond);
 }

@@ -25,6 +25,8 @@ class Environment {
   virtual Vec3d sample(double u1, double u2) const = 0;
   virtual double pdf_solid_angle(const Vec3d& d) const = 0;
 
+  // Whether the radiance is the same from all directions.
+  virtual bool is_uniform() const = 0;
   // Mean over the sphere of the luminance of `radiance`, exact.
   virtual double mean_luminance() const = 0;
 

@@ -20,6 +20,8 @@ struct ForestConfig {
   bool soft_weights = true;
   // Children weigh by the light that may come from behind them.
   bool light_term = true;
+  // The same for an environment that is not uniform.
+  bool environment_term = true;
   // How many nodes a choice looks at: nodes of edges only are weighed by their edges, before one of
   // their siblings is drawn; or any node by its children (up to 16 at once), or none.
   enum class Lookahead { kNone, kEdges, kAll };

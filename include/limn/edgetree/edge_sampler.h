@@ -11,6 +11,7 @@
 #include "limn/core/bsdf.h"
 #include "limn/core/rng.h"
 #include "limn/edgetree/edges.h"
+#include "limn/edgetree/radiance_pyramid.h"
 
 namespace limn {
 
@@ -51,6 +52,8 @@ struct EdgeSamplerInput {
   std::vector<EdgeMesh> objects;
   std::vector<LightTriangle> lights = {};
   double environment_luminance = 0;  // mean over the sphere
+  // How it is spread over directions; null if it is uniform or absent.
+  std::shared_ptr<const RadiancePyramid> environment = nullptr;
   // Weights that make the speeds of different parameters comparable (a metre, a radian), for
   // importance only.
   Lanes lane_scale = {1, 1, 1, 1};
