@@ -48,6 +48,13 @@ double mean_magnitude(const Moments& moments) {
   return sum / moments.size();
 }
 
+// Of the image: the mean over pixels and channels of the squared standard error.
+double mean_squared_error(const Moments& moments) {
+  double sum = 0;
+  for (size_t i = 0; i < moments.size(); ++i) sum += moments.variance(i);
+  return sum / moments.size();
+}
+
 struct Sum {
   double value, error;
 };
@@ -82,8 +89,11 @@ json write_parameter(const Scene& scene, const ParameterGradient& g, const std::
   for (int t = 0; t < kTermCount; ++t) {
     terms[term_name(t)] = {{"mean_magnitude", mean_magnitude(g.terms[t])}};
   }
-  return {{"name", g.name}, {"image", output},  {"picture", picture},      {"stderr", errors},
-          {"scale", scale}, {"sum", sum.value}, {"sum_stderr", sum.error}, {"terms", terms}};
+  return {{"name", g.name},          {"image", output},
+          {"picture", picture},      {"stderr", errors},
+          {"scale", scale},          {"sum", sum.value},
+          {"sum_stderr", sum.error}, {"mean_squared_error", mean_squared_error(g.total)},
+          {"terms", terms}};
 }
 
 void print_terms(const GradientResult& result, const std::array<bool, kTermCount>& terms) {
