@@ -12,7 +12,7 @@ constexpr float kShallow = 0.1f;
 // Points in or near a box see its edges at this share of its squared radius at least.
 constexpr float kNear = 0.25f;
 // Radiance of objects as a share of the mean of the environment that lights them.
-constexpr float kScattered = 0.25f;
+constexpr float kScattered = 1.0f;
 
 // p in the frame of a node, and what rounding can add to row . x of all rows together: of the
 // entries of rows and of x by 2^-24 each, four roundings in a product and two in sums; rows have
