@@ -121,7 +121,11 @@ CheckResult check(const Scene& scene, const CheckOptions& options, const RunSett
       summarize(z_scores(d.blocks_at_double_step, d.event_at_double_step, variance));
   result.extrapolated = summarize(z_scores(d.blocks_extrapolated, d.event_extrapolated, variance));
   result.total = compare_totals(g.image_sum, d.image_sum);
-  result.agree = result.extrapolated.plausible(kLevel) && normal_p_value(result.total.z) >= kLevel;
+  // Extrapolation only helps where the double step is still small; a wrong gradient agrees with
+  // neither.
+  const bool blocks_agree =
+      result.at_step.plausible(kLevel) || result.extrapolated.plausible(kLevel);
+  result.agree = blocks_agree && normal_p_value(result.total.z) >= kLevel;
   if (!result.agree) {
     // A term that was left out may be the one that is missing.
     const GradientResult others = other_terms(scene, gradient_options, first);

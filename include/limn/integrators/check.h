@@ -36,8 +36,10 @@ struct CheckResult {
       extrapolated;       // z = (gradient - differences) / combined error, over blocks
   TotalComparison total;  // against the extrapolated differences
   std::array<Suspicion, kTermCount> suspicions;
-  bool agree = false;  // extrapolated z-scores and the total are plausible at the level 1e-4
-  int suspect = -1;    // a term, if they disagree
+  // The z-scores at the step or the extrapolated ones are plausible at the level 1e-4, and so is
+  // the total.
+  bool agree = false;
+  int suspect = -1;  // a term, if they disagree
   GradientResult gradient;
   DifferenceResult differences;
 };
