@@ -34,6 +34,13 @@ struct ObjectDescription {
 };
 
 struct SceneDescription {
+  SceneDescription() = default;
+  SceneDescription(SceneDescription&&) = default;
+  // Objects that refer to each other in a circle (an error) would keep each other alive.
+  ~SceneDescription() {
+    for (const auto& object : with_id) object->children.clear();
+  }
+
   std::string file;
   SourceLocation where;                                     // of <scene>
   std::vector<std::shared_ptr<ObjectDescription>> objects;  // directly under <scene>, in order
