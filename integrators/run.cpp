@@ -33,10 +33,12 @@ std::string NonFinite::message() const {
   return text;
 }
 
-Batches::Batches(int spp) : count(std::min(spp, 64)), spp_(spp) {}
-
-int Batches::first_sample(int batch) const {
-  return static_cast<int>(static_cast<int64_t>(spp_) * batch / count);
+Batches::Batches(int spp) : ends_{0} {
+  while (ends_.back() < spp) {
+    const int done = ends_.back();
+    ends_.push_back(std::min(spp, done + 1 + done / 32));
+  }
+  count = static_cast<int>(ends_.size()) - 1;
 }
 
 void ProgressCounter::step() {

@@ -37,15 +37,17 @@ struct NonFinite {
   std::string message() const;
 };
 
-// How the samples are split: `count` batches, at most 64, each of spp / count samples or one more.
+// How the samples are split: batches of one sample per pixel at first, then of a thirty-second of
+// what is done, so that an interrupt always loses little, and there are always enough batches for a
+// standard error.
 struct Batches {
   int count;
   explicit Batches(int spp);
-  int first_sample(int batch) const;
-  int samples(int batch) const { return first_sample(batch + 1) - first_sample(batch); }
+  int first_sample(int batch) const { return ends_[batch]; }
+  int samples(int batch) const { return ends_[batch + 1] - ends_[batch]; }
 
  private:
-  int spp_;
+  std::vector<int> ends_;  // count + 1, from 0 to spp
 };
 
 class Stopwatch {
