@@ -12,16 +12,7 @@ inline uint64_t mix_bits(uint64_t z) {
   return z ^ (z >> 31);
 }
 
-enum class Purpose : uint64_t {
-  kFilm,
-  kBsdf,
-  kEmitter,
-  kRoulette,
-  kEdge,
-  kEdgeSide,
-  kCamera,
-  kTest
-};
+enum class Purpose : uint64_t { kFilm, kBsdf, kEmitter, kRoulette, kEdge, kEdgeSide, kCamera };
 
 // SplitMix64 started from a hash of (seed, pixel, sample): a stream for one path. `at` derives the
 // stream of one path vertex and one purpose, so that drawing more numbers at one place leaves all

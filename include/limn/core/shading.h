@@ -133,9 +133,6 @@ SurfacePoint<S> surface_on_ray(const Scene& scene, FaceRef face, const Vec3<S>& 
   return point;
 }
 
-// The point with barycentric coordinates (b1, b2) of the second and third corner.
-SurfacePoint<double> surface_at(const Scene& scene, FaceRef face, double b1, double b2);
-
 // The scattering function at a surface point for a fixed direction to the viewer.
 template <class S>
 class Scattering {
