@@ -1,6 +1,8 @@
 #include "limn/edgetree/edge_forest.h"
 
 #include <algorithm>
+#include <bit>
+#include <cstring>
 
 #include "forest_build.h"
 #include "forest_query.h"
@@ -12,30 +14,41 @@ namespace {
 
 using Lookahead = ForestConfig::Lookahead;
 
-// The weights of a node's children, and of theirs where those were looked at.
-struct Weights {
-  Float4 own;
-  Float4 ahead[kWidth];
-  double total() const {
-    return (static_cast<double>(own[0]) + own[1]) + (static_cast<double>(own[2]) + own[3]);
-  }
-};
-
 double below_one(double u) { return std::clamp(u, 0.0, 0x1.fffffffffffffp-1); }
 
-// Draws a lane by the uniform number u and leaves another one in it. Some weight is positive.
-int choose(const Weights& weights, double& u) {
-  double rest = u * weights.total();
-  int chosen = -1;
-  for (int lane = 0; lane < kWidth; ++lane) {
-    if (!(weights.own[lane] > 0)) continue;
-    if (chosen >= 0) rest -= weights.own[chosen];
-    chosen = lane;
-    if (rest < weights.own[lane]) break;
+// A node, the weights of its children, and their sums in pairs, fours and all.
+struct Choice {
+  NodeId node = kNoChild;
+  float weights[kWidth];
+  double pairs[4], fours[2], total = 0;
+
+  Choice() = default;
+  Choice(NodeId id, Floats w) : node(id) {
+    static_assert(kWidth == 8);
+    std::memcpy(weights, &w, sizeof weights);
+    for (int i = 0; i < 4; ++i) pairs[i] = static_cast<double>(weights[2 * i]) + weights[2 * i + 1];
+    for (int i = 0; i < 2; ++i) fours[i] = pairs[2 * i] + pairs[2 * i + 1];
+    total = fours[0] + fours[1];
   }
-  u = below_one(rest / weights.own[chosen]);
-  return chosen;
-}
+
+  // Draws a lane by the uniform number u and leaves another one in it; total > 0. By halves, and
+  // without branches, which would depend on chance.
+  int draw(double& u) const {
+    double rest = u * total;
+    int lane = 0;
+    const auto step = [&](double left, int half) {
+      const int right = rest >= left;
+      rest -= left * right;
+      lane += half * right;
+    };
+    step(fours[0], 4);
+    step(pairs[lane / 2], 2);
+    step(weights[lane], 1);
+    while (!(weights[lane] > 0)) lane = (lane + kWidth - 1) % kWidth;  // by rounding
+    u = below_one(rest / weights[lane]);
+    return lane;
+  }
+};
 
 }  // namespace
 
@@ -53,121 +66,110 @@ struct EdgeForest::Impl {
   }
 
   // Both sampling and evaluating a probability ask here, and get the same bits.
-  void weigh(uint32_t index, const ForestQuery& query, Weights& weights) const {
-    const ForestNode& node = forest.nodes[index];
-    prefetch_children(node);
-    weights.own = weigh_children(node, query, config.soft_weights);
-    if (config.lookahead == Lookahead::kNone) return;
-    for (int lane = 0; lane < kWidth; ++lane) {
-      if (!(weights.own[lane] > 0) || node.child[lane] <= 0) continue;
-      if (config.lookahead == Lookahead::kEdges && !is_twig(node, lane)) continue;
-      const ForestNode& child = forest.nodes[node.child[lane]];
-      weights.ahead[lane] = weigh_children(child, query, config.soft_weights);
-      weights.own[lane] = sum(weights.ahead[lane]);
+  Choice choice_at(NodeId id, const ForestQuery& query) const {
+    if (id < 0) {
+      return {id, weigh_edges(forest.edges[~id], query)};
     }
+    const InnerNode& node = forest.inner[id];
+    ChildWeights children = weigh_children(node, query, config.soft_weights);
+    if (config.lookahead != Lookahead::kNone) look_ahead(node, query.point, children);
+    return {id, children.product()};
   }
 
-  // One of them is next: fetching starts while this node is weighed.
-  void prefetch_children(const ForestNode& node) const {
-    for (int lane = 0; lane < kWidth; ++lane) {
-      if (node.child[lane] <= 0) continue;
-      const auto* bytes = reinterpret_cast<const char*>(&forest.nodes[node.child[lane]]);
-      for (size_t line = 0; line < sizeof(ForestNode); line += 64) __builtin_prefetch(bytes + line);
+  void look_ahead(const InnerNode& node, const ForestPoint& point, ChildWeights& children) const {
+    const bool all = config.lookahead == Lookahead::kAll;
+    Ints wanted = children.rest > 0;
+    if (!all) wanted &= node.child < 0;
+    for (uint32_t lanes = bits(wanted); lanes != 0; lanes &= lanes - 1) {
+      const int lane = std::countr_zero(lanes);
+      const NodeId child = node.child[lane];
+      const float unit = node.head.inverse_radius;
+      children.length[lane] =
+          child < 0 ? length_below(forest.edges[~child], point, unit)
+                    : length_below(forest.inner[child], point, config.soft_weights, unit);
     }
   }
-
-  // From `weights` of a node to those of a child.
-  void descend(const ForestNode& node, int lane, const ForestQuery& query, Weights& weights) const {
-    if (config.lookahead != Lookahead::kNone && is_twig(node, lane)) {
-      weights.own = weights.ahead[lane];
-    } else {
-      weigh(static_cast<uint32_t>(node.child[lane]), query, weights);
-    }
-  }
-
-  static bool is_twig(const ForestNode& node, int lane) { return (node.twigs >> lane & 1) != 0; }
 
   double root_total(const ForestQuery& query) const {
     double total = 0;
-    Weights weights;
-    for (uint32_t root : forest.roots) {
-      weigh(root, query, weights);
-      total += weights.total();
-    }
+    for (NodeId root : forest.roots) total += choice_at(root, query).total;
     return total;
   }
 
-  // Draws a root by the uniform number u, leaves another one in it, and the root's weights. Returns
-  // kNoParent if no root has weight. total: root_total.
-  uint32_t choose_root(const ForestQuery& query, double& u, Weights& weights, double& total) const {
-    uint32_t chosen = kNoParent;
-    Weights next;
+  // Draws a root by the uniform number u and leaves another one in it. False if no root has weight.
+  // total: root_total.
+  bool choose_root(const ForestQuery& query, double& u, Choice& chosen, double& total) const {
+    bool any = false;
     total = 0;
-    for (uint32_t root : forest.roots) {
-      weigh(root, query, chosen == kNoParent ? weights : next);
-      const double weight = (chosen == kNoParent ? weights : next).total();
-      total += weight;
-      const double share = weight > 0 ? weight / total : 0;
+    for (NodeId root : forest.roots) {
+      const Choice next = choice_at(root, query);
+      total += next.total;
+      const double share = next.total > 0 ? next.total / total : 0;
       if (u < share) {
         u = below_one(u / share);
-        if (chosen != kNoParent) weights = next;
-        chosen = root;
-      } else if (chosen != kNoParent) {
+        chosen = next;
+        any = true;
+      } else if (any) {
         u = below_one((u - share) / (1 - share));
       }
     }
-    return chosen;
+    return any;
   }
 
-  // Draws an edge without testing it.
-  bool draw(const ForestQuery& query, double u, EdgeSample& sample) const {
+  // Where a draw ends: an edge, not yet tested, in a lane of an edge node.
+  struct Draw {
+    const EdgeNode* node;
+    int lane;
+    double probability;
+    EdgeId edge() const { return {node->head.object, static_cast<uint32_t>(node->edge[lane])}; }
+  };
+  bool draw(const ForestQuery& query, double u, Draw& result) const {
+    Choice choice;
     double scale;
-    Weights weights;
-    const uint32_t root = choose_root(query, u, weights, scale);
-    if (root == kNoParent) return false;
-    const ForestNode* node = &forest.nodes[root];
-    sample.probability = 1;
+    if (!choose_root(query, u, choice, scale)) return false;
+    result.probability = 1;
     while (true) {
-      const int lane = choose(weights, u);
-      sample.probability *= weights.own[lane] / scale;
-      const int32_t child = node->child[lane];
-      if (child < 0) {
-        sample.edge = {node->object, static_cast<uint32_t>(~child)};
+      const int lane = choice.draw(u);
+      result.probability *= choice.weights[lane] / scale;
+      if (choice.node < 0) {
+        result.node = &forest.edges[~choice.node];
+        result.lane = lane;
         return true;
       }
-      descend(*node, lane, query, weights);
-      node = &forest.nodes[child];
-      scale = weights.total();
+      choice = choice_at(forest.inner[choice.node].child[lane], query);
+      scale = choice.total;
       if (!(scale > 0)) return false;
     }
   }
 
-  // Of drawing the child at a slot; multiplied from the root on, as `draw` does. Leaves the weights
-  // of the slot's node.
-  double probability(uint32_t slot, const ForestQuery& query, Weights& weights) const {
-    const ForestNode& node = forest.nodes[slot / kWidth];
-    double reach = 1, scale;
-    if (node.parent == kNoParent) {
-      scale = root_total(query);
-      weigh(slot / kWidth, query, weights);
-    } else {
-      reach = probability(node.parent, query, weights);
-      if (reach == 0) return 0;
-      descend(forest.nodes[node.parent / kWidth], node.parent % kWidth, query, weights);
-      scale = weights.total();
-    }
-    return scale > 0 ? reach * (weights.own[slot % kWidth] / scale) : 0;
+  // Of drawing the child in a lane of a node; multiplied from the root on, as `draw` does.
+  double probability(NodeId id, int lane, const ForestQuery& query) const {
+    const uint32_t parent = forest.head(id).parent;
+    const bool is_root = parent == kNoParent;
+    const double reach = is_root ? 1
+                                 : probability(static_cast<NodeId>(parent / kWidth),
+                                               static_cast<int>(parent % kWidth), query);
+    if (reach == 0) return 0;
+    const Choice choice = choice_at(id, query);
+    const double scale = is_root ? root_total(query) : choice.total;
+    return scale > 0 ? reach * (choice.weights[lane] / scale) : 0;
   }
 
-  // Exact test of a drawn edge.
-  bool accepts(const EdgeQuery& query, EdgeId id) const {
-    return is_candidate(input.objects[id.object], id.edge, query.p) &&
-           !is_own_edge(input, query, id);
+  // Exact test of a drawn edge; most pass without a look at the mesh.
+  bool accepts(const EdgeQuery& query, const ForestPoint& point, const EdgeNode& node,
+               int lane) const {
+    const EdgeId id{node.head.object, static_cast<uint32_t>(node.edge[lane])};
+    // Concave edges are in the forest only where they can be silhouettes, or for comparison.
+    if (!config.cull_concave || !surely_candidate(node, lane, point)) {
+      if (!is_candidate(input.objects[id.object], id.edge, query.p)) return false;
+    }
+    return !is_own_edge(input, query, id);
   }
-  SeenEdge seen_edge(const LtcLobe& lobe, const Vec3d& p, EdgeId id) const {
-    const EdgeMesh& mesh = input.objects[id.object];
-    const auto [a, b] = mesh.edges[id.edge].vertices;
-    return {lobe, mesh.positions[a] - p, mesh.positions[b] - p};
+  static SeenEdge seen_edge(const LtcLobe& lobe, const Vec3d& p, const EdgeNode& node, int lane) {
+    const auto end = [&](int e) {
+      return Vec3d{node.ends[e][0][lane], node.ends[e][1][lane], node.ends[e][2][lane]};
+    };
+    return {lobe, end(0) - p, end(1) - p};
   }
 };
 
@@ -188,9 +190,12 @@ std::unique_ptr<EdgeForest> EdgeForest::build(const EdgeSamplerInput& input, int
 bool EdgeForest::sample(const EdgeQuery& query, Rng& rng, EdgeSample& sample) const {
   const double u_edge = rng.uniform(), u_t = rng.uniform();
   const ForestQuery prepared = impl_->prepare(query);
-  if (!impl_->draw(prepared, u_edge, sample)) return false;
-  if (!impl_->accepts(query, sample.edge)) return false;
-  const SeenEdge edge = impl_->seen_edge(prepared.lobe, query.p, sample.edge);
+  Impl::Draw draw;
+  if (!impl_->draw(prepared, u_edge, draw)) return false;
+  if (!impl_->accepts(query, prepared.point, *draw.node, draw.lane)) return false;
+  sample.edge = draw.edge();
+  sample.probability = draw.probability;
+  const SeenEdge edge = Impl::seen_edge(prepared.lobe, query.p, *draw.node, draw.lane);
   if (!(edge.is_seen())) return false;
   sample.t = edge.sample_t(u_t);
   sample.pdf_t = edge.pdf_t(sample.t);
@@ -200,35 +205,46 @@ bool EdgeForest::sample(const EdgeQuery& query, Rng& rng, EdgeSample& sample) co
 
 double EdgeForest::probability(const EdgeQuery& query, EdgeId id) const {
   const uint32_t slot = impl_->forest.slots[id.object][id.edge];
-  if (slot == kNoParent || !impl_->accepts(query, id)) return 0;
+  if (slot == kNoParent) return 0;
+  const EdgeNode& node = impl_->forest.edges[slot / kWidth];
+  const int lane = static_cast<int>(slot % kWidth);
   const ForestQuery prepared = impl_->prepare(query);
-  if (!(impl_->seen_edge(prepared.lobe, query.p, id).is_seen())) return 0;
-  Weights weights;
-  return impl_->probability(slot, prepared, weights);
+  if (!impl_->accepts(query, prepared.point, node, lane)) return 0;
+  if (!(Impl::seen_edge(prepared.lobe, query.p, node, lane).is_seen())) return 0;
+  return impl_->probability(~static_cast<NodeId>(slot / kWidth), lane, prepared);
 }
 
 double EdgeForest::pdf_t(const EdgeQuery& query, EdgeId id, double t) const {
-  const SeenEdge edge = impl_->seen_edge(LtcLobe(query.lobe, query.n, query.wi), query.p, id);
+  const uint32_t slot = impl_->forest.slots[id.object][id.edge];
+  if (slot == kNoParent) return 0;
+  const SeenEdge edge = Impl::seen_edge(LtcLobe(query.lobe, query.n, query.wi), query.p,
+                                        impl_->forest.edges[slot / kWidth],
+                                        static_cast<int>(slot % kWidth));
   return edge.is_seen() ? edge.pdf_t(t) : 0;
 }
 
 uint64_t EdgeForest::list_silhouettes(const Vec3d& p, std::vector<EdgeId>& edges) const {
   const Forest& forest = impl_->forest;
   const ForestPoint point = point_of(forest, p);
-  std::vector<uint32_t> stack(forest.roots.rbegin(), forest.roots.rend());
+  std::vector<NodeId> stack(forest.roots.rbegin(), forest.roots.rend());
   uint64_t tested = 0;
   while (!stack.empty()) {
-    const ForestNode& node = forest.nodes[stack.back()];
+    const NodeId id = stack.back();
     stack.pop_back();
     ++tested;
-    const Int4 alive = may_hold_candidates(node, point);
-    for (int lane = kWidth - 1; lane >= 0; --lane)
-      if (alive[lane] && node.child[lane] > 0)
-        stack.push_back(static_cast<uint32_t>(node.child[lane]));
+    if (id >= 0) {
+      const InnerNode& node = forest.inner[id];
+      const Ints alive = may_hold_candidates(node, point);
+      for (int lane = kWidth - 1; lane >= 0; --lane)
+        if (alive[lane]) stack.push_back(node.child[lane]);
+      continue;
+    }
+    const EdgeNode& node = forest.edges[~id];
+    const Ints alive = may_hold_candidates(node, point);
     for (int lane = 0; lane < kWidth; ++lane) {
-      if (!alive[lane] || node.child[lane] >= 0) continue;
-      const EdgeId id{node.object, static_cast<uint32_t>(~node.child[lane])};
-      if (is_candidate(impl_->input.objects[id.object], id.edge, p)) edges.push_back(id);
+      if (!alive[lane]) continue;
+      const EdgeId edge{node.head.object, static_cast<uint32_t>(node.edge[lane])};
+      if (is_candidate(impl_->input.objects[edge.object], edge.edge, p)) edges.push_back(edge);
     }
   }
   return tested;
@@ -236,11 +252,14 @@ uint64_t EdgeForest::list_silhouettes(const Vec3d& p, std::vector<EdgeId>& edges
 
 uint64_t EdgeForest::bytes() const {
   const Forest& forest = impl_->forest;
-  uint64_t sum = forest.nodes.size() * sizeof(ForestNode) + forest.roots.size() * sizeof(uint32_t);
+  uint64_t sum = forest.inner.size() * sizeof(InnerNode) + forest.edges.size() * sizeof(EdgeNode) +
+                 forest.roots.size() * sizeof(NodeId);
   for (const auto& slots : forest.slots) sum += slots.size() * sizeof(uint32_t);
   return sum;
 }
 
-uint64_t EdgeForest::node_count() const { return impl_->forest.nodes.size(); }
+uint64_t EdgeForest::node_count() const {
+  return impl_->forest.inner.size() + impl_->forest.edges.size();
+}
 
 }  // namespace limn

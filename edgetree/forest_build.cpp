@@ -76,39 +76,68 @@ double truncated(double x) {
 NodeFrame frame_of(const Box& box) {
   const Vec3d center = box.center();
   return {{truncated(center.x), truncated(center.y), truncated(center.z)},
-          truncated(length(box.half()))};
+          truncated(1 / length(box.half()))};
 }
 
-float rounded_up(double x) {
-  const auto f = static_cast<float>(x);
-  return f >= x ? f : std::nextafter(f, std::numeric_limits<float>::max());
+double length_of(std::span<const Wedge> wedges) {
+  double sum = 0;
+  for (const Wedge& wedge : wedges) sum += wedge.length;
+  return sum;
 }
 
-// Fills the nodes of one tree, each on its own.
+float positive(double x) {
+  return static_cast<float>(std::max(x, double{std::numeric_limits<float>::min()}));
+}
+
+// Motion too slow for a float still is motion.
+float speed_of(std::span<const Wedge> wedges) {
+  double speed = 0;
+  for (const Wedge& wedge : wedges) speed += wedge.length * wedge.speed;
+  return speed > 0 ? positive(speed / length_of(wedges)) : 0;
+}
+
+// Outward to a step.
+void put_box(const Box& box, const NodeFrame& frame, int lane, InnerNode& node) {
+  constexpr double kMargin = 0x1.0p-16;  // more than a query's rounding, in steps
+  const auto step = [](double x) {
+    return static_cast<int32_t>(std::clamp(x, 0.0, double{kBoxSteps}));
+  };
+  int32_t packed_low = 0, packed_high = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double low = (box.low[k] - frame.center[k]) * frame.inverse_radius;
+    const double high = (box.high[k] - frame.center[k]) * frame.inverse_radius;
+    packed_low |= step(std::floor((low + 1) * 0.5 * kBoxSteps - kMargin)) << (k * kBoxBits);
+    packed_high |= step(std::ceil((high + 1) * 0.5 * kBoxSteps + kMargin)) << (k * kBoxBits);
+  }
+  node.low[lane] = packed_low;
+  node.high[lane] = packed_high;
+}
+
+template <class Rows>
+void put_rows(const DualFit& fit, int lane, Rows& rows) {
+  for (size_t i = 0; i < std::size(rows); ++i)
+    for (int k = 0; k < 4; ++k) rows[i][k][lane] = static_cast<float>(fit.rows[i][k]);
+}
+
+// Fills the nodes of one tree, each on its own. ids: of the tree's nodes in the forest.
 class TreeFiller {
  public:
-  TreeFiller(const SplitTree& tree, std::span<const Wedge> wedges, ForestGroup group,
-             const ForestConfig& config)
-      : tree_(tree), wedges_(wedges), group_(group), config_(config) {}
+  TreeFiller(const SplitTree& tree, std::span<const NodeId> ids, std::span<const Wedge> wedges,
+             uint32_t object, ForestGroup group, const ForestConfig& config)
+      : tree_(tree), ids_(ids), wedges_(wedges), object_(object), group_(group), config_(config) {}
 
-  // All but parent and object; offset: of the tree's nodes in the forest.
-  ForestNode fill(uint32_t index, uint32_t offset) const {
+  void fill(uint32_t index, Forest& forest) const {
     const SplitNode& split = tree_.nodes[index];
-    ForestNode node{};
     const NodeFrame frame = frame_of(box_of(edges(split.range)));
-    for (int k = 0; k < 3; ++k) node.center[k] = static_cast<float>(frame.center[k]);
-    node.radius = static_cast<float>(frame.radius);
-    node.group = group_;
-    for (int lane = 0; lane < kWidth; ++lane) {
-      const EdgeRange range = split.ranges[lane];
-      if (range.size() == 0) continue;
-      const uint32_t child = split.children[lane];
-      node.child[lane] = child != 0 ? static_cast<int32_t>(child + offset)
-                                    : ~static_cast<int32_t>(wedges_[range.begin].edge);
-      if (child != 0 && has_edges_only(tree_.nodes[child])) node.twigs |= 1 << lane;
-      fill_lane(edges(range), frame, lane, node);
+    if (split.has_edges) {
+      EdgeNode& node = forest.edges[~ids_[index]];
+      fill_head(frame, node.head);
+      fill_edges(split, frame, node);
+    } else {
+      InnerNode& node = forest.inner[ids_[index]];
+      fill_head(frame, node.head);
+      fill_children(split, frame, node);
     }
-    return node;
   }
 
  private:
@@ -116,83 +145,105 @@ class TreeFiller {
     return wedges_.subspan(range.begin, range.size());
   }
 
-  static bool has_edges_only(const SplitNode& node) {
-    return std::all_of(node.children.begin(), node.children.end(),
-                       [](uint32_t child) { return child == 0; });
+  // All but the parent.
+  void fill_head(const NodeFrame& frame, NodeHead& head) const {
+    for (int k = 0; k < 3; ++k) head.center[k] = static_cast<float>(frame.center[k]);
+    head.inverse_radius = static_cast<float>(frame.inverse_radius);
+    head.object = object_;
+    head.group = group_;
   }
 
   DualFit fit(std::span<const Wedge> wedges, const NodeFrame& frame) const {
     if (group_ == ForestGroup::kSilhouette) return fit_dual(wedges, frame, config_);
-    double length = 0;
-    for (const Wedge& wedge : wedges) length += wedge.length;
+    const double length = length_of(wedges);
     if (group_ == ForestGroup::kAlways) return unrejectable_fit(length);
     DualFit fit = fit_dual(wedges, frame, config_);
     fit.cover[0] = length;
     return fit;
   }
 
-  void fill_lane(std::span<const Wedge> wedges, const NodeFrame& frame, int lane,
-                 ForestNode& node) const {
-    const DualFit dual = fit(wedges, frame);
-    const auto put = [lane](Float4& lanes, double value) {
-      lanes[lane] = static_cast<float>(value);
-    };
-    for (int i = 0; i < 4; ++i)
-      for (int k = 0; k < 4; ++k) put(node.rows[i][k], dual.rows[i][k]);
-    const double squared = frame.radius * frame.radius;
-    for (int k = 0; k < 3; ++k) put(node.cover[k], dual.cover[k] / squared);
-    const Box box = box_of(wedges);
-    for (int k = 0; k < 3; ++k) {
-      const double center = truncated((box.center()[k] - frame.center[k]) / frame.radius);
-      put(node.box_center[k], center);
-      const double low = (box.low[k] - frame.center[k]) / frame.radius;
-      const double high = (box.high[k] - frame.center[k]) / frame.radius;
-      node.box_half[k][lane] = rounded_up(std::max(high - center, center - low));
+  void fill_children(const SplitNode& split, const NodeFrame& frame, InnerNode& node) const {
+    node.child = Ints{} + kNoChild;
+    const double scale = frame.inverse_radius * frame.inverse_radius;
+    for (int lane = 0; lane < kWidth; ++lane) {
+      const std::span<const Wedge> wedges = edges(split.ranges[lane]);
+      if (wedges.empty()) continue;
+      const DualFit dual = fit(wedges, frame);
+      put_rows(dual, lane, node.rows);
+      for (int k = 0; k < 3; ++k) node.cover[k][lane] = positive(dual.cover[k] * scale);
+      node.speed[lane] = speed_of(wedges);
+      node.child[lane] = ids_[split.children[lane]];
+      put_box(box_of(wedges), frame, lane, node);
     }
-    double length = 0, speed = 0;
-    for (const Wedge& wedge : wedges) {
-      length += wedge.length;
-      speed += wedge.length * wedge.speed;
+  }
+
+  void fill_edges(const SplitNode& split, const NodeFrame& frame, EdgeNode& node) const {
+    node.edge = Ints{} + kNoChild;
+    const double scale = frame.inverse_radius * frame.inverse_radius;
+    for (int lane = 0; lane < kWidth; ++lane) {
+      const std::span<const Wedge> wedges = edges(split.ranges[lane]);
+      if (wedges.empty()) continue;
+      put_rows(fit_edge(wedges[0], frame), lane, node.rows);
+      node.length[lane] = positive(wedges[0].length * scale);
+      node.speed[lane] = speed_of(wedges);
+      node.edge[lane] = static_cast<int32_t>(wedges[0].edge);
+      for (int e = 0; e < 2; ++e)
+        for (int k = 0; k < 3; ++k)
+          node.ends[e][k][lane] = static_cast<float>(wedges[0].ends[e][k]);
     }
-    // Motion too slow for a float still is motion.
-    put(node.speed,
-        speed > 0 ? std::max(speed / length, double{std::numeric_limits<float>::min()}) : 0);
   }
 
   const SplitTree& tree_;
+  std::span<const NodeId> ids_;
   std::span<const Wedge> wedges_;
+  uint32_t object_;
   ForestGroup group_;
   const ForestConfig& config_;
 };
 
+// Makes room for the nodes of a tree and gives them their places.
+std::vector<NodeId> append_nodes(const SplitTree& tree, Forest& forest) {
+  std::vector<NodeId> ids(tree.nodes.size());
+  auto inner = static_cast<NodeId>(forest.inner.size());
+  auto edges = static_cast<NodeId>(forest.edges.size());
+  for (size_t i = 0; i < ids.size(); ++i) ids[i] = tree.nodes[i].has_edges ? ~edges++ : inner++;
+  forest.inner.resize(inner);
+  forest.edges.resize(edges);
+  forest.roots.push_back(ids[0]);
+  return ids;
+}
+
+// Parents of nodes and slots of edges, for the nodes that were just filled.
+void link(std::span<const NodeId> ids, Forest& forest) {
+  forest.head(ids[0]).parent = kNoParent;
+  for (const NodeId id : ids)
+    for (int lane = 0; lane < kWidth; ++lane) {
+      const uint32_t slot = kWidth * static_cast<uint32_t>(id < 0 ? ~id : id) + lane;
+      const int32_t child = id < 0 ? forest.edges[~id].edge[lane] : forest.inner[id].child[lane];
+      if (child == kNoChild) continue;
+      if (id < 0)
+        forest.slots[forest.edges[~id].head.object][child] = slot;
+      else
+        forest.head(child).parent = slot;
+    }
+}
+
 void append_tree(std::span<const Wedge> wedges, uint32_t object, ForestGroup group, int threads,
                  const ForestConfig& config, Forest& forest) {
-  const SplitTree tree = split_edges(wedges, threads);
+  const SplitTree tree = split_edges(wedges, config.width, threads);
   std::vector<Wedge> sorted(wedges.size());
   parallel_for((wedges.size() + 4095) / 4096, threads, [&](size_t block) {
     for (size_t i = 4096 * block; i < std::min(wedges.size(), 4096 * (block + 1)); ++i)
       sorted[i] = wedges[tree.order[i]];
   });
-  const auto offset = static_cast<uint32_t>(forest.nodes.size());
-  forest.roots.push_back(offset);
-  forest.nodes.resize(offset + tree.nodes.size());
-  const TreeFiller filler(tree, sorted, group, config);
+  const std::vector<NodeId> ids = append_nodes(tree, forest);
+  const TreeFiller filler(tree, ids, sorted, object, group, config);
   constexpr size_t kBlock = 64;
   parallel_for((tree.nodes.size() + kBlock - 1) / kBlock, threads, [&](size_t block) {
     const size_t end = std::min(tree.nodes.size(), kBlock * (block + 1));
-    for (size_t i = kBlock * block; i < end; ++i) {
-      ForestNode& node = forest.nodes[offset + i];
-      node = filler.fill(static_cast<uint32_t>(i), offset);
-      node.object = object;
-    }
+    for (size_t i = kBlock * block; i < end; ++i) filler.fill(static_cast<uint32_t>(i), forest);
   });
-  forest.nodes[offset].parent = kNoParent;
-  for (uint32_t i = offset; i < forest.nodes.size(); ++i)
-    for (uint32_t lane = 0; lane < kWidth; ++lane) {
-      const int32_t child = forest.nodes[i].child[lane];
-      if (child > 0) forest.nodes[child].parent = kWidth * i + lane;
-      if (child < 0) forest.slots[object][~child] = kWidth * i + lane;
-    }
+  link(ids, forest);
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ constexpr double kMinSeparation = 0x1.0p-20;
 constexpr double kFlat = 0x1.0p-12;
 
 Vector4d dual_point(const Plane& plane, const NodeFrame& frame) {
-  return {plane.n.x, plane.n.y, plane.n.z, plane.distance(frame.center) / frame.radius};
+  return {plane.n.x, plane.n.y, plane.n.z, plane.distance(frame.center) * frame.inverse_radius};
 }
 
 struct Farthest {
@@ -120,15 +120,6 @@ Eigen::Matrix3d principal_axes(const std::vector<Vector3d>& points) {
   return solver.eigenvectors().rowwise().reverse();
 }
 
-// Two chart points only: the segment itself.
-void fit_segment(const Vector4d& a, const Vector4d& b, DualFit& fit) {
-  for (int i = 0; i < 4; ++i) {
-    fit.rows[0][i] = 0.5 * (a[i] + b[i]);
-    fit.rows[1][i] = 0.5 * (a[i] - b[i]);
-    fit.rows[2][i] = fit.rows[3][i] = 0;
-  }
-}
-
 void fit_box(std::vector<Vector3d>& points, const Vector4d& z, const ForestConfig& config,
              DualFit& fit) {
   const Matrix<double, 4, 3> basis = complement_of(z);
@@ -188,16 +179,22 @@ DualFit fit_dual(std::span<const Wedge> wedges, const NodeFrame& frame,
   DualFit fit = unrejectable_fit(angles);
   if (z.norm() == 0) return fit;
   for (Vector4d& q : planes) q /= q.dot(z);
-  if (wedges.size() == 1 && config.principal_axes) {
-    fit_segment(planes[0], planes[1], fit);
-    fit.cover[0] = wedges[0].length;
-  } else {
-    const Matrix<double, 4, 3> basis = complement_of(z);
-    points.clear();
-    for (const Vector4d& q : planes) points.push_back(basis.transpose() * q);
-    fit_box(points, z, config, fit);
-    sum_cover(wedges, points, fit);
-  }
+  const Matrix<double, 4, 3> basis = complement_of(z);
+  points.clear();
+  for (const Vector4d& q : planes) points.push_back(basis.transpose() * q);
+  fit_box(points, z, config, fit);
+  sum_cover(wedges, points, fit);
+  scale_rows(fit);
+  return fit;
+}
+
+// p is in front of one plane and behind the other iff |(q_0 + q_1) . x| < |(q_0 - q_1) . x|,
+// whatever the planes: no Z is needed.
+DualFit fit_edge(const Wedge& wedge, const NodeFrame& frame) {
+  const Vector4d a = dual_point(wedge.planes[0], frame), b = dual_point(wedge.planes[1], frame);
+  DualFit fit{};
+  Vector4d::Map(fit.rows[0]) = 0.5 * (a + b);
+  Vector4d::Map(fit.rows[1]) = 0.5 * (a - b);
   scale_rows(fit);
   return fit;
 }

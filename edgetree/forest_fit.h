@@ -19,13 +19,13 @@ struct Wedge {
   uint32_t edge = 0;
 };
 
-// The frame in which a node's children are described: x = ((p - center) / radius, 1).
+// The frame in which a node's children are described: x = ((p - center) * inverse_radius, 1).
 struct NodeFrame {
-  Vec3d center;  // representable as floats, as is the radius
-  double radius = 1;
+  Vec3d center;  // representable as floats, as is the inverse radius
+  double inverse_radius = 1;
 };
 
-// See ForestNode for the meaning of rows and cover.
+// See InnerNode for the meaning of rows and cover.
 struct DualFit {
   double rows[4][4];
   double cover[3];  // times radius^2
@@ -36,5 +36,7 @@ DualFit unrejectable_fit(double cover);
 // Holds all planes of all wedges. In double precision: rounding to float moves rows by a relative
 // 2^-24.
 DualFit fit_dual(std::span<const Wedge> wedges, const NodeFrame& frame, const ForestConfig& config);
+// The segment between the planes of one edge: rows 0 and 1.
+DualFit fit_edge(const Wedge& wedge, const NodeFrame& frame);
 
 }  // namespace limn

@@ -1,10 +1,11 @@
 #pragma once
-// Data of the edge forest: nodes of four children, side by side in SIMD lanes.
+// Data of the edge forest: nodes of up to eight children, side by side in SIMD lanes. Inner nodes
+// have nodes for children, edge nodes have edges.
 #include <cstdint>
 #include <vector>
 
 #include "limn/edgetree/edges.h"
-#include "simd4.h"
+#include "simd.h"
 
 namespace limn {
 
@@ -16,35 +17,58 @@ enum class ForestGroup : uint8_t {
 };
 inline constexpr int kForestGroups = 3;
 
-// A child: 0 none; positive: index of a node (node 0 is a root, nobody's child); negative: ~edge.
-inline constexpr int32_t kNoChild = 0;
+// A node: >= 0 is an index of an inner node, < 0 is ~index of an edge node.
+using NodeId = int32_t;
+inline constexpr int32_t kNoChild = INT32_MIN;
 inline constexpr uint32_t kNoParent = UINT32_MAX;
 
-// In the frame of a node x = ((p - center) / radius, 1). Planes of a child that pass through p
-// satisfy  row_0 . x + sum over k of u_k (row_k . x) = 0  for some u in [-1, 1]^3: the dual box
-// (README.md). Rows are scaled so that their lengths add up to 1.
-struct ForestNode {
-  Float4 rows[4][4];     // [row][component of x]
-  Float4 box_center[3];  // positions, in the frame
-  Float4 box_half[3];    // not negative
-  // Half the sum over edges of length / radius^2 times what their wedges cover of axis u_k: a plane
-  // that crosses the box at random along axis k crosses wedges of this length on average.
-  Float4 cover[3];
-  Float4 speed;  // mean over the edges; 0 only if none moves
-  Int4 child;
+inline constexpr int kBoxBits = 10;
+inline constexpr int kBoxSteps = (1 << kBoxBits) - 1;
+
+// What both kinds of nodes have. In the frame of a node x = ((p - center) * inverse_radius, 1).
+struct NodeHead {
   float center[3];
-  float radius;
-  uint32_t parent;  // 4 * node + lane
+  float inverse_radius;
+  uint32_t parent;  // kWidth * inner node + lane
   uint32_t object;
   ForestGroup group;
-  uint8_t twigs;  // bit per lane: the child is a node of edges only
+};
+
+// Planes of a child that pass through p satisfy row_0 . x + sum over k of u_k (row_k . x) = 0 for
+// some u in [-1, 1]^3: the dual box (README.md). Rows are scaled so that their lengths add up to 1.
+struct alignas(64) InnerNode {
+  Floats rows[4][4];  // [row][component of x]
+  // Half the sum over edges of length * inverse_radius^2 times what their wedges cover of axis u_k:
+  // a plane that crosses the box at random along axis k crosses wedges of this length on average.
+  Floats cover[3];
+  NodeHead head;
+  Floats speed;  // mean over the edges; 0 only if none moves
+  Ints child;    // NodeId or kNoChild
+  // Boxes around the children: the cube [-1, 1]^3 of the frame is kBoxSteps wide; bits 0 to 9 are x,
+  // then y, then z.
+  Ints low, high;
+};
+
+// An edge's dual box is the segment between the planes of its faces: u_0 in [-1, 1].
+struct alignas(64) EdgeNode {
+  Floats rows[2][4];
+  Floats length;  // times inverse_radius^2; 0 where there is no edge
+  NodeHead head;
+  Floats speed;
+  Ints edge;           // index of an edge of the object, or kNoChild
+  Floats ends[2][3];   // world space, exactly
 };
 
 struct Forest {
-  std::vector<ForestNode> nodes;
-  std::vector<uint32_t> roots;               // nodes
+  std::vector<InnerNode> inner;
+  std::vector<EdgeNode> edges;
+  std::vector<NodeId> roots;
   double extent = 0;                         // largest |x| of a position
-  std::vector<std::vector<uint32_t>> slots;  // [object][edge]: 4 * node + lane, or kNoParent
+  std::vector<std::vector<uint32_t>> slots;  // [object][edge]: kWidth * edge node + lane, or
+                                             // kNoParent
+
+  NodeHead& head(NodeId id) { return id < 0 ? edges[~id].head : inner[id].head; }
+  const NodeHead& head(NodeId id) const { return id < 0 ? edges[~id].head : inner[id].head; }
 };
 
 }  // namespace limn

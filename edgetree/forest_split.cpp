@@ -61,7 +61,7 @@ struct Cut {
 };
 
 constexpr int kBins = 16;
-constexpr uint32_t kSortBelow = 48;
+constexpr uint32_t kSortBelow = 96;
 
 struct Bins {
   float low, scale;
@@ -113,11 +113,11 @@ void sort_along(std::span<Item> items, int axis) {
   });
 }
 
-// Few items: any place in the sorted order that leaves full nodes of four.
-Cut best_place(std::span<Item> items) {
+// Few items: any place in the sorted order that leaves full nodes of edges.
+Cut best_place(std::span<Item> items, uint32_t width) {
   Cut best;
   const auto n = static_cast<uint32_t>(items.size());
-  const uint32_t step = n > 4 ? 4 : 1;
+  const uint32_t step = n > width ? width : 1;
   for (int axis = 0; axis < kAxes; ++axis) {
     sort_along(items, axis);
     float right_cost[kSortBelow];
@@ -138,10 +138,10 @@ Cut best_place(std::span<Item> items) {
 }
 
 // Reorders the items and returns how many go left: at least one, and not all.
-uint32_t split(std::span<Item> items) {
+uint32_t split(std::span<Item> items, uint32_t width) {
   const auto n = static_cast<uint32_t>(items.size());
   if (n < kSortBelow) {
-    const Cut cut = best_place(items);
+    const Cut cut = best_place(items, width);
     sort_along(items, cut.axis);
     return cut.bin;
   }
@@ -156,50 +156,61 @@ uint32_t split(std::span<Item> items) {
   return static_cast<uint32_t>(middle - items.begin());
 }
 
-// Splits the largest part until there are four, but not what fits into one node of edges.
-SplitNode split_node(std::span<Item> items, EdgeRange range) {
-  SplitNode node;
-  node.range = range;
-  if (range.size() <= 4) {
-    for (uint32_t i = 0; i < range.size(); ++i)
-      node.ranges[i] = {range.begin + i, range.begin + i + 1};
+// The largest part is split until there are `width` parts, or all fit into nodes of edges.
+class Splitter {
+ public:
+  Splitter(std::span<Item> items, uint32_t width) : items_(items), width_(width) {}
+
+  // Appends the subtree over a range and returns its first node. Ranges of at most `stop` items
+  // below that are left to `pending` as (node, lane).
+  struct Pending {
+    uint32_t node;
+    uint32_t lane;
+  };
+  uint32_t append(EdgeRange range, uint32_t stop, std::vector<SplitNode>& nodes,
+                  std::vector<Pending>* pending) const {
+    const auto index = static_cast<uint32_t>(nodes.size());
+    nodes.push_back(node_over(range));
+    if (nodes[index].has_edges) return index;
+    for (uint32_t lane = 0; lane < width_; ++lane) {
+      const EdgeRange child = nodes[index].ranges[lane];
+      if (child.size() == 0) continue;
+      if (child.size() <= stop) {
+        pending->push_back({index, lane});
+        continue;
+      }
+      const uint32_t at = append(child, stop, nodes, pending);
+      nodes[index].children[lane] = at;
+    }
+    return index;
+  }
+
+ private:
+  SplitNode node_over(EdgeRange range) const {
+    SplitNode node;
+    node.range = range;
+    node.has_edges = range.size() <= width_;
+    if (node.has_edges) {
+      for (uint32_t i = 0; i < range.size(); ++i)
+        node.ranges[i] = {range.begin + i, range.begin + i + 1};
+      return node;
+    }
+    node.ranges[0] = range;
+    for (uint32_t count = 1; count < width_; ++count) {
+      EdgeRange& largest = *std::max_element(
+          node.ranges.begin(), node.ranges.begin() + count,
+          [](const EdgeRange& a, const EdgeRange& b) { return a.size() < b.size(); });
+      if (largest.size() <= width_) break;
+      const uint32_t left = split(items_.subspan(largest.begin, largest.size()), width_);
+      node.ranges[count] = {largest.begin + left, largest.end};
+      largest.end = largest.begin + left;
+    }
     return node;
   }
-  node.ranges[0] = range;
-  for (int count = 1; count < 4; ++count) {
-    EdgeRange& largest = *std::max_element(
-        node.ranges.begin(), node.ranges.begin() + count,
-        [](const EdgeRange& a, const EdgeRange& b) { return a.size() < b.size(); });
-    if (largest.size() <= 4) break;
-    const uint32_t left = split(items.subspan(largest.begin, largest.size()));
-    node.ranges[count] = {largest.begin + left, largest.end};
-    largest.end = largest.begin + left;
-  }
-  return node;
-}
 
-// Appends the subtree over a range; ranges of at most `stop` items below the first are left to
-// `pending` as (node, lane).
-struct Pending {
-  uint32_t node;
-  int lane;
+  std::span<Item> items_;
+  uint32_t width_;
 };
-uint32_t append_tree(std::span<Item> items, EdgeRange range, uint32_t stop,
-                     std::vector<SplitNode>& nodes, std::vector<Pending>* pending) {
-  const auto index = static_cast<uint32_t>(nodes.size());
-  nodes.push_back(split_node(items, range));
-  for (int lane = 0; lane < 4; ++lane) {
-    const EdgeRange child = nodes[index].ranges[lane];
-    if (child.size() <= 1) continue;
-    if (child.size() <= stop) {
-      pending->push_back({index, lane});
-      continue;
-    }
-    const uint32_t at = append_tree(items, child, stop, nodes, pending);
-    nodes[index].children[lane] = at;
-  }
-  return index;
-}
 
 std::vector<Item> items_of(std::span<const Wedge> wedges) {
   Vec3d low{1e300, 1e300, 1e300}, high = -low;
@@ -227,17 +238,18 @@ std::vector<Item> items_of(std::span<const Wedge> wedges) {
 
 }  // namespace
 
-SplitTree split_edges(std::span<const Wedge> wedges, int threads) {
+SplitTree split_edges(std::span<const Wedge> wedges, uint32_t width, int threads) {
   std::vector<Item> items = items_of(wedges);
   const auto n = static_cast<uint32_t>(items.size());
+  const Splitter splitter(items, width);
   constexpr uint32_t kTask = 4096;  // edges that one thread splits alone
   SplitTree tree;
-  std::vector<Pending> pending;
-  append_tree(items, {0, n}, n > kTask ? kTask : 0, tree.nodes, &pending);
+  std::vector<Splitter::Pending> pending;
+  splitter.append({0, n}, n > kTask ? kTask : 0, tree.nodes, &pending);
   std::vector<std::vector<SplitNode>> parts(pending.size());
   parallel_for(parts.size(), threads, [&](size_t i) {
     const EdgeRange range = tree.nodes[pending[i].node].ranges[pending[i].lane];
-    append_tree(items, range, 0, parts[i], nullptr);
+    splitter.append(range, 0, parts[i], nullptr);
   });
   for (size_t i = 0; i < parts.size(); ++i) {
     const auto offset = static_cast<uint32_t>(tree.nodes.size());

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "forest_fit.h"
+#include "simd.h"
 
 namespace limn {
 
@@ -14,11 +15,13 @@ struct EdgeRange {
   uint32_t size() const { return end - begin; }
 };
 
-// A node of up to four children; a child of one edge is that edge, others are nodes.
+// A node of up to `width` children: all of them are nodes or, if it has no more edges than that, all
+// are edges.
 struct SplitNode {
-  std::array<EdgeRange, 4> ranges;     // empty for none
-  std::array<uint32_t, 4> children{};  // 0 where the range is empty or one edge
+  std::array<EdgeRange, kWidth> ranges;     // empty for none
+  std::array<uint32_t, kWidth> children{};  // 0 where the range is empty or one edge
   EdgeRange range;
+  bool has_edges = false;
 };
 
 struct SplitTree {
@@ -26,7 +29,7 @@ struct SplitTree {
   std::vector<uint32_t> order;   // ranges refer to this permutation of the wedges
 };
 
-// wedges: at least one.
-SplitTree split_edges(std::span<const Wedge> wedges, int threads);
+// wedges: at least one. width: 2 to kWidth.
+SplitTree split_edges(std::span<const Wedge> wedges, uint32_t width, int threads);
 
 }  // namespace limn

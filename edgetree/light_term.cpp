@@ -124,23 +124,23 @@ LightCones::LightCones(const LightClusters& lights, const Vec3d& p) {
 // Two caps: the smaller lies in the other if the distance D of their centres is below the
 // difference of their chords, and they are apart if it is above the sum of the outer chords;
 // in between the overlap falls as the square of the remaining distance.
-Float4 LightCones::mean_over_boxes(Float4x3 centre, const Float4x3& half) const {
-  const Float4 zero = splat(0.0f), one = splat(1.0f), tiny = splat(0x1p-60f);
-  const Float4 centre2 = max(dot(centre, centre), splat(0x1p-126f)), half2 = dot(half, half);
+Floats LightCones::mean_over_boxes(Floats3 centre, const Floats3& half) const {
+  const Floats zero = splat(0.0f), one = splat(1.0f), tiny = splat(0x1p-60f);
+  const Floats centre2 = max(dot(centre, centre), splat(0x1p-126f)), half2 = dot(half, half);
   centre = centre * (1 / sqrt(centre2));
   // A box around p (share 1) is the whole sphere, chord 2; a distant cube has 2 |half|^2 and
   // reaches |half| sideways.
-  const Float4 share = half2 / (centre2 + half2);
-  const Float4 chord2 =
+  const Floats share = half2 / (centre2 + half2);
+  const Floats chord2 =
       share * (static_cast<float>(2 / kPi) + static_cast<float>(4 - 2 / kPi) * share) + tiny;
-  const Float4 chord = sqrt(chord2), chord_outer = sqrt(share * (1 + 3 * share));
-  Float4 sum = splat(base_);
+  const Floats chord = sqrt(chord2), chord_outer = sqrt(share * (1 + 3 * share));
+  Floats sum = splat(base_);
   for (int i = 0; i < count_; ++i) {
     const Cone& c = cones_[i];
-    const Float4 cosine = centre.x * c.axis[0] + centre.y * c.axis[1] + centre.z * c.axis[2];
-    const Float4 distance = sqrt(max(2 - 2 * cosine, zero));
-    const Float4 outer = chord_outer + c.chord_outer, inner = abs(chord - c.chord);
-    const Float4 overlap = clamp((outer - distance) / max(outer - inner, tiny), zero, one);
+    const Floats cosine = centre.x * c.axis[0] + centre.y * c.axis[1] + centre.z * c.axis[2];
+    const Floats distance = sqrt(max(2 - 2 * cosine, zero));
+    const Floats outer = chord_outer + c.chord_outer, inner = abs(chord - c.chord);
+    const Floats overlap = clamp((outer - distance) / max(outer - inner, tiny), zero, one);
     sum = sum + c.luminance * overlap * overlap * min(c.chord * c.chord / chord2, one);
   }
   return sum;

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "limn/edgetree/edge_sampler.h"
-#include "simd4.h"
+#include "simd.h"
 
 namespace limn {
 
@@ -54,7 +54,7 @@ class LightCones {
   // Estimate of the mean luminance over the directions of each box, with nothing in between:
   // environment, lights, and light scattered by objects. Its centre minus p and half extents
   // (>= 0) are given. Positive everywhere if there is any light.
-  Float4 mean_over_boxes(Float4x3 centre, const Float4x3& half) const;
+  Floats mean_over_boxes(Floats3 centre, const Floats3& half) const;
 
  private:
   struct Cone {

@@ -20,21 +20,21 @@ namespace {
 
 #include "ltc_tables.inc"
 
-Float4 dot3(const float a[3], const Float4x3& b) { return b.x * a[0] + b.y * a[1] + b.z * a[2]; }
-Float4 abs_dot3(const float a[3], const Float4x3& b) {
+Floats dot3(const float a[3], const Floats3& b) { return b.x * a[0] + b.y * a[1] + b.z * a[2]; }
+Floats abs_dot3(const float a[3], const Floats3& b) {
   return b.x * std::fabs(a[0]) + b.y * std::fabs(a[1]) + b.z * std::fabs(a[2]);
 }
 // Mean of max(0, z) for z uniform in middle +- reach.
-Float4 mean_above_zero(Float4 middle, Float4 reach) {
-  const Float4 upper = max(middle + reach, splat(0.0f));
+Floats mean_above_zero(Floats middle, Floats reach) {
+  const Floats upper = max(middle + reach, splat(0.0f));
   return middle >= reach ? middle : upper * upper / max(4 * reach, splat(0x1p-126f));
 }
 
 // Mean of d/dx of x / sqrt(z^2 + x^2) over middle +- reach, middle >= 0, reach > 0.
-Float4 mean_slope(Float4 middle, Float4 reach, Float4 z) {
-  const Float4 x1 = middle - reach, x2 = middle + reach, z2 = z * z;
-  const Float4 s1 = sqrt(z2 + x1 * x1), s2 = sqrt(z2 + x2 * x2);
-  const Float4 a = x2 * s1, b = x1 * s2;
+Floats mean_slope(Floats middle, Floats reach, Floats z) {
+  const Floats x1 = middle - reach, x2 = middle + reach, z2 = z * z;
+  const Floats s1 = sqrt(z2 + x1 * x1), s2 = sqrt(z2 + x2 * x2);
+  const Floats a = x2 * s1, b = x1 * s2;
   // Two forms of (a - b) / (2 reach): without cancellation for either sign of x1.
   return (x1 > 0 ? 2 * middle * z2 / (a + b) : (a - b) / (2 * reach)) / (s1 * s2);
 }
@@ -42,9 +42,9 @@ Float4 mean_slope(Float4 middle, Float4 reach, Float4 z) {
 // Half width of the uniform distribution whose variance the box has along `row`, measured in the
 // slope to `axis` around the centre's slope, times z. A floor of 3 % of the lobe's width (which has
 // z for its unit) changes no mean and avoids 0 / 0.
-Float4 reach_across(const float row[3], const float axis[3], Float4 slope, const Float4x3& half,
-                    Float4 z) {
-  const Float4 a = (row[0] - slope * axis[0]) * half.x, b = (row[1] - slope * axis[1]) * half.y,
+Floats reach_across(const float row[3], const float axis[3], Floats slope, const Floats3& half,
+                    Floats z) {
+  const Floats a = (row[0] - slope * axis[0]) * half.x, b = (row[1] - slope * axis[1]) * half.y,
                c = (row[2] - slope * axis[2]) * half.z;
   return sqrt(a * a + b * b + c * c + 1e-3f * z * z);
 }
@@ -109,49 +109,49 @@ double LtcLobe::value(const Vec3d& w) const {
   return (1 - kLtcFloor) * ltc(w) + kLtcFloor * height / kPi;
 }
 
-Float4 LtcLobe::mean_over_boxes(Float4x3 centre, Float4x3 half) const {
+Floats LtcLobe::mean_over_boxes(Floats3 centre, Floats3 half) const {
   // Lengths relative to one between the distance and the size of the box. The cosine's mean is then
   // about the mean height, from far away to a box around p.
-  const Float4 size2 = dot(centre, centre) + dot(half, half);
-  const Float4 scale = 1 / sqrt(max(size2, splat(0x1p-126f)));
+  const Floats size2 = dot(centre, centre) + dot(half, half);
+  const Floats scale = 1 / sqrt(max(size2, splat(0x1p-126f)));
   centre = centre * scale;
   half = half * scale;
   // Rounding stays below what is added here.
-  const Float4 middle = dot3(n_f_, centre) + 0x1p-21f;
-  const Float4 reach = abs_dot3(n_f_, half) + 0x1p-21f;
-  const Float4 cosine = mean_above_zero(middle, reach) * kInversePi;
+  const Floats middle = dot3(n_f_, centre) + 0x1p-21f;
+  const Floats reach = abs_dot3(n_f_, half) + 0x1p-21f;
+  const Floats cosine = mean_above_zero(middle, reach) * kInversePi;
   if (diffuse_) return cosine;
-  const Float4 mixed = static_cast<float>(1 - kLtcFloor) * ltc_mean(centre, half) +
+  const Floats mixed = static_cast<float>(1 - kLtcFloor) * ltc_mean(centre, half) +
                        static_cast<float>(kLtcFloor) * cosine;
   return select(middle + reach > 0, mixed, splat(0.0f));
 }
 
 // Mean of `ltc` alone; |centre|^2 + |half|^2 = 1.
-Float4 LtcLobe::ltc_mean(const Float4x3& centre, const Float4x3& half) const {
-  const Float4 middle_z = dot3(rows_f_[2], centre), reach_z = abs_dot3(rows_f_[2], half);
-  const Float4 z = mean_above_zero(middle_z, reach_z);
+Floats LtcLobe::ltc_mean(const Floats3& centre, const Floats3& half) const {
+  const Floats middle_z = dot3(rows_f_[2], centre), reach_z = abs_dot3(rows_f_[2], half);
+  const Floats z = mean_above_zero(middle_z, reach_z);
   // 1 / z for boxes that are far from the lobe's horizon, 0 for those that meet it.
-  const Float4 inverse_z =
+  const Floats inverse_z =
       max(middle_z - reach_z, splat(0.0f)) / max(middle_z * middle_z, splat(0x1p-126f));
-  const Float4 signed_x = dot3(rows_f_[0], centre), signed_y = dot3(rows_f_[1], centre);
-  const Float4 reach_x = reach_across(rows_f_[0], rows_f_[2], signed_x * inverse_z, half, z);
-  const Float4 reach_y = reach_across(rows_f_[1], rows_f_[2], signed_y * inverse_z, half, z);
-  const Float4 x = abs(signed_x), y = abs(signed_y);
+  const Floats signed_x = dot3(rows_f_[0], centre), signed_y = dot3(rows_f_[1], centre);
+  const Floats reach_x = reach_across(rows_f_[0], rows_f_[2], signed_x * inverse_z, half, z);
+  const Floats reach_y = reach_across(rows_f_[1], rows_f_[2], signed_y * inverse_z, half, z);
+  const Floats x = abs(signed_x), y = abs(signed_y);
 
-  const Int4 swap = y > x;
-  const Float4 far = select(swap, y, x), near = select(swap, x, y);
-  const Float4 reach_far = select(swap, reach_y, reach_x);
-  const Float4 reach_near = select(swap, reach_x, reach_y);
-  const Float4 closest = max(far - reach_far, splat(0.0f));
-  const Float4 density = 0.25f * mean_slope(far, reach_far, z) *
+  const Ints swap = y > x;
+  const Floats far = select(swap, y, x), near = select(swap, x, y);
+  const Floats reach_far = select(swap, reach_y, reach_x);
+  const Floats reach_near = select(swap, reach_x, reach_y);
+  const Floats closest = max(far - reach_far, splat(0.0f));
+  const Floats density = 0.25f * mean_slope(far, reach_far, z) *
                          mean_slope(near, reach_near, sqrt(z * z + closest * closest));
   // From slopes to solid angle: det |w|^3 / z^3 for a distant box, the whole mass over 4 pi for one
   // around p. No mean exceeds mass 1 over the box's solid angle: about 2 |half|^2 for a distant
   // cube, 4 pi around p.
-  const Float4 d2 = dot(centre, centre), half2 = dot(half, half);
-  const Float4 distant = density * d2 * sqrt(d2) * det_f_ / z;
-  const Float4 around = density * reach_far * reach_near * (4 / kSphere);
-  const Float4 solid_angle = half2 * (2 + (kSphere - 2) * half2);
+  const Floats d2 = dot(centre, centre), half2 = dot(half, half);
+  const Floats distant = density * d2 * sqrt(d2) * det_f_ / z;
+  const Floats around = density * reach_far * reach_near * (4 / kSphere);
+  const Floats solid_angle = half2 * (2 + (kSphere - 2) * half2);
   return select(z > 0, min(distant + around, 1 / solid_angle), splat(0.0f));
 }
 

@@ -8,7 +8,7 @@
 // The floor keeps the value positive wherever the scattering function is. Diffuse: M = identity,
 // and value is the scattering function over its albedo.
 #include "limn/core/bsdf.h"
-#include "simd4.h"
+#include "simd.h"
 
 namespace limn {
 
@@ -24,7 +24,7 @@ class LtcLobe {
   // Estimate of the mean of `value` over the directions of each box [1/sr], its centre minus p and
   // its half extents (>= 0) given. Positive, allowing for rounding here, wherever some point of the
   // box is above the horizon.
-  Float4 mean_over_boxes(Float4x3 centre, Float4x3 half) const;
+  Floats mean_over_boxes(Floats3 centre, Floats3 half) const;
 
   bool diffuse() const { return diffuse_; }
   const Vec3d& n() const { return n_; }
@@ -40,7 +40,7 @@ class LtcLobe {
  private:
   void read_table(const LobeSummary& lobe, const Vec3d& wi);
   void prepare_boxes();
-  Float4 ltc_mean(const Float4x3& centre, const Float4x3& half) const;
+  Floats ltc_mean(const Floats3& centre, const Floats3& half) const;
 
   bool diffuse_;
   Vec3d n_;

@@ -1,5 +1,5 @@
 #pragma once
-// The edge forest: 4-wide trees over the edges of a scene that find silhouettes in logarithmic time
+// The edge forest: 8-wide trees over the edges of a scene that find silhouettes in logarithmic time
 // and reject what has none (after Soroka, Peters, Marschner 2025; edgetree/README.md says where it
 // departs from the paper).
 #include <cstdint>
@@ -22,8 +22,10 @@ struct ForestConfig {
   bool light_term = true;
   // The same for an environment that is not uniform.
   bool environment_term = true;
-  // How many nodes a choice looks at: nodes of edges only are weighed by their edges, before one of
-  // their siblings is drawn; or any node by its children (up to 16 at once), or none.
+  // Children of a node, 2 to 8.
+  uint32_t width = 8;
+  // What a choice among nodes looks at: a node of edges weighs by the length of those that are
+  // silhouettes; or any node by the lengths that its children expect; or none.
   enum class Lookahead { kNone, kEdges, kAll };
   Lookahead lookahead = Lookahead::kEdges;
   // Concave smooth edges of closed one-sided meshes are left out.
@@ -42,7 +44,7 @@ class EdgeForest final : public EdgeSampler {
   double pdf_t(const EdgeQuery& query, EdgeId edge, double t) const override;
 
   // All of E(p), without regard to occlusion, horizon or motion, in the order of the trees. Appends
-  // and returns the number of nodes (of up to four children) that were tested.
+  // and returns the number of nodes (of up to eight children) that were tested.
   uint64_t list_silhouettes(const Vec3d& p, std::vector<EdgeId>& edges) const;
 
   // Of everything that the forest allocates beside its input.
