@@ -12,8 +12,6 @@
 namespace limn {
 namespace {
 
-using Lookahead = ForestConfig::Lookahead;
-
 double below_one(double u) { return std::clamp(u, 0.0, 0x1.fffffffffffffp-1); }
 
 // A node, the weights of its children, and their sums in pairs, fours and all.
@@ -72,15 +70,12 @@ struct EdgeForest::Impl {
     }
     const InnerNode& node = forest.inner[id];
     ChildWeights children = weigh_children(node, query, config.soft_weights);
-    if (config.lookahead != Lookahead::kNone) look_ahead(node, query.point, children);
+    look_ahead(node, query.point, children);
     return {id, children.product()};
   }
 
   void look_ahead(const InnerNode& node, const ForestPoint& point, ChildWeights& children) const {
-    const bool all = config.lookahead == Lookahead::kAll;
-    Ints wanted = children.rest > 0;
-    if (!all) wanted &= node.child < 0;
-    for (uint32_t lanes = bits(wanted); lanes != 0; lanes &= lanes - 1) {
+    for (uint32_t lanes = bits(children.rest > 0) & node.ahead; lanes != 0; lanes &= lanes - 1) {
       const int lane = std::countr_zero(lanes);
       const NodeId child = node.child[lane];
       const float unit = node.head.inverse_radius;
@@ -217,9 +212,9 @@ double EdgeForest::probability(const EdgeQuery& query, EdgeId id) const {
 double EdgeForest::pdf_t(const EdgeQuery& query, EdgeId id, double t) const {
   const uint32_t slot = impl_->forest.slots[id.object][id.edge];
   if (slot == kNoParent) return 0;
-  const SeenEdge edge = Impl::seen_edge(LtcLobe(query.lobe, query.n, query.wi), query.p,
-                                        impl_->forest.edges[slot / kWidth],
-                                        static_cast<int>(slot % kWidth));
+  const SeenEdge edge =
+      Impl::seen_edge(LtcLobe(query.lobe, query.n, query.wi), query.p,
+                      impl_->forest.edges[slot / kWidth], static_cast<int>(slot % kWidth));
   return edge.is_seen() ? edge.pdf_t(t) : 0;
 }
 

@@ -213,6 +213,26 @@ std::vector<NodeId> append_nodes(const SplitTree& tree, Forest& forest) {
   return ids;
 }
 
+// Heights, from the last node, whose children are edges, to the root.
+void set_heights(std::span<const NodeId> ids, const ForestConfig& config, Forest& forest) {
+  for (size_t i = ids.size(); i-- > 0;) {
+    if (ids[i] < 0) {
+      forest.head(ids[i]).height = 0;
+      continue;
+    }
+    InnerNode& node = forest.inner[ids[i]];
+    node.ahead = 0;
+    int highest = 0;
+    for (int lane = 0; lane < kWidth; ++lane) {
+      if (node.child[lane] == kNoChild) continue;
+      const int height = forest.head(node.child[lane]).height;
+      highest = std::max(highest, height);
+      if (height <= config.look_ahead) node.ahead |= static_cast<uint8_t>(1 << lane);
+    }
+    node.head.height = static_cast<uint8_t>(std::min(highest + 1, 255));
+  }
+}
+
 // Parents of nodes and slots of edges, for the nodes that were just filled.
 void link(std::span<const NodeId> ids, Forest& forest) {
   forest.head(ids[0]).parent = kNoParent;
@@ -243,6 +263,7 @@ void append_tree(std::span<const Wedge> wedges, uint32_t object, ForestGroup gro
     const size_t end = std::min(tree.nodes.size(), kBlock * (block + 1));
     for (size_t i = kBlock * block; i < end; ++i) filler.fill(static_cast<uint32_t>(i), forest);
   });
+  set_heights(ids, config, forest);
   link(ids, forest);
 }
 

@@ -32,6 +32,7 @@ struct NodeHead {
   uint32_t parent;  // kWidth * inner node + lane
   uint32_t object;
   ForestGroup group;
+  uint8_t height;  // 0 for nodes of edges, else one more than the highest child's
 };
 
 // Planes of a child that pass through p satisfy row_0 . x + sum over k of u_k (row_k . x) = 0 for
@@ -44,9 +45,10 @@ struct alignas(64) InnerNode {
   NodeHead head;
   Floats speed;  // mean over the edges; 0 only if none moves
   Ints child;    // NodeId or kNoChild
-  // Boxes around the children: the cube [-1, 1]^3 of the frame is kBoxSteps wide; bits 0 to 9 are x,
-  // then y, then z.
+  // Boxes around the children: the cube [-1, 1]^3 of the frame is kBoxSteps wide; bits 0 to 9 are
+  // x, then y, then z.
   Ints low, high;
+  uint8_t ahead;  // bit per lane: the child weighs by its own children, see ForestConfig
 };
 
 // An edge's dual box is the segment between the planes of its faces: u_0 in [-1, 1].
@@ -55,8 +57,8 @@ struct alignas(64) EdgeNode {
   Floats length;  // times inverse_radius^2; 0 where there is no edge
   NodeHead head;
   Floats speed;
-  Ints edge;           // index of an edge of the object, or kNoChild
-  Floats ends[2][3];   // world space, exactly
+  Ints edge;          // index of an edge of the object, or kNoChild
+  Floats ends[2][3];  // world space, exactly
 };
 
 struct Forest {

@@ -226,7 +226,8 @@ Floats weigh_edges(const EdgeNode& node, const ForestQuery& query) {
                        w_0.x * along.y - w_0.y * along.x};
   const Floats product = max(l_0 * l_1, splat(1e-30f));
   const Floats sine = sqrt(dot(normal, normal)) / product, cosine = dot(w_0, w_1) / product;
-  const Floats tangent = select(cosine > 0, sine / (1 + cosine), (1 - cosine) / max(sine, splat(1e-6f)));
+  const Floats tangent =
+      select(cosine > 0, sine / (1 + cosine), (1 - cosine) / max(sine, splat(1e-6f)));
 
   Ints alive = length_of(node, at) > 0;
   // Rounding of w and of the product with n.
@@ -237,8 +238,8 @@ Floats weigh_edges(const EdgeNode& node, const ForestQuery& query) {
   const Floats3 d{w_0.x + along.x * 0.5f, w_0.y + along.y * 0.5f, w_0.z + along.z * 0.5f};
   const Floats3 half{abs(along.x) * 0.5f, abs(along.y) * 0.5f, abs(along.z) * 0.5f};
   const Floats distance2 = max(dot(d, d), kNear * dot(half, half) + 1e-30f);
-  const Floats weight = speed * tangent * (l_0 + l_1) / product *
-                        light_through(query, d, half, distance2, alive);
+  const Floats weight =
+      speed * tangent * (l_0 + l_1) / product * light_through(query, d, half, distance2, alive);
   return select(alive, max(weight, splat(kLeast)), splat(0.0f));
 }
 

@@ -15,8 +15,8 @@ struct EdgeRange {
   uint32_t size() const { return end - begin; }
 };
 
-// A node of up to `width` children: all of them are nodes or, if it has no more edges than that, all
-// are edges.
+// A node of up to `width` children: all of them are nodes or, if it has no more edges than that,
+// all are edges.
 struct SplitNode {
   std::array<EdgeRange, kWidth> ranges;     // empty for none
   std::array<uint32_t, kWidth> children{};  // 0 where the range is empty or one edge

@@ -48,14 +48,22 @@ std::vector<Variant> variants() {
   add("arbitrary axes", &ForestConfig::principal_axes);
   add("no soft weights", &ForestConfig::soft_weights);
   add("no concave culling", &ForestConfig::cull_concave);
+  const auto add_choice = [&](const std::string& name, uint32_t width, int look_ahead) {
+    ForestConfig config;
+    config.width = width;
+    config.look_ahead = look_ahead;
+    list.push_back({name, config});
+  };
+  add_choice("edges ahead", 8, 0);
+  add_choice("none ahead", 8, -1);
+  add_choice("all ahead", 8, ForestConfig::kAnyHeight);
+  add_choice("4-wide", 4, -1);
+  add_choice("4-wide, all ahead", 4, ForestConfig::kAnyHeight);
+  add_choice("2-wide", 2, -1);
   ForestConfig config;
-  config.lookahead = ForestConfig::Lookahead::kNone;
-  list.push_back({"no lookahead", config});
+  config.look_ahead = -1;
   config.principal_axes = config.soft_weights = false;
   list.push_back({"boxes alone", config});
-  config = {};
-  config.lookahead = ForestConfig::Lookahead::kAll;
-  list.push_back({"16-wide choice", config});
   return list;
 }
 

@@ -106,7 +106,8 @@ ForestConfig without(bool ForestConfig::*option) {
 }
 INSTANTIATE_TEST_SUITE_P(Variants, Forests,
                          testing::Values(ForestConfig{}, without(&ForestConfig::principal_axes),
-                                         without(&ForestConfig::cull_concave)));
+                                         without(&ForestConfig::cull_concave),
+                                         ForestConfig{.width = 2}));
 
 TEST(Forest, DoesNotDependOnThreads) {
   Rng rng(22, 0, 0);

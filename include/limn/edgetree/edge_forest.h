@@ -24,10 +24,11 @@ struct ForestConfig {
   bool environment_term = true;
   // Children of a node, 2 to 8.
   uint32_t width = 8;
-  // What a choice among nodes looks at: a node of edges weighs by the length of those that are
-  // silhouettes; or any node by the lengths that its children expect; or none.
-  enum class Lookahead { kNone, kEdges, kAll };
-  Lookahead lookahead = Lookahead::kEdges;
+  // Children of at most this height weigh by the lengths that their own children expect, which for
+  // nodes of edges (height 0) are exact: -1 for none, kAnyHeight for all. Fewer draws end without
+  // an edge, at the price of more nodes read.
+  static constexpr int kAnyHeight = 255;
+  int look_ahead = 2;
   // Concave smooth edges of closed one-sided meshes are left out.
   bool cull_concave = true;
 };
