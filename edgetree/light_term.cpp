@@ -11,7 +11,7 @@ namespace {
 constexpr double kReflectance = 0.5;
 // Least weight, as a share of the brightest light's luminance: the light may reach objects that are
 // seen from here without reaching this point.
-constexpr double kFloor = 1.0 / 64;
+constexpr double kFloor = 1.0 / 4096;
 
 Vec3d centroid(const LightTriangle& t) {
   return (t.corners[0] + t.corners[1] + t.corners[2]) / 3.0;
@@ -105,8 +105,9 @@ LightCones::LightCones(const LightClusters& lights, const Vec3d& p) {
         std::max(0.0, facing) + 0.25 * std::max(0.0, c.area - length(c.area_vector));
     // Between those seen at the centre's and at the rim's distance; at most a hemisphere.
     const double solid_angle = std::min(visible / (d2 + r2 / 8), 2 * kPi);
+    // Objects nearby may face the light where this point does not.
+    scattered += c.luminance * std::min(c.area / (d2 + r2 / 8), 2 * kPi);
     if (solid_angle <= 0) continue;
-    scattered += c.luminance * solid_angle;
     // sin of the bounding cone is radius / distance: squared chord 2 - 2 cos; 4 from inside.
     const double outer2 = d2 > r2 ? 2 * r2 / d2 / (1 + std::sqrt(1 - r2 / d2)) : 4;
     const double chord = std::sqrt(solid_angle / kPi);
