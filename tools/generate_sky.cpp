@@ -54,14 +54,14 @@ Image make_soft_sky() {
   });
 }
 
-// A sun of 0.6 degrees radius, 30,000 times as bright as the air around it: most light comes from
-// it.
+// A sun of 1.5 degrees radius, thousands of times as bright as the air around it: most light comes
+// from it.
 Image make_sun_sky() {
-  const double edge = std::cos(0.6 * kPi / 180);
-  return make_map(1024, 512, 4, [&](const Vec3d& d) {
+  const double edge = std::cos(1.5 * kPi / 180);
+  return make_map(1024, 512, 2, [&](const Vec3d& d) {
     const double cosine = dot(d, normalize(Vec3d{0.55, 0.62, 0.56}));
     const Colour air = clear_air(d) * 0.7 + Colour{0.8, 0.6, 0.4} * std::exp(60 * (cosine - 1));
-    return cosine > edge ? air + Colour{26000, 23000, 18000} : air;
+    return cosine > edge ? air + Colour{4200, 3700, 2900} : air;
   });
 }
 
