@@ -1,5 +1,9 @@
 #include "limn/integrators/crossings.h"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+
 #include "limn/edgetree/edges.h"
 
 namespace limn {
@@ -12,6 +16,42 @@ std::vector<std::vector<uint32_t>> faces_by_vertex(const Mesh& mesh) {
     for (const uint32_t vertex : mesh.faces[f]) faces[mesh.weld[vertex]].push_back(f);
   }
   return faces;
+}
+
+// Whether the segment from a to b passes through the triangle, in double precision: a ray tracer's
+// answer is noise where the two lie in one plane.
+bool passes_through(const Vec3d& a, const Vec3d& b, const std::array<Vec3d, 3>& triangle) {
+  const Vec3d n = cross(triangle[1] - triangle[0], triangle[2] - triangle[0]);
+  const double d_a = dot(n, a - triangle[0]);
+  const double d_b = dot(n, b - triangle[0]);
+  if ((d_a < 0) == (d_b < 0)) return false;
+  const Vec3d x = a + (b - a) * (d_a / (d_a - d_b));
+  for (int i = 0; i < 3; ++i) {
+    const Vec3d& corner = triangle[i];
+    if (dot(cross(triangle[(i + 1) % 3] - corner, x - corner), n) < 0) return false;
+  }
+  return true;
+}
+
+std::array<Vec3d, 3> corners(const Scene& scene, const FaceRef& face) {
+  const Mesh& mesh = scene.shapes[face.shape].mesh;
+  std::array<Vec3d, 3> result;
+  for (int i = 0; i < 3; ++i) {
+    result[i] = cast<double>(mesh.positions[mesh.faces[face.face][i]]);
+  }
+  return result;
+}
+
+// The first hit of the ray (an edge from a to b) that holds in double precision.
+bool first_crossing(const Scene& scene, const RayTracer& tracer, Ray ray, const Vec3d& a,
+                    const Vec3d& b, Hit& hit) {
+  while (tracer.closest(ray, hit)) {
+    if (passes_through(a, b, corners(scene, hit.face))) return true;
+    // The next float: the ray tracer may compute in single precision.
+    ray.t_min = std::nextafter(static_cast<float>(std::max(hit.t, ray.t_min)), INFINITY);
+    if (ray.t_min >= ray.t_max) return false;
+  }
+  return false;
 }
 
 }  // namespace
@@ -34,7 +74,7 @@ Crossings find_crossings(const Scene& scene, const RayTracer& tracer) {
       ray.skip_shape = s;
       ray.skip_faces = skipped;
       Hit hit;
-      if (!tracer.closest(ray, hit)) continue;
+      if (!first_crossing(scene, tracer, ray, a, b, hit)) continue;
       if (crossings.edges++ == 0) {
         crossings.shape_a = s;
         crossings.shape_b = hit.face.shape;

@@ -98,7 +98,11 @@ std::string DescribedProperties::file(const std::string& name) {
   const std::string* text = std::get_if<std::string>(&p->value);
   if (!text) fail_type(name, *p, "<string>");
   const std::string found = find_input_file(*text, p->where.file, scene_.search_path);
-  if (found.empty()) fail(name, "no such file: \"" + *text + "\"");
+  if (found.empty()) {
+    const bool from_build = text->find("build/generated/") != std::string::npos;
+    fail(name, "no such file: \"" + *text + "\"" +
+                   (from_build ? " (the build makes it: run tools/build)" : ""));
+  }
   return found;
 }
 
