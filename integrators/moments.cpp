@@ -34,11 +34,16 @@ Image standard_error_image(const Moments& moments, int width, int height) {
   return image;
 }
 
+size_t block_count(int width, int height, int block) {
+  const size_t columns = (width + block - 1) / block;
+  const size_t rows = (height + block - 1) / block;
+  return columns * rows;
+}
+
 std::vector<double> sum_blocks(const std::vector<double>& values, int width, int height,
                                int block) {
   const int columns = (width + block - 1) / block;
-  const int rows = (height + block - 1) / block;
-  std::vector<double> sums(static_cast<size_t>(columns) * rows);
+  std::vector<double> sums(block_count(width, height, block));
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       for (int c = 0; c < 3; ++c) {

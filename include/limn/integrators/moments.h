@@ -36,8 +36,9 @@ class Moments {
 Image mean_image(const Moments& moments, int width, int height);
 Image standard_error_image(const Moments& moments, int width, int height);
 
-// Sums over square blocks of pixels: H by W by 3 values become ceil(H / block) by ceil(W / block)
-// by 3.
+// Sums over the pixels and channels of square blocks: H by W by 3 values become ceil(H / block) by
+// ceil(W / block).
+size_t block_count(int width, int height, int block);
 std::vector<double> sum_blocks(const std::vector<double>& values, int width, int height, int block);
 
 }  // namespace limn
