@@ -43,12 +43,20 @@ class Runner {
     if (stopped(settings_) || result.spp == 0) return false;
     if (result.peak_memory_bytes == 0) result.peak_memory_bytes = peak_memory_bytes();
     add(method, {rung, repeat, settings.seed, std::move(result), {}}, to);
+    report();
     return true;
   }
 
-  void skip(size_t rung) { done_ += options_.times[rung]; }
+  void skip(size_t rung) {
+    done_ += options_.times[rung];
+    report();
+  }
 
  private:
+  void report() {
+    if (settings_.progress) settings_.progress(done_ / total_);
+  }
+
   void add(const DerivativeMethod& method, ComparedRun run, ComparedMethod& to) {
     run.errors = image_errors(run.run.image, reference_.image, reference_.variance);
     if (run.repeat == 0) {

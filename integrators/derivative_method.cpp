@@ -31,7 +31,7 @@ class SamplerMethod final : public DerivativeMethod {
     run.spp = result.spp;
     for (const TermCost& cost : result.costs) {
       run.rays += cost.rays;
-      run.term_seconds.push_back(cost.seconds);
+      run.term_seconds.push_back(cost.seconds / settings.threads);
     }
     run.non_finite = result.non_finite;
     return run;

@@ -22,7 +22,7 @@ struct MethodRun {
   double setup_seconds = 0;  // of which before the first sample
   int64_t spp = 0;           // 0 if interrupted before the first pass over the image
   uint64_t rays = 0;         // 0 if unknown
-  // Seconds, summed over threads; empty for methods that do not work term by term.
+  // Seconds of the run, as a mean over threads; empty for methods that do not work term by term.
   std::vector<double> term_seconds;
   uint64_t peak_memory_bytes = 0;  // 0: this process' own peak
   NonFinite non_finite;
