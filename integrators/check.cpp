@@ -37,7 +37,8 @@ std::vector<double> z_scores(const DifferenceEstimate& estimate,
   std::vector<double> z;
   for (size_t b = 0; b < gradient.size(); ++b) {
     const double residual = gradient.mean(b) - differences.mean(b);
-    const double both = gradient.variance(b) + variance(differences, estimate.event, b);
+    const double both =
+        gradient.variance(b) + variance(differences, estimate.events.large_size(), b);
     if (both == 0 && residual == 0) continue;
     z.push_back(normal_from_student(residual / std::sqrt(both), gradient.batches() - 1));
   }
@@ -52,7 +53,7 @@ Suspicion regress(const Moments& term, const DifferenceResult& differences,
   double product = 0;
   double square = 0;
   for (size_t b = 0; b < term.size(); ++b) {
-    const double both = gradient.variance(b) + variance(blocks, estimate.event, b);
+    const double both = gradient.variance(b) + variance(blocks, estimate.events.large_size(), b);
     if (both == 0) continue;
     const double value = term.mean(b);
     const double residual = blocks.mean(b) - gradient.mean(b);

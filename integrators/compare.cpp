@@ -89,7 +89,8 @@ std::vector<double> mean_term_seconds(const std::vector<const ComparedRun*>& run
   return sums;
 }
 
-RungSummary summarize_rung(const std::vector<const ComparedRun*>& runs, const BlockSums& blocks) {
+RungSummary summarize_rung(const std::vector<const ComparedRun*>& runs,
+                           const Reference& reference) {
   RungSummary s;
   s.rung = runs[0]->rung;
   s.seconds = mean_of(collect(runs, [](const ComparedRun& r) { return r.run.seconds; }));
@@ -104,7 +105,7 @@ RungSummary summarize_rung(const std::vector<const ComparedRun*>& runs, const Bl
       mean_of_repeats(collect(runs, [](const ComparedRun& r) { return r.errors.trimmed_mse; }));
   std::vector<BlockSums> repeats;
   for (const ComparedRun* run : runs) repeats.push_back(run->run.blocks);
-  s.bias = summarize(bias_scores(repeats, blocks));
+  s.bias = summarize(bias_scores(repeats, reference.blocks, reference.edges));
   s.term_seconds = mean_term_seconds(runs);
   for (const ComparedRun* run : runs) {
     s.peak_memory_bytes = std::max(s.peak_memory_bytes, run->run.peak_memory_bytes);
@@ -120,7 +121,7 @@ std::vector<const ComparedRun*> runs_of_rung(const ComparedMethod& method, size_
   return runs;
 }
 
-void summarize_method(const CompareOptions& options, const BlockSums& reference,
+void summarize_method(const CompareOptions& options, const Reference& reference,
                       ComparedMethod& method) {
   std::vector<Rung> ladder;
   for (size_t rung = 0; rung < options.times.size(); ++rung) {
@@ -200,7 +201,7 @@ std::vector<ComparedMethod> compare(const CompareOptions& options, const Referen
   };
   run_all();
   for (ComparedMethod& result : results) {
-    summarize_method(options, reference.blocks, result);
+    summarize_method(options, reference, result);
     set_status(options, result);
   }
   for (ComparedMethod& result : results) {

@@ -25,7 +25,7 @@ class SamplerMethod final : public DerivativeMethod {
     const GradientResult result = gradient(input_.scene, options, settings);
     MethodRun run;
     run.image = means(result.parameters[0].total);
-    run.blocks = block_sums(result.parameters[0].total_blocks);
+    run.blocks = block_sums(result.parameters[0].total_blocks, result.parameters[0].events);
     run.seconds = result.seconds;
     run.setup_seconds = result.setup_seconds;
     run.spp = result.spp;
@@ -56,11 +56,14 @@ std::vector<double> variances(const Moments& moments) {
   return values;
 }
 
-BlockSums block_sums(const Moments& blocks) {
+BlockSums block_sums(const Moments& blocks, const Events& events) {
   BlockSums result;
   result.sums = means(blocks);
   if (blocks.batches() > 1) result.variances = variances(blocks);
   result.degrees = blocks.batches() - 1;
+  if (blocks.samples() > 0) {
+    result.event = events.mean_size() / static_cast<double>(blocks.samples());
+  }
   return result;
 }
 

@@ -45,7 +45,7 @@ class DifferenceMethod final : public DerivativeMethod {
                                                           {pilot.step}, {{1}}, input_.block, rest);
     MethodRun run;
     run.image = means(result.estimates[0].total);
-    run.blocks = block_sums(result.estimates[0].blocks);
+    run.blocks = block_sums(result.estimates[0].blocks, result.estimates[0].events);
     run.seconds = result.seconds + pilot.seconds;
     run.setup_seconds = result.setup_seconds + pilot.seconds;
     run.spp = result.spp;

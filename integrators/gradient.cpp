@@ -251,10 +251,15 @@ class Pass {
 void collect(const Pass::Output& output, int samples, int width, int height, int block,
              ParameterGradient* parameters) {
   for (size_t k = 0; k < output.sums.size(); ++k) {
-    std::vector<double> total(output.radiance.size());
+    std::vector<double> edges(output.radiance.size());
+    std::vector<double> total = output.sums[k][kInterior];
+    for (size_t i = 0; i < total.size(); ++i) {
+      edges[i] = output.sums[k][kCamera][i] + output.sums[k][kBoundary][i];
+      total[i] += edges[i];
+    }
+    parameters[k].events.add_batch(edges);
     for (int term = 0; term < kTermCount; ++term) {
       const auto& sums = output.sums[k][term];
-      for (size_t i = 0; i < total.size(); ++i) total[i] += sums[i];
       parameters[k].terms[term].add_batch(sums, samples);
       if (block > 0) {
         parameters[k].term_blocks[term].add_batch(sum_blocks(sums, width, height, block), samples);

@@ -9,6 +9,6 @@ namespace limn {
 
 std::vector<double> means(const Moments& moments);
 std::vector<double> variances(const Moments& moments);  // NaN with fewer than two batches
-BlockSums block_sums(const Moments& blocks);
+BlockSums block_sums(const Moments& blocks, const Events& events);
 
 }  // namespace limn

@@ -39,7 +39,7 @@ struct Variance {
 };
 
 // Of the mean over repeats of one block.
-Variance variance_of_mean(const std::vector<BlockSums>& repeats, size_t block) {
+Variance variance_of_mean(const std::vector<BlockSums>& repeats, size_t block, double edges) {
   const auto count = static_cast<double>(repeats.size());
   Variance known;
   for (const BlockSums& repeat : repeats) {
@@ -49,7 +49,8 @@ Variance variance_of_mean(const std::vector<BlockSums>& repeats, size_t block) {
       const double error = mean_of_repeats(values).error;
       return {error * error, count - 1};
     }
-    known.value += repeat.variances[block] / (count * count);
+    const double variance = std::max(repeat.variances[block], edges * repeat.event);
+    known.value += variance / (count * count);
     known.degrees += repeat.degrees;
   }
   return known;
@@ -94,13 +95,14 @@ Uncertain mean_of_repeats(const std::vector<double>& values) {
   return {mean, std::sqrt(squares / (n - 1) / n)};
 }
 
-std::vector<double> bias_scores(const std::vector<BlockSums>& repeats, const BlockSums& reference) {
+std::vector<double> bias_scores(const std::vector<BlockSums>& repeats, const BlockSums& reference,
+                                const std::vector<double>& edges) {
   std::vector<double> scores;
   for (size_t b = 0; b < reference.sums.size() && !repeats.empty(); ++b) {
     double mean = 0;
     for (const BlockSums& r : repeats) mean += r.sums[b] / static_cast<double>(repeats.size());
     const double residual = mean - reference.sums[b];
-    const Variance ours = variance_of_mean(repeats, b);
+    const Variance ours = variance_of_mean(repeats, b, edges[b]);
     const Variance theirs{reference.variances[b], reference.degrees};
     const double both = ours.value + theirs.value;
     if (std::isnan(both)) return {};

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -139,6 +140,7 @@ void read_header(const Attributes& attributes, const Film& film, Reference& r) {
   const int block = std::stoi(attributes.at("limn.block"));
   r.blocks.sums = sum_blocks(r.image, film.crop_width, film.crop_height, block);
   r.blocks.variances = split_numbers(attributes.at("limn.block_variances"));
+  r.edges = split_numbers(attributes.at("limn.block_edges"));
   r.blocks.degrees = std::stod(attributes.at("limn.block_degrees"));
 }
 
@@ -160,8 +162,9 @@ Reference read_matching(const std::string& file, const Attributes& attributes, c
   } catch (const std::logic_error&) {  // a number that is none, or an attribute that is missing
     throw InputError({file}, "the header of the reference is damaged");
   }
-  if (r.blocks.variances.size() != r.blocks.sums.size()) {
-    throw InputError({file}, "the header of the reference is damaged: variances of blocks");
+  const size_t blocks = r.blocks.sums.size();
+  if (r.blocks.variances.size() != blocks || r.edges.size() != blocks) {
+    throw InputError({file}, "the header of the reference is damaged: figures of blocks");
   }
   return r;
 }
@@ -198,10 +201,18 @@ Reference make_reference(const MethodInput& input, const RunSettings& settings) 
   options.sampler = kSampler;
   options.block = input.block;
   const GradientResult result = gradient(input.scene, options, settings);
+  const ParameterGradient& g = result.parameters[0];
   Reference r;
-  r.image = means(result.parameters[0].total);
-  r.variance = variances(result.parameters[0].total);
-  r.blocks = block_sums(result.parameters[0].total_blocks);
+  r.image = means(g.total);
+  r.variance = variances(g.total);
+  r.blocks = block_sums(g.total_blocks, g.events);
+  for (size_t b = 0; b < g.total_blocks.size(); ++b) {
+    r.edges.push_back(std::fabs(g.term_blocks[kCamera].mean(b)) +
+                      std::fabs(g.term_blocks[kBoundary].mean(b)));
+  }
+  for (size_t b = 0; b < r.blocks.variances.size(); ++b) {
+    r.blocks.variances[b] = std::max(r.blocks.variances[b], r.edges[b] * r.blocks.event);
+  }
   r.sampler = kSampler;
   r.spp = result.spp;
   r.seed = settings.seed;
@@ -222,7 +233,8 @@ void write_reference(const std::string& file, const Reference& reference, const 
       {"limn.asked_seconds", fmt::format("{}", reference.asked_seconds)},
       {"limn.block", std::to_string(block)},
       {"limn.block_degrees", fmt::format("{}", reference.blocks.degrees)},
-      {"limn.block_variances", join_numbers(reference.blocks.variances)}};
+      {"limn.block_variances", join_numbers(reference.blocks.variances)},
+      {"limn.block_edges", join_numbers(reference.edges)}};
   for (const auto& [name, value] : identity) attributes.push_back({name, value});
   std::vector<double> errors = reference.variance;
   for (double& e : errors) e = std::sqrt(e);

@@ -96,21 +96,6 @@ bool render_batch(const PrimalRenderer& renderer, const Schedule& batch, Progres
   return !progress.stopped();
 }
 
-// Sums behind DifferenceEstimate::event.
-struct EventSize {
-  double cubes = 0;
-  double squares = 0;
-  // Three channels per pixel.
-  void add(const std::vector<double>& sums) {
-    for (size_t i = 0; i < sums.size(); i += 3) {
-      const double x = std::fabs(sums[i] + sums[i + 1] + sums[i + 2]);
-      squares += x * x;
-      cubes += x * x * x;
-    }
-  }
-  double value() const { return squares > 0 ? cubes / squares : 0; }
-};
-
 // A weighted sum of central differences. outputs: images at +steps[0], -steps[0], +steps[1], ...
 std::vector<double> combine(const std::vector<BatchOutput>& outputs,
                             const std::vector<double>& steps, const std::vector<double>& weights) {
@@ -137,6 +122,7 @@ void DifferenceEstimate::add_batch(const std::vector<double>& sums, const Film& 
   const int width = film.crop_width;
   const int height = film.crop_height;
   total.add_batch(sums, samples);
+  events.add_batch(sums);
   blocks.add_batch(sum_blocks(sums, width, height, block), samples);
   image_sum.add_batch(sum_blocks(sums, width, height, std::max(width, height)), samples);
 }
@@ -178,7 +164,6 @@ CentralDifferences central_differences(const Scene& scene, const std::string& pa
   result.estimates.assign(combinations.size(), DifferenceEstimate(scene.film, block));
   result.setup_seconds = watch.seconds();
 
-  std::vector<EventSize> events(combinations.size());
   const size_t tiles = make_tiles(scene.film).size() * renderers.size();
   ProgressCounter progress(settings, watch, tiles * Schedule::batch_count(settings.spp));
   Schedule batches(settings, watch);
@@ -190,7 +175,6 @@ CentralDifferences central_differences(const Scene& scene, const std::string& pa
     if (progress.stopped()) break;
     for (size_t k = 0; k < combinations.size(); ++k) {
       const std::vector<double> sums = combine(outputs, steps, combinations[k]);
-      events[k].add(sums);
       result.estimates[k].add_batch(sums, scene.film, block, batches.samples());
     }
     for (const BatchOutput& o : outputs) {
@@ -199,7 +183,6 @@ CentralDifferences central_differences(const Scene& scene, const std::string& pa
     }
     result.spp += batches.samples();
   }
-  for (size_t k = 0; k < events.size(); ++k) result.estimates[k].event = events[k].value();
   result.seconds = watch.seconds();
   return result;
 }

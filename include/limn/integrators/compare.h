@@ -50,9 +50,10 @@ struct ComparedMethod {
   std::optional<Uncertain> time_ratio;
 };
 
-// Runs are interleaved: for every rung, for every repeat, for every method; each with a seed of its
-// own. settings: threads, seed, progress over all runs, interruption; samples and seconds do not
-// count. Interrupted, the result holds all runs that were finished.
+// reference: of at least two batches. Runs are interleaved: for every rung, for every repeat, for
+// every method; each with a seed of its own. settings: threads, seed, progress over all runs,
+// interruption; samples and seconds do not count. Interrupted, the result holds all runs that were
+// finished.
 std::vector<ComparedMethod> compare(const CompareOptions& options, const Reference& reference,
                                     const std::vector<std::unique_ptr<DerivativeMethod>>& methods,
                                     const RunSettings& settings);

@@ -36,13 +36,19 @@ struct BlockSums {
   std::vector<double> sums;
   std::vector<double> variances;  // of the sums; empty if unknown
   double degrees = 0;             // of freedom behind the variances
+  // Mean size of an event (moments.h) over the number of samples per pixel; 0 if unknown. If the
+  // method is right, edges that add m to a block's mean do so with a variance of about m times
+  // this, even where no event has come.
+  double event = 0;
 };
 
 // z-scores of the blocks: mean over the repeats minus the reference, over the standard error of
 // both. Student's t with the degrees of freedom of Welch and Satterthwaite, turned into normal
 // scores. Blocks without any variance that are equal are left out. Empty if no variance is known:
 // one repeat without variances of its own.
-std::vector<double> bias_scores(const std::vector<BlockSums>& repeats, const BlockSums& reference);
+// edges: magnitude of what edges add to each block of the reference, for the variance of events.
+std::vector<double> bias_scores(const std::vector<BlockSums>& repeats, const BlockSums& reference,
+                                const std::vector<double>& edges);
 
 // Two-sided p-value of a whole set of scores: the smaller of summarize()'s two, doubled.
 double p_value(const ZSummary& summary);

@@ -17,6 +17,7 @@ struct Reference {
   std::vector<double> image;     // crop_height by crop_width by 3, per unit of the parameter
   std::vector<double> variance;  // of the image, the same shape
   BlockSums blocks;
+  std::vector<double> edges;  // magnitude of what edges add to each block
   std::string sampler;
   int64_t spp = 0;  // 0: interrupted before the first pass over the image
   uint64_t seed = 0;
