@@ -38,22 +38,27 @@ struct Variance {
   double degrees = 0;
 };
 
-// Of the mean over repeats of one block.
+// Of the mean over repeats of one block, whose edges add `edges`.
 Variance variance_of_mean(const std::vector<BlockSums>& repeats, size_t block, double edges) {
   const auto count = static_cast<double>(repeats.size());
-  Variance known;
+  std::vector<double> values;
+  bool known = true;
+  Variance own;
+  double events = 0;
   for (const BlockSums& repeat : repeats) {
-    if (repeat.variances.empty()) {
-      std::vector<double> values;
-      for (const BlockSums& r : repeats) values.push_back(r.sums[block]);
-      const double error = mean_of_repeats(values).error;
-      return {error * error, count - 1};
-    }
-    const double variance = std::max(repeat.variances[block], edges * repeat.event);
-    known.value += variance / (count * count);
-    known.degrees += repeat.degrees;
+    values.push_back(repeat.sums[block]);
+    events += edges * repeat.event / (count * count);
+    known = known && !repeat.variances.empty();
+    if (!known) continue;
+    own.value += repeat.variances[block] / (count * count);
+    own.degrees += repeat.degrees;
   }
-  return known;
+  if (!known) {
+    const double error = mean_of_repeats(values).error;
+    if (std::isnan(error)) return {error, 0};
+    own = {error * error, count - 1};
+  }
+  return {std::max(own.value, events), own.degrees};
 }
 
 double squared(double x) { return x * x; }

@@ -89,8 +89,14 @@ class Stages {
     }
     return stage;
   }
+  // Ends the bar's line.
   void finish() const {
-    if (settings_.progress) settings_.progress(1);
+    if (!settings_.progress) return;
+    if (settings_.interrupted->load()) {
+      fmt::print(stderr, "\n");
+    } else {
+      settings_.progress(1);
+    }
   }
 
  private:
@@ -140,11 +146,13 @@ class Comparer {
     RunSettings image = stages.next(command_.time);
     image.spp = kImageSamples;
     result_.image = render(scene_, image);
-    if (made && !make_reference_file(stages.next(reference_seconds_))) return false;
-    result_.methods =
-        compare(result_.options, result_.reference, methods_, stages.next(methods_seconds_));
+    const bool ready = !made || make_reference_file(stages.next(reference_seconds_));
+    if (ready) {
+      result_.methods =
+          compare(result_.options, result_.reference, methods_, stages.next(methods_seconds_));
+    }
     stages.finish();
-    return true;
+    return ready;
   }
 
   void write() const {
@@ -229,7 +237,7 @@ int run_compare(const CommonOptions& common, const CompareCommand& command) {
   const RunSettings settings = make_settings(common, scene, "compare");
   Comparer comparer(common, command, scene, settings);
   if (!comparer.run()) {
-    fmt::print(stderr, "\ninterrupted before there was a reference: nothing is written\n");
+    fmt::print(stderr, "interrupted before there was a reference: nothing is written\n");
     return kInterrupted;
   }
   comparer.write();
