@@ -112,9 +112,7 @@ std::vector<double> bias_scores(const std::vector<BlockSums>& repeats, const Blo
     const double both = ours.value + theirs.value;
     if (std::isnan(both)) return {};
     if (both == 0 && residual == 0) continue;
-    double spread = squared(theirs.value) / theirs.degrees;
-    if (ours.value > 0) spread += squared(ours.value) / ours.degrees;
-    const double degrees = spread > 0 ? squared(both) / spread : theirs.degrees;
+    const double degrees = std::min(ours.degrees, theirs.degrees);
     scores.push_back(normal_from_student(residual / std::sqrt(both), degrees));
   }
   return scores;

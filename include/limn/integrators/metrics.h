@@ -43,9 +43,10 @@ struct BlockSums {
 };
 
 // z-scores of the blocks: mean over the repeats minus the reference, over the standard error of
-// both. Student's t with the degrees of freedom of Welch and Satterthwaite, turned into normal
-// scores. Blocks without any variance that are equal are left out. Empty if no variance is known:
-// one repeat without variances of its own.
+// both. Student's t, turned into normal scores, with the fewer degrees of freedom of the two: a few
+// repeats that agree by chance must not pass for precise (as they would with the degrees of Welch
+// and Satterthwaite). Blocks without any variance that are equal are left out. Empty if no variance
+// is known: one repeat without variances of its own.
 // edges: magnitude of what edges add to each block of the reference, for the variance of events.
 std::vector<double> bias_scores(const std::vector<BlockSums>& repeats, const BlockSums& reference,
                                 const std::vector<double>& edges);
