@@ -13,8 +13,9 @@ namespace limn {
 namespace {
 
 constexpr double kPilotShare = 0.1;  // of the time of a run
+constexpr int kPilotSamples = 4;     // per pixel, at least
 // The steps that the pilot tries, in natural steps: that one is for pictures that change a lot.
-constexpr double kNear = 1.0 / 16;
+constexpr double kNear = 1.0 / 8;
 constexpr double kFactor = 16;
 
 struct Pilot {
@@ -70,15 +71,13 @@ class DifferenceMethod final : public DerivativeMethod {
     RunSettings settings = run;
     settings.seconds = kPilotShare * run.seconds;
     settings.progress = nullptr;
+    settings.least_spp = kPilotSamples;
     settings.seed = run.seed + 1;  // not the samples that the run will take
     const double near = kNear * natural_;
     const CentralDifferences r =
         central_differences(input_.scene, input_.parameter, {near, kFactor * near},
                             {{1, 0}, {0, 1}, {-1, 1}}, input_.block, settings);
-    if (r.spp < 2) {
-      return {natural_ / 4, r.seconds,
-              "a guess: the time is too short for a pilot of two samples per pixel"};
-    }
+    if (r.spp < kPilotSamples) return {natural_, r.seconds, "interrupted"};
     PilotFigures figures;
     figures.step = near;
     figures.factor = kFactor;
@@ -108,8 +107,9 @@ class DifferenceMethod final : public DerivativeMethod {
 double best_step(const PilotFigures& pilot, double seconds) {
   const double far = pilot.factor * pilot.step;
   const double samples = std::max(1.0, pilot.samples_per_second * seconds);
-  // A bias below the noise of the pilot does not speak against the larger step.
-  if (!(pilot.squared_change > 0) || !(pilot.variance_far > 0)) return far;
+  if (!(pilot.variance_far > 0)) return far;
+  // A bias that drowns in the noise of the smaller step may still be too large at the larger one.
+  if (!(pilot.squared_change > 0)) return std::sqrt(pilot.step * far);
   if (!(pilot.variance > 0)) return pilot.step;
   const double bias = pilot.squared_change / std::pow(pilot.factor * pilot.factor - 1, 2);  // B h^4
   const double power = std::log(pilot.variance / pilot.variance_far) / std::log(pilot.factor);

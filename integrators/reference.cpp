@@ -200,7 +200,9 @@ Reference make_reference(const MethodInput& input, const RunSettings& settings) 
   options.terms = input.terms;
   options.sampler = kSampler;
   options.block = input.block;
-  const GradientResult result = gradient(input.scene, options, settings);
+  RunSettings at_least_two = settings;
+  at_least_two.least_spp = 2;  // for variances
+  const GradientResult result = gradient(input.scene, options, at_least_two);
   const ParameterGradient& g = result.parameters[0];
   Reference r;
   r.image = means(g.total);

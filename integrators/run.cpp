@@ -57,7 +57,7 @@ bool Schedule::next() {
   if (last_) return false;
   const double now = watch_.seconds();
   int end = batch_end(end_, settings_.spp);
-  if (settings_.seconds > 0 && end_ > 0) {
+  if (settings_.seconds > 0 && end_ >= settings_.least_spp) {
     const int fitting = samples_in_time(now);
     last_ = fitting < end - end_;
     end = std::min(end, end_ + fitting);

@@ -219,7 +219,8 @@ std::string uncertain(const Uncertain& u) {
 
 void print_method(const ComparedMethod& m, size_t rungs, size_t width) {
   if (m.summary.empty() || m.summary.back().rung + 1 != rungs) {
-    fmt::print("{:{}}  {}: {}\n", m.name, width, status_name(m.status), m.message);
+    const bool missing = m.status == MethodStatus::kMissing;
+    fmt::print("{:{}} {}{}\n", m.name, width, missing ? "missing: " : "", m.message);
     return;
   }
   const RungSummary& s = m.summary.back();

@@ -242,7 +242,7 @@ TEST(Differences, BestStepIsTheMinimum) {
     }
   }
   pilot.squared_change = -1;  // no bias to be seen
-  EXPECT_EQ(best_step(pilot, 2), 0.16);
+  EXPECT_DOUBLE_EQ(best_step(pilot, 2), 0.04);
   pilot.squared_change = 1;
   pilot.variance_far = pilot.variance;  // nothing to gain from a larger step
   EXPECT_EQ(best_step(pilot, 2), 0.01);

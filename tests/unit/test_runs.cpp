@@ -224,6 +224,8 @@ TEST(TimeLimit, IsNoMoreThanTheSamples) {
   settings.seconds = 1e-9;  // one sample per pixel all the same
   EXPECT_EQ(render(scene, settings).spp, 1);
   EXPECT_EQ(run_gradient(scene, settings).spp, 1);
+  settings.least_spp = 2;
+  EXPECT_EQ(run_gradient(scene, settings).spp, 2);
 }
 
 }  // namespace

@@ -33,7 +33,8 @@ struct Reference {
 using Identity = std::vector<std::pair<std::string, std::string>>;
 Identity identify(const MethodInput& input, const std::map<std::string, std::string>& defines);
 
-// By the sampler "forest", which is unbiased and fast nearly everywhere, in settings.seconds.
+// By the sampler "forest", which is unbiased and fast nearly everywhere, in settings.seconds but
+// with at least two samples per pixel; fewer if interrupted.
 Reference make_reference(const MethodInput& input, const RunSettings& settings);
 
 // Writes `file` (an EXR) and beside it FILE_stderr.exr, which also holds the variances of the

@@ -14,9 +14,10 @@ namespace limn {
 struct RunSettings {
   int spp = 4;  // samples per pixel; with a limit of time, at most this many
   // Seconds for the whole run, set-up included; 0: no limit. As many samples as fit, but at least
-  // one per pixel. The result has the same bits as that of a run without limit and with the number
-  // of samples that this one came to.
+  // `least_spp` (or spp, if that is less). The result has the same bits as that of a run without
+  // limit and with the number of samples that this one came to.
   double seconds = 0;
+  int least_spp = 1;
   uint64_t seed = 0;
   int threads = 1;
   // Called now and then with the fraction done, from any thread, never concurrently.
