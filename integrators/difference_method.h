@@ -18,8 +18,9 @@ struct PilotFigures {
   double samples_per_second = 0;  // of two images
 };
 // The step of least expected squared error for a run of that many seconds, between h and
-// factor * h: B h^4 + V(h) / n, where the bias is b h^2 with (factor^2 - 1)^2 h^4 B =
-// squared_change, and V is the power of h that goes through both variances.
+// factor * h: B h^4 + V(h) / n, where B h^4 (factor^2 - 1)^2 = squared_change at the smaller step,
+// and V is the power of h that goes through both variances. Without a bias to be seen, the
+// geometric middle of the two steps.
 double best_step(const PilotFigures& pilot, double seconds);
 
 }  // namespace limn

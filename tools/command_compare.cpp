@@ -122,6 +122,7 @@ class Comparer {
     result_.defines = common.defines;
     result_.parameter = command.parameter;
     result_.unit = find_parameter(scene, command.parameter).unit;
+    result_.terms = command.terms;
     result_.seed = settings.seed;
     result_.threads = settings.threads;
     result_.options = make_options(command);
@@ -155,12 +156,7 @@ class Comparer {
     return ready;
   }
 
-  void write() const {
-    auto attributes = provenance(scene_, settings_, 0);
-    attributes.push_back({"limn.parameter", command_.parameter});
-    attributes.push_back({"limn.terms", command_.terms});
-    write_comparison(command_.output, scene_, result_, attributes);
-  }
+  void write() const { write_comparison(command_.output, scene_, result_); }
 
   const Comparison& result() const { return result_; }
 

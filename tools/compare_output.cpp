@@ -51,8 +51,22 @@ std::string in_folder(const std::string& folder, const std::string& name) {
   return (std::filesystem::path(folder) / name).string();
 }
 
+// Of the image that is shown: the first repeat of the longest rung.
+std::vector<ImageAttribute> image_attributes(const Scene& scene, const Comparison& c,
+                                             const ComparedMethod& m) {
+  const auto shown = std::find_if(m.runs.rbegin(), m.runs.rend(),
+                                  [](const ComparedRun& r) { return r.repeat == 0; });
+  RunSettings settings;
+  settings.seed = shown->seed;
+  auto attributes = provenance(scene, settings, shown->run.spp);
+  attributes.push_back({"limn.parameter", c.parameter});
+  attributes.push_back({"limn.terms", c.terms});
+  attributes.push_back({"limn.method", m.name});
+  return attributes;
+}
+
 void write_pictures(const std::string& folder, const Scene& scene, const Comparison& c,
-                    const Scales& scales, const std::vector<ImageAttribute>& attributes) {
+                    const Scales& scales) {
   const Film& film = scene.film;
   if (c.image.spp > 0) {
     write_png(in_folder(folder, "image.png"),
@@ -64,9 +78,7 @@ void write_pictures(const std::string& folder, const Scene& scene, const Compari
     if (m.image.empty()) continue;
     const std::string stem = in_folder(folder, m.name);
     const Image image = to_image(m.image, film);
-    auto with_method = attributes;
-    with_method.push_back({"limn.method", m.name});
-    write_exr(stem + ".exr", film_channels(scene, image), false, with_method);
+    write_exr(stem + ".exr", film_channels(scene, image), false, image_attributes(scene, c, m));
     write_signed_png(stem + ".png", image, scales.derivative);
     write_signed_png(stem + "_error.png", to_image(minus(m.image, c.reference.image), film),
                      scales.error);
@@ -240,12 +252,11 @@ void print_method(const ComparedMethod& m, size_t rungs, size_t width) {
 
 }  // namespace
 
-void write_comparison(const std::string& folder, const Scene& scene, const Comparison& comparison,
-                      const std::vector<ImageAttribute>& attributes) {
+void write_comparison(const std::string& folder, const Scene& scene, const Comparison& comparison) {
   Scales scales;
   scales.derivative = signed_scale(to_image(comparison.reference.image, scene.film));
   scales.error = error_scale(comparison, scene.film);
-  write_pictures(folder, scene, comparison, scales, attributes);
+  write_pictures(folder, scene, comparison, scales);
   write_csv(in_folder(folder, "compare.csv"), comparison);
   write_json(in_folder(folder, "compare.json"), comparison_json(scene, comparison, scales).dump(2));
 }

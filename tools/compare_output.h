@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "limn/core/image.h"
 #include "limn/core/scene.h"
 #include "limn/integrators/compare.h"
 #include "limn/integrators/render.h"
@@ -15,7 +14,7 @@ namespace limn {
 struct Comparison {
   std::string command;
   std::map<std::string, std::string> defines;
-  std::string parameter, unit;
+  std::string parameter, unit, terms;
   uint64_t seed = 0;
   int threads = 1;
   CompareOptions options;
@@ -26,8 +25,7 @@ struct Comparison {
 };
 
 // Writes everything but the reference's EXRs into the folder, which exists.
-void write_comparison(const std::string& folder, const Scene& scene, const Comparison& comparison,
-                      const std::vector<ImageAttribute>& attributes);
+void write_comparison(const std::string& folder, const Scene& scene, const Comparison& comparison);
 // Of the longest rung.
 void print_comparison(const Comparison& comparison);
 
