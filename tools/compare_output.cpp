@@ -92,7 +92,10 @@ json terms_json(const std::vector<double>& seconds) {
 }
 
 // 0: unknown.
-json bytes_json(uint64_t bytes) { return bytes > 0 ? json(bytes) : json(nullptr); }
+template <class Number>
+json or_null(Number value) {
+  return value > 0 ? json(value) : json(nullptr);
+}
 
 json run_json(const ComparedRun& r, const std::vector<double>& times) {
   return {{"time", times[r.rung]},
@@ -100,12 +103,12 @@ json run_json(const ComparedRun& r, const std::vector<double>& times) {
           {"seconds", r.run.seconds},
           {"setup_seconds", r.run.setup_seconds},
           {"spp", r.run.spp},
-          {"rays", r.run.rays},
+          {"rays", or_null(r.run.rays)},
           {"mse", r.errors.mse},
           {"relative_mse", r.errors.relative_mse},
           {"trimmed_mse", r.errors.trimmed_mse},
           {"terms", terms_json(r.run.term_seconds)},
-          {"peak_memory_bytes", bytes_json(r.run.peak_memory_bytes)}};
+          {"peak_memory_bytes", or_null(r.run.peak_memory_bytes)}};
 }
 
 json bias_json(const ZSummary& z) {
@@ -122,7 +125,7 @@ json summary_json(const RungSummary& s, const std::vector<double>& times) {
           {"seconds", s.seconds},
           {"setup_seconds", s.setup_seconds},
           {"spp", s.spp},
-          {"rays", s.rays},
+          {"rays", or_null(s.rays)},
           {"mse", s.mse.value},
           {"mse_stderr", s.mse.error},
           {"relative_mse", s.relative_mse.value},
@@ -131,7 +134,7 @@ json summary_json(const RungSummary& s, const std::vector<double>& times) {
           {"trimmed_mse_stderr", s.trimmed_mse.error},
           {"bias", bias_json(s.bias)},
           {"terms", terms_json(s.term_seconds)},
-          {"peak_memory_bytes", bytes_json(s.peak_memory_bytes)}};
+          {"peak_memory_bytes", or_null(s.peak_memory_bytes)}};
 }
 
 json settings_json(const std::vector<MethodSetting>& settings) {
@@ -239,10 +242,11 @@ void print_method(const ComparedMethod& m, size_t rungs, size_t width) {
   const std::string bias =
       s.bias.count > 0 ? fmt::format("{:.2g} ({:.2g})", p_value(s.bias), s.bias.largest) : "-";
   fmt::print(
-      "{:{}} {:>7.3g} {:>7.2g} {:>8.4g} {:>9.3g} {:>20} {:>9.3g} {:>9.3g} {:>14} {:>16} {:>15}\n",
-      m.name, width, s.seconds, s.setup_seconds, s.spp, s.rays, uncertain(s.mse),
-      s.relative_mse.value, s.trimmed_mse.value, bias,
-      m.time_ratio ? uncertain(*m.time_ratio) : "-", m.slope ? uncertain(*m.slope) : "-");
+      "{:{}} {:>7.3g} {:>7.2g} {:>8.4g} {:>9} {:>20} {:>9.3g} {:>9.3g} {:>14} {:>16} {:>15}\n",
+      m.name, width, s.seconds, s.setup_seconds, s.spp,
+      s.rays > 0 ? fmt::format("{:.3g}", s.rays) : "-", uncertain(s.mse), s.relative_mse.value,
+      s.trimmed_mse.value, bias, m.time_ratio ? uncertain(*m.time_ratio) : "-",
+      m.slope ? uncertain(*m.slope) : "-");
   if (m.status != MethodStatus::kDone) fmt::print("  {}\n", m.message);
   for (const MethodSetting& setting : m.settings) {
     std::visit([&](const auto& value) { fmt::print("  {}: {}\n", setting.name, value); },

@@ -18,8 +18,10 @@ struct Outcome {
   std::string text;  // both streams
 };
 
-Outcome run(const std::string& arguments) {
-  FILE* pipe = popen((std::string(LIMN_PROGRAM) + " " + arguments + " 2>&1").c_str(), "r");
+// environment: as a shell takes it before a command, "NAME=VALUE ".
+Outcome run(const std::string& arguments, const std::string& environment = "") {
+  const std::string command = environment + LIMN_PROGRAM + " " + arguments + " 2>&1";
+  FILE* pipe = popen(command.c_str(), "r");
   Outcome outcome{-1, ""};
   if (!pipe) return outcome;
   std::array<char, 4096> buffer;
@@ -113,6 +115,24 @@ TEST_F(Program, Compares) {
   const std::string text = refused(other + " --methods forest");
   EXPECT_NE(text.find("parameter (--wrt): \"screen.translate.x\" there"), std::string::npos)
       << text;
+}
+
+// A Python that cannot start is as good as none.
+TEST_F(Program, WithoutPythonTheDataIsWritten) {
+  const std::string folder = files_.path("folder");
+  const Outcome outcome = run("compare " + scene_ + " --wrt screen.translate.x --time 0.05" +
+                                  " --repeats 2 --methods forest,mitsuba -o " + folder,
+                              "PYTHONHOME=/nowhere ");
+  EXPECT_EQ(outcome.status, 0) << outcome.text;
+  EXPECT_NE(outcome.text.find("no report.html: "), std::string::npos) << outcome.text;
+  EXPECT_NE(outcome.text.find("All data is in " + folder), std::string::npos) << outcome.text;
+  EXPECT_NE(outcome.text.find("mitsuba missing: "), std::string::npos) << outcome.text;
+  EXPECT_FALSE(std::filesystem::exists(folder + "/report.html"));
+  std::ifstream stream(folder + "/compare.json");
+  const auto methods = nlohmann::json::parse(stream)["methods"];
+  EXPECT_EQ(methods[0]["status"], "done");
+  EXPECT_EQ(methods[1]["status"], "missing");
+  EXPECT_NE(methods[1]["message"], "");
 }
 
 TEST_F(Program, ComparesOnlyWhatItKnows) {
