@@ -30,13 +30,15 @@ struct DifferenceVariance {
   }
 };
 
-std::vector<double> z_scores(const Moments& differences, double event,
+std::vector<double> z_scores(const DifferenceEstimate& estimate,
                              const DifferenceVariance& variance) {
+  const Moments& differences = estimate.blocks;
   const Moments& gradient = variance.gradient.total_blocks;
   std::vector<double> z;
   for (size_t b = 0; b < gradient.size(); ++b) {
     const double residual = gradient.mean(b) - differences.mean(b);
-    const double both = gradient.variance(b) + variance(differences, event, b);
+    const double both =
+        gradient.variance(b) + variance(differences, estimate.events.large_size(), b);
     if (both == 0 && residual == 0) continue;
     z.push_back(normal_from_student(residual / std::sqrt(both), gradient.batches() - 1));
   }
@@ -46,11 +48,12 @@ std::vector<double> z_scores(const Moments& differences, double event,
 Suspicion regress(const Moments& term, const DifferenceResult& differences,
                   const DifferenceVariance& variance) {
   const Moments& gradient = variance.gradient.total_blocks;
-  const Moments& blocks = differences.blocks_extrapolated;
+  const DifferenceEstimate& estimate = differences.extrapolated;
+  const Moments& blocks = estimate.blocks;
   double product = 0;
   double square = 0;
   for (size_t b = 0; b < term.size(); ++b) {
-    const double both = gradient.variance(b) + variance(blocks, differences.event_extrapolated, b);
+    const double both = gradient.variance(b) + variance(blocks, estimate.events.large_size(), b);
     if (both == 0) continue;
     const double value = term.mean(b);
     const double residual = blocks.mean(b) - gradient.mean(b);
@@ -116,11 +119,10 @@ CheckResult check(const Scene& scene, const CheckOptions& options, const RunSett
   const ParameterGradient& g = result.gradient.parameters[0];
   const DifferenceResult& d = result.differences;
   const DifferenceVariance variance{g, block_means(result, scene.film), result.step};
-  result.at_step = summarize(z_scores(d.blocks_at_step, d.event_at_step, variance));
-  result.at_double_step =
-      summarize(z_scores(d.blocks_at_double_step, d.event_at_double_step, variance));
-  result.extrapolated = summarize(z_scores(d.blocks_extrapolated, d.event_extrapolated, variance));
-  result.total = compare_totals(g.image_sum, d.image_sum);
+  result.at_step = summarize(z_scores(d.at_step, variance));
+  result.at_double_step = summarize(z_scores(d.at_double_step, variance));
+  result.extrapolated = summarize(z_scores(d.extrapolated, variance));
+  result.total = compare_totals(g.image_sum, d.extrapolated.image_sum);
   // Extrapolation only helps where the double step is still small; a wrong gradient agrees with
   // neither.
   const bool blocks_agree =

@@ -251,10 +251,15 @@ class Pass {
 void collect(const Pass::Output& output, int samples, int width, int height, int block,
              ParameterGradient* parameters) {
   for (size_t k = 0; k < output.sums.size(); ++k) {
-    std::vector<double> total(output.radiance.size());
+    std::vector<double> edges(output.radiance.size());
+    std::vector<double> total = output.sums[k][kInterior];
+    for (size_t i = 0; i < total.size(); ++i) {
+      edges[i] = output.sums[k][kCamera][i] + output.sums[k][kBoundary][i];
+      total[i] += edges[i];
+    }
+    parameters[k].events.add_batch(edges);
     for (int term = 0; term < kTermCount; ++term) {
       const auto& sums = output.sums[k][term];
-      for (size_t i = 0; i < total.size(); ++i) total[i] += sums[i];
       parameters[k].terms[term].add_batch(sums, samples);
       if (block > 0) {
         parameters[k].term_blocks[term].add_batch(sum_blocks(sums, width, height, block), samples);
@@ -277,8 +282,7 @@ ParameterGradient empty_gradient(const std::string& name, const Film& film, int 
   g.terms.fill(Moments(size));
   g.image_sum = Moments(1);
   if (block > 0) {
-    const std::vector<double> zeros(size);
-    const Moments blocks(sum_blocks(zeros, film.crop_width, film.crop_height, block).size());
+    const Moments blocks(block_count(film.crop_width, film.crop_height, block));
     g.total_blocks = blocks;
     g.term_blocks.fill(blocks);
   }
@@ -312,25 +316,25 @@ GradientResult gradient(const Scene& scene, const GradientOptions& options,
   }
   result.setup_seconds = watch.seconds();
 
-  const Batches batches(settings.spp);
-  ProgressCounter progress(settings, Pass::steps_per_batch(film) * batches.count * passes.size());
-  for (int b = 0; b < batches.count && !progress.stopped(); ++b) {
+  Schedule batches(settings, watch);
+  const size_t steps = Pass::steps_per_batch(film) * Schedule::batch_count(settings.spp);
+  ProgressCounter progress(settings, watch, steps * passes.size());
+  while (!progress.stopped() && batches.next()) {
     std::vector<Pass::Output> outputs;
     for (const auto& pass : passes) {
-      outputs.push_back(
-          pass->run_batch(batches.first_sample(b), batches.first_sample(b + 1), progress));
+      outputs.push_back(pass->run_batch(batches.first_sample(), batches.end_sample(), progress));
     }
     if (progress.stopped()) break;
     for (size_t p = 0; p < passes.size(); ++p) {
-      collect(outputs[p], batches.samples(b), film.crop_width, film.crop_height, options.block,
+      collect(outputs[p], batches.samples(), film.crop_width, film.crop_height, options.block,
               &result.parameters[p * kLanes]);
       for (int term = 0; term < kTermCount; ++term) {
         result.costs[term].merge(outputs[p].costs[term]);
       }
       result.non_finite.merge(outputs[p].non_finite);
     }
-    result.radiance.add_batch(outputs[0].radiance, batches.samples(b));
-    result.spp += batches.samples(b);
+    result.radiance.add_batch(outputs[0].radiance, batches.samples());
+    result.spp += batches.samples();
   }
   result.seconds = watch.seconds();
   return result;

@@ -20,6 +20,15 @@ double Moments::variance(size_t i) const {
   return std::fmax(0.0, between) / (batches_ - 1) / samples_;
 }
 
+void Events::add_batch(const std::vector<double>& sums) {
+  for (size_t i = 0; i < sums.size(); i += 3) {
+    const double x = std::fabs(sums[i] + sums[i + 1] + sums[i + 2]);
+    sizes_ += x;
+    squares_ += x * x;
+    cubes_ += x * x * x;
+  }
+}
+
 Image mean_image(const Moments& moments, int width, int height) {
   Image image(width, height, 3);
   for (size_t i = 0; i < moments.size(); ++i) image.data[i] = static_cast<float>(moments.mean(i));
@@ -34,11 +43,16 @@ Image standard_error_image(const Moments& moments, int width, int height) {
   return image;
 }
 
+size_t block_count(int width, int height, int block) {
+  const size_t columns = (width + block - 1) / block;
+  const size_t rows = (height + block - 1) / block;
+  return columns * rows;
+}
+
 std::vector<double> sum_blocks(const std::vector<double>& values, int width, int height,
                                int block) {
   const int columns = (width + block - 1) / block;
-  const int rows = (height + block - 1) / block;
-  std::vector<double> sums(static_cast<size_t>(columns) * rows);
+  std::vector<double> sums(block_count(width, height, block));
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       for (int c = 0; c < 3; ++c) {

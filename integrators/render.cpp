@@ -62,8 +62,8 @@ struct BatchOutput {
   NonFinite non_finite;
 };
 
-// Sums over samples [first, last) of every pixel. False if interrupted.
-bool render_batch(const PrimalRenderer& renderer, int first, int last, ProgressCounter& progress,
+// Sums over a batch's samples of every pixel. False if interrupted.
+bool render_batch(const PrimalRenderer& renderer, const Schedule& batch, ProgressCounter& progress,
                   BatchOutput& output) {
   const Film& film = renderer.scene.film;
   const std::vector<Tile> tiles = make_tiles(film);
@@ -75,7 +75,7 @@ bool render_batch(const PrimalRenderer& renderer, int first, int last, ProgressC
     for (int y = tiles[i].y0; y < tiles[i].y1; ++y) {
       for (int x = tiles[i].x0; x < tiles[i].x1; ++x) {
         Rgb<double> sum{};
-        for (int s = first; s < last; ++s) {
+        for (int s = batch.first_sample(); s < batch.end_sample(); ++s) {
           const Rgb<double> radiance = renderer.sample(x, y, s, rays[i]);
           if (is_finite(radiance)) {
             sum += radiance;
@@ -96,41 +96,92 @@ bool render_batch(const PrimalRenderer& renderer, int first, int last, ProgressC
   return !progress.stopped();
 }
 
-// Sums behind DifferenceResult::event_*.
-struct EventSize {
-  double cubes = 0;
-  double squares = 0;
-  // Three channels per pixel.
-  void add(const std::vector<double>& sums) {
-    for (size_t i = 0; i < sums.size(); i += 3) {
-      const double x = std::fabs(sums[i] + sums[i + 1] + sums[i + 2]);
-      squares += x * x;
-      cubes += x * x * x;
-    }
+// A weighted sum of central differences. outputs: images at +steps[0], -steps[0], +steps[1], ...
+std::vector<double> combine(const std::vector<BatchOutput>& outputs,
+                            const std::vector<double>& steps, const std::vector<double>& weights) {
+  std::vector<double> sums(outputs[0].sums.size());
+  for (size_t j = 0; j < steps.size(); ++j) {
+    const std::vector<double>& forward = outputs[2 * j].sums;
+    const std::vector<double>& back = outputs[2 * j + 1].sums;
+    const double factor = weights[j] / (2 * steps[j]);
+    if (factor == 0) continue;
+    for (size_t i = 0; i < sums.size(); ++i) sums[i] += factor * (forward[i] - back[i]);
   }
-  double value() const { return squares > 0 ? cubes / squares : 0; }
-};
+  return sums;
+}
 
 }  // namespace
+
+DifferenceEstimate::DifferenceEstimate(const Film& film, int block)
+    : total(static_cast<size_t>(film.crop_width) * film.crop_height * 3),
+      blocks(block_count(film.crop_width, film.crop_height, block)),
+      image_sum(1) {}
+
+void DifferenceEstimate::add_batch(const std::vector<double>& sums, const Film& film, int block,
+                                   int samples) {
+  const int width = film.crop_width;
+  const int height = film.crop_height;
+  total.add_batch(sums, samples);
+  events.add_batch(sums);
+  blocks.add_batch(sum_blocks(sums, width, height, block), samples);
+  image_sum.add_batch(sum_blocks(sums, width, height, std::max(width, height)), samples);
+}
 
 RenderResult render(const Scene& scene, const RunSettings& settings) {
   const Stopwatch watch;
   const PrimalRenderer renderer(scene, settings);
-  const Batches batches(settings.spp);
   RenderResult result;
   result.radiance =
       Moments(static_cast<size_t>(scene.film.crop_width) * scene.film.crop_height * 3);
-  ProgressCounter progress(settings, make_tiles(scene.film).size() * batches.count);
-  for (int b = 0; b < batches.count; ++b) {
+  const size_t steps = make_tiles(scene.film).size() * Schedule::batch_count(settings.spp);
+  ProgressCounter progress(settings, watch, steps);
+  Schedule batches(settings, watch);
+  while (batches.next()) {
     BatchOutput output;
-    if (!render_batch(renderer, batches.first_sample(b), batches.first_sample(b + 1), progress,
-                      output)) {
-      break;
-    }
-    result.radiance.add_batch(output.sums, batches.samples(b));
+    if (!render_batch(renderer, batches, progress, output)) break;
+    result.radiance.add_batch(output.sums, batches.samples());
     result.rays += output.rays;
     result.non_finite.merge(output.non_finite);
-    result.spp += batches.samples(b);
+    result.spp += batches.samples();
+  }
+  result.seconds = watch.seconds();
+  return result;
+}
+
+CentralDifferences central_differences(const Scene& scene, const std::string& parameter,
+                                       const std::vector<double>& steps,
+                                       const std::vector<std::vector<double>>& combinations,
+                                       int block, const RunSettings& settings) {
+  const Stopwatch watch;
+  std::vector<Scene> moved;
+  for (const double step : steps) {
+    moved.push_back(perturbed(scene, parameter, step));
+    moved.push_back(perturbed(scene, parameter, -step));
+  }
+  std::vector<std::unique_ptr<PrimalRenderer>> renderers;
+  for (const Scene& s : moved) renderers.push_back(std::make_unique<PrimalRenderer>(s, settings));
+  CentralDifferences result;
+  result.estimates.assign(combinations.size(), DifferenceEstimate(scene.film, block));
+  result.setup_seconds = watch.seconds();
+
+  const size_t tiles = make_tiles(scene.film).size() * renderers.size();
+  ProgressCounter progress(settings, watch, tiles * Schedule::batch_count(settings.spp));
+  Schedule batches(settings, watch);
+  while (!progress.stopped() && batches.next()) {
+    std::vector<BatchOutput> outputs(renderers.size());
+    for (size_t i = 0; i < renderers.size(); ++i) {
+      render_batch(*renderers[i], batches, progress, outputs[i]);
+    }
+    if (progress.stopped()) break;
+    for (size_t k = 0; k < combinations.size(); ++k) {
+      const std::vector<double> sums = combine(outputs, steps, combinations[k]);
+      result.estimates[k].add_batch(sums, scene.film, block, batches.samples());
+    }
+    for (const BatchOutput& o : outputs) {
+      result.rays += o.rays;
+      result.non_finite.merge(o.non_finite);
+    }
+    result.spp += batches.samples();
   }
   result.seconds = watch.seconds();
   return result;
@@ -138,63 +189,15 @@ RenderResult render(const Scene& scene, const RunSettings& settings) {
 
 DifferenceResult finite_differences(const Scene& scene, const std::string& parameter, double step,
                                     int block, const RunSettings& settings) {
-  const Stopwatch watch;
-  const double offsets[4] = {step, -step, 2 * step, -2 * step};
-  std::vector<Scene> moved;
-  moved.reserve(4);
-  for (const double offset : offsets) moved.push_back(perturbed(scene, parameter, offset));
-  std::vector<std::unique_ptr<PrimalRenderer>> renderers;
-  for (const Scene& s : moved) renderers.push_back(std::make_unique<PrimalRenderer>(s, settings));
-
-  const int width = scene.film.crop_width;
-  const int height = scene.film.crop_height;
-  const size_t size = static_cast<size_t>(width) * height * 3;
-  const size_t block_size = sum_blocks(std::vector<double>(size), width, height, block).size();
-  DifferenceResult result;
-  result.at_step = result.at_double_step = result.extrapolated = Moments(size);
-  result.blocks_at_step = result.blocks_at_double_step = result.blocks_extrapolated =
-      Moments(block_size);
-  result.image_sum = Moments(1);
-  EventSize events[3];
-  const Batches batches(settings.spp);
-  ProgressCounter progress(settings, make_tiles(scene.film).size() * batches.count * 4);
-  for (int b = 0; b < batches.count; ++b) {
-    BatchOutput output[4];
-    for (int i = 0; i < 4; ++i) {
-      render_batch(*renderers[i], batches.first_sample(b), batches.first_sample(b + 1), progress,
-                   output[i]);
-    }
-    if (progress.stopped()) break;
-    std::vector<double> single(size);
-    std::vector<double> twice(size);
-    std::vector<double> combined(size);
-    for (size_t i = 0; i < size; ++i) {
-      single[i] = (output[0].sums[i] - output[1].sums[i]) / (2 * step);
-      twice[i] = (output[2].sums[i] - output[3].sums[i]) / (4 * step);
-      combined[i] = (4 * single[i] - twice[i]) / 3;
-    }
-    events[0].add(single);
-    events[1].add(twice);
-    events[2].add(combined);
-    const int n = batches.samples(b);
-    result.at_step.add_batch(single, n);
-    result.at_double_step.add_batch(twice, n);
-    result.extrapolated.add_batch(combined, n);
-    result.blocks_at_step.add_batch(sum_blocks(single, width, height, block), n);
-    result.blocks_at_double_step.add_batch(sum_blocks(twice, width, height, block), n);
-    result.blocks_extrapolated.add_batch(sum_blocks(combined, width, height, block), n);
-    result.image_sum.add_batch(sum_blocks(combined, width, height, std::max(width, height)), n);
-    for (const BatchOutput& o : output) {
-      result.rays += o.rays;
-      result.non_finite.merge(o.non_finite);
-    }
-    result.spp += n;
-  }
-  result.event_at_step = events[0].value();
-  result.event_at_double_step = events[1].value();
-  result.event_extrapolated = events[2].value();
-  result.seconds = watch.seconds();
-  return result;
+  CentralDifferences run = central_differences(
+      scene, parameter, {step, 2 * step}, {{1, 0}, {0, 1}, {4.0 / 3, -1.0 / 3}}, block, settings);
+  return {std::move(run.estimates[0]),
+          std::move(run.estimates[1]),
+          std::move(run.estimates[2]),
+          run.spp,
+          run.rays,
+          run.seconds,
+          std::move(run.non_finite)};
 }
 
 }  // namespace limn

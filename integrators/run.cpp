@@ -33,18 +33,51 @@ std::string NonFinite::message() const {
   return text;
 }
 
-Batches::Batches(int spp) : ends_{0} {
-  while (ends_.back() < spp) {
-    const int done = ends_.back();
-    ends_.push_back(std::min(spp, done + 1 + done / 32));
+namespace {
+
+int batch_end(int done, int spp) { return std::min<int64_t>(spp, int64_t{done} + 1 + done / 32); }
+
+}  // namespace
+
+int Schedule::batch_count(int spp) {
+  int count = 0;
+  for (int done = 0; done < spp; done = batch_end(done, spp)) ++count;
+  return count;
+}
+
+int Schedule::samples_in_time(double now) const {
+  const double left = settings_.seconds - now;
+  if (left <= 0) return 0;
+  const int done = samples() + before_;
+  const double spent = now - (before_ > 0 ? began_[1] : began_[0]);
+  return spent > 0 ? static_cast<int>(std::min(left * done / spent, 1e9)) : settings_.spp;
+}
+
+bool Schedule::next() {
+  if (last_) return false;
+  const double now = watch_.seconds();
+  int end = batch_end(end_, settings_.spp);
+  if (settings_.seconds > 0 && end_ >= settings_.least_spp) {
+    const int fitting = samples_in_time(now);
+    last_ = fitting < end - end_;
+    end = std::min(end, end_ + fitting);
   }
-  count = static_cast<int>(ends_.size()) - 1;
+  if (end == end_) return false;
+  before_ = samples();
+  began_[1] = began_[0];
+  began_[0] = now;
+  first_ = end_;
+  end_ = end;
+  return true;
 }
 
 void ProgressCounter::step() {
   const std::scoped_lock lock(mutex_);
   ++done_;
-  if (settings_.progress) settings_.progress(static_cast<double>(done_) / steps_);
+  if (!settings_.progress) return;
+  double done = static_cast<double>(done_) / steps_;
+  if (settings_.seconds > 0) done = std::max(done, watch_.seconds() / settings_.seconds);
+  settings_.progress(std::min(done, 1.0));
 }
 
 }  // namespace limn

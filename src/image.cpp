@@ -129,17 +129,39 @@ void write_exr(const std::string& file, const Image& image, bool half,
   output.commit();
 }
 
-Image read_exr(const std::string& file) {
+namespace {
+
+// Opens an EXR and calls read(input).
+template <class Read>
+auto with_exr(const std::string& file, Read read) {
   check_is_exr(file);
   try {
     Imf::InputFile input(file.c_str());
-    return read_open_file(input, file);
+    return read(input);
   } catch (const InputError&) {
     throw;
   } catch (const std::exception&) {
     // OpenEXR's own words depend on where in the file it notices.
     throw InputError(SourceLocation{file}, "the EXR file is truncated or damaged");
   }
+}
+
+}  // namespace
+
+Image read_exr(const std::string& file) {
+  return with_exr(file, [&](Imf::InputFile& input) { return read_open_file(input, file); });
+}
+
+std::vector<ImageAttribute> read_exr_attributes(const std::string& file) {
+  return with_exr(file, [](Imf::InputFile& input) {
+    std::vector<ImageAttribute> attributes;
+    const Imf::Header& header = input.header();
+    for (auto i = header.begin(); i != header.end(); ++i) {
+      const auto* text = dynamic_cast<const Imf::StringAttribute*>(&i.attribute());
+      if (text) attributes.push_back({i.name(), text->value()});
+    }
+    return attributes;
+  });
 }
 
 }  // namespace limn

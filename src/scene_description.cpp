@@ -29,6 +29,7 @@ class Describer {
     scene_.file = file;
     scene_.where = root.where;
     scene_.search_path = tree.search_path;
+    scene_.files = tree.files;
     for (const XmlElement& child : root.children) add_to_scene(child);
     for (const auto& object : all_objects_) resolve(*object);
     return std::move(scene_);

@@ -46,6 +46,7 @@ struct SceneDescription {
   std::vector<std::shared_ptr<ObjectDescription>> objects;  // directly under <scene>, in order
   std::vector<std::shared_ptr<ObjectDescription>> with_id;  // every object that has one, in order
   std::vector<std::string> search_path;
+  std::vector<std::string> files;  // the scene file and what it includes
 };
 
 // Every reference is resolved. InputError for unknown elements, attributes and references, and for

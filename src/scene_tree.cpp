@@ -35,6 +35,7 @@ class TreeLoader {
 
   SceneTree load(const std::string& file) {
     tree_.root = parse_xml(file);
+    tree_.files.push_back(file);
     expand(tree_.root, 0, true);
     check_defines(file);
     return std::move(tree_);
@@ -127,6 +128,7 @@ class TreeLoader {
       throw InputError(name.where, "files are included more than 15 deep");
     }
     XmlElement root = parse_xml(file);
+    tree_.files.push_back(file);
     const bool is_scene = root.name == "scene";
     expand(root, depth + 1, is_scene);
     if (!is_scene) {

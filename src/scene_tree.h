@@ -12,6 +12,7 @@ namespace limn {
 struct SceneTree {
   XmlElement root;
   std::vector<std::string> search_path;  // directories of <path>, the latest first
+  std::vector<std::string> files;        // all that were read, in order
 };
 
 // `defines` override <default>; one that nothing refers to is an error. An included file has the

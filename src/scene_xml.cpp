@@ -20,7 +20,11 @@ class SceneBuilder {
 
   Scene build() {
     scene_.file = description_.file;
-    for (const auto& object : description_.objects) add(*object);
+    scene_.xml_files = description_.files;
+    for (const auto& object : description_.objects) {
+      add(*object);
+      note_data_file(*object);
+    }
     // BSDFs that no shape uses are made as well: their mistakes count, and so do their ids.
     for (const auto& object : description_.objects) {
       if (object->tag == "bsdf") bsdf(*object);
@@ -42,6 +46,11 @@ class SceneBuilder {
     } else if (object.tag == "emitter") {
       add_environment(object);
     }
+  }
+
+  void note_data_file(const ObjectDescription& object) {
+    DescribedProperties p(object, description_, make_nested_);
+    if (p.has("filename")) scene_.data_files.push_back(p.file("filename"));
   }
 
   static void only_one(const ObjectDescription& object, const std::string& what,

@@ -3,7 +3,6 @@
 #include <cctype>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "commands.h"
 #include "limn/core/error.h"
@@ -15,23 +14,6 @@ namespace limn {
 namespace {
 
 using nlohmann::json;
-
-std::array<bool, kTermCount> parse_terms(const std::string& list) {
-  std::array<bool, kTermCount> terms = {false, false, false};
-  std::stringstream stream(list);
-  for (std::string name; std::getline(stream, name, ',');) {
-    bool known = false;
-    for (int term = 0; term < kTermCount; ++term) {
-      if (name != term_name(term)) continue;
-      terms[term] = known = true;
-    }
-    if (!known) {
-      throw InputError("--terms: unknown term \"" + name +
-                       "\" (known: interior, camera, boundary; several with commas)");
-    }
-  }
-  return terms;
-}
 
 // A parameter's name as a part of a file's name.
 std::string file_part(const std::string& name) {

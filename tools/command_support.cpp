@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 
 #include "commands.h"
 #include "limn/core/error.h"
@@ -73,6 +74,23 @@ void write_json(const std::string& file, const std::string& text) {
   std::ofstream stream(file);
   stream << text << "\n";
   if (!stream) throw InputError({file}, "cannot be written");
+}
+
+std::array<bool, kTermCount> parse_terms(const std::string& list) {
+  std::array<bool, kTermCount> terms = {false, false, false};
+  std::stringstream stream(list);
+  for (std::string name; std::getline(stream, name, ',');) {
+    bool known = false;
+    for (int term = 0; term < kTermCount; ++term) {
+      if (name != term_name(term)) continue;
+      terms[term] = known = true;
+    }
+    if (!known) {
+      throw InputError("--terms: unknown term \"" + name +
+                       "\" (known: interior, camera, boundary; several with commas)");
+    }
+  }
+  return terms;
 }
 
 int finish_status(const NonFinite& non_finite, int64_t spp_done, int64_t spp_asked) {

@@ -1,5 +1,6 @@
 #pragma once
 // The commands of the program `limn`: each reads its scene, calls the library and prints.
+#include <array>
 #include <map>
 #include <optional>
 #include <string>
@@ -7,6 +8,7 @@
 
 #include "limn/core/image.h"
 #include "limn/core/scene.h"
+#include "limn/integrators/gradient.h"
 #include "limn/integrators/run.h"
 
 namespace limn {
@@ -31,6 +33,21 @@ struct GradientCommand {
   int block = 0;
 };
 
+struct CompareCommand {
+  std::string parameter;
+  std::vector<std::string> methods;
+  double time = 0;  // seconds of a run, on the longest rung
+  int rungs = 1;    // of the ladder of times
+  int repeats = 4;
+  std::string reference;      // "": made
+  double reference_time = 0;  // 0: four times all runs of one method
+  std::string terms = "interior,camera,boundary";
+  double step = 0;  // of finite differences; 0: found by a pilot
+  std::string output;
+  bool report = true;
+  std::string command_line;
+};
+
 // Exit statuses.
 enum Status { kSuccess = 0, kDisagree = 1, kBadInput = 2, kNonFinite = 3, kInterrupted = 130 };
 
@@ -38,6 +55,7 @@ int run_info(const CommonOptions& common);
 int run_render(const CommonOptions& common, const std::string& output);
 int run_gradient(const CommonOptions& common, const GradientCommand& command);
 int run_check(const CommonOptions& common, const GradientCommand& command);
+int run_compare(const CommonOptions& common, const CompareCommand& command);
 
 // Shared by the commands.
 // The EXR's header says what made it.
@@ -50,6 +68,10 @@ std::string with_ending(const std::string& output, const std::string& ending);
 // Made before long work starts: InputError if the file cannot be written.
 void check_output(const std::string& file);
 void write_json(const std::string& file, const std::string& text);
+// Of --terms.
+std::array<bool, kTermCount> parse_terms(const std::string& list);
+// Makes FOLDER/report.html with Python, or says what is missing for it.
+void write_report(const std::string& folder, bool quiet);
 Scene load_scene(const CommonOptions& common);
 RunSettings make_settings(const CommonOptions& common, const Scene& scene,
                           const std::string& label);

@@ -6,10 +6,12 @@
 #include "commands.h"
 #include "limn/core/error.h"
 #include "limn/edgetree/edge_sampler.h"
+#include "limn/integrators/derivative_method.h"
 
 namespace {
 
 using limn::CommonOptions;
+using limn::CompareCommand;
 using limn::GradientCommand;
 
 void add_common(CLI::App& command, CommonOptions& common, std::vector<std::string>& defines) {
@@ -49,6 +51,74 @@ void add_gradient_options(CLI::App& command, GradientCommand& gradient) {
   command
       .add_option("--sampler", gradient.sampler, "How shading points choose an edge: " + samplers)
       ->capture_default_str();
+}
+
+void add_compare_options(CLI::App& command, CompareCommand& compare) {
+  command.add_option("--wrt", compare.parameter, "Parameter to differentiate")
+      ->required()
+      ->type_name("PARAM");
+  std::string names;
+  for (const auto& method : limn::method_names()) names += method.name + ", ";
+  command
+      .add_option("--methods", compare.methods,
+                  "Methods to compare, the first is the measure of the others: " + names +
+                      "mitsuba (where Mitsuba 3 is installed)")
+      ->delimiter(',')
+      ->required()
+      ->type_name("A,B,...");
+  command.add_option("--time", compare.time, "Seconds of each run, set-up included")
+      ->required()
+      ->check(CLI::PositiveNumber)
+      ->type_name("SECONDS");
+  command
+      .add_option("--sweep", compare.rungs,
+                  "Error against time: this many times, each twice the one before, up to --time "
+                  "(5 if no number is given)")
+      ->expected(0, 1)
+      ->default_str("5")
+      ->check(CLI::Range(1, 30))
+      ->type_name("N");
+  command.add_option("--repeats", compare.repeats, "Runs of each method and time, for error bars")
+      ->check(CLI::Range(1, 1 << 20))
+      ->capture_default_str();
+  command
+      .add_option("--reference", compare.reference,
+                  "Reference that limn compare wrote for the same scene and parameter (default: "
+                  "that of the folder, or a new one)")
+      ->type_name("FILE.exr");
+  command
+      .add_option("--reference-time", compare.reference_time,
+                  "Seconds for a new reference (default: four times all runs of one method)")
+      ->check(CLI::PositiveNumber)
+      ->type_name("SECONDS");
+  command.add_option("--terms", compare.terms, "Terms to compute: interior,camera,boundary")
+      ->capture_default_str();
+  command
+      .add_option("--step", compare.step,
+                  "Step of finite differences (default: found by a short pilot)")
+      ->check(CLI::PositiveNumber);
+  command.add_option("-o,--output", compare.output, "Folder to write")
+      ->required()
+      ->type_name("FOLDER");
+  command.add_flag("!--no-report", compare.report, "Do not make report.html");
+}
+
+// What was typed, for a shell.
+std::string command_line(int argc, char** argv) {
+  const std::string plain =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=.,:/@%";
+  std::string line = "limn";
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    if (!word.empty() && word.find_first_not_of(plain) == std::string::npos) {
+      line += " " + word;
+      continue;
+    }
+    line += " '";
+    for (const char c : word) line += c == '\'' ? "'\\''" : std::string(1, c);
+    line += "'";
+  }
+  return line;
 }
 
 std::map<std::string, std::string> parse_defines(const std::vector<std::string>& defines) {
@@ -96,6 +166,11 @@ int run(int argc, char** argv) {
       ->add_option("--block", command.block,
                    "Compare blocks of this many pixels (default: an eighth of the longer side)")
       ->check(CLI::Range(1, 1 << 20));
+  CLI::App* compare = app.add_subcommand(
+      "compare", "Derivative images of several methods at equal time, with a report");
+  CompareCommand comparison;
+  add_common(*compare, common, defines);
+  add_compare_options(*compare, comparison);
 
   try {
     app.parse(argc, argv);
@@ -106,6 +181,10 @@ int run(int argc, char** argv) {
   if (info->parsed()) return limn::run_info(common);
   if (render->parsed()) return limn::run_render(common, command.output);
   if (gradient->parsed()) return limn::run_gradient(common, command);
+  if (compare->parsed()) {
+    comparison.command_line = command_line(argc, argv);
+    return limn::run_compare(common, comparison);
+  }
   return limn::run_check(common, command);
 }
 

@@ -18,8 +18,10 @@ struct Outcome {
   std::string text;  // both streams
 };
 
-Outcome run(const std::string& arguments) {
-  FILE* pipe = popen((std::string(LIMN_PROGRAM) + " " + arguments + " 2>&1").c_str(), "r");
+// environment: as a shell takes it before a command, "NAME=VALUE ".
+Outcome run(const std::string& arguments, const std::string& environment = "") {
+  const std::string command = environment + LIMN_PROGRAM + " " + arguments + " 2>&1";
+  FILE* pipe = popen(command.c_str(), "r");
   Outcome outcome{-1, ""};
   if (!pipe) return outcome;
   std::array<char, 4096> buffer;
@@ -67,6 +69,84 @@ TEST_F(Program, RendersAndDifferentiates) {
   std::ifstream stream(figures);
   EXPECT_EQ(nlohmann::json::parse(stream)["spp"], 8);
   EXPECT_EQ(run("info " + scene_).status, 0);
+}
+
+TEST_F(Program, Compares) {
+  const std::string folder = files_.path("folder");
+  const std::string compare = "compare " + scene_ + " --wrt screen.translate.x --time 0.1" +
+                              " --reference-time 0.1 --repeats 2 --quiet --no-report -o " + folder;
+  const Outcome outcome = run(compare + " --methods forest,fd --sweep 2");
+  EXPECT_EQ(outcome.status, 0) << outcome.text;
+  EXPECT_EQ(outcome.text, "");
+  const auto report = [&] {
+    std::ifstream stream(folder + "/compare.json");
+    return nlohmann::json::parse(stream);
+  };
+  const nlohmann::json first = report();
+  EXPECT_EQ(first["kind"], "compare");
+  EXPECT_EQ(first["unit"], "scene units");
+  EXPECT_EQ(first["times"], nlohmann::json({0.05, 0.1}));
+  EXPECT_FALSE(first["reference"]["cached"].get<bool>());
+  ASSERT_EQ(first["methods"].size(), 2u);
+  for (const nlohmann::json& method : first["methods"]) {
+    EXPECT_EQ(method["status"], "done");
+    EXPECT_EQ(method["runs"].size(), 4u);
+    EXPECT_EQ(method["summary"].size(), 2u);
+    EXPECT_TRUE(method["slope"]["value"].is_number() || method["slope"].is_null());
+    for (const char* key : {"image", "picture", "error_picture"}) {
+      EXPECT_TRUE(std::filesystem::exists(folder + "/" + method[key].get<std::string>())) << key;
+    }
+    for (const char* key : {"mse", "relative_mse", "trimmed_mse", "seconds", "spp", "rays"}) {
+      EXPECT_TRUE(method["summary"][1][key].is_number()) << key;
+      EXPECT_TRUE(method["runs"][3][key].is_number()) << key;
+    }
+  }
+  EXPECT_TRUE(first["methods"][1]["settings"]["step"].is_number());
+  for (const char* file : {"compare.csv", "image.png", "reference.png", "reference_stderr.exr"}) {
+    EXPECT_TRUE(std::filesystem::exists(folder + "/" + file)) << file;
+  }
+
+  EXPECT_EQ(run(compare + " --methods uniform").status, 0);
+  EXPECT_TRUE(report()["reference"]["cached"].get<bool>());
+  EXPECT_EQ(report()["reference"]["spp"], first["reference"]["spp"]);
+
+  const std::string other = "compare " + scene_ + " --wrt screen.translate.y --time 0.1 -o " +
+                            files_.path("other") + " --reference " + folder + "/reference.exr";
+  const std::string text = refused(other + " --methods forest");
+  EXPECT_NE(text.find("parameter (--wrt): \"screen.translate.x\" there"), std::string::npos)
+      << text;
+}
+
+// A Python that cannot start is as good as none.
+TEST_F(Program, WithoutPythonTheDataIsWritten) {
+  const std::string folder = files_.path("folder");
+  const Outcome outcome = run("compare " + scene_ + " --wrt screen.translate.x --time 0.05" +
+                                  " --repeats 2 --methods forest,mitsuba -o " + folder,
+                              "PYTHONHOME=/nowhere ");
+  EXPECT_EQ(outcome.status, 0) << outcome.text;
+  EXPECT_NE(outcome.text.find("no report.html: "), std::string::npos) << outcome.text;
+  EXPECT_NE(outcome.text.find("All data is in " + folder), std::string::npos) << outcome.text;
+  EXPECT_NE(outcome.text.find("mitsuba missing: "), std::string::npos) << outcome.text;
+  EXPECT_FALSE(std::filesystem::exists(folder + "/report.html"));
+  std::ifstream stream(folder + "/compare.json");
+  const auto methods = nlohmann::json::parse(stream)["methods"];
+  EXPECT_EQ(methods[0]["status"], "done");
+  EXPECT_EQ(methods[1]["status"], "missing");
+  EXPECT_NE(methods[1]["message"], "");
+}
+
+TEST_F(Program, ComparesOnlyWhatItKnows) {
+  const std::string compare = "compare " + scene_ + " --wrt screen.translate.x --time 0.1 -o " +
+                              files_.path("folder") + " --methods ";
+  const std::string text = refused(compare + "forest,forrest");
+  EXPECT_NE(text.find("unknown method \"forrest\" (known: forest, brute"), std::string::npos)
+      << text;
+  EXPECT_NE(text.find("fd, mitsuba)"), std::string::npos) << text;
+  EXPECT_NE(refused(compare + "forest,forest").find("given twice"), std::string::npos);
+  EXPECT_NE(refused(compare + "fd --terms interior").find("all terms in one"), std::string::npos);
+  EXPECT_NE(refused(compare + "forest --spp 4").find("--time"), std::string::npos);
+  EXPECT_NE(refused(compare + "forest --repeats 0").find("--repeats"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(files_.path("folder")));
 }
 
 TEST_F(Program, ChecksBothWays) {

@@ -67,7 +67,7 @@ TEST_P(Threads, SameBits) {
   const auto differences = [&](int threads) {
     return finite_differences(scene, "ball.translate.x", 0.01, 8, run_settings(2, threads));
   };
-  expect_same(differences(1).extrapolated, differences(GetParam()).extrapolated);
+  expect_same(differences(1).extrapolated.total, differences(GetParam()).extrapolated.total);
 }
 
 INSTANTIATE_TEST_SUITE_P(, Threads, testing::Values(2, 7));
@@ -191,6 +191,41 @@ TEST(Interruption, KeepsWhatIsDone) {
   stop = true;
   settings.progress = nullptr;
   EXPECT_EQ(render(scene, settings).spp, 0);
+}
+
+// Whatever the time allows, the result is that of a run with the same number of samples.
+TEST(TimeLimit, GivesTheBitsOfARunWithThatManySamples) {
+  const TempFiles files;
+  const Scene scene = make_scene(files, small_scene(files));
+  RunSettings limited = run_settings(1 << 30, 2);
+  limited.seconds = 0.3;
+  const GradientResult g = run_gradient(scene, limited);
+  EXPECT_GE(g.spp, 1);
+  EXPECT_GE(g.seconds, g.setup_seconds);
+  const GradientResult whole = run_gradient(scene, run_settings(static_cast<int>(g.spp)));
+  EXPECT_EQ(whole.spp, g.spp);
+  expect_same(g.parameters[0].total, whole.parameters[0].total);
+
+  const auto differences = [&](const RunSettings& settings) {
+    return central_differences(scene, "ball.translate.x", {0.01}, {{1}}, 8, settings);
+  };
+  const CentralDifferences d = differences(limited);
+  EXPECT_GE(d.spp, 1);
+  expect_same(d.estimates[0].total,
+              differences(run_settings(static_cast<int>(d.spp))).estimates[0].total);
+}
+
+TEST(TimeLimit, IsNoMoreThanTheSamples) {
+  const TempFiles files;
+  const Scene scene = make_scene(files, small_scene(files));
+  RunSettings settings = run_settings(3);
+  settings.seconds = 3600;
+  EXPECT_EQ(render(scene, settings).spp, 3);
+  settings.seconds = 1e-9;  // one sample per pixel all the same
+  EXPECT_EQ(render(scene, settings).spp, 1);
+  EXPECT_EQ(run_gradient(scene, settings).spp, 1);
+  settings.least_spp = 2;
+  EXPECT_EQ(run_gradient(scene, settings).spp, 2);
 }
 
 }  // namespace

@@ -193,6 +193,19 @@ TEST(Scene, IncludesReferencesAndAliases) {
   EXPECT_EQ(s.bsdfs_by_id.count("unused"), 1u);
 }
 
+TEST(Scene, KnowsTheFilesItWasReadFrom) {
+  const TempFiles files;
+  const std::string mesh = files.write("m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  files.write("part.xml", "<scene version=\"3.0.0\"><shape type=\"cube\"/></scene>");
+  const std::string file = files.write(
+      "s.xml", "<scene version=\"3.0.0\">" + kSensor + "<include filename=\"part.xml\"/>" +
+                   "<shape type=\"obj\"><string name=\"filename\" value=\"m.obj\"/></shape>" +
+                   "</scene>");
+  const Scene s = read_scene(file, {}, nullptr);
+  EXPECT_EQ(s.xml_files, (std::vector<std::string>{file, files.path("part.xml")}));
+  EXPECT_EQ(s.data_files, std::vector<std::string>{mesh});
+}
+
 TEST(Scene, ConstantSpectrumOfAReflectanceIsGrey) {
   const Scene s = read(kSensor +
                        "<shape type=\"disk\"><bsdf type=\"diffuse\">"

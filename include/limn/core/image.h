@@ -35,6 +35,8 @@ void write_exr(const std::string& file, const Image& image, bool half,
 // Any scanline or tiled EXR with R G B (or Y) channels of half or float, as three channels (or
 // one).
 Image read_exr(const std::string& file);
+// The string attributes of its header.
+std::vector<ImageAttribute> read_exr_attributes(const std::string& file);
 
 // 8-bit sRGB picture of radiance: clamped to [0, 1] after multiplication with `exposure`.
 void write_png(const std::string& file, const Image& image, double exposure);

@@ -34,6 +34,8 @@ struct Shape {
 
 struct Scene {
   std::string file;
+  std::vector<std::string> xml_files;   // the file and what it includes
+  std::vector<std::string> data_files;  // meshes and images that it mentions
   Camera camera;
   Film film;
   int max_depth = -1;  // as in Mitsuba: 1 emission only, 2 direct light, -1 no limit

@@ -34,6 +34,7 @@ struct ParameterGradient {
   Moments total_blocks;
   std::array<Moments, kTermCount> term_blocks;
   Moments image_sum;  // one value: the sum over all pixels and channels
+  Events events;      // of the camera and boundary terms together
 };
 
 // What one term cost. Times are summed over threads.

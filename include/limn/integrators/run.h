@@ -12,7 +12,12 @@
 namespace limn {
 
 struct RunSettings {
-  int spp = 4;  // samples per pixel
+  int spp = 4;  // samples per pixel; with a limit of time, at most this many
+  // Seconds for the whole run, set-up included; 0: no limit. As many samples as fit, but at least
+  // `least_spp` (or spp, if that is less). The result has the same bits as that of a run without
+  // limit and with the number of samples that this one came to.
+  double seconds = 0;
+  int least_spp = 1;
   uint64_t seed = 0;
   int threads = 1;
   // Called now and then with the fraction done, from any thread, never concurrently.
@@ -37,19 +42,6 @@ struct NonFinite {
   std::string message() const;
 };
 
-// How the samples are split: batches of one sample per pixel at first, then of a thirty-second of
-// what is done, so that an interrupt always loses little, and there are always enough batches for a
-// standard error.
-struct Batches {
-  int count;
-  explicit Batches(int spp);
-  int first_sample(int batch) const { return ends_[batch]; }
-  int samples(int batch) const { return ends_[batch + 1] - ends_[batch]; }
-
- private:
-  std::vector<int> ends_;  // count + 1, from 0 to spp
-};
-
 class Stopwatch {
  public:
   double seconds() const {
@@ -60,10 +52,40 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-// Fraction done over a known number of steps, from many threads.
+// How the samples are split: batches of one sample per pixel at first, then of a thirty-second of
+// what is done, so that an interrupt always loses little, and there are always enough batches for a
+// standard error. Where time is limited, the last batch is cut to what is expected to fit, judged
+// by the two batches before.
+class Schedule {
+ public:
+  // `watch` runs since the job began.
+  Schedule(const RunSettings& settings, const Stopwatch& watch)
+      : settings_(settings), watch_(watch) {}
+  // Goes to the next batch; false if all samples are done or no other fits.
+  bool next();
+  int first_sample() const { return first_; }
+  int end_sample() const { return end_; }
+  int samples() const { return end_ - first_; }
+  // Batches of a run of that many samples.
+  static int batch_count(int spp);
+
+ private:
+  int samples_in_time(double now) const;
+
+  const RunSettings& settings_;
+  const Stopwatch& watch_;
+  int first_ = 0, end_ = 0;
+  bool last_ = false;
+  // When the last batches began, and their samples: the latest first.
+  double began_[2] = {0, 0};
+  int before_ = 0;  // samples of the batch before this one
+};
+
+// Fraction done, from many threads: of a number of steps, or of the time if that is nearer its end.
 class ProgressCounter {
  public:
-  ProgressCounter(const RunSettings& settings, size_t steps) : settings_(settings), steps_(steps) {}
+  ProgressCounter(const RunSettings& settings, const Stopwatch& watch, size_t steps)
+      : settings_(settings), watch_(watch), steps_(steps) {}
   void step();
   bool stopped() const {
     return settings_.interrupted && settings_.interrupted->load(std::memory_order_relaxed);
@@ -71,6 +93,7 @@ class ProgressCounter {
 
  private:
   const RunSettings& settings_;
+  const Stopwatch& watch_;
   size_t steps_;
   size_t done_ = 0;
   std::mutex mutex_;

@@ -1,0 +1,64 @@
+#pragma once
+// Derivative images of several methods at equal time, against one reference.
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "limn/integrators/derivative_method.h"
+#include "limn/integrators/metrics.h"
+#include "limn/integrators/reference.h"
+
+namespace limn {
+
+struct CompareOptions {
+  std::vector<double> times;  // seconds of a run on each rung, ascending
+  int repeats = 4;
+};
+
+struct ComparedRun {
+  size_t rung = 0;  // index into the times
+  int repeat = 0;
+  uint64_t seed = 0;
+  MethodRun run;  // the image is kept for the method's shown run only
+  ImageErrors errors;
+};
+
+// Over the repeats of one rung.
+struct RungSummary {
+  size_t rung = 0;
+  double seconds = 0, setup_seconds = 0, spp = 0, rays = 0;  // means
+  Uncertain mse, relative_mse, trimmed_mse;
+  ZSummary bias;  // count 0: unknown
+  std::vector<double> term_seconds;
+  uint64_t peak_memory_bytes = 0;  // 0: unknown
+};
+
+enum class MethodStatus { kDone, kInterrupted, kMissing };
+
+struct ComparedMethod {
+  std::string name, description;
+  MethodStatus status = MethodStatus::kInterrupted;
+  std::string message;  // why it is missing or not complete
+  std::vector<MethodSetting> settings;
+  std::vector<ComparedRun> runs;
+  // The first repeat of the longest rung that has one; empty without runs.
+  std::vector<double> image;
+  std::vector<RungSummary> summary;  // of the rungs with a run
+  std::optional<Uncertain> slope;
+  // Time for the error that the first method has after equal time, over that method's, on the
+  // longest rung that both have.
+  std::optional<Uncertain> time_ratio;
+};
+
+// reference: of at least two batches. Runs are interleaved: for every rung, for every repeat, for
+// every method; each with a seed of its own. settings: threads, seed, progress over all runs,
+// interruption; samples and seconds do not count. Interrupted, the result holds all runs that were
+// finished.
+std::vector<ComparedMethod> compare(const CompareOptions& options, const Reference& reference,
+                                    const std::vector<std::unique_ptr<DerivativeMethod>>& methods,
+                                    const RunSettings& settings);
+
+// The seed of one run: a different one for each purpose, whatever the other runs are.
+uint64_t derived_seed(uint64_t seed, const std::string& purpose);
+
+}  // namespace limn

@@ -1,0 +1,334 @@
+// Comparing methods: on closed-form scenes, with methods made for the test, interrupted, and with
+// references that belong elsewhere.
+#include "limn/integrators/compare.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "integrators/difference_method.h"
+#include "limn/core/error.h"
+#include "support/temp_files.h"
+
+namespace limn {
+namespace {
+
+const std::string kFolder = std::string(LIMN_SOURCE_DIR) + "/scenes/closed_form/";
+const std::string kFile = "half_hidden_lamp.xml";
+const std::string kParameter = "lamp.translate.x";
+
+// A job on a closed-form scene of a few pixels.
+struct Job {
+  Scene scene = read_scene(kFolder + kFile, {}, nullptr);
+  MethodInput input{scene, kParameter, {true, true, true}, 0, 1};
+  RunSettings settings;
+  Job() { settings.seed = 5; }
+
+  Reference reference(double seconds) const {
+    RunSettings run = settings;
+    run.spp = 1 << 20;
+    run.seconds = seconds;
+    run.seed = derived_seed(settings.seed, "reference");
+    return make_reference(input, run);
+  }
+  std::vector<std::unique_ptr<DerivativeMethod>> methods(
+      const std::vector<std::string>& names) const {
+    std::vector<std::unique_ptr<DerivativeMethod>> made;
+    for (const std::string& name : names) made.push_back(make_method(input, name));
+    return made;
+  }
+};
+
+// Of all channels of all pixels.
+std::vector<double> exact_derivative() {
+  std::ifstream file(kFolder + "references.json");
+  const nlohmann::json all = nlohmann::json::parse(file);
+  for (const auto& scene : all["scenes"]) {
+    if (scene["file"] != kFile) continue;
+    for (const auto& p : scene["parameters"]) {
+      if (p["name"] == kParameter) return p["total"].get<std::vector<double>>();
+    }
+  }
+  return {};
+}
+
+// All against the exact image: the reference and every method agree with it.
+TEST(Compare, MethodsAgreeWithTheClosedForm) {
+  const Job job;
+  const Reference measured = job.reference(0.2);
+  Reference exact = measured;
+  exact.image = exact_derivative();
+  ASSERT_EQ(exact.image.size(), measured.image.size());
+  const Film& film = job.scene.film;
+  exact.blocks.sums = sum_blocks(exact.image, film.crop_width, film.crop_height, 1);
+  const ZSummary z = summarize(bias_scores({measured.blocks}, exact.blocks, exact.edges));
+  EXPECT_GT(p_value(z), 1e-6) << z.largest;
+
+  CompareOptions options;
+  options.times = {0.1};
+  options.repeats = 2;
+  for (const ComparedMethod& m :
+       compare(options, exact, job.methods({"forest", "brute"}), job.settings)) {
+    EXPECT_EQ(m.status, MethodStatus::kDone) << m.name << m.message;
+    ASSERT_EQ(m.summary.size(), 1u);
+    EXPECT_GT(m.summary[0].bias.count, 0) << m.name;
+    EXPECT_GT(p_value(m.summary[0].bias), 1e-6) << m.name << m.summary[0].bias.largest;
+    EXPECT_EQ(m.summary[0].term_seconds.size(), size_t{kTermCount});
+  }
+}
+
+TEST(Compare, FindsABias) {
+  Job job;
+  const Reference reference = job.reference(0.1);
+  job.input.terms[kBoundary] = false;
+  CompareOptions options;
+  options.times = {0.05};
+  options.repeats = 2;
+  const auto results = compare(options, reference, job.methods({"forest"}), job.settings);
+  EXPECT_LT(p_value(results[0].summary[0].bias), 1e-6);
+}
+
+// What a method was asked, and an image with a known error.
+class KnownMethod final : public DerivativeMethod {
+ public:
+  KnownMethod(std::string name, double error, std::vector<RunSettings>& log)
+      : name_(std::move(name)), error_(error), log_(log) {}
+  std::string name() const override { return name_; }
+  std::string description() const override { return "made for a test"; }
+  MethodRun run(const RunSettings& settings) override {
+    log_.push_back(settings);
+    names.push_back(name_);
+    MethodRun run;
+    run.image.assign(12, 1 + error_ / std::sqrt(settings.seconds));
+    run.blocks.sums.assign(4, 3 * run.image[0]);
+    run.seconds = settings.seconds;
+    run.spp = 3;
+    return run;
+  }
+  std::vector<MethodSetting> settings() const override {
+    return {{"seconds", log_.back().seconds}};
+  }
+  static inline std::vector<std::string> names;
+
+ private:
+  std::string name_;
+  double error_;
+  std::vector<RunSettings>& log_;
+};
+
+class MissingMethod final : public DerivativeMethod {
+ public:
+  std::string name() const override { return "absent"; }
+  std::string description() const override { return "not there"; }
+  MethodRun run(const RunSettings&) override { throw MethodMissing("install it"); }
+};
+
+Reference known_reference() {
+  Reference reference;
+  reference.image.assign(12, 1.0);
+  reference.variance.assign(12, 0.0);
+  reference.blocks = {std::vector<double>(4, 3.0), std::vector<double>(4, 0.0), 10, 0};
+  reference.edges.assign(4, 0.0);
+  reference.spp = 2;
+  return reference;
+}
+
+TEST(Compare, InterleavesWithSeedsOfTheirOwn) {
+  KnownMethod::names.clear();
+  std::vector<RunSettings> log;
+  std::vector<std::unique_ptr<DerivativeMethod>> methods;
+  methods.push_back(std::make_unique<KnownMethod>("a", 0.1, log));
+  methods.push_back(std::make_unique<MissingMethod>());
+  methods.push_back(std::make_unique<KnownMethod>("b", 0.2, log));
+  CompareOptions options;
+  options.times = {1, 2};
+  options.repeats = 2;
+  const auto results = compare(options, known_reference(), methods, RunSettings());
+  EXPECT_EQ(KnownMethod::names, (std::vector<std::string>{"a", "b", "a", "b", "a", "b", "a", "b"}));
+  std::set<uint64_t> seeds;
+  for (const RunSettings& run : log) seeds.insert(run.seed);
+  EXPECT_EQ(seeds.size(), log.size());
+  EXPECT_EQ(log.front().seconds, 1);
+  EXPECT_EQ(log.back().seconds, 2);
+
+  EXPECT_EQ(results[1].status, MethodStatus::kMissing);
+  EXPECT_EQ(results[1].message, "install it");
+  EXPECT_TRUE(results[1].summary.empty());
+  for (const size_t m : {0, 2}) {
+    const double error = m == 0 ? 0.1 : 0.2;
+    EXPECT_EQ(results[m].status, MethodStatus::kDone);
+    ASSERT_EQ(results[m].summary.size(), 2u);
+    EXPECT_NEAR(results[m].summary[0].mse.value, error * error, 1e-12);
+    EXPECT_NEAR(results[m].summary[1].mse.value, error * error / 2, 1e-12);
+    EXPECT_NEAR(results[m].slope->value, -1, 1e-9);
+    EXPECT_NEAR(results[m].image[0], 1 + error / std::sqrt(2), 1e-12);  // the longest rung
+    EXPECT_EQ(std::get<double>(results[m].settings[0].value), 2);
+  }
+  EXPECT_NEAR(results[0].time_ratio->value, 1, 1e-12);
+  EXPECT_NEAR(results[2].time_ratio->value, 4, 1e-9);
+}
+
+TEST(Compare, AnInterruptKeepsFinishedRuns) {
+  const Job job;
+  const Reference reference = job.reference(0.05);
+  std::atomic<bool> stop = false;
+  RunSettings settings = job.settings;
+  settings.interrupted = &stop;
+  settings.progress = [&](double done) { stop = stop || done > 0.55; };  // in the second run
+  CompareOptions options;
+  options.times = {0.05};
+  options.repeats = 1;
+  const auto results = compare(options, reference, job.methods({"forest", "uniform"}), settings);
+  EXPECT_EQ(results[0].status, MethodStatus::kDone);
+  EXPECT_EQ(results[0].runs.size(), 1u);
+  EXPECT_FALSE(results[0].image.empty());
+  EXPECT_EQ(results[1].status, MethodStatus::kInterrupted);
+  EXPECT_EQ(results[1].message, "interrupted after 0 of 1 runs");
+  EXPECT_TRUE(results[1].image.empty());
+}
+
+TEST(Methods, AreTheSamplersAndDifferences) {
+  const Job job;
+  std::set<std::string> names;
+  for (const MethodName& m : method_names()) {
+    names.insert(m.name);
+    EXPECT_EQ(make_method(job.input, m.name)->name(), m.name);
+  }
+  EXPECT_TRUE(names.count("forest") && names.count("brute") && names.count("fd"));
+  try {
+    make_method(job.input, "forrest");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("known: forest, brute"), std::string::npos);
+  }
+}
+
+TEST(Differences, TakeTheStepThatIsGiven) {
+  Job job;
+  job.input.step = 0.015625;
+  const auto method = make_method(job.input, "fd");
+  RunSettings settings = job.settings;
+  settings.spp = 64;
+  const MethodRun run = method->run(settings);
+  EXPECT_EQ(run.spp, 64);
+  EXPECT_GT(run.rays, 0u);
+  EXPECT_TRUE(run.term_seconds.empty());
+  EXPECT_EQ(run.blocks.variances.size(), run.blocks.sums.size());
+  ASSERT_EQ(method->settings().size(), 2u);
+  EXPECT_EQ(std::get<double>(method->settings()[0].value), 0.015625);
+}
+
+// Against a search over many steps.
+TEST(Differences, BestStepIsTheMinimum) {
+  PilotFigures pilot;
+  pilot.step = 0.01;
+  pilot.factor = 16;
+  pilot.samples_per_second = 50;
+  for (const double power : {0.5, 1.0, 2.0}) {
+    for (const double bias : {1e-5, 1e-4, 1e-3}) {  // squared, at the smaller step
+      pilot.variance = 3;
+      pilot.variance_far = 3 * std::pow(16, -power);
+      pilot.squared_change = bias * 255 * 255;
+      const auto error = [&](double x) {
+        return bias * std::pow(x, 4) + 3 * std::pow(x, -power) / (50 * 2);
+      };
+      const double found = best_step(pilot, 2) / pilot.step;
+      EXPECT_GE(found, 1);
+      EXPECT_LE(found, 16);
+      for (double x = 1; x <= 16; x *= 1.01) EXPECT_LE(error(found), error(x) * (1 + 1e-9));
+    }
+  }
+  pilot.squared_change = -1;  // no bias to be seen
+  EXPECT_DOUBLE_EQ(best_step(pilot, 2), 0.04);
+  pilot.squared_change = 1;
+  pilot.variance_far = pilot.variance;  // nothing to gain from a larger step
+  EXPECT_EQ(best_step(pilot, 2), 0.01);
+}
+
+class ReferenceFile : public testing::Test {
+ protected:
+  ReferenceFile() {
+    reference_ = job_.reference(0.02);
+    write_reference(file_, reference_, identity(), job_.scene.film, 1);
+  }
+  Identity identity() const { return identify(job_.input, {}); }
+  Reference read(const Identity& identity) const {
+    return read_reference(file_, identity, job_.scene.film);
+  }
+  // The message of a refusal.
+  std::string refusal(const Identity& identity) const {
+    try {
+      read(identity);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  TempFiles files_;
+  Job job_;
+  std::string file_ = files_.path("reference.exr");
+  Reference reference_;
+};
+
+TEST_F(ReferenceFile, IsReadAsItWasWritten) {
+  const Reference back = read(identity());
+  EXPECT_TRUE(back.cached);
+  EXPECT_EQ(back.seed, reference_.seed);
+  EXPECT_EQ(back.spp, reference_.spp);
+  EXPECT_EQ(back.sampler, "forest");
+  EXPECT_EQ(back.asked_seconds, 0.02);
+  EXPECT_EQ(back.blocks.variances, reference_.blocks.variances);
+  EXPECT_EQ(back.blocks.degrees, reference_.blocks.degrees);
+  EXPECT_EQ(back.edges, reference_.edges);
+  for (size_t i = 0; i < back.image.size(); ++i) {  // rounded to float
+    EXPECT_NEAR(back.image[i], reference_.image[i], 1e-7 * std::fabs(reference_.image[i]));
+    EXPECT_NEAR(back.variance[i], reference_.variance[i], 1e-6 * reference_.variance[i]);
+  }
+}
+
+TEST_F(ReferenceFile, OfSomethingElseIsRefused) {
+  const MethodInput other{job_.scene, "lamp.translate.z", {true, true, true}, 0, 1};
+  std::string text = refusal(identify(other, {}));
+  EXPECT_NE(text.find("reference.exr: error: the reference belongs to something else"),
+            std::string::npos)
+      << text;
+  EXPECT_NE(text.find("parameter (--wrt): \"lamp.translate.x\" there, \"lamp.translate.z\" here"),
+            std::string::npos)
+      << text;
+  EXPECT_EQ(text.find("terms"), std::string::npos) << text;
+
+  const MethodInput edges{job_.scene, kParameter, {false, true, true}, 0, 1};
+  EXPECT_NE(refusal(identify(edges, {})).find("terms (--terms)"), std::string::npos);
+  EXPECT_NE(refusal(identify(job_.input, {{"spp", "3"}})).find("defines (-D)"), std::string::npos);
+  job_.scene = read_scene(kFolder + "lamp_over_plane.xml", {}, nullptr);
+  text = refusal(identity());
+  EXPECT_NE(text.find("content of the scene file"), std::string::npos) << text;
+  EXPECT_NE(text.find("content of the scene's meshes and maps"), std::string::npos) << text;
+}
+
+TEST_F(ReferenceFile, MustBeWhole) {
+  std::filesystem::remove(files_.path("reference_stderr.exr"));
+  EXPECT_NE(refusal(identity()).find("standard errors is missing"), std::string::npos);
+  write_exr(file_, Image(4, 4, 3), false, {});
+  EXPECT_NE(refusal(identity()).find("is not a reference"), std::string::npos);
+}
+
+TEST_F(ReferenceFile, IsUsedAgainIfItIsLongEnough) {
+  std::string why;
+  const auto find = [&](double seconds) {
+    return find_reference(file_, identity(), job_.scene.film, seconds, why);
+  };
+  EXPECT_TRUE(find(0.02));
+  EXPECT_EQ(why, "");
+  EXPECT_FALSE(find(0.03));
+  EXPECT_NE(why.find("less than the 0.03 s asked for"), std::string::npos) << why;
+  EXPECT_FALSE(find_reference(files_.path("none.exr"), identity(), job_.scene.film, 0, why));
+  EXPECT_EQ(why, "");
+}
+
+}  // namespace
+}  // namespace limn

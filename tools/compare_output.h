@@ -1,0 +1,32 @@
+#pragma once
+// What `limn compare` leaves behind: pictures, images, figures, a table.
+#include <map>
+#include <string>
+#include <vector>
+
+#include "limn/core/scene.h"
+#include "limn/integrators/compare.h"
+#include "limn/integrators/render.h"
+
+namespace limn {
+
+// All of a comparison, with what a reader needs to repeat it.
+struct Comparison {
+  std::string command;
+  std::map<std::string, std::string> defines;
+  std::string parameter, unit, terms;
+  uint64_t seed = 0;
+  int threads = 1;
+  CompareOptions options;
+  RenderResult image;  // the plain rendering; no samples if interrupted
+  Reference reference;
+  std::string reference_file;
+  std::vector<ComparedMethod> methods;
+};
+
+// Writes everything but the reference's EXRs into the folder, which exists.
+void write_comparison(const std::string& folder, const Scene& scene, const Comparison& comparison);
+// Of the longest rung.
+void print_comparison(const Comparison& comparison);
+
+}  // namespace limn
