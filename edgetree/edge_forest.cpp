@@ -6,6 +6,7 @@
 
 #include "forest_build.h"
 #include "forest_query.h"
+#include "forest_rejection.h"
 #include "samplers.h"
 #include "seen_edge.h"
 
@@ -216,6 +217,10 @@ double EdgeForest::pdf_t(const EdgeQuery& query, EdgeId id, double t) const {
       Impl::seen_edge(LtcLobe(query.lobe, query.n, query.wi), query.p,
                       impl_->forest.edges[slot / kWidth], static_cast<int>(slot % kWidth));
   return edge.is_seen() ? edge.pdf_t(t) : 0;
+}
+
+std::unique_ptr<RejectionTree> EdgeForest::rejection_tree() const {
+  return make_forest_rejection_tree(impl_->forest);
 }
 
 uint64_t EdgeForest::list_silhouettes(const Vec3d& p, std::vector<EdgeId>& edges) const {

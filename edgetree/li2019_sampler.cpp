@@ -69,6 +69,18 @@ bool meets_sphere(const Box& box, const Vec3d& center, double radius) {
   return nearest <= radius * radius + slack && farthest >= radius * radius - slack;
 }
 
+// The planes through p, as Hough points.
+struct PlaneSphere {
+  Vec3d center;
+  double radius;
+
+  PlaneSphere(const Vec3d& p, const Vec3d& origin)
+      : center((p + origin) * 0.5), radius(0.5 * length(p - origin)) {}
+  bool rejects(const Node& node) const {
+    return !node.always && !meets_sphere(node.planes, center, radius);
+  }
+};
+
 // Largest z / |w| over the axis-aligned box around eight corners; z grows with the cosine, x and y
 // with the distance.
 double largest_cosine(const std::array<Vec3d, 8>& corners) {
@@ -86,18 +98,13 @@ struct Descent {
   const EdgeQuery& query;
   LtcLobe lobe;
   Frame frame;
-  Vec3d sphere_center;
-  double sphere_radius;
+  PlaneSphere sphere;
 
   Descent(const EdgeQuery& q, const Vec3d& origin)
-      : query(q),
-        lobe(q.lobe, q.n, q.wi),
-        frame(q.n),
-        sphere_center((q.p + origin) * 0.5),
-        sphere_radius(0.5 * length(q.p - origin)) {}
+      : query(q), lobe(q.lobe, q.n, q.wi), frame(q.n), sphere(q.p, origin) {}
 
   double importance(const Node& node) const {
-    if (!node.always && !meets_sphere(node.planes, sphere_center, sphere_radius)) return 0;
+    if (sphere.rejects(node)) return 0;
     std::array<Vec3d, 8> transformed;
     std::array<Vec3d, 8> plain;
     for (int i = 0; i < 8; ++i) {
@@ -114,6 +121,39 @@ struct Descent {
     const double distance = std::max(limn::length(node.positions.center() - query.p), size);
     return node.length * (cosine + 0.01 * plain_cosine) / distance;
   }
+};
+
+// The nodes but for the root, which no choice leads to.
+class Li2019RejectionTree final : public RejectionTree {
+ public:
+  Li2019RejectionTree(const std::vector<Node>& nodes, const std::vector<Item>& items,
+                      const Vec3d& origin)
+      : tree_(nodes), origin_(origin), first_(nodes.size() > 1 ? 1 : 0) {
+    for (const Item& item : items) edges_.push_back(item.id);
+    std::vector<uint32_t> open;  // nodes around the next one, outermost first
+    for (uint32_t i = first_; i < tree_.size(); ++i) {
+      while (!open.empty() && nodes_[open.back()].end <= tree_[i].begin) close(open);
+      const uint32_t parent = open.empty() ? kNoNode : open.back();
+      const auto depth = static_cast<uint32_t>(open.size() + 1);
+      open.push_back(static_cast<uint32_t>(nodes_.size()));
+      nodes_.push_back({parent, 0, depth, tree_[i].begin, tree_[i].end});
+    }
+    while (!open.empty()) close(open);
+  }
+
+  bool rejects(uint32_t node, const Vec3d& p) const override {
+    return PlaneSphere(p, origin_).rejects(tree_[node + first_]);
+  }
+
+ private:
+  void close(std::vector<uint32_t>& open) {
+    nodes_[open.back()].after = static_cast<uint32_t>(nodes_.size());
+    open.pop_back();
+  }
+
+  const std::vector<Node>& tree_;
+  Vec3d origin_;
+  uint32_t first_;
 };
 
 class Li2019Sampler final : public EdgeSampler {
@@ -183,6 +223,10 @@ class Li2019Sampler final : public EdgeSampler {
 
   double pdf_t(const EdgeQuery& query, EdgeId id, double t) const override {
     return transformed_edge(Descent(query, origin_), id).pdf_t(t);
+  }
+
+  std::unique_ptr<RejectionTree> rejection_tree() const override {
+    return std::make_unique<Li2019RejectionTree>(nodes_, items_, origin_);
   }
 
  private:

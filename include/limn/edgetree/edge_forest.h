@@ -43,6 +43,7 @@ class EdgeForest final : public EdgeSampler {
   bool sample(const EdgeQuery& query, Rng& rng, EdgeSample& sample) const override;
   double probability(const EdgeQuery& query, EdgeId edge) const override;
   double pdf_t(const EdgeQuery& query, EdgeId edge, double t) const override;
+  std::unique_ptr<RejectionTree> rejection_tree() const override;
 
   // All of E(p), without regard to occlusion, horizon or motion, in the order of the trees. Appends
   // and returns the number of nodes (of up to eight children) that were tested.

@@ -12,6 +12,7 @@
 #include "limn/core/rng.h"
 #include "limn/edgetree/edges.h"
 #include "limn/edgetree/radiance_pyramid.h"
+#include "limn/edgetree/rejection_tree.h"
 
 namespace limn {
 
@@ -74,6 +75,10 @@ class EdgeSampler {
   virtual double probability(const EdgeQuery& query, EdgeId edge) const = 0;
   // Density of t given the edge.
   virtual double pdf_t(const EdgeQuery& query, EdgeId edge, double t) const = 0;
+
+  // The tree whose nodes this sampler rejects, for looking at; null if it rejects none. The sampler
+  // must outlive it.
+  virtual std::unique_ptr<RejectionTree> rejection_tree() const { return nullptr; }
 };
 
 // One row per sampler; tests and comparisons loop over them.
