@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "command_reject.h"
 #include "commands.h"
 #include "limn/core/error.h"
 #include "limn/edgetree/edge_sampler.h"
@@ -14,21 +15,24 @@ using limn::CommonOptions;
 using limn::CompareCommand;
 using limn::GradientCommand;
 
-void add_common(CLI::App& command, CommonOptions& common, std::vector<std::string>& defines) {
-  command.add_option("scene", common.scene, "Scene file (Mitsuba 3 XML)")
-      ->required()
-      ->type_name("SCENE");
+void add_input(CLI::App& command, CommonOptions& common, std::vector<std::string>& defines,
+               const std::string& text, const std::string& type) {
+  command.add_option("scene", common.scene, text)->required()->type_name(type);
   command.add_option("-D", defines, "Value of a $name in the scene")
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false);
-  command.add_option("--spp", common.spp, "Samples per pixel (default: the scene's)")
-      ->check(CLI::Range(1, 1 << 30));
   command.add_option("--seed", common.seed, "Seed of all random numbers (default: the scene's)")
       ->check(CLI::NonNegativeNumber);
   command.add_option("--threads", common.threads, "Threads (default: all cores)")
       ->check(CLI::Range(1, 4096));
-  command.add_option("--json", common.json, "Write the figures for machines to this file");
   command.add_flag("--quiet", common.quiet, "Print nothing but errors and warnings");
+}
+
+void add_common(CLI::App& command, CommonOptions& common, std::vector<std::string>& defines) {
+  add_input(command, common, defines, "Scene file (Mitsuba 3 XML)", "SCENE");
+  command.add_option("--spp", common.spp, "Samples per pixel (default: the scene's)")
+      ->check(CLI::Range(1, 1 << 30));
+  command.add_option("--json", common.json, "Write the figures for machines to this file");
   command
       .add_option("--shading", common.shading,
                   "How interpolated normals shade: continuous, or as Mitsuba does (its jumps are "
@@ -171,6 +175,11 @@ int run(int argc, char** argv) {
   CompareCommand comparison;
   add_common(*compare, common, defines);
   add_compare_options(*compare, comparison);
+  CLI::App* reject = app.add_subcommand(
+      "reject", "Pictures and figures of what edge samplers reject, accept and wrongly accept");
+  limn::RejectCommand rejection;
+  add_input(*reject, common, defines, "Scene file, or a mesh (.obj, .ply)", "SCENE|MESH");
+  limn::add_reject_options(*reject, rejection);
 
   try {
     app.parse(argc, argv);
@@ -178,13 +187,12 @@ int run(int argc, char** argv) {
     return app.exit(error) == 0 ? limn::kSuccess : limn::kBadInput;
   }
   common.defines = parse_defines(defines);
+  comparison.command_line = rejection.command_line = command_line(argc, argv);
   if (info->parsed()) return limn::run_info(common);
   if (render->parsed()) return limn::run_render(common, command.output);
   if (gradient->parsed()) return limn::run_gradient(common, command);
-  if (compare->parsed()) {
-    comparison.command_line = command_line(argc, argv);
-    return limn::run_compare(common, comparison);
-  }
+  if (compare->parsed()) return limn::run_compare(common, comparison);
+  if (reject->parsed()) return limn::run_reject(common, rejection);
   return limn::run_check(common, command);
 }
 

@@ -209,6 +209,69 @@ TEST_F(Program, NonFiniteSamplesAreAnError) {
   EXPECT_TRUE(std::filesystem::exists(out()));
 }
 
+nlohmann::json read_json(const std::string& file) {
+  std::ifstream stream(file);
+  return nlohmann::json::parse(stream);
+}
+
+TEST_F(Program, ShowsRejection) {
+  const std::string mesh = write_mesh(files_, "ball.obj", torus_mesh(16, 8));
+  const std::string folder = files_.path("rejection");
+  const Outcome outcome =
+      run("reject " + mesh + " --no-report --size 32 --points 8 --node-edges 40 -o " + folder);
+  EXPECT_EQ(outcome.status, 0) << outcome.text;
+  EXPECT_NE(outcome.text.find("hit rate"), std::string::npos) << outcome.text;
+  const nlohmann::json report = read_json(folder + "/reject.json");
+  EXPECT_EQ(report["kind"], "reject");
+  EXPECT_EQ(report["edges"], 3 * 16 * 8);
+  EXPECT_EQ(report["variants"].size(), 4u);
+  EXPECT_TRUE(std::filesystem::exists(folder + "/reject.csv"));
+  std::vector<std::string> pictures = {report["overview"]};
+  for (const auto& variant : report["variants"]) {
+    pictures.push_back(variant["edges_picture"]);
+    EXPECT_EQ(variant["reachable_edges"],
+              variant["silhouettes"].get<int>() + variant["false_accepts"].get<int>());
+    EXPECT_EQ(variant["slices"].size(), 2u);
+    for (const auto& slice : variant["slices"]) {
+      pictures.push_back(slice["picture"]);
+      EXPECT_EQ(slice["points"], 32 * 32);
+      EXPECT_EQ(slice["missed"], 0);
+    }
+  }
+  for (const std::string& picture : pictures)
+    EXPECT_GT(std::filesystem::file_size(folder + "/" + picture), 100u) << picture;
+}
+
+TEST_F(Program, ShowsRejectionInAScene) {
+  const std::string folder = files_.path("rejection");
+  const std::string reject = "reject " + scene_ +
+                             " --no-report --quiet --methods forest --size 16 --points 4 -o " +
+                             folder;
+  const Outcome outcome = run(reject + " --shape screen --point 0,3,0 --view 1,0.2,0 --node 0");
+  EXPECT_EQ(outcome.status, 0) << outcome.text;
+  EXPECT_EQ(outcome.text, "");
+  EXPECT_EQ(read_json(folder + "/reject.json")["shape"], "screen");
+  EXPECT_NE(refused(reject + " --shape scren")
+                .find("no shape has the id \"scren\" (known: floor, "
+                      "screen, lamp)"),
+            std::string::npos);
+  EXPECT_NE(refused(reject + " --node 4000").find("--node 4000: forest has nodes 0 to"),
+            std::string::npos);
+  EXPECT_NE(refused(reject + " --view 1,2").find("--view"), std::string::npos);
+  EXPECT_NE(refused(reject + " --up 0,0,0").find("--up: a direction cannot be 0,0,0"),
+            std::string::npos);
+  EXPECT_NE(refused(reject + " --point 0,nan,0").find("--point: must be finite"),
+            std::string::npos);
+  EXPECT_NE(refused(reject + " --methods forest,brute")
+                .find("\"brute\" is no sampler with a rejection test (those "
+                      "are forest, li2019,"),
+            std::string::npos);
+  EXPECT_EQ(refused("reject no/such.ply -o " + folder),
+            "no/such.ply: error: cannot read the file\n");
+  EXPECT_NE(refused("reject " + scene_ + " -o /proc/no/such").find("/proc/no/such"),
+            std::string::npos);
+}
+
 TEST_F(Program, MissingSceneAndHelp) {
   EXPECT_EQ(refused("info no/such.xml"), "no/such.xml: error: cannot read the file\n");
   EXPECT_EQ(run("--help").status, 0);
