@@ -84,7 +84,7 @@ def comparison(folder, scene, parameter, times, methods):
     y, x = np.mgrid[0:SIZE, 0:SIZE] / SIZE
     write_png(os.path.join(folder, "image.png"), np.stack([x, y, 1 - x], axis=-1))
     write_png(os.path.join(folder, "reference.png"), signed(derivative()))
-    made = [absent(**m) if "message" in m and "error" not in m else method(folder, random=random, times=times, **m)
+    made = [absent(**m) if "error" not in m else method(folder, random=random, times=times, **m)
             for m in methods]
     data = {"kind": "compare", "command": f"limn compare {scene} --wrt {parameter} --methods forest,fd --time 8 --sweep",
             "scene": scene, "defines": {"alpha": "0.05", "width": SIZE}, "parameter": parameter, "unit": "scene units",
@@ -114,7 +114,7 @@ def variant(folder, name, hit_rate, wrong, missed=0):
         slices.append({"picture": f"{name}_slice_{i}.png", "true_reject": 1500, "true_accept": 400,
                        "false_accept": int(2000 * wrong), "missed": missed, "points": 1900 + int(2000 * wrong) + missed})
     slice_picture(os.path.join(folder, f"{name}_edges.png"), 0.1, 0.15)
-    depths = [{"depth": d, "nodes_tested": 4**d, "accepted": 1 + 2**d, "false_accepts": int(wrong * 2**d)}
+    depths = [{"depth": d, "nodes_tested": 4**d, "accepted": 2**d, "false_accepts": int(wrong * 2**d)}
               for d in range(7)]
     return {"name": name, "description": f"about {name}", "slices": slices, "edges_picture": f"{name}_edges.png",
             "reachable_edges": int(900 * (1 + wrong)), "silhouettes": 700, "false_accepts": int(900 * wrong),

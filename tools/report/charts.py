@@ -18,8 +18,8 @@ except ImportError as missing:
 else:
     MISSING = None
 
-TEXT, GRID, FAINT, ON_BAR = "#a2005e", "#a2015e", "#a2025e", "#a2035e"
-PAGE = {TEXT: "currentColor", GRID: "var(--grid)", FAINT: "var(--faint)", ON_BAR: "var(--page)"}
+TEXT, GRID, FAINT = "#a2005e", "#a2015e", "#a2025e"
+PAGE = {TEXT: "currentColor", GRID: "var(--grid)", FAINT: "var(--faint)"}
 STYLE = {"svg.fonttype": "none", "svg.hashsalt": "limn", "font.family": "DejaVu Sans", "font.size": 10,
          "text.color": TEXT, "axes.edgecolor": FAINT, "axes.labelcolor": TEXT, "axes.titlesize": 11,
          "xtick.color": FAINT, "ytick.color": FAINT, "xtick.labelcolor": TEXT, "ytick.labelcolor": TEXT,
@@ -213,13 +213,12 @@ def hit_rates(rows, palette):
         for y, (name, rate, error) in enumerate(rows):
             panel.barh(y, 100 * rate, height=0.62, color=palette.ink(name), alpha=0.85,
                        xerr=100 * (error or 0), ecolor=TEXT)
-            inside = rate > 0.8
-            panel.annotate(f"{100 * rate:.1f} %", (0 if inside else 100 * (rate + (error or 0)), y),
-                           (6, 0), textcoords="offset points", va="center",
-                           color=ON_BAR if inside else TEXT)
+            panel.annotate(f"{100 * rate:.1f} %", (100 * (rate + (error or 0)), y), (6, 0),
+                           textcoords="offset points", va="center")
         panel.set_yticks(range(len(rows)), [name for name, _, _ in rows])
         panel.tick_params(axis="y", length=0)
-        panel.set_xlim(0, 100)
+        panel.set_xlim(0, 118)  # Room for the figure beside a full bar.
+        panel.set_xticks(range(0, 101, 20))
         panel.invert_yaxis()
         panel.grid(axis="y", visible=False)
         panel.set_xlabel("descents that end on a silhouette, %")
