@@ -270,8 +270,9 @@ class Renderer:
                 "message": f"prb_projective, octree guiding, {VARIANT}; compilation of {compilation:.1f} s not counted"}
 
 
-def write(mi, image, file):
+def write(mi, dr, image, file):
     import numpy as np
+    dr.set_thread_count(2)  # With one thread, Bitmap.write of Mitsuba 3.9.1 waits for itself for ever.
     try:
         mi.Bitmap(image.astype(np.float32), pixel_format=mi.Bitmap.PixelFormat.RGB).write(file)
     except RuntimeError as error:
@@ -283,8 +284,8 @@ def run(arguments):
     mi, dr = load_mitsuba(arguments.threads)
     renderer = Renderer(mi, dr, arguments)
     setup = renderer.render_samples(arguments.spp) if arguments.spp else renderer.render_for(arguments.time)
-    write(mi, renderer.image(), arguments.output)
     figures = renderer.figures(setup, mi.__version__)
+    write(mi, dr, renderer.image(), arguments.output)
     if arguments.json:
         with open(arguments.json, "w", encoding="utf-8") as stream:
             json.dump(figures, stream, indent=2)
