@@ -18,9 +18,12 @@ OTHERS = [("#0e7f90", "#4fd3e6", "X"), ("#6a7400", "#c8d53d", "<"), ("#8a4b2a", 
 SHADES = {"interior": ("#3f8fb5", "#5fb3da"), "camera": ("#d9a441", "#e5b95f"),
           "boundary": ("#8c5a9e", "#b584c8"), "rest": ("#b8bec6", "#59616b")}
 
-# Of the pictures that `limn reject` draws; equal in both modes because the pictures are.
+# Of the pictures that `limn reject` draws, unless its file names others; equal in both modes because the pictures are.
 SLICES = {"true_reject": ("true reject", "#d9d9d9"), "true_accept": ("true accept", "#2f6fb7"),
           "false_accept": ("false accept", "#f28e2b"), "missed": ("missed", "#d6006e")}
+EDGES = {"edge_silhouette": ("silhouettes", "#2f6fb7"), "edge_false_accept": ("reachable in vain", "#f28e2b"),
+         "edge_dead_end": ("of dead ends", "#f8d3a6"), "node": ("of the chosen node", "#b3261e"),
+         "point": ("shading point", "#202020")}
 
 
 class Palette:

@@ -62,7 +62,7 @@ class ComparisonSection:
     def _what(self):
         data, reference = self.data, self.data.record("reference")
         unit = SINGULAR.get(data.text("unit"), data.text("unit"))
-        times_text = ", ".join(f"{t:g}" for t in data.numbers("times"))
+        times_text = ", ".join(f"{t:.3g}" for t in data.numbers("times"))
         repeats = data.number("repeats")
         kept = " (kept from an earlier run)" if reference.flag("cached", False) else ""
         return element(
@@ -100,12 +100,12 @@ class ComparisonSection:
         behind = f"{self.group}-reference"
         self.styles.append(flip_style(behind, self.pictures.uri(reference.text("picture"))))
         unit = f"radiance per {SINGULAR.get(data.text('unit'), data.text('unit'))}"
+        plain = figure(self.pictures.picture(data.text("image"), f"plain rendering of {self.title}"),
+                       "the picture itself") if data.text("image") else None
         cards = [element("div", element("h4", "reference"), figure(
             self.pictures.picture(reference.text("picture"), f"reference derivative of {self.title}"),
-            f"{reference.text('sampler')}, {count(reference.number('spp'))} spp"),
-            figure(self.pictures.picture(data.text("image"), f"plain rendering of {self.title}"),
-                   "the picture itself"), class_="card")]
-        cards += [self._card(m, behind) for m in self.methods if m.text("status") != "missing"]
+            f"{reference.text('sampler')}, {count(reference.number('spp'))} spp"), plain, class_="card")]
+        cards += [self._card(m, behind) for m in self.methods if m.text("picture")]
         bars = element("div", colour_bar(data.number("scale"), unit, "Derivative"),
                        colour_bar(data.number("error_scale"), unit, "Error: method − reference"),
                        class_="bars")

@@ -75,12 +75,12 @@ class Overview:
             rows.append([label, *(self._time_cell(by_name.get(m), ratios.get(m), m == best) for m in methods)])
         note = element("p", "× 5 means: needs five times the time for the same mean squared error. Shaded: the best of its "
                             "line. ⚠ biased: differs from the reference by more than chance explains, so its error "
-                            "will not go on falling. ✕: no figure, for the reason given.", class_="hint")
+                            "will not go on falling. ✕: no figure, for the reason given. –: not run.", class_="hint")
         return join(table(["scene, parameter", *methods], rows, f"Time for equal error, {BASELINE} = 1"), note)
 
     def _time_cell(self, method, ratio, best):
         if method is None:
-            return element("td", "not run", class_="muted")
+            return element("td", "–", class_="muted")
         status = method.text("status")
         if status == "missing" or not finished(method):
             return element("td", f"✕ {status}", class_="bad", title=method.text("message", ""))
@@ -102,17 +102,17 @@ class Overview:
             cells = [self._slope_cell(by_name.get(m)) for m in methods]
             rows.append([self._link(identifier, self._label(result.data)), *cells])
         note = element("p", "Of log error over log time, ± one standard error. −1: the error falls as one over time, as an "
-                            "unbiased method's does. Nearer to 0: held up by bias, by set-up time, or by rare large "
-                            "errors that have not been met yet.", class_="hint")
+                            "unbiased method's does. ⚠ flatter, by more than three standard errors: held up by bias, or by "
+                            "rare large errors. Steeper: set-up took much of the short times.", class_="hint")
         return join(table(["scene, parameter", *methods], rows, "Slopes of error against time"), note)
 
     def _slope_cell(self, method):
         slope = method.record_or_none("slope") if method is not None else None
         if slope is None or slope.number("value") is None:
             return "–"
-        text = with_error(slope.number("value"), slope.number("stderr"))
-        far = slope.number("stderr") and abs(slope.number("value") + 1) > 3 * slope.number("stderr")
-        return element("td", text, element("span", " ⚠ not −1", class_="bad") if far else None)
+        value, error = slope.number("value"), slope.number("stderr")
+        flat = error and value + 1 > 3 * error
+        return element("td", with_error(value, error), element("span", " ⚠ flatter", class_="bad") if flat else None)
 
     def _hits(self):
         variants = list(dict.fromkeys(v.text("name") for result, _, _ in self.rejections

@@ -66,8 +66,12 @@ def _contents(sections, overview):
                                           for group, title in links)), aria_label="Contents")
 
 
-def _title(sections):
-    return f"limn: {sections[0].title}" if len(sections) == 1 else f"limn: {len(sections)} comparisons"
+def _title(results, sections):
+    if len(sections) == 1:
+        return f"limn: {sections[0].title}"
+    counts = [(sum(r.kind == kind for r in results), word)
+              for kind, word in (("compare", "comparison"), ("reject", "rejection test"))]
+    return "limn: " + ", ".join(f"{n} {word}{'' if n == 1 else 's'}" for n, word in counts if n)
 
 
 def page(results):
@@ -83,7 +87,7 @@ def page(results):
         parts.insert(0, Overview([entry for entry in listed if entry[0].kind == "compare"],
                                  [entry for entry in listed if entry[0].kind == "reject"],
                                  palette, threshold).html())
-    title = _title(sections)
+    title = _title(results, sections)
     style = join(Markup(_style(palette)), *(rule for s in sections for rule in s.styles))
     head = element("head", element("meta", charset="utf-8"),
                    element("meta", http_equiv="Content-Security-Policy", content=POLICY),

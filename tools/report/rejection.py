@@ -2,7 +2,7 @@
 import os
 
 from . import charts
-from .colours import SLICES
+from .colours import EDGES, SLICES
 from .markup import count, element, join, percent, table
 from .pictures import Pictures, figure, missing_notice, size_choice
 
@@ -24,7 +24,7 @@ class RejectionSection:
         self.styles = []
 
     def html(self):
-        parts = [element("h2", self.title), self._what(), self._missed(), self._gallery(),
+        parts = [element("h2", self.title), self._what(), self._missed(), self._interrupted(), self._gallery(),
                  element("h3", "Hit rates"), self._hit_chart(), self._rates(),
                  element("h3", "False accepts by depth"), self._depth_chart(), self._depth_table(),
                  element("h3", "Settings"), self._command()]
@@ -40,20 +40,34 @@ class RejectionSection:
                             "them asks the node's rejection test, and brute force knows the answer.")
 
     def _missed(self):
-        """A silhouette that a test loses is a bug of the program, whatever else the report says."""
-        wrong = [f"{v.text('name')}: {sum(s.number('missed') or 0 for s in v.records('slices'))} points"
-                 for v in self.variants if any(s.number("missed") for s in v.records("slices"))]
+        """A silhouette that a test loses is a bug of the program, whatever else the report says. "missed" of a variant, where
+        it is given, counts those of its descents too."""
+        lost = {v.text("name"): v.number("missed") if v.has("missed") else
+                sum(s.number("missed") or 0 for s in v.records("slices")) for v in self.variants}
+        wrong = [f"{name}: {times} times" for name, times in lost.items() if times]
         if not wrong:
             return None
         return element("div", element("strong", "⚠ Silhouettes were missed. "), "This is a bug, and gradients are "
                        "biased by it: " + "; ".join(wrong) + ".", class_="notice danger")
 
+    def _interrupted(self):
+        if self.data.text("status", "done") == "done":
+            return None
+        return element("div", element("strong", f"{self.data.text('status')}. "), "Only what was finished is shown.",
+                       class_="notice")
+
     def _gallery(self):
-        legend = [element("span", element("span", class_="swatch", style=f"background:{colour}"), f" {label}  ")
-                  for label, colour in SLICES.values()]
         cards = [self._overview_card()] + [self._card(v) for v in self.variants]
-        return element("div", size_choice(self.group), element("p", *legend, class_="legend"),
-                       element("div", *cards, class_="cards"), class_="gallery")
+        return element("div", size_choice(self.group), self._legend("Slices", SLICES), self._legend("Edges", EDGES),
+                       element("div", *cards, class_="cards"), class_="gallery wide")
+
+    def _legend(self, title, names):
+        """The colours that the program says it drew with."""
+        said = self.data.record_or_none("colors")
+        entries = [element("span", element("span", class_="swatch", style=f"background:{colour}"), f" {label}  ")
+                   for label, colour in ((label, said.text(key, colour) if said else colour)
+                                         for key, (label, colour) in names.items())]
+        return element("p", f"{title}:  ", *entries, class_="legend")
 
     def _overview_card(self):
         picture = self.pictures.picture(self.data.text("overview"), "the mesh, the chosen node and the slices in space")
