@@ -157,7 +157,7 @@ def _draw_methods(panel, data, key, palette):
 
 def _time_and_error_axes(panels, points, floor):
     """Logarithmic, around all points with some air, and a factor of 4 at least."""
-    values = [[t for t, _, _ in points] or [1], [e for _, e, _ in points] or [1]]
+    values = [[t for t, _, _ in points] or [1], [v for _, e, d in points for v in (e, e + d)] or [1]]
     if floor and floor > 0:
         values[1].append(floor)
     for axis, (low, high) in zip(("x", "y"), ((min(v), max(v)) for v in values)):

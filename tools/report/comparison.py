@@ -209,7 +209,8 @@ class ComparisonSection:
         rows += [[f"-D {key}", value] for key, value in data.record("defines").items()]
         rows.append(["reference", f"{reference.text('file')}, seed {reference.number('seed')}"])
         for method in self.methods:
-            settings = ", ".join(f"{key} {value}" for key, value in method.record("settings").items())
+            settings = ", ".join(f"{key.replace('_', ' ')} {figures(value) if isinstance(value, float) else value}"
+                                 for key, value in method.record("settings").items())
             about = "; ".join(t for t in (method.text("description", ""), settings) if t)
             rows.append([self._name(method), about or "–"])
         return table(["setting", "value"], rows, f"Settings, {self.title}", class_="settings")
