@@ -4,14 +4,18 @@
     tools/report.py FOLDER             writes FOLDER/report.html
     tools/report.py FOLDER... -o FILE  all of them in one page, an overview first
 
-Pictures and charts are within the page: it opens from disk and needs no network. The charts need matplotlib
-(Debian: python3-matplotlib). Exit status: 0 written, 2 bad input, 3 matplotlib is missing.
+Pictures and charts are within the page: it opens from disk and needs no network. The charts need
+matplotlib (Debian: python3-matplotlib). Exit status: 0 written, 2 bad input, 3 matplotlib is
+missing.
 """
+
 import argparse
 import os
 import sys
 
-SYSTEM_PYTHON = "/usr/bin/python3"  # Where Debian's matplotlib is, when another python3 comes first.
+SYSTEM_PYTHON = (  # Where Debian's matplotlib is, when another python3 comes first.
+    "/usr/bin/python3"
+)
 
 
 def use_a_python_with_matplotlib():
@@ -26,6 +30,7 @@ def use_a_python_with_matplotlib():
 
 def write(file, text):
     from report.errors import ReportError
+
     try:
         with open(file, "w", encoding="utf-8") as stream:
             stream.write(text)
@@ -38,6 +43,7 @@ def run(arguments):
     from report.errors import ReportError
     from report.page import page
     from report.records import read_folder
+
     try:
         results = [result for folder in arguments.folders for result in read_folder(folder)]
     except ReportError as error:
@@ -47,7 +53,9 @@ def run(arguments):
     except ReportError as error:
         return fail(error, 3)
     one = len(arguments.folders) == 1
-    file = arguments.output or (os.path.join(arguments.folders[0], "report.html") if one else "report.html")
+    file = arguments.output or (
+        os.path.join(arguments.folders[0], "report.html") if one else "report.html"
+    )
     try:
         text, missing = page(results)
         write(file, text)
@@ -65,10 +73,18 @@ def fail(error, status):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folders", nargs="+", metavar="FOLDER", help="where compare.json or reject.json lies")
-    parser.add_argument("-o", "--output", metavar="FILE", help="the page (default: FOLDER/report.html, or report.html for "
-                                                               "several folders)")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "folders", nargs="+", metavar="FOLDER", help="where compare.json or reject.json lies"
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="FILE",
+        help="the page (default: FOLDER/report.html, or report.html for several folders)",
+    )
     arguments = parser.parse_args()
     use_a_python_with_matplotlib()
     return run(arguments)

@@ -1,4 +1,5 @@
 """Ends a test as skipped, with the reason, where something that it needs is not installed."""
+
 import sys
 
 from browser import find_browser

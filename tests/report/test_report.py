@@ -1,4 +1,5 @@
 """tools/report.py on sample folders: what the page says, and what is said of faulty input."""
+
 import json
 import os
 import re
@@ -21,8 +22,12 @@ from report.records import read_folder  # noqa: E402
 
 
 def run(*arguments, **environment):
-    return subprocess.run([sys.executable, REPORT, *arguments], capture_output=True, text=True,
-                          env={**os.environ, **environment})
+    return subprocess.run(
+        [sys.executable, REPORT, *arguments],
+        capture_output=True,
+        text=True,
+        env={**os.environ, **environment},
+    )
 
 
 def section(page, title):
@@ -32,21 +37,32 @@ def section(page, title):
 
 class TestMarkup(unittest.TestCase):
     def test_numbers(self):
-        self.assertEqual([figures(v) for v in (None, 0, 1.234567, 12345, -0.01234, 1.234e-7, 2e9)],
-                         ["–", "0", "1.23", "12\u2009345", "−0.0123", "1.23×10⁻⁷", "2.00×10⁹"])
+        self.assertEqual(
+            [figures(v) for v in (None, 0, 1.234567, 12345, -0.01234, 1.234e-7, 2e9)],
+            ["–", "0", "1.23", "12\u2009345", "−0.0123", "1.23×10⁻⁷", "2.00×10⁹"],
+        )
 
     def test_errors_have_two_figures_at_most(self):
         pm = "\u00a0±\u00a0"
-        self.assertEqual([with_error(*v) for v in ((1.2345, 0.0412), (123.4, 56.7), (2e-6, 3e-7), (0.5, None), (1, 0))],
-                         [f"1.23{pm}0.04", f"123{pm}57", f"(2.00{pm}0.30)×10⁻⁶", "0.500", "1.00"])
+        self.assertEqual(
+            [
+                with_error(*v)
+                for v in ((1.2345, 0.0412), (123.4, 56.7), (2e-6, 3e-7), (0.5, None), (1, 0))
+            ],
+            [f"1.23{pm}0.04", f"123{pm}57", f"(2.00{pm}0.30)×10⁻⁶", "0.500", "1.00"],
+        )
 
     def test_counts_and_shares(self):
-        self.assertEqual([count(v) for v in (12, 12345, 2.5e6, 3e9)], ["12", "12.3 k", "2.5 M", "3 G"])
+        self.assertEqual(
+            [count(v) for v in (12, 12345, 2.5e6, 3e9)], ["12", "12.3 k", "2.5 M", "3 G"]
+        )
         self.assertEqual([percent(v) for v in (0.5, 0, None)], ["50 %", "0 %", "–"])
 
     def test_text_is_escaped(self):
-        self.assertEqual(element("td", '<b> & "', title='"<'),
-                         '<td title="&quot;&lt;">&lt;b&gt; &amp; &quot;</td>')
+        self.assertEqual(
+            element("td", '<b> & "', title='"<'),
+            '<td title="&quot;&lt;">&lt;b&gt; &amp; &quot;</td>',
+        )
 
 
 class TestReport(unittest.TestCase):
@@ -77,18 +93,26 @@ class TestReport(unittest.TestCase):
     def test_nothing_points_outside(self):
         self.assertEqual(re.findall(r"(?:https?|file):[^\s\"<]*", self.page), [])
         sources = re.findall(r"(?:src=\"|url\()([^\")]{0,22})", self.page)
-        self.assertEqual([s for s in sources if not s.startswith(("data:image/png;base64,", "#"))], [])
+        self.assertEqual(
+            [s for s in sources if not s.startswith(("data:image/png;base64,", "#"))], []
+        )
         self.assertNotIn("<script", self.page)
 
     def test_only_the_biased_method_is_marked(self):
         times = section(self.page, "Time for equal error")
         self.assertEqual(times.count("⚠ biased</span>"), 1)
         row = section(self.page, "At the longest time")
-        marked = re.findall(r"<tr><th[^>]*><span.*?</span>([^<]*)</span>(?:(?!</tr>).)*implausible", row, re.S)
+        marked = re.findall(
+            r"<tr><th[^>]*><span.*?</span>([^<]*)</span>(?:(?!</tr>).)*implausible", row, re.S
+        )
         self.assertEqual(marked, ["fd"])
 
     def test_missing_and_interrupted_methods_say_why(self):
-        self.assertIn("<strong>mitsuba: missing. </strong>Mitsuba is not installed: pip install mitsuba==3.9.1", self.page)
+        self.assertIn(
+            "<strong>mitsuba: missing. </strong>Mitsuba is not installed: pip install"
+            " mitsuba==3.9.1",
+            self.page,
+        )
         self.assertIn("<strong>brute: interrupted. </strong>Ctrl-C after one repeat", self.page)
 
     def test_times_are_relative_to_the_forest(self):
@@ -104,8 +128,11 @@ class TestReport(unittest.TestCase):
         self.assertEqual(section(self.page, "Slopes").count("⚠ flatter</span>"), 1)
 
     def test_the_command_is_there(self):
-        self.assertIn("limn compare scenes/mirror.xml --wrt object.translate.y --methods forest,fd --time 8 --sweep",
-                      self.page)
+        self.assertIn(
+            "limn compare scenes/mirror.xml --wrt object.translate.y --methods forest,fd --time 8"
+            " --sweep",
+            self.page,
+        )
 
     def test_the_same_input_gives_the_same_page(self):
         again = os.path.join(self.temporary.name, "again.html")
@@ -118,8 +145,11 @@ class TestReport(unittest.TestCase):
         rejection(folder, "meshes/bunny.ply", missed=3)
         self.assertEqual(run(folder).returncode, 0)
         with open(os.path.join(folder, "report.html"), encoding="utf-8") as stream:
-            self.assertIn("Silhouettes were missed. </strong>This is a bug, and gradients are biased by it: "
-                          "li2019: 6 times.", stream.read())
+            self.assertIn(
+                "Silhouettes were missed. </strong>This is a bug, and gradients are biased by it: "
+                "li2019: 6 times.",
+                stream.read(),
+            )
         self.assertNotIn("Silhouettes were missed", self.page)
 
     def test_missing_pictures_are_named(self):
@@ -131,9 +161,14 @@ class TestReport(unittest.TestCase):
         done = run(folder)
         self.assertEqual(done.returncode, 0)
         self.assertIn(f"picture missing: {folder}/forest.png: the file is cut off", done.stderr)
-        self.assertIn(f"picture missing: {folder}/fd_error.png: no such file or directory", done.stderr)
+        self.assertIn(
+            f"picture missing: {folder}/fd_error.png: no such file or directory", done.stderr
+        )
         with open(os.path.join(folder, "report.html"), encoding="utf-8") as stream:
-            self.assertIn(f"<li><code>{folder}/reference.png: no such file or directory</code></li>", stream.read())
+            self.assertIn(
+                f"<li><code>{folder}/reference.png: no such file or directory</code></li>",
+                stream.read(),
+            )
 
     def fails(self, status, message, *arguments, **environment):
         done = run(*arguments, **environment)
@@ -144,10 +179,17 @@ class TestReport(unittest.TestCase):
         self.fails(2, f"{nowhere}: no such folder", nowhere)
         empty = os.path.join(self.temporary.name, "empty")
         os.makedirs(empty)
-        self.fails(2, f"{empty}: neither compare.json nor reject.json is here; make one with `limn compare ... -o {empty}` "
-                      f"or `limn reject ... -o {empty}`", empty)
+        self.fails(
+            2,
+            f"{empty}: neither compare.json nor reject.json is here; make one with `limn compare"
+            f" ... -o {empty}` or `limn reject ... -o {empty}`",
+            empty,
+        )
         folder = self.broken(lambda text: text[:40])
-        self.assertRegex(run(folder).stderr, r"broken/compare\.json:\d+:\d+: not JSON: .*; run the command that wrote it again")
+        self.assertRegex(
+            run(folder).stderr,
+            r"broken/compare\.json:\d+:\d+: not JSON: .*; run the command that wrote it again",
+        )
         folder = self.broken(lambda text: "[1]")
         self.fails(2, f"{folder}/compare.json: not a JSON object", folder)
         folder = self.broken(lambda text: text.replace('"kind": "compare"', '"kind": "bake"'))
@@ -160,8 +202,13 @@ class TestReport(unittest.TestCase):
             data = json.loads(text)
             edit(data)
             return json.dumps(data)
-        folder = self.broken(lambda text: change(text, lambda d: d["methods"][1]["summary"][3].pop("mse")))
-        self.fails(2, f'{folder}/compare.json: methods[1]: summary[3]: "mse" is missing; {advice}', folder)
+
+        folder = self.broken(
+            lambda text: change(text, lambda d: d["methods"][1]["summary"][3].pop("mse"))
+        )
+        self.fails(
+            2, f'{folder}/compare.json: methods[1]: summary[3]: "mse" is missing; {advice}', folder
+        )
         folder = self.broken(lambda text: change(text, lambda d: d["reference"].update(spp="many")))
         self.fails(2, f'{folder}/compare.json: reference: "spp" is not a number; {advice}', folder)
 
@@ -172,6 +219,7 @@ class TestReport(unittest.TestCase):
                 rung.update(mse=None, mse_stderr=None, bias=None, rays=float("nan"))
             data["methods"][1]["summary"][2]["mse"] = -1e-4
             return json.dumps(data)
+
         folder = self.broken(undefined, "undefined")
         self.assertEqual(run(folder).returncode, 0)
         with open(os.path.join(folder, "report.html"), encoding="utf-8") as stream:
@@ -184,9 +232,14 @@ class TestReport(unittest.TestCase):
         os.makedirs(os.path.join(stub, "matplotlib"))
         with open(os.path.join(stub, "matplotlib", "__init__.py"), "w") as out:
             out.write("raise ImportError(\"No module named 'matplotlib'\")\n")
-        self.fails(3, "the charts need matplotlib and numpy (No module named 'matplotlib'): on Debian `apt-get install "
-                      "python3-matplotlib python3-numpy` and run this with /usr/bin/python3, elsewhere `pip install "
-                      "matplotlib numpy`", self.mirror, PYTHONPATH=stub)
+        self.fails(
+            3,
+            "the charts need matplotlib and numpy (No module named 'matplotlib'): on Debian"
+            " `apt-get install python3-matplotlib python3-numpy` and run this with"
+            " /usr/bin/python3, elsewhere `pip install matplotlib numpy`",
+            self.mirror,
+            PYTHONPATH=stub,
+        )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,5 @@
 """HTML elements and numbers as text."""
+
 import html
 import math
 
@@ -19,24 +20,34 @@ def join(*contents):
 
 def element(name, /, *contents, **attributes):
     """element("td", "1 < 2", class_="number"): None contents and None attributes are left out."""
-    text = "".join(f' {key.rstrip("_").replace("_", "-")}="{html.escape(str(value))}"'
-                   for key, value in attributes.items() if value is not None)
+    text = "".join(
+        f' {key.rstrip("_").replace("_", "-")}="{html.escape(str(value))}"'
+        for key, value in attributes.items()
+        if value is not None
+    )
     if name in VOID:
         return Markup(f"<{name}{text}>")
     return Markup(f"<{name}{text}>{join(*contents)}</{name}>")
 
 
 def table(head, rows, label, class_=None):
-    """head: texts; rows: lists of cells whose first is the row's header. A cell may be a <td>. label: what it is, for
-    those who cannot see what stands above it."""
+    """head: texts; rows: lists of cells whose first is the row's header. A cell may be a <td>.
+    label: what it is, for those who cannot see what stands above it.
+    """
+
     def cell(content):
         return content if str(content).startswith("<td") else element("td", content)
+
     body = [element("tr", element("th", row[0], scope="row"), *map(cell, row[1:])) for row in rows]
-    whole = element("table", element("thead", element("tr", *(element("th", h, scope="col") for h in head))),
-                    element("tbody", *body), class_=class_, aria_label=label)
+    whole = element(
+        "table",
+        element("thead", element("tr", *(element("th", h, scope="col") for h in head))),
+        element("tbody", *body),
+        class_=class_,
+        aria_label=label,
+    )
     # Focusable, so that the keyboard can scroll it.
-    return element("div", whole, class_="scroll", tabindex="0", role="region",
-                   aria_label=label)
+    return element("div", whole, class_="scroll", tabindex="0", role="region", aria_label=label)
 
 
 def superscript(number):
@@ -65,10 +76,14 @@ def with_error(value, error):
     last = max(math.floor(math.log10(error)) - 1, exponent - 2)
     if -3 <= exponent < 5:
         decimals = max(0, -last)
-        return f"{value:,.{decimals}f}\u00a0±\u00a0{error:,.{decimals}f}".replace("-", "−").replace(",", "\u2009")
+        return f"{value:,.{decimals}f}\u00a0±\u00a0{error:,.{decimals}f}".replace("-", "−").replace(
+            ",", "\u2009"
+        )
     decimals = max(0, exponent - last)
     scale = 10.0**exponent
-    text = f"({value / scale:.{decimals}f}\u00a0±\u00a0{error / scale:.{decimals}f})".replace("-", "−")
+    text = f"({value / scale:.{decimals}f}\u00a0±\u00a0{error / scale:.{decimals}f})".replace(
+        "-", "−"
+    )
     return f"{text}×10{superscript(exponent)}"
 
 

@@ -1,4 +1,5 @@
 """What several folders say together: who wins where and by how much."""
+
 import math
 
 from . import charts
@@ -9,11 +10,17 @@ BASELINE = "forest"
 
 
 def relative_times(data):
-    """{method: (factor, stderr)} of time for equal error and the method they refer to: the forest where it was
-    run, else the first. Errors of the two ratios are taken as independent."""
+    """{method: (factor, stderr)} of time for equal error and the method they refer to: the forest
+    where it was run, else the first. Errors of the two ratios are taken as independent.
+    """
     methods = [m for m in data.records("methods") if finished(m)]
-    ratios = {m.text("name"): (m.number("time_ratio"), m.number("time_ratio_stderr") or 0.0) for m in methods}
-    ratios = {name: ratio for name, ratio in ratios.items() if ratio[0] is not None and ratio[0] > 0}
+    ratios = {
+        m.text("name"): (m.number("time_ratio"), m.number("time_ratio_stderr") or 0.0)
+        for m in methods
+    }
+    ratios = {
+        name: ratio for name, ratio in ratios.items() if ratio[0] is not None and ratio[0] > 0
+    }
     first = data.records("methods")[0].text("name") if data.records("methods") else ""
     base, base_error = ratios.get(BASELINE, (None, 0.0))
     if base is None or first == BASELINE:
@@ -38,8 +45,13 @@ class Overview:
     def html(self):
         parts = [element("h2", "Overview")]
         if self.comparisons:
-            parts += [element("h3", "Time for equal error"), self._chart(), self._times(),
-                      element("h3", "Slopes"), self._slopes()]
+            parts += [
+                element("h3", "Time for equal error"),
+                self._chart(),
+                self._times(),
+                element("h3", "Slopes"),
+                self._slopes(),
+            ]
         if self.rejections:
             parts += [element("h3", "Hit rates"), self._hits()]
         return element("section", *parts, id="overview")
@@ -51,15 +63,22 @@ class Overview:
         return f"{scene_name(data)}, {data.text('parameter')}"
 
     def _methods(self):
-        return list(dict.fromkeys(m.text("name") for result, _, _ in self.comparisons
-                                  for m in result.data.records("methods")))
+        return list(
+            dict.fromkeys(
+                m.text("name")
+                for result, _, _ in self.comparisons
+                for m in result.data.records("methods")
+            )
+        )
 
     def _chart(self):
         rows, baselines = [], set()
         for result, _, _ in self.comparisons:
             ratios, baseline = relative_times(result.data)
             if ratios:
-                rows.append((self._label(result.data), [(m, *ratio) for m, ratio in ratios.items()]))
+                rows.append(
+                    (self._label(result.data), [(m, *ratio) for m, ratio in ratios.items()])
+                )
                 baselines.add(baseline)
         return charts.factors(rows, " or ".join(sorted(baselines)), self.palette) if rows else None
 
@@ -68,15 +87,29 @@ class Overview:
         rows = []
         for result, identifier, _ in self.comparisons:
             ratios, baseline = relative_times(result.data)
-            label = join(self._link(identifier, self._label(result.data)),
-                         None if baseline == BASELINE else f" (against {baseline})")
+            label = join(
+                self._link(identifier, self._label(result.data)),
+                None if baseline == BASELINE else f" (against {baseline})",
+            )
             best = min(ratios, key=lambda m: ratios[m][0]) if ratios else None
             by_name = {m.text("name"): m for m in result.data.records("methods")}
-            rows.append([label, *(self._time_cell(by_name.get(m), ratios.get(m), m == best) for m in methods)])
-        note = element("p", "× 5 means: needs five times the time for the same mean squared error. Shaded: the best of its "
-                            "line. ⚠ biased: differs from the reference by more than chance explains, so its error "
-                            "will not go on falling. ✕: no figure, for the reason given. –: not run.", class_="hint")
-        return join(table(["scene, parameter", *methods], rows, f"Time for equal error, {BASELINE} = 1"), note)
+            rows.append(
+                [
+                    label,
+                    *(self._time_cell(by_name.get(m), ratios.get(m), m == best) for m in methods),
+                ]
+            )
+        note = element(
+            "p",
+            "× 5 means: needs five times the time for the same mean squared error. Shaded: the best"
+            " of its line. ⚠ biased: differs from the reference by more than chance explains, so"
+            " its error will not go on falling. ✕: no figure, for the reason given. –: not run.",
+            class_="hint",
+        )
+        return join(
+            table(["scene, parameter", *methods], rows, f"Time for equal error, {BASELINE} = 1"),
+            note,
+        )
 
     def _time_cell(self, method, ratio, best):
         if method is None:
@@ -88,7 +121,9 @@ class Overview:
         if implausible(last_summary(method), self.threshold):
             marks.append(element("span", " ⚠ biased", class_="bad"))
         if status == "interrupted":
-            marks.append(element("span", " interrupted", class_="bad", title=method.text("message", "")))
+            marks.append(
+                element("span", " interrupted", class_="bad", title=method.text("message", ""))
+            )
         text = times(*ratio) if ratio else "✕ undefined"
         if best and ratio:
             return element("td", element("strong", text), *marks, class_="best")
@@ -101,10 +136,17 @@ class Overview:
             by_name = {m.text("name"): m for m in result.data.records("methods")}
             cells = [self._slope_cell(by_name.get(m)) for m in methods]
             rows.append([self._link(identifier, self._label(result.data)), *cells])
-        note = element("p", "Of log error over log time, ± one standard error. −1: the error falls as one over time, as an "
-                            "unbiased method's does. ⚠ flatter, by more than three standard errors: held up by bias, or by "
-                            "rare large errors. Steeper: set-up took much of the short times.", class_="hint")
-        return join(table(["scene, parameter", *methods], rows, "Slopes of error against time"), note)
+        note = element(
+            "p",
+            "Of log error over log time, ± one standard error. −1: the error falls as one over"
+            " time, as an unbiased method's does. ⚠ flatter, by more than three standard errors:"
+            " held up by bias, or by rare large errors. Steeper: set-up took much of the short"
+            " times.",
+            class_="hint",
+        )
+        return join(
+            table(["scene, parameter", *methods], rows, "Slopes of error against time"), note
+        )
 
     def _slope_cell(self, method):
         slope = method.record_or_none("slope") if method is not None else None
@@ -112,17 +154,28 @@ class Overview:
             return "–"
         value, error = slope.number("value"), slope.number("stderr")
         flat = error and value + 1 > 3 * error
-        return element("td", with_error(value, error), element("span", " ⚠ flatter", class_="bad") if flat else None)
+        return element(
+            "td",
+            with_error(value, error),
+            element("span", " ⚠ flatter", class_="bad") if flat else None,
+        )
 
     def _hits(self):
-        variants = list(dict.fromkeys(v.text("name") for result, _, _ in self.rejections
-                                      for v in result.data.records("variants")))
+        variants = list(
+            dict.fromkeys(
+                v.text("name")
+                for result, _, _ in self.rejections
+                for v in result.data.records("variants")
+            )
+        )
         rows = []
         for result, identifier, title in self.rejections:
             by_name = {v.text("name"): v for v in result.data.records("variants")}
             cells = []
             for name in variants:
                 v = by_name.get(name)
-                cells.append(percent(v.number("hit_rate"), v.number("hit_rate_stderr")) if v else "–")
+                cells.append(
+                    percent(v.number("hit_rate"), v.number("hit_rate_stderr")) if v else "–"
+                )
             rows.append([self._link(identifier, title), *cells])
         return table(["mesh", *variants], rows, "Descents that end on a silhouette")

@@ -1,4 +1,6 @@
-"""Pictures as data: URIs, the colour bar of signed pictures, and what stands in for a missing one."""
+"""Pictures as data: URIs, the colour bar of signed pictures, and what stands in for a missing one.
+"""
+
 import base64
 import os
 import struct
@@ -34,14 +36,21 @@ class Pictures:
         return _png(os.path.join(self.folder, name))[0]
 
     def picture(self, name, alt, behind=None):
-        """An <img>, or a box that names the file. behind: CSS class that shows another picture while the
-        pointer (or the keyboard's focus) is on this one."""
+        """An <img>, or a box that names the file. behind: CSS class that shows another picture
+        while the pointer (or the keyboard's focus) is on this one.
+        """
         file = os.path.join(self.folder, name)
         uri, width, height = _png(file)
         if uri is None:
             self.missing.append(f"{file}: {width}")
-            return element("div", element("strong", "Picture missing"), element("code", name),
-                           element("span", width), class_="missing-picture", role="note")
+            return element(
+                "div",
+                element("strong", "Picture missing"),
+                element("code", name),
+                element("span", width),
+                class_="missing-picture",
+                role="note",
+            )
         image = element("img", src=uri, alt=alt, width=width, height=height)
         if behind is None:
             return element("span", image, class_="picture")
@@ -54,7 +63,8 @@ def _srgb(linear):
 
 
 def _signed_colour(t):
-    """limn's signed pictures: linear (1 + min(t, 0), 1 - |t|, 1 - max(t, 0)), then the sRGB curve."""
+    """limn's signed pictures: linear (1 + min(t, 0), 1 - |t|, 1 - max(t, 0)), then the sRGB curve.
+    """
     return "rgb({},{},{})".format(*map(_srgb, (1 + min(t, 0), 1 - abs(t), 1 - max(t, 0))))
 
 
@@ -63,11 +73,16 @@ def colour_bar(scale, unit, what):
     stops = ",".join(_signed_colour(-1 + i / 12) for i in range(25))
     text = f"{what}: blue −{figures(scale)}, white 0, red +{figures(scale)}, {unit}"
     ticks = [element("span", label) for label in (f"−{figures(scale)}", "0", f"+{figures(scale)}")]
-    return element("div", element("span", what, class_="bar-title"),
-                   element("span", class_="bar", style=f"background:linear-gradient(to right,{stops})"),
-                   element("span", *ticks, class_="bar-ticks"),
-                   element("span", unit, class_="bar-unit"),
-                   class_="colour-bar", role="img", aria_label=text)
+    return element(
+        "div",
+        element("span", what, class_="bar-title"),
+        element("span", class_="bar", style=f"background:linear-gradient(to right,{stops})"),
+        element("span", *ticks, class_="bar-ticks"),
+        element("span", unit, class_="bar-unit"),
+        class_="colour-bar",
+        role="img",
+        aria_label=text,
+    )
 
 
 def figure(picture, caption):
@@ -82,9 +97,12 @@ def flip_style(name, uri):
 def missing_notice(missing):
     if not missing:
         return None
-    return element("div", element("strong", "Pictures that could not be shown: "),
-                   element("ul", *(element("li", element("code", m)) for m in missing)),
-                   class_="notice warning")
+    return element(
+        "div",
+        element("strong", "Pictures that could not be shown: "),
+        element("ul", *(element("li", element("code", m)) for m in missing)),
+        class_="notice warning",
+    )
 
 
 def size_choice(group):
@@ -92,7 +110,15 @@ def size_choice(group):
     choices = []
     for i, label in enumerate(("small", "medium", "large")):
         identifier = f"{group}-size-{i}"
-        choices += [element("input", type="radio", name=f"{group}-size", id=identifier, class_=f"size-{i}",
-                            checked="" if i == 1 else None),
-                    element("label", label, for_=identifier)]
+        choices += [
+            element(
+                "input",
+                type="radio",
+                name=f"{group}-size",
+                id=identifier,
+                class_=f"size-{i}",
+                checked="" if i == 1 else None,
+            ),
+            element("label", label, for_=identifier),
+        ]
     return join(element("span", "Picture size", class_="size-label"), *choices)

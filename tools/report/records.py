@@ -1,4 +1,7 @@
-"""JSON files whose every access is checked, so that a faulty file is named together with the place in it."""
+"""JSON files whose every access is checked, so that a faulty file is named together with the place
+in it.
+"""
+
 import json
 import math
 import os
@@ -15,8 +18,10 @@ class Record:
 
     def _fail(self, key, expected):
         found = "is missing" if key not in self.values else f"is not {expected}"
-        raise ReportError(f'{self.place}: "{key}" {found}; was the file written by another '
-                          "version of limn? Run its command again.")
+        raise ReportError(
+            f'{self.place}: "{key}" {found}; was the file written by another '
+            "version of limn? Run its command again."
+        )
 
     def _get(self, key, kinds, expected, default):
         value = self.values.get(key, default)
@@ -81,8 +86,10 @@ def _read(file):
     except UnicodeDecodeError:
         raise ReportError(f"{file}: not a text file") from None
     except json.JSONDecodeError as error:
-        raise ReportError(f"{file}:{error.lineno}:{error.colno}: not JSON: {error.msg}; "
-                          "run the command that wrote it again") from None
+        raise ReportError(
+            f"{file}:{error.lineno}:{error.colno}: not JSON: {error.msg}; "
+            "run the command that wrote it again"
+        ) from None
     if not isinstance(values, dict):
         raise ReportError(f"{file}: not a JSON object")
     return Record(values, file)
@@ -95,8 +102,10 @@ def read_folder(folder):
     files = [os.path.join(folder, f"{kind}.json") for kind in ("compare", "reject")]
     results = [Result(folder, _read(file)) for file in files if os.path.exists(file)]
     if not results:
-        raise ReportError(f"{folder}: neither compare.json nor reject.json is here; "
-                          f"make one with `limn compare ... -o {folder}` or `limn reject ... -o {folder}`")
+        raise ReportError(
+            f"{folder}: neither compare.json nor reject.json is here; "
+            f"make one with `limn compare ... -o {folder}` or `limn reject ... -o {folder}`"
+        )
     for result, kind in ((r, k) for r in results for k in [r.kind]):
         if kind not in ("compare", "reject"):
             raise ReportError(f'{result.data.place}: "kind" is "{kind}" (known: compare, reject)')
