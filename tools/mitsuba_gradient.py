@@ -173,8 +173,10 @@ class Motion:
         positions = dr.unravel(mi.Point3f, self._params[key])
         t = mi.Float(0)
         dr.enable_grad(t)
+        normals = mi.Float(self._params[f"{self._shape}.vertex_normals"])
         self._params[key] = dr.ravel(positions + t * self._velocity(positions))
         self._params.update()
+        self._keep_normals_of_the_file(normals, t)
         dr.forward(t, dr.ADFlag.ClearEdges)
         moving = [
             k
@@ -183,6 +185,22 @@ class Motion:
         ]
         self._velocities = {k: mi.Float(dr.grad(self._params[k])) for k in moving}
         dr.eval(self._velocities)
+
+    def _keep_normals_of_the_file(self, normals, t):
+        """Mitsuba 3.9.1 computes a mesh's normals anew when its vertices move, those from a file too.
+        Where that changed them by more than rounding, they are put back, and turn with the shape as
+        limn's do.
+        """
+        mi, dr, key = self._mi, self._dr, f"{self._shape}.vertex_normals"
+        rounding = dr.epsilon(mi.Float) ** 0.5
+        if len(normals) == 0 or dr.all(dr.abs(self._params[key] - normals) < rounding):
+            return
+        directions = dr.unravel(mi.Normal3f, normals)
+        if self._operation == "rotate":
+            axis = mi.Vector3f(*(float(i == self._axis) for i in range(3)))
+            directions = directions + t * dr.cross(axis, mi.Vector3f(directions))
+        self._params[key] = dr.ravel(mi.Normal3f(directions))
+        self._params.update()
 
     def _attach_transform(self):
         mi, dr, c = self._mi, self._dr, self._centre
