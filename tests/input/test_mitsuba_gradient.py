@@ -1,0 +1,78 @@
+"""What tools/mitsuba_gradient.py says and returns where Mitsuba is not installed, or cannot do what
+is asked.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
+TOOL = os.path.join(ROOT, "tools", "mitsuba_gradient.py")
+SCENE = os.path.join(ROOT, "scenes", "closed_form", "cube_in_sky.xml")
+
+
+class TestMitsubaGradient(unittest.TestCase):
+    def setUp(self):
+        # A Python without Mitsuba, whatever is installed here.
+        self.folder = tempfile.TemporaryDirectory(prefix="limn_mitsuba_")
+        with open(os.path.join(self.folder.name, "mitsuba.py"), "w") as out:
+            out.write("raise ImportError(\"No module named 'mitsuba'\")\n")
+        self.addCleanup(self.folder.cleanup)
+
+    def run_tool(self, *arguments):
+        image = os.path.join(self.folder.name, "image.exr")
+        done = subprocess.run(
+            [sys.executable, TOOL, SCENE, "-o", image, *arguments],
+            capture_output=True,
+            text=True,
+            env={**os.environ, "PYTHONPATH": self.folder.name},
+        )
+        self.assertFalse(os.path.exists(image))
+        return done.returncode, done.stderr
+
+    def test_not_installed(self):
+        self.assertEqual(
+            self.run_tool("--wrt", "object.translate.y", "--time", "1"),
+            (
+                3,
+                (
+                    f"tools/mitsuba_gradient.py: Mitsuba is not installed for {sys.executable} (No"
+                    " module named 'mitsuba'): pip install mitsuba==3.9.1\n"
+                ),
+            ),
+        )
+
+    def test_parameters_that_it_cannot_move(self):
+        for name in (
+            "sensor.fov",
+            "object_bsdf.reflectance",
+            "object.vertex_positions:FILE",
+            "object.translate",
+        ):
+            self.assertEqual(
+                self.run_tool("--wrt", name, "--time", "1"),
+                (
+                    4,
+                    (
+                        f"tools/mitsuba_gradient.py: {name}: not supported by this method (known:"
+                        " SHAPE.translate.x, .y, .z, SHAPE.rotate.x, .y, .z, SHAPE.scale)\n"
+                    ),
+                ),
+            )
+
+    def test_arguments(self):
+        for arguments, message in (
+            (["--time", "-1"], "argument --time: invalid positive float value: '-1'"),
+            (["--time", "1", "-D", "width"], 'argument -D: "width" is not NAME=VALUE'),
+            ([], "one of the arguments --time --spp is required"),
+        ):
+            status, text = self.run_tool("--wrt", "object.scale", *arguments)
+            self.assertEqual(
+                (status, text.splitlines()[-1]), (2, f"mitsuba_gradient.py: error: {message}")
+            )
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,246 @@
+"""tools/report.py on sample folders: what the page says, and what is said of faulty input."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+
+from needs import need_matplotlib
+from sample_folders import rejection, write_samples
+
+need_matplotlib()
+TOOLS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tools")
+REPORT = os.path.join(TOOLS, "report.py")
+sys.path.insert(0, TOOLS)
+
+from report.markup import count, element, figures, percent, with_error  # noqa: E402
+from report.overview import relative_times  # noqa: E402
+from report.records import read_folder  # noqa: E402
+
+
+def run(*arguments, **environment):
+    return subprocess.run(
+        [sys.executable, REPORT, *arguments],
+        capture_output=True,
+        text=True,
+        env={**os.environ, **environment},
+    )
+
+
+def section(page, title):
+    """What lies under a heading, up to the next of its rank."""
+    return re.search(rf"<h(\d)>{re.escape(title)}</h\1>(.*?)(?=<h\1>|</section>)", page, re.S)[2]
+
+
+class TestMarkup(unittest.TestCase):
+    def test_numbers(self):
+        self.assertEqual(
+            [figures(v) for v in (None, 0, 1.234567, 12345, -0.01234, 1.234e-7, 2e9)],
+            ["–", "0", "1.23", "12\u2009345", "−0.0123", "1.23×10⁻⁷", "2.00×10⁹"],
+        )
+
+    def test_errors_have_two_figures_at_most(self):
+        pm = "\u00a0±\u00a0"
+        self.assertEqual(
+            [
+                with_error(*v)
+                for v in ((1.2345, 0.0412), (123.4, 56.7), (2e-6, 3e-7), (0.5, None), (1, 0))
+            ],
+            [f"1.23{pm}0.04", f"123{pm}57", f"(2.00{pm}0.30)×10⁻⁶", "0.500", "1.00"],
+        )
+
+    def test_counts_and_shares(self):
+        self.assertEqual(
+            [count(v) for v in (12, 12345, 2.5e6, 3e9)], ["12", "12.3 k", "2.5 M", "3 G"]
+        )
+        self.assertEqual([percent(v) for v in (0.5, 0, None)], ["50 %", "0 %", "–"])
+
+    def test_text_is_escaped(self):
+        self.assertEqual(
+            element("td", '<b> & "', title='"<'),
+            '<td title="&quot;&lt;">&lt;b&gt; &amp; &quot;</td>',
+        )
+
+
+class TestReport(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.temporary = tempfile.TemporaryDirectory(prefix="limn_report_")
+        cls.mirror, cls.shadow, cls.bunny = write_samples(os.path.join(cls.temporary.name, "runs"))
+        cls.file = os.path.join(cls.temporary.name, "report.html")
+        done = run(cls.mirror, cls.shadow, cls.bunny, "-o", cls.file)
+        assert done.returncode == 0, done.stderr
+        with open(cls.file, encoding="utf-8") as stream:
+            cls.page = stream.read()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.temporary.cleanup()
+
+    def broken(self, change, name="broken"):
+        """A folder whose compare.json went through `change`, a function of its text."""
+        folder = os.path.join(self.temporary.name, name)
+        os.makedirs(folder, exist_ok=True)
+        with open(os.path.join(self.mirror, "compare.json")) as stream:
+            text = stream.read()
+        with open(os.path.join(folder, "compare.json"), "w") as stream:
+            stream.write(change(text))
+        return folder
+
+    def test_nothing_points_outside(self):
+        self.assertEqual(re.findall(r"(?:https?|file):[^\s\"<]*", self.page), [])
+        sources = re.findall(r"(?:src=\"|url\()([^\")]{0,22})", self.page)
+        self.assertEqual(
+            [s for s in sources if not s.startswith(("data:image/png;base64,", "#"))], []
+        )
+        self.assertNotIn("<script", self.page)
+
+    def test_only_the_biased_method_is_marked(self):
+        times = section(self.page, "Time for equal error")
+        self.assertEqual(times.count("⚠ biased</span>"), 1)
+        row = section(self.page, "At the longest time")
+        marked = re.findall(
+            r"<tr><th[^>]*><span.*?</span>([^<]*)</span>(?:(?!</tr>).)*implausible", row, re.S
+        )
+        self.assertEqual(marked, ["fd"])
+
+    def test_missing_and_interrupted_methods_say_why(self):
+        self.assertIn(
+            "<strong>mitsuba: missing. </strong>Mitsuba is not installed: pip install"
+            " mitsuba==3.9.1",
+            self.page,
+        )
+        self.assertIn("<strong>brute: interrupted. </strong>Ctrl-C after one repeat", self.page)
+
+    def test_times_are_relative_to_the_forest(self):
+        ratios, baseline = relative_times(read_folder(self.shadow)[0].data)
+        # li2019 came first: forest 0.25 +- 0.025, brute 7.5 +- 0.75, li2019 1 +- 0.1.
+        self.assertEqual(baseline, "forest")
+        self.assertEqual(ratios["forest"], (1.0, 0.0))
+        self.assertAlmostEqual(ratios["li2019"][0], 4)
+        self.assertAlmostEqual(ratios["brute"][0], 30)
+        self.assertAlmostEqual(ratios["brute"][1], 30 * 2**0.5 * 0.1)
+
+    def test_a_flat_slope_is_marked(self):
+        self.assertEqual(section(self.page, "Slopes").count("⚠ flatter</span>"), 1)
+
+    def test_the_command_is_there(self):
+        self.assertIn(
+            "limn compare scenes/mirror.xml --wrt object.translate.y --methods forest,fd --time 8"
+            " --sweep",
+            self.page,
+        )
+
+    def test_the_same_input_gives_the_same_page(self):
+        again = os.path.join(self.temporary.name, "again.html")
+        self.assertEqual(run(self.mirror, self.shadow, self.bunny, "-o", again).returncode, 0)
+        with open(again, encoding="utf-8") as stream:
+            self.assertEqual(stream.read(), self.page)
+
+    def test_a_missed_silhouette_is_loud(self):
+        folder = os.path.join(self.temporary.name, "missed")
+        rejection(folder, "meshes/bunny.ply", missed=3)
+        self.assertEqual(run(folder).returncode, 0)
+        with open(os.path.join(folder, "report.html"), encoding="utf-8") as stream:
+            self.assertIn(
+                "Silhouettes were missed. </strong>This is a bug, and gradients are biased by it: "
+                "li2019: 6 times.",
+                stream.read(),
+            )
+        self.assertNotIn("Silhouettes were missed", self.page)
+
+    def test_missing_pictures_are_named(self):
+        folder = self.broken(lambda text: text, "no_pictures")
+        with open(os.path.join(self.mirror, "forest.png"), "rb") as whole:
+            start = whole.read()[:500]
+        with open(os.path.join(folder, "forest.png"), "wb") as part:
+            part.write(start)
+        done = run(folder)
+        self.assertEqual(done.returncode, 0)
+        self.assertIn(f"picture missing: {folder}/forest.png: the file is cut off", done.stderr)
+        self.assertIn(
+            f"picture missing: {folder}/fd_error.png: no such file or directory", done.stderr
+        )
+        with open(os.path.join(folder, "report.html"), encoding="utf-8") as stream:
+            self.assertIn(
+                f"<li><code>{folder}/reference.png: no such file or directory</code></li>",
+                stream.read(),
+            )
+
+    def fails(self, status, message, *arguments, **environment):
+        done = run(*arguments, **environment)
+        self.assertEqual((done.returncode, done.stderr), (status, f"tools/report.py: {message}\n"))
+
+    def test_faulty_input(self):
+        nowhere = os.path.join(self.temporary.name, "nowhere")
+        self.fails(2, f"{nowhere}: no such folder", nowhere)
+        empty = os.path.join(self.temporary.name, "empty")
+        os.makedirs(empty)
+        self.fails(
+            2,
+            f"{empty}: neither compare.json nor reject.json is here; make one with `limn compare"
+            f" ... -o {empty}` or `limn reject ... -o {empty}`",
+            empty,
+        )
+        folder = self.broken(lambda text: text[:40])
+        self.assertRegex(
+            run(folder).stderr,
+            r"broken/compare\.json:\d+:\d+: not JSON: .*; run the command that wrote it again",
+        )
+        folder = self.broken(lambda text: "[1]")
+        self.fails(2, f"{folder}/compare.json: not a JSON object", folder)
+        folder = self.broken(lambda text: text.replace('"kind": "compare"', '"kind": "bake"'))
+        self.fails(2, f'{folder}/compare.json: "kind" is "bake" (known: compare, reject)', folder)
+
+    def test_faulty_values_are_named_with_their_place(self):
+        advice = "was the file written by another version of limn? Run its command again."
+
+        def change(text, edit):
+            data = json.loads(text)
+            edit(data)
+            return json.dumps(data)
+
+        folder = self.broken(
+            lambda text: change(text, lambda d: d["methods"][1]["summary"][3].pop("mse"))
+        )
+        self.fails(
+            2, f'{folder}/compare.json: methods[1]: summary[3]: "mse" is missing; {advice}', folder
+        )
+        folder = self.broken(lambda text: change(text, lambda d: d["reference"].update(spp="many")))
+        self.fails(2, f'{folder}/compare.json: reference: "spp" is not a number; {advice}', folder)
+
+    def test_undefined_numbers_are_dashes(self):
+        def undefined(text):
+            data = json.loads(text)
+            for rung in data["methods"][0]["summary"]:
+                rung.update(mse=None, mse_stderr=None, bias=None, rays=float("nan"))
+            data["methods"][1]["summary"][2]["mse"] = -1e-4
+            return json.dumps(data)
+
+        folder = self.broken(undefined, "undefined")
+        self.assertEqual(run(folder).returncode, 0)
+        with open(os.path.join(folder, "report.html"), encoding="utf-8") as stream:
+            page = stream.read()
+        self.assertIn("<td>–</td>", page)
+        self.assertNotRegex(page, r"(?i)>\s*(nan|none|inf)\b")
+
+    def test_without_matplotlib(self):
+        stub = os.path.join(self.temporary.name, "stub")
+        os.makedirs(os.path.join(stub, "matplotlib"))
+        with open(os.path.join(stub, "matplotlib", "__init__.py"), "w") as out:
+            out.write("raise ImportError(\"No module named 'matplotlib'\")\n")
+        self.fails(
+            3,
+            "the charts need matplotlib and numpy (No module named 'matplotlib'): on Debian"
+            " `apt-get install python3-matplotlib python3-numpy` and run this with"
+            " /usr/bin/python3, elsewhere `pip install matplotlib numpy`",
+            self.mirror,
+            PYTHONPATH=stub,
+        )
+
+
+if __name__ == "__main__":
+    unittest.main()
