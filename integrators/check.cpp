@@ -112,6 +112,7 @@ CheckResult check(const Scene& scene, const CheckOptions& options, const RunSett
   gradient_options.terms = options.terms;
   gradient_options.sampler = options.sampler;
   gradient_options.block = result.block;
+  gradient_options.samples = options.samples;
   result.gradient = gradient(scene, gradient_options, first);
   result.differences =
       finite_differences(scene, options.parameter, result.step, result.block, second);

@@ -22,6 +22,7 @@ class SamplerMethod final : public DerivativeMethod {
     options.terms = input_.terms;
     options.sampler = type_.name;
     options.block = input_.block;
+    options.samples = input_.samples;
     const GradientResult result = gradient(input_.scene, options, settings);
     MethodRun run;
     run.image = means(result.parameters[0].total);
@@ -34,12 +35,18 @@ class SamplerMethod final : public DerivativeMethod {
       run.term_seconds.push_back(cost.seconds / settings.threads);
     }
     run.non_finite = result.non_finite;
+    samples_ = result.samples;
     return run;
+  }
+
+  std::vector<MethodSetting> settings() const override {
+    return {{"samples of each term", to_string(samples_)}};
   }
 
  private:
   const MethodInput& input_;
   const EdgeSamplerType& type_;
+  SampleCounts samples_;
 };
 
 }  // namespace

@@ -1,8 +1,12 @@
 #include "limn/integrators/gradient.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
+#include "allocation.h"
 #include "camera_boundary.h"
+#include "limn/core/error.h"
 #include "limn/core/parameter.h"
 #include "pixel_samples.h"
 #include "shading_boundary.h"
@@ -12,6 +16,10 @@ namespace limn {
 const char* term_name(int term) {
   constexpr const char* kNames[] = {"interior", "camera", "boundary"};
   return kNames[term];
+}
+
+std::string to_string(const SampleCounts& samples) {
+  return fmt::format("{},{},{}", samples.interior, samples.camera, samples.boundary);
 }
 
 void TermCost::merge(const TermCost& other) {
@@ -27,6 +35,14 @@ void TermCost::merge(const TermCost& other) {
 namespace {
 
 using Costs = std::array<TermCost, kTermCount>;
+
+// Samples [first, last) of every pixel.
+struct Batch {
+  uint64_t seed;
+  int first, last;
+  SampleCounts samples;
+  int count() const { return last - first; }
+};
 
 // A pass differentiates up to kLanes parameters of one scene.
 class Pass {
@@ -55,6 +71,7 @@ class Pass {
   Pass(const Pass&) = delete;
   Pass& operator=(const Pass&) = delete;
 
+  const EdgeSamplerInput& sampler_input() const { return input_; }
   static size_t steps_per_batch(const Film& film) { return make_tiles(film).size() + 1; }
 
   // Sums over one batch. sums[lane][term] and radiance are crop_height by crop_width by 3.
@@ -64,7 +81,7 @@ class Pass {
     Costs costs;
     NonFinite non_finite;
   };
-  Output run_batch(int first, int last, ProgressCounter& progress) const {
+  Output run_batch(const Batch& batch, ProgressCounter& progress) const {
     Output output;
     output.radiance.assign(size(), 0.0);
     output.sums.resize(lanes_);
@@ -72,9 +89,9 @@ class Pass {
       for (auto& sums : terms) sums.assign(size(), 0.0);
     }
     if (options_.terms[kInterior] || options_.terms[kBoundary]) {
-      run_paths(first, last, progress, output);
+      run_paths(batch, progress, output);
     }
-    if (camera_ && !camera_->empty()) run_camera(first, last, progress, output);
+    if (camera_ && !camera_->empty()) run_camera(batch, progress, output);
     progress.step();
     return output;
   }
@@ -91,12 +108,12 @@ class Pass {
     return static_cast<size_t>(scene_.film.crop_width) * scene_.film.crop_height * 3;
   }
 
-  void run_paths(int first, int last, ProgressCounter& progress, Output& output) const {
+  void run_paths(const Batch& batch, ProgressCounter& progress, Output& output) const {
     std::vector<Costs> costs(tiles_.size());
     std::vector<NonFinite> bad(tiles_.size());
     parallel_for(tiles_.size(), settings_.threads, [&](size_t i) {
       if (progress.stopped()) return;
-      run_tile(tiles_[i], first, last, output, costs[i], bad[i]);
+      run_tile(tiles_[i], batch, output, costs[i], bad[i]);
       progress.step();
     });
     for (size_t i = 0; i < tiles_.size(); ++i) {
@@ -105,50 +122,67 @@ class Pass {
     }
   }
 
-  void run_tile(const Tile& tile, int first, int last, Output& output, Costs& costs,
+  void run_tile(const Tile& tile, const Batch& batch, Output& output, Costs& costs,
                 NonFinite& bad) const {
     const Stopwatch watch;
     for (int y = tile.y0; y < tile.y1; ++y) {
       for (int x = tile.x0; x < tile.x1; ++x) {
-        for (int s = first; s < last; ++s) run_sample(x, y, s, output, costs, bad);
+        for (int s = batch.first; s < batch.last; ++s) {
+          run_sample(batch, x, y, s, output, costs, bad);
+        }
       }
     }
     costs[kInterior].seconds += watch.seconds() - costs[kBoundary].seconds;
   }
 
-  void run_sample(int x, int y, int s, Output& output, Costs& costs, NonFinite& bad) const {
-    const Rng key = pixel_key(scene_, settings_.seed, x, y, s);
-    const FilmPosition film = sample_film(scene_.film, x, y, key);
+  void run_sample(const Batch& batch, int x, int y, int s, Output& output, Costs& costs,
+                  NonFinite& bad) const {
+    const Rng key = pixel_key(scene_, batch.seed, x, y, s);
+    const int paths = options_.terms[kInterior] ? batch.samples.interior : 1;
+    int first_without = 0;
+    if (sampler_) {
+      ShadingBoundary visitor(context_, input_.objects, *sampler_, batch.samples.boundary,
+                              costs[kBoundary]);
+      add_path({x, y, s}, key, visitor, 1.0 / paths, output, costs, bad);
+      if (all_finite(visitor.sum())) {
+        add(output, kBoundary, pixel_index(scene_.film, x, y), visitor.sum(),
+            1.0 / batch.samples.boundary);
+      } else {
+        bad.add({x, y, s, term_name(kBoundary)});
+      }
+      first_without = 1;
+    }
+    for (int i = first_without; i < paths; ++i) {
+      NoVisitor nothing;
+      add_path({x, y, s}, key.copy(Purpose::kPathCopy, i), nothing, 1.0 / paths, output, costs,
+               bad);
+    }
+  }
+
+  struct PixelSample {
+    int x, y, s;
+  };
+
+  // Radiance and the interior term of one path.
+  template <class Visitor>
+  void add_path(const PixelSample& at, const Rng& key, Visitor& visitor, double weight,
+                Output& output, Costs& costs, NonFinite& bad) const {
+    const FilmPosition film = sample_film(scene_.film, at.x, at.y, key);
     const Ray primal = camera_ray(scene_, scene_.camera.ray<double>(film.x, film.y));
     const auto ray = scene_.camera.ray<Dual>(film.x, film.y);
     RayCount rays;
-    Rgb<Dual> radiance;
-    Rgb<Lanes> boundary;
-    if (sampler_) {
-      ShadingBoundary visitor(context_, input_.objects, *sampler_, costs[kBoundary]);
-      PathTracer<Dual, ShadingBoundary> path(context_, rays, visitor);
-      radiance = path.from_ray(primal, ray.origin, ray.direction, 0, key);
-      boundary = visitor.sum();
-    } else {
-      NoVisitor nothing;
-      PathTracer<Dual, NoVisitor> path(context_, rays, nothing);
-      radiance = path.from_ray(primal, ray.origin, ray.direction, 0, key);
-    }
+    PathTracer<Dual, Visitor> path(context_, rays, visitor);
+    const Rgb<Dual> radiance = path.from_ray(primal, ray.origin, ray.direction, 0, key);
     costs[kInterior].rays += rays.total();
     ++costs[kInterior].samples;
-    const size_t index = pixel_index(scene_.film, x, y);
     const Rgb<Lanes> interior{radiance.r.d, radiance.g.d, radiance.b.d};
     if (!is_finite(value(radiance)) || !all_finite(interior)) {
-      bad.add({x, y, s, term_name(kInterior)});
-    } else {
-      for (int c = 0; c < 3; ++c) output.radiance[index + c] += radiance[c].v;
-      if (options_.terms[kInterior]) add(output, kInterior, index, interior, 1);
+      bad.add({at.x, at.y, at.s, term_name(kInterior)});
+      return;
     }
-    if (!all_finite(boundary)) {
-      bad.add({x, y, s, term_name(kBoundary)});
-    } else {
-      add(output, kBoundary, index, boundary, 1);
-    }
+    const size_t index = pixel_index(scene_.film, at.x, at.y);
+    for (int c = 0; c < 3; ++c) output.radiance[index + c] += radiance[c].v * weight;
+    if (options_.terms[kInterior]) add(output, kInterior, index, interior, weight);
   }
 
   static bool all_finite(const Rgb<Lanes>& value) {
@@ -165,13 +199,15 @@ class Pass {
     }
   }
 
-  // As many samples as the batch has paths, in strata along the summed length of all projected
-  // edges.
-  void run_camera(int first, int last, ProgressCounter& progress, Output& output) const {
+  // Samples in strata along the summed length of all projected edges. The same whole number per
+  // sample per pixel in every batch, so that all batches weigh alike.
+  void run_camera(const Batch& batch, ProgressCounter& progress, Output& output) const {
     constexpr size_t kChunk = 1024;
     const Film& film = scene_.film;
-    const size_t pixels = static_cast<size_t>(film.crop_width) * film.crop_height;
-    const size_t count = pixels * (last - first);
+    const auto per_sample =
+        static_cast<size_t>(std::ceil(batch.samples.camera * film.crop_width * film.crop_height));
+    const size_t count = per_sample * batch.count();
+    const size_t first = per_sample * batch.first;
     const size_t chunks = (count + kChunk - 1) / kChunk;
     std::vector<std::vector<FilmSample>> samples(chunks);
     std::vector<TermCost> costs(chunks);
@@ -181,8 +217,8 @@ class Pass {
       const Stopwatch watch;
       RayCount rays;
       for (size_t i = chunk * kChunk; i < std::min(count, (chunk + 1) * kChunk); ++i) {
-        const auto id = static_cast<int64_t>(pixels * first + i);
-        const Rng key(settings_.seed, UINT64_MAX, static_cast<uint64_t>(id));
+        const auto id = static_cast<int64_t>(first + i);
+        const Rng key(batch.seed, UINT64_MAX, static_cast<uint64_t>(id));
         const double u = (i + key.at(Purpose::kCamera, 0).uniform()) / count;
         FilmSample sample;
         if (!camera_->sample(u, key, rays, sample)) continue;
@@ -196,7 +232,7 @@ class Pass {
       costs[chunk].rays = rays.total();
       costs[chunk].seconds = watch.seconds();
     });
-    const double scale = 1.0 / pixels;
+    const double scale = 1.0 / static_cast<double>(per_sample);
     for (size_t chunk = 0; chunk < chunks; ++chunk) {
       for (const FilmSample& sample : samples[chunk]) splat(sample, scale, output);
       output.costs[kCamera].merge(costs[chunk]);
@@ -289,52 +325,111 @@ ParameterGradient empty_gradient(const std::string& name, const Film& film, int 
   return g;
 }
 
-}  // namespace
+using Passes = std::vector<std::unique_ptr<Pass>>;
 
-GradientResult gradient(const Scene& scene, const GradientOptions& options,
-                        const RunSettings& settings) {
-  const Stopwatch watch;
-  const Film& film = scene.film;
-  GradientResult result;
-  if (scene.shading == ShadingModel::kMitsuba) {
-    result.warnings.push_back(
-        "shading 'mitsuba' is discontinuous where no edge is: the derivative of interpolated "
-        "normals is incomplete");
-  }
-  for (const auto& name : options.parameters) {
-    find_parameter(scene, name);
-    result.parameters.push_back(empty_gradient(name, film, options.block));
-  }
-  result.radiance = Moments(static_cast<size_t>(film.crop_width) * film.crop_height * 3);
-
-  std::vector<std::unique_ptr<Pass>> passes;
+Passes make_passes(const Scene& scene, const GradientOptions& options,
+                   const RunSettings& settings) {
+  Passes passes;
   for (size_t k = 0; k < options.parameters.size(); k += kLanes) {
     const auto begin = options.parameters.begin() + static_cast<std::ptrdiff_t>(k);
     const auto end = begin + std::min<std::ptrdiff_t>(kLanes, options.parameters.end() - begin);
     passes.push_back(
         std::make_unique<Pass>(scene, std::vector<std::string>(begin, end), options, settings));
   }
+  return passes;
+}
+
+// Without samples yet.
+GradientResult empty_result(const Scene& scene, const GradientOptions& options) {
+  const Film& film = scene.film;
+  GradientResult result;
+  for (const auto& name : options.parameters) {
+    find_parameter(scene, name);
+    result.parameters.push_back(empty_gradient(name, film, options.block));
+  }
+  result.radiance = Moments(static_cast<size_t>(film.crop_width) * film.crop_height * 3);
+  return result;
+}
+
+// False if it was stopped; the result is then as before.
+bool add_batch(const Passes& passes, const Batch& batch, const Film& film, int block,
+               ProgressCounter& progress, GradientResult& result) {
+  std::vector<Pass::Output> outputs;
+  for (const auto& pass : passes) outputs.push_back(pass->run_batch(batch, progress));
+  if (progress.stopped()) return false;
+  for (size_t p = 0; p < passes.size(); ++p) {
+    collect(outputs[p], batch.count(), film.crop_width, film.crop_height, block,
+            &result.parameters[p * kLanes]);
+    for (int term = 0; term < kTermCount; ++term) {
+      result.costs[term].merge(outputs[p].costs[term]);
+    }
+    result.non_finite.merge(outputs[p].non_finite);
+  }
+  result.radiance.add_batch(outputs[0].radiance, batch.count());
+  result.spp += batch.count();
+  return true;
+}
+
+// Chooses the samples of each term. watch: since the job began.
+SampleCounts choose_samples(const Passes& passes, const Scene& scene,
+                            const GradientOptions& options, const RunSettings& settings,
+                            const Stopwatch& watch, int& pilot_spp) {
+  const Film& film = scene.film;
+  const int spp =
+      pilot_samples(static_cast<size_t>(film.crop_width) * film.crop_height, settings.spp);
+  if (spp == 0 || std::count(options.terms.begin(), options.terms.end(), true) < 2) return {};
+  RunSettings quiet = settings;
+  quiet.progress = nullptr;
+  ProgressCounter progress(quiet, watch, 1);
+  GradientResult pilot = empty_result(scene, options);
+  // Another stream of random numbers: a choice that depends on the samples it is made for would
+  // bias them.
+  const uint64_t seed = mix_bits(settings.seed + 0x9110);
+  const double began = watch.seconds();
+  while (pilot.spp < spp) {
+    const int s = static_cast<int>(pilot.spp);
+    if (!add_batch(passes, {seed, s, s + 1, {}}, film, options.block, progress, pilot)) return {};
+    if (settings.seconds > 0 && watch.seconds() - began > settings.seconds / 8) break;
+  }
+  pilot_spp = static_cast<int>(pilot.spp);
+  if (pilot.spp < 2) return {};
+  size_t edges = 0;
+  for (const EdgeMesh& object : passes[0]->sampler_input().objects) edges += object.edges.size();
+  return best_samples(pilot_figures(pilot, options.sampler, edges));
+}
+
+void check_samples(const SampleCounts& samples) {
+  if (samples.interior >= 1 && samples.camera > 0 && std::isfinite(samples.camera) &&
+      samples.boundary >= 1) {
+    return;
+  }
+  throw InputError("samples of the terms: " + to_string(samples) + " are not all positive");
+}
+
+}  // namespace
+
+GradientResult gradient(const Scene& scene, const GradientOptions& options,
+                        const RunSettings& settings) {
+  const Stopwatch watch;
+  GradientResult result = empty_result(scene, options);
+  if (scene.shading == ShadingModel::kMitsuba) {
+    result.warnings.push_back(
+        "shading 'mitsuba' is discontinuous where no edge is: the derivative of interpolated "
+        "normals is incomplete");
+  }
+  if (options.samples) check_samples(*options.samples);
+  const Passes passes = make_passes(scene, options, settings);
+  result.samples = options.samples
+                       ? *options.samples
+                       : choose_samples(passes, scene, options, settings, watch, result.pilot_spp);
   result.setup_seconds = watch.seconds();
 
   Schedule batches(settings, watch);
-  const size_t steps = Pass::steps_per_batch(film) * Schedule::batch_count(settings.spp);
+  const size_t steps = Pass::steps_per_batch(scene.film) * Schedule::batch_count(settings.spp);
   ProgressCounter progress(settings, watch, steps * passes.size());
   while (!progress.stopped() && batches.next()) {
-    std::vector<Pass::Output> outputs;
-    for (const auto& pass : passes) {
-      outputs.push_back(pass->run_batch(batches.first_sample(), batches.end_sample(), progress));
-    }
-    if (progress.stopped()) break;
-    for (size_t p = 0; p < passes.size(); ++p) {
-      collect(outputs[p], batches.samples(), film.crop_width, film.crop_height, options.block,
-              &result.parameters[p * kLanes]);
-      for (int term = 0; term < kTermCount; ++term) {
-        result.costs[term].merge(outputs[p].costs[term]);
-      }
-      result.non_finite.merge(outputs[p].non_finite);
-    }
-    result.radiance.add_batch(outputs[0].radiance, batches.samples());
-    result.spp += batches.samples();
+    const Batch batch{settings.seed, batches.first_sample(), batches.end_sample(), result.samples};
+    if (!add_batch(passes, batch, scene.film, options.block, progress, result)) break;
   }
   result.seconds = watch.seconds();
   return result;

@@ -200,6 +200,7 @@ Reference make_reference(const MethodInput& input, const RunSettings& settings) 
   options.terms = input.terms;
   options.sampler = kSampler;
   options.block = input.block;
+  options.samples = input.samples;
   RunSettings at_least_two = settings;
   at_least_two.least_spp = 2;  // for variances
   const GradientResult result = gradient(input.scene, options, at_least_two);

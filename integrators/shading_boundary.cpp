@@ -43,14 +43,6 @@ void ShadingBoundary::operator()(const SurfacePoint<Dual>& surface,
                                  const Scattering<Dual>& scattering, const Rgb<Dual>& throughput,
                                  int bounces, const Rng& key) {
   const Stopwatch watch;
-  add_sample(surface, scattering, value(throughput), bounces, key);
-  cost_.seconds += watch.seconds();
-}
-
-void ShadingBoundary::add_sample(const SurfacePoint<Dual>& surface,
-                                 const Scattering<Dual>& scattering, const Rgb<double>& throughput,
-                                 int bounces, const Rng& key) {
-  ++cost_.samples;
   EdgeQuery query;
   query.p = value(surface.p);
   query.n = value(scattering.normal());
@@ -59,6 +51,15 @@ void ShadingBoundary::add_sample(const SurfacePoint<Dual>& surface,
   query.velocity = velocity(surface.p);
   query.object = surface.face.shape;
   query.face = surface.face.face;
+  for (int i = 0; i < samples_; ++i) {
+    add_sample(query, scattering, value(throughput), bounces, key.copy(Purpose::kEdgeCopy, i));
+  }
+  cost_.seconds += watch.seconds();
+}
+
+void ShadingBoundary::add_sample(const EdgeQuery& query, const Scattering<Dual>& scattering,
+                                 const Rgb<double>& throughput, int bounces, const Rng& key) {
+  ++cost_.samples;
   Rng rng = key.at(Purpose::kEdge, bounces);
   EdgeSample sample;
   if (!sampler_.sample(query, rng, sample)) {
@@ -82,7 +83,7 @@ void ShadingBoundary::add_sample(const SurfacePoint<Dual>& surface,
   RayCount rays;
   Rgb<double> jump;
   const bool visible =
-      edge_jump(context_, mesh, view, surface.face, 0, bounces + 1, key, rays, jump);
+      edge_jump(context_, mesh, view, {query.object, query.face}, 0, bounces + 1, key, rays, jump);
   cost_.rays += rays.total();
   if (!visible) {
     ++cost_.occluded;

@@ -114,8 +114,8 @@ class Comparer {
         command_(command),
         scene_(scene),
         settings_(settings),
-        input_{scene, command.parameter, parse_terms(command.terms), command.step,
-               block_size(scene.film)},
+        input_{scene,        command.parameter,      parse_terms(command.terms),
+               command.step, block_size(scene.film), parse_samples(command.samples)},
         identity_(identify(input_, common.defines)),
         kept_file_((fs::path(command.output) / "reference.exr").string()) {
     result_.command = command.command_line;

@@ -69,7 +69,8 @@ json write_parameter(const Scene& scene, const ParameterGradient& g, const std::
   }
   json terms;
   for (int t = 0; t < kTermCount; ++t) {
-    terms[term_name(t)] = {{"mean_magnitude", mean_magnitude(g.terms[t])}};
+    terms[term_name(t)] = {{"mean_magnitude", mean_magnitude(g.terms[t])},
+                           {"mean_squared_error", mean_squared_error(g.terms[t])}};
   }
   return {{"name", g.name},          {"image", output},
           {"picture", picture},      {"stderr", errors},
@@ -107,6 +108,13 @@ void print_terms(const GradientResult& result, const std::array<bool, kTermCount
   }
 }
 
+void print_samples(const GradientResult& r) {
+  fmt::print("{} samples per pixel, {:.2f} s, of which {:.2f} s set-up\n", r.spp, r.seconds,
+             r.setup_seconds);
+  fmt::print("each holds {} of interior, camera, boundary{}\n", to_string(r.samples),
+             r.pilot_spp > 0 ? fmt::format(", chosen by {} samples per pixel", r.pilot_spp) : "");
+}
+
 json costs_json(const GradientResult& result) {
   json costs;
   for (int t = 0; t < kTermCount; ++t) {
@@ -119,6 +127,11 @@ json costs_json(const GradientResult& result) {
   return costs;
 }
 
+json samples_json(const SampleCounts& samples) {
+  return {
+      {"interior", samples.interior}, {"camera", samples.camera}, {"boundary", samples.boundary}};
+}
+
 }  // namespace
 
 int run_gradient(const CommonOptions& common, const GradientCommand& command) {
@@ -127,6 +140,7 @@ int run_gradient(const CommonOptions& common, const GradientCommand& command) {
   options.parameters = command.parameters;
   options.terms = parse_terms(command.terms);
   options.sampler = command.sampler;
+  options.samples = parse_samples(command.samples);
   for (const auto& name : options.parameters) find_parameter(scene, name);
   std::vector<std::string> outputs;
   for (const auto& name : options.parameters) {
@@ -145,6 +159,7 @@ int run_gradient(const CommonOptions& common, const GradientCommand& command) {
   auto attributes = provenance(scene, settings, result.spp);
   attributes.push_back({"limn.terms", command.terms});
   attributes.push_back({"limn.sampler", command.sampler});
+  attributes.push_back({"limn.samples", to_string(result.samples)});
   json parameters = json::array();
   for (size_t k = 0; k < outputs.size(); ++k) {
     parameters.push_back(
@@ -152,14 +167,20 @@ int run_gradient(const CommonOptions& common, const GradientCommand& command) {
   }
   if (!common.quiet) {
     print_terms(result, options.terms);
-    fmt::print("{} samples per pixel, {:.2f} s, of which {:.2f} s set-up\n", result.spp,
-               result.seconds, result.setup_seconds);
+    print_samples(result);
   }
-  const json report = {{"scene", scene.file},         {"spp", result.spp},
-                       {"seed", settings.seed},       {"threads", settings.threads},
-                       {"sampler", command.sampler},  {"terms", command.terms},
-                       {"seconds", result.seconds},   {"setup_seconds", result.setup_seconds},
-                       {"costs", costs_json(result)}, {"non_finite", result.non_finite.count},
+  const json report = {{"scene", scene.file},
+                       {"spp", result.spp},
+                       {"seed", settings.seed},
+                       {"threads", settings.threads},
+                       {"sampler", command.sampler},
+                       {"terms", command.terms},
+                       {"samples", samples_json(result.samples)},
+                       {"pilot_spp", result.pilot_spp},
+                       {"seconds", result.seconds},
+                       {"setup_seconds", result.setup_seconds},
+                       {"costs", costs_json(result)},
+                       {"non_finite", result.non_finite.count},
                        {"parameters", parameters}};
   write_json(common.json, report.dump(2));
   return finish_status(result.non_finite, result.spp, settings.spp);
@@ -182,8 +203,9 @@ json z_json(const ZSummary& z) {
 }
 
 void print_check(const std::string& name, const CheckResult& r) {
-  fmt::print("{}: {} samples per pixel, blocks of {} x {} pixels\n", name, r.gradient.spp, r.block,
-             r.block);
+  fmt::print(
+      "{}: {} samples per pixel ({} of interior, camera, boundary), blocks of {} x {} pixels\n",
+      name, r.gradient.spp, to_string(r.gradient.samples), r.block, r.block);
   fmt::print("  {:24} {:>10} {:>7} {:>8} {:>8} {:>8} {:>9}\n", "z against", "step", "blocks",
              "mean", "sd", "max |z|", "p");
   print_z("differences", r.step, r.at_step);
@@ -209,14 +231,15 @@ void print_check(const std::string& name, const CheckResult& r) {
 int run_check(const CommonOptions& common, const GradientCommand& command) {
   const Scene scene = load_scene(common);
   const auto terms = parse_terms(command.terms);
+  const auto samples = parse_samples(command.samples);
   for (const auto& name : command.parameters) find_parameter(scene, name);
   json report = json::array();
   int status = kSuccess;
   for (const auto& name : command.parameters) {
     const RunSettings settings = make_settings(common, scene, "check " + name);
     if (settings.spp < 2) throw InputError("check needs --spp of at least 2, for standard errors");
-    const CheckResult r =
-        check(scene, {name, terms, command.sampler, command.step, command.block}, settings);
+    const CheckResult r = check(
+        scene, {name, terms, command.sampler, command.step, command.block, samples}, settings);
     if (r.differences.spp < settings.spp) {
       fmt::print(stderr, "interrupted: no verdict\n");
       return kInterrupted;
@@ -225,6 +248,7 @@ int run_check(const CommonOptions& common, const GradientCommand& command) {
     report.push_back({{"parameter", name},
                       {"step", r.step},
                       {"spp", r.gradient.spp},
+                      {"samples", samples_json(r.gradient.samples)},
                       {"agree", r.agree},
                       {"gradient_sum", r.total.gradient},
                       {"gradient_sum_stderr", r.total.gradient_error},

@@ -93,6 +93,24 @@ std::array<bool, kTermCount> parse_terms(const std::string& list) {
   return terms;
 }
 
+std::optional<SampleCounts> parse_samples(const std::string& list) {
+  if (list == "auto") return std::nullopt;
+  constexpr int kMost = 1024;
+  std::istringstream stream(list);
+  SampleCounts samples;
+  char comma[2] = {};
+  stream >> samples.interior >> comma[0] >> samples.camera >> comma[1] >> samples.boundary;
+  const auto in_range = [](double count) { return count > 0 && count <= kMost; };
+  if (stream.fail() || !stream.eof() || comma[0] != ',' || comma[1] != ',' ||
+      !in_range(samples.interior) || !in_range(samples.camera) || !in_range(samples.boundary)) {
+    throw InputError(fmt::format(
+        "--samples: \"{}\" is neither auto nor three counts of at most {}, for the interior, the "
+        "camera (which may be less than 1) and the boundary, as in 3,0.5,1",
+        list, kMost));
+  }
+  return samples;
+}
+
 int finish_status(const NonFinite& non_finite, int64_t spp_done, int64_t spp_asked) {
   if (non_finite.count > 0) {
     fmt::print(stderr, "error: {}\n", non_finite.message());

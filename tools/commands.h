@@ -29,6 +29,7 @@ struct GradientCommand {
   std::string output;
   std::string terms = "interior,camera,boundary";
   std::string sampler;
+  std::string samples = "auto";  // of each term
   double step = 0;
   int block = 0;
 };
@@ -42,7 +43,8 @@ struct CompareCommand {
   std::string reference;      // "": made
   double reference_time = 0;  // 0: four times all runs of one method
   std::string terms = "interior,camera,boundary";
-  double step = 0;  // of finite differences; 0: found by a pilot
+  std::string samples = "auto";  // of each term
+  double step = 0;               // of finite differences; 0: found by a pilot
   std::string output;
   bool report = true;
   std::string command_line;
@@ -70,6 +72,8 @@ void check_output(const std::string& file);
 void write_json(const std::string& file, const std::string& text);
 // Of --terms.
 std::array<bool, kTermCount> parse_terms(const std::string& list);
+// Of --samples; none for "auto".
+std::optional<SampleCounts> parse_samples(const std::string& list);
 // Makes FOLDER/report.html with Python, or says what is missing for it.
 void write_report(const std::string& folder, bool quiet);
 Scene load_scene(const CommonOptions& common);

@@ -55,6 +55,13 @@ void add_gradient_options(CLI::App& command, GradientCommand& gradient) {
   command
       .add_option("--sampler", gradient.sampler, "How shading points choose an edge: " + samplers)
       ->capture_default_str();
+  command
+      .add_option("--samples", gradient.samples,
+                  "What a sample per pixel holds: paths for the interior, camera samples (may be "
+                  "less than 1), edges per vertex of one path for the boundary; auto: the best for "
+                  "the time by a short pilot, or 1,1,1 if --spp is less than 16")
+      ->capture_default_str()
+      ->type_name("I,C,B");
 }
 
 void add_compare_options(CLI::App& command, CompareCommand& compare) {
@@ -96,6 +103,10 @@ void add_compare_options(CLI::App& command, CompareCommand& compare) {
       ->check(CLI::PositiveNumber)
       ->type_name("SECONDS");
   command.add_option("--terms", compare.terms, "Terms to compute: interior,camera,boundary")
+      ->capture_default_str();
+  command
+      .add_option("--samples", compare.samples,
+                  "Samples of each term, as in `limn gradient` (finite differences have none)")
       ->capture_default_str();
   command
       .add_option("--step", compare.step,

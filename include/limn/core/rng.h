@@ -12,7 +12,17 @@ inline uint64_t mix_bits(uint64_t z) {
   return z ^ (z >> 31);
 }
 
-enum class Purpose : uint64_t { kFilm, kBsdf, kEmitter, kRoulette, kEdge, kEdgeSide, kCamera };
+enum class Purpose : uint64_t {
+  kFilm,
+  kBsdf,
+  kEmitter,
+  kRoulette,
+  kEdge,
+  kEdgeSide,
+  kCamera,
+  kPathCopy,
+  kEdgeCopy
+};
 
 // SplitMix64 started from a hash of (seed, pixel, sample): a stream for one path. `at` derives the
 // stream of one path vertex and one purpose, so that drawing more numbers at one place leaves all
@@ -26,6 +36,8 @@ class Rng {
   Rng at(Purpose purpose, uint64_t depth) const {
     return Rng(mix_bits(key_ + kGolden * (1 + static_cast<uint64_t>(purpose) + 64 * depth)));
   }
+  // The stream of one of several samples of the same kind; the first is this one itself.
+  Rng copy(Purpose purpose, int index) const { return index == 0 ? *this : at(purpose, index); }
   // Uniform in [0, 1), 53 bits.
   double uniform() {
     state_ += kGolden;

@@ -12,6 +12,7 @@ struct CheckOptions {
   std::string sampler = "brute";
   double step = 0;  // of the finite differences; 0 takes the parameter's natural step
   int block = 0;    // pixels; 0 splits the longer side into eight
+  std::optional<SampleCounts> samples = SampleCounts{};  // of the gradient
 };
 
 // A whole image summed: gradient and differences, each with its standard error.

@@ -3,6 +3,7 @@
 // returns an image with what it knows of its own error.
 #include <array>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <variant>
@@ -56,8 +57,9 @@ struct MethodInput {
   const Scene& scene;
   std::string parameter;
   std::array<bool, kTermCount> terms = {true, true, true};
-  double step = 0;  // of finite differences; 0: found by a pilot
-  int block = 8;    // pixels, of the block sums
+  double step = 0;                                     // of finite differences; 0: found by a pilot
+  int block = 8;                                       // pixels, of the block sums
+  std::optional<SampleCounts> samples = std::nullopt;  // of the samplers; none: chosen by a pilot
 };
 
 // One method per sampler of the registry, which computes the terms by gradient(); and "fd", central

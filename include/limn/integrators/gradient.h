@@ -5,6 +5,7 @@
 //   + boundary (silhouettes that shading points see), after Li et al. 2018 with directions held
 //   fixed in solid angle everywhere.
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,11 +19,27 @@ enum Term { kInterior = 0, kCamera = 1, kBoundary = 2 };
 inline constexpr int kTermCount = 3;
 const char* term_name(int term);
 
+// What one sample per pixel holds of each term. Each term is averaged over its own, so that all
+// results have the same mean whatever the counts.
+struct SampleCounts {
+  int interior = 1;   // paths; 1 if the interior term is not computed
+  double camera = 1;  // points on edges that the camera sees, per pixel; may be less than one
+  int boundary = 1;   // edges at every vertex of the first path
+  bool operator==(const SampleCounts&) const = default;
+};
+// "3,0.5,1": in the order of the terms.
+std::string to_string(const SampleCounts& samples);
+
 struct GradientOptions {
   std::vector<std::string> parameters;
   std::array<bool, kTermCount> terms = {true, true, true};
   std::string sampler = "brute";  // how shading points choose an edge, see edge_sampler.h
-  int block = 0;                  // also keep moments of sums over blocks of this many pixels
+  // None: chosen for the least squared error after equal time, all parameters alike, by a pilot of
+  // two to eight samples per pixel with a seed of its own, which are then thrown away. One of each
+  // if spp is less than 16, for one term alone, or if less than two samples of the pilot fit into
+  // an eighth of the limit of time. The choice does not depend on clocks but for that.
+  std::optional<SampleCounts> samples = SampleCounts{};
+  int block = 0;  // also keep moments of sums over blocks of this many pixels
 };
 
 // Derivative images of one parameter, crop_height by crop_width by 3, per unit of the parameter.
@@ -54,15 +71,17 @@ struct GradientResult {
   std::vector<ParameterGradient> parameters;  // in the order asked for
   Moments radiance;                           // the image itself, from the same paths
   std::array<TermCost, kTermCount> costs;
-  int64_t spp = 0;  // samples per pixel that were finished
+  int64_t spp = 0;       // samples per pixel that were finished
+  SampleCounts samples;  // what each of them held
+  int pilot_spp = 0;     // samples per pixel of the pilot that chose them
   double seconds = 0;
-  double setup_seconds = 0;  // edges, samplers, ray tracer
+  double setup_seconds = 0;  // edges, samplers, ray tracer, pilot
   NonFinite non_finite;
   std::vector<std::string> warnings;
 };
 
 // More than kLanes parameters take several passes over the same samples. InputError for unknown
-// parameters or samplers.
+// parameters or samplers, and for counts that are not positive.
 GradientResult gradient(const Scene& scene, const GradientOptions& options,
                         const RunSettings& settings);
 

@@ -1,0 +1,283 @@
+// How the work is shared among the terms: no choice changes what is estimated, and the pilot's
+// choice goes the right way.
+#include <gtest/gtest.h>
+
+#include "integrators/allocation.h"
+#include "limn/core/error.h"
+#include "limn/integrators/check.h"
+#include "support/meshes.h"
+#include "support/scenes.h"
+
+namespace limn {
+namespace {
+
+double error_times_cost(const PilotFigures& f, const SampleCounts& n) {
+  const double counts[] = {static_cast<double>(n.interior), n.camera,
+                           static_cast<double>(n.boundary)};
+  double variance = 0;
+  double cost = 0;
+  for (int t = 0; t < kTermCount; ++t) {
+    variance += f[t].variance / counts[t];
+    cost += f[t].cost * counts[t];
+  }
+  return variance * cost;
+}
+
+// (sum of sqrt(variance cost))^2, reached where samples ~ sqrt(variance / cost).
+double least_product(const PilotFigures& figures) {
+  double sum = 0;
+  for (const TermFigures& f : figures) sum += std::sqrt(f.variance * f.cost);
+  return sum * sum;
+}
+
+TEST(BestSamples, AreProportionalToTheRootOfVarianceOverCost) {
+  EXPECT_EQ(best_samples({{{1, 1}, {1, 1}, {1, 1}}}), (SampleCounts{1, 1, 1}));
+  EXPECT_EQ(best_samples({{{4, 1}, {1, 1}, {1, 1}}}), (SampleCounts{2, 1, 1}));
+  EXPECT_EQ(best_samples({{{1, 1}, {1, 4}, {9, 1}}}), (SampleCounts{1, 0.5, 3}));
+  EXPECT_EQ(best_samples({{{1, 4}, {4, 1}, {1, 4}}}), (SampleCounts{1, 4, 1}));
+}
+
+TEST(BestSamples, ReachTheLeastErrorWithinTheirRange) {
+  Rng rng(1, 2, 3);
+  for (int i = 0; i < 200; ++i) {
+    PilotFigures figures;
+    // Ratios of counts up to 4.
+    for (TermFigures& f : figures) f = {std::exp2(4 * rng.uniform()), 1};
+    const SampleCounts best = best_samples(figures);
+    const double least = least_product(figures);
+    EXPECT_GE(error_times_cost(figures, best), least * (1 - 1e-12));
+    // Rounded to whole numbers, real counts change by factors within [1 / sqrt(2), sqrt(2)]; the
+    // product then grows by at most 9 / 8 (Kantorovich's inequality), and by the tie.
+    EXPECT_LE(error_times_cost(figures, best), 1.01 * 9 / 8 * least);
+  }
+}
+
+TEST(BestSamples, AreLimited) {
+  EXPECT_EQ(best_samples({{{1e6, 1}, {1, 1}, {1, 1}}}), (SampleCounts{8, 0.125, 1}));
+  EXPECT_EQ(best_samples({{{0, 1}, {0, 1}, {1, 1}}}), (SampleCounts{1, 0.125, 8}));
+  EXPECT_EQ(best_samples({{{1, 1}, {0, 0}, {0, 0}}}), SampleCounts{});
+  EXPECT_EQ(best_samples({}), SampleCounts{});
+}
+
+TEST(PilotSamples, AreFewAndNoneForShortJobs) {
+  EXPECT_EQ(pilot_samples(64 * 64, 15), 0);
+  EXPECT_EQ(pilot_samples(64 * 64, 16), 2);
+  EXPECT_EQ(pilot_samples(16 * 16, 1024), 8);
+  EXPECT_EQ(pilot_samples(1024 * 1024, 1024), 2);
+  for (int spp = 16; spp < 100; ++spp) EXPECT_LE(8 * pilot_samples(64, spp), spp);
+}
+
+SceneParts base_scene(const TempFiles& files) {
+  SceneParts parts;
+  parts.body = square("floor", 2.5, -90, {0, 0, 0}, conductor("gloss", 0.3)) +
+               obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(1)), false, 0.8,
+                         {0.2, 1, 0}, diffuse("clay", "0.7, 0.5, 0.3")) +
+               square("lamp", 0.5, 90, {0.3, 2.4, 0.5}, area_light("glow", "6, 5, 4")) +
+               make_sky(files, "sky");
+  return parts;
+}
+
+// A black body over a floor under an even sky: nothing slides.
+Scene shadow_scene(const TempFiles& files) {
+  SceneParts parts;
+  parts.max_depth = 2;
+  parts.origin = {0, 3, 3};
+  parts.target = {0, 0, 0};
+  parts.body = square("floor", 2.5, -90, {0, 0, 0}, diffuse("chalk", "0.8, 0.8, 0.8")) +
+               obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(1)), true, 0.5,
+                         {0, 1, 0}, diffuse("soot", "0, 0, 0")) +
+               constant_light("sky", "1, 1, 1");
+  return make_scene(files, parts);
+}
+
+GradientResult run(const Scene& scene, const std::vector<std::string>& parameters,
+                   const std::optional<SampleCounts>& samples, const RunSettings& settings,
+                   std::array<bool, kTermCount> terms = {true, true, true}) {
+  GradientOptions options;
+  options.parameters = parameters;
+  options.samples = samples;
+  options.terms = terms;
+  return gradient(scene, options, settings);
+}
+
+RunSettings run_settings(int spp, int threads = 1) {
+  RunSettings settings;
+  settings.spp = spp;
+  settings.seed = 5;
+  settings.threads = threads;
+  return settings;
+}
+
+TEST(Choice, GoesTheRightWay) {
+  const TempFiles files;
+  const Scene lit = make_scene(files, base_scene(files));
+  // How bright the lamp is moves no edge, the interior has all the noise.
+  const SampleCounts still = run(lit, {"glow.radiance"}, {}, run_settings(64)).samples;
+  EXPECT_GT(still.interior, 1);
+  EXPECT_EQ(still.boundary, 1);
+  // Where nothing slides, edges have all the noise.
+  const SampleCounts shadow =
+      run(shadow_scene(files), {"ball.translate.y"}, {}, run_settings(64)).samples;
+  EXPECT_EQ(shadow.interior, 1);
+  EXPECT_GE(shadow.boundary, 2);
+  // Both parameters count.
+  EXPECT_GT(run(lit, {"ball.translate.x", "glow.radiance"}, {}, run_settings(64)).samples.interior,
+            1);
+}
+
+// A choice that is better by its own figures must be better by those of long runs, too.
+TEST(Choice, LowersTheErrorForTheWork) {
+  const TempFiles files;
+  const Scene scene = shadow_scene(files);
+  const auto product = [&](const SampleCounts& samples) {
+    const GradientResult r = run(scene, {"ball.translate.y"}, samples, run_settings(256));
+    const Moments& total = r.parameters[0].total;
+    double variance = 0;
+    for (size_t i = 0; i < total.size(); ++i) variance += total.variance(i);
+    double rays = 0;
+    for (const TermCost& cost : r.costs) rays += static_cast<double>(cost.rays);
+    return variance * rays;
+  };
+  const GradientResult chosen = run(scene, {"ball.translate.y"}, {}, run_settings(64));
+  EXPECT_NE(chosen.samples, SampleCounts{});
+  EXPECT_LT(product(chosen.samples), product({}));
+}
+
+TEST(Choice, IsNotMadeForShortJobsOrOneTerm) {
+  const TempFiles files;
+  const Scene scene = shadow_scene(files);
+  const GradientResult brief = run(scene, {"ball.translate.y"}, {}, run_settings(15));
+  EXPECT_EQ(brief.samples, SampleCounts{});
+  EXPECT_EQ(brief.pilot_spp, 0);
+  const GradientResult alone =
+      run(scene, {"ball.translate.y"}, {}, run_settings(64), {false, false, true});
+  EXPECT_EQ(alone.samples, SampleCounts{});
+  EXPECT_EQ(alone.pilot_spp, 0);
+}
+
+void expect_same(const Moments& a, const Moments& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a.mean(i), b.mean(i)) << i;
+    EXPECT_EQ(a.variance(i), b.variance(i)) << i;
+  }
+}
+
+void expect_same(const GradientResult& a, const GradientResult& b) {
+  EXPECT_EQ(a.samples, b.samples);
+  expect_same(a.radiance, b.radiance);
+  for (size_t k = 0; k < a.parameters.size(); ++k) {
+    expect_same(a.parameters[k].total, b.parameters[k].total);
+    for (int t = 0; t < kTermCount; ++t) {
+      expect_same(a.parameters[k].terms[t], b.parameters[k].terms[t]);
+    }
+  }
+}
+
+// Also of the choice; five parameters take two passes.
+TEST(Choice, SameBitsOnAnyNumberOfThreads) {
+  const TempFiles files;
+  const Scene scene = make_scene(files, base_scene(files));
+  const std::vector<std::string> parameters = {"ball.translate.x", "ball.rotate.y", "ball.scale",
+                                               "glow.radiance", "sensor.translate.x"};
+  const GradientResult one = run(scene, parameters, {}, run_settings(32));
+  EXPECT_GT(one.pilot_spp, 0);
+  EXPECT_NE(one.samples, SampleCounts{});
+  for (const int threads : {2, 7}) {
+    expect_same(one, run(scene, parameters, {}, run_settings(32, threads)));
+  }
+}
+
+// The pilot leaves nothing behind but its choice.
+TEST(Choice, GivesTheBitsOfARunWithTheseSamples) {
+  const TempFiles files;
+  const Scene scene = make_scene(files, base_scene(files));
+  const GradientResult chosen = run(scene, {"ball.translate.x"}, {}, run_settings(32));
+  expect_same(chosen, run(scene, {"ball.translate.x"}, chosen.samples, run_settings(32)));
+
+  RunSettings limited = run_settings(1 << 30, 2);
+  limited.seconds = 0.3;
+  const GradientResult timed = run(scene, {"ball.translate.x"}, {}, limited);
+  EXPECT_GE(timed.spp, 1);
+  expect_same(timed, run(scene, {"ball.translate.x"}, timed.samples,
+                         run_settings(static_cast<int>(timed.spp))));
+}
+
+TEST(Choice, IsLeftWhenInterrupted) {
+  const TempFiles files;
+  const std::atomic<bool> stop = true;
+  RunSettings settings = run_settings(64);
+  settings.interrupted = &stop;
+  const GradientResult r = run(shadow_scene(files), {"ball.translate.y"}, {}, settings);
+  EXPECT_EQ(r.spp, 0);
+  EXPECT_EQ(r.samples, SampleCounts{});
+}
+
+// More samples of a term lower its variance as independent samples do, and leave the others as they
+// are.
+TEST(Samples, OfATermLowerItsVarianceAlone) {
+  const TempFiles files;
+  const Scene scene = make_scene(files, base_scene(files));
+  const auto variances = [&](const SampleCounts& samples) {
+    const GradientResult r = run(scene, {"ball.translate.x"}, samples, run_settings(256));
+    std::array<double, kTermCount> sums{};
+    for (int t = 0; t < kTermCount; ++t) {
+      const Moments& term = r.parameters[0].terms[t];
+      for (size_t i = 0; i < term.size(); ++i) sums[t] += term.variance(i);
+    }
+    return sums;
+  };
+  const auto one = variances({1, 1, 1});
+  const auto more = variances({4, 4, 4});
+  const auto boundary = variances({1, 1, 4});
+  const auto interior = variances({4, 1, 1});
+  for (int t = 0; t < kTermCount; ++t) EXPECT_LT(more[t], one[t]) << term_name(t);
+  EXPECT_EQ(boundary[kInterior], one[kInterior]);
+  EXPECT_EQ(boundary[kCamera], one[kCamera]);
+  EXPECT_EQ(boundary[kBoundary], more[kBoundary]);
+  EXPECT_EQ(interior[kBoundary], one[kBoundary]);
+  EXPECT_EQ(interior[kInterior], more[kInterior]);
+}
+
+TEST(Samples, AreCounted) {
+  const TempFiles files;
+  const Scene scene = make_scene(files, base_scene(files));
+  const auto counts = [&](const SampleCounts& samples, std::array<bool, kTermCount> terms) {
+    return run(scene, {"ball.translate.x"}, samples, run_settings(2), terms).costs;
+  };
+  const uint64_t paths = 16 * 16 * 2;
+  const auto one = counts({1, 1, 1}, {true, true, true});
+  const auto more = counts({3, 0.5, 4}, {true, true, true});
+  EXPECT_EQ(more[kInterior].samples, 3 * paths);
+  EXPECT_EQ(more[kCamera].samples, paths / 2);
+  EXPECT_EQ(more[kBoundary].samples, 4 * one[kBoundary].samples);
+  // Without the interior term there is nothing that more paths are good for.
+  EXPECT_EQ(counts({3, 1, 4}, {false, true, true})[kInterior].samples, paths);
+}
+
+TEST(Samples, AgreeWithDifferences) {
+  const TempFiles files;
+  const Scene scene = make_scene(files, base_scene(files));
+  CheckOptions options;
+  options.parameter = "ball.translate.x";
+  options.block = 4;
+  for (const auto& samples :
+       {std::optional<SampleCounts>{}, std::optional<SampleCounts>{{3, 0.25, 2}}}) {
+    options.samples = samples;
+    const CheckResult r = check(scene, options, run_settings(256));
+    EXPECT_GT(r.extrapolated.count, 0);
+    EXPECT_TRUE(r.agree) << to_string(r.gradient.samples);
+  }
+}
+
+TEST(Samples, MustBePositive) {
+  const TempFiles files;
+  const Scene scene = shadow_scene(files);
+  for (const SampleCounts& samples : {SampleCounts{0, 1, 1}, SampleCounts{1, 0, 1},
+                                      SampleCounts{1, 1, -1}, SampleCounts{1, NAN, 1}}) {
+    EXPECT_THROW(run(scene, {"ball.translate.y"}, samples, run_settings(1)), InputError);
+  }
+}
+
+}  // namespace
+}  // namespace limn
