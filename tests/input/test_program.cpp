@@ -71,6 +71,35 @@ TEST_F(Program, RendersAndDifferentiates) {
   EXPECT_EQ(run("info " + scene_).status, 0);
 }
 
+TEST_F(Program, SharesTheWorkAmongTerms) {
+  const std::string figures = files_.path("figures.json");
+  const std::string gradient = "gradient " + scene_ + " --wrt screen.translate.x --threads 1" +
+                               " --json " + figures + " -o " + out();
+  const auto report = [&](const std::string& arguments) {
+    const Outcome outcome = run(gradient + arguments);
+    EXPECT_EQ(outcome.status, 0) << outcome.text;
+    std::ifstream stream(figures);
+    return std::pair(nlohmann::json::parse(stream), outcome.text);
+  };
+  const auto [given, given_text] = report(" --spp 16 --samples 3,0.5,2");
+  EXPECT_EQ(given["samples"], (nlohmann::json{{"interior", 3}, {"camera", 0.5}, {"boundary", 2}}));
+  EXPECT_EQ(given["pilot_spp"], 0);
+  EXPECT_EQ(given["costs"]["interior"]["samples"], 3 * 16 * 64);
+  EXPECT_NE(given_text.find("3,0.5,2"), std::string::npos) << given_text;
+  std::string attribute;
+  for (const ImageAttribute& a : read_exr_attributes(out())) {
+    if (a.name == "limn.samples") attribute = a.value;
+  }
+  EXPECT_EQ(attribute, "3,0.5,2");
+
+  const auto [chosen, chosen_text] = report(" --spp 16");
+  EXPECT_EQ(chosen["pilot_spp"], 2);
+  EXPECT_NE(chosen_text.find("chosen by 2"), std::string::npos) << chosen_text;
+  const auto [brief, brief_text] = report(" --spp 15");
+  EXPECT_EQ(brief["pilot_spp"], 0);
+  EXPECT_EQ(brief["samples"], (nlohmann::json{{"interior", 1}, {"camera", 1}, {"boundary", 1}}));
+}
+
 TEST_F(Program, Compares) {
   const std::string folder = files_.path("folder");
   const std::string compare = "compare " + scene_ + " --wrt screen.translate.x --time 0.1" +
@@ -185,6 +214,16 @@ TEST_F(Program, BadNumbers) {
             std::string::npos);
   EXPECT_EQ(refused("check " + scene_ + " --wrt screen.translate.x --spp 1"),
             "error: check needs --spp of at least 2, for standard errors\n");
+}
+
+TEST_F(Program, BadSamples) {
+  const std::string gradient = "gradient " + scene_ + " --wrt screen.translate.x -o " + out();
+  for (const char* samples : {"3", "3,1", "3,1,1,1", "3;1;1", "0,1,1", "1,0,1", "1,1,0.5",
+                              "1.5,1,1", "1,1,2000", "-1,1,1", "many", "''"}) {
+    const std::string message = refused(gradient + " --samples=" + samples);
+    EXPECT_NE(message.find("--samples"), std::string::npos) << samples << ": " << message;
+    EXPECT_NE(message.find("3,0.5,1"), std::string::npos) << samples << ": " << message;
+  }
 }
 
 TEST_F(Program, BadDefines) {

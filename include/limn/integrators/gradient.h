@@ -37,7 +37,8 @@ struct GradientOptions {
   // None: chosen for the least squared error after equal time, all parameters alike, by a pilot of
   // two to eight samples per pixel with a seed of its own, which are then thrown away. One of each
   // if spp is less than 16, for one term alone, or if less than two samples of the pilot fit into
-  // an eighth of the limit of time. The choice does not depend on clocks but for that.
+  // an eighth of the limit of time. The choice does not depend on clocks but for that; it does on
+  // the crop.
   std::optional<SampleCounts> samples = SampleCounts{};
   int block = 0;  // also keep moments of sums over blocks of this many pixels
 };
