@@ -57,7 +57,7 @@ class Pass {
         lights_(scene_),
         context_{scene_, *tracer_, lights_},
         tiles_(make_tiles(scene_.film)) {
-    input_ = make_sampler_input(scene_);
+    if (options.terms[kBoundary] || options.terms[kCamera]) input_ = make_sampler_input(scene_);
     for (int k = 0; k < lanes_; ++k) {
       input_.lane_scale[k] = find_parameter(scene, parameters[k]).natural_step;
     }
