@@ -14,9 +14,10 @@ namespace {
 
 constexpr double kPilotShare = 0.1;  // of the time of a run
 constexpr int kPilotSamples = 4;     // per pixel, at least
-// The steps that the pilot tries, in natural steps: that one is for pictures that change a lot.
-constexpr double kNear = 1.0 / 8;
-constexpr double kFactor = 16;
+// The steps that the pilot tries: down from the natural one, which is for pictures that change a
+// lot.
+constexpr int kTrials = 5;
+constexpr double kFactor = 4;
 
 struct Pilot {
   double step = 0;
@@ -73,26 +74,36 @@ class DifferenceMethod final : public DerivativeMethod {
     settings.progress = nullptr;
     settings.least_spp = kPilotSamples;
     settings.seed = run.seed + 1;  // not the samples that the run will take
-    const double near = kNear * natural_;
-    const CentralDifferences r =
-        central_differences(input_.scene, input_.parameter, {near, kFactor * near},
-                            {{1, 0}, {0, 1}, {-1, 1}}, input_.block, settings);
+    std::vector<double> steps;
+    for (int k = kTrials - 1; k >= 0; --k) steps.push_back(natural_ * std::pow(kFactor, -k));
+    const CentralDifferences r = central_differences(input_.scene, input_.parameter, steps,
+                                                     steps_and_changes(), input_.block, settings);
     if (r.spp < kPilotSamples) return {natural_, r.seconds, "interrupted"};
-    PilotFigures figures;
-    figures.step = near;
-    figures.factor = kFactor;
-    figures.variance = mean_variance(r.estimates[0].total) * static_cast<double>(r.spp);
-    figures.variance_far = mean_variance(r.estimates[1].total) * static_cast<double>(r.spp);
-    figures.squared_change =
-        mean_square(means(r.estimates[2].total)) - mean_variance(r.estimates[2].total);
-    // Four images take twice the time of two.
-    figures.samples_per_second =
-        2 * static_cast<double>(r.spp) / std::max(r.seconds - r.setup_seconds, 1e-9);
-    const double left = run.seconds - r.seconds - 0.5 * r.setup_seconds;
-    return {best_step(figures, left), r.seconds,
-            fmt::format("a pilot of {} samples per pixel at steps {:.3g} and {:.3g}: least sum of "
-                        "squared bias and variance for a run of {:.3g} s",
-                        r.spp, near, kFactor * near, run.seconds)};
+    std::vector<StepTrial> trials;
+    for (int k = 0; k < kTrials; ++k) {
+      const Moments& change = r.estimates[kTrials + std::max(k - 1, 0)].total;
+      trials.push_back({steps[k], mean_variance(r.estimates[k].total) * static_cast<double>(r.spp),
+                        mean_square(means(change)) - mean_variance(change)});
+    }
+    // A run makes two images a sample, the pilot 2 kTrials.
+    const double samples_per_second =
+        kTrials * static_cast<double>(r.spp) / std::max(r.seconds - r.setup_seconds, 1e-9);
+    const double left = run.seconds - r.seconds - r.setup_seconds / kTrials;
+    return {best_step(trials, samples_per_second * left), r.seconds,
+            fmt::format("a pilot of {} samples per pixel at {} steps from {:.3g} to {:.3g}: least "
+                        "sum of squared bias and variance for a run of {:.3g} s",
+                        r.spp, kTrials, steps.front(), steps.back(), run.seconds)};
+  }
+
+  // The differences at every step, and what changes from each to the next.
+  static std::vector<std::vector<double>> steps_and_changes() {
+    std::vector<std::vector<double>> combinations(2 * kTrials - 1, std::vector<double>(kTrials));
+    for (int k = 0; k < kTrials; ++k) combinations[k][k] = 1;
+    for (int k = 0; k + 1 < kTrials; ++k) {
+      combinations[kTrials + k][k] = -1;
+      combinations[kTrials + k][k + 1] = 1;
+    }
+    return combinations;
   }
 
   const MethodInput& input_;
@@ -104,19 +115,23 @@ class DifferenceMethod final : public DerivativeMethod {
 
 }  // namespace
 
-double best_step(const PilotFigures& pilot, double seconds) {
-  const double far = pilot.factor * pilot.step;
-  const double samples = std::max(1.0, pilot.samples_per_second * seconds);
-  if (!(pilot.variance_far > 0)) return far;
-  // A bias that drowns in the noise of the smaller step may still be too large at the larger one.
-  if (!(pilot.squared_change > 0)) return std::sqrt(pilot.step * far);
-  if (!(pilot.variance > 0)) return pilot.step;
-  const double bias = pilot.squared_change / std::pow(pilot.factor * pilot.factor - 1, 2);  // B h^4
-  const double power = std::log(pilot.variance / pilot.variance_far) / std::log(pilot.factor);
-  if (!(power > 0)) return pilot.step;
-  // With x the step over h: minimum of bias x^4 + (variance / samples) x^-power.
-  const double x = std::pow(power * pilot.variance / samples / (4 * bias), 1 / (4 + power));
-  return std::clamp(x, 1.0, pilot.factor) * pilot.step;
+double best_step(std::span<const StepTrial> trials, double samples) {
+  const double factor = trials[1].step / trials[0].step, square = factor * factor;
+  std::vector<double> errors;
+  for (size_t k = 0; k < trials.size(); ++k) {
+    const double change = std::max(0.0, trials[std::max<size_t>(k, 1)].squared_change);
+    // b (h^2 - (h / factor)^2) changes, b h^2 is the bias.
+    const double scale = square / (square - 1) / (k == 0 ? square : 1);
+    errors.push_back(change * scale * scale + trials[k].variance / std::max(1.0, samples));
+  }
+  const auto best =
+      static_cast<size_t>(std::min_element(errors.begin(), errors.end()) - errors.begin());
+  const double middle = trials[best].step;
+  if (best == 0 || best + 1 == errors.size() || !(errors[best] > 0)) return middle;
+  const double left = std::log(errors[best - 1] / errors[best]);
+  const double right = std::log(errors[best + 1] / errors[best]);
+  const double offset = left + right > 0 ? 0.5 * (left - right) / (left + right) : 0;
+  return middle * std::pow(factor, offset);
 }
 
 std::unique_ptr<DerivativeMethod> make_difference_method(const MethodInput& input) {

@@ -1,5 +1,7 @@
 #pragma once
 // Finite differences as a method to compare with, and how their step is found.
+#include <span>
+
 #include "limn/integrators/derivative_method.h"
 
 namespace limn {
@@ -8,19 +10,16 @@ inline constexpr const char* kDifferences = "fd";
 
 std::unique_ptr<DerivativeMethod> make_difference_method(const MethodInput& input);
 
-// What a pilot saw of central differences at two steps, as means over pixels and channels.
-struct PilotFigures {
-  double step = 0;                // the smaller one, h
-  double factor = 4;              // the other one is factor * h
-  double variance = 0;            // of one sample at h
-  double variance_far = 0;        // of one sample at factor * h
-  double squared_change = 0;      // of (D_far - D_h)^2, minus its own variance
-  double samples_per_second = 0;  // of two images
+// What a pilot saw of central differences D_h at one step, as means over pixels and channels.
+struct StepTrial {
+  double step = 0;            // h
+  double variance = 0;        // of one sample
+  double squared_change = 0;  // of (D_h - D of the next smaller step)^2, minus its own variance
 };
-// The step of least expected squared error for a run of that many seconds, between h and
-// factor * h: B h^4 + V(h) / n, where B h^4 (factor^2 - 1)^2 = squared_change at the smaller step,
-// and V is the power of h that goes through both variances. Without a bias to be seen, the
-// geometric middle of the two steps.
-double best_step(const PilotFigures& pilot, double seconds);
+// The step of least expected squared error with that many samples. trials: by ascending step, each
+// the same factor times the one before; the squared change of the first is not used. The bias
+// grows with h^2, which gives the squared bias of a step from its change, and that of the first
+// from the second's. Between trials the error is interpolated, a parabola in logarithms.
+double best_step(std::span<const StepTrial> trials, double samples);
 
 }  // namespace limn

@@ -221,31 +221,39 @@ TEST(Differences, TakeTheStepThatIsGiven) {
   EXPECT_EQ(std::get<double>(method->settings()[0].value), 0.015625);
 }
 
-// Against a search over many steps.
-TEST(Differences, BestStepIsTheMinimum) {
-  PilotFigures pilot;
-  pilot.step = 0.01;
-  pilot.factor = 16;
-  pilot.samples_per_second = 50;
+// Trials of exact power laws: squared bias B h^4, variance V / h^power.
+std::vector<StepTrial> trials_of(double bias, double variance, double power) {
+  std::vector<StepTrial> trials;
+  for (int k = 0; k < 5; ++k) {
+    const double h = 0.001 * std::pow(4, k);
+    const double change = std::sqrt(bias) * (h * h - h * h / 16);
+    trials.push_back({h, variance * std::pow(h, -power), k > 0 ? change * change : 1e9});
+  }
+  return trials;
+}
+
+// Interpolating never does worse than the best trial.
+TEST(Differences, BestStepIsNearTheMinimum) {
   for (const double power : {0.5, 1.0, 2.0}) {
-    for (const double bias : {1e-5, 1e-4, 1e-3}) {  // squared, at the smaller step
-      pilot.variance = 3;
-      pilot.variance_far = 3 * std::pow(16, -power);
-      pilot.squared_change = bias * 255 * 255;
-      const auto error = [&](double x) {
-        return bias * std::pow(x, 4) + 3 * std::pow(x, -power) / (50 * 2);
+    for (const double optimum : {0.004, 0.01, 0.03, 0.06}) {
+      const double bias = 10, samples = 100;
+      // The derivative of B h^4 + V h^-power / n is zero there.
+      const double variance = 4 * bias * samples / power * std::pow(optimum, 4 + power);
+      const auto error = [&](double h) {
+        return bias * std::pow(h, 4) + variance * std::pow(h, -power) / samples;
       };
-      const double found = best_step(pilot, 2) / pilot.step;
-      EXPECT_GE(found, 1);
-      EXPECT_LE(found, 16);
-      for (double x = 1; x <= 16; x *= 1.01) EXPECT_LE(error(found), error(x) * (1 + 1e-9));
+      const double found = best_step(trials_of(bias, variance, power), samples);
+      for (int k = 0; k < 5; ++k) {
+        EXPECT_LE(error(found), error(0.001 * std::pow(4, k)) * (1 + 1e-9)) << power << optimum;
+      }
     }
   }
-  pilot.squared_change = -1;  // no bias to be seen
-  EXPECT_DOUBLE_EQ(best_step(pilot, 2), 0.04);
-  pilot.squared_change = 1;
-  pilot.variance_far = pilot.variance;  // nothing to gain from a larger step
-  EXPECT_EQ(best_step(pilot, 2), 0.01);
+  // Without bias the largest step, without noise the smallest.
+  EXPECT_DOUBLE_EQ(best_step(trials_of(0, 1, 1), 100), 0.256);
+  EXPECT_DOUBLE_EQ(best_step(trials_of(1, 0, 1), 100), 0.001);
+  // Noise that does not fall with the step: as small as the bias needs it, whatever is far away.
+  std::vector<StepTrial> trials = trials_of(10, 1, 0);
+  EXPECT_LT(best_step(trials, 100), 0.256);
 }
 
 class ReferenceFile : public testing::Test {
