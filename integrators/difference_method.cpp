@@ -117,21 +117,24 @@ class DifferenceMethod final : public DerivativeMethod {
 
 double best_step(std::span<const StepTrial> trials, double samples) {
   const double factor = trials[1].step / trials[0].step, square = factor * factor;
-  std::vector<double> errors;
+  std::vector<double> biases, errors;  // squared
   for (size_t k = 0; k < trials.size(); ++k) {
-    const double change = std::max(0.0, trials[std::max<size_t>(k, 1)].squared_change);
     // b (h^2 - (h / factor)^2) changes, b h^2 is the bias.
+    const double change = std::max(0.0, trials[std::max<size_t>(k, 1)].squared_change);
     const double scale = square / (square - 1) / (k == 0 ? square : 1);
-    errors.push_back(change * scale * scale + trials[k].variance / std::max(1.0, samples));
+    biases.push_back(change * scale * scale);
+    errors.push_back(biases[k] + trials[k].variance / std::max(1.0, samples));
   }
-  const auto best =
-      static_cast<size_t>(std::min_element(errors.begin(), errors.end()) - errors.begin());
-  const double middle = trials[best].step;
-  if (best == 0 || best + 1 == errors.size() || !(errors[best] > 0)) return middle;
-  const double left = std::log(errors[best - 1] / errors[best]);
-  const double right = std::log(errors[best + 1] / errors[best]);
-  const double offset = left + right > 0 ? 0.5 * (left - right) / (left + right) : 0;
-  return middle * std::pow(factor, offset);
+  const auto least = std::min_element(errors.begin(), errors.end());
+  const auto k = static_cast<size_t>(least - errors.begin());
+  if (k == 0 || k + 1 == trials.size()) return trials[k].step;
+  // With x the step over trial k's: minimum of bias x^4 + noise x^-power.
+  const double bias = biases[k] > 0 ? biases[k] : biases[k + 1] / (square * square);
+  const double noise = errors[k] - biases[k];
+  const double power = std::log(trials[k - 1].variance / trials[k + 1].variance) / std::log(square);
+  if (!(bias > 0 && power > 0)) return trials[k].step;
+  const double x = std::pow(power * noise / (4 * bias), 1 / (4 + power));
+  return std::clamp(x, 1 / factor, factor) * trials[k].step;
 }
 
 std::unique_ptr<DerivativeMethod> make_difference_method(const MethodInput& input) {

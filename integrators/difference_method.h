@@ -19,7 +19,7 @@ struct StepTrial {
 // The step of least expected squared error with that many samples. trials: by ascending step, each
 // the same factor times the one before; the squared change of the first is not used. The bias
 // grows with h^2, which gives the squared bias of a step from its change, and that of the first
-// from the second's. Between trials the error is interpolated, a parabola in logarithms.
+// from the second's; around the best trial the variance is taken for a power of h.
 double best_step(std::span<const StepTrial> trials, double samples);
 
 }  // namespace limn
