@@ -148,6 +148,20 @@ std::map<std::string, std::string> parse_defines(const std::vector<std::string>&
   return parsed;
 }
 
+// CLI11 alone would say no more than that a command is needed.
+void check_command(const CLI::App& app, int argc, char** argv) {
+  const std::string first = argc > 1 ? argv[1] : "";
+  if (first.starts_with('-')) return;
+  std::string known;
+  for (const CLI::App* command : app.get_subcommands(nullptr)) {
+    if (command->get_name() == first) return;
+    known += (known.empty() ? "" : ", ") + command->get_name();
+  }
+  throw limn::InputError(
+      (first.empty() ? "limn: a command is needed" : "limn " + first + ": no such command") +
+      " (known: " + known + "; limn --help tells more)");
+}
+
 int run(int argc, char** argv) {
   CLI::App app("limn: a path tracer that also computes how its image changes when the scene moves");
   app.require_subcommand(1);
@@ -192,6 +206,7 @@ int run(int argc, char** argv) {
   add_input(*reject, common, defines, "Scene file, or a mesh (.obj, .ply)", "SCENE|MESH");
   limn::add_reject_options(*reject, rejection);
 
+  check_command(app, argc, argv);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

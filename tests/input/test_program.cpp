@@ -201,7 +201,11 @@ TEST_F(Program, UnknownNamesListTheKnown) {
   EXPECT_NE(refused(gradient + " --terms interior,border").find("boundary"), std::string::npos);
   EXPECT_NE(refused("render " + scene_ + " --shading phong -o " + out()).find("continuous"),
             std::string::npos);
-  EXPECT_NE(refused("paint " + scene_).find("A subcommand is required"), std::string::npos);
+  EXPECT_NE(refused("paint " + scene_)
+                .find("limn paint: no such command (known: info, render, gradient, check, compare, "
+                      "reject; limn --help tells more)"),
+            std::string::npos);
+  EXPECT_NE(refused("").find("limn: a command is needed (known: info"), std::string::npos);
 }
 
 TEST_F(Program, BadNumbers) {
