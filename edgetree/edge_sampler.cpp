@@ -1,8 +1,8 @@
 #include "limn/edgetree/edge_sampler.h"
 
+#include "edgetree/samplers.h"
 #include "limn/core/error.h"
 #include "limn/edgetree/edge_forest.h"
-#include "samplers.h"
 
 namespace limn {
 

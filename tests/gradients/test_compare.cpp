@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "integrators/difference_method.h"
+#include "integrators/methods/difference_method.h"
 #include "limn/core/error.h"
 #include "support/temp_files.h"
 

@@ -1,4 +1,4 @@
-"""What tools/mitsuba_gradient.py says and returns where Mitsuba is not installed, or cannot do what
+"""What tools/mitsuba/mitsuba_gradient.py says and returns where Mitsuba is not installed, or cannot do what
 is asked.
 """
 
@@ -9,7 +9,7 @@ import tempfile
 import unittest
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
-TOOL = os.path.join(ROOT, "tools", "mitsuba_gradient.py")
+TOOL = os.path.join(ROOT, "tools", "mitsuba", "mitsuba_gradient.py")
 SCENE = os.path.join(ROOT, "scenes", "closed_form", "cube_in_sky.xml")
 
 
@@ -38,7 +38,7 @@ class TestMitsubaGradient(unittest.TestCase):
             (
                 3,
                 (
-                    f"tools/mitsuba_gradient.py: Mitsuba is not installed for {sys.executable} (No"
+                    f"tools/mitsuba/mitsuba_gradient.py: Mitsuba is not installed for {sys.executable} (No"
                     " module named 'mitsuba'): pip install mitsuba==3.9.1\n"
                 ),
             ),
@@ -56,7 +56,7 @@ class TestMitsubaGradient(unittest.TestCase):
                 (
                     4,
                     (
-                        f"tools/mitsuba_gradient.py: {name}: not supported by this method (known:"
+                        f"tools/mitsuba/mitsuba_gradient.py: {name}: not supported by this method (known:"
                         " SHAPE.translate.x, .y, .z, SHAPE.rotate.x, .y, .z, SHAPE.scale)\n"
                     ),
                 ),

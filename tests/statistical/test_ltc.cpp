@@ -6,11 +6,11 @@
 #include <memory>
 #include <vector>
 
-#include "../../edgetree/ltc.h"
-#include "../../edgetree/ltc_table.h"
 #include "../support/chi_square.h"
 #include "../support/quadrature.h"
 #include "../support/running_mean.h"
+#include "edgetree/lobe/ltc.h"
+#include "edgetree/lobe/ltc_table.h"
 #include "limn/core/rng.h"
 
 namespace limn {
@@ -18,7 +18,7 @@ namespace {
 
 using Kind = LobeSummary::Kind;
 
-#include "../../edgetree/ltc_tables.inc"
+#include "edgetree/lobe/ltc_tables.inc"
 
 // Fixed seeds: a p-value below this is an error, not luck.
 constexpr double kSignificance = 1e-6;

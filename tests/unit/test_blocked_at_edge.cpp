@@ -5,7 +5,7 @@
 
 #include <numeric>
 
-#include "integrators/path.h"
+#include "integrators/terms/path.h"
 #include "support/meshes.h"
 #include "support/scenes.h"
 

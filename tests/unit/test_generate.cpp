@@ -13,7 +13,7 @@
 #include "limn/integrators/crossings.h"
 #include "support/scenes.h"
 #include "support/temp_files.h"
-#include "tools/generate.h"
+#include "tools/generate/generate.h"
 
 namespace limn {
 namespace {

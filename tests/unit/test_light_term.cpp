@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "../../edgetree/light_term.h"
+#include "edgetree/light/light_term.h"
 #include "limn/core/rng.h"
 
 namespace limn {

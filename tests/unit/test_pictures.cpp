@@ -3,9 +3,9 @@
 
 #include <cmath>
 
-#include "../../tools/canvas.h"
-#include "../../tools/mesh_view.h"
 #include "../support/meshes.h"
+#include "tools/limn/reject/canvas.h"
+#include "tools/limn/reject/mesh_view.h"
 
 namespace limn {
 namespace {

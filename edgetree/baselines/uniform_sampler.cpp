@@ -1,0 +1,52 @@
+#include <algorithm>
+
+#include "edgetree/samplers.h"
+
+namespace limn {
+namespace {
+
+// Every edge of the scene is drawn alike; one that is no candidate ends the draw.
+class UniformSampler final : public EdgeSampler {
+ public:
+  explicit UniformSampler(const EdgeSamplerInput& input) : input_(input) {
+    for (const EdgeMesh& mesh : input.objects) ends_.push_back(count() + mesh.edges.size());
+  }
+
+  bool sample(const EdgeQuery& query, Rng& rng, EdgeSample& sample) const override {
+    if (count() == 0) return false;
+    const double u_edge = rng.uniform();
+    const auto index =
+        std::min(static_cast<uint64_t>(u_edge * static_cast<double>(count())), count() - 1);
+    const auto object = std::upper_bound(ends_.begin(), ends_.end(), index) - ends_.begin();
+    const uint64_t begin = object == 0 ? 0 : ends_[object - 1];
+    sample.edge = {static_cast<uint32_t>(object), static_cast<uint32_t>(index - begin)};
+    sample.t = rng.uniform();
+    sample.probability = probability(query, sample.edge);
+    sample.pdf_t = 1;
+    return sample.probability > 0;
+  }
+
+  double probability(const EdgeQuery& query, EdgeId id) const override {
+    const bool drawn = is_candidate(input_.objects[id.object], id.edge, query.p) &&
+                       !is_own_edge(input_, query, id);
+    return drawn ? 1 / static_cast<double>(count()) : 0;
+  }
+
+  double pdf_t(const EdgeQuery&, EdgeId, double t) const override {
+    return t >= 0 && t <= 1 ? 1 : 0;
+  }
+
+ private:
+  uint64_t count() const { return ends_.empty() ? 0 : ends_.back(); }
+
+  const EdgeSamplerInput& input_;
+  std::vector<uint64_t> ends_;  // running count of edges per object
+};
+
+}  // namespace
+
+std::unique_ptr<EdgeSampler> make_uniform_sampler(const EdgeSamplerInput& input, int) {
+  return std::make_unique<UniformSampler>(input);
+}
+
+}  // namespace limn

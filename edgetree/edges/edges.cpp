@@ -1,0 +1,199 @@
+#include "limn/edgetree/edges.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "edgetree/edges/half_edges.h"
+
+namespace limn {
+namespace {
+
+// In extended precision, so that needles get a normal that is right to double precision as well.
+Plane plane_of(const Mesh& mesh, const FaceIndices& face) {
+  const Vec3f &fa = mesh.positions[face[0]], &fb = mesh.positions[face[1]],
+              &fc = mesh.positions[face[2]];
+  if (collinear(fa, fb, fc)) return {};
+  using Real = long double;
+  const Vec3<Real> a = cast<Real>(fa);
+  const Vec3<Real> n = normalize(cross(cast<Real>(fb) - a, cast<Real>(fc) - a));
+  return {cast<double>(n), static_cast<double>(-dot(n, a))};
+}
+
+// Six times the signed volume of the tetrahedron over an edge (a, b) and the far corners c, d of
+// its two faces: positive if each face lies in front of the other's plane; and how much of it the
+// rounding of the positions can explain. A position is taken to have been rounded to float twice
+// (in the file, and after a rotation or scaling about the origin): it is off by at most
+// 2 * 2^-24 |x|, which changes the volume by at most the gradient's length times that.
+struct Fold {
+  double volume, rounding;
+};
+Fold fold_of(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& d) {
+  const Vec3d ab = b - a, ac = c - a, ad = d - a;
+  const Vec3d by_d = cross(ab, ac), by_c = cross(ad, ab), by_b = cross(ac, ad);
+  const double sum = length(by_b + by_c + by_d) * length(a) + length(by_b) * length(b) +
+                     length(by_c) * length(c) + length(by_d) * length(d);
+  return {dot(by_d, ad), 0x1.0p-23 * sum};
+}
+
+// Builds one EdgeMesh; the steps are called in the order in which they stand.
+class Builder {
+ public:
+  Builder(const Mesh& mesh, bool black_behind) : mesh_(mesh), ids_(edge_vertex_ids(mesh)) {
+    copy_vertices();
+    for (const FaceIndices& face : mesh.faces) result_.planes.push_back(plane_of(mesh, face));
+    group_half_edges();
+    result_.one_sided_closed = black_behind && is_closed() && parts_have_volume();
+  }
+
+  EdgeMesh take() { return std::move(result_); }
+
+ private:
+  void copy_vertices() {
+    for (const Vec3f& x : mesh_.positions) result_.positions.push_back(cast<double>(x));
+    result_.tangents = mesh_.position_tangents;
+    for (const FaceIndices& face : mesh_.faces)
+      for (uint32_t v : face)
+        result_.extent = std::max(result_.extent, length(result_.positions[v]));
+  }
+
+  void group_half_edges() {
+    sides_ = half_edges_of(mesh_, ids_);
+    const auto ends = [](const HalfEdge& s) {
+      return std::pair(std::min(s.from, s.to), std::max(s.from, s.to));
+    };
+    std::sort(sides_.begin(), sides_.end(), [&](const HalfEdge& a, const HalfEdge& b) {
+      return ends(a) != ends(b) ? ends(a) < ends(b) : a.face < b.face;
+    });
+    result_.face_offsets.push_back(0);
+    for (size_t begin = 0, end; begin < sides_.size(); begin = end) {
+      for (end = begin; end < sides_.size() && ends(sides_[end]) == ends(sides_[begin]); ++end)
+        result_.incident_faces.push_back(sides_[end].face);
+      result_.face_offsets.push_back(static_cast<uint32_t>(end));
+      append_edge({&sides_[begin], end - begin});
+    }
+  }
+
+  void append_edge(std::span<const HalfEdge> around) {
+    const HalfEdge& first = around[0];
+    Edge edge;
+    edge.vertices = {first.from, first.to};
+    edge.faces = {first.face, around.size() > 1 ? around[1].face : kNoFace};
+    if (around.size() == 1) {
+      edge.edge_class = EdgeClass::kBorder;
+    } else if (around.size() > 2 || around[1].from == first.from) {
+      edge.edge_class = EdgeClass::kIrregular;
+    } else {
+      const Fold fold = fold_of(position(first.from), position(first.to), position(first.opposite),
+                                position(around[1].opposite));
+      edge.edge_class = class_of_pair(edge, fold);
+      edge.concave = edge.edge_class != EdgeClass::kFlat && fold.volume > fold.rounding;
+    }
+    result_.edges.push_back(edge);
+  }
+
+  EdgeClass class_of_pair(const Edge& edge, const Fold& fold) const {
+    const bool flat = is_flat(edge, fold);
+    const bool continuous =
+        mesh_.normal_source == NormalSource::kFace ? flat : normals_continuous(edge);
+    if (!continuous) return EdgeClass::kSharp;
+    return flat ? EdgeClass::kFlat : EdgeClass::kSmooth;
+  }
+
+  // Coplanar to the rounding of the positions. The faces of a needle may be tilted far by rounding,
+  // and then two "flat" edges in a row could hide a crease: what counts as flat must also agree to
+  // half the digits of a float. Calling a flat edge sharp costs samples; the reverse costs a jump.
+  bool is_flat(const Edge& edge, const Fold& fold) const {
+    const Vec3d &n0 = result_.planes[edge.faces[0]].n, &n1 = result_.planes[edge.faces[1]].n;
+    return std::fabs(fold.volume) <= fold.rounding && dot(n0, n1) > 0 &&
+           length(cross(n0, n1)) <= 0x1.0p-12;
+  }
+
+  // Whether both faces have the same shading normals at both ends (then along the whole edge). An
+  // end that is no corner of a face (where a side was split) has a normal of its own.
+  bool normals_continuous(const Edge& edge) const {
+    for (uint32_t vertex : edge.vertices) {
+      const Vec3d* a = corner_normal(edge.faces[0], vertex);
+      const Vec3d* b = corner_normal(edge.faces[1], vertex);
+      if (!a || !b || !(*a == *b)) return false;
+    }
+    return true;
+  }
+
+  const Vec3d* corner_normal(uint32_t face, uint32_t vertex) const {
+    for (int k = 0; k < 3; ++k)
+      if (ids_[mesh_.faces[face][k]] == vertex) return &mesh_.normals[mesh_.normal_ids[face][k]];
+    return nullptr;
+  }
+
+  bool is_closed() const {
+    return result_.count(EdgeClass::kBorder) == 0 && result_.count(EdgeClass::kIrregular) == 0;
+  }
+
+  // Whether each part of a closed mesh encloses positive volume, beyond rounding.
+  bool parts_have_volume() const {
+    std::vector<uint32_t> parents(mesh_.faces.size());
+    std::iota(parents.begin(), parents.end(), 0u);
+    const auto root = [&](uint32_t f) {
+      while (parents[f] != f) f = parents[f] = parents[parents[f]];
+      return f;
+    };
+    for (const Edge& edge : result_.edges) parents[root(edge.faces[0])] = root(edge.faces[1]);
+    std::vector<double> volumes(mesh_.faces.size()), sizes(mesh_.faces.size());
+    for (const HalfEdge& side :
+         sides_) {  // three or more per face: its area, as a fan of triangles
+      const uint32_t part = root(side.face);
+      const Vec3d origin = position(mesh_.faces[part][0]), e = position(side.from) - origin;
+      const Plane& plane = result_.planes[side.face];
+      const Vec3d x = position(side.opposite) - position(side.from);
+      const double area = length(cross(position(side.to) - position(side.from), x));
+      volumes[part] += dot(plane.n, e) * area;
+      sizes[part] += length(e) * area;
+    }
+    for (uint32_t f = 0; f < parents.size(); ++f)
+      if (sizes[f] > 0 && volumes[f] <= 0x1.0p-44 * sizes[f]) return false;
+    return !result_.edges.empty();
+  }
+
+  const Vec3d& position(uint32_t vertex) const { return result_.positions[vertex]; }
+
+  const Mesh& mesh_;
+  std::vector<uint32_t> ids_;    // V
+  std::vector<HalfEdge> sides_;  // sorted by edge
+  EdgeMesh result_;
+};
+
+}  // namespace
+
+uint64_t EdgeMesh::count(EdgeClass edge_class) const {
+  return std::count_if(edges.begin(), edges.end(),
+                       [&](const Edge& e) { return e.edge_class == edge_class; });
+}
+
+EdgeMesh build_edge_mesh(const Mesh& mesh, bool black_behind) {
+  return Builder(mesh, black_behind).take();
+}
+
+// Four roundings in n . p + offset, of terms no larger than |p| and the extent; three in the offset
+// and two in the normal, twice.
+double distance_error(const EdgeMesh& mesh, const Vec3d& p) {
+  return 11 * 0x1.0p-53 * (length(p) + mesh.extent);
+}
+
+bool is_candidate(const EdgeMesh& mesh, uint32_t edge_index, const Vec3d& p) {
+  const Edge& edge = mesh.edges[edge_index];
+  if (edge.edge_class == EdgeClass::kBorder || edge.edge_class == EdgeClass::kIrregular)
+    return true;
+  if (edge.edge_class == EdgeClass::kSharp && !mesh.one_sided_closed) return true;
+  if (edge.edge_class == EdgeClass::kSmooth && edge.concave && mesh.one_sided_closed) return false;
+  const double error = distance_error(mesh, p);
+  const double d0 = mesh.planes[edge.faces[0]].distance(p);
+  const double d1 = mesh.planes[edge.faces[1]].distance(p);
+  const bool front0 = d0 >= -error, front1 = d1 >= -error;
+  if (edge.edge_class == EdgeClass::kSharp) return front0 || front1;
+  const bool back0 = d0 <= error, back1 = d1 <= error;
+  return (front0 && back1) || (back0 && front1);
+}
+
+}  // namespace limn

@@ -1,0 +1,173 @@
+#include "edgetree/edges/half_edges.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <unordered_map>
+
+namespace limn {
+namespace {
+
+bool moves_alike(const Vec3<Lanes>& a, const Vec3<Lanes>& b) {
+  for (int i = 0; i < kLanes; ++i) {
+    double size = 0, difference = 0;
+    for (int k = 0; k < 3; ++k) {
+      size = std::max({size, std::fabs(a[k][i]), std::fabs(b[k][i])});
+      difference = std::max(difference, std::fabs(a[k][i] - b[k][i]));
+    }
+    // Each velocity was rounded to float once, and by the motion's own arithmetic.
+    if (difference > 0x1.0p-22 * size) return false;
+  }
+  return true;
+}
+
+// Whether the exact sum of the terms is zero (Shewchuk 1997, grow-expansion: the parts do not
+// overlap, so they sum to zero only if all are zero).
+bool sums_to_zero(const std::array<double, 6>& terms) {
+  std::array<double, 6> parts{};
+  int count = 0;
+  for (double carry : terms) {
+    for (int i = 0; i < count; ++i) {
+      const double sum = parts[i] + carry;
+      const double b = sum - parts[i];
+      parts[i] = (parts[i] - (sum - b)) + (carry - b);
+      carry = sum;
+    }
+    parts[count++] = carry;
+  }
+  return std::all_of(parts.begin(), parts.end(), [](double part) { return part == 0; });
+}
+
+// Whether the triangle's projection to the plane of two axes has zero area. Products of floats are
+// exact in double.
+bool projection_vanishes(double ax, double ay, double bx, double by, double cx, double cy) {
+  const std::array<double, 6> terms{bx * cy, -(bx * ay), -(ax * cy), -(by * cx), by * ax, ay * cx};
+  double sum = 0, size = 0;
+  for (double term : terms) {
+    sum += term;
+    size += std::fabs(term);
+  }
+  if (std::fabs(sum) > 8 * 0x1.0p-53 * size) return false;  // beyond the rounding of five additions
+  return sums_to_zero(terms);
+}
+
+uint64_t undirected_key(uint32_t a, uint32_t b) {
+  return uint64_t{std::min(a, b)} << 32 | std::max(a, b);
+}
+
+// Sets of collinear vertices that faces of zero area tie together.
+class SliverLines {
+ public:
+  SliverLines(const Mesh& mesh, const std::vector<uint32_t>& ids,
+              const std::vector<uint32_t>& slivers)
+      : mesh_(mesh), parents_(slivers.size()), vertices_(slivers.size()) {
+    std::iota(parents_.begin(), parents_.end(), 0u);
+    for (uint32_t s = 0; s < slivers.size(); ++s) {
+      const FaceIndices& face = mesh.faces[slivers[s]];
+      for (int k = 0; k < 3; ++k) {
+        const uint32_t a = ids[face[k]], b = ids[face[(k + 1) % 3]];
+        if (a == b) continue;
+        const auto [found, is_new] = line_of_edge_.emplace(undirected_key(a, b), s);
+        if (!is_new) parents_[root(s)] = root(found->second);
+      }
+    }
+    for (uint32_t s = 0; s < slivers.size(); ++s)
+      for (uint32_t corner : mesh.faces[slivers[s]]) vertices_[root(s)].push_back(ids[corner]);
+  }
+
+  // Appends the parts of a side, split at the vertices of its line strictly between its ends.
+  void append_split(const HalfEdge& side, std::vector<HalfEdge>& sides) {
+    const auto line = line_of_edge_.find(undirected_key(side.from, side.to));
+    if (line == line_of_edge_.end()) {
+      sides.push_back(side);
+      return;
+    }
+    HalfEdge part = side;
+    for (uint32_t vertex : between(side.from, side.to, vertices_[root(line->second)])) {
+      part.to = vertex;
+      sides.push_back(part);
+      part.from = vertex;
+    }
+    part.to = side.to;
+    sides.push_back(part);
+  }
+
+ private:
+  uint32_t root(uint32_t s) {
+    while (parents_[s] != s) s = parents_[s] = parents_[parents_[s]];
+    return s;
+  }
+
+  // Points of one line are told apart, and ordered, by the axis along which it runs longest.
+  std::vector<uint32_t> between(uint32_t from, uint32_t to,
+                                const std::vector<uint32_t>& candidates) const {
+    const Vec3d e = cast<double>(mesh_.positions[to]) - cast<double>(mesh_.positions[from]);
+    const double ax = std::fabs(e.x), ay = std::fabs(e.y), az = std::fabs(e.z);
+    const int axis = ax >= ay && ax >= az ? 0 : ay >= az ? 1 : 2;
+    const float sign = e[axis] > 0 ? 1.0f : -1.0f;
+    const auto along = [&](uint32_t v) { return sign * mesh_.positions[v][axis]; };
+    std::vector<uint32_t> inside;
+    for (uint32_t v : candidates)
+      if (along(v) > along(from) && along(v) < along(to)) inside.push_back(v);
+    std::sort(inside.begin(), inside.end(), [&](uint32_t a, uint32_t b) {
+      return along(a) != along(b) ? along(a) < along(b) : a < b;
+    });
+    inside.erase(std::unique(inside.begin(), inside.end()), inside.end());
+    return inside;
+  }
+
+  const Mesh& mesh_;
+  std::vector<uint32_t> parents_;                        // union-find over slivers
+  std::vector<std::vector<uint32_t>> vertices_;          // of the line, at its root
+  std::unordered_map<uint64_t, uint32_t> line_of_edge_;  // to one sliver of the line
+};
+
+}  // namespace
+
+std::vector<uint32_t> edge_vertex_ids(const Mesh& mesh) {
+  std::vector<uint32_t> ids = mesh.weld;
+  if (mesh.position_tangents.empty()) return ids;
+  std::unordered_map<uint32_t, std::vector<uint32_t>> torn;  // weld id to further representatives
+  for (uint32_t v = 0; v < ids.size(); ++v) {
+    const auto alike = [&](uint32_t other) {
+      return moves_alike(mesh.position_tangents[v], mesh.position_tangents[other]);
+    };
+    if (alike(ids[v])) continue;
+    std::vector<uint32_t>& others = torn[ids[v]];
+    const auto found = std::find_if(others.begin(), others.end(), alike);
+    ids[v] = found != others.end() ? *found : v;
+    if (found == others.end()) others.push_back(v);
+  }
+  return ids;
+}
+
+bool collinear(const Vec3f& fa, const Vec3f& fb, const Vec3f& fc) {
+  const Vec3d a = cast<double>(fa), b = cast<double>(fb), c = cast<double>(fc);
+  return projection_vanishes(a.x, a.y, b.x, b.y, c.x, c.y) &&
+         projection_vanishes(a.y, a.z, b.y, b.z, c.y, c.z) &&
+         projection_vanishes(a.z, a.x, b.z, b.x, c.z, c.x);
+}
+
+std::vector<HalfEdge> half_edges_of(const Mesh& mesh, const std::vector<uint32_t>& ids) {
+  std::vector<uint32_t> slivers;
+  std::vector<HalfEdge> sides;
+  sides.reserve(3 * mesh.faces.size());
+  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+    const FaceIndices& face = mesh.faces[f];
+    if (collinear(mesh.positions[face[0]], mesh.positions[face[1]], mesh.positions[face[2]])) {
+      slivers.push_back(f);
+      continue;
+    }
+    for (int k = 0; k < 3; ++k)
+      sides.push_back({ids[face[k]], ids[face[(k + 1) % 3]], f, ids[face[(k + 2) % 3]]});
+  }
+  if (slivers.empty()) return sides;
+  SliverLines lines(mesh, ids, slivers);
+  std::vector<HalfEdge> split;
+  split.reserve(sides.size());
+  for (const HalfEdge& side : sides) lines.append_split(side, split);
+  return split;
+}
+
+}  // namespace limn

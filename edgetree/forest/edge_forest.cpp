@@ -1,0 +1,265 @@
+#include "limn/edgetree/edge_forest.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+
+#include "edgetree/forest/forest_build.h"
+#include "edgetree/forest/forest_query.h"
+#include "edgetree/forest/forest_rejection.h"
+#include "edgetree/lobe/seen_edge.h"
+#include "edgetree/samplers.h"
+
+namespace limn {
+namespace {
+
+double below_one(double u) { return std::clamp(u, 0.0, 0x1.fffffffffffffp-1); }
+
+// A node, the weights of its children, and their sums in pairs, fours and all.
+struct Choice {
+  NodeId node = kNoChild;
+  float weights[kWidth];
+  double pairs[4], fours[2], total = 0;
+
+  Choice() = default;
+  Choice(NodeId id, Floats w) : node(id) {
+    static_assert(kWidth == 8);
+    std::memcpy(weights, &w, sizeof weights);
+    for (int i = 0; i < 4; ++i) pairs[i] = static_cast<double>(weights[2 * i]) + weights[2 * i + 1];
+    for (int i = 0; i < 2; ++i) fours[i] = pairs[2 * i] + pairs[2 * i + 1];
+    total = fours[0] + fours[1];
+  }
+
+  // Draws a lane by the uniform number u and leaves another one in it; total > 0. By halves, and
+  // without branches, which would depend on chance.
+  int draw(double& u) const {
+    double rest = u * total;
+    int lane = 0;
+    const auto step = [&](double left, int half) {
+      const int right = rest >= left;
+      rest -= left * right;
+      lane += half * right;
+    };
+    step(fours[0], 4);
+    step(pairs[lane / 2], 2);
+    step(weights[lane], 1);
+    while (!(weights[lane] > 0)) lane = (lane + kWidth - 1) % kWidth;  // by rounding
+    u = below_one(rest / weights[lane]);
+    return lane;
+  }
+};
+
+}  // namespace
+
+struct EdgeForest::Impl {
+  const EdgeSamplerInput& input;
+  ForestConfig config;
+  LightClusters lights;
+  Forest forest;
+
+  ForestQuery prepare(const EdgeQuery& query) const {
+    const bool lit = config.light_term && !lights.empty();
+    const RadiancePyramid* environment =
+        config.environment_term ? input.environment.get() : nullptr;
+    return {forest, lit ? &lights : nullptr, environment, query, input.lane_scale};
+  }
+
+  // Both sampling and evaluating a probability ask here, and get the same bits.
+  Choice choice_at(NodeId id, const ForestQuery& query) const {
+    if (id < 0) {
+      return {id, weigh_edges(forest.edges[~id], query)};
+    }
+    const InnerNode& node = forest.inner[id];
+    ChildWeights children = weigh_children(node, query, config.soft_weights);
+    look_ahead(node, query.point, children);
+    return {id, children.product()};
+  }
+
+  void look_ahead(const InnerNode& node, const ForestPoint& point, ChildWeights& children) const {
+    for (uint32_t lanes = bits(children.rest > 0) & node.ahead; lanes != 0; lanes &= lanes - 1) {
+      const int lane = std::countr_zero(lanes);
+      const NodeId child = node.child[lane];
+      const float unit = node.head.inverse_radius;
+      children.length[lane] =
+          child < 0 ? length_below(forest.edges[~child], point, unit)
+                    : length_below(forest.inner[child], point, config.soft_weights, unit);
+    }
+  }
+
+  double root_total(const ForestQuery& query) const {
+    double total = 0;
+    for (NodeId root : forest.roots) total += choice_at(root, query).total;
+    return total;
+  }
+
+  // Draws a root by the uniform number u and leaves another one in it. False if no root has weight.
+  // total: root_total.
+  bool choose_root(const ForestQuery& query, double& u, Choice& chosen, double& total) const {
+    bool any = false;
+    total = 0;
+    for (NodeId root : forest.roots) {
+      const Choice next = choice_at(root, query);
+      total += next.total;
+      const double share = next.total > 0 ? next.total / total : 0;
+      if (u < share) {
+        u = below_one(u / share);
+        chosen = next;
+        any = true;
+      } else if (any) {
+        u = below_one((u - share) / (1 - share));
+      }
+    }
+    return any;
+  }
+
+  // Where a draw ends: an edge, not yet tested, in a lane of an edge node.
+  struct Draw {
+    const EdgeNode* node;
+    int lane;
+    double probability;
+    EdgeId edge() const { return {node->head.object, static_cast<uint32_t>(node->edge[lane])}; }
+  };
+  bool draw(const ForestQuery& query, double u, Draw& result) const {
+    Choice choice;
+    double scale;
+    if (!choose_root(query, u, choice, scale)) return false;
+    result.probability = 1;
+    while (true) {
+      const int lane = choice.draw(u);
+      result.probability *= choice.weights[lane] / scale;
+      if (choice.node < 0) {
+        result.node = &forest.edges[~choice.node];
+        result.lane = lane;
+        return true;
+      }
+      choice = choice_at(forest.inner[choice.node].child[lane], query);
+      scale = choice.total;
+      if (!(scale > 0)) return false;
+    }
+  }
+
+  // Of drawing the child in a lane of a node; multiplied from the root on, as `draw` does.
+  double probability(NodeId id, int lane, const ForestQuery& query) const {
+    const uint32_t parent = forest.head(id).parent;
+    const bool is_root = parent == kNoParent;
+    const double reach = is_root ? 1
+                                 : probability(static_cast<NodeId>(parent / kWidth),
+                                               static_cast<int>(parent % kWidth), query);
+    if (reach == 0) return 0;
+    const Choice choice = choice_at(id, query);
+    const double scale = is_root ? root_total(query) : choice.total;
+    return scale > 0 ? reach * (choice.weights[lane] / scale) : 0;
+  }
+
+  // Exact test of a drawn edge; most pass without a look at the mesh.
+  bool accepts(const EdgeQuery& query, const ForestPoint& point, const EdgeNode& node,
+               int lane) const {
+    const EdgeId id{node.head.object, static_cast<uint32_t>(node.edge[lane])};
+    // Concave edges are in the forest only where they can be silhouettes, or for comparison.
+    if (!config.cull_concave || !surely_candidate(node, lane, point)) {
+      if (!is_candidate(input.objects[id.object], id.edge, query.p)) return false;
+    }
+    return !is_own_edge(input, query, id);
+  }
+  static SeenEdge seen_edge(const LtcLobe& lobe, const Vec3d& p, const EdgeNode& node, int lane) {
+    const auto end = [&](int e) {
+      return Vec3d{node.ends[e][0][lane], node.ends[e][1][lane], node.ends[e][2][lane]};
+    };
+    return {lobe, end(0) - p, end(1) - p};
+  }
+};
+
+EdgeForest::EdgeForest(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+EdgeForest::~EdgeForest() = default;
+
+std::unique_ptr<EdgeForest> EdgeForest::build(const EdgeSamplerInput& input, int threads,
+                                              const ForestConfig& config) {
+  // What is spread over directions weighs by itself.
+  const bool spread = config.environment_term && input.environment;
+  const double uniform_luminance = spread ? 0 : input.environment_luminance;
+  auto impl =
+      std::unique_ptr<Impl>(new Impl{input, config, LightClusters(input.lights, uniform_luminance),
+                                     build_forest(input, threads, config)});
+  return std::unique_ptr<EdgeForest>(new EdgeForest(std::move(impl)));
+}
+
+bool EdgeForest::sample(const EdgeQuery& query, Rng& rng, EdgeSample& sample) const {
+  const double u_edge = rng.uniform(), u_t = rng.uniform();
+  const ForestQuery prepared = impl_->prepare(query);
+  Impl::Draw draw;
+  if (!impl_->draw(prepared, u_edge, draw)) return false;
+  if (!impl_->accepts(query, prepared.point, *draw.node, draw.lane)) return false;
+  sample.edge = draw.edge();
+  sample.probability = draw.probability;
+  const SeenEdge edge = Impl::seen_edge(prepared.lobe, query.p, *draw.node, draw.lane);
+  if (!(edge.is_seen())) return false;
+  sample.t = edge.sample_t(u_t);
+  sample.pdf_t = edge.pdf_t(sample.t);
+  // Nothing where the density is lost to rounding, on an edge that lies in the horizon.
+  return sample.pdf_t > 0;
+}
+
+double EdgeForest::probability(const EdgeQuery& query, EdgeId id) const {
+  const uint32_t slot = impl_->forest.slots[id.object][id.edge];
+  if (slot == kNoParent) return 0;
+  const EdgeNode& node = impl_->forest.edges[slot / kWidth];
+  const int lane = static_cast<int>(slot % kWidth);
+  const ForestQuery prepared = impl_->prepare(query);
+  if (!impl_->accepts(query, prepared.point, node, lane)) return 0;
+  if (!(Impl::seen_edge(prepared.lobe, query.p, node, lane).is_seen())) return 0;
+  return impl_->probability(~static_cast<NodeId>(slot / kWidth), lane, prepared);
+}
+
+double EdgeForest::pdf_t(const EdgeQuery& query, EdgeId id, double t) const {
+  const uint32_t slot = impl_->forest.slots[id.object][id.edge];
+  if (slot == kNoParent) return 0;
+  const SeenEdge edge =
+      Impl::seen_edge(LtcLobe(query.lobe, query.n, query.wi), query.p,
+                      impl_->forest.edges[slot / kWidth], static_cast<int>(slot % kWidth));
+  return edge.is_seen() ? edge.pdf_t(t) : 0;
+}
+
+std::unique_ptr<RejectionTree> EdgeForest::rejection_tree() const {
+  return make_forest_rejection_tree(impl_->forest);
+}
+
+uint64_t EdgeForest::list_silhouettes(const Vec3d& p, std::vector<EdgeId>& edges) const {
+  const Forest& forest = impl_->forest;
+  const ForestPoint point = point_of(forest, p);
+  std::vector<NodeId> stack(forest.roots.rbegin(), forest.roots.rend());
+  uint64_t tested = 0;
+  while (!stack.empty()) {
+    const NodeId id = stack.back();
+    stack.pop_back();
+    ++tested;
+    if (id >= 0) {
+      const InnerNode& node = forest.inner[id];
+      const Ints alive = may_hold_candidates(node, point);
+      for (int lane = kWidth - 1; lane >= 0; --lane)
+        if (alive[lane]) stack.push_back(node.child[lane]);
+      continue;
+    }
+    const EdgeNode& node = forest.edges[~id];
+    const Ints alive = may_hold_candidates(node, point);
+    for (int lane = 0; lane < kWidth; ++lane) {
+      if (!alive[lane]) continue;
+      const EdgeId edge{node.head.object, static_cast<uint32_t>(node.edge[lane])};
+      if (is_candidate(impl_->input.objects[edge.object], edge.edge, p)) edges.push_back(edge);
+    }
+  }
+  return tested;
+}
+
+uint64_t EdgeForest::bytes() const {
+  const Forest& forest = impl_->forest;
+  uint64_t sum = forest.inner.size() * sizeof(InnerNode) + forest.edges.size() * sizeof(EdgeNode) +
+                 forest.roots.size() * sizeof(NodeId);
+  for (const auto& slots : forest.slots) sum += slots.size() * sizeof(uint32_t);
+  return sum;
+}
+
+uint64_t EdgeForest::node_count() const {
+  return impl_->forest.inner.size() + impl_->forest.edges.size();
+}
+
+}  // namespace limn

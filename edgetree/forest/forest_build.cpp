@@ -1,0 +1,289 @@
+#include "edgetree/forest/forest_build.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "edgetree/forest/forest_fit.h"
+#include "edgetree/forest/forest_split.h"
+#include "limn/core/parallel.h"
+
+namespace limn {
+namespace {
+
+// Nothing for an edge that no query needs.
+std::optional<ForestGroup> group_of(const EdgeMesh& mesh, const Edge& edge,
+                                    const ForestConfig& config) {
+  switch (edge.edge_class) {
+    case EdgeClass::kSmooth:
+    case EdgeClass::kFlat:
+      if (config.cull_concave && edge.concave && mesh.one_sided_closed) return std::nullopt;
+      return ForestGroup::kSilhouette;
+    case EdgeClass::kSharp:
+      return mesh.one_sided_closed ? ForestGroup::kFront : ForestGroup::kAlways;
+    default:
+      return ForestGroup::kAlways;
+  }
+}
+
+double speed_of(const EdgeMesh& mesh, uint32_t vertex, const Lanes& scale) {
+  if (mesh.tangents.empty()) return 0;
+  const Vec3<Lanes>& v = mesh.tangents[vertex];
+  double sum = 0;
+  for (int i = 0; i < kLanes; ++i) sum += scale[i] * std::hypot(v.x[i], v.y[i], v.z[i]);
+  return sum;
+}
+
+Wedge wedge_of(const EdgeMesh& mesh, uint32_t index, const Lanes& scale) {
+  const Edge& edge = mesh.edges[index];
+  const auto [a, b] = edge.vertices;
+  Wedge wedge;
+  wedge.planes[0] = mesh.planes[edge.faces[0]];
+  wedge.planes[1] = edge.faces[1] == kNoFace ? wedge.planes[0] : mesh.planes[edge.faces[1]];
+  wedge.ends = {mesh.positions[a], mesh.positions[b]};
+  wedge.length = length(wedge.ends[1] - wedge.ends[0]);
+  const Vec3d &n0 = wedge.planes[0].n, &n1 = wedge.planes[1].n;
+  wedge.angle = std::atan2(length(cross(n0, n1)), dot(n0, n1));
+  wedge.speed = 0.5 * (speed_of(mesh, a, scale) + speed_of(mesh, b, scale));
+  wedge.edge = index;
+  return wedge;
+}
+
+struct Box {
+  Vec3d low{1e300, 1e300, 1e300}, high{-1e300, -1e300, -1e300};
+  Vec3d center() const { return (low + high) * 0.5; }
+  Vec3d half() const { return (high - low) * 0.5; }
+};
+Box box_of(std::span<const Wedge> wedges) {
+  Box box;
+  for (const Wedge& wedge : wedges)
+    for (const Vec3d& x : wedge.ends)
+      for (int k = 0; k < 3; ++k) {
+        box.low[k] = std::min(box.low[k], x[k]);
+        box.high[k] = std::max(box.high[k], x[k]);
+      }
+  return box;
+}
+
+// The 24 leading bits: a number that a float holds. Not by a cast to float and back, because GCC 12
+// drops such a pair of casts where it makes vectors of them.
+double truncated(double x) {
+  return std::bit_cast<double>(std::bit_cast<uint64_t>(x) & ~((uint64_t{1} << 29) - 1));
+}
+
+NodeFrame frame_of(const Box& box) {
+  const Vec3d center = box.center();
+  return {{truncated(center.x), truncated(center.y), truncated(center.z)},
+          truncated(1 / length(box.half()))};
+}
+
+double length_of(std::span<const Wedge> wedges) {
+  double sum = 0;
+  for (const Wedge& wedge : wedges) sum += wedge.length;
+  return sum;
+}
+
+float positive(double x) {
+  return static_cast<float>(std::max(x, double{std::numeric_limits<float>::min()}));
+}
+
+// Motion too slow for a float still is motion.
+float speed_of(std::span<const Wedge> wedges) {
+  double speed = 0;
+  for (const Wedge& wedge : wedges) speed += wedge.length * wedge.speed;
+  return speed > 0 ? positive(speed / length_of(wedges)) : 0;
+}
+
+// Outward to a step.
+void put_box(const Box& box, const NodeFrame& frame, int lane, InnerNode& node) {
+  constexpr double kMargin = 0x1.0p-16;  // more than a query's rounding, in steps
+  const auto step = [](double x) {
+    return static_cast<int32_t>(std::clamp(x, 0.0, double{kBoxSteps}));
+  };
+  int32_t packed_low = 0, packed_high = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double low = (box.low[k] - frame.center[k]) * frame.inverse_radius;
+    const double high = (box.high[k] - frame.center[k]) * frame.inverse_radius;
+    packed_low |= step(std::floor((low + 1) * 0.5 * kBoxSteps - kMargin)) << (k * kBoxBits);
+    packed_high |= step(std::ceil((high + 1) * 0.5 * kBoxSteps + kMargin)) << (k * kBoxBits);
+  }
+  node.low[lane] = packed_low;
+  node.high[lane] = packed_high;
+}
+
+template <class Rows>
+void put_rows(const DualFit& fit, int lane, Rows& rows) {
+  for (size_t i = 0; i < std::size(rows); ++i)
+    for (int k = 0; k < 4; ++k) rows[i][k][lane] = static_cast<float>(fit.rows[i][k]);
+}
+
+// Fills the nodes of one tree, each on its own. ids: of the tree's nodes in the forest.
+class TreeFiller {
+ public:
+  TreeFiller(const SplitTree& tree, std::span<const NodeId> ids, std::span<const Wedge> wedges,
+             uint32_t object, ForestGroup group, const ForestConfig& config)
+      : tree_(tree), ids_(ids), wedges_(wedges), object_(object), group_(group), config_(config) {}
+
+  void fill(uint32_t index, Forest& forest) const {
+    const SplitNode& split = tree_.nodes[index];
+    const NodeFrame frame = frame_of(box_of(edges(split.range)));
+    if (split.has_edges) {
+      EdgeNode& node = forest.edges[~ids_[index]];
+      fill_head(frame, node.head);
+      fill_edges(split, frame, node);
+    } else {
+      InnerNode& node = forest.inner[ids_[index]];
+      fill_head(frame, node.head);
+      fill_children(split, frame, node);
+    }
+  }
+
+ private:
+  std::span<const Wedge> edges(EdgeRange range) const {
+    return wedges_.subspan(range.begin, range.size());
+  }
+
+  // All but the parent.
+  void fill_head(const NodeFrame& frame, NodeHead& head) const {
+    for (int k = 0; k < 3; ++k) head.center[k] = static_cast<float>(frame.center[k]);
+    head.inverse_radius = static_cast<float>(frame.inverse_radius);
+    head.object = object_;
+    head.group = group_;
+  }
+
+  DualFit fit(std::span<const Wedge> wedges, const NodeFrame& frame) const {
+    if (group_ == ForestGroup::kSilhouette) return fit_dual(wedges, frame, config_);
+    const double length = length_of(wedges);
+    if (group_ == ForestGroup::kAlways) return unrejectable_fit(length);
+    DualFit fit = fit_dual(wedges, frame, config_);
+    fit.cover[0] = length;
+    return fit;
+  }
+
+  void fill_children(const SplitNode& split, const NodeFrame& frame, InnerNode& node) const {
+    node.child = Ints{} + kNoChild;
+    const double scale = frame.inverse_radius * frame.inverse_radius;
+    for (int lane = 0; lane < kWidth; ++lane) {
+      const std::span<const Wedge> wedges = edges(split.ranges[lane]);
+      if (wedges.empty()) continue;
+      const DualFit dual = fit(wedges, frame);
+      put_rows(dual, lane, node.rows);
+      for (int k = 0; k < 3; ++k) node.cover[k][lane] = positive(dual.cover[k] * scale);
+      node.speed[lane] = speed_of(wedges);
+      node.child[lane] = ids_[split.children[lane]];
+      put_box(box_of(wedges), frame, lane, node);
+    }
+  }
+
+  void fill_edges(const SplitNode& split, const NodeFrame& frame, EdgeNode& node) const {
+    node.edge = Ints{} + kNoChild;
+    const double scale = frame.inverse_radius * frame.inverse_radius;
+    for (int lane = 0; lane < kWidth; ++lane) {
+      const std::span<const Wedge> wedges = edges(split.ranges[lane]);
+      if (wedges.empty()) continue;
+      put_rows(fit_edge(wedges[0], frame), lane, node.rows);
+      node.length[lane] = positive(wedges[0].length * scale);
+      node.speed[lane] = speed_of(wedges);
+      node.edge[lane] = static_cast<int32_t>(wedges[0].edge);
+      for (int e = 0; e < 2; ++e)
+        for (int k = 0; k < 3; ++k)
+          node.ends[e][k][lane] = static_cast<float>(wedges[0].ends[e][k]);
+    }
+  }
+
+  const SplitTree& tree_;
+  std::span<const NodeId> ids_;
+  std::span<const Wedge> wedges_;
+  uint32_t object_;
+  ForestGroup group_;
+  const ForestConfig& config_;
+};
+
+// Makes room for the nodes of a tree and gives them their places.
+std::vector<NodeId> append_nodes(const SplitTree& tree, Forest& forest) {
+  std::vector<NodeId> ids(tree.nodes.size());
+  auto inner = static_cast<NodeId>(forest.inner.size());
+  auto edges = static_cast<NodeId>(forest.edges.size());
+  for (size_t i = 0; i < ids.size(); ++i) ids[i] = tree.nodes[i].has_edges ? ~edges++ : inner++;
+  forest.inner.resize(inner);
+  forest.edges.resize(edges);
+  forest.roots.push_back(ids[0]);
+  return ids;
+}
+
+// Heights, from the last node, whose children are edges, to the root.
+void set_heights(std::span<const NodeId> ids, const ForestConfig& config, Forest& forest) {
+  for (size_t i = ids.size(); i-- > 0;) {
+    if (ids[i] < 0) {
+      forest.head(ids[i]).height = 0;
+      continue;
+    }
+    InnerNode& node = forest.inner[ids[i]];
+    node.ahead = 0;
+    int highest = 0;
+    for (int lane = 0; lane < kWidth; ++lane) {
+      if (node.child[lane] == kNoChild) continue;
+      const int height = forest.head(node.child[lane]).height;
+      highest = std::max(highest, height);
+      if (height <= config.look_ahead) node.ahead |= static_cast<uint8_t>(1 << lane);
+    }
+    node.head.height = static_cast<uint8_t>(std::min(highest + 1, 255));
+  }
+}
+
+// Parents of nodes and slots of edges, for the nodes that were just filled.
+void link(std::span<const NodeId> ids, Forest& forest) {
+  forest.head(ids[0]).parent = kNoParent;
+  for (const NodeId id : ids)
+    for (int lane = 0; lane < kWidth; ++lane) {
+      const uint32_t slot = kWidth * static_cast<uint32_t>(id < 0 ? ~id : id) + lane;
+      const int32_t child = id < 0 ? forest.edges[~id].edge[lane] : forest.inner[id].child[lane];
+      if (child == kNoChild) continue;
+      if (id < 0)
+        forest.slots[forest.edges[~id].head.object][child] = slot;
+      else
+        forest.head(child).parent = slot;
+    }
+}
+
+void append_tree(std::span<const Wedge> wedges, uint32_t object, ForestGroup group, int threads,
+                 const ForestConfig& config, Forest& forest) {
+  const SplitTree tree = split_edges(wedges, config.width, threads);
+  std::vector<Wedge> sorted(wedges.size());
+  parallel_for((wedges.size() + 4095) / 4096, threads, [&](size_t block) {
+    for (size_t i = 4096 * block; i < std::min(wedges.size(), 4096 * (block + 1)); ++i)
+      sorted[i] = wedges[tree.order[i]];
+  });
+  const std::vector<NodeId> ids = append_nodes(tree, forest);
+  const TreeFiller filler(tree, ids, sorted, object, group, config);
+  constexpr size_t kBlock = 64;
+  parallel_for((tree.nodes.size() + kBlock - 1) / kBlock, threads, [&](size_t block) {
+    const size_t end = std::min(tree.nodes.size(), kBlock * (block + 1));
+    for (size_t i = kBlock * block; i < end; ++i) filler.fill(static_cast<uint32_t>(i), forest);
+  });
+  set_heights(ids, config, forest);
+  link(ids, forest);
+}
+
+}  // namespace
+
+Forest build_forest(const EdgeSamplerInput& input, int threads, const ForestConfig& config) {
+  Forest forest;
+  for (uint32_t object = 0; object < input.objects.size(); ++object) {
+    const EdgeMesh& mesh = input.objects[object];
+    forest.extent = std::max(forest.extent, mesh.extent);
+    forest.slots.emplace_back(mesh.edges.size(), kNoParent);
+    std::vector<Wedge> groups[kForestGroups];
+    for (uint32_t e = 0; e < mesh.edges.size(); ++e)
+      if (const auto group = group_of(mesh, mesh.edges[e], config))
+        groups[static_cast<int>(*group)].push_back(wedge_of(mesh, e, input.lane_scale));
+    for (int g = 0; g < kForestGroups; ++g)
+      if (!groups[g].empty())
+        append_tree(groups[g], object, static_cast<ForestGroup>(g), threads, config, forest);
+  }
+  return forest;
+}
+
+}  // namespace limn

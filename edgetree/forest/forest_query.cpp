@@ -1,0 +1,256 @@
+#include "edgetree/forest/forest_query.h"
+
+#include <cmath>
+#include <limits>
+
+namespace limn {
+namespace {
+
+// A plane near a corner of a dual box is taken to meet this share of what one in the middle does,
+// at least.
+constexpr float kShallow = 0.1f;
+// Points in or near a box see its edges at this share of its squared radius at least.
+constexpr float kNear = 0.25f;
+// Radiance of objects as a share of the mean of the environment that lights them.
+constexpr float kScattered = 1.0f;
+
+constexpr float kLeast = std::numeric_limits<float>::min();
+
+// p in the frame of a node, and what rounding can add to row . x of all rows together: of the
+// entries of rows and of x by 2^-24 each, four roundings in a product and two in sums; rows have
+// unit length together.
+struct FramePoint {
+  float x[3];
+  float error;
+  float size;  // sum of |x| and 1
+};
+FramePoint to_frame(const NodeHead& head, const ForestPoint& point) {
+  FramePoint result;
+  const double inverse = head.inverse_radius;
+  result.size = 1;
+  for (int k = 0; k < 3; ++k) {
+    result.x[k] = static_cast<float>((point.p[k] - head.center[k]) * inverse);
+    result.size += std::fabs(result.x[k]);
+  }
+  result.error = 12 * 0x1.0p-24f * result.size + static_cast<float>(2 * point.slack * inverse);
+  return result;
+}
+
+Floats row_product(const Floats row[4], const FramePoint& at) {
+  return row[0] * at.x[0] + row[1] * at.x[1] + row[2] * at.x[2] + row[3];
+}
+
+// The query plane u -> g[0] + g[1] u_0 + g[2] u_1 + g[3] u_2 in the coordinates of each child's
+// dual box.
+struct DualPlane {
+  Floats g[4];
+  Floats half;  // largest |g - g[0]| over the box, widened
+};
+DualPlane dual_plane(const InnerNode& node, const FramePoint& at) {
+  DualPlane plane;
+  for (int i = 0; i < 4; ++i) plane.g[i] = row_product(node.rows[i], at);
+  plane.half = abs(plane.g[1]) + abs(plane.g[2]) + abs(plane.g[3]) + at.error;
+  return plane;
+}
+
+// Of edges.
+struct DualSegment {
+  Floats middle;
+  Floats half;  // widened
+};
+DualSegment dual_segment(const EdgeNode& node, const FramePoint& at) {
+  return {row_product(node.rows[0], at), abs(row_product(node.rows[1], at)) + at.error};
+}
+
+Ints not_rejected(ForestGroup group, Floats middle, Floats half) {
+  if (group == ForestGroup::kSilhouette) return abs(middle) <= half;
+  if (group == ForestGroup::kFront) return middle + half >= 0;
+  return Ints{} - 1;
+}
+
+// The length of silhouettes that a child is expected to hold, given the query plane. With planes
+// spread evenly over the dual box, the values of g - g[0] have nearly the density of the sum of two
+// uniform numbers, one of half-width a = max |g[k]| and one of what is left of half: flat, with
+// ramps at both ends.
+Floats expected_length(const InnerNode& node, const DualPlane& plane, float error, bool soft) {
+  const Floats size[3] = {abs(plane.g[1]) + error, abs(plane.g[2]), abs(plane.g[3])};
+  const Floats widest = max(size[0], max(size[1], size[2]));
+  const Floats length =
+      (size[0] * node.cover[0] + size[1] * node.cover[1] + size[2] * node.cover[2]) / widest;
+  if (!soft) return length;
+  const Floats rest = plane.half - widest;
+  const Floats ramp = clamp(0.5f * (plane.half - abs(plane.g[0])) / max(rest, splat(1e-30f)),
+                            splat(kShallow), splat(1.0f));
+  // Not every box that is met holds a silhouette: the power makes up for part of that.
+  return length * (ramp * sqrt(ramp));
+}
+
+// Not positive for children that are rejected.
+Floats length_of(const InnerNode& node, const FramePoint& at, bool soft) {
+  const ForestGroup group = node.head.group;
+  if (group == ForestGroup::kAlways) return node.cover[0];
+  const DualPlane plane = dual_plane(node, at);
+  Floats length = node.cover[0];
+  if (group == ForestGroup::kSilhouette) {
+    length = expected_length(node, plane, at.error, soft);
+  } else if (soft) {
+    length *= clamp(0.5f + 0.5f * plane.g[0] / plane.half, splat(kShallow), splat(1.0f));
+  }
+  return select(not_rejected(group, plane.g[0], plane.half), length, splat(0.0f));
+}
+
+Floats length_of(const EdgeNode& node, const FramePoint& at) {
+  if (node.head.group == ForestGroup::kAlways) return node.length;
+  const DualSegment segment = dual_segment(node, at);
+  return select(not_rejected(node.head.group, segment.middle, segment.half), node.length,
+                splat(0.0f));
+}
+
+// Radiance that may come from behind the boxes, from lights and environment.
+Floats brightness(const ForestQuery& query, const Floats3& d, const Floats3& half, Floats tangent,
+                  Ints alive) {
+  Floats sum = splat(0.0f);
+  if (query.lights) sum = query.lights->mean_over_boxes(d, half);
+  if (!query.environment) return sum;
+  for (int lane = 0; lane < kWidth; ++lane) {
+    if (!alive[lane]) continue;
+    sum[lane] += query.environment->mean(d.x[lane], d.y[lane], d.z[lane], tangent[lane]);
+  }
+  // Where the environment is dark, edges still jump against the objects that it lights.
+  return sum + kScattered * query.environment->mean();
+}
+
+// The boxes of a node's children: centres minus p, and half extents.
+void boxes_of(const InnerNode& node, const FramePoint& at, Floats3& d, Floats3& half) {
+  Floats* centers[3] = {&d.x, &d.y, &d.z};
+  Floats* halves[3] = {&half.x, &half.y, &half.z};
+  for (int k = 0; k < 3; ++k) {
+    const Ints low = node.low >> (k * kBoxBits) & kBoxSteps;
+    const Ints high = node.high >> (k * kBoxBits) & kBoxSteps;
+    *centers[k] = to_float(low + high) * (1.0f / kBoxSteps) - (1 + at.x[k]);
+    *halves[k] = to_float(high - low) * (1.0f / kBoxSteps);
+  }
+}
+
+// End e of the edges, minus p.
+Floats3 end_of(const EdgeNode& node, const ForestQuery& query, int e) {
+  const auto coordinate = [&](int k) { return (node.ends[e][k] - query.p[0][k]) - query.p[1][k]; };
+  return {coordinate(0), coordinate(1), coordinate(2)};
+}
+
+Floats dot_n(const ForestQuery& query, const Floats3& d) {
+  return d.x * query.n[0] + d.y * query.n[1] + d.z * query.n[2];
+}
+
+// Mean of f_s times luminance over boxes.
+Floats light_through(const ForestQuery& query, const Floats3& d, const Floats3& half,
+                     Floats distance2, Ints alive) {
+  const Floats lobe = query.lobe.mean_over_boxes(d, half);
+  if (!query.lights && !query.environment) return lobe;
+  return lobe * brightness(query, d, half, sqrt(dot(half, half) / distance2), alive);
+}
+
+}  // namespace
+
+ForestPoint point_of(const Forest& forest, const Vec3d& p) {
+  EdgeMesh farthest;
+  farthest.extent = forest.extent;
+  return {p, distance_error(farthest, p)};
+}
+
+ForestQuery::ForestQuery(const Forest& forest, const LightClusters* clusters,
+                         const RadiancePyramid* pyramid, const EdgeQuery& query,
+                         const Lanes& lane_scale)
+    : point(point_of(forest, query.p)), lobe(query.lobe, query.n, query.wi), environment(pyramid) {
+  if (clusters) lights.emplace(*clusters, query.p);
+  for (int k = 0; k < 3; ++k) {
+    n[k] = static_cast<float>(query.n[k]);
+    p[0][k] = static_cast<float>(query.p[k]);
+    p[1][k] = static_cast<float>(query.p[k] - p[0][k]);
+  }
+  const Vec3<Lanes>& v = query.velocity;
+  double sum = 0;
+  for (int i = 0; i < kLanes; ++i)
+    sum += lane_scale[i] * std::sqrt(v.x[i] * v.x[i] + v.y[i] * v.y[i] + v.z[i] * v.z[i]);
+  speed = static_cast<float>(sum);
+}
+
+Ints may_hold_candidates(const InnerNode& node, const ForestPoint& point) {
+  const DualPlane plane = dual_plane(node, to_frame(node.head, point));
+  return (node.child != kNoChild) & not_rejected(node.head.group, plane.g[0], plane.half);
+}
+
+Ints may_hold_candidates(const EdgeNode& node, const ForestPoint& point) {
+  const DualSegment segment = dual_segment(node, to_frame(node.head, point));
+  return (node.edge != kNoChild) & not_rejected(node.head.group, segment.middle, segment.half);
+}
+
+bool surely_candidate(const EdgeNode& node, int lane, const ForestPoint& point) {
+  if (node.head.group == ForestGroup::kAlways) return true;
+  const FramePoint at = to_frame(node.head, point);
+  const DualSegment segment = dual_segment(node, at);
+  // `half` was widened by the error once.
+  return not_rejected(node.head.group, segment.middle, segment.half - 2 * at.error)[lane] != 0;
+}
+
+// Motion, light or length too little for a float still is some.
+Floats ChildWeights::product() const {
+  return select((length > 0) & (rest > 0), max(length * rest, splat(kLeast)), splat(0.0f));
+}
+
+ChildWeights weigh_children(const InnerNode& node, const ForestQuery& query, bool soft) {
+  const FramePoint at = to_frame(node.head, query.point);
+  const Floats length = length_of(node, at, soft);
+  Ints alive = length > 0;
+  Floats3 d, half;
+  boxes_of(node, at, d, half);
+  const float* n = query.n;
+  const Floats height = dot_n(query, d) + half.x * std::fabs(n[0]) + half.y * std::fabs(n[1]) +
+                        half.z * std::fabs(n[2]);
+  alive &= height >= -16 * 0x1.0p-24f * at.size;
+  const Floats speed = query.speed + node.speed;
+  alive &= speed > 0;
+  const Floats distance2 = max(dot(d, d), kNear * dot(half, half) + 1e-30f);
+  const Floats rest = speed / distance2 * light_through(query, d, half, distance2, alive);
+  return {length, select(alive, max(rest, splat(kLeast)), splat(0.0f))};
+}
+
+// The integral over the edge of |w x w'| / |w|^3, w = (1 - t) w_0 + t w_1, is
+// tan(gamma / 2) (1 / l_0 + 1 / l_1), with the ends' distances l and the angle gamma between them.
+Floats weigh_edges(const EdgeNode& node, const ForestQuery& query) {
+  const FramePoint at = to_frame(node.head, query.point);
+  const Floats3 w_0 = end_of(node, query, 0), w_1 = end_of(node, query, 1);
+  const Floats3 along{w_1.x - w_0.x, w_1.y - w_0.y, w_1.z - w_0.z};
+  const Floats l_0 = sqrt(dot(w_0, w_0)), l_1 = sqrt(dot(w_1, w_1));
+  const Floats3 normal{w_0.y * along.z - w_0.z * along.y, w_0.z * along.x - w_0.x * along.z,
+                       w_0.x * along.y - w_0.y * along.x};
+  const Floats product = max(l_0 * l_1, splat(1e-30f));
+  const Floats sine = sqrt(dot(normal, normal)) / product, cosine = dot(w_0, w_1) / product;
+  const Floats tangent =
+      select(cosine > 0, sine / (1 + cosine), (1 - cosine) / max(sine, splat(1e-6f)));
+
+  Ints alive = length_of(node, at) > 0;
+  // Rounding of w and of the product with n.
+  const Floats slack = 8 * 0x1.0p-24f * (l_0 + l_1);
+  alive &= max(dot_n(query, w_0), dot_n(query, w_1)) >= -slack;
+  const Floats speed = query.speed + node.speed;
+  alive &= speed > 0;
+  const Floats3 d{w_0.x + along.x * 0.5f, w_0.y + along.y * 0.5f, w_0.z + along.z * 0.5f};
+  const Floats3 half{abs(along.x) * 0.5f, abs(along.y) * 0.5f, abs(along.z) * 0.5f};
+  const Floats distance2 = max(dot(d, d), kNear * dot(half, half) + 1e-30f);
+  const Floats weight =
+      speed * tangent * (l_0 + l_1) / product * light_through(query, d, half, distance2, alive);
+  return select(alive, max(weight, splat(kLeast)), splat(0.0f));
+}
+
+float length_below(const InnerNode& node, const ForestPoint& point, bool soft,
+                   float inverse_radius) {
+  const float ratio = inverse_radius / node.head.inverse_radius;
+  return sum(length_of(node, to_frame(node.head, point), soft)) * ratio * ratio;
+}
+float length_below(const EdgeNode& node, const ForestPoint& point, float inverse_radius) {
+  const float ratio = inverse_radius / node.head.inverse_radius;
+  return sum(length_of(node, to_frame(node.head, point))) * ratio * ratio;
+}
+
+}  // namespace limn

@@ -1,0 +1,56 @@
+#pragma once
+// How the children of a node are rejected and weighed for a query.
+#include <optional>
+
+#include "edgetree/forest/forest_node.h"
+#include "edgetree/light/light_term.h"
+#include "edgetree/lobe/ltc.h"
+#include "limn/edgetree/edge_forest.h"
+
+namespace limn {
+
+// The point alone, for rejection.
+struct ForestPoint {
+  Vec3d p;
+  double slack;  // of distances from planes, see distance_error
+};
+ForestPoint point_of(const Forest& forest, const Vec3d& p);
+
+// All that does not depend on the node.
+struct ForestQuery {
+  // lights, environment: null if they are not to weigh.
+  ForestQuery(const Forest& forest, const LightClusters* lights, const RadiancePyramid* environment,
+              const EdgeQuery& query, const Lanes& lane_scale);
+  ForestPoint point;
+  LtcLobe lobe;
+  std::optional<LightCones> lights;
+  const RadiancePyramid* environment;
+  float n[3];
+  float p[2][3];  // p = p[0] + p[1], to twice the precision of a float
+  float speed;    // of p
+};
+
+// Lanes (-1 or 0) of the children that may hold an edge of E(p): never 0 where one does.
+Ints may_hold_candidates(const InnerNode& node, const ForestPoint& point);
+Ints may_hold_candidates(const EdgeNode& node, const ForestPoint& point);
+// Whether the edge in a lane is in E(p) beyond doubt: rounding could not make it seem so.
+bool surely_candidate(const EdgeNode& node, int lane, const ForestPoint& point);
+
+// The weight of a child is length * rest. Both are not negative, and the product is 0 only where no
+// edge can contribute.
+struct ChildWeights {
+  Floats length;  // of the silhouettes that each child should hold, over the squared radius
+  Floats rest;    // speed, distance, lobe and light; 0 where the child is rejected
+  Floats product() const;
+};
+ChildWeights weigh_children(const InnerNode& node, const ForestQuery& query, bool soft);
+// `length` alone, for all children together and over the squared radius that `inverse_radius`
+// stands for.
+float length_below(const InnerNode& node, const ForestPoint& point, bool soft,
+                   float inverse_radius);
+float length_below(const EdgeNode& node, const ForestPoint& point, float inverse_radius);
+
+// Weights of edges: not negative, 0 only where the edge cannot contribute.
+Floats weigh_edges(const EdgeNode& node, const ForestQuery& query);
+
+}  // namespace limn

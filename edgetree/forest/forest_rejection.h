@@ -1,0 +1,12 @@
+#pragma once
+#include <memory>
+
+#include "edgetree/forest/forest_node.h"
+#include "limn/edgetree/rejection_tree.h"
+
+namespace limn {
+
+// Its nodes are the lanes of the forest's nodes. The forest must outlive it.
+std::unique_ptr<RejectionTree> make_forest_rejection_tree(const Forest& forest);
+
+}  // namespace limn

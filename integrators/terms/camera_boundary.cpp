@@ -1,0 +1,166 @@
+#include "integrators/terms/camera_boundary.h"
+
+#include <algorithm>
+
+namespace limn {
+namespace {
+
+struct Window {
+  double x0, y0, x1, y1;
+};
+
+// Where a film position can matter to a pixel of the crop window.
+Window sampled_window(const Film& film) {
+  const double border = film.sample_border ? film.filter.radius : 0;
+  return {film.crop_x - border, film.crop_y - border, film.crop_x + film.crop_width + border,
+          film.crop_y + film.crop_height + border};
+}
+
+// Cuts the parameter range [s0, s1] of a + s d to where it lies in [lower, upper] (Liang and
+// Barsky).
+bool clip(double a, double d, double lower, double upper, double& s0, double& s1) {
+  if (d == 0) return a >= lower && a <= upper;
+  double enter = (lower - a) / d;
+  double leave = (upper - a) / d;
+  if (enter > leave) std::swap(enter, leave);
+  s0 = std::max(s0, enter);
+  s1 = std::min(s1, leave);
+  return s0 < s1;
+}
+
+// Perspective: the fraction of the segment in space that is seen at the fraction s of its
+// projection.
+double fraction_in_space(double s, double depth0, double depth1) {
+  return s * depth0 / ((1 - s) * depth1 + s * depth0);
+}
+
+double weighted_speed(const FilmEdge& edge, int lane) {
+  return edge.length * std::max(std::fabs(edge.speed0[lane]), std::fabs(edge.speed1[lane]));
+}
+
+}  // namespace
+
+CameraBoundary::CameraBoundary(const PathContext& context, const std::vector<EdgeMesh>& objects,
+                               int lanes)
+    : context_(context), objects_(objects) {
+  for (uint32_t object = 0; object < objects.size(); ++object) add_object(object);
+  weigh(lanes);
+}
+
+void CameraBoundary::add_object(uint32_t object) {
+  if (context_.scene.hide_emitters && context_.scene.shapes[object].is_emitter) return;
+  const EdgeMesh& mesh = objects_[object];
+  const Vec3d pinhole = value(context_.scene.camera.origin);
+  for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
+    FilmEdge edge;
+    if (!is_candidate(mesh, e, pinhole) || !clip_and_project({object, e}, edge)) continue;
+    if (is_zero(edge.speed0) && is_zero(edge.speed1)) continue;
+    edges_.push_back(edge);
+  }
+}
+
+bool CameraBoundary::clip_and_project(EdgeId id, FilmEdge& edge) const {
+  const EdgeMesh& mesh = objects_[id.object];
+  const Camera& camera = context_.scene.camera;
+  const auto& ends = mesh.edges[id.edge].vertices;
+  const Vec3d a = mesh.positions[ends[0]];
+  const Vec3d b = mesh.positions[ends[1]];
+  const double depth_a = camera.depth(a);
+  const double depth_b = camera.depth(b);
+  double t0 = 0;
+  double t1 = 1;
+  if (!clip(depth_a, depth_b - depth_a, camera.near_clip, camera.far_clip, t0, t1)) return false;
+
+  const auto at = [&](double t) { return a + (b - a) * t; };
+  const auto film0 = camera.project(at(t0));
+  const auto film1 = camera.project(at(t1));
+  const double z0 = camera.depth(at(t0));
+  const double z1 = camera.depth(at(t1));
+  const Window window = sampled_window(context_.scene.film);
+  double s0 = 0;
+  double s1 = 1;
+  if (!clip(film0.x, film1.x - film0.x, window.x0, window.x1, s0, s1)) return false;
+  if (!clip(film0.y, film1.y - film0.y, window.y0, window.y1, s0, s1)) return false;
+
+  edge.id = id;
+  edge.t0 = t0 + (t1 - t0) * fraction_in_space(s0, z0, z1);
+  edge.t1 = t0 + (t1 - t0) * fraction_in_space(s1, z0, z1);
+  const auto moving = [&](double t) {
+    const Vec3d x = at(t);
+    Vec3<Dual> result{x.x, x.y, x.z};
+    if (!mesh.tangents.empty()) {
+      const Vec3<Lanes> d = mesh.tangents[ends[0]] * (1 - t) + mesh.tangents[ends[1]] * t;
+      result = {{x.x, d.x}, {x.y, d.y}, {x.z, d.z}};
+    }
+    return result;
+  };
+  const auto p0 = camera.project(moving(edge.t0));
+  const auto p1 = camera.project(moving(edge.t1));
+  const double dx = p1.x.v - p0.x.v;
+  const double dy = p1.y.v - p0.y.v;
+  edge.length = std::hypot(dx, dy);
+  if (edge.length == 0) return false;
+  // A step along the film normal turns the viewing ray by -(left n_x + up n_y), up to a positive
+  // factor.
+  double nx = dy / edge.length;
+  double ny = -dx / edge.length;
+  const Vec3d pinhole = value(camera.origin);
+  const Vec3d turn = value(camera.left) * -nx - value(camera.up) * ny;
+  if (dot(turn, cross(a - pinhole, b - pinhole)) < 0) {
+    nx = -nx;
+    ny = -ny;
+  }
+  edge.speed0 = p0.x.d * nx + p0.y.d * ny;
+  edge.speed1 = p1.x.d * nx + p1.y.d * ny;
+  edge.x0 = p0.x.v;
+  edge.y0 = p0.y.v;
+  edge.x1 = p1.x.v;
+  edge.y1 = p1.y.v;
+  edge.depth0 = camera.depth(at(edge.t0));
+  edge.depth1 = camera.depth(at(edge.t1));
+  return true;
+}
+
+// Projected length times speed: exact but for the jump itself. Every parameter gets an equal
+// share of the samples, whatever its unit.
+void CameraBoundary::weigh(int lanes) {
+  Lanes totals;
+  for (const FilmEdge& edge : edges_) {
+    for (int k = 0; k < lanes; ++k) totals[k] += weighted_speed(edge, k);
+  }
+  double sum = 0;
+  for (const FilmEdge& edge : edges_) {
+    for (int k = 0; k < lanes; ++k) {
+      if (totals[k] > 0) sum += weighted_speed(edge, k) / totals[k];
+    }
+    cumulative_.push_back(sum);
+  }
+}
+
+bool CameraBoundary::sample(double u, const Rng& key, RayCount& rays, FilmSample& sample) const {
+  const double target = u * cumulative_.back();
+  const auto found = std::upper_bound(cumulative_.begin(), cumulative_.end(), target);
+  const size_t index = std::min<size_t>(found - cumulative_.begin(), edges_.size() - 1);
+  const double below = index == 0 ? 0 : cumulative_[index - 1];
+  const double weight = cumulative_[index] - below;
+  const double s = std::clamp((target - below) / weight, 0.0, 1.0);
+
+  const FilmEdge& edge = edges_[index];
+  const double t = edge.t0 + (edge.t1 - edge.t0) * fraction_in_space(s, edge.depth0, edge.depth1);
+  const Camera& camera = context_.scene.camera;
+  EdgeView view;
+  if (!view_edge(objects_[edge.id.object], edge.id, t, value(camera.origin), view)) return false;
+  const double t_min = camera.near_clip / dot(view.omega, value(camera.forward));
+  Rgb<double> jump;
+  if (!edge_jump(context_, objects_[edge.id.object], view, {}, t_min, 0, key, rays, jump)) {
+    return false;
+  }
+  sample.x = edge.x0 + (edge.x1 - edge.x0) * s;
+  sample.y = edge.y0 + (edge.y1 - edge.y0) * s;
+  const double density = weight / (cumulative_.back() * edge.length);
+  const Lanes speed = (edge.speed0 * (1 - s) + edge.speed1 * s) / density;
+  sample.value = {speed * jump.r, speed * jump.g, speed * jump.b};
+  return true;
+}
+
+}  // namespace limn

@@ -1,0 +1,88 @@
+#include "integrators/terms/edge_jump.h"
+
+namespace limn {
+
+bool view_edge(const EdgeMesh& mesh, EdgeId id, double t, const Vec3d& p, EdgeView& view) {
+  const Edge& edge = mesh.edges[id.edge];
+  view.id = id;
+  view.p = p;
+  view.x0 = mesh.positions[edge.vertices[0]];
+  view.x1 = mesh.positions[edge.vertices[1]];
+  view.y = view.x0 + (view.x1 - view.x0) * t;
+  const Vec3d w = view.y - p;
+  view.distance = length(w);
+  if (view.distance == 0) return false;
+  view.omega = w / view.distance;
+  view.side = cross(view.x0 - p, view.x1 - p);
+  return true;
+}
+
+namespace {
+
+struct Sides {
+  uint32_t negative = kNoFace;
+  uint32_t positive = kNoFace;
+};
+
+// In the plane across the edge, a face leaves the edge along the unit vector a = alpha m + beta w,
+// with m the normal of the viewing plane through the edge and w the part of omega across the edge:
+// it lies on the side of alpha's sign, and the smaller beta / |alpha|, the nearer it is.
+Sides nearest_faces(const Scene& scene, const EdgeMesh& mesh, const EdgeView& view) {
+  Sides sides;
+  double slopes[2] = {0, 0};
+  const Vec3d along = normalize(view.x1 - view.x0);
+  const Vec3d across = view.omega - along * dot(view.omega, along);
+  for (const uint32_t face : mesh.faces_around(view.id.edge)) {
+    const Vec3d a = direction_into_face(scene.shapes[view.id.object].mesh, face, view.x0, along);
+    const double alpha = dot(a, view.side);
+    if (alpha == 0) continue;
+    const double slope = dot(a, across) / std::fabs(alpha);
+    uint32_t& nearest = alpha > 0 ? sides.positive : sides.negative;
+    double& best = slopes[alpha > 0];
+    if (nearest == kNoFace || slope < best) {
+      nearest = face;
+      best = slope;
+    }
+  }
+  return sides;
+}
+
+}  // namespace
+
+bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView& view,
+               FaceRef start, double t_min, int bounces, const Rng& key, RayCount& rays,
+               Rgb<double>& jump) {
+  Ray ray{view.p, view.omega};
+  ray.t_min = t_min;
+  ray.start = start;
+  ray.skip_shape = view.id.object;
+  ray.skip_faces = mesh.faces_around(view.id.edge);
+  ray.skip_emitters = bounces == 0 && context.scene.hide_emitters;
+  Hit behind;
+  ++rays.closest;
+  const bool found = context.tracer.closest(ray, behind);
+  if (found && behind.t < view.distance) return false;
+
+  NoVisitor nothing;
+  PathTracer<double, NoVisitor> path(context, rays, nothing);
+  const EdgeStart edge{view.id.object, ray.skip_faces, view.x0, view.x1};
+  // Both sides share their random numbers: where they hardly differ, so do their estimates.
+  const Rng side_key = key.at(Purpose::kEdgeSide, bounces);
+  const auto radiance = [&](uint32_t face) {
+    if (face != kNoFace) {
+      const FaceRef ref{view.id.object, face};
+      const auto corners = face_corners<double>(context.scene.shapes[ref.shape].mesh, face);
+      const Vec3d n = cross(corners[1] - corners[0], corners[2] - corners[0]);
+      return path.from_surface(surface_on_ray(context.scene, ref, view.y, n), -view.omega, bounces,
+                               side_key, &edge);
+    }
+    if (!found) return path.escaped(view.omega, bounces);
+    return path.from_surface(surface_on_ray(context.scene, behind.face, view.p, view.omega),
+                             -view.omega, bounces, side_key, nullptr);
+  };
+  const Sides sides = nearest_faces(context.scene, mesh, view);
+  jump = radiance(sides.negative) - radiance(sides.positive);
+  return true;
+}
+
+}  // namespace limn

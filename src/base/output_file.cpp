@@ -1,0 +1,33 @@
+#include "src/base/output_file.h"
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <system_error>
+
+#include "limn/core/error.h"
+
+namespace limn {
+
+OutputFile::OutputFile(const std::string& file)
+    : file_(file), temporary_(file + "." + std::to_string(getpid()) + ".tmp") {
+  const std::filesystem::path folder = std::filesystem::path(file).parent_path();
+  std::error_code ignored;
+  if (!folder.empty() && !std::filesystem::is_directory(folder, ignored)) {
+    throw InputError(SourceLocation{file}, "cannot write: no such folder");
+  }
+}
+
+OutputFile::~OutputFile() {
+  std::error_code ignored;
+  if (!committed_) std::filesystem::remove(temporary_, ignored);
+}
+
+void OutputFile::commit() {
+  std::error_code error;
+  std::filesystem::rename(temporary_, file_, error);
+  if (error) throw InputError(SourceLocation{file_}, "cannot write: " + error.message());
+  committed_ = true;
+}
+
+}  // namespace limn

@@ -1,0 +1,69 @@
+#include "src/base/text.h"
+
+#include <charconv>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+namespace limn {
+
+namespace {
+
+// from_chars knows no leading plus sign.
+std::string_view without_plus(std::string_view text) {
+  if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
+  return text;
+}
+
+}  // namespace
+
+std::optional<double> parse_double(std::string_view text) {
+  text = without_plus(text);
+  double number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (end != text.data() + text.size()) return std::nullopt;
+  if (error == std::errc::result_out_of_range) {
+    // Both "1e400" and "1e-400" come here; only the latter has a meaning.
+    if (text.find("e-") == text.npos && text.find("E-") == text.npos) return std::nullopt;
+    return 0.0;
+  }
+  if (error != std::errc()) return std::nullopt;
+  return number;
+}
+
+std::optional<int64_t> parse_integer(std::string_view text) {
+  text = without_plus(text);
+  int64_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return number;
+}
+
+std::vector<std::string_view> split(std::string_view text, std::string_view separators) {
+  std::vector<std::string_view> pieces;
+  size_t begin = text.find_first_not_of(separators);
+  while (begin != text.npos) {
+    const size_t end = std::min(text.find_first_of(separators, begin), text.size());
+    pieces.push_back(text.substr(begin, end - begin));
+    begin = text.find_first_not_of(separators, end);
+  }
+  return pieces;
+}
+
+std::string join(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+std::optional<std::string> read_whole_file(const std::string& file) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) return std::nullopt;
+  std::ifstream stream(file, std::ios::binary);
+  std::ostringstream content;
+  content << stream.rdbuf();
+  if (!stream) return std::nullopt;
+  return std::move(content).str();
+}
+
+}  // namespace limn

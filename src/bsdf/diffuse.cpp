@@ -1,0 +1,71 @@
+// Lambert's cosine law, black from behind.
+#include <fmt/format.h>
+
+#include "src/bsdf/types.h"
+
+namespace limn {
+namespace {
+
+class Diffuse final : public Bsdf {
+ public:
+  explicit Diffuse(const Rgb<double>& reflectance) : reflectance_(constant(reflectance)) {}
+
+  Rgb<double> eval(const Vec3<double>& n, const Vec3<double>& wi,
+                   const Vec3<double>& wo) const override {
+    return evaluate(n, wi, wo);
+  }
+  Rgb<Dual> eval(const Vec3<Dual>& n, const Vec3<Dual>& wi, const Vec3<Dual>& wo) const override {
+    return evaluate(n, wi, wo);
+  }
+  double pdf_solid_angle(const Vec3d& n, const Vec3d& wi, const Vec3d& wo) const override {
+    return dot(n, wi) > 0 ? std::fmax(0.0, dot(n, wo)) / kPi : 0;
+  }
+  BsdfValue eval_with_pdf(const Vec3d& n, const Vec3d& wi, const Vec3d& wo) const override {
+    return {evaluate(n, wi, wo), pdf_solid_angle(n, wi, wo)};
+  }
+  std::optional<Vec3d> sample(const Vec3d& n, const Vec3d& wi, double u1, double u2) const override;
+
+  LobeSummary lobe() const override {
+    return {LobeSummary::Kind::kDiffuse, 1, max_channel(value(reflectance_))};
+  }
+  std::vector<ParameterRef> parameters() override {
+    return {{"reflectance", {&reflectance_.r, &reflectance_.g, &reflectance_.b}}};
+  }
+  std::shared_ptr<Bsdf> clone() const override { return std::make_shared<Diffuse>(*this); }
+  std::string describe() const override {
+    return fmt::format("diffuse, reflectance {:g} {:g} {:g}", reflectance_.r.v, reflectance_.g.v,
+                       reflectance_.b.v);
+  }
+
+ private:
+  template <class S>
+  Rgb<S> evaluate(const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo) const {
+    const S cos_o = dot(n, wo);
+    if (!(value(cos_o) > 0 && dot(value(n), value(wi)) > 0)) return {};
+    return as<S>(reflectance_) * (cos_o * (1 / kPi));
+  }
+
+  Rgb<Dual> reflectance_;
+};
+
+// A uniform point of the unit disk, lifted to the hemisphere, is distributed as the cosine
+// (Malley's method).
+std::optional<Vec3d> Diffuse::sample(const Vec3d& n, const Vec3d& wi, double u1, double u2) const {
+  if (!(dot(n, wi) > 0)) return std::nullopt;
+  const double r = std::sqrt(u1);
+  const double phi = 2 * kPi * u2;
+  const Vec3d local{r * std::cos(phi), r * std::sin(phi), std::sqrt(1 - u1)};
+  return Frame(n).to_world(local);
+}
+
+}  // namespace
+
+std::shared_ptr<Bsdf> make_diffuse(const Rgb<double>& reflectance) {
+  return std::make_shared<Diffuse>(reflectance);
+}
+
+std::shared_ptr<Bsdf> read_diffuse(Properties& properties) {
+  return make_diffuse(read_reflectance(properties, "reflectance", 0.5));
+}
+
+}  // namespace limn

@@ -1,0 +1,244 @@
+// A rough metal: D G1(wi) G1(wo) F / (4 cos_i), the cosine of wo included.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "src/bsdf/microfacet.h"
+#include "src/bsdf/types.h"
+
+namespace limn {
+namespace {
+
+using Distribution = RoughConductorValues::Distribution;
+
+// Mitsuba 3.9.1's presets: spectra integrated against the CIE 1931 observer, per channel.
+struct Material {
+  const char* name;
+  Rgb<double> eta, k;
+};
+constexpr Material kMaterials[] = {
+    {"Ag", {0.155276, 0.116728, 0.138388}, {4.82835, 3.12222, 2.1469}},
+    {"Al", {1.6575, 0.880405, 0.521244}, {9.22381, 6.2695, 4.837}},
+    {"Au", {0.143036, 0.375307, 1.44205}, {3.983, 2.38556, 1.60336}},
+    {"Cu", {0.201005, 0.92375, 1.10222}, {3.91326, 2.45305, 2.14209}},
+    {"Cr", {4.36967, 2.91651, 1.6549}, {5.20655, 4.23131, 3.7547}},
+    {"W", {4.37082, 3.30025, 2.99841}, {3.50064, 2.60487, 2.27323}},
+    {"Hg", {2.39894, 1.44003, 0.90957}, {6.32759, 4.37192, 3.42176}},
+    {"Ir", {3.0863, 2.08219, 1.61791}, {5.59215, 4.06709, 3.26731}},
+    {"K", {0.0640432, 0.0464098, 0.0381849}, {2.1042, 1.34894, 0.913126}},
+    {"Li", {0.265791, 0.195618, 0.220949}, {3.54015, 2.31112, 1.66861}},
+    {"Ni_palik", {2.3673, 1.66337, 1.46708}, {4.49881, 3.05015, 2.34544}},
+    {"TiN", {1.64845, 1.15052, 1.37982}, {3.36833, 1.9435, 1.10207}},
+};
+
+constexpr double kMinimumAlpha = 1e-4;  // as in Mitsuba
+
+// What value and density share at one pair of directions.
+template <class S>
+struct Reflection {
+  bool above = false;  // both directions in front of the surface; else nothing below is set
+  S cos_i, cos_o;
+  S cos_h;  // wi.h
+  S d;      // D(h)
+};
+
+class RoughConductor final : public Bsdf {
+ public:
+  explicit RoughConductor(const RoughConductorValues& v)
+      : distribution_(v.distribution),
+        alpha_(v.alpha),
+        eta_(v.eta),
+        k_(v.k),
+        specular_reflectance_(constant(v.specular_reflectance)) {}
+
+  Rgb<double> eval(const Vec3<double>& n, const Vec3<double>& wi,
+                   const Vec3<double>& wo) const override {
+    return evaluate(reflect(n, wi, wo));
+  }
+  Rgb<Dual> eval(const Vec3<Dual>& n, const Vec3<Dual>& wi, const Vec3<Dual>& wo) const override {
+    return evaluate(reflect(n, wi, wo));
+  }
+  double pdf_solid_angle(const Vec3d& n, const Vec3d& wi, const Vec3d& wo) const override {
+    return density(reflect(n, wi, wo));
+  }
+  BsdfValue eval_with_pdf(const Vec3d& n, const Vec3d& wi, const Vec3d& wo) const override {
+    const Reflection<double> r = reflect(n, wi, wo);
+    return {evaluate(r), density(r)};
+  }
+  std::optional<Vec3d> sample(const Vec3d& n, const Vec3d& wi, double u1, double u2) const override;
+
+  LobeSummary lobe() const override;
+  std::vector<ParameterRef> parameters() override {
+    Rgb<Dual>& s = specular_reflectance_;
+    return {{"alpha", {&alpha_}}, {"specular_reflectance", {&s.r, &s.g, &s.b}}};
+  }
+  std::shared_ptr<Bsdf> clone() const override { return std::make_shared<RoughConductor>(*this); }
+  std::string describe() const override;
+
+ private:
+  bool is_ggx() const { return distribution_ == Distribution::kGgx; }
+  template <class S>
+  S alpha() const {
+    const S a = as<S>(alpha_);
+    return value(a) > kMinimumAlpha ? a : S(kMinimumAlpha);
+  }
+  template <class S>
+  Reflection<S> reflect(const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo) const;
+  template <class S>
+  Rgb<S> evaluate(const Reflection<S>& r) const;
+  double density(const Reflection<double>& r) const;
+
+  Distribution distribution_;
+  Dual alpha_;
+  Rgb<double> eta_, k_;
+  Rgb<Dual> specular_reflectance_;
+};
+
+// The sine of the half vector comes from a cross product: 1 - cos^2 would leave nothing of it at
+// small roughness. With m = wi + wo, h = m / |m| and wi.h = |m| / 2.
+template <class S>
+Reflection<S> RoughConductor::reflect(const Vec3<S>& n, const Vec3<S>& wi,
+                                      const Vec3<S>& wo) const {
+  using std::sqrt;
+  Reflection<S> r;
+  r.cos_i = dot(n, wi);
+  r.cos_o = dot(n, wo);
+  r.above = value(r.cos_i) > 0 && value(r.cos_o) > 0;
+  if (!r.above) return r;
+  const Vec3<S> m = wi + wo;
+  const S m2 = dot(m, m);
+  const S inverse_m2 = 1.0 / m2;
+  const S cos_m = r.cos_i + r.cos_o;
+  const S cos2 = cos_m * cos_m * inverse_m2;
+  const S sin2 = length_squared(cross(n, m)) * inverse_m2;
+  r.cos_h = 0.5 * sqrt(m2);
+  r.d = is_ggx() ? microfacet::ggx_d(cos2, sin2, alpha<S>())
+                 : microfacet::beckmann_d(cos2, sin2, alpha<S>());
+  return r;
+}
+
+template <class S>
+Rgb<S> RoughConductor::evaluate(const Reflection<S>& r) const {
+  if (!r.above || value(r.d) == 0) return {};
+  const S a = alpha<S>();
+  const S masking =
+      is_ggx() ? microfacet::ggx_g1_over_cos(r.cos_i, a) * microfacet::ggx_g1_over_cos(r.cos_o, a)
+               : microfacet::beckmann_g1_over_cos(r.cos_i, a) *
+                     microfacet::beckmann_g1_over_cos(r.cos_o, a);
+  const S common = r.d * masking * r.cos_o * 0.25;
+  Rgb<S> result = as<S>(specular_reflectance_) * common;
+  for (int i = 0; i < 3; ++i) {
+    result[i] = result[i] * microfacet::fresnel_conductor(r.cos_h, eta_[i], k_[i]);
+  }
+  return result;
+}
+
+// Visible normals have the density D G1(wi) (wi.h) / cos_i per solid angle of h, and reflection
+// divides by 4 (wi.h). For Beckmann the exact G1 stands here, since the rational one of `evaluate`
+// does not integrate to 1.
+double RoughConductor::density(const Reflection<double>& r) const {
+  if (!r.above) return 0;
+  const double a = alpha<double>();
+  return 0.25 * r.d *
+         (is_ggx() ? microfacet::ggx_g1_over_cos(r.cos_i, a)
+                   : microfacet::beckmann_exact_g1_over_cos(r.cos_i, a));
+}
+
+std::optional<Vec3d> RoughConductor::sample(const Vec3d& n, const Vec3d& wi, double u1,
+                                            double u2) const {
+  if (!(dot(n, wi) > 0)) return std::nullopt;
+  const Frame frame(n);
+  const Vec3d v = frame.to_local(wi);
+  const Vec3d h = is_ggx() ? microfacet::ggx_sample_visible(v, alpha<double>(), u1, u2)
+                           : microfacet::beckmann_sample_visible(v, alpha<double>(), u1, u2);
+  const Vec3d wo = normalize(frame.to_world(h * (2 * dot(v, h)) - v));
+  if (!(dot(n, wo) > 0)) return std::nullopt;
+  return wo;
+}
+
+LobeSummary RoughConductor::lobe() const {
+  const double bound = max_channel(value(specular_reflectance_));
+  if (is_ggx()) return {LobeSummary::Kind::kGgx, alpha<double>(), bound};
+  return {LobeSummary::Kind::kBeckmann, alpha<double>(),
+          bound * microfacet::kBeckmannRationalExcess};
+}
+
+std::string RoughConductor::describe() const {
+  return fmt::format("roughconductor, {}, alpha {:g}, eta {:g} {:g} {:g}, k {:g} {:g} {:g}",
+                     is_ggx() ? "ggx" : "beckmann", alpha_.v, eta_.r, eta_.g, eta_.b, k_.r, k_.g,
+                     k_.b);
+}
+
+double read_alpha(Properties& properties) {
+  const char* name = "alpha";
+  if (properties.has("alpha_u") || properties.has("alpha_v")) {
+    name = properties.has("alpha_u") ? "alpha_u" : "alpha_v";
+    if (!(properties.has("alpha_u") && properties.has("alpha_v"))) {
+      properties.fail(name, "alpha_u and alpha_v come together");
+    }
+    if (properties.has("alpha")) properties.fail("alpha", "give either alpha or alpha_u, alpha_v");
+    if (properties.number("alpha_u", 0) != properties.number("alpha_v", 0)) {
+      properties.fail(name, "anisotropic roughness is not supported: alpha_u must equal alpha_v");
+    }
+  }
+  const double alpha = properties.number(name, 0.1);
+  if (!(alpha >= 0 && alpha < 1e6)) properties.fail(name, "the roughness must not be negative");
+  return std::max(alpha, kMinimumAlpha);
+}
+
+Distribution read_distribution(Properties& properties) {
+  const std::string name = properties.string("distribution", "beckmann");
+  if (name == "beckmann") return Distribution::kBeckmann;
+  if (name == "ggx") return Distribution::kGgx;
+  properties.fail("distribution", "unknown distribution \"" + name + "\" (known: beckmann, ggx)");
+}
+
+void read_material(Properties& properties, RoughConductorValues& values) {
+  const std::string name = properties.string("material", "none");
+  values.eta = properties.rgb("eta", grey(0.0));
+  values.k = properties.rgb("k", grey(1.0));
+  if (name == "none") {
+    for (int i = 0; i < 3; ++i) {
+      if (!(values.eta[i] >= 0)) properties.fail("eta", "must not be negative");
+      if (!(values.k[i] >= 0)) properties.fail("k", "must not be negative");
+      if (values.eta[i] == 0 && values.k[i] == 0) {
+        properties.fail("k", "eta and k are both 0 in a channel");
+      }
+    }
+    return;
+  }
+  if (properties.has("eta") || properties.has("k")) {
+    properties.fail("material", "give either a material or (eta, k), not both");
+  }
+  std::string known = "none";
+  for (const Material& m : kMaterials) {
+    known += std::string(", ") + m.name;
+    if (name == m.name) {
+      values.eta = m.eta;
+      values.k = m.k;
+      return;
+    }
+  }
+  properties.fail("material", "unknown material \"" + name + "\" (known: " + known + ")");
+}
+
+}  // namespace
+
+std::shared_ptr<Bsdf> make_roughconductor(const RoughConductorValues& values) {
+  return std::make_shared<RoughConductor>(values);
+}
+
+std::shared_ptr<Bsdf> read_roughconductor(Properties& properties) {
+  RoughConductorValues values;
+  values.distribution = read_distribution(properties);
+  values.alpha = read_alpha(properties);
+  values.specular_reflectance = read_reflectance(properties, "specular_reflectance", 1);
+  read_material(properties, values);
+  if (!properties.boolean("sample_visible", true)) {
+    properties.fail("sample_visible",
+                    "only sampling of visible normals is supported (it changes the noise alone)");
+  }
+  return make_roughconductor(values);
+}
+
+}  // namespace limn

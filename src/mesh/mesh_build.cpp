@@ -1,0 +1,151 @@
+#include "src/mesh/mesh_build.h"
+
+#include <cmath>
+#include <limits>
+
+namespace limn {
+
+namespace {
+
+void warn(std::vector<std::string>* warnings, const SourceLocation& where,
+          const std::string& text) {
+  if (warnings) warnings->push_back(format_warning(where, text));
+}
+
+void set_positions(Mesh& mesh, const RawMesh& raw, const Matrix4& to_world) {
+  mesh.positions.reserve(raw.positions.size());
+  for (size_t i = 0; i < raw.positions.size(); ++i) {
+    const Vec3d p = to_world.point(raw.positions[i]);
+    for (int k = 0; k < 3; ++k) {
+      if (!(std::fabs(p[k]) <= std::numeric_limits<float>::max())) {
+        throw InputError({raw.where}, "vertex " + std::to_string(i) +
+                                          ": position does not fit single precision");
+      }
+    }
+    mesh.positions.push_back(cast<float>(p));
+  }
+}
+
+// Keeps the faces whose corners are at three distinct positions.
+void set_faces(Mesh& mesh, const RawMesh& raw, bool flip) {
+  for (size_t f = 0; f < raw.faces.size(); ++f) {
+    FaceIndices face = raw.faces[f];
+    const uint32_t a = mesh.weld[face[0]], b = mesh.weld[face[1]], c = mesh.weld[face[2]];
+    if (a == b || b == c || c == a) {
+      ++mesh.collapsed_faces;
+      continue;
+    }
+    if (flip) std::swap(face[1], face[2]);
+    mesh.faces.push_back(face);
+    if (mesh.normal_source != NormalSource::kGiven) continue;
+    FaceIndices ids = raw.normal_ids[f];
+    if (flip) std::swap(ids[1], ids[2]);
+    mesh.normal_ids.push_back(ids);
+  }
+}
+
+Vec3d doubled_area(const Mesh& mesh, size_t face) {
+  const FaceIndices& f = mesh.faces[face];
+  const Vec3d p = cast<double>(mesh.positions[f[0]]);
+  return cross(cast<double>(mesh.positions[f[1]]) - p, cast<double>(mesh.positions[f[2]]) - p);
+}
+
+// Normals in world space. A corner without one (or with one that is zero or not finite) gets the
+// normal of its face.
+void set_given_normals(Mesh& mesh, const RawMesh& raw, const MeshOptions& options,
+                       std::vector<std::string>* warnings) {
+  std::vector<bool> usable(raw.normals.size());
+  for (size_t i = 0; i < raw.normals.size(); ++i) {
+    Vec3d n = options.to_world.normal(raw.normals[i]);
+    const double size = length(n);
+    usable[i] = size > 0 && std::isfinite(size);
+    if (usable[i]) n = n * ((options.flip_normals ? -1 : 1) / size);
+    mesh.normals.push_back(n);
+  }
+  uint64_t mended = 0;
+  for (size_t f = 0; f < mesh.faces.size(); ++f) {
+    uint32_t face_normal = kNoNormal;
+    for (uint32_t& id : mesh.normal_ids[f]) {
+      if (id != kNoNormal && usable[id]) continue;
+      if (face_normal == kNoNormal) {
+        const Vec3d n = doubled_area(mesh, f);
+        face_normal = static_cast<uint32_t>(mesh.normals.size());
+        mesh.normals.push_back(length(n) > 0 ? normalize(n) : Vec3d{0, 0, 1});
+        ++mended;
+      }
+      id = face_normal;
+    }
+  }
+  // What no corner refers to any more must still be a unit vector.
+  for (size_t i = 0; i < usable.size(); ++i) {
+    if (!usable[i]) mesh.normals[i] = {0, 0, 1};
+  }
+  if (mended > 0) {
+    warn(warnings, raw.where,
+         std::to_string(mended) +
+             " faces have corners without a usable normal: the face's own "
+             "normal is used there");
+  }
+}
+
+// Normals that point away from their faces make a surface black or transparent-looking: a file
+// whose winding and normals disagree is worth a word.
+void check_orientation(const Mesh& mesh, const SourceLocation& where,
+                       std::vector<std::string>* warnings) {
+  uint64_t opposed = 0, counted = 0;
+  for (size_t f = 0; f < mesh.faces.size(); ++f) {
+    const Vec3d area = doubled_area(mesh, f);
+    if (length_squared(area) == 0) continue;
+    ++counted;
+    Vec3d sum;
+    for (uint32_t n : mesh.normal_ids[f]) sum += mesh.normals[n];
+    if (dot(sum, area) < 0) ++opposed;
+  }
+  if (opposed == 0) return;
+  const bool nearly_all = opposed * 20 >= counted * 19;
+  warn(warnings, where,
+       "the vertex normals oppose the winding of " +
+           (nearly_all ? "(nearly) all faces; the file is inside out for one of the two, or its "
+                         "transform mirrors it"
+                       : std::to_string(opposed) + " of " + std::to_string(counted) + " faces"));
+}
+
+}  // namespace
+
+Mesh build_mesh(RawMesh raw, const MeshOptions& options, std::vector<std::string>* warnings) {
+  Mesh mesh;
+  mesh.normal_source = options.face_normals     ? NormalSource::kFace
+                       : raw.normal_ids.empty() ? NormalSource::kComputed
+                                                : NormalSource::kGiven;
+  if (raw.positions.empty()) throw InputError(raw.where, "the mesh has no vertices");
+  if (raw.faces.empty()) throw InputError(raw.where, "the mesh has no faces");
+  set_positions(mesh, raw, options.to_world);
+  weld_positions(mesh);
+  set_faces(mesh, raw, options.flip_normals);
+  if (mesh.faces.empty()) {
+    throw InputError(raw.where, "the mesh has no faces: each of its " +
+                                    std::to_string(raw.faces.size()) +
+                                    " faces has two corners at the same position");
+  }
+  if (mesh.collapsed_faces > 0) {
+    warn(warnings, raw.where,
+         std::to_string(mesh.collapsed_faces) + " of " + std::to_string(raw.faces.size()) +
+             " faces have two corners at the same position and are left out");
+  }
+  if (mesh.normal_source == NormalSource::kGiven) {
+    set_given_normals(mesh, raw, options, warnings);
+    check_orientation(mesh, raw.where, warnings);
+  }
+  update_shading_normals(mesh);
+  return mesh;
+}
+
+Mesh read_obj(const std::string& file, bool face_normals) {
+  return build_mesh(parse_obj(file), {Matrix4{}, face_normals, false}, nullptr);
+}
+
+Mesh read_ply(const std::string& file, bool face_normals) {
+  return build_mesh(parse_ply(file), {Matrix4{}, face_normals, false}, nullptr);
+}
+
+}  // namespace limn

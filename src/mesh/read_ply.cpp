@@ -1,0 +1,318 @@
+// Stanford PLY: ascii and both binary byte orders.
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <map>
+
+#include "src/base/text.h"
+#include "src/mesh/mesh_build.h"
+
+namespace limn {
+
+namespace {
+
+enum class Number { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat32, kFloat64 };
+
+std::optional<Number> number_type(std::string_view name) {
+  static const std::map<std::string_view, Number> types = {
+      {"char", Number::kInt8},      {"int8", Number::kInt8},       {"uchar", Number::kUint8},
+      {"uint8", Number::kUint8},    {"short", Number::kInt16},     {"int16", Number::kInt16},
+      {"ushort", Number::kUint16},  {"uint16", Number::kUint16},   {"int", Number::kInt32},
+      {"int32", Number::kInt32},    {"uint", Number::kUint32},     {"uint32", Number::kUint32},
+      {"float", Number::kFloat32},  {"float32", Number::kFloat32}, {"double", Number::kFloat64},
+      {"float64", Number::kFloat64}};
+  const auto found = types.find(name);
+  if (found == types.end()) return std::nullopt;
+  return found->second;
+}
+
+bool is_integer(Number type) { return type != Number::kFloat32 && type != Number::kFloat64; }
+
+struct PlyProperty {
+  std::string name;
+  Number type;
+  std::optional<Number> list_size;  // set for lists
+};
+
+struct PlyElement {
+  std::string name;
+  uint64_t count = 0;
+  std::vector<PlyProperty> properties;
+  int line = 0;  // of its declaration
+};
+
+// Where reading is, and what to blame.
+class PlyCursor {
+ public:
+  PlyCursor(std::string file, const std::string& data) : file_(std::move(file)), data_(data) {}
+
+  [[noreturn]] void fail(const std::string& message) const {
+    throw InputError({file_, binary_ ? 0 : line_}, message);
+  }
+  [[noreturn]] void fail_at(int line, const std::string& message) const {
+    throw InputError({file_, line}, message);
+  }
+  int line() const { return line_; }
+
+  // The next line without its end; nothing at the end of the file.
+  std::optional<std::string_view> next_line() {
+    if (next_ >= data_.size()) return std::nullopt;
+    const size_t end = std::min(data_.find('\n', next_), data_.size());
+    std::string_view line(data_.data() + next_, end - next_);
+    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+    next_ = std::min(end + 1, data_.size());
+    ++line_;
+    return line;
+  }
+
+  void start_body(bool binary, bool big_endian) {
+    binary_ = binary;
+    swap_ = big_endian == (std::endian::native == std::endian::little);
+  }
+
+  // Ascii bodies have one element per line, blank lines apart.
+  void start_element(const std::string& what) {
+    what_ = what;
+    if (binary_) return;
+    words_.clear();
+    used_ = 0;
+    while (words_.empty()) {
+      const std::optional<std::string_view> line = next_line();
+      if (!line) fail("the file ends before " + what_);
+      words_ = split(*line, " \t");
+    }
+  }
+  void end_element() const {
+    if (!binary_ && used_ < words_.size()) fail(what_ + ": too many numbers on the line");
+  }
+
+  double number(Number type) { return binary_ ? binary_number(type) : ascii_number(); }
+
+ private:
+  double ascii_number() {
+    if (used_ >= words_.size()) fail(what_ + ": too few numbers on the line");
+    const std::string_view word = words_[used_++];
+    const std::optional<double> number = parse_double(word);
+    if (!number) fail(what_ + ": not a number: \"" + std::string(word) + "\"");
+    return *number;
+  }
+
+  template <class T>
+  double take() {
+    if (data_.size() - next_ < sizeof(T)) fail("the file ends inside " + what_);
+    char bytes[sizeof(T)];
+    std::memcpy(bytes, data_.data() + next_, sizeof(T));
+    next_ += sizeof(T);
+    if (swap_) std::reverse(bytes, bytes + sizeof(T));
+    T number;
+    std::memcpy(&number, bytes, sizeof(T));
+    return static_cast<double>(number);
+  }
+
+  double binary_number(Number type) {
+    switch (type) {
+      case Number::kInt8:
+        return take<int8_t>();
+      case Number::kUint8:
+        return take<uint8_t>();
+      case Number::kInt16:
+        return take<int16_t>();
+      case Number::kUint16:
+        return take<uint16_t>();
+      case Number::kInt32:
+        return take<int32_t>();
+      case Number::kUint32:
+        return take<uint32_t>();
+      case Number::kFloat32:
+        return take<float>();
+      case Number::kFloat64:
+        return take<double>();
+    }
+    return 0;
+  }
+
+  std::string file_;
+  const std::string& data_;
+  size_t next_ = 0;
+  int line_ = 0;
+  bool binary_ = false;
+  bool swap_ = false;
+  std::string what_;
+  std::vector<std::string_view> words_;
+  size_t used_ = 0;
+};
+
+Number declared_type(const PlyCursor& in, std::string_view name) {
+  const std::optional<Number> type = number_type(name);
+  if (!type) in.fail("unknown type \"" + std::string(name) + "\"");
+  return *type;
+}
+
+PlyProperty parse_property(const PlyCursor& in, const std::vector<std::string_view>& words) {
+  if (words.size() == 3) {
+    return {std::string(words[2]), declared_type(in, words[1]), std::nullopt};
+  }
+  if (words.size() == 5 && words[1] == "list") {
+    const Number size = declared_type(in, words[2]);
+    if (!is_integer(size)) in.fail("the size of a list must be an integer");
+    return {std::string(words[4]), declared_type(in, words[3]), size};
+  }
+  in.fail("malformed property (property TYPE NAME, or property list TYPE TYPE NAME)");
+}
+
+void parse_format(PlyCursor& in, const std::vector<std::string_view>& words) {
+  const std::string_view kind = words.size() > 1 ? words[1] : "";
+  if (kind == "ascii") {
+    in.start_body(false, false);
+  } else if (kind == "binary_little_endian" || kind == "binary_big_endian") {
+    in.start_body(true, kind == "binary_big_endian");
+  } else {
+    in.fail("unknown format \"" + std::string(kind) +
+            "\" (known: ascii, binary_little_endian, binary_big_endian)");
+  }
+}
+
+std::vector<PlyElement> parse_header(PlyCursor& in) {
+  std::vector<PlyElement> elements;
+  if (in.next_line().value_or("") != "ply") in.fail_at(1, "not a PLY file");
+  std::vector<std::string_view> format;
+  while (true) {
+    const std::optional<std::string_view> line = in.next_line();
+    if (!line) in.fail_at(in.line(), "the file ends inside its header");
+    const std::vector<std::string_view> words = split(*line, " \t");
+    if (words.empty() || words[0] == "comment" || words[0] == "obj_info") continue;
+    if (words[0] == "end_header") break;
+    if (words[0] == "format") {
+      format = words;
+      if (words.size() != 3) in.fail("malformed format");
+    } else if (words[0] == "element") {
+      const auto count = words.size() == 3 ? parse_integer(words[2]) : std::nullopt;
+      if (!count || *count < 0) in.fail("malformed element (element NAME COUNT)");
+      elements.push_back({std::string(words[1]), static_cast<uint64_t>(*count), {}, in.line()});
+    } else if (words[0] == "property") {
+      if (elements.empty()) in.fail("property before any element");
+      elements.back().properties.push_back(parse_property(in, words));
+    } else {
+      in.fail("unknown keyword \"" + std::string(words[0]) + "\" in the header");
+    }
+  }
+  for (const PlyElement& e : elements) {
+    if (e.properties.empty()) in.fail_at(e.line, "element " + e.name + " has no properties");
+  }
+  parse_format(in, format);
+  return elements;
+}
+
+// Number of an element's scalar property; nothing if it has none of this name.
+std::optional<size_t> scalar_index(const PlyElement& element, const std::string& name) {
+  for (size_t i = 0; i < element.properties.size(); ++i) {
+    if (element.properties[i].name == name && !element.properties[i].list_size) return i;
+  }
+  return std::nullopt;
+}
+
+// All numbers of one element: values[property][item].
+void read_element(PlyCursor& in, const PlyElement& element, uint64_t index,
+                  std::vector<std::vector<double>>& values) {
+  const std::string what = element.name + " " + std::to_string(index);
+  in.start_element(what);
+  values.resize(element.properties.size());
+  for (size_t i = 0; i < element.properties.size(); ++i) {
+    const PlyProperty& property = element.properties[i];
+    double size = property.list_size ? in.number(*property.list_size) : 1;
+    if (!(size >= 0) || size != std::floor(size)) {
+      in.fail(what + ": impossible size of list " + property.name);
+    }
+    values[i].clear();
+    for (; size > 0; --size) values[i].push_back(in.number(property.type));
+  }
+  in.end_element();
+}
+
+void read_vertices(PlyCursor& in, const PlyElement& element, RawMesh& mesh) {
+  std::array<std::optional<size_t>, 3> p, n;
+  for (int k = 0; k < 3; ++k) {
+    const std::string axis(1, "xyz"[k]);
+    p[k] = scalar_index(element, axis);
+    n[k] = scalar_index(element, "n" + axis);
+    if (!p[k]) in.fail_at(element.line, "element vertex has no property " + axis);
+  }
+  const bool has_normals = n[0] && n[1] && n[2];
+  std::vector<std::vector<double>> values;
+  for (uint64_t i = 0; i < element.count; ++i) {
+    read_element(in, element, i, values);
+    Vec3d position, normal;
+    for (int k = 0; k < 3; ++k) {
+      position[k] = values[*p[k]][0];
+      if (has_normals) normal[k] = values[*n[k]][0];
+      const std::string what = "vertex " + std::to_string(i);
+      if (!std::isfinite(position[k])) in.fail(what + ": the position is not finite");
+    }
+    mesh.positions.push_back(position);
+    if (has_normals) mesh.normals.push_back(normal);
+  }
+}
+
+void read_faces(PlyCursor& in, const PlyElement& element, uint64_t vertex_count, RawMesh& mesh) {
+  size_t list = element.properties.size();
+  for (size_t i = 0; i < element.properties.size(); ++i) {
+    const PlyProperty& p = element.properties[i];
+    if (p.list_size && (p.name == "vertex_indices" || p.name == "vertex_index")) list = i;
+  }
+  if (list == element.properties.size()) {
+    in.fail_at(element.line, "element face has no list vertex_indices (or vertex_index)");
+  }
+  if (!is_integer(element.properties[list].type)) {
+    in.fail_at(element.line, "vertex_indices must be integers");
+  }
+  std::vector<std::vector<double>> values;
+  for (uint64_t i = 0; i < element.count; ++i) {
+    read_element(in, element, i, values);
+    const std::vector<double>& corners = values[list];
+    const std::string what = "face " + std::to_string(i);
+    if (corners.size() != 3) {
+      in.fail(what + " has " + std::to_string(corners.size()) +
+              " corners: only triangles are read");
+    }
+    FaceIndices face{};
+    for (int k = 0; k < 3; ++k) {
+      if (!(corners[k] >= 0 && corners[k] < static_cast<double>(vertex_count)) ||
+          corners[k] != std::floor(corners[k])) {
+        in.fail(what + " refers to vertex " + std::to_string(static_cast<int64_t>(corners[k])) +
+                ", but there are " + std::to_string(vertex_count) + " (counted from 0)");
+      }
+      face[k] = static_cast<uint32_t>(corners[k]);
+    }
+    mesh.faces.push_back(face);
+  }
+}
+
+}  // namespace
+
+RawMesh parse_ply(const std::string& file) {
+  const std::optional<std::string> data = read_whole_file(file);
+  if (!data) throw InputError({file}, "cannot read the file");
+  PlyCursor in(file, *data);
+  const std::vector<PlyElement> elements = parse_header(in);
+  const auto vertices = std::find_if(elements.begin(), elements.end(),
+                                     [](const PlyElement& e) { return e.name == "vertex"; });
+  const uint64_t vertex_count = vertices == elements.end() ? 0 : vertices->count;
+  if (vertex_count >= UINT32_MAX) in.fail_at(vertices->line, "too many vertices");
+  RawMesh mesh;
+  mesh.where = {file};
+  std::vector<std::vector<double>> skipped;
+  for (const PlyElement& element : elements) {
+    if (element.name == "vertex") {
+      read_vertices(in, element, mesh);
+    } else if (element.name == "face") {
+      read_faces(in, element, vertex_count, mesh);
+    } else {
+      for (uint64_t i = 0; i < element.count; ++i) read_element(in, element, i, skipped);
+    }
+  }
+  if (!mesh.normals.empty()) mesh.normal_ids = mesh.faces;
+  return mesh;
+}
+
+}  // namespace limn

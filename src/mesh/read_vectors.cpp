@@ -1,0 +1,58 @@
+// Vector fields on the vertices of a mesh.
+#include <cmath>
+#include <filesystem>
+
+#include "src/base/text.h"
+#include "src/mesh/mesh_build.h"
+
+namespace limn {
+
+namespace {
+
+// Lower-case ending of the file's name, with its dot.
+std::string ending(const std::string& file) {
+  std::string text = std::filesystem::path(file).extension().string();
+  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return text;
+}
+
+Vec3d parse_vector(const SourceLocation& where, std::string_view line) {
+  const std::vector<std::string_view> words = split(line, " \t\r,");
+  if (words.size() != 3) throw InputError(where, "expected three numbers \"x y z\"");
+  Vec3d v;
+  for (int k = 0; k < 3; ++k) {
+    const std::optional<double> number = parse_double(words[k]);
+    if (!number) throw InputError(where, "not a number: \"" + std::string(words[k]) + "\"");
+    if (!std::isfinite(*number)) throw InputError(where, "the vector is not finite");
+    v[k] = *number;
+  }
+  return v;
+}
+
+}  // namespace
+
+bool is_mesh_file(const std::string& file) {
+  return ending(file) == ".obj" || ending(file) == ".ply";
+}
+
+RawMesh parse_mesh(const std::string& file) {
+  return ending(file) == ".ply" ? parse_ply(file) : parse_obj(file);
+}
+
+std::vector<Vec3d> read_vertex_vectors(const std::string& file) {
+  if (is_mesh_file(file)) return parse_mesh(file).positions;
+  const std::optional<std::string> text = read_whole_file(file);
+  if (!text) throw InputError({file}, "cannot read the file");
+  std::vector<Vec3d> vectors;
+  std::string_view rest = *text;
+  for (int line = 1; !rest.empty(); ++line) {
+    const size_t end = std::min(rest.find('\n'), rest.size());
+    const std::string_view content = rest.substr(0, end);
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+    const bool blank = content.find_first_not_of(" \t\r") == content.npos;
+    if (!blank && content[0] != '#') vectors.push_back(parse_vector({file, line}, content));
+  }
+  return vectors;
+}
+
+}  // namespace limn

@@ -1,0 +1,109 @@
+// Mitsuba's built-in shapes as meshes.
+#include <array>
+#include <cmath>
+#include <map>
+
+#include "src/mesh/mesh_build.h"
+
+namespace limn {
+
+namespace {
+
+// Sides of the polygon that stands for a disk: its area is 1e-4 less than the disk's.
+constexpr uint32_t kDiskSides = 256;
+// Times the icosahedron's faces are split in four: 5120 faces; the surface lies up to 1.2e-3 radii
+// inside the sphere.
+constexpr int kSphereSplits = 4;
+
+// A sphere of triangles whose vertices are their own normals.
+struct SphereBuilder {
+  std::vector<Vec3d> points;
+  std::vector<FaceIndices> faces;
+  std::map<std::pair<uint32_t, uint32_t>, uint32_t> midpoints;
+
+  uint32_t midpoint(uint32_t a, uint32_t b) {
+    const auto [entry, is_new] =
+        midpoints.try_emplace(std::minmax(a, b), static_cast<uint32_t>(points.size()));
+    if (is_new) points.push_back(normalize(points[a] + points[b]));
+    return entry->second;
+  }
+
+  void split() {
+    std::vector<FaceIndices> finer;
+    for (const FaceIndices& f : faces) {
+      const uint32_t a = midpoint(f[0], f[1]);
+      const uint32_t b = midpoint(f[1], f[2]);
+      const uint32_t c = midpoint(f[2], f[0]);
+      finer.insert(finer.end(), {{f[0], a, c}, {a, f[1], b}, {c, b, f[2]}, {a, b, c}});
+    }
+    faces = std::move(finer);
+  }
+};
+
+// Corners (0, +-1, +-g) and their cyclic shifts; a face is every triple of mutual neighbours.
+SphereBuilder icosahedron() {
+  SphereBuilder sphere;
+  const double g = (1 + std::sqrt(5.0)) / 2;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int sign = 0; sign < 4; ++sign) {
+      Vec3d p;
+      p[(axis + 1) % 3] = sign & 1 ? -1 : 1;
+      p[(axis + 2) % 3] = sign & 2 ? -g : g;
+      sphere.points.push_back(p);
+    }
+  }
+  const auto neighbours = [&](uint32_t a, uint32_t b) {
+    return length_squared(sphere.points[a] - sphere.points[b]) < 5;  // edges have length 2
+  };
+  for (uint32_t a = 0; a < 12; ++a) {
+    for (uint32_t b = a + 1; b < 12; ++b) {
+      for (uint32_t c = b + 1; c < 12; ++c) {
+        if (!neighbours(a, b) || !neighbours(b, c) || !neighbours(a, c)) continue;
+        const auto& p = sphere.points;
+        const bool outward = determinant(p[a], p[b], p[c]) > 0;
+        sphere.faces.push_back(outward ? FaceIndices{a, b, c} : FaceIndices{a, c, b});
+      }
+    }
+  }
+  for (Vec3d& p : sphere.points) p = normalize(p);
+  return sphere;
+}
+
+}  // namespace
+
+RawMesh make_rectangle() {
+  return {{}, {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}, {}, {}};
+}
+
+// Vertex i has the coordinate +1 where bit k of i is set.
+RawMesh make_cube() {
+  RawMesh cube{{}, {}, {}, {}, {}};
+  for (int i = 0; i < 8; ++i) {
+    cube.positions.push_back({i & 1 ? 1. : -1., i & 2 ? 1. : -1., i & 4 ? 1. : -1.});
+  }
+  const std::array<uint32_t, 4> sides[6] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
+                                            {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
+  for (const auto& s : sides) {
+    cube.faces.push_back({s[0], s[1], s[2]});
+    cube.faces.push_back({s[0], s[2], s[3]});
+  }
+  return cube;
+}
+
+RawMesh make_disk() {
+  RawMesh disk{{}, {{0, 0, 0}}, {}, {}, {}};
+  for (uint32_t i = 0; i < kDiskSides; ++i) {
+    const double angle = 2 * kPi * i / kDiskSides;
+    disk.positions.push_back({std::cos(angle), std::sin(angle), 0});
+    disk.faces.push_back({0, i + 1, (i + 1) % kDiskSides + 1});
+  }
+  return disk;
+}
+
+RawMesh make_sphere() {
+  SphereBuilder sphere = icosahedron();
+  for (int i = 0; i < kSphereSplits; ++i) sphere.split();
+  return {{}, sphere.points, sphere.faces, sphere.points, sphere.faces};
+}
+
+}  // namespace limn

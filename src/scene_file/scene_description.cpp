@@ -1,0 +1,175 @@
+#include "src/scene_file/scene_description.h"
+
+#include <algorithm>
+
+#include "src/base/text.h"
+#include "src/scene_file/scene_tree.h"
+
+namespace limn {
+
+namespace {
+
+const std::vector<std::string> kObjectTags = {"bsdf",    "emitter", "film",   "integrator",
+                                              "rfilter", "sampler", "sensor", "shape"};
+const std::vector<std::string> kSceneObjectTags = {"bsdf", "emitter", "integrator", "sensor",
+                                                   "shape"};
+
+bool contains(const std::vector<std::string>& words, const std::string& word) {
+  return std::find(words.begin(), words.end(), word) != words.end();
+}
+
+class Describer {
+ public:
+  SceneDescription describe(const SceneTree& tree, const std::string& file) {
+    const XmlElement& root = tree.root;
+    if (root.name != "scene") {
+      throw InputError(root.where, "the root element must be <scene>, not <" + root.name + ">");
+    }
+    check_version(root);
+    scene_.file = file;
+    scene_.where = root.where;
+    scene_.search_path = tree.search_path;
+    scene_.files = tree.files;
+    for (const XmlElement& child : root.children) add_to_scene(child);
+    for (const auto& object : all_objects_) resolve(*object);
+    return std::move(scene_);
+  }
+
+ private:
+  static void check_version(const XmlElement& root) {
+    check_attributes(root, {"version"}, {"version"});
+    const XmlAttribute& version = *root.find("version");
+    const std::vector<std::string_view> parts = split(version.value, ".");
+    bool ok = parts.size() == 3;
+    for (std::string_view part : parts) ok = ok && parse_integer(part).value_or(-1) >= 0;
+    if (!ok) {
+      throw InputError(version.where,
+                       "<scene>: version must be like \"3.0.0\", not \"" + version.value + "\"");
+    }
+    const int64_t major = *parse_integer(parts[0]);
+    if (major < 2 || major > 3) {
+      throw InputError(version.where, "<scene>: version " + version.value +
+                                          " is not supported (known: 2.0.0 to 3.x)");
+    }
+  }
+
+  void add_to_scene(const XmlElement& element) {
+    if (element.name == "alias") {
+      add_alias(element);
+    } else if (contains(kSceneObjectTags, element.name)) {
+      scene_.objects.push_back(describe_object(element));
+    } else {
+      std::vector<std::string> known = kSceneObjectTags;
+      known.insert(known.end(), {"alias", "default", "include", "path"});
+      std::sort(known.begin(), known.end());
+      throw InputError(element.where, "<scene>: unknown element <" + element.name +
+                                          "> (known: " + join(known) + ")");
+    }
+  }
+
+  void add_alias(const XmlElement& element) {
+    check_attributes(element, {"as", "id"}, {"as", "id"});
+    const std::string& name = element.find("as")->value;
+    check_new_id(name, element.find("as")->where);
+    id_places_.emplace(name, element.find("as")->where);
+    aliases_[name] = *element.find("id");
+  }
+
+  void check_new_id(const std::string& id, const SourceLocation& where) const {
+    const auto earlier = id_places_.find(id);
+    if (earlier == id_places_.end()) return;
+    const SourceLocation& place = earlier->second;
+    throw InputError(where, "the id \"" + id + "\" is taken already, at " + place.file + ":" +
+                                std::to_string(place.line) + ":" + std::to_string(place.column));
+  }
+
+  std::shared_ptr<ObjectDescription> describe_object(const XmlElement& element) {
+    check_attributes(element, {"id", "name", "type"}, {"type"});
+    auto object = std::make_shared<ObjectDescription>();
+    object->tag = element.name;
+    object->type = element.find("type")->value;
+    object->where = element.where;
+    if (const XmlAttribute* id = element.find("id")) {
+      if (id->value.empty()) throw InputError(id->where, "the id is empty");
+      check_new_id(id->value, id->where);
+      id_places_.emplace(id->value, id->where);
+      by_id_[id->value] = object;
+      scene_.with_id.push_back(object);
+      object->id = id->value;
+    }
+    all_objects_.push_back(object);
+    for (const XmlElement& child : element.children) add_to_object(child, *object);
+    return object;
+  }
+
+  void add_to_object(const XmlElement& element, ObjectDescription& object) {
+    if (element.name == "ref") {
+      check_attributes(element, {"id", "name"}, {"id"});
+      if (!element.children.empty()) {
+        throw InputError(element.children[0].where, "<ref> takes no elements");
+      }
+      object.children.push_back({nullptr, element.find("id")->value, element.find("id")->where});
+    } else if (is_property_tag(element.name)) {
+      add_property(element, object);
+    } else if (contains(kObjectTags, element.name)) {
+      object.children.push_back({describe_object(element), "", element.where});
+    } else {
+      std::vector<std::string> known = kObjectTags;
+      known.insert(known.end(), property_tags().begin(), property_tags().end());
+      known.push_back("ref");
+      std::sort(known.begin(), known.end());
+      throw InputError(element.where, object.tag + " \"" + object.type + "\": unknown element <" +
+                                          element.name + "> (known: " + join(known) + ")");
+    }
+  }
+
+  static void add_property(const XmlElement& element, ObjectDescription& object) {
+    PropertyValue value = parse_property(element);
+    const std::string& name = element.find("name")->value;
+    const bool is_new =
+        object.properties.emplace(name, DescribedProperty{element.name, value, element.where})
+            .second;
+    if (!is_new) {
+      throw InputError(element.where, object.tag + " \"" + object.type + "\": parameter \"" + name +
+                                          "\" is given twice");
+    }
+  }
+
+  // Aliases may name aliases that come later in the file.
+  std::shared_ptr<ObjectDescription> find(std::string id, SourceLocation where) const {
+    for (size_t step = 0;; ++step) {
+      if (step > aliases_.size()) throw InputError(where, "the alias \"" + id + "\" names itself");
+      const auto found = by_id_.find(id);
+      if (found != by_id_.end()) return found->second;
+      const auto alias = aliases_.find(id);
+      if (alias == aliases_.end()) break;
+      id = alias->second.value;
+      where = alias->second.where;
+    }
+    std::vector<std::string> known;
+    for (const auto& [name, object] : by_id_) known.push_back(name);
+    throw InputError(where, "there is no object with the id \"" + id + "\" (" +
+                                (known.empty() ? "none has one" : "known: " + join(known)) + ")");
+  }
+
+  void resolve(ObjectDescription& object) const {
+    for (ChildDescription& child : object.children) {
+      if (!child.object) child.object = find(child.reference, child.where);
+    }
+  }
+
+  SceneDescription scene_;
+  std::vector<std::shared_ptr<ObjectDescription>> all_objects_;
+  std::map<std::string, std::shared_ptr<ObjectDescription>> by_id_;
+  std::map<std::string, SourceLocation> id_places_;
+  std::map<std::string, XmlAttribute> aliases_;
+};
+
+}  // namespace
+
+SceneDescription describe_scene(const std::string& file,
+                                const std::map<std::string, std::string>& defines) {
+  return Describer().describe(load_scene_tree(file, defines), file);
+}
+
+}  // namespace limn

@@ -1,0 +1,57 @@
+#pragma once
+// A scene file as objects with typed properties, before anything is made of them.
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "src/scene_file/scene_values.h"
+
+namespace limn {
+
+struct DescribedProperty {
+  std::string tag;  // "float", "rgb", ...
+  PropertyValue value;
+  SourceLocation where;
+};
+
+struct ObjectDescription;
+
+// An object inside another: written there, or referred to.
+struct ChildDescription {
+  std::shared_ptr<ObjectDescription> object;  // null until a reference is resolved
+  std::string reference;                      // "" if written in place
+  SourceLocation where;
+};
+
+struct ObjectDescription {
+  std::string tag;   // "bsdf"
+  std::string type;  // "diffuse"
+  std::string id;    // "" if none
+  SourceLocation where;
+  std::map<std::string, DescribedProperty> properties;
+  std::vector<ChildDescription> children;
+};
+
+struct SceneDescription {
+  SceneDescription() = default;
+  SceneDescription(SceneDescription&&) = default;
+  // Objects that refer to each other in a circle (an error) would keep each other alive.
+  ~SceneDescription() {
+    for (const auto& object : with_id) object->children.clear();
+  }
+
+  std::string file;
+  SourceLocation where;                                     // of <scene>
+  std::vector<std::shared_ptr<ObjectDescription>> objects;  // directly under <scene>, in order
+  std::vector<std::shared_ptr<ObjectDescription>> with_id;  // every object that has one, in order
+  std::vector<std::string> search_path;
+  std::vector<std::string> files;  // the scene file and what it includes
+};
+
+// Every reference is resolved. InputError for unknown elements, attributes and references, and for
+// duplicate ids and properties.
+SceneDescription describe_scene(const std::string& file,
+                                const std::map<std::string, std::string>& defines);
+
+}  // namespace limn

@@ -1,0 +1,56 @@
+#pragma once
+// Properties over one described object.
+#include <functional>
+#include <set>
+
+#include "limn/core/properties.h"
+#include "src/scene_file/scene_description.h"
+
+namespace limn {
+
+using BsdfMaker = std::function<std::shared_ptr<Bsdf>(const ObjectDescription&)>;
+
+class DescribedProperties final : public Properties {
+ public:
+  // `make_nested` makes nested BSDFs. Description, scene and maker must outlive this object.
+  DescribedProperties(const ObjectDescription& object, const SceneDescription& scene,
+                      const BsdfMaker& make_nested)
+      : object_(object), scene_(scene), make_nested_(make_nested) {}
+
+  const std::string& tag() const override { return object_.tag; }
+  const std::string& type() const override { return object_.type; }
+  const std::string& id() const override { return object_.id; }
+  const SourceLocation& where() const override { return object_.where; }
+  SourceLocation where(const std::string& name) const override;
+
+  bool has(const std::string& name) const override;
+  double number(const std::string& name, double absent) override;
+  int64_t integer(const std::string& name, int64_t absent) override;
+  bool boolean(const std::string& name, bool absent) override;
+  std::string string(const std::string& name, const std::string& absent) override;
+  Vec3d point(const std::string& name, const Vec3d& absent) override;
+  Rgb<double> rgb(const std::string& name, const Rgb<double>& absent) override;
+  Matrix4 transform(const std::string& name) override;
+  std::string file(const std::string& name) override;
+  std::vector<std::shared_ptr<Bsdf>> bsdfs() override;
+
+  // The nested object of this tag; null if there is none, InputError if there are several.
+  const ObjectDescription* nested(const std::string& tag);
+
+  // InputError at the first property or nested object that nobody has asked for.
+  void check_all_used() const;
+
+ private:
+  // Null if absent. Remembers that the name is known.
+  const DescribedProperty* find(const std::string& name) const;
+  [[noreturn]] void fail_type(const std::string& name, const DescribedProperty& property,
+                              const std::string& expected) const;
+
+  const ObjectDescription& object_;
+  const SceneDescription& scene_;
+  const BsdfMaker& make_nested_;
+  mutable std::set<std::string> known_;
+  std::set<std::string> known_tags_;
+};
+
+}  // namespace limn

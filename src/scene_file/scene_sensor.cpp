@@ -1,0 +1,200 @@
+#include "src/scene_file/scene_sensor.h"
+
+#include <cmath>
+#include <limits>
+
+#include "src/base/text.h"
+
+namespace limn {
+
+namespace {
+
+const BsdfMaker kNoBsdfs;
+
+std::string lower(std::string text) {
+  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return text;
+}
+
+[[noreturn]] void fail_unknown_type(const ObjectDescription& object, const std::string& known) {
+  throw InputError(object.where, "unknown " + object.tag + " type \"" + object.type +
+                                     "\" (known: " + known + ")");
+}
+
+int bounded_integer(Properties& properties, const std::string& name, int64_t absent,
+                    int64_t smallest) {
+  const int64_t number = properties.integer(name, absent);
+  if (number < smallest || number > std::numeric_limits<int>::max() / 2) {
+    properties.fail(
+        name, "must be at least " + std::to_string(smallest) + ", not " + std::to_string(number));
+  }
+  return static_cast<int>(number);
+}
+
+double positive(Properties& properties, const std::string& name, double absent) {
+  const double number = properties.number(name, absent);
+  if (!(number > 0)) properties.fail(name, "must be positive");
+  return number;
+}
+
+void read_filter(const ObjectDescription& object, const SceneDescription& scene, Filter& filter) {
+  DescribedProperties p(object, scene, kNoBsdfs);
+  if (object.type == "box") {
+    filter = {Filter::Kind::kBox, 0.5, 0};
+  } else if (object.type == "tent") {
+    filter = {Filter::Kind::kTent, positive(p, "radius", 1), 0};
+  } else if (object.type == "gaussian") {
+    const double stddev = positive(p, "stddev", 0.5);
+    filter = {Filter::Kind::kGaussian, 4 * stddev, stddev};
+  } else {
+    fail_unknown_type(object, "box, gaussian, tent");
+  }
+  p.check_all_used();
+}
+
+// A string that must be one of `known`.
+std::string choice(Properties& properties, const std::string& name, const std::string& absent,
+                   const std::vector<std::string>& known) {
+  const std::string word = lower(properties.string(name, absent));
+  for (const std::string& k : known) {
+    if (k == word) return word;
+  }
+  properties.fail(name, "unknown value \"" + word + "\" (known: " + join(known) + ")");
+}
+
+void read_crop(Properties& p, const Camera& camera, Film& film) {
+  film.crop_x = bounded_integer(p, "crop_offset_x", 0, 0);
+  film.crop_y = bounded_integer(p, "crop_offset_y", 0, 0);
+  film.crop_width = bounded_integer(p, "crop_width", camera.width, 1);
+  film.crop_height = bounded_integer(p, "crop_height", camera.height, 1);
+  if (film.crop_x + film.crop_width > camera.width ||
+      film.crop_y + film.crop_height > camera.height) {
+    p.fail("the crop window reaches beyond the film (" + std::to_string(camera.width) + " x " +
+           std::to_string(camera.height) + " pixels)");
+  }
+}
+
+void read_film(const ObjectDescription& object, const SceneDescription& description, Scene& scene) {
+  if (object.type != "hdrfilm") fail_unknown_type(object, "hdrfilm");
+  DescribedProperties p(object, description, kNoBsdfs);
+  Film& film = scene.film;
+  scene.camera.width = bounded_integer(p, "width", 768, 1);
+  scene.camera.height = bounded_integer(p, "height", 576, 1);
+  read_crop(p, scene.camera, film);
+  film.sample_border = p.boolean("sample_border", false);
+  choice(p, "file_format", "openexr", {"openexr", "exr"});
+  film.luminance = choice(p, "pixel_format", "rgb", {"luminance", "rgb"}) == "luminance";
+  film.half = choice(p, "component_format", "float16", {"float16", "float32"}) == "float16";
+  // Neither changes a picture here: sums are in double precision, and there is no banner.
+  p.boolean("compensate", false);
+  p.boolean("banner", false);
+  if (const ObjectDescription* filter = p.nested("rfilter")) {
+    read_filter(*filter, description, film.filter);
+  }
+  p.check_all_used();
+}
+
+void read_sampler(const ObjectDescription& object, const SceneDescription& description,
+                  Scene& scene) {
+  if (object.type != "independent") fail_unknown_type(object, "independent");
+  DescribedProperties p(object, description, kNoBsdfs);
+  scene.sample_count = bounded_integer(p, "sample_count", 4, 1);
+  const int64_t seed = p.integer("seed", 0);
+  if (seed < 0) p.fail("seed", "must not be negative");
+  scene.seed = static_cast<uint64_t>(seed);
+  p.check_all_used();
+}
+
+// tan(x_fov / 2) over tan(fov / 2), for a field of view along `axis` of a film of this aspect.
+double x_factor(Properties& p, const std::string& axis, double aspect) {
+  if (axis == "x") return 1;
+  if (axis == "y") return aspect;
+  if (axis == "diagonal") return 1 / std::sqrt(1 + 1 / (aspect * aspect));
+  if (axis == "smaller") return aspect > 1 ? aspect : 1;
+  if (axis == "larger") return aspect > 1 ? 1 : aspect;
+  p.fail("fov_axis", "unknown axis \"" + axis + "\" (known: diagonal, larger, smaller, x, y)");
+}
+
+// Field of view [degrees] of a focal length on 35 mm film, along its diagonal.
+double fov_of_focal_length(Properties& p) {
+  std::string text = p.string("focal_length", "50mm");
+  if (text.ends_with("mm")) text.resize(text.size() - 2);
+  const double focal_length = parse_double(text).value_or(0);
+  if (!(focal_length > 0)) p.fail("focal_length", "must be a positive length like \"50mm\"");
+  return 2 * std::atan(std::hypot(36.0, 24.0) / (2 * focal_length)) * (180 / kPi);
+}
+
+void read_fov(Properties& p, Camera& camera) {
+  const double aspect = static_cast<double>(camera.width) / camera.height;
+  std::string axis = lower(p.string("fov_axis", "x"));
+  double fov = 0;
+  if (p.has("fov")) {
+    if (p.has("focal_length")) p.fail("focal_length", "give either fov or focal_length, not both");
+    fov = p.number("fov", 0);
+    if (!(fov > 0 && fov < 180)) p.fail("fov", "must lie between 0 and 180 degrees");
+  } else {
+    if (p.has("fov_axis")) {
+      p.fail("fov_axis", "needs fov (a focal length is measured along the diagonal)");
+    }
+    fov = fov_of_focal_length(p);
+    axis = "diagonal";
+  }
+  camera.fov = fov;
+  camera.x_factor = x_factor(p, axis, aspect);
+}
+
+Vec3<Dual> dual(const Vec3d& v) { return {v.x, v.y, v.z}; }
+
+// The camera's axes, made exactly orthonormal. Mirrored cameras are allowed, as in Mitsuba.
+void read_axes(Properties& p, Camera& camera) {
+  constexpr double kDigits = 1e-3;  // Mitsuba's bound on scale factors
+  const Matrix4 m = p.transform("to_world");
+  Vec3d row[3], column[3];
+  for (int i = 0; i < 3; ++i) {
+    row[i] = {m.m[i][0], m.m[i][1], m.m[i][2]};
+    column[i] = {m.m[0][i], m.m[1][i], m.m[2][i]};
+  }
+  for (int i = 0; i < 3; ++i) {
+    if (!(std::fabs(length(row[i]) - 1) <= kDigits && std::fabs(length(column[i]) - 1) <= kDigits &&
+          std::fabs(dot(column[i], column[(i + 1) % 3])) <= kDigits)) {
+      p.fail("to_world", "a camera can be moved and rotated, not scaled or sheared");
+    }
+  }
+  const Vec3d forward = normalize(column[2]);
+  const Vec3d up = normalize(column[1] - forward * dot(forward, column[1]));
+  const Vec3d left = cross(up, forward);
+  camera.forward = dual(forward);
+  camera.up = dual(up);
+  camera.left = dual(dot(left, column[0]) > 0 ? left : -left);
+  camera.origin = dual({m.m[0][3], m.m[1][3], m.m[2][3]});
+}
+
+}  // namespace
+
+void read_sensor(const ObjectDescription& sensor, const SceneDescription& description,
+                 Scene& scene) {
+  if (sensor.type != "perspective") fail_unknown_type(sensor, "perspective");
+  DescribedProperties p(sensor, description, kNoBsdfs);
+  Camera& camera = scene.camera;
+  if (const ObjectDescription* film = p.nested("film")) {
+    read_film(*film, description, scene);
+  }
+  if (const ObjectDescription* sampler = p.nested("sampler")) {
+    read_sampler(*sampler, description, scene);
+  }
+  read_fov(p, camera);
+  read_axes(p, camera);
+  camera.near_clip = positive(p, "near_clip", 0.01);
+  camera.far_clip = positive(p, "far_clip", 10000);
+  if (!(camera.near_clip < camera.far_clip)) p.fail("far_clip", "must be larger than near_clip");
+  camera.offset_x = p.number("principal_point_offset_x", 0);
+  camera.offset_y = p.number("principal_point_offset_y", 0);
+  // Nothing here moves during an exposure and a pinhole has no focus: Mitsuba's files carry these,
+  // and they change nothing there either.
+  p.number("shutter_open", 0);
+  p.number("shutter_close", 0);
+  p.number("focus_distance", camera.far_clip);
+  p.check_all_used();
+}
+
+}  // namespace limn

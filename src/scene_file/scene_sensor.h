@@ -1,0 +1,13 @@
+#pragma once
+// Sensor, film, reconstruction filter and sampler of a scene file.
+#include "limn/core/scene.h"
+#include "src/scene_file/scene_properties.h"
+
+namespace limn {
+
+// Reads `sensor` (with its film, filter and sampler) into the scene's camera, film, sample count
+// and seed.
+void read_sensor(const ObjectDescription& sensor, const SceneDescription& description,
+                 Scene& scene);
+
+}  // namespace limn

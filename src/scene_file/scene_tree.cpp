@@ -1,0 +1,194 @@
+#include "src/scene_file/scene_tree.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <set>
+
+#include "src/base/text.h"
+
+namespace limn {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int kMaxIncludeDepth = 15;
+
+bool is_word(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+}
+
+std::vector<std::string> names_of(const std::map<std::string, std::string>& map) {
+  std::vector<std::string> names;
+  for (const auto& [name, value] : map) names.push_back(name);
+  return names;
+}
+
+std::string known_parameters(const std::map<std::string, std::string>& values) {
+  return values.empty() ? "none are defined" : "known: " + join(names_of(values));
+}
+
+class TreeLoader {
+ public:
+  explicit TreeLoader(const std::map<std::string, std::string>& defines)
+      : defines_(defines), values_(defines) {}
+
+  SceneTree load(const std::string& file) {
+    tree_.root = parse_xml(file);
+    tree_.files.push_back(file);
+    expand(tree_.root, 0, true);
+    check_defines(file);
+    return std::move(tree_);
+  }
+
+ private:
+  // Replaces $name, the longest known name first; \$ stands for a dollar sign.
+  std::string substitute(const XmlAttribute& attribute) {
+    std::string result;
+    const std::string& text = attribute.value;
+    for (size_t i = 0; i < text.size(); ++i) {
+      if (text.compare(i, 2, "\\$") == 0) {
+        result += text[++i];
+      } else if (text[i] == '$') {
+        const std::string name = parameter_at(text, i + 1, attribute.where);
+        used_.insert(name);
+        result += values_.at(name);
+        i += name.size();
+      } else {
+        result += text[i];
+      }
+    }
+    return result;
+  }
+
+  std::string parameter_at(const std::string& text, size_t begin, const SourceLocation& where) {
+    std::string longest;
+    for (const auto& [name, value] : values_) {
+      if (text.compare(begin, name.size(), name) == 0 && name.size() > longest.size()) {
+        longest = name;
+      }
+    }
+    if (!longest.empty()) return longest;
+    size_t end = begin;
+    while (end < text.size() && is_word(text[end])) ++end;
+    throw InputError(where, "undefined parameter \"$" + text.substr(begin, end - begin) + "\" (" +
+                                known_parameters(values_) + ")");
+  }
+
+  void expand(XmlElement& element, int include_depth, bool is_root) {
+    for (XmlAttribute& attribute : element.attributes) attribute.value = substitute(attribute);
+    std::vector<XmlElement> children = std::move(element.children);
+    element.children.clear();
+    for (XmlElement& child : children) {
+      if (child.name == "default" || child.name == "path" || child.name == "include") {
+        if (!is_root) {
+          throw InputError(child.where, "<" + child.name + "> belongs directly under <scene>");
+        }
+        expand(child, include_depth, false);
+        obey(child, element, include_depth);
+      } else {
+        expand(child, include_depth, false);
+        element.children.push_back(std::move(child));
+      }
+    }
+  }
+
+  // Carries out <default>, <path> or <include>.
+  void obey(const XmlElement& order, XmlElement& parent, int include_depth) {
+    if (order.name == "default") {
+      check_attributes(order, {"name", "value"}, {"name", "value"});
+      const std::string& name = order.find("name")->value;
+      if (name.empty()) throw InputError(order.where, "<default>: the name is empty");
+      values_.try_emplace(name, order.find("value")->value);
+    } else if (order.name == "path") {
+      add_path(order);
+    } else {
+      include(order, parent, include_depth);
+    }
+  }
+
+  void add_path(const XmlElement& order) {
+    check_attributes(order, {"value"}, {"value"});
+    const XmlAttribute& value = *order.find("value");
+    fs::path directory = value.value;
+    if (directory.is_relative()) directory = fs::path(value.where.file).parent_path() / directory;
+    std::error_code error;
+    if (!fs::is_directory(directory, error)) {
+      throw InputError(value.where, "no such directory: \"" + value.value + "\"");
+    }
+    tree_.search_path.insert(tree_.search_path.begin(), directory.string());
+  }
+
+  void include(const XmlElement& order, XmlElement& parent, int depth) {
+    check_attributes(order, {"filename"}, {"filename"});
+    const XmlAttribute& name = *order.find("filename");
+    const std::string file = find_input_file(name.value, name.where.file, tree_.search_path);
+    if (file.empty()) throw InputError(name.where, "no such file: \"" + name.value + "\"");
+    if (depth >= kMaxIncludeDepth) {
+      throw InputError(name.where, "files are included more than 15 deep");
+    }
+    XmlElement root = parse_xml(file);
+    tree_.files.push_back(file);
+    const bool is_scene = root.name == "scene";
+    expand(root, depth + 1, is_scene);
+    if (!is_scene) {
+      parent.children.push_back(std::move(root));
+      return;
+    }
+    check_attributes(root, {"version"}, {"version"});
+    std::move(root.children.begin(), root.children.end(), std::back_inserter(parent.children));
+  }
+
+  void check_defines(const std::string& file) const {
+    for (const auto& [name, value] : defines_) {
+      if (used_.count(name)) continue;
+      auto known = values_;
+      for (const auto& [other, unused] : defines_) {
+        if (!used_.count(other)) known.erase(other);
+      }
+      throw InputError({file}, "-D " + name + "=" + value + ": the scene has no parameter \"$" +
+                                   name + "\" (" + known_parameters(known) + ")");
+    }
+  }
+
+  const std::map<std::string, std::string>& defines_;
+  std::map<std::string, std::string> values_;
+  std::set<std::string> used_;
+  SceneTree tree_;
+};
+
+}  // namespace
+
+void check_attributes(const XmlElement& element, const std::vector<std::string>& known,
+                      const std::vector<std::string>& required) {
+  for (const XmlAttribute& a : element.attributes) {
+    if (std::find(known.begin(), known.end(), a.name) == known.end()) {
+      throw InputError(a.where, "<" + element.name + ">: unknown attribute \"" + a.name +
+                                    "\" (known: " + join(known) + ")");
+    }
+  }
+  for (const std::string& name : required) {
+    if (!element.find(name)) {
+      throw InputError(element.where,
+                       "<" + element.name + ">: attribute \"" + name + "\" is missing");
+    }
+  }
+}
+
+std::string find_input_file(const std::string& name, const std::string& mentioned_in,
+                            const std::vector<std::string>& search_path) {
+  std::error_code error;
+  std::vector<fs::path> candidates{fs::path(mentioned_in).parent_path() / name};
+  for (const std::string& directory : search_path) candidates.push_back(fs::path(directory) / name);
+  for (const fs::path& path : candidates) {  // an absolute name replaces what it is appended to
+    if (fs::is_regular_file(path, error)) return path.string();
+  }
+  return "";
+}
+
+SceneTree load_scene_tree(const std::string& file,
+                          const std::map<std::string, std::string>& defines) {
+  return TreeLoader(defines).load(file);
+}
+
+}  // namespace limn

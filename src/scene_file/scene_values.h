@@ -1,0 +1,26 @@
+#pragma once
+// The property tags of a scene file and their values.
+#include <string>
+#include <variant>
+
+#include "limn/core/properties.h"
+#include "src/scene_file/xml_tree.h"
+
+namespace limn {
+
+// <spectrum value="0.5">: the same at all wavelengths.
+struct ConstantSpectrum {
+  double value = 0;
+};
+
+using PropertyValue =
+    std::variant<bool, int64_t, double, std::string, Vec3d, Rgb<double>, ConstantSpectrum, Matrix4>;
+
+// Names of the property tags: boolean, integer, ...
+const std::vector<std::string>& property_tags();
+bool is_property_tag(const std::string& tag);
+
+// The value of a property element; InputError where an attribute is unknown, missing or malformed.
+PropertyValue parse_property(const XmlElement& element);
+
+}  // namespace limn

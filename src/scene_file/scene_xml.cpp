@@ -1,0 +1,212 @@
+// From the description of a scene to the scene.
+#include <cmath>
+#include <stdexcept>
+
+#include "limn/core/scene.h"
+#include "src/mesh/mesh_build.h"
+#include "src/scene_file/scene_properties.h"
+#include "src/scene_file/scene_sensor.h"
+
+namespace limn {
+
+namespace {
+
+class SceneBuilder {
+ public:
+  SceneBuilder(const SceneDescription& description, std::vector<std::string>* warnings)
+      : description_(description),
+        warnings_(warnings),
+        make_nested_([this](const ObjectDescription& object) { return bsdf(object); }) {}
+
+  Scene build() {
+    scene_.file = description_.file;
+    scene_.xml_files = description_.files;
+    for (const auto& object : description_.objects) {
+      add(*object);
+      note_data_file(*object);
+    }
+    // BSDFs that no shape uses are made as well: their mistakes count, and so do their ids.
+    for (const auto& object : description_.objects) {
+      if (object->tag == "bsdf") bsdf(*object);
+    }
+    if (!sensor_) throw InputError(description_.where, "<scene>: there is no sensor");
+    return std::move(scene_);
+  }
+
+ private:
+  void add(const ObjectDescription& object) {
+    if (object.tag == "integrator") {
+      only_one(object, "integrator", integrator_);
+      read_integrator(object);
+    } else if (object.tag == "sensor") {
+      only_one(object, "sensor", sensor_);
+      read_sensor(object, description_, scene_);
+    } else if (object.tag == "shape") {
+      add_shape(object);
+    } else if (object.tag == "emitter") {
+      add_environment(object);
+    }
+  }
+
+  void note_data_file(const ObjectDescription& object) {
+    DescribedProperties p(object, description_, make_nested_);
+    if (p.has("filename")) scene_.data_files.push_back(p.file("filename"));
+  }
+
+  static void only_one(const ObjectDescription& object, const std::string& what,
+                       const ObjectDescription*& earlier) {
+    if (earlier) {
+      throw InputError(object.where, "a second " + what + ": the first is at " +
+                                         earlier->where.file + ":" +
+                                         std::to_string(earlier->where.line) + ":" +
+                                         std::to_string(earlier->where.column));
+    }
+    earlier = &object;
+  }
+
+  void read_integrator(const ObjectDescription& object) {
+    if (object.type != "path") {
+      throw InputError(object.where,
+                       "unknown integrator type \"" + object.type + "\" (known: path)");
+    }
+    DescribedProperties p(object, description_, make_nested_);
+    const int64_t depth = p.integer("max_depth", -1);
+    if (depth < -1 || depth > INT32_MAX) p.fail("max_depth", "must be -1 (no limit) or 0 and more");
+    const int64_t rr_depth = p.integer("rr_depth", 5);
+    if (rr_depth < 1 || rr_depth > INT32_MAX) p.fail("rr_depth", "must be 1 or more");
+    scene_.max_depth = static_cast<int>(depth);
+    scene_.rr_depth = static_cast<int>(rr_depth);
+    scene_.hide_emitters = p.boolean("hide_emitters", false);
+    p.check_all_used();
+  }
+
+  // One object per element, however often it is referred to.
+  std::shared_ptr<Bsdf> bsdf(const ObjectDescription& object) {
+    const auto [entry, is_new] = bsdfs_.try_emplace(&object);
+    if (!is_new) {
+      if (!entry->second) throw InputError(object.where, "the bsdf contains itself");
+      return entry->second;
+    }
+    DescribedProperties p(object, description_, make_nested_);
+    std::shared_ptr<Bsdf> made = make_bsdf(p);
+    p.check_all_used();
+    if (!object.id.empty()) scene_.bsdfs_by_id[object.id] = made;
+    bsdfs_[&object] = made;
+    return made;
+  }
+
+  void add_environment(const ObjectDescription& object) {
+    if (object.type == "area") {
+      throw InputError(object.where, "an area emitter belongs inside a shape");
+    }
+    only_one(object, "environment", environment_);
+    DescribedProperties p(object, description_, make_nested_);
+    scene_.environment = make_environment(p);
+    scene_.environment_id = object.id;
+    p.check_all_used();
+  }
+
+  void read_area_emitter(const ObjectDescription& object, Shape& shape) {
+    if (object.type != "area") {
+      throw InputError(object.where, "unknown type \"" + object.type +
+                                         "\" of an emitter inside a shape (known: area)");
+    }
+    DescribedProperties p(object, description_, make_nested_);
+    const Rgb<double> radiance = p.rgb("radiance", grey(1.0));
+    for (int i = 0; i < 3; ++i) {
+      if (!(radiance[i] >= 0)) p.fail("radiance", "must not be negative");
+      shape.radiance[i] = radiance[i];
+    }
+    p.check_all_used();
+    shape.is_emitter = true;
+    shape.emitter_id = object.id;
+  }
+
+  MeshOptions read_mesh_options(DescribedProperties& p, bool from_file) {
+    MeshOptions options;
+    options.to_world = p.transform("to_world");
+    try {
+      options.to_world.inverse();
+    } catch (const std::domain_error&) {
+      p.fail("to_world", "the transform is not invertible: it flattens the shape");
+    }
+    options.flip_normals = p.boolean("flip_normals", false);
+    if (from_file) {
+      options.face_normals = p.boolean("face_normals", false);
+      p.boolean("flip_tex_coords", true);  // there are no textures to flip
+    }
+    return options;
+  }
+
+  // The shape's mesh in its own space; sets `options`.
+  RawMesh read_geometry(DescribedProperties& p, MeshOptions& options) {
+    const std::string& type = p.type();
+    const bool from_file = type == "obj" || type == "ply";
+    if (from_file) {
+      const std::string file = p.file("filename");
+      options = read_mesh_options(p, true);
+      return type == "obj" ? parse_obj(file) : parse_ply(file);
+    }
+    options = read_mesh_options(p, false);
+    // Flat shapes have the normals of their faces.
+    options.face_normals = type != "sphere";
+    if (type == "rectangle") return make_rectangle();
+    if (type == "cube") return make_cube();
+    if (type == "disk") return make_disk();
+    if (type != "sphere") {
+      throw InputError(p.where(), "unknown shape type \"" + type +
+                                      "\" (known: cube, disk, obj, ply, rectangle, sphere)");
+    }
+    return read_sphere(p, options);
+  }
+
+  static RawMesh read_sphere(DescribedProperties& p, MeshOptions& options) {
+    const double radius = p.number("radius", 1);
+    if (!(radius > 0)) p.fail("radius", "must be positive");
+    const Vec3d center = p.point("center", {});
+    Matrix4 place;
+    for (int i = 0; i < 3; ++i) {
+      place.m[i][i] = radius;
+      place.m[i][3] = center[i];
+    }
+    options.to_world = options.to_world * place;
+    return make_sphere();
+  }
+
+  void add_shape(const ObjectDescription& object) {
+    DescribedProperties p(object, description_, make_nested_);
+    Shape shape;
+    shape.id = object.id;
+    shape.where = object.where;
+    MeshOptions options;
+    RawMesh raw = read_geometry(p, options);
+    if (raw.where.file.empty()) raw.where = object.where;
+    const std::vector<std::shared_ptr<Bsdf>> bsdfs = p.bsdfs();
+    if (bsdfs.size() > 1) p.fail("has " + std::to_string(bsdfs.size()) + " bsdfs (one at most)");
+    if (const ObjectDescription* emitter = p.nested("emitter")) read_area_emitter(*emitter, shape);
+    p.check_all_used();
+    shape.mesh = build_mesh(std::move(raw), options, warnings_);
+    const double grey_value = shape.is_emitter ? 0.0 : 0.5;
+    shape.bsdf = bsdfs.empty() ? make_diffuse(grey(grey_value)) : bsdfs[0];
+    scene_.shapes.push_back(std::move(shape));
+  }
+
+  const SceneDescription& description_;
+  std::vector<std::string>* warnings_;
+  BsdfMaker make_nested_;
+  Scene scene_;
+  std::map<const ObjectDescription*, std::shared_ptr<Bsdf>> bsdfs_;
+  const ObjectDescription* integrator_ = nullptr;
+  const ObjectDescription* sensor_ = nullptr;
+  const ObjectDescription* environment_ = nullptr;
+};
+
+}  // namespace
+
+Scene read_scene(const std::string& file, const std::map<std::string, std::string>& defines,
+                 std::vector<std::string>* warnings) {
+  const SceneDescription description = describe_scene(file, defines);
+  return SceneBuilder(description, warnings).build();
+}
+
+}  // namespace limn

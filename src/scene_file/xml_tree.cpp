@@ -1,0 +1,120 @@
+// The only file that knows pugixml.
+#include "src/scene_file/xml_tree.h"
+
+#include <algorithm>
+#include <pugixml.hpp>
+
+#include "src/base/text.h"
+
+namespace limn {
+
+namespace {
+
+constexpr int kMaxDepth = 64;
+
+// Lines and columns of byte offsets. A column counts bytes.
+class TextPlaces {
+ public:
+  TextPlaces(const std::string& file, const std::string& text) : file_(file), text_(text) {
+    for (size_t i = 0; i < text.size(); ++i) {
+      if (text[i] == '\n') line_starts_.push_back(i + 1);
+    }
+  }
+  const std::string& text() const { return text_; }
+
+  SourceLocation at(size_t offset) const {
+    const auto next = std::upper_bound(line_starts_.begin(), line_starts_.end(), offset);
+    const size_t line = static_cast<size_t>(next - line_starts_.begin());
+    return {file_, static_cast<int>(line), static_cast<int>(offset - *(next - 1)) + 1};
+  }
+
+ private:
+  std::string file_;
+  const std::string& text_;
+  std::vector<size_t> line_starts_{0};
+};
+
+// pugixml knows where elements begin but not where attributes do. The text is well-formed, so from
+// the element's name on it is `name = "value"` again and again.
+std::vector<size_t> attribute_offsets(const std::string& text, size_t offset, size_t count) {
+  static const char* const kSpace = " \t\r\n";
+  std::vector<size_t> offsets;
+  size_t i = text.find_first_of(" \t\r\n", offset);
+  while (offsets.size() < count) {
+    i = text.find_first_not_of(kSpace, i);
+    offsets.push_back(i);
+    const size_t quote = text.find_first_of("\"'", i);
+    i = text.find(text[quote], quote + 1) + 1;
+  }
+  return offsets;
+}
+
+void convert_attributes(const pugi::xml_node& node, const TextPlaces& places, XmlElement& element) {
+  for (const pugi::xml_attribute& a : node.attributes()) {
+    element.attributes.push_back({a.name(), a.value(), {}});
+  }
+  const auto offsets = attribute_offsets(places.text(), static_cast<size_t>(node.offset_debug()),
+                                         element.attributes.size());
+  for (size_t i = 0; i < offsets.size(); ++i) {
+    XmlAttribute& attribute = element.attributes[i];
+    attribute.where = places.at(offsets[i]);
+    if (element.find(attribute.name) != &attribute) {
+      throw InputError(attribute.where, "<" + element.name + ">: attribute \"" + attribute.name +
+                                            "\" is given twice");
+    }
+  }
+}
+
+XmlElement convert(const pugi::xml_node& node, const TextPlaces& places, int depth) {
+  XmlElement element;
+  element.name = node.name();
+  element.where = places.at(static_cast<size_t>(node.offset_debug()) - 1);
+  if (depth > kMaxDepth) {
+    throw InputError(element.where, "elements are nested more than 64 deep");
+  }
+  convert_attributes(node, places, element);
+  for (const pugi::xml_node& child : node.children()) {
+    if (child.type() == pugi::node_element) {
+      element.children.push_back(convert(child, places, depth + 1));
+    } else {
+      const size_t begin = static_cast<size_t>(child.offset_debug());
+      throw InputError(places.at(places.text().find_first_not_of(" \t\r\n", begin)),
+                       "<" + element.name + ">: text between elements means nothing here");
+    }
+  }
+  return element;
+}
+
+}  // namespace
+
+const XmlAttribute* XmlElement::find(const std::string& attribute) const {
+  for (const XmlAttribute& a : attributes) {
+    if (a.name == attribute) return &a;
+  }
+  return nullptr;
+}
+
+XmlElement parse_xml(const std::string& file) {
+  const std::optional<std::string> text = read_whole_file(file);
+  if (!text) throw InputError({file}, "cannot read the file");
+  const TextPlaces places(file, *text);
+  pugi::xml_document document;
+  const pugi::xml_parse_result result =
+      document.load_buffer(text->data(), text->size(), pugi::parse_default, pugi::encoding_utf8);
+  if (!result) {
+    const size_t offset = std::min(static_cast<size_t>(result.offset), text->size());
+    throw InputError(places.at(offset), std::string("malformed XML: ") + result.description());
+  }
+  pugi::xml_node root;
+  for (const pugi::xml_node& child : document.children()) {
+    if (child.type() != pugi::node_element) continue;
+    if (root) {
+      throw InputError(places.at(static_cast<size_t>(child.offset_debug()) - 1),
+                       "a second root element <" + std::string(child.name()) + ">");
+    }
+    root = child;
+  }
+  return convert(root, places, 1);
+}
+
+}  // namespace limn

@@ -1,0 +1,115 @@
+// The tables of what can be made, and the mesh files.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+#include "tools/generate/generate.h"
+#include "tools/generate/generate_kinds.h"
+
+namespace limn {
+
+std::span<const MeshKind> mesh_kinds() {
+  static const MeshKind kinds[] = {
+      {"pebble", "a sphere with hollows and bumps", 30000, 1000, true, 1, 0, make_pebble},
+      {"knot", "a trefoil, genus 1", 30000, 1000, true, 1, 1, make_knot},
+      {"pretzel", "two rings grown together, genus 2", 30000, 1000, true, 1, 2, make_pretzel},
+      {"tetrapod", "the edges of a tetrahedron grown thick, genus 3", 30000, 1000, true, 1, 3,
+       make_tetrapod},
+      {"creature", "an animal with ears and a curled tail", 40000, 3000, true, 1, 0, make_creature},
+      {"harp", "a frame and two rows of thin strings with their pins", 60000, 20000, true, 290, 1,
+       make_harp},
+      {"chandelier", "arms, candles, a chain, beads and drops", 70000, 30000, true, 448, 26,
+       make_chandelier},
+      {"bracket", "a CAD part with bores, a boss and chamfers, for face_normals", 20000, 2000, true,
+       1, 5, make_bracket},
+      {"plant", "open leaves on closed stems in a pot", 30000, 5000, false, 69, 0, make_plant},
+  };
+  return kinds;
+}
+
+std::span<const SkyKind> sky_kinds() {
+  static const SkyKind kinds[] = {
+      {"sky_soft", "clouds, lit from one side", make_soft_sky},
+      {"sky_sun", "clear, with a strong small sun", make_sun_sky},
+  };
+  return kinds;
+}
+
+Triangles make_mesh(const MeshKind& kind, int faces) {
+  Triangles mesh = kind.make(faces);
+  Bounds bounds;
+  for (const Vec3d& p : mesh.positions) bounds.extend(p);
+  const Vec3d size = bounds.upper - bounds.lower;
+  const double scale = 1.98 / std::max({size.x, size.y, size.z});
+  const Vec3d centre = bounds.center();
+  for (Vec3d& p : mesh.positions) {
+    p = Vec3d{p.x - centre.x, p.y - bounds.lower.y, p.z - centre.z} * scale - Vec3d{0, 0.99, 0};
+  }
+  return mesh;
+}
+
+namespace {
+
+template <class T>
+void put(std::string& bytes, T number) {
+  if constexpr (std::endian::native == std::endian::big && sizeof(T) == 4) {
+    number = std::bit_cast<T>(__builtin_bswap32(std::bit_cast<uint32_t>(number)));
+  }
+  char raw[sizeof(T)];
+  std::memcpy(raw, &number, sizeof(T));
+  bytes.append(raw, sizeof(T));
+}
+
+std::string ply_bytes(const Triangles& mesh) {
+  std::string bytes = fmt::format(
+      "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\n"
+      "property float y\nproperty float z\nelement face {}\n"
+      "property list uchar int vertex_indices\nend_header\n",
+      mesh.positions.size(), mesh.faces.size());
+  for (const Vec3d& p : mesh.positions) {
+    for (int i = 0; i < 3; ++i) put(bytes, static_cast<float>(p[i]));
+  }
+  for (const FaceIndices& face : mesh.faces) {
+    put(bytes, uint8_t{3});
+    for (const uint32_t v : face) put(bytes, v);
+  }
+  return bytes;
+}
+
+std::string obj_bytes(const Triangles& mesh) {
+  std::string bytes;
+  for (const Vec3d& p : mesh.positions) {
+    bytes += fmt::format("v {} {} {}\n", static_cast<float>(p.x), static_cast<float>(p.y),
+                         static_cast<float>(p.z));
+  }
+  for (const auto& [a, b, c] : mesh.faces) {
+    bytes += fmt::format("f {} {} {}\n", a + 1, b + 1, c + 1);
+  }
+  return bytes;
+}
+
+}  // namespace
+
+void write_triangles(const std::string& file, const Triangles& mesh) {
+  const bool obj = file.ends_with(".obj");
+  if (!obj && !file.ends_with(".ply")) {
+    throw InputError({file}, "mesh files end with .ply or .obj");
+  }
+  // Under another name first: nobody reads half a file.
+  const std::string unfinished = file + ".unfinished";
+  std::ofstream out(unfinished, std::ios::binary);
+  out << (obj ? obj_bytes(mesh) : ply_bytes(mesh));
+  out.close();
+  std::error_code failed;
+  if (out) std::filesystem::rename(unfinished, file, failed);
+  if (!out || failed) {
+    std::filesystem::remove(unfinished, failed);
+    throw InputError({file}, "cannot be written");
+  }
+}
+
+}  // namespace limn

@@ -1,0 +1,251 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "limn/core/error.h"
+#include "limn/core/parallel.h"
+#include "limn/core/parameter.h"
+#include "tools/limn/commands.h"
+#include "tools/limn/compare_output.h"
+#include "tools/mitsuba/mitsuba_method.h"
+
+namespace limn {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kImageSamples = 256;  // of the plain rendering, at most
+
+// Names are checked before any work.
+void check_methods(const std::vector<std::string>& names) {
+  std::vector<MethodName> known = method_names();
+  known.push_back(mitsuba_name());
+  std::set<std::string> seen;
+  for (const std::string& name : names) {
+    const auto same = [&](const MethodName& m) { return m.name == name; };
+    if (std::none_of(known.begin(), known.end(), same)) {
+      std::string list;
+      for (const MethodName& m : known) list += (list.empty() ? "" : ", ") + m.name;
+      throw InputError("--methods: unknown method \"" + name + "\" (known: " + list + ")");
+    }
+    if (!seen.insert(name).second) {
+      throw InputError("--methods: \"" + name + "\" is given twice");
+    }
+  }
+}
+
+// Methods that know no terms cannot leave one out.
+void check_terms(const std::vector<std::string>& names, const std::array<bool, kTermCount>& terms) {
+  if (std::all_of(terms.begin(), terms.end(), [](bool term) { return term; })) return;
+  for (const std::string& name : names) {
+    if (name != "fd" && name != kMitsuba) continue;
+    throw InputError("--terms: \"" + name +
+                     "\" has all terms in one: leave it out of --methods, or --terms as it is");
+  }
+}
+
+void make_folder(const std::string& folder) {
+  std::error_code failed;
+  fs::create_directories(folder, failed);
+  if (failed) throw InputError({folder}, "cannot make this folder: " + failed.message());
+  check_output((fs::path(folder) / "reference.exr").string());
+}
+
+CompareOptions make_options(const CompareCommand& command) {
+  CompareOptions options;
+  options.repeats = command.repeats;
+  for (int rung = command.rungs; rung-- > 0;) {
+    options.times.push_back(std::ldexp(command.time, -rung));
+  }
+  return options;
+}
+
+// As `check` has them: eight blocks along the longer side.
+int block_size(const Film& film) {
+  return std::max(1, (std::max(film.crop_width, film.crop_height) + 7) / 8);
+}
+
+// Shares the progress bar among jobs in proportion to their seconds.
+class Stages {
+ public:
+  Stages(const RunSettings& settings, double total) : settings_(settings), total_(total) {}
+
+  // Settings of the next job.
+  RunSettings next(double seconds) {
+    RunSettings stage = settings_;
+    stage.seconds = seconds;
+    const double from = done_ / total_;
+    const double share = seconds / total_;
+    done_ += seconds;
+    if (settings_.progress) {
+      // The bar ends its line at 1, which is for the end of all stages.
+      stage.progress = [this, from, share](double done) {
+        settings_.progress(std::min(from + share * done, 0.9999));
+      };
+    }
+    return stage;
+  }
+  // Ends the bar's line.
+  void finish() const {
+    if (!settings_.progress) return;
+    if (settings_.interrupted->load()) {
+      fmt::print(stderr, "\n");
+    } else {
+      settings_.progress(1);
+    }
+  }
+
+ private:
+  const RunSettings& settings_;
+  double total_;
+  double done_ = 0;
+};
+
+// A whole comparison, step by step.
+class Comparer {
+ public:
+  Comparer(const CommonOptions& common, const CompareCommand& command, const Scene& scene,
+           const RunSettings& settings)
+      : common_(common),
+        command_(command),
+        scene_(scene),
+        settings_(settings),
+        input_{scene,        command.parameter,      parse_terms(command.terms),
+               command.step, block_size(scene.film), parse_samples(command.samples)},
+        identity_(identify(input_, common.defines)),
+        kept_file_((fs::path(command.output) / "reference.exr").string()) {
+    result_.command = command.command_line;
+    result_.defines = common.defines;
+    result_.parameter = command.parameter;
+    result_.unit = find_parameter(scene, command.parameter).unit;
+    result_.terms = command.terms;
+    result_.seed = settings.seed;
+    result_.threads = settings.threads;
+    result_.options = make_options(command);
+    double runs = 0;
+    for (const double time : result_.options.times) runs += time * command.repeats;
+    reference_seconds_ = command.reference_time > 0 ? command.reference_time : 4 * runs;
+    methods_seconds_ = runs * static_cast<double>(command.methods.size());
+    for (const std::string& name : command.methods) {
+      methods_.push_back(name == kMitsuba
+                             ? make_mitsuba_method(input_, common.defines, command.output)
+                             : make_method(input_, name));
+    }
+    take_reference();
+  }
+  Comparer(const Comparer&) = delete;
+  Comparer& operator=(const Comparer&) = delete;
+
+  // False if interrupted before there is something to write.
+  bool run() {
+    const bool made = result_.reference.spp == 0;
+    Stages stages(settings_, command_.time + methods_seconds_ + (made ? reference_seconds_ : 0));
+    RunSettings image = stages.next(command_.time);
+    image.spp = kImageSamples;
+    result_.image = render(scene_, image);
+    const bool ready = !made || make_reference_file(stages.next(reference_seconds_));
+    if (ready) {
+      result_.methods =
+          compare(result_.options, result_.reference, methods_, stages.next(methods_seconds_));
+    }
+    stages.finish();
+    return ready;
+  }
+
+  void write() const { write_comparison(command_.output, scene_, result_); }
+
+  const Comparison& result() const { return result_; }
+
+  NonFinite non_finite() const {
+    NonFinite all = result_.image.non_finite;
+    all.merge(result_.reference.non_finite);
+    for (const ComparedMethod& m : result_.methods) {
+      for (const ComparedRun& r : m.runs) all.merge(r.run.non_finite);
+    }
+    return all;
+  }
+
+ private:
+  // Reads the reference, if there is one to read.
+  void take_reference() {
+    const Film& film = scene_.film;
+    if (!command_.reference.empty()) {
+      result_.reference_file = command_.reference;
+      result_.reference = read_reference(command_.reference, identity_, film);
+      // The folder holds all that its report shows.
+      if (!fs::exists(kept_file_) || !fs::equivalent(kept_file_, command_.reference)) {
+        write_reference(kept_file_, result_.reference, identity_, film, input_.block);
+      }
+      return;
+    }
+    result_.reference_file = kept_file_;
+    std::string why;
+    if (auto kept = find_reference(kept_file_, identity_, film, reference_seconds_, why)) {
+      result_.reference = std::move(*kept);
+    } else if (!why.empty() && !common_.quiet) {
+      fmt::print("{}\nmaking a new reference\n", why);
+    }
+  }
+
+  bool make_reference_file(RunSettings settings) {
+    settings.spp = 1 << 30;
+    settings.seed = derived_seed(settings_.seed, "reference");
+    result_.reference = make_reference(input_, settings);
+    if (result_.reference.spp < 2) return false;
+    write_reference(kept_file_, result_.reference, identity_, scene_.film, input_.block);
+    return true;
+  }
+
+  const CommonOptions& common_;
+  const CompareCommand& command_;
+  const Scene& scene_;
+  const RunSettings& settings_;
+  MethodInput input_;
+  Identity identity_;
+  std::string kept_file_;  // the reference's place in the folder
+  double reference_seconds_ = 0, methods_seconds_ = 0;
+  std::vector<std::unique_ptr<DerivativeMethod>> methods_;
+  Comparison result_;
+};
+
+}  // namespace
+
+int run_compare(const CommonOptions& common, const CompareCommand& command) {
+  check_methods(command.methods);
+  check_terms(command.methods, parse_terms(command.terms));
+  if (common.spp > 0) {
+    throw InputError("--spp: methods are compared at equal time: say how long with --time");
+  }
+  const Scene scene = load_scene(common);
+  find_parameter(scene, command.parameter);
+  make_folder(command.output);
+  const RunSettings settings = make_settings(common, scene, "compare");
+  Comparer comparer(common, command, scene, settings);
+  if (!comparer.run()) {
+    fmt::print(stderr, "interrupted before there was a reference: nothing is written\n");
+    return kInterrupted;
+  }
+  comparer.write();
+  if (!common.quiet) print_comparison(comparer.result());
+  if (!common.json.empty()) {
+    fs::copy_file(fs::path(command.output) / "compare.json", common.json,
+                  fs::copy_options::overwrite_existing);
+  }
+  const NonFinite non_finite = comparer.non_finite();
+  if (command.report) write_report(command.output, common.quiet);
+  if (non_finite.count > 0) {
+    fmt::print(stderr, "error: {}\n", non_finite.message());
+    return kNonFinite;
+  }
+  if (settings.interrupted->load()) {
+    fmt::print(stderr, "interrupted: {} holds all runs that were finished\n", command.output);
+    return kInterrupted;
+  }
+  return kSuccess;
+}
+
+}  // namespace limn

@@ -1,0 +1,106 @@
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "limn/core/parallel.h"
+#include "limn/core/parameter.h"
+#include "limn/core/ray_tracer.h"
+#include "limn/edgetree/edges.h"
+#include "limn/integrators/crossings.h"
+#include "tools/limn/commands.h"
+
+namespace limn {
+namespace {
+
+using nlohmann::json;
+
+std::string shape_name(const Scene& scene, uint32_t index) {
+  const std::string& id = scene.shapes[index].id;
+  return id.empty() ? fmt::format("shape {} (without id)", index) : id;
+}
+
+json describe_shape(const Scene& scene, uint32_t index) {
+  const Shape& shape = scene.shapes[index];
+  const EdgeMesh edges = build_edge_mesh(shape.mesh, shape.bsdf->side(false) == nullptr);
+  const Bounds bounds = bounds_of(shape.mesh);
+  constexpr const char* kNormals[] = {"face", "computed", "from the file"};
+  const auto vector = [](const Vec3d& v) { return json::array({v.x, v.y, v.z}); };
+  return {{"name", shape_name(scene, index)},
+          {"faces", shape.mesh.faces.size()},
+          {"vertices", shape.mesh.positions.size()},
+          {"collapsed_faces", shape.mesh.collapsed_faces},
+          {"normals", kNormals[static_cast<int>(shape.mesh.normal_source)]},
+          {"bounds", {vector(bounds.lower), vector(bounds.upper)}},
+          {"edges",
+           {{"smooth", edges.count(EdgeClass::kSmooth)},
+            {"sharp", edges.count(EdgeClass::kSharp)},
+            {"border", edges.count(EdgeClass::kBorder)},
+            {"irregular", edges.count(EdgeClass::kIrregular)},
+            {"flat", edges.count(EdgeClass::kFlat)}}},
+          {"closed", edges.count(EdgeClass::kBorder) + edges.count(EdgeClass::kIrregular) == 0},
+          {"bsdf", shape.bsdf->describe()},
+          {"emitter", shape.is_emitter}};
+}
+
+void print_shape(const json& shape) {
+  const json& edges = shape["edges"];
+  fmt::print("  {}: {} faces, {} vertices, {}, {} normals, {}{}\n",
+             shape["name"].get<std::string>(), shape["faces"].get<size_t>(),
+             shape["vertices"].get<size_t>(), shape["closed"].get<bool>() ? "closed" : "open",
+             shape["normals"].get<std::string>(), shape["bsdf"].get<std::string>(),
+             shape["emitter"].get<bool>() ? ", emits light" : "");
+  fmt::print("    edges: {} smooth, {} sharp, {} border, {} irregular, {} flat\n",
+             edges["smooth"].get<size_t>(), edges["sharp"].get<size_t>(),
+             edges["border"].get<size_t>(), edges["irregular"].get<size_t>(),
+             edges["flat"].get<size_t>());
+  const size_t collapsed = shape["collapsed_faces"];
+  if (collapsed > 0) fmt::print("    {} faces with coinciding corners left out\n", collapsed);
+}
+
+void print_camera(const Scene& scene) {
+  const Camera& camera = scene.camera;
+  const Film& film = scene.film;
+  fmt::print("camera: at ({:.6g}, {:.6g}, {:.6g}), fov {:.6g} degrees, film {} x {}",
+             camera.origin.x.v, camera.origin.y.v, camera.origin.z.v, camera.fov.v, camera.width,
+             camera.height);
+  if (film.crop_width != camera.width || film.crop_height != camera.height) {
+    fmt::print(", crop {} x {} at ({}, {})", film.crop_width, film.crop_height, film.crop_x,
+               film.crop_y);
+  }
+  fmt::print("\nintegrator: max_depth {}, rr_depth {}{}\n", scene.max_depth, scene.rr_depth,
+             scene.hide_emitters ? ", emitters hidden" : "");
+}
+
+}  // namespace
+
+int run_info(const CommonOptions& common) {
+  const Scene scene = load_scene(common);
+  print_camera(scene);
+  fmt::print("shapes: {}\n", scene.shapes.size());
+  json report = {{"scene", scene.file}, {"shapes", json::array()}, {"parameters", json::array()}};
+  for (uint32_t i = 0; i < scene.shapes.size(); ++i) {
+    report["shapes"].push_back(describe_shape(scene, i));
+    print_shape(report["shapes"].back());
+  }
+  fmt::print("environment: {}\n",
+             scene.environment ? scene.environment->describe() : std::string("none"));
+  const auto tracer = make_embree_tracer(scene, thread_count(common.threads));
+  const Crossings crossings = find_crossings(scene, *tracer);
+  report["crossing_edges"] = crossings.edges;
+  if (crossings.edges > 0) {
+    fmt::print(
+        "warning: surfaces cross each other: {} edges pass through a face (first: {} and {});\n"
+        "  the line where they cross moves too, and no gradient carries it\n",
+        crossings.edges, shape_name(scene, crossings.shape_a),
+        shape_name(scene, crossings.shape_b));
+  }
+  fmt::print("parameters (for --wrt):\n");
+  for (const ParameterInfo& parameter : list_parameters(scene)) {
+    report["parameters"].push_back({{"name", parameter.name}, {"unit", parameter.unit}});
+    fmt::print("  {}  [{}]\n", parameter.name, parameter.unit);
+  }
+  write_json(common.json, report.dump(2));
+  return kSuccess;
+}
+
+}  // namespace limn

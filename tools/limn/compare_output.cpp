@@ -1,0 +1,280 @@
+#include "tools/limn/compare_output.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "limn/core/error.h"
+#include "tools/limn/commands.h"
+
+namespace limn {
+namespace {
+
+using json = nlohmann::ordered_json;
+
+// Common to all pictures of one kind: white is 0, saturated is +-scale.
+struct Scales {
+  double derivative = 1;
+  double error = 1;
+};
+
+Image to_image(const std::vector<double>& values, const Film& film) {
+  Image image(film.crop_width, film.crop_height, 3);
+  for (size_t i = 0; i < values.size(); ++i) image.data[i] = static_cast<float>(values[i]);
+  return image;
+}
+
+std::vector<double> minus(std::vector<double> a, const std::vector<double>& b) {
+  for (size_t i = 0; i < a.size(); ++i) a[i] -= b[i];
+  return a;
+}
+
+// The middle one of the methods' own scales (of two, the smaller): neither the worst method nor the
+// best makes the others' errors invisible.
+double error_scale(const Comparison& c, const Film& film) {
+  std::vector<double> scales;
+  for (const ComparedMethod& m : c.methods) {
+    if (!m.image.empty()) {
+      scales.push_back(signed_scale(to_image(minus(m.image, c.reference.image), film)));
+    }
+  }
+  if (scales.empty()) return 1;
+  std::sort(scales.begin(), scales.end());
+  return scales[(scales.size() - 1) / 2];
+}
+
+std::string in_folder(const std::string& folder, const std::string& name) {
+  return (std::filesystem::path(folder) / name).string();
+}
+
+// Of the image that is shown: the first repeat of the longest rung.
+std::vector<ImageAttribute> image_attributes(const Scene& scene, const Comparison& c,
+                                             const ComparedMethod& m) {
+  const auto shown = std::find_if(m.runs.rbegin(), m.runs.rend(),
+                                  [](const ComparedRun& r) { return r.repeat == 0; });
+  RunSettings settings;
+  settings.seed = shown->seed;
+  auto attributes = provenance(scene, settings, shown->run.spp);
+  attributes.push_back({"limn.parameter", c.parameter});
+  attributes.push_back({"limn.terms", c.terms});
+  attributes.push_back({"limn.method", m.name});
+  return attributes;
+}
+
+void write_pictures(const std::string& folder, const Scene& scene, const Comparison& c,
+                    const Scales& scales) {
+  const Film& film = scene.film;
+  if (c.image.spp > 0) {
+    write_png(in_folder(folder, "image.png"),
+              mean_image(c.image.radiance, film.crop_width, film.crop_height), 1);
+  }
+  write_signed_png(in_folder(folder, "reference.png"), to_image(c.reference.image, film),
+                   scales.derivative);
+  for (const ComparedMethod& m : c.methods) {
+    if (m.image.empty()) continue;
+    const std::string stem = in_folder(folder, m.name);
+    const Image image = to_image(m.image, film);
+    write_exr(stem + ".exr", film_channels(scene, image), false, image_attributes(scene, c, m));
+    write_signed_png(stem + ".png", image, scales.derivative);
+    write_signed_png(stem + "_error.png", to_image(minus(m.image, c.reference.image), film),
+                     scales.error);
+  }
+}
+
+json terms_json(const std::vector<double>& seconds) {
+  json terms = json::object();
+  for (size_t t = 0; t < seconds.size(); ++t) terms[term_name(static_cast<int>(t))] = seconds[t];
+  return terms;
+}
+
+// 0: unknown.
+template <class Number>
+json or_null(Number value) {
+  return value > 0 ? json(value) : json(nullptr);
+}
+
+json run_json(const ComparedRun& r, const std::vector<double>& times) {
+  return {{"time", times[r.rung]},
+          {"repeat", r.repeat},
+          {"seconds", r.run.seconds},
+          {"setup_seconds", r.run.setup_seconds},
+          {"spp", r.run.spp},
+          {"rays", or_null(r.run.rays)},
+          {"mse", r.errors.mse},
+          {"relative_mse", r.errors.relative_mse},
+          {"trimmed_mse", r.errors.trimmed_mse},
+          {"terms", terms_json(r.run.term_seconds)},
+          {"peak_memory_bytes", or_null(r.run.peak_memory_bytes)}};
+}
+
+json bias_json(const ZSummary& z) {
+  if (z.count == 0) return nullptr;
+  return {{"blocks", z.count},
+          {"mean", z.mean},
+          {"deviation", z.deviation},
+          {"largest", z.largest},
+          {"p", p_value(z)}};
+}
+
+json summary_json(const RungSummary& s, const std::vector<double>& times) {
+  return {{"time", times[s.rung]},
+          {"seconds", s.seconds},
+          {"setup_seconds", s.setup_seconds},
+          {"spp", s.spp},
+          {"rays", or_null(s.rays)},
+          {"mse", s.mse.value},
+          {"mse_stderr", s.mse.error},
+          {"relative_mse", s.relative_mse.value},
+          {"relative_mse_stderr", s.relative_mse.error},
+          {"trimmed_mse", s.trimmed_mse.value},
+          {"trimmed_mse_stderr", s.trimmed_mse.error},
+          {"bias", bias_json(s.bias)},
+          {"terms", terms_json(s.term_seconds)},
+          {"peak_memory_bytes", or_null(s.peak_memory_bytes)}};
+}
+
+json settings_json(const std::vector<MethodSetting>& settings) {
+  json object = json::object();
+  for (const MethodSetting& s : settings) {
+    std::visit([&](const auto& value) { object[s.name] = value; }, s.value);
+  }
+  return object;
+}
+
+const char* status_name(MethodStatus status) {
+  constexpr const char* kNames[] = {"done", "interrupted", "missing"};
+  return kNames[static_cast<int>(status)];
+}
+
+json method_json(const ComparedMethod& m, const std::vector<double>& times) {
+  const auto file = [&](const char* ending) { return m.image.empty() ? "" : m.name + ending; };
+  json object = {{"name", m.name},
+                 {"description", m.description},
+                 {"status", status_name(m.status)},
+                 {"message", m.message},
+                 {"image", file(".exr")},
+                 {"picture", file(".png")},
+                 {"error_picture", file("_error.png")},
+                 {"settings", settings_json(m.settings)},
+                 {"runs", json::array()},
+                 {"summary", json::array()},
+                 {"slope", nullptr},
+                 {"time_ratio", nullptr},
+                 {"time_ratio_stderr", nullptr}};
+  for (const ComparedRun& run : m.runs) object["runs"].push_back(run_json(run, times));
+  for (const RungSummary& s : m.summary) object["summary"].push_back(summary_json(s, times));
+  if (m.slope) object["slope"] = {{"value", m.slope->value}, {"stderr", m.slope->error}};
+  if (m.time_ratio) {
+    object["time_ratio"] = m.time_ratio->value;
+    object["time_ratio_stderr"] = m.time_ratio->error;
+  }
+  return object;
+}
+
+json comparison_json(const Scene& scene, const Comparison& c, const Scales& scales) {
+  json object = {{"kind", "compare"},
+                 {"command", c.command},
+                 {"scene", scene.file},
+                 {"defines", c.defines},
+                 {"parameter", c.parameter},
+                 {"unit", c.unit},
+                 {"width", scene.film.crop_width},
+                 {"height", scene.film.crop_height},
+                 {"seed", c.seed},
+                 {"threads", c.threads},
+                 {"repeats", c.options.repeats},
+                 {"times", c.options.times},
+                 {"scale", scales.derivative},
+                 {"error_scale", scales.error},
+                 {"image", c.image.spp > 0 ? "image.png" : ""}};
+  object["reference"] = {{"image", "reference.exr"},
+                         {"picture", "reference.png"},
+                         {"sampler", c.reference.sampler},
+                         {"spp", c.reference.spp},
+                         {"seconds", c.reference.seconds},
+                         {"seed", c.reference.seed},
+                         {"cached", c.reference.cached},
+                         {"file", c.reference_file},
+                         {"mean_squared_error", mean_of(c.reference.variance)}};
+  object["methods"] = json::array();
+  for (const ComparedMethod& m : c.methods) {
+    object["methods"].push_back(method_json(m, c.options.times));
+  }
+  return object;
+}
+
+void write_csv(const std::string& file, const Comparison& c) {
+  std::ofstream stream(file);
+  stream << "method,time,repeat,seed,seconds,setup_seconds,spp,rays,mse,relative_mse,trimmed_mse,"
+            "interior_seconds,camera_seconds,boundary_seconds,peak_memory_bytes\n";
+  for (const ComparedMethod& m : c.methods) {
+    for (const ComparedRun& r : m.runs) {
+      stream << fmt::format("{},{},{},{},{},{},{},{},{},{},{}", m.name, c.options.times[r.rung],
+                            r.repeat, r.seed, r.run.seconds, r.run.setup_seconds, r.run.spp,
+                            r.run.rays, r.errors.mse, r.errors.relative_mse, r.errors.trimmed_mse);
+      for (size_t t = 0; t < kTermCount; ++t) {
+        stream << ",";
+        if (t < r.run.term_seconds.size()) stream << fmt::format("{}", r.run.term_seconds[t]);
+      }
+      stream << fmt::format(",{}\n", r.run.peak_memory_bytes);
+    }
+  }
+  if (!stream) throw InputError({file}, "cannot be written");
+}
+
+// "1.23e-05 +- 4e-07"
+std::string uncertain(const Uncertain& u) {
+  return std::isnan(u.error) ? fmt::format("{:.3g}", u.value)
+                             : fmt::format("{:.3g} +- {:.1g}", u.value, u.error);
+}
+
+void print_method(const ComparedMethod& m, size_t rungs, size_t width) {
+  if (m.summary.empty() || m.summary.back().rung + 1 != rungs) {
+    const bool missing = m.status == MethodStatus::kMissing;
+    fmt::print("{:{}} {}{}\n", m.name, width, missing ? "missing: " : "", m.message);
+    return;
+  }
+  const RungSummary& s = m.summary.back();
+  const std::string bias =
+      s.bias.count > 0 ? fmt::format("{:.2g} ({:.2g})", p_value(s.bias), s.bias.largest) : "-";
+  fmt::print(
+      "{:{}} {:>7.3g} {:>7.2g} {:>8.4g} {:>9} {:>20} {:>9.3g} {:>9.3g} {:>14} {:>16} {:>15}\n",
+      m.name, width, s.seconds, s.setup_seconds, s.spp,
+      s.rays > 0 ? fmt::format("{:.3g}", s.rays) : "-", uncertain(s.mse), s.relative_mse.value,
+      s.trimmed_mse.value, bias, m.time_ratio ? uncertain(*m.time_ratio) : "-",
+      m.slope ? uncertain(*m.slope) : "-");
+  if (m.status != MethodStatus::kDone) fmt::print("  {}\n", m.message);
+  for (const MethodSetting& setting : m.settings) {
+    std::visit([&](const auto& value) { fmt::print("  {}: {}\n", setting.name, value); },
+               setting.value);
+  }
+}
+
+}  // namespace
+
+void write_comparison(const std::string& folder, const Scene& scene, const Comparison& comparison) {
+  Scales scales;
+  scales.derivative = signed_scale(to_image(comparison.reference.image, scene.film));
+  scales.error = error_scale(comparison, scene.film);
+  write_pictures(folder, scene, comparison, scales);
+  write_csv(in_folder(folder, "compare.csv"), comparison);
+  write_json(in_folder(folder, "compare.json"), comparison_json(scene, comparison, scales).dump(2));
+}
+
+void print_comparison(const Comparison& c) {
+  size_t width = 6;
+  for (const ComparedMethod& m : c.methods) width = std::max(width, m.name.size());
+  fmt::print("reference: {}, {} samples per pixel, {:.3g} s{}, its own error {:.3g}\n",
+             c.reference.sampler, c.reference.spp, c.reference.seconds,
+             c.reference.cached ? " (kept)" : "", mean_of(c.reference.variance));
+  fmt::print("{:{}} {:>7} {:>7} {:>8} {:>9} {:>20} {:>9} {:>9} {:>14} {:>16} {:>15}\n", "method",
+             width, "s", "set-up", "spp", "rays", "mse", "relative", "trimmed", "bias p (|z|)",
+             "time, 1st = 1", "slope");
+  for (const ComparedMethod& m : c.methods) print_method(m, c.options.times.size(), width);
+}
+
+}  // namespace limn
