@@ -1,0 +1,100 @@
+#pragma once
+// The contract of a term: one part of a derivative image, with an estimator of its own. A method
+// that works term by term adds up, for every sample of a pixel,
+//   what finished paths add (add_path), what the vertices of the first path add (add_at_vertex),
+//   and what points on curves of the film add (sample_film), splatted through the filter.
+// A term does what it needs of the three. All are unbiased on their own, so terms can be left out
+// and can have any number of samples. Objects are made once per pass (up to kLanes parameters) and
+// used by all threads at once.
+#include <memory>
+#include <span>
+
+#include "integrators/terms/path.h"
+#include "limn/core/dual.h"
+#include "limn/edgetree/edge_sampler.h"
+#include "limn/integrators/gradient.h"
+
+namespace limn {
+
+// Where a path scatters.
+struct PathVertex {
+  const SurfacePoint<Dual>& surface;
+  const Scattering<Dual>& scattering;
+  const Rgb<double>& throughput;  // of the path up to here
+  int bounces;                    // how often it has scattered before
+  const Rng& key;                 // of the path
+};
+
+// A point on a curve of the film across which radiance jumps.
+struct FilmSample {
+  double x, y;       // film position [pixels]
+  Rgb<Lanes> value;  // jump times normal speed of the curve [pixels per unit of the parameter],
+                     // over the density of the sample [1 / pixel of length]
+};
+
+class Term {
+ public:
+  virtual ~Term() = default;
+
+  // Whether finished paths add something, and what: a path's radiance with its derivative. Averaged
+  // over the paths of a sample, as many as the term has samples.
+  virtual bool uses_paths() const { return false; }
+  virtual Rgb<Lanes> add_path(const Rgb<Dual>& /*radiance*/) const { return {}; }
+
+  // Whether the vertices of a sample's first path add something. add_at_vertex takes `samples`
+  // samples there and adds their sum (not their mean) to `sum`, their cost to `cost`.
+  virtual bool uses_vertices() const { return false; }
+  virtual void add_at_vertex(const PathVertex& /*vertex*/, int /*samples*/, TermCost& /*cost*/,
+                             Rgb<Lanes>& /*sum*/) const {}
+
+  // Whether the film holds curves to sample. sample_film draws a point: u in [0, 1), stratified
+  // over a batch, chooses the curve and the point on it; `key` is for everything else. False if
+  // the sample adds nothing.
+  virtual bool uses_film() const { return false; }
+  virtual bool sample_film(double /*u*/, const Rng& /*key*/, RayCount& /*rays*/,
+                           FilmSample& /*sample*/) const {
+    return false;
+  }
+
+  // What the samples behind `cost` cost, in units of one ray with the shading at its end: the same
+  // on every machine, so that choices that follow from it are.
+  virtual double work(const TermCost& cost) const { return static_cast<double>(cost.rays); }
+};
+
+// What the terms of a pass are made from. It outlives them.
+class TermInput {
+ public:
+  TermInput(const PathContext& path_context, int lane_count, const Lanes& lane_scales,
+            const EdgeSamplerType* sampler_type, int thread_count)
+      : context(path_context),
+        lanes(lane_count),
+        lane_scale(lane_scales),
+        sampler(sampler_type),
+        threads(thread_count) {}
+
+  const PathContext& context;      // the scene with its parameters seeded
+  int lanes;                       // how many derivative lanes are in use
+  Lanes lane_scale;                // what makes speeds of the parameters comparable
+  const EdgeSamplerType* sampler;  // how shading points choose an edge; null if none does
+  int threads;
+
+  // Edges of all shapes (object i is shape i), light polygons and the environment, as an edge
+  // sampler takes them. Made when a term first asks.
+  const EdgeSamplerInput& edges();
+
+ private:
+  std::unique_ptr<EdgeSamplerInput> edges_;
+};
+
+// One row per term.
+struct TermType {
+  const char* name;
+  const char* description;
+  double least_samples;  // per sample of a pixel: 1 where they belong to paths, less on the film
+  // Null where the scene has nothing that the term could be of.
+  std::unique_ptr<Term> (*make)(TermInput& input);
+};
+// In the order of --samples and of all tables.
+std::span<const TermType> term_types();
+
+}  // namespace limn
