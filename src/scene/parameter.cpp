@@ -94,12 +94,16 @@ void add_sensor_targets(const Scene& scene, std::vector<Target>& targets) {
 }
 
 // Values of an object with an id: a hundredth of the largest, or 0.01 where all are 0.
+// size: of the scene.
 void add_value_targets(const std::string& id, const std::vector<ParameterRef>& parameters,
-                       std::vector<Target>& targets) {
+                       std::vector<Target>& targets, double size = 0) {
   for (const ParameterRef& p : parameters) {
     double largest = 0;
     for (const Dual* v : p.values) largest = std::max(largest, std::fabs(v->v));
-    targets.push_back({{id + "." + p.name, "", 0.01 * (largest > 0 ? largest : 1)},
+    ParameterInfo info{id + "." + p.name, "", 0.01 * (largest > 0 ? largest : 1)};
+    if (p.unit == ParameterRef::Unit::kLength) info = {info.name, "scene units", 0.01 * size};
+    if (p.unit == ParameterRef::Unit::kRadians) info = {info.name, "radians", 0.01};
+    targets.push_back({info,
                        Motion::kValues,
                        nullptr,
                        0,
@@ -122,6 +126,10 @@ std::vector<Target> all_targets(Scene& scene) {
   }
   if (scene.environment && !scene.environment_id.empty()) {
     add_value_targets(scene.environment_id, scene.environment->parameters(), targets);
+  }
+  for (const auto& light : scene.delta_lights) {
+    if (light->id.empty()) continue;
+    add_value_targets(light->id, light->parameters(), targets, scene_size(scene));
   }
   return targets;
 }
