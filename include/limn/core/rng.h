@@ -22,6 +22,7 @@ enum class Purpose : uint64_t {
   kCamera,
   kPathCopy,
   kEdgeCopy,
+  kFilmCopy,
   kShadow,
   kShadowCopy
 };
