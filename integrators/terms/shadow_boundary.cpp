@@ -46,10 +46,6 @@ struct Viewer {
   double distance;       // to the shadow's edge
 };
 
-double distance_to(const LightOrigin& light, const Vec3d& y) {
-  return light.infinite ? 1.0 : length(y - value(light.v));
-}
-
 // Which sides of the plane through light and edge the faces around the edge lie on. A face that is
 // seen edge-on, to the rounding of the determinant, casts no shadow of its own.
 double lit_side(const Mesh& mesh, const EdgeMesh& edges, uint32_t e, const LightOrigin& light) {
