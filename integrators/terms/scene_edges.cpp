@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "limn/core/shading.h"
+
 namespace limn {
 
 EdgeSamplerInput make_sampler_input(const Scene& scene) {

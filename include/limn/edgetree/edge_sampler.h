@@ -70,6 +70,8 @@ class EdgeSampler {
   // that grows per query.
   virtual bool sample(const EdgeQuery& query, Rng& rng, EdgeSample& sample) const = 0;
 
+  virtual double draw_cost() const { return 5; }
+
   // P(e) for this query, without sampling: what `sample` reports when it returns this edge. Zero
   // only where the edge cannot contribute.
   virtual double probability(const EdgeQuery& query, EdgeId edge) const = 0;
