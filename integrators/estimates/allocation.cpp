@@ -12,16 +12,6 @@ constexpr double kLeastCamera = 0.125;
 // behind when a run is stopped.
 constexpr double kTie = 1.01;
 
-// Work in units of one ray with the shading at its end, about 4 microseconds in scenes of 20000
-// triangles. An edge's draw was timed there: a walk down a tree costs a handful of rays, a uniform
-// draw about one, and brute force bounds all edges. Clocks would be exact, but give other samples
-// each time.
-double draw_cost(const std::string& sampler, size_t edges) {
-  if (sampler == "brute") return static_cast<double>(edges) / 200;
-  if (sampler == "uniform") return 1;
-  return 5;
-}
-
 // The variance of one sample of every pixel, over its channels.
 std::vector<double> pixel_variances(const Moments& moments) {
   std::vector<double> variances(moments.size() / 3);
@@ -83,7 +73,7 @@ SampleCounts best_samples(const PilotFigures& figures) {
   return best->samples;
 }
 
-PilotFigures pilot_figures(const GradientResult& pilot, const std::string& sampler, size_t edges) {
+PilotFigures pilot_figures(const GradientResult& pilot, double draw_cost) {
   PilotFigures figures;
   for (const ParameterGradient& gradient : pilot.parameters) {
     const auto variances = mean_variances(gradient);
@@ -94,8 +84,7 @@ PilotFigures pilot_figures(const GradientResult& pilot, const std::string& sampl
   for (int t = 0; t < kTermCount; ++t) {
     figures[t].cost = static_cast<double>(pilot.costs[t].rays);
   }
-  figures[kBoundary].cost +=
-      draw_cost(sampler, edges) * static_cast<double>(pilot.costs[kBoundary].samples);
+  figures[kBoundary].cost += draw_cost * static_cast<double>(pilot.costs[kBoundary].samples);
   return figures;
 }
 

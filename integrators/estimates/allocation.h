@@ -24,8 +24,8 @@ SampleCounts best_samples(const PilotFigures& figures);
 // Of a pilot's gradient of any number of parameters. The variance is a mean over pixels; a
 // thousandth of them, those with the largest variance of all terms together, is left out: single
 // bright samples would rule the choice. Each parameter counts alike: its variances are divided by
-// their sum. The cost is one that has the same value on every machine, see allocation.cpp.
-PilotFigures pilot_figures(const GradientResult& pilot, const std::string& sampler, size_t edges);
+// their sum. The cost counts rays and draws (EdgeSampler::draw_cost): the same on every machine.
+PilotFigures pilot_figures(const GradientResult& pilot, double draw_cost);
 
 // Samples per pixel of a pilot for a job of `spp` samples of `pixels` pixels; 0 if the job is too
 // short for one.

@@ -3,7 +3,7 @@
 #include "integrators/compare/method_images.h"
 #include "integrators/methods/difference_method.h"
 #include "limn/core/error.h"
-#include "limn/edgetree/edge_sampler.h"
+#include "limn/edgetree/edge_sampler_types.h"
 
 namespace limn {
 namespace {

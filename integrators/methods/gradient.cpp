@@ -10,6 +10,7 @@
 #include "integrators/terms/shading_boundary.h"
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
+#include "limn/edgetree/edge_sampler_types.h"
 
 namespace limn {
 
@@ -71,7 +72,7 @@ class Pass {
   Pass(const Pass&) = delete;
   Pass& operator=(const Pass&) = delete;
 
-  const EdgeSamplerInput& sampler_input() const { return input_; }
+  double draw_cost() const { return sampler_ ? sampler_->draw_cost() : 0; }
   static size_t steps_per_batch(const Film& film) { return make_tiles(film).size() + 1; }
 
   // Sums over one batch. sums[lane][term] and radiance are crop_height by crop_width by 3.
@@ -393,9 +394,7 @@ SampleCounts choose_samples(const Passes& passes, const Scene& scene,
   }
   pilot_spp = static_cast<int>(pilot.spp);
   if (pilot.spp < 2) return {};
-  size_t edges = 0;
-  for (const EdgeMesh& object : passes[0]->sampler_input().objects) edges += object.edges.size();
-  return best_samples(pilot_figures(pilot, options.sampler, edges));
+  return best_samples(pilot_figures(pilot, passes[0]->draw_cost()));
 }
 
 void check_samples(const SampleCounts& samples) {

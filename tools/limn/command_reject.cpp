@@ -9,6 +9,7 @@
 
 #include "limn/core/error.h"
 #include "limn/core/parallel.h"
+#include "limn/edgetree/edge_sampler_types.h"
 #include "tools/limn/reject/reject_figures.h"
 #include "tools/limn/reject/reject_pictures.h"
 #include "tools/limn/terminal.h"

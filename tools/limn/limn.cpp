@@ -4,7 +4,7 @@
 #include <CLI/CLI.hpp>
 
 #include "limn/core/error.h"
-#include "limn/edgetree/edge_sampler.h"
+#include "limn/edgetree/edge_sampler_types.h"
 #include "limn/integrators/derivative_method.h"
 #include "tools/limn/command_reject.h"
 #include "tools/limn/commands.h"
