@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "integrators/methods/method_table.h"
 #include "integrators/methods/selection.h"
@@ -60,13 +61,23 @@ size_t GradientResult::term(const std::string& name) const {
   return static_cast<size_t>(found - terms.begin());
 }
 
+double edge_magnitude(const GradientResult& result, const ParameterGradient& g, size_t block) {
+  double sum = 0;
+  for (size_t t = 0; t < result.terms.size(); ++t) {
+    if (result.terms[t].edges && result.terms[t].computed) {
+      sum += std::fabs(g.term_blocks[t].mean(block));
+    }
+  }
+  return sum;
+}
+
 std::vector<std::string> selected_terms(const std::vector<std::string>& known,
                                         const std::vector<std::string>& chosen,
                                         const std::string& file) {
   for (const std::string& name : chosen) {
     if (std::find(known.begin(), known.end(), name) != known.end()) continue;
-    throw InputError({file}, "no term \"" + name + "\" here (terms of this scene: " + join(known) +
-                                 ")");
+    throw InputError({file},
+                     "no term \"" + name + "\" here (terms of this scene: " + join(known) + ")");
   }
   return chosen.empty() ? known : chosen;
 }

@@ -13,7 +13,7 @@ RadianceEstimator::RadianceEstimator(const Scene& scene, int threads)
       context_{scene_, *tracer_, lights_} {}
 
 void RadianceEstimator::add_pixel(const PixelSample& at, const Rng& key, SampleSink& sink) const {
-  const FilmPosition film = sample_film(scene_.film, at.x, at.y, key);
+  const FilmPosition film = sample_pixel_filter(scene_.film, at.x, at.y, key);
   const auto ray = scene_.camera.ray<double>(film.x, film.y);
   RayCount rays;
   const auto trace = [&](auto& visitor) {

@@ -125,7 +125,7 @@ void TermEstimator::add_vertices(const PixelSample& at, const VertexTerms& verti
 template <class Visitor>
 void TermEstimator::add_path(const PixelSample& at, const Rng& key, Visitor& visitor,
                              double weight, SampleSink& sink) const {
-  const FilmPosition film = sample_film(scene_.film, at.x, at.y, key);
+  const FilmPosition film = sample_pixel_filter(scene_.film, at.x, at.y, key);
   const Ray primal = camera_ray(scene_, scene_.camera.ray<double>(film.x, film.y));
   const auto ray = scene_.camera.ray<Dual>(film.x, film.y);
   if (sink.log()) log_camera_ray(*sink.log(), film.x, film.y, primal.origin, primal.direction);

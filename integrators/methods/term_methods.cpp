@@ -13,7 +13,7 @@
 #include "integrators/methods/term_estimator.h"
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
-#include "limn/edgetree/edge_sampler.h"
+#include "limn/edgetree/edge_sampler_types.h"
 
 namespace limn {
 namespace {
@@ -227,6 +227,7 @@ MethodType term_method(const EdgeSamplerType& sampler) {
   method.description = sampler.description;
   for (const TermType& type : term_types()) method.terms.emplace_back(type.name);
   method.terms_can_be_left_out = true;
+  method.ablation = sampler.ablation;
   method.run = [&sampler](const MethodType&, const Scene& scene, const GradientOptions& options,
                           const RunSettings& settings) {
     const Stopwatch watch;

@@ -14,7 +14,7 @@ namespace limn {
 struct FilmPosition {
   double x, y;
 };
-inline FilmPosition sample_film(const Film& film, int x, int y, const Rng& key) {
+inline FilmPosition sample_pixel_filter(const Film& film, int x, int y, const Rng& key) {
   Rng rng = key.at(Purpose::kFilm, 0);
   const auto columns = film.range_x(x);
   const auto rows = film.range_y(y);

@@ -12,7 +12,7 @@
 #include "integrators/estimates/sample_estimator.h"
 #include "integrators/terms/path.h"
 #include "limn/core/dual.h"
-#include "limn/edgetree/edge_sampler.h"
+#include "limn/edgetree/edge_sampler_types.h"
 #include "limn/integrators/gradient.h"
 
 namespace limn {

@@ -7,6 +7,7 @@
 #include "limn/core/ray_tracer.h"
 #include "limn/edgetree/edges.h"
 #include "limn/integrators/crossings.h"
+#include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
 
 namespace limn {
@@ -79,8 +80,6 @@ void print_parameter(const Parameter& parameter) {
                  : fmt::format("  {} numbers: add :FILE, or .0.x, .0.y, ...", parameter.size));
 }
 
-}  // namespace
-
 int run_info(const CommonOptions& common) {
   const Scene scene = load_scene(common);
   print_camera(scene);
@@ -118,5 +117,22 @@ int run_info(const CommonOptions& common) {
   write_json(common.json, report.dump(2));
   return kSuccess;
 }
+
+class InfoCommand final : public Command {
+ public:
+  const char* name() const override { return "info"; }
+  const char* description() const override {
+    return "What the scene holds, and what can be differentiated";
+  }
+  void add_options(CLI::App& app, bool) override { add_common_options(app, common_); }
+  int run(const std::string&) override { return run_info(common_); }
+
+ private:
+  CommonOptions common_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_info_command() { return std::make_unique<InfoCommand>(); }
 
 }  // namespace limn

@@ -106,6 +106,9 @@ struct GradientResult {
   size_t term(const std::string& name) const;
 };
 
+// The magnitude of what terms of edges add to one block of g, a parameter of the result.
+double edge_magnitude(const GradientResult& result, const ParameterGradient& g, size_t block);
+
 // Parameters are differentiated in passes of kLanes over the same samples. InputError for unknown
 // parameters, methods or terms, for a method that cannot leave terms out, and for counts that are
 // not positive.
