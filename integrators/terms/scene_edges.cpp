@@ -13,7 +13,8 @@ EdgeSamplerInput make_sampler_input(const Scene& scene) {
     const bool black_behind = shape.bsdf->side(false) == nullptr;
     input.objects.push_back(build_edge_mesh(shape.mesh, black_behind));
   }
-  for (const Light* light : Lights(scene).all()) light->add_triangles(input.lights);
+  const Lights lights(scene);
+  for (const Light* light : lights.all()) light->add_triangles(input.lights);
   if (!scene.environment) return input;
   const Environment& environment = *scene.environment;
   input.environment_luminance = environment.mean_luminance();
