@@ -133,8 +133,8 @@ class TermJob {
       wanted += fmt::format("{}{}{}", wanted.empty() ? "" : ", ", type->name,
                             type->least_samples == 1 ? "" : " (may be less than 1)");
     }
-    throw InputError(fmt::format("samples of the terms: \"{}\": they must be positive, in whole "
-                                 "numbers where paths are concerned; the terms are {}",
+    throw InputError(fmt::format("--samples: \"{}\": counts must be positive, and whole where "
+                                 "paths are concerned, as in 3,0.5,1; the terms are {}",
                                  to_string(samples), wanted));
   }
 

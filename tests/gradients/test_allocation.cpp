@@ -2,7 +2,7 @@
 // choice goes the right way.
 #include <gtest/gtest.h>
 
-#include "integrators/estimates/allocation.h"
+#include "integrators/methods/allocation.h"
 #include "limn/core/error.h"
 #include "limn/integrators/check.h"
 #include "support/meshes.h"
@@ -11,16 +11,22 @@
 namespace limn {
 namespace {
 
+using PilotFigures = std::vector<TermFigures>;
+
 double error_times_cost(const PilotFigures& f, const SampleCounts& n) {
-  const double counts[] = {static_cast<double>(n.interior), n.camera,
-                           static_cast<double>(n.boundary)};
   double variance = 0;
   double cost = 0;
-  for (int t = 0; t < kTermCount; ++t) {
-    variance += f[t].variance / counts[t];
-    cost += f[t].cost * counts[t];
+  for (size_t t = 0; t < f.size(); ++t) {
+    variance += f[t].variance / n[t];
+    cost += f[t].cost * n[t];
   }
   return variance * cost;
+}
+
+// Three terms, the second of which may have less than one sample.
+PilotFigures three(TermFigures a, TermFigures b, TermFigures c) {
+  b.least = 0.125;
+  return {a, b, c};
 }
 
 // (sum of sqrt(variance cost))^2, reached where samples ~ sqrt(variance / cost).
@@ -31,18 +37,19 @@ double least_product(const PilotFigures& figures) {
 }
 
 TEST(BestSamples, AreProportionalToTheRootOfVarianceOverCost) {
-  EXPECT_EQ(best_samples({{{1, 1}, {1, 1}, {1, 1}}}), (SampleCounts{1, 1, 1}));
-  EXPECT_EQ(best_samples({{{4, 1}, {1, 1}, {1, 1}}}), (SampleCounts{2, 1, 1}));
-  EXPECT_EQ(best_samples({{{1, 1}, {1, 4}, {9, 1}}}), (SampleCounts{1, 0.5, 3}));
-  EXPECT_EQ(best_samples({{{1, 4}, {4, 1}, {1, 4}}}), (SampleCounts{1, 4, 1}));
+  EXPECT_EQ(best_samples(three({1, 1}, {1, 1}, {1, 1})), (SampleCounts{1, 1, 1}));
+  EXPECT_EQ(best_samples(three({4, 1}, {1, 1}, {1, 1})), (SampleCounts{2, 1, 1}));
+  EXPECT_EQ(best_samples(three({1, 1}, {1, 4}, {9, 1})), (SampleCounts{1, 0.5, 3}));
+  EXPECT_EQ(best_samples(three({1, 4}, {4, 1}, {1, 4})), (SampleCounts{1, 4, 1}));
 }
 
 TEST(BestSamples, ReachTheLeastErrorWithinTheirRange) {
   Rng rng(1, 2, 3);
   for (int i = 0; i < 200; ++i) {
-    PilotFigures figures;
+    PilotFigures figures(3 + i % 2);
+    figures[1].least = 0.125;
     // Ratios of counts up to 4.
-    for (TermFigures& f : figures) f = {std::exp2(4 * rng.uniform()), 1};
+    for (TermFigures& f : figures) f.variance = std::exp2(4 * rng.uniform()), f.cost = 1;
     const SampleCounts best = best_samples(figures);
     const double least = least_product(figures);
     EXPECT_GE(error_times_cost(figures, best), least * (1 - 1e-12));
@@ -53,10 +60,11 @@ TEST(BestSamples, ReachTheLeastErrorWithinTheirRange) {
 }
 
 TEST(BestSamples, AreLimited) {
-  EXPECT_EQ(best_samples({{{1e6, 1}, {1, 1}, {1, 1}}}), (SampleCounts{8, 0.125, 1}));
-  EXPECT_EQ(best_samples({{{0, 1}, {0, 1}, {1, 1}}}), (SampleCounts{1, 0.125, 8}));
-  EXPECT_EQ(best_samples({{{1, 1}, {0, 0}, {0, 0}}}), SampleCounts{});
+  EXPECT_EQ(best_samples(three({1e6, 1}, {1, 1}, {1, 1})), (SampleCounts{8, 0.125, 1}));
+  EXPECT_EQ(best_samples(three({0, 1}, {0, 1}, {1, 1})), (SampleCounts{1, 0.125, 8}));
+  EXPECT_EQ(best_samples(three({1, 1}, {0, 0}, {0, 0})), SampleCounts{});
   EXPECT_EQ(best_samples({}), SampleCounts{});
+  EXPECT_EQ(best_samples({{4, 1}, {1, 1}, {1, 1}, {9, 1, 0.125}}), (SampleCounts{2, 1, 1, 3}));
 }
 
 TEST(PilotSamples, AreFewAndNoneForShortJobs) {
@@ -66,6 +74,9 @@ TEST(PilotSamples, AreFewAndNoneForShortJobs) {
   EXPECT_EQ(pilot_samples(1024 * 1024, 1024), 2);
   for (int spp = 16; spp < 100; ++spp) EXPECT_LE(8 * pilot_samples(64, spp), spp);
 }
+
+// Indices of the terms of scenes without sharp shadows.
+enum Term { kInterior, kCamera, kBoundary };
 
 SceneParts base_scene(const TempFiles& files) {
   SceneParts parts;
@@ -92,7 +103,7 @@ Scene shadow_scene(const TempFiles& files) {
 
 GradientResult run(const Scene& scene, const std::vector<std::string>& parameters,
                    const std::optional<SampleCounts>& samples, const RunSettings& settings,
-                   std::array<bool, kTermCount> terms = {true, true, true}) {
+                   const std::vector<std::string>& terms = {}) {
   GradientOptions options;
   options.parameters = parameters;
   options.samples = samples;
@@ -112,16 +123,16 @@ TEST(Choice, GoesTheRightWay) {
   const TempFiles files;
   const Scene lit = make_scene(files, base_scene(files));
   // How bright the lamp is moves no edge, the interior has all the noise.
-  const SampleCounts still = run(lit, {"glow.radiance"}, {}, run_settings(64)).samples;
-  EXPECT_GT(still.interior, 1);
-  EXPECT_EQ(still.boundary, 1);
+  const SampleCounts still = run(lit, {"glow.radiance"}, {}, run_settings(64)).samples();
+  EXPECT_GT(still[kInterior], 1);
+  EXPECT_EQ(still[kBoundary], 1);
   // Where nothing slides, edges have all the noise.
   const SampleCounts shadow =
-      run(shadow_scene(files), {"ball.translate.y"}, {}, run_settings(64)).samples;
-  EXPECT_EQ(shadow.interior, 1);
-  EXPECT_GE(shadow.boundary, 2);
+      run(shadow_scene(files), {"ball.translate.y"}, {}, run_settings(64)).samples();
+  EXPECT_EQ(shadow[kInterior], 1);
+  EXPECT_GE(shadow[kBoundary], 2);
   // Both parameters count.
-  EXPECT_GT(run(lit, {"ball.translate.x", "glow.radiance"}, {}, run_settings(64)).samples.interior,
+  EXPECT_GT(run(lit, {"ball.translate.x", "glow.radiance"}, {}, run_settings(64)).samples()[kInterior],
             1);
 }
 
@@ -135,23 +146,23 @@ TEST(Choice, LowersTheErrorForTheWork) {
     double variance = 0;
     for (size_t i = 0; i < total.size(); ++i) variance += total.variance(i);
     double rays = 0;
-    for (const TermCost& cost : r.costs) rays += static_cast<double>(cost.rays);
+    for (const TermRun& term : r.terms) rays += static_cast<double>(term.cost.rays);
     return variance * rays;
   };
   const GradientResult chosen = run(scene, {"ball.translate.y"}, {}, run_settings(64));
-  EXPECT_NE(chosen.samples, SampleCounts{});
-  EXPECT_LT(product(chosen.samples), product({}));
+  EXPECT_FALSE(chosen.samples() == SampleCounts{});
+  EXPECT_LT(product(chosen.samples()), product({}));
 }
 
 TEST(Choice, IsNotMadeForShortJobsOrOneTerm) {
   const TempFiles files;
   const Scene scene = shadow_scene(files);
   const GradientResult brief = run(scene, {"ball.translate.y"}, {}, run_settings(15));
-  EXPECT_EQ(brief.samples, SampleCounts{});
+  EXPECT_EQ(brief.samples(), SampleCounts{});
   EXPECT_EQ(brief.pilot_spp, 0);
   const GradientResult alone =
-      run(scene, {"ball.translate.y"}, {}, run_settings(64), {false, false, true});
-  EXPECT_EQ(alone.samples, SampleCounts{});
+      run(scene, {"ball.translate.y"}, {}, run_settings(64), {"boundary"});
+  EXPECT_EQ(alone.samples(), SampleCounts{});
   EXPECT_EQ(alone.pilot_spp, 0);
 }
 
@@ -164,11 +175,11 @@ void expect_same(const Moments& a, const Moments& b) {
 }
 
 void expect_same(const GradientResult& a, const GradientResult& b) {
-  EXPECT_EQ(a.samples, b.samples);
+  EXPECT_EQ(a.samples(), b.samples());
   expect_same(a.radiance, b.radiance);
   for (size_t k = 0; k < a.parameters.size(); ++k) {
     expect_same(a.parameters[k].total, b.parameters[k].total);
-    for (int t = 0; t < kTermCount; ++t) {
+    for (size_t t = 0; t < a.terms.size(); ++t) {
       expect_same(a.parameters[k].terms[t], b.parameters[k].terms[t]);
     }
   }
@@ -182,7 +193,7 @@ TEST(Choice, SameBitsOnAnyNumberOfThreads) {
                                                "glow.radiance", "sensor.translate.x"};
   const GradientResult one = run(scene, parameters, {}, run_settings(32));
   EXPECT_GT(one.pilot_spp, 0);
-  EXPECT_NE(one.samples, SampleCounts{});
+  EXPECT_FALSE(one.samples() == SampleCounts{});
   for (const int threads : {2, 7}) {
     expect_same(one, run(scene, parameters, {}, run_settings(32, threads)));
   }
@@ -193,13 +204,13 @@ TEST(Choice, GivesTheBitsOfARunWithTheseSamples) {
   const TempFiles files;
   const Scene scene = make_scene(files, base_scene(files));
   const GradientResult chosen = run(scene, {"ball.translate.x"}, {}, run_settings(32));
-  expect_same(chosen, run(scene, {"ball.translate.x"}, chosen.samples, run_settings(32)));
+  expect_same(chosen, run(scene, {"ball.translate.x"}, chosen.samples(), run_settings(32)));
 
   RunSettings limited = run_settings(1 << 30, 2);
   limited.seconds = 0.3;
   const GradientResult timed = run(scene, {"ball.translate.x"}, {}, limited);
   EXPECT_GE(timed.spp, 1);
-  expect_same(timed, run(scene, {"ball.translate.x"}, timed.samples,
+  expect_same(timed, run(scene, {"ball.translate.x"}, timed.samples(),
                          run_settings(static_cast<int>(timed.spp))));
 }
 
@@ -210,7 +221,7 @@ TEST(Choice, IsLeftWhenInterrupted) {
   settings.interrupted = &stop;
   const GradientResult r = run(shadow_scene(files), {"ball.translate.y"}, {}, settings);
   EXPECT_EQ(r.spp, 0);
-  EXPECT_EQ(r.samples, SampleCounts{});
+  EXPECT_EQ(r.samples(), SampleCounts{});
 }
 
 // More samples of a term lower its variance as independent samples do, and leave the others as they
@@ -220,8 +231,8 @@ TEST(Samples, OfATermLowerItsVarianceAlone) {
   const Scene scene = make_scene(files, base_scene(files));
   const auto variances = [&](const SampleCounts& samples) {
     const GradientResult r = run(scene, {"ball.translate.x"}, samples, run_settings(256));
-    std::array<double, kTermCount> sums{};
-    for (int t = 0; t < kTermCount; ++t) {
+    std::vector<double> sums(r.terms.size());
+    for (size_t t = 0; t < sums.size(); ++t) {
       const Moments& term = r.parameters[0].terms[t];
       for (size_t i = 0; i < term.size(); ++i) sums[t] += term.variance(i);
     }
@@ -231,7 +242,7 @@ TEST(Samples, OfATermLowerItsVarianceAlone) {
   const auto more = variances({4, 4, 4});
   const auto boundary = variances({1, 1, 4});
   const auto interior = variances({4, 1, 1});
-  for (int t = 0; t < kTermCount; ++t) EXPECT_LT(more[t], one[t]) << term_name(t);
+  for (size_t t = 0; t < one.size(); ++t) EXPECT_LT(more[t], one[t]) << t;
   EXPECT_EQ(boundary[kInterior], one[kInterior]);
   EXPECT_EQ(boundary[kCamera], one[kCamera]);
   EXPECT_EQ(boundary[kBoundary], more[kBoundary]);
@@ -242,17 +253,17 @@ TEST(Samples, OfATermLowerItsVarianceAlone) {
 TEST(Samples, AreCounted) {
   const TempFiles files;
   const Scene scene = make_scene(files, base_scene(files));
-  const auto counts = [&](const SampleCounts& samples, std::array<bool, kTermCount> terms) {
-    return run(scene, {"ball.translate.x"}, samples, run_settings(2), terms).costs;
+  const auto counts = [&](const SampleCounts& samples, const std::vector<std::string>& terms) {
+    return run(scene, {"ball.translate.x"}, samples, run_settings(2), terms).terms;
   };
   const uint64_t paths = 16 * 16 * 2;
-  const auto one = counts({1, 1, 1}, {true, true, true});
-  const auto more = counts({3, 0.5, 4}, {true, true, true});
-  EXPECT_EQ(more[kInterior].samples, 3 * paths);
-  EXPECT_EQ(more[kCamera].samples, paths / 2);
-  EXPECT_EQ(more[kBoundary].samples, 4 * one[kBoundary].samples);
+  const auto one = counts({1, 1, 1}, {});
+  const auto more = counts({3, 0.5, 4}, {});
+  EXPECT_EQ(more[kInterior].cost.samples, 3 * paths);
+  EXPECT_EQ(more[kCamera].cost.samples, paths / 2);
+  EXPECT_EQ(more[kBoundary].cost.samples, 4 * one[kBoundary].cost.samples);
   // Without the interior term there is nothing that more paths are good for.
-  EXPECT_EQ(counts({3, 1, 4}, {false, true, true})[kInterior].samples, paths);
+  EXPECT_EQ(counts({3, 1, 4}, {"camera", "boundary"})[kInterior].cost.samples, paths);
 }
 
 TEST(Samples, AgreeWithDifferences) {
@@ -262,11 +273,11 @@ TEST(Samples, AgreeWithDifferences) {
   options.parameter = "ball.translate.x";
   options.block = 4;
   for (const auto& samples :
-       {std::optional<SampleCounts>{}, std::optional<SampleCounts>{{3, 0.25, 2}}}) {
+       {std::optional<SampleCounts>{}, std::optional<SampleCounts>{SampleCounts{3, 0.25, 2}}}) {
     options.samples = samples;
     const CheckResult r = check(scene, options, run_settings(256));
     EXPECT_GT(r.extrapolated.count, 0);
-    EXPECT_TRUE(r.agree) << to_string(r.gradient.samples);
+    EXPECT_TRUE(r.agree) << to_string(r.gradient.samples());
   }
 }
 
@@ -274,7 +285,8 @@ TEST(Samples, MustBePositive) {
   const TempFiles files;
   const Scene scene = shadow_scene(files);
   for (const SampleCounts& samples : {SampleCounts{0, 1, 1}, SampleCounts{1, 0, 1},
-                                      SampleCounts{1, 1, -1}, SampleCounts{1, NAN, 1}}) {
+                                      SampleCounts{1, 1, -1}, SampleCounts{1, NAN, 1},
+                                      SampleCounts{1, 1, 1.5}, SampleCounts{1, 1, 1, 1}}) {
     EXPECT_THROW(run(scene, {"ball.translate.y"}, samples, run_settings(1)), InputError);
   }
 }

@@ -87,7 +87,7 @@ void expect_exact(const std::string& sampler, const std::string& file,
   const json reference = find_reference(file);
   const Scene scene = read_scene(kFolder + file, {}, nullptr);
   GradientOptions options;
-  options.sampler = sampler;
+  options.method = sampler;
   options.samples = samples;
   for (const json& p : reference["parameters"]) {
     std::string name = p["name"];
@@ -101,17 +101,17 @@ void expect_exact(const std::string& sampler, const std::string& file,
   const GradientResult result = gradient(scene, options, settings);
   EXPECT_EQ(result.non_finite.count, 0u) << result.non_finite.message();
   const double accuracy = reference["accuracy"];
-  const double fewest = std::min(1.0, samples.camera);
+  const double fewest = std::min(1.0, samples[result.term("camera")]);
   compare(result.radiance, reference["image"], accuracy, "image", fewest);
   for (size_t k = 0; k < options.parameters.size(); ++k) {
     const json& exact = reference["parameters"][k];
     const ParameterGradient& g = result.parameters[k];
     const std::string name = exact["name"];
     compare(g.total, exact["total"], accuracy, name, fewest);
-    for (int term = 0; term < kTermCount; ++term) {
-      if (!exact.contains(term_name(term)) || exact[term_name(term)].is_null()) continue;
-      compare(g.terms[term], exact[term_name(term)], accuracy, name + " " + term_name(term),
-              fewest);
+    for (size_t t = 0; t < result.terms.size(); ++t) {
+      const std::string& term = result.terms[t].name;
+      if (!exact.contains(term) || exact[term].is_null()) continue;
+      compare(g.terms[t], exact[term], accuracy, name + " " + term, fewest);
     }
   }
 }

@@ -80,7 +80,6 @@ TEST_P(SceneFile, HasAMainParameterWithADerivative) {
   EXPECT_EQ(warnings, std::vector<std::string>{});
   GradientOptions options;
   options.parameters = {main[1]};
-  options.sampler = "forest";
   RunSettings settings;
   settings.spp = 1;
   const GradientResult result = gradient(scene, options, settings);

@@ -10,8 +10,7 @@
 #include "limn/core/lights.h"
 #include "limn/core/ray_tracer.h"
 #include "limn/core/shading.h"
-#include "limn/edgetree/edge_sampler_types.h"
-#include "limn/integrators/gradient.h"
+#include "limn/integrators/methods.h"
 #include "limn/integrators/render.h"
 
 namespace limn {
@@ -114,28 +113,27 @@ void add_render_benchmark(const Bench& bench) {
 
 // Samples per second of one term: its share of the run, by the terms' own clocks, in processor
 // time.
-void add_term_benchmark(const Bench& bench, int term, const std::string& sampler,
+void add_term_benchmark(const Bench& bench, const std::string& term, const std::string& method,
                         const std::string& parameter) {
-  std::string name = fmt::format("gradient/{}", term_name(term));
-  if (term == kBoundary) name += "/" + sampler;
+  const std::string name = fmt::format("gradient/{}/{}", term, method);
   benchmark::RegisterBenchmark(
       name.c_str(),
       [=, &bench](benchmark::State& state) {
         GradientOptions options;
         options.parameters = {parameter};
-        options.terms = {false, false, false};
-        options.terms[term] = true;
-        options.sampler = sampler;
+        options.terms = {term};
+        options.method = method;
         TermCost cost;
         for (auto _ : state) {
           const GradientResult result = gradient(bench.scene, options, one_thread(1));
-          state.SetIterationTime(result.costs[term].seconds);
-          cost.merge(result.costs[term]);
+          const TermCost& c = result.terms[result.term(term)].cost;
+          state.SetIterationTime(c.seconds);
+          cost.merge(c);
         }
         state.counters["samples"] = rate(static_cast<double>(cost.samples));
         state.counters["rays"] = rate(static_cast<double>(cost.rays));
         state.counters["counted"] =
-            term == kInterior ? 1.0 : static_cast<double>(cost.counted) / cost.samples;
+            cost.counted == 0 ? 1.0 : static_cast<double>(cost.counted) / cost.samples;
       })
       ->Unit(benchmark::kMillisecond)
       ->UseManualTime();
@@ -159,10 +157,15 @@ int run(const std::string& file) {
                                     : bench.scene.shapes.front().id + ".translate.y";
   add_ray_benchmarks(bench);
   add_render_benchmark(bench);
-  add_term_benchmark(bench, kInterior, "uniform", parameter);
-  add_term_benchmark(bench, kCamera, "uniform", parameter);
-  for (const auto& type : edge_sampler_types()) {
-    add_term_benchmark(bench, kBoundary, type.name, parameter);
+  // Terms that no method changes are timed once; those at shading points for every method.
+  const MethodType& standard = method_types().front();
+  for (const std::string& term : standard.terms) {
+    for (const MethodType& method : method_types()) {
+      const bool same = term != "boundary" && method.name != standard.name;
+      if (method.terms == standard.terms && !same) {
+        add_term_benchmark(bench, term, method.name, parameter);
+      }
+    }
   }
   benchmark::AddCustomContext("scene", file);
   benchmark::AddCustomContext("parameter", parameter);
