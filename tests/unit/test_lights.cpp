@@ -1,0 +1,103 @@
+// Lights by themselves: what arrives from each kind, and how one of them is chosen.
+#include "limn/core/lights.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "support/scenes.h"
+
+namespace limn {
+namespace {
+
+Scene scene_with(const TempFiles& files, const std::string& body) {
+  SceneParts parts;
+  parts.body = body;
+  return make_scene(files, parts);
+}
+
+std::shared_ptr<DeltaLight> only_light(const std::string& emitter) {
+  const TempFiles files;
+  return scene_with(files, emitter).delta_lights.at(0);
+}
+
+TEST(DeltaLights, APointFallsOffWithTheSquareOfTheDistance) {
+  for (const char* place : {R"(<point name="position" value="1,2,3"/>)",
+                            R"(<transform name="to_world"><rotate x="1" angle="40"/>
+                               <translate value="1,2,3"/></transform>)"}) {
+    const auto light = only_light(std::string(R"(<emitter type="point">)") + place +
+                                  R"(<rgb name="intensity" value="8,4,2"/></emitter>)");
+    const auto a = light->arriving(Vec3d{1, 2, -1});
+    ASSERT_TRUE(a);
+    EXPECT_NEAR(a->irradiance.r, 8.0 / 16, 1e-15);
+    EXPECT_NEAR(a->irradiance.b, 2.0 / 16, 1e-15);
+    EXPECT_NEAR(a->wo.z, 1, 1e-15);
+    EXPECT_FALSE(light->arriving(value(light->origin().v)));
+  }
+}
+
+// Full up to beam_width, then linear in the angle down to cutoff_angle (Mitsuba 3).
+TEST(DeltaLights, ASpotFallsOffLinearlyInTheAngle) {
+  const auto light = only_light(
+      R"(<emitter type="spot"><float name="cutoff_angle" value="40"/><transform name="to_world">
+         <lookat origin="0,5,0" target="0,0,0" up="1,0,0"/></transform></emitter>)");
+  for (const double degrees : {0.0, 10.0, 29.9, 30.1, 35.0, 39.9, 40.1, 90.0, 180.0}) {
+    const double angle = degrees * kPi / 180;
+    const auto a = light->arriving(Vec3d{2 * std::sin(angle), 5 - 2 * std::cos(angle), 0});
+    ASSERT_EQ(a.has_value(), degrees < 40) << degrees;
+    if (!a) continue;
+    EXPECT_NEAR(a->irradiance.g, 0.25 * std::min(1.0, (40 - degrees) / 10), 1e-12);
+  }
+}
+
+TEST(DeltaLights, ADirectionComesFromInfinity) {
+  for (const char* place : {R"(<vector name="direction" value="0,-3,0"/>)",
+                            R"(<transform name="to_world"><lookat origin="1,2,3" target="1,1,3"
+                               up="1,0,0"/></transform>)"}) {
+    const auto light = only_light(std::string(R"(<emitter type="directional">)") + place +
+                                  R"(<rgb name="irradiance" value="3,2,1"/></emitter>)");
+    const auto a = light->arriving(Vec3d{100, -1e6, 3});
+    EXPECT_NEAR(a->wo.y, 1, 1e-15);
+    EXPECT_EQ(a->irradiance.r, 3);
+    Rng rng(1, 2, 3);
+    EXPECT_TRUE(std::isinf(light->sample({0, 0, 0}, 2, rng)->distance));
+  }
+}
+
+// Every light is equally likely: shapes in their order, the environment, then delta lights.
+TEST(Lights, AreChosenUniformly) {
+  const TempFiles files;
+  const Scene scene = scene_with(
+      files, R"(<emitter type="directional"/><emitter type="constant"/><emitter type="point"/>)" +
+                 square("lamp", 1, 90, {0, 3, 0}, area_light("glow", "1, 1, 1")));
+  const Lights lights(scene);
+  ASSERT_EQ(lights.all().size(), 4u);
+  EXPECT_EQ(lights.all()[1], scene.environment.get());
+  EXPECT_EQ(lights.all()[2], scene.delta_lights[0].get());
+  const Vec3d p{0.3, 1, 0.2};
+  const int draws = 40000;
+  std::vector<int> counts(4);
+  Rng rng(4, 5, 6);
+  for (int i = 0; i < draws; ++i) {
+    const auto sample = lights.sample(p, rng);
+    ASSERT_TRUE(sample);
+    const auto which = std::ranges::find(lights.all(), sample->light) - lights.all().begin();
+    ++counts[which];
+    EXPECT_EQ(sample->face.has_value(), which == 0);
+    const LightView lamp{sample->wo, sample->distance, Vec3d{0, -1, 0}};
+    const double expected = which == 0   ? lights.pdf(0, lamp)
+                            : which == 1 ? lights.pdf_environment(sample->wo)
+                                         : 0.25;
+    EXPECT_DOUBLE_EQ(sample->pdf, expected);
+  }
+  // Binomial, five standard errors.
+  for (const int count : counts) EXPECT_NEAR(count, draws / 4, 5 * std::sqrt(draws * 3 / 16.0));
+}
+
+TEST(Lights, OfASceneWithoutAnyAreEmpty) {
+  const TempFiles files;
+  EXPECT_TRUE(Lights(scene_with(files, square("floor", 1, 0, {}, ""))).empty());
+}
+
+}  // namespace
+}  // namespace limn
