@@ -37,6 +37,18 @@ VISIBLE_LAMP = """<shape type="rectangle"><transform name="to_world"><scale valu
     <translate x="1" y="1.2" z="-1"/></transform>
     <emitter type="area"><rgb name="radiance" value="3,2,1"/></emitter></shape>"""
 CONSTANT = '<emitter type="constant"><rgb name="radiance" value="0.3,0.4,0.5"/></emitter>'
+TILTED = '<transform name="to_world"><lookat origin="2,4,2" target="-0.5,0.4,0" up="0,1,0"/></transform>'
+POINT = """<emitter type="point"><point name="position" value="1,3,2"/>
+    <rgb name="intensity" value="30,20,10"/></emitter>"""
+PLACED_POINT = """<emitter type="point"><rgb name="intensity" value="9"/><transform name="to_world">
+    <rotate y="1" angle="30"/><translate x="1" y="2" z="-1"/></transform></emitter>"""
+SPOT = f"""<emitter type="spot">{TILTED}<rgb name="intensity" value="60,40,20"/></emitter>"""
+WIDE_SPOT = f"""<emitter type="spot">{TILTED}<rgb name="intensity" value="20,40,60"/>
+    <float name="cutoff_angle" value="35"/><float name="beam_width" value="5"/></emitter>"""
+DIRECTIONAL = """<emitter type="directional"><vector name="direction" value="1,-2,-0.5"/>
+    <rgb name="irradiance" value="1,2,3"/></emitter>"""
+TURNED_DIRECTIONAL = f"""<emitter type="directional">{TILTED}
+    <rgb name="irradiance" value="3,2,1"/></emitter>"""
 CONDUCTOR = """<bsdf type="roughconductor"><string name="distribution" value="{distribution}"/>
     <float name="alpha" value="{alpha}"/><rgb name="eta" value="0.2,0.92,1.1"/>
     <rgb name="k" value="3.9,2.4,2.1"/></bsdf>"""
@@ -127,6 +139,13 @@ def cases(folder):
     yield "twosided", {"objects": CUBE.replace("rotate y", "rotate x"), "floor":
                        f'<bsdf type="twosided">{CONDUCTOR.format(distribution="ggx", alpha=0.3)}{GREY}</bsdf>',
                        "sensor": FOV, "lights": VISIBLE_LAMP.replace('y="1.2"', 'y="-1.5"') + envmap}, []
+    for name, lights in (("point", POINT), ("placed point", PLACED_POINT), ("spot", SPOT),
+                         ("wide spot", WIDE_SPOT), ("directional", DIRECTIONAL),
+                         ("turned directional", TURNED_DIRECTIONAL),
+                         ("delta lights and others", POINT + SPOT + DIRECTIONAL + ONE_LAMP + envmap)):
+        yield name, {"lights": lights}, []
+        yield f"{name} gloss", {"lights": lights, "floor": CONDUCTOR.format(
+            distribution="ggx", alpha=0.2)}, []
     yield "two lamps", {"lights": LAMP.format(angle=90, size=0.5, x=-1, radiance="8,1,1") +
                         LAMP.format(angle=70, size=0.3, x=2, radiance="1,9,30")}, []
     yield "hide_emitters", {"integrator": DEPTH.format(3, 1000) +
