@@ -148,8 +148,8 @@ class PathTracer {
     const Rgb<S> radiance = surface.emission(-wo, c_.scene.shading);
     if (is_black(value(radiance))) return radiance;
     // A face around an edge that is met at distance 0 is never drawn by light sampling.
-    const double other =
-        distance > 0 ? c_.lights.pdf_face(surface.face, surface.n_g, wo, distance) : 0;
+    const LightView view{wo, distance, surface.n_g};
+    const double other = distance > 0 ? c_.lights.pdf(surface.face.shape, view) : 0;
     return radiance * mis_weight(pdf, other);
   }
 
@@ -157,17 +157,28 @@ class PathTracer {
                       const Rng& key, const EdgeStart* edge) {
     if (c_.lights.empty()) return {};
     Rng rng = key.at(Purpose::kEmitter, bounces);
-    LightSample light;
     const Vec3d p = value(surface.p);
-    if (!c_.lights.sample(p, rng, light)) return {};
-    const auto [f, bsdf_pdf] = scattering.eval_with_pdf(light.wo);
-    if (is_black(value(f)) || shadowed(p, surface.face, light, edge)) return {};
-    const double weight = mis_weight(light.pdf, bsdf_pdf) / light.pdf;
-    const Rgb<S> radiance =
-        light.face.shape == UINT32_MAX
-            ? c_.scene.environment->radiance(Vec3<S>{light.wo.x, light.wo.y, light.wo.z})
-            : as<S>(c_.scene.shapes[light.face.shape].radiance);
-    return f * radiance * weight;
+    const auto light = c_.lights.sample(p, rng);
+    if (!light) return {};
+    if (const DeltaLight* delta = light->light->delta()) {
+      return delta_light(*delta, *light, surface, scattering, edge);
+    }
+    const auto [f, bsdf_pdf] = scattering.eval_with_pdf(light->wo);
+    if (is_black(value(f)) || shadowed(p, surface.face, *light, edge)) return {};
+    const double weight = mis_weight(light->pdf, bsdf_pdf) / light->pdf;
+    return f * light->light->radiance(Vec3<S>{light->wo.x, light->wo.y, light->wo.z}) * weight;
+  }
+
+  // No ray meets a delta light by chance, so it has the whole weight. Its direction follows the
+  // parameters, and f_s with it.
+  Rgb<S> delta_light(const DeltaLight& light, const LightSample& sample,
+                     const SurfacePoint<S>& surface, const Scattering<S>& scattering,
+                     const EdgeStart* edge) {
+    const auto arrival = light.arriving(surface.p);
+    if (!arrival) return {};
+    const Rgb<S> f = scattering.eval(arrival->wo);
+    if (is_black(value(f)) || shadowed(value(surface.p), surface.face, sample, edge)) return {};
+    return f * arrival->irradiance * (1 / sample.pdf);
   }
 
   bool shadowed(const Vec3d& p, FaceRef start, const LightSample& light, const EdgeStart* edge) {
@@ -181,7 +192,7 @@ class PathTracer {
     }
     // Ends a float's rounding before the light, so that neighbours of the chosen face do not hide
     // the point.
-    if (light.distance < 1e300) ray.t_max = light.distance * (1 - 0x1p-20);
+    ray.t_max = light.distance * (1 - 0x1p-20);
     ++rays_.shadow;
     return c_.tracer.occluded(ray);
   }

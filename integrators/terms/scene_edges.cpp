@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "limn/core/shading.h"
+#include "limn/core/lights.h"
 
 namespace limn {
 
@@ -12,13 +12,9 @@ EdgeSamplerInput make_sampler_input(const Scene& scene) {
   for (const Shape& shape : scene.shapes) {
     const bool black_behind = shape.bsdf->side(false) == nullptr;
     input.objects.push_back(build_edge_mesh(shape.mesh, black_behind));
-    if (!shape.is_emitter) continue;
-    for (uint32_t f = 0; f < shape.mesh.faces.size(); ++f) {
-      const auto corners = face_corners<double>(shape.mesh, f);
-      input.lights.push_back(
-          {{corners[0], corners[1], corners[2]}, luminance(value(shape.radiance))});
-    }
   }
+  const Lights lights(scene);
+  for (const Light* light : lights.all()) light->add_triangles(input.lights);
   if (!scene.environment) return input;
   const Environment& environment = *scene.environment;
   input.environment_luminance = environment.mean_luminance();

@@ -7,8 +7,10 @@ namespace limn {
 std::unique_ptr<Term> make_interior_term(TermInput& input);
 std::unique_ptr<Term> make_camera_term(TermInput& input);
 std::unique_ptr<Term> make_boundary_term(TermInput& input);
+std::unique_ptr<Term> make_shadow_term(TermInput& input);
 
 inline bool always(const Scene&) { return true; }
+inline bool has_delta_lights(const Scene& scene) { return !scene.delta_lights.empty(); }
 
 // The camera's samples are drawn over the whole film: there may be fewer of them than pixels.
 inline constexpr double kLeastFilmSamples = 0.125;  // not tuned
@@ -20,6 +22,7 @@ inline constexpr TermType kTermTypes[] = {
      make_camera_term},
     {"boundary", "silhouettes that shading points see", 1, false, true, 0, always,
      make_boundary_term},
+    {"shadow", "edges of sharp shadows", 1, false, true, 1, has_delta_lights, make_shadow_term},
 };
 
 }  // namespace limn

@@ -52,16 +52,6 @@ class FieldOfView final : public Motion {
   void move(Scene& scene, double step, size_t) const override { scene.camera.fov.v += step; }
 };
 
-double scene_size(const Scene& scene) {
-  Bounds bounds;
-  for (const Shape& shape : scene.shapes) {
-    const Bounds b = bounds_of(shape.mesh);
-    bounds.extend(b.lower);
-    bounds.extend(b.upper);
-  }
-  return scene.shapes.empty() ? 1 : bounds.diagonal();
-}
-
 }  // namespace
 
 void add_camera_parameters(const Scene& scene, std::vector<Parameter>& list) {

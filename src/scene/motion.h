@@ -28,5 +28,7 @@ class Motion {
 // Coordinate axis 0 to 2, and v turned about it by `angle` [radians].
 Vec3d unit_vector(int axis);
 Vec3d turned(const Vec3d& v, int axis, double angle);
+// The diagonal of the bounds of all shapes; 1 if there is none.
+double scene_size(const Scene& scene);
 
 }  // namespace limn

@@ -26,6 +26,7 @@ Scene deep_copy(const Scene& scene) {
   for (Shape& shape : copy.shapes) shape.bsdf = copy_once(shape.bsdf, copies);
   for (auto& [id, bsdf] : copy.bsdfs_by_id) bsdf = copy_once(bsdf, copies);
   if (scene.environment) copy.environment = scene.environment->clone();
+  for (auto& light : copy.delta_lights) light = light->clone();
   return copy;
 }
 

@@ -35,16 +35,26 @@ Parameter value_parameter(const std::string& name, const std::vector<double>& no
   return {name, "", 0.01 * (largest > 0 ? largest : 1), 1, std::make_shared<ValueMotion>(values)};
 }
 
+// size: of the scene; unused without lengths.
+void set_unit(ParameterRef::Unit unit, double size, Parameter& parameter) {
+  if (unit == ParameterRef::Unit::kValue) return;
+  const bool length = unit == ParameterRef::Unit::kLength;
+  parameter.unit = length ? "scene units" : "radians";
+  parameter.natural_step = length ? 0.01 * size : 0.01;
+}
+
 // The values of an object that has them under names. owner: finds that object in a copy.
 template <class Owner>
 void add_values(const std::string& id, const std::vector<ParameterRef>& values, const Owner& owner,
-                std::vector<Parameter>& list) {
+                std::vector<Parameter>& list, double size = 0) {
   for (size_t k = 0; k < values.size(); ++k) {
     std::vector<double> now;
     for (const Dual* v : values[k].values) now.push_back(v->v);
-    list.push_back(value_parameter(id + "." + values[k].name, now, [owner, k](Scene& scene) {
+    Parameter p = value_parameter(id + "." + values[k].name, now, [owner, k](Scene& scene) {
       return owner(scene)->parameters()[k].values;
-    }));
+    });
+    set_unit(values[k].unit, size, p);
+    list.push_back(p);
   }
 }
 
@@ -72,6 +82,12 @@ void add_emitter_parameters(const Scene& scene, std::vector<Parameter>& list) {
   if (scene.environment && !scene.environment_id.empty()) {
     const auto owner = [](Scene& copy) { return copy.environment; };
     add_values(scene.environment_id, scene.environment->parameters(), owner, list);
+  }
+  for (size_t i = 0; i < scene.delta_lights.size(); ++i) {
+    DeltaLight& light = *scene.delta_lights[i];
+    if (light.id.empty()) continue;
+    const auto owner = [i](Scene& copy) { return copy.delta_lights[i]; };
+    add_values(light.id, light.parameters(), owner, list, scene_size(scene));
   }
 }
 

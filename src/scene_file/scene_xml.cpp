@@ -44,7 +44,7 @@ class SceneBuilder {
     } else if (object.tag == "shape") {
       add_shape(object);
     } else if (object.tag == "emitter") {
-      add_environment(object);
+      add_light(object);
     }
   }
 
@@ -95,31 +95,20 @@ class SceneBuilder {
     return made;
   }
 
-  void add_environment(const ObjectDescription& object) {
-    if (object.type == "area") {
-      throw InputError(object.where, "an area emitter belongs inside a shape");
-    }
-    only_one(object, "environment", environment_);
+  void add_light(const ObjectDescription& object) {
     DescribedProperties p(object, description_, make_nested_);
-    scene_.environment = make_environment(p);
-    scene_.environment_id = object.id;
+    const auto before = scene_.environment;
+    read_light(p, scene_, nullptr);
     p.check_all_used();
+    if (scene_.environment == before) return;
+    only_one(object, "environment", environment_);
+    scene_.environment_id = object.id;
   }
 
-  void read_area_emitter(const ObjectDescription& object, Shape& shape) {
-    if (object.type != "area") {
-      throw InputError(object.where, "unknown type \"" + object.type +
-                                         "\" of an emitter inside a shape (known: area)");
-    }
+  void read_nested_light(const ObjectDescription& object, Shape& shape) {
     DescribedProperties p(object, description_, make_nested_);
-    const Rgb<double> radiance = p.rgb("radiance", grey(1.0));
-    for (int i = 0; i < 3; ++i) {
-      if (!(radiance[i] >= 0)) p.fail("radiance", "must not be negative");
-      shape.radiance[i] = radiance[i];
-    }
+    read_light(p, scene_, &shape);
     p.check_all_used();
-    shape.is_emitter = true;
-    shape.emitter_id = object.id;
   }
 
   MeshOptions read_mesh_options(DescribedProperties& p, bool from_file) {
@@ -183,7 +172,7 @@ class SceneBuilder {
     if (raw.where.file.empty()) raw.where = object.where;
     const std::vector<std::shared_ptr<Bsdf>> bsdfs = p.bsdfs();
     if (bsdfs.size() > 1) p.fail("has " + std::to_string(bsdfs.size()) + " bsdfs (one at most)");
-    if (const ObjectDescription* emitter = p.nested("emitter")) read_area_emitter(*emitter, shape);
+    if (const ObjectDescription* emitter = p.nested("emitter")) read_nested_light(*emitter, shape);
     p.check_all_used();
     shape.mesh = build_mesh(std::move(raw), options, warnings_);
     const double grey_value = shape.is_emitter ? 0.0 : 0.5;

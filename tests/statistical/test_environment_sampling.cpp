@@ -87,7 +87,7 @@ TEST(EnvironmentSampling, MatchesItsDensity) {
     for (int i = 0; i < kSamples; ++i) {
       const double u1 = rng.uniform();
       const double u2 = rng.uniform();
-      const Vec3d d = map->sample(u1, u2);
+      const Vec3d d = map->sample_direction(u1, u2);
       EXPECT_NEAR(length(d), 1, 1e-14);
       ++observed[bins.bin(apply_transposed(turn, d))];
     }
@@ -108,7 +108,7 @@ TEST(EnvironmentSampling, EstimatesTheMean) {
     for (int i = 0; i < kSamples; ++i) {
       const double u1 = rng.uniform();
       const double u2 = rng.uniform();
-      const Vec3d d = map->sample(u1, u2);
+      const Vec3d d = map->sample_direction(u1, u2);
       const double value = luminance(map->radiance(d)) / (map->pdf_solid_angle(d) * 4 * kPi);
       sum += value;
       sum2 += value * value;
@@ -146,7 +146,7 @@ TEST(EnvironmentSampling, ConstantIsUniform) {
   for (int i = 0; i < kSamples; ++i) {
     const double u1 = rng.uniform();
     const double u2 = rng.uniform();
-    ++observed[bins.bin(constant->sample(u1, u2))];
+    ++observed[bins.bin(constant->sample_direction(u1, u2))];
   }
   EXPECT_GT(test::chi_square_test(observed, expected).p_value, 0.01);
 }

@@ -6,6 +6,7 @@
 
 #include "limn/core/environment.h"
 #include "limn/core/image.h"
+#include "limn/core/scene.h"
 #include "support/temporary_file.h"
 #include "support/test_properties.h"
 
@@ -17,7 +18,9 @@ inline std::shared_ptr<Environment> make_envmap(const Image& image, double scale
   write_exr(file.path(), image, false, {});
   TestProperties properties("emitter", "envmap",
                             {{"filename", file.path()}, {"scale", scale}, {"to_world", to_world}});
-  return make_environment(properties);
+  Scene scene;
+  read_light(properties, scene, nullptr);
+  return scene.environment;
 }
 
 // A turn by 40 degrees about (2, -1, 2) / 3.

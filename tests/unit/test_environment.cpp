@@ -183,7 +183,8 @@ TEST(Environment, MeanLuminanceIsTheIntegral) {
 
 void expect_error(const std::string& message, TestProperties properties) {
   try {
-    make_environment(properties);
+    Scene scene;
+    read_light(properties, scene, nullptr);
     FAIL() << "no error: " << message;
   } catch (const InputError& e) {
     EXPECT_NE(std::string(e.what()).find(message), std::string::npos) << e.what();
@@ -194,8 +195,9 @@ TEST(Environment, BadInputIsExplained) {
   const test::TemporaryFile file("bad.exr");
   Image image(4, 3, 3);
   write_exr(file.path(), image, false, {});
-  expect_error("unknown environment emitter type \"sunsky\" (known: constant, envmap)",
-               {"emitter", "sunsky"});
+  expect_error(
+      "unknown emitter type \"sunsky\" (known: constant, directional, envmap, point, spot)",
+      {"emitter", "sunsky"});
   expect_error("must be finite", {"emitter", "constant", {{"radiance", INFINITY}}});
   Matrix4 sheared;
   sheared.m[0][1] = 0.5;

@@ -29,6 +29,12 @@ class Parameters : public testing::Test {
         <emitter type="area" id="lamp"><rgb name="radiance" value="1,2,3"/></emitter></shape>
       <shape type="cube"/>
       <emitter type="constant" id="sky"><rgb name="radiance" value="0.5"/></emitter>
+      <emitter type="point" id="bulb"><point name="position" value="1,2,3"/></emitter>
+      <emitter type="spot" id="torch"><rgb name="intensity" value="80"/>
+        <float name="cutoff_angle" value="60"/><float name="beam_width" value="10"/>
+        <transform name="to_world">
+        <lookat origin="1,3,1" target="0.2,0,0.5" up="0,1,0"/></transform></emitter>
+      <emitter type="directional" id="sun"><vector name="direction" value="1,-2,0.5"/></emitter>
       </scene>)");
     scene_ = read_scene(file, {}, nullptr);
     std::string field;
@@ -63,6 +69,16 @@ std::vector<Dual> numbers(const Scene& scene) {
   }
   for (const ParameterRef& p : scene.environment->parameters()) {
     for (const Dual* v : p.values) all.push_back(*v);
+  }
+  for (const auto& light : scene.delta_lights) {
+    // Where the spot falls off.
+    for (const Vec3d& p : {Vec3d{1, 0.5, -1}, Vec3d{2, 0, 2}}) {
+      const auto arrival = light->arriving(Vec3<Dual>{p.x, p.y, p.z});
+      if (!arrival) continue;
+      add(arrival->wo);
+      all.insert(all.end(), {arrival->irradiance.r, arrival->irradiance.g, arrival->irradiance.b});
+    }
+    add(light->origin().v);
   }
   for (const Vec3<Dual>* v :
        {&scene.camera.origin, &scene.camera.left, &scene.camera.up, &scene.camera.forward}) {
@@ -113,7 +129,9 @@ TEST_F(Parameters, AreListed) {
   for (const char* name :
        {"tent.translate.x", "ball.rotate.z", "ball.scale", "tent.vertex_positions",
         "sensor.translate.y", "sensor.rotate.x", "sensor.fov", "metal.alpha", "both.alpha",
-        "lamp.radiance", "sky.radiance"}) {
+        "lamp.radiance", "sky.radiance", "bulb.translate.x", "bulb.intensity", "torch.translate.z",
+        "torch.rotate.x", "torch.cutoff_angle", "torch.beam_width", "sun.rotate.y",
+        "sun.irradiance"}) {
     EXPECT_EQ(std::count(names.begin(), names.end(), name), 1) << name;
   }
 }

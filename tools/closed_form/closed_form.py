@@ -21,13 +21,14 @@ from closed_form_scenes import SCENES
 
 FOLDER = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "scenes", "closed_form")
 STENCIL = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}
-TERMS = {"interior": (0, 1, 0), "camera": (1, 0, 0), "boundary": (0, 0, 1), "total": (1, 1, 1)}
+TERMS = {"interior": (0, 1, 0, 0), "camera": (1, 0, 0, 0), "boundary": (0, 0, 1, 0),
+         "shadow": (0, 0, 0, 1), "total": (1, 1, 1, 1)}
 
 
 def derivative(scene, model, name, term, order, step):
     """d image / d parameter of one term: height by width by 3, truncation error O(step^8)."""
     total = np.zeros((scene.camera.height, scene.camera.width, 3))
-    if term == "camera" and not model.outlines_in_view:
+    if (term == "camera" and not model.outlines_in_view) or (term == "shadow" and not scene.lights):
         return total
     for k, weight in STENCIL.items():
         for sign in (1, -1):
@@ -39,10 +40,11 @@ def derivative(scene, model, name, term, order, step):
 
 def evaluate(scene, model, names, order, step):
     """The image, and every parameter's terms."""
-    image = model.image(scene, scene, scene, order)
-    terms = {n: {t: derivative(scene, model, n, t, order, step) for t in TERMS} for n in names}
+    image = model.image(scene, scene, scene, scene, order)
+    kinds = [t for t in TERMS if t != "shadow" or scene.lights]
+    terms = {n: {t: derivative(scene, model, n, t, order, step) for t in kinds} for n in names}
     for name, values in terms.items():
-        rest = values["total"] - values["interior"] - values["camera"] - values["boundary"]
+        rest = 2 * values["total"] - sum(values.values())
         assert np.max(np.abs(rest)) < 1e-8 * (1 + np.max(np.abs(values["total"]))), name
     return image, terms
 

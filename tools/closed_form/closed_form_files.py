@@ -58,6 +58,23 @@ def shape_xml(name, shape, mesh_file):
     return head + body + "  </shape>\n"
 
 
+def light_xml(name, light):
+    text = f'  <emitter type="{light.kind}" id="{name}">{rgb(light.power_name(), light.power)}'
+    if light.kind == "directional":
+        return text + f'<vector name="direction" value="{digits(light.direction)}"/></emitter>\n'
+    if light.kind == "point":
+        return text + f'<point name="position" value="{digits(light.position)}"/></emitter>\n'
+    target = light.position + light.direction
+    return (f'{text}\n    <float name="cutoff_angle" value="{light.cutoff_angle:.15g}"/>'
+            f'<float name="beam_width" value="{light.beam_width:.15g}"/>\n'
+            f'    <transform name="to_world"><lookat origin="{digits(light.position)}" '
+            f'target="{digits(target)}" up="0,1,0"/></transform></emitter>\n')
+
+
+def digits(values):
+    return ",".join(f"{v:.17g}" for v in values)
+
+
 def sensor_xml(camera):
     axes, origin = camera.axes(), camera.pinhole()
     moved = np.any(camera.shift != 0) or np.any(camera.turn != np.eye(3))
@@ -100,6 +117,8 @@ def write_scene(scene, folder, moved=False):
     if scene.environment is not None:
         text += (f'  <emitter type="constant" id="environment">'
                  f'{rgb("radiance", scene.environment)}</emitter>\n')
+    for name, light in scene.lights.items():
+        text += light_xml(name, light)
     path = os.path.join(folder, scene.name)
     with open(path, "w") as out:
         out.write(text + "</scene>\n")

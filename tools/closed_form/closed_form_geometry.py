@@ -77,14 +77,48 @@ class Camera:
 
 
 @dataclass
+class Light:
+    """kind: point, spot or directional. direction: unit, in which the light travels."""
+
+    kind: str
+    power: np.ndarray  # 3: intensity, of a directional light irradiance
+    position: np.ndarray = None
+    direction: np.ndarray = None
+    cutoff_angle: float = 20.0  # degrees, as is
+    beam_width: float = 15.0
+
+    def power_name(self):
+        return "irradiance" if self.kind == "directional" else "intensity"
+
+    def through(self, x):
+        """The directions, not normalised, in which light passes through x (N by 3)."""
+        return x - self.position if self.kind != "directional" else self.direction + 0 * x
+
+    def arriving(self, x):
+        """Unit directions from x to the light (N by 3), and the irradiance across them (N by 3)."""
+        w = self.through(x)
+        r = np.linalg.norm(w, axis=1, keepdims=True)
+        power = self.power / r**2 if self.kind != "directional" else self.power + 0 * x
+        if self.kind == "spot":
+            angle = np.degrees(np.arccos((w / r) @ self.direction))
+            ramp = (self.cutoff_angle - angle) / (self.cutoff_angle - self.beam_width)
+            flat = angle <= self.beam_width
+            assert np.all(flat) or not np.any(flat), "the rim of the beam crosses the view"
+            assert np.all(ramp > 0) or np.all(ramp < 0), "the rim of the cone crosses the view"
+            power = power * (1.0 if flat[0] else np.maximum(ramp, 0)[:, None])
+        return -w / r, power
+
+
+@dataclass
 class Scene:
-    """name: of the XML file; shapes by id; environment: radiance (3) or None."""
+    """name: of the XML file; shapes and lights by id; environment: radiance (3) or None."""
 
     name: str
     camera: Camera
     shapes: dict
     max_depth: int
     environment: np.ndarray = None
+    lights: dict = field(default_factory=dict)
     velocities: dict = field(default_factory=dict)  # FILE -> V by 3 velocity field
 
 
@@ -108,6 +142,8 @@ def moved(scene, name, step):
     axis = "xyz".find(rest[0]) if rest else -1
     if owner == "sensor":
         move_camera(scene.camera, what, axis, step)
+    elif owner in scene.lights:
+        move_light(scene.lights[owner], what, axis, step)
     elif what in ("reflectance", "alpha"):
         bsdf = next(s.bsdf for s in scene.shapes.values() if s.bsdf and s.bsdf.id == owner)
         setattr(bsdf, what, getattr(bsdf, what) + step)
@@ -131,6 +167,25 @@ def move_camera(camera, what, axis, step):
         camera.turn = rotation(axis, step) @ camera.turn
     else:
         raise ValueError(what)
+
+
+def move_light(light, what, axis, step):
+    if what == "translate":
+        light.position = light.position + step * np.eye(3)[axis]
+    elif what == "rotate":
+        light.direction = rotation(axis, step) @ light.direction
+    elif what == light.power_name():
+        light.power = light.power + step
+    else:
+        setattr(light, what, getattr(light, what) + step)
+
+
+def shadow_on_plane(light, points, loop):
+    """Where light through the points (N by 3) meets the plane of `loop`."""
+    w, normal = light.through(points), loop_normal(loop)
+    s = (loop[0] - points) @ normal / (w @ normal)
+    assert np.all(s > 0), "the plane lies before what should shade it"
+    return points + s[:, None] * w
 
 
 def move_shape(scene, shape, what, axis, step):

@@ -44,7 +44,7 @@ def two_sides(scene, model, name):
     for step in STEPS:
         both = [moved(scene, name, s * step) for s in (1, -1)]
         try:
-            return step, both, [model.image(s, s, s, 12) for s in both]
+            return step, both, [model.image(s, s, s, s, 12) for s in both]
         except AssertionError:
             continue
     raise ValueError(f"{scene.name}: no step is small enough for {name}")
@@ -55,7 +55,7 @@ def compare(keys, spp):
         for key in keys:
             print(key)
             scene, model, names = SCENES[key]()
-            expected = model.image(scene, scene, scene, 12)
+            expected = model.image(scene, scene, scene, scene, 12)
             report("image", z_scores(render(scene, folder, spp), expected), expected)
             for name in names:
                 step, both, images = two_sides(scene, model, name)

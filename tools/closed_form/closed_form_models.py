@@ -1,18 +1,19 @@
 """What each kind of scene's picture is, in closed form, with the three terms kept apart.
 
-A model's image(domain, shade, outline, order) takes the scene three times, so that a parameter can
-be moved in one copy alone (directions omega are held fixed in solid angle while it moves):
+A model's image(domain, shade, outline, shadow, order) takes the scene four times, so that a parameter
+can be moved in one copy alone (directions omega are held fixed in solid angle while it moves):
   domain   decides what the camera's rays meet first:            its derivative is the camera term,
   shade    holds normals, directions to the viewer, BSDFs, radiances:             interior term,
-  outline  holds shading points and all outlines seen from them:                  boundary term.
+  outline  holds shading points and all outlines seen from them:                  boundary term,
+  shadow   holds the edges of sharp shadows, and all that they fall on:             shadow term.
 All three moved together give the picture of the moved scene, so the terms add up to its derivative.
 `order` is the number of Gauss nodes per axis. Images are height by width by 3.
 """
 import numpy as np
 
 from closed_form_geometry import (clip, clip_box, clip_convex, hit_plane, loop_normal, loop_rule,
-                                  square_rule)
-from closed_form_radiance import (Filter, convex_vector, lobe_over_polygon, polygon_area,
+                                  shadow_on_plane, square_rule, unit)
+from closed_form_radiance import (Filter, convex_vector, lobe, lobe_over_polygon, polygon_area,
                                   polygon_vector)
 
 
@@ -21,7 +22,7 @@ class FloorModel:
 
     outlines_in_view = False
 
-    def image(self, domain, shade, outline, order):
+    def image(self, domain, shade, outline, shadow, order):
         camera = domain.camera
         nodes, weights = square_rule(order)
         result = np.zeros((camera.height, camera.width, 3))
@@ -122,6 +123,103 @@ class WedgeInGloss(FloorModel):
                                  4 * order, reflected)
 
 
+class SharpShadow(FloorModel):
+    """A triangle's sharp shadow on a diffuse floor: L = rho / pi E n.wo where the floor is lit.
+
+    The shadow is a polygon on the film: its share of the pixel is taken off the whole pixel.
+    """
+
+    def image(self, domain, shade, outline, shadow, order):
+        camera = domain.camera
+        corners = shadow_on_plane(shadow.lights["lamp"], shadow.shapes["object"].face(0),
+                                  shadow.shapes["floor"].face(0))
+        dark = shadow.camera.project(corners)
+        result = np.zeros((camera.height, camera.width, 3))
+        for row in range(camera.height):
+            for column in range(camera.width):
+                lower = np.array([column, row], dtype=float)
+                square = lower + np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])
+                result[row, column] = self.light(shade, square, order)
+                part = clip_box(dark, lower, lower + 1)
+                if len(part):
+                    result[row, column] -= self.light(shade, part, order)
+        return result
+
+    def light(self, scene, polygon, order):
+        film, weights = loop_rule(polygon, order)
+        floor = scene.shapes["floor"]
+        x = hit_plane(scene.camera, film, floor.face(0))
+        return weights @ reflected_light(scene.lights["lamp"], floor, x)
+
+
+def reflected_light(light, shape, x):
+    """Radiance that leaves points x of face 0 of a diffuse shape, lit from its front."""
+    wo, irradiance = light.arriving(x)
+    cosine = wo @ loop_normal(shape.face(0))
+    assert np.all(cosine > 0), "lit from behind"
+    return cosine[:, None] * irradiance * shape.bsdf.reflectance / np.pi
+
+
+class SharpShadowInGloss(FloorModel):
+    """A triangle's sharp shadow on a diffuse panel, seen in a glossy floor that the light misses.
+
+    Directions from the floor are points of the plane of the panel at rest as seen from the point of
+    the floor at rest, where all outlines are polygons: the panel's, and in it the shadow's.
+    """
+
+    def image(self, domain, shade, outline, shadow, order):
+        camera, rest = domain.camera, domain
+        nodes, weights = square_rule(order)
+        result = np.zeros((camera.height, camera.width, 3))
+        for row in range(camera.height):
+            for column in range(camera.width):
+                film = nodes + [column, row]
+                q = [hit_plane(s.camera, film, s.shapes["floor"].face(0))
+                     for s in (rest, shade, outline, shadow)]
+                viewer = -shade.camera.directions(film)
+                for k, weight in enumerate(weights):
+                    seen = self.radiance_at(shade, outline, shadow, rest, [p[k] for p in q],
+                                            viewer[k], order)
+                    result[row, column] += weight * seen
+        return result
+
+    def radiance_at(self, shade, outline, shadow, rest, q, viewer, order):
+        chart = rest.shapes["panel"].face(0)
+        panel = on_chart(outline.shapes["panel"].face(0), q[2], chart, q[0])
+        corners = shadow_on_plane(shadow.lights["lamp"], shadow.shapes["object"].face(0),
+                                  shadow.shapes["panel"].face(0))
+        dark = on_chart(corners, q[3], chart, q[0])
+        frame = chart_frame(chart)
+        flat, hole = (panel - chart[0]) @ frame.T, (dark - chart[0]) @ frame.T
+        assert polygon_area(clip_convex(hole, flat)) > polygon_area(hole) * (1 - 1e-9), "clipped"
+        return (self.reflected(shade, chart, q[0], panel, q[1], viewer, order)
+                - self.reflected(shade, chart, q[0], dark, q[1], viewer, order))
+
+    def reflected(self, shade, chart, q_rest, polygon, q, viewer, order):
+        node, area = loop_rule(polygon, 2 * order)
+        w = node - q_rest
+        r = np.linalg.norm(w, axis=1)
+        facing = -(w @ loop_normal(chart))
+        omega = w / r[:, None]
+        panel = shade.shapes["panel"]
+        normal = loop_normal(panel.face(0))
+        x = q + omega * ((panel.face(0)[0] - q) @ normal / (omega @ normal))[:, None]
+        f = lobe(shade.shapes["floor"].bsdf, floor_normal(shade), viewer, omega)
+        return (area * facing / r**3) @ (f * reflected_light(shade.lights["lamp"], panel, x))
+
+
+def on_chart(points, q, chart, q_rest):
+    """Directions from q to the points as points of the chart's plane seen from q_rest."""
+    w, normal = points - q, loop_normal(chart)
+    return q_rest + w * ((chart[0] - q_rest) @ normal / (w @ normal))[:, None]
+
+
+def chart_frame(chart):
+    """Two orthonormal rows in the plane of the chart."""
+    a = unit(chart[1] - chart[0])
+    return np.stack([a, np.cross(loop_normal(chart), a)])
+
+
 def film_loop(scene, loop):
     """A face as a polygon on the film [pixels]."""
     return scene.camera.project(loop)
@@ -136,7 +234,7 @@ class LampsInView:
 
     outlines_in_view = True
 
-    def image(self, domain, shade, outline, order):
+    def image(self, domain, shade, outline, shadow, order):
         camera, sky = domain.camera, shade.environment
         near = film_loop(domain, domain.shapes["near"].face(0))
         far = film_loop(domain, domain.shapes["far"].face(0))
@@ -160,7 +258,7 @@ class ConvexInView:
 
     outlines_in_view = True
 
-    def image(self, domain, shade, outline, order):
+    def image(self, domain, shade, outline, shadow, order):
         camera, sky, shape = domain.camera, shade.environment, domain.shapes["object"]
         front = [film_loop(domain, shape.vertices[f]) for f in shape.faces
                  if np.dot(camera.pinhole() - shape.vertices[f][0],
@@ -181,7 +279,7 @@ class ReceiverInView:
 
     outlines_in_view = True
 
-    def image(self, domain, shade, outline, order):
+    def image(self, domain, shade, outline, shadow, order):
         camera = domain.camera
         seen = film_loop(domain, domain.shapes["receiver"].face(0))
         n = loop_normal(shade.shapes["receiver"].face(0))

@@ -5,7 +5,7 @@ Coordinates are dyadic fractions, exact in single precision.
 import numpy as np
 
 import closed_form_models as models
-from closed_form_geometry import Bsdf, Camera, Scene, Shape
+from closed_form_geometry import Bsdf, Camera, Light, Scene, Shape, unit
 
 MOVES = ["translate.x", "translate.y", "translate.z", "rotate.x", "rotate.y", "rotate.z"]
 SENSOR = [f"sensor.{m}" for m in MOVES] + ["sensor.fov"]
@@ -191,6 +191,47 @@ def wedge_in_gloss():
     return scene, models.WedgeInGloss(), [n for n in names if n != "floor_bsdf.reflectance"]
 
 
+def moves_of_light(light):
+    names = [f"lamp.{light.power_name()}"]
+    names += [f"lamp.{m}" for m in MOVES if light.position is not None and m.startswith("t")]
+    names += [f"lamp.{m}" for m in MOVES if light.direction is not None and m.startswith("r")]
+    return names + (["lamp.cutoff_angle", "lamp.beam_width"] if light.kind == "spot" else [])
+
+
+def sharp_shadow(name, light):
+    """The light and the corner of the triangle that shades the middle of the view are in line."""
+    triangle = Shape(vector(0.296875, 1.25, -0.046875, -1.0625, 1.5, -0.25, 0.1875, 1.5, -2).reshape(3, 3),
+                     [[0, 1, 2]])
+    scene = Scene(f"{name}.xml", floor_camera(), {"floor": floor(), "object": triangle}, 2,
+                  lights={"lamp": light})
+    names = moves_of("object") + moves_of_light(light) + FLOOR_MOVES + SENSOR
+    return scene, models.SharpShadow(), names + ["floor_bsdf.reflectance"]
+
+
+ABOVE = (-0.5, 4, -0.5)  # a light there shades the middle of the view by that corner
+
+
+def shadow_of_spot(name, cutoff, beam):
+    axis = unit(vector(0.5, -4, 0.5))
+    return sharp_shadow(name, Light("spot", vector(64, 32, 16), vector(*ABOVE), axis, cutoff, beam))
+
+
+def shadow_in_gloss():
+    """A spot beside the floor lights a panel above it past a small triangle; it misses the floor."""
+    panel = parallelogram((-1.5, 2, -1.25), (3, 0.5, 0), (0, 0.125, 2.5))
+    panel.bsdf = Bsdf("panel_bsdf", "diffuse", vector(0.75, 0.5, 0.25))
+    triangle = Shape(vector(-1.5, 1.25, -0.25, -1.25, 1.375, 0.25, -1.5625, 1.625, 0).reshape(3, 3),
+                     [[0, 1, 2]])
+    triangle.bsdf = Bsdf("object_bsdf", "diffuse", vector(0, 0, 0))
+    position = vector(-3, 0.5, 0)
+    light = Light("spot", vector(64, 32, 16), position, unit(vector(2.625, 1.75, 0)), 38, 34)
+    scene = Scene("shadow_in_gloss.xml", floor_camera(),
+                  {"floor": floor("ggx", 0.375), "object": triangle, "panel": panel}, 3,
+                  lights={"lamp": light})
+    names = moves_of("object") + moves_of_light(light) + moves_of("panel") + FLOOR_MOVES + SENSOR
+    return scene, models.SharpShadowInGloss(), names + ["panel_bsdf.reflectance", "floor_bsdf.alpha"]
+
+
 SCENES = {
     "convex_over_plane": convex_over_plane,
     "lamp_over_plane": lamp_over_plane,
@@ -208,4 +249,12 @@ SCENES = {
     "open_box_over_plane": open_box_over_plane,
     "sideways_box_over_plane": sideways_box_over_plane,
     "wedge_in_gloss": wedge_in_gloss,
+    "shadow_of_point": lambda: sharp_shadow(
+        "shadow_of_point", Light("point", vector(64, 32, 16), vector(*ABOVE))),
+    "shadow_of_directional": lambda: sharp_shadow(
+        "shadow_of_directional",
+        Light("directional", vector(4, 2, 1), direction=unit(vector(1.25, -4, 0.75)))),
+    "shadow_of_spot": lambda: shadow_of_spot("shadow_of_spot", 30, 20),
+    "shadow_in_falloff": lambda: shadow_of_spot("shadow_in_falloff", 30, 1),
+    "shadow_in_gloss": shadow_in_gloss,
 }

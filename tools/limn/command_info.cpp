@@ -84,13 +84,20 @@ int run_info(const CommonOptions& common) {
   const Scene scene = load_scene(common);
   print_camera(scene);
   fmt::print("shapes: {}\n", scene.shapes.size());
-  json report = {{"scene", scene.file}, {"shapes", json::array()}, {"parameters", json::array()}};
+  json report = {{"scene", scene.file},
+                 {"shapes", json::array()},
+                 {"lights", json::array()},
+                 {"parameters", json::array()}};
   for (uint32_t i = 0; i < scene.shapes.size(); ++i) {
     report["shapes"].push_back(describe_shape(scene, i));
     print_shape(report["shapes"].back());
   }
   fmt::print("environment: {}\n",
              scene.environment ? scene.environment->describe() : std::string("none"));
+  for (const auto& light : scene.delta_lights) {
+    report["lights"].push_back({{"name", light->id}, {"light", light->describe()}});
+    fmt::print("light{}: {}\n", light->id.empty() ? "" : " " + light->id, light->describe());
+  }
   const auto tracer = make_embree_tracer(scene, thread_count(common.threads));
   const Crossings crossings = find_crossings(scene, *tracer);
   report["crossing_edges"] = crossings.edges;

@@ -21,6 +21,7 @@ class Properties;
 struct ParameterRef {
   std::string name;
   std::vector<Dual*> values;  // one, or the three channels
+  enum class Unit { kValue, kLength, kRadians } unit = Unit::kValue;
 };
 
 // What an edge sampler may know of a BSDF without seeing it.

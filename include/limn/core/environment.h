@@ -1,28 +1,22 @@
 #pragma once
-// Light from infinity.
+// Light from infinity, from all directions: what a ray sees that leaves the scene.
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "limn/core/bsdf.h"
-#include "limn/core/dual.h"
-#include "limn/core/vec.h"
+#include "limn/core/light.h"
 
 namespace limn {
 
-class Properties;
-
-class Environment {
+class Environment : public Light {
  public:
-  virtual ~Environment() = default;
-
   // Radiance arriving from the unit direction d. The Dual version carries the motion of d (a
   // turning camera) and of the environment's own parameters; it is continuous in d.
-  virtual Rgb<double> radiance(const Vec3<double>& d) const = 0;
-  virtual Rgb<Dual> radiance(const Vec3<Dual>& d) const = 0;
+  Rgb<double> radiance(const Vec3<double>& d) const override = 0;
+  Rgb<Dual> radiance(const Vec3<Dual>& d) const override = 0;
   // Importance sampling: a unit direction from two numbers in [0, 1), its density [1/sr]
   // (which rounding at the border of a black region may turn into 0: such a draw counts as none).
-  virtual Vec3d sample(double u1, double u2) const = 0;
+  virtual Vec3d sample_direction(double u1, double u2) const = 0;
   virtual double pdf_solid_angle(const Vec3d& d) const = 0;
 
   // Whether the radiance is the same from all directions.
@@ -33,10 +27,13 @@ class Environment {
   virtual std::vector<ParameterRef> parameters() = 0;  // constant: radiance; envmap: scale
   virtual std::shared_ptr<Environment> clone() const = 0;
   virtual std::string describe() const = 0;
+
+  std::optional<LightSample> sample(const Vec3d& p, double choices, Rng& rng) const final;
+  double pdf(const LightView& view, double choices) const final {
+    return pdf_solid_angle(view.wo) / choices;
+  }
 };
 
 std::shared_ptr<Environment> make_constant_environment(const Rgb<double>& radiance);
-// Elements <emitter type="constant"> and <emitter type="envmap">.
-std::shared_ptr<Environment> make_environment(Properties& properties);
 
 }  // namespace limn

@@ -1,47 +1,40 @@
 #pragma once
-// Sampling directions towards the light of a scene.
+// All lights of a scene, one of which is chosen at a time.
+#include <memory>
+#include <span>
 #include <vector>
 
-#include "limn/core/ray_tracer.h"
-#include "limn/core/rng.h"
+#include "limn/core/light.h"
 #include "limn/core/scene.h"
 
 namespace limn {
 
-struct LightSample {
-  Vec3d wo;             // unit direction from the shading point
-  double distance = 0;  // 1e300 for the environment
-  double pdf = 0;       // [1/sr], of this light and direction
-  FaceRef face;         // of the emitter; invalid for the environment
-};
-
-// Chooses one emitter uniformly (every emitting shape and the environment is one), then a point
-// uniform in area or a direction of the environment. Directions are what is sampled: while a
-// parameter moves the scene they are held fixed, so densities are constants.
+// Chooses one light uniformly: every emitting shape is one, in their order, then the environment,
+// then the delta lights in the order of the file. The scene must outlive it.
 class Lights {
  public:
   explicit Lights(const Scene& scene);
 
-  bool empty() const { return count_ == 0; }
-  // False if the chosen point shines away from p: a sample of value zero.
-  bool sample(const Vec3d& p, Rng& rng, LightSample& sample) const;
-  // The density with which `sample` at a point that sees this face from `distance` along the unit
-  // direction wo draws wo.
-  double pdf_face(FaceRef face, const Vec3d& n_g, const Vec3d& wo, double distance) const;
-  double pdf_environment(const Vec3d& wo) const;
+  bool empty() const { return all_.empty(); }
+  std::span<const Light* const> all() const { return all_; }
+
+  // None: a sample of value zero (see Light::sample).
+  std::optional<LightSample> sample(const Vec3d& p, Rng& rng) const;
+  // The density [1/sr] with which `sample` draws what a ray sees: an emitting shape, or, where it
+  // leaves the scene, the environment (there must be one).
+  double pdf(uint32_t shape, const LightView& view) const {
+    return of_shape_[shape]->pdf(view, choices_);
+  }
+  double pdf_environment(const Vec3d& wo) const {
+    return environment_->pdf_solid_angle(wo) / choices_;
+  }
 
  private:
-  struct AreaLight {
-    uint32_t shape;
-    double area;
-    std::vector<double> cumulative;  // F, of face areas
-  };
-  bool sample_area(const AreaLight& light, const Vec3d& p, Rng& rng, LightSample& sample) const;
-
-  const Scene& scene_;
-  std::vector<AreaLight> area_lights_;
-  std::vector<double> inverse_area_;  // per shape, 0 where not a light
-  size_t count_ = 0;
+  std::vector<std::unique_ptr<Light>> area_lights_;
+  std::vector<const Light*> all_;
+  std::vector<const Light*> of_shape_;  // null where a shape emits nothing
+  const Environment* environment_;      // null if none
+  double choices_;                      // how many there are
 };
 
 }  // namespace limn

@@ -13,6 +13,13 @@ namespace limn {
 
 using FaceIndices = std::array<uint32_t, 3>;  // counter-clockwise from outside
 
+// A face of a scene.
+struct FaceRef {
+  uint32_t shape = UINT32_MAX;
+  uint32_t face = UINT32_MAX;
+  bool operator==(const FaceRef&) const = default;
+};
+
 enum class NormalSource {
   kFace,      // flat shading: the shading normal is the geometric normal
   kComputed,  // angle-weighted vertex normals over welded positions; they move with the vertices

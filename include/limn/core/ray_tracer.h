@@ -2,6 +2,7 @@
 // Rays against the triangles of a scene.
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 
@@ -9,17 +10,11 @@
 
 namespace limn {
 
-struct FaceRef {
-  uint32_t shape = UINT32_MAX;
-  uint32_t face = UINT32_MAX;
-  bool operator==(const FaceRef&) const = default;
-};
-
 struct Ray {
   Vec3d origin;
   Vec3d direction;  // unit
   double t_min = 0;
-  double t_max = 1e300;
+  double t_max = std::numeric_limits<double>::infinity();
   // Faces that the ray never meets: the one it starts on, and those around an edge that it grazes.
   // By id, never by distance.
   FaceRef start = {};

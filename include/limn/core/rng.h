@@ -22,7 +22,9 @@ enum class Purpose : uint64_t {
   kCamera,
   kPathCopy,
   kEdgeCopy,
-  kFilmCopy
+  kFilmCopy,
+  kShadow,
+  kShadowCopy
 };
 
 // SplitMix64 started from a hash of (seed, pixel, sample): a stream for one path. `at` derives the

@@ -154,8 +154,10 @@ class Scattering {
   const Vec3<S>& normal() const { return n_; }
   const Vec3<S>& wi() const { return wi_; }
 
-  // Value times cosine [1/sr] for the unit direction wo towards the light, which is held fixed.
-  Rgb<S> eval(const Vec3d& wo) const {
+  // Value times cosine [1/sr] for the unit direction wo towards the light: held fixed (double), or
+  // moving as its Dual says (towards a delta light).
+  template <class W>
+  Rgb<S> eval(const Vec3<W>& wo) const {
     const Vec3<S> w{wo.x, wo.y, wo.z};
     if (!limited_) return bsdf_->eval(n_, wi_, w);
     const S factor = horizon_factor(wo);
@@ -189,7 +191,8 @@ class Scattering {
     const S c = dot(n_s_, wi_);
     if (value(c) < limit) n_ = normalize(n_s_ + wi_ * (limit - c));
   }
-  S horizon_factor(const Vec3d& wo) const {
+  template <class W>
+  S horizon_factor(const Vec3<W>& wo) const {
     const S c = dot(n_s_, wo);
     if (value(c) <= value(horizon_)) return S(0.0);
     const S width = horizon_ * (1.0 - horizon_);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "limn/core/bsdf.h"
+#include "limn/core/light.h"
 #include "limn/core/rng.h"
 #include "limn/edgetree/edges.h"
 #include "limn/edgetree/radiance_pyramid.h"
@@ -39,12 +40,6 @@ struct EdgeSample {
   double t = 0;            // position on the edge: (1 - t) x_0 + t x_1
   double probability = 0;  // P(e), of this edge for this query
   double pdf_t = 0;        // density of t given the edge, per unit t
-};
-
-// A triangle of an emitter, wound counter-clockwise seen from where it shines.
-struct LightTriangle {
-  Vec3d corners[3];
-  double luminance = 0;
 };
 
 // What samplers are built from. It must outlive them.

@@ -1,0 +1,122 @@
+#pragma once
+// The contract of a light: what a path tracer, the edge samplers and the edges of shadows ask of it.
+//
+// Directions are what is sampled: while a parameter moves the scene they are held fixed, so
+// densities are constants. A delta light (a point, a spot, a direction) has no directions to choose
+// from: the one direction is a function of the parameters and carries their derivative.
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "limn/core/bsdf.h"
+#include "limn/core/dual.h"
+#include "limn/core/mesh.h"
+#include "limn/core/rng.h"
+#include "limn/core/vec.h"
+
+namespace limn {
+
+class DeltaLight;
+class Light;
+class Properties;
+struct Scene;
+struct Shape;
+
+// A direction in which a point may see a light.
+struct LightSample {
+  Vec3d wo;             // unit, from the point towards the light
+  double distance = 0;  // infinite for light from infinity
+  // [1/sr], of this light among all and this direction; of a delta light the probability of the
+  // light alone.
+  double pdf = 0;
+  std::optional<FaceRef> face = {};  // of an area light
+  const Light* light = nullptr;
+};
+
+// A light as a ray meets it.
+struct LightView {
+  Vec3d wo;         // unit, of the ray
+  double distance;  // along it; infinite for light from infinity
+  Vec3d n_g;        // unit geometric normal there; unused for light from infinity
+};
+
+// A triangle of an emitter, wound counter-clockwise seen from where it shines.
+struct LightTriangle {
+  Vec3d corners[3];
+  double luminance = 0;
+};
+
+class Light {
+ public:
+  virtual ~Light() = default;
+
+  // A direction from p to the light, where `choices` lights are equally likely. None if the point
+  // that was drawn does not shine on p: a sample of value zero.
+  virtual std::optional<LightSample> sample(const Vec3d& p, double choices, Rng& rng) const = 0;
+  // The density [1/sr] with which `sample` draws this view; 0 of a delta light.
+  virtual double pdf(const LightView& view, double choices) const = 0;
+
+  // Radiance that arrives from the unit direction wo at the points that the light shines on; none
+  // of a delta light.
+  virtual Rgb<double> radiance(const Vec3<double>& wo) const = 0;
+  virtual Rgb<Dual> radiance(const Vec3<Dual>& wo) const = 0;
+
+  // This light as a delta light; null if it is none.
+  virtual const DeltaLight* delta() const { return nullptr; }
+  // Appends its outline as triangles, for edge samplers; nothing for light from infinity and for
+  // delta lights.
+  virtual void add_triangles(std::vector<LightTriangle>& /*triangles*/) const {}
+};
+
+// Light that arrives at a point from one direction.
+template <class S>
+struct Arrival {
+  Vec3<S> wo;         // unit, towards the light
+  Rgb<S> irradiance;  // through an area across wo [W / m^2]
+};
+
+// Where the light of a delta light comes from.
+struct LightOrigin {
+  Vec3<Dual> v;  // the position; at infinity the unit direction in which light travels
+  bool infinite = false;
+
+  // The direction, not normalised, in which light passes through y.
+  template <class S>
+  Vec3<S> through(const Vec3<S>& y) const {
+    return infinite ? as<S>(v) : y - as<S>(v);
+  }
+};
+
+class DeltaLight : public Light {
+ public:
+  std::string id;  // "" if the file gives none
+
+  // What arrives at p if nothing is in the way. None if nothing ever does: outside the cone of a
+  // spot, or at the light's own position.
+  virtual std::optional<Arrival<double>> arriving(const Vec3<double>& p) const = 0;
+  virtual std::optional<Arrival<Dual>> arriving(const Vec3<Dual>& p) const = 0;
+  virtual LightOrigin origin() const = 0;
+  // A bound of the luminance that leaves it: of the intensity [W/sr], at infinity of the
+  // irradiance [W / m^2].
+  virtual double power() const = 0;
+
+  virtual std::vector<ParameterRef> parameters() = 0;
+  virtual std::shared_ptr<DeltaLight> clone() const = 0;
+  virtual std::string describe() const = 0;  // one line for `limn info`
+
+  std::optional<LightSample> sample(const Vec3d& p, double choices, Rng& rng) const final;
+  double pdf(const LightView&, double) const final { return 0; }
+  Rgb<double> radiance(const Vec3<double>&) const final { return {}; }
+  Rgb<Dual> radiance(const Vec3<Dual>&) const final { return {}; }
+  const DeltaLight* delta() const final { return this; }
+};
+
+// Reads an emitter element into the scene: into `shape` if it stands inside one (else null).
+// InputError for an unknown type (listing the known ones), one in the wrong place, or bad values.
+void read_light(Properties& properties, Scene& scene, Shape* shape);
+
+// The light of an emitting shape, uniform in area. The scene must outlive it.
+std::unique_ptr<Light> make_area_light(const Scene& scene, uint32_t shape);
+
+}  // namespace limn

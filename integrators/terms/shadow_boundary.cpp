@@ -1,0 +1,346 @@
+// The boundary term of delta lights: the edges of their sharp shadows, listed as seen from the light
+// and seen in turn by the camera and by the vertices of paths.
+//
+// A point, or parallel light, lights all or nothing of a surface: radiance jumps where a plane
+// through the light and an edge of the mesh meets what lies behind the edge. With y(t) =
+// (1 - t) y0 + t y1 a point of the edge, w(t) the direction in which light passes through it (y - l
+// for a light at l, the direction d of parallel light) and N = w(0) x (y1 - y0), the function
+//   G(x) = N . (x - y0)
+// changes sign on that plane. From a viewer q in the fixed direction omega a surface is met at
+// x(omega), and the derivative of the integral of f L H(G) over directions holds
+//   integral of  f dL dG/dtheta delta(G) domega,
+// where dL is the light's share of the radiance that leaves x towards q, positive if the side G > 0
+// is lit, and dG/dtheta carries the motion of light, edge, viewer and of the surface at x. With n
+// the normal at x, r = |x - q| and cos_x = n . omega,
+//   delta(G) domega = m(t) |cos_x| / r^2 dt,   m(t) = |x - l| / (|w| |n . w|),   1 / |n . d| at
+// infinity, which follows from dx/dt = m n x (dw/dt x w) (and |n x N| is G's slope on the surface).
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "integrators/terms/term_table.h"
+
+namespace limn {
+namespace {
+
+// An edge that parts light from shadow, as seen from one light.
+struct ShadowEdge {
+  const DeltaLight* light;
+  EdgeId id;
+  double sign;   // 1: the side G > 0 is lit; -1: the other
+  double angle;  // how long it is as seen from the light [rad]; at infinity [scene units]
+  Lanes speed;   // how fast its shadow moves, as seen from the light; only edge and light count
+};
+
+// Where the shadow of a point of an edge falls.
+struct ShadowPoint {
+  FaceRef face;
+  Vec3d x;
+  double m;  // see above
+};
+
+// A ray from a viewer that meets the shadow's edge.
+struct Viewer {
+  Vec3<Dual> origin;
+  Vec3<Dual> direction;  // unit; held fixed or turning with the camera
+  double distance;       // to the shadow's edge
+};
+
+// Which sides of the plane through light and edge the faces around the edge lie on. A face that is
+// seen edge-on, to the rounding of the determinant, casts no shadow of its own.
+double lit_side(const Mesh& mesh, const EdgeMesh& edges, uint32_t e, const LightOrigin& light) {
+  const auto& ends = edges.edges[e].vertices;
+  const Vec3d x0 = edges.positions[ends[0]];
+  const Vec3d along = edges.positions[ends[1]] - x0;
+  const Vec3d w = light.through(x0);
+  const Vec3d n = cross(w, along);
+  const double scale = 8 * 0x1p-53 * length(w) * length(along);
+  bool blocked[2] = {false, false};
+  for (const uint32_t face : edges.faces_around(e)) {
+    double side = 0;
+    for (const Vec3d& corner : face_corners<double>(mesh, face)) {
+      const Vec3d a = corner - x0;
+      const double d = dot(a, n);
+      if (std::fabs(d) > scale * length(a) && std::fabs(d) > std::fabs(side)) side = d;
+    }
+    if (side != 0) blocked[side > 0] = true;
+  }
+  return blocked[0] == blocked[1] ? 0 : blocked[0] ? 1 : -1;
+}
+
+Vec3<Dual> moving_vertex(const EdgeMesh& mesh, uint32_t vertex) {
+  const Vec3d& x = mesh.positions[vertex];
+  if (mesh.tangents.empty()) return {x.x, x.y, x.z};
+  const Vec3<Lanes>& d = mesh.tangents[vertex];
+  return {{x.x, d.x}, {x.y, d.y}, {x.z, d.z}};
+}
+
+class ShadowTerm final : public Term {
+ public:
+  explicit ShadowTerm(TermInput& input) : context_(input.context), objects_(input.edges().objects) {
+    const Stopwatch watch;
+    Bounds bounds;
+    for (const Shape& shape : context_.scene.shapes) {
+      const Bounds b = bounds_of(shape.mesh);
+      bounds.extend(b.lower);
+      bounds.extend(b.upper);
+    }
+    reach_ = 2 * bounds.diagonal();
+    for (const auto& light : context_.scene.delta_lights) {
+      const size_t first = edges_.size();
+      for (uint32_t object = 0; object < objects_.size(); ++object) list(*light, object);
+      weigh(first, input.lanes);
+    }
+    list_seconds_ = watch.seconds();
+  }
+
+  bool uses_vertices() const override { return !edges_.empty(); }
+  void add_at_vertex(const PathVertex& vertex, int samples, TermCost& cost,
+                     Rgb<Lanes>& sum) const override {
+    const int max_depth = context_.scene.max_depth;
+    if (max_depth >= 0 && vertex.bounces + 2 >= max_depth) return;
+    for (int i = 0; i < samples; ++i) {
+      const Rng key = vertex.key.copy(Purpose::kShadowCopy, i);
+      add_sample(vertex, key.at(Purpose::kShadow, vertex.bounces), cost, sum);
+    }
+  }
+
+  bool uses_film() const override {
+    const int max_depth = context_.scene.max_depth;
+    return !edges_.empty() && (max_depth < 0 || max_depth > 1);
+  }
+  bool sample_film(double u, const Rng& key, RayCount& rays, FilmSample& sample) const override;
+
+  void describe(GradientStats& stats) const override {
+    stats.setup.emplace_back("edges of sharp shadows", list_seconds_);
+    stats.edges.emplace_back("of sharp shadows", edges_.size());
+  }
+
+ private:
+  void list(const DeltaLight& light, uint32_t object);
+  void weigh(size_t first, int lanes);
+  // The edge at u in [0, 1), and its probability.
+  const ShadowEdge& choose(double u, double& probability) const;
+  std::optional<ShadowPoint> cast(const ShadowEdge& edge, double t, RayCount& rays) const;
+  // dL of the point as it is seen along the unit direction omega.
+  Rgb<double> jump(const ShadowEdge& edge, const ShadowPoint& point, const Vec3d& q,
+                   const Vec3d& omega) const;
+  // dG/dtheta times delta(G) domega / dt.
+  Lanes sweep(const ShadowEdge& edge, const ShadowPoint& point, const Viewer& viewer) const;
+  void add_sample(const PathVertex& vertex, Rng rng, TermCost& cost, Rgb<Lanes>& sum) const;
+
+  const PathContext& context_;
+  const std::vector<EdgeMesh>& objects_;
+  double reach_ = 0;  // longer than any line through the scene
+  std::vector<ShadowEdge> edges_;
+  std::vector<double> cumulative_;  // probabilities of the edges, summed
+  double list_seconds_ = 0;
+};
+
+void ShadowTerm::list(const DeltaLight& light, uint32_t object) {
+  const EdgeMesh& mesh = objects_[object];
+  const LightOrigin origin = light.origin();
+  for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
+    ShadowEdge edge{&light, {object, e}, 0, 0, {}};
+    edge.sign = lit_side(context_.scene.shapes[object].mesh, mesh, e, origin);
+    if (edge.sign == 0) continue;
+    const auto& ends = mesh.edges[e].vertices;
+    const Vec3<Dual> y[2] = {moving_vertex(mesh, ends[0]), moving_vertex(mesh, ends[1])};
+    const Vec3d along = value(y[1]) - value(y[0]);
+    const Vec3d w[2] = {origin.through(value(y[0])), origin.through(value(y[1]))};
+    const Vec3d normal = cross(w[0], along);
+    const double size = length(normal);
+    if (size == 0) continue;
+    edge.angle = origin.infinite ? size : std::atan2(size, dot(w[0], w[1]));
+    for (int i = 0; i < 2; ++i) {
+      const Vec3<Dual> moving = origin.through(y[i]);
+      const Lanes d = Lanes(moving.x.d * normal.x + moving.y.d * normal.y + moving.z.d * normal.z);
+      const Vec3<Dual> at = y[i];
+      const Lanes own = at.x.d * normal.x + at.y.d * normal.y + at.z.d * normal.z;
+      for (int k = 0; k < kLanes; ++k) {
+        // Parallel light that turns moves a shadow by as much as it is far: by the scene's size.
+        const double v = origin.infinite ? std::fabs(own[k]) + std::fabs(d[k]) * reach_
+                                         : std::fabs(d[k]) / length(w[i]);
+        edge.speed[k] = std::max(edge.speed[k], v / size);
+      }
+    }
+    edges_.push_back(edge);
+  }
+}
+
+// Half of the samples follow length times speed, half length alone: a surface or a viewer that moves
+// makes all shadows count. Every light and every parameter gets an equal share. Not tuned.
+void ShadowTerm::weigh(size_t first, int lanes) {
+  double length = 0;
+  Lanes swept;
+  for (size_t i = first; i < edges_.size(); ++i) {
+    length += edges_[i].angle;
+    swept += edges_[i].speed * edges_[i].angle;
+  }
+  double sum = cumulative_.empty() ? 0 : cumulative_.back();
+  for (size_t i = first; i < edges_.size(); ++i) {
+    const ShadowEdge& edge = edges_[i];
+    for (int k = 0; k < lanes; ++k) {
+      sum += edge.angle / length;
+      sum += swept[k] > 0 ? edge.speed[k] * edge.angle / swept[k] : edge.angle / length;
+    }
+    cumulative_.push_back(sum);
+  }
+}
+
+const ShadowEdge& ShadowTerm::choose(double u, double& probability) const {
+  const double target = u * cumulative_.back();
+  const auto found = std::upper_bound(cumulative_.begin(), cumulative_.end(), target);
+  const size_t index = std::min<size_t>(found - cumulative_.begin(), edges_.size() - 1);
+  const double below = index == 0 ? 0 : cumulative_[index - 1];
+  probability = (cumulative_[index] - below) / cumulative_.back();
+  return edges_[index];
+}
+
+std::optional<ShadowPoint> ShadowTerm::cast(const ShadowEdge& edge, double t,
+                                            RayCount& rays) const {
+  const EdgeMesh& mesh = objects_[edge.id.object];
+  const auto& ends = mesh.edges[edge.id.edge].vertices;
+  const Vec3d y = mesh.positions[ends[0]] * (1 - t) + mesh.positions[ends[1]] * t;
+  const LightOrigin origin = edge.light->origin();
+  const Vec3d w = origin.through(y);
+  const double w_length = length(w);
+  const double before = origin.infinite ? reach_ : w_length;  // of the ray, up to y
+  Ray ray{y - w * (before / w_length), w / w_length};
+  ray.skip_shape = edge.id.object;
+  ray.skip_faces = mesh.faces_around(edge.id.edge);
+  Hit hit;
+  ++rays.closest;
+  // Where the edge touches what it shades, to a float's rounding, the shadow starts behind the edge
+  // for every viewer, who sees the edge itself.
+  if (!context_.tracer.closest(ray, hit) || hit.t <= before * (1 + 0x1p-20)) return {};
+  const auto c = face_corners<double>(context_.scene.shapes[hit.face.shape].mesh, hit.face.face);
+  const Vec3d n = normalize(cross(c[1] - c[0], c[2] - c[0]));
+  const double slope = dot(n, w);
+  const double s = dot(n, c[0] - y) / slope;
+  const double m = (origin.infinite ? 1 : 1 + s) / std::fabs(slope);
+  if (!std::isfinite(m)) return {};
+  return ShadowPoint{hit.face, y + w * s, m};
+}
+
+Rgb<double> ShadowTerm::jump(const ShadowEdge& edge, const ShadowPoint& point, const Vec3d& q,
+                             const Vec3d& omega) const {
+  const Scene& scene = context_.scene;
+  const auto surface = surface_on_ray<double>(scene, point.face, q, omega);
+  const Scattering<double> scattering(surface, -omega, scene.shading);
+  const auto arrival = edge.light->arriving(point.x);
+  if (scattering.black() || !arrival) return {};
+  return scattering.eval(arrival->wo) * arrival->irradiance * edge.sign;
+}
+
+Lanes ShadowTerm::sweep(const ShadowEdge& edge, const ShadowPoint& point,
+                        const Viewer& viewer) const {
+  const EdgeMesh& mesh = objects_[edge.id.object];
+  const auto& ends = mesh.edges[edge.id.edge].vertices;
+  const Vec3<Dual> y0 = moving_vertex(mesh, ends[0]);
+  const Vec3<Dual> normal =
+      cross(edge.light->origin().through(y0), moving_vertex(mesh, ends[1]) - y0);
+  const auto x = surface_on_ray<Dual>(context_.scene, point.face, viewer.origin, viewer.direction);
+  const double cosine = std::fabs(dot(x.n_g, value(viewer.direction)));
+  return dot(normal, x.p - y0).d * (point.m * cosine / (viewer.distance * viewer.distance));
+}
+
+void ShadowTerm::add_sample(const PathVertex& vertex, Rng rng, TermCost& cost,
+                            Rgb<Lanes>& sum) const {
+  ++cost.samples;
+  double probability;
+  const ShadowEdge& edge = choose(rng.uniform(), probability);
+  RayCount rays;
+  const auto point = cast(edge, rng.uniform(), rays);
+  cost.add(rays);
+  if (!point) {
+    ++cost.occluded;
+    return;
+  }
+  const Vec3d q = value(vertex.surface.p);
+  const double distance = length(point->x - q);
+  const Vec3d omega = (point->x - q) / distance;
+  const bool apart = distance > 0 && point->face != vertex.surface.face;
+  const Rgb<double> f = apart ? value(vertex.scattering.eval(omega)) : Rgb<double>{};
+  if (is_black(f)) {
+    ++cost.zero_weight;
+    return;
+  }
+  const Vec3<Dual> fixed{omega.x, omega.y, omega.z};
+  const Lanes swept = sweep(edge, *point, {vertex.surface.p, fixed, distance});
+  const Rgb<double> amount = vertex.throughput * f * jump(edge, *point, q, omega);
+  if (is_zero(swept) || is_black(amount)) {
+    ++cost.zero_weight;
+    return;
+  }
+  Ray ray{q, omega};
+  ray.start = vertex.surface.face;
+  ray.skip_shape = point->face.shape;
+  ray.skip_faces = {&point->face.face, 1};
+  ray.t_max = distance * (1 - 0x1p-20);  // as shadow rays end
+  RayCount to_viewer{0, 1};
+  cost.add(to_viewer);
+  if (context_.tracer.occluded(ray)) {
+    ++cost.occluded;
+    return;
+  }
+  ++cost.counted;
+  const Lanes weight = swept * (1 / probability);
+  const Rgb<Lanes> added{weight * amount.r, weight * amount.g, weight * amount.b};
+  if (vertex.log) {
+    vertex.log->push_back(fmt::format(
+        "  shadow of edge {} of shape {} on face {} of shape {}: probability {:.4g}, adds "
+        "({:.6g}, {:.6g}, {:.6g}) to the first parameter",
+        edge.id.edge, edge.id.object, point->face.face, point->face.shape, probability, added.r[0],
+        added.g[0], added.b[0]));
+  }
+  sum = sum + added;
+}
+
+// The film measures directions by ds = (W / (2 tan_x))^2 / cos^3 domega [pixels^2], with W the
+// film's width in pixels, tan_x that of half its field of view, and cos to the optical axis.
+bool ShadowTerm::sample_film(double u, const Rng& key, RayCount& rays, FilmSample& sample) const {
+  const Scene& scene = context_.scene;
+  const Camera& camera = scene.camera;
+  double probability;
+  const ShadowEdge& edge = choose(u, probability);
+  const auto point = cast(edge, key.at(Purpose::kShadow, 0).uniform(), rays);
+  if (!point) return false;
+  if (scene.hide_emitters && scene.shapes[point->face.shape].is_emitter) return false;
+  const double depth = camera.depth(point->x);
+  if (!(depth > camera.near_clip && depth < camera.far_clip)) return false;
+  const auto film = camera.project(point->x);
+  const double border = scene.film.filter.radius;
+  if (film.x < scene.film.crop_x - border || film.y < scene.film.crop_y - border ||
+      film.x > scene.film.crop_x + scene.film.crop_width + border ||
+      film.y > scene.film.crop_y + scene.film.crop_height + border) {
+    return false;
+  }
+  const auto seen = camera.ray<Dual>(film.x, film.y);
+  const Vec3d q = value(seen.origin);
+  const Vec3d omega = value(seen.direction);
+  const double distance = length(point->x - q);
+  const Lanes swept = sweep(edge, *point, {seen.origin, seen.direction, distance});
+  const Rgb<double> amount = jump(edge, *point, q, omega);
+  if (is_zero(swept) || is_black(amount)) return false;
+  Ray ray{q, omega, seen.t_min, distance * (1 - 0x1p-20)};
+  ray.start = point->face;
+  ray.skip_emitters = scene.hide_emitters;
+  ++rays.shadow;
+  if (context_.tracer.occluded(ray)) return false;
+  const double cosine = dot(omega, value(camera.forward));
+  const double scale = camera.width / (2 * std::tan(camera.fov.v * (kPi / 360)) * camera.x_factor);
+  sample.x = film.x;
+  sample.y = film.y;
+  const Lanes weight = swept * (scale * scale / (cosine * cosine * cosine * probability));
+  sample.value = {weight * amount.r, weight * amount.g, weight * amount.b};
+  return true;
+}
+
+}  // namespace
+
+std::unique_ptr<Term> make_shadow_term(TermInput& input) {
+  return std::make_unique<ShadowTerm>(input);
+}
+
+}  // namespace limn

@@ -1,0 +1,78 @@
+// Emitter "area": the surface of a shape shines from the front of every face.
+#include <algorithm>
+
+#include "limn/core/shading.h"
+#include "src/light/types.h"
+
+namespace limn {
+namespace {
+
+class AreaLight final : public Light {
+ public:
+  AreaLight(const Scene& scene, uint32_t index) : shape_(scene.shapes[index]), index_(index) {
+    double area = 0;
+    for (uint32_t f = 0; f < shape_.mesh.faces.size(); ++f) {
+      const auto c = face_corners<double>(shape_.mesh, f);
+      area += 0.5 * length(cross(c[1] - c[0], c[2] - c[0]));
+      cumulative_.push_back(area);
+    }
+    inverse_area_ = 1 / area;
+  }
+
+  std::optional<LightSample> sample(const Vec3d& p, double choices, Rng& rng) const override {
+    const double target = rng.uniform() * cumulative_.back();
+    const auto found = std::upper_bound(cumulative_.begin(), cumulative_.end(), target);
+    const auto face = static_cast<uint32_t>(
+        std::min<size_t>(found - cumulative_.begin(), cumulative_.size() - 1));
+    const double root = std::sqrt(rng.uniform());
+    const double b2 = root * rng.uniform();
+    const auto c = face_corners<double>(shape_.mesh, face);
+    const Vec3d y = c[0] + (c[1] - c[0]) * (1 - root) + (c[2] - c[0]) * b2;
+    const double distance = length(y - p);
+    if (distance == 0) return {};
+    const Vec3d wo = (y - p) / distance;
+    const Vec3d n = cross(c[1] - c[0], c[2] - c[0]);
+    const double n_length = length(n);
+    if (n_length == 0 || dot(n, wo) >= 0) return {};
+    const double density = pdf({wo, distance, n / n_length}, choices);
+    return LightSample{wo, distance, density, FaceRef{index_, face}, this};
+  }
+  double pdf(const LightView& view, double choices) const override {
+    const double cosine = std::fabs(dot(view.n_g, view.wo));
+    return view.distance * view.distance * inverse_area_ / (cosine * choices);
+  }
+
+  Rgb<double> radiance(const Vec3<double>&) const override { return value(shape_.radiance); }
+  Rgb<Dual> radiance(const Vec3<Dual>&) const override { return shape_.radiance; }
+
+  void add_triangles(std::vector<LightTriangle>& triangles) const override {
+    for (uint32_t f = 0; f < shape_.mesh.faces.size(); ++f) {
+      const auto c = face_corners<double>(shape_.mesh, f);
+      triangles.push_back({{c[0], c[1], c[2]}, luminance(value(shape_.radiance))});
+    }
+  }
+
+ private:
+  const Shape& shape_;
+  uint32_t index_;
+  std::vector<double> cumulative_;  // F, of face areas
+  double inverse_area_;
+};
+
+}  // namespace
+
+std::unique_ptr<Light> make_area_light(const Scene& scene, uint32_t shape) {
+  return std::make_unique<AreaLight>(scene, shape);
+}
+
+void read_area(Properties& properties, Scene&, Shape* shape) {
+  const Rgb<double> radiance = properties.rgb("radiance", grey(1.0));
+  for (int i = 0; i < 3; ++i) {
+    if (!(radiance[i] >= 0)) properties.fail("radiance", "must not be negative");
+    shape->radiance[i] = radiance[i];
+  }
+  shape->is_emitter = true;
+  shape->emitter_id = properties.id();
+}
+
+}  // namespace limn

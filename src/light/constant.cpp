@@ -1,0 +1,54 @@
+// Emitter "constant": the same radiance from all directions.
+#include <fmt/format.h>
+
+#include "src/light/types.h"
+
+namespace limn {
+namespace {
+
+class ConstantEnvironment final : public Environment {
+ public:
+  explicit ConstantEnvironment(const Rgb<double>& radiance)
+      : radiance_{radiance.r, radiance.g, radiance.b} {}
+
+  Rgb<double> radiance(const Vec3<double>&) const override { return value(radiance_); }
+  Rgb<Dual> radiance(const Vec3<Dual>&) const override { return radiance_; }
+  Vec3d sample_direction(double u1, double u2) const override {
+    const double z = 1 - 2 * u1;
+    const double r = std::sqrt(std::max(0.0, 1 - z * z));
+    return {r * std::cos(2 * kPi * u2), r * std::sin(2 * kPi * u2), z};
+  }
+  double pdf_solid_angle(const Vec3d&) const override { return 1 / (4 * kPi); }
+  bool is_uniform() const override { return true; }
+  double mean_luminance() const override { return luminance(value(radiance_)); }
+
+  std::vector<ParameterRef> parameters() override {
+    return {{"radiance", {&radiance_.r, &radiance_.g, &radiance_.b}}};
+  }
+  std::shared_ptr<Environment> clone() const override {
+    return std::make_shared<ConstantEnvironment>(*this);
+  }
+  std::string describe() const override {
+    return fmt::format("constant, radiance {:g} {:g} {:g}", radiance_.r.v, radiance_.g.v,
+                       radiance_.b.v);
+  }
+
+ private:
+  Rgb<Dual> radiance_;
+};
+
+}  // namespace
+
+std::shared_ptr<Environment> make_constant_environment(const Rgb<double>& radiance) {
+  return std::make_shared<ConstantEnvironment>(radiance);
+}
+
+void read_constant(Properties& properties, Scene& scene, Shape*) {
+  const Rgb<double> radiance = properties.rgb("radiance", grey(1.0));
+  for (int i = 0; i < 3; ++i) {
+    if (!std::isfinite(radiance[i])) properties.fail("radiance", "must be finite");
+  }
+  scene.environment = make_constant_environment(radiance);
+}
+
+}  // namespace limn

@@ -1,0 +1,88 @@
+// Emitter "envmap": radiance from all directions, from an image.
+#include <fmt/format.h>
+
+#include "src/light/environment_map.h"
+#include "src/light/types.h"
+
+namespace limn {
+namespace {
+
+// A map turned by the columns of a rotation. Copies share the texels, which never change.
+class MapEnvironment final : public Environment {
+ public:
+  MapEnvironment(std::shared_ptr<const EnvironmentMap> map, const Vec3d axes[3], double scale,
+                 std::string file)
+      : map_(std::move(map)),
+        axes_{axes[0], axes[1], axes[2]},
+        scale_(scale),
+        file_(std::move(file)) {}
+
+  Rgb<double> radiance(const Vec3<double>& d) const override {
+    return map_->radiance(map_from_world(d)) * scale_.v;
+  }
+  Rgb<Dual> radiance(const Vec3<Dual>& d) const override {
+    return map_->radiance(map_from_world(d)) * scale_;
+  }
+  Vec3d sample_direction(double u1, double u2) const override {
+    const Vec3d v = map_->sample(u1, u2);
+    return axes_[0] * v.x + axes_[1] * v.y + axes_[2] * v.z;
+  }
+  double pdf_solid_angle(const Vec3d& d) const override {
+    return map_->pdf_solid_angle(map_from_world(d));
+  }
+  bool is_uniform() const override { return false; }
+  double mean_luminance() const override { return map_->mean_luminance() * scale_.v; }
+
+  std::vector<ParameterRef> parameters() override { return {{"scale", {&scale_}}}; }
+  std::shared_ptr<Environment> clone() const override {
+    return std::make_shared<MapEnvironment>(*this);
+  }
+  std::string describe() const override {
+    return fmt::format("envmap, {} ({} x {}), scale {:g}", file_, map_->width(), map_->height(),
+                       scale_.v);
+  }
+
+ private:
+  template <class S>
+  Vec3<S> map_from_world(const Vec3<S>& d) const {
+    return {dot(d, axes_[0]), dot(d, axes_[1]), dot(d, axes_[2])};
+  }
+
+  std::shared_ptr<const EnvironmentMap> map_;
+  Vec3d axes_[3];  // of the map, in the world
+  Dual scale_;
+  std::string file_;
+};
+
+void check_finite(const Image& image, const std::string& file) {
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < image.width; ++x) {
+      for (int c = 0; c < image.channels; ++c) {
+        if (std::isfinite(image.at(x, y, c))) continue;
+        throw InputError(SourceLocation{file},
+                         fmt::format("the environment map's pixel (column {}, row {}) is not "
+                                     "finite",
+                                     x, y));
+      }
+    }
+  }
+}
+
+}  // namespace
+
+void read_envmap(Properties& properties, Scene& scene, Shape*) {
+  const std::string file = properties.file("filename");
+  const double scale = properties.number("scale", 1);
+  if (!std::isfinite(scale)) properties.fail("scale", "must be finite");
+  Vec3d axes[3];
+  read_axes(properties, "an envmap", axes);
+  if (properties.boolean("mis_compensation", false)) {
+    properties.fail("mis_compensation", "is not supported (it changes the noise alone)");
+  }
+  const Image image = read_exr(file);
+  check_finite(image, file);
+  scene.environment =
+      std::make_shared<MapEnvironment>(std::make_shared<EnvironmentMap>(image), axes, scale, file);
+}
+
+}  // namespace limn

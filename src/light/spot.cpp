@@ -1,0 +1,92 @@
+// Emitter "spot": a cone of light from one point, along +Z of its own space.
+#include <fmt/format.h>
+
+#include "src/light/types.h"
+
+namespace limn {
+namespace {
+
+// Angles are differentiable and in degrees, as in the file.
+struct Cone {
+  Dual cutoff;  // from the axis: black beyond
+  Dual beam;    // full intensity within, linear in the angle between the two
+};
+
+class SpotLight final : public DeltaLight {
+ public:
+  SpotLight(const Vec3d& position, const Vec3d& axis, const Rgb<Dual>& intensity, const Cone& cone)
+      : position_{position.x, position.y, position.z},
+        axis_(axis),
+        intensity_(intensity),
+        cone_(cone) {}
+
+  std::optional<Arrival<double>> arriving(const Vec3<double>& p) const override { return at(p); }
+  std::optional<Arrival<Dual>> arriving(const Vec3<Dual>& p) const override { return at(p); }
+  LightOrigin origin() const override { return {position_}; }
+  double power() const override { return luminance(value(intensity_)); }
+
+  std::vector<ParameterRef> parameters() override {
+    std::vector<ParameterRef> list{colour_parameter("intensity", intensity_),
+                                   {"cutoff_angle", {&cone_.cutoff}},
+                                   {"beam_width", {&cone_.beam}}};
+    append_vector_parameters("translate", position_, ParameterRef::Unit::kLength, list);
+    append_vector_parameters("rotate", turn_, ParameterRef::Unit::kRadians, list);
+    return list;
+  }
+  std::shared_ptr<DeltaLight> clone() const override { return std::make_shared<SpotLight>(*this); }
+  std::string describe() const override {
+    return fmt::format(
+        "spot at ({:.6g}, {:.6g}, {:.6g}) along ({:.6g}, {:.6g}, {:.6g}), cutoff {:.6g} degrees, "
+        "beam {:.6g} degrees, intensity {:g} {:g} {:g}",
+        position_.x.v, position_.y.v, position_.z.v, axis_.x, axis_.y, axis_.z, cone_.cutoff.v,
+        cone_.beam.v, intensity_.r.v, intensity_.g.v, intensity_.b.v);
+  }
+
+ private:
+  template <class S>
+  std::optional<Arrival<S>> at(const Vec3<S>& p) const {
+    const Vec3<S> w = as<S>(position_) - p;
+    const S squared = length_squared(w);
+    if (value(squared) == 0) return {};
+    using std::sqrt;
+    const Vec3<S> wo = w / sqrt(squared);
+    const S c = -dot(wo, turned<S>(axis_, turn_));
+    const S degrees = angle(c) * (180 / kPi);
+    if (!(value(degrees) < cone_.cutoff.v)) return {};
+    const Rgb<S> full = as<S>(intensity_) * (1.0 / squared);
+    if (value(degrees) <= cone_.beam.v) return Arrival<S>{wo, full};
+    const S width = as<S>(cone_.cutoff) - as<S>(cone_.beam);
+    return Arrival<S>{wo, full * ((as<S>(cone_.cutoff) - degrees) / width)};
+  }
+  static double angle(double c) { return std::acos(std::clamp(c, -1.0, 1.0)); }
+  static Dual angle(const Dual& c) { return acos(Dual(std::clamp(c.v, -1.0, 1.0), c.d)); }
+
+  Vec3<Dual> position_;
+  Vec3d axis_;           // unit
+  Vec3<Dual> turn_{};    // of the axis, see turned()
+  Rgb<Dual> intensity_;  // [W/sr], on the axis
+  Cone cone_;
+};
+
+}  // namespace
+
+void read_spot(Properties& properties, Scene& scene, Shape*) {
+  const double cutoff = properties.number("cutoff_angle", 20);
+  if (!(cutoff > 0 && cutoff <= 180)) {
+    properties.fail("cutoff_angle", "must lie in (0, 180] degrees");
+  }
+  const double beam = properties.number("beam_width", 0.75 * cutoff);
+  if (!(beam >= 0 && beam < cutoff)) {
+    properties.fail("beam_width",
+                    "must be at least 0 and less than cutoff_angle: a rim that is sharp moves "
+                    "without a term for it");
+  }
+  Vec3d axes[3];
+  read_axes(properties, "a spot", axes);
+  const Vec3d position = properties.transform("to_world").point({});
+  scene.delta_lights.push_back(std::make_shared<SpotLight>(
+      position, axes[2], read_power(properties, "intensity"), Cone{cutoff, beam}));
+  scene.delta_lights.back()->id = properties.id();
+}
+
+}  // namespace limn
