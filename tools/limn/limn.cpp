@@ -8,6 +8,7 @@
 #include "limn/integrators/derivative_method.h"
 #include "tools/limn/command_reject.h"
 #include "tools/limn/commands.h"
+#include "tools/limn/version.h"
 
 namespace {
 
@@ -165,6 +166,7 @@ void check_command(const CLI::App& app, int argc, char** argv) {
 int run(int argc, char** argv) {
   CLI::App app("limn: a path tracer that also computes how its image changes when the scene moves");
   app.require_subcommand(1);
+  app.set_version_flag("--version", limn::version_text(), "Print version, commit and build type");
   CommonOptions common;
   GradientCommand command;
   command.sampler = limn::edge_sampler_types().front().name;
