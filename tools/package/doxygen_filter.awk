@@ -9,18 +9,18 @@ markdown {
   next
 }
 /^#pragma once/ {
-  print
+  name = FILENAME
+  sub(/.*\/limn\//, "limn/", name)
+  print "/** @file " name
   opening = 1  # the file's comment comes next
   next
 }
 /^ *\/\// {
   column = match($0, /\/\//)
   text = substr($0, column + 2)
+  gsub(/</, "\\<", text)  # no tags of HTML here
   indent = substr($0, 1, column - 1)
-  if (opening == 1) {
-    print "/** @file" text
-    opening = 2
-  } else if (opening == 2) {
+  if (opening) {
     print text
   } else {
     # Below a comment beside a declaration and in its column: the same comment goes on.
@@ -28,10 +28,12 @@ markdown {
   }
   next
 }
-opening == 2 {
+opening {
   $0 = "*/ " $0
   opening = 0
 }
+# Without a comment of its own, a namespace's functions would have no page.
+/^namespace limn \{/ { $0 = "/** All of limn. */ " $0 }
 {
   beside = match($0, /[;,{}] +\/\/ /)
   if (beside) {
