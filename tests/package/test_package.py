@@ -63,6 +63,14 @@ class Package(unittest.TestCase):
                 for place in (os.path.join(ROOT, "src"), BUILD):
                     self.assertNotIn(place, text, name)
 
+    def test_installed_program_finds_its_report_script(self):
+        mesh = os.path.join(ROOT, "scenes", "closed_form", "cube_in_sky_object.obj")
+        folder = os.path.join(WORK, "reject")
+        text = run(os.path.join(PREFIX, "bin", "limn"), "reject", mesh, "-o", folder)
+        script = os.path.join(PREFIX, "share", "limn", "report.py")
+        found = os.path.exists(os.path.join(folder, "report.html")) or f"python3 {script}" in text
+        self.assertTrue(found, text)
+
     def test_installed_program_says_its_version(self):
         with open(os.path.join(ROOT, "CMakeLists.txt"), encoding="utf-8") as stream:
             version = re.search(r"project\(limn VERSION (\S+)", stream.read())[1]

@@ -12,6 +12,12 @@ set_target_properties(limn_options PROPERTIES EXPORT_NAME contracts)
 install(TARGETS limn_options limn_core limn_edgetree limn_integrators EXPORT limn
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT limn)
 install(TARGETS limn RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT limn)
+# What the program calls.
+install(PROGRAMS tools/report.py DESTINATION ${CMAKE_INSTALL_DATADIR}/limn COMPONENT limn)
+install(DIRECTORY tools/report DESTINATION ${CMAKE_INSTALL_DATADIR}/limn COMPONENT limn
+  FILES_MATCHING PATTERN "*.py" PATTERN "*.css" PATTERN "__pycache__" EXCLUDE)
+install(PROGRAMS tools/mitsuba/mitsuba_gradient.py
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/limn/mitsuba COMPONENT limn)
 install(DIRECTORY include/limn DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT limn
   FILES_MATCHING PATTERN "*.h")
 install(EXPORT limn FILE limnTargets.cmake NAMESPACE limn:: DESTINATION ${package} COMPONENT limn)
