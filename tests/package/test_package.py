@@ -66,7 +66,8 @@ class Package(unittest.TestCase):
     def test_installed_program_finds_its_report_script(self):
         mesh = os.path.join(ROOT, "scenes", "closed_form", "cube_in_sky_object.obj")
         folder = os.path.join(WORK, "reject")
-        text = run(os.path.join(PREFIX, "bin", "limn"), "reject", mesh, "-o", folder)
+        text = run(os.path.join(PREFIX, "bin", "limn"), "reject", mesh, "--methods", "forest",
+                   "--size", "64", "--points", "20", "-o", folder)
         script = os.path.join(PREFIX, "share", "limn", "report.py")
         found = os.path.exists(os.path.join(folder, "report.html")) or f"python3 {script}" in text
         self.assertTrue(found, text)
