@@ -1,5 +1,5 @@
-# `cmake --build build --target docs`: pages of the contracts in include/limn, in build/docs/html. Needs
-# doxygen; without it there is no such target.
+# `cmake --build build --target docs`: pages of the contracts in include/limn, in build/docs/html.
+# Needs doxygen; without it there is no such target.
 find_package(Doxygen QUIET)
 if(NOT DOXYGEN_FOUND)
   return()
@@ -18,4 +18,5 @@ set(DOXYGEN_GENERATE_LATEX NO)
 set(DOXYGEN_QUIET YES)
 # What has no comment is told, and is no error.
 set(DOXYGEN_WARN_AS_ERROR NO)
-doxygen_add_docs(docs include/limn include/README.md COMMENT "Pages of the contracts: build/docs/html")
+doxygen_add_docs(docs include/limn include/README.md
+  COMMENT "Pages of the contracts: build/docs/html")

@@ -1,5 +1,5 @@
-# Marks a header's comments for Doxygen: `//` above a declaration becomes `///`, beside one `///<`, and
-# the comment right below `#pragma once` describes the file. Line numbers stay.
+# Marks a header's comments for Doxygen: `//` above a declaration becomes `///`, beside one `///<`,
+# and the comment right below `#pragma once` describes the file. Line numbers stay.
 FNR == 1 {
   markdown = FILENAME ~ /\.md$/
   opening = beside = 0
