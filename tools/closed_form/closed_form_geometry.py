@@ -25,7 +25,7 @@ class Shape:
     def face(self, k):
         return self.vertices[self.faces[k]]
 
-    def centre(self):
+    def center(self):
         return (self.vertices.min(axis=0) + self.vertices.max(axis=0)) / 2
 
 
@@ -134,15 +134,15 @@ def move_camera(camera, what, axis, step):
 
 
 def move_shape(scene, shape, what, axis, step):
-    centre = shape.centre()
+    center = shape.center()
     if what.startswith("vertex_positions:"):
         shape.vertices = shape.vertices + step * scene.velocities[what.split(":")[1]]
     elif what.startswith("translate"):
         shape.vertices[:, axis] += step
     elif what.startswith("rotate"):
-        shape.vertices = centre + (shape.vertices - centre) @ rotation(axis, step).T
+        shape.vertices = center + (shape.vertices - center) @ rotation(axis, step).T
     elif what == "scale":
-        shape.vertices = centre + (shape.vertices - centre) * (1 + step)
+        shape.vertices = center + (shape.vertices - center) * (1 + step)
     else:
         raise ValueError(what)
 
@@ -185,10 +185,10 @@ def clip_box(polygon, lower, upper):
 
 def clip_convex(polygon, clipper):
     """The intersection of two convex planar polygons of any orientation."""
-    centre = clipper.mean(axis=0)
+    center = clipper.mean(axis=0)
     for a, b in zip(clipper, np.roll(clipper, -1, axis=0)):
         normal = np.array([a[1] - b[1], b[0] - a[0]])
-        normal = normal * np.sign(np.dot(centre - a, normal))
+        normal = normal * np.sign(np.dot(center - a, normal))
         polygon = clip(polygon, normal, np.dot(a, normal))
     return polygon
 

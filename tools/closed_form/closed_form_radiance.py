@@ -107,18 +107,18 @@ class Filter:
             return (1 - np.abs(x)) / self.total
         return (np.exp(-2 * x * x) - np.exp(-8.0)) / self.total  # stddev 1/2, radius 2
 
-    def over_polygon(self, polygon, centre):
+    def over_polygon(self, polygon, center):
         """Integral of f(x - cx) f(y - cy) over a convex polygon (K by 2, pixels)."""
         if self.kind == "box":
-            return polygon_area(clip_box(polygon, centre - 0.5, centre + 0.5))
+            return polygon_area(clip_box(polygon, center - 0.5, center + 0.5))
         order = 6 if self.kind == "tent" else 24
         total = 0.0
         for ax, bx in zip(self.cells, self.cells[1:]):
             for ay, by in zip(self.cells, self.cells[1:]):
-                part = clip_box(polygon, centre + [ax, ay], centre + [bx, by])
+                part = clip_box(polygon, center + [ax, ay], center + [bx, by])
                 if len(part):
                     x, w = loop_rule(part, order)
-                    total += np.sum(w * self(x[:, 0] - centre[0]) * self(x[:, 1] - centre[1]))
+                    total += np.sum(w * self(x[:, 0] - center[0]) * self(x[:, 1] - center[1]))
         return total
 
 
