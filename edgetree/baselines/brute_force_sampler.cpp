@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <atomic>
 
-#include "edgetree/samplers.h"
+#include "edgetree/baselines/baselines.h"
 #include "limn/edgetree/contribution_bound.h"
 
 namespace limn {
@@ -80,6 +80,20 @@ class BruteForceSampler final : public EdgeSampler {
   double pdf_t(const EdgeQuery& query, EdgeId id, double t) const override {
     const EdgeBound bound = bound_of(query, id);
     return bound.total() > 0 ? bound.pdf_t(t) : 0;
+  }
+
+  // It bounds every edge.
+  double draw_cost() const override {
+    size_t edges = 0;
+    for (const EdgeMesh& mesh : input_.objects) edges += mesh.edges.size();
+    return static_cast<double>(edges) / 200;
+  }
+  SamplerSize size() const override {
+    uint64_t bytes = 0;
+    for (const Packed& p : packed_)
+      bytes += 4 * p.x.size() * sizeof p.x[0] +
+               p.needed.size() * (sizeof p.faces[0] + sizeof p.needed[0]);
+    return {0, bytes};
   }
 
  private:

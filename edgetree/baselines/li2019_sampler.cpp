@@ -17,8 +17,8 @@
 #include <algorithm>
 #include <array>
 
+#include "edgetree/baselines/baselines.h"
 #include "edgetree/lobe/ltc.h"
-#include "edgetree/samplers.h"
 
 namespace limn {
 namespace {
@@ -225,6 +225,13 @@ class Li2019Sampler final : public EdgeSampler {
     return transformed_edge(Descent(query, origin_), id).pdf_t(t);
   }
 
+  // A walk down the trees costs a handful of rays.
+  double draw_cost() const override { return 5; }
+  SamplerSize size() const override {
+    uint64_t bytes = nodes_.size() * sizeof(Node) + items_.size() * sizeof(Item);
+    for (const auto& places : places_) bytes += places.size() * sizeof(uint32_t);
+    return {nodes_.size(), bytes};
+  }
   std::unique_ptr<RejectionTree> rejection_tree() const override {
     return std::make_unique<Li2019RejectionTree>(nodes_, items_, origin_);
   }

@@ -1,6 +1,6 @@
 #include <algorithm>
 
-#include "edgetree/samplers.h"
+#include "edgetree/baselines/baselines.h"
 
 namespace limn {
 namespace {
@@ -35,6 +35,8 @@ class UniformSampler final : public EdgeSampler {
   double pdf_t(const EdgeQuery&, EdgeId, double t) const override {
     return t >= 0 && t <= 1 ? 1 : 0;
   }
+
+  double draw_cost() const override { return 1; }
 
  private:
   uint64_t count() const { return ends_.empty() ? 0 : ends_.back(); }

@@ -166,6 +166,11 @@ class Builder {
 
 }  // namespace
 
+const char* edge_class_name(EdgeClass edge_class) {
+  constexpr const char* kNames[] = {"smooth", "sharp", "border", "irregular", "flat"};
+  return kNames[static_cast<int>(edge_class)];
+}
+
 uint64_t EdgeMesh::count(EdgeClass edge_class) const {
   return std::count_if(edges.begin(), edges.end(),
                        [&](const Edge& e) { return e.edge_class == edge_class; });

@@ -1,4 +1,5 @@
-#include "limn/edgetree/edge_forest.h"
+// The edge forest as a sampler: descending the trees.
+#include "edgetree/forest/edge_forest.h"
 
 #include <algorithm>
 #include <bit>
@@ -8,7 +9,6 @@
 #include "edgetree/forest/forest_query.h"
 #include "edgetree/forest/forest_rejection.h"
 #include "edgetree/lobe/seen_edge.h"
-#include "edgetree/samplers.h"
 
 namespace limn {
 namespace {
@@ -250,16 +250,12 @@ uint64_t EdgeForest::list_silhouettes(const Vec3d& p, std::vector<EdgeId>& edges
   return tested;
 }
 
-uint64_t EdgeForest::bytes() const {
+SamplerSize EdgeForest::size() const {
   const Forest& forest = impl_->forest;
-  uint64_t sum = forest.inner.size() * sizeof(InnerNode) + forest.edges.size() * sizeof(EdgeNode) +
-                 forest.roots.size() * sizeof(NodeId);
-  for (const auto& slots : forest.slots) sum += slots.size() * sizeof(uint32_t);
-  return sum;
-}
-
-uint64_t EdgeForest::node_count() const {
-  return impl_->forest.inner.size() + impl_->forest.edges.size();
+  uint64_t bytes = forest.inner.size() * sizeof(InnerNode) +
+                   forest.edges.size() * sizeof(EdgeNode) + forest.roots.size() * sizeof(NodeId);
+  for (const auto& slots : forest.slots) bytes += slots.size() * sizeof(uint32_t);
+  return {forest.inner.size() + forest.edges.size(), bytes};
 }
 
 }  // namespace limn

@@ -1,6 +1,8 @@
 #pragma once
+// Building the trees of the edge forest.
+#include "edgetree/forest/forest_config.h"
 #include "edgetree/forest/forest_node.h"
-#include "limn/edgetree/edge_forest.h"
+#include "limn/edgetree/edge_sampler.h"
 
 namespace limn {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-#include "limn/edgetree/edge_forest.h"
+#include "edgetree/forest/forest_config.h"
 #include "limn/edgetree/edges.h"
 
 namespace limn {

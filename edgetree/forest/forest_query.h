@@ -5,7 +5,7 @@
 #include "edgetree/forest/forest_node.h"
 #include "edgetree/light/light_term.h"
 #include "edgetree/lobe/ltc.h"
-#include "limn/edgetree/edge_forest.h"
+#include "limn/edgetree/edge_sampler.h"
 
 namespace limn {
 

@@ -1,4 +1,5 @@
 #pragma once
+// The edge forest as a tree of nodes that one test rejects or accepts.
 #include <memory>
 
 #include "edgetree/forest/forest_node.h"

@@ -1,3 +1,4 @@
+// A gradient against differences: z-scores over blocks of pixels, and whom to suspect.
 #include "limn/integrators/check.h"
 
 #include <algorithm>
@@ -17,13 +18,13 @@ constexpr double kLevel = 1e-4;
 // spp, even where no event has come yet. And a difference of two images of radiance L over 2 h is
 // rounded to some hundred units in the last place of L / h.
 struct DifferenceVariance {
+  const GradientResult& result;
   const ParameterGradient& gradient;
   std::vector<double> radiance;  // of the blocks
   double step;
 
   double operator()(const Moments& differences, double event, size_t block) const {
-    const double edges = std::fabs(gradient.term_blocks[kCamera].mean(block)) +
-                         std::fabs(gradient.term_blocks[kBoundary].mean(block));
+    const double edges = edge_magnitude(result, gradient, block);
     const double rounding = 0x1p-44 * radiance[block] / step;
     return std::max(differences.variance(block), edges * event / differences.samples()) +
            rounding * rounding;
@@ -77,24 +78,48 @@ TotalComparison compare_totals(const Moments& gradient, const Moments& differenc
 }
 
 std::vector<double> block_means(const CheckResult& result, const Film& film) {
-  const Moments& radiance = result.gradient.radiance;
-  std::vector<double> means(radiance.size());
-  for (size_t i = 0; i < means.size(); ++i) means[i] = radiance.mean(i);
-  return sum_blocks(means, film.crop_width, film.crop_height, result.block);
+  return sum_blocks(means(result.gradient.radiance), film.crop_width, film.crop_height,
+                    result.block);
 }
 
-// The terms that the options leave out.
-GradientResult other_terms(const Scene& scene, GradientOptions options, RunSettings settings) {
-  for (bool& term : options.terms) term = !term;
+// The terms that were left out.
+GradientResult other_terms(const Scene& scene, const GradientResult& result,
+                           GradientOptions options, RunSettings settings) {
+  options.terms.clear();
+  for (const TermRun& term : result.terms) {
+    if (!term.computed) options.terms.push_back(term.name);
+  }
   settings.progress = nullptr;
   return gradient(scene, options, settings);
+}
+
+// Sets the suspicions, and the suspect among them.
+void suspect_terms(const Scene& scene, const GradientOptions& options, const RunSettings& settings,
+                   const DifferenceVariance& variance, CheckResult& result) {
+  const std::vector<TermRun>& terms = result.gradient.terms;
+  // A term that was left out may be the one that is missing.
+  std::optional<GradientResult> others;
+  double largest = -1;
+  for (size_t t = 0; t < terms.size(); ++t) {
+    if (!terms[t].computed && !others) {
+      others = other_terms(scene, result.gradient, options, settings);
+    }
+    const GradientResult& from = terms[t].computed ? result.gradient : *others;
+    const Suspicion suspicion =
+        regress(from.parameters[0].term_blocks[t], result.differences, variance);
+    result.suspicions.push_back(suspicion);
+    if (std::fabs(suspicion.z) > largest) {
+      largest = std::fabs(suspicion.z);
+      result.suspect = terms[t].name;
+    }
+  }
 }
 
 }  // namespace
 
 CheckResult check(const Scene& scene, const CheckOptions& options, const RunSettings& settings) {
   CheckResult result;
-  const ParameterInfo parameter = find_parameter(scene, options.parameter);
+  const Parameter parameter = find_parameter(scene, options.parameter);
   const int longer = std::max(scene.film.crop_width, scene.film.crop_height);
   result.step = options.step > 0 ? options.step : parameter.natural_step;
   result.block = options.block > 0 ? options.block : std::max(1, (longer + 7) / 8);
@@ -110,7 +135,7 @@ CheckResult check(const Scene& scene, const CheckOptions& options, const RunSett
   GradientOptions gradient_options;
   gradient_options.parameters = {options.parameter};
   gradient_options.terms = options.terms;
-  gradient_options.sampler = options.sampler;
+  gradient_options.method = options.method;
   gradient_options.block = result.block;
   gradient_options.samples = options.samples;
   result.gradient = gradient(scene, gradient_options, first);
@@ -119,7 +144,8 @@ CheckResult check(const Scene& scene, const CheckOptions& options, const RunSett
 
   const ParameterGradient& g = result.gradient.parameters[0];
   const DifferenceResult& d = result.differences;
-  const DifferenceVariance variance{g, block_means(result, scene.film), result.step};
+  const DifferenceVariance variance{result.gradient, g, block_means(result, scene.film),
+                                    result.step};
   result.at_step = summarize(z_scores(d.at_step, variance));
   result.at_double_step = summarize(z_scores(d.at_double_step, variance));
   result.extrapolated = summarize(z_scores(d.extrapolated, variance));
@@ -129,18 +155,7 @@ CheckResult check(const Scene& scene, const CheckOptions& options, const RunSett
   const bool blocks_agree =
       result.at_step.plausible(kLevel) || result.extrapolated.plausible(kLevel);
   result.agree = blocks_agree && normal_p_value(result.total.z) >= kLevel;
-  if (!result.agree) {
-    // A term that was left out may be the one that is missing.
-    const GradientResult others = other_terms(scene, gradient_options, first);
-    for (int term = 0; term < kTermCount; ++term) {
-      const auto& from = options.terms[term] ? result.gradient : others;
-      result.suspicions[term] = regress(from.parameters[0].term_blocks[term], d, variance);
-    }
-    const auto worst = std::max_element(
-        result.suspicions.begin(), result.suspicions.end(),
-        [](const Suspicion& a, const Suspicion& b) { return std::fabs(a.z) < std::fabs(b.z); });
-    result.suspect = static_cast<int>(worst - result.suspicions.begin());
-  }
+  if (!result.agree) suspect_terms(scene, gradient_options, first, variance, result);
   return result;
 }
 

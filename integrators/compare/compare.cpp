@@ -1,3 +1,4 @@
+// Methods in turn at equal time, and what their runs add up to.
 #include "limn/integrators/compare.h"
 
 #include <fmt/format.h>
@@ -81,12 +82,16 @@ std::vector<double> collect(const std::vector<const ComparedRun*>& runs, Get get
   return values;
 }
 
-std::vector<double> mean_term_seconds(const std::vector<const ComparedRun*>& runs) {
-  std::vector<double> sums(runs[0]->run.term_seconds.size());
+std::vector<std::pair<std::string, double>> mean_term_seconds(
+    const std::vector<const ComparedRun*>& runs) {
+  auto means = runs[0]->run.term_seconds;
+  for (auto& [name, seconds] : means) seconds = 0;
   for (const ComparedRun* run : runs) {
-    for (size_t t = 0; t < sums.size(); ++t) sums[t] += run->run.term_seconds[t] / runs.size();
+    for (size_t t = 0; t < means.size(); ++t) {
+      means[t].second += run->run.term_seconds[t].second / static_cast<double>(runs.size());
+    }
   }
-  return sums;
+  return means;
 }
 
 RungSummary summarize_rung(const std::vector<const ComparedRun*>& runs,

@@ -1,3 +1,4 @@
+// Errors of images against a reference, bias scores, slopes, ratios of time.
 #include "limn/integrators/metrics.h"
 
 #include <algorithm>
@@ -79,18 +80,6 @@ ImageErrors image_errors(const std::vector<double>& image, const std::vector<dou
   return errors;
 }
 
-double mean_of(const std::vector<double>& values) {
-  double sum = 0;
-  for (const double v : values) sum += v;
-  return sum / static_cast<double>(values.size());
-}
-
-double mean_square(const std::vector<double>& values) {
-  double sum = 0;
-  for (const double v : values) sum += v * v;
-  return sum / static_cast<double>(values.size());
-}
-
 Uncertain mean_of_repeats(const std::vector<double>& values) {
   const double mean = mean_of(values);
   if (values.size() < 2) return {mean, kNaN};
@@ -154,6 +143,17 @@ std::optional<Uncertain> time_ratio(const std::vector<double>& method,
   if (!(a.value > 0) || !(b.value > 0)) return std::nullopt;
   const double ratio = a.value / b.value;
   return Uncertain{ratio, ratio * std::hypot(a.error / a.value, b.error / b.value)};
+}
+
+BlockSums block_sums(const Moments& blocks, const Events& events) {
+  BlockSums result;
+  result.sums = means(blocks);
+  if (blocks.batches() > 1) result.variances = variances(blocks);
+  result.degrees = blocks.batches() - 1;
+  if (blocks.samples() > 0) {
+    result.event = events.mean_size() / static_cast<double>(blocks.samples());
+  }
+  return result;
 }
 
 }  // namespace limn

@@ -1,3 +1,4 @@
+// References: made, written, and refused where they belong to something else.
 #include "limn/integrators/reference.h"
 
 #include <fmt/format.h>
@@ -8,15 +9,12 @@
 #include <fstream>
 #include <sstream>
 
-#include "integrators/compare/method_images.h"
 #include "limn/core/error.h"
 
 namespace limn {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr const char* kSampler = "forest";
 
 // Names of attributes that say what the reference belongs to, and how a user knows them.
 const std::vector<std::pair<std::string, std::string>> kNames = {
@@ -64,11 +62,11 @@ std::string parameter_identity(const std::string& parameter, std::vector<std::st
   return parameter.substr(0, colon);
 }
 
-std::string join_terms(const std::array<bool, kTermCount>& terms) {
+// The terms that the default method computes for these options.
+std::string join_terms(const MethodInput& input) {
+  if (input.terms.empty()) return "all";
   std::string text;
-  for (int t = 0; t < kTermCount; ++t) {
-    if (terms[t]) text += (text.empty() ? "" : ",") + std::string(term_name(t));
-  }
+  for (const std::string& name : input.terms) text += (text.empty() ? "" : ",") + name;
   return text;
 }
 
@@ -132,7 +130,7 @@ std::vector<double> read_values(const std::string& file, const Film& film) {
 }
 
 void read_header(const Attributes& attributes, const Film& film, Reference& r) {
-  r.sampler = attributes.at("limn.sampler");
+  r.method = attributes.at("limn.method");
   r.spp = std::stoll(attributes.at("limn.spp"));
   r.seed = std::stoull(attributes.at("limn.seed"));
   r.seconds = std::stod(attributes.at("limn.seconds"));
@@ -185,7 +183,7 @@ Identity identify(const MethodInput& input, const std::map<std::string, std::str
       fmt::format("{:016x}", hash_files(data)),
       given,
       parameter,
-      join_terms(input.terms),
+      join_terms(input),
       scene.shading == ShadingModel::kMitsuba ? "mitsuba" : "continuous",
       fmt::format("{} x {} at {}, {}", f.crop_width, f.crop_height, f.crop_x, f.crop_y),
   };
@@ -195,28 +193,22 @@ Identity identify(const MethodInput& input, const std::map<std::string, std::str
 }
 
 Reference make_reference(const MethodInput& input, const RunSettings& settings) {
-  GradientOptions options;
-  options.parameters = {input.parameter};
-  options.terms = input.terms;
-  options.sampler = kSampler;
-  options.block = input.block;
-  options.samples = input.samples;
+  const MethodType& method = find_method("");
   RunSettings at_least_two = settings;
   at_least_two.least_spp = 2;  // for variances
-  const GradientResult result = gradient(input.scene, options, at_least_two);
+  const GradientResult result = gradient(input.scene, input.options(method), at_least_two);
   const ParameterGradient& g = result.parameters[0];
   Reference r;
   r.image = means(g.total);
   r.variance = variances(g.total);
   r.blocks = block_sums(g.total_blocks, g.events);
   for (size_t b = 0; b < g.total_blocks.size(); ++b) {
-    r.edges.push_back(std::fabs(g.term_blocks[kCamera].mean(b)) +
-                      std::fabs(g.term_blocks[kBoundary].mean(b)));
+    r.edges.push_back(edge_magnitude(result, g, b));
   }
   for (size_t b = 0; b < r.blocks.variances.size(); ++b) {
     r.blocks.variances[b] = std::max(r.blocks.variances[b], r.edges[b] * r.blocks.event);
   }
-  r.sampler = kSampler;
+  r.method = method.name;
   r.spp = result.spp;
   r.seed = settings.seed;
   r.seconds = result.seconds;
@@ -229,7 +221,7 @@ Reference make_reference(const MethodInput& input, const RunSettings& settings) 
 void write_reference(const std::string& file, const Reference& reference, const Identity& identity,
                      const Film& film, int block) {
   std::vector<ImageAttribute> attributes = {
-      {"limn.sampler", reference.sampler},
+      {"limn.method", reference.method},
       {"limn.spp", std::to_string(reference.spp)},
       {"limn.seed", std::to_string(reference.seed)},
       {"limn.seconds", fmt::format("{}", reference.seconds)},

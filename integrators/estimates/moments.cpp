@@ -1,3 +1,4 @@
+// Means and variances from batches, and sums over blocks of pixels.
 #include "limn/integrators/moments.h"
 
 #include <cmath>
@@ -27,6 +28,18 @@ void Events::add_batch(const std::vector<double>& sums) {
     squares_ += x * x;
     cubes_ += x * x * x;
   }
+}
+
+std::vector<double> means(const Moments& moments) {
+  std::vector<double> values(moments.size());
+  for (size_t i = 0; i < values.size(); ++i) values[i] = moments.mean(i);
+  return values;
+}
+
+std::vector<double> variances(const Moments& moments) {
+  std::vector<double> values(moments.size());
+  for (size_t i = 0; i < values.size(); ++i) values[i] = moments.variance(i);
+  return values;
 }
 
 Image mean_image(const Moments& moments, int width, int height) {

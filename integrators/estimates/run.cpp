@@ -1,3 +1,4 @@
+// Counting samples, scheduling batches, reporting progress.
 #include "limn/integrators/run.h"
 
 #include <fmt/format.h>
@@ -16,6 +17,32 @@ void NonFinite::merge(const NonFinite& other) {
   for (const Place& place : other.first) {
     if (first.size() < 10) first.push_back(place);
   }
+}
+
+void LargestSample::add(double squared_magnitude, const NonFinite::Place& where) {
+  squares += squared_magnitude;
+  if (!(squared_magnitude > square)) return;
+  square = squared_magnitude;
+  place = where;
+}
+
+void LargestSample::merge(const LargestSample& other) {
+  squares += other.squares;
+  if (!(other.square > square)) return;
+  square = other.square;
+  place = other.place;
+}
+
+void TermCost::merge(const TermCost& other) {
+  seconds += other.seconds;
+  rays += other.rays;
+  shadow_rays += other.shadow_rays;
+  samples += other.samples;
+  no_edge += other.no_edge;
+  zero_weight += other.zero_weight;
+  occluded += other.occluded;
+  counted += other.counted;
+  largest.merge(other.largest);
 }
 
 std::string NonFinite::message() const {

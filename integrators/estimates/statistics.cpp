@@ -1,3 +1,4 @@
+// Scores and their chances.
 #include "limn/integrators/statistics.h"
 
 #include <algorithm>
@@ -34,6 +35,18 @@ ZSummary summarize(const std::vector<double>& z) {
   summary.p_chi_square = chi_square_p_value(squares, static_cast<double>(z.size()));
   summary.p_largest = -std::expm1(z.size() * std::log1p(-normal_p_value(summary.largest)));
   return summary;
+}
+
+double mean_of(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double v : values) sum += v;
+  return sum / static_cast<double>(values.size());
+}
+
+double mean_square(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double v : values) sum += v * v;
+  return sum / static_cast<double>(values.size());
 }
 
 }  // namespace limn

@@ -1,3 +1,5 @@
+// Finite differences as a method: one step for each parameter, the user's or the one that a pilot
+// finds.
 #include "integrators/methods/difference_method.h"
 
 #include <fmt/format.h>
@@ -5,115 +7,127 @@
 #include <algorithm>
 #include <cmath>
 
-#include "integrators/compare/method_images.h"
+#include "integrators/methods/method_table.h"
 #include "limn/core/parameter.h"
-#include "limn/integrators/render.h"
+#include "limn/integrators/differences.h"
+#include "limn/integrators/metrics.h"
 
 namespace limn {
 namespace {
 
-constexpr double kPilotShare = 0.1;  // of the time of a run
-constexpr int kPilotSamples = 4;     // per pixel, at least
+constexpr double kPilotShare = 0.1;  // of a run's time or samples; not tuned
+constexpr int kPilotSamples = 4;     // per pixel, at least: variances need some
 // The steps that the pilot tries: down from the natural one, which is for pictures that change a
 // lot.
 constexpr int kTrials = 5;
 constexpr double kFactor = 4;
 
-struct Pilot {
-  double step = 0;
-  double seconds = 0;
-  std::string how;
+struct Step {
+  double value = 0;
+  std::string found_by;
 };
 
 double mean_variance(const Moments& moments) { return mean_of(variances(moments)); }
 
-class DifferenceMethod final : public DerivativeMethod {
- public:
-  explicit DifferenceMethod(const MethodInput& input)
-      : input_(input), natural_(find_parameter(input.scene, input.parameter).natural_step) {}
-
-  std::string name() const override { return kDifferences; }
-  std::string description() const override {
-    return "central finite differences with common random numbers";
+// The differences at every step, and what changes from each to the next.
+std::vector<std::vector<double>> steps_and_changes() {
+  std::vector<std::vector<double>> combinations(2 * kTrials - 1, std::vector<double>(kTrials));
+  for (int k = 0; k < kTrials; ++k) combinations[k][k] = 1;
+  for (int k = 0; k + 1 < kTrials; ++k) {
+    combinations[kTrials + k][k] = -1;
+    combinations[kTrials + k][k + 1] = 1;
   }
+  return combinations;
+}
 
-  MethodRun run(const RunSettings& settings) override {
-    const Pilot& pilot = pilot_for(settings);
-    RunSettings rest = settings;
-    rest.seconds = std::max(settings.seconds - pilot.seconds, kPilotShare * settings.seconds);
-    step_ = pilot.step;
-    how_ = pilot.how;
-    const CentralDifferences result = central_differences(input_.scene, input_.parameter,
-                                                          {pilot.step}, {{1}}, input_.block, rest);
-    MethodRun run;
-    run.image = means(result.estimates[0].total);
-    run.blocks = block_sums(result.estimates[0].blocks, result.estimates[0].events);
-    run.seconds = result.seconds + pilot.seconds;
-    run.setup_seconds = result.setup_seconds + pilot.seconds;
-    run.spp = result.spp;
-    run.rays = result.rays;
-    run.non_finite = result.non_finite;
-    return run;
+// Looks for a step for one parameter out of `parameters`, which share the time. seconds: of the
+// whole run, 0 if it has no limit.
+Step find_step(const Scene& scene, const Parameter& parameter, size_t parameters,
+               const RunSettings& run, double& seconds) {
+  RunSettings settings = run;
+  settings.progress = nullptr;
+  settings.seconds = kPilotShare * run.seconds / parameters;
+  // Without a limit of time, pilot and run differ by their samples.
+  if (run.seconds == 0) {
+    settings.spp = std::max(kPilotSamples, static_cast<int>(kPilotShare * run.spp));
   }
-
-  std::vector<MethodSetting> settings() const override {
-    return {{"step", step_}, {"step_found_by", how_}};
+  settings.least_spp = kPilotSamples;
+  settings.seed = run.seed + 1;  // not the samples that the run will take
+  DifferenceJob job{parameter.name, {}, steps_and_changes()};
+  for (int k = kTrials - 1; k >= 0; --k) {
+    job.steps.push_back(parameter.natural_step * std::pow(kFactor, -k));
   }
-
- private:
-  // One pilot for all runs of the same time; each run is charged for it.
-  const Pilot& pilot_for(const RunSettings& settings) {
-    const auto [place, is_new] = pilots_.try_emplace(settings.seconds);
-    if (is_new) place->second = input_.step > 0 ? Pilot{input_.step, 0, "--step"} : find(settings);
-    return place->second;
+  const CentralDifferences r = central_differences(scene, {job}, 0, settings);
+  seconds += r.seconds;
+  if (r.spp < kPilotSamples) return {parameter.natural_step, "interrupted"};
+  std::vector<StepTrial> trials;
+  for (int k = 0; k < kTrials; ++k) {
+    const Moments& change = r.estimates[0][kTrials + std::max(k - 1, 0)].total;
+    trials.push_back({job.steps[k],
+                      mean_variance(r.estimates[0][k].total) * static_cast<double>(r.spp),
+                      mean_square(means(change)) - mean_variance(change)});
   }
+  // A run makes two images a sample and parameter, the pilot 2 kTrials.
+  const double per_second =
+      kTrials * static_cast<double>(r.spp) / std::max(r.seconds - r.setup_seconds, 1e-9);
+  const double left = (run.seconds - r.setup_seconds / kTrials) / parameters - r.seconds;
+  const double samples = run.seconds > 0 ? per_second * left : run.spp;
+  return {best_step(trials, samples),
+          fmt::format("a pilot of {} samples per pixel at {} steps from {:.3g} to {:.3g}: least sum "
+                      "of squared bias and variance for {:.3g} samples per pixel",
+                      r.spp, kTrials, job.steps.front(), job.steps.back(), samples)};
+}
 
-  Pilot find(const RunSettings& run) const {
-    RunSettings settings = run;
-    settings.seconds = kPilotShare * run.seconds;
-    settings.progress = nullptr;
-    settings.least_spp = kPilotSamples;
-    settings.seed = run.seed + 1;  // not the samples that the run will take
-    std::vector<double> steps;
-    for (int k = kTrials - 1; k >= 0; --k) steps.push_back(natural_ * std::pow(kFactor, -k));
-    const CentralDifferences r = central_differences(input_.scene, input_.parameter, steps,
-                                                     steps_and_changes(), input_.block, settings);
-    if (r.spp < kPilotSamples) return {natural_, r.seconds, "interrupted"};
-    std::vector<StepTrial> trials;
-    for (int k = 0; k < kTrials; ++k) {
-      const Moments& change = r.estimates[kTrials + std::max(k - 1, 0)].total;
-      trials.push_back({steps[k], mean_variance(r.estimates[k].total) * static_cast<double>(r.spp),
-                        mean_square(means(change)) - mean_variance(change)});
-    }
-    // A run makes two images a sample, the pilot 2 kTrials.
-    const double samples_per_second =
-        kTrials * static_cast<double>(r.spp) / std::max(r.seconds - r.setup_seconds, 1e-9);
-    const double left = run.seconds - r.seconds - r.setup_seconds / kTrials;
-    return {best_step(trials, samples_per_second * left), r.seconds,
-            fmt::format("a pilot of {} samples per pixel at {} steps from {:.3g} to {:.3g}: least "
-                        "sum of squared bias and variance for a run of {:.3g} s",
-                        r.spp, kTrials, steps.front(), steps.back(), run.seconds)};
-  }
-
-  // The differences at every step, and what changes from each to the next.
-  static std::vector<std::vector<double>> steps_and_changes() {
-    std::vector<std::vector<double>> combinations(2 * kTrials - 1, std::vector<double>(kTrials));
-    for (int k = 0; k < kTrials; ++k) combinations[k][k] = 1;
-    for (int k = 0; k + 1 < kTrials; ++k) {
-      combinations[kTrials + k][k] = -1;
-      combinations[kTrials + k][k + 1] = 1;
-    }
-    return combinations;
-  }
-
-  const MethodInput& input_;
-  double natural_;
-  std::map<double, Pilot> pilots_;
-  double step_ = 0;
-  std::string how_;
-};
+ParameterGradient to_gradient(const std::string& name, DifferenceEstimate& estimate) {
+  ParameterGradient g;
+  g.name = name;
+  g.terms = {estimate.total};
+  g.total = std::move(estimate.total);
+  if (estimate.blocks.size() > 0) g.term_blocks = {estimate.blocks};
+  g.total_blocks = std::move(estimate.blocks);
+  g.image_sum = std::move(estimate.image_sum);
+  g.events = estimate.events;
+  return g;
+}
 
 }  // namespace
+
+GradientResult run_differences(const MethodType& method, const Scene& scene,
+                               const GradientOptions& options, const RunSettings& settings) {
+  const Stopwatch watch;
+  std::vector<DifferenceJob> jobs;
+  GradientResult result;
+  std::vector<Parameter> parameters;
+  for (const std::string& name : options.parameters) {
+    parameters.push_back(find_parameter(scene, name));
+  }
+  double pilot_seconds = 0;
+  for (const Parameter& parameter : parameters) {
+    const Step step = options.step > 0 ? Step{options.step, "--step"}
+                                       : find_step(scene, parameter, parameters.size(), settings,
+                                                   pilot_seconds);
+    jobs.push_back({parameter.name, {step.value}, {{1}}});
+    const std::string of = parameters.size() > 1 ? " of " + parameter.name : "";
+    result.settings.push_back({"step" + of, step.value});
+    result.settings.push_back({"step" + of + " found by", step.found_by});
+  }
+  RunSettings rest = settings;
+  if (settings.seconds > 0) {
+    rest.seconds = std::max(settings.seconds - watch.seconds(), kPilotShare * settings.seconds);
+  }
+  CentralDifferences run = central_differences(scene, jobs, options.block, rest);
+  for (size_t k = 0; k < jobs.size(); ++k) {
+    result.parameters.push_back(to_gradient(jobs[k].parameter, run.estimates[k][0]));
+  }
+  result.radiance = std::move(run.radiance);
+  result.terms = {{method.terms[0], true, true, 1, run.cost}};
+  result.spp = run.spp;
+  result.seconds = watch.seconds();
+  result.setup_seconds = run.setup_seconds + pilot_seconds;
+  result.stats.setup = {{"pilot", pilot_seconds}, {"moved scenes", run.setup_seconds}};
+  result.non_finite = std::move(run.non_finite);
+  return result;
+}
 
 double best_step(std::span<const StepTrial> trials, double samples) {
   const double factor = trials[1].step / trials[0].step, square = factor * factor;
@@ -135,10 +149,6 @@ double best_step(std::span<const StepTrial> trials, double samples) {
   if (!(bias > 0 && power > 0)) return trials[k].step;
   const double x = std::pow(power * noise / (4 * bias), 1 / (4 + power));
   return std::clamp(x, 1 / factor, factor) * trials[k].step;
-}
-
-std::unique_ptr<DerivativeMethod> make_difference_method(const MethodInput& input) {
-  return std::make_unique<DifferenceMethod>(input);
 }
 
 }  // namespace limn

@@ -1,14 +1,8 @@
 #pragma once
-// Finite differences as a method to compare with, and how their step is found.
+// How the step of finite differences is found.
 #include <span>
 
-#include "limn/integrators/derivative_method.h"
-
 namespace limn {
-
-inline constexpr const char* kDifferences = "fd";
-
-std::unique_ptr<DerivativeMethod> make_difference_method(const MethodInput& input);
 
 // What a pilot saw of central differences D_h at one step, as means over pixels and channels.
 struct StepTrial {

@@ -1,9 +1,25 @@
-#include "integrators/terms/camera_boundary.h"
+// The boundary term of the camera: edges seen from the pinhole, listed once, sampled on the film.
+//   dI_j/dtheta  +=  integral along the projected edges of h_j(s) dL v_n dl,
+// with s the film position [pixels], dl its length element, v_n = ds/dtheta . n the normal speed of
+// the projected edge, and dL the radiance behind the normal n minus that before it.
 
 #include <algorithm>
+#include <vector>
+
+#include "integrators/terms/edge_jump.h"
+#include "integrators/terms/term_table.h"
 
 namespace limn {
 namespace {
+
+struct FilmEdge {
+  EdgeId id;
+  double t0, t1;          // the part of the edge that may reach the film
+  double depth0, depth1;  // depths of its two ends
+  double x0, y0, x1, y1;  // their film positions
+  Lanes speed0, speed1;   // v_n there [pixels]; n points to the positive side of EdgeView::side
+  double length;          // [pixels]
+};
 
 struct Window {
   double x0, y0, x1, y1;
@@ -38,16 +54,35 @@ double weighted_speed(const FilmEdge& edge, int lane) {
   return edge.length * std::max(std::fabs(edge.speed0[lane]), std::fabs(edge.speed1[lane]));
 }
 
-}  // namespace
+class CameraTerm final : public Term {
+ public:
+  explicit CameraTerm(TermInput& input) : context_(input.context), objects_(input.edges().objects) {
+    const Stopwatch watch;
+    for (uint32_t object = 0; object < objects_.size(); ++object) add_object(object);
+    weigh(input.lanes);
+    list_seconds_ = watch.seconds();
+  }
 
-CameraBoundary::CameraBoundary(const PathContext& context, const std::vector<EdgeMesh>& objects,
-                               int lanes)
-    : context_(context), objects_(objects) {
-  for (uint32_t object = 0; object < objects.size(); ++object) add_object(object);
-  weigh(lanes);
-}
+  bool uses_film() const override { return !edges_.empty(); }
+  bool sample_film(double u, const Rng& key, RayCount& rays, FilmSample& sample) const override;
+  void describe(GradientStats& stats) const override {
+    stats.setup.emplace_back("edges on the film", list_seconds_);
+    stats.edges.emplace_back("moving on the film", edges_.size());
+  }
 
-void CameraBoundary::add_object(uint32_t object) {
+ private:
+  void add_object(uint32_t object);
+  bool clip_and_project(EdgeId id, FilmEdge& edge) const;
+  void weigh(int lanes);
+
+  const PathContext& context_;
+  const std::vector<EdgeMesh>& objects_;
+  std::vector<FilmEdge> edges_;
+  std::vector<double> cumulative_;  // probabilities of the edges, summed
+  double list_seconds_ = 0;
+};
+
+void CameraTerm::add_object(uint32_t object) {
   if (context_.scene.hide_emitters && context_.scene.shapes[object].is_emitter) return;
   const EdgeMesh& mesh = objects_[object];
   const Vec3d pinhole = value(context_.scene.camera.origin);
@@ -59,7 +94,7 @@ void CameraBoundary::add_object(uint32_t object) {
   }
 }
 
-bool CameraBoundary::clip_and_project(EdgeId id, FilmEdge& edge) const {
+bool CameraTerm::clip_and_project(EdgeId id, FilmEdge& edge) const {
   const EdgeMesh& mesh = objects_[id.object];
   const Camera& camera = context_.scene.camera;
   const auto& ends = mesh.edges[id.edge].vertices;
@@ -123,7 +158,7 @@ bool CameraBoundary::clip_and_project(EdgeId id, FilmEdge& edge) const {
 
 // Projected length times speed: exact but for the jump itself. Every parameter gets an equal
 // share of the samples, whatever its unit.
-void CameraBoundary::weigh(int lanes) {
+void CameraTerm::weigh(int lanes) {
   Lanes totals;
   for (const FilmEdge& edge : edges_) {
     for (int k = 0; k < lanes; ++k) totals[k] += weighted_speed(edge, k);
@@ -137,7 +172,7 @@ void CameraBoundary::weigh(int lanes) {
   }
 }
 
-bool CameraBoundary::sample(double u, const Rng& key, RayCount& rays, FilmSample& sample) const {
+bool CameraTerm::sample_film(double u, const Rng& key, RayCount& rays, FilmSample& sample) const {
   const double target = u * cumulative_.back();
   const auto found = std::upper_bound(cumulative_.begin(), cumulative_.end(), target);
   const size_t index = std::min<size_t>(found - cumulative_.begin(), edges_.size() - 1);
@@ -161,6 +196,12 @@ bool CameraBoundary::sample(double u, const Rng& key, RayCount& rays, FilmSample
   const Lanes speed = (edge.speed0 * (1 - s) + edge.speed1 * s) / density;
   sample.value = {speed * jump.r, speed * jump.g, speed * jump.b};
   return true;
+}
+
+}  // namespace
+
+std::unique_ptr<Term> make_camera_term(TermInput& input) {
+  return std::make_unique<CameraTerm>(input);
 }
 
 }  // namespace limn

@@ -12,6 +12,7 @@
 #include "limn/core/rng.h"
 #include "limn/core/scene.h"
 #include "limn/core/shading.h"
+#include "limn/integrators/run.h"
 
 namespace limn {
 
@@ -19,13 +20,6 @@ struct PathContext {
   const Scene& scene;
   const RayTracer& tracer;
   const Lights& lights;
-};
-
-// Rays that were traced on behalf of one term.
-struct RayCount {
-  uint64_t closest = 0;
-  uint64_t shadow = 0;
-  uint64_t total() const { return closest + shadow; }
 };
 
 // A path that starts exactly on an edge, on one of the faces around it. Its first rays never meet

@@ -1,6 +1,11 @@
-#include "integrators/terms/shading_boundary.h"
+// The boundary term of shading points: some samples of it at every vertex of a path, weighed by the
+// path's throughput.
+//   dL_o/dtheta  +=  sum over edges of the integral over t of dL(t) f_s(w_t) J(t) dt,
+//   J(t) = det(w_0, w_1, v) / |w|^3
+#include <fmt/format.h>
 
-#include <algorithm>
+#include "integrators/terms/edge_jump.h"
+#include "integrators/terms/term_table.h"
 
 namespace limn {
 namespace {
@@ -13,85 +18,106 @@ Vec3<Lanes> edge_velocity(const EdgeMesh& mesh, uint32_t edge, double t) {
 
 Vec3<Lanes> velocity(const Vec3<Dual>& p) { return {p.x.d, p.y.d, p.z.d}; }
 
-}  // namespace
+class BoundaryTerm final : public Term {
+ public:
+  explicit BoundaryTerm(TermInput& input) : context_(input.context), edges_(input.edges()) {
+    const Stopwatch watch;
+    sampler_ = input.sampler.make(edges_, input.threads);
+    build_seconds_ = watch.seconds();
+  }
 
-EdgeSamplerInput make_sampler_input(const Scene& scene) {
-  EdgeSamplerInput input;
-  for (const Shape& shape : scene.shapes) {
-    const bool black_behind = shape.bsdf->side(false) == nullptr;
-    input.objects.push_back(build_edge_mesh(shape.mesh, black_behind));
-    if (!shape.is_emitter) continue;
-    for (uint32_t f = 0; f < shape.mesh.faces.size(); ++f) {
-      const auto corners = face_corners<double>(shape.mesh, f);
-      input.lights.push_back(
-          {{corners[0], corners[1], corners[2]}, luminance(value(shape.radiance))});
+  bool uses_vertices() const override { return true; }
+  void add_at_vertex(const PathVertex& vertex, int samples, TermCost& cost,
+                     Rgb<Lanes>& sum) const override {
+    EdgeQuery query;
+    query.p = value(vertex.surface.p);
+    query.n = value(vertex.scattering.normal());
+    query.wi = value(vertex.scattering.wi());
+    query.lobe = vertex.scattering.bsdf().lobe();
+    query.velocity = velocity(vertex.surface.p);
+    query.object = vertex.surface.face.shape;
+    query.face = vertex.surface.face.face;
+    for (int i = 0; i < samples; ++i) {
+      add_sample(vertex, query, vertex.key.copy(Purpose::kEdgeCopy, i), cost, sum);
     }
   }
-  if (!scene.environment) return input;
-  const Environment& environment = *scene.environment;
-  input.environment_luminance = environment.mean_luminance();
-  if (!environment.is_uniform()) {
-    const auto brightness = [&](const Vec3d& d) {
-      return std::max(0.0, luminance(environment.radiance(d)));
-    };
-    input.environment = std::make_shared<RadiancePyramid>(brightness, 8, 2);
-  }
-  return input;
-}
 
-void ShadingBoundary::operator()(const SurfacePoint<Dual>& surface,
-                                 const Scattering<Dual>& scattering, const Rgb<Dual>& throughput,
-                                 int bounces, const Rng& key) {
-  const Stopwatch watch;
-  EdgeQuery query;
-  query.p = value(surface.p);
-  query.n = value(scattering.normal());
-  query.wi = value(scattering.wi());
-  query.lobe = scattering.bsdf().lobe();
-  query.velocity = velocity(surface.p);
-  query.object = surface.face.shape;
-  query.face = surface.face.face;
-  for (int i = 0; i < samples_; ++i) {
-    add_sample(query, scattering, value(throughput), bounces, key.copy(Purpose::kEdgeCopy, i));
+  double work(const TermCost& cost) const override {
+    return static_cast<double>(cost.rays) +
+           sampler_->draw_cost() * static_cast<double>(cost.samples);
   }
-  cost_.seconds += watch.seconds();
-}
 
-void ShadingBoundary::add_sample(const EdgeQuery& query, const Scattering<Dual>& scattering,
-                                 const Rgb<double>& throughput, int bounces, const Rng& key) {
-  ++cost_.samples;
-  Rng rng = key.at(Purpose::kEdge, bounces);
+  void describe(GradientStats& stats) const override {
+    stats.setup.emplace_back("edge sampler", build_seconds_);
+  }
+
+ private:
+  void add_sample(const PathVertex& vertex, const EdgeQuery& query, const Rng& key, TermCost& cost,
+                  Rgb<Lanes>& sum) const;
+
+  const PathContext& context_;
+  const EdgeSamplerInput& edges_;
+  std::unique_ptr<EdgeSampler> sampler_;
+  double build_seconds_ = 0;
+};
+
+void BoundaryTerm::add_sample(const PathVertex& vertex, const EdgeQuery& query, const Rng& key,
+                              TermCost& cost, Rgb<Lanes>& sum) const {
+  ++cost.samples;
+  Rng rng = key.at(Purpose::kEdge, vertex.bounces);
   EdgeSample sample;
-  if (!sampler_.sample(query, rng, sample)) {
-    ++cost_.no_edge;
+  if (!sampler_->sample(query, rng, sample)) {
+    ++cost.no_edge;
+    if (vertex.log) vertex.log->push_back("  edge: none found");
     return;
   }
-  const EdgeMesh& mesh = objects_[sample.edge.object];
+  const EdgeMesh& mesh = edges_.objects[sample.edge.object];
   EdgeView view;
   const bool seen = view_edge(mesh, sample.edge, sample.t, query.p, view);
   const Vec3<Lanes> v = edge_velocity(mesh, sample.edge.edge, sample.t) - query.velocity;
   const Lanes weight =
       (v.x * view.side.x + v.y * view.side.y + v.z * view.side.z) *
       (1 / (view.distance * view.distance * view.distance * sample.probability * sample.pdf_t));
+  if (vertex.log) {
+    vertex.log->push_back(fmt::format(
+        "  edge {} of shape {} at t = {:.6g}: probability {:.4g}, density of t {:.4g}, distance "
+        "{:.6g}",
+        sample.edge.edge, sample.edge.object, sample.t, sample.probability, sample.pdf_t,
+        view.distance));
+  }
   // A density may round to zero at the very horizon.
   const Rgb<double> f =
-      seen && sample.pdf_t > 0 ? value(scattering.eval(view.omega)) : Rgb<double>{};
+      seen && sample.pdf_t > 0 ? value(vertex.scattering.eval(view.omega)) : Rgb<double>{};
   if (is_zero(weight) || is_black(f)) {
-    ++cost_.zero_weight;
+    ++cost.zero_weight;
+    if (vertex.log) vertex.log->push_back("    no weight");
     return;
   }
   RayCount rays;
   Rgb<double> jump;
-  const bool visible =
-      edge_jump(context_, mesh, view, {query.object, query.face}, 0, bounces + 1, key, rays, jump);
-  cost_.rays += rays.total();
+  const bool visible = edge_jump(context_, mesh, view, {query.object, query.face}, 0,
+                                 vertex.bounces + 1, key, rays, jump);
+  cost.add(rays);
   if (!visible) {
-    ++cost_.occluded;
+    ++cost.occluded;
+    if (vertex.log) vertex.log->push_back("    hidden");
     return;
   }
-  ++cost_.counted;
-  const Rgb<double> amount = throughput * f * jump;
-  sum_ = sum_ + Rgb<Lanes>{weight * amount.r, weight * amount.g, weight * amount.b};
+  ++cost.counted;
+  const Rgb<double> amount = vertex.throughput * f * jump;
+  const Rgb<Lanes> added{weight * amount.r, weight * amount.g, weight * amount.b};
+  if (vertex.log) {
+    vertex.log->push_back(fmt::format(
+        "    jump ({:.6g}, {:.6g}, {:.6g}), adds ({:.6g}, {:.6g}, {:.6g}) to the first parameter",
+        jump.r, jump.g, jump.b, added.r[0], added.g[0], added.b[0]));
+  }
+  sum = sum + added;
+}
+
+}  // namespace
+
+std::unique_ptr<Term> make_boundary_term(TermInput& input) {
+  return std::make_unique<BoundaryTerm>(input);
 }
 
 }  // namespace limn

@@ -9,9 +9,10 @@
 #include <memory>
 #include <span>
 
+#include "integrators/estimates/sample_estimator.h"
 #include "integrators/terms/path.h"
 #include "limn/core/dual.h"
-#include "limn/edgetree/edge_sampler.h"
+#include "limn/edgetree/edge_sampler_types.h"
 #include "limn/integrators/gradient.h"
 
 namespace limn {
@@ -23,21 +24,15 @@ struct PathVertex {
   const Rgb<double>& throughput;  // of the path up to here
   int bounces;                    // how often it has scattered before
   const Rng& key;                 // of the path
-};
-
-// A point on a curve of the film across which radiance jumps.
-struct FilmSample {
-  double x, y;       // film position [pixels]
-  Rgb<Lanes> value;  // jump times normal speed of the curve [pixels per unit of the parameter],
-                     // over the density of the sample [1 / pixel of length]
+  SampleLog* log = nullptr;       // null unless somebody reads it
 };
 
 class Term {
  public:
   virtual ~Term() = default;
 
-  // Whether finished paths add something, and what: a path's radiance with its derivative. Averaged
-  // over the paths of a sample, as many as the term has samples.
+  // What a finished path adds: made of its radiance with its derivative. Averaged over the paths of
+  // a sample, as many as the term that traces them has samples.
   virtual bool uses_paths() const { return false; }
   virtual Rgb<Lanes> add_path(const Rgb<Dual>& /*radiance*/) const { return {}; }
 
@@ -59,13 +54,16 @@ class Term {
   // What the samples behind `cost` cost, in units of one ray with the shading at its end: the same
   // on every machine, so that choices that follow from it are.
   virtual double work(const TermCost& cost) const { return static_cast<double>(cost.rays); }
+
+  // What the term built, for people to read.
+  virtual void describe(GradientStats& /*stats*/) const {}
 };
 
 // What the terms of a pass are made from. It outlives them.
 class TermInput {
  public:
   TermInput(const PathContext& path_context, int lane_count, const Lanes& lane_scales,
-            const EdgeSamplerType* sampler_type, int thread_count)
+            const EdgeSamplerType& sampler_type, int thread_count)
       : context(path_context),
         lanes(lane_count),
         lane_scale(lane_scales),
@@ -75,26 +73,39 @@ class TermInput {
   const PathContext& context;      // the scene with its parameters seeded
   int lanes;                       // how many derivative lanes are in use
   Lanes lane_scale;                // what makes speeds of the parameters comparable
-  const EdgeSamplerType* sampler;  // how shading points choose an edge; null if none does
+  const EdgeSamplerType& sampler;  // how shading points choose an edge
   int threads;
 
   // Edges of all shapes (object i is shape i), light polygons and the environment, as an edge
   // sampler takes them. Made when a term first asks.
   const EdgeSamplerInput& edges();
+  // Null if no term has asked.
+  const EdgeSamplerInput* made_edges() const { return edges_.get(); }
+  double edges_seconds() const { return edges_seconds_; }
 
  private:
   std::unique_ptr<EdgeSamplerInput> edges_;
+  double edges_seconds_ = 0;
 };
 
 // One row per term.
 struct TermType {
   const char* name;
   const char* description;
-  double least_samples;  // per sample of a pixel: 1 where they belong to paths, less on the film
-  // Null where the scene has nothing that the term could be of.
+  // The least number of samples in a sample of a pixel: whole numbers from 1 where they belong to
+  // paths, less than 1 where they belong to the film.
+  double least_samples;
+  // Paths are this term's samples, and what it takes to trace them is booked on it even if only
+  // others are computed. One row.
+  bool traces_paths;
+  bool edges;                           // it samples edges: rare events
+  int film_stream;                      // tells the random numbers of terms on the film apart
+  bool (*applies)(const Scene& scene);  // whether the scene has anything that the term could be of
   std::unique_ptr<Term> (*make)(TermInput& input);
 };
 // In the order of --samples and of all tables.
 std::span<const TermType> term_types();
+// Sums of all terms are kept on the stack.
+inline constexpr size_t kMostTerms = 4;
 
 }  // namespace limn

@@ -8,7 +8,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "limn/edgetree/edge_sampler.h"
+#include "limn/edgetree/edge_sampler_types.h"
 #include "limn/integrators/gradient.h"
 #include "limn/integrators/statistics.h"
 

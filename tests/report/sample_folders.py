@@ -161,7 +161,7 @@ def comparison(folder, scene, parameter, times, methods):
         "reference": {
             "image": "reference.exr",
             "picture": "reference.png",
-            "sampler": "forest",
+            "method": "forest",
             "spp": 16384,
             "seconds": 812.5,
             "seed": 99,

@@ -10,7 +10,7 @@
 #include "../support/running_mean.h"
 #include "limn/core/error.h"
 #include "limn/edgetree/contribution_bound.h"
-#include "limn/edgetree/edge_sampler.h"
+#include "limn/edgetree/edge_sampler_types.h"
 
 namespace limn {
 namespace {

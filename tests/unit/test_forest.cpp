@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "../support/meshes.h"
-#include "limn/edgetree/edge_forest.h"
+#include "edgetree/forest/edge_forest.h"
 
 namespace limn {
 namespace {

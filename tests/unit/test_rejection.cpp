@@ -10,7 +10,8 @@
 #include <numeric>
 
 #include "../support/meshes.h"
-#include "limn/edgetree/edge_forest.h"
+#include "edgetree/forest/edge_forest.h"
+#include "limn/edgetree/edge_sampler_types.h"
 #include "limn/edgetree/rejection_places.h"
 
 namespace limn {

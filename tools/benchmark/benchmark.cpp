@@ -10,7 +10,7 @@
 #include "limn/core/lights.h"
 #include "limn/core/ray_tracer.h"
 #include "limn/core/shading.h"
-#include "limn/edgetree/edge_sampler.h"
+#include "limn/edgetree/edge_sampler_types.h"
 #include "limn/integrators/gradient.h"
 #include "limn/integrators/render.h"
 

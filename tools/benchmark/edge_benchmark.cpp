@@ -1,13 +1,15 @@
-// Measures the edge forest: hit rates, costs and build times over meshes and variants. One table to
-// standard output; seeds are fixed.
+// Measures edge samplers, all rows of their table: hit rate (the share of draws that end on an edge
+// of E(p)), cost of a draw, time of the build. One table to standard output; seeds are fixed.
 //   edge_benchmark [MESH.obj|MESH.ply ...]
-// Without meshes: tori of 1k to 1M edges.
+// Without meshes: the default sampler on tori of 1k to 1M edges.
 #include <fmt/core.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <ctime>
+#include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,7 +17,8 @@
 #include "limn/core/parallel.h"
 #include "limn/core/ray_tracer.h"
 #include "limn/edgetree/contribution_bound.h"
-#include "limn/edgetree/edge_forest.h"
+#include "limn/edgetree/edge_sampler_types.h"
+#include "limn/edgetree/rejection.h"
 
 namespace limn {
 namespace {
@@ -33,39 +36,6 @@ class Stopwatch {
  private:
   std::clock_t start_ = std::clock();
 };
-
-struct Variant {
-  std::string name;
-  ForestConfig config;
-};
-std::vector<Variant> variants() {
-  std::vector<Variant> list{{"forest", {}}};
-  const auto add = [&](const std::string& name, bool ForestConfig::*option) {
-    ForestConfig config;
-    config.*option = false;
-    list.push_back({name, config});
-  };
-  add("arbitrary axes", &ForestConfig::principal_axes);
-  add("no soft weights", &ForestConfig::soft_weights);
-  add("no concave culling", &ForestConfig::cull_concave);
-  const auto add_choice = [&](const std::string& name, uint32_t width, int look_ahead) {
-    ForestConfig config;
-    config.width = width;
-    config.look_ahead = look_ahead;
-    list.push_back({name, config});
-  };
-  add_choice("edges ahead", 8, 0);
-  add_choice("none ahead", 8, -1);
-  add_choice("all ahead", 8, ForestConfig::kAnyHeight);
-  add_choice("4-wide", 4, -1);
-  add_choice("4-wide, all ahead", 4, ForestConfig::kAnyHeight);
-  add_choice("2-wide", 2, -1);
-  ForestConfig config;
-  config.look_ahead = -1;
-  config.principal_axes = config.soft_weights = false;
-  list.push_back({"boxes alone", config});
-  return list;
-}
 
 // A torus with bumps, about 6 tube^2 edges.
 Mesh bumpy_torus(int tube) {
@@ -126,14 +96,15 @@ std::vector<EdgeQuery> queries_around(const Mesh& mesh, int count, const LobeSum
 struct Draws {
   double hit_rate = 0, nanoseconds = 0;
 };
-Draws measure_draws(const EdgeForest& forest, const std::vector<EdgeQuery>& queries, int repeat) {
+// repeat: draws of each query.
+Draws measure_draws(const EdgeSampler& sampler, const std::vector<EdgeQuery>& queries, int repeat) {
   uint64_t hits = 0;
   Rng rng(2, 0, 0);
   const Stopwatch watch;
   for (int k = 0; k < repeat; ++k)
     for (const EdgeQuery& q : queries) {
       EdgeSample sample;
-      hits += forest.sample(q, rng, sample);
+      hits += sampler.sample(q, rng, sample);
     }
   const double draws = static_cast<double>(queries.size()) * repeat;
   return {static_cast<double>(hits) / draws, watch.seconds() * 1e9 / draws};
@@ -142,19 +113,18 @@ Draws measure_draws(const EdgeForest& forest, const std::vector<EdgeQuery>& quer
 // (sum b)^2 / sum of b^2 / P, b the bound of an edge's contribution: 1 if edges are drawn in
 // proportion to it, the inverse of the number of draws that one ideal draw is worth. Mean over
 // queries of the numerator over that of the denominator.
-double efficiency(const EdgeForest& forest, const EdgeMesh& mesh,
+double efficiency(const EdgeSampler& sampler, const EdgeMesh& mesh,
                   const std::vector<EdgeQuery>& queries) {
   double squares = 0, seconds = 0;
   for (const EdgeQuery& q : queries) {
-    std::vector<EdgeId> edges;
-    forest.list_silhouettes(q.p, edges);
     const LobeBound lobe(q.n, q.wi, q.lobe);
     double sum = 0, second = 0;
-    for (EdgeId id : edges) {
-      const double b = EdgeBound(lobe, segment_of(mesh, id.edge, q)).total();
+    for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
+      if (!is_candidate(mesh, e, q.p)) continue;
+      const double b = EdgeBound(lobe, segment_of(mesh, e, q)).total();
       if (!(b > 0)) continue;
       sum += b;
-      second += b * b / forest.probability(q, id);
+      second += b * b / sampler.probability(q, {0, e});
     }
     squares += sum * sum;
     seconds += second;
@@ -162,14 +132,15 @@ double efficiency(const EdgeForest& forest, const EdgeMesh& mesh,
   return squares / seconds;
 }
 
-double nodes_per_silhouette(const EdgeForest& forest, const std::vector<EdgeQuery>& queries) {
-  uint64_t nodes = 0, found = 0;
-  for (const EdgeQuery& q : queries) {
-    std::vector<EdgeId> edges;
-    nodes += forest.list_silhouettes(q.p, edges);
-    found += edges.size();
-  }
-  return static_cast<double>(nodes) / static_cast<double>(found);
+// Rejection tests (of nodes and of edges) to find all of E(p), over its size; 0 without a tree.
+double tests_per_silhouette(const EdgeSamplerInput& input, const EdgeSampler& sampler,
+                            const std::vector<EdgeQuery>& queries) {
+  const auto tree = sampler.rejection_tree();
+  if (!tree) return 0;
+  const ReachCounts counts = count_reach(input, *tree, queries, 2);
+  uint64_t tests = 0;
+  for (const DepthCounts& depth : counts.by_depth) tests += depth.tested;
+  return static_cast<double>(tests) / static_cast<double>(counts.silhouettes);
 }
 
 double ray_nanoseconds(const Mesh& mesh) {
@@ -194,7 +165,29 @@ double ray_nanoseconds(const Mesh& mesh) {
   return hits > 0 ? time * 1e9 / static_cast<double>(rays.size()) : 0;
 }
 
-void measure(const std::string& name, const Mesh& mesh, bool all_variants) {
+void measure(const EdgeSamplerInput& input, const EdgeSamplerType& type,
+             const std::vector<EdgeQuery>& queries, const std::vector<EdgeQuery>& glossy) {
+  std::unique_ptr<EdgeSampler> sampler;
+  double build[2];
+  for (int threads = 1; threads <= 2; ++threads) {
+    const auto start = Clock::now();
+    sampler = type.make(input, threads);
+    build[threads - 1] = seconds_since(start) * 1e3;
+  }
+  const EdgeMesh& mesh = input.objects[0];
+  // Slow ones draw less often.
+  const int repeat = static_cast<int>(std::clamp(1000 / sampler->draw_cost(), 1.0, 200.0));
+  const Draws draws = measure_draws(*sampler, queries, repeat);
+  const Draws glossy_draws = measure_draws(*sampler, glossy, repeat);
+  const auto bytes = static_cast<double>(sampler->size().bytes);
+  fmt::print("  {:<30} {:8.1f} {:8.1f} {:6.0f} {:6.3f} {:6.3f} {:6.2f} {:8.0f} {:8.0f} {:8.3f}\n",
+             type.name, build[0], build[1], bytes / static_cast<double>(mesh.edges.size()),
+             draws.hit_rate, efficiency(*sampler, mesh, queries),
+             tests_per_silhouette(input, *sampler, queries), draws.nanoseconds,
+             glossy_draws.nanoseconds, efficiency(*sampler, mesh, glossy));
+}
+
+void measure(const std::string& name, const Mesh& mesh, std::span<const EdgeSamplerType> types) {
   EdgeSamplerInput input;
   input.objects.push_back(build_edge_mesh(mesh, true));
   const EdgeMesh& edges = input.objects[0];
@@ -204,30 +197,13 @@ void measure(const std::string& name, const Mesh& mesh, bool all_variants) {
   fmt::print("{}: {} edges, {:.0f} % concave, {}; a ray takes {:.0f} ns\n", name, count,
              100 * static_cast<double>(concave) / count,
              edges.one_sided_closed ? "closed" : "not closed", ray_nanoseconds(mesh));
-  fmt::print("  {:<20} {:>8} {:>8} {:>6} {:>6} {:>6} {:>6} {:>8} {:>8} {:>8}\n", "variant",
-             "build 1", "build 2", "B/edge", "hits", "effic.", "nodes/", "draw", "glossy",
-             "glossy");
-  fmt::print("  {:<20} {:>8} {:>8} {:>6} {:>6} {:>6} {:>6} {:>8} {:>8} {:>8}\n", "", "[ms]", "[ms]",
-             "", "", "", "silh.", "[ns]", "[ns]", "effic.");
+  const char* row = "  {:<30} {:>8} {:>8} {:>6} {:>6} {:>6} {:>6} {:>8} {:>8} {:>8}\n";
+  fmt::print(fmt::runtime(row), "sampler", "build 1", "build 2", "B/edge", "hits", "effic.",
+             "tests/", "draw", "glossy", "glossy");
+  fmt::print(fmt::runtime(row), "", "[ms]", "[ms]", "", "", "", "silh.", "[ns]", "[ns]", "effic.");
   const auto queries = queries_around(mesh, 500, {LobeSummary::Kind::kDiffuse, 1, 0.8});
   const auto glossy = queries_around(mesh, 500, {LobeSummary::Kind::kGgx, 0.1, 0.8});
-  for (const Variant& variant : variants()) {
-    double build[2];
-    for (int threads = 1; threads <= 2; ++threads) {
-      const auto start = Clock::now();
-      EdgeForest::build(input, threads, variant.config);
-      build[threads - 1] = seconds_since(start) * 1e3;
-    }
-    const auto forest = EdgeForest::build(input, 2, variant.config);
-    const Draws draws = measure_draws(*forest, queries, 200);
-    const Draws glossy_draws = measure_draws(*forest, glossy, 200);
-    fmt::print("  {:<20} {:8.1f} {:8.1f} {:6.0f} {:6.3f} {:6.3f} {:6.2f} {:8.0f} {:8.0f} {:8.3f}\n",
-               variant.name, build[0], build[1], static_cast<double>(forest->bytes()) / count,
-               draws.hit_rate, efficiency(*forest, edges, queries),
-               nodes_per_silhouette(*forest, queries), draws.nanoseconds, glossy_draws.nanoseconds,
-               efficiency(*forest, edges, glossy));
-    if (!all_variants) break;
-  }
+  for (const EdgeSamplerType& type : types) measure(input, type, queries, glossy);
 }
 
 }  // namespace
@@ -239,9 +215,10 @@ int main(int argc, char** argv) {
     const std::string file = argv[i];
     const bool ply = file.size() > 4 && file.substr(file.size() - 4) == ".ply";
     const Mesh mesh = ply ? read_ply(file, false) : read_obj(file, false);
-    measure(file.substr(file.find_last_of('/') + 1), smoothed(mesh), true);
+    measure(file.substr(file.find_last_of('/') + 1), smoothed(mesh), edge_sampler_types());
   }
   if (argc > 1) return 0;
   for (int tube : {13, 41, 129, 408})
-    measure(fmt::format("torus {}", tube), smoothed(bumpy_torus(tube)), false);
+    measure(fmt::format("torus {}", tube), smoothed(bumpy_torus(tube)),
+            edge_sampler_types().first(1));
 }

@@ -1,14 +1,13 @@
-#include <fmt/format.h>
-
+// `limn compare`: derivative images of several methods at equal time, with a report.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <set>
 
 #include "limn/core/error.h"
 #include "limn/core/parallel.h"
 #include "limn/core/parameter.h"
+#include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
 #include "tools/limn/compare_output.h"
 #include "tools/mitsuba/mitsuba_method.h"
@@ -20,31 +19,63 @@ namespace fs = std::filesystem;
 
 constexpr int kImageSamples = 256;  // of the plain rendering, at most
 
+struct CompareArguments {
+  std::string parameter;
+  std::vector<std::string> methods;
+  double time = 0;  // seconds of a run, on the longest rung
+  int rungs = 1;    // of the ladder of times
+  int repeats = 4;
+  std::string reference;      // "": made
+  double reference_time = 0;  // 0: four times all runs of one method
+  std::string terms;
+  std::string samples = "auto";  // of each term
+  double step = 0;               // of finite differences; 0: found by a pilot
+  std::string output;
+  bool report = true;
+};
+
+// A way to compare: a row of the table of methods, or Mitsuba, which lives outside.
+struct Row {
+  std::string name;
+  bool terms_can_be_left_out;
+  bool ablation;
+};
+
+std::vector<Row> rows() {
+  std::vector<Row> rows;
+  for (const MethodType& type : method_types()) {
+    rows.push_back({type.name, type.terms_can_be_left_out, type.ablation});
+  }
+  rows.push_back({kMitsuba, false, false});
+  return rows;
+}
+
+std::string row_names(bool all) {
+  std::string names;
+  for (const Row& row : rows()) {
+    if (all || !row.ablation) names += (names.empty() ? "" : ", ") + row.name;
+  }
+  return names;
+}
+
 // Names are checked before any work.
-void check_methods(const std::vector<std::string>& names) {
-  std::vector<MethodName> known = method_names();
-  known.push_back(mitsuba_name());
+void check_methods(const std::vector<std::string>& names, const std::vector<std::string>& terms) {
+  const std::vector<Row> known = rows();
   std::set<std::string> seen;
   for (const std::string& name : names) {
-    const auto same = [&](const MethodName& m) { return m.name == name; };
-    if (std::none_of(known.begin(), known.end(), same)) {
-      std::string list;
-      for (const MethodName& m : known) list += (list.empty() ? "" : ", ") + m.name;
-      throw InputError("--methods: unknown method \"" + name + "\" (known: " + list + ")");
+    const auto row =
+        std::find_if(known.begin(), known.end(), [&](const Row& r) { return r.name == name; });
+    if (row == known.end()) {
+      throw InputError("--methods: unknown method \"" + name + "\" (known: " + row_names(true) +
+                       ")");
     }
     if (!seen.insert(name).second) {
       throw InputError("--methods: \"" + name + "\" is given twice");
     }
-  }
-}
-
-// Methods that know no terms cannot leave one out.
-void check_terms(const std::vector<std::string>& names, const std::array<bool, kTermCount>& terms) {
-  if (std::all_of(terms.begin(), terms.end(), [](bool term) { return term; })) return;
-  for (const std::string& name : names) {
-    if (name != "fd" && name != kMitsuba) continue;
-    throw InputError("--terms: \"" + name +
-                     "\" has all terms in one: leave it out of --methods, or --terms as it is");
+    if (!terms.empty() && !row->terms_can_be_left_out) {
+      throw InputError("--terms: \"" + name +
+                       "\" has all terms in one: leave it out of --methods, or leave out --terms");
+    }
   }
 }
 
@@ -55,7 +86,7 @@ void make_folder(const std::string& folder) {
   check_output((fs::path(folder) / "reference.exr").string());
 }
 
-CompareOptions make_options(const CompareCommand& command) {
+CompareOptions make_options(const CompareArguments& command) {
   CompareOptions options;
   options.repeats = command.repeats;
   for (int rung = command.rungs; rung-- > 0;) {
@@ -108,8 +139,8 @@ class Stages {
 // A whole comparison, step by step.
 class Comparer {
  public:
-  Comparer(const CommonOptions& common, const CompareCommand& command, const Scene& scene,
-           const RunSettings& settings)
+  Comparer(const CommonOptions& common, const CompareArguments& command, const Scene& scene,
+           const RunSettings& settings, const std::string& command_line)
       : common_(common),
         command_(command),
         scene_(scene),
@@ -118,11 +149,11 @@ class Comparer {
                command.step, block_size(scene.film), parse_samples(command.samples)},
         identity_(identify(input_, common.defines)),
         kept_file_((fs::path(command.output) / "reference.exr").string()) {
-    result_.command = command.command_line;
+    result_.command = command_line;
     result_.defines = common.defines;
     result_.parameter = command.parameter;
     result_.unit = find_parameter(scene, command.parameter).unit;
-    result_.terms = command.terms;
+    result_.terms = command.terms.empty() ? "all" : command.terms;
     result_.seed = settings.seed;
     result_.threads = settings.threads;
     result_.options = make_options(command);
@@ -201,7 +232,7 @@ class Comparer {
   }
 
   const CommonOptions& common_;
-  const CompareCommand& command_;
+  const CompareArguments& command_;
   const Scene& scene_;
   const RunSettings& settings_;
   MethodInput input_;
@@ -212,40 +243,94 @@ class Comparer {
   Comparison result_;
 };
 
-}  // namespace
+class CompareCommand final : public Command {
+ public:
+  const char* name() const override { return "compare"; }
+  const char* description() const override {
+    return "Derivative images of several methods at equal time, with a report";
+  }
+  void add_options(CLI::App& app, bool all) override;
+  int run(const std::string& command_line) override;
 
-int run_compare(const CommonOptions& common, const CompareCommand& command) {
-  check_methods(command.methods);
-  check_terms(command.methods, parse_terms(command.terms));
-  if (common.spp > 0) {
+ private:
+  CommonOptions common_;
+  CompareArguments command_;
+};
+
+void CompareCommand::add_options(CLI::App& app, bool all) {
+  add_common_options(app, common_);
+  app.add_option("--wrt", command_.parameter, "Parameter to differentiate")
+      ->required()
+      ->type_name("PARAM");
+  app.add_option("--methods", command_.methods,
+                 "Methods to compare, the first is the measure of the others: " + row_names(all) +
+                     " (the last where Mitsuba 3 is installed)")
+      ->delimiter(',')
+      ->required()
+      ->type_name("A,B,...");
+  app.add_option("--time", command_.time, "Seconds of each run, set-up included")
+      ->required()
+      ->check(CLI::PositiveNumber)
+      ->type_name("SECONDS");
+  app.add_option("--sweep", command_.rungs,
+                 "Error against time: this many times, each twice the one before, up to --time (5 "
+                 "if no number is given)")
+      ->expected(0, 1)
+      ->default_str("5")
+      ->check(CLI::Range(1, 30))
+      ->type_name("N");
+  app.add_option("--repeats", command_.repeats, "Runs of each method and time, for error bars")
+      ->check(CLI::Range(1, 1 << 20))
+      ->capture_default_str();
+  app.add_option("--reference", command_.reference,
+                 "Reference that limn compare wrote for the same scene and parameter (default: "
+                 "that of the folder, or a new one)")
+      ->type_name("FILE.exr");
+  app.add_option("--reference-time", command_.reference_time,
+                 "Seconds for a new reference (default: four times all runs of one method)")
+      ->check(CLI::PositiveNumber)
+      ->type_name("SECONDS");
+  add_term_options(app, command_.terms, command_.samples);
+  app.add_option("--step", command_.step, "Step of finite differences (default: found by a pilot)")
+      ->check(CLI::PositiveNumber);
+  app.add_option("-o,--output", command_.output, "Folder to write")
+      ->required()
+      ->type_name("FOLDER");
+  app.add_flag("!--no-report", command_.report, "Do not make report.html");
+}
+
+int CompareCommand::run(const std::string& command_line) {
+  check_methods(command_.methods, parse_terms(command_.terms));
+  if (common_.spp > 0) {
     throw InputError("--spp: methods are compared at equal time: say how long with --time");
   }
-  const Scene scene = load_scene(common);
-  find_parameter(scene, command.parameter);
-  make_folder(command.output);
-  const RunSettings settings = make_settings(common, scene, "compare");
-  Comparer comparer(common, command, scene, settings);
+  const Scene scene = load_scene(common_);
+  find_parameter(scene, command_.parameter);
+  make_folder(command_.output);
+  const RunSettings settings = make_settings(common_, scene, name());
+  Comparer comparer(common_, command_, scene, settings, command_line);
   if (!comparer.run()) {
     fmt::print(stderr, "interrupted before there was a reference: nothing is written\n");
     return kInterrupted;
   }
   comparer.write();
-  if (!common.quiet) print_comparison(comparer.result());
-  if (!common.json.empty()) {
-    fs::copy_file(fs::path(command.output) / "compare.json", common.json,
+  if (!common_.quiet) print_comparison(comparer.result());
+  if (!common_.json.empty()) {
+    fs::copy_file(fs::path(command_.output) / "compare.json", common_.json,
                   fs::copy_options::overwrite_existing);
   }
   const NonFinite non_finite = comparer.non_finite();
-  if (command.report) write_report(command.output, common.quiet);
-  if (non_finite.count > 0) {
-    fmt::print(stderr, "error: {}\n", non_finite.message());
-    return kNonFinite;
-  }
+  if (command_.report) write_report(command_.output, common_.quiet);
+  if (non_finite.count > 0) return finish_status(non_finite, 0, 0, "", "");
   if (settings.interrupted->load()) {
-    fmt::print(stderr, "interrupted: {} holds all runs that were finished\n", command.output);
+    fmt::print(stderr, "interrupted: {} holds all runs that were finished\n", command_.output);
     return kInterrupted;
   }
   return kSuccess;
 }
+
+}  // namespace
+
+std::unique_ptr<Command> make_compare_command() { return std::make_unique<CompareCommand>(); }
 
 }  // namespace limn

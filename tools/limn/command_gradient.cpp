@@ -1,19 +1,21 @@
-#include <fmt/format.h>
+// `limn gradient`: derivative images with standard errors, by any method.
+#include "limn/integrators/gradient.h"
 
 #include <cctype>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
-#include "limn/integrators/check.h"
-#include "limn/integrators/gradient.h"
+#include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
 
 namespace limn {
 namespace {
 
 using nlohmann::json;
+
+// From this share of the squares of a term's samples on, one of them rules its error.
+constexpr double kRulingShare = 0.1;
 
 // A parameter's name as a part of a file's name.
 std::string file_part(const std::string& name) {
@@ -43,7 +45,8 @@ struct Sum {
 Sum image_sum(const Moments& sum) { return {sum.mean(0), std::sqrt(sum.variance(0))}; }
 
 // Writes the images of one parameter; returns its figures.
-json write_parameter(const Scene& scene, const ParameterGradient& g, const std::string& output,
+json write_parameter(const Scene& scene, const ParameterGradient& g,
+                     const std::vector<TermRun>& terms, const std::string& output,
                      std::vector<ImageAttribute> attributes, const CommonOptions& common) {
   attributes.push_back({"limn.parameter", g.name});
   const int width = scene.film.crop_width;
@@ -67,204 +70,246 @@ json write_parameter(const Scene& scene, const ParameterGradient& g, const std::
         "  picture: blue -{0:.4g}, white 0, red +{0:.4g}; sum over the image {1:.6g} +- {2:.2g}\n",
         scale, sum.value, sum.error);
   }
-  json terms;
-  for (int t = 0; t < kTermCount; ++t) {
-    terms[term_name(t)] = {{"mean_magnitude", mean_magnitude(g.terms[t])},
-                           {"mean_squared_error", mean_squared_error(g.terms[t])}};
+  json term_figures = json::object();
+  for (size_t t = 0; t < terms.size(); ++t) {
+    if (!terms[t].computed) continue;
+    term_figures[terms[t].name] = {{"mean_magnitude", mean_magnitude(g.terms[t])},
+                                   {"mean_squared_error", mean_squared_error(g.terms[t])}};
   }
   return {{"name", g.name},          {"image", output},
           {"picture", picture},      {"stderr", errors},
           {"scale", scale},          {"sum", sum.value},
           {"sum_stderr", sum.error}, {"mean_squared_error", mean_squared_error(g.total)},
-          {"terms", terms}};
+          {"terms", term_figures}};
 }
 
-void print_terms(const GradientResult& result, const std::array<bool, kTermCount>& terms) {
+double share_of(const ParameterGradient& g, size_t term) {
+  double all = 0;
+  for (const Moments& m : g.terms) all += mean_magnitude(m);
+  return all > 0 ? mean_magnitude(g.terms[term]) / all : 0;
+}
+
+void print_terms(const GradientResult& result) {
   double seconds = 0;
-  for (const TermCost& cost : result.costs) seconds += cost.seconds;
-  fmt::print("{:10} {:>7} {:>12} {:>12}", "term", "time", "rays", "samples");
+  size_t width = 10;
+  for (const TermRun& term : result.terms) {
+    seconds += term.cost.seconds;
+    width = std::max(width, term.name.size());
+  }
+  fmt::print("{:{}} {:>7} {:>12} {:>12}", "term", width, "time", "rays", "samples");
   for (const auto& g : result.parameters) fmt::print("  share of {}", g.name);
   fmt::print("\n");
-  for (int t = 0; t < kTermCount; ++t) {
-    const TermCost& cost = result.costs[t];
-    if (!terms[t] && cost.samples == 0) continue;
-    fmt::print("{:10} {:5.1f} % {:>12} {:>12}", term_name(t), 100 * cost.seconds / seconds,
-               cost.rays, cost.samples);
+  for (size_t t = 0; t < result.terms.size(); ++t) {
+    const TermRun& term = result.terms[t];
+    if (!term.computed && term.cost.samples == 0) continue;
+    fmt::print("{:{}} {:5.1f} % {:>12} {:>12}", term.name, width, 100 * term.cost.seconds / seconds,
+               term.cost.rays, term.cost.samples);
     for (const auto& g : result.parameters) {
-      double all = 0;
-      for (const Moments& term : g.terms) all += mean_magnitude(term);
-      fmt::print("  {:>{}.1f} %", all > 0 ? 100 * mean_magnitude(g.terms[t]) / all : 0.0,
-                 g.name.size() + 7);
+      fmt::print("  {:>{}.1f} %", 100 * share_of(g, t), g.name.size() + 7);
     }
     fmt::print("\n");
   }
-  const TermCost& b = result.costs[kBoundary];
-  if (b.samples > 0) {
-    const auto share = [&](uint64_t n) { return 100.0 * n / b.samples; };
+  for (const TermRun& term : result.terms) {
+    const TermCost& c = term.cost;
+    if (c.no_edge + c.zero_weight == 0) continue;
+    const auto share = [&](uint64_t n) { return 100.0 * n / c.samples; };
     fmt::print(
-        "boundary samples: {:.1f} % found no edge, {:.1f} % without weight, {:.1f} % occluded, "
-        "{:.1f} % counted\n",
-        share(b.no_edge), share(b.zero_weight), share(b.occluded), share(b.counted));
+        "{} samples: {:.1f} % found no edge, {:.1f} % without weight, {:.1f} % occluded, {:.1f} % "
+        "counted\n",
+        term.name, share(c.no_edge), share(c.zero_weight), share(c.occluded), share(c.counted));
   }
+}
+
+// "3,0.25,1 of interior, camera, boundary"
+std::string samples_of_terms(const GradientResult& result) {
+  std::string names;
+  for (const TermRun& term : result.terms) names += (names.empty() ? "" : ", ") + term.name;
+  return to_string(result.samples()) + " of " + names;
 }
 
 void print_samples(const GradientResult& r) {
   fmt::print("{} samples per pixel, {:.2f} s, of which {:.2f} s set-up\n", r.spp, r.seconds,
              r.setup_seconds);
-  fmt::print("each holds {} of interior, camera, boundary{}\n", to_string(r.samples),
+  fmt::print("each holds {}{}\n", samples_of_terms(r),
              r.pilot_spp > 0 ? fmt::format(", chosen by {} samples per pixel", r.pilot_spp) : "");
+  for (const MethodSetting& setting : r.settings) {
+    std::visit([&](const auto& value) { fmt::print("{}: {}\n", setting.name, value); },
+               setting.value);
+  }
+}
+
+std::string text_of(const GradientResult& result, const LargestSample& largest) {
+  const auto& place = largest.place;
+  return place.x >= 0
+             ? fmt::format("pixel ({}, {}), sample {}", place.x, place.y, place.sample)
+             : fmt::format("sample {} of {} samples per pixel", place.sample, result.spp);
+}
+
+// Single samples that rule a term's error, each with the command that does it again.
+void print_largest(const GradientResult& result, const std::string& command_line, bool all) {
+  for (const TermRun& term : result.terms) {
+    LargestSample largest = term.cost.largest;
+    if (!term.computed || largest.square == 0) continue;
+    if (!all && largest.share() < kRulingShare) continue;
+    if (largest.place.x < 0) largest.place.term = term.name;
+    fmt::print("{}: one sample holds {:.2g} % of the squares of all: {}\n  to see it: {}\n",
+               term.name, 100 * largest.share(), text_of(result, largest),
+               repeat_command(command_line, largest.place, to_string(result.samples())));
+  }
+}
+
+void print_stats(const GradientResult& result) {
+  if (!result.stats.edges.empty()) {
+    std::string edges;
+    for (const auto& [name, count] : result.stats.edges) {
+      edges += fmt::format("{}{} {}", edges.empty() ? "" : ", ", count, name);
+    }
+    fmt::print("edges: {}\n", edges);
+  }
+  if (result.stats.sampler_nodes > 0) {
+    fmt::print("edge sampler: {} nodes, {:.3g} MB\n", result.stats.sampler_nodes,
+               static_cast<double>(result.stats.sampler_bytes) / 1e6);
+  }
+  for (const TermRun& term : result.terms) {
+    const TermCost& c = term.cost;
+    if (c.samples == 0) continue;
+    fmt::print("{}: {} samples, {} rays to the next surface, {} shadow rays, {:.3g} s of all "
+               "threads\n",
+               term.name, c.samples, c.rays - c.shadow_rays, c.shadow_rays, c.seconds);
+  }
+  for (const auto& [name, seconds] : result.stats.setup) {
+    fmt::print("set-up, {}: {:.3g} s\n", name, seconds);
+  }
 }
 
 json costs_json(const GradientResult& result) {
   json costs;
-  for (int t = 0; t < kTermCount; ++t) {
-    const TermCost& c = result.costs[t];
-    costs[term_name(t)] = {{"seconds", c.seconds},         {"rays", c.rays},
-                           {"samples", c.samples},         {"no_edge", c.no_edge},
-                           {"zero_weight", c.zero_weight}, {"occluded", c.occluded},
-                           {"counted", c.counted}};
+  for (const TermRun& term : result.terms) {
+    const TermCost& c = term.cost;
+    costs[term.name] = {{"seconds", c.seconds},
+                        {"rays", c.rays},
+                        {"shadow_rays", c.shadow_rays},
+                        {"samples", c.samples},
+                        {"no_edge", c.no_edge},
+                        {"zero_weight", c.zero_weight},
+                        {"occluded", c.occluded},
+                        {"counted", c.counted},
+                        {"largest_sample_share", c.largest.share()}};
   }
   return costs;
 }
 
-json samples_json(const SampleCounts& samples) {
-  return {
-      {"interior", samples.interior}, {"camera", samples.camera}, {"boundary", samples.boundary}};
+json stats_json(const GradientStats& stats) {
+  json edges = json::object(), setup = json::object();
+  for (const auto& [name, count] : stats.edges) edges[name] = count;
+  for (const auto& [name, seconds] : stats.setup) setup[name] = seconds;
+  return {{"edges", edges},
+          {"sampler_nodes", stats.sampler_nodes},
+          {"sampler_bytes", stats.sampler_bytes},
+          {"setup_seconds", setup}};
 }
 
-}  // namespace
+class GradientCommand final : public Command {
+ public:
+  const char* name() const override { return "gradient"; }
+  const char* description() const override { return "Derivative images, with standard errors"; }
 
-int run_gradient(const CommonOptions& common, const GradientCommand& command) {
-  const Scene scene = load_scene(common);
-  GradientOptions options;
-  options.parameters = command.parameters;
-  options.terms = parse_terms(command.terms);
-  options.sampler = command.sampler;
-  options.samples = parse_samples(command.samples);
-  for (const auto& name : options.parameters) find_parameter(scene, name);
-  std::vector<std::string> outputs;
-  for (const auto& name : options.parameters) {
-    outputs.push_back(options.parameters.size() == 1
-                          ? command.output
-                          : with_ending(command.output, "_" + file_part(name) + ".exr"));
-    check_output(outputs.back());
+  void add_options(CLI::App& app, bool all) override {
+    add_common_options(app, common_);
+    add_parameter_options(app, options_.parameters, options_.method, all);
+    add_term_options(app, terms_, samples_);
+    app.add_option("--step", options_.step, "Step of finite differences (default: found by a pilot)")
+        ->check(CLI::PositiveNumber);
+    app.add_option("-o,--output", output_,
+                   "Image to write (.exr; _stderr.exr and .png are put beside it)")
+        ->required();
+    app.add_flag("--stats", stats_, "Print edges, nodes, bytes, rays by kind, where the time went");
+    add_debug_option(app, debug_);
   }
-  const RunSettings settings = make_settings(common, scene, "gradient");
-  const GradientResult result = gradient(scene, options, settings);
-  for (const auto& warning : result.warnings) fmt::print(stderr, "warning: {}\n", warning);
-  if (result.spp == 0) {
-    fmt::print(stderr, "interrupted before the first pass over the image: nothing is written\n");
-    return kInterrupted;
-  }
-  auto attributes = provenance(scene, settings, result.spp);
-  attributes.push_back({"limn.terms", command.terms});
-  attributes.push_back({"limn.sampler", command.sampler});
-  attributes.push_back({"limn.samples", to_string(result.samples)});
-  json parameters = json::array();
-  for (size_t k = 0; k < outputs.size(); ++k) {
-    parameters.push_back(
-        write_parameter(scene, result.parameters[k], outputs[k], attributes, common));
-  }
-  if (!common.quiet) {
-    print_terms(result, options.terms);
-    print_samples(result);
-  }
-  const json report = {{"scene", scene.file},
-                       {"spp", result.spp},
-                       {"seed", settings.seed},
-                       {"threads", settings.threads},
-                       {"sampler", command.sampler},
-                       {"terms", command.terms},
-                       {"samples", samples_json(result.samples)},
-                       {"pilot_spp", result.pilot_spp},
-                       {"seconds", result.seconds},
-                       {"setup_seconds", result.setup_seconds},
-                       {"costs", costs_json(result)},
-                       {"non_finite", result.non_finite.count},
-                       {"parameters", parameters}};
-  write_json(common.json, report.dump(2));
-  return finish_status(result.non_finite, result.spp, settings.spp);
-}
 
-namespace {
-
-void print_z(const char* name, double step, const ZSummary& z) {
-  fmt::print("  {:24} {:10.3g} {:7} {:8.2f} {:8.2f} {:8.2f} {:9.2g}\n", name, step, z.count, z.mean,
-             z.deviation, z.largest, std::min(z.p_chi_square, z.p_largest));
-}
-
-json z_json(const ZSummary& z) {
-  return {{"blocks", z.count},
-          {"mean", z.mean},
-          {"deviation", z.deviation},
-          {"largest", z.largest},
-          {"p_chi_square", z.p_chi_square},
-          {"p_largest", z.p_largest}};
-}
-
-void print_check(const std::string& name, const CheckResult& r) {
-  fmt::print(
-      "{}: {} samples per pixel ({} of interior, camera, boundary), blocks of {} x {} pixels\n",
-      name, r.gradient.spp, to_string(r.gradient.samples), r.block, r.block);
-  fmt::print("  {:24} {:>10} {:>7} {:>8} {:>8} {:>8} {:>9}\n", "z against", "step", "blocks",
-             "mean", "sd", "max |z|", "p");
-  print_z("differences", r.step, r.at_step);
-  print_z("differences, twice", 2 * r.step, r.at_double_step);
-  print_z("both, extrapolated", r.step, r.extrapolated);
-  fmt::print("  whole image: gradient {:.6g} +- {:.2g}, differences {:.6g} +- {:.2g}, z = {:.2f}\n",
-             r.total.gradient, r.total.gradient_error, r.total.difference, r.total.difference_error,
-             r.total.z);
-  if (r.agree) {
-    fmt::print("  agree\n");
-    return;
-  }
-  const Suspicion& s = r.suspicions[r.suspect];
-  fmt::print(
-      "  DISAGREE: suspect the {} term: the differences hold {:.3g} times more of it (z = "
-      "{:.1f}).\n"
-      "  If the two steps disagree with each other as well, try a smaller --step.\n",
-      term_name(r.suspect), 1 + s.factor, s.z);
-}
-
-}  // namespace
-
-int run_check(const CommonOptions& common, const GradientCommand& command) {
-  const Scene scene = load_scene(common);
-  const auto terms = parse_terms(command.terms);
-  const auto samples = parse_samples(command.samples);
-  for (const auto& name : command.parameters) find_parameter(scene, name);
-  json report = json::array();
-  int status = kSuccess;
-  for (const auto& name : command.parameters) {
-    const RunSettings settings = make_settings(common, scene, "check " + name);
-    if (settings.spp < 2) throw InputError("check needs --spp of at least 2, for standard errors");
-    const CheckResult r = check(
-        scene, {name, terms, command.sampler, command.step, command.block, samples}, settings);
-    if (r.differences.spp < settings.spp) {
-      fmt::print(stderr, "interrupted: no verdict\n");
+  int run(const std::string& command_line) override {
+    const Scene scene = load_scene(common_);
+    options_.terms = parse_terms(terms_);
+    options_.samples = parse_samples(samples_);
+    if (!debug_.empty()) return trace(scene);
+    for (const auto& parameter : options_.parameters) find_parameter(scene, parameter);
+    for (const auto& parameter : options_.parameters) {
+      outputs_.push_back(options_.parameters.size() == 1
+                             ? output_
+                             : with_ending(output_, "_" + file_part(parameter) + ".exr"));
+      check_output(outputs_.back());
+    }
+    const RunSettings settings = make_settings(common_, scene, name());
+    const GradientResult result = gradient(scene, options_, settings);
+    for (const auto& warning : result.warnings) fmt::print(stderr, "warning: {}\n", warning);
+    if (result.spp == 0) {
+      fmt::print(stderr, "interrupted before the first pass over the image: nothing is written\n");
       return kInterrupted;
     }
-    print_check(name, r);
-    report.push_back({{"parameter", name},
-                      {"step", r.step},
-                      {"spp", r.gradient.spp},
-                      {"samples", samples_json(r.gradient.samples)},
-                      {"agree", r.agree},
-                      {"gradient_sum", r.total.gradient},
-                      {"gradient_sum_stderr", r.total.gradient_error},
-                      {"difference_sum", r.total.difference},
-                      {"difference_sum_stderr", r.total.difference_error},
-                      {"z_sum", r.total.z},
-                      {"z_at_step", z_json(r.at_step)},
-                      {"z_at_double_step", z_json(r.at_double_step)},
-                      {"z_extrapolated", z_json(r.extrapolated)}});
-    if (!r.agree) status = kDisagree;
-    NonFinite bad = r.gradient.non_finite;
-    bad.merge(r.differences.non_finite);
-    if (const int s = finish_status(bad, settings.spp, settings.spp)) status = s;
+    write(scene, settings, result);
+    if (!common_.quiet) {
+      print_terms(result);
+      print_samples(result);
+      print_largest(result, command_line, stats_);
+    }
+    if (stats_) print_stats(result);
+    return finish_status(result.non_finite, result.spp, settings.spp, command_line,
+                         to_string(result.samples()));
   }
-  write_json(common.json, report.dump(2));
-  return status;
-}
+
+ private:
+  int trace(const Scene& scene) {
+    if (!options_.samples) options_.samples = SampleCounts{};
+    const RunSettings settings = make_settings(common_, scene, name());
+    for (const auto& line : trace_sample(scene, options_, settings, parse_place(debug_))) {
+      fmt::print("{}\n", line);
+    }
+    return kSuccess;
+  }
+
+  void write(const Scene& scene, const RunSettings& settings, const GradientResult& result) const {
+    std::string terms;
+    json samples = json::object();
+    for (const TermRun& term : result.terms) {
+      samples[term.name] = term.samples;
+      if (term.computed) terms += (terms.empty() ? "" : ",") + term.name;
+    }
+    auto attributes = provenance(scene, settings, result.spp);
+    attributes.push_back({"limn.terms", terms});
+    attributes.push_back({"limn.method", result.method});
+    attributes.push_back({"limn.samples", to_string(result.samples())});
+    json parameters = json::array();
+    for (size_t k = 0; k < outputs_.size(); ++k) {
+      parameters.push_back(write_parameter(scene, result.parameters[k], result.terms, outputs_[k],
+                                           attributes, common_));
+    }
+    const json report = {{"scene", scene.file},
+                         {"spp", result.spp},
+                         {"seed", settings.seed},
+                         {"threads", settings.threads},
+                         {"method", result.method},
+                         {"terms", terms},
+                         {"samples", samples},
+                         {"pilot_spp", result.pilot_spp},
+                         {"seconds", result.seconds},
+                         {"setup_seconds", result.setup_seconds},
+                         {"costs", costs_json(result)},
+                         {"stats", stats_json(result.stats)},
+                         {"non_finite", result.non_finite.count},
+                         {"parameters", parameters}};
+    write_json(common_.json, report.dump(2));
+  }
+
+  CommonOptions common_;
+  GradientOptions options_;
+  std::string terms_, samples_ = "auto";
+  std::string output_, debug_;
+  bool stats_ = false;
+  std::vector<std::string> outputs_;  // of each parameter
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_gradient_command() { return std::make_unique<GradientCommand>(); }
 
 }  // namespace limn

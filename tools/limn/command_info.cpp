@@ -7,6 +7,7 @@
 #include "limn/core/ray_tracer.h"
 #include "limn/edgetree/edges.h"
 #include "limn/integrators/crossings.h"
+#include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
 
 namespace limn {
@@ -71,7 +72,13 @@ void print_camera(const Scene& scene) {
              scene.hide_emitters ? ", emitters hidden" : "");
 }
 
-}  // namespace
+// An array is listed once, with the number of its numbers.
+void print_parameter(const Parameter& parameter) {
+  fmt::print("  {}  [{}]{}\n", parameter.name, parameter.unit,
+             parameter.size == 1
+                 ? ""
+                 : fmt::format("  {} numbers: add :FILE, or .0.x, .0.y, ...", parameter.size));
+}
 
 int run_info(const CommonOptions& common) {
   const Scene scene = load_scene(common);
@@ -95,12 +102,30 @@ int run_info(const CommonOptions& common) {
         shape_name(scene, crossings.shape_b));
   }
   fmt::print("parameters (for --wrt):\n");
-  for (const ParameterInfo& parameter : list_parameters(scene)) {
-    report["parameters"].push_back({{"name", parameter.name}, {"unit", parameter.unit}});
-    fmt::print("  {}  [{}]\n", parameter.name, parameter.unit);
+  for (const Parameter& parameter : list_parameters(scene)) {
+    report["parameters"].push_back(
+        {{"name", parameter.name}, {"unit", parameter.unit}, {"size", parameter.size}});
+    print_parameter(parameter);
   }
   write_json(common.json, report.dump(2));
   return kSuccess;
 }
+
+class InfoCommand final : public Command {
+ public:
+  const char* name() const override { return "info"; }
+  const char* description() const override {
+    return "What the scene holds, and what can be differentiated";
+  }
+  void add_options(CLI::App& app, bool) override { add_common_options(app, common_); }
+  int run(const std::string&) override { return run_info(common_); }
+
+ private:
+  CommonOptions common_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_info_command() { return std::make_unique<InfoCommand>(); }
 
 }  // namespace limn

@@ -1,5 +1,7 @@
 #include "tools/limn/command_reject.h"
 
+#include "tools/limn/commands.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,6 +11,7 @@
 
 #include "limn/core/error.h"
 #include "limn/core/parallel.h"
+#include "limn/edgetree/edge_sampler_types.h"
 #include "tools/limn/reject/reject_figures.h"
 #include "tools/limn/reject/reject_pictures.h"
 #include "tools/limn/terminal.h"
@@ -328,14 +331,34 @@ class Rejection {
   std::vector<RejectVariant> variants_;
 };
 
+class RejectProgram final : public Command {
+ public:
+  const char* name() const override { return "reject"; }
+  const char* description() const override {
+    return "Pictures and figures of what edge samplers reject, accept and wrongly accept";
+  }
+  void add_options(CLI::App& app, bool) override {
+    add_input_options(app, common_, "Scene file, or a mesh (.obj, .ply)", "SCENE|MESH");
+    add_reject_options(app, command_);
+  }
+  int run(const std::string& command_line) override {
+    command_.command_line = command_line;
+    std::error_code failed;
+    std::filesystem::create_directories(command_.output, failed);
+    if (failed) {
+      throw InputError({command_.output}, "the folder cannot be made: " + failed.message());
+    }
+    watch_interrupt();
+    return Rejection(common_, command_).run();
+  }
+
+ private:
+  CommonOptions common_;
+  RejectCommand command_;
+};
+
 }  // namespace
 
-int run_reject(const CommonOptions& common, const RejectCommand& command) {
-  std::error_code failed;
-  std::filesystem::create_directories(command.output, failed);
-  if (failed) throw InputError({command.output}, "the folder cannot be made: " + failed.message());
-  watch_interrupt();
-  return Rejection(common, command).run();
-}
+std::unique_ptr<Command> make_reject_command() { return std::make_unique<RejectProgram>(); }
 
 }  // namespace limn

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "tools/limn/commands.h"
+#include "tools/limn/command_support.h"
 
 namespace limn {
 
@@ -28,6 +28,5 @@ struct RejectCommand {
 
 // All but what CommonOptions hold.
 void add_reject_options(CLI::App& app, RejectCommand& command);
-int run_reject(const CommonOptions& common, const RejectCommand& command);
 
 }  // namespace limn

@@ -1,33 +1,55 @@
-#include <fmt/format.h>
-
-#include <nlohmann/json.hpp>
-
-#include "limn/core/error.h"
-#include "limn/core/image.h"
+// `limn render`: an image as EXR and PNG.
 #include "limn/integrators/render.h"
+#include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
 
 namespace limn {
+namespace {
 
-int run_render(const CommonOptions& common, const std::string& output) {
-  const Scene scene = load_scene(common);
-  check_output(output);
-  const RunSettings settings = make_settings(common, scene, "render");
-  const RenderResult result = render(scene, settings);
-  if (result.spp == 0) {
-    fmt::print(stderr, "interrupted before the first pass over the image: nothing is written\n");
-    return kInterrupted;
+class RenderCommand final : public Command {
+ public:
+  const char* name() const override { return "render"; }
+  const char* description() const override { return "Render the image"; }
+  void add_options(CLI::App& app, bool) override {
+    add_common_options(app, common_);
+    app.add_option("-o,--output", output_, "Image to write (.exr; a .png is put beside it)")
+        ->required();
+    add_debug_option(app, debug_);
   }
-  const Image image = mean_image(result.radiance, scene.film.crop_width, scene.film.crop_height);
-  const std::string picture = with_ending(output, ".png");
-  write_exr(output, film_channels(scene, image), scene.film.half,
-            provenance(scene, settings, result.spp));
-  write_png(picture, image, 1);
-  if (!common.quiet) {
-    fmt::print("{} and {}: {} samples per pixel, {:.2f} s, {:.3g} million rays per second\n",
-               output, picture, result.spp, result.seconds, result.rays / result.seconds / 1e6);
+
+  int run(const std::string& command_line) override {
+    const Scene scene = load_scene(common_);
+    const RunSettings settings = make_settings(common_, scene, name());
+    if (!debug_.empty()) {
+      for (const auto& line : trace_sample(scene, settings, parse_place(debug_))) {
+        fmt::print("{}\n", line);
+      }
+      return kSuccess;
+    }
+    check_output(output_);
+    const RenderResult result = render(scene, settings);
+    if (result.spp == 0) {
+      fmt::print(stderr, "interrupted before the first pass over the image: nothing is written\n");
+      return kInterrupted;
+    }
+    write(scene, settings, result);
+    return finish_status(result.non_finite, result.spp, settings.spp, command_line, "");
   }
-  if (!common.json.empty()) {
+
+ private:
+  void write(const Scene& scene, const RunSettings& settings, const RenderResult& result) const {
+    const Image image =
+        mean_image(result.radiance, scene.film.crop_width, scene.film.crop_height);
+    const std::string picture = with_ending(output_, ".png");
+    write_exr(output_, film_channels(scene, image), scene.film.half,
+              provenance(scene, settings, result.spp));
+    write_png(picture, image, 1);
+    if (!common_.quiet) {
+      fmt::print("{} and {}: {} samples per pixel, {:.2f} s, {:.3g} million rays per second\n",
+                 output_, picture, result.spp, result.seconds,
+                 static_cast<double>(result.rays) / result.seconds / 1e6);
+    }
+    if (common_.json.empty()) return;
     const nlohmann::json report = {{"scene", scene.file},
                                    {"spp", result.spp},
                                    {"seed", settings.seed},
@@ -35,9 +57,15 @@ int run_render(const CommonOptions& common, const std::string& output) {
                                    {"seconds", result.seconds},
                                    {"rays", result.rays},
                                    {"non_finite", result.non_finite.count}};
-    write_json(common.json, report.dump(2));
+    write_json(common_.json, report.dump(2));
   }
-  return finish_status(result.non_finite, result.spp, settings.spp);
-}
+
+  CommonOptions common_;
+  std::string output_, debug_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_render_command() { return std::make_unique<RenderCommand>(); }
 
 }  // namespace limn

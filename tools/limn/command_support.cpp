@@ -1,3 +1,4 @@
+// What commands share.
 #include <fmt/format.h>
 
 #include <filesystem>
@@ -6,10 +7,104 @@
 
 #include "limn/core/error.h"
 #include "limn/core/parallel.h"
-#include "tools/limn/commands.h"
+#include "tools/limn/command_support.h"
 #include "tools/limn/terminal.h"
 
 namespace limn {
+namespace {
+
+std::map<std::string, std::string> parse_defines(const std::vector<std::string>& defines) {
+  std::map<std::string, std::string> parsed;
+  for (const std::string& define : defines) {
+    const size_t equals = define.find('=');
+    if (equals == std::string::npos || equals == 0) {
+      throw InputError("-D " + define + ": expected NAME=VALUE");
+    }
+    parsed[define.substr(0, equals)] = define.substr(equals + 1);
+  }
+  return parsed;
+}
+
+std::vector<std::string> split(const std::string& list) {
+  std::vector<std::string> parts;
+  std::stringstream stream(list);
+  for (std::string part; std::getline(stream, part, ',');) parts.push_back(part);
+  return parts;
+}
+
+}  // namespace
+
+void add_input_options(CLI::App& app, CommonOptions& common, const std::string& text,
+                       const std::string& type) {
+  app.add_option("scene", common.scene, text)->required()->type_name(type);
+  app.add_option_function<std::vector<std::string>>(
+         "-D",
+         [&common](const std::vector<std::string>& defines) {
+           common.defines = parse_defines(defines);
+         },
+         "Value of a $name in the scene")
+      ->type_name("NAME=VALUE")
+      ->allow_extra_args(false);
+  app.add_option("--seed", common.seed, "Seed of all random numbers (default: the scene's)")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--threads", common.threads, "Threads (default: all cores)")
+      ->check(CLI::Range(1, 4096));
+  app.add_flag("--quiet", common.quiet, "Print nothing but errors and warnings");
+}
+
+void add_common_options(CLI::App& app, CommonOptions& common) {
+  add_input_options(app, common, "Scene file (Mitsuba 3 XML)", "SCENE");
+  app.add_option("--spp", common.spp, "Samples per pixel (default: the scene's)")
+      ->check(CLI::Range(1, 1 << 30));
+  app.add_option("--json", common.json, "Write the figures for machines to this file");
+  app.add_option("--shading", common.shading,
+                 "How interpolated normals shade: continuous, or as Mitsuba does (its jumps are "
+                 "missing from gradients)")
+      ->check(CLI::IsMember({"continuous", "mitsuba"}))
+      ->capture_default_str();
+}
+
+std::string method_list(bool all) {
+  std::string names;
+  for (const MethodType& type : method_types()) {
+    if (type.ablation && !all) continue;
+    names += (names.empty() ? "" : ", ") + type.name;
+  }
+  return names;
+}
+
+void add_parameter_options(CLI::App& app, std::vector<std::string>& parameters,
+                           std::string& method, bool all) {
+  app.add_option("--wrt", parameters, "Parameter to differentiate (repeatable)")
+      ->required()
+      ->type_name("PARAM")
+      ->allow_extra_args(false);
+  method = method_types().front().name;
+  app.add_option("--method,--sampler", method, "How: " + method_list(all))->capture_default_str();
+}
+
+void add_term_options(CLI::App& app, std::string& terms, std::string& samples) {
+  std::string names;
+  for (const std::string& term : method_types().front().terms) {
+    names += (names.empty() ? "" : ",") + term;
+  }
+  app.add_option("--terms", terms, "Terms to compute, of " + names + " (default: all there are)")
+      ->type_name("A,B,...");
+  app.add_option("--samples", samples,
+                 "What a sample per pixel holds of each term, in this order: paths, points on the "
+                 "film (may be less than 1), edges per vertex of one path; auto: the best for the "
+                 "time by a short pilot, or 1 of each if --spp is less than 16")
+      ->capture_default_str()
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
+      ->type_name("N,N,...");
+}
+
+void add_debug_option(CLI::App& app, std::string& place) {
+  app.add_option("--debug-sample", place,
+                 "Do one sample alone and print all it meets: pixel and sample, or a term and its "
+                 "sample on the film")
+      ->type_name("X,Y,S|TERM,N");
+}
 
 Scene load_scene(const CommonOptions& common) {
   std::vector<std::string> warnings;
@@ -76,44 +171,58 @@ void write_json(const std::string& file, const std::string& text) {
   if (!stream) throw InputError({file}, "cannot be written");
 }
 
-std::array<bool, kTermCount> parse_terms(const std::string& list) {
-  std::array<bool, kTermCount> terms = {false, false, false};
-  std::stringstream stream(list);
-  for (std::string name; std::getline(stream, name, ',');) {
-    bool known = false;
-    for (int term = 0; term < kTermCount; ++term) {
-      if (name != term_name(term)) continue;
-      terms[term] = known = true;
-    }
-    if (!known) {
-      throw InputError("--terms: unknown term \"" + name +
-                       "\" (known: interior, camera, boundary; several with commas)");
-    }
-  }
-  return terms;
-}
+std::vector<std::string> parse_terms(const std::string& list) { return split(list); }
 
 std::optional<SampleCounts> parse_samples(const std::string& list) {
   if (list == "auto") return std::nullopt;
-  constexpr int kMost = 1024;
-  std::istringstream stream(list);
-  SampleCounts samples;
-  char comma[2] = {};
-  stream >> samples.interior >> comma[0] >> samples.camera >> comma[1] >> samples.boundary;
-  const auto in_range = [](double count) { return count > 0 && count <= kMost; };
-  if (stream.fail() || !stream.eof() || comma[0] != ',' || comma[1] != ',' ||
-      !in_range(samples.interior) || !in_range(samples.camera) || !in_range(samples.boundary)) {
-    throw InputError(fmt::format(
-        "--samples: \"{}\" is neither auto nor three counts of at most {}, for the interior, the "
-        "camera (which may be less than 1) and the boundary, as in 3,0.5,1",
-        list, kMost));
+  constexpr double kMost = 1024;
+  std::vector<double> counts;
+  bool good = !list.empty() && list.back() != ',';
+  for (const std::string& part : split(list)) {
+    char* end = nullptr;
+    counts.push_back(std::strtod(part.c_str(), &end));
+    good = good && !part.empty() && *end == 0 && counts.back() > 0 && counts.back() <= kMost;
   }
-  return samples;
+  if (good) return SampleCounts(counts);
+  throw InputError(fmt::format(
+      "--samples: \"{}\" is neither auto nor counts of at most {}, one for each term, as in 3,0.5,1",
+      list, kMost));
 }
 
-int finish_status(const NonFinite& non_finite, int64_t spp_done, int64_t spp_asked) {
+NonFinite::Place parse_place(const std::string& text) {
+  const std::vector<std::string> parts = split(text);
+  const auto number = [&](size_t i) {
+    size_t used = 0;
+    const int64_t value = std::stoll(parts[i], &used);
+    if (used != parts[i].size()) throw std::invalid_argument(parts[i]);
+    return value;
+  };
+  try {
+    if (parts.size() == 2) return {-1, -1, number(1), parts[0]};
+    if (parts.size() == 3) {
+      return {static_cast<int>(number(0)), static_cast<int>(number(1)), number(2), ""};
+    }
+  } catch (const std::logic_error&) {  // no number, or too large a one
+  }
+  throw InputError("--debug-sample: \"" + text +
+                   "\" is neither X,Y,S (a pixel and the number of its sample) nor TERM,N");
+}
+
+std::string repeat_command(const std::string& command_line, const NonFinite::Place& place,
+                           const std::string& samples) {
+  return command_line + (samples.empty() ? "" : " --samples " + samples) + " --debug-sample " +
+         (place.x >= 0 ? fmt::format("{},{},{}", place.x, place.y, place.sample)
+                       : fmt::format("{},{}", place.term, place.sample));
+}
+
+int finish_status(const NonFinite& non_finite, int64_t spp_done, int64_t spp_asked,
+                  const std::string& command_line, const std::string& samples) {
   if (non_finite.count > 0) {
     fmt::print(stderr, "error: {}\n", non_finite.message());
+    if (!command_line.empty()) {
+      fmt::print(stderr, "  to see the first: {}\n",
+                 repeat_command(command_line, non_finite.first[0], samples));
+    }
     return kNonFinite;
   }
   if (spp_done < spp_asked) {

@@ -1,3 +1,4 @@
+// Pictures, images, JSON and CSV of a comparison.
 #include "tools/limn/compare_output.h"
 
 #include <fmt/format.h>
@@ -9,7 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "limn/core/error.h"
-#include "tools/limn/commands.h"
+#include "tools/limn/command_support.h"
 
 namespace limn {
 namespace {
@@ -85,9 +86,9 @@ void write_pictures(const std::string& folder, const Scene& scene, const Compari
   }
 }
 
-json terms_json(const std::vector<double>& seconds) {
+json terms_json(const std::vector<std::pair<std::string, double>>& seconds) {
   json terms = json::object();
-  for (size_t t = 0; t < seconds.size(); ++t) terms[term_name(static_cast<int>(t))] = seconds[t];
+  for (const auto& [name, s] : seconds) terms[name] = s;
   return terms;
 }
 
@@ -193,7 +194,7 @@ json comparison_json(const Scene& scene, const Comparison& c, const Scales& scal
                  {"image", c.image.spp > 0 ? "image.png" : ""}};
   object["reference"] = {{"image", "reference.exr"},
                          {"picture", "reference.png"},
-                         {"sampler", c.reference.sampler},
+                         {"method", c.reference.method},
                          {"spp", c.reference.spp},
                          {"seconds", c.reference.seconds},
                          {"seed", c.reference.seed},
@@ -207,18 +208,35 @@ json comparison_json(const Scene& scene, const Comparison& c, const Scales& scal
   return object;
 }
 
+// Of all methods, in the order in which they first come.
+std::vector<std::string> term_names(const Comparison& c) {
+  std::vector<std::string> names;
+  for (const ComparedMethod& m : c.methods) {
+    for (const ComparedRun& r : m.runs) {
+      for (const auto& [name, seconds] : r.run.term_seconds) {
+        if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+      }
+    }
+  }
+  return names;
+}
+
 void write_csv(const std::string& file, const Comparison& c) {
   std::ofstream stream(file);
-  stream << "method,time,repeat,seed,seconds,setup_seconds,spp,rays,mse,relative_mse,trimmed_mse,"
-            "interior_seconds,camera_seconds,boundary_seconds,peak_memory_bytes\n";
+  const std::vector<std::string> names = term_names(c);
+  stream << "method,time,repeat,seed,seconds,setup_seconds,spp,rays,mse,relative_mse,trimmed_mse";
+  for (const std::string& name : names) stream << "," << name << "_seconds";
+  stream << ",peak_memory_bytes\n";
   for (const ComparedMethod& m : c.methods) {
     for (const ComparedRun& r : m.runs) {
       stream << fmt::format("{},{},{},{},{},{},{},{},{},{},{}", m.name, c.options.times[r.rung],
                             r.repeat, r.seed, r.run.seconds, r.run.setup_seconds, r.run.spp,
                             r.run.rays, r.errors.mse, r.errors.relative_mse, r.errors.trimmed_mse);
-      for (size_t t = 0; t < kTermCount; ++t) {
+      for (const std::string& name : names) {
         stream << ",";
-        if (t < r.run.term_seconds.size()) stream << fmt::format("{}", r.run.term_seconds[t]);
+        for (const auto& [term, seconds] : r.run.term_seconds) {
+          if (term == name) stream << fmt::format("{}", seconds);
+        }
       }
       stream << fmt::format(",{}\n", r.run.peak_memory_bytes);
     }
@@ -269,7 +287,7 @@ void print_comparison(const Comparison& c) {
   size_t width = 6;
   for (const ComparedMethod& m : c.methods) width = std::max(width, m.name.size());
   fmt::print("reference: {}, {} samples per pixel, {:.3g} s{}, its own error {:.3g}\n",
-             c.reference.sampler, c.reference.spp, c.reference.seconds,
+             c.reference.method, c.reference.spp, c.reference.seconds,
              c.reference.cached ? " (kept)" : "", mean_of(c.reference.variance));
   fmt::print("{:{}} {:>7} {:>7} {:>8} {:>9} {:>20} {:>9} {:>9} {:>14} {:>16} {:>15}\n", "method",
              width, "s", "set-up", "spp", "rays", "mse", "relative", "trimmed", "bias p (|z|)",

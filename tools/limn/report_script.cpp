@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 
 #include "tools/limn/child_process.h"
-#include "tools/limn/commands.h"
+#include "tools/limn/command_support.h"
 
 namespace limn {
 namespace {

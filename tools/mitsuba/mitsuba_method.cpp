@@ -41,7 +41,9 @@ class MitsubaMethod final : public DerivativeMethod {
         report_((fs::path(folder) / "mitsuba_run.json").string()) {}
 
   std::string name() const override { return kMitsuba; }
-  std::string description() const override { return mitsuba_name().description; }
+  std::string description() const override { 
+    return "Mitsuba 3's prb_projective with octree guiding, where it is installed";
+  }
 
   MethodRun run(const RunSettings& settings) override {
     const ChildOutcome outcome = run_child(command(settings));
@@ -127,10 +129,6 @@ class MitsubaMethod final : public DerivativeMethod {
 };
 
 }  // namespace
-
-MethodName mitsuba_name() {
-  return {kMitsuba, "Mitsuba 3's prb_projective with octree guiding, where it is installed"};
-}
 
 std::unique_ptr<DerivativeMethod> make_mitsuba_method(
     const MethodInput& input, const std::map<std::string, std::string>& defines,

@@ -8,7 +8,6 @@
 namespace limn {
 
 inline constexpr const char* kMitsuba = "mitsuba";
-MethodName mitsuba_name();
 
 // `folder` takes the files that each run leaves behind for a moment. Every run throws MethodMissing
 // where Mitsuba is not installed.

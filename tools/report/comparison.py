@@ -89,7 +89,7 @@ class ComparisonSection:
             f" in radiance per {unit}, {data.number('width')} × {data.number('height')} pixels,"
             f" computed by {len(self.methods)} methods in {times_text} s each on"
             f" {data.number('threads')} threads, {repeats}"
-            f" {'repeat' if repeats == 1 else 'repeats'}. Reference: {reference.text('sampler')},"
+            f" {'repeat' if repeats == 1 else 'repeats'}. Reference: {reference.text('method')},"
             f" {count(reference.number('spp'))} samples per pixel,"
             f" {figures(reference.number('seconds'))} s{kept}; its own mean squared error is"
             f" {figures(reference.number('mean_squared_error'))}.",
@@ -147,7 +147,7 @@ class ComparisonSection:
                     self.pictures.picture(
                         reference.text("picture"), f"reference derivative of {self.title}"
                     ),
-                    f"{reference.text('sampler')}, {count(reference.number('spp'))} spp",
+                    f"{reference.text('method')}, {count(reference.number('spp'))} spp",
                 ),
                 plain,
                 class_="card",

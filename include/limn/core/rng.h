@@ -21,7 +21,8 @@ enum class Purpose : uint64_t {
   kEdgeSide,
   kCamera,
   kPathCopy,
-  kEdgeCopy
+  kEdgeCopy,
+  kFilmCopy
 };
 
 // SplitMix64 started from a hash of (seed, pixel, sample): a stream for one path. `at` derives the

@@ -22,6 +22,8 @@ enum class EdgeClass : uint8_t {
           // but on their common plane
 };
 
+const char* edge_class_name(EdgeClass edge_class);
+
 inline constexpr uint32_t kNoFace = UINT32_MAX;
 
 struct Edge {

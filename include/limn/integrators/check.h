@@ -1,15 +1,15 @@
 #pragma once
 // A gradient against finite differences.
+#include "limn/integrators/differences.h"
 #include "limn/integrators/gradient.h"
-#include "limn/integrators/render.h"
 #include "limn/integrators/statistics.h"
 
 namespace limn {
 
 struct CheckOptions {
   std::string parameter;
-  std::array<bool, kTermCount> terms = {true, true, true};
-  std::string sampler = "brute";
+  std::string method;              // see methods.h; "": the default
+  std::vector<std::string> terms;  // by name; none: all that the scene has
   double step = 0;  // of the finite differences; 0 takes the parameter's natural step
   int block = 0;    // pixels; 0 splits the longer side into eight
   std::optional<SampleCounts> samples = SampleCounts{};  // of the gradient
@@ -34,13 +34,13 @@ struct CheckResult {
   double step = 0;
   int block = 0;
   ZSummary at_step, at_double_step,
-      extrapolated;       // z = (gradient - differences) / combined error, over blocks
-  TotalComparison total;  // against the extrapolated differences
-  std::array<Suspicion, kTermCount> suspicions;
+      extrapolated;                   // z = (gradient - differences) / combined error, over blocks
+  TotalComparison total;              // against the extrapolated differences
+  std::vector<Suspicion> suspicions;  // of each term of the gradient, if they disagree
   // The z-scores at the step or the extrapolated ones are plausible at the level 1e-4, and so is
   // the total.
   bool agree = false;
-  int suspect = -1;  // a term, if they disagree
+  std::string suspect;  // the term with the largest |z| of these; ""
   GradientResult gradient;
   DifferenceResult differences;
 };

@@ -29,7 +29,7 @@ struct RungSummary {
   double seconds = 0, setup_seconds = 0, spp = 0, rays = 0;  // means
   Uncertain mse, relative_mse, trimmed_mse;
   ZSummary bias;  // count 0: unknown
-  std::vector<double> term_seconds;
+  std::vector<std::pair<std::string, double>> term_seconds;
   uint64_t peak_memory_bytes = 0;  // 0: unknown
 };
 

@@ -1,16 +1,17 @@
 #pragma once
-// Ways to a derivative image that can be compared: each takes a scene, a parameter and a time, and
-// returns an image with what it knows of its own error.
-#include <array>
+// Ways to a derivative image as a comparison runs them: each takes a scene, a parameter and a time,
+// and returns an image with what it knows of its own error. The rows of methods.h are such ways;
+// others can live outside.
 #include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
-#include <variant>
+#include <utility>
 #include <vector>
 
 #include "limn/core/scene.h"
 #include "limn/integrators/gradient.h"
+#include "limn/integrators/methods.h"
 #include "limn/integrators/metrics.h"
 #include "limn/integrators/run.h"
 
@@ -23,16 +24,10 @@ struct MethodRun {
   double setup_seconds = 0;  // of which before the first sample
   int64_t spp = 0;           // 0 if interrupted before the first pass over the image
   uint64_t rays = 0;         // 0 if unknown
-  // Seconds of the run, as a mean over threads; empty for methods that do not work term by term.
-  std::vector<double> term_seconds;
+  // Seconds of each term, as a mean over threads; empty if unknown.
+  std::vector<std::pair<std::string, double>> term_seconds;
   uint64_t peak_memory_bytes = 0;  // 0: this process' own peak
   NonFinite non_finite;
-};
-
-// What a reader needs to know of how a method was set up.
-struct MethodSetting {
-  std::string name;
-  std::variant<double, std::string> value;
 };
 
 // The method cannot run here; what() says why and what to do.
@@ -56,22 +51,15 @@ class DerivativeMethod {
 struct MethodInput {
   const Scene& scene;
   std::string parameter;
-  std::array<bool, kTermCount> terms = {true, true, true};
+  std::vector<std::string> terms = {};                 // none: all
   double step = 0;                                     // of finite differences; 0: found by a pilot
   int block = 8;                                       // pixels, of the block sums
-  std::optional<SampleCounts> samples = std::nullopt;  // of the samplers; none: chosen by a pilot
+  std::optional<SampleCounts> samples = std::nullopt;  // of the terms; none: chosen by a pilot
+
+  GradientOptions options(const MethodType& method) const;
 };
 
-// One method per sampler of the registry, which computes the terms by gradient(); and "fd", central
-// differences with common random numbers at one step, of all terms at once. Without a step of the
-// user's, a pilot takes a tenth of the time of every kind of run to find one, see
-// difference_method.cpp.
-struct MethodName {
-  std::string name;
-  std::string description;
-};
-std::vector<MethodName> method_names();
-// InputError that lists the known names if there is none of this name.
+// A row of the table. InputError that lists the known names if there is none of this name.
 std::unique_ptr<DerivativeMethod> make_method(const MethodInput& input, const std::string& name);
 
 }  // namespace limn

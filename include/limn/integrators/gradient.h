@@ -1,89 +1,125 @@
 #pragma once
-// Derivatives of the image with respect to scene parameters, in forward mode: unbiased, with
-// standard errors.
-//   dI/dtheta = interior (what slides within continuous regions) + camera (silhouettes on the film)
-//   + boundary (silhouettes that shading points see), after Li et al. 2018 with directions held
-//   fixed in solid angle everywhere.
-#include <array>
+// Derivatives of the image with respect to scene parameters, in forward mode, by any method, with
+// standard errors. Methods that work term by term add up
+//   dI/dtheta = interior (what slides within continuous regions)
+//             + camera   (silhouettes on the film)
+//             + boundary (silhouettes that shading points see)
+//             + shadow   (edges of sharp shadows, where the scene has lights without extent)
+// after Li et al. 2018 with directions held fixed in solid angle everywhere.
+#include <initializer_list>
 #include <optional>
 #include <string>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "limn/core/scene.h"
+#include "limn/edgetree/edges.h"
 #include "limn/integrators/moments.h"
 #include "limn/integrators/run.h"
 
 namespace limn {
 
-enum Term { kInterior = 0, kCamera = 1, kBoundary = 2 };
-inline constexpr int kTermCount = 3;
-const char* term_name(int term);
+// What one sample per pixel holds of each term, in the order of the method's terms; 1 for those
+// that are not given. Each term is averaged over its own, so that results have the same mean
+// whatever the counts. Terms that ride on paths take whole numbers.
+class SampleCounts {
+ public:
+  SampleCounts() = default;
+  SampleCounts(std::initializer_list<double> counts) : counts_(counts) {}
+  explicit SampleCounts(std::vector<double> counts) : counts_(std::move(counts)) {}
 
-// What one sample per pixel holds of each term. Each term is averaged over its own, so that all
-// results have the same mean whatever the counts.
-struct SampleCounts {
-  int interior = 1;   // paths; 1 if the interior term is not computed
-  double camera = 1;  // points on edges that the camera sees, per pixel; may be less than one
-  int boundary = 1;   // edges at every vertex of the first path
-  bool operator==(const SampleCounts&) const = default;
+  double operator[](size_t term) const { return term < counts_.size() ? counts_[term] : 1; }
+  size_t size() const { return counts_.size(); }
+  bool operator==(const SampleCounts& other) const;
+
+ private:
+  std::vector<double> counts_;
 };
-// "3,0.5,1": in the order of the terms.
+// "3,0.5,1"
 std::string to_string(const SampleCounts& samples);
 
 struct GradientOptions {
   std::vector<std::string> parameters;
-  std::array<bool, kTermCount> terms = {true, true, true};
-  std::string sampler = "brute";  // how shading points choose an edge, see edge_sampler.h
+  std::string method;              // see methods.h; "": the default
+  std::vector<std::string> terms;  // by name; none: all that the scene has
   // None: chosen for the least squared error after equal time, all parameters alike, by a pilot of
   // two to eight samples per pixel with a seed of its own, which are then thrown away. One of each
   // if spp is less than 16, for one term alone, or if less than two samples of the pilot fit into
   // an eighth of the limit of time. The choice does not depend on clocks but for that; it does on
   // the crop.
   std::optional<SampleCounts> samples = SampleCounts{};
-  int block = 0;  // also keep moments of sums over blocks of this many pixels
+  double step = 0;  // of finite differences; 0: found by a pilot
+  int block = 0;    // also keep moments of sums over blocks of this many pixels
 };
 
 // Derivative images of one parameter, crop_height by crop_width by 3, per unit of the parameter.
 struct ParameterGradient {
   std::string name;
   Moments total;
-  std::array<Moments, kTermCount> terms;
+  std::vector<Moments> terms;  // as in GradientResult::terms; empty for those not computed
   // One value per block: the sum over its pixels and channels. Empty unless asked for.
   Moments total_blocks;
-  std::array<Moments, kTermCount> term_blocks;
+  std::vector<Moments> term_blocks;
   Moments image_sum;  // one value: the sum over all pixels and channels
-  Events events;      // of the camera and boundary terms together
+  Events events;      // of all terms that sample edges together
 };
 
-// What one term cost. Times are summed over threads.
-struct TermCost {
-  double seconds = 0;
-  uint64_t rays = 0;
-  // Where the samples of the camera and boundary terms went.
-  uint64_t samples = 0;
-  uint64_t no_edge = 0;      // the sampler ended without an edge
-  uint64_t zero_weight = 0;  // below the horizon, or without relative motion
-  uint64_t occluded = 0;     // the edge point is hidden (or, for the camera, off the film)
-  uint64_t counted = 0;
-  void merge(const TermCost& other);
+// One term of a run.
+struct TermRun {
+  std::string name;
+  bool computed = true;  // false: only what other terms need of it was done
+  bool edges = true;     // it samples edges: rare events
+  double samples = 1;    // in each sample of a pixel
+  TermCost cost;
+};
+
+// What a reader needs to know of how a method was set up.
+struct MethodSetting {
+  std::string name;
+  std::variant<double, std::string> value;
+};
+
+// What a run was made of, for `limn gradient --stats`.
+struct GradientStats {
+  std::vector<std::pair<std::string, uint64_t>> edges;  // number of edges of each class
+  uint64_t sampler_nodes = 0, sampler_bytes = 0;        // of the structure that chooses edges
+  std::vector<std::pair<std::string, double>> setup;    // seconds of each part of the set-up
 };
 
 struct GradientResult {
+  std::string method;
   std::vector<ParameterGradient> parameters;  // in the order asked for
-  Moments radiance;                           // the image itself, from the same paths
-  std::array<TermCost, kTermCount> costs;
-  int64_t spp = 0;       // samples per pixel that were finished
-  SampleCounts samples;  // what each of them held
-  int pilot_spp = 0;     // samples per pixel of the pilot that chose them
+  Moments radiance;                           // the image itself, from the same samples
+  std::vector<TermRun> terms;                 // all that the scene has, in the method's order
+  int64_t spp = 0;                            // samples per pixel that were finished
+  int pilot_spp = 0;                          // samples per pixel of the pilot that chose `terms`
   double seconds = 0;
   double setup_seconds = 0;  // edges, samplers, ray tracer, pilot
   NonFinite non_finite;
+  std::vector<MethodSetting> settings;
   std::vector<std::string> warnings;
+  GradientStats stats;
+
+  SampleCounts samples() const;
+  // Index of the term of that name; it must be there.
+  size_t term(const std::string& name) const;
 };
 
-// More than kLanes parameters take several passes over the same samples. InputError for unknown
-// parameters or samplers, and for counts that are not positive.
+// The magnitude of what terms of edges add to one block of g, a parameter of the result.
+double edge_magnitude(const GradientResult& result, const ParameterGradient& g, size_t block);
+
+// Parameters are differentiated in passes of kLanes over the same samples. InputError for unknown
+// parameters, methods or terms, for a method that cannot leave terms out, and for counts that are
+// not positive.
 GradientResult gradient(const Scene& scene, const GradientOptions& options,
                         const RunSettings& settings);
+
+// One sample of one pixel (x >= 0) or of a term's points on the film (x < 0: `term`, `sample`),
+// done again with all it meets written down, line by line. options.samples must be given; settings:
+// those of the run, which matter for points on the film. InputError as above and if there is no
+// such sample.
+std::vector<std::string> trace_sample(const Scene& scene, const GradientOptions& options,
+                                      const RunSettings& settings, const NonFinite::Place& place);
 
 }  // namespace limn

@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "limn/integrators/moments.h"
 #include "limn/integrators/statistics.h"
 
 namespace limn {
@@ -18,9 +19,6 @@ struct ImageErrors {
 };
 ImageErrors image_errors(const std::vector<double>& image, const std::vector<double>& reference,
                          const std::vector<double>& reference_variance);
-
-double mean_of(const std::vector<double>& values);
-double mean_square(const std::vector<double>& values);
 
 // A value with its standard error; NaN where one cannot be known.
 struct Uncertain {
@@ -41,6 +39,9 @@ struct BlockSums {
   // this, even where no event has come.
   double event = 0;
 };
+
+// Of one run.
+BlockSums block_sums(const Moments& blocks, const Events& events);
 
 // z-scores of the blocks: mean over the repeats minus the reference, over the standard error of
 // both. Student's t, turned into normal scores, with the fewer degrees of freedom of the two: a few

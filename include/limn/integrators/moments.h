@@ -49,6 +49,10 @@ class Events {
   double cubes_ = 0, squares_ = 0, sizes_ = 0;
 };
 
+// Of every value; variances are NaN with fewer than two batches.
+std::vector<double> means(const Moments& moments);
+std::vector<double> variances(const Moments& moments);
+
 // H by W by 3 images of the means and of the standard errors (NaN with fewer than two batches).
 Image mean_image(const Moments& moments, int width, int height);
 Image standard_error_image(const Moments& moments, int width, int height);

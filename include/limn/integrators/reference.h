@@ -1,7 +1,6 @@
 #pragma once
 // The derivative image that methods are measured against: from a long run, kept in files that know
 // what they belong to.
-#include <array>
 #include <map>
 #include <optional>
 #include <string>
@@ -18,7 +17,7 @@ struct Reference {
   std::vector<double> variance;  // of the image, the same shape
   BlockSums blocks;
   std::vector<double> edges;  // magnitude of what edges add to each block
-  std::string sampler;
+  std::string method;
   int64_t spp = 0;  // 0: interrupted before the first pass over the image
   uint64_t seed = 0;
   double seconds = 0;
@@ -33,8 +32,8 @@ struct Reference {
 using Identity = std::vector<std::pair<std::string, std::string>>;
 Identity identify(const MethodInput& input, const std::map<std::string, std::string>& defines);
 
-// By the sampler "forest", which is unbiased and fast nearly everywhere, in settings.seconds but
-// with at least two samples per pixel; fewer if interrupted.
+// By the default method, which is unbiased and fast nearly everywhere, in settings.seconds but with
+// at least two samples per pixel; fewer if interrupted.
 Reference make_reference(const MethodInput& input, const RunSettings& settings);
 
 // Writes `file` (an EXR) and beside it FILE_stderr.exr, which also holds the variances of the

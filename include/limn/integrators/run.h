@@ -42,6 +42,44 @@ struct NonFinite {
   std::string message() const;
 };
 
+// Rays that were traced on behalf of one term.
+struct RayCount {
+  uint64_t closest = 0;
+  uint64_t shadow = 0;
+  uint64_t total() const { return closest + shadow; }
+};
+
+// The largest of a set of samples, to find those that rule an error.
+struct LargestSample {
+  double square = 0;   // its squared magnitude: over channels and parameters, each in units of its
+                       // natural step
+  double squares = 0;  // the same, summed over all samples
+  NonFinite::Place place{-1, -1, 0, ""};
+  void add(double squared_magnitude, const NonFinite::Place& where);
+  void merge(const LargestSample& other);
+  // The share of the sum that this one sample makes, in [0, 1].
+  double share() const { return squares > 0 ? square / squares : 0; }
+};
+
+// What one term cost, and where its samples went. Times are summed over threads.
+struct TermCost {
+  double seconds = 0;
+  uint64_t rays = 0;         // of both kinds
+  uint64_t shadow_rays = 0;  // of which rays that only ask whether something is in the way
+  uint64_t samples = 0;
+  // Where samples of edges went.
+  uint64_t no_edge = 0;      // the sampler ended without an edge
+  uint64_t zero_weight = 0;  // below the horizon, or without relative motion
+  uint64_t occluded = 0;     // the edge point is hidden (or, for the camera, off the film)
+  uint64_t counted = 0;
+  LargestSample largest;
+  void add(const RayCount& count) {
+    rays += count.total();
+    shadow_rays += count.shadow;
+  }
+  void merge(const TermCost& other);
+};
+
 class Stopwatch {
  public:
   double seconds() const {

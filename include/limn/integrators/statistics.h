@@ -28,4 +28,7 @@ struct ZSummary {
 };
 ZSummary summarize(const std::vector<double>& z);
 
+double mean_of(const std::vector<double>& values);
+double mean_square(const std::vector<double>& values);
+
 }  // namespace limn

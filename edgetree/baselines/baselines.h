@@ -1,0 +1,13 @@
+#pragma once
+// One factory per sampler of this folder, for the table in edge_sampler_types.cpp.
+#include <memory>
+
+#include "limn/edgetree/edge_sampler.h"
+
+namespace limn {
+
+std::unique_ptr<EdgeSampler> make_brute_force_sampler(const EdgeSamplerInput& input, int threads);
+std::unique_ptr<EdgeSampler> make_li2019_sampler(const EdgeSamplerInput& input, int threads);
+std::unique_ptr<EdgeSampler> make_uniform_sampler(const EdgeSamplerInput& input, int threads);
+
+}  // namespace limn

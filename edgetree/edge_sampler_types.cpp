@@ -1,0 +1,73 @@
+// The table of edge samplers.
+#include "limn/edgetree/edge_sampler_types.h"
+
+#include "edgetree/baselines/baselines.h"
+#include "edgetree/forest/edge_forest.h"
+#include "limn/core/error.h"
+
+namespace limn {
+namespace {
+
+template <ForestConfig kConfig>
+std::unique_ptr<EdgeSampler> make_forest(const EdgeSamplerInput& input, int threads) {
+  return EdgeForest::build(input, threads, kConfig);
+}
+
+constexpr int kNoHeight = ForestConfig::kNoHeight, kEdgesOnly = ForestConfig::kEdgesOnly,
+              kAnyHeight = ForestConfig::kAnyHeight;
+constexpr bool kAblation = true;
+
+}  // namespace
+
+std::span<const EdgeSamplerType> edge_sampler_types() {
+  static const EdgeSamplerType types[] = {
+      {"forest", "8-wide trees that reject what holds no silhouette", make_forest<ForestConfig{}>},
+      {"brute", "lists every candidate and draws by a bound of its contribution (the oracle)",
+       make_brute_force_sampler},
+      {"li2019", "the tree of Li et al. 2018 over positions and Hough-transformed planes",
+       make_li2019_sampler},
+      {"uniform", "any edge of the scene, any point on it", make_uniform_sampler},
+      {"forest-look-ahead-none", "forest whose children are chosen without a look at theirs",
+       make_forest<ForestConfig{.look_ahead = kNoHeight}>, kAblation},
+      {"forest-look-ahead-edges", "forest that looks ahead at nodes of edges alone",
+       make_forest<ForestConfig{.look_ahead = kEdgesOnly}>, kAblation},
+      {"forest-look-ahead-all", "forest that looks ahead at all nodes",
+       make_forest<ForestConfig{.look_ahead = kAnyHeight}>, kAblation},
+      {"forest-width-2-look-ahead-none", "forest of two children a node, without a look at theirs",
+       make_forest<ForestConfig{.width = 2, .look_ahead = kNoHeight}>, kAblation},
+      {"forest-width-4-look-ahead-none", "forest of four children a node, without a look at theirs",
+       make_forest<ForestConfig{.width = 4, .look_ahead = kNoHeight}>, kAblation},
+      {"forest-width-4-look-ahead-all",
+       "forest of four children a node that looks ahead at all nodes",
+       make_forest<ForestConfig{.width = 4, .look_ahead = kAnyHeight}>, kAblation},
+      {"forest-any-axes", "forest with dual boxes along any axes",
+       make_forest<ForestConfig{.principal_axes = false}>, kAblation},
+      {"forest-hard-weights", "forest whose children weigh by length and distance or are rejected",
+       make_forest<ForestConfig{.soft_weights = false}>, kAblation},
+      {"forest-plain", "forest with dual boxes along any axes, hard weights and no look ahead",
+       make_forest<ForestConfig{
+           .principal_axes = false, .soft_weights = false, .look_ahead = kNoHeight}>,
+       kAblation},
+      {"forest-concave", "forest that keeps concave edges",
+       make_forest<ForestConfig{.cull_concave = false}>, kAblation},
+      {"forest-no-lights", "forest whose weights ignore where the lights are",
+       make_forest<ForestConfig{.light_term = false}>, kAblation},
+      {"forest-no-environment", "forest whose weights take the environment for uniform",
+       make_forest<ForestConfig{.environment_term = false}>, kAblation},
+  };
+  return types;
+}
+
+const EdgeSamplerType& default_edge_sampler() { return edge_sampler_types().front(); }
+
+std::unique_ptr<EdgeSampler> make_edge_sampler(const std::string& name,
+                                               const EdgeSamplerInput& input, int threads) {
+  std::string known;
+  for (const EdgeSamplerType& type : edge_sampler_types()) {
+    if (type.name == name) return type.make(input, threads);
+    known += (known.empty() ? "" : ", ") + type.name;
+  }
+  throw InputError("unknown edge sampler \"" + name + "\" (known: " + known + ")");
+}
+
+}  // namespace limn

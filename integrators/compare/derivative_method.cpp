@@ -1,0 +1,56 @@
+// The rows of the table of methods, as a comparison runs them.
+#include "limn/integrators/derivative_method.h"
+
+namespace limn {
+namespace {
+
+class TableMethod final : public DerivativeMethod {
+ public:
+  TableMethod(const MethodInput& input, const MethodType& type) : input_(input), type_(type) {}
+
+  std::string name() const override { return type_.name; }
+  std::string description() const override { return type_.description; }
+
+  MethodRun run(const RunSettings& settings) override {
+    GradientResult result = gradient(input_.scene, input_.options(type_), settings);
+    MethodRun run;
+    run.image = means(result.parameters[0].total);
+    run.blocks = block_sums(result.parameters[0].total_blocks, result.parameters[0].events);
+    run.seconds = result.seconds;
+    run.setup_seconds = result.setup_seconds;
+    run.spp = result.spp;
+    for (const TermRun& term : result.terms) {
+      run.rays += term.cost.rays;
+      run.term_seconds.emplace_back(term.name, term.cost.seconds / settings.threads);
+    }
+    run.non_finite = result.non_finite;
+    settings_ = std::move(result.settings);
+    return run;
+  }
+
+  std::vector<MethodSetting> settings() const override { return settings_; }
+
+ private:
+  const MethodInput& input_;
+  const MethodType& type_;
+  std::vector<MethodSetting> settings_;
+};
+
+}  // namespace
+
+GradientOptions MethodInput::options(const MethodType& method) const {
+  GradientOptions options;
+  options.parameters = {parameter};
+  options.method = method.name;
+  options.terms = terms;
+  options.samples = samples;
+  options.step = step;
+  options.block = block;
+  return options;
+}
+
+std::unique_ptr<DerivativeMethod> make_method(const MethodInput& input, const std::string& name) {
+  return std::make_unique<TableMethod>(input, find_method(name));
+}
+
+}  // namespace limn

@@ -1,0 +1,308 @@
+// Batches of samples over the film: tiles in parallel, sums in a fixed order.
+#include "integrators/estimates/batches.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "limn/core/error.h"
+#include "limn/core/parallel.h"
+
+namespace limn {
+
+std::vector<Tile> make_tiles(const Film& film) {
+  std::vector<Tile> tiles;
+  const int right = film.crop_x + film.crop_width;
+  const int bottom = film.crop_y + film.crop_height;
+  for (int y = film.crop_y; y < bottom; y += kTileSize) {
+    for (int x = film.crop_x; x < right; x += kTileSize) {
+      tiles.push_back({x, y, std::min(x + kTileSize, right), std::min(y + kTileSize, bottom)});
+    }
+  }
+  return tiles;
+}
+
+namespace {
+
+Rng pixel_key(const Scene& scene, uint64_t seed, const PixelSample& at) {
+  return {seed, static_cast<uint64_t>(at.y) * scene.camera.width + at.x,
+          static_cast<uint64_t>(at.s)};
+}
+
+// A slot's samples of the film over a batch: the same whole number per sample per pixel in every
+// batch, so that all batches weigh alike.
+struct FilmBatch {
+  size_t per_sample;  // samples of the film for one sample per pixel
+  size_t first, count;
+
+  FilmBatch(const SampleEstimator& estimator, size_t slot, int first_sample, int samples) {
+    const Film& film = estimator.scene().film;
+    per_sample = static_cast<size_t>(
+        std::ceil(estimator.film_samples(slot) * film.crop_width * film.crop_height));
+    first = per_sample * first_sample;
+    count = per_sample * samples;
+  }
+};
+
+// The i-th sample of a batch, in strata along [0, 1).
+bool sample_film(const SampleEstimator& estimator, size_t slot, uint64_t seed,
+                 const FilmBatch& batch, size_t i, RayCount& rays, FilmSample& sample) {
+  const Rng key =
+      Rng(seed, UINT64_MAX, batch.first + i).copy(Purpose::kFilmCopy, estimator.film_stream(slot));
+  const double u = (i + key.at(Purpose::kCamera, 0).uniform()) / batch.count;
+  return estimator.sample_film(slot, u, key, rays, sample);
+}
+
+// One estimator over one batch.
+class BatchRunner {
+ public:
+  BatchRunner(const SampleEstimator& estimator, const Batch& batch, int threads,
+              ProgressCounter& progress)
+      : estimator_(estimator),
+        film_(estimator.scene().film),
+        batch_(batch),
+        threads_(threads),
+        progress_(progress),
+        lane_scale_(estimator.lane_scale()) {
+    sums_.radiance.assign(film_size(film_), 0.0);
+    sums_.images.resize(estimator.slots() * estimator.lanes());
+    for (auto& image : sums_.images) image.assign(film_size(film_), 0.0);
+    sums_.costs.resize(estimator.slots());
+  }
+
+  BatchSums run() {
+    if (estimator_.samples_pixels()) run_pixels();
+    for (size_t slot = 0; slot < estimator_.slots(); ++slot) {
+      if (estimator_.film_samples(slot) > 0) run_film(slot);
+    }
+    progress_.step();
+    return std::move(sums_);
+  }
+
+ private:
+  void run_pixels() {
+    const std::vector<Tile> tiles = make_tiles(film_);
+    std::vector<std::vector<TermCost>> costs(tiles.size());
+    std::vector<NonFinite> bad(tiles.size());
+    parallel_for(tiles.size(), threads_, [&](size_t i) {
+      if (progress_.stopped()) return;
+      costs[i].resize(estimator_.slots());
+      run_tile(tiles[i], costs[i], bad[i]);
+      progress_.step();
+    });
+    if (progress_.stopped()) return;
+    for (size_t i = 0; i < tiles.size(); ++i) {
+      for (size_t slot = 0; slot < costs[i].size(); ++slot) sums_.costs[slot].merge(costs[i][slot]);
+      sums_.non_finite.merge(bad[i]);
+    }
+  }
+
+  void run_tile(const Tile& tile, std::vector<TermCost>& costs, NonFinite& bad) {
+    const Stopwatch watch;
+    SampleSink sink(film_, estimator_.lanes(), lane_scale_, sums_, costs, bad, nullptr);
+    for (int y = tile.y0; y < tile.y1; ++y) {
+      for (int x = tile.x0; x < tile.x1; ++x) {
+        for (int s = batch_.first; s < batch_.last; ++s) {
+          const PixelSample at{x, y, s};
+          estimator_.add_pixel(at, pixel_key(estimator_.scene(), batch_.seed, at), sink);
+        }
+      }
+    }
+    double booked = 0;
+    for (const TermCost& cost : costs) booked += cost.seconds;
+    costs[estimator_.pixel_slot()].seconds += watch.seconds() - booked;
+  }
+
+  struct Chunk {
+    std::vector<std::pair<size_t, FilmSample>> samples;  // with their numbers
+    TermCost cost;
+    NonFinite bad;
+  };
+
+  void run_film(size_t slot) {
+    constexpr size_t kChunk = 1024;  // not tuned
+    const FilmBatch batch(estimator_, slot, batch_.first, batch_.count());
+    std::vector<Chunk> chunks((batch.count + kChunk - 1) / kChunk);
+    parallel_for(chunks.size(), threads_, [&](size_t c) {
+      if (progress_.stopped()) return;
+      const Stopwatch watch;
+      RayCount rays;
+      for (size_t i = c * kChunk; i < std::min(batch.count, (c + 1) * kChunk); ++i) {
+        FilmSample sample;
+        if (!sample_film(estimator_, slot, batch_.seed, batch, i, rays, sample)) continue;
+        if (is_finite(sample.value)) {
+          chunks[c].samples.emplace_back(batch.first + i, sample);
+        } else {
+          const auto number = static_cast<int64_t>(batch.first + i);
+          chunks[c].bad.add({-1, -1, number, estimator_.slot_name(slot)});
+        }
+      }
+      chunks[c].cost.counted = chunks[c].samples.size();
+      chunks[c].cost.add(rays);
+      chunks[c].cost.seconds = watch.seconds();
+    });
+    // A batch's sum is its number of samples per pixel times its mean; this turns sums over film
+    // samples into that.
+    const double scale = 1.0 / static_cast<double>(batch.per_sample);
+    TermCost& cost = sums_.costs[slot];
+    for (const Chunk& chunk : chunks) {
+      for (const auto& [number, sample] : chunk.samples) {
+        splat(slot, sample, scale);
+        cost.largest.add(
+            SampleSink::squared_magnitude(sample.value, scale, estimator_.lanes(), lane_scale_),
+            {-1, -1, static_cast<int64_t>(number), ""});
+      }
+      cost.merge(chunk.cost);
+      sums_.non_finite.merge(chunk.bad);
+    }
+    cost.samples += batch.count;
+    cost.occluded += batch.count - cost.counted;
+  }
+
+  // Adds a sample to the pixels whose filters reach it.
+  void splat(size_t slot, const FilmSample& sample, double scale) {
+    const double radius = film_.filter.radius;
+    const int x0 = std::max(film_.crop_x, static_cast<int>(std::floor(sample.x - 0.5 - radius)));
+    const int y0 = std::max(film_.crop_y, static_cast<int>(std::floor(sample.y - 0.5 - radius)));
+    const int x1 = std::min(film_.crop_x + film_.crop_width - 1,
+                            static_cast<int>(std::ceil(sample.x - 0.5 + radius)));
+    const int y1 = std::min(film_.crop_y + film_.crop_height - 1,
+                            static_cast<int>(std::ceil(sample.y - 0.5 + radius)));
+    const auto weight = [&](double offset, Film::Range range) {
+      if (offset < range.lower || offset > range.upper) return 0.0;
+      return film_.filter.eval(offset) /
+             (film_.filter.integral(range.upper) - film_.filter.integral(range.lower));
+    };
+    for (int y = y0; y <= y1; ++y) {
+      const double wy = weight(sample.y - (y + 0.5), film_.range_y(y));
+      if (wy == 0) continue;
+      for (int x = x0; x <= x1; ++x) {
+        const double wx = weight(sample.x - (x + 0.5), film_.range_x(x));
+        if (wx != 0) add(slot, pixel_index(film_, x, y), sample.value, wx * wy * scale);
+      }
+    }
+  }
+
+  void add(size_t slot, size_t index, const Rgb<Lanes>& value, double weight) {
+    const int lanes = estimator_.lanes();
+    for (int k = 0; k < lanes; ++k) {
+      double* out = &sums_.images[slot * lanes + k][index];
+      for (int c = 0; c < 3; ++c) out[c] += value[c][k] * weight;
+    }
+  }
+
+  const SampleEstimator& estimator_;
+  const Film& film_;
+  const Batch& batch_;
+  int threads_;
+  ProgressCounter& progress_;
+  Lanes lane_scale_;
+  BatchSums sums_;
+};
+
+std::string to_text(const Rgb<Lanes>& value, int lanes) {
+  std::string text;
+  for (int k = 0; k < lanes; ++k) {
+    text += fmt::format("{}({:.6g}, {:.6g}, {:.6g})", k > 0 ? " " : "", value.r[k], value.g[k],
+                        value.b[k]);
+  }
+  return text;
+}
+
+}  // namespace
+
+std::vector<BatchSums> run_batch(Estimators estimators, const Batch& batch, int threads,
+                                 ProgressCounter& progress) {
+  std::vector<BatchSums> sums;
+  for (const auto& estimator : estimators) {
+    sums.push_back(BatchRunner(*estimator, batch, threads, progress).run());
+    if (progress.stopped()) return {};
+  }
+  return sums;
+}
+
+size_t steps_per_batch(Estimators estimators) {
+  size_t steps = 0;
+  for (const auto& estimator : estimators) {
+    steps += 1;
+    if (estimator->samples_pixels()) steps += make_tiles(estimator->scene().film).size();
+  }
+  return steps;
+}
+
+void run_batches(Estimators estimators, const RunSettings& settings, const Stopwatch& watch,
+                 const std::function<void(const Batch&, const std::vector<BatchSums>&)>& collect) {
+  ProgressCounter progress(settings, watch,
+                           steps_per_batch(estimators) * Schedule::batch_count(settings.spp));
+  Schedule schedule(settings, watch);
+  while (!progress.stopped() && schedule.next()) {
+    const Batch batch{settings.seed, schedule.first_sample(), schedule.end_sample()};
+    const std::vector<BatchSums> sums = run_batch(estimators, batch, settings.threads, progress);
+    if (progress.stopped()) break;
+    collect(batch, sums);
+  }
+}
+
+void check_pixel(const Film& film, const NonFinite::Place& place) {
+  const int x = place.x - film.crop_x;
+  const int y = place.y - film.crop_y;
+  if (x >= 0 && x < film.crop_width && y >= 0 && y < film.crop_height && place.sample >= 0) return;
+  throw InputError(fmt::format(
+      "there is no sample {} of pixel ({}, {}): pixels of this film are ({}, {}) to ({}, {})",
+      place.sample, place.x, place.y, film.crop_x, film.crop_y,
+      film.crop_x + film.crop_width - 1, film.crop_y + film.crop_height - 1));
+}
+
+void run_pixel_sample(const SampleEstimator& estimator, uint64_t seed, const PixelSample& at,
+                      SampleLog& log) {
+  BatchSums sums;
+  const Film& film = estimator.scene().film;
+  sums.radiance.assign(film_size(film), 0.0);
+  sums.images.assign(estimator.slots() * estimator.lanes(), sums.radiance);
+  std::vector<TermCost> costs(estimator.slots());
+  NonFinite bad;
+  const Lanes lane_scale = estimator.lane_scale();
+  SampleSink sink(film, estimator.lanes(), lane_scale, sums, costs, bad, &log);
+  estimator.add_pixel(at, pixel_key(estimator.scene(), seed, at), sink);
+  const size_t index = pixel_index(film, at.x, at.y);
+  const auto rgb = [&](const std::vector<double>& image) {
+    return fmt::format("({:.6g}, {:.6g}, {:.6g})", image[index], image[index + 1],
+                       image[index + 2]);
+  };
+  log.push_back("sum: radiance " + rgb(sums.radiance));
+  for (size_t slot = 0; slot < estimator.slots(); ++slot) {
+    for (int k = 0; k < estimator.lanes(); ++k) {
+      log.push_back(fmt::format("sum: {} of parameter {}: {}", estimator.slot_name(slot), k + 1,
+                                rgb(sums.images[slot * estimator.lanes() + k])));
+    }
+  }
+  if (bad.count > 0) log.push_back(bad.message());
+}
+
+bool run_film_sample(const SampleEstimator& estimator, const RunSettings& settings, size_t slot,
+                     int64_t number, SampleLog& log) {
+  if (estimator.film_samples(slot) <= 0 || number < 0) return false;
+  const Stopwatch watch;
+  RunSettings untimed = settings;
+  untimed.seconds = 0;
+  Schedule schedule(untimed, watch);
+  while (schedule.next()) {
+    const FilmBatch batch(estimator, slot, schedule.first_sample(), schedule.samples());
+    const auto n = static_cast<size_t>(number);
+    if (n >= batch.first + batch.count) continue;
+    RayCount rays;
+    FilmSample sample;
+    if (sample_film(estimator, slot, settings.seed, batch, n - batch.first, rays, sample)) {
+      log.push_back(fmt::format("film point ({:.6f}, {:.6f}), value over density {}", sample.x,
+                                sample.y, to_text(sample.value, estimator.lanes())));
+    } else {
+      log.push_back("adds nothing");
+    }
+    log.push_back(fmt::format("{} rays", rays.total()));
+    return true;
+  }
+  return false;
+}
+
+}  // namespace limn

@@ -1,0 +1,44 @@
+#pragma once
+// The loop that every run shares: batches over the passes' estimators, each over the film's tiles.
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "integrators/estimates/sample_estimator.h"
+
+namespace limn {
+
+// Samples [first, last) of every pixel.
+struct Batch {
+  uint64_t seed;
+  int first, last;
+  int count() const { return last - first; }
+};
+
+using Estimators = std::span<const std::unique_ptr<SampleEstimator>>;
+
+// Sums of every estimator over one batch; empty if stopped meanwhile.
+std::vector<BatchSums> run_batch(Estimators estimators, const Batch& batch, int threads,
+                                 ProgressCounter& progress);
+
+// Steps that run_batch reports for one batch.
+size_t steps_per_batch(Estimators estimators);
+
+// Runs batch after batch until all samples are done, the time is over or the run is interrupted.
+// collect(batch, sums) takes the sums of every finished batch.
+void run_batches(Estimators estimators, const RunSettings& settings, const Stopwatch& watch,
+                 const std::function<void(const Batch&, const std::vector<BatchSums>&)>& collect);
+
+// InputError if the film has no such pixel.
+void check_pixel(const Film& film, const NonFinite::Place& place);
+
+// One sample of a pixel alone.
+void run_pixel_sample(const SampleEstimator& estimator, uint64_t seed, const PixelSample& at,
+                      SampleLog& log);
+// One of a slot's samples of the film, by its number in the run; false if the run has none of this
+// number.
+bool run_film_sample(const SampleEstimator& estimator, const RunSettings& settings, size_t slot,
+                     int64_t number, SampleLog& log);
+
+}  // namespace limn

@@ -1,0 +1,128 @@
+#pragma once
+// The contract of what a run estimates: what one sample of a pixel adds, and what one sample of the
+// film as a whole adds. Batches, tiles, threads, sums, progress and interruption are the same for
+// all estimators and stand in batches.h.
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "integrators/estimates/tiles.h"
+#include "limn/core/dual.h"
+#include "limn/core/rng.h"
+#include "limn/core/scene.h"
+#include "limn/integrators/run.h"
+
+namespace limn {
+
+// Sample `s` of a pixel of the full film.
+struct PixelSample {
+  int x, y;
+  int64_t s;
+};
+
+// A point on a curve of the film across which radiance jumps.
+struct FilmSample {
+  double x, y;       // film position [pixels]
+  Rgb<Lanes> value;  // jump times normal speed of the curve [pixels per unit of the parameter],
+                     // over the density of the sample [1 / pixel of length]
+};
+
+// What a sample met, line by line, for reading.
+using SampleLog = std::vector<std::string>;
+
+// Sums over one batch.
+struct BatchSums {
+  // Of radiance, crop_height by crop_width by 3.
+  std::vector<double> radiance;
+  // images[slot * lanes + lane], the same shape: derivatives.
+  std::vector<std::vector<double>> images;
+  std::vector<TermCost> costs;  // of each slot
+  NonFinite non_finite;
+};
+
+// Where the samples of one tile go. Pixels of different tiles do not overlap, so that tiles share
+// the images; costs and what was not finite are a tile's own.
+class SampleSink {
+ public:
+  SampleSink(const Film& film, int lanes, const Lanes& lane_scale, BatchSums& images,
+             std::vector<TermCost>& costs, NonFinite& non_finite, SampleLog* log)
+      : film_(film),
+        lanes_(lanes),
+        lane_scale_(lane_scale),
+        sums_(images),
+        costs_(costs),
+        non_finite_(non_finite),
+        log_(log) {}
+
+  void add_radiance(const PixelSample& at, const Rgb<double>& radiance, double weight) {
+    double* out = &sums_.radiance[pixel_index(film_, at.x, at.y)];
+    for (int c = 0; c < 3; ++c) out[c] += radiance[c] * weight;
+  }
+  // `name`: of the slot.
+  void add(size_t slot, const PixelSample& at, const Rgb<Lanes>& value, double weight) {
+    const size_t index = pixel_index(film_, at.x, at.y);
+    for (int k = 0; k < lanes_; ++k) {
+      double* out = &sums_.images[slot * lanes_ + k][index];
+      for (int c = 0; c < 3; ++c) out[c] += value[c][k] * weight;
+    }
+    costs_[slot].largest.add(squared_magnitude(value, weight, lanes_, lane_scale_),
+                             {at.x, at.y, at.s, ""});
+  }
+  // A sample that is not finite: it counts as zero and is reported.
+  void reject(const PixelSample& at, const std::string& name) {
+    non_finite_.add({at.x, at.y, at.s, name});
+  }
+  TermCost& cost(size_t slot) { return costs_[slot]; }
+  SampleLog* log() const { return log_; }  // null unless somebody reads it
+
+  static double squared_magnitude(const Rgb<Lanes>& value, double weight, int lanes,
+                                  const Lanes& lane_scale) {
+    double sum = 0;
+    for (int k = 0; k < lanes; ++k) {
+      const double w = weight * lane_scale[k];
+      for (int c = 0; c < 3; ++c) sum += value[c][k] * w * (value[c][k] * w);
+    }
+    return sum;
+  }
+
+ private:
+  const Film& film_;
+  int lanes_;
+  const Lanes& lane_scale_;
+  BatchSums& sums_;
+  std::vector<TermCost>& costs_;
+  NonFinite& non_finite_;
+  SampleLog* log_;
+};
+
+// Thread-safe: all of it is const.
+class SampleEstimator {
+ public:
+  virtual ~SampleEstimator() = default;
+
+  virtual const Scene& scene() const = 0;
+  // Slots hold a cost each, and a derivative image for each lane.
+  virtual size_t slots() const = 0;
+  virtual const char* slot_name(size_t slot) const = 0;
+  virtual int lanes() const { return 0; }
+  virtual Lanes lane_scale() const { return {}; }  // natural steps of the parameters
+
+  // All that one sample of one pixel adds, to that pixel alone. Seconds that are not booked on a
+  // slot go to pixel_slot().
+  virtual bool samples_pixels() const { return true; }
+  virtual size_t pixel_slot() const { return 0; }
+  virtual void add_pixel(const PixelSample& at, const Rng& key, SampleSink& sink) const = 0;
+
+  // Samples of a slot that belong to the film as a whole: how many per pixel (0: none), and one of
+  // them: `u` in [0, 1) is stratified over a batch, `key` is for everything else. False if it adds
+  // nothing.
+  virtual double film_samples(size_t /*slot*/) const { return 0; }
+  // Tells the streams of different slots apart.
+  virtual int film_stream(size_t /*slot*/) const { return 0; }
+  virtual bool sample_film(size_t /*slot*/, double /*u*/, const Rng& /*key*/, RayCount& /*rays*/,
+                           FilmSample& /*sample*/) const {
+    return false;
+  }
+};
+
+}  // namespace limn

@@ -1,0 +1,104 @@
+// Central differences: every moved scene is rendered with the same random numbers.
+#include "limn/integrators/differences.h"
+
+#include <algorithm>
+#include <deque>
+
+#include "integrators/estimates/batches.h"
+#include "integrators/methods/radiance_estimator.h"
+#include "limn/core/parameter.h"
+
+namespace limn {
+namespace {
+
+// A weighted sum of central differences. images: at +steps[0], -steps[0], +steps[1], ...
+std::vector<double> combine(const BatchSums* images, const std::vector<double>& steps,
+                            const std::vector<double>& weights) {
+  std::vector<double> sums(images[0].radiance.size());
+  for (size_t j = 0; j < steps.size(); ++j) {
+    const std::vector<double>& forward = images[2 * j].radiance;
+    const std::vector<double>& back = images[2 * j + 1].radiance;
+    const double factor = weights[j] / (2 * steps[j]);
+    if (factor == 0) continue;
+    for (size_t i = 0; i < sums.size(); ++i) sums[i] += factor * (forward[i] - back[i]);
+  }
+  return sums;
+}
+
+std::vector<double> mean_of_two(const std::vector<double>& a, const std::vector<double>& b) {
+  std::vector<double> mean(a.size());
+  for (size_t i = 0; i < a.size(); ++i) mean[i] = 0.5 * (a[i] + b[i]);
+  return mean;
+}
+
+}  // namespace
+
+DifferenceEstimate::DifferenceEstimate(const Film& film, int block)
+    : total(film_size(film)),
+      blocks(block > 0 ? block_count(film.crop_width, film.crop_height, block) : 0),
+      image_sum(1) {}
+
+void DifferenceEstimate::add_batch(const std::vector<double>& sums, const Film& film, int block,
+                                   int samples) {
+  const int width = film.crop_width;
+  const int height = film.crop_height;
+  total.add_batch(sums, samples);
+  events.add_batch(sums);
+  if (block > 0) blocks.add_batch(sum_blocks(sums, width, height, block), samples);
+  image_sum.add_batch(sum_blocks(sums, width, height, std::max(width, height)), samples);
+}
+
+CentralDifferences central_differences(const Scene& scene, const std::vector<DifferenceJob>& jobs,
+                                       int block, const RunSettings& settings) {
+  const Stopwatch watch;
+  std::deque<Scene> moved;  // keeps its elements where they are
+  std::vector<std::unique_ptr<SampleEstimator>> estimators;
+  CentralDifferences result;
+  for (const DifferenceJob& job : jobs) {
+    const Parameter parameter = find_parameter(scene, job.parameter);
+    for (const double step : job.steps) {
+      for (const double h : {step, -step}) {
+        moved.push_back(parameter.moved(scene, h));
+        estimators.push_back(std::make_unique<RadianceEstimator>(moved.back(), settings.threads));
+      }
+    }
+    result.estimates.emplace_back(job.combinations.size(), DifferenceEstimate(scene.film, block));
+  }
+  result.radiance = Moments(film_size(scene.film));
+  result.setup_seconds = watch.seconds();
+  run_batches(estimators, settings, watch, [&](const Batch& batch, const auto& sums) {
+    const BatchSums* images = sums.data();
+    result.radiance.add_batch(mean_of_two(images[0].radiance, images[1].radiance), batch.count());
+    for (size_t j = 0; j < jobs.size(); ++j) {
+      for (size_t k = 0; k < jobs[j].combinations.size(); ++k) {
+        result.estimates[j][k].add_batch(combine(images, jobs[j].steps, jobs[j].combinations[k]),
+                                         scene.film, block, batch.count());
+      }
+      images += 2 * jobs[j].steps.size();
+    }
+    for (const BatchSums& s : sums) {
+      result.cost.merge(s.costs[0]);
+      result.non_finite.merge(s.non_finite);
+    }
+    result.spp += batch.count();
+  });
+  result.seconds = watch.seconds();
+  return result;
+}
+
+DifferenceResult finite_differences(const Scene& scene, const std::string& parameter, double step,
+                                    int block, const RunSettings& settings) {
+  CentralDifferences run = central_differences(
+      scene, {{parameter, {step, 2 * step}, {{1, 0}, {0, 1}, {4.0 / 3, -1.0 / 3}}}}, block,
+      settings);
+  auto& estimates = run.estimates[0];
+  return {std::move(estimates[0]),
+          std::move(estimates[1]),
+          std::move(estimates[2]),
+          run.spp,
+          run.cost.rays,
+          run.seconds,
+          std::move(run.non_finite)};
+}
+
+}  // namespace limn

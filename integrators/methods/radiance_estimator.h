@@ -1,0 +1,27 @@
+#pragma once
+// The radiance of a scene as an estimator: images, and differences of images.
+#include <memory>
+
+#include "integrators/estimates/sample_estimator.h"
+#include "integrators/terms/path.h"
+
+namespace limn {
+
+class RadianceEstimator final : public SampleEstimator {
+ public:
+  // The scene must outlive the estimator.
+  RadianceEstimator(const Scene& scene, int threads);
+
+  const Scene& scene() const override { return scene_; }
+  size_t slots() const override { return 1; }
+  const char* slot_name(size_t) const override { return "radiance"; }
+  void add_pixel(const PixelSample& at, const Rng& key, SampleSink& sink) const override;
+
+ private:
+  const Scene& scene_;
+  std::unique_ptr<RayTracer> tracer_;
+  Lights lights_;
+  PathContext context_;
+};
+
+}  // namespace limn

@@ -1,0 +1,71 @@
+#pragma once
+// The terms of a derivative image as one estimator: up to kLanes parameters of one scene.
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "integrators/estimates/sample_estimator.h"
+#include "integrators/terms/term.h"
+#include "limn/core/parameter.h"
+
+namespace limn {
+
+// The rows of term_types() that the scene has anything of. Slots are indices into it.
+std::vector<const TermType*> terms_of(const Scene& scene);
+
+class TermEstimator final : public SampleEstimator {
+ public:
+  // parameters: at most kLanes. computed: for each of terms_of(scene), whether it is computed.
+  TermEstimator(const Scene& scene, std::span<const Parameter> parameters,
+                const std::vector<bool>& computed, const EdgeSamplerType& sampler, int threads);
+  TermEstimator(const TermEstimator&) = delete;
+  TermEstimator& operator=(const TermEstimator&) = delete;
+
+  // What a sample of a pixel holds from now on.
+  void set_samples(const SampleCounts& samples) { samples_ = samples; }
+  // What samples of a slot cost, see Term::work.
+  double work(size_t slot, const TermCost& cost) const;
+  void describe(GradientStats& stats) const;
+
+  const Scene& scene() const override { return scene_; }
+  size_t slots() const override { return types_.size(); }
+  const char* slot_name(size_t slot) const override { return types_[slot]->name; }
+  int lanes() const override { return lanes_; }
+  Lanes lane_scale() const override { return lane_scale_; }
+
+  bool samples_pixels() const override { return paths_ || vertices_; }
+  size_t pixel_slot() const override { return pixel_slot_; }
+  void add_pixel(const PixelSample& at, const Rng& key, SampleSink& sink) const override;
+
+  double film_samples(size_t slot) const override {
+    return terms_[slot] && terms_[slot]->uses_film() ? samples_[slot] : 0;
+  }
+  int film_stream(size_t slot) const override { return types_[slot]->film_stream; }
+  bool sample_film(size_t slot, double u, const Rng& key, RayCount& rays,
+                   FilmSample& sample) const override {
+    return terms_[slot]->sample_film(u, key, rays, sample);
+  }
+
+ private:
+  class VertexTerms;
+  template <class Visitor>
+  void add_path(const PixelSample& at, const Rng& key, Visitor& visitor, double weight,
+                SampleSink& sink) const;
+  void add_vertices(const PixelSample& at, const VertexTerms& vertices, SampleSink& sink) const;
+
+  Scene scene_;  // with its parameters seeded
+  int lanes_;
+  Lanes lane_scale_;
+  std::unique_ptr<RayTracer> tracer_;
+  double tracer_seconds_ = 0;
+  Lights lights_;
+  PathContext context_;
+  TermInput input_;
+  std::vector<const TermType*> types_;
+  std::vector<std::unique_ptr<Term>> terms_;  // of each slot; null where not computed
+  size_t pixel_slot_ = 0;                     // of the term that traces paths
+  bool paths_ = false, vertices_ = false;     // whether some term uses them
+  SampleCounts samples_;
+};
+
+}  // namespace limn

@@ -1,0 +1,33 @@
+#pragma once
+// Where a path starts: a position in a pixel's filter, and the camera's ray through it.
+#include "limn/core/film.h"
+#include "limn/core/ray_tracer.h"
+#include "limn/core/rng.h"
+#include "limn/core/scene.h"
+
+namespace limn {
+
+// Position of one sample of a pixel [pixels of the full film]: drawn from the reconstruction filter
+// around the pixel's centre, so that every sample counts with weight one and no pixel shares samples
+// with another. The stream depends on the pixel of the full film, hence a crop repeats the full
+// image.
+struct FilmPosition {
+  double x, y;
+};
+inline FilmPosition sample_pixel_filter(const Film& film, int x, int y, const Rng& key) {
+  Rng rng = key.at(Purpose::kFilm, 0);
+  const auto columns = film.range_x(x);
+  const auto rows = film.range_y(y);
+  const double dx = film.filter.sample(columns.lower, columns.upper, rng);
+  const double dy = film.filter.sample(rows.lower, rows.upper, rng);
+  return {x + 0.5 + dx, y + 0.5 + dy};
+}
+
+// The primal camera ray.
+inline Ray camera_ray(const Scene& scene, const CameraRay<double>& c) {
+  Ray ray{c.origin, c.direction, c.t_min, c.t_max};
+  ray.skip_emitters = scene.hide_emitters;
+  return ray;
+}
+
+}  // namespace limn

@@ -1,0 +1,11 @@
+#pragma once
+// A scene's edges as edge samplers take them.
+#include "limn/core/scene.h"
+#include "limn/edgetree/edge_sampler.h"
+
+namespace limn {
+
+// Edges of all shapes (object i is shape i), light polygons and the environment's mean.
+EdgeSamplerInput make_sampler_input(const Scene& scene);
+
+}  // namespace limn

@@ -1,0 +1,25 @@
+#pragma once
+// The terms: a factory in a file of its own each, and one row. Included by terms.cpp alone.
+#include "integrators/terms/term.h"
+
+namespace limn {
+
+std::unique_ptr<Term> make_interior_term(TermInput& input);
+std::unique_ptr<Term> make_camera_term(TermInput& input);
+std::unique_ptr<Term> make_boundary_term(TermInput& input);
+
+inline bool always(const Scene&) { return true; }
+
+// The camera's samples are drawn over the whole film: there may be fewer of them than pixels.
+inline constexpr double kLeastFilmSamples = 0.125;  // not tuned
+
+inline constexpr TermType kTermTypes[] = {
+    {"interior", "what slides within continuous regions", 1, true, false, 0, always,
+     make_interior_term},
+    {"camera", "silhouettes on the film", kLeastFilmSamples, false, true, 0, always,
+     make_camera_term},
+    {"boundary", "silhouettes that shading points see", 1, false, true, 0, always,
+     make_boundary_term},
+};
+
+}  // namespace limn

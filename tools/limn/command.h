@@ -1,0 +1,24 @@
+#pragma once
+// The contract of a command of the program: it says what it takes, then does it.
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <string>
+
+namespace limn {
+
+// Exit statuses.
+enum Status { kSuccess = 0, kDisagree = 1, kBadInput = 2, kNonFinite = 3, kInterrupted = 130 };
+
+class Command {
+ public:
+  virtual ~Command() = default;
+  virtual const char* name() const = 0;
+  virtual const char* description() const = 0;
+  // What the command line says goes into the command itself. all: the help also tells of variants
+  // that only those who build methods need.
+  virtual void add_options(CLI::App& app, bool all) = 0;
+  // After parsing. command_line: what was typed, for a shell. Returns an exit status.
+  virtual int run(const std::string& command_line) = 0;
+};
+
+}  // namespace limn

@@ -1,0 +1,77 @@
+#pragma once
+// What commands share: options, scenes, settings of a run, files.
+#include <fmt/format.h>
+
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "limn/core/image.h"
+#include "limn/core/scene.h"
+#include "limn/integrators/gradient.h"
+#include "limn/integrators/methods.h"
+#include "limn/integrators/run.h"
+#include "tools/limn/command.h"
+
+namespace limn {
+
+struct CommonOptions {
+  std::string scene;
+  std::map<std::string, std::string> defines;
+  int spp = 0;  // 0: the scene's
+  std::optional<uint64_t> seed;
+  int threads = 0;  // 0: all cores
+  std::string json;
+  bool quiet = false;
+  std::string shading = "continuous";
+};
+
+// Scene or mesh, -D, --seed, --threads, --quiet. text, type: of the input.
+void add_input_options(CLI::App& app, CommonOptions& common, const std::string& text,
+                       const std::string& type);
+// These and --spp, --json, --shading.
+void add_common_options(CLI::App& app, CommonOptions& common);
+// Names of methods as help text; all: of ablations, too.
+std::string method_list(bool all);
+// --wrt; --method, which --sampler says as well
+void add_parameter_options(CLI::App& app, std::vector<std::string>& parameters,
+                           std::string& method, bool all);
+// --terms and --samples
+void add_term_options(CLI::App& app, std::string& terms, std::string& samples);
+// --debug-sample
+void add_debug_option(CLI::App& app, std::string& place);
+
+// The EXR's header says what made it.
+std::vector<ImageAttribute> provenance(const Scene& scene, const RunSettings& settings,
+                                       int64_t spp);
+// One channel (luminance) if the scene's film asks for it.
+Image film_channels(const Scene& scene, const Image& image);
+// output with another ending: "a/b.exr", "_stderr.exr" gives "a/b_stderr.exr".
+std::string with_ending(const std::string& output, const std::string& ending);
+// Made before long work starts: InputError if the file cannot be written.
+void check_output(const std::string& file);
+void write_json(const std::string& file, const std::string& text);
+// "a,b" of --terms; none for "".
+std::vector<std::string> parse_terms(const std::string& list);
+// Of --samples; none for "auto".
+std::optional<SampleCounts> parse_samples(const std::string& list);
+// "X,Y,S", or "TERM,N" for a term's samples on the film.
+NonFinite::Place parse_place(const std::string& text);
+// Makes FOLDER/report.html with Python, or says what is missing for it.
+void write_report(const std::string& folder, bool quiet);
+Scene load_scene(const CommonOptions& common);
+RunSettings make_settings(const CommonOptions& common, const Scene& scene,
+                          const std::string& label);
+
+// The command that does one sample again.
+std::string repeat_command(const std::string& command_line, const NonFinite::Place& place,
+                           const std::string& samples);
+// Prints a warning about non-finite samples and the command that does the first again, and turns
+// the status into kNonFinite or kInterrupted where that is due. command_line: "" for commands that
+// cannot do one sample alone. samples: of --samples, "" if the command has none.
+int finish_status(const NonFinite& non_finite, int64_t spp_done, int64_t spp_asked,
+                  const std::string& command_line, const std::string& samples);
+
+}  // namespace limn
