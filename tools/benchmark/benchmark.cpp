@@ -10,8 +10,7 @@
 #include "limn/core/lights.h"
 #include "limn/core/ray_tracer.h"
 #include "limn/core/shading.h"
-#include "limn/edgetree/edge_sampler_types.h"
-#include "limn/integrators/gradient.h"
+#include "limn/integrators/methods.h"
 #include "limn/integrators/render.h"
 
 namespace limn {
@@ -112,33 +111,45 @@ void add_render_benchmark(const Bench& bench) {
   })->Unit(benchmark::kMillisecond);
 }
 
-// Samples per second of one term: its share of the run, by the terms' own clocks, in processor
-// time.
-void add_term_benchmark(const Bench& bench, int term, const std::string& sampler,
+// Samples per second of one term by one method: its share of the run, by the terms' own clocks, in
+// processor time.
+void add_term_benchmark(const Bench& bench, const std::string& method, const std::string& term,
                         const std::string& parameter) {
-  std::string name = fmt::format("gradient/{}", term_name(term));
-  if (term == kBoundary) name += "/" + sampler;
   benchmark::RegisterBenchmark(
-      name.c_str(),
+      fmt::format("gradient/{}/{}", method, term).c_str(),
       [=, &bench](benchmark::State& state) {
         GradientOptions options;
         options.parameters = {parameter};
-        options.terms = {false, false, false};
-        options.terms[term] = true;
-        options.sampler = sampler;
+        options.method = method;
+        options.terms = {term};
         TermCost cost;
+        bool edges = false;
         for (auto _ : state) {
           const GradientResult result = gradient(bench.scene, options, one_thread(1));
-          state.SetIterationTime(result.costs[term].seconds);
-          cost.merge(result.costs[term]);
+          const TermRun& run = result.terms[result.term(term)];
+          state.SetIterationTime(run.cost.seconds);
+          cost.merge(run.cost);
+          edges = run.edges;
         }
         state.counters["samples"] = rate(static_cast<double>(cost.samples));
         state.counters["rays"] = rate(static_cast<double>(cost.rays));
-        state.counters["counted"] =
-            term == kInterior ? 1.0 : static_cast<double>(cost.counted) / cost.samples;
+        state.counters["counted"] = edges ? static_cast<double>(cost.counted) / cost.samples : 1.0;
       })
       ->Unit(benchmark::kMillisecond)
       ->UseManualTime();
+}
+
+// Every term that the scene has, by every method that computes terms one by one.
+void add_gradient_benchmarks(const Bench& bench, const std::string& parameter) {
+  GradientOptions options;
+  options.parameters = {parameter};
+  const GradientResult by_default = gradient(bench.scene, options, one_thread(1));
+  for (const MethodType& method : method_types()) {
+    if (method.ablation || !method.terms_can_be_left_out) continue;
+    for (const TermRun& term : by_default.terms) {
+      add_term_benchmark(bench, method.name, term.name, parameter);
+    }
+  }
 }
 
 Scene read_at_fixed_size(const std::string& file) {
@@ -159,11 +170,7 @@ int run(const std::string& file) {
                                     : bench.scene.shapes.front().id + ".translate.y";
   add_ray_benchmarks(bench);
   add_render_benchmark(bench);
-  add_term_benchmark(bench, kInterior, "uniform", parameter);
-  add_term_benchmark(bench, kCamera, "uniform", parameter);
-  for (const auto& type : edge_sampler_types()) {
-    add_term_benchmark(bench, kBoundary, type.name, parameter);
-  }
+  add_gradient_benchmarks(bench, parameter);
   benchmark::AddCustomContext("scene", file);
   benchmark::AddCustomContext("parameter", parameter);
   benchmark::RunSpecifiedBenchmarks();
