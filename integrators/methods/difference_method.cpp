@@ -10,7 +10,7 @@
 #include "integrators/methods/method_table.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/differences.h"
-#include "limn/integrators/metrics.h"
+#include "limn/integrators/statistics.h"
 
 namespace limn {
 namespace {
