@@ -36,8 +36,7 @@ RayTape record_rays(const Scene& scene, const RayTracer& tracer, size_t count) {
     const auto surface = surface_on_ray<double>(scene, hit.face, ray.origin, ray.direction);
     const Scattering<double> scattering(surface, -ray.direction, scene.shading);
     if (scattering.black()) continue;
-    std::optional<LightSample> light;
-    if (!lights.empty()) light = lights.sample(surface.p, rng);
+    const auto light = lights.empty() ? std::nullopt : lights.sample(surface.p, rng);
     if (light && !is_black(scattering.eval(light->wo))) {
       Ray shadow{surface.p, light->wo};
       shadow.start = hit.face;
@@ -111,32 +110,45 @@ void add_render_benchmark(const Bench& bench) {
   })->Unit(benchmark::kMillisecond);
 }
 
-// Samples per second of one term: its share of the run, by the terms' own clocks, in processor
-// time.
-void add_term_benchmark(const Bench& bench, const std::string& term, const std::string& method,
+// Samples per second of one term by one method: its share of the run, by the terms' own clocks, in
+// processor time.
+void add_term_benchmark(const Bench& bench, const std::string& method, const std::string& term,
                         const std::string& parameter) {
-  const std::string name = fmt::format("gradient/{}/{}", term, method);
   benchmark::RegisterBenchmark(
-      name.c_str(),
+      fmt::format("gradient/{}/{}", method, term).c_str(),
       [=, &bench](benchmark::State& state) {
         GradientOptions options;
         options.parameters = {parameter};
-        options.terms = {term};
         options.method = method;
+        options.terms = {term};
         TermCost cost;
+        bool edges = false;
         for (auto _ : state) {
           const GradientResult result = gradient(bench.scene, options, one_thread(1));
-          const TermCost& c = result.terms[result.term(term)].cost;
-          state.SetIterationTime(c.seconds);
-          cost.merge(c);
+          const TermRun& run = result.terms[result.term(term)];
+          state.SetIterationTime(run.cost.seconds);
+          cost.merge(run.cost);
+          edges = run.edges;
         }
         state.counters["samples"] = rate(static_cast<double>(cost.samples));
         state.counters["rays"] = rate(static_cast<double>(cost.rays));
-        state.counters["counted"] =
-            cost.counted == 0 ? 1.0 : static_cast<double>(cost.counted) / cost.samples;
+        state.counters["counted"] = edges ? static_cast<double>(cost.counted) / cost.samples : 1.0;
       })
       ->Unit(benchmark::kMillisecond)
       ->UseManualTime();
+}
+
+// Every term that the scene has, by every method that computes terms one by one.
+void add_gradient_benchmarks(const Bench& bench, const std::string& parameter) {
+  GradientOptions options;
+  options.parameters = {parameter};
+  const GradientResult by_default = gradient(bench.scene, options, one_thread(1));
+  for (const MethodType& method : method_types()) {
+    if (method.ablation || !method.terms_can_be_left_out) continue;
+    for (const TermRun& term : by_default.terms) {
+      add_term_benchmark(bench, method.name, term.name, parameter);
+    }
+  }
 }
 
 Scene read_at_fixed_size(const std::string& file) {
@@ -157,16 +169,7 @@ int run(const std::string& file) {
                                     : bench.scene.shapes.front().id + ".translate.y";
   add_ray_benchmarks(bench);
   add_render_benchmark(bench);
-  // Terms that no method changes are timed once; those at shading points for every method.
-  const MethodType& standard = method_types().front();
-  for (const std::string& term : standard.terms) {
-    for (const MethodType& method : method_types()) {
-      const bool same = term != "boundary" && method.name != standard.name;
-      if (method.terms == standard.terms && !same) {
-        add_term_benchmark(bench, term, method.name, parameter);
-      }
-    }
-  }
+  add_gradient_benchmarks(bench, parameter);
   benchmark::AddCustomContext("scene", file);
   benchmark::AddCustomContext("parameter", parameter);
   benchmark::RunSpecifiedBenchmarks();

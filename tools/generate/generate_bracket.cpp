@@ -62,7 +62,7 @@ struct Cell {
   Vec3d point(double u, double v, double z) const {
     return {x_0 + u * (x_1 - x_0), y_0 + v * (y_1 - y_0), z};
   }
-  // From (x_0, y_0) around.
+  // The outline, from (x_0, y_0) around.
   Loop outline(double z) const {
     Loop loop;
     for (int i = 0; i < columns; ++i) loop.push_back(point(1.0 * i / columns, 0, z));
@@ -115,7 +115,7 @@ void add_bored(Builder& builder, const Cell& cell, const std::vector<Circle>& ci
                 pieces(side / 2 - circles.back().radius));
 }
 
-// Around the plate: from the top's outline over a chamfer, the wall and a chamfer to the bottom's.
+// The plate's rim: from the top's outline over a chamfer, the wall and a chamfer to the bottom's.
 void add_rim(Builder& builder, const Cell* cells, double h) {
   Loop top;
   const auto add_side = [&](int first, int stride, int side) {

@@ -1,3 +1,4 @@
+// Surfaces of functions by surface nets, spread evenly and cut into triangles.
 #include "tools/generate/generate_implicit.h"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 #pragma once
-// One function for every row of the tables in generate.cpp.
+// One function for every row of the tables in generate_files.cpp.
 #include "tools/generate/generate.h"
 
 namespace limn {

@@ -1,3 +1,4 @@
+// Tubes, rods, lathes and ellipsoids as closed meshes, and the search for a number of faces.
 #include "tools/generate/generate_parts.h"
 
 #include <algorithm>

@@ -39,10 +39,10 @@ struct Tube {
   double stretch = 1;
 };
 Triangles tube(const Tube& tube, double h);
-// Straight, of one radius.
+// A straight tube of one radius.
 Triangles rod(const Vec3d& from, const Vec3d& to, double radius, double h);
 
-// Around the y axis: (r, y) from the lowest point (0, y) to the highest, a polyline whose corners
+// A surface of revolution around the y axis: (r, y) from the lowest point (0, y) to the highest, a polyline whose corners
 // stay; edges are about h long.
 Triangles lathe(const std::vector<std::pair<double, double>>& profile, double h);
 // The same with the corners rounded off, as a spline of the points.
@@ -52,7 +52,7 @@ Triangles torus(const Vec3d& centre, const Vec3d& axis, double radius, double tu
                 double h);
 
 Triangles moved(Triangles mesh, const Vec3d& offset);
-// Counter-clockwise about +y, radians.
+// The mesh turned counter-clockwise about +y, radians.
 Triangles turned(Triangles mesh, double angle);
 Vec3d turned(const Vec3d& p, double angle);
 
@@ -60,7 +60,7 @@ Vec3d turned(const Vec3d& p, double angle);
 Vec3d spline(const std::vector<Vec3d>& points, double t);
 double arc_length(const std::function<Vec3d(double)>& position);
 
-// At least `fewest`.
+// As many steps as `h` fits into `length`, but at least `fewest`.
 int steps(double length, double h, int fewest);
 
 }  // namespace limn

@@ -1,3 +1,4 @@
+// Other programs, run and waited for.
 #include "tools/limn/child_process.h"
 
 #include <fcntl.h>
@@ -75,8 +76,13 @@ ChildOutcome run_child(const std::vector<std::string>& command) {
 std::string tool_script(const std::string& name) {
   std::error_code failed;
   const fs::path program = fs::read_symlink("/proc/self/exe", failed);
-  const fs::path script = (program.parent_path() / ".." / "tools" / name).lexically_normal();
-  return !failed && fs::exists(script, failed) ? script.string() : "";
+  if (failed) return "";
+  // In the source's build folder, and where it was installed.
+  for (const char* place : {"tools", "share/limn"}) {
+    const fs::path script = (program.parent_path() / ".." / place / name).lexically_normal();
+    if (fs::exists(script, failed)) return script.string();
+  }
+  return "";
 }
 
 }  // namespace limn

@@ -14,7 +14,7 @@ struct ChildOutcome {
 // Runs a program (found in PATH) and waits for its end. Its standard output is dropped.
 ChildOutcome run_child(const std::vector<std::string>& command);
 
-// A script of the folder tools/, which lies beside that of the executable; "" if it is not there.
+// A script of tools/, beside the build folder or installed with the program; "" if it is not there.
 std::string tool_script(const std::string& name);
 
 }  // namespace limn

@@ -5,6 +5,7 @@
 
 #include "limn/core/error.h"
 #include "tools/limn/commands.h"
+#include "tools/limn/version.h"
 
 namespace {
 
@@ -45,6 +46,7 @@ int run(int argc, char** argv) {
   const bool all = std::find(argv, argv + argc, std::string(kHelpAll)) != argv + argc;
   CLI::App app("limn: a path tracer that also computes how its image changes when the scene moves");
   app.require_subcommand(1);
+  app.set_version_flag("--version", limn::version_text(), "Print version, commit and build type");
   app.set_help_all_flag(kHelpAll, "The help of all commands, with variants of methods");
   std::vector<std::pair<CLI::App*, std::unique_ptr<limn::Command>>> commands;
   for (const limn::CommandMaker make : limn::kCommands) {

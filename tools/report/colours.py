@@ -21,7 +21,7 @@ OTHERS = [
     ("#4a4a4a", "#dddddd", "d"),
 ]
 
-# Of the page and of charts: name: (on white, on black).
+# The colours of the page and of charts, name: (on white, on black).
 SHADES = {
     "interior": ("#3f8fb5", "#5fb3da"),
     "camera": ("#d9a441", "#e5b95f"),
@@ -29,7 +29,7 @@ SHADES = {
     "rest": ("#b8bec6", "#59616b"),
 }
 
-# Of the pictures that `limn reject` draws, unless its file names others; equal in both modes
+# The colours of the pictures that `limn reject` draws, unless its file names others; equal in both modes
 # because the pictures are.
 SLICES = {
     "true_reject": ("true reject", "#d9d9d9"),

@@ -1,0 +1,66 @@
+#!/usr/bin/env python3
+"""The pages: links that lead somewhere, prose within 100 columns, small pictures, one version."""
+
+import os
+import re
+import unittest
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+WIDTH = 100
+MOST_PICTURE_BYTES = 300_000
+
+
+def pages():
+    """(name from the root, text) of every page in the repository."""
+    for folder, inner, names in os.walk(ROOT):
+        inner[:] = [n for n in inner if not n.startswith(("build", ".git")) and n != "out"]
+        for name in names:
+            if name.endswith(".md"):
+                file = os.path.join(folder, name)
+                with open(file, encoding="utf-8") as stream:
+                    yield os.path.relpath(file, ROOT), stream.read()
+
+
+def read(name):
+    with open(os.path.join(ROOT, name), encoding="utf-8") as stream:
+        return stream.read()
+
+
+class Pages(unittest.TestCase):
+    def test_links_lead_to_files(self):
+        for name, text in pages():
+            here = os.path.dirname(os.path.join(ROOT, name))
+            targets = re.findall(r"\]\(([^)\s]+)\)", text)
+            targets += re.findall(r"^\[[^]]+\]: (\S+)$", text, re.MULTILINE)
+            for target in (t for t in targets if not t.startswith(("https://", "#"))):
+                with self.subTest(page=name, target=target):
+                    self.assertTrue(os.path.exists(os.path.join(here, target.split("#")[0])))
+
+    # Tables, samples of output and what a link makes long are left as they are.
+    def test_prose_keeps_to_the_width(self):
+        for name, text in pages():
+            fenced = False
+            for number, line in enumerate(text.splitlines(), 1):
+                fenced ^= line.startswith("```")
+                exempt = line.startswith(("    ", "|", "![")) or re.match(r"\[[^]]+\]: ", line)
+                if not fenced and not exempt:
+                    with self.subTest(page=name, line=number):
+                        self.assertLessEqual(len(line), WIDTH)
+
+    def test_pictures_are_small_and_shown(self):
+        folder = os.path.join(ROOT, "scenes", "pictures")
+        shown = set(re.findall(r"scenes/pictures/([\w.]+)", read("README.md")))
+        self.assertEqual(shown, set(os.listdir(folder)))
+        total = sum(os.path.getsize(os.path.join(folder, n)) for n in shown)
+        self.assertLessEqual(total, MOST_PICTURE_BYTES)
+
+    def test_one_version_everywhere(self):
+        version = re.search(r"project\(limn VERSION (\S+)", read("CMakeLists.txt"))[1]
+        self.assertEqual(re.search(r"^version: (\S+)$", read("CITATION.cff"), re.M)[1], version)
+        self.assertEqual(re.search(r"^## (\S+)", read("CHANGELOG.md"), re.M)[1], version)
+        short = version.rsplit(".", 1)[0]
+        self.assertIn(f"find_package(limn {short})", read("README.md"))
+
+
+if __name__ == "__main__":
+    unittest.main()
