@@ -10,6 +10,7 @@
 namespace limn {
 namespace {
 
+// The chance that a right gradient is accused, of each of the tests.
 constexpr double kLevel = 1e-4;
 
 // The variance of a block's difference, with two lower limits that the batches may not show.

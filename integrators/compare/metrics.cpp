@@ -39,7 +39,7 @@ struct Variance {
   double degrees = 0;
 };
 
-// Of the mean over repeats of one block, whose edges add `edges`.
+// The variance of the mean over repeats of one block, to which edges add `edges`.
 Variance variance_of_mean(const std::vector<BlockSums>& repeats, size_t block, double edges) {
   const auto count = static_cast<double>(repeats.size());
   std::vector<double> values;

@@ -1,3 +1,4 @@
+// The peak of resident memory, as Linux tells it.
 #include "integrators/estimates/peak_memory.h"
 
 #include <fstream>

@@ -32,8 +32,7 @@ using SampleLog = std::vector<std::string>;
 
 // Sums over one batch.
 struct BatchSums {
-  // Of radiance, crop_height by crop_width by 3.
-  std::vector<double> radiance;
+  std::vector<double> radiance;  // crop_height by crop_width by 3
   // images[slot * lanes + lane], the same shape: derivatives.
   std::vector<std::vector<double>> images;
   std::vector<TermCost> costs;  // of each slot
@@ -58,7 +57,6 @@ class SampleSink {
     double* out = &sums_.radiance[pixel_index(film_, at.x, at.y)];
     for (int c = 0; c < 3; ++c) out[c] += radiance[c] * weight;
   }
-  // `name`: of the slot.
   void add(size_t slot, const PixelSample& at, const Rgb<Lanes>& value, double weight) {
     const size_t index = pixel_index(film_, at.x, at.y);
     for (int k = 0; k < lanes_; ++k) {

@@ -11,7 +11,7 @@
 
 namespace limn {
 
-inline constexpr int kTileSize = 16;
+inline constexpr int kTileSize = 16;  // not tuned
 
 struct Tile {
   int x0, y0, x1, y1;  // full-film pixels, [x0, x1) by [y0, y1)

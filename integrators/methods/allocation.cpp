@@ -95,7 +95,7 @@ std::vector<double> pilot_variances(const GradientResult& pilot) {
 int pilot_samples(size_t pixels, int spp) {
   // At least two, for variances; at most an eighth of the job; more than some ten thousand paths
   // say nothing new.
-  constexpr size_t kEnough = 16384;
+  constexpr size_t kEnough = 16384;  // not tuned
   if (spp < 16) return 0;
   const size_t wanted = (kEnough + pixels - 1) / pixels;
   return static_cast<int>(std::clamp<size_t>(wanted, 2, std::min(8, spp / 8)));

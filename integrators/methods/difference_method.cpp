@@ -10,7 +10,7 @@
 #include "integrators/methods/method_table.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/differences.h"
-#include "limn/integrators/metrics.h"
+#include "limn/integrators/statistics.h"
 
 namespace limn {
 namespace {
@@ -18,7 +18,7 @@ namespace {
 constexpr double kPilotShare = 0.1;  // of a run's time or samples; not tuned
 constexpr int kPilotSamples = 4;     // per pixel, at least: variances need some
 // The steps that the pilot tries: down from the natural one, which is for pictures that change a
-// lot.
+// lot. Not tuned.
 constexpr int kTrials = 5;
 constexpr double kFactor = 4;
 

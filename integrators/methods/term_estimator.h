@@ -56,8 +56,8 @@ class TermEstimator final : public SampleEstimator {
   Scene scene_;  // with its parameters seeded
   int lanes_;
   Lanes lane_scale_;
-  std::unique_ptr<RayTracer> tracer_;
   double tracer_seconds_ = 0;
+  std::unique_ptr<RayTracer> tracer_;
   Lights lights_;
   PathContext context_;
   TermInput input_;

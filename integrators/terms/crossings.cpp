@@ -1,3 +1,4 @@
+// Edges that pass through faces: every edge traced as a ray.
 #include "limn/integrators/crossings.h"
 
 #include <algorithm>

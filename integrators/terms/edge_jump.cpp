@@ -1,3 +1,4 @@
+// The jump of radiance across an edge: which faces lie on either side, and a path from each.
 #include "integrators/terms/edge_jump.h"
 
 namespace limn {

@@ -1,3 +1,4 @@
+// What happens at an edge that a path starts on: decided in the plane across it.
 #include "integrators/terms/path.h"
 
 namespace limn {

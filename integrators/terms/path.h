@@ -78,7 +78,14 @@ class PathTracer {
   }
 
   // Radiance that leaves the surface along wi: emission and everything scattered within the scene's
-  // depth.
+  // depth. With x_0 the surface, w_i a direction drawn at x_i with density p_i, f_i the scattering
+  // function times cosine there, and the throughput T_k = f_0 / p_0 ... f_(k-1) / p_(k-1), one path
+  // estimates
+  //   L = L_e(x_0) + sum over k of T_k (E_k + f_k / p_k m_k L_e(x_(k+1))),
+  //   E_k = f_k(l) / q_k(l) n_k L_e(l),
+  // l a direction that light sampling draws with density q_k, and m_k = p^2 / (p^2 + q^2) and
+  // n_k = q^2 / (p^2 + q^2) the weights of the power heuristic at either's direction (n_k = 1 for a
+  // delta light). w, l, p, q, m, n are constants when S carries derivatives.
   Rgb<S> from_surface(SurfacePoint<S> surface, Vec3<S> wi, int bounces, const Rng& key,
                       const EdgeStart* edge) {
     Rgb<S> radiance = surface.emission(value(wi), c_.scene.shading);

@@ -36,12 +36,11 @@ RayTape record_rays(const Scene& scene, const RayTracer& tracer, size_t count) {
     const auto surface = surface_on_ray<double>(scene, hit.face, ray.origin, ray.direction);
     const Scattering<double> scattering(surface, -ray.direction, scene.shading);
     if (scattering.black()) continue;
-    LightSample light;
-    if (!lights.empty() && lights.sample(surface.p, rng, light) &&
-        !is_black(scattering.eval(light.wo))) {
-      Ray shadow{surface.p, light.wo};
+    const auto light = lights.empty() ? std::nullopt : lights.sample(surface.p, rng);
+    if (light && !is_black(scattering.eval(light->wo))) {
+      Ray shadow{surface.p, light->wo};
       shadow.start = hit.face;
-      if (light.distance < 1e300) shadow.t_max = light.distance * (1 - 0x1p-20);
+      shadow.t_max = light->distance * (1 - 0x1p-20);
       tape.shadow.push_back(shadow);
     }
     const double u1 = rng.uniform();

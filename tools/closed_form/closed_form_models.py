@@ -196,7 +196,9 @@ class SharpShadowInGloss(FloorModel):
                 - self.reflected(shade, chart, q[0], dark, q[1], viewer, order))
 
     def reflected(self, shade, chart, q_rest, polygon, q, viewer, order):
-        node, area = loop_rule(polygon, 2 * order)
+        # As triangles, whatever its shape: one rule for the polygon at rest and moved.
+        parts = [loop_rule(polygon[[0, k, k + 1]], 4 * order) for k in range(1, len(polygon) - 1)]
+        node, area = (np.concatenate(values) for values in zip(*parts))
         w = node - q_rest
         r = np.linalg.norm(w, axis=1)
         facing = -(w @ loop_normal(chart))

@@ -225,11 +225,14 @@ def shadow_in_gloss():
     triangle.bsdf = Bsdf("object_bsdf", "diffuse", vector(0, 0, 0))
     position = vector(-3, 0.5, 0)
     light = Light("spot", vector(64, 32, 16), position, unit(vector(2.625, 1.75, 0)), 38, 34)
-    scene = Scene("shadow_in_gloss.xml", floor_camera(),
+    scene = Scene("shadow_in_gloss.xml", floor_camera((1, 1)),
                   {"floor": floor("ggx", 0.375), "object": triangle, "panel": panel}, 3,
                   lights={"lamp": light})
-    names = moves_of("object") + moves_of_light(light) + moves_of("panel") + FLOOR_MOVES + SENSOR
-    return scene, models.SharpShadowInGloss(), names + ["panel_bsdf.reflectance", "floor_bsdf.alpha"]
+    names = ["object.translate.x", "object.translate.y", "object.rotate.z", "object.scale",
+             "lamp.translate.x", "lamp.translate.z", "lamp.rotate.z", "lamp.intensity",
+             "panel.translate.y", "panel.rotate.x", "floor.translate.y", "floor.rotate.x",
+             "sensor.translate.x", "sensor.rotate.y", "panel_bsdf.reflectance", "floor_bsdf.alpha"]
+    return scene, models.SharpShadowInGloss(), names
 
 
 SCENES = {

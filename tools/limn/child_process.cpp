@@ -1,3 +1,4 @@
+// Other programs, run and waited for.
 #include "tools/limn/child_process.h"
 
 #include <fcntl.h>

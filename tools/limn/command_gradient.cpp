@@ -14,7 +14,7 @@ namespace {
 
 using nlohmann::json;
 
-// From this share of the squares of a term's samples on, one of them rules its error.
+// From this share of the squares of a term's samples on, one of them rules its error. Not tuned.
 constexpr double kRulingShare = 0.1;
 
 // A parameter's name as a part of a file's name.
@@ -32,7 +32,7 @@ double mean_magnitude(const Moments& moments) {
   return sum / moments.size();
 }
 
-// Of the image: the mean over pixels and channels of the squared standard error.
+// The mean over pixels and channels of the squared standard error.
 double mean_squared_error(const Moments& moments) {
   double sum = 0;
   for (size_t i = 0; i < moments.size(); ++i) sum += moments.variance(i);

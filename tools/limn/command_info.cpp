@@ -1,3 +1,4 @@
+// `limn info`: what a scene holds, and what can be differentiated.
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>

@@ -55,7 +55,7 @@ void check_output(const std::string& file);
 void write_json(const std::string& file, const std::string& text);
 // "a,b" of --terms; none for "".
 std::vector<std::string> parse_terms(const std::string& list);
-// Of --samples; none for "auto".
+// The counts of --samples; none for "auto".
 std::optional<SampleCounts> parse_samples(const std::string& list);
 // "X,Y,S", or "TERM,N" for a term's samples on the film.
 NonFinite::Place parse_place(const std::string& text);

@@ -52,7 +52,7 @@ std::string in_folder(const std::string& folder, const std::string& name) {
   return (std::filesystem::path(folder) / name).string();
 }
 
-// Of the image that is shown: the first repeat of the longest rung.
+// Attributes of the image that is shown: the first repeat of the longest rung.
 std::vector<ImageAttribute> image_attributes(const Scene& scene, const Comparison& c,
                                              const ComparedMethod& m) {
   const auto shown = std::find_if(m.runs.rbegin(), m.runs.rend(),
@@ -208,7 +208,7 @@ json comparison_json(const Scene& scene, const Comparison& c, const Scales& scal
   return object;
 }
 
-// Of all methods, in the order in which they first come.
+// Names of terms of all methods, in the order in which they first come.
 std::vector<std::string> term_names(const Comparison& c) {
   std::vector<std::string> names;
   for (const ComparedMethod& m : c.methods) {

@@ -1,3 +1,4 @@
+// The call of tools/report.py, or what is missing for it.
 #include <fmt/format.h>
 
 #include "tools/limn/child_process.h"

@@ -1,3 +1,4 @@
+// Progress on a terminal, and Ctrl-C.
 #include "tools/limn/terminal.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// Mitsuba 3's gradient by the script beside this file, run as a program of its own.
 #include "tools/mitsuba/mitsuba_method.h"
 
 #include <fmt/format.h>

@@ -43,7 +43,7 @@ class DerivativeMethod {
   virtual std::string description() const = 0;
   // Takes settings.seconds and reports what it really took. May throw MethodMissing.
   virtual MethodRun run(const RunSettings& settings) = 0;
-  // Of the latest run.
+  // How the latest run was set up.
   virtual std::vector<MethodSetting> settings() const { return {}; }
 };
 

@@ -40,7 +40,7 @@ struct BlockSums {
   double event = 0;
 };
 
-// Of one run.
+// The sums of one run.
 BlockSums block_sums(const Moments& blocks, const Events& events);
 
 // z-scores of the blocks: mean over the repeats minus the reference, over the standard error of

@@ -23,7 +23,7 @@ class Moments {
   // sums: one value per element, the sum over `samples` samples.
   void add_batch(const std::vector<double>& sums, int64_t samples);
   double mean(size_t i) const { return samples_ > 0 ? sums_[i] / samples_ : 0; }
-  // Of the mean; needs two batches.
+  // The variance of the mean; needs two batches.
   double variance(size_t i) const;
 
  private:
@@ -49,7 +49,7 @@ class Events {
   double cubes_ = 0, squares_ = 0, sizes_ = 0;
 };
 
-// Of every value; variances are NaN with fewer than two batches.
+// Means and variances of every value; variances are NaN with fewer than two batches.
 std::vector<double> means(const Moments& moments);
 std::vector<double> variances(const Moments& moments);
 
