@@ -1,3 +1,4 @@
+// The dual box of a set of edges: the normaliser, the axes, the rows.
 #include "edgetree/forest/forest_fit.h"
 
 #include <Eigen/Dense>

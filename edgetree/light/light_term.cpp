@@ -1,3 +1,4 @@
+// Clusters of lights, and how bright it is behind a box seen from a point.
 #include "edgetree/light/light_term.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Means of an environment over cones, by an octahedral pyramid.
 #include "limn/edgetree/radiance_pyramid.h"
 
 #include <algorithm>

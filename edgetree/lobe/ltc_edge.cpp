@@ -1,3 +1,4 @@
+// Integrals of a transformed cosine along an edge, and draws in proportion.
 #include <algorithm>
 #include <cmath>
 #include <limits>

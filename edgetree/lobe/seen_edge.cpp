@@ -1,3 +1,4 @@
+// A density along an edge that costs little where the edge is short.
 #include "edgetree/lobe/seen_edge.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Where to look at a rejection test.
 #include "limn/edgetree/rejection_places.h"
 
 #include <algorithm>

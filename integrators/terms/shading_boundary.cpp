@@ -61,11 +61,12 @@ void ShadingBoundary::add_sample(const EdgeQuery& query, const Scattering<Dual>&
                                  const Rgb<double>& throughput, int bounces, const Rng& key) {
   ++cost_.samples;
   Rng rng = key.at(Purpose::kEdge, bounces);
-  EdgeSample sample;
-  if (!sampler_.sample(query, rng, sample)) {
+  const std::optional<EdgeSample> drawn = sampler_.sample(query, rng);
+  if (!drawn) {
     ++cost_.no_edge;
     return;
   }
+  const EdgeSample& sample = *drawn;
   const EdgeMesh& mesh = objects_[sample.edge.object];
   EdgeView view;
   const bool seen = view_edge(mesh, sample.edge, sample.t, query.p, view);

@@ -158,9 +158,8 @@ std::optional<Vec3d> RoughConductor::sample(const Vec3d& n, const Vec3d& wi, dou
 
 LobeSummary RoughConductor::lobe() const {
   const double bound = max_channel(value(specular_reflectance_));
-  if (is_ggx()) return {LobeSummary::Kind::kGgx, alpha<double>(), bound};
-  return {LobeSummary::Kind::kBeckmann, alpha<double>(),
-          bound * microfacet::kBeckmannRationalExcess};
+  if (is_ggx()) return {ggx_lobe(), alpha<double>(), bound};
+  return {beckmann_lobe(), alpha<double>(), bound * microfacet::kBeckmannRationalExcess};
 }
 
 std::string RoughConductor::describe() const {

@@ -70,7 +70,7 @@ TEST(Includes, NothingPointsUpward) {
 TEST(Includes, EdgetreeSeesNoScene) {
   const std::vector<std::string> allowed = {
       "limn/edgetree/",  "limn/core/mesh.h", "limn/core/vec.h",   "limn/core/dual.h",
-      "limn/core/rng.h", "limn/core/bsdf.h", "limn/core/error.h", "limn/core/parallel.h"};
+      "limn/core/rng.h", "limn/core/lobe.h", "limn/core/error.h", "limn/core/parallel.h"};
   EXPECT_EQ(strays("edgetree", allowed), Strings{});
   EXPECT_EQ(strays("include/limn/edgetree", allowed), Strings{});
 }

@@ -102,10 +102,7 @@ Draws measure_draws(const EdgeSampler& sampler, const std::vector<EdgeQuery>& qu
   Rng rng(2, 0, 0);
   const Stopwatch watch;
   for (int k = 0; k < repeat; ++k)
-    for (const EdgeQuery& q : queries) {
-      EdgeSample sample;
-      hits += sampler.sample(q, rng, sample);
-    }
+    for (const EdgeQuery& q : queries) hits += sampler.sample(q, rng).has_value();
   const double draws = static_cast<double>(queries.size()) * repeat;
   return {static_cast<double>(hits) / draws, watch.seconds() * 1e9 / draws};
 }
@@ -201,8 +198,8 @@ void measure(const std::string& name, const Mesh& mesh, std::span<const EdgeSamp
   fmt::print(fmt::runtime(row), "sampler", "build 1", "build 2", "B/edge", "hits", "effic.",
              "tests/", "draw", "glossy", "glossy");
   fmt::print(fmt::runtime(row), "", "[ms]", "[ms]", "", "", "", "silh.", "[ns]", "[ns]", "effic.");
-  const auto queries = queries_around(mesh, 500, {LobeSummary::Kind::kDiffuse, 1, 0.8});
-  const auto glossy = queries_around(mesh, 500, {LobeSummary::Kind::kGgx, 0.1, 0.8});
+  const auto queries = queries_around(mesh, 500, {});
+  const auto glossy = queries_around(mesh, 500, {ggx_lobe(), 0.1, 1});
   for (const EdgeSamplerType& type : types) measure(input, type, queries, glossy);
 }
 

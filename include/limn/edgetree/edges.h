@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "limn/core/dual.h"
@@ -62,6 +63,15 @@ struct EdgeMesh {
             face_offsets[edge + 1] - face_offsets[edge]};
   }
   uint64_t count(EdgeClass edge_class) const;
+  // The first of the above that does not hold, in words; empty if all of it does.
+  std::string validate() const;
+};
+
+// An edge of a scene.
+struct EdgeId {
+  uint32_t object = UINT32_MAX;  // index of the EdgeMesh
+  uint32_t edge = UINT32_MAX;    // index in its edges
+  bool operator==(const EdgeId&) const = default;
 };
 
 // mesh.weld must be filled. black_behind: the mesh's BSDF is black from behind. Faces without area
