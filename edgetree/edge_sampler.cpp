@@ -2,6 +2,7 @@
 
 #include "edgetree/samplers.h"
 #include "limn/core/error.h"
+#include "limn/core/names.h"
 #include "limn/edgetree/edge_forest.h"
 
 namespace limn {
@@ -47,12 +48,10 @@ std::span<const EdgeSamplerType> edge_sampler_types() {
 
 std::unique_ptr<EdgeSampler> make_edge_sampler(const std::string& name,
                                                const EdgeSamplerInput& input, int threads) {
-  std::string known;
   for (const EdgeSamplerType& type : edge_sampler_types()) {
     if (type.name == name) return type.make(input, threads);
-    known += (known.empty() ? "" : ", ") + type.name;
   }
-  throw InputError("unknown edge sampler \"" + name + "\" (known: " + known + ")");
+  throw InputError(unknown_name("edge sampler", name, names_of(edge_sampler_types())));
 }
 
 }  // namespace limn

@@ -8,6 +8,7 @@
 
 #include "edgetree/forest/forest_fit.h"
 #include "edgetree/forest/forest_split.h"
+#include "limn/core/bounds.h"
 #include "limn/core/parallel.h"
 
 namespace limn {
@@ -51,20 +52,11 @@ Wedge wedge_of(const EdgeMesh& mesh, uint32_t index, const Lanes& scale) {
   return wedge;
 }
 
-struct Box {
-  Vec3d low{1e300, 1e300, 1e300}, high{-1e300, -1e300, -1e300};
-  Vec3d center() const { return (low + high) * 0.5; }
-  Vec3d half() const { return (high - low) * 0.5; }
-};
-Box box_of(std::span<const Wedge> wedges) {
-  Box box;
+Bounds bounds_of(std::span<const Wedge> wedges) {
+  Bounds bounds;
   for (const Wedge& wedge : wedges)
-    for (const Vec3d& x : wedge.ends)
-      for (int k = 0; k < 3; ++k) {
-        box.low[k] = std::min(box.low[k], x[k]);
-        box.high[k] = std::max(box.high[k], x[k]);
-      }
-  return box;
+    for (const Vec3d& x : wedge.ends) bounds.extend(x);
+  return bounds;
 }
 
 // The 24 leading bits: a number that a float holds. Not by a cast to float and back, because GCC 12
@@ -73,10 +65,10 @@ double truncated(double x) {
   return std::bit_cast<double>(std::bit_cast<uint64_t>(x) & ~((uint64_t{1} << 29) - 1));
 }
 
-NodeFrame frame_of(const Box& box) {
+NodeFrame frame_of(const Bounds& box) {
   const Vec3d center = box.center();
   return {{truncated(center.x), truncated(center.y), truncated(center.z)},
-          truncated(1 / length(box.half()))};
+          truncated(2 / box.diagonal())};
 }
 
 double length_of(std::span<const Wedge> wedges) {
@@ -97,15 +89,15 @@ float speed_of(std::span<const Wedge> wedges) {
 }
 
 // Outward to a step.
-void put_box(const Box& box, const NodeFrame& frame, int lane, InnerNode& node) {
+void put_box(const Bounds& box, const NodeFrame& frame, int lane, InnerNode& node) {
   constexpr double kMargin = 0x1.0p-16;  // more than a query's rounding, in steps
   const auto step = [](double x) {
     return static_cast<int32_t>(std::clamp(x, 0.0, double{kBoxSteps}));
   };
   int32_t packed_low = 0, packed_high = 0;
   for (int k = 0; k < 3; ++k) {
-    const double low = (box.low[k] - frame.center[k]) * frame.inverse_radius;
-    const double high = (box.high[k] - frame.center[k]) * frame.inverse_radius;
+    const double low = (box.lower[k] - frame.center[k]) * frame.inverse_radius;
+    const double high = (box.upper[k] - frame.center[k]) * frame.inverse_radius;
     packed_low |= step(std::floor((low + 1) * 0.5 * kBoxSteps - kMargin)) << (k * kBoxBits);
     packed_high |= step(std::ceil((high + 1) * 0.5 * kBoxSteps + kMargin)) << (k * kBoxBits);
   }
@@ -128,7 +120,7 @@ class TreeFiller {
 
   void fill(uint32_t index, Forest& forest) const {
     const SplitNode& split = tree_.nodes[index];
-    const NodeFrame frame = frame_of(box_of(edges(split.range)));
+    const NodeFrame frame = frame_of(bounds_of(edges(split.range)));
     if (split.has_edges) {
       EdgeNode& node = forest.edges[~ids_[index]];
       fill_head(frame, node.head);
@@ -173,7 +165,7 @@ class TreeFiller {
       for (int k = 0; k < 3; ++k) node.cover[k][lane] = positive(dual.cover[k] * scale);
       node.speed[lane] = speed_of(wedges);
       node.child[lane] = ids_[split.children[lane]];
-      put_box(box_of(wedges), frame, lane, node);
+      put_box(bounds_of(wedges), frame, lane, node);
     }
   }
 

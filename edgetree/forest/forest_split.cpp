@@ -5,6 +5,7 @@
 #include <limits>
 #include <numeric>
 
+#include "limn/core/bounds.h"
 #include "limn/core/parallel.h"
 
 namespace limn {
@@ -213,15 +214,11 @@ class Splitter {
 };
 
 std::vector<Item> items_of(std::span<const Wedge> wedges) {
-  Vec3d low{1e300, 1e300, 1e300}, high = -low;
+  Bounds bounds;
   for (const Wedge& wedge : wedges)
-    for (const Vec3d& x : wedge.ends)
-      for (int k = 0; k < 3; ++k) {
-        low[k] = std::min(low[k], x[k]);
-        high[k] = std::max(high[k], x[k]);
-      }
-  const Vec3d center = (low + high) * 0.5;
-  const double diagonal = length(high - low), scale = diagonal > 0 ? 2 / diagonal : 1;
+    for (const Vec3d& x : wedge.ends) bounds.extend(x);
+  const Vec3d center = bounds.center();
+  const double diagonal = bounds.diagonal(), scale = diagonal > 0 ? 2 / diagonal : 1;
   std::vector<Item> items(wedges.size());
   for (uint32_t i = 0; i < items.size(); ++i) {
     const Wedge& wedge = wedges[i];
