@@ -19,6 +19,7 @@
 
 #include "edgetree/baselines/baselines.h"
 #include "edgetree/lobe/ltc.h"
+#include "limn/core/bounds.h"
 
 namespace limn {
 namespace {

@@ -135,7 +135,7 @@ class Builder {
   // Whether each part of a closed mesh encloses positive volume, beyond rounding.
   bool parts_have_volume() const {
     UnionFind parts(mesh_.faces.size());
-    for (const Edge& edge : result_.edges) parts.unite(edge.faces[0], edge.faces[1]);
+    for (const Edge& edge : result_.edges) parts.join(edge.faces[0], edge.faces[1]);
     std::vector<double> volumes(mesh_.faces.size()), sizes(mesh_.faces.size());
     // Three or more sides per face: its area, as a fan of triangles.
     for (const HalfEdge& side : sides_) {

@@ -70,7 +70,7 @@ class SliverLines {
         const uint32_t a = ids[face[k]], b = ids[face[(k + 1) % 3]];
         if (a == b) continue;
         const auto [found, is_new] = line_of_edge_.emplace(undirected_key(a, b), s);
-        if (!is_new) lines_.unite(s, found->second);
+        if (!is_new) lines_.join(s, found->second);
       }
     }
     for (uint32_t s = 0; s < slivers.size(); ++s)
@@ -115,7 +115,7 @@ class SliverLines {
   }
 
   const Mesh& mesh_;
-  UnionFind lines_;                                      // slivers of one line
+  UnionFind lines_;                                      // over slivers
   std::vector<std::vector<uint32_t>> vertices_;          // of the line, at its root
   std::unordered_map<uint64_t, uint32_t> line_of_edge_;  // to one sliver of the line
 };

@@ -9,6 +9,7 @@
 
 #include "edgetree/forest/forest_fit.h"
 #include "edgetree/forest/forest_split.h"
+#include "limn/core/bounds.h"
 #include "limn/core/parallel.h"
 
 namespace limn {
@@ -58,7 +59,6 @@ Bounds bounds_of(std::span<const Wedge> wedges) {
     for (const Vec3d& x : wedge.ends) bounds.extend(x);
   return bounds;
 }
-Vec3d half_size(const Bounds& bounds) { return (bounds.upper - bounds.lower) * 0.5; }
 
 // The 24 leading bits: a number that a float holds. Not by a cast to float and back, because GCC 12
 // drops such a pair of casts where it makes vectors of them.
@@ -69,7 +69,7 @@ double truncated(double x) {
 NodeFrame frame_of(const Bounds& box) {
   const Vec3d center = box.center();
   return {{truncated(center.x), truncated(center.y), truncated(center.z)},
-          truncated(1 / length(half_size(box)))};
+          truncated(2 / box.diagonal())};
 }
 
 double length_of(std::span<const Wedge> wedges) {

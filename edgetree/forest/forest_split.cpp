@@ -6,6 +6,7 @@
 #include <limits>
 #include <numeric>
 
+#include "limn/core/bounds.h"
 #include "limn/core/parallel.h"
 
 namespace limn {

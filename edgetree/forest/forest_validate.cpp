@@ -3,7 +3,7 @@
 #include <string>
 
 #include "edgetree/forest/forest_node.h"
-#include "limn/core/mesh.h"
+#include "limn/core/bounds.h"
 
 namespace limn {
 namespace {

@@ -94,7 +94,7 @@ GradientResult other_terms(const Scene& scene, GradientOptions options, RunSetti
 
 CheckResult check(const Scene& scene, const CheckOptions& options, const RunSettings& settings) {
   CheckResult result;
-  const ParameterInfo parameter = find_parameter(scene, options.parameter);
+  const Parameter parameter = find_parameter(scene, options.parameter);
   const int longer = std::max(scene.film.crop_width, scene.film.crop_height);
   result.step = options.step > 0 ? options.step : parameter.natural_step;
   result.block = options.block > 0 ? options.block : std::max(1, (longer + 7) / 8);

@@ -3,6 +3,7 @@
 #include "integrators/compare/method_images.h"
 #include "integrators/methods/difference_method.h"
 #include "limn/core/error.h"
+#include "limn/core/names.h"
 #include "limn/edgetree/edge_sampler_types.h"
 
 namespace limn {
@@ -88,11 +89,7 @@ std::unique_ptr<DerivativeMethod> make_method(const MethodInput& input, const st
   for (const EdgeSamplerType& type : edge_sampler_types()) {
     if (type.name == name) return std::make_unique<SamplerMethod>(input, type);
   }
-  std::string known;
-  for (const MethodName& method : method_names()) {
-    known += (known.empty() ? "" : ", ") + method.name;
-  }
-  throw InputError("unknown method \"" + name + "\" (known: " + known + ")");
+  throw InputError(unknown_name("method", name, names_of(method_names())));
 }
 
 }  // namespace limn

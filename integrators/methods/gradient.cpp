@@ -101,7 +101,7 @@ class Pass {
   static Scene seed(const Scene& scene, const std::vector<std::string>& parameters) {
     Scene copy = deep_copy(scene);
     for (size_t k = 0; k < parameters.size(); ++k) {
-      seed_parameter(copy, parameters[k], static_cast<int>(k));
+      find_parameter(scene, parameters[k]).seed(copy, static_cast<int>(k));
     }
     return copy;
   }

@@ -153,10 +153,11 @@ CentralDifferences central_differences(const Scene& scene, const std::string& pa
                                        const std::vector<std::vector<double>>& combinations,
                                        int block, const RunSettings& settings) {
   const Stopwatch watch;
+  const Parameter resolved = find_parameter(scene, parameter);
   std::vector<Scene> moved;
   for (const double step : steps) {
-    moved.push_back(perturbed(scene, parameter, step));
-    moved.push_back(perturbed(scene, parameter, -step));
+    moved.push_back(resolved.moved(scene, step));
+    moved.push_back(resolved.moved(scene, -step));
   }
   std::vector<std::unique_ptr<PrimalRenderer>> renderers;
   for (const Scene& s : moved) renderers.push_back(std::make_unique<PrimalRenderer>(s, settings));

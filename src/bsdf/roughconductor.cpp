@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "limn/core/names.h"
 #include "src/bsdf/microfacet.h"
 #include "src/bsdf/types.h"
 
@@ -189,7 +190,7 @@ Distribution read_distribution(Properties& properties) {
   const std::string name = properties.string("distribution", "beckmann");
   if (name == "beckmann") return Distribution::kBeckmann;
   if (name == "ggx") return Distribution::kGgx;
-  properties.fail("distribution", "unknown distribution \"" + name + "\" (known: beckmann, ggx)");
+  properties.fail("distribution", unknown_name("distribution", name, {"beckmann", "ggx"}));
 }
 
 void read_material(Properties& properties, RoughConductorValues& values) {
@@ -209,16 +210,16 @@ void read_material(Properties& properties, RoughConductorValues& values) {
   if (properties.has("eta") || properties.has("k")) {
     properties.fail("material", "give either a material or (eta, k), not both");
   }
-  std::string known = "none";
   for (const Material& m : kMaterials) {
-    known += std::string(", ") + m.name;
     if (name == m.name) {
       values.eta = m.eta;
       values.k = m.k;
       return;
     }
   }
-  properties.fail("material", "unknown material \"" + name + "\" (known: " + known + ")");
+  std::vector<std::string> known = names_of(kMaterials);
+  known.insert(known.begin(), "none");
+  properties.fail("material", unknown_name("material", name, known));
 }
 
 }  // namespace

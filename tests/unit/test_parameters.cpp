@@ -79,10 +79,11 @@ void expect_derivative(const Scene& scene, const std::string& name) {
   const double h = 0x1p-7;
   const double bound = 8 * h * h + 16 * 0x1p-23 / h;
   Scene seeded = deep_copy(scene);
-  seed_parameter(seeded, name, 2);
+  const Parameter parameter = find_parameter(scene, name);
+  parameter.seed(seeded, 2);
   const std::vector<Dual> at = numbers(seeded);
-  const std::vector<Dual> up = numbers(perturbed(scene, name, h));
-  const std::vector<Dual> down = numbers(perturbed(scene, name, -h));
+  const std::vector<Dual> up = numbers(parameter.moved(scene, h));
+  const std::vector<Dual> down = numbers(parameter.moved(scene, -h));
   ASSERT_EQ(at.size(), up.size());
   double motion = 0;
   for (size_t i = 0; i < at.size(); ++i) {
@@ -95,39 +96,80 @@ void expect_derivative(const Scene& scene, const std::string& name) {
 }
 
 TEST_F(Parameters, DerivativesMatchMoves) {
-  for (const ParameterInfo& p : list_parameters(scene_)) {
-    if (!p.name.ends_with("FILE")) expect_derivative(scene_, p.name);
+  for (const Parameter& p : list_parameters(scene_)) {
+    if (p.size == 1) expect_derivative(scene_, p.name);
   }
   expect_derivative(scene_, "tent.vertex_positions:" + field_);
+  expect_derivative(scene_, "tent.vertex_positions.2.y");
+  expect_derivative(scene_, "tent.vertex_positions.4.z");  // a copy: its twin moves along
 }
 
 TEST_F(Parameters, AreListed) {
   std::vector<std::string> names;
-  for (const ParameterInfo& p : list_parameters(scene_)) {
+  for (const Parameter& p : list_parameters(scene_)) {
     names.push_back(p.name);
     EXPECT_GT(p.natural_step, 0) << p.name;
   }
   for (const char* name :
-       {"tent.translate.x", "ball.rotate.z", "ball.scale", "tent.vertex_positions:FILE",
+       {"tent.translate.x", "ball.rotate.z", "ball.scale", "tent.vertex_positions",
         "sensor.translate.y", "sensor.rotate.x", "sensor.fov", "metal.alpha", "both.alpha",
         "lamp.radiance", "sky.radiance"}) {
     EXPECT_EQ(std::count(names.begin(), names.end(), name), 1) << name;
   }
 }
 
+// An array's components, summed over the first copies, are any motion of the shape.
+TEST_F(Parameters, ComponentsOfAnArrayAddUpToAnyMotion) {
+  const Parameter array = find_parameter_or_array(scene_, "tent.vertex_positions");
+  const Mesh& mesh = scene_.shapes[0].mesh;
+  ASSERT_EQ(array.size, 3 * mesh.positions.size());
+  for (const std::string name :
+       {"tent.translate.y", "tent.rotate.z", "tent.scale", "tent.vertex_positions.2.y"}) {
+    const Parameter parameter = find_parameter(scene_, name);
+    const std::vector<Vec3d> wanted = parameter.velocities(scene_, 0);
+    std::vector<Vec3d> sum(wanted.size());
+    for (size_t c = 0; c < array.size; ++c) {
+      if (mesh.weld[c / 3] != c / 3) continue;
+      const double factor = wanted[c / 3][static_cast<int>(c % 3)];
+      const std::vector<Vec3d> one = array.velocities(scene_, 0, c);
+      for (size_t i = 0; i < sum.size(); ++i) sum[i] += one[i] * factor;
+    }
+    EXPECT_EQ(sum, wanted) << name;
+    EXPECT_TRUE(parameter.velocities(scene_, 1).empty());
+  }
+  Scene by_array = deep_copy(scene_), by_name = deep_copy(scene_);
+  array.seed(by_array, 1, 2 * 3 + 1);
+  find_parameter(scene_, "tent.vertex_positions.2.y").seed(by_name, 1);
+  const std::vector<Dual> a = numbers(by_array), b = numbers(by_name);
+  for (size_t i = 0; i < a.size(); ++i) EXPECT_EQ(a[i].d[1], b[i].d[1]);
+}
+
+// It points to nothing in the scene that it was resolved in.
+TEST_F(Parameters, OutliveTheSceneTheyWereResolvedIn) {
+  auto other = std::make_unique<Scene>(deep_copy(scene_));
+  const std::vector<Parameter> list = list_parameters(*other);
+  other.reset();
+  for (const Parameter& p : list) {
+    const std::vector<Dual> before = numbers(scene_);
+    const std::vector<Dual> after = numbers(p.moved(scene_, 0.1));
+    const auto same = [](const Dual& a, const Dual& b) { return a.v == b.v; };
+    EXPECT_FALSE(std::equal(before.begin(), before.end(), after.begin(), same)) << p.name;
+  }
+}
+
 TEST_F(Parameters, LanesAddUp) {
   Scene both = deep_copy(scene_);
-  seed_parameter(both, "tent.rotate.x", 0);
-  seed_parameter(both, "tent.scale", 1);
+  find_parameter(scene_, "tent.rotate.x").seed(both, 0);
+  find_parameter(scene_, "tent.scale").seed(both, 1);
   Scene one = deep_copy(scene_);
-  seed_parameter(one, "tent.scale", 1);
+  find_parameter(scene_, "tent.scale").seed(one, 1);
   const std::vector<Dual> a = numbers(both), b = numbers(one);
   for (size_t i = 0; i < a.size(); ++i) EXPECT_EQ(a[i].d[1], b[i].d[1]);
 }
 
 TEST_F(Parameters, MovesAreExactForLargeSteps) {
   const Mesh& before = scene_.shapes[0].mesh;
-  const Mesh after = perturbed(scene_, "tent.rotate.z", kPi).shapes[0].mesh;
+  const Mesh after = find_parameter(scene_, "tent.rotate.z").moved(scene_, kPi).shapes[0].mesh;
   const Vec3d c = bounds_of(before).center();
   for (size_t i = 0; i < before.positions.size(); ++i) {
     const Vec3d p = cast<double>(before.positions[i]), q = cast<double>(after.positions[i]);
@@ -136,7 +178,7 @@ TEST_F(Parameters, MovesAreExactForLargeSteps) {
 }
 
 TEST_F(Parameters, CopiesShareNothingWithTheOriginalAndKeepSharing) {
-  const Scene moved = perturbed(scene_, "metal.alpha", 0.1);
+  const Scene moved = find_parameter(scene_, "metal.alpha").moved(scene_, 0.1);
   const auto alpha = [](const Scene& s, size_t shape) {
     for (const ParameterRef& p : s.shapes[shape].bsdf->parameters()) {
       if (p.name == "alpha") return p.values[0]->v;
@@ -170,6 +212,30 @@ std::string message_of(const Scene& scene, const std::string& name) {
     return error.what();
   }
   return "no error";
+}
+
+TEST_F(Parameters, ArraysSayHowToNameAPart) {
+  const std::string at = files_.path("s.xml") + ": error: ";
+  EXPECT_EQ(message_of(scene_, "tent.vertex_positions"),
+            at + "parameter \"tent.vertex_positions\" is an array of 18 numbers, and one is "
+                 "wanted: \"tent.vertex_positions:FILE\" for a field of vectors, "
+                 "\"tent.vertex_positions.0.x\" for one number");
+  EXPECT_EQ(message_of(scene_, "tent.vertex_positions.6.x"),
+            at + "parameter \"tent.vertex_positions.6.x\": the mesh has vertices 0 to 5");
+  for (const char* name :
+       {"tent.vertex_positions:", "tent.vertex_positions.1", "tent.vertex_positions.1.w",
+        "tent.vertex_positions.x.1", "tent.vertex_positionsx", "tent.vertex_positions.-1.xy"}) {
+    EXPECT_TRUE(message_of(scene_, name).starts_with(at + "unknown parameter")) << name;
+  }
+}
+
+TEST_F(Parameters, SeedAndComponentAreChecked) {
+  Scene copy = deep_copy(scene_);
+  const Parameter array = find_parameter_or_array(scene_, "tent.vertex_positions");
+  EXPECT_DEATH(array.seed(copy, kLanes), "parameter.cpp.*lane < kLanes .4 and 4.");
+  EXPECT_DEATH(array.seed(copy, -1), "parameter.cpp.*0 <= lane .0 and -1.");
+  EXPECT_DEATH(array.seed(copy, 0, 18), "parameter.cpp.*component < size .18 and 18.");
+  EXPECT_DEATH(array.moved(copy, 0.1, 18), "component < size");
 }
 
 TEST_F(Parameters, VectorFilesMustFit) {

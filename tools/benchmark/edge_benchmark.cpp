@@ -210,9 +210,8 @@ int main(int argc, char** argv) {
   using namespace limn;
   for (int i = 1; i < argc; ++i) {
     const std::string file = argv[i];
-    const bool ply = file.size() > 4 && file.substr(file.size() - 4) == ".ply";
-    const Mesh mesh = ply ? read_ply(file, false) : read_obj(file, false);
-    measure(file.substr(file.find_last_of('/') + 1), smoothed(mesh), edge_sampler_types());
+    measure(file.substr(file.find_last_of('/') + 1), smoothed(read_mesh(file, false)),
+            edge_sampler_types());
   }
   if (argc > 1) return 0;
   for (int tube : {13, 41, 129, 408})

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "limn/core/error.h"
+#include "limn/core/names.h"
 #include "limn/core/parallel.h"
 #include "limn/core/parameter.h"
 #include "tools/limn/commands.h"
@@ -28,9 +29,7 @@ void check_methods(const std::vector<std::string>& names) {
   for (const std::string& name : names) {
     const auto same = [&](const MethodName& m) { return m.name == name; };
     if (std::none_of(known.begin(), known.end(), same)) {
-      std::string list;
-      for (const MethodName& m : known) list += (list.empty() ? "" : ", ") + m.name;
-      throw InputError("--methods: unknown method \"" + name + "\" (known: " + list + ")");
+      throw InputError("--methods: " + unknown_name("method", name, names_of(known)));
     }
     if (!seen.insert(name).second) {
       throw InputError("--methods: \"" + name + "\" is given twice");

@@ -71,6 +71,14 @@ void print_camera(const Scene& scene) {
              scene.hide_emitters ? ", emitters hidden" : "");
 }
 
+// An array is listed once, with the number of its numbers.
+void print_parameter(const Parameter& parameter) {
+  fmt::print("  {}  [{}]{}\n", parameter.name, parameter.unit,
+             parameter.size == 1
+                 ? ""
+                 : fmt::format("  {} numbers: add :FILE, or .0.x, .0.y, ...", parameter.size));
+}
+
 }  // namespace
 
 int run_info(const CommonOptions& common) {
@@ -95,9 +103,10 @@ int run_info(const CommonOptions& common) {
         shape_name(scene, crossings.shape_b));
   }
   fmt::print("parameters (for --wrt):\n");
-  for (const ParameterInfo& parameter : list_parameters(scene)) {
-    report["parameters"].push_back({{"name", parameter.name}, {"unit", parameter.unit}});
-    fmt::print("  {}  [{}]\n", parameter.name, parameter.unit);
+  for (const Parameter& parameter : list_parameters(scene)) {
+    report["parameters"].push_back(
+        {{"name", parameter.name}, {"unit", parameter.unit}, {"size", parameter.size}});
+    print_parameter(parameter);
   }
   write_json(common.json, report.dump(2));
   return kSuccess;

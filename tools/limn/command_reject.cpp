@@ -26,15 +26,11 @@ json to_json(const Vec3d& v) { return {v.x, v.y, v.z}; }
 
 // ---- What is looked at.
 
-bool is_mesh_file(const std::string& file) {
-  return file.ends_with(".obj") || file.ends_with(".ply");
-}
-
 Scene scene_of_mesh(const std::string& file) {
   Scene scene;
   scene.file = file;
   Shape shape;
-  shape.mesh = file.ends_with(".ply") ? read_ply(file, false) : read_obj(file, false);
+  shape.mesh = read_mesh(file, false);
   shape.bsdf = make_diffuse({0.5, 0.5, 0.5});
   scene.shapes.push_back(std::move(shape));
   return scene;

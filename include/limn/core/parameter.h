@@ -1,11 +1,19 @@
 #pragma once
 // Scene parameters that can be differentiated, by name:
-//   <shape id>.translate.x|y|z   scene units         <shape id>.rotate.x|y|z   radians, world axes
-//   through the centre of its bounding box <shape id>.scale             factor - 1, about the
-//   centre of its bounding box <shape id>.vertex_positions:FILE   moves every vertex by the
-//   parameter times the vector in FILE sensor.translate.x|y|z       sensor.rotate.x|y|z (radians,
-//   world axes through the pinhole)      sensor.fov (degrees) <bsdf id>.NAME, <emitter id>.NAME
-//   (see their parameters())
+//
+//   SHAPE.translate.x|y|z         scene units
+//   SHAPE.rotate.x|y|z            radians, world axes through the centre of its bounds
+//   SHAPE.scale                   factor - 1, about the centre of its bounds
+//   SHAPE.vertex_positions        scene units: an array, the V by 3 coordinates of its vertices
+//   SHAPE.vertex_positions.V.x|y|z  one of them: vertex V (from 0) with its copies
+//   SHAPE.vertex_positions:FILE   moves every vertex by the parameter times its vector in FILE
+//   sensor.translate.x|y|z        scene units
+//   sensor.rotate.x|y|z           radians, world axes through the pinhole
+//   sensor.fov                    degrees
+//   BSDF.NAME, EMITTER.NAME       see their parameters()
+//
+// Capitals stand for the id of an element, or for what the user writes.
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -13,23 +21,40 @@
 
 namespace limn {
 
-struct ParameterInfo {
+class Motion;
+
+// What a name stands for in a scene, resolved once. It holds indices and ids, no pointers into the
+// scene, so it serves every deep copy of that scene as well. Copies of a Parameter are cheap.
+// `component` counts the numbers of an array, row by row (vertex 2's y: 2 * 3 + 1); of a scalar it
+// is 0.
+struct Parameter {
   std::string name;
   std::string unit;
-  double natural_step;  // a small step: about a hundredth of what changes the picture a lot
+  double natural_step = 0;  // a small step: about a hundredth of what changes the picture a lot
+  size_t size = 1;          // numbers: 1 of a scalar, 3 V of vertex_positions
+  std::shared_ptr<const Motion> motion;
+
+  // Adds derivative lane `lane` of everything in the scene that the parameter moves.
+  void seed(Scene& scene, int lane, size_t component = 0) const;
+
+  // A deep copy of the scene with the parameter moved by `step`; exact for large steps (rotations
+  // rotate). Tangents are kept as they are.
+  Scene moved(const Scene& scene, double step, size_t component = 0) const;
+
+  // V by 3: the derivative of the positions of a shape's vertices; empty where the parameter moves
+  // none of that shape.
+  std::vector<Vec3d> velocities(const Scene& scene, size_t shape, size_t component = 0) const;
 };
 
-// All parameters of the scene, vertex_positions with FILE left open.
-std::vector<ParameterInfo> list_parameters(const Scene& scene);
+// All parameters of the scene, scalars and arrays; a part of an array (one component, a field) is
+// not listed apart.
+std::vector<Parameter> list_parameters(const Scene& scene);
 
-// The parameter called `name`; InputError that lists the nearest known names if there is none.
-ParameterInfo find_parameter(const Scene& scene, const std::string& name);
+// The scalar called `name`. InputError that lists the nearest known names if there is none, or that
+// says how to name a part if it is an array; also if FILE cannot be read or does not fit the mesh.
+Parameter find_parameter(const Scene& scene, const std::string& name);
 
-// Adds derivative lane `lane` of everything in the scene that the parameter moves.
-void seed_parameter(Scene& scene, const std::string& name, int lane);
-
-// A copy of the scene with the parameter moved by `step`; exact for large steps (rotations rotate).
-// Tangents are kept as they are.
-Scene perturbed(const Scene& scene, const std::string& name, double step);
+// The same, arrays included.
+Parameter find_parameter_or_array(const Scene& scene, const std::string& name);
 
 }  // namespace limn

@@ -1,0 +1,31 @@
+// What most motions have in common: they move no shape and are no arrays.
+#include "src/scene/motion.h"
+
+#include <cmath>
+
+namespace limn {
+
+std::vector<Vec3d> Motion::velocities(const Scene&, size_t, size_t) const { return {}; }
+
+std::optional<Parameter> Motion::part(const Scene&, const Parameter&, const std::string&) const {
+  return std::nullopt;
+}
+
+std::string Motion::parts(const std::string& name) const { return name; }
+
+Vec3d unit_vector(int axis) {
+  Vec3d v;
+  v[axis] = 1;
+  return v;
+}
+
+Vec3d turned(const Vec3d& v, int axis, double angle) {
+  const int i = (axis + 1) % 3, j = (axis + 2) % 3;
+  const double c = std::cos(angle), s = std::sin(angle);
+  Vec3d r = v;
+  r[i] = c * v[i] - s * v[j];
+  r[j] = s * v[i] + c * v[j];
+  return r;
+}
+
+}  // namespace limn

@@ -1,0 +1,32 @@
+#pragma once
+// What a parameter does to a scene: one class per kind of motion.
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "limn/core/parameter.h"
+
+namespace limn {
+
+class Motion {
+ public:
+  virtual ~Motion() = default;
+
+  // See Parameter.
+  virtual void seed(Scene& scene, int lane, size_t component) const = 0;
+  virtual void move(Scene& scene, double step, size_t component) const = 0;
+  virtual std::vector<Vec3d> velocities(const Scene& scene, size_t shape, size_t component) const;
+
+  // The part of an array whose name continues the array's with `rest` (":FILE", ".7.x"); nothing if
+  // `rest` means nothing here. InputError if it means something that cannot be.
+  virtual std::optional<Parameter> part(const Scene& scene, const Parameter& whole,
+                                        const std::string& rest) const;
+  // How to name a part of the array called `name`, for messages.
+  virtual std::string parts(const std::string& name) const;
+};
+
+// Coordinate axis 0 to 2, and v turned about it by `angle` [radians].
+Vec3d unit_vector(int axis);
+Vec3d turned(const Vec3d& v, int axis, double angle);
+
+}  // namespace limn

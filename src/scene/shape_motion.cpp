@@ -1,0 +1,252 @@
+// Motions of a shape's vertices: rigid, scaled, along a field, one by one.
+#include <algorithm>
+#include <cmath>
+
+#include "limn/core/check.h"
+#include "src/base/text.h"
+#include "src/scene/motion.h"
+#include "src/scene/motion_lists.h"
+
+namespace limn {
+
+namespace {
+
+void add_to_lane(std::vector<Vec3<Lanes>>& tangents, int lane,
+                 const std::vector<Vec3d>& velocities) {
+  tangents.resize(velocities.size());
+  for (size_t i = 0; i < velocities.size(); ++i) {
+    for (int k = 0; k < 3; ++k) tangents[i][k][lane] += velocities[i][k];
+  }
+}
+
+// Moves along straight lines, and leaves normals of the file alone, unless a kind says otherwise.
+class ShapeMotion : public Motion {
+ public:
+  explicit ShapeMotion(size_t shape) : shape_(shape) {}
+
+  void seed(Scene& scene, int lane, size_t component) const final {
+    Mesh& mesh = scene.shapes[shape_].mesh;
+    add_to_lane(mesh.position_tangents, lane, vertex_velocities(mesh, component));
+    if (mesh.normal_source == NormalSource::kGiven) seed_given_normals(mesh, lane);
+    update_shading_normals(mesh);
+  }
+  void move(Scene& scene, double step, size_t component) const final {
+    Mesh& mesh = scene.shapes[shape_].mesh;
+    move_vertices(mesh, step, component);
+    update_shading_normals(mesh);
+  }
+  std::vector<Vec3d> velocities(const Scene& scene, size_t shape, size_t component) const final {
+    if (shape != shape_) return {};
+    return vertex_velocities(scene.shapes[shape_].mesh, component);
+  }
+
+ protected:
+  virtual std::vector<Vec3d> vertex_velocities(const Mesh& mesh, size_t component) const = 0;
+  virtual void seed_given_normals(Mesh&, int /*lane*/) const {}
+  virtual void move_vertices(Mesh& mesh, double step, size_t component) const {
+    const std::vector<Vec3d> velocities = vertex_velocities(mesh, component);
+    for (size_t i = 0; i < mesh.positions.size(); ++i) {
+      mesh.positions[i] = cast<float>(cast<double>(mesh.positions[i]) + velocities[i] * step);
+    }
+  }
+
+ private:
+  size_t shape_;
+};
+
+class ShapeTranslation final : public ShapeMotion {
+ public:
+  ShapeTranslation(size_t shape, int axis) : ShapeMotion(shape), axis_(axis) {}
+
+ protected:
+  std::vector<Vec3d> vertex_velocities(const Mesh& mesh, size_t) const override {
+    return std::vector<Vec3d>(mesh.positions.size(), unit_vector(axis_));
+  }
+
+ private:
+  int axis_;
+};
+
+// About the centre of the shape's bounds.
+class ShapeRotation final : public ShapeMotion {
+ public:
+  ShapeRotation(size_t shape, int axis) : ShapeMotion(shape), axis_(axis) {}
+
+ protected:
+  std::vector<Vec3d> vertex_velocities(const Mesh& mesh, size_t) const override {
+    const Vec3d center = bounds_of(mesh).center();
+    std::vector<Vec3d> velocities;
+    velocities.reserve(mesh.positions.size());
+    for (const Vec3f& p : mesh.positions) {
+      velocities.push_back(cross(unit_vector(axis_), cast<double>(p) - center));
+    }
+    return velocities;
+  }
+  void seed_given_normals(Mesh& mesh, int lane) const override {
+    std::vector<Vec3d> turns;
+    for (const Vec3d& n : mesh.normals) turns.push_back(cross(unit_vector(axis_), n));
+    add_to_lane(mesh.normal_tangents, lane, turns);
+  }
+  void move_vertices(Mesh& mesh, double step, size_t) const override {
+    const Vec3d center = bounds_of(mesh).center();
+    for (Vec3f& p : mesh.positions) {
+      p = cast<float>(center + turned(cast<double>(p) - center, axis_, step));
+    }
+    if (mesh.normal_source != NormalSource::kGiven) return;
+    for (Vec3d& n : mesh.normals) n = turned(n, axis_, step);
+  }
+
+ private:
+  int axis_;
+};
+
+// About the centre of the shape's bounds.
+class ShapeScaling final : public ShapeMotion {
+ public:
+  using ShapeMotion::ShapeMotion;
+
+ protected:
+  std::vector<Vec3d> vertex_velocities(const Mesh& mesh, size_t) const override {
+    const Vec3d center = bounds_of(mesh).center();
+    std::vector<Vec3d> velocities;
+    velocities.reserve(mesh.positions.size());
+    for (const Vec3f& p : mesh.positions) velocities.push_back(cast<double>(p) - center);
+    return velocities;
+  }
+};
+
+class VertexField final : public ShapeMotion {
+ public:
+  VertexField(size_t shape, std::vector<Vec3d> field)
+      : ShapeMotion(shape), field_(std::move(field)) {}
+
+ protected:
+  std::vector<Vec3d> vertex_velocities(const Mesh& mesh, size_t) const override {
+    CHECK_EQ(mesh.positions.size(), field_.size());
+    return field_;
+  }
+
+ private:
+  std::vector<Vec3d> field_;  // V
+};
+
+// One vector per vertex of the mesh. Copies of a vertex must not come apart: the mesh would tear.
+std::vector<Vec3d> read_field(const Shape& shape, const std::string& file) {
+  const Mesh& mesh = shape.mesh;
+  std::vector<Vec3d> v = read_vertex_vectors(file);
+  if (v.size() != mesh.positions.size()) {
+    throw InputError({file}, "the file has " + std::to_string(v.size()) +
+                                 " vectors, but the mesh of \"" + shape.id + "\" has " +
+                                 std::to_string(mesh.positions.size()) + " vertices");
+  }
+  for (size_t i = 0; i < v.size(); ++i) {
+    if (v[i] == v[mesh.weld[i]]) continue;
+    throw InputError({file}, "vertices " + std::to_string(mesh.weld[i]) + " and " +
+                                 std::to_string(i) + " (counted from 0) of \"" + shape.id +
+                                 "\" are at the same position but move apart");
+  }
+  return v;
+}
+
+// Vertex 2's y of an array.
+class OneComponent final : public Motion {
+ public:
+  OneComponent(std::shared_ptr<const Motion> array, size_t component)
+      : array_(std::move(array)), component_(component) {}
+
+  void seed(Scene& scene, int lane, size_t) const override {
+    array_->seed(scene, lane, component_);
+  }
+  void move(Scene& scene, double step, size_t) const override {
+    array_->move(scene, step, component_);
+  }
+  std::vector<Vec3d> velocities(const Scene& scene, size_t shape, size_t) const override {
+    return array_->velocities(scene, shape, component_);
+  }
+
+ private:
+  std::shared_ptr<const Motion> array_;
+  size_t component_;
+};
+
+// All coordinates of all vertices. A component moves its vertex with all copies, so that the mesh
+// stays whole; the derivative along a field is the sum over first copies (weld[i] == i).
+class VertexArray final : public ShapeMotion {
+ public:
+  explicit VertexArray(size_t shape) : ShapeMotion(shape), shape_(shape) {}
+
+  std::optional<Parameter> part(const Scene& scene, const Parameter& whole,
+                                const std::string& rest) const override {
+    if (rest.size() < 2) return std::nullopt;
+    if (rest[0] == ':') return field(scene, whole, rest.substr(1));
+    if (rest[0] == '.') return component(scene, whole, rest.substr(1));
+    return std::nullopt;
+  }
+  std::string parts(const std::string& name) const override {
+    return "\"" + name + ":FILE\" for a field of vectors, \"" + name + ".0.x\" for one number";
+  }
+
+ protected:
+  std::vector<Vec3d> vertex_velocities(const Mesh& mesh, size_t component) const override {
+    std::vector<Vec3d> velocities(mesh.positions.size());
+    const uint32_t root = mesh.weld[component / 3];
+    for (size_t i = root; i < velocities.size(); ++i) {
+      if (mesh.weld[i] == root) velocities[i] = unit_vector(static_cast<int>(component % 3));
+    }
+    return velocities;
+  }
+
+ private:
+  Parameter field(const Scene& scene, const Parameter& whole, const std::string& file) const {
+    const Shape& shape = scene.shapes[shape_];
+    std::vector<Vec3d> field = read_field(shape, file);
+    double longest = 0;
+    for (const Vec3d& v : field) longest = std::max(longest, length(v));
+    const double diagonal = bounds_of(shape.mesh).diagonal();
+    return {whole.name + ":" + file, "times the vectors in FILE",
+            longest > 0 ? 0.01 * diagonal / longest : 0.01, 1,
+            std::make_shared<VertexField>(shape_, std::move(field))};
+  }
+
+  static std::optional<Parameter> component(const Scene& scene, const Parameter& whole,
+                                            const std::string& text) {
+    const std::vector<std::string_view> words = split(text, ".");
+    if (words.size() != 2 || words[1].size() != 1) return std::nullopt;
+    const std::optional<int64_t> vertex = parse_integer(words[0]);
+    const size_t axis = std::string_view("xyz").find(words[1][0]);
+    if (!vertex || axis > 2) return std::nullopt;
+    const auto count = static_cast<int64_t>(whole.size / 3);
+    if (*vertex < 0 || *vertex >= count) {
+      throw InputError({scene.file}, "parameter \"" + whole.name + "." + text +
+                                         "\": the mesh has vertices 0 to " +
+                                         std::to_string(count - 1));
+    }
+    const size_t component = static_cast<size_t>(*vertex) * 3 + axis;
+    return Parameter{whole.name + "." + text, whole.unit, whole.natural_step, 1,
+                     std::make_shared<OneComponent>(whole.motion, component)};
+  }
+
+  size_t shape_;
+};
+
+}  // namespace
+
+void add_shape_parameters(const Scene& scene, std::vector<Parameter>& list) {
+  for (size_t i = 0; i < scene.shapes.size(); ++i) {
+    const Shape& shape = scene.shapes[i];
+    if (shape.id.empty()) continue;
+    const double step = 0.01 * bounds_of(shape.mesh).diagonal();
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::string end(1, "xyz"[axis]);
+      list.push_back({shape.id + ".translate." + end, "scene units", step, 1,
+                      std::make_shared<ShapeTranslation>(i, axis)});
+      list.push_back({shape.id + ".rotate." + end, "radians", 0.01, 1,
+                      std::make_shared<ShapeRotation>(i, axis)});
+    }
+    list.push_back({shape.id + ".scale", "factor", 0.01, 1, std::make_shared<ShapeScaling>(i)});
+    list.push_back({shape.id + ".vertex_positions", "scene units", step,
+                    3 * shape.mesh.positions.size(), std::make_shared<VertexArray>(i)});
+  }
+}
+
+}  // namespace limn
