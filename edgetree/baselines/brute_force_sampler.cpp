@@ -18,11 +18,8 @@ struct Packed {
   std::vector<uint8_t> needed;
 };
 
-enum Side : uint8_t {
-  kFront = 1,
-  kBack = 2,
-  kNever = 4
-};  // front and back: on the plane, to rounding
+// Front and back at once: on the plane, to rounding.
+enum Side : uint8_t { kFront = 1, kBack = 2, kNever = 4 };
 
 bool same(const Vec3<Lanes>& a, const Vec3<Lanes>& b) {
   for (int k = 0; k < 3; ++k)

@@ -138,7 +138,8 @@ struct EdgeForest::Impl {
     }
   }
 
-  // Of drawing the child in a lane of a node; multiplied from the root on, as `draw` does.
+  // Probability of drawing the child in a lane of a node; multiplied from the root on, as `draw`
+  // does.
   double probability(NodeId id, int lane, const ForestQuery& query) const {
     const uint32_t parent = forest.head(id).parent;
     const bool is_root = parent == kNoParent;

@@ -66,10 +66,15 @@ double truncated(double x) {
   return std::bit_cast<double>(std::bit_cast<uint64_t>(x) & ~((uint64_t{1} << 29) - 1));
 }
 
+// The cube around the centre holds the box: children's boxes are cut off at it.
 NodeFrame frame_of(const Bounds& box) {
-  const Vec3d center = box.center();
-  return {{truncated(center.x), truncated(center.y), truncated(center.z)},
-          truncated(2 / box.diagonal())};
+  const Vec3d middle = box.center();
+  const Vec3d center{truncated(middle.x), truncated(middle.y), truncated(middle.z)};
+  double radius = 0.5 * box.diagonal();
+  // Thin boxes reach as far as their diagonal, and the centre was rounded.
+  for (int k = 0; k < 3; ++k)
+    radius = std::max({radius, box.upper[k] - center[k], center[k] - box.lower[k]});
+  return {center, truncated(1 / radius)};
 }
 
 double length_of(std::span<const Wedge> wedges) {
@@ -251,7 +256,7 @@ void append_tree(std::span<const Wedge> wedges, uint32_t object, ForestGroup gro
   });
   const std::vector<NodeId> ids = append_nodes(tree, forest);
   const TreeFiller filler(tree, ids, sorted, object, group, config);
-  constexpr size_t kBlock = 64;
+  constexpr size_t kBlock = 64;  // nodes; not tuned
   parallel_for((tree.nodes.size() + kBlock - 1) / kBlock, threads, [&](size_t block) {
     const size_t end = std::min(tree.nodes.size(), kBlock * (block + 1));
     for (size_t i = kBlock * block; i < end; ++i) filler.fill(static_cast<uint32_t>(i), forest);

@@ -67,9 +67,9 @@ struct Forest {
   std::vector<InnerNode> inner;
   std::vector<EdgeNode> edges;
   std::vector<NodeId> roots;
-  double extent = 0;                         // largest |x| of a position
-  std::vector<std::vector<uint32_t>> slots;  // [object][edge]: kWidth * edge node + lane, or
-                                             // kNoParent
+  double extent = 0;  // largest |x| of a position
+  // [object][edge]: kWidth * edge node + lane, or kNoParent.
+  std::vector<std::vector<uint32_t>> slots;
 
   // What does not hold of these trees over the edges of `objects`, in words; empty if all is well:
   // every node has one parent, every edge one lane, boxes hold what is below, rows are scaled.

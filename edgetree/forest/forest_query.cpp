@@ -170,11 +170,16 @@ Floats light_through(const ForestQuery& query, const Floats3& d, const Floats3& 
 
 }  // namespace
 
+// The nearest float. Never inlined, because GCC 12 drops a cast to float and back where it makes
+// vectors of such pairs.
+__attribute__((noinline)) static double nearest_float(double x) { return static_cast<float>(x); }
+
 ForestPoint point_of(const Forest& forest, const Vec3d& p) {
   EdgeMesh farthest;
   farthest.extent = forest.extent;
-  const auto is_float = [](double x) { return static_cast<double>(static_cast<float>(x)) == x; };
-  return {p, distance_error(farthest, p), is_float(p.x) && is_float(p.y) && is_float(p.z)};
+  bool is_float = true;
+  for (int k = 0; k < 3; ++k) is_float = is_float && nearest_float(p[k]) == p[k];
+  return {p, distance_error(farthest, p), is_float};
 }
 
 ForestQuery::ForestQuery(const Forest& forest, const LightClusters* clusters,
@@ -190,8 +195,9 @@ ForestQuery::ForestQuery(const Forest& forest, const LightClusters* clusters,
   for (int k = 0; k < 3; ++k) {
     const double x = query.p[k] * unit;
     n[k] = static_cast<float>(query.n[k]);
-    p[0][k] = static_cast<float>(x);
-    p[1][k] = static_cast<float>(x - p[0][k]);
+    const double high = nearest_float(x);
+    p[0][k] = static_cast<float>(high);
+    p[1][k] = static_cast<float>(x - high);
   }
   const Vec3<Lanes>& v = query.velocity;
   double sum = 0;

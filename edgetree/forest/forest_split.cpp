@@ -62,6 +62,7 @@ struct Cut {
   uint32_t bin = 0;  // or, where items are sorted, the number of items on the left
 };
 
+// Not tuned: sets below this size are sorted along each axis instead of binned.
 constexpr int kBins = 16;
 constexpr uint32_t kSortBelow = 96;
 
@@ -240,7 +241,7 @@ SplitTree split_edges(std::span<const Wedge> wedges, uint32_t width, int threads
   std::vector<Item> items = items_of(wedges);
   const auto n = static_cast<uint32_t>(items.size());
   const Splitter splitter(items, width);
-  constexpr uint32_t kTask = 4096;  // edges that one thread splits alone
+  constexpr uint32_t kTask = 4096;  // edges that one thread splits alone; not tuned
   SplitTree tree;
   std::vector<Splitter::Pending> pending;
   splitter.append({0, n}, n > kTask ? kTask : 0, tree.nodes, &pending);

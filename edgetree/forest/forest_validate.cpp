@@ -158,8 +158,7 @@ class Walk {
       const auto in_frame = [&](double x) {
         return ((x - node.head.center[k]) * node.head.inverse_radius + 1) * 0.5 * kBoxSteps;
       };
-      // Boxes end at the frame's cube, which holds all edges to the rounding of its radius.
-      const double rounding = kBoxSteps * 0x1.0p-22;
+      constexpr double rounding = kBoxSteps * 0x1.0p-50;  // of in_frame
       require(
           in_frame(below.lower[k]) >= low - rounding && in_frame(below.upper[k]) <= high + rounding,
           "a child's box does not hold its edges");

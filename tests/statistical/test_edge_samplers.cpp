@@ -379,6 +379,11 @@ INSTANTIATE_TEST_SUITE_P(All, EdgeSamplers, testing::ValuesIn(sampler_names()),
                            return name;
                          });
 
+TEST(EdgeSamplerTable, TheDefaultIsARowAndNoAblation) {
+  EXPECT_FALSE(default_edge_sampler().ablation);
+  EXPECT_NO_THROW(make_edge_sampler(default_edge_sampler().name, {}, 1));
+}
+
 TEST(EdgeSamplerTable, UnknownNamesListTheKnown) {
   try {
     make_edge_sampler("forrest", {}, 1);

@@ -7,6 +7,7 @@
 #include "../support/meshes.h"
 #include "edgetree/forest/edge_forest.h"
 #include "edgetree/forest/forest_build.h"
+#include "edgetree/forest/forest_query.h"
 
 namespace limn {
 namespace {
@@ -165,7 +166,10 @@ TEST(Forest, CorruptedCopiesAreFound) {
       {"an end is not the mesh's", [](Forest& f) { f.edges[0].ends[0][1][0] += 1; }},
       {"an edge has no length", [](Forest& f) { f.edges[0].length[0] = 0; }},
       {"a slot does not lead to its edge",
-       [](Forest& f) { f.slots[0][f.edges[0].edge[0]] = kWidth; }},
+       [](Forest& f) {
+         f.edges[0].edge[0] = kNoChild;
+         f.edges[0].length[0] = 0;
+       }},
       {"an edge that may be a silhouette is in no node",
        [](Forest& f) {
          // Taken out without a trace, but for the edge itself.
@@ -217,6 +221,21 @@ TEST(Forest, ProbabilitiesDoNotDependOnTheScale) {
         sum += probability;
       }
       EXPECT_GT(sum, 0.5) << exponent;
+    }
+  }
+}
+
+// Two floats hold a coordinate of p, scaled, to 2^-48 of it.
+TEST(Forest, QueriesKeepThePointToTwiceAFloat) {
+  Rng rng(25, 0, 0);
+  const Forest forest = build_forest(moving_torus(1), 1, {});
+  for (int i = 0; i < 100; ++i) {
+    EdgeQuery query;
+    query.p = random_direction(rng) * random_scale(rng);
+    const ForestQuery prepared(forest, nullptr, nullptr, query, {1, 1, 1, 1});
+    for (int k = 0; k < 3; ++k) {
+      const double x = query.p[k] * prepared.unit;
+      EXPECT_LE(std::fabs(double{prepared.p[0][k]} + prepared.p[1][k] - x), 0x1p-48 * std::fabs(x));
     }
   }
 }

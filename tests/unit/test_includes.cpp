@@ -76,6 +76,27 @@ TEST(Includes, EdgetreeSeesNoScene) {
   EXPECT_EQ(strays("include/limn/edgetree", allowed), Strings{});
 }
 
+// The rooms of edgetree, each on top of what stands before it: nothing runs back up, nor sideways.
+TEST(Includes, RoomsOfEdgetreeInOrder) {
+  const std::map<std::string, std::set<std::string>> below = {
+      {"edges", {}},
+      {"lobe", {}},
+      {"light", {}},
+      {"rejection", {}},
+      {"baselines", {"lobe"}},
+      {"forest", {"edges", "lobe", "light"}},
+  };
+  for (const auto& [room, allowed] : below) {
+    for (const Include& include : includes_below("edgetree/" + room)) {
+      if (!include.path.starts_with("edgetree/")) continue;
+      const std::string rest = include.path.substr(std::string("edgetree/").size());
+      const std::string other = rest.substr(0, rest.find('/'));
+      EXPECT_TRUE(rest == "simd.h" || other == room || allowed.contains(other))
+          << include.file << " includes " << include.path;
+    }
+  }
+}
+
 // Headers inside src, edgetree, integrators and tools are private to that folder and named by their
 // path from the repository's root. tools/fit_ltc is a part of edgetree's source (it writes a table
 // that edgetree compiles in) and stands apart.

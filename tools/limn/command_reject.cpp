@@ -114,7 +114,7 @@ Vec3d turned(const Vec3d& v, double degrees) {
   return {c * v.x - s * v.y, s * v.x + c * v.y, v.z};
 }
 
-// For legends.
+// The pictures' colours, for legends.
 json colors_json() {
   json colors = {{"edge_silhouette", css(kSilhouetteColor)},
                  {"edge_false_accept", css(kFalseAcceptColor)},

@@ -77,8 +77,8 @@ class EdgeBound {
   Vec3d tangent_{};                      // unit, at u_a towards u_b
 
   int pieces_ = 0;
-  std::array<double, kMaxPieces + 1>
-      cuts_;  // angles from u_a, ascending; the last only if there are several pieces
+  // Angles from u_a, ascending; the last only if there are several pieces.
+  std::array<double, kMaxPieces + 1> cuts_;
   std::array<double, kMaxPieces> weights_;
   std::array<double, kMaxPieces + 1> cumulative_;  // of the weights, from 0
   double total_ = 0;
