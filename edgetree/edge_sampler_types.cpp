@@ -4,6 +4,7 @@
 #include "edgetree/baselines/baselines.h"
 #include "edgetree/forest/edge_forest.h"
 #include "limn/core/error.h"
+#include "limn/core/names.h"
 
 namespace limn {
 namespace {
@@ -62,12 +63,10 @@ const EdgeSamplerType& default_edge_sampler() { return edge_sampler_types().fron
 
 std::unique_ptr<EdgeSampler> make_edge_sampler(const std::string& name,
                                                const EdgeSamplerInput& input, int threads) {
-  std::string known;
   for (const EdgeSamplerType& type : edge_sampler_types()) {
     if (type.name == name) return type.make(input, threads);
-    known += (known.empty() ? "" : ", ") + type.name;
   }
-  throw InputError("unknown edge sampler \"" + name + "\" (known: " + known + ")");
+  throw InputError(unknown_name("edge sampler", name, names_of(edge_sampler_types())));
 }
 
 }  // namespace limn

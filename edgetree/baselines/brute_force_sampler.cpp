@@ -18,11 +18,8 @@ struct Packed {
   std::vector<uint8_t> needed;
 };
 
-enum Side : uint8_t {
-  kFront = 1,
-  kBack = 2,
-  kNever = 4
-};  // front and back: on the plane, to rounding
+// Front and back at once: on the plane, to rounding.
+enum Side : uint8_t { kFront = 1, kBack = 2, kNever = 4 };
 
 bool same(const Vec3<Lanes>& a, const Vec3<Lanes>& b) {
   for (int k = 0; k < 3; ++k)
@@ -31,8 +28,7 @@ bool same(const Vec3<Lanes>& a, const Vec3<Lanes>& b) {
   return true;
 }
 bool same(const EdgeQuery& a, const EdgeQuery& b) {
-  return a.p == b.p && a.n == b.n && a.wi == b.wi && a.lobe.kind == b.lobe.kind &&
-         a.lobe.alpha == b.lobe.alpha && a.lobe.albedo == b.lobe.albedo &&
+  return a.p == b.p && a.n == b.n && a.wi == b.wi && a.lobe == b.lobe &&
          same(a.velocity, b.velocity) && a.object == b.object && a.face == b.face;
 }
 
@@ -55,19 +51,20 @@ class BruteForceSampler final : public EdgeSampler {
     for (const EdgeMesh& mesh : input.objects) packed_.push_back(pack(mesh));
   }
 
-  bool sample(const EdgeQuery& query, Rng& rng, EdgeSample& sample) const override {
+  std::optional<EdgeSample> sample(const EdgeQuery& query, Rng& rng) const override {
     const Listing& listing = list(query);
-    if (listing.edges.empty()) return false;
+    if (listing.edges.empty()) return std::nullopt;
     const double u_edge = rng.uniform(), u_piece = rng.uniform(), u_angle = rng.uniform();
     const auto begin = listing.cumulative.begin();
     const auto found =
         std::upper_bound(begin, listing.cumulative.end() - 1, u_edge * listing.total());
+    EdgeSample sample;
     sample.edge = listing.edges[found - begin];
     const EdgeBound bound = bound_of(query, sample.edge);
     sample.t = bound.sample_t(u_piece, u_angle);
     sample.pdf_t = bound.pdf_t(sample.t);
     sample.probability = bound.total() / listing.total();
-    return true;
+    return sample;
   }
 
   double probability(const EdgeQuery& query, EdgeId id) const override {

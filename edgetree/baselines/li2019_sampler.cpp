@@ -19,26 +19,14 @@
 
 #include "edgetree/baselines/baselines.h"
 #include "edgetree/lobe/ltc.h"
+#include "limn/core/bounds.h"
 
 namespace limn {
 namespace {
 
-struct Box {
-  Vec3d lower{1e300, 1e300, 1e300};
-  Vec3d upper{-1e300, -1e300, -1e300};
-
-  void extend(const Vec3d& p) {
-    for (int i = 0; i < 3; ++i) {
-      lower[i] = std::min(lower[i], p[i]);
-      upper[i] = std::max(upper[i], p[i]);
-    }
-  }
-  Vec3d center() const { return (lower + upper) * 0.5; }
-};
-
 struct Node {
-  Box positions;
-  Box planes;                   // Hough points of all faces
+  Bounds positions;
+  Bounds planes;                // Hough points of all faces
   bool always = false;          // the planes say nothing: may matter from everywhere
   double length = 0;            // of all edges
   uint32_t begin = 0, end = 0;  // range of edges
@@ -53,7 +41,7 @@ struct Item {
 };
 
 // Whether the sphere around `center` meets the box, seen as hollow.
-bool meets_sphere(const Box& box, const Vec3d& center, double radius) {
+bool meets_sphere(const Bounds& box, const Vec3d& center, double radius) {
   double nearest = 0;
   double farthest = 0;
   for (int i = 0; i < 3; ++i) {
@@ -84,7 +72,7 @@ struct PlaneSphere {
 // Largest z / |w| over the axis-aligned box around eight corners; z grows with the cosine, x and y
 // with the distance.
 double largest_cosine(const std::array<Vec3d, 8>& corners) {
-  Box box;
+  Bounds box;
   for (const Vec3d& corner : corners) box.extend(corner);
   const double z = box.upper.z;
   if (z <= 0) return 0;
@@ -174,15 +162,15 @@ class Li2019Sampler final : public EdgeSampler {
       places_[items_[i].id.object][items_[i].id.edge] = i;
   }
 
-  bool sample(const EdgeQuery& query, Rng& rng, EdgeSample& sample) const override {
-    if (nodes_.empty()) return false;
+  std::optional<EdgeSample> sample(const EdgeQuery& query, Rng& rng) const override {
+    if (nodes_.empty()) return std::nullopt;
     const Descent descent(query, origin_);
     double u = rng.uniform();
     uint32_t node = 0;
     double probability = 1;
     while (nodes_[node].right != 0) {
       const double first = first_share(descent, node);
-      if (first < 0) return false;
+      if (first < 0) return std::nullopt;
       if (u < first) {
         u /= first;
         probability *= first;
@@ -194,14 +182,16 @@ class Li2019Sampler final : public EdgeSampler {
       }
     }
     const EdgeId id = items_[nodes_[node].begin].id;
-    if (!is_drawn(query, id)) return false;
+    if (!is_drawn(query, id)) return std::nullopt;
     const LtcEdge edge = transformed_edge(descent, id);
-    if (!(edge.integral() > 0)) return false;
+    if (!(edge.integral() > 0)) return std::nullopt;
+    EdgeSample sample;
     sample.edge = id;
     sample.probability = probability;
     sample.t = edge.sample_t(rng.uniform());
     sample.pdf_t = edge.pdf_t(sample.t);
-    return sample.pdf_t > 0;
+    if (!(sample.pdf_t > 0)) return std::nullopt;
+    return sample;
   }
 
   double probability(const EdgeQuery& query, EdgeId id) const override {
@@ -238,7 +228,7 @@ class Li2019Sampler final : public EdgeSampler {
 
  private:
   void collect() {
-    Box all;
+    Bounds all;
     for (const EdgeMesh& mesh : input_.objects) {
       for (const Edge& edge : mesh.edges) {
         for (const uint32_t vertex : edge.vertices) all.extend(mesh.positions[vertex]);
@@ -248,7 +238,7 @@ class Li2019Sampler final : public EdgeSampler {
     for (uint32_t object = 0; object < input_.objects.size(); ++object) {
       const EdgeMesh& mesh = input_.objects[object];
       for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
-        const Box box = plane_box(mesh, e);
+        const Bounds box = plane_box(mesh, e);
         const auto& ends = mesh.edges[e].vertices;
         items_.push_back({{object, e},
                           (mesh.positions[ends[0]] + mesh.positions[ends[1]]) * 0.5,
@@ -268,8 +258,8 @@ class Li2019Sampler final : public EdgeSampler {
     return std::min(std::fabs(s0), std::fabs(s1)) <= error || (s0 > 0) != (s1 > 0);
   }
 
-  Box plane_box(const EdgeMesh& mesh, uint32_t edge) const {
-    Box box;
+  Bounds plane_box(const EdgeMesh& mesh, uint32_t edge) const {
+    Bounds box;
     for (const uint32_t face : mesh.faces_around(edge)) {
       const Plane& plane = mesh.planes[face];
       box.extend(origin_ - plane.n * plane.distance(origin_));
@@ -335,8 +325,8 @@ class Li2019Sampler final : public EdgeSampler {
   }
 
   int widest_axis(uint32_t begin, uint32_t end) const {
-    Box centers;
-    Box planes;
+    Bounds centers;
+    Bounds planes;
     for (uint32_t i = begin; i < end; ++i) {
       centers.extend(items_[i].center);
       planes.extend(items_[i].plane);
@@ -345,7 +335,7 @@ class Li2019Sampler final : public EdgeSampler {
     double width = -1;
     const int axes = items_[begin].always ? 3 : 6;
     for (int axis = 0; axis < axes; ++axis) {
-      const Box& box = axis < 3 ? centers : planes;
+      const Bounds& box = axis < 3 ? centers : planes;
       const double extent = box.upper[axis % 3] - box.lower[axis % 3];
       if (extent > width) {
         width = extent;

@@ -1,3 +1,4 @@
+// The sampler that knows nothing: the least that any other must beat.
 #include <algorithm>
 
 #include "edgetree/baselines/baselines.h"
@@ -12,18 +13,20 @@ class UniformSampler final : public EdgeSampler {
     for (const EdgeMesh& mesh : input.objects) ends_.push_back(count() + mesh.edges.size());
   }
 
-  bool sample(const EdgeQuery& query, Rng& rng, EdgeSample& sample) const override {
-    if (count() == 0) return false;
+  std::optional<EdgeSample> sample(const EdgeQuery& query, Rng& rng) const override {
+    if (count() == 0) return std::nullopt;
     const double u_edge = rng.uniform();
     const auto index =
         std::min(static_cast<uint64_t>(u_edge * static_cast<double>(count())), count() - 1);
     const auto object = std::upper_bound(ends_.begin(), ends_.end(), index) - ends_.begin();
     const uint64_t begin = object == 0 ? 0 : ends_[object - 1];
+    EdgeSample sample;
     sample.edge = {static_cast<uint32_t>(object), static_cast<uint32_t>(index - begin)};
     sample.t = rng.uniform();
     sample.probability = probability(query, sample.edge);
     sample.pdf_t = 1;
-    return sample.probability > 0;
+    if (!(sample.probability > 0)) return std::nullopt;
+    return sample;
   }
 
   double probability(const EdgeQuery& query, EdgeId id) const override {

@@ -1,11 +1,12 @@
+// Edges from the sides of faces: pairing, classes, planes, and the exact test of E(p).
 #include "limn/edgetree/edges.h"
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 #include "edgetree/edges/half_edges.h"
+#include "edgetree/edges/union_find.h"
 
 namespace limn {
 namespace {
@@ -133,17 +134,12 @@ class Builder {
 
   // Whether each part of a closed mesh encloses positive volume, beyond rounding.
   bool parts_have_volume() const {
-    std::vector<uint32_t> parents(mesh_.faces.size());
-    std::iota(parents.begin(), parents.end(), 0u);
-    const auto root = [&](uint32_t f) {
-      while (parents[f] != f) f = parents[f] = parents[parents[f]];
-      return f;
-    };
-    for (const Edge& edge : result_.edges) parents[root(edge.faces[0])] = root(edge.faces[1]);
+    UnionFind parts(mesh_.faces.size());
+    for (const Edge& edge : result_.edges) parts.join(edge.faces[0], edge.faces[1]);
     std::vector<double> volumes(mesh_.faces.size()), sizes(mesh_.faces.size());
-    for (const HalfEdge& side :
-         sides_) {  // three or more per face: its area, as a fan of triangles
-      const uint32_t part = root(side.face);
+    // Three or more sides per face: its area, as a fan of triangles.
+    for (const HalfEdge& side : sides_) {
+      const uint32_t part = parts.root(side.face);
       const Vec3d origin = position(mesh_.faces[part][0]), e = position(side.from) - origin;
       const Plane& plane = result_.planes[side.face];
       const Vec3d x = position(side.opposite) - position(side.from);
@@ -151,7 +147,7 @@ class Builder {
       volumes[part] += dot(plane.n, e) * area;
       sizes[part] += length(e) * area;
     }
-    for (uint32_t f = 0; f < parents.size(); ++f)
+    for (uint32_t f = 0; f < sizes.size(); ++f)
       if (sizes[f] > 0 && volumes[f] <= 0x1.0p-44 * sizes[f]) return false;
     return !result_.edges.empty();
   }

@@ -1,10 +1,12 @@
+// Sides of faces over welded vertices; faces of zero area taken out.
 #include "edgetree/edges/half_edges.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 #include <unordered_map>
+
+#include "edgetree/edges/union_find.h"
 
 namespace limn {
 namespace {
@@ -61,19 +63,19 @@ class SliverLines {
  public:
   SliverLines(const Mesh& mesh, const std::vector<uint32_t>& ids,
               const std::vector<uint32_t>& slivers)
-      : mesh_(mesh), parents_(slivers.size()), vertices_(slivers.size()) {
-    std::iota(parents_.begin(), parents_.end(), 0u);
+      : mesh_(mesh), lines_(slivers.size()), vertices_(slivers.size()) {
     for (uint32_t s = 0; s < slivers.size(); ++s) {
       const FaceIndices& face = mesh.faces[slivers[s]];
       for (int k = 0; k < 3; ++k) {
         const uint32_t a = ids[face[k]], b = ids[face[(k + 1) % 3]];
         if (a == b) continue;
         const auto [found, is_new] = line_of_edge_.emplace(undirected_key(a, b), s);
-        if (!is_new) parents_[root(s)] = root(found->second);
+        if (!is_new) lines_.join(s, found->second);
       }
     }
     for (uint32_t s = 0; s < slivers.size(); ++s)
-      for (uint32_t corner : mesh.faces[slivers[s]]) vertices_[root(s)].push_back(ids[corner]);
+      for (uint32_t corner : mesh.faces[slivers[s]])
+        vertices_[lines_.root(s)].push_back(ids[corner]);
   }
 
   // Appends the parts of a side, split at the vertices of its line strictly between its ends.
@@ -84,7 +86,7 @@ class SliverLines {
       return;
     }
     HalfEdge part = side;
-    for (uint32_t vertex : between(side.from, side.to, vertices_[root(line->second)])) {
+    for (uint32_t vertex : between(side.from, side.to, vertices_[lines_.root(line->second)])) {
       part.to = vertex;
       sides.push_back(part);
       part.from = vertex;
@@ -94,11 +96,6 @@ class SliverLines {
   }
 
  private:
-  uint32_t root(uint32_t s) {
-    while (parents_[s] != s) s = parents_[s] = parents_[parents_[s]];
-    return s;
-  }
-
   // Points of one line are told apart, and ordered, by the axis along which it runs longest.
   std::vector<uint32_t> between(uint32_t from, uint32_t to,
                                 const std::vector<uint32_t>& candidates) const {
@@ -118,7 +115,7 @@ class SliverLines {
   }
 
   const Mesh& mesh_;
-  std::vector<uint32_t> parents_;                        // union-find over slivers
+  UnionFind lines_;                                      // over slivers
   std::vector<std::vector<uint32_t>> vertices_;          // of the line, at its root
   std::unordered_map<uint64_t, uint32_t> line_of_edge_;  // to one sliver of the line
 };

@@ -138,7 +138,8 @@ struct EdgeForest::Impl {
     }
   }
 
-  // Of drawing the child in a lane of a node; multiplied from the root on, as `draw` does.
+  // Probability of drawing the child in a lane of a node; multiplied from the root on, as `draw`
+  // does.
   double probability(NodeId id, int lane, const ForestQuery& query) const {
     const uint32_t parent = forest.head(id).parent;
     const bool is_root = parent == kNoParent;
@@ -183,20 +184,19 @@ std::unique_ptr<EdgeForest> EdgeForest::build(const EdgeSamplerInput& input, int
   return std::unique_ptr<EdgeForest>(new EdgeForest(std::move(impl)));
 }
 
-bool EdgeForest::sample(const EdgeQuery& query, Rng& rng, EdgeSample& sample) const {
+std::optional<EdgeSample> EdgeForest::sample(const EdgeQuery& query, Rng& rng) const {
   const double u_edge = rng.uniform(), u_t = rng.uniform();
   const ForestQuery prepared = impl_->prepare(query);
   Impl::Draw draw;
-  if (!impl_->draw(prepared, u_edge, draw)) return false;
-  if (!impl_->accepts(query, prepared.point, *draw.node, draw.lane)) return false;
-  sample.edge = draw.edge();
-  sample.probability = draw.probability;
+  if (!impl_->draw(prepared, u_edge, draw)) return std::nullopt;
+  if (!impl_->accepts(query, prepared.point, *draw.node, draw.lane)) return std::nullopt;
   const SeenEdge edge = Impl::seen_edge(prepared.lobe, query.p, *draw.node, draw.lane);
-  if (!(edge.is_seen())) return false;
-  sample.t = edge.sample_t(u_t);
+  if (!edge.is_seen()) return std::nullopt;
+  EdgeSample sample{draw.edge(), edge.sample_t(u_t), draw.probability, 0};
   sample.pdf_t = edge.pdf_t(sample.t);
   // Nothing where the density is lost to rounding, on an edge that lies in the horizon.
-  return sample.pdf_t > 0;
+  if (!(sample.pdf_t > 0)) return std::nullopt;
+  return sample;
 }
 
 double EdgeForest::probability(const EdgeQuery& query, EdgeId id) const {
@@ -206,7 +206,7 @@ double EdgeForest::probability(const EdgeQuery& query, EdgeId id) const {
   const int lane = static_cast<int>(slot % kWidth);
   const ForestQuery prepared = impl_->prepare(query);
   if (!impl_->accepts(query, prepared.point, node, lane)) return 0;
-  if (!(Impl::seen_edge(prepared.lobe, query.p, node, lane).is_seen())) return 0;
+  if (!Impl::seen_edge(prepared.lobe, query.p, node, lane).is_seen()) return 0;
   return impl_->probability(~static_cast<NodeId>(slot / kWidth), lane, prepared);
 }
 

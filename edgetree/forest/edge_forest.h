@@ -17,7 +17,7 @@ class EdgeForest final : public EdgeSampler {
                                            const ForestConfig& config = {});
   ~EdgeForest() override;
 
-  bool sample(const EdgeQuery& query, Rng& rng, EdgeSample& sample) const override;
+  std::optional<EdgeSample> sample(const EdgeQuery& query, Rng& rng) const override;
   double probability(const EdgeQuery& query, EdgeId edge) const override;
   double pdf_t(const EdgeQuery& query, EdgeId edge, double t) const override;
   // A walk down the trees costs a handful of rays.

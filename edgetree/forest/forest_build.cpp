@@ -1,3 +1,4 @@
+// One tree per object and group: groups, node frames, heights, links.
 #include "edgetree/forest/forest_build.h"
 
 #include <algorithm>
@@ -8,6 +9,7 @@
 
 #include "edgetree/forest/forest_fit.h"
 #include "edgetree/forest/forest_split.h"
+#include "limn/core/bounds.h"
 #include "limn/core/parallel.h"
 
 namespace limn {
@@ -51,20 +53,11 @@ Wedge wedge_of(const EdgeMesh& mesh, uint32_t index, const Lanes& scale) {
   return wedge;
 }
 
-struct Box {
-  Vec3d low{1e300, 1e300, 1e300}, high{-1e300, -1e300, -1e300};
-  Vec3d center() const { return (low + high) * 0.5; }
-  Vec3d half() const { return (high - low) * 0.5; }
-};
-Box box_of(std::span<const Wedge> wedges) {
-  Box box;
+Bounds bounds_of(std::span<const Wedge> wedges) {
+  Bounds bounds;
   for (const Wedge& wedge : wedges)
-    for (const Vec3d& x : wedge.ends)
-      for (int k = 0; k < 3; ++k) {
-        box.low[k] = std::min(box.low[k], x[k]);
-        box.high[k] = std::max(box.high[k], x[k]);
-      }
-  return box;
+    for (const Vec3d& x : wedge.ends) bounds.extend(x);
+  return bounds;
 }
 
 // The 24 leading bits: a number that a float holds. Not by a cast to float and back, because GCC 12
@@ -73,10 +66,15 @@ double truncated(double x) {
   return std::bit_cast<double>(std::bit_cast<uint64_t>(x) & ~((uint64_t{1} << 29) - 1));
 }
 
-NodeFrame frame_of(const Box& box) {
-  const Vec3d center = box.center();
-  return {{truncated(center.x), truncated(center.y), truncated(center.z)},
-          truncated(1 / length(box.half()))};
+// The cube around the centre holds the box: children's boxes are cut off at it.
+NodeFrame frame_of(const Bounds& box) {
+  const Vec3d middle = box.center();
+  const Vec3d center{truncated(middle.x), truncated(middle.y), truncated(middle.z)};
+  double radius = 0.5 * box.diagonal();
+  // Thin boxes reach as far as their diagonal, and the centre was rounded.
+  for (int k = 0; k < 3; ++k)
+    radius = std::max({radius, box.upper[k] - center[k], center[k] - box.lower[k]});
+  return {center, truncated(1 / radius)};
 }
 
 double length_of(std::span<const Wedge> wedges) {
@@ -97,15 +95,15 @@ float speed_of(std::span<const Wedge> wedges) {
 }
 
 // Outward to a step.
-void put_box(const Box& box, const NodeFrame& frame, int lane, InnerNode& node) {
+void put_box(const Bounds& box, const NodeFrame& frame, int lane, InnerNode& node) {
   constexpr double kMargin = 0x1.0p-16;  // more than a query's rounding, in steps
   const auto step = [](double x) {
     return static_cast<int32_t>(std::clamp(x, 0.0, double{kBoxSteps}));
   };
   int32_t packed_low = 0, packed_high = 0;
   for (int k = 0; k < 3; ++k) {
-    const double low = (box.low[k] - frame.center[k]) * frame.inverse_radius;
-    const double high = (box.high[k] - frame.center[k]) * frame.inverse_radius;
+    const double low = (box.lower[k] - frame.center[k]) * frame.inverse_radius;
+    const double high = (box.upper[k] - frame.center[k]) * frame.inverse_radius;
     packed_low |= step(std::floor((low + 1) * 0.5 * kBoxSteps - kMargin)) << (k * kBoxBits);
     packed_high |= step(std::ceil((high + 1) * 0.5 * kBoxSteps + kMargin)) << (k * kBoxBits);
   }
@@ -128,7 +126,7 @@ class TreeFiller {
 
   void fill(uint32_t index, Forest& forest) const {
     const SplitNode& split = tree_.nodes[index];
-    const NodeFrame frame = frame_of(box_of(edges(split.range)));
+    const NodeFrame frame = frame_of(bounds_of(edges(split.range)));
     if (split.has_edges) {
       EdgeNode& node = forest.edges[~ids_[index]];
       fill_head(frame, node.head);
@@ -173,7 +171,7 @@ class TreeFiller {
       for (int k = 0; k < 3; ++k) node.cover[k][lane] = positive(dual.cover[k] * scale);
       node.speed[lane] = speed_of(wedges);
       node.child[lane] = ids_[split.children[lane]];
-      put_box(box_of(wedges), frame, lane, node);
+      put_box(bounds_of(wedges), frame, lane, node);
     }
   }
 
@@ -258,7 +256,7 @@ void append_tree(std::span<const Wedge> wedges, uint32_t object, ForestGroup gro
   });
   const std::vector<NodeId> ids = append_nodes(tree, forest);
   const TreeFiller filler(tree, ids, sorted, object, group, config);
-  constexpr size_t kBlock = 64;
+  constexpr size_t kBlock = 64;  // nodes; not tuned
   parallel_for((tree.nodes.size() + kBlock - 1) / kBlock, threads, [&](size_t block) {
     const size_t end = std::min(tree.nodes.size(), kBlock * (block + 1));
     for (size_t i = kBlock * block; i < end; ++i) filler.fill(static_cast<uint32_t>(i), forest);

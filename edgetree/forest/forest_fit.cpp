@@ -1,3 +1,4 @@
+// The dual box of a set of edges: the normaliser, the axes, the rows.
 #include "edgetree/forest/forest_fit.h"
 
 #include <Eigen/Dense>
@@ -25,7 +26,7 @@ using Eigen::Vector4d;
 // rounding of floats, which the query's own bound must cover.
 constexpr double kMinSeparation = 0x1.0p-20;
 
-// Flat edges count a little, for the points on their plane.
+// Flat edges count a little, for the points on their plane. Not tuned.
 constexpr double kFlat = 0x1.0p-12;
 
 Vector4d dual_point(const Plane& plane, const NodeFrame& frame) {
@@ -51,7 +52,7 @@ Vector4d central_direction(const std::vector<Vector4d>& points) {
   Vector3d mean = Vector3d::Zero();
   for (const Vector4d& q : points) mean += q.head<3>();
   Vector3d center = mean / static_cast<double>(points.size());
-  constexpr int kSteps = 12;
+  constexpr int kSteps = 12;  // not tuned
   for (int i = 2; i < 2 + kSteps && points.size() > 2; ++i) {
     // Normals are unit vectors: the farthest has the smallest product with the centre.
     const Farthest far = least_product(points, Vector4d(center[0], center[1], center[2], 0));
@@ -71,7 +72,7 @@ Vector4d farthest_hyperplane(const std::vector<Vector4d>& points) {
     active.push_back(*low);
     active.push_back(*high);
   }
-  constexpr int kRounds = 24;
+  constexpr int kRounds = 24;  // not tuned
   for (int round = 0;; ++round) {
     const Vector4d z = separating_direction(active);
     if (z.norm() == 0) return z;
@@ -87,7 +88,8 @@ Vector4d farthest_hyperplane(const std::vector<Vector4d>& points) {
 Vector4d normaliser_of(const std::vector<Vector4d>& points) {
   const Vector4d z = central_direction(points);
   const double least = z.norm() > 0 ? least_product(points, z).value : 0;
-  constexpr double kWide = 0.2;  // the chart would be five times as large as it needs to be
+  // The chart would be five times as large as it needs to be. Not tuned.
+  constexpr double kWide = 0.2;
   if (least >= kWide) return z;
   const Vector4d other = farthest_hyperplane(points);
   const double other_least = other.norm() > 0 ? least_product(points, other).value : 0;

@@ -2,6 +2,8 @@
 // Data of the edge forest: nodes of up to eight children, side by side in SIMD lanes. Inner nodes
 // have nodes for children, edge nodes have edges.
 #include <cstdint>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "edgetree/simd.h"
@@ -65,9 +67,13 @@ struct Forest {
   std::vector<InnerNode> inner;
   std::vector<EdgeNode> edges;
   std::vector<NodeId> roots;
-  double extent = 0;                         // largest |x| of a position
-  std::vector<std::vector<uint32_t>> slots;  // [object][edge]: kWidth * edge node + lane, or
-                                             // kNoParent
+  double extent = 0;  // largest |x| of a position
+  // [object][edge]: kWidth * edge node + lane, or kNoParent.
+  std::vector<std::vector<uint32_t>> slots;
+
+  // What does not hold of these trees over the edges of `objects`, in words; empty if all is well:
+  // every node has one parent, every edge one lane, boxes hold what is below, rows are scaled.
+  std::string validate(std::span<const EdgeMesh> objects) const;
 
   NodeHead& head(NodeId id) { return id < 0 ? edges[~id].head : inner[id].head; }
   const NodeHead& head(NodeId id) const { return id < 0 ? edges[~id].head : inner[id].head; }

@@ -1,5 +1,7 @@
+// How the children of a node are rejected and weighed for a query: the inner loop of a draw.
 #include "edgetree/forest/forest_query.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -7,14 +9,17 @@ namespace limn {
 namespace {
 
 // A plane near a corner of a dual box is taken to meet this share of what one in the middle does,
-// at least.
+// at least. Tuned, together with the ramp's power in expected_length.
 constexpr float kShallow = 0.1f;
-// Points in or near a box see its edges at this share of its squared radius at least.
+// Points in or near a box see its edges at this share of its squared radius at least. Not tuned.
 constexpr float kNear = 0.25f;
-// Radiance of objects as a share of the mean of the environment that lights them.
+// Radiance of objects as a share of the mean of the environment that lights them. With a quarter,
+// rare bright samples were left (edgetree/FIGURES.md).
 constexpr float kScattered = 1.0f;
 
 constexpr float kLeast = std::numeric_limits<float>::min();
+// Far above any weight that means something, and sums of many still are finite.
+constexpr float kMost = 0x1p100f;
 
 // p in the frame of a node, and what rounding can add to row . x of all rows together: of the
 // entries of rows and of x by 2^-24 each, four roundings in a product and two in sums; rows have
@@ -53,7 +58,7 @@ DualPlane dual_plane(const InnerNode& node, const FramePoint& at) {
   return plane;
 }
 
-// Of edges.
+// The same for the segments of edges.
 struct DualSegment {
   Floats middle;
   Floats half;  // widened
@@ -79,7 +84,7 @@ Floats expected_length(const InnerNode& node, const DualPlane& plane, float erro
       (size[0] * node.cover[0] + size[1] * node.cover[1] + size[2] * node.cover[2]) / widest;
   if (!soft) return length;
   const Floats rest = plane.half - widest;
-  const Floats ramp = clamp(0.5f * (plane.half - abs(plane.g[0])) / max(rest, splat(1e-30f)),
+  const Floats ramp = clamp(0.5f * (plane.half - abs(plane.g[0])) / max(rest, splat(kLeast)),
                             splat(kShallow), splat(1.0f));
   // Not every box that is met holds a silhouette: the power makes up for part of that.
   return length * (ramp * sqrt(ramp));
@@ -132,14 +137,27 @@ void boxes_of(const InnerNode& node, const FramePoint& at, Floats3& d, Floats3& 
   }
 }
 
-// End e of the edges, minus p.
+// End e of the edges minus p, times the query's unit.
 Floats3 end_of(const EdgeNode& node, const ForestQuery& query, int e) {
-  const auto coordinate = [&](int k) { return (node.ends[e][k] - query.p[0][k]) - query.p[1][k]; };
+  const auto coordinate = [&](int k) {
+    return (node.ends[e][k] * query.unit - query.p[0][k]) - query.p[1][k];
+  };
   return {coordinate(0), coordinate(1), coordinate(2)};
 }
 
 Floats dot_n(const ForestQuery& query, const Floats3& d) {
   return d.x * query.n[0] + d.y * query.n[1] + d.z * query.n[2];
+}
+
+// Lanes of the edges that end at p exactly. They lie on lines through p, where the Jacobian is
+// zero, and rounding makes candidates of them all.
+Ints ends_at(const EdgeNode& node, const Vec3d& p) {
+  Ints at = Ints{};
+  for (const auto& end : node.ends) {
+    const auto equal = [&](int k) { return end[k] == static_cast<float>(p[k]); };
+    at |= equal(0) & equal(1) & equal(2);
+  }
+  return at;
 }
 
 // Mean of f_s times luminance over boxes.
@@ -152,10 +170,16 @@ Floats light_through(const ForestQuery& query, const Floats3& d, const Floats3& 
 
 }  // namespace
 
+// The nearest float. Never inlined, because GCC 12 drops a cast to float and back where it makes
+// vectors of such pairs.
+__attribute__((noinline)) static double nearest_float(double x) { return static_cast<float>(x); }
+
 ForestPoint point_of(const Forest& forest, const Vec3d& p) {
   EdgeMesh farthest;
   farthest.extent = forest.extent;
-  return {p, distance_error(farthest, p)};
+  bool is_float = true;
+  for (int k = 0; k < 3; ++k) is_float = is_float && nearest_float(p[k]) == p[k];
+  return {p, distance_error(farthest, p), is_float};
 }
 
 ForestQuery::ForestQuery(const Forest& forest, const LightClusters* clusters,
@@ -163,10 +187,17 @@ ForestQuery::ForestQuery(const Forest& forest, const LightClusters* clusters,
                          const Lanes& lane_scale)
     : point(point_of(forest, query.p)), lobe(query.lobe, query.n, query.wi), environment(pyramid) {
   if (clusters) lights.emplace(*clusters, query.p);
+  const double size =
+      forest.extent + std::fabs(query.p.x) + std::fabs(query.p.y) + std::fabs(query.p.z);
+  int exponent = 0;
+  std::frexp(size, &exponent);
+  unit = std::ldexp(1.0f, std::clamp(-exponent, -126, 126));
   for (int k = 0; k < 3; ++k) {
+    const double x = query.p[k] * unit;
     n[k] = static_cast<float>(query.n[k]);
-    p[0][k] = static_cast<float>(query.p[k]);
-    p[1][k] = static_cast<float>(query.p[k] - p[0][k]);
+    const double high = nearest_float(x);
+    p[0][k] = static_cast<float>(high);
+    p[1][k] = static_cast<float>(x - high);
   }
   const Vec3<Lanes>& v = query.velocity;
   double sum = 0;
@@ -210,13 +241,16 @@ ChildWeights weigh_children(const InnerNode& node, const ForestQuery& query, boo
   alive &= height >= -16 * 0x1.0p-24f * at.size;
   const Floats speed = query.speed + node.speed;
   alive &= speed > 0;
-  const Floats distance2 = max(dot(d, d), kNear * dot(half, half) + 1e-30f);
+  // A child's box is a step wide at least in every direction: this is positive.
+  const Floats distance2 = max(dot(d, d), kNear * dot(half, half));
   const Floats rest = speed / distance2 * light_through(query, d, half, distance2, alive);
   return {length, select(alive, max(rest, splat(kLeast)), splat(0.0f))};
 }
 
 // The integral over the edge of |w x w'| / |w|^3, w = (1 - t) w_0 + t w_1, is
 // tan(gamma / 2) (1 / l_0 + 1 / l_1), with the ends' distances l and the angle gamma between them.
+// It grows without bound as p comes close to an end. At an end it is zero; where only the rounding
+// of squares takes p for an end, the weight is kMost at most.
 Floats weigh_edges(const EdgeNode& node, const ForestQuery& query) {
   const FramePoint at = to_frame(node.head, query.point);
   const Floats3 w_0 = end_of(node, query, 0), w_1 = end_of(node, query, 1);
@@ -224,12 +258,13 @@ Floats weigh_edges(const EdgeNode& node, const ForestQuery& query) {
   const Floats l_0 = sqrt(dot(w_0, w_0)), l_1 = sqrt(dot(w_1, w_1));
   const Floats3 normal{w_0.y * along.z - w_0.z * along.y, w_0.z * along.x - w_0.x * along.z,
                        w_0.x * along.y - w_0.y * along.x};
-  const Floats product = max(l_0 * l_1, splat(1e-30f));
+  const Floats product = max(l_0 * l_1, splat(kLeast));
   const Floats sine = sqrt(dot(normal, normal)) / product, cosine = dot(w_0, w_1) / product;
   const Floats tangent =
       select(cosine > 0, sine / (1 + cosine), (1 - cosine) / max(sine, splat(1e-6f)));
 
   Ints alive = length_of(node, at) > 0;
+  if (query.point.may_be_vertex) alive &= ~ends_at(node, query.point.p);
   // Rounding of w and of the product with n.
   const Floats slack = 8 * 0x1.0p-24f * (l_0 + l_1);
   alive &= max(dot_n(query, w_0), dot_n(query, w_1)) >= -slack;
@@ -237,10 +272,10 @@ Floats weigh_edges(const EdgeNode& node, const ForestQuery& query) {
   alive &= speed > 0;
   const Floats3 d{w_0.x + along.x * 0.5f, w_0.y + along.y * 0.5f, w_0.z + along.z * 0.5f};
   const Floats3 half{abs(along.x) * 0.5f, abs(along.y) * 0.5f, abs(along.z) * 0.5f};
-  const Floats distance2 = max(dot(d, d), kNear * dot(half, half) + 1e-30f);
-  const Floats weight =
-      speed * tangent * (l_0 + l_1) / product * light_through(query, d, half, distance2, alive);
-  return select(alive, max(weight, splat(kLeast)), splat(0.0f));
+  const Floats distance2 = max(max(dot(d, d), kNear * dot(half, half)), splat(kLeast));
+  const Floats weight = speed * query.unit * tangent * (l_0 + l_1) / product *
+                        light_through(query, d, half, distance2, alive);
+  return select(alive, clamp(weight, splat(kLeast), splat(kMost)), splat(0.0f));
 }
 
 float length_below(const InnerNode& node, const ForestPoint& point, bool soft,
@@ -250,7 +285,9 @@ float length_below(const InnerNode& node, const ForestPoint& point, bool soft,
 }
 float length_below(const EdgeNode& node, const ForestPoint& point, float inverse_radius) {
   const float ratio = inverse_radius / node.head.inverse_radius;
-  return sum(length_of(node, to_frame(node.head, point))) * ratio * ratio;
+  Floats length = length_of(node, to_frame(node.head, point));
+  if (point.may_be_vertex) length = select(ends_at(node, point.p), splat(0.0f), length);
+  return sum(length) * ratio * ratio;
 }
 
 }  // namespace limn

@@ -13,6 +13,8 @@ namespace limn {
 struct ForestPoint {
   Vec3d p;
   double slack;  // of distances from planes, see distance_error
+  // p is representable as floats, as vertices are: it may be one.
+  bool may_be_vertex = false;
 };
 ForestPoint point_of(const Forest& forest, const Vec3d& p);
 
@@ -26,7 +28,10 @@ struct ForestQuery {
   std::optional<LightCones> lights;
   const RadiancePyramid* environment;
   float n[3];
-  float p[2][3];  // p = p[0] + p[1], to twice the precision of a float
+  // A power of two that brings the scene to the size of 1: products of lengths then neither
+  // overflow nor vanish, at any scale of the scene.
+  float unit;
+  float p[2][3];  // unit * p = p[0] + p[1], to twice the precision of a float
   float speed;    // of p
 };
 

@@ -1,3 +1,4 @@
+// The edge forest as a tree of nodes that one test rejects or accepts.
 #include "edgetree/forest/forest_rejection.h"
 
 #include "edgetree/forest/forest_query.h"

@@ -1,3 +1,4 @@
+// Binned splits of edges by where they are and where their normals point.
 #include "edgetree/forest/forest_split.h"
 
 #include <algorithm>
@@ -5,6 +6,7 @@
 #include <limits>
 #include <numeric>
 
+#include "limn/core/bounds.h"
 #include "limn/core/parallel.h"
 
 namespace limn {
@@ -60,6 +62,7 @@ struct Cut {
   uint32_t bin = 0;  // or, where items are sorted, the number of items on the left
 };
 
+// Not tuned: sets below this size are sorted along each axis instead of binned.
 constexpr int kBins = 16;
 constexpr uint32_t kSortBelow = 96;
 
@@ -213,15 +216,11 @@ class Splitter {
 };
 
 std::vector<Item> items_of(std::span<const Wedge> wedges) {
-  Vec3d low{1e300, 1e300, 1e300}, high = -low;
+  Bounds bounds;
   for (const Wedge& wedge : wedges)
-    for (const Vec3d& x : wedge.ends)
-      for (int k = 0; k < 3; ++k) {
-        low[k] = std::min(low[k], x[k]);
-        high[k] = std::max(high[k], x[k]);
-      }
-  const Vec3d center = (low + high) * 0.5;
-  const double diagonal = length(high - low), scale = diagonal > 0 ? 2 / diagonal : 1;
+    for (const Vec3d& x : wedge.ends) bounds.extend(x);
+  const Vec3d center = bounds.center();
+  const double diagonal = bounds.diagonal(), scale = diagonal > 0 ? 2 / diagonal : 1;
   std::vector<Item> items(wedges.size());
   for (uint32_t i = 0; i < items.size(); ++i) {
     const Wedge& wedge = wedges[i];
@@ -242,7 +241,7 @@ SplitTree split_edges(std::span<const Wedge> wedges, uint32_t width, int threads
   std::vector<Item> items = items_of(wedges);
   const auto n = static_cast<uint32_t>(items.size());
   const Splitter splitter(items, width);
-  constexpr uint32_t kTask = 4096;  // edges that one thread splits alone
+  constexpr uint32_t kTask = 4096;  // edges that one thread splits alone; not tuned
   SplitTree tree;
   std::vector<Splitter::Pending> pending;
   splitter.append({0, n}, n > kTask ? kTask : 0, tree.nodes, &pending);

@@ -1,3 +1,4 @@
+// Clusters of lights, and how bright it is behind a box seen from a point.
 #include "edgetree/light/light_term.h"
 
 #include <algorithm>
@@ -7,10 +8,10 @@ namespace limn {
 namespace {
 
 // Objects are lit about as the shading point is: they scatter this share of the light that arrives
-// there, spread over the hemisphere.
+// there, spread over the hemisphere. Not tuned.
 constexpr double kReflectance = 0.5;
 // Least weight, as a share of the brightest light's luminance: the light may reach objects that are
-// seen from here without reaching this point.
+// seen from here without reaching this point. Not tuned.
 constexpr double kFloor = 1.0 / 4096;
 
 Vec3d centroid(const LightTriangle& t) {
@@ -70,7 +71,8 @@ LightClusters::Cluster LightClusters::make_cluster(std::span<const LightTriangle
   return cluster;
 }
 
-// One triangle, or a flat patch that fills half of the disc around it (a square: 0.64).
+// One triangle, or a flat patch that fills half of the disc around it (a square: 0.64). Neither
+// that half nor what counts as flat is tuned.
 bool LightClusters::is_compact(const Cluster& c) {
   const bool flat = length(c.area_vector) >= 0.999 * c.area;
   return c.triangles.size() == 1 || (flat && c.area >= 0.5 * kPi * c.radius * c.radius);

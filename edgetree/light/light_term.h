@@ -18,7 +18,7 @@ namespace limn {
 // The lights of a scene as at most kMaxClusters groups of neighbouring triangles.
 class LightClusters {
  public:
-  static constexpr int kMaxClusters = 8;
+  static constexpr int kMaxClusters = 8;  // not tuned: a query looks at all of them
 
   LightClusters(std::span<const LightTriangle> lights, double environment_luminance);
 

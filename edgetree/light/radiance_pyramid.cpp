@@ -1,3 +1,4 @@
+// Means of an environment over cones, by an octahedral pyramid.
 #include "limn/edgetree/radiance_pyramid.h"
 
 #include <algorithm>
@@ -27,8 +28,8 @@ RadiancePyramid::RadiancePyramid(const std::function<double(const Vec3d&)>& lumi
       const double step = 2.0 / (size * samples);
       const Vec3d d = octahedral_direction((x + 0.5) * step - 1, (y + 0.5) * step - 1);
       const double r = length(d);
-      // Every face of the octahedron has the same distance from its centre: solid angle goes with 1
-      // / r^3.
+      // Every face of the octahedron has the same distance from its centre: solid angle goes with
+      // 1 / r^3.
       const double weight = 1 / (r * r * r);
       const size_t texel = static_cast<size_t>(y / samples) * size + x / samples;
       sums[texel] += weight * luminance(d / r);

@@ -1,3 +1,4 @@
+// Bounds of what one edge contributes.
 #include "limn/edgetree/contribution_bound.h"
 
 #include <algorithm>
@@ -9,12 +10,6 @@
 //   integral of dt / |w|^3 = dt (l_a + l_b) / (l_a^2 l_b^2 (1 + cos gamma)),
 // from the antiderivative (w.e) / (|w| |w x e|^2), with (u_b - u_a).(w_b - w_a) = (l_a + l_b)
 // (1 - cos gamma) and |w_a x w_b|^2 = l_a^2 l_b^2 (1 - cos gamma)(1 + cos gamma).
-//
-// The scattering function. Diffuse: albedo / pi * cos. Microfacets: f cos_o = F D(h) G / (4 cos_i).
-// With r the mirror image of wi about n, the turn from r to wo is the product of the reflections
-// about n and about h, a rotation by 2 theta_h, so the angle between r and wo is at most 2 theta_h:
-// D(theta_h) is at most the largest value of D from half that angle on. G is at most the smaller of
-// its two factors, and F at most the albedo bound.
 //
 // Along an arc the cosine to an axis is A cos(phi - phi_0): largest at an end, or A where it peaks
 // inside.
@@ -51,43 +46,17 @@ EdgeSegment segment_of(const EdgeMesh& mesh, uint32_t edge, const EdgeQuery& que
 }
 
 LobeBound::LobeBound(const Vec3d& n, const Vec3d& wi, const LobeSummary& lobe)
-    : n_(n), axis_(n), lobe_(lobe), width_(1), scale_(lobe.albedo / kPi) {
-  if (lobe.kind == LobeSummary::Kind::kDiffuse) return;
-  const double cos_i = dot(n, wi);
-  axis_ = normalize(n * (2 * cos_i) - wi);
-  width_ = std::min(1.0, lobe.alpha);
-  masking_wi_ = masking(cos_i);
-  scale_ = lobe.albedo / (4 * cos_i);
-}
-
-// Largest value of D at angles from theta on, cos_squared = cos^2 theta.
-double LobeBound::distribution(double cos_squared) const {
-  const double a2 = lobe_.alpha * lobe_.alpha;
-  if (lobe_.kind == LobeSummary::Kind::kGgx) {
-    const double k = cos_squared * a2 + (1 - cos_squared);
-    return a2 / (kPi * std::min(k * k, 1.0));  // falls with theta if alpha < 1, else rises to 1
-  }
-  const double c2 = std::min(cos_squared, 1 / (2 * a2));  // log D peaks at cos^2 = 1 / (2 alpha^2)
-  return c2 > 0 ? std::exp(-(1 - c2) / (c2 * a2)) / (kPi * a2 * c2 * c2) : 0;
-}
-
-// Upper bound of Smith's G1, increasing with the cosine. Beckmann: 1 / (1 + Lambda(a)) and its
-// rational fit by Walter et al. 2007 stay below 2 sqrt(pi) a, a = 1 / (alpha tan theta).
-double LobeBound::masking(double cos_theta) const {
-  if (cos_theta <= 0) return 0;
-  const double tan_theta = std::sqrt(std::max(0.0, 1 - cos_theta * cos_theta)) / cos_theta;
-  const double x = lobe_.alpha * tan_theta;
-  if (lobe_.kind == LobeSummary::Kind::kGgx) return 2 / (1 + std::sqrt(1 + x * x));
-  const double slope = 2 * std::sqrt(kPi);
-  return x <= slope ? 1 : slope / x;
-}
+    : n_(n),
+      axis_(lobe.model->axis(n, wi)),
+      lobe_(lobe),
+      width_(lobe.model->width(lobe)),
+      cos_i_(dot(n, wi)) {}
 
 double LobeBound::over_arc(const Vec3d& u_a, const Vec3d& u_b) const {
   const double cos_o = max_cosine(n_, u_a, u_b);
   if (cos_o <= 0) return 0;
-  if (lobe_.kind == LobeSummary::Kind::kDiffuse) return scale_ * cos_o;
-  const double cos_mirror = max_cosine(axis_, u_a, u_b);
-  return scale_ * distribution(0.5 * (1 + cos_mirror)) * std::min(masking_wi_, masking(cos_o));
+  const double cos_axis = axis_ == n_ ? cos_o : max_cosine(axis_, u_a, u_b);
+  return lobe_.model->bound(lobe_, cos_i_, cos_o, cos_axis);
 }
 
 EdgeBound::EdgeBound(const LobeBound& lobe, const EdgeSegment& segment) {

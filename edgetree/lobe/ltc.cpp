@@ -1,3 +1,4 @@
+// A transformed cosine for a query: read from the table, its value, its means over boxes.
 #include "edgetree/lobe/ltc.h"
 
 #include <algorithm>
@@ -54,25 +55,26 @@ constexpr float kSphere = static_cast<float>(4 * kPi);
 
 }  // namespace
 
-LtcLobe::LtcLobe(const LobeSummary& lobe, const Vec3d& n, const Vec3d& wi)
-    : diffuse_(lobe.kind == LobeSummary::Kind::kDiffuse), n_(n) {
-  if (diffuse_) {
+LtcLobe::LtcLobe(const LobeSummary& lobe, const Vec3d& n, const Vec3d& wi) : n_(n) {
+  const std::optional<LtcRow> row = lobe.model->ltc(lobe);
+  diffuse_ = !row;
+  if (!row) {
     const Frame frame(n);
     rows_[0] = frame.s;
     rows_[1] = frame.t;
     rows_[2] = n;
   } else {
-    read_table(lobe, wi);
+    read_table(*row, wi);
   }
   prepare_boxes();
 }
 
 // With X, Y, Z the columns of R, M^-1 = [1/width_x 0 -skew/width_x; 0 1/width_y 0; 0 0 1] R^T.
-void LtcLobe::read_table(const LobeSummary& lobe, const Vec3d& wi) {
-  const double alpha = std::min(lobe.alpha, kLtcMaxAlpha);
+void LtcLobe::read_table(const LtcRow& row, const Vec3d& wi) {
+  const double alpha = std::min(row.alpha, kLtcMaxAlpha);
   const double cos_i = std::clamp(dot(n_, wi), 1e-6, 1.0);
   const LtcEntry entry =
-      interpolate(lobe.kind == LobeSummary::Kind::kGgx ? kGgxTable : kBeckmannTable, alpha, cos_i);
+      interpolate(row.table == LtcRow::Table::kGgx ? kGgxTable : kBeckmannTable, alpha, cos_i);
   const LtcShape shape = scaled(entry, alpha, cos_i);
   norm_ = entry.norm;
 

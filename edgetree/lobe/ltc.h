@@ -6,9 +6,10 @@
 //   value(w) = (1 - kLtcFloor) ltc(w) + kLtcFloor (n.w) / pi   where n.w > 0, else 0  [1/sr].
 //
 // The floor keeps the value positive wherever the scattering function is. Diffuse: M = identity,
-// and value is the scattering function over its albedo.
+// and value is the scattering function over its albedo. Which transformed cosine it is the lobe says
+// (LobeModel::ltc); one that says none is taken for diffuse.
 #include "edgetree/simd.h"
-#include "limn/core/bsdf.h"
+#include "limn/core/lobe.h"
 
 namespace limn {
 
@@ -38,7 +39,7 @@ class LtcLobe {
   double norm() const { return norm_; }
 
  private:
-  void read_table(const LobeSummary& lobe, const Vec3d& wi);
+  void read_table(const LtcRow& row, const Vec3d& wi);
   void prepare_boxes();
   Floats ltc_mean(const Floats3& centre, const Floats3& half) const;
 

@@ -1,3 +1,4 @@
+// Integrals of a transformed cosine along an edge, and draws in proportion.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,7 +12,7 @@ namespace {
 // Newton's error is about the square of its last step, a bisection's the step itself; the bracket
 // alone takes 48 halvings to this precision.
 constexpr double kPrecision = 0x1p-48;
-constexpr int kMaxSteps = 60;
+constexpr int kMaxSteps = 60;  // never reached: the bracket ends it
 // Sine of the angle that a cross product of two vectors, each exact to rounding, cannot resolve.
 constexpr double kParallel = 0x1p-50;
 

@@ -7,7 +7,7 @@
 namespace limn {
 
 // Every lobe is evaluated as (1 - kLtcFloor) LTC + kLtcFloor cos / pi: where the fit misses the
-// true lobe, the importance stays positive.
+// true lobe, the importance stays positive. The floor is not tuned.
 inline constexpr double kLtcFloor = 0.1;
 
 // A matrix M = R [width_x 0 skew; 0 width_y 0; 0 0 1]; R turns +z by theta_i + tilt from the normal

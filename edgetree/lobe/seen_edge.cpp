@@ -1,3 +1,4 @@
+// A density along an edge that costs little where the edge is short.
 #include "edgetree/lobe/seen_edge.h"
 
 #include <algorithm>
@@ -13,7 +14,7 @@ double density_at(const LtcLobe& lobe, const Vec3d& w) {
 
 // The density varies over lengths of the order of |M^-1 w|.
 bool is_short(const LtcLobe& lobe, const Vec3d& w_0, const Vec3d& w_1) {
-  constexpr double kShort = 0.25;
+  constexpr double kShort = 0.25;  // not tuned
   const Vec3d a = lobe.transform(w_0), e = lobe.transform(w_1 - w_0);
   return length_squared(e) < kShort * kShort * length_squared(a);
 }

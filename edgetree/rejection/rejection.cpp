@@ -1,3 +1,4 @@
+// Rejection trees against the exact test of every edge.
 #include "limn/edgetree/rejection.h"
 
 #include <algorithm>
@@ -52,10 +53,6 @@ Vec3d random_direction(Rng& rng) {
 }
 
 }  // namespace
-
-std::span<const EdgeId> RejectionTree::edges(uint32_t node) const {
-  return std::span(edges_).subspan(nodes_[node].begin, nodes_[node].end - nodes_[node].begin);
-}
 
 Verdict judge(const EdgeSamplerInput& input, const RejectionTree& tree, uint32_t node,
               const Vec3d& p) {
@@ -152,7 +149,6 @@ std::vector<EdgeQuery> queries_around(const EdgeMesh& mesh, int count, uint64_t 
     EdgeQuery query;
     query.p = bounds.center() + direction * (1.5 * radius);
     query.n = query.wi = -direction;
-    query.lobe = {LobeSummary::Kind::kDiffuse, 1, 0.8};
     const Vec3d velocity = random_direction(rng);
     for (int k = 0; k < 3; ++k) query.velocity[k][0] = -velocity[k];
     queries.push_back(query);
@@ -166,8 +162,7 @@ HitRate hit_rate(const EdgeSampler& sampler, std::span<const EdgeQuery> queries,
   parallel_for(queries.size(), threads, [&](size_t i) {
     Rng rng(seed, i, 0);
     int hits = 0;
-    EdgeSample sample;
-    for (int k = 0; k < draws; ++k) hits += sampler.sample(queries[i], rng, sample);
+    for (int k = 0; k < draws; ++k) hits += sampler.sample(queries[i], rng).has_value();
     shares[i] = static_cast<double>(hits) / draws;
   });
   const auto n = static_cast<double>(shares.size());

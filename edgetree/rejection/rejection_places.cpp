@@ -1,3 +1,4 @@
+// Where to look at a rejection test.
 #include "limn/edgetree/rejection_places.h"
 
 #include <algorithm>
@@ -7,7 +8,7 @@
 namespace limn {
 namespace {
 
-// Of the faces around the edges, once for each edge.
+// Normals of the faces around the edges, once for each edge.
 std::vector<Vec3d> normals_of(const EdgeSamplerInput& input, std::span<const EdgeId> edges) {
   std::vector<Vec3d> normals;
   for (const EdgeId id : edges) {
@@ -38,7 +39,7 @@ Vec3d widest_tangent(const std::vector<Vec3d>& vectors, const Vec3d& n) {
   return frame.s * std::cos(angle) + frame.t * std::sin(angle);
 }
 
-// Of two counts: the logarithm of their ratio, zero if equal.
+// How far apart two counts are: the logarithm of their ratio, zero if equal.
 double misfit(uint32_t a, uint32_t b) { return std::fabs(std::log(static_cast<double>(a) / b)); }
 
 // Nodes within a factor of 3/2 of the number of edges, else those nearest to it.

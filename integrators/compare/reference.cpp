@@ -113,12 +113,6 @@ bool is_reference(const Attributes& attributes, const Identity& identity) {
   return true;
 }
 
-Image to_image(const std::vector<double>& values, const Film& film) {
-  Image image(film.crop_width, film.crop_height, 3);
-  for (size_t i = 0; i < values.size(); ++i) image.data[i] = static_cast<float>(values[i]);
-  return image;
-}
-
 std::vector<double> read_values(const std::string& file, const Film& film) {
   const Image image = read_exr(file);
   if (image.width != film.crop_width || image.height != film.crop_height || image.channels != 3) {

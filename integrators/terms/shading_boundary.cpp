@@ -65,12 +65,13 @@ void BoundaryTerm::add_sample(const PathVertex& vertex, const EdgeQuery& query, 
                               TermCost& cost, Rgb<Lanes>& sum) const {
   ++cost.samples;
   Rng rng = key.at(Purpose::kEdge, vertex.bounces);
-  EdgeSample sample;
-  if (!sampler_->sample(query, rng, sample)) {
+  const std::optional<EdgeSample> drawn = sampler_->sample(query, rng);
+  if (!drawn) {
     ++cost.no_edge;
     if (vertex.log) vertex.log->push_back("  edge: none found");
     return;
   }
+  const EdgeSample& sample = *drawn;
   const EdgeMesh& mesh = edges_.objects[sample.edge.object];
   EdgeView view;
   const bool seen = view_edge(mesh, sample.edge, sample.t, query.p, view);

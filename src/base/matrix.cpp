@@ -1,8 +1,9 @@
-// Matrix4, and the errors of Properties.
+// Products and inverses of 4x4 matrices.
+#include "limn/core/matrix.h"
+
 #include <cmath>
 #include <stdexcept>
-
-#include "limn/core/properties.h"
+#include <utility>
 
 namespace limn {
 
@@ -74,14 +75,6 @@ Matrix4 operator*(const Matrix4& a, const Matrix4& b) {
     }
   }
   return r;
-}
-
-void Properties::fail(const std::string& message) const {
-  throw InputError(where(), tag() + " \"" + type() + "\": " + message);
-}
-
-void Properties::fail(const std::string& property, const std::string& message) const {
-  throw InputError(where(property), tag() + " \"" + type() + "\": " + property + ": " + message);
 }
 
 }  // namespace limn

@@ -1,3 +1,4 @@
+// Numbers, words and whole files.
 #include "src/base/text.h"
 
 #include <charconv>
@@ -48,12 +49,6 @@ std::vector<std::string_view> split(std::string_view text, std::string_view sepa
     begin = text.find_first_not_of(separators, end);
   }
   return pieces;
-}
-
-std::string join(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
 }
 
 std::optional<std::string> read_whole_file(const std::string& file) {

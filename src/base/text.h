@@ -16,9 +16,6 @@ std::optional<int64_t> parse_integer(std::string_view text);
 // Pieces of `text` between any of `separators`, without empty pieces.
 std::vector<std::string_view> split(std::string_view text, std::string_view separators);
 
-// "a, b, c"
-std::string join(const std::vector<std::string>& words);
-
 // The whole file; nothing if it cannot be read.
 std::optional<std::string> read_whole_file(const std::string& file);
 

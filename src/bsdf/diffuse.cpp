@@ -25,9 +25,7 @@ class Diffuse final : public Bsdf {
   }
   std::optional<Vec3d> sample(const Vec3d& n, const Vec3d& wi, double u1, double u2) const override;
 
-  LobeSummary lobe() const override {
-    return {LobeSummary::Kind::kDiffuse, 1, max_channel(value(reflectance_))};
-  }
+  LobeSummary lobe() const override { return {kHemisphere, 1, max_channel(value(reflectance_))}; }
   std::vector<ParameterRef> parameters() override {
     return {{"reflectance", {&reflectance_.r, &reflectance_.g, &reflectance_.b}}};
   }

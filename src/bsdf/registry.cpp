@@ -1,5 +1,5 @@
-#include <string>
-
+// The BSDFs by the names of their types.
+#include "limn/core/names.h"
 #include "src/bsdf/types.h"
 
 namespace limn {
@@ -19,13 +19,11 @@ constexpr BsdfType kTypes[] = {
 }  // namespace
 
 std::shared_ptr<Bsdf> make_bsdf(Properties& properties) {
-  std::string known;
   for (const BsdfType& type : kTypes) {
     if (properties.type() == type.name) return type.read(properties);
-    known += known.empty() ? type.name : std::string(", ") + type.name;
   }
   throw InputError(properties.where(),
-                   "unknown bsdf type \"" + properties.type() + "\" (known: " + known + ")");
+                   unknown_name("bsdf type", properties.type(), names_of(kTypes)));
 }
 
 Rgb<double> read_reflectance(Properties& properties, const char* name, double absent) {

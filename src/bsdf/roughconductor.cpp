@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "limn/core/names.h"
 #include "src/bsdf/microfacet.h"
 #include "src/bsdf/types.h"
 
@@ -158,9 +159,8 @@ std::optional<Vec3d> RoughConductor::sample(const Vec3d& n, const Vec3d& wi, dou
 
 LobeSummary RoughConductor::lobe() const {
   const double bound = max_channel(value(specular_reflectance_));
-  if (is_ggx()) return {LobeSummary::Kind::kGgx, alpha<double>(), bound};
-  return {LobeSummary::Kind::kBeckmann, alpha<double>(),
-          bound * microfacet::kBeckmannRationalExcess};
+  if (is_ggx()) return {ggx_lobe(), alpha<double>(), bound};
+  return {beckmann_lobe(), alpha<double>(), bound * microfacet::kBeckmannRationalExcess};
 }
 
 std::string RoughConductor::describe() const {
@@ -190,7 +190,7 @@ Distribution read_distribution(Properties& properties) {
   const std::string name = properties.string("distribution", "beckmann");
   if (name == "beckmann") return Distribution::kBeckmann;
   if (name == "ggx") return Distribution::kGgx;
-  properties.fail("distribution", "unknown distribution \"" + name + "\" (known: beckmann, ggx)");
+  properties.fail("distribution", unknown_name("distribution", name, {"beckmann", "ggx"}));
 }
 
 void read_material(Properties& properties, RoughConductorValues& values) {
@@ -210,16 +210,16 @@ void read_material(Properties& properties, RoughConductorValues& values) {
   if (properties.has("eta") || properties.has("k")) {
     properties.fail("material", "give either a material or (eta, k), not both");
   }
-  std::string known = "none";
   for (const Material& m : kMaterials) {
-    known += std::string(", ") + m.name;
     if (name == m.name) {
       values.eta = m.eta;
       values.k = m.k;
       return;
     }
   }
-  properties.fail("material", "unknown material \"" + name + "\" (known: " + known + ")");
+  std::vector<std::string> known = names_of(kMaterials);
+  known.insert(known.begin(), "none");
+  properties.fail("material", unknown_name("material", name, known));
 }
 
 }  // namespace

@@ -1,8 +1,10 @@
+// Reconstruction filters and the part of the film that a pixel sees.
 #include "limn/core/film.h"
 
 #include <algorithm>
 #include <cmath>
 
+#include "limn/core/check.h"
 #include "limn/core/vec.h"
 
 namespace limn {
@@ -77,6 +79,13 @@ Film::Range Film::range_x(int pixel) const {
 
 Film::Range Film::range_y(int pixel) const {
   return range_around(pixel + 0.5, crop_y, crop_y + crop_height, sample_border, filter.radius);
+}
+
+Image to_image(const std::vector<double>& values, const Film& film) {
+  Image image(film.crop_width, film.crop_height, 3);
+  CHECK_EQ(values.size(), image.data.size());
+  for (size_t i = 0; i < values.size(); ++i) image.data[i] = static_cast<float>(values[i]);
+  return image;
 }
 
 }  // namespace limn

@@ -196,13 +196,6 @@ void update_shading_normals(Mesh& mesh) {
   }
 }
 
-void Bounds::extend(const Vec3d& p) {
-  for (int k = 0; k < 3; ++k) {
-    lower[k] = std::min(lower[k], p[k]);
-    upper[k] = std::max(upper[k], p[k]);
-  }
-}
-
 Bounds bounds_of(const Mesh& mesh) {
   Bounds bounds;
   for (const FaceIndices& f : mesh.faces) {

@@ -140,12 +140,4 @@ Mesh build_mesh(RawMesh raw, const MeshOptions& options, std::vector<std::string
   return mesh;
 }
 
-Mesh read_obj(const std::string& file, bool face_normals) {
-  return build_mesh(parse_obj(file), {Matrix4{}, face_normals, false}, nullptr);
-}
-
-Mesh read_ply(const std::string& file, bool face_normals) {
-  return build_mesh(parse_ply(file), {Matrix4{}, face_normals, false}, nullptr);
-}
-
 }  // namespace limn

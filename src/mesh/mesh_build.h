@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "limn/core/matrix.h"
 #include "limn/core/mesh.h"
-#include "limn/core/properties.h"
 
 namespace limn {
 
@@ -30,18 +30,5 @@ struct MeshOptions {
 // Faces whose corners coincide are left out. What was mended is appended to `warnings` (may be
 // null). InputError if no face is left or a position does not fit a float.
 Mesh build_mesh(RawMesh raw, const MeshOptions& options, std::vector<std::string>* warnings);
-
-RawMesh parse_obj(const std::string& file);
-RawMesh parse_ply(const std::string& file);
-// Obj or ply, by the ending of the file's name.
-bool is_mesh_file(const std::string& file);
-RawMesh parse_mesh(const std::string& file);
-
-// Mitsuba's built-in shapes: the square [-1, 1]^2 and the unit disk in z = 0 facing +Z, the cube
-// [-1, 1]^3, the unit sphere.
-RawMesh make_rectangle();
-RawMesh make_cube();
-RawMesh make_disk();
-RawMesh make_sphere();
 
 }  // namespace limn

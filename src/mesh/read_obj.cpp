@@ -9,7 +9,7 @@
 #include <streambuf>
 
 #include "src/base/text.h"
-#include "src/mesh/mesh_build.h"
+#include "src/mesh/mesh_file.h"
 
 namespace limn {
 

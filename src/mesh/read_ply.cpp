@@ -6,7 +6,7 @@
 #include <map>
 
 #include "src/base/text.h"
-#include "src/mesh/mesh_build.h"
+#include "src/mesh/mesh_file.h"
 
 namespace limn {
 

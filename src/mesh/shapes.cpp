@@ -3,7 +3,7 @@
 #include <cmath>
 #include <map>
 
-#include "src/mesh/mesh_build.h"
+#include "src/mesh/shapes.h"
 
 namespace limn {
 

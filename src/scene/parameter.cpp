@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "limn/core/check.h"
-#include "src/base/text.h"
+#include "limn/core/names.h"
 #include "src/scene/motion.h"
 #include "src/scene/motion_lists.h"
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "limn/core/names.h"
 #include "src/base/text.h"
 #include "src/scene_file/scene_tree.h"
 
@@ -62,8 +63,8 @@ class Describer {
       std::vector<std::string> known = kSceneObjectTags;
       known.insert(known.end(), {"alias", "default", "include", "path"});
       std::sort(known.begin(), known.end());
-      throw InputError(element.where, "<scene>: unknown element <" + element.name +
-                                          "> (known: " + join(known) + ")");
+      throw InputError(element.where, "<scene>: unknown element <" + element.name + "> (" +
+                                          known_names(known) + ")");
     }
   }
 
@@ -119,7 +120,7 @@ class Describer {
       known.push_back("ref");
       std::sort(known.begin(), known.end());
       throw InputError(element.where, object.tag + " \"" + object.type + "\": unknown element <" +
-                                          element.name + "> (known: " + join(known) + ")");
+                                          element.name + "> (" + known_names(known) + ")");
     }
   }
 
@@ -149,7 +150,7 @@ class Describer {
     std::vector<std::string> known;
     for (const auto& [name, object] : by_id_) known.push_back(name);
     throw InputError(where, "there is no object with the id \"" + id + "\" (" +
-                                (known.empty() ? "none has one" : "known: " + join(known)) + ")");
+                                known_names(known, "none has one") + ")");
   }
 
   void resolve(ObjectDescription& object) const {

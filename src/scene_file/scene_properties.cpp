@@ -2,16 +2,15 @@
 
 #include <algorithm>
 
-#include "src/base/text.h"
+#include "limn/core/names.h"
 #include "src/scene_file/scene_tree.h"
 
 namespace limn {
 
 namespace {
 
-std::string known_names(const std::set<std::string>& names) {
-  return names.empty() ? "none are known"
-                       : "known: " + join(std::vector<std::string>(names.begin(), names.end()));
+std::vector<std::string> sorted(const std::set<std::string>& names) {
+  return {names.begin(), names.end()};
 }
 
 }  // namespace
@@ -141,13 +140,13 @@ void DescribedProperties::check_all_used() const {
     first_name = name;
   }
   if (first) {
-    throw InputError(first->where, tag() + " \"" + type() + "\": unknown parameter \"" +
-                                       first_name + "\" (" + known_names(known_) + ")");
+    throw InputError(first->where, tag() + " \"" + type() + "\": " +
+                                       unknown_name("parameter", first_name, sorted(known_)));
   }
   for (const ChildDescription& child : object_.children) {
     if (known_tags_.count(child.object->tag)) continue;
     throw InputError(child.where, tag() + " \"" + type() + "\": takes no " + child.object->tag +
-                                      " (" + known_names(known_tags_) + ")");
+                                      " (" + known_names(sorted(known_tags_)) + ")");
   }
 }
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "limn/core/names.h"
 #include "src/base/text.h"
 
 namespace limn {
@@ -11,14 +12,9 @@ namespace {
 
 const BsdfMaker kNoBsdfs;
 
-std::string lower(std::string text) {
-  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return text;
-}
-
-[[noreturn]] void fail_unknown_type(const ObjectDescription& object, const std::string& known) {
-  throw InputError(object.where, "unknown " + object.tag + " type \"" + object.type +
-                                     "\" (known: " + known + ")");
+[[noreturn]] void fail_unknown_type(const ObjectDescription& object,
+                                    const std::vector<std::string>& known) {
+  throw InputError(object.where, unknown_name(object.tag + " type", object.type, known));
 }
 
 int bounded_integer(Properties& properties, const std::string& name, int64_t absent,
@@ -47,7 +43,7 @@ void read_filter(const ObjectDescription& object, const SceneDescription& scene,
     const double stddev = positive(p, "stddev", 0.5);
     filter = {Filter::Kind::kGaussian, 4 * stddev, stddev};
   } else {
-    fail_unknown_type(object, "box, gaussian, tent");
+    fail_unknown_type(object, {"box", "gaussian", "tent"});
   }
   p.check_all_used();
 }
@@ -55,11 +51,11 @@ void read_filter(const ObjectDescription& object, const SceneDescription& scene,
 // A string that must be one of `known`.
 std::string choice(Properties& properties, const std::string& name, const std::string& absent,
                    const std::vector<std::string>& known) {
-  const std::string word = lower(properties.string(name, absent));
+  const std::string word = lower_case(properties.string(name, absent));
   for (const std::string& k : known) {
     if (k == word) return word;
   }
-  properties.fail(name, "unknown value \"" + word + "\" (known: " + join(known) + ")");
+  properties.fail(name, unknown_name("value", word, known));
 }
 
 void read_crop(Properties& p, const Camera& camera, Film& film) {
@@ -75,7 +71,7 @@ void read_crop(Properties& p, const Camera& camera, Film& film) {
 }
 
 void read_film(const ObjectDescription& object, const SceneDescription& description, Scene& scene) {
-  if (object.type != "hdrfilm") fail_unknown_type(object, "hdrfilm");
+  if (object.type != "hdrfilm") fail_unknown_type(object, {"hdrfilm"});
   DescribedProperties p(object, description, kNoBsdfs);
   Film& film = scene.film;
   scene.camera.width = bounded_integer(p, "width", 768, 1);
@@ -96,7 +92,7 @@ void read_film(const ObjectDescription& object, const SceneDescription& descript
 
 void read_sampler(const ObjectDescription& object, const SceneDescription& description,
                   Scene& scene) {
-  if (object.type != "independent") fail_unknown_type(object, "independent");
+  if (object.type != "independent") fail_unknown_type(object, {"independent"});
   DescribedProperties p(object, description, kNoBsdfs);
   scene.sample_count = bounded_integer(p, "sample_count", 4, 1);
   const int64_t seed = p.integer("seed", 0);
@@ -112,7 +108,7 @@ double x_factor(Properties& p, const std::string& axis, double aspect) {
   if (axis == "diagonal") return 1 / std::sqrt(1 + 1 / (aspect * aspect));
   if (axis == "smaller") return aspect > 1 ? aspect : 1;
   if (axis == "larger") return aspect > 1 ? 1 : aspect;
-  p.fail("fov_axis", "unknown axis \"" + axis + "\" (known: diagonal, larger, smaller, x, y)");
+  p.fail("fov_axis", unknown_name("axis", axis, {"diagonal", "larger", "smaller", "x", "y"}));
 }
 
 // Field of view [degrees] of a focal length on 35 mm film, along its diagonal.
@@ -126,7 +122,7 @@ double fov_of_focal_length(Properties& p) {
 
 void read_fov(Properties& p, Camera& camera) {
   const double aspect = static_cast<double>(camera.width) / camera.height;
-  std::string axis = lower(p.string("fov_axis", "x"));
+  std::string axis = lower_case(p.string("fov_axis", "x"));
   double fov = 0;
   if (p.has("fov")) {
     if (p.has("focal_length")) p.fail("focal_length", "give either fov or focal_length, not both");
@@ -173,7 +169,7 @@ void read_axes(Properties& p, Camera& camera) {
 
 void read_sensor(const ObjectDescription& sensor, const SceneDescription& description,
                  Scene& scene) {
-  if (sensor.type != "perspective") fail_unknown_type(sensor, "perspective");
+  if (sensor.type != "perspective") fail_unknown_type(sensor, {"perspective"});
   DescribedProperties p(sensor, description, kNoBsdfs);
   Camera& camera = scene.camera;
   if (const ObjectDescription* film = p.nested("film")) {

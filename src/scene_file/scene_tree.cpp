@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <set>
 
-#include "src/base/text.h"
+#include "limn/core/names.h"
 
 namespace limn {
 
@@ -18,14 +18,10 @@ bool is_word(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
 }
 
-std::vector<std::string> names_of(const std::map<std::string, std::string>& map) {
-  std::vector<std::string> names;
-  for (const auto& [name, value] : map) names.push_back(name);
-  return names;
-}
-
 std::string known_parameters(const std::map<std::string, std::string>& values) {
-  return values.empty() ? "none are defined" : "known: " + join(names_of(values));
+  std::vector<std::string> names;
+  for (const auto& [name, value] : values) names.push_back(name);
+  return known_names(names, "none are defined");
 }
 
 class TreeLoader {
@@ -163,8 +159,8 @@ void check_attributes(const XmlElement& element, const std::vector<std::string>&
                       const std::vector<std::string>& required) {
   for (const XmlAttribute& a : element.attributes) {
     if (std::find(known.begin(), known.end(), a.name) == known.end()) {
-      throw InputError(a.where, "<" + element.name + ">: unknown attribute \"" + a.name +
-                                    "\" (known: " + join(known) + ")");
+      throw InputError(a.where,
+                       "<" + element.name + ">: " + unknown_name("attribute", a.name, known));
     }
   }
   for (const std::string& name : required) {

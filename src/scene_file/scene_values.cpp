@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "limn/core/names.h"
 #include "src/base/text.h"
 #include "src/scene_file/scene_tree.h"
 
@@ -171,8 +172,10 @@ PropertyValue parse_transform(const XmlElement& e) {
   for (const XmlElement& child : e.children) {
     const auto operation = transform_operations().find(child.name);
     if (operation == transform_operations().end()) {
-      throw InputError(child.where, "<transform>: unknown element <" + child.name +
-                                        "> (known: lookat, matrix, rotate, scale, translate)");
+      std::vector<std::string> known;
+      for (const auto& [name, parser] : transform_operations()) known.push_back(name);
+      throw InputError(child.where, "<transform>: unknown element <" + child.name + "> (" +
+                                        known_names(known) + ")");
     }
     if (!child.children.empty()) {
       throw InputError(child.children[0].where, "<" + child.name + "> takes no elements");
@@ -189,8 +192,7 @@ const XmlAttribute& value_of(const XmlElement& e) {
 
 PropertyValue parse_boolean(const XmlElement& e) {
   const XmlAttribute& a = value_of(e);
-  std::string word = a.value;
-  for (char& c : word) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  const std::string word = lower_case(a.value);
   if (word != "true" && word != "false") fail(a, e, "true or false");
   return word == "true";
 }

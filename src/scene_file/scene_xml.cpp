@@ -2,8 +2,11 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "limn/core/names.h"
 #include "limn/core/scene.h"
 #include "src/mesh/mesh_build.h"
+#include "src/mesh/mesh_file.h"
+#include "src/mesh/shapes.h"
 #include "src/scene_file/scene_properties.h"
 #include "src/scene_file/scene_sensor.h"
 
@@ -66,8 +69,7 @@ class SceneBuilder {
 
   void read_integrator(const ObjectDescription& object) {
     if (object.type != "path") {
-      throw InputError(object.where,
-                       "unknown integrator type \"" + object.type + "\" (known: path)");
+      throw InputError(object.where, unknown_name("integrator type", object.type, {"path"}));
     }
     DescribedProperties p(object, description_, make_nested_);
     const int64_t depth = p.integer("max_depth", -1);
@@ -143,8 +145,9 @@ class SceneBuilder {
     if (type == "cube") return make_cube();
     if (type == "disk") return make_disk();
     if (type != "sphere") {
-      throw InputError(p.where(), "unknown shape type \"" + type +
-                                      "\" (known: cube, disk, obj, ply, rectangle, sphere)");
+      throw InputError(
+          p.where(),
+          unknown_name("shape type", type, {"cube", "disk", "obj", "ply", "rectangle", "sphere"}));
     }
     return read_sphere(p, options);
   }

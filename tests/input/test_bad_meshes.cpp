@@ -106,7 +106,7 @@ std::string message_of(const TempFiles& files, const std::string& name,
                        const std::string& content) {
   const std::string file = files.write(name, content);
   try {
-    name.ends_with("ply") ? read_ply(file, false) : read_obj(file, false);
+    read_mesh(file, false);
   } catch (const InputError& error) {
     const std::string text = error.what();
     EXPECT_EQ(text.rfind(file, 0), 0u) << text;
@@ -190,7 +190,7 @@ TEST(MendedMesh, WarnsOfCollapsedFaces) {
 TEST(MendedMesh, KeepsFacesWithoutAreaWhoseCornersDiffer) {
   const TempFiles files;
   const std::string file = files.write("a.obj", kTriangle + "v 2 0 0\nf 1 2 3\nf 1 2 4\n");
-  const Mesh mesh = read_obj(file, false);
+  const Mesh mesh = read_mesh(file, false);
   EXPECT_EQ(mesh.faces.size(), 2u);
   EXPECT_EQ(mesh.collapsed_faces, 0u);
   // Only the face with an area shapes the normals.

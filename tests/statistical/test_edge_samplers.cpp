@@ -18,22 +18,43 @@ namespace {
 // Fixed seeds: a p-value below this, or a z-score beyond +-5 (chance 6e-7), is an error, not luck.
 constexpr double kSignificance = 1e-6;
 
-using Kind = LobeSummary::Kind;
+bool is_diffuse(const LobeSummary& lobe) { return lobe.model == &kHemisphere; }
+bool is_ggx(const LobeSummary& lobe) { return lobe.model == &ggx_lobe(); }
+bool is_beckmann(const LobeSummary& lobe) { return lobe.model == &beckmann_lobe(); }
 
-// What the bounds are made for: Lambert, and microfacets with Smith's separable G and F = albedo.
+// A lobe that the library does not know: a cosine's power about the mirror direction, whose width it
+// tells and which it takes for a GGX lobe.
+class PhongLobe final : public LobeModel {
+ public:
+  static double power(const LobeSummary& lobe) { return 2 / (lobe.alpha * lobe.alpha); }
+  Vec3d axis(const Vec3d& n, const Vec3d& wi) const override { return n * (2 * dot(n, wi)) - wi; }
+  double width(const LobeSummary& lobe) const override { return std::min(1.0, lobe.alpha); }
+  double bound(const LobeSummary& lobe, double, double cos_o, double cos_axis) const override {
+    if (cos_axis <= 0) return 0;
+    return lobe.albedo * (power(lobe) + 2) / (2 * kPi) * std::pow(cos_axis, power(lobe)) * cos_o;
+  }
+  std::optional<LtcRow> ltc(const LobeSummary& lobe) const override {
+    return LtcRow{LtcRow::Table::kGgx, lobe.alpha};
+  }
+};
+constexpr PhongLobe kPhong;
+bool is_phong(const LobeSummary& lobe) { return lobe.model == &kPhong; }
+
+// What the bounds are made for: Lambert, microfacets with Smith's separable G and F = albedo, and
+// the lobe above.
 double scattering(const EdgeQuery& q, const Vec3d& wo) {
   const double cos_o = dot(q.n, wo), cos_i = dot(q.n, q.wi), a = q.lobe.alpha;
   if (cos_o <= 0) return 0;
-  if (q.lobe.kind == Kind::kDiffuse) return q.lobe.albedo / kPi * cos_o;
+  if (is_phong(q.lobe)) return kPhong.bound(q.lobe, cos_i, cos_o, dot(kPhong.axis(q.n, q.wi), wo));
+  if (is_diffuse(q.lobe)) return q.lobe.albedo / kPi * cos_o;
   const double c = dot(q.n, normalize(q.wi + wo)), tan2 = (1 - c * c) / (c * c);
   const auto masking = [&](double cosine) {
     const double tangent = std::sqrt(1 - cosine * cosine) / cosine, x = 1 / (a * tangent);
-    if (q.lobe.kind == Kind::kGgx) return 2 / (1 + std::sqrt(1 + a * a * tangent * tangent));
+    if (is_ggx(q.lobe)) return 2 / (1 + std::sqrt(1 + a * a * tangent * tangent));
     return 1 / (1 + 0.5 * (std::erf(x) - 1) + std::exp(-x * x) / (2 * x * std::sqrt(kPi)));
   };
-  const double d = q.lobe.kind == Kind::kGgx
-                       ? a * a / (kPi * std::pow(c * c * (a * a - 1) + 1, 2))
-                       : std::exp(-tan2 / (a * a)) / (kPi * a * a * std::pow(c, 4));
+  const double d = is_ggx(q.lobe) ? a * a / (kPi * std::pow(c * c * (a * a - 1) + 1, 2))
+                                  : std::exp(-tan2 / (a * a)) / (kPi * a * a * std::pow(c, 4));
   return q.lobe.albedo * d * masking(cos_o) * masking(cos_i) / (4 * cos_i);
 }
 
@@ -57,7 +78,10 @@ double integral(const EdgeQuery& q, const EdgeSegment& s, int cells) {
 
 LobeSummary random_lobe(Rng& rng) {
   const double u = rng.uniform();
-  const Kind kind = u < 0.3 ? Kind::kDiffuse : u < 0.7 ? Kind::kGgx : Kind::kBeckmann;
+  const LobeModel& kind = u < 0.25   ? kHemisphere
+                          : u < 0.5  ? ggx_lobe()
+                          : u < 0.75 ? beckmann_lobe()
+                                     : static_cast<const LobeModel&>(kPhong);
   const double alpha = std::exp(std::log(1e-3) * rng.uniform());
   return {kind, alpha, 0.2 + 0.8 * rng.uniform()};
 }
@@ -126,7 +150,7 @@ TEST(EdgeBound, BoundsTheIntegralAndIsTightForShortEdges) {
     const EdgeBound bound(LobeBound(q.n, q.wi, q.lobe), s);
     const double fine = integral(q, s, 2000), coarse = integral(q, s, 1000);
     EXPECT_LE(fine, bound.total() + std::fabs(fine - coarse)) << i;
-    if (q.lobe.kind == Kind::kDiffuse && size < 0.01 && dot(q.n, s.w_0) > 0.1) {
+    if (is_diffuse(q.lobe) && size < 0.01 && dot(q.n, s.w_0) > 0.1) {
       EXPECT_GT(fine, 0.85 * bound.total()) << i;
     }
   }
@@ -203,11 +227,12 @@ TEST_P(EdgeSamplers, DrawAsTheyState) {
       if (expected.back() < 1e-6) expected.back() = 0;
       observed.assign(expected.size(), 0);
       for (int k = 0; k < kDraws; ++k) {
-        EdgeSample s;
-        if (!sampler->sample(q, rng, s)) {
+        const auto drawn = sampler->sample(q, rng);
+        if (!drawn) {
           ++observed.back();
           continue;
         }
+        const EdgeSample& s = *drawn;
         ++observed[begin[s.edge.object] + s.edge.edge];
         ASSERT_EQ(s.probability, sampler->probability(q, s.edge)) << name;
         ASSERT_EQ(s.pdf_t, sampler->pdf_t(q, s.edge, s.t)) << name;
@@ -248,9 +273,9 @@ TEST_P(EdgeSamplers, DensityAlongTheEdge) {
   const auto sampler = make(input);
   for (int i = 0; i < 40; ++i) {
     const EdgeQuery q = random_query(rng);
-    EdgeSample s;
-    if (!sampler->sample(q, rng, s)) continue;
-    const EdgeId edge = s.edge;
+    const auto first = sampler->sample(q, rng);
+    if (!first) continue;
+    const EdgeId edge = first->edge;
     constexpr int kBins = 20, kDraws = 5000, kFine = 500;
     std::vector<double> expected(kBins), observed(kBins);
     for (int b = 0; b < kBins * kFine; ++b)  // jittered: unbiased whatever the density's jumps
@@ -258,8 +283,9 @@ TEST_P(EdgeSamplers, DensityAlongTheEdge) {
           sampler->pdf_t(q, edge, (b + rng.uniform()) / (kBins * kFine)) / (kBins * kFine);
     double count = 0;
     for (int k = 0; k < 100 * kDraws && count < kDraws; ++k) {
-      if (!sampler->sample(q, rng, s) || !(s.edge == edge)) continue;
-      ++observed[std::min(kBins - 1, static_cast<int>(s.t * kBins))];
+      const auto s = sampler->sample(q, rng);
+      if (!s || !(s->edge == edge)) continue;
+      ++observed[std::min(kBins - 1, static_cast<int>(s->t * kBins))];
       ++count;
     }
     for (double& e : expected) e *= count;
@@ -275,8 +301,9 @@ TEST_P(EdgeSamplers, EstimateTheSumOverAllEdges) {
     const auto sampler = make(input);
     for (int i = 0; i < 6; ++i) {
       EdgeQuery q = random_query(rng);
-      // Beckmann's tail spans hundreds of decades if it is narrow: no variance to speak of.
-      q.lobe.alpha = std::max(q.lobe.alpha, q.lobe.kind == Kind::kBeckmann ? 0.4 : 0.05);
+      // Tails that span hundreds of decades if the lobe is narrow: no variance to speak of.
+      const bool long_tail = is_beckmann(q.lobe) || is_phong(q.lobe);
+      q.lobe.alpha = std::max(q.lobe.alpha, long_tail ? 0.4 : 0.05);
       double exact = 0;
       for_every_edge(input, [&](EdgeId id) {
         if (is_candidate(input.objects[id.object], id.edge, q.p))
@@ -284,11 +311,10 @@ TEST_P(EdgeSamplers, EstimateTheSumOverAllEdges) {
       });
       RunningMean estimate;
       for (int k = 0; k < 20000; ++k) {
-        EdgeSample s;
-        const bool drawn = sampler->sample(q, rng, s);
+        const auto s = sampler->sample(q, rng);
         const EdgeSegment segment =
-            drawn ? segment_of(input.objects[s.edge.object], s.edge.edge, q) : EdgeSegment{};
-        estimate.add(drawn ? integrand(q, segment, s.t) / (s.probability * s.pdf_t) : 0);
+            s ? segment_of(input.objects[s->edge.object], s->edge.edge, q) : EdgeSegment{};
+        estimate.add(s ? integrand(q, segment, s->t) / (s->probability * s->pdf_t) : 0);
       }
       if (exact > 0) {
         EXPECT_LT(std::fabs(estimate.z_score(exact)), 5) << name << " " << i;
@@ -322,9 +348,8 @@ TEST_P(EdgeSamplers, NeverDrawTheOwnFace) {
       }
     });
     for (int k = 0; k < 200; ++k) {
-      EdgeSample s;
-      if (sampler->sample(q, rng, s)) {
-        EXPECT_FALSE(is_own(s.edge));
+      if (const auto s = sampler->sample(q, rng)) {
+        EXPECT_FALSE(is_own(s->edge));
       }
     }
   }
@@ -336,10 +361,9 @@ TEST_P(EdgeSamplers, HoldWithoutEdges) {
   const EdgeSamplerInput still{{build_edge_mesh(cube_mesh(), true)}, {}, 1};
   EdgeQuery q = random_query(rng);
   q.velocity = {};
-  EdgeSample s;
-  EXPECT_FALSE(make(nothing)->sample(q, rng, s));
+  EXPECT_FALSE(make(nothing)->sample(q, rng));
   if (GetParam() == "brute") {
-    EXPECT_FALSE(make(still)->sample(q, rng, s));
+    EXPECT_FALSE(make(still)->sample(q, rng));
   }
 }
 
@@ -354,6 +378,11 @@ INSTANTIATE_TEST_SUITE_P(All, EdgeSamplers, testing::ValuesIn(sampler_names()),
                            std::replace(name.begin(), name.end(), '-', '_');
                            return name;
                          });
+
+TEST(EdgeSamplerTable, TheDefaultIsARowAndNoAblation) {
+  EXPECT_FALSE(default_edge_sampler().ablation);
+  EXPECT_NO_THROW(make_edge_sampler(default_edge_sampler().name, {}, 1));
+}
 
 TEST(EdgeSamplerTable, UnknownNamesListTheKnown) {
   try {

@@ -11,12 +11,13 @@
 #include "../support/running_mean.h"
 #include "edgetree/lobe/ltc.h"
 #include "edgetree/lobe/ltc_table.h"
+#include "limn/core/bsdf.h"
 #include "limn/core/rng.h"
 
 namespace limn {
 namespace {
 
-using Kind = LobeSummary::Kind;
+const LobeModel* const kModels[] = {&kHemisphere, &ggx_lobe(), &beckmann_lobe()};
 
 #include "edgetree/lobe/ltc_tables.inc"
 
@@ -38,7 +39,7 @@ struct Case {
 // All kinds, roughness over the whole range and beyond, also grazing views.
 Case random_case(Rng& rng) {
   Case c;
-  c.lobe.kind = static_cast<Kind>(static_cast<int>(3 * rng.uniform()));
+  c.lobe.model = kModels[static_cast<int>(3 * rng.uniform())];
   c.lobe.alpha = std::exp(std::log(1e-4) * rng.uniform()) * 1.5;
   c.lobe.albedo = 1;
   c.n = random_direction(rng);
@@ -101,11 +102,11 @@ TEST(LtcLobe, IntegratesToOne) {
 }
 
 std::shared_ptr<Bsdf> bsdf_of(const Case& c) {
-  if (c.lobe.kind == Kind::kDiffuse) return make_diffuse({1, 1, 1});
+  if (c.lobe.model == &kHemisphere) return make_diffuse({1, 1, 1});
   RoughConductorValues v;
   v.alpha = c.lobe.alpha;
-  v.distribution = c.lobe.kind == Kind::kGgx ? RoughConductorValues::Distribution::kGgx
-                                             : RoughConductorValues::Distribution::kBeckmann;
+  v.distribution = c.lobe.model == &ggx_lobe() ? RoughConductorValues::Distribution::kGgx
+                                               : RoughConductorValues::Distribution::kBeckmann;
   return make_roughconductor(v);
 }
 
@@ -131,8 +132,8 @@ TEST(LtcLobe, FitsAsWellAsTheTableStates) {
       const double value = f.value.r / lobe.norm();
       distance.add(f.pdf > 0 ? 2 * std::max(0.0, value - lobe.ltc(*w)) / f.pdf : 0);
     }
-    const double worst = c.lobe.kind == Kind::kDiffuse ? 0
-                         : c.lobe.kind == Kind::kGgx   ? kLtcWorstGgx
+    const double worst = c.lobe.model == &kHemisphere  ? 0
+                         : c.lobe.model == &ggx_lobe() ? kLtcWorstGgx
                                                        : kLtcWorstBeckmann;
     // A diffuse lobe is matched exactly, up to rounding; norm is interpolated.
     EXPECT_LT(distance.mean(), worst + 5 * distance.standard_error() + 1e-12)
@@ -265,12 +266,12 @@ BoxReference reference(const Case& c, const Vec3d& centre, const Vec3d& half, Rn
 // Log ratios of estimate and reference over boxes near the lobe, against those of the value at the
 // centre: a quarter of the second moment or less for microfacets, less for the smooth cosine.
 TEST(LtcBoxes, MeansBeatTheValueAtTheCentre) {
-  for (const Kind kind : {Kind::kDiffuse, Kind::kGgx, Kind::kBeckmann}) {
+  for (const LobeModel* model : kModels) {
     Rng rng(10, 0, 0);
     double moment = 0, moment_centre = 0;
     for (int i = 0; i < 250; ++i) {
       Case c = random_case(rng);
-      c.lobe.kind = kind;
+      c.lobe.model = model;
       c.lobe.alpha = 0.02 + 0.2 * rng.uniform();
       const double x = rng.uniform(), y = rng.uniform(), z = rng.uniform();
       const Vec3d half = normalize(Vec3d{x, y, z}) * (0.1 + 0.8 * rng.uniform());
@@ -285,8 +286,10 @@ TEST(LtcBoxes, MeansBeatTheValueAtTheCentre) {
       moment += std::pow(std::log(box_mean(lobe, centre, half) / mean), 2);
       moment_centre += std::pow(std::log(value / mean), 2);
     }
-    EXPECT_LT(moment, (kind == Kind::kDiffuse ? 1 : 0.25) * moment_centre)
-        << static_cast<int>(kind);
+    EXPECT_LT(moment, (model == &kHemisphere ? 1 : 0.25) * moment_centre)
+        << (model == &kHemisphere  ? "diffuse"
+            : model == &ggx_lobe() ? "ggx"
+                                   : "beckmann");
   }
 }
 
@@ -295,7 +298,7 @@ TEST(LtcBoxes, SmallBoxesHaveTheDensityOfTheirCentre) {
   Rng rng(9, 0, 0);
   for (int i = 0; i < 1000; ++i) {
     Case c = random_case(rng);
-    c.lobe.kind = Kind::kDiffuse;
+    c.lobe.model = &kHemisphere;
     const Vec3d w = random_direction(rng);
     const double mean = box_mean(c.ltc(), w, Vec3d{1, 1, 1} * 1e-9), value = c.ltc().value(w);
     EXPECT_NEAR(mean, value, 0x1p-20);

@@ -7,17 +7,18 @@
 #include "limn/core/environment.h"
 #include "limn/core/image.h"
 #include "limn/core/scene.h"
-#include "support/temporary_file.h"
+#include "support/temp_files.h"
 #include "support/test_properties.h"
 
 namespace limn::test {
 
 inline std::shared_ptr<Environment> make_envmap(const Image& image, double scale = 1,
                                                 const Matrix4& to_world = {}) {
-  const TemporaryFile file("map.exr");
-  write_exr(file.path(), image, false, {});
+  const TempFiles files;
+  const std::string file = files.path("map.exr");
+  write_exr(file, image, false, {});
   TestProperties properties("emitter", "envmap",
-                            {{"filename", file.path()}, {"scale", scale}, {"to_world", to_world}});
+                            {{"filename", file}, {"scale", scale}, {"to_world", to_world}});
   Scene scene;
   read_light(properties, scene, nullptr);
   return scene.environment;

@@ -392,8 +392,8 @@ TEST(Bsdf, TwoSidedHasTwoSides) {
   TestProperties pair("bsdf", "twosided", {},
                       {make_diffuse({0.5, 0.5, 0.5}), make_roughconductor({})});
   const auto both = make_bsdf(pair);
-  EXPECT_EQ(both->side(true)->lobe().kind, LobeSummary::Kind::kDiffuse);
-  EXPECT_EQ(both->side(false)->lobe().kind, LobeSummary::Kind::kBeckmann);
+  EXPECT_EQ(both->side(true)->lobe().model, &kHemisphere);
+  EXPECT_EQ(both->side(false)->lobe().model, &beckmann_lobe());
   EXPECT_EQ(both->parameters()[1].name, "back.alpha");
   EXPECT_EQ(make_diffuse({})->side(false), nullptr);
 }

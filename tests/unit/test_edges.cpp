@@ -325,5 +325,56 @@ TEST(Edges, SharpEdgesNeedAFaceInFront) {
   EXPECT_EQ(count(two_sided, {0.2, 0.3, 0.1}), 12);
 }
 
+TEST(EdgeMesh, IsValidForAllMeshes) {
+  for (const auto& [name, mesh] : test_meshes())
+    for (const bool black_behind : {false, true})
+      EXPECT_EQ(build_edge_mesh(mesh, black_behind).validate(), "") << name;
+  EXPECT_EQ(EdgeMesh(build_edge_mesh(make_mesh({}, {}), true)).validate(), "");
+}
+
+// Each change breaks one thing that validate names.
+TEST(EdgeMesh, CorruptedCopiesAreFound) {
+  using Change = void (*)(EdgeMesh&);
+  const std::pair<const char*, Change> changes[] = {
+      {"there are other than V tangents", [](EdgeMesh& m) { m.tangents.resize(1); }},
+      {"there are other than E + 1 offsets", [](EdgeMesh& m) { m.face_offsets.pop_back(); }},
+      {"offsets do not span the incident faces", [](EdgeMesh& m) { m.incident_faces.pop_back(); }},
+      {"an edge has no faces", [](EdgeMesh& m) { m.face_offsets[3] = m.face_offsets[4]; }},
+      {"an incident face is out of range", [](EdgeMesh& m) { m.incident_faces[2] = 1000; }},
+      {"a vertex is out of range", [](EdgeMesh& m) { m.edges[2].vertices[1] = 1000; }},
+      {"face 3: a plane's normal is not a unit vector", [](EdgeMesh& m) { m.planes[3].n.x += 1; }},
+      {"face 3: a plane without a normal has an offset", [](EdgeMesh& m) { m.planes[3].n = {}; }},
+      {"edge 0: its two ends are one vertex",
+       [](EdgeMesh& m) { m.edges[0].vertices[0] = m.edges[0].vertices[1]; }},
+      {"edge 2: edges are not sorted by their vertices",
+       [](EdgeMesh& m) { m.edges[2] = m.edges[1]; }},
+      {"edge 0: an end lies beyond the extent", [](EdgeMesh& m) { m.extent *= 0.5; }},
+      {"edge 4: its first face is not the first around it",
+       [](EdgeMesh& m) { std::swap(m.edges[4].faces[0], m.edges[4].faces[1]); }},
+      {"edge 4: its second face is not the second around it",
+       [](EdgeMesh& m) { m.edges[4].faces[1] = kNoFace; }},
+      {"edge 0: an end lies off the plane of a face around it",
+       [](EdgeMesh& m) { m.planes[m.edges[0].faces[0]].offset += 1e-12; }},
+      {"edge 5: a border has one face",
+       [](EdgeMesh& m) { m.edges[5].edge_class = EdgeClass::kBorder; }},
+      {"edge 5: a closed mesh has neither borders nor irregular edges",
+       [](EdgeMesh& m) { m.edges[5].edge_class = EdgeClass::kIrregular; }},
+      {"edge 5: only smooth and sharp edges are concave",
+       [](EdgeMesh& m) {
+         m.edges[5].edge_class = EdgeClass::kFlat;
+         m.edges[5].concave = true;
+       }},
+  };
+  Mesh mesh = icosphere_mesh(1);
+  set_test_tangents(mesh);
+  const EdgeMesh whole = build_edge_mesh(mesh, true);
+  ASSERT_EQ(whole.validate(), "");
+  for (const auto& [fault, change] : changes) {
+    EdgeMesh copy = whole;
+    change(copy);
+    EXPECT_EQ(copy.validate(), fault);
+  }
+}
+
 }  // namespace
 }  // namespace limn

@@ -192,9 +192,10 @@ void expect_error(const std::string& message, TestProperties properties) {
 }
 
 TEST(Environment, BadInputIsExplained) {
-  const test::TemporaryFile file("bad.exr");
+  const TempFiles files;
+  const std::string file = files.path("bad.exr");
   Image image(4, 3, 3);
-  write_exr(file.path(), image, false, {});
+  write_exr(file, image, false, {});
   expect_error(
       "unknown emitter type \"sunsky\" (known: constant, directional, envmap, point, spot)",
       {"emitter", "sunsky"});
@@ -202,13 +203,13 @@ TEST(Environment, BadInputIsExplained) {
   Matrix4 sheared;
   sheared.m[0][1] = 0.5;
   expect_error("an envmap can be rotated, not sheared",
-               {"emitter", "envmap", {{"filename", file.path()}, {"to_world", sheared}}});
+               {"emitter", "envmap", {{"filename", file}, {"to_world", sheared}}});
   expect_error("mis_compensation",
-               {"emitter", "envmap", {{"filename", file.path()}, {"mis_compensation", true}}});
+               {"emitter", "envmap", {{"filename", file}, {"mis_compensation", true}}});
   image.at(2, 1, 1) = std::numeric_limits<float>::quiet_NaN();
-  write_exr(file.path(), image, false, {});
-  expect_error(file.path() + ": error: the environment map's pixel (column 2, row 1) is not finite",
-               {"emitter", "envmap", {{"filename", file.path()}}});
+  write_exr(file, image, false, {});
+  expect_error(file + ": error: the environment map's pixel (column 2, row 1) is not finite",
+               {"emitter", "envmap", {{"filename", file}}});
 }
 
 }  // namespace

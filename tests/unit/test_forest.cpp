@@ -6,6 +6,8 @@
 
 #include "../support/meshes.h"
 #include "edgetree/forest/edge_forest.h"
+#include "edgetree/forest/forest_build.h"
+#include "edgetree/forest/forest_query.h"
 
 namespace limn {
 namespace {
@@ -120,6 +122,153 @@ TEST(Forest, DoesNotDependOnThreads) {
     EXPECT_EQ(one->list_silhouettes(p, a), seven->list_silhouettes(p, b));
     EXPECT_EQ(a, b);
   }
+}
+
+// Two objects of each kind.
+TEST(Forest, IsValidForAllMeshes) {
+  Rng rng(23, 0, 0);
+  for (const auto& [name, mesh] : meshes_of_all_kinds(rng)) {
+    Vec3d rows[3];
+    random_rotation(rng, rows);
+    const Mesh other = transformed(mesh, rows, 1e-3, {1e3, -1, 2});
+    const EdgeSamplerInput input{{build_edge_mesh(mesh, true), build_edge_mesh(other, false)}};
+    for (const EdgeMesh& object : input.objects) EXPECT_EQ(object.validate(), "") << name;
+    for (const uint32_t width : {2u, 5u, 8u}) {
+      const Forest forest = build_forest(input, 2, ForestConfig{.width = width});
+      EXPECT_EQ(forest.validate(input.objects), "") << name;
+    }
+  }
+}
+
+// Each change breaks one thing that validate names.
+TEST(Forest, CorruptedCopiesAreFound) {
+  using Change = void (*)(Forest&);
+  const std::pair<const char*, Change> changes[] = {
+      {"there are slots for other objects", [](Forest& f) { f.slots.pop_back(); }},
+      {"there are slots for other edges", [](Forest& f) { f.slots[0].pop_back(); }},
+      {"a node is out of range", [](Forest& f) { f.roots[0] = 1000; }},
+      {"a root has a parent", [](Forest& f) { f.head(f.roots[0]).parent = 0; }},
+      {"no root leads to an inner node", [](Forest& f) { f.inner.push_back(f.inner[0]); }},
+      {"no root leads to a node of edges", [](Forest& f) { f.edges.push_back(f.edges[0]); }},
+      {"two ways lead to a node", [](Forest& f) { f.roots.push_back(f.roots[0]); }},
+      {"a child has another parent", [](Forest& f) { f.head(f.inner[0].child[1]).parent = 0; }},
+      {"a child is of another tree", [](Forest& f) { f.head(f.inner[0].child[1]).object = 1; }},
+      {"a height is not its children's", [](Forest& f) { ++f.inner[0].head.height; }},
+      {"a node of edges is not at height 0", [](Forest& f) { f.edges[0].head.height = 1; }},
+      {"a speed is negative", [](Forest& f) { f.inner[0].speed[0] = -1; }},
+      {"a cover is negative", [](Forest& f) { f.inner[0].cover[2][0] = -1; }},
+      {"a child's box is empty", [](Forest& f) { f.inner[0].high[0] = 0; }},
+      {"a child's box does not hold its edges", [](Forest& f) { f.inner[0].low[0] += 200; }},
+      {"the rows of a dual box are not of unit length",
+       [](Forest& f) { f.inner[0].rows[0][1][0] *= 2; }},
+      {"a lane without an edge has a length", [](Forest& f) { f.edges[0].edge[0] = kNoChild; }},
+      {"an edge is in two lanes", [](Forest& f) { f.edges[0].edge[0] = f.edges[0].edge[1]; }},
+      {"an end is not the mesh's", [](Forest& f) { f.edges[0].ends[0][1][0] += 1; }},
+      {"an edge has no length", [](Forest& f) { f.edges[0].length[0] = 0; }},
+      {"a slot does not lead to its edge",
+       [](Forest& f) {
+         f.edges[0].edge[0] = kNoChild;
+         f.edges[0].length[0] = 0;
+       }},
+      {"an edge that may be a silhouette is in no node",
+       [](Forest& f) {
+         // Taken out without a trace, but for the edge itself.
+         EdgeNode& node = f.edges[0];
+         f.slots[node.head.object][node.edge[0]] = kNoParent;
+         node.edge[0] = kNoChild;
+         node.length[0] = 0;
+       }},
+  };
+  const EdgeMesh mesh = build_edge_mesh(with_smooth_normals(icosphere_mesh(2)), true);
+  const EdgeSamplerInput input{{mesh, mesh}};
+  const Forest whole = build_forest(input, 1, {});
+  ASSERT_EQ(whole.validate(input.objects), "");
+  for (const auto& [fault, change] : changes) {
+    Forest copy = whole;
+    change(copy);
+    EXPECT_EQ(copy.validate(input.objects), fault);
+  }
+}
+
+// A moving torus and a query that sees half of it.
+EdgeSamplerInput moving_torus(double scale) {
+  Mesh mesh = with_smooth_normals(torus_mesh(24, 12));
+  set_test_tangents(mesh);
+  for (Vec3f& x : mesh.positions) x = x * static_cast<float>(scale);
+  return {{build_edge_mesh(mesh, true)}};
+}
+
+// Scaling by a power of two commutes with every rounding: probabilities keep their bits.
+TEST(Forest, ProbabilitiesDoNotDependOnTheScale) {
+  const EdgeSamplerInput unit_input = moving_torus(1);
+  const auto unit = EdgeForest::build(unit_input, 1);
+  for (const int exponent : {-80, -40, -3, 10, 45, 60}) {
+    const double scale = std::ldexp(1.0, exponent);
+    const EdgeSamplerInput input = moving_torus(scale);
+    const auto scaled = EdgeForest::build(input, 1);
+    Rng rng(24, 0, 0);
+    for (int i = 0; i < 5; ++i) {
+      EdgeQuery query;
+      query.p = random_direction(rng) * 2.5;
+      query.n = query.wi = -normalize(query.p);
+      if (i % 2 == 1) query.lobe = {ggx_lobe(), 0.2, 1};
+      EdgeQuery moved = query;
+      moved.p = query.p * scale;
+      double sum = 0;
+      for (uint32_t e = 0; e < input.objects[0].edges.size(); ++e) {
+        const double probability = unit->probability(query, {0, e});
+        EXPECT_EQ(scaled->probability(moved, {0, e}), probability) << exponent << " " << e;
+        sum += probability;
+      }
+      EXPECT_GT(sum, 0.5) << exponent;
+    }
+  }
+}
+
+// Two floats hold a coordinate of p, scaled, to 2^-48 of it.
+TEST(Forest, QueriesKeepThePointToTwiceAFloat) {
+  Rng rng(25, 0, 0);
+  const Forest forest = build_forest(moving_torus(1), 1, {});
+  for (int i = 0; i < 100; ++i) {
+    EdgeQuery query;
+    query.p = random_direction(rng) * random_scale(rng);
+    const ForestQuery prepared(forest, nullptr, nullptr, query, {1, 1, 1, 1});
+    for (int k = 0; k < 3; ++k) {
+      const double x = query.p[k] * prepared.unit;
+      EXPECT_LE(std::fabs(double{prepared.p[0][k]} + prepared.p[1][k] - x), 0x1p-48 * std::fabs(x));
+    }
+  }
+}
+
+double lost_share(const EdgeForest& forest, const EdgeMesh& mesh, const EdgeQuery& query) {
+  double sum = 0;
+  for (uint32_t e = 0; e < mesh.edges.size(); ++e) sum += forest.probability(query, {0, e});
+  return 1 - sum;
+}
+
+// At a vertex all edges that end there pass for silhouettes, and none contributes. As many draws
+// are lost there as at a point nearby on the same face.
+TEST(Forest, LosesNoMoreDrawsAtAVertex) {
+  const EdgeSamplerInput input = moving_torus(1);
+  const Mesh torus = torus_mesh(24, 12);
+  const EdgeMesh& mesh = input.objects[0];
+  const auto forest = EdgeForest::build(input, 1);
+  double at_vertices = 0, nearby = 0;
+  int count = 0;
+  for (uint32_t face = 0; face < torus.faces.size(); face += 3) {
+    const FaceIndices& corners = torus.faces[face];
+    EdgeQuery query;
+    query.n = query.wi = mesh.planes[face].n;
+    query.object = 0;
+    query.face = face;
+    query.p = mesh.positions[corners[0]];
+    at_vertices += lost_share(*forest, mesh, query);
+    query.p = query.p * 0.98 + (mesh.positions[corners[1]] + mesh.positions[corners[2]]) * 0.01;
+    nearby += lost_share(*forest, mesh, query);
+    ++count;
+  }
+  printf("lost at vertices %g, nearby %g\n", at_vertices / count, nearby / count);
+  EXPECT_LE(at_vertices, nearby);
 }
 
 }  // namespace

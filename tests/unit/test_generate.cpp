@@ -5,9 +5,9 @@
 #include <cmath>
 #include <fstream>
 #include <map>
-#include <numeric>
 #include <sstream>
 
+#include "edgetree/edges/union_find.h"
 #include "limn/core/ray_tracer.h"
 #include "limn/edgetree/edges.h"
 #include "limn/integrators/crossings.h"
@@ -44,7 +44,7 @@ Mesh written(const Triangles& triangles, bool flat) {
   const TempFiles files;
   const std::string file = files.path("mesh.ply");
   write_triangles(file, triangles);
-  Mesh mesh = read_ply(file, flat);
+  Mesh mesh = read_mesh(file, flat);
   if (!flat) mesh.normal_source = NormalSource::kComputed;
   weld_positions(mesh);
   update_shading_normals(mesh);
@@ -53,18 +53,14 @@ Mesh written(const Triangles& triangles, bool flat) {
 
 // The part that each vertex belongs to, as the smallest id in it.
 std::vector<uint32_t> parts_of(const Triangles& mesh) {
-  std::vector<uint32_t> parent(mesh.positions.size());
-  std::iota(parent.begin(), parent.end(), 0u);
-  const auto root = [&](uint32_t v) {
-    while (parent[v] != v) v = parent[v] = parent[parent[v]];
-    return v;
-  };
+  UnionFind parts(mesh.positions.size());
   for (const auto& [a, b, c] : mesh.faces) {
-    const uint32_t least = std::min({root(a), root(b), root(c)});
-    for (const uint32_t v : {a, b, c}) parent[root(v)] = least;
+    const uint32_t least = std::min({parts.root(a), parts.root(b), parts.root(c)});
+    for (const uint32_t v : {a, b, c}) parts.join(v, least);
   }
-  for (uint32_t v = 0; v < parent.size(); ++v) parent[v] = root(v);
-  return parent;
+  std::vector<uint32_t> roots(mesh.positions.size());
+  for (uint32_t v = 0; v < roots.size(); ++v) roots[v] = parts.root(v);
+  return roots;
 }
 
 // Euler's V - E + F and six times the enclosed volume, of each part.

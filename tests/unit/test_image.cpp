@@ -11,12 +11,10 @@
 #include <limits>
 
 #include "limn/core/error.h"
-#include "support/temporary_file.h"
+#include "support/temp_files.h"
 
 namespace limn {
 namespace {
-
-using test::TemporaryFile;
 
 Image ramp(int width, int height, int channels) {
   Image image(width, height, channels);
@@ -33,15 +31,16 @@ std::string contents(const std::string& file) {
 
 TEST(Image, FloatExrKeepsEveryBit) {
   for (int channels : {1, 3}) {
-    const TemporaryFile file("float.exr");
+    const TempFiles files;
+    const std::string file = files.path("float.exr");
     const Image image = ramp(7, 5, channels);
-    write_exr(file.path(), image, false, {{"limn.seed", "seed 17 of the test"}});
-    const Image back = read_exr(file.path());
+    write_exr(file, image, false, {{"limn.seed", "seed 17 of the test"}});
+    const Image back = read_exr(file);
     EXPECT_EQ(back.width, 7);
     EXPECT_EQ(back.height, 5);
     EXPECT_EQ(back.channels, channels);
     EXPECT_EQ(back.data, image.data);
-    const std::vector<ImageAttribute> attributes = read_exr_attributes(file.path());
+    const std::vector<ImageAttribute> attributes = read_exr_attributes(file);
     ASSERT_EQ(attributes.size(), 1u);
     EXPECT_EQ(attributes[0].name, "limn.seed");
     EXPECT_EQ(attributes[0].value, "seed 17 of the test");
@@ -49,13 +48,14 @@ TEST(Image, FloatExrKeepsEveryBit) {
 }
 
 TEST(Image, HalfExrRoundsAndStaysFinite) {
-  const TemporaryFile file("half.exr");
+  const TempFiles files;
+  const std::string file = files.path("half.exr");
   Image image = ramp(6, 4, 3);
   image.data[5] = 1e9f;
   image.data[6] = -1e9f;
   image.data[7] = std::numeric_limits<float>::infinity();
-  write_exr(file.path(), image, true, {});
-  const Image back = read_exr(file.path());
+  write_exr(file, image, true, {});
+  const Image back = read_exr(file);
   EXPECT_EQ(back.data[5], 65504);
   EXPECT_EQ(back.data[6], -65504);
   EXPECT_TRUE(std::isinf(back.data[7]));
@@ -90,19 +90,19 @@ std::string error_of(F f) {
 }
 
 TEST(Image, BrokenFilesAreExplained) {
-  const TemporaryFile file("broken.exr");
-  const std::string& path = file.path();
-  const auto read = [&] { read_exr(path); };
-  EXPECT_EQ(error_of(read), path + ": error: cannot read: No such file or directory");
-  std::ofstream(path).close();
-  EXPECT_EQ(error_of(read), path + ": error: cannot read: the file is empty");
-  std::ofstream(path) << "P6 not an exr";
-  EXPECT_EQ(error_of(read), path + ": error: is not an OpenEXR image");
-  write_exr(path, ramp(200, 100, 3), false, {});
-  const std::string whole = contents(path);
+  const TempFiles files;
+  const std::string file = files.path("broken.exr");
+  const auto read = [&] { read_exr(file); };
+  EXPECT_EQ(error_of(read), file + ": error: cannot read: No such file or directory");
+  std::ofstream(file).close();
+  EXPECT_EQ(error_of(read), file + ": error: cannot read: the file is empty");
+  std::ofstream(file) << "P6 not an exr";
+  EXPECT_EQ(error_of(read), file + ": error: is not an OpenEXR image");
+  write_exr(file, ramp(200, 100, 3), false, {});
+  const std::string whole = contents(file);
   for (size_t size : {whole.size() * 9 / 10, whole.size() / 2, size_t{60}}) {
-    std::ofstream(path, std::ios::binary) << whole.substr(0, size);
-    EXPECT_EQ(error_of(read), path + ": error: the EXR file is truncated or damaged") << size;
+    std::ofstream(file, std::ios::binary) << whole.substr(0, size);
+    EXPECT_EQ(error_of(read), file + ": error: the EXR file is truncated or damaged") << size;
   }
   EXPECT_EQ(error_of([&] { write_exr("/no/such/folder/a.exr", ramp(2, 2, 3), true, {}); }),
             "/no/such/folder/a.exr: error: cannot write: no such folder");
@@ -112,12 +112,13 @@ TEST(Image, BrokenFilesAreExplained) {
 
 // Any prefix of a file is an error, never a crash or a picture.
 TEST(Image, EveryTruncationIsAnError) {
-  const TemporaryFile file("prefix.exr");
-  write_exr(file.path(), ramp(9, 40, 3), true, {});
-  const std::string whole = contents(file.path());
+  const TempFiles files;
+  const std::string file = files.path("prefix.exr");
+  write_exr(file, ramp(9, 40, 3), true, {});
+  const std::string whole = contents(file);
   for (size_t size = 0; size < whole.size(); size += 13) {
-    std::ofstream(file.path(), std::ios::binary) << whole.substr(0, size);
-    EXPECT_NE(error_of([&] { read_exr(file.path()); }), "no error") << size;
+    std::ofstream(file, std::ios::binary) << whole.substr(0, size);
+    EXPECT_NE(error_of([&] { read_exr(file); }), "no error") << size;
   }
 }
 
@@ -153,12 +154,13 @@ Picture read_picture(const std::string& file) {
 
 // sRGB: 0.5 is 188, 0.002 is 12.92 * 0.002 * 255 = 6.6.
 TEST(Image, PngIsSrgb) {
-  const TemporaryFile file("picture.png");
+  const TempFiles files;
+  const std::string file = files.path("picture.png");
   Image image(2, 2, 3);
   image.data = {0, 0.25f, 0.001f, 7, -1, std::nanf(""), 0.5f, 0.5f, 0.5f, 0.1f, 0, 0};
-  write_png(file.path(), image, 2);
-  EXPECT_EQ(contents(file.path()).substr(0, 4), "\x89PNG");
-  const Picture picture = read_picture(file.path());
+  write_png(file, image, 2);
+  EXPECT_EQ(contents(file).substr(0, 4), "\x89PNG");
+  const Picture picture = read_picture(file);
   EXPECT_EQ(picture.width, 2u);
   EXPECT_EQ(picture.height, 2u);
   const std::vector<png_byte> expected = {0, 188, 7, 255, 0, 0, 255, 255, 255, 124, 0, 0};
@@ -166,13 +168,14 @@ TEST(Image, PngIsSrgb) {
 }
 
 TEST(Image, SignedPngIsBlueWhiteRed) {
-  const TemporaryFile file("signed.png");
+  const TempFiles files;
+  const std::string file = files.path("signed.png");
   Image image(5, 1, 1);
   image.data = {0, 2, -2, 1, -100};
-  write_signed_png(file.path(), image, 2);
+  write_signed_png(file, image, 2);
   const std::vector<png_byte> expected = {255, 255, 255, 255, 0, 0, 0,  0,
                                           255, 255, 128, 128, 0, 0, 255};
-  EXPECT_EQ(read_picture(file.path()).rgb, expected);
+  EXPECT_EQ(read_picture(file).rgb, expected);
 }
 
 TEST(Image, SignedScaleIgnoresZerosAndTheBrightest) {

@@ -69,10 +69,32 @@ TEST(Includes, NothingPointsUpward) {
 // film, image or ray.
 TEST(Includes, EdgetreeSeesNoScene) {
   const std::vector<std::string> allowed = {
-      "limn/edgetree/",  "limn/core/mesh.h", "limn/core/vec.h",   "limn/core/dual.h",
-      "limn/core/rng.h", "limn/core/bsdf.h", "limn/core/error.h", "limn/core/parallel.h"};
+      "limn/edgetree/",     "limn/core/mesh.h",  "limn/core/vec.h",   "limn/core/dual.h",
+      "limn/core/rng.h",    "limn/core/lobe.h",  "limn/core/error.h", "limn/core/parallel.h",
+      "limn/core/bounds.h", "limn/core/check.h", "limn/core/names.h"};
   EXPECT_EQ(strays("edgetree", allowed), Strings{});
   EXPECT_EQ(strays("include/limn/edgetree", allowed), Strings{});
+}
+
+// The rooms of edgetree, each on top of what stands before it: nothing runs back up, nor sideways.
+TEST(Includes, RoomsOfEdgetreeInOrder) {
+  const std::map<std::string, std::set<std::string>> below = {
+      {"edges", {}},
+      {"lobe", {}},
+      {"light", {}},
+      {"rejection", {}},
+      {"baselines", {"lobe"}},
+      {"forest", {"edges", "lobe", "light"}},
+  };
+  for (const auto& [room, allowed] : below) {
+    for (const Include& include : includes_below("edgetree/" + room)) {
+      if (!include.path.starts_with("edgetree/")) continue;
+      const std::string rest = include.path.substr(std::string("edgetree/").size());
+      const std::string other = rest.substr(0, rest.find('/'));
+      EXPECT_TRUE(rest == "simd.h" || other == room || allowed.contains(other))
+          << include.file << " includes " << include.path;
+    }
+  }
 }
 
 // Headers inside src, edgetree, integrators and tools are private to that folder and named by their

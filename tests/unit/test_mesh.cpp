@@ -14,12 +14,12 @@ namespace {
 
 TEST(ReadObj, PolygonsNegativeIndicesAndOddSpacing) {
   const TempFiles files;
-  const Mesh mesh = read_obj(files.write("a.obj",
-                                         "# a square\r\nmtllib none.mtl\r\no square\r\n"
-                                         "v\t+0 0 0 1\r\nv 1e0 0 0\r\n  v 1 1 0\r\n"
-                                         "v 0 1.0 -0.0 0.5 0.5 0.5\r\nvt 0 0\r\ng x\r\n"
-                                         "usemtl none\r\ns 1\r\nf -4/1 -3/1 -2/1 -1/1"),
-                             false);
+  const Mesh mesh = read_mesh(files.write("a.obj",
+                                          "# a square\r\nmtllib none.mtl\r\no square\r\n"
+                                          "v\t+0 0 0 1\r\nv 1e0 0 0\r\n  v 1 1 0\r\n"
+                                          "v 0 1.0 -0.0 0.5 0.5 0.5\r\nvt 0 0\r\ng x\r\n"
+                                          "usemtl none\r\ns 1\r\nf -4/1 -3/1 -2/1 -1/1"),
+                              false);
   ASSERT_EQ(mesh.positions.size(), 4u);
   ASSERT_EQ(mesh.faces.size(), 2u);
   EXPECT_EQ(mesh.faces[0], (FaceIndices{0, 1, 2}));
@@ -31,10 +31,10 @@ TEST(ReadObj, PolygonsNegativeIndicesAndOddSpacing) {
 TEST(ReadObj, NumbersAreRoundedOnce) {
   const TempFiles files;
   const Mesh mesh =
-      read_obj(files.write("a.obj",
-                           "v 0.1 1e-40 16777217\nv 1 0 0\nv 0 1.00000017881393432617187499 0\n"
-                           "f 1 2 3\n"),
-               true);
+      read_mesh(files.write("a.obj",
+                            "v 0.1 1e-40 16777217\nv 1 0 0\nv 0 1.00000017881393432617187499 0\n"
+                            "f 1 2 3\n"),
+                true);
   EXPECT_EQ(mesh.positions[0].x, 0.1f);
   EXPECT_EQ(mesh.positions[0].y, 1e-40f);
   EXPECT_EQ(mesh.positions[0].z, 16777216.0f);
@@ -46,7 +46,7 @@ TEST(ReadObj, TheLocaleDoesNotMatter) {
   const TempFiles files;
   const std::string file = files.write("a.obj", "v 0.5 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   std::setlocale(LC_ALL, "de_DE.UTF-8");
-  EXPECT_EQ(read_obj(file, true).positions[0].x, 0.5f);
+  EXPECT_EQ(read_mesh(file, true).positions[0].x, 0.5f);
   std::setlocale(LC_ALL, "C");
 }
 
@@ -80,7 +80,7 @@ TEST(ReadPly, AllThreeFormatsAgree) {
     text += ascii ? "3 0 1 2 9\n"
                   : bytes<uint16_t>(3, big) + bytes<int32_t>(0, big) + bytes<int32_t>(1, big) +
                         bytes<int32_t>(2, big) + bytes<uint32_t>(9, big);
-    meshes.push_back(read_ply(files.write("a.ply", text), false));
+    meshes.push_back(read_mesh(files.write("a.ply", text), false));
     ASSERT_EQ(meshes.back().positions.size(), 3u) << format;
     for (int i = 0; i < 3; ++i) {
       EXPECT_EQ(meshes.back().positions[i], (Vec3f{x[i][0], x[i][1], x[i][2]})) << format;
@@ -98,8 +98,8 @@ const std::string kSeamPyramid =
 
 TEST(Weld, SeamCopiesShareNormalsAndHorizon) {
   const TempFiles files;
-  const Mesh whole = read_obj(files.write("a.obj", kPyramid), false);
-  const Mesh seam = read_obj(files.write("b.obj", kSeamPyramid), false);
+  const Mesh whole = read_mesh(files.write("a.obj", kPyramid), false);
+  const Mesh seam = read_mesh(files.write("b.obj", kSeamPyramid), false);
   EXPECT_EQ(seam.weld, (std::vector<uint32_t>{0, 1, 2, 3, 4, 0, 1}));
   ASSERT_EQ(seam.normals.size(), whole.normals.size());
   for (size_t f = 0; f < whole.faces.size(); ++f) {
@@ -112,7 +112,7 @@ TEST(Weld, SeamCopiesShareNormalsAndHorizon) {
 
 TEST(Normals, OfAPyramid) {
   const TempFiles files;
-  const Mesh mesh = read_obj(files.write("a.obj", kPyramid), false);
+  const Mesh mesh = read_mesh(files.write("a.obj", kPyramid), false);
   EXPECT_NEAR(length(mesh.normals[mesh.normal_ids[0][0]] - Vec3d{0, 0, 1}), 0, 1e-15);
   // Faces have normals (0, 2, 1)/sqrt(5) and so on: the tip tilts by acos(1/sqrt(5)). At a corner
   // two such faces meet: the normal (2, 2, 2)/.. has the cosine 3/sqrt(15) with each.
@@ -123,7 +123,7 @@ TEST(Normals, OfAPyramid) {
 
 TEST(Normals, DoNotDependOnTheScale) {
   const TempFiles files;
-  const Mesh mesh = read_obj(files.write("a.obj", kPyramid), false);
+  const Mesh mesh = read_mesh(files.write("a.obj", kPyramid), false);
   for (float scale : {0x1p-13f, 0x1p13f}) {
     Mesh scaled = mesh;
     for (Vec3f& p : scaled.positions) p = {p.x * scale, p.y * scale, p.z * scale};
@@ -136,10 +136,10 @@ TEST(Normals, DoNotDependOnTheScale) {
 TEST(Normals, TangentsMatchDifferences) {
   const TempFiles files;
   // Without symmetry, so that no maximum over faces is tied.
-  Mesh mesh = read_obj(files.write("a.obj",
-                                   "v 0.1 0.2 2\nv 1 1.3 0\nv -1 1 0.1\nv -1.2 -1 0\n"
-                                   "v 1 -0.8 0.3\nf 1 2 3\nf 1 3 4\nf 1 4 5\nf 1 5 2\n"),
-                       false);
+  Mesh mesh = read_mesh(files.write("a.obj",
+                                    "v 0.1 0.2 2\nv 1 1.3 0\nv -1 1 0.1\nv -1.2 -1 0\n"
+                                    "v 1 -0.8 0.3\nf 1 2 3\nf 1 3 4\nf 1 4 5\nf 1 5 2\n"),
+                        false);
   const Vec3d velocity[5] = {{1, 0.5, 0}, {0, 1, 2}, {-1, 0, 1}, {0.3, 0.7, 0}, {0, 0, -1}};
   const auto moved = [&](double h) {
     Mesh copy = mesh;

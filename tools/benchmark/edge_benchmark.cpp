@@ -28,7 +28,7 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// Of one thread, so that other work on the machine hardly counts.
+// The time of one thread, so that other work on the machine hardly counts.
 class Stopwatch {
  public:
   double seconds() const { return static_cast<double>(std::clock() - start_) / CLOCKS_PER_SEC; }
@@ -102,10 +102,7 @@ Draws measure_draws(const EdgeSampler& sampler, const std::vector<EdgeQuery>& qu
   Rng rng(2, 0, 0);
   const Stopwatch watch;
   for (int k = 0; k < repeat; ++k)
-    for (const EdgeQuery& q : queries) {
-      EdgeSample sample;
-      hits += sampler.sample(q, rng, sample);
-    }
+    for (const EdgeQuery& q : queries) hits += sampler.sample(q, rng).has_value();
   const double draws = static_cast<double>(queries.size()) * repeat;
   return {static_cast<double>(hits) / draws, watch.seconds() * 1e9 / draws};
 }
@@ -201,8 +198,8 @@ void measure(const std::string& name, const Mesh& mesh, std::span<const EdgeSamp
   fmt::print(fmt::runtime(row), "sampler", "build 1", "build 2", "B/edge", "hits", "effic.",
              "tests/", "draw", "glossy", "glossy");
   fmt::print(fmt::runtime(row), "", "[ms]", "[ms]", "", "", "", "silh.", "[ns]", "[ns]", "effic.");
-  const auto queries = queries_around(mesh, 500, {LobeSummary::Kind::kDiffuse, 1, 0.8});
-  const auto glossy = queries_around(mesh, 500, {LobeSummary::Kind::kGgx, 0.1, 0.8});
+  const auto queries = queries_around(mesh, 500, {});
+  const auto glossy = queries_around(mesh, 500, {ggx_lobe(), 0.1, 1});
   for (const EdgeSamplerType& type : types) measure(input, type, queries, glossy);
 }
 
@@ -213,9 +210,8 @@ int main(int argc, char** argv) {
   using namespace limn;
   for (int i = 1; i < argc; ++i) {
     const std::string file = argv[i];
-    const bool ply = file.size() > 4 && file.substr(file.size() - 4) == ".ply";
-    const Mesh mesh = ply ? read_ply(file, false) : read_obj(file, false);
-    measure(file.substr(file.find_last_of('/') + 1), smoothed(mesh), edge_sampler_types());
+    measure(file.substr(file.find_last_of('/') + 1), smoothed(read_mesh(file, false)),
+            edge_sampler_types());
   }
   if (argc > 1) return 0;
   for (int tube : {13, 41, 129, 408})

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "limn/core/error.h"
+#include "limn/core/names.h"
 #include "limn/core/parallel.h"
 #include "limn/core/parameter.h"
 #include "tools/limn/command_support.h"
@@ -66,8 +67,7 @@ void check_methods(const std::vector<std::string>& names, const std::vector<std:
     const auto row =
         std::find_if(known.begin(), known.end(), [&](const Row& r) { return r.name == name; });
     if (row == known.end()) {
-      throw InputError("--methods: unknown method \"" + name + "\" (known: " + row_names(true) +
-                       ")");
+      throw InputError("--methods: " + unknown_name("method", name, names_of(known)));
     }
     if (!seen.insert(name).second) {
       throw InputError("--methods: \"" + name + "\" is given twice");

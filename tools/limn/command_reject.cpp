@@ -1,3 +1,4 @@
+// limn reject: measures what samplers reject, draws it, writes pictures and figures.
 #include "tools/limn/command_reject.h"
 
 #include "tools/limn/commands.h"
@@ -27,15 +28,11 @@ json to_json(const Vec3d& v) { return {v.x, v.y, v.z}; }
 
 // ---- What is looked at.
 
-bool is_mesh_file(const std::string& file) {
-  return file.ends_with(".obj") || file.ends_with(".ply");
-}
-
 Scene scene_of_mesh(const std::string& file) {
   Scene scene;
   scene.file = file;
   Shape shape;
-  shape.mesh = file.ends_with(".ply") ? read_ply(file, false) : read_obj(file, false);
+  shape.mesh = read_mesh(file, false);
   shape.bsdf = make_diffuse({0.5, 0.5, 0.5});
   scene.shapes.push_back(std::move(shape));
   return scene;
@@ -119,7 +116,7 @@ Vec3d turned(const Vec3d& v, double degrees) {
   return {c * v.x - s * v.y, s * v.x + c * v.y, v.z};
 }
 
-// For legends.
+// The pictures' colours, for legends.
 json colors_json() {
   json colors = {{"edge_silhouette", css(kSilhouetteColor)},
                  {"edge_false_accept", css(kFalseAcceptColor)},
@@ -148,14 +145,14 @@ class Rejection {
   }
 
   int run() {
-    for (const EdgeSamplerType* type : types_)
-      if (!measure(*type)) break;
-    if (progress_ && is_done()) progress_(1);
-    if (variants_.empty()) {
+    measure_all();
+    if (measured_.empty()) {
       fmt::print(stderr, "\ninterrupted before the first method was done: nothing is written\n");
       return kInterrupted;
     }
-    write();
+    for (const Measured& method : measured_) write(method, draw(method));
+    write_png(file("overview.png"), draw_overview(), 1);
+    write_figures();
     if (!common_.quiet) print();
     if (command_.report) write_report(command_.output, common_.quiet);
     return status();
@@ -213,60 +210,98 @@ class Rejection {
     clay_ = reach_view_->picture();
   }
 
-  // False if interrupted: then nothing is kept of this method.
-  bool measure(const EdgeSamplerType& type) {
-    const auto sampler = type.make(input_, threads_);
-    const auto tree = sampler->rejection_tree();
-    if (node_edges_.empty()) choose_places(*tree);
-    RejectVariant v;
-    v.name = type.name;
-    v.description = type.description;
-    v.match = best_match(input_, *tree, node_edges_);
-    v.node = tree->nodes()[v.match.node];
-    std::vector<PlacedSlice> placed;
-    std::vector<Image> pictures;
-    for (const Slice& slice : slices_) {
-      auto verdicts = judge_slice(input_, *tree, v.match.node, slice, threads_);
-      v.slices.push_back(count(verdicts));
-      pictures.push_back(slice_picture(subject(), *tree, v.match.node, slice, verdicts));
-      placed.push_back({slice, std::move(verdicts)});
-      if (!go_on(0.3 * static_cast<double>(placed.size()))) return false;
+  // One method: its tree, what was found, and the verdicts over the slices.
+  struct Measured {
+    std::unique_ptr<EdgeSampler> sampler;
+    std::unique_ptr<RejectionTree> tree;
+    RejectVariant figures;
+    std::vector<PlacedSlice> slices;
+  };
+
+  void measure_all() {
+    for (const EdgeSamplerType* type : types_) {
+      std::optional<Measured> method = measure(*type);
+      if (!method) break;
+      measured_.push_back(std::move(*method));
     }
-    v.reach = reach_from(input_, *tree, point_);
-    v.counts = count_reach(input_, *tree, queries_, threads_);
-    if (!go_on(0.8)) return false;
-    v.hits = hit_rate(*sampler, queries_, kDraws, seed_, threads_);
-    const Image reach = reach_picture(*reach_view_, clay_, mesh(), v.reach, point_);
-    if (!go_on(0.95)) return false;
-    for (size_t i = 0; i < pictures.size(); ++i)
-      write_png(file(slice_file(v.name, i)), pictures[i], 1);
-    write_png(file(edges_file(v.name)), reach, 1);
-    if (variants_.empty()) write_png(file("overview.png"), overview(placed), 1);
-    variants_.push_back(std::move(v));
-    return true;
+    if (progress_ && is_done()) progress_(1);
   }
 
-  bool is_done() const { return variants_.size() == types_.size(); }
+  // Nothing if interrupted.
+  std::optional<Measured> measure(const EdgeSamplerType& type) {
+    Measured method;
+    method.sampler = type.make(input_, threads_);
+    method.tree = method.sampler->rejection_tree();
+    const RejectionTree& tree = *method.tree;
+    if (node_edges_.empty()) choose_places(tree);
+    RejectVariant& v = method.figures;
+    v.name = type.name;
+    v.description = type.description;
+    v.match = best_match(input_, tree, node_edges_);
+    v.node = tree.nodes()[v.match.node];
+    for (const Slice& slice : slices_) {
+      method.slices.push_back({slice, judge_slice(input_, tree, v.match.node, slice, threads_)});
+      v.slices.push_back(count(method.slices.back().verdicts));
+      if (!go_on(0.2 * static_cast<double>(method.slices.size()))) return std::nullopt;
+    }
+    v.reach = reach_from(input_, tree, point_);
+    v.counts = count_reach(input_, tree, queries_, threads_);
+    if (!go_on(0.8)) return std::nullopt;
+    v.hits = hit_rate(*method.sampler, queries_, kDraws, seed_, threads_);
+    if (!go_on(0.95)) return std::nullopt;
+    return method;
+  }
+
+  struct Pictures {
+    std::vector<Image> slices;
+    Image edges;
+  };
+  Pictures draw(const Measured& method) const {
+    const RejectVariant& v = method.figures;
+    Pictures pictures;
+    for (const auto& [slice, verdicts] : method.slices)
+      pictures.slices.push_back(
+          slice_picture(subject(), *method.tree, v.match.node, slice, verdicts));
+    pictures.edges = reach_picture(*reach_view_, clay_, mesh(), v.reach, point_);
+    return pictures;
+  }
+
+  void write(const Measured& method, const Pictures& pictures) const {
+    const std::string& name = method.figures.name;
+    for (size_t i = 0; i < pictures.slices.size(); ++i)
+      write_png(file(slice_file(name, i)), pictures.slices[i], 1);
+    write_png(file(edges_file(name)), pictures.edges, 1);
+  }
+
+  bool is_done() const { return measured_.size() == types_.size(); }
 
   // Tells how much of the current method is done; false if interrupted.
   bool go_on(double part) const {
     if (progress_)
-      progress_((static_cast<double>(variants_.size()) + part) /
+      progress_((static_cast<double>(measured_.size()) + part) /
                 static_cast<double>(types_.size()));
     return !interrupt_flag().load();
   }
 
-  Image overview(const std::vector<PlacedSlice>& placed) const {
+  // With the verdicts of the first method.
+  Image draw_overview() const {
     std::vector<Vec3d> shown = mesh().positions;
     for (const Slice& slice : slices_)
       for (int k = 0; k < 4; ++k)
         shown.push_back(slice.point(k % 2 * slice.size, k / 2 * slice.size));
     const Vec3d view = patch_.across * 0.75 + patch_.bend * 0.6 + patch_.normal * 0.35;
     const Camera camera = camera_for(shown, view, command_.up, command_.size);
-    return overview_picture({scene_, *tracer_, camera, threads_}, mesh(), node_edges_, placed);
+    return overview_picture({scene_, *tracer_, camera, threads_}, mesh(), node_edges_,
+                            measured_[0].slices);
   }
 
-  void write() const {
+  std::vector<RejectVariant> variants() const {
+    std::vector<RejectVariant> all;
+    for (const Measured& method : measured_) all.push_back(method.figures);
+    return all;
+  }
+
+  void write_figures() const {
     json report = {
         {"kind", "reject"},
         {"command", command_.command_line},
@@ -281,24 +316,25 @@ class Rejection {
         {"points", queries_.size()},
         {"colors", colors_json()},
         {"status", is_done() ? "done" : "interrupted"}};
-    for (const RejectVariant& variant : variants_) report["variants"].push_back(to_json(variant));
+    const std::vector<RejectVariant> all = variants();
+    for (const RejectVariant& variant : all) report["variants"].push_back(to_json(variant));
     write_json(file("reject.json"), report.dump(2));
-    write_json(file("reject.csv"), summary_csv(variants_));
-    write_json(file("reject_by_depth.csv"), depth_csv(variants_));
+    write_json(file("reject.csv"), summary_csv(all));
+    write_json(file("reject_by_depth.csv"), depth_csv(all));
   }
 
   void print() const {
     fmt::print("{}: {} edges; node {} of {}, at depth {}, has {}\n", common_.scene,
                mesh().edges.size(), node_, types_[0]->name, node_depth_, node_edges_.size());
-    print_tables(variants_);
+    print_tables(variants());
   }
 
   int status() const {
     int result = is_done() ? kSuccess : kInterrupted;
     if (result == kInterrupted)
-      fmt::print(stderr, "interrupted: {} of {} methods are done\n", variants_.size(),
+      fmt::print(stderr, "interrupted: {} of {} methods are done\n", measured_.size(),
                  types_.size());
-    for (const RejectVariant& variant : variants_) {
+    for (const RejectVariant& variant : variants()) {
       if (variant.missed() == 0) continue;
       fmt::print(
           stderr,
@@ -328,7 +364,7 @@ class Rejection {
   Vec3d point_;
   std::optional<MeshView> reach_view_;
   Image clay_;
-  std::vector<RejectVariant> variants_;
+  std::vector<Measured> measured_;
 };
 
 class RejectProgram final : public Command {

@@ -23,12 +23,6 @@ struct Scales {
   double error = 1;
 };
 
-Image to_image(const std::vector<double>& values, const Film& film) {
-  Image image(film.crop_width, film.crop_height, 3);
-  for (size_t i = 0; i < values.size(); ++i) image.data[i] = static_cast<float>(values[i]);
-  return image;
-}
-
 std::vector<double> minus(std::vector<double> a, const std::vector<double>& b) {
   for (size_t i = 0; i < a.size(); ++i) a[i] -= b[i];
   return a;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "limn/core/dual.h"
+#include "limn/core/lobe.h"
 #include "limn/core/vec.h"
 
 namespace limn {
@@ -22,14 +23,6 @@ struct ParameterRef {
   std::string name;
   std::vector<Dual*> values;  // one, or the three channels
   enum class Unit { kValue, kLength, kRadians } unit = Unit::kValue;
-};
-
-// What an edge sampler may know of a BSDF without seeing it.
-struct LobeSummary {
-  enum class Kind { kDiffuse, kGgx, kBeckmann };
-  Kind kind = Kind::kDiffuse;
-  double alpha = 1;   // roughness of the microfacet kinds
-  double albedo = 0;  // upper bound of the directional albedo over channels and directions
 };
 
 // A value and the density of `sample` at one pair of directions.
@@ -61,7 +54,8 @@ class Bsdf {
   // treated as a front with reversed normals.
   virtual const Bsdf* side(bool front) const { return front ? this : nullptr; }
 
-  virtual LobeSummary lobe() const = 0;
+  // What edge samplers go by. The default knows nothing: the hemisphere.
+  virtual LobeSummary lobe() const { return {}; }
   virtual std::vector<ParameterRef> parameters() = 0;
   virtual std::shared_ptr<Bsdf> clone() const = 0;  // deep
   // The BSDFs inside this one, so that a copy of a scene can share what the original shares.

@@ -1,7 +1,8 @@
 #pragma once
 // The film: which pixels are made, and the reconstruction filter that defines them.
-#include <string>
+#include <vector>
 
+#include "limn/core/image.h"
 #include "limn/core/rng.h"
 
 namespace limn {
@@ -42,5 +43,8 @@ struct Film {
   Range range_x(int pixel) const;
   Range range_y(int pixel) const;
 };
+
+// crop_height by crop_width by 3 values as an image of the film's size.
+Image to_image(const std::vector<double>& values, const Film& film);
 
 }  // namespace limn

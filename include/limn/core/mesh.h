@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "limn/core/bounds.h"
 #include "limn/core/dual.h"
 #include "limn/core/error.h"
 #include "limn/core/vec.h"
@@ -62,22 +63,17 @@ void weld_positions(Mesh& mesh);
 // crease.
 void update_shading_normals(Mesh& mesh);
 
-// Axis-aligned bounds of all positions referenced by faces.
-struct Bounds {
-  Vec3d lower{1e300, 1e300, 1e300};
-  Vec3d upper{-1e300, -1e300, -1e300};
-  void extend(const Vec3d& p);
-  Vec3d center() const { return (lower + upper) * 0.5; }
-  double diagonal() const { return length(upper - lower); }
-};
+// Bounds of all positions referenced by faces.
 Bounds bounds_of(const Mesh& mesh);
 
-// Mesh files. Both throw InputError (missing file, malformed line, index out of range, non-finite
+// Mesh files: obj or ply, by the ending of the file's name (in small or capital letters).
+bool is_mesh_file(const std::string& file);
+
+// The mesh of a file (obj, unless the ending is ply). InputError (missing file, malformed line, index out of range, non-finite
 // position, no faces, non-triangle PLY face, ...) with the file and, where it can be known, the
 // line. Polygons of OBJ files are fanned from their first corner. Texture coordinates are read
 // past: nothing in limn uses them. `face_normals` ignores normals of the file.
-Mesh read_obj(const std::string& file, bool face_normals);
-Mesh read_ply(const std::string& file, bool face_normals);
+Mesh read_mesh(const std::string& file, bool face_normals);
 
 // Positions of a mesh file (obj or ply), or of a text file with "x y z" lines, in file order: a
 // velocity field.

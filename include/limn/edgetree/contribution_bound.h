@@ -3,7 +3,7 @@
 // and radiance aside, and a density for the point on it that follows this bound.
 #include <array>
 
-#include "limn/core/bsdf.h"
+#include "limn/core/lobe.h"
 #include "limn/edgetree/edge_sampler.h"
 
 namespace limn {
@@ -15,7 +15,7 @@ struct EdgeSegment {
 };
 EdgeSegment segment_of(const EdgeMesh& mesh, uint32_t edge, const EdgeQuery& query);
 
-// Upper bound of the scattering function over an arc of directions.
+// Upper bound of the scattering function over an arc of directions, for one viewer.
 class LobeBound {
  public:
   // n: unit; wi: unit, n.wi > 0
@@ -23,20 +23,15 @@ class LobeBound {
 
   // Over the shorter great arc from u_a to u_b (unit) [1/sr].
   double over_arc(const Vec3d& u_a, const Vec3d& u_b) const;
-  // Where the lobe peaks, unit, and the angle at which it has fallen notably.
+  // See LobeModel.
   const Vec3d& axis() const { return axis_; }
   double width() const { return width_; }
   const Vec3d& n() const { return n_; }
 
  private:
-  double distribution(double cos_squared) const;
-  double masking(double cos_theta) const;
-
   Vec3d n_, axis_;
   LobeSummary lobe_;
-  double width_;
-  double masking_wi_ = 1;
-  double scale_;
+  double width_, cos_i_;
 };
 
 // The part of an edge above the horizon n.w > 0, cut into pieces that are short against the lobe.
@@ -82,8 +77,8 @@ class EdgeBound {
   Vec3d tangent_{};                      // unit, at u_a towards u_b
 
   int pieces_ = 0;
-  std::array<double, kMaxPieces + 1>
-      cuts_;  // angles from u_a, ascending; the last only if there are several pieces
+  // Angles from u_a, ascending; the last only if there are several pieces.
+  std::array<double, kMaxPieces + 1> cuts_;
   std::array<double, kMaxPieces> weights_;
   std::array<double, kMaxPieces + 1> cumulative_;  // of the weights, from 0
   double total_ = 0;

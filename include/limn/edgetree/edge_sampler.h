@@ -5,10 +5,11 @@
 // The contract of those who choose; the table of them is edge_sampler_types.h.
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
-#include "limn/core/bsdf.h"
 #include "limn/core/light.h"
+#include "limn/core/lobe.h"
 #include "limn/core/rng.h"
 #include "limn/edgetree/edges.h"
 #include "limn/edgetree/radiance_pyramid.h"
@@ -16,18 +17,12 @@
 
 namespace limn {
 
-struct EdgeId {
-  uint32_t object = UINT32_MAX;  // index of the EdgeMesh
-  uint32_t edge = UINT32_MAX;    // index in its edges
-  bool operator==(const EdgeId&) const = default;
-};
-
 // Everything about the shading point that a sampler may use.
 struct EdgeQuery {
   Vec3d p;                 // world space
   Vec3d n;                 // unit normal of the scattering function, n.wi > 0
   Vec3d wi;                // unit, towards the viewer
-  LobeSummary lobe;        // bound of the scattering function
+  LobeSummary lobe;        // of the scattering function
   Vec3<Lanes> velocity{};  // of p, per parameter; an edge's velocity relative to p counts
   // The face that p lies on: its edges lie on p's horizon, where the scattering function is zero,
   // and are never drawn.
@@ -72,11 +67,11 @@ class EdgeSampler {
  public:
   virtual ~EdgeSampler() = default;
 
-  // Draws an edge of E(p) (never one of the query's own face) and a point on it. False if the draw
-  // ends without one; that happens with the probability that is missing from the sum of
+  // Draws an edge of E(p) (never one of the query's own face) and a point on it. Nothing if the
+  // draw ends without one; that happens with the probability that is missing from the sum of
   // `probability` over all edges, and counts as a sample of value zero. Thread-safe, no allocation
   // that grows per query.
-  virtual bool sample(const EdgeQuery& query, Rng& rng, EdgeSample& sample) const = 0;
+  virtual std::optional<EdgeSample> sample(const EdgeQuery& query, Rng& rng) const = 0;
 
   // P(e) for this query, without sampling: what `sample` reports when it returns this edge. Zero
   // only where the edge cannot contribute.

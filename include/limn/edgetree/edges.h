@@ -1,9 +1,10 @@
 #pragma once
-// The edges of a mesh, their classes, and the exact test whether radiance may jump across one as
-// seen from a point.
+// The edges of a mesh, their classes, and E(p): the set of edges across which radiance may jump as
+// seen from a point p.
 #include <array>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "limn/core/dual.h"
@@ -13,13 +14,17 @@
 namespace limn {
 
 enum class EdgeClass : uint8_t {
-  kSmooth,  // two faces, shading normals continuous: a jump only where it is a silhouette
-  kSharp,   // two faces, shading normals differ: a jump for every point that sees one of the faces
-  kBorder,  // one face: a jump for every point
-  kIrregular,  // more than two faces, or two that wind the same way: treated as a jump for every
-               // point
-  kFlat,  // two coplanar faces (exactly, or to rounding) with equal shading normals: never a jump
-          // but on their common plane
+  // Two faces, shading normals continuous: a jump only where it is a silhouette.
+  kSmooth,
+  // Two faces, shading normals differ: a jump for every point that sees one of the faces.
+  kSharp,
+  // One face: a jump for every point.
+  kBorder,
+  // More than two faces, or two that wind the same way: treated as a jump for every point.
+  kIrregular,
+  // Two coplanar faces (exactly, or to rounding) with equal shading normals: never a jump but on
+  // their common plane.
+  kFlat,
 };
 
 const char* edge_class_name(EdgeClass edge_class);
@@ -45,13 +50,13 @@ struct Plane {
 // The edges of one mesh (an object), with all that a query needs. Welded: copies of a vertex along
 // a texture seam are one vertex.
 struct EdgeMesh {
-  std::vector<Vec3d> positions;        // V, world space, the floats that Embree sees
-  std::vector<Vec3<Lanes>> tangents;   // V; empty where nothing moves
-  std::vector<Plane> planes;           // F, outward, double precision
-  std::vector<Edge> edges;             // E
+  std::vector<Vec3d> positions;       // V, world space, the floats that Embree sees
+  std::vector<Vec3<Lanes>> tangents;  // V; empty where nothing moves
+  std::vector<Plane> planes;          // F, outward, double precision
+  std::vector<Edge> edges;            // E
+  // The faces around edge e: incident_faces[face_offsets[e], face_offsets[e + 1]).
   std::vector<uint32_t> face_offsets;  // E + 1
-  std::vector<uint32_t>
-      incident_faces;  // the faces around edge e: [face_offsets[e], face_offsets[e + 1])
+  std::vector<uint32_t> incident_faces;
   // The mesh is closed and its surfaces are black from behind: a point that sees only back faces
   // sees no jump at a sharp edge, and concave edges are never silhouettes from outside.
   // Holds if every connected part encloses positive volume (a part turned inside out, or the cavity
@@ -64,6 +69,15 @@ struct EdgeMesh {
             face_offsets[edge + 1] - face_offsets[edge]};
   }
   uint64_t count(EdgeClass edge_class) const;
+  // The first of the above that does not hold, in words; empty if all of it does.
+  std::string validate() const;
+};
+
+// An edge of a scene.
+struct EdgeId {
+  uint32_t object = UINT32_MAX;  // index of the EdgeMesh
+  uint32_t edge = UINT32_MAX;    // index in its edges
+  bool operator==(const EdgeId&) const = default;
 };
 
 // mesh.weld must be filled. black_behind: the mesh's BSDF is black from behind. Faces without area

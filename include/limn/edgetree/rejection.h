@@ -1,5 +1,6 @@
 #pragma once
-// How well a sampler's rejection test does: against the exact test of every edge, in numbers.
+// How well a sampler's rejection test does: against the exact test of every edge, in numbers. E(p),
+// the edges across which radiance may jump as seen from p, is what edges.h defines.
 #include <array>
 #include <cstdint>
 #include <span>
@@ -23,7 +24,7 @@ Verdict judge(const EdgeSamplerInput& input, const RejectionTree& tree, uint32_t
 struct Slice {
   Vec3d center, right, up;  // right, up: of equal length, at right angles
   int size = 0;             // rows of `size` pixels
-  // Of a position in pixels; those of centres are halves.
+  // The point at a position in pixels; those of centres are halves.
   Vec3d point(double x, double y) const {
     return center + right * (2 * x / size - 1) + up * (1 - 2 * y / size);
   }
@@ -44,7 +45,7 @@ struct DepthCounts {
 struct Reach {
   std::vector<EdgeId> silhouettes;    // where a descent can end, in E(p)
   std::vector<EdgeId> false_accepts;  // where a descent can end, not in E(p)
-  std::vector<EdgeId> dead_ends;  // of nodes that are accepted while all nodes below are rejected
+  std::vector<EdgeId> dead_ends;  // in nodes that are accepted while all nodes below are rejected
   std::vector<EdgeId> missed;     // in E(p), but no descent can end there
   std::vector<DepthCounts> by_depth;  // [0] is depth 1
 };
@@ -63,8 +64,8 @@ ReachCounts count_reach(const EdgeSamplerInput& input, const RejectionTree& tree
 // another direction.
 std::vector<EdgeQuery> queries_around(const EdgeMesh& mesh, int count, uint64_t seed);
 
-// The share of draws that end on an edge of E(p), and its standard error: over the queries, of
-// their shares of `draws` draws each.
+// The hit rate, which is the share of draws that end on an edge of E(p), and its standard error:
+// over the queries, of their shares of `draws` draws each.
 struct HitRate {
   double mean = 0, standard_error = 0;
 };

@@ -7,8 +7,8 @@
 
 namespace limn {
 
-// Of the nodes with about `edges` edges (within a factor of 3/2, or else the nearest), the one that
-// holds edges of E(p) for about half of the queries: a patch curved enough to be accepted often and
+// A node with about `edges` edges (within a factor of 3/2, or else the nearest): the one that holds
+// edges of E(p) for about half of the queries: a patch curved enough to be accepted often and
 // flat enough to be rejected often. The tree has a node.
 uint32_t balanced_node(const EdgeSamplerInput& input, const RejectionTree& tree, uint32_t edges,
                        std::span<const EdgeQuery> queries);

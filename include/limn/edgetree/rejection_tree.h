@@ -5,10 +5,9 @@
 #include <vector>
 
 #include "limn/core/vec.h"
+#include "limn/edgetree/edges.h"
 
 namespace limn {
-
-struct EdgeId;
 
 // A set of edges that one test rejects or accepts as a whole.
 struct RejectionNode {
@@ -27,7 +26,9 @@ class RejectionTree {
   // Depth first.
   std::span<const RejectionNode> nodes() const { return nodes_; }
   std::span<const EdgeId> edges() const { return edges_; }
-  std::span<const EdgeId> edges(uint32_t node) const;
+  std::span<const EdgeId> edges(uint32_t node) const {
+    return edges().subspan(nodes_[node].begin, nodes_[node].end - nodes_[node].begin);
+  }
 
   // Whether the test finds that no edge of the node can be in E(p), by the code that sampling runs.
   // Horizon, motion and the test of an edge after it is drawn are left out. Thread-safe.

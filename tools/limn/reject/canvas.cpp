@@ -1,3 +1,4 @@
+// Lines, discs and polygons, smoothed by coverage.
 #include "tools/limn/reject/canvas.h"
 
 #include <fmt/format.h>

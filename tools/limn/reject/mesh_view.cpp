@@ -1,3 +1,4 @@
+// A mesh in grey clay, seen through a pinhole, with edges drawn over it.
 #include "tools/limn/reject/mesh_view.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// The figures of limn reject as JSON, CSV and tables.
 #include "tools/limn/reject/reject_figures.h"
 
 #include <fmt/format.h>

@@ -31,7 +31,7 @@ nlohmann::json to_json(const RejectVariant& variant);
 std::string summary_csv(std::span<const RejectVariant> variants);
 // One row per variant and depth, with a header.
 std::string depth_csv(std::span<const RejectVariant> variants);
-// To standard output.
+// Prints the tables to standard output.
 void print_tables(std::span<const RejectVariant> variants);
 
 }  // namespace limn

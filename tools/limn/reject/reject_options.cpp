@@ -1,3 +1,4 @@
+// The options of limn reject.
 #include <cmath>
 
 #include "tools/limn/command_reject.h"

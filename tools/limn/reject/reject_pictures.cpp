@@ -1,3 +1,4 @@
+// The pictures of limn reject: slices, reachable edges, the overview.
 #include "tools/limn/reject/reject_pictures.h"
 
 #include <algorithm>

@@ -1,19 +1,18 @@
-// Vector fields on the vertices of a mesh.
+// Mesh files by the ending of their names, and vector fields on the vertices of a mesh.
+#include "src/mesh/mesh_file.h"
+
 #include <cmath>
 #include <filesystem>
 
+#include "limn/core/names.h"
 #include "src/base/text.h"
-#include "src/mesh/mesh_build.h"
 
 namespace limn {
 
 namespace {
 
-// Lower-case ending of the file's name, with its dot.
 std::string ending(const std::string& file) {
-  std::string text = std::filesystem::path(file).extension().string();
-  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return text;
+  return lower_case(std::filesystem::path(file).extension().string());
 }
 
 Vec3d parse_vector(const SourceLocation& where, std::string_view line) {
@@ -37,6 +36,10 @@ bool is_mesh_file(const std::string& file) {
 
 RawMesh parse_mesh(const std::string& file) {
   return ending(file) == ".ply" ? parse_ply(file) : parse_obj(file);
+}
+
+Mesh read_mesh(const std::string& file, bool face_normals) {
+  return build_mesh(parse_mesh(file), {Matrix4{}, face_normals, false}, nullptr);
 }
 
 std::vector<Vec3d> read_vertex_vectors(const std::string& file) {

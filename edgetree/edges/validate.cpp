@@ -1,0 +1,93 @@
+// What holds of every EdgeMesh, checked.
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "limn/edgetree/edges.h"
+
+namespace limn {
+namespace {
+
+std::pair<uint32_t, uint32_t> ends_of(const Edge& edge) {
+  return std::minmax(edge.vertices[0], edge.vertices[1]);
+}
+
+const char* fault_of_sizes(const EdgeMesh& mesh) {
+  if (!mesh.tangents.empty() && mesh.tangents.size() != mesh.positions.size())
+    return "there are other than V tangents";
+  if (mesh.face_offsets.size() != mesh.edges.size() + 1)
+    return "there are other than E + 1 offsets";
+  if (mesh.face_offsets.front() != 0 || mesh.face_offsets.back() != mesh.incident_faces.size())
+    return "offsets do not span the incident faces";
+  for (size_t e = 0; e < mesh.edges.size(); ++e)
+    if (mesh.face_offsets[e] >= mesh.face_offsets[e + 1]) return "an edge has no faces";
+  for (const uint32_t face : mesh.incident_faces)
+    if (face >= mesh.planes.size()) return "an incident face is out of range";
+  for (const Edge& edge : mesh.edges)
+    if (ends_of(edge).second >= mesh.positions.size()) return "a vertex is out of range";
+  return nullptr;
+}
+
+// Unit to the rounding of a normalisation, or zero altogether.
+const char* fault_of(const Plane& plane) {
+  const double squared = length_squared(plane.n);
+  if (squared == 0) return plane.offset == 0 ? nullptr : "a plane without a normal has an offset";
+  return std::fabs(squared - 1) <= 8 * 0x1.0p-53 ? nullptr
+                                                 : "a plane's normal is not a unit vector";
+}
+
+const char* fault_of_faces(const EdgeMesh& mesh, uint32_t index) {
+  const Edge& edge = mesh.edges[index];
+  const std::span<const uint32_t> around = mesh.faces_around(index);
+  if (edge.faces[0] != around[0]) return "its first face is not the first around it";
+  if (edge.faces[1] != (around.size() > 1 ? around[1] : kNoFace))
+    return "its second face is not the second around it";
+  for (const uint32_t face : around) {
+    const Plane& plane = mesh.planes[face];
+    if (length_squared(plane.n) == 0) return "a face around it has no area";
+    for (const uint32_t vertex : edge.vertices) {
+      const Vec3d& x = mesh.positions[vertex];
+      if (std::fabs(plane.distance(x)) > distance_error(mesh, x))
+        return "an end lies off the plane of a face around it";
+    }
+  }
+  return nullptr;
+}
+
+const char* fault_of_class(const EdgeMesh& mesh, uint32_t index) {
+  const Edge& edge = mesh.edges[index];
+  const size_t faces = mesh.faces_around(index).size();
+  const bool irregular = edge.edge_class == EdgeClass::kIrregular;
+  if ((edge.edge_class == EdgeClass::kBorder) != (faces == 1)) return "a border has one face";
+  if (faces > 2 && !irregular) return "more than two faces make it irregular";
+  if (edge.concave && (faces != 2 || irregular || edge.edge_class == EdgeClass::kFlat))
+    return "only smooth and sharp edges are concave";
+  if (mesh.one_sided_closed && (faces != 2 || irregular))
+    return "a closed mesh has neither borders nor irregular edges";
+  return nullptr;
+}
+
+const char* fault_of_edge(const EdgeMesh& mesh, uint32_t index) {
+  const Edge& edge = mesh.edges[index];
+  if (edge.vertices[0] == edge.vertices[1]) return "its two ends are one vertex";
+  if (index > 0 && ends_of(mesh.edges[index - 1]) >= ends_of(edge))
+    return "edges are not sorted by their vertices";
+  for (const uint32_t vertex : edge.vertices)
+    if (!(length(mesh.positions[vertex]) <= mesh.extent)) return "an end lies beyond the extent";
+  if (const char* fault = fault_of_faces(mesh, index)) return fault;
+  return fault_of_class(mesh, index);
+}
+
+}  // namespace
+
+std::string EdgeMesh::validate() const {
+  if (const char* fault = fault_of_sizes(*this)) return fault;
+  for (size_t f = 0; f < planes.size(); ++f)
+    if (const char* fault = fault_of(planes[f])) return "face " + std::to_string(f) + ": " + fault;
+  for (uint32_t e = 0; e < edges.size(); ++e)
+    if (const char* fault = fault_of_edge(*this, e))
+      return "edge " + std::to_string(e) + ": " + fault;
+  return {};
+}
+
+}  // namespace limn
