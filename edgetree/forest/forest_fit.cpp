@@ -73,7 +73,7 @@ Vector4d farthest_hyperplane(const std::vector<Vector4d>& points) {
   }
   constexpr int kRounds = 24;
   for (int round = 0;; ++round) {
-    const Vector4d z = separating_direction(active);
+    Vector4d z = separating_direction(active);
     if (z.norm() == 0) return z;
     const double rho = least_product(active, z).value;
     const Farthest least = least_product(points, z);
@@ -85,7 +85,7 @@ Vector4d farthest_hyperplane(const std::vector<Vector4d>& points) {
 
 // Unit Z with Z . q > 0 for all points, or zero.
 Vector4d normaliser_of(const std::vector<Vector4d>& points) {
-  const Vector4d z = central_direction(points);
+  Vector4d z = central_direction(points);
   const double least = z.norm() > 0 ? least_product(points, z).value : 0;
   constexpr double kWide = 0.2;  // the chart would be five times as large as it needs to be
   if (least >= kWide) return z;

@@ -1,3 +1,4 @@
+// What is resolved before any element has a meaning: <default>, <include>, <path>, $name.
 #include "src/scene_file/scene_tree.h"
 
 #include <algorithm>

@@ -14,7 +14,7 @@ namespace limn {
 Scene load_scene(const CommonOptions& common) {
   std::vector<std::string> warnings;
   Scene scene = read_scene(common.scene, common.defines, &warnings);
-  for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
+  for (const std::string& warning : warnings) fmt::print(stderr, "{}\n", warning);
   if (common.shading == "mitsuba") scene.shading = ShadingModel::kMitsuba;
   return scene;
 }
