@@ -22,7 +22,7 @@
 namespace limn {
 namespace {
 
-constexpr int64_t kMaxPixels = int64_t{1} << 28;
+constexpr int64_t kMaxPixels = int64_t{1} << 28;  // not tuned: 3 GB in memory
 
 std::vector<const char*> channel_names(int channels) {
   if (channels == 3) return {"R", "G", "B"};
