@@ -74,7 +74,7 @@ Vector4d farthest_hyperplane(const std::vector<Vector4d>& points) {
   }
   constexpr int kRounds = 24;  // not tuned
   for (int round = 0;; ++round) {
-    const Vector4d z = separating_direction(active);
+    Vector4d z = separating_direction(active);
     if (z.norm() == 0) return z;
     const double rho = least_product(active, z).value;
     const Farthest least = least_product(points, z);
@@ -86,7 +86,7 @@ Vector4d farthest_hyperplane(const std::vector<Vector4d>& points) {
 
 // Unit Z with Z . q > 0 for all points, or zero.
 Vector4d normaliser_of(const std::vector<Vector4d>& points) {
-  const Vector4d z = central_direction(points);
+  Vector4d z = central_direction(points);
   const double least = z.norm() > 0 ? least_product(points, z).value : 0;
   // The chart would be five times as large as it needs to be. Not tuned.
   constexpr double kWide = 0.2;

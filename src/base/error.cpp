@@ -1,3 +1,4 @@
+// The words of errors and warnings.
 #include "limn/core/error.h"
 
 namespace limn {

@@ -1,3 +1,4 @@
+// Files that appear whole or not at all.
 #include "src/base/output_file.h"
 
 #include <unistd.h>

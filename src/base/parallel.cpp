@@ -7,6 +7,8 @@
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
 
+#include "limn/core/check.h"
+
 namespace limn {
 
 int thread_count(int requested) {
@@ -14,6 +16,7 @@ int thread_count(int requested) {
 }
 
 void parallel_for(size_t count, int threads, const std::function<void(size_t)>& work) {
+  CHECK_LE(1, threads);
   // More threads than cores are granted too: results must not depend on their number, and tests ask
   // for seven.
   const oneapi::tbb::global_control limit(oneapi::tbb::global_control::max_allowed_parallelism,

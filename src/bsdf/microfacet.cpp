@@ -1,3 +1,4 @@
+// Sampling of visible normals.
 #include "src/bsdf/microfacet.h"
 
 #include <algorithm>

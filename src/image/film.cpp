@@ -43,6 +43,7 @@ double Filter::integral(double x) const {
 // Inversion of the integral by Newton's method, kept inside a shrinking bracket: exact to rounding
 // for every filter, and one random number per sample.
 double Filter::sample(double lower, double upper, Rng& rng) const {
+  DCHECK_LT(integral(lower), integral(upper));
   const double u = rng.uniform();
   if (kind == Kind::kBox) return lower + u * (upper - lower);
   const double target = integral(lower) + u * (integral(upper) - integral(lower));

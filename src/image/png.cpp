@@ -81,8 +81,8 @@ double signed_scale(const Image& image) {
     }
   }
   if (sizes.empty()) return 1;
-  const auto rank = static_cast<size_t>(0.995 * static_cast<double>(sizes.size() - 1) + 0.5);
-  std::nth_element(sizes.begin(), sizes.begin() + static_cast<std::ptrdiff_t>(rank), sizes.end());
+  const std::ptrdiff_t rank = std::lround(0.995 * static_cast<double>(sizes.size() - 1));
+  std::nth_element(sizes.begin(), sizes.begin() + rank, sizes.end());
   return sizes[rank];
 }
 

@@ -1,3 +1,4 @@
+// The alias table over the cells of a map, and its density.
 #include "src/light/environment_map.h"
 
 #include <limits>

@@ -1,9 +1,12 @@
+// Welded positions, shading normals and horizons, with their derivatives.
 #include "limn/core/mesh.h"
 
 #include <algorithm>
 #include <limits>
 #include <numeric>
 #include <tuple>
+
+#include "limn/core/check.h"
 
 namespace limn {
 
@@ -181,6 +184,7 @@ void store_tangents(Mesh& mesh, const ShadingNormals<Dual>& from) {
 }  // namespace
 
 void update_shading_normals(Mesh& mesh) {
+  CHECK_EQ(mesh.weld.size(), mesh.positions.size());
   if (mesh.normal_source == NormalSource::kFace) return;
   const bool computed = mesh.normal_source == NormalSource::kComputed;
   if (computed) assign_normal_ids(mesh);

@@ -1,7 +1,7 @@
+// From what a mesh file says to a checked mesh: transform, weld, mend, normals.
 #include "src/mesh/mesh_build.h"
 
 #include <cmath>
-#include <limits>
 
 namespace limn {
 
@@ -17,10 +17,10 @@ void set_positions(Mesh& mesh, const RawMesh& raw, const Matrix4& to_world) {
   for (size_t i = 0; i < raw.positions.size(); ++i) {
     const Vec3d p = to_world.point(raw.positions[i]);
     for (int k = 0; k < 3; ++k) {
-      if (!(std::fabs(p[k]) <= std::numeric_limits<float>::max())) {
-        throw InputError({raw.where}, "vertex " + std::to_string(i) +
-                                          ": position does not fit single precision");
-      }
+      if (std::fabs(p[k]) <= kLargestCoordinate) continue;
+      throw InputError({raw.where}, "vertex " + std::to_string(i) +
+                                        " (counted from 0) has a coordinate beyond 2e12, where "
+                                        "rays miss it in single precision: use a larger unit");
     }
     mesh.positions.push_back(cast<float>(p));
   }
@@ -112,7 +112,8 @@ void check_orientation(const Mesh& mesh, const SourceLocation& where,
 
 }  // namespace
 
-Mesh build_mesh(RawMesh raw, const MeshOptions& options, std::vector<std::string>* warnings) {
+Mesh build_mesh(const RawMesh& raw, const MeshOptions& options,
+                std::vector<std::string>* warnings) {
   Mesh mesh;
   mesh.normal_source = options.face_normals     ? NormalSource::kFace
                        : raw.normal_ids.empty() ? NormalSource::kComputed

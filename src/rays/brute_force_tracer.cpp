@@ -1,3 +1,4 @@
+// Every face tested in double precision: the oracle for Embree.
 #include <algorithm>
 
 #include "limn/core/ray_tracer.h"

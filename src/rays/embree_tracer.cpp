@@ -2,8 +2,13 @@
 #include <embree3/rtcore.h>
 
 #include <algorithm>
+#include <cmath>
+#include <memory>
+#include <mutex>
 #include <string>
+#include <type_traits>
 
+#include "limn/core/check.h"
 #include "limn/core/error.h"
 #include "limn/core/ray_tracer.h"
 
@@ -32,6 +37,8 @@ void reject_skipped(const RTCFilterFunctionNArguments* arguments) {
 }
 
 RTCRay to_embree(const Ray& ray) {
+  // Float directions of unit length are this near to it.
+  DCHECK_LE(std::fabs(length_squared(ray.direction) - 1), 0x1p-20);
   RTCRay r{};
   r.org_x = static_cast<float>(ray.origin.x);
   r.org_y = static_cast<float>(ray.origin.y);
@@ -46,26 +53,50 @@ RTCRay to_embree(const Ray& ray) {
   return r;
 }
 
+struct Release {
+  void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
+  void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
+  void operator()(RTCGeometry geometry) const { rtcReleaseGeometry(geometry); }
+};
+template <class Handle>
+using Owned = std::unique_ptr<std::remove_pointer_t<Handle>, Release>;
+
+// What Embree reported, first of all. It may report from any of its threads.
+class EmbreeErrors {
+ public:
+  // The callback; `self` is an EmbreeErrors.
+  static void note(void* self, RTCError /*code*/, const char* text) {
+    auto& errors = *static_cast<EmbreeErrors*>(self);
+    const std::lock_guard lock(errors.mutex_);
+    if (errors.first_.empty()) errors.first_ = text && *text ? text : "unknown error";
+  }
+  void check() {
+    const std::lock_guard lock(mutex_);
+    if (!first_.empty()) throw InputError("Embree: " + first_);
+  }
+
+ private:
+  std::mutex mutex_;
+  std::string first_;
+};
+
 class EmbreeTracer final : public RayTracer {
  public:
   EmbreeTracer(const Scene& scene, int threads) : scene_(scene) {
     const std::string config = "threads=" + std::to_string(threads);
-    device_ = rtcNewDevice(config.c_str());
+    device_.reset(rtcNewDevice(config.c_str()));
     if (!device_) throw InputError("Embree cannot start on this machine");
-    rtc_scene_ = rtcNewScene(device_);
+    rtcSetDeviceErrorFunction(device_.get(), EmbreeErrors::note, &errors_);
+    rtc_scene_.reset(rtcNewScene(device_.get()));
+    errors_.check();
     rtcSetSceneFlags(
-        rtc_scene_,
+        rtc_scene_.get(),
         static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION));
-    rtcSetSceneBuildQuality(rtc_scene_, RTC_BUILD_QUALITY_HIGH);
+    rtcSetSceneBuildQuality(rtc_scene_.get(), RTC_BUILD_QUALITY_HIGH);
     for (size_t i = 0; i < scene.shapes.size(); ++i) attach(scene.shapes[i].mesh, i);
-    rtcCommitScene(rtc_scene_);
+    rtcCommitScene(rtc_scene_.get());
+    errors_.check();
   }
-  ~EmbreeTracer() override {
-    rtcReleaseScene(rtc_scene_);
-    rtcReleaseDevice(device_);
-  }
-  EmbreeTracer(const EmbreeTracer&) = delete;
-  EmbreeTracer& operator=(const EmbreeTracer&) = delete;
 
   bool closest(const Ray& ray, Hit& hit) const override {
     Context context = make_context(ray);
@@ -73,7 +104,7 @@ class EmbreeTracer final : public RayTracer {
     query.ray = to_embree(ray);
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(rtc_scene_, &context.base, &query);
+    rtcIntersect1(rtc_scene_.get(), &context.base, &query);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
     hit.face = {query.hit.geomID, query.hit.primID};
     hit.t = query.ray.tfar;
@@ -83,25 +114,26 @@ class EmbreeTracer final : public RayTracer {
   bool occluded(const Ray& ray) const override {
     Context context = make_context(ray);
     RTCRay query = to_embree(ray);
-    rtcOccluded1(rtc_scene_, &context.base, &query);
+    rtcOccluded1(rtc_scene_.get(), &context.base, &query);
     return query.tfar < 0;
   }
 
  private:
   void attach(const Mesh& mesh, size_t id) {
-    RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+    const Owned<RTCGeometry> geometry(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
+    errors_.check();
     auto* vertices = static_cast<Vec3f*>(
-        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+        rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                 sizeof(Vec3f), mesh.positions.size()));
     auto* faces = static_cast<FaceIndices*>(
-        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+        rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                 sizeof(FaceIndices), mesh.faces.size()));
-    if (!vertices || !faces) throw InputError("Embree ran out of memory");
+    errors_.check();
     std::copy(mesh.positions.begin(), mesh.positions.end(), vertices);
     std::copy(mesh.faces.begin(), mesh.faces.end(), faces);
-    rtcCommitGeometry(geometry);
-    rtcAttachGeometryByID(rtc_scene_, geometry, static_cast<unsigned>(id));
-    rtcReleaseGeometry(geometry);
+    rtcCommitGeometry(geometry.get());
+    rtcAttachGeometryByID(rtc_scene_.get(), geometry.get(), static_cast<unsigned>(id));
+    errors_.check();
   }
   Context make_context(const Ray& ray) const {
     Context context;
@@ -115,8 +147,9 @@ class EmbreeTracer final : public RayTracer {
   }
 
   const Scene& scene_;
-  RTCDevice device_ = nullptr;
-  RTCScene rtc_scene_ = nullptr;
+  EmbreeErrors errors_;  // before what reports to it
+  Owned<RTCDevice> device_;
+  Owned<RTCScene> rtc_scene_;
 };
 
 }  // namespace

@@ -1,6 +1,6 @@
 #pragma once
-// What can move in a scene, one list per kind of thing (each appends to `list`). parameter.cpp joins
-// them; a new kind of thing is a .cpp, a line here and a line there.
+// What can move in a scene, one list per kind of thing (each appends to `list`). parameter.cpp
+// joins them: a new kind of thing is a .cpp, a line here and a line there.
 #include <vector>
 
 #include "limn/core/parameter.h"

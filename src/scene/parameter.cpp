@@ -1,4 +1,4 @@
-// Parameters by name: the lists of what can move, joined, and what to say of a name that is in none.
+// Parameters by name: the lists of what can move, and what to say of a name that none has.
 #include "limn/core/parameter.h"
 
 #include <algorithm>

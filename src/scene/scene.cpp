@@ -1,3 +1,4 @@
+// Copies of scenes.
 #include "limn/core/scene.h"
 
 namespace limn {

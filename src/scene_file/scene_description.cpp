@@ -1,3 +1,4 @@
+// From the tree of a scene file to objects with typed properties: ids, aliases, references.
 #include "src/scene_file/scene_description.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Typed access to the properties of one element, and what nobody asked for.
 #include "src/scene_file/scene_properties.h"
 
 #include <algorithm>
@@ -96,7 +97,7 @@ std::string DescribedProperties::file(const std::string& name) {
   if (!p) fail("parameter \"" + name + "\" is missing");
   const std::string* text = std::get_if<std::string>(&p->value);
   if (!text) fail_type(name, *p, "<string>");
-  const std::string found = find_input_file(*text, p->where.file, scene_.search_path);
+  std::string found = find_input_file(*text, p->where.file, scene_.search_path);
   if (found.empty()) {
     const bool from_build = text->find("build/generated/") != std::string::npos;
     fail(name, "no such file: \"" + *text + "\"" +

@@ -1,3 +1,4 @@
+// From the description of a sensor to camera, film, filter and sampler.
 #include "src/scene_file/scene_sensor.h"
 
 #include <cmath>
@@ -51,7 +52,7 @@ void read_filter(const ObjectDescription& object, const SceneDescription& scene,
 // A string that must be one of `known`.
 std::string choice(Properties& properties, const std::string& name, const std::string& absent,
                    const std::vector<std::string>& known) {
-  const std::string word = lower_case(properties.string(name, absent));
+  std::string word = lower_case(properties.string(name, absent));
   for (const std::string& k : known) {
     if (k == word) return word;
   }
@@ -162,6 +163,12 @@ void read_axes(Properties& p, Camera& camera) {
   camera.forward = dual(forward);
   camera.up = dual(up);
   camera.left = dual(dot(left, column[0]) > 0 ? left : -left);
+  for (int k = 0; k < 3; ++k) {
+    if (std::fabs(m.m[k][3]) <= kLargestCoordinate) continue;
+    p.fail("to_world",
+           "the pinhole has a coordinate beyond 2e12, where rays miss everything in single "
+           "precision: use a larger unit");
+  }
   camera.origin = dual({m.m[0][3], m.m[1][3], m.m[2][3]});
 }
 

@@ -1,3 +1,4 @@
+// The values of property tags: numbers, colours, vectors, transforms.
 #include "src/scene_file/scene_values.h"
 
 #include <algorithm>

@@ -177,7 +177,7 @@ class SceneBuilder {
     if (bsdfs.size() > 1) p.fail("has " + std::to_string(bsdfs.size()) + " bsdfs (one at most)");
     if (const ObjectDescription* emitter = p.nested("emitter")) read_nested_light(*emitter, shape);
     p.check_all_used();
-    shape.mesh = build_mesh(std::move(raw), options, warnings_);
+    shape.mesh = build_mesh(raw, options, warnings_);
     const double grey_value = shape.is_emitter ? 0.0 : 0.5;
     shape.bsdf = bsdfs.empty() ? make_diffuse(grey(grey_value)) : bsdfs[0];
     scene_.shapes.push_back(std::move(shape));

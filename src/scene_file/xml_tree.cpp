@@ -10,7 +10,7 @@ namespace limn {
 
 namespace {
 
-constexpr int kMaxDepth = 64;
+constexpr int kMaxDepth = 64;  // of elements; not tuned: far below what the stack takes
 
 // Lines and columns of byte offsets. A column counts bytes.
 class TextPlaces {

@@ -42,7 +42,7 @@ struct Job {
   }
 };
 
-// Of all channels of all pixels.
+// One value per channel of every pixel.
 std::vector<double> exact_derivative() {
   std::ifstream file(kFolder + "references.json");
   const nlohmann::json all = nlohmann::json::parse(file);

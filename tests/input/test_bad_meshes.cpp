@@ -40,7 +40,8 @@ const std::vector<Mistake>& mistakes() {
       {"ObjInf", "a.obj", "\r\nv 0 0 -inf\r\n", "a.obj:2: error: vertex is not finite"},
       {"ObjTooLarge", "a.obj", "v 0 0 1e400\n", "a.obj:1: error: not a number: \"1e400\""},
       {"ObjBeyondFloat", "a.obj", kTriangle + "v 0 0 1e300\nf 1 2 4\n",
-       "a.obj: error: vertex 3: position does not fit single precision"},
+       "a.obj: error: vertex 3 (counted from 0) has a coordinate beyond 2e12, where "
+       "rays miss it in single precision: use a larger unit"},
       {"ObjGarbage", "a.obj", "v 0 0 O\n", "a.obj:1: error: not a number: \"O\""},
       {"ObjShortVertex", "a.obj", "v 0 0\n", "a.obj:1: error: vertex needs three numbers"},
       {"ObjIndexTooLarge", "a.obj", kTriangle + "\nf 1 2 4\n",

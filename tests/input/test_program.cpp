@@ -56,6 +56,18 @@ class Program : public testing::Test {
   std::string scene_;
 };
 
+TEST_F(Program, WarnsOnce) {
+  const std::string mesh = files_.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 2\n");
+  SceneParts parts;
+  parts.width = parts.height = 2;
+  parts.body = R"(  <shape type="obj"><string name="filename" value="a.obj"/></shape>
+)";
+  const std::string scene = files_.write("collapsed.xml", scene_text(parts));
+  EXPECT_EQ(
+      run("render " + scene + " --spp 1 --quiet -o " + out()).text,
+      mesh + ": warning: 1 of 2 faces have two corners at the same position and are left out\n");
+}
+
 TEST_F(Program, RendersAndDifferentiates) {
   EXPECT_EQ(run("render " + scene_ + " --spp 2 --quiet -o " + out()).text, "");
   EXPECT_EQ(read_exr(out()).width, 8);

@@ -1,5 +1,11 @@
 // Embree against every face tested in double precision.
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
 
 #include "limn/core/shading.h"
 #include "support/meshes.h"
@@ -87,9 +93,43 @@ TEST_P(RayTracers, AgreeButForRounding) {
   EXPECT_LT(at_borders, kRays / 500);
 }
 
-INSTANTIATE_TEST_SUITE_P(, RayTracers, testing::Values(1e-3, 1.0, 1e4), [](const auto& test) {
-  return test.param < 1 ? "small" : test.param > 1 ? "large" : "one";
+// The largest puts coordinates near kLargestCoordinate.
+INSTANTIATE_TEST_SUITE_P(, RayTracers, testing::Values(1e-3, 1.0, 1e4, 5e11), [](const auto& test) {
+  return test.param < 1 ? "small" : test.param < 2 ? "one" : test.param < 1e5 ? "large" : "largest";
 });
+
+// Lets the process have a little more memory than it has now.
+void allow_little_memory() {
+  std::ifstream statm("/proc/self/statm");
+  rlim_t pages = 0;
+  statm >> pages;
+  const rlim_t bytes = pages * sysconf(_SC_PAGESIZE) + (rlim_t{64} << 20);
+  const rlimit limit{bytes, bytes};
+  setrlimit(RLIMIT_AS, &limit);
+}
+
+TEST(EmbreeDeathTest, SaysWhatItLacks) {
+#ifdef __SANITIZE_ADDRESS__
+  GTEST_SKIP() << "the sanitizer needs all addresses";
+#endif
+  Scene scene;
+  scene.shapes.emplace_back();
+  Mesh& mesh = scene.shapes[0].mesh;
+  mesh.positions.resize(6'000'000);  // 72 MB
+  mesh.faces.resize(1);
+  const auto make = [&] {
+    const Scene empty;
+    const auto first = make_embree_tracer(empty, 1);  // has threads and their memory
+    allow_little_memory();
+    try {
+      make_embree_tracer(scene, 1);
+    } catch (const InputError& error) {
+      std::fputs(error.what(), stderr);
+      std::exit(3);
+    }
+  };
+  EXPECT_EXIT(make(), testing::ExitedWithCode(3), "^error: Embree: .*memory");
+}
 
 }  // namespace
 }  // namespace limn

@@ -1,3 +1,4 @@
+// Pearson's test: bins with few expected samples are pooled.
 #include "support/chi_square.h"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// Meshes made by formula.
 #include "meshes.h"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// XML of small scenes, put together from parts.
 #include "support/scenes.h"
 
 #include <fmt/format.h>

@@ -277,7 +277,7 @@ TEST(Edges, PointsOnAPlaneKeepTheEdge) {
 TEST(Edges, SilhouettesFormLoops) {
   Rng rng(4, 0, 0);
   for (const Mesh& shape : {icosphere_mesh(3), torus_mesh(40, 20), cube_mesh()}) {
-    // Of a mesh that is black from behind, the concave parts of the loops would be missing.
+    // If the mesh were black from behind, the concave parts of the loops would be missing.
     const EdgeMesh edges = build_edge_mesh(with_smooth_normals(shape), false);
     for (double radius : {0.05, 1.5, 3.0, 1e3, 1e6}) {
       const Vec3d p = random_direction(rng) * radius;

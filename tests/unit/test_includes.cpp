@@ -1,6 +1,8 @@
-// Who may include whom: the folders' order, and one door for every third party.
+// Who may include whom: the order of folders, rooms and contracts, one door for every third party;
+// and how files begin.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -112,6 +114,78 @@ TEST(Includes, PrivateHeadersStayInTheirFolder) {
   }
 }
 
+// The rooms of a folder, lowest first. A file includes private headers of its own room, of rooms
+// before it and of the folder's top; what lies at the top (registries) includes all.
+struct Rooms {
+  std::string folder;
+  Strings rooms;
+};
+const std::vector<Rooms>& all_rooms() {
+  static const std::vector<Rooms> rooms = {
+      {"src", {"base", "mesh", "image", "bsdf", "light", "rays", "scene", "scene_file"}},
+      {"edgetree", {"edges", "lobe", "light", "forest", "baselines", "rejection"}},
+      {"integrators", {"estimates", "terms", "compare", "methods"}},
+  };
+  return rooms;
+}
+
+std::string room_of(const std::string& path) {
+  const size_t first = path.find('/'), second = path.find('/', first + 1);
+  return second == path.npos ? "" : path.substr(first + 1, second - first - 1);
+}
+
+size_t rank(const Strings& order, const std::string& name) {
+  return std::find(order.begin(), order.end(), name) - order.begin();
+}
+
+TEST(Includes, NothingRunsBackUpBetweenRooms) {
+  for (const auto& [folder, rooms] : all_rooms()) {
+    for (const Include& include : includes_below(folder)) {
+      const std::string from = room_of(include.file);
+      if (from.empty()) continue;
+      EXPECT_LT(rank(rooms, from), rooms.size()) << include.file << ": an unknown room";
+      if (!include.path.starts_with(folder + "/")) continue;
+      const std::string to = room_of(include.path);
+      if (to.empty()) continue;
+      EXPECT_LE(rank(rooms, to), rank(rooms, from)) << include.file << " includes " << include.path;
+    }
+  }
+}
+
+// The contracts of limn/core, lowest first: each includes only earlier ones. A room of src sees
+// contracts up to the one given.
+const Strings kContracts = {"check.h",  "error.h",       "vec.h",    "dual.h",       "rng.h",
+                            "names.h",  "parallel.h",    "matrix.h", "bounds.h",     "mesh.h",
+                            "bsdf.h",   "properties.h",  "image.h",  "film.h",       "camera.h",
+                            "light.h",  "environment.h", "scene.h",  "ray_tracer.h", "shading.h",
+                            "lights.h", "parameter.h"};
+const std::map<std::string, std::string> kSeenFrom = {
+    {"base", "properties.h"}, {"mesh", "mesh.h"},        {"image", "film.h"},
+    {"bsdf", "properties.h"}, {"light", "lights.h"},     {"rays", "ray_tracer.h"},
+    {"scene", "parameter.h"}, {"scene_file", "lights.h"}};
+
+TEST(Includes, ContractsOfCoreStandInOrder) {
+  const std::string core = "limn/core/";
+  for (const std::string folder : {"include/limn/core", "src"}) {
+    for (const Include& include : includes_below(folder)) {
+      if (!include.path.starts_with(core)) continue;
+      const size_t to = rank(kContracts, include.path.substr(core.size()));
+      const std::string name = fs::path(include.file).filename().string();
+      const size_t from = folder == "src" ? rank(kContracts, kSeenFrom.at(room_of(include.file)))
+                                          : rank(kContracts, name);
+      EXPECT_LT(from, kContracts.size()) << include.file << ": give it a place in kContracts";
+      EXPECT_LE(to, from) << include.file << " includes " << include.path;
+    }
+  }
+}
+
+// Its macros have names that other libraries have too.
+TEST(Includes, NoPublicHeaderIncludesCheck) {
+  for (const Include& include : includes_below("include")) {
+    EXPECT_NE(include.path, "limn/core/check.h") << include.file;
+  }
+}
+
 // In src, edgetree and integrators every library but fmt and Eigen is included by one .cpp.
 TEST(Includes, OneDoorPerThirdParty) {
   const std::map<std::string, std::regex> libraries = {
@@ -151,6 +225,24 @@ TEST(Includes, HeadersAreGuardedByPragmaOnce) {
       std::string first;
       std::getline(stream, first);
       EXPECT_EQ(first, "#pragma once") << entry.path();
+    }
+  }
+}
+
+// Folders whose every .cpp opens with a line that says what it is for.
+const Strings kOpened = {"src/base",    "src/mesh",          "src/image",      "src/bsdf",
+                         "src/rays",    "src/scene",         "src/scene_file", "tests/gradients",
+                         "tests/input", "tests/statistical", "tests/unit",     "tests/support"};
+
+TEST(Includes, SourcesOpenWithTheirPurpose) {
+  const fs::path root(LIMN_SOURCE_DIR);
+  for (const std::string& folder : kOpened) {
+    for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
+      if (entry.path().extension() != ".cpp") continue;
+      std::ifstream stream(entry.path());
+      std::string first;
+      std::getline(stream, first);
+      EXPECT_TRUE(first.starts_with("// ") && first.size() > 12) << entry.path();
     }
   }
 }

@@ -12,7 +12,7 @@
 #include <cstring>
 #include <filesystem>
 
-extern char** environ;
+extern char** environ;  // NOLINT(readability-redundant-declaration): POSIX leaves it to us
 
 namespace limn {
 namespace {

@@ -109,7 +109,7 @@ void add_debug_option(CLI::App& app, std::string& place) {
 Scene load_scene(const CommonOptions& common) {
   std::vector<std::string> warnings;
   Scene scene = read_scene(common.scene, common.defines, &warnings);
-  for (const std::string& warning : warnings) fmt::print(stderr, "warning: {}\n", warning);
+  for (const std::string& warning : warnings) fmt::print(stderr, "{}\n", warning);
   if (common.shading == "mitsuba") scene.shading = ShadingModel::kMitsuba;
   return scene;
 }

@@ -7,6 +7,11 @@
 Each renderer makes SEEDS independent images. Per block of pixels and channel, the difference of
 the two means over its standard error (Welch) is turned into a standard normal z. The suite holds
 one scene per feature that both renderers have. Needs `pip install mitsuba==3.9.1`.
+
+Mitsuba's scalar variants look tent and gaussian filters up in a table of 31 steps. Pixels on a
+border of light differ by up to a percent of its step there, so the suite's cases of these filters
+are left out under them (src/README.md has the figures); those of the other variants are as exact
+as limn's to 6e-5.
 """
 import argparse
 import math
@@ -104,7 +109,11 @@ def main():
     if arguments.suite:
         with tempfile.TemporaryDirectory() as folder:
             for name, scene, options in suite(folder):
-                if arguments.only in name:
+                if arguments.only not in name:
+                    continue
+                if arguments.variant.startswith("scalar") and ("gaussian" in name or "tent" in name):
+                    print(f"{name:36} left out: {arguments.variant} tabulates this filter")
+                else:
                     results.append(compare(name, scene, {}, arguments.spp, options))
     print(f"{sum(results)} of {len(results)} agree")
     return 0 if all(results) else 1

@@ -116,6 +116,7 @@ def cases(folder):
             kind = text.split('"')[1] + (text.split('value="')[1][:3] if "value" in text else "")
             film = SIZE.format(24, 24) + f'<boolean name="sample_border" value="{border}"/>' + text
             yield f"filter {kind} border {border}", {"film": film}, []
+    yield "filter gaussian 8 x 8", {"film": SIZE.format(8, 8) + '<rfilter type="gaussian"/>'}, []
     crop = "".join(f'<integer name="crop_{n}" value="{v}"/>' for n, v in
                    (("offset_x", 9), ("offset_y", 4), ("width", 24), ("height", 16)))
     yield "crop", {"film": SIZE.format(64, 40) + crop + BOX}, []

@@ -35,8 +35,8 @@ class Bsdf {
  public:
   virtual ~Bsdf() = default;
 
-  // Value times |cos(n, wo)| [1/sr]. n: unit shading normal; wi: unit, towards the viewer, n.wi >
-  // 0; wo: unit, towards the light. Zero if n.wo <= 0, and continuous there.
+  // Value times |cos(n, wo)| [1/sr]. n: unit shading normal; wi: unit, towards the viewer,
+  // n.wi > 0; wo: unit, towards the light. Zero if n.wo <= 0, and continuous there.
   virtual Rgb<double> eval(const Vec3<double>& n, const Vec3<double>& wi,
                            const Vec3<double>& wo) const = 0;
   virtual Rgb<Dual> eval(const Vec3<Dual>& n, const Vec3<Dual>& wi, const Vec3<Dual>& wo) const = 0;

@@ -23,7 +23,7 @@ struct Image {
   }
 };
 
-// OpenEXR, scanline, ZIP. Channels R G B for three channels, Y for one. Attributes are written as
+// OpenEXR, scanline, ZIP. Channels R G B for three channels, Y for one (no other number is). Attributes are written as
 // string attributes of the header. Files are written under a temporary name and renamed, so that a
 // crash never leaves half a file. Throw InputError with the file's name.
 struct ImageAttribute {
@@ -32,8 +32,7 @@ struct ImageAttribute {
 };
 void write_exr(const std::string& file, const Image& image, bool half,
                const std::vector<ImageAttribute>& attributes);
-// Any scanline or tiled EXR with R G B (or Y) channels of half or float, as three channels (or
-// one).
+// Any scanline or tiled EXR with channels R G B (or Y) of half or float: three channels (or one).
 Image read_exr(const std::string& file);
 // The string attributes of its header.
 std::vector<ImageAttribute> read_exr_attributes(const std::string& file);

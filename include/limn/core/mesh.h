@@ -21,6 +21,11 @@ struct FaceRef {
   bool operator==(const FaceRef&) const = default;
 };
 
+// No coordinate may be larger. Embree multiplies three lengths in single precision (a distance and
+// two edges), and a product that does not fit is a miss, in silence: (2 sqrt(3) 2e12)^3 = 3.33e38
+// just fits. (At 1.844e18 Embree drops the triangle altogether.)
+inline constexpr double kLargestCoordinate = 2e12;
+
 enum class NormalSource {
   kFace,      // flat shading: the shading normal is the geometric normal
   kComputed,  // angle-weighted vertex normals over welded positions; they move with the vertices
@@ -69,14 +74,14 @@ Bounds bounds_of(const Mesh& mesh);
 // Mesh files: obj or ply, by the ending of the file's name (in small or capital letters).
 bool is_mesh_file(const std::string& file);
 
-// The mesh of a file (obj, unless the ending is ply). InputError (missing file, malformed line, index out of range, non-finite
-// position, no faces, non-triangle PLY face, ...) with the file and, where it can be known, the
-// line. Polygons of OBJ files are fanned from their first corner. Texture coordinates are read
-// past: nothing in limn uses them. `face_normals` ignores normals of the file.
+// The mesh of a file (obj, unless the ending is ply). InputError (missing file, malformed line,
+// index out of range, position not finite or beyond kLargestCoordinate, no faces, non-triangle PLY
+// face, ...) with the file and, where it can be known, the line. Polygons of OBJ files are fanned
+// from their first corner. Texture coordinates are read past: nothing in limn uses them.
+// `face_normals` ignores normals of the file.
 Mesh read_mesh(const std::string& file, bool face_normals);
 
-// Positions of a mesh file (obj or ply), or of a text file with "x y z" lines, in file order: a
-// velocity field.
+// Positions of a mesh file, or of a text file with "x y z" lines, in file order: a velocity field.
 std::vector<Vec3d> read_vertex_vectors(const std::string& file);
 
 }  // namespace limn

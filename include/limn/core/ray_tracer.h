@@ -36,7 +36,8 @@ class RayTracer {
   virtual bool occluded(const Ray& ray) const = 0;
 };
 
-// The scene must outlive the tracer.
+// The scene must outlive the tracer. InputError with Embree's words if it fails (out of memory,
+// unsupported machine).
 std::unique_ptr<RayTracer> make_embree_tracer(const Scene& scene, int threads);
 // Every face tested in double precision: the oracle for tests.
 std::unique_ptr<RayTracer> make_brute_force_tracer(const Scene& scene);

@@ -3,18 +3,20 @@
 //
 // The default scattering function is continuous in position and in both directions wherever normals
 // are interpolated, so that a gradient needs no edges but those of edges.h. With n_s the
-// interpolated and n_g the geometric normal:
+// interpolated and n_g the geometric normal, and s = `horizon`:
+//
 //  - the side of the surface follows n_g, which changes sides only at silhouettes;
-//  - where n_s turns away from the viewer (n_s.wi < e) the BSDF is evaluated with the normal n =
-//  normalize(n_s + (e - n_s.wi) wi), which
-//    meets n_s at n_s.wi = e and keeps n.wi > 0;
+//  - where n_s turns away from the viewer (n_s.wi < e) the BSDF is evaluated with the normal
+//        n = normalize(n_s + (e - n_s.wi) wi),
+//    which meets n_s at n_s.wi = e and keeps n.wi > 0;
 //  - a factor reaches zero before wo does reach the geometric horizon n_g.wo = 0, below which the
-//  ray would start inside the mesh. The
-//    usual factors (Chiang, Li and Burley 2019) are functions of n_g and jump from triangle to
-//    triangle. Ours uses a bound instead: every vertex stores the sine of the largest tilt between
-//    n_s and n_g over the faces around it; s, its interpolation, is continuous and at any point at
-//    least the sine of the tilt there, so n_s.wo > s implies n_g.wo > 0. The factor is
-//    clamp((n_s.wo - s) / (s (1 - s)), 0, 1).
+//    ray would start inside the mesh:
+//        clamp((n_s.wo - s) / (s (1 - s)), 0, 1).
+//    The usual factors (Chiang, Li and Burley 2019) are functions of n_g and jump from triangle to
+//    triangle. Here every vertex stores the sine of the largest tilt between n_s and n_g over the
+//    faces around it. Its interpolation s is continuous and at any point at least the sine of the
+//    tilt there, so n_s.wo > s implies n_g.wo > 0.
+//
 // Flat-shaded meshes have n_s = n_g and s = 0, and are left as they are.
 #include <algorithm>
 #include <optional>
@@ -123,13 +125,13 @@ SurfacePoint<S> surface_on_ray(const Scene& scene, FaceRef face, const Vec3<S>& 
   point.shape = &scene.shapes[face.shape];
   point.face = face;
   const Mesh& mesh = point.shape->mesh;
-  if constexpr (std::is_same_v<S, double>) {
-    detail::place_on_plane<S, double>(mesh, origin, direction, point);
-  } else if (mesh.position_tangents.empty()) {
-    detail::place_on_plane<S, double>(mesh, origin, direction, point);
-  } else {
-    detail::place_on_plane<S, Dual>(mesh, origin, direction, point);
+  if constexpr (std::is_same_v<S, Dual>) {
+    if (!mesh.position_tangents.empty()) {
+      detail::place_on_plane<S, Dual>(mesh, origin, direction, point);
+      return point;
+    }
   }
+  detail::place_on_plane<S, double>(mesh, origin, direction, point);
   return point;
 }
 
@@ -187,7 +189,7 @@ class Scattering {
 
  private:
   void bend() {
-    const double limit = 0.01;  // e above: any small number defines a continuous function
+    const double limit = 0.01;  // e above; not tuned: any small number is continuous
     const S c = dot(n_s_, wi_);
     if (value(c) < limit) n_ = normalize(n_s_ + wi_ * (limit - c));
   }
