@@ -29,7 +29,7 @@ bool same(const Vec3<Lanes>& a, const Vec3<Lanes>& b) {
 }
 bool same(const EdgeQuery& a, const EdgeQuery& b) {
   return a.p == b.p && a.n == b.n && a.wi == b.wi && a.lobe == b.lobe &&
-         same(a.velocity, b.velocity) && a.object == b.object && a.face == b.face;
+         same(a.velocity, b.velocity) && a.face == b.face;
 }
 
 bool is_still(const Vec3<Lanes>& v) { return is_zero(v.x) && is_zero(v.y) && is_zero(v.z); }
@@ -40,7 +40,7 @@ struct Listing {
   EdgeQuery query;
   std::vector<uint8_t> sides;   // of p, by face of one object
   std::vector<uint32_t> found;  // candidates of one object
-  std::vector<EdgeId> edges;
+  std::vector<EdgeRef> edges;
   std::vector<double> cumulative;  // of their weights
   double total() const { return cumulative.empty() ? 0 : cumulative.back(); }
 };
@@ -67,14 +67,14 @@ class BruteForceSampler final : public EdgeSampler {
     return sample;
   }
 
-  double probability(const EdgeQuery& query, EdgeId id) const override {
-    if (!is_candidate(input_.objects[id.object], id.edge, query.p)) return 0;
+  double probability(const EdgeQuery& query, EdgeRef id) const override {
+    if (!is_candidate(input_.object(id.object), id.edge, query.p)) return 0;
     if (is_own_edge(input_, query, id)) return 0;
     const double total = list(query).total();
     return total > 0 ? bound_of(query, id).total() / total : 0;
   }
 
-  double pdf_t(const EdgeQuery& query, EdgeId id, double t) const override {
+  double pdf_t(const EdgeQuery& query, EdgeRef id, double t) const override {
     const EdgeBound bound = bound_of(query, id);
     return bound.total() > 0 ? bound.pdf_t(t) : 0;
   }
@@ -94,9 +94,9 @@ class BruteForceSampler final : public EdgeSampler {
   }
 
  private:
-  EdgeBound bound_of(const EdgeQuery& query, EdgeId id) const {
+  EdgeBound bound_of(const EdgeQuery& query, EdgeRef id) const {
     return {LobeBound(query.n, query.wi, query.lobe),
-            segment_of(input_.objects[id.object], id.edge, query)};
+            segment_of(input_.object(id.object), id.edge, query)};
   }
 
   const Listing& list(const EdgeQuery& query) const {
@@ -106,9 +106,9 @@ class BruteForceSampler final : public EdgeSampler {
     listing.query = query;
     listing.edges.clear();
     listing.cumulative.clear();
-    for (uint32_t object = 0; object < input_.objects.size(); ++object) {
-      if (input_.objects[object].tangents.empty() && is_still(query.velocity)) continue;
-      list_object(object, query, listing);
+    for (uint32_t o = 0; o < input_.objects.size(); ++o) {
+      if (input_.objects[o].tangents.empty() && is_still(query.velocity)) continue;
+      list_object(ShapeId(o), query, listing);
     }
     return listing;
   }
@@ -122,7 +122,8 @@ class BruteForceSampler final : public EdgeSampler {
       packed.offset.push_back(plane.offset);
     }
     for (const Edge& edge : mesh.edges) {
-      packed.faces.push_back({edge.faces[0], edge.faces[1] == kNoFace ? 0 : edge.faces[1]});
+      const auto [a, b] = edge.faces;
+      packed.faces.push_back({a.index(), b.valid() ? b.index() : 0});
       packed.needed.push_back(needed_sides(mesh, edge));
     }
     return packed;
@@ -162,16 +163,16 @@ class BruteForceSampler final : public EdgeSampler {
     return count;
   }
 
-  void list_object(uint32_t object, const EdgeQuery& query, Listing& listing) const {
-    const EdgeMesh& mesh = input_.objects[object];
-    const Packed& packed = packed_[object];
+  void list_object(ShapeId object, const EdgeQuery& query, Listing& listing) const {
+    const EdgeMesh& mesh = input_.object(object);
+    const Packed& packed = packed_[object.index()];
     listing.sides.resize(std::max(listing.sides.size(), packed.x.size()));
     listing.found.resize(std::max(listing.found.size(), packed.faces.size() + 1));
     find_sides(packed, distance_error(mesh, query.p), query.p, listing.sides.data());
     const size_t count = find_candidates(packed, listing.sides.data(), listing.found.data());
     const LobeBound lobe(query.n, query.wi, query.lobe);
     for (size_t i = 0; i < count; ++i) {
-      const EdgeId id{object, listing.found[i]};
+      const EdgeRef id{object, EdgeId(listing.found[i])};
       if (is_own_edge(input_, query, id)) continue;
       const EdgeBound bound(lobe, segment_of(mesh, id.edge, query));
       if (!(bound.total() > 0)) continue;

@@ -34,7 +34,7 @@ struct Node {
 };
 
 struct Item {
-  EdgeId id;
+  EdgeRef id;
   Vec3d center;
   Vec3d plane;  // mean of the Hough points
   bool always;  // in the tree over positions alone
@@ -158,8 +158,7 @@ class Li2019Sampler final : public EdgeSampler {
     for (size_t o = 0; o < input.objects.size(); ++o) {
       places_[o].resize(input.objects[o].edges.size());
     }
-    for (uint32_t i = 0; i < items_.size(); ++i)
-      places_[items_[i].id.object][items_[i].id.edge] = i;
+    for (uint32_t i = 0; i < items_.size(); ++i) place(items_[i].id) = i;
   }
 
   std::optional<EdgeSample> sample(const EdgeQuery& query, Rng& rng) const override {
@@ -181,7 +180,7 @@ class Li2019Sampler final : public EdgeSampler {
         node = nodes_[node].right;
       }
     }
-    const EdgeId id = items_[nodes_[node].begin].id;
+    const EdgeRef id = items_[nodes_[node].begin].id;
     if (!is_drawn(query, id)) return std::nullopt;
     const LtcEdge edge = transformed_edge(descent, id);
     if (!(edge.integral() > 0)) return std::nullopt;
@@ -194,24 +193,24 @@ class Li2019Sampler final : public EdgeSampler {
     return sample;
   }
 
-  double probability(const EdgeQuery& query, EdgeId id) const override {
+  double probability(const EdgeQuery& query, EdgeRef id) const override {
     if (!is_drawn(query, id)) return 0;
     const Descent descent(query, origin_);
     if (!(transformed_edge(descent, id).integral() > 0)) return 0;
-    const uint32_t place = places_[id.object][id.edge];
+    const uint32_t own = place(id);
     uint32_t node = 0;
     double probability = 1;
     while (nodes_[node].right != 0) {
       const double first = first_share(descent, node);
       if (first < 0) return 0;
-      const bool right = place >= nodes_[nodes_[node].right].begin;
+      const bool right = own >= nodes_[nodes_[node].right].begin;
       probability *= right ? 1 - first : first;
       node = right ? nodes_[node].right : node + 1;
     }
     return probability;
   }
 
-  double pdf_t(const EdgeQuery& query, EdgeId id, double t) const override {
+  double pdf_t(const EdgeQuery& query, EdgeRef id, double t) const override {
     return transformed_edge(Descent(query, origin_), id).pdf_t(t);
   }
 
@@ -231,37 +230,36 @@ class Li2019Sampler final : public EdgeSampler {
     Bounds all;
     for (const EdgeMesh& mesh : input_.objects) {
       for (const Edge& edge : mesh.edges) {
-        for (const uint32_t vertex : edge.vertices) all.extend(mesh.positions[vertex]);
+        for (const VertexId vertex : edge.vertices) all.extend(mesh.position(vertex));
       }
     }
     origin_ = all.center();
-    for (uint32_t object = 0; object < input_.objects.size(); ++object) {
-      const EdgeMesh& mesh = input_.objects[object];
+    for (uint32_t o = 0; o < input_.objects.size(); ++o) {
+      const EdgeMesh& mesh = input_.objects[o];
       for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
-        const Bounds box = plane_box(mesh, e);
-        const auto& ends = mesh.edges[e].vertices;
-        items_.push_back({{object, e},
-                          (mesh.positions[ends[0]] + mesh.positions[ends[1]]) * 0.5,
-                          box.center(),
-                          matters_everywhere(mesh, e)});
+        const EdgeRef id{ShapeId(o), EdgeId(e)};
+        const Bounds box = plane_box(mesh, id.edge);
+        const auto [a, b] = mesh.edge(id.edge).vertices;
+        items_.push_back({id, (mesh.position(a) + mesh.position(b)) * 0.5, box.center(),
+                          matters_everywhere(mesh, id.edge)});
       }
     }
   }
 
   // Also where o lies within rounding of a plane.
-  bool matters_everywhere(const EdgeMesh& mesh, uint32_t e) const {
-    const Edge& edge = mesh.edges[e];
+  bool matters_everywhere(const EdgeMesh& mesh, EdgeId id) const {
+    const Edge& edge = mesh.edge(id);
     if (edge.edge_class != EdgeClass::kSmooth && edge.edge_class != EdgeClass::kFlat) return true;
     const double error = distance_error(mesh, origin_);
-    const double s0 = mesh.planes[edge.faces[0]].distance(origin_);
-    const double s1 = mesh.planes[edge.faces[1]].distance(origin_);
+    const double s0 = mesh.plane(edge.faces[0]).distance(origin_);
+    const double s1 = mesh.plane(edge.faces[1]).distance(origin_);
     return std::min(std::fabs(s0), std::fabs(s1)) <= error || (s0 > 0) != (s1 > 0);
   }
 
-  Bounds plane_box(const EdgeMesh& mesh, uint32_t edge) const {
+  Bounds plane_box(const EdgeMesh& mesh, EdgeId edge) const {
     Bounds box;
-    for (const uint32_t face : mesh.faces_around(edge)) {
-      const Plane& plane = mesh.planes[face];
+    for (const FaceId face : mesh.faces_around(edge)) {
+      const Plane& plane = mesh.plane(face);
       box.extend(origin_ - plane.n * plane.distance(origin_));
     }
     return box;
@@ -315,13 +313,13 @@ class Li2019Sampler final : public EdgeSampler {
 
   void fill_leaf(uint32_t index) {
     Node& node = nodes_[index];
-    const EdgeId id = items_[node.begin].id;
-    const EdgeMesh& mesh = input_.objects[id.object];
-    const Edge& edge = mesh.edges[id.edge];
+    const EdgeRef id = items_[node.begin].id;
+    const EdgeMesh& mesh = input_.object(id.object);
+    const Edge& edge = mesh.edge(id.edge);
     node.always = items_[node.begin].always;
-    for (const uint32_t vertex : edge.vertices) node.positions.extend(mesh.positions[vertex]);
+    for (const VertexId vertex : edge.vertices) node.positions.extend(mesh.position(vertex));
     node.planes = plane_box(mesh, id.edge);
-    node.length = length(mesh.positions[edge.vertices[1]] - mesh.positions[edge.vertices[0]]);
+    node.length = length(mesh.position(edge.vertices[1]) - mesh.position(edge.vertices[0]));
   }
 
   int widest_axis(uint32_t begin, uint32_t end) const {
@@ -352,17 +350,19 @@ class Li2019Sampler final : public EdgeSampler {
     return first + second > 0 ? first / (first + second) : -1;
   }
 
-  bool is_drawn(const EdgeQuery& query, EdgeId id) const {
-    return is_candidate(input_.objects[id.object], id.edge, query.p) &&
+  bool is_drawn(const EdgeQuery& query, EdgeRef id) const {
+    return is_candidate(input_.object(id.object), id.edge, query.p) &&
            !is_own_edge(input_, query, id);
   }
 
-  LtcEdge transformed_edge(const Descent& descent, EdgeId id) const {
-    const EdgeMesh& mesh = input_.objects[id.object];
-    const auto& ends = mesh.edges[id.edge].vertices;
-    return {descent.lobe, mesh.positions[ends[0]] - descent.query.p,
-            mesh.positions[ends[1]] - descent.query.p};
+  LtcEdge transformed_edge(const Descent& descent, EdgeRef id) const {
+    const EdgeMesh& mesh = input_.object(id.object);
+    const auto [a, b] = mesh.edge(id.edge).vertices;
+    return {descent.lobe, mesh.position(a) - descent.query.p, mesh.position(b) - descent.query.p};
   }
+
+  uint32_t place(EdgeRef id) const { return places_[id.object.index()][id.edge.index()]; }
+  uint32_t& place(EdgeRef id) { return places_[id.object.index()][id.edge.index()]; }
 
   const EdgeSamplerInput& input_;
   Vec3d origin_{};

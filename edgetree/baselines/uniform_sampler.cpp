@@ -21,7 +21,8 @@ class UniformSampler final : public EdgeSampler {
     const auto object = std::upper_bound(ends_.begin(), ends_.end(), index) - ends_.begin();
     const uint64_t begin = object == 0 ? 0 : ends_[object - 1];
     EdgeSample sample;
-    sample.edge = {static_cast<uint32_t>(object), static_cast<uint32_t>(index - begin)};
+    sample.edge = {ShapeId(static_cast<uint32_t>(object)),
+                   EdgeId(static_cast<uint32_t>(index - begin))};
     sample.t = rng.uniform();
     sample.probability = probability(query, sample.edge);
     sample.pdf_t = 1;
@@ -29,13 +30,13 @@ class UniformSampler final : public EdgeSampler {
     return sample;
   }
 
-  double probability(const EdgeQuery& query, EdgeId id) const override {
-    const bool drawn = is_candidate(input_.objects[id.object], id.edge, query.p) &&
-                       !is_own_edge(input_, query, id);
+  double probability(const EdgeQuery& query, EdgeRef id) const override {
+    const bool drawn =
+        is_candidate(input_.object(id.object), id.edge, query.p) && !is_own_edge(input_, query, id);
     return drawn ? 1 / static_cast<double>(count()) : 0;
   }
 
-  double pdf_t(const EdgeQuery&, EdgeId, double t) const override {
+  double pdf_t(const EdgeQuery&, EdgeRef, double t) const override {
     return t >= 0 && t <= 1 ? 1 : 0;
   }
 

@@ -80,7 +80,7 @@ class Builder {
     const HalfEdge& first = around[0];
     Edge edge;
     edge.vertices = {first.from, first.to};
-    edge.faces = {first.face, around.size() > 1 ? around[1].face : kNoFace};
+    edge.faces = {first.face, around.size() > 1 ? around[1].face : FaceId::none()};
     if (around.size() == 1) {
       edge.edge_class = EdgeClass::kBorder;
     } else if (around.size() > 2 || around[1].from == first.from) {
@@ -106,7 +106,7 @@ class Builder {
   // and then two "flat" edges in a row could hide a crease: what counts as flat must also agree to
   // half the digits of a float. Calling a flat edge sharp costs samples; the reverse costs a jump.
   bool is_flat(const Edge& edge, const Fold& fold) const {
-    const Vec3d &n0 = result_.planes[edge.faces[0]].n, &n1 = result_.planes[edge.faces[1]].n;
+    const Vec3d &n0 = result_.plane(edge.faces[0]).n, &n1 = result_.plane(edge.faces[1]).n;
     return std::fabs(fold.volume) <= fold.rounding && dot(n0, n1) > 0 &&
            length(cross(n0, n1)) <= 0x1.0p-12;
   }
@@ -114,7 +114,7 @@ class Builder {
   // Whether both faces have the same shading normals at both ends (then along the whole edge). An
   // end that is no corner of a face (where a side was split) has a normal of its own.
   bool normals_continuous(const Edge& edge) const {
-    for (uint32_t vertex : edge.vertices) {
+    for (const VertexId vertex : edge.vertices) {
       const Vec3d* a = corner_normal(edge.faces[0], vertex);
       const Vec3d* b = corner_normal(edge.faces[1], vertex);
       if (!a || !b || !(*a == *b)) return false;
@@ -122,9 +122,10 @@ class Builder {
     return true;
   }
 
-  const Vec3d* corner_normal(uint32_t face, uint32_t vertex) const {
+  const Vec3d* corner_normal(FaceId face, VertexId vertex) const {
     for (int k = 0; k < 3; ++k)
-      if (ids_[mesh_.faces[face][k]] == vertex) return &mesh_.normals[mesh_.normal_ids[face][k]];
+      if (ids_[mesh_.face(face)[k]] == vertex)
+        return &mesh_.normals[mesh_.normal_ids[face.index()][k]];
     return nullptr;
   }
 
@@ -135,13 +136,14 @@ class Builder {
   // Whether each part of a closed mesh encloses positive volume, beyond rounding.
   bool parts_have_volume() const {
     UnionFind parts(mesh_.faces.size());
-    for (const Edge& edge : result_.edges) parts.join(edge.faces[0], edge.faces[1]);
+    for (const Edge& edge : result_.edges) parts.join(edge.faces[0].index(), edge.faces[1].index());
     std::vector<double> volumes(mesh_.faces.size()), sizes(mesh_.faces.size());
     // Three or more sides per face: its area, as a fan of triangles.
     for (const HalfEdge& side : sides_) {
-      const uint32_t part = parts.root(side.face);
-      const Vec3d origin = position(mesh_.faces[part][0]), e = position(side.from) - origin;
-      const Plane& plane = result_.planes[side.face];
+      const uint32_t part = parts.root(side.face.index());
+      const Vec3d origin = position(VertexId(mesh_.faces[part][0])),
+                  e = position(side.from) - origin;
+      const Plane& plane = result_.plane(side.face);
       const Vec3d x = position(side.opposite) - position(side.from);
       const double area = length(cross(position(side.to) - position(side.from), x));
       volumes[part] += dot(plane.n, e) * area;
@@ -152,10 +154,10 @@ class Builder {
     return !result_.edges.empty();
   }
 
-  const Vec3d& position(uint32_t vertex) const { return result_.positions[vertex]; }
+  const Vec3d& position(VertexId vertex) const { return result_.position(vertex); }
 
   const Mesh& mesh_;
-  std::vector<uint32_t> ids_;    // V
+  std::vector<VertexId> ids_;    // V
   std::vector<HalfEdge> sides_;  // sorted by edge
   EdgeMesh result_;
 };
@@ -182,15 +184,15 @@ double distance_error(const EdgeMesh& mesh, const Vec3d& p) {
   return 11 * 0x1.0p-53 * (length(p) + mesh.extent);
 }
 
-bool is_candidate(const EdgeMesh& mesh, uint32_t edge_index, const Vec3d& p) {
-  const Edge& edge = mesh.edges[edge_index];
+bool is_candidate(const EdgeMesh& mesh, EdgeId id, const Vec3d& p) {
+  const Edge& edge = mesh.edge(id);
   if (edge.edge_class == EdgeClass::kBorder || edge.edge_class == EdgeClass::kIrregular)
     return true;
   if (edge.edge_class == EdgeClass::kSharp && !mesh.one_sided_closed) return true;
   if (edge.edge_class == EdgeClass::kSmooth && edge.concave && mesh.one_sided_closed) return false;
   const double error = distance_error(mesh, p);
-  const double d0 = mesh.planes[edge.faces[0]].distance(p);
-  const double d1 = mesh.planes[edge.faces[1]].distance(p);
+  const double d0 = mesh.plane(edge.faces[0]).distance(p);
+  const double d1 = mesh.plane(edge.faces[1]).distance(p);
   const bool front0 = d0 >= -error, front1 = d1 >= -error;
   if (edge.edge_class == EdgeClass::kSharp) return front0 || front1;
   const bool back0 = d0 <= error, back1 = d1 <= error;

@@ -54,27 +54,27 @@ bool projection_vanishes(double ax, double ay, double bx, double by, double cx, 
   return sums_to_zero(terms);
 }
 
-uint64_t undirected_key(uint32_t a, uint32_t b) {
-  return uint64_t{std::min(a, b)} << 32 | std::max(a, b);
+uint64_t undirected_key(VertexId a, VertexId b) {
+  return uint64_t{std::min(a, b).index()} << 32 | std::max(a, b).index();
 }
 
 // Sets of collinear vertices that faces of zero area tie together.
 class SliverLines {
  public:
-  SliverLines(const Mesh& mesh, const std::vector<uint32_t>& ids,
-              const std::vector<uint32_t>& slivers)
+  SliverLines(const Mesh& mesh, const std::vector<VertexId>& ids,
+              const std::vector<FaceId>& slivers)
       : mesh_(mesh), lines_(slivers.size()), vertices_(slivers.size()) {
     for (uint32_t s = 0; s < slivers.size(); ++s) {
-      const FaceIndices& face = mesh.faces[slivers[s]];
+      const FaceIndices& face = mesh.face(slivers[s]);
       for (int k = 0; k < 3; ++k) {
-        const uint32_t a = ids[face[k]], b = ids[face[(k + 1) % 3]];
+        const VertexId a = ids[face[k]], b = ids[face[(k + 1) % 3]];
         if (a == b) continue;
         const auto [found, is_new] = line_of_edge_.emplace(undirected_key(a, b), s);
         if (!is_new) lines_.join(s, found->second);
       }
     }
     for (uint32_t s = 0; s < slivers.size(); ++s)
-      for (uint32_t corner : mesh.faces[slivers[s]])
+      for (uint32_t corner : mesh.face(slivers[s]))
         vertices_[lines_.root(s)].push_back(ids[corner]);
   }
 
@@ -86,7 +86,8 @@ class SliverLines {
       return;
     }
     HalfEdge part = side;
-    for (uint32_t vertex : between(side.from, side.to, vertices_[lines_.root(line->second)])) {
+    for (const VertexId vertex :
+         between(side.from, side.to, vertices_[lines_.root(line->second)])) {
       part.to = vertex;
       sides.push_back(part);
       part.from = vertex;
@@ -97,17 +98,18 @@ class SliverLines {
 
  private:
   // Points of one line are told apart, and ordered, by the axis along which it runs longest.
-  std::vector<uint32_t> between(uint32_t from, uint32_t to,
-                                const std::vector<uint32_t>& candidates) const {
-    const Vec3d e = cast<double>(mesh_.positions[to]) - cast<double>(mesh_.positions[from]);
+  std::vector<VertexId> between(VertexId from, VertexId to,
+                                const std::vector<VertexId>& candidates) const {
+    const auto position = [&](VertexId v) { return mesh_.positions[v.index()]; };
+    const Vec3d e = cast<double>(position(to)) - cast<double>(position(from));
     const double ax = std::fabs(e.x), ay = std::fabs(e.y), az = std::fabs(e.z);
     const int axis = ax >= ay && ax >= az ? 0 : ay >= az ? 1 : 2;
     const float sign = e[axis] > 0 ? 1.0f : -1.0f;
-    const auto along = [&](uint32_t v) { return sign * mesh_.positions[v][axis]; };
-    std::vector<uint32_t> inside;
-    for (uint32_t v : candidates)
+    const auto along = [&](VertexId v) { return sign * position(v)[axis]; };
+    std::vector<VertexId> inside;
+    for (const VertexId v : candidates)
       if (along(v) > along(from) && along(v) < along(to)) inside.push_back(v);
-    std::sort(inside.begin(), inside.end(), [&](uint32_t a, uint32_t b) {
+    std::sort(inside.begin(), inside.end(), [&](VertexId a, VertexId b) {
       return along(a) != along(b) ? along(a) < along(b) : a < b;
     });
     inside.erase(std::unique(inside.begin(), inside.end()), inside.end());
@@ -116,25 +118,26 @@ class SliverLines {
 
   const Mesh& mesh_;
   UnionFind lines_;                                      // over slivers
-  std::vector<std::vector<uint32_t>> vertices_;          // of the line, at its root
+  std::vector<std::vector<VertexId>> vertices_;          // of the line, at its root
   std::unordered_map<uint64_t, uint32_t> line_of_edge_;  // to one sliver of the line
 };
 
 }  // namespace
 
-std::vector<uint32_t> edge_vertex_ids(const Mesh& mesh) {
-  std::vector<uint32_t> ids = mesh.weld;
+std::vector<VertexId> edge_vertex_ids(const Mesh& mesh) {
+  std::vector<VertexId> ids(mesh.weld.begin(), mesh.weld.end());
   if (mesh.position_tangents.empty()) return ids;
-  std::unordered_map<uint32_t, std::vector<uint32_t>> torn;  // weld id to further representatives
+  std::unordered_map<uint32_t, std::vector<VertexId>> torn;  // weld to further representatives
   for (uint32_t v = 0; v < ids.size(); ++v) {
-    const auto alike = [&](uint32_t other) {
-      return moves_alike(mesh.position_tangents[v], mesh.position_tangents[other]);
+    const auto alike = [&](VertexId other) {
+      return moves_alike(mesh.position_tangents[v], mesh.position_tangents[other.index()]);
     };
     if (alike(ids[v])) continue;
-    std::vector<uint32_t>& others = torn[ids[v]];
+    std::vector<VertexId>& others = torn[mesh.weld[v]];
     const auto found = std::find_if(others.begin(), others.end(), alike);
-    ids[v] = found != others.end() ? *found : v;
-    if (found == others.end()) others.push_back(v);
+    const bool is_new = found == others.end();
+    ids[v] = is_new ? VertexId(v) : *found;
+    if (is_new) others.push_back(ids[v]);
   }
   return ids;
 }
@@ -146,18 +149,18 @@ bool collinear(const Vec3f& fa, const Vec3f& fb, const Vec3f& fc) {
          projection_vanishes(a.z, a.x, b.z, b.x, c.z, c.x);
 }
 
-std::vector<HalfEdge> half_edges_of(const Mesh& mesh, const std::vector<uint32_t>& ids) {
-  std::vector<uint32_t> slivers;
+std::vector<HalfEdge> half_edges_of(const Mesh& mesh, const std::vector<VertexId>& ids) {
+  std::vector<FaceId> slivers;
   std::vector<HalfEdge> sides;
   sides.reserve(3 * mesh.faces.size());
   for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
     const FaceIndices& face = mesh.faces[f];
     if (collinear(mesh.positions[face[0]], mesh.positions[face[1]], mesh.positions[face[2]])) {
-      slivers.push_back(f);
+      slivers.emplace_back(f);
       continue;
     }
     for (int k = 0; k < 3; ++k)
-      sides.push_back({ids[face[k]], ids[face[(k + 1) % 3]], f, ids[face[(k + 2) % 3]]});
+      sides.push_back({ids[face[k]], ids[face[(k + 1) % 3]], FaceId(f), ids[face[(k + 2) % 3]]});
   }
   if (slivers.empty()) return sides;
   SliverLines lines(mesh, ids, slivers);

@@ -9,15 +9,15 @@ namespace limn {
 
 // A side of a face, or a part of one where a face of zero area met it.
 struct HalfEdge {
-  uint32_t from, to;  // welded vertex ids, in the face's winding
-  uint32_t face;
-  uint32_t opposite;  // the corner of the face off this side, welded
+  VertexId from, to;  // welded, in the face's winding
+  FaceId face;
+  VertexId opposite;  // the corner of the face off this side, welded
 };
 
 // V: the id under which a vertex takes part in edges: the smallest index of a vertex at the same
 // position that moves alike in every lane (to the rounding of floats). Copies that move apart tear
 // the surface: they keep ids of their own, so that both rims become borders.
-std::vector<uint32_t> edge_vertex_ids(const Mesh& mesh);
+std::vector<VertexId> edge_vertex_ids(const Mesh& mesh);
 
 // Whether the three points lie on one line (or coincide), decided exactly.
 bool collinear(const Vec3f& a, const Vec3f& b, const Vec3f& c);
@@ -26,6 +26,6 @@ bool collinear(const Vec3f& a, const Vec3f& b, const Vec3f& c);
 // and only says that its long side equals its two short ones. So it is left out, and the sides of
 // its neighbours are split at the corners that lie on them: the real neighbours meet.
 // ids: V, from edge_vertex_ids
-std::vector<HalfEdge> half_edges_of(const Mesh& mesh, const std::vector<uint32_t>& ids);
+std::vector<HalfEdge> half_edges_of(const Mesh& mesh, const std::vector<VertexId>& ids);
 
 }  // namespace limn

@@ -8,7 +8,7 @@
 namespace limn {
 namespace {
 
-std::pair<uint32_t, uint32_t> ends_of(const Edge& edge) {
+std::pair<VertexId, VertexId> ends_of(const Edge& edge) {
   return std::minmax(edge.vertices[0], edge.vertices[1]);
 }
 
@@ -21,10 +21,10 @@ const char* fault_of_sizes(const EdgeMesh& mesh) {
     return "offsets do not span the incident faces";
   for (size_t e = 0; e < mesh.edges.size(); ++e)
     if (mesh.face_offsets[e] >= mesh.face_offsets[e + 1]) return "an edge has no faces";
-  for (const uint32_t face : mesh.incident_faces)
-    if (face >= mesh.planes.size()) return "an incident face is out of range";
+  for (const FaceId face : mesh.incident_faces)
+    if (face.index() >= mesh.planes.size()) return "an incident face is out of range";
   for (const Edge& edge : mesh.edges)
-    if (ends_of(edge).second >= mesh.positions.size()) return "a vertex is out of range";
+    if (ends_of(edge).second.index() >= mesh.positions.size()) return "a vertex is out of range";
   return nullptr;
 }
 
@@ -36,17 +36,17 @@ const char* fault_of(const Plane& plane) {
                                                  : "a plane's normal is not a unit vector";
 }
 
-const char* fault_of_faces(const EdgeMesh& mesh, uint32_t index) {
-  const Edge& edge = mesh.edges[index];
-  const std::span<const uint32_t> around = mesh.faces_around(index);
+const char* fault_of_faces(const EdgeMesh& mesh, EdgeId id) {
+  const Edge& edge = mesh.edge(id);
+  const std::span<const FaceId> around = mesh.faces_around(id);
   if (edge.faces[0] != around[0]) return "its first face is not the first around it";
-  if (edge.faces[1] != (around.size() > 1 ? around[1] : kNoFace))
+  if (edge.faces[1] != (around.size() > 1 ? around[1] : FaceId::none()))
     return "its second face is not the second around it";
-  for (const uint32_t face : around) {
-    const Plane& plane = mesh.planes[face];
+  for (const FaceId face : around) {
+    const Plane& plane = mesh.plane(face);
     if (length_squared(plane.n) == 0) return "a face around it has no area";
-    for (const uint32_t vertex : edge.vertices) {
-      const Vec3d& x = mesh.positions[vertex];
+    for (const VertexId vertex : edge.vertices) {
+      const Vec3d& x = mesh.position(vertex);
       if (std::fabs(plane.distance(x)) > distance_error(mesh, x))
         return "an end lies off the plane of a face around it";
     }
@@ -54,9 +54,9 @@ const char* fault_of_faces(const EdgeMesh& mesh, uint32_t index) {
   return nullptr;
 }
 
-const char* fault_of_class(const EdgeMesh& mesh, uint32_t index) {
-  const Edge& edge = mesh.edges[index];
-  const size_t faces = mesh.faces_around(index).size();
+const char* fault_of_class(const EdgeMesh& mesh, EdgeId id) {
+  const Edge& edge = mesh.edge(id);
+  const size_t faces = mesh.faces_around(id).size();
   const bool irregular = edge.edge_class == EdgeClass::kIrregular;
   if ((edge.edge_class == EdgeClass::kBorder) != (faces == 1)) return "a border has one face";
   if (faces > 2 && !irregular) return "more than two faces make it irregular";
@@ -67,15 +67,15 @@ const char* fault_of_class(const EdgeMesh& mesh, uint32_t index) {
   return nullptr;
 }
 
-const char* fault_of_edge(const EdgeMesh& mesh, uint32_t index) {
-  const Edge& edge = mesh.edges[index];
+const char* fault_of_edge(const EdgeMesh& mesh, EdgeId id) {
+  const Edge& edge = mesh.edge(id);
   if (edge.vertices[0] == edge.vertices[1]) return "its two ends are one vertex";
-  if (index > 0 && ends_of(mesh.edges[index - 1]) >= ends_of(edge))
+  if (id.index() > 0 && ends_of(mesh.edges[id.index() - 1]) >= ends_of(edge))
     return "edges are not sorted by their vertices";
-  for (const uint32_t vertex : edge.vertices)
-    if (!(length(mesh.positions[vertex]) <= mesh.extent)) return "an end lies beyond the extent";
-  if (const char* fault = fault_of_faces(mesh, index)) return fault;
-  return fault_of_class(mesh, index);
+  for (const VertexId vertex : edge.vertices)
+    if (!(length(mesh.position(vertex)) <= mesh.extent)) return "an end lies beyond the extent";
+  if (const char* fault = fault_of_faces(mesh, id)) return fault;
+  return fault_of_class(mesh, id);
 }
 
 }  // namespace
@@ -85,7 +85,7 @@ std::string EdgeMesh::validate() const {
   for (size_t f = 0; f < planes.size(); ++f)
     if (const char* fault = fault_of(planes[f])) return "face " + std::to_string(f) + ": " + fault;
   for (uint32_t e = 0; e < edges.size(); ++e)
-    if (const char* fault = fault_of_edge(*this, e))
+    if (const char* fault = fault_of_edge(*this, EdgeId(e)))
       return "edge " + std::to_string(e) + ": " + fault;
   return {};
 }

@@ -117,7 +117,7 @@ struct EdgeForest::Impl {
     const EdgeNode* node;
     int lane;
     double probability;
-    EdgeId edge() const { return {node->head.object, static_cast<uint32_t>(node->edge[lane])}; }
+    EdgeRef edge() const { return node->edge_at(lane); }
   };
   bool draw(const ForestQuery& query, double u, Draw& result) const {
     Choice choice;
@@ -155,10 +155,10 @@ struct EdgeForest::Impl {
   // Exact test of a drawn edge; most pass without a look at the mesh.
   bool accepts(const EdgeQuery& query, const ForestPoint& point, const EdgeNode& node,
                int lane) const {
-    const EdgeId id{node.head.object, static_cast<uint32_t>(node.edge[lane])};
+    const EdgeRef id = node.edge_at(lane);
     // Concave edges are in the forest only where they can be silhouettes, or for comparison.
     if (!config.cull_concave || !surely_candidate(node, lane, point)) {
-      if (!is_candidate(input.objects[id.object], id.edge, query.p)) return false;
+      if (!is_candidate(input.object(id.object), id.edge, query.p)) return false;
     }
     return !is_own_edge(input, query, id);
   }
@@ -199,8 +199,8 @@ std::optional<EdgeSample> EdgeForest::sample(const EdgeQuery& query, Rng& rng) c
   return sample;
 }
 
-double EdgeForest::probability(const EdgeQuery& query, EdgeId id) const {
-  const uint32_t slot = impl_->forest.slots[id.object][id.edge];
+double EdgeForest::probability(const EdgeQuery& query, EdgeRef id) const {
+  const uint32_t slot = impl_->forest.slot(id);
   if (slot == kNoParent) return 0;
   const EdgeNode& node = impl_->forest.edges[slot / kWidth];
   const int lane = static_cast<int>(slot % kWidth);
@@ -210,8 +210,8 @@ double EdgeForest::probability(const EdgeQuery& query, EdgeId id) const {
   return impl_->probability(~static_cast<NodeId>(slot / kWidth), lane, prepared);
 }
 
-double EdgeForest::pdf_t(const EdgeQuery& query, EdgeId id, double t) const {
-  const uint32_t slot = impl_->forest.slots[id.object][id.edge];
+double EdgeForest::pdf_t(const EdgeQuery& query, EdgeRef id, double t) const {
+  const uint32_t slot = impl_->forest.slot(id);
   if (slot == kNoParent) return 0;
   const SeenEdge edge =
       Impl::seen_edge(LtcLobe(query.lobe, query.n, query.wi), query.p,
@@ -223,7 +223,7 @@ std::unique_ptr<RejectionTree> EdgeForest::rejection_tree() const {
   return make_forest_rejection_tree(impl_->forest);
 }
 
-uint64_t EdgeForest::list_silhouettes(const Vec3d& p, std::vector<EdgeId>& edges) const {
+uint64_t EdgeForest::list_silhouettes(const Vec3d& p, std::vector<EdgeRef>& edges) const {
   const Forest& forest = impl_->forest;
   const ForestPoint point = point_of(forest, p);
   std::vector<NodeId> stack(forest.roots.rbegin(), forest.roots.rend());
@@ -243,8 +243,8 @@ uint64_t EdgeForest::list_silhouettes(const Vec3d& p, std::vector<EdgeId>& edges
     const Ints alive = may_hold_candidates(node, point);
     for (int lane = 0; lane < kWidth; ++lane) {
       if (!alive[lane]) continue;
-      const EdgeId edge{node.head.object, static_cast<uint32_t>(node.edge[lane])};
-      if (is_candidate(impl_->input.objects[edge.object], edge.edge, p)) edges.push_back(edge);
+      const EdgeRef edge = node.edge_at(lane);
+      if (is_candidate(impl_->input.object(edge.object), edge.edge, p)) edges.push_back(edge);
     }
   }
   return tested;

@@ -18,8 +18,8 @@ class EdgeForest final : public EdgeSampler {
   ~EdgeForest() override;
 
   std::optional<EdgeSample> sample(const EdgeQuery& query, Rng& rng) const override;
-  double probability(const EdgeQuery& query, EdgeId edge) const override;
-  double pdf_t(const EdgeQuery& query, EdgeId edge, double t) const override;
+  double probability(const EdgeQuery& query, EdgeRef edge) const override;
+  double pdf_t(const EdgeQuery& query, EdgeRef edge, double t) const override;
   // A walk down the trees costs a handful of rays.
   double draw_cost() const override { return 5; }
   SamplerSize size() const override;
@@ -27,7 +27,7 @@ class EdgeForest final : public EdgeSampler {
 
   // All of E(p), without regard to occlusion, horizon or motion, in the order of the trees. Appends
   // and returns the number of nodes (of up to eight children) that were tested.
-  uint64_t list_silhouettes(const Vec3d& p, std::vector<EdgeId>& edges) const;
+  uint64_t list_silhouettes(const Vec3d& p, std::vector<EdgeRef>& edges) const;
 
  private:
   struct Impl;

@@ -30,26 +30,26 @@ std::optional<ForestGroup> group_of(const EdgeMesh& mesh, const Edge& edge,
   }
 }
 
-double speed_of(const EdgeMesh& mesh, uint32_t vertex, const Lanes& scale) {
+double speed_of(const EdgeMesh& mesh, VertexId vertex, const Lanes& scale) {
   if (mesh.tangents.empty()) return 0;
-  const Vec3<Lanes>& v = mesh.tangents[vertex];
+  const Vec3<Lanes>& v = mesh.tangent(vertex);
   double sum = 0;
   for (int i = 0; i < kLanes; ++i) sum += scale[i] * std::hypot(v.x[i], v.y[i], v.z[i]);
   return sum;
 }
 
-Wedge wedge_of(const EdgeMesh& mesh, uint32_t index, const Lanes& scale) {
-  const Edge& edge = mesh.edges[index];
+Wedge wedge_of(const EdgeMesh& mesh, EdgeId id, const Lanes& scale) {
+  const Edge& edge = mesh.edge(id);
   const auto [a, b] = edge.vertices;
   Wedge wedge;
-  wedge.planes[0] = mesh.planes[edge.faces[0]];
-  wedge.planes[1] = edge.faces[1] == kNoFace ? wedge.planes[0] : mesh.planes[edge.faces[1]];
-  wedge.ends = {mesh.positions[a], mesh.positions[b]};
+  wedge.planes[0] = mesh.plane(edge.faces[0]);
+  wedge.planes[1] = edge.faces[1].valid() ? mesh.plane(edge.faces[1]) : wedge.planes[0];
+  wedge.ends = {mesh.position(a), mesh.position(b)};
   wedge.length = length(wedge.ends[1] - wedge.ends[0]);
   const Vec3d &n0 = wedge.planes[0].n, &n1 = wedge.planes[1].n;
   wedge.angle = std::atan2(length(cross(n0, n1)), dot(n0, n1));
   wedge.speed = 0.5 * (speed_of(mesh, a, scale) + speed_of(mesh, b, scale));
-  wedge.edge = index;
+  wedge.edge = id;
   return wedge;
 }
 
@@ -121,7 +121,7 @@ void put_rows(const DualFit& fit, int lane, Rows& rows) {
 class TreeFiller {
  public:
   TreeFiller(const SplitTree& tree, std::span<const NodeId> ids, std::span<const Wedge> wedges,
-             uint32_t object, ForestGroup group, const ForestConfig& config)
+             ShapeId object, ForestGroup group, const ForestConfig& config)
       : tree_(tree), ids_(ids), wedges_(wedges), object_(object), group_(group), config_(config) {}
 
   void fill(uint32_t index, Forest& forest) const {
@@ -184,7 +184,7 @@ class TreeFiller {
       put_rows(fit_edge(wedges[0], frame), lane, node.rows);
       node.length[lane] = positive(wedges[0].length * scale);
       node.speed[lane] = speed_of(wedges);
-      node.edge[lane] = static_cast<int32_t>(wedges[0].edge);
+      node.edge[lane] = static_cast<int32_t>(wedges[0].edge.index());
       for (int e = 0; e < 2; ++e)
         for (int k = 0; k < 3; ++k)
           node.ends[e][k][lane] = static_cast<float>(wedges[0].ends[e][k]);
@@ -194,7 +194,7 @@ class TreeFiller {
   const SplitTree& tree_;
   std::span<const NodeId> ids_;
   std::span<const Wedge> wedges_;
-  uint32_t object_;
+  ShapeId object_;
   ForestGroup group_;
   const ForestConfig& config_;
 };
@@ -240,13 +240,13 @@ void link(std::span<const NodeId> ids, Forest& forest) {
       const int32_t child = id < 0 ? forest.edges[~id].edge[lane] : forest.inner[id].child[lane];
       if (child == kNoChild) continue;
       if (id < 0)
-        forest.slots[forest.edges[~id].head.object][child] = slot;
+        forest.slots[forest.edges[~id].head.object.index()][child] = slot;
       else
         forest.head(child).parent = slot;
     }
 }
 
-void append_tree(std::span<const Wedge> wedges, uint32_t object, ForestGroup group, int threads,
+void append_tree(std::span<const Wedge> wedges, ShapeId object, ForestGroup group, int threads,
                  const ForestConfig& config, Forest& forest) {
   const SplitTree tree = split_edges(wedges, config.width, threads);
   std::vector<Wedge> sorted(wedges.size());
@@ -269,17 +269,17 @@ void append_tree(std::span<const Wedge> wedges, uint32_t object, ForestGroup gro
 
 Forest build_forest(const EdgeSamplerInput& input, int threads, const ForestConfig& config) {
   Forest forest;
-  for (uint32_t object = 0; object < input.objects.size(); ++object) {
-    const EdgeMesh& mesh = input.objects[object];
+  for (uint32_t o = 0; o < input.objects.size(); ++o) {
+    const EdgeMesh& mesh = input.objects[o];
     forest.extent = std::max(forest.extent, mesh.extent);
     forest.slots.emplace_back(mesh.edges.size(), kNoParent);
     std::vector<Wedge> groups[kForestGroups];
     for (uint32_t e = 0; e < mesh.edges.size(); ++e)
       if (const auto group = group_of(mesh, mesh.edges[e], config))
-        groups[static_cast<int>(*group)].push_back(wedge_of(mesh, e, input.lane_scale));
+        groups[static_cast<int>(*group)].push_back(wedge_of(mesh, EdgeId(e), input.lane_scale));
     for (int g = 0; g < kForestGroups; ++g)
       if (!groups[g].empty())
-        append_tree(groups[g], object, static_cast<ForestGroup>(g), threads, config, forest);
+        append_tree(groups[g], ShapeId(o), static_cast<ForestGroup>(g), threads, config, forest);
   }
   return forest;
 }

@@ -16,7 +16,7 @@ struct Wedge {
   double length = 0;
   double angle = 0;  // exterior dihedral angle
   double speed = 0;  // mean of the two ends, lanes added up
-  uint32_t edge = 0;
+  EdgeId edge;
 };
 
 // The frame in which a node's children are described: x = ((p - center) * inverse_radius, 1).

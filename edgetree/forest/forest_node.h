@@ -32,7 +32,7 @@ struct NodeHead {
   float center[3];
   float inverse_radius;
   uint32_t parent;  // kWidth * inner node + lane
-  uint32_t object;
+  ShapeId object;
   ForestGroup group;
   uint8_t height;  // 0 for nodes of edges, else one more than the highest child's
 };
@@ -61,6 +61,11 @@ struct alignas(64) EdgeNode {
   Floats speed;
   Ints edge;          // index of an edge of the object, or kNoChild
   Floats ends[2][3];  // world space, exactly
+
+  // In a lane that has one.
+  EdgeRef edge_at(int lane) const {
+    return {head.object, EdgeId(static_cast<uint32_t>(edge[lane]))};
+  }
 };
 
 struct Forest {
@@ -75,6 +80,7 @@ struct Forest {
   // every node has one parent, every edge one lane, boxes hold what is below, rows are scaled.
   std::string validate(std::span<const EdgeMesh> objects) const;
 
+  uint32_t slot(EdgeRef id) const { return slots[id.object.index()][id.edge.index()]; }
   NodeHead& head(NodeId id) { return id < 0 ? edges[~id].head : inner[id].head; }
   const NodeHead& head(NodeId id) const { return id < 0 ? edges[~id].head : inner[id].head; }
 };

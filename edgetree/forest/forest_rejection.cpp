@@ -35,7 +35,7 @@ class ForestRejectionTree final : public RejectionTree {
       nodes_.push_back({parent, 0, depth, static_cast<uint32_t>(edges_.size()), 0});
       slots_.push_back({id, lane});
       if (id < 0) {
-        edges_.push_back({forest_.edges[~id].head.object, static_cast<uint32_t>(lanes[lane])});
+        edges_.push_back(forest_.edges[~id].edge_at(lane));
       } else {
         append(lanes[lane], node, depth + 1);
       }

@@ -33,8 +33,8 @@ class Walk {
     }
     for (const bool seen : inner_seen_) require(seen, "no root leads to an inner node");
     for (const bool seen : edges_seen_) require(seen, "no root leads to a node of edges");
-    for (size_t o = 0; o < objects_.size(); ++o)
-      for (uint32_t e = 0; e < objects_[o].edges.size(); ++e) require_slot(o, e);
+    for (uint32_t o = 0; o < objects_.size(); ++o)
+      for (uint32_t e = 0; e < objects_[o].edges.size(); ++e) require_slot({ShapeId(o), EdgeId(e)});
   }
 
  private:
@@ -48,19 +48,18 @@ class Walk {
   }
 
   // An edge is in the lane that its slot names, or in none: then it is concave and culled.
-  void require_slot(size_t object, uint32_t index) const {
-    const uint32_t slot = forest_.slots[object][index];
+  void require_slot(EdgeRef id) const {
+    const uint32_t slot = forest_.slot(id);
     if (slot == kNoParent) {
-      const Edge& edge = objects_[object].edges[index];
-      require(edge.concave && edge.edge_class == EdgeClass::kSmooth &&
-                  objects_[object].one_sided_closed,
+      const EdgeMesh& mesh = objects_[id.object.index()];
+      const Edge& edge = mesh.edge(id.edge);
+      require(edge.concave && edge.edge_class == EdgeClass::kSmooth && mesh.one_sided_closed,
               "an edge that may be a silhouette is in no node");
       return;
     }
     require(slot / kWidth < forest_.edges.size(), "a slot is out of range");
     const EdgeNode& node = forest_.edges[slot / kWidth];
-    require(node.head.object == object && node.edge[slot % kWidth] == static_cast<int32_t>(index),
-            "a slot does not lead to its edge");
+    require(node.edge_at(slot % kWidth) == id, "a slot does not lead to its edge");
   }
 
   // Returns bounds of all edges below.
@@ -69,7 +68,7 @@ class Walk {
     require(!seen[id < 0 ? ~id : id], "two ways lead to a node");
     seen[id < 0 ? ~id : id] = true;
     const NodeHead& head = forest_.head(id);
-    require(head.object < objects_.size(), "an object is out of range");
+    require(head.object.index() < objects_.size(), "an object is out of range");
     require(head.inverse_radius > 0 && std::isfinite(head.inverse_radius),
             "a node's radius is not positive");
     return id < 0 ? visit_edges(~id) : visit_children(id);
@@ -94,16 +93,16 @@ class Walk {
   }
 
   void require_edge(const EdgeNode& node, int lane, uint32_t slot) const {
-    const EdgeMesh& mesh = objects_[node.head.object];
-    const auto index = static_cast<uint32_t>(node.edge[lane]);
-    require(index < mesh.edges.size(), "an edge is out of range");
-    require(forest_.slots[node.head.object][index] == slot, "an edge is in two lanes");
+    const EdgeMesh& mesh = objects_[node.head.object.index()];
+    const EdgeRef id = node.edge_at(lane);
+    require(id.edge.index() < mesh.edges.size(), "an edge is out of range");
+    require(forest_.slot(id) == slot, "an edge is in two lanes");
     require(node.length[lane] > 0, "an edge has no length");
     require(node.speed[lane] >= 0, "a speed is negative");
     require_rows(node.rows, lane);
     for (int e = 0; e < 2; ++e)
       for (int k = 0; k < 3; ++k)
-        require(node.ends[e][k][lane] == mesh.positions[mesh.edges[index].vertices[e]][k],
+        require(node.ends[e][k][lane] == mesh.position(mesh.edge(id.edge).vertices[e])[k],
                 "an end is not the mesh's");
   }
 

@@ -27,9 +27,9 @@ double max_cosine(const Vec3d& axis, const Vec3d& u_a, const Vec3d& u_b) {
   return std::clamp(peak, std::max(a, b), 1.0);
 }
 
-Vec3<Lanes> relative_velocity(const EdgeMesh& mesh, uint32_t vertex, const EdgeQuery& query) {
+Vec3<Lanes> relative_velocity(const EdgeMesh& mesh, VertexId vertex, const EdgeQuery& query) {
   if (mesh.tangents.empty()) return -query.velocity;
-  const Vec3<Lanes>& v = mesh.tangents[vertex];
+  const Vec3<Lanes>& v = mesh.tangent(vertex);
   return {v.x - query.velocity.x, v.y - query.velocity.y, v.z - query.velocity.z};
 }
 
@@ -39,10 +39,10 @@ Lanes component_along(const Vec3<Lanes>& v, const Vec3d& c) {
 
 }  // namespace
 
-EdgeSegment segment_of(const EdgeMesh& mesh, uint32_t edge, const EdgeQuery& query) {
-  const auto [a, b] = mesh.edges[edge].vertices;
-  return {mesh.positions[a] - query.p, mesh.positions[b] - query.p,
-          relative_velocity(mesh, a, query), relative_velocity(mesh, b, query)};
+EdgeSegment segment_of(const EdgeMesh& mesh, EdgeId edge, const EdgeQuery& query) {
+  const auto [a, b] = mesh.edge(edge).vertices;
+  return {mesh.position(a) - query.p, mesh.position(b) - query.p, relative_velocity(mesh, a, query),
+          relative_velocity(mesh, b, query)};
 }
 
 LobeBound::LobeBound(const Vec3d& n, const Vec3d& wi, const LobeSummary& lobe)

@@ -9,8 +9,8 @@
 namespace limn {
 namespace {
 
-bool is_candidate(const EdgeSamplerInput& input, EdgeId id, const Vec3d& p) {
-  return limn::is_candidate(input.objects[id.object], id.edge, p);
+bool is_candidate(const EdgeSamplerInput& input, EdgeRef id, const Vec3d& p) {
+  return limn::is_candidate(input.object(id.object), id.edge, p);
 }
 
 // Number of edges of E(p) among the first i of a tree.
@@ -18,7 +18,7 @@ std::vector<uint32_t> running_candidates(const EdgeSamplerInput& input, const Re
                                          const Vec3d& p) {
   std::vector<uint32_t> running{0};
   running.reserve(tree.edges().size() + 1);
-  for (const EdgeId id : tree.edges())
+  for (const EdgeRef id : tree.edges())
     running.push_back(running.back() + (is_candidate(input, id, p) ? 1 : 0));
   return running;
 }
@@ -34,15 +34,17 @@ void add(std::vector<DepthCounts>& sums, const std::vector<DepthCounts>& counts)
 }
 
 // E(p) in order, but for what was reached.
-std::vector<EdgeId> not_reached(const EdgeSamplerInput& input, const std::vector<EdgeId>& reached,
-                                const Vec3d& p) {
+std::vector<EdgeRef> not_reached(const EdgeSamplerInput& input, const std::vector<EdgeRef>& reached,
+                                 const Vec3d& p) {
   std::vector<std::vector<bool>> known;
   for (const EdgeMesh& mesh : input.objects) known.emplace_back(mesh.edges.size(), false);
-  for (const EdgeId id : reached) known[id.object][id.edge] = true;
-  std::vector<EdgeId> rest;
+  for (const EdgeRef id : reached) known[id.object.index()][id.edge.index()] = true;
+  std::vector<EdgeRef> rest;
   for (uint32_t o = 0; o < input.objects.size(); ++o)
-    for (uint32_t e = 0; e < input.objects[o].edges.size(); ++e)
-      if (!known[o][e] && is_candidate(input, {o, e}, p)) rest.push_back({o, e});
+    for (uint32_t e = 0; e < input.objects[o].edges.size(); ++e) {
+      const EdgeRef id{ShapeId(o), EdgeId(e)};
+      if (!known[o][e] && is_candidate(input, id, p)) rest.push_back(id);
+    }
   return rest;
 }
 
@@ -58,7 +60,7 @@ Verdict judge(const EdgeSamplerInput& input, const RejectionTree& tree, uint32_t
               const Vec3d& p) {
   const auto edges = tree.edges(node);
   const bool holds = std::any_of(edges.begin(), edges.end(),
-                                 [&](EdgeId id) { return is_candidate(input, id, p); });
+                                 [&](EdgeRef id) { return is_candidate(input, id, p); });
   if (tree.rejects(node, p)) return holds ? Verdict::kMissed : Verdict::kTrueReject;
   return holds ? Verdict::kTrueAccept : Verdict::kFalseAccept;
 }
@@ -137,11 +139,11 @@ ReachCounts count_reach(const EdgeSamplerInput& input, const RejectionTree& tree
 std::vector<EdgeQuery> queries_around(const EdgeMesh& mesh, int count, uint64_t seed) {
   Bounds bounds;
   for (const Edge& edge : mesh.edges)
-    for (const uint32_t vertex : edge.vertices) bounds.extend(mesh.positions[vertex]);
+    for (const VertexId vertex : edge.vertices) bounds.extend(mesh.position(vertex));
   double radius = 0;
   for (const Edge& edge : mesh.edges)
-    for (const uint32_t vertex : edge.vertices)
-      radius = std::max(radius, length(mesh.positions[vertex] - bounds.center()));
+    for (const VertexId vertex : edge.vertices)
+      radius = std::max(radius, length(mesh.position(vertex) - bounds.center()));
   Rng rng(seed, 0, 0);
   std::vector<EdgeQuery> queries;
   for (int i = 0; i < count; ++i) {

@@ -9,11 +9,11 @@ namespace limn {
 namespace {
 
 // Normals of the faces around the edges, once for each edge.
-std::vector<Vec3d> normals_of(const EdgeSamplerInput& input, std::span<const EdgeId> edges) {
+std::vector<Vec3d> normals_of(const EdgeSamplerInput& input, std::span<const EdgeRef> edges) {
   std::vector<Vec3d> normals;
-  for (const EdgeId id : edges) {
-    const EdgeMesh& mesh = input.objects[id.object];
-    for (const uint32_t face : mesh.faces_around(id.edge)) normals.push_back(mesh.planes[face].n);
+  for (const EdgeRef id : edges) {
+    const EdgeMesh& mesh = input.object(id.object);
+    for (const FaceId face : mesh.faces_around(id.edge)) normals.push_back(mesh.plane(face).n);
   }
   return normals;
 }
@@ -64,8 +64,8 @@ uint32_t balanced_node(const EdgeSamplerInput& input, const RejectionTree& tree,
   for (const uint32_t i : nodes_of_size(tree, edges)) {
     const auto own = tree.edges(i);
     const auto holds = std::count_if(queries.begin(), queries.end(), [&](const EdgeQuery& query) {
-      return std::any_of(own.begin(), own.end(), [&](EdgeId id) {
-        return is_candidate(input.objects[id.object], id.edge, query.p);
+      return std::any_of(own.begin(), own.end(), [&](EdgeRef id) {
+        return is_candidate(input.object(id.object), id.edge, query.p);
       });
     });
     const double off = std::fabs(static_cast<double>(holds) - 0.5 * queries.size());
@@ -78,13 +78,13 @@ uint32_t balanced_node(const EdgeSamplerInput& input, const RejectionTree& tree,
 }
 
 Match best_match(const EdgeSamplerInput& input, const RejectionTree& tree,
-                 std::span<const EdgeId> edges) {
+                 std::span<const EdgeRef> edges) {
   std::vector<std::vector<bool>> wanted;
   for (const EdgeMesh& mesh : input.objects) wanted.emplace_back(mesh.edges.size(), false);
-  for (const EdgeId id : edges) wanted[id.object][id.edge] = true;
+  for (const EdgeRef id : edges) wanted[id.object.index()][id.edge.index()] = true;
   std::vector<uint32_t> running{0};
-  for (const EdgeId id : tree.edges())
-    running.push_back(running.back() + (wanted[id.object][id.edge] ? 1 : 0));
+  for (const EdgeRef id : tree.edges())
+    running.push_back(running.back() + (wanted[id.object.index()][id.edge.index()] ? 1 : 0));
   Match best;
   for (uint32_t i = 0; i < tree.nodes().size(); ++i) {
     const RejectionNode& node = tree.nodes()[i];
@@ -95,12 +95,11 @@ Match best_match(const EdgeSamplerInput& input, const RejectionTree& tree,
   return best;
 }
 
-Patch patch_of(const EdgeSamplerInput& input, std::span<const EdgeId> edges) {
+Patch patch_of(const EdgeSamplerInput& input, std::span<const EdgeRef> edges) {
   Bounds bounds;
-  for (const EdgeId id : edges) {
-    const EdgeMesh& mesh = input.objects[id.object];
-    for (const uint32_t vertex : mesh.edges[id.edge].vertices)
-      bounds.extend(mesh.positions[vertex]);
+  for (const EdgeRef id : edges) {
+    const EdgeMesh& mesh = input.object(id.object);
+    for (const VertexId vertex : mesh.edge(id.edge).vertices) bounds.extend(mesh.position(vertex));
   }
   const std::vector<Vec3d> normals = normals_of(input, edges);
   const Vec3d sum = mean(normals);

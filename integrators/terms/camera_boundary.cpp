@@ -13,7 +13,7 @@ namespace limn {
 namespace {
 
 struct FilmEdge {
-  EdgeId id;
+  EdgeRef id;
   double t0, t1;          // the part of the edge that may reach the film
   double depth0, depth1;  // depths of its two ends
   double x0, y0, x1, y1;  // their film positions
@@ -56,9 +56,9 @@ double weighted_speed(const FilmEdge& edge, int lane) {
 
 class CameraTerm final : public Term {
  public:
-  explicit CameraTerm(TermInput& input) : context_(input.context), objects_(input.edges().objects) {
+  explicit CameraTerm(TermInput& input) : context_(input.context), input_(input.edges()) {
     const Stopwatch watch;
-    for (uint32_t object = 0; object < objects_.size(); ++object) add_object(object);
+    for (uint32_t o = 0; o < input_.objects.size(); ++o) add_object(ShapeId(o));
     weigh(input.lanes);
     list_seconds_ = watch.seconds();
   }
@@ -71,35 +71,36 @@ class CameraTerm final : public Term {
   }
 
  private:
-  void add_object(uint32_t object);
-  bool clip_and_project(EdgeId id, FilmEdge& edge) const;
+  void add_object(ShapeId object);
+  bool clip_and_project(EdgeRef id, FilmEdge& edge) const;
   void weigh(int lanes);
 
   const PathContext& context_;
-  const std::vector<EdgeMesh>& objects_;
+  const EdgeSamplerInput& input_;
   std::vector<FilmEdge> edges_;
   std::vector<double> cumulative_;  // probabilities of the edges, summed
   double list_seconds_ = 0;
 };
 
-void CameraTerm::add_object(uint32_t object) {
-  if (context_.scene.hide_emitters && context_.scene.shapes[object].is_emitter) return;
-  const EdgeMesh& mesh = objects_[object];
+void CameraTerm::add_object(ShapeId object) {
+  if (context_.scene.hide_emitters && context_.scene.shape(object).is_emitter) return;
+  const EdgeMesh& mesh = input_.object(object);
   const Vec3d pinhole = value(context_.scene.camera.origin);
   for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
+    const EdgeRef id{object, EdgeId(e)};
     FilmEdge edge;
-    if (!is_candidate(mesh, e, pinhole) || !clip_and_project({object, e}, edge)) continue;
+    if (!is_candidate(mesh, id.edge, pinhole) || !clip_and_project(id, edge)) continue;
     if (is_zero(edge.speed0) && is_zero(edge.speed1)) continue;
     edges_.push_back(edge);
   }
 }
 
-bool CameraTerm::clip_and_project(EdgeId id, FilmEdge& edge) const {
-  const EdgeMesh& mesh = objects_[id.object];
+bool CameraTerm::clip_and_project(EdgeRef id, FilmEdge& edge) const {
+  const EdgeMesh& mesh = input_.object(id.object);
   const Camera& camera = context_.scene.camera;
-  const auto& ends = mesh.edges[id.edge].vertices;
-  const Vec3d a = mesh.positions[ends[0]];
-  const Vec3d b = mesh.positions[ends[1]];
+  const auto& ends = mesh.edge(id.edge).vertices;
+  const Vec3d a = mesh.position(ends[0]);
+  const Vec3d b = mesh.position(ends[1]);
   const double depth_a = camera.depth(a);
   const double depth_b = camera.depth(b);
   double t0 = 0;
@@ -124,7 +125,7 @@ bool CameraTerm::clip_and_project(EdgeId id, FilmEdge& edge) const {
     const Vec3d x = at(t);
     Vec3<Dual> result{x.x, x.y, x.z};
     if (!mesh.tangents.empty()) {
-      const Vec3<Lanes> d = mesh.tangents[ends[0]] * (1 - t) + mesh.tangents[ends[1]] * t;
+      const Vec3<Lanes> d = mesh.tangent(ends[0]) * (1 - t) + mesh.tangent(ends[1]) * t;
       result = {{x.x, d.x}, {x.y, d.y}, {x.z, d.z}};
     }
     return result;
@@ -183,11 +184,12 @@ bool CameraTerm::sample_film(double u, const Rng& key, RayCount& rays, FilmSampl
   const FilmEdge& edge = edges_[index];
   const double t = edge.t0 + (edge.t1 - edge.t0) * fraction_in_space(s, edge.depth0, edge.depth1);
   const Camera& camera = context_.scene.camera;
+  const EdgeMesh& mesh = input_.object(edge.id.object);
   EdgeView view;
-  if (!view_edge(objects_[edge.id.object], edge.id, t, value(camera.origin), view)) return false;
+  if (!view_edge(mesh, edge.id, t, value(camera.origin), view)) return false;
   const double t_min = camera.near_clip / dot(view.omega, value(camera.forward));
   Rgb<double> jump;
-  if (!edge_jump(context_, objects_[edge.id.object], view, {}, t_min, 0, key, rays, jump)) {
+  if (!edge_jump(context_, mesh, view, {}, t_min, 0, key, rays, jump)) {
     return false;
   }
   sample.x = edge.x0 + (edge.x1 - edge.x0) * s;

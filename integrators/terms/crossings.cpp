@@ -5,16 +5,17 @@
 #include <array>
 #include <cmath>
 
+#include "limn/core/shading.h"
 #include "limn/edgetree/edges.h"
 
 namespace limn {
 namespace {
 
 // The faces around each welded vertex.
-std::vector<std::vector<uint32_t>> faces_by_vertex(const Mesh& mesh) {
-  std::vector<std::vector<uint32_t>> faces(mesh.positions.size());
+std::vector<std::vector<FaceId>> faces_by_vertex(const Mesh& mesh) {
+  std::vector<std::vector<FaceId>> faces(mesh.positions.size());
   for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
-    for (const uint32_t vertex : mesh.faces[f]) faces[mesh.weld[vertex]].push_back(f);
+    for (const uint32_t vertex : mesh.faces[f]) faces[mesh.weld[vertex]].emplace_back(f);
   }
   return faces;
 }
@@ -34,20 +35,12 @@ bool passes_through(const Vec3d& a, const Vec3d& b, const std::array<Vec3d, 3>& 
   return true;
 }
 
-std::array<Vec3d, 3> corners(const Scene& scene, const FaceRef& face) {
-  const Mesh& mesh = scene.shapes[face.shape].mesh;
-  std::array<Vec3d, 3> result;
-  for (int i = 0; i < 3; ++i) {
-    result[i] = cast<double>(mesh.positions[mesh.faces[face.face][i]]);
-  }
-  return result;
-}
-
 // The first hit of the ray (an edge from a to b) that holds in double precision.
 bool first_crossing(const Scene& scene, const RayTracer& tracer, Ray ray, const Vec3d& a,
                     const Vec3d& b, Hit& hit) {
   while (tracer.closest(ray, hit)) {
-    if (passes_through(a, b, corners(scene, hit.face))) return true;
+    const Mesh& mesh = scene.shape(hit.face.shape).mesh;
+    if (passes_through(a, b, face_corners<double>(mesh, hit.face.face))) return true;
     // The next float: the ray tracer may compute in single precision.
     ray.t_min = std::nextafter(static_cast<float>(std::max(hit.t, ray.t_min)), INFINITY);
     if (ray.t_min >= ray.t_max) return false;
@@ -64,20 +57,20 @@ Crossings find_crossings(const Scene& scene, const RayTracer& tracer) {
     const EdgeMesh edges = build_edge_mesh(mesh, false);
     const auto around = faces_by_vertex(mesh);
     for (const Edge& edge : edges.edges) {
-      const Vec3d a = edges.positions[edge.vertices[0]];
-      const Vec3d b = edges.positions[edge.vertices[1]];
+      const Vec3d a = edges.position(edge.vertices[0]);
+      const Vec3d b = edges.position(edge.vertices[1]);
       // Faces that share an end with the edge touch it without crossing.
-      std::vector<uint32_t> skipped = around[edge.vertices[0]];
-      const auto& more = around[edge.vertices[1]];
+      std::vector<FaceId> skipped = around[edge.vertices[0].index()];
+      const auto& more = around[edge.vertices[1].index()];
       skipped.insert(skipped.end(), more.begin(), more.end());
       const double distance = length(b - a);
       Ray ray{a, (b - a) / distance, 0, distance};
-      ray.skip_shape = s;
+      ray.skip_shape = ShapeId(s);
       ray.skip_faces = skipped;
       Hit hit;
       if (!first_crossing(scene, tracer, ray, a, b, hit)) continue;
       if (crossings.edges++ == 0) {
-        crossings.shape_a = s;
+        crossings.shape_a = ShapeId(s);
         crossings.shape_b = hit.face.shape;
       }
     }

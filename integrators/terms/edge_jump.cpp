@@ -3,12 +3,12 @@
 
 namespace limn {
 
-bool view_edge(const EdgeMesh& mesh, EdgeId id, double t, const Vec3d& p, EdgeView& view) {
-  const Edge& edge = mesh.edges[id.edge];
+bool view_edge(const EdgeMesh& mesh, EdgeRef id, double t, const Vec3d& p, EdgeView& view) {
+  const Edge& edge = mesh.edge(id.edge);
   view.id = id;
   view.p = p;
-  view.x0 = mesh.positions[edge.vertices[0]];
-  view.x1 = mesh.positions[edge.vertices[1]];
+  view.x0 = mesh.position(edge.vertices[0]);
+  view.x1 = mesh.position(edge.vertices[1]);
   view.y = view.x0 + (view.x1 - view.x0) * t;
   const Vec3d w = view.y - p;
   view.distance = length(w);
@@ -20,9 +20,9 @@ bool view_edge(const EdgeMesh& mesh, EdgeId id, double t, const Vec3d& p, EdgeVi
 
 namespace {
 
+// The nearest face on either side of an edge, or none.
 struct Sides {
-  uint32_t negative = kNoFace;
-  uint32_t positive = kNoFace;
+  FaceId negative, positive;
 };
 
 // In the plane across the edge, a face leaves the edge along the unit vector a = alpha m + beta w,
@@ -33,14 +33,14 @@ Sides nearest_faces(const Scene& scene, const EdgeMesh& mesh, const EdgeView& vi
   double slopes[2] = {0, 0};
   const Vec3d along = normalize(view.x1 - view.x0);
   const Vec3d across = view.omega - along * dot(view.omega, along);
-  for (const uint32_t face : mesh.faces_around(view.id.edge)) {
-    const Vec3d a = direction_into_face(scene.shapes[view.id.object].mesh, face, view.x0, along);
+  for (const FaceId face : mesh.faces_around(view.id.edge)) {
+    const Vec3d a = direction_into_face(scene.shape(view.id.object).mesh, face, view.x0, along);
     const double alpha = dot(a, view.side);
     if (alpha == 0) continue;
     const double slope = dot(a, across) / std::fabs(alpha);
-    uint32_t& nearest = alpha > 0 ? sides.positive : sides.negative;
+    FaceId& nearest = alpha > 0 ? sides.positive : sides.negative;
     double& best = slopes[alpha > 0];
-    if (nearest == kNoFace || slope < best) {
+    if (!nearest.valid() || slope < best) {
       nearest = face;
       best = slope;
     }
@@ -69,10 +69,10 @@ bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView&
   const EdgeStart edge{view.id.object, ray.skip_faces, view.x0, view.x1};
   // Both sides share their random numbers: where they hardly differ, so do their estimates.
   const Rng side_key = key.at(Purpose::kEdgeSide, bounces);
-  const auto radiance = [&](uint32_t face) {
-    if (face != kNoFace) {
+  const auto radiance = [&](FaceId face) {
+    if (face.valid()) {
       const FaceRef ref{view.id.object, face};
-      const auto corners = face_corners<double>(context.scene.shapes[ref.shape].mesh, face);
+      const auto corners = face_corners<double>(context.scene.shape(ref.shape).mesh, face);
       const Vec3d n = cross(corners[1] - corners[0], corners[2] - corners[0]);
       return path.from_surface(surface_on_ray(context.scene, ref, view.y, n), -view.omega, bounces,
                                side_key, &edge);

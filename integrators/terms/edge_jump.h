@@ -7,7 +7,7 @@ namespace limn {
 
 // A point on an edge seen from p.
 struct EdgeView {
-  EdgeId id;
+  EdgeRef id;
   Vec3d p;
   Vec3d x0, x1;  // ends of the edge
   Vec3d y;       // the point, (1 - t) x0 + t x1
@@ -17,7 +17,7 @@ struct EdgeView {
   Vec3d side;
 };
 // False if y coincides with p.
-bool view_edge(const EdgeMesh& mesh, EdgeId id, double t, const Vec3d& p, EdgeView& view);
+bool view_edge(const EdgeMesh& mesh, EdgeRef id, double t, const Vec3d& p, EdgeView& view);
 
 // Estimates dL: radiance that arrives at p from just beside y on the negative side, minus that on
 // the positive side. False if y is hidden from p. Each side shows the nearest of the faces around

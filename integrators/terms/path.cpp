@@ -3,7 +3,7 @@
 
 namespace limn {
 
-Vec3d direction_into_face(const Mesh& mesh, uint32_t face, const Vec3d& x0, const Vec3d& along) {
+Vec3d direction_into_face(const Mesh& mesh, FaceId face, const Vec3d& x0, const Vec3d& along) {
   Vec3d best{};
   double best_length = 0;
   for (const Vec3d& corner : face_corners<double>(mesh, face)) {
@@ -21,15 +21,15 @@ Vec3d direction_into_face(const Mesh& mesh, uint32_t face, const Vec3d& x0, cons
 // In the plane across the edge a face is a ray {s g, s >= 0} and the path starts at a point f of
 // its own face, |f| -> 0. It meets g where f + r w = s g with r, s > 0; by Cramer's rule r = (f x
 // g) / (g x w), s = (f x w) / (g x w). Lengths drop out.
-std::optional<uint32_t> blocked_at_edge(const Scene& scene, const EdgeStart& edge, uint32_t start,
-                                        const Vec3d& direction) {
-  const Mesh& mesh = scene.shapes[edge.shape].mesh;
+std::optional<FaceId> blocked_at_edge(const Scene& scene, const EdgeStart& edge, FaceId start,
+                                      const Vec3d& direction) {
+  const Mesh& mesh = scene.shape(edge.shape).mesh;
   const Vec3d along = normalize(edge.x1 - edge.x0);
   const Vec3d f = direction_into_face(mesh, start, edge.x0, along);
   const auto turn = [&](const Vec3d& a, const Vec3d& b) { return dot(along, cross(a, b)); };
-  std::optional<uint32_t> nearest;
+  std::optional<FaceId> nearest;
   double nearest_r = 0;
-  for (const uint32_t face : edge.faces) {
+  for (const FaceId face : edge.faces) {
     if (face == start) continue;
     const Vec3d g = direction_into_face(mesh, face, edge.x0, along);
     const double gw = turn(g, direction);

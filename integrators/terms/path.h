@@ -27,19 +27,19 @@ struct PathContext {
 // these faces by rounding: whether a face blocks its neighbour at their common edge is decided by
 // their directions alone.
 struct EdgeStart {
-  uint32_t shape = 0;
-  std::span<const uint32_t> faces;  // around the edge
-  Vec3d x0, x1;                     // its ends
+  ShapeId shape;
+  std::span<const FaceId> faces;  // around the edge
+  Vec3d x0, x1;                   // its ends
 };
 
 // The unit vector across an edge that lies in the face and points into it. x0: a point of the edge,
 // along: its unit direction.
-Vec3d direction_into_face(const Mesh& mesh, uint32_t face, const Vec3d& x0, const Vec3d& along);
+Vec3d direction_into_face(const Mesh& mesh, FaceId face, const Vec3d& x0, const Vec3d& along);
 
 // The face around the edge that a ray meets at once when it leaves `start` infinitely close to the
 // edge, if any.
-std::optional<uint32_t> blocked_at_edge(const Scene& scene, const EdgeStart& edge, uint32_t start,
-                                        const Vec3d& direction);
+std::optional<FaceId> blocked_at_edge(const Scene& scene, const EdgeStart& edge, FaceId start,
+                                      const Vec3d& direction);
 
 // Does nothing at path vertices.
 struct NoVisitor {
@@ -146,7 +146,7 @@ class PathTracer {
   void move_along_edge(SurfacePoint<S>& surface, FaceRef face) const {
     // Only primal paths start on edges, so the point itself does not change.
     const Vec3<S> p = surface.p;
-    const auto corners = face_corners<double>(c_.scene.shapes[face.shape].mesh, face.face);
+    const auto corners = face_corners<double>(c_.scene.shape(face.shape).mesh, face.face);
     const Vec3d n = cross(corners[1] - corners[0], corners[2] - corners[0]);
     surface = surface_on_ray<S>(c_.scene, face, p, Vec3<S>{n.x, n.y, n.z});
   }

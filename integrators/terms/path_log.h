@@ -24,9 +24,10 @@ void log_vertex(SampleLog& log, const SurfacePoint<S>& surface, const Scattering
   log.push_back(fmt::format(
       "vertex {}: face {} of shape {}{} at {}, normal {}, to the viewer {}, throughput ({:.6g}, "
       "{:.6g}, {:.6g})",
-      bounces, surface.face.face, surface.face.shape, id.empty() ? "" : " \"" + id + "\"",
-      to_text(value(surface.p)), to_text(value(scattering.normal())),
-      to_text(value(scattering.wi())), throughput.r, throughput.g, throughput.b));
+      bounces, surface.face.face.index(), surface.face.shape.index(),
+      id.empty() ? "" : " \"" + id + "\"", to_text(value(surface.p)),
+      to_text(value(scattering.normal())), to_text(value(scattering.wi())), throughput.r,
+      throughput.g, throughput.b));
 }
 
 // Visitor of a PathTracer.

@@ -10,10 +10,10 @@
 namespace limn {
 namespace {
 
-Vec3<Lanes> edge_velocity(const EdgeMesh& mesh, uint32_t edge, double t) {
+Vec3<Lanes> edge_velocity(const EdgeMesh& mesh, EdgeId edge, double t) {
   if (mesh.tangents.empty()) return {};
-  const auto& ends = mesh.edges[edge].vertices;
-  return mesh.tangents[ends[0]] * (1 - t) + mesh.tangents[ends[1]] * t;
+  const auto& ends = mesh.edge(edge).vertices;
+  return mesh.tangent(ends[0]) * (1 - t) + mesh.tangent(ends[1]) * t;
 }
 
 Vec3<Lanes> velocity(const Vec3<Dual>& p) { return {p.x.d, p.y.d, p.z.d}; }
@@ -35,8 +35,7 @@ class BoundaryTerm final : public Term {
     query.wi = value(vertex.scattering.wi());
     query.lobe = vertex.scattering.bsdf().lobe();
     query.velocity = velocity(vertex.surface.p);
-    query.object = vertex.surface.face.shape;
-    query.face = vertex.surface.face.face;
+    query.face = vertex.surface.face;
     for (int i = 0; i < samples; ++i) {
       add_sample(vertex, query, vertex.key.copy(Purpose::kEdgeCopy, i), cost, sum);
     }
@@ -72,7 +71,7 @@ void BoundaryTerm::add_sample(const PathVertex& vertex, const EdgeQuery& query, 
     return;
   }
   const EdgeSample& sample = *drawn;
-  const EdgeMesh& mesh = edges_.objects[sample.edge.object];
+  const EdgeMesh& mesh = edges_.object(sample.edge.object);
   EdgeView view;
   const bool seen = view_edge(mesh, sample.edge, sample.t, query.p, view);
   const Vec3<Lanes> v = edge_velocity(mesh, sample.edge.edge, sample.t) - query.velocity;
@@ -83,8 +82,8 @@ void BoundaryTerm::add_sample(const PathVertex& vertex, const EdgeQuery& query, 
     vertex.log->push_back(fmt::format(
         "  edge {} of shape {} at t = {:.6g}: probability {:.4g}, density of t {:.4g}, distance "
         "{:.6g}",
-        sample.edge.edge, sample.edge.object, sample.t, sample.probability, sample.pdf_t,
-        view.distance));
+        sample.edge.edge.index(), sample.edge.object.index(), sample.t, sample.probability,
+        sample.pdf_t, view.distance));
   }
   // A density may round to zero at the very horizon.
   const Rgb<double> f =
@@ -96,8 +95,8 @@ void BoundaryTerm::add_sample(const PathVertex& vertex, const EdgeQuery& query, 
   }
   RayCount rays;
   Rgb<double> jump;
-  const bool visible = edge_jump(context_, mesh, view, {query.object, query.face}, 0,
-                                 vertex.bounces + 1, key, rays, jump);
+  const bool visible =
+      edge_jump(context_, mesh, view, query.face, 0, vertex.bounces + 1, key, rays, jump);
   cost.add(rays);
   if (!visible) {
     ++cost.occluded;

@@ -26,7 +26,7 @@ namespace {
 // An edge that parts light from shadow, as seen from one light.
 struct ShadowEdge {
   const DeltaLight* light;
-  EdgeId id;
+  EdgeRef id;
   double sign;   // 1: the side G > 0 is lit; -1: the other
   double angle;  // how long it is as seen from the light [rad]; at infinity [scene units]
   Lanes speed;   // how fast its shadow moves, as seen from the light; only edge and light count
@@ -48,15 +48,15 @@ struct Viewer {
 
 // Which sides of the plane through light and edge the faces around the edge lie on. A face that is
 // seen edge-on, to the rounding of the determinant, casts no shadow of its own.
-double lit_side(const Mesh& mesh, const EdgeMesh& edges, uint32_t e, const LightOrigin& light) {
-  const auto& ends = edges.edges[e].vertices;
-  const Vec3d x0 = edges.positions[ends[0]];
-  const Vec3d along = edges.positions[ends[1]] - x0;
+double lit_side(const Mesh& mesh, const EdgeMesh& edges, EdgeId edge, const LightOrigin& light) {
+  const auto& ends = edges.edge(edge).vertices;
+  const Vec3d x0 = edges.position(ends[0]);
+  const Vec3d along = edges.position(ends[1]) - x0;
   const Vec3d w = light.through(x0);
   const Vec3d n = cross(w, along);
   const double scale = 8 * 0x1p-53 * length(w) * length(along);
   bool blocked[2] = {false, false};
-  for (const uint32_t face : edges.faces_around(e)) {
+  for (const FaceId face : edges.faces_around(edge)) {
     double side = 0;
     for (const Vec3d& corner : face_corners<double>(mesh, face)) {
       const Vec3d a = corner - x0;
@@ -68,16 +68,16 @@ double lit_side(const Mesh& mesh, const EdgeMesh& edges, uint32_t e, const Light
   return blocked[0] == blocked[1] ? 0 : blocked[0] ? 1 : -1;
 }
 
-Vec3<Dual> moving_vertex(const EdgeMesh& mesh, uint32_t vertex) {
-  const Vec3d& x = mesh.positions[vertex];
+Vec3<Dual> moving_vertex(const EdgeMesh& mesh, VertexId vertex) {
+  const Vec3d& x = mesh.position(vertex);
   if (mesh.tangents.empty()) return {x.x, x.y, x.z};
-  const Vec3<Lanes>& d = mesh.tangents[vertex];
+  const Vec3<Lanes>& d = mesh.tangent(vertex);
   return {{x.x, d.x}, {x.y, d.y}, {x.z, d.z}};
 }
 
 class ShadowTerm final : public Term {
  public:
-  explicit ShadowTerm(TermInput& input) : context_(input.context), objects_(input.edges().objects) {
+  explicit ShadowTerm(TermInput& input) : context_(input.context), input_(input.edges()) {
     const Stopwatch watch;
     Bounds bounds;
     for (const Shape& shape : context_.scene.shapes) {
@@ -88,7 +88,7 @@ class ShadowTerm final : public Term {
     reach_ = 2 * bounds.diagonal();
     for (const auto& light : context_.scene.delta_lights) {
       const size_t first = edges_.size();
-      for (uint32_t object = 0; object < objects_.size(); ++object) list(*light, object);
+      for (uint32_t o = 0; o < input_.objects.size(); ++o) list(*light, ShapeId(o));
       weigh(first, input.lanes);
     }
     list_seconds_ = watch.seconds();
@@ -117,7 +117,7 @@ class ShadowTerm final : public Term {
   }
 
  private:
-  void list(const DeltaLight& light, uint32_t object);
+  void list(const DeltaLight& light, ShapeId object);
   void weigh(size_t first, int lanes);
   // The edge at u in [0, 1), and its probability.
   const ShadowEdge& choose(double u, double& probability) const;
@@ -130,21 +130,21 @@ class ShadowTerm final : public Term {
   void add_sample(const PathVertex& vertex, Rng rng, TermCost& cost, Rgb<Lanes>& sum) const;
 
   const PathContext& context_;
-  const std::vector<EdgeMesh>& objects_;
+  const EdgeSamplerInput& input_;
   double reach_ = 0;  // longer than any line through the scene
   std::vector<ShadowEdge> edges_;
   std::vector<double> cumulative_;  // probabilities of the edges, summed
   double list_seconds_ = 0;
 };
 
-void ShadowTerm::list(const DeltaLight& light, uint32_t object) {
-  const EdgeMesh& mesh = objects_[object];
+void ShadowTerm::list(const DeltaLight& light, ShapeId object) {
+  const EdgeMesh& mesh = input_.object(object);
   const LightOrigin origin = light.origin();
   for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
-    ShadowEdge edge{&light, {object, e}, 0, 0, {}};
-    edge.sign = lit_side(context_.scene.shapes[object].mesh, mesh, e, origin);
+    ShadowEdge edge{&light, {object, EdgeId(e)}, 0, 0, {}};
+    edge.sign = lit_side(context_.scene.shape(object).mesh, mesh, edge.id.edge, origin);
     if (edge.sign == 0) continue;
-    const auto& ends = mesh.edges[e].vertices;
+    const auto& ends = mesh.edge(edge.id.edge).vertices;
     const Vec3<Dual> y[2] = {moving_vertex(mesh, ends[0]), moving_vertex(mesh, ends[1])};
     const Vec3d along = value(y[1]) - value(y[0]);
     const Vec3d w[2] = {origin.through(value(y[0])), origin.through(value(y[1]))};
@@ -199,9 +199,9 @@ const ShadowEdge& ShadowTerm::choose(double u, double& probability) const {
 
 std::optional<ShadowPoint> ShadowTerm::cast(const ShadowEdge& edge, double t,
                                             RayCount& rays) const {
-  const EdgeMesh& mesh = objects_[edge.id.object];
-  const auto& ends = mesh.edges[edge.id.edge].vertices;
-  const Vec3d y = mesh.positions[ends[0]] * (1 - t) + mesh.positions[ends[1]] * t;
+  const EdgeMesh& mesh = input_.object(edge.id.object);
+  const auto& ends = mesh.edge(edge.id.edge).vertices;
+  const Vec3d y = mesh.position(ends[0]) * (1 - t) + mesh.position(ends[1]) * t;
   const LightOrigin origin = edge.light->origin();
   const Vec3d w = origin.through(y);
   const double w_length = length(w);
@@ -214,7 +214,7 @@ std::optional<ShadowPoint> ShadowTerm::cast(const ShadowEdge& edge, double t,
   // Where the edge touches what it shades, to a float's rounding, the shadow starts behind the edge
   // for every viewer, who sees the edge itself.
   if (!context_.tracer.closest(ray, hit) || hit.t <= before * (1 + 0x1p-20)) return {};
-  const auto c = face_corners<double>(context_.scene.shapes[hit.face.shape].mesh, hit.face.face);
+  const auto c = face_corners<double>(context_.scene.shape(hit.face.shape).mesh, hit.face.face);
   const Vec3d n = normalize(cross(c[1] - c[0], c[2] - c[0]));
   const double slope = dot(n, w);
   const double s = dot(n, c[0] - y) / slope;
@@ -235,8 +235,8 @@ Rgb<double> ShadowTerm::jump(const ShadowEdge& edge, const ShadowPoint& point, c
 
 Lanes ShadowTerm::sweep(const ShadowEdge& edge, const ShadowPoint& point,
                         const Viewer& viewer) const {
-  const EdgeMesh& mesh = objects_[edge.id.object];
-  const auto& ends = mesh.edges[edge.id.edge].vertices;
+  const EdgeMesh& mesh = input_.object(edge.id.object);
+  const auto& ends = mesh.edge(edge.id.edge).vertices;
   const Vec3<Dual> y0 = moving_vertex(mesh, ends[0]);
   const Vec3<Dual> normal =
       cross(edge.light->origin().through(y0), moving_vertex(mesh, ends[1]) - y0);
@@ -291,8 +291,8 @@ void ShadowTerm::add_sample(const PathVertex& vertex, Rng rng, TermCost& cost,
     vertex.log->push_back(fmt::format(
         "  shadow of edge {} of shape {} on face {} of shape {}: probability {:.4g}, adds "
         "({:.6g}, {:.6g}, {:.6g}) to the first parameter",
-        edge.id.edge, edge.id.object, point->face.face, point->face.shape, probability, added.r[0],
-        added.g[0], added.b[0]));
+        edge.id.edge.index(), edge.id.object.index(), point->face.face.index(),
+        point->face.shape.index(), probability, added.r[0], added.g[0], added.b[0]));
   }
   sum = sum + added;
 }
@@ -306,7 +306,7 @@ bool ShadowTerm::sample_film(double u, const Rng& key, RayCount& rays, FilmSampl
   const ShadowEdge& edge = choose(u, probability);
   const auto point = cast(edge, key.at(Purpose::kShadow, 0).uniform(), rays);
   if (!point) return false;
-  if (scene.hide_emitters && scene.shapes[point->face.shape].is_emitter) return false;
+  if (scene.hide_emitters && scene.shape(point->face.shape).is_emitter) return false;
   const double depth = camera.depth(point->x);
   if (!(depth > camera.near_clip && depth < camera.far_clip)) return false;
   const auto film = camera.project(point->x);

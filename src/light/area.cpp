@@ -9,10 +9,10 @@ namespace {
 
 class AreaLight final : public Light {
  public:
-  AreaLight(const Scene& scene, uint32_t index) : shape_(scene.shapes[index]), index_(index) {
+  AreaLight(const Scene& scene, ShapeId id) : shape_(scene.shape(id)), id_(id) {
     double area = 0;
     for (uint32_t f = 0; f < shape_.mesh.faces.size(); ++f) {
-      const auto c = face_corners<double>(shape_.mesh, f);
+      const auto c = face_corners<double>(shape_.mesh, FaceId(f));
       area += 0.5 * length(cross(c[1] - c[0], c[2] - c[0]));
       cumulative_.push_back(area);
     }
@@ -22,8 +22,8 @@ class AreaLight final : public Light {
   std::optional<LightSample> sample(const Vec3d& p, double choices, Rng& rng) const override {
     const double target = rng.uniform() * cumulative_.back();
     const auto found = std::upper_bound(cumulative_.begin(), cumulative_.end(), target);
-    const auto face = static_cast<uint32_t>(
-        std::min<size_t>(found - cumulative_.begin(), cumulative_.size() - 1));
+    const FaceId face(static_cast<uint32_t>(
+        std::min<size_t>(found - cumulative_.begin(), cumulative_.size() - 1)));
     const double root = std::sqrt(rng.uniform());
     const double b2 = root * rng.uniform();
     const auto c = face_corners<double>(shape_.mesh, face);
@@ -35,7 +35,7 @@ class AreaLight final : public Light {
     const double n_length = length(n);
     if (n_length == 0 || dot(n, wo) >= 0) return {};
     const double density = pdf({wo, distance, n / n_length}, choices);
-    return LightSample{wo, distance, density, FaceRef{index_, face}, this};
+    return LightSample{wo, distance, density, FaceRef{id_, face}, this};
   }
   double pdf(const LightView& view, double choices) const override {
     const double cosine = std::fabs(dot(view.n_g, view.wo));
@@ -47,21 +47,21 @@ class AreaLight final : public Light {
 
   void add_triangles(std::vector<LightTriangle>& triangles) const override {
     for (uint32_t f = 0; f < shape_.mesh.faces.size(); ++f) {
-      const auto c = face_corners<double>(shape_.mesh, f);
+      const auto c = face_corners<double>(shape_.mesh, FaceId(f));
       triangles.push_back({{c[0], c[1], c[2]}, luminance(value(shape_.radiance))});
     }
   }
 
  private:
   const Shape& shape_;
-  uint32_t index_;
+  ShapeId id_;
   std::vector<double> cumulative_;  // F, of face areas
   double inverse_area_;
 };
 
 }  // namespace
 
-std::unique_ptr<Light> make_area_light(const Scene& scene, uint32_t shape) {
+std::unique_ptr<Light> make_area_light(const Scene& scene, ShapeId shape) {
   return std::make_unique<AreaLight>(scene, shape);
 }
 

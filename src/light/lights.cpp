@@ -28,7 +28,7 @@ Lights::Lights(const Scene& scene)
     : of_shape_(scene.shapes.size(), nullptr), environment_(scene.environment.get()) {
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     if (!scene.shapes[s].is_emitter) continue;
-    area_lights_.push_back(make_area_light(scene, s));
+    area_lights_.push_back(make_area_light(scene, ShapeId(s)));
     of_shape_[s] = area_lights_.back().get();
     all_.push_back(of_shape_[s]);
   }

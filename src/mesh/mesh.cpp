@@ -10,10 +10,10 @@
 
 namespace limn {
 
-Vec3<Dual> Mesh::position(uint32_t vertex) const {
-  const Vec3d p = cast<double>(positions[vertex]);
+Vec3<Dual> Mesh::position(VertexId id) const {
+  const Vec3d p = cast<double>(positions[id.index()]);
   if (position_tangents.empty()) return {p.x, p.y, p.z};
-  const Vec3<Lanes>& t = position_tangents[vertex];
+  const Vec3<Lanes>& t = position_tangents[id.index()];
   return {{p.x, t.x}, {p.y, t.y}, {p.z, t.z}};
 }
 
@@ -40,7 +40,7 @@ namespace {
 inline constexpr uint32_t kUnused = UINT32_MAX;
 
 template <class S>
-Vec3<S> position_as(const Mesh& mesh, uint32_t vertex) {
+Vec3<S> position_as(const Mesh& mesh, VertexId vertex) {
   return as<S>(mesh.position(vertex));
 }
 
@@ -53,12 +53,12 @@ struct FaceShape {
 };
 
 template <class S>
-FaceShape<S> face_shape(const Mesh& mesh, uint32_t face) {
+FaceShape<S> face_shape(const Mesh& mesh, FaceId face) {
   using std::atan2;
-  const FaceIndices& f = mesh.faces[face];
+  const FaceIndices& f = mesh.face(face);
   // Copies of a vertex move together: the first one stands for all.
   std::array<Vec3<S>, 3> p;
-  for (int i = 0; i < 3; ++i) p[i] = position_as<S>(mesh, mesh.weld[f[i]]);
+  for (int i = 0; i < 3; ++i) p[i] = position_as<S>(mesh, VertexId(mesh.weld[f[i]]));
   const Vec3<S> a = p[1] - p[0], b = p[2] - p[0], c = p[2] - p[1];
   const Vec3<S> doubled_area = cross(a, b);
   const S size = length(doubled_area);
@@ -139,10 +139,10 @@ std::vector<Vec3<S>> stored_normals(const Mesh& mesh) {
 // Sine of the largest tilt of a face's corner normals against the face. The sine is the length of
 // the cross product, which is exact where sqrt(1 - cos^2) would lose all digits.
 template <class S>
-S face_tilt(const Mesh& mesh, uint32_t face, const Vec3<S>& face_normal,
+S face_tilt(const Mesh& mesh, FaceId face, const Vec3<S>& face_normal,
             const std::vector<Vec3<S>>& normals) {
   S tilt(0);
-  for (uint32_t n : mesh.normal_ids[face]) {
+  for (uint32_t n : mesh.normal_ids[face.index()]) {
     if (value(dot(normals[n], face_normal)) <= 0) return S(1);
     const S sine = length(cross(normals[n], face_normal));
     if (sine > tilt) tilt = sine;
@@ -153,14 +153,14 @@ S face_tilt(const Mesh& mesh, uint32_t face, const Vec3<S>& face_normal,
 template <class S>
 ShadingNormals<S> shading_normals(const Mesh& mesh) {
   std::vector<FaceShape<S>> shapes(mesh.faces.size());
-  for (uint32_t f = 0; f < shapes.size(); ++f) shapes[f] = face_shape<S>(mesh, f);
+  for (uint32_t f = 0; f < shapes.size(); ++f) shapes[f] = face_shape<S>(mesh, FaceId(f));
   ShadingNormals<S> result;
   result.normals = mesh.normal_source == NormalSource::kComputed ? computed_normals(mesh, shapes)
                                                                  : stored_normals<S>(mesh);
   std::vector<S> at_root(mesh.positions.size(), S(0));
   for (uint32_t f = 0; f < shapes.size(); ++f) {
     if (!shapes[f].has_area) continue;
-    const S tilt = face_tilt(mesh, f, shapes[f].normal, result.normals);
+    const S tilt = face_tilt(mesh, FaceId(f), shapes[f].normal, result.normals);
     for (uint32_t v : mesh.faces[f]) {
       S& horizon = at_root[mesh.weld[v]];
       if (tilt > horizon) horizon = tilt;

@@ -33,12 +33,13 @@ class BruteForceTracer final : public RayTracer {
       if (ray.skip_emitters && scene_.shapes[s].is_emitter) continue;
       const Mesh& mesh = scene_.shapes[s].mesh;
       for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
-        if (is_skipped(ray, {s, f})) continue;
+        const FaceRef face{ShapeId(s), FaceId(f)};
+        if (is_skipped(ray, face)) continue;
         const auto corner = [&](int k) { return cast<double>(mesh.positions[mesh.faces[f][k]]); };
         const double t = intersect(ray, corner(0), corner(1), corner(2));
         if (t < 0 || t <= ray.t_min || t >= nearest) continue;
         nearest = t;
-        hit = {{s, f}, t};
+        hit = {face, t};
         found = true;
       }
     }

@@ -24,7 +24,7 @@ struct Context {
 bool is_skipped(const Context& context, FaceRef face) {
   const Ray& ray = *context.ray;
   if (face == ray.start) return true;
-  if (ray.skip_emitters && context.scene->shapes[face.shape].is_emitter) return true;
+  if (ray.skip_emitters && context.scene->shape(face.shape).is_emitter) return true;
   if (face.shape != ray.skip_shape) return false;
   return std::find(ray.skip_faces.begin(), ray.skip_faces.end(), face.face) != ray.skip_faces.end();
 }
@@ -32,7 +32,8 @@ bool is_skipped(const Context& context, FaceRef face) {
 void reject_skipped(const RTCFilterFunctionNArguments* arguments) {
   const auto& context = *reinterpret_cast<const Context*>(arguments->context);
   // Only single rays are traced.
-  const FaceRef face{RTCHitN_geomID(arguments->hit, 1, 0), RTCHitN_primID(arguments->hit, 1, 0)};
+  const FaceRef face{ShapeId(RTCHitN_geomID(arguments->hit, 1, 0)),
+                     FaceId(RTCHitN_primID(arguments->hit, 1, 0))};
   if (is_skipped(context, face)) arguments->valid[0] = 0;
 }
 
@@ -106,7 +107,7 @@ class EmbreeTracer final : public RayTracer {
     query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     rtcIntersect1(rtc_scene_.get(), &context.base, &query);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
-    hit.face = {query.hit.geomID, query.hit.primID};
+    hit.face = {ShapeId(query.hit.geomID), FaceId(query.hit.primID)};
     hit.t = query.ray.tfar;
     return true;
   }
@@ -138,8 +139,7 @@ class EmbreeTracer final : public RayTracer {
   Context make_context(const Ray& ray) const {
     Context context;
     rtcInitIntersectContext(&context.base);
-    const bool skips =
-        ray.start.shape != UINT32_MAX || !ray.skip_faces.empty() || ray.skip_emitters;
+    const bool skips = ray.start.shape.valid() || !ray.skip_faces.empty() || ray.skip_emitters;
     if (skips) context.base.filter = reject_skipped;
     context.ray = &ray;
     context.scene = &scene_;

@@ -5,7 +5,7 @@
 
 namespace limn {
 
-std::vector<Vec3d> Motion::velocities(const Scene&, size_t, size_t) const { return {}; }
+std::vector<Vec3d> Motion::velocities(const Scene&, ShapeId, size_t) const { return {}; }
 
 std::optional<Parameter> Motion::part(const Scene&, const Parameter&, const std::string&) const {
   return std::nullopt;

@@ -15,7 +15,7 @@ class Motion {
   // See Parameter.
   virtual void seed(Scene& scene, int lane, size_t component) const = 0;
   virtual void move(Scene& scene, double step, size_t component) const = 0;
-  virtual std::vector<Vec3d> velocities(const Scene& scene, size_t shape, size_t component) const;
+  virtual std::vector<Vec3d> velocities(const Scene& scene, ShapeId shape, size_t component) const;
 
   // The part of an array whose name continues the array's with `rest` (":FILE", ".7.x"); nothing if
   // `rest` means nothing here. InputError if it means something that cannot be.

@@ -63,7 +63,8 @@ Scene Parameter::moved(const Scene& scene, double step, size_t component) const 
   return copy;
 }
 
-std::vector<Vec3d> Parameter::velocities(const Scene& scene, size_t shape, size_t component) const {
+std::vector<Vec3d> Parameter::velocities(const Scene& scene, ShapeId shape,
+                                         size_t component) const {
   CHECK_LT(component, size);
   return motion->velocities(scene, shape, component);
 }

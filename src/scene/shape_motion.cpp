@@ -22,22 +22,22 @@ void add_to_lane(std::vector<Vec3<Lanes>>& tangents, int lane,
 // Moves along straight lines, and leaves normals of the file alone, unless a kind says otherwise.
 class ShapeMotion : public Motion {
  public:
-  explicit ShapeMotion(size_t shape) : shape_(shape) {}
+  explicit ShapeMotion(ShapeId shape) : shape_(shape) {}
 
   void seed(Scene& scene, int lane, size_t component) const final {
-    Mesh& mesh = scene.shapes[shape_].mesh;
+    Mesh& mesh = scene.shapes[shape_.index()].mesh;
     add_to_lane(mesh.position_tangents, lane, vertex_velocities(mesh, component));
     if (mesh.normal_source == NormalSource::kGiven) seed_given_normals(mesh, lane);
     update_shading_normals(mesh);
   }
   void move(Scene& scene, double step, size_t component) const final {
-    Mesh& mesh = scene.shapes[shape_].mesh;
+    Mesh& mesh = scene.shapes[shape_.index()].mesh;
     move_vertices(mesh, step, component);
     update_shading_normals(mesh);
   }
-  std::vector<Vec3d> velocities(const Scene& scene, size_t shape, size_t component) const final {
+  std::vector<Vec3d> velocities(const Scene& scene, ShapeId shape, size_t component) const final {
     if (shape != shape_) return {};
-    return vertex_velocities(scene.shapes[shape_].mesh, component);
+    return vertex_velocities(scene.shape(shape_).mesh, component);
   }
 
  protected:
@@ -51,12 +51,12 @@ class ShapeMotion : public Motion {
   }
 
  private:
-  size_t shape_;
+  ShapeId shape_;
 };
 
 class ShapeTranslation final : public ShapeMotion {
  public:
-  ShapeTranslation(size_t shape, int axis) : ShapeMotion(shape), axis_(axis) {}
+  ShapeTranslation(ShapeId shape, int axis) : ShapeMotion(shape), axis_(axis) {}
 
  protected:
   std::vector<Vec3d> vertex_velocities(const Mesh& mesh, size_t) const override {
@@ -70,7 +70,7 @@ class ShapeTranslation final : public ShapeMotion {
 // About the centre of the shape's bounds.
 class ShapeRotation final : public ShapeMotion {
  public:
-  ShapeRotation(size_t shape, int axis) : ShapeMotion(shape), axis_(axis) {}
+  ShapeRotation(ShapeId shape, int axis) : ShapeMotion(shape), axis_(axis) {}
 
  protected:
   std::vector<Vec3d> vertex_velocities(const Mesh& mesh, size_t) const override {
@@ -117,7 +117,7 @@ class ShapeScaling final : public ShapeMotion {
 
 class VertexField final : public ShapeMotion {
  public:
-  VertexField(size_t shape, std::vector<Vec3d> field)
+  VertexField(ShapeId shape, std::vector<Vec3d> field)
       : ShapeMotion(shape), field_(std::move(field)) {}
 
  protected:
@@ -160,7 +160,7 @@ class OneComponent final : public Motion {
   void move(Scene& scene, double step, size_t) const override {
     array_->move(scene, step, component_);
   }
-  std::vector<Vec3d> velocities(const Scene& scene, size_t shape, size_t) const override {
+  std::vector<Vec3d> velocities(const Scene& scene, ShapeId shape, size_t) const override {
     return array_->velocities(scene, shape, component_);
   }
 
@@ -173,7 +173,7 @@ class OneComponent final : public Motion {
 // stays whole; the derivative along a field is the sum over first copies (weld[i] == i).
 class VertexArray final : public ShapeMotion {
  public:
-  explicit VertexArray(size_t shape) : ShapeMotion(shape), shape_(shape) {}
+  explicit VertexArray(ShapeId shape) : ShapeMotion(shape), shape_(shape) {}
 
   std::optional<Parameter> part(const Scene& scene, const Parameter& whole,
                                 const std::string& rest) const override {
@@ -198,7 +198,7 @@ class VertexArray final : public ShapeMotion {
 
  private:
   Parameter field(const Scene& scene, const Parameter& whole, const std::string& file) const {
-    const Shape& shape = scene.shapes[shape_];
+    const Shape& shape = scene.shape(shape_);
     std::vector<Vec3d> field = read_field(shape, file);
     double longest = 0;
     for (const Vec3d& v : field) longest = std::max(longest, length(v));
@@ -226,26 +226,27 @@ class VertexArray final : public ShapeMotion {
                      std::make_shared<OneComponent>(whole.motion, component)};
   }
 
-  size_t shape_;
+  ShapeId shape_;
 };
 
 }  // namespace
 
 void add_shape_parameters(const Scene& scene, std::vector<Parameter>& list) {
-  for (size_t i = 0; i < scene.shapes.size(); ++i) {
-    const Shape& shape = scene.shapes[i];
+  for (uint32_t i = 0; i < scene.shapes.size(); ++i) {
+    const ShapeId id(i);
+    const Shape& shape = scene.shape(id);
     if (shape.id.empty()) continue;
     const double step = 0.01 * bounds_of(shape.mesh).diagonal();
     for (int axis = 0; axis < 3; ++axis) {
       const std::string end(1, "xyz"[axis]);
       list.push_back({shape.id + ".translate." + end, "scene units", step, 1,
-                      std::make_shared<ShapeTranslation>(i, axis)});
+                      std::make_shared<ShapeTranslation>(id, axis)});
       list.push_back({shape.id + ".rotate." + end, "radians", 0.01, 1,
-                      std::make_shared<ShapeRotation>(i, axis)});
+                      std::make_shared<ShapeRotation>(id, axis)});
     }
-    list.push_back({shape.id + ".scale", "factor", 0.01, 1, std::make_shared<ShapeScaling>(i)});
+    list.push_back({shape.id + ".scale", "factor", 0.01, 1, std::make_shared<ShapeScaling>(id)});
     list.push_back({shape.id + ".vertex_positions", "scene units", step,
-                    3 * shape.mesh.positions.size(), std::make_shared<VertexArray>(i)});
+                    3 * shape.mesh.positions.size(), std::make_shared<VertexArray>(id)});
   }
 }
 

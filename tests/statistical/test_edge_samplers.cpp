@@ -110,7 +110,7 @@ EdgeSamplerInput test_input(const Mesh& mesh) {
 template <class F>
 void for_every_edge(const EdgeSamplerInput& input, F f) {
   for (uint32_t o = 0; o < input.objects.size(); ++o)
-    for (uint32_t e = 0; e < input.objects[o].edges.size(); ++e) f(EdgeId{o, e});
+    for (uint32_t e = 0; e < input.objects[o].edges.size(); ++e) f(EdgeRef{ShapeId(o), EdgeId(e)});
 }
 
 TEST(LobeBound, BoundsTheScatteringFunctionOverArcs) {
@@ -213,8 +213,8 @@ TEST_P(EdgeSamplers, DrawAsTheyState) {
       std::vector<double> expected, observed;
       std::vector<size_t> begin;  // of an object's cells
       double sum = 0;
-      for_every_edge(input, [&](EdgeId id) {
-        if (id.edge == 0) begin.push_back(expected.size());
+      for_every_edge(input, [&](EdgeRef id) {
+        if (id.edge == EdgeId(0)) begin.push_back(expected.size());
         const double probability = sampler->probability(q, id);
         sum += probability;
         expected.push_back(probability * kDraws);
@@ -233,7 +233,7 @@ TEST_P(EdgeSamplers, DrawAsTheyState) {
           continue;
         }
         const EdgeSample& s = *drawn;
-        ++observed[begin[s.edge.object] + s.edge.edge];
+        ++observed[begin[s.edge.object.index()] + s.edge.edge.index()];
         ASSERT_EQ(s.probability, sampler->probability(q, s.edge)) << name;
         ASSERT_EQ(s.pdf_t, sampler->pdf_t(q, s.edge, s.t)) << name;
         ASSERT_GT(s.pdf_t, 0) << name;
@@ -251,8 +251,8 @@ TEST_P(EdgeSamplers, MissNoEdgeThatContributes) {
     const auto sampler = make(input);
     for (int i = 0; i < 10; ++i) {
       const EdgeQuery q = random_query(rng);
-      for_every_edge(input, [&](EdgeId id) {
-        const EdgeMesh& edges = input.objects[id.object];
+      for_every_edge(input, [&](EdgeRef id) {
+        const EdgeMesh& edges = input.object(id.object);
         if (!is_candidate(edges, id.edge, q.p)) {
           EXPECT_EQ(sampler->probability(q, id), 0) << name;
           return;
@@ -275,7 +275,7 @@ TEST_P(EdgeSamplers, DensityAlongTheEdge) {
     const EdgeQuery q = random_query(rng);
     const auto first = sampler->sample(q, rng);
     if (!first) continue;
-    const EdgeId edge = first->edge;
+    const EdgeRef edge = first->edge;
     constexpr int kBins = 20, kDraws = 5000, kFine = 500;
     std::vector<double> expected(kBins), observed(kBins);
     for (int b = 0; b < kBins * kFine; ++b)  // jittered: unbiased whatever the density's jumps
@@ -305,15 +305,15 @@ TEST_P(EdgeSamplers, EstimateTheSumOverAllEdges) {
       const bool long_tail = is_beckmann(q.lobe) || is_phong(q.lobe);
       q.lobe.alpha = std::max(q.lobe.alpha, long_tail ? 0.4 : 0.05);
       double exact = 0;
-      for_every_edge(input, [&](EdgeId id) {
-        if (is_candidate(input.objects[id.object], id.edge, q.p))
-          exact += integral(q, segment_of(input.objects[id.object], id.edge, q), 400);
+      for_every_edge(input, [&](EdgeRef id) {
+        if (is_candidate(input.object(id.object), id.edge, q.p))
+          exact += integral(q, segment_of(input.object(id.object), id.edge, q), 400);
       });
       RunningMean estimate;
       for (int k = 0; k < 20000; ++k) {
         const auto s = sampler->sample(q, rng);
         const EdgeSegment segment =
-            s ? segment_of(input.objects[s->edge.object], s->edge.edge, q) : EdgeSegment{};
+            s ? segment_of(input.object(s->edge.object), s->edge.edge, q) : EdgeSegment{};
         estimate.add(s ? integrand(q, segment, s->t) / (s->probability * s->pdf_t) : 0);
       }
       if (exact > 0) {
@@ -328,21 +328,21 @@ TEST_P(EdgeSamplers, NeverDrawTheOwnFace) {
   const Mesh mesh = torus_mesh(12, 8);
   const EdgeSamplerInput input = test_input(mesh);
   const auto sampler = make(input);
-  for (uint32_t face = 0; face < mesh.faces.size(); face += 7) {
+  for (uint32_t f = 0; f < mesh.faces.size(); f += 7) {
+    const FaceId face(f);
     EdgeQuery q = random_query(rng);
-    q.object = 0;
-    q.face = face;
+    q.face = {ShapeId(0), face};
     const EdgeMesh& edges = input.objects[0];
-    q.p = (edges.positions[mesh.faces[face][0]] + edges.positions[mesh.faces[face][1]] +
-           edges.positions[mesh.faces[face][2]]) /
-          3.0;
-    q.n = edges.planes[face].n;
+    const auto [a, b, c] = mesh.face(face);
+    q.p = (edges.positions[a] + edges.positions[b] + edges.positions[c]) / 3.0;
+    q.n = edges.plane(face).n;
     q.wi = normalize(q.n + random_direction(rng) * 0.7);
-    const auto is_own = [&](EdgeId id) {
+    const auto is_own = [&](EdgeRef id) {
       const auto around = edges.faces_around(id.edge);
-      return id.object == 0 && std::find(around.begin(), around.end(), face) != around.end();
+      return id.object == ShapeId(0) &&
+             std::find(around.begin(), around.end(), face) != around.end();
     };
-    for_every_edge(input, [&](EdgeId id) {
+    for_every_edge(input, [&](EdgeRef id) {
       if (is_own(id)) {
         EXPECT_EQ(sampler->probability(q, id), 0);
       }

@@ -30,7 +30,7 @@ Scene some_scene(double unit) {
 // The smallest barycentric coordinate of the point where the ray meets the face's plane: how far
 // from its border it passes.
 double margin(const Scene& scene, const Ray& ray, FaceRef face) {
-  const auto c = face_corners<double>(scene.shapes[face.shape].mesh, face.face);
+  const auto c = face_corners<double>(scene.shape(face.shape).mesh, face.face);
   const Vec3d n = cross(c[1] - c[0], c[2] - c[0]);
   const Vec3d p = ray.origin + ray.direction * (dot(c[0] - ray.origin, n) / dot(n, ray.direction));
   const double b1 = dot(cross(p - c[0], c[2] - c[0]), n) / dot(n, n);
@@ -58,7 +58,7 @@ TEST_P(RayTracers, AgreeButForRounding) {
     ray.skip_emitters = i % 3 == 0;
     if (i % 5 == 0) ray.t_max = static_cast<float>(3 * rng.uniform() * unit);
     if (i % 7 == 0) ray.t_min = static_cast<float>(rng.uniform() * unit);
-    std::vector<uint32_t> faces;
+    std::vector<FaceId> faces;
     Hit a, b;
     // Half of the rays pass through what they met first.
     if (i % 2 == 0 && oracle->closest(ray, b)) {
@@ -66,7 +66,7 @@ TEST_P(RayTracers, AgreeButForRounding) {
       if (i % 4 == 0) {
         ray.start = b.face;
       } else {
-        faces = {b.face.face, 0};
+        faces = {b.face.face, FaceId(0)};
         ray.skip_shape = b.face.shape;
         ray.skip_faces = faces;
       }

@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include <numeric>
-
 #include "integrators/terms/path.h"
 #include "support/meshes.h"
 #include "support/scenes.h"
@@ -37,16 +35,16 @@ TEST(BlockedAtEdge, AgreesWithRaysCloseBy) {
     scene.shapes.emplace_back();
     scene.shapes[0].mesh = fan(wings, rng);
     const Mesh& mesh = scene.shapes[0].mesh;
-    std::vector<uint32_t> faces(wings);
-    std::iota(faces.begin(), faces.end(), 0u);
-    const EdgeStart edge{0, faces, {0, 0, -1}, {0, 0, 1}};
+    std::vector<FaceId> faces;
+    for (int f = 0; f < wings; ++f) faces.emplace_back(f);
+    const EdgeStart edge{ShapeId(0), faces, {0, 0, -1}, {0, 0, 1}};
     const auto tracer = make_brute_force_tracer(scene);
     for (int k = 0; k < 20; ++k) {
-      const auto start = static_cast<uint32_t>(rng.uniform() * wings);
+      const FaceId start(static_cast<uint32_t>(rng.uniform() * wings));
       const Vec3d direction = random_direction(rng);
       const Vec3d into = direction_into_face(mesh, start, edge.x0, {0, 0, 1});
       Ray ray{Vec3d{0, 0, rng.uniform() - 0.5} + into * 1e-12, direction};
-      ray.start = {0, start};
+      ray.start = {ShapeId(0), start};
       ray.t_max = 1e-3;
       Hit hit;
       const bool found = tracer->closest(ray, hit);
@@ -70,14 +68,14 @@ TEST(BlockedAtEdge, RightAngle) {
   scene.shapes.emplace_back();
   scene.shapes[0].mesh =
       make_mesh({{0, 0, -1}, {0, 0, 1}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {1, 0, 3}});
-  const std::array<uint32_t, 2> faces = {0, 1};
-  const EdgeStart edge{0, faces, {0, 0, -1}, {0, 0, 1}};
-  EXPECT_EQ(blocked_at_edge(scene, edge, 0, normalize(Vec3d{-1, 1, 0})), 1u);
-  EXPECT_EQ(blocked_at_edge(scene, edge, 0, normalize(Vec3d{-1, 1e-9, 0})), 1u);
-  EXPECT_EQ(blocked_at_edge(scene, edge, 0, normalize(Vec3d{1, 1, 0})), std::nullopt);
-  EXPECT_EQ(blocked_at_edge(scene, edge, 0, normalize(Vec3d{-1, -1, 0})), std::nullopt);
-  EXPECT_EQ(blocked_at_edge(scene, edge, 1, normalize(Vec3d{1, -1, 0})), 0u);
-  EXPECT_EQ(blocked_at_edge(scene, edge, 1, normalize(Vec3d{1, 1, 0})), std::nullopt);
+  const std::array faces = {FaceId(0), FaceId(1)};
+  const EdgeStart edge{ShapeId(0), faces, {0, 0, -1}, {0, 0, 1}};
+  EXPECT_EQ(blocked_at_edge(scene, edge, faces[0], normalize(Vec3d{-1, 1, 0})), faces[1]);
+  EXPECT_EQ(blocked_at_edge(scene, edge, faces[0], normalize(Vec3d{-1, 1e-9, 0})), faces[1]);
+  EXPECT_EQ(blocked_at_edge(scene, edge, faces[0], normalize(Vec3d{1, 1, 0})), std::nullopt);
+  EXPECT_EQ(blocked_at_edge(scene, edge, faces[0], normalize(Vec3d{-1, -1, 0})), std::nullopt);
+  EXPECT_EQ(blocked_at_edge(scene, edge, faces[1], normalize(Vec3d{1, -1, 0})), faces[0]);
+  EXPECT_EQ(blocked_at_edge(scene, edge, faces[1], normalize(Vec3d{1, 1, 0})), std::nullopt);
 }
 
 }  // namespace

@@ -44,8 +44,8 @@ uint64_t counted(const Scene& scene) {
   for (const Shape& shape : scene.shapes) {
     const EdgeMesh edges = build_edge_mesh(shape.mesh, false);
     for (const Edge& edge : edges.edges) {
-      const Vec3d p = edges.positions[edge.vertices[0]];
-      const Vec3d q = edges.positions[edge.vertices[1]];
+      const Vec3d p = edges.position(edge.vertices[0]);
+      const Vec3d q = edges.position(edge.vertices[1]);
       count += std::ranges::any_of(scene.shapes, [&](const Shape& other) {
         return std::ranges::any_of(other.mesh.faces, [&](const FaceIndices& face) {
           std::array<Vec3d, 3> t;

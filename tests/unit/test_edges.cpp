@@ -26,7 +26,7 @@ using Point = std::tuple<double, double, double>;
 std::multiset<std::tuple<Point, Point, EdgeClass, bool>> edges_in_space(const EdgeMesh& mesh) {
   std::multiset<std::tuple<Point, Point, EdgeClass, bool>> edges;
   for (const Edge& e : mesh.edges) {
-    const Vec3d &a = mesh.positions[e.vertices[0]], &b = mesh.positions[e.vertices[1]];
+    const Vec3d &a = mesh.position(e.vertices[0]), &b = mesh.position(e.vertices[1]);
     const auto [low, high] = std::minmax({Point{a.x, a.y, a.z}, Point{b.x, b.y, b.z}});
     edges.emplace(low, high, e.edge_class, e.concave);
   }
@@ -54,12 +54,12 @@ TEST(Edges, FirstFaceRunsAlongTheEdge) {
     const EdgeMesh edges = build_edge_mesh(mesh, true);
     for (uint32_t e = 0; e < edges.edges.size(); ++e) {
       const auto [from, to] = edges.edges[e].vertices;
-      const FaceIndices& face = mesh.faces[edges.edges[e].faces[0]];
+      const FaceIndices& face = mesh.face(edges.edges[e].faces[0]);
       int matches = 0;
       for (int k = 0; k < 3; ++k)
-        matches += mesh.weld[face[k]] == from && mesh.weld[face[(k + 1) % 3]] == to;
+        matches += mesh.weld[face[k]] == from.index() && mesh.weld[face[(k + 1) % 3]] == to.index();
       EXPECT_EQ(matches, 1) << name << " edge " << e;
-      EXPECT_EQ(edges.faces_around(e)[0], edges.edges[e].faces[0]);
+      EXPECT_EQ(edges.faces_around(EdgeId(e))[0], edges.edges[e].faces[0]);
     }
     EXPECT_EQ(edges.face_offsets.size(), edges.edges.size() + 1);
     EXPECT_EQ(edges.incident_faces.size(), 3 * mesh.faces.size()) << name;
@@ -104,7 +104,7 @@ TEST(Edges, ConcaveEdges) {
   EXPECT_GT(concave_count(torus), 0u);
   for (const Edge& e : torus.edges) {
     if (!e.concave) continue;
-    const Vec3d middle = (torus.positions[e.vertices[0]] + torus.positions[e.vertices[1]]) * 0.5;
+    const Vec3d middle = (torus.position(e.vertices[0]) + torus.position(e.vertices[1])) * 0.5;
     EXPECT_LT(std::hypot(middle.x, middle.y), 1.0);
   }
 }
@@ -137,7 +137,7 @@ TEST(Edges, IrregularEdges) {
   EXPECT_EQ(counts({{0, 1, 2}, {0, 2, 1}}), (Counts{0, 0, 3, 0, 0}));
   const EdgeMesh fan = build_edge_mesh(make_mesh(x, {{0, 1, 2}, {1, 0, 3}, {1, 0, 4}}), true);
   for (uint32_t e = 0; e < fan.edges.size(); ++e)
-    EXPECT_EQ(fan.faces_around(e).size(),
+    EXPECT_EQ(fan.faces_around(EdgeId(e)).size(),
               fan.edges[e].edge_class == EdgeClass::kIrregular ? 3u : 1u);
 }
 
@@ -218,10 +218,10 @@ TEST(Edges, NeedlesDoNotHideACrease) {
   const Mesh mesh =
       cube_with_t_junction({{0.3f, -1, std::nextafter(1.0f, 2.0f)}}, top, {{4, 5, 8}});
   const EdgeMesh edges = build_edge_mesh(mesh, true);
-  for (const auto& [from, to] : {std::pair{4u, 8u}, {5u, 8u}}) {
+  for (const auto& ends : {std::pair{VertexId(4), VertexId(8)}, {VertexId(5), VertexId(8)}}) {
     const auto found = std::find_if(edges.edges.begin(), edges.edges.end(), [&](const Edge& e) {
-      return std::min(e.vertices[0], e.vertices[1]) == from &&
-             std::max(e.vertices[0], e.vertices[1]) == to;
+      const auto [low, high] = std::minmax(e.vertices[0], e.vertices[1]);
+      return std::pair(low, high) == ends;
     });
     ASSERT_NE(found, edges.edges.end());
     EXPECT_EQ(found->edge_class, EdgeClass::kSharp);
@@ -236,7 +236,7 @@ TEST(Edges, TornSeamsHaveTwoRims) {
   const EdgeMesh torn = build_edge_mesh(mesh, true);
   EXPECT_EQ(counts_of(torn), (Counts{6, 0, 0, 0, 0}));
   for (const Edge& e : torn.edges)
-    EXPECT_EQ(torn.tangents[e.vertices[0]].x[3], e.faces[0] == 0 ? 0 : 2);
+    EXPECT_EQ(torn.tangent(e.vertices[0]).x[3], e.faces[0] == FaceId(0) ? 0 : 2);
 }
 
 TEST(Edges, DistancesAreRightToTheirBound) {
@@ -263,12 +263,12 @@ TEST(Edges, PointsOnAPlaneKeepTheEdge) {
   const Mesh mesh = with_smooth_normals(icosphere_mesh(1));
   const EdgeMesh edges = build_edge_mesh(mesh, true);
   for (uint32_t e = 0; e < edges.edges.size(); ++e) {
-    const FaceIndices& face = mesh.faces[edges.edges[e].faces[e % 2]];
+    const FaceIndices& face = mesh.face(edges.edges[e].faces[e % 2]);
     const Vec3d a = edges.positions[face[0]];
     for (int i = 0; i < 50; ++i) {
       const Vec3d p = a + (edges.positions[face[1]] - a) * (10 * rng.uniform() - 5) +
                       (edges.positions[face[2]] - a) * (10 * rng.uniform() - 5);
-      EXPECT_TRUE(is_candidate(edges, e, p));
+      EXPECT_TRUE(is_candidate(edges, EdgeId(e), p));
     }
   }
 }
@@ -281,12 +281,12 @@ TEST(Edges, SilhouettesFormLoops) {
     const EdgeMesh edges = build_edge_mesh(with_smooth_normals(shape), false);
     for (double radius : {0.05, 1.5, 3.0, 1e3, 1e6}) {
       const Vec3d p = random_direction(rng) * radius;
-      std::map<uint32_t, int> degree;
+      std::map<VertexId, int> degree;
       uint64_t count = 0;
       for (uint32_t e = 0; e < edges.edges.size(); ++e) {
-        if (!is_candidate(edges, e, p)) continue;
+        if (!is_candidate(edges, EdgeId(e), p)) continue;
         ++count;
-        for (uint32_t v : edges.edges[e].vertices) ++degree[v];
+        for (const VertexId v : edges.edges[e].vertices) ++degree[v];
       }
       for (const auto& [vertex, edges_at] : degree) EXPECT_EQ(edges_at % 2, 0);
       if (radius > 1.5) {
@@ -298,10 +298,10 @@ TEST(Edges, SilhouettesFormLoops) {
   const EdgeMesh sphere = build_edge_mesh(with_smooth_normals(icosphere_mesh(3)), true);
   const EdgeMesh cube = build_edge_mesh(with_smooth_normals(cube_mesh()), true);
   for (uint32_t e = 0; e < sphere.edges.size(); ++e)
-    EXPECT_FALSE(is_candidate(sphere, e, {0.1, 0.2, -0.3}));
+    EXPECT_FALSE(is_candidate(sphere, EdgeId(e), {0.1, 0.2, -0.3}));
   const auto cube_count = [&](const Vec3d& p) {
     int count = 0;
-    for (uint32_t e = 0; e < cube.edges.size(); ++e) count += is_candidate(cube, e, p);
+    for (uint32_t e = 0; e < cube.edges.size(); ++e) count += is_candidate(cube, EdgeId(e), p);
     return count;
   };
   EXPECT_EQ(cube_count({0.2, 0.3, 4}), 4);
@@ -315,7 +315,7 @@ TEST(Edges, SharpEdgesNeedAFaceInFront) {
   const auto count = [](const EdgeMesh& edges, const Vec3d& p) {
     int sharp = 0;
     for (uint32_t e = 0; e < edges.edges.size(); ++e)
-      sharp += edges.edges[e].edge_class == EdgeClass::kSharp && is_candidate(edges, e, p);
+      sharp += edges.edges[e].edge_class == EdgeClass::kSharp && is_candidate(edges, EdgeId(e), p);
     return sharp;
   };
   EXPECT_EQ(count(closed, {0.2, 0.3, 4}), 4);    // the edges of one side
@@ -340,8 +340,8 @@ TEST(EdgeMesh, CorruptedCopiesAreFound) {
       {"there are other than E + 1 offsets", [](EdgeMesh& m) { m.face_offsets.pop_back(); }},
       {"offsets do not span the incident faces", [](EdgeMesh& m) { m.incident_faces.pop_back(); }},
       {"an edge has no faces", [](EdgeMesh& m) { m.face_offsets[3] = m.face_offsets[4]; }},
-      {"an incident face is out of range", [](EdgeMesh& m) { m.incident_faces[2] = 1000; }},
-      {"a vertex is out of range", [](EdgeMesh& m) { m.edges[2].vertices[1] = 1000; }},
+      {"an incident face is out of range", [](EdgeMesh& m) { m.incident_faces[2] = FaceId(1000); }},
+      {"a vertex is out of range", [](EdgeMesh& m) { m.edges[2].vertices[1] = VertexId(1000); }},
       {"face 3: a plane's normal is not a unit vector", [](EdgeMesh& m) { m.planes[3].n.x += 1; }},
       {"face 3: a plane without a normal has an offset", [](EdgeMesh& m) { m.planes[3].n = {}; }},
       {"edge 0: its two ends are one vertex",
@@ -352,9 +352,9 @@ TEST(EdgeMesh, CorruptedCopiesAreFound) {
       {"edge 4: its first face is not the first around it",
        [](EdgeMesh& m) { std::swap(m.edges[4].faces[0], m.edges[4].faces[1]); }},
       {"edge 4: its second face is not the second around it",
-       [](EdgeMesh& m) { m.edges[4].faces[1] = kNoFace; }},
+       [](EdgeMesh& m) { m.edges[4].faces[1] = FaceId::none(); }},
       {"edge 0: an end lies off the plane of a face around it",
-       [](EdgeMesh& m) { m.planes[m.edges[0].faces[0]].offset += 1e-12; }},
+       [](EdgeMesh& m) { m.planes[m.edges[0].faces[0].index()].offset += 1e-12; }},
       {"edge 5: a border has one face",
        [](EdgeMesh& m) { m.edges[5].edge_class = EdgeClass::kBorder; }},
       {"edge 5: a closed mesh has neither borders nor irregular edges",

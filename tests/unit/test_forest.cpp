@@ -51,8 +51,8 @@ double random_scale(Rng& rng) { return std::exp(std::log(1e-3) + std::log(1e7) *
 // On a plane, at a vertex, on an edge, inside, near or far.
 Vec3d random_point(const EdgeMesh& mesh, double scale, Rng& rng) {
   const Edge& edge = mesh.edges[static_cast<size_t>(rng.uniform() * mesh.edges.size())];
-  const Vec3d a = mesh.positions[edge.vertices[0]], b = mesh.positions[edge.vertices[1]];
-  const Plane& plane = mesh.planes[edge.faces[0]];
+  const Vec3d a = mesh.position(edge.vertices[0]), b = mesh.position(edge.vertices[1]);
+  const Plane& plane = mesh.plane(edge.faces[0]);
   const double kind = rng.uniform(), u = rng.uniform();
   if (kind < 0.1) return a;
   if (kind < 0.2) return a * (1 - u) + b * u;
@@ -65,17 +65,17 @@ Vec3d random_point(const EdgeMesh& mesh, double scale, Rng& rng) {
 
 void expect_complete(const EdgeSamplerInput& input, const EdgeForest& forest, const Vec3d& p,
                      const std::string& name) {
-  std::vector<EdgeId> listed;
+  std::vector<EdgeRef> listed;
   forest.list_silhouettes(p, listed);
   std::vector<std::vector<bool>> found;
   for (const EdgeMesh& mesh : input.objects) found.emplace_back(mesh.edges.size(), false);
-  for (EdgeId id : listed) {
-    EXPECT_FALSE(found[id.object][id.edge]) << name << ": listed twice";
-    found[id.object][id.edge] = true;
+  for (EdgeRef id : listed) {
+    EXPECT_FALSE(found[id.object.index()][id.edge.index()]) << name << ": listed twice";
+    found[id.object.index()][id.edge.index()] = true;
   }
   for (uint32_t o = 0; o < input.objects.size(); ++o)
     for (uint32_t e = 0; e < input.objects[o].edges.size(); ++e)
-      EXPECT_EQ(found[o][e], is_candidate(input.objects[o], e, p))
+      EXPECT_EQ(found[o][e], is_candidate(input.objects[o], EdgeId(e), p))
           << name << " object " << o << " edge " << e << " p " << p.x << " " << p.y << " " << p.z;
 }
 
@@ -118,7 +118,7 @@ TEST(Forest, DoesNotDependOnThreads) {
   const auto one = EdgeForest::build(input, 1), seven = EdgeForest::build(input, 7);
   for (int i = 0; i < 20; ++i) {
     const Vec3d p = random_direction(rng) * 3.0;
-    std::vector<EdgeId> a, b;
+    std::vector<EdgeRef> a, b;
     EXPECT_EQ(one->list_silhouettes(p, a), seven->list_silhouettes(p, b));
     EXPECT_EQ(a, b);
   }
@@ -152,7 +152,8 @@ TEST(Forest, CorruptedCopiesAreFound) {
       {"no root leads to a node of edges", [](Forest& f) { f.edges.push_back(f.edges[0]); }},
       {"two ways lead to a node", [](Forest& f) { f.roots.push_back(f.roots[0]); }},
       {"a child has another parent", [](Forest& f) { f.head(f.inner[0].child[1]).parent = 0; }},
-      {"a child is of another tree", [](Forest& f) { f.head(f.inner[0].child[1]).object = 1; }},
+      {"a child is of another tree",
+       [](Forest& f) { f.head(f.inner[0].child[1]).object = ShapeId(1); }},
       {"a height is not its children's", [](Forest& f) { ++f.inner[0].head.height; }},
       {"a node of edges is not at height 0", [](Forest& f) { f.edges[0].head.height = 1; }},
       {"a speed is negative", [](Forest& f) { f.inner[0].speed[0] = -1; }},
@@ -174,7 +175,7 @@ TEST(Forest, CorruptedCopiesAreFound) {
        [](Forest& f) {
          // Taken out without a trace, but for the edge itself.
          EdgeNode& node = f.edges[0];
-         f.slots[node.head.object][node.edge[0]] = kNoParent;
+         f.slots[node.head.object.index()][node.edge[0]] = kNoParent;
          node.edge[0] = kNoChild;
          node.length[0] = 0;
        }},
@@ -216,8 +217,9 @@ TEST(Forest, ProbabilitiesDoNotDependOnTheScale) {
       moved.p = query.p * scale;
       double sum = 0;
       for (uint32_t e = 0; e < input.objects[0].edges.size(); ++e) {
-        const double probability = unit->probability(query, {0, e});
-        EXPECT_EQ(scaled->probability(moved, {0, e}), probability) << exponent << " " << e;
+        const EdgeRef id{ShapeId(0), EdgeId(e)};
+        const double probability = unit->probability(query, id);
+        EXPECT_EQ(scaled->probability(moved, id), probability) << exponent << " " << e;
         sum += probability;
       }
       EXPECT_GT(sum, 0.5) << exponent;
@@ -242,7 +244,8 @@ TEST(Forest, QueriesKeepThePointToTwiceAFloat) {
 
 double lost_share(const EdgeForest& forest, const EdgeMesh& mesh, const EdgeQuery& query) {
   double sum = 0;
-  for (uint32_t e = 0; e < mesh.edges.size(); ++e) sum += forest.probability(query, {0, e});
+  for (uint32_t e = 0; e < mesh.edges.size(); ++e)
+    sum += forest.probability(query, {ShapeId(0), EdgeId(e)});
   return 1 - sum;
 }
 
@@ -259,8 +262,7 @@ TEST(Forest, LosesNoMoreDrawsAtAVertex) {
     const FaceIndices& corners = torus.faces[face];
     EdgeQuery query;
     query.n = query.wi = mesh.planes[face].n;
-    query.object = 0;
-    query.face = face;
+    query.face = {ShapeId(0), FaceId(face)};
     query.p = mesh.positions[corners[0]];
     at_vertices += lost_share(*forest, mesh, query);
     query.p = query.p * 0.98 + (mesh.positions[corners[1]] + mesh.positions[corners[2]]) * 0.01;

@@ -73,7 +73,7 @@ std::map<uint32_t, Part> measure_parts(const Triangles& mesh, const EdgeMesh& ed
   const std::vector<uint32_t> part = parts_of(mesh);
   std::map<uint32_t, Part> parts;
   for (const uint32_t p : part) ++parts[p].euler;
-  for (const Edge& edge : edges.edges) --parts[part[edge.vertices[0]]].euler;
+  for (const Edge& edge : edges.edges) --parts[part[edge.vertices[0].index()]].euler;
   for (const auto& [a, b, c] : mesh.faces) {
     Part& p = parts[part[a]];
     ++p.euler;
@@ -159,9 +159,8 @@ TEST(Bracket, HasSharpEdgesAndFlatSides) {
     int right_angles = 0;
     for (const Edge& edge : edges.edges) {
       if (edge.edge_class != EdgeClass::kSharp) continue;
-      const double cosine =
-          dot(edges.planes[edge.faces[0]].n, edges.planes[edge.faces[1]].n) /
-          (length(edges.planes[edge.faces[0]].n) * length(edges.planes[edge.faces[1]].n));
+      const Vec3d &n0 = edges.plane(edge.faces[0]).n, &n1 = edges.plane(edge.faces[1]).n;
+      const double cosine = dot(n0, n1) / (length(n0) * length(n1));
       const double angle = std::acos(std::min(1.0, cosine)) * 180 / kPi;
       EXPECT_FALSE(angle > 20 && angle < 38) << angle;
       creases += angle > 38;

@@ -85,7 +85,7 @@ TEST(Lights, AreChosenUniformly) {
     ++counts[which];
     EXPECT_EQ(sample->face.has_value(), which == 0);
     const LightView lamp{sample->wo, sample->distance, Vec3d{0, -1, 0}};
-    const double expected = which == 0   ? lights.pdf(0, lamp)
+    const double expected = which == 0   ? lights.pdf(ShapeId(0), lamp)
                             : which == 1 ? lights.pdf_environment(sample->wo)
                                          : 0.25;
     EXPECT_DOUBLE_EQ(sample->pdf, expected);

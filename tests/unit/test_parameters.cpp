@@ -53,7 +53,7 @@ std::vector<Dual> numbers(const Scene& scene) {
   const auto add = [&](const Vec3<Dual>& v) { all.insert(all.end(), {v.x, v.y, v.z}); };
   for (const Shape& shape : scene.shapes) {
     const Mesh& m = shape.mesh;
-    for (uint32_t i = 0; i < m.positions.size(); ++i) add(m.position(i));
+    for (uint32_t i = 0; i < m.positions.size(); ++i) add(m.position(VertexId(i)));
     for (size_t i = 0; i < m.normals.size(); ++i) {
       Vec3<Dual> n{m.normals[i].x, m.normals[i].y, m.normals[i].z};
       for (int k = 0; k < 3 && !m.normal_tangents.empty(); ++k) n[k].d = m.normal_tangents[i][k];
@@ -144,16 +144,16 @@ TEST_F(Parameters, ComponentsOfAnArrayAddUpToAnyMotion) {
   for (const std::string name :
        {"tent.translate.y", "tent.rotate.z", "tent.scale", "tent.vertex_positions.2.y"}) {
     const Parameter parameter = find_parameter(scene_, name);
-    const std::vector<Vec3d> wanted = parameter.velocities(scene_, 0);
+    const std::vector<Vec3d> wanted = parameter.velocities(scene_, ShapeId(0));
     std::vector<Vec3d> sum(wanted.size());
     for (size_t c = 0; c < array.size; ++c) {
       if (mesh.weld[c / 3] != c / 3) continue;
       const double factor = wanted[c / 3][static_cast<int>(c % 3)];
-      const std::vector<Vec3d> one = array.velocities(scene_, 0, c);
+      const std::vector<Vec3d> one = array.velocities(scene_, ShapeId(0), c);
       for (size_t i = 0; i < sum.size(); ++i) sum[i] += one[i] * factor;
     }
     EXPECT_EQ(sum, wanted) << name;
-    EXPECT_TRUE(parameter.velocities(scene_, 1).empty());
+    EXPECT_TRUE(parameter.velocities(scene_, ShapeId(1)).empty());
   }
   Scene by_array = deep_copy(scene_), by_name = deep_copy(scene_);
   array.seed(by_array, 1, 2 * 3 + 1);

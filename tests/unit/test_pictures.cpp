@@ -91,11 +91,11 @@ TEST(MeshView, TellsHiddenEdges) {
   };
   int seen = 0, unseen = 0;
   for (uint32_t e = 0; e < edges.edges.size(); ++e) {
-    const double d0 = edges.planes[edges.edges[e].faces[0]].distance(eye);
-    const double d1 = edges.planes[edges.edges[e].faces[1]].distance(eye);
+    const double d0 = edges.plane(edges.edges[e].faces[0]).distance(eye);
+    const double d1 = edges.plane(edges.edges[e].faces[1]).distance(eye);
     if (d0 * d1 < 0) continue;  // the outline
     Layer visible(64, 64), hidden(64, 64);
-    view.draw_edge(edges, e, 1, visible, hidden);
+    view.draw_edge(edges, EdgeId(e), 1, visible, hidden);
     EXPECT_EQ(total(visible) > 0, d0 > 0) << e;
     EXPECT_EQ(total(hidden) > 0, d0 < 0) << e;
     ++(d0 > 0 ? seen : unseen);

@@ -20,16 +20,17 @@ namespace {
 // Fixed seeds: a z-score beyond this (chance 6e-7) is an error, not luck.
 constexpr double kLargestZ = 5;
 
-bool holds_candidate(const EdgeSamplerInput& input, std::span<const EdgeId> edges, const Vec3d& p) {
+bool holds_candidate(const EdgeSamplerInput& input, std::span<const EdgeRef> edges,
+                     const Vec3d& p) {
   return std::any_of(edges.begin(), edges.end(),
-                     [&](EdgeId id) { return is_candidate(input.objects[id.object], id.edge, p); });
+                     [&](EdgeRef id) { return is_candidate(input.object(id.object), id.edge, p); });
 }
 
 // Two edges below one node; what it rejects is up to the test.
 class PairTree final : public RejectionTree {
  public:
   using Test = std::function<bool(uint32_t node, const Vec3d& p)>;
-  PairTree(EdgeId a, EdgeId b, Test rejects) : rejects_(std::move(rejects)) {
+  PairTree(EdgeRef a, EdgeRef b, Test rejects) : rejects_(std::move(rejects)) {
     nodes_ = {{kNoNode, 3, 1, 0, 2}, {0, 2, 2, 0, 1}, {0, 3, 2, 1, 2}};
     edges_ = {a, b};
   }
@@ -46,19 +47,19 @@ EdgeSamplerInput roof() {
       make_mesh({{0, -1, 0}, {0, 1, 0}, {1, 0, -1}, {-1, 0, -1}}, {{0, 2, 1}, {0, 1, 3}}));
   return {{build_edge_mesh(mesh, true)}};
 }
-EdgeId ridge_of(const EdgeSamplerInput& input) {
+EdgeRef ridge_of(const EdgeSamplerInput& input) {
   const auto& edges = input.objects[0].edges;
   const auto smooth = std::find_if(edges.begin(), edges.end(), [](const Edge& edge) {
     return edge.edge_class == EdgeClass::kSmooth;
   });
-  return {0, static_cast<uint32_t>(smooth - edges.begin())};
+  return {ShapeId(0), EdgeId(static_cast<uint32_t>(smooth - edges.begin()))};
 }
 
 // Across the ridge: the planes of the roof are the diagonals of the slice, and p lies between them
 // in the left and right quarters.
 TEST(Slice, CountsOfARoofAreKnown) {
   const EdgeSamplerInput input = roof();
-  const EdgeId ridge = ridge_of(input);
+  const EdgeRef ridge = ridge_of(input);
   const Slice slice{{0, 0, 0}, {3, 0, 0}, {0, 0, 3}, 64};
   // Pixels on the two diagonals lie on a plane, and count as between.
   const uint64_t all = 64 * 64, between = (all - 128) / 2 + 128;
@@ -79,7 +80,7 @@ TEST(Slice, RowZeroIsOnTop) {
   EXPECT_EQ(slice.point(0, 0), (Vec3d{-1, 2, 5}));
   EXPECT_EQ(slice.point(4, 4), (Vec3d{3, 2, 1}));
   const EdgeSamplerInput input = roof();
-  const EdgeId ridge = ridge_of(input);
+  const EdgeRef ridge = ridge_of(input);
   const PairTree tree(ridge, ridge, [](uint32_t, const Vec3d& p) { return p.z > 4 && p.x < 0; });
   const auto verdicts = judge_slice(input, tree, 0, slice, 1);
   EXPECT_EQ(verdicts[0], Verdict::kTrueReject);
@@ -88,7 +89,8 @@ TEST(Slice, RowZeroIsOnTop) {
 
 TEST(Reach, TellsEndsFromDeadEndsAndLosses) {
   const EdgeSamplerInput input = roof();
-  const EdgeId ridge = ridge_of(input), border{0, ridge.edge == 0 ? 1u : 0u};
+  const EdgeRef ridge = ridge_of(input),
+                border{ShapeId(0), EdgeId(ridge.edge == EdgeId(0) ? 1 : 0)};
   const uint32_t borders = input.objects[0].edges.size() - 2;  // but for ridge and `border`
   const Vec3d above{0, 0, 5}, aside{5, 0, 0};                  // the ridge counts for the second
   const auto reach = [&](const Vec3d& p, bool top, bool first, bool second) {
@@ -152,9 +154,9 @@ TEST_P(RejectingSamplers, TreesAreInOrder) {
     EXPECT_EQ(edges, tree->edges().size());
     std::vector<std::vector<bool>> seen;
     for (const EdgeMesh& object : input.objects) seen.emplace_back(object.edges.size(), false);
-    for (const EdgeId id : tree->edges()) {
-      EXPECT_FALSE(seen[id.object][id.edge]);
-      seen[id.object][id.edge] = true;
+    for (const EdgeRef id : tree->edges()) {
+      EXPECT_FALSE(seen[id.object.index()][id.edge.index()]);
+      seen[id.object.index()][id.edge.index()] = true;
     }
   }
 }
@@ -194,10 +196,11 @@ TEST_P(RejectingSamplers, DescentsReachAllSilhouettes) {
       EXPECT_TRUE(reach.missed.empty()) << name << ": missed " << reach.missed.size();
       uint64_t candidates = 0, false_accepts = 0;
       for (const EdgeMesh& object : input.objects)
-        for (uint32_t e = 0; e < object.edges.size(); ++e) candidates += is_candidate(object, e, p);
+        for (uint32_t e = 0; e < object.edges.size(); ++e)
+          candidates += is_candidate(object, EdgeId(e), p);
       EXPECT_EQ(reach.silhouettes.size(), candidates) << name;
-      for (const EdgeId id : reach.false_accepts)
-        EXPECT_FALSE(is_candidate(input.objects[id.object], id.edge, p)) << name;
+      for (const EdgeRef id : reach.false_accepts)
+        EXPECT_FALSE(is_candidate(input.object(id.object), id.edge, p)) << name;
       // Counted from the other side: nodes whose ancestors and themselves are accepted in vain.
       for (const DepthCounts& counts : reach.by_depth) false_accepts += counts.false_accepts;
       const auto nodes = tree->nodes();
@@ -224,7 +227,7 @@ TEST_P(RejectingSamplers, HitRateIsTheSumOfProbabilities) {
     for (const EdgeQuery& query : queries) {
       double sum = 0;
       for (uint32_t e = 0; e < input.objects[0].edges.size(); ++e)
-        sum += sampler->probability(query, {0, e});
+        sum += sampler->probability(query, {ShapeId(0), EdgeId(e)});
       expected += sum / queries.size();
       variance += sum * (1 - sum) / (kDraws * queries.size() * queries.size());
     }
@@ -267,10 +270,10 @@ TEST(RejectionTree, OfTheForestReachesWhatItLists) {
   const auto tree = forest->rejection_tree();
   for (int i = 0; i < 30; ++i) {
     const Vec3d p = random_direction(rng) * 2.0;
-    std::vector<EdgeId> listed;
+    std::vector<EdgeRef> listed;
     forest->list_silhouettes(p, listed);
-    std::vector<EdgeId> reached = reach_from(input, *tree, p).silhouettes;
-    const auto before = [](EdgeId a, EdgeId b) { return a.edge < b.edge; };
+    std::vector<EdgeRef> reached = reach_from(input, *tree, p).silhouettes;
+    const auto before = [](EdgeRef a, EdgeRef b) { return a.edge < b.edge; };
     std::sort(listed.begin(), listed.end(), before);
     std::sort(reached.begin(), reached.end(), before);
     EXPECT_EQ(listed, reached);
@@ -322,8 +325,8 @@ TEST(Places, APatchBendsAcrossATube) {
   for (Vec3f& x : mesh.positions) x = {std::sin(x.x), 2 * x.y, std::cos(x.x)};
   weld_positions(mesh);
   const EdgeSamplerInput input{{build_edge_mesh(with_smooth_normals(mesh), true)}};
-  std::vector<EdgeId> edges(input.objects[0].edges.size());
-  for (uint32_t e = 0; e < edges.size(); ++e) edges[e] = {0, e};
+  std::vector<EdgeRef> edges(input.objects[0].edges.size());
+  for (uint32_t e = 0; e < edges.size(); ++e) edges[e] = {ShapeId(0), EdgeId(e)};
   const Patch patch = patch_of(input, edges);
   EXPECT_NEAR(patch.normal.z, 1, 1e-6);
   EXPECT_NEAR(std::fabs(patch.bend.x), 1, 1e-6);

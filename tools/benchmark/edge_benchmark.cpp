@@ -117,11 +117,11 @@ double efficiency(const EdgeSampler& sampler, const EdgeMesh& mesh,
     const LobeBound lobe(q.n, q.wi, q.lobe);
     double sum = 0, second = 0;
     for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
-      if (!is_candidate(mesh, e, q.p)) continue;
-      const double b = EdgeBound(lobe, segment_of(mesh, e, q)).total();
+      if (!is_candidate(mesh, EdgeId(e), q.p)) continue;
+      const double b = EdgeBound(lobe, segment_of(mesh, EdgeId(e), q)).total();
       if (!(b > 0)) continue;
       sum += b;
-      second += b * b / sampler.probability(q, {0, e});
+      second += b * b / sampler.probability(q, {ShapeId(0), EdgeId(e)});
     }
     squares += sum * sum;
     seconds += second;

@@ -16,18 +16,18 @@ namespace {
 
 using nlohmann::json;
 
-std::string shape_name(const Scene& scene, uint32_t index) {
-  const std::string& id = scene.shapes[index].id;
-  return id.empty() ? fmt::format("shape {} (without id)", index) : id;
+std::string shape_name(const Scene& scene, ShapeId shape) {
+  const std::string& id = scene.shape(shape).id;
+  return id.empty() ? fmt::format("shape {} (without id)", shape.index()) : id;
 }
 
-json describe_shape(const Scene& scene, uint32_t index) {
-  const Shape& shape = scene.shapes[index];
+json describe_shape(const Scene& scene, ShapeId id) {
+  const Shape& shape = scene.shape(id);
   const EdgeMesh edges = build_edge_mesh(shape.mesh, shape.bsdf->side(false) == nullptr);
   const Bounds bounds = bounds_of(shape.mesh);
   constexpr const char* kNormals[] = {"face", "computed", "from the file"};
   const auto vector = [](const Vec3d& v) { return json::array({v.x, v.y, v.z}); };
-  return {{"name", shape_name(scene, index)},
+  return {{"name", shape_name(scene, id)},
           {"faces", shape.mesh.faces.size()},
           {"vertices", shape.mesh.positions.size()},
           {"collapsed_faces", shape.mesh.collapsed_faces},
@@ -90,7 +90,7 @@ int run_info(const CommonOptions& common) {
                  {"lights", json::array()},
                  {"parameters", json::array()}};
   for (uint32_t i = 0; i < scene.shapes.size(); ++i) {
-    report["shapes"].push_back(describe_shape(scene, i));
+    report["shapes"].push_back(describe_shape(scene, ShapeId(i)));
     print_shape(report["shapes"].back());
   }
   fmt::print("environment: {}\n",

@@ -73,11 +73,11 @@ struct Sphere {
 Sphere sphere_around(const EdgeMesh& mesh) {
   Bounds bounds;
   for (const Edge& edge : mesh.edges)
-    for (const uint32_t vertex : edge.vertices) bounds.extend(mesh.positions[vertex]);
+    for (const VertexId vertex : edge.vertices) bounds.extend(mesh.position(vertex));
   Sphere sphere{bounds.center()};
   for (const Edge& edge : mesh.edges)
-    for (const uint32_t vertex : edge.vertices)
-      sphere.radius = std::max(sphere.radius, length(mesh.positions[vertex] - sphere.center));
+    for (const VertexId vertex : edge.vertices)
+      sphere.radius = std::max(sphere.radius, length(mesh.position(vertex) - sphere.center));
   return sphere;
 }
 
@@ -358,7 +358,7 @@ class Rejection {
   uint64_t seed_ = 0;
   std::vector<EdgeQuery> queries_;
   uint32_t node_ = 0, node_depth_ = 0;
-  std::vector<EdgeId> node_edges_;
+  std::vector<EdgeRef> node_edges_;
   Patch patch_;
   std::array<Slice, 2> slices_;
   Vec3d point_;

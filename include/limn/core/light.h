@@ -117,6 +117,6 @@ class DeltaLight : public Light {
 void read_light(Properties& properties, Scene& scene, Shape* shape);
 
 // The light of an emitting shape, uniform in area. The scene must outlive it.
-std::unique_ptr<Light> make_area_light(const Scene& scene, uint32_t shape);
+std::unique_ptr<Light> make_area_light(const Scene& scene, ShapeId shape);
 
 }  // namespace limn

@@ -22,8 +22,8 @@ class Lights {
   std::optional<LightSample> sample(const Vec3d& p, Rng& rng) const;
   // The density [1/sr] with which `sample` draws what a ray sees: an emitting shape, or, where it
   // leaves the scene, the environment (there must be one).
-  double pdf(uint32_t shape, const LightView& view) const {
-    return of_shape_[shape]->pdf(view, choices_);
+  double pdf(ShapeId shape, const LightView& view) const {
+    return of_shape_[shape.index()]->pdf(view, choices_);
   }
   double pdf_environment(const Vec3d& wo) const {
     return environment_->pdf_solid_angle(wo) / choices_;

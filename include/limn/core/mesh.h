@@ -8,16 +8,18 @@
 #include "limn/core/bounds.h"
 #include "limn/core/dual.h"
 #include "limn/core/error.h"
+#include "limn/core/ids.h"
 #include "limn/core/vec.h"
 
 namespace limn {
 
-using FaceIndices = std::array<uint32_t, 3>;  // counter-clockwise from outside
+// Three vertices (or normals), counter-clockwise from outside, as files and Embree have them.
+using FaceIndices = std::array<uint32_t, 3>;
 
-// A face of a scene.
+// A face of a scene, or none.
 struct FaceRef {
-  uint32_t shape = UINT32_MAX;
-  uint32_t face = UINT32_MAX;
+  ShapeId shape;
+  FaceId face;
   bool operator==(const FaceRef&) const = default;
 };
 
@@ -55,7 +57,8 @@ struct Mesh {
   // What the loader mended: faces that were left out because two of their corners coincide.
   uint64_t collapsed_faces = 0;
 
-  Vec3<Dual> position(uint32_t vertex) const;
+  const FaceIndices& face(FaceId id) const { return faces[id.index()]; }
+  Vec3<Dual> position(VertexId id) const;
 };
 
 // Fills `weld` from the positions: vertices at bitwise equal coordinates (with -0 = 0) share the

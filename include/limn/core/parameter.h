@@ -43,7 +43,7 @@ struct Parameter {
 
   // V by 3: the derivative of the positions of a shape's vertices; empty where the parameter moves
   // none of that shape.
-  std::vector<Vec3d> velocities(const Scene& scene, size_t shape, size_t component = 0) const;
+  std::vector<Vec3d> velocities(const Scene& scene, ShapeId shape, size_t component = 0) const;
 };
 
 // All parameters of the scene, scalars and arrays; a part of an array (one component, a field) is

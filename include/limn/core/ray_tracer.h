@@ -18,8 +18,8 @@ struct Ray {
   // Faces that the ray never meets: the one it starts on, and those around an edge that it grazes.
   // By id, never by distance.
   FaceRef start = {};
-  uint32_t skip_shape = UINT32_MAX;
-  std::span<const uint32_t> skip_faces = {};
+  ShapeId skip_shape = {};
+  std::span<const FaceId> skip_faces = {};
   bool skip_emitters = false;  // hide_emitters, for camera rays
 };
 

@@ -45,12 +45,12 @@ struct SurfacePoint {
 
 // Corners of a face as the scalar P.
 template <class P>
-std::array<Vec3<P>, 3> face_corners(const Mesh& mesh, uint32_t face) {
+std::array<Vec3<P>, 3> face_corners(const Mesh& mesh, FaceId face) {
   std::array<Vec3<P>, 3> corners;
   for (int k = 0; k < 3; ++k) {
-    const uint32_t vertex = mesh.faces[face][k];
+    const VertexId vertex(mesh.face(face)[k]);
     if constexpr (std::is_same_v<P, double>) {
-      corners[k] = cast<double>(mesh.positions[vertex]);
+      corners[k] = cast<double>(mesh.positions[vertex.index()]);
     } else {
       corners[k] = mesh.position(vertex);
     }
@@ -70,8 +70,8 @@ S interpolate(const S& b0, const S& b1, const S& b2, const S& a0, const S& a1, c
 template <class S>
 void interpolate_shading(const Mesh& mesh, const S& b1, const S& b2, SurfacePoint<S>& point) {
   const S b0 = 1.0 - b1 - b2;
-  const FaceIndices& ids = mesh.normal_ids[point.face.face];
-  const FaceIndices& vertices = mesh.faces[point.face.face];
+  const FaceIndices& ids = mesh.normal_ids[point.face.face.index()];
+  const FaceIndices& vertices = mesh.face(point.face.face);
   Vec3<S> n[3];
   S h[3];
   for (int k = 0; k < 3; ++k) {
@@ -122,7 +122,7 @@ template <class S>
 SurfacePoint<S> surface_on_ray(const Scene& scene, FaceRef face, const Vec3<S>& origin,
                                const Vec3<S>& direction) {
   SurfacePoint<S> point;
-  point.shape = &scene.shapes[face.shape];
+  point.shape = &scene.shape(face.shape);
   point.face = face;
   const Mesh& mesh = point.shape->mesh;
   if constexpr (std::is_same_v<S, Dual>) {

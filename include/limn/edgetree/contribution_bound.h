@@ -13,7 +13,7 @@ struct EdgeSegment {
   Vec3d w_0, w_1;        // ends minus p
   Vec3<Lanes> v_0, v_1;  // velocities of the ends minus that of p
 };
-EdgeSegment segment_of(const EdgeMesh& mesh, uint32_t edge, const EdgeQuery& query);
+EdgeSegment segment_of(const EdgeMesh& mesh, EdgeId edge, const EdgeQuery& query);
 
 // Upper bound of the scattering function over an arc of directions, for one viewer.
 class LobeBound {

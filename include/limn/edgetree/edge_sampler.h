@@ -24,14 +24,13 @@ struct EdgeQuery {
   Vec3d wi;                // unit, towards the viewer
   LobeSummary lobe;        // of the scattering function
   Vec3<Lanes> velocity{};  // of p, per parameter; an edge's velocity relative to p counts
-  // The face that p lies on: its edges lie on p's horizon, where the scattering function is zero,
-  // and are never drawn.
-  uint32_t object = UINT32_MAX;
-  uint32_t face = kNoFace;
+  // The face that p lies on, if any: its edges lie on p's horizon, where the scattering function is
+  // zero, and are never drawn.
+  FaceRef face = {};
 };
 
 struct EdgeSample {
-  EdgeId edge;
+  EdgeRef edge;
   double t = 0;            // position on the edge: (1 - t) x_0 + t x_1
   double probability = 0;  // P(e), of this edge for this query
   double pdf_t = 0;        // density of t given the edge, per unit t
@@ -39,7 +38,7 @@ struct EdgeSample {
 
 // What samplers are built from. It must outlive them.
 struct EdgeSamplerInput {
-  std::vector<EdgeMesh> objects;
+  std::vector<EdgeMesh> objects;  // of the scene's shapes, in their order
   std::vector<LightTriangle> lights = {};
   double environment_luminance = 0;  // mean over the sphere
   // How it is spread over directions; null if it is uniform or absent.
@@ -47,13 +46,15 @@ struct EdgeSamplerInput {
   // Weights that make the speeds of different parameters comparable (a metre, a radian), for
   // importance only.
   Lanes lane_scale = {1, 1, 1, 1};
+
+  const EdgeMesh& object(ShapeId id) const { return objects[id.index()]; }
 };
 
 // Whether the query's own face is among those around the edge.
-inline bool is_own_edge(const EdgeSamplerInput& input, const EdgeQuery& query, EdgeId id) {
-  if (id.object != query.object || query.face == kNoFace) return false;
-  for (uint32_t face : input.objects[id.object].faces_around(id.edge))
-    if (face == query.face) return true;
+inline bool is_own_edge(const EdgeSamplerInput& input, const EdgeQuery& query, EdgeRef id) {
+  if (id.object != query.face.shape) return false;
+  for (const FaceId face : input.object(id.object).faces_around(id.edge))
+    if (face == query.face.face) return true;
   return false;
 }
 
@@ -75,9 +76,9 @@ class EdgeSampler {
 
   // P(e) for this query, without sampling: what `sample` reports when it returns this edge. Zero
   // only where the edge cannot contribute.
-  virtual double probability(const EdgeQuery& query, EdgeId edge) const = 0;
+  virtual double probability(const EdgeQuery& query, EdgeRef edge) const = 0;
   // Density of t given the edge.
-  virtual double pdf_t(const EdgeQuery& query, EdgeId edge, double t) const = 0;
+  virtual double pdf_t(const EdgeQuery& query, EdgeRef edge, double t) const = 0;
 
   // Time of a draw in units of one ray with the shading at its end, about 4 microseconds in scenes
   // of 20000 triangles, where it was timed. A figure and not a clock, so that what follows from it

@@ -29,13 +29,11 @@ enum class EdgeClass : uint8_t {
 
 const char* edge_class_name(EdgeClass edge_class);
 
-inline constexpr uint32_t kNoFace = UINT32_MAX;
-
 struct Edge {
-  // Welded vertex ids of the mesh; the first face runs from [0] to [1]. Where a face without area
+  // Welded vertices of the mesh; the first face runs from [0] to [1]. Where a face without area
   // met a long side, an edge may be a part of that side.
-  std::array<uint32_t, 2> vertices;
-  std::array<uint32_t, 2> faces;  // two of its faces; [1] is kNoFace for a border
+  std::array<VertexId, 2> vertices;
+  std::array<FaceId, 2> faces;  // two of its faces; [1] is none for a border
   EdgeClass edge_class = EdgeClass::kSmooth;
   bool concave = false;  // two faces, each in front of the other's plane
 };
@@ -56,7 +54,7 @@ struct EdgeMesh {
   std::vector<Edge> edges;            // E
   // The faces around edge e: incident_faces[face_offsets[e], face_offsets[e + 1]).
   std::vector<uint32_t> face_offsets;  // E + 1
-  std::vector<uint32_t> incident_faces;
+  std::vector<FaceId> incident_faces;
   // The mesh is closed and its surfaces are black from behind: a point that sees only back faces
   // sees no jump at a sharp edge, and concave edges are never silhouettes from outside.
   // Holds if every connected part encloses positive volume (a part turned inside out, or the cavity
@@ -64,20 +62,24 @@ struct EdgeMesh {
   bool one_sided_closed = false;
   double extent = 0;  // largest |x| of a position that a face uses
 
-  std::span<const uint32_t> faces_around(uint32_t edge) const {
-    return {incident_faces.data() + face_offsets[edge],
-            face_offsets[edge + 1] - face_offsets[edge]};
+  const Edge& edge(EdgeId id) const { return edges[id.index()]; }
+  const Plane& plane(FaceId id) const { return planes[id.index()]; }
+  const Vec3d& position(VertexId id) const { return positions[id.index()]; }
+  const Vec3<Lanes>& tangent(VertexId id) const { return tangents[id.index()]; }
+  std::span<const FaceId> faces_around(EdgeId id) const {
+    const uint32_t *begin = &face_offsets[id.index()], *end = begin + 1;
+    return {incident_faces.data() + *begin, *end - *begin};
   }
   uint64_t count(EdgeClass edge_class) const;
   // The first of the above that does not hold, in words; empty if all of it does.
   std::string validate() const;
 };
 
-// An edge of a scene.
-struct EdgeId {
-  uint32_t object = UINT32_MAX;  // index of the EdgeMesh
-  uint32_t edge = UINT32_MAX;    // index in its edges
-  bool operator==(const EdgeId&) const = default;
+// An edge of a scene, or none.
+struct EdgeRef {
+  ShapeId object;  // whose EdgeMesh it is in
+  EdgeId edge;
+  bool operator==(const EdgeRef&) const = default;
 };
 
 // mesh.weld must be filled. black_behind: the mesh's BSDF is black from behind. Faces without area
@@ -96,6 +98,6 @@ double distance_error(const EdgeMesh& mesh, const Vec3d& p);
 // than lost); never, if concave and one_sided_closed: the mesh itself hides such an edge from every
 // point that lies between its planes. Sharp: p is in front of at least one face, or the mesh is not
 // one_sided_closed. Border, irregular: always. Flat: as smooth.
-bool is_candidate(const EdgeMesh& mesh, uint32_t edge, const Vec3d& p);
+bool is_candidate(const EdgeMesh& mesh, EdgeId edge, const Vec3d& p);
 
 }  // namespace limn

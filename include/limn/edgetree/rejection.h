@@ -43,10 +43,10 @@ struct DepthCounts {
 
 // All that descents from one point can meet, if they go wherever the test lets them.
 struct Reach {
-  std::vector<EdgeId> silhouettes;    // where a descent can end, in E(p)
-  std::vector<EdgeId> false_accepts;  // where a descent can end, not in E(p)
-  std::vector<EdgeId> dead_ends;  // in nodes that are accepted while all nodes below are rejected
-  std::vector<EdgeId> missed;     // in E(p), but no descent can end there
+  std::vector<EdgeRef> silhouettes;    // where a descent can end, in E(p)
+  std::vector<EdgeRef> false_accepts;  // where a descent can end, not in E(p)
+  std::vector<EdgeRef> dead_ends;  // in nodes that are accepted while all nodes below are rejected
+  std::vector<EdgeRef> missed;     // in E(p), but no descent can end there
   std::vector<DepthCounts> by_depth;  // [0] is depth 1
 };
 Reach reach_from(const EdgeSamplerInput& input, const RejectionTree& tree, const Vec3d& p);

@@ -19,7 +19,7 @@ struct Match {
   double overlap = 0;  // in [0, 1]: edges in both over edges in either
 };
 Match best_match(const EdgeSamplerInput& input, const RejectionTree& tree,
-                 std::span<const EdgeId> edges);
+                 std::span<const EdgeRef> edges);
 
 // A patch of surface: unit axes at right angles.
 struct Patch {
@@ -28,7 +28,7 @@ struct Patch {
   Vec3d normal;        // mean of the faces around its edges
   Vec3d bend, across;  // the tangents along which normals vary most and least
 };
-Patch patch_of(const EdgeSamplerInput& input, std::span<const EdgeId> edges);
+Patch patch_of(const EdgeSamplerInput& input, std::span<const EdgeRef> edges);
 
 // Two parallel squares of half-width `extent` in the plane of the patch's normal (up) and bend (to
 // the right): one through its centre and one that is `distance` off, along `across`.

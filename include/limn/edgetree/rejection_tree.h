@@ -25,8 +25,8 @@ class RejectionTree {
 
   // Depth first.
   std::span<const RejectionNode> nodes() const { return nodes_; }
-  std::span<const EdgeId> edges() const { return edges_; }
-  std::span<const EdgeId> edges(uint32_t node) const {
+  std::span<const EdgeRef> edges() const { return edges_; }
+  std::span<const EdgeRef> edges(uint32_t node) const {
     return edges().subspan(nodes_[node].begin, nodes_[node].end - nodes_[node].begin);
   }
 
@@ -36,7 +36,7 @@ class RejectionTree {
 
  protected:
   std::vector<RejectionNode> nodes_;
-  std::vector<EdgeId> edges_;
+  std::vector<EdgeRef> edges_;
 };
 
 }  // namespace limn

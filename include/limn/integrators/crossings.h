@@ -8,9 +8,8 @@
 namespace limn {
 
 struct Crossings {
-  uint64_t edges = 0;             // edges that pass through a face of another part of the surface
-  uint32_t shape_a = UINT32_MAX;  // shapes of the first one found
-  uint32_t shape_b = UINT32_MAX;
+  uint64_t edges = 0;        // edges that pass through a face of another part of the surface
+  ShapeId shape_a, shape_b;  // of the first one found
 };
 
 // Two triangles cross if and only if an edge of one passes through the other (but for measure

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "limn/core/parallel.h"
+#include "limn/core/shading.h"
 
 namespace limn {
 namespace {
@@ -55,17 +56,15 @@ Ray MeshView::ray(double x, double y) const {
 }
 
 // The shading normal, or that of the face.
-Vec3d MeshView::normal_at(const FaceRef& ref, const Vec3d& x) const {
-  const FaceIndices& face = mesh_.faces[ref.face];
-  Vec3d corners[3];
-  for (int k = 0; k < 3; ++k) corners[k] = cast<double>(mesh_.positions[face[k]]);
+Vec3d MeshView::normal_at(FaceId face, const Vec3d& x) const {
+  const auto corners = face_corners<double>(mesh_, face);
   const Vec3d area = cross(corners[1] - corners[0], corners[2] - corners[0]);
   Vec3d n = area;
   if (!mesh_.normal_ids.empty()) {
     n = {};
     for (int k = 0; k < 3; ++k) {
       const Vec3d part = cross(corners[(k + 1) % 3] - x, corners[(k + 2) % 3] - x);
-      n += mesh_.normals[mesh_.normal_ids[ref.face][k]] * dot(part, area);
+      n += mesh_.normals[mesh_.normal_ids[face.index()][k]] * dot(part, area);
     }
   }
   return length(n) > 0 ? normalize(n) : Vec3d{0, 0, 1};
@@ -75,7 +74,7 @@ MeshView::Surface MeshView::surface(const Ray& ray) const {
   static const Color background = srgb(0xffffff), clay = srgb(0xdedbd6);
   Hit hit;
   if (!tracer_.closest(ray, hit)) return {background, std::numeric_limits<double>::infinity()};
-  Vec3d n = normal_at(hit.face, ray.origin + ray.direction * hit.t);
+  Vec3d n = normal_at(hit.face.face, ray.origin + ray.direction * hit.t);
   if (dot(n, ray.direction) > 0) n = -n;
   // A soft light from above on the left behind the camera.
   const Vec3d light =
@@ -110,16 +109,14 @@ PixelPoint MeshView::project(const Vec3d& x) const {
   return {film.x, film.y};
 }
 
-void MeshView::draw_edge(const EdgeMesh& edges, uint32_t edge, double width, Layer& visible,
+void MeshView::draw_edge(const EdgeMesh& edges, EdgeId edge, double width, Layer& visible,
                          Layer& hidden) const {
-  const auto [a, b] = edges.edges[edge].vertices;
-  draw_line(edges.positions[a], edges.positions[b], width, edges.faces_around(edge), visible,
-            hidden);
+  const auto [a, b] = edges.edge(edge).vertices;
+  draw_line(edges.position(a), edges.position(b), width, edges.faces_around(edge), visible, hidden);
 }
 
 void MeshView::draw_line(const Vec3d& a, const Vec3d& b, double width,
-                         std::span<const uint32_t> skip_faces, Layer& visible,
-                         Layer& hidden) const {
+                         std::span<const FaceId> skip_faces, Layer& visible, Layer& hidden) const {
   const PixelPoint from = project(a), to = project(b);
   const int pieces =
       std::max(1, static_cast<int>(std::hypot(to.x - from.x, to.y - from.y) / kPiece));
@@ -130,7 +127,7 @@ void MeshView::draw_line(const Vec3d& a, const Vec3d& b, double width,
     const Vec3d w = at(i + 0.5) - sight.origin;
     sight.t_max = length(w);
     sight.direction = w / sight.t_max;
-    sight.skip_shape = 0;
+    sight.skip_shape = ShapeId(0);
     sight.skip_faces = skip_faces;
     Layer& layer = tracer_.occluded(sight) ? hidden : visible;
     layer.line(project(at(i)), project(at(i + 1)), width);

@@ -35,7 +35,7 @@ class MeshView {
 
   PixelPoint project(const Vec3d& x) const;
   // Draws edges, cut into short pieces: a piece that the mesh hides goes to `hidden`.
-  void draw_edge(const EdgeMesh& edges, uint32_t edge, double width, Layer& visible,
+  void draw_edge(const EdgeMesh& edges, EdgeId edge, double width, Layer& visible,
                  Layer& hidden) const;
   void draw_line(const Vec3d& a, const Vec3d& b, double width, Layer& visible,
                  Layer& hidden) const {
@@ -43,9 +43,9 @@ class MeshView {
   }
 
  private:
-  void draw_line(const Vec3d& a, const Vec3d& b, double width, std::span<const uint32_t> skip_faces,
+  void draw_line(const Vec3d& a, const Vec3d& b, double width, std::span<const FaceId> skip_faces,
                  Layer& visible, Layer& hidden) const;
-  Vec3d normal_at(const FaceRef& face, const Vec3d& x) const;
+  Vec3d normal_at(FaceId face, const Vec3d& x) const;
 
   const Mesh& mesh_;
   const RayTracer& tracer_;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "limn/core/parallel.h"
+#include "limn/core/shading.h"
 
 namespace limn {
 namespace {
@@ -29,14 +30,11 @@ PixelPoint place_on(const Slice& slice, const Vec3d& x) {
 struct Cut {
   Vec3d a, b;
 };
-std::optional<Cut> cut_of(const Mesh& mesh, uint32_t face, const Slice& slice) {
+std::optional<Cut> cut_of(const Mesh& mesh, FaceId face, const Slice& slice) {
   const Vec3d n = cross(slice.right, slice.up);
-  Vec3d corners[3];
+  const auto corners = face_corners<double>(mesh, face);
   double heights[3];
-  for (int k = 0; k < 3; ++k) {
-    corners[k] = cast<double>(mesh.positions[mesh.faces[face][k]]);
-    heights[k] = dot(corners[k] - slice.center, n);
-  }
+  for (int k = 0; k < 3; ++k) heights[k] = dot(corners[k] - slice.center, n);
   std::vector<Vec3d> ends;
   for (int k = 0; k < 3; ++k) {
     const int l = (k + 1) % 3;
@@ -48,17 +46,17 @@ std::optional<Cut> cut_of(const Mesh& mesh, uint32_t face, const Slice& slice) {
   return Cut{ends[0], ends[1]};
 }
 
-void draw_cuts(const Mesh& mesh, std::span<const uint32_t> faces, const Slice& slice, double width,
+void draw_cuts(const Mesh& mesh, std::span<const FaceId> faces, const Slice& slice, double width,
                Layer& layer) {
-  for (const uint32_t face : faces) {
+  for (const FaceId face : faces) {
     const auto cut = cut_of(mesh, face, slice);
     if (cut) layer.line(place_on(slice, cut->a), place_on(slice, cut->b), width);
   }
 }
 
-std::vector<uint32_t> faces_around(const EdgeMesh& mesh, std::span<const EdgeId> edges) {
-  std::vector<uint32_t> faces;
-  for (const EdgeId id : edges) {
+std::vector<FaceId> faces_around(const EdgeMesh& mesh, std::span<const EdgeRef> edges) {
+  std::vector<FaceId> faces;
+  for (const EdgeRef id : edges) {
     const auto around = mesh.faces_around(id.edge);
     faces.insert(faces.end(), around.begin(), around.end());
   }
@@ -115,8 +113,7 @@ class SlicePainter {
     ray.origin = slice_.point(x + 0.5, y + 0.5);
     ray.direction = normalize(cross(slice_.right, slice_.up));
     Hit hit;
-    return subject_.tracer.closest(ray, hit) &&
-           dot(mesh.planes[hit.face.face].n, ray.direction) > 0;
+    return subject_.tracer.closest(ray, hit) && dot(mesh.plane(hit.face.face).n, ray.direction) > 0;
   }
 
   const Subject& subject_;
@@ -152,8 +149,8 @@ Image slice_picture(const Subject& subject, const RejectionTree& tree, uint32_t 
                     const Slice& slice, const std::vector<Verdict>& verdicts) {
   Image image = SlicePainter(subject, tree, node, slice, verdicts).paint();
   const Mesh& mesh = subject.scene.shapes[0].mesh;
-  std::vector<uint32_t> all(mesh.faces.size());
-  for (uint32_t f = 0; f < all.size(); ++f) all[f] = f;
+  std::vector<FaceId> all;
+  for (uint32_t f = 0; f < mesh.faces.size(); ++f) all.emplace_back(f);
   Layer outline(slice.size, slice.size), patch(slice.size, slice.size);
   draw_cuts(mesh, all, slice, stroke(2, slice.size), outline);
   draw_cuts(mesh, faces_around(subject.input.objects[0], tree.edges(node)), slice,
@@ -166,10 +163,10 @@ Image slice_picture(const Subject& subject, const RejectionTree& tree, uint32_t 
 Image reach_picture(const MeshView& view, Image clay, const EdgeMesh& edges, const Reach& reach,
                     const Vec3d& p) {
   const int size = clay.width;
-  const auto draw = [&](const std::vector<EdgeId>& ids, double width, uint32_t color,
+  const auto draw = [&](const std::vector<EdgeRef>& ids, double width, uint32_t color,
                         double faint) {
     Layer visible(size, size), hidden(size, size);
-    for (const EdgeId id : ids)
+    for (const EdgeRef id : ids)
       view.draw_edge(edges, id.edge, stroke(width, size), visible, hidden);
     paint(clay, hidden, srgb(color), faint);
     paint(clay, visible, srgb(color));
@@ -186,7 +183,7 @@ Image reach_picture(const MeshView& view, Image clay, const EdgeMesh& edges, con
   return clay;
 }
 
-Image overview_picture(const MeshView& view, const EdgeMesh& mesh, std::span<const EdgeId> edges,
+Image overview_picture(const MeshView& view, const EdgeMesh& mesh, std::span<const EdgeRef> edges,
                        std::span<const PlacedSlice> slices) {
   Image image = view.picture([&](const Ray& ray) {
     const MeshView::Surface behind = view.surface(ray);
@@ -202,7 +199,7 @@ Image overview_picture(const MeshView& view, const EdgeMesh& mesh, std::span<con
     return color;
   });
   Layer visible(image.width, image.height), hidden(image.width, image.height);
-  for (const EdgeId id : edges)
+  for (const EdgeRef id : edges)
     view.draw_edge(mesh, id.edge, stroke(1.6, image.width), visible, hidden);
   paint(image, hidden, srgb(kNodeColor), 0.15);
   paint(image, visible, srgb(kNodeColor));

@@ -36,7 +36,7 @@ struct PlacedSlice {
   std::vector<Verdict> verdicts;
 };
 // The mesh, the edges of the node, and the slices as panes.
-Image overview_picture(const MeshView& view, const EdgeMesh& mesh, std::span<const EdgeId> edges,
+Image overview_picture(const MeshView& view, const EdgeMesh& mesh, std::span<const EdgeRef> edges,
                        std::span<const PlacedSlice> slices);
 
 }  // namespace limn
