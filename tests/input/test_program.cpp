@@ -234,8 +234,8 @@ TEST_F(Program, BadNumbers) {
 
 TEST_F(Program, BadSamples) {
   const std::string gradient = "gradient " + scene_ + " --wrt screen.translate.x -o " + out();
-  for (const char* samples : {"3,", "3,1,1,1", "3:1:1", "0,1,1", "1,0,1", "1,1,0.5",
-                              "1.5,1,1", "1,1,2000", "-1,1,1", "many"}) {
+  for (const char* samples : {"3,", "3,1,1,1", "3:1:1", "0,1,1", "1,0,1", "1,1,0.5", "1.5,1,1",
+                              "1,1,2000", "-1,1,1", "many"}) {
     const std::string message = refused(gradient + " --samples=" + samples);
     EXPECT_NE(message.find("--samples"), std::string::npos) << samples << ": " << message;
     EXPECT_NE(message.find("3,0.5,1"), std::string::npos) << samples << ": " << message;

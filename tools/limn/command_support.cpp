@@ -73,8 +73,8 @@ std::string method_list(bool all) {
   return names;
 }
 
-void add_parameter_options(CLI::App& app, std::vector<std::string>& parameters,
-                           std::string& method, bool all) {
+void add_parameter_options(CLI::App& app, std::vector<std::string>& parameters, std::string& method,
+                           bool all) {
   app.add_option("--wrt", parameters, "Parameter to differentiate (repeatable)")
       ->required()
       ->type_name("PARAM")
@@ -184,9 +184,10 @@ std::optional<SampleCounts> parse_samples(const std::string& list) {
     good = good && !part.empty() && *end == 0 && counts.back() > 0 && counts.back() <= kMost;
   }
   if (good) return SampleCounts(counts);
-  throw InputError(fmt::format(
-      "--samples: \"{}\" is neither auto nor counts of at most {}, one for each term, as in 3,0.5,1",
-      list, kMost));
+  throw InputError(
+      fmt::format("--samples: \"{}\" is neither auto nor counts of at most {}, one for each term, "
+                  "as in 3,0.5,1",
+                  list, kMost));
 }
 
 NonFinite::Place parse_place(const std::string& text) {

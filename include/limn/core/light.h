@@ -11,6 +11,7 @@
 
 #include "limn/core/bsdf.h"
 #include "limn/core/dual.h"
+#include "limn/core/light_triangle.h"
 #include "limn/core/mesh.h"
 #include "limn/core/rng.h"
 #include "limn/core/vec.h"
@@ -39,12 +40,6 @@ struct LightView {
   Vec3d wo;         // unit, of the ray
   double distance;  // along it; infinite for light from infinity
   Vec3d n_g;        // unit geometric normal there; unused for light from infinity
-};
-
-// A triangle of an emitter, wound counter-clockwise seen from where it shines.
-struct LightTriangle {
-  Vec3d corners[3];
-  double luminance = 0;
 };
 
 class Light {

@@ -48,7 +48,7 @@ struct Scene {
   std::vector<Shape> shapes;
   std::shared_ptr<Environment> environment;  // null if none
   std::string environment_id;
-  std::vector<std::shared_ptr<DeltaLight>> delta_lights;  // in the order of the file
+  std::vector<std::shared_ptr<DeltaLight>> delta_lights;     // in the order of the file
   std::map<std::string, std::shared_ptr<Bsdf>> bsdfs_by_id;  // every bsdf element with an id
 };
 
