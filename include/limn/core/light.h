@@ -11,7 +11,6 @@
 
 #include "limn/core/bsdf.h"
 #include "limn/core/dual.h"
-#include "limn/core/light_triangle.h"
 #include "limn/core/mesh.h"
 #include "limn/core/rng.h"
 #include "limn/core/vec.h"
