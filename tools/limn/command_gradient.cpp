@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "limn/core/error.h"
+#include "limn/core/names.h"
 #include "limn/core/parameter.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
@@ -26,7 +27,9 @@ std::string file_part(const std::string& name) {
   return part;
 }
 
+// 0 for a term that is not computed.
 double mean_magnitude(const Moments& moments) {
+  if (moments.size() == 0) return 0;
   double sum = 0;
   for (size_t i = 0; i < moments.size(); ++i) sum += std::fabs(moments.mean(i));
   return sum / moments.size();
@@ -122,9 +125,7 @@ void print_terms(const GradientResult& result) {
 
 // "3,0.25,1 of interior, camera, boundary"
 std::string samples_of_terms(const GradientResult& result) {
-  std::string names;
-  for (const TermRun& term : result.terms) names += (names.empty() ? "" : ", ") + term.name;
-  return to_string(result.samples()) + " of " + names;
+  return to_string(result.samples()) + " of " + join(names_of(result.terms));
 }
 
 void print_samples(const GradientResult& r) {
