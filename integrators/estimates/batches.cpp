@@ -250,8 +250,8 @@ void check_pixel(const Film& film, const NonFinite::Place& place) {
   if (x >= 0 && x < film.crop_width && y >= 0 && y < film.crop_height && place.sample >= 0) return;
   throw InputError(fmt::format(
       "there is no sample {} of pixel ({}, {}): pixels of this film are ({}, {}) to ({}, {})",
-      place.sample, place.x, place.y, film.crop_x, film.crop_y,
-      film.crop_x + film.crop_width - 1, film.crop_y + film.crop_height - 1));
+      place.sample, place.x, place.y, film.crop_x, film.crop_y, film.crop_x + film.crop_width - 1,
+      film.crop_y + film.crop_height - 1));
 }
 
 void run_pixel_sample(const SampleEstimator& estimator, uint64_t seed, const PixelSample& at,

@@ -72,10 +72,11 @@ Step find_step(const Scene& scene, const Parameter& parameter, size_t parameters
       kTrials * static_cast<double>(r.spp) / std::max(r.seconds - r.setup_seconds, 1e-9);
   const double left = (run.seconds - r.setup_seconds / kTrials) / parameters - r.seconds;
   const double samples = run.seconds > 0 ? per_second * left : run.spp;
-  return {best_step(trials, samples),
-          fmt::format("a pilot of {} samples per pixel at {} steps from {:.3g} to {:.3g}: least sum "
-                      "of squared bias and variance for {:.3g} samples per pixel",
-                      r.spp, kTrials, job.steps.front(), job.steps.back(), samples)};
+  return {
+      best_step(trials, samples),
+      fmt::format("a pilot of {} samples per pixel at {} steps from {:.3g} to {:.3g}: least sum "
+                  "of squared bias and variance for {:.3g} samples per pixel",
+                  r.spp, kTrials, job.steps.front(), job.steps.back(), samples)};
 }
 
 ParameterGradient to_gradient(const std::string& name, DifferenceEstimate& estimate) {
@@ -103,9 +104,9 @@ GradientResult run_differences(const MethodType& method, const Scene& scene,
   }
   double pilot_seconds = 0;
   for (const Parameter& parameter : parameters) {
-    const Step step = options.step > 0 ? Step{options.step, "--step"}
-                                       : find_step(scene, parameter, parameters.size(), settings,
-                                                   pilot_seconds);
+    const Step step = options.step > 0
+                          ? Step{options.step, "--step"}
+                          : find_step(scene, parameter, parameters.size(), settings, pilot_seconds);
     jobs.push_back({parameter.name, {step.value}, {{1}}});
     const std::string of = parameters.size() > 1 ? " of " + parameter.name : "";
     result.settings.push_back({"step" + of, step.value});

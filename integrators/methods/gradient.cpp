@@ -9,15 +9,10 @@
 #include "integrators/methods/method_table.h"
 #include "integrators/methods/selection.h"
 #include "limn/core/error.h"
+#include "limn/core/names.h"
 
 namespace limn {
 namespace {
-
-std::string join(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
 
 void check_shading(const Scene& scene, GradientResult& result) {
   if (scene.shading != ShadingModel::kMitsuba) return;
@@ -93,12 +88,10 @@ const std::vector<MethodType>& method_types() {
 
 const MethodType& find_method(const std::string& name) {
   if (name.empty()) return method_types().front();
-  std::vector<std::string> known;
   for (const MethodType& type : method_types()) {
     if (type.name == name) return type;
-    known.push_back(type.name);
   }
-  throw InputError("unknown method \"" + name + "\" (known: " + join(known) + ")");
+  throw InputError(unknown_name("method", name, names_of(method_types())));
 }
 
 GradientResult gradient(const Scene& scene, const GradientOptions& options,

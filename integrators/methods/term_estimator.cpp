@@ -123,8 +123,8 @@ void TermEstimator::add_vertices(const PixelSample& at, const VertexTerms& verti
 
 // One path: radiance, and what the terms make of it.
 template <class Visitor>
-void TermEstimator::add_path(const PixelSample& at, const Rng& key, Visitor& visitor,
-                             double weight, SampleSink& sink) const {
+void TermEstimator::add_path(const PixelSample& at, const Rng& key, Visitor& visitor, double weight,
+                             SampleSink& sink) const {
   const FilmPosition film = sample_pixel_filter(scene_.film, at.x, at.y, key);
   const Ray primal = camera_ray(scene_, scene_.camera.ray<double>(film.x, film.y));
   const auto ray = scene_.camera.ray<Dual>(film.x, film.y);

@@ -61,8 +61,8 @@ class TermJob {
     std::vector<Parameter> parameters;
     for (const auto& name : options.parameters) parameters.push_back(find_parameter(scene, name));
     for (size_t k = 0; k < parameters.size(); k += kLanes) {
-      const auto some = std::span(parameters).subspan(k).first(
-          std::min<size_t>(kLanes, parameters.size() - k));
+      const auto some =
+          std::span(parameters).subspan(k).first(std::min<size_t>(kLanes, parameters.size() - k));
       passes_.push_back(std::make_unique<TermEstimator>(scene, some, computed_, sampler, threads));
     }
   }
@@ -133,9 +133,10 @@ class TermJob {
       wanted += fmt::format("{}{}{}", wanted.empty() ? "" : ", ", type->name,
                             type->least_samples == 1 ? "" : " (may be less than 1)");
     }
-    throw InputError(fmt::format("--samples: \"{}\": counts must be positive, and whole where "
-                                 "paths are concerned, as in 3,0.5,1; the terms are {}",
-                                 to_string(samples), wanted));
+    throw InputError(
+        fmt::format("--samples: \"{}\": counts must be positive, and whole where "
+                    "paths are concerned, as in 3,0.5,1; the terms are {}",
+                    to_string(samples), wanted));
   }
 
   void set_samples(const SampleCounts& samples, GradientResult& result) const {

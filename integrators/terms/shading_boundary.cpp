@@ -48,6 +48,9 @@ class BoundaryTerm final : public Term {
 
   void describe(GradientStats& stats) const override {
     stats.setup.emplace_back("edge sampler", build_seconds_);
+    const SamplerSize size = sampler_->size();
+    stats.sampler_nodes += size.nodes;
+    stats.sampler_bytes += size.bytes;
   }
 
  private:

@@ -34,8 +34,7 @@ CheckResult run_check(const Scene& scene, const std::string& parameter, int spp,
 void expect_agreement(const Scene& scene, const std::string& parameter, int spp) {
   const CheckResult r = run_check(scene, parameter, spp);
   EXPECT_GT(r.extrapolated.count, 0) << parameter;
-  EXPECT_TRUE(r.agree) << parameter << ": suspect "
-                       << r.suspect;
+  EXPECT_TRUE(r.agree) << parameter << ": suspect " << r.suspect;
 }
 
 // A leaf of two triangles, bent, seen from both sides.

@@ -132,8 +132,9 @@ TEST(Choice, GoesTheRightWay) {
   EXPECT_EQ(shadow[kInterior], 1);
   EXPECT_GE(shadow[kBoundary], 2);
   // Both parameters count.
-  EXPECT_GT(run(lit, {"ball.translate.x", "glow.radiance"}, {}, run_settings(64)).samples()[kInterior],
-            1);
+  EXPECT_GT(
+      run(lit, {"ball.translate.x", "glow.radiance"}, {}, run_settings(64)).samples()[kInterior],
+      1);
 }
 
 // A choice that is better by its own figures must be better by those of long runs, too.
@@ -160,8 +161,7 @@ TEST(Choice, IsNotMadeForShortJobsOrOneTerm) {
   const GradientResult brief = run(scene, {"ball.translate.y"}, {}, run_settings(15));
   EXPECT_EQ(brief.samples(), SampleCounts{});
   EXPECT_EQ(brief.pilot_spp, 0);
-  const GradientResult alone =
-      run(scene, {"ball.translate.y"}, {}, run_settings(64), {"boundary"});
+  const GradientResult alone = run(scene, {"ball.translate.y"}, {}, run_settings(64), {"boundary"});
   EXPECT_EQ(alone.samples(), SampleCounts{});
   EXPECT_EQ(alone.pilot_spp, 0);
 }
@@ -284,9 +284,9 @@ TEST(Samples, AgreeWithDifferences) {
 TEST(Samples, MustBePositive) {
   const TempFiles files;
   const Scene scene = shadow_scene(files);
-  for (const SampleCounts& samples : {SampleCounts{0, 1, 1}, SampleCounts{1, 0, 1},
-                                      SampleCounts{1, 1, -1}, SampleCounts{1, NAN, 1},
-                                      SampleCounts{1, 1, 1.5}, SampleCounts{1, 1, 1, 1}}) {
+  for (const SampleCounts& samples :
+       {SampleCounts{0, 1, 1}, SampleCounts{1, 0, 1}, SampleCounts{1, 1, -1},
+        SampleCounts{1, NAN, 1}, SampleCounts{1, 1, 1.5}, SampleCounts{1, 1, 1, 1}}) {
     EXPECT_THROW(run(scene, {"ball.translate.y"}, samples, run_settings(1)), InputError);
   }
 }

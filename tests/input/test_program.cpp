@@ -200,6 +200,91 @@ TEST_F(Program, ChecksBothWays) {
   EXPECT_NE(wrong.text.find("suspect the boundary term"), std::string::npos) << wrong.text;
 }
 
+// Whatever the method: images, standard errors and figures of every parameter.
+TEST_F(Program, GradientsByAnyMethod) {
+  for (const std::string method : {"forest", "uniform", "fd"}) {
+    const Outcome outcome =
+        run("gradient " + scene_ + " --wrt screen.translate.x --wrt screen.translate.y --spp 8" +
+            " --method " + method + " --stats --json " + files_.path("g.json") + " -o " + out());
+    EXPECT_EQ(outcome.status, 0) << outcome.text;
+    EXPECT_NE(outcome.text.find("set-up, "), std::string::npos) << outcome.text;
+    for (const char* parameter : {"screen.translate.x", "screen.translate.y"}) {
+      const std::string stem = files_.path("out_" + std::string(parameter));
+      for (const char* ending : {".exr", ".png", "_stderr.exr"}) {
+        EXPECT_TRUE(std::filesystem::exists(stem + ending)) << method << stem << ending;
+        std::filesystem::remove(stem + ending);
+      }
+    }
+    std::ifstream stream(files_.path("g.json"));
+    const auto figures = nlohmann::json::parse(stream);
+    EXPECT_EQ(figures["method"], method);
+    EXPECT_EQ(figures["costs"].size(), method == "fd" ? 1u : 3u);
+    EXPECT_EQ(figures["parameters"].size(), 2u);
+  }
+  EXPECT_NE(refused("gradient " + scene_ + " --wrt screen.translate.x --method fd --terms " +
+                    "interior -o " + out())
+                .find("\"fd\" has all terms in one"),
+            std::string::npos);
+}
+
+TEST_F(Program, ChecksAnyMethod) {
+  for (const std::string method : {"li2019", "fd"}) {
+    const Outcome outcome = run("check " + scene_ + " --spp 512 --block 2 --method " + method +
+                                " --wrt screen.translate.y");
+    EXPECT_EQ(outcome.status, 0) << method << outcome.text;
+  }
+}
+
+// A sample done again adds what it added in its run: with one sample per pixel, the pixel's value.
+TEST_F(Program, RepeatsOneSample) {
+  const std::string gradient = "gradient " + scene_ + " --wrt screen.translate.x -o " + out();
+  const Outcome whole = run(gradient + " --spp 1 --samples 1 --terms boundary");
+  EXPECT_EQ(whole.status, 0) << whole.text;
+  const Image image = read_exr(out());
+  int brightest = 0;
+  for (int i = 0; i < image.width * image.height; ++i) {
+    const auto size = [&](int k) { return std::fabs(image.data[3 * k]); };
+    if (size(i) > size(brightest)) brightest = i;
+  }
+  ASSERT_NE(image.data[3 * brightest], 0);
+  const Outcome one = run(gradient + " --spp 1 --samples 1 --terms boundary --debug-sample " +
+                          std::to_string(brightest % image.width) + "," +
+                          std::to_string(brightest / image.width) + ",0");
+  EXPECT_EQ(one.status, 0) << one.text;
+  EXPECT_NE(one.text.find("vertex 0: face "), std::string::npos) << one.text;
+  const std::string sum = "sum: boundary of parameter 1: (";
+  const size_t place = one.text.find(sum);
+  ASSERT_NE(place, std::string::npos) << one.text;
+  EXPECT_NEAR(std::stod(one.text.substr(place + sum.size())), image.data[3 * brightest],
+              1e-5 * std::fabs(image.data[3 * brightest]));
+  EXPECT_NE(refused(gradient + " --debug-sample 1,2").find("there is no sample 2 of the term"),
+            std::string::npos);
+  EXPECT_NE(refused(gradient + " --debug-sample 9999,0,0").find("pixels of this film"),
+            std::string::npos);
+  EXPECT_NE(refused(gradient + " --debug-sample here").find("X,Y,S"), std::string::npos);
+  EXPECT_NE(
+      refused("render " + scene_ + " -o " + out() + " --debug-sample 0,0,-1").find("no sample -1"),
+      std::string::npos);
+}
+
+// Samples that are not finite come with the command that shows the first.
+TEST_F(Program, NonFiniteSamplesCanBeRepeated) {
+  const Outcome outcome = run("gradient " + scene_ + " -D glow=1e308 --wrt screen.translate.x" +
+                              " --spp 2 --samples 1 -o " + out());
+  EXPECT_EQ(outcome.status, 3) << outcome.text;
+  EXPECT_NE(outcome.text.find("  to see the first: limn gradient "), std::string::npos)
+      << outcome.text;
+  EXPECT_NE(outcome.text.find(" --debug-sample "), std::string::npos) << outcome.text;
+}
+
+TEST_F(Program, AblationsStandInTheLongHelp) {
+  const std::string brief = run("gradient --help").text;
+  const std::string all = run("gradient --help-all").text;
+  EXPECT_EQ(brief.find("forest-concave"), std::string::npos) << brief;
+  EXPECT_NE(brief.find("li2019"), std::string::npos) << brief;
+  EXPECT_NE(all.find("forest-concave"), std::string::npos) << all;
+}
+
 TEST_F(Program, UnknownParameterListsTheNearest) {
   const std::string text = refused("gradient " + scene_ + " --wrt scren.translate.x -o " + out());
   EXPECT_NE(text.find("\"scren.translate.x\""), std::string::npos) << text;
@@ -234,8 +319,8 @@ TEST_F(Program, BadNumbers) {
 
 TEST_F(Program, BadSamples) {
   const std::string gradient = "gradient " + scene_ + " --wrt screen.translate.x -o " + out();
-  for (const char* samples : {"3,", "3,1,1,1", "3:1:1", "0,1,1", "1,0,1", "1,1,0.5",
-                              "1.5,1,1", "1,1,2000", "-1,1,1", "many"}) {
+  for (const char* samples : {"3,", "3,1,1,1", "3:1:1", "0,1,1", "1,0,1", "1,1,0.5", "1.5,1,1",
+                              "1,1,2000", "-1,1,1", "many"}) {
     const std::string message = refused(gradient + " --samples=" + samples);
     EXPECT_NE(message.find("--samples"), std::string::npos) << samples << ": " << message;
     EXPECT_NE(message.find("3,0.5,1"), std::string::npos) << samples << ": " << message;

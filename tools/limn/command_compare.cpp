@@ -52,11 +52,11 @@ std::vector<Row> rows() {
 }
 
 std::string row_names(bool all) {
-  std::string names;
+  std::vector<std::string> names;
   for (const Row& row : rows()) {
-    if (all || !row.ablation) names += (names.empty() ? "" : ", ") + row.name;
+    if (all || !row.ablation) names.push_back(row.name);
   }
-  return names;
+  return join(names);
 }
 
 // Names are checked before any work.

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "limn/core/error.h"
+#include "limn/core/names.h"
 #include "limn/core/parameter.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
@@ -26,7 +27,9 @@ std::string file_part(const std::string& name) {
   return part;
 }
 
+// 0 for a term that is not computed.
 double mean_magnitude(const Moments& moments) {
+  if (moments.size() == 0) return 0;
   double sum = 0;
   for (size_t i = 0; i < moments.size(); ++i) sum += std::fabs(moments.mean(i));
   return sum / moments.size();
@@ -122,9 +125,7 @@ void print_terms(const GradientResult& result) {
 
 // "3,0.25,1 of interior, camera, boundary"
 std::string samples_of_terms(const GradientResult& result) {
-  std::string names;
-  for (const TermRun& term : result.terms) names += (names.empty() ? "" : ", ") + term.name;
-  return to_string(result.samples()) + " of " + names;
+  return to_string(result.samples()) + " of " + join(names_of(result.terms));
 }
 
 void print_samples(const GradientResult& r) {
@@ -140,9 +141,8 @@ void print_samples(const GradientResult& r) {
 
 std::string text_of(const GradientResult& result, const LargestSample& largest) {
   const auto& place = largest.place;
-  return place.x >= 0
-             ? fmt::format("pixel ({}, {}), sample {}", place.x, place.y, place.sample)
-             : fmt::format("sample {} of {} samples per pixel", place.sample, result.spp);
+  return place.x >= 0 ? fmt::format("pixel ({}, {}), sample {}", place.x, place.y, place.sample)
+                      : fmt::format("sample {} of {} samples per pixel", place.sample, result.spp);
 }
 
 // Single samples that rule a term's error, each with the command that does it again.
@@ -173,9 +173,10 @@ void print_stats(const GradientResult& result) {
   for (const TermRun& term : result.terms) {
     const TermCost& c = term.cost;
     if (c.samples == 0) continue;
-    fmt::print("{}: {} samples, {} rays to the next surface, {} shadow rays, {:.3g} s of all "
-               "threads\n",
-               term.name, c.samples, c.rays - c.shadow_rays, c.shadow_rays, c.seconds);
+    fmt::print(
+        "{}: {} samples, {} rays to the next surface, {} shadow rays, {:.3g} s of all "
+        "threads\n",
+        term.name, c.samples, c.rays - c.shadow_rays, c.shadow_rays, c.seconds);
   }
   for (const auto& [name, seconds] : result.stats.setup) {
     fmt::print("set-up, {}: {:.3g} s\n", name, seconds);
@@ -218,7 +219,8 @@ class GradientCommand final : public Command {
     add_common_options(app, common_);
     add_parameter_options(app, options_.parameters, options_.method, all);
     add_term_options(app, terms_, samples_);
-    app.add_option("--step", options_.step, "Step of finite differences (default: found by a pilot)")
+    app.add_option("--step", options_.step,
+                   "Step of finite differences (default: found by a pilot)")
         ->check(CLI::PositiveNumber);
     app.add_option("-o,--output", output_,
                    "Image to write (.exr; _stderr.exr and .png are put beside it)")

@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "limn/core/error.h"
+#include "limn/core/names.h"
 #include "limn/core/parallel.h"
 #include "limn/edgetree/edge_sampler_types.h"
 #include "tools/limn/reject/reject_figures.h"
@@ -46,10 +47,10 @@ EdgeMesh edges_of(const Shape& shape) {
 EdgeMesh keep_one_shape(Scene& scene, const std::string& id) {
   EdgeMesh chosen;
   size_t index = scene.shapes.size();
-  std::string known;
+  std::vector<std::string> known;
   for (size_t i = 0; i < scene.shapes.size(); ++i) {
     const std::string& name = scene.shapes[i].id;
-    if (!name.empty()) known += (known.empty() ? "" : ", ") + name;
+    if (!name.empty()) known.push_back(name);
     if (!id.empty() && name != id) continue;
     EdgeMesh edges = edges_of(scene.shapes[i]);
     if (index < scene.shapes.size() && edges.edges.size() <= chosen.edges.size()) continue;
@@ -57,9 +58,9 @@ EdgeMesh keep_one_shape(Scene& scene, const std::string& id) {
     index = i;
   }
   if (index == scene.shapes.size())
-    throw InputError({scene.file},
-                     id.empty() ? "the scene has no shapes"
-                                : fmt::format("no shape has the id \"{}\" (known: {})", id, known));
+    throw InputError({scene.file}, id.empty() ? "the scene has no shapes"
+                                              : fmt::format("no shape has the id \"{}\" ({})", id,
+                                                            known_names(known)));
   Shape shape = std::move(scene.shapes[index]);
   scene.shapes.clear();
   scene.shapes.push_back(std::move(shape));

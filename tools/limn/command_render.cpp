@@ -38,8 +38,7 @@ class RenderCommand final : public Command {
 
  private:
   void write(const Scene& scene, const RunSettings& settings, const RenderResult& result) const {
-    const Image image =
-        mean_image(result.radiance, scene.film.crop_width, scene.film.crop_height);
+    const Image image = mean_image(result.radiance, scene.film.crop_width, scene.film.crop_height);
     const std::string picture = with_ending(output_, ".png");
     write_exr(output_, film_channels(scene, image), scene.film.half,
               provenance(scene, settings, result.spp));

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "limn/core/error.h"
+#include "limn/core/names.h"
 #include "limn/core/parallel.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/terminal.h"
@@ -65,16 +66,15 @@ void add_common_options(CLI::App& app, CommonOptions& common) {
 }
 
 std::string method_list(bool all) {
-  std::string names;
+  std::vector<std::string> names;
   for (const MethodType& type : method_types()) {
-    if (type.ablation && !all) continue;
-    names += (names.empty() ? "" : ", ") + type.name;
+    if (all || !type.ablation) names.push_back(type.name);
   }
-  return names;
+  return join(names);
 }
 
-void add_parameter_options(CLI::App& app, std::vector<std::string>& parameters,
-                           std::string& method, bool all) {
+void add_parameter_options(CLI::App& app, std::vector<std::string>& parameters, std::string& method,
+                           bool all) {
   app.add_option("--wrt", parameters, "Parameter to differentiate (repeatable)")
       ->required()
       ->type_name("PARAM")
@@ -84,11 +84,9 @@ void add_parameter_options(CLI::App& app, std::vector<std::string>& parameters,
 }
 
 void add_term_options(CLI::App& app, std::string& terms, std::string& samples) {
-  std::string names;
-  for (const std::string& term : method_types().front().terms) {
-    names += (names.empty() ? "" : ",") + term;
-  }
-  app.add_option("--terms", terms, "Terms to compute, of " + names + " (default: all there are)")
+  app.add_option(
+         "--terms", terms,
+         "Terms to compute, of " + join(method_types().front().terms) + " (default: all there are)")
       ->type_name("A,B,...");
   app.add_option("--samples", samples,
                  "What a sample per pixel holds of each term, in this order: paths, points on the "
@@ -184,9 +182,10 @@ std::optional<SampleCounts> parse_samples(const std::string& list) {
     good = good && !part.empty() && *end == 0 && counts.back() > 0 && counts.back() <= kMost;
   }
   if (good) return SampleCounts(counts);
-  throw InputError(fmt::format(
-      "--samples: \"{}\" is neither auto nor counts of at most {}, one for each term, as in 3,0.5,1",
-      list, kMost));
+  throw InputError(
+      fmt::format("--samples: \"{}\" is neither auto nor counts of at most {}, one for each term, "
+                  "as in 3,0.5,1",
+                  list, kMost));
 }
 
 NonFinite::Place parse_place(const std::string& text) {

@@ -36,8 +36,8 @@ void add_common_options(CLI::App& app, CommonOptions& common);
 // Names of methods as help text; all: of ablations, too.
 std::string method_list(bool all);
 // --wrt; --method, which --sampler says as well
-void add_parameter_options(CLI::App& app, std::vector<std::string>& parameters,
-                           std::string& method, bool all);
+void add_parameter_options(CLI::App& app, std::vector<std::string>& parameters, std::string& method,
+                           bool all);
 // --terms and --samples
 void add_term_options(CLI::App& app, std::string& terms, std::string& samples);
 // --debug-sample

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 
 #include "limn/core/error.h"
+#include "limn/core/names.h"
 #include "tools/limn/commands.h"
 #include "tools/limn/version.h"
 
@@ -31,14 +32,14 @@ std::string command_line(int argc, char** argv) {
 void check_command(const CLI::App& app, int argc, char** argv) {
   const std::string first = argc > 1 ? argv[1] : "";
   if (first.starts_with('-')) return;
-  std::string known;
+  std::vector<std::string> known;
   for (const CLI::App* command : app.get_subcommands(nullptr)) {
     if (command->get_name() == first) return;
-    known += (known.empty() ? "" : ", ") + command->get_name();
+    known.push_back(command->get_name());
   }
   throw limn::InputError(
-      (first.empty() ? "limn: a command is needed" : "limn " + first + ": no such command") +
-      " (known: " + known + "; limn --help tells more)");
+      (first.empty() ? "limn: a command is needed" : "limn " + first + ": no such command") + " (" +
+      limn::known_names(known) + "; limn --help tells more)");
 }
 
 int run(int argc, char** argv) {

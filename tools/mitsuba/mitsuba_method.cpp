@@ -42,7 +42,7 @@ class MitsubaMethod final : public DerivativeMethod {
         report_((fs::path(folder) / "mitsuba_run.json").string()) {}
 
   std::string name() const override { return kMitsuba; }
-  std::string description() const override { 
+  std::string description() const override {
     return "Mitsuba 3's prb_projective with octree guiding, where it is installed";
   }
 

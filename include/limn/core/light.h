@@ -41,12 +41,6 @@ struct LightView {
   Vec3d n_g;        // unit geometric normal there; unused for light from infinity
 };
 
-// A triangle of an emitter, wound counter-clockwise seen from where it shines.
-struct LightTriangle {
-  Vec3d corners[3];
-  double luminance = 0;
-};
-
 class Light {
  public:
   virtual ~Light() = default;

@@ -28,6 +28,12 @@ struct FaceRef {
 // just fits. (At 1.844e18 Embree drops the triangle altogether.)
 inline constexpr double kLargestCoordinate = 2e12;
 
+// A triangle of an emitter, wound counter-clockwise seen from where it shines.
+struct LightTriangle {
+  Vec3d corners[3];
+  double luminance = 0;
+};
+
 enum class NormalSource {
   kFace,      // flat shading: the shading normal is the geometric normal
   kComputed,  // angle-weighted vertex normals over welded positions; they move with the vertices

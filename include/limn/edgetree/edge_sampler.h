@@ -8,7 +8,6 @@
 #include <optional>
 #include <vector>
 
-#include "limn/core/light.h"
 #include "limn/core/lobe.h"
 #include "limn/core/rng.h"
 #include "limn/edgetree/edges.h"
