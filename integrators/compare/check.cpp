@@ -13,34 +13,41 @@ namespace {
 // The chance that a right gradient is accused, of each of the tests.
 constexpr double kLevel = 1e-4;
 
-// The variance of a block's difference, with two lower limits that the batches may not show.
-// Under the hypothesis that the gradient is right, an edge gives events of size x [per sample] at
-// such a rate that their mean is the edge's part of the gradient: a variance of at least |mean| x /
-// spp, even where no event has come yet. And a difference of two images of radiance L over 2 h is
-// rounded to some hundred units in the last place of L / h.
-struct DifferenceVariance {
+// The variance of a block's difference between gradient and differences, with lower limits that the
+// batches may not show. Under the hypothesis that the gradient is right, an edge gives events of
+// size x [per sample] at such a rate that their mean is the edge's part of the derivative: a variance
+// of at least |mean| x / spp, even where no event has come yet. And a difference of two images of
+// radiance L over 2 h is rounded to some hundred units in the last place of L / h.
+struct BlockVariance {
   const GradientResult& result;
   const ParameterGradient& gradient;
   std::vector<double> radiance;  // of the blocks
   double step;
+  bool all_edges;  // the gradient has no part but rare events, as differences have
 
-  double operator()(const Moments& differences, double event, size_t block) const {
+  double operator()(const DifferenceEstimate& differences, size_t block) const {
+    const Moments& blocks = differences.blocks;
     const double edges = edge_magnitude(result, gradient, block);
     const double rounding = 0x1p-44 * radiance[block] / step;
-    return std::max(differences.variance(block), edges * event / differences.samples()) +
-           rounding * rounding;
+    const double of_differences = std::max(
+        blocks.variance(block), edges * differences.events.large_size() / blocks.samples());
+    const Moments& own = gradient.total_blocks;
+    double of_gradient = own.variance(block);
+    if (all_edges) {
+      of_gradient = std::max(of_gradient, std::fabs(blocks.mean(block)) *
+                                              gradient.events.large_size() / own.samples());
+    }
+    return of_gradient + of_differences + rounding * rounding;
   }
 };
 
-std::vector<double> z_scores(const DifferenceEstimate& estimate,
-                             const DifferenceVariance& variance) {
+std::vector<double> z_scores(const DifferenceEstimate& estimate, const BlockVariance& variance) {
   const Moments& differences = estimate.blocks;
   const Moments& gradient = variance.gradient.total_blocks;
   std::vector<double> z;
   for (size_t b = 0; b < gradient.size(); ++b) {
     const double residual = gradient.mean(b) - differences.mean(b);
-    const double both =
-        gradient.variance(b) + variance(differences, estimate.events.large_size(), b);
+    const double both = variance(estimate, b);
     if (both == 0 && residual == 0) continue;
     z.push_back(normal_from_student(residual / std::sqrt(both), gradient.batches() - 1));
   }
@@ -48,14 +55,14 @@ std::vector<double> z_scores(const DifferenceEstimate& estimate,
 }
 
 Suspicion regress(const Moments& term, const DifferenceResult& differences,
-                  const DifferenceVariance& variance) {
+                  const BlockVariance& variance) {
   const Moments& gradient = variance.gradient.total_blocks;
   const DifferenceEstimate& estimate = differences.extrapolated;
   const Moments& blocks = estimate.blocks;
   double product = 0;
   double square = 0;
   for (size_t b = 0; b < term.size(); ++b) {
-    const double both = gradient.variance(b) + variance(blocks, estimate.events.large_size(), b);
+    const double both = variance(estimate, b);
     if (both == 0) continue;
     const double value = term.mean(b);
     const double residual = blocks.mean(b) - gradient.mean(b);
@@ -96,7 +103,7 @@ GradientResult other_terms(const Scene& scene, const GradientResult& result,
 
 // Sets the suspicions, and the suspect among them.
 void suspect_terms(const Scene& scene, const GradientOptions& options, const RunSettings& settings,
-                   const DifferenceVariance& variance, CheckResult& result) {
+                   const BlockVariance& variance, CheckResult& result) {
   const std::vector<TermRun>& terms = result.gradient.terms;
   // A term that was left out may be the one that is missing.
   std::optional<GradientResult> others;
@@ -145,8 +152,10 @@ CheckResult check(const Scene& scene, const CheckOptions& options, const RunSett
 
   const ParameterGradient& g = result.gradient.parameters[0];
   const DifferenceResult& d = result.differences;
-  const DifferenceVariance variance{result.gradient, g, block_means(result, scene.film),
-                                    result.step};
+  const auto slides = [](const TermRun& term) { return term.computed && !term.edges; };
+  const auto& terms = result.gradient.terms;
+  const BlockVariance variance{result.gradient, g, block_means(result, scene.film), result.step,
+                               std::none_of(terms.begin(), terms.end(), slides)};
   result.at_step = summarize(z_scores(d.at_step, variance));
   result.at_double_step = summarize(z_scores(d.at_double_step, variance));
   result.extrapolated = summarize(z_scores(d.extrapolated, variance));
