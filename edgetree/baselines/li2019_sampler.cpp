@@ -11,7 +11,7 @@
 // a tree of their own over positions alone, which rejects nothing. Importance of a node: summed
 // length times the largest cosine of the transformed box, divided by the distance.
 //
-// Where we depart: o is the centre of the scene's edges (he takes the camera's place, which an edge
+// Where we depart: o is the center of the scene's edges (he takes the camera's place, which an edge
 // sampler does not know); the sphere-box test is exact; and a hundredth of the untransformed cosine
 // is added, so that no edge is lost where the transformed cosine is zero and the BSDF is not.
 #include <algorithm>

@@ -66,12 +66,12 @@ double truncated(double x) {
   return std::bit_cast<double>(std::bit_cast<uint64_t>(x) & ~((uint64_t{1} << 29) - 1));
 }
 
-// The cube around the centre holds the box: children's boxes are cut off at it.
+// The cube around the center holds the box: children's boxes are cut off at it.
 NodeFrame frame_of(const Bounds& box) {
   const Vec3d middle = box.center();
   const Vec3d center{truncated(middle.x), truncated(middle.y), truncated(middle.z)};
   double radius = 0.5 * box.diagonal();
-  // Thin boxes reach as far as their diagonal, and the centre was rounded.
+  // Thin boxes reach as far as their diagonal, and the center was rounded.
   for (int k = 0; k < 3; ++k)
     radius = std::max({radius, box.upper[k] - center[k], center[k] - box.lower[k]});
   return {center, truncated(1 / radius)};

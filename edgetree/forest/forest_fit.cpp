@@ -8,7 +8,7 @@
 
 #include "edgetree/forest/linear_program.h"
 
-// A plane is q = (n, signed distance of the frame's centre / radius), so that q . x is the signed
+// A plane is q = (n, signed distance of the frame's center / radius), so that q . x is the signed
 // distance of p / radius. Dividing by Z . q > 0 puts all planes on the hyperplane Z . q = 1, an
 // affine 3-space (the chart), where a wedge is the segment between the planes of its two faces.
 // The chart points are Z + t_1 r_1 + t_2 r_2 + t_3 r_3 for an orthonormal basis (t_1, t_2, t_3, Z).
@@ -46,7 +46,7 @@ Farthest least_product(const std::vector<Vector4d>& points, const Vector4d& z) {
   return least;
 }
 
-// The direction whose largest angle with all normals is smallest, roughly: the centre of the
+// The direction whose largest angle with all normals is smallest, roughly: the center of the
 // smallest enclosing ball of the normals by Badoiu and Clarkson's steps towards the farthest.
 Vector4d central_direction(const std::vector<Vector4d>& points) {
   Vector3d mean = Vector3d::Zero();
@@ -54,7 +54,7 @@ Vector4d central_direction(const std::vector<Vector4d>& points) {
   Vector3d center = mean / static_cast<double>(points.size());
   constexpr int kSteps = 12;  // not tuned
   for (int i = 2; i < 2 + kSteps && points.size() > 2; ++i) {
-    // Normals are unit vectors: the farthest has the smallest product with the centre.
+    // Normals are unit vectors: the farthest has the smallest product with the center.
     const Farthest far = least_product(points, Vector4d(center[0], center[1], center[2], 0));
     center += (points[far.index].head<3>() - center) / i;
   }

@@ -125,7 +125,7 @@ Floats brightness(const ForestQuery& query, const Floats3& d, const Floats3& hal
   return sum + kScattered * query.environment->mean();
 }
 
-// The boxes of a node's children: centres minus p, and half extents.
+// The boxes of a node's children: centers minus p, and half extents.
 void boxes_of(const InnerNode& node, const FramePoint& at, Floats3& d, Floats3& half) {
   Floats* centers[3] = {&d.x, &d.y, &d.z};
   Floats* halves[3] = {&half.x, &half.y, &half.z};

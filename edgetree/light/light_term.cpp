@@ -63,10 +63,10 @@ LightClusters::Cluster LightClusters::make_cluster(std::span<const LightTriangle
     power += t.luminance * length(area_vector);
   }
   cluster.luminance = power / cluster.area;
-  cluster.centre = bounds.center();
+  cluster.center = bounds.center();
   for (uint32_t i : triangles)
     for (const Vec3d& corner : lights[i].corners)
-      cluster.radius = std::max(cluster.radius, length(corner - cluster.centre));
+      cluster.radius = std::max(cluster.radius, length(corner - cluster.center));
   cluster.triangles = std::move(triangles);
   return cluster;
 }
@@ -99,13 +99,13 @@ std::array<LightClusters::Cluster, 2> LightClusters::split(std::span<const Light
 LightCones::LightCones(const LightClusters& lights, const Vec3d& p) {
   double scattered = 0;
   for (const LightClusters::Cluster& c : lights.clusters_) {
-    const Vec3d to = c.centre - p;
+    const Vec3d to = c.center - p;
     const double d2 = length_squared(to), r2 = c.radius * c.radius;
     const double distance = std::sqrt(d2);
     const double facing = distance > 0 ? -dot(c.area_vector, to) / distance : 0;
     const double visible =
         std::max(0.0, facing) + 0.25 * std::max(0.0, c.area - length(c.area_vector));
-    // Between those seen at the centre's and at the rim's distance; at most a hemisphere.
+    // Between those seen at the center's and at the rim's distance; at most a hemisphere.
     const double solid_angle = std::min(visible / (d2 + r2 / 8), 2 * kPi);
     // Objects nearby may face the light where this point does not.
     scattered += c.luminance * std::min(c.area / (d2 + r2 / 8), 2 * kPi);
@@ -124,13 +124,13 @@ LightCones::LightCones(const LightClusters& lights, const Vec3d& p) {
                              std::max(kReflectance / kPi * scattered, lights.floor_));
 }
 
-// Two caps: the smaller lies in the other if the distance D of their centres is below the
+// Two caps: the smaller lies in the other if the distance D of their centers is below the
 // difference of their chords, and they are apart if it is above the sum of the outer chords;
 // in between the overlap falls as the square of the remaining distance.
-Floats LightCones::mean_over_boxes(Floats3 centre, const Floats3& half) const {
+Floats LightCones::mean_over_boxes(Floats3 center, const Floats3& half) const {
   const Floats zero = splat(0.0f), one = splat(1.0f), tiny = splat(0x1p-60f);
-  const Floats centre2 = max(dot(centre, centre), splat(0x1p-126f)), half2 = dot(half, half);
-  centre = centre * (1 / sqrt(centre2));
+  const Floats centre2 = max(dot(center, center), splat(0x1p-126f)), half2 = dot(half, half);
+  center = center * (1 / sqrt(centre2));
   // A box around p (share 1) is the whole sphere, chord 2; a distant cube has 2 |half|^2 and
   // reaches |half| sideways.
   const Floats share = half2 / (centre2 + half2);
@@ -140,7 +140,7 @@ Floats LightCones::mean_over_boxes(Floats3 centre, const Floats3& half) const {
   Floats sum = splat(base_);
   for (int i = 0; i < count_; ++i) {
     const Cone& c = cones_[i];
-    const Floats cosine = centre.x * c.axis[0] + centre.y * c.axis[1] + centre.z * c.axis[2];
+    const Floats cosine = center.x * c.axis[0] + center.y * c.axis[1] + center.z * c.axis[2];
     const Floats distance = sqrt(max(2 - 2 * cosine, zero));
     const Floats outer = chord_outer + c.chord_outer, inner = abs(chord - c.chord);
     const Floats overlap = clamp((outer - distance) / max(outer - inner, tiny), zero, one);

@@ -4,7 +4,7 @@
 // more.
 //
 // Angles are measured by chords of the unit sphere: the cap whose rim is at the distance k from its
-// centre has the solid angle pi k^2.
+// center has the solid angle pi k^2.
 #include <array>
 #include <cstdint>
 #include <span>
@@ -29,8 +29,8 @@ class LightClusters {
   friend class LightCones;
   struct Cluster {
     std::vector<uint32_t> triangles;
-    Vec3d centre{};
-    double radius = 0;     // of a sphere around centre that holds all corners
+    Vec3d center{};
+    double radius = 0;     // of a sphere around center that holds all corners
     Vec3d area_vector{};   // sum of area times normal
     double area = 0;       // sum
     double luminance = 0;  // mean over the area
@@ -52,9 +52,9 @@ class LightCones {
   LightCones(const LightClusters& lights, const Vec3d& p);
 
   // Estimate of the mean luminance over the directions of each box, with nothing in between:
-  // environment, lights, and light scattered by objects. Its centre minus p and half extents
+  // environment, lights, and light scattered by objects. Its center minus p and half extents
   // (>= 0) are given. Positive everywhere if there is any light.
-  Floats mean_over_boxes(Floats3 centre, const Floats3& half) const;
+  Floats mean_over_boxes(Floats3 center, const Floats3& half) const;
 
  private:
   struct Cone {

@@ -28,7 +28,7 @@ RadiancePyramid::RadiancePyramid(const std::function<double(const Vec3d&)>& lumi
       const double step = 2.0 / (size * samples);
       const Vec3d d = octahedral_direction((x + 0.5) * step - 1, (y + 0.5) * step - 1);
       const double r = length(d);
-      // Every face of the octahedron has the same distance from its centre: solid angle goes with
+      // Every face of the octahedron has the same distance from its center: solid angle goes with
       // 1 / r^3.
       const double weight = 1 / (r * r * r);
       const size_t texel = static_cast<size_t>(y / samples) * size + x / samples;

@@ -41,7 +41,7 @@ Floats mean_slope(Floats middle, Floats reach, Floats z) {
 }
 
 // Half width of the uniform distribution whose variance the box has along `row`, measured in the
-// slope to `axis` around the centre's slope, times z. A floor of 3 % of the lobe's width (which has
+// slope to `axis` around the center's slope, times z. A floor of 3 % of the lobe's width (which has
 // z for its unit) changes no mean and avoids 0 / 0.
 Floats reach_across(const float row[3], const float axis[3], Floats slope, const Floats3& half,
                     Floats z) {
@@ -111,31 +111,31 @@ double LtcLobe::value(const Vec3d& w) const {
   return (1 - kLtcFloor) * ltc(w) + kLtcFloor * height / kPi;
 }
 
-Floats LtcLobe::mean_over_boxes(Floats3 centre, Floats3 half) const {
+Floats LtcLobe::mean_over_boxes(Floats3 center, Floats3 half) const {
   // Lengths relative to one between the distance and the size of the box. The cosine's mean is then
   // about the mean height, from far away to a box around p.
-  const Floats size2 = dot(centre, centre) + dot(half, half);
+  const Floats size2 = dot(center, center) + dot(half, half);
   const Floats scale = 1 / sqrt(max(size2, splat(0x1p-126f)));
-  centre = centre * scale;
+  center = center * scale;
   half = half * scale;
   // Rounding stays below what is added here.
-  const Floats middle = dot3(n_f_, centre) + 0x1p-21f;
+  const Floats middle = dot3(n_f_, center) + 0x1p-21f;
   const Floats reach = abs_dot3(n_f_, half) + 0x1p-21f;
   const Floats cosine = mean_above_zero(middle, reach) * kInversePi;
   if (diffuse_) return cosine;
-  const Floats mixed = static_cast<float>(1 - kLtcFloor) * ltc_mean(centre, half) +
+  const Floats mixed = static_cast<float>(1 - kLtcFloor) * ltc_mean(center, half) +
                        static_cast<float>(kLtcFloor) * cosine;
   return select(middle + reach > 0, mixed, splat(0.0f));
 }
 
-// Mean of `ltc` alone; |centre|^2 + |half|^2 = 1.
-Floats LtcLobe::ltc_mean(const Floats3& centre, const Floats3& half) const {
-  const Floats middle_z = dot3(rows_f_[2], centre), reach_z = abs_dot3(rows_f_[2], half);
+// Mean of `ltc` alone; |center|^2 + |half|^2 = 1.
+Floats LtcLobe::ltc_mean(const Floats3& center, const Floats3& half) const {
+  const Floats middle_z = dot3(rows_f_[2], center), reach_z = abs_dot3(rows_f_[2], half);
   const Floats z = mean_above_zero(middle_z, reach_z);
   // 1 / z for boxes that are far from the lobe's horizon, 0 for those that meet it.
   const Floats inverse_z =
       max(middle_z - reach_z, splat(0.0f)) / max(middle_z * middle_z, splat(0x1p-126f));
-  const Floats signed_x = dot3(rows_f_[0], centre), signed_y = dot3(rows_f_[1], centre);
+  const Floats signed_x = dot3(rows_f_[0], center), signed_y = dot3(rows_f_[1], center);
   const Floats reach_x = reach_across(rows_f_[0], rows_f_[2], signed_x * inverse_z, half, z);
   const Floats reach_y = reach_across(rows_f_[1], rows_f_[2], signed_y * inverse_z, half, z);
   const Floats x = abs(signed_x), y = abs(signed_y);
@@ -150,7 +150,7 @@ Floats LtcLobe::ltc_mean(const Floats3& centre, const Floats3& half) const {
   // From slopes to solid angle: det |w|^3 / z^3 for a distant box, the whole mass over 4 pi for one
   // around p. No mean exceeds mass 1 over the box's solid angle: about 2 |half|^2 for a distant
   // cube, 4 pi around p.
-  const Floats d2 = dot(centre, centre), half2 = dot(half, half);
+  const Floats d2 = dot(center, center), half2 = dot(half, half);
   const Floats distant = density * d2 * sqrt(d2) * det_f_ / z;
   const Floats around = density * reach_far * reach_near * (4 / kSphere);
   const Floats solid_angle = half2 * (2 + (kSphere - 2) * half2);

@@ -22,10 +22,10 @@ class LtcLobe {
   double ltc(const Vec3d& w) const;
   double value(const Vec3d& w) const;
 
-  // Estimate of the mean of `value` over the directions of each box [1/sr], its centre minus p and
+  // Estimate of the mean of `value` over the directions of each box [1/sr], its center minus p and
   // its half extents (>= 0) given. Positive, allowing for rounding here, wherever some point of the
   // box is above the horizon.
-  Floats mean_over_boxes(Floats3 centre, Floats3 half) const;
+  Floats mean_over_boxes(Floats3 center, Floats3 half) const;
 
   bool diffuse() const { return diffuse_; }
   const Vec3d& n() const { return n_; }
@@ -41,7 +41,7 @@ class LtcLobe {
  private:
   void read_table(const LtcRow& row, const Vec3d& wi);
   void prepare_boxes();
-  Floats ltc_mean(const Floats3& centre, const Floats3& half) const;
+  Floats ltc_mean(const Floats3& center, const Floats3& half) const;
 
   bool diffuse_;
   Vec3d n_;

@@ -67,7 +67,7 @@ class ShapeTranslation final : public ShapeMotion {
   int axis_;
 };
 
-// About the centre of the shape's bounds.
+// About the center of the shape's bounds.
 class ShapeRotation final : public ShapeMotion {
  public:
   ShapeRotation(ShapeId shape, int axis) : ShapeMotion(shape), axis_(axis) {}
@@ -100,7 +100,7 @@ class ShapeRotation final : public ShapeMotion {
   int axis_;
 };
 
-// About the centre of the shape's bounds.
+// About the center of the shape's bounds.
 class ShapeScaling final : public ShapeMotion {
  public:
   using ShapeMotion::ShapeMotion;

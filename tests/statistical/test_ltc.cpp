@@ -196,9 +196,9 @@ TEST(LtcEdge, StaysFiniteInExtremeGeometry) {
 }
 
 // One box in the first lane.
-double box_mean(const LtcLobe& lobe, const Vec3d& centre, const Vec3d& half) {
+double box_mean(const LtcLobe& lobe, const Vec3d& center, const Vec3d& half) {
   const auto lane = [](double a) { return splat(static_cast<float>(a)); };
-  return lobe.mean_over_boxes({lane(centre.x), lane(centre.y), lane(centre.z)},
+  return lobe.mean_over_boxes({lane(center.x), lane(center.y), lane(center.z)},
                               {lane(half.x), lane(half.y), lane(half.z)})[0];
 }
 
@@ -212,10 +212,10 @@ TEST(LtcBoxes, ArePositiveAboveTheHorizon) {
     const double size = std::exp(std::log(1e6) * (rng.uniform() - 0.8));
     const auto thin = [&] { return rng.uniform() < 0.2 ? 0 : rng.uniform() * size; };
     const double x = thin(), y = thin(), z = thin();
-    const Vec3d half{x, y, z}, centre = rng.uniform() < 0.02 ? Vec3d{} : random_direction(rng);
-    const double top = dot(c.n, centre) + std::fabs(c.n.x) * half.x + std::fabs(c.n.y) * half.y +
+    const Vec3d half{x, y, z}, center = rng.uniform() < 0.02 ? Vec3d{} : random_direction(rng);
+    const double top = dot(c.n, center) + std::fabs(c.n.x) * half.x + std::fabs(c.n.y) * half.y +
                        std::fabs(c.n.z) * half.z;
-    const double mean = box_mean(lobe, centre, half);
+    const double mean = box_mean(lobe, center, half);
     ASSERT_TRUE(std::isfinite(mean)) << i;
     if (top > 0) {
       EXPECT_GT(mean, 0) << i;
@@ -224,14 +224,14 @@ TEST(LtcBoxes, ArePositiveAboveTheHorizon) {
       EXPECT_EQ(mean, 0) << i;
     }
     const double power = std::exp2(std::floor(30 * (rng.uniform() - 0.5)));
-    EXPECT_EQ(box_mean(lobe, centre * power, half * power), mean) << i;
+    EXPECT_EQ(box_mean(lobe, center * power, half * power), mean) << i;
   }
 }
 
-bool hits(const Vec3d& centre, const Vec3d& half, const Vec3d& w) {
+bool hits(const Vec3d& center, const Vec3d& half, const Vec3d& w) {
   double near = 0, far = 1e300;
   for (int i = 0; i < 3; ++i) {
-    const double a = (centre[i] - half[i]) / w[i], b = (centre[i] + half[i]) / w[i];
+    const double a = (center[i] - half[i]) / w[i], b = (center[i] + half[i]) / w[i];
     near = std::max(near, std::min(a, b));
     far = std::min(far, std::max(a, b));
   }
@@ -243,20 +243,20 @@ bool hits(const Vec3d& centre, const Vec3d& half, const Vec3d& w) {
 struct BoxReference {
   double mass = 0, solid_angle = 0;
 };
-BoxReference reference(const Case& c, const Vec3d& centre, const Vec3d& half, Rng& rng) {
+BoxReference reference(const Case& c, const Vec3d& center, const Vec3d& half, Rng& rng) {
   const auto bsdf = bsdf_of(c);
-  const Frame frame(normalize(centre));
-  const double height = 1 - std::sqrt(1 - length_squared(half) / length_squared(centre));
+  const Frame frame(normalize(center));
+  const double height = 1 - std::sqrt(1 - length_squared(half) / length_squared(center));
   constexpr int kDraws = 4000;
   BoxReference r;
   for (int k = 0; k < kDraws; ++k) {
     const double z = 1 - rng.uniform() * height, phi = 2 * kPi * rng.uniform();
     const double sine = std::sqrt(1 - z * z);
     const Vec3d w = frame.to_world({sine * std::cos(phi), sine * std::sin(phi), z});
-    if (hits(centre, half, w)) r.solid_angle += 2 * kPi * height / kDraws;
+    if (hits(center, half, w)) r.solid_angle += 2 * kPi * height / kDraws;
     const double u = rng.uniform();
     const auto drawn = bsdf->sample(c.n, c.wi, u, rng.uniform());
-    if (!drawn || !hits(centre, half, *drawn)) continue;
+    if (!drawn || !hits(center, half, *drawn)) continue;
     const BsdfValue f = bsdf->eval_with_pdf(c.n, c.wi, *drawn);
     if (f.pdf > 0) r.mass += f.value.r / f.pdf / kDraws;
   }
@@ -264,11 +264,11 @@ BoxReference reference(const Case& c, const Vec3d& centre, const Vec3d& half, Rn
 }
 
 // Log ratios of estimate and reference over boxes near the lobe, against those of the value at the
-// centre: a quarter of the second moment or less for microfacets, less for the smooth cosine.
-TEST(LtcBoxes, MeansBeatTheValueAtTheCentre) {
+// center: a quarter of the second moment or less for microfacets, less for the smooth cosine.
+TEST(LtcBoxes, MeansBeatTheValueAtTheCenter) {
   for (const LobeModel* model : kModels) {
     Rng rng(10, 0, 0);
-    double moment = 0, moment_centre = 0;
+    double moment = 0, moment_center = 0;
     for (int i = 0; i < 250; ++i) {
       Case c = random_case(rng);
       c.lobe.model = model;
@@ -277,16 +277,16 @@ TEST(LtcBoxes, MeansBeatTheValueAtTheCentre) {
       const Vec3d half = normalize(Vec3d{x, y, z}) * (0.1 + 0.8 * rng.uniform());
       const auto drawn = bsdf_of(c)->sample(c.n, c.wi, rng.uniform(), 0.5);
       if (!drawn) continue;
-      const Vec3d centre = normalize(*drawn + random_direction(rng) * length(half));
+      const Vec3d center = normalize(*drawn + random_direction(rng) * length(half));
       const LtcLobe lobe = c.ltc();
-      const BoxReference r = reference(c, centre, half, rng);
-      const double value = lobe.value(centre);
+      const BoxReference r = reference(c, center, half, rng);
+      const double value = lobe.value(center);
       if (value == 0 || r.mass < 0.02) continue;
       const double mean = r.mass / (r.solid_angle * lobe.norm());
-      moment += std::pow(std::log(box_mean(lobe, centre, half) / mean), 2);
-      moment_centre += std::pow(std::log(value / mean), 2);
+      moment += std::pow(std::log(box_mean(lobe, center, half) / mean), 2);
+      moment_center += std::pow(std::log(value / mean), 2);
     }
-    EXPECT_LT(moment, (model == &kHemisphere ? 1 : 0.25) * moment_centre)
+    EXPECT_LT(moment, (model == &kHemisphere ? 1 : 0.25) * moment_center)
         << (model == &kHemisphere  ? "diffuse"
             : model == &ggx_lobe() ? "ggx"
                                    : "beckmann");
@@ -294,7 +294,7 @@ TEST(LtcBoxes, MeansBeatTheValueAtTheCentre) {
 }
 
 // A box that shrinks to a point has the density of its direction.
-TEST(LtcBoxes, SmallBoxesHaveTheDensityOfTheirCentre) {
+TEST(LtcBoxes, SmallBoxesHaveTheDensityOfTheirCenter) {
   Rng rng(9, 0, 0);
   for (int i = 0; i < 1000; ++i) {
     Case c = random_case(rng);

@@ -38,7 +38,7 @@ void expect_compass(const Rgb<double>& c, double column, double seam, double row
 
 TEST(Environment, MapIsOrientedAsInMitsuba) {
   const auto map = make_envmap(compass());
-  expect_compass(map->radiance(Vec3d{0, 0, 1}), 31.5, 0, 16);   // the centre of the image
+  expect_compass(map->radiance(Vec3d{0, 0, 1}), 31.5, 0, 16);   // the center of the image
   expect_compass(map->radiance(Vec3d{1, 0, 0}), 15.5, 0, 16);   // a quarter from the left
   expect_compass(map->radiance(Vec3d{-1, 0, 0}), 47.5, 0, 16);  // a quarter from the right
   expect_compass(map->radiance(Vec3d{0, 0, -1}), 31.5, 1, 16);  // the seam: columns 0 and 63

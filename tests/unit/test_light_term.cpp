@@ -16,20 +16,20 @@ Vec3d random_direction(Rng& rng) {
   return {r * std::cos(phi), r * std::sin(phi), z};
 }
 
-// A square at `centre` with half side `half`, shining along `normal`.
-void add_square(std::vector<LightTriangle>& lights, const Vec3d& centre, const Vec3d& normal,
+// A square at `center` with half side `half`, shining along `normal`.
+void add_square(std::vector<LightTriangle>& lights, const Vec3d& center, const Vec3d& normal,
                 double half, double luminance) {
   const Frame frame(normal);
   const Vec3d s = frame.s * half, t = frame.t * half;
-  const Vec3d corners[4] = {centre - s - t, centre + s - t, centre + s + t, centre - s + t};
+  const Vec3d corners[4] = {center - s - t, center + s - t, center + s + t, center - s + t};
   lights.push_back({{corners[0], corners[1], corners[2]}, luminance});
   lights.push_back({{corners[0], corners[2], corners[3]}, luminance});
 }
 
 // One box in the first lane.
-double weight(const LightCones& cones, const Vec3d& centre, const Vec3d& half) {
+double weight(const LightCones& cones, const Vec3d& center, const Vec3d& half) {
   const auto lane = [](double a) { return splat(static_cast<float>(a)); };
-  return cones.mean_over_boxes({lane(centre.x), lane(centre.y), lane(centre.z)},
+  return cones.mean_over_boxes({lane(center.x), lane(center.y), lane(center.z)},
                                {lane(half.x), lane(half.y), lane(half.z)})[0];
 }
 
@@ -102,10 +102,10 @@ TEST(LightTerm, DoesNotDependOnTheTessellation) {
   const LightClusters a(coarse, 0), b(fine, 0);
   Rng rng(2, 0, 0);
   for (int i = 0; i < 100; ++i) {
-    const Vec3d p = random_direction(rng) * 5.0, centre = random_direction(rng) * 3.0;
+    const Vec3d p = random_direction(rng) * 5.0, center = random_direction(rng) * 3.0;
     const Vec3d half = Vec3d{1, 1, 1} * rng.uniform();
-    const double expected = weight(LightCones(a, p), centre, half);
-    EXPECT_NEAR(weight(LightCones(b, p), centre, half), expected, 1e-5 * expected);
+    const double expected = weight(LightCones(a, p), center, half);
+    EXPECT_NEAR(weight(LightCones(b, p), center, half), expected, 1e-5 * expected);
   }
 }
 

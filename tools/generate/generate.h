@@ -37,7 +37,7 @@ struct SkyKind {
 std::span<const MeshKind> mesh_kinds();
 std::span<const SkyKind> sky_kinds();
 
-// A mesh as the scenes expect it: the longest side of its bounds is 1.98, centred in x and z, the
+// A mesh as the scenes expect it: the longest side of its bounds is 1.98, centered in x and z, the
 // lowest point at y = -0.99 (where the Stanford bunny of glmark2-data has its feet).
 Triangles make_mesh(const MeshKind& kind, int faces);
 

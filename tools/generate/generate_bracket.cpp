@@ -71,15 +71,15 @@ struct Cell {
     for (int i = rows; i > 0; --i) loop.push_back(point(0, 1.0 * i / rows, z));
     return loop;
   }
-  // A circle around the centre with a quarter of its turn for every side.
+  // A circle around the center with a quarter of its turn for every side.
   Loop circle(const Circle& circle) const {
     Loop loop;
-    const Vec3d centre = point(0.5, 0.5, circle.z);
+    const Vec3d center = point(0.5, 0.5, circle.z);
     for (int side = 0; side < 4; ++side) {
       const int pieces = side % 2 == 0 ? columns : rows;
       for (int i = 0; i < pieces; ++i) {
         const double a = kPi / 2 * (side + 1.0 * i / pieces) - 0.75 * kPi;
-        loop.push_back(centre + Vec3d{std::cos(a), std::sin(a), 0} * circle.radius);
+        loop.push_back(center + Vec3d{std::cos(a), std::sin(a), 0} * circle.radius);
       }
     }
     return loop;
@@ -131,7 +131,7 @@ void add_rim(Builder& builder, const Cell* cells, double h) {
   add_side(2, 3, 1);
   add_side(8, -1, 2);
   add_side(6, -3, 3);
-  const double x = cells[8].x_1, y = cells[8].y_1;  // the plate is centred
+  const double x = cells[8].x_1, y = cells[8].y_1;  // the plate is centered
   const auto moved_to = [&](double out, double z) {
     Loop loop = top;
     for (Vec3d& p : loop) p = {p.x * (x + out) / x, p.y * (y + out) / y, z};

@@ -65,10 +65,10 @@ Triangles garland(const Tier& tier, double h) {
   for (int i = 0; i < kBeads; ++i) {
     const double u = -1 + 2 * (i + 1.0) / (kBeads + 1);
     const double sag = 0.22 * (1 - u * u);
-    const Vec3d centre = turned({0.86 * tier.reach, tier.height - 0.02 - sag, 0}, half * (1 + u));
+    const Vec3d center = turned({0.86 * tier.reach, tier.height - 0.02 - sag, 0}, half * (1 + u));
     const double radius = i == kBeads / 2 ? 0.0155 : 0.0115;
-    append(mesh, ellipsoid(centre, {radius, radius, radius}, h));
-    if (i == kBeads / 2) append(mesh, drop(centre - Vec3d{0, 0.022, 0}, 0.075, h));
+    append(mesh, ellipsoid(center, {radius, radius, radius}, h));
+    if (i == kBeads / 2) append(mesh, drop(center - Vec3d{0, 0.022, 0}, 0.075, h));
   }
   return mesh;
 }

@@ -45,9 +45,9 @@ Triangles make_mesh(const MeshKind& kind, int faces) {
   for (const Vec3d& p : mesh.positions) bounds.extend(p);
   const Vec3d size = bounds.upper - bounds.lower;
   const double scale = 1.98 / std::max({size.x, size.y, size.z});
-  const Vec3d centre = bounds.center();
+  const Vec3d center = bounds.center();
   for (Vec3d& p : mesh.positions) {
-    p = Vec3d{p.x - centre.x, p.y - bounds.lower.y, p.z - centre.z} * scale - Vec3d{0, 0.99, 0};
+    p = Vec3d{p.x - center.x, p.y - bounds.lower.y, p.z - center.z} * scale - Vec3d{0, 0.99, 0};
   }
   return mesh;
 }

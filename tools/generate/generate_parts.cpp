@@ -65,13 +65,13 @@ std::vector<Vec3d> transport(const std::vector<Ring>& rings) {
 
 void add_ring(Triangles& mesh, const Ring& ring, const Vec3d& across, double angle, int sides) {
   if (ring.radius == 0) {
-    mesh.positions.push_back(ring.centre);
+    mesh.positions.push_back(ring.center);
     return;
   }
   const Vec3d up = cross(normalize(ring.axis), across);
   for (int i = 0; i < sides; ++i) {
     const double a = angle + 2 * kPi * i / sides;
-    mesh.positions.push_back(ring.centre + (across * std::cos(a) + up * std::sin(a)) * ring.radius);
+    mesh.positions.push_back(ring.center + (across * std::cos(a) + up * std::sin(a)) * ring.radius);
   }
 }
 
@@ -196,7 +196,7 @@ Triangles smooth_lathe(const std::vector<std::pair<double, double>>& profile, do
   return lathe(fine, 1e9);
 }
 
-Triangles ellipsoid(const Vec3d& centre, const Vec3d& radii, double h) {
+Triangles ellipsoid(const Vec3d& center, const Vec3d& radii, double h) {
   const double girth = 2 * kPi * std::max(radii.x, radii.z);
   const int sides = steps(girth, h, 6);
   const int rows = steps(kPi * std::max(radii.x, radii.y), h, 4);
@@ -208,19 +208,19 @@ Triangles ellipsoid(const Vec3d& centre, const Vec3d& radii, double h) {
   }
   Triangles mesh = sweep(rings, sides);
   for (Vec3d& p : mesh.positions) {
-    p = centre + Vec3d{p.x * radii.x, p.y * radii.y, p.z * radii.z};
+    p = center + Vec3d{p.x * radii.x, p.y * radii.y, p.z * radii.z};
   }
   return mesh;
 }
 
-Triangles torus(const Vec3d& centre, const Vec3d& axis, double radius, double tube_radius,
+Triangles torus(const Vec3d& center, const Vec3d& axis, double radius, double tube_radius,
                 double h) {
   const Frame frame(normalize(axis));
   const int around = steps(2 * kPi * radius, h, 10);
   std::vector<Ring> rings;
   for (int i = 0; i < around; ++i) {
     const double a = 2 * kPi * i / around;
-    rings.push_back({centre + (frame.s * std::cos(a) + frame.t * std::sin(a)) * radius,
+    rings.push_back({center + (frame.s * std::cos(a) + frame.t * std::sin(a)) * radius,
                      frame.t * std::cos(a) - frame.s * std::sin(a), tube_radius});
   }
   return closed_sweep(rings, steps(2 * kPi * tube_radius, h, 6));

@@ -20,7 +20,7 @@ bool every_side_is_paired(const Triangles& mesh);
 
 // A circle around `axis` (any length) of a surface that is swept along a path; radius 0: a point.
 struct Ring {
-  Vec3d centre;
+  Vec3d center;
   Vec3d axis;
   double radius;
 };
@@ -47,8 +47,8 @@ Triangles rod(const Vec3d& from, const Vec3d& to, double radius, double h);
 Triangles lathe(const std::vector<std::pair<double, double>>& profile, double h);
 // The same with the corners rounded off, as a spline of the points.
 Triangles smooth_lathe(const std::vector<std::pair<double, double>>& profile, double h);
-Triangles ellipsoid(const Vec3d& centre, const Vec3d& radii, double h);
-Triangles torus(const Vec3d& centre, const Vec3d& axis, double radius, double tube_radius,
+Triangles ellipsoid(const Vec3d& center, const Vec3d& radii, double h);
+Triangles torus(const Vec3d& center, const Vec3d& axis, double radius, double tube_radius,
                 double h);
 
 Triangles moved(Triangles mesh, const Vec3d& offset);

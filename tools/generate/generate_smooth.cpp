@@ -88,16 +88,16 @@ Triangles make_knot(int faces) {
 
 // Two rings that have grown together.
 Triangles make_pretzel(int faces) {
-  constexpr double kCentre = 0.72;
+  constexpr double kCenter = 0.72;
   constexpr double kWidth = 0.06;
-  const auto ring = [](const Vec3d& p, double centre, double lean) {
-    const double x = p.x - centre;
+  const auto ring = [](const Vec3d& p, double center, double lean) {
+    const double x = p.x - center;
     const double z = p.z - lean * x;
     return std::hypot(std::hypot(x, p.y) - 0.58, z) - 0.2;
   };
   return surface_with_faces({[&](const Vec3d& p) {
-                               const double a = ring(p, -kCentre, 0.35);
-                               const double b = ring(p, kCentre, -0.35);
+                               const double a = ring(p, -kCenter, 0.35);
+                               const double b = ring(p, kCenter, -0.35);
                                return -kWidth *
                                       std::log(std::exp(-a / kWidth) + std::exp(-b / kWidth));
                              },

@@ -4,8 +4,8 @@ with it.
 
     tools/mitsuba/mitsuba_gradient.py SCENE --wrt SHAPE.translate.y --time 10 -o out.exr --json out.json
 
-PARAM: SHAPE.translate.x|y|z, SHAPE.rotate.x|y|z (radians, about world axes through the centre of
-the shape's bounding box), SHAPE.scale (about that centre). Needs `pip install mitsuba==3.9.1` and
+PARAM: SHAPE.translate.x|y|z, SHAPE.rotate.x|y|z (radians, about world axes through the center of
+the shape's bounding box), SHAPE.scale (about that center). Needs `pip install mitsuba==3.9.1` and
 LLVM (Debian: libllvm19).
 
 How the time is spent: one pass of each of the three terms, in which kernels are compiled and the
@@ -141,7 +141,7 @@ class Motion:
                 f" {known})",
             )
         self._params = mi.traverse(scene)
-        self._centre = mi.Point3f(shapes[0].bbox().center())
+        self._center = mi.Point3f(shapes[0].bbox().center())
         self._velocities = None
         if f"{self._shape}.vertex_positions" in self._params:
             self._attach_mesh()
@@ -157,12 +157,12 @@ class Motion:
     def _velocity(self, positions):
         mi, axis = self._mi, self._axis
         if self._operation == "scale":
-            return positions - self._centre
+            return positions - self._center
         direction = mi.Vector3f(*(float(i == axis) for i in range(3)))
         return (
             direction
             if self._operation == "translate"
-            else self._dr.cross(direction, positions - self._centre)
+            else self._dr.cross(direction, positions - self._center)
         )
 
     def _attach_mesh(self):
@@ -203,7 +203,7 @@ class Motion:
         self._params.update()
 
     def _attach_transform(self):
-        mi, dr, c = self._mi, self._dr, self._centre
+        mi, dr, c = self._mi, self._dr, self._center
         t = mi.Float(0)
         dr.enable_grad(t)
         if self._operation == "scale":

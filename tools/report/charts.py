@@ -238,7 +238,7 @@ def factors(rows, baseline, palette):
         methods = list(dict.fromkeys(m for _, marks in rows for m, _, _ in marks))
         lines = max(1, sum(len(marks) for _, marks in rows))
         figure, panel = pyplot.subplots(figsize=(8.6, 0.9 + 0.24 * lines + 0.16 * len(rows)))
-        y, centres, seen = 0, [], set()
+        y, centers, seen = 0, [], set()
         for _, marks in rows:
             start = y
             panel.axhspan(y - 0.6, y + len(marks) - 0.4, color=GRID, alpha=0.35, linewidth=0)
@@ -255,14 +255,14 @@ def factors(rows, baseline, palette):
                 )
                 seen.add(method)
                 y += 1
-            centres.append((start + y - 1) / 2)
+            centers.append((start + y - 1) / 2)
             y += 0.7
         panel.set_xscale("log")
         panel.axvline(1, color=TEXT, linewidth=1, linestyle="--")
         if len(rows) == 1:  # Each line names its method; no legend needed.
             panel.set_yticks(range(len(methods)), methods)
         else:
-            panel.set_yticks(centres, [scene for scene, _ in rows])
+            panel.set_yticks(centers, [scene for scene, _ in rows])
         panel.tick_params(axis="y", length=0)
         panel.invert_yaxis()
         panel.grid(axis="y", visible=False)

@@ -35,8 +35,8 @@ struct Film {
   bool half = true;        // component_format float16
   Filter filter;
 
-  // The part of the filter's support around the centre of full-film column (or row) `pixel` where
-  // samples may fall, as offsets from that centre.
+  // The part of the filter's support around the center of full-film column (or row) `pixel` where
+  // samples may fall, as offsets from that center.
   struct Range {
     double lower, upper;
   };

@@ -2,8 +2,8 @@
 // Scene parameters that can be differentiated, by name:
 //
 //   SHAPE.translate.x|y|z         scene units
-//   SHAPE.rotate.x|y|z            radians, world axes through the centre of its bounds
-//   SHAPE.scale                   factor - 1, about the centre of its bounds
+//   SHAPE.rotate.x|y|z            radians, world axes through the center of its bounds
+//   SHAPE.scale                   factor - 1, about the center of its bounds
 //   SHAPE.vertex_positions        scene units: an array, the V by 3 coordinates of its vertices
 //   SHAPE.vertex_positions.V.x|y|z  one of them: vertex V (from 0) with its copies
 //   SHAPE.vertex_positions:FILE   moves every vertex by the parameter times its vector in FILE

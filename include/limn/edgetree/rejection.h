@@ -24,12 +24,12 @@ Verdict judge(const EdgeSamplerInput& input, const RejectionTree& tree, uint32_t
 struct Slice {
   Vec3d center, right, up;  // right, up: of equal length, at right angles
   int size = 0;             // rows of `size` pixels
-  // The point at a position in pixels; those of centres are halves.
+  // The point at a position in pixels; those of centers are halves.
   Vec3d point(double x, double y) const {
     return center + right * (2 * x / size - 1) + up * (1 - 2 * y / size);
   }
 };
-// At the centres of the pixels, row 0 on top.
+// At the centers of the pixels, row 0 on top.
 std::vector<Verdict> judge_slice(const EdgeSamplerInput& input, const RejectionTree& tree,
                                  uint32_t node, const Slice& slice, int threads);
 VerdictCounts count(std::span<const Verdict> verdicts);
@@ -59,8 +59,8 @@ struct ReachCounts {
 ReachCounts count_reach(const EdgeSamplerInput& input, const RejectionTree& tree,
                         std::span<const EdgeQuery> queries, int threads);
 
-// Diffuse points at 1.5 times the radius around the centre of the object's bounds, spread evenly
-// over directions, that look at the centre; the object moves against them as a whole, each time in
+// Diffuse points at 1.5 times the radius around the center of the object's bounds, spread evenly
+// over directions, that look at the center; the object moves against them as a whole, each time in
 // another direction.
 std::vector<EdgeQuery> queries_around(const EdgeMesh& mesh, int count, uint64_t seed);
 

@@ -31,7 +31,7 @@ struct Patch {
 Patch patch_of(const EdgeSamplerInput& input, std::span<const EdgeRef> edges);
 
 // Two parallel squares of half-width `extent` in the plane of the patch's normal (up) and bend (to
-// the right): one through its centre and one that is `distance` off, along `across`.
+// the right): one through its center and one that is `distance` off, along `across`.
 std::array<Slice, 2> slices_around(const Patch& patch, double extent, double distance, int size);
 
 }  // namespace limn

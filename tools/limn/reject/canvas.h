@@ -14,7 +14,7 @@ using Color = Rgb<double>;  // linear Rec.709
 Color srgb(uint32_t hex);
 std::string css(uint32_t hex);
 
-// In pixels from the top left corner of the picture; centres of pixels are at halves.
+// In pixels from the top left corner of the picture; centers of pixels are at halves.
 struct PixelPoint {
   double x = 0, y = 0;
 };
