@@ -129,11 +129,11 @@ LightCones::LightCones(const LightClusters& lights, const Vec3d& p) {
 // in between the overlap falls as the square of the remaining distance.
 Floats LightCones::mean_over_boxes(Floats3 center, const Floats3& half) const {
   const Floats zero = splat(0.0f), one = splat(1.0f), tiny = splat(0x1p-60f);
-  const Floats centre2 = max(dot(center, center), splat(0x1p-126f)), half2 = dot(half, half);
-  center = center * (1 / sqrt(centre2));
+  const Floats center2 = max(dot(center, center), splat(0x1p-126f)), half2 = dot(half, half);
+  center = center * (1 / sqrt(center2));
   // A box around p (share 1) is the whole sphere, chord 2; a distant cube has 2 |half|^2 and
   // reaches |half| sideways.
-  const Floats share = half2 / (centre2 + half2);
+  const Floats share = half2 / (center2 + half2);
   const Floats chord2 =
       share * (static_cast<float>(2 / kPi) + static_cast<float>(4 - 2 / kPi) * share) + tiny;
   const Floats chord = sqrt(chord2), chord_outer = sqrt(share * (1 + 3 * share));
