@@ -1,4 +1,4 @@
-// Derivatives by any method: what options and results have in common, and the table of methods.
+// Derivatives by any method: what options and results have in common.
 #include "limn/integrators/gradient.h"
 
 #include <fmt/format.h>
@@ -6,10 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "integrators/methods/method_table.h"
-#include "integrators/methods/selection.h"
 #include "limn/core/error.h"
-#include "limn/core/names.h"
+#include "limn/integrators/methods.h"
 
 namespace limn {
 namespace {
@@ -64,34 +62,6 @@ double edge_magnitude(const GradientResult& result, const ParameterGradient& g, 
     }
   }
   return sum;
-}
-
-std::vector<std::string> selected_terms(const std::vector<std::string>& known,
-                                        const std::vector<std::string>& chosen,
-                                        const std::string& file) {
-  for (const std::string& name : chosen) {
-    if (std::find(known.begin(), known.end(), name) != known.end()) continue;
-    throw InputError({file},
-                     "no term \"" + name + "\" here (terms of this scene: " + join(known) + ")");
-  }
-  return chosen.empty() ? known : chosen;
-}
-
-const std::vector<MethodType>& method_types() {
-  static const std::vector<MethodType> types = [] {
-    std::vector<MethodType> all = term_methods();
-    for (MethodType& row : other_methods()) all.push_back(std::move(row));
-    return all;
-  }();
-  return types;
-}
-
-const MethodType& find_method(const std::string& name) {
-  if (name.empty()) return method_types().front();
-  for (const MethodType& type : method_types()) {
-    if (type.name == name) return type;
-  }
-  throw InputError(unknown_name("method", name, names_of(method_types())));
 }
 
 GradientResult gradient(const Scene& scene, const GradientOptions& options,

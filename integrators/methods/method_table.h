@@ -1,5 +1,5 @@
 #pragma once
-// The methods: a file of its own each, and one row. Included by gradient.cpp alone.
+// The methods: a file of its own each, and one row. Included by methods.cpp, and by the methods.
 #include "integrators/methods/term_methods.h"
 #include "limn/integrators/methods.h"
 

@@ -11,6 +11,7 @@
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
 #include "tools/limn/compare_output.h"
+#include "tools/limn/report_script.h"
 #include "tools/mitsuba/mitsuba_method.h"
 
 namespace limn {

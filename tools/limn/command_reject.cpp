@@ -2,6 +2,7 @@
 #include "tools/limn/command_reject.h"
 
 #include "tools/limn/commands.h"
+#include "tools/limn/report_script.h"
 
 #include <fmt/format.h>
 

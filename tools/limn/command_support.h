@@ -59,8 +59,6 @@ std::vector<std::string> parse_terms(const std::string& list);
 std::optional<SampleCounts> parse_samples(const std::string& list);
 // "X,Y,S", or "TERM,N" for a term's samples on the film.
 NonFinite::Place parse_place(const std::string& text);
-// Makes FOLDER/report.html with Python, or says what is missing for it.
-void write_report(const std::string& folder, bool quiet);
 Scene load_scene(const CommonOptions& common);
 RunSettings make_settings(const CommonOptions& common, const Scene& scene,
                           const std::string& label);

@@ -1,8 +1,9 @@
 // The call of tools/report.py, or what is missing for it.
+#include "tools/limn/report_script.h"
+
 #include <fmt/format.h>
 
 #include "tools/limn/child_process.h"
-#include "tools/limn/command_support.h"
 
 namespace limn {
 namespace {

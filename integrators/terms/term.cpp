@@ -1,4 +1,6 @@
 // The table of terms, and what they are made from.
+#include "integrators/terms/term.h"
+
 #include "integrators/terms/scene_edges.h"
 #include "integrators/terms/term_table.h"
 
