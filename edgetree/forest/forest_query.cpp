@@ -174,6 +174,13 @@ Floats light_through(const ForestQuery& query, const Floats3& d, const Floats3& 
 // vectors of such pairs.
 __attribute__((noinline)) static double nearest_float(double x) { return static_cast<float>(x); }
 
+static float sum_of_speeds(const Vec3<Lanes>& v, const Lanes& lane_scale) {
+  double sum = 0;
+  for (int i = 0; i < kLanes; ++i)
+    sum += lane_scale[i] * std::sqrt(v.x[i] * v.x[i] + v.y[i] * v.y[i] + v.z[i] * v.z[i]);
+  return static_cast<float>(sum);
+}
+
 ForestPoint point_of(const Forest& forest, const Vec3d& p) {
   EdgeMesh farthest;
   farthest.extent = forest.extent;
@@ -199,11 +206,8 @@ ForestQuery::ForestQuery(const Forest& forest, const LightClusters* clusters,
     p[0][k] = static_cast<float>(high);
     p[1][k] = static_cast<float>(x - high);
   }
-  const Vec3<Lanes>& v = query.velocity;
-  double sum = 0;
-  for (int i = 0; i < kLanes; ++i)
-    sum += lane_scale[i] * std::sqrt(v.x[i] * v.x[i] + v.y[i] * v.y[i] + v.z[i] * v.z[i]);
-  speed = static_cast<float>(sum);
+  speed = sum_of_speeds(query.velocity, lane_scale);
+  turn = sum_of_speeds(query.turn, lane_scale);
 }
 
 Ints may_hold_candidates(const InnerNode& node, const ForestPoint& point) {
@@ -239,10 +243,11 @@ ChildWeights weigh_children(const InnerNode& node, const ForestQuery& query, boo
   const Floats height = dot_n(query, d) + half.x * std::fabs(n[0]) + half.y * std::fabs(n[1]) +
                         half.z * std::fabs(n[2]);
   alive &= height >= -16 * 0x1.0p-24f * at.size;
-  const Floats speed = query.speed + node.speed;
-  alive &= speed > 0;
   // A child's box is a step wide at least in every direction: this is positive.
   const Floats distance2 = max(dot(d, d), kNear * dot(half, half));
+  Floats speed = query.speed + node.speed;
+  if (query.turn > 0) speed = speed + query.turn / node.head.inverse_radius * sqrt(distance2);
+  alive &= speed > 0;
   const Floats rest = speed / distance2 * light_through(query, d, half, distance2, alive);
   return {length, select(alive, max(rest, splat(kLeast)), splat(0.0f))};
 }
@@ -268,11 +273,12 @@ Floats weigh_edges(const EdgeNode& node, const ForestQuery& query) {
   // Rounding of w and of the product with n.
   const Floats slack = 8 * 0x1.0p-24f * (l_0 + l_1);
   alive &= max(dot_n(query, w_0), dot_n(query, w_1)) >= -slack;
-  const Floats speed = query.speed + node.speed;
-  alive &= speed > 0;
   const Floats3 d{w_0.x + along.x * 0.5f, w_0.y + along.y * 0.5f, w_0.z + along.z * 0.5f};
   const Floats3 half{abs(along.x) * 0.5f, abs(along.y) * 0.5f, abs(along.z) * 0.5f};
   const Floats distance2 = max(max(dot(d, d), kNear * dot(half, half)), splat(kLeast));
+  Floats speed = query.speed + node.speed;
+  if (query.turn > 0) speed = speed + query.turn / query.unit * sqrt(distance2);
+  alive &= speed > 0;
   const Floats weight = speed * query.unit * tangent * (l_0 + l_1) / product *
                         light_through(query, d, half, distance2, alive);
   return select(alive, clamp(weight, splat(kLeast), splat(kMost)), splat(0.0f));

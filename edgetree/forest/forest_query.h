@@ -33,6 +33,7 @@ struct ForestQuery {
   float unit;
   float p[2][3];  // unit * p = p[0] + p[1], to twice the precision of a float
   float speed;    // of p
+  float turn;     // of the directions
 };
 
 // Lanes (-1 or 0) of the children that may hold an edge of E(p): never 0 where one does.

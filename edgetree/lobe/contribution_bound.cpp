@@ -27,12 +27,6 @@ double max_cosine(const Vec3d& axis, const Vec3d& u_a, const Vec3d& u_b) {
   return std::clamp(peak, std::max(a, b), 1.0);
 }
 
-Vec3<Lanes> relative_velocity(const EdgeMesh& mesh, VertexId vertex, const EdgeQuery& query) {
-  if (mesh.tangents.empty()) return -query.velocity;
-  const Vec3<Lanes>& v = mesh.tangent(vertex);
-  return {v.x - query.velocity.x, v.y - query.velocity.y, v.z - query.velocity.z};
-}
-
 Lanes component_along(const Vec3<Lanes>& v, const Vec3d& c) {
   return v.x * c.x + v.y * c.y + v.z * c.z;
 }

@@ -10,12 +10,6 @@
 namespace limn {
 namespace {
 
-Vec3<Lanes> edge_velocity(const EdgeMesh& mesh, EdgeId edge, double t) {
-  if (mesh.tangents.empty()) return {};
-  const auto& ends = mesh.edge(edge).vertices;
-  return mesh.tangent(ends[0]) * (1 - t) + mesh.tangent(ends[1]) * t;
-}
-
 Vec3<Lanes> velocity(const Vec3<Dual>& p) { return {p.x.d, p.y.d, p.z.d}; }
 
 class BoundaryTerm final : public Term {
@@ -77,7 +71,9 @@ void BoundaryTerm::add_sample(const PathVertex& vertex, const EdgeQuery& query, 
   const EdgeMesh& mesh = edges_.object(sample.edge.object);
   EdgeView view;
   const bool seen = view_edge(mesh, sample.edge, sample.t, query.p, view);
-  const Vec3<Lanes> v = edge_velocity(mesh, sample.edge.edge, sample.t) - query.velocity;
+  const auto [a, b] = mesh.edge(sample.edge.edge).vertices;
+  const Vec3<Lanes> v = relative_velocity(mesh, a, query) * (1 - sample.t) +
+                        relative_velocity(mesh, b, query) * sample.t;
   const Lanes weight =
       (v.x * view.side.x + v.y * view.side.y + v.z * view.side.z) *
       (1 / (view.distance * view.distance * view.distance * sample.probability * sample.pdf_t));

@@ -23,10 +23,21 @@ struct EdgeQuery {
   Vec3d wi;                // unit, towards the viewer
   LobeSummary lobe;        // of the scattering function
   Vec3<Lanes> velocity{};  // of p, per parameter; an edge's velocity relative to p counts
+  // Angular velocity of all directions at p, per parameter: a direction w moves with turn x w, and
+  // an edge that follows it is at rest.
+  Vec3<Lanes> turn{};
   // The face that p lies on, if any: its edges lie on p's horizon, where the scattering function is
   // zero, and are never drawn.
   FaceRef face = {};
 };
+
+// Velocity of an edge's end, as seen from p: against p, and against the directions that turn. Along
+// the edge it is linear in t.
+inline Vec3<Lanes> relative_velocity(const EdgeMesh& mesh, VertexId vertex,
+                                     const EdgeQuery& query) {
+  const Vec3<Lanes> own = mesh.tangents.empty() ? Vec3<Lanes>{} : mesh.tangent(vertex);
+  return own - query.velocity - cross(query.turn, mesh.position(vertex) - query.p);
+}
 
 struct EdgeSample {
   EdgeRef edge;
