@@ -22,6 +22,7 @@ struct PathVertex {
   const SurfacePoint<Dual>& surface;
   const Scattering<Dual>& scattering;
   const Rgb<double>& throughput;  // of the path up to here
+  Vec3<Lanes> turn;               // angular velocity of directions here, see direction_field.h
   int bounces;                    // how often it has scattered before
   const Rng& key;                 // of the path
   SampleLog* log = nullptr;       // null unless somebody reads it
