@@ -51,9 +51,25 @@ void collect(const std::vector<const std::vector<double>*>& sums, const std::vec
 // What a method does beside sampling its terms.
 struct TermMethod {
   const EdgeSamplerType& sampler;
-  bool moves_directions = false;  // see direction_field.h
-  bool spreads_samples = false;   // over pixels, see spread_samples
+  bool moves_directions = false;   // see direction_field.h
+  bool spreads_samples = false;    // over pixels, see spread_samples
+  bool random_directions = false;  // directions move by chance: to show that no mean changes
 };
+
+// A turn and a score of every pixel and parameter, of the order of what moves.
+std::vector<DirectionField> random_fields(size_t count, uint64_t seed) {
+  constexpr uint64_t kStream = 0xf1e1d;  // any number
+  std::vector<DirectionField> fields(count);
+  for (size_t i = 0; i < count; ++i) {
+    Rng rng(mix_bits(seed + kStream), i, 0);
+    for (Vec3<Lanes>* v : {&fields[i].turn, &fields[i].score}) {
+      for (int k = 0; k < 3; ++k) {
+        for (int lane = 0; lane < kLanes; ++lane) (*v)[k][lane] = 2 * rng.uniform() - 1;
+      }
+    }
+  }
+  return fields;
+}
 
 // A whole run of one method.
 class TermJob {
@@ -108,6 +124,14 @@ class TermJob {
   }
 
  private:
+  // What moving directions change in one term they take back in the others, and at every jump of
+  // radiance there must be an edge.
+  bool can_move_directions() const {
+    for (size_t t = 0; t < types_.size(); ++t) {
+      if (types_[t]->moved_with_directions && !computed_[t]) return false;
+    }
+    return scene_.shading == ShadingModel::kContinuous;
+  }
   int64_t terms_computed() const { return std::count(computed_.begin(), computed_.end(), true); }
   TermEstimator& pass(size_t p) const { return static_cast<TermEstimator&>(*passes_[p]); }
 
@@ -154,6 +178,10 @@ class TermJob {
       SamplePlan plan;
       plan.uniform = options_.samples.value_or(SampleCounts{});
       if (!options_.samples) plan = plan_by_pilot(pass(p), settings, watch, result);
+      if (method_.random_directions && can_move_directions()) {
+        plan.grid = PlanGrid(scene_.film, film_size(scene_.film));
+        plan.fields = random_fields(plan.grid.size(), settings.seed);
+      }
       for (size_t t = 0; t < types_.size(); ++t) {
         means[t] += plan.uniform[t] / static_cast<double>(passes_.size());
       }
@@ -210,9 +238,8 @@ class TermJob {
     SamplePlan plan;
     const int spp = pilot_samples(settings.spp);
     if (spp == 0 || (!method_.spreads_samples && terms_computed() < 2)) return plan;
-    const bool turns = method_.moves_directions && estimator.lanes() == 1 &&
-                       !estimator.motion_rates().still() &&
-                       scene_.shading == ShadingModel::kContinuous && estimator.samples_pixels();
+    const bool turns = method_.moves_directions && can_move_directions() &&
+                       estimator.lanes() == 1 && !estimator.motion_rates().still();
     const PilotFigures pilot = run_pilot(estimator, turns, spp, settings, watch);
     if (pilot.spp == 0) return plan;
     result.pilot_spp = pilot.spp;
@@ -275,7 +302,8 @@ MethodType method_row(const std::string& name, const std::string& description,
   method.description = description;
   for (const TermType& type : term_types()) method.terms.emplace_back(type.name);
   method.terms_can_be_left_out = true;
-  method.ablation = term_method.sampler.ablation;
+  method.ablation = term_method.sampler.ablation || term_method.random_directions;
+  method.only_sum_fixed = term_method.moves_directions || term_method.random_directions;
   method.run = [term_method](const MethodType&, const Scene& scene, const GradientOptions& options,
                              const RunSettings& settings) {
     const Stopwatch watch;
@@ -304,6 +332,10 @@ std::vector<MethodType> term_methods() {
   for (const EdgeSamplerType& type : edge_sampler_types()) {
     methods.push_back(method_row(type.name, type.description, {type}));
   }
+  methods.push_back(method_row("random-directions",
+                               "the forest, with directions that move by chance: noise, but the "
+                               "same mean",
+                               {forest, false, false, true}));
   return methods;
 }
 

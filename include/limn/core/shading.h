@@ -166,12 +166,18 @@ class Scattering {
     if (value(factor) == 0) return {};
     return bsdf_->eval(n_, wi_, w) * factor;
   }
-  // The part of eval's derivative that comes from the motion of wo alone.
+  // The part of eval's derivative that comes from the motion of wo alone, for parameters that are
+  // not the BSDF's own; zero for those that leave wo at rest.
   Rgb<Lanes> eval_derivative(const Vec3<Dual>& wo) const {
     Scattering<Dual> still(*this);
     still.hold();
     const Rgb<Dual> f = still.eval(wo);
-    return {f.r.d, f.g.d, f.b.d};
+    Rgb<Lanes> result;
+    for (int k = 0; k < kLanes; ++k) {
+      if (wo.x.d[k] == 0 && wo.y.d[k] == 0 && wo.z.d[k] == 0) continue;
+      for (int c = 0; c < 3; ++c) result[c][k] = f[c].d[k];
+    }
+    return result;
   }
   double pdf_solid_angle(const Vec3d& wo) const {
     return bsdf_->pdf_solid_angle(value(n_), value(wi_), wo);
