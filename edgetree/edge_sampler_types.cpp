@@ -23,6 +23,8 @@ constexpr bool kAblation = true;
 std::span<const EdgeSamplerType> edge_sampler_types() {
   static const EdgeSamplerType types[] = {
       {"forest", "8-wide trees that reject what holds no silhouette", make_forest<ForestConfig{}>},
+      {"silhouettes", "forest, and all silhouettes before lamps, listed by it",
+       make_forest<ForestConfig{}>, false, true},
       {"brute", "lists every candidate and draws by a bound of its contribution (the oracle)",
        make_brute_force_sampler},
       {"li2019", "the tree of Li et al. 2018 over positions and Hough-transformed planes",

@@ -51,9 +51,8 @@ class TermJob {
  public:
   TermJob(const Scene& scene, const GradientOptions& options, const EdgeSamplerType& sampler,
           int threads)
-      : scene_(scene), options_(options), types_(terms_of(scene)) {
-    const std::vector<std::string> chosen =
-        selected_terms(term_names(scene), options.terms, scene.file);
+      : scene_(scene), options_(options), types_(terms_of(scene, sampler)) {
+    const std::vector<std::string> chosen = selected_terms(term_names(), options.terms, scene.file);
     for (const TermType* type : types_) {
       computed_.push_back(std::find(chosen.begin(), chosen.end(), type->name) != chosen.end());
     }
@@ -104,9 +103,9 @@ class TermJob {
  private:
   TermEstimator& pass(size_t p) const { return static_cast<TermEstimator&>(*passes_[p]); }
 
-  static std::vector<std::string> term_names(const Scene& scene) {
+  std::vector<std::string> term_names() const {
     std::vector<std::string> names;
-    for (const TermType* type : terms_of(scene)) names.emplace_back(type->name);
+    for (const TermType* type : types_) names.emplace_back(type->name);
     return names;
   }
 
@@ -226,7 +225,9 @@ MethodType term_method(const EdgeSamplerType& sampler) {
   MethodType method;
   method.name = sampler.name;
   method.description = sampler.description;
-  for (const TermType& type : term_types()) method.terms.emplace_back(type.name);
+  for (const TermType& type : term_types()) {
+    if (!type.regions || sampler.regions) method.terms.emplace_back(type.name);
+  }
   method.terms_can_be_left_out = true;
   method.ablation = sampler.ablation;
   method.run = [&sampler](const MethodType&, const Scene& scene, const GradientOptions& options,

@@ -24,7 +24,9 @@ enum class Purpose : uint64_t {
   kEdgeCopy,
   kFilmCopy,
   kShadow,
-  kShadowCopy
+  kShadowCopy,
+  kDirect,
+  kDirectCopy
 };
 
 // SplitMix64 started from a hash of (seed, pixel, sample): a stream for one path. `at` derives the

@@ -15,6 +15,9 @@ struct EdgeSamplerType {
   std::unique_ptr<EdgeSampler> (*make)(const EdgeSamplerInput& input, int threads);
   // A sampler with one idea taken out, which shows what the idea is worth: of no use but for that.
   bool ablation = false;
+  // Regions of light (lamps, bright patches of the environment) are kept apart from what it chooses
+  // by: its list of outlines serves them.
+  bool regions = false;
 };
 std::span<const EdgeSamplerType> edge_sampler_types();
 
