@@ -37,59 +37,55 @@ void EdgePieces::add(const ListedEdge& edge, const EdgeMesh& mesh, double t0, do
                      std::vector<EdgePiece>& pieces) const {
   const Vec3d w0 = edge.x0 - query_.p, along = edge.x1 - edge.x0;
   const Vec3d side = cross(w0, along);
-  const double side_length = length(side);
-  if (side_length == 0) return;
+  const Vec3d a = w0 + along * t0, b = w0 + along * t1;
+  const double l_a = length(a), l_b = length(b), side_length = length(side);
+  if (side_length == 0 || l_a == 0 || l_b == 0) return;
   const auto [i, j] = mesh.edge(edge.id.edge).vertices;
   const Vec3d m = side / side_length;
   const auto across = [&](VertexId vertex) {
     const Vec3<Lanes> v = relative_velocity(mesh, vertex, query_);
-    Across result{};
-    for (int k = 0; k < lanes_; ++k)
-      result.lane[k] = scale_[k] * (m.x * v.x[k] + m.y * v.y[k] + m.z * v.z[k]);
-    return result;
+    return v.x * m.x + v.y * m.y + v.z * m.z;
   };
-  const Across v0 = across(i), v1 = across(j);
+  const Lanes v0 = across(i), v1 = across(j);
+  if (is_zero(v0) && is_zero(v1)) return;
 
-  const Vec3d a = w0 + along * t0, b = w0 + along * t1;
-  const double l_a = length(a), l_b = length(b), cosine = dot(a, b);
-  if (l_a == 0 || l_b == 0) return;
-  const bool is_short = cosine >= cosine_of_widest_ * l_a * l_b;
-  const double angle = is_short ? 0 : std::atan2(side_length * (t1 - t0), cosine);
-  const int count = is_short ? 1 : static_cast<int>(std::ceil(angle / widest_));
-  double begin = t0;
-  Vec3d w_begin = a;
-  for (int k = 1; k <= count; ++k) {
-    double end = t1;
-    if (k < count) {
-      // Where the direction has turned by k / count of the angle.
-      const double to_a = std::sin(angle * (count - k) / count) / l_a;
-      const double to_b = std::sin(angle * k / count) / l_b;
-      end = t0 + (t1 - t0) * (to_b / (to_a + to_b));
-    }
-    const Vec3d w_end = w0 + along * end;
-    EdgePiece piece{edge.id, begin, end, 1 / length(w_begin), 1 / length(w_end), 0};
+  const auto append = [&](double begin, double end, double l_begin, double l_end) {
+    EdgePiece piece{edge.id, begin, end, 1 / l_begin, 1 / l_end, 0};
     const double sine = side_length * (end - begin) * piece.inverse_l0 * piece.inverse_l1;
-    piece.weight = weigh(w_begin, w_end, piece, sine, v0, v1);
+    piece.weight = sine * mean_over(piece, w0, along, v0, v1);
     if (piece.weight > 0 && std::isfinite(piece.weight)) pieces.push_back(piece);
+  };
+  const double cosine = dot(a, b);
+  if (cosine >= cosine_of_widest_ * l_a * l_b) return append(t0, t1, l_a, l_b);
+  const double angle = std::atan2(side_length * (t1 - t0), cosine);
+  const int count = static_cast<int>(std::ceil(angle / widest_));
+  double begin = t0, l_begin = l_a;
+  for (int k = 1; k <= count; ++k) {
+    // Where the direction has turned by k / count of the angle.
+    const double to_a = std::sin(angle * (count - k) / count) / l_a;
+    const double to_b = std::sin(angle * k / count) / l_b;
+    const double end = k < count ? t0 + (t1 - t0) * (to_b / (to_a + to_b)) : t1;
+    const double l_end = length(w0 + along * end);
+    append(begin, end, l_begin, l_end);
     begin = end;
-    w_begin = w_end;
+    l_begin = l_end;
   }
 }
 
-double EdgePieces::weigh(const Vec3d& a, const Vec3d& b, const EdgePiece& piece, double sine,
-                         const Across& v0, const Across& v1) const {
+// Mean over u of f_s(z / |z|) |m . v(z)| / |z|^3, with v over the distance; m is normal to the plane
+// through p and the edge, v0 and v1 are m . v at the ends of the whole edge.
+double EdgePieces::mean_over(const EdgePiece& piece, const Vec3d& w0, const Vec3d& along,
+                             const Lanes& v0, const Lanes& v1) const {
   double sum = 0;
   for (const double u : {kGauss, 1 - kGauss}) {
-    const double to_a = (1 - u) * piece.inverse_l0, to_b = u * piece.inverse_l1;
-    const Vec3d z = a * to_a + b * to_b;
-    const double z2 = length_squared(z), z_length = std::sqrt(z2);
-    // v at t is (1 - t) v0 + t v1.
-    const double to_v1 = to_a * piece.t0 + to_b * piece.t1, to_v0 = to_a + to_b - to_v1;
+    const double to_begin = (1 - u) * piece.inverse_l0, to_end = u * piece.inverse_l1;
+    const double to_both = to_begin + to_end, to_v1 = to_begin * piece.t0 + to_end * piece.t1;
     double speed = 0;
-    for (int k = 0; k < lanes_; ++k) speed += std::fabs(v0.lane[k] * to_v0 + v1.lane[k] * to_v1);
-    sum += lobe_.value(z / z_length) * speed / (z2 * z_length);
+    for (int k = 0; k < lanes_; ++k)
+      speed += scale_[k] * std::fabs(v0[k] * (to_both - to_v1) + v1[k] * to_v1);
+    sum += speed * lobe_.homogeneous_value(w0 * to_both + along * to_v1);
   }
-  return 0.5 * sine * sum;
+  return 0.5 * sum;
 }
 
 }  // namespace limn

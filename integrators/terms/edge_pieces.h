@@ -42,12 +42,8 @@ class EdgePieces {
            std::vector<EdgePiece>& pieces) const;
 
  private:
-  // The velocity across the plane through p and the edge, of each lane.
-  struct Across {
-    double lane[kLanes];
-  };
-  double weigh(const Vec3d& a, const Vec3d& b, const EdgePiece& piece, double sine,
-               const Across& v0, const Across& v1) const;
+  double mean_over(const EdgePiece& piece, const Vec3d& w0, const Vec3d& along, const Lanes& v0,
+                   const Lanes& v1) const;
 
   const EdgeQuery& query_;
   int lanes_;
