@@ -169,7 +169,7 @@ TEST(EdgePieces, WeighTheIntegralAndTileTheEdge) {
     const Vec3d w0 = c.mesh.positions[0] - c.query.p, w1 = c.mesh.positions[1] - c.query.p;
     double t0 = 0, t1 = 1;
     if (!DirectionCone::clip_by(dot(c.query.n, w0), dot(c.query.n, w1), t0, t1)) continue;
-    const EdgePieces cut(c.query, kLanes, scale);
+    const EdgePieces cut(c.query, scale);
     std::vector<EdgePiece> pieces;
     cut.add({{ShapeId(0), EdgeId(0)}, c.mesh.positions[0], c.mesh.positions[1]}, c.mesh, t0, t1,
             pieces);
@@ -218,7 +218,7 @@ TEST(EdgePieces, DoNotCancel) {
       c.mesh.tangents[1][i][0] = v1[i];
     }
     std::vector<EdgePiece> pieces;
-    EdgePieces(c.query, 1, {1, 1, 1, 1}).add(listed, c.mesh, 0, 1, pieces);
+    EdgePieces(c.query, {1, 1, 1, 1}).add(listed, c.mesh, 0, 1, pieces);
     return pieces.empty() ? 0 : pieces[0].weight;
   };
   const double full = weight({0, 1, 0}, {0, 1, 0});
@@ -238,12 +238,12 @@ TEST(EdgePieces, OfEdgesThroughThePoint) {
   for (const double x : {0.0, -1.0, -0.3, 2.0}) {
     c.mesh.positions = {{x, 0, 0}, {x + 1, 0, 0}};
     std::vector<EdgePiece> pieces;
-    EdgePieces(c.query, 1, {1, 1, 1, 1})
+    EdgePieces(c.query, {1, 1, 1, 1})
         .add({{ShapeId(0), EdgeId(0)}, c.mesh.positions[0], c.mesh.positions[1]}, c.mesh, 0, 1,
              pieces);
     EXPECT_TRUE(pieces.empty());
     for (Vec3d& p : c.mesh.positions) p.z = 1e-300;
-    EdgePieces(c.query, 1, {1, 1, 1, 1})
+    EdgePieces(c.query, {1, 1, 1, 1})
         .add({{ShapeId(0), EdgeId(0)}, c.mesh.positions[0], c.mesh.positions[1]}, c.mesh, 0, 1,
              pieces);
     for (const EdgePiece& piece : pieces) EXPECT_TRUE(std::isfinite(piece.weight));
