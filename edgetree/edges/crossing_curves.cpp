@@ -1,0 +1,249 @@
+// Pairs of faces that pass through each other, and the lines along which they do.
+#include "limn/edgetree/crossing_curves.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <tuple>
+
+#include "edgetree/edges/overlap_tree.h"
+#include "limn/core/parallel.h"
+
+namespace limn {
+namespace {
+
+struct Triangle {
+  std::array<Vec3f, 3> corners;
+  FaceRef face;
+};
+
+FloatBox box_of(const Triangle& triangle) {
+  const auto& [a, b, c] = triangle.corners;
+  FloatBox box;
+  for (int k = 0; k < 3; ++k) {
+    box.lower[k] = std::min({a[k], b[k], c[k]});
+    box.upper[k] = std::max({a[k], b[k], c[k]});
+  }
+  return box;
+}
+
+// Heights of points over the plane of a triangle, times twice its area: six times the volume of the
+// tetrahedron over it. Corners are taken in the triangle's own order, so that a point has the same
+// bits whichever triangle of its own surface it is asked for.
+class HeightOver {
+ public:
+  explicit HeightOver(const Triangle& triangle)
+      : a_(cast<double>(triangle.corners[0])),
+        b_(cast<double>(triangle.corners[1])),
+        c_(cast<double>(triangle.corners[2])),
+        normal_(cross(b_ - a_, c_ - a_)) {}
+
+  const Vec3d& normal() const { return normal_; }
+  double of(const Vec3d& x) const { return dot(normal_, x - a_); }
+
+  // How much of it rounding can explain. A position is taken to have been rounded to float twice
+  // (in the file, and after it was moved): it is off by at most 2 * 2^-24 |x|, which changes the
+  // volume by at most the gradient's length times that. In double precision, eight roundings of the
+  // volume's terms.
+  double rounding(const Vec3d& x) const {
+    const Vec3d ab = b_ - a_, ac = c_ - a_, ax = x - a_;
+    const Vec3d by_b = cross(ac, ax), by_c = cross(ax, ab);
+    const double positions = length(normal_ + by_b + by_c) * length(a_) +
+                             length(by_b) * length(b_) + length(by_c) * length(c_) +
+                             length(normal_) * length(x);
+    return 0x1p-23 * positions + 8 * 0x1p-53 * length(ab) * length(ac) * length(ax);
+  }
+
+ private:
+  Vec3d a_, b_, c_, normal_;
+};
+
+// On which side of a plane the corners of a triangle lie: heights, 0 where rounding can explain
+// them.
+struct Sides {
+  std::array<double, 3> heights;
+  bool both() const {
+    const auto [least, most] = std::minmax({heights[0], heights[1], heights[2]});
+    return least < 0 && most > 0;
+  }
+};
+
+Sides sides_of(const Triangle& triangle, const HeightOver& plane) {
+  Sides sides;
+  for (int k = 0; k < 3; ++k) sides.heights[k] = plane.of(cast<double>(triangle.corners[k]));
+  if (!sides.both()) return sides;
+  for (int k = 0; k < 3; ++k) {
+    const double rounding = plane.rounding(cast<double>(triangle.corners[k]));
+    if (std::fabs(sides.heights[k]) <= rounding) sides.heights[k] = 0;
+  }
+  return sides;
+}
+
+bool before(const Vec3f& a, const Vec3f& b) {
+  return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
+}
+
+// Where an edge with its ends on different sides of a plane meets it: the same bits from either
+// face of the edge.
+Vec3d meet(Vec3f a, Vec3f b, double height_a, double height_b) {
+  if (before(b, a)) {
+    std::swap(a, b);
+    std::swap(height_a, height_b);
+  }
+  const Vec3d from = cast<double>(a);
+  return from + (cast<double>(b) - from) * (height_a / (height_a - height_b));
+}
+
+// A part of the line where two planes meet.
+struct Interval {
+  std::array<Vec3d, 2> ends;
+  std::array<double, 2> places;  // of the ends along the line, in ascending order
+};
+
+// What a triangle with corners on both sides of the other's plane has of the line.
+Interval interval_of(const Triangle& triangle, const Sides& sides, const Vec3d& along,
+                     const Vec3d& origin) {
+  Interval interval;
+  int count = 0;
+  const auto add = [&](const Vec3d& x) {
+    interval.ends[count] = x;
+    interval.places[count++] = dot(along, x - origin);
+  };
+  for (int k = 0; k < 3; ++k) {
+    const Vec3f &a = triangle.corners[k], &b = triangle.corners[(k + 1) % 3];
+    const double height_a = sides.heights[k], height_b = sides.heights[(k + 1) % 3];
+    if (height_a == 0) add(cast<double>(a));
+    if ((height_a < 0 && height_b > 0) || (height_a > 0 && height_b < 0))
+      add(meet(a, b, height_a, height_b));
+  }
+  if (interval.places[0] > interval.places[1]) {
+    std::swap(interval.ends[0], interval.ends[1]);
+    std::swap(interval.places[0], interval.places[1]);
+  }
+  return interval;
+}
+
+std::optional<CrossingSegment> cross_faces(const Triangle& first, const Triangle& second) {
+  const HeightOver over_first(first), over_second(second);
+  const Sides of_second = sides_of(second, over_first);
+  if (!of_second.both()) return std::nullopt;
+  const Sides of_first = sides_of(first, over_second);
+  if (!of_first.both()) return std::nullopt;
+  const Vec3d along = cross(over_first.normal(), over_second.normal());
+  const Vec3d origin = cast<double>(first.corners[0]);
+  const Interval a = interval_of(first, of_first, along, origin);
+  const Interval b = interval_of(second, of_second, along, origin);
+  const int begin = b.places[0] > a.places[0], end = b.places[1] < a.places[1];
+  if (!((end ? b : a).places[1] > (begin ? b : a).places[0])) return std::nullopt;
+  const CrossingSegment segment{{first.face, second.face},
+                                {(begin ? b : a).ends[0], (end ? b : a).ends[1]}};
+  // Sides that meet in a point have what rounding of either leaves of it in common.
+  const double size = std::max(length(segment.ends[0]), length(segment.ends[1]));
+  if (length(segment.ends[1] - segment.ends[0]) <= 0x1p-22 * size) return std::nullopt;
+  return segment;
+}
+
+int common_corners(const Triangle& a, const Triangle& b) {
+  int count = 0;
+  for (const Vec3f& x : a.corners)
+    for (const Vec3f& y : b.corners) count += x == y;
+  return count;
+}
+
+std::vector<Triangle> triangles_of(std::span<const Mesh* const> meshes) {
+  std::vector<Triangle> triangles;
+  size_t count = 0;
+  for (const Mesh* mesh : meshes) count += mesh->faces.size();
+  triangles.reserve(count);
+  for (uint32_t s = 0; s < meshes.size(); ++s)
+    for (uint32_t f = 0; f < meshes[s]->faces.size(); ++f) {
+      const auto& positions = meshes[s]->positions;
+      const auto& [a, b, c] = meshes[s]->faces[f];
+      triangles.push_back({{positions[a], positions[b], positions[c]}, {ShapeId(s), FaceId(f)}});
+    }
+  return triangles;
+}
+
+std::vector<Triangle> permuted(const std::vector<Triangle>& triangles,
+                               const std::vector<uint32_t>& order) {
+  std::vector<Triangle> result;
+  result.reserve(order.size());
+  for (const uint32_t i : order) result.push_back(triangles[i]);
+  return result;
+}
+
+auto key(FaceRef face) { return std::pair(face.shape, face.face); }
+
+Vec3<Lanes> velocity_on(const Mesh& mesh, FaceId id, const Vec3d& normal, const Vec3d& x) {
+  if (mesh.position_tangents.empty()) return {};
+  const FaceIndices& face = mesh.face(id);
+  Vec3d corners[3];
+  for (int k = 0; k < 3; ++k) corners[k] = cast<double>(mesh.positions[face[k]]);
+  Vec3<Lanes> velocity;
+  for (int k = 0; k < 3; ++k) {
+    const Vec3d &a = corners[(k + 1) % 3], &b = corners[(k + 2) % 3];
+    const double weight = dot(normal, cross(a - x, b - x)) / length_squared(normal);
+    velocity += mesh.position_tangents[face[k]] * weight;
+  }
+  return velocity;
+}
+
+Vec3d normal_of(const Mesh& mesh, FaceId id) {
+  const auto& [i, j, k] = mesh.face(id);
+  const Vec3d a = cast<double>(mesh.positions[i]);
+  return cross(cast<double>(mesh.positions[j]) - a, cast<double>(mesh.positions[k]) - a);
+}
+
+}  // namespace
+
+std::vector<CrossingSegment> find_crossings(std::span<const Mesh* const> meshes, int threads) {
+  std::vector<Triangle> triangles = triangles_of(meshes);
+  std::vector<FloatBox> boxes;
+  boxes.reserve(triangles.size());
+  for (const Triangle& triangle : triangles) boxes.push_back(box_of(triangle));
+  const OverlapTree tree(boxes, threads);
+  std::vector<FloatBox>().swap(boxes);
+  triangles = permuted(triangles, tree.order());
+  std::vector<std::vector<CrossingSegment>> parts(tree.parts());
+  parallel_for(parts.size(), threads, [&](size_t part) {
+    tree.visit_pairs(part, [&](uint32_t i, uint32_t j) {
+      // The pair in one order, whatever the tree's.
+      const bool swapped = key(triangles[j].face) < key(triangles[i].face);
+      const Triangle &a = triangles[swapped ? j : i], &b = triangles[swapped ? i : j];
+      // Neighbours along an edge meet there and nowhere else, or in a plane.
+      if (common_corners(a, b) > 1) return;
+      if (const auto segment = cross_faces(a, b)) parts[part].push_back(*segment);
+    });
+  });
+  std::vector<CrossingSegment> segments;
+  for (const auto& part : parts) segments.insert(segments.end(), part.begin(), part.end());
+  std::sort(segments.begin(), segments.end(),
+            [](const CrossingSegment& a, const CrossingSegment& b) {
+              return std::pair(key(a.faces[0]), key(a.faces[1])) <
+                     std::pair(key(b.faces[0]), key(b.faces[1]));
+            });
+  return segments;
+}
+
+// With unit normals n and m, speeds s and t along them, and l = n x m: v . n = s, v . m = t and
+// v . l = 0 hold for v = (s m x l + t l x n) / |l|^2.
+Vec3<Lanes> crossing_velocity(std::span<const Mesh* const> meshes, const CrossingSegment& segment,
+                              const Vec3d& x) {
+  Vec3d normals[2];
+  Lanes speeds[2];
+  for (int i = 0; i < 2; ++i) {
+    const auto [shape, face] = segment.faces[i];
+    const Mesh& mesh = *meshes[shape.index()];
+    const Vec3d normal = normal_of(mesh, face);
+    normals[i] = normalize(normal);
+    speeds[i] = dot(velocity_on(mesh, face, normal, x), normals[i]);
+  }
+  const Vec3d line = cross(normals[0], normals[1]);
+  const double scale = 1 / length_squared(line);
+  const Vec3d by_first = cross(normals[1], line) * scale;
+  const Vec3d by_second = cross(line, normals[0]) * scale;
+  const auto component = [&](int k) { return speeds[0] * by_first[k] + speeds[1] * by_second[k]; };
+  return {component(0), component(1), component(2)};
+}
+
+}  // namespace limn
