@@ -258,8 +258,9 @@ class Li2019Sampler final : public EdgeSampler {
 
   Bounds plane_box(const EdgeMesh& mesh, EdgeId edge) const {
     Bounds box;
-    for (const FaceId face : mesh.faces_around(edge)) {
-      const Plane& plane = mesh.plane(face);
+    for (const FaceRef face : mesh.faces_around(edge)) {
+      if (face.shape != mesh.shape) continue;
+      const Plane& plane = mesh.plane(face.face);
       box.extend(origin_ - plane.n * plane.distance(origin_));
     }
     return box;

@@ -41,7 +41,9 @@ Fold fold_of(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& d) {
 // Builds one EdgeMesh; the steps are called in the order in which they stand.
 class Builder {
  public:
-  Builder(const Mesh& mesh, bool black_behind) : mesh_(mesh), ids_(edge_vertex_ids(mesh)) {
+  Builder(const Mesh& mesh, bool black_behind, ShapeId shape)
+      : mesh_(mesh), ids_(edge_vertex_ids(mesh)) {
+    result_.shape = shape;
     copy_vertices();
     for (const FaceIndices& face : mesh.faces) result_.planes.push_back(plane_of(mesh, face));
     group_half_edges();
@@ -70,7 +72,7 @@ class Builder {
     result_.face_offsets.push_back(0);
     for (size_t begin = 0, end; begin < sides_.size(); begin = end) {
       for (end = begin; end < sides_.size() && ends(sides_[end]) == ends(sides_[begin]); ++end)
-        result_.incident_faces.push_back(sides_[end].face);
+        result_.incident_faces.push_back({result_.shape, sides_[end].face});
       result_.face_offsets.push_back(static_cast<uint32_t>(end));
       append_edge({&sides_[begin], end - begin});
     }
@@ -174,8 +176,8 @@ uint64_t EdgeMesh::count(EdgeClass edge_class) const {
                        [&](const Edge& e) { return e.edge_class == edge_class; });
 }
 
-EdgeMesh build_edge_mesh(const Mesh& mesh, bool black_behind) {
-  return Builder(mesh, black_behind).take();
+EdgeMesh build_edge_mesh(const Mesh& mesh, bool black_behind, ShapeId shape) {
+  return Builder(mesh, black_behind, shape).take();
 }
 
 // Four roundings in n . p + offset, of terms no larger than |p| and the extent; three in the offset

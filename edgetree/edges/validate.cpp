@@ -21,8 +21,9 @@ const char* fault_of_sizes(const EdgeMesh& mesh) {
     return "offsets do not span the incident faces";
   for (size_t e = 0; e < mesh.edges.size(); ++e)
     if (mesh.face_offsets[e] >= mesh.face_offsets[e + 1]) return "an edge has no faces";
-  for (const FaceId face : mesh.incident_faces)
-    if (face.index() >= mesh.planes.size()) return "an incident face is out of range";
+  for (const FaceRef face : mesh.incident_faces)
+    if (face.shape == mesh.shape && face.face.index() >= mesh.planes.size())
+      return "an incident face is out of range";
   for (const Edge& edge : mesh.edges)
     if (ends_of(edge).second.index() >= mesh.positions.size()) return "a vertex is out of range";
   return nullptr;
@@ -38,12 +39,15 @@ const char* fault_of(const Plane& plane) {
 
 const char* fault_of_faces(const EdgeMesh& mesh, EdgeId id) {
   const Edge& edge = mesh.edge(id);
-  const std::span<const FaceId> around = mesh.faces_around(id);
-  if (edge.faces[0] != around[0]) return "its first face is not the first around it";
-  if (edge.faces[1] != (around.size() > 1 ? around[1] : FaceId::none()))
+  const std::span<const FaceRef> around = mesh.faces_around(id);
+  if (around[0] != FaceRef{mesh.shape, edge.faces[0]})
+    return "its first face is not the first around it";
+  const bool has_second = around.size() > 1 && around[1].shape == mesh.shape;
+  if (edge.faces[1] != (has_second ? around[1].face : FaceId::none()))
     return "its second face is not the second around it";
-  for (const FaceId face : around) {
-    const Plane& plane = mesh.plane(face);
+  for (const FaceRef face : around) {
+    if (face.shape != mesh.shape) continue;
+    const Plane& plane = mesh.plane(face.face);
     if (length_squared(plane.n) == 0) return "a face around it has no area";
     for (const VertexId vertex : edge.vertices) {
       const Vec3d& x = mesh.position(vertex);

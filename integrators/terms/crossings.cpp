@@ -12,10 +12,12 @@ namespace limn {
 namespace {
 
 // The faces around each welded vertex.
-std::vector<std::vector<FaceId>> faces_by_vertex(const Mesh& mesh) {
-  std::vector<std::vector<FaceId>> faces(mesh.positions.size());
+std::vector<std::vector<FaceRef>> faces_by_vertex(const Mesh& mesh, ShapeId shape) {
+  std::vector<std::vector<FaceRef>> faces(mesh.positions.size());
   for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
-    for (const uint32_t vertex : mesh.faces[f]) faces[mesh.weld[vertex]].emplace_back(f);
+    for (const uint32_t vertex : mesh.faces[f]) {
+      faces[mesh.weld[vertex]].push_back({shape, FaceId(f)});
+    }
   }
   return faces;
 }
@@ -55,17 +57,16 @@ Crossings find_crossings(const Scene& scene, const RayTracer& tracer) {
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     const Mesh& mesh = scene.shapes[s].mesh;
     const EdgeMesh edges = build_edge_mesh(mesh, false);
-    const auto around = faces_by_vertex(mesh);
+    const auto around = faces_by_vertex(mesh, ShapeId(s));
     for (const Edge& edge : edges.edges) {
       const Vec3d a = edges.position(edge.vertices[0]);
       const Vec3d b = edges.position(edge.vertices[1]);
       // Faces that share an end with the edge touch it without crossing.
-      std::vector<FaceId> skipped = around[edge.vertices[0].index()];
+      std::vector<FaceRef> skipped = around[edge.vertices[0].index()];
       const auto& more = around[edge.vertices[1].index()];
       skipped.insert(skipped.end(), more.begin(), more.end());
       const double distance = length(b - a);
       Ray ray{a, (b - a) / distance, 0, distance};
-      ray.skip_shape = ShapeId(s);
       ray.skip_faces = skipped;
       Hit hit;
       if (!first_crossing(scene, tracer, ray, a, b, hit)) continue;

@@ -22,29 +22,28 @@ namespace {
 
 // The nearest face on either side of an edge, or none.
 struct Sides {
-  FaceId negative, positive;
+  std::optional<FaceSide> negative, positive;
 };
 
 // In the plane across the edge, a face leaves the edge along the unit vector a = alpha m + beta w,
 // with m the normal of the viewing plane through the edge and w the part of omega across the edge:
 // it lies on the side of alpha's sign, and the smaller beta / |alpha|, the nearer it is.
-Sides nearest_faces(const Scene& scene, const EdgeMesh& mesh, const EdgeView& view) {
+Sides nearest_faces(const Scene& scene, const FacesAround& around, const EdgeView& view) {
   Sides sides;
   double slopes[2] = {0, 0};
   const Vec3d along = normalize(view.x1 - view.x0);
   const Vec3d across = view.omega - along * dot(view.omega, along);
-  for (const FaceId face : mesh.faces_around(view.id.edge)) {
-    const Vec3d a = direction_into_face(scene.shape(view.id.object).mesh, face, view.x0, along);
-    const double alpha = dot(a, view.side);
-    if (alpha == 0) continue;
-    const double slope = dot(a, across) / std::fabs(alpha);
-    FaceId& nearest = alpha > 0 ? sides.positive : sides.negative;
+  for_every_side(scene, around, view.x0, along, [&](const FaceSide& side, Incidence) {
+    const double alpha = dot(side.into, view.side);
+    if (alpha == 0) return;
+    const double slope = dot(side.into, across) / std::fabs(alpha);
+    auto& nearest = alpha > 0 ? sides.positive : sides.negative;
     double& best = slopes[alpha > 0];
-    if (!nearest.valid() || slope < best) {
-      nearest = face;
+    if (!nearest || slope < best) {
+      nearest = side;
       best = slope;
     }
-  }
+  });
   return sides;
 }
 
@@ -56,8 +55,8 @@ bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView&
   Ray ray{view.p, view.omega};
   ray.t_min = t_min;
   ray.start = start;
-  ray.skip_shape = view.id.object;
-  ray.skip_faces = mesh.faces_around(view.id.edge);
+  const FacesAround around = mesh.around(view.id.edge);
+  ray.skip_faces = around.faces;
   ray.skip_emitters = bounces == 0 && context.scene.hide_emitters;
   Hit behind;
   ++rays.closest;
@@ -66,22 +65,22 @@ bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView&
 
   NoVisitor nothing;
   PathTracer<double, NoVisitor> path(context, rays, nothing);
-  const EdgeStart edge{view.id.object, ray.skip_faces, view.x0, view.x1};
   // Both sides share their random numbers: where they hardly differ, so do their estimates.
   const Rng side_key = key.at(Purpose::kEdgeSide, bounces);
-  const auto radiance = [&](FaceId face) {
-    if (face.valid()) {
-      const FaceRef ref{view.id.object, face};
-      const auto corners = face_corners<double>(context.scene.shape(ref.shape).mesh, face);
+  const auto radiance = [&](const std::optional<FaceSide>& side) {
+    if (side) {
+      const FaceRef face = side->face;
+      const auto corners = face_corners<double>(context.scene.shape(face.shape).mesh, face.face);
       const Vec3d n = cross(corners[1] - corners[0], corners[2] - corners[0]);
-      return path.from_surface(surface_on_ray(context.scene, ref, view.y, n), -view.omega, bounces,
+      EdgeStart edge{around, view.x0, view.x1, *side};
+      return path.from_surface(surface_on_ray(context.scene, face, view.y, n), -view.omega, bounces,
                                side_key, &edge);
     }
     if (!found) return path.escaped(view.omega, bounces);
     return path.from_surface(surface_on_ray(context.scene, behind.face, view.p, view.omega),
                              -view.omega, bounces, side_key, nullptr);
   };
-  const Sides sides = nearest_faces(context.scene, mesh, view);
+  const Sides sides = nearest_faces(context.scene, around, view);
   jump = radiance(sides.negative) - radiance(sides.positive);
   return true;
 }

@@ -9,9 +9,10 @@ namespace limn {
 
 EdgeSamplerInput make_sampler_input(const Scene& scene) {
   EdgeSamplerInput input;
-  for (const Shape& shape : scene.shapes) {
+  for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+    const Shape& shape = scene.shapes[s];
     const bool black_behind = shape.bsdf->side(false) == nullptr;
-    input.objects.push_back(build_edge_mesh(shape.mesh, black_behind));
+    input.objects.push_back(build_edge_mesh(shape.mesh, black_behind, ShapeId(s)));
   }
   const Lights lights(scene);
   for (const Light* light : lights.all()) light->add_triangles(input.lights);

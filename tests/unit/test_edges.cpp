@@ -59,7 +59,7 @@ TEST(Edges, FirstFaceRunsAlongTheEdge) {
       for (int k = 0; k < 3; ++k)
         matches += mesh.weld[face[k]] == from.index() && mesh.weld[face[(k + 1) % 3]] == to.index();
       EXPECT_EQ(matches, 1) << name << " edge " << e;
-      EXPECT_EQ(edges.faces_around(EdgeId(e))[0], edges.edges[e].faces[0]);
+      EXPECT_EQ(edges.faces_around(EdgeId(e))[0].face, edges.edges[e].faces[0]);
     }
     EXPECT_EQ(edges.face_offsets.size(), edges.edges.size() + 1);
     EXPECT_EQ(edges.incident_faces.size(), 3 * mesh.faces.size()) << name;
@@ -340,7 +340,8 @@ TEST(EdgeMesh, CorruptedCopiesAreFound) {
       {"there are other than E + 1 offsets", [](EdgeMesh& m) { m.face_offsets.pop_back(); }},
       {"offsets do not span the incident faces", [](EdgeMesh& m) { m.incident_faces.pop_back(); }},
       {"an edge has no faces", [](EdgeMesh& m) { m.face_offsets[3] = m.face_offsets[4]; }},
-      {"an incident face is out of range", [](EdgeMesh& m) { m.incident_faces[2] = FaceId(1000); }},
+      {"an incident face is out of range",
+       [](EdgeMesh& m) { m.incident_faces[2].face = FaceId(1000); }},
       {"a vertex is out of range", [](EdgeMesh& m) { m.edges[2].vertices[1] = VertexId(1000); }},
       {"face 3: a plane's normal is not a unit vector", [](EdgeMesh& m) { m.planes[3].n.x += 1; }},
       {"face 3: a plane without a normal has an offset", [](EdgeMesh& m) { m.planes[3].n = {}; }},

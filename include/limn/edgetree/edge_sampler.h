@@ -62,9 +62,8 @@ struct EdgeSamplerInput {
 
 // Whether the query's own face is among those around the edge.
 inline bool is_own_edge(const EdgeSamplerInput& input, const EdgeQuery& query, EdgeRef id) {
-  if (id.object != query.face.shape) return false;
-  for (const FaceId face : input.object(id.object).faces_around(id.edge))
-    if (face == query.face.face) return true;
+  for (const FaceRef face : input.object(id.object).faces_around(id.edge))
+    if (face == query.face) return true;
   return false;
 }
 

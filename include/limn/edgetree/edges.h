@@ -33,9 +33,28 @@ struct Edge {
   // Welded vertices of the mesh; the first face runs from [0] to [1]. Where a face without area
   // met a long side, an edge may be a part of that side.
   std::array<VertexId, 2> vertices;
-  std::array<FaceId, 2> faces;  // two of its faces; [1] is none for a border
+  std::array<FaceId, 2> faces;  // two of its own mesh's faces around it; [1] is none if it has one
   EdgeClass edge_class = EdgeClass::kSmooth;
   bool concave = false;  // two faces, each in front of the other's plane
+  uint8_t rim = 0;       // the edge moves with those faces around it that have this number
+};
+
+// How a face lies around an edge.
+struct Incidence {
+  // The edge runs through the inside of the face, which therefore lies on both sides of it; else the
+  // edge is on the face's border.
+  bool through = false;
+  // Faces around one place that move alike share a number; where there are several, each has an edge
+  // of its own there.
+  uint8_t rim = 0;
+  bool operator==(const Incidence&) const = default;
+};
+
+// All faces of a scene that touch an edge along its whole length.
+struct FacesAround {
+  std::span<const FaceRef> faces;
+  std::span<const Incidence> incidences;  // of each; empty if all are as by default
+  Incidence incidence(size_t i) const { return incidences.empty() ? Incidence{} : incidences[i]; }
 };
 
 // n . x + offset is the signed distance of x, positive in front; n is zero for a face without area.
@@ -52,9 +71,12 @@ struct EdgeMesh {
   std::vector<Vec3<Lanes>> tangents;  // V; empty where nothing moves
   std::vector<Plane> planes;          // F, outward, double precision
   std::vector<Edge> edges;            // E
-  // The faces around edge e: incident_faces[face_offsets[e], face_offsets[e + 1]).
+  ShapeId shape;                      // whose faces `planes` are
+  // The faces around edge e: incident_faces[face_offsets[e], face_offsets[e + 1]), of any shape;
+  // those of `shape` come first.
   std::vector<uint32_t> face_offsets;  // E + 1
-  std::vector<FaceId> incident_faces;
+  std::vector<FaceRef> incident_faces;
+  std::vector<Incidence> incidences;  // of incident_faces; empty if all are as by default
   // The mesh is closed and its surfaces are black from behind: a point that sees only back faces
   // sees no jump at a sharp edge, and concave edges are never silhouettes from outside.
   // Holds if every connected part encloses positive volume (a part turned inside out, or the cavity
@@ -66,9 +88,14 @@ struct EdgeMesh {
   const Plane& plane(FaceId id) const { return planes[id.index()]; }
   const Vec3d& position(VertexId id) const { return positions[id.index()]; }
   const Vec3<Lanes>& tangent(VertexId id) const { return tangents[id.index()]; }
-  std::span<const FaceId> faces_around(EdgeId id) const {
+  std::span<const FaceRef> faces_around(EdgeId id) const {
     const uint32_t *begin = &face_offsets[id.index()], *end = begin + 1;
     return {incident_faces.data() + *begin, *end - *begin};
+  }
+  FacesAround around(EdgeId id) const {
+    const auto faces = faces_around(id);
+    if (incidences.empty()) return {faces, {}};
+    return {faces, {&incidences[face_offsets[id.index()]], faces.size()}};
   }
   uint64_t count(EdgeClass edge_class) const;
   // The first of the above that does not hold, in words; empty if all of it does.
@@ -82,11 +109,12 @@ struct EdgeRef {
   bool operator==(const EdgeRef&) const = default;
 };
 
-// mesh.weld must be filled. black_behind: the mesh's BSDF is black from behind. Faces without area
+// mesh.weld must be filled. black_behind: the mesh's BSDF is black from behind. shape: whose mesh it
+// is. Faces without area
 // stay in `planes` with a zero normal and have no edges: their neighbours' sides are split at the
 // corners that lie on them, so that the neighbours meet. Copies of a vertex that move differently
 // tear the surface: both rims are borders.
-EdgeMesh build_edge_mesh(const Mesh& mesh, bool black_behind);
+EdgeMesh build_edge_mesh(const Mesh& mesh, bool black_behind, ShapeId shape = ShapeId(0));
 
 // Bound of the rounding error of Plane::distance(p) for the planes of a mesh: within it of zero, p
 // counts as lying on either side.
