@@ -246,4 +246,33 @@ Vec3<Lanes> crossing_velocity(std::span<const Mesh* const> meshes, const Crossin
   return {component(0), component(1), component(2)};
 }
 
+EdgeMesh crossing_edges(std::span<const Mesh* const> meshes,
+                        std::span<const CrossingSegment> segments) {
+  EdgeMesh result;
+  const bool moves = std::any_of(meshes.begin(), meshes.end(),
+                                 [](const Mesh* mesh) { return !mesh->position_tangents.empty(); });
+  result.face_offsets.push_back(0);
+  for (const CrossingSegment& segment : segments) {
+    const auto first = static_cast<uint32_t>(result.positions.size());
+    Edge edge;
+    edge.edge_class = EdgeClass::kCrossing;
+    for (int i = 0; i < 2; ++i) {
+      const Vec3d& x = segment.ends[i];
+      const FaceRef face = segment.faces[i];
+      const Vec3d n = normalize(normal_of(*meshes[face.shape.index()], face.face));
+      edge.vertices[i] = VertexId(first + i);
+      edge.faces[i] = FaceId(first + i);
+      result.positions.push_back(x);
+      if (moves) result.tangents.push_back(crossing_velocity(meshes, segment, x));
+      result.planes.push_back({n, -dot(n, x)});
+      result.incident_faces.push_back(face);
+      result.incidences.push_back({.through = true});
+      result.extent = std::max(result.extent, length(x));
+    }
+    result.edges.push_back(edge);
+    result.face_offsets.push_back(static_cast<uint32_t>(result.incident_faces.size()));
+  }
+  return result;
+}
+
 }  // namespace limn

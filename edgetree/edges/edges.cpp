@@ -167,7 +167,7 @@ class Builder {
 }  // namespace
 
 const char* edge_class_name(EdgeClass edge_class) {
-  constexpr const char* kNames[] = {"smooth", "sharp", "border", "irregular", "flat"};
+  constexpr const char* kNames[] = {"smooth", "sharp", "border", "irregular", "flat", "crossing"};
   return kNames[static_cast<int>(edge_class)];
 }
 
@@ -188,7 +188,8 @@ double distance_error(const EdgeMesh& mesh, const Vec3d& p) {
 
 bool is_candidate(const EdgeMesh& mesh, EdgeId id, const Vec3d& p) {
   const Edge& edge = mesh.edge(id);
-  if (edge.edge_class == EdgeClass::kBorder || edge.edge_class == EdgeClass::kIrregular)
+  if (edge.edge_class == EdgeClass::kBorder || edge.edge_class == EdgeClass::kIrregular ||
+      edge.edge_class == EdgeClass::kCrossing)
     return true;
   if (edge.edge_class == EdgeClass::kSharp && !mesh.one_sided_closed) return true;
   if (edge.edge_class == EdgeClass::kSmooth && edge.concave && mesh.one_sided_closed) return false;

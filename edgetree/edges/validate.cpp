@@ -58,6 +58,19 @@ const char* fault_of_faces(const EdgeMesh& mesh, EdgeId id) {
   return nullptr;
 }
 
+// Of curves where faces cross: both lie on both sides of it, whichever shapes they are of.
+const char* fault_of_crossing(const EdgeMesh& mesh, EdgeId id) {
+  if (mesh.shape.valid()) return "a mesh has an edge where faces cross";
+  const FacesAround around = mesh.around(id);
+  if (around.faces.size() != 2) return "other than two faces cross";
+  for (size_t i = 0; i < 2; ++i) {
+    if (!around.faces[i].shape.valid()) return "a face that crosses is of no shape";
+    if (!around.incidence(i).through) return "a face that crosses ends there";
+    if (mesh.edge(id).faces[i].index() >= mesh.planes.size()) return "a plane is out of range";
+  }
+  return nullptr;
+}
+
 const char* fault_of_class(const EdgeMesh& mesh, EdgeId id) {
   const Edge& edge = mesh.edge(id);
   const size_t faces = mesh.faces_around(id).size();
@@ -78,6 +91,7 @@ const char* fault_of_edge(const EdgeMesh& mesh, EdgeId id) {
     return "edges are not sorted by their vertices";
   for (const VertexId vertex : edge.vertices)
     if (!(length(mesh.position(vertex)) <= mesh.extent)) return "an end lies beyond the extent";
+  if (edge.edge_class == EdgeClass::kCrossing) return fault_of_crossing(mesh, id);
   if (const char* fault = fault_of_faces(mesh, id)) return fault;
   return fault_of_class(mesh, id);
 }

@@ -72,6 +72,7 @@ class CameraTerm final : public Term {
 
  private:
   void add_object(ShapeId object);
+  bool is_hidden(const EdgeMesh& mesh, EdgeId edge) const;
   bool clip_and_project(EdgeRef id, FilmEdge& edge) const;
   void weigh(int lanes);
 
@@ -83,16 +84,27 @@ class CameraTerm final : public Term {
 };
 
 void CameraTerm::add_object(ShapeId object) {
-  if (context_.scene.hide_emitters && context_.scene.shape(object).is_emitter) return;
   const EdgeMesh& mesh = input_.object(object);
   const Vec3d pinhole = value(context_.scene.camera.origin);
   for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
     const EdgeRef id{object, EdgeId(e)};
     FilmEdge edge;
+    if (is_hidden(mesh, id.edge)) continue;
     if (!is_candidate(mesh, id.edge, pinhole) || !clip_and_project(id, edge)) continue;
     if (is_zero(edge.speed0) && is_zero(edge.speed1)) continue;
     edges_.push_back(edge);
   }
+}
+
+// No ray of the camera meets a hidden emitter: none of its edges is seen, and nothing jumps where it
+// passes through another surface.
+bool CameraTerm::is_hidden(const EdgeMesh& mesh, EdgeId edge) const {
+  const Scene& scene = context_.scene;
+  if (!scene.hide_emitters) return false;
+  if (mesh.shape.valid()) return scene.shape(mesh.shape).is_emitter;
+  const auto crossing = mesh.faces_around(edge);
+  return std::any_of(crossing.begin(), crossing.end(),
+                     [&](FaceRef face) { return scene.shape(face.shape).is_emitter; });
 }
 
 bool CameraTerm::clip_and_project(EdgeRef id, FilmEdge& edge) const {

@@ -4,16 +4,21 @@
 #include <algorithm>
 
 #include "limn/core/lights.h"
+#include "limn/edgetree/crossing_curves.h"
 
 namespace limn {
 
-EdgeSamplerInput make_sampler_input(const Scene& scene) {
+EdgeSamplerInput make_sampler_input(const Scene& scene, int threads) {
   EdgeSamplerInput input;
+  std::vector<const Mesh*> meshes;
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     const Shape& shape = scene.shapes[s];
     const bool black_behind = shape.bsdf->side(false) == nullptr;
     input.objects.push_back(build_edge_mesh(shape.mesh, black_behind, ShapeId(s)));
+    meshes.push_back(&shape.mesh);
   }
+  const std::vector<CrossingSegment> crossings = find_crossings(meshes, threads);
+  if (!crossings.empty()) input.objects.push_back(crossing_edges(meshes, crossings));
   const Lights lights(scene);
   for (const Light* light : lights.all()) light->add_triangles(input.lights);
   if (!scene.environment) return input;

@@ -48,7 +48,8 @@ struct EdgeSample {
 
 // What samplers are built from. It must outlive them.
 struct EdgeSamplerInput {
-  std::vector<EdgeMesh> objects;  // of the scene's shapes, in their order
+  // Of the scene's shapes, in their order; then the curves where they cross, if any.
+  std::vector<EdgeMesh> objects;
   std::vector<LightTriangle> lights = {};
   double environment_luminance = 0;  // mean over the sphere
   // How it is spread over directions; null if it is uniform or absent.

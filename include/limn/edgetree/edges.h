@@ -25,6 +25,9 @@ enum class EdgeClass : uint8_t {
   // Two coplanar faces (exactly, or to rounding) with equal shading normals: never a jump but on
   // their common plane.
   kFlat,
+  // Two faces of any shapes that pass through each other along it, see crossing_curves.h: treated as
+  // a jump for every point.
+  kCrossing,
 };
 
 const char* edge_class_name(EdgeClass edge_class);
@@ -71,7 +74,7 @@ struct EdgeMesh {
   std::vector<Vec3<Lanes>> tangents;  // V; empty where nothing moves
   std::vector<Plane> planes;          // F, outward, double precision
   std::vector<Edge> edges;            // E
-  ShapeId shape;                      // whose faces `planes` are
+  ShapeId shape;                      // whose faces `planes` are; none for crossing curves
   // The faces around edge e: incident_faces[face_offsets[e], face_offsets[e + 1]), of any shape;
   // those of `shape` come first.
   std::vector<uint32_t> face_offsets;  // E + 1
@@ -125,7 +128,7 @@ double distance_error(const EdgeMesh& mesh, const Vec3d& p);
 // planes (a distance of zero, to rounding, counts as either side, so that an edge is rather listed
 // than lost); never, if concave and one_sided_closed: the mesh itself hides such an edge from every
 // point that lies between its planes. Sharp: p is in front of at least one face, or the mesh is not
-// one_sided_closed. Border, irregular: always. Flat: as smooth.
+// one_sided_closed. Border, irregular, crossing: always. Flat: as smooth.
 bool is_candidate(const EdgeMesh& mesh, EdgeId edge, const Vec3d& p);
 
 }  // namespace limn
