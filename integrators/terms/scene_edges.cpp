@@ -2,18 +2,38 @@
 #include "integrators/terms/scene_edges.h"
 
 #include <algorithm>
+#include <map>
 
 #include "limn/core/lights.h"
+#include "limn/edgetree/touching.h"
 
 namespace limn {
 
-EdgeSamplerInput make_sampler_input(const Scene& scene) {
+namespace {
+
+// Shapes look alike if they share a BSDF; every emitter looks like itself alone.
+std::vector<TouchingShape> touching_shapes(const Scene& scene) {
+  std::vector<TouchingShape> shapes;
+  std::map<const Bsdf*, uint32_t> first_of_bsdf;
+  for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+    const Shape& shape = scene.shapes[s];
+    const uint32_t look =
+        shape.is_emitter ? s : first_of_bsdf.emplace(shape.bsdf.get(), s).first->second;
+    shapes.push_back({&shape.mesh, look});
+  }
+  return shapes;
+}
+
+}  // namespace
+
+EdgeSamplerInput make_sampler_input(const Scene& scene, int threads) {
   EdgeSamplerInput input;
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     const Shape& shape = scene.shapes[s];
     const bool black_behind = shape.bsdf->side(false) == nullptr;
     input.objects.push_back(build_edge_mesh(shape.mesh, black_behind, ShapeId(s)));
   }
+  unite_touching_edges(touching_shapes(scene), threads, input.objects);
   const Lights lights(scene);
   for (const Light* light : lights.all()) light->add_triangles(input.lights);
   if (!scene.environment) return input;

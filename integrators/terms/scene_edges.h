@@ -5,7 +5,7 @@
 
 namespace limn {
 
-// Edges of all shapes (object i is shape i), light polygons and the environment's mean.
-EdgeSamplerInput make_sampler_input(const Scene& scene);
+// Edges of all shapes (object i is shape i), united where they touch, light polygons and the environment's mean.
+EdgeSamplerInput make_sampler_input(const Scene& scene, int threads);
 
 }  // namespace limn
