@@ -6,7 +6,9 @@
 #include <optional>
 #include <tuple>
 
-#include "edgetree/edges/overlap_tree.h"
+#include "edgetree/edges/box_tree.h"
+#include "edgetree/edges/contacts.h"
+#include "edgetree/edges/fold.h"
 #include "limn/core/parallel.h"
 
 namespace limn {
@@ -16,6 +18,14 @@ struct Triangle {
   std::array<Vec3f, 3> corners;
   FaceRef face;
 };
+
+// The largest coordinate.
+double size_of(const Triangle& triangle) {
+  double size = 0;
+  for (const Vec3f& x : triangle.corners)
+    for (int k = 0; k < 3; ++k) size = std::max(size, std::fabs(double{x[k]}));
+  return size;
+}
 
 FloatBox box_of(const Triangle& triangle) {
   const auto& [a, b, c] = triangle.corners;
@@ -36,26 +46,23 @@ class HeightOver {
       : a_(cast<double>(triangle.corners[0])),
         b_(cast<double>(triangle.corners[1])),
         c_(cast<double>(triangle.corners[2])),
-        normal_(cross(b_ - a_, c_ - a_)) {}
+        normal_(cross(b_ - a_, c_ - a_)),
+        triangle_(triangle) {}
 
   const Vec3d& normal() const { return normal_; }
   double of(const Vec3d& x) const { return dot(normal_, x - a_); }
 
-  // How much of it rounding can explain. A position is taken to have been rounded to float twice
-  // (in the file, and after it was moved): it is off by at most 2 * 2^-24 |x|, which changes the
-  // volume by at most the gradient's length times that. In double precision, eight roundings of the
-  // volume's terms.
-  double rounding(const Vec3d& x) const {
-    const Vec3d ab = b_ - a_, ac = c_ - a_, ax = x - a_;
-    const Vec3d by_b = cross(ac, ax), by_c = cross(ax, ab);
-    const double positions = length(normal_ + by_b + by_c) * length(a_) +
-                             length(by_b) * length(b_) + length(by_c) * length(c_) +
-                             length(normal_) * length(x);
-    return 0x1p-23 * positions + 8 * 0x1p-53 * length(ab) * length(ac) * length(ax);
+  // How much of it rounding can explain: of the three corners and x, wherever x is over the plane
+  // (the gradient's length times 2 * 2^-24 |x|, as in fold_of); no less than lets edges lie on a face
+  // (contacts.h), so that what touches does not cross. size: of x's triangle.
+  double rounding(const Vec3d& x, double size) const {
+    const double positions = fold_of(a_, b_, c_, x).rounding;
+    return std::max(positions, touch_tolerance(size_of(triangle_), size) * length(normal_));
   }
 
  private:
   Vec3d a_, b_, c_, normal_;
+  const Triangle& triangle_;
 };
 
 // On which side of a plane the corners of a triangle lie: heights, 0 where rounding can explain
@@ -72,8 +79,9 @@ Sides sides_of(const Triangle& triangle, const HeightOver& plane) {
   Sides sides;
   for (int k = 0; k < 3; ++k) sides.heights[k] = plane.of(cast<double>(triangle.corners[k]));
   if (!sides.both()) return sides;
+  const double size = size_of(triangle);
   for (int k = 0; k < 3; ++k) {
-    const double rounding = plane.rounding(cast<double>(triangle.corners[k]));
+    const double rounding = plane.rounding(cast<double>(triangle.corners[k]), size);
     if (std::fabs(sides.heights[k]) <= rounding) sides.heights[k] = 0;
   }
   return sides;
@@ -124,9 +132,10 @@ Interval interval_of(const Triangle& triangle, const Sides& sides, const Vec3d& 
 }
 
 std::optional<CrossingSegment> cross_faces(const Triangle& first, const Triangle& second) {
-  const HeightOver over_first(first), over_second(second);
+  const HeightOver over_first(first);
   const Sides of_second = sides_of(second, over_first);
   if (!of_second.both()) return std::nullopt;
+  const HeightOver over_second(second);
   const Sides of_first = sides_of(first, over_second);
   if (!of_first.both()) return std::nullopt;
   const Vec3d along = cross(over_first.normal(), over_second.normal());
@@ -164,15 +173,52 @@ std::vector<Triangle> triangles_of(std::span<const Mesh* const> meshes) {
   return triangles;
 }
 
-std::vector<Triangle> permuted(const std::vector<Triangle>& triangles,
-                               const std::vector<uint32_t>& order) {
-  std::vector<Triangle> result;
-  result.reserve(order.size());
-  for (const uint32_t i : order) result.push_back(triangles[i]);
-  return result;
-}
-
 auto key(FaceRef face) { return std::pair(face.shape, face.face); }
+
+// All triangles of the scene, and pairs of them whose boxes overlap.
+class Search {
+ public:
+  Search(std::vector<Triangle> triangles, int threads)
+      : triangles_(std::move(triangles)), boxes_(boxes_of(triangles_)), tree_(boxes_, threads) {}
+
+  uint32_t leaf_count() const { return tree_.leaf_count(); }
+
+  // Of pairs within the leaf, and with triangles of later ones.
+  void append_pairs_of(uint32_t leaf, std::vector<CrossingSegment>& segments) const {
+    std::vector<uint32_t> others;
+    tree_.find_leaves(tree_.leaf_box(leaf), others);
+    const auto own = tree_.leaf(leaf);
+    for (const uint32_t other : others) {
+      if (other < leaf) continue;
+      for (size_t i = 0; i < own.size(); ++i) {
+        const FloatBox& box = boxes_[own[i]];
+        if (!box.overlaps(tree_.leaf_box(other))) continue;
+        for (const uint32_t j : tree_.leaf(other).subspan(other == leaf ? i + 1 : 0))
+          if (box.overlaps(boxes_[j])) append_pair(own[i], j, segments);
+      }
+    }
+  }
+
+ private:
+  static std::vector<FloatBox> boxes_of(const std::vector<Triangle>& triangles) {
+    std::vector<FloatBox> boxes;
+    boxes.reserve(triangles.size());
+    for (const Triangle& triangle : triangles) boxes.push_back(box_of(triangle));
+    return boxes;
+  }
+
+  void append_pair(uint32_t i, uint32_t j, std::vector<CrossingSegment>& segments) const {
+    // In the order of the shapes' faces, whatever the tree's.
+    const Triangle &a = triangles_[std::min(i, j)], &b = triangles_[std::max(i, j)];
+    // Neighbours along an edge meet there and nowhere else, or in a plane.
+    if (common_corners(a, b) > 1) return;
+    if (const auto segment = cross_faces(a, b)) segments.push_back(*segment);
+  }
+
+  std::vector<Triangle> triangles_;
+  std::vector<FloatBox> boxes_;
+  BoxTree tree_;
+};
 
 Vec3<Lanes> velocity_on(const Mesh& mesh, FaceId id, const Vec3d& normal, const Vec3d& x) {
   if (mesh.position_tangents.empty()) return {};
@@ -197,26 +243,16 @@ Vec3d normal_of(const Mesh& mesh, FaceId id) {
 }  // namespace
 
 std::vector<CrossingSegment> find_crossings(std::span<const Mesh* const> meshes, int threads) {
-  std::vector<Triangle> triangles = triangles_of(meshes);
-  std::vector<FloatBox> boxes;
-  boxes.reserve(triangles.size());
-  for (const Triangle& triangle : triangles) boxes.push_back(box_of(triangle));
-  const OverlapTree tree(boxes, threads);
-  std::vector<FloatBox>().swap(boxes);
-  triangles = permuted(triangles, tree.order());
-  std::vector<std::vector<CrossingSegment>> parts(tree.parts());
-  parallel_for(parts.size(), threads, [&](size_t part) {
-    tree.visit_pairs(part, [&](uint32_t i, uint32_t j) {
-      // The pair in one order, whatever the tree's.
-      const bool swapped = key(triangles[j].face) < key(triangles[i].face);
-      const Triangle &a = triangles[swapped ? j : i], &b = triangles[swapped ? i : j];
-      // Neighbours along an edge meet there and nowhere else, or in a plane.
-      if (common_corners(a, b) > 1) return;
-      if (const auto segment = cross_faces(a, b)) parts[part].push_back(*segment);
-    });
+  const Search search(triangles_of(meshes), threads);
+  constexpr uint32_t kBlock = 64;  // leaves; not tuned
+  std::vector<std::vector<CrossingSegment>> blocks((search.leaf_count() + kBlock - 1) / kBlock);
+  parallel_for(blocks.size(), threads, [&](size_t block) {
+    const auto begin = static_cast<uint32_t>(block * kBlock);
+    for (uint32_t leaf = begin; leaf < std::min(begin + kBlock, search.leaf_count()); ++leaf)
+      search.append_pairs_of(leaf, blocks[block]);
   });
   std::vector<CrossingSegment> segments;
-  for (const auto& part : parts) segments.insert(segments.end(), part.begin(), part.end());
+  for (const auto& block : blocks) segments.insert(segments.end(), block.begin(), block.end());
   std::sort(segments.begin(), segments.end(),
             [](const CrossingSegment& a, const CrossingSegment& b) {
               return std::pair(key(a.faces[0]), key(a.faces[1])) <
@@ -266,7 +302,7 @@ EdgeMesh crossing_edges(std::span<const Mesh* const> meshes,
       if (moves) result.tangents.push_back(crossing_velocity(meshes, segment, x));
       result.planes.push_back({n, -dot(n, x)});
       result.incident_faces.push_back(face);
-      result.incidences.push_back({.through = true});
+      result.incidences.push_back({.through = true, .rim = kNoRim});
       result.extent = std::max(result.extent, length(x));
     }
     result.edges.push_back(edge);

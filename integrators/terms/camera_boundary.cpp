@@ -72,7 +72,14 @@ class CameraTerm final : public Term {
 
  private:
   void add_object(ShapeId object);
-  bool is_hidden(const EdgeMesh& mesh, EdgeId edge) const;
+  // Whether all faces around the edge are emitters that the camera does not see.
+  bool is_hidden(const EdgeMesh& mesh, EdgeId edge) const {
+    if (!context_.scene.hide_emitters) return false;
+    const auto faces = mesh.faces_around(edge);
+    return std::all_of(faces.begin(), faces.end(), [&](const FaceRef face) {
+      return context_.scene.shape(face.shape).is_emitter;
+    });
+  }
   bool clip_and_project(EdgeRef id, FilmEdge& edge) const;
   void weigh(int lanes);
 
@@ -89,22 +96,11 @@ void CameraTerm::add_object(ShapeId object) {
   for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
     const EdgeRef id{object, EdgeId(e)};
     FilmEdge edge;
-    if (is_hidden(mesh, id.edge)) continue;
-    if (!is_candidate(mesh, id.edge, pinhole) || !clip_and_project(id, edge)) continue;
+    if (!is_candidate(mesh, id.edge, pinhole) || is_hidden(mesh, id.edge)) continue;
+    if (!clip_and_project(id, edge)) continue;
     if (is_zero(edge.speed0) && is_zero(edge.speed1)) continue;
     edges_.push_back(edge);
   }
-}
-
-// No ray of the camera meets a hidden emitter: none of its edges is seen, and nothing jumps where it
-// passes through another surface.
-bool CameraTerm::is_hidden(const EdgeMesh& mesh, EdgeId edge) const {
-  const Scene& scene = context_.scene;
-  if (!scene.hide_emitters) return false;
-  if (mesh.shape.valid()) return scene.shape(mesh.shape).is_emitter;
-  const auto crossing = mesh.faces_around(edge);
-  return std::any_of(crossing.begin(), crossing.end(),
-                     [&](FaceRef face) { return scene.shape(face.shape).is_emitter; });
 }
 
 bool CameraTerm::clip_and_project(EdgeRef id, FilmEdge& edge) const {

@@ -28,20 +28,34 @@ struct Sides {
 // In the plane across the edge, a face leaves the edge along the unit vector a = alpha m + beta w,
 // with m the normal of the viewing plane through the edge and w the part of omega across the edge:
 // it lies on the side of alpha's sign, and the smaller beta / |alpha|, the nearer it is.
-Sides nearest_faces(const Scene& scene, const FacesAround& around, const EdgeView& view) {
-  Sides sides;
-  double slopes[2] = {0, 0};
+Sides nearest_faces(const Scene& scene, const EdgeMesh& mesh, const EdgeView& view,
+                    bool hide_emitters) {
   const Vec3d along = normalize(view.x1 - view.x0);
   const Vec3d across = view.omega - along * dot(view.omega, along);
-  for_every_side(scene, around, view.x0, along, [&](const FaceSide& side, Incidence) {
-    const double alpha = dot(side.into, view.side);
-    if (alpha == 0) return;
-    const double slope = dot(side.into, across) / std::fabs(alpha);
-    auto& nearest = alpha > 0 ? sides.positive : sides.negative;
-    double& best = slopes[alpha > 0];
-    if (!nearest || slope < best) {
+  const FacesAround around = mesh.around(view.id.edge);
+  const auto for_every_seen_side = [&](const auto& visit) {
+    for_every_side(scene, around, view.x0, along, [&](const FaceSide& side, Incidence incidence) {
+      const double alpha = dot(side.into, view.side);
+      if (alpha == 0 || (hide_emitters && scene.shape(side.face.shape).is_emitter)) return;
+      visit(side, incidence.rim, alpha > 0, dot(side.into, across) / std::fabs(alpha));
+    });
+  };
+  RimOrder order;
+  if (!around.incidences.empty()) {
+    for_every_seen_side([&](const FaceSide&, uint8_t rim, bool positive, double slope) {
+      order.add(rim, positive, slope);
+    });
+  }
+  Sides sides;
+  double slopes[2] = {0, 0};
+  const uint8_t own = mesh.edge(view.id.edge).rim;
+  for_every_seen_side([&](const FaceSide& side, uint8_t rim, bool positive, double slope) {
+    for (const bool place : {false, true}) {
+      if (!order.is_seen(rim, positive, own, place)) continue;
+      auto& nearest = place ? sides.positive : sides.negative;
+      if (nearest && slope >= slopes[place]) continue;
       nearest = side;
-      best = slope;
+      slopes[place] = slope;
     }
   });
   return sides;
@@ -80,7 +94,7 @@ bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView&
     return path.from_surface(surface_on_ray(context.scene, behind.face, view.p, view.omega),
                              -view.omega, bounces, side_key, nullptr);
   };
-  const Sides sides = nearest_faces(context.scene, around, view);
+  const Sides sides = nearest_faces(context.scene, mesh, view, ray.skip_emitters);
   jump = radiance(sides.negative) - radiance(sides.positive);
   return true;
 }

@@ -1,6 +1,8 @@
 // What happens at an edge that a path starts on: decided in the plane across it.
 #include "integrators/terms/path.h"
 
+#include <tuple>
+
 namespace limn {
 
 Vec3d direction_into_face(const Mesh& mesh, FaceId face, const Vec3d& x0, const Vec3d& along) {
@@ -16,6 +18,23 @@ Vec3d direction_into_face(const Mesh& mesh, FaceId face, const Vec3d& x0, const 
     }
   }
   return best;
+}
+
+void RimOrder::add(uint8_t rim, bool positive, double slope) {
+  if (rim == kNoRim) return;
+  Rim& r = rims_[rim];
+  r.slope[positive] = r.has[positive] ? std::min(r.slope[positive], slope) : slope;
+  r.has[positive] = true;
+}
+
+bool RimOrder::comes_before(uint8_t a, uint8_t b) const {
+  const auto place = [&](uint8_t rim) {
+    const Rim& r = rims_[rim];
+    const int group = r.has[0] == r.has[1] ? 1 : r.has[0] ? 0 : 2;
+    const double within = group == 0 ? -r.slope[0] : group == 2 ? r.slope[1] : 0;
+    return std::tuple(group, within, rim);
+  };
+  return place(a) < place(b);
 }
 
 // In the plane across the edge a face is a ray {s g, s >= 0} and the path starts at a point f of

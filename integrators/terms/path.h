@@ -3,6 +3,7 @@
 // interior term of its derivative. Sampled directions, their densities and MIS weights are
 // constants while the parameters move (solid-angle measure, everywhere), but for the one direction
 // of a light without extent, which follows the parameters.
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <optional>
@@ -56,6 +57,32 @@ void for_every_side(const Scene& scene, const FacesAround& around, const Vec3d& 
     if (incidence.through) visit(FaceSide{face, -into}, incidence);
   }
 }
+
+// In which order the rims in one place part as their faces move, seen across them from the negative
+// side to the positive one: those of faces on the negative side alone come first, the rear ones
+// before those that hide them; those of faces on the positive side alone last, the front ones first.
+// So surfaces leave gaps and do not pass through each other.
+class RimOrder {
+ public:
+  // A face lies on this side; smaller slopes are nearer.
+  void add(uint8_t rim, bool positive, double slope);
+  // Whether a face is seen just beside the rim `own`, on its positive side or the other: one of the
+  // same rim on its own side only, one of a rim that comes later (or has come before) on both, if it
+  // lies on the negative (or the positive) side.
+  bool is_seen(uint8_t rim, bool positive, uint8_t own, bool on_positive_side) const {
+    if (rim == own || rim == kNoRim) return positive == on_positive_side;
+    return positive == comes_before(rim, own);
+  }
+
+ private:
+  bool comes_before(uint8_t a, uint8_t b) const;
+
+  struct Rim {
+    bool has[2] = {false, false};  // faces on the negative and on the positive side
+    double slope[2];               // of the nearest
+  };
+  std::array<Rim, kMostRims> rims_;
+};
 
 // The side that a ray meets at once when it leaves edge.start infinitely close to the edge, if any.
 std::optional<FaceSide> blocked_at_edge(const Scene& scene, const EdgeStart& edge,

@@ -55,20 +55,36 @@ double lit_side(const Scene& scene, const EdgeMesh& edges, EdgeId edge, const Li
   const Vec3d w = light.through(x0);
   const Vec3d n = cross(w, along);
   const double scale = 8 * 0x1p-53 * length(w) * length(along);
-  bool blocked[2] = {false, false};
   const FacesAround around = edges.around(edge);
-  for (size_t i = 0; i < around.faces.size(); ++i) {
-    const FaceRef face = around.faces[i];
-    double side = 0;
-    for (const Vec3d& corner : face_corners<double>(scene.shape(face.shape).mesh, face.face)) {
-      const Vec3d a = corner - x0;
-      const double d = dot(a, n);
-      if (std::fabs(d) > scale * length(a) && std::fabs(d) > std::fabs(side)) side = d;
+  const uint8_t own = edges.edge(edge).rim;
+  bool blocked[2] = {false, false};
+  const auto for_every_face = [&](const auto& visit) {
+    for (size_t i = 0; i < around.faces.size(); ++i) {
+      const FaceRef face = around.faces[i];
+      double side = 0;
+      for (const Vec3d& corner : face_corners<double>(scene.shape(face.shape).mesh, face.face)) {
+        const Vec3d a = corner - x0;
+        const double d = dot(a, n);
+        if (std::fabs(d) > scale * length(a) && std::fabs(d) > std::fabs(side)) side = d;
+      }
+      if (side == 0) continue;
+      visit(face, around.incidence(i), side > 0);
     }
-    if (side == 0) continue;
-    if (around.incidence(i).through) return 0;
-    blocked[side > 0] = true;
+  };
+  RimOrder order;
+  if (!around.incidences.empty()) {
+    for_every_face([&](FaceRef face, Incidence incidence, bool positive) {
+      const Vec3d into =
+          direction_into_face(scene.shape(face.shape).mesh, face.face, x0, normalize(along));
+      order.add(incidence.rim, positive, dot(into, w) / std::fabs(dot(into, n)));
+    });
   }
+  for_every_face([&](FaceRef, Incidence incidence, bool positive) {
+    for (const bool place : {false, true}) {
+      if (incidence.through || order.is_seen(incidence.rim, positive, own, place))
+        blocked[place] = true;
+    }
+  });
   return blocked[0] == blocked[1] ? 0 : blocked[0] ? 1 : -1;
 }
 

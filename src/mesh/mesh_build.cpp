@@ -133,6 +133,7 @@ Mesh build_mesh(const RawMesh& raw, const MeshOptions& options,
          std::to_string(mesh.collapsed_faces) + " of " + std::to_string(raw.faces.size()) +
              " faces have two corners at the same position and are left out");
   }
+  weld_seams(mesh);
   if (mesh.normal_source == NormalSource::kGiven) {
     set_given_normals(mesh, raw, options, warnings);
     check_orientation(mesh, raw.where, warnings);

@@ -20,7 +20,8 @@ enum class EdgeClass : uint8_t {
   kSharp,
   // One face: a jump for every point.
   kBorder,
-  // More than two faces, or two that wind the same way: treated as a jump for every point.
+  // More than two faces, two that wind the same way, or faces of several edges that were united
+  // (touching.h): treated as a jump for every point.
   kIrregular,
   // Two coplanar faces (exactly, or to rounding) with equal shading normals: never a jump but on
   // their common plane.
@@ -42,13 +43,19 @@ struct Edge {
   uint8_t rim = 0;       // the edge moves with those faces around it that have this number
 };
 
+// No border of what moves: the surface goes on across the edge.
+inline constexpr uint8_t kNoRim = 255;
+// As many numbers of rims there are at most in one place; the last stands for all further ones.
+inline constexpr uint8_t kMostRims = 8;
+
 // How a face lies around an edge.
 struct Incidence {
   // The edge runs through the inside of the face, which therefore lies on both sides of it; else the
   // edge is on the face's border.
   bool through = false;
-  // Faces around one place that move alike share a number; where there are several, each has an edge
-  // of its own there.
+  // Faces whose common border moves as one share a number; where there are several numbers, each has
+  // an edge of its own in this place. kNoRim: a face that the edge runs through, or that another one
+  // continues in its plane, which looks and moves alike.
   uint8_t rim = 0;
   bool operator==(const Incidence&) const = default;
 };
@@ -82,6 +89,7 @@ struct EdgeMesh {
   std::vector<Incidence> incidences;  // of incident_faces; empty if all are as by default
   // The mesh is closed and its surfaces are black from behind: a point that sees only back faces
   // sees no jump at a sharp edge, and concave edges are never silhouettes from outside.
+  // United edges are irregular and stand outside of this rule.
   // Holds if every connected part encloses positive volume (a part turned inside out, or the cavity
   // of a hollow body, makes it false); parts that cross themselves are beyond this test.
   bool one_sided_closed = false;
