@@ -29,6 +29,7 @@ class BoundaryTerm final : public Term {
     query.wi = value(vertex.scattering.wi());
     query.lobe = vertex.scattering.bsdf().lobe();
     query.velocity = velocity(vertex.surface.p);
+    query.turn = vertex.turn;
     query.face = vertex.surface.face;
     for (int i = 0; i < samples; ++i) {
       add_sample(vertex, query, vertex.key.copy(Purpose::kEdgeCopy, i), cost, sum);

@@ -17,13 +17,14 @@ inline bool has_delta_lights(const Scene& scene) { return !scene.delta_lights.em
 inline constexpr double kLeastFilmSamples = 0.125;  // not tuned
 
 inline constexpr TermType kTermTypes[] = {
-    {"interior", "what slides within continuous regions", 1, true, false, 0, always,
+    {"interior", "what slides within continuous regions", 1, true, false, true, 0, always,
      make_interior_term},
-    {"camera", "silhouettes on the film", kLeastFilmSamples, false, true, 0, always,
+    {"camera", "silhouettes on the film", kLeastFilmSamples, false, true, false, 0, always,
      make_camera_term},
-    {"boundary", "silhouettes that shading points see", 1, false, true, 0, always,
+    {"boundary", "silhouettes that shading points see", 1, false, true, true, 0, always,
      make_boundary_term},
-    {"shadow", "edges of sharp shadows", 1, false, true, 1, has_delta_lights, make_shadow_term},
+    {"shadow", "edges of sharp shadows", 1, false, true, true, 1, has_delta_lights,
+     make_shadow_term},
 };
 
 }  // namespace limn

@@ -24,7 +24,8 @@ enum class Purpose : uint64_t {
   kEdgeCopy,
   kFilmCopy,
   kShadow,
-  kShadowCopy
+  kShadowCopy,
+  kLightCopy
 };
 
 // SplitMix64 started from a hash of (seed, pixel, sample): a stream for one path. `at` derives the
