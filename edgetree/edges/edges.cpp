@@ -187,4 +187,14 @@ bool is_candidate(const EdgeMesh& mesh, EdgeId id, const Vec3d& p) {
   return (front0 && back1) || (back0 && front1);
 }
 
+bool is_outline(const EdgeMesh& mesh, EdgeId id, const Vec3d& p) {
+  const Edge& edge = mesh.edge(id);
+  if (edge.edge_class != EdgeClass::kSharp) return is_candidate(mesh, id, p);
+  if (edge.concave && mesh.one_sided_closed) return false;
+  const double error = distance_error(mesh, p);
+  const double d0 = mesh.plane(edge.faces[0]).distance(p);
+  const double d1 = mesh.plane(edge.faces[1]).distance(p);
+  return std::fmin(d0, d1) <= error && std::fmax(d0, d1) >= -error;
+}
+
 }  // namespace limn

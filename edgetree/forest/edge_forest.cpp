@@ -259,6 +259,59 @@ uint64_t EdgeForest::list_silhouettes(const Vec3d& p, std::vector<EdgeRef>& edge
   return tested;
 }
 
+// Brings a node's lines into the cache while others are looked at.
+static void prefetch(const Forest& forest, NodeId id) {
+  constexpr size_t kLine = 64;
+  const auto fetch = [](const void* node, size_t size) {
+    for (size_t i = 0; i < size; i += kLine) {
+      __builtin_prefetch(static_cast<const char*>(node) + i);
+    }
+  };
+  if (id < 0) {
+    fetch(&forest.edges[~id], sizeof(EdgeNode));
+  } else {
+    fetch(&forest.inner[id], sizeof(InnerNode));
+  }
+}
+
+bool EdgeForest::list_outlines(const EdgeQuery& query, const DirectionCone& directions,
+                               std::vector<ListedEdge>& edges) const {
+  const Forest& forest = impl_->forest;
+  const EdgeSamplerInput& input = impl_->input;
+  const ForestCone cone(forest, query, directions, input.lane_scale);
+  static thread_local std::vector<NodeId> stack;
+  stack.assign(forest.roots.rbegin(), forest.roots.rend());
+  while (!stack.empty()) {
+    const NodeId id = stack.back();
+    stack.pop_back();
+    if (id >= 0) {
+      const InnerNode& node = forest.inner[id];
+      for (uint32_t lanes = bits(may_hold_outlines(node, cone)); lanes != 0; lanes &= lanes - 1) {
+        stack.push_back(node.child[std::countr_zero(lanes)]);
+        prefetch(forest, stack.back());
+      }
+      continue;
+    }
+    const EdgeNode& node = forest.edges[~id];
+    // Concave smooth edges are in the forest only where they can be outlines, or for comparison.
+    const bool smooth = impl_->config.cull_concave && node.head.group == ForestGroup::kSilhouette;
+    for (uint32_t lanes = bits(may_hold_outlines(node, cone)); lanes != 0; lanes &= lanes - 1) {
+      const int lane = std::countr_zero(lanes);
+      const EdgeRef edge = node.edge_at(lane);
+      if (!(smooth && surely_candidate(node, lane, cone.point)) &&
+          !is_outline(input.object(edge.object), edge.edge, query.p)) {
+        continue;
+      }
+      if (is_own_edge(input, query, edge)) continue;
+      const auto end = [&](int e) {
+        return Vec3d{node.ends[e][0][lane], node.ends[e][1][lane], node.ends[e][2][lane]};
+      };
+      edges.push_back({edge, end(0), end(1)});
+    }
+  }
+  return true;
+}
+
 SamplerSize EdgeForest::size() const {
   const Forest& forest = impl_->forest;
   uint64_t bytes = forest.inner.size() * sizeof(InnerNode) +

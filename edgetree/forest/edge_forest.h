@@ -20,6 +20,8 @@ class EdgeForest final : public EdgeSampler {
   std::optional<EdgeSample> sample(const EdgeQuery& query, Rng& rng) const override;
   double probability(const EdgeQuery& query, EdgeRef edge) const override;
   double pdf_t(const EdgeQuery& query, EdgeRef edge, double t) const override;
+  bool list_outlines(const EdgeQuery& query, const DirectionCone& cone,
+                     std::vector<ListedEdge>& edges) const override;
   // A walk down the trees costs a handful of rays.
   double draw_cost() const override { return 5; }
   SamplerSize size() const override;

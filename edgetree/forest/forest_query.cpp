@@ -138,7 +138,8 @@ void boxes_of(const InnerNode& node, const FramePoint& at, Floats3& d, Floats3& 
 }
 
 // End e of the edges minus p, times the query's unit.
-Floats3 end_of(const EdgeNode& node, const ForestQuery& query, int e) {
+template <class Query>
+Floats3 end_of(const EdgeNode& node, const Query& query, int e) {
   const auto coordinate = [&](int k) {
     return (node.ends[e][k] * query.unit - query.p[0][k]) - query.p[1][k];
   };
@@ -189,23 +190,31 @@ ForestPoint point_of(const Forest& forest, const Vec3d& p) {
   return {p, distance_error(farthest, p), is_float};
 }
 
+static float unit_of(const Forest& forest, const Vec3d& p) {
+  const double size = forest.extent + std::fabs(p.x) + std::fabs(p.y) + std::fabs(p.z);
+  int exponent = 0;
+  std::frexp(size, &exponent);
+  return std::ldexp(1.0f, std::clamp(-exponent, -126, 126));
+}
+
+// unit * p as the sum of two floats per coordinate.
+static void split(const Vec3d& p, float unit, float (&parts)[2][3]) {
+  for (int k = 0; k < 3; ++k) {
+    const double x = p[k] * unit;
+    const double high = nearest_float(x);
+    parts[0][k] = static_cast<float>(high);
+    parts[1][k] = static_cast<float>(x - high);
+  }
+}
+
 ForestQuery::ForestQuery(const Forest& forest, const LightClusters* clusters,
                          const RadiancePyramid* pyramid, const EdgeQuery& query,
                          const Lanes& lane_scale)
     : point(point_of(forest, query.p)), lobe(query.lobe, query.n, query.wi), environment(pyramid) {
   if (clusters) lights.emplace(*clusters, query.p);
-  const double size =
-      forest.extent + std::fabs(query.p.x) + std::fabs(query.p.y) + std::fabs(query.p.z);
-  int exponent = 0;
-  std::frexp(size, &exponent);
-  unit = std::ldexp(1.0f, std::clamp(-exponent, -126, 126));
-  for (int k = 0; k < 3; ++k) {
-    const double x = query.p[k] * unit;
-    n[k] = static_cast<float>(query.n[k]);
-    const double high = nearest_float(x);
-    p[0][k] = static_cast<float>(high);
-    p[1][k] = static_cast<float>(x - high);
-  }
+  for (int k = 0; k < 3; ++k) n[k] = static_cast<float>(query.n[k]);
+  unit = unit_of(forest, query.p);
+  split(query.p, unit, p);
   speed = sum_of_speeds(query.velocity, lane_scale);
   turn = sum_of_speeds(query.turn, lane_scale);
 }
@@ -226,6 +235,67 @@ bool surely_candidate(const EdgeNode& node, int lane, const ForestPoint& point) 
   const DualSegment segment = dual_segment(node, at);
   // `half` was widened by the error once.
   return not_rejected(node.head.group, segment.middle, segment.half - 2 * at.error)[lane] != 0;
+}
+
+ForestCone::ForestCone(const Forest& forest, const EdgeQuery& query, const DirectionCone& cone,
+                       const Lanes& lane_scale)
+    : point(point_of(forest, query.p)),
+      at_rest(sum_of_speeds(query.velocity, lane_scale) == 0 &&
+              sum_of_speeds(query.turn, lane_scale) == 0),
+      slack(static_cast<float>(cone.slack)),
+      unit(unit_of(forest, query.p)) {
+  const auto add = [&](const Vec3d& plane) {
+    for (int k = 0; k < 3; ++k) planes[count][k] = static_cast<float>(plane[k]);
+    ++count;
+  };
+  add(query.n);
+  for (int i = 0; i < cone.count; ++i) add(cone.planes[i]);
+  split(query.p, unit, p);
+}
+
+// Boxes are wider than their edges by more than is rounded here, but for the product.
+Ints may_hold_outlines(const InnerNode& node, const ForestCone& cone) {
+  const FramePoint at = to_frame(node.head, cone.point);
+  Ints alive = node.child != kNoChild;
+  if (node.head.group != ForestGroup::kAlways) {
+    const DualPlane plane = dual_plane(node, at);
+    alive &= abs(plane.g[0]) <= plane.half;
+  }
+  if (cone.at_rest) alive &= node.speed > 0;
+  if (bits(alive) == 0) return alive;
+  Floats3 d, half;
+  boxes_of(node, at, d, half);
+  const Floats far = abs(d.x) + abs(d.y) + abs(d.z) + half.x + half.y + half.z;
+  const Floats slack = far * cone.slack + 16 * 0x1.0p-24f * at.size;
+  for (int i = 0; i < cone.count; ++i) {
+    const float* m = cone.planes[i];
+    const Floats height = (d.x * m[0] + d.y * m[1] + d.z * m[2]) + half.x * std::fabs(m[0]) +
+                          half.y * std::fabs(m[1]) + half.z * std::fabs(m[2]);
+    alive &= height >= -slack;
+  }
+  return alive;
+}
+
+Ints may_hold_outlines(const EdgeNode& node, const ForestCone& cone) {
+  Ints alive = node.edge != kNoChild;
+  if (node.head.group != ForestGroup::kAlways) {
+    const DualSegment segment = dual_segment(node, to_frame(node.head, cone.point));
+    alive &= abs(segment.middle) <= segment.half;
+  }
+  if (cone.at_rest) alive &= node.speed > 0;
+  if (cone.point.may_be_vertex) alive &= ~ends_at(node, cone.point.p);
+  if (bits(alive) == 0) return alive;
+  const Floats3 w_0 = end_of(node, cone, 0), w_1 = end_of(node, cone, 1);
+  const Floats far =
+      (abs(w_0.x) + abs(w_0.y) + abs(w_0.z)) + (abs(w_1.x) + abs(w_1.y) + abs(w_1.z));
+  const Floats slack = far * (cone.slack + 8 * 0x1.0p-24f);
+  for (int i = 0; i < cone.count; ++i) {
+    const float* m = cone.planes[i];
+    const Floats a = w_0.x * m[0] + w_0.y * m[1] + w_0.z * m[2];
+    const Floats b = w_1.x * m[0] + w_1.y * m[1] + w_1.z * m[2];
+    alive &= max(a, b) >= -slack;
+  }
+  return alive;
 }
 
 // Motion, light or length too little for a float still is some.

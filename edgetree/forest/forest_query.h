@@ -42,6 +42,22 @@ Ints may_hold_candidates(const EdgeNode& node, const ForestPoint& point);
 // Whether the edge in a lane is in E(p) beyond doubt: rounding could not make it seem so.
 bool surely_candidate(const EdgeNode& node, int lane, const ForestPoint& point);
 
+// What a list of outlines asks of every node.
+struct ForestCone {
+  ForestCone(const Forest& forest, const EdgeQuery& query, const DirectionCone& cone,
+             const Lanes& lane_scale);
+  ForestPoint point;
+  bool at_rest;                                     // p and the directions
+  int count = 0;                                    // of planes
+  float planes[DirectionCone::kMostPlanes + 1][3];  // those of the cone, and the horizon
+  float slack;                                      // as in DirectionCone
+  float unit, p[2][3];                              // as in ForestQuery
+};
+// Lanes of the children that may hold an outline inside the cone and in motion: never 0 where one
+// does.
+Ints may_hold_outlines(const InnerNode& node, const ForestCone& cone);
+Ints may_hold_outlines(const EdgeNode& node, const ForestCone& cone);
+
 // The weight of a child is length * rest. Both are not negative, and the product is 0 only where no
 // edge can contribute.
 struct ChildWeights {

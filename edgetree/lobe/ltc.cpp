@@ -111,6 +111,13 @@ double LtcLobe::value(const Vec3d& w) const {
   return (1 - kLtcFloor) * ltc(w) + kLtcFloor * height / kPi;
 }
 
+double LtcLobe::homogeneous_value(const Vec3d& w) const {
+  const double height = dot(n_, w);
+  if (height <= 0) return 0;
+  const double w2 = length_squared(w), cosine = height / (kPi * w2 * w2);
+  return diffuse_ ? cosine : (1 - kLtcFloor) * ltc(w) + kLtcFloor * cosine;
+}
+
 Floats LtcLobe::mean_over_boxes(Floats3 center, Floats3 half) const {
   // Lengths relative to one between the distance and the size of the box. The cosine's mean is then
   // about the mean height, from far away to a box around p.

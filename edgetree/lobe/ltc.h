@@ -21,6 +21,8 @@ class LtcLobe {
   // Densities [1/sr] for unit w; ltc integrates to 1 over the sphere, value to at most 1.
   double ltc(const Vec3d& w) const;
   double value(const Vec3d& w) const;
+  // value(w / |w|) / |w|^3 for w of any length but 0, without a root.
+  double homogeneous_value(const Vec3d& w) const;
 
   // Estimate of the mean of `value` over the directions of each box [1/sr], its center minus p and
   // its half extents (>= 0) given. Positive, allowing for rounding here, wherever some point of the

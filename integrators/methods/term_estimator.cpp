@@ -29,9 +29,10 @@ Lanes natural_steps(std::span<const Parameter> parameters) {
 
 }  // namespace
 
-std::vector<const TermType*> terms_of(const Scene& scene) {
+std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler) {
   std::vector<const TermType*> types;
   for (const TermType& type : term_types()) {
+    if (type.regions && !sampler.regions) continue;
     if (type.applies(scene)) types.push_back(&type);
   }
   return types;
@@ -52,7 +53,7 @@ TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> para
       lights_(scene_),
       context_{scene_, *tracer_, lights_},
       input_(context_, lanes_, lane_scale_, sampler, threads),
-      types_(terms_of(scene)),
+      types_(terms_of(scene, sampler)),
       rates_(scene_, lanes_) {
   for (size_t slot = 0; slot < types_.size(); ++slot) {
     if (types_[slot]->traces_paths) pixel_slot_ = slot;

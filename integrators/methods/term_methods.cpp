@@ -75,9 +75,8 @@ std::vector<DirectionField> random_fields(size_t count, uint64_t seed) {
 class TermJob {
  public:
   TermJob(const Scene& scene, const GradientOptions& options, const TermMethod& method, int threads)
-      : scene_(scene), options_(options), method_(method), types_(terms_of(scene)) {
-    const std::vector<std::string> chosen =
-        selected_terms(term_names(scene), options.terms, scene.file);
+      : scene_(scene), options_(options), method_(method), types_(terms_of(scene, method.sampler)) {
+    const std::vector<std::string> chosen = selected_terms(term_names(), options.terms, scene.file);
     for (const TermType* type : types_) {
       computed_.push_back(std::find(chosen.begin(), chosen.end(), type->name) != chosen.end());
     }
@@ -135,9 +134,9 @@ class TermJob {
   int64_t terms_computed() const { return std::count(computed_.begin(), computed_.end(), true); }
   TermEstimator& pass(size_t p) const { return static_cast<TermEstimator&>(*passes_[p]); }
 
-  static std::vector<std::string> term_names(const Scene& scene) {
+  std::vector<std::string> term_names() const {
     std::vector<std::string> names;
-    for (const TermType* type : terms_of(scene)) names.emplace_back(type->name);
+    for (const TermType* type : types_) names.emplace_back(type->name);
     return names;
   }
 
@@ -343,7 +342,9 @@ MethodType method_row(const std::string& name, const std::string& description,
   MethodType method;
   method.name = name;
   method.description = description;
-  for (const TermType& type : term_types()) method.terms.emplace_back(type.name);
+  for (const TermType& type : term_types()) {
+    if (!type.regions || term_method.sampler.regions) method.terms.emplace_back(type.name);
+  }
   method.terms_can_be_left_out = true;
   method.ablation = term_method.sampler.ablation || term_method.random_directions;
   method.only_sum_fixed = term_method.moves_directions || term_method.random_directions;
@@ -363,22 +364,23 @@ MethodType method_row(const std::string& name, const std::string& description,
 }  // namespace
 
 std::vector<MethodType> term_methods() {
-  const EdgeSamplerType& forest = edge_sampler_types()[0];
+  const EdgeSamplerType& silhouettes = edge_sampler_type("silhouettes");
   std::vector<MethodType> methods;
-  methods.push_back(method_row("adaptive",
-                               "the forest, with directions that move along with what they see and "
-                               "samples where the error is",
-                               {forest, true, true}));
+  methods.push_back(
+      method_row("adaptive",
+                 "silhouettes, with directions that move along with what they see and "
+                 "samples where the error is",
+                 {silhouettes, true, true}));
   methods.push_back(method_row("moving-directions",
-                               "the forest, with directions that move along with what they see",
-                               {forest, true, false}));
+                               "silhouettes, with directions that move along with what they see",
+                               {silhouettes, true, false}));
   for (const EdgeSamplerType& type : edge_sampler_types()) {
     methods.push_back(method_row(type.name, type.description, {type}));
   }
   methods.push_back(method_row("random-directions",
-                               "the forest, with directions that move by chance: noise, but the "
+                               "silhouettes, with directions that move by chance: noise, but the "
                                "same mean",
-                               {forest, false, false, true}));
+                               {silhouettes, false, false, true}));
   return methods;
 }
 

@@ -65,7 +65,7 @@ Sides nearest_faces(const Scene& scene, const EdgeMesh& mesh, const EdgeView& vi
 
 bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView& view,
                FaceRef start, double t_min, int bounces, const Rng& key, RayCount& rays,
-               Rgb<double>& jump) {
+               Rgb<double>& jump, const RadiancePart& part) {
   Ray ray{view.p, view.omega};
   ray.t_min = t_min;
   ray.start = start;
@@ -81,18 +81,25 @@ bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView&
   PathTracer<double, NoVisitor> path(context, rays, nothing);
   // Both sides share their random numbers: where they hardly differ, so do their estimates.
   const Rng side_key = key.at(Purpose::kEdgeSide, bounces);
+  const Vec3d wi = -view.omega;
+  const auto leaving = [&](const SurfacePoint<double>& surface, EdgeStart* at) {
+    if (part.region) return part.regions->emission(*part.region, surface, wi);
+    const Rgb<double> all = path.from_surface(surface, wi, bounces, side_key, at);
+    return part.regions ? all - part.regions->emission(surface, wi) : all;
+  };
   const auto radiance = [&](const std::optional<FaceSide>& side) {
     if (side) {
       const FaceRef face = side->face;
       const auto corners = face_corners<double>(context.scene.shape(face.shape).mesh, face.face);
       const Vec3d n = cross(corners[1] - corners[0], corners[2] - corners[0]);
       EdgeStart edge{around, view.x0, view.x1, *side};
-      return path.from_surface(surface_on_ray(context.scene, face, view.y, n), -view.omega, bounces,
-                               side_key, &edge);
+      return leaving(surface_on_ray(context.scene, face, view.y, n), &edge);
     }
-    if (!found) return path.escaped(view.omega, bounces);
-    return path.from_surface(surface_on_ray(context.scene, behind.face, view.p, view.omega),
-                             -view.omega, bounces, side_key, nullptr);
+    if (found) {
+      return leaving(surface_on_ray(context.scene, behind.face, view.p, view.omega), nullptr);
+    }
+    if (part.region) return Rgb<double>{};
+    return path.escaped(view.omega, bounces);
   };
   const Sides sides = nearest_faces(context.scene, mesh, view, ray.skip_emitters);
   jump = radiance(sides.negative) - radiance(sides.positive);

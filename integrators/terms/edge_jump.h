@@ -1,5 +1,6 @@
 #pragma once
 // The jump of incident radiance across an edge, as seen from a point.
+#include "integrators/terms/light_regions.h"
 #include "integrators/terms/path.h"
 #include "limn/edgetree/edge_sampler.h"
 
@@ -24,9 +25,10 @@ bool view_edge(const EdgeMesh& mesh, EdgeRef id, double t, const Vec3d& p, EdgeV
 // the edge that lie on that side, or, where there is none, what lies behind the edge: the same rule
 // for silhouettes, borders, sharp edges and edges of many faces. start: the face that p lies on;
 // t_min: where rays from p begin (the near plane of a camera); bounces: how often the path has
-// scattered, p included; the unit directions and both faces are exact, nothing is offset.
+// scattered, p included; part: of the radiance. The unit directions and both faces are exact,
+// nothing is offset.
 bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView& view,
                FaceRef start, double t_min, int bounces, const Rng& key, RayCount& rays,
-               Rgb<double>& jump);
+               Rgb<double>& jump, const RadiancePart& part = {});
 
 }  // namespace limn

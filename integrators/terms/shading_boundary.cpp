@@ -1,36 +1,30 @@
 // The boundary term of shading points: some samples of it at every vertex of a path, weighed by the
-// path's throughput.
+// path's throughput. What regions of light emit is left to direct_boundary.cpp, where they are apart.
 //   dL_o/dtheta  +=  sum over edges of the integral over t of dL(t) f_s(w_t) J(t) dt,
 //   J(t) = det(w_0, w_1, v) / |w|^3
 #include <fmt/format.h>
 
 #include "integrators/terms/edge_jump.h"
 #include "integrators/terms/term_table.h"
+#include "integrators/terms/vertex_query.h"
 
 namespace limn {
 namespace {
 
-Vec3<Lanes> velocity(const Vec3<Dual>& p) { return {p.x.d, p.y.d, p.z.d}; }
-
 class BoundaryTerm final : public Term {
  public:
-  explicit BoundaryTerm(TermInput& input) : context_(input.context), edges_(input.edges()) {
-    const Stopwatch watch;
-    sampler_ = input.sampler.make(edges_, input.threads);
-    build_seconds_ = watch.seconds();
-  }
+  explicit BoundaryTerm(TermInput& input)
+      : context_(input.context),
+        edges_(input.edges()),
+        sampler_(input.edge_sampler()),
+        build_seconds_(input.edge_sampler_seconds()),
+        part_{input.regions()} {}
 
   bool uses_vertices() const override { return true; }
   void add_at_vertex(const PathVertex& vertex, int samples, TermCost& cost,
                      Rgb<Lanes>& sum) const override {
-    EdgeQuery query;
-    query.p = value(vertex.surface.p);
-    query.n = value(vertex.scattering.normal());
-    query.wi = value(vertex.scattering.wi());
-    query.lobe = vertex.scattering.bsdf().lobe();
-    query.velocity = velocity(vertex.surface.p);
-    query.turn = vertex.turn;
-    query.face = vertex.surface.face;
+    if (is_left_out(vertex.bounces)) return;
+    const EdgeQuery query = query_at(vertex);
     for (int i = 0; i < samples; ++i) {
       add_sample(vertex, query, vertex.key.copy(Purpose::kEdgeCopy, i), cost, sum);
     }
@@ -38,31 +32,37 @@ class BoundaryTerm final : public Term {
 
   double work(const TermCost& cost) const override {
     return static_cast<double>(cost.rays) +
-           sampler_->draw_cost() * static_cast<double>(cost.samples);
+           sampler_.draw_cost() * static_cast<double>(cost.samples);
   }
 
   void describe(GradientStats& stats) const override {
     stats.setup.emplace_back("edge sampler", build_seconds_);
-    const SamplerSize size = sampler_->size();
+    const SamplerSize size = sampler_.size();
     stats.sampler_nodes += size.nodes;
     stats.sampler_bytes += size.bytes;
   }
 
  private:
+  // Whether what arrives at a vertex is what regions emit, and nothing else.
+  bool is_left_out(int bounces) const {
+    const int max_depth = context_.scene.max_depth;
+    return part_.regions && part_.regions->hold_all() && max_depth >= 0 && bounces + 2 >= max_depth;
+  }
   void add_sample(const PathVertex& vertex, const EdgeQuery& query, const Rng& key, TermCost& cost,
                   Rgb<Lanes>& sum) const;
 
   const PathContext& context_;
   const EdgeSamplerInput& edges_;
-  std::unique_ptr<EdgeSampler> sampler_;
-  double build_seconds_ = 0;
+  const EdgeSampler& sampler_;
+  double build_seconds_;
+  RadiancePart part_;
 };
 
 void BoundaryTerm::add_sample(const PathVertex& vertex, const EdgeQuery& query, const Rng& key,
                               TermCost& cost, Rgb<Lanes>& sum) const {
   ++cost.samples;
   Rng rng = key.at(Purpose::kEdge, vertex.bounces);
-  const std::optional<EdgeSample> drawn = sampler_->sample(query, rng);
+  const std::optional<EdgeSample> drawn = sampler_.sample(query, rng);
   if (!drawn) {
     ++cost.no_edge;
     if (vertex.log) vertex.log->push_back("  edge: none found");
@@ -96,7 +96,7 @@ void BoundaryTerm::add_sample(const PathVertex& vertex, const EdgeQuery& query, 
   RayCount rays;
   Rgb<double> jump;
   const bool visible =
-      edge_jump(context_, mesh, view, query.face, 0, vertex.bounces + 1, key, rays, jump);
+      edge_jump(context_, mesh, view, query.face, 0, vertex.bounces + 1, key, rays, jump, part_);
   cost.add(rays);
   if (!visible) {
     ++cost.occluded;

@@ -15,8 +15,27 @@ const EdgeSamplerInput& TermInput::edges() {
   const Stopwatch watch;
   edges_ = std::make_unique<EdgeSamplerInput>(make_sampler_input(context.scene, threads));
   edges_->lane_scale = lane_scale;
+  if (sampler.regions) {
+    regions_ = std::make_unique<LightRegions>(context.scene);
+    if (regions_->empty()) regions_.reset();
+  }
+  if (regions_) regions_->leave_out(context.scene, *edges_);
   edges_seconds_ = watch.seconds();
   return *edges_;
+}
+
+const LightRegions* TermInput::regions() {
+  edges();
+  return regions_.get();
+}
+
+const EdgeSampler& TermInput::edge_sampler() {
+  if (edge_sampler_) return *edge_sampler_;
+  edges();
+  const Stopwatch watch;
+  edge_sampler_ = sampler.make(*edges_, threads);
+  edge_sampler_seconds_ = watch.seconds();
+  return *edge_sampler_;
 }
 
 }  // namespace limn

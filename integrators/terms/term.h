@@ -10,6 +10,7 @@
 #include <span>
 
 #include "integrators/estimates/sample_estimator.h"
+#include "integrators/terms/light_regions.h"
 #include "integrators/terms/path.h"
 #include "limn/core/dual.h"
 #include "limn/edgetree/edge_sampler_types.h"
@@ -78,15 +79,22 @@ class TermInput {
   int threads;
 
   // Edges of all shapes (object i is shape i), light polygons and the environment, as an edge
-  // sampler takes them. Made when a term first asks.
+  // sampler takes them; without the regions of light. Made when a term first asks.
   const EdgeSamplerInput& edges();
+  // The regions of light; null if the sampler has none apart, or the scene has none.
+  const LightRegions* regions();
+  // What shading points choose edges by, shared by all terms. Made when a term first asks.
+  const EdgeSampler& edge_sampler();
+  double edge_sampler_seconds() const { return edge_sampler_seconds_; }
   // Null if no term has asked.
   const EdgeSamplerInput* made_edges() const { return edges_.get(); }
   double edges_seconds() const { return edges_seconds_; }
 
  private:
   std::unique_ptr<EdgeSamplerInput> edges_;
-  double edges_seconds_ = 0;
+  std::unique_ptr<LightRegions> regions_;
+  std::unique_ptr<EdgeSampler> edge_sampler_;
+  double edges_seconds_ = 0, edge_sampler_seconds_ = 0;
 };
 
 // One row per term.
@@ -103,11 +111,12 @@ struct TermType {
   bool moved_with_directions;  // its mean changes where directions move, see direction_field.h
   int film_stream;             // tells the random numbers of terms on the film apart
   bool (*applies)(const Scene& scene);  // whether the scene has anything that the term could be of
+  bool regions;  // it is of samplers that keep regions of light apart, and of no others
   std::unique_ptr<Term> (*make)(TermInput& input);
 };
 // In the order of --samples and of all tables.
 std::span<const TermType> term_types();
 // Sums of all terms are kept on the stack.
-inline constexpr size_t kMostTerms = 4;
+inline constexpr size_t kMostTerms = 5;
 
 }  // namespace limn

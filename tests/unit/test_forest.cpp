@@ -1,4 +1,5 @@
 // The edge forest rejects no edge of E(p): its listing against the exact test of every edge.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -98,6 +99,112 @@ TEST_P(Forests, ListWhatTheExactTestLists) {
         expect_complete(input, *forest, random_point(input.objects[k % 2], scale, rng), name);
       if (HasFailure()) return;
     }
+  }
+}
+
+// The planes of a cone around an axis, a pyramid of three to eight sides, sometimes a sliver.
+DirectionCone random_cone(const Vec3d& axis, Rng& rng) {
+  DirectionCone cone;
+  const Frame frame(axis);
+  const int sides = 3 + static_cast<int>(rng.uniform() * 6);
+  const double wide = std::exp(std::log(1e-2) * rng.uniform());
+  const double flat = rng.uniform() < 0.3 ? 1e-3 : 1;
+  for (int i = 0; i < sides; ++i) {
+    const double a = 2 * kPi * (i + 0.5 * rng.uniform()) / sides;
+    cone.add(normalize(frame.to_world({std::cos(a), std::sin(a) / flat, wide})));
+  }
+  cone.slack = rng.uniform() < 0.5 ? 0 : 1e-3 * rng.uniform();
+  return cone;
+}
+
+struct Count {
+  int wanted = 0, listed = 0;
+};
+
+void expect_outlines(const EdgeSamplerInput& input, const EdgeForest& forest,
+                     const EdgeQuery& query, const DirectionCone& cone, const std::string& name,
+                     Count& count) {
+  std::vector<ListedEdge> listed;
+  EXPECT_TRUE(forest.list_outlines(query, cone, listed));
+  std::vector<std::vector<bool>> found;
+  for (const EdgeMesh& mesh : input.objects) found.emplace_back(mesh.edges.size(), false);
+  for (const ListedEdge& edge : listed) {
+    const EdgeMesh& mesh = input.object(edge.id.object);
+    const auto [a, b] = mesh.edge(edge.id.edge).vertices;
+    EXPECT_TRUE(edge.x0 == mesh.position(a) && edge.x1 == mesh.position(b)) << name;
+    EXPECT_TRUE(is_outline(mesh, edge.id.edge, query.p)) << name;
+    EXPECT_FALSE(is_own_edge(input, query, edge.id)) << name;
+    EXPECT_FALSE(found[edge.id.object.index()][edge.id.edge.index()]) << name << ": listed twice";
+    found[edge.id.object.index()][edge.id.edge.index()] = true;
+  }
+  count.listed += static_cast<int>(listed.size());
+  for (uint32_t o = 0; o < input.objects.size(); ++o) {
+    const EdgeMesh& mesh = input.objects[o];
+    for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
+      const EdgeRef id{ShapeId(o), EdgeId(e)};
+      const auto [i, j] = mesh.edge(id.edge).vertices;
+      const Vec3d a = mesh.position(i) - query.p, b = mesh.position(j) - query.p;
+      const bool moves =
+          !mesh.tangents.empty() || !is_zero(query.velocity.x) || !is_zero(query.turn.y);
+      double t0 = 0, t1 = 1;
+      if (!moves || is_own_edge(input, query, id) || !is_outline(mesh, id.edge, query.p) ||
+          length(cross(a, b)) == 0 || std::max(dot(query.n, a), dot(query.n, b)) <= 0 ||
+          !cone.clip(a, b, t0, t1)) {
+        continue;
+      }
+      ++count.wanted;
+      EXPECT_TRUE(found[o][e]) << name << " object " << o << " edge " << e << " p " << query.p.x
+                               << " " << query.p.y << " " << query.p.z;
+    }
+  }
+}
+
+TEST_P(Forests, ListOutlinesInCones) {
+  Rng rng(24, 0, 0);
+  Count count;
+  for (const auto& [name, mesh] : meshes_of_all_kinds(rng)) {
+    for (int i = 0; i < 6; ++i) {
+      Vec3d rows[3];
+      random_rotation(rng, rows);
+      const double scale = random_scale(rng), shift = i % 2 == 0 ? 0 : 1e4 * rng.uniform();
+      Mesh moved = transformed(mesh, rows, scale, random_direction(rng) * shift);
+      set_test_tangents(moved);
+      const Mesh other = transformed(mesh, rows, 0.1 * scale, {});
+      const EdgeSamplerInput input{
+          {build_edge_mesh(moved, i % 3 != 0), build_edge_mesh(other, true)}};
+      const auto forest = EdgeForest::build(input, 1, GetParam());
+      for (int k = 0; k < 60; ++k) {
+        EdgeQuery query;
+        query.p = random_point(input.objects[k % 2], scale, rng);
+        query.n = random_direction(rng);
+        if (k % 3 == 1) query.velocity.x[2] = 1;
+        if (k % 3 == 2) query.turn.y[0] = 1;
+        if (k % 5 == 0) query.face = {ShapeId(k % 2), FaceId(0)};
+        const Vec3d to = random_point(input.objects[k % 2], scale, rng) - query.p;
+        const Vec3d axis = length(to) > 0 ? normalize(to) : random_direction(rng);
+        expect_outlines(input, *forest, query, random_cone(axis, rng), name, count);
+      }
+      if (HasFailure()) return;
+    }
+  }
+  fmt::print("{} outlines, {} listed\n", count.wanted, count.listed);
+  EXPECT_GT(count.wanted, 10000);
+}
+
+// Sharp edges are outlines only where one side is free.
+TEST(Outlines, OfACube) {
+  const EdgeMesh solid = build_edge_mesh(cube_mesh(), true),
+                 sheet = build_edge_mesh(cube_mesh(), false);
+  for (const EdgeMesh* mesh : {&solid, &sheet}) {
+    const auto count = [&](const Vec3d& p) {
+      int sum = 0;
+      for (uint32_t e = 0; e < mesh->edges.size(); ++e) sum += is_outline(*mesh, EdgeId(e), p);
+      return sum;
+    };
+    EXPECT_EQ(count({5, 0.2, 0.3}), 4);
+    EXPECT_EQ(count({5, 6, 0.3}), 6);
+    EXPECT_EQ(count({5, 6, 7}), 6);
+    EXPECT_EQ(count({0.1, 0.2, 0.3}), 0);
   }
 }
 

@@ -25,7 +25,9 @@ enum class Purpose : uint64_t {
   kFilmCopy,
   kShadow,
   kShadowCopy,
-  kLightCopy
+  kLightCopy,
+  kDirect,
+  kDirectCopy
 };
 
 // SplitMix64 started from a hash of (seed, pixel, sample): a stream for one path. `at` derives the

@@ -10,6 +10,7 @@
 
 #include "limn/core/lobe.h"
 #include "limn/core/rng.h"
+#include "limn/edgetree/direction_cone.h"
 #include "limn/edgetree/edges.h"
 #include "limn/edgetree/radiance_pyramid.h"
 #include "limn/edgetree/rejection_tree.h"
@@ -74,6 +75,12 @@ struct SamplerSize {
   uint64_t bytes = 0;
 };
 
+// An edge with its ends, which are the floats of its mesh.
+struct ListedEdge {
+  EdgeRef id;
+  Vec3d x0, x1;
+};
+
 class EdgeSampler {
  public:
   virtual ~EdgeSampler() = default;
@@ -89,6 +96,15 @@ class EdgeSampler {
   virtual double probability(const EdgeQuery& query, EdgeRef edge) const = 0;
   // Density of t given the edge.
   virtual double pdf_t(const EdgeQuery& query, EdgeRef edge, double t) const = 0;
+
+  // Appends every outline (see is_outline) that a part of may be seen from the query's point inside
+  // the cone, above the horizon and in motion, but for those of the query's own face; some edges
+  // outside may be among them. The order depends on the scene alone. False if this sampler lists
+  // nothing. Thread-safe.
+  virtual bool list_outlines(const EdgeQuery& /*query*/, const DirectionCone& /*cone*/,
+                             std::vector<ListedEdge>& /*edges*/) const {
+    return false;
+  }
 
   // Time of a draw in units of one ray with the shading at its end, about 4 microseconds in scenes
   // of 20000 triangles, where it was timed. A figure and not a clock, so that what follows from it

@@ -15,6 +15,9 @@ struct EdgeSamplerType {
   std::unique_ptr<EdgeSampler> (*make)(const EdgeSamplerInput& input, int threads);
   // A sampler with one idea taken out, which shows what the idea is worth: of no use but for that.
   bool ablation = false;
+  // Regions of light (lamps, bright patches of the environment) are kept apart from what it chooses
+  // by: its list of outlines serves them.
+  bool regions = false;
 };
 std::span<const EdgeSamplerType> edge_sampler_types();
 
@@ -22,6 +25,7 @@ std::span<const EdgeSamplerType> edge_sampler_types();
 const EdgeSamplerType& default_edge_sampler();
 
 // InputError that lists the known names if there is none of this name.
+const EdgeSamplerType& edge_sampler_type(const std::string& name);
 std::unique_ptr<EdgeSampler> make_edge_sampler(const std::string& name,
                                                const EdgeSamplerInput& input, int threads);
 

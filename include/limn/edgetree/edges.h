@@ -139,4 +139,9 @@ double distance_error(const EdgeMesh& mesh, const Vec3d& p);
 // one_sided_closed. Border, irregular, crossing: always. Flat: as smooth.
 bool is_candidate(const EdgeMesh& mesh, EdgeId edge, const Vec3d& p);
 
+// Whether the edge is in E(p) and its faces may leave one side of it free, so that what lies behind
+// it is seen there: silhouettes of all classes, borders, irregular edges. It is E(p) without sharp
+// edges that have a face on either side as seen from p, and without those that their own mesh hides.
+bool is_outline(const EdgeMesh& mesh, EdgeId edge, const Vec3d& p);
+
 }  // namespace limn

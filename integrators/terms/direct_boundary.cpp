@@ -1,0 +1,160 @@
+// The boundary term of light that shading points see directly from regions: all silhouettes inside a
+// region's cone are listed, and points on them drawn by what each would add.
+//   dL_o/dtheta  +=  sum over regions k of the sum over edges of
+//                    the integral over t of dL_k(t) f_s(w_t) J(t) dt
+// dL_k, the jump of what region k emits and p sees directly, is not zero but on outlines inside the
+// cone of directions around the region (those of the lamp itself are on its boundary). With weights
+// W_i of the pieces i of these, W their sum, N points u_j = (j + xi) / N of the cumulated weights, in
+// the order of the list, estimate the sum: each piece is drawn N W_i / W times on average. The order
+// is the trees': points that follow each other lie near each other in the scene.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "integrators/terms/edge_jump.h"
+#include "integrators/terms/edge_pieces.h"
+#include "integrators/terms/term_table.h"
+#include "integrators/terms/vertex_query.h"
+
+namespace limn {
+namespace {
+
+// Points for one sample. Not tuned.
+constexpr int kPoints = 4;
+// What a list costs per point, in the unit of Term::work. Not tuned.
+constexpr double kListCost = 0.5;
+
+struct Drawn {
+  uint32_t region;
+  EdgePiece piece;
+  double sum;  // of the weights up to here
+};
+
+class DirectTerm final : public Term {
+ public:
+  explicit DirectTerm(TermInput& input)
+      : context_(input.context),
+        edges_(input.edges()),
+        sampler_(input.edge_sampler()),
+        regions_(*input.regions()),
+        lane_scale_(input.lane_scale) {}
+
+  bool uses_vertices() const override { return true; }
+  void add_at_vertex(const PathVertex& vertex, int samples, TermCost& cost,
+                     Rgb<Lanes>& sum) const override;
+  double work(const TermCost& cost) const override {
+    return static_cast<double>(cost.rays) + kListCost * static_cast<double>(cost.samples);
+  }
+
+ private:
+  void list(const EdgeQuery& query, std::vector<Drawn>& drawn) const;
+  void add_point(const PathVertex& vertex, const EdgeQuery& query, const Drawn& drawn, double u,
+                 double times, TermCost& cost, Rgb<Lanes>& sum) const;
+
+  const PathContext& context_;
+  const EdgeSamplerInput& edges_;
+  const EdgeSampler& sampler_;
+  const LightRegions& regions_;
+  Lanes lane_scale_;
+};
+
+void DirectTerm::list(const EdgeQuery& query, std::vector<Drawn>& drawn) const {
+  static thread_local std::vector<ListedEdge> listed;
+  static thread_local std::vector<EdgePiece> pieces;
+  const EdgePieces cut(query, lane_scale_);
+  double sum = 0;
+  for (uint32_t k = 0; k < regions_.size(); ++k) {
+    const std::optional<DirectionCone> cone = regions_.cone(k, query.p, query.n);
+    if (!cone) continue;
+    listed.clear();
+    pieces.clear();
+    sampler_.list_outlines(query, *cone, listed);
+    for (const ListedEdge& edge : listed) {
+      const Vec3d w0 = edge.x0 - query.p, w1 = edge.x1 - query.p;
+      double t0 = 0, t1 = 1;
+      if (!DirectionCone::clip_by(dot(query.n, w0), dot(query.n, w1), t0, t1)) continue;
+      if (cone->clip(w0, w1, t0, t1)) cut.add(edge, edges_.object(edge.id.object), t0, t1, pieces);
+    }
+    for (const EdgePiece& piece : pieces) {
+      sum += piece.weight * regions_.luminance(k);
+      drawn.push_back({k, piece, sum});
+    }
+  }
+}
+
+void DirectTerm::add_at_vertex(const PathVertex& vertex, int samples, TermCost& cost,
+                               Rgb<Lanes>& sum) const {
+  static thread_local std::vector<Drawn> drawn;
+  drawn.clear();
+  const EdgeQuery query = query_at(vertex);
+  list(query, drawn);
+  const int points = kPoints * samples;
+  cost.samples += static_cast<uint64_t>(points);
+  const double total = drawn.empty() ? 0 : drawn.back().sum;
+  if (vertex.log) {
+    vertex.log->push_back(fmt::format("  direct: {} pieces of silhouettes before {} regions",
+                                      drawn.size(), regions_.size()));
+  }
+  if (!(total > 0)) {
+    cost.no_edge += static_cast<uint64_t>(points);
+    return;
+  }
+  Rng rng = vertex.key.at(Purpose::kDirect, vertex.bounces);
+  const double offset = rng.uniform();
+  size_t i = 0;
+  for (int j = 0; j < points; ++j) {
+    const double target = (j + offset) / points * total;
+    while (i + 1 < drawn.size() && drawn[i].sum <= target) ++i;
+    const double before = i == 0 ? 0 : drawn[i - 1].sum, weight = drawn[i].sum - before;
+    const double u = std::clamp((target - before) / weight, 0.0, 1.0);
+    add_point(vertex, query, drawn[i], u, weight / total * kPoints, cost, sum);
+  }
+}
+
+// times: how often the piece is drawn, on average, for one sample.
+void DirectTerm::add_point(const PathVertex& vertex, const EdgeQuery& query, const Drawn& drawn,
+                           double u, double times, TermCost& cost, Rgb<Lanes>& sum) const {
+  const EdgeRef id = drawn.piece.edge;
+  const EdgeMesh& mesh = edges_.object(id.object);
+  const auto [t, density] = drawn.piece.place(u);
+  EdgeView view;
+  const bool seen = view_edge(mesh, id, t, query.p, view);
+  const auto [a, b] = mesh.edge(id.edge).vertices;
+  const Vec3<Lanes> v =
+      relative_velocity(mesh, a, query) * (1 - t) + relative_velocity(mesh, b, query) * t;
+  const Lanes weight = (v.x * view.side.x + v.y * view.side.y + v.z * view.side.z) *
+                       (1 / (view.distance * view.distance * view.distance * density * times));
+  const Rgb<double> f = seen ? value(vertex.scattering.eval(view.omega)) : Rgb<double>{};
+  if (is_zero(weight) || is_black(f)) {
+    ++cost.zero_weight;
+    return;
+  }
+  RayCount rays;
+  Rgb<double> jump;
+  const bool visible = edge_jump(context_, mesh, view, query.face, 0, vertex.bounces + 1,
+                                 vertex.key, rays, jump, {&regions_, drawn.region});
+  cost.add(rays);
+  if (!visible) {
+    ++cost.occluded;
+    return;
+  }
+  ++cost.counted;
+  const Rgb<double> amount = vertex.throughput * f * jump;
+  const Rgb<Lanes> added{weight * amount.r, weight * amount.g, weight * amount.b};
+  if (vertex.log) {
+    vertex.log->push_back(fmt::format(
+        "    edge {} of shape {} at t = {:.6g}, drawn {:.4g} times a sample before region {}: jump "
+        "({:.6g}, {:.6g}, {:.6g}), adds ({:.6g}, {:.6g}, {:.6g}) to the first parameter",
+        id.edge.index(), id.object.index(), t, times, drawn.region, jump.r, jump.g, jump.b,
+        added.r[0], added.g[0], added.b[0]));
+  }
+  sum = sum + added;
+}
+
+}  // namespace
+
+std::unique_ptr<Term> make_direct_term(TermInput& input) {
+  return std::make_unique<DirectTerm>(input);
+}
+
+}  // namespace limn

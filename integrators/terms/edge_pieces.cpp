@@ -1,0 +1,90 @@
+// Pieces of edges: cut so that directions hardly turn within one, weighed, drawn.
+#include "integrators/terms/edge_pieces.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace limn {
+namespace {
+
+// The largest angle of a piece: of the hemisphere, and as a share of the lobe's width. Not tuned.
+constexpr double kWidest = 0.3, kShareOfLobe = 0.5, kNarrowest = 0.02;
+
+constexpr double kGauss = 0.21132486540518712;  // (1 - 1 / sqrt(3)) / 2
+
+double widest_of(const LobeSummary& lobe) {
+  return std::clamp(kShareOfLobe * lobe.model->width(lobe), kNarrowest, kWidest);
+}
+
+}  // namespace
+
+// z(u) meets the edge at s = (u / l_1) / ((1 - u) / l_0 + u / l_1) of the way between the ends.
+EdgePiece::Place EdgePiece::place(double u) const {
+  const double sum = (1 - u) * inverse_l0 + u * inverse_l1;
+  const double s = u * inverse_l1 / sum;
+  return {t0 + (t1 - t0) * s, sum * sum / (inverse_l0 * inverse_l1 * (t1 - t0))};
+}
+
+EdgePieces::EdgePieces(const EdgeQuery& query, const Lanes& lane_scale)
+    : query_(query),
+      scale_(lane_scale),
+      lobe_(query.lobe, query.n, query.wi),
+      widest_(widest_of(query.lobe)),
+      cosine_of_widest_(std::cos(widest_)) {}
+
+void EdgePieces::add(const ListedEdge& edge, const EdgeMesh& mesh, double t0, double t1,
+                     std::vector<EdgePiece>& pieces) const {
+  const Vec3d w0 = edge.x0 - query_.p, along = edge.x1 - edge.x0;
+  const Vec3d side = cross(w0, along);
+  const Vec3d a = w0 + along * t0, b = w0 + along * t1;
+  const double l_a = length(a), l_b = length(b), side_length = length(side);
+  if (side_length == 0 || l_a == 0 || l_b == 0) return;
+  const auto [i, j] = mesh.edge(edge.id.edge).vertices;
+  const Vec3d m = side / side_length;
+  const auto across = [&](VertexId vertex) {
+    const Vec3<Lanes> v = relative_velocity(mesh, vertex, query_);
+    return v.x * m.x + v.y * m.y + v.z * m.z;
+  };
+  const Lanes v0 = across(i), v1 = across(j);
+  if (is_zero(v0) && is_zero(v1)) return;
+
+  const auto append = [&](double begin, double end, double l_begin, double l_end) {
+    EdgePiece piece{edge.id, begin, end, 1 / l_begin, 1 / l_end, 0};
+    const double sine = side_length * (end - begin) * piece.inverse_l0 * piece.inverse_l1;
+    piece.weight = sine * mean_over(piece, w0, along, v0, v1);
+    if (piece.weight > 0 && std::isfinite(piece.weight)) pieces.push_back(piece);
+  };
+  const double cosine = dot(a, b);
+  if (cosine >= cosine_of_widest_ * l_a * l_b) return append(t0, t1, l_a, l_b);
+  const double angle = std::atan2(side_length * (t1 - t0), cosine);
+  const int count = static_cast<int>(std::ceil(angle / widest_));
+  double begin = t0, l_begin = l_a;
+  for (int k = 1; k <= count; ++k) {
+    // Where the direction has turned by k / count of the angle.
+    const double to_a = std::sin(angle * (count - k) / count) / l_a;
+    const double to_b = std::sin(angle * k / count) / l_b;
+    const double end = k < count ? t0 + (t1 - t0) * (to_b / (to_a + to_b)) : t1;
+    const double l_end = length(w0 + along * end);
+    append(begin, end, l_begin, l_end);
+    begin = end;
+    l_begin = l_end;
+  }
+}
+
+// Mean over u of f_s(z / |z|) |m . v(z)| / |z|^3, with v over the distance; m is normal to the plane
+// through p and the edge, v0 and v1 are m . v at the ends of the whole edge.
+double EdgePieces::mean_over(const EdgePiece& piece, const Vec3d& w0, const Vec3d& along,
+                             const Lanes& v0, const Lanes& v1) const {
+  double sum = 0;
+  for (const double u : {kGauss, 1 - kGauss}) {
+    const double to_begin = (1 - u) * piece.inverse_l0, to_end = u * piece.inverse_l1;
+    const double to_both = to_begin + to_end, to_v1 = to_begin * piece.t0 + to_end * piece.t1;
+    double speed = 0;
+    for (int k = 0; k < kLanes; ++k)
+      speed += scale_[k] * std::fabs(v0[k] * (to_both - to_v1) + v1[k] * to_v1);
+    sum += speed * lobe_.homogeneous_value(w0 * to_both + along * to_v1);
+  }
+  return 0.5 * sum;
+}
+
+}  // namespace limn

@@ -1,0 +1,210 @@
+// Lamps as regions of light: their hulls, and cones around these.
+#include "integrators/terms/light_regions.h"
+
+#include <algorithm>
+
+#include "limn/core/bounds.h"
+#include "limn/core/light.h"
+
+namespace limn {
+namespace {
+
+// Lamps of more faces are not asked whether p is behind all of them. Not tuned.
+constexpr size_t kFewFaces = 16;
+// Lamps of more corners are taken for the box around them. Not tuned.
+constexpr size_t kFewCorners = 64;
+// Cones are wider than lamps by this angle [rad], which is beyond rounding: edges on their boundary,
+// a lamp's own among them, are inside. Not tuned.
+constexpr double kSlack = 1e-8;
+
+Vec3d corner(const Mesh& mesh, uint32_t vertex) { return cast<double>(mesh.positions[vertex]); }
+
+std::vector<Vec3d> distinct_corners(const Mesh& mesh) {
+  std::vector<uint32_t> ids;
+  for (const FaceIndices& face : mesh.faces) {
+    for (const uint32_t vertex : face) ids.push_back(mesh.weld[vertex]);
+  }
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  std::vector<Vec3d> corners;
+  for (const uint32_t id : ids) corners.push_back(corner(mesh, id));
+  return corners;
+}
+
+// Planes of faces that have an area.
+std::vector<Plane> face_planes(const Mesh& mesh) {
+  std::vector<Plane> planes;
+  for (const FaceIndices& face : mesh.faces) {
+    const Vec3d a = corner(mesh, face[0]);
+    const Vec3d n = cross(corner(mesh, face[1]) - a, corner(mesh, face[2]) - a);
+    const double n_length = length(n);
+    if (n_length > 0) planes.push_back({n / n_length, -dot(n, a) / n_length});
+  }
+  return planes;
+}
+
+struct Point2 {
+  double x, y;
+};
+double turn(const Point2& a, const Point2& b, const Point2& c) {
+  return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+}
+
+// The convex hull, counter-clockwise (Andrew's monotone chain). What turns by less than
+// `tolerance`, an area, is left out.
+std::vector<Point2> convex_hull(std::vector<Point2> points, double tolerance) {
+  std::sort(points.begin(), points.end(), [](const Point2& a, const Point2& b) {
+    return a.x < b.x || (a.x == b.x && a.y < b.y);
+  });
+  std::vector<Point2> hull;
+  const auto walk = [&](auto begin, auto end) {
+    const size_t first = hull.size();
+    for (auto p = begin; p != end; ++p) {
+      while (hull.size() >= first + 2 && turn(hull[hull.size() - 2], hull.back(), *p) <= tolerance)
+        hull.pop_back();
+      hull.push_back(*p);
+    }
+    hull.pop_back();
+  };
+  walk(points.begin(), points.end());
+  walk(points.rbegin(), points.rend());
+  return hull;
+}
+
+// How far points of the plane reach out of a convex polygon.
+double reach_out(const std::vector<Point2>& points, const std::vector<Point2>& polygon) {
+  double reach = 0;
+  for (size_t i = 0; i < polygon.size(); ++i) {
+    const Point2 &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+    const double side = std::hypot(b.x - a.x, b.y - a.y);
+    for (const Point2& p : points) reach = std::max(reach, -turn(a, b, p) / side);
+  }
+  return reach;
+}
+
+// Makes a flat lamp a polygon; leaves the others as they are.
+void flatten(const std::vector<Plane>& faces, LampHull& hull) {
+  constexpr double kFlat = 1e-5;  // of the radius; not tuned
+  if (faces.empty() || hull.radius == 0) return;
+  const Frame frame(faces[0].n);
+  for (const Plane& face : faces) {
+    if (dot(face.n, frame.n) < 0.5) return;
+  }
+  std::vector<Point2> points;
+  double deviation = 0;
+  for (const Vec3d& x : hull.points) {
+    const Vec3d local = frame.to_local(x - hull.center);
+    points.push_back({local.x, local.y});
+    deviation = std::max(deviation, std::fabs(faces[0].distance(x)));
+  }
+  if (deviation > kFlat * hull.radius) return;
+  const double area = hull.radius * hull.radius;
+  const std::vector<Point2> polygon = convex_hull(points, 1e-12 * area);
+  if (polygon.size() < 3 || polygon.size() > DirectionCone::kMostPlanes) return;
+  hull.flat = true;
+  hull.plane = faces[0];
+  hull.deviation = deviation + reach_out(points, polygon);
+  hull.points.clear();
+  const Vec3d middle = hull.center - frame.n * faces[0].distance(hull.center);
+  for (const Point2& p : polygon) hull.points.push_back(middle + frame.s * p.x + frame.t * p.y);
+}
+
+DirectionCone around_polygon(const LampHull& lamp, const Vec3d& p, double height) {
+  DirectionCone cone;
+  const double nearest = std::max(height, length(lamp.center - p) - lamp.radius);
+  cone.slack = kSlack + 2 * lamp.deviation / nearest;
+  for (size_t i = 0; i < lamp.points.size(); ++i) {
+    const Vec3d a = lamp.points[i] - p, b = lamp.points[(i + 1) % lamp.points.size()] - p;
+    const Vec3d m = cross(b, a);
+    const double m_length = length(m);
+    // Where a side points at p its plane is not known, and left out.
+    if (m_length > 1e-9 * length(a) * length(b)) cone.add(m / m_length);
+  }
+  return cone;
+}
+
+// The octagon around the points as seen from p; no planes where they fill nearly a hemisphere.
+DirectionCone around_points(const LampHull& lamp, const Vec3d& p) {
+  DirectionCone cone;
+  cone.slack = kSlack;
+  const Vec3d to = lamp.center - p;
+  const double distance = length(to);
+  if (distance == 0) return cone;
+  const Frame frame(to / distance);
+  constexpr int kSides = DirectionCone::kMostPlanes;
+  double support[kSides];
+  std::fill_n(support, kSides, -1e300);
+  const double d = std::sqrt(0.5);
+  const double cosines[kSides] = {1, d, 0, -d, -1, -d, 0, d};
+  for (const Vec3d& x : lamp.points) {
+    const Vec3d w = frame.to_local(x - p);
+    if (w.z <= 0.05 * length(w)) return cone;
+    for (int k = 0; k < kSides; ++k) {
+      const double along = cosines[k] * w.x + cosines[(k + 6) % kSides] * w.y;
+      support[k] = std::max(support[k], along / w.z);
+    }
+  }
+  for (int k = 0; k < kSides; ++k) {
+    const Vec3d out = frame.s * cosines[k] + frame.t * cosines[(k + 6) % kSides];
+    cone.add(normalize(frame.n * support[k] - out));
+  }
+  return cone;
+}
+
+}  // namespace
+
+LampHull make_lamp_hull(const Mesh& mesh, ShadingModel shading) {
+  LampHull hull;
+  hull.points = distinct_corners(mesh);
+  Bounds bounds;
+  for (const Vec3d& x : hull.points) bounds.extend(x);
+  hull.center = bounds.center();
+  for (const Vec3d& x : hull.points) hull.radius = std::max(hull.radius, length(x - hull.center));
+  const std::vector<Plane> faces = face_planes(mesh);
+  // Interpolated normals let a lamp shine behind its faces.
+  const bool by_planes =
+      shading == ShadingModel::kContinuous || mesh.normal_source == NormalSource::kFace;
+  if (by_planes && faces.size() <= kFewFaces) hull.faces = faces;
+  flatten(faces, hull);
+  if (hull.flat || hull.points.size() <= kFewCorners) return hull;
+  hull.points.clear();
+  for (int i = 0; i < 8; ++i) {
+    const auto at = [&](int k) { return (i >> k & 1) != 0 ? bounds.upper[k] : bounds.lower[k]; };
+    hull.points.push_back({at(0), at(1), at(2)});
+  }
+  return hull;
+}
+
+std::optional<DirectionCone> cone_around(const LampHull& lamp, const Vec3d& p, const Vec3d& n) {
+  const auto behind = [&](const Plane& face) { return face.distance(p) <= 0; };
+  if (!lamp.faces.empty() && std::all_of(lamp.faces.begin(), lamp.faces.end(), behind)) return {};
+  const auto below = [&](const Vec3d& x) { return dot(n, x - p) + lamp.deviation <= 0; };
+  if (std::all_of(lamp.points.begin(), lamp.points.end(), below)) return {};
+  if (!lamp.flat) return around_points(lamp, p);
+  const double height = lamp.plane.distance(p);
+  return height > 0 ? around_polygon(lamp, p, height) : DirectionCone{};
+}
+
+LightRegions::LightRegions(const Scene& scene) : shading_(scene.shading) {
+  for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+    const Shape& shape = scene.shapes[s];
+    if (!shape.is_emitter) continue;
+    const double mean = limn::luminance(value(shape.radiance));
+    regions_.push_back({ShapeId(s), mean, make_lamp_hull(shape.mesh, scene.shading)});
+  }
+  hold_all_ = !scene.environment;
+}
+
+Rgb<double> LightRegions::emission(size_t k, const SurfacePoint<double>& surface,
+                                   const Vec3d& wi) const {
+  if (surface.face.shape != regions_[k].shape) return {};
+  return surface.emission(wi, shading_);
+}
+
+Rgb<double> LightRegions::emission(const SurfacePoint<double>& surface, const Vec3d& wi) const {
+  return surface.emission(wi, shading_);
+}
+
+void LightRegions::leave_out(const Scene&, EdgeSamplerInput& input) const { input.lights.clear(); }
+
+}  // namespace limn

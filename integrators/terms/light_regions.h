@@ -1,0 +1,74 @@
+#pragma once
+// What is emitted, split into regions of few directions each, and the rest. The jump of radiance
+// across an edge is linear in radiance: dL = sum over regions of dL_k + dL_rest, dL_k being the jump
+// of what region k emits and p sees directly. All scattered light belongs to the rest. Each part has
+// an estimator of its own: direct_boundary.cpp lists the silhouettes before a region.
+#include <optional>
+#include <vector>
+
+#include "limn/core/scene.h"
+#include "limn/core/shading.h"
+#include "limn/edgetree/edge_sampler.h"
+
+namespace limn {
+
+// A convex set of points that a lamp lies in, for cones around it.
+struct LampHull {
+  // A convex polygon, counter-clockwise seen from where it shines; else points around the lamp.
+  bool flat = false;
+  std::vector<Vec3d> points;
+  Plane plane;           // of the polygon
+  double deviation = 0;  // how far the lamp reaches out of the polygon [scene units]
+  Vec3d center;
+  double radius = 0;         // of a sphere around the center that holds all points
+  std::vector<Plane> faces;  // it shines in front of one of these; none: it may shine everywhere
+};
+LampHull make_lamp_hull(const Mesh& mesh, ShadingModel shading);
+
+// The directions from p in which the lamp may be seen above the horizon of n; none if there are
+// none.
+std::optional<DirectionCone> cone_around(const LampHull& lamp, const Vec3d& p, const Vec3d& n);
+
+class LightRegions {
+ public:
+  // Every lamp is a region.
+  explicit LightRegions(const Scene& scene);
+
+  size_t size() const { return regions_.size(); }
+  bool empty() const { return regions_.empty(); }
+  // Whether nothing else emits.
+  bool hold_all() const { return hold_all_; }
+  // Mean luminance of region k [W / (m^2 sr)], for importance.
+  double luminance(size_t k) const { return regions_[k].luminance; }
+  // Its directions from p above the horizon of n; none if it does not shine there.
+  std::optional<DirectionCone> cone(size_t k, const Vec3d& p, const Vec3d& n) const {
+    return cone_around(regions_[k].hull, p, n);
+  }
+
+  // What a surface emits towards the unit direction wi as part of region k.
+  Rgb<double> emission(size_t k, const SurfacePoint<double>& surface, const Vec3d& wi) const;
+  // As part of any region.
+  Rgb<double> emission(const SurfacePoint<double>& surface, const Vec3d& wi) const;
+
+  // Takes the regions' light out of what edge samplers weigh by.
+  void leave_out(const Scene& scene, EdgeSamplerInput& input) const;
+
+ private:
+  struct Region {
+    ShapeId shape;
+    double luminance;
+    LampHull hull;
+  };
+  ShadingModel shading_;
+  std::vector<Region> regions_;
+  bool hold_all_ = false;
+};
+
+// Which part of the radiance that arrives counts.
+struct RadiancePart {
+  const LightRegions* regions = nullptr;  // null: all of it
+  // What this region emits, seen directly; none: all but what any region emits.
+  std::optional<size_t> region = {};
+};
+
+}  // namespace limn

@@ -1,0 +1,192 @@
+// Regions of light: the terms "direct" and "boundary" of `silhouettes` together are what "boundary"
+// of `forest` is, block by block, whatever the lamps and whatever moves.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "limn/integrators/check.h"
+#include "support/compare_moments.h"
+#include "support/meshes.h"
+#include "support/scenes.h"
+
+namespace limn {
+namespace {
+
+constexpr double kLevel = 1e-4;
+
+GradientResult run(const Scene& scene, const std::string& method,
+                   const std::vector<std::string>& parameters, int spp, uint64_t seed,
+                   int threads = 0) {
+  GradientOptions options;
+  options.parameters = parameters;
+  options.method = method;
+  options.block = 4;
+  options.terms = {"boundary"};
+  if (method == "silhouettes") options.terms.emplace_back("direct");
+  RunSettings settings;
+  settings.spp = spp;
+  settings.seed = seed;
+  if (threads > 0) settings.threads = threads;
+  GradientResult result = gradient(scene, options, settings);
+  EXPECT_EQ(result.non_finite.count, 0u) << result.non_finite.message();
+  return result;
+}
+
+void expect_equal(const ParameterGradient& a, const ParameterGradient& b, double b_scale = 1) {
+  const ZSummary blocks = compare_moments(a.total_blocks, b.total_blocks, b_scale);
+  const ZSummary image = compare_moments(a.image_sum, b.image_sum, b_scale);
+  fmt::print(
+      "{:20} {:3} blocks, mean z {:5.2f}, sd {:4.2f}, max |z| {:5.2f}; image {:9.4g} +- {:7.2g}, "
+      "other {:9.4g} +- {:7.2g}, z {:5.2f}\n",
+      a.name, blocks.count, blocks.mean, blocks.deviation, blocks.largest, a.image_sum.mean(0),
+      std::sqrt(a.image_sum.variance(0)), b_scale * b.image_sum.mean(0),
+      b_scale * std::sqrt(b.image_sum.variance(0)), image.mean);
+  EXPECT_GT(blocks.count, 0);
+  EXPECT_TRUE(blocks.plausible(kLevel)) << a.name;
+  EXPECT_TRUE(image.plausible(kLevel)) << a.name;
+}
+
+// A body above a floor, with whatever shines.
+Scene lit_scene(const TempFiles& files, const std::string& lights,
+                const std::string& floor = diffuse("chalk", "0.8, 0.7, 0.6"), double unit = 1) {
+  SceneParts parts;
+  parts.max_depth = 3;
+  parts.unit = unit;
+  parts.origin = {0.3, 3, 3.5};
+  parts.target = {0, 0.3, 0};
+  parts.body = square("floor", 2.5 * unit, -90, {0, 0, 0}, floor) +
+               obj_shape("body", write_mesh(files, "body.obj", torus_mesh(10, 6)), true, 0.5 * unit,
+                         Vec3d{0, 0.7, 0.1} * unit, diffuse("clay", "0.6, 0.5, 0.4")) +
+               lights;
+  return make_scene(files, parts);
+}
+
+std::string lamp(const TempFiles& files, const std::string& id, const Mesh& mesh, double scale,
+                 const Vec3d& offset, const std::string& inner = "") {
+  return obj_shape(id, write_mesh(files, id + ".obj", mesh), true, scale, offset,
+                   inner + area_light(id + "_light", "9, 8, 6"));
+}
+
+Mesh hook_mesh() {
+  return make_mesh({{0, 0, 0}, {0, 0, 2}, {1, 0, 2}, {1, 0, 1}, {2, 0, 1}, {2, 0, 0}},
+                   {{0, 2, 1}, {0, 3, 2}, {0, 4, 3}, {0, 5, 4}});
+}
+
+std::string lights_of(const TempFiles& files, const std::string& name) {
+  const std::string above =
+      square("lamp", 0.5, 90, {0.4, 2.5, -0.3}, area_light("glow", "9, 8, 6"));
+  const std::string twosided =
+      R"(<bsdf type="twosided">)" + diffuse("white", "1, 1, 1") + "</bsdf>";
+  if (name == "above") return above;
+  // Turned upwards: from below it is black, and hides another.
+  if (name == "away")
+    return square("lamp", 0.3, -90, {0.4, 2.2, -0.3}, area_light("glow", "9, 8, 6")) +
+           square("other", 0.5, 90, {0.4, 2.5, -0.3}, area_light("dim", "3, 4, 5"));
+  // Upright, half of it below the floor: the horizon cuts it, and the body stands before it.
+  if (name == "cut") return square("lamp", 0.7, 0, {0, 0.2, -1.2}, area_light("glow", "9, 8, 6"));
+  // Through the body, which crosses its plane.
+  if (name == "crossed")
+    return square("lamp", 0.4, 90, {0.3, 0.7, 0.1}, area_light("glow", "9, 8, 6"));
+  // One hides a part of the other.
+  if (name == "two")
+    return above + square("near", 0.2, 90, {0.2, 1.6, 0}, area_light("dim", "3, 4, 5"));
+  if (name == "hook") return lamp(files, "lamp", hook_mesh(), 0.4, {-0.3, 2, -0.2});
+  if (name == "cube") return lamp(files, "lamp", cube_mesh(), 0.25, {0.6, 1.8, 0.2});
+  if (name == "ball") return lamp(files, "lamp", icosphere_mesh(2), 0.3, {0.6, 1.8, 0.2});
+  if (name == "ring") return lamp(files, "lamp", torus_mesh(12, 6), 0.4, {0.2, 1.9, 0.2});
+  // It scatters, from both sides.
+  if (name == "white")
+    return square("lamp", 0.5, 90, {0.4, 2.5, -0.3}, twosided + area_light("glow", "9, 8, 6"));
+  return above + make_sky(files, "sky");
+}
+
+class Lamps : public testing::TestWithParam<std::string> {};
+
+TEST_P(Lamps, AddUpToTheForest) {
+  const TempFiles files;
+  const Scene scene = lit_scene(files, lights_of(files, GetParam()));
+  const std::vector<std::string> parameters = {"body.translate.x", "lamp.translate.y",
+                                               "floor.rotate.x", "lamp.rotate.z"};
+  const GradientResult a = run(scene, "silhouettes", parameters, 256, 1);
+  const GradientResult b = run(scene, "forest", parameters, 1024, 2);
+  for (size_t k = 0; k < parameters.size(); ++k) expect_equal(a.parameters[k], b.parameters[k]);
+}
+
+INSTANTIATE_TEST_SUITE_P(, Lamps,
+                         testing::Values("above", "away", "cut", "crossed", "two", "hook", "cube",
+                                         "ball", "ring", "white", "sky"),
+                         [](const auto& test) { return test.param; });
+
+TEST(Regions, OnGloss) {
+  const TempFiles files;
+  for (const double alpha : {0.05, 0.3}) {
+    const Scene scene = lit_scene(files, lights_of(files, "sky"), conductor("gloss", alpha));
+    const std::vector<std::string> parameters = {"body.translate.x", "lamp.translate.y"};
+    const GradientResult a = run(scene, "silhouettes", parameters, 256, 1);
+    const GradientResult b = run(scene, "forest", parameters, 1024, 2);
+    for (size_t k = 0; k < parameters.size(); ++k) expect_equal(a.parameters[k], b.parameters[k]);
+  }
+}
+
+// Against finite differences, all terms.
+TEST(Regions, AgreeWithDifferences) {
+  const TempFiles files;
+  const Scene scene = lit_scene(files, lights_of(files, "two"));
+  for (const std::string parameter : {"body.translate.x", "lamp.translate.x", "near.rotate.x"}) {
+    CheckOptions options;
+    options.method = "silhouettes";
+    options.parameter = parameter;
+    options.block = 4;
+    RunSettings settings;
+    settings.spp = 256;
+    settings.seed = 5;
+    EXPECT_TRUE(check(scene, options, settings).agree) << parameter;
+  }
+}
+
+// Units of length drop out.
+TEST(Regions, DoNotKnowTheUnit) {
+  const std::vector<std::string> parameters = {"body.rotate.x"};
+  const TempFiles one_files;
+  const auto lights = [](double unit) {
+    return square("lamp", 0.5 * unit, 90, Vec3d{0.4, 2.5, -0.3} * unit,
+                  area_light("glow", "9, 8, 6"));
+  };
+  const std::string chalk = diffuse("chalk", "0.8, 0.7, 0.6");
+  const GradientResult one =
+      run(lit_scene(one_files, lights(1), chalk, 1), "silhouettes", parameters, 256, 1);
+  for (const double unit : {1e-3, 1e3}) {
+    const TempFiles files;
+    const GradientResult other =
+        run(lit_scene(files, lights(unit), chalk, unit), "silhouettes", parameters, 256, 2);
+    expect_equal(one.parameters[0], other.parameters[0]);
+  }
+}
+
+TEST(Regions, SameBitsOnAnyThreads) {
+  const TempFiles files;
+  const Scene scene = lit_scene(files, lights_of(files, "two"));
+  const GradientResult a = run(scene, "silhouettes", {"body.translate.x"}, 8, 1, 1);
+  const GradientResult b = run(scene, "silhouettes", {"body.translate.x"}, 8, 1, 3);
+  for (size_t i = 0; i < a.parameters[0].total.size(); ++i)
+    ASSERT_EQ(a.parameters[0].total.mean(i), b.parameters[0].total.mean(i));
+}
+
+// Without lamps there is no such term, and nothing changes.
+TEST(Regions, NoneWithoutLamps) {
+  const TempFiles files;
+  const Scene scene = lit_scene(files, constant_light("sky", "1, 1, 1"));
+  GradientOptions options;
+  options.parameters = {"body.translate.x"};
+  RunSettings settings;
+  settings.spp = 4;
+  options.method = "forest";
+  const GradientResult a = gradient(scene, options, settings);
+  options.method = "silhouettes";
+  const GradientResult b = gradient(scene, options, settings);
+  EXPECT_EQ(a.terms.size(), b.terms.size());
+  for (size_t i = 0; i < a.parameters[0].total.size(); ++i)
+    ASSERT_EQ(a.parameters[0].total.mean(i), b.parameters[0].total.mean(i));
+}
+
+}  // namespace
+}  // namespace limn

@@ -1,0 +1,254 @@
+// Cones around lamps hold all that shines; pieces of edges are drawn by the density they tell, and
+// weigh what they should.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "integrators/terms/edge_pieces.h"
+#include "integrators/terms/light_regions.h"
+#include "support/meshes.h"
+
+namespace limn {
+namespace {
+
+Mesh disk_mesh(int corners) {
+  std::vector<Vec3f> positions;
+  std::vector<FaceIndices> faces;
+  for (int i = 0; i < corners; ++i) {
+    const double a = 2 * kPi * i / corners;
+    positions.push_back({static_cast<float>(std::cos(a)), static_cast<float>(std::sin(a)), 0});
+  }
+  for (uint32_t i = 2; i < static_cast<uint32_t>(corners); ++i) faces.push_back({0, i - 1, i});
+  return make_mesh(std::move(positions), std::move(faces));
+}
+
+// An L in the plane z = 0.
+Mesh concave_mesh() {
+  return make_mesh({{0, 0, 0}, {2, 0, 0}, {2, 1, 0}, {1, 1, 0}, {1, 2, 0}, {0, 2, 0}},
+                   {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 5}});
+}
+
+std::vector<NamedMesh> lamps() {
+  return {{"square", grid_mesh(1)},
+          {"squares", grid_mesh(4)},
+          {"triangle", disk_mesh(3)},
+          {"octagon", disk_mesh(8)},
+          {"disk", disk_mesh(40)},
+          {"concave", concave_mesh()},
+          {"tetrahedron", tetrahedron_mesh()},
+          {"cube", cube_mesh()},
+          {"ball", icosphere_mesh(2)},
+          {"cap", cap_mesh(1)},
+          {"torus", torus_mesh(12, 8)},
+          {"inside out", reversed(cube_mesh())}};
+}
+
+Vec3d random_point(const Mesh& mesh, uint32_t face, Rng& rng) {
+  const double root = std::sqrt(rng.uniform()), b = root * rng.uniform();
+  const auto at = [&](int k) { return cast<double>(mesh.positions[mesh.faces[face][k]]); };
+  return at(0) * (1 - root) + at(1) * (root - b) + at(2) * b;
+}
+
+// Far, near, or very close to the lamp, and sometimes nearly on the plane of one of its faces.
+Vec3d random_place(const Mesh& mesh, double scale, Rng& rng) {
+  const auto face = static_cast<uint32_t>(rng.uniform() * mesh.faces.size());
+  const double far = std::exp(std::log(1e-3) + std::log(1e6) * rng.uniform());
+  const Vec3d x = random_point(mesh, face, rng), p = x + random_direction(rng) * (scale * far);
+  if (rng.uniform() < 0.7) return p;
+  const auto at = [&](int k) { return cast<double>(mesh.positions[mesh.faces[face][k]]); };
+  const Vec3d n = normalize(cross(at(1) - at(0), at(2) - at(0)));
+  return p - n * (dot(n, p - x) * (1 - 1e-6 * rng.uniform()));
+}
+
+// Whatever is seen of the lamp's front above the horizon is inside the cone.
+TEST(LightRegions, ConesHoldTheirLamps) {
+  Rng rng(31, 0, 0);
+  for (const auto& [name, shape] : lamps()) {
+    int seen = 0, cut = 0;
+    for (int i = 0; i < 20; ++i) {
+      Vec3d rows[3];
+      random_rotation(rng, rows);
+      const double scale = std::exp(std::log(1e-3) + std::log(1e6) * rng.uniform());
+      const Mesh mesh = transformed(shape, rows, scale, random_direction(rng) * (scale * i));
+      const LampHull hull = make_lamp_hull(mesh, ShadingModel::kContinuous);
+      for (int k = 0; k < 100; ++k) {
+        const Vec3d p = random_place(mesh, scale, rng), n = random_direction(rng);
+        const auto cone = cone_around(hull, p, n);
+        if (cone) cut += cone->count > 0;
+        for (uint32_t f = 0; f < mesh.faces.size(); f += 1 + mesh.faces.size() / 30) {
+          const Vec3d x = random_point(mesh, f, rng), w = x - p;
+          const auto c = face_corners<double>(mesh, FaceId(f));
+          if (dot(cross(c[1] - c[0], c[2] - c[0]), w) >= 0 || dot(n, w) <= 0) continue;
+          ++seen;
+          ASSERT_TRUE(cone) << name;
+          for (int j = 0; j < cone->count; ++j)
+            ASSERT_GE(dot(cone->planes[j], w), -cone->slack * length(w)) << name << " plane " << j;
+        }
+      }
+    }
+    fmt::print("{:12} {} points seen, {} cones with planes\n", name, seen, cut);
+    EXPECT_GT(seen, 500) << name;
+    EXPECT_GT(cut, 200) << name;
+  }
+}
+
+// A square of half-width 1 as seen from a height of 2 above its middle: four planes through its
+// sides, none further out. The octagon around a ball is nowhere wider than the octagon's corners.
+TEST(LightRegions, ConesAreTight) {
+  const LampHull square = make_lamp_hull(grid_mesh(2), ShadingModel::kContinuous);
+  EXPECT_TRUE(square.flat);
+  EXPECT_EQ(square.points.size(), 4u);
+  const auto cone = cone_around(square, {0, 0, 2}, {0, 0, -1});
+  ASSERT_TRUE(cone);
+  EXPECT_EQ(cone->count, 4);
+  double t0 = 0, t1 = 1;
+  EXPECT_TRUE(cone->clip({-4, 0, -2}, {4, 0, -2}, t0, t1));
+  EXPECT_NEAR(t0, 0.375, 1e-6);
+  EXPECT_NEAR(t1, 0.625, 1e-6);
+  EXPECT_FALSE(cone_around(square, {0, 0, -2}, {0, 0, 1})) << "from behind";
+  EXPECT_FALSE(cone_around(square, {3, 0, 0}, {-1, 0, 0})) << "on its plane";
+  EXPECT_FALSE(cone_around(square, {0, 0, 2}, {0, 0, 1})) << "below the horizon";
+  const LampHull ball = make_lamp_hull(icosphere_mesh(1), ShadingModel::kContinuous);
+  const auto around = cone_around(ball, {0, 0, 10}, {0, 0, -1});
+  ASSERT_TRUE(around);
+  EXPECT_EQ(around->count, 8);
+  t0 = 0;
+  t1 = 1;
+  EXPECT_TRUE(around->clip({-4, 0, -10}, {4, 0, -10}, t0, t1));
+  EXPECT_LT(8 * (t1 - t0), 2.3);
+}
+
+struct Case {
+  EdgeMesh mesh;
+  EdgeQuery query;
+};
+
+// An edge of unknown length before p, with velocities of its own in all lanes.
+Case random_case(Rng& rng) {
+  Case c;
+  const double size = std::exp(std::log(1e-2) + std::log(1e3) * rng.uniform());
+  c.query.p = random_direction(rng);
+  c.query.n = random_direction(rng);
+  c.query.wi = normalize(c.query.n + random_direction(rng) * 0.7);
+  c.query.velocity.y[1] = 0.3;
+  c.query.turn.x[2] = rng.uniform();
+  for (int i = 0; i < 2; ++i) {
+    const Vec3d d = random_direction(rng);
+    c.mesh.positions.push_back(c.query.p + d * (size * (0.1 + rng.uniform())));
+    Vec3<Lanes> v;
+    for (int k = 0; k < kLanes; ++k) {
+      const Vec3d r = random_direction(rng);
+      v.x[k] = r.x, v.y[k] = r.y, v.z[k] = r.z;
+    }
+    c.mesh.tangents.push_back(v);
+  }
+  Edge edge;
+  edge.vertices = {VertexId(0), VertexId(1)};
+  c.mesh.edges.push_back(edge);
+  return c;
+}
+
+// det(w_0, w_1, v) / |w|^3, of each lane.
+Lanes jacobian(const Case& c, double t) {
+  const Vec3d a = c.mesh.positions[0] - c.query.p, b = c.mesh.positions[1] - c.query.p;
+  const Vec3d w = a * (1 - t) + b * t, side = cross(a, b);
+  const Vec3<Lanes> v = relative_velocity(c.mesh, VertexId(0), c.query) * (1 - t) +
+                        relative_velocity(c.mesh, VertexId(1), c.query) * t;
+  const double l = length(w);
+  return (v.x * side.x + v.y * side.y + v.z * side.z) * (1 / (l * l * l));
+}
+
+// Along one edge: the pieces tile it, each density integrates to one, and where the cosine and the
+// velocity keep their signs a weight is the integral of the modulus, lanes added up by their scales.
+TEST(EdgePieces, WeighTheIntegralAndTileTheEdge) {
+  Rng rng(32, 0, 0);
+  const Lanes scale(1, 2, 0.5, 3);
+  double largest = 0;
+  int pieces_seen = 0;
+  for (int i = 0; i < 400; ++i) {
+    const Case c = random_case(rng);
+    const Vec3d w0 = c.mesh.positions[0] - c.query.p, w1 = c.mesh.positions[1] - c.query.p;
+    double t0 = 0, t1 = 1;
+    if (!DirectionCone::clip_by(dot(c.query.n, w0), dot(c.query.n, w1), t0, t1)) continue;
+    const EdgePieces cut(c.query, scale);
+    std::vector<EdgePiece> pieces;
+    cut.add({{ShapeId(0), EdgeId(0)}, c.mesh.positions[0], c.mesh.positions[1]}, c.mesh, t0, t1,
+            pieces);
+    ASSERT_FALSE(pieces.empty());
+    double at = t0, sum = 0, integral = 0;
+    for (const EdgePiece& piece : pieces) {
+      EXPECT_EQ(piece.t0, at);
+      at = piece.t1;
+      ++pieces_seen;
+      sum += piece.weight;
+      constexpr int kSteps = 200;
+      for (int k = 0; k < kSteps; ++k) {
+        const double u = (k + 0.5) / kSteps, h = 1e-5;
+        const auto [t, density] = piece.place(u);
+        const double slope = (piece.place(u + h).t - piece.place(u - h).t) / (2 * h);
+        ASSERT_NEAR(slope * density, 1, 1e-4);
+        const Vec3d w = w0 * (1 - t) + w1 * t;
+        const double cosine = std::max(0.0, dot(c.query.n, w) / length(w)) / kPi;
+        const Lanes j = jacobian(c, t);
+        for (int lane = 0; lane < kLanes; ++lane)
+          integral += scale[lane] * std::fabs(j[lane]) * cosine / (density * kSteps);
+      }
+    }
+    EXPECT_EQ(at, t1);
+    largest = std::max(largest, std::fabs(sum / integral - 1));
+    EXPECT_NEAR(sum / integral, 1, 0.1);
+  }
+  fmt::print("{} pieces, largest error of a sum {:.3f}\n", pieces_seen, largest);
+  EXPECT_GT(pieces_seen, 1000);
+}
+
+// A velocity across the edge that changes its sign in the middle: its integral is zero, the weight
+// is not. Motion along the plane through p and the edge weighs nothing.
+TEST(EdgePieces, DoNotCancel) {
+  Case c;
+  c.query.n = c.query.wi = {0, 0, 1};
+  c.mesh.positions = {{-0.1, 0, 1}, {0.1, 0, 1}};
+  Edge edge;
+  edge.vertices = {VertexId(0), VertexId(1)};
+  c.mesh.edges = {edge};
+  const ListedEdge listed{{ShapeId(0), EdgeId(0)}, c.mesh.positions[0], c.mesh.positions[1]};
+  const auto weight = [&](const Vec3d& v0, const Vec3d& v1) {
+    c.mesh.tangents.assign(2, {});
+    for (int i = 0; i < 3; ++i) {
+      c.mesh.tangents[0][i][0] = v0[i];
+      c.mesh.tangents[1][i][0] = v1[i];
+    }
+    std::vector<EdgePiece> pieces;
+    EdgePieces(c.query, {1, 1, 1, 1}).add(listed, c.mesh, 0, 1, pieces);
+    return pieces.empty() ? 0 : pieces[0].weight;
+  };
+  const double full = weight({0, 1, 0}, {0, 1, 0});
+  EXPECT_NEAR(full, 0.2 / kPi, 0.01);
+  EXPECT_GT(weight({0, 1, 0}, {0, -1, 0}), 0.4 * full);
+  EXPECT_EQ(weight({1, 0, 0}, {0, 0, 1}), 0);
+}
+
+// p at an end, on the edge, on its line: nothing, and nothing that is no number.
+TEST(EdgePieces, OfEdgesThroughThePoint) {
+  Case c;
+  c.query.n = c.query.wi = {0, 0, 1};
+  c.query.velocity.y[0] = 1;
+  Edge edge;
+  edge.vertices = {VertexId(0), VertexId(1)};
+  c.mesh.edges = {edge};
+  for (const double x : {0.0, -1.0, -0.3, 2.0}) {
+    c.mesh.positions = {{x, 0, 0}, {x + 1, 0, 0}};
+    std::vector<EdgePiece> pieces;
+    EdgePieces(c.query, {1, 1, 1, 1})
+        .add({{ShapeId(0), EdgeId(0)}, c.mesh.positions[0], c.mesh.positions[1]}, c.mesh, 0, 1,
+             pieces);
+    EXPECT_TRUE(pieces.empty());
+    for (Vec3d& p : c.mesh.positions) p.z = 1e-300;
+    EdgePieces(c.query, {1, 1, 1, 1})
+        .add({{ShapeId(0), EdgeId(0)}, c.mesh.positions[0], c.mesh.positions[1]}, c.mesh, 0, 1,
+             pieces);
+    for (const EdgePiece& piece : pieces) EXPECT_TRUE(std::isfinite(piece.weight));
+  }
+}
+
+}  // namespace
+}  // namespace limn
