@@ -2,6 +2,7 @@
 #include "edgetree/edges/box_tree.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "limn/core/parallel.h"
 
@@ -14,6 +15,33 @@ void FloatBox::extend(const FloatBox& other) {
   }
 }
 
+LeafBoxes::LeafBoxes() {
+  for (int k = 0; k < 3; ++k)
+    for (uint32_t lane = 0; lane < kLanes; ++lane) {
+      lower[k][lane] = std::numeric_limits<float>::infinity();
+      upper[k][lane] = -std::numeric_limits<float>::infinity();
+    }
+}
+
+void LeafBoxes::set(uint32_t lane, const FloatBox& box) {
+  for (int k = 0; k < 3; ++k) {
+    lower[k][lane] = box.lower[k];
+    upper[k][lane] = box.upper[k];
+  }
+}
+
+uint32_t LeafBoxes::overlaps(const FloatBox& box) const {
+  // Written so that it becomes a few instructions on whole registers.
+  int32_t apart[kLanes] = {};
+  for (int k = 0; k < 3; ++k)
+    for (uint32_t lane = 0; lane < kLanes; ++lane)
+      apart[lane] |= (lower[k][lane] > box.upper[k]) | (box.lower[k] > upper[k][lane]);
+  uint32_t bits = 0;
+  for (uint32_t lane = 0; lane < kLanes; ++lane)
+    bits |= static_cast<uint32_t>(!apart[lane]) << lane;
+  return bits;
+}
+
 BoxTree::BoxTree(std::span<const FloatBox> boxes, int threads)
     : boxes_(boxes), leaves_(static_cast<uint32_t>((boxes.size() + kLeaf - 1) / kLeaf)) {
   if (leaves_ == 0) return;
@@ -24,6 +52,7 @@ BoxTree::BoxTree(std::span<const FloatBox> boxes, int threads)
   }
   nodes_.resize(2 * leaves_ - 1);
   leaf_boxes_.resize(leaves_);
+  packed_.resize(leaves_);
   order_.resize(boxes.size());
   const Part root{0, 0, leaves_};
   const uint32_t smallest = std::max(leaves_ / 32, 1u);  // some parts for each thread; not tuned
@@ -79,6 +108,7 @@ void BoxTree::build(const Part& part) {
   for (size_t i = begin; i < end; ++i) {
     order_[i] = items_[i].box;
     box.extend(boxes_[order_[i]]);
+    packed_[part.first].set(static_cast<uint32_t>(i - begin), boxes_[order_[i]]);
   }
   nodes_[part.node] = leaf_boxes_[part.first] = box;
 }

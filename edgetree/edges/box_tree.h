@@ -18,18 +18,30 @@ struct FloatBox {
   void extend(const FloatBox& other);
 };
 
+// Boxes side by side, one in each lane; lanes without a box overlap nothing.
+struct LeafBoxes {
+  static constexpr uint32_t kLanes = 8;  // not tuned
+  float lower[3][kLanes], upper[3][kLanes];
+
+  LeafBoxes();
+  void set(uint32_t lane, const FloatBox& box);
+  // Bit i: the box overlaps that of lane i.
+  uint32_t overlaps(const FloatBox& box) const;
+};
+
 // Halves the boxes at the median of their centers until leaves hold kLeaf of them at most. The
 // boxes must outlive it; they are finite.
 class BoxTree {
  public:
-  static constexpr uint32_t kLeaf = 8;  // not tuned
+  static constexpr uint32_t kLeaf = LeafBoxes::kLanes;
 
   BoxTree(std::span<const FloatBox> boxes, int threads);
 
   uint32_t leaf_count() const { return leaves_; }
   const FloatBox& leaf_box(uint32_t leaf) const { return leaf_boxes_[leaf]; }
-  // Indices of the boxes in a leaf.
+  // Indices of the boxes in a leaf, and these boxes.
   std::span<const uint32_t> leaf(uint32_t leaf) const;
+  const LeafBoxes& boxes(uint32_t leaf) const { return packed_[leaf]; }
   // Sets `leaves` to those whose boxes overlap `box`, in rising order.
   void find_leaves(const FloatBox& box, std::vector<uint32_t>& leaves) const;
 
@@ -56,6 +68,7 @@ class BoxTree {
   std::vector<Item> items_;
   std::vector<uint32_t> order_;
   std::vector<FloatBox> nodes_, leaf_boxes_;
+  std::vector<LeafBoxes> packed_;
 };
 
 }  // namespace limn

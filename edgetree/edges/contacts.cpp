@@ -2,6 +2,7 @@
 #include "edgetree/edges/contacts.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <optional>
 #include <tuple>
@@ -33,14 +34,15 @@ double size_of(const Mesh& mesh, FaceId face) {
 }
 
 // The part of the segment that lies in the triangle, seen along its normal; its sides are moved
-// outward by `margin`.
+// outward by at least `margin`, at most sqrt(3) times that.
 std::optional<Interval> clip(const Segment& segment, const Corners& corners, const Vec3d& normal,
                              double margin) {
   Interval part{0, 1};
   for (int k = 0; k < 3; ++k) {
     const Vec3d side = corners[(k + 1) % 3] - corners[k];
     const Vec3d inward = cross(normal, side);
-    const double height = dot(inward, segment.a - corners[k]) + margin * length(side);
+    const double height = dot(inward, segment.a - corners[k]) +
+                          margin * (std::fabs(side.x) + std::fabs(side.y) + std::fabs(side.z));
     const double slope = dot(inward, segment.d);
     if (height < 0 && height + slope < 0) return std::nullopt;
     if (height < 0) part.t0 = std::max(part.t0, -height / slope);
@@ -87,6 +89,41 @@ std::optional<Interval> common_part(const Segment& longer, const Segment& shorte
   return Interval{std::min(ends[0], ends[1]), std::max(ends[0], ends[1])};
 }
 
+// V: whether the faces around a vertex form one closed fan that covers the directions around it once,
+// seen along their mean normal. No edge at such a vertex lies on another face at it.
+std::vector<bool> single_fans(const EdgeMesh& edges, const Mesh& mesh) {
+  const size_t count = mesh.positions.size();
+  std::vector<Vec3d> axes(count);
+  std::vector<uint8_t> covers(count);
+  std::vector<bool> single(count, true);
+  for (uint32_t f = 0; f < mesh.faces.size(); ++f)
+    for (const uint32_t v : mesh.faces[f]) axes[mesh.weld[v]] += edges.planes[f].n;
+  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+    for (int k = 0; k < 3; ++k) {
+      const uint32_t v = mesh.weld[mesh.faces[f][k]];
+      const Vec3d& axis = axes[v];
+      const Vec3d x = cast<double>(mesh.positions[v]);
+      const auto to_corner = [&](int corner) {
+        return cast<double>(mesh.positions[mesh.weld[mesh.faces[f][corner % 3]]]) - x;
+      };
+      if (!(dot(edges.planes[f].n, axis) > 0)) single[v] = false;
+      const auto turn = [&](const Vec3d& a, const Vec3d& b) { return dot(axis, cross(a, b)); };
+      const Vec3d reference =
+          cross(axis, std::fabs(axis.x) < std::fabs(axis.y) ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0});
+      const bool covered =
+          turn(to_corner(k + 1), reference) >= 0 && turn(reference, to_corner(k + 2)) > 0;
+      covers[v] = static_cast<uint8_t>(std::min(covers[v] + covered, 2));
+    }
+  }
+  for (size_t v = 0; v < count; ++v)
+    if (covers[v] != 1) single[v] = false;
+  for (const Edge& edge : edges.edges) {
+    if (edge.edge_class != EdgeClass::kBorder && edge.edge_class != EdgeClass::kIrregular) continue;
+    for (const VertexId v : edge.vertices) single[v.index()] = single[mesh.weld[v.index()]] = false;
+  }
+  return single;
+}
+
 class ContactFinder {
  public:
   ContactFinder(std::span<const EdgeMesh> objects, std::span<const Mesh* const> meshes, int threads)
@@ -109,6 +146,7 @@ class ContactFinder {
   }
 
  private:
+  using LeafCorners = std::array<FaceIndices, BoxTree::kLeaf>;
   struct Pair {
     EdgeRef edge;
     FaceRef face;
@@ -131,15 +169,25 @@ class ContactFinder {
     return size_around(objects_[object], *meshes_[object], id.edge);
   }
 
-  // Faces that have area, with their boxes.
+  // All faces, with their boxes and those of their corners that may be passed over.
   void collect_faces() {
+    uint32_t first_vertex = 0;
     for (uint32_t o = 0; o < objects_.size(); ++o) {
       first_face_.push_back(static_cast<uint32_t>(faces_.size()));
+      first_vertex_.push_back(first_vertex);
+      const Mesh& mesh = *meshes_[o];
+      const std::vector<bool> single = single_fans(objects_[o], mesh);
       for (uint32_t f = 0; f < objects_[o].planes.size(); ++f) {
         faces_.push_back({ShapeId(o), FaceId(f)});
+        FaceIndices& corners = single_corners_.emplace_back();
+        for (int k = 0; k < 3; ++k) {
+          const uint32_t v = mesh.weld[mesh.faces[f][k]];
+          corners[k] = single[v] ? first_vertex + v : UINT32_MAX;
+        }
         const double tolerance = touch_tolerance(size_of(*meshes_[o], FaceId(f)), 0);
-        boxes_.push_back(box_of(corners(faces_.back()), tolerance));
+        boxes_.push_back(box_of(this->corners(faces_.back()), tolerance));
       }
+      first_vertex += static_cast<uint32_t>(mesh.positions.size());
     }
   }
 
@@ -181,13 +229,18 @@ class ContactFinder {
     const BoxTree tree(boxes_, threads_);
     constexpr uint32_t kBlock = 256;  // leaves; not tuned
     const uint32_t blocks = (tree.leaf_count() + kBlock - 1) / kBlock;
+    // Corners in the order of the leaves.
+    std::vector<LeafCorners> corners(tree.leaf_count());
+    for (uint32_t leaf = 0; leaf < tree.leaf_count(); ++leaf)
+      for (size_t i = 0; i < tree.leaf(leaf).size(); ++i)
+        corners[leaf][i] = single_corners_[tree.leaf(leaf)[i]];
     std::vector<std::vector<Pair>> found(blocks);
     parallel_for(blocks, threads_, [&](size_t block) {
       std::vector<uint32_t> leaves;
       const auto begin = static_cast<uint32_t>(block) * kBlock;
       for (uint32_t leaf = begin; leaf < std::min(begin + kBlock, tree.leaf_count()); ++leaf) {
         tree.find_leaves(tree.leaf_box(leaf), leaves);
-        find_pairs_of_leaf(tree, leaf, leaves, found[block]);
+        find_pairs_of_leaf(tree, corners, leaf, leaves, found[block]);
       }
     });
     std::vector<Pair> pairs;
@@ -195,8 +248,8 @@ class ContactFinder {
     return pairs;
   }
 
-  void find_pairs_of_leaf(const BoxTree& tree, uint32_t leaf, std::span<const uint32_t> leaves,
-                          std::vector<Pair>& pairs) const {
+  void find_pairs_of_leaf(const BoxTree& tree, std::span<const LeafCorners> corners, uint32_t leaf,
+                          std::span<const uint32_t> leaves, std::vector<Pair>& pairs) const {
     for (const uint32_t first : tree.leaf(leaf)) {
       for (uint32_t i = edge_offsets_[first]; i < edge_offsets_[first + 1]; ++i) {
         const EdgeRef id = edges_[i];
@@ -204,11 +257,19 @@ class ContactFinder {
         const double edge_size = size(id);
         const Vec3d ends[2] = {s.a, s.at(1)};
         const FloatBox box = box_of(ends, touch_tolerance(edge_size, 0));
+        const uint32_t first_vertex = first_vertex_[id.object.index()];
+        const auto [a, b] = objects_[id.object.index()].edge(id.edge).vertices;
+        const uint32_t from = first_vertex + a.index(), to = first_vertex + b.index();
         for (const uint32_t other : leaves) {
           if (!tree.leaf_box(other).overlaps(box)) continue;
-          for (const uint32_t face : tree.leaf(other))
-            if (boxes_[face].overlaps(box) && may_touch(id, s, edge_size, faces_[face]))
-              pairs.push_back({id, faces_[face]});
+          for (uint32_t bits = tree.boxes(other).overlaps(box); bits != 0; bits &= bits - 1) {
+            const int lane = std::countr_zero(bits);
+            const FaceIndices& c = corners[other][lane];
+            if (c[0] == from || c[1] == from || c[2] == from) continue;
+            if (c[0] == to || c[1] == to || c[2] == to) continue;
+            const FaceRef face = faces_[tree.leaf(other)[lane]];
+            if (may_touch(id, s, edge_size, face)) pairs.push_back({id, face});
+          }
         }
       }
     }
@@ -217,15 +278,15 @@ class ContactFinder {
   // Looser than what decides.
   bool may_touch(EdgeRef id, const Segment& s, double edge_size, FaceRef face) const {
     const Plane& p = plane(face);
-    if (length_squared(p.n) == 0) return false;
-    for (const FaceRef around : objects_[id.object.index()].faces_around(id.edge))
-      if (around == face) return false;
     const Corners c = corners(face);
     const double tolerance =
         touch_tolerance(edge_size, size_of(*meshes_[face.shape.index()], face.face));
     const double d0 = dot(p.n, s.a - c[0]);
     const double d1 = d0 + dot(p.n, s.d);
     if (std::min(d0, d1) > 2 * tolerance || std::max(d0, d1) < -2 * tolerance) return false;
+    if (length_squared(p.n) == 0) return false;
+    for (const FaceRef around : objects_[id.object.index()].faces_around(id.edge))
+      if (around == face) return false;
     const auto part = clip(s, c, p.n, 2 * tolerance);
     if (!part || (part->t1 - part->t0) * length(s.d) <= kShortestTouch * tolerance) return false;
     return std::fabs(d0 + (d1 - d0) * part->t0) <= 4 * tolerance &&
@@ -301,9 +362,12 @@ class ContactFinder {
   std::span<const EdgeMesh> objects_;
   std::span<const Mesh* const> meshes_;
   int threads_;
-  std::vector<uint32_t> first_face_;  // of each object, in faces_
-  std::vector<FaceRef> faces_;        // of all objects
-  std::vector<FloatBox> boxes_;       // theirs
+  std::vector<uint32_t> first_face_;    // of each object, in faces_
+  std::vector<FaceRef> faces_;          // of all objects
+  std::vector<FloatBox> boxes_;         // theirs
+  std::vector<uint32_t> first_vertex_;  // of each object, in a count over all
+  // Of every face, the corners with a single fan of faces, counted over all objects; else UINT32_MAX.
+  std::vector<FaceIndices> single_corners_;
   // Edges whose first face is faces_[f]: edges_[edge_offsets_[f], edge_offsets_[f + 1]).
   std::vector<uint32_t> edge_offsets_;
   std::vector<EdgeRef> edges_;

@@ -47,19 +47,34 @@ class Builder {
   }
 
   void group_half_edges() {
-    sides_ = half_edges_of(mesh_, ids_);
+    sort_sides(half_edges_of(mesh_, ids_));
     const auto ends = [](const HalfEdge& s) {
       return std::pair(std::min(s.from, s.to), std::max(s.from, s.to));
     };
-    std::sort(sides_.begin(), sides_.end(), [&](const HalfEdge& a, const HalfEdge& b) {
-      return ends(a) != ends(b) ? ends(a) < ends(b) : a.face < b.face;
-    });
     result_.face_offsets.push_back(0);
     for (size_t begin = 0, end; begin < sides_.size(); begin = end) {
       for (end = begin; end < sides_.size() && ends(sides_[end]) == ends(sides_[begin]); ++end)
         result_.incident_faces.push_back({result_.shape, sides_[end].face});
       result_.face_offsets.push_back(static_cast<uint32_t>(end));
       append_edge({&sides_[begin], end - begin});
+    }
+  }
+
+  // By the smaller of the two ends (counted, which is faster than to compare), the larger, the face.
+  void sort_sides(const std::vector<HalfEdge>& sides) {
+    const auto low = [](const HalfEdge& s) { return std::min(s.from, s.to).index(); };
+    std::vector<uint32_t> offsets(mesh_.positions.size() + 1);
+    for (const HalfEdge& side : sides) ++offsets[low(side) + 1];
+    for (size_t v = 1; v < offsets.size(); ++v) offsets[v] += offsets[v - 1];
+    sides_.resize(sides.size());
+    std::vector<uint32_t> next(offsets.begin(), offsets.end() - 1);
+    for (const HalfEdge& side : sides) sides_[next[low(side)]++] = side;
+    for (size_t v = 0; v + 1 < offsets.size(); ++v) {
+      std::sort(sides_.begin() + offsets[v], sides_.begin() + offsets[v + 1],
+                [](const HalfEdge& a, const HalfEdge& b) {
+                  return std::pair(std::max(a.from, a.to), a.face) <
+                         std::pair(std::max(b.from, b.to), b.face);
+                });
     }
   }
 

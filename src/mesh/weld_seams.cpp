@@ -51,7 +51,7 @@ class SeamWelder {
     std::sort(levels.begin(), levels.end());
     levels.erase(std::unique(levels.begin(), levels.end()), levels.end());
     for (const int l : levels) join_neighbours(l);
-    dissolve_collapsing();
+    dissolve_small_faces();
     for (uint32_t& w : mesh_.weld) w = root(w);
   }
 
@@ -109,9 +109,12 @@ class SeamWelder {
     }
   }
 
+  double distance(uint32_t u, uint32_t v) const {
+    return length(cast<double>(mesh_.positions[u]) - cast<double>(mesh_.positions[v]));
+  }
+
   void join_if_near(uint32_t u, uint32_t v) {
-    const Vec3d d = cast<double>(mesh_.positions[u]) - cast<double>(mesh_.positions[v]);
-    if (length(d) > tolerances_[u] + tolerances_[v]) return;
+    if (distance(u, v) > tolerances_[u] + tolerances_[v]) return;
     const uint32_t a = root(u), b = root(v);
     roots_[std::max(a, b)] = std::min(a, b);
   }
@@ -121,13 +124,17 @@ class SeamWelder {
     return v;
   }
 
-  // Faces as small as that keep their corners apart.
-  void dissolve_collapsing() {
+  // A needle between copies of a pole may vanish; where faces are as small as the rounding, all
+  // corners keep apart.
+  void dissolve_small_faces() {
     std::vector<bool> collapses(mesh_.positions.size());
     for (const FaceIndices& face : mesh_.faces)
       for (int k = 0; k < 3; ++k) {
-        const uint32_t a = root(mesh_.weld[face[k]]);
-        if (a == root(mesh_.weld[face[(k + 1) % 3]])) collapses[a] = true;
+        const uint32_t a = mesh_.weld[face[k]], b = mesh_.weld[face[(k + 1) % 3]];
+        if (a == b || root(a) != root(b)) continue;
+        constexpr double kSharp = 1024;  // longer than wide; not tuned
+        if (distance(a, face[(k + 2) % 3]) <= kSharp * (tolerances_[a] + tolerances_[b]))
+          collapses[root(a)] = true;
       }
     std::vector<uint32_t> apart;
     for (const uint32_t v : open_)

@@ -338,7 +338,7 @@ TEST_P(EdgeSamplers, NeverDrawTheOwnFace) {
     q.n = edges.plane(face).n;
     q.wi = normalize(q.n + random_direction(rng) * 0.7);
     const auto is_own = [&](EdgeRef id) {
-      const auto around = edges.faces_around(id.edge);
+      const auto around = input.object(id.object).faces_around(id.edge);
       return std::find(around.begin(), around.end(), q.face) != around.end();
     };
     for_every_edge(input, [&](EdgeRef id) {

@@ -355,7 +355,27 @@ TEST(EdgeMesh, CorruptedCopiesAreFound) {
       {"edge 4: its second face is not the second around it",
        [](EdgeMesh& m) { m.edges[4].faces[1] = FaceId::none(); }},
       {"edge 0: an end lies off the plane of a face around it",
-       [](EdgeMesh& m) { m.planes[m.edges[0].faces[0].index()].offset += 1e-12; }},
+       [](EdgeMesh& m) { m.planes[m.edges[0].faces[0].index()].offset += 1e-6; }},
+      {"there are other incidences than incident faces",
+       [](EdgeMesh& m) { m.incidences.resize(3); }},
+      {"edge 2: its own mesh's faces do not come first",
+       [](EdgeMesh& m) {
+         m.incident_faces.insert(m.incident_faces.begin() + m.face_offsets[2] + 1,
+                                 {ShapeId(1), FaceId(0)});
+         for (size_t e = 3; e < m.face_offsets.size(); ++e) ++m.face_offsets[e];
+         m.edges[2].faces[1] = FaceId::none();
+       }},
+      {"edge 1: a face that it runs through has a rim",
+       [](EdgeMesh& m) {
+         m.incidences.resize(m.incident_faces.size());
+         m.incidences[m.face_offsets[1]].through = true;
+       }},
+      {"edge 1: a rim is out of range",
+       [](EdgeMesh& m) {
+         m.incidences.resize(m.incident_faces.size());
+         m.incidences[m.face_offsets[1]].rim = kMostRims;
+       }},
+      {"edge 7: no face around it moves with it", [](EdgeMesh& m) { m.edges[7].rim = 1; }},
       {"edge 5: a border has one face",
        [](EdgeMesh& m) { m.edges[5].edge_class = EdgeClass::kBorder; }},
       {"edge 5: a closed mesh has neither borders nor irregular edges",

@@ -73,8 +73,8 @@ void weld_positions(Mesh& mesh);
 
 // Welds copies of a vertex that differ by no more than the rounding of their positions (a float's,
 // twice, of the largest coordinate of a face around them), where sides of faces lie open: seams as
-// programs write them, -2.4e-16 here and 0 there. Copies that a face of that size needs apart stay
-// so. `weld` must hold what weld_positions says of the faces that are left.
+// programs write them, -2.4e-16 here and 0 there. Needles between copies collapse; but where faces are
+// no larger than the rounding in any direction, their corners stay apart. `weld` must hold what weld_positions says of the faces that are left.
 void weld_seams(Mesh& mesh);
 
 // Fills normals (if kComputed), horizon and their tangents from positions, faces, weld and
