@@ -206,7 +206,7 @@ void TermEstimator::describe(GradientStats& stats) const {
   if (const EdgeSamplerInput* edges = input_.made_edges()) {
     stats.setup.emplace_back("edges", input_.edges_seconds());
     for (const EdgeClass c : {EdgeClass::kSmooth, EdgeClass::kSharp, EdgeClass::kBorder,
-                              EdgeClass::kIrregular, EdgeClass::kFlat}) {
+                              EdgeClass::kIrregular, EdgeClass::kFlat, EdgeClass::kCrossing}) {
       uint64_t count = 0;
       for (const EdgeMesh& object : edges->objects) count += object.count(c);
       stats.edges.emplace_back(edge_class_name(c), count);
