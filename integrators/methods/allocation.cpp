@@ -2,6 +2,7 @@
 #include "integrators/methods/allocation.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 namespace limn {
@@ -11,36 +12,6 @@ constexpr int kMost = 8;  // not tuned
 // Products that differ by less are equal as far as a pilot can tell; the cheaper one leaves less
 // behind when a run is stopped.
 constexpr double kTie = 1.01;
-
-// The variance of one sample of every pixel, over its channels.
-std::vector<double> pixel_variances(const Moments& moments) {
-  std::vector<double> variances(moments.size() / 3);
-  for (size_t i = 0; i < moments.size(); ++i) {
-    variances[i / 3] += moments.variance(i) * static_cast<double>(moments.samples());
-  }
-  return variances;
-}
-
-std::vector<double> mean_variances(const ParameterGradient& gradient, size_t pixel_count) {
-  std::vector<std::vector<double>> terms;
-  for (const Moments& term : gradient.terms) {
-    terms.push_back(term.size() > 0 ? pixel_variances(term) : std::vector<double>(pixel_count));
-  }
-  std::vector<double> all(pixel_count);
-  for (const auto& term : terms) {
-    for (size_t i = 0; i < pixel_count; ++i) all[i] += term[i];
-  }
-  std::vector<size_t> pixels(pixel_count);
-  for (size_t i = 0; i < pixels.size(); ++i) pixels[i] = i;
-  const size_t kept = pixels.size() - pixels.size() / 1000;
-  std::stable_sort(pixels.begin(), pixels.end(),
-                   [&](size_t a, size_t b) { return all[a] < all[b]; });
-  std::vector<double> means(terms.size());
-  for (size_t t = 0; t < terms.size(); ++t) {
-    for (size_t i = 0; i < kept; ++i) means[t] += terms[t][pixels[i]] / static_cast<double>(kept);
-  }
-  return means;
-}
 
 std::vector<double> counts_to_try(const TermFigures& term) {
   std::vector<double> counts;
@@ -81,24 +52,122 @@ SampleCounts best_samples(const std::vector<TermFigures>& figures) {
   return SampleCounts(best->samples);
 }
 
-std::vector<double> pilot_variances(const GradientResult& pilot) {
-  std::vector<double> shares(pilot.terms.size());
-  for (const ParameterGradient& gradient : pilot.parameters) {
-    const std::vector<double> variances = mean_variances(gradient, gradient.total.size() / 3);
-    const double sum = std::accumulate(variances.begin(), variances.end(), 0.0);
-    if (!(sum > 0)) continue;
-    for (size_t t = 0; t < shares.size(); ++t) shares[t] += variances[t] / sum;
+namespace {
+
+constexpr int kSpreadRadius = 4;      // windows of 9 by 9 cells
+constexpr double kLeastShare = 0.25;  // of the mean; not tuned
+constexpr int kMostInPixel = 64;      // not tuned
+// A plan whose product is this close to the best has counts that are large enough. Short samples
+// leave less behind when a run is stopped.
+constexpr double kRounding = 1.1;
+
+// Counts before rounding, up to a common factor.
+struct Wish {
+  std::vector<double> cells;     // empty for a term of the film
+  std::vector<double> variance;  // of the same cells, smoothed
+  double film = 0;
+};
+
+Wish wish_of(const TermFigures& term, const PlanGrid& grid) {
+  Wish wish;
+  const double deviation = std::sqrt(term.variance);
+  const double price = term.cost > 0 ? std::sqrt(term.cost) : 0;
+  if (term.cells.empty()) {
+    wish.film = price > 0 ? deviation / price : 0;
+    return wish;
   }
-  return shares;
+  wish.variance = window_means(grid, term.cells, kSpreadRadius);
+  double mean = 0;
+  for (double& v : wish.variance) {
+    v = std::max(v, 0.0);
+    wish.cells.push_back(price > 0 ? std::sqrt(deviation * std::sqrt(v)) / price : 0);
+    mean += wish.cells.back() / static_cast<double>(grid.size());
+  }
+  for (double& share : wish.cells) share = std::max(share, kLeastShare * mean);
+  return wish;
 }
 
-int pilot_samples(size_t pixels, int spp) {
-  // At least two, for variances; at most an eighth of the job; more than some ten thousand paths
-  // say nothing new.
-  constexpr size_t kEnough = 16384;  // not tuned
+double whole(double count) { return std::clamp(std::round(count), 1.0, double{kMostInPixel}); }
+
+double film_count(const TermFigures& term, double count) {
+  return std::clamp(count, term.least, double{kMostInPixel});
+}
+
+// Squared error times cost with all wishes multiplied by `scale`.
+double product_at(const std::vector<TermFigures>& terms, const std::vector<Wish>& wishes,
+                  double scale) {
+  double error = 0, cost = 0;
+  for (size_t t = 0; t < terms.size(); ++t) {
+    if (wishes[t].cells.empty()) {
+      const double n = film_count(terms[t], scale * wishes[t].film);
+      error += terms[t].variance / n;
+      cost += terms[t].cost * n;
+      continue;
+    }
+    const double each = 1.0 / static_cast<double>(wishes[t].cells.size());
+    for (size_t i = 0; i < wishes[t].cells.size(); ++i) {
+      const double n = whole(scale * wishes[t].cells[i]);
+      error += each * wishes[t].variance[i] / n;
+      cost += each * terms[t].cost * n;
+    }
+  }
+  return error * cost;
+}
+
+double best_scale(const std::vector<TermFigures>& terms, const std::vector<Wish>& wishes) {
+  double largest = 0;
+  for (const Wish& wish : wishes) {
+    for (const double share : wish.cells) largest = std::max(largest, share);
+  }
+  if (!(largest > 0)) return 0;
+  std::vector<double> scales, products;
+  for (double most = 1; most <= kMostInPixel; most *= std::sqrt(2.0)) {
+    scales.push_back(most / largest);
+    products.push_back(product_at(terms, wishes, scales.back()));
+  }
+  const double least = *std::min_element(products.begin(), products.end());
+  for (size_t i = 0; i < scales.size(); ++i) {
+    if (products[i] <= kRounding * least) return scales[i];
+  }
+  return scales.front();
+}
+
+}  // namespace
+
+void spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& grid,
+                    SamplePlan& plan) {
+  std::vector<Wish> wishes;
+  for (const TermFigures& term : figures) wishes.push_back(wish_of(term, grid));
+  const double scale = best_scale(figures, wishes);
+  if (!(scale > 0)) return;
+  plan.grid = grid;
+  plan.counts.assign(grid.size(), {});
+  std::vector<double> means;
+  for (size_t t = 0; t < figures.size(); ++t) {
+    if (wishes[t].cells.empty()) {
+      means.push_back(film_count(figures[t], scale * wishes[t].film));
+      continue;
+    }
+    double sum = 0;
+    for (size_t i = 0; i < grid.size(); ++i) {
+      plan.counts[i][t] = static_cast<uint16_t>(whole(scale * wishes[t].cells[i]));
+      sum += plan.counts[i][t];
+    }
+    means.push_back(sum / static_cast<double>(grid.size()));
+  }
+  plan.uniform = SampleCounts(means);
+}
+
+double trimmed_mean(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const size_t kept = values.size() - values.size() / 1000;
+  return std::accumulate(values.begin(), values.begin() + static_cast<long>(kept), 0.0) /
+         static_cast<double>(kept);
+}
+
+int pilot_samples(int spp) {
   if (spp < 16) return 0;
-  const size_t wanted = (kEnough + pixels - 1) / pixels;
-  return static_cast<int>(std::clamp<size_t>(wanted, 2, std::min(8, spp / 8)));
+  return std::clamp(spp / 8, 4, 8) / 2 * 2;
 }
 
 }  // namespace limn

@@ -1,17 +1,18 @@
 #pragma once
-// How a job's work is shared among the terms of a derivative.
+// How a job's work is shared among the terms of a derivative, and among the pixels.
 #include <vector>
 
-#include "limn/integrators/gradient.h"
+#include "integrators/methods/sample_plan.h"
 
 namespace limn {
 
-// One sample of a term: its variance, in any unit that all terms share, and what it costs, in any
-// unit that all terms share.
+// What a pilot tells of one sample of a term, in units that all terms share.
 struct TermFigures {
-  double variance = 0;
+  double variance = 0;  // a mean over pixels, without the thousandth of them that varies most
   double cost = 0;
   double least = 1;  // the fewest samples it can have in a sample of a pixel
+  // The variance in every cell of a grid; empty for a term of the film.
+  std::vector<double> cells = {};
 };
 
 // After equal time, the squared error goes with (sum of variance / samples) times (sum of cost *
@@ -19,14 +20,17 @@ struct TermFigures {
 // in use: at most eight, so that a pilot that saw too little of a term starves it no further.
 SampleCounts best_samples(const std::vector<TermFigures>& figures);
 
-// Variances of one sample of each term in a pilot of any number of parameters: means over pixels; a
-// thousandth of them, those with the largest variance of all terms together, is left out: single
-// bright samples would rule the choice. Each parameter counts alike: its variances are divided by
-// their sum.
-std::vector<double> pilot_variances(const GradientResult& pilot);
+// The same for every cell. The ideal share of a cell goes with the standard deviation there; a
+// pilot knows that too badly, so the share goes with the square root of the deviation over 9 by 9
+// cells, and is a quarter of the mean at least. Counts are whole; they are as small as rounding
+// allows.
+void spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& grid,
+                    SamplePlan& plan);
 
-// Samples per pixel of a pilot for a job of `spp` samples of `pixels` pixels; 0 if the job is too
-// short for one.
-int pilot_samples(size_t pixels, int spp);
+// Without the thousandth of the values that is largest: single bright samples would rule a choice.
+double trimmed_mean(std::vector<double> values);
+
+// Samples per pixel of a pilot for a job of `spp`, even; 0 if the job is too short for one.
+int pilot_samples(int spp);
 
 }  // namespace limn

@@ -1,8 +1,6 @@
 // One sample of a pixel: its paths, the first of which carries the terms at vertices.
 #include "integrators/methods/term_estimator.h"
 
-#include <array>
-
 #include "integrators/terms/camera_path.h"
 #include "integrators/terms/path_log.h"
 
@@ -15,8 +13,14 @@ Scene seeded(const Scene& scene, std::span<const Parameter> parameters) {
   return copy;
 }
 
+// With one parameter the other lanes are free: a pilot lets directions turn there, at the rate of
+// what moves. Edges that move by it alone count for so much less than those of the parameter. Not
+// tuned.
+constexpr double kTurnShare = 0.3;
+
 Lanes natural_steps(std::span<const Parameter> parameters) {
-  Lanes steps{1, 1, 1, 1};
+  const double free = parameters.size() == 1 ? kTurnShare * parameters[0].natural_step : 1;
+  Lanes steps{free, free, free, free};
   for (size_t k = 0; k < parameters.size(); ++k) {
     steps[static_cast<int>(k)] = parameters[k].natural_step;
   }
@@ -49,7 +53,8 @@ TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> para
       lights_(scene_),
       context_{scene_, *tracer_, lights_},
       input_(context_, lanes_, lane_scale_, sampler, threads),
-      types_(terms_of(scene, sampler)) {
+      types_(terms_of(scene, sampler)),
+      rates_(scene_, lanes_) {
   for (size_t slot = 0; slot < types_.size(); ++slot) {
     if (types_[slot]->traces_paths) pixel_slot_ = slot;
     terms_.push_back(computed[slot] ? types_[slot]->make(input_) : nullptr);
@@ -66,20 +71,22 @@ double TermEstimator::work(size_t slot, const TermCost& cost) const {
 // The terms at vertices, as the visitor of a path.
 class TermEstimator::VertexTerms {
  public:
-  VertexTerms(const TermEstimator& estimator, SampleSink& sink)
-      : estimator_(estimator), sink_(sink), sums_() {}
+  VertexTerms(const TermEstimator& estimator, const PixelCounts& counts, SampleSink& sink)
+      : estimator_(estimator), counts_(counts), sink_(sink), sums_() {}
 
   void operator()(const SurfacePoint<Dual>& surface, const Scattering<Dual>& scattering,
-                  const Rgb<Dual>& throughput, int bounces, const Rng& key) {
+                  const Rgb<Dual>& throughput, const DirectionMotion* motion, int bounces,
+                  const Rng& key) {
     const Rgb<double> weight = value(throughput);
-    const PathVertex vertex{surface, scattering, weight, bounces, key, sink_.log()};
+    const PathVertex vertex{surface, scattering, weight,     motion ? motion->turn : Vec3<Lanes>{},
+                            bounces, key,        sink_.log()};
     if (vertex.log) log_vertex(*vertex.log, surface, scattering, weight, bounces);
     for (size_t slot = 0; slot < estimator_.slots(); ++slot) {
       const Term* term = estimator_.terms_[slot].get();
       if (!term || !term->uses_vertices()) continue;
       const Stopwatch watch;
       TermCost& cost = sink_.cost(slot);
-      term->add_at_vertex(vertex, static_cast<int>(estimator_.samples_[slot]), cost, sums_[slot]);
+      term->add_at_vertex(vertex, counts_[slot], cost, sums_[slot]);
       cost.seconds += watch.seconds();
     }
   }
@@ -88,67 +95,98 @@ class TermEstimator::VertexTerms {
 
  private:
   const TermEstimator& estimator_;
+  const PixelCounts& counts_;
   SampleSink& sink_;
   std::array<Rgb<Lanes>, kMostTerms> sums_;
 };
 
 void TermEstimator::add_pixel(const PixelSample& at, const Rng& key, SampleSink& sink) const {
-  const int paths = paths_ ? static_cast<int>(samples_[pixel_slot_]) : 1;
+  const PixelCounts counts = plan_.counts_at(at);
+  const DirectionField* field = plan_.field_at(at);
+  const int paths = paths_ ? counts[pixel_slot_] : 1;
   for (int i = 0; i < paths; ++i) {
     const Rng path_key = key.copy(Purpose::kPathCopy, i);
     if (i == 0 && (vertices_ || sink.log())) {
-      VertexTerms vertices(*this, sink);
-      add_path(at, path_key, vertices, 1.0 / paths, sink);
-      add_vertices(at, vertices, sink);
+      VertexTerms vertices(*this, counts, sink);
+      add_path(at, trace(at, path_key, field, vertices, sink), 1.0 / paths, sink);
+      add_vertices(at, vertices, counts, sink);
     } else if (sink.log()) {
       PathLog log(*sink.log());
-      add_path(at, path_key, log, 1.0 / paths, sink);
+      add_path(at, trace(at, path_key, field, log, sink), 1.0 / paths, sink);
     } else {
       NoVisitor nothing;
-      add_path(at, path_key, nothing, 1.0 / paths, sink);
+      add_path(at, trace(at, path_key, field, nothing, sink), 1.0 / paths, sink);
     }
   }
 }
 
 void TermEstimator::add_vertices(const PixelSample& at, const VertexTerms& vertices,
-                                 SampleSink& sink) const {
+                                 const PixelCounts& counts, SampleSink& sink) const {
   for (size_t slot = 0; slot < terms_.size(); ++slot) {
     if (!terms_[slot] || !terms_[slot]->uses_vertices()) continue;
     if (is_finite(vertices.sum(slot))) {
-      sink.add(slot, at, vertices.sum(slot), 1.0 / static_cast<int>(samples_[slot]));
+      sink.add(slot, at, vertices.sum(slot), 1.0 / counts[slot]);
     } else {
       sink.reject(at, slot_name(slot));
     }
   }
 }
 
-// One path: radiance, and what the terms make of it.
 template <class Visitor>
-void TermEstimator::add_path(const PixelSample& at, const Rng& key, Visitor& visitor, double weight,
-                             SampleSink& sink) const {
+TermEstimator::Path TermEstimator::trace(const PixelSample& at, const Rng& key,
+                                         const DirectionField* field, Visitor& visitor,
+                                         SampleSink& sink) const {
   const FilmPosition film = sample_pixel_filter(scene_.film, at.x, at.y, key);
   const Ray primal = camera_ray(scene_, scene_.camera.ray<double>(film.x, film.y));
   const auto ray = scene_.camera.ray<Dual>(film.x, film.y);
   if (sink.log()) log_camera_ray(*sink.log(), film.x, film.y, primal.origin, primal.direction);
   RayCount rays;
-  PathTracer<Dual, Visitor> path(context_, rays, visitor);
-  const Rgb<Dual> radiance = path.from_ray(primal, ray.origin, ray.direction, 0, key);
+  PathTracer<Dual, Visitor> tracer(context_, rays, visitor);
+  if (field) tracer.move_directions(rates_, *field);
+  Path path;
+  path.radiance = tracer.from_ray(primal, ray.origin, ray.direction, 0, key);
+  path.score = tracer.score();
   sink.cost(pixel_slot_).add(rays);
   ++sink.cost(pixel_slot_).samples;
-  bool finite = is_finite(value(radiance));
+  path.finite = is_finite(value(path.radiance)) && is_finite(path.score);
   for (const auto& term : terms_) {
-    if (term && term->uses_paths()) finite = finite && is_finite(term->add_path(radiance));
+    if (term && term->uses_paths()) {
+      path.finite = path.finite && is_finite(term->add_path(path.radiance));
+    }
   }
-  if (!finite) {
+  return path;
+}
+
+// Radiance, and what the terms make of it.
+void TermEstimator::add_path(const PixelSample& at, const Path& path, double weight,
+                             SampleSink& sink) const {
+  if (!path.finite) {
     sink.reject(at, slot_name(pixel_slot_));
     return;
   }
-  sink.add_radiance(at, value(radiance), weight);
+  sink.add_radiance(at, value(path.radiance), weight);
   for (size_t slot = 0; slot < terms_.size(); ++slot) {
     if (terms_[slot] && terms_[slot]->uses_paths()) {
-      sink.add(slot, at, terms_[slot]->add_path(radiance), weight);
+      sink.add(slot, at, terms_[slot]->add_path(path.radiance) + path.score, weight);
     }
   }
+}
+
+TermEstimator::Sample TermEstimator::sample(const PixelSample& at, const Rng& key,
+                                            const DirectionField* field, SampleSink& sink) const {
+  PixelCounts ones;
+  ones.fill(1);
+  VertexTerms vertices(*this, ones, sink);
+  const Path path = trace(at, key, field, vertices, sink);
+  Sample sample{value(path.radiance), {}, path.score, path.finite};
+  for (size_t slot = 0; slot < terms_.size(); ++slot) {
+    const Term* term = terms_[slot].get();
+    if (!term) continue;
+    if (term->uses_paths()) sample.terms[slot] = term->add_path(path.radiance);
+    if (term->uses_vertices()) sample.terms[slot] = vertices.sum(slot);
+    sample.finite = sample.finite && is_finite(sample.terms[slot]);
+  }
+  return sample;
 }
 
 void TermEstimator::describe(GradientStats& stats) const {

@@ -1,10 +1,12 @@
 #pragma once
 // The terms of a derivative image as one estimator: up to kLanes parameters of one scene.
+#include <array>
 #include <memory>
 #include <span>
 #include <vector>
 
 #include "integrators/estimates/sample_estimator.h"
+#include "integrators/methods/sample_plan.h"
 #include "integrators/terms/term.h"
 #include "limn/core/parameter.h"
 
@@ -21,11 +23,26 @@ class TermEstimator final : public SampleEstimator {
   TermEstimator(const TermEstimator&) = delete;
   TermEstimator& operator=(const TermEstimator&) = delete;
 
-  // What a sample of a pixel holds from now on.
-  void set_samples(const SampleCounts& samples) { samples_ = samples; }
+  // What samples hold from now on.
+  void set_plan(SamplePlan plan) { plan_ = std::move(plan); }
   // What samples of a slot cost, see Term::work.
   double work(size_t slot, const TermCost& cost) const;
   void describe(GradientStats& stats) const;
+  const MotionRates& motion_rates() const { return rates_; }
+  // Whether a slot's samples belong to pixels, not to the film.
+  bool adds_to_pixels(size_t slot) const {
+    return terms_[slot] && (terms_[slot]->uses_paths() || terms_[slot]->uses_vertices());
+  }
+
+  // One path with one sample of every term at its vertices.
+  struct Sample {
+    Rgb<double> radiance;
+    std::array<Rgb<Lanes>, kMostTerms> terms;  // of each slot; zero for those of the film
+    Rgb<Lanes> score;                          // not yet in any term
+    bool finite;
+  };
+  Sample sample(const PixelSample& at, const Rng& key, const DirectionField* field,
+                SampleSink& sink) const;
 
   const Scene& scene() const override { return scene_; }
   size_t slots() const override { return types_.size(); }
@@ -38,7 +55,7 @@ class TermEstimator final : public SampleEstimator {
   void add_pixel(const PixelSample& at, const Rng& key, SampleSink& sink) const override;
 
   double film_samples(size_t slot) const override {
-    return terms_[slot] && terms_[slot]->uses_film() ? samples_[slot] : 0;
+    return terms_[slot] && terms_[slot]->uses_film() ? plan_.uniform[slot] : 0;
   }
   int film_stream(size_t slot) const override { return types_[slot]->film_stream; }
   bool sample_film(size_t slot, double u, const Rng& key, RayCount& rays,
@@ -48,10 +65,17 @@ class TermEstimator final : public SampleEstimator {
 
  private:
   class VertexTerms;
+  struct Path {
+    Rgb<Dual> radiance;
+    Rgb<Lanes> score;
+    bool finite;
+  };
   template <class Visitor>
-  void add_path(const PixelSample& at, const Rng& key, Visitor& visitor, double weight,
-                SampleSink& sink) const;
-  void add_vertices(const PixelSample& at, const VertexTerms& vertices, SampleSink& sink) const;
+  Path trace(const PixelSample& at, const Rng& key, const DirectionField* field, Visitor& visitor,
+             SampleSink& sink) const;
+  void add_path(const PixelSample& at, const Path& path, double weight, SampleSink& sink) const;
+  void add_vertices(const PixelSample& at, const VertexTerms& vertices, const PixelCounts& counts,
+                    SampleSink& sink) const;
 
   Scene scene_;  // with its parameters seeded
   int lanes_;
@@ -65,7 +89,8 @@ class TermEstimator final : public SampleEstimator {
   std::vector<std::unique_ptr<Term>> terms_;  // of each slot; null where not computed
   size_t pixel_slot_ = 0;                     // of the term that traces paths
   bool paths_ = false, vertices_ = false;     // whether some term uses them
-  SampleCounts samples_;
+  MotionRates rates_;
+  SamplePlan plan_;
 };
 
 }  // namespace limn

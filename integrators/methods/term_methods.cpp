@@ -9,6 +9,8 @@
 
 #include "integrators/estimates/batches.h"
 #include "integrators/methods/allocation.h"
+#include "integrators/methods/field_fit.h"
+#include "integrators/methods/pilot.h"
 #include "integrators/methods/selection.h"
 #include "integrators/methods/term_estimator.h"
 #include "limn/core/error.h"
@@ -46,12 +48,34 @@ void collect(const std::vector<const std::vector<double>*>& sums, const std::vec
   if (block > 0) g.total_blocks.add_batch(sum_blocks(total, width, height, block), samples);
 }
 
+// What a method does beside sampling its terms.
+struct TermMethod {
+  const EdgeSamplerType& sampler;
+  bool moves_directions = false;   // see direction_field.h
+  bool spreads_samples = false;    // over pixels, see spread_samples
+  bool random_directions = false;  // directions move by chance: to show that no mean changes
+};
+
+// A turn and a score of every pixel and parameter, of the order of what moves.
+std::vector<DirectionField> random_fields(size_t count, uint64_t seed) {
+  constexpr uint64_t kStream = 0xf1e1d;  // any number
+  std::vector<DirectionField> fields(count);
+  for (size_t i = 0; i < count; ++i) {
+    Rng rng(mix_bits(seed + kStream), i, 0);
+    for (Vec3<Lanes>* v : {&fields[i].turn, &fields[i].score}) {
+      for (int k = 0; k < 3; ++k) {
+        for (int lane = 0; lane < kLanes; ++lane) (*v)[k][lane] = 2 * rng.uniform() - 1;
+      }
+    }
+  }
+  return fields;
+}
+
 // A whole run of one method.
 class TermJob {
  public:
-  TermJob(const Scene& scene, const GradientOptions& options, const EdgeSamplerType& sampler,
-          int threads)
-      : scene_(scene), options_(options), types_(terms_of(scene, sampler)) {
+  TermJob(const Scene& scene, const GradientOptions& options, const TermMethod& method, int threads)
+      : scene_(scene), options_(options), method_(method), types_(terms_of(scene, method.sampler)) {
     const std::vector<std::string> chosen = selected_terms(term_names(), options.terms, scene.file);
     for (const TermType* type : types_) {
       computed_.push_back(std::find(chosen.begin(), chosen.end(), type->name) != chosen.end());
@@ -62,18 +86,15 @@ class TermJob {
     for (size_t k = 0; k < parameters.size(); k += kLanes) {
       const auto some =
           std::span(parameters).subspan(k).first(std::min<size_t>(kLanes, parameters.size() - k));
-      passes_.push_back(std::make_unique<TermEstimator>(scene, some, computed_, sampler, threads));
+      passes_.push_back(
+          std::make_unique<TermEstimator>(scene, some, computed_, method.sampler, threads));
     }
   }
 
   GradientResult run(const RunSettings& settings, const Stopwatch& watch) {
     GradientResult result = empty_result();
     for (size_t p = 0; p < passes_.size(); ++p) pass(p).describe(result.stats);
-    const Stopwatch pilot_watch;
-    const SampleCounts samples =
-        options_.samples ? *options_.samples : choose_samples(settings, watch, result.pilot_spp);
-    if (result.pilot_spp > 0) result.stats.setup.emplace_back("pilot", pilot_watch.seconds());
-    set_samples(samples, result);
+    plan(settings, watch, result);
     result.setup_seconds = watch.seconds();
     run_batches(passes_, settings, watch, [&](const Batch& batch, const auto& sums) {
       add_batch(batch.count(), sums, result);
@@ -84,7 +105,8 @@ class TermJob {
 
   std::vector<std::string> trace(const RunSettings& settings, const NonFinite::Place& place) {
     GradientResult unused = empty_result();
-    set_samples(options_.samples.value_or(SampleCounts{}), unused);
+    const Stopwatch watch;
+    plan(settings, watch, unused);
     SampleLog log;
     for (size_t p = 0; p < passes_.size(); ++p) {
       for (size_t k = 0; k < static_cast<size_t>(pass(p).lanes()); ++k) {
@@ -101,6 +123,15 @@ class TermJob {
   }
 
  private:
+  // What moving directions change in one term they take back in the others, and at every jump of
+  // radiance there must be an edge.
+  bool can_move_directions() const {
+    for (size_t t = 0; t < types_.size(); ++t) {
+      if (types_[t]->moved_with_directions && !computed_[t]) return false;
+    }
+    return scene_.shading == ShadingModel::kContinuous;
+  }
+  int64_t terms_computed() const { return std::count(computed_.begin(), computed_.end(), true); }
   TermEstimator& pass(size_t p) const { return static_cast<TermEstimator&>(*passes_[p]); }
 
   std::vector<std::string> term_names() const {
@@ -138,9 +169,25 @@ class TermJob {
                     to_string(samples), wanted));
   }
 
-  void set_samples(const SampleCounts& samples, GradientResult& result) const {
-    for (size_t p = 0; p < passes_.size(); ++p) pass(p).set_samples(samples);
-    for (size_t t = 0; t < result.terms.size(); ++t) result.terms[t].samples = samples[t];
+  // Plans every pass, by a pilot or as the options say.
+  void plan(const RunSettings& settings, const Stopwatch& watch, GradientResult& result) const {
+    const Stopwatch pilot_watch;
+    std::vector<double> means(types_.size());
+    for (size_t p = 0; p < passes_.size(); ++p) {
+      SamplePlan plan;
+      plan.uniform = options_.samples.value_or(SampleCounts{});
+      if (!options_.samples) plan = plan_by_pilot(pass(p), settings, watch, result);
+      if (method_.random_directions && can_move_directions()) {
+        plan.grid = PlanGrid(scene_.film, film_size(scene_.film));
+        plan.fields = random_fields(plan.grid.size(), settings.seed);
+      }
+      for (size_t t = 0; t < types_.size(); ++t) {
+        means[t] += plan.uniform[t] / static_cast<double>(passes_.size());
+      }
+      pass(p).set_plan(std::move(plan));
+    }
+    for (size_t t = 0; t < types_.size(); ++t) result.terms[t].samples = means[t];
+    if (result.pilot_spp > 0) result.stats.setup.emplace_back("pilot", pilot_watch.seconds());
   }
 
   GradientResult empty_result() const {
@@ -184,60 +231,89 @@ class TermJob {
     result.spp += samples;
   }
 
-  // Chooses the samples of each term by a pilot. watch: since the job began.
-  SampleCounts choose_samples(const RunSettings& settings, const Stopwatch& watch, int& pilot_spp) {
-    const int spp = pilot_samples(film_size(scene_.film) / 3, settings.spp);
-    if (spp == 0 || std::count(computed_.begin(), computed_.end(), true) < 2) return {};
-    RunSettings quiet = settings;
-    quiet.progress = nullptr;
-    ProgressCounter progress(quiet, watch, 1);
-    GradientResult pilot = empty_result();
-    // Another stream of random numbers: a choice that depends on the samples it is made for would
-    // bias them.
-    const uint64_t seed = mix_bits(settings.seed + 0x9110);
-    const double began = watch.seconds();
-    while (pilot.spp < spp) {
-      const int s = static_cast<int>(pilot.spp);
-      const auto sums = run_batch(passes_, {seed, s, s + 1}, settings.threads, progress);
-      if (sums.empty()) return {};
-      add_batch(1, sums, pilot);
-      if (settings.seconds > 0 && watch.seconds() - began > settings.seconds / 8) break;
+  // watch: since the job began.
+  SamplePlan plan_by_pilot(const TermEstimator& estimator, const RunSettings& settings,
+                           const Stopwatch& watch, GradientResult& result) const {
+    SamplePlan plan;
+    const int spp = pilot_samples(settings.spp);
+    if (spp == 0 || (!method_.spreads_samples && terms_computed() < 2)) return plan;
+    const bool turns = method_.moves_directions && can_move_directions() &&
+                       estimator.lanes() == 1 && !estimator.motion_rates().still();
+    const PilotFigures pilot = run_pilot(estimator, turns, spp, settings, watch);
+    if (pilot.spp == 0) return plan;
+    result.pilot_spp = pilot.spp;
+    FieldFit fit;
+    if (turns) fit = fit_fields(pilot, settings.threads);
+    const std::vector<TermFigures> figures = figures_of(estimator, pilot, fit);
+    if (method_.spreads_samples) {
+      spread_samples(figures, pilot.grid, plan);
+    } else {
+      plan.uniform = best_samples(figures);
     }
-    pilot_spp = static_cast<int>(pilot.spp);
-    if (pilot.spp < 2) return {};
-    const std::vector<double> variances = pilot_variances(pilot);
-    std::vector<TermFigures> figures;
-    for (size_t t = 0; t < types_.size(); ++t) {
-      figures.push_back(
-          {variances[t], pass(0).work(t, pilot.terms[t].cost), types_[t]->least_samples});
+    plan.grid = pilot.grid;
+    plan.fields = std::move(fit.fields);
+    return plan;
+  }
+
+  // Each parameter counts alike: its variances are divided by their sum.
+  std::vector<TermFigures> figures_of(const TermEstimator& estimator, const PilotFigures& pilot,
+                                      const FieldFit& fit) const {
+    std::vector<TermFigures> figures(types_.size());
+    for (size_t t = 0; t < figures.size(); ++t) {
+      figures[t].cost = pilot.work[t];
+      figures[t].least = types_[t]->least_samples;
+      if (!pilot.halves[0][t].empty()) figures[t].cells.resize(pilot.grid.size());
     }
-    return best_samples(figures);
+    for (int lane = 0; lane < estimator.lanes(); ++lane) {
+      std::vector<std::vector<double>> cells(figures.size());
+      std::vector<double> means(figures.size());
+      double sum = 0;
+      for (size_t t = 0; t < figures.size(); ++t) {
+        if (figures[t].cells.empty()) {
+          means[t] = pilot.film_variance[t][lane];
+        } else {
+          cells[t] = fit.variances.empty() ? pilot.variances(t, lane) : fit.variances[t];
+          means[t] = trimmed_mean(cells[t]);
+        }
+        sum += means[t];
+      }
+      if (!(sum > 0)) continue;
+      for (size_t t = 0; t < figures.size(); ++t) {
+        figures[t].variance += means[t] / sum;
+        for (size_t i = 0; i < cells[t].size(); ++i) figures[t].cells[i] += cells[t][i] / sum;
+      }
+    }
+    return figures;
   }
 
   const Scene& scene_;
   const GradientOptions& options_;
+  TermMethod method_;
   std::vector<const TermType*> types_;
   std::vector<bool> computed_;  // of each term
   std::vector<std::unique_ptr<SampleEstimator>> passes_;
 };
 
-MethodType term_method(const EdgeSamplerType& sampler) {
+MethodType method_row(const std::string& name, const std::string& description,
+                      const TermMethod& term_method) {
   MethodType method;
-  method.name = sampler.name;
-  method.description = sampler.description;
+  method.name = name;
+  method.description = description;
   for (const TermType& type : term_types()) {
-    if (!type.regions || sampler.regions) method.terms.emplace_back(type.name);
+    if (!type.regions || term_method.sampler.regions) method.terms.emplace_back(type.name);
   }
   method.terms_can_be_left_out = true;
-  method.ablation = sampler.ablation;
-  method.run = [&sampler](const MethodType&, const Scene& scene, const GradientOptions& options,
-                          const RunSettings& settings) {
+  method.ablation = term_method.sampler.ablation || term_method.random_directions;
+  method.only_sum_fixed = term_method.moves_directions || term_method.random_directions;
+  method.run = [term_method](const MethodType&, const Scene& scene, const GradientOptions& options,
+                             const RunSettings& settings) {
     const Stopwatch watch;
-    return TermJob(scene, options, sampler, settings.threads).run(settings, watch);
+    return TermJob(scene, options, term_method, settings.threads).run(settings, watch);
   };
-  method.trace = [&sampler](const MethodType&, const Scene& scene, const GradientOptions& options,
-                            const RunSettings& settings, const NonFinite::Place& place) {
-    return TermJob(scene, options, sampler, settings.threads).trace(settings, place);
+  method.trace = [term_method](const MethodType&, const Scene& scene,
+                               const GradientOptions& options, const RunSettings& settings,
+                               const NonFinite::Place& place) {
+    return TermJob(scene, options, term_method, settings.threads).trace(settings, place);
   };
   return method;
 }
@@ -245,8 +321,26 @@ MethodType term_method(const EdgeSamplerType& sampler) {
 }  // namespace
 
 std::vector<MethodType> term_methods() {
+  const EdgeSamplerType& forest = edge_sampler_types()[0];
+  const EdgeSamplerType& silhouettes = edge_sampler_types()[1];
   std::vector<MethodType> methods;
-  for (const EdgeSamplerType& type : edge_sampler_types()) methods.push_back(term_method(type));
+  methods.push_back(method_row("adaptive",
+                               "the forest, with directions that move along with what they see and "
+                               "samples where the error is",
+                               {forest, true, true}));
+  methods.push_back(method_row("moving-directions",
+                               "the forest, with directions that move along with what they see",
+                               {forest, true, false}));
+  methods.push_back(method_row("adaptive-silhouettes",
+                               "adaptive, and all silhouettes before lamps, listed by the forest",
+                               {silhouettes, true, true}));
+  for (const EdgeSamplerType& type : edge_sampler_types()) {
+    methods.push_back(method_row(type.name, type.description, {type}));
+  }
+  methods.push_back(method_row("random-directions",
+                               "the forest, with directions that move by chance: noise, but the "
+                               "same mean",
+                               {forest, false, false, true}));
   return methods;
 }
 

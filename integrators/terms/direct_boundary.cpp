@@ -37,7 +37,6 @@ class DirectTerm final : public Term {
         edges_(input.edges()),
         sampler_(input.edge_sampler()),
         regions_(*input.regions()),
-        lanes_(input.lanes),
         lane_scale_(input.lane_scale) {}
 
   bool uses_vertices() const override { return true; }
@@ -56,14 +55,13 @@ class DirectTerm final : public Term {
   const EdgeSamplerInput& edges_;
   const EdgeSampler& sampler_;
   const LightRegions& regions_;
-  int lanes_;
   Lanes lane_scale_;
 };
 
 void DirectTerm::list(const EdgeQuery& query, std::vector<Drawn>& drawn) const {
   static thread_local std::vector<ListedEdge> listed;
   static thread_local std::vector<EdgePiece> pieces;
-  const EdgePieces cut(query, lanes_, lane_scale_);
+  const EdgePieces cut(query, lane_scale_);
   double sum = 0;
   for (uint32_t k = 0; k < regions_.size(); ++k) {
     const std::optional<DirectionCone> cone = regions_.cone(k, query.p, query.n);

@@ -25,9 +25,8 @@ EdgePiece::Place EdgePiece::place(double u) const {
   return {t0 + (t1 - t0) * s, sum * sum / (inverse_l0 * inverse_l1 * (t1 - t0))};
 }
 
-EdgePieces::EdgePieces(const EdgeQuery& query, int lanes, const Lanes& lane_scale)
+EdgePieces::EdgePieces(const EdgeQuery& query, const Lanes& lane_scale)
     : query_(query),
-      lanes_(lanes),
       scale_(lane_scale),
       lobe_(query.lobe, query.n, query.wi),
       widest_(widest_of(query.lobe)),
@@ -81,7 +80,7 @@ double EdgePieces::mean_over(const EdgePiece& piece, const Vec3d& w0, const Vec3
     const double to_begin = (1 - u) * piece.inverse_l0, to_end = u * piece.inverse_l1;
     const double to_both = to_begin + to_end, to_v1 = to_begin * piece.t0 + to_end * piece.t1;
     double speed = 0;
-    for (int k = 0; k < lanes_; ++k)
+    for (int k = 0; k < kLanes; ++k)
       speed += scale_[k] * std::fabs(v0[k] * (to_both - to_v1) + v1[k] * to_v1);
     sum += speed * lobe_.homogeneous_value(w0 * to_both + along * to_v1);
   }

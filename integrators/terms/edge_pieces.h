@@ -33,8 +33,8 @@ struct EdgePiece {
 
 class EdgePieces {
  public:
-  // lanes: how many parameters count, each by its scale.
-  EdgePieces(const EdgeQuery& query, int lanes, const Lanes& lane_scale);
+  // Each parameter counts by its scale.
+  EdgePieces(const EdgeQuery& query, const Lanes& lane_scale);
 
   // Appends the part [t0, t1] of an edge, which lies above the horizon, in pieces. Nothing if it is
   // at rest or if its line meets p.
@@ -46,7 +46,6 @@ class EdgePieces {
                    const Lanes& v1) const;
 
   const EdgeQuery& query_;
-  int lanes_;
   Lanes scale_;
   LtcLobe lobe_;
   double widest_, cosine_of_widest_;

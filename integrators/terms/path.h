@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 
+#include "integrators/terms/direction_field.h"
 #include "limn/core/lights.h"
 #include "limn/core/ray_tracer.h"
 #include "limn/core/rng.h"
@@ -53,13 +54,23 @@ inline double mis_weight(double pdf, double other) {
   return 1 / (1 + ratio * ratio);
 }
 
-// Visitor: called as visitor(surface, scattering, throughput, bounces, key) at every vertex where
-// the path scatters.
+// Visitor: called as visitor(surface, scattering, throughput, motion, bounces, key) at every vertex
+// where the path scatters. motion: how directions move there, null where they are held.
 template <class S, class Visitor>
 class PathTracer {
  public:
   PathTracer(const PathContext& context, RayCount& rays, Visitor& visitor)
       : c_(context), rays_(rays), visitor_(visitor) {}
+
+  // Directions at the first vertex of the path move from now on. Both must outlive the tracer. Only
+  // where S carries derivatives.
+  void move_directions(const MotionRates& rates, const DirectionField& field) {
+    static_assert(std::is_same_v<S, Dual>);
+    rates_ = &rates;
+    field_ = &field;
+  }
+  // Sum of the scores over the paths so far: has mean zero, and belongs to the interior term.
+  const Rgb<Lanes>& score() const { return score_; }
 
   // Radiance that arrives at the origin of a ray against its direction. `ray` is the primal ray
   // with its skipped faces; bounces: how often the whole path has scattered before.
@@ -95,19 +106,21 @@ class PathTracer {
       if (c_.scene.max_depth >= 0 && bounces + 1 >= c_.scene.max_depth) return radiance;
       const Scattering<S> scattering(surface, wi, c_.scene.shading);
       if (scattering.black()) return radiance;
-      visitor_(surface, scattering, throughput, bounces, key);
-      radiance += throughput * direct_light(surface, scattering, bounces, key, edge);
+      const DirectionMotion* motion = motion_at(surface, bounces);
+      visitor_(surface, scattering, throughput, motion, bounces, key);
+      radiance += throughput * direct_light(surface, scattering, motion, bounces, key, edge);
       Rng rng = key.at(Purpose::kBsdf, bounces);
       const double u1 = rng.uniform();
       const double u2 = rng.uniform();
       const auto wo = scattering.sample(u1, u2);
       if (!wo) return radiance;
-      const auto [f, pdf] = scattering.eval_with_pdf(*wo);
+      const Vec3<S> direction = moving(*wo, motion);
+      const auto [f, pdf] = evaluate(scattering, *wo, direction, motion);
       if (is_black(value(f))) return radiance;
+      add_score(scattering, *wo, motion, value(throughput) * (1 / pdf));
       throughput = throughput * f * (1 / pdf);
       Hit hit;
       const bool found = next_hit(surface, *wo, edge, hit);
-      const Vec3<S> direction{wo->x, wo->y, wo->z};
       if (!found) {
         if (!c_.scene.environment) return radiance;
         const double weight = mis_weight(pdf, c_.lights.pdf_environment(*wo));
@@ -127,6 +140,35 @@ class PathTracer {
   }
 
  private:
+  const DirectionMotion* motion_at(const SurfacePoint<S>& surface, int bounces) {
+    if constexpr (std::is_same_v<S, Dual>) {
+      if (bounces > 0 || !field_) return nullptr;
+      motion_ = rates_->motion_at(value(surface.p), *field_);
+      return &motion_;
+    }
+    return nullptr;
+  }
+  static Vec3<S> moving(const Vec3d& w, const DirectionMotion* motion) {
+    if constexpr (std::is_same_v<S, Dual>) {
+      if (motion) return motion->moving(w);
+    }
+    return {w.x, w.y, w.z};
+  }
+  static typename Scattering<S>::Evaluation evaluate(const Scattering<S>& scattering,
+                                                     const Vec3d& w, const Vec3<S>& direction,
+                                                     const DirectionMotion* motion) {
+    if (!motion) return scattering.eval_with_pdf(w);
+    return {scattering.eval(direction), scattering.pdf_solid_angle(w)};
+  }
+  void add_score(const Scattering<S>& scattering, const Vec3d& w, const DirectionMotion* motion,
+                 const Rgb<double>& weight) {
+    if constexpr (std::is_same_v<S, Dual>) {
+      if (!motion || !motion->scoring) return;
+      const Rgb<Lanes> f = scattering.eval_derivative(motion->moving_score(w));
+      score_ = score_ + Rgb<Lanes>{f.r * weight.r, f.g * weight.g, f.b * weight.b};
+    }
+  }
+
   // The next surface from a path vertex; hit.t = 0 for a neighbour that blocks at the edge itself.
   bool next_hit(const SurfacePoint<S>& surface, const Vec3d& wo, const EdgeStart* edge, Hit& hit) {
     Ray ray{value(surface.p), wo};
@@ -161,8 +203,9 @@ class PathTracer {
     return radiance * mis_weight(pdf, other);
   }
 
-  Rgb<S> direct_light(const SurfacePoint<S>& surface, const Scattering<S>& scattering, int bounces,
-                      const Rng& key, const EdgeStart* edge) {
+  Rgb<S> direct_light(const SurfacePoint<S>& surface, const Scattering<S>& scattering,
+                      const DirectionMotion* motion, int bounces, const Rng& key,
+                      const EdgeStart* edge) {
     if (c_.lights.empty()) return {};
     Rng rng = key.at(Purpose::kEmitter, bounces);
     const Vec3d p = value(surface.p);
@@ -171,10 +214,11 @@ class PathTracer {
     if (const DeltaLight* delta = light->light->delta()) {
       return delta_light(*delta, *light, surface, scattering, edge);
     }
-    const auto [f, bsdf_pdf] = scattering.eval_with_pdf(light->wo);
+    const Vec3<S> direction = moving(light->wo, motion);
+    const auto [f, bsdf_pdf] = evaluate(scattering, light->wo, direction, motion);
     if (is_black(value(f)) || shadowed(p, surface.face, *light, edge)) return {};
     const double weight = mis_weight(light->pdf, bsdf_pdf) / light->pdf;
-    return f * light->light->radiance(Vec3<S>{light->wo.x, light->wo.y, light->wo.z}) * weight;
+    return f * light->light->radiance(direction) * weight;
   }
 
   // No ray meets a delta light by chance, so it has the whole weight. Its direction follows the
@@ -218,6 +262,10 @@ class PathTracer {
   const PathContext& c_;
   RayCount& rays_;
   Visitor& visitor_;
+  const MotionRates* rates_ = nullptr;
+  const DirectionField* field_ = nullptr;
+  DirectionMotion motion_;
+  Rgb<Lanes> score_;
 };
 
 }  // namespace limn

@@ -23,6 +23,7 @@ struct PathVertex {
   const SurfacePoint<Dual>& surface;
   const Scattering<Dual>& scattering;
   const Rgb<double>& throughput;  // of the path up to here
+  Vec3<Lanes> turn;               // angular velocity of directions here, see direction_field.h
   int bounces;                    // how often it has scattered before
   const Rng& key;                 // of the path
   SampleLog* log = nullptr;       // null unless somebody reads it
@@ -106,8 +107,9 @@ struct TermType {
   // Paths are this term's samples, and what it takes to trace them is booked on it even if only
   // others are computed. One row.
   bool traces_paths;
-  bool edges;                           // it samples edges: rare events
-  int film_stream;                      // tells the random numbers of terms on the film apart
+  bool edges;                  // it samples edges: rare events
+  bool moved_with_directions;  // its mean changes where directions move, see direction_field.h
+  int film_stream;             // tells the random numbers of terms on the film apart
   bool (*applies)(const Scene& scene);  // whether the scene has anything that the term could be of
   bool regions;  // it is of samplers that keep regions of light apart, and of no others
   std::unique_ptr<Term> (*make)(TermInput& input);

@@ -13,27 +13,20 @@ std::unique_ptr<Term> make_direct_term(TermInput& input);
 
 inline bool always(const Scene&) { return true; }
 inline bool has_delta_lights(const Scene& scene) { return !scene.delta_lights.empty(); }
-inline bool has_lamps(const Scene& scene) {
-  for (const Shape& shape : scene.shapes) {
-    if (shape.is_emitter) return true;
-  }
-  return false;
-}
-
 // The camera's samples are drawn over the whole film: there may be fewer of them than pixels.
 inline constexpr double kLeastFilmSamples = 0.125;  // not tuned
 
 inline constexpr TermType kTermTypes[] = {
-    {"interior", "what slides within continuous regions", 1, true, false, 0, always, false,
+    {"interior", "what slides within continuous regions", 1, true, false, true, 0, always, false,
      make_interior_term},
-    {"camera", "silhouettes on the film", kLeastFilmSamples, false, true, 0, always, false,
+    {"camera", "silhouettes on the film", kLeastFilmSamples, false, true, false, 0, always, false,
      make_camera_term},
-    {"boundary", "silhouettes that shading points see", 1, false, true, 0, always, false,
+    {"boundary", "silhouettes that shading points see", 1, false, true, true, 0, always, false,
      make_boundary_term},
-    {"shadow", "edges of sharp shadows", 1, false, true, 1, has_delta_lights, false,
+    {"shadow", "edges of sharp shadows", 1, false, true, true, 1, has_delta_lights, false,
      make_shadow_term},
-    {"direct", "silhouettes that shading points see before lamps", 1, false, true, 0, has_lamps,
-     true, make_direct_term},
+    {"direct", "silhouettes that shading points see before lamps and the sun", 1, false, true, true,
+     0, LightRegions::any_in, true, make_direct_term},
 };
 
 }  // namespace limn

@@ -13,6 +13,7 @@ inline EdgeQuery query_at(const PathVertex& vertex) {
   query.wi = value(vertex.scattering.wi());
   query.lobe = vertex.scattering.bsdf().lobe();
   query.velocity = {p.x.d, p.y.d, p.z.d};
+  query.turn = vertex.turn;
   query.face = vertex.surface.face;
   return query;
 }

@@ -67,12 +67,47 @@ TEST(BestSamples, AreLimited) {
   EXPECT_EQ(best_samples({{4, 1}, {1, 1}, {1, 1}, {9, 1, 0.125}}), (SampleCounts{2, 1, 1, 3}));
 }
 
-TEST(PilotSamples, AreFewAndNoneForShortJobs) {
-  EXPECT_EQ(pilot_samples(64 * 64, 15), 0);
-  EXPECT_EQ(pilot_samples(64 * 64, 16), 2);
-  EXPECT_EQ(pilot_samples(16 * 16, 1024), 8);
-  EXPECT_EQ(pilot_samples(1024 * 1024, 1024), 2);
-  for (int spp = 16; spp < 100; ++spp) EXPECT_LE(8 * pilot_samples(64, spp), spp);
+TEST(PilotSamples, AreFewAndEvenAndNoneForShortJobs) {
+  EXPECT_EQ(pilot_samples(15), 0);
+  EXPECT_EQ(pilot_samples(16), 4);
+  EXPECT_EQ(pilot_samples(1024), 8);
+  for (int spp = 16; spp < 100; ++spp) {
+    EXPECT_EQ(pilot_samples(spp) % 2, 0);
+    EXPECT_LE(4 * pilot_samples(spp), spp);
+  }
+}
+
+// Two halves of a film of 36 by 12 cells, one with a hundred times the variance of the other.
+TEST(SpreadSamples, GoWithTheRootOfTheDeviation) {
+  PlanGrid grid;
+  grid.columns = 36;
+  grid.rows = 12;
+  TermFigures term{50.5, 1, 1, std::vector<double>(grid.size(), 1.0)};
+  for (size_t i = 0; i < grid.size(); ++i) {
+    if (i % 36 < 18) term.cells[i] = 100;
+  }
+  SamplePlan plan;
+  spread_samples({term, {0, 0, 0.125}}, grid, plan);
+  ASSERT_EQ(plan.counts.size(), grid.size());
+  // Cells whose windows lie in one half.
+  const double ratio = plan.counts[0][0] / static_cast<double>(plan.counts[35][0]);
+  EXPECT_GE(ratio, 2);
+  EXPECT_LE(ratio, 4);  // the root of ten is 3.2
+  double sum = 0;
+  for (const PixelCounts& counts : plan.counts) sum += counts[0];
+  EXPECT_DOUBLE_EQ(plan.uniform[0], sum / static_cast<double>(grid.size()));
+}
+
+TEST(SpreadSamples, AreEvenWhereNothingVaries) {
+  PlanGrid grid;
+  grid.columns = grid.rows = 10;
+  SamplePlan plan;
+  const std::vector<double> ones(grid.size(), 1.0);
+  spread_samples({{1, 1, 1, ones}, {9, 1, 1, std::vector<double>(grid.size(), 9.0)}}, grid, plan);
+  for (const PixelCounts& counts : plan.counts) {
+    EXPECT_EQ(counts[0], 1);
+    EXPECT_EQ(counts[1], 3);
+  }
 }
 
 // Indices of the terms of scenes without sharp shadows.
@@ -103,8 +138,10 @@ Scene shadow_scene(const TempFiles& files) {
 
 GradientResult run(const Scene& scene, const std::vector<std::string>& parameters,
                    const std::optional<SampleCounts>& samples, const RunSettings& settings,
-                   const std::vector<std::string>& terms = {}) {
+                   const std::vector<std::string>& terms = {},
+                   const std::string& method = "forest") {
   GradientOptions options;
+  options.method = method;
   options.parameters = parameters;
   options.samples = samples;
   options.terms = terms;

@@ -8,7 +8,6 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "limn/edgetree/edge_sampler_types.h"
 #include "limn/integrators/methods.h"
 #include "limn/integrators/statistics.h"
 
@@ -72,7 +71,7 @@ void compare(const Moments& estimate, const json& exact, double accuracy, const 
   EXPECT_GE(summary.p_largest, kLevel) << name << ": largest |z| " << summary.largest;
 }
 
-// Sampler and scene file.
+// Method and scene file.
 class ClosedForm : public testing::TestWithParam<std::tuple<std::string, std::string>> {};
 
 json find_reference(const std::string& file) {
@@ -82,12 +81,13 @@ json find_reference(const std::string& file) {
   return {};
 }
 
-void expect_exact(const std::string& sampler, const std::string& file,
-                  const SampleCounts& samples) {
+// samples: none where the method is to choose them.
+void expect_exact(const std::string& method, const std::string& file,
+                  const std::optional<SampleCounts>& samples) {
   const json reference = find_reference(file);
   const Scene scene = read_scene(kFolder + file, {}, nullptr);
   GradientOptions options;
-  options.method = sampler;
+  options.method = method;
   options.samples = samples;
   for (const json& p : reference["parameters"]) {
     std::string name = p["name"];
@@ -101,13 +101,14 @@ void expect_exact(const std::string& sampler, const std::string& file,
   const GradientResult result = gradient(scene, options, settings);
   EXPECT_EQ(result.non_finite.count, 0u) << result.non_finite.message();
   const double accuracy = reference["accuracy"];
-  const double fewest = std::min(1.0, samples[result.term("camera")]);
+  const double fewest = std::min(1.0, result.terms[result.term("camera")].samples);
   compare(result.radiance, reference["image"], accuracy, "image", fewest);
   for (size_t k = 0; k < options.parameters.size(); ++k) {
     const json& exact = reference["parameters"][k];
     const ParameterGradient& g = result.parameters[k];
     const std::string name = exact["name"];
     compare(g.total, exact["total"], accuracy, name, fewest);
+    if (find_method(method).only_sum_fixed) continue;
     for (size_t t = 0; t < result.terms.size(); ++t) {
       const std::string& term = result.terms[t].name;
       // Where regions of light are apart, the boundary term is two.
@@ -119,8 +120,9 @@ void expect_exact(const std::string& sampler, const std::string& file,
 }
 
 TEST_P(ClosedForm, GradientIsExact) {
-  const auto& [sampler, file] = GetParam();
-  expect_exact(sampler, file, {});
+  const auto& [method, file] = GetParam();
+  const bool chooses = find_method(method).only_sum_fixed && !find_method(method).ablation;
+  expect_exact(method, file, chooses ? std::nullopt : std::optional(SampleCounts{}));
 }
 
 // Whatever one sample per pixel holds.
@@ -165,10 +167,11 @@ bool has_boundary(const json& reference) {
 
 std::vector<std::tuple<std::string, std::string>> all_cases() {
   std::vector<std::tuple<std::string, std::string>> cases;
-  for (const auto& type : edge_sampler_types()) {
+  for (const MethodType& type : method_types()) {
+    if (!type.terms_can_be_left_out) continue;
     for (const json& reference : read_references()) {
       // Where shading points see no edge move, a variant of the forest has nothing to show.
-      if (type.ablation && !has_boundary(reference)) continue;
+      if (type.ablation && !type.only_sum_fixed && !has_boundary(reference)) continue;
       cases.emplace_back(type.name, reference["file"]);
     }
   }

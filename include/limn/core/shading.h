@@ -166,6 +166,19 @@ class Scattering {
     if (value(factor) == 0) return {};
     return bsdf_->eval(n_, wi_, w) * factor;
   }
+  // The part of eval's derivative that comes from the motion of wo alone, for parameters that are
+  // not the BSDF's own; zero for those that leave wo at rest.
+  Rgb<Lanes> eval_derivative(const Vec3<Dual>& wo) const {
+    Scattering<Dual> still(*this);
+    still.hold();
+    const Rgb<Dual> f = still.eval(wo);
+    Rgb<Lanes> result;
+    for (int k = 0; k < kLanes; ++k) {
+      if (wo.x.d[k] == 0 && wo.y.d[k] == 0 && wo.z.d[k] == 0) continue;
+      for (int c = 0; c < 3; ++c) result[c][k] = f[c].d[k];
+    }
+    return result;
+  }
   double pdf_solid_angle(const Vec3d& wo) const {
     return bsdf_->pdf_solid_angle(value(n_), value(wi_), wo);
   }
@@ -188,6 +201,16 @@ class Scattering {
   }
 
  private:
+  // Drops all derivatives.
+  void hold() {
+    const auto constant = [](const Vec3<S>& v) {
+      return Vec3<S>{value(v.x), value(v.y), value(v.z)};
+    };
+    wi_ = constant(wi_);
+    n_s_ = constant(n_s_);
+    n_ = constant(n_);
+    horizon_ = S(value(horizon_));
+  }
   void bend() {
     const double limit = 0.01;  // e above; not tuned: any small number is continuous
     const S c = dot(n_s_, wi_);

@@ -14,6 +14,8 @@ struct MethodType {
   std::string description;
   std::vector<std::string> terms;  // what it can compute, in the order of --samples and all tables
   bool terms_can_be_left_out = false;
+  // What terms hold by themselves depends on choices that the run makes; their sum does not.
+  bool only_sum_fixed = false;
   bool ablation = false;  // a variant that shows what a part of a method is worth
   std::function<GradientResult(const MethodType&, const Scene&, const GradientOptions&,
                                const RunSettings&)>

@@ -1,0 +1,49 @@
+#pragma once
+// The pilot of a run: a few samples of every pixel, or of one pixel in every cell of a large film,
+// for choices about the others. Its random numbers are its own, and its samples are thrown away: a
+// choice that depends on the samples it is made for would bias them.
+#include <array>
+#include <vector>
+
+#include "integrators/estimates/batches.h"
+#include "integrators/methods/sample_plan.h"
+#include "integrators/methods/term_estimator.h"
+
+namespace limn {
+
+// What is known of one sample of a term: its derivatives in all lanes, and for the term that traces
+// paths the scores of lanes 1 to 3.
+inline constexpr int kFigures = kLanes + 3;
+
+// Symmetric, kFigures by kFigures; summed over channels.
+struct Covariance {
+  std::array<float, kFigures*(kFigures + 1) / 2> entries{};
+
+  static constexpr size_t index(int i, int j) {
+    return i < j ? index(j, i) : static_cast<size_t>(i * (i + 1) / 2 + j);
+  }
+  float& at(int i, int j) { return entries[index(i, j)]; }
+  float at(int i, int j) const { return entries[index(i, j)]; }
+};
+
+struct PilotFigures {
+  int spp = 0;  // samples of every probed pixel; 0: there was no time for a pilot
+  PlanGrid grid;
+  // [half][slot][cell]: covariances of one sample, from either half of the pilot. Empty for slots
+  // that add nothing to pixels.
+  std::array<std::vector<std::vector<Covariance>>, 2> halves;
+  // Of slots on the film: the mean over pixels of the variance of one sample per pixel, summed over
+  // channels, of each lane.
+  std::vector<Lanes> film_variance;
+  // Of one sample of a slot, in every cell.
+  std::vector<double> variances(size_t slot, int lane) const;
+  std::vector<double> work;  // of one sample of a pixel, of every slot, see Term::work
+};
+
+// fields: directions at first vertices turn in lanes 1 to 3, about the axes, at the rates of
+// estimator.motion_rates(); needs a single parameter. spp: even. settings: its limit of time holds
+// for the whole job, which `watch` has timed since it began: a pilot takes an eighth of it at most.
+PilotFigures run_pilot(const TermEstimator& estimator, bool fields, int spp,
+                       const RunSettings& settings, const Stopwatch& watch);
+
+}  // namespace limn

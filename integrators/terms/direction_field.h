@@ -1,0 +1,69 @@
+#pragma once
+// Directions that move with the parameters: at the first vertex of a path a sampled direction w may
+// turn, dw/dtheta = V(w) = turn x w. The substitution changes no integral over directions, so the
+// change that it makes to the interior term,
+//   a_V = (f L)' along V,     (div V = 0: nothing stretches)
+// and the change that it makes to the boundary terms, whose edges now move with v - |w| V instead
+// of v, have means that cancel. So any turn gives the same mean, and that with the least variance
+// may be chosen, from other samples than those it is used for. A turn that follows an object as it
+// is seen from the vertex takes its sliding hit points and its silhouettes out together.
+//
+// The score without radiance, f' along V over the density of w, has mean zero as well, because f
+// vanishes at the horizon: any multiple of it may be added.
+#include <vector>
+
+#include "limn/core/scene.h"
+
+namespace limn {
+
+// Of a pixel, per parameter, in units of MotionRates.
+struct DirectionField {
+  Vec3<Lanes> turn{};   // of the sampled directions
+  Vec3<Lanes> score{};  // of the directions of the score that is added
+};
+
+// The same at one vertex: angular velocities.
+struct DirectionMotion {
+  Vec3<Lanes> turn{}, score{};
+  bool scoring = false;  // whether the score is not zero
+
+  // The direction w with its derivative.
+  Vec3<Dual> moving(const Vec3d& w) const { return rotated(turn, w); }
+  Vec3<Dual> moving_score(const Vec3d& w) const { return rotated(score, w); }
+
+ private:
+  static Vec3<Dual> rotated(const Vec3<Lanes>& rate, const Vec3d& w) {
+    const Vec3<Lanes> v = cross(rate, w);
+    return {{w.x, v.x}, {w.y, v.y}, {w.z, v.z}};
+  }
+};
+
+// How fast what moves does so as seen from a point: the unit of turns, per parameter.
+class MotionRates {
+ public:
+  // scene: with its parameters seeded in the first `lanes` lanes. With one parameter the other
+  // lanes repeat its rate.
+  MotionRates(const Scene& scene, int lanes);
+
+  // Angular velocity at p [1 / unit of the parameter], at least a bound's order of magnitude.
+  Lanes at(const Vec3d& p) const;
+  DirectionMotion motion_at(const Vec3d& p, const DirectionField& field) const;
+  // Nothing moves: turning would only add noise.
+  bool still() const { return sources_.empty(); }
+
+ private:
+  struct Source {
+    int lane;
+    Vec3d center;
+    double radius;    // at least; > 0
+    double speed;     // root mean square over the object's vertices, or of the camera
+    double rotation;  // of the camera [1 / unit of the parameter]
+  };
+  void add_object(const Scene& scene, int lane);
+  void add_camera(const Scene& scene, int lane);
+
+  std::vector<Source> sources_;
+  bool repeat_ = false;
+};
+
+}  // namespace limn
