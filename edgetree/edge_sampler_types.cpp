@@ -63,12 +63,16 @@ std::span<const EdgeSamplerType> edge_sampler_types() {
 
 const EdgeSamplerType& default_edge_sampler() { return edge_sampler_types().front(); }
 
-std::unique_ptr<EdgeSampler> make_edge_sampler(const std::string& name,
-                                               const EdgeSamplerInput& input, int threads) {
+const EdgeSamplerType& edge_sampler_type(const std::string& name) {
   for (const EdgeSamplerType& type : edge_sampler_types()) {
-    if (type.name == name) return type.make(input, threads);
+    if (type.name == name) return type;
   }
   throw InputError(unknown_name("edge sampler", name, names_of(edge_sampler_types())));
+}
+
+std::unique_ptr<EdgeSampler> make_edge_sampler(const std::string& name,
+                                               const EdgeSamplerInput& input, int threads) {
+  return edge_sampler_type(name).make(input, threads);
 }
 
 }  // namespace limn

@@ -158,6 +158,18 @@ void spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& gri
   plan.uniform = SampleCounts(means);
 }
 
+int best_light_samples(double variance, double cost, const LightFigures& light) {
+  constexpr double kGain = 0.95;  // more must be worth it; not tuned
+  const auto product = [&](int n) {
+    return (variance + light.variance / n) * (cost + light.cost * n);
+  };
+  int best = 1;
+  for (const int n : {2, 4, 8}) {
+    if (product(n) < kGain * product(best)) best = n;
+  }
+  return best;
+}
+
 double trimmed_mean(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   const size_t kept = values.size() - values.size() / 1000;

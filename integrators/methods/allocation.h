@@ -27,6 +27,14 @@ SampleCounts best_samples(const std::vector<TermFigures>& figures);
 void spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& grid,
                     SamplePlan& plan);
 
+// Light samples of a path: what one of them adds to its variance, and what it costs.
+struct LightFigures {
+  double variance = 0, cost = 0;
+};
+// How many light samples of each path, of 1, 2, 4 and 8, give the least product of what a path is
+// left with and what it costs. variance, cost: of a path without any.
+int best_light_samples(double variance, double cost, const LightFigures& light);
+
 // Without the thousandth of the values that is largest: single bright samples would rule a choice.
 double trimmed_mean(std::vector<double> values);
 

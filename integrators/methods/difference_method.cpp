@@ -121,7 +121,7 @@ GradientResult run_differences(const MethodType& method, const Scene& scene,
     result.parameters.push_back(to_gradient(jobs[k].parameter, run.estimates[k][0]));
   }
   result.radiance = std::move(run.radiance);
-  result.terms = {{method.terms[0], true, true, 1, run.cost}};
+  result.terms = {{method.terms[0], true, true, 1, {}, run.cost}};
   result.spp = run.spp;
   result.seconds = watch.seconds();
   result.setup_seconds = run.setup_seconds + pilot_seconds;

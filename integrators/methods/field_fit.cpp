@@ -117,7 +117,7 @@ class Fitter {
   // its derivative by v is proportional to sqrt(c / v).
   void weigh_terms(const std::vector<std::vector<double>>& variances) {
     for (int half = 0; half < 2; ++half) total_[half].assign(grid_.size(), {});
-    for (size_t slot = 0; slot < variances.size(); ++slot) {
+    for (size_t slot = 0; slot < figures_.work.size(); ++slot) {
       if (variances[slot].empty()) continue;
       const double mean = trimmed_mean(variances[slot]);
       if (!(mean > 0)) continue;

@@ -9,7 +9,7 @@ namespace limn {
 struct FieldFit {
   std::vector<DirectionField> fields;  // by cell; empty if directions are better held everywhere
   // [slot][cell]: the variance of one sample, cross-validated: fields from one half of the pilot
-  // are judged by the other. Empty for slots that add nothing to pixels.
+  // are judged by the other. Slots as in PilotFigures::halves.
   std::vector<std::vector<double>> variances;
   double held_share = 1;  // of the cells, where directions are held
 };

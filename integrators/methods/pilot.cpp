@@ -2,6 +2,7 @@
 #include "integrators/methods/pilot.h"
 
 #include <algorithm>
+#include <numeric>
 
 namespace limn {
 namespace {
@@ -47,6 +48,8 @@ class PilotEstimator final : public SampleEstimator {
     for (size_t slot = 0; slot < terms.slots(); ++slot) {
       sums_.emplace_back(terms.adds_to_pixels(slot) ? grid_.size() : 0);
     }
+    sums_.emplace_back(grid_.size());
+    later_lights_.resize(grid_.size());
     if (!fields) return;
     turning_.turn = {{0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}};
     turning_.score = turning_.turn;
@@ -76,13 +79,18 @@ class PilotEstimator final : public SampleEstimator {
       if (sums_[slot].empty()) continue;
       sums_[slot][cell].add(sample.terms[slot], slot == pixel_slot() ? sample.score : Rgb<Lanes>{});
     }
+    sums_.back()[cell].add(sample.light_difference, {});
+    later_lights_[cell] += static_cast<uint32_t>(sample.later_lights);
   }
 
   const PlanGrid& grid() const { return grid_; }
+  uint64_t later_lights() const {
+    return std::accumulate(later_lights_.begin(), later_lights_.end(), uint64_t{0});
+  }
   // Of the samples since the last call.
   std::vector<std::vector<Covariance>> take_covariances(int samples) {
-    std::vector<std::vector<Covariance>> result(slots());
-    for (size_t slot = 0; slot < slots(); ++slot) {
+    std::vector<std::vector<Covariance>> result(sums_.size());
+    for (size_t slot = 0; slot < sums_.size(); ++slot) {
       for (Sums& sums : sums_[slot]) {
         result[slot].push_back(sums.covariance(samples));
         sums = {};
@@ -98,6 +106,7 @@ class PilotEstimator final : public SampleEstimator {
   DirectionField turning_;
   // [slot][cell]; each is written by the thread of its tile alone.
   mutable std::vector<std::vector<Sums>> sums_;
+  mutable std::vector<uint32_t> later_lights_;
 };
 
 // Sums up batches.
@@ -193,6 +202,8 @@ PilotFigures run_pilot(const TermEstimator& estimator, bool fields, int spp,
   figures.spp = spp;
   figures.grid = pilot.grid();
   figures.work = run.work(spp, figures.grid.size());
+  figures.light_work = static_cast<double>(pilot.later_lights()) /
+                       (kPilotLights * static_cast<double>(spp) * figures.grid.size());
   for (size_t slot = 0; slot < estimator.slots(); ++slot) {
     figures.film_variance.push_back(estimator.film_samples(slot) > 0 ? run.film_variance(slot)
                                                                      : Lanes{});

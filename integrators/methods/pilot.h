@@ -26,17 +26,21 @@ struct Covariance {
   float at(int i, int j) const { return entries[index(i, j)]; }
 };
 
+inline constexpr int kPilotLights = 2;  // light samples at later vertices
+
 struct PilotFigures {
   int spp = 0;  // samples of every probed pixel; 0: there was no time for a pilot
   PlanGrid grid;
   // [half][slot][cell]: covariances of one sample, from either half of the pilot. Empty for slots
-  // that add nothing to pixels.
+  // that add nothing to pixels. Behind the slots stands one more: PathTracer::light_difference,
+  // which is half of what a light sample at later vertices adds, paths taking two of them.
   std::array<std::vector<std::vector<Covariance>>, 2> halves;
   // Of slots on the film: the mean over pixels of the variance of one sample per pixel, summed over
   // channels, of each lane.
   std::vector<Lanes> film_variance;
   // Of one sample of a slot, in every cell.
   std::vector<double> variances(size_t slot, int lane) const;
+  double light_work = 0;     // of one light sample at all later vertices of a path
   std::vector<double> work;  // of one sample of a pixel, of every slot, see Term::work
 };
 

@@ -40,6 +40,7 @@ struct SamplePlan {
   SampleCounts uniform;
   PlanGrid grid;
   std::vector<PixelCounts> counts;     // by cell; empty: `uniform`
+  int light_samples = 1;               // at every vertex of a path but the first
   std::vector<DirectionField> fields;  // by cell; empty: directions are held
 
   PixelCounts counts_at(const PixelSample& at) const;

@@ -143,9 +143,12 @@ TermEstimator::Path TermEstimator::trace(const PixelSample& at, const Rng& key,
   RayCount rays;
   PathTracer<Dual, Visitor> tracer(context_, rays, visitor);
   if (field) tracer.move_directions(rates_, *field);
+  tracer.take_light_samples(plan_.light_samples);
   Path path;
   path.radiance = tracer.from_ray(primal, ray.origin, ray.direction, 0, key);
   path.score = tracer.score();
+  path.light_difference = tracer.light_difference();
+  path.later_lights = tracer.later_lights();
   sink.cost(pixel_slot_).add(rays);
   ++sink.cost(pixel_slot_).samples;
   path.finite = is_finite(value(path.radiance)) && is_finite(path.score);
@@ -178,7 +181,9 @@ TermEstimator::Sample TermEstimator::sample(const PixelSample& at, const Rng& ke
   ones.fill(1);
   VertexTerms vertices(*this, ones, sink);
   const Path path = trace(at, key, field, vertices, sink);
-  Sample sample{value(path.radiance), {}, path.score, path.finite};
+  const Rgb<Dual>& light = path.light_difference;
+  Sample sample{value(path.radiance), {},         path.score, {light.r.d, light.g.d, light.b.d},
+                path.later_lights,    path.finite};
   for (size_t slot = 0; slot < terms_.size(); ++slot) {
     const Term* term = terms_[slot].get();
     if (!term) continue;

@@ -39,8 +39,11 @@ class TermEstimator final : public SampleEstimator {
     Rgb<double> radiance;
     std::array<Rgb<Lanes>, kMostTerms> terms;  // of each slot; zero for those of the film
     Rgb<Lanes> score;                          // not yet in any term
+    Rgb<Lanes> light_difference;               // see PathTracer
+    uint64_t later_lights;
     bool finite;
   };
+  // Takes light_samples of the plan, which must be two for a light_difference.
   Sample sample(const PixelSample& at, const Rng& key, const DirectionField* field,
                 SampleSink& sink) const;
 
@@ -68,6 +71,8 @@ class TermEstimator final : public SampleEstimator {
   struct Path {
     Rgb<Dual> radiance;
     Rgb<Lanes> score;
+    Rgb<Dual> light_difference;
+    uint64_t later_lights;
     bool finite;
   };
   template <class Visitor>

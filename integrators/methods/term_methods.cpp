@@ -184,6 +184,7 @@ class TermJob {
       for (size_t t = 0; t < types_.size(); ++t) {
         means[t] += plan.uniform[t] / static_cast<double>(passes_.size());
       }
+      add_pixel_samples(plan, result);
       pass(p).set_plan(std::move(plan));
     }
     for (size_t t = 0; t < types_.size(); ++t) result.terms[t].samples = means[t];
@@ -196,7 +197,7 @@ class TermJob {
     const Moments blocks(block > 0 ? block_count(film.crop_width, film.crop_height, block) : 0);
     GradientResult result;
     for (size_t t = 0; t < types_.size(); ++t) {
-      result.terms.push_back({types_[t]->name, computed_[t], types_[t]->edges, 1, {}});
+      result.terms.push_back({types_[t]->name, computed_[t], types_[t]->edges, 1, {}, {}});
     }
     for (const auto& name : options_.parameters) {
       ParameterGradient& g = result.parameters.emplace_back();
@@ -231,21 +232,40 @@ class TermJob {
     result.spp += samples;
   }
 
+  void add_pixel_samples(const SamplePlan& plan, GradientResult& result) const {
+    const Film& film = scene_.film;
+    if (plan.counts.empty()) return;
+    for (size_t t = 0; t < types_.size(); ++t) {
+      if (!computed_[t] || !pass(0).adds_to_pixels(t)) continue;
+      std::vector<float>& samples = result.terms[t].pixel_samples;
+      samples.resize(film_size(film) / 3);
+      for (size_t i = 0; i < samples.size(); ++i) {
+        const PixelSample at{film.crop_x + static_cast<int>(i) % film.crop_width,
+                             film.crop_y + static_cast<int>(i) / film.crop_width, 0};
+        samples[i] +=
+            static_cast<float>(plan.counts_at(at)[t]) / static_cast<float>(passes_.size());
+      }
+    }
+  }
+
   // watch: since the job began.
-  SamplePlan plan_by_pilot(const TermEstimator& estimator, const RunSettings& settings,
+  SamplePlan plan_by_pilot(TermEstimator& estimator, const RunSettings& settings,
                            const Stopwatch& watch, GradientResult& result) const {
     SamplePlan plan;
     const int spp = pilot_samples(settings.spp);
     if (spp == 0 || (!method_.spreads_samples && terms_computed() < 2)) return plan;
     const bool turns = method_.moves_directions && can_move_directions() &&
                        estimator.lanes() == 1 && !estimator.motion_rates().still();
+    SamplePlan probing;
+    if (method_.spreads_samples) probing.light_samples = kPilotLights;
+    estimator.set_plan(probing);
     const PilotFigures pilot = run_pilot(estimator, turns, spp, settings, watch);
     if (pilot.spp == 0) return plan;
     result.pilot_spp = pilot.spp;
     FieldFit fit;
     if (turns) fit = fit_fields(pilot, settings.threads);
-    const std::vector<TermFigures> figures = figures_of(estimator, pilot, fit);
-    if (method_.spreads_samples) {
+    const std::vector<TermFigures> figures = figures_of(estimator, pilot, fit, plan);
+    if (method_.spreads_samples && !options_.uniform_samples) {
       spread_samples(figures, pilot.grid, plan);
     } else {
       plan.uniform = best_samples(figures);
@@ -255,9 +275,25 @@ class TermJob {
     return plan;
   }
 
-  // Each parameter counts alike: its variances are divided by their sum.
+  // The pilot's paths took two light samples at later vertices; `light` is half of what one adds.
+  static void choose_lights(size_t slot, const PilotFigures& pilot, const TermFigures& light,
+                            std::vector<TermFigures>& figures, SamplePlan& plan) {
+    TermFigures& paths = figures[slot];
+    const double bare = paths.cost - kPilotLights * pilot.light_work;
+    plan.light_samples = best_light_samples(paths.variance - light.variance, bare,
+                                            {kPilotLights * light.variance, pilot.light_work});
+    const double change = static_cast<double>(kPilotLights) / plan.light_samples - 1;
+    paths.cost = bare + plan.light_samples * pilot.light_work;
+    paths.variance += change * light.variance;
+    for (size_t i = 0; i < paths.cells.size(); ++i) paths.cells[i] += change * light.cells[i];
+  }
+
+  // Each parameter counts alike: its variances are divided by their sum. Sets the plan's light
+  // samples.
   std::vector<TermFigures> figures_of(const TermEstimator& estimator, const PilotFigures& pilot,
-                                      const FieldFit& fit) const {
+                                      const FieldFit& fit, SamplePlan& plan) const {
+    TermFigures light;
+    light.cells.resize(pilot.grid.size());
     std::vector<TermFigures> figures(types_.size());
     for (size_t t = 0; t < figures.size(); ++t) {
       figures[t].cost = pilot.work[t];
@@ -282,6 +318,13 @@ class TermJob {
         figures[t].variance += means[t] / sum;
         for (size_t i = 0; i < cells[t].size(); ++i) figures[t].cells[i] += cells[t][i] / sum;
       }
+      const auto lights = fit.variances.empty() ? pilot.variances(figures.size(), lane)
+                                                : fit.variances[figures.size()];
+      light.variance += trimmed_mean(lights) / sum;
+      for (size_t i = 0; i < lights.size(); ++i) light.cells[i] += lights[i] / sum;
+    }
+    if (method_.spreads_samples) {
+      choose_lights(estimator.pixel_slot(), pilot, light, figures, plan);
     }
     return figures;
   }
@@ -321,26 +364,23 @@ MethodType method_row(const std::string& name, const std::string& description,
 }  // namespace
 
 std::vector<MethodType> term_methods() {
-  const EdgeSamplerType& forest = edge_sampler_types()[0];
-  const EdgeSamplerType& silhouettes = edge_sampler_types()[1];
+  const EdgeSamplerType& silhouettes = edge_sampler_type("silhouettes");
   std::vector<MethodType> methods;
-  methods.push_back(method_row("adaptive",
-                               "the forest, with directions that move along with what they see and "
-                               "samples where the error is",
-                               {forest, true, true}));
+  methods.push_back(
+      method_row("adaptive",
+                 "silhouettes, with directions that move along with what they see and "
+                 "samples where the error is",
+                 {silhouettes, true, true}));
   methods.push_back(method_row("moving-directions",
-                               "the forest, with directions that move along with what they see",
-                               {forest, true, false}));
-  methods.push_back(method_row("adaptive-silhouettes",
-                               "adaptive, and all silhouettes before lamps, listed by the forest",
-                               {silhouettes, true, true}));
+                               "silhouettes, with directions that move along with what they see",
+                               {silhouettes, true, false}));
   for (const EdgeSamplerType& type : edge_sampler_types()) {
     methods.push_back(method_row(type.name, type.description, {type}));
   }
   methods.push_back(method_row("random-directions",
-                               "the forest, with directions that move by chance: noise, but the "
+                               "silhouettes, with directions that move by chance: noise, but the "
                                "same mean",
-                               {forest, false, false, true}));
+                               {silhouettes, false, false, true}));
   return methods;
 }
 

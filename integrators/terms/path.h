@@ -69,6 +69,12 @@ class PathTracer {
     rates_ = &rates;
     field_ = &field;
   }
+  // How many light samples are averaged at every vertex but the first.
+  void take_light_samples(int count) { light_samples_ = count; }
+  // With two of them: half of what the first makes more than the second, at all vertices of the
+  // paths so far. It has mean zero, and half the variance of one light sample alone.
+  const Rgb<S>& light_difference() const { return light_difference_; }
+  uint64_t later_lights() const { return later_lights_; }  // light samples behind it
   // Sum of the scores over the paths so far: has mean zero, and belongs to the interior term.
   const Rgb<Lanes>& score() const { return score_; }
 
@@ -108,7 +114,7 @@ class PathTracer {
       if (scattering.black()) return radiance;
       const DirectionMotion* motion = motion_at(surface, bounces);
       visitor_(surface, scattering, throughput, motion, bounces, key);
-      radiance += throughput * direct_light(surface, scattering, motion, bounces, key, edge);
+      add_lights(surface, scattering, motion, throughput, bounces, key, edge, radiance);
       Rng rng = key.at(Purpose::kBsdf, bounces);
       const double u1 = rng.uniform();
       const double u2 = rng.uniform();
@@ -166,6 +172,25 @@ class PathTracer {
       if (!motion || !motion->scoring) return;
       const Rgb<Lanes> f = scattering.eval_derivative(motion->moving_score(w));
       score_ = score_ + Rgb<Lanes>{f.r * weight.r, f.g * weight.g, f.b * weight.b};
+    }
+  }
+
+  void add_lights(const SurfacePoint<S>& surface, const Scattering<S>& scattering,
+                  const DirectionMotion* motion, const Rgb<S>& throughput, int bounces,
+                  const Rng& key, const EdgeStart* edge, Rgb<S>& radiance) {
+    const int count = bounces > 0 ? light_samples_ : 1;
+    if (bounces > 0) later_lights_ += count;
+    if (count == 1) {
+      radiance += throughput * direct_light(surface, scattering, motion, bounces, key, edge);
+      return;
+    }
+    const Rgb<S> share = throughput * (1.0 / count);
+    for (int i = 0; i < count; ++i) {
+      const Rng copy = key.copy(Purpose::kLightCopy, i);
+      const Rgb<S> light = share * direct_light(surface, scattering, motion, bounces, copy, edge);
+      radiance += light;
+      if (i == 0) light_difference_ += light;
+      if (i == 1) light_difference_ = light_difference_ - light;
     }
   }
 
@@ -266,6 +291,9 @@ class PathTracer {
   const DirectionField* field_ = nullptr;
   DirectionMotion motion_;
   Rgb<Lanes> score_;
+  int light_samples_ = 1;
+  Rgb<S> light_difference_;
+  uint64_t later_lights_ = 0;
 };
 
 }  // namespace limn

@@ -105,9 +105,19 @@ TEST(SpreadSamples, AreEvenWhereNothingVaries) {
   const std::vector<double> ones(grid.size(), 1.0);
   spread_samples({{1, 1, 1, ones}, {9, 1, 1, std::vector<double>(grid.size(), 9.0)}}, grid, plan);
   for (const PixelCounts& counts : plan.counts) {
-    EXPECT_EQ(counts[0], 1);
-    EXPECT_EQ(counts[1], 3);
+    EXPECT_EQ(counts, plan.counts[0]);
   }
+  // 1 and 3 would be ideal.
+  const auto product = [](double a, double b) { return (1 / a + 9 / b) * (a + b); };
+  EXPECT_LE(product(plan.counts[0][0], plan.counts[0][1]), 1.1 * product(1, 3));
+}
+
+TEST(LightSamples, AreAsManyAsPay) {
+  // sqrt of (16 / 1) / (1 / 1)
+  EXPECT_EQ(best_light_samples(1, 1, {16, 1}), 4);
+  EXPECT_EQ(best_light_samples(1, 1, {0.5, 1}), 1);
+  EXPECT_EQ(best_light_samples(1, 1, {0, 1}), 1);
+  EXPECT_EQ(best_light_samples(1, 10, {100, 1}), 8);
 }
 
 // Indices of the terms of scenes without sharp shadows.

@@ -113,7 +113,7 @@ class CheckCommand final : public Command {
       if (!r.agree) status = kDisagree;
       NonFinite bad = r.gradient.non_finite;
       bad.merge(r.differences.non_finite);
-      if (const int s = finish_status(bad, settings.spp, settings.spp, "", "")) status = s;
+      if (const int s = finish_status(bad, settings.spp, settings.spp, "")) status = s;
     }
     write_json(common_.json, report.dump(2));
     return status;

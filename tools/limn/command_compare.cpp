@@ -322,7 +322,7 @@ int CompareCommand::run(const std::string& command_line) {
   }
   const NonFinite non_finite = comparer.non_finite();
   if (command_.report) write_report(command_.output, common_.quiet);
-  if (non_finite.count > 0) return finish_status(non_finite, 0, 0, "", "");
+  if (non_finite.count > 0) return finish_status(non_finite, 0, 0, "");
   if (settings.interrupted->load()) {
     fmt::print(stderr, "interrupted: {} holds all runs that were finished\n", command_.output);
     return kInterrupted;

@@ -1,8 +1,10 @@
 // `limn gradient`: derivative images with standard errors, by any method.
 #include "limn/integrators/gradient.h"
 
+#include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <functional>
 
 #include "limn/core/error.h"
 #include "limn/core/names.h"
@@ -17,6 +19,9 @@ using nlohmann::json;
 
 // From this share of the squares of a term's samples on, one of them rules its error. Not tuned.
 constexpr double kRulingShare = 0.1;
+
+// From this share of the squared error in a thousandth of the pixels on. Not tuned.
+constexpr double kRulingPixels = 0.5;
 
 // A parameter's name as a part of a file's name.
 std::string file_part(const std::string& name) {
@@ -40,6 +45,23 @@ double mean_squared_error(const Moments& moments) {
   double sum = 0;
   for (size_t i = 0; i < moments.size(); ++i) sum += moments.variance(i);
   return sum / moments.size();
+}
+
+// The share of the squared error in the thousandth of the pixels where it is largest.
+double worst_share(const Moments& moments) {
+  std::vector<double> pixels(moments.size() / 3);
+  double sum = 0;
+  for (size_t i = 0; i < moments.size(); ++i) {
+    const double variance = moments.variance(i);
+    pixels[i / 3] += variance;
+    sum += variance;
+  }
+  const size_t few = std::max<size_t>(1, pixels.size() / 1000);
+  std::partial_sort(pixels.begin(), pixels.begin() + static_cast<long>(few), pixels.end(),
+                    std::greater<>());
+  double worst = 0;
+  for (size_t i = 0; i < few; ++i) worst += pixels[i];
+  return sum > 0 ? worst / sum : 0;
 }
 
 struct Sum {
@@ -69,6 +91,13 @@ json write_parameter(const Scene& scene, const ParameterGradient& g,
   const Sum sum = image_sum(g.image_sum);
   if (!common.quiet) {
     fmt::print("{}: {}, {}, standard error {}\n", g.name, output, picture, errors);
+    if (const double share = worst_share(g.total); share >= kRulingPixels) {
+      fmt::print(
+          stderr,
+          "warning: {}: {:.0f} % of the squared error lie in a thousandth of the pixels: few "
+          "samples rule the standard errors\n",
+          g.name, 100 * share);
+    }
     fmt::print(
         "  picture: blue -{0:.4g}, white 0, red +{0:.4g}; sum over the image {1:.6g} +- {2:.2g}\n",
         scale, sum.value, sum.error);
@@ -79,10 +108,15 @@ json write_parameter(const Scene& scene, const ParameterGradient& g,
     term_figures[terms[t].name] = {{"mean_magnitude", mean_magnitude(g.terms[t])},
                                    {"mean_squared_error", mean_squared_error(g.terms[t])}};
   }
-  return {{"name", g.name},          {"image", output},
-          {"picture", picture},      {"stderr", errors},
-          {"scale", scale},          {"sum", sum.value},
-          {"sum_stderr", sum.error}, {"mean_squared_error", mean_squared_error(g.total)},
+  return {{"name", g.name},
+          {"image", output},
+          {"picture", picture},
+          {"stderr", errors},
+          {"scale", scale},
+          {"sum", sum.value},
+          {"sum_stderr", sum.error},
+          {"mean_squared_error", mean_squared_error(g.total)},
+          {"worst_share", worst_share(g.total)},
           {"terms", term_figures}};
 }
 
@@ -154,7 +188,7 @@ void print_largest(const GradientResult& result, const std::string& command_line
     if (largest.place.x < 0) largest.place.term = term.name;
     fmt::print("{}: one sample holds {:.2g} % of the squares of all: {}\n  to see it: {}\n",
                term.name, 100 * largest.share(), text_of(result, largest),
-               repeat_command(command_line, largest.place, to_string(result.samples())));
+               repeat_command(command_line, largest.place));
   }
 }
 
@@ -225,6 +259,9 @@ class GradientCommand final : public Command {
     app.add_option("-o,--output", output_,
                    "Image to write (.exr; _stderr.exr and .png are put beside it)")
         ->required();
+    app.add_flag("--sample-images", sample_images_,
+                 "Also write how many samples of each term a sample of every pixel holds, to "
+                 "OUTPUT_samples_TERM.exr");
     app.add_flag("--stats", stats_, "Print edges, nodes, bytes, rays by kind, where the time went");
     add_debug_option(app, debug_);
   }
@@ -233,6 +270,7 @@ class GradientCommand final : public Command {
     const Scene scene = load_scene(common_);
     options_.terms = parse_terms(terms_);
     options_.samples = parse_samples(samples_);
+    options_.uniform_samples = samples_ == "uniform";
     if (!debug_.empty()) return trace(scene);
     for (const auto& parameter : options_.parameters) find_parameter(scene, parameter);
     for (const auto& parameter : options_.parameters) {
@@ -255,13 +293,11 @@ class GradientCommand final : public Command {
       print_largest(result, command_line, stats_);
     }
     if (stats_) print_stats(result);
-    return finish_status(result.non_finite, result.spp, settings.spp, command_line,
-                         to_string(result.samples()));
+    return finish_status(result.non_finite, result.spp, settings.spp, command_line);
   }
 
  private:
   int trace(const Scene& scene) {
-    if (!options_.samples) options_.samples = SampleCounts{};
     const RunSettings settings = make_settings(common_, scene, name());
     for (const auto& line : trace_sample(scene, options_, settings, parse_place(debug_))) {
       fmt::print("{}\n", line);
@@ -285,6 +321,7 @@ class GradientCommand final : public Command {
       parameters.push_back(write_parameter(scene, result.parameters[k], result.terms, outputs_[k],
                                            attributes, common_));
     }
+    if (sample_images_) write_sample_images(scene, result, attributes);
     const json report = {{"scene", scene.file},
                          {"spp", result.spp},
                          {"seed", settings.seed},
@@ -302,11 +339,23 @@ class GradientCommand final : public Command {
     write_json(common_.json, report.dump(2));
   }
 
+  void write_sample_images(const Scene& scene, const GradientResult& result,
+                           const std::vector<ImageAttribute>& attributes) const {
+    for (const TermRun& term : result.terms) {
+      if (!term.computed) continue;
+      Image image(scene.film.crop_width, scene.film.crop_height, 1);
+      image.data = term.pixel_samples;
+      image.data.resize(static_cast<size_t>(image.width) * image.height,
+                        static_cast<float>(term.samples));
+      write_exr(with_ending(output_, "_samples_" + term.name + ".exr"), image, false, attributes);
+    }
+  }
+
   CommonOptions common_;
   GradientOptions options_;
   std::string terms_, samples_ = "auto";
   std::string output_, debug_;
-  bool stats_ = false;
+  bool stats_ = false, sample_images_ = false;
   std::vector<std::string> outputs_;  // of each parameter
 };
 

@@ -33,7 +33,7 @@ class RenderCommand final : public Command {
       return kInterrupted;
     }
     write(scene, settings, result);
-    return finish_status(result.non_finite, result.spp, settings.spp, command_line, "");
+    return finish_status(result.non_finite, result.spp, settings.spp, command_line);
   }
 
  private:

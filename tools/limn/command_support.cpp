@@ -91,7 +91,8 @@ void add_term_options(CLI::App& app, std::string& terms, std::string& samples) {
   app.add_option("--samples", samples,
                  "What a sample per pixel holds of each term, in this order: paths, points on the "
                  "film (may be less than 1), edges per vertex of one path; auto: the best for the "
-                 "time by a short pilot, or 1 of each if --spp is less than 16")
+                 "time by a short pilot, or 1 of each if --spp is less than 16; uniform: the same, "
+                 "but alike in all pixels")
       ->capture_default_str()
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
       ->type_name("N,N,...");
@@ -172,7 +173,7 @@ void write_json(const std::string& file, const std::string& text) {
 std::vector<std::string> parse_terms(const std::string& list) { return split(list); }
 
 std::optional<SampleCounts> parse_samples(const std::string& list) {
-  if (list == "auto") return std::nullopt;
+  if (list == "auto" || list == "uniform") return std::nullopt;
   constexpr double kMost = 1024;
   std::vector<double> counts;
   bool good = !list.empty() && list.back() != ',';
@@ -182,10 +183,10 @@ std::optional<SampleCounts> parse_samples(const std::string& list) {
     good = good && !part.empty() && *end == 0 && counts.back() > 0 && counts.back() <= kMost;
   }
   if (good) return SampleCounts(counts);
-  throw InputError(
-      fmt::format("--samples: \"{}\" is neither auto nor counts of at most {}, one for each term, "
-                  "as in 3,0.5,1",
-                  list, kMost));
+  throw InputError(fmt::format(
+      "--samples: \"{}\" is neither auto nor uniform nor counts of at most {}, one for each term, "
+      "as in 3,0.5,1",
+      list, kMost));
 }
 
 NonFinite::Place parse_place(const std::string& text) {
@@ -207,20 +208,19 @@ NonFinite::Place parse_place(const std::string& text) {
                    "\" is neither X,Y,S (a pixel and the number of its sample) nor TERM,N");
 }
 
-std::string repeat_command(const std::string& command_line, const NonFinite::Place& place,
-                           const std::string& samples) {
-  return command_line + (samples.empty() ? "" : " --samples " + samples) + " --debug-sample " +
+std::string repeat_command(const std::string& command_line, const NonFinite::Place& place) {
+  return command_line + " --debug-sample " +
          (place.x >= 0 ? fmt::format("{},{},{}", place.x, place.y, place.sample)
                        : fmt::format("{},{}", place.term, place.sample));
 }
 
 int finish_status(const NonFinite& non_finite, int64_t spp_done, int64_t spp_asked,
-                  const std::string& command_line, const std::string& samples) {
+                  const std::string& command_line) {
   if (non_finite.count > 0) {
     fmt::print(stderr, "error: {}\n", non_finite.message());
     if (!command_line.empty()) {
       fmt::print(stderr, "  to see the first: {}\n",
-                 repeat_command(command_line, non_finite.first[0], samples));
+                 repeat_command(command_line, non_finite.first[0]));
     }
     return kNonFinite;
   }

@@ -64,12 +64,11 @@ RunSettings make_settings(const CommonOptions& common, const Scene& scene,
                           const std::string& label);
 
 // The command that does one sample again.
-std::string repeat_command(const std::string& command_line, const NonFinite::Place& place,
-                           const std::string& samples);
+std::string repeat_command(const std::string& command_line, const NonFinite::Place& place);
 // Prints a warning about non-finite samples and the command that does the first again, and turns
 // the status into kNonFinite or kInterrupted where that is due. command_line: "" for commands that
-// cannot do one sample alone. samples: of --samples, "" if the command has none.
+// cannot do one sample alone.
 int finish_status(const NonFinite& non_finite, int64_t spp_done, int64_t spp_asked,
-                  const std::string& command_line, const std::string& samples);
+                  const std::string& command_line);
 
 }  // namespace limn

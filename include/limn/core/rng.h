@@ -25,6 +25,7 @@ enum class Purpose : uint64_t {
   kFilmCopy,
   kShadow,
   kShadowCopy,
+  kLightCopy,
   kDirect,
   kDirectCopy
 };

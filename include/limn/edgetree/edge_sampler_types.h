@@ -25,6 +25,7 @@ std::span<const EdgeSamplerType> edge_sampler_types();
 const EdgeSamplerType& default_edge_sampler();
 
 // InputError that lists the known names if there is none of this name.
+const EdgeSamplerType& edge_sampler_type(const std::string& name);
 std::unique_ptr<EdgeSampler> make_edge_sampler(const std::string& name,
                                                const EdgeSamplerInput& input, int threads);
 

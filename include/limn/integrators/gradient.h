@@ -49,6 +49,8 @@ struct GradientOptions {
   // an eighth of the limit of time. The choice does not depend on clocks but for that; it does on
   // the crop.
   std::optional<SampleCounts> samples = SampleCounts{};
+  // The same samples in every pixel, also where the method would spread them.
+  bool uniform_samples = false;
   double step = 0;  // of finite differences; 0: found by a pilot
   int block = 0;    // also keep moments of sums over blocks of this many pixels
 };
@@ -70,7 +72,9 @@ struct TermRun {
   std::string name;
   bool computed = true;  // false: only what other terms need of it was done
   bool edges = true;     // it samples edges: rare events
-  double samples = 1;    // in each sample of a pixel
+  double samples = 1;    // in each sample of a pixel, as a mean over pixels
+  // In every pixel of the crop, row by row, as a mean over passes; empty if they are all alike.
+  std::vector<float> pixel_samples;
   TermCost cost;
 };
 
