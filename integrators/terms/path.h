@@ -110,8 +110,8 @@ class PathTracer {
       const Vec3<S> direction{wo->x, wo->y, wo->z};
       if (!found) {
         if (!c_.scene.environment) return radiance;
-        const double weight = mis_weight(pdf, c_.lights.pdf_environment(*wo));
-        radiance += throughput * c_.scene.environment->radiance(direction) * weight;
+        const auto sight = c_.lights.template environment<S>(*wo);
+        radiance += throughput * sight.radiance * mis_weight(pdf, sight.pdf);
         return radiance;
       }
       if (hit.t > 0) {
@@ -174,7 +174,7 @@ class PathTracer {
     const auto [f, bsdf_pdf] = scattering.eval_with_pdf(light->wo);
     if (is_black(value(f)) || shadowed(p, surface.face, *light, edge)) return {};
     const double weight = mis_weight(light->pdf, bsdf_pdf) / light->pdf;
-    return f * light->light->radiance(Vec3<S>{light->wo.x, light->wo.y, light->wo.z}) * weight;
+    return f * light->light->template drawn_radiance<S>(*light) * weight;
   }
 
   // No ray meets a delta light by chance, so it has the whole weight. Its direction follows the
