@@ -1,6 +1,7 @@
 // Emitter "constant": the same radiance from all directions.
 #include <fmt/format.h>
 
+#include "src/base/angles.h"
 #include "src/light/types.h"
 
 namespace limn {
@@ -16,7 +17,8 @@ class ConstantEnvironment final : public Environment {
   Drawn sample_direction(double u1, double u2) const override {
     const double z = 1 - 2 * u1;
     const double r = std::sqrt(std::max(0.0, 1 - z * z));
-    return {{r * std::cos(2 * kPi * u2), r * std::sin(2 * kPi * u2), z}, kDensity, {}};
+    const SinCos azimuth = sin_cos_of_turns(u2);
+    return {{r * azimuth.cos, r * azimuth.sin, z}, kDensity, {}};
   }
   double pdf_solid_angle(const Vec3d&) const override { return kDensity; }
   void look(const Vec3d&, Sight<double>& sight) const override {

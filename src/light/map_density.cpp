@@ -189,14 +189,22 @@ class MapDensity::Builder {
   }
   // Beyond the border: a leaf that is never drawn, so that those of a square can be counted off.
   void add_leaf(int x, int y, int log) {
-    Leaf leaf{0, {1, 1, 1, 1}, static_cast<uint32_t>(x), static_cast<uint32_t>(y)};
+    Leaf leaf{0,
+              {1, 1, 1, 1},
+              static_cast<uint32_t>(x),
+              static_cast<uint32_t>(y),
+              static_cast<uint32_t>(log),
+              0,
+              0};
     if (x < d_.width_ && y + 1 < d_.height_) {
       const Patch p = d_.patch(x, y, log);
       const Fit f = fit(p);
       const double azimuth = 2 * kPi / d_.width_;
+      leaf.top = d_.cos_theta_[p.y0];
+      leaf.bottom = d_.cos_theta_[p.y1];
       leaf.corners = f.corners;
       leaf.scale =
-          static_cast<float>(f.mass * azimuth * 4 / (d_.solid_angle(p) * sum_of(f.corners)));
+          static_cast<float>(f.mass * azimuth * 4 / (d_.solid_angle(leaf) * sum_of(f.corners)));
       // Never 0 by rounding where there is something.
       if (f.mass > 0) leaf.scale = std::max(leaf.scale, std::numeric_limits<float>::min());
     }
@@ -232,14 +240,14 @@ const MapDensity::Leaf& MapDensity::leaf(const Square& square, int column, int r
   return leaves_[square.first + static_cast<uint32_t>(index)];
 }
 
-double MapDensity::solid_angle(const Patch& p) const {
-  return (cos_theta_[p.y0] - cos_theta_[p.y1]) * (p.x1 - p.x0) * (2 * kPi / width_);
+double MapDensity::solid_angle(const Leaf& leaf) const {
+  const Patch p = patch(leaf.column, leaf.row, leaf.log);
+  return (leaf.top - leaf.bottom) * (p.x1 - p.x0) * (2 * kPi / width_);
 }
 
 double MapDensity::mass(const Leaf& leaf) const {
   if (!(leaf.scale > 0)) return 0;
-  const int log = static_cast<int>(square(leaf.column, leaf.row).log);
-  return 0.25 * sum_of(leaf.corners) * leaf.scale * solid_angle(patch(leaf.column, leaf.row, log));
+  return 0.25 * sum_of(leaf.corners) * leaf.scale * solid_angle(leaf);
 }
 
 void MapDensity::build_aliases() {
@@ -306,13 +314,12 @@ MapDensity::Drawn MapDensity::sample(double u1, double u2) const {
   const uint32_t b = choose(block_slots_.data(), static_cast<uint32_t>(blocks_.size()), u1);
   const Block block = blocks_[b];
   const Leaf& leaf = leaves_[block.first + choose(&slots_[block.first], block.count, u1)];
-  const int log = static_cast<int>(square(leaf.column, leaf.row).log);
-  const Patch p = patch(leaf.column, leaf.row, log);
+  const Patch p = patch(leaf.column, leaf.row, leaf.log);
   const Corners& c = leaf.corners;
   const double t = sample_linear(c[0] + c[1], c[2] + c[3], u1);
   const double left = mix(c[0], c[2], t), right = mix(c[1], c[3], t);
   const double s = sample_linear(left, right, u2);
-  return {p.x0 + s * (p.x1 - p.x0), mix(cos_theta_[p.y0], cos_theta_[p.y1], t),
+  return {p.x0 + s * (p.x1 - p.x0), mix(leaf.top, leaf.bottom, t),
           mix(left, right, s) * leaf.scale * inverse_total_};
 }
 
@@ -321,8 +328,7 @@ double MapDensity::pdf(int column, int row, double x, double cos_theta) const {
   const Leaf& l = leaf(s, column, row);
   const Patch p = patch(column, row, static_cast<int>(s.log));
   const double along = (x - p.x0) / (p.x1 - p.x0);
-  const double top = cos_theta_[p.y0], bottom = cos_theta_[p.y1];
-  const double down = std::clamp((top - cos_theta) / (top - bottom), 0.0, 1.0);
+  const double down = std::clamp((l.top - cos_theta) / (l.top - l.bottom), 0.0, 1.0);
   const Corners& c = l.corners;
   return mix(mix(c[0], c[1], along), mix(c[2], c[3], along), down) * l.scale * inverse_total_;
 }

@@ -38,7 +38,6 @@ class MapDensity {
   // column, row: the cell of (x, y). cos_theta: that of y. [1/sr]
   double pdf(int column, int row, double x, double cos_theta) const;
 
-  double cos_theta(int row) const { return cos_theta_[row]; }
   size_t leaf_count() const { return leaves_.size(); }
 
  private:
@@ -48,9 +47,12 @@ class MapDensity {
   using Corners = std::array<uint8_t, 4>;  // top left, top right, bottom left, bottom right
 
   struct Leaf {
-    float scale;           // of `corners`, to the density before it is normalised
-    Corners corners;       // at least 1
-    uint32_t column, row;  // of its first cell
+    float scale;      // of `corners`, to the density before it is normalised
+    Corners corners;  // at least 1
+    uint32_t column;  // of its first cell
+    uint32_t row : 28;
+    uint32_t log : 4;    // of its side
+    double top, bottom;  // cos(theta) of its borders
   };
   // One of as many equally likely slots as there are items: its first `share` belongs to the item
   // of the slot's own index, the rest to `alias`.
@@ -78,8 +80,8 @@ class MapDensity {
     return grid_[static_cast<size_t>(row >> kGridLog) * grid_width_ + (column >> kGridLog)];
   }
   const Leaf& leaf(const Square& square, int column, int row) const;
-  double solid_angle(const Patch& p) const;  // [sr]
-  double mass(const Leaf& leaf) const;       // its integral, before it is normalised
+  double solid_angle(const Leaf& leaf) const;  // [sr]
+  double mass(const Leaf& leaf) const;         // its integral, before it is normalised
   void build_aliases();
   static void fill_slots(std::span<const double> weights, double total, Slot* slots);
   // The item that u chooses; u becomes uniform again.
