@@ -10,11 +10,12 @@ RadianceEstimator::RadianceEstimator(const Scene& scene, int threads)
     : scene_(scene),
       tracer_(make_embree_tracer(scene_, threads)),
       lights_(scene_),
-      context_{scene_, *tracer_, lights_} {}
+      context_{scene_, *tracer_, lights_},
+      camera_(scene_.camera) {}
 
 void RadianceEstimator::add_pixel(const PixelSample& at, const Rng& key, SampleSink& sink) const {
   const FilmPosition film = sample_pixel_filter(scene_.film, at.x, at.y, key);
-  const auto ray = scene_.camera.ray<double>(film.x, film.y);
+  const auto ray = camera_.ray(film.x, film.y);
   RayCount rays;
   const auto trace = [&](auto& visitor) {
     PathTracer<double, std::decay_t<decltype(visitor)>> path(context_, rays, visitor);

@@ -22,6 +22,7 @@ class RadianceEstimator final : public SampleEstimator {
   std::unique_ptr<RayTracer> tracer_;
   Lights lights_;
   PathContext context_;
+  CameraView<double> camera_;
 };
 
 }  // namespace limn

@@ -52,6 +52,7 @@ TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> para
       }()),
       lights_(scene_),
       context_{scene_, *tracer_, lights_},
+      camera_(scene_.camera),
       input_(context_, lanes_, lane_scale_, sampler, threads),
       types_(terms_of(scene, sampler)),
       rates_(scene_, lanes_) {
@@ -144,8 +145,9 @@ TermEstimator::Path TermEstimator::trace(const PixelSample& at, const Rng& key,
                                          const DirectionField* field, Visitor& visitor,
                                          SampleSink& sink) const {
   const FilmPosition film = sample_pixel_filter(scene_.film, at.x, at.y, key);
-  const Ray primal = camera_ray(scene_, scene_.camera.ray<double>(film.x, film.y));
-  const auto ray = scene_.camera.ray<Dual>(film.x, film.y);
+  const auto ray = camera_.ray(film.x, film.y);
+  const Ray primal = camera_ray(
+      scene_, CameraRay<double>{value(ray.origin), value(ray.direction), ray.t_min, ray.t_max});
   if (sink.log()) log_camera_ray(*sink.log(), film.x, film.y, primal.origin, primal.direction);
   RayCount rays;
   PathTracer<Dual, Visitor> tracer(context_, rays, visitor);

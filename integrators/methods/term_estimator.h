@@ -89,6 +89,7 @@ class TermEstimator final : public SampleEstimator {
   std::unique_ptr<RayTracer> tracer_;
   Lights lights_;
   PathContext context_;
+  CameraView<Dual> camera_;
   TermInput input_;
   std::vector<const TermType*> types_;
   std::vector<std::unique_ptr<Term>> terms_;  // of each slot; null where not computed

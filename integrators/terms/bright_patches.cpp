@@ -31,8 +31,8 @@ std::vector<Drawn> draw(const Environment& environment) {
   for (int i = 0; i < kGrid * kGrid; ++i) {
     const double u = (i % kGrid + std::fmod((i + 1) * kGolden, 1.0)) / kGrid;
     const double v = (i / kGrid + std::fmod((i + 1) * kSilver, 1.0)) / kGrid;
-    const Vec3d w = environment.sample_direction(u, v);
-    const double density = environment.pdf_solid_angle(w) * kGrid * kGrid;
+    const auto [w, pdf, place] = environment.sample_direction(u, v);
+    const double density = pdf * kGrid * kGrid;
     const double value = luminance(environment.radiance(w));
     if (density > 0 && value > 0) drawn.push_back({w, value / density});
   }

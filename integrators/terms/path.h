@@ -177,8 +177,9 @@ class PathTracer {
       const bool found = next_hit(surface, *wo, edge, hit);
       if (!found) {
         if (!c_.scene.environment) return radiance;
-        const double weight = mis_weight(pdf, c_.lights.pdf_environment(*wo));
-        radiance += throughput * c_.scene.environment->radiance(direction) * weight;
+        auto sight = c_.lights.template environment<S>(*wo);
+        if (motion) sight.radiance = c_.scene.environment->radiance(direction);
+        radiance += throughput * sight.radiance * mis_weight(pdf, sight.pdf);
         return radiance;
       }
       if (hit.t > 0) {
@@ -291,7 +292,9 @@ class PathTracer {
     const auto [f, bsdf_pdf] = evaluate(scattering, light->wo, direction, motion);
     if (is_black(value(f)) || shadowed(p, surface.face, *light, edge)) return {};
     const double weight = mis_weight(light->pdf, bsdf_pdf) / light->pdf;
-    return f * light->light->radiance(direction) * weight;
+    const Rgb<S> radiance = motion ? light->light->radiance(direction)
+                                   : light->light->template drawn_radiance<S>(*light);
+    return f * radiance * weight;
   }
 
   // No ray meets a delta light by chance, so it has the whole weight. Its direction follows the

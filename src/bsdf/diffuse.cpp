@@ -1,6 +1,7 @@
 // Lambert's cosine law, black from behind.
 #include <fmt/format.h>
 
+#include "src/base/angles.h"
 #include "src/bsdf/types.h"
 
 namespace limn {
@@ -25,6 +26,7 @@ class Diffuse final : public Bsdf {
   }
   std::optional<Vec3d> sample(const Vec3d& n, const Vec3d& wi, double u1, double u2) const override;
 
+  bool is_still() const override { return limn::is_still(reflectance_); }
   LobeSummary lobe() const override { return {kHemisphere, 1, max_channel(value(reflectance_))}; }
   std::vector<ParameterRef> parameters() override {
     return {{"reflectance", {&reflectance_.r, &reflectance_.g, &reflectance_.b}}};
@@ -51,8 +53,8 @@ class Diffuse final : public Bsdf {
 std::optional<Vec3d> Diffuse::sample(const Vec3d& n, const Vec3d& wi, double u1, double u2) const {
   if (!(dot(n, wi) > 0)) return std::nullopt;
   const double r = std::sqrt(u1);
-  const double phi = 2 * kPi * u2;
-  const Vec3d local{r * std::cos(phi), r * std::sin(phi), std::sqrt(1 - u1)};
+  const SinCos phi = sin_cos_of_turns(u2);
+  const Vec3d local{r * phi.cos, r * phi.sin, std::sqrt(1 - u1)};
   return Frame(n).to_world(local);
 }
 

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "src/base/angles.h"
+
 namespace limn::microfacet {
 namespace {
 
@@ -69,10 +71,10 @@ double beckmann_exact_g1_over_cos(double cos_v, double alpha) {
 // visible GGX normals with spherical caps".
 Vec3d ggx_sample_visible(const Vec3d& v, double alpha, double u1, double u2) {
   const Vec3d stretched = normalize(Vec3d{alpha * v.x, alpha * v.y, v.z});
-  const double phi = 2 * kPi * u1;
+  const SinCos phi = sin_cos_of_turns(u1);
   const double z = (1 - u2) * (1 + stretched.z) - stretched.z;
   const double r = std::sqrt(std::max(0.0, 1 - z * z));
-  const Vec3d h = stretched + Vec3d{r * std::cos(phi), r * std::sin(phi), z};
+  const Vec3d h = stretched + Vec3d{r * phi.cos, r * phi.sin, z};
   return normalize(Vec3d{alpha * h.x, alpha * h.y, h.z});
 }
 

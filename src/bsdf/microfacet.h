@@ -75,8 +75,7 @@ S fresnel_conductor(const S& cos_h, double eta, double k) {
   const S a2b2 = sqrt(t * t + 4 * nk * nk);
   // (a2b2 + t) / 2, without cancellation where t < 0.
   const S difference = a2b2 - t;
-  S a2 = (a2b2 + t) * 0.5;
-  if (value(t) < 0) a2 = 2 * nk * nk / difference;
+  const S a2 = value(t) < 0 ? S(2 * nk * nk / difference) : S((a2b2 + t) * 0.5);
   const S two_ac = 2.0 * sqrt(a2) * cos_h;
   const S rs = (a2b2 + c2 - two_ac) / (a2b2 + c2 + two_ac);
   const S p = a2b2 * c2 + s2 * s2;

@@ -68,6 +68,9 @@ class RoughConductor final : public Bsdf {
   }
   std::optional<Vec3d> sample(const Vec3d& n, const Vec3d& wi, double u1, double u2) const override;
 
+  bool is_still() const override {
+    return limn::is_still(alpha_) && limn::is_still(specular_reflectance_);
+  }
   LobeSummary lobe() const override;
   std::vector<ParameterRef> parameters() override {
     Rgb<Dual>& s = specular_reflectance_;
@@ -127,11 +130,12 @@ Rgb<S> RoughConductor::evaluate(const Reflection<S>& r) const {
                : microfacet::beckmann_g1_over_cos(r.cos_i, a) *
                      microfacet::beckmann_g1_over_cos(r.cos_o, a);
   const S common = r.d * masking * r.cos_o * 0.25;
-  Rgb<S> result = as<S>(specular_reflectance_) * common;
-  for (int i = 0; i < 3; ++i) {
-    result[i] = result[i] * microfacet::fresnel_conductor(r.cos_h, eta_[i], k_[i]);
-  }
-  return result;
+  // Arrays of four, so that plain numbers are worked on side by side.
+  const double eta[4] = {eta_.r, eta_.g, eta_.b, 1}, k[4] = {k_.r, k_.g, k_.b, 1};
+  S f[4];
+  constexpr int kChannels = std::is_same_v<S, double> ? 4 : 3;
+  for (int i = 0; i < kChannels; ++i) f[i] = microfacet::fresnel_conductor(r.cos_h, eta[i], k[i]);
+  return as<S>(specular_reflectance_) * Rgb<S>{f[0], f[1], f[2]} * common;
 }
 
 // Visible normals have the density D G1(wi) (wi.h) / cos_i per solid angle of h, and reflection

@@ -1,6 +1,7 @@
 // Emitter "constant": the same radiance from all directions.
 #include <fmt/format.h>
 
+#include "src/base/angles.h"
 #include "src/light/types.h"
 
 namespace limn {
@@ -13,12 +14,17 @@ class ConstantEnvironment final : public Environment {
 
   Rgb<double> radiance(const Vec3<double>&) const override { return value(radiance_); }
   Rgb<Dual> radiance(const Vec3<Dual>&) const override { return radiance_; }
-  Vec3d sample_direction(double u1, double u2) const override {
+  Drawn sample_direction(double u1, double u2) const override {
     const double z = 1 - 2 * u1;
     const double r = std::sqrt(std::max(0.0, 1 - z * z));
-    return {r * std::cos(2 * kPi * u2), r * std::sin(2 * kPi * u2), z};
+    const SinCos azimuth = sin_cos_of_turns(u2);
+    return {{r * azimuth.cos, r * azimuth.sin, z}, kDensity, {}};
   }
-  double pdf_solid_angle(const Vec3d&) const override { return 1 / (4 * kPi); }
+  double pdf_solid_angle(const Vec3d&) const override { return kDensity; }
+  void look(const Vec3d&, Sight<double>& sight) const override {
+    sight = {value(radiance_), kDensity};
+  }
+  void look(const Vec3d&, Sight<Dual>& sight) const override { sight = {radiance_, kDensity}; }
   bool is_uniform() const override { return true; }
   double mean_luminance() const override { return luminance(value(radiance_)); }
 
@@ -34,6 +40,8 @@ class ConstantEnvironment final : public Environment {
   }
 
  private:
+  static constexpr double kDensity = 1 / (4 * kPi);
+
   Rgb<Dual> radiance_;
 };
 

@@ -4,13 +4,17 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
+#include <optional>
+#include <variant>
 #include <vector>
 
 #include "limn/core/dual.h"
 #include "limn/core/image.h"
 #include "limn/core/vec.h"
+#include "src/base/angles.h"
+#include "src/base/half.h"
 #include "src/base/huge_pages.h"
+#include "src/light/map_density.h"
 
 namespace limn {
 
@@ -26,18 +30,28 @@ class EnvironmentMap {
   // One or three channels; at least one texel, all finite. A single row stands for all.
   explicit EnvironmentMap(const Image& image);
 
+  // Where a direction lies: columns to the right of the center of column 0, in [0, W); rows below
+  // row 0, in [0, H - 1].
   template <class S>
-  Rgb<S> radiance(const Vec3<S>& d) const;
+  struct Place {
+    S x, y;
+  };
+  template <class S>
+  Place<S> locate(const Vec3<S>& d) const;
+  template <class S>
+  Rgb<S> radiance(const Place<S>& place) const;
 
   // The density follows the luminance of the absolute values of the texels: it is positive
-  // wherever radiance is not zero, negative texels included. A cell is drawn in proportion to the
-  // mean of its corners times its solid angle (so the cell's probability drops out of the density);
-  // within it the density is bilinear in azimuth and cos(theta) through the corners' luminances,
-  // each mixed with a little of their mean (where one side of a cell is black, radiance falls to
-  // zero with theta but the density with cos(theta), and near a pole their ratio would grow without
-  // bound). An all-black map is sampled uniformly.
-  Vec3d sample(double u1, double u2) const;
-  double pdf_solid_angle(const Vec3d& d) const;  // [1/sr]
+  // wherever radiance is not zero, negative texels included. An all-black map is sampled uniformly.
+  struct Drawn {
+    Vec3d direction;
+    Place<double> place;
+    double pdf;  // [1/sr]
+  };
+  // Asks for the texels there, so that they are at hand when radiance is.
+  Drawn sample(double u1, double u2) const;
+  // place: of d. [1/sr]
+  double pdf_solid_angle(const Place<double>& place, const Vec3d& d) const;
 
   // The exact mean over the sphere of the luminance of `radiance`.
   double mean_luminance() const;
@@ -46,69 +60,60 @@ class EnvironmentMap {
   int height() const { return height_; }
 
  private:
-  // A position in a cell: fractions along azimuth and along cos(theta), both in [0, 1].
-  struct CellPoint {
-    int column = 0;
-    int row = 0;
-    double s = 0;
-    double t = 0;
-  };
-  // The four values at a cell's corners: [along t][along s].
-  struct Corners {
-    double v[2][2];
-  };
+  // Red, green, blue; filled up so that a texel never lies across two lines of a cache.
+  template <class Number>
+  using Texel = std::array<Number, 4>;
+  // As half floats where all are exactly that, as in most files: half the misses.
+  using Texels = std::variant<HugePageVector<Texel<Half>>, HugePageVector<Texel<float>>>;
 
-  // Radiance, and what the sampling density follows: together, as they are looked up together.
-  struct Texel {
-    std::array<float, 3> rgb;
-    float importance;
-  };
-  // One of as many equally likely slots as there are cells: its first `share` belongs to the cell
-  // of the slot's own index, the rest to `alias`.
-  struct Slot {
-    float share;
-    uint32_t alias;
-  };
-
-  const Texel& texel(int column, int row) const {
-    return texels_[static_cast<size_t>(row) * width_ + column];
+  size_t index(int column, int row) const { return static_cast<size_t>(row) * width_ + column; }
+  // f is called with the texels as they are kept.
+  template <class F>
+  auto with_texels(F f) const {
+    if (const auto* halves = std::get_if<0>(&texels_)) return f(halves->data());
+    return f(std::get<1>(texels_).data());
   }
   int next_column(int column) const { return column + 1 == width_ ? 0 : column + 1; }
   double polar_angle(int row) const { return kPi * row / (height_ - 1); }
-  Corners density_corners(int column, int row) const;
-  void build_distribution();
-  void build_aliases(const std::vector<double>& weights);
+  template <class Number>
+  void fill(const Image& image, HugePageVector<Texel<Number>>& texels);
+  // The cell's first column and row; rounding may put a place on the border behind it.
+  int column_of(double x) const { return std::min(static_cast<int>(x), width_ - 1); }
+  int row_of(double y) const { return std::clamp(static_cast<int>(y), 0, height_ - 2); }
 
   int width_ = 0;
-  int height_ = 0;                 // at least 2
-  HugePageVector<Texel> texels_;   // height_ x width_
-  HugePageVector<Slot> slots_;     // of cells, height_ - 1 x width_
-  double inverse_total_ = 0;       // 1 / integral over the sphere of what the density follows
-  std::vector<double> cos_theta_;  // of each row of texels (height_)
+  int height_ = 0;  // at least 2
+  Texels texels_;   // height_ x width_
+  std::optional<MapDensity> density_;
 };
 
 template <class S>
-Rgb<S> EnvironmentMap::radiance(const Vec3<S>& d) const {
-  using std::atan2;
+EnvironmentMap::Place<S> EnvironmentMap::locate(const Vec3<S>& d) const {
   using std::sqrt;
-  const S x = atan2(d.x, -d.z) * (width_ / (2 * kPi)) - 0.5;
-  const S y = atan2(sqrt(d.x * d.x + d.z * d.z), d.y) * ((height_ - 1) / kPi);
-  const int left = static_cast<int>(std::floor(value(x)));
-  const int row = std::clamp(static_cast<int>(value(y)), 0, height_ - 2);
-  const S s = x - static_cast<double>(left);
-  const S t = y - static_cast<double>(row);
-  const int column = ((left % width_) + width_) % width_;
+  const S x = angle_of(d.x, -d.z) * (width_ / (2 * kPi)) - 0.5;
+  const S y = angle_of(sqrt(d.x * d.x + d.z * d.z), d.y) * ((height_ - 1) / kPi);
+  return {value(x) < 0 ? S(x + static_cast<double>(width_)) : x, y};
+}
+
+template <class S>
+Rgb<S> EnvironmentMap::radiance(const Place<S>& place) const {
+  const int column = column_of(value(place.x));
+  const int row = row_of(value(place.y));
+  const S s = place.x - static_cast<double>(column);
+  const S t = place.y - static_cast<double>(row);
   const int next = next_column(column);
-  const std::array<float, 3>* corners[4] = {&texel(column, row).rgb, &texel(next, row).rgb,
-                                            &texel(column, row + 1).rgb, &texel(next, row + 1).rgb};
-  Rgb<S> result;
-  for (int c = 0; c < 3; ++c) {
-    const auto corner = [&](int i) { return static_cast<double>((*corners[i])[c]); };
-    const S top = corner(0) + s * (corner(1) - corner(0));
-    const S bottom = corner(2) + s * (corner(3) - corner(2));
-    result[c] = top + t * (bottom - top);
-  }
-  return result;
+  return with_texels([&](const auto* texels) {
+    decltype(texels) corners[4] = {&texels[index(column, row)], &texels[index(next, row)],
+                                   &texels[index(column, row + 1)], &texels[index(next, row + 1)]};
+    Rgb<S> result;
+    for (int c = 0; c < 3; ++c) {
+      const auto corner = [&](int i) { return static_cast<double>((*corners[i])[c]); };
+      const S top = corner(0) + s * (corner(1) - corner(0));
+      const S bottom = corner(2) + s * (corner(3) - corner(2));
+      result[c] = top + t * (bottom - top);
+    }
+    return result;
+  });
 }
 
 }  // namespace limn

@@ -18,18 +18,24 @@ class MapEnvironment final : public Environment {
         file_(std::move(file)) {}
 
   Rgb<double> radiance(const Vec3<double>& d) const override {
-    return map_->radiance(map_from_world(d)) * scale_.v;
+    return map_->radiance(map_->locate(map_from_world(d))) * scale_.v;
   }
   Rgb<Dual> radiance(const Vec3<Dual>& d) const override {
-    return map_->radiance(map_from_world(d)) * scale_;
+    return map_->radiance(map_->locate(map_from_world(d))) * scale_;
   }
-  Vec3d sample_direction(double u1, double u2) const override {
-    const Vec3d v = map_->sample(u1, u2);
-    return axes_[0] * v.x + axes_[1] * v.y + axes_[2] * v.z;
+  Drawn sample_direction(double u1, double u2) const override {
+    const EnvironmentMap::Drawn drawn = map_->sample(u1, u2);
+    const Vec3d& v = drawn.direction;
+    return {axes_[0] * v.x + axes_[1] * v.y + axes_[2] * v.z,
+            drawn.pdf,
+            {drawn.place.x, drawn.place.y}};
   }
   double pdf_solid_angle(const Vec3d& d) const override {
-    return map_->pdf_solid_angle(map_from_world(d));
+    const Vec3d v = map_from_world(d);
+    return map_->pdf_solid_angle(map_->locate(v), v);
   }
+  void look(const Vec3d& d, Sight<double>& sight) const override { look(d, scale_.v, sight); }
+  void look(const Vec3d& d, Sight<Dual>& sight) const override { look(d, scale_, sight); }
   bool is_uniform() const override { return false; }
   double mean_luminance() const override { return map_->mean_luminance() * scale_.v; }
 
@@ -43,6 +49,18 @@ class MapEnvironment final : public Environment {
   }
 
  private:
+  Rgb<double> drawn_value(const LightSample& sample) const override {
+    return map_->radiance<double>({sample.place[0], sample.place[1]}) * scale_.v;
+  }
+  Rgb<Dual> drawn_dual(const LightSample& sample) const override {
+    return map_->radiance<double>({sample.place[0], sample.place[1]}) * scale_;
+  }
+  template <class S>
+  void look(const Vec3d& d, const S& scale, Sight<S>& sight) const {
+    const Vec3d v = map_from_world(d);
+    const auto place = map_->locate(v);
+    sight = {map_->radiance(place) * scale, map_->pdf_solid_angle(place, v)};
+  }
   template <class S>
   Vec3<S> map_from_world(const Vec3<S>& d) const {
     return {dot(d, axes_[0]), dot(d, axes_[1]), dot(d, axes_[2])};

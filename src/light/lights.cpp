@@ -18,10 +18,11 @@ std::optional<LightSample> DeltaLight::sample(const Vec3d& p, double choices, Rn
 std::optional<LightSample> Environment::sample(const Vec3d&, double choices, Rng& rng) const {
   const double u1 = rng.uniform();
   const double u2 = rng.uniform();
-  const Vec3d wo = sample_direction(u1, u2);
-  const double density = pdf_solid_angle(wo) / choices;
+  const Drawn drawn = sample_direction(u1, u2);
+  const double density = drawn.pdf / choices;
   if (!(density > 0)) return {};
-  return LightSample{wo, std::numeric_limits<double>::infinity(), density, {}, this};
+  return LightSample{drawn.direction, std::numeric_limits<double>::infinity(), density, {}, this,
+                     drawn.place};
 }
 
 Lights::Lights(const Scene& scene)

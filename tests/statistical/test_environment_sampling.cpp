@@ -67,6 +67,25 @@ Vec3d apply_transposed(const Matrix4& m, const Vec3d& v) {
   return apply(t, v);
 }
 
+// What a draw says of itself is what the map says of its direction, in the two scalars alike.
+void expect_same_look(const Environment& map, const Environment::Drawn& drawn) {
+  const Vec3d& d = drawn.direction;
+  Environment::Sight<double> sight;
+  Environment::Sight<Dual> dual;
+  map.look(d, sight);
+  map.look(d, dual);
+  LightSample sample{d};
+  sample.place = drawn.place;
+  EXPECT_NEAR(drawn.pdf, map.pdf_solid_angle(d), 1e-8 * drawn.pdf);
+  EXPECT_EQ(sight.pdf, map.pdf_solid_angle(d));
+  EXPECT_EQ(dual.pdf, sight.pdf);
+  const double scale = 1 + std::fabs(map.radiance(d).r);
+  EXPECT_NEAR(map.drawn_radiance<double>(sample).r, map.radiance(d).r, 1e-6 * scale);
+  EXPECT_EQ(map.drawn_radiance<Dual>(sample).r.v, map.drawn_radiance<double>(sample).r);
+  EXPECT_EQ(sight.radiance.r, map.radiance(d).r);
+  EXPECT_EQ(dual.radiance.r.v, sight.radiance.r);
+}
+
 TEST(EnvironmentSampling, MatchesItsDensity) {
   const Matrix4 turn = test::some_rotation();
   const std::vector<MapCase> cases = test::map_cases();
@@ -87,8 +106,10 @@ TEST(EnvironmentSampling, MatchesItsDensity) {
     for (int i = 0; i < kSamples; ++i) {
       const double u1 = rng.uniform();
       const double u2 = rng.uniform();
-      const Vec3d d = map->sample_direction(u1, u2);
+      const Environment::Drawn drawn = map->sample_direction(u1, u2);
+      const Vec3d& d = drawn.direction;
       EXPECT_NEAR(length(d), 1, 1e-14);
+      if (i < 1000) expect_same_look(*map, drawn);
       ++observed[bins.bin(apply_transposed(turn, d))];
     }
     const test::ChiSquare result = test::chi_square_test(observed, expected);
@@ -108,7 +129,7 @@ TEST(EnvironmentSampling, EstimatesTheMean) {
     for (int i = 0; i < kSamples; ++i) {
       const double u1 = rng.uniform();
       const double u2 = rng.uniform();
-      const Vec3d d = map->sample_direction(u1, u2);
+      const Vec3d d = map->sample_direction(u1, u2).direction;
       const double value = luminance(map->radiance(d)) / (map->pdf_solid_angle(d) * 4 * kPi);
       sum += value;
       sum2 += value * value;
@@ -146,7 +167,7 @@ TEST(EnvironmentSampling, ConstantIsUniform) {
   for (int i = 0; i < kSamples; ++i) {
     const double u1 = rng.uniform();
     const double u2 = rng.uniform();
-    ++observed[bins.bin(constant->sample_direction(u1, u2))];
+    ++observed[bins.bin(constant->sample_direction(u1, u2).direction)];
   }
   EXPECT_GT(test::chi_square_test(observed, expected).p_value, 0.01);
 }

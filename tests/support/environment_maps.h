@@ -63,6 +63,14 @@ inline std::vector<MapCase> map_cases() {
       {"sun at the pole", fill(12, 9, [](int, int y) { return y == 0 ? 1e3 : 0.01; })},
       {"sun alone", fill(16, 9, [](int x, int y) { return x == 0 && y == 4 ? 5 : 0; })},
       {"half black", fill(16, 8, [](int x, int y) { return y < 4 ? 1 + 0.3 * (x % 3) : 0; })},
+      // Smooth but for a sun and a black corner: cells of many sizes are drawn as one.
+      {"large sky", fill(150, 77,
+                         [](int x, int y) {
+                           if (x < 40 && y > 60) return 0.0;
+                           return x == 101 && y == 20
+                                      ? 30
+                                      : 1 + 0.5 * std::sin(2 * kPi * x / 150) + 0.01 * y;
+                         })},
       {"negative texels", fill(8, 5, [](int x, int y) { return (x * 5 + y * 3) % 7 - 2; })},
   };
 }

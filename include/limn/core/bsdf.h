@@ -54,6 +54,10 @@ class Bsdf {
   // treated as a front with reversed normals.
   virtual const Bsdf* side(bool front) const { return front ? this : nullptr; }
 
+  // Whether no parameter of the pass moves its values: `eval` is then as good in plain numbers
+  // wherever its arguments are still. May be false without need.
+  virtual bool is_still() const { return false; }
+
   // What edge samplers go by. The default knows nothing: the hemisphere.
   virtual LobeSummary lobe() const { return {}; }
   virtual std::vector<ParameterRef> parameters() = 0;

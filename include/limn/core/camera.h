@@ -14,6 +14,9 @@ struct CameraRay {
   double t_max;
 };
 
+template <class S>
+class CameraView;
+
 struct Camera {
   Vec3<Dual> origin;
   Vec3<Dual> left, up, forward;  // orthonormal, world space
@@ -26,7 +29,8 @@ struct Camera {
   int width = 768;  // full film, pixels
   int height = 576;
 
-  // The ray through film position (x, y) [pixels of the full film, row 0 on top].
+  // The ray through film position (x, y) [pixels of the full film, row 0 on top]. For many rays,
+  // see CameraView.
   template <class S>
   CameraRay<S> ray(double x, double y) const;
 
@@ -44,15 +48,39 @@ struct Camera {
   }
 };
 
+// What all rays of a camera share, worked out once. The camera must stay as it is.
+template <class S>
+class CameraView {
+ public:
+  explicit CameraView(const Camera& camera)
+      : camera_(camera),
+        origin_(as<S>(camera.origin)),
+        left_(as<S>(camera.left)),
+        up_(as<S>(camera.up)),
+        forward_(as<S>(camera.forward)) {
+    using std::tan;
+    tan_x_ = tan(as<S>(camera.fov) * (kPi / 360)) * camera.x_factor;
+  }
+
+  // As Camera::ray.
+  CameraRay<S> ray(double x, double y) const {
+    const Camera& c = camera_;
+    const double sx = 1 - 2 * (x / c.width + c.offset_x);
+    const double sy = (1 - 2 * (y / c.height + c.offset_y)) * c.height / c.width;
+    const Vec3<S> d = left_ * (tan_x_ * sx) + up_ * (tan_x_ * sy) + forward_;
+    const double d_length = length(value(d));
+    return {origin_, normalize(d), c.near_clip * d_length, c.far_clip * d_length};
+  }
+
+ private:
+  const Camera& camera_;
+  Vec3<S> origin_, left_, up_, forward_;
+  S tan_x_;
+};
+
 template <class S>
 CameraRay<S> Camera::ray(double x, double y) const {
-  using std::tan;
-  const S tan_x = tan(as<S>(fov) * (kPi / 360)) * x_factor;
-  const double sx = 1 - 2 * (x / width + offset_x);
-  const double sy = (1 - 2 * (y / height + offset_y)) * height / width;
-  const Vec3<S> d = as<S>(left) * (tan_x * sx) + as<S>(up) * (tan_x * sy) + as<S>(forward);
-  const double d_length = length(value(d));
-  return {as<S>(origin), normalize(d), near_clip * d_length, far_clip * d_length};
+  return CameraView<S>(*this).ray(x, y);
 }
 
 template <class S>

@@ -114,6 +114,13 @@ inline Dual atan2(const Dual& y, const Dual& x) {
 inline Dual max(const Dual& a, const Dual& b) { return a.v >= b.v ? a : b; }
 inline Dual min(const Dual& a, const Dual& b) { return a.v <= b.v ? a : b; }
 
+// Whether no parameter of the pass moves it.
+inline bool is_still(const Dual& a) { return is_zero(a.d); }
+inline bool is_still(const Vec3<Dual>& a) {
+  return is_still(a.x) && is_still(a.y) && is_still(a.z);
+}
+inline bool is_still(const Rgb<Dual>& a) { return is_still(a.r) && is_still(a.g) && is_still(a.b); }
+
 inline double value(double a) { return a; }
 inline double value(const Dual& a) { return a.v; }
 template <class S>

@@ -1,5 +1,6 @@
 #pragma once
 // Light from infinity, from all directions: what a ray sees that leaves the scene.
+#include <array>
 #include <memory>
 #include <string>
 #include <vector>
@@ -14,10 +15,24 @@ class Environment : public Light {
   // turning camera) and of the environment's own parameters; it is continuous in d.
   Rgb<double> radiance(const Vec3<double>& d) const override = 0;
   Rgb<Dual> radiance(const Vec3<Dual>& d) const override = 0;
-  // Importance sampling: a unit direction from two numbers in [0, 1), its density [1/sr]
+  // Importance sampling: a unit direction from two numbers in [0, 1), and its density [1/sr]
   // (which rounding at the border of a black region may turn into 0: such a draw counts as none).
-  virtual Vec3d sample_direction(double u1, double u2) const = 0;
+  struct Drawn {
+    Vec3d direction;
+    double pdf;
+    std::array<double, 2> place;  // see LightSample
+  };
+  virtual Drawn sample_direction(double u1, double u2) const = 0;
   virtual double pdf_solid_angle(const Vec3d& d) const = 0;
+
+  // Radiance from a unit direction that is held, and its density, found at once.
+  template <class S>
+  struct Sight {
+    Rgb<S> radiance;  // derivatives: those of the environment's own parameters alone
+    double pdf;       // [1/sr]
+  };
+  virtual void look(const Vec3d& d, Sight<double>& sight) const = 0;
+  virtual void look(const Vec3d& d, Sight<Dual>& sight) const = 0;
 
   // Whether the radiance is the same from all directions.
   virtual bool is_uniform() const = 0;

@@ -4,6 +4,7 @@
 // Directions are what is sampled: while a parameter moves the scene they are held fixed, so
 // densities are constants. A delta light (a point, a spot, a direction) has no directions to choose
 // from: the one direction is a function of the parameters and carries their derivative.
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
@@ -32,6 +33,7 @@ struct LightSample {
   double pdf = 0;
   std::optional<FaceRef> face = {};  // of an area light
   const Light* light = nullptr;
+  std::array<double, 2> place = {};  // of the direction, in a light's own terms
 };
 
 // A light as a ray meets it.
@@ -55,12 +57,28 @@ class Light {
   // of a delta light.
   virtual Rgb<double> radiance(const Vec3<double>& wo) const = 0;
   virtual Rgb<Dual> radiance(const Vec3<Dual>& wo) const = 0;
+  // The same from the direction of a sample that this light drew, which is held: derivatives are
+  // those of the light's own parameters alone.
+  template <class S>
+  Rgb<S> drawn_radiance(const LightSample& sample) const {
+    if constexpr (std::is_same_v<S, double>) {
+      return drawn_value(sample);
+    } else {
+      return drawn_dual(sample);
+    }
+  }
 
   // This light as a delta light; null if it is none.
   virtual const DeltaLight* delta() const { return nullptr; }
   // Appends its outline as triangles, for edge samplers; nothing for light from infinity and for
   // delta lights.
   virtual void add_triangles(std::vector<LightTriangle>& /*triangles*/) const {}
+
+ protected:
+  virtual Rgb<double> drawn_value(const LightSample& sample) const { return radiance(sample.wo); }
+  virtual Rgb<Dual> drawn_dual(const LightSample& sample) const {
+    return radiance(Vec3<Dual>{sample.wo.x, sample.wo.y, sample.wo.z});
+  }
 };
 
 // Light that arrives at a point from one direction.

@@ -28,6 +28,14 @@ class Lights {
   double pdf_environment(const Vec3d& wo) const {
     return environment_->pdf_solid_angle(wo) / choices_;
   }
+  // With the radiance that a ray along the held direction wo sees there.
+  template <class S>
+  Environment::Sight<S> environment(const Vec3d& wo) const {
+    Environment::Sight<S> sight;
+    environment_->look(wo, sight);
+    sight.pdf /= choices_;
+    return sight;
+  }
 
  private:
   std::vector<std::unique_ptr<Light>> area_lights_;

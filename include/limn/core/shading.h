@@ -114,6 +114,12 @@ void place_on_plane(const Mesh& mesh, const Vec3<S>& origin, const Vec3<S>& dire
                          point);
 }
 
+// A point that no parameter moves.
+inline SurfacePoint<Dual> as_dual(const SurfacePoint<double>& point) {
+  const auto still = [](const Vec3d& v) { return Vec3<Dual>{v.x, v.y, v.z}; };
+  return {point.shape, point.face, still(point.p), point.n_g, still(point.n_s), point.horizon};
+}
+
 }  // namespace detail
 
 // Where the line origin + t direction meets the plane of the face: the point that slides along the
@@ -129,6 +135,9 @@ SurfacePoint<S> surface_on_ray(const Scene& scene, FaceRef face, const Vec3<S>& 
     if (!mesh.position_tangents.empty()) {
       detail::place_on_plane<S, Dual>(mesh, origin, direction, point);
       return point;
+    }
+    if (is_still(origin) && is_still(direction) && mesh.normal_tangents.empty()) {
+      return detail::as_dual(surface_on_ray<double>(scene, face, value(origin), value(direction)));
     }
   }
   detail::place_on_plane<S, double>(mesh, origin, direction, point);
@@ -149,6 +158,9 @@ class Scattering {
     n_ = n_s_;
     limited_ = !mitsuba && point.shape->mesh.normal_source != NormalSource::kFace;
     if (limited_) bend();
+    if constexpr (std::is_same_v<S, Dual>) {
+      still_ = is_still(n_s_) && is_still(wi_) && is_still(horizon_) && bsdf_ && bsdf_->is_still();
+    }
   }
 
   bool black() const { return bsdf_ == nullptr; }
@@ -188,13 +200,13 @@ class Scattering {
     double pdf;
   };
   Evaluation eval_with_pdf(const Vec3d& wo) const {
-    if constexpr (std::is_same_v<S, double>) {
-      const S factor = limited_ ? horizon_factor(wo) : 1.0;
-      const BsdfValue f = bsdf_->eval_with_pdf(n_, wi_, wo);
-      return {f.value * factor, f.pdf};
-    } else {
-      return {eval(wo), pdf_solid_angle(wo)};
+    if constexpr (std::is_same_v<S, Dual>) {
+      if (!still_) return {eval(wo), pdf_solid_angle(wo)};
     }
+    const double factor = limited_ ? value(horizon_factor(wo)) : 1.0;
+    const BsdfValue f = bsdf_->eval_with_pdf(value(n_), value(wi_), wo);
+    const Rgb<double> c = f.value * factor;
+    return {{S(c.r), S(c.g), S(c.b)}, f.pdf};
   }
   std::optional<Vec3d> sample(double u1, double u2) const {
     return bsdf_->sample(value(n_), value(wi_), u1, u2);
@@ -230,6 +242,7 @@ class Scattering {
   S horizon_;
   const Bsdf* bsdf_ = nullptr;
   bool limited_ = false;
+  bool still_ = false;  // Dual: no parameter of the pass moves it while wo is held
 };
 
 }  // namespace limn

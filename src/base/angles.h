@@ -1,0 +1,63 @@
+#pragma once
+// Angles from vectors and back, for the inner loops: a few units in the last place from the maths
+// library, which spends several times as long on arguments that never occur here.
+#include <cmath>
+
+#include "limn/core/dual.h"
+
+namespace limn {
+
+// a + b t + c t^2 + ...
+template <int N>
+inline double polynomial(const double (&coefficients)[N], double t) {
+  double sum = coefficients[N - 1];
+  for (int i = N - 2; i >= 0; --i) sum = sum * t + coefficients[i];
+  return sum;
+}
+
+// atan2(y, x), finite and not both 0 (then 0); in [-pi, pi], without branches.
+inline double angle_of(double y, double x) {
+  // (atan(z) / z - 1) / z^2 in z^2 up to tan(pi / 8)^2, at Chebyshev's nodes: 7e-18 off.
+  constexpr double kAtan[] = {-0x1.5555555555555p-2, 0x1.999999999934ap-3,  -0x1.24924924360cbp-3,
+                              0x1.c71c7185314cbp-4,  -0x1.745d0b26b83e7p-4, 0x1.3b1262d95579ep-4,
+                              -0x1.10fa75382537fp-4, 0x1.dfe61e80903d2p-5,  -0x1.a098bb6ba4941p-5,
+                              0x1.41603647c7a7cp-5,  -0x1.3a2b7a07caea9p-6};
+  constexpr double kTanEighth = 0.41421356237309505;
+  const double ax = std::fabs(x), ay = std::fabs(y);
+  const double large = ax > ay ? ax : ay, small = ax > ay ? ay : ax;
+  // atan(q) = pi / 4 + atan((q - 1) / (q + 1)).
+  const bool turned = small > kTanEighth * large;
+  const double numerator = turned ? small - large : small;
+  const double denominator = turned ? small + large : large;
+  const double z = denominator > 0 ? numerator / denominator : 0;
+  const double z2 = z * z;
+  double angle = (turned ? kPi / 4 : 0) + (z + z * (z2 * polynomial(kAtan, z2)));
+  angle = ay > ax ? kPi / 2 - angle : angle;
+  angle = std::signbit(x) ? kPi - angle : angle;
+  return std::copysign(angle, y);
+}
+inline Dual angle_of(const Dual& y, const Dual& x) {
+  const double r2 = x.v * x.v + y.v * y.v;
+  return {angle_of(y.v, x.v), r2 > 0 ? (y.d * x.v - x.d * y.v) / r2 : Lanes{}};
+}
+
+struct SinCos {
+  double sin, cos;
+};
+// Of an angle in turns, 0 to 1.
+inline SinCos sin_cos_of_turns(double turns) {
+  // sin(2 pi r) / r and cos(2 pi r) in r^2 up to 1/64, at Chebyshev's nodes: 3e-17 and 2e-17 off.
+  constexpr double kSin[] = {0x1.921fb54442d18p+2,  -0x1.4abbce625be41p+5, 0x1.466bc677587f8p+6,
+                             -0x1.32d2cce2e5b19p+6, 0x1.50782fda12d96p+5,  -0x1.e30071afc3e59p+3,
+                             0x1.e3f38399551bfp+1};
+  constexpr double kCos[] = {0x1.0000000000000p+0,  -0x1.3bd3cc9be45dep+4, 0x1.03c1f081b5aacp+6,
+                             -0x1.55d3c7e3c90f8p+6, 0x1.e1f5068355e15p+5,  -0x1.a6d1ec7906c20p+4,
+                             0x1.f9cc41140bb60p+2,  -0x1.b264ba152378ap+0};
+  const int quarter = static_cast<int>(4 * turns + 0.5);
+  const double r = turns - 0.25 * quarter, r2 = r * r;
+  const double s = r * polynomial(kSin, r2), c = polynomial(kCos, r2);
+  const double sin = quarter & 1 ? c : s, cos = quarter & 1 ? s : c;
+  return {quarter & 2 ? -sin : sin, (quarter + 1) & 2 ? -cos : cos};
+}
+
+}  // namespace limn

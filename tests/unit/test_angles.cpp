@@ -1,0 +1,87 @@
+// Angles and half floats against the maths library and the format's definition.
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "limn/core/rng.h"
+#include "src/base/angles.h"
+#include "src/base/half.h"
+
+namespace limn {
+namespace {
+
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+
+TEST(Angles, OfVectorsAreThoseOfTheLibrary) {
+  Rng rng(1, 2, 3);
+  for (int i = 0; i < 200000; ++i) {
+    const double size = std::pow(10, 40 * rng.uniform() - 20);
+    const double turn = 2 * kPi * rng.uniform();
+    // Near an axis every other time.
+    const double thin = i % 2 ? 1 : std::pow(10, -16 * rng.uniform());
+    const double x = size * std::cos(turn), y = size * thin * std::sin(turn);
+    const double expected = std::atan2(y, x);
+    EXPECT_NEAR(angle_of(y, x), expected, 2 * kEpsilon * std::fabs(expected)) << y << " " << x;
+    EXPECT_NEAR(angle_of(x, y), std::atan2(x, y), 2 * kEpsilon * std::fabs(std::atan2(x, y)));
+  }
+  for (const double y : {0.0, -0.0, 1.0, -1.0}) {
+    for (const double x : {0.0, -0.0, 1.0, -1.0}) {
+      EXPECT_DOUBLE_EQ(angle_of(y, x), std::atan2(y, x)) << y << " " << x;
+      EXPECT_EQ(std::signbit(angle_of(y, x)), std::signbit(y));
+    }
+  }
+}
+
+TEST(Angles, CarryDerivatives) {
+  const Dual y(0.3, {1, 0, 2, 0}), x(-0.7, {0, 1, -1, 0});
+  const Dual expected = atan2(y, x), got = angle_of(y, x);
+  for (int k = 0; k < kLanes; ++k) EXPECT_DOUBLE_EQ(got.d[k], expected.d[k]);
+}
+
+TEST(Angles, SinesAndCosinesAreThoseOfTheLibrary) {
+  Rng rng(4, 5, 6);
+  for (int i = 0; i < 200000; ++i) {
+    const double turns = i <= 16 ? i / 16.0 : rng.uniform();
+    const SinCos found = sin_cos_of_turns(turns);
+    // The library's argument is rounded: by half a unit in the last place of up to 2 pi.
+    const double rounding = 4 * kEpsilon;
+    EXPECT_NEAR(found.sin, std::sin(2 * kPi * turns), rounding) << turns;
+    EXPECT_NEAR(found.cos, std::cos(2 * kPi * turns), rounding) << turns;
+    EXPECT_NEAR(found.sin * found.sin + found.cos * found.cos, 1, 2 * kEpsilon) << turns;
+  }
+}
+
+// Sign, five bits of exponent, ten of fraction.
+double half_value(uint32_t bits) {
+  const double sign = bits & 0x8000 ? -1 : 1;
+  const auto exponent = static_cast<int>(bits >> 10 & 31);
+  const double fraction = (bits & 1023) / 1024.0;
+  return sign *
+         (exponent == 0 ? std::ldexp(fraction, -14) : std::ldexp(1 + fraction, exponent - 15));
+}
+
+TEST(Halves, HoldEveryFiniteHalfExactly) {
+  for (uint32_t bits = 0; bits < 65536; ++bits) {
+    if ((bits >> 10 & 31) == 31) continue;
+    const auto v = static_cast<float>(half_value(bits));
+    const float found = Half(v);
+    EXPECT_EQ(found, v);
+    EXPECT_EQ(std::signbit(found), std::signbit(v));
+  }
+}
+
+// Whoever compares learns that a number is no half.
+TEST(Halves, ChangeEverythingElse) {
+  Rng rng(7, 8, 9);
+  for (int i = 0; i < 100000; ++i) {
+    const auto v = static_cast<float>(std::pow(10, 76 * rng.uniform() - 38));
+    const double scaled = std::ldexp(v, std::max(-14, std::ilogb(v)) * -1 + 10);
+    const bool is_half = v < 131072 && scaled == std::floor(scaled);
+    EXPECT_EQ(static_cast<float>(Half(v)) == v, is_half) << v;
+  }
+  EXPECT_NE(static_cast<float>(Half(131072.0f)), 131072.0f);
+  EXPECT_NE(static_cast<float>(Half(1e-10f)), 1e-10f);
+}
+
+}  // namespace
+}  // namespace limn
