@@ -258,10 +258,14 @@ class Li2019Sampler final : public EdgeSampler {
 
   Bounds plane_box(const EdgeMesh& mesh, EdgeId edge) const {
     Bounds box;
-    for (const FaceId face : mesh.faces_around(edge)) {
+    const auto extend = [&](FaceId face) {
       const Plane& plane = mesh.plane(face);
       box.extend(origin_ - plane.n * plane.distance(origin_));
-    }
+    };
+    for (const FaceRef face : mesh.faces_around(edge))
+      if (face.shape == mesh.shape) extend(face.face);
+    for (const FaceId face : mesh.edge(edge).faces)
+      if (face.valid()) extend(face);
     return box;
   }
 

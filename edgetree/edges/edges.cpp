@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "edgetree/edges/fold.h"
 #include "edgetree/edges/half_edges.h"
 #include "edgetree/edges/union_find.h"
 
@@ -22,26 +23,12 @@ Plane plane_of(const Mesh& mesh, const FaceIndices& face) {
   return {cast<double>(n), static_cast<double>(-dot(n, a))};
 }
 
-// Six times the signed volume of the tetrahedron over an edge (a, b) and the far corners c, d of
-// its two faces: positive if each face lies in front of the other's plane; and how much of it the
-// rounding of the positions can explain. A position is taken to have been rounded to float twice
-// (in the file, and after a rotation or scaling about the origin): it is off by at most
-// 2 * 2^-24 |x|, which changes the volume by at most the gradient's length times that.
-struct Fold {
-  double volume, rounding;
-};
-Fold fold_of(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& d) {
-  const Vec3d ab = b - a, ac = c - a, ad = d - a;
-  const Vec3d by_d = cross(ab, ac), by_c = cross(ad, ab), by_b = cross(ac, ad);
-  const double sum = length(by_b + by_c + by_d) * length(a) + length(by_b) * length(b) +
-                     length(by_c) * length(c) + length(by_d) * length(d);
-  return {dot(by_d, ad), 0x1.0p-23 * sum};
-}
-
 // Builds one EdgeMesh; the steps are called in the order in which they stand.
 class Builder {
  public:
-  Builder(const Mesh& mesh, bool black_behind) : mesh_(mesh), ids_(edge_vertex_ids(mesh)) {
+  Builder(const Mesh& mesh, bool black_behind, ShapeId shape)
+      : mesh_(mesh), ids_(edge_vertex_ids(mesh)) {
+    result_.shape = shape;
     copy_vertices();
     for (const FaceIndices& face : mesh.faces) result_.planes.push_back(plane_of(mesh, face));
     group_half_edges();
@@ -60,19 +47,34 @@ class Builder {
   }
 
   void group_half_edges() {
-    sides_ = half_edges_of(mesh_, ids_);
+    sort_sides(half_edges_of(mesh_, ids_));
     const auto ends = [](const HalfEdge& s) {
       return std::pair(std::min(s.from, s.to), std::max(s.from, s.to));
     };
-    std::sort(sides_.begin(), sides_.end(), [&](const HalfEdge& a, const HalfEdge& b) {
-      return ends(a) != ends(b) ? ends(a) < ends(b) : a.face < b.face;
-    });
     result_.face_offsets.push_back(0);
     for (size_t begin = 0, end; begin < sides_.size(); begin = end) {
       for (end = begin; end < sides_.size() && ends(sides_[end]) == ends(sides_[begin]); ++end)
-        result_.incident_faces.push_back(sides_[end].face);
+        result_.incident_faces.push_back({result_.shape, sides_[end].face});
       result_.face_offsets.push_back(static_cast<uint32_t>(end));
       append_edge({&sides_[begin], end - begin});
+    }
+  }
+
+  // By the smaller of the two ends (counted, which is faster than to compare), the larger, the face.
+  void sort_sides(const std::vector<HalfEdge>& sides) {
+    const auto low = [](const HalfEdge& s) { return std::min(s.from, s.to).index(); };
+    std::vector<uint32_t> offsets(mesh_.positions.size() + 1);
+    for (const HalfEdge& side : sides) ++offsets[low(side) + 1];
+    for (size_t v = 1; v < offsets.size(); ++v) offsets[v] += offsets[v - 1];
+    sides_.resize(sides.size());
+    std::vector<uint32_t> next(offsets.begin(), offsets.end() - 1);
+    for (const HalfEdge& side : sides) sides_[next[low(side)]++] = side;
+    for (size_t v = 0; v + 1 < offsets.size(); ++v) {
+      std::sort(sides_.begin() + offsets[v], sides_.begin() + offsets[v + 1],
+                [](const HalfEdge& a, const HalfEdge& b) {
+                  return std::pair(std::max(a.from, a.to), a.face) <
+                         std::pair(std::max(b.from, b.to), b.face);
+                });
     }
   }
 
@@ -165,7 +167,7 @@ class Builder {
 }  // namespace
 
 const char* edge_class_name(EdgeClass edge_class) {
-  constexpr const char* kNames[] = {"smooth", "sharp", "border", "irregular", "flat"};
+  constexpr const char* kNames[] = {"smooth", "sharp", "border", "irregular", "flat", "crossing"};
   return kNames[static_cast<int>(edge_class)];
 }
 
@@ -174,8 +176,8 @@ uint64_t EdgeMesh::count(EdgeClass edge_class) const {
                        [&](const Edge& e) { return e.edge_class == edge_class; });
 }
 
-EdgeMesh build_edge_mesh(const Mesh& mesh, bool black_behind) {
-  return Builder(mesh, black_behind).take();
+EdgeMesh build_edge_mesh(const Mesh& mesh, bool black_behind, ShapeId shape) {
+  return Builder(mesh, black_behind, shape).take();
 }
 
 // Four roundings in n . p + offset, of terms no larger than |p| and the extent; three in the offset
@@ -186,7 +188,8 @@ double distance_error(const EdgeMesh& mesh, const Vec3d& p) {
 
 bool is_candidate(const EdgeMesh& mesh, EdgeId id, const Vec3d& p) {
   const Edge& edge = mesh.edge(id);
-  if (edge.edge_class == EdgeClass::kBorder || edge.edge_class == EdgeClass::kIrregular)
+  if (edge.edge_class == EdgeClass::kBorder || edge.edge_class == EdgeClass::kIrregular ||
+      edge.edge_class == EdgeClass::kCrossing)
     return true;
   if (edge.edge_class == EdgeClass::kSharp && !mesh.one_sided_closed) return true;
   if (edge.edge_class == EdgeClass::kSmooth && edge.concave && mesh.one_sided_closed) return false;

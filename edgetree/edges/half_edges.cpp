@@ -11,18 +11,41 @@
 namespace limn {
 namespace {
 
-bool moves_alike(const Vec3<Lanes>& a, const Vec3<Lanes>& b) {
-  for (int i = 0; i < kLanes; ++i) {
-    double size = 0, difference = 0;
-    for (int k = 0; k < 3; ++k) {
-      size = std::max({size, std::fabs(a[k][i]), std::fabs(b[k][i])});
-      difference = std::max(difference, std::fabs(a[k][i] - b[k][i]));
-    }
-    // Each velocity was rounded to float once, and by the motion's own arithmetic.
-    if (difference > 0x1.0p-22 * size) return false;
+// Whether copies of a vertex move alike.
+class Motions {
+ public:
+  explicit Motions(const Mesh& mesh) : mesh_(mesh), diagonal_(bounds_of(mesh).diagonal()) {
+    for (const Vec3<Lanes>& v : mesh.position_tangents)
+      for (int k = 0; k < 3; ++k)
+        for (int i = 0; i < kLanes; ++i) speeds_[i] = std::max(speeds_[i], std::fabs(v[k][i]));
   }
-  return true;
-}
+
+  bool are_alike(VertexId u, VertexId v) const {
+    const Vec3<Lanes>&a = tangent(u), &b = tangent(v);
+    const double apart = length(position(u) - position(v));
+    for (int i = 0; i < kLanes; ++i) {
+      double size = 0, difference = 0;
+      for (int k = 0; k < 3; ++k) {
+        size = std::max({size, std::fabs(a[k][i]), std::fabs(b[k][i])});
+        difference = std::max(difference, std::fabs(a[k][i] - b[k][i]));
+      }
+      // Each velocity was rounded to float once, and by the motion's own arithmetic. Copies that
+      // were rounded apart differ as the motion does between their places.
+      double allowed = 0x1.0p-22 * size;
+      if (apart > 0) allowed += speeds_[i] * (0x1.0p-20 + 2 * apart / diagonal_);
+      if (difference > allowed) return false;
+    }
+    return true;
+  }
+
+ private:
+  const Vec3<Lanes>& tangent(VertexId v) const { return mesh_.position_tangents[v.index()]; }
+  Vec3d position(VertexId v) const { return cast<double>(mesh_.positions[v.index()]); }
+
+  const Mesh& mesh_;
+  double diagonal_;
+  Lanes speeds_;  // the largest component of a velocity
+};
 
 // Whether the exact sum of the terms is zero (Shewchuk 1997, grow-expansion: the parts do not
 // overlap, so they sum to zero only if all are zero).
@@ -127,11 +150,10 @@ class SliverLines {
 std::vector<VertexId> edge_vertex_ids(const Mesh& mesh) {
   std::vector<VertexId> ids(mesh.weld.begin(), mesh.weld.end());
   if (mesh.position_tangents.empty()) return ids;
+  const Motions motions(mesh);
   std::unordered_map<uint32_t, std::vector<VertexId>> torn;  // weld to further representatives
   for (uint32_t v = 0; v < ids.size(); ++v) {
-    const auto alike = [&](VertexId other) {
-      return moves_alike(mesh.position_tangents[v], mesh.position_tangents[other.index()]);
-    };
+    const auto alike = [&](VertexId other) { return motions.are_alike(VertexId(v), other); };
     if (alike(ids[v])) continue;
     std::vector<VertexId>& others = torn[mesh.weld[v]];
     const auto found = std::find_if(others.begin(), others.end(), alike);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <string>
 
+#include "edgetree/edges/contacts.h"
 #include "limn/edgetree/edges.h"
 
 namespace limn {
@@ -17,12 +18,15 @@ const char* fault_of_sizes(const EdgeMesh& mesh) {
     return "there are other than V tangents";
   if (mesh.face_offsets.size() != mesh.edges.size() + 1)
     return "there are other than E + 1 offsets";
+  if (!mesh.incidences.empty() && mesh.incidences.size() != mesh.incident_faces.size())
+    return "there are other incidences than incident faces";
   if (mesh.face_offsets.front() != 0 || mesh.face_offsets.back() != mesh.incident_faces.size())
     return "offsets do not span the incident faces";
   for (size_t e = 0; e < mesh.edges.size(); ++e)
     if (mesh.face_offsets[e] >= mesh.face_offsets[e + 1]) return "an edge has no faces";
-  for (const FaceId face : mesh.incident_faces)
-    if (face.index() >= mesh.planes.size()) return "an incident face is out of range";
+  for (const FaceRef face : mesh.incident_faces)
+    if (face.shape == mesh.shape && face.face.index() >= mesh.planes.size())
+      return "an incident face is out of range";
   for (const Edge& edge : mesh.edges)
     if (ends_of(edge).second.index() >= mesh.positions.size()) return "a vertex is out of range";
   return nullptr;
@@ -36,22 +40,54 @@ const char* fault_of(const Plane& plane) {
                                                  : "a plane's normal is not a unit vector";
 }
 
+// Copies of a vertex may be this far apart (contacts.h).
+double welding_error(const EdgeMesh& mesh) { return touch_tolerance(mesh.extent, mesh.extent); }
+
 const char* fault_of_faces(const EdgeMesh& mesh, EdgeId id) {
   const Edge& edge = mesh.edge(id);
-  const std::span<const FaceId> around = mesh.faces_around(id);
-  if (edge.faces[0] != around[0]) return "its first face is not the first around it";
-  if (edge.faces[1] != (around.size() > 1 ? around[1] : FaceId::none()))
+  const std::span<const FaceRef> around = mesh.faces_around(id);
+  if (around[0] != FaceRef{mesh.shape, edge.faces[0]})
+    return "its first face is not the first around it";
+  const bool has_second = around.size() > 1 && around[1].shape == mesh.shape;
+  if (edge.faces[1] != (has_second ? around[1].face : FaceId::none()))
     return "its second face is not the second around it";
-  for (const FaceId face : around) {
-    const Plane& plane = mesh.plane(face);
+  for (size_t i = 0; i < around.size(); ++i) {
+    if (around[i].shape != mesh.shape) continue;
+    if (i > 0 && around[i - 1].shape != mesh.shape) return "its own mesh's faces do not come first";
+    const Plane& plane = mesh.plane(around[i].face);
     if (length_squared(plane.n) == 0) return "a face around it has no area";
-    for (const VertexId vertex : edge.vertices) {
-      const Vec3d& x = mesh.position(vertex);
-      if (std::fabs(plane.distance(x)) > distance_error(mesh, x))
+    for (const VertexId vertex : edge.vertices)
+      if (std::fabs(plane.distance(mesh.position(vertex))) > welding_error(mesh))
         return "an end lies off the plane of a face around it";
-    }
   }
   return nullptr;
+}
+
+// Of curves where faces cross: both lie on both sides of it, whichever shapes they are of.
+const char* fault_of_crossing(const EdgeMesh& mesh, EdgeId id) {
+  if (mesh.shape.valid()) return "a mesh has an edge where faces cross";
+  const FacesAround around = mesh.around(id);
+  if (around.faces.size() != 2) return "other than two faces cross";
+  for (size_t i = 0; i < 2; ++i) {
+    if (!around.faces[i].shape.valid()) return "a face that crosses is of no shape";
+    if (around.incidence(i) != Incidence{.through = true, .rim = kNoRim})
+      return "a face that crosses ends there";
+    if (mesh.edge(id).faces[i].index() >= mesh.planes.size()) return "a plane is out of range";
+  }
+  return nullptr;
+}
+
+const char* fault_of_rims(const EdgeMesh& mesh, EdgeId id) {
+  const FacesAround around = mesh.around(id);
+  bool moves_with_it = false;
+  for (size_t i = 0; i < around.faces.size(); ++i) {
+    const Incidence incidence = around.incidence(i);
+    if (incidence.through && incidence.rim != kNoRim)
+      return "a face that it runs through has a rim";
+    if (incidence.rim >= kMostRims && incidence.rim != kNoRim) return "a rim is out of range";
+    moves_with_it |= incidence.rim == mesh.edge(id).rim;
+  }
+  return moves_with_it ? nullptr : "no face around it moves with it";
 }
 
 const char* fault_of_class(const EdgeMesh& mesh, EdgeId id) {
@@ -62,7 +98,7 @@ const char* fault_of_class(const EdgeMesh& mesh, EdgeId id) {
   if (faces > 2 && !irregular) return "more than two faces make it irregular";
   if (edge.concave && (faces != 2 || irregular || edge.edge_class == EdgeClass::kFlat))
     return "only smooth and sharp edges are concave";
-  if (mesh.one_sided_closed && (faces != 2 || irregular))
+  if (mesh.one_sided_closed && (faces == 1 || (faces == 2 && irregular)))
     return "a closed mesh has neither borders nor irregular edges";
   return nullptr;
 }
@@ -74,7 +110,9 @@ const char* fault_of_edge(const EdgeMesh& mesh, EdgeId id) {
     return "edges are not sorted by their vertices";
   for (const VertexId vertex : edge.vertices)
     if (!(length(mesh.position(vertex)) <= mesh.extent)) return "an end lies beyond the extent";
+  if (edge.edge_class == EdgeClass::kCrossing) return fault_of_crossing(mesh, id);
   if (const char* fault = fault_of_faces(mesh, id)) return fault;
+  if (const char* fault = fault_of_rims(mesh, id)) return fault;
   return fault_of_class(mesh, id);
 }
 

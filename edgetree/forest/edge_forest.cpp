@@ -56,6 +56,7 @@ struct EdgeForest::Impl {
   ForestConfig config;
   LightClusters lights;
   Forest forest;
+  ShapeId crossings;  // the object whose ends are no floats, or none
 
   ForestQuery prepare(const EdgeQuery& query) const {
     const bool lit = config.light_term && !lights.empty();
@@ -162,7 +163,12 @@ struct EdgeForest::Impl {
     }
     return !is_own_edge(input, query, id);
   }
-  static SeenEdge seen_edge(const LtcLobe& lobe, const Vec3d& p, const EdgeNode& node, int lane) {
+  SeenEdge seen_edge(const LtcLobe& lobe, const Vec3d& p, const EdgeNode& node, int lane) const {
+    if (node.head.object == crossings) {
+      const EdgeMesh& mesh = input.object(crossings);
+      const auto [a, b] = mesh.edge(node.edge_at(lane).edge).vertices;
+      return {lobe, mesh.position(a) - p, mesh.position(b) - p};
+    }
     const auto end = [&](int e) {
       return Vec3d{node.ends[e][0][lane], node.ends[e][1][lane], node.ends[e][2][lane]};
     };
@@ -178,9 +184,12 @@ std::unique_ptr<EdgeForest> EdgeForest::build(const EdgeSamplerInput& input, int
   // What is spread over directions weighs by itself.
   const bool spread = config.environment_term && input.environment;
   const double uniform_luminance = spread ? 0 : input.environment_luminance;
+  const bool crosses = !input.objects.empty() && !input.objects.back().shape.valid();
+  const ShapeId crossings =
+      crosses ? ShapeId(static_cast<uint32_t>(input.objects.size() - 1)) : ShapeId::none();
   auto impl =
       std::unique_ptr<Impl>(new Impl{input, config, LightClusters(input.lights, uniform_luminance),
-                                     build_forest(input, threads, config)});
+                                     build_forest(input, threads, config), crossings});
   return std::unique_ptr<EdgeForest>(new EdgeForest(std::move(impl)));
 }
 
@@ -190,7 +199,7 @@ std::optional<EdgeSample> EdgeForest::sample(const EdgeQuery& query, Rng& rng) c
   Impl::Draw draw;
   if (!impl_->draw(prepared, u_edge, draw)) return std::nullopt;
   if (!impl_->accepts(query, prepared.point, *draw.node, draw.lane)) return std::nullopt;
-  const SeenEdge edge = Impl::seen_edge(prepared.lobe, query.p, *draw.node, draw.lane);
+  const SeenEdge edge = impl_->seen_edge(prepared.lobe, query.p, *draw.node, draw.lane);
   if (!edge.is_seen()) return std::nullopt;
   EdgeSample sample{draw.edge(), edge.sample_t(u_t), draw.probability, 0};
   sample.pdf_t = edge.pdf_t(sample.t);
@@ -206,7 +215,7 @@ double EdgeForest::probability(const EdgeQuery& query, EdgeRef id) const {
   const int lane = static_cast<int>(slot % kWidth);
   const ForestQuery prepared = impl_->prepare(query);
   if (!impl_->accepts(query, prepared.point, node, lane)) return 0;
-  if (!Impl::seen_edge(prepared.lobe, query.p, node, lane).is_seen()) return 0;
+  if (!impl_->seen_edge(prepared.lobe, query.p, node, lane).is_seen()) return 0;
   return impl_->probability(~static_cast<NodeId>(slot / kWidth), lane, prepared);
 }
 
@@ -214,8 +223,8 @@ double EdgeForest::pdf_t(const EdgeQuery& query, EdgeRef id, double t) const {
   const uint32_t slot = impl_->forest.slot(id);
   if (slot == kNoParent) return 0;
   const SeenEdge edge =
-      Impl::seen_edge(LtcLobe(query.lobe, query.n, query.wi), query.p,
-                      impl_->forest.edges[slot / kWidth], static_cast<int>(slot % kWidth));
+      impl_->seen_edge(LtcLobe(query.lobe, query.n, query.wi), query.p,
+                       impl_->forest.edges[slot / kWidth], static_cast<int>(slot % kWidth));
   return edge.is_seen() ? edge.pdf_t(t) : 0;
 }
 

@@ -60,7 +60,7 @@ struct alignas(64) EdgeNode {
   NodeHead head;
   Floats speed;
   Ints edge;          // index of an edge of the object, or kNoChild
-  Floats ends[2][3];  // world space, exactly
+  Floats ends[2][3];  // world space: exactly; of crossing curves to the nearest float
 
   // In a lane that has one.
   EdgeRef edge_at(int lane) const {

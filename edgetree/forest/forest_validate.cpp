@@ -102,7 +102,8 @@ class Walk {
     require_rows(node.rows, lane);
     for (int e = 0; e < 2; ++e)
       for (int k = 0; k < 3; ++k)
-        require(node.ends[e][k][lane] == mesh.position(mesh.edge(id.edge).vertices[e])[k],
+        require(node.ends[e][k][lane] ==
+                    static_cast<float>(mesh.position(mesh.edge(id.edge).vertices[e])[k]),
                 "an end is not the mesh's");
   }
 

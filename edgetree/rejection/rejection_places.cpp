@@ -13,7 +13,8 @@ std::vector<Vec3d> normals_of(const EdgeSamplerInput& input, std::span<const Edg
   std::vector<Vec3d> normals;
   for (const EdgeRef id : edges) {
     const EdgeMesh& mesh = input.object(id.object);
-    for (const FaceId face : mesh.faces_around(id.edge)) normals.push_back(mesh.plane(face).n);
+    for (const FaceRef face : mesh.faces_around(id.edge))
+      if (face.shape == mesh.shape) normals.push_back(mesh.plane(face.face).n);
   }
   return normals;
 }

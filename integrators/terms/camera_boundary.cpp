@@ -72,6 +72,14 @@ class CameraTerm final : public Term {
 
  private:
   void add_object(ShapeId object);
+  // Whether all faces around the edge are emitters that the camera does not see.
+  bool is_hidden(const EdgeMesh& mesh, EdgeId edge) const {
+    if (!context_.scene.hide_emitters) return false;
+    const auto faces = mesh.faces_around(edge);
+    return std::all_of(faces.begin(), faces.end(), [&](const FaceRef face) {
+      return context_.scene.shape(face.shape).is_emitter;
+    });
+  }
   bool clip_and_project(EdgeRef id, FilmEdge& edge) const;
   void weigh(int lanes);
 
@@ -83,13 +91,13 @@ class CameraTerm final : public Term {
 };
 
 void CameraTerm::add_object(ShapeId object) {
-  if (context_.scene.hide_emitters && context_.scene.shape(object).is_emitter) return;
   const EdgeMesh& mesh = input_.object(object);
   const Vec3d pinhole = value(context_.scene.camera.origin);
   for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
     const EdgeRef id{object, EdgeId(e)};
     FilmEdge edge;
-    if (!is_candidate(mesh, id.edge, pinhole) || !clip_and_project(id, edge)) continue;
+    if (!is_candidate(mesh, id.edge, pinhole) || is_hidden(mesh, id.edge)) continue;
+    if (!clip_and_project(id, edge)) continue;
     if (is_zero(edge.speed0) && is_zero(edge.speed1)) continue;
     edges_.push_back(edge);
   }

@@ -22,29 +22,42 @@ namespace {
 
 // The nearest face on either side of an edge, or none.
 struct Sides {
-  FaceId negative, positive;
+  std::optional<FaceSide> negative, positive;
 };
 
 // In the plane across the edge, a face leaves the edge along the unit vector a = alpha m + beta w,
 // with m the normal of the viewing plane through the edge and w the part of omega across the edge:
 // it lies on the side of alpha's sign, and the smaller beta / |alpha|, the nearer it is.
-Sides nearest_faces(const Scene& scene, const EdgeMesh& mesh, const EdgeView& view) {
-  Sides sides;
-  double slopes[2] = {0, 0};
+Sides nearest_faces(const Scene& scene, const EdgeMesh& mesh, const EdgeView& view,
+                    bool hide_emitters) {
   const Vec3d along = normalize(view.x1 - view.x0);
   const Vec3d across = view.omega - along * dot(view.omega, along);
-  for (const FaceId face : mesh.faces_around(view.id.edge)) {
-    const Vec3d a = direction_into_face(scene.shape(view.id.object).mesh, face, view.x0, along);
-    const double alpha = dot(a, view.side);
-    if (alpha == 0) continue;
-    const double slope = dot(a, across) / std::fabs(alpha);
-    FaceId& nearest = alpha > 0 ? sides.positive : sides.negative;
-    double& best = slopes[alpha > 0];
-    if (!nearest.valid() || slope < best) {
-      nearest = face;
-      best = slope;
-    }
+  const FacesAround around = mesh.around(view.id.edge);
+  const auto for_every_seen_side = [&](const auto& visit) {
+    for_every_side(scene, around, view.x0, along, [&](const FaceSide& side, Incidence incidence) {
+      const double alpha = dot(side.into, view.side);
+      if (alpha == 0 || (hide_emitters && scene.shape(side.face.shape).is_emitter)) return;
+      visit(side, incidence.rim, alpha > 0, dot(side.into, across) / std::fabs(alpha));
+    });
+  };
+  RimOrder order;
+  if (!around.incidences.empty()) {
+    for_every_seen_side([&](const FaceSide&, uint8_t rim, bool positive, double slope) {
+      order.add(rim, positive, slope);
+    });
   }
+  Sides sides;
+  double slopes[2] = {0, 0};
+  const uint8_t own = mesh.edge(view.id.edge).rim;
+  for_every_seen_side([&](const FaceSide& side, uint8_t rim, bool positive, double slope) {
+    for (const bool place : {false, true}) {
+      if (!order.is_seen(rim, positive, own, place)) continue;
+      auto& nearest = place ? sides.positive : sides.negative;
+      if (nearest && slope >= slopes[place]) continue;
+      nearest = side;
+      slopes[place] = slope;
+    }
+  });
   return sides;
 }
 
@@ -56,8 +69,8 @@ bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView&
   Ray ray{view.p, view.omega};
   ray.t_min = t_min;
   ray.start = start;
-  ray.skip_shape = view.id.object;
-  ray.skip_faces = mesh.faces_around(view.id.edge);
+  const FacesAround around = mesh.around(view.id.edge);
+  ray.skip_faces = around.faces;
   ray.skip_emitters = bounces == 0 && context.scene.hide_emitters;
   Hit behind;
   ++rays.closest;
@@ -66,21 +79,21 @@ bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView&
 
   NoVisitor nothing;
   PathTracer<double, NoVisitor> path(context, rays, nothing);
-  const EdgeStart edge{view.id.object, ray.skip_faces, view.x0, view.x1};
   // Both sides share their random numbers: where they hardly differ, so do their estimates.
   const Rng side_key = key.at(Purpose::kEdgeSide, bounces);
   const Vec3d wi = -view.omega;
-  const auto leaving = [&](const SurfacePoint<double>& surface, const EdgeStart* at) {
+  const auto leaving = [&](const SurfacePoint<double>& surface, EdgeStart* at) {
     if (part.region) return part.regions->emission(*part.region, surface, wi);
     const Rgb<double> all = path.from_surface(surface, wi, bounces, side_key, at);
     return part.regions ? all - part.regions->emission(surface, wi) : all;
   };
-  const auto radiance = [&](FaceId face) {
-    if (face.valid()) {
-      const FaceRef ref{view.id.object, face};
-      const auto corners = face_corners<double>(context.scene.shape(ref.shape).mesh, face);
+  const auto radiance = [&](const std::optional<FaceSide>& side) {
+    if (side) {
+      const FaceRef face = side->face;
+      const auto corners = face_corners<double>(context.scene.shape(face.shape).mesh, face.face);
       const Vec3d n = cross(corners[1] - corners[0], corners[2] - corners[0]);
-      return leaving(surface_on_ray(context.scene, ref, view.y, n), &edge);
+      EdgeStart edge{around, view.x0, view.x1, *side};
+      return leaving(surface_on_ray(context.scene, face, view.y, n), &edge);
     }
     if (found) {
       return leaving(surface_on_ray(context.scene, behind.face, view.p, view.omega), nullptr);
@@ -89,7 +102,7 @@ bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView&
     const Rgb<double> all = path.escaped(view.omega, bounces);
     return part.regions ? all - part.regions->escaped(view.omega) : all;
   };
-  const Sides sides = nearest_faces(context.scene, mesh, view);
+  const Sides sides = nearest_faces(context.scene, mesh, view, ray.skip_emitters);
   jump = radiance(sides.negative) - radiance(sides.positive);
   return true;
 }

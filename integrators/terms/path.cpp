@@ -1,6 +1,8 @@
 // What happens at an edge that a path starts on: decided in the plane across it.
 #include "integrators/terms/path.h"
 
+#include <tuple>
+
 namespace limn {
 
 Vec3d direction_into_face(const Mesh& mesh, FaceId face, const Vec3d& x0, const Vec3d& along) {
@@ -18,29 +20,45 @@ Vec3d direction_into_face(const Mesh& mesh, FaceId face, const Vec3d& x0, const 
   return best;
 }
 
+void RimOrder::add(uint8_t rim, bool positive, double slope) {
+  if (rim == kNoRim) return;
+  Rim& r = rims_[rim];
+  r.slope[positive] = r.has[positive] ? std::min(r.slope[positive], slope) : slope;
+  r.has[positive] = true;
+}
+
+bool RimOrder::comes_before(uint8_t a, uint8_t b) const {
+  const auto place = [&](uint8_t rim) {
+    const Rim& r = rims_[rim];
+    const int group = r.has[0] == r.has[1] ? 1 : r.has[0] ? 0 : 2;
+    const double within = group == 0 ? -r.slope[0] : group == 2 ? r.slope[1] : 0;
+    return std::tuple(group, within, rim);
+  };
+  return place(a) < place(b);
+}
+
 // In the plane across the edge a face is a ray {s g, s >= 0} and the path starts at a point f of
 // its own face, |f| -> 0. It meets g where f + r w = s g with r, s > 0; by Cramer's rule r = (f x
 // g) / (g x w), s = (f x w) / (g x w). Lengths drop out.
-std::optional<FaceId> blocked_at_edge(const Scene& scene, const EdgeStart& edge, FaceId start,
-                                      const Vec3d& direction) {
-  const Mesh& mesh = scene.shape(edge.shape).mesh;
+std::optional<FaceSide> blocked_at_edge(const Scene& scene, const EdgeStart& edge,
+                                        const Vec3d& direction) {
   const Vec3d along = normalize(edge.x1 - edge.x0);
-  const Vec3d f = direction_into_face(mesh, start, edge.x0, along);
+  const Vec3d& f = edge.start.into;
   const auto turn = [&](const Vec3d& a, const Vec3d& b) { return dot(along, cross(a, b)); };
-  std::optional<FaceId> nearest;
+  std::optional<FaceSide> nearest;
   double nearest_r = 0;
-  for (const FaceId face : edge.faces) {
-    if (face == start) continue;
-    const Vec3d g = direction_into_face(mesh, face, edge.x0, along);
+  for_every_side(scene, edge.around, edge.x0, along, [&](const FaceSide& side, Incidence) {
+    if (side.face == edge.start.face) return;
+    const Vec3d& g = side.into;
     const double gw = turn(g, direction);
     const double r = turn(f, g) / gw;
     const double s = turn(f, direction) / gw;
-    if (gw == 0 || !(r > 0) || !(s > 0)) continue;
+    if (gw == 0 || !(r > 0) || !(s > 0)) return;
     if (!nearest || r < nearest_r) {
-      nearest = face;
+      nearest = side;
       nearest_r = r;
     }
-  }
+  });
   return nearest;
 }
 

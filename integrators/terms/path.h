@@ -3,6 +3,7 @@
 // interior term of its derivative. Sampled directions, their densities and MIS weights are
 // constants while the parameters move (solid-angle measure, everywhere), but for the one direction
 // of a light without extent, which follows the parameters.
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <optional>
@@ -14,6 +15,7 @@
 #include "limn/core/rng.h"
 #include "limn/core/scene.h"
 #include "limn/core/shading.h"
+#include "limn/edgetree/edges.h"
 #include "limn/integrators/run.h"
 
 namespace limn {
@@ -24,23 +26,68 @@ struct PathContext {
   const Lights& lights;
 };
 
+// One side of a face beside an edge: the face, and the unit vector across the edge that lies in it
+// and points into it.
+struct FaceSide {
+  FaceRef face;
+  Vec3d into;
+};
+
 // A path that starts exactly on an edge, on one of the faces around it. Its first rays never meet
 // these faces by rounding: whether a face blocks its neighbour at their common edge is decided by
 // their directions alone.
 struct EdgeStart {
-  ShapeId shape;
-  std::span<const FaceId> faces;  // around the edge
-  Vec3d x0, x1;                   // its ends
+  FacesAround around;
+  Vec3d x0, x1;    // ends of the edge
+  FaceSide start;  // where the path is
 };
 
-// The unit vector across an edge that lies in the face and points into it. x0: a point of the edge,
-// along: its unit direction.
+// `into` of FaceSide. x0: a point of the edge, along: its unit direction. Of a face that the edge
+// runs through, one of the two sides; the other is its opposite.
 Vec3d direction_into_face(const Mesh& mesh, FaceId face, const Vec3d& x0, const Vec3d& along);
 
-// The face around the edge that a ray meets at once when it leaves `start` infinitely close to the
-// edge, if any.
-std::optional<FaceId> blocked_at_edge(const Scene& scene, const EdgeStart& edge, FaceId start,
-                                      const Vec3d& direction);
+// Calls visit(side, incidence) for every side of the faces around an edge.
+template <class Visit>
+void for_every_side(const Scene& scene, const FacesAround& around, const Vec3d& x0,
+                    const Vec3d& along, const Visit& visit) {
+  for (size_t i = 0; i < around.faces.size(); ++i) {
+    const FaceRef face = around.faces[i];
+    const Incidence incidence = around.incidence(i);
+    const Vec3d into = direction_into_face(scene.shape(face.shape).mesh, face.face, x0, along);
+    visit(FaceSide{face, into}, incidence);
+    if (incidence.through) visit(FaceSide{face, -into}, incidence);
+  }
+}
+
+// In which order the rims in one place part as their faces move, seen across them from the negative
+// side to the positive one: those of faces on the negative side alone come first, the rear ones
+// before those that hide them; those of faces on the positive side alone last, the front ones first.
+// So surfaces leave gaps and do not pass through each other.
+class RimOrder {
+ public:
+  // A face lies on this side; smaller slopes are nearer.
+  void add(uint8_t rim, bool positive, double slope);
+  // Whether a face is seen just beside the rim `own`, on its positive side or the other: one of the
+  // same rim on its own side only, one of a rim that comes later (or has come before) on both, if it
+  // lies on the negative (or the positive) side.
+  bool is_seen(uint8_t rim, bool positive, uint8_t own, bool on_positive_side) const {
+    if (rim == own || rim == kNoRim) return positive == on_positive_side;
+    return positive == comes_before(rim, own);
+  }
+
+ private:
+  bool comes_before(uint8_t a, uint8_t b) const;
+
+  struct Rim {
+    bool has[2] = {false, false};  // faces on the negative and on the positive side
+    double slope[2];               // of the nearest
+  };
+  std::array<Rim, kMostRims> rims_;
+};
+
+// The side that a ray meets at once when it leaves edge.start infinitely close to the edge, if any.
+std::optional<FaceSide> blocked_at_edge(const Scene& scene, const EdgeStart& edge,
+                                        const Vec3d& direction);
 
 // Does nothing at path vertices.
 struct NoVisitor {
@@ -96,7 +143,8 @@ class PathTracer {
   }
 
   // Radiance that leaves the surface along wi: emission and everything scattered within the scene's
-  // depth. With x_0 the surface, w_i a direction drawn at x_i with density p_i, f_i the scattering
+  // depth. edge: where the surface lies, if the path starts on an edge; it follows the path while
+  // that stays there. With x_0 the surface, w_i a direction drawn at x_i with density p_i, f_i the scattering
   // function times cosine there, and the throughput T_k = f_0 / p_0 ... f_(k-1) / p_(k-1), one path
   // estimates
   //   L = L_e(x_0) + sum over k of T_k (E_k + f_k / p_k m_k L_e(x_(k+1))),
@@ -105,7 +153,7 @@ class PathTracer {
   // n_k = q^2 / (p^2 + q^2) the weights of the power heuristic at either's direction (n_k = 1 for a
   // delta light). w, l, p, q, m, n are constants when S carries derivatives.
   Rgb<S> from_surface(SurfacePoint<S> surface, Vec3<S> wi, int bounces, const Rng& key,
-                      const EdgeStart* edge) {
+                      EdgeStart* edge) {
     Rgb<S> radiance = surface.emission(value(wi), c_.scene.shading);
     Rgb<S> throughput = grey(S(1.0));
     for (;; ++bounces) {
@@ -195,16 +243,16 @@ class PathTracer {
   }
 
   // The next surface from a path vertex; hit.t = 0 for a neighbour that blocks at the edge itself.
-  bool next_hit(const SurfacePoint<S>& surface, const Vec3d& wo, const EdgeStart* edge, Hit& hit) {
+  bool next_hit(const SurfacePoint<S>& surface, const Vec3d& wo, EdgeStart* edge, Hit& hit) {
     Ray ray{value(surface.p), wo};
     ray.start = surface.face;
     if (edge) {
-      if (const auto face = blocked_at_edge(c_.scene, *edge, surface.face.face, wo)) {
-        hit = {{edge->shape, *face}, 0};
+      if (const auto side = blocked_at_edge(c_.scene, *edge, wo)) {
+        edge->start = *side;
+        hit = {side->face, 0};
         return true;
       }
-      ray.skip_shape = edge->shape;
-      ray.skip_faces = edge->faces;
+      ray.skip_faces = edge->around.faces;
     }
     ++rays_.closest;
     return c_.tracer.closest(ray, hit);
@@ -263,9 +311,8 @@ class PathTracer {
     Ray ray{p, light.wo};
     ray.start = start;
     if (edge) {
-      if (blocked_at_edge(c_.scene, *edge, start.face, light.wo)) return true;
-      ray.skip_shape = edge->shape;
-      ray.skip_faces = edge->faces;
+      if (blocked_at_edge(c_.scene, *edge, light.wo)) return true;
+      ray.skip_faces = edge->around.faces;
     }
     // Ends a float's rounding before the light, so that neighbours of the chosen face do not hide
     // the point.

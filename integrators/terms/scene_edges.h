@@ -5,7 +5,9 @@
 
 namespace limn {
 
-// Edges of all shapes (object i is shape i), light polygons and the environment's mean.
-EdgeSamplerInput make_sampler_input(const Scene& scene);
+// Edges of all shapes (object i is shape i), united where they touch, after them the curves where
+// surfaces cross (if any do), light polygons and the environment's mean. The result does not depend
+// on `threads`.
+EdgeSamplerInput make_sampler_input(const Scene& scene, int threads);
 
 }  // namespace limn

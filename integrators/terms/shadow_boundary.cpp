@@ -48,23 +48,43 @@ struct Viewer {
 
 // Which sides of the plane through light and edge the faces around the edge lie on. A face that is
 // seen edge-on, to the rounding of the determinant, casts no shadow of its own.
-double lit_side(const Mesh& mesh, const EdgeMesh& edges, EdgeId edge, const LightOrigin& light) {
+double lit_side(const Scene& scene, const EdgeMesh& edges, EdgeId edge, const LightOrigin& light) {
   const auto& ends = edges.edge(edge).vertices;
   const Vec3d x0 = edges.position(ends[0]);
   const Vec3d along = edges.position(ends[1]) - x0;
   const Vec3d w = light.through(x0);
   const Vec3d n = cross(w, along);
   const double scale = 8 * 0x1p-53 * length(w) * length(along);
+  const FacesAround around = edges.around(edge);
+  const uint8_t own = edges.edge(edge).rim;
   bool blocked[2] = {false, false};
-  for (const FaceId face : edges.faces_around(edge)) {
-    double side = 0;
-    for (const Vec3d& corner : face_corners<double>(mesh, face)) {
-      const Vec3d a = corner - x0;
-      const double d = dot(a, n);
-      if (std::fabs(d) > scale * length(a) && std::fabs(d) > std::fabs(side)) side = d;
+  const auto for_every_face = [&](const auto& visit) {
+    for (size_t i = 0; i < around.faces.size(); ++i) {
+      const FaceRef face = around.faces[i];
+      double side = 0;
+      for (const Vec3d& corner : face_corners<double>(scene.shape(face.shape).mesh, face.face)) {
+        const Vec3d a = corner - x0;
+        const double d = dot(a, n);
+        if (std::fabs(d) > scale * length(a) && std::fabs(d) > std::fabs(side)) side = d;
+      }
+      if (side == 0) continue;
+      visit(face, around.incidence(i), side > 0);
     }
-    if (side != 0) blocked[side > 0] = true;
+  };
+  RimOrder order;
+  if (!around.incidences.empty()) {
+    for_every_face([&](FaceRef face, Incidence incidence, bool positive) {
+      const Vec3d into =
+          direction_into_face(scene.shape(face.shape).mesh, face.face, x0, normalize(along));
+      order.add(incidence.rim, positive, dot(into, w) / std::fabs(dot(into, n)));
+    });
   }
+  for_every_face([&](FaceRef, Incidence incidence, bool positive) {
+    for (const bool place : {false, true}) {
+      if (incidence.through || order.is_seen(incidence.rim, positive, own, place))
+        blocked[place] = true;
+    }
+  });
   return blocked[0] == blocked[1] ? 0 : blocked[0] ? 1 : -1;
 }
 
@@ -142,7 +162,7 @@ void ShadowTerm::list(const DeltaLight& light, ShapeId object) {
   const LightOrigin origin = light.origin();
   for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
     ShadowEdge edge{&light, {object, EdgeId(e)}, 0, 0, {}};
-    edge.sign = lit_side(context_.scene.shape(object).mesh, mesh, edge.id.edge, origin);
+    edge.sign = lit_side(context_.scene, mesh, edge.id.edge, origin);
     if (edge.sign == 0) continue;
     const auto& ends = mesh.edge(edge.id.edge).vertices;
     const Vec3<Dual> y[2] = {moving_vertex(mesh, ends[0]), moving_vertex(mesh, ends[1])};
@@ -207,7 +227,6 @@ std::optional<ShadowPoint> ShadowTerm::cast(const ShadowEdge& edge, double t,
   const double w_length = length(w);
   const double before = origin.infinite ? reach_ : w_length;  // of the ray, up to y
   Ray ray{y - w * (before / w_length), w / w_length};
-  ray.skip_shape = edge.id.object;
   ray.skip_faces = mesh.faces_around(edge.id.edge);
   Hit hit;
   ++rays.closest;
@@ -275,8 +294,7 @@ void ShadowTerm::add_sample(const PathVertex& vertex, Rng rng, TermCost& cost,
   }
   Ray ray{q, omega};
   ray.start = vertex.surface.face;
-  ray.skip_shape = point->face.shape;
-  ray.skip_faces = {&point->face.face, 1};
+  ray.skip_faces = {&point->face, 1};
   ray.t_max = distance * (1 - 0x1p-20);  // as shadow rays end
   RayCount to_viewer{0, 1};
   cost.add(to_viewer);

@@ -13,7 +13,7 @@ std::span<const TermType> term_types() { return kTermTypes; }
 const EdgeSamplerInput& TermInput::edges() {
   if (edges_) return *edges_;
   const Stopwatch watch;
-  edges_ = std::make_unique<EdgeSamplerInput>(make_sampler_input(context.scene));
+  edges_ = std::make_unique<EdgeSamplerInput>(make_sampler_input(context.scene, threads));
   edges_->lane_scale = lane_scale;
   if (sampler.regions) {
     regions_ = std::make_unique<LightRegions>(context.scene);

@@ -1,6 +1,7 @@
 // From what a mesh file says to a checked mesh: transform, weld, mend, normals.
 #include "src/mesh/mesh_build.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace limn {
@@ -42,6 +43,48 @@ void set_faces(Mesh& mesh, const RawMesh& raw, bool flip) {
     if (flip) std::swap(ids[1], ids[2]);
     mesh.normal_ids.push_back(ids);
   }
+}
+
+// Returns how many faces were dropped.
+template <class Keep>
+size_t keep_faces(Mesh& mesh, const Keep& keep) {
+  size_t kept = 0;
+  for (size_t f = 0; f < mesh.faces.size(); ++f) {
+    if (!keep(f)) continue;
+    mesh.faces[kept] = mesh.faces[f];
+    if (!mesh.normal_ids.empty()) mesh.normal_ids[kept] = mesh.normal_ids[f];
+    ++kept;
+  }
+  const size_t dropped = mesh.faces.size() - kept;
+  mesh.faces.resize(kept);
+  if (!mesh.normal_ids.empty()) mesh.normal_ids.resize(kept);
+  return dropped;
+}
+
+// Faces that welded seams have closed.
+void drop_collapsed(Mesh& mesh) {
+  mesh.collapsed_faces += keep_faces(mesh, [&](size_t f) {
+    const FaceIndices& face = mesh.faces[f];
+    const uint32_t a = mesh.weld[face[0]], b = mesh.weld[face[1]], c = mesh.weld[face[2]];
+    return a != b && b != c && c != a;
+  });
+}
+
+// Faces with the corners and the winding of an earlier one: rays would meet either.
+size_t drop_repeated(Mesh& mesh) {
+  std::vector<std::pair<FaceIndices, uint32_t>> faces;
+  faces.reserve(mesh.faces.size());
+  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+    FaceIndices face = mesh.faces[f];
+    for (uint32_t& v : face) v = mesh.weld[v];
+    std::rotate(face.begin(), std::min_element(face.begin(), face.end()), face.end());
+    faces.push_back({face, f});
+  }
+  std::sort(faces.begin(), faces.end());
+  std::vector<bool> repeats(faces.size());
+  for (size_t i = 1; i < faces.size(); ++i)
+    if (faces[i].first == faces[i - 1].first) repeats[faces[i].second] = true;
+  return keep_faces(mesh, [&](size_t f) { return !repeats[f]; });
 }
 
 Vec3d doubled_area(const Mesh& mesh, size_t face) {
@@ -123,6 +166,8 @@ Mesh build_mesh(const RawMesh& raw, const MeshOptions& options,
   set_positions(mesh, raw, options.to_world);
   weld_positions(mesh);
   set_faces(mesh, raw, options.flip_normals);
+  weld_seams(mesh);
+  drop_collapsed(mesh);
   if (mesh.faces.empty()) {
     throw InputError(raw.where, "the mesh has no faces: each of its " +
                                     std::to_string(raw.faces.size()) +
@@ -132,6 +177,11 @@ Mesh build_mesh(const RawMesh& raw, const MeshOptions& options,
     warn(warnings, raw.where,
          std::to_string(mesh.collapsed_faces) + " of " + std::to_string(raw.faces.size()) +
              " faces have two corners at the same position and are left out");
+  }
+  if (const size_t repeated = drop_repeated(mesh); repeated > 0) {
+    warn(warnings, raw.where,
+         std::to_string(repeated) + " of " + std::to_string(raw.faces.size()) +
+             " faces repeat another face and are left out");
   }
   if (mesh.normal_source == NormalSource::kGiven) {
     set_given_normals(mesh, raw, options, warnings);

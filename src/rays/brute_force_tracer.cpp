@@ -54,8 +54,7 @@ class BruteForceTracer final : public RayTracer {
  private:
   static bool is_skipped(const Ray& ray, FaceRef face) {
     if (face == ray.start) return true;
-    return face.shape == ray.skip_shape && std::find(ray.skip_faces.begin(), ray.skip_faces.end(),
-                                                     face.face) != ray.skip_faces.end();
+    return std::find(ray.skip_faces.begin(), ray.skip_faces.end(), face) != ray.skip_faces.end();
   }
 
   const Scene& scene_;

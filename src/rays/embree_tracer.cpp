@@ -25,8 +25,7 @@ bool is_skipped(const Context& context, FaceRef face) {
   const Ray& ray = *context.ray;
   if (face == ray.start) return true;
   if (ray.skip_emitters && context.scene->shape(face.shape).is_emitter) return true;
-  if (face.shape != ray.skip_shape) return false;
-  return std::find(ray.skip_faces.begin(), ray.skip_faces.end(), face.face) != ray.skip_faces.end();
+  return std::find(ray.skip_faces.begin(), ray.skip_faces.end(), face) != ray.skip_faces.end();
 }
 
 void reject_skipped(const RTCFilterFunctionNArguments* arguments) {

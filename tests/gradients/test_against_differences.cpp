@@ -215,6 +215,41 @@ INSTANTIATE_TEST_SUITE_P(, Room,
                            return name;
                          });
 
+// A turned cube that shines and a ball that does not, both halfway in a glossy floor and a glossy
+// wall: the lines where they cross move on the film and in the gloss.
+class CrossingSurfaces : public testing::TestWithParam<std::string> {};
+
+TEST_P(CrossingSurfaces, Agree) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.max_depth = 2;
+  parts.origin = {1, 2.5, 5};
+  parts.target = {0, 0.2, 0};
+  Rng rng(5, 0, 0);
+  Vec3d rows[3];
+  random_rotation(rng, rows);
+  const Mesh cube = transformed(cube_mesh(), rows, 0.6, {});
+  parts.body = square("floor", 2.5, -90, {0, 0, 0}, conductor("gloss", 0.4)) +
+               square("wall", 2, 0, {0, 1, -1}, conductor("sheen", 0.3)) +
+               obj_shape("cube", write_mesh(files, "cube.obj", cube), true, 1, {-0.5, 0.2, -0.3},
+                         area_light("glow", "4, 3, 2")) +
+               obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(2)), false, 0.6,
+                         {0.8, 0.1, -0.8}, diffuse("chalk", "0.2, 0.2, 0.2")) +
+               constant_light("sky", "0.3, 0.3, 0.3");
+  expect_agreement(make_scene(files, parts), GetParam(), 1024);
+}
+
+INSTANTIATE_TEST_SUITE_P(, CrossingSurfaces,
+                         testing::Values("cube.translate.x", "cube.translate.y", "cube.scale",
+                                         "cube.rotate.z", "ball.translate.y", "ball.scale",
+                                         "floor.translate.y", "floor.rotate.z", "wall.translate.z",
+                                         "sensor.translate.x"),
+                         [](const auto& test) {
+                           std::string name = test.param;
+                           std::replace(name.begin(), name.end(), '.', '_');
+                           return name;
+                         });
+
 // Roulette and hidden emitters change the paths, not what they mean.
 TEST(Paths, RouletteAgrees) {
   const TempFiles files;

@@ -104,7 +104,7 @@ EdgeSamplerInput test_input(const Mesh& mesh) {
   Mesh first = mesh, second = transformed(mesh, identity, 0.5, {1.2, 0.1, -0.4});
   set_test_tangents(first);
   set_test_tangents(second);
-  return {{build_edge_mesh(first, true), build_edge_mesh(second, true)}, {}, 1};
+  return {{build_edge_mesh(first, true), build_edge_mesh(second, true, ShapeId(1))}, {}, 1};
 }
 
 template <class F>
@@ -338,9 +338,8 @@ TEST_P(EdgeSamplers, NeverDrawTheOwnFace) {
     q.n = edges.plane(face).n;
     q.wi = normalize(q.n + random_direction(rng) * 0.7);
     const auto is_own = [&](EdgeRef id) {
-      const auto around = edges.faces_around(id.edge);
-      return id.object == ShapeId(0) &&
-             std::find(around.begin(), around.end(), face) != around.end();
+      const auto around = input.object(id.object).faces_around(id.edge);
+      return std::find(around.begin(), around.end(), q.face) != around.end();
     };
     for_every_edge(input, [&](EdgeRef id) {
       if (is_own(id)) {

@@ -58,7 +58,7 @@ TEST_P(RayTracers, AgreeButForRounding) {
     ray.skip_emitters = i % 3 == 0;
     if (i % 5 == 0) ray.t_max = static_cast<float>(3 * rng.uniform() * unit);
     if (i % 7 == 0) ray.t_min = static_cast<float>(rng.uniform() * unit);
-    std::vector<FaceId> faces;
+    std::vector<FaceRef> faces;
     Hit a, b;
     // Half of the rays pass through what they met first.
     if (i % 2 == 0 && oracle->closest(ray, b)) {
@@ -66,8 +66,7 @@ TEST_P(RayTracers, AgreeButForRounding) {
       if (i % 4 == 0) {
         ray.start = b.face;
       } else {
-        faces = {b.face.face, FaceId(0)};
-        ray.skip_shape = b.face.shape;
+        faces = {b.face, {b.face.shape, FaceId(0)}};
         ray.skip_faces = faces;
       }
     }

@@ -35,23 +35,24 @@ TEST(BlockedAtEdge, AgreesWithRaysCloseBy) {
     scene.shapes.emplace_back();
     scene.shapes[0].mesh = fan(wings, rng);
     const Mesh& mesh = scene.shapes[0].mesh;
-    std::vector<FaceId> faces;
-    for (int f = 0; f < wings; ++f) faces.emplace_back(f);
-    const EdgeStart edge{ShapeId(0), faces, {0, 0, -1}, {0, 0, 1}};
+    std::vector<FaceRef> faces;
+    for (int f = 0; f < wings; ++f) faces.push_back({ShapeId(0), FaceId(f)});
+    EdgeStart edge{{faces, {}}, {0, 0, -1}, {0, 0, 1}, {}};
     const auto tracer = make_brute_force_tracer(scene);
     for (int k = 0; k < 20; ++k) {
-      const FaceId start(static_cast<uint32_t>(rng.uniform() * wings));
+      const FaceRef start = faces[static_cast<uint32_t>(rng.uniform() * wings)];
       const Vec3d direction = random_direction(rng);
-      const Vec3d into = direction_into_face(mesh, start, edge.x0, {0, 0, 1});
+      const Vec3d into = direction_into_face(mesh, start.face, edge.x0, {0, 0, 1});
+      edge.start = {start, into};
       Ray ray{Vec3d{0, 0, rng.uniform() - 0.5} + into * 1e-12, direction};
-      ray.start = {ShapeId(0), start};
+      ray.start = start;
       ray.t_max = 1e-3;
       Hit hit;
       const bool found = tracer->closest(ray, hit);
-      const auto face = blocked_at_edge(scene, edge, start, direction);
-      ASSERT_EQ(found, face.has_value()) << "trial " << trial << ", direction " << k;
+      const auto side = blocked_at_edge(scene, edge, direction);
+      ASSERT_EQ(found, side.has_value()) << "trial " << trial << ", direction " << k;
       if (found) {
-        EXPECT_EQ(hit.face.face, *face);
+        EXPECT_EQ(hit.face, side->face);
       }
       ++(found ? blocked : free);
     }
@@ -68,14 +69,19 @@ TEST(BlockedAtEdge, RightAngle) {
   scene.shapes.emplace_back();
   scene.shapes[0].mesh =
       make_mesh({{0, 0, -1}, {0, 0, 1}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {1, 0, 3}});
-  const std::array faces = {FaceId(0), FaceId(1)};
-  const EdgeStart edge{ShapeId(0), faces, {0, 0, -1}, {0, 0, 1}};
-  EXPECT_EQ(blocked_at_edge(scene, edge, faces[0], normalize(Vec3d{-1, 1, 0})), faces[1]);
-  EXPECT_EQ(blocked_at_edge(scene, edge, faces[0], normalize(Vec3d{-1, 1e-9, 0})), faces[1]);
-  EXPECT_EQ(blocked_at_edge(scene, edge, faces[0], normalize(Vec3d{1, 1, 0})), std::nullopt);
-  EXPECT_EQ(blocked_at_edge(scene, edge, faces[0], normalize(Vec3d{-1, -1, 0})), std::nullopt);
-  EXPECT_EQ(blocked_at_edge(scene, edge, faces[1], normalize(Vec3d{1, -1, 0})), faces[0]);
-  EXPECT_EQ(blocked_at_edge(scene, edge, faces[1], normalize(Vec3d{1, 1, 0})), std::nullopt);
+  const std::array faces = {FaceRef{ShapeId(0), FaceId(0)}, FaceRef{ShapeId(0), FaceId(1)}};
+  const Vec3d into[] = {{1, 0, 0}, {0, 1, 0}};
+  const auto blocked = [&](int start, const Vec3d& direction) {
+    const EdgeStart edge{{faces, {}}, {0, 0, -1}, {0, 0, 1}, {faces[start], into[start]}};
+    const auto side = blocked_at_edge(scene, edge, normalize(direction));
+    return side ? std::optional(side->face) : std::nullopt;
+  };
+  EXPECT_EQ(blocked(0, {-1, 1, 0}), faces[1]);
+  EXPECT_EQ(blocked(0, {-1, 1e-9, 0}), faces[1]);
+  EXPECT_EQ(blocked(0, {1, 1, 0}), std::nullopt);
+  EXPECT_EQ(blocked(0, {-1, -1, 0}), std::nullopt);
+  EXPECT_EQ(blocked(1, {1, -1, 0}), faces[0]);
+  EXPECT_EQ(blocked(1, {1, 1, 0}), std::nullopt);
 }
 
 }  // namespace

@@ -59,7 +59,7 @@ TEST(Edges, FirstFaceRunsAlongTheEdge) {
       for (int k = 0; k < 3; ++k)
         matches += mesh.weld[face[k]] == from.index() && mesh.weld[face[(k + 1) % 3]] == to.index();
       EXPECT_EQ(matches, 1) << name << " edge " << e;
-      EXPECT_EQ(edges.faces_around(EdgeId(e))[0], edges.edges[e].faces[0]);
+      EXPECT_EQ(edges.faces_around(EdgeId(e))[0].face, edges.edges[e].faces[0]);
     }
     EXPECT_EQ(edges.face_offsets.size(), edges.edges.size() + 1);
     EXPECT_EQ(edges.incident_faces.size(), 3 * mesh.faces.size()) << name;
@@ -340,7 +340,8 @@ TEST(EdgeMesh, CorruptedCopiesAreFound) {
       {"there are other than E + 1 offsets", [](EdgeMesh& m) { m.face_offsets.pop_back(); }},
       {"offsets do not span the incident faces", [](EdgeMesh& m) { m.incident_faces.pop_back(); }},
       {"an edge has no faces", [](EdgeMesh& m) { m.face_offsets[3] = m.face_offsets[4]; }},
-      {"an incident face is out of range", [](EdgeMesh& m) { m.incident_faces[2] = FaceId(1000); }},
+      {"an incident face is out of range",
+       [](EdgeMesh& m) { m.incident_faces[2].face = FaceId(1000); }},
       {"a vertex is out of range", [](EdgeMesh& m) { m.edges[2].vertices[1] = VertexId(1000); }},
       {"face 3: a plane's normal is not a unit vector", [](EdgeMesh& m) { m.planes[3].n.x += 1; }},
       {"face 3: a plane without a normal has an offset", [](EdgeMesh& m) { m.planes[3].n = {}; }},
@@ -354,7 +355,27 @@ TEST(EdgeMesh, CorruptedCopiesAreFound) {
       {"edge 4: its second face is not the second around it",
        [](EdgeMesh& m) { m.edges[4].faces[1] = FaceId::none(); }},
       {"edge 0: an end lies off the plane of a face around it",
-       [](EdgeMesh& m) { m.planes[m.edges[0].faces[0].index()].offset += 1e-12; }},
+       [](EdgeMesh& m) { m.planes[m.edges[0].faces[0].index()].offset += 1e-6; }},
+      {"there are other incidences than incident faces",
+       [](EdgeMesh& m) { m.incidences.resize(3); }},
+      {"edge 2: its own mesh's faces do not come first",
+       [](EdgeMesh& m) {
+         m.incident_faces.insert(m.incident_faces.begin() + m.face_offsets[2] + 1,
+                                 {ShapeId(1), FaceId(0)});
+         for (size_t e = 3; e < m.face_offsets.size(); ++e) ++m.face_offsets[e];
+         m.edges[2].faces[1] = FaceId::none();
+       }},
+      {"edge 1: a face that it runs through has a rim",
+       [](EdgeMesh& m) {
+         m.incidences.resize(m.incident_faces.size());
+         m.incidences[m.face_offsets[1]].through = true;
+       }},
+      {"edge 1: a rim is out of range",
+       [](EdgeMesh& m) {
+         m.incidences.resize(m.incident_faces.size());
+         m.incidences[m.face_offsets[1]].rim = kMostRims;
+       }},
+      {"edge 7: no face around it moves with it", [](EdgeMesh& m) { m.edges[7].rim = 1; }},
       {"edge 5: a border has one face",
        [](EdgeMesh& m) { m.edges[5].edge_class = EdgeClass::kBorder; }},
       {"edge 5: a closed mesh has neither borders nor irregular edges",

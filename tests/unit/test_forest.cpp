@@ -93,7 +93,7 @@ TEST_P(Forests, ListWhatTheExactTestLists) {
       const Mesh moved = transformed(mesh, rows, scale, random_direction(rng) * shift);
       const Mesh other = transformed(mesh, rows, 0.1 * scale, {});
       const EdgeSamplerInput input{
-          {build_edge_mesh(moved, i % 3 != 0), build_edge_mesh(other, true)}};
+          {build_edge_mesh(moved, i % 3 != 0), build_edge_mesh(other, true, ShapeId(1))}};
       const auto forest = EdgeForest::build(input, 1, GetParam());
       for (int k = 0; k < 60; ++k)
         expect_complete(input, *forest, random_point(input.objects[k % 2], scale, rng), name);
@@ -238,7 +238,8 @@ TEST(Forest, IsValidForAllMeshes) {
     Vec3d rows[3];
     random_rotation(rng, rows);
     const Mesh other = transformed(mesh, rows, 1e-3, {1e3, -1, 2});
-    const EdgeSamplerInput input{{build_edge_mesh(mesh, true), build_edge_mesh(other, false)}};
+    const EdgeSamplerInput input{
+        {build_edge_mesh(mesh, true), build_edge_mesh(other, false, ShapeId(1))}};
     for (const EdgeMesh& object : input.objects) EXPECT_EQ(object.validate(), "") << name;
     for (const uint32_t width : {2u, 5u, 8u}) {
       const Forest forest = build_forest(input, 2, ForestConfig{.width = width});

@@ -9,8 +9,8 @@
 
 #include "edgetree/edges/union_find.h"
 #include "limn/core/ray_tracer.h"
+#include "limn/edgetree/crossing_curves.h"
 #include "limn/edgetree/edges.h"
-#include "limn/integrators/crossings.h"
 #include "support/scenes.h"
 #include "support/temp_files.h"
 #include "tools/generate/generate.h"
@@ -136,12 +136,10 @@ TEST_P(GeneratedMesh, HasTheSameBytesEveryTime) {
 
 TEST_P(GeneratedMesh, DoesNotCrossItself) {
   const TempFiles files;
-  SceneParts parts;
-  parts.body = obj_shape("object", files.path("mesh.obj"), false, 1, {0, 0, 0}, "") +
-               constant_light("sky", "1");
   write_triangles(files.path("mesh.obj"), mesh_);
-  const Scene scene = make_scene(files, parts);
-  EXPECT_EQ(find_crossings(scene, *make_embree_tracer(scene, 1)).edges, 0u);
+  const Mesh mesh = read_mesh(files.path("mesh.obj"), true);
+  const Mesh* meshes[] = {&mesh};
+  EXPECT_TRUE(find_crossings(meshes, 1).empty());
 }
 
 INSTANTIATE_TEST_SUITE_P(, GeneratedMesh, testing::ValuesIn(cases()), [](const auto& test) {

@@ -61,7 +61,7 @@ TEST(Ids, NoFaceHasNoEdges) {
   EdgeSamplerInput input;
   input.objects.emplace_back();
   input.objects[0].face_offsets = {0, 2};
-  input.objects[0].incident_faces = {FaceId(3), FaceId(5)};
+  input.objects[0].incident_faces = {{ShapeId(0), FaceId(3)}, {ShapeId(0), FaceId(5)}};
   const EdgeRef edge{ShapeId(0), EdgeId(0)};
   EdgeQuery query;
   EXPECT_FALSE(is_own_edge(input, query, edge));

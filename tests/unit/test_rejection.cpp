@@ -123,8 +123,9 @@ class RejectingSamplers : public testing::TestWithParam<EdgeSamplerType> {
  protected:
   static EdgeSamplerInput input_of(const Mesh& mesh) {
     const Vec3d identity[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-    return {{build_edge_mesh(mesh, true),
-             build_edge_mesh(transformed(mesh, identity, 0.5, {1.2, 0.1, -0.4}), true)}};
+    return {
+        {build_edge_mesh(mesh, true),
+         build_edge_mesh(transformed(mesh, identity, 0.5, {1.2, 0.1, -0.4}), true, ShapeId(1))}};
   }
 };
 

@@ -90,6 +90,51 @@ class HalfHiddenLamp(FloorModel):
         return irradiance * floor.bsdf.reflectance / np.pi
 
 
+def faces_before(shape, eye, loop):
+    """What an eye (3) sees of a convex mesh that passes through the plane of `loop`, which hides all
+    behind it: the front faces, clipped by the plane, and a key that says which they are."""
+    normal = loop_normal(loop)
+    assert np.dot(eye - loop[0], normal) > 0, "the plane is seen from behind"
+    parts, pattern = [], []
+    for k, face in enumerate(shape.faces):
+        corners = shape.vertices[face]
+        above = (corners - loop[0]) @ normal > 0
+        if np.dot(eye - corners[0], loop_normal(corners)) > 0 and np.any(above):
+            parts.append(clip(corners, normal, np.dot(loop[0], normal)))
+            pattern.append((k, *above))
+    return parts, tuple(pattern)
+
+
+class CrossingLampsOnFloor(FloorModel):
+    """A convex mesh "object" that emits L_o passes through a lamp that emits L_l, over a diffuse floor:
+    L = rho / pi (L_l n.Phi(lamp) + (L_o - L_l) n.Phi(faces of the object before the lamp)).
+
+    From every p the part before the lamp must lie within the lamp's outline.
+    """
+
+    def radiance(self, shade, outline, p, viewer, order):
+        loop, shape = lamp_loop(outline, p), outline.shapes["object"]
+        phi, patterns = np.zeros_like(p), set()
+        for k, point in enumerate(p):
+            parts, pattern = faces_before(shape, point, loop)
+            assert all(np.all(within(on_chart(part, point, loop, point), loop)) for part in parts)
+            phi[k] = sum(polygon_vector(point[None], part)[0] for part in parts)
+            patterns.add(pattern)
+        assert len(patterns) == 1, "the crossing line changes within a pixel"
+        n, floor = floor_normal(shade), shade.shapes["floor"]
+        lamp, other = shade.shapes["lamp"].radiance, shade.shapes["object"].radiance
+        irradiance = ((polygon_vector(p, loop) @ n)[:, None] * lamp
+                      + (phi @ n)[:, None] * (other - lamp))
+        return irradiance * floor.bsdf.reflectance / np.pi
+
+
+def within(points, loop):
+    """Whether points of the plane of a convex loop (N by 3) lie inside it."""
+    normal = loop_normal(loop)
+    return np.all([(points - a) @ np.cross(normal, b - a) > 0
+                   for a, b in zip(loop, np.roll(loop, -1, axis=0))], axis=0)
+
+
 class LampInGloss(FloorModel):
     """A lamp over a rough conductor: L = L_e times the integral of f_s over the lamp's outline."""
 
@@ -248,6 +293,29 @@ class LampsInView:
                 shown = cover(far, at) - cover(both, at)
                 result[row, column] = (sky + (shade.shapes["near"].radiance - sky) * cover(near, at)
                                        + (shade.shapes["far"].radiance - sky) * shown)
+        return result
+
+
+class CrossingInView:
+    """A convex mesh "object" that emits L_o passes through a face "plane" that emits L_p, before a
+    constant sky: I = L_sky + (L_p - L_sky) c(plane) + (L_o - L_p) c(the object before the plane)."""
+
+    outlines_in_view = True
+
+    def image(self, domain, shade, outline, shadow, order):
+        camera, sky, loop = domain.camera, shade.environment, domain.shapes["plane"].face(0)
+        parts, _ = faces_before(domain.shapes["object"], camera.pinhole(), loop)
+        plane, parts = film_loop(domain, loop), [film_loop(domain, part) for part in parts]
+        for part in parts:
+            assert polygon_area(clip_convex(part, plane)) > polygon_area(part) * (1 - 1e-9), "beyond"
+        emitted, other = shade.shapes["plane"].radiance, shade.shapes["object"].radiance
+        result = np.zeros((camera.height, camera.width, 3))
+        for row in range(camera.height):
+            for column in range(camera.width):
+                box = np.array([column, row], dtype=float)
+                covered = sum(polygon_area(clip_box(part, box, box + 1)) for part in parts)
+                result[row, column] = (sky + (other - emitted) * covered
+                                       + (emitted - sky) * polygon_area(clip_box(plane, box, box + 1)))
         return result
 
 

@@ -148,6 +148,27 @@ def lamps_in_view(kind):
     return scene, models.LampsInView(), names
 
 
+def crossing_in_view():
+    camera = Camera(vector(0.375, 0.5, -3.9375), vector(0.5, 0.25, -0.1875), vector(0, 1, 0), 30, 4,
+                    4)
+    plane = lamp(parallelogram((-1, -1, 0.25), (0.25, 2.25, 0.125), (2.25, -0.25, 0.25)),
+                 (0.5, 2, 4), "plane")
+    cube = lamp(box((0.0625, -0.21875, 0), (0.65625, 0.375, 0.59375)), (3, 1, 0.5), "object")
+    scene = Scene("crossing_in_view.xml", camera, {"plane": plane, "object": cube}, 1,
+                  vector(0.25, 0.5, 1))
+    names = SENSOR + moves_of("object") + moves_of("plane")
+    names += ["object_emitter.radiance", "plane_emitter.radiance", "environment.radiance"]
+    return scene, models.CrossingInView(), names
+
+
+def crossing_over_plane():
+    cube = lamp(box((-0.65625, 1.96875, -0.28125), (-0.375, 2.25, 0)), (1, 3, 8), "object")
+    shapes = {"floor": floor(), "lamp": tilted_lamp(), "object": cube}
+    scene = Scene("crossing_over_plane.xml", floor_camera(), shapes, 2)
+    names = moves_of("object") + LAMP_NAMES + ["object_emitter.radiance"]
+    return scene, models.CrossingLampsOnFloor(), names
+
+
 def lamp_in_gloss(kind, alpha):
     scene = Scene(f"lamp_in_{kind}.xml", floor_camera(),
                   {"floor": floor(kind, alpha), "lamp": tilted_lamp()}, 2)
@@ -243,6 +264,8 @@ SCENES = {
     "lamps_in_view_box": lambda: lamps_in_view("box"),
     "lamps_in_view_tent": lambda: lamps_in_view("tent"),
     "lamps_in_view_gaussian": lambda: lamps_in_view("gaussian"),
+    "crossing_in_view": crossing_in_view,
+    "crossing_over_plane": crossing_over_plane,
     "lamp_in_ggx": lambda: lamp_in_gloss("ggx", 0.1),
     "lamp_in_beckmann": lambda: lamp_in_gloss("beckmann", 0.3),
     "cube_in_sky": lambda: cube_in_sky("cube_in_sky", True),

@@ -2,12 +2,12 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "limn/core/parallel.h"
 #include "limn/core/parameter.h"
-#include "limn/core/ray_tracer.h"
+#include "limn/edgetree/crossing_curves.h"
 #include "limn/edgetree/edges.h"
-#include "limn/integrators/crossings.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
 
@@ -81,6 +81,25 @@ void print_parameter(const Parameter& parameter) {
                  : fmt::format("  {} numbers: add :FILE, or .0.x, .0.y, ...", parameter.size));
 }
 
+json describe_crossings(const Scene& scene, int threads) {
+  std::vector<const Mesh*> meshes;
+  for (const Shape& shape : scene.shapes) meshes.push_back(&shape.mesh);
+  const std::vector<CrossingSegment> segments = find_crossings(meshes, threads);
+  std::set<ShapeId> shapes;
+  for (const CrossingSegment& segment : segments)
+    for (const FaceRef face : segment.faces) shapes.insert(face.shape);
+  json names = json::array();
+  for (const ShapeId shape : shapes) names.push_back(shape_name(scene, shape));
+  return {{"segments", segments.size()}, {"shapes", names}};
+}
+
+void print_crossings(const json& crossings) {
+  const size_t segments = crossings["segments"];
+  if (segments == 0) return;
+  fmt::print("surfaces cross along {} segments, which are edges too; shapes involved: {}\n",
+             segments, fmt::join(crossings["shapes"].get<std::vector<std::string>>(), ", "));
+}
+
 int run_info(const CommonOptions& common) {
   const Scene scene = load_scene(common);
   print_camera(scene);
@@ -99,16 +118,8 @@ int run_info(const CommonOptions& common) {
     report["lights"].push_back({{"name", light->id}, {"light", light->describe()}});
     fmt::print("light{}: {}\n", light->id.empty() ? "" : " " + light->id, light->describe());
   }
-  const auto tracer = make_embree_tracer(scene, thread_count(common.threads));
-  const Crossings crossings = find_crossings(scene, *tracer);
-  report["crossing_edges"] = crossings.edges;
-  if (crossings.edges > 0) {
-    fmt::print(
-        "warning: surfaces cross each other: {} edges pass through a face (first: {} and {});\n"
-        "  the line where they cross moves too, and no gradient carries it\n",
-        crossings.edges, shape_name(scene, crossings.shape_a),
-        shape_name(scene, crossings.shape_b));
-  }
+  report["crossings"] = describe_crossings(scene, thread_count(common.threads));
+  print_crossings(report["crossings"]);
   fmt::print("parameters (for --wrt):\n");
   for (const Parameter& parameter : list_parameters(scene)) {
     report["parameters"].push_back(

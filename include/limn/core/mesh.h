@@ -45,7 +45,7 @@ enum class NormalSource {
 struct Mesh {
   std::vector<Vec3f> positions;    // V, scene units, as in the file (seam copies are kept)
   std::vector<FaceIndices> faces;  // F by 3, into positions
-  std::vector<uint32_t> weld;      // V: the smallest index of a vertex at exactly the same position
+  std::vector<uint32_t> weld;      // V: the smallest index of a vertex at the same position
 
   NormalSource normal_source = NormalSource::kFace;
   std::vector<Vec3d> normals;           // N unit vectors; empty for kFace
@@ -70,6 +70,12 @@ struct Mesh {
 // Fills `weld` from the positions: vertices at bitwise equal coordinates (with -0 = 0) share the
 // smallest index.
 void weld_positions(Mesh& mesh);
+
+// Welds copies of a vertex that differ by no more than the rounding of their positions (a float's,
+// twice, of the largest coordinate of a face around them), where sides of faces lie open: seams as
+// programs write them, -2.4e-16 here and 0 there. Needles between copies collapse; but where faces are
+// no larger than the rounding in any direction, their corners stay apart. `weld` must hold what weld_positions says of the faces that are left.
+void weld_seams(Mesh& mesh);
 
 // Fills normals (if kComputed), horizon and their tangents from positions, faces, weld and
 // tangents. Called at load and after every change of positions or position_tangents. Angle-weighted

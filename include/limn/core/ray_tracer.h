@@ -18,8 +18,7 @@ struct Ray {
   // Faces that the ray never meets: the one it starts on, and those around an edge that it grazes.
   // By id, never by distance.
   FaceRef start = {};
-  ShapeId skip_shape = {};
-  std::span<const FaceId> skip_faces = {};
+  std::span<const FaceRef> skip_faces = {};
   bool skip_emitters = false;  // hide_emitters, for camera rays
 };
 

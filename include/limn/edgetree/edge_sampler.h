@@ -49,7 +49,8 @@ struct EdgeSample {
 
 // What samplers are built from. It must outlive them.
 struct EdgeSamplerInput {
-  std::vector<EdgeMesh> objects;  // of the scene's shapes, in their order
+  // Of the scene's shapes, in their order; then the curves where they cross, if any.
+  std::vector<EdgeMesh> objects;
   std::vector<LightTriangle> lights = {};
   double environment_luminance = 0;  // mean over the sphere
   // How it is spread over directions; null if it is uniform or absent.
@@ -63,9 +64,8 @@ struct EdgeSamplerInput {
 
 // Whether the query's own face is among those around the edge.
 inline bool is_own_edge(const EdgeSamplerInput& input, const EdgeQuery& query, EdgeRef id) {
-  if (id.object != query.face.shape) return false;
-  for (const FaceId face : input.object(id.object).faces_around(id.edge))
-    if (face == query.face.face) return true;
+  for (const FaceRef face : input.object(id.object).faces_around(id.edge))
+    if (face == query.face) return true;
   return false;
 }
 

@@ -20,11 +20,15 @@ enum class EdgeClass : uint8_t {
   kSharp,
   // One face: a jump for every point.
   kBorder,
-  // More than two faces, or two that wind the same way: treated as a jump for every point.
+  // More than two faces, two that wind the same way, or faces of several edges that were united
+  // (touching.h): treated as a jump for every point.
   kIrregular,
   // Two coplanar faces (exactly, or to rounding) with equal shading normals: never a jump but on
   // their common plane.
   kFlat,
+  // Two faces of any shapes that pass through each other along it, see crossing_curves.h: treated as
+  // a jump for every point.
+  kCrossing,
 };
 
 const char* edge_class_name(EdgeClass edge_class);
@@ -33,9 +37,34 @@ struct Edge {
   // Welded vertices of the mesh; the first face runs from [0] to [1]. Where a face without area
   // met a long side, an edge may be a part of that side.
   std::array<VertexId, 2> vertices;
-  std::array<FaceId, 2> faces;  // two of its faces; [1] is none for a border
+  std::array<FaceId, 2> faces;  // two of its own mesh's faces around it; [1] is none if it has one
   EdgeClass edge_class = EdgeClass::kSmooth;
   bool concave = false;  // two faces, each in front of the other's plane
+  uint8_t rim = 0;       // the edge moves with those faces around it that have this number
+};
+
+// No border of what moves: the surface goes on across the edge.
+inline constexpr uint8_t kNoRim = 255;
+// As many numbers of rims there are at most in one place; the last stands for all further ones.
+inline constexpr uint8_t kMostRims = 8;
+
+// How a face lies around an edge.
+struct Incidence {
+  // The edge runs through the inside of the face, which therefore lies on both sides of it; else the
+  // edge is on the face's border.
+  bool through = false;
+  // Faces whose common border moves as one share a number; where there are several numbers, each has
+  // an edge of its own in this place. kNoRim: a face that the edge runs through, or that another one
+  // continues in its plane, which looks and moves alike.
+  uint8_t rim = 0;
+  bool operator==(const Incidence&) const = default;
+};
+
+// All faces of a scene that touch an edge along its whole length.
+struct FacesAround {
+  std::span<const FaceRef> faces;
+  std::span<const Incidence> incidences;  // of each; empty if all are as by default
+  Incidence incidence(size_t i) const { return incidences.empty() ? Incidence{} : incidences[i]; }
 };
 
 // n . x + offset is the signed distance of x, positive in front; n is zero for a face without area.
@@ -52,11 +81,15 @@ struct EdgeMesh {
   std::vector<Vec3<Lanes>> tangents;  // V; empty where nothing moves
   std::vector<Plane> planes;          // F, outward, double precision
   std::vector<Edge> edges;            // E
-  // The faces around edge e: incident_faces[face_offsets[e], face_offsets[e + 1]).
+  ShapeId shape;                      // whose faces `planes` are; none for crossing curves
+  // The faces around edge e: incident_faces[face_offsets[e], face_offsets[e + 1]), of any shape;
+  // those of `shape` come first.
   std::vector<uint32_t> face_offsets;  // E + 1
-  std::vector<FaceId> incident_faces;
+  std::vector<FaceRef> incident_faces;
+  std::vector<Incidence> incidences;  // of incident_faces; empty if all are as by default
   // The mesh is closed and its surfaces are black from behind: a point that sees only back faces
   // sees no jump at a sharp edge, and concave edges are never silhouettes from outside.
+  // United edges are irregular and stand outside of this rule.
   // Holds if every connected part encloses positive volume (a part turned inside out, or the cavity
   // of a hollow body, makes it false); parts that cross themselves are beyond this test.
   bool one_sided_closed = false;
@@ -66,9 +99,14 @@ struct EdgeMesh {
   const Plane& plane(FaceId id) const { return planes[id.index()]; }
   const Vec3d& position(VertexId id) const { return positions[id.index()]; }
   const Vec3<Lanes>& tangent(VertexId id) const { return tangents[id.index()]; }
-  std::span<const FaceId> faces_around(EdgeId id) const {
+  std::span<const FaceRef> faces_around(EdgeId id) const {
     const uint32_t *begin = &face_offsets[id.index()], *end = begin + 1;
     return {incident_faces.data() + *begin, *end - *begin};
+  }
+  FacesAround around(EdgeId id) const {
+    const auto faces = faces_around(id);
+    if (incidences.empty()) return {faces, {}};
+    return {faces, {&incidences[face_offsets[id.index()]], faces.size()}};
   }
   uint64_t count(EdgeClass edge_class) const;
   // The first of the above that does not hold, in words; empty if all of it does.
@@ -82,11 +120,12 @@ struct EdgeRef {
   bool operator==(const EdgeRef&) const = default;
 };
 
-// mesh.weld must be filled. black_behind: the mesh's BSDF is black from behind. Faces without area
+// mesh.weld must be filled. black_behind: the mesh's BSDF is black from behind. shape: whose mesh it
+// is. Faces without area
 // stay in `planes` with a zero normal and have no edges: their neighbours' sides are split at the
 // corners that lie on them, so that the neighbours meet. Copies of a vertex that move differently
 // tear the surface: both rims are borders.
-EdgeMesh build_edge_mesh(const Mesh& mesh, bool black_behind);
+EdgeMesh build_edge_mesh(const Mesh& mesh, bool black_behind, ShapeId shape = ShapeId(0));
 
 // Bound of the rounding error of Plane::distance(p) for the planes of a mesh: within it of zero, p
 // counts as lying on either side.
@@ -97,7 +136,7 @@ double distance_error(const EdgeMesh& mesh, const Vec3d& p);
 // planes (a distance of zero, to rounding, counts as either side, so that an edge is rather listed
 // than lost); never, if concave and one_sided_closed: the mesh itself hides such an edge from every
 // point that lies between its planes. Sharp: p is in front of at least one face, or the mesh is not
-// one_sided_closed. Border, irregular: always. Flat: as smooth.
+// one_sided_closed. Border, irregular, crossing: always. Flat: as smooth.
 bool is_candidate(const EdgeMesh& mesh, EdgeId edge, const Vec3d& p);
 
 // Whether the edge is in E(p) and its faces may leave one side of it free, so that what lies behind

@@ -116,7 +116,7 @@ void MeshView::draw_edge(const EdgeMesh& edges, EdgeId edge, double width, Layer
 }
 
 void MeshView::draw_line(const Vec3d& a, const Vec3d& b, double width,
-                         std::span<const FaceId> skip_faces, Layer& visible, Layer& hidden) const {
+                         std::span<const FaceRef> skip_faces, Layer& visible, Layer& hidden) const {
   const PixelPoint from = project(a), to = project(b);
   const int pieces =
       std::max(1, static_cast<int>(std::hypot(to.x - from.x, to.y - from.y) / kPiece));
@@ -127,7 +127,6 @@ void MeshView::draw_line(const Vec3d& a, const Vec3d& b, double width,
     const Vec3d w = at(i + 0.5) - sight.origin;
     sight.t_max = length(w);
     sight.direction = w / sight.t_max;
-    sight.skip_shape = ShapeId(0);
     sight.skip_faces = skip_faces;
     Layer& layer = tracer_.occluded(sight) ? hidden : visible;
     layer.line(project(at(i)), project(at(i + 1)), width);

@@ -43,7 +43,7 @@ class MeshView {
   }
 
  private:
-  void draw_line(const Vec3d& a, const Vec3d& b, double width, std::span<const FaceId> skip_faces,
+  void draw_line(const Vec3d& a, const Vec3d& b, double width, std::span<const FaceRef> skip_faces,
                  Layer& visible, Layer& hidden) const;
   Vec3d normal_at(FaceId face, const Vec3d& x) const;
 

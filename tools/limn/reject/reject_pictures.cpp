@@ -57,8 +57,7 @@ void draw_cuts(const Mesh& mesh, std::span<const FaceId> faces, const Slice& sli
 std::vector<FaceId> faces_around(const EdgeMesh& mesh, std::span<const EdgeRef> edges) {
   std::vector<FaceId> faces;
   for (const EdgeRef id : edges) {
-    const auto around = mesh.faces_around(id.edge);
-    faces.insert(faces.end(), around.begin(), around.end());
+    for (const FaceRef face : mesh.faces_around(id.edge)) faces.push_back(face.face);
   }
   std::sort(faces.begin(), faces.end());
   faces.erase(std::unique(faces.begin(), faces.end()), faces.end());

@@ -1,0 +1,147 @@
+// A tree over boxes, to find pairs that overlap.
+#include "edgetree/edges/box_tree.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "limn/core/parallel.h"
+
+namespace limn {
+
+void FloatBox::extend(const FloatBox& other) {
+  for (int k = 0; k < 3; ++k) {
+    lower[k] = std::min(lower[k], other.lower[k]);
+    upper[k] = std::max(upper[k], other.upper[k]);
+  }
+}
+
+LeafBoxes::LeafBoxes() {
+  for (int k = 0; k < 3; ++k)
+    for (uint32_t lane = 0; lane < kLanes; ++lane) {
+      lower[k][lane] = std::numeric_limits<float>::infinity();
+      upper[k][lane] = -std::numeric_limits<float>::infinity();
+    }
+}
+
+void LeafBoxes::set(uint32_t lane, const FloatBox& box) {
+  for (int k = 0; k < 3; ++k) {
+    lower[k][lane] = box.lower[k];
+    upper[k][lane] = box.upper[k];
+  }
+}
+
+uint32_t LeafBoxes::overlaps(const FloatBox& box) const {
+  // Written so that it becomes a few instructions on whole registers.
+  int32_t apart[kLanes] = {};
+  for (int k = 0; k < 3; ++k)
+    for (uint32_t lane = 0; lane < kLanes; ++lane)
+      apart[lane] |= (lower[k][lane] > box.upper[k]) | (box.lower[k] > upper[k][lane]);
+  uint32_t bits = 0;
+  for (uint32_t lane = 0; lane < kLanes; ++lane)
+    bits |= static_cast<uint32_t>(!apart[lane]) << lane;
+  return bits;
+}
+
+BoxTree::BoxTree(std::span<const FloatBox> boxes, int threads)
+    : boxes_(boxes), leaves_(static_cast<uint32_t>((boxes.size() + kLeaf - 1) / kLeaf)) {
+  if (leaves_ == 0) return;
+  items_.reserve(boxes.size());
+  for (uint32_t i = 0; i < boxes.size(); ++i) {
+    const auto& [low, high] = boxes[i];
+    items_.push_back({{low[0] + high[0], low[1] + high[1], low[2] + high[2]}, i});
+  }
+  nodes_.resize(2 * leaves_ - 1);
+  leaf_boxes_.resize(leaves_);
+  packed_.resize(leaves_);
+  order_.resize(boxes.size());
+  const Part root{0, 0, leaves_};
+  const uint32_t smallest = std::max(leaves_ / 32, 1u);  // some parts for each thread; not tuned
+  std::vector<Part> parts;
+  split(root, smallest, parts);
+  parallel_for(parts.size(), threads, [&](size_t i) { build(parts[i]); });
+  join_boxes(root, smallest);
+  items_ = {};
+}
+
+void BoxTree::split(const Part& part, uint32_t smallest, std::vector<Part>& parts) {
+  if (part.count <= smallest) {
+    parts.push_back(part);
+    return;
+  }
+  halve(part);
+  split(part.left(), smallest, parts);
+  split(part.right(), smallest, parts);
+}
+
+// At the median along the axis on which the centers spread most.
+void BoxTree::halve(const Part& part) {
+  const auto begin = items_.begin() + part.first * kLeaf;
+  const auto end =
+      items_.begin() + std::min<size_t>((part.first + part.count) * kLeaf, items_.size());
+  std::array<float, 3> low = begin->center, high = low;
+  for (auto item = begin; item != end; ++item) {
+    for (int k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], item->center[k]);
+      high[k] = std::max(high[k], item->center[k]);
+    }
+  }
+  int axis = 0;
+  for (int k = 1; k < 3; ++k)
+    if (high[k] - low[k] > high[axis] - low[axis]) axis = k;
+  std::nth_element(
+      begin, items_.begin() + part.right().first * kLeaf, end, [&](const Item& a, const Item& b) {
+        return a.center[axis] != b.center[axis] ? a.center[axis] < b.center[axis] : a.box < b.box;
+      });
+}
+
+void BoxTree::build(const Part& part) {
+  if (part.count > 1) {
+    halve(part);
+    build(part.left());
+    build(part.right());
+    nodes_[part.node] = nodes_[part.left().node];
+    nodes_[part.node].extend(nodes_[part.right().node]);
+    return;
+  }
+  const size_t begin = size_t{part.first} * kLeaf, end = std::min(begin + kLeaf, items_.size());
+  FloatBox box = boxes_[items_[begin].box];
+  for (size_t i = begin; i < end; ++i) {
+    order_[i] = items_[i].box;
+    box.extend(boxes_[order_[i]]);
+    packed_[part.first].set(static_cast<uint32_t>(i - begin), boxes_[order_[i]]);
+  }
+  nodes_[part.node] = leaf_boxes_[part.first] = box;
+}
+
+void BoxTree::join_boxes(const Part& part, uint32_t smallest) {
+  if (part.count <= smallest) return;
+  join_boxes(part.left(), smallest);
+  join_boxes(part.right(), smallest);
+  nodes_[part.node] = nodes_[part.left().node];
+  nodes_[part.node].extend(nodes_[part.right().node]);
+}
+
+std::span<const uint32_t> BoxTree::leaf(uint32_t leaf) const {
+  const size_t begin = size_t{leaf} * kLeaf, end = std::min(begin + kLeaf, order_.size());
+  return {&order_[begin], end - begin};
+}
+
+void BoxTree::find_leaves(const FloatBox& box, std::vector<uint32_t>& leaves) const {
+  leaves.clear();
+  if (leaves_ == 0) return;
+  std::array<Part, 64> stack;  // the tree is balanced: twice as many leaves, one more
+  size_t depth = 0;
+  stack[depth++] = {0, 0, leaves_};
+  while (depth > 0) {
+    const Part part = stack[--depth];
+    if (!nodes_[part.node].overlaps(box)) continue;
+    if (part.count == 1) {
+      leaves.push_back(part.first);
+      continue;
+    }
+    stack[depth++] = part.right();
+    stack[depth++] = part.left();
+  }
+}
+
+}  // namespace limn

@@ -1,0 +1,314 @@
+// Pairs of faces that pass through each other, and the lines along which they do.
+#include "limn/edgetree/crossing_curves.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <tuple>
+
+#include "edgetree/edges/box_tree.h"
+#include "edgetree/edges/contacts.h"
+#include "edgetree/edges/fold.h"
+#include "limn/core/parallel.h"
+
+namespace limn {
+namespace {
+
+struct Triangle {
+  std::array<Vec3f, 3> corners;
+  FaceRef face;
+};
+
+// The largest coordinate.
+double size_of(const Triangle& triangle) {
+  double size = 0;
+  for (const Vec3f& x : triangle.corners)
+    for (int k = 0; k < 3; ++k) size = std::max(size, std::fabs(double{x[k]}));
+  return size;
+}
+
+FloatBox box_of(const Triangle& triangle) {
+  const auto& [a, b, c] = triangle.corners;
+  FloatBox box;
+  for (int k = 0; k < 3; ++k) {
+    box.lower[k] = std::min({a[k], b[k], c[k]});
+    box.upper[k] = std::max({a[k], b[k], c[k]});
+  }
+  return box;
+}
+
+// Heights of points over the plane of a triangle, times twice its area: six times the volume of the
+// tetrahedron over it. Corners are taken in the triangle's own order, so that a point has the same
+// bits whichever triangle of its own surface it is asked for.
+class HeightOver {
+ public:
+  explicit HeightOver(const Triangle& triangle)
+      : a_(cast<double>(triangle.corners[0])),
+        b_(cast<double>(triangle.corners[1])),
+        c_(cast<double>(triangle.corners[2])),
+        normal_(cross(b_ - a_, c_ - a_)),
+        triangle_(triangle) {}
+
+  const Vec3d& normal() const { return normal_; }
+  double of(const Vec3d& x) const { return dot(normal_, x - a_); }
+
+  // How much of it rounding can explain: of the three corners and x, wherever x is over the plane
+  // (the gradient's length times 2 * 2^-24 |x|, as in fold_of); no less than lets edges lie on a face
+  // (contacts.h), so that what touches does not cross. size: of x's triangle.
+  double rounding(const Vec3d& x, double size) const {
+    const double positions = fold_of(a_, b_, c_, x).rounding;
+    return std::max(positions, touch_tolerance(size_of(triangle_), size) * length(normal_));
+  }
+
+ private:
+  Vec3d a_, b_, c_, normal_;
+  const Triangle& triangle_;
+};
+
+// On which side of a plane the corners of a triangle lie: heights, 0 where rounding can explain
+// them.
+struct Sides {
+  std::array<double, 3> heights;
+  bool both() const {
+    const auto [least, most] = std::minmax({heights[0], heights[1], heights[2]});
+    return least < 0 && most > 0;
+  }
+};
+
+Sides sides_of(const Triangle& triangle, const HeightOver& plane) {
+  Sides sides;
+  for (int k = 0; k < 3; ++k) sides.heights[k] = plane.of(cast<double>(triangle.corners[k]));
+  if (!sides.both()) return sides;
+  const double size = size_of(triangle);
+  for (int k = 0; k < 3; ++k) {
+    const double rounding = plane.rounding(cast<double>(triangle.corners[k]), size);
+    if (std::fabs(sides.heights[k]) <= rounding) sides.heights[k] = 0;
+  }
+  return sides;
+}
+
+bool before(const Vec3f& a, const Vec3f& b) {
+  return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
+}
+
+// Where an edge with its ends on different sides of a plane meets it: the same bits from either
+// face of the edge.
+Vec3d meet(Vec3f a, Vec3f b, double height_a, double height_b) {
+  if (before(b, a)) {
+    std::swap(a, b);
+    std::swap(height_a, height_b);
+  }
+  const Vec3d from = cast<double>(a);
+  return from + (cast<double>(b) - from) * (height_a / (height_a - height_b));
+}
+
+// A part of the line where two planes meet.
+struct Interval {
+  std::array<Vec3d, 2> ends;
+  std::array<double, 2> places;  // of the ends along the line, in ascending order
+};
+
+// What a triangle with corners on both sides of the other's plane has of the line.
+Interval interval_of(const Triangle& triangle, const Sides& sides, const Vec3d& along,
+                     const Vec3d& origin) {
+  Interval interval;
+  int count = 0;
+  const auto add = [&](const Vec3d& x) {
+    interval.ends[count] = x;
+    interval.places[count++] = dot(along, x - origin);
+  };
+  for (int k = 0; k < 3; ++k) {
+    const Vec3f &a = triangle.corners[k], &b = triangle.corners[(k + 1) % 3];
+    const double height_a = sides.heights[k], height_b = sides.heights[(k + 1) % 3];
+    if (height_a == 0) add(cast<double>(a));
+    if ((height_a < 0 && height_b > 0) || (height_a > 0 && height_b < 0))
+      add(meet(a, b, height_a, height_b));
+  }
+  if (interval.places[0] > interval.places[1]) {
+    std::swap(interval.ends[0], interval.ends[1]);
+    std::swap(interval.places[0], interval.places[1]);
+  }
+  return interval;
+}
+
+std::optional<CrossingSegment> cross_faces(const Triangle& first, const Triangle& second) {
+  const HeightOver over_first(first);
+  const Sides of_second = sides_of(second, over_first);
+  if (!of_second.both()) return std::nullopt;
+  const HeightOver over_second(second);
+  const Sides of_first = sides_of(first, over_second);
+  if (!of_first.both()) return std::nullopt;
+  const Vec3d along = cross(over_first.normal(), over_second.normal());
+  const Vec3d origin = cast<double>(first.corners[0]);
+  const Interval a = interval_of(first, of_first, along, origin);
+  const Interval b = interval_of(second, of_second, along, origin);
+  const int begin = b.places[0] > a.places[0], end = b.places[1] < a.places[1];
+  if (!((end ? b : a).places[1] > (begin ? b : a).places[0])) return std::nullopt;
+  const CrossingSegment segment{{first.face, second.face},
+                                {(begin ? b : a).ends[0], (end ? b : a).ends[1]}};
+  // Sides that meet in a point have what rounding of either leaves of it in common.
+  const double size = std::max(length(segment.ends[0]), length(segment.ends[1]));
+  if (length(segment.ends[1] - segment.ends[0]) <= 0x1p-22 * size) return std::nullopt;
+  return segment;
+}
+
+int common_corners(const Triangle& a, const Triangle& b) {
+  int count = 0;
+  for (const Vec3f& x : a.corners)
+    for (const Vec3f& y : b.corners) count += x == y;
+  return count;
+}
+
+std::vector<Triangle> triangles_of(std::span<const Mesh* const> meshes) {
+  std::vector<Triangle> triangles;
+  size_t count = 0;
+  for (const Mesh* mesh : meshes) count += mesh->faces.size();
+  triangles.reserve(count);
+  for (uint32_t s = 0; s < meshes.size(); ++s)
+    for (uint32_t f = 0; f < meshes[s]->faces.size(); ++f) {
+      const auto& positions = meshes[s]->positions;
+      const auto& [a, b, c] = meshes[s]->faces[f];
+      triangles.push_back({{positions[a], positions[b], positions[c]}, {ShapeId(s), FaceId(f)}});
+    }
+  return triangles;
+}
+
+auto key(FaceRef face) { return std::pair(face.shape, face.face); }
+
+// All triangles of the scene, and pairs of them whose boxes overlap.
+class Search {
+ public:
+  Search(std::vector<Triangle> triangles, int threads)
+      : triangles_(std::move(triangles)), boxes_(boxes_of(triangles_)), tree_(boxes_, threads) {}
+
+  uint32_t leaf_count() const { return tree_.leaf_count(); }
+
+  // Of pairs within the leaf, and with triangles of later ones.
+  void append_pairs_of(uint32_t leaf, std::vector<CrossingSegment>& segments) const {
+    std::vector<uint32_t> others;
+    tree_.find_leaves(tree_.leaf_box(leaf), others);
+    const auto own = tree_.leaf(leaf);
+    for (const uint32_t other : others) {
+      if (other < leaf) continue;
+      for (size_t i = 0; i < own.size(); ++i) {
+        const FloatBox& box = boxes_[own[i]];
+        if (!box.overlaps(tree_.leaf_box(other))) continue;
+        for (const uint32_t j : tree_.leaf(other).subspan(other == leaf ? i + 1 : 0))
+          if (box.overlaps(boxes_[j])) append_pair(own[i], j, segments);
+      }
+    }
+  }
+
+ private:
+  static std::vector<FloatBox> boxes_of(const std::vector<Triangle>& triangles) {
+    std::vector<FloatBox> boxes;
+    boxes.reserve(triangles.size());
+    for (const Triangle& triangle : triangles) boxes.push_back(box_of(triangle));
+    return boxes;
+  }
+
+  void append_pair(uint32_t i, uint32_t j, std::vector<CrossingSegment>& segments) const {
+    // In the order of the shapes' faces, whatever the tree's.
+    const Triangle &a = triangles_[std::min(i, j)], &b = triangles_[std::max(i, j)];
+    // Neighbours along an edge meet there and nowhere else, or in a plane.
+    if (common_corners(a, b) > 1) return;
+    if (const auto segment = cross_faces(a, b)) segments.push_back(*segment);
+  }
+
+  std::vector<Triangle> triangles_;
+  std::vector<FloatBox> boxes_;
+  BoxTree tree_;
+};
+
+Vec3<Lanes> velocity_on(const Mesh& mesh, FaceId id, const Vec3d& normal, const Vec3d& x) {
+  if (mesh.position_tangents.empty()) return {};
+  const FaceIndices& face = mesh.face(id);
+  Vec3d corners[3];
+  for (int k = 0; k < 3; ++k) corners[k] = cast<double>(mesh.positions[face[k]]);
+  Vec3<Lanes> velocity;
+  for (int k = 0; k < 3; ++k) {
+    const Vec3d &a = corners[(k + 1) % 3], &b = corners[(k + 2) % 3];
+    const double weight = dot(normal, cross(a - x, b - x)) / length_squared(normal);
+    velocity += mesh.position_tangents[face[k]] * weight;
+  }
+  return velocity;
+}
+
+Vec3d normal_of(const Mesh& mesh, FaceId id) {
+  const auto& [i, j, k] = mesh.face(id);
+  const Vec3d a = cast<double>(mesh.positions[i]);
+  return cross(cast<double>(mesh.positions[j]) - a, cast<double>(mesh.positions[k]) - a);
+}
+
+}  // namespace
+
+std::vector<CrossingSegment> find_crossings(std::span<const Mesh* const> meshes, int threads) {
+  const Search search(triangles_of(meshes), threads);
+  constexpr uint32_t kBlock = 64;  // leaves; not tuned
+  std::vector<std::vector<CrossingSegment>> blocks((search.leaf_count() + kBlock - 1) / kBlock);
+  parallel_for(blocks.size(), threads, [&](size_t block) {
+    const auto begin = static_cast<uint32_t>(block * kBlock);
+    for (uint32_t leaf = begin; leaf < std::min(begin + kBlock, search.leaf_count()); ++leaf)
+      search.append_pairs_of(leaf, blocks[block]);
+  });
+  std::vector<CrossingSegment> segments;
+  for (const auto& block : blocks) segments.insert(segments.end(), block.begin(), block.end());
+  std::sort(segments.begin(), segments.end(),
+            [](const CrossingSegment& a, const CrossingSegment& b) {
+              return std::pair(key(a.faces[0]), key(a.faces[1])) <
+                     std::pair(key(b.faces[0]), key(b.faces[1]));
+            });
+  return segments;
+}
+
+// With unit normals n and m, speeds s and t along them, and l = n x m: v . n = s, v . m = t and
+// v . l = 0 hold for v = (s m x l + t l x n) / |l|^2.
+Vec3<Lanes> crossing_velocity(std::span<const Mesh* const> meshes, const CrossingSegment& segment,
+                              const Vec3d& x) {
+  Vec3d normals[2];
+  Lanes speeds[2];
+  for (int i = 0; i < 2; ++i) {
+    const auto [shape, face] = segment.faces[i];
+    const Mesh& mesh = *meshes[shape.index()];
+    const Vec3d normal = normal_of(mesh, face);
+    normals[i] = normalize(normal);
+    speeds[i] = dot(velocity_on(mesh, face, normal, x), normals[i]);
+  }
+  const Vec3d line = cross(normals[0], normals[1]);
+  const double scale = 1 / length_squared(line);
+  const Vec3d by_first = cross(normals[1], line) * scale;
+  const Vec3d by_second = cross(line, normals[0]) * scale;
+  const auto component = [&](int k) { return speeds[0] * by_first[k] + speeds[1] * by_second[k]; };
+  return {component(0), component(1), component(2)};
+}
+
+EdgeMesh crossing_edges(std::span<const Mesh* const> meshes,
+                        std::span<const CrossingSegment> segments) {
+  EdgeMesh result;
+  const bool moves = std::any_of(meshes.begin(), meshes.end(),
+                                 [](const Mesh* mesh) { return !mesh->position_tangents.empty(); });
+  result.face_offsets.push_back(0);
+  for (const CrossingSegment& segment : segments) {
+    const auto first = static_cast<uint32_t>(result.positions.size());
+    Edge edge;
+    edge.edge_class = EdgeClass::kCrossing;
+    for (int i = 0; i < 2; ++i) {
+      const Vec3d& x = segment.ends[i];
+      const FaceRef face = segment.faces[i];
+      const Vec3d n = normalize(normal_of(*meshes[face.shape.index()], face.face));
+      edge.vertices[i] = VertexId(first + i);
+      edge.faces[i] = FaceId(first + i);
+      result.positions.push_back(x);
+      if (moves) result.tangents.push_back(crossing_velocity(meshes, segment, x));
+      result.planes.push_back({n, -dot(n, x)});
+      result.incident_faces.push_back(face);
+      result.incidences.push_back({.through = true, .rim = kNoRim});
+      result.extent = std::max(result.extent, length(x));
+    }
+    result.edges.push_back(edge);
+    result.face_offsets.push_back(static_cast<uint32_t>(result.incident_faces.size()));
+  }
+  return result;
+}
+
+}  // namespace limn

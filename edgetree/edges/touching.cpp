@@ -1,0 +1,352 @@
+// Edges that touch, united: an edge is cut into parts, each with all faces around it.
+//
+// Several boundaries in one place. Let rims 1 ... n lie in one line, seen from p, each the common
+// border of faces that move alike, and let s_k be the speed of rim k across the line. After a short
+// time they lie apart, in some order, and radiance is constant between neighbours, L_0 before the
+// first and L_n after the last. The integral of radiance over directions changes by
+//   sum over k of s_k (L_(k-1) - L_k),
+// which is s (L_0 - L_n) if all have one speed: then they are one edge. Else each rim is an edge of
+// its own, with its own velocity and with the jump between its two neighbourhoods: it has to know
+// all faces, and which of them move with it. The order differs before and after the moment of
+// contact; edge_jump takes the one in which surfaces part instead of passing through each other.
+#include "limn/edgetree/touching.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <tuple>
+
+#include "edgetree/edges/contacts.h"
+#include "edgetree/edges/fold.h"
+
+namespace limn {
+namespace {
+
+// A face around a part of an edge.
+struct Neighbour {
+  FaceRef face;
+  EdgeId along;             // the edge of its mesh that runs there, or none
+  bool own = false;         // around the edge before it was united
+  Vec3<Lanes> velocity[2];  // at the ends of the part
+  uint8_t rim = 0;
+};
+
+using Corners = std::array<Vec3d, 3>;
+
+class Unifier {
+ public:
+  Unifier(std::span<const TouchingShape> shapes, std::vector<EdgeMesh>& objects)
+      : shapes_(shapes), objects_(objects), before_(objects) {
+    find_speeds();
+  }
+
+  // contacts: sorted by edge.
+  void unite(std::span<const Contact> contacts) {
+    for (size_t begin = 0, end; begin < contacts.size(); begin = end) {
+      const EdgeRef id = contacts[begin].edge;
+      for (end = begin; end < contacts.size() && contacts[end].edge == id; ++end) continue;
+      cut(id, contacts.subspan(begin, end - begin));
+    }
+    for (uint32_t o = 0; o < objects_.size(); ++o)
+      if (const auto parts = parts_.find(o); parts != parts_.end()) rewrite(o, parts->second);
+  }
+
+ private:
+  // A part of an edge that stays, or (edge_class of the whole) an edge that is dropped: no faces.
+  struct Part {
+    EdgeId whole;
+    Edge edge;
+    std::vector<FaceRef> faces;
+    std::vector<Incidence> incidences;
+  };
+
+  const Edge& edge(EdgeRef id) const { return before_[id.object.index()].edge(id.edge); }
+  Vec3d position(EdgeRef id, double t) const {
+    const EdgeMesh& mesh = before_[id.object.index()];
+    const auto [a, b] = edge(id).vertices;
+    if (t == 0) return mesh.position(a);
+    if (t == 1) return mesh.position(b);
+    return mesh.position(a) + (mesh.position(b) - mesh.position(a)) * t;
+  }
+  Vec3<Lanes> velocity(EdgeRef id, double t) const {
+    const EdgeMesh& mesh = before_[id.object.index()];
+    if (mesh.tangents.empty()) return {};
+    const auto [a, b] = edge(id).vertices;
+    return mesh.tangent(a) * (1 - t) + mesh.tangent(b) * t;
+  }
+  Corners corners(FaceRef face) const {
+    const Mesh& mesh = *shapes_[face.shape.index()].mesh;
+    const FaceIndices& f = mesh.face(face.face);
+    return {cast<double>(mesh.positions[f[0]]), cast<double>(mesh.positions[f[1]]),
+            cast<double>(mesh.positions[f[2]])};
+  }
+  const Plane& plane(FaceRef face) const { return before_[face.shape.index()].plane(face.face); }
+  double size(EdgeRef id) const {
+    const size_t object = id.object.index();
+    return size_around(before_[object], *shapes_[object].mesh, id.edge);
+  }
+
+  // Velocity of the face's plane where x lies on it.
+  Vec3<Lanes> velocity(FaceRef face, const Vec3d& x) const {
+    const Mesh& mesh = *shapes_[face.shape.index()].mesh;
+    if (mesh.position_tangents.empty()) return {};
+    const Corners c = corners(face);
+    const Vec3d n = cross(c[1] - c[0], c[2] - c[0]);
+    const double scale = 1 / length_squared(n);
+    const double b1 = dot(cross(x - c[0], c[2] - c[0]), n) * scale;
+    const double b2 = dot(cross(c[1] - c[0], x - c[0]), n) * scale;
+    const FaceIndices& f = mesh.face(face.face);
+    return mesh.position_tangents[f[0]] * (1 - b1 - b2) + mesh.position_tangents[f[1]] * b1 +
+           mesh.position_tangents[f[2]] * b2;
+  }
+
+  void find_speeds() {
+    for (const TouchingShape& shape : shapes_)
+      for (const Vec3<Lanes>& v : shape.mesh->position_tangents)
+        for (int k = 0; k < 3; ++k)
+          for (int i = 0; i < kLanes; ++i) speeds_[i] = std::max(speeds_[i], std::fabs(v[k][i]));
+  }
+  // To the rounding of floats, of the fastest that moves: velocities follow from positions.
+  bool moves_alike(const Vec3<Lanes>& a, const Vec3<Lanes>& b) const {
+    for (int k = 0; k < 3; ++k)
+      for (int i = 0; i < kLanes; ++i)
+        if (std::fabs(a[k][i] - b[k][i]) > 0x1.0p-20 * speeds_[i]) return false;
+    return true;
+  }
+
+  void cut(EdgeRef id, std::span<const Contact> contacts) {
+    const double edge_length = length(position(id, 1) - position(id, 0));
+    const double shortest = kShortestTouch * touch_tolerance(size(id), size(id)) / edge_length;
+    std::vector<double> ends{0};
+    std::vector<double> between;
+    for (const Contact& contact : contacts) {
+      between.push_back(contact.t0);
+      between.push_back(contact.t1);
+    }
+    std::sort(between.begin(), between.end());
+    for (const double t : between)
+      if (t - ends.back() > shortest && t < 1 - shortest) ends.push_back(t);
+    ends.push_back(1);
+    drop(id);
+    for (size_t i = 0; i + 1 < ends.size(); ++i) add_part(id, contacts, ends[i], ends[i + 1]);
+  }
+
+  void drop(EdgeRef id) { parts_[id.object.index()].push_back({id.edge, edge(id), {}, {}}); }
+
+  void add_part(EdgeRef id, std::span<const Contact> contacts, double t0, double t1) {
+    std::vector<Neighbour> around;
+    const auto add = [&](FaceRef face, EdgeId along, bool own) {
+      const auto same = [&](const Neighbour& n) { return n.face == face; };
+      if (std::any_of(around.begin(), around.end(), same)) return;
+      Neighbour n{face, along, own, {}, 0};
+      for (int i = 0; i < 2; ++i)
+        n.velocity[i] =
+            own ? velocity(id, i == 0 ? t0 : t1) : velocity(face, position(id, i == 0 ? t0 : t1));
+      around.push_back(n);
+    };
+    for (const FaceRef face : before_[id.object.index()].faces_around(id.edge))
+      add(face, id.edge, true);
+    const double middle = 0.5 * (t0 + t1);
+    for (const Contact& contact : contacts)
+      if (contact.t0 <= middle && middle <= contact.t1) add(contact.face, contact.along, false);
+
+    Part part{id.edge, edge(id), {}, {}};
+    part.edge.vertices = {vertex_at(id, t0), vertex_at(id, t1)};
+    if (around.back().own) {  // nothing touches here
+      const auto faces = before_[id.object.index()].faces_around(id.edge);
+      part.faces.assign(faces.begin(), faces.end());
+      part.incidences.resize(faces.size());
+    } else if (!unite_part(id, around, part)) {
+      return;
+    }
+    parts_[id.object.index()].push_back(std::move(part));
+  }
+
+  // False if the part is no edge, or another one stands for it.
+  bool unite_part(EdgeRef id, std::vector<Neighbour>& around, Part& part) const {
+    // In an order that all edges in this place agree on.
+    std::sort(around.begin(), around.end(), [](const Neighbour& a, const Neighbour& b) {
+      return std::tuple(a.face.shape, a.face.face) < std::tuple(b.face.shape, b.face.face);
+    });
+    number_rims(around);
+    const auto own =
+        std::find_if(around.begin(), around.end(), [](const auto& n) { return n.own; });
+    const uint8_t rim = own->rim;
+    for (const Neighbour& n : around)
+      if (n.rim == rim && stands_for(n, id)) return false;
+    mark_planes(id, around);
+    if (std::none_of(around.begin(), around.end(), [&](const auto& n) { return n.rim == rim; }))
+      return false;
+    part.edge.rim = rim;
+    part.edge.edge_class = EdgeClass::kIrregular;
+    part.edge.concave = false;
+    // Its own faces first, as they were; then others of its mesh.
+    const auto faces = before_[id.object.index()].faces_around(id.edge);
+    std::stable_sort(around.begin(), around.end(), [&](const Neighbour& a, const Neighbour& b) {
+      return rank(a, id, faces) < rank(b, id, faces);
+    });
+    for (const Neighbour& n : around) {
+      part.faces.push_back(n.face);
+      part.incidences.push_back({!n.along.valid(), n.rim});
+    }
+    const bool has_second = around[1].face.shape == id.object;
+    part.edge.faces[1] = has_second ? around[1].face.face : FaceId::none();
+    return true;
+  }
+
+  static size_t rank(const Neighbour& n, EdgeRef id, std::span<const FaceRef> faces) {
+    if (n.own) return std::find(faces.begin(), faces.end(), n.face) - faces.begin();
+    return n.face.shape == id.object ? faces.size() : faces.size() + 1;
+  }
+
+  // Neighbours that move alike get the same number; the last number takes all that is left over.
+  void number_rims(std::vector<Neighbour>& around) const {
+    std::vector<const Neighbour*> rims;
+    for (Neighbour& n : around) {
+      if (!n.along.valid()) {
+        n.rim = kNoRim;
+        continue;
+      }
+      const auto same = [&](const Neighbour* rim) {
+        return moves_alike(n.velocity[0], rim->velocity[0]) &&
+               moves_alike(n.velocity[1], rim->velocity[1]);
+      };
+      const auto found = std::find_if(rims.begin(), rims.end(), same);
+      n.rim = static_cast<uint8_t>(std::min<size_t>(found - rims.begin(), kMostRims - 1));
+      if (found == rims.end()) rims.push_back(&n);
+    }
+  }
+
+  // Whether the neighbour's edge here, which moves as edge `id` does, is kept instead of that.
+  bool stands_for(const Neighbour& n, EdgeRef id) const {
+    const EdgeRef other{n.face.shape, n.along};
+    return edge(other).edge_class != EdgeClass::kFlat &&
+           std::tuple(other.object, other.edge) < std::tuple(id.object, id.edge);
+  }
+
+  // Pairs of faces that continue each other across the edge have no rim.
+  void mark_planes(EdgeRef id, std::vector<Neighbour>& around) const {
+    for (size_t i = 0; i < around.size(); ++i)
+      for (size_t j = 0; j < i; ++j) {
+        if (around[i].rim != around[j].rim || around[i].rim == kNoRim) continue;
+        if (continues(id, around[i].face, around[j].face)) around[i].rim = around[j].rim = kNoRim;
+      }
+  }
+
+  bool continues(EdgeRef id, FaceRef a, FaceRef b) const {
+    const TouchingShape &shape_a = shapes_[a.shape.index()], &shape_b = shapes_[b.shape.index()];
+    if (shape_a.look != shape_b.look || !agree(plane(a).n, plane(b).n)) return false;
+    const auto normal_a = shading_normal(a), normal_b = shading_normal(b);
+    if (!normal_a || !normal_b || !agree(*normal_a, *normal_b)) return false;
+    const Vec3d x0 = position(id, 0), x1 = position(id, 1);
+    const Vec3d c = far_corner(a, x0, x1), d = far_corner(b, x0, x1);
+    const Vec3d side = cross(plane(a).n, x1 - x0);
+    if (dot(side, c - x0) * dot(side, d - x0) >= 0) return false;
+    const Fold fold = fold_of(x0, x1, c, d);
+    return std::fabs(fold.volume) <= 2 * fold.rounding;  // of edges that were rounded apart
+  }
+
+  // As flat edges are decided (edges.cpp).
+  static bool agree(const Vec3d& a, const Vec3d& b) {
+    return dot(a, b) > 0 && length(cross(a, b)) <= 0x1.0p-12;
+  }
+
+  // Of a face that has the same one everywhere.
+  std::optional<Vec3d> shading_normal(FaceRef face) const {
+    const Mesh& mesh = *shapes_[face.shape.index()].mesh;
+    if (mesh.normal_source == NormalSource::kFace) return plane(face).n;
+    const FaceIndices& ids = mesh.normal_ids[face.face.index()];
+    const Vec3d& n = mesh.normals[ids[0]];
+    if (!(n == mesh.normals[ids[1]]) || !(n == mesh.normals[ids[2]])) return std::nullopt;
+    return n;
+  }
+
+  Vec3d far_corner(FaceRef face, const Vec3d& x0, const Vec3d& x1) const {
+    const Vec3d along = normalize(x1 - x0);
+    const Corners c = corners(face);
+    return *std::max_element(c.begin(), c.end(), [&](const Vec3d& a, const Vec3d& b) {
+      return length_squared(cross(along, a - x0)) < length_squared(cross(along, b - x0));
+    });
+  }
+
+  // The vertex at an end of the edge, or a new one on it.
+  VertexId vertex_at(EdgeRef id, double t) {
+    if (t == 0) return edge(id).vertices[0];
+    if (t == 1) return edge(id).vertices[1];
+    const auto [found, is_new] = cuts_.emplace(std::tuple(id.object, id.edge, t), VertexId::none());
+    if (!is_new) return found->second;
+    EdgeMesh& mesh = objects_[id.object.index()];
+    found->second = VertexId(static_cast<uint32_t>(mesh.positions.size()));
+    mesh.positions.push_back(position(id, t));
+    if (!mesh.tangents.empty()) mesh.tangents.push_back(velocity(id, t));
+    return found->second;
+  }
+
+  // parts: by edge, the whole edge before its parts.
+  void rewrite(uint32_t object, std::span<const Part> parts) {
+    const EdgeMesh& old = before_[object];
+    EdgeMesh& mesh = objects_[object];
+    struct Source {
+      const Edge* edge;
+      const Part* part;  // null if the edge is as it was
+    };
+    std::vector<Source> sources;
+    sources.reserve(old.edges.size() + parts.size());
+    size_t next = 0;
+    for (uint32_t e = 0; e < old.edges.size(); ++e) {
+      if (next == parts.size() || parts[next].whole != EdgeId(e)) {
+        sources.push_back({&old.edges[e], nullptr});
+        continue;
+      }
+      for (++next; next < parts.size() && parts[next].whole == EdgeId(e); ++next)
+        sources.push_back({&parts[next].edge, &parts[next]});
+    }
+    const auto ends = [](const Source& s) {
+      return std::minmax(s.edge->vertices[0], s.edge->vertices[1]);
+    };
+    std::sort(sources.begin(), sources.end(),
+              [&](const Source& a, const Source& b) { return ends(a) < ends(b); });
+    mesh.edges.clear();
+    mesh.face_offsets.assign(1, 0);
+    mesh.incident_faces.clear();
+    for (const Source& source : sources) {
+      mesh.edges.push_back(*source.edge);
+      const auto faces =
+          source.part
+              ? std::span<const FaceRef>(source.part->faces)
+              : old.faces_around(EdgeId(static_cast<uint32_t>(source.edge - old.edges.data())));
+      mesh.incident_faces.insert(mesh.incident_faces.end(), faces.begin(), faces.end());
+      mesh.incidences.resize(mesh.incident_faces.size());
+      if (source.part) {
+        std::copy(source.part->incidences.begin(), source.part->incidences.end(),
+                  mesh.incidences.end() - static_cast<ptrdiff_t>(faces.size()));
+      }
+      mesh.face_offsets.push_back(static_cast<uint32_t>(mesh.incident_faces.size()));
+    }
+    if (std::all_of(mesh.incidences.begin(), mesh.incidences.end(),
+                    [](const Incidence& i) { return i == Incidence{}; })) {
+      mesh.incidences.clear();
+    }
+  }
+
+  std::span<const TouchingShape> shapes_;
+  std::vector<EdgeMesh>& objects_;
+  const std::vector<EdgeMesh> before_;
+  Lanes speeds_;                                 // the largest component of a velocity
+  std::map<uint32_t, std::vector<Part>> parts_;  // by object
+  std::map<std::tuple<ShapeId, EdgeId, double>, VertexId> cuts_;
+};
+
+}  // namespace
+
+void unite_touching_edges(std::span<const TouchingShape> shapes, int threads,
+                          std::vector<EdgeMesh>& objects) {
+  std::vector<const Mesh*> meshes;
+  for (const TouchingShape& shape : shapes) meshes.push_back(shape.mesh);
+  const std::vector<Contact> contacts = find_contacts(objects, meshes, threads);
+  if (!contacts.empty()) Unifier(shapes, objects).unite(contacts);
+}
+
+}  // namespace limn

@@ -1,0 +1,30 @@
+#pragma once
+// Edges that touch faces or edges of any shape of a scene, united.
+#include <span>
+#include <vector>
+
+#include "limn/edgetree/edges.h"
+
+namespace limn {
+
+// One shape, as far as touching goes.
+struct TouchingShape {
+  const Mesh* mesh = nullptr;
+  // Shapes of the same look are told apart by their geometry alone: same BSDF, no emission.
+  uint32_t look = 0;
+};
+
+// Rewrites the edges of all objects (object i is shape i, as build_edge_mesh made it) so that edges
+// in one place are one edge, and every edge knows all faces that touch it:
+//  - an edge is split where faces that it lies on begin and end: at ends of other edges that run
+//    along it (T-junctions, tiles of different size), at borders of faces that it lies in;
+//  - each part lists all faces around it (Incidence), and is irregular if it was alone before;
+//  - of parts of several edges in one place that move alike, the one of the first shape stays. If
+//    they move differently each stays, as a rim of the faces that move with it;
+//  - a seam of two faces in one plane that look and move alike is no edge.
+// What touches is decided to the rounding of positions (edges/contacts.h). Where nothing touches
+// nothing changes.
+void unite_touching_edges(std::span<const TouchingShape> shapes, int threads,
+                          std::vector<EdgeMesh>& objects);
+
+}  // namespace limn

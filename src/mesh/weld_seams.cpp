@@ -1,0 +1,155 @@
+// Copies of a vertex along an open seam that differ by the rounding of their positions.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <numeric>
+
+#include "limn/core/mesh.h"
+
+namespace limn {
+namespace {
+
+uint64_t mixed(uint64_t x) {
+  x ^= x >> 33;
+  x *= 0xff51afd7ed558ccdull;
+  x ^= x >> 33;
+  x *= 0xc4ceb9fe1a85ec53ull;
+  return x ^ x >> 33;
+}
+
+// Vertices (the first of their copies) at which some side of a face has no opposite. Opposite sides
+// cancel in a sum of random numbers, one for each edge, so nothing is sorted.
+std::vector<uint32_t> open_vertices(const Mesh& mesh) {
+  std::vector<uint64_t> sums(mesh.positions.size());
+  for (const FaceIndices& face : mesh.faces) {
+    for (int k = 0; k < 3; ++k) {
+      const uint64_t a = mesh.weld[face[k]], b = mesh.weld[face[(k + 1) % 3]];
+      const uint64_t number = mixed(std::min(a, b) << 32 | std::max(a, b));
+      sums[a] += a < b ? number : -number;
+      sums[b] += a < b ? number : -number;
+    }
+  }
+  std::vector<uint32_t> open;
+  for (uint32_t v = 0; v < sums.size(); ++v)
+    if (sums[v] != 0) open.push_back(v);
+  return open;
+}
+
+// Sets of open vertices that are within the rounding of their positions of one another.
+class SeamWelder {
+ public:
+  explicit SeamWelder(Mesh& mesh) : mesh_(mesh), open_(open_vertices(mesh)) {}
+
+  void weld() {
+    if (open_.empty()) return;
+    measure();
+    roots_.resize(mesh_.positions.size());
+    std::iota(roots_.begin(), roots_.end(), 0u);
+    std::vector<int> levels;
+    for (const uint32_t v : open_) levels.push_back(level(v));
+    std::sort(levels.begin(), levels.end());
+    levels.erase(std::unique(levels.begin(), levels.end()), levels.end());
+    for (const int l : levels) join_neighbours(l);
+    dissolve_small_faces();
+    for (uint32_t& w : mesh_.weld) w = root(w);
+  }
+
+ private:
+  using Cell = std::array<int64_t, 3>;
+
+  // A position is taken to have been rounded to float twice (in the file, and after its transform),
+  // each time by half a step of a coordinate as large as its face's largest: it is off by at most
+  // sqrt(3) 2^-23 of that.
+  void measure() {
+    tolerances_.assign(mesh_.positions.size(), 0);
+    for (const FaceIndices& face : mesh_.faces) {
+      float size = 0;
+      for (const uint32_t v : face)
+        for (int k = 0; k < 3; ++k) size = std::max(size, std::fabs(mesh_.positions[v][k]));
+      for (const uint32_t v : face) {
+        double& tolerance = tolerances_[mesh_.weld[v]];
+        tolerance = std::max(tolerance, 0x1.0p-22 * size);
+      }
+    }
+  }
+
+  // Cells of size 2^level are no smaller than the distance at which the vertex still meets others of
+  // its level or below.
+  int level(uint32_t v) const { return std::ilogb(tolerances_[v]) + 2; }
+
+  Cell cell(uint32_t v, int level) const {
+    Cell cell;
+    for (int k = 0; k < 3; ++k)
+      cell[k] = static_cast<int64_t>(
+          std::floor(std::ldexp(static_cast<double>(mesh_.positions[v][k]), -level)));
+    return cell;
+  }
+
+  // Joins vertices of this level with those of no higher level.
+  void join_neighbours(int l) {
+    std::vector<std::pair<Cell, uint32_t>> places;
+    for (const uint32_t v : open_)
+      if (level(v) <= l) places.push_back({cell(v, l), v});
+    std::sort(places.begin(), places.end());
+    for (const uint32_t u : open_) {
+      if (level(u) != l) continue;
+      const Cell center = cell(u, l);
+      for (int dx = -1; dx <= 1; ++dx)
+        for (int dy = -1; dy <= 1; ++dy) {
+          // Cells of a row follow each other.
+          const Cell row{center[0] + dx, center[1] + dy, center[2] - 1};
+          for (auto i = std::lower_bound(places.begin(), places.end(), std::pair(row, 0u));
+               i != places.end() && i->first[0] == row[0] && i->first[1] == row[1] &&
+               i->first[2] <= center[2] + 1;
+               ++i) {
+            join_if_near(u, i->second);
+          }
+        }
+    }
+  }
+
+  double distance(uint32_t u, uint32_t v) const {
+    return length(cast<double>(mesh_.positions[u]) - cast<double>(mesh_.positions[v]));
+  }
+
+  void join_if_near(uint32_t u, uint32_t v) {
+    if (distance(u, v) > tolerances_[u] + tolerances_[v]) return;
+    const uint32_t a = root(u), b = root(v);
+    roots_[std::max(a, b)] = std::min(a, b);
+  }
+
+  uint32_t root(uint32_t v) const {
+    while (roots_[v] != v) v = roots_[v];
+    return v;
+  }
+
+  // A needle between copies of a pole may vanish; where faces are as small as the rounding, all
+  // corners keep apart.
+  void dissolve_small_faces() {
+    std::vector<bool> collapses(mesh_.positions.size());
+    for (const FaceIndices& face : mesh_.faces)
+      for (int k = 0; k < 3; ++k) {
+        const uint32_t a = mesh_.weld[face[k]], b = mesh_.weld[face[(k + 1) % 3]];
+        if (a == b || root(a) != root(b)) continue;
+        constexpr double kSharp = 1024;  // longer than wide; not tuned
+        if (distance(a, face[(k + 2) % 3]) <= kSharp * (tolerances_[a] + tolerances_[b]))
+          collapses[root(a)] = true;
+      }
+    std::vector<uint32_t> apart;
+    for (const uint32_t v : open_)
+      if (collapses[root(v)]) apart.push_back(v);
+    for (const uint32_t v : apart) roots_[v] = v;
+  }
+
+  Mesh& mesh_;
+  std::vector<uint32_t> open_;
+  std::vector<double> tolerances_;  // V
+  std::vector<uint32_t> roots_;     // V, a forest; roots are the smallest of their sets
+};
+
+}  // namespace
+
+void weld_seams(Mesh& mesh) { SeamWelder(mesh).weld(); }
+
+}  // namespace limn
