@@ -307,6 +307,7 @@ bool EdgeForest::list_outlines(const EdgeQuery& query, const DirectionCone& dire
         return Vec3d{node.ends[e][0][lane], node.ends[e][1][lane], node.ends[e][2][lane]};
       };
       edges.push_back({edge, end(0), end(1)});
+      __builtin_prefetch(&input.object(edge.object).edge(edge.edge));
     }
   }
   return true;

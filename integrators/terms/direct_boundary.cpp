@@ -24,6 +24,9 @@ constexpr int kPoints = 4;
 // What a list costs per point, in the unit of Term::work. Not tuned.
 constexpr double kListCost = 0.5;
 
+// Edges whose mesh is fetched this many before they are looked at. Not tuned.
+constexpr size_t kAhead = 4;
+
 struct Drawn {
   uint32_t region;
   EdgePiece piece;
@@ -69,7 +72,12 @@ void DirectTerm::list(const EdgeQuery& query, std::vector<Drawn>& drawn) const {
     listed.clear();
     pieces.clear();
     sampler_.list_outlines(query, *cone, listed);
-    for (const ListedEdge& edge : listed) {
+    for (size_t i = 0; i < listed.size(); ++i) {
+      if (i + kAhead < listed.size()) {
+        const ListedEdge& next = listed[i + kAhead];
+        EdgePieces::fetch(next, edges_.object(next.id.object));
+      }
+      const ListedEdge& edge = listed[i];
       const Vec3d w0 = edge.x0 - query.p, w1 = edge.x1 - query.p;
       double t0 = 0, t1 = 1;
       if (!DirectionCone::clip_by(dot(query.n, w0), dot(query.n, w1), t0, t1)) continue;

@@ -16,6 +16,8 @@ double widest_of(const LobeSummary& lobe) {
   return std::clamp(kShareOfLobe * lobe.model->width(lobe), kNarrowest, kWidest);
 }
 
+Lanes dot_lanes(const Vec3<Lanes>& v, const Vec3d& m) { return v.x * m.x + v.y * m.y + v.z * m.z; }
+
 }  // namespace
 
 // z(u) meets the edge at s = (u / l_1) / ((1 - u) / l_0 + u / l_1) of the way between the ends.
@@ -30,7 +32,17 @@ EdgePieces::EdgePieces(const EdgeQuery& query, const Lanes& lane_scale)
       scale_(lane_scale),
       lobe_(query.lobe, query.n, query.wi),
       widest_(widest_of(query.lobe)),
-      cosine_of_widest_(std::cos(widest_)) {}
+      cosine_of_widest_(std::cos(widest_)),
+      turns_(!is_zero(query.turn.x) || !is_zero(query.turn.y) || !is_zero(query.turn.z)) {}
+
+void EdgePieces::fetch(const ListedEdge& edge, const EdgeMesh& mesh) {
+  if (mesh.tangents.empty()) return;
+  for (const VertexId vertex : mesh.edge(edge.id.edge).vertices) {
+    const char* tangent = reinterpret_cast<const char*>(&mesh.tangent(vertex));
+    __builtin_prefetch(tangent);
+    __builtin_prefetch(tangent + sizeof(Vec3<Lanes>) - 1);
+  }
+}
 
 void EdgePieces::add(const ListedEdge& edge, const EdgeMesh& mesh, double t0, double t1,
                      std::vector<EdgePiece>& pieces) const {
@@ -39,13 +51,17 @@ void EdgePieces::add(const ListedEdge& edge, const EdgeMesh& mesh, double t0, do
   const Vec3d a = w0 + along * t0, b = w0 + along * t1;
   const double l_a = length(a), l_b = length(b), side_length = length(side);
   if (side_length == 0 || l_a == 0 || l_b == 0) return;
-  const auto [i, j] = mesh.edge(edge.id.edge).vertices;
   const Vec3d m = side / side_length;
-  const auto across = [&](VertexId vertex) {
-    const Vec3<Lanes> v = relative_velocity(mesh, vertex, query_);
-    return v.x * m.x + v.y * m.y + v.z * m.z;
-  };
-  const Lanes v0 = across(i), v1 = across(j);
+  Lanes v0 = dot_lanes(query_.velocity, -m), v1 = v0;
+  if (!mesh.tangents.empty()) {
+    const auto [i, j] = mesh.edge(edge.id.edge).vertices;
+    v0 += dot_lanes(mesh.tangent(i), m);
+    v1 += dot_lanes(mesh.tangent(j), m);
+  }
+  if (turns_) {  // m . (turn x w) = turn . (w x m)
+    v0 = v0 - dot_lanes(query_.turn, cross(w0, m));
+    v1 = v1 - dot_lanes(query_.turn, cross(w0 + along, m));
+  }
   if (is_zero(v0) && is_zero(v1)) return;
 
   const auto append = [&](double begin, double end, double l_begin, double l_end) {

@@ -41,6 +41,9 @@ class EdgePieces {
   void add(const ListedEdge& edge, const EdgeMesh& mesh, double t0, double t1,
            std::vector<EdgePiece>& pieces) const;
 
+  // Brings what `add` reads of the mesh into the cache.
+  static void fetch(const ListedEdge& edge, const EdgeMesh& mesh);
+
  private:
   double mean_over(const EdgePiece& piece, const Vec3d& w0, const Vec3d& along, const Lanes& v0,
                    const Lanes& v1) const;
@@ -49,6 +52,7 @@ class EdgePieces {
   Lanes scale_;
   LtcLobe lobe_;
   double widest_, cosine_of_widest_;
+  bool turns_;
 };
 
 }  // namespace limn
