@@ -23,7 +23,7 @@ constexpr bool kAblation = true;
 std::span<const EdgeSamplerType> edge_sampler_types() {
   static const EdgeSamplerType types[] = {
       {"forest", "8-wide trees that reject what holds no silhouette", make_forest<ForestConfig{}>},
-      {"silhouettes", "forest, and all silhouettes before lamps, listed by it",
+      {"silhouettes", "forest, and all silhouettes before lamps and the sun, listed by it",
        make_forest<ForestConfig{}>, false, true},
       {"brute", "lists every candidate and draws by a bound of its contribution (the oracle)",
        make_brute_force_sampler},

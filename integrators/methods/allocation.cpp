@@ -87,7 +87,11 @@ Wish wish_of(const TermFigures& term, const PlanGrid& grid) {
   return wish;
 }
 
-double whole(double count) { return std::clamp(std::round(count), 1.0, double{kMostInPixel}); }
+// The number nearest to `count` that a pixel can have.
+double possible(const TermFigures& term, double count) {
+  if (count < 0.75) return std::max(count, term.least);
+  return std::clamp(std::round(count), 1.0, double{kMostInPixel});
+}
 
 double film_count(const TermFigures& term, double count) {
   return std::clamp(count, term.least, double{kMostInPixel});
@@ -106,7 +110,7 @@ double product_at(const std::vector<TermFigures>& terms, const std::vector<Wish>
     }
     const double each = 1.0 / static_cast<double>(wishes[t].cells.size());
     for (size_t i = 0; i < wishes[t].cells.size(); ++i) {
-      const double n = whole(scale * wishes[t].cells[i]);
+      const double n = possible(terms[t], scale * wishes[t].cells[i]);
       error += each * wishes[t].variance[i] / n;
       cost += each * terms[t].cost * n;
     }
@@ -121,7 +125,7 @@ double best_scale(const std::vector<TermFigures>& terms, const std::vector<Wish>
   }
   if (!(largest > 0)) return 0;
   std::vector<double> scales, products;
-  for (double most = 1; most <= kMostInPixel; most *= std::sqrt(2.0)) {
+  for (double most = 0.5; most <= kMostInPixel; most *= std::sqrt(2.0)) {
     scales.push_back(most / largest);
     products.push_back(product_at(terms, wishes, scales.back()));
   }
@@ -150,7 +154,7 @@ void spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& gri
     }
     double sum = 0;
     for (size_t i = 0; i < grid.size(); ++i) {
-      plan.counts[i][t] = static_cast<uint16_t>(whole(scale * wishes[t].cells[i]));
+      plan.counts[i][t] = static_cast<float>(possible(figures[t], scale * wishes[t].cells[i]));
       sum += plan.counts[i][t];
     }
     means.push_back(sum / static_cast<double>(grid.size()));

@@ -45,7 +45,7 @@ PixelCounts SamplePlan::counts_at(const PixelSample& at) const {
   if (!counts.empty()) return counts[grid.index(at.x, at.y)];
   PixelCounts result;
   for (size_t t = 0; t < kMostTerms; ++t) {
-    result[t] = static_cast<uint16_t>(std::max(1.0, uniform[t]));
+    result[t] = static_cast<float>(std::max(1.0, uniform[t]));
   }
   return result;
 }

@@ -1,7 +1,6 @@
 #pragma once
 // What a sample of each pixel holds: how many samples of every term, and how its directions move.
 #include <array>
-#include <cstdint>
 #include <vector>
 
 #include "integrators/estimates/sample_estimator.h"
@@ -33,7 +32,9 @@ struct PlanGrid {
 std::vector<double> window_means(const PlanGrid& grid, const std::vector<double>& values,
                                  int radius);
 
-using PixelCounts = std::array<uint16_t, kMostTerms>;
+// Whole numbers, or less than one at vertices: then a path has one sample at each with this
+// probability, or none at all.
+using PixelCounts = std::array<float, kMostTerms>;
 
 struct SamplePlan {
   // Of every term that has no counts by pixel: those of the film, and all if `counts` is empty.

@@ -84,9 +84,11 @@ class TermEstimator::VertexTerms {
     for (size_t slot = 0; slot < estimator_.slots(); ++slot) {
       const Term* term = estimator_.terms_[slot].get();
       if (!term || !term->uses_vertices()) continue;
+      if (skipped(slot, key)) continue;
       const Stopwatch watch;
       TermCost& cost = sink_.cost(slot);
-      term->add_at_vertex(vertex, counts_[slot], cost, sums_[slot]);
+      const int samples = std::max(1, static_cast<int>(counts_[slot]));
+      term->add_at_vertex(vertex, samples, cost, sums_[slot]);
       cost.seconds += watch.seconds();
     }
   }
@@ -94,6 +96,11 @@ class TermEstimator::VertexTerms {
   const Rgb<Lanes>& sum(size_t slot) const { return sums_[slot]; }
 
  private:
+  // One decision for all vertices of a path.
+  bool skipped(size_t slot, const Rng& key) const {
+    return counts_[slot] < 1 && key.at(Purpose::kTermRoulette, slot).uniform() >= counts_[slot];
+  }
+
   const TermEstimator& estimator_;
   const PixelCounts& counts_;
   SampleSink& sink_;
@@ -103,7 +110,7 @@ class TermEstimator::VertexTerms {
 void TermEstimator::add_pixel(const PixelSample& at, const Rng& key, SampleSink& sink) const {
   const PixelCounts counts = plan_.counts_at(at);
   const DirectionField* field = plan_.field_at(at);
-  const int paths = paths_ ? counts[pixel_slot_] : 1;
+  const int paths = paths_ ? static_cast<int>(counts[pixel_slot_]) : 1;
   for (int i = 0; i < paths; ++i) {
     const Rng path_key = key.copy(Purpose::kPathCopy, i);
     if (i == 0 && (vertices_ || sink.log())) {

@@ -56,6 +56,10 @@ struct TermMethod {
   bool random_directions = false;  // directions move by chance: to show that no mean changes
 };
 
+// The fewest samples of a term in one of a pixel, where they are spread: a rare event that a pilot
+// has not seen must not cost more than this. Not tuned.
+constexpr double kLeastSamples = 0.125;
+
 // A turn and a score of every pixel and parameter, of the order of what moves.
 std::vector<DirectionField> random_fields(size_t count, uint64_t seed) {
   constexpr uint64_t kStream = 0xf1e1d;  // any number
@@ -298,6 +302,7 @@ class TermJob {
     for (size_t t = 0; t < figures.size(); ++t) {
       figures[t].cost = pilot.work[t];
       figures[t].least = types_[t]->least_samples;
+      if (method_.spreads_samples && t != estimator.pixel_slot()) figures[t].least = kLeastSamples;
       if (!pilot.halves[0][t].empty()) figures[t].cells.resize(pilot.grid.size());
     }
     for (int lane = 0; lane < estimator.lanes(); ++lane) {

@@ -98,8 +98,9 @@ bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView&
     if (found) {
       return leaving(surface_on_ray(context.scene, behind.face, view.p, view.omega), nullptr);
     }
-    if (part.region) return Rgb<double>{};
-    return path.escaped(view.omega, bounces);
+    if (part.region) return part.regions->escaped(*part.region, view.omega);
+    const Rgb<double> all = path.escaped(view.omega, bounces);
+    return part.regions ? all - part.regions->escaped(view.omega) : all;
   };
   const Sides sides = nearest_faces(context.scene, mesh, view, ray.skip_emitters);
   jump = radiance(sides.negative) - radiance(sides.positive);

@@ -33,7 +33,7 @@ struct EdgePiece {
 
 class EdgePieces {
  public:
-  // Every lane counts by its scale.
+  // Each parameter counts by its scale.
   EdgePieces(const EdgeQuery& query, const Lanes& lane_scale);
 
   // Appends the part [t0, t1] of an edge, which lies above the horizon, in pieces. Nothing if it is

@@ -185,26 +185,71 @@ std::optional<DirectionCone> cone_around(const LampHull& lamp, const Vec3d& p, c
   return height > 0 ? around_polygon(lamp, p, height) : DirectionCone{};
 }
 
-LightRegions::LightRegions(const Scene& scene) : shading_(scene.shading) {
+// The octagon around the cap.
+std::optional<DirectionCone> cone_around(const DirectionCap& cap, const Vec3d& n) {
+  if (dot(n, cap.axis) <= -cap.sine) return {};
+  DirectionCone cone;
+  cone.slack = kSlack;
+  const Frame frame(cap.axis);
+  for (int k = 0; k < DirectionCone::kMostPlanes; ++k) {
+    const double a = 2 * kPi * k / DirectionCone::kMostPlanes;
+    const Vec3d out = frame.s * std::cos(a) + frame.t * std::sin(a);
+    cone.add(cap.axis * cap.sine - out * cap.cosine);
+  }
+  return cone;
+}
+
+LightRegions::LightRegions(const Scene& scene) : scene_(scene) {
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     const Shape& shape = scene.shapes[s];
     if (!shape.is_emitter) continue;
     const double mean = limn::luminance(value(shape.radiance));
-    regions_.push_back({ShapeId(s), mean, make_lamp_hull(shape.mesh, scene.shading)});
+    regions_.push_back({ShapeId(s), mean, make_lamp_hull(shape.mesh, scene.shading), {}});
   }
   hold_all_ = !scene.environment;
+  if (!scene.environment) return;
+  for (const BrightPatch& patch : find_bright_patches(*scene.environment)) {
+    regions_.push_back({{}, patch.luminance, {}, patch.cap});
+  }
+}
+
+bool LightRegions::any_in(const Scene& scene) {
+  for (const Shape& shape : scene.shapes) {
+    if (shape.is_emitter) return true;
+  }
+  return scene.environment && !find_bright_patches(*scene.environment).empty();
 }
 
 Rgb<double> LightRegions::emission(size_t k, const SurfacePoint<double>& surface,
                                    const Vec3d& wi) const {
   if (surface.face.shape != regions_[k].shape) return {};
-  return surface.emission(wi, shading_);
+  return surface.emission(wi, scene_.shading);
 }
 
 Rgb<double> LightRegions::emission(const SurfacePoint<double>& surface, const Vec3d& wi) const {
-  return surface.emission(wi, shading_);
+  return surface.emission(wi, scene_.shading);
 }
 
-void LightRegions::leave_out(const Scene&, EdgeSamplerInput& input) const { input.lights.clear(); }
+Rgb<double> LightRegions::escaped(size_t k, const Vec3d& w) const {
+  const Region& region = regions_[k];
+  if (region.shape.valid() || !region.cap.holds(w)) return {};
+  return scene_.environment->radiance(w);
+}
+
+Rgb<double> LightRegions::escaped(const Vec3d& w) const {
+  for (const Region& region : regions_) {
+    if (!region.shape.valid() && region.cap.holds(w)) return scene_.environment->radiance(w);
+  }
+  return {};
+}
+
+void LightRegions::leave_out(EdgeSamplerInput& input) const {
+  input.lights.clear();
+  if (!input.environment) return;
+  const auto brightness = [&](const Vec3d& w) {
+    return std::max(0.0, limn::luminance(scene_.environment->radiance(w) - escaped(w)));
+  };
+  input.environment = std::make_shared<RadiancePyramid>(brightness, 8, 2);
+}
 
 }  // namespace limn

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "integrators/terms/bright_patches.h"
 #include "limn/core/scene.h"
 #include "limn/core/shading.h"
 #include "limn/edgetree/edge_sampler.h"
@@ -28,11 +29,14 @@ LampHull make_lamp_hull(const Mesh& mesh, ShadingModel shading);
 // The directions from p in which the lamp may be seen above the horizon of n; none if there are
 // none.
 std::optional<DirectionCone> cone_around(const LampHull& lamp, const Vec3d& p, const Vec3d& n);
+std::optional<DirectionCone> cone_around(const DirectionCap& cap, const Vec3d& n);
 
 class LightRegions {
  public:
-  // Every lamp is a region.
+  // Every lamp is a region, and every bright patch of the environment.
   explicit LightRegions(const Scene& scene);
+  // Whether the scene has any.
+  static bool any_in(const Scene& scene);
 
   size_t size() const { return regions_.size(); }
   bool empty() const { return regions_.empty(); }
@@ -42,24 +46,29 @@ class LightRegions {
   double luminance(size_t k) const { return regions_[k].luminance; }
   // Its directions from p above the horizon of n; none if it does not shine there.
   std::optional<DirectionCone> cone(size_t k, const Vec3d& p, const Vec3d& n) const {
-    return cone_around(regions_[k].hull, p, n);
+    const Region& region = regions_[k];
+    return region.shape.valid() ? cone_around(region.hull, p, n) : cone_around(region.cap, n);
   }
 
   // What a surface emits towards the unit direction wi as part of region k.
   Rgb<double> emission(size_t k, const SurfacePoint<double>& surface, const Vec3d& wi) const;
   // As part of any region.
   Rgb<double> emission(const SurfacePoint<double>& surface, const Vec3d& wi) const;
+  // What arrives from infinity in the unit direction w as part of region k, or of any.
+  Rgb<double> escaped(size_t k, const Vec3d& w) const;
+  Rgb<double> escaped(const Vec3d& w) const;
 
   // Takes the regions' light out of what edge samplers weigh by.
-  void leave_out(const Scene& scene, EdgeSamplerInput& input) const;
+  void leave_out(EdgeSamplerInput& input) const;
 
  private:
   struct Region {
-    ShapeId shape;
+    ShapeId shape;  // none: a patch of the environment
     double luminance;
     LampHull hull;
+    DirectionCap cap;
   };
-  ShadingModel shading_;
+  const Scene& scene_;
   std::vector<Region> regions_;
   bool hold_all_ = false;
 };

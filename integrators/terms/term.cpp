@@ -19,7 +19,7 @@ const EdgeSamplerInput& TermInput::edges() {
     regions_ = std::make_unique<LightRegions>(context.scene);
     if (regions_->empty()) regions_.reset();
   }
-  if (regions_) regions_->leave_out(context.scene, *edges_);
+  if (regions_) regions_->leave_out(*edges_);
   edges_seconds_ = watch.seconds();
   return *edges_;
 }

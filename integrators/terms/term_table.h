@@ -13,13 +13,6 @@ std::unique_ptr<Term> make_direct_term(TermInput& input);
 
 inline bool always(const Scene&) { return true; }
 inline bool has_delta_lights(const Scene& scene) { return !scene.delta_lights.empty(); }
-inline bool has_lamps(const Scene& scene) {
-  for (const Shape& shape : scene.shapes) {
-    if (shape.is_emitter) return true;
-  }
-  return false;
-}
-
 // The camera's samples are drawn over the whole film: there may be fewer of them than pixels.
 inline constexpr double kLeastFilmSamples = 0.125;  // not tuned
 
@@ -32,8 +25,8 @@ inline constexpr TermType kTermTypes[] = {
      make_boundary_term},
     {"shadow", "edges of sharp shadows", 1, false, true, true, 1, has_delta_lights, false,
      make_shadow_term},
-    {"direct", "silhouettes that shading points see before lamps", 1, false, true, true, 0,
-     has_lamps, true, make_direct_term},
+    {"direct", "silhouettes that shading points see before lamps and the sun", 1, false, true, true,
+     0, LightRegions::any_in, true, make_direct_term},
 };
 
 }  // namespace limn

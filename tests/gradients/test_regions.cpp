@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "integrators/terms/light_regions.h"
+#include "limn/core/image.h"
 #include "limn/integrators/check.h"
 #include "support/compare_moments.h"
 #include "support/meshes.h"
@@ -97,6 +99,41 @@ std::string lights_of(const TempFiles& files, const std::string& name) {
   if (name == "white")
     return square("lamp", 0.5, 90, {0.4, 2.5, -0.3}, twosided + area_light("glow", "9, 8, 6"));
   return above + make_sky(files, "sky");
+}
+
+// A sun of 3 degrees in a dim sky, and a small one beside the zenith.
+std::string two_suns(const TempFiles& files) {
+  Image map(512, 256, 3);
+  const std::pair<Vec3d, double> suns[] = {{{0.5, 0.8, 0.4}, 3}, {{-0.2, 1, 0.1}, 1.5}};
+  for (int y = 0; y < map.height; ++y) {
+    for (int x = 0; x < map.width; ++x) {
+      const double phi = 2 * kPi * (x + 0.5) / map.width, theta = kPi * y / (map.height - 1);
+      const Vec3d w{std::sin(phi) * std::sin(theta), std::cos(theta),
+                    -std::cos(phi) * std::sin(theta)};
+      for (int c = 0; c < 3; ++c) map.at(x, y, c) = 0.2f + 0.1f * static_cast<float>(c);
+      for (const auto& [axis, angle] : suns) {
+        if (dot(w, normalize(axis)) < std::cos(angle * kPi / 180)) continue;
+        for (int c = 0; c < 3; ++c) map.at(x, y, c) = 500.0f - 50.0f * static_cast<float>(c);
+      }
+    }
+  }
+  write_exr(files.path("suns.exr"), map, false, {});
+  return R"(  <emitter type="envmap" id="sky"><string name="filename" value=")" +
+         files.path("suns.exr") + "\"/></emitter>\n";
+}
+
+// The object before the sun, and a lamp beside it.
+TEST(Regions, TheSunIsOne) {
+  const TempFiles files;
+  for (const std::string& lamp : {std::string(), lights_of(files, "above")}) {
+    const Scene scene = lit_scene(files, lamp + two_suns(files));
+    EXPECT_EQ(LightRegions(scene).size(), lamp.empty() ? 2u : 3u);
+    const std::vector<std::string> parameters = {"body.translate.x", "floor.rotate.x",
+                                                 "body.rotate.z", "body.scale"};
+    const GradientResult a = run(scene, "silhouettes", parameters, 256, 1);
+    const GradientResult b = run(scene, "forest", parameters, 1024, 2);
+    for (size_t k = 0; k < parameters.size(); ++k) expect_equal(a.parameters[k], b.parameters[k]);
+  }
 }
 
 class Lamps : public testing::TestWithParam<std::string> {};

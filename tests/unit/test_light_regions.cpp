@@ -5,6 +5,7 @@
 
 #include "integrators/terms/edge_pieces.h"
 #include "integrators/terms/light_regions.h"
+#include "support/environment_maps.h"
 #include "support/meshes.h"
 
 namespace limn {
@@ -115,6 +116,90 @@ TEST(LightRegions, ConesAreTight) {
   t1 = 1;
   EXPECT_TRUE(around->clip({-4, 0, -10}, {4, 0, -10}, t0, t1));
   EXPECT_LT(8 * (t1 - t0), 2.3);
+}
+
+// Radiance 1, with discs of given axes, angles [degrees] and radiances.
+struct Disc {
+  Vec3d axis;
+  double angle, radiance;
+};
+std::shared_ptr<Environment> sky_with(const std::vector<Disc>& discs, int width, double base = 1) {
+  Image image(width, width / 2, 3);
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const double phi = 2 * kPi * (x + 0.5) / width, theta = kPi * y / (image.height - 1);
+      const Vec3d w{std::sin(phi) * std::sin(theta), std::cos(theta),
+                    -std::cos(phi) * std::sin(theta)};
+      double value = base;
+      for (const Disc& disc : discs) {
+        if (dot(w, normalize(disc.axis)) >= std::cos(disc.angle * kPi / 180)) value = disc.radiance;
+      }
+      for (int c = 0; c < 3; ++c) image.at(x, y, c) = static_cast<float>(value);
+    }
+  }
+  return test::make_envmap(image);
+}
+
+// The cap of each disc holds it, and is little wider; what the cap has and what is left is all.
+TEST(BrightPatches, AreTheSuns) {
+  const std::vector<std::vector<Disc>> skies = {
+      {{{1, 1, 0.3}, 3, 2000}},
+      {{{0.1, 1, 0}, 0.5, 1e5}},                           // near the pole
+      {{{0.01, 0.3, -1}, 1, 3e4}},                         // over the map's seam
+      {{{1, 1, 0.3}, 2, 4000}, {{-1, 0.4, 0.2}, 3, 1000}}  // two
+  };
+  for (const std::vector<Disc>& discs : skies) {
+    const auto patches = find_bright_patches(*sky_with(discs, 1024));
+    ASSERT_EQ(patches.size(), discs.size());
+    for (const BrightPatch& patch : patches) {
+      double apart = 10;
+      const Disc* own = nullptr;
+      for (const Disc& disc : discs) {
+        const double angle = std::acos(std::min(1.0, dot(normalize(disc.axis), patch.cap.axis)));
+        if (angle < apart) apart = angle, own = &disc;
+      }
+      const double angle = own->angle * kPi / 180, texel = kPi / 512;
+      fmt::print("disc of {} degrees: {:.2f} degrees apart, cap of {:.2f}, luminance {:.4g}\n",
+                 own->angle, apart * 180 / kPi, std::asin(patch.cap.sine) * 180 / kPi,
+                 patch.luminance);
+      EXPECT_LT(apart, 0.2 * angle + texel);
+      EXPECT_GT(std::asin(patch.cap.sine), 0.9 * angle);
+      EXPECT_LT(std::asin(patch.cap.sine), 1.4 * angle + 2 * texel);
+    }
+  }
+}
+
+TEST(BrightPatches, NoneInPlainSkies) {
+  EXPECT_TRUE(find_bright_patches(*make_constant_environment({1, 1, 1})).empty());
+  EXPECT_TRUE(find_bright_patches(*sky_with({}, 64)).empty());
+  EXPECT_TRUE(find_bright_patches(*sky_with({}, 64, 0)).empty()) << "black";
+  // Wide, or not bright, or with hardly any of the light.
+  EXPECT_TRUE(find_bright_patches(*sky_with({{{1, 1, 0}, 40, 100}}, 512)).empty());
+  EXPECT_TRUE(find_bright_patches(*sky_with({{{1, 1, 0}, 3, 5}}, 512)).empty());
+  EXPECT_TRUE(find_bright_patches(*sky_with({{{1, 1, 0}, 1, 100}}, 512)).empty());
+}
+
+// Every direction of a cap above the horizon is inside its cone, and few others.
+TEST(BrightPatches, ConesHoldTheirCaps) {
+  Rng rng(33, 0, 0);
+  int in_cone = 0, in_cap = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const double angle = 0.14 * rng.uniform();
+    const DirectionCap cap{random_direction(rng), std::sin(angle), std::cos(angle)};
+    const Vec3d n = random_direction(rng);
+    const auto cone = cone_around(cap, n);
+    for (int k = 0; k < 20; ++k) {
+      const Vec3d w = normalize(cap.axis + random_direction(rng) * (1.5 * angle * rng.uniform()));
+      if (dot(n, w) <= 0) continue;
+      bool inside = cone.has_value();
+      for (int j = 0; cone && j < cone->count; ++j)
+        inside = inside && dot(cone->planes[j], w) >= -cone->slack;
+      in_cone += inside;
+      in_cap += cap.holds(w);
+      EXPECT_TRUE(inside || !cap.holds(w));
+    }
+  }
+  EXPECT_LT(in_cone, 1.1 * in_cap);
 }
 
 struct Case {

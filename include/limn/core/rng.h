@@ -27,7 +27,8 @@ enum class Purpose : uint64_t {
   kShadowCopy,
   kLightCopy,
   kDirect,
-  kDirectCopy
+  kDirectCopy,
+  kTermRoulette
 };
 
 // SplitMix64 started from a hash of (seed, pixel, sample): a stream for one path. `at` derives the
