@@ -2,6 +2,7 @@
 #include "limn/edgetree/crossing_curves.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <optional>
 #include <tuple>
@@ -191,10 +192,10 @@ class Search {
     for (const uint32_t other : others) {
       if (other < leaf) continue;
       for (size_t i = 0; i < own.size(); ++i) {
-        const FloatBox& box = boxes_[own[i]];
-        if (!box.overlaps(tree_.leaf_box(other))) continue;
-        for (const uint32_t j : tree_.leaf(other).subspan(other == leaf ? i + 1 : 0))
-          if (box.overlaps(boxes_[j])) append_pair(own[i], j, segments);
+        uint32_t lanes = tree_.boxes(other).overlaps(boxes_[own[i]]);
+        if (other == leaf) lanes &= ~((2u << i) - 1);
+        for (; lanes != 0; lanes &= lanes - 1)
+          append_pair(own[i], tree_.leaf(other)[std::countr_zero(lanes)], segments);
       }
     }
   }

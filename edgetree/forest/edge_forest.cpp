@@ -163,16 +163,15 @@ struct EdgeForest::Impl {
     }
     return !is_own_edge(input, query, id);
   }
-  SeenEdge seen_edge(const LtcLobe& lobe, const Vec3d& p, const EdgeNode& node, int lane) const {
+  Vec3d end_of(const EdgeNode& node, int lane, int e) const {
     if (node.head.object == crossings) {
       const EdgeMesh& mesh = input.object(crossings);
-      const auto [a, b] = mesh.edge(node.edge_at(lane).edge).vertices;
-      return {lobe, mesh.position(a) - p, mesh.position(b) - p};
+      return mesh.position(mesh.edge(node.edge_at(lane).edge).vertices[e]);
     }
-    const auto end = [&](int e) {
-      return Vec3d{node.ends[e][0][lane], node.ends[e][1][lane], node.ends[e][2][lane]};
-    };
-    return {lobe, end(0) - p, end(1) - p};
+    return {node.ends[e][0][lane], node.ends[e][1][lane], node.ends[e][2][lane]};
+  }
+  SeenEdge seen_edge(const LtcLobe& lobe, const Vec3d& p, const EdgeNode& node, int lane) const {
+    return {lobe, end_of(node, lane, 0) - p, end_of(node, lane, 1) - p};
   }
 };
 
@@ -303,10 +302,7 @@ bool EdgeForest::list_outlines(const EdgeQuery& query, const DirectionCone& dire
         continue;
       }
       if (is_own_edge(input, query, edge)) continue;
-      const auto end = [&](int e) {
-        return Vec3d{node.ends[e][0][lane], node.ends[e][1][lane], node.ends[e][2][lane]};
-      };
-      edges.push_back({edge, end(0), end(1)});
+      edges.push_back({edge, impl_->end_of(node, lane, 0), impl_->end_of(node, lane, 1)});
       __builtin_prefetch(&input.object(edge.object).edge(edge.edge));
     }
   }

@@ -6,6 +6,7 @@
 #include <map>
 #include <tuple>
 
+#include "edgetree/forest/forest_build.h"
 #include "limn/edgetree/crossing_curves.h"
 #include "support/meshes.h"
 
@@ -224,6 +225,33 @@ TEST(Crossings, NoneOfFacesWithoutArea) {
   const Mesh point = make_mesh({{0, 0, 0}, {0, 0, 0}, {1, 0, 1}}, {{0, 1, 2}});
   EXPECT_TRUE(found({grid_mesh(3), needle, point}).empty());
   EXPECT_TRUE(found({}).empty());
+}
+
+// As edges: valid by themselves and in the forest's trees; what is broken is found.
+TEST(Crossings, AreEdges) {
+  std::vector<Mesh> meshes = {placed(icosphere_mesh(2), 1, 1, {}),
+                              placed(cube_mesh(), 2, 0.8, {0.7, 0.4, 0.1})};
+  for (Mesh& mesh : meshes) set_test_tangents(mesh);
+  const Segments segments = found(meshes);
+  const EdgeMesh edges = crossing_edges(pointers(meshes), segments);
+  EXPECT_EQ(edges.validate(), "");
+  ASSERT_EQ(edges.count(EdgeClass::kCrossing), segments.size());
+  for (size_t i = 0; i < segments.size(); ++i) {
+    const auto faces = edges.faces_around(EdgeId(static_cast<uint32_t>(i)));
+    EXPECT_TRUE(std::ranges::equal(faces, segments[i].faces));
+  }
+  const EdgeSamplerInput input{
+      {build_edge_mesh(meshes[0], true), build_edge_mesh(meshes[1], true, ShapeId(1)), edges}};
+  EXPECT_EQ(build_forest(input, 2, {}).validate(input.objects), "");
+  EdgeMesh broken = edges;
+  broken.incidences[3].through = false;
+  EXPECT_EQ(broken.validate(), "edge 1: a face that crosses ends there");
+  broken = edges;
+  broken.incident_faces[4].shape = ShapeId::none();
+  EXPECT_EQ(broken.validate(), "edge 2: a face that crosses is of no shape");
+  broken = edges;
+  broken.shape = ShapeId(7);
+  EXPECT_EQ(broken.validate(), "edge 0: a mesh has an edge where faces cross");
 }
 
 // Every plane's own speed is found on the line, which does not move along itself; and the line is
