@@ -241,6 +241,7 @@ class PathTracer {
     if (light.face == start) return true;
     Ray ray{p, light.wo};
     ray.start = start;
+    ray.end = light.face.value_or(FaceRef{});
     if (edge) {
       if (blocked_at_edge(c_.scene, *edge, light.wo)) return true;
       ray.skip_faces = edge->around.faces;

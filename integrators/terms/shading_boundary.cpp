@@ -95,7 +95,8 @@ void BoundaryTerm::add_sample(const PathVertex& vertex, const EdgeQuery& query, 
   RayCount rays;
   Rgb<double> jump;
   const bool visible =
-      edge_jump(context_, mesh, view, query.face, 0, vertex.bounces + 1, key, rays, jump);
+      edge_jump(context_, mesh, view, query.face, 0, std::numeric_limits<double>::infinity(),
+                vertex.bounces + 1, key, rays, jump);
   cost.add(rays);
   if (!visible) {
     ++cost.occluded;
