@@ -195,9 +195,10 @@ bool CameraTerm::sample_film(double u, const Rng& key, RayCount& rays, FilmSampl
   const EdgeMesh& mesh = input_.object(edge.id.object);
   EdgeView view;
   if (!view_edge(mesh, edge.id, t, value(camera.origin), view)) return false;
-  const double t_min = camera.near_clip / dot(view.omega, value(camera.forward));
+  const double cosine = dot(view.omega, value(camera.forward));
   Rgb<double> jump;
-  if (!edge_jump(context_, mesh, view, {}, t_min, 0, key, rays, jump)) {
+  if (!edge_jump(context_, mesh, view, {}, camera.near_clip / cosine, camera.far_clip / cosine, 0,
+                 key, rays, jump)) {
     return false;
   }
   sample.x = edge.x0 + (edge.x1 - edge.x0) * s;

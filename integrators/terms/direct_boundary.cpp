@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "integrators/terms/edge_jump.h"
 #include "integrators/terms/edge_pieces.h"
@@ -139,8 +140,9 @@ void DirectTerm::add_point(const PathVertex& vertex, const EdgeQuery& query, con
   }
   RayCount rays;
   Rgb<double> jump;
-  const bool visible = edge_jump(context_, mesh, view, query.face, 0, vertex.bounces + 1,
-                                 vertex.key, rays, jump, {&regions_, drawn.region});
+  const bool visible =
+      edge_jump(context_, mesh, view, query.face, 0, std::numeric_limits<double>::infinity(),
+                vertex.bounces + 1, vertex.key, rays, jump, {&regions_, drawn.region});
   cost.add(rays);
   if (!visible) {
     ++cost.occluded;

@@ -64,10 +64,11 @@ Sides nearest_faces(const Scene& scene, const EdgeMesh& mesh, const EdgeView& vi
 }  // namespace
 
 bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView& view,
-               FaceRef start, double t_min, int bounces, const Rng& key, RayCount& rays,
-               Rgb<double>& jump, const RadiancePart& part) {
+               FaceRef start, double t_min, double t_max, int bounces, const Rng& key,
+               RayCount& rays, Rgb<double>& jump, const RadiancePart& part) {
   Ray ray{view.p, view.omega};
   ray.t_min = t_min;
+  ray.t_max = t_max;
   ray.start = start;
   const FacesAround around = mesh.around(view.id.edge);
   ray.skip_faces = around.faces;

@@ -24,11 +24,11 @@ bool view_edge(const EdgeMesh& mesh, EdgeRef id, double t, const Vec3d& p, EdgeV
 // the positive side. False if y is hidden from p. Each side shows the nearest of the faces around
 // the edge that lie on that side, or, where there is none, what lies behind the edge: the same rule
 // for silhouettes, borders, sharp edges and edges of many faces. start: the face that p lies on;
-// t_min: where rays from p begin (the near plane of a camera); bounces: how often the path has
-// scattered, p included; part: of the radiance. The unit directions and both faces are exact,
-// nothing is offset.
+// t_min, t_max: where rays from p begin and end (the clip planes of a camera); bounces: how often
+// the path has scattered, p included; part: of the radiance. The unit directions and both faces are
+// exact, nothing is offset.
 bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView& view,
-               FaceRef start, double t_min, int bounces, const Rng& key, RayCount& rays,
-               Rgb<double>& jump, const RadiancePart& part = {});
+               FaceRef start, double t_min, double t_max, int bounces, const Rng& key,
+               RayCount& rays, Rgb<double>& jump, const RadiancePart& part = {});
 
 }  // namespace limn

@@ -4,6 +4,8 @@
 //   J(t) = det(w_0, w_1, v) / |w|^3
 #include <fmt/format.h>
 
+#include <limits>
+
 #include "integrators/terms/edge_jump.h"
 #include "integrators/terms/term_table.h"
 #include "integrators/terms/vertex_query.h"
@@ -96,7 +98,8 @@ void BoundaryTerm::add_sample(const PathVertex& vertex, const EdgeQuery& query, 
   RayCount rays;
   Rgb<double> jump;
   const bool visible =
-      edge_jump(context_, mesh, view, query.face, 0, vertex.bounces + 1, key, rays, jump, part_);
+      edge_jump(context_, mesh, view, query.face, 0, std::numeric_limits<double>::infinity(),
+                vertex.bounces + 1, key, rays, jump, part_);
   cost.add(rays);
   if (!visible) {
     ++cost.occluded;

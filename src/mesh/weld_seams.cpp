@@ -3,7 +3,10 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <map>
 #include <numeric>
+#include <utility>
+#include <vector>
 
 #include "limn/core/mesh.h"
 
@@ -124,22 +127,42 @@ class SeamWelder {
     return v;
   }
 
-  // A needle between copies of a pole may vanish; where faces are as small as the rounding, all
-  // corners keep apart.
+  // A face that collapses is a needle between copies of a pole, and its neighbours meet when it is
+  // gone. Where that is not so, faces are as small as the rounding, and their corners stay apart.
   void dissolve_small_faces() {
-    std::vector<bool> collapses(mesh_.positions.size());
+    std::map<Side, bool> long_sides;  // of needles, and whether they have another face
+    std::vector<std::pair<Side, uint32_t>> needles;
+    std::vector<bool> small(mesh_.positions.size());
     for (const FaceIndices& face : mesh_.faces)
       for (int k = 0; k < 3; ++k) {
         const uint32_t a = mesh_.weld[face[k]], b = mesh_.weld[face[(k + 1) % 3]];
         if (a == b || root(a) != root(b)) continue;
+        const uint32_t tip = mesh_.weld[face[(k + 2) % 3]];
         constexpr double kSharp = 1024;  // longer than wide; not tuned
-        if (distance(a, face[(k + 2) % 3]) <= kSharp * (tolerances_[a] + tolerances_[b]))
-          collapses[root(a)] = true;
+        if (distance(a, tip) <= kSharp * (tolerances_[a] + tolerances_[b])) small[root(a)] = true;
+        needles.push_back({side(a, tip), root(a)});
+        long_sides[side(a, tip)] = false;
       }
+    if (needles.empty()) return;
+    for (const FaceIndices& face : mesh_.faces) {
+      const uint32_t a = root_of_corner(face, 0), b = root_of_corner(face, 1),
+                     c = root_of_corner(face, 2);
+      if (a == b || b == c || c == a) continue;
+      for (const Side& s : {side(a, b), side(b, c), side(c, a)})
+        if (const auto found = long_sides.find(s); found != long_sides.end()) found->second = true;
+    }
+    for (const auto& [s, set] : needles)
+      if (!long_sides[s]) small[set] = true;
     std::vector<uint32_t> apart;
     for (const uint32_t v : open_)
-      if (collapses[root(v)]) apart.push_back(v);
+      if (small[root(v)]) apart.push_back(v);
     for (const uint32_t v : apart) roots_[v] = v;
+  }
+
+  using Side = std::pair<uint32_t, uint32_t>;
+  Side side(uint32_t u, uint32_t v) const { return std::minmax({root(u), root(v)}); }
+  uint32_t root_of_corner(const FaceIndices& face, int k) const {
+    return root(mesh_.weld[face[k]]);
   }
 
   Mesh& mesh_;

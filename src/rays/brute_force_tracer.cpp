@@ -53,7 +53,7 @@ class BruteForceTracer final : public RayTracer {
 
  private:
   static bool is_skipped(const Ray& ray, FaceRef face) {
-    if (face == ray.start) return true;
+    if (face == ray.start || face == ray.end) return true;
     return std::find(ray.skip_faces.begin(), ray.skip_faces.end(), face) != ray.skip_faces.end();
   }
 

@@ -23,7 +23,7 @@ struct Context {
 
 bool is_skipped(const Context& context, FaceRef face) {
   const Ray& ray = *context.ray;
-  if (face == ray.start) return true;
+  if (face == ray.start || face == ray.end) return true;
   if (ray.skip_emitters && context.scene->shape(face.shape).is_emitter) return true;
   return std::find(ray.skip_faces.begin(), ray.skip_faces.end(), face) != ray.skip_faces.end();
 }
@@ -36,13 +36,13 @@ void reject_skipped(const RTCFilterFunctionNArguments* arguments) {
   if (is_skipped(context, face)) arguments->valid[0] = 0;
 }
 
-RTCRay to_embree(const Ray& ray) {
+RTCRay to_embree(const Ray& ray, const Vec3d& origin) {
   // Float directions of unit length are this near to it.
   DCHECK_LE(std::fabs(length_squared(ray.direction) - 1), 0x1p-20);
   RTCRay r{};
-  r.org_x = static_cast<float>(ray.origin.x);
-  r.org_y = static_cast<float>(ray.origin.y);
-  r.org_z = static_cast<float>(ray.origin.z);
+  r.org_x = static_cast<float>(ray.origin.x - origin.x);
+  r.org_y = static_cast<float>(ray.origin.y - origin.y);
+  r.org_z = static_cast<float>(ray.origin.z - origin.z);
   r.dir_x = static_cast<float>(ray.direction.x);
   r.dir_y = static_cast<float>(ray.direction.y);
   r.dir_z = static_cast<float>(ray.direction.z);
@@ -51,6 +51,25 @@ RTCRay to_embree(const Ray& ray) {
       ray.t_max > 3e38 ? std::numeric_limits<float>::infinity() : static_cast<float>(ray.t_max);
   r.mask = ~0u;
   return r;
+}
+
+// Zero on every axis but those along which the scene lies far from the origin for its size. Floats
+// between half of this and twice this lose nothing when it is subtracted (Sterbenz 1974), and the
+// origins of rays are no longer rounded to steps as coarse as the positions'.
+Vec3d origin_of(const Scene& scene) {
+  Bounds bounds;
+  for (const Shape& shape : scene.shapes) {
+    const Bounds b = bounds_of(shape.mesh);
+    bounds.extend(b.lower);
+    bounds.extend(b.upper);
+  }
+  Vec3d origin;
+  if (scene.shapes.empty()) return origin;
+  const Vec3d center = bounds.center();
+  constexpr double kFar = 8;  // diagonals; at least 1 for Sterbenz, beyond that not tuned
+  for (int k = 0; k < 3; ++k)
+    if (std::fabs(center[k]) > kFar * bounds.diagonal()) origin[k] = static_cast<float>(center[k]);
+  return origin;
 }
 
 struct Release {
@@ -82,7 +101,7 @@ class EmbreeErrors {
 
 class EmbreeTracer final : public RayTracer {
  public:
-  EmbreeTracer(const Scene& scene, int threads) : scene_(scene) {
+  EmbreeTracer(const Scene& scene, int threads) : scene_(scene), origin_(origin_of(scene)) {
     const std::string config = "threads=" + std::to_string(threads);
     device_.reset(rtcNewDevice(config.c_str()));
     if (!device_) throw InputError("Embree cannot start on this machine");
@@ -101,7 +120,7 @@ class EmbreeTracer final : public RayTracer {
   bool closest(const Ray& ray, Hit& hit) const override {
     Context context = make_context(ray);
     RTCRayHit query;
-    query.ray = to_embree(ray);
+    query.ray = to_embree(ray, origin_);
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     rtcIntersect1(rtc_scene_.get(), &context.base, &query);
@@ -113,7 +132,7 @@ class EmbreeTracer final : public RayTracer {
 
   bool occluded(const Ray& ray) const override {
     Context context = make_context(ray);
-    RTCRay query = to_embree(ray);
+    RTCRay query = to_embree(ray, origin_);
     rtcOccluded1(rtc_scene_.get(), &context.base, &query);
     return query.tfar < 0;
   }
@@ -129,7 +148,8 @@ class EmbreeTracer final : public RayTracer {
         rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                 sizeof(FaceIndices), mesh.faces.size()));
     errors_.check();
-    std::copy(mesh.positions.begin(), mesh.positions.end(), vertices);
+    std::transform(mesh.positions.begin(), mesh.positions.end(), vertices,
+                   [&](const Vec3f& x) { return cast<float>(cast<double>(x) - origin_); });
     std::copy(mesh.faces.begin(), mesh.faces.end(), faces);
     rtcCommitGeometry(geometry.get());
     rtcAttachGeometryByID(rtc_scene_.get(), geometry.get(), static_cast<unsigned>(id));
@@ -138,7 +158,8 @@ class EmbreeTracer final : public RayTracer {
   Context make_context(const Ray& ray) const {
     Context context;
     rtcInitIntersectContext(&context.base);
-    const bool skips = ray.start.shape.valid() || !ray.skip_faces.empty() || ray.skip_emitters;
+    const bool skips = ray.start.shape.valid() || ray.end.shape.valid() ||
+                       !ray.skip_faces.empty() || ray.skip_emitters;
     if (skips) context.base.filter = reject_skipped;
     context.ray = &ray;
     context.scene = &scene_;
@@ -146,6 +167,7 @@ class EmbreeTracer final : public RayTracer {
   }
 
   const Scene& scene_;
+  Vec3d origin_;         // of Embree's coordinates
   EmbreeErrors errors_;  // before what reports to it
   Owned<RTCDevice> device_;
   Owned<RTCScene> rtc_scene_;

@@ -169,5 +169,47 @@ TEST(Depth, LimitAndRouletteAgree) {
   }
 }
 
+// All positions are multiples of 1/64, which floats hold at either place.
+TEST(Place, DoesNotMatter) {
+  const TempFiles files;
+  const auto scene_at = [&](const Vec3d& offset) {
+    SceneParts parts;
+    parts.origin = Vec3d{0.5, 1.75, 3.5} + offset;
+    parts.target = Vec3d{0, 0.5, 0} + offset;
+    parts.body =
+        square("floor", 3, -90, offset, diffuse("chalk", "0.75, 0.75, 0.75")) +
+        obj_shape("cube", write_mesh(files, "cube.obj", cube_mesh()), true, 0.5,
+                  Vec3d{0.25, 0.75, 0} + offset, diffuse("clay", "0.7, 0.5, 0.3")) +
+        square("lamp", 0.5, 90, Vec3d{0.25, 2.5, 0.5} + offset, area_light("glow", "6, 5, 4"));
+    return make_scene(files, parts);
+  };
+  const std::vector<std::string> parameters = {"cube.translate.x", "glow.radiance"};
+  const GradientResult here = run_gradient(scene_at({0, 0, 0}), parameters, 256, 1);
+  for (const double distance : {100.0, 1e5}) {
+    const Vec3d offset = Vec3d{1, 1, 1} * distance;
+    const GradientResult there = run_gradient(scene_at(offset), parameters, 256, 2);
+    for (size_t k = 0; k < parameters.size(); ++k)
+      expect_equal(here.parameters[k], there.parameters[k]);
+  }
+}
+
+// What lies beyond the far plane is not behind an edge either.
+TEST(FarPlane, HidesWhatIsBehindEdges) {
+  const TempFiles files;
+  const auto scene_with = [&](bool wall) {
+    SceneParts parts;
+    parts.body = obj_shape("cube", write_mesh(files, "cube.obj", cube_mesh()), true, 0.5,
+                           {0, 0.5, 0}, diffuse("clay", "0, 0, 0")) +
+                 constant_light("sky", "0.4, 0.5, 0.7");
+    if (wall) parts.body += square("wall", 9, 0, {0, 0, -6}, diffuse("paint", "0.1, 0.1, 0.1"));
+    Scene scene = make_scene(files, parts);
+    scene.camera.far_clip = 9;
+    return scene;
+  };
+  const GradientResult a = run_gradient(scene_with(true), {"cube.scale"}, 64, 1);
+  const GradientResult b = run_gradient(scene_with(false), {"cube.scale"}, 64, 2);
+  expect_equal(a.parameters[0], b.parameters[0]);
+}
+
 }  // namespace
 }  // namespace limn

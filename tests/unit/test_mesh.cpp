@@ -110,6 +110,18 @@ TEST(Weld, SeamCopiesShareNormalsAndHorizon) {
   }
 }
 
+TEST(Weld, RepeatedFacesAreLeftOut) {
+  // The same corners by copies, from another one on; the other side of a sheet is no repetition.
+  const TempFiles files;
+  const Mesh mesh = read_mesh(files.write("a.obj",
+                                          "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0\nv 1 0 0\n"
+                                          "f 1 2 3\nf 3 4 5\nf 1 3 2\n"),
+                              true);
+  ASSERT_EQ(mesh.faces.size(), 2u);
+  EXPECT_EQ(mesh.faces[0], (FaceIndices{0, 1, 2}));
+  EXPECT_EQ(mesh.faces[1], (FaceIndices{0, 2, 1}));
+}
+
 TEST(Normals, OfAPyramid) {
   const TempFiles files;
   const Mesh mesh = read_mesh(files.write("a.obj", kPyramid), false);

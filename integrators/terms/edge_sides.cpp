@@ -1,5 +1,5 @@
 // What happens at an edge that a path starts on: decided in the plane across it.
-#include "integrators/terms/path.h"
+#include "integrators/terms/edge_sides.h"
 
 #include <tuple>
 

@@ -1,0 +1,76 @@
+#pragma once
+// The sides of faces around an edge, seen in the plane across it: what blocks what, and what parts
+// when faces move.
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "limn/core/shading.h"
+#include "limn/edgetree/edges.h"
+
+namespace limn {
+
+// One side of a face beside an edge: the face, and the unit vector across the edge that lies in it
+// and points into it.
+struct FaceSide {
+  FaceRef face;
+  Vec3d into;
+};
+
+// A path that starts exactly on an edge, on one of the faces around it. Its first rays never meet
+// these faces by rounding: whether a face blocks its neighbour at their common edge is decided by
+// their directions alone.
+struct EdgeStart {
+  FacesAround around;
+  Vec3d x0, x1;    // ends of the edge
+  FaceSide start;  // where the path is
+};
+
+// `into` of FaceSide. x0: a point of the edge, along: its unit direction. Of a face that the edge
+// runs through, one of the two sides; the other is its opposite.
+Vec3d direction_into_face(const Mesh& mesh, FaceId face, const Vec3d& x0, const Vec3d& along);
+
+// Calls visit(side, incidence) for every side of the faces around an edge.
+template <class Visit>
+void for_every_side(const Scene& scene, const FacesAround& around, const Vec3d& x0,
+                    const Vec3d& along, const Visit& visit) {
+  for (size_t i = 0; i < around.faces.size(); ++i) {
+    const FaceRef face = around.faces[i];
+    const Incidence incidence = around.incidence(i);
+    const Vec3d into = direction_into_face(scene.shape(face.shape).mesh, face.face, x0, along);
+    visit(FaceSide{face, into}, incidence);
+    if (incidence.through) visit(FaceSide{face, -into}, incidence);
+  }
+}
+
+// In which order the rims in one place part as their faces move, seen across them from the negative
+// side to the positive one: those of faces on the negative side alone come first, the rear ones
+// before those that hide them; those of faces on the positive side alone last, the front ones first.
+// So surfaces leave gaps and do not pass through each other.
+class RimOrder {
+ public:
+  // A face lies on this side; smaller slopes are nearer.
+  void add(uint8_t rim, bool positive, double slope);
+  // Whether a face is seen just beside the rim `own`, on its positive side or the other: one of the
+  // same rim on its own side only, one of a rim that comes later (or has come before) on both, if it
+  // lies on the negative (or the positive) side.
+  bool is_seen(uint8_t rim, bool positive, uint8_t own, bool on_positive_side) const {
+    if (rim == own || rim == kNoRim) return positive == on_positive_side;
+    return positive == comes_before(rim, own);
+  }
+
+ private:
+  bool comes_before(uint8_t a, uint8_t b) const;
+
+  struct Rim {
+    bool has[2] = {false, false};  // faces on the negative and on the positive side
+    double slope[2];               // of the nearest
+  };
+  std::array<Rim, kMostRims> rims_;
+};
+
+// The side that a ray meets at once when it leaves edge.start infinitely close to the edge, if any.
+std::optional<FaceSide> blocked_at_edge(const Scene& scene, const EdgeStart& edge,
+                                        const Vec3d& direction);
+
+}  // namespace limn
