@@ -258,6 +258,29 @@ uint64_t EdgeForest::list_silhouettes(const Vec3d& p, std::vector<EdgeRef>& edge
   return tested;
 }
 
+// The edges of a query's own face lie in its plane: most others need no look at their mesh.
+class OwnEdges {
+ public:
+  OwnEdges(const EdgeSamplerInput& input, const EdgeQuery& query, double extent)
+      : input_(input), query_(query), any_(query.face.shape.valid()) {
+    if (!any_) return;
+    plane_ = input.object(query.face.shape).plane(query.face.face);
+    // Far beyond rounding. Not tuned.
+    near_ = 0x1.0p-16 * (extent + length(query.p));
+  }
+  bool holds(const ListedEdge& edge) const {
+    return any_ && std::fabs(plane_.distance(edge.x0)) <= near_ &&
+           std::fabs(plane_.distance(edge.x1)) <= near_ && is_own_edge(input_, query_, edge.id);
+  }
+
+ private:
+  const EdgeSamplerInput& input_;
+  const EdgeQuery& query_;
+  bool any_;
+  Plane plane_;
+  double near_ = 0;
+};
+
 // Brings a node's lines into the cache while others are looked at.
 static void prefetch(const Forest& forest, NodeId id) {
   constexpr size_t kLine = 64;
@@ -278,6 +301,7 @@ bool EdgeForest::list_outlines(const EdgeQuery& query, const DirectionCone& dire
   const Forest& forest = impl_->forest;
   const EdgeSamplerInput& input = impl_->input;
   const ForestCone cone(forest, query, directions, input.lane_scale);
+  const OwnEdges own(input, query, forest.extent);
   static thread_local std::vector<NodeId> stack;
   stack.assign(forest.roots.rbegin(), forest.roots.rend());
   while (!stack.empty()) {
@@ -301,8 +325,9 @@ bool EdgeForest::list_outlines(const EdgeQuery& query, const DirectionCone& dire
           !is_outline(input.object(edge.object), edge.edge, query.p)) {
         continue;
       }
-      if (is_own_edge(input, query, edge)) continue;
-      edges.push_back({edge, impl_->end_of(node, lane, 0), impl_->end_of(node, lane, 1)});
+      const ListedEdge listed{edge, impl_->end_of(node, lane, 0), impl_->end_of(node, lane, 1)};
+      if (own.holds(listed)) continue;
+      edges.push_back(listed);
       __builtin_prefetch(&input.object(edge.object).edge(edge.edge));
     }
   }

@@ -13,21 +13,19 @@
 #include <limits>
 
 #include "integrators/terms/edge_jump.h"
-#include "integrators/terms/edge_pieces.h"
 #include "integrators/terms/term_table.h"
 #include "integrators/terms/vertex_query.h"
+#include "limn/edgetree/edge_pieces.h"
 
 namespace limn {
 namespace {
 
-// Points for one sample. Not tuned.
+// Points for one sample. Sixteen instead took 1.6 times the time for 0.57 of the squared error with
+// four lamps on gloss, where the list is long: what is left is the error of p within its pixel.
 constexpr int kPoints = 4;
-// What a list costs per point, in the unit of Term::work. Not tuned.
-constexpr double kListCost = 0.5;
-
-// Edges whose mesh is fetched this many before they are looked at. Not tuned.
-constexpr size_t kAhead = 4;
-
+// What a list costs per point, in the unit of Term::work: timed as 0.2 (the sun), 1.0 (soft shadow),
+// 1.9 (CAD part), 3.3 (plant), 3.5 (four lamps), against draws of the forest.
+constexpr double kListCost = 1;
 struct Drawn {
   uint32_t region;
   EdgePiece piece;
@@ -40,8 +38,7 @@ class DirectTerm final : public Term {
       : context_(input.context),
         edges_(input.edges()),
         sampler_(input.edge_sampler()),
-        regions_(*input.regions()),
-        lane_scale_(input.lane_scale) {}
+        regions_(*input.regions()) {}
 
   bool uses_vertices() const override { return true; }
   void add_at_vertex(const PathVertex& vertex, int samples, TermCost& cost,
@@ -59,13 +56,11 @@ class DirectTerm final : public Term {
   const EdgeSamplerInput& edges_;
   const EdgeSampler& sampler_;
   const LightRegions& regions_;
-  Lanes lane_scale_;
 };
 
 void DirectTerm::list(const EdgeQuery& query, std::vector<Drawn>& drawn) const {
   static thread_local std::vector<ListedEdge> listed;
   static thread_local std::vector<EdgePiece> pieces;
-  const EdgePieces cut(query, lane_scale_);
   double sum = 0;
   for (uint32_t k = 0; k < regions_.size(); ++k) {
     const std::optional<DirectionCone> cone = regions_.cone(k, query.p, query.n);
@@ -73,17 +68,7 @@ void DirectTerm::list(const EdgeQuery& query, std::vector<Drawn>& drawn) const {
     listed.clear();
     pieces.clear();
     sampler_.list_outlines(query, *cone, listed);
-    for (size_t i = 0; i < listed.size(); ++i) {
-      if (i + kAhead < listed.size()) {
-        const ListedEdge& next = listed[i + kAhead];
-        EdgePieces::fetch(next, edges_.object(next.id.object));
-      }
-      const ListedEdge& edge = listed[i];
-      const Vec3d w0 = edge.x0 - query.p, w1 = edge.x1 - query.p;
-      double t0 = 0, t1 = 1;
-      if (!DirectionCone::clip_by(dot(query.n, w0), dot(query.n, w1), t0, t1)) continue;
-      if (cone->clip(w0, w1, t0, t1)) cut.add(edge, edges_.object(edge.id.object), t0, t1, pieces);
-    }
+    cut_edges(edges_, query, *cone, listed, pieces);
     for (const EdgePiece& piece : pieces) {
       sum += piece.weight * regions_.luminance(k);
       drawn.push_back({k, piece, sum});

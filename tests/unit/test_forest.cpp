@@ -171,7 +171,7 @@ TEST_P(Forests, ListOutlinesInCones) {
       set_test_tangents(moved);
       const Mesh other = transformed(mesh, rows, 0.1 * scale, {});
       const EdgeSamplerInput input{
-          {build_edge_mesh(moved, i % 3 != 0), build_edge_mesh(other, true)}};
+          {build_edge_mesh(moved, i % 3 != 0), build_edge_mesh(other, true, ShapeId(1))}};
       const auto forest = EdgeForest::build(input, 1, GetParam());
       for (int k = 0; k < 60; ++k) {
         EdgeQuery query;

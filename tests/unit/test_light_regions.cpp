@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "integrators/terms/edge_pieces.h"
 #include "integrators/terms/light_regions.h"
+#include "limn/edgetree/edge_pieces.h"
 #include "support/environment_maps.h"
 #include "support/meshes.h"
 
@@ -232,6 +232,15 @@ Case random_case(Rng& rng) {
   return c;
 }
 
+std::vector<EdgePiece> pieces_of(const Case& c, const Lanes& scale = {1, 1, 1, 1}) {
+  EdgeSamplerInput input{{c.mesh}};
+  input.lane_scale = scale;
+  const ListedEdge edge{{ShapeId(0), EdgeId(0)}, c.mesh.positions[0], c.mesh.positions[1]};
+  std::vector<EdgePiece> pieces;
+  cut_edges(input, c.query, {}, {&edge, 1}, pieces);
+  return pieces;
+}
+
 // det(w_0, w_1, v) / |w|^3, of each lane.
 Lanes jacobian(const Case& c, double t) {
   const Vec3d a = c.mesh.positions[0] - c.query.p, b = c.mesh.positions[1] - c.query.p;
@@ -254,10 +263,7 @@ TEST(EdgePieces, WeighTheIntegralAndTileTheEdge) {
     const Vec3d w0 = c.mesh.positions[0] - c.query.p, w1 = c.mesh.positions[1] - c.query.p;
     double t0 = 0, t1 = 1;
     if (!DirectionCone::clip_by(dot(c.query.n, w0), dot(c.query.n, w1), t0, t1)) continue;
-    const EdgePieces cut(c.query, scale);
-    std::vector<EdgePiece> pieces;
-    cut.add({{ShapeId(0), EdgeId(0)}, c.mesh.positions[0], c.mesh.positions[1]}, c.mesh, t0, t1,
-            pieces);
+    const std::vector<EdgePiece> pieces = pieces_of(c, scale);
     ASSERT_FALSE(pieces.empty());
     double at = t0, sum = 0, integral = 0;
     for (const EdgePiece& piece : pieces) {
@@ -295,15 +301,13 @@ TEST(EdgePieces, DoNotCancel) {
   Edge edge;
   edge.vertices = {VertexId(0), VertexId(1)};
   c.mesh.edges = {edge};
-  const ListedEdge listed{{ShapeId(0), EdgeId(0)}, c.mesh.positions[0], c.mesh.positions[1]};
   const auto weight = [&](const Vec3d& v0, const Vec3d& v1) {
     c.mesh.tangents.assign(2, {});
     for (int i = 0; i < 3; ++i) {
       c.mesh.tangents[0][i][0] = v0[i];
       c.mesh.tangents[1][i][0] = v1[i];
     }
-    std::vector<EdgePiece> pieces;
-    EdgePieces(c.query, {1, 1, 1, 1}).add(listed, c.mesh, 0, 1, pieces);
+    const std::vector<EdgePiece> pieces = pieces_of(c);
     return pieces.empty() ? 0 : pieces[0].weight;
   };
   const double full = weight({0, 1, 0}, {0, 1, 0});
@@ -322,16 +326,9 @@ TEST(EdgePieces, OfEdgesThroughThePoint) {
   c.mesh.edges = {edge};
   for (const double x : {0.0, -1.0, -0.3, 2.0}) {
     c.mesh.positions = {{x, 0, 0}, {x + 1, 0, 0}};
-    std::vector<EdgePiece> pieces;
-    EdgePieces(c.query, {1, 1, 1, 1})
-        .add({{ShapeId(0), EdgeId(0)}, c.mesh.positions[0], c.mesh.positions[1]}, c.mesh, 0, 1,
-             pieces);
-    EXPECT_TRUE(pieces.empty());
+    EXPECT_TRUE(pieces_of(c).empty());
     for (Vec3d& p : c.mesh.positions) p.z = 1e-300;
-    EdgePieces(c.query, {1, 1, 1, 1})
-        .add({{ShapeId(0), EdgeId(0)}, c.mesh.positions[0], c.mesh.positions[1]}, c.mesh, 0, 1,
-             pieces);
-    for (const EdgePiece& piece : pieces) EXPECT_TRUE(std::isfinite(piece.weight));
+    for (const EdgePiece& piece : pieces_of(c)) EXPECT_TRUE(std::isfinite(piece.weight));
   }
 }
 

@@ -11,9 +11,10 @@
 // of the modulus, f_s being the transformed cosine. No closed form is needed, and no weight is zero
 // by cancellation: a linear function that vanishes at both points vanishes everywhere, and the
 // cosine is positive within a part above the horizon.
+#include <span>
 #include <vector>
 
-#include "edgetree/lobe/ltc.h"
+#include "limn/edgetree/direction_cone.h"
 #include "limn/edgetree/edge_sampler.h"
 
 namespace limn {
@@ -31,28 +32,10 @@ struct EdgePiece {
   Place place(double u) const;
 };
 
-class EdgePieces {
- public:
-  // Each parameter counts by its scale.
-  EdgePieces(const EdgeQuery& query, const Lanes& lane_scale);
-
-  // Appends the part [t0, t1] of an edge, which lies above the horizon, in pieces. Nothing if it is
-  // at rest or if its line meets p.
-  void add(const ListedEdge& edge, const EdgeMesh& mesh, double t0, double t1,
-           std::vector<EdgePiece>& pieces) const;
-
-  // Brings what `add` reads of the mesh into the cache.
-  static void fetch(const ListedEdge& edge, const EdgeMesh& mesh);
-
- private:
-  double mean_over(const EdgePiece& piece, const Vec3d& w0, const Vec3d& along, const Lanes& v0,
-                   const Lanes& v1) const;
-
-  const EdgeQuery& query_;
-  Lanes scale_;
-  LtcLobe lobe_;
-  double widest_, cosine_of_widest_;
-  bool turns_;
-};
+// Appends what of the edges lies inside the cone and above the query's horizon, in pieces of at most
+// 0.3 rad, less in narrow lobes. Nothing of an edge that is at rest relative to the query, or whose
+// line meets p.
+void cut_edges(const EdgeSamplerInput& input, const EdgeQuery& query, const DirectionCone& cone,
+               std::span<const ListedEdge> edges, std::vector<EdgePiece>& pieces);
 
 }  // namespace limn

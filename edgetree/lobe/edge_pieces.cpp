@@ -1,8 +1,10 @@
 // Pieces of edges: cut so that directions hardly turn within one, weighed, drawn.
-#include "integrators/terms/edge_pieces.h"
+#include "limn/edgetree/edge_pieces.h"
 
 #include <algorithm>
 #include <cmath>
+
+#include "edgetree/lobe/ltc.h"
 
 namespace limn {
 namespace {
@@ -16,26 +18,32 @@ double widest_of(const LobeSummary& lobe) {
   return std::clamp(kShareOfLobe * lobe.model->width(lobe), kNarrowest, kWidest);
 }
 
+// Edges whose mesh is fetched this many before they are looked at. Not tuned.
+constexpr size_t kAhead = 4;
+
 Lanes dot_lanes(const Vec3<Lanes>& v, const Vec3d& m) { return v.x * m.x + v.y * m.y + v.z * m.z; }
 
-}  // namespace
+// Cuts the edges that one query sees.
+class EdgeCutter {
+ public:
+  EdgeCutter(const EdgeQuery& query, const Lanes& lane_scale);
+  // The part [t0, t1] of an edge, which lies above the horizon.
+  void add(const ListedEdge& edge, const EdgeMesh& mesh, double t0, double t1,
+           std::vector<EdgePiece>& pieces) const;
 
-// z(u) meets the edge at s = (u / l_1) / ((1 - u) / l_0 + u / l_1) of the way between the ends.
-EdgePiece::Place EdgePiece::place(double u) const {
-  const double sum = (1 - u) * inverse_l0 + u * inverse_l1;
-  const double s = u * inverse_l1 / sum;
-  return {t0 + (t1 - t0) * s, sum * sum / (inverse_l0 * inverse_l1 * (t1 - t0))};
-}
+ private:
+  double mean_over(const EdgePiece& piece, const Vec3d& w0, const Vec3d& along, const Lanes& v0,
+                   const Lanes& v1) const;
 
-EdgePieces::EdgePieces(const EdgeQuery& query, const Lanes& lane_scale)
-    : query_(query),
-      scale_(lane_scale),
-      lobe_(query.lobe, query.n, query.wi),
-      widest_(widest_of(query.lobe)),
-      cosine_of_widest_(std::cos(widest_)),
-      turns_(!is_zero(query.turn.x) || !is_zero(query.turn.y) || !is_zero(query.turn.z)) {}
+  const EdgeQuery& query_;
+  Lanes scale_;
+  LtcLobe lobe_;
+  double widest_, cosine_of_widest_;
+  bool turns_;
+};
 
-void EdgePieces::fetch(const ListedEdge& edge, const EdgeMesh& mesh) {
+// Brings what `add` reads of the mesh into the cache.
+void fetch(const ListedEdge& edge, const EdgeMesh& mesh) {
   if (mesh.tangents.empty()) return;
   for (const VertexId vertex : mesh.edge(edge.id.edge).vertices) {
     const char* tangent = reinterpret_cast<const char*>(&mesh.tangent(vertex));
@@ -44,7 +52,15 @@ void EdgePieces::fetch(const ListedEdge& edge, const EdgeMesh& mesh) {
   }
 }
 
-void EdgePieces::add(const ListedEdge& edge, const EdgeMesh& mesh, double t0, double t1,
+EdgeCutter::EdgeCutter(const EdgeQuery& query, const Lanes& lane_scale)
+    : query_(query),
+      scale_(lane_scale),
+      lobe_(query.lobe, query.n, query.wi),
+      widest_(widest_of(query.lobe)),
+      cosine_of_widest_(std::cos(widest_)),
+      turns_(!is_zero(query.turn.x) || !is_zero(query.turn.y) || !is_zero(query.turn.z)) {}
+
+void EdgeCutter::add(const ListedEdge& edge, const EdgeMesh& mesh, double t0, double t1,
                      std::vector<EdgePiece>& pieces) const {
   const Vec3d w0 = edge.x0 - query_.p, along = edge.x1 - edge.x0;
   const Vec3d side = cross(w0, along);
@@ -89,7 +105,7 @@ void EdgePieces::add(const ListedEdge& edge, const EdgeMesh& mesh, double t0, do
 
 // Mean over u of f_s(z / |z|) |m . v(z)| / |z|^3, with v over the distance; m is normal to the plane
 // through p and the edge, v0 and v1 are m . v at the ends of the whole edge.
-double EdgePieces::mean_over(const EdgePiece& piece, const Vec3d& w0, const Vec3d& along,
+double EdgeCutter::mean_over(const EdgePiece& piece, const Vec3d& w0, const Vec3d& along,
                              const Lanes& v0, const Lanes& v1) const {
   double sum = 0;
   for (const double u : {kGauss, 1 - kGauss}) {
@@ -101,6 +117,32 @@ double EdgePieces::mean_over(const EdgePiece& piece, const Vec3d& w0, const Vec3
     sum += speed * lobe_.homogeneous_value(w0 * to_both + along * to_v1);
   }
   return 0.5 * sum;
+}
+
+}  // namespace
+
+// z(u) meets the edge at s = (u / l_1) / ((1 - u) / l_0 + u / l_1) of the way between the ends.
+EdgePiece::Place EdgePiece::place(double u) const {
+  const double sum = (1 - u) * inverse_l0 + u * inverse_l1;
+  const double s = u * inverse_l1 / sum;
+  return {t0 + (t1 - t0) * s, sum * sum / (inverse_l0 * inverse_l1 * (t1 - t0))};
+}
+
+void cut_edges(const EdgeSamplerInput& input, const EdgeQuery& query, const DirectionCone& cone,
+               std::span<const ListedEdge> edges, std::vector<EdgePiece>& pieces) {
+  if (edges.empty()) return;
+  const EdgeCutter cutter(query, input.lane_scale);
+  for (size_t i = 0; i < edges.size(); ++i) {
+    if (i + kAhead < edges.size()) {
+      const ListedEdge& next = edges[i + kAhead];
+      fetch(next, input.object(next.id.object));
+    }
+    const Vec3d w0 = edges[i].x0 - query.p, w1 = edges[i].x1 - query.p;
+    double t0 = 0, t1 = 1;
+    if (!DirectionCone::clip_by(dot(query.n, w0), dot(query.n, w1), t0, t1)) continue;
+    if (!cone.clip(w0, w1, t0, t1)) continue;
+    cutter.add(edges[i], input.object(edges[i].id.object), t0, t1, pieces);
+  }
 }
 
 }  // namespace limn
