@@ -76,6 +76,12 @@ Wish wish_of(const TermFigures& term, const PlanGrid& grid) {
     wish.film = price > 0 ? deviation / price : 0;
     return wish;
   }
+  if (!(deviation > 0)) {
+    // What a pilot has not seen may be there: one sample, whatever the scale.
+    wish.variance.assign(grid.size(), 0);
+    wish.cells.assign(grid.size(), 0);
+    return wish;
+  }
   wish.variance = window_means(grid, term.cells, kSpreadRadius);
   double mean = 0;
   for (double& v : wish.variance) {
@@ -89,6 +95,7 @@ Wish wish_of(const TermFigures& term, const PlanGrid& grid) {
 
 // The number nearest to `count` that a pixel can have.
 double possible(const TermFigures& term, double count) {
+  if (!(term.variance > 0)) return 1;
   if (count < 0.75) return std::max(count, term.least);
   return std::clamp(std::round(count), 1.0, double{kMostInPixel});
 }

@@ -183,7 +183,8 @@ TEST(TouchingShapes, SlidingBox) {
   const auto box = [](double gap) {
     Stage stage;
     stage.add("floor", {kFloor}, "white");
-    stage.add("box", kCube, "clay", 0.5, {0.1, 0.5 + gap, 0.2});
+    // No side in one plane with the camera: the derivative would have a kink.
+    stage.add("box", kCube, "clay", 0.5, {0.15, 0.5 + gap, 0.2});
     return stage.scene();
   };
   expect_equal(box(0), box(2e-5), "box.translate.x");

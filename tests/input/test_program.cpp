@@ -85,8 +85,9 @@ TEST_F(Program, RendersAndDifferentiates) {
 
 TEST_F(Program, SharesTheWorkAmongTerms) {
   const std::string figures = files_.path("figures.json");
-  const std::string gradient = "gradient " + scene_ + " --wrt screen.translate.x --threads 1" +
-                               " --json " + figures + " -o " + out();
+  const std::string gradient = "gradient " + scene_ +
+                               " --wrt screen.translate.x --method forest --threads 1 --json " +
+                               figures + " -o " + out();
   const auto report = [&](const std::string& arguments) {
     const Outcome outcome = run(gradient + arguments);
     EXPECT_EQ(outcome.status, 0) << outcome.text;
@@ -105,8 +106,8 @@ TEST_F(Program, SharesTheWorkAmongTerms) {
   EXPECT_EQ(attribute, "3,0.5,2");
 
   const auto [chosen, chosen_text] = report(" --spp 16");
-  EXPECT_EQ(chosen["pilot_spp"], 2);
-  EXPECT_NE(chosen_text.find("chosen by 2"), std::string::npos) << chosen_text;
+  EXPECT_EQ(chosen["pilot_spp"], 4);
+  EXPECT_NE(chosen_text.find("chosen by 4"), std::string::npos) << chosen_text;
   const auto [brief, brief_text] = report(" --spp 15");
   EXPECT_EQ(brief["pilot_spp"], 0);
   EXPECT_EQ(brief["samples"], (nlohmann::json{{"interior", 1}, {"camera", 1}, {"boundary", 1}}));
@@ -180,8 +181,7 @@ TEST_F(Program, ComparesOnlyWhatItKnows) {
   const std::string compare = "compare " + scene_ + " --wrt screen.translate.x --time 0.1 -o " +
                               files_.path("folder") + " --methods ";
   const std::string text = refused(compare + "forest,forrest");
-  EXPECT_NE(text.find("unknown method \"forrest\" (known: forest, brute"), std::string::npos)
-      << text;
+  EXPECT_NE(text.find("unknown method \"forrest\" (known: adaptive, "), std::string::npos) << text;
   EXPECT_NE(text.find("fd, mitsuba)"), std::string::npos) << text;
   EXPECT_NE(refused(compare + "forest,forest").find("given twice"), std::string::npos);
   EXPECT_NE(refused(compare + "fd --terms interior").find("all terms in one"), std::string::npos);
@@ -195,9 +195,9 @@ TEST_F(Program, ChecksBothWays) {
   const Outcome right = run(check);
   EXPECT_EQ(right.status, 0) << right.text;
   EXPECT_NE(right.text.find("agree"), std::string::npos);
-  const Outcome wrong = run(check + " --terms interior,camera");
+  const Outcome wrong = run(check + " --terms interior,camera,boundary");
   EXPECT_EQ(wrong.status, 1) << wrong.text;
-  EXPECT_NE(wrong.text.find("suspect the boundary term"), std::string::npos) << wrong.text;
+  EXPECT_NE(wrong.text.find("suspect the direct term"), std::string::npos) << wrong.text;
 }
 
 // Whatever the method: images, standard errors and figures of every parameter.
@@ -237,7 +237,8 @@ TEST_F(Program, ChecksAnyMethod) {
 
 // A sample done again adds what it added in its run: with one sample per pixel, the pixel's value.
 TEST_F(Program, RepeatsOneSample) {
-  const std::string gradient = "gradient " + scene_ + " --wrt screen.translate.x -o " + out();
+  const std::string gradient =
+      "gradient " + scene_ + " --wrt screen.translate.x --method forest -o " + out();
   const Outcome whole = run(gradient + " --spp 1 --samples 1 --terms boundary");
   EXPECT_EQ(whole.status, 0) << whole.text;
   const Image image = read_exr(out());
@@ -318,7 +319,8 @@ TEST_F(Program, BadNumbers) {
 }
 
 TEST_F(Program, BadSamples) {
-  const std::string gradient = "gradient " + scene_ + " --wrt screen.translate.x -o " + out();
+  const std::string gradient =
+      "gradient " + scene_ + " --wrt screen.translate.x --method forest -o " + out();
   for (const char* samples : {"3,", "3,1,1,1", "3:1:1", "0,1,1", "1,0,1", "1,1,0.5", "1.5,1,1",
                               "1,1,2000", "-1,1,1", "many"}) {
     const std::string message = refused(gradient + " --samples=" + samples);
@@ -404,7 +406,7 @@ TEST_F(Program, ShowsRejectionInAScene) {
             std::string::npos);
   EXPECT_NE(refused(reject + " --methods forest,brute")
                 .find("\"brute\" is no sampler with a rejection test (those "
-                      "are forest, li2019,"),
+                      "are forest, silhouettes, li2019,"),
             std::string::npos);
   EXPECT_EQ(refused("reject no/such.ply -o " + folder),
             "no/such.ply: error: cannot read the file\n");
