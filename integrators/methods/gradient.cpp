@@ -36,7 +36,7 @@ bool SampleCounts::operator==(const SampleCounts& other) const {
 std::string to_string(const SampleCounts& samples) {
   std::string text;
   for (size_t t = 0; t < samples.size(); ++t) {
-    text += fmt::format("{}{}", t > 0 ? "," : "", samples[t]);
+    text += fmt::format("{}{:.4g}", t > 0 ? "," : "", samples[t]);
   }
   return text.empty() ? "1" : text;
 }

@@ -30,7 +30,7 @@ json z_json(const ZSummary& z) {
 void print_check(const std::string& name, const CheckResult& r) {
   std::string samples;
   for (const TermRun& term : r.gradient.terms) {
-    samples += fmt::format("{}{} {}", samples.empty() ? "" : ", ", term.samples, term.name);
+    samples += fmt::format("{}{:.3g} {}", samples.empty() ? "" : ", ", term.samples, term.name);
   }
   fmt::print("{}: {} samples per pixel ({}), blocks of {} x {} pixels\n", name, r.gradient.spp,
              samples, r.block, r.block);
