@@ -81,7 +81,7 @@ class TestPaper(unittest.TestCase):
         mirror, shadow, reject = self.calls()
         self.assertEqual(mirror[:2], ["compare", "scenes/rough_mirror.xml"])
         self.assertIn("alpha=0.2", mirror)
-        self.assertEqual(self.value(shadow, "--methods"), "forest,forest-no-lights,li2019,uniform,fd")
+        self.assertEqual(self.value(shadow, "--methods"), "forest,silhouettes,moving-directions,adaptive,forest-no-lights,li2019,uniform,fd")
         self.assertEqual(self.value(shadow, "--time"), self.value(mirror, "--time"))
         self.assertEqual(self.value(shadow, "--seed"), "7")
         self.assertEqual(reject[:2], ["reject", "build/generated/pebble.ply"])
