@@ -10,11 +10,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
 
-#include "integrators/terms/edge_jump.h"
 #include "integrators/terms/term_table.h"
-#include "integrators/terms/vertex_query.h"
+#include "integrators/terms/vertex_edges.h"
 #include "limn/edgetree/edge_pieces.h"
 
 namespace limn {
@@ -108,42 +106,10 @@ void DirectTerm::add_at_vertex(const PathVertex& vertex, int samples, TermCost& 
 // times: how often the piece is drawn, on average, for one sample.
 void DirectTerm::add_point(const PathVertex& vertex, const EdgeQuery& query, const Drawn& drawn,
                            double u, double times, TermCost& cost, Rgb<Lanes>& sum) const {
-  const EdgeRef id = drawn.piece.edge;
-  const EdgeMesh& mesh = edges_.object(id.object);
   const auto [t, density] = drawn.piece.place(u);
-  EdgeView view;
-  const bool seen = view_edge(mesh, id, t, query.p, view);
-  const auto [a, b] = mesh.edge(id.edge).vertices;
-  const Vec3<Lanes> v =
-      relative_velocity(mesh, a, query) * (1 - t) + relative_velocity(mesh, b, query) * t;
-  const Lanes weight = (v.x * view.side.x + v.y * view.side.y + v.z * view.side.z) *
-                       (1 / (view.distance * view.distance * view.distance * density * times));
-  const Rgb<double> f = seen ? value(vertex.scattering.eval(view.omega)) : Rgb<double>{};
-  if (is_zero(weight) || is_black(f)) {
-    ++cost.zero_weight;
-    return;
-  }
-  RayCount rays;
-  Rgb<double> jump;
-  const bool visible =
-      edge_jump(context_, mesh, view, query.face, 0, std::numeric_limits<double>::infinity(),
-                vertex.bounces + 1, vertex.key, rays, jump, {&regions_, drawn.region});
-  cost.add(rays);
-  if (!visible) {
-    ++cost.occluded;
-    return;
-  }
-  ++cost.counted;
-  const Rgb<double> amount = vertex.throughput * f * jump;
-  const Rgb<Lanes> added{weight * amount.r, weight * amount.g, weight * amount.b};
-  if (vertex.log) {
-    vertex.log->push_back(fmt::format(
-        "    edge {} of shape {} at t = {:.6g}, drawn {:.4g} times a sample before region {}: jump "
-        "({:.6g}, {:.6g}, {:.6g}), adds ({:.6g}, {:.6g}, {:.6g}) to the first parameter",
-        id.edge.index(), id.object.index(), t, times, drawn.region, jump.r, jump.g, jump.b,
-        added.r[0], added.g[0], added.b[0]));
-  }
-  sum = sum + added;
+  const EdgeSample sample{drawn.piece.edge, t, density, times};
+  add_edge_point(context_, edges_.object(sample.edge.object), vertex, query, sample,
+                 {&regions_, drawn.region}, vertex.key, cost, sum);
 }
 
 }  // namespace

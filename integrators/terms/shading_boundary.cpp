@@ -2,13 +2,8 @@
 // path's throughput. What regions of light emit is left to direct_boundary.cpp, where they are apart.
 //   dL_o/dtheta  +=  sum over edges of the integral over t of dL(t) f_s(w_t) J(t) dt,
 //   J(t) = det(w_0, w_1, v) / |w|^3
-#include <fmt/format.h>
-
-#include <limits>
-
-#include "integrators/terms/edge_jump.h"
 #include "integrators/terms/term_table.h"
-#include "integrators/terms/vertex_query.h"
+#include "integrators/terms/vertex_edges.h"
 
 namespace limn {
 namespace {
@@ -70,51 +65,8 @@ void BoundaryTerm::add_sample(const PathVertex& vertex, const EdgeQuery& query, 
     if (vertex.log) vertex.log->push_back("  edge: none found");
     return;
   }
-  const EdgeSample& sample = *drawn;
-  const EdgeMesh& mesh = edges_.object(sample.edge.object);
-  EdgeView view;
-  const bool seen = view_edge(mesh, sample.edge, sample.t, query.p, view);
-  const auto [a, b] = mesh.edge(sample.edge.edge).vertices;
-  const Vec3<Lanes> v = relative_velocity(mesh, a, query) * (1 - sample.t) +
-                        relative_velocity(mesh, b, query) * sample.t;
-  const Lanes weight =
-      (v.x * view.side.x + v.y * view.side.y + v.z * view.side.z) *
-      (1 / (view.distance * view.distance * view.distance * sample.probability * sample.pdf_t));
-  if (vertex.log) {
-    vertex.log->push_back(fmt::format(
-        "  edge {} of shape {} at t = {:.6g}: probability {:.4g}, density of t {:.4g}, distance "
-        "{:.6g}",
-        sample.edge.edge.index(), sample.edge.object.index(), sample.t, sample.probability,
-        sample.pdf_t, view.distance));
-  }
-  // A density may round to zero at the very horizon.
-  const Rgb<double> f =
-      seen && sample.pdf_t > 0 ? value(vertex.scattering.eval(view.omega)) : Rgb<double>{};
-  if (is_zero(weight) || is_black(f)) {
-    ++cost.zero_weight;
-    if (vertex.log) vertex.log->push_back("    no weight");
-    return;
-  }
-  RayCount rays;
-  Rgb<double> jump;
-  const bool visible =
-      edge_jump(context_, mesh, view, query.face, 0, std::numeric_limits<double>::infinity(),
-                vertex.bounces + 1, key, rays, jump, part_);
-  cost.add(rays);
-  if (!visible) {
-    ++cost.occluded;
-    if (vertex.log) vertex.log->push_back("    hidden");
-    return;
-  }
-  ++cost.counted;
-  const Rgb<double> amount = vertex.throughput * f * jump;
-  const Rgb<Lanes> added{weight * amount.r, weight * amount.g, weight * amount.b};
-  if (vertex.log) {
-    vertex.log->push_back(fmt::format(
-        "    jump ({:.6g}, {:.6g}, {:.6g}), adds ({:.6g}, {:.6g}, {:.6g}) to the first parameter",
-        jump.r, jump.g, jump.b, added.r[0], added.g[0], added.b[0]));
-  }
-  sum = sum + added;
+  add_edge_point(context_, edges_.object(drawn->edge.object), vertex, query, *drawn, part_, key,
+                 cost, sum);
 }
 
 }  // namespace

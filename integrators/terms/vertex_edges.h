@@ -1,0 +1,18 @@
+#pragma once
+// A vertex of a path as edge samplers see it, and what a point on an edge adds there.
+#include "integrators/terms/edge_jump.h"
+#include "integrators/terms/term.h"
+#include "limn/edgetree/edge_sampler.h"
+
+namespace limn {
+
+EdgeQuery query_at(const PathVertex& vertex);
+
+// Adds what a point on an edge contributes to the boundary integral at a vertex, over its density:
+// throughput dL(t) f_s det(w_0, w_1, v) / |w|^3 / (probability pdf_t). part: of the radiance; key:
+// of the path and the sample. Books rays and what became of the sample on `cost`.
+void add_edge_point(const PathContext& context, const EdgeMesh& mesh, const PathVertex& vertex,
+                    const EdgeQuery& query, const EdgeSample& sample, const RadiancePart& part,
+                    const Rng& key, TermCost& cost, Rgb<Lanes>& sum);
+
+}  // namespace limn
