@@ -20,6 +20,25 @@ const std::string kFolder = std::string(LIMN_SOURCE_DIR) + "/scenes/closed_form/
 const std::string kFile = "half_hidden_lamp.xml";
 const std::string kParameter = "lamp.translate.x";
 
+// The same run whatever a machine does in the time: a number of samples instead of seconds.
+class CountedMethod final : public DerivativeMethod {
+ public:
+  CountedMethod(std::unique_ptr<DerivativeMethod> method, int spp)
+      : method_(std::move(method)), spp_(spp) {}
+  std::string name() const override { return method_->name(); }
+  std::string description() const override { return method_->description(); }
+  MethodRun run(const RunSettings& settings) override {
+    RunSettings counted = settings;
+    counted.spp = spp_;
+    counted.seconds = 0;
+    return method_->run(counted);
+  }
+
+ private:
+  std::unique_ptr<DerivativeMethod> method_;
+  int spp_;
+};
+
 // A job on a closed-form scene of a few pixels.
 struct Job {
   Scene scene = read_scene(kFolder + kFile, {}, nullptr);
@@ -27,17 +46,18 @@ struct Job {
   RunSettings settings;
   Job() { settings.seed = 5; }
 
-  Reference reference(double seconds) const {
+  Reference reference(int spp) const {
     RunSettings run = settings;
-    run.spp = 1 << 20;
-    run.seconds = seconds;
+    run.spp = spp;
     run.seed = derived_seed(settings.seed, "reference");
     return make_reference(input, run);
   }
-  std::vector<std::unique_ptr<DerivativeMethod>> methods(
-      const std::vector<std::string>& names) const {
+  std::vector<std::unique_ptr<DerivativeMethod>> methods(const std::vector<std::string>& names,
+                                                         int spp) const {
     std::vector<std::unique_ptr<DerivativeMethod>> made;
-    for (const std::string& name : names) made.push_back(make_method(input, name));
+    for (const std::string& name : names) {
+      made.push_back(std::make_unique<CountedMethod>(make_method(input, name), spp));
+    }
     return made;
   }
 };
@@ -58,7 +78,7 @@ std::vector<double> exact_derivative() {
 // All against the exact image: the reference and every method agree with it.
 TEST(Compare, MethodsAgreeWithTheClosedForm) {
   const Job job;
-  const Reference measured = job.reference(0.2);
+  const Reference measured = job.reference(1024);
   Reference exact = measured;
   exact.image = exact_derivative();
   ASSERT_EQ(exact.image.size(), measured.image.size());
@@ -71,7 +91,7 @@ TEST(Compare, MethodsAgreeWithTheClosedForm) {
   options.times = {0.1};
   options.repeats = 2;
   for (const ComparedMethod& m :
-       compare(options, exact, job.methods({"forest", "brute"}), job.settings)) {
+       compare(options, exact, job.methods({"forest", "brute"}, 1024), job.settings)) {
     EXPECT_EQ(m.status, MethodStatus::kDone) << m.name << m.message;
     ASSERT_EQ(m.summary.size(), 1u);
     EXPECT_GT(m.summary[0].bias.count, 0) << m.name;
@@ -82,12 +102,12 @@ TEST(Compare, MethodsAgreeWithTheClosedForm) {
 
 TEST(Compare, FindsABias) {
   Job job;
-  const Reference reference = job.reference(0.1);
+  const Reference reference = job.reference(1024);
   job.input.terms = {"interior", "camera"};
   CompareOptions options;
   options.times = {0.05};
   options.repeats = 2;
-  const auto results = compare(options, reference, job.methods({"forest"}), job.settings);
+  const auto results = compare(options, reference, job.methods({"forest"}, 1024), job.settings);
   EXPECT_LT(p_value(results[0].summary[0].bias), 1e-6);
 }
 
@@ -173,7 +193,7 @@ TEST(Compare, InterleavesWithSeedsOfTheirOwn) {
 
 TEST(Compare, AnInterruptKeepsFinishedRuns) {
   const Job job;
-  const Reference reference = job.reference(0.05);
+  const Reference reference = job.reference(64);
   std::atomic<bool> stop = false;
   RunSettings settings = job.settings;
   settings.interrupted = &stop;
@@ -181,7 +201,8 @@ TEST(Compare, AnInterruptKeepsFinishedRuns) {
   CompareOptions options;
   options.times = {0.05};
   options.repeats = 1;
-  const auto results = compare(options, reference, job.methods({"forest", "uniform"}), settings);
+  const auto results =
+      compare(options, reference, job.methods({"forest", "uniform"}, 1024), settings);
   EXPECT_EQ(results[0].status, MethodStatus::kDone);
   EXPECT_EQ(results[0].runs.size(), 1u);
   EXPECT_FALSE(results[0].image.empty());
@@ -252,7 +273,8 @@ TEST(Differences, BestStepIsTheMinimum) {
 class ReferenceFile : public testing::Test {
  protected:
   ReferenceFile() {
-    reference_ = job_.reference(0.02);
+    reference_ = job_.reference(64);
+    reference_.asked_seconds = 0.02;
     write_reference(file_, reference_, identity(), job_.scene.film, 1);
   }
   Identity identity() const { return identify(job_.input, {}); }
