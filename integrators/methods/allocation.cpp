@@ -23,33 +23,42 @@ std::vector<double> counts_to_try(const TermFigures& term) {
 
 }  // namespace
 
+// The least product of two sums lies on the lower hull of all choices, where every term has its own
+// least of variance / n + price * cost * n for one price. As the price falls, counts rise one by
+// one: each step is taken where both of its counts are alike.
 SampleCounts best_samples(const std::vector<TermFigures>& figures) {
-  struct Choice {
-    std::vector<double> samples;
-    double cost = 0, variance = 0;
-    double product() const { return variance * cost; }
+  struct Step {
+    double price;
+    size_t term;
+    double count;  // after it
   };
-  std::vector<Choice> choices(1);
-  for (const TermFigures& term : figures) {
-    std::vector<Choice> longer;
-    for (const Choice& choice : choices) {
-      for (const double n : counts_to_try(term)) {
-        Choice& c = longer.emplace_back(choice);
-        c.samples.push_back(n);
-        c.cost += term.cost * n;
-        c.variance += term.variance / n;
-      }
+  std::vector<Step> steps;
+  std::vector<double> samples;
+  double variance = 0, cost = 0;
+  for (size_t t = 0; t < figures.size(); ++t) {
+    const TermFigures& term = figures[t];
+    const std::vector<double> counts = counts_to_try(term);
+    samples.push_back(counts.front());
+    variance += term.variance / counts.front();
+    cost += term.cost * counts.front();
+    for (size_t i = 1; i < counts.size(); ++i) {
+      steps.push_back({term.variance / (counts[i - 1] * counts[i] * term.cost), t, counts[i]});
     }
-    choices = std::move(longer);
   }
-  double least = choices[0].product();
-  for (const Choice& c : choices) least = std::min(least, c.product());
-  if (!(least > 0)) return {};
-  const Choice* best = nullptr;
-  for (const Choice& c : choices) {
-    if (c.product() <= kTie * least && (!best || c.cost < best->cost)) best = &c;
+  std::stable_sort(steps.begin(), steps.end(),
+                   [](const Step& a, const Step& b) { return a.price > b.price; });
+  double least = variance * cost;
+  std::vector<double> best = samples;
+  for (const Step& step : steps) {
+    const TermFigures& term = figures[step.term];
+    variance += term.variance * (1 / step.count - 1 / samples[step.term]);
+    cost += term.cost * (step.count - samples[step.term]);
+    samples[step.term] = step.count;
+    if (variance * cost * kTie >= least) continue;
+    least = variance * cost;
+    best = samples;
   }
-  return SampleCounts(best->samples);
+  return least > 0 ? SampleCounts(best) : SampleCounts();
 }
 
 namespace {

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 
+#include "integrators/terms/penumbra.h"
 #include "integrators/terms/term_table.h"
 #include "integrators/terms/vertex_edges.h"
 #include "limn/edgetree/edge_pieces.h"
@@ -47,6 +48,8 @@ class DirectTerm final : public Term {
 
  private:
   void list(const EdgeQuery& query, std::vector<Drawn>& drawn) const;
+  bool is_elsewhere(const PathVertex& vertex, const EdgeMesh& mesh, const EdgeSample& sample,
+                    uint32_t region) const;
   void add_point(const PathVertex& vertex, const EdgeQuery& query, const Drawn& drawn, double u,
                  double times, TermCost& cost, Rgb<Lanes>& sum) const;
 
@@ -103,13 +106,27 @@ void DirectTerm::add_at_vertex(const PathVertex& vertex, int samples, TermCost& 
   }
 }
 
+// Whether `penumbra` adds what the edge does at the vertex, but for what turning directions change.
+bool DirectTerm::is_elsewhere(const PathVertex& vertex, const EdgeMesh& mesh,
+                              const EdgeSample& sample, uint32_t region) const {
+  if (vertex.bounces > 0) return false;
+  const auto& ends = mesh.edge(sample.edge.edge).vertices;
+  const Vec3d e = mesh.position(ends[0]) * (1 - sample.t) + mesh.position(ends[1]) * sample.t;
+  const double density = film_density_through(context_.scene.camera, regions_, region, e,
+                                              value(vertex.surface.p), vertex.surface.n_g);
+  return is_thin(density) && may_be_thin(regions_, region, mesh.faces_around(sample.edge.edge));
+}
+
 // times: how often the piece is drawn, on average, for one sample.
 void DirectTerm::add_point(const PathVertex& vertex, const EdgeQuery& query, const Drawn& drawn,
                            double u, double times, TermCost& cost, Rgb<Lanes>& sum) const {
   const auto [t, density] = drawn.piece.place(u);
   const EdgeSample sample{drawn.piece.edge, t, density, times};
-  add_edge_point(context_, edges_.object(sample.edge.object), vertex, query, sample,
-                 {&regions_, drawn.region}, vertex.key, cost, sum);
+  const EdgeMesh& mesh = edges_.object(sample.edge.object);
+  const EdgeMotion motion =
+      is_elsewhere(vertex, mesh, sample, drawn.region) ? EdgeMotion::kTurn : EdgeMotion::kAll;
+  add_edge_point(context_, mesh, vertex, query, sample, {&regions_, drawn.region}, vertex.key, cost,
+                 sum, motion);
 }
 
 }  // namespace

@@ -105,6 +105,10 @@ void flatten(const std::vector<Plane>& faces, LampHull& hull) {
   hull.plane = faces[0];
   hull.deviation = deviation + reach_out(points, polygon);
   hull.points.clear();
+  hull.area = 0;
+  for (size_t i = 2; i < polygon.size(); ++i) {
+    hull.area += 0.5 * turn(polygon[0], polygon[i - 1], polygon[i]);
+  }
   const Vec3d middle = hull.center - frame.n * faces[0].distance(hull.center);
   for (const Point2& p : polygon) hull.points.push_back(middle + frame.s * p.x + frame.t * p.y);
 }
@@ -160,6 +164,10 @@ LampHull make_lamp_hull(const Mesh& mesh, ShadingModel shading) {
   for (const Vec3d& x : hull.points) bounds.extend(x);
   hull.center = bounds.center();
   for (const Vec3d& x : hull.points) hull.radius = std::max(hull.radius, length(x - hull.center));
+  for (const FaceIndices& face : mesh.faces) {
+    const Vec3d a = corner(mesh, face[0]);
+    hull.area += 0.5 * length(cross(corner(mesh, face[1]) - a, corner(mesh, face[2]) - a));
+  }
   const std::vector<Plane> faces = face_planes(mesh);
   // Interpolated normals let a lamp shine behind its faces.
   const bool by_planes =
@@ -207,10 +215,21 @@ LightRegions::LightRegions(const Scene& scene) : scene_(scene) {
     regions_.push_back({ShapeId(s), mean, make_lamp_hull(shape.mesh, scene.shading), {}});
   }
   hold_all_ = !scene.environment;
+  leave_out_dim_lamps();
   if (!scene.environment) return;
   for (const BrightPatch& patch : find_bright_patches(*scene.environment)) {
     regions_.push_back({{}, patch.luminance, {}, patch.cap});
   }
+}
+
+void LightRegions::leave_out_dim_lamps() {
+  constexpr size_t kMost = 16;  // not tuned
+  if (regions_.size() <= kMost) return;
+  const auto light = [](const Region& region) { return region.luminance * region.hull.area; };
+  std::vector<double> lights;
+  for (const Region& region : regions_) lights.push_back(light(region));
+  std::nth_element(lights.begin(), lights.begin() + kMost, lights.end(), std::greater<>());
+  for (Region& region : regions_) region.lists_thin = light(region) > lights[kMost];
 }
 
 bool LightRegions::any_in(const Scene& scene) {
@@ -218,6 +237,75 @@ bool LightRegions::any_in(const Scene& scene) {
     if (shape.is_emitter) return true;
   }
   return scene.environment && !find_bright_patches(*scene.environment).empty();
+}
+
+namespace {
+
+double cap_solid_angle(const DirectionCap& cap) {
+  return 2 * kPi * cap.sine * cap.sine / (1 + cap.cosine);
+}
+
+// A point of a convex polygon, uniform: of a fan of triangles.
+Vec3d draw_in_polygon(const LampHull& lamp, double u1, double u2) {
+  const Vec3d& a = lamp.points[0];
+  double left = u1 * lamp.area;
+  for (size_t i = 2;; ++i) {
+    const Vec3d b = lamp.points[i - 1] - a, c = lamp.points[i] - a;
+    const double part = 0.5 * length(cross(b, c));
+    if (left >= part && i + 1 < lamp.points.size()) {
+      left -= part;
+      continue;
+    }
+    const double root = std::sqrt(std::min(left / part, 1.0));
+    return a + b * (root * (1 - u2)) + c * (root * u2);
+  }
+}
+
+bool is_in_polygon(const LampHull& lamp, const Vec3d& y) {
+  for (size_t i = 0; i < lamp.points.size(); ++i) {
+    const Vec3d &a = lamp.points[i], &b = lamp.points[(i + 1) % lamp.points.size()];
+    if (dot(cross(b - a, y - a), lamp.plane.n) < 0) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+std::optional<DirectionCap> LightRegions::cap_around(const Region& region, const Vec3d& x) const {
+  if (!region.shape.valid()) return region.cap;
+  const Vec3d to = region.hull.center - x;
+  const double distance = length(to), sine = region.hull.radius / distance;
+  if (!(sine > 0 && sine < 1)) return {};
+  return DirectionCap{to / distance, sine, std::sqrt(1 - sine * sine)};
+}
+
+std::optional<Vec3d> LightRegions::draw_direction(size_t k, const Vec3d& x, double u1,
+                                                  double u2) const {
+  const Region& region = regions_[k];
+  if (region.hull.flat) {
+    if (!(region.hull.plane.distance(x) > 0)) return {};
+    return normalize(draw_in_polygon(region.hull, u1, u2) - x);
+  }
+  const auto cap = cap_around(region, x);
+  if (!cap) return {};
+  const double below = u1 * cap->sine * cap->sine / (1 + cap->cosine);  // 1 - the cosine
+  const double sine = std::sqrt(below * (2 - below));
+  const Frame frame(cap->axis);
+  return frame.n * (1 - below) + frame.s * (sine * std::cos(2 * kPi * u2)) +
+         frame.t * (sine * std::sin(2 * kPi * u2));
+}
+
+double LightRegions::direction_pdf(size_t k, const Vec3d& x, const Vec3d& w) const {
+  const Region& region = regions_[k];
+  if (region.hull.flat) {
+    const double height = region.hull.plane.distance(x), cosine = -dot(region.hull.plane.n, w);
+    if (!(height > 0 && cosine > 0)) return 0;
+    const double distance = height / cosine;
+    if (!is_in_polygon(region.hull, x + w * distance)) return 0;
+    return distance * distance / (region.hull.area * cosine);
+  }
+  const auto cap = cap_around(region, x);
+  return cap && cap->holds(w) ? 1 / cap_solid_angle(*cap) : 0;
 }
 
 Rgb<double> LightRegions::emission(size_t k, const SurfacePoint<double>& surface,

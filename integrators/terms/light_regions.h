@@ -22,6 +22,7 @@ struct LampHull {
   double deviation = 0;  // how far the lamp reaches out of the polygon [scene units]
   Vec3d center;
   double radius = 0;         // of a sphere around the center that holds all points
+  double area = 0;           // of the lamp; of a flat one that of the polygon
   std::vector<Plane> faces;  // it shines in front of one of these; none: it may shine everywhere
 };
 LampHull make_lamp_hull(const Mesh& mesh, ShadingModel shading);
@@ -50,6 +51,19 @@ class LightRegions {
     return region.shape.valid() ? cone_around(region.hull, p, n) : cone_around(region.cap, n);
   }
 
+  // A direction from x in which the region may be: uniform on the polygon of a flat lamp, else over
+  // the sphere or the cap that the region lies in. None where direction_pdf is zero everywhere.
+  std::optional<Vec3d> draw_direction(size_t k, const Vec3d& x, double u1, double u2) const;
+  // Its density [1/sr] at the unit direction w; zero where it is never drawn: behind a flat lamp,
+  // inside the sphere around others.
+  double direction_pdf(size_t k, const Vec3d& x, const Vec3d& w) const;
+  // Whether its penumbras may be thin, see penumbra.h.
+  bool lists_thin(size_t k) const { return regions_[k].lists_thin; }
+  // The shape of a lamp; none of a patch.
+  ShapeId shape(size_t k) const { return regions_[k].shape; }
+  const LampHull& hull(size_t k) const { return regions_[k].hull; }
+  const DirectionCap& cap(size_t k) const { return regions_[k].cap; }
+
   // What a surface emits towards the unit direction wi as part of region k.
   Rgb<double> emission(size_t k, const SurfacePoint<double>& surface, const Vec3d& wi) const;
   // As part of any region.
@@ -67,7 +81,13 @@ class LightRegions {
     double luminance;
     LampHull hull;
     DirectionCap cap;
+    bool lists_thin = true;
   };
+  // Edges before lamps are listed: no more than for the lamps with the most light.
+  void leave_out_dim_lamps();
+  // The cap of directions from x that holds region k, unless that is a flat lamp.
+  std::optional<DirectionCap> cap_around(const Region& region, const Vec3d& x) const;
+
   const Scene& scene_;
   std::vector<Region> regions_;
   bool hold_all_ = false;

@@ -18,6 +18,7 @@
 
 #include <algorithm>
 
+#include "integrators/terms/film_point.h"
 #include "integrators/terms/term_table.h"
 
 namespace limn {
@@ -315,42 +316,21 @@ void ShadowTerm::add_sample(const PathVertex& vertex, Rng rng, TermCost& cost,
   sum = sum + added;
 }
 
-// The film measures directions by ds = (W / (2 tan_x))^2 / cos^3 domega [pixels^2], with W the
-// film's width in pixels, tan_x that of half its field of view, and cos to the optical axis.
 bool ShadowTerm::sample_film(double u, const Rng& key, RayCount& rays, FilmSample& sample) const {
-  const Scene& scene = context_.scene;
-  const Camera& camera = scene.camera;
   double probability;
   const ShadowEdge& edge = choose(u, probability);
   const auto point = cast(edge, key.at(Purpose::kShadow, 0).uniform(), rays);
   if (!point) return false;
-  if (scene.hide_emitters && scene.shape(point->face.shape).is_emitter) return false;
-  const double depth = camera.depth(point->x);
-  if (!(depth > camera.near_clip && depth < camera.far_clip)) return false;
-  const auto film = camera.project(point->x);
-  const double border = scene.film.filter.radius;
-  if (film.x < scene.film.crop_x - border || film.y < scene.film.crop_y - border ||
-      film.x > scene.film.crop_x + scene.film.crop_width + border ||
-      film.y > scene.film.crop_y + scene.film.crop_height + border) {
-    return false;
-  }
-  const auto seen = camera.ray<Dual>(film.x, film.y);
-  const Vec3d q = value(seen.origin);
-  const Vec3d omega = value(seen.direction);
-  const double distance = length(point->x - q);
-  const Lanes swept = sweep(edge, *point, {seen.origin, seen.direction, distance});
-  const Rgb<double> amount = jump(edge, *point, q, omega);
+  const auto seen = film_point(context_.scene, point->face, point->x);
+  if (!seen) return false;
+  const Lanes swept = sweep(edge, *point, {seen->ray.origin, seen->ray.direction, seen->distance});
+  const Rgb<double> amount = jump(edge, *point, value(seen->ray.origin), seen->omega);
   if (is_zero(swept) || is_black(amount)) return false;
-  Ray ray{q, omega, seen.t_min, distance * (1 - 0x1p-20)};
-  ray.start = point->face;
-  ray.skip_emitters = scene.hide_emitters;
-  ++rays.shadow;
-  if (context_.tracer.occluded(ray)) return false;
-  const double cosine = dot(omega, value(camera.forward));
-  const double scale = camera.width / (2 * std::tan(camera.fov.v * (kPi / 360)) * camera.x_factor);
-  sample.x = film.x;
-  sample.y = film.y;
-  const Lanes weight = swept * (scale * scale / (cosine * cosine * cosine * probability));
+  if (is_hidden(context_, *seen, point->face, rays)) return false;
+  sample.x = seen->x;
+  sample.y = seen->y;
+  const Lanes weight =
+      swept * (film_per_solid_angle(context_.scene.camera, seen->omega) / probability);
   sample.value = {weight * amount.r, weight * amount.g, weight * amount.b};
   return true;
 }

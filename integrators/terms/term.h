@@ -117,6 +117,6 @@ struct TermType {
 // In the order of --samples and of all tables.
 std::span<const TermType> term_types();
 // Sums of all terms are kept on the stack.
-inline constexpr size_t kMostTerms = 5;
+inline constexpr size_t kMostTerms = 6;
 
 }  // namespace limn

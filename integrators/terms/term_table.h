@@ -10,6 +10,7 @@ std::unique_ptr<Term> make_camera_term(TermInput& input);
 std::unique_ptr<Term> make_boundary_term(TermInput& input);
 std::unique_ptr<Term> make_shadow_term(TermInput& input);
 std::unique_ptr<Term> make_direct_term(TermInput& input);
+std::unique_ptr<Term> make_penumbra_term(TermInput& input);
 
 inline bool always(const Scene&) { return true; }
 inline bool has_delta_lights(const Scene& scene) { return !scene.delta_lights.empty(); }
@@ -27,6 +28,8 @@ inline constexpr TermType kTermTypes[] = {
      make_shadow_term},
     {"direct", "silhouettes that shading points see before lamps and the sun", 1, false, true, true,
      0, LightRegions::any_in, true, make_direct_term},
+    {"penumbra", "of these, what has a thin penumbra on the film", kLeastFilmSamples, false, true,
+     false, 2, LightRegions::any_in, true, make_penumbra_term},
 };
 
 }  // namespace limn

@@ -10,9 +10,14 @@ EdgeQuery query_at(const PathVertex& vertex);
 
 // Adds what a point on an edge contributes to the boundary integral at a vertex, over its density:
 // throughput dL(t) f_s det(w_0, w_1, v) / |w|^3 / (probability pdf_t). part: of the radiance; key:
-// of the path and the sample. Books rays and what became of the sample on `cost`.
+// of the path and the sample; motion: of v. Books rays and what became of the sample on `cost`.
+enum class EdgeMotion {
+  kAll,   // of the edge against p and against directions that turn
+  kTurn,  // against these alone
+};
 void add_edge_point(const PathContext& context, const EdgeMesh& mesh, const PathVertex& vertex,
                     const EdgeQuery& query, const EdgeSample& sample, const RadiancePart& part,
-                    const Rng& key, TermCost& cost, Rgb<Lanes>& sum);
+                    const Rng& key, TermCost& cost, Rgb<Lanes>& sum,
+                    EdgeMotion motion = EdgeMotion::kAll);
 
 }  // namespace limn
