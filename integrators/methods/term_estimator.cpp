@@ -76,11 +76,11 @@ class TermEstimator::VertexTerms {
       : estimator_(estimator), counts_(counts), sink_(sink), sums_() {}
 
   void operator()(const SurfacePoint<Dual>& surface, const Scattering<Dual>& scattering,
-                  const Rgb<Dual>& throughput, const DirectionMotion* motion, int bounces,
-                  const Rng& key) {
+                  const Rgb<Dual>& throughput, const DirectionMotion* motion, const PathStep& step,
+                  int bounces, const Rng& key) {
     const Rgb<double> weight = value(throughput);
-    const PathVertex vertex{surface, scattering, weight,     motion ? motion->turn : Vec3<Lanes>{},
-                            bounces, key,        sink_.log()};
+    const PathVertex vertex{surface, scattering, weight, motion ? motion->turn : Vec3<Lanes>{},
+                            bounces, step,       key,    sink_.log()};
     if (vertex.log) log_vertex(*vertex.log, surface, scattering, weight, bounces);
     for (size_t slot = 0; slot < estimator_.slots(); ++slot) {
       const Term* term = estimator_.terms_[slot].get();

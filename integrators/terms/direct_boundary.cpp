@@ -109,12 +109,11 @@ void DirectTerm::add_at_vertex(const PathVertex& vertex, int samples, TermCost& 
 // Whether `penumbra` adds what the edge does at the vertex, but for what turning directions change.
 bool DirectTerm::is_elsewhere(const PathVertex& vertex, const EdgeMesh& mesh,
                               const EdgeSample& sample, uint32_t region) const {
-  if (vertex.bounces > 0) return false;
   const auto& ends = mesh.edge(sample.edge.edge).vertices;
   const Vec3d e = mesh.position(ends[0]) * (1 - sample.t) + mesh.position(ends[1]) * sample.t;
-  const double density = film_density_through(context_.scene.camera, regions_, region, e,
-                                              value(vertex.surface.p), vertex.surface.n_g);
-  return is_thin(density) && may_be_thin(regions_, region, mesh.faces_around(sample.edge.edge));
+  const LampLine line{region, e, value(vertex.surface.p), vertex.surface.n_g};
+  return is_thin(context_.scene.camera, regions_, line, vertex.step, vertex.bounces) &&
+         may_be_thin(regions_, region, mesh.faces_around(sample.edge.edge));
 }
 
 // times: how often the piece is drawn, on average, for one sample.

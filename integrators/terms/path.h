@@ -35,8 +35,14 @@ inline double mis_weight(double pdf, double other) {
   return 1 / (1 + ratio * ratio);
 }
 
-// Visitor: called as visitor(surface, scattering, throughput, motion, bounces, key) at every vertex
-// where the path scatters. motion: how directions move there, null where they are held.
+// How a path came to a vertex.
+struct PathStep {
+  Vec3d from;      // the vertex before
+  double pdf = 0;  // of the direction from there [1/sr]; 0 for what the camera or an edge sees
+};
+
+// Visitor: called as visitor(surface, scattering, throughput, motion, step, bounces, key) at every
+// vertex where the path scatters. motion: how directions move there, null where they are held.
 template <class S, class Visitor>
 class PathTracer {
  public:
@@ -90,12 +96,13 @@ class PathTracer {
                       EdgeStart* edge) {
     Rgb<S> radiance = surface.emission(value(wi), c_.scene.shading);
     Rgb<S> throughput = grey(S(1.0));
+    PathStep step;
     for (;; ++bounces) {
       if (c_.scene.max_depth >= 0 && bounces + 1 >= c_.scene.max_depth) return radiance;
       const Scattering<S> scattering(surface, wi, c_.scene.shading);
       if (scattering.black()) return radiance;
       const DirectionMotion* motion = motion_at(surface, bounces);
-      visitor_(surface, scattering, throughput, motion, bounces, key);
+      visitor_(surface, scattering, throughput, motion, step, bounces, key);
       add_lights(surface, scattering, motion, throughput, bounces, key, edge, radiance);
       Rng rng = key.at(Purpose::kBsdf, bounces);
       const double u1 = rng.uniform();
@@ -107,6 +114,7 @@ class PathTracer {
       if (is_black(value(f))) return radiance;
       add_score(scattering, *wo, motion, value(throughput) * (1 / pdf));
       throughput = throughput * f * (1 / pdf);
+      step = {value(surface.p), pdf};
       Hit hit;
       const bool found = next_hit(surface, *wo, edge, hit);
       if (!found) {

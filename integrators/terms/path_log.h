@@ -36,7 +36,8 @@ class PathLog {
   explicit PathLog(SampleLog& log) : log_(log) {}
   template <class S>
   void operator()(const SurfacePoint<S>& surface, const Scattering<S>& scattering,
-                  const Rgb<S>& throughput, const DirectionMotion*, int bounces, const Rng&) {
+                  const Rgb<S>& throughput, const DirectionMotion*, const PathStep&, int bounces,
+                  const Rng&) {
     log_vertex(log_, surface, scattering, value(throughput), bounces);
   }
 

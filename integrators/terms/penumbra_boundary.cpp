@@ -1,11 +1,11 @@
-// The boundary term of penumbras that are thin on the film, see penumbra.h. At the first vertices p(s)
-// of paths, s a position on the film with filter h, `direct` is
-//   integral over the film of h(s) times the integral over edges of C(p(s), t) dt ds,
+// The boundary term of thin penumbras, see penumbra.h. With p(omega) what a viewer q sees in the
+// direction omega and T the throughput to there, `direct` is
+//   integral of T(omega) times the integral over edges of C(p(omega), t) dt domega,
 // with C its integrand. Here a point e(t) of an edge is drawn first, then a line through it from a
-// direction where region k lies; behind e it meets p, whose film position has the density
-//   pdf(omega) |n_p . omega| / |p - e|^2 / (ds / dA_p) :
-// the estimate C over all densities stays bounded where lamp and distance vanish. It holds the turn
-// of directions at p at rest, which is left to `direct` where the penumbra is thin.
+// direction where region k lies; behind e it meets p, in whose direction omega its density is
+//   pdf(line) (|n . line| / |p - e|^2) / (|n . omega| / |p - q|^2) :
+// the estimate C over all densities stays bounded where lamp and distance vanish. The turn of
+// directions at p is left to `direct`, also where the penumbra is thin.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,19 +17,27 @@
 
 namespace limn {
 
-double film_density_through(const Camera& camera, const LightRegions& regions, size_t k,
-                            const Vec3d& e, const Vec3d& p, const Vec3d& n_g) {
-  const Vec3d through = e - p;
+double density_seen(const LightRegions& regions, const LampLine& line, const Vec3d& q) {
+  const Vec3d through = line.e - line.p;
   const double behind = length(through);
   if (!(behind > 0)) return 0;
   const Vec3d omega = through / behind;
-  const double pdf = regions.direction_pdf(k, e, omega);
+  const double pdf = regions.direction_pdf(line.region, line.e, omega);
   if (!(pdf > 0)) return 0;
-  const Vec3d sight = p - value(camera.origin);
+  const Vec3d sight = line.p - q;
   const double distance = length(sight);
-  const double film = film_per_solid_angle(camera, sight / distance) * std::fabs(dot(n_g, sight)) /
-                      (distance * distance * distance);
-  return pdf * std::fabs(dot(n_g, omega)) / (behind * behind * film);
+  const double seen = std::fabs(dot(line.n, sight)) / (distance * distance * distance);
+  return pdf * std::fabs(dot(line.n, omega)) / (behind * behind * seen);
+}
+
+bool is_thin(const Camera& camera, const LightRegions& regions, const LampLine& line,
+             const PathStep& step, int bounces) {
+  if (bounces == 0) {
+    const Vec3d pinhole = value(camera.origin);
+    const double pixel = 1 / film_per_solid_angle(camera, normalize(line.p - pinhole));
+    return density_seen(regions, line, pinhole) * pixel * kThinPenumbra > 1;
+  }
+  return step.pdf > 0 && density_seen(regions, line, step.from) * kThinPenumbra > step.pdf;
 }
 
 bool may_be_thin(const LightRegions& regions, size_t k, std::span<const FaceRef> faces_around) {
@@ -77,6 +85,16 @@ class PenumbraTerm final : public Term {
     return !listed_.empty() && (max_depth < 0 || max_depth > 1);
   }
   bool sample_film(double u, const Rng& key, RayCount& rays, FilmSample& sample) const override;
+  bool uses_vertices() const override { return !listed_.empty(); }
+  void add_at_vertex(const PathVertex& vertex, int samples, TermCost& cost,
+                     Rgb<Lanes>& sum) const override {
+    const int max_depth = context_.scene.max_depth;
+    if (max_depth >= 0 && vertex.bounces + 2 >= max_depth) return;
+    for (int i = 0; i < samples; ++i) {
+      const Rng key = vertex.key.copy(Purpose::kShadowCopy, i);
+      add_sample(vertex, key, cost, sum);
+    }
+  }
   void describe(GradientStats& stats) const override {
     stats.setup.emplace_back("edges before lamps", list_seconds_);
     stats.edges.emplace_back("before lamps", listed_.size());
@@ -86,10 +104,20 @@ class PenumbraTerm final : public Term {
   RegionSight sight_of(uint32_t k) const;
   void list(uint32_t k, std::vector<double>& lengths, std::vector<Lanes>& speeds);
   void weigh(const std::vector<double>& lengths, const std::vector<Lanes>& speeds, int lanes);
-  // The vertex of a path that starts at the film point on the face, and what it gets through the
-  // point of the edge.
-  Rgb<Lanes> at_vertex(const FilmPoint& seen, FaceRef face, const EdgeRef& edge, double t,
-                       uint32_t region, double probability, const Rng& key, RayCount& rays) const;
+  struct Drawn {
+    EdgeRef edge;
+    double t;
+    double probability;  // of the edge
+    FaceRef face;        // that the line meets
+    LampLine line;
+  };
+  std::optional<Drawn> draw(double u, Rng rng, RayCount& rays) const;
+  // The vertices before, at viewers that are not the camera.
+  void add_sample(const PathVertex& viewer, const Rng& key, TermCost& cost, Rgb<Lanes>& sum) const;
+  // What the drawn line adds for a path that comes along the ray with the throughput.
+  void add(const Drawn& drawn, const Vec3<Dual>& origin, const Vec3<Dual>& direction,
+           const Rgb<double>& throughput, double density, int bounces, const Rng& key,
+           SampleLog* log, TermCost& cost, Rgb<Lanes>& sum) const;
 
   const PathContext& context_;
   const EdgeSamplerInput& edges_;
@@ -174,60 +202,104 @@ void PenumbraTerm::weigh(const std::vector<double>& lengths, const std::vector<L
   }
 }
 
-bool PenumbraTerm::sample_film(double u, const Rng& key, RayCount& rays, FilmSample& sample) const {
+std::optional<PenumbraTerm::Drawn> PenumbraTerm::draw(double u, Rng rng, RayCount& rays) const {
   const double target = u * cumulative_.back();
   const auto found = std::upper_bound(cumulative_.begin(), cumulative_.end(), target);
   const size_t index = std::min<size_t>(found - cumulative_.begin(), listed_.size() - 1);
   const double below = index == 0 ? 0 : cumulative_[index - 1];
-  const double probability = (cumulative_[index] - below) / cumulative_.back();
   const auto [id, region] = listed_[index];
 
-  Rng rng = key.at(Purpose::kShadow, 0);
   const double t = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
   const EdgeMesh& mesh = edges_.object(id.object);
   const auto& ends = mesh.edge(id.edge).vertices;
   const Vec3d e = mesh.position(ends[0]) * (1 - t) + mesh.position(ends[1]) * t;
   const auto omega = regions_.draw_direction(region, e, u1, u2);
-  if (!omega) return false;
+  if (!omega) return {};
   Ray ray{e, -*omega};
   ray.skip_faces = mesh.faces_around(id.edge);
   Hit hit;
   ++rays.closest;
-  if (!context_.tracer.closest(ray, hit)) return false;
-  for (const FaceRef face : ray.skip_faces) {
-    if (face == hit.face) return false;
-  }
+  if (!context_.tracer.closest(ray, hit)) return {};
   const auto corners =
       face_corners<double>(context_.scene.shape(hit.face.shape).mesh, hit.face.face);
-  const Vec3d n = cross(corners[1] - corners[0], corners[2] - corners[0]);
-  const Vec3d x = e - *omega * (dot(n, e - corners[0]) / dot(n, *omega));
-  const auto seen = film_point(context_.scene, hit.face, x);
-  if (!seen) return false;
-  const double density =
-      film_density_through(context_.scene.camera, regions_, region, e, x, normalize(n));
-  if (!is_thin(density) || is_hidden(context_, *seen, hit.face, rays)) return false;
-  sample.x = seen->x;
-  sample.y = seen->y;
-  sample.value = at_vertex(*seen, hit.face, id, t, region, probability * density, key, rays);
-  return !is_zero(sample.value.r) || !is_zero(sample.value.g) || !is_zero(sample.value.b);
+  const Vec3d n = normalize(cross(corners[1] - corners[0], corners[2] - corners[0]));
+  // More exactly than the ray's floats.
+  const Vec3d p = e - *omega * (dot(n, e - corners[0]) / dot(n, *omega));
+  return Drawn{
+      id, t, (cumulative_[index] - below) / cumulative_.back(), hit.face, {region, e, p, n}};
 }
 
-Rgb<Lanes> PenumbraTerm::at_vertex(const FilmPoint& seen, FaceRef face, const EdgeRef& edge,
-                                   double t, uint32_t region, double probability, const Rng& key,
-                                   RayCount& rays) const {
-  const Scene& scene = context_.scene;
-  const auto surface = surface_on_ray<Dual>(scene, face, seen.ray.origin, seen.ray.direction);
-  const Scattering<Dual> scattering(surface, -seen.ray.direction, scene.shading);
-  if (scattering.black()) return {};
-  const Rgb<double> all = grey(1.0);
-  const PathVertex vertex{surface, scattering, all, {}, 0, key};
+bool PenumbraTerm::sample_film(double u, const Rng& key, RayCount& rays, FilmSample& sample) const {
+  const auto drawn = draw(u, key.at(Purpose::kShadow, 0), rays);
+  if (!drawn) return false;
+  const auto seen = film_point(context_.scene, drawn->face, drawn->line.p);
+  if (!seen || !is_thin(context_.scene.camera, regions_, drawn->line, {}, 0)) return false;
+  if (is_hidden(context_, *seen, drawn->face, rays)) return false;
+  const Vec3d q = value(seen->ray.origin);
+  const double density = density_seen(regions_, drawn->line, q) /
+                         film_per_solid_angle(context_.scene.camera, seen->omega);
   TermCost cost;
   Rgb<Lanes> sum;
-  add_edge_point(context_, edges_.object(edge.object), vertex, query_at(vertex),
-                 {edge, t, probability, 1}, {&regions_, region}, key, cost, sum);
+  add(*drawn, seen->ray.origin, seen->ray.direction, grey(1.0), density, 0, key, nullptr, cost,
+      sum);
   rays.closest += cost.rays - cost.shadow_rays;
   rays.shadow += cost.shadow_rays;
-  return sum;
+  sample = {seen->x, seen->y, sum};
+  return cost.counted > 0;
+}
+
+void PenumbraTerm::add_sample(const PathVertex& viewer, const Rng& key, TermCost& cost,
+                              Rgb<Lanes>& sum) const {
+  ++cost.samples;
+  RayCount rays;
+  Rng rng = key.at(Purpose::kShadow, viewer.bounces);
+  const double u = rng.uniform();
+  const auto drawn = draw(u, rng, rays);
+  cost.add(rays);
+  if (!drawn) {
+    ++cost.no_edge;
+    return;
+  }
+  const Vec3d q = value(viewer.surface.p);
+  const Vec3d to = drawn->line.p - q;
+  const double distance = length(to);
+  const bool apart = distance > 0 && drawn->face != viewer.surface.face;
+  const Vec3d omega = apart ? to / distance : Vec3d{};
+  const double pdf = apart ? viewer.scattering.pdf_solid_angle(omega) : 0;
+  const Rgb<double> f = pdf > 0 ? value(viewer.scattering.eval(omega)) : Rgb<double>{};
+  const int bounces = viewer.bounces + 1;
+  if (is_black(f) || !is_thin(context_.scene.camera, regions_, drawn->line, {q, pdf}, bounces)) {
+    ++cost.zero_weight;
+    return;
+  }
+  Ray ray{q, omega};
+  ray.start = viewer.surface.face;
+  ray.skip_faces = {&drawn->face, 1};
+  ray.t_max = distance * (1 - 0x1p-20);  // as shadow rays end
+  cost.add(RayCount{0, 1});
+  if (context_.tracer.occluded(ray)) {
+    ++cost.occluded;
+    return;
+  }
+  if (viewer.log) {
+    viewer.log->push_back(fmt::format(
+        "  penumbra on face {} of shape {}:", drawn->face.face.index(), drawn->face.shape.index()));
+  }
+  add(*drawn, viewer.surface.p, DirectionMotion{viewer.turn}.moving(omega), viewer.throughput * f,
+      density_seen(regions_, drawn->line, q), bounces, key, viewer.log, cost, sum);
+}
+
+void PenumbraTerm::add(const Drawn& drawn, const Vec3<Dual>& origin, const Vec3<Dual>& direction,
+                       const Rgb<double>& throughput, double density, int bounces, const Rng& key,
+                       SampleLog* log, TermCost& cost, Rgb<Lanes>& sum) const {
+  const Scene& scene = context_.scene;
+  const auto surface = surface_on_ray<Dual>(scene, drawn.face, origin, direction);
+  const Scattering<Dual> scattering(surface, -direction, scene.shading);
+  if (scattering.black()) return;
+  const PathVertex vertex{surface, scattering, throughput, {}, bounces, {}, key, log};
+  add_edge_point(context_, edges_.object(drawn.edge.object), vertex, query_at(vertex),
+                 {drawn.edge, drawn.t, drawn.probability * density, 1},
+                 {&regions_, drawn.line.region}, key, cost, sum);
 }
 
 }  // namespace

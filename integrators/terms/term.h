@@ -25,6 +25,7 @@ struct PathVertex {
   const Rgb<double>& throughput;  // of the path up to here
   Vec3<Lanes> turn;               // angular velocity of directions here, see direction_field.h
   int bounces;                    // how often it has scattered before
+  PathStep step;                  // how it came here
   const Rng& key;                 // of the path
   SampleLog* log = nullptr;       // null unless somebody reads it
 };

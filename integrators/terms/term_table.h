@@ -28,8 +28,8 @@ inline constexpr TermType kTermTypes[] = {
      make_shadow_term},
     {"direct", "silhouettes that shading points see before lamps and the sun", 1, false, true, true,
      0, LightRegions::any_in, true, make_direct_term},
-    {"penumbra", "of these, what has a thin penumbra on the film", kLeastFilmSamples, false, true,
-     false, 2, LightRegions::any_in, true, make_penumbra_term},
+    {"penumbra", "of these, what has a thin penumbra", 1, false, true, true, 2,
+     LightRegions::any_in, true, make_penumbra_term},
 };
 
 }  // namespace limn

@@ -229,7 +229,7 @@ TEST_P(ExactDirectOf, IsWhatIsDrawn) {
         const Rgb<double> one = grey(1.0);
         TermCost cost;
         Rgb<Lanes> sum;
-        world.term->add_at_vertex({surface, scattering, one, {}, 0, key}, 1, cost, sum);
+        world.term->add_at_vertex({surface, scattering, one, {}, 1, {}, key}, 1, cost, sum);
         values[r] = sum.g[0];
         mean += values[r] / kRepeats;
       }
