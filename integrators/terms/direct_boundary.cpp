@@ -25,6 +25,10 @@ constexpr int kPoints = 4;
 // What a list costs per point, in the unit of Term::work: timed as 0.2 (the sun), 1.0 (soft shadow),
 // 1.9 (CAD part), 3.3 (plant), 3.5 (four lamps), against draws of the forest.
 constexpr double kListCost = 1;
+// Lamps are small below this angle [rad], and have few sides up to this number. Not tuned.
+constexpr double kSmall = 0.1;
+constexpr int kMostSides = 8;
+
 struct Drawn {
   uint32_t region;
   EdgePiece piece;
@@ -47,7 +51,19 @@ class DirectTerm final : public Term {
   }
 
  private:
-  void list(const EdgeQuery& query, std::vector<Drawn>& drawn) const;
+  struct Lists {
+    std::vector<Drawn> others;
+    std::vector<Drawn> outlines;  // of small lamps, one lamp after the other
+    void clear() { others.clear(), outlines.clear(); }
+  };
+  void list(const EdgeQuery& query, Lists& lists) const;
+  void add_drawn(const PathVertex& vertex, const EdgeQuery& query, int samples,
+                 const std::vector<Drawn>& drawn, TermCost& cost, Rgb<Lanes>& sum) const;
+  // Pieces [begin, end).
+  void add_outline(const PathVertex& vertex, const EdgeQuery& query, int sample, const Drawn* begin,
+                   const Drawn* end, TermCost& cost, Rgb<Lanes>& sum) const;
+  // Whether the edge is a side of the lamp itself.
+  bool is_own_edge(uint32_t region, EdgeRef edge) const;
   bool is_elsewhere(const PathVertex& vertex, const EdgeMesh& mesh, const EdgeSample& sample,
                     uint32_t region) const;
   void add_point(const PathVertex& vertex, const EdgeQuery& query, const Drawn& drawn, double u,
@@ -59,10 +75,12 @@ class DirectTerm final : public Term {
   const LightRegions& regions_;
 };
 
-void DirectTerm::list(const EdgeQuery& query, std::vector<Drawn>& drawn) const {
+void DirectTerm::list(const EdgeQuery& query, Lists& lists) const {
   static thread_local std::vector<ListedEdge> listed;
   static thread_local std::vector<EdgePiece> pieces;
-  double sum = 0;
+  const auto append = [](std::vector<Drawn>& to, uint32_t k, const EdgePiece& piece, double light) {
+    to.push_back({k, piece, (to.empty() ? 0 : to.back().sum) + piece.weight * light});
+  };
   for (uint32_t k = 0; k < regions_.size(); ++k) {
     const std::optional<DirectionCone> cone = regions_.cone(k, query.p, query.n);
     if (!cone) continue;
@@ -70,26 +88,47 @@ void DirectTerm::list(const EdgeQuery& query, std::vector<Drawn>& drawn) const {
     pieces.clear();
     sampler_.list_outlines(query, *cone, listed);
     cut_edges(edges_, query, *cone, listed, pieces);
+    const bool small = regions_.shape(k).valid() &&
+                       regions_.hull(k).radius < kSmall * length(regions_.hull(k).center - query.p);
     for (const EdgePiece& piece : pieces) {
-      sum += piece.weight * regions_.luminance(k);
-      drawn.push_back({k, piece, sum});
+      const bool own = small && is_own_edge(k, piece.edge);
+      append(own ? lists.outlines : lists.others, k, piece, regions_.luminance(k));
     }
   }
 }
 
+bool DirectTerm::is_own_edge(uint32_t region, EdgeRef edge) const {
+  const auto faces = edges_.object(edge.object).faces_around(edge.edge);
+  return std::any_of(faces.begin(), faces.end(),
+                     [&](FaceRef face) { return face.shape == regions_.shape(region); });
+}
+
 void DirectTerm::add_at_vertex(const PathVertex& vertex, int samples, TermCost& cost,
                                Rgb<Lanes>& sum) const {
-  static thread_local std::vector<Drawn> drawn;
-  drawn.clear();
+  static thread_local Lists lists;
+  lists.clear();
   const EdgeQuery query = query_at(vertex);
-  list(query, drawn);
+  list(query, lists);
+  if (vertex.log) {
+    vertex.log->push_back(fmt::format("  direct: {} pieces of silhouettes before {} regions",
+                                      lists.others.size() + lists.outlines.size(),
+                                      regions_.size()));
+  }
+  add_drawn(vertex, query, samples, lists.others, cost, sum);
+  const auto& outlines = lists.outlines;
+  for (size_t begin = 0, end = 0; begin < outlines.size(); begin = end) {
+    while (end < outlines.size() && outlines[end].region == outlines[begin].region) ++end;
+    for (int i = 0; i < samples; ++i) {
+      add_outline(vertex, query, i, &outlines[begin], &outlines[begin] + (end - begin), cost, sum);
+    }
+  }
+}
+
+void DirectTerm::add_drawn(const PathVertex& vertex, const EdgeQuery& query, int samples,
+                           const std::vector<Drawn>& drawn, TermCost& cost, Rgb<Lanes>& sum) const {
   const int points = kPoints * samples;
   cost.samples += static_cast<uint64_t>(points);
   const double total = drawn.empty() ? 0 : drawn.back().sum;
-  if (vertex.log) {
-    vertex.log->push_back(fmt::format("  direct: {} pieces of silhouettes before {} regions",
-                                      drawn.size(), regions_.size()));
-  }
   if (!(total > 0)) {
     cost.no_edge += static_cast<uint64_t>(points);
     return;
@@ -103,6 +142,34 @@ void DirectTerm::add_at_vertex(const PathVertex& vertex, int samples, TermCost& 
     const double before = i == 0 ? 0 : drawn[i - 1].sum, weight = drawn[i].sum - before;
     const double u = std::clamp((target - before) / weight, 0.0, 1.0);
     add_point(vertex, query, drawn[i], u, weight / total * kPoints, cost, sum);
+  }
+}
+
+// What the sides of a small lamp add cancels but for its size: none of them is left out, and all are
+// met at the same place. Of many, each is met as often as it weighs.
+void DirectTerm::add_outline(const PathVertex& vertex, const EdgeQuery& query, int sample,
+                             const Drawn* begin, const Drawn* end, TermCost& cost,
+                             Rgb<Lanes>& sum) const {
+  Rng rng = vertex.key.copy(Purpose::kDirectCopy, sample + 1).at(Purpose::kDirect, vertex.bounces);
+  const double u = rng.uniform();
+  if (end - begin <= kMostSides) {
+    cost.samples += static_cast<uint64_t>(end - begin);
+    for (const Drawn* piece = begin; piece != end; ++piece) {
+      add_point(vertex, query, *piece, u, 1, cost, sum);
+    }
+    return;
+  }
+  cost.samples += kMostSides;
+  const double first = begin->sum - begin->piece.weight * regions_.luminance(begin->region);
+  const double total = (end - 1)->sum - first;
+  const Drawn* piece = begin;
+  for (int j = 0; j < kMostSides; ++j) {
+    const double target = first + (j + u) / kMostSides * total;
+    while (piece + 1 != end && piece->sum <= target) ++piece;
+    const double before = piece == begin ? first : (piece - 1)->sum;
+    const double weight = piece->sum - before;
+    const double place = std::clamp((target - before) / weight, 0.0, 1.0);
+    add_point(vertex, query, *piece, place, weight / total * kMostSides, cost, sum);
   }
 }
 

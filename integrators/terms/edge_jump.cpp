@@ -1,6 +1,8 @@
 // The jump of radiance across an edge: which faces lie on either side, and a path from each.
 #include "integrators/terms/edge_jump.h"
 
+#include <algorithm>
+
 namespace limn {
 
 bool view_edge(const EdgeMesh& mesh, EdgeRef id, double t, const Vec3d& p, EdgeView& view) {
@@ -72,6 +74,11 @@ bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView&
   ray.start = start;
   const FacesAround around = mesh.around(view.id.edge);
   ray.skip_faces = around.faces;
+  if (part.region) {
+    const auto lamp = part.regions->flat_faces(*part.region);
+    const auto is_of_lamp = [&](FaceRef f) { return !lamp.empty() && f.shape == lamp[0].shape; };
+    if (std::all_of(around.faces.begin(), around.faces.end(), is_of_lamp)) ray.skip_faces = lamp;
+  }
   ray.skip_emitters = bounces == 0 && context.scene.hide_emitters;
   Hit behind;
   ++rays.closest;

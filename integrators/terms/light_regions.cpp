@@ -212,13 +212,22 @@ LightRegions::LightRegions(const Scene& scene) : scene_(scene) {
     const Shape& shape = scene.shapes[s];
     if (!shape.is_emitter) continue;
     const double mean = limn::luminance(value(shape.radiance));
-    regions_.push_back({ShapeId(s), mean, make_lamp_hull(shape.mesh, scene.shading), {}});
+    Region& region = regions_.emplace_back();
+    region.shape = ShapeId(s);
+    region.luminance = mean;
+    region.hull = make_lamp_hull(shape.mesh, scene.shading);
+    if (!region.hull.flat || shape.mesh.faces.size() > kFewFaces) continue;
+    for (uint32_t f = 0; f < shape.mesh.faces.size(); ++f) {
+      region.flat_faces.push_back({region.shape, FaceId(f)});
+    }
   }
   hold_all_ = !scene.environment;
   leave_out_dim_lamps();
   if (!scene.environment) return;
   for (const BrightPatch& patch : find_bright_patches(*scene.environment)) {
-    regions_.push_back({{}, patch.luminance, {}, patch.cap});
+    Region& region = regions_.emplace_back();
+    region.luminance = patch.luminance;
+    region.cap = patch.cap;
   }
 }
 

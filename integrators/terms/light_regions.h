@@ -62,6 +62,9 @@ class LightRegions {
   // The shape of a lamp; none of a patch.
   ShapeId shape(size_t k) const { return regions_[k].shape; }
   const LampHull& hull(size_t k) const { return regions_[k].hull; }
+  // All faces of a flat lamp of few: a line meets one of them at most, also where rounding lets rays
+  // meet neighbours. Else empty.
+  std::span<const FaceRef> flat_faces(size_t k) const { return regions_[k].flat_faces; }
   const DirectionCap& cap(size_t k) const { return regions_[k].cap; }
 
   // What a surface emits towards the unit direction wi as part of region k.
@@ -81,6 +84,7 @@ class LightRegions {
     double luminance;
     LampHull hull;
     DirectionCap cap;
+    std::vector<FaceRef> flat_faces;
     bool lists_thin = true;
   };
   // Edges before lamps are listed: no more than for the lamps with the most light.
