@@ -41,7 +41,8 @@ class DirectTerm final : public Term {
       : context_(input.context),
         edges_(input.edges()),
         sampler_(input.edge_sampler()),
-        regions_(*input.regions()) {}
+        regions_(*input.regions()),
+        lamp_edges_(*input.lamp_edges()) {}
 
   bool uses_vertices() const override { return true; }
   void add_at_vertex(const PathVertex& vertex, int samples, TermCost& cost,
@@ -64,8 +65,8 @@ class DirectTerm final : public Term {
                    const Drawn* end, TermCost& cost, Rgb<Lanes>& sum) const;
   // Whether the edge is a side of the lamp itself.
   bool is_own_edge(uint32_t region, EdgeRef edge) const;
-  bool is_elsewhere(const PathVertex& vertex, const EdgeMesh& mesh, const EdgeSample& sample,
-                    uint32_t region) const;
+  double own_share(const PathVertex& vertex, const EdgeMesh& mesh, const EdgeSample& sample,
+                   uint32_t region) const;
   void add_point(const PathVertex& vertex, const EdgeQuery& query, const Drawn& drawn, double u,
                  double times, TermCost& cost, Rgb<Lanes>& sum) const;
 
@@ -73,6 +74,7 @@ class DirectTerm final : public Term {
   const EdgeSamplerInput& edges_;
   const EdgeSampler& sampler_;
   const LightRegions& regions_;
+  const LampEdges& lamp_edges_;
 };
 
 void DirectTerm::list(const EdgeQuery& query, Lists& lists) const {
@@ -173,14 +175,15 @@ void DirectTerm::add_outline(const PathVertex& vertex, const EdgeQuery& query, i
   }
 }
 
-// Whether `penumbra` adds what the edge does at the vertex, but for what turning directions change.
-bool DirectTerm::is_elsewhere(const PathVertex& vertex, const EdgeMesh& mesh,
-                              const EdgeSample& sample, uint32_t region) const {
+// Of what the edge adds at the vertex, but for what turning directions change.
+double DirectTerm::own_share(const PathVertex& vertex, const EdgeMesh& mesh,
+                             const EdgeSample& sample, uint32_t region) const {
   const auto& ends = mesh.edge(sample.edge.edge).vertices;
   const Vec3d e = mesh.position(ends[0]) * (1 - sample.t) + mesh.position(ends[1]) * sample.t;
-  const LampLine line{region, e, value(vertex.surface.p), vertex.surface.n_g};
-  return is_thin(context_.scene.camera, regions_, line, vertex.step, vertex.bounces) &&
-         may_be_thin(regions_, region, mesh.faces_around(sample.edge.edge));
+  const LampLine line{region, sample.edge, e, value(vertex.surface.p), vertex.surface.n_g};
+  return 1 - penumbra_share(context_.scene, edges_, regions_, lamp_edges_, line, vertex.step,
+                            vertex.bounces)
+                 .share;
 }
 
 // times: how often the piece is drawn, on average, for one sample.
@@ -189,10 +192,8 @@ void DirectTerm::add_point(const PathVertex& vertex, const EdgeQuery& query, con
   const auto [t, density] = drawn.piece.place(u);
   const EdgeSample sample{drawn.piece.edge, t, density, times};
   const EdgeMesh& mesh = edges_.object(sample.edge.object);
-  const EdgeMotion motion =
-      is_elsewhere(vertex, mesh, sample, drawn.region) ? EdgeMotion::kTurn : EdgeMotion::kAll;
   add_edge_point(context_, mesh, vertex, query, sample, {&regions_, drawn.region}, vertex.key, cost,
-                 sum, motion);
+                 sum, own_share(vertex, mesh, sample, drawn.region));
 }
 
 }  // namespace

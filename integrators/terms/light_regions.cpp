@@ -238,7 +238,7 @@ void LightRegions::leave_out_dim_lamps() {
   std::vector<double> lights;
   for (const Region& region : regions_) lights.push_back(light(region));
   std::nth_element(lights.begin(), lights.begin() + kMost, lights.end(), std::greater<>());
-  for (Region& region : regions_) region.lists_thin = light(region) > lights[kMost];
+  for (Region& region : regions_) region.lists_edges = light(region) > lights[kMost];
 }
 
 bool LightRegions::any_in(const Scene& scene) {

@@ -57,8 +57,8 @@ class LightRegions {
   // Its density [1/sr] at the unit direction w; zero where it is never drawn: behind a flat lamp,
   // inside the sphere around others.
   double direction_pdf(size_t k, const Vec3d& x, const Vec3d& w) const;
-  // Whether its penumbras may be thin, see penumbra.h.
-  bool lists_thin(size_t k) const { return regions_[k].lists_thin; }
+  // Whether edges before it are listed, see penumbra.h: not before all of many lamps.
+  bool lists_edges(size_t k) const { return regions_[k].lists_edges; }
   // The shape of a lamp; none of a patch.
   ShapeId shape(size_t k) const { return regions_[k].shape; }
   const LampHull& hull(size_t k) const { return regions_[k].hull; }
@@ -85,9 +85,8 @@ class LightRegions {
     LampHull hull;
     DirectionCap cap;
     std::vector<FaceRef> flat_faces;
-    bool lists_thin = true;
+    bool lists_edges = true;
   };
-  // Edges before lamps are listed: no more than for the lamps with the most light.
   void leave_out_dim_lamps();
   // The cap of directions from x that holds region k, unless that is a flat lamp.
   std::optional<DirectionCap> cap_around(const Region& region, const Vec3d& x) const;

@@ -1,40 +1,87 @@
 #pragma once
 // Thin penumbras. In the shadow of an edge before a small lamp, or close behind an edge, the place
 // where the edge cuts into the lamp is small, and what the edge adds there is as large: samples of
-// pixels and of directions meet it ever more rarely. So what `direct` holds at a vertex p of a path is
-// split. Projected through a point of the edge onto the surface at p, the lamp covers some solid angle
-// as seen from the viewer q of p, the camera or the vertex before. Where a path from q meets that by
-// few chances, the penumbra is thin, and `penumbra` finds the same contribution from the other end,
-// along lines from the lamp through the edge (penumbra_boundary.cpp).
+// pixels and of directions meet it ever more rarely. So what `direct` holds is found from both ends:
+// `direct` itself lists edges at the vertices that paths come to; `penumbra` draws lines from a lamp
+// through a point of an edge to a vertex, and asks who sees that (penumbra_boundary.cpp). Each
+// contribution is shared between the two in proportion to how densely they are expected to meet it
+// (the balance heuristic; any shares that add up to one are right).
 #include <span>
+#include <vector>
 
-#include "integrators/terms/term.h"
-#include "limn/edgetree/edges.h"
+#include "integrators/terms/path.h"
+#include "limn/edgetree/edge_sampler.h"
 
 namespace limn {
 
-// Fewer paths than this of a pixel's, or of those that come to the vertex before, meet a penumbra
-// that is thin.
-inline constexpr double kThinPenumbra = 0.25;
+class LightRegions;
+
+// The edges that lines from regions of light may pass, with how likely each is drawn.
+class LampEdges {
+ public:
+  // All must outlive it. lanes: in use.
+  LampEdges(const Scene& scene, const EdgeSamplerInput& edges, const LightRegions& regions,
+            int lanes);
+
+  size_t size() const { return listed_.size(); }
+  struct Drawn {
+    EdgeRef edge;
+    uint32_t region;
+    double probability;
+  };
+  // u in [0, 1); there must be edges.
+  Drawn draw(double u) const;
+  // Of this edge before region k; 0 if lines from there never pass it: a lamp's own edges, and edges
+  // whose two faces all of the region sees from the same side.
+  double probability(size_t k, EdgeRef edge) const;
+
+ private:
+  // What is seen of a region from around the scene.
+  struct Sight {
+    bool infinite = false;
+    Vec3d v;            // center, or the direction towards it
+    double radius = 0;  // around the center; at infinity the sine of the angle
+    double light = 0;   // luminance times area; at infinity times solid angle
+    bool listed = false;
+  };
+  struct Weight {
+    double length = 0;  // times light
+    Lanes speed;        // of its shadow, per length
+  };
+  struct Listed {
+    EdgeRef edge;
+    uint32_t region;
+  };
+  Sight sight_of(const LightRegions& regions, size_t k) const;
+  std::optional<Weight> weigh(size_t k, EdgeRef edge) const;
+  double share_of(const Weight& weight) const;
+
+  const EdgeSamplerInput& edges_;
+  int lanes_;
+  double reach_ = 0;  // the scene's diagonal
+  std::vector<Sight> sights_;
+  std::vector<ShapeId> lamps_;  // of the regions; none of patches
+  std::vector<Listed> listed_;
+  std::vector<double> cumulative_;
+  double length_ = 0;  // of all weights
+  Lanes swept_;
+};
 
 // A line from region k through the point e of an edge that meets a surface of unit normal n at p.
 struct LampLine {
   size_t region;
+  EdgeRef edge;
   Vec3d e, p, n;
 };
 
-// If lines through e follow LightRegions::draw_direction, the density of p as seen from q [1/sr].
-// One over it is, up to the shape of the lamp, the solid angle that the lamp covers projected through
-// e. Zero if none comes there.
-double density_seen(const LightRegions& regions, const LampLine& line, const Vec3d& q);
-
-// Whether the penumbra around p is thin where a path has come by this step: by the density of
-// directions; for the camera, whose steps have none, by that of positions in one pixel.
-bool is_thin(const Camera& camera, const LightRegions& regions, const LampLine& line,
-             const PathStep& step, int bounces);
-
-// Whether penumbras of an edge with these faces around may be thin before region k: not a lamp's own,
-// which are its border and no occluders.
-bool may_be_thin(const LightRegions& regions, size_t k, std::span<const FaceRef> faces_around);
+struct PenumbraShare {
+  double density = 0;  // of p as seen from the vertex before [1/sr], if lines through e are drawn
+  double share = 0;    // of `penumbra`; the rest is that of `direct`
+};
+// step: how a path came to p, after how many bounces: by the density of directions, or of positions
+// in a pixel if it comes from the camera.
+PenumbraShare penumbra_share(const Scene& scene, const EdgeSamplerInput& edges,
+                             const LightRegions& regions, const LampEdges& lamp_edges,
+                             const LampLine& line, const PathStep& step, int bounces);
 
 }  // namespace limn

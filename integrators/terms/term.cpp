@@ -29,6 +29,15 @@ const LightRegions* TermInput::regions() {
   return regions_.get();
 }
 
+const LampEdges* TermInput::lamp_edges() {
+  if (!lamp_edges_ && regions()) {
+    const Stopwatch watch;
+    lamp_edges_ = std::make_unique<LampEdges>(context.scene, edges(), *regions_, lanes);
+    edges_seconds_ += watch.seconds();
+  }
+  return lamp_edges_.get();
+}
+
 const EdgeSampler& TermInput::edge_sampler() {
   if (edge_sampler_) return *edge_sampler_;
   edges();

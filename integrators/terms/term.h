@@ -12,6 +12,7 @@
 #include "integrators/estimates/sample_estimator.h"
 #include "integrators/terms/light_regions.h"
 #include "integrators/terms/path.h"
+#include "integrators/terms/penumbra.h"
 #include "limn/core/dual.h"
 #include "limn/edgetree/edge_sampler_types.h"
 #include "limn/integrators/gradient.h"
@@ -84,6 +85,8 @@ class TermInput {
   const EdgeSamplerInput& edges();
   // The regions of light; null if the sampler has none apart, or the scene has none.
   const LightRegions* regions();
+  // The edges before them; null if there are no regions.
+  const LampEdges* lamp_edges();
   // What shading points choose edges by, shared by all terms. Made when a term first asks.
   const EdgeSampler& edge_sampler();
   double edge_sampler_seconds() const { return edge_sampler_seconds_; }
@@ -94,6 +97,7 @@ class TermInput {
  private:
   std::unique_ptr<EdgeSamplerInput> edges_;
   std::unique_ptr<LightRegions> regions_;
+  std::unique_ptr<LampEdges> lamp_edges_;
   std::unique_ptr<EdgeSampler> edge_sampler_;
   double edges_seconds_ = 0, edge_sampler_seconds_ = 0;
 };

@@ -22,15 +22,13 @@ EdgeQuery query_at(const PathVertex& vertex) {
 
 void add_edge_point(const PathContext& context, const EdgeMesh& mesh, const PathVertex& vertex,
                     const EdgeQuery& query, const EdgeSample& sample, const RadiancePart& part,
-                    const Rng& key, TermCost& cost, Rgb<Lanes>& sum, EdgeMotion motion) {
+                    const Rng& key, TermCost& cost, Rgb<Lanes>& sum, double share) {
   EdgeView view;
   const bool seen = view_edge(mesh, sample.edge, sample.t, query.p, view);
   const auto [a, b] = mesh.edge(sample.edge.edge).vertices;
-  Vec3<Lanes> v = cross(query.turn, view.y - query.p) * -1.0;
-  if (motion == EdgeMotion::kAll) {
-    v = relative_velocity(mesh, a, query) * (1 - sample.t) +
-        relative_velocity(mesh, b, query) * sample.t;
-  }
+  Vec3<Lanes> v = relative_velocity(mesh, a, query) * (1 - sample.t) +
+                  relative_velocity(mesh, b, query) * sample.t;
+  if (share != 1) v = v * share - cross(query.turn, view.y - query.p) * (1 - share);
   const Lanes weight =
       (v.x * view.side.x + v.y * view.side.y + v.z * view.side.z) *
       (1 / (view.distance * view.distance * view.distance * sample.probability * sample.pdf_t));

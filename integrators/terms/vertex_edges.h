@@ -10,14 +10,10 @@ EdgeQuery query_at(const PathVertex& vertex);
 
 // Adds what a point on an edge contributes to the boundary integral at a vertex, over its density:
 // throughput dL(t) f_s det(w_0, w_1, v) / |w|^3 / (probability pdf_t). part: of the radiance; key:
-// of the path and the sample; motion: of v. Books rays and what became of the sample on `cost`.
-enum class EdgeMotion {
-  kAll,   // of the edge against p and against directions that turn
-  kTurn,  // against these alone
-};
+// of the path and the sample; share: of what v is while directions are held. Books rays and what
+// became of the sample on `cost`.
 void add_edge_point(const PathContext& context, const EdgeMesh& mesh, const PathVertex& vertex,
                     const EdgeQuery& query, const EdgeSample& sample, const RadiancePart& part,
-                    const Rng& key, TermCost& cost, Rgb<Lanes>& sum,
-                    EdgeMotion motion = EdgeMotion::kAll);
+                    const Rng& key, TermCost& cost, Rgb<Lanes>& sum, double share = 1);
 
 }  // namespace limn

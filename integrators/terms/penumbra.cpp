@@ -1,0 +1,162 @@
+// Which edges lines from lamps pass, and who finds what they add.
+#include "integrators/terms/penumbra.h"
+
+#include <algorithm>
+
+#include "integrators/terms/film_point.h"
+#include "integrators/terms/light_regions.h"
+#include "limn/core/bounds.h"
+
+namespace limn {
+
+LampEdges::LampEdges(const Scene& scene, const EdgeSamplerInput& edges, const LightRegions& regions,
+                     int lanes)
+    : edges_(edges), lanes_(lanes) {
+  Bounds bounds;
+  for (const Shape& shape : scene.shapes) {
+    const Bounds b = bounds_of(shape.mesh);
+    bounds.extend(b.lower);
+    bounds.extend(b.upper);
+  }
+  reach_ = bounds.diagonal();
+  std::vector<Weight> weights;
+  for (size_t k = 0; k < regions.size(); ++k) {
+    sights_.push_back(sight_of(regions, k));
+    lamps_.push_back(regions.shape(k));
+    if (!sights_.back().listed) continue;
+    for (uint32_t o = 0; o < edges_.objects.size(); ++o) {
+      for (uint32_t e = 0; e < edges_.objects[o].edges.size(); ++e) {
+        const EdgeRef edge{ShapeId(o), EdgeId(e)};
+        const auto weight = weigh(k, edge);
+        if (!weight) continue;
+        listed_.push_back({edge, static_cast<uint32_t>(k)});
+        weights.push_back(*weight);
+        length_ += weight->length;
+        swept_ += weight->speed * weight->length;
+      }
+    }
+  }
+  double sum = 0;
+  for (const Weight& weight : weights) cumulative_.push_back(sum += share_of(weight));
+}
+
+LampEdges::Sight LampEdges::sight_of(const LightRegions& regions, size_t k) const {
+  Sight sight;
+  sight.listed = regions.lists_edges(k);
+  if (regions.shape(k).valid()) {
+    const LampHull& hull = regions.hull(k);
+    sight.v = hull.center;
+    sight.radius = hull.radius;
+    sight.light = regions.luminance(k) * hull.area;
+  } else {
+    const DirectionCap& cap = regions.cap(k);
+    sight.infinite = true;
+    sight.v = cap.axis;
+    sight.radius = cap.sine;
+    sight.light = regions.luminance(k) * cap.sine * cap.sine * kPi;
+  }
+  sight.listed = sight.listed && sight.radius > 0 && sight.light > 0;
+  return sight;
+}
+
+std::optional<LampEdges::Weight> LampEdges::weigh(size_t k, EdgeRef id) const {
+  const Sight& sight = sights_[k];
+  const EdgeMesh& mesh = edges_.object(id.object);
+  const Edge& edge = mesh.edge(id.edge);
+  // The side of a plane that all of the region is on; 0 if there is none.
+  const auto side_of = [&](const Plane& plane) {
+    const double d = sight.infinite ? dot(plane.n, sight.v) : plane.distance(sight.v);
+    const double slack = sight.radius * (1 + 1e-6) + (sight.infinite ? 1e-12 : 0);
+    return d > slack ? 1 : d < -slack ? -1 : 0;
+  };
+  const EdgeClass kind = edge.edge_class;
+  if (kind == EdgeClass::kSmooth || kind == EdgeClass::kSharp || kind == EdgeClass::kFlat) {
+    const int side = side_of(mesh.plane(edge.faces[0]));
+    if (side != 0 && side == side_of(mesh.plane(edge.faces[1]))) return {};
+  }
+  for (const FaceRef face : mesh.faces_around(id.edge)) {
+    if (face.shape == lamps_[k]) return {};
+  }
+  const Vec3d x0 = mesh.position(edge.vertices[0]), x1 = mesh.position(edge.vertices[1]);
+  const double edge_length = length(x1 - x0);
+  const Vec3d w = sight.infinite ? sight.v * reach_ : 0.5 * (x0 + x1) - sight.v;
+  const double distance = std::max(length(w), sight.infinite ? 0.0 : sight.radius);
+  Weight weight;
+  weight.length = sight.light * edge_length / (distance + edge_length);
+  if (!sight.infinite) weight.length /= distance * distance;
+  if (!(weight.length > 0)) return {};
+  const Vec3d normal = cross(w, x1 - x0);
+  const double size = length(normal);
+  if (mesh.tangents.empty() || !(size > 0)) return weight;
+  for (const VertexId end : edge.vertices) {
+    const Vec3<Lanes>& v = mesh.tangent(end);
+    const Lanes across = v.x * normal.x + v.y * normal.y + v.z * normal.z;
+    for (int lane = 0; lane < lanes_; ++lane) {
+      weight.speed[lane] =
+          std::max(weight.speed[lane], std::fabs(across[lane]) / (size * distance));
+    }
+  }
+  return weight;
+}
+
+// As for the edges of sharp shadows: half of the lines follow length times speed, half length alone,
+// since a surface or a camera that moves makes all edges count. Not tuned.
+double LampEdges::share_of(const Weight& weight) const {
+  const double own = weight.length / length_;
+  double share = 0;
+  for (int k = 0; k < lanes_; ++k) {
+    share += own + (swept_[k] > 0 ? weight.speed[k] * weight.length / swept_[k] : own);
+  }
+  return share / (2 * lanes_);
+}
+
+LampEdges::Drawn LampEdges::draw(double u) const {
+  const auto found =
+      std::upper_bound(cumulative_.begin(), cumulative_.end(), u * cumulative_.back());
+  const size_t i = std::min<size_t>(found - cumulative_.begin(), listed_.size() - 1);
+  return {listed_[i].edge, listed_[i].region, probability(listed_[i].region, listed_[i].edge)};
+}
+
+double LampEdges::probability(size_t k, EdgeRef edge) const {
+  if (!sights_[k].listed) return 0;
+  const auto weight = weigh(k, edge);
+  return weight ? share_of(*weight) : 0;
+}
+
+PenumbraShare penumbra_share(const Scene& scene, const EdgeSamplerInput& edges,
+                             const LightRegions& regions, const LampEdges& lamp_edges,
+                             const LampLine& line, const PathStep& step, int bounces) {
+  if (bounces > 0 && !(step.pdf > 0)) return {};
+  const double probability = lamp_edges.probability(line.region, line.edge);
+  const Vec3d through = line.e - line.p;
+  const double behind = length(through);
+  if (!(probability > 0 && behind > 0)) return {};
+  const Vec3d omega = through / behind;
+  const double pdf = regions.direction_pdf(line.region, line.e, omega);
+  if (!(pdf > 0)) return {};
+
+  const Vec3d q = bounces == 0 ? value(scene.camera.origin) : step.from;
+  const Vec3d sight = line.p - q;
+  const double distance = length(sight);
+  const double seen = std::fabs(dot(line.n, sight)) / (distance * distance * distance);
+  PenumbraShare result;
+  result.density = pdf * std::fabs(dot(line.n, omega)) / (behind * behind * seen);
+
+  // Per sample of a pixel, each way: how many of its points lie here, per length of the edge. Lines
+  // are drawn for the whole film; at p, four points on the edges that cross a lamp that is seen
+  // beside e with a width of |p - e| / sqrt(pdf), or less.
+  double lines = probability * result.density, points = step.pdf;
+  if (bounces == 0) {
+    const double pixels = static_cast<double>(scene.film.crop_width) * scene.film.crop_height;
+    lines *= pixels / film_per_solid_angle(scene.camera, sight / distance);
+    points = 1;
+  }
+  const auto& ends = edges.object(line.edge.object).edge(line.edge.edge).vertices;
+  const EdgeMesh& mesh = edges.object(line.edge.object);
+  lines /= length(mesh.position(ends[1]) - mesh.position(ends[0]));
+  points *= 4 * std::sqrt(pdf) / behind;
+  result.share = std::isfinite(lines) ? lines / (lines + points) : 0;
+  return result;
+}
+
+}  // namespace limn
