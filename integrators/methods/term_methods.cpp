@@ -314,7 +314,10 @@ class TermJob {
           means[t] = pilot.film_variance[t][lane];
         } else {
           cells[t] = fit.variances.empty() ? pilot.variances(t, lane) : fit.variances[t];
-          means[t] = trimmed_mean(cells[t]);
+          // Some terms have samples of both kinds.
+          const double film = pilot.film_variance[t][lane];
+          means[t] = trimmed_mean(cells[t]) + film;
+          for (double& cell : cells[t]) cell += film;
         }
         sum += means[t];
       }
