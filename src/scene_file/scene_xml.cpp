@@ -73,9 +73,11 @@ class SceneBuilder {
     }
     DescribedProperties p(object, description_, make_nested_);
     const int64_t depth = p.integer("max_depth", -1);
-    if (depth < -1 || depth > INT32_MAX) p.fail("max_depth", "must be -1 (no limit) or 0 and more");
+    if (depth < -1) p.fail("max_depth", "must be -1 (no limit) or 0 and more");
+    if (depth > INT32_MAX) p.fail("max_depth", "must be at most 2147483647");
     const int64_t rr_depth = p.integer("rr_depth", 5);
-    if (rr_depth < 1 || rr_depth > INT32_MAX) p.fail("rr_depth", "must be 1 or more");
+    if (rr_depth < 1) p.fail("rr_depth", "must be 1 or more");
+    if (rr_depth > INT32_MAX) p.fail("rr_depth", "must be at most 2147483647");
     scene_.max_depth = static_cast<int>(depth);
     scene_.rr_depth = static_cast<int>(rr_depth);
     scene_.hide_emitters = p.boolean("hide_emitters", false);
@@ -89,9 +91,15 @@ class SceneBuilder {
       if (!entry->second) throw InputError(object.where, "the bsdf contains itself");
       return entry->second;
     }
+    constexpr int kMaxDepth = 64;  // not tuned: far below what the stack takes
+    if (bsdf_depth_ == kMaxDepth) {
+      throw InputError(object.where, "bsdfs are nested more than 64 deep");
+    }
+    ++bsdf_depth_;
     DescribedProperties p(object, description_, make_nested_);
     std::shared_ptr<Bsdf> made = make_bsdf(p);
     p.check_all_used();
+    --bsdf_depth_;
     if (!object.id.empty()) scene_.bsdfs_by_id[object.id] = made;
     bsdfs_[&object] = made;
     return made;
@@ -188,6 +196,7 @@ class SceneBuilder {
   BsdfMaker make_nested_;
   Scene scene_;
   std::map<const ObjectDescription*, std::shared_ptr<Bsdf>> bsdfs_;
+  int bsdf_depth_ = 0;
   const ObjectDescription* integrator_ = nullptr;
   const ObjectDescription* sensor_ = nullptr;
   const ObjectDescription* environment_ = nullptr;

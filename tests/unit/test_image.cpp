@@ -102,7 +102,8 @@ TEST(Image, BrokenFilesAreExplained) {
   const std::string whole = contents(file);
   for (size_t size : {whole.size() * 9 / 10, whole.size() / 2, size_t{60}}) {
     std::ofstream(file, std::ios::binary) << whole.substr(0, size);
-    EXPECT_EQ(error_of(read), file + ": error: the EXR file is truncated or damaged") << size;
+    const std::string error = error_of(read);
+    EXPECT_TRUE(error.starts_with(file + ": error: the EXR file is truncated or damaged")) << error;
   }
   EXPECT_EQ(error_of([&] { write_exr("/no/such/folder/a.exr", ramp(2, 2, 3), true, {}); }),
             "/no/such/folder/a.exr: error: cannot write: no such folder");
