@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "limn/core/error.h"
+#include "limn/core/memory.h"
 #include "limn/core/parallel.h"
 
 namespace limn {
@@ -219,8 +220,26 @@ size_t steps_per_batch(Estimators estimators) {
   return steps;
 }
 
+// Of every image: the sums of a batch, of all batches, and their squares.
+void check_memory(Estimators estimators) {
+  double images = 0;
+  for (const auto& estimator : estimators) {
+    images += 1 + static_cast<double>(estimator->slots()) * estimator->lanes();
+  }
+  if (images == 0) return;
+  const Scene& scene = (*estimators.begin())->scene();
+  const double bytes = 3 * sizeof(double) * images * static_cast<double>(film_size(scene.film));
+  require_memory({scene.file}, bytes,
+                 fmt::format("a run with {:.0f} images of {} x {} pixels (each term of each "
+                             "parameter has one)",
+                             images, scene.film.crop_width, scene.film.crop_height),
+                 "lower width and height (with -D where the scene has parameters for them), or ask "
+                 "for fewer parameters at once");
+}
+
 void run_batches(Estimators estimators, const RunSettings& settings, const Stopwatch& watch,
                  const std::function<void(const Batch&, const std::vector<BatchSums>&)>& collect) {
+  check_memory(estimators);
   ProgressCounter progress(settings, watch,
                            steps_per_batch(estimators) * Schedule::batch_count(settings.spp));
   Schedule schedule(settings, watch);

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <fstream>
 #include <limits>
 #include <string>
@@ -47,7 +48,7 @@ double address_space_free() {
 
 std::string in_gigabytes(double bytes) {
   const double gigabytes = bytes * 1e-9;
-  const int tenths = static_cast<int>(std::min(gigabytes * 10 + 0.5, 1e9));
+  const auto tenths = static_cast<int64_t>(std::min(gigabytes * 10 + 0.5, 1e18));
   return std::to_string(tenths / 10) + "." + std::to_string(tenths % 10) + " GB";
 }
 
