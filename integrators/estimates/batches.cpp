@@ -220,7 +220,6 @@ size_t steps_per_batch(Estimators estimators) {
   return steps;
 }
 
-// Of every image: the sums of a batch, of all batches, and their squares.
 void check_memory(Estimators estimators) {
   double images = 0;
   for (const auto& estimator : estimators) {
@@ -228,6 +227,7 @@ void check_memory(Estimators estimators) {
   }
   if (images == 0) return;
   const Scene& scene = (*estimators.begin())->scene();
+  // Of every image: the sums of a batch, of all batches, and their squares.
   const double bytes = 3 * sizeof(double) * images * static_cast<double>(film_size(scene.film));
   require_memory({scene.file}, bytes,
                  fmt::format("a run with {:.0f} images of {} x {} pixels (each term of each "
@@ -239,7 +239,6 @@ void check_memory(Estimators estimators) {
 
 void run_batches(Estimators estimators, const RunSettings& settings, const Stopwatch& watch,
                  const std::function<void(const Batch&, const std::vector<BatchSums>&)>& collect) {
-  check_memory(estimators);
   ProgressCounter progress(settings, watch,
                            steps_per_batch(estimators) * Schedule::batch_count(settings.spp));
   Schedule schedule(settings, watch);

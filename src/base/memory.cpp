@@ -60,6 +60,8 @@ double free_memory() {
 
 void require_memory(const SourceLocation& where, double bytes, const std::string& what,
                     const std::string& remedy) {
+  constexpr double kWorthAsking = 0x1p26;  // not tuned: asking takes 50 microseconds
+  if (bytes < kWorthAsking) return;
   const double free = free_memory();
   if (bytes <= free) return;
   throw InputError(where, what + " takes " + in_gigabytes(bytes) + " of memory, and " +
