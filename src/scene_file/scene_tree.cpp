@@ -155,12 +155,14 @@ class TreeLoader {
     if (tree_.files.size() == kMaxFiles) {
       throw InputError(mentioned, "more than 1000 files are included");
     }
-    const std::optional<std::string> text = read_whole_file(file);
-    if (!text) throw InputError({file}, "cannot read the file");
-    text_ += text->size();
-    if (text_ > kMaxText) {
+    std::error_code error;
+    const uintmax_t size = fs::file_size(file, error);
+    if (!error && size > kMaxText - text_) {
       throw InputError(mentioned, "the scene's files have more than 33554432 bytes of XML");
     }
+    const std::optional<std::string> text = read_whole_file(file);
+    if (!text) throw InputError({file}, "cannot read the file");
+    text_ += std::min(text->size(), kMaxText - text_);
     tree_.files.push_back(file);
     return parse_xml(file, *text);
   }
