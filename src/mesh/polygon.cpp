@@ -75,8 +75,10 @@ class EarClipper {
     Triangles triangles;
     size_t at = 0;
     while (left_.size() > 2) {
-      size_t tries = 0;
+      // A polygon that does not cross itself always has an ear: without one, any corner will do.
+      size_t tries = simple_ ? 0 : left_.size();
       while (tries < left_.size() && !is_ear(at % left_.size())) ++at, ++tries;
+      simple_ = tries < left_.size();
       at %= left_.size();
       triangles.push_back({around(at, -1), around(at, 0), around(at, 1)});
       left_.erase(left_.begin() + static_cast<std::ptrdiff_t>(at));
@@ -111,6 +113,7 @@ class EarClipper {
 
   std::vector<Point> points_;
   std::vector<uint32_t> left_;  // corners, in order
+  bool simple_ = true;
 };
 
 }  // namespace
