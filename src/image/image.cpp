@@ -187,9 +187,14 @@ class ExrReader {
       exr_.fail(size + " cannot come out of a file of " +
                 std::to_string(static_cast<int64_t>(held)) + " bytes: it is truncated or damaged");
     }
-    // Floats here, and what an environment map makes of them beside that.
-    require_memory({exr_.file()}, 8.0 * width_ * height_ * static_cast<double>(names_.size()), size,
-                   "use a smaller one");
+    // Floats here, what an environment map makes of them, and a block before and after unpacking.
+    uint64_t block = 0;
+    exr_.check(exr_get_chunk_unpacked_size(exr_.context(), 0, &block));
+    require_memory(
+        {exr_.file()},
+        8.0 * static_cast<double>(width_ * height_) * static_cast<double>(names_.size()) +
+            3.0 * static_cast<double>(block),
+        size, "use a smaller one");
   }
 
   // Bytes that may come out of one: a run of 128 equal ones from 2; deflate's 1032; a run of 255
