@@ -109,27 +109,25 @@ class BatchRunner {
     NonFinite bad;
   };
 
+  static constexpr size_t kChunk = 1024;  // not tuned
+
   void run_film(size_t slot) {
-    constexpr size_t kChunk = 1024;  // not tuned
+    constexpr size_t kHeld = 1024 * kChunk;  // samples in memory, 120 bytes each; not tuned
     const FilmBatch batch(estimator_, slot, batch_.first, batch_.count());
-    std::vector<Chunk> chunks((batch.count + kChunk - 1) / kChunk);
+    for (size_t begin = 0; begin < batch.count && !progress_.stopped(); begin += kHeld) {
+      add_film_samples(slot, batch, begin, std::min(batch.count, begin + kHeld));
+    }
+    TermCost& cost = sums_.costs[slot];
+    cost.samples += batch.count;
+    cost.occluded += batch.count - cost.counted;
+  }
+
+  void add_film_samples(size_t slot, const FilmBatch& batch, size_t begin, size_t end) {
+    std::vector<Chunk> chunks((end - begin + kChunk - 1) / kChunk);
     parallel_for(chunks.size(), threads_, [&](size_t c) {
       if (progress_.stopped()) return;
-      const Stopwatch watch;
-      RayCount rays;
-      for (size_t i = c * kChunk; i < std::min(batch.count, (c + 1) * kChunk); ++i) {
-        FilmSample sample;
-        if (!sample_film(estimator_, slot, batch_.seed, batch, i, rays, sample)) continue;
-        if (is_finite(sample.value)) {
-          chunks[c].samples.emplace_back(batch.first + i, sample);
-        } else {
-          const auto number = static_cast<int64_t>(batch.first + i);
-          chunks[c].bad.add({-1, -1, number, estimator_.slot_name(slot)});
-        }
-      }
-      chunks[c].cost.counted = chunks[c].samples.size();
-      chunks[c].cost.add(rays);
-      chunks[c].cost.seconds = watch.seconds();
+      const size_t first = begin + c * kChunk;
+      run_chunk(slot, batch, first, std::min(end, first + kChunk), chunks[c]);
     });
     // A batch's sum is its number of samples per pixel times its mean; this turns sums over film
     // samples into that.
@@ -145,8 +143,24 @@ class BatchRunner {
       cost.merge(chunk.cost);
       sums_.non_finite.merge(chunk.bad);
     }
-    cost.samples += batch.count;
-    cost.occluded += batch.count - cost.counted;
+  }
+
+  void run_chunk(size_t slot, const FilmBatch& batch, size_t first, size_t last,
+                 Chunk& chunk) const {
+    const Stopwatch watch;
+    RayCount rays;
+    for (size_t i = first; i < last; ++i) {
+      FilmSample sample;
+      if (!sample_film(estimator_, slot, batch_.seed, batch, i, rays, sample)) continue;
+      if (is_finite(sample.value)) {
+        chunk.samples.emplace_back(batch.first + i, sample);
+      } else {
+        chunk.bad.add({-1, -1, static_cast<int64_t>(batch.first + i), estimator_.slot_name(slot)});
+      }
+    }
+    chunk.cost.counted = chunk.samples.size();
+    chunk.cost.add(rays);
+    chunk.cost.seconds = watch.seconds();
   }
 
   // Adds a sample to the pixels whose filters reach it.
