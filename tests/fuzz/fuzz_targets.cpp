@@ -50,9 +50,11 @@ class Folder {
 
   std::string write(const char* name, Bytes bytes) const {
     const std::string file = (path_ / name).string();
-    std::ofstream(file, std::ios::binary)
-        .write(reinterpret_cast<const char*>(bytes.data()),
-               static_cast<std::streamsize>(bytes.size()));
+    std::ofstream stream(file, std::ios::binary);
+    stream.write(reinterpret_cast<const char*>(bytes.data()),
+                 static_cast<std::streamsize>(bytes.size()));
+    stream.close();
+    demand(stream.good(), "the input can be written");
     return file;
   }
 
