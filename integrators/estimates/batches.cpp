@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "limn/core/error.h"
+#include "limn/core/memory.h"
 #include "limn/core/parallel.h"
 
 namespace limn {
@@ -108,27 +109,25 @@ class BatchRunner {
     NonFinite bad;
   };
 
+  static constexpr size_t kChunk = 1024;  // not tuned
+
   void run_film(size_t slot) {
-    constexpr size_t kChunk = 1024;  // not tuned
+    constexpr size_t kHeld = 1024 * kChunk;  // samples in memory, 120 bytes each; not tuned
     const FilmBatch batch(estimator_, slot, batch_.first, batch_.count());
-    std::vector<Chunk> chunks((batch.count + kChunk - 1) / kChunk);
+    for (size_t begin = 0; begin < batch.count && !progress_.stopped(); begin += kHeld) {
+      add_film_samples(slot, batch, begin, std::min(batch.count, begin + kHeld));
+    }
+    TermCost& cost = sums_.costs[slot];
+    cost.samples += batch.count;
+    cost.occluded += batch.count - cost.counted;
+  }
+
+  void add_film_samples(size_t slot, const FilmBatch& batch, size_t begin, size_t end) {
+    std::vector<Chunk> chunks((end - begin + kChunk - 1) / kChunk);
     parallel_for(chunks.size(), threads_, [&](size_t c) {
       if (progress_.stopped()) return;
-      const Stopwatch watch;
-      RayCount rays;
-      for (size_t i = c * kChunk; i < std::min(batch.count, (c + 1) * kChunk); ++i) {
-        FilmSample sample;
-        if (!sample_film(estimator_, slot, batch_.seed, batch, i, rays, sample)) continue;
-        if (is_finite(sample.value)) {
-          chunks[c].samples.emplace_back(batch.first + i, sample);
-        } else {
-          const auto number = static_cast<int64_t>(batch.first + i);
-          chunks[c].bad.add({-1, -1, number, estimator_.slot_name(slot)});
-        }
-      }
-      chunks[c].cost.counted = chunks[c].samples.size();
-      chunks[c].cost.add(rays);
-      chunks[c].cost.seconds = watch.seconds();
+      const size_t first = begin + c * kChunk;
+      run_chunk(slot, batch, first, std::min(end, first + kChunk), chunks[c]);
     });
     // A batch's sum is its number of samples per pixel times its mean; this turns sums over film
     // samples into that.
@@ -144,8 +143,24 @@ class BatchRunner {
       cost.merge(chunk.cost);
       sums_.non_finite.merge(chunk.bad);
     }
-    cost.samples += batch.count;
-    cost.occluded += batch.count - cost.counted;
+  }
+
+  void run_chunk(size_t slot, const FilmBatch& batch, size_t first, size_t last,
+                 Chunk& chunk) const {
+    const Stopwatch watch;
+    RayCount rays;
+    for (size_t i = first; i < last; ++i) {
+      FilmSample sample;
+      if (!sample_film(estimator_, slot, batch_.seed, batch, i, rays, sample)) continue;
+      if (is_finite(sample.value)) {
+        chunk.samples.emplace_back(batch.first + i, sample);
+      } else {
+        chunk.bad.add({-1, -1, static_cast<int64_t>(batch.first + i), estimator_.slot_name(slot)});
+      }
+    }
+    chunk.cost.counted = chunk.samples.size();
+    chunk.cost.add(rays);
+    chunk.cost.seconds = watch.seconds();
   }
 
   // Adds a sample to the pixels whose filters reach it.
@@ -217,6 +232,23 @@ size_t steps_per_batch(Estimators estimators) {
     if (estimator->samples_pixels()) steps += make_tiles(estimator->scene().film).size();
   }
   return steps;
+}
+
+void check_memory(Estimators estimators) {
+  double images = 0;
+  for (const auto& estimator : estimators) {
+    images += 1 + static_cast<double>(estimator->slots()) * estimator->lanes();
+  }
+  if (images == 0) return;
+  const Scene& scene = (*estimators.begin())->scene();
+  // Of every image: the sums of a batch, of all batches, and their squares.
+  const double bytes = 3 * sizeof(double) * images * static_cast<double>(film_size(scene.film));
+  require_memory({scene.file}, bytes,
+                 fmt::format("a run with {:.0f} images of {} x {} pixels (each term of each "
+                             "parameter has one)",
+                             images, scene.film.crop_width, scene.film.crop_height),
+                 "lower width and height (with -D where the scene has parameters for them), or ask "
+                 "for fewer parameters at once");
 }
 
 void run_batches(Estimators estimators, const RunSettings& settings, const Stopwatch& watch,

@@ -22,6 +22,9 @@ using Estimators = std::span<const std::unique_ptr<SampleEstimator>>;
 std::vector<BatchSums> run_batch(Estimators estimators, const Batch& batch, int threads,
                                  ProgressCounter& progress);
 
+// InputError if memory does not hold the images of a run. To be called before any is made.
+void check_memory(Estimators estimators);
+
 // Steps that run_batch reports for one batch.
 size_t steps_per_batch(Estimators estimators);
 

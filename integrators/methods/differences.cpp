@@ -64,6 +64,7 @@ CentralDifferences central_differences(const Scene& scene, const std::vector<Dif
     }
     result.estimates.emplace_back(job.combinations.size(), DifferenceEstimate(scene.film, block));
   }
+  check_memory(estimators);
   result.radiance = Moments(film_size(scene.film));
   result.setup_seconds = watch.seconds();
   run_batches(estimators, settings, watch, [&](const Batch& batch, const auto& sums) {

@@ -13,6 +13,7 @@ RenderResult render(const Scene& scene, const RunSettings& settings) {
   const Stopwatch watch;
   std::vector<std::unique_ptr<SampleEstimator>> estimators;
   estimators.push_back(std::make_unique<RadianceEstimator>(scene, settings.threads));
+  check_memory(estimators);
   RenderResult result;
   result.radiance = Moments(film_size(scene.film));
   run_batches(estimators, settings, watch, [&](const Batch& batch, const auto& sums) {

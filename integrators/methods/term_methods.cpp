@@ -96,6 +96,7 @@ class TermJob {
   }
 
   GradientResult run(const RunSettings& settings, const Stopwatch& watch) {
+    check_memory(passes_);
     GradientResult result = empty_result();
     for (size_t p = 0; p < passes_.size(); ++p) pass(p).describe(result.stats);
     plan(settings, watch, result);

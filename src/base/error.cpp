@@ -5,6 +5,26 @@ namespace limn {
 
 namespace {
 
+// Quoted input may hold anything: what would end a message or move a terminal's cursor is written as
+// \x1b, and the middle of what nobody can read is left out.
+std::string printable(const std::string& message) {
+  constexpr size_t kBegin = 1500, kEnd = 300;  // not tuned
+  static const char* const kDigits = "0123456789abcdef";
+  std::string text;
+  for (size_t i = 0; i < message.size(); ++i) {
+    const auto c = static_cast<unsigned char>(message[i]);
+    if (i == kBegin && message.size() > kBegin + kEnd) {
+      text += " [...] ";
+      i = message.size() - kEnd;
+    } else if (c < 0x20 || c == 0x7f) {
+      text += std::string("\\x") + kDigits[c >> 4] + kDigits[c & 15];
+    } else {
+      text += message[i];
+    }
+  }
+  return text;
+}
+
 std::string format(const SourceLocation& where, const std::string& kind,
                    const std::string& message) {
   std::string text;
@@ -16,7 +36,7 @@ std::string format(const SourceLocation& where, const std::string& kind,
     }
     text += " ";
   }
-  return text + kind + ": " + message;
+  return text + kind + ": " + printable(message);
 }
 
 }  // namespace

@@ -4,7 +4,8 @@
 #include <charconv>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
+
+#include "limn/core/memory.h"
 
 namespace limn {
 
@@ -54,11 +55,14 @@ std::vector<std::string_view> split(std::string_view text, std::string_view sepa
 std::optional<std::string> read_whole_file(const std::string& file) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error)) return std::nullopt;
+  const uintmax_t size = std::filesystem::file_size(file, error);
   std::ifstream stream(file, std::ios::binary);
-  std::ostringstream content;
-  content << stream.rdbuf();
-  if (!stream) return std::nullopt;
-  return std::move(content).str();
+  if (error || !stream) return std::nullopt;
+  require_memory({file}, static_cast<double>(size), "the file", "split it");
+  std::string content(size, '\0');
+  stream.read(content.data(), static_cast<std::streamsize>(size));
+  if (static_cast<uintmax_t>(stream.gcount()) != size) return std::nullopt;
+  return content;
 }
 
 }  // namespace limn

@@ -16,7 +16,7 @@ std::optional<int64_t> parse_integer(std::string_view text);
 // Pieces of `text` between any of `separators`, without empty pieces.
 std::vector<std::string_view> split(std::string_view text, std::string_view separators);
 
-// The whole file; nothing if it cannot be read.
+// The whole file; nothing if it cannot be read. InputError where memory does not hold it.
 std::optional<std::string> read_whole_file(const std::string& file);
 
 }  // namespace limn

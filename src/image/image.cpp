@@ -8,21 +8,24 @@
 #include <ImfOutputFile.h>
 #include <ImfStringAttribute.h>
 #include <ImfTestFile.h>
+#include <openexr.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <stdexcept>
 
 #include "limn/core/check.h"
 #include "limn/core/error.h"
+#include "limn/core/memory.h"
 #include "src/base/output_file.h"
 
 namespace limn {
 namespace {
 
-constexpr int64_t kMaxPixels = int64_t{1} << 28;  // not tuned: 3 GB in memory
+constexpr int kMaxTile = 8192;  // pixels on a side; not tuned
 
 std::vector<const char*> channel_names(int channels) {
   if (channels == 3) return {"R", "G", "B"};
@@ -71,36 +74,248 @@ void check_is_exr(const std::string& file) {
   }
 }
 
-std::vector<const char*> channels_to_read(const Imf::ChannelList& channels,
-                                          const std::string& file) {
-  const auto full = [&](const char* name) {
-    const Imf::Channel* c = channels.findChannel(name);
-    return c && c->xSampling == 1 && c->ySampling == 1;
-  };
-  if (full("R") && full("G") && full("B")) return {"R", "G", "B"};
-  if (full("Y") && !channels.findChannel("RY")) return {"Y"};
-  std::string found;
-  for (auto c = channels.begin(); c != channels.end(); ++c) {
-    found += (found.empty() ? "" : ", ") + std::string(c.name());
+// An open EXR. OpenEXR's reader in C checks sizes against the file before it believes them and blocks
+// against the size that they must have; the one in C++ does neither.
+class ExrFile {
+ public:
+  explicit ExrFile(const std::string& file) : file_(file) {
+    check_is_exr(file);
+    complaint_.clear();
+    exr_context_initializer_t options = EXR_DEFAULT_CONTEXT_INITIALIZER;
+    options.error_handler_fn = [](exr_const_context_t, exr_result_t, const char* message) {
+      if (complaint_.empty()) complaint_ = message;
+    };
+    options.max_tile_width = options.max_tile_height = kMaxTile;
+    options.flags = EXR_CONTEXT_FLAG_DISABLE_CHUNK_RECONSTRUCTION;
+    const exr_result_t result = exr_start_read(&context_, file.c_str(), &options);
+    // Where an attribute cannot be, it goes on, and what follows is chance.
+    if (result == EXR_ERR_SUCCESS && complaint_.empty()) return;
+    exr_finish(&context_);
+    fail_damaged();
   }
-  throw InputError(SourceLocation{file},
-                   "needs channels R, G, B or Y in full resolution (found: " + found + ")");
-}
+  ~ExrFile() { exr_finish(&context_); }
+  ExrFile(const ExrFile&) = delete;
+  ExrFile& operator=(const ExrFile&) = delete;
 
-Image read_open_file(Imf::InputFile& input, const std::string& file) {
-  const Imath::Box2i window = input.header().dataWindow();
-  const int64_t width = int64_t{window.max.x} - window.min.x + 1;
-  const int64_t height = int64_t{window.max.y} - window.min.y + 1;
-  if (width > kMaxPixels || height > kMaxPixels || width * height > kMaxPixels) {
-    throw InputError(SourceLocation{file}, "the image is too large");
+  const std::string& file() const { return file_; }
+  exr_const_context_t context() const { return context_; }
+  [[noreturn]] void fail(const std::string& message) const { throw InputError({file_}, message); }
+  [[noreturn]] void fail_damaged() const {
+    fail("the EXR file is truncated or damaged" + (complaint_.empty() ? "" : ": " + complaint_));
   }
-  const std::vector<const char*> names = channels_to_read(input.header().channels(), file);
-  if (!input.isComplete()) throw std::runtime_error("scanlines are missing");
-  Image image(static_cast<int>(width), static_cast<int>(height), static_cast<int>(names.size()));
-  input.setFrameBuffer(interleaved(image.data.data(), Imf::FLOAT, names, image.width, window.min));
-  input.readPixels(window.min.y, window.max.y);
-  return image;
-}
+  void check(exr_result_t result) const {
+    if (result != EXR_ERR_SUCCESS) fail_damaged();
+  }
+
+ private:
+  static thread_local std::string complaint_;  // OpenEXR's first since a file was opened
+  std::string file_;
+  exr_context_t context_ = nullptr;
+};
+thread_local std::string ExrFile::complaint_;
+
+// The first part of a file, as an image.
+class ExrReader {
+ public:
+  explicit ExrReader(const ExrFile& exr) : exr_(exr) {
+    exr.check(exr_get_storage(exr.context(), 0, &storage_));
+    exr.check(exr_get_compression(exr.context(), 0, &compression_));
+    exr.check(exr_get_data_window(exr.context(), 0, &window_));
+    exr.check(exr_get_channels(exr.context(), 0, &channels_));
+    if (storage_ != EXR_STORAGE_SCANLINE && storage_ != EXR_STORAGE_TILED) {
+      exr.fail("deep images are not read");
+    }
+    names_ = channels_to_read();
+    width_ = int64_t{window_.max.x} - window_.min.x + 1;
+    height_ = int64_t{window_.max.y} - window_.min.y + 1;
+    check_size();
+  }
+
+  Image read() {
+    image_.width = static_cast<int>(width_);
+    image_.height = static_cast<int>(height_);
+    image_.channels = static_cast<int>(names_.size());
+    image_.data.reserve(static_cast<size_t>(width_ * height_) * names_.size());
+    if (compression_ == EXR_COMPRESSION_DWAA || compression_ == EXR_COMPRESSION_DWAB) {
+      read_dwa();
+    } else {
+      BlockDecoder decoder(exr_);
+      for_each_block([&](const exr_chunk_info_t& block, int64_t x, int64_t y) {
+        grow_to(y + block.height);
+        decode(decoder, block, x, y);
+      });
+    }
+    return std::move(image_);
+  }
+
+ private:
+  std::vector<std::string> channels_to_read() const {
+    const auto full = [&](const char* name) {
+      return std::any_of(channels_->entries, channels_->entries + channels_->num_channels,
+                         [&](const exr_attr_chlist_entry_t& c) {
+                           return std::strcmp(c.name.str, name) == 0 && c.x_sampling == 1 &&
+                                  c.y_sampling == 1;
+                         });
+    };
+    std::string found;
+    bool has_chroma = false;
+    for (int i = 0; i < channels_->num_channels; ++i) {
+      const std::string name = channels_->entries[i].name.str;
+      found += (found.empty() ? "" : ", ") + name;
+      has_chroma = has_chroma || name == "RY";
+    }
+    if (full("R") && full("G") && full("B")) return {"R", "G", "B"};
+    if (full("Y") && !has_chroma) return {"Y"};
+    exr_.fail("needs channels R, G, B or Y in full resolution (found: " + found + ")");
+  }
+
+  // What the file cannot hold is refused before anything is taken for it.
+  void check_size() const {
+    const std::string size =
+        "the image of " + std::to_string(width_) + " x " + std::to_string(height_) + " pixels";
+    if (width_ > kMaxPixels || height_ > kMaxPixels || width_ * height_ > kMaxPixels) {
+      exr_.fail(size + " is too large (at most " + std::to_string(kMaxPixels) + " pixels)");
+    }
+    double bytes = 0;
+    for (int i = 0; i < channels_->num_channels; ++i) {
+      const exr_attr_chlist_entry_t& c = channels_->entries[i];
+      bytes += (c.pixel_type == EXR_PIXEL_HALF ? 2.0 : 4.0) * width_ * height_ /
+               (static_cast<double>(c.x_sampling) * c.y_sampling);
+    }
+    const auto held = static_cast<double>(std::filesystem::file_size(exr_.file()));
+    if (bytes > held * largest_ratio()) {
+      exr_.fail(size + " cannot come out of a file of " +
+                std::to_string(static_cast<int64_t>(held)) + " bytes: it is truncated or damaged");
+    }
+    // Floats here, what an environment map makes of them, and a block before and after unpacking.
+    uint64_t block = 0;
+    exr_.check(exr_get_chunk_unpacked_size(exr_.context(), 0, &block));
+    require_memory(
+        {exr_.file()},
+        8.0 * static_cast<double>(width_ * height_) * static_cast<double>(names_.size()) +
+            3.0 * static_cast<double>(block),
+        size, "use a smaller one");
+  }
+
+  // Bytes that may come out of one: a run of 128 equal ones from 2; deflate's 1032; a run of 255
+  // halves from 9 bits; four by four halves from 3 bytes; eight by eight floats from 4 bytes that
+  // are deflated.
+  double largest_ratio() const {
+    switch (compression_) {
+      case EXR_COMPRESSION_NONE:
+        return 1;
+      case EXR_COMPRESSION_RLE:
+        return 64;
+      case EXR_COMPRESSION_PIZ:
+        return 454;
+      case EXR_COMPRESSION_B44:
+      case EXR_COMPRESSION_B44A:
+        return 11;
+      case EXR_COMPRESSION_DWAA:
+      case EXR_COMPRESSION_DWAB:
+        return 64.0 * 1032;
+      default:
+        return 4.0 / 3 * 1032;  // of floats PXR24 keeps three bytes
+    }
+  }
+
+  // Memory is taken as lines come, so that no more is taken than the file makes up.
+  void grow_to(int64_t lines) {
+    image_.data.resize(static_cast<size_t>(lines * width_) * names_.size());
+  }
+
+  // Blocks in the order of the image, those of full resolution: visit(block, x, y) with the pixel of
+  // the image where it begins.
+  template <class Visit>
+  void for_each_block(const Visit& visit) const {
+    const bool tiled = storage_ == EXR_STORAGE_TILED;
+    int32_t across = static_cast<int32_t>(width_), down = 0;
+    exr_.check(tiled ? exr_get_tile_sizes(exr_.context(), 0, 0, 0, &across, &down)
+                     : exr_get_scanlines_per_chunk(exr_.context(), 0, &down));
+    for (int64_t y = 0; y < height_; y += down) {
+      for (int64_t x = 0; x < width_; x += across) {
+        exr_chunk_info_t block{};
+        exr_.check(tiled ? exr_read_tile_chunk_info(exr_.context(), 0, static_cast<int>(x / across),
+                                                    static_cast<int>(y / down), 0, 0, &block)
+                         : exr_read_scanline_chunk_info(
+                               exr_.context(), 0, static_cast<int>(window_.min.y + y), &block));
+        if (x + block.width > width_ || y + block.height > height_) exr_.fail_damaged();
+        visit(block, x, y);
+      }
+    }
+  }
+
+  struct BlockDecoder {
+    explicit BlockDecoder(const ExrFile& file) : exr(file) {}
+    ~BlockDecoder() { exr_decoding_destroy(exr.context(), &pipeline); }
+    BlockDecoder(const BlockDecoder&) = delete;
+    BlockDecoder& operator=(const BlockDecoder&) = delete;
+    const ExrFile& exr;
+    exr_decode_pipeline_t pipeline{};
+    bool begun = false;
+  };
+
+  // A block whose top left pixel is (x, y) of the image.
+  void decode(BlockDecoder& decoder, const exr_chunk_info_t& block, int64_t x, int64_t y) {
+    exr_decode_pipeline_t& pipeline = decoder.pipeline;
+    exr_.check(decoder.begun ? exr_decoding_update(exr_.context(), 0, &block, &pipeline)
+                             : exr_decoding_initialize(exr_.context(), 0, &block, &pipeline));
+    decoder.begun = true;
+    const size_t pixel = names_.size();
+    float* const corner = &image_.data[static_cast<size_t>(y * width_ + x) * pixel];
+    for (int c = 0; c < pipeline.channel_count; ++c) {
+      exr_coding_channel_info_t& channel = pipeline.channels[c];
+      const auto wanted =
+          std::find(names_.begin(), names_.end(), std::string(channel.channel_name));
+      channel.decode_to_ptr = nullptr;
+      if (wanted == names_.end()) continue;
+      channel.decode_to_ptr = reinterpret_cast<uint8_t*>(corner + (wanted - names_.begin()));
+      channel.user_data_type = EXR_PIXEL_FLOAT;
+      channel.user_bytes_per_element = sizeof(float);
+      channel.user_pixel_stride = static_cast<int32_t>(pixel * sizeof(float));
+      channel.user_line_stride = static_cast<int32_t>(width_ * pixel * sizeof(float));
+    }
+    exr_.check(exr_decoding_choose_default_routines(exr_.context(), 0, &pipeline));
+    exr_.check(exr_decoding_run(exr_.context(), 0, &pipeline));
+  }
+
+  // The reader in C does not know this compression yet (OpenEXR 3.1).
+  void read_dwa() {
+    for_each_block([](const exr_chunk_info_t&, int64_t, int64_t) {});
+    try {
+      Imf::InputFile input(exr_.file().c_str());
+      const Imath::Box2i window = input.header().dataWindow();
+      if (window.min != Imath::V2i(window_.min.x, window_.min.y) ||
+          window.max != Imath::V2i(window_.max.x, window_.max.y) || !input.isComplete()) {
+        throw std::runtime_error("not the same");
+      }
+      std::vector<const char*> names;
+      for (const std::string& name : names_) names.push_back(name.c_str());
+      grow_to(1);
+      input.setFrameBuffer(
+          interleaved(image_.data.data(), Imf::FLOAT, names, image_.width, window.min));
+      constexpr int64_t kLines = 256;  // as many as a block may have
+      for (int64_t y = 0; y < height_; y += kLines) {
+        const int64_t end = std::min(height_, y + kLines);
+        grow_to(end);
+        input.readPixels(static_cast<int>(window.min.y + y),
+                         static_cast<int>(window.min.y + end) - 1);
+      }
+    } catch (const std::exception&) {
+      // OpenEXR's own words depend on where in the file it notices.
+      exr_.fail_damaged();
+    }
+  }
+
+  const ExrFile& exr_;
+  exr_storage_t storage_{};
+  exr_compression_t compression_{};
+  exr_attr_box2i_t window_{};
+  const exr_attr_chlist_t* channels_ = nullptr;
+  std::vector<std::string> names_;  // of the channels that are read
+  int64_t width_ = 0, height_ = 0;
+  Image image_;
+};
 
 }  // namespace
 
@@ -131,39 +346,23 @@ void write_exr(const std::string& file, const Image& image, bool half,
   output.commit();
 }
 
-namespace {
-
-// Opens an EXR and calls read(input).
-template <class Read>
-auto with_exr(const std::string& file, Read read) {
-  check_is_exr(file);
-  try {
-    Imf::InputFile input(file.c_str());
-    return read(input);
-  } catch (const InputError&) {
-    throw;
-  } catch (const std::exception&) {
-    // OpenEXR's own words depend on where in the file it notices.
-    throw InputError(SourceLocation{file}, "the EXR file is truncated or damaged");
-  }
-}
-
-}  // namespace
-
 Image read_exr(const std::string& file) {
-  return with_exr(file, [&](Imf::InputFile& input) { return read_open_file(input, file); });
+  const ExrFile exr(file);
+  return ExrReader(exr).read();
 }
 
 std::vector<ImageAttribute> read_exr_attributes(const std::string& file) {
-  return with_exr(file, [](Imf::InputFile& input) {
-    std::vector<ImageAttribute> attributes;
-    const Imf::Header& header = input.header();
-    for (auto i = header.begin(); i != header.end(); ++i) {
-      const auto* text = dynamic_cast<const Imf::StringAttribute*>(&i.attribute());
-      if (text) attributes.push_back({i.name(), text->value()});
-    }
-    return attributes;
-  });
+  const ExrFile exr(file);
+  int32_t count = 0;
+  exr.check(exr_get_attribute_count(exr.context(), 0, &count));
+  std::vector<ImageAttribute> attributes;
+  for (int32_t i = 0; i < count; ++i) {
+    const exr_attribute_t* a = nullptr;
+    exr.check(exr_get_attribute_by_index(exr.context(), 0, EXR_ATTR_LIST_SORTED_ORDER, i, &a));
+    if (a->type != EXR_ATTR_STRING) continue;
+    attributes.push_back({a->name, std::string(a->string->str, a->string->length)});
+  }
+  return attributes;
 }
 
 }  // namespace limn

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <limits>
 
 #include "limn/core/names.h"
 #include "src/base/text.h"
@@ -20,9 +21,14 @@ Vec3d parse_vector(const SourceLocation& where, std::string_view line) {
   if (words.size() != 3) throw InputError(where, "expected three numbers \"x y z\"");
   Vec3d v;
   for (int k = 0; k < 3; ++k) {
+    const int column = static_cast<int>(words[k].data() - line.data()) + 1;
+    const SourceLocation word{where.file, where.line, column};
     const std::optional<double> number = parse_double(words[k]);
-    if (!number) throw InputError(where, "not a number: \"" + std::string(words[k]) + "\"");
-    if (!std::isfinite(*number)) throw InputError(where, "the vector is not finite");
+    if (!number) throw InputError(word, "not a number: \"" + std::string(words[k]) + "\"");
+    if (!std::isfinite(*number)) throw InputError(word, "the vector is not finite");
+    if (std::fabs(*number) > std::numeric_limits<float>::max()) {
+      throw InputError(word, "a number is beyond a float's range (3.4e38)");
+    }
     v[k] = *number;
   }
   return v;

@@ -8,7 +8,7 @@ namespace limn {
 
 // Obj or ply, by the ending of the file's name.
 RawMesh parse_mesh(const std::string& file);
-RawMesh parse_obj(const std::string& file);  // read_obj.cpp, the door to tinyobjloader
+RawMesh parse_obj(const std::string& file);  // read_obj.cpp
 RawMesh parse_ply(const std::string& file);  // read_ply.cpp
 
 }  // namespace limn

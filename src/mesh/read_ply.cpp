@@ -1,7 +1,9 @@
 // Stanford PLY: ascii and both binary byte orders.
 #include <algorithm>
 #include <bit>
+#include <cfloat>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <map>
 
@@ -29,6 +31,34 @@ std::optional<Number> number_type(std::string_view name) {
 
 bool is_integer(Number type) { return type != Number::kFloat32 && type != Number::kFloat64; }
 
+constexpr size_t bytes_of(Number type) {
+  constexpr size_t kBytes[] = {1, 1, 2, 2, 4, 4, 4, 8};
+  return kBytes[static_cast<size_t>(type)];
+}
+
+// The smallest and the largest number of a type.
+std::pair<double, double> range_of(Number type) {
+  switch (type) {
+    case Number::kInt8:
+      return {INT8_MIN, INT8_MAX};
+    case Number::kUint8:
+      return {0, UINT8_MAX};
+    case Number::kInt16:
+      return {INT16_MIN, INT16_MAX};
+    case Number::kUint16:
+      return {0, UINT16_MAX};
+    case Number::kInt32:
+      return {INT32_MIN, INT32_MAX};
+    case Number::kUint32:
+      return {0, UINT32_MAX};
+    case Number::kFloat32:
+      return {-FLT_MAX, FLT_MAX};
+    case Number::kFloat64:
+      return {-DBL_MAX, DBL_MAX};
+  }
+  return {};
+}
+
 struct PlyProperty {
   std::string name;
   Number type;
@@ -45,11 +75,13 @@ struct PlyElement {
 // Where reading is, and what to blame.
 class PlyCursor {
  public:
-  PlyCursor(std::string file, const std::string& data) : file_(std::move(file)), data_(data) {}
+  PlyCursor(std::string file, const std::string& data)
+      : file_(std::move(file)), data_(data), line_begin_(data.data()) {}
 
-  [[noreturn]] void fail(const std::string& message) const {
-    throw InputError({file_, binary_ ? 0 : line_}, message);
-  }
+  // In text at the latest word; in binary bodies the byte is told, counted from 0.
+  [[noreturn]] void fail(const std::string& message) const { fail_at_column(column_, message); }
+  // Of an element as a whole.
+  [[noreturn]] void fail_element(const std::string& message) const { fail_at_column(0, message); }
   [[noreturn]] void fail_at(int line, const std::string& message) const {
     throw InputError({file_, line}, message);
   }
@@ -61,10 +93,15 @@ class PlyCursor {
     const size_t end = std::min(data_.find('\n', next_), data_.size());
     std::string_view line(data_.data() + next_, end - next_);
     if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+    line_begin_ = line.data();
     next_ = std::min(end + 1, data_.size());
     ++line_;
+    column_ = 0;
     return line;
   }
+
+  bool is_binary() const { return binary_; }
+  size_t bytes_left() const { return data_.size() - next_; }
 
   void start_body(bool binary, bool big_endian) {
     binary_ = binary;
@@ -79,22 +116,63 @@ class PlyCursor {
     used_ = 0;
     while (words_.empty()) {
       const std::optional<std::string_view> line = next_line();
-      if (!line) fail("the file ends before " + what_);
+      if (!line) fail_element("the file ends before " + what_);
       words_ = split(*line, " \t");
     }
   }
-  void end_element() const {
-    if (!binary_ && used_ < words_.size()) fail(what_ + ": too many numbers on the line");
+  void end_element() {
+    if (binary_ || used_ == words_.size()) return;
+    set_column(words_[used_]);
+    fail(what_ + ": too many numbers on the line");
   }
 
-  double number(Number type) { return binary_ ? binary_number(type) : ascii_number(); }
+  // Nothing but blank lines may follow the last element.
+  void end_body() {
+    if (binary_) {
+      if (bytes_left() > 0)
+        fail(std::to_string(bytes_left()) + " bytes follow the last element of the header");
+      return;
+    }
+    while (const std::optional<std::string_view> line = next_line()) {
+      const std::vector<std::string_view> words = split(*line, " \t");
+      if (words.empty()) continue;
+      set_column(words[0]);
+      fail("\"" + std::string(words[0]) + "\" follows the last element of the header");
+    }
+  }
+
+  double number(Number type) { return binary_ ? binary_number(type) : ascii_number(type); }
+
+  // Numbers of this type that can still come for this element, at most.
+  size_t numbers_left(Number type) const {
+    return binary_ ? bytes_left() / bytes_of(type) : words_.size() - used_;
+  }
 
  private:
-  double ascii_number() {
+  [[noreturn]] void fail_at_column(int column, const std::string& message) const {
+    if (!binary_) throw InputError({file_, line_, column}, message);
+    throw InputError({file_}, message + " (at byte " + std::to_string(next_) + ")");
+  }
+  void set_column(std::string_view word) {
+    column_ = static_cast<int>(word.data() - line_begin_) + 1;
+  }
+
+  double ascii_number(Number type) {
     if (used_ >= words_.size()) fail(what_ + ": too few numbers on the line");
     const std::string_view word = words_[used_++];
+    set_column(word);
     const std::optional<double> number = parse_double(word);
     if (!number) fail(what_ + ": not a number: \"" + std::string(word) + "\"");
+    if (is_integer(type) && *number != std::floor(*number)) {
+      fail(what_ + ": not a whole number: \"" + std::string(word) + "\"");
+    }
+    const auto [least, most] = range_of(type);
+    if (*number < least || *number > most) {
+      // Infinity is no mistake in what nobody uses.
+      if (is_integer(type) || std::isfinite(*number)) {
+        fail(what_ + ": beyond the range of its type: \"" + std::string(word) + "\"");
+      }
+    }
     return *number;
   }
 
@@ -135,7 +213,8 @@ class PlyCursor {
   std::string file_;
   const std::string& data_;
   size_t next_ = 0;
-  int line_ = 0;
+  const char* line_begin_;
+  int line_ = 0, column_ = 0;
   bool binary_ = false;
   bool swap_ = false;
   std::string what_;
@@ -162,7 +241,8 @@ PlyProperty parse_property(const PlyCursor& in, const std::vector<std::string_vi
 }
 
 void parse_format(PlyCursor& in, const std::vector<std::string_view>& words) {
-  const std::string_view kind = words.size() > 1 ? words[1] : "";
+  if (words.empty()) in.fail("the header has no format");
+  const std::string_view kind = words[1];
   if (kind == "ascii") {
     in.start_body(false, false);
   } else if (kind == "binary_little_endian" || kind == "binary_big_endian") {
@@ -170,6 +250,35 @@ void parse_format(PlyCursor& in, const std::vector<std::string_view>& words) {
   } else {
     in.fail("unknown format \"" + std::string(kind) +
             "\" (known: ascii, binary_little_endian, binary_big_endian)");
+  }
+}
+
+constexpr size_t kMostParts = 1024;  // elements, and properties of each; not tuned
+
+void add_property(const PlyCursor& in, PlyElement& element, const PlyProperty& property) {
+  for (const PlyProperty& p : element.properties) {
+    if (p.name == property.name) {
+      in.fail("element " + element.name + " has a second property " + p.name);
+    }
+  }
+  if (element.properties.size() == kMostParts) in.fail("more than 1024 properties");
+  element.properties.push_back(property);
+}
+
+// Before anything is taken for them: that a binary file can hold what its header counts. (Text is
+// read line by line, and nothing is taken for lines that do not come.)
+void check_counts(const PlyCursor& in, const std::vector<PlyElement>& elements) {
+  if (!in.is_binary()) return;
+  auto left = static_cast<double>(in.bytes_left());
+  for (const PlyElement& e : elements) {
+    size_t each = 0;
+    for (const PlyProperty& p : e.properties) each += bytes_of(p.list_size.value_or(p.type));
+    const double needed = static_cast<double>(each) * static_cast<double>(e.count);
+    if (needed > left) {
+      in.fail_at(e.line, "element " + e.name + ": the file ends before " + std::to_string(e.count) +
+                             " of them, of " + std::to_string(each) + " bytes at least");
+    }
+    left -= needed;
   }
 }
 
@@ -184,15 +293,24 @@ std::vector<PlyElement> parse_header(PlyCursor& in) {
     if (words.empty() || words[0] == "comment" || words[0] == "obj_info") continue;
     if (words[0] == "end_header") break;
     if (words[0] == "format") {
+      if (!format.empty()) in.fail("a second format");
+      if (words.size() != 3) in.fail("malformed format (format KIND VERSION)");
+      if (words[2] != "1.0") {
+        in.fail("version " + std::string(words[2]) + " is not read (known: 1.0)");
+      }
       format = words;
-      if (words.size() != 3) in.fail("malformed format");
     } else if (words[0] == "element") {
       const auto count = words.size() == 3 ? parse_integer(words[2]) : std::nullopt;
       if (!count || *count < 0) in.fail("malformed element (element NAME COUNT)");
+      const auto same = [&](const PlyElement& e) { return e.name == words[1]; };
+      if (std::any_of(elements.begin(), elements.end(), same)) {
+        in.fail("a second element " + std::string(words[1]));
+      }
+      if (elements.size() == kMostParts) in.fail("more than 1024 elements");
       elements.push_back({std::string(words[1]), static_cast<uint64_t>(*count), {}, in.line()});
     } else if (words[0] == "property") {
       if (elements.empty()) in.fail("property before any element");
-      elements.back().properties.push_back(parse_property(in, words));
+      add_property(in, elements.back(), parse_property(in, words));
     } else {
       in.fail("unknown keyword \"" + std::string(words[0]) + "\" in the header");
     }
@@ -201,6 +319,7 @@ std::vector<PlyElement> parse_header(PlyCursor& in) {
     if (e.properties.empty()) in.fail_at(e.line, "element " + e.name + " has no properties");
   }
   parse_format(in, format);
+  check_counts(in, elements);
   return elements;
 }
 
@@ -221,8 +340,11 @@ void read_element(PlyCursor& in, const PlyElement& element, uint64_t index,
   for (size_t i = 0; i < element.properties.size(); ++i) {
     const PlyProperty& property = element.properties[i];
     double size = property.list_size ? in.number(*property.list_size) : 1;
-    if (!(size >= 0) || size != std::floor(size)) {
-      in.fail(what + ": impossible size of list " + property.name);
+    if (size < 0) in.fail(what + ": list " + property.name + " has a negative size");
+    if (property.list_size && size > static_cast<double>(in.numbers_left(property.type))) {
+      in.fail(what + ": list " + property.name + " of " +
+              std::to_string(static_cast<int64_t>(size)) + " numbers, but the " +
+              (in.is_binary() ? "file" : "line") + " ends before");
     }
     values[i].clear();
     for (; size > 0; --size) values[i].push_back(in.number(property.type));
@@ -247,7 +369,10 @@ void read_vertices(PlyCursor& in, const PlyElement& element, RawMesh& mesh) {
       position[k] = values[*p[k]][0];
       if (has_normals) normal[k] = values[*n[k]][0];
       const std::string what = "vertex " + std::to_string(i);
-      if (!std::isfinite(position[k])) in.fail(what + ": the position is not finite");
+      if (!std::isfinite(position[k])) in.fail_element(what + ": the position is not finite");
+      if (std::fabs(position[k]) > FLT_MAX) {
+        in.fail_element(what + ": the position is beyond a float's range (3.4e38)");
+      }
     }
     mesh.positions.push_back(position);
     if (has_normals) mesh.normals.push_back(normal);
@@ -272,15 +397,15 @@ void read_faces(PlyCursor& in, const PlyElement& element, uint64_t vertex_count,
     const std::vector<double>& corners = values[list];
     const std::string what = "face " + std::to_string(i);
     if (corners.size() != 3) {
-      in.fail(what + " has " + std::to_string(corners.size()) +
-              " corners: only triangles are read");
+      in.fail_element(what + " has " + std::to_string(corners.size()) +
+                      " corners: only triangles are read");
     }
     FaceIndices face{};
     for (int k = 0; k < 3; ++k) {
-      if (!(corners[k] >= 0 && corners[k] < static_cast<double>(vertex_count)) ||
-          corners[k] != std::floor(corners[k])) {
-        in.fail(what + " refers to vertex " + std::to_string(static_cast<int64_t>(corners[k])) +
-                ", but there are " + std::to_string(vertex_count) + " (counted from 0)");
+      if (!(corners[k] >= 0 && corners[k] < static_cast<double>(vertex_count))) {
+        in.fail_element(what + " refers to vertex " +
+                        std::to_string(static_cast<int64_t>(corners[k])) + ", but there are " +
+                        std::to_string(vertex_count) + " (counted from 0)");
       }
       face[k] = static_cast<uint32_t>(corners[k]);
     }
@@ -311,6 +436,7 @@ RawMesh parse_ply(const std::string& file) {
       for (uint64_t i = 0; i < element.count; ++i) read_element(in, element, i, skipped);
     }
   }
+  in.end_body();
   if (!mesh.normals.empty()) mesh.normal_ids = mesh.faces;
   return mesh;
 }

@@ -16,6 +16,8 @@ const std::vector<std::string> kObjectTags = {"bsdf",    "emitter", "film",   "i
 const std::vector<std::string> kSceneObjectTags = {"bsdf", "emitter", "integrator", "sensor",
                                                    "shape"};
 
+constexpr size_t kMaxAliases = 64;  // on the way to an object; not tuned
+
 bool contains(const std::vector<std::string>& words, const std::string& word) {
   return std::find(words.begin(), words.end(), word) != words.end();
 }
@@ -34,6 +36,7 @@ class Describer {
     scene_.files = tree.files;
     for (const XmlElement& child : root.children) add_to_scene(child);
     for (const auto& object : all_objects_) resolve(*object);
+    for (const auto& [name, id] : aliases_) find(id.value, id.where);
     return std::move(scene_);
   }
 
@@ -141,6 +144,7 @@ class Describer {
   std::shared_ptr<ObjectDescription> find(std::string id, SourceLocation where) const {
     for (size_t step = 0;; ++step) {
       if (step > aliases_.size()) throw InputError(where, "the alias \"" + id + "\" names itself");
+      if (step > kMaxAliases) throw InputError(where, "aliases of aliases, more than 64 deep");
       const auto found = by_id_.find(id);
       if (found != by_id_.end()) return found->second;
       const auto alias = aliases_.find(id);

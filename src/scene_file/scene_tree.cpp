@@ -6,6 +6,7 @@
 #include <set>
 
 #include "limn/core/names.h"
+#include "src/base/text.h"
 
 namespace limn {
 
@@ -13,13 +14,18 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr int kMaxIncludeDepth = 15;  // not tuned: a file that includes itself must end
+// A scene ends, whatever includes and refers to whatever. Not tuned: far above what scenes have.
+constexpr int kMaxIncludeDepth = 15;
+constexpr size_t kMaxFiles = 1000;
+constexpr size_t kMaxPaths = 64;
+constexpr size_t kMaxText = size_t{1} << 25;         // bytes of all files
+constexpr size_t kMaxSubstituted = size_t{1} << 24;  // characters that parameters put in
 
 bool is_word(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
 }
 
-std::string known_parameters(const std::map<std::string, std::string>& values) {
+std::string known_parameters(const std::map<std::string, std::string, std::less<>>& values) {
   std::vector<std::string> names;
   for (const auto& [name, value] : values) names.push_back(name);
   return known_names(names, "none are defined");
@@ -28,11 +34,10 @@ std::string known_parameters(const std::map<std::string, std::string>& values) {
 class TreeLoader {
  public:
   explicit TreeLoader(const std::map<std::string, std::string>& defines)
-      : defines_(defines), values_(defines) {}
+      : defines_(defines), values_(defines.begin(), defines.end()) {}
 
   SceneTree load(const std::string& file) {
-    tree_.root = parse_xml(file);
-    tree_.files.push_back(file);
+    tree_.root = parse_file(file, {file});
     expand(tree_.root, 0, true);
     check_defines(file);
     return std::move(tree_);
@@ -49,7 +54,12 @@ class TreeLoader {
       } else if (text[i] == '$') {
         const std::string name = parameter_at(text, i + 1, attribute.where);
         used_.insert(name);
-        result += values_.at(name);
+        const std::string& value = values_.at(name);
+        substituted_ += value.size();
+        if (substituted_ > kMaxSubstituted) {
+          throw InputError(attribute.where, "parameters put in more than 16777216 characters");
+        }
+        result += value;
         i += name.size();
       } else {
         result += text[i];
@@ -59,13 +69,16 @@ class TreeLoader {
   }
 
   std::string parameter_at(const std::string& text, size_t begin, const SourceLocation& where) {
-    std::string longest;
-    for (const auto& [name, value] : values_) {
-      if (text.compare(begin, name.size(), name) == 0 && name.size() > longest.size()) {
-        longest = name;
-      }
+    // Every name that begins the text comes before it in order, the longest one last.
+    std::string_view rest = std::string_view(text).substr(begin);
+    for (auto i = values_.upper_bound(rest); i != values_.begin();) {
+      const std::string& name = (--i)->first;
+      const auto [end, ignored] = std::mismatch(rest.begin(), rest.end(), name.begin(), name.end());
+      const auto common = static_cast<size_t>(end - rest.begin());
+      if (common == name.size()) return name;
+      rest = rest.substr(0, common);
+      i = values_.upper_bound(rest);
     }
-    if (!longest.empty()) return longest;
     size_t end = begin;
     while (end < text.size() && is_word(text[end])) ++end;
     throw InputError(where, "undefined parameter \"$" + text.substr(begin, end - begin) + "\" (" +
@@ -113,6 +126,9 @@ class TreeLoader {
     if (!fs::is_directory(directory, error)) {
       throw InputError(value.where, "no such directory: \"" + value.value + "\"");
     }
+    if (tree_.search_path.size() == kMaxPaths) {
+      throw InputError(order.where, "more than 64 of <path>");
+    }
     tree_.search_path.insert(tree_.search_path.begin(), directory.string());
   }
 
@@ -124,8 +140,7 @@ class TreeLoader {
     if (depth >= kMaxIncludeDepth) {
       throw InputError(name.where, "files are included more than 15 deep");
     }
-    XmlElement root = parse_xml(file);
-    tree_.files.push_back(file);
+    XmlElement root = parse_file(file, name.where);
     const bool is_scene = root.name == "scene";
     expand(root, depth + 1, is_scene);
     if (!is_scene) {
@@ -134,6 +149,22 @@ class TreeLoader {
     }
     check_attributes(root, {"version"}, {"version"});
     std::move(root.children.begin(), root.children.end(), std::back_inserter(parent.children));
+  }
+
+  XmlElement parse_file(const std::string& file, const SourceLocation& mentioned) {
+    if (tree_.files.size() == kMaxFiles) {
+      throw InputError(mentioned, "more than 1000 files are included");
+    }
+    std::error_code error;
+    const uintmax_t size = fs::file_size(file, error);
+    if (!error && size > kMaxText - text_) {
+      throw InputError(mentioned, "the scene's files have more than 33554432 bytes of XML");
+    }
+    const std::optional<std::string> text = read_whole_file(file);
+    if (!text) throw InputError({file}, "cannot read the file");
+    text_ += std::min(text->size(), kMaxText - text_);
+    tree_.files.push_back(file);
+    return parse_xml(file, *text);
   }
 
   void check_defines(const std::string& file) const {
@@ -149,8 +180,9 @@ class TreeLoader {
   }
 
   const std::map<std::string, std::string>& defines_;
-  std::map<std::string, std::string> values_;
+  std::map<std::string, std::string, std::less<>> values_;
   std::set<std::string> used_;
+  size_t text_ = 0, substituted_ = 0;
   SceneTree tree_;
 };
 

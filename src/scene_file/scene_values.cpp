@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "limn/core/names.h"
@@ -19,10 +20,19 @@ namespace {
                                         expected + ", not \"" + attribute.value + "\"");
 }
 
-double parse_number(const XmlElement& element, const XmlAttribute& attribute) {
-  const std::optional<double> number = parse_double(attribute.value);
-  if (!number || !std::isfinite(*number)) fail(attribute, element, "a finite number");
+// `expected` of numbers; what no float holds is beyond any use here, and overflows on its way.
+double parse_number(const XmlElement& element, const XmlAttribute& attribute, std::string_view word,
+                    const std::string& expected) {
+  const std::optional<double> number = parse_double(word);
+  if (!number || !std::isfinite(*number)) fail(attribute, element, expected);
+  if (std::fabs(*number) > std::numeric_limits<float>::max()) {
+    fail(attribute, element, "within a float's range (3.4e38)");
+  }
   return *number;
+}
+
+double parse_number(const XmlElement& element, const XmlAttribute& attribute) {
+  return parse_number(element, attribute, attribute.value, "a finite number");
 }
 
 // Numbers between commas and blanks, as many as one of `counts` allows.
@@ -35,9 +45,7 @@ std::vector<double> parse_numbers(const XmlElement& element, const XmlAttribute&
   }
   expected += expected == "1" ? " finite number" : " finite numbers";
   for (std::string_view word : split(attribute.value, ", \t\r\n")) {
-    const std::optional<double> number = parse_double(word);
-    if (!number || !std::isfinite(*number)) fail(attribute, element, expected);
-    numbers.push_back(*number);
+    numbers.push_back(parse_number(element, attribute, word, expected));
   }
   if (std::find(counts.begin(), counts.end(), numbers.size()) == counts.end()) {
     fail(attribute, element, expected);
@@ -224,13 +232,12 @@ PropertyValue parse_rgb(const XmlElement& e) {
 PropertyValue parse_spectrum(const XmlElement& e) {
   check_attributes(e, {"name", "value", "filename"}, {"name"});
   const XmlAttribute* a = e.find("value");
-  const std::optional<double> number = a ? parse_double(a->value) : std::nullopt;
-  if (!number || !std::isfinite(*number)) {
+  if (!a || !parse_double(a->value)) {
     throw InputError(e.where,
                      "<spectrum>: only one constant value is read; give other colours as "
                      "<rgb>");
   }
-  return ConstantSpectrum{*number};
+  return ConstantSpectrum{parse_number(e, *a)};
 }
 
 using PropertyParser = PropertyValue (*)(const XmlElement&);

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "limn/core/memory.h"
 #include "limn/core/names.h"
 #include "limn/core/scene.h"
 #include "src/mesh/mesh_build.h"
@@ -73,9 +74,11 @@ class SceneBuilder {
     }
     DescribedProperties p(object, description_, make_nested_);
     const int64_t depth = p.integer("max_depth", -1);
-    if (depth < -1 || depth > INT32_MAX) p.fail("max_depth", "must be -1 (no limit) or 0 and more");
+    if (depth < -1) p.fail("max_depth", "must be -1 (no limit) or 0 and more");
+    if (depth > INT32_MAX) p.fail("max_depth", "must be at most 2147483647");
     const int64_t rr_depth = p.integer("rr_depth", 5);
-    if (rr_depth < 1 || rr_depth > INT32_MAX) p.fail("rr_depth", "must be 1 or more");
+    if (rr_depth < 1) p.fail("rr_depth", "must be 1 or more");
+    if (rr_depth > INT32_MAX) p.fail("rr_depth", "must be at most 2147483647");
     scene_.max_depth = static_cast<int>(depth);
     scene_.rr_depth = static_cast<int>(rr_depth);
     scene_.hide_emitters = p.boolean("hide_emitters", false);
@@ -89,9 +92,15 @@ class SceneBuilder {
       if (!entry->second) throw InputError(object.where, "the bsdf contains itself");
       return entry->second;
     }
+    constexpr int kMaxDepth = 64;  // not tuned: far below what the stack takes
+    if (bsdf_depth_ == kMaxDepth) {
+      throw InputError(object.where, "bsdfs are nested more than 64 deep");
+    }
+    ++bsdf_depth_;
     DescribedProperties p(object, description_, make_nested_);
     std::shared_ptr<Bsdf> made = make_bsdf(p);
     p.check_all_used();
+    --bsdf_depth_;
     if (!object.id.empty()) scene_.bsdfs_by_id[object.id] = made;
     bsdfs_[&object] = made;
     return made;
@@ -165,6 +174,17 @@ class SceneBuilder {
     return make_sphere();
   }
 
+  // What shapes take beside what they have taken already, asked for now and then.
+  void check_memory(const RawMesh& raw) {
+    // Of mesh, ray tracer and image, measured: 0.2 and 1 million faces. Edges take more.
+    constexpr double kBytesPerFace = 180;
+    constexpr double kWorthAsking = 1e8;
+    unasked_ += kBytesPerFace * static_cast<double>(raw.faces.size());
+    if (unasked_ < kWorthAsking) return;
+    require_memory(raw.where, unasked_, "the shapes up to here", "use fewer, or coarser ones");
+    unasked_ = 0;
+  }
+
   void add_shape(const ObjectDescription& object) {
     DescribedProperties p(object, description_, make_nested_);
     Shape shape;
@@ -177,6 +197,7 @@ class SceneBuilder {
     if (bsdfs.size() > 1) p.fail("has " + std::to_string(bsdfs.size()) + " bsdfs (one at most)");
     if (const ObjectDescription* emitter = p.nested("emitter")) read_nested_light(*emitter, shape);
     p.check_all_used();
+    check_memory(raw);
     shape.mesh = build_mesh(raw, options, warnings_);
     const double grey_value = shape.is_emitter ? 0.0 : 0.5;
     shape.bsdf = bsdfs.empty() ? make_diffuse(grey(grey_value)) : bsdfs[0];
@@ -188,6 +209,8 @@ class SceneBuilder {
   BsdfMaker make_nested_;
   Scene scene_;
   std::map<const ObjectDescription*, std::shared_ptr<Bsdf>> bsdfs_;
+  int bsdf_depth_ = 0;
+  double unasked_ = 0;  // bytes of shapes since memory was asked for
   const ObjectDescription* integrator_ = nullptr;
   const ObjectDescription* sensor_ = nullptr;
   const ObjectDescription* environment_ = nullptr;

@@ -4,13 +4,12 @@
 #include <algorithm>
 #include <pugixml.hpp>
 
-#include "src/base/text.h"
-
 namespace limn {
 
 namespace {
 
-constexpr int kMaxDepth = 64;  // of elements; not tuned: far below what the stack takes
+constexpr int kMaxDepth = 64;          // of elements; not tuned: far below what the stack takes
+constexpr size_t kMaxAttributes = 64;  // of an element; not tuned: none knows more than eight
 
 // Lines and columns of byte offsets. A column counts bytes.
 class TextPlaces {
@@ -34,9 +33,23 @@ class TextPlaces {
   std::vector<size_t> line_starts_{0};
 };
 
+// pugixml leaves what it does not know as it is; what a document defines itself is not read.
+void check_entities(const TextPlaces& places, size_t begin, size_t end) {
+  const std::string& text = places.text();
+  for (size_t i = begin; i < end; ++i) {
+    if (text[i] != '&') continue;
+    const std::string name = text.substr(i + 1, std::min(text.find(';', i), end) - i - 1);
+    if (name == "amp" || name == "lt" || name == "gt" || name == "quot" || name == "apos") continue;
+    if (name.starts_with("#")) continue;
+    throw InputError(places.at(i), "unknown entity \"&" + name.substr(0, 32) +
+                                       ";\" (known: amp, apos, gt, lt, quot, and numbers)");
+  }
+}
+
 // pugixml knows where elements begin but not where attributes do. The text is well-formed, so from
 // the element's name on it is `name = "value"` again and again.
-std::vector<size_t> attribute_offsets(const std::string& text, size_t offset, size_t count) {
+std::vector<size_t> attribute_offsets(const TextPlaces& places, size_t offset, size_t count) {
+  const std::string& text = places.text();
   static const char* const kSpace = " \t\r\n";
   std::vector<size_t> offsets;
   size_t i = text.find_first_of(" \t\r\n", offset);
@@ -45,15 +58,19 @@ std::vector<size_t> attribute_offsets(const std::string& text, size_t offset, si
     offsets.push_back(i);
     const size_t quote = text.find_first_of("\"'", i);
     i = text.find(text[quote], quote + 1) + 1;
+    check_entities(places, quote + 1, i - 1);
   }
   return offsets;
 }
 
 void convert_attributes(const pugi::xml_node& node, const TextPlaces& places, XmlElement& element) {
   for (const pugi::xml_attribute& a : node.attributes()) {
+    if (element.attributes.size() == kMaxAttributes) {
+      throw InputError(element.where, "<" + element.name + ">: more than 64 attributes");
+    }
     element.attributes.push_back({a.name(), a.value(), {}});
   }
-  const auto offsets = attribute_offsets(places.text(), static_cast<size_t>(node.offset_debug()),
+  const auto offsets = attribute_offsets(places, static_cast<size_t>(node.offset_debug()),
                                          element.attributes.size());
   for (size_t i = 0; i < offsets.size(); ++i) {
     XmlAttribute& attribute = element.attributes[i];
@@ -94,19 +111,25 @@ const XmlAttribute* XmlElement::find(const std::string& attribute) const {
   return nullptr;
 }
 
-XmlElement parse_xml(const std::string& file) {
-  const std::optional<std::string> text = read_whole_file(file);
-  if (!text) throw InputError({file}, "cannot read the file");
-  const TextPlaces places(file, *text);
+XmlElement parse_xml(const std::string& file, const std::string& text) {
+  const TextPlaces places(file, text);
+  // pugixml would end there.
+  if (const size_t nul = text.find('\0'); nul != text.npos) {
+    throw InputError(places.at(nul), "malformed XML: a byte of value 0");
+  }
   pugi::xml_document document;
-  const pugi::xml_parse_result result =
-      document.load_buffer(text->data(), text->size(), pugi::parse_default, pugi::encoding_utf8);
+  const pugi::xml_parse_result result = document.load_buffer(
+      text.data(), text.size(), pugi::parse_default | pugi::parse_doctype, pugi::encoding_utf8);
   if (!result) {
-    const size_t offset = std::min(static_cast<size_t>(result.offset), text->size());
+    const size_t offset = std::min(static_cast<size_t>(result.offset), text.size());
     throw InputError(places.at(offset), std::string("malformed XML: ") + result.description());
   }
   pugi::xml_node root;
   for (const pugi::xml_node& child : document.children()) {
+    if (child.type() == pugi::node_doctype) {
+      throw InputError(places.at(static_cast<size_t>(child.offset_debug())),
+                       "<!DOCTYPE> is not read: entities are not substituted");
+    }
     if (child.type() != pugi::node_element) continue;
     if (root) {
       throw InputError(places.at(static_cast<size_t>(child.offset_debug()) - 1),

@@ -23,8 +23,9 @@ struct XmlElement {
   const XmlAttribute* find(const std::string& attribute) const;
 };
 
-// Parses `file` and returns its root. InputError at the place of what is malformed: also for text
-// between elements, repeated attributes, and elements nested more than 64 deep.
-XmlElement parse_xml(const std::string& file);
+// Parses `text`, the content of `file`, and returns its root. InputError at the place of what is
+// malformed: also for text between elements, repeated attributes, entities other than XML's five,
+// elements nested more than 64 deep, and more than 64 attributes.
+XmlElement parse_xml(const std::string& file, const std::string& text);
 
 }  // namespace limn

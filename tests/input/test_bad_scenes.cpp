@@ -1,6 +1,7 @@
 // The exact message of every kind of mistake in a scene file.
 #include <gtest/gtest.h>
 
+#include "limn/core/memory.h"
 #include "limn/core/scene.h"
 #include "support/temp_files.h"
 
@@ -49,6 +50,17 @@ std::string transform(const std::string& body) {
   return shape("<transform name=\"to_world\">\n" + body + "\n</transform>");
 }
 
+// `text` so often, with the number from 0 for "#" and the next for "@".
+std::string repeated(int count, const std::string& text) {
+  std::string all;
+  for (int i = 0; i < count; ++i) {
+    for (const char c : text) {
+      all += c == '#' ? std::to_string(i) : c == '@' ? std::to_string(i + 1) : std::string(1, c);
+    }
+  }
+  return all;
+}
+
 const std::vector<Mistake>& mistakes() {
   static const std::vector<Mistake> all = {
 #include "bad_scenes.inc"
@@ -91,6 +103,22 @@ TEST(BadScene, DefineOfAWrongType) {
   EXPECT_EQ(message_of(files, content, {{"d", "deep"}}),
             "@/s.xml:3:51: error: <integer>: value must be an integer, not \"deep\"");
   EXPECT_EQ(message_of(files, content, {{"d", "3"}}), "no error");
+}
+
+// What a run asks of memory is said before it is taken. (What is free is the machine's affair.)
+TEST(BadScene, FilmBeyondMemory) {
+  const SourceLocation where{"s.xml", 3, 1};
+  try {
+    require_memory(where, 1e18, "the film", "lower width");
+    FAIL();
+  } catch (const InputError& error) {
+    const std::string text = error.what();
+    EXPECT_EQ(text.rfind("s.xml:3:1: error: the film takes 1000000000.0 GB of memory, and ", 0), 0u)
+        << text;
+    EXPECT_TRUE(text.ends_with(" GB are free: lower width")) << text;
+  }
+  EXPECT_NO_THROW(require_memory(where, 1, "", ""));
+  EXPECT_GT(free_memory(), 0);
 }
 
 // Mistakes inside nested elements must never be taken for a valid scene, however a valid file is

@@ -5,6 +5,7 @@
 #include <png.h>
 
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -102,7 +103,8 @@ TEST(Image, BrokenFilesAreExplained) {
   const std::string whole = contents(file);
   for (size_t size : {whole.size() * 9 / 10, whole.size() / 2, size_t{60}}) {
     std::ofstream(file, std::ios::binary) << whole.substr(0, size);
-    EXPECT_EQ(error_of(read), file + ": error: the EXR file is truncated or damaged") << size;
+    const std::string error = error_of(read);
+    EXPECT_TRUE(error.starts_with(file + ": error: the EXR file is truncated or damaged")) << error;
   }
   EXPECT_EQ(error_of([&] { write_exr("/no/such/folder/a.exr", ramp(2, 2, 3), true, {}); }),
             "/no/such/folder/a.exr: error: cannot write: no such folder");
@@ -120,6 +122,70 @@ TEST(Image, EveryTruncationIsAnError) {
     std::ofstream(file, std::ios::binary) << whole.substr(0, size);
     EXPECT_NE(error_of([&] { read_exr(file); }), "no error") << size;
   }
+}
+
+// A written file with other numbers in its windows (16 pixels by 8 before).
+std::string with_windows(std::string content, int32_t right, int32_t bottom) {
+  for (const std::string name : {"dataWindow", "displayWindow"}) {
+    const size_t at = content.find(name) + name.size() + 1 + sizeof("box2i") + 4;
+    std::memcpy(&content[at + 8], &right, 4);
+    std::memcpy(&content[at + 12], &bottom, 4);
+  }
+  return content;
+}
+
+TEST(Image, SizesAreHeldAgainstTheFile) {
+  const TempFiles files;
+  const std::string file = files.path("window.exr");
+  write_exr(file, ramp(16, 8, 3), true, {{"note", "by hand"}});
+  const std::string whole = contents(file);
+  const auto error_with = [&](const std::string& content) {
+    std::ofstream(file, std::ios::binary) << content;
+    return error_of([&] { read_exr(file); });
+  };
+  const std::string error = file + ": error: ";
+  EXPECT_EQ(error_with(with_windows(whole, 15, 7)), "no error");
+  EXPECT_EQ(error_with(with_windows(whole, 16383, 16383)),
+            error + "the image of 16384 x 16384 pixels cannot come out of a file of " +
+                std::to_string(whole.size()) + " bytes: it is truncated or damaged");
+  EXPECT_EQ(error_with(with_windows(whole, 65534, 65534)),
+            error + "the image of 65535 x 65535 pixels is too large (at most 268435456 pixels)");
+  // One pixel or line more or less than the blocks hold.
+  for (const auto& [right, bottom] : {std::pair{16, 7}, {14, 7}, {15, 8}, {15, 6}, {-1, -1}}) {
+    EXPECT_EQ(error_with(with_windows(whole, right, bottom))
+                  .rfind(error + "the EXR file is truncated or damaged: ", 0),
+              0u)
+        << right << " " << bottom;
+  }
+  std::string attribute = whole;
+  const int32_t size = 0x69651cad;
+  std::memcpy(&attribute[attribute.find("note") + 5 + sizeof("string")], &size, 4);
+  EXPECT_EQ(error_with(attribute), error +
+                                       "the EXR file is truncated or damaged: Attribute 'note', "
+                                       "type 'string': Invalid size 1768234157");
+}
+
+// Five by three pixels, a tenth of the number of the value, in all compressions that keep halves.
+TEST(Image, ReadsEveryCompressionAndTiles) {
+  const std::filesystem::path corpus =
+      std::filesystem::path(LIMN_SOURCE_DIR) / "tests" / "fuzz" / "corpus" / "exr";
+  for (const char* name :
+       {"none", "rle", "zips", "zip", "piz", "pxr24", "none_tiled", "zip_tiled", "piz_tiled"}) {
+    const Image image = read_exr((corpus / (std::string(name) + ".exr")).string());
+    ASSERT_EQ(image.data.size(), 45u) << name;
+    for (size_t i = 0; i < image.data.size(); ++i) {
+      const float value = 0.1f * static_cast<float>(i);
+      EXPECT_NEAR(image.data[i], value, value / 2048) << name;
+    }
+  }
+  // These keep an impression.
+  for (const char* name : {"b44", "b44a", "dwaa", "dwab", "dwaa_tiled"}) {
+    const Image image = read_exr((corpus / (std::string(name) + ".exr")).string());
+    EXPECT_EQ(image.data.size(), 45u) << name;
+    EXPECT_LT(image.data.front(), image.data.back()) << name;
+  }
+  const Image grey = read_exr((corpus / "grey_offset.exr").string());
+  EXPECT_EQ(grey.data, (std::vector<float>{0, 1, 2, 3, 4, 5}));
 }
 
 // Debian's blender-data holds maps with DWA compression.

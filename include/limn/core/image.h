@@ -1,9 +1,13 @@
 #pragma once
 // Images in memory and on disk.
+#include <cstdint>
 #include <string>
 #include <vector>
 
 namespace limn {
+
+// Images that are read and films may have as many.
+inline constexpr int64_t kMaxPixels = int64_t{1} << 28;  // not tuned: 3 GB in memory
 
 // H rows of W pixels of C interleaved channels, row 0 on top, linear.
 struct Image {
@@ -32,7 +36,8 @@ struct ImageAttribute {
 };
 void write_exr(const std::string& file, const Image& image, bool half,
                const std::vector<ImageAttribute>& attributes);
-// Any scanline or tiled EXR with channels R G B (or Y) of half or float: three channels (or one).
+// Any scanline or tiled EXR with channels R G B (or Y) of half or float: three channels (or one), at
+// most kMaxPixels pixels. Sizes are held against the file's before memory is taken.
 Image read_exr(const std::string& file);
 // The string attributes of its header.
 std::vector<ImageAttribute> read_exr_attributes(const std::string& file);

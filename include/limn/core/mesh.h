@@ -89,11 +89,11 @@ Bounds bounds_of(const Mesh& mesh);
 // Mesh files: obj or ply, by the ending of the file's name (in small or capital letters).
 bool is_mesh_file(const std::string& file);
 
-// The mesh of a file (obj, unless the ending is ply). InputError (missing file, malformed line,
-// index out of range, position not finite or beyond kLargestCoordinate, no faces, non-triangle PLY
-// face, ...) with the file and, where it can be known, the line. Polygons of OBJ files are fanned
-// from their first corner. Texture coordinates are read past: nothing in limn uses them.
-// `face_normals` ignores normals of the file.
+// The mesh of a file (obj, unless the ending is ply). InputError (missing file, a word that is not
+// understood, index out of range, position not finite or beyond kLargestCoordinate, no faces,
+// non-triangle PLY face, ...) with the file and, where it can be known, the line and column.
+// Polygons of OBJ files are split into triangles, concave ones too. Texture coordinates are read
+// past: nothing in limn uses them. `face_normals` ignores normals of the file.
 Mesh read_mesh(const std::string& file, bool face_normals);
 
 // Positions of a mesh file, or of a text file with "x y z" lines, in file order: a velocity field.

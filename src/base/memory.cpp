@@ -1,0 +1,71 @@
+// How much memory is free, and the error where it is not enough.
+#include "limn/core/memory.h"
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <fstream>
+#include <limits>
+#include <string>
+
+namespace limn {
+
+namespace {
+
+constexpr double kUnlimited = std::numeric_limits<double>::infinity();
+
+// The number after `key` in a file of lines "KEY NUMBER ..."; the first word's if `key` is "".
+// `absent` if there is none ("max" is none).
+double number_in(const std::string& file, const std::string& key, double absent) {
+  std::ifstream stream(file);
+  std::string word;
+  while (!key.empty() && stream >> word && word != key) {
+  }
+  double number = 0;
+  return stream >> number ? number : absent;
+}
+
+double machine_free() { return 1024 * number_in("/proc/meminfo", "MemAvailable:", kUnlimited); }
+
+// Pages of files count as taken there, but are given back on demand.
+double container_free() {
+  const std::string folder = "/sys/fs/cgroup/";
+  const double limit = number_in(folder + "memory.max", "", kUnlimited);
+  const double taken = number_in(folder + "memory.current", "", 0);
+  const double files = number_in(folder + "memory.stat", "active_file", 0) +
+                       number_in(folder + "memory.stat", "inactive_file", 0);
+  return limit - std::max(0.0, taken - files);
+}
+
+double address_space_free() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return kUnlimited;
+  const double pages = number_in("/proc/self/statm", "", 0);
+  return static_cast<double>(limit.rlim_cur) - pages * static_cast<double>(sysconf(_SC_PAGESIZE));
+}
+
+std::string in_gigabytes(double bytes) {
+  const double gigabytes = bytes * 1e-9;
+  const auto tenths = static_cast<int64_t>(std::min(gigabytes * 10 + 0.5, 1e18));
+  return std::to_string(tenths / 10) + "." + std::to_string(tenths % 10) + " GB";
+}
+
+}  // namespace
+
+double free_memory() {
+  return std::max(0.0, std::min({machine_free(), container_free(), address_space_free()}));
+}
+
+void require_memory(const SourceLocation& where, double bytes, const std::string& what,
+                    const std::string& remedy) {
+  constexpr double kWorthAsking = 0x1p26;  // not tuned: asking takes 50 microseconds
+  if (bytes < kWorthAsking) return;
+  const double free = free_memory();
+  if (bytes <= free) return;
+  throw InputError(where, what + " takes " + in_gigabytes(bytes) + " of memory, and " +
+                              in_gigabytes(free) + " are free: " + remedy);
+}
+
+}  // namespace limn
