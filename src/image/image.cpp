@@ -6,6 +6,7 @@
 #include <ImfHeader.h>
 #include <ImfInputFile.h>
 #include <ImfOutputFile.h>
+#include <ImfStdIO.h>
 #include <ImfStringAttribute.h>
 #include <ImfTestFile.h>
 
@@ -120,11 +121,16 @@ void write_exr(const std::string& file, const Image& image, bool half,
     const Imath::V2i origin(0, 0);
     std::vector<::half> halves;
     if (half) halves = to_half(image.data);
-    Imf::OutputFile exr(output.temporary().c_str(), header);
-    exr.setFrameBuffer(half ? interleaved(halves.data(), Imf::HALF, names, image.width, origin)
-                            : interleaved(const_cast<float*>(image.data.data()), Imf::FLOAT, names,
-                                          image.width, origin));
-    exr.writePixels(image.height);
+    // In memory: a file that OpenEXR closes does not tell that the disk was full.
+    Imf::StdOSStream stream;
+    {
+      Imf::OutputFile exr(stream, header);
+      exr.setFrameBuffer(half ? interleaved(halves.data(), Imf::HALF, names, image.width, origin)
+                              : interleaved(const_cast<float*>(image.data.data()), Imf::FLOAT,
+                                            names, image.width, origin));
+      exr.writePixels(image.height);
+    }
+    output.write(stream.str());
   } catch (const std::exception& e) {
     throw InputError(SourceLocation{file}, std::string("cannot write: ") + e.what());
   }

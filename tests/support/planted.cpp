@@ -89,8 +89,8 @@ Planted planted_term(const TempFiles& files, const std::string& method, const st
 Planted planted_border(const TempFiles& files, int spp) {
   SceneParts parts = base_parts();
   const Mesh cube = cube_mesh();
-  const Mesh leaf =
-      make_mesh({{1.5f, -1, 0.3f}, {3, -1, 0}, {3, 0.5f, -0.3f}, {1.5f, 0.5f, 0}}, {{0, 1, 2}, {0, 2, 3}});
+  const Mesh leaf = make_mesh({{1.5f, -1, 0.3f}, {3, -1, 0}, {3, 0.5f, -0.3f}, {1.5f, 0.5f, 0}},
+                              {{0, 1, 2}, {0, 2, 3}});
   const std::string both =
       R"(<bsdf type="twosided">)" + diffuse("green", "0.3, 0.6, 0.2") + "</bsdf>";
   parts.body = square("floor", 3, -90, {0, 0, 0}, diffuse("chalk", "0.8, 0.8, 0.8")) +
@@ -123,7 +123,7 @@ Planted planted_normals(const TempFiles& files, int spp) {
   // The same normals, but as numbers that nothing moves.
   std::string text, velocities;
   for (const Vec3f& x : ball.positions) text += fmt::format("v {} {} {}\n", x.x, x.y, x.z);
-  for (const Vec3f& n : ball.normals) text += fmt::format("vn {} {} {}\n", n.x, n.y, n.z);
+  for (const auto& n : ball.normals) text += fmt::format("vn {} {} {}\n", n.x, n.y, n.z);
   for (const FaceIndices& f : ball.faces) {
     text += fmt::format("f {0}//{0} {1}//{1} {2}//{2}\n", f[0] + 1, f[1] + 1, f[2] + 1);
   }

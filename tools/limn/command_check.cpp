@@ -8,6 +8,7 @@
 #include "limn/core/parameter.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
+#include "tools/limn/output_files.h"
 
 namespace limn {
 namespace {
@@ -78,7 +79,7 @@ void print_check(const std::string& name, const CheckResult& r, int spp) {
 // JSON has no infinity.
 json number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
 
-json check_json(const std::string& name, const CheckResult& r, int spp) {
+json figures_json(const std::string& name, const CheckResult& r, int spp) {
   json samples = json::object(), visible = json::object(), shares = json::object();
   for (const TermRun& term : r.gradient.terms) samples[term.name] = term.samples;
   for (const CheckPower& power : r.power) {
@@ -129,12 +130,14 @@ class CheckCommand final : public Command {
                    "Step of the differences (default: found in the image, by a pilot)")
         ->check(CLI::PositiveNumber);
     app.add_option("--block", options_.block,
-                   "Compare windows this many pixels apart (default: an eighth of the longer side, at least 4)")
+                   "Compare windows this many pixels apart (default: an eighth of the longer side, "
+                   "at least 4)")
         ->check(CLI::Range(1, 1 << 20));
   }
 
   int run(const std::string&) override {
-    const Scene scene = load_scene(common_);
+    const Scene scene = load_scene(common_, warnings_);
+    check_outputs({{"--json", common_.json}}, scene, field_files(parameters_));
     options_.terms = parse_terms(terms_);
     options_.samples = parse_samples(samples_);
     for (const auto& parameter : parameters_) find_parameter(scene, parameter);
@@ -151,8 +154,10 @@ class CheckCommand final : public Command {
         fmt::print(stderr, "interrupted: no verdict\n");
         return kInterrupted;
       }
+      warnings_.add_all(r.gradient.warnings);
       print_check(parameter, r, settings.spp);
-      report.push_back(check_json(parameter, r, settings.spp));
+      report.push_back(figures_json(parameter, r, settings.spp));
+      report.back()["warnings"] = warnings_.lines();
       // What is wrong comes before what is not known.
       if (r.verdict == Verdict::kDisagree) status = kDisagree;
       if (r.verdict == Verdict::kCannotTell && status == kSuccess) status = kCannotTell;
@@ -166,6 +171,7 @@ class CheckCommand final : public Command {
 
  private:
   CommonOptions common_;
+  Warnings warnings_;
   CheckOptions options_;
   std::vector<std::string> parameters_;
   std::string terms_, samples_ = "auto";
