@@ -96,7 +96,7 @@ TEST(CheckVerdict, PlantedDefects) {
     const std::string method = methods[k / 3 % 3];
     const std::string term =
         k % 3 == 1 && method != "forest" ? std::string("direct") : terms[k % 3];
-    count(planted_term(files, method, term, 0.9, 8192), seed);
+    count(planted_term(files, method, term, 0.5, 1024), seed);
     count(planted_border(files, 1024), seed);
     count(planted_normals(files, 1024), seed);
     all += 3;
