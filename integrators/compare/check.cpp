@@ -184,7 +184,7 @@ class Checker {
     }
     Runs runs;
     runs.gradient = run_(scene_, gradient_options(), settings_of(settings_.spp, 0, 0));
-    result.step = run_differences(windows, result.step, runs);
+    result.step = run_at_small_step(windows, result.step, runs);
     if (!complete(runs, settings_.spp)) return interrupted(std::move(runs), result);
     const Residual residual = residual_of(windows, runs, result.step);
     const Places places = score_places(residual, windows, runs.gradient);
@@ -237,7 +237,7 @@ class Checker {
   }
 
   // Differences of the first run, at smaller steps until their bias is small; returns the step.
-  double run_differences(const Windows& windows, double step, Runs& runs) const {
+  double run_at_small_step(const Windows& windows, double step, Runs& runs) const {
     for (int reduced = 0;; ++reduced) {
       runs.differences = finite_differences(scene_, options_.parameter, step, fine_,
                                             settings_of(settings_.spp, 0, 1 + reduced));

@@ -16,6 +16,7 @@ CheckResult run(const Planted& planted, uint64_t seed) {
   const CheckResult r = check(planted.scene, planted.options, settings, planted.run);
   std::string power;
   for (const CheckPower& p : r.power) power += fmt::format(" {} {:.3g}", p.term, p.visible);
+  for (const Suspicion& s : r.suspicions) power += fmt::format(" z {:.1f}", s.z);
   fmt::print("{}: verdict {}, p {:.2g}, second {:.2g}, suspect {}; visible:{}\n", planted.name,
              static_cast<int>(r.verdict), r.p, r.confirmation ? r.confirmation->p : 1, r.suspect,
              power);
@@ -98,7 +99,7 @@ TEST(CheckVerdict, PlantedDefects) {
         k % 3 == 1 && method != "forest" ? std::string("direct") : terms[k % 3];
     count(planted_term(files, method, term, 0.5, 1024), seed);
     count(planted_border(files, 1024), seed);
-    count(planted_normals(files, 1024), seed);
+    count(planted_normals(files, 256), seed);
     all += 3;
   }
   fmt::print("{} runs, {} within the stated power: {} found, {} named\n", all, seen, found, named);
