@@ -309,6 +309,9 @@ class Checker {
         result.suspect = terms[t].name;
       }
     }
+    // A defect that is no part of any term's image must not be blamed on the nearest.
+    const double level = share_of_level(kCheckStageLevel, terms.size());
+    if (normal_p_value(largest) >= level) result.suspect.clear();
   }
 
   static Suspicion suspect(const Residual& residual, const Moments& term) {

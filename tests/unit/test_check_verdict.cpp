@@ -76,7 +76,7 @@ TEST(CheckVerdict, StepDoesNotGrowWithTheFloor) {
 TEST(CheckVerdict, PlantedDefects) {
   const char* wanted = std::getenv("LIMN_PLANTED_RUNS");
   if (!wanted) GTEST_SKIP() << "LIMN_PLANTED_RUNS is not set";
-  int seen = 0, found = 0, named = 0, all = 0;
+  int seen = 0, found = 0, scaled = 0, named = 0, all = 0;
   const auto count = [&](const Planted& planted, uint64_t seed) {
     const CheckResult r = run(planted, seed);
     // Where the size is not known, the defect is meant to be seen.
@@ -84,6 +84,9 @@ TEST(CheckVerdict, PlantedDefects) {
     const bool disagrees = r.verdict == Verdict::kDisagree;
     ++seen;
     found += disagrees;
+    // Other defects are no part of a term's image: they need not look like one.
+    if (planted.size == 0) return;
+    ++scaled;
     named += disagrees && names(planted, r.suspect);
   };
   const TempFiles files;
@@ -102,9 +105,10 @@ TEST(CheckVerdict, PlantedDefects) {
     count(planted_normals(files, 256), seed);
     all += 3;
   }
-  fmt::print("{} runs, {} within the stated power: {} found, {} named\n", all, seen, found, named);
+  fmt::print("{} runs, {} within the stated power: {} found; {} of {} scaled terms named\n", all,
+             seen, found, named, scaled);
   EXPECT_GE(found, 0.95 * seen);
-  EXPECT_GE(named, 0.95 * seen);
+  EXPECT_GE(named, 0.95 * scaled);
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ const char* verdict_name(Verdict verdict) {
 }
 
 std::string percent(double part) {
-  return part < 10 ? fmt::format("{:.2g} %", 100 * part) : "more than it whole";
+  return part < 10 ? fmt::format("{:.2g} %", 100 * part) : "more than all";
 }
 
 // "2.1 % of the whole; 1.9 % of interior, 6 % of camera"
@@ -43,7 +43,10 @@ std::string power_text(const CheckResult& r) {
 }
 
 void print_verdict(const CheckResult& r, int spp) {
-  if (r.verdict == Verdict::kDisagree) {
+  if (r.verdict == Verdict::kDisagree && r.suspect.empty()) {
+    fmt::print("  DISAGREE at the level {:.0e}: what is wrong looks like no single term\n",
+               kCheckLevel);
+  } else if (r.verdict == Verdict::kDisagree) {
     fmt::print("  DISAGREE at the level {:.0e}: suspect the {} term", kCheckLevel, r.suspect);
     const Suspicion& s = r.suspicions[r.gradient.term(r.suspect)];
     fmt::print(": the differences hold {:.3g} times of it (z = {:.1f})\n", 1 + s.factor, s.z);
