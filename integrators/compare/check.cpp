@@ -1,172 +1,354 @@
-// A gradient against differences: z-scores over blocks of pixels, and whom to suspect.
+// A gradient against differences: scores of windows, image and terms, what they could have seen,
+// and whom to suspect.
 #include "limn/integrators/check.h"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "integrators/compare/check_scores.h"
+#include "integrators/compare/check_step.h"
 #include "limn/core/parameter.h"
 
 namespace limn {
 namespace {
 
-// The chance that a right gradient is accused, of each of the tests.
-constexpr double kLevel = 1e-4;
+constexpr int kWindowsAlong = 8;  // the longer side, but for small films
+constexpr int kLeastSpacing = 4;  // pixels: a tent of fewer has steps that are too high
+constexpr int kFineParts = 4;     // blocks along a window's spacing
+constexpr int kStepsReduced = 3;  // times that a run may ask for a smaller step
+// What is to be found must exceed what accuses by this many standard errors: 96 %, and the second
+// run, whose errors are less, finds 99 % of it.
+constexpr double kFound = 1.75;
+// The noise goes with (n h)^-1/2 and the step with n^-1/5, so that the bias keeps below the noise.
+constexpr double kSamplesPower = 2.5;
 
-// The variance of a block's difference between gradient and differences, with lower limits that the
-// batches may not show. Under the hypothesis that the gradient is right, an edge gives events of
-// size x [per sample] at such a rate that their mean is the edge's part of the derivative: a variance
-// of at least |mean| x / spp, even where no event has come yet. And a difference of two images of
-// radiance L over 2 h is rounded to some hundred units in the last place of L / h.
-struct BlockVariance {
-  const GradientResult& result;
-  const ParameterGradient& gradient;
-  std::vector<double> radiance;  // of the blocks
-  double step;
-  bool all_edges;  // the gradient has no part but rare events, as differences have
-
-  double operator()(const DifferenceEstimate& differences, size_t block) const {
-    const Moments& blocks = differences.blocks;
-    const double edges = edge_magnitude(result, gradient, block);
-    const double rounding = 0x1p-44 * radiance[block] / step;
-    const double of_differences = std::max(
-        blocks.variance(block), edges * differences.events.large_size() / blocks.samples());
-    const Moments& own = gradient.total_blocks;
-    double of_gradient = own.variance(block);
-    if (all_edges) {
-      of_gradient = std::max(of_gradient, std::fabs(blocks.mean(block)) *
-                                              gradient.events.large_size() / own.samples());
-    }
-    return of_gradient + of_differences + rounding * rounding;
-  }
+struct Runs {
+  GradientResult gradient;
+  DifferenceResult differences;
 };
 
-std::vector<double> z_scores(const DifferenceEstimate& estimate, const BlockVariance& variance) {
-  const Moments& differences = estimate.blocks;
-  const Moments& gradient = variance.gradient.total_blocks;
-  std::vector<double> z;
-  for (size_t b = 0; b < gradient.size(); ++b) {
-    const double residual = gradient.mean(b) - differences.mean(b);
-    const double both = variance(estimate, b);
-    if (both == 0 && residual == 0) continue;
-    z.push_back(normal_from_student(residual / std::sqrt(both), gradient.batches() - 1));
+// What accuses, and what its score must exceed.
+struct Place {
+  std::string name;
+  Probe probe;
+  Score score;
+  double limit = 0;  // |z|
+};
+
+// All probes of one run. Half of the level is the windows', half that of the image and the terms.
+struct Places {
+  std::vector<Place> list;
+  size_t windows = 0;  // the first of the list
+  double p = 1;
+  size_t smallest = 0;
+};
+
+// The |z| at which a two-sided test has this level.
+double limit_of_level(double level) {
+  double low = 0, high = 40;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (normal_p_value(middle) > level ? low : high) = middle;
   }
-  return z;
+  return high;
 }
 
-Suspicion regress(const Moments& term, const DifferenceResult& differences,
-                  const BlockVariance& variance) {
-  const Moments& gradient = variance.gradient.total_blocks;
-  const DifferenceEstimate& estimate = differences.extrapolated;
-  const Moments& blocks = estimate.blocks;
-  double product = 0;
-  double square = 0;
-  for (size_t b = 0; b < term.size(); ++b) {
-    const double both = variance(estimate, b);
-    if (both == 0) continue;
-    const double value = term.mean(b);
-    const double residual = blocks.mean(b) - gradient.mean(b);
-    product += value * residual / both;
-    square += value * value / both;
-  }
-  if (square == 0) return {};
-  return {product / square, product / std::sqrt(square)};
+// One of n tests, all of which together have the level.
+double share_of_level(double level, size_t n) {
+  return n == 0 ? level : -std::expm1(std::log1p(-level) / static_cast<double>(n));
 }
 
-TotalComparison compare_totals(const Moments& gradient, const Moments& differences) {
+bool is_zero(const Probe& probe) {
+  const auto zero = [](double w) { return w == 0; };
+  return std::all_of(probe[0].begin(), probe[0].end(), zero) &&
+         std::all_of(probe[1].begin(), probe[1].end(), zero);
+}
+
+void judge(Places& places) {
+  const size_t windows = places.windows, others = places.list.size() - windows;
+  const double limits[2] = {
+      limit_of_level(share_of_level(0.5 * kCheckStageLevel, windows)),
+      limit_of_level(share_of_level(0.5 * kCheckStageLevel, others)),
+  };
+  for (size_t i = 0; i < places.list.size(); ++i) {
+    Place& place = places.list[i];
+    place.limit = limits[i < windows ? 0 : 1];
+    const double one = normal_p_value(place.score.z);
+    const double n = static_cast<double>(i < windows ? windows : others);
+    const double p = std::min(1.0, -2 * std::expm1(n * std::log1p(-one)));
+    // A NaN must not pass for agreement.
+    if (p >= places.p) continue;
+    places.p = std::isnan(p) ? 0 : p;
+    places.smallest = i;
+  }
+}
+
+Places score_places(const Residual& residual, const Windows& windows, const GradientResult& run) {
+  Places places;
+  const auto scores = residual.window_scores();
+  for (size_t k = 0; k < scores.size(); ++k) {
+    if (scores[k].value == 0 && scores[k].error == 0) continue;
+    Probe probe{std::vector<double>(windows.size()), {}};
+    probe[0][k] = 1;
+    probe[1] = probe[0];
+    places.list.push_back({"a part of the image", probe, scores[k]});
+  }
+  places.windows = places.list.size();
+  const std::vector<double> ones(windows.size(), 1.0);
+  places.list.push_back({"the whole image", {ones, ones}, residual.score({ones, ones})});
+  for (size_t t = 0; t < run.terms.size(); ++t) {
+    if (!run.terms[t].computed) continue;
+    const Probe probe = residual.term_probe(run.parameters[0].term_blocks[t]);
+    if (is_zero(probe)) continue;
+    places.list.push_back({"the " + run.terms[t].name + " term", probe, residual.score(probe)});
+  }
+  judge(places);
+  return places;
+}
+
+// The least part of an image (its means in the windows) that some probe finds.
+double visible_part(const Places& places, const std::vector<double>& image, int degrees) {
+  double visible = std::numeric_limits<double>::infinity();
+  for (const Place& place : places.list) {
+    double seen = 0;
+    for (size_t k = 0; k < image.size(); ++k) {
+      seen += 0.5 * (place.probe[0][k] + place.probe[1][k]) * image[k];
+    }
+    const double wanted = student_from_normal(place.limit, degrees) + kFound;
+    if (seen != 0) visible = std::min(visible, wanted * place.score.error / std::fabs(seen));
+  }
+  return visible;
+}
+
+double magnitude(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double v : values) sum += std::fabs(v);
+  return sum;
+}
+
+void find_power(const Places& places, const Residual& residual, const GradientResult& run,
+                CheckResult& result) {
+  const ParameterGradient& g = run.parameters[0];
+  result.power = {{"", 1, visible_part(places, residual.mean(g.total_blocks), residual.degrees())}};
+  double sum = 0;
+  for (size_t t = 0; t < run.terms.size(); ++t) {
+    if (!run.terms[t].computed) continue;
+    const std::vector<double> image = residual.mean(g.term_blocks[t]);
+    result.power.push_back(
+        {run.terms[t].name, magnitude(image), visible_part(places, image, residual.degrees())});
+    sum += result.power.back().share;
+  }
+  double worst = 0;
+  for (size_t i = 0; i < result.power.size(); ++i) {
+    CheckPower& power = result.power[i];
+    if (i > 0) power.share = sum > 0 ? power.share / sum : 0;
+    if (sum > 0 && !power.negligible()) worst = std::max(worst, power.visible);
+  }
+  result.needed_spp =
+      static_cast<double>(run.spp) * std::max(1.0, std::pow(worst / kCheckWanted, kSamplesPower));
+}
+
+TotalComparison compare_totals(const Moments& gradient, const Moments& differences,
+                               const Score& score) {
   TotalComparison total;
   total.gradient = gradient.mean(0);
   total.difference = differences.mean(0);
   total.gradient_error = std::sqrt(gradient.variance(0));
   total.difference_error = std::sqrt(differences.variance(0));
-  const double residual = total.gradient - total.difference;
-  const double error = std::hypot(total.gradient_error, total.difference_error);
-  total.z = residual == 0 ? 0 : normal_from_student(residual / error, gradient.batches() - 1);
+  total.z = -score.z;
   return total;
 }
 
-std::vector<double> block_means(const CheckResult& result, const Film& film) {
-  return sum_blocks(means(result.gradient.radiance), film.crop_width, film.crop_height,
-                    result.block);
-}
-
-// The terms that were left out.
-GradientResult other_terms(const Scene& scene, const GradientResult& result,
-                           GradientOptions options, RunSettings settings) {
-  options.terms.clear();
-  for (const TermRun& term : result.terms) {
-    if (!term.computed) options.terms.push_back(term.name);
+class Checker {
+ public:
+  Checker(const Scene& scene, const CheckOptions& options, const RunSettings& settings,
+          const GradientRun& run)
+      : scene_(scene), options_(options), settings_(settings), run_(run) {
+    const int longer = std::max(scene.film.crop_width, scene.film.crop_height);
+    block_ = options.block > 0
+                 ? options.block
+                 : std::max(kLeastSpacing, (longer + kWindowsAlong - 1) / kWindowsAlong);
+    fine_ = std::max(1, block_ / kFineParts);
   }
-  settings.progress = nullptr;
-  return gradient(scene, options, settings);
-}
 
-// Sets the suspicions, and the suspect among them.
-void suspect_terms(const Scene& scene, const GradientOptions& options, const RunSettings& settings,
-                   const BlockVariance& variance, CheckResult& result) {
-  const std::vector<TermRun>& terms = result.gradient.terms;
-  // A term that was left out may be the one that is missing.
-  std::optional<GradientResult> others;
-  double largest = -1;
-  for (size_t t = 0; t < terms.size(); ++t) {
-    if (!terms[t].computed && !others) {
-      others = other_terms(scene, result.gradient, options, settings);
+  CheckResult check() {
+    CheckResult result;
+    const Windows windows(scene_.film, block_, fine_);
+    result.block = block_;
+    result.step = options_.step;
+    if (result.step <= 0) {
+      result.step = find_check_step(scene_, options_.parameter, windows, settings_);
     }
-    const GradientResult& from = terms[t].computed ? result.gradient : *others;
-    const Suspicion suspicion =
-        regress(from.parameters[0].term_blocks[t], result.differences, variance);
-    result.suspicions.push_back(suspicion);
-    if (std::fabs(suspicion.z) > largest) {
-      largest = std::fabs(suspicion.z);
-      result.suspect = terms[t].name;
+    Runs runs;
+    runs.gradient = run_(scene_, gradient_options(), settings_of(settings_.spp, 0, 0));
+    result.step = run_at_small_step(windows, result.step, runs);
+    if (!complete(runs, settings_.spp)) return interrupted(std::move(runs), result);
+    const Residual residual = residual_of(windows, runs, result.step);
+    const Places places = score_places(residual, windows, runs.gradient);
+    std::vector<double> z;
+    for (size_t k = 0; k < places.windows; ++k) z.push_back(-places.list[k].score.z);
+    result.windows = summarize(z);
+    result.total =
+        compare_totals(runs.gradient.parameters[0].image_sum,
+                       runs.differences.extrapolated.image_sum, places.list[places.windows].score);
+    result.p = places.p;
+    const Place& found = places.list[places.smallest];
+    result.found = found.name;
+    find_power(places, residual, runs.gradient, result);
+    if (result.p < kCheckStageLevel) {
+      if (!confirm(windows, found, runs, result)) return interrupted(std::move(runs), result);
+    }
+    if (result.confirmation && result.confirmation->p < kCheckStageLevel) {
+      result.verdict = Verdict::kDisagree;
+    } else if (result.needed_spp <= static_cast<double>(settings_.spp)) {
+      result.verdict = Verdict::kAgree;
+    }
+    result.gradient = std::move(runs.gradient);
+    result.differences = std::move(runs.differences);
+    return result;
+  }
+
+ private:
+  GradientOptions gradient_options() const {
+    GradientOptions gradient_options;
+    gradient_options.parameters = {options_.parameter};
+    gradient_options.terms = options_.terms;
+    gradient_options.method = options_.method;
+    gradient_options.block = fine_;
+    gradient_options.samples = options_.samples;
+    return gradient_options;
+  }
+
+  // Seeds of their own for every stage, and for gradient and differences.
+  RunSettings settings_of(int64_t spp, int stage, int part) const {
+    RunSettings settings = settings_;
+    settings.spp = static_cast<int>(std::min<int64_t>(spp, 1 << 30));
+    settings.seed = settings_.seed + static_cast<uint64_t>(stage) * 0xc0ffee +
+                    static_cast<uint64_t>(part) * 0x5eed;
+    if (settings_.progress) {
+      settings.progress = [this, part](double done) {
+        settings_.progress(0.5 * (std::min(part, 1) + done));
+      };
+    }
+    return settings;
+  }
+
+  // Differences of the first run, at smaller steps until their bias is small; returns the step.
+  double run_at_small_step(const Windows& windows, double step, Runs& runs) const {
+    for (int reduced = 0;; ++reduced) {
+      runs.differences = finite_differences(scene_, options_.parameter, step, fine_,
+                                            settings_of(settings_.spp, 0, 1 + reduced));
+      if (options_.step > 0 || reduced == kStepsReduced) return step;
+      if (runs.differences.spp < settings_.spp) return step;
+      const double smaller = reduced_step(runs.differences, step, windows);
+      if (smaller == step) return step;
+      step = smaller;
     }
   }
-}
+
+  static bool complete(const Runs& runs, int64_t spp) {
+    return runs.gradient.spp >= spp && runs.differences.spp >= spp;
+  }
+
+  static CheckResult interrupted(Runs runs, CheckResult result) {
+    result.interrupted = true;
+    result.gradient = std::move(runs.gradient);
+    result.differences = std::move(runs.differences);
+    return result;
+  }
+
+  Residual residual_of(const Windows& windows, const Runs& runs, double step) const {
+    const Film& film = scene_.film;
+    const auto radiance =
+        sum_blocks(means(runs.gradient.radiance), film.crop_width, film.crop_height, fine_);
+    return {windows, runs.gradient, runs.differences.extrapolated, radiance, step};
+  }
+
+  // The second run, which takes the first one's place. False if it was interrupted.
+  bool confirm(const Windows& windows, const Place& found, Runs& runs, CheckResult& result) {
+    const double step = options_.step > 0 ? options_.step : 0.5 * result.step;
+    const int64_t spp = 2 * static_cast<int64_t>(settings_.spp);
+    NonFinite bad[2] = {runs.gradient.non_finite, runs.differences.non_finite};
+    runs.gradient = run_(scene_, gradient_options(), settings_of(spp, 1, 0));
+    runs.differences =
+        finite_differences(scene_, options_.parameter, step, fine_, settings_of(spp, 1, 1));
+    runs.gradient.non_finite.merge(bad[0]);
+    runs.differences.non_finite.merge(bad[1]);
+    if (!complete(runs, spp)) return false;
+    const Residual residual = residual_of(windows, runs, step);
+    // Weights from one half of the batches need not be kept from the other any more.
+    Probe probe = found.probe;
+    for (size_t k = 0; k < probe[0].size(); ++k) {
+      probe[0][k] = probe[1][k] = 0.5 * (found.probe[0][k] + found.probe[1][k]);
+    }
+    const double z = residual.score(probe).z;
+    const bool same_side = z * found.score.z >= 0;
+    const double half = 0.5 * normal_p_value(z);
+    result.confirmation = {spp, step, same_side ? half : 1 - half};
+    if (std::isnan(z)) result.confirmation->p = 0;
+    if (result.confirmation->p < kCheckStageLevel) suspect_terms(residual, runs, result);
+    return true;
+  }
+
+  // Sets the suspicions, and the suspect among them, from the second run.
+  void suspect_terms(const Residual& residual, const Runs& runs, CheckResult& result) const {
+    const std::vector<TermRun>& terms = runs.gradient.terms;
+    // A term that was left out may be the one that is missing.
+    std::optional<GradientResult> others;
+    double largest = -1;
+    for (size_t t = 0; t < terms.size(); ++t) {
+      if (!terms[t].computed && !others) others = other_terms(runs.gradient);
+      const GradientResult& from = terms[t].computed ? runs.gradient : *others;
+      const Suspicion suspicion = suspect(residual, from.parameters[0].term_blocks[t]);
+      result.suspicions.push_back(suspicion);
+      if (std::fabs(suspicion.z) > largest) {
+        largest = std::fabs(suspicion.z);
+        result.suspect = terms[t].name;
+      }
+    }
+    // A defect that is no part of any term's image must not be blamed on the nearest.
+    const double level = share_of_level(kCheckStageLevel, terms.size());
+    if (normal_p_value(largest) >= level) result.suspect.clear();
+  }
+
+  static Suspicion suspect(const Residual& residual, const Moments& term) {
+    const Probe probe = residual.term_probe(term);
+    const std::vector<double> image = residual.mean(term);
+    double whole = 0;
+    for (size_t k = 0; k < image.size(); ++k) {
+      whole += 0.5 * (probe[0][k] + probe[1][k]) * image[k];
+    }
+    if (whole == 0) return {};
+    const Score score = residual.score(probe);
+    return {score.value / whole, score.z};
+  }
+
+  GradientResult other_terms(const GradientResult& result) const {
+    GradientOptions options = gradient_options();
+    options.terms.clear();
+    for (const TermRun& term : result.terms) {
+      if (!term.computed) options.terms.push_back(term.name);
+    }
+    RunSettings settings = settings_of(result.spp, 2, 0);
+    settings.progress = nullptr;
+    return gradient(scene_, options, settings);
+  }
+
+  const Scene& scene_;
+  const CheckOptions& options_;
+  const RunSettings& settings_;
+  const GradientRun& run_;
+  int block_ = 0, fine_ = 0;
+};
 
 }  // namespace
 
-CheckResult check(const Scene& scene, const CheckOptions& options, const RunSettings& settings) {
-  CheckResult result;
-  const Parameter parameter = find_parameter(scene, options.parameter);
-  const int longer = std::max(scene.film.crop_width, scene.film.crop_height);
-  result.step = options.step > 0 ? options.step : parameter.natural_step;
-  result.block = options.block > 0 ? options.block : std::max(1, (longer + 7) / 8);
-
-  // The job is two runs; differences trace four images without derivatives.
-  RunSettings first = settings;
-  RunSettings second = settings;
-  second.seed = settings.seed + 0x5eed;
-  if (settings.progress) {
-    first.progress = [&](double done) { settings.progress(0.5 * done); };
-    second.progress = [&](double done) { settings.progress(0.5 + 0.5 * done); };
-  }
-  GradientOptions gradient_options;
-  gradient_options.parameters = {options.parameter};
-  gradient_options.terms = options.terms;
-  gradient_options.method = options.method;
-  gradient_options.block = result.block;
-  gradient_options.samples = options.samples;
-  result.gradient = gradient(scene, gradient_options, first);
-  result.differences =
-      finite_differences(scene, options.parameter, result.step, result.block, second);
-
-  const ParameterGradient& g = result.gradient.parameters[0];
-  const DifferenceResult& d = result.differences;
-  const auto slides = [](const TermRun& term) { return term.computed && !term.edges; };
-  const auto& terms = result.gradient.terms;
-  const BlockVariance variance{result.gradient, g, block_means(result, scene.film), result.step,
-                               std::none_of(terms.begin(), terms.end(), slides)};
-  result.at_step = summarize(z_scores(d.at_step, variance));
-  result.at_double_step = summarize(z_scores(d.at_double_step, variance));
-  result.extrapolated = summarize(z_scores(d.extrapolated, variance));
-  result.total = compare_totals(g.image_sum, d.extrapolated.image_sum);
-  // Extrapolation only helps where the double step is still small; a wrong gradient agrees with
-  // neither.
-  const bool blocks_agree =
-      result.at_step.plausible(kLevel) || result.extrapolated.plausible(kLevel);
-  result.agree = blocks_agree && normal_p_value(result.total.z) >= kLevel;
-  if (!result.agree) suspect_terms(scene, gradient_options, first, variance, result);
-  return result;
+CheckResult check(const Scene& scene, const CheckOptions& options, const RunSettings& settings,
+                  const GradientRun& run) {
+  return Checker(scene, options, settings, run).check();
 }
 
 }  // namespace limn

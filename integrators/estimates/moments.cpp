@@ -13,6 +13,7 @@ void Moments::add_batch(const std::vector<double>& sums, int64_t samples) {
   }
   samples_ += samples;
   ++batches_;
+  if (keep_) kept_.push_back({sums, samples});
 }
 
 double Moments::variance(size_t i) const {

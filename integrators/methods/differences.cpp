@@ -35,7 +35,7 @@ std::vector<double> mean_of_two(const std::vector<double>& a, const std::vector<
 
 DifferenceEstimate::DifferenceEstimate(const Film& film, int block)
     : total(film_size(film)),
-      blocks(block > 0 ? block_count(film.crop_width, film.crop_height, block) : 0),
+      blocks(block > 0 ? block_count(film.crop_width, film.crop_height, block) : 0, true),
       image_sum(1) {}
 
 void DifferenceEstimate::add_batch(const std::vector<double>& sums, const Film& film, int block,

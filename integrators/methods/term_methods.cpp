@@ -199,7 +199,8 @@ class TermJob {
   GradientResult empty_result() const {
     const Film& film = scene_.film;
     const int block = options_.block;
-    const Moments blocks(block > 0 ? block_count(film.crop_width, film.crop_height, block) : 0);
+    const Moments blocks(block > 0 ? block_count(film.crop_width, film.crop_height, block) : 0,
+                         true);
     GradientResult result;
     for (size_t t = 0; t < types_.size(); ++t) {
       result.terms.push_back({types_[t]->name, computed_[t], types_[t]->edges, 1, {}, {}});

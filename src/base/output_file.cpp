@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <fstream>
 #include <system_error>
 
 #include "limn/core/error.h"
@@ -22,6 +23,13 @@ OutputFile::OutputFile(const std::string& file)
 OutputFile::~OutputFile() {
   std::error_code ignored;
   if (!committed_) std::filesystem::remove(temporary_, ignored);
+}
+
+void OutputFile::write(const std::string& bytes) const {
+  std::ofstream stream(temporary_, std::ios::binary);
+  stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  stream.close();
+  if (!stream) throw InputError(SourceLocation{file_}, "cannot write: is the disk full?");
 }
 
 void OutputFile::commit() {

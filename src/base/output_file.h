@@ -13,6 +13,8 @@ class OutputFile {
   OutputFile& operator=(const OutputFile&) = delete;
 
   const std::string& temporary() const { return temporary_; }
+  // All of the temporary file; InputError if it cannot be written, as on a full disk.
+  void write(const std::string& bytes) const;
   void commit();  // InputError if the file cannot be put in place
 
  private:

@@ -6,6 +6,7 @@
 #include <ImfHeader.h>
 #include <ImfInputFile.h>
 #include <ImfOutputFile.h>
+#include <ImfStdIO.h>
 #include <ImfStringAttribute.h>
 #include <ImfTestFile.h>
 #include <openexr.h>
@@ -331,11 +332,13 @@ void write_exr(const std::string& file, const Image& image, bool half,
     header.insert(a.name, Imf::StringAttribute(a.value));
   }
   OutputFile output(file);
+  // In memory: a file that OpenEXR closes does not tell that the disk was full.
+  Imf::StdOSStream stream;
   try {
     const Imath::V2i origin(0, 0);
     std::vector<::half> halves;
     if (half) halves = to_half(image.data);
-    Imf::OutputFile exr(output.temporary().c_str(), header);
+    Imf::OutputFile exr(stream, header);
     exr.setFrameBuffer(half ? interleaved(halves.data(), Imf::HALF, names, image.width, origin)
                             : interleaved(const_cast<float*>(image.data.data()), Imf::FLOAT, names,
                                           image.width, origin));
@@ -343,6 +346,7 @@ void write_exr(const std::string& file, const Image& image, bool half,
   } catch (const std::exception& e) {
     throw InputError(SourceLocation{file}, std::string("cannot write: ") + e.what());
   }
+  output.write(stream.str());
   output.commit();
 }
 

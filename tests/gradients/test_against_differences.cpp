@@ -26,16 +26,16 @@ CheckResult run_check(const Scene& scene, const std::string& parameter, int spp,
   fmt::print(
       "{:28} {:3} blocks, mean z {:6.2f}, sd {:5.2f}, max |z| {:6.2f}; image {:10.4g} +- "
       "{:8.2g}, differences {:10.4g} +- {:8.2g}, z {:6.2f}\n",
-      parameter.substr(0, parameter.find(':')), r.extrapolated.count, r.extrapolated.mean,
-      r.extrapolated.deviation, r.extrapolated.largest, r.total.gradient, r.total.gradient_error,
+      parameter.substr(0, parameter.find(':')), r.windows.count, r.windows.mean,
+      r.windows.deviation, r.windows.largest, r.total.gradient, r.total.gradient_error,
       r.total.difference, r.total.difference_error, r.total.z);
   return r;
 }
 
 void expect_agreement(const Scene& scene, const std::string& parameter, int spp) {
   const CheckResult r = run_check(scene, parameter, spp);
-  EXPECT_GT(r.extrapolated.count, 0) << parameter;
-  EXPECT_TRUE(r.agree) << parameter << ": suspect " << r.suspect;
+  EXPECT_GT(r.windows.count, 0) << parameter;
+  EXPECT_NE(r.verdict, Verdict::kDisagree) << parameter << ": suspect " << r.suspect;
 }
 
 // A leaf of two triangles, bent, seen from both sides.
@@ -115,7 +115,7 @@ TEST_P(MissingTerm, IsNoticedAndNamed) {
   std::erase(terms, missing);
   const CheckResult r =
       run_check(scene, "ball.translate.y", 1024, terms, with_regions ? "silhouettes" : "forest");
-  EXPECT_FALSE(r.agree);
+  EXPECT_EQ(r.verdict, Verdict::kDisagree);
   EXPECT_EQ(r.suspect, missing);
   const Suspicion& suspicion = r.suspicions[r.gradient.term(missing)];
   EXPECT_NEAR(suspicion.factor, 1, 6 / std::fabs(suspicion.z));
@@ -156,11 +156,11 @@ TEST_P(CoarseBall, DisagreesWhereShadingJumps) {
   Scene scene = make(files);
   scene.shading = ShadingModel::kMitsuba;
   const CheckResult r = run_check(scene, "ball.scale", 512);
-  EXPECT_FALSE(r.agree);
-  EXPECT_GT(std::max(std::fabs(r.total.z), r.extrapolated.largest), 6);
+  EXPECT_EQ(r.verdict, Verdict::kDisagree);
+  EXPECT_GT(std::max(std::fabs(r.total.z), r.windows.largest), 6);
   ASSERT_EQ(r.gradient.warnings.size(), 1u);
   scene.shading = ShadingModel::kContinuous;
-  EXPECT_TRUE(run_check(scene, "ball.scale", 512).agree);
+  EXPECT_NE(run_check(scene, "ball.scale", 512).verdict, Verdict::kDisagree);
 }
 
 INSTANTIATE_TEST_SUITE_P(, CoarseBall,

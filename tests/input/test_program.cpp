@@ -193,8 +193,9 @@ TEST_F(Program, ComparesOnlyWhatItKnows) {
 TEST_F(Program, ChecksBothWays) {
   const std::string check = "check " + scene_ + " --spp 2048 --block 2 --wrt screen.translate.y";
   const Outcome right = run(check);
-  EXPECT_EQ(right.status, 0) << right.text;
-  EXPECT_NE(right.text.find("agree"), std::string::npos);
+  // Too few samples for a verdict are no accusation.
+  EXPECT_TRUE(right.status == 0 || right.status == 4) << right.text;
+  EXPECT_NE(right.text.find("found with 95 %"), std::string::npos);
   const Outcome wrong = run(check + " --terms interior,camera,boundary");
   EXPECT_EQ(wrong.status, 1) << wrong.text;
   EXPECT_NE(wrong.text.find("suspect the direct term"), std::string::npos) << wrong.text;
@@ -231,7 +232,7 @@ TEST_F(Program, ChecksAnyMethod) {
   for (const std::string method : {"li2019", "fd"}) {
     const Outcome outcome = run("check " + scene_ + " --spp 512 --block 2 --method " + method +
                                 " --wrt screen.translate.y");
-    EXPECT_EQ(outcome.status, 0) << method << outcome.text;
+    EXPECT_TRUE(outcome.status == 0 || outcome.status == 4) << method << outcome.text;
   }
 }
 
@@ -341,6 +342,87 @@ TEST_F(Program, OutputsThatCannotBeWritten) {
   EXPECT_NE(text.find("/proc/no/such.exr: error: cannot be written"), std::string::npos) << text;
   EXPECT_NE(refused("render " + scene_ + " -o " + files_.path("out.jpg")).find(".exr"),
             std::string::npos);
+}
+
+TEST_F(Program, OutputsThatCollide) {
+  const std::string gradient = "gradient " + scene_ + " --spp 2 --quiet --wrt screen.translate.x";
+  EXPECT_NE(refused(gradient + " -o " + out() + " --json " + out())
+                .find("-o and --json would both write this file"),
+            std::string::npos);
+  EXPECT_NE(
+      refused(gradient + " --wrt screen.translate.x -o " + out()).find("would have this name"),
+      std::string::npos);
+  EXPECT_NE(refused(gradient + " -o " + out() + " --json " + scene_)
+                .find("--json would write over a file that is read"),
+            std::string::npos);
+  EXPECT_NE(refused("check " + scene_ + " --wrt screen.translate.x --json " + files_.path("."))
+                .find("it is a folder"),
+            std::string::npos);
+  EXPECT_NE(refused("info " + scene_ + " --json " + files_.path("none/x.json")).find("no folder"),
+            std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(out()));
+}
+
+TEST_F(Program, NothingOldLiesBesideANewImage) {
+  const auto there = [&](const char* ending) {
+    return std::filesystem::exists(files_.path(std::string("out") + ending));
+  };
+  files_.write("out_notes.exr", "not an image");
+  const std::string gradient = "gradient " + scene_ + " --quiet -o " + out();
+  EXPECT_EQ(run(gradient + " --spp 2 --sample-images --wrt screen.translate.x" +
+                " --wrt screen.translate.y")
+                .status,
+            0);
+  EXPECT_TRUE(there("_screen.translate.y_stderr.exr") && there("_samples_camera.exr"));
+  EXPECT_EQ(run(gradient + " --spp 2 --wrt screen.translate.x").status, 0);
+  EXPECT_FALSE(there("_screen.translate.y.exr") || there("_screen.translate.y.png") ||
+               there("_screen.translate.y_stderr.exr") || there("_samples_camera.exr"));
+  EXPECT_TRUE(there(".exr") && there("_stderr.exr"));
+  EXPECT_EQ(run("render " + scene_ + " --spp 1 --quiet -o " + out()).status, 0);
+  EXPECT_FALSE(there("_stderr.exr"));
+  EXPECT_TRUE(there("_notes.exr"));
+}
+
+// A file that may not grow is as good as a full disk.
+TEST_F(Program, FullDisksAreAnError) {
+  const Outcome outcome =
+      run("gradient " + scene_ + " --spp 2 --quiet --wrt screen.translate.x" + " -o " + out(),
+          "trap '' XFSZ; ulimit -f 1; ");
+  EXPECT_EQ(outcome.status, 2) << outcome.text;
+  EXPECT_NE(outcome.text.find("cannot write"), std::string::npos) << outcome.text;
+  EXPECT_FALSE(std::filesystem::exists(out()));
+}
+
+TEST_F(Program, SigtermWritesWhatIsDone) {
+  const Outcome outcome = run(
+      "gradient " + scene_ + " --quiet --spp 1000000000 --wrt " + "screen.translate.x -o " + out(),
+      "timeout --preserve-status -s TERM 2 ");
+  EXPECT_EQ(outcome.status, 130) << outcome.text;
+  EXPECT_TRUE(std::filesystem::exists(out()));
+}
+
+// Every warning of `info` stands in the figures of a run, too.
+TEST_F(Program, WarningsAreInTheFigures) {
+  files_.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 2\n");
+  SceneParts parts;
+  parts.width = parts.height = 2;
+  parts.body = R"(  <shape type="obj" id="a"><string name="filename" value="a.obj"/></shape>
+)";
+  const std::string scene = files_.write("collapsed.xml", scene_text(parts));
+  const std::string figures = files_.path("figures.json");
+  const auto warnings = [&](const std::string& arguments) {
+    run(arguments + " --json " + figures);
+    std::ifstream stream(figures);
+    const auto report = nlohmann::json::parse(stream);
+    return (report.is_array() ? report[0] : report)["warnings"];
+  };
+  const auto of_info = warnings("info " + scene);
+  ASSERT_EQ(of_info.size(), 1u);
+  const std::string wrt = " --spp 2 --quiet --wrt a.translate.x";
+  EXPECT_EQ(warnings("gradient " + scene + wrt + " -o " + out())[0], of_info[0]);
+  EXPECT_EQ(warnings("check " + scene + wrt), of_info);
+  EXPECT_EQ(warnings("render " + scene + " --spp 1 --quiet -o " + out()), of_info);
+  EXPECT_EQ(warnings("check " + scene + wrt + " --shading mitsuba").size(), 2u);
 }
 
 TEST_F(Program, NonFiniteSamplesAreAnError) {

@@ -7,7 +7,14 @@
 namespace limn {
 
 // Exit statuses.
-enum Status { kSuccess = 0, kDisagree = 1, kBadInput = 2, kNonFinite = 3, kInterrupted = 130 };
+enum Status {
+  kSuccess = 0,
+  kDisagree = 1,
+  kBadInput = 2,
+  kNonFinite = 3,
+  kCannotTell = 4,  // a check whose samples were too few for a verdict
+  kInterrupted = 130
+};
 
 class Command {
  public:

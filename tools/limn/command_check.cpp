@@ -2,75 +2,122 @@
 #include "limn/integrators/check.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
+#include "tools/limn/output_files.h"
 
 namespace limn {
 namespace {
 
 using nlohmann::json;
 
-void print_z(const char* name, double step, const ZSummary& z) {
-  fmt::print("  {:24} {:10.3g} {:7} {:8.2f} {:8.2f} {:8.2f} {:9.2g}\n", name, step, z.count, z.mean,
-             z.deviation, z.largest, std::min(z.p_chi_square, z.p_largest));
+const char* verdict_name(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kAgree:
+      return "agree";
+    case Verdict::kDisagree:
+      return "disagree";
+    case Verdict::kCannotTell:
+      break;
+  }
+  return "cannot tell";
 }
 
-json z_json(const ZSummary& z) {
-  return {{"blocks", z.count},
-          {"mean", z.mean},
-          {"deviation", z.deviation},
-          {"largest", z.largest},
-          {"p_chi_square", z.p_chi_square},
-          {"p_largest", z.p_largest}};
+std::string percent(double part) {
+  return part < 10 ? fmt::format("{:.2g} %", 100 * part) : "more than all";
 }
 
-void print_check(const std::string& name, const CheckResult& r) {
+// "2.1 % of the whole; 1.9 % of interior, 6 % of camera"
+std::string power_text(const CheckResult& r) {
+  std::string text;
+  for (const CheckPower& power : r.power) {
+    if (!power.term.empty() && power.negligible()) continue;
+    const std::string of = power.term.empty() ? "the whole" : power.term;
+    text += (text.empty() ? "" : ", ") + percent(power.visible) + " of " + of;
+  }
+  return text;
+}
+
+void print_verdict(const CheckResult& r, int spp) {
+  if (r.verdict == Verdict::kDisagree && r.suspect.empty()) {
+    fmt::print("  DISAGREE at the level {:.0e}: what is wrong looks like no single term\n",
+               kCheckLevel);
+  } else if (r.verdict == Verdict::kDisagree) {
+    fmt::print("  DISAGREE at the level {:.0e}: suspect the {} term", kCheckLevel, r.suspect);
+    const Suspicion& s = r.suspicions[r.gradient.term(r.suspect)];
+    fmt::print(": the differences hold {:.3g} times of it (z = {:.1f})\n", 1 + s.factor, s.z);
+  } else if (r.verdict == Verdict::kAgree) {
+    fmt::print("  agree\n");
+  } else {
+    fmt::print("  CANNOT TELL: an error of a fifth could have hidden: take about --spp {:.2g}\n",
+               std::max(r.needed_spp, spp + 1.0));
+  }
+}
+
+void print_check(const std::string& name, const CheckResult& r, int spp) {
   std::string samples;
   for (const TermRun& term : r.gradient.terms) {
     samples += fmt::format("{}{:.3g} {}", samples.empty() ? "" : ", ", term.samples, term.name);
   }
-  fmt::print("{}: {} samples per pixel ({}), blocks of {} x {} pixels\n", name, r.gradient.spp,
-             samples, r.block, r.block);
-  fmt::print("  {:24} {:>10} {:>7} {:>8} {:>8} {:>8} {:>9}\n", "z against", "step", "blocks",
-             "mean", "sd", "max |z|", "p");
-  print_z("differences", r.step, r.at_step);
-  print_z("differences, twice", 2 * r.step, r.at_double_step);
-  print_z("both, extrapolated", r.step, r.extrapolated);
+  fmt::print("{}: {} samples per pixel ({}), {} windows of {} pixels, step {:.3g}\n", name, spp,
+             samples, r.windows.count, r.block, r.step);
   fmt::print("  whole image: gradient {:.6g} +- {:.2g}, differences {:.6g} +- {:.2g}, z = {:.2f}\n",
              r.total.gradient, r.total.gradient_error, r.total.difference, r.total.difference_error,
              r.total.z);
-  if (r.agree) {
-    fmt::print("  agree\n");
-    return;
+  fmt::print("  windows: z has mean {:.2f}, deviation {:.2f}, largest {:.2f}\n", r.windows.mean,
+             r.windows.deviation, r.windows.largest);
+  fmt::print("  p = {:.2g} for windows, image and terms together, smallest at {}\n", r.p, r.found);
+  if (r.confirmation) {
+    fmt::print("  second run there, {} samples per pixel, step {:.3g}: p = {:.2g}\n",
+               r.confirmation->spp, r.confirmation->step, r.confirmation->p);
   }
-  const Suspicion& s = r.suspicions[r.gradient.term(r.suspect)];
-  fmt::print(
-      "  DISAGREE: suspect the {} term: the differences hold {:.3g} times more of it (z = "
-      "{:.1f}).\n"
-      "  If the two steps disagree with each other as well, try a smaller --step.\n",
-      r.suspect, 1 + s.factor, s.z);
+  fmt::print("  found with 95 %: an error of {}\n", power_text(r));
+  print_verdict(r, spp);
 }
 
-json check_json(const std::string& name, const CheckResult& r) {
-  json samples = json::object();
+// JSON has no infinity.
+json number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
+
+json figures_json(const std::string& name, const CheckResult& r, int spp) {
+  json samples = json::object(), visible = json::object(), shares = json::object();
   for (const TermRun& term : r.gradient.terms) samples[term.name] = term.samples;
-  return {{"parameter", name},
-          {"method", r.gradient.method},
-          {"step", r.step},
-          {"spp", r.gradient.spp},
-          {"samples", samples},
-          {"agree", r.agree},
-          {"gradient_sum", r.total.gradient},
-          {"gradient_sum_stderr", r.total.gradient_error},
-          {"difference_sum", r.total.difference},
-          {"difference_sum_stderr", r.total.difference_error},
-          {"z_sum", r.total.z},
-          {"z_at_step", z_json(r.at_step)},
-          {"z_at_double_step", z_json(r.at_double_step)},
-          {"z_extrapolated", z_json(r.extrapolated)}};
+  for (const CheckPower& power : r.power) {
+    const std::string of = power.term.empty() ? "total" : power.term;
+    visible[of] = number(power.visible);
+    shares[of] = power.share;
+  }
+  json report = {{"parameter", name},
+                 {"method", r.gradient.method},
+                 {"step", r.step},
+                 {"spp", spp},
+                 {"samples", samples},
+                 {"verdict", verdict_name(r.verdict)},
+                 {"level", kCheckLevel},
+                 {"p", r.p},
+                 {"smallest_at", r.found},
+                 {"visible", visible},
+                 {"shares", shares},
+                 {"needed_spp", number(r.needed_spp)},
+                 {"gradient_sum", r.total.gradient},
+                 {"gradient_sum_stderr", r.total.gradient_error},
+                 {"difference_sum", r.total.difference},
+                 {"difference_sum_stderr", r.total.difference_error},
+                 {"z_sum", r.total.z},
+                 {"windows",
+                  {{"count", r.windows.count},
+                   {"mean", r.windows.mean},
+                   {"deviation", r.windows.deviation},
+                   {"largest", r.windows.largest}}}};
+  if (r.confirmation) {
+    report["second_run"] = {
+        {"spp", r.confirmation->spp}, {"step", r.confirmation->step}, {"p", r.confirmation->p}};
+  }
+  if (r.verdict == Verdict::kDisagree) report["suspect"] = r.suspect;
+  return report;
 }
 
 class CheckCommand final : public Command {
@@ -83,15 +130,17 @@ class CheckCommand final : public Command {
     add_parameter_options(app, parameters_, options_.method, all);
     add_term_options(app, terms_, samples_);
     app.add_option("--step", options_.step,
-                   "Step of the differences (default: the parameter's own)")
+                   "Step of the differences (default: found in the image, by a pilot)")
         ->check(CLI::PositiveNumber);
     app.add_option("--block", options_.block,
-                   "Compare blocks of this many pixels (default: an eighth of the longer side)")
+                   "Compare windows this many pixels apart (default: an eighth of the longer side, "
+                   "at least 4)")
         ->check(CLI::Range(1, 1 << 20));
   }
 
   int run(const std::string&) override {
-    const Scene scene = load_scene(common_);
+    const Scene scene = load_scene(common_, warnings_);
+    check_outputs({{"--json", common_.json}}, scene, field_files(parameters_));
     options_.terms = parse_terms(terms_);
     options_.samples = parse_samples(samples_);
     for (const auto& parameter : parameters_) find_parameter(scene, parameter);
@@ -104,13 +153,17 @@ class CheckCommand final : public Command {
       }
       options_.parameter = parameter;
       const CheckResult r = check(scene, options_, settings);
-      if (r.differences.spp < settings.spp) {
+      if (r.interrupted) {
         fmt::print(stderr, "interrupted: no verdict\n");
         return kInterrupted;
       }
-      print_check(parameter, r);
-      report.push_back(check_json(parameter, r));
-      if (!r.agree) status = kDisagree;
+      warnings_.add_all(r.gradient.warnings);
+      print_check(parameter, r, settings.spp);
+      report.push_back(figures_json(parameter, r, settings.spp));
+      report.back()["warnings"] = warnings_.lines();
+      // What is wrong comes before what is not known.
+      if (r.verdict == Verdict::kDisagree) status = kDisagree;
+      if (r.verdict == Verdict::kCannotTell && status == kSuccess) status = kCannotTell;
       NonFinite bad = r.gradient.non_finite;
       bad.merge(r.differences.non_finite);
       if (const int s = finish_status(bad, settings.spp, settings.spp, "")) status = s;
@@ -121,6 +174,7 @@ class CheckCommand final : public Command {
 
  private:
   CommonOptions common_;
+  Warnings warnings_;
   CheckOptions options_;
   std::vector<std::string> parameters_;
   std::string terms_, samples_ = "auto";

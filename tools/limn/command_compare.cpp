@@ -11,6 +11,7 @@
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
 #include "tools/limn/compare_output.h"
+#include "tools/limn/output_files.h"
 #include "tools/limn/report_script.h"
 #include "tools/mitsuba/mitsuba_method.h"
 
@@ -305,9 +306,13 @@ int CompareCommand::run(const std::string& command_line) {
   if (common_.spp > 0) {
     throw InputError("--spp: methods are compared at equal time: say how long with --time");
   }
-  const Scene scene = load_scene(common_);
+  Warnings warnings;
+  const Scene scene = load_scene(common_, warnings);
   find_parameter(scene, command_.parameter);
   make_folder(command_.output);
+  check_outputs(
+      {{"-o", (fs::path(command_.output) / "compare.json").string()}, {"--json", common_.json}},
+      scene, field_files({command_.parameter}));
   const RunSettings settings = make_settings(common_, scene, name());
   Comparer comparer(common_, command_, scene, settings, command_line);
   if (!comparer.run()) {

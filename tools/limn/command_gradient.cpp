@@ -11,6 +11,7 @@
 #include "limn/core/parameter.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
+#include "tools/limn/output_files.h"
 
 namespace limn {
 namespace {
@@ -69,10 +70,13 @@ struct Sum {
 };
 Sum image_sum(const Moments& sum) { return {sum.mean(0), std::sqrt(sum.variance(0))}; }
 
+std::string stderr_file(const std::string& output) { return with_ending(output, "_stderr.exr"); }
+
 // Writes the images of one parameter; returns its figures.
 json write_parameter(const Scene& scene, const ParameterGradient& g,
                      const std::vector<TermRun>& terms, const std::string& output,
-                     std::vector<ImageAttribute> attributes, const CommonOptions& common) {
+                     std::vector<ImageAttribute> attributes, const CommonOptions& common,
+                     Warnings& warnings) {
   attributes.push_back({"limn.parameter", g.name});
   const int width = scene.film.crop_width;
   const int height = scene.film.crop_height;
@@ -84,20 +88,19 @@ json write_parameter(const Scene& scene, const ParameterGradient& g,
   write_signed_png(picture, image, scale);
   std::string errors = "none (one batch only)";
   if (g.total.batches() > 1) {
-    errors = with_ending(output, "_stderr.exr");
+    errors = stderr_file(output);
     write_exr(errors, film_channels(scene, standard_error_image(g.total, width, height)), false,
               attributes);
   }
   const Sum sum = image_sum(g.image_sum);
+  if (const double share = worst_share(g.total); share >= kRulingPixels) {
+    warnings.add_all({fmt::format(
+        "{}: {:.0f} % of the squared error lie in a thousandth of the pixels: few samples rule the "
+        "standard errors",
+        g.name, 100 * share)});
+  }
   if (!common.quiet) {
     fmt::print("{}: {}, {}, standard error {}\n", g.name, output, picture, errors);
-    if (const double share = worst_share(g.total); share >= kRulingPixels) {
-      fmt::print(
-          stderr,
-          "warning: {}: {:.0f} % of the squared error lie in a thousandth of the pixels: few "
-          "samples rule the standard errors\n",
-          g.name, 100 * share);
-    }
     fmt::print(
         "  picture: blue -{0:.4g}, white 0, red +{0:.4g}; sum over the image {1:.6g} +- {2:.2g}\n",
         scale, sum.value, sum.error);
@@ -267,7 +270,7 @@ class GradientCommand final : public Command {
   }
 
   int run(const std::string& command_line) override {
-    const Scene scene = load_scene(common_);
+    const Scene scene = load_scene(common_, warnings_);
     options_.terms = parse_terms(terms_);
     options_.samples = parse_samples(samples_);
     options_.uniform_samples = samples_ == "uniform";
@@ -279,9 +282,11 @@ class GradientCommand final : public Command {
                              : with_ending(output_, "_" + file_part(parameter) + ".exr"));
       check_output(outputs_.back());
     }
+    check_outputs(planned_files(), scene, field_files(options_.parameters));
+    check_memory(scene);
     const RunSettings settings = make_settings(common_, scene, name());
     const GradientResult result = gradient(scene, options_, settings);
-    for (const auto& warning : result.warnings) fmt::print(stderr, "warning: {}\n", warning);
+    warnings_.add_all(result.warnings);
     if (result.spp == 0) {
       fmt::print(stderr, "interrupted before the first pass over the image: nothing is written\n");
       return kInterrupted;
@@ -305,7 +310,59 @@ class GradientCommand final : public Command {
     return kSuccess;
   }
 
-  void write(const Scene& scene, const RunSettings& settings, const GradientResult& result) const {
+  // All that may be written, before the run.
+  std::vector<PlannedFile> planned_files() const {
+    std::vector<PlannedFile> files;
+    for (size_t k = 0; k < outputs_.size(); ++k) {
+      const std::string option = outputs_.size() > 1 ? "-o, --wrt " + options_.parameters[k] : "-o";
+      for (const std::string& file :
+           {outputs_[k], with_ending(outputs_[k], ".png"), stderr_file(outputs_[k])}) {
+        files.push_back({option, file});
+      }
+    }
+    if (sample_images_) {
+      for (const std::string& term : find_method(options_.method).terms) {
+        files.push_back({"--sample-images", samples_file(term)});
+      }
+    }
+    files.push_back({"--json", common_.json});
+    return files;
+  }
+
+  // Moments and sums of batches: numbers of each pixel and channel.
+  void check_memory(const Scene& scene) const {
+    const double terms = static_cast<double>(find_method(options_.method).terms.size());
+    const double parameters = static_cast<double>(options_.parameters.size());
+    const double numbers = parameters * (2 * (terms + 1) + terms) + 4;
+    const double bytes = numbers * sizeof(double) * 3 * scene.film.crop_width *
+                         static_cast<double>(scene.film.crop_height);
+    const double available = available_memory();
+    if (available <= 0 || bytes < available) return;
+    throw InputError(fmt::format(
+        "the derivative images of {} parameter{} of {} x {} pixels need {:.3g} GB, {:.3g} GB are "
+        "free: take fewer --wrt in one run, or a smaller film or crop",
+        parameters, parameters == 1 ? "" : "s", scene.film.crop_width, scene.film.crop_height,
+        bytes / 1e9, available / 1e9));
+  }
+
+  std::string samples_file(const std::string& term) const {
+    return with_ending(output_, "_samples_" + term + ".exr");
+  }
+
+  // What this run leaves: older files of the same name are none of it.
+  void remove_older(const GradientResult& result) const {
+    std::vector<std::string> written = outputs_;
+    for (size_t k = 0; k < outputs_.size(); ++k) {
+      if (result.parameters[k].total.batches() > 1) written.push_back(stderr_file(outputs_[k]));
+    }
+    for (const TermRun& term : result.terms) {
+      if (sample_images_ && term.computed) written.push_back(samples_file(term.name));
+    }
+    remove_stale(output_, written);
+  }
+
+  void write(const Scene& scene, const RunSettings& settings, const GradientResult& result) {
+    remove_older(result);
     std::string terms;
     json samples = json::object();
     for (const TermRun& term : result.terms) {
@@ -316,10 +373,11 @@ class GradientCommand final : public Command {
     attributes.push_back({"limn.terms", terms});
     attributes.push_back({"limn.method", result.method});
     attributes.push_back({"limn.samples", to_string(result.samples())});
+    attributes.push_back({kOutputAttribute, output_name(output_)});
     json parameters = json::array();
     for (size_t k = 0; k < outputs_.size(); ++k) {
       parameters.push_back(write_parameter(scene, result.parameters[k], result.terms, outputs_[k],
-                                           attributes, common_));
+                                           attributes, common_, warnings_));
     }
     if (sample_images_) write_sample_images(scene, result, attributes);
     const json report = {{"scene", scene.file},
@@ -335,7 +393,8 @@ class GradientCommand final : public Command {
                          {"costs", costs_json(result)},
                          {"stats", stats_json(result.stats)},
                          {"non_finite", result.non_finite.count},
-                         {"parameters", parameters}};
+                         {"parameters", parameters},
+                         {"warnings", warnings_.lines()}};
     write_json(common_.json, report.dump(2));
   }
 
@@ -347,11 +406,12 @@ class GradientCommand final : public Command {
       image.data = term.pixel_samples;
       image.data.resize(static_cast<size_t>(image.width) * image.height,
                         static_cast<float>(term.samples));
-      write_exr(with_ending(output_, "_samples_" + term.name + ".exr"), image, false, attributes);
+      write_exr(samples_file(term.name), image, false, attributes);
     }
   }
 
   CommonOptions common_;
+  Warnings warnings_;
   GradientOptions options_;
   std::string terms_, samples_ = "auto";
   std::string output_, debug_;

@@ -101,7 +101,8 @@ void print_crossings(const json& crossings) {
 }
 
 int run_info(const CommonOptions& common) {
-  const Scene scene = load_scene(common);
+  Warnings warnings;
+  const Scene scene = load_scene(common, warnings);
   print_camera(scene);
   fmt::print("shapes: {}\n", scene.shapes.size());
   json report = {{"scene", scene.file},
@@ -126,6 +127,7 @@ int run_info(const CommonOptions& common) {
         {{"name", parameter.name}, {"unit", parameter.unit}, {"size", parameter.size}});
     print_parameter(parameter);
   }
+  report["warnings"] = warnings.lines();
   write_json(common.json, report.dump(2));
   return kSuccess;
 }

@@ -137,7 +137,8 @@ class Rejection {
         command_(command),
         threads_(thread_count(common.threads)),
         types_(chosen_types(command.methods)),
-        scene_(is_mesh_file(common.scene) ? scene_of_mesh(common.scene) : load_scene(common)),
+        scene_(is_mesh_file(common.scene) ? scene_of_mesh(common.scene)
+                                          : load_scene(common, warnings_)),
         progress_(progress_bar("reject", common.quiet)) {
     input_.objects.push_back(keep_one_shape(scene_, command.shape));
     tracer_ = make_embree_tracer(scene_, threads_);
@@ -352,6 +353,7 @@ class Rejection {
   const RejectCommand& command_;
   int threads_;
   std::vector<const EdgeSamplerType*> types_;
+  Warnings warnings_;
   Scene scene_;
   std::function<void(double)> progress_;
   EdgeSamplerInput input_;

@@ -2,6 +2,7 @@
 #include "limn/integrators/render.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
+#include "tools/limn/output_files.h"
 
 namespace limn {
 namespace {
@@ -18,7 +19,7 @@ class RenderCommand final : public Command {
   }
 
   int run(const std::string& command_line) override {
-    const Scene scene = load_scene(common_);
+    const Scene scene = load_scene(common_, warnings_);
     const RunSettings settings = make_settings(common_, scene, name());
     if (!debug_.empty()) {
       for (const auto& line : trace_sample(scene, settings, parse_place(debug_))) {
@@ -27,6 +28,8 @@ class RenderCommand final : public Command {
       return kSuccess;
     }
     check_output(output_);
+    check_outputs({{"-o", output_}, {"-o", with_ending(output_, ".png")}, {"--json", common_.json}},
+                  scene);
     const RenderResult result = render(scene, settings);
     if (result.spp == 0) {
       fmt::print(stderr, "interrupted before the first pass over the image: nothing is written\n");
@@ -40,8 +43,10 @@ class RenderCommand final : public Command {
   void write(const Scene& scene, const RunSettings& settings, const RenderResult& result) const {
     const Image image = mean_image(result.radiance, scene.film.crop_width, scene.film.crop_height);
     const std::string picture = with_ending(output_, ".png");
-    write_exr(output_, film_channels(scene, image), scene.film.half,
-              provenance(scene, settings, result.spp));
+    auto attributes = provenance(scene, settings, result.spp);
+    attributes.push_back({kOutputAttribute, output_name(output_)});
+    remove_stale(output_, {output_});
+    write_exr(output_, film_channels(scene, image), scene.film.half, attributes);
     write_png(picture, image, 1);
     if (!common_.quiet) {
       fmt::print("{} and {}: {} samples per pixel, {:.2f} s, {:.3g} million rays per second\n",
@@ -49,17 +54,16 @@ class RenderCommand final : public Command {
                  static_cast<double>(result.rays) / result.seconds / 1e6);
     }
     if (common_.json.empty()) return;
-    const nlohmann::json report = {{"scene", scene.file},
-                                   {"spp", result.spp},
-                                   {"seed", settings.seed},
-                                   {"threads", settings.threads},
-                                   {"seconds", result.seconds},
-                                   {"rays", result.rays},
-                                   {"non_finite", result.non_finite.count}};
+    const nlohmann::json report = {
+        {"scene", scene.file},           {"spp", result.spp},
+        {"seed", settings.seed},         {"threads", settings.threads},
+        {"seconds", result.seconds},     {"rays", result.rays},
+        {"warnings", warnings_.lines()}, {"non_finite", result.non_finite.count}};
     write_json(common_.json, report.dump(2));
   }
 
   CommonOptions common_;
+  Warnings warnings_;
   std::string output_, debug_;
 };
 

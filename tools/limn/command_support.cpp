@@ -1,6 +1,7 @@
 // What commands share.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -9,6 +10,7 @@
 #include "limn/core/names.h"
 #include "limn/core/parallel.h"
 #include "tools/limn/command_support.h"
+#include "tools/limn/output_files.h"
 #include "tools/limn/terminal.h"
 
 namespace limn {
@@ -105,10 +107,21 @@ void add_debug_option(CLI::App& app, std::string& place) {
       ->type_name("X,Y,S|TERM,N");
 }
 
-Scene load_scene(const CommonOptions& common) {
+void Warnings::add(const std::string& line) {
+  if (std::find(lines_.begin(), lines_.end(), line) != lines_.end()) return;
+  fmt::print(stderr, "{}\n", line);
+  lines_.push_back(line);
+}
+
+void Warnings::add_all(const std::vector<std::string>& texts) {
+  for (const std::string& text : texts) add("warning: " + text);
+}
+
+Scene load_scene(const CommonOptions& common, Warnings& shown) {
+  check_json(common.json);
   std::vector<std::string> warnings;
   Scene scene = read_scene(common.scene, common.defines, &warnings);
-  for (const std::string& warning : warnings) fmt::print(stderr, "{}\n", warning);
+  for (const std::string& warning : warnings) shown.add(warning);
   if (common.shading == "mitsuba") scene.shading = ShadingModel::kMitsuba;
   return scene;
 }
@@ -167,7 +180,19 @@ void write_json(const std::string& file, const std::string& text) {
   if (file.empty()) return;
   std::ofstream stream(file);
   stream << text << "\n";
+  stream.close();  // a full disk may show only here
   if (!stream) throw InputError({file}, "cannot be written");
+}
+
+double available_memory() {
+  std::ifstream stream("/proc/meminfo");
+  std::string name, unit;
+  double kilobytes = 0;
+  while (stream >> name >> kilobytes) {
+    if (name == "MemAvailable:") return 1024 * kilobytes;
+    std::getline(stream, unit);
+  }
+  return 0;
 }
 
 std::vector<std::string> parse_terms(const std::string& list) { return split(list); }

@@ -53,13 +53,29 @@ std::string with_ending(const std::string& output, const std::string& ending);
 // Made before long work starts: InputError if the file cannot be written.
 void check_output(const std::string& file);
 void write_json(const std::string& file, const std::string& text);
+// Bytes that can be taken without paging, as the system tells; 0 if it does not.
+double available_memory();
 // "a,b" of --terms; none for "".
 std::vector<std::string> parse_terms(const std::string& list);
 // The counts of --samples; none for "auto".
 std::optional<SampleCounts> parse_samples(const std::string& list);
 // "X,Y,S", or "TERM,N" for a term's samples on the film.
 NonFinite::Place parse_place(const std::string& text);
-Scene load_scene(const CommonOptions& common);
+// What is told once on standard error and again under "warnings" of --json, by every command whose
+// result it concerns.
+class Warnings {
+ public:
+  // A whole line, as read_scene() makes them; nothing if it was told before.
+  void add(const std::string& line);
+  // Texts without the word "warning".
+  void add_all(const std::vector<std::string>& texts);
+  const std::vector<std::string>& lines() const { return lines_; }
+
+ private:
+  std::vector<std::string> lines_;
+};
+// InputError also if --json cannot be written.
+Scene load_scene(const CommonOptions& common, Warnings& shown);
 RunSettings make_settings(const CommonOptions& common, const Scene& scene,
                           const std::string& label);
 

@@ -18,6 +18,7 @@ std::atomic<bool> g_interrupted{false};
 void on_interrupt(int) {
   g_interrupted.store(true);
   std::signal(SIGINT, SIG_DFL);
+  std::signal(SIGTERM, SIG_DFL);
 }
 
 std::string duration(double seconds) {
@@ -31,7 +32,10 @@ std::string duration(double seconds) {
 
 const std::atomic<bool>& interrupt_flag() { return g_interrupted; }
 
-void watch_interrupt() { std::signal(SIGINT, on_interrupt); }
+void watch_interrupt() {
+  std::signal(SIGINT, on_interrupt);
+  std::signal(SIGTERM, on_interrupt);
+}
 
 std::function<void(double)> progress_bar(const std::string& label, bool quiet) {
   if (quiet || !isatty(STDERR_FILENO)) return nullptr;

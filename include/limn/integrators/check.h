@@ -1,5 +1,7 @@
 #pragma once
 // A gradient against finite differences.
+#include <functional>
+
 #include "limn/integrators/differences.h"
 #include "limn/integrators/gradient.h"
 #include "limn/integrators/statistics.h"
@@ -10,10 +12,20 @@ struct CheckOptions {
   std::string parameter;
   std::string method;              // see methods.h; "": the default
   std::vector<std::string> terms;  // by name; none: all that the scene has
-  double step = 0;  // of the finite differences; 0 takes the parameter's natural step
-  int block = 0;    // pixels; 0 splits the longer side into eight
+  double step = 0;                 // of the finite differences; 0: found by a pilot
+  int block = 0;                   // pixels between windows; 0: an eighth of the longer side
   std::optional<SampleCounts> samples = SampleCounts{};  // of the gradient
 };
+
+// A disagreement needs a p-value below kCheckStageLevel in two runs of their own, the second one in
+// the place and direction that the first one accuses.
+constexpr double kCheckStageLevel = 0.01;
+// The chance that a right gradient is accused.
+constexpr double kCheckLevel = kCheckStageLevel * kCheckStageLevel;
+// A check that could not have seen a fifth of a term cannot tell whether the gradient is right.
+constexpr double kCheckWanted = 0.2;
+// Terms below this share of the sum of all magnitudes need not be seen.
+constexpr double kCheckNegligible = 0.05;
 
 // A whole image summed: gradient and differences, each with its standard error.
 struct TotalComparison {
@@ -30,23 +42,51 @@ struct Suspicion {
   double z = 0;  // of the factor
 };
 
+// What a check could have seen.
+struct CheckPower {
+  std::string term;    // "": all terms together
+  double share = 0;    // of the sum of all terms' magnitudes
+  double visible = 0;  // the error, as a part of the term, that is found with 95 %; may be infinite
+  bool negligible() const { return share < kCheckNegligible; }
+};
+
+// The run that had to confirm what the first one found.
+struct Confirmation {
+  int64_t spp = 0;
+  double step = 0;
+  double p = 1;  // one-sided
+};
+
+enum class Verdict { kAgree, kDisagree, kCannotTell };
+
 struct CheckResult {
+  Verdict verdict = Verdict::kCannotTell;
+  bool interrupted = false;  // nothing below is complete
   double step = 0;
   int block = 0;
-  ZSummary at_step, at_double_step,
-      extrapolated;                   // z = (gradient - differences) / combined error, over blocks
-  TotalComparison total;              // against the extrapolated differences
-  std::vector<Suspicion> suspicions;  // of each term of the gradient, if they disagree
-  // The z-scores at the step or the extrapolated ones are plausible at the level 1e-4, and so is
-  // the total.
-  bool agree = false;
-  std::string suspect;  // the term with the largest |z| of these; ""
-  GradientResult gradient;
+  // z = (gradient - differences) / combined error: of the windows, and of the whole image. Windows
+  // are tents, `block` pixels apart, that add up to one: what moves over the border of two changes
+  // both smoothly, and a step keeps its bias small.
+  ZSummary windows;
+  TotalComparison total;
+  double p = 1;       // of the whole first run: windows, image and terms, paid for all of them
+  std::string found;  // where it is smallest: "the whole image", "the camera term", ...
+  std::vector<CheckPower> power;             // all terms together, then each
+  double needed_spp = 0;                     // to see kCheckWanted of all that is not negligible
+  std::optional<Confirmation> confirmation;  // if p < kCheckStageLevel
+  std::vector<Suspicion> suspicions;         // of each term of the gradient, if they disagree
+  std::string suspect;                       // the term with the largest |z| of these; ""
+  GradientResult gradient;                   // of the last run
   DifferenceResult differences;
 };
 
-// Differences use another seed than the gradient, so that both are independent. Blocks that are
-// exactly equal and without variance are left out of the z-scores.
-CheckResult check(const Scene& scene, const CheckOptions& options, const RunSettings& settings);
+// A gradient to be checked, in place of gradient().
+using GradientRun =
+    std::function<GradientResult(const Scene&, const GradientOptions&, const RunSettings&)>;
+
+// Differences use other seeds than the gradient, so that both are independent, and so does the
+// second run, which takes twice the samples at half the step: a step's bias would shrink there.
+CheckResult check(const Scene& scene, const CheckOptions& options, const RunSettings& settings,
+                  const GradientRun& run = gradient);
 
 }  // namespace limn

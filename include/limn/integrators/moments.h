@@ -14,7 +14,8 @@ namespace limn {
 class Moments {
  public:
   Moments() = default;
-  explicit Moments(size_t size) : sums_(size), squares_(size) {}
+  // keep: remember the sums of every batch, for tests that need more than means and variances.
+  explicit Moments(size_t size, bool keep = false) : sums_(size), squares_(size), keep_(keep) {}
 
   size_t size() const { return sums_.size(); }
   int batches() const { return batches_; }
@@ -26,8 +27,18 @@ class Moments {
   // The variance of the mean; needs two batches.
   double variance(size_t i) const;
 
+  // One batch, as it was added.
+  struct Batch {
+    std::vector<double> sums;
+    int64_t samples = 0;
+  };
+  // In the order they came; empty unless they are kept.
+  const std::vector<Batch>& kept() const { return kept_; }
+
  private:
   std::vector<double> sums_, squares_;
+  std::vector<Batch> kept_;
+  bool keep_ = false;
   int batches_ = 0;
   int64_t samples_ = 0;
 };

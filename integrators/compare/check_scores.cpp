@@ -1,0 +1,229 @@
+// Weighted sums of what a gradient and differences disagree in, and their errors.
+#include "integrators/compare/check_scores.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "limn/integrators/statistics.h"
+
+namespace limn {
+namespace {
+
+constexpr size_t kBatchesOfHalf = 3;  // the fewest that weights are taken from
+// Where fewer events than this are expected, those that rule the variance may not have come. Not
+// tuned.
+constexpr double kFewEvents = 20;
+
+using Batches = std::vector<Moments::Batch>;
+
+double dot(const std::vector<double>& a, const std::vector<double>& b) {
+  double sum = 0;
+  for (size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
+  return sum;
+}
+
+// Mean and variance of a probe over batches, or of those with one parity (0 or 1; else all).
+struct Estimate {
+  double mean = 0, variance = 0;
+};
+Estimate estimate(const Batches& batches, const Probe& probe) {
+  Moments moments(1);
+  for (size_t b = 0; b < batches.size(); ++b) {
+    moments.add_batch({dot(probe[b % 2], batches[b].sums)}, batches[b].samples);
+  }
+  return {moments.mean(0), moments.variance(0)};
+}
+
+// All windows over one half of the batches.
+Moments half(const Batches& batches, size_t parity) {
+  Moments moments(batches.empty() ? 0 : batches[0].sums.size());
+  for (size_t b = parity; b < batches.size(); b += 2) {
+    moments.add_batch(batches[b].sums, batches[b].samples);
+  }
+  return moments;
+}
+
+// What the terms of edges, or the others, add to a block.
+std::vector<double> magnitude_of_edges(const GradientResult& result, const ParameterGradient& g,
+                                       const std::vector<double>& differences) {
+  std::vector<double> known(differences.size()), sliding(differences.size());
+  for (size_t t = 0; t < result.terms.size(); ++t) {
+    if (!result.terms[t].computed) continue;
+    for (size_t i = 0; i < known.size(); ++i) {
+      const double mean = g.term_blocks[t].mean(i);
+      if (result.terms[t].edges) {
+        known[i] += std::fabs(mean);
+      } else {
+        sliding[i] += mean;
+      }
+    }
+  }
+  // The gradient's own events may be those that have not come.
+  for (size_t i = 0; i < known.size(); ++i) {
+    known[i] = std::max(known[i], std::fabs(differences[i] - sliding[i]));
+  }
+  return known;
+}
+
+}  // namespace
+
+Windows::Axis::Axis(int pixels, int spacing, int fine) : count((pixels + spacing - 1) / spacing) {
+  for (int begin = 0; begin < pixels; begin += fine) {
+    const double middle = 0.5 * (begin + std::min(begin + fine, pixels));
+    const double place = std::clamp(middle / spacing - 0.5, 0.0, count - 1.0);
+    first.push_back(std::min(static_cast<int>(place), std::max(count - 2, 0)));
+    second_weight.push_back(place - first.back());
+  }
+}
+
+Windows::Windows(const Film& film, int spacing, int fine)
+    : fine_(fine), x_(film.crop_width, spacing, fine), y_(film.crop_height, spacing, fine) {}
+
+// visit(block, window, weight) for all pairs that belong together.
+template <class Visit>
+void Windows::visit(const Visit& visit) const {
+  size_t block = 0;
+  for (size_t y = 0; y < y_.first.size(); ++y) {
+    for (size_t x = 0; x < x_.first.size(); ++x, ++block) {
+      for (const int dy : {0, 1}) {
+        const double wy = dy == 1 ? y_.second_weight[y] : 1 - y_.second_weight[y];
+        for (const int dx : {0, 1}) {
+          const double w = wy * (dx == 1 ? x_.second_weight[x] : 1 - x_.second_weight[x]);
+          if (w == 0) continue;
+          visit(block, static_cast<size_t>(y_.first[y] + dy) * x_.count + x_.first[x] + dx, w);
+        }
+      }
+    }
+  }
+}
+
+std::vector<double> Windows::gather(const std::vector<double>& blocks) const {
+  std::vector<double> values(size());
+  visit([&](size_t block, size_t window, double w) { values[window] += w * blocks[block]; });
+  return values;
+}
+
+std::vector<double> Windows::spread(const std::vector<double>& weights) const {
+  std::vector<double> values(x_.first.size() * y_.first.size());
+  visit([&](size_t block, size_t window, double w) { values[block] += w * weights[window]; });
+  return values;
+}
+
+Residual::Residual(const Windows& windows, const GradientResult& gradient,
+                   const DifferenceEstimate& differences, const std::vector<double>& radiance,
+                   double step)
+    : windows_(windows) {
+  const ParameterGradient& g = gradient.parameters[0];
+  gradient_ = gather(g.total_blocks);
+  differences_ = gather(differences.blocks);
+  // Events of size x at such a rate that their mean is m have a variance of |m| x per sample, also
+  // in places where none has come.
+  const std::vector<double> of_differences = means(differences.blocks);
+  const std::vector<double> edges = magnitude_of_edges(gradient, g, of_differences);
+  const double samples = static_cast<double>(g.total_blocks.samples());
+  const double pixels = static_cast<double>(windows.fine()) * windows.fine();
+  for (size_t i = 0; i < edges.size(); ++i) {
+    rare_gradient_.magnitude.push_back(edges[i]);
+    rare_gradient_.of_mean_size.push_back(edges[i] * g.events.mean_size() / samples);
+    rare_gradient_.of_large_size.push_back(edges[i] * g.events.large_size() / samples);
+    // Differences may hold all of it as events; one that has not been seen at all as large as the
+    // light of a pixel, over both steps.
+    const double all =
+        std::max({edges[i], std::fabs(of_differences[i]), std::fabs(g.total_blocks.mean(i))});
+    const double large =
+        std::max(differences.events.large_size(), radiance[i] / pixels / (2 * step));
+    rare_differences_.magnitude.push_back(all);
+    rare_differences_.of_mean_size.push_back(all * differences.events.mean_size() / samples);
+    rare_differences_.of_large_size.push_back(all * large / samples);
+  }
+  // A difference of two images of radiance L over 2 h is rounded to some hundred units in the last
+  // place of L / h.
+  rounding_ = windows.gather(radiance);
+  for (double& r : rounding_) r *= 0x1p-44 / step;
+}
+
+Batches Residual::gather(const Moments& blocks) const {
+  Batches batches;
+  for (const Moments::Batch& batch : blocks.kept()) {
+    batches.push_back({windows_.gather(batch.sums), batch.samples});
+  }
+  return batches;
+}
+
+double Residual::rare(const Probe& probe, const Rare& variances) const {
+  double mean = 0, of_mean_size = 0, of_large_size = 0;
+  for (const std::vector<double>& weights : probe) {
+    const std::vector<double> of_blocks = windows_.spread(weights);
+    for (size_t i = 0; i < of_blocks.size(); ++i) {
+      const double square = 0.5 * of_blocks[i] * of_blocks[i];
+      mean += 0.5 * std::fabs(of_blocks[i]) * variances.magnitude[i];
+      of_mean_size += square * variances.of_mean_size[i];
+      of_large_size += square * variances.of_large_size[i];
+    }
+  }
+  return mean * mean < kFewEvents * of_large_size ? std::max(of_mean_size, of_large_size)
+                                                  : of_mean_size;
+}
+
+Score Residual::score(const Probe& probe) const {
+  const Estimate g = estimate(gradient_, probe);
+  const Estimate d = estimate(differences_, probe);
+  double rounding = 0;
+  for (size_t i = 0; i < rounding_.size(); ++i) rounding += std::fabs(probe[0][i]) * rounding_[i];
+  Score score;
+  score.value = d.mean - g.mean;
+  score.error =
+      std::sqrt(std::max(g.variance, rare(probe, rare_gradient_)) +
+                std::max(d.variance, rare(probe, rare_differences_)) + rounding * rounding);
+  if (score.value == 0) return score;
+  score.z = normal_from_student(score.value / score.error, degrees());
+  return score;
+}
+
+std::vector<Score> Residual::window_scores() const {
+  std::vector<Score> scores;
+  Probe probe{std::vector<double>(windows_.size()), std::vector<double>(windows_.size())};
+  for (size_t k = 0; k < windows_.size(); ++k) {
+    probe[0][k] = probe[1][k] = 1;
+    scores.push_back(score(probe));
+    probe[0][k] = probe[1][k] = 0;
+  }
+  return scores;
+}
+
+Probe Residual::term_probe(const Moments& term_blocks) const {
+  const size_t size = windows_.size();
+  Probe probe{std::vector<double>(size), std::vector<double>(size)};
+  const Batches term = gather(term_blocks);
+  if (std::min(term.size(), gradient_.size()) < 2 * kBatchesOfHalf) return probe;
+  std::vector<double> rare = rare_gradient_.of_mean_size;
+  for (size_t i = 0; i < rare.size(); ++i) rare[i] += rare_differences_.of_mean_size[i];
+  rare = windows_.gather(rare);
+  for (const size_t parity : {0, 1}) {
+    const Moments mean = half(term, 1 - parity);
+    const Moments g = half(gradient_, 1 - parity);
+    const Moments d = half(differences_, 1 - parity);
+    std::vector<double> variance(size);
+    for (size_t k = 0; k < size; ++k) {
+      variance[k] = std::max(0.5 * (g.variance(k) + d.variance(k)), rare[k]);
+    }
+    // No window weighs by a variance that is small by chance.
+    const double least = 1e-3 * mean_of(variance);
+    double square = 0;
+    for (size_t k = 0; k < size; ++k) {
+      const double v = std::max(variance[k], least);
+      if (v == 0) continue;
+      probe[parity][k] = mean.mean(k) / v;
+      square += probe[parity][k] * mean.mean(k);
+    }
+    for (double& w : probe[parity]) w = square > 0 ? w / std::sqrt(square) : 0;
+  }
+  return probe;
+}
+
+double student_from_normal(double z, double degrees) {
+  const double s = z * (8 * degrees + 3) / (8 * degrees + 1);
+  return std::sqrt(degrees * std::expm1(s * s / degrees));
+}
+
+}  // namespace limn

@@ -1,0 +1,20 @@
+#pragma once
+// The step at which a gradient is checked against differences.
+#include "integrators/compare/check_scores.h"
+#include "limn/core/scene.h"
+#include "limn/integrators/run.h"
+
+namespace limn {
+
+// The largest step, up to the parameter's natural one, whose differences are biased by less than a
+// part of the standard error that their extrapolation will have with settings.spp samples: as a
+// mean over the windows, and of the whole image. From a pilot with a seed of its own. A power of
+// two: moved positions are exact where floats allow it.
+double find_check_step(const Scene& scene, const std::string& parameter, const Windows& windows,
+                       const RunSettings& settings);
+
+// The same judged by the run itself, which sees more than the pilot: the step if the run's bias is
+// small enough, else a smaller one.
+double reduced_step(const DifferenceResult& differences, double step, const Windows& windows);
+
+}  // namespace limn

@@ -1,0 +1,115 @@
+// Verdicts of the check: right gradients, gradients with a planted defect, too few samples.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "support/planted.h"
+
+namespace limn {
+namespace {
+
+CheckResult run(const Planted& planted, uint64_t seed) {
+  RunSettings settings;
+  settings.spp = planted.spp;
+  settings.seed = seed;
+  const CheckResult r = check(planted.scene, planted.options, settings, planted.run);
+  std::string power;
+  for (const CheckPower& p : r.power) power += fmt::format(" {} {:.3g}", p.term, p.visible);
+  for (const Suspicion& s : r.suspicions) power += fmt::format(" z {:.1f}", s.z);
+  fmt::print("{}: verdict {}, p {:.2g}, second {:.2g}, suspect {}; visible:{}\n", planted.name,
+             static_cast<int>(r.verdict), r.p, r.confirmation ? r.confirmation->p : 1, r.suspect,
+             power);
+  return r;
+}
+
+bool names(const Planted& planted, const std::string& term) {
+  return std::find(planted.terms.begin(), planted.terms.end(), term) != planted.terms.end();
+}
+
+// The part of the defect's term that could have been seen.
+double visible(const CheckResult& r, const std::string& term) {
+  for (const CheckPower& power : r.power) {
+    if (power.term == term) return power.visible;
+  }
+  return 0;
+}
+
+TEST(CheckVerdict, FewSamplesCannotTell) {
+  const TempFiles files;
+  const Planted planted = planted_term(files, "forest", "camera", 1, 8);
+  const CheckResult r = run(planted, 3);
+  EXPECT_EQ(r.verdict, Verdict::kCannotTell);
+  EXPECT_GT(r.needed_spp, 8);
+  EXPECT_GT(r.power[0].visible, kCheckWanted);
+}
+
+TEST(CheckVerdict, DefectsAreFoundAndNamed) {
+  const TempFiles files;
+  for (const char* term : {"interior", "camera", "boundary"}) {
+    const Planted planted = planted_term(files, "forest", term, 0.3, 1024);
+    const CheckResult r = run(planted, 5);
+    EXPECT_EQ(r.verdict, Verdict::kDisagree) << planted.name;
+    EXPECT_EQ(r.suspect, term);
+  }
+}
+
+// The step comes from the image: a floor a thousand times wider must not change it much.
+TEST(CheckVerdict, StepDoesNotGrowWithTheFloor) {
+  const TempFiles files;
+  const auto step = [&](double half) {
+    SceneParts parts;
+    parts.body = square("floor", half, -90, {0, 0, 0}, diffuse("chalk", "0.8, 0.8, 0.8")) +
+                 square("screen", 0.4, 50, {0, 0.7, 0}, diffuse("clay", "0.4, 0.4, 0.4")) +
+                 square("lamp", 0.5, 90, {0, 2.5, 1}, area_light("glow", "5, 5, 5"));
+    CheckOptions options;
+    options.parameter = "sensor.translate.x";
+    RunSettings settings;
+    settings.spp = 32;
+    settings.seed = 2;
+    return check(make_scene(files, parts), options, settings).step;
+  };
+  EXPECT_LE(step(3000), 16 * step(3));
+}
+
+// Many runs: LIMN_PLANTED_RUNS of each kind, from seed LIMN_PLANTED_FIRST on.
+TEST(CheckVerdict, PlantedDefects) {
+  const char* wanted = std::getenv("LIMN_PLANTED_RUNS");
+  if (!wanted) GTEST_SKIP() << "LIMN_PLANTED_RUNS is not set";
+  int seen = 0, found = 0, scaled = 0, named = 0, all = 0;
+  const auto count = [&](const Planted& planted, uint64_t seed) {
+    const CheckResult r = run(planted, seed);
+    // Where the size is not known, the defect is meant to be seen.
+    if (planted.size > 0 && visible(r, planted.terms[0]) > planted.size) return;
+    const bool disagrees = r.verdict == Verdict::kDisagree;
+    ++seen;
+    found += disagrees;
+    // Other defects are no part of a term's image: they need not look like one.
+    if (planted.size == 0) return;
+    ++scaled;
+    named += disagrees && names(planted, r.suspect);
+  };
+  const TempFiles files;
+  const int runs = std::atoi(wanted);
+  const char* first = std::getenv("LIMN_PLANTED_FIRST");
+  const int begin = first ? std::atoi(first) : 0;
+  for (int k = begin; k < begin + runs; ++k) {
+    const auto seed = static_cast<uint64_t>(100 + k);
+    const char* terms[] = {"camera", "boundary", "interior"};
+    const char* methods[] = {"forest", "adaptive", "silhouettes"};
+    const std::string method = methods[k / 3 % 3];
+    const std::string term =
+        k % 3 == 1 && method != "forest" ? std::string("direct") : terms[k % 3];
+    count(planted_term(files, method, term, 0.5, 1024), seed);
+    count(planted_border(files, 1024), seed);
+    count(planted_normals(files, 256), seed);
+    all += 3;
+  }
+  fmt::print("{} runs, {} within the stated power: {} found; {} of {} scaled terms named\n", all,
+             seen, found, named, scaled);
+  EXPECT_GE(found, 0.95 * seen);
+  EXPECT_GE(named, 0.95 * scaled);
+}
+
+}  // namespace
+}  // namespace limn

@@ -1,0 +1,34 @@
+#pragma once
+// The files that a command writes: checked before long work, and none of an older run beside them.
+#include <string>
+#include <vector>
+
+#include "limn/core/scene.h"
+
+namespace limn {
+
+// The attribute of every EXR that names what -o said, so that a later run knows what is its own.
+inline constexpr const char* kOutputAttribute = "limn.output";
+
+// What a run will write, with the option that says so: ("-o", "a/b.exr").
+struct PlannedFile {
+  std::string option, file;
+};
+// InputError where two of the files are one, one is a file that the scene is made of, or one cannot
+// be written. Folders of images are made; that of --json must be there.
+// inputs: further files that are read.
+void check_outputs(const std::vector<PlannedFile>& files, const Scene& scene,
+                   const std::vector<std::string>& inputs = {});
+// The files in parameters' names (SHAPE.vertex_positions:FILE).
+std::vector<std::string> field_files(const std::vector<std::string>& parameters);
+// InputError if the file cannot be written; nothing for "".
+void check_json(const std::string& file);
+
+// Images beside `output` that an earlier run wrote for the same -o, and that are not among
+// `written`: standard errors, other parameters, counts of samples; with their pictures. Files that
+// limn did not write stay.
+void remove_stale(const std::string& output, const std::vector<std::string>& written);
+// The value of kOutputAttribute for this -o.
+std::string output_name(const std::string& output);
+
+}  // namespace limn
