@@ -11,7 +11,6 @@
 namespace limn {
 namespace {
 
-constexpr int kUnknowns = kFigures - 1;  // turns about three axes, then scores
 using Coefficients = Eigen::Matrix<double, kUnknowns, 1>;
 
 // Which unknowns a fit uses: [first, first + count).
@@ -31,7 +30,7 @@ constexpr double kRidge = 0.05;
 
 using Halves = std::array<std::vector<Covariance>, 2>;
 
-// Variance of lane 0 plus the combination of the unknowns.
+// Variance of the derivative plus the combination of the unknowns.
 double variance_with(const Covariance& c, const Coefficients& b) {
   double sum = c.at(0, 0);
   for (int i = 0; i < kUnknowns; ++i) {
@@ -91,13 +90,19 @@ class Windows {
   int radius_;
 };
 
+// One parameter's share of what is fitted.
+struct ParameterFit {
+  std::vector<std::vector<double>> variances;  // [slot][cell]
+  std::vector<Coefficients> fields;            // by cell; empty if directions are better held
+};
+
 class Fitter {
  public:
-  Fitter(const PilotFigures& figures, int threads)
-      : figures_(figures), grid_(figures.grid), threads_(threads) {}
+  Fitter(const PilotFigures& figures, int parameter, int threads)
+      : figures_(figures), grid_(figures.grid), parameter_(parameter), threads_(threads) {}
 
-  FieldFit run() {
-    FieldFit result;
+  ParameterFit run() {
+    ParameterFit result;
     std::vector<int> chosen(grid_.size(), kHeld);
     set_variances(chosen, result);
     // What remains of a term decides how much of the work it gets, and so how much it counts.
@@ -106,9 +111,7 @@ class Fitter {
       chosen = choose();
       set_variances(chosen, result);
     }
-    result.held_share = static_cast<double>(std::count(chosen.begin(), chosen.end(), kHeld)) /
-                        static_cast<double>(chosen.size());
-    if (result.held_share < 1) set_fields(chosen, result);
+    set_fields(chosen, result);
     return result;
   }
 
@@ -125,7 +128,7 @@ class Fitter {
       for (int half = 0; half < 2; ++half) {
         for (size_t cell = 0; cell < grid_.size(); ++cell) {
           auto& to = total_[half][cell].entries;
-          const auto& from = figures_.halves[half][slot][cell].entries;
+          const auto from = of(half, slot, cell).entries;
           for (size_t i = 0; i < to.size(); ++i) to[i] += weight * from[i];
         }
       }
@@ -191,19 +194,22 @@ class Fitter {
     }
   }
 
-  void set_variances(const std::vector<int>& chosen, FieldFit& result) const {
+  Covariance of(int half, size_t slot, size_t cell) const {
+    return figures_.halves[half][slot].of(cell, parameter_);
+  }
+
+  void set_variances(const std::vector<int>& chosen, ParameterFit& result) const {
     const size_t slots = figures_.halves[0].size();
     result.variances.assign(slots, {});
     const auto set = [&](size_t cell, const Coefficients& first, const Coefficients& second) {
       for (size_t slot = 0; slot < slots; ++slot) {
-        if (figures_.halves[0][slot].empty()) continue;
-        result.variances[slot][cell] =
-            0.5 * (variance_with(figures_.halves[1][slot][cell], first) +
-                   variance_with(figures_.halves[0][slot][cell], second));
+        if (!figures_.in_cells(slot)) continue;
+        result.variances[slot][cell] = 0.5 * (variance_with(of(1, slot, cell), first) +
+                                              variance_with(of(0, slot, cell), second));
       }
     };
     for (size_t slot = 0; slot < slots; ++slot) {
-      if (!figures_.halves[0][slot].empty()) result.variances[slot].resize(grid_.size());
+      if (figures_.in_cells(slot)) result.variances[slot].resize(grid_.size());
     }
     for (size_t cell = 0; cell < grid_.size(); ++cell) {
       set(cell, Coefficients::Zero(), Coefficients::Zero());
@@ -212,28 +218,37 @@ class Fitter {
                          const Coefficients&) { set(cell, first, second); });
   }
 
-  void set_fields(const std::vector<int>& chosen, FieldFit& result) const {
-    result.fields.resize(grid_.size());
-    for_fits(chosen,
-             [&](size_t cell, const Coefficients&, const Coefficients&, const Coefficients& both) {
-               DirectionField& field = result.fields[cell];
-               for (int k = 0; k < 3; ++k) {
-                 field.turn[k][0] = both[k];
-                 field.score[k][0] = both[3 + k];
-               }
-             });
+  void set_fields(const std::vector<int>& chosen, ParameterFit& result) const {
+    if (std::all_of(chosen.begin(), chosen.end(), [](int f) { return f == kHeld; })) return;
+    result.fields.resize(grid_.size(), Coefficients::Zero());
+    for_fits(chosen, [&](size_t cell, const Coefficients&, const Coefficients&,
+                         const Coefficients& both) { result.fields[cell] = both; });
   }
 
   const PilotFigures& figures_;
   const PlanGrid& grid_;
+  int parameter_;
   int threads_;
   Halves total_;  // of all terms, weighed
 };
 
 }  // namespace
 
-FieldFit fit_fields(const PilotFigures& figures, int threads) {
-  return Fitter(figures, threads).run();
+FieldFit fit_fields(const PilotFigures& figures, int parameters, int threads) {
+  FieldFit result;
+  for (int k = 0; k < parameters; ++k) {
+    ParameterFit fit = Fitter(figures, k, threads).run();
+    result.variances.push_back(std::move(fit.variances));
+    if (fit.fields.empty()) continue;
+    result.fields.resize(figures.grid.size());
+    for (size_t cell = 0; cell < result.fields.size(); ++cell) {
+      for (int axis = 0; axis < 3; ++axis) {
+        result.fields[cell].turn[axis][k] = fit.fields[cell][axis];
+        result.fields[cell].score[axis][k] = fit.fields[cell][3 + axis];
+      }
+    }
+  }
+  return result;
 }
 
 }  // namespace limn

@@ -42,7 +42,7 @@ struct ShadowPoint {
 // A ray from a viewer that meets the shadow's edge.
 struct Viewer {
   Vec3<Dual> origin;
-  Vec3<Dual> direction;  // unit; held fixed or turning with the camera
+  Vec3<Dual> direction;  // unit; turning with the camera, or as directions at the vertex do
   double distance;       // to the shadow's edge
 };
 
@@ -285,8 +285,10 @@ void ShadowTerm::add_sample(const PathVertex& vertex, Rng rng, TermCost& cost,
     ++cost.zero_weight;
     return;
   }
-  const Vec3<Dual> fixed{omega.x, omega.y, omega.z};
-  const Lanes swept = sweep(edge, *point, {vertex.surface.p, fixed, distance});
+  const auto swept_with = [&](const Vec3<Lanes>& turn) {
+    return sweep(edge, *point, {vertex.surface.p, turning(omega, turn), distance});
+  };
+  const Lanes swept = swept_with(vertex.turn);
   const Rgb<double> amount = vertex.throughput * f * jump(edge, *point, q, omega);
   if (is_zero(swept) || is_black(amount)) {
     ++cost.zero_weight;
@@ -305,6 +307,11 @@ void ShadowTerm::add_sample(const PathVertex& vertex, Rng rng, TermCost& cost,
   ++cost.counted;
   const Lanes weight = swept * (1 / probability);
   const Rgb<Lanes> added{weight * amount.r, weight * amount.g, weight * amount.b};
+  if (vertex.turned) {
+    const Lanes t = swept_with({{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}) - swept_with({});
+    for (int c = 0; c < 3; ++c)
+      (*vertex.turned)[c] += Vec3d{t[0], t[1], t[2]} * (amount[c] / probability);
+  }
   if (vertex.log) {
     vertex.log->push_back(fmt::format(
         "  shadow of edge {} of shape {} on face {} of shape {}: probability {:.4g}, adds "

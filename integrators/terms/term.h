@@ -27,6 +27,9 @@ struct PathVertex {
   int bounces;                    // how often it has scattered before
   const Rng& key;                 // of the path
   SampleLog* log = nullptr;       // null unless somebody reads it
+  // Where a pilot wants to know it: what directions that turn about the three axes [1 / unit of the
+  // parameter] would add to a term's sum, on the same samples. Added to.
+  Rgb<Vec3d>* turned = nullptr;
 };
 
 class Term {

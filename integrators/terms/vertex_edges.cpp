@@ -28,9 +28,9 @@ void add_edge_point(const PathContext& context, const EdgeMesh& mesh, const Path
   const auto [a, b] = mesh.edge(sample.edge.edge).vertices;
   const Vec3<Lanes> v = relative_velocity(mesh, a, query) * (1 - sample.t) +
                         relative_velocity(mesh, b, query) * sample.t;
-  const Lanes weight =
-      (v.x * view.side.x + v.y * view.side.y + v.z * view.side.z) *
-      (1 / (view.distance * view.distance * view.distance * sample.probability * sample.pdf_t));
+  const double measure =
+      1 / (view.distance * view.distance * view.distance * sample.probability * sample.pdf_t);
+  const Lanes weight = (v.x * view.side.x + v.y * view.side.y + v.z * view.side.z) * measure;
   if (vertex.log) {
     vertex.log->push_back(fmt::format(
         "  edge {} of shape {} at t = {:.6g}: probability {:.4g}, density of t {:.4g}, distance "
@@ -60,6 +60,10 @@ void add_edge_point(const PathContext& context, const EdgeMesh& mesh, const Path
   ++cost.counted;
   const Rgb<double> amount = vertex.throughput * f * jump;
   const Rgb<Lanes> added{weight * amount.r, weight * amount.g, weight * amount.b};
+  if (vertex.turned) {  // -(axis x w) . side for all axes
+    const Vec3d turned = cross(view.side, view.y - query.p) * measure;
+    for (int c = 0; c < 3; ++c) (*vertex.turned)[c] += turned * amount[c];
+  }
   if (vertex.log) {
     vertex.log->push_back(fmt::format(
         "    jump ({:.6g}, {:.6g}, {:.6g}), adds ({:.6g}, {:.6g}, {:.6g}) to the first parameter",
