@@ -133,7 +133,7 @@ std::vector<double> PilotFigures::variances(size_t slot, int lane) const {
   std::vector<double> result;
   for (size_t cell = 0; cell < grid.size(); ++cell) {
     result.push_back(0.5 *
-                     (halves[0][slot].variance(cell, lane) + halves[1][slot].variance(cell, lane)));
+                     (halves[0][slot][cell].variance(lane) + halves[1][slot][cell].variance(lane)));
   }
   return result;
 }

@@ -37,13 +37,6 @@ DirectionField turning_about_axes(const Lanes& steps, int lanes) {
   return field;
 }
 
-bool is_finite(const Rgb<Vec3d>& x) {
-  for (int c = 0; c < 3; ++c) {
-    if (!std::isfinite(x[c].x + x[c].y + x[c].z)) return false;
-  }
-  return true;
-}
-
 }  // namespace
 
 std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler) {
@@ -87,20 +80,39 @@ double TermEstimator::work(size_t slot, const TermCost& cost) const {
   return terms_[slot] ? terms_[slot]->work(cost) : static_cast<double>(cost.rays);
 }
 
+// How the vertices of a path move; the visitor of a path.
+class TermEstimator::VertexMotions {
+ public:
+  void operator()(const SurfacePoint<Dual>& surface, const Scattering<Dual>&, const Rgb<Dual>&,
+                  const DirectionMotion*, int, const Rng&) {
+    velocities_.push_back({surface.p.x.d, surface.p.y.d, surface.p.z.d});
+  }
+  const Vec3<Lanes>& velocity(int bounces) const { return velocities_.at(bounces); }
+
+ private:
+  std::vector<Vec3<Lanes>> velocities_;
+};
+
 // The terms at vertices, as the visitor of a path.
 class TermEstimator::VertexTerms {
  public:
-  // turns: whether what turns change is asked for.
-  VertexTerms(const TermEstimator& estimator, const PixelCounts& counts, bool turns,
+  // held: how the vertices of the path move while its directions are held, if what turns change is
+  // asked for; else null.
+  VertexTerms(const TermEstimator& estimator, const PixelCounts& counts, const VertexMotions* held,
               SampleSink& sink)
-      : estimator_(estimator), counts_(counts), turns_(turns), sink_(sink), sums_(), turned_() {}
+      : estimator_(estimator), counts_(counts), held_(held), sink_(sink), sums_(), turned_() {}
 
   void operator()(const SurfacePoint<Dual>& surface, const Scattering<Dual>& scattering,
                   const Rgb<Dual>& throughput, const DirectionMotion* motion, int bounces,
                   const Rng& key) {
     const Rgb<double> weight = value(throughput);
+    TurnedVertex turned;
     PathVertex vertex{surface, scattering, weight,     motion ? motion->turn : Vec3<Lanes>{},
                       bounces, key,        sink_.log()};
+    if (held_) {
+      turned = turned_at(surface, motion, bounces);
+      vertex.turned = &turned;
+    }
     if (vertex.log) log_vertex(*vertex.log, surface, scattering, weight, bounces);
     for (size_t slot = 0; slot < estimator_.slots(); ++slot) {
       const Term* term = estimator_.terms_[slot].get();
@@ -109,19 +121,26 @@ class TermEstimator::VertexTerms {
       const Stopwatch watch;
       TermCost& cost = sink_.cost(slot);
       const int samples = std::max(1, static_cast<int>(counts_[slot]));
-      Rgb<Vec3d> turned;
-      if (turns_ && motion) vertex.turned = &turned;
+      turned.sum = {};
       term->add_at_vertex(vertex, samples, cost, sums_[slot]);
-      if (vertex.turned) turned_[slot] = turned_[slot] + turned * motion->unit;
+      turned_[slot] = turned_[slot] + turned.sum;
       cost.seconds += watch.seconds();
     }
   }
 
   const Rgb<Lanes>& sum(size_t slot) const { return sums_[slot]; }
-  // In the unit of MotionRates.
-  const Rgb<Vec3d>& turned(size_t slot) const { return turned_[slot]; }
+  const Rgb<Lanes>& turned(size_t slot) const { return turned_[slot]; }
 
  private:
+  TurnedVertex turned_at(const SurfacePoint<Dual>& surface, const DirectionMotion* motion,
+                         int bounces) const {
+    TurnedVertex turned;
+    for (int k = 0; k < 3; ++k) {
+      if (motion) turned.turn[k][k] = motion->unit;
+      turned.velocity[k] = estimator_.turned(surface.p[k].d, held_->velocity(bounces)[k]);
+    }
+    return turned;
+  }
   // One decision for all vertices of a path.
   bool skipped(size_t slot, const Rng& key) const {
     return counts_[slot] < 1 && key.at(Purpose::kTermRoulette, slot).uniform() >= counts_[slot];
@@ -129,10 +148,10 @@ class TermEstimator::VertexTerms {
 
   const TermEstimator& estimator_;
   const PixelCounts& counts_;
-  bool turns_;
+  const VertexMotions* held_;
   SampleSink& sink_;
   std::array<Rgb<Lanes>, kMostTerms> sums_;
-  std::array<Rgb<Vec3d>, kMostTerms> turned_;
+  std::array<Rgb<Lanes>, kMostTerms> turned_;
 };
 
 void TermEstimator::add_pixel(const PixelSample& at, const Rng& key, SampleSink& sink) const {
@@ -142,7 +161,7 @@ void TermEstimator::add_pixel(const PixelSample& at, const Rng& key, SampleSink&
   for (int i = 0; i < paths; ++i) {
     const Rng path_key = key.copy(Purpose::kPathCopy, i);
     if (i == 0 && (vertices_ || sink.log())) {
-      VertexTerms vertices(*this, counts, false, sink);
+      VertexTerms vertices(*this, counts, nullptr, sink);
       add_path(at, trace(at, path_key, field, vertices, sink.log()), 1.0 / paths, sink);
       add_vertices(at, vertices, counts, sink);
     } else if (sink.log()) {
@@ -210,38 +229,45 @@ void TermEstimator::add_path(const PixelSample& at, const Path& path, double wei
   }
 }
 
-Rgb<Vec3d> TermEstimator::turned(const Rgb<Lanes>& turning, const Rgb<Lanes>& held) const {
-  Rgb<Vec3d> result;
+Lanes TermEstimator::turned(const Lanes& turning, const Lanes& held) const {
+  Lanes result;
+  for (int k = 0; k < 3; ++k) {
+    result[k] = (turning[k + 1] - held[k + 1]) / turning_.turn[k][k + 1];
+  }
+  return result;
+}
+Rgb<Lanes> TermEstimator::turned(const Rgb<Lanes>& turning, const Rgb<Lanes>& held) const {
+  return {turned(turning.r, held.r), turned(turning.g, held.g), turned(turning.b, held.b)};
+}
+Rgb<Lanes> TermEstimator::at_rest(const Rgb<Lanes>& turning, const Rgb<Lanes>& turned) const {
+  Rgb<Lanes> result = turning;
   for (int c = 0; c < 3; ++c) {
-    for (int k = 0; k < 3; ++k) {
-      const int lane = k + 1;
-      result[c][k] = (turning[c][lane] - held[c][lane]) / turning_.turn[k][lane];
-    }
+    for (int k = 0; k < 3; ++k) result[c][k + 1] -= turning_.turn[k][k + 1] * turned[c][k];
   }
   return result;
 }
 
-// All that turns change is linear in them. At vertices it is asked for, since edges are drawn by how
-// fast they move; a path is traced once more with directions at rest, unless the lanes in which they
-// turn are free.
+// All that turns change is linear in them. With one parameter they have lanes of their own. With
+// more a path is traced twice, first with directions at rest; but terms at vertices draw edges by
+// how fast these move, so they are asked for both at once.
 TermEstimator::Sample TermEstimator::sample(const PixelSample& at, const Rng& key, bool turns,
                                             SampleSink& sink) const {
   PixelCounts ones;
   ones.fill(1);
-  const bool again = turns && lanes_ > 1;
-  VertexTerms vertices(*this, ones, again, sink);
+  const bool twice = turns && lanes_ > 1;
+  VertexMotions motions;
+  Path held;
+  if (twice) {
+    const DirectionField rest;  // as a field, so that both take the same steps
+    held = trace(at, key, &rest, motions, nullptr);
+  }
+  VertexTerms vertices(*this, ones, twice ? &motions : nullptr, sink);
   const Path path = trace(at, key, turns ? &turning_ : nullptr, vertices, nullptr);
   sink.cost(pixel_slot_).add(path.rays);
   ++sink.cost(pixel_slot_).samples;
-  Path held;
-  if (again) {
-    NoVisitor nothing;
-    const DirectionField rest;  // as a field, so that both take the same steps
-    held = trace(at, key, &rest, nothing, nullptr);
-  }
   const auto split = [&](const Rgb<Lanes>& turning, const Rgb<Lanes>& resting) {
     if (!turns) return TurnedSample{turning, {}, {}};
-    return TurnedSample{again ? resting : turning, turned(turning, resting), {}};
+    return TurnedSample{twice ? resting : turning, turned(turning, resting), {}};
   };
   const auto derivative = [](const Rgb<Dual>& x) { return Rgb<Lanes>{x.r.d, x.g.d, x.b.d}; };
   Sample sample{value(path.radiance), {}, {}, path.later_lights, path.finite};
@@ -254,19 +280,12 @@ TermEstimator::Sample TermEstimator::sample(const PixelSample& at, const Rng& ke
     if (term->uses_paths())
       to = split(term->add_path(path.radiance), term->add_path(held.radiance));
     if (term->uses_vertices()) {
-      to = again ? at_rest(vertices.sum(slot), vertices.turned(slot))
-                 : split(vertices.sum(slot), {});
+      const Rgb<Lanes>& sum = vertices.sum(slot);
+      to = twice ? TurnedSample{at_rest(sum, vertices.turned(slot)), vertices.turned(slot), {}}
+                 : split(sum, {});
     }
     if (turns && slot == pixel_slot_) to.scores = turned(path.score, {});
     sample.finite = sample.finite && is_finite(to.value) && is_finite(to.turned);
-  }
-  return sample;
-}
-
-TurnedSample TermEstimator::at_rest(const Rgb<Lanes>& turning, const Rgb<Vec3d>& turned) const {
-  TurnedSample sample{turning, turned, {}};
-  for (int c = 0; c < 3; ++c) {
-    for (int k = 0; k < 3; ++k) sample.value[c][k + 1] -= turning_.turn[k][k + 1] * turned[c][k];
   }
   return sample;
 }

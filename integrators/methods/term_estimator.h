@@ -68,6 +68,7 @@ class TermEstimator final : public SampleEstimator {
 
  private:
   class VertexTerms;
+  class VertexMotions;
   struct Path {
     Rgb<Dual> radiance;
     Rgb<Lanes> score;
@@ -79,10 +80,12 @@ class TermEstimator final : public SampleEstimator {
   template <class Visitor>
   Path trace(const PixelSample& at, const Rng& key, const DirectionField* field, Visitor& visitor,
              SampleLog* log) const;
-  // What lanes 1 to 3 have more where directions turn in them, in the unit of MotionRates.
-  Rgb<Vec3d> turned(const Rgb<Lanes>& turning, const Rgb<Lanes>& held) const;
-  // What lanes 1 to 3 hold without that.
-  TurnedSample at_rest(const Rgb<Lanes>& turning, const Rgb<Vec3d>& turned) const;
+  // What turns about the axes change, in the unit of MotionRates: from what lanes 1 to 3 have more
+  // where directions turn in them.
+  Lanes turned(const Lanes& turning, const Lanes& held) const;
+  Rgb<Lanes> turned(const Rgb<Lanes>& turning, const Rgb<Lanes>& held) const;
+  // Without what turns change in lanes 1 to 3.
+  Rgb<Lanes> at_rest(const Rgb<Lanes>& turning, const Rgb<Lanes>& turned) const;
   void add_path(const PixelSample& at, const Path& path, double weight, SampleSink& sink) const;
   void add_vertices(const PixelSample& at, const VertexTerms& vertices, const PixelCounts& counts,
                     SampleSink& sink) const;

@@ -60,9 +60,11 @@ void add_edge_point(const PathContext& context, const EdgeMesh& mesh, const Path
   ++cost.counted;
   const Rgb<double> amount = vertex.throughput * f * jump;
   const Rgb<Lanes> added{weight * amount.r, weight * amount.g, weight * amount.b};
-  if (vertex.turned) {  // -(axis x w) . side for all axes
-    const Vec3d turned = cross(view.side, view.y - query.p) * measure;
-    for (int c = 0; c < 3; ++c) (*vertex.turned)[c] += turned * amount[c];
+  if (TurnedVertex* turned = vertex.turned) {
+    const Vec3<Lanes> moving = -turned->velocity - cross(turned->turn, view.y - query.p);
+    const Lanes swept =
+        (moving.x * view.side.x + moving.y * view.side.y + moving.z * view.side.z) * measure;
+    for (int c = 0; c < 3; ++c) turned->sum[c] += swept * amount[c];
   }
   if (vertex.log) {
     vertex.log->push_back(fmt::format(
