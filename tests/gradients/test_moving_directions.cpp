@@ -88,17 +88,20 @@ TEST(MovingDirections, KeepTheMeanOfSeveralParameters) {
                    {"random-directions", "moving-directions", "adaptive"});
 }
 
-// The edges of sharp shadows that a gloss shows move with directions, too.
+// The edge of a sharp shadow on a wall, which a glossy floor shows, moves with directions, too.
 TEST(MovingDirections, KeepTheMeanOfSharpShadows) {
   const TempFiles files;
   SceneParts parts;
-  parts.body = square("floor", 2.5, -90, {0, 0, 0}, conductor("gloss", 0.2)) +
-               square("wall", 2.5, 0, {0, 1.5, -1.5}, diffuse("plaster", "0.7, 0.7, 0.6")) +
-               obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(2)), false, 0.5,
-                         {0, 1, 0}, diffuse("clay", "0.7, 0.5, 0.3")) +
-               R"(<emitter type="point" id="bulb"><point name="position" value="-0.6,1.6,1.6"/>
-                  <rgb name="intensity" value="9,8,7"/></emitter>)";
-  expect_same_mean(make_scene(files, parts), {"ball.translate.x", "bulb.position.y"},
+  parts.origin = {0, 2, 4};
+  parts.target = {0, 0, 0.2};
+  parts.fov = 30;
+  parts.body = square("floor", 2.5, -90, {0, 0, 0}, conductor("gloss", 0.15)) +
+               square("wall", 3, 0, {0, 1.5, -1.5}, diffuse("plaster", "0.7, 0.7, 0.7")) +
+               square("leaf", 0.5, 0, {0, 2.6, -1},
+                      R"(<bsdf type="twosided">)" + diffuse("soot", "0, 0, 0") + "</bsdf>") +
+               R"(<emitter type="point" id="bulb"><point name="position" value="0.1,3.2,0.6"/>
+                  <rgb name="intensity" value="9,9,9"/></emitter>)";
+  expect_same_mean(make_scene(files, parts), {"leaf.translate.y", "leaf.translate.x"},
                    {"random-directions", "adaptive"});
 }
 
