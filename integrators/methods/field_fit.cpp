@@ -187,12 +187,13 @@ class Fitter {
   Choice choose() const {
     const size_t size = grid_.size();
     Choice chosen(parameters_, std::vector<int>(size, kHeld));
-    std::vector<std::vector<double>> least(parameters_);
+    std::vector<std::vector<double>> held(parameters_), least;
     for (int k = 0; k < parameters_; ++k) {
-      std::vector<double> held(size);
+      std::vector<double> cells(size);
       for (size_t i = 0; i < size; ++i)
-        held[i] = 0.5 * (total_[0][i].variance(k) + total_[1][i].variance(k));
-      least[k] = window_means(grid_, held, kJudgeRadius);
+        cells[i] = 0.5 * (total_[0][i].variance(k) + total_[1][i].variance(k));
+      held[k] = window_means(grid_, cells, kJudgeRadius);
+      least.push_back(held[k]);
       for (double& v : least[k]) v *= kConvincing;
     }
     for (int r = 0; r < static_cast<int>(std::size(kRadii)); ++r) {
@@ -208,7 +209,29 @@ class Fitter {
         }
       }
     }
+    if (parameters_ > 1) hold_where_few_gain(held, least, chosen);
     return chosen;
+  }
+
+  // Edges are drawn for all parameters at once: a turn for one of them, which moves edges at rest,
+  // takes samples from the others. So the same must hold for all of them together, each variance in
+  // units of its mean.
+  void hold_where_few_gain(const std::vector<std::vector<double>>& held,
+                           const std::vector<std::vector<double>>& least, Choice& chosen) const {
+    std::vector<double> weights;
+    for (const std::vector<double>& values : held) {
+      const double mean = trimmed_mean(values);
+      weights.push_back(mean > 0 ? 1 / mean : 0);
+    }
+    for (size_t i = 0; i < grid_.size(); ++i) {
+      double before = 0, after = 0;
+      for (int k = 0; k < parameters_; ++k) {
+        before += weights[k] * held[k][i];
+        after += weights[k] * (chosen[k][i] == kHeld ? held[k][i] : least[k][i]);
+      }
+      if (after < kConvincing * before) continue;
+      for (auto& fits : chosen) fits[i] = kHeld;
+    }
   }
 
   CellCovariances row(int half, int radius, size_t y) const {

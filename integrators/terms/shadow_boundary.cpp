@@ -42,7 +42,7 @@ struct ShadowPoint {
 // A ray from a viewer that meets the shadow's edge.
 struct Viewer {
   Vec3<Dual> origin;
-  Vec3<Dual> direction;  // unit; turning with the camera, or as directions at the vertex do
+  Vec3<Dual> direction;  // unit; held fixed, or turning with the camera or the directions of a path
   double distance;       // to the shadow's edge
 };
 
