@@ -33,8 +33,9 @@ struct PilotFigures {
   bool in_cells(size_t slot) const { return !halves[0][slot].empty(); }
 };
 
-// turns: whether turns of directions at first vertices are looked at. spp: even. settings: its limit of time holds
-// for the whole job, which `watch` has timed since it began: a pilot takes an eighth of it at most.
+// turns: whether turns of directions at first vertices are looked at. spp: even. settings: its limit
+// of time holds for the whole job, which `watch` has timed since it began: a pilot takes an eighth of
+// it at most.
 PilotFigures run_pilot(const TermEstimator& estimator, bool turns, int spp,
                        const RunSettings& settings, const Stopwatch& watch);
 
