@@ -9,50 +9,16 @@ namespace {
 
 constexpr size_t kMostProbes = 65536;  // a film of 256 by 256 has them all; not tuned
 
-// Sums over the samples of one term in one pixel.
-struct Sums {
-  float first[3][kFigures] = {};
-  Covariance second;
-
-  void add(const Rgb<Lanes>& value, const Rgb<Lanes>& score) {
-    for (int c = 0; c < 3; ++c) {
-      float x[kFigures];
-      for (int k = 0; k < kLanes; ++k) x[k] = static_cast<float>(value[c][k]);
-      for (int k = 1; k < kLanes; ++k) x[kLanes + k - 1] = static_cast<float>(score[c][k]);
-      for (int i = 0; i < kFigures; ++i) {
-        first[c][i] += x[i];
-        for (int j = 0; j <= i; ++j) second.at(i, j) += x[i] * x[j];
-      }
-    }
-  }
-
-  Covariance covariance(int samples) const {
-    Covariance result;
-    const float n = static_cast<float>(samples);
-    for (int i = 0; i < kFigures; ++i) {
-      for (int j = 0; j <= i; ++j) {
-        float products = 0;
-        for (int c = 0; c < 3; ++c) products += first[c][i] * first[c][j];
-        result.at(i, j) = (second.at(i, j) - products / n) / (n - 1);
-      }
-    }
-    return result;
-  }
-};
-
 // The samples of probed pixels go into sums; only what belongs to the film goes on.
 class PilotEstimator final : public SampleEstimator {
  public:
-  PilotEstimator(const TermEstimator& terms, bool fields)
-      : terms_(terms), grid_(terms.scene().film, kMostProbes), fields_(fields) {
+  PilotEstimator(const TermEstimator& terms, bool turns)
+      : terms_(terms), grid_(terms.scene().film, kMostProbes), turns_(turns) {
     for (size_t slot = 0; slot < terms.slots(); ++slot) {
-      sums_.emplace_back(terms.adds_to_pixels(slot) ? grid_.size() : 0);
+      sums_.emplace_back(terms.adds_to_pixels(slot) ? grid_.size() : 0, terms.lanes());
     }
-    sums_.emplace_back(grid_.size());
+    sums_.emplace_back(grid_.size(), terms.lanes());
     later_lights_.resize(grid_.size());
-    if (!fields) return;
-    turning_.turn = {{0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}};
-    turning_.score = turning_.turn;
   }
 
   const Scene& scene() const override { return terms_.scene(); }
@@ -71,15 +37,13 @@ class PilotEstimator final : public SampleEstimator {
 
   void add_pixel(const PixelSample& at, const Rng& key, SampleSink& sink) const override {
     if (!grid_.is_probe(scene().film, at.x, at.y)) return;
-    const TermEstimator::Sample sample =
-        terms_.sample(at, key, fields_ ? &turning_ : nullptr, sink);
+    const TermEstimator::Sample sample = terms_.sample(at, key, turns_, sink);
     if (!sample.finite) return;
     const size_t cell = grid_.index(at.x, at.y);
     for (size_t slot = 0; slot < slots(); ++slot) {
-      if (sums_[slot].empty()) continue;
-      sums_[slot][cell].add(sample.terms[slot], slot == pixel_slot() ? sample.score : Rgb<Lanes>{});
+      if (!sums_[slot].empty()) sums_[slot].add(cell, sample.terms[slot]);
     }
-    sums_.back()[cell].add(sample.light_difference, {});
+    sums_.back().add(cell, sample.light_difference);
     later_lights_[cell] += static_cast<uint32_t>(sample.later_lights);
   }
 
@@ -88,24 +52,18 @@ class PilotEstimator final : public SampleEstimator {
     return std::accumulate(later_lights_.begin(), later_lights_.end(), uint64_t{0});
   }
   // Of the samples since the last call.
-  std::vector<std::vector<Covariance>> take_covariances(int samples) {
-    std::vector<std::vector<Covariance>> result(sums_.size());
-    for (size_t slot = 0; slot < sums_.size(); ++slot) {
-      for (Sums& sums : sums_[slot]) {
-        result[slot].push_back(sums.covariance(samples));
-        sums = {};
-      }
-    }
+  std::vector<CellCovariances> take_covariances(int samples) {
+    std::vector<CellCovariances> result;
+    for (CellSums& sums : sums_) result.push_back(sums.take(samples));
     return result;
   }
 
  private:
   const TermEstimator& terms_;
   PlanGrid grid_;
-  bool fields_;
-  DirectionField turning_;
-  // [slot][cell]; each is written by the thread of its tile alone.
-  mutable std::vector<std::vector<Sums>> sums_;
+  bool turns_;
+  // Of every slot; a cell is written by the thread of its tile alone.
+  mutable std::vector<CellSums> sums_;
   mutable std::vector<uint32_t> later_lights_;
 };
 
@@ -175,15 +133,15 @@ std::vector<double> PilotFigures::variances(size_t slot, int lane) const {
   std::vector<double> result;
   for (size_t cell = 0; cell < grid.size(); ++cell) {
     result.push_back(0.5 *
-                     (halves[0][slot][cell].at(lane, lane) + halves[1][slot][cell].at(lane, lane)));
+                     (halves[0][slot][cell].variance(lane) + halves[1][slot][cell].variance(lane)));
   }
   return result;
 }
 
-PilotFigures run_pilot(const TermEstimator& estimator, bool fields, int spp,
+PilotFigures run_pilot(const TermEstimator& estimator, bool turns, int spp,
                        const RunSettings& settings, const Stopwatch& watch) {
   PilotFigures figures;
-  auto owned = std::make_unique<PilotEstimator>(estimator, fields);
+  auto owned = std::make_unique<PilotEstimator>(estimator, turns);
   PilotEstimator& pilot = *owned;
   PilotRun run(estimator, std::move(owned));
   const double began = watch.seconds();

@@ -6,35 +6,21 @@
 #include <vector>
 
 #include "integrators/estimates/batches.h"
+#include "integrators/methods/pilot_moments.h"
 #include "integrators/methods/sample_plan.h"
 #include "integrators/methods/term_estimator.h"
 
 namespace limn {
-
-// What is known of one sample of a term: its derivatives in all lanes, and for the term that traces
-// paths the scores of lanes 1 to 3.
-inline constexpr int kFigures = kLanes + 3;
-
-// Symmetric, kFigures by kFigures; summed over channels.
-struct Covariance {
-  std::array<float, kFigures*(kFigures + 1) / 2> entries{};
-
-  static constexpr size_t index(int i, int j) {
-    return i < j ? index(j, i) : static_cast<size_t>(i * (i + 1) / 2 + j);
-  }
-  float& at(int i, int j) { return entries[index(i, j)]; }
-  float at(int i, int j) const { return entries[index(i, j)]; }
-};
 
 inline constexpr int kPilotLights = 2;  // light samples at later vertices
 
 struct PilotFigures {
   int spp = 0;  // samples of every probed pixel; 0: there was no time for a pilot
   PlanGrid grid;
-  // [half][slot][cell]: covariances of one sample, from either half of the pilot. Empty for slots
-  // that add nothing to pixels. Behind the slots stands one more: PathTracer::light_difference,
+  // [half][slot]: covariances of one sample, from either half of the pilot. Empty for slots that add
+  // nothing to pixels. Behind the slots stands one more: PathTracer::light_difference,
   // which is half of what a light sample at later vertices adds, paths taking two of them.
-  std::array<std::vector<std::vector<Covariance>>, 2> halves;
+  std::array<std::vector<CellCovariances>, 2> halves;
   // Of slots on the film: the mean over pixels of the variance of one sample per pixel, summed over
   // channels, of each lane.
   std::vector<Lanes> film_variance;
@@ -42,12 +28,15 @@ struct PilotFigures {
   std::vector<double> variances(size_t slot, int lane) const;
   double light_work = 0;     // of one light sample at all later vertices of a path
   std::vector<double> work;  // of one sample of a pixel, of every slot, see Term::work
+
+  // Whether a slot's samples belong to pixels.
+  bool in_cells(size_t slot) const { return !halves[0][slot].empty(); }
 };
 
-// fields: directions at first vertices turn in lanes 1 to 3, about the axes, at the rates of
-// estimator.motion_rates(); needs a single parameter. spp: even. settings: its limit of time holds
-// for the whole job, which `watch` has timed since it began: a pilot takes an eighth of it at most.
-PilotFigures run_pilot(const TermEstimator& estimator, bool fields, int spp,
+// turns: whether turns of directions at first vertices are looked at. spp: even. settings: its limit
+// of time holds for the whole job, which `watch` has timed since it began: a pilot takes an eighth of
+// it at most.
+PilotFigures run_pilot(const TermEstimator& estimator, bool turns, int spp,
                        const RunSettings& settings, const Stopwatch& watch);
 
 }  // namespace limn

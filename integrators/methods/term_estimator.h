@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "integrators/estimates/sample_estimator.h"
+#include "integrators/methods/pilot_moments.h"
 #include "integrators/methods/sample_plan.h"
 #include "integrators/terms/term.h"
 #include "limn/core/parameter.h"
@@ -37,15 +38,14 @@ class TermEstimator final : public SampleEstimator {
   // One path with one sample of every term at its vertices.
   struct Sample {
     Rgb<double> radiance;
-    std::array<Rgb<Lanes>, kMostTerms> terms;  // of each slot; zero for those of the film
-    Rgb<Lanes> score;                          // not yet in any term
-    Rgb<Lanes> light_difference;               // see PathTracer
+    std::array<TurnedSample, kMostTerms> terms;  // of each slot; zero for those of the film
+    TurnedSample light_difference;               // see PathTracer
     uint64_t later_lights;
     bool finite;
   };
-  // Takes light_samples of the plan, which must be two for a light_difference.
-  Sample sample(const PixelSample& at, const Rng& key, const DirectionField* field,
-                SampleSink& sink) const;
+  // Takes light_samples of the plan, which must be two for a light_difference. turns: whether turns
+  // of directions at the first vertex are looked at; the values are those of directions at rest.
+  Sample sample(const PixelSample& at, const Rng& key, bool turns, SampleSink& sink) const;
 
   const Scene& scene() const override { return scene_; }
   size_t slots() const override { return types_.size(); }
@@ -68,16 +68,24 @@ class TermEstimator final : public SampleEstimator {
 
  private:
   class VertexTerms;
+  class VertexMotions;
   struct Path {
     Rgb<Dual> radiance;
     Rgb<Lanes> score;
     Rgb<Dual> light_difference;
     uint64_t later_lights;
+    RayCount rays;
     bool finite;
   };
   template <class Visitor>
   Path trace(const PixelSample& at, const Rng& key, const DirectionField* field, Visitor& visitor,
-             SampleSink& sink) const;
+             SampleLog* log) const;
+  // What turns about the axes change, in the unit of MotionRates: from what lanes 1 to 3 have more
+  // where directions turn in them.
+  Lanes turned(const Lanes& turning, const Lanes& held) const;
+  Rgb<Lanes> turned(const Rgb<Lanes>& turning, const Rgb<Lanes>& held) const;
+  // Without what turns change in lanes 1 to 3.
+  Rgb<Lanes> at_rest(const Rgb<Lanes>& turning, const Rgb<Lanes>& turned) const;
   void add_path(const PixelSample& at, const Path& path, double weight, SampleSink& sink) const;
   void add_vertices(const PixelSample& at, const VertexTerms& vertices, const PixelCounts& counts,
                     SampleSink& sink) const;
@@ -96,6 +104,8 @@ class TermEstimator final : public SampleEstimator {
   size_t pixel_slot_ = 0;                     // of the term that traces paths
   bool paths_ = false, vertices_ = false;     // whether some term uses them
   MotionRates rates_;
+  // What a pilot turns directions by: about the axes x, y and z in the lanes 1 to 3.
+  DirectionField turning_;
   SamplePlan plan_;
 };
 

@@ -60,15 +60,21 @@ struct TermMethod {
 // has not seen must not cost more than this. Not tuned.
 constexpr double kLeastSamples = 0.125;
 
-// A turn and a score of every pixel and parameter, of the order of what moves.
-std::vector<DirectionField> random_fields(size_t count, uint64_t seed) {
+// A turn and a score of every pixel and parameter, of the order of what moves. Their means are not
+// zero: otherwise a change of the derivative that they should not make would go unseen in sums over
+// pixels.
+std::vector<DirectionField> random_fields(size_t count, const TermEstimator& estimator,
+                                          uint64_t seed) {
   constexpr uint64_t kStream = 0xf1e1d;  // any number
+  const Lanes steps = estimator.lane_scale();
   std::vector<DirectionField> fields(count);
   for (size_t i = 0; i < count; ++i) {
     Rng rng(mix_bits(seed + kStream), i, 0);
     for (Vec3<Lanes>* v : {&fields[i].turn, &fields[i].score}) {
       for (int k = 0; k < 3; ++k) {
-        for (int lane = 0; lane < kLanes; ++lane) (*v)[k][lane] = 2 * rng.uniform() - 1;
+        for (int lane = 0; lane < estimator.lanes(); ++lane) {
+          (*v)[k][lane] = rng.uniform() * steps[0] / steps[lane];
+        }
       }
     }
   }
@@ -184,7 +190,7 @@ class TermJob {
       if (!options_.samples) plan = plan_by_pilot(pass(p), settings, watch, result);
       if (method_.random_directions && can_move_directions()) {
         plan.grid = PlanGrid(scene_.film, film_size(scene_.film));
-        plan.fields = random_fields(plan.grid.size(), settings.seed);
+        plan.fields = random_fields(plan.grid.size(), pass(p), settings.seed);
       }
       for (size_t t = 0; t < types_.size(); ++t) {
         means[t] += plan.uniform[t] / static_cast<double>(passes_.size());
@@ -260,16 +266,18 @@ class TermJob {
     SamplePlan plan;
     const int spp = pilot_samples(settings.spp);
     if (spp == 0 || (!method_.spreads_samples && terms_computed() < 2)) return plan;
-    const bool turns = method_.moves_directions && can_move_directions() &&
-                       estimator.lanes() == 1 && !estimator.motion_rates().still();
+    const bool turns =
+        method_.moves_directions && can_move_directions() && !estimator.motion_rates().still();
     SamplePlan probing;
     if (method_.spreads_samples) probing.light_samples = kPilotLights;
     estimator.set_plan(probing);
-    const PilotFigures pilot = run_pilot(estimator, turns, spp, settings, watch);
+    RunSettings share = settings;
+    share.seconds /= static_cast<double>(passes_.size());
+    const PilotFigures pilot = run_pilot(estimator, turns, spp, share, watch);
     if (pilot.spp == 0) return plan;
     result.pilot_spp = pilot.spp;
     FieldFit fit;
-    if (turns) fit = fit_fields(pilot, settings.threads);
+    if (turns) fit = fit_fields(pilot, estimator.lanes(), settings.threads);
     const std::vector<TermFigures> figures = figures_of(estimator, pilot, fit, plan);
     if (method_.spreads_samples && !options_.uniform_samples) {
       spread_samples(figures, pilot.grid, plan);
@@ -305,7 +313,7 @@ class TermJob {
       figures[t].cost = pilot.work[t];
       figures[t].least = types_[t]->least_samples;
       if (method_.spreads_samples && t != estimator.pixel_slot()) figures[t].least = kLeastSamples;
-      if (!pilot.halves[0][t].empty()) figures[t].cells.resize(pilot.grid.size());
+      if (pilot.in_cells(t)) figures[t].cells.resize(pilot.grid.size());
     }
     for (int lane = 0; lane < estimator.lanes(); ++lane) {
       std::vector<std::vector<double>> cells(figures.size());
@@ -315,7 +323,7 @@ class TermJob {
         if (figures[t].cells.empty()) {
           means[t] = pilot.film_variance[t][lane];
         } else {
-          cells[t] = fit.variances.empty() ? pilot.variances(t, lane) : fit.variances[t];
+          cells[t] = fit.variances.empty() ? pilot.variances(t, lane) : fit.variances[lane][t];
           // Some terms have samples of both kinds.
           const double film = pilot.film_variance[t][lane];
           means[t] = trimmed_mean(cells[t]) + film;
@@ -329,7 +337,7 @@ class TermJob {
         for (size_t i = 0; i < cells[t].size(); ++i) figures[t].cells[i] += cells[t][i] / sum;
       }
       const auto lights = fit.variances.empty() ? pilot.variances(figures.size(), lane)
-                                                : fit.variances[figures.size()];
+                                                : fit.variances[lane][figures.size()];
       light.variance += trimmed_mean(lights) / sum;
       for (size_t i = 0; i < lights.size(); ++i) light.cells[i] += lights[i] / sum;
     }

@@ -12,31 +12,22 @@ namespace {
 Vec3d lane_of(const Vec3<Lanes>& v, int lane) { return {v.x[lane], v.y[lane], v.z[lane]}; }
 Vec3d derivative(const Vec3<Dual>& v, int lane) { return {v.x.d[lane], v.y.d[lane], v.z.d[lane]}; }
 
-Vec3<Lanes> scaled(const Vec3<Lanes>& v, const Lanes& rates) {
-  Vec3<Lanes> result;
-  for (int k = 0; k < kLanes; ++k) {
-    result.x[k] = v.x[k] * rates[k];
-    result.y[k] = v.y[k] * rates[k];
-    result.z[k] = v.z[k] * rates[k];
-  }
-  return result;
-}
-
 bool is_zero(const Vec3<Lanes>& v) {
   return limn::is_zero(v.x) && limn::is_zero(v.y) && limn::is_zero(v.z);
 }
 
 }  // namespace
 
-MotionRates::MotionRates(const Scene& scene, int lanes) : repeat_(lanes == 1) {
+MotionRates::MotionRates(const Scene& scene, int lanes, const Lanes& steps) {
   for (int lane = 0; lane < lanes; ++lane) {
-    add_object(scene, lane);
-    add_camera(scene, lane);
+    const double share = steps[lane] / steps[0];
+    add_object(scene, lane, share);
+    add_camera(scene, lane, share);
   }
 }
 
 // All vertices that move, as one object.
-void MotionRates::add_object(const Scene& scene, int lane) {
+void MotionRates::add_object(const Scene& scene, int lane, double share) {
   Bounds bounds;
   double squares = 0, count = 0;
   for (const Shape& shape : scene.shapes) {
@@ -51,34 +42,31 @@ void MotionRates::add_object(const Scene& scene, int lane) {
   if (count == 0) return;
   const double radius = 0.5 * length(bounds.upper - bounds.lower);
   if (!(radius > 0)) return;
-  sources_.push_back({lane, bounds.center(), radius, std::sqrt(squares / count), 0});
+  sources_.push_back({bounds.center(), radius, share * std::sqrt(squares / count), 0});
 }
 
-void MotionRates::add_camera(const Scene& scene, int lane) {
+void MotionRates::add_camera(const Scene& scene, int lane, double share) {
   const Camera& camera = scene.camera;
   const double speed = length(derivative(camera.origin, lane));
   const double rotation = length(derivative(camera.left, lane)) +
                           length(derivative(camera.up, lane)) +
                           std::fabs(camera.fov.d[lane]) * (kPi / 180);
   if (!(speed > 0) && !(rotation > 0)) return;
-  sources_.push_back({lane, value(camera.origin), camera.near_clip, speed, rotation});
+  sources_.push_back({value(camera.origin), camera.near_clip, share * speed, share * rotation});
 }
 
-Lanes MotionRates::at(const Vec3d& p) const {
-  Lanes rates;
+double MotionRates::at(const Vec3d& p) const {
+  double rate = 0;
   for (const Source& source : sources_) {
     const double distance = std::max(length(source.center - p), source.radius);
-    rates[source.lane] += source.speed / distance + source.rotation;
+    rate += source.speed / distance + source.rotation;
   }
-  if (repeat_) {
-    for (int k = 1; k < kLanes; ++k) rates[k] = rates[0];
-  }
-  return rates;
+  return rate;
 }
 
 DirectionMotion MotionRates::motion_at(const Vec3d& p, const DirectionField& field) const {
-  const Lanes rates = at(p);
-  return {scaled(field.turn, rates), scaled(field.score, rates), !is_zero(field.score)};
+  const double unit = at(p);
+  return {field.turn * unit, field.score * unit, !is_zero(field.score), unit};
 }
 
 }  // namespace limn

@@ -16,54 +16,57 @@
 
 namespace limn {
 
-// Of a pixel, per parameter, in units of MotionRates.
+// Of a pixel, per parameter, in the unit of MotionRates.
 struct DirectionField {
   Vec3<Lanes> turn{};   // of the sampled directions
   Vec3<Lanes> score{};  // of the directions of the score that is added
 };
 
-// The same at one vertex: angular velocities.
+// The direction w as it turns with an angular velocity.
+inline Vec3<Dual> turning(const Vec3d& w, const Vec3<Lanes>& turn) {
+  const Vec3<Lanes> v = cross(turn, w);
+  return {{w.x, v.x}, {w.y, v.y}, {w.z, v.z}};
+}
+
+// The same at one vertex: angular velocities [1 / unit of the parameter].
 struct DirectionMotion {
   Vec3<Lanes> turn{}, score{};
   bool scoring = false;  // whether the score is not zero
+  double unit = 0;       // MotionRates::at the vertex
 
   // The direction w with its derivative.
-  Vec3<Dual> moving(const Vec3d& w) const { return rotated(turn, w); }
-  Vec3<Dual> moving_score(const Vec3d& w) const { return rotated(score, w); }
-
- private:
-  static Vec3<Dual> rotated(const Vec3<Lanes>& rate, const Vec3d& w) {
-    const Vec3<Lanes> v = cross(rate, w);
-    return {{w.x, v.x}, {w.y, v.y}, {w.z, v.z}};
-  }
+  Vec3<Dual> moving(const Vec3d& w) const { return turning(w, turn); }
+  Vec3<Dual> moving_score(const Vec3d& w) const { return turning(w, score); }
 };
 
-// How fast what moves does so as seen from a point: the unit of turns, per parameter.
+// How fast what moves does so as seen from a point: the unit of all turns. One for all parameters,
+// which turn directions at multiples of it: what a turn changes in a sample is then the same for all
+// of them.
 class MotionRates {
  public:
-  // scene: with its parameters seeded in the first `lanes` lanes. With one parameter the other
-  // lanes repeat its rate.
-  MotionRates(const Scene& scene, int lanes);
+  // scene: with its parameters seeded in the first `lanes` lanes. steps: what makes speeds of the
+  // parameters comparable.
+  MotionRates(const Scene& scene, int lanes, const Lanes& steps);
 
-  // Angular velocity at p [1 / unit of the parameter], at least a bound's order of magnitude.
-  Lanes at(const Vec3d& p) const;
+  // Angular velocity at p [1 / unit of the first parameter], summed over the parameters with their
+  // steps; at least a bound's order of magnitude.
+  double at(const Vec3d& p) const;
   DirectionMotion motion_at(const Vec3d& p, const DirectionField& field) const;
   // Nothing moves: turning would only add noise.
   bool still() const { return sources_.empty(); }
 
  private:
   struct Source {
-    int lane;
     Vec3d center;
     double radius;    // at least; > 0
     double speed;     // root mean square over the object's vertices, or of the camera
     double rotation;  // of the camera [1 / unit of the parameter]
   };
-  void add_object(const Scene& scene, int lane);
-  void add_camera(const Scene& scene, int lane);
+  // share: the lane's step in those of the first.
+  void add_object(const Scene& scene, int lane, double share);
+  void add_camera(const Scene& scene, int lane, double share);
 
   std::vector<Source> sources_;
-  bool repeat_ = false;
 };
 
 }  // namespace limn

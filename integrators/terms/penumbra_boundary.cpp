@@ -61,7 +61,10 @@ class PenumbraTerm final : public Term {
   // What the drawn line adds for a path that comes along the ray with the throughput.
   void add(const Drawn& drawn, const Vec3<Dual>& origin, const Vec3<Dual>& direction,
            const Rgb<double>& throughput, int bounces, const Rng& key, SampleLog* log,
-           TermCost& cost, Rgb<Lanes>& sum) const;
+           TurnedVertex* turned, TermCost& cost, Rgb<Lanes>& sum) const;
+  // How the point that the line meets slides if the viewer's directions turn.
+  Vec3<Lanes> sliding(const Drawn& drawn, const Vec3d& q, const Vec3d& omega,
+                      const TurnedVertex& viewer) const;
 
   const PathContext& context_;
   const EdgeSamplerInput& edges_;
@@ -110,7 +113,8 @@ bool PenumbraTerm::sample_film(double u, const Rng& key, RayCount& rays, FilmSam
   drawn->edge.probability /= film_per_solid_angle(context_.scene.camera, seen->omega);
   TermCost cost;
   Rgb<Lanes> sum;
-  add(*drawn, seen->ray.origin, seen->ray.direction, grey(1.0), 0, key, nullptr, cost, sum);
+  add(*drawn, seen->ray.origin, seen->ray.direction, grey(1.0), 0, key, nullptr, nullptr, cost,
+      sum);
   rays.closest += cost.rays - cost.shadow_rays;
   rays.shadow += cost.shadow_rays;
   sample = {seen->x, seen->y, sum};
@@ -154,18 +158,33 @@ void PenumbraTerm::add_sample(const PathVertex& viewer, const Rng& key, TermCost
     viewer.log->push_back(fmt::format(
         "  penumbra on face {} of shape {}:", drawn->face.face.index(), drawn->face.shape.index()));
   }
-  add(*drawn, viewer.surface.p, DirectionMotion{viewer.turn}.moving(omega), viewer.throughput * f,
-      bounces, key, viewer.log, cost, sum);
+  TurnedVertex turned;
+  if (viewer.turned) turned.velocity = sliding(*drawn, q, omega, *viewer.turned);
+  add(*drawn, viewer.surface.p, turning(omega, viewer.turn), viewer.throughput * f, bounces, key,
+      viewer.log, viewer.turned ? &turned : nullptr, cost, sum);
+  if (viewer.turned) viewer.turned->sum = viewer.turned->sum + turned.sum;
+}
+
+Vec3<Lanes> PenumbraTerm::sliding(const Drawn& drawn, const Vec3d& q, const Vec3d& omega,
+                                  const TurnedVertex& viewer) const {
+  const Vec3<Lanes>& v = viewer.velocity;
+  const auto turns =
+      surface_on_ray<Dual>(context_.scene, drawn.face, {{q.x, v.x}, {q.y, v.y}, {q.z, v.z}},
+                           turning(omega, viewer.turn));
+  // What does not turn is in both.
+  const auto rests =
+      surface_on_ray<Dual>(context_.scene, drawn.face, {q.x, q.y, q.z}, turning(omega, {}));
+  return {turns.p.x.d - rests.p.x.d, turns.p.y.d - rests.p.y.d, turns.p.z.d - rests.p.z.d};
 }
 
 void PenumbraTerm::add(const Drawn& drawn, const Vec3<Dual>& origin, const Vec3<Dual>& direction,
                        const Rgb<double>& throughput, int bounces, const Rng& key, SampleLog* log,
-                       TermCost& cost, Rgb<Lanes>& sum) const {
+                       TurnedVertex* turned, TermCost& cost, Rgb<Lanes>& sum) const {
   const Scene& scene = context_.scene;
   const auto surface = surface_on_ray<Dual>(scene, drawn.face, origin, direction);
   const Scattering<Dual> scattering(surface, -direction, scene.shading);
   if (scattering.black()) return;
-  const PathVertex vertex{surface, scattering, throughput, {}, bounces, {}, key, log};
+  const PathVertex vertex{surface, scattering, throughput, {}, bounces, {}, key, log, turned};
   add_edge_point(context_, edges_.object(drawn.edge.edge.object), vertex, query_at(vertex),
                  drawn.edge, {&regions_, drawn.line.region}, key, cost, sum);
 }

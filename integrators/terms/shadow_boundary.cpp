@@ -286,8 +286,8 @@ void ShadowTerm::add_sample(const PathVertex& vertex, Rng rng, TermCost& cost,
     ++cost.zero_weight;
     return;
   }
-  const Vec3<Dual> direction = DirectionMotion{vertex.turn}.moving(omega);
-  const Lanes swept = sweep(edge, *point, {vertex.surface.p, direction, distance});
+  const Lanes swept =
+      sweep(edge, *point, {vertex.surface.p, turning(omega, vertex.turn), distance});
   const Rgb<double> amount = vertex.throughput * f * jump(edge, *point, q, omega);
   if (is_zero(swept) || is_black(amount)) {
     ++cost.zero_weight;
@@ -306,6 +306,15 @@ void ShadowTerm::add_sample(const PathVertex& vertex, Rng rng, TermCost& cost,
   ++cost.counted;
   const Lanes weight = swept * (1 / probability);
   const Rgb<Lanes> added{weight * amount.r, weight * amount.g, weight * amount.b};
+  if (TurnedVertex* turned = vertex.turned) {
+    // What does not turn is in both.
+    const Vec3<Lanes>& v = turned->velocity;
+    const Viewer turns{
+        {{q.x, v.x}, {q.y, v.y}, {q.z, v.z}}, turning(omega, turned->turn), distance};
+    const Viewer rests{{q.x, q.y, q.z}, turning(omega, {}), distance};
+    const Lanes of_turns = sweep(edge, *point, turns) - sweep(edge, *point, rests);
+    for (int c = 0; c < 3; ++c) turned->sum[c] += of_turns * (amount[c] / probability);
+  }
   if (vertex.log) {
     vertex.log->push_back(fmt::format(
         "  shadow of edge {} of shape {} on face {} of shape {}: probability {:.4g}, adds "

@@ -19,16 +19,25 @@
 
 namespace limn {
 
+// What a pilot asks of a vertex: what it would add if directions at the path's first vertex turned
+// about the axes x, y and z, on the same samples. Lanes 0 to 2 are the axes.
+struct TurnedVertex {
+  Vec3<Lanes> velocity{};  // of the vertex as it then slides [scene units per unit of the turn]
+  Vec3<Lanes> turn{};      // of directions here, in the same unit; zero but at the first vertex
+  Rgb<Lanes> sum{};        // added to
+};
+
 // Where a path scatters.
 struct PathVertex {
   const SurfacePoint<Dual>& surface;
   const Scattering<Dual>& scattering;
-  const Rgb<double>& throughput;  // of the path up to here
-  Vec3<Lanes> turn;               // angular velocity of directions here, see direction_field.h
-  int bounces;                    // how often it has scattered before
-  PathStep step;                  // how it came here
-  const Rng& key;                 // of the path
-  SampleLog* log = nullptr;       // null unless somebody reads it
+  const Rgb<double>& throughput;   // of the path up to here
+  Vec3<Lanes> turn;                // angular velocity of directions here, see direction_field.h
+  int bounces;                     // how often it has scattered before
+  PathStep step;                   // how it came here
+  const Rng& key;                  // of the path
+  SampleLog* log = nullptr;        // null unless somebody reads it
+  TurnedVertex* turned = nullptr;  // null unless a pilot asks
 };
 
 class Term {

@@ -29,9 +29,9 @@ void add_edge_point(const PathContext& context, const EdgeMesh& mesh, const Path
   Vec3<Lanes> v = relative_velocity(mesh, a, query) * (1 - sample.t) +
                   relative_velocity(mesh, b, query) * sample.t;
   if (share != 1) v = v * share - cross(query.turn, view.y - query.p) * (1 - share);
-  const Lanes weight =
-      (v.x * view.side.x + v.y * view.side.y + v.z * view.side.z) *
-      (1 / (view.distance * view.distance * view.distance * sample.probability * sample.pdf_t));
+  const double measure =
+      1 / (view.distance * view.distance * view.distance * sample.probability * sample.pdf_t);
+  const Lanes weight = (v.x * view.side.x + v.y * view.side.y + v.z * view.side.z) * measure;
   if (vertex.log) {
     vertex.log->push_back(fmt::format(
         "  edge {} of shape {} at t = {:.6g}: probability {:.4g}, density of t {:.4g}, distance "
@@ -61,6 +61,12 @@ void add_edge_point(const PathContext& context, const EdgeMesh& mesh, const Path
   ++cost.counted;
   const Rgb<double> amount = vertex.throughput * f * jump;
   const Rgb<Lanes> added{weight * amount.r, weight * amount.g, weight * amount.b};
+  if (TurnedVertex* turned = vertex.turned) {
+    const Vec3<Lanes> moving = turned->velocity * -share - cross(turned->turn, view.y - query.p);
+    const Lanes swept =
+        (moving.x * view.side.x + moving.y * view.side.y + moving.z * view.side.z) * measure;
+    for (int c = 0; c < 3; ++c) turned->sum[c] += swept * amount[c];
+  }
   if (vertex.log) {
     vertex.log->push_back(fmt::format(
         "    jump ({:.6g}, {:.6g}, {:.6g}), adds ({:.6g}, {:.6g}, {:.6g}) to the first parameter",
