@@ -1,6 +1,8 @@
 // One sample of a pixel: its paths, the first of which carries the terms at vertices.
 #include "integrators/methods/term_estimator.h"
 
+#include <limits>
+
 #include "integrators/terms/camera_path.h"
 #include "integrators/terms/path_log.h"
 
@@ -17,6 +19,10 @@ Scene seeded(const Scene& scene, std::span<const Parameter> parameters) {
 // what moves. Edges that move by it alone count for so much less than those of the parameter. Not
 // tuned.
 constexpr double kTurnShare = 0.3;
+
+// What a sample comes to that asks for a ray which cannot be traced.
+const double kNan = std::numeric_limits<double>::quiet_NaN();
+const Lanes kNotFinite{kNan, kNan, kNan, kNan};
 
 Lanes natural_steps(std::span<const Parameter> parameters) {
   const double free = parameters.size() == 1 ? kTurnShare * parameters[0].natural_step : 1;
@@ -89,7 +95,11 @@ class TermEstimator::VertexTerms {
       const Stopwatch watch;
       TermCost& cost = sink_.cost(slot);
       const int samples = std::max(1, static_cast<int>(counts_[slot]));
-      term->add_at_vertex(vertex, samples, cost, sums_[slot]);
+      try {
+        term->add_at_vertex(vertex, samples, cost, sums_[slot]);
+      } catch (const UntraceableRay&) {
+        sums_[slot] = grey(kNotFinite);
+      }
       cost.seconds += watch.seconds();
     }
   }
@@ -154,7 +164,11 @@ TermEstimator::Path TermEstimator::trace(const PixelSample& at, const Rng& key,
   if (field) tracer.move_directions(rates_, *field);
   tracer.take_light_samples(plan_.light_samples);
   Path path;
-  path.radiance = tracer.from_ray(primal, ray.origin, ray.direction, 0, key);
+  try {
+    path.radiance = tracer.from_ray(primal, ray.origin, ray.direction, 0, key);
+  } catch (const UntraceableRay&) {
+    path.radiance = grey(Dual(kNotFinite[0]));
+  }
   path.score = tracer.score();
   path.light_difference = tracer.light_difference();
   path.later_lights = tracer.later_lights();
@@ -181,6 +195,16 @@ void TermEstimator::add_path(const PixelSample& at, const Path& path, double wei
     if (terms_[slot] && terms_[slot]->uses_paths()) {
       sink.add(slot, at, terms_[slot]->add_path(path.radiance) + path.score, weight);
     }
+  }
+}
+
+bool TermEstimator::sample_film(size_t slot, double u, const Rng& key, RayCount& rays,
+                                FilmSample& sample) const {
+  try {
+    return terms_[slot]->sample_film(u, key, rays, sample);
+  } catch (const UntraceableRay&) {
+    sample.value = grey(kNotFinite);
+    return true;
   }
 }
 

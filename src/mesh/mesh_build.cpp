@@ -183,6 +183,7 @@ Mesh build_mesh(const RawMesh& raw, const MeshOptions& options,
          std::to_string(repeated) + " of " + std::to_string(raw.faces.size()) +
              " faces repeat another face and are left out");
   }
+  turn_needles(mesh);
   if (mesh.normal_source == NormalSource::kGiven) {
     set_given_normals(mesh, raw, options, warnings);
     check_orientation(mesh, raw.where, warnings);

@@ -37,6 +37,9 @@ void reject_skipped(const RTCFilterFunctionNArguments* arguments) {
 }
 
 RTCRay to_embree(const Ray& ray, const Vec3d& origin) {
+  // The only place where rays reach Embree, which may crash or abort on others.
+  if (!is_traceable(ray)) [[unlikely]]
+    throw UntraceableRay();
   // Float directions of unit length are this near to it.
   DCHECK_LE(std::fabs(length_squared(ray.direction) - 1), 0x1p-20);
   RTCRay r{};
@@ -150,7 +153,10 @@ class EmbreeTracer final : public RayTracer {
     errors_.check();
     std::transform(mesh.positions.begin(), mesh.positions.end(), vertices,
                    [&](const Vec3f& x) { return cast<float>(cast<double>(x) - origin_); });
-    std::copy(mesh.faces.begin(), mesh.faces.end(), faces);
+    // Relative to a ray's origin Embree rounds corners, and might meet a line.
+    std::transform(mesh.faces.begin(), mesh.faces.end(), faces, [&](const FaceIndices& face) {
+      return has_area(mesh, face) ? face : FaceIndices{face[0], face[0], face[0]};
+    });
     rtcCommitGeometry(geometry.get());
     rtcAttachGeometryByID(rtc_scene_.get(), geometry.get(), static_cast<unsigned>(id));
     errors_.check();
