@@ -73,7 +73,7 @@ class SceneWriter {
         {"<rfilter type=\"box\"/>", "<rfilter type=\"tent\"/>", "<rfilter type=\"gaussian\"/>"});
     return "<sensor type=\"perspective\">" +
            real("fov", die_.mostly({40.0, 90.0, 1.0, 1e-4, 179.9})) +
-           real("near_clip", unit_ * die_.mostly({0.01, 1e-6, 1e-30, 1.0, 3.0})) +
+           real("near_clip", unit_ * die_.mostly({0.01, 1e-6, 1.0, 3.0, 1e-12, 1e-30})) +
            real("far_clip", unit_ * die_.mostly({1e3, 1e6, 4.0, 1e30, 1e300})) +
            fmt::format(
                "<transform name=\"to_world\"><lookat origin=\"{}\" target=\"{}\" "

@@ -5,7 +5,8 @@
 // The scene of a seed is the same everywhere. A scene fails if its process ends by a signal (an
 // abort, a sanitizer's report), takes longer than SECONDS (20), throws anything but InputError, or
 // if an image holds what is not finite. Refused scenes and runs that report samples which are not
-// finite are counted. The scenes of failures stay, and their places are printed.
+// finite are counted. The scenes of failures stay, and their places are printed; with NASTY_SHOW in
+// the environment all scenes stay, and errors are printed.
 #include <fmt/format.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -57,7 +58,7 @@ Outcome run_scene(uint64_t seed, const std::string& folder) {
     if (bad > 0) fmt::print("seed {}: {} ({})\n", seed, result.non_finite.message(), asked);
     return bad > 0 ? kReported : kFinite;
   } catch (const InputError& e) {
-    if (getenv("NASTY_SHOW_ERRORS")) fmt::print("seed {}: {}\n", seed, e.what());
+    if (getenv("NASTY_SHOW")) fmt::print("seed {}: {}\n", seed, e.what());
     return kRefused;
   } catch (const std::exception& e) {
     fmt::print("  exception: {} ({})\n", e.what(), asked);
@@ -89,14 +90,14 @@ int run_all(uint64_t first, uint64_t count, unsigned seconds) {
     const int status = run_in_child(seed, folder.string(), seconds);
     if (status >= 0 && status < kWrong) {
       ++outcomes[status];
-      fs::remove_all(folder);
+      if (!getenv("NASTY_SHOW")) fs::remove_all(folder);
     } else {
       ++failures;
       fmt::print("seed {} fails{}: {}\n", seed, status < 0 ? " by a signal" : "", folder.string());
     }
     fflush(stdout);
   }
-  if (failures == 0) fs::remove_all(root);
+  if (failures == 0 && !getenv("NASTY_SHOW")) fs::remove_all(root);
   for (int i = 0; i < 3; ++i) fmt::print("{} {}\n", outcomes[i], kOutcomes[i]);
   fmt::print("{} failures of {} scenes, seeds from {} on\n", failures, count, first);
   return failures == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
