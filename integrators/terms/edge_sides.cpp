@@ -52,6 +52,7 @@ std::optional<FaceSide> blocked_at_edge(const Scene& scene, const EdgeStart& edg
   for_every_side(scene, edge.around, edge.x0, along, [&](const FaceSide& side, Incidence) {
     if (side.face == edge.start.face) return;
     const Vec3d& g = side.into;
+    // A copy of the face that the path starts on, to the rounding of directions, hides nothing of it.
     if (length_squared(g - f) <= 0x1.0p-60 && are_copies(scene, side.face, edge.start.face)) return;
     const double gw = turn(g, direction);
     const double r = turn(f, g) / gw;

@@ -152,6 +152,8 @@ class EmbreeTracer final : public RayTracer {
   }
 
   bool occluded(const Ray& ray) const override {
+    if (!copies_.empty() && is_end_hidden(ray)) [[unlikely]]
+      return true;
     Context context = make_context(ray);
     RTCRay query = to_embree(ray, origin_);
     rtcOccluded1(rtc_scene_.get(), &context.base, &query);
@@ -159,6 +161,11 @@ class EmbreeTracer final : public RayTracer {
   }
 
  private:
+  // Whether a copy is met in the place of the face where the ray ends.
+  bool is_end_hidden(const Ray& ray) const {
+    return ray.end.shape.valid() &&
+           copies_.met(ray.end, ray.direction, ray.skip_emitters) != ray.end;
+  }
   // Relative to a ray's origin Embree rounds corners, and might meet a line. Of copies the first one
   // stands for all.
   bool is_traced(const Mesh& mesh, FaceRef face) const {
