@@ -231,24 +231,6 @@ void store_tangents(Mesh& mesh, const ShadingNormals<Dual>& from) {
 
 }  // namespace
 
-void turn_needles(Mesh& mesh) {
-  for (size_t f = 0; f < mesh.faces.size(); ++f) {
-    Vec3d corners[3];
-    for (int k = 0; k < 3; ++k) corners[k] = cast<double>(mesh.positions[mesh.faces[f][k]]);
-    const Vec3d e1 = corners[1] - corners[0], e2 = corners[2] - corners[0], n = cross(e1, e2);
-    constexpr double kThin = 0x1.0p-20;  // a quarter of the digits are lost in one; not tuned
-    if (dot(n, n) > kThin * kThin * (dot(e1, e1) * dot(e2, e2))) continue;
-    double sides[3];  // opposite to the corners
-    for (int k = 0; k < 3; ++k)
-      sides[k] = length_squared(corners[(k + 2) % 3] - corners[(k + 1) % 3]);
-    const auto first = std::max_element(sides, sides + 3) - sides;
-    std::rotate(mesh.faces[f].begin(), mesh.faces[f].begin() + first, mesh.faces[f].end());
-    if (mesh.normal_ids.empty()) continue;
-    auto& ids = mesh.normal_ids[f];
-    std::rotate(ids.begin(), ids.begin() + first, ids.end());
-  }
-}
-
 void update_shading_normals(Mesh& mesh) {
   CHECK_EQ(mesh.weld.size(), mesh.positions.size());
   if (mesh.normal_source == NormalSource::kFace) return;

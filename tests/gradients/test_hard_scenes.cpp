@@ -198,21 +198,27 @@ TEST_F(Copies, OfBothSides) {
   }
 }
 
-// A face of width 1e-23 at a distance of 1 from the origin.
-TEST(Needle, IsFinite) {
-  const TempFiles files;
-  SceneParts parts;
-  parts.max_depth = 5;
-  parts.width = parts.height = 4;
-  parts.origin = {0.6, 1.8, 3.4};
-  const std::string file =
-      files.write("needle.obj", "v -1e-20 0 0\nv 0 1e-3 0.3\nv 0 0 0\nf 2 1 3\n");
-  parts.body = square("floor", 3, -90, {}, conductor("gloss", 0.05)) +
-               square("lamp", 1e-4, 90, {0.3, 2.6, 0.5}, area_light("glow", "1e6, 1e6, 1e6")) +
-               constant_light("sky", "0.4, 0.5, 0.7") +
-               obj_shape("object", file, false, 1e-3, {0, 1, 0},
-                         "<bsdf type=\"twosided\"><bsdf type=\"diffuse\"/></bsdf>");
-  run(make_scene(files, parts), {"object.translate.x"}, 0, 16);
+// A face of width 1e-23 at a distance of 1 from the origin changes nothing.
+TEST(Needle, IsNotSeen) {
+  const auto sums = [](const std::string& needle) {
+    const TempFiles files;
+    SceneParts parts;
+    parts.max_depth = 5;
+    parts.width = parts.height = 4;
+    parts.origin = {0.6, 1.8, 3.4};
+    const std::string file =
+        files.write("needle.obj",
+                    "v -1e-20 0 0\nv 0 1e-3 0.3\nv 0 0 0\nv 100 0 0\nv 0 100 0\n"
+                    "f 3 4 5\n" +
+                        needle);
+    parts.body = square("floor", 3, -90, {}, conductor("gloss", 0.05)) +
+                 square("lamp", 1e-4, 90, {0.3, 2.6, 0.5}, area_light("glow", "1e6, 1e6, 1e6")) +
+                 constant_light("sky", "0.4, 0.5, 0.7") +
+                 obj_shape("object", file, false, 1e-3, {0, 1, 0},
+                           "<bsdf type=\"twosided\"><bsdf type=\"diffuse\"/></bsdf>");
+    return means(run(make_scene(files, parts), {"object.translate.x"}, 0, 16).parameters[0].total);
+  };
+  EXPECT_EQ(sums("f 2 1 3\n"), sums(""));
 }
 
 }  // namespace

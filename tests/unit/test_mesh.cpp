@@ -254,21 +254,16 @@ TEST(Normals, CancelledOnesAreFinite) {
   for (const Vec3d& n : mesh.normals) EXPECT_NEAR(length(n), 1, 1e-15);
 }
 
-// The corner between the short sides comes first, and winding and normals stay.
-TEST(Mesh, NeedlesAreTurned) {
+// A needle of width 1e-20 between two faces: they meet where it was.
+TEST(Mesh, NeedlesCollapse) {
   const TempFiles files;
-  const Mesh mesh =
-      read_mesh(files.write("a.obj",
-                            "v -1e-20 0 0\nv 0 1e-3 0.3\nv 0 0 0\nvn 1 0 0\nvn 0 1 0\nvn 0 0 1\n"
-                            "f 2//2 1//1 3//3\n"),
-                false);
-  ASSERT_EQ(mesh.faces.size(), 1u);
-  EXPECT_TRUE(has_area(mesh, mesh.faces[0]));
-  EXPECT_TRUE((mesh.faces[0] == FaceIndices{0, 2, 1}) || (mesh.faces[0] == FaceIndices{2, 1, 0}));
-  for (int k = 0; k < 3; ++k) {
-    const Vec3d n = mesh.normals[mesh.normal_ids[0][k]];
-    EXPECT_EQ(n[static_cast<int>(mesh.faces[0][k])], 1);
-  }
+  const Mesh mesh = read_mesh(files.write("a.obj",
+                                          "v -1e-20 0 0\nv 0 1e-3 0.3\nv 0 0 0\nv 1 0 0\nv -1 0 0\n"
+                                          "f 2 1 3\nf 3 4 2\nf 5 1 2\n"),
+                              true);
+  EXPECT_EQ(mesh.collapsed_faces, 1u);
+  ASSERT_EQ(mesh.faces.size(), 2u);
+  EXPECT_EQ(mesh.weld[2], 0u);
 }
 
 Mesh shape_mesh(const std::string& xml) {
