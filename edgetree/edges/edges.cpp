@@ -14,9 +14,9 @@ namespace {
 
 // In extended precision, so that needles get a normal that is right to double precision as well.
 Plane plane_of(const Mesh& mesh, const FaceIndices& face) {
+  if (!has_area(mesh, face)) return {};
   const Vec3f &fa = mesh.positions[face[0]], &fb = mesh.positions[face[1]],
               &fc = mesh.positions[face[2]];
-  if (collinear(fa, fb, fc)) return {};
   using Real = long double;
   const Vec3<Real> a = cast<Real>(fa);
   const Vec3<Real> n = normalize(cross(cast<Real>(fb) - a, cast<Real>(fc) - a));

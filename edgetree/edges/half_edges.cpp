@@ -47,36 +47,6 @@ class Motions {
   Lanes speeds_;  // the largest component of a velocity
 };
 
-// Whether the exact sum of the terms is zero (Shewchuk 1997, grow-expansion: the parts do not
-// overlap, so they sum to zero only if all are zero).
-bool sums_to_zero(const std::array<double, 6>& terms) {
-  std::array<double, 6> parts{};
-  int count = 0;
-  for (double carry : terms) {
-    for (int i = 0; i < count; ++i) {
-      const double sum = parts[i] + carry;
-      const double b = sum - parts[i];
-      parts[i] = (parts[i] - (sum - b)) + (carry - b);
-      carry = sum;
-    }
-    parts[count++] = carry;
-  }
-  return std::all_of(parts.begin(), parts.end(), [](double part) { return part == 0; });
-}
-
-// Whether the triangle's projection to the plane of two axes has zero area. Products of floats are
-// exact in double.
-bool projection_vanishes(double ax, double ay, double bx, double by, double cx, double cy) {
-  const std::array<double, 6> terms{bx * cy, -(bx * ay), -(ax * cy), -(by * cx), by * ax, ay * cx};
-  double sum = 0, size = 0;
-  for (double term : terms) {
-    sum += term;
-    size += std::fabs(term);
-  }
-  if (std::fabs(sum) > 8 * 0x1.0p-53 * size) return false;  // beyond the rounding of five additions
-  return sums_to_zero(terms);
-}
-
 uint64_t undirected_key(VertexId a, VertexId b) {
   return uint64_t{std::min(a, b).index()} << 32 | std::max(a, b).index();
 }
@@ -164,20 +134,13 @@ std::vector<VertexId> edge_vertex_ids(const Mesh& mesh) {
   return ids;
 }
 
-bool collinear(const Vec3f& fa, const Vec3f& fb, const Vec3f& fc) {
-  const Vec3d a = cast<double>(fa), b = cast<double>(fb), c = cast<double>(fc);
-  return projection_vanishes(a.x, a.y, b.x, b.y, c.x, c.y) &&
-         projection_vanishes(a.y, a.z, b.y, b.z, c.y, c.z) &&
-         projection_vanishes(a.z, a.x, b.z, b.x, c.z, c.x);
-}
-
 std::vector<HalfEdge> half_edges_of(const Mesh& mesh, const std::vector<VertexId>& ids) {
   std::vector<FaceId> slivers;
   std::vector<HalfEdge> sides;
   sides.reserve(3 * mesh.faces.size());
   for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
     const FaceIndices& face = mesh.faces[f];
-    if (collinear(mesh.positions[face[0]], mesh.positions[face[1]], mesh.positions[face[2]])) {
+    if (!has_area(mesh, face)) {
       slivers.emplace_back(f);
       continue;
     }

@@ -1,5 +1,5 @@
 #pragma once
-// Directed sides of faces over welded vertices, with faces of zero area taken out exactly.
+// Directed sides of faces over welded vertices, with faces of zero area taken out.
 #include <cstdint>
 #include <vector>
 
@@ -18,9 +18,6 @@ struct HalfEdge {
 // position that moves alike in every lane (to the rounding of floats). Copies that move apart tear
 // the surface: they keep ids of their own, so that both rims become borders.
 std::vector<VertexId> edge_vertex_ids(const Mesh& mesh);
-
-// Whether the three points lie on one line (or coincide), decided exactly.
-bool collinear(const Vec3f& a, const Vec3f& b, const Vec3f& c);
 
 // The sides of all faces that have area. A face of zero area is a line segment: it is invisible,
 // and only says that its long side equals its two short ones. So it is left out, and the sides of

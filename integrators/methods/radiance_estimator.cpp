@@ -1,6 +1,8 @@
 // One path per sample of a pixel, in plain numbers.
 #include "integrators/methods/radiance_estimator.h"
 
+#include <limits>
+
 #include "integrators/terms/camera_path.h"
 #include "integrators/terms/path_log.h"
 
@@ -19,7 +21,11 @@ void RadianceEstimator::add_pixel(const PixelSample& at, const Rng& key, SampleS
   RayCount rays;
   const auto trace = [&](auto& visitor) {
     PathTracer<double, std::decay_t<decltype(visitor)>> path(context_, rays, visitor);
-    return path.from_ray(camera_ray(scene_, ray), ray.origin, ray.direction, 0, key);
+    try {
+      return path.from_ray(camera_ray(scene_, ray), ray.origin, ray.direction, 0, key);
+    } catch (const UntraceableRay&) {
+      return grey(std::numeric_limits<double>::quiet_NaN());
+    }
   };
   Rgb<double> radiance;
   if (SampleLog* log = sink.log()) {

@@ -1,6 +1,8 @@
 // One sample of a pixel: its paths, the first of which carries the terms at vertices.
 #include "integrators/methods/term_estimator.h"
 
+#include <limits>
+
 #include "integrators/terms/camera_path.h"
 #include "integrators/terms/path_log.h"
 
@@ -19,6 +21,10 @@ Scene seeded(const Scene& scene, std::span<const Parameter> parameters) {
 // than they are: with 0.3, four at once had 1.1 to 1.2 times the squared error in a soft shadow, with
 // 0.02 1.15 times in a chandelier.
 constexpr double kFreeTurnShare = 0.3, kTurnShare = 0.05;
+
+// What a sample comes to that asks for a ray which cannot be traced.
+const double kNan = std::numeric_limits<double>::quiet_NaN();
+const Lanes kNotFinite{kNan, kNan, kNan, kNan};
 
 Lanes natural_steps(std::span<const Parameter> parameters) {
   // A pilot lets directions turn in lanes that are free.
@@ -124,7 +130,11 @@ class TermEstimator::VertexTerms {
       TermCost& cost = sink_.cost(slot);
       const int samples = std::max(1, static_cast<int>(counts_[slot]));
       turned.sum = {};
-      term->add_at_vertex(vertex, samples, cost, sums_[slot]);
+      try {
+        term->add_at_vertex(vertex, samples, cost, sums_[slot]);
+      } catch (const UntraceableRay&) {
+        sums_[slot] = grey(kNotFinite);
+      }
       turned_[slot] = turned_[slot] + turned.sum;
       cost.seconds += watch.seconds();
     }
@@ -201,7 +211,11 @@ TermEstimator::Path TermEstimator::trace(const PixelSample& at, const Rng& key,
   PathTracer<Dual, Visitor> tracer(context_, path.rays, visitor);
   if (field) tracer.move_directions(rates_, *field);
   tracer.take_light_samples(plan_.light_samples);
-  path.radiance = tracer.from_ray(primal, ray.origin, ray.direction, 0, key);
+  try {
+    path.radiance = tracer.from_ray(primal, ray.origin, ray.direction, 0, key);
+  } catch (const UntraceableRay&) {
+    path.radiance = grey(Dual(kNotFinite[0]));
+  }
   path.score = tracer.score();
   path.light_difference = tracer.light_difference();
   path.later_lights = tracer.later_lights();
@@ -228,6 +242,16 @@ void TermEstimator::add_path(const PixelSample& at, const Path& path, double wei
     if (terms_[slot] && terms_[slot]->uses_paths()) {
       sink.add(slot, at, terms_[slot]->add_path(path.radiance) + path.score, weight);
     }
+  }
+}
+
+bool TermEstimator::sample_film(size_t slot, double u, const Rng& key, RayCount& rays,
+                                FilmSample& sample) const {
+  try {
+    return terms_[slot]->sample_film(u, key, rays, sample);
+  } catch (const UntraceableRay&) {
+    sample.value = grey(kNotFinite);
+    return true;
   }
 }
 

@@ -62,9 +62,7 @@ class TermEstimator final : public SampleEstimator {
   }
   int film_stream(size_t slot) const override { return types_[slot]->film_stream; }
   bool sample_film(size_t slot, double u, const Rng& key, RayCount& rays,
-                   FilmSample& sample) const override {
-    return terms_[slot]->sample_film(u, key, rays, sample);
-  }
+                   FilmSample& sample) const override;
 
  private:
   class VertexTerms;

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "src/rays/face_copies.h"
+
 namespace limn {
 
 bool view_edge(const EdgeMesh& mesh, EdgeRef id, double t, const Vec3d& p, EdgeView& view) {
@@ -26,6 +28,14 @@ namespace {
 struct Sides {
   std::optional<FaceSide> negative, positive;
 };
+
+// Whether a face is seen before another one on the same side. Copies have one slope, but for rounding.
+bool hides(const Scene& scene, const FaceSide& a, double slope_a, const FaceSide& b, double slope_b,
+           const Vec3d& omega) {
+  const bool near = std::fabs(slope_a - slope_b) <= 0x1.0p-30 * (1 + std::fabs(slope_a));
+  if (near && are_copies(scene, a.face, b.face)) return is_met_first(scene, a.face, b.face, omega);
+  return slope_a < slope_b;
+}
 
 // In the plane across the edge, a face leaves the edge along the unit vector a = alpha m + beta w,
 // with m the normal of the viewing plane through the edge and w the part of omega across the edge:
@@ -55,7 +65,7 @@ Sides nearest_faces(const Scene& scene, const EdgeMesh& mesh, const EdgeView& vi
     for (const bool place : {false, true}) {
       if (!order.is_seen(rim, positive, own, place)) continue;
       auto& nearest = place ? sides.positive : sides.negative;
-      if (nearest && slope >= slopes[place]) continue;
+      if (nearest && !hides(scene, side, slope, *nearest, slopes[place], view.omega)) continue;
       nearest = side;
       slopes[place] = slope;
     }

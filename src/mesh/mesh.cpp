@@ -50,7 +50,18 @@ struct FaceShape {
   bool has_area = false;
   Vec3<S> normal;
   std::array<S, 3> angles;
+  double rounding = 0;  // [rad] how far the rounding of its corners may have turned the normal
 };
+
+// Corners off by 2^-22 of the largest coordinate, one up and one down (weld_seams.cpp).
+double normal_rounding(const std::array<Vec3d, 3>& corners, double doubled_area) {
+  double size = 0, longest = 0;
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) size = std::max(size, std::fabs(corners[i][k]));
+    longest = std::max(longest, length(corners[(i + 1) % 3] - corners[i]));
+  }
+  return 0x1.0p-21 * size * longest / doubled_area;
+}
 
 template <class S>
 FaceShape<S> face_shape(const Mesh& mesh, FaceId face) {
@@ -62,14 +73,11 @@ FaceShape<S> face_shape(const Mesh& mesh, FaceId face) {
   const Vec3<S> a = p[1] - p[0], b = p[2] - p[0], c = p[2] - p[1];
   const Vec3<S> doubled_area = cross(a, b);
   const S size = length(doubled_area);
-  // Each product below is rounded once, each difference of products once more: what is no larger
-  // than that error is no area.
-  const double rounding = 4 * std::numeric_limits<double>::epsilon() *
-                          std::sqrt(length_squared(value(a)) * length_squared(value(b)));
   FaceShape<S> shape;
-  shape.has_area = value(size) > rounding;
+  shape.has_area = has_area(value(p[0]), value(p[1]), value(p[2]));
   if (!shape.has_area) return shape;
   shape.normal = doubled_area / size;
+  shape.rounding = normal_rounding({value(p[0]), value(p[1]), value(p[2])}, value(size));
   shape.angles = {S(atan2(size, dot(a, b))), S(atan2(size, -dot(a, c))), S(atan2(size, dot(b, c)))};
   return shape;
 }
@@ -97,24 +105,30 @@ void assign_normal_ids(Mesh& mesh) {
 }
 
 // Sums of face normals weighted by corner angles (Thuermer and Wuethrich 1998), normalised. Where
-// they cancel (a sheet that is folded onto itself) any face's normal serves; a vertex of faces
-// without area alone gets +Z, which nothing ever reads.
+// they cancel (fins around an axis, a sheet that is folded onto itself) to a thousandth and to what
+// rounding may have left of it, any face's normal serves: the direction of the rest says nothing, and its
+// derivative has no bound. A vertex of faces without area alone gets +Z, which nothing ever reads.
 template <class S>
 std::vector<Vec3<S>> computed_normals(const Mesh& mesh, const std::vector<FaceShape<S>>& shapes) {
   std::vector<Vec3<S>> normals(mesh.normals.size());
   std::vector<uint32_t> any_face(mesh.normals.size(), kUnused);
+  std::vector<double> angles(mesh.normals.size()), noise(mesh.normals.size());
   for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
     if (!shapes[f].has_area) continue;
     for (int c = 0; c < 3; ++c) {
       const uint32_t n = mesh.normal_ids[f][c];
       normals[n] += shapes[f].normal * shapes[f].angles[c];
       any_face[n] = f;
+      angles[n] += value(shapes[f].angles[c]);
+      noise[n] += value(shapes[f].angles[c]) * shapes[f].rounding;
     }
   }
   for (size_t n = 0; n < normals.size(); ++n) {
+    const double rest = std::max(64 * std::numeric_limits<double>::epsilon(),
+                                 std::min(noise[n], 0x1.0p-10 * angles[n]));
     if (any_face[n] == kUnused) {
       normals[n] = {S(0), S(0), S(1)};
-    } else if (value(length(normals[n])) > 64 * std::numeric_limits<double>::epsilon()) {
+    } else if (value(length(normals[n])) > rest) {
       normals[n] = normalize(normals[n]);
     } else {
       normals[n] = shapes[any_face[n]].normal;
@@ -136,18 +150,55 @@ std::vector<Vec3<S>> stored_normals(const Mesh& mesh) {
   return normals;
 }
 
-// Sine of the largest tilt of a face's corner normals against the face. The sine is the length of
-// the cross product, which is exact where sqrt(1 - cos^2) would lose all digits.
+// Sine of the tilt of a corner's normal against its face; 1 if it is no less than a right angle. The
+// sine is the length of the cross product, which is exact where sqrt(1 - cos^2) would lose all digits.
 template <class S>
-S face_tilt(const Mesh& mesh, FaceId face, const Vec3<S>& face_normal,
-            const std::vector<Vec3<S>>& normals) {
-  S tilt(0);
-  for (uint32_t n : mesh.normal_ids[face.index()]) {
-    if (value(dot(normals[n], face_normal)) <= 0) return S(1);
-    const S sine = length(cross(normals[n], face_normal));
-    if (sine > tilt) tilt = sine;
+S sine_of_tilt(const Vec3<S>& normal, const Vec3<S>& face_normal) {
+  if (value(dot(normal, face_normal)) <= 0) return S(1);
+  const S sine = length(cross(normal, face_normal));
+  return sine < 1.0 ? sine : S(1);
+}
+
+// Calls visit(root, sine, rounding) for the tilt of each corner of a face, at each of its vertices.
+template <class S, class Visit>
+void for_every_tilt(const Mesh& mesh, const std::vector<FaceShape<S>>& shapes,
+                    const std::vector<Vec3<S>>& normals, const std::vector<double>& noise,
+                    const Visit& visit) {
+  for (uint32_t f = 0; f < shapes.size(); ++f) {
+    if (!shapes[f].has_area) continue;
+    for (const uint32_t n : mesh.normal_ids[f]) {
+      const S sine = sine_of_tilt(normals[n], shapes[f].normal);
+      // At most what leaves the derivative of a mesh far from the origin its meaning; not tuned.
+      const double rounding = std::min(0x1.0p-16, shapes[f].rounding + noise[n]);
+      for (const uint32_t v : mesh.faces[f]) visit(mesh.weld[v], sine, rounding);
+    }
   }
-  return tilt < 1.0 ? tilt : S(1);
+}
+
+// The derivative of a maximum at a tie depends on the side. The mean of both sides stands for it, the
+// middle between the least and the largest of those that tie: what central differences come to. In
+// symmetric meshes ties are everywhere, but for the rounding of positions: what may be the largest,
+// as far as that goes, ties.
+void average_tied_slopes(const Mesh& mesh, const std::vector<FaceShape<Dual>>& shapes,
+                         const std::vector<Vec3<Dual>>& normals, std::vector<Dual>& horizon) {
+  std::vector<double> noise(normals.size());
+  for (uint32_t f = 0; f < shapes.size(); ++f)
+    for (const uint32_t n : mesh.normal_ids[f]) noise[n] = std::max(noise[n], shapes[f].rounding);
+  std::vector<double> largest(horizon.size());
+  for_every_tilt(mesh, shapes, normals, noise, [&](uint32_t v, const Dual& sine, double rounding) {
+    largest[v] = std::max(largest[v], sine.v - rounding);
+  });
+  std::vector<Lanes> least(horizon.size()), most(horizon.size());
+  std::vector<bool> found(horizon.size());
+  for_every_tilt(mesh, shapes, normals, noise, [&](uint32_t v, const Dual& sine, double rounding) {
+    if (sine.v + rounding < largest[v]) return;
+    for (int k = 0; k < kLanes; ++k) {
+      least[v][k] = found[v] ? std::min(least[v][k], sine.d[k]) : sine.d[k];
+      most[v][k] = found[v] ? std::max(most[v][k], sine.d[k]) : sine.d[k];
+    }
+    found[v] = true;
+  });
+  for (size_t v = 0; v < horizon.size(); ++v) horizon[v].d = 0.5 * (least[v] + most[v]);
 }
 
 template <class S>
@@ -158,14 +209,11 @@ ShadingNormals<S> shading_normals(const Mesh& mesh) {
   result.normals = mesh.normal_source == NormalSource::kComputed ? computed_normals(mesh, shapes)
                                                                  : stored_normals<S>(mesh);
   std::vector<S> at_root(mesh.positions.size(), S(0));
-  for (uint32_t f = 0; f < shapes.size(); ++f) {
-    if (!shapes[f].has_area) continue;
-    const S tilt = face_tilt(mesh, FaceId(f), shapes[f].normal, result.normals);
-    for (uint32_t v : mesh.faces[f]) {
-      S& horizon = at_root[mesh.weld[v]];
-      if (tilt > horizon) horizon = tilt;
-    }
-  }
+  for_every_tilt(mesh, shapes, result.normals, std::vector<double>(result.normals.size()),
+                 [&](uint32_t v, const S& sine, double) {
+                   if (sine > at_root[v]) at_root[v] = sine;
+                 });
+  if constexpr (std::is_same_v<S, Dual>) average_tied_slopes(mesh, shapes, result.normals, at_root);
   result.horizon.resize(at_root.size());
   for (size_t v = 0; v < at_root.size(); ++v) result.horizon[v] = at_root[mesh.weld[v]];
   return result;

@@ -61,6 +61,35 @@ size_t keep_faces(Mesh& mesh, const Keep& keep) {
   return dropped;
 }
 
+// The vertex that stands for all that are welded to v, directly or not.
+uint32_t root_of(const Mesh& mesh, uint32_t v) {
+  while (mesh.weld[v] != v) v = mesh.weld[v];
+  return v;
+}
+
+// Corners of a face that are nearer to each other than a billionth of its longest side become one:
+// nobody sees such a face, and its sides cannot be told apart in double precision, so that its edges would
+// not cancel.
+void weld_needles(Mesh& mesh) {
+  constexpr double kThin = 0x1.0p-30;  // not tuned
+  const auto position = [&](uint32_t v) { return cast<double>(mesh.positions[v]); };
+  bool found = false;
+  for (const FaceIndices& face : mesh.faces) {
+    double squares[3];
+    for (int k = 0; k < 3; ++k)
+      squares[k] = length_squared(position(face[(k + 1) % 3]) - position(face[k]));
+    const double longest = *std::max_element(squares, squares + 3);
+    for (int k = 0; k < 3; ++k) {
+      if (squares[k] > kThin * kThin * longest) continue;
+      const uint32_t a = root_of(mesh, face[k]), b = root_of(mesh, face[(k + 1) % 3]);
+      mesh.weld[std::max(a, b)] = std::min(a, b);
+      found = true;
+    }
+  }
+  if (!found) return;
+  for (uint32_t v = 0; v < mesh.weld.size(); ++v) mesh.weld[v] = root_of(mesh, v);
+}
+
 // Faces that welded seams have closed.
 void drop_collapsed(Mesh& mesh) {
   mesh.collapsed_faces += keep_faces(mesh, [&](size_t f) {
@@ -167,6 +196,7 @@ Mesh build_mesh(const RawMesh& raw, const MeshOptions& options,
   weld_positions(mesh);
   set_faces(mesh, raw, options.flip_normals);
   weld_seams(mesh);
+  weld_needles(mesh);
   drop_collapsed(mesh);
   if (mesh.faces.empty()) {
     throw InputError(raw.where, "the mesh has no faces: each of its " +

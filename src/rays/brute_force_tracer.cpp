@@ -27,6 +27,7 @@ class BruteForceTracer final : public RayTracer {
   explicit BruteForceTracer(const Scene& scene) : scene_(scene) {}
 
   bool closest(const Ray& ray, Hit& hit) const override {
+    if (!is_traceable(ray)) throw UntraceableRay();
     bool found = false;
     double nearest = ray.t_max;
     for (uint32_t s = 0; s < scene_.shapes.size(); ++s) {

@@ -11,6 +11,7 @@
 #include "limn/core/check.h"
 #include "limn/core/error.h"
 #include "limn/core/ray_tracer.h"
+#include "src/rays/face_copies.h"
 
 namespace limn {
 namespace {
@@ -19,10 +20,23 @@ struct Context {
   RTCIntersectContext base;  // first: Embree hands back a pointer to it
   const Ray* ray;
   const Scene* scene;
+  const FaceCopies* copies;
 };
+
+// Whether the ray skips a face that stands for copies: what skips one of them skips all.
+bool is_skipped_place(const Context& context, FaceRef face) {
+  const Ray& ray = *context.ray;
+  const auto is_here = [&](FaceRef other) {
+    return other.shape.valid() && context.copies->first(other) == face;
+  };
+  return is_here(ray.start) || is_here(ray.end) ||
+         std::any_of(ray.skip_faces.begin(), ray.skip_faces.end(), is_here) ||
+         !context.copies->met(face, ray.direction, ray.skip_emitters);
+}
 
 bool is_skipped(const Context& context, FaceRef face) {
   const Ray& ray = *context.ray;
+  if (!context.copies->empty()) return is_skipped_place(context, face);
   if (face == ray.start || face == ray.end) return true;
   if (ray.skip_emitters && context.scene->shape(face.shape).is_emitter) return true;
   return std::find(ray.skip_faces.begin(), ray.skip_faces.end(), face) != ray.skip_faces.end();
@@ -37,6 +51,9 @@ void reject_skipped(const RTCFilterFunctionNArguments* arguments) {
 }
 
 RTCRay to_embree(const Ray& ray, const Vec3d& origin) {
+  // The only place where rays reach Embree, which may crash or abort on others.
+  if (!is_traceable(ray)) [[unlikely]]
+    throw UntraceableRay();
   // Float directions of unit length are this near to it.
   DCHECK_LE(std::fabs(length_squared(ray.direction) - 1), 0x1p-20);
   RTCRay r{};
@@ -101,7 +118,8 @@ class EmbreeErrors {
 
 class EmbreeTracer final : public RayTracer {
  public:
-  EmbreeTracer(const Scene& scene, int threads) : scene_(scene), origin_(origin_of(scene)) {
+  EmbreeTracer(const Scene& scene, int threads)
+      : scene_(scene), copies_(scene), origin_(origin_of(scene)) {
     const std::string config = "threads=" + std::to_string(threads);
     device_.reset(rtcNewDevice(config.c_str()));
     if (!device_) throw InputError("Embree cannot start on this machine");
@@ -112,7 +130,8 @@ class EmbreeTracer final : public RayTracer {
         rtc_scene_.get(),
         static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION));
     rtcSetSceneBuildQuality(rtc_scene_.get(), RTC_BUILD_QUALITY_HIGH);
-    for (size_t i = 0; i < scene.shapes.size(); ++i) attach(scene.shapes[i].mesh, i);
+    for (size_t i = 0; i < scene.shapes.size(); ++i)
+      attach(scene.shapes[i].mesh, ShapeId(static_cast<uint32_t>(i)));
     rtcCommitScene(rtc_scene_.get());
     errors_.check();
   }
@@ -126,11 +145,15 @@ class EmbreeTracer final : public RayTracer {
     rtcIntersect1(rtc_scene_.get(), &context.base, &query);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
     hit.face = {ShapeId(query.hit.geomID), FaceId(query.hit.primID)};
+    if (!copies_.empty()) [[unlikely]]
+      hit.face = copies_.met(hit.face, ray.direction, ray.skip_emitters).value_or(hit.face);
     hit.t = query.ray.tfar;
     return true;
   }
 
   bool occluded(const Ray& ray) const override {
+    if (!copies_.empty() && is_end_hidden(ray)) [[unlikely]]
+      return true;
     Context context = make_context(ray);
     RTCRay query = to_embree(ray, origin_);
     rtcOccluded1(rtc_scene_.get(), &context.base, &query);
@@ -138,7 +161,17 @@ class EmbreeTracer final : public RayTracer {
   }
 
  private:
-  void attach(const Mesh& mesh, size_t id) {
+  // Whether a copy is met in the place of the face where the ray ends.
+  bool is_end_hidden(const Ray& ray) const {
+    return ray.end.shape.valid() &&
+           copies_.met(ray.end, ray.direction, ray.skip_emitters) != ray.end;
+  }
+  // Relative to a ray's origin Embree rounds corners, and might meet a line. Of copies the first one
+  // stands for all.
+  bool is_traced(const Mesh& mesh, FaceRef face) const {
+    return has_area(mesh, mesh.face(face.face)) && copies_.first(face) == face;
+  }
+  void attach(const Mesh& mesh, ShapeId id) {
     const Owned<RTCGeometry> geometry(rtcNewGeometry(device_.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
     errors_.check();
     auto* vertices = static_cast<Vec3f*>(
@@ -150,9 +183,12 @@ class EmbreeTracer final : public RayTracer {
     errors_.check();
     std::transform(mesh.positions.begin(), mesh.positions.end(), vertices,
                    [&](const Vec3f& x) { return cast<float>(cast<double>(x) - origin_); });
-    std::copy(mesh.faces.begin(), mesh.faces.end(), faces);
+    for (uint32_t i = 0; i < mesh.faces.size(); ++i) {
+      const FaceIndices& face = mesh.faces[i];
+      faces[i] = is_traced(mesh, {id, FaceId(i)}) ? face : FaceIndices{face[0], face[0], face[0]};
+    }
     rtcCommitGeometry(geometry.get());
-    rtcAttachGeometryByID(rtc_scene_.get(), geometry.get(), static_cast<unsigned>(id));
+    rtcAttachGeometryByID(rtc_scene_.get(), geometry.get(), id.index());
     errors_.check();
   }
   Context make_context(const Ray& ray) const {
@@ -163,10 +199,12 @@ class EmbreeTracer final : public RayTracer {
     if (skips) context.base.filter = reject_skipped;
     context.ray = &ray;
     context.scene = &scene_;
+    context.copies = &copies_;
     return context;
   }
 
   const Scene& scene_;
+  FaceCopies copies_;
   Vec3d origin_;         // of Embree's coordinates
   EmbreeErrors errors_;  // before what reports to it
   Owned<RTCDevice> device_;

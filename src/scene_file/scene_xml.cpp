@@ -8,6 +8,7 @@
 #include "src/mesh/mesh_build.h"
 #include "src/mesh/mesh_file.h"
 #include "src/mesh/shapes.h"
+#include "src/rays/face_copies.h"
 #include "src/scene_file/scene_properties.h"
 #include "src/scene_file/scene_sensor.h"
 
@@ -34,6 +35,7 @@ class SceneBuilder {
       if (object->tag == "bsdf") bsdf(*object);
     }
     if (!sensor_) throw InputError(description_.where, "<scene>: there is no sensor");
+    if (warnings_) warn_of_copies(scene_, *warnings_);
     return std::move(scene_);
   }
 

@@ -130,5 +130,46 @@ TEST(EmbreeDeathTest, SaysWhatItLacks) {
   EXPECT_EXIT(make(), testing::ExitedWithCode(3), "^error: Embree: .*memory");
 }
 
+TEST(BadRays, AreRefused) {
+  const Scene scene = some_scene(1);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double infinity = std::numeric_limits<double>::infinity();
+  const Ray good{{0, 0, 3}, {0, 0, -1}};
+  std::vector<Ray> bad(8, good);
+  bad[0].origin.x = nan;
+  bad[1].origin.y = -infinity;
+  bad[2].origin.z = 0x1p61;
+  bad[3].direction.x = nan;
+  bad[4].direction.z = -infinity;
+  bad[5].t_min = nan;
+  bad[6].t_max = nan;
+  bad[7].t_max = -1;
+  for (const auto& tracer : {make_embree_tracer(scene, 1), make_brute_force_tracer(scene)}) {
+    Hit hit;
+    EXPECT_NO_THROW(tracer->closest(good, hit));
+    for (const Ray& ray : bad) {
+      EXPECT_THROW(tracer->closest(ray, hit), UntraceableRay);
+      EXPECT_THROW(tracer->occluded(ray), UntraceableRay);
+    }
+  }
+}
+
+// Corners on a line, which rounding relative to a ray's origin may move off it.
+TEST(FacesWithoutArea, AreNeverMet) {
+  Scene scene;
+  scene.shapes.emplace_back();
+  scene.shapes[0].mesh =
+      make_mesh({{0.1f, 0.3f, 0.7f}, {0.2f, 0.6f, 1.4f}, {0.4f, 1.2f, 2.8f}}, {{0, 1, 2}});
+  ASSERT_FALSE(has_area(scene.shapes[0].mesh, {0, 1, 2}));
+  const auto tracer = make_embree_tracer(scene, 1);
+  Rng rng(1, 2, 3);
+  for (int i = 0; i < 20000; ++i) {
+    const Vec3d origin = random_direction(rng);
+    const Vec3d target = Vec3d{0.1f, 0.3f, 0.7f} * (1 + 3 * rng.uniform());
+    Hit hit;
+    EXPECT_FALSE(tracer->closest({origin, normalize(target - origin)}, hit));
+  }
+}
+
 }  // namespace
 }  // namespace limn

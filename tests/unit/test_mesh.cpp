@@ -7,6 +7,7 @@
 
 #include "limn/core/mesh.h"
 #include "limn/core/scene.h"
+#include "support/meshes.h"
 #include "support/temp_files.h"
 
 namespace limn {
@@ -181,6 +182,88 @@ TEST(Normals, TangentsMatchDifferences) {
     EXPECT_NEAR(mesh.horizon_tangents[i][1], difference, bound);
     EXPECT_GT(std::fabs(difference), 10 * bound);
   }
+}
+
+// The cube of four vertices up and four down; all faces around a vertex tilt alike.
+Mesh moving_cube(const Vec3d (&rows)[3]) {
+  Mesh mesh = transformed(with_smooth_normals(cube_mesh()), rows, 1, {});
+  mesh.normal_source = NormalSource::kComputed;
+  mesh.position_tangents.resize(8);
+  for (int v = 0; v < 8; ++v) {
+    const Vec3d velocity{0.5, v % 2 == 0 ? -0.25 : 0.25, v % 4 < 2 ? 0.5 : -0.5};
+    for (int k = 0; k < 3; ++k) mesh.position_tangents[v][k][1] = dot(rows[k], velocity);
+  }
+  update_shading_normals(mesh);
+  return mesh;
+}
+
+TEST(Normals, TiesHaveTheMeanOfBothSides) {
+  const Vec3d straight[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  const Mesh mesh = moving_cube(straight);
+  const auto differences = [&](double h) {
+    std::vector<double> horizon[2];
+    for (const int side : {0, 1}) {
+      Mesh copy = mesh;
+      for (size_t v = 0; v < 8; ++v)
+        for (int k = 0; k < 3; ++k)
+          copy.positions[v][k] +=
+              static_cast<float>((side ? h : -h) * mesh.position_tangents[v][k][1]);
+      update_shading_normals(copy);
+      horizon[side] = copy.horizon;
+    }
+    for (size_t v = 0; v < 8; ++v) horizon[1][v] = (horizon[1][v] - horizon[0][v]) / (2 * h);
+    return horizon[1];
+  };
+  // Positions are exact. Either side is smooth: the error falls with h, so it is at most the change.
+  const auto coarse = differences(0x1p-10), fine = differences(0x1p-11);
+  for (size_t v = 0; v < 8; ++v) {
+    EXPECT_NEAR(mesh.horizon_tangents[v][1], fine[v], 2 * std::fabs(coarse[v] - fine[v]) + 0x1p-40);
+  }
+  // Rounding breaks the ties of a turned cube.
+  Rng rng(1, 2, 3);
+  for (int i = 0; i < 10; ++i) {
+    Vec3d rows[3];
+    random_rotation(rng, rows);
+    const Mesh turned = moving_cube(rows);
+    for (size_t v = 0; v < 8; ++v)
+      EXPECT_NEAR(turned.horizon_tangents[v][1], mesh.horizon_tangents[v][1], 0x1p-18);
+  }
+}
+
+// Fins around an axis, as a file rounds them: normals along the axis cancel.
+TEST(Normals, CancelledOnesAreFinite) {
+  std::vector<Vec3f> x{{0, -1, 0}, {0, 1, 0}};
+  std::vector<FaceIndices> faces;
+  for (uint32_t i = 0; i < 7; ++i) {
+    const double angle = 0.2 + 2 * kPi * i / 7;
+    for (const double y : {-1, 1})
+      x.push_back(cast<float>(Vec3d{std::cos(angle), y, std::sin(angle)}));
+    faces.insert(faces.end(), {{0, 2 * i + 2, 2 * i + 3}, {0, 2 * i + 3, 1}});
+  }
+  Mesh mesh = make_mesh(x, faces);
+  mesh.normal_source = NormalSource::kComputed;
+  Rng rng(1, 2, 3);
+  for (size_t v = 0; v < x.size(); ++v) {
+    mesh.position_tangents.emplace_back();
+    for (int k = 0; k < 3; ++k) mesh.position_tangents[v][k][0] = rng.uniform();
+  }
+  update_shading_normals(mesh);
+  // Faces are 1 high at least, and corners move at sqrt(3) at most: none turns faster than this.
+  for (const Vec3<Lanes>& n : mesh.normal_tangents)
+    EXPECT_LT(length(Vec3d{n.x[0], n.y[0], n.z[0]}), 4 * std::sqrt(3));
+  for (const Vec3d& n : mesh.normals) EXPECT_NEAR(length(n), 1, 1e-15);
+}
+
+// A needle of width 1e-20 between two faces: they meet where it was.
+TEST(Mesh, NeedlesCollapse) {
+  const TempFiles files;
+  const Mesh mesh = read_mesh(files.write("a.obj",
+                                          "v -1e-20 0 0\nv 0 1e-3 0.3\nv 0 0 0\nv 1 0 0\nv -1 0 0\n"
+                                          "f 2 1 3\nf 3 4 2\nf 5 1 2\n"),
+                              true);
+  EXPECT_EQ(mesh.collapsed_faces, 1u);
+  ASSERT_EQ(mesh.faces.size(), 2u);
+  EXPECT_EQ(mesh.weld[2], 0u);
 }
 
 Mesh shape_mesh(const std::string& xml) {

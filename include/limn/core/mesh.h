@@ -83,6 +83,18 @@ void weld_seams(Mesh& mesh);
 // crease.
 void update_shading_normals(Mesh& mesh);
 
+// Whether a face has an area, and so a plane, as far as double precision can tell; else it is a line,
+// which no ray meets and which only ties other faces together (half_edges.h). Each product of the
+// normal is rounded once, each difference of products once more.
+inline bool has_area(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
+  const Vec3d e1 = b - a, e2 = c - a, n = cross(e1, e2);
+  return dot(n, n) > 0x1.0p-100 * (dot(e1, e1) * dot(e2, e2));
+}
+inline bool has_area(const Mesh& mesh, const FaceIndices& face) {
+  const auto corner = [&](int k) { return cast<double>(mesh.positions[face[k]]); };
+  return has_area(corner(0), corner(1), corner(2));
+}
+
 // Bounds of all positions referenced by faces.
 Bounds bounds_of(const Mesh& mesh);
 

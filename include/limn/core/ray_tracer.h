@@ -1,7 +1,9 @@
 #pragma once
 // Rays against the triangles of a scene.
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <exception>
 #include <limits>
 #include <memory>
 #include <span>
@@ -28,10 +30,29 @@ struct Hit {
   double t = 0;
 };
 
+// What a tracer throws at a ray that it cannot trace. The sample that asked for it is not finite,
+// and is reported as such: a miss in its stead would be wrong without a word.
+class UntraceableRay final : public std::exception {
+ public:
+  const char* what() const noexcept override {
+    return "a ray is not finite or starts too far away";
+  }
+};
+
+// Whether Embree can trace it: all numbers are finite (t_max may be infinite), and no coordinate of
+// its origin is beyond 2^60, more than any point on a face and less than where Embree stops (1.844e18).
+inline bool is_traceable(const Ray& ray) {
+  const Vec3d& o = ray.origin;
+  // Sums with NaN compare false, and so does the length of a direction that has one.
+  return std::fabs(o.x) + std::fabs(o.y) + std::fabs(o.z) <= 0x1p60 &&
+         length_squared(ray.direction) <= 2 && ray.t_min >= 0 && ray.t_max >= 0;
+}
+
 class RayTracer {
  public:
   virtual ~RayTracer() = default;
-  // The first hit in (t_min, t_max); false if none. Thread-safe.
+  // The first hit in (t_min, t_max); false if none. Faces without area are never met. Thread-safe.
+  // Throws UntraceableRay unless is_traceable(ray).
   virtual bool closest(const Ray& ray, Hit& hit) const = 0;
   virtual bool occluded(const Ray& ray) const = 0;
 };

@@ -68,7 +68,10 @@ S interpolate(const S& b0, const S& b1, const S& b2, const S& a0, const S& a1, c
 // Shading normal and horizon from the barycentric coordinates (b1, b2) of the second and third
 // corner.
 template <class S>
-void interpolate_shading(const Mesh& mesh, const S& b1, const S& b2, SurfacePoint<S>& point) {
+void interpolate_shading(const Mesh& mesh, S b1, S b2, SurfacePoint<S>& point) {
+  // A face that is narrower than the rounding of its points has no coordinates across: its middle
+  // stands for all.
+  if (!(std::fabs(value(b1)) <= 2 && std::fabs(value(b2)) <= 2)) b1 = b2 = S(1.0 / 3);
   const S b0 = 1.0 - b1 - b2;
   const FaceIndices& ids = mesh.normal_ids[point.face.face.index()];
   const FaceIndices& vertices = mesh.face(point.face.face);

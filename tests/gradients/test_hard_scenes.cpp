@@ -1,0 +1,225 @@
+// Scenes that are easy to get wrong: clip planes that cut geometry, surfaces in one place, normals
+// that cancel, needles.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "limn/integrators/gradient.h"
+#include "limn/integrators/render.h"
+#include "support/compare_moments.h"
+#include "support/meshes.h"
+#include "support/scenes.h"
+
+namespace limn {
+namespace {
+
+constexpr double kLevel = 1e-4;
+
+GradientResult run(const Scene& scene, const std::vector<std::string>& parameters, uint64_t seed,
+                   int spp) {
+  GradientOptions options;
+  options.parameters = parameters;
+  options.block = 4;
+  RunSettings settings;
+  settings.spp = spp;
+  settings.seed = seed;
+  GradientResult result = gradient(scene, options, settings);
+  EXPECT_EQ(result.non_finite.count, 0u) << result.non_finite.message();
+  return result;
+}
+
+// A glowing floor at y = -1 below a camera that looks along -z, 90 degrees wide, with N by N pixels.
+// The clip planes leave its depths from n = 2 to f = 50: on the film, rows from y = -1 / n to -1 / f (in
+// half widths). A screen at depth 10 hides what lies above -1 / 20 in the left half, so the far cut.
+class ClippedFloor : public testing::Test {
+ protected:
+  static constexpr int kPixels = 8;
+
+  static Scene scene(bool screen) {
+    const TempFiles files;
+    SceneParts parts;
+    parts.max_depth = 1;
+    parts.origin = {0, 0, 0};
+    parts.target = {0, 0, -1};
+    parts.fov = 90;
+    parts.width = parts.height = kPixels;
+    parts.body = square("floor", 200, -90, {0, -1, 0}, area_light("glow", "1, 1, 1"));
+    if (screen) {
+      parts.body += square("screen", 10, 0, {-10, 9.5, -10}, diffuse("black", "0, 0, 0"));
+    }
+    Scene result = make_scene(files, parts);
+    result.camera.near_clip = 2;
+    result.camera.far_clip = 50;
+    return result;
+  }
+
+  // rows: the derivative of the height of the near cut on the film, and of the far cut, in half widths.
+  static void expect(const std::string& parameter, double near, double far, bool screen = false) {
+    const GradientResult result = run(scene(screen), {parameter}, 1, 64);
+    const double area = kPixels * kPixels / 2.0;  // of one half width
+    const double exact = 3 * area * (far * (screen ? 0.5 : 1) - near);
+    const Moments& sum = result.parameters[0].image_sum;
+    fmt::print("{}: {} +- {}, exact {}\n", parameter, sum.mean(0), std::sqrt(sum.variance(0)),
+               exact);
+    EXPECT_TRUE(compare_moments(sum, std::vector<double>{exact}).plausible(kLevel));
+  }
+};
+
+TEST_F(ClippedFloor, MovesWithTheCamera) { expect("sensor.translate.y", -1.0 / 2, -1.0 / 50); }
+TEST_F(ClippedFloor, MovesWithTheFloor) { expect("floor.translate.y", 1.0 / 2, 1.0 / 50); }
+TEST_F(ClippedFloor, FieldOfView) {
+  // y = -1 / (n tan(fov / 2)), and tan' = (1 + 1) / 2 per radian.
+  const double per_degree = kPi / 180;
+  expect("sensor.fov", per_degree / 2, per_degree / 50);
+}
+TEST_F(ClippedFloor, BehindAScreen) { expect("floor.translate.y", 1.0 / 2, 1.0 / 50, true); }
+
+TEST(ClippedCube, AgreesWithDifferences) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.origin = {0.6, 1.8, 3.4};
+  parts.body = square("floor", 3, -90, {}, diffuse("chalk", "0.75, 0.75, 0.75")) +
+               constant_light("sky", "0.4, 0.5, 0.7") +
+               obj_shape("object", write_mesh(files, "cube.obj", cube_mesh()), true, 0.6,
+                         {0, 0.9, 0}, diffuse("clay", "0.7, 0.5, 0.3"));
+  Scene scene = make_scene(files, parts);
+  scene.camera.near_clip = 3;
+  const GradientResult ours = run(scene, {"sensor.translate.z"}, 1, 128);
+  GradientOptions differences;
+  differences.parameters = {"sensor.translate.z"};
+  differences.method = "fd";
+  differences.step = 0.01;
+  RunSettings settings;
+  settings.spp = 1024;
+  const Moments reference = gradient(scene, differences, settings).parameters[0].image_sum;
+  const Moments& sum = ours.parameters[0].image_sum;
+  fmt::print("{} +- {}, differences {} +- {}\n", sum.mean(0), std::sqrt(sum.variance(0)),
+             reference.mean(0), std::sqrt(reference.variance(0)));
+  EXPECT_TRUE(compare_moments(sum, reference).plausible(kLevel));
+}
+
+// Two shapes in one place.
+class Copies : public testing::Test {
+ protected:
+  static Scene scene(bool copy) {
+    const TempFiles files;
+    SceneParts parts;
+    parts.origin = {0.6, 1.8, 3.4};
+    parts.body = diffuse("clay", "0.7, 0.5, 0.3") + constant_light("sky", "0.4, 0.5, 0.7") +
+                 square("floor", 3, -90, {}, diffuse("chalk", "0.75, 0.75, 0.75")) +
+                 square("lamp", 0.5, 90, {0.3, 2.6, 0.5}, area_light("glow", "6, 5, 4"));
+    const std::string file = write_mesh(files, "cube.obj", cube_mesh());
+    const std::string clay = "<ref id=\"clay\"/>";
+    parts.body += obj_shape("object", file, true, 0.5, {0, 0.9, 0}, clay);
+    if (copy) parts.body += obj_shape("again", file, true, 0.5, {0, 0.9, 0}, clay);
+    return make_scene(files, parts);
+  }
+};
+
+TEST_F(Copies, ShadowNothing) {
+  RunSettings settings;
+  settings.spp = 64;
+  // The same rays meet the same faces: not even rounding differs.
+  EXPECT_EQ(means(render(scene(true), settings).radiance),
+            means(render(scene(false), settings).radiance));
+}
+
+TEST_F(Copies, MoveWithTheCamera) {
+  const auto two = run(scene(true), {"sensor.translate.x"}, 1, 128);
+  const auto one = run(scene(false), {"sensor.translate.x"}, 2, 128);
+  EXPECT_TRUE(compare_moments(two.parameters[0].total_blocks, one.parameters[0].total_blocks)
+                  .plausible(kLevel));
+  EXPECT_TRUE(
+      compare_moments(two.parameters[0].image_sum, one.parameters[0].image_sum).plausible(kLevel));
+}
+
+TEST_F(Copies, MoveTogether) {
+  // As each moves alone the image has a kink; the two sum to what both come to.
+  for (const char* motion : {"translate.x", "translate.y", "rotate.y"}) {
+    const auto two =
+        run(scene(true), {std::string("object.") + motion, std::string("again.") + motion}, 1, 64);
+    const auto one = run(scene(false), {std::string("object.") + motion}, 2, 64);
+    const auto& [a, b] = std::tie(two.parameters[0].image_sum, two.parameters[1].image_sum);
+    const Moments& both = one.parameters[0].image_sum;
+    // Of one run: their errors add at most.
+    const double error = std::sqrt(a.variance(0)) + std::sqrt(b.variance(0));
+    const double residual = a.mean(0) + b.mean(0) - both.mean(0);
+    fmt::print("{}: {} + {} against {}\n", motion, a.mean(0), b.mean(0), both.mean(0));
+    EXPECT_LT(std::fabs(residual), 4 * std::hypot(error, std::sqrt(both.variance(0)))) << motion;
+  }
+}
+
+TEST_F(Copies, AreWarnedOf) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.body =
+      square("one", 1, 0, {}, "") + square("two", 1, 0, {}, "") + square("behind", 1, 180, {}, "");
+  std::vector<std::string> warnings;
+  read_scene(files.write("scene.xml", scene_text(parts)), {}, &warnings);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("2 faces of \"two\" are in the place of faces of \"one\""),
+            std::string::npos)
+      << warnings[0];
+}
+
+// Only one of two lamps is seen, and only one shines.
+TEST_F(Copies, OfLamps) {
+  const auto image = [](int lamps, uint64_t seed) {
+    const TempFiles files;
+    SceneParts parts;
+    parts.body = square("floor", 3, -90, {}, diffuse("chalk", "0.75, 0.75, 0.75"));
+    for (int i = 0; i < lamps; ++i) {
+      parts.body += square("lamp" + std::to_string(i), 1.5, 90, {0, 1.5, 0},
+                           area_light("glow" + std::to_string(i), "6, 5, 4"));
+    }
+    RunSettings settings;
+    settings.spp = 256;
+    settings.seed = seed;
+    return render(make_scene(files, parts), settings).radiance;
+  };
+  EXPECT_TRUE(compare_moments(image(2, 1), image(1, 2)).plausible(kLevel));
+}
+
+// Two one-sided faces back to back: each side shows its own.
+TEST_F(Copies, OfBothSides) {
+  for (const double side : {1.0, -1.0}) {
+    const TempFiles files;
+    SceneParts parts;
+    parts.max_depth = 1;
+    parts.width = parts.height = 4;
+    parts.origin = {0.1, 0.2, 4 * side};
+    parts.target = {0, 0, 0};
+    const std::string front = write_mesh(files, "front.obj", grid_mesh(1));
+    const std::string back = write_mesh(files, "back.obj", reversed(grid_mesh(1)));
+    parts.body = obj_shape("front", front, true, 10, {}, area_light("a", "1, 1, 1")) +
+                 obj_shape("back", back, true, 10, {}, area_light("b", "3, 3, 3"));
+    RunSettings settings;
+    for (const double value : means(render(make_scene(files, parts), settings).radiance))
+      EXPECT_EQ(value, side > 0 ? 1 : 3);
+  }
+}
+
+// A face of width 1e-23 at a distance of 1 from the origin changes nothing.
+TEST(Needle, IsNotSeen) {
+  const auto sums = [](const std::string& needle) {
+    const TempFiles files;
+    SceneParts parts;
+    parts.max_depth = 5;
+    parts.width = parts.height = 4;
+    parts.origin = {0.6, 1.8, 3.4};
+    const std::string file =
+        files.write("needle.obj",
+                    "v -1e-20 0 0\nv 0 1e-3 0.3\nv 0 0 0\nv 100 0 0\nv 0 100 0\n"
+                    "f 3 4 5\n" +
+                        needle);
+    parts.body = square("floor", 3, -90, {}, conductor("gloss", 0.05)) +
+                 square("lamp", 1e-4, 90, {0.3, 2.6, 0.5}, area_light("glow", "1e6, 1e6, 1e6")) +
+                 constant_light("sky", "0.4, 0.5, 0.7") +
+                 obj_shape("object", file, false, 1e-3, {0, 1, 0},
+                           "<bsdf type=\"twosided\"><bsdf type=\"diffuse\"/></bsdf>");
+    return means(run(make_scene(files, parts), {"object.translate.x"}, 0, 16).parameters[0].total);
+  };
+  EXPECT_EQ(sums("f 2 1 3\n"), sums(""));
+}
+
+}  // namespace
+}  // namespace limn
