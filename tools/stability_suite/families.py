@@ -8,9 +8,9 @@ import numpy as np
 from . import exr, meshes
 from .scene import Scene, Shape, diffuse, glossy, twosided
 
-# Of the step of differences: about 3 % of a pixel on the table's film, where an edge is hardly
-# blurred. In scene units.
-STEP = 0.003
+# Of differences: about 8 % of a pixel on the table's film, in scene units. An edge is hardly blurred:
+# a pixel's derivative changes only while an edge passes one of its corners.
+STEP = 0.008
 
 
 @dataclass
@@ -35,18 +35,19 @@ class Family:
     make: object  # value: (scene, reference)
     what: str  # a sentence
     truth: str  # what the reference is
-    hard: str = ""  # towards which end it gets harder, in words; "": the last value
+    why_not: str = ""  # why ours is not the last one standing, where it is not
 
     def point(self, value):
+        """(scene, reference)"""
         return self.make(value)
 
 
 FAMILIES = []
 
 
-def family(name, knob, values, what, truth):
+def family(name, knob, values, what, truth, why_not=""):
     def register(make):
-        FAMILIES.append(Family(name, knob, values, make, what, truth))
+        FAMILIES.append(Family(name, knob, values, make, what, truth, why_not))
         return make
 
     return register

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 BLOCKS = 6  # along each side of the film
-# A bias is called where its p is below this twice: in the runs, and in as many new ones, twice as
-# long. One false alarm in a hundred pages of a thousand tests.
+# A bias is called where its p is below this twice: in the runs, and in as many new ones, longer. One
+# false alarm in a hundred pages of a thousand tests.
 LEVEL = 1e-5
 WORST = 0.001  # the share of pixels whose part in the squared error is the tail
 
@@ -78,7 +78,8 @@ def bias(runs, reference):
     difference = blocks(whole.mean - reference.mean)
     known = variance > 0
     if not known.any():
-        return {"p": None, "largest_z": None, "share": None, "visible": None, "scores": []}
+        return {"p": None, "chi_square": 0, "blocks": 0, "largest_z": None, "share": None,
+                "visible": None, "scores": []}
     z = difference[known] / np.sqrt(variance[known])
     truth = blocks(reference.mean)[known] / np.sqrt(variance[known])
     n = len(z)
@@ -87,11 +88,26 @@ def bias(runs, reference):
     squares = float((truth**2).sum())
     return {
         "p": min(1.0, 2 * min(p_all, p_largest)),
+        "chi_square": float((z**2).sum()),
+        "blocks": n,
         "largest_z": float(np.abs(z).max()),
         "share": float((truth * z).sum() / squares) if squares > 0 else None,
         "visible": least_visible(n, squares),
         "scores": [round(float(v), 3) for v in z],
     }
+
+
+def called(bias):
+    return bias is not None and bias["p"] is not None and bias["p"] < LEVEL
+
+
+def confirmed(first, longer):
+    """Whether a bias that was called shows in longer runs, too, and no weaker than chance allows.
+    What rare samples that were not met pretend fades with time."""
+    if not (called(first) and called(longer)):
+        return False
+    chance = math.sqrt(2 * first["blocks"] + 4 * first["chi_square"])
+    return longer["chi_square"] > first["chi_square"] - 3 * chance
 
 
 def least_visible(count, squares):
@@ -131,6 +147,10 @@ def errors(runs, reference):
     return {
         "error": math.sqrt(mse / power) if power > 0 else None,
         "tail": worst / total if total > 0 else 0.0,
-        "reference_error": math.sqrt(max(0.0, float(reference.variance.mean())) / power)
-        if power > 0 else None,
     }
+
+
+def own_error(reference):
+    """Of a reference, relative to the derivative; None if it is all noise."""
+    power = float((reference.mean**2 - reference.variance).mean())
+    return math.sqrt(float(reference.variance.mean()) / power) if power > 0 else None
