@@ -9,7 +9,8 @@ from report.markup import Markup, element, figures, join, percent, table
 from . import chart
 from .statistics import LEVEL
 from .suite import LONGER, REFERENCE, REPEATS, RESOLUTION
-from .table import (OURS, breaks_first, cells, markdown, methods_of, standing, verdicts, who_breaks)
+from .table import (OURS, beaten, beaten_text, cells, markdown, methods_of, standing, verdicts,
+                    who_breaks)
 from .verdicts import LATENESS, MEANING, ORDER, RIGHT, number
 
 READING = [
@@ -53,16 +54,14 @@ def _verdict_table(records):
 
 def _summary(records):
     """Where ours is not the last one standing."""
-    lost = [(f, breaks_first(f, r)) for f, r in records]
-    lost = [(f, b) for f, b in lost if b]
+    lost = [(f, places) for f, r in records if (places := beaten(f, r))]
     holds = sum(all(v in (RIGHT, None) for v in verdicts(r, OURS)) for _, r in records)
     text = f"{OURS} is right at every point of {holds} of {len(records)} families."
     if not lost:
-        return element("p", text, " Nowhere is another method right where it is not.")
-    items = [element("li", element("a", f.name, href=f"#{f.name}"), ": ",
-                     "; ".join(f"at {number(v)} {', '.join(m)}" for v, m in b),
-                     f". {f.why_not}" if f.why_not else "") for f, b in lost]
-    return element("div", f"{text} Another one is right where it is not:", element("ul", *items),
+        return element("p", text, " Nowhere does another method stand where it does not.")
+    items = [element("li", element("a", f.name, href=f"#{f.name}"), f": {beaten_text(places)}. ",
+                     f.why_not) for f, places in lost]
+    return element("div", f"{text} Others are ahead where it is not:", element("ul", *items),
                    class_="notice")
 
 
@@ -110,7 +109,7 @@ def _section(output, family, records, palette):
     broken = [t for t in (who_breaks(family, records, m) for m in methods) if t]
     sentence = " ".join(t for t in (
         standing(family, records), "; ".join(broken) + "." if broken else "",
-        family.why_not if breaks_first(family, records) else "") if t)
+        family.why_not if beaten(family, records) else "") if t)
     return element(
         "section", element("h2", family.name), element("p", family.what),
         element("p", "Reference: ", family.truth, class_="hint"),

@@ -63,14 +63,18 @@ class Program:
         for process in list(self._running):
             process.send_signal(signal.SIGKILL)
 
+    def length(self, seconds):
+        """The options that say how long a run is."""
+        return ["--time", f"{seconds:.6g}"]
+
     def gradient(self, scene_file, parameter, method, seconds, seed, folder, step=0):
-        """One run of at most about this many seconds. folder: of its own, removed afterwards."""
+        """One run. folder: of its own, removed afterwards."""
         if self.stopped:
             raise Interrupted
         os.makedirs(folder, exist_ok=True)
         image, figures = os.path.join(folder, "d.exr"), os.path.join(folder, "d.json")
         command = [self.file, "gradient", scene_file, "--wrt", parameter, "--method", method,
-                   "--time", f"{seconds:.6g}", "--seed", str(seed), "--threads", str(self.threads),
+                   *self.length(seconds), "--seed", str(seed), "--threads", str(self.threads),
                    "-o", image, "--json", figures]
         if step:
             command += ["--step", f"{step:.9g}"]

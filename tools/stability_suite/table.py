@@ -4,8 +4,8 @@ import os
 import re
 
 from .families import FAMILIES
-from .suite import point_file, Point, read_json
-from .verdicts import BIASED, FAILS, LATE, MEANING, ORDER, RIGHT, number, of_family
+from .suite import Point, point_file, read_json
+from .verdicts import MEANING, NOISY, ORDER, RIGHT, UNKNOWN, number, of_family
 
 OURS = "adaptive"
 BEGIN, END = "<!-- stability: begin -->", "<!-- stability: end -->"
@@ -40,16 +40,25 @@ def cells(stored_records):
             for f, records in stored_records for m in methods_of(stored_records)}
 
 
-def breaks_first(family, records):
-    """[(value, methods that are right there)] where ours is not right and another one is."""
-    beaten = []
+def beats(other, ours):
+    """Figures of two methods at a point: whether the other one stands where ours does not. Where both
+    are noisy: whether it has less than half the error."""
+    if ours["verdict"] in (RIGHT, UNKNOWN):
+        return False
+    if other["verdict"] != NOISY:
+        return other["verdict"] == RIGHT
+    return ours["verdict"] != NOISY or 2 * other["error"] < ours["error"]
+
+
+def beaten(family, records):
+    """[(value, methods that stand there)] where ours is not right and others beat it."""
+    places = []
     for value, record in zip(family.values, records):
-        if not record or record["methods"].get(OURS, {}).get("verdict", RIGHT) == RIGHT:
-            continue
-        better = [m for m, figures in record["methods"].items() if figures["verdict"] == RIGHT]
-        if better:
-            beaten.append((value, better))
-    return beaten
+        ours = record and record["methods"].get(OURS)
+        if ours:
+            better = [m for m, f in record["methods"].items() if beats(f, ours)]
+            places += [(value, better)] if better else []
+    return places
 
 
 def standing(family, records):
@@ -57,14 +66,17 @@ def standing(family, records):
     ours = verdicts(records, OURS)
     if not any(ours):
         return ""
-    beaten = breaks_first(family, records)
-    if beaten:
-        places = "; ".join(f"at {number(v)} {' and '.join(m)} {'is' if len(m) == 1 else 'are'}"
-                           for v, m in beaten)
-        return f"{OURS} is not the last one standing: {places} right where it is not."
+    places = beaten(family, records)
+    if places:
+        return f"{OURS} is not the last one standing: ahead of it are {beaten_text(places)}."
     if all(v in (RIGHT, None) for v in ours):
         return f"{OURS} holds throughout."
     return f"{OURS} is the last one standing."
+
+
+def beaten_text(places):
+    """Of what beaten() gives: "fd, uniform at 1e-3"."""
+    return "; ".join(f"{', '.join(methods)} at {number(value)}" for value, methods in places)
 
 
 def who_breaks(family, records, method):
@@ -105,6 +117,3 @@ def publish(file, stored_records):
 
 def chart_file(output, family):
     return os.path.join(output, "charts", f"{family.name}.png")
-
-
-BROKEN = (BIASED, FAILS, LATE)  # what a chart marks
