@@ -73,25 +73,27 @@ def bias(runs, reference):
     p, the largest |z|, the share of the derivative that is too much (negative: missing), and
     the least such share that would have been called."""
     whole = pooled(runs)
-    magnitude = np.abs(reference.mean)
-    variance = block_variances(whole, magnitude) + block_variances(reference, magnitude)
+    truth = np.abs(reference.mean)
+    # What the runs have met and the reference has not, it may have missed.
+    variance = block_variances(whole, truth) + block_variances(
+        reference, np.maximum(truth, np.abs(whole.mean)))
     difference = blocks(whole.mean - reference.mean)
     known = variance > 0
     if not known.any():
         return {"p": None, "chi_square": 0, "blocks": 0, "largest_z": None, "share": None,
                 "visible": None, "scores": []}
     z = difference[known] / np.sqrt(variance[known])
-    truth = blocks(reference.mean)[known] / np.sqrt(variance[known])
+    strength = blocks(reference.mean)[known] / np.sqrt(variance[known])
     n = len(z)
     p_all = chi_square_tail(float((z**2).sum()), n)
     p_largest = -math.expm1(n * math.log1p(-min(normal_tail(np.abs(z).max()), 1 - 1e-16)))
-    squares = float((truth**2).sum())
+    squares = float((strength**2).sum())
     return {
         "p": min(1.0, 2 * min(p_all, p_largest)),
         "chi_square": float((z**2).sum()),
         "blocks": n,
         "largest_z": float(np.abs(z).max()),
-        "share": float((truth * z).sum() / squares) if squares > 0 else None,
+        "share": float((strength * z).sum() / squares) if squares > 0 else None,
         "visible": least_visible(n, squares),
         "scores": [round(float(v), 3) for v in z],
     }
