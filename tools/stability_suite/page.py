@@ -7,9 +7,9 @@ from report.colours import Palette
 from report.markup import Markup, element, figures, join, percent, table
 
 from . import chart
-from .statistics import LEVEL
+from .statistics import LEVEL, called
 from .suite import LONGER, REFERENCE, REPEATS, RESOLUTION
-from .table import (OURS, beaten, beaten_text, cells, markdown, methods_of, standing, verdicts,
+from .table import (AHEAD, OURS, beaten, beaten_text, cells, markdown, methods_of, standing, verdicts,
                     who_breaks)
 from .verdicts import LATENESS, MEANING, ORDER, RIGHT, number
 
@@ -19,7 +19,8 @@ READING = [
      f"image. A run takes the same seconds for every method, set-up included, on one thread; "
      f"{REPEATS} repeats, interleaved."),
     ("Reference", f"A run {REFERENCE} times as long, with seeds of its own, of the same shape made "
-     "otherwise, or of differences with a small fixed step. Its noise is known, pixel by pixel, from "
+     "otherwise, or of differences with a small fixed step; one of the former kind is itself held "
+     "against differences. Its noise is known, pixel by pixel, from "
      "its independent batches, and is taken off the squared error. Where methods are better than "
      "that noise, their error is the spread of the repeats, which needs no reference; what the mean "
      "of the repeats misses beyond it is added where it is more than the reference's noise explains "
@@ -34,7 +35,9 @@ READING = [
      "does not meet a rare event in all its runs cannot be told from a biased one."),
     ("Tail", "The share of the squared error in the worst 0.1 % of the pixels of all repeats."),
     ("Verdict", "; ".join(f"{word}: {MEANING[word]}" for word in reversed(ORDER)) +
-     f". Late: more than {LATENESS:g} times the seconds."),
+     f". Late: more than {LATENESS:g} times the seconds. Ahead of {OURS} where it is not right: a "
+     f"method that is right where it fails or is late; that has less error where it is biased; less "
+     f"than 1/{AHEAD} of its error where it is noisy."),
 ]
 
 
@@ -53,16 +56,22 @@ def _verdict_table(records):
 
 
 def _summary(records):
-    """Where ours is not the last one standing."""
-    lost = [(f, places) for f, r in records if (places := beaten(f, r))]
-    holds = sum(all(v in (RIGHT, None) for v in verdicts(r, OURS)) for _, r in records)
-    text = f"{OURS} is right at every point of {holds} of {len(records)} families."
-    if not lost:
-        return element("p", text, " Nowhere does another method stand where it does not.")
-    items = [element("li", element("a", f.name, href=f"#{f.name}"), f": {beaten_text(places)}. ",
-                     f.why_not) for f, places in lost]
-    return element("div", f"{text} Others are ahead where it is not:", element("ul", *items),
-                   class_="notice")
+    """Where ours is not right, and who is ahead there."""
+    items, lost = [], 0
+    for family, stored in records:
+        word = who_breaks(family, stored, OURS)
+        if word is None:
+            continue
+        places = beaten(family, stored)
+        lost += bool(places)
+        ahead = f" Ahead of it: {beaten_text(places)}. {family.why_not}" if places else ""
+        items.append(element("li", element("a", family.name, href=f"#{family.name}"),
+                             f": {word.split(': ', 1)[1]}.", ahead))
+    text = (f"{OURS} is right at every point of {len(records) - len(items)} of {len(records)} "
+            f"families, and another method is ahead where it is not in {lost}.")
+    if not items:
+        return element("p", text)
+    return element("div", text, element("ul", *items), class_="notice")
 
 
 def _row(record, method, label):
@@ -84,15 +93,21 @@ def _figures(family, records):
             "visible", "p of longer runs", "s", "spp"]
     rows = [_row(record, method, number(value)) for value, record in zip(family.values, records)
             if record for method in methods_of([(family, records)])]
-    references = [
-        [number(v), (r["reference"].get("method") or "–"), r["reference"]["status"],
-         figures(r["reference"].get("error")), figures(r["reference"].get("spp")),
-         figures(r["reference"].get("seconds"))]
-        for v, r in zip(family.values, records) if r and r.get("reference")]
+    references = [_reference_row(number(v), r["reference"])
+                  for v, r in zip(family.values, records) if r]
     return element("details", element("summary", "All figures"),
                    table(head, [r for r in rows if r], f"Figures, {family.name}"),
-                   table([family.knob, "reference", "status", "its own error", "spp", "s"],
+                   table([family.knob, "reference by", "status", "its own error", "spp", "s",
+                          "p against differences"],
                          references, f"References, {family.name}"))
+
+
+def _reference_row(label, about):
+    check = about.get("against_differences")
+    doubt = called(check)
+    return [label, about["method"], about["message"] or about["status"], figures(about.get("error")),
+            figures(about["spp"]), figures(about["seconds"]),
+            element("td", figures(check["p"], 2) if check else "–", class_="bad" if doubt else None)]
 
 
 def _warnings(records):
@@ -104,6 +119,15 @@ def _warnings(records):
                    element("ul", *(element("li", t) for t in sorted(texts))))
 
 
+def _doubt(records):
+    """Where the reference itself disagrees with differences."""
+    checks = [r["reference"].get("against_differences") for r in records if r]
+    if not any(called(c) for c in checks):
+        return None
+    return element("p", "The reference disagrees with differences of its own scene: trust nothing "
+                   "below.", class_="notice danger")
+
+
 def _section(output, family, records, palette):
     methods = methods_of([(family, records)])
     broken = [t for t in (who_breaks(family, records, m) for m in methods) if t]
@@ -112,7 +136,7 @@ def _section(output, family, records, palette):
         family.why_not if beaten(family, records) else "") if t)
     return element(
         "section", element("h2", family.name), element("p", family.what),
-        element("p", "Reference: ", family.truth, class_="hint"),
+        element("p", "Reference: ", family.truth, class_="hint"), _doubt(records),
         chart.draw(output, family, records, palette), element("p", sentence),
         _figures(family, records), _warnings(records), id=family.name)
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import statistics
-from .families import FAMILIES
+from .families import FAMILIES, STEP
 from .program import DONE, Interrupted
 from .statistics import Estimate
 from .verdicts import verdict
@@ -54,8 +54,10 @@ def all_points(families):
 def run_seconds(minutes, jobs, methods, resolution=RESOLUTION):
     """Of one run, so that the whole suite takes this long."""
     points = sum(len(f.values) for f in FAMILIES)
-    own = len({reference_identity(f, v, resolution) for f in FAMILIES for v in f.values})
-    shares = points * methods * REPEATS * (1 + LONGER * SUSPECTED) + own * REFERENCE
+    own = {reference_identity(f, v, resolution): f.point(v)[1].method
+           for f in FAMILIES for v in f.values}
+    references = len(own) + sum(method != "fd" for method in own.values())
+    shares = points * methods * REPEATS * (1 + LONGER * SUSPECTED) + references * REFERENCE
     left = max(60 * minutes - DRAWING_SECONDS, 30 * minutes)
     return max(LEAST_SECONDS, float(f"{left * jobs / OVERHEAD / shares:.3g}"))
 
@@ -104,14 +106,13 @@ class References:
         folder = os.path.join(self.folder, key)
         try:
             file = scene.write(folder, resolution)
-            seconds = REFERENCE * self.settings["seconds"]
-            run = self.program.gradient(file, scene.parameter, reference.method, seconds,
-                                        self.settings["seed"] + 7919,
-                                        os.path.join(folder, "run"), reference.step)
+            run = self._run(scene, file, reference.method, 7919, folder, reference.step)
+            about = {"settings": self.settings, "status": run.status, "message": run.message,
+                     "spp": run.spp, "seconds": run.seconds, "method": reference.method}
+            if run.status == DONE and not reference.step:
+                about["against_differences"] = self._check(scene, file, folder, run.estimate)
         finally:
             shutil.rmtree(folder, ignore_errors=True)
-        about = {"settings": self.settings, "status": run.status, "message": run.message,
-                 "spp": run.spp, "seconds": run.seconds, "method": reference.method}
         if run.status != DONE:
             return {**about, "estimate": None}
         partial = os.path.join(self.folder, f"{key}.partial.npz")
@@ -119,6 +120,19 @@ class References:
                  variance=run.estimate.variance)
         os.replace(partial, self._file(key))
         return {**about, "estimate": run.estimate}
+
+    def _run(self, scene, file, method, seed, folder, step):
+        return self.program.gradient(file, scene.parameter, method,
+                                     REFERENCE * self.settings["seconds"],
+                                     self.settings["seed"] + seed, os.path.join(folder, "run"), step)
+
+    def _check(self, scene, file, folder, estimate):
+        """The bias of a reference that is not made of differences, against differences; None if
+        those cannot be had."""
+        differences = self._run(scene, file, "fd", 104729, folder, STEP)
+        if differences.status != DONE:
+            return None
+        return statistics.bias([estimate], differences.estimate)
 
 
 def read_json(file):
