@@ -1,5 +1,5 @@
-"""Error after a fixed time against the family's knob, a line for each method: as SVG for the page, and
-as a PNG beside it."""
+"""Error after a fixed time against the family's knob, a line for each method: as SVG for the page,
+and as a PNG beside it."""
 
 import math
 import os

@@ -1,4 +1,4 @@
-"""OpenEXR images as limn writes them (scan lines, zipped or plain), and plain ones for it to read."""
+"""OpenEXR images as limn writes them (scan lines, zipped or plain), and plain ones that it reads."""
 
 import struct
 import zlib

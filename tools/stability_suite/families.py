@@ -36,7 +36,7 @@ class Family:
     make: object  # value: (scene, reference)
     what: str  # a sentence
     truth: str  # what the reference is
-    why_not: str = ""  # why ours is not the last one standing, where it is not
+    why: str = ""  # shown where ours is not right: why
 
     def point(self, value):
         """(scene, reference)"""
@@ -46,9 +46,9 @@ class Family:
 FAMILIES = []
 
 
-def family(name, knob, values, what, truth, why_not=""):
+def family(name, knob, values, what, truth, why=""):
     def register(make):
-        FAMILIES.append(Family(name, knob, values, make, what, truth, why_not))
+        FAMILIES.append(Family(name, knob, values, make, what, truth, why))
         return make
 
     return register
@@ -78,13 +78,18 @@ def by_differences(scene, step=STEP):
 
 DIFFERENCES = "Differences of the same scene with a small fixed step."
 PLAIN = "The same shape as one clean mesh, by a long run of `adaptive`."
+CLOSE = ("Edges that lie within a few roundings of each other are neither united nor told apart by "
+         "a ray: light is judged to be on both sides of an edge that is covered.")
+NARROW = ("The penumbra is narrow: few points of the picture lie in it, each with a derivative of "
+          "one over its width (term direct). Differences blur it by their step.")
+SET_UP = "Building the tree of edges takes longer than the run: it pays off in longer ones."
 
 
 @family(
     "coincident", "gap between the faces' edges", [1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 0],
     "A box of six shapes whose edges lie in one place, or a gap apart; the camera moves.",
     "Up to a gap of 1e-4 the box as one clean mesh, by a long run of `adaptive`; beyond, "
-    "differences.",
+    "differences.", CLOSE,
 )
 def coincident(gap):
     clean = table(meshes.prism(), parameter="sensor.translate.x")
@@ -96,6 +101,7 @@ def coincident(gap):
 @family(
     "t-junctions", "strips of each side", [1, 2, 3, 7, 16, 61],
     "A box whose sides are cut into strips that its lid and floor know nothing of.", PLAIN,
+    CLOSE,
 )
 def t_junctions(count):
     plain = table(meshes.prism(), parameter="object.translate.y")
@@ -104,7 +110,7 @@ def t_junctions(count):
 
 @family(
     "contact", "gap to the floor", [1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 0],
-    "A box slides along the floor, at last on it.", DIFFERENCES,
+    "A box slides along the floor, at last on it.", DIFFERENCES, NARROW,
 )
 def contact(gap):
     return by_differences(table(meshes.prism(gap, gap + 0.75)))
@@ -112,7 +118,7 @@ def contact(gap):
 
 @family(
     "slivers", "width of strips along the edges", [1e-1, 1e-2, 1e-3, 1e-5, 1e-7],
-    "A box with ever narrower triangles along all its edges.", PLAIN,
+    "A box with ever narrower triangles along all its edges.", PLAIN, CLOSE,
 )
 def slivers(width):
     plain = table(meshes.prism())
@@ -121,7 +127,7 @@ def slivers(width):
 
 @family(
     "zero-area", "faces without area", [0, 1, 4, 16, 64, 256],
-    "A box and faces whose three different corners lie on one of its edges.", PLAIN,
+    "A box and faces whose three different corners lie on one of its edges.", PLAIN, CLOSE,
 )
 def zero_area(count):
     plain = table(meshes.prism())
@@ -161,7 +167,7 @@ def open_mesh(share):
 @family(
     "crossing", "blades", [1, 4, 16, 64],
     "Blades move through a block that stands still: the curves where they cross are edges, too.",
-    DIFFERENCES,
+    DIFFERENCES, SET_UP,
 )
 def crossing(count):
     rng = np.random.default_rng(7)
@@ -181,7 +187,7 @@ def crossing(count):
     "seams", "distance of the copies, in radii", [0, 2.4e-16, 1e-12, 1e-8, 1e-7, 1e-6],
     "A sphere of longitudes and latitudes whose first and last meridian differ by a rounding, as "
     "programs write it.",
-    "The sphere without a seam, by a long run of `adaptive`.",
+    "The sphere without a seam, by a long run of `adaptive`.", CLOSE,
 )
 def seams(distance):
     at, radius = (0, 0, 0.65), 0.45
@@ -212,7 +218,7 @@ def distance(offset):
 
 @family(
     "small-lamps", "size of the lamp", [1, 1e-1, 1e-2, 1e-3, 1e-4],
-    "A lamp of the same power that shrinks to a point.", DIFFERENCES,
+    "A lamp of the same power that shrinks to a point.", DIFFERENCES, NARROW,
 )
 def small_lamps(size):
     scene = table(meshes.prism())
@@ -251,6 +257,8 @@ def sun_map(degrees):
 @family(
     "sun", "its diameter in degrees", [10, 3, 1, 0.5, 0.2],
     "A box in the light of a map with a sun that shrinks.", DIFFERENCES,
+    "Few edges stand before the sun, and a node of the tree says little about which; reading the "
+    "map and preparing its sums takes a good part of a short run.",
 )
 def sun(degrees):
     scene = table(meshes.prism())
@@ -265,7 +273,7 @@ def sun(degrees):
 
 @family(
     "intricate", "parts", [1, 10, 100, 1000],
-    "A cloud of ever more and smaller tetrahedra over a glossy floor.", DIFFERENCES,
+    "A cloud of ever more and smaller tetrahedra over a glossy floor.", DIFFERENCES, SET_UP,
 )
 def intricate(count):
     p, f = meshes.scattered(count)
@@ -278,6 +286,7 @@ def intricate(count):
     "Three slanted strings over a floor; the camera has the middle one, a fiftieth of the table "
     "along each side.",
     "Differences of the same scene with a step of 6 % of a pixel; at 1e-4, of 20 %.",
+    "Eighteen edges share the samples of the film, and the camera sees few of them.",
 )
 def strings(radius):
     rods = [meshes.rod((x - 0.075, -0.35, 0.25), (x + 0.075, 0.35, 0.95), radius)
@@ -308,6 +317,7 @@ def grazing(degrees):
 @family(
     "depth", "length of the paths", [2, 3, 4, 8, 16],
     "A box in a closed room with walls of reflectance 0.8.", DIFFERENCES,
+    "A pass of two samples per pixel, and the pilot before it, take longer than the run.",
 )
 def depth(length):
     p, f = meshes.room(2.0, 1)
@@ -356,6 +366,7 @@ def in_plane(step):
     "inside", "squares along each wall", [1, 2, 4, 8, 16, 32],
     "The mesh is the room around camera, lamp and block: every point is in it, or on its planes.",
     "The room of six squares, by a long run of `adaptive`.",
+    "Every wall moves, and with it the light on it: the whole picture is noise of the term direct.",
 )
 def inside(splits):
     def scene(count):

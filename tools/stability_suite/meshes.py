@@ -2,7 +2,7 @@
 
 import numpy as np
 
-# A square turned by 18 degrees whose corners are multiples of 1/8: far away they stay exact in float.
+# A square turned by 18 degrees whose corners are multiples of 1/8: exact in float even far away.
 CORNERS = np.array([(0.375, 0.125), (-0.125, 0.375), (-0.375, -0.125), (0.125, -0.375)])
 SIDES = [(0, 1), (1, 2), (2, 3), (3, 0)]
 

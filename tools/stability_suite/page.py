@@ -1,4 +1,4 @@
-"""The page: the table of verdicts, then every family with its chart, its sentences and its figures."""
+"""The page: the table of verdicts, then every family with its chart, sentences and figures."""
 
 import os
 
@@ -9,35 +9,51 @@ from report.markup import Markup, element, figures, join, percent, table
 from . import chart
 from .statistics import LEVEL, called
 from .suite import LONGER, REFERENCE, REPEATS, RESOLUTION
-from .table import (AHEAD, OURS, beaten, beaten_text, cells, markdown, methods_of, standing, verdicts,
+from .table import (AHEAD, OURS, beaten, beaten_text, cells, markdown, methods_of, standing,
                     who_breaks)
 from .verdicts import LATENESS, MEANING, ORDER, RIGHT, number
 
 READING = [
-    ("Error", f"The root of the mean squared error of one run over that of the derivative, over all "
-     f"pixels ({RESOLUTION} × {RESOLUTION}, box filter, one channel): 1 is the error of a black "
-     f"image. A run takes the same seconds for every method, set-up included, on one thread; "
-     f"{REPEATS} repeats, interleaved."),
-    ("Reference", f"A run {REFERENCE} times as long, with seeds of its own, of the same shape made "
-     "otherwise, or of differences with a small fixed step; one of the former kind is itself held "
-     "against differences. Its noise is known, pixel by pixel, from "
-     "its independent batches, and is taken off the squared error. Where methods are better than "
-     "that noise, their error is the spread of the repeats, which needs no reference; what the mean "
-     "of the repeats misses beyond it is added where it is more than the reference's noise explains "
-     "(by three standard errors)."),
-    ("Bias", "Sums over 6 × 6 blocks of pixels, the mean of the repeats minus the reference, in "
-     "standard errors of both. p: the chance of scores as large as these (sum of squares, and the "
-     f"largest; doubled). Called where p is below {LEVEL:g}, and below it again in new runs "
-     f"{LONGER} times as long, whose scores must not be weaker than chance allows: what rare samples "
-     "pretend before they are met fades. Too much: the share of the derivative that the method adds "
-     "(negative: loses). Visible: the smallest share that would have been called. Differences are "
-     "biased by their step; where their error is ruled by it, they are called, too. A method that "
-     "does not meet a rare event in all its runs cannot be told from a biased one."),
-    ("Tail", "The share of the squared error in the worst 0.1 % of the pixels of all repeats."),
-    ("Verdict", "; ".join(f"{word}: {MEANING[word]}" for word in reversed(ORDER)) +
-     f". Late: more than {LATENESS:g} times the seconds. Ahead of {OURS} where it is not right: a "
-     f"method that is right where it fails or is late; that has less error where it is biased; less "
-     f"than 1/{AHEAD} of its error where it is noisy."),
+    (
+        "Error",
+        "The root of the mean squared error of one run over that of the derivative, over all "
+        f"pixels ({RESOLUTION} × {RESOLUTION}, box filter, one channel): 1 is the error of a black "
+        "image. A run takes the same seconds for every method, set-up included, on one thread; "
+        f"{REPEATS} repeats, interleaved.",
+    ),
+    (
+        "Reference",
+        f"A run {REFERENCE} times as long, with seeds of its own, of the same shape made "
+        "otherwise, or of differences with a small fixed step; one of the former kind is itself "
+        "held against differences. Its noise is known, pixel by pixel, from its independent "
+        "batches, and is taken off the squared error. Where methods are better than that noise, "
+        "their error is the spread of the repeats, which needs no reference; what the mean of the "
+        "repeats misses beyond it is added where it is more than the reference's noise explains "
+        "(by three standard errors).",
+    ),
+    (
+        "Bias",
+        "Sums over 6 × 6 blocks of pixels, the mean of the repeats minus the reference, in "
+        "standard errors of both. p: the chance of scores as large as these (sum of squares, and "
+        f"the largest; doubled). Called where p is below {LEVEL:g}, and below it again in new runs "
+        f"{LONGER} times as long, whose scores must not be weaker than chance allows: what rare "
+        "samples pretend before they are met fades. Too much: the share of the derivative that "
+        "the method adds (negative: loses). Visible: the smallest share that would have been "
+        "called. Differences are biased by their step; where their error is ruled by it, they are "
+        "called, too. A method that does not meet a rare event in all its runs cannot be told "
+        "from a biased one.",
+    ),
+    (
+        "Tail",
+        "The share of the squared error in the worst 0.1 % of the pixels of all repeats.",
+    ),
+    (
+        "Verdict",
+        "; ".join(f"{word}: {MEANING[word]}" for word in reversed(ORDER))
+        + f". Late: more than {LATENESS:g} times the seconds. Ahead of {OURS} where it is not "
+        "right: a method that is right where it fails or is late; that has less error where it is "
+        f"biased; less than 1/{AHEAD} of its error where it is noisy.",
+    ),
 ]
 
 
@@ -64,7 +80,7 @@ def _summary(records):
             continue
         places = beaten(family, stored)
         lost += bool(places)
-        ahead = f" Ahead of it: {beaten_text(places)}. {family.why_not}" if places else ""
+        ahead = f" Ahead of it: {beaten_text(places)}." if places else ""
         items.append(element("li", element("a", family.name, href=f"#{family.name}"),
                              f": {word.split(': ', 1)[1]}.", ahead))
     text = (f"{OURS} is right at every point of {len(records) - len(items)} of {len(records)} "
@@ -105,9 +121,10 @@ def _figures(family, records):
 def _reference_row(label, about):
     check = about.get("against_differences")
     doubt = called(check)
-    return [label, about["method"], about["message"] or about["status"], figures(about.get("error")),
-            figures(about["spp"]), figures(about["seconds"]),
-            element("td", figures(check["p"], 2) if check else "–", class_="bad" if doubt else None)]
+    return [label, about["method"], about["message"] or about["status"],
+            figures(about.get("error")), figures(about["spp"]), figures(about["seconds"]),
+            element("td", figures(check["p"], 2) if check else "–",
+                    class_="bad" if doubt else None)]
 
 
 def _warnings(records):
@@ -133,7 +150,7 @@ def _section(output, family, records, palette):
     broken = [t for t in (who_breaks(family, records, m) for m in methods) if t]
     sentence = " ".join(t for t in (
         standing(family, records), "; ".join(broken) + "." if broken else "",
-        family.why_not if beaten(family, records) else "") if t)
+        family.why if who_breaks(family, records, OURS) else "") if t)
     return element(
         "section", element("h2", family.name), element("p", family.what),
         element("p", "Reference: ", family.truth, class_="hint"), _doubt(records),

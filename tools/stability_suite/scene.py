@@ -1,5 +1,5 @@
-"""Scenes as text: a subset of Mitsuba's XML with meshes beside it. Everything is kept as numbers, so
-that a scene can be scaled and moved as a whole."""
+"""Scenes as text: a subset of Mitsuba's XML with meshes beside it. Everything is kept as numbers,
+so that a scene can be scaled and moved as a whole."""
 
 import copy
 import hashlib

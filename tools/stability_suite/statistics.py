@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 BLOCKS = 6  # along each side of the film
-# A bias is called where its p is below this twice: in the runs, and in as many new ones, longer. One
-# false alarm in a hundred pages of a thousand tests.
+# A bias is called where its p is below this twice: in the runs, and in as many new ones, longer.
+# One false alarm in a hundred pages of a thousand tests.
 LEVEL = 1e-5
 WORST = 0.001  # the share of pixels whose part in the squared error is the tail
 

@@ -1,4 +1,4 @@
-"""Points in turn: the reference, then the methods, repeat by repeat; each point's figures are kept."""
+"""Points in turn: the reference, then the methods, repeat by repeat; the figures are kept."""
 
 import hashlib
 import json
@@ -122,9 +122,10 @@ class References:
         return {**about, "estimate": run.estimate}
 
     def _run(self, scene, file, method, seed, folder, step):
-        return self.program.gradient(file, scene.parameter, method,
-                                     REFERENCE * self.settings["seconds"],
-                                     self.settings["seed"] + seed, os.path.join(folder, "run"), step)
+        seconds = REFERENCE * self.settings["seconds"]
+        return self.program.gradient(file, scene.parameter, method, seconds,
+                                     self.settings["seed"] + seed, os.path.join(folder, "run"),
+                                     step)
 
     def _check(self, scene, file, folder, estimate):
         """The bias of a reference that is not made of differences, against differences; None if
