@@ -77,7 +77,7 @@ def by_differences(scene, step=STEP):
 
 
 DIFFERENCES = "Differences of the same scene with a small fixed step."
-PLAIN = "The same shape as one clean mesh, by a long run of `adaptive`."
+PLAIN = "The same shape as one clean mesh, by a long run of adaptive."
 CLOSE = ("Edges that lie within a few roundings of each other are neither united nor told apart by "
          "a ray: light is judged to be on both sides of an edge that is covered.")
 NARROW = ("The penumbra is narrow: few points of the picture lie in it, each with a derivative of "
@@ -88,7 +88,7 @@ SET_UP = "Building the tree of edges takes longer than the run: it pays off in l
 @family(
     "coincident", "gap between the faces' edges", [1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 0],
     "A box of six shapes whose edges lie in one place, or a gap apart; the camera moves.",
-    "Up to a gap of 1e-4 the box as one clean mesh, by a long run of `adaptive`; beyond, "
+    "Up to a gap of 1e-4 the box as one clean mesh, by a long run of adaptive; beyond, "
     "differences.", CLOSE,
 )
 def coincident(gap):
@@ -187,7 +187,7 @@ def crossing(count):
     "seams", "distance of the copies, in radii", [0, 2.4e-16, 1e-12, 1e-8, 1e-7, 1e-6],
     "A sphere of longitudes and latitudes whose first and last meridian differ by a rounding, as "
     "programs write it.",
-    "The sphere without a seam, by a long run of `adaptive`.", CLOSE,
+    "The sphere without a seam, by a long run of adaptive.", CLOSE,
 )
 def seams(distance):
     at, radius = (0, 0, 0.65), 0.45
@@ -199,7 +199,7 @@ def seams(distance):
 @family(
     "scale", "size of the scene", [1e-10, 1e-6, 1e-3, 1, 1e3, 1e6, 1e10],
     "The same scene in ever smaller or larger units.",
-    "The scene at scale 1, by a long run of `adaptive`, divided by the scale.",
+    "The scene at scale 1, by a long run of adaptive, divided by the scale.",
 )
 def scale(size):
     plain = table(meshes.prism())
@@ -209,7 +209,7 @@ def scale(size):
 @family(
     "distance", "distance from the origin", [1, 8, 64, 1024, 8192, 131072],
     "The same scene ever farther away; all positions stay exact in float.",
-    "The scene at the origin, by a long run of `adaptive`.",
+    "The scene at the origin, by a long run of adaptive.",
 )
 def distance(offset):
     plain = table(meshes.prism())
@@ -365,7 +365,7 @@ def in_plane(step):
 @family(
     "inside", "squares along each wall", [1, 2, 4, 8, 16, 32],
     "The mesh is the room around camera, lamp and block: every point is in it, or on its planes.",
-    "The room of six squares, by a long run of `adaptive`.",
+    "The room of six squares, by a long run of adaptive.",
     "Every wall moves, and with it the light on it: the whole picture is noise of the term direct.",
 )
 def inside(splits):
