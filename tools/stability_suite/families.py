@@ -99,6 +99,34 @@ def coincident(gap):
 
 
 @family(
+    "shared-face", "how far one box sinks into the other", [1e-1, 1e-2, 1e-4, 1e-6, 1e-8, 0],
+    "A box stands on another one of the same plan, or sinks into it; at 0 they share a face. The "
+    "camera moves.",
+    "One tall box, by a long run of adaptive.", CLOSE,
+)
+def shared_face(depth):
+    plain = table(meshes.prism(), parameter="sensor.translate.x")
+    lower = Shape("lower", meshes.prism(0.25, 0.625))
+    scene = plain.replaced("object", mesh=meshes.prism(0.625 - depth, 1.0))
+    scene.shapes.insert(1, lower)
+    return scene, Reference(plain)
+
+
+@family(
+    "tiles", "bricks along each side of the floor", [1, 2, 3, 8, 21],
+    "The floor is of bricks, every other row a shape of its own; the camera moves.",
+    "One floor, by a long run of adaptive.", CLOSE,
+)
+def tiles(count):
+    plain = table(meshes.prism(), parameter="sensor.translate.x")
+    rows = [meshes.join(*meshes.bricks(count, 8, first)) for first in (0, 1) if first < count]
+    scene = plain.replaced("floor", mesh=rows[0])
+    if count > 1:
+        scene.shapes.insert(1, Shape("floor2", rows[1], plain.shape("floor").bsdf))
+    return scene, Reference(plain)
+
+
+@family(
     "t-junctions", "strips of each side", [1, 2, 3, 7, 16, 61],
     "A box whose sides are cut into strips that its lid and floor know nothing of.", PLAIN,
     CLOSE,

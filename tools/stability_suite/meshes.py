@@ -237,6 +237,20 @@ def room(half, splits):
     return join(*parts)
 
 
+def bricks(count, half, first):
+    """Rows first, first + 2, ... of a level square of `count` rows; those of odd rows begin half a
+    brick later."""
+    size = 2 * half / count
+    parts = []
+    for row in range(first, count, 2):
+        low, high = -half + row * size, -half + (row + 1) * size
+        cuts = [-half + (k + 0.5 * (row % 2)) * size for k in range(count + 1)]
+        cuts = [-half, *(c for c in cuts if -half < c < half), half]
+        parts += [quad((a, low, 0), (b, low, 0), (b, high, 0), (a, high, 0))
+                  for a, b in zip(cuts, cuts[1:])]
+    return parts
+
+
 def scattered(count, spread=0.5, fill=0.35, seed=5):
     """Small tetrahedra in a cube, turned at random; together they take about the same space."""
     rng = np.random.default_rng(seed)
