@@ -42,7 +42,7 @@ struct ShadowPoint {
 // A ray from a viewer that meets the shadow's edge.
 struct Viewer {
   Vec3<Dual> origin;
-  Vec3<Dual> direction;  // unit; held fixed or turning with the camera
+  Vec3<Dual> direction;  // unit; held fixed, or turning with the camera or the directions of a path
   double distance;       // to the shadow's edge
 };
 
@@ -285,8 +285,8 @@ void ShadowTerm::add_sample(const PathVertex& vertex, Rng rng, TermCost& cost,
     ++cost.zero_weight;
     return;
   }
-  const Vec3<Dual> fixed{omega.x, omega.y, omega.z};
-  const Lanes swept = sweep(edge, *point, {vertex.surface.p, fixed, distance});
+  const Vec3<Dual> direction = DirectionMotion{vertex.turn}.moving(omega);
+  const Lanes swept = sweep(edge, *point, {vertex.surface.p, direction, distance});
   const Rgb<double> amount = vertex.throughput * f * jump(edge, *point, q, omega);
   if (is_zero(swept) || is_black(amount)) {
     ++cost.zero_weight;

@@ -73,6 +73,30 @@ TEST(MovingDirections, KeepTheMean) {
   }
 }
 
+// The edges of a point light's shadows, seen in gloss, move against directions that turn. One pixel:
+// each seed is one turn.
+TEST(MovingDirections, KeepTheMeanOfSharpShadows) {
+  const Scene scene = read_scene(
+      std::string(LIMN_SOURCE_DIR) + "/scenes/closed_form/shadow_in_gloss.xml", {}, nullptr);
+  const auto estimate = [&](const std::string& method, int spp, uint64_t seed) {
+    GradientOptions options;
+    options.parameters = {"object.translate.x"};
+    options.method = method;
+    options.samples = SampleCounts{1, 0.5, 1, 4};
+    RunSettings settings;
+    settings.spp = spp;
+    settings.seed = seed;
+    return gradient(scene, options, settings).parameters[0].image_sum;
+  };
+  const Moments held = estimate("forest", 32768, 1);
+  std::vector<double> z;
+  for (uint64_t seed = 1; seed <= 6; ++seed) {
+    const Moments turned = estimate("random-directions", 16384, seed);
+    z.push_back((turned.mean(0) - held.mean(0)) / std::sqrt(turned.variance(0) + held.variance(0)));
+  }
+  EXPECT_GE(summarize(z).p_largest, 1e-4) << summarize(z).largest;
+}
+
 TEST(MovingDirections, TakeOutWhatSlides) {
   const TempFiles files;
   SceneParts parts;
