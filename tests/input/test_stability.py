@@ -157,6 +157,38 @@ class TestVerdicts(unittest.TestCase):
         self.assertEqual(verdicts.verdict({"status": "done", "seconds": 2}, 1), "late")
 
 
+class TestTable(unittest.TestCase):
+    @staticmethod
+    def records(*points):
+        """points: {method: (verdict, error)}."""
+        return [{"methods": {m: {"verdict": v, "error": e} for m, (v, e) in p.items()}} for p in points]
+
+    def test_who_is_ahead(self):
+        family = families.find("crossing")
+        for ours, other, ahead in (
+            (("right", 0.5), ("right", 0.1), False),  # A line that stands is enough.
+            (("noisy", 3.0), ("right", 0.9), True),
+            (("noisy", 1.2), ("right", 0.9), False),
+            (("noisy", 9.0), ("noisy", 2.0), True),
+            (("biased", 0.2), ("right", 0.5), False),  # It would not have seen that bias.
+            (("biased", 0.2), ("right", 0.1), True),
+            (("late", 2.0), ("noisy", 1.1), False),
+            (("fails", None), ("right", 0.9), True),
+            (("noisy", 3.0), ("biased", 0.1), False),
+        ):
+            records = self.records({"adaptive": ours, "fd": other})
+            self.assertEqual(table.beaten(family, records), [(1, ["fd"])] if ahead else [], (ours, other))
+
+    def test_errors_where_both_are_right(self):
+        stored = [(families.find("crossing"), [*self.records(
+            {"adaptive": ("right", 0.1), "fd": ("right", 0.4)},
+            {"adaptive": ("right", 0.1), "fd": ("right", 0.1)},
+            {"adaptive": ("noisy", 9), "fd": ("right", 0.1)}), None])]
+        ((method, ratio, count),) = table.against_others(stored)
+        self.assertEqual((method, count), ("fd", 2))
+        self.assertAlmostEqual(ratio, 0.5)
+
+
 class TestRuns(unittest.TestCase):
     @classmethod
     def setUpClass(cls):  # One folder: they share a reference.

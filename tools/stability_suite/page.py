@@ -9,8 +9,8 @@ from report.markup import Markup, element, figures, join, percent, table
 from . import chart
 from .statistics import LEVEL, called
 from .suite import LONGER, REFERENCE, REPEATS, RESOLUTION
-from .table import (AHEAD, OURS, beaten, beaten_text, cells, markdown, methods_of, standing,
-                    who_breaks)
+from .table import (AHEAD, OURS, against_others_text, beaten, beaten_text, cells, markdown,
+                    methods_of, standing, who_breaks)
 from .verdicts import LATENESS, MEANING, ORDER, RIGHT, number
 
 READING = [
@@ -85,9 +85,10 @@ def _summary(records):
                              f": {word.split(': ', 1)[1]}.", ahead))
     text = (f"{OURS} is right at every point of {len(records) - len(items)} of {len(records)} "
             f"families, and another method is ahead where it is not in {lost}.")
-    if not items:
-        return element("p", text)
-    return element("div", text, element("ul", *items), class_="notice")
+    notice = element("div", text, element("ul", *items), class_="notice") if items else element(
+        "p", text)
+    return join(notice, element("p", against_others_text(records),
+                                " Geometric means; the time for equal error is its square."))
 
 
 def _row(record, method, label):

@@ -1,7 +1,9 @@
 """What is stored, the table of verdicts, and the same as Markdown."""
 
+import math
 import os
 import re
+import textwrap
 
 from .families import FAMILIES
 from .suite import Point, point_file, read_json
@@ -82,6 +84,27 @@ def beaten_text(places):
     return "; ".join(f"{', '.join(methods)} at {number(value)}" for value, methods in places)
 
 
+def against_others(stored_records):
+    """[(method, geometric mean of our error over its, number of points)] where both are right."""
+    logarithms = {}
+    for _, records in stored_records:
+        for record in filter(None, records):
+            ours = record["methods"].get(OURS, {})
+            for method, figures in record["methods"].items():
+                if method != OURS and figures["verdict"] == ours.get("verdict") == RIGHT:
+                    ratio = ours["error"] / figures["error"]
+                    logarithms.setdefault(method, []).append(math.log(ratio))
+    return [(m, math.exp(sum(v) / len(v)), len(v)) for m, v in logarithms.items()]
+
+
+def against_others_text(stored_records):
+    parts = [f"{ratio:.2g} of {method}'s ({count} points)"
+             for method, ratio, count in against_others(stored_records)]
+    if not parts:
+        return ""
+    return f"Where both are right, {OURS} has this much error: {', '.join(parts)}."
+
+
 def who_breaks(family, records, method):
     """ "li2019: noisy from 0.01", or None for one that is right throughout."""
     text = of_family(verdicts(records, method), family.values)
@@ -99,6 +122,7 @@ def markdown(stored_records):
                      " | ".join(text[family.name, m] for m in methods) + " |")
     seconds = sorted({r["settings"]["seconds"] for _, rs in stored_records for r in rs if r})
     lines += ["", "Seconds of a run: " + ", ".join(f"{s:g}" for s in seconds) + "."]
+    lines += textwrap.wrap(against_others_text(stored_records), 100) + [""]
     used = [w for w in ORDER if any(w in verdicts(rs, m) for _, rs in stored_records
                                     for m in methods)]
     lines += [f"- {word}: {MEANING[word]}" for word in reversed(used)]

@@ -11,7 +11,7 @@ MEANING = {
     RIGHT: "no bias found, and nearer to the truth than a black image",
     NOISY: "no bias found, but further from the truth than a black image",
     BIASED: "off by more than chance explains, and again in longer runs",
-    LATE: "two samples per pixel took half as long again as there was time",
+    LATE: "two samples per pixel took more than one and a half times the seconds of a run",
     FAILS: "a crash, no end, or a result that is not finite",
     REFUSES: "an error that says why",
     UNKNOWN: "the reference is too noisy to tell",
