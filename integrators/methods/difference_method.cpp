@@ -67,6 +67,7 @@ Step find_step(const Scene& scene, const Parameter& parameter, size_t parameters
                       mean_variance(r.estimates[0][k].total) * static_cast<double>(r.spp),
                       mean_square(means(change)) - mean_variance(change)});
   }
+  extrapolate_variances(trials);
   // A run makes two images a sample and parameter, the pilot 2 kTrials.
   const double per_second =
       kTrials * static_cast<double>(r.spp) / std::max(r.seconds - r.setup_seconds, 1e-9);
@@ -128,6 +129,17 @@ GradientResult run_differences(const MethodType& method, const Scene& scene,
   result.stats.setup = {{"pilot", pilot_seconds}, {"moved scenes", run.setup_seconds}};
   result.non_finite = std::move(run.non_finite);
   return result;
+}
+
+void extrapolate_variances(std::span<StepTrial> trials) {
+  for (size_t k = trials.size() - 2; k-- > 0;) {
+    const double next = trials[k + 1].variance, after = trials[k + 2].variance;
+    if (after <= 0) continue;
+    // Noise that is not common to the two images has a variance of 1 / h^2, and none has more.
+    const double factor = trials[k + 2].step / trials[k + 1].step;
+    const double growth = std::clamp(next / after, 1.0, factor * factor);
+    trials[k].variance = std::max(trials[k].variance, next * growth);
+  }
 }
 
 double best_step(std::span<const StepTrial> trials, double samples) {

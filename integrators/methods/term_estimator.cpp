@@ -92,7 +92,7 @@ double TermEstimator::work(size_t slot, const TermCost& cost) const {
 class TermEstimator::VertexMotions {
  public:
   void operator()(const SurfacePoint<Dual>& surface, const Scattering<Dual>&, const Rgb<Dual>&,
-                  const DirectionMotion*, int, const Rng&) {
+                  const DirectionMotion*, const PathStep&, int, const Rng&) {
     velocities_.push_back({surface.p.x.d, surface.p.y.d, surface.p.z.d});
   }
   const Vec3<Lanes>& velocity(int bounces) const { return velocities_.at(bounces); }

@@ -270,6 +270,31 @@ TEST(Differences, BestStepIsTheMinimum) {
   EXPECT_LT(best_step(trials, 100), 0.256);
 }
 
+TEST(Differences, VarianceThatAPilotHasNotMetIsExtrapolated) {
+  // An exact law stays as it is.
+  for (const double power : {0.0, 1.0, 2.0}) {
+    std::vector<StepTrial> trials = trials_of(1, 1, power);
+    extrapolate_variances(trials);
+    for (int k = 0; k < 5; ++k) {
+      EXPECT_NEAR(trials[k].variance * std::pow(trials[k].step, power), 1, 1e-12);
+    }
+  }
+  // Edges that the smaller steps did not meet.
+  std::vector<StepTrial> trials = trials_of(10, 1, 1);
+  for (int k = 0; k < 3; ++k) trials[k].variance = 0;
+  extrapolate_variances(trials);
+  for (int k = 0; k < 5; ++k) EXPECT_NEAR(trials[k].variance * trials[k].step, 1, 1e-12);
+  // No growth beyond that of two unrelated images, none without any variance.
+  trials = trials_of(1, 0, 1);
+  trials[3].variance = 1000;
+  trials[4].variance = 1;
+  extrapolate_variances(trials);
+  EXPECT_DOUBLE_EQ(trials[2].variance, 16000);
+  trials = trials_of(1, 0, 1);
+  extrapolate_variances(trials);
+  EXPECT_EQ(trials[0].variance, 0);
+}
+
 class ReferenceFile : public testing::Test {
  protected:
   ReferenceFile() {

@@ -83,6 +83,19 @@ TEST_F(Program, RendersAndDifferentiates) {
   EXPECT_EQ(run("info " + scene_).status, 0);
 }
 
+TEST_F(Program, DifferentiatesForATime) {
+  const std::string figures = files_.path("figures.json");
+  const Outcome outcome = run("gradient " + scene_ + " --time 0.01 --quiet --wrt " +
+                              "screen.translate.x --json " + figures + " -o " + out());
+  EXPECT_EQ(outcome.status, 0) << outcome.text;
+  std::ifstream stream(figures);
+  EXPECT_GE(nlohmann::json::parse(stream)["spp"], 2);  // standard errors need two
+  EXPECT_TRUE(std::filesystem::exists(files_.path("out_stderr.exr")));
+  EXPECT_NE(refused("gradient " + scene_ + " --time 1 --spp 4 --wrt screen.translate.x -o " + out())
+                .find("--spp excludes --time"),
+            std::string::npos);
+}
+
 TEST_F(Program, SharesTheWorkAmongTerms) {
   const std::string figures = files_.path("figures.json");
   const std::string gradient = "gradient " + scene_ +

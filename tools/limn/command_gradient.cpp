@@ -24,6 +24,8 @@ constexpr double kRulingShare = 0.1;
 // From this share of the squared error in a thousandth of the pixels on. Not tuned.
 constexpr double kRulingPixels = 0.5;
 
+constexpr int kUnlimited = 1 << 30;  // samples per pixel
+
 // A parameter's name as a part of a file's name.
 std::string file_part(const std::string& name) {
   std::string part = name;
@@ -259,6 +261,11 @@ class GradientCommand final : public Command {
     app.add_option("--step", options_.step,
                    "Step of finite differences (default: found by a pilot)")
         ->check(CLI::PositiveNumber);
+    app.add_option("--time", seconds_,
+                   "Seconds, set-up included: as many samples as fit, instead of --spp")
+        ->check(CLI::PositiveNumber)
+        ->type_name("SECONDS")
+        ->excludes("--spp");
     app.add_option("-o,--output", output_,
                    "Image to write (.exr; _stderr.exr and .png are put beside it)")
         ->required();
@@ -284,7 +291,12 @@ class GradientCommand final : public Command {
     }
     check_outputs(planned_files(), scene, field_files(options_.parameters));
     check_memory(scene);
-    const RunSettings settings = make_settings(common_, scene, name());
+    RunSettings settings = make_settings(common_, scene, name());
+    if (seconds_ > 0) {
+      settings.seconds = seconds_;
+      settings.spp = kUnlimited;
+      settings.least_spp = 2;  // for standard errors
+    }
     const GradientResult result = gradient(scene, options_, settings);
     warnings_.add_all(result.warnings);
     if (result.spp == 0) {
@@ -298,7 +310,9 @@ class GradientCommand final : public Command {
       print_largest(result, command_line, stats_);
     }
     if (stats_) print_stats(result);
-    return finish_status(result.non_finite, result.spp, settings.spp, command_line);
+    const bool all = seconds_ > 0 && !settings.interrupted->load();
+    return finish_status(result.non_finite, result.spp, all ? result.spp : settings.spp,
+                         command_line);
   }
 
  private:
@@ -415,6 +429,7 @@ class GradientCommand final : public Command {
   GradientOptions options_;
   std::string terms_, samples_ = "auto";
   std::string output_, debug_;
+  double seconds_ = 0;  // 0: as many samples as are asked for
   bool stats_ = false, sample_images_ = false;
   std::vector<std::string> outputs_;  // of each parameter
 };
