@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "src/rays/face_copies.h"
+#include "limn/core/face_copies.h"
 
 namespace limn {
 

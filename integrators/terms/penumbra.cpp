@@ -155,7 +155,9 @@ PenumbraShare penumbra_share(const Scene& scene, const EdgeSamplerInput& edges,
   const EdgeMesh& mesh = edges.object(line.edge.object);
   lines /= length(mesh.position(ends[1]) - mesh.position(ends[0]));
   points *= 4 * std::sqrt(pdf) / behind;
-  result.share = std::isfinite(lines) ? lines / (lines + points) : 0;
+  // Where one way hardly comes, the little that it would be left with is a rare event.
+  const double ratio = points / lines;
+  result.share = std::isfinite(lines) ? 1 / (1 + ratio * ratio) : 0;
   return result;
 }
 

@@ -4,8 +4,8 @@
 // pixels and of directions meet it ever more rarely. So what `direct` holds is found from both ends:
 // `direct` itself lists edges at the vertices that paths come to; `penumbra` draws lines from a lamp
 // through a point of an edge to a vertex, and asks who sees that (penumbra_boundary.cpp). Each
-// contribution is shared between the two in proportion to how densely they are expected to meet it
-// (the balance heuristic; any shares that add up to one are right).
+// contribution is shared between the two by how densely they are expected to meet it (the power
+// heuristic; any shares that add up to one are right).
 #include <span>
 #include <vector>
 

@@ -10,8 +10,8 @@
 
 #include "limn/core/check.h"
 #include "limn/core/error.h"
+#include "limn/core/face_copies.h"
 #include "limn/core/ray_tracer.h"
-#include "src/rays/face_copies.h"
 
 namespace limn {
 namespace {

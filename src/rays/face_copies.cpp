@@ -1,5 +1,5 @@
 // Faces in one place, found by a number for their corners.
-#include "src/rays/face_copies.h"
+#include "limn/core/face_copies.h"
 
 #include <algorithm>
 #include <bit>

@@ -8,7 +8,7 @@
 #include "src/mesh/mesh_build.h"
 #include "src/mesh/mesh_file.h"
 #include "src/mesh/shapes.h"
-#include "src/rays/face_copies.h"
+#include "limn/core/face_copies.h"
 #include "src/scene_file/scene_properties.h"
 #include "src/scene_file/scene_sensor.h"
 

@@ -52,6 +52,15 @@ class Program : public testing::Test {
     return outcome.text;
   }
 
+  // Seen from so far that no ray can be traced.
+  std::string far_scene() const {
+    SceneParts parts;
+    parts.width = parts.height = 4;
+    parts.origin = {0, 2e19, 6e19};
+    parts.body = square("screen", 0.8, 50, {0.2, 0.9, 0}, diffuse("paper", "0.8, 0.8, 0.8"));
+    return files_.write("far.xml", scene_text(parts));
+  }
+
   TempFiles files_;
   std::string scene_;
 };
@@ -284,7 +293,7 @@ TEST_F(Program, RepeatsOneSample) {
 
 // Samples that are not finite come with the command that shows the first.
 TEST_F(Program, NonFiniteSamplesCanBeRepeated) {
-  const Outcome outcome = run("gradient " + scene_ + " -D glow=1e308 --wrt screen.translate.x" +
+  const Outcome outcome = run("gradient " + far_scene() + " --wrt screen.translate.x" +
                               " --spp 2 --samples 1 -o " + out());
   EXPECT_EQ(outcome.status, 3) << outcome.text;
   EXPECT_NE(outcome.text.find("  to see the first: limn gradient "), std::string::npos)
@@ -439,7 +448,7 @@ TEST_F(Program, WarningsAreInTheFigures) {
 }
 
 TEST_F(Program, NonFiniteSamplesAreAnError) {
-  const Outcome outcome = run("render " + scene_ + " --spp 16 --quiet -D glow=1e308 -o " + out());
+  const Outcome outcome = run("render " + far_scene() + " --spp 16 --quiet -o " + out());
   EXPECT_EQ(outcome.status, 3) << outcome.text;
   EXPECT_NE(outcome.text.find("non-finite sample"), std::string::npos) << outcome.text;
   EXPECT_NE(outcome.text.find("(pixel "), std::string::npos) << outcome.text;

@@ -142,9 +142,10 @@ TEST(NonFinite, IsCountedAndLocated) {
   const TempFiles files;
   SceneParts parts = small_scene(files);
   parts.width = parts.height = 8;
+  parts.body += square("blinding", 1, 90, {-1, 2.8, 0}, area_light("blaze", "1, 0, 0"));
+  Scene scene = make_scene(files, parts);
   // More than an image can hold.
-  parts.body += square("blinding", 1, 90, {-1, 2.8, 0}, area_light("blaze", "1e308, 0, 0"));
-  const Scene scene = make_scene(files, parts);
+  scene.shapes.back().radiance.r = 1e308;
   const RenderResult r = render(scene, run_settings(16));
   EXPECT_GT(r.non_finite.count, 0u);
   ASSERT_FALSE(r.non_finite.first.empty());

@@ -181,12 +181,12 @@ class Scattering {
     if (value(factor) == 0) return {};
     return bsdf_->eval(n_, wi_, w) * factor;
   }
-  // The part of eval's derivative that comes from the motion of wo alone, for parameters that are
-  // not the BSDF's own; zero for those that leave wo at rest.
+  // The part of eval's derivative that comes from the motion of wo alone.
   Rgb<Lanes> eval_derivative(const Vec3<Dual>& wo) const {
     Scattering<Dual> still(*this);
     still.hold();
-    const Rgb<Dual> f = still.eval(wo);
+    Rgb<Dual> f = still.eval(wo);
+    if (!bsdf_->is_still()) f = f - still.eval(value(wo));
     Rgb<Lanes> result;
     for (int k = 0; k < kLanes; ++k) {
       if (wo.x.d[k] == 0 && wo.y.d[k] == 0 && wo.z.d[k] == 0) continue;
