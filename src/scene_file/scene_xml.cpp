@@ -2,13 +2,13 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "limn/core/face_copies.h"
 #include "limn/core/memory.h"
 #include "limn/core/names.h"
 #include "limn/core/scene.h"
 #include "src/mesh/mesh_build.h"
 #include "src/mesh/mesh_file.h"
 #include "src/mesh/shapes.h"
-#include "limn/core/face_copies.h"
 #include "src/scene_file/scene_properties.h"
 #include "src/scene_file/scene_sensor.h"
 
