@@ -145,12 +145,7 @@ void PenumbraTerm::add_sample(const PathVertex& viewer, const Rng& key, TermCost
     ++cost.zero_weight;
     return;
   }
-  Ray ray{q, omega};
-  ray.start = viewer.surface.face;
-  ray.skip_faces = {&drawn->face, 1};
-  ray.t_max = distance * (1 - 0x1p-20);  // as shadow rays end
-  cost.add(RayCount{0, 1});
-  if (context_.tracer.occluded(ray)) {
+  if (is_hidden_from(context_, viewer, drawn->face, omega, distance, cost)) {
     ++cost.occluded;
     return;
   }

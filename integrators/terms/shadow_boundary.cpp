@@ -20,6 +20,7 @@
 
 #include "integrators/terms/film_point.h"
 #include "integrators/terms/term_table.h"
+#include "integrators/terms/vertex_edges.h"
 
 namespace limn {
 namespace {
@@ -293,13 +294,7 @@ void ShadowTerm::add_sample(const PathVertex& vertex, Rng rng, TermCost& cost,
     ++cost.zero_weight;
     return;
   }
-  Ray ray{q, omega};
-  ray.start = vertex.surface.face;
-  ray.skip_faces = {&point->face, 1};
-  ray.t_max = distance * (1 - 0x1p-20);  // as shadow rays end
-  RayCount to_viewer{0, 1};
-  cost.add(to_viewer);
-  if (context_.tracer.occluded(ray)) {
+  if (is_hidden_from(context_, vertex, point->face, omega, distance, cost)) {
     ++cost.occluded;
     return;
   }

@@ -5,6 +5,7 @@
 
 #include "limn/integrators/gradient.h"
 #include "limn/integrators/render.h"
+#include "support/block_runs.h"
 #include "support/compare_moments.h"
 #include "support/meshes.h"
 #include "support/scenes.h"
@@ -13,19 +14,6 @@ namespace limn {
 namespace {
 
 constexpr double kLevel = 1e-4;
-
-GradientResult run(const Scene& scene, const std::vector<std::string>& parameters, uint64_t seed,
-                   int spp) {
-  GradientOptions options;
-  options.parameters = parameters;
-  options.block = 4;
-  RunSettings settings;
-  settings.spp = spp;
-  settings.seed = seed;
-  GradientResult result = gradient(scene, options, settings);
-  EXPECT_EQ(result.non_finite.count, 0u) << result.non_finite.message();
-  return result;
-}
 
 // A glowing floor at y = -1 below a camera that looks along -z, 90 degrees wide, with N by N pixels.
 // The clip planes leave its depths from n = 2 to f = 50: on the film, rows from y = -1 / n to -1 / f (in
@@ -54,7 +42,7 @@ class ClippedFloor : public testing::Test {
 
   // rows: the derivative of the height of the near cut on the film, and of the far cut, in half widths.
   static void expect(const std::string& parameter, double near, double far, bool screen = false) {
-    const GradientResult result = run(scene(screen), {parameter}, 1, 64);
+    const GradientResult result = run_blocks(scene(screen), {parameter}, 64, 1);
     const double area = kPixels * kPixels / 2.0;  // of one half width
     const double exact = 3 * area * (far * (screen ? 0.5 : 1) - near);
     const Moments& sum = result.parameters[0].image_sum;
@@ -83,7 +71,7 @@ TEST(ClippedCube, AgreesWithDifferences) {
                          {0, 0.9, 0}, diffuse("clay", "0.7, 0.5, 0.3"));
   Scene scene = make_scene(files, parts);
   scene.camera.near_clip = 3;
-  const GradientResult ours = run(scene, {"sensor.translate.z"}, 1, 128);
+  const GradientResult ours = run_blocks(scene, {"sensor.translate.z"}, 128, 1);
   GradientOptions differences;
   differences.parameters = {"sensor.translate.z"};
   differences.method = "fd";
@@ -124,8 +112,8 @@ TEST_F(Copies, ShadowNothing) {
 }
 
 TEST_F(Copies, MoveWithTheCamera) {
-  const auto two = run(scene(true), {"sensor.translate.x"}, 1, 128);
-  const auto one = run(scene(false), {"sensor.translate.x"}, 2, 128);
+  const auto two = run_blocks(scene(true), {"sensor.translate.x"}, 128, 1);
+  const auto one = run_blocks(scene(false), {"sensor.translate.x"}, 128, 2);
   EXPECT_TRUE(compare_moments(two.parameters[0].total_blocks, one.parameters[0].total_blocks)
                   .plausible(kLevel));
   EXPECT_TRUE(
@@ -135,9 +123,9 @@ TEST_F(Copies, MoveWithTheCamera) {
 TEST_F(Copies, MoveTogether) {
   // As each moves alone the image has a kink; the two sum to what both come to.
   for (const char* motion : {"translate.x", "translate.y", "rotate.y"}) {
-    const auto two =
-        run(scene(true), {std::string("object.") + motion, std::string("again.") + motion}, 1, 64);
-    const auto one = run(scene(false), {std::string("object.") + motion}, 2, 64);
+    const auto two = run_blocks(
+        scene(true), {std::string("object.") + motion, std::string("again.") + motion}, 64, 1);
+    const auto one = run_blocks(scene(false), {std::string("object.") + motion}, 64, 2);
     const auto& [a, b] = std::tie(two.parameters[0].image_sum, two.parameters[1].image_sum);
     const Moments& both = one.parameters[0].image_sum;
     // Of one run: their errors add at most.
@@ -216,7 +204,8 @@ TEST(Needle, IsNotSeen) {
                  constant_light("sky", "0.4, 0.5, 0.7") +
                  obj_shape("object", file, false, 1e-3, {0, 1, 0},
                            "<bsdf type=\"twosided\"><bsdf type=\"diffuse\"/></bsdf>");
-    return means(run(make_scene(files, parts), {"object.translate.x"}, 0, 16).parameters[0].total);
+    return means(
+        run_blocks(make_scene(files, parts), {"object.translate.x"}, 16, 0).parameters[0].total);
   };
   EXPECT_EQ(sums("f 2 1 3\n"), sums(""));
 }

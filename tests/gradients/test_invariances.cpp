@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "limn/integrators/check.h"
+#include "support/block_runs.h"
 #include "support/compare_moments.h"
 #include "support/meshes.h"
 #include "support/scenes.h"
@@ -12,19 +13,6 @@ namespace limn {
 namespace {
 
 constexpr double kLevel = 1e-4;
-
-GradientResult run_gradient(const Scene& scene, const std::vector<std::string>& parameters, int spp,
-                            uint64_t seed) {
-  GradientOptions options;
-  options.parameters = parameters;
-  options.block = 4;
-  RunSettings settings;
-  settings.spp = spp;
-  settings.seed = seed;
-  GradientResult result = gradient(scene, options, settings);
-  EXPECT_EQ(result.non_finite.count, 0u) << result.non_finite.message();
-  return result;
-}
 
 // Blocks and the whole image; b times b_scale should be a.
 void expect_equal(const ParameterGradient& a, const ParameterGradient& b, double b_scale = 1) {
@@ -62,8 +50,8 @@ TEST_P(Seams, ChangeNothing) {
   const Scene welded = white_body(files, mesh, GetParam());
   const Scene split = white_body(files, seam_split(mesh), GetParam());
   const std::vector<std::string> parameters = {"body.translate.y", "body.rotate.x"};
-  const GradientResult a = run_gradient(welded, parameters, 256, 1);
-  const GradientResult b = run_gradient(split, parameters, 256, 2);
+  const GradientResult a = run_blocks(welded, parameters, 256, 1);
+  const GradientResult b = run_blocks(split, parameters, 256, 2);
   for (size_t k = 0; k < parameters.size(); ++k) expect_equal(a.parameters[k], b.parameters[k]);
   CheckOptions options;
   options.parameter = "body.translate.y";
@@ -92,9 +80,9 @@ TEST(Furnace, WhiteBodyIsInvisible) {
   const TempFiles files;
   const std::vector<std::string> parameters = {"body.translate.y", "body.rotate.x",
                                                "sensor.translate.x", "body.scale"};
-  const GradientResult white = run_gradient(body_in_the_open(files, "1, 1, 1"), parameters, 256, 1);
+  const GradientResult white = run_blocks(body_in_the_open(files, "1, 1, 1"), parameters, 256, 1);
   const GradientResult grey =
-      run_gradient(body_in_the_open(files, "0.9, 0.9, 0.9"), parameters, 256, 1);
+      run_blocks(body_in_the_open(files, "0.9, 0.9, 0.9"), parameters, 256, 1);
   for (size_t k = 0; k < parameters.size(); ++k) {
     const Moments& blocks = white.parameters[k].total_blocks;
     const std::vector<double> zeros(blocks.size(), 0.0);
@@ -135,8 +123,8 @@ TEST_P(UnitOfLength, DoesNotMatter) {
                                            "gloss.alpha"};
   std::vector<std::string> all = lengths;
   all.insert(all.end(), others.begin(), others.end());
-  const GradientResult a = run_gradient(scaled_scene(files, 1), all, 96, 1);
-  const GradientResult b = run_gradient(scaled_scene(files, GetParam()), all, 96, 2);
+  const GradientResult a = run_blocks(scaled_scene(files, 1), all, 96, 1);
+  const GradientResult b = run_blocks(scaled_scene(files, GetParam()), all, 96, 2);
   for (size_t k = 0; k < all.size(); ++k) {
     expect_equal(a.parameters[k], b.parameters[k], k < lengths.size() ? GetParam() : 1);
   }
@@ -161,7 +149,7 @@ TEST(Depth, LimitAndRouletteAgree) {
   for (const auto& [depth, roulette] : {std::pair{24, 1000}, {-1, 1000}, {-1, 1}}) {
     parts.max_depth = depth;
     parts.rr_depth = roulette;
-    results.push_back(run_gradient(make_scene(files, parts), parameters, 192, results.size() + 1));
+    results.push_back(run_blocks(make_scene(files, parts), parameters, 192, results.size() + 1));
   }
   for (size_t k = 0; k < parameters.size(); ++k) {
     expect_equal(results[0].parameters[k], results[1].parameters[k]);
@@ -184,10 +172,10 @@ TEST(Place, DoesNotMatter) {
     return make_scene(files, parts);
   };
   const std::vector<std::string> parameters = {"cube.translate.x", "glow.radiance"};
-  const GradientResult here = run_gradient(scene_at({0, 0, 0}), parameters, 256, 1);
+  const GradientResult here = run_blocks(scene_at({0, 0, 0}), parameters, 256, 1);
   for (const double distance : {100.0, 1e5}) {
     const Vec3d offset = Vec3d{1, 1, 1} * distance;
-    const GradientResult there = run_gradient(scene_at(offset), parameters, 256, 2);
+    const GradientResult there = run_blocks(scene_at(offset), parameters, 256, 2);
     for (size_t k = 0; k < parameters.size(); ++k)
       expect_equal(here.parameters[k], there.parameters[k]);
   }
@@ -206,8 +194,8 @@ TEST(FarPlane, HidesWhatIsBehindEdges) {
     scene.camera.far_clip = 9;
     return scene;
   };
-  const GradientResult a = run_gradient(scene_with(true), {"cube.scale"}, 64, 1);
-  const GradientResult b = run_gradient(scene_with(false), {"cube.scale"}, 64, 2);
+  const GradientResult a = run_blocks(scene_with(true), {"cube.scale"}, 64, 1);
+  const GradientResult b = run_blocks(scene_with(false), {"cube.scale"}, 64, 2);
   expect_equal(a.parameters[0], b.parameters[0]);
 }
 

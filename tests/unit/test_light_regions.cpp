@@ -7,6 +7,7 @@
 #include "limn/edgetree/edge_pieces.h"
 #include "support/environment_maps.h"
 #include "support/meshes.h"
+#include "support/scenes.h"
 
 namespace limn {
 namespace {
@@ -330,6 +331,48 @@ TEST(EdgePieces, OfEdgesThroughThePoint) {
     for (Vec3d& p : c.mesh.positions) p.z = 1e-300;
     for (const EdgePiece& piece : pieces_of(c)) EXPECT_TRUE(std::isfinite(piece.weight));
   }
+}
+
+// Directions towards a region follow the density that is told: integrals over it by draws are those by
+// directions of the whole sphere.
+TEST(LightRegions, DrawDirectionsByTheirDensity) {
+  const TempFiles files;
+  SceneParts parts;
+  const auto lamp = [&](const std::string& id, const Mesh& mesh, const Vec3d& offset) {
+    return obj_shape(id, write_mesh(files, id + ".obj", mesh), true, 0.5, offset,
+                     area_light(id + "_light", "1, 1, 1"));
+  };
+  parts.body = lamp("octagon", disk_mesh(8), {0, 0, 0}) + lamp("hook", concave_mesh(), {0, 1, 0}) +
+               lamp("ball", icosphere_mesh(1), {1, 0, 0});
+  const Scene scene = make_scene(files, parts);
+  const LightRegions regions(scene);
+  ASSERT_EQ(regions.size(), 3u);
+  const auto g = [](const Vec3d& w) { return 2 + w.x - 0.5 * w.y; };
+  constexpr int kDraws = 200000;
+  Rng rng(5, 0, 0);
+  for (size_t k = 0; k < regions.size(); ++k) {
+    for (const Vec3d& x : {Vec3d{0.3, 0.2, 1.5}, Vec3d{2, -0.5, 0.7}}) {
+      double drawn = 0, drawn2 = 0, whole = 0, whole2 = 0;
+      for (int i = 0; i < kDraws; ++i) {
+        const auto w = regions.draw_direction(k, x, rng.uniform(), rng.uniform());
+        ASSERT_TRUE(w);
+        const double pdf = regions.direction_pdf(k, x, *w);
+        const double a = pdf > 0 ? g(*w) : 0;
+        drawn += a, drawn2 += a * a;
+        const double z = 2 * rng.uniform() - 1, phi = 2 * kPi * rng.uniform();
+        const double r = std::sqrt(1 - z * z);
+        const Vec3d v{r * std::cos(phi), r * std::sin(phi), z};
+        const double b = 4 * kPi * regions.direction_pdf(k, x, v) * g(v);
+        whole += b, whole2 += b * b;
+      }
+      const double error =
+          std::sqrt(drawn2 - drawn * drawn / kDraws + whole2 - whole * whole / kDraws);
+      EXPECT_LT(std::fabs(drawn - whole), 5 * error) << k;
+    }
+  }
+  // Nothing shines behind a flat lamp.
+  EXPECT_FALSE(regions.draw_direction(0, {0, 0, -1}, 0.5, 0.5));
+  EXPECT_EQ(regions.direction_pdf(0, {0, 0, -1}, {0, 0, 1}), 0);
 }
 
 }  // namespace
