@@ -190,6 +190,31 @@ TEST(Regions, BesideContacts) {
   EXPECT_GT(a.terms[a.term("penumbra")].cost.counted, 1000u);
 }
 
+// The body and its shadow, behind the camera, are seen in a wall alone: by the first vertices of paths.
+TEST(Regions, SeenByVertices) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.max_depth = 3;
+  parts.origin = {0, 0.8, 0.6};
+  parts.target = {0, 0.8, -1};
+  parts.fov = 50;
+  parts.width = parts.height = 8;
+  parts.body = square("wall", 2, 0, {0, 1, -1}, diffuse("paint", "0.9, 0.9, 0.9")) +
+               square("floor", 2.5, -90, {0, 0, 1}, diffuse("chalk", "0.8, 0.7, 0.6")) +
+               obj_shape("body", write_mesh(files, "body.obj", cube_mesh()), true, 0.35,
+                         {0.1, 0.5, 1.6}, diffuse("clay", "0.1, 0.1, 0.1")) +
+               square("lamp", 0.1, 90, {0.2, 2.2, 1.4}, area_light("glow", "300, 300, 300"));
+  const Scene scene = make_scene(files, parts);
+  const GradientResult a = run(scene, "silhouettes", {"body.translate.z"}, 2048, 1);
+  const GradientResult b = run(scene, "forest", {"body.translate.z"}, 16384, 2);
+  expect_equal(a.parameters[0], b.parameters[0]);
+  // Nearly all of it is found from the lamp.
+  const Moments& found = a.parameters[0].terms[a.term("penumbra")];
+  double mean = 0;
+  for (size_t i = 0; i < found.size(); ++i) mean += found.mean(i);
+  EXPECT_GT(mean, 0.5 * a.parameters[0].image_sum.mean(0));
+}
+
 // Against finite differences, all terms. The penumbras of small lamps are too thin for `forest`.
 TEST(Regions, AgreeWithDifferences) {
   const TempFiles files;
