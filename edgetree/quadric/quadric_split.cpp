@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "limn/core/bounds.h"
 #include "limn/core/parallel.h"
 
 namespace limn {
@@ -142,13 +143,19 @@ class Splitter {
   std::span<Item> items_;
 };
 
+// Around the center and in diagonals of all edges: areas neither overflow nor vanish.
 std::vector<Item> items_of(std::span<const Wedge> wedges) {
+  Bounds bounds;
+  for (const Wedge& wedge : wedges)
+    for (const Vec3d& x : wedge.ends) bounds.extend(x);
+  const Vec3d center = bounds.center();
+  const double diagonal = bounds.diagonal(), scale = diagonal > 0 ? 1 / diagonal : 1;
   std::vector<Item> items(wedges.size());
   for (uint32_t i = 0; i < items.size(); ++i) {
     items[i].wedge = i;
     for (const Vec3d& x : wedges[i].ends)
       for (int k = 0; k < 3; ++k) {
-        const auto value = static_cast<float>(x[k]);
+        const auto value = static_cast<float>((x[k] - center[k]) * scale);
         items[i].box.low[k] = std::min(items[i].box.low[k], value);
         items[i].box.high[k] = std::max(items[i].box.high[k], value);
       }
