@@ -152,7 +152,8 @@ class Filler {
       const double high = (box.upper[k] - frame.center[k]) * frame.inverse_radius;
       const float center = static_cast<float>(0.5 * (low + high));
       node.center[k][lane] = center;
-      const double half = std::max(high - center, center - low) + 0x1.0p-40;
+      // Far more than the rounding of the center, whose modulus is 1 at most.
+      const double half = std::max(high - center, center - low) + 0x1.0p-20;
       node.half[k][lane] = std::nextafter(static_cast<float>(half), kInfinite);
     }
   }
