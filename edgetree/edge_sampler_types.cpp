@@ -3,6 +3,7 @@
 
 #include "edgetree/baselines/baselines.h"
 #include "edgetree/forest/edge_forest.h"
+#include "edgetree/quadric/quadric_sampler.h"
 #include "limn/core/error.h"
 #include "limn/core/names.h"
 
@@ -12,6 +13,11 @@ namespace {
 template <ForestConfig kConfig>
 std::unique_ptr<EdgeSampler> make_forest(const EdgeSamplerInput& input, int threads) {
   return EdgeForest::build(input, threads, kConfig);
+}
+
+template <QuadricConfig kConfig>
+std::unique_ptr<EdgeSampler> make_quadric(const EdgeSamplerInput& input, int threads) {
+  return QuadricSampler::build(input, threads, kConfig);
 }
 
 constexpr int kNoHeight = ForestConfig::kNoHeight, kEdgesOnly = ForestConfig::kEdgesOnly,
@@ -29,6 +35,8 @@ std::span<const EdgeSamplerType> edge_sampler_types() {
        make_brute_force_sampler},
       {"li2019", "the tree of Li et al. 2018 over positions and Hough-transformed planes",
        make_li2019_sampler},
+      {"quadric", "the forest of Soroka et al. 2025: 4-wide, dual boxes and pairs of quadrics",
+       make_quadric<QuadricConfig{}>},
       {"uniform", "any edge of the scene, any point on it", make_uniform_sampler},
       {"forest-look-ahead-none", "forest whose children are chosen without a look at theirs",
        make_forest<ForestConfig{.look_ahead = kNoHeight}>, kAblation},
@@ -57,6 +65,12 @@ std::span<const EdgeSamplerType> edge_sampler_types() {
        make_forest<ForestConfig{.light_term = false}>, kAblation},
       {"forest-no-environment", "forest whose weights take the environment for uniform",
        make_forest<ForestConfig{.environment_term = false}>, kAblation},
+      {"quadric-box", "quadric without the pairs of quadrics",
+       make_quadric<QuadricConfig{.quadrics = false}>, kAblation},
+      {"quadric-no-lights", "quadric whose weights ignore where the lights are",
+       make_quadric<QuadricConfig{.light_term = false}>, kAblation},
+      {"quadric-concave", "quadric that keeps concave edges",
+       make_quadric<QuadricConfig{.cull_concave = false}>, kAblation},
   };
   return types;
 }

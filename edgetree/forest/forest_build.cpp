@@ -5,30 +5,12 @@
 #include <bit>
 #include <cmath>
 #include <limits>
-#include <optional>
 
-#include "edgetree/forest/forest_fit.h"
 #include "edgetree/forest/forest_split.h"
-#include "limn/core/bounds.h"
 #include "limn/core/parallel.h"
 
 namespace limn {
 namespace {
-
-// Nothing for an edge that no query needs.
-std::optional<ForestGroup> group_of(const EdgeMesh& mesh, const Edge& edge,
-                                    const ForestConfig& config) {
-  switch (edge.edge_class) {
-    case EdgeClass::kSmooth:
-    case EdgeClass::kFlat:
-      if (config.cull_concave && edge.concave && mesh.one_sided_closed) return std::nullopt;
-      return ForestGroup::kSilhouette;
-    case EdgeClass::kSharp:
-      return mesh.one_sided_closed ? ForestGroup::kFront : ForestGroup::kAlways;
-    default:
-      return ForestGroup::kAlways;
-  }
-}
 
 double speed_of(const EdgeMesh& mesh, VertexId vertex, const Lanes& scale) {
   if (mesh.tangents.empty()) return 0;
@@ -36,6 +18,27 @@ double speed_of(const EdgeMesh& mesh, VertexId vertex, const Lanes& scale) {
   double sum = 0;
   for (int i = 0; i < kLanes; ++i) sum += scale[i] * std::hypot(v.x[i], v.y[i], v.z[i]);
   return sum;
+}
+
+// The 24 leading bits: a number that a float holds. Not by a cast to float and back, because GCC 12
+// drops such a pair of casts where it makes vectors of them.
+double truncated(double x) {
+  return std::bit_cast<double>(std::bit_cast<uint64_t>(x) & ~((uint64_t{1} << 29) - 1));
+}
+
+}  // namespace
+
+std::optional<ForestGroup> group_of(const EdgeMesh& mesh, const Edge& edge, bool cull_concave) {
+  switch (edge.edge_class) {
+    case EdgeClass::kSmooth:
+    case EdgeClass::kFlat:
+      if (cull_concave && edge.concave && mesh.one_sided_closed) return std::nullopt;
+      return ForestGroup::kSilhouette;
+    case EdgeClass::kSharp:
+      return mesh.one_sided_closed ? ForestGroup::kFront : ForestGroup::kAlways;
+    default:
+      return ForestGroup::kAlways;
+  }
 }
 
 Wedge wedge_of(const EdgeMesh& mesh, EdgeId id, const Lanes& scale) {
@@ -60,12 +63,6 @@ Bounds bounds_of(std::span<const Wedge> wedges) {
   return bounds;
 }
 
-// The 24 leading bits: a number that a float holds. Not by a cast to float and back, because GCC 12
-// drops such a pair of casts where it makes vectors of them.
-double truncated(double x) {
-  return std::bit_cast<double>(std::bit_cast<uint64_t>(x) & ~((uint64_t{1} << 29) - 1));
-}
-
 // The cube around the center holds the box: children's boxes are cut off at it.
 NodeFrame frame_of(const Bounds& box) {
   const Vec3d middle = box.center();
@@ -76,6 +73,8 @@ NodeFrame frame_of(const Bounds& box) {
     radius = std::max({radius, box.upper[k] - center[k], center[k] - box.lower[k]});
   return {center, truncated(1 / radius)};
 }
+
+namespace {
 
 double length_of(std::span<const Wedge> wedges) {
   double sum = 0;
@@ -275,7 +274,7 @@ Forest build_forest(const EdgeSamplerInput& input, int threads, const ForestConf
     forest.slots.emplace_back(mesh.edges.size(), kNoParent);
     std::vector<Wedge> groups[kForestGroups];
     for (uint32_t e = 0; e < mesh.edges.size(); ++e)
-      if (const auto group = group_of(mesh, mesh.edges[e], config))
+      if (const auto group = group_of(mesh, mesh.edges[e], config.cull_concave))
         groups[static_cast<int>(*group)].push_back(wedge_of(mesh, EdgeId(e), input.lane_scale));
     for (int g = 0; g < kForestGroups; ++g)
       if (!groups[g].empty())

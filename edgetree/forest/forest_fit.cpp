@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "edgetree/forest/linear_program.h"
+#include "edgetree/forest/normaliser.h"
 
 // A plane is q = (n, signed distance of the frame's center / radius), so that q . x is the signed
 // distance of p / radius. Dividing by Z . q > 0 puts all planes on the hyperplane Z . q = 1, an
@@ -22,93 +22,11 @@ using Eigen::Matrix;
 using Eigen::Vector3d;
 using Eigen::Vector4d;
 
-// Chart points are right to 2^-52 / (Z . q): with less than this of Z . q they could be off by a
-// rounding of floats, which the query's own bound must cover.
-constexpr double kMinSeparation = 0x1.0p-20;
-
 // Flat edges count a little, for the points on their plane. Not tuned.
 constexpr double kFlat = 0x1.0p-12;
 
 Vector4d dual_point(const Plane& plane, const NodeFrame& frame) {
   return {plane.n.x, plane.n.y, plane.n.z, plane.distance(frame.center) * frame.inverse_radius};
-}
-
-struct Farthest {
-  double value;
-  size_t index;
-};
-Farthest least_product(const std::vector<Vector4d>& points, const Vector4d& z) {
-  Farthest least{points[0].dot(z), 0};
-  for (size_t i = 1; i < points.size(); ++i) {
-    const double product = points[i].dot(z);
-    if (product < least.value) least = {product, i};
-  }
-  return least;
-}
-
-// The direction whose largest angle with all normals is smallest, roughly: the center of the
-// smallest enclosing ball of the normals by Badoiu and Clarkson's steps towards the farthest.
-Vector4d central_direction(const std::vector<Vector4d>& points) {
-  Vector3d mean = Vector3d::Zero();
-  for (const Vector4d& q : points) mean += q.head<3>();
-  Vector3d center = mean / static_cast<double>(points.size());
-  constexpr int kSteps = 12;  // not tuned
-  for (int i = 2; i < 2 + kSteps && points.size() > 2; ++i) {
-    // Normals are unit vectors: the farthest has the smallest product with the center.
-    const Farthest far = least_product(points, Vector4d(center[0], center[1], center[2], 0));
-    center += (points[far.index].head<3>() - center) / i;
-  }
-  const double norm = center.norm();
-  if (norm == 0) return Vector4d::Zero();
-  return Vector4d(center[0], center[1], center[2], 0) / norm;
-}
-
-// The linear program over all points, by adding the most violated ones until none is left.
-Vector4d farthest_hyperplane(const std::vector<Vector4d>& points) {
-  std::vector<Vector4d> active;
-  for (int i = 0; i < 4; ++i) {
-    const auto by = [&](const Vector4d& a, const Vector4d& b) { return a[i] < b[i]; };
-    const auto [low, high] = std::minmax_element(points.begin(), points.end(), by);
-    active.push_back(*low);
-    active.push_back(*high);
-  }
-  constexpr int kRounds = 24;  // not tuned
-  for (int round = 0;; ++round) {
-    Vector4d z = separating_direction(active);
-    if (z.norm() == 0) return z;
-    const double rho = least_product(active, z).value;
-    const Farthest least = least_product(points, z);
-    // Any Z that works will do: nearly optimal is enough.
-    if (least.value > 0.5 * rho || round == kRounds) return z / z.norm();
-    active.push_back(points[least.index]);
-  }
-}
-
-// Unit Z with Z . q > 0 for all points, or zero.
-Vector4d normaliser_of(const std::vector<Vector4d>& points) {
-  Vector4d z = central_direction(points);
-  const double least = z.norm() > 0 ? least_product(points, z).value : 0;
-  // The chart would be five times as large as it needs to be. Not tuned.
-  constexpr double kWide = 0.2;
-  if (least >= kWide) return z;
-  const Vector4d other = farthest_hyperplane(points);
-  const double other_least = other.norm() > 0 ? least_product(points, other).value : 0;
-  if (std::max(least, other_least) < kMinSeparation) return Vector4d::Zero();
-  return least >= other_least ? z : other;
-}
-
-// Columns: orthonormal, and orthogonal to the unit vector z (a Householder reflection).
-Matrix<double, 4, 3> complement_of(const Vector4d& z) {
-  int k = 0;
-  z.cwiseAbs().maxCoeff(&k);
-  Vector4d v = z;
-  v[k] += std::copysign(1.0, z[k]);
-  Matrix<double, 4, 3> basis;
-  for (int column = 0, i = 0; i < 4; ++i) {
-    if (i == k) continue;
-    basis.col(column++) = Vector4d::Unit(i) - v * (2 * v[i] / v.squaredNorm());
-  }
-  return basis;
 }
 
 // Principal axes of points, the widest first.

@@ -102,7 +102,7 @@ struct Rooms {
 const std::vector<Rooms>& all_rooms() {
   static const std::vector<Rooms> rooms = {
       {"src", {"base", "mesh", "image", "bsdf", "light", "rays", "scene", "scene_file"}},
-      {"edgetree", {"edges", "lobe", "light", "forest", "baselines", "rejection"}},
+      {"edgetree", {"edges", "lobe", "light", "forest", "quadric", "baselines", "rejection"}},
       {"integrators", {"estimates", "terms", "methods", "compare"}},
   };
   return rooms;

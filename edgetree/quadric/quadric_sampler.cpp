@@ -1,0 +1,225 @@
+// The paper's forest as a sampler: descending the trees.
+#include "edgetree/quadric/quadric_sampler.h"
+
+#include <algorithm>
+
+#include "edgetree/lobe/seen_edge.h"
+#include "edgetree/quadric/quadric_build.h"
+#include "edgetree/quadric/quadric_query.h"
+
+namespace limn {
+namespace {
+
+double below_one(double u) { return std::clamp(u, 0.0, 0x1.fffffffffffffp-1); }
+
+// A node and the weights of its children.
+struct Choice {
+  NodeId node = kNoChild;
+  double weights[kQuadricWidth];
+  double total = 0;
+
+  void sum() {
+    total = 0;
+    for (const double weight : weights) total += weight;
+  }
+  // Draws a lane by the uniform number u and leaves another one in it; total > 0.
+  int draw(double& u) const {
+    double rest = u * total;
+    int lane = 0;
+    while (lane + 1 < kQuadricWidth && rest >= weights[lane]) rest -= weights[lane++];
+    while (!(weights[lane] > 0)) lane = (lane + kQuadricWidth - 1) % kQuadricWidth;  // by rounding
+    u = below_one(rest / weights[lane]);
+    return lane;
+  }
+};
+
+// Its nodes are the lanes of the forest's nodes, and the edges of leaves.
+class QuadricRejectionTree final : public RejectionTree {
+ public:
+  QuadricRejectionTree(const EdgeSamplerInput& input, const QuadricForest& forest)
+      : input_(input), forest_(forest) {
+    for (const NodeId root : forest.roots) append(root, kNoNode, 1);
+  }
+
+  bool rejects(uint32_t node, const Vec3d& p) const override {
+    const auto [id, lane] = slots_[node];
+    if (id < 0) {
+      const EdgeRef edge = edges_[nodes_[node].begin];
+      return !is_candidate(input_.object(edge.object), edge.edge, p);
+    }
+    return may_hold_candidates(forest_, id, QuadricPoint(forest_, p))[lane] == 0;
+  }
+
+ private:
+  struct Slot {
+    NodeId node;
+    int lane;
+  };
+
+  // The lanes of a node and all below them.
+  void append(NodeId id, uint32_t parent, uint32_t depth) {
+    for (int lane = 0; lane < kQuadricWidth; ++lane) {
+      const int32_t child = forest_.lanes(id)[lane];
+      if (child == kNoChild) continue;
+      const auto node = static_cast<uint32_t>(nodes_.size());
+      nodes_.push_back({parent, 0, depth, static_cast<uint32_t>(edges_.size()), 0});
+      slots_.push_back({id, lane});
+      if (id < 0) {
+        edges_.push_back({forest_.leaves[~id].object, EdgeId(static_cast<uint32_t>(child))});
+      } else {
+        append(child, node, depth + 1);
+      }
+      nodes_[node].after = static_cast<uint32_t>(nodes_.size());
+      nodes_[node].end = static_cast<uint32_t>(edges_.size());
+    }
+  }
+
+  const EdgeSamplerInput& input_;
+  const QuadricForest& forest_;
+  std::vector<Slot> slots_;  // of each node
+};
+
+}  // namespace
+
+struct QuadricSampler::Impl {
+  const EdgeSamplerInput& input;
+  QuadricConfig config;
+  PolygonLights lights;
+  QuadricForest forest;
+
+  QuadricQuery prepare(const EdgeQuery& query) const {
+    const bool lit = config.light_term && !lights.empty();
+    return {forest, lit ? &lights : nullptr, query};
+  }
+
+  // Both sampling and evaluating a probability ask here, and get the same bits.
+  Choice choice_at(NodeId id, const QuadricQuery& query) const {
+    Choice choice;
+    choice.node = id;
+    if (id < 0) {
+      weigh_edges(input, forest.leaves[~id], query, choice.weights);
+    } else {
+      weigh_children(forest, id, query, choice.weights);
+    }
+    choice.sum();
+    return choice;
+  }
+
+  double root_total(const QuadricQuery& query) const {
+    double total = 0;
+    for (NodeId root : forest.roots) total += choice_at(root, query).total;
+    return total;
+  }
+
+  // Draws one of the trees, whose four roots are the children of `chosen`, by the uniform number u
+  // and leaves another one in it. False if no root has weight. total: root_total.
+  bool choose_root(const QuadricQuery& query, double& u, Choice& chosen, double& total) const {
+    bool found = false;
+    total = 0;
+    for (NodeId root : forest.roots) {
+      const Choice next = choice_at(root, query);
+      total += next.total;
+      const double share = next.total > 0 ? next.total / total : 0;
+      if (u < share) {
+        u = below_one(u / share);
+        chosen = next;
+        found = true;
+      } else if (found) {
+        u = below_one((u - share) / (1 - share));
+      }
+    }
+    return found;
+  }
+
+  struct Draw {
+    EdgeRef edge;
+    double probability = 1;
+  };
+  std::optional<Draw> draw(const QuadricQuery& query, double u) const {
+    Choice choice;
+    double scale;
+    if (!choose_root(query, u, choice, scale)) return std::nullopt;
+    Draw result;
+    while (true) {
+      const int lane = choice.draw(u);
+      result.probability *= choice.weights[lane] / scale;
+      const int32_t child = forest.lanes(choice.node)[lane];
+      if (choice.node < 0) {
+        result.edge = {forest.leaves[~choice.node].object, EdgeId(static_cast<uint32_t>(child))};
+        return result;
+      }
+      choice = choice_at(child, query);
+      scale = choice.total;
+      if (!(scale > 0)) return std::nullopt;
+    }
+  }
+
+  // Probability of drawing the child in a lane of a node; multiplied from the root on, as `draw`
+  // does.
+  double probability(NodeId id, int lane, const QuadricQuery& query) const {
+    const uint32_t parent = forest.parent(id);
+    const bool is_root = parent == kNoParent;
+    const double reach = is_root ? 1
+                                 : probability(static_cast<NodeId>(parent / kQuadricWidth),
+                                               static_cast<int>(parent % kQuadricWidth), query);
+    if (reach == 0) return 0;
+    const Choice choice = choice_at(id, query);
+    const double scale = is_root ? root_total(query) : choice.total;
+    return scale > 0 ? reach * (choice.weights[lane] / scale) : 0;
+  }
+
+  SeenEdge seen_edge(const LtcLobe& lobe, const Vec3d& p, EdgeRef id) const {
+    const EdgeMesh& mesh = input.object(id.object);
+    const auto [a, b] = mesh.edge(id.edge).vertices;
+    return {lobe, mesh.position(a) - p, mesh.position(b) - p};
+  }
+};
+
+QuadricSampler::QuadricSampler(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+QuadricSampler::~QuadricSampler() = default;
+
+std::unique_ptr<QuadricSampler> QuadricSampler::build(const EdgeSamplerInput& input, int threads,
+                                                      const QuadricConfig& config) {
+  auto impl = std::unique_ptr<Impl>(
+      new Impl{input, config, PolygonLights(input.lights, input.environment_luminance),
+               build_quadric_forest(input, threads, config)});
+  return std::unique_ptr<QuadricSampler>(new QuadricSampler(std::move(impl)));
+}
+
+std::optional<EdgeSample> QuadricSampler::sample(const EdgeQuery& query, Rng& rng) const {
+  const double u_edge = rng.uniform(), u_t = rng.uniform();
+  const QuadricQuery prepared = impl_->prepare(query);
+  const auto draw = impl_->draw(prepared, u_edge);
+  if (!draw) return std::nullopt;
+  const SeenEdge edge = impl_->seen_edge(prepared.lobe, query.p, draw->edge);
+  if (!edge.is_seen()) return std::nullopt;
+  EdgeSample sample{draw->edge, edge.sample_t(u_t), draw->probability, 0};
+  sample.pdf_t = edge.pdf_t(sample.t);
+  // Nothing where the density is lost to rounding, on an edge that lies in the horizon.
+  if (!(sample.pdf_t > 0)) return std::nullopt;
+  return sample;
+}
+
+double QuadricSampler::probability(const EdgeQuery& query, EdgeRef id) const {
+  const uint32_t slot = impl_->forest.slots[id.object.index()][id.edge.index()];
+  if (slot == kNoParent) return 0;
+  const QuadricQuery prepared = impl_->prepare(query);
+  if (!impl_->seen_edge(prepared.lobe, query.p, id).is_seen()) return 0;
+  return impl_->probability(~static_cast<NodeId>(slot / kQuadricWidth),
+                            static_cast<int>(slot % kQuadricWidth), prepared);
+}
+
+double QuadricSampler::pdf_t(const EdgeQuery& query, EdgeRef id, double t) const {
+  const SeenEdge edge = impl_->seen_edge(LtcLobe(query.lobe, query.n, query.wi), query.p, id);
+  return edge.is_seen() ? edge.pdf_t(t) : 0;
+}
+
+SamplerSize QuadricSampler::size() const {
+  return {impl_->forest.nodes.size() + impl_->forest.leaves.size(), impl_->forest.bytes()};
+}
+
+std::unique_ptr<RejectionTree> QuadricSampler::rejection_tree() const {
+  return std::make_unique<QuadricRejectionTree>(impl_->input, impl_->forest);
+}
+
+}  // namespace limn
