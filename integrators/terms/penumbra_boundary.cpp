@@ -139,7 +139,7 @@ void PenumbraTerm::add_sample(const PathVertex& viewer, const Rng& key, TermCost
   const bool apart = distance > 0 && drawn->face != viewer.surface.face;
   const Vec3d omega = apart ? to / distance : Vec3d{};
   const double pdf = apart ? viewer.scattering.pdf_solid_angle(omega) : 0;
-  const Rgb<double> f = pdf > 0 ? value(viewer.scattering.eval(omega)) : Rgb<double>{};
+  const Rgb<double> f = pdf > 0 ? viewer.scattering.eval_value(omega) : Rgb<double>{};
   const int bounces = viewer.bounces + 1;
   if (is_black(f) || !complete(*drawn, {q, pdf}, bounces, rng)) {
     ++cost.zero_weight;
