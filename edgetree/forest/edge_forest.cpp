@@ -90,6 +90,7 @@ struct EdgeForest::Impl {
 
   // Both sampling and evaluating a probability ask here, and get the same bits.
   Choice choice_at(NodeId id, const ForestQuery& query) const {
+    forest.fetch(id);  // all lines at once
     if (id < 0) {
       return {id, weigh_edges(forest.edges[~id], query)};
     }
