@@ -65,8 +65,8 @@ class LampEdges {
   double reach_ = 0;  // the scene's diagonal
   std::vector<Sight> sights_;
   std::vector<ShapeId> lamps_;  // of the regions; none of patches
-  // In the order of regions, objects and edges, so that a few bits per edge find them again: to weigh
-  // an edge anew would fetch ten lines of the mesh.
+  // In the order of regions, objects and edges, so that a few bits per edge find them again: to
+  // weigh an edge anew would fetch ten lines of the mesh.
   std::vector<Drawn> listed_;
   std::vector<Block> blocks_;
   std::vector<size_t> first_block_;  // of each object, behind its region's first

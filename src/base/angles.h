@@ -18,8 +18,8 @@ inline double polynomial(const double (&coefficients)[N], double t) {
 }
 
 namespace detail {
-// Two numbers, of which the second does not matter: a choice between vectors is never made by a branch,
-// which for random directions is guessed wrongly every other time.
+// Two numbers, of which the second does not matter: a choice between vectors is never made by a
+// branch, which for random directions is guessed wrongly every other time.
 using Pair [[gnu::vector_size(16)]] = double;
 using Bits [[gnu::vector_size(16)]] = int64_t;
 }  // namespace detail

@@ -108,8 +108,8 @@ struct EdgeMesh {
     if (incidences.empty()) return {faces, {}};
     return {faces, {&incidences[face_offsets[id.index()]], faces.size()}};
   }
-  // For edges that are looked at soon: bring into the cache the edge itself; and once that is there,
-  // its ends and its faces.
+  // For edges that are looked at soon: bring into the cache the edge itself; and once that is
+  // there, its ends and its faces.
   void fetch_edge(EdgeId id) const {
     __builtin_prefetch(&edges[id.index()]);
     __builtin_prefetch(&face_offsets[id.index()]);
