@@ -49,6 +49,29 @@ struct Choice {
   }
 };
 
+// The edges of a query's own face lie in its plane: most others need no look at their mesh.
+class OwnEdges {
+ public:
+  OwnEdges(const EdgeSamplerInput& input, const EdgeQuery& query, double extent)
+      : input_(input), query_(query), any_(query.face.shape.valid()) {
+    if (!any_) return;
+    plane_ = input.object(query.face.shape).plane(query.face.face);
+    // Far beyond rounding. Not tuned.
+    near_ = 0x1.0p-16 * (extent + length(query.p));
+  }
+  bool holds(const ListedEdge& edge) const {
+    return any_ && std::fabs(plane_.distance(edge.x0)) <= near_ &&
+           std::fabs(plane_.distance(edge.x1)) <= near_ && is_own_edge(input_, query_, edge.id);
+  }
+
+ private:
+  const EdgeSamplerInput& input_;
+  const EdgeQuery& query_;
+  bool any_;
+  Plane plane_;
+  double near_ = 0;
+};
+
 }  // namespace
 
 struct EdgeForest::Impl {
@@ -67,6 +90,7 @@ struct EdgeForest::Impl {
 
   // Both sampling and evaluating a probability ask here, and get the same bits.
   Choice choice_at(NodeId id, const ForestQuery& query) const {
+    forest.fetch(id);  // all lines at once
     if (id < 0) {
       return {id, weigh_edges(forest.edges[~id], query)};
     }
@@ -161,7 +185,8 @@ struct EdgeForest::Impl {
     if (!config.cull_concave || !surely_candidate(node, lane, point)) {
       if (!is_candidate(input.object(id.object), id.edge, query.p)) return false;
     }
-    return !is_own_edge(input, query, id);
+    const ListedEdge edge{id, end_of(node, lane, 0), end_of(node, lane, 1)};
+    return !OwnEdges(input, query, forest.extent).holds(edge);
   }
   Vec3d end_of(const EdgeNode& node, int lane, int e) const {
     if (node.head.object == crossings) {
@@ -197,10 +222,14 @@ std::optional<EdgeSample> EdgeForest::sample(const EdgeQuery& query, Rng& rng) c
   const ForestQuery prepared = impl_->prepare(query);
   Impl::Draw draw;
   if (!impl_->draw(prepared, u_edge, draw)) return std::nullopt;
+  const EdgeRef id = draw.edge();
+  const EdgeMesh& mesh = impl_->input.object(id.object);
+  mesh.fetch_edge(id.edge);  // for what follows this draw
   if (!impl_->accepts(query, prepared.point, *draw.node, draw.lane)) return std::nullopt;
   const SeenEdge edge = impl_->seen_edge(prepared.lobe, query.p, *draw.node, draw.lane);
   if (!edge.is_seen()) return std::nullopt;
-  EdgeSample sample{draw.edge(), edge.sample_t(u_t), draw.probability, 0};
+  EdgeSample sample{id, edge.sample_t(u_t), draw.probability, 0};
+  mesh.fetch_ends(id.edge);
   sample.pdf_t = edge.pdf_t(sample.t);
   // Nothing where the density is lost to rounding, on an edge that lies in the horizon.
   if (!(sample.pdf_t > 0)) return std::nullopt;
@@ -258,44 +287,6 @@ uint64_t EdgeForest::list_silhouettes(const Vec3d& p, std::vector<EdgeRef>& edge
   return tested;
 }
 
-// The edges of a query's own face lie in its plane: most others need no look at their mesh.
-class OwnEdges {
- public:
-  OwnEdges(const EdgeSamplerInput& input, const EdgeQuery& query, double extent)
-      : input_(input), query_(query), any_(query.face.shape.valid()) {
-    if (!any_) return;
-    plane_ = input.object(query.face.shape).plane(query.face.face);
-    // Far beyond rounding. Not tuned.
-    near_ = 0x1.0p-16 * (extent + length(query.p));
-  }
-  bool holds(const ListedEdge& edge) const {
-    return any_ && std::fabs(plane_.distance(edge.x0)) <= near_ &&
-           std::fabs(plane_.distance(edge.x1)) <= near_ && is_own_edge(input_, query_, edge.id);
-  }
-
- private:
-  const EdgeSamplerInput& input_;
-  const EdgeQuery& query_;
-  bool any_;
-  Plane plane_;
-  double near_ = 0;
-};
-
-// Brings a node's lines into the cache while others are looked at.
-static void prefetch(const Forest& forest, NodeId id) {
-  constexpr size_t kLine = 64;
-  const auto fetch = [](const void* node, size_t size) {
-    for (size_t i = 0; i < size; i += kLine) {
-      __builtin_prefetch(static_cast<const char*>(node) + i);
-    }
-  };
-  if (id < 0) {
-    fetch(&forest.edges[~id], sizeof(EdgeNode));
-  } else {
-    fetch(&forest.inner[id], sizeof(InnerNode));
-  }
-}
-
 bool EdgeForest::list_outlines(const EdgeQuery& query, const DirectionCone& directions,
                                std::vector<ListedEdge>& edges) const {
   const Forest& forest = impl_->forest;
@@ -311,7 +302,7 @@ bool EdgeForest::list_outlines(const EdgeQuery& query, const DirectionCone& dire
       const InnerNode& node = forest.inner[id];
       for (uint32_t lanes = bits(may_hold_outlines(node, cone)); lanes != 0; lanes &= lanes - 1) {
         stack.push_back(node.child[std::countr_zero(lanes)]);
-        prefetch(forest, stack.back());
+        forest.fetch(stack.back());
       }
       continue;
     }

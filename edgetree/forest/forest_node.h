@@ -80,6 +80,16 @@ struct Forest {
   // every node has one parent, every edge one lane, boxes hold what is below, rows are scaled.
   std::string validate(std::span<const EdgeMesh> objects) const;
 
+  // Brings the lines of a node into the cache.
+  void fetch(NodeId id) const {
+    const void* node = id < 0 ? static_cast<const void*>(&edges[~id]) : &inner[id];
+    const size_t size = id < 0 ? sizeof(EdgeNode) : sizeof(InnerNode);
+    constexpr size_t kLine = 64;
+    for (size_t i = 0; i < size; i += kLine) {
+      __builtin_prefetch(static_cast<const char*>(node) + i);
+    }
+  }
+
   uint32_t slot(EdgeRef id) const { return slots[id.object.index()][id.edge.index()]; }
   NodeHead& head(NodeId id) { return id < 0 ? edges[~id].head : inner[id].head; }
   const NodeHead& head(NodeId id) const { return id < 0 ? edges[~id].head : inner[id].head; }

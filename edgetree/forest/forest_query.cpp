@@ -2,8 +2,11 @@
 #include "edgetree/forest/forest_query.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
+
+#include "edgetree/light/radiance_means.h"
 
 namespace limn {
 namespace {
@@ -117,10 +120,7 @@ Floats brightness(const ForestQuery& query, const Floats3& d, const Floats3& hal
   Floats sum = splat(0.0f);
   if (query.lights) sum = query.lights->mean_over_boxes(d, half);
   if (!query.environment) return sum;
-  for (int lane = 0; lane < kWidth; ++lane) {
-    if (!alive[lane]) continue;
-    sum[lane] += query.environment->mean(d.x[lane], d.y[lane], d.z[lane], tangent[lane]);
-  }
+  sum += select(alive, means(*query.environment, d, tangent), splat(0.0f));
   // Where the environment is dark, edges still jump against the objects that it lights.
   return sum + kScattered * query.environment->mean();
 }
@@ -207,10 +207,13 @@ static void split(const Vec3d& p, float unit, float (&parts)[2][3]) {
   }
 }
 
-ForestQuery::ForestQuery(const Forest& forest, const LightClusters* clusters,
+ForestQuery::ForestQuery(const Forest& tree, const LightClusters* clusters,
                          const RadiancePyramid* pyramid, const EdgeQuery& query,
                          const Lanes& lane_scale)
-    : point(point_of(forest, query.p)), lobe(query.lobe, query.n, query.wi), environment(pyramid) {
+    : forest(tree),
+      point(point_of(forest, query.p)),
+      lobe(query.lobe, query.n, query.wi),
+      environment(pyramid) {
   if (clusters) lights.emplace(*clusters, query.p);
   for (int k = 0; k < 3; ++k) n[k] = static_cast<float>(query.n[k]);
   unit = unit_of(forest, query.p);
@@ -318,6 +321,9 @@ ChildWeights weigh_children(const InnerNode& node, const ForestQuery& query, boo
   Floats speed = query.speed + node.speed;
   if (query.turn > 0) speed = speed + query.turn / node.head.inverse_radius * sqrt(distance2);
   alive &= speed > 0;
+  // What a look ahead reads comes in while light is weighed.
+  for (uint32_t lanes = bits(alive) & node.ahead; lanes != 0; lanes &= lanes - 1)
+    query.forest.fetch(node.child[std::countr_zero(lanes)]);
   const Floats rest = speed / distance2 * light_through(query, d, half, distance2, alive);
   return {length, select(alive, max(rest, splat(kLeast)), splat(0.0f))};
 }

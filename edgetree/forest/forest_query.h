@@ -23,6 +23,7 @@ struct ForestQuery {
   // lights, environment: null if they are not to weigh.
   ForestQuery(const Forest& forest, const LightClusters* lights, const RadiancePyramid* environment,
               const EdgeQuery& query, const Lanes& lane_scale);
+  const Forest& forest;
   ForestPoint point;
   LtcLobe lobe;
   std::optional<LightCones> lights;

@@ -1,8 +1,9 @@
 // Means of an environment over cones, by an octahedral pyramid.
 #include "limn/edgetree/radiance_pyramid.h"
 
-#include <algorithm>
 #include <cmath>
+
+#include "edgetree/light/radiance_means.h"
 
 namespace limn {
 namespace {
@@ -19,7 +20,7 @@ Vec3d octahedral_direction(double u, double v) {
 
 RadiancePyramid::RadiancePyramid(const std::function<double(const Vec3d&)>& luminance, int levels,
                                  int samples)
-    : levels_(levels), texels_(levels + 1) {
+    : levels_(levels), texels_(((size_t{4} << 2 * levels) - 1) / 3) {
   const int size = 1 << levels;
   std::vector<double> sums(static_cast<size_t>(size) * size);
   std::vector<double> weights(sums.size());
@@ -38,9 +39,9 @@ RadiancePyramid::RadiancePyramid(const std::function<double(const Vec3d&)>& lumi
   }
   for (int level = levels;; --level) {
     const int width = 1 << level;
-    texels_[level].resize(sums.size());
+    const size_t first = ((size_t{1} << 2 * level) - 1) / 3;
     for (size_t i = 0; i < sums.size(); ++i) {
-      texels_[level][i] = static_cast<float>(sums[i] / weights[i]);
+      texels_[first + i] = static_cast<float>(sums[i] / weights[i]);
     }
     if (level == 0) return;
     std::vector<double> coarse_sums(sums.size() / 4);
@@ -59,30 +60,45 @@ RadiancePyramid::RadiancePyramid(const std::function<double(const Vec3d&)>& lumi
 }
 
 float RadiancePyramid::mean(float dx, float dy, float dz, float tangent) const {
+  return means(*this, {splat(dx), splat(dy), splat(dz)}, splat(tangent))[0];
+}
+
+namespace {
+
+Floats with_sign_of(Floats magnitude, Floats sign) {
+  return (Floats)(((Ints)magnitude & INT32_MAX) | ((Ints)sign & INT32_MIN));
+}
+
+Floats gather(const float* texels, Ints index) {
+  Floats result;
+  for (int i = 0; i < kWidth; ++i) result[i] = texels[index[i]];
+  return result;
+}
+
+}  // namespace
+
+Floats means(const RadiancePyramid& pyramid, const Floats3& d, Floats tangent) {
   // 4^l texels share 4 pi: a texel of level l has the solid angle of a cone of tangent 2 * 2^-l.
-  int level = 0;
-  std::frexp(1.41f / std::max(tangent, 1e-6f), &level);
-  level = std::clamp(level, 0, levels_);
-  const float inverse = 1 / (std::fabs(dx) + std::fabs(dy) + std::fabs(dz));
-  float u = dx * inverse;
-  float v = dy * inverse;
-  if (dz < 0) {
-    const float folded = std::copysign(1 - std::fabs(v), u);
-    v = std::copysign(1 - std::fabs(u), v);
-    u = folded;
-  }
-  const int size = 1 << level;
-  const float x = std::clamp((u + 1) * 0.5f * size - 0.5f, 0.0f, size - 1.0f);
-  const float y = std::clamp((v + 1) * 0.5f * size - 0.5f, 0.0f, size - 1.0f);
-  const int x0 = static_cast<int>(x);
-  const int y0 = static_cast<int>(y);
-  const int x1 = std::min(x0 + 1, size - 1);
-  const int y1 = std::min(y0 + 1, size - 1);
-  const float fx = x - x0;
-  const float fy = y - y0;
-  const std::vector<float>& t = texels_[level];
-  const float top = t[y0 * size + x0] * (1 - fx) + t[y0 * size + x1] * fx;
-  const float bottom = t[y1 * size + x0] * (1 - fx) + t[y1 * size + x1] * fx;
+  const Floats ratio = 1.41f / max(tangent, splat(1e-6f));
+  Ints level = ((Ints)ratio >> 23) - 126;  // its exponent
+  level = level > 0 ? level : Ints{};
+  level = level < pyramid.levels() ? level : Ints{} + pyramid.levels();
+  const Floats inverse = 1 / (abs(d.x) + abs(d.y) + abs(d.z));
+  const Floats u = d.x * inverse, v = d.y * inverse;
+  const Floats u_folded = with_sign_of(1 - abs(v), u), v_folded = with_sign_of(1 - abs(u), v);
+  const Ints below = d.z < 0;
+  const Ints one = Ints{} + 1, size = one << level;
+  const Floats width = to_float(size), zero = splat(0.0f);
+  const Floats x = clamp((select(below, u_folded, u) + 1) * 0.5f * width - 0.5f, zero, width - 1);
+  const Floats y = clamp((select(below, v_folded, v) + 1) * 0.5f * width - 0.5f, zero, width - 1);
+  const Ints x0 = __builtin_convertvector(x, Ints), y0 = __builtin_convertvector(y, Ints);
+  const Ints x1 = x0 + 1 < size ? x0 + 1 : x0, y1 = y0 + 1 < size ? y0 + 1 : y0;
+  const Floats fx = x - to_float(x0), fy = y - to_float(y0);
+  const Ints first = ((one << 2 * level) - 1) & 0x55555555;  // (4^level - 1) / 3
+  const Ints row0 = first + (y0 << level), row1 = first + (y1 << level);
+  const float* t = pyramid.texels().data();
+  const Floats top = gather(t, row0 + x0) * (1 - fx) + gather(t, row0 + x1) * fx;
+  const Floats bottom = gather(t, row1 + x0) * (1 - fx) + gather(t, row1 + x1) * fx;
   return top * (1 - fy) + bottom * fy;
 }
 

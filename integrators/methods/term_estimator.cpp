@@ -49,9 +49,15 @@ DirectionField turning_about_axes(const Lanes& steps, int lanes) {
 
 std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler) {
   std::vector<const TermType*> types;
+  bool (*asked)(const Scene&) = nullptr;  // looks at the whole environment: once for rows alike
+  bool applies = false;
   for (const TermType& type : term_types()) {
     if (type.regions && !sampler.regions) continue;
-    if (type.applies(scene)) types.push_back(&type);
+    if (type.applies != asked) {
+      asked = type.applies;
+      applies = asked(scene);
+    }
+    if (applies) types.push_back(&type);
   }
   return types;
 }

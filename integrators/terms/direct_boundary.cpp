@@ -137,10 +137,20 @@ void DirectTerm::add_drawn(const PathVertex& vertex, const EdgeQuery& query, int
   }
   Rng rng = vertex.key.at(Purpose::kDirect, vertex.bounces);
   const double offset = rng.uniform();
+  // The piece of each point; what is read of its edge comes in while the points before are met.
+  static thread_local std::vector<size_t> chosen;
+  chosen.clear();
   size_t i = 0;
   for (int j = 0; j < points; ++j) {
     const double target = (j + offset) / points * total;
     while (i + 1 < drawn.size() && drawn[i].sum <= target) ++i;
+    chosen.push_back(i);
+    const EdgeRef edge = drawn[i].piece.edge;
+    edges_.object(edge.object).fetch_ends(edge.edge);
+  }
+  for (int j = 0; j < points; ++j) {
+    const double target = (j + offset) / points * total;
+    i = chosen[j];
     const double before = i == 0 ? 0 : drawn[i - 1].sum, weight = drawn[i].sum - before;
     const double u = std::clamp((target - before) / weight, 0.0, 1.0);
     add_point(vertex, query, drawn[i], u, weight / total * kPoints, cost, sum);

@@ -37,6 +37,19 @@ bool hides(const Scene& scene, const FaceSide& a, double slope_a, const FaceSide
   return slope_a < slope_b;
 }
 
+// Bring what nearest_faces reads into the cache: which corners faces have, and where these lie.
+void fetch_faces(const Scene& scene, const FacesAround& around) {
+  for (const FaceRef face : around.faces) {
+    __builtin_prefetch(&scene.shape(face.shape).mesh.face(face.face));
+  }
+}
+void fetch_corners(const Scene& scene, const FacesAround& around) {
+  for (const FaceRef face : around.faces) {
+    const Mesh& mesh = scene.shape(face.shape).mesh;
+    for (const uint32_t vertex : mesh.face(face.face)) __builtin_prefetch(&mesh.positions[vertex]);
+  }
+}
+
 // In the plane across the edge, a face leaves the edge along the unit vector a = alpha m + beta w,
 // with m the normal of the viewing plane through the edge and w the part of omega across the edge:
 // it lies on the side of alpha's sign, and the smaller beta / |alpha|, the nearer it is.
@@ -83,6 +96,7 @@ bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView&
   ray.t_max = t_max;
   ray.start = start;
   const FacesAround around = mesh.around(view.id.edge);
+  fetch_faces(context.scene, around);
   ray.skip_faces = around.faces;
   if (part.region) {
     const auto lamp = part.regions->flat_faces(*part.region);
@@ -90,6 +104,7 @@ bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView&
     if (std::all_of(around.faces.begin(), around.faces.end(), is_of_lamp)) ray.skip_faces = lamp;
   }
   ray.skip_emitters = bounces == 0 && context.scene.hide_emitters;
+  fetch_corners(context.scene, around);  // while the ray is traced
   Hit behind;
   ++rays.closest;
   const bool found = context.tracer.closest(ray, behind);

@@ -98,7 +98,7 @@ class PathTracer {
     Rgb<S> throughput = grey(S(1.0));
     PathStep step;
     for (;; ++bounces) {
-      if (c_.scene.max_depth >= 0 && bounces + 1 >= c_.scene.max_depth) return radiance;
+      if (is_complete(bounces)) return radiance;
       const Scattering<S> scattering(surface, wi, c_.scene.shading);
       if (scattering.black()) return radiance;
       const DirectionMotion* motion = motion_at(surface, bounces);
@@ -115,8 +115,11 @@ class PathTracer {
       add_score(scattering, *wo, motion, value(throughput) * (1 / pdf));
       throughput = throughput * f * (1 / pdf);
       step = {value(surface.p), pdf};
+      // Behind the last scattering only what emits counts.
+      const bool last = is_complete(bounces + 1), shapes_emit = c_.lights.on_shapes();
+      if (last && !shapes_emit && !c_.scene.environment) return radiance;
       Hit hit;
-      const bool found = next_hit(surface, *wo, edge, hit);
+      const bool found = next_hit(surface, *wo, edge, last && !shapes_emit, hit);
       if (!found) {
         if (!c_.scene.environment) return radiance;
         auto sight = c_.lights.template environment<S>(*wo);
@@ -124,6 +127,7 @@ class PathTracer {
         radiance += throughput * sight.radiance * mis_weight(pdf, sight.pdf);
         return radiance;
       }
+      if (last && !(shapes_emit && c_.scene.shape(hit.face.shape).is_emitter)) return radiance;
       if (hit.t > 0) {
         surface = surface_on_ray<S>(c_.scene, hit.face, surface.p, direction);
         edge = nullptr;
@@ -137,6 +141,10 @@ class PathTracer {
   }
 
  private:
+  // Whether a path that has scattered so often scatters no more.
+  bool is_complete(int bounces) const {
+    return c_.scene.max_depth >= 0 && bounces + 1 >= c_.scene.max_depth;
+  }
   const DirectionMotion* motion_at(const SurfacePoint<S>& surface, int bounces) {
     if constexpr (std::is_same_v<S, Dual>) {
       if (bounces > 0 || !field_) return nullptr;
@@ -186,7 +194,9 @@ class PathTracer {
   }
 
   // The next surface from a path vertex; hit.t = 0 for a neighbour that blocks at the edge itself.
-  bool next_hit(const SurfacePoint<S>& surface, const Vec3d& wo, EdgeStart* edge, Hit& hit) {
+  // any: whether there is one suffices, and which is not said.
+  bool next_hit(const SurfacePoint<S>& surface, const Vec3d& wo, EdgeStart* edge, bool any,
+                Hit& hit) {
     Ray ray{value(surface.p), wo};
     ray.start = surface.face;
     if (edge) {
@@ -198,7 +208,7 @@ class PathTracer {
       ray.skip_faces = edge->around.faces;
     }
     ++rays_.closest;
-    return c_.tracer.closest(ray, hit);
+    return any ? c_.tracer.occluded(ray) : c_.tracer.closest(ray, hit);
   }
 
   void move_along_edge(SurfacePoint<S>& surface, FaceRef face) const {

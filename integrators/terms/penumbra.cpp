@@ -2,6 +2,7 @@
 #include "integrators/terms/penumbra.h"
 
 #include <algorithm>
+#include <bit>
 
 #include "integrators/terms/film_point.h"
 #include "integrators/terms/light_regions.h"
@@ -19,25 +20,52 @@ LampEdges::LampEdges(const Scene& scene, const EdgeSamplerInput& edges, const Li
     bounds.extend(b.upper);
   }
   reach_ = bounds.diagonal();
+  list(regions);
+}
+
+void LampEdges::list(const LightRegions& regions) {
+  size_t blocks = 0;
+  for (const EdgeMesh& object : edges_.objects) {
+    first_block_.push_back(blocks);
+    blocks += object.edges.size() / 64 + 1;
+  }
   std::vector<Weight> weights;
   for (size_t k = 0; k < regions.size(); ++k) {
     sights_.push_back(sight_of(regions, k));
     lamps_.push_back(regions.shape(k));
     if (!sights_.back().listed) continue;
-    for (uint32_t o = 0; o < edges_.objects.size(); ++o) {
-      for (uint32_t e = 0; e < edges_.objects[o].edges.size(); ++e) {
-        const EdgeRef edge{ShapeId(o), EdgeId(e)};
-        const auto weight = weigh(k, edge);
-        if (!weight) continue;
-        listed_.push_back({edge, static_cast<uint32_t>(k)});
-        weights.push_back(*weight);
-        length_ += weight->length;
-        swept_ += weight->speed * weight->length;
-      }
-    }
+    sights_.back().first_block = blocks_.size();
+    blocks_.resize(blocks_.size() + blocks);
+    for (uint32_t o = 0; o < edges_.objects.size(); ++o) list_object(k, ShapeId(o), weights);
   }
   double sum = 0;
-  for (const Weight& weight : weights) cumulative_.push_back(sum += share_of(weight));
+  for (size_t i = 0; i < listed_.size(); ++i) {
+    listed_[i].probability = share_of(weights[i]);
+    cumulative_.push_back(sum += listed_[i].probability);
+  }
+  uint32_t found = 0;
+  for (size_t i = 0; i < listed_.size(); ++i) {
+    const double target = static_cast<double>(i) / static_cast<double>(listed_.size()) * sum;
+    while (found + 1 < listed_.size() && cumulative_[found] <= target) ++found;
+    guide_.push_back(found);
+  }
+}
+
+void LampEdges::list_object(size_t k, ShapeId object, std::vector<Weight>& weights) {
+  const size_t count = edges_.object(object).edges.size();
+  Block* block = &blocks_[sights_[k].first_block + first_block_[object.index()]];
+  block->before = static_cast<uint32_t>(listed_.size());
+  for (uint32_t e = 0; e < count; ++e) {
+    if (e > 0 && e % 64 == 0) (++block)->before = static_cast<uint32_t>(listed_.size());
+    const EdgeRef edge{object, EdgeId(e)};
+    const auto weight = weigh(k, edge);
+    if (!weight) continue;
+    block->listed |= uint64_t{1} << e % 64;
+    listed_.push_back({edge, static_cast<uint32_t>(k), 0});
+    weights.push_back(*weight);
+    length_ += weight->length;
+    swept_ += weight->speed * weight->length;
+  }
 }
 
 LampEdges::Sight LampEdges::sight_of(const LightRegions& regions, size_t k) const {
@@ -111,16 +139,22 @@ double LampEdges::share_of(const Weight& weight) const {
 }
 
 LampEdges::Drawn LampEdges::draw(double u) const {
-  const auto found =
-      std::upper_bound(cumulative_.begin(), cumulative_.end(), u * cumulative_.back());
-  const size_t i = std::min<size_t>(found - cumulative_.begin(), listed_.size() - 1);
-  return {listed_[i].edge, listed_[i].region, probability(listed_[i].region, listed_[i].edge)};
+  const double target = u * cumulative_.back();
+  const size_t last = listed_.size() - 1;
+  size_t i = guide_[std::min(static_cast<size_t>(u * static_cast<double>(listed_.size())), last)];
+  // The first whose sum is larger; rounding may start the search behind it.
+  while (i > 0 && cumulative_[i - 1] > target) --i;
+  while (i < last && cumulative_[i] <= target) ++i;
+  return listed_[i];
 }
 
 double LampEdges::probability(size_t k, EdgeRef edge) const {
   if (!sights_[k].listed) return 0;
-  const auto weight = weigh(k, edge);
-  return weight ? share_of(*weight) : 0;
+  const uint32_t e = edge.edge.index();
+  const Block& block = blocks_[sights_[k].first_block + first_block_[edge.object.index()] + e / 64];
+  const uint64_t bit = uint64_t{1} << e % 64;
+  if (!(block.listed & bit)) return 0;
+  return listed_[block.before + std::popcount(block.listed & (bit - 1))].probability;
 }
 
 PenumbraShare penumbra_share(const Scene& scene, const EdgeSamplerInput& edges,

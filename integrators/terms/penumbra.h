@@ -43,15 +43,19 @@ class LampEdges {
     double radius = 0;  // around the center; at infinity the sine of the angle
     double light = 0;   // luminance times area; at infinity times solid angle
     bool listed = false;
+    size_t first_block = 0;  // of its edges, if they are listed
   };
   struct Weight {
     double length = 0;  // times light
     Lanes speed;        // of its shadow, per length
   };
-  struct Listed {
-    EdgeRef edge;
-    uint32_t region;
+  // 64 edges of one object before one region: which of them are listed, and how many come before.
+  struct Block {
+    uint64_t listed = 0;
+    uint32_t before = 0;
   };
+  void list(const LightRegions& regions);
+  void list_object(size_t k, ShapeId object, std::vector<Weight>& weights);
   Sight sight_of(const LightRegions& regions, size_t k) const;
   std::optional<Weight> weigh(size_t k, EdgeRef edge) const;
   double share_of(const Weight& weight) const;
@@ -61,9 +65,14 @@ class LampEdges {
   double reach_ = 0;  // the scene's diagonal
   std::vector<Sight> sights_;
   std::vector<ShapeId> lamps_;  // of the regions; none of patches
-  std::vector<Listed> listed_;
+  // In the order of regions, objects and edges, so that a few bits per edge find them again: to
+  // weigh an edge anew would fetch ten lines of the mesh.
+  std::vector<Drawn> listed_;
+  std::vector<Block> blocks_;
+  std::vector<size_t> first_block_;  // of each object, behind its region's first
   std::vector<double> cumulative_;
-  double length_ = 0;  // of all weights
+  std::vector<uint32_t> guide_;  // where draws of u in [i, i + 1) / size() start to look
+  double length_ = 0;            // of all weights
   Lanes swept_;
 };
 

@@ -282,7 +282,7 @@ void ShadowTerm::add_sample(const PathVertex& vertex, Rng rng, TermCost& cost,
   const double distance = length(point->x - q);
   const Vec3d omega = (point->x - q) / distance;
   const bool apart = distance > 0 && point->face != vertex.surface.face;
-  const Rgb<double> f = apart ? value(vertex.scattering.eval(omega)) : Rgb<double>{};
+  const Rgb<double> f = apart ? vertex.scattering.eval_value(omega) : Rgb<double>{};
   if (is_black(f)) {
     ++cost.zero_weight;
     return;

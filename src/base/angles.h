@@ -1,7 +1,9 @@
 #pragma once
 // Angles from vectors and back, for the inner loops: a few units in the last place from the maths
 // library, which spends several times as long on arguments that never occur here.
+#include <bit>
 #include <cmath>
+#include <cstdint>
 
 #include "limn/core/dual.h"
 
@@ -15,6 +17,19 @@ inline double polynomial(const double (&coefficients)[N], double t) {
   return sum;
 }
 
+namespace detail {
+// Two numbers, of which the second does not matter: a choice between vectors is never made by a
+// branch, which for random directions is guessed wrongly every other time.
+using Pair [[gnu::vector_size(16)]] = double;
+using Bits [[gnu::vector_size(16)]] = int64_t;
+}  // namespace detail
+
+// a > b ? more : other, without a branch.
+inline double choose_above(double a, double b, double more, double other) {
+  using detail::Pair;
+  return (Pair{a} > Pair{b} ? Pair{more} : Pair{other})[0];
+}
+
 // atan2(y, x), finite and not both 0 (then 0); in [-pi, pi], without branches.
 inline double angle_of(double y, double x) {
   // (atan(z) / z - 1) / z^2 in z^2 up to tan(pi / 8)^2, at Chebyshev's nodes: 7e-18 off.
@@ -24,16 +39,16 @@ inline double angle_of(double y, double x) {
                               0x1.41603647c7a7cp-5,  -0x1.3a2b7a07caea9p-6};
   constexpr double kTanEighth = 0.41421356237309505;
   const double ax = std::fabs(x), ay = std::fabs(y);
-  const double large = ax > ay ? ax : ay, small = ax > ay ? ay : ax;
-  // atan(q) = pi / 4 + atan((q - 1) / (q + 1)).
-  const bool turned = small > kTanEighth * large;
-  const double numerator = turned ? small - large : small;
-  const double denominator = turned ? small + large : large;
+  const double large = choose_above(ax, ay, ax, ay), small = choose_above(ax, ay, ay, ax);
+  // atan(q) = pi / 4 + atan((q - 1) / (q + 1)), beyond this.
+  const double limit = kTanEighth * large;
+  const double numerator = choose_above(small, limit, small - large, small);
+  const double denominator = choose_above(small, limit, small + large, large);
   const double z = denominator > 0 ? numerator / denominator : 0;
   const double z2 = z * z;
-  double angle = (turned ? kPi / 4 : 0) + (z + z * (z2 * polynomial(kAtan, z2)));
-  angle = ay > ax ? kPi / 2 - angle : angle;
-  angle = std::signbit(x) ? kPi - angle : angle;
+  double angle = choose_above(small, limit, kPi / 4, 0) + (z + z * (z2 * polynomial(kAtan, z2)));
+  angle = choose_above(ay, ax, kPi / 2 - angle, angle);
+  angle = choose_above(0, std::copysign(1.0, x), kPi - angle, angle);
   return std::copysign(angle, y);
 }
 inline Dual angle_of(const Dual& y, const Dual& x) {
@@ -56,8 +71,12 @@ inline SinCos sin_cos_of_turns(double turns) {
   const int quarter = static_cast<int>(4 * turns + 0.5);
   const double r = turns - 0.25 * quarter, r2 = r * r;
   const double s = r * polynomial(kSin, r2), c = polynomial(kCos, r2);
-  const double sin = quarter & 1 ? c : s, cos = quarter & 1 ? s : c;
-  return {quarter & 2 ? -sin : sin, (quarter + 1) & 2 ? -cos : cos};
+  const int64_t odd = -int64_t{quarter & 1};
+  detail::Pair both = detail::Bits{odd, odd} ? detail::Pair{c, s} : detail::Pair{s, c};
+  both = std::bit_cast<detail::Pair>(
+      std::bit_cast<detail::Bits>(both) ^
+      detail::Bits{int64_t{quarter & 2} << 62, int64_t{(quarter + 1) & 2} << 62});
+  return {both[0], both[1]};
 }
 
 }  // namespace limn

@@ -130,12 +130,18 @@ Rgb<S> RoughConductor::evaluate(const Reflection<S>& r) const {
                : microfacet::beckmann_g1_over_cos(r.cos_i, a) *
                      microfacet::beckmann_g1_over_cos(r.cos_o, a);
   const S common = r.d * masking * r.cos_o * 0.25;
-  // Arrays of four, so that plain numbers are worked on side by side.
-  const double eta[4] = {eta_.r, eta_.g, eta_.b, 1}, k[4] = {k_.r, k_.g, k_.b, 1};
-  S f[4];
-  constexpr int kChannels = std::is_same_v<S, double> ? 4 : 3;
-  for (int i = 0; i < kChannels; ++i) f[i] = microfacet::fresnel_conductor(r.cos_h, eta[i], k[i]);
-  return as<S>(specular_reflectance_) * Rgb<S>{f[0], f[1], f[2]} * common;
+  if constexpr (std::is_same_v<S, double>) {
+    // Arrays of four, so that plain numbers are worked on side by side.
+    const double eta[4] = {eta_.r, eta_.g, eta_.b, 1}, k[4] = {k_.r, k_.g, k_.b, 1};
+    double f[4];
+    for (int i = 0; i < 4; ++i) f[i] = microfacet::fresnel_conductor(r.cos_h, eta[i], k[i]);
+    return value(specular_reflectance_) * Rgb<double>{f[0], f[1], f[2]} * common;
+  } else {
+    const Rgb<S> f{microfacet::fresnel_conductor(r.cos_h, eta_.r, k_.r),
+                   microfacet::fresnel_conductor(r.cos_h, eta_.g, k_.g),
+                   microfacet::fresnel_conductor(r.cos_h, eta_.b, k_.b)};
+    return as<S>(specular_reflectance_) * f * common;
+  }
 }
 
 // Visible normals have the density D G1(wi) (wi.h) / cos_i per solid angle of h, and reflection

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "limn/core/vec.h"
+#include "src/base/angles.h"
 
 namespace limn {
 namespace {
@@ -194,14 +195,11 @@ class MapDensity::Builder {
               static_cast<uint32_t>(x),
               static_cast<uint32_t>(y),
               static_cast<uint32_t>(log),
-              0,
-              0};
+              {}};
     if (x < d_.width_ && y + 1 < d_.height_) {
       const Patch p = d_.patch(x, y, log);
       const Fit f = fit(p);
       const double azimuth = 2 * kPi / d_.width_;
-      leaf.top = d_.cos_theta_[p.y0];
-      leaf.bottom = d_.cos_theta_[p.y1];
       leaf.corners = f.corners;
       leaf.scale =
           static_cast<float>(f.mass * azimuth * 4 / (d_.solid_angle(leaf) * sum_of(f.corners)));
@@ -242,7 +240,7 @@ const MapDensity::Leaf& MapDensity::leaf(const Square& square, int column, int r
 
 double MapDensity::solid_angle(const Leaf& leaf) const {
   const Patch p = patch(leaf.column, leaf.row, leaf.log);
-  return (leaf.top - leaf.bottom) * (p.x1 - p.x0) * (2 * kPi / width_);
+  return (cos_theta_[p.y0] - cos_theta_[p.y1]) * (p.x1 - p.x0) * (2 * kPi / width_);
 }
 
 double MapDensity::mass(const Leaf& leaf) const {
@@ -251,7 +249,6 @@ double MapDensity::mass(const Leaf& leaf) const {
 }
 
 void MapDensity::build_aliases() {
-  slots_.resize(leaves_.size());
   std::vector<double> block_weights;
   double total = 0;
   for (const Block& block : blocks_) {
@@ -261,18 +258,20 @@ void MapDensity::build_aliases() {
       weights.push_back(mass(leaves_[block.first + i]));
       sum += weights.back();
     }
-    fill_slots(weights, sum, &slots_[block.first]);
+    const std::vector<Slot> slots = make_slots(weights, sum);
+    for (uint32_t i = 0; i < block.count; ++i) leaves_[block.first + i].slot = slots[i];
     block_weights.push_back(sum);
     total += sum;
   }
   inverse_total_ = 1 / total;
-  block_slots_.resize(blocks_.size());
-  fill_slots(block_weights, total, block_slots_.data());
+  block_slots_ = make_slots(block_weights, total);
 }
 
 // Vose 1991, "A linear algorithm for generating random numbers with a given distribution".
-void MapDensity::fill_slots(std::span<const double> weights, double total, Slot* slots) {
+std::vector<MapDensity::Slot> MapDensity::make_slots(std::span<const double> weights,
+                                                     double total) {
   const auto count = static_cast<uint32_t>(weights.size());
+  std::vector<Slot> slots(count);
   std::vector<double> filled(count);
   std::vector<uint32_t> small, large;
   for (uint32_t i = 0; i < count; ++i) {
@@ -295,31 +294,35 @@ void MapDensity::fill_slots(std::span<const double> weights, double total, Slot*
   for (const auto* rest : {&small, &large}) {
     for (const uint32_t i : *rest) slots[i] = {1, i};
   }
+  return slots;
 }
 
-uint32_t MapDensity::choose(const Slot* slots, uint32_t count, double& u) {
+template <class SlotOf>
+uint32_t MapDensity::choose(SlotOf slot_of, uint32_t count, double& u) {
   const double place = u * count;
   const uint32_t index = std::min(static_cast<uint32_t>(place), count - 1);
-  const Slot slot = slots[index];
+  const Slot slot = slot_of(index);
   u = place - index;
-  if (u < slot.share) {
-    u /= slot.share;
-    return index;
-  }
-  u = (u - slot.share) / (1 - slot.share);
-  return slot.alias;
+  // Without branches, which would be guessed wrongly every other time.
+  const double share = slot.share, from = choose_above(share, u, 0, share);
+  const uint32_t chosen[2] = {slot.alias, index};
+  const uint32_t item = chosen[u < share];
+  u = (u - from) / choose_above(share, u, share, 1 - slot.share);
+  return item;
 }
 
 MapDensity::Drawn MapDensity::sample(double u1, double u2) const {
-  const uint32_t b = choose(block_slots_.data(), static_cast<uint32_t>(blocks_.size()), u1);
+  const uint32_t b = choose([&](uint32_t i) { return block_slots_[i]; },
+                            static_cast<uint32_t>(blocks_.size()), u1);
   const Block block = blocks_[b];
-  const Leaf& leaf = leaves_[block.first + choose(&slots_[block.first], block.count, u1)];
+  const Leaf* leaves = &leaves_[block.first];
+  const Leaf& leaf = leaves[choose([&](uint32_t i) { return leaves[i].slot; }, block.count, u1)];
   const Patch p = patch(leaf.column, leaf.row, leaf.log);
   const Corners& c = leaf.corners;
   const double t = sample_linear(c[0] + c[1], c[2] + c[3], u1);
   const double left = mix(c[0], c[2], t), right = mix(c[1], c[3], t);
   const double s = sample_linear(left, right, u2);
-  return {p.x0 + s * (p.x1 - p.x0), mix(leaf.top, leaf.bottom, t),
+  return {p.x0 + s * (p.x1 - p.x0), mix(cos_theta_[p.y0], cos_theta_[p.y1], t),
           mix(left, right, s) * leaf.scale * inverse_total_};
 }
 
@@ -328,7 +331,8 @@ double MapDensity::pdf(int column, int row, double x, double cos_theta) const {
   const Leaf& l = leaf(s, column, row);
   const Patch p = patch(column, row, static_cast<int>(s.log));
   const double along = (x - p.x0) / (p.x1 - p.x0);
-  const double down = std::clamp((l.top - cos_theta) / (l.top - l.bottom), 0.0, 1.0);
+  const double top = cos_theta_[p.y0], bottom = cos_theta_[p.y1];
+  const double down = std::clamp((top - cos_theta) / (top - bottom), 0.0, 1.0);
   const Corners& c = l.corners;
   return mix(mix(c[0], c[1], along), mix(c[2], c[3], along), down) * l.scale * inverse_total_;
 }

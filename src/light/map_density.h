@@ -46,19 +46,20 @@ class MapDensity {
 
   using Corners = std::array<uint8_t, 4>;  // top left, top right, bottom left, bottom right
 
-  struct Leaf {
-    float scale;      // of `corners`, to the density before it is normalised
-    Corners corners;  // at least 1
-    uint32_t column;  // of its first cell
-    uint32_t row : 28;
-    uint32_t log : 4;    // of its side
-    double top, bottom;  // cos(theta) of its borders
-  };
   // One of as many equally likely slots as there are items: its first `share` belongs to the item
   // of the slot's own index, the rest to `alias`.
   struct Slot {
     float share = 1;
     uint32_t alias = 0;
+  };
+  // All that a draw reads of it, in one line of a cache mostly.
+  struct Leaf {
+    float scale;      // of `corners`, to the density before it is normalised
+    Corners corners;  // at least 1
+    uint32_t column;  // of its first cell
+    uint32_t row : 28;
+    uint32_t log : 4;  // of its side
+    Slot slot;         // of as many as its block has leaves; `alias` counts from the block's first
   };
   // The leaves of a block follow each other.
   struct Block {
@@ -83,16 +84,16 @@ class MapDensity {
   double solid_angle(const Leaf& leaf) const;  // [sr]
   double mass(const Leaf& leaf) const;         // its integral, before it is normalised
   void build_aliases();
-  static void fill_slots(std::span<const double> weights, double total, Slot* slots);
-  // The item that u chooses; u becomes uniform again.
-  static uint32_t choose(const Slot* slots, uint32_t count, double& u);
+  static std::vector<Slot> make_slots(std::span<const double> weights, double total);
+  // The item that u chooses; u becomes uniform again. slot_of: the slot of an index.
+  template <class SlotOf>
+  static uint32_t choose(SlotOf slot_of, uint32_t count, double& u);
   class Builder;
 
   int width_, height_, grid_width_;
   std::vector<double> cos_theta_;  // of each row of texels
   HugePageVector<Square> grid_;
   HugePageVector<Leaf> leaves_;
-  HugePageVector<Slot> slots_;  // of leaves within their block, as offsets from its first
   std::vector<Block> blocks_;
   std::vector<Slot> block_slots_;
   double inverse_total_ = 0;  // 1 / integral over the sphere of the density before it is normalised

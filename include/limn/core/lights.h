@@ -16,6 +16,8 @@ class Lights {
   explicit Lights(const Scene& scene);
 
   bool empty() const { return all_.empty(); }
+  // Whether any shape emits.
+  bool on_shapes() const { return !area_lights_.empty(); }
   std::span<const Light* const> all() const { return all_; }
 
   // None: a sample of value zero (see Light::sample).

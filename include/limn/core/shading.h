@@ -95,9 +95,31 @@ void interpolate_shading(const Mesh& mesh, S b1, S b2, SurfacePoint<S>& point) {
   point.horizon = interpolate(b0, b1, b2, h[0], h[1], h[2]);
 }
 
+// Brings what interpolate_shading reads into the cache, while the plane is still to be met.
+template <class S>
+void fetch_shading(const Mesh& mesh, FaceId face) {
+  const auto fetch = [](const auto& values, uint32_t i) {
+    const char* begin = reinterpret_cast<const char*>(&values[i]);
+    __builtin_prefetch(begin);
+    if (sizeof(values[i]) > 64) __builtin_prefetch(begin + sizeof(values[i]) - 1);
+  };
+  const FaceIndices& ids = mesh.normal_ids[face.index()];
+  const FaceIndices& vertices = mesh.face(face);
+  for (int k = 0; k < 3; ++k) {
+    fetch(mesh.normals, ids[k]);
+    fetch(mesh.horizon, vertices[k]);
+    if constexpr (!std::is_same_v<S, double>) {
+      if (!mesh.position_tangents.empty()) fetch(mesh.position_tangents, vertices[k]);
+      if (!mesh.normal_tangents.empty()) fetch(mesh.normal_tangents, ids[k]);
+      if (!mesh.horizon_tangents.empty()) fetch(mesh.horizon_tangents, vertices[k]);
+    }
+  }
+}
+
 template <class S, class P>
 void place_on_plane(const Mesh& mesh, const Vec3<S>& origin, const Vec3<S>& direction,
                     SurfacePoint<S>& point) {
+  if (mesh.normal_source != NormalSource::kFace) fetch_shading<S>(mesh, point.face.face);
   const auto corners = face_corners<P>(mesh, point.face.face);
   const Vec3<P> e1 = corners[1] - corners[0];
   const Vec3<P> e2 = corners[2] - corners[0];
@@ -180,6 +202,12 @@ class Scattering {
     const S factor = horizon_factor(wo);
     if (value(factor) == 0) return {};
     return bsdf_->eval(n_, wi_, w) * factor;
+  }
+  // The value of eval for a direction that is held, at the cost of plain numbers; to rounding.
+  Rgb<double> eval_value(const Vec3d& wo) const {
+    const double factor = limited_ ? value(horizon_factor(wo)) : 1.0;
+    if (factor == 0) return {};
+    return bsdf_->eval(value(n_), value(wi_), wo) * factor;
   }
   // The part of eval's derivative that comes from the motion of wo alone.
   Rgb<Lanes> eval_derivative(const Vec3<Dual>& wo) const {

@@ -108,6 +108,22 @@ struct EdgeMesh {
     if (incidences.empty()) return {faces, {}};
     return {faces, {&incidences[face_offsets[id.index()]], faces.size()}};
   }
+  // For edges that are looked at soon: bring into the cache the edge itself; and once that is
+  // there, its ends and its faces.
+  void fetch_edge(EdgeId id) const {
+    __builtin_prefetch(&edges[id.index()]);
+    __builtin_prefetch(&face_offsets[id.index()]);
+  }
+  void fetch_ends(EdgeId id) const {
+    for (const VertexId vertex : edge(id).vertices) {
+      __builtin_prefetch(&positions[vertex.index()]);
+      if (tangents.empty()) continue;
+      const char* begin = reinterpret_cast<const char*>(&tangents[vertex.index()]);
+      __builtin_prefetch(begin);
+      __builtin_prefetch(begin + sizeof(Vec3<Lanes>) - 1);
+    }
+    __builtin_prefetch(incident_faces.data() + face_offsets[id.index()]);
+  }
   uint64_t count(EdgeClass edge_class) const;
   // The first of the above that does not hold, in words; empty if all of it does.
   std::string validate() const;

@@ -2,6 +2,7 @@
 // How bright an environment is on average over cones of directions: an importance for edges seen
 // before it.
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "limn/core/vec.h"
@@ -22,11 +23,15 @@ class RadiancePyramid {
   // are about as wide as the cone.
   float mean(float dx, float dy, float dz, float tangent) const;
   // Over the whole sphere.
-  float mean() const { return texels_.front().front(); }
+  float mean() const { return texels_.front(); }
+
+  int levels() const { return levels_; }
+  // Of all levels, the coarsest first: level l, 2^l by 2^l of them, begins at (4^l - 1) / 3.
+  std::span<const float> texels() const { return texels_; }
 
  private:
   int levels_;
-  std::vector<std::vector<float>> texels_;  // level l: 2^l by 2^l
+  std::vector<float> texels_;
 };
 
 }  // namespace limn
