@@ -153,8 +153,8 @@ void expect_agreement(const Scene& scene, int spp, const std::vector<std::string
 
 TEST(Backward, AgreesInMirrors) {
   const TempFiles files;
-  expect_agreement(mirror_scene(files, true), 64);
-  expect_agreement(mirror_scene(files, false), 64);
+  expect_agreement(mirror_scene(files, true), 32);
+  expect_agreement(mirror_scene(files, false), 32);
 }
 
 TEST(Backward, AgreesInSharpShadows) {
@@ -223,9 +223,11 @@ TEST(Backward, ThreadsChangeNoBit) {
   std::vector<std::vector<double>> all;
   for (const int threads : {1, 2, 7}) {
     RunSettings settings;
-    settings.spp = 70;  // more than one wave of tiles
+    settings.spp = 136;
     settings.threads = threads;
-    const BackwardResult result = backward(scene, adjoint, {}, settings);
+    BackwardOptions options;
+    options.batches = 2;  // each of more than one wave of tiles
+    const BackwardResult result = backward(scene, adjoint, options, settings);
     EXPECT_EQ(result.non_finite.count, 0u);
     std::vector<double> values;
     for (const ParameterAdjoint& p : result.parameters) {
