@@ -43,6 +43,9 @@ class BackwardCommand final : public Command {
     app.add_option("--camera-samples", options_.camera_samples,
                    "Points on silhouettes of the film, for each path")
         ->check(CLI::PositiveNumber);
+    app.add_option("--batches", options_.batches,
+                   "At most, for standard errors; each costs some time per vertex")
+        ->check(CLI::Range(1, 1 << 16));
     app.add_option("-o,--output", output_, "Folder to write (made if it is not there)")->required();
     app.add_flag("--stats", stats_, "Print edges, nodes, bytes, rays by kind, where the time went");
   }
