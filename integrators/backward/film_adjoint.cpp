@@ -1,5 +1,5 @@
-// Silhouettes and sharp shadows on the film: the jump of radiance, weighed by the adjoint there, pushes
-// the film position along the curve's normal.
+// Silhouettes and sharp shadows on the film: the jump of radiance, weighed by the adjoint there,
+// pushes the film position along the curve's normal.
 #include "integrators/backward/film_adjoint.h"
 
 #include "integrators/backward/path_adjoint.h"

@@ -25,9 +25,8 @@ struct PixelPath {
 
 class PixelChoice {
  public:
-  // adjoint: of the crop's pixels. uniform: all alike; else a quarter of the paths is spread evenly (0.1 in
-  // place of 0.25 was about as good in two scenes with mirrors) and the rest in proportion to the
-  // adjoint's magnitude, in strata along the rows.
+  // adjoint: of the crop's pixels. uniform: all alike; else a quarter of the paths (not tuned) is
+  // spread evenly and the rest in proportion to the adjoint's magnitude, in strata along the rows.
   PixelChoice(const std::vector<Rgb<double>>& adjoint, bool uniform);
 
   size_t paths(const PathBatch& batch) const { return cumulative_.size() * batch.count(); }

@@ -1,8 +1,8 @@
 #pragma once
 // The path tracer, written once for any scalar: double gives radiance, Dual gives radiance and the
-// interior term of its derivative, Var writes a tape of it. Sampled directions, their densities and MIS weights are
-// constants while the parameters move (solid-angle measure, everywhere), but for the one direction
-// of a light without extent, which follows the parameters.
+// interior term of its derivative, Var writes a tape of it. Sampled directions, their densities and
+// MIS weights are constants while the parameters move (solid-angle measure, everywhere), but for the
+// one direction of a light without extent, which follows the parameters.
 #include <atomic>
 #include <cstdint>
 

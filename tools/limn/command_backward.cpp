@@ -1,4 +1,4 @@
-// `limn backward`: from a loss, or its derivative for every pixel, to the derivative for every parameter.
+// `limn backward`: from a loss, or its derivative by pixels, to its derivative for every parameter.
 #include "limn/integrators/backward.h"
 
 #include <fmt/format.h>

@@ -101,8 +101,8 @@ struct LossResult {
 // Renders the scene twice with settings.spp samples per pixel each, with seeds of their own that are
 // derived from settings.seed. For l2 and relative-l2 the loss is the mean of w (I - T)(I' - T), and
 // the adjoint 2 w ((I + I') / 2 - T) / N has the mean of dLoss/dI; backward() with settings.seed
-// itself is independent of both, so that the product of both is unbiased. target: crop_height by crop_width, of three
-// channels or one. InputError for another size.
+// itself is independent of both, so that the product of both is unbiased. target: crop_height by
+// crop_width, of three channels or one. InputError for another size.
 LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
                       const RunSettings& settings);
 
