@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdio>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "limn/core/image.h"
@@ -12,6 +13,8 @@
 
 namespace limn {
 namespace {
+
+using nlohmann::json;
 
 struct Outcome {
   int status;
@@ -55,6 +58,30 @@ class Program : public testing::Test {
   TempFiles files_;
   std::string scene_;
 };
+
+// An array's files: a mesh, and a field that gradient takes.
+TEST_F(Program, BackwardWritesWhatOthersRead) {
+  const std::string target = out(), folder = files_.path("back");
+  ASSERT_EQ(run("render " + scene_ + " --spp 2 --quiet -D glow=5,5,5 -o " + target).status, 0);
+  const Outcome outcome = run("backward " + scene_ + " --spp 2 --target " + target +
+                              " --wrt screen.vertex_positions --wrt blaze.radiance -o " + folder);
+  ASSERT_EQ(outcome.status, 0) << outcome.text;
+  const json report = json::parse(std::ifstream(folder + "/gradient.json"));
+  ASSERT_EQ(report["parameters"].size(), 2u);
+  EXPECT_EQ(report["parameters"][0]["shape"], json({4, 3}));
+  EXPECT_GT(report["loss"]["value"], 0);
+  const std::string array = folder + "/screen.vertex_positions";
+  EXPECT_EQ(read_mesh(array + ".ply", true).positions.size(), 4u);
+  EXPECT_EQ(run("gradient " + scene_ + " --spp 1 --quiet --wrt screen.vertex_positions:" + array +
+                ".txt -o " + out())
+                .status,
+            0);
+  EXPECT_NE(refused("backward " + scene_ + " -o " + folder).find("--adjoint or --target"),
+            std::string::npos);
+  EXPECT_NE(refused("backward " + scene_ + " --adjoint " + target + " --terms sky -o " + folder)
+                .find("no term \"sky\""),
+            std::string::npos);
+}
 
 TEST_F(Program, WarnsOnce) {
   const std::string mesh = files_.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 2\n");
