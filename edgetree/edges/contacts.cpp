@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <tuple>
 
@@ -32,6 +33,22 @@ double size_of(const Mesh& mesh, FaceId face) {
   }
   return size;
 }
+
+// Of a face with area: its least height.
+double width_of(const Corners& corners) {
+  double longest = 0;
+  for (int k = 0; k < 3; ++k)
+    longest = std::max(longest, length_squared(corners[(k + 1) % 3] - corners[k]));
+  return length(cross(corners[1] - corners[0], corners[2] - corners[0])) / std::sqrt(longest);
+}
+
+// What the rounding of rays explains at distance D, and no more than this share of a width.
+constexpr double kNear = 0x1.0p-20, kMostNear = 0x1.0p-8;
+// Of an edge's length, what a face is near to at least.
+constexpr double kLeastNear = 1.0 / 16;
+// What is near to both sides of a face together, at its middle, makes it a needle; all that touches it
+// is off by no more than this share of its width, far beyond what rounding in double explains.
+constexpr double kMostTouch = 0x1.0p-20;
 
 // The part of the segment that lies in the triangle, seen along its normal; its sides are moved
 // outward by at least `margin`, at most sqrt(3) times that.
@@ -90,8 +107,10 @@ std::optional<Interval> common_part(const Segment& longer, const Segment& shorte
 }
 
 // V: whether the faces around a vertex form one closed fan that covers the directions around it once,
-// seen along their mean normal. No edge at such a vertex lies on another face at it.
-std::vector<bool> single_fans(const EdgeMesh& edges, const Mesh& mesh) {
+// seen along their mean normal, none of them a needle. No edge at such a vertex lies on another face
+// at it.
+std::vector<bool> single_fans(const EdgeMesh& edges, const Mesh& mesh,
+                              const std::vector<bool>& is_needle) {
   const size_t count = mesh.positions.size();
   std::vector<Vec3d> axes(count);
   std::vector<uint8_t> covers(count);
@@ -106,7 +125,7 @@ std::vector<bool> single_fans(const EdgeMesh& edges, const Mesh& mesh) {
       const auto to_corner = [&](int corner) {
         return cast<double>(mesh.positions[mesh.weld[mesh.faces[f][corner % 3]]]) - x;
       };
-      if (!(dot(edges.planes[f].n, axis) > 0)) single[v] = false;
+      if (!(dot(edges.planes[f].n, axis) > 0) || is_needle[f]) single[v] = false;
       const auto turn = [&](const Vec3d& a, const Vec3d& b) { return dot(axis, cross(a, b)); };
       const Vec3d reference =
           cross(axis, std::fabs(axis.x) < std::fabs(axis.y) ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0});
@@ -126,23 +145,33 @@ std::vector<bool> single_fans(const EdgeMesh& edges, const Mesh& mesh) {
 
 class ContactFinder {
  public:
-  ContactFinder(std::span<const EdgeMesh> objects, std::span<const Mesh* const> meshes, int threads)
-      : objects_(objects), meshes_(meshes), threads_(threads) {
+  ContactFinder(std::span<const EdgeMesh> objects, std::span<const Mesh* const> meshes,
+                const Vec3d& viewer, int threads)
+      : objects_(objects), meshes_(meshes), viewer_(viewer), threads_(threads) {
     collect_faces();
     collect_edges();
   }
 
-  std::vector<Contact> find() {
-    const std::vector<Pair> pairs = find_pairs();
-    if (pairs.empty()) return {};
-    list_edges_of_faces(pairs);
-    std::vector<Contact> contacts;
-    for (const Pair& pair : pairs) add_contacts(pair, contacts);
+  Contacts find() {
+    Contacts found;
+    std::vector<Pair> touching;
+    for (const Pair& pair : find_pairs()) {
+      if (pair.may_touch) touching.push_back(pair);
+      if (pair.is_near) found.near.push_back({pair.edge, pair.face});
+    }
+    std::sort(found.near.begin(), found.near.end(), [](const NearFace& a, const NearFace& b) {
+      return std::tuple(a.edge.object, a.edge.edge, a.face.shape, a.face.face) <
+             std::tuple(b.edge.object, b.edge.edge, b.face.shape, b.face.face);
+    });
+    if (touching.empty()) return found;
+    list_edges_of_faces(touching);
+    std::vector<Contact>& contacts = found.contacts;
+    for (const Pair& pair : touching) add_contacts(pair, contacts);
     std::sort(contacts.begin(), contacts.end(), [](const Contact& a, const Contact& b) {
       return std::tuple(a.edge.object, a.edge.edge, a.face.shape, a.face.face, a.t0) <
              std::tuple(b.edge.object, b.edge.edge, b.face.shape, b.face.face, b.t0);
     });
-    return contacts;
+    return found;
   }
 
  private:
@@ -150,6 +179,7 @@ class ContactFinder {
   struct Pair {
     EdgeRef edge;
     FaceRef face;
+    bool may_touch, is_near;
   };
 
   Segment segment(EdgeRef id) const {
@@ -168,6 +198,36 @@ class ContactFinder {
     const size_t object = id.object.index();
     return size_around(objects_[object], *meshes_[object], id.edge);
   }
+  // How far two things that touch may be apart: the tolerance, but for needles.
+  double tolerance(EdgeRef a, EdgeRef b) const {
+    return std::min({touch_tolerance(size(a), size(b)), most_touch(a), most_touch(b)});
+  }
+  double tolerance(EdgeRef edge, FaceRef face) const {
+    const double most = touch_tolerance(size(edge), size_of(*meshes_[face.shape.index()], face.face));
+    return std::min({most, most_touch(edge), most_touch(face)});
+  }
+  double most_touch(FaceRef face) const {
+    return most_touches_[first_face_[face.shape.index()] + face.face.index()];
+  }
+  double most_touch(EdgeRef id) const {
+    double most = std::numeric_limits<double>::infinity();
+    for (const FaceRef face : objects_[id.object.index()].faces_around(id.edge))
+      most = std::min(most, most_touch(face));
+    return most;
+  }
+  // How far rays from the viewer may miss points of the face.
+  double blur(FaceRef face) const {
+    double distance = size_of(*meshes_[face.shape.index()], face.face);
+    for (const Vec3d& x : corners(face)) distance = std::max(distance, length(x - viewer_));
+    return kNear * distance;
+  }
+  // Up to which distance faces are near to the edge, on its part, and to the face.
+  double reach(EdgeRef id, const Segment& s) const {
+    double reach = 0;
+    for (const FaceRef face : objects_[id.object.index()].faces_around(id.edge))
+      reach = std::max(reach, blur(face));
+    return std::min(reach, kMostNear * length(s.d));
+  }
 
   // All faces, with their boxes and those of their corners that may be passed over.
   void collect_faces() {
@@ -176,16 +236,29 @@ class ContactFinder {
       first_face_.push_back(static_cast<uint32_t>(faces_.size()));
       first_vertex_.push_back(first_vertex);
       const Mesh& mesh = *meshes_[o];
-      const std::vector<bool> single = single_fans(objects_[o], mesh);
-      for (uint32_t f = 0; f < objects_[o].planes.size(); ++f) {
+      const auto count = static_cast<uint32_t>(objects_[o].planes.size());
+      std::vector<bool> is_needle(count);
+      std::vector<double> reaches(count);
+      for (uint32_t f = 0; f < count; ++f) {
+        const FaceRef face{ShapeId(o), FaceId(f)};
+        const double width = width_of(this->corners(face)), blur = this->blur(face);
+        is_needle[f] = !(width * kLeastNear > blur);
+        most_touches_.push_back(is_needle[f] ? kMostTouch * width
+                                             : std::numeric_limits<double>::infinity());
+        reaches[f] = std::min(blur, kMostNear * width);
+      }
+      const std::vector<bool> single = single_fans(objects_[o], mesh, is_needle);
+      for (uint32_t f = 0; f < count; ++f) {
         faces_.push_back({ShapeId(o), FaceId(f)});
+        reaches_.push_back(reaches[f]);
         FaceIndices& corners = single_corners_.emplace_back();
         for (int k = 0; k < 3; ++k) {
           const uint32_t v = mesh.weld[mesh.faces[f][k]];
           corners[k] = single[v] ? first_vertex + v : UINT32_MAX;
         }
         const double tolerance = touch_tolerance(size_of(*meshes_[o], FaceId(f)), 0);
-        boxes_.push_back(box_of(this->corners(faces_.back()), tolerance));
+        boxes_.push_back(
+            box_of(this->corners(faces_.back()), std::max(tolerance, reaches_.back())));
       }
       first_vertex += static_cast<uint32_t>(mesh.positions.size());
     }
@@ -256,7 +329,8 @@ class ContactFinder {
         const Segment s = segment(id);
         const double edge_size = size(id);
         const Vec3d ends[2] = {s.a, s.at(1)};
-        const FloatBox box = box_of(ends, touch_tolerance(edge_size, 0));
+        const double edge_reach = reach(id, s);
+        const FloatBox box = box_of(ends, std::max(touch_tolerance(edge_size, 0), edge_reach));
         const uint32_t first_vertex = first_vertex_[id.object.index()];
         const auto [a, b] = objects_[id.object.index()].edge(id.edge).vertices;
         const uint32_t from = first_vertex + a.index(), to = first_vertex + b.index();
@@ -267,12 +341,34 @@ class ContactFinder {
             const FaceIndices& c = corners[other][lane];
             if (c[0] == from || c[1] == from || c[2] == from) continue;
             if (c[0] == to || c[1] == to || c[2] == to) continue;
-            const FaceRef face = faces_[tree.leaf(other)[lane]];
-            if (may_touch(id, s, edge_size, face)) pairs.push_back({id, face});
+            const uint32_t place = tree.leaf(other)[lane];
+            const FaceRef face = faces_[place];
+            const bool is_near = this->is_near(id, s, std::max(edge_reach, reaches_[place]), face);
+            const bool may_touch = this->may_touch(id, s, edge_size, face);
+            if (is_near || may_touch) pairs.push_back({id, face, may_touch, is_near});
           }
         }
       }
     }
+  }
+
+  bool is_near(EdgeRef id, const Segment& s, double reach, FaceRef face) const {
+    const Plane& p = plane(face);
+    const Corners c = corners(face);
+    const double d0 = dot(p.n, s.a - c[0]);
+    const double d1 = d0 + dot(p.n, s.d);
+    if (std::min(d0, d1) > reach || std::max(d0, d1) < -reach) return false;
+    if (length_squared(p.n) == 0) return false;
+    for (const FaceRef around : objects_[id.object.index()].faces_around(id.edge))
+      if (around == face) return false;
+    auto part = clip(s, c, p.n, reach);
+    if (!part) return false;
+    if (d0 != d1) {
+      const double t0 = (-reach - d0) / (d1 - d0), t1 = (reach - d0) / (d1 - d0);
+      part->t0 = std::max(part->t0, std::min(t0, t1));
+      part->t1 = std::min(part->t1, std::max(t0, t1));
+    }
+    return part->t1 - part->t0 >= kLeastNear;
   }
 
   // Looser than what decides.
@@ -317,7 +413,6 @@ class ContactFinder {
   }
 
   void add_contacts(const Pair& pair, std::vector<Contact>& contacts) const {
-    if (lies_on_edge(pair)) return;
     const size_t count = contacts.size();
     const auto first = std::lower_bound(edges_of_faces_.begin(), edges_of_faces_.end(),
                                         EdgeOfFace{pair.face, EdgeId(0)}, before);
@@ -325,29 +420,16 @@ class ContactFinder {
       if (const auto part = part_along(pair.edge, {pair.face.shape, i->edge}))
         contacts.push_back({pair.edge, pair.face, part->t0, part->t1, i->edge});
     if (contacts.size() > count) return;
-    const double tolerance = touch_tolerance(
-        size(pair.edge), size_of(*meshes_[pair.face.shape.index()], pair.face.face));
     const Corners c = corners(pair.face);
-    if (const auto part = part_on_face(segment(pair.edge), c, plane(pair.face), tolerance, 0))
+    if (const auto part = part_on_face(segment(pair.edge), c, plane(pair.face),
+                                       tolerance(pair.edge, pair.face), 0))
       contacts.push_back({pair.edge, pair.face, part->t0, part->t1, EdgeId::none()});
-  }
-
-  // Whether all corners of the face lie on the edge's line: such a needle has no side of it.
-  bool lies_on_edge(const Pair& pair) const {
-    const Segment s = segment(pair.edge);
-    const Vec3d along = normalize(s.d);
-    const double tolerance = touch_tolerance(
-        size(pair.edge), size_of(*meshes_[pair.face.shape.index()], pair.face.face));
-    double off = 0;
-    for (const Vec3d& corner : corners(pair.face))
-      off = std::max(off, length(cross(along, corner - s.a)));
-    return off <= 4 * tolerance;
   }
 
   // The part of edge a along which edge b runs. Decided for both alike.
   std::optional<Interval> part_along(EdgeRef a, EdgeRef b) const {
     const Segment s = segment(a), r = segment(b);
-    const double tolerance = touch_tolerance(size(a), size(b));
+    const double tolerance = this->tolerance(a, b);
     const double difference = length_squared(s.d) - length_squared(r.d);
     const bool longer = difference != 0
                             ? difference > 0
@@ -361,10 +443,13 @@ class ContactFinder {
 
   std::span<const EdgeMesh> objects_;
   std::span<const Mesh* const> meshes_;
+  Vec3d viewer_;
   int threads_;
   std::vector<uint32_t> first_face_;    // of each object, in faces_
   std::vector<FaceRef> faces_;          // of all objects
   std::vector<FloatBox> boxes_;         // theirs
+  std::vector<double> reaches_;         // up to where edges are near to them
+  std::vector<double> most_touches_;    // up to where edges touch them at most
   std::vector<uint32_t> first_vertex_;  // of each object, in a count over all
   // Of every face, the corners with a single fan of faces, counted over all objects; else UINT32_MAX.
   std::vector<FaceIndices> single_corners_;
@@ -383,9 +468,9 @@ double size_around(const EdgeMesh& edges, const Mesh& mesh, EdgeId edge) {
   return size;
 }
 
-std::vector<Contact> find_contacts(std::span<const EdgeMesh> objects,
-                                   std::span<const Mesh* const> meshes, int threads) {
-  return ContactFinder(objects, meshes, threads).find();
+Contacts find_contacts(std::span<const EdgeMesh> objects, std::span<const Mesh* const> meshes,
+                       const Vec3d& viewer, int threads) {
+  return ContactFinder(objects, meshes, viewer, threads).find();
 }
 
 }  // namespace limn

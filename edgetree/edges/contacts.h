@@ -1,5 +1,6 @@
 #pragma once
-// Where edges of a scene lie on faces of it, to the rounding of positions.
+// Where edges of a scene lie on faces of it, to the rounding of positions, and which faces are
+// nearer to them than rays can tell.
 //
 // A position is taken to have been rounded to float twice (in a file, and after its transform): what
 // the rounding of positions of size M explains is touch_tolerance(M). M is the largest coordinate of
@@ -10,6 +11,10 @@
 #include "limn/edgetree/edges.h"
 
 namespace limn {
+
+//
+// Needles may be narrower than that, and would touch along both of their sides. They touch what is in
+// their place to a millionth of their width, and are near to the rest.
 
 // sqrt(3) * 2 * 2^-24 for each of two positions, rounded up.
 inline double touch_tolerance(double size_a, double size_b) {
@@ -27,11 +32,25 @@ struct Contact {
   EdgeId along;
 };
 
-// All contacts of edges that are not flat with faces that have area and are not so thin that they
-// lie on the edge as a whole; by edge. Whether two edges run along each other is decided for the
-// two alike. meshes: of the objects.
-std::vector<Contact> find_contacts(std::span<const EdgeMesh> objects,
-                                   std::span<const Mesh* const> meshes, int threads);
+// An edge, and a face that is near to at least a sixteenth of it, but is not around it. Near is less
+// than 2^-20 of the distance D between the viewer and either's faces or of their M: 16 roundings of
+// a ray's origin, of its direction, of corners relative to the origin, and of sums of products of
+// them; but no more than 2^-8 of the edge's length or the face's width. So a near face either lies
+// along the edge or leaves a common corner at less than a sixteenth.
+struct NearFace {
+  EdgeRef edge;
+  FaceRef face;
+};
+
+struct Contacts {
+  std::vector<Contact> contacts;  // by edge
+  std::vector<NearFace> near;     // by edge; also of edges that touch the face
+};
+
+// Of edges that are not flat with faces that have area. Whether two edges run along each other is
+// decided for the two alike. meshes: of the objects.
+Contacts find_contacts(std::span<const EdgeMesh> objects, std::span<const Mesh* const> meshes,
+                       const Vec3d& viewer, int threads);
 
 // The size of the faces of `mesh` around an edge: M above.
 double size_around(const EdgeMesh& edges, const Mesh& mesh, EdgeId edge);

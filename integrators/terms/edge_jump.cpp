@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "integrators/terms/near_faces.h"
 #include "limn/core/face_copies.h"
 
 namespace limn {
@@ -83,8 +84,8 @@ bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView&
   ray.t_max = t_max;
   ray.start = start;
   const FacesAround around = mesh.around(view.id.edge);
-  ray.skip_faces = around.faces;
-  if (part.region) {
+  ray.skip_faces = around.all;
+  if (part.region && around.near.empty()) {
     const auto lamp = part.regions->flat_faces(*part.region);
     const auto is_of_lamp = [&](FaceRef f) { return !lamp.empty() && f.shape == lamp[0].shape; };
     if (std::all_of(around.faces.begin(), around.faces.end(), is_of_lamp)) ray.skip_faces = lamp;
@@ -92,7 +93,8 @@ bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView&
   ray.skip_emitters = bounces == 0 && context.scene.hide_emitters;
   Hit behind;
   ++rays.closest;
-  const bool found = context.tracer.closest(ray, behind);
+  const bool found = closest_at_edge(context.tracer, context.scene, around, view.y, view.distance,
+                                     ray, behind);
   if (found && behind.t < view.distance) return false;
 
   NoVisitor nothing;

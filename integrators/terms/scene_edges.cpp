@@ -36,7 +36,7 @@ EdgeSamplerInput make_sampler_input(const Scene& scene, int threads) {
     input.objects.push_back(build_edge_mesh(shape.mesh, black_behind, ShapeId(s)));
     meshes.push_back(&shape.mesh);
   }
-  unite_touching_edges(touching_shapes(scene), threads, input.objects);
+  unite_touching_edges(touching_shapes(scene), value(scene.camera.origin), threads, input.objects);
   const std::vector<CrossingSegment> crossings = find_crossings(meshes, threads);
   if (!crossings.empty()) input.objects.push_back(crossing_edges(meshes, crossings));
   const Lights lights(scene);

@@ -31,7 +31,7 @@ std::vector<EdgeMesh> united(const std::vector<Mesh>& meshes,
     objects.push_back(build_edge_mesh(meshes[i], true, ShapeId(i)));
     shapes.push_back({&meshes[i], looks.empty() ? 0 : looks[i]});
   }
-  unite_touching_edges(shapes, 2, objects);
+  unite_touching_edges(shapes, {0, 0, 0}, 2, objects);
   for (const EdgeMesh& object : objects) EXPECT_EQ(object.validate(), "");
   return objects;
 }
