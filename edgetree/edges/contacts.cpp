@@ -1,14 +1,12 @@
-// Where edges lie on faces: pairs from a tree over the faces' boxes, then tests in double precision.
+// Where edges lie on faces or near to them: tests of pairs in double precision.
 #include "edgetree/edges/contacts.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <optional>
 #include <tuple>
 
-#include "edgetree/edges/box_tree.h"
 #include "limn/core/parallel.h"
 
 namespace limn {
@@ -25,29 +23,10 @@ struct Interval {
   double t0, t1;
 };
 
-double size_of(const Mesh& mesh, FaceId face) {
-  float size = 0;
-  for (const uint32_t vertex : mesh.face(face)) {
-    const Vec3f& x = mesh.positions[vertex];
-    size = std::max({size, std::fabs(x.x), std::fabs(x.y), std::fabs(x.z)});
-  }
-  return size;
-}
-
-// Of a face with area: its least height.
-double width_of(const Corners& corners) {
-  double longest = 0;
-  for (int k = 0; k < 3; ++k)
-    longest = std::max(longest, length_squared(corners[(k + 1) % 3] - corners[k]));
-  return length(cross(corners[1] - corners[0], corners[2] - corners[0])) / std::sqrt(longest);
-}
-
-// What the rounding of rays explains at distance D, and no more than this share of a width.
-constexpr double kNear = 0x1.0p-20, kMostNear = 0x1.0p-8;
 // Of an edge's length, what a face is near to at least.
 constexpr double kLeastNear = 1.0 / 16;
-// What is near to both sides of a face together, at its middle, makes it a needle; all that touches it
-// is off by no more than this share of its width, far beyond what rounding in double explains.
+// What touches a needle is off by no more than this share of its width: far beyond what rounding in
+// double precision explains.
 constexpr double kMostTouch = 0x1.0p-20;
 
 // The part of the segment that lies in the triangle, seen along its normal; its sides are moved
@@ -106,56 +85,18 @@ std::optional<Interval> common_part(const Segment& longer, const Segment& shorte
   return Interval{std::min(ends[0], ends[1]), std::max(ends[0], ends[1])};
 }
 
-// V: whether the faces around a vertex form one closed fan that covers the directions around it once,
-// seen along their mean normal, none of them a needle. No edge at such a vertex lies on another face
-// at it.
-std::vector<bool> single_fans(const EdgeMesh& edges, const Mesh& mesh,
-                              const std::vector<bool>& is_needle) {
-  const size_t count = mesh.positions.size();
-  std::vector<Vec3d> axes(count);
-  std::vector<uint8_t> covers(count);
-  std::vector<bool> single(count, true);
-  for (uint32_t f = 0; f < mesh.faces.size(); ++f)
-    for (const uint32_t v : mesh.faces[f]) axes[mesh.weld[v]] += edges.planes[f].n;
-  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
-    for (int k = 0; k < 3; ++k) {
-      const uint32_t v = mesh.weld[mesh.faces[f][k]];
-      const Vec3d& axis = axes[v];
-      const Vec3d x = cast<double>(mesh.positions[v]);
-      const auto to_corner = [&](int corner) {
-        return cast<double>(mesh.positions[mesh.weld[mesh.faces[f][corner % 3]]]) - x;
-      };
-      if (!(dot(edges.planes[f].n, axis) > 0) || is_needle[f]) single[v] = false;
-      const auto turn = [&](const Vec3d& a, const Vec3d& b) { return dot(axis, cross(a, b)); };
-      const Vec3d reference =
-          cross(axis, std::fabs(axis.x) < std::fabs(axis.y) ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0});
-      const bool covered =
-          turn(to_corner(k + 1), reference) >= 0 && turn(reference, to_corner(k + 2)) > 0;
-      covers[v] = static_cast<uint8_t>(std::min(covers[v] + covered, 2));
-    }
-  }
-  for (size_t v = 0; v < count; ++v)
-    if (covers[v] != 1) single[v] = false;
-  for (const Edge& edge : edges.edges) {
-    if (edge.edge_class != EdgeClass::kBorder && edge.edge_class != EdgeClass::kIrregular) continue;
-    for (const VertexId v : edge.vertices) single[v.index()] = single[mesh.weld[v.index()]] = false;
-  }
-  return single;
-}
-
 class ContactFinder {
  public:
   ContactFinder(std::span<const EdgeMesh> objects, std::span<const Mesh* const> meshes,
                 const Vec3d& viewer, int threads)
-      : objects_(objects), meshes_(meshes), viewer_(viewer), threads_(threads) {
-    collect_faces();
-    collect_edges();
-  }
+      : objects_(objects), meshes_(meshes), viewer_(viewer), threads_(threads) {}
 
-  Contacts find() {
+  Contacts find(std::span<const FacePair> pairs) {
     Contacts found;
+    if (pairs.empty()) return found;
+    collect_edges();
     std::vector<Pair> touching;
-    for (const Pair& pair : find_pairs()) {
+    for (const Pair& pair : find_pairs(pairs)) {
       if (pair.may_touch) touching.push_back(pair);
       if (pair.is_near) found.near.push_back({pair.edge, pair.face});
     }
@@ -175,7 +116,6 @@ class ContactFinder {
   }
 
  private:
-  using LeafCorners = std::array<FaceIndices, BoxTree::kLeaf>;
   struct Pair {
     EdgeRef edge;
     FaceRef face;
@@ -203,11 +143,14 @@ class ContactFinder {
     return std::min({touch_tolerance(size(a), size(b)), most_touch(a), most_touch(b)});
   }
   double tolerance(EdgeRef edge, FaceRef face) const {
-    const double most = touch_tolerance(size(edge), size_of(*meshes_[face.shape.index()], face.face));
+    const double most =
+        touch_tolerance(size(edge), size_of(*meshes_[face.shape.index()], face.face));
     return std::min({most, most_touch(edge), most_touch(face)});
   }
   double most_touch(FaceRef face) const {
-    return most_touches_[first_face_[face.shape.index()] + face.face.index()];
+    const Mesh& mesh = *meshes_[face.shape.index()];
+    if (!is_needle(mesh, face.face, viewer_)) return std::numeric_limits<double>::infinity();
+    return kMostTouch * width_of(mesh, face.face);
   }
   double most_touch(EdgeRef id) const {
     double most = std::numeric_limits<double>::infinity();
@@ -215,73 +158,21 @@ class ContactFinder {
       most = std::min(most, most_touch(face));
     return most;
   }
-  // How far rays from the viewer may miss points of the face.
-  double blur(FaceRef face) const {
-    double distance = size_of(*meshes_[face.shape.index()], face.face);
-    for (const Vec3d& x : corners(face)) distance = std::max(distance, length(x - viewer_));
-    return kNear * distance;
-  }
-  // Up to which distance faces are near to the edge, on its part, and to the face.
+  // Up to which distance faces are near to the edge, on its part.
   double reach(EdgeRef id, const Segment& s) const {
     double reach = 0;
     for (const FaceRef face : objects_[id.object.index()].faces_around(id.edge))
-      reach = std::max(reach, blur(face));
+      reach = std::max(reach, blur_of(*meshes_[face.shape.index()], face.face, viewer_));
     return std::min(reach, kMostNear * length(s.d));
   }
-
-  // All faces, with their boxes and those of their corners that may be passed over.
-  void collect_faces() {
-    uint32_t first_vertex = 0;
-    for (uint32_t o = 0; o < objects_.size(); ++o) {
-      first_face_.push_back(static_cast<uint32_t>(faces_.size()));
-      first_vertex_.push_back(first_vertex);
-      const Mesh& mesh = *meshes_[o];
-      const auto count = static_cast<uint32_t>(objects_[o].planes.size());
-      std::vector<bool> is_needle(count);
-      std::vector<double> reaches(count);
-      for (uint32_t f = 0; f < count; ++f) {
-        const FaceRef face{ShapeId(o), FaceId(f)};
-        const double width = width_of(this->corners(face)), blur = this->blur(face);
-        is_needle[f] = !(width * kLeastNear > blur);
-        most_touches_.push_back(is_needle[f] ? kMostTouch * width
-                                             : std::numeric_limits<double>::infinity());
-        reaches[f] = std::min(blur, kMostNear * width);
-      }
-      const std::vector<bool> single = single_fans(objects_[o], mesh, is_needle);
-      for (uint32_t f = 0; f < count; ++f) {
-        faces_.push_back({ShapeId(o), FaceId(f)});
-        reaches_.push_back(reaches[f]);
-        FaceIndices& corners = single_corners_.emplace_back();
-        for (int k = 0; k < 3; ++k) {
-          const uint32_t v = mesh.weld[mesh.faces[f][k]];
-          corners[k] = single[v] ? first_vertex + v : UINT32_MAX;
-        }
-        const double tolerance = touch_tolerance(size_of(*meshes_[o], FaceId(f)), 0);
-        boxes_.push_back(
-            box_of(this->corners(faces_.back()), std::max(tolerance, reaches_.back())));
-      }
-      first_vertex += static_cast<uint32_t>(mesh.positions.size());
-    }
-  }
-
-  // Twice the tolerance: a float's rounding is less than the second half.
-  static FloatBox box_of(std::span<const Vec3d> points, double tolerance) {
-    FloatBox box;
-    for (int k = 0; k < 3; ++k) {
-      double low = points[0][k], high = low;
-      for (const Vec3d& x : points) {
-        low = std::min(low, x[k]);
-        high = std::max(high, x[k]);
-      }
-      box.lower[k] = static_cast<float>(low - 2 * tolerance);
-      box.upper[k] = static_cast<float>(high + 2 * tolerance);
-    }
-    return box;
-  }
-
   // Edges by their first face: they lie in its box.
   void collect_edges() {
-    edge_offsets_.assign(faces_.size() + 1, 0);
+    uint32_t faces = 0;
+    for (const EdgeMesh& mesh : objects_) {
+      first_face_.push_back(faces);
+      faces += static_cast<uint32_t>(mesh.planes.size());
+    }
+    edge_offsets_.assign(faces + 1, 0);
     const auto for_every_edge = [&](const auto& visit) {
       for (uint32_t o = 0; o < objects_.size(); ++o)
         for (uint32_t e = 0; e < objects_[o].edges.size(); ++e) {
@@ -291,29 +182,22 @@ class ContactFinder {
         }
     };
     for_every_edge([&](uint32_t face, EdgeRef) { ++edge_offsets_[face + 1]; });
-    for (size_t f = 0; f < faces_.size(); ++f) edge_offsets_[f + 1] += edge_offsets_[f];
+    for (size_t f = 0; f < faces; ++f) edge_offsets_[f + 1] += edge_offsets_[f];
     edges_.resize(edge_offsets_.back());
     std::vector<uint32_t> next(edge_offsets_.begin(), edge_offsets_.end() - 1);
     for_every_edge([&](uint32_t face, EdgeRef id) { edges_[next[face]++] = id; });
   }
 
-  // Pairs that may touch, in an order that does not depend on threads.
-  std::vector<Pair> find_pairs() const {
-    const BoxTree tree(boxes_, threads_);
-    constexpr uint32_t kBlock = 256;  // leaves; not tuned
-    const uint32_t blocks = (tree.leaf_count() + kBlock - 1) / kBlock;
-    // Corners in the order of the leaves.
-    std::vector<LeafCorners> corners(tree.leaf_count());
-    for (uint32_t leaf = 0; leaf < tree.leaf_count(); ++leaf)
-      for (size_t i = 0; i < tree.leaf(leaf).size(); ++i)
-        corners[leaf][i] = single_corners_[tree.leaf(leaf)[i]];
-    std::vector<std::vector<Pair>> found(blocks);
-    parallel_for(blocks, threads_, [&](size_t block) {
-      std::vector<uint32_t> leaves;
-      const auto begin = static_cast<uint32_t>(block) * kBlock;
-      for (uint32_t leaf = begin; leaf < std::min(begin + kBlock, tree.leaf_count()); ++leaf) {
-        tree.find_leaves(tree.leaf_box(leaf), leaves);
-        find_pairs_of_leaf(tree, corners, leaf, leaves, found[block]);
+  // Pairs that may touch or are near, in an order that does not depend on threads.
+  std::vector<Pair> find_pairs(std::span<const FacePair> candidates) const {
+    constexpr size_t kBlock = 4096;  // not tuned
+    std::vector<std::vector<Pair>> found((candidates.size() + kBlock - 1) / kBlock);
+    parallel_for(found.size(), threads_, [&](size_t block) {
+      const size_t begin = block * kBlock;
+      for (const FacePair& pair :
+           candidates.subspan(begin, std::min(kBlock, candidates.size() - begin))) {
+        append_pairs(pair.first, pair.second, found[block]);
+        append_pairs(pair.second, pair.first, found[block]);
       }
     });
     std::vector<Pair> pairs;
@@ -321,34 +205,17 @@ class ContactFinder {
     return pairs;
   }
 
-  void find_pairs_of_leaf(const BoxTree& tree, std::span<const LeafCorners> corners, uint32_t leaf,
-                          std::span<const uint32_t> leaves, std::vector<Pair>& pairs) const {
-    for (const uint32_t first : tree.leaf(leaf)) {
-      for (uint32_t i = edge_offsets_[first]; i < edge_offsets_[first + 1]; ++i) {
-        const EdgeRef id = edges_[i];
-        const Segment s = segment(id);
-        const double edge_size = size(id);
-        const Vec3d ends[2] = {s.a, s.at(1)};
-        const double edge_reach = reach(id, s);
-        const FloatBox box = box_of(ends, std::max(touch_tolerance(edge_size, 0), edge_reach));
-        const uint32_t first_vertex = first_vertex_[id.object.index()];
-        const auto [a, b] = objects_[id.object.index()].edge(id.edge).vertices;
-        const uint32_t from = first_vertex + a.index(), to = first_vertex + b.index();
-        for (const uint32_t other : leaves) {
-          if (!tree.leaf_box(other).overlaps(box)) continue;
-          for (uint32_t bits = tree.boxes(other).overlaps(box); bits != 0; bits &= bits - 1) {
-            const int lane = std::countr_zero(bits);
-            const FaceIndices& c = corners[other][lane];
-            if (c[0] == from || c[1] == from || c[2] == from) continue;
-            if (c[0] == to || c[1] == to || c[2] == to) continue;
-            const uint32_t place = tree.leaf(other)[lane];
-            const FaceRef face = faces_[place];
-            const bool is_near = this->is_near(id, s, std::max(edge_reach, reaches_[place]), face);
-            const bool may_touch = this->may_touch(id, s, edge_size, face);
-            if (is_near || may_touch) pairs.push_back({id, face, may_touch, is_near});
-          }
-        }
-      }
+  // Of the edges that have `first` as their first face, with the other one.
+  void append_pairs(FaceRef first, FaceRef other, std::vector<Pair>& pairs) const {
+    const size_t f = first_face_[first.shape.index()] + first.face.index();
+    const Mesh& mesh = *meshes_[other.shape.index()];
+    for (uint32_t i = edge_offsets_[f]; i < edge_offsets_[f + 1]; ++i) {
+      const EdgeRef id = edges_[i];
+      const Segment s = segment(id);
+      const bool near =
+          is_near(id, s, std::max(reach(id, s), reach_of(mesh, other.face, viewer_)), other);
+      const bool touching = may_touch(id, s, size(id), other);
+      if (near || touching) pairs.push_back({id, other, touching, near});
     }
   }
 
@@ -445,15 +312,8 @@ class ContactFinder {
   std::span<const Mesh* const> meshes_;
   Vec3d viewer_;
   int threads_;
-  std::vector<uint32_t> first_face_;    // of each object, in faces_
-  std::vector<FaceRef> faces_;          // of all objects
-  std::vector<FloatBox> boxes_;         // theirs
-  std::vector<double> reaches_;         // up to where edges are near to them
-  std::vector<double> most_touches_;    // up to where edges touch them at most
-  std::vector<uint32_t> first_vertex_;  // of each object, in a count over all
-  // Of every face, the corners with a single fan of faces, counted over all objects; else UINT32_MAX.
-  std::vector<FaceIndices> single_corners_;
-  // Edges whose first face is faces_[f]: edges_[edge_offsets_[f], edge_offsets_[f + 1]).
+  std::vector<uint32_t> first_face_;  // of each object, in a count over all
+  // Edges whose first face is the f-th of all: edges_[edge_offsets_[f], edge_offsets_[f + 1]).
   std::vector<uint32_t> edge_offsets_;
   std::vector<EdgeRef> edges_;
   std::vector<EdgeOfFace> edges_of_faces_;  // sorted
@@ -469,8 +329,8 @@ double size_around(const EdgeMesh& edges, const Mesh& mesh, EdgeId edge) {
 }
 
 Contacts find_contacts(std::span<const EdgeMesh> objects, std::span<const Mesh* const> meshes,
-                       const Vec3d& viewer, int threads) {
-  return ContactFinder(objects, meshes, viewer, threads).find();
+                       std::span<const FacePair> pairs, const Vec3d& viewer, int threads) {
+  return ContactFinder(objects, meshes, viewer, threads).find(pairs);
 }
 
 }  // namespace limn

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "limn/edgetree/edges.h"
+#include "limn/edgetree/face_pairs.h"
 
 namespace limn {
 
@@ -32,11 +33,11 @@ struct Contact {
   EdgeId along;
 };
 
-// An edge, and a face that is near to at least a sixteenth of it, but is not around it. Near is less
-// than 2^-20 of the distance D between the viewer and either's faces or of their M: 16 roundings of
-// a ray's origin, of its direction, of corners relative to the origin, and of sums of products of
-// them; but no more than 2^-8 of the edge's length or the face's width. So a near face either lies
-// along the edge or leaves a common corner at less than a sixteenth.
+// Nearness ends at this share of an edge's length, or of a face's longest side.
+inline constexpr double kMostNear = 0x1.0p-8;
+// An edge, and a face that is near to at least a sixteenth of it, but is not around it: nearer than the
+// reach of either's faces (face_pairs.h). A near face lies along the edge, or leaves a common corner at
+// less than a sixteenth.
 struct NearFace {
   EdgeRef edge;
   FaceRef face;
@@ -48,9 +49,9 @@ struct Contacts {
 };
 
 // Of edges that are not flat with faces that have area. Whether two edges run along each other is
-// decided for the two alike. meshes: of the objects.
+// decided for the two alike. meshes: of the objects; pairs, viewer: as find_face_pairs has them.
 Contacts find_contacts(std::span<const EdgeMesh> objects, std::span<const Mesh* const> meshes,
-                       const Vec3d& viewer, int threads);
+                       std::span<const FacePair> pairs, const Vec3d& viewer, int threads);
 
 // The size of the faces of `mesh` around an edge: M above.
 double size_around(const EdgeMesh& edges, const Mesh& mesh, EdgeId edge);

@@ -341,10 +341,11 @@ class Unifier {
     mesh.near_offsets.assign(1, 0);
     for (const Source& source : sources) {
       mesh.edges.push_back(*source.edge);
-      const EdgeId whole = source.part ? source.part->whole
-                                       : EdgeId(static_cast<uint32_t>(source.edge - old.edges.data()));
-      const auto faces = source.part ? std::span<const FaceRef>(source.part->faces)
-                                     : old.faces_around(whole);
+      const EdgeId whole = source.part
+                               ? source.part->whole
+                               : EdgeId(static_cast<uint32_t>(source.edge - old.edges.data()));
+      const auto faces =
+          source.part ? std::span<const FaceRef>(source.part->faces) : old.faces_around(whole);
       append_near(near, whole, faces, mesh);
       mesh.incident_faces.insert(mesh.incident_faces.end(), faces.begin(), faces.end());
       mesh.incidences.resize(mesh.incident_faces.size());
@@ -371,11 +372,11 @@ class Unifier {
 
 }  // namespace
 
-void unite_touching_edges(std::span<const TouchingShape> shapes, const Vec3d& viewer, int threads,
-                          std::vector<EdgeMesh>& objects) {
+void unite_touching_edges(std::span<const TouchingShape> shapes, std::span<const FacePair> pairs,
+                          const Vec3d& viewer, int threads, std::vector<EdgeMesh>& objects) {
   std::vector<const Mesh*> meshes;
   for (const TouchingShape& shape : shapes) meshes.push_back(shape.mesh);
-  const Contacts found = find_contacts(objects, meshes, viewer, threads);
+  const Contacts found = find_contacts(objects, meshes, pairs, viewer, threads);
   if (!found.contacts.empty() || !found.near.empty()) Unifier(shapes, objects).unite(found);
 }
 

@@ -30,11 +30,10 @@ struct Sides {
   std::optional<FaceSide> negative, positive;
 };
 
-// Whether a face is seen before another one on the same side. Copies have one slope, but for rounding.
+// Whether a face is seen before another one on the same side.
 bool hides(const Scene& scene, const FaceSide& a, double slope_a, const FaceSide& b, double slope_b,
            const Vec3d& omega) {
-  const bool near = std::fabs(slope_a - slope_b) <= 0x1.0p-30 * (1 + std::fabs(slope_a));
-  if (near && are_copies(scene, a.face, b.face)) return is_met_first(scene, a.face, b.face, omega);
+  if (overlap(a, b)) return is_met_first(scene, a.face, b.face, omega);
   return slope_a < slope_b;
 }
 
@@ -93,8 +92,8 @@ bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView&
   ray.skip_emitters = bounces == 0 && context.scene.hide_emitters;
   Hit behind;
   ++rays.closest;
-  const bool found = closest_at_edge(context.tracer, context.scene, around, view.y, view.distance,
-                                     ray, behind);
+  const bool found =
+      closest_at_edge(context.tracer, context.scene, around, view.y, view.distance, ray, behind);
   if (found && behind.t < view.distance) return false;
 
   NoVisitor nothing;

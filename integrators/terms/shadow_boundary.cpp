@@ -77,8 +77,7 @@ double lit_side(const Scene& scene, const EdgeMesh& edges, EdgeId edge, const Li
   RimOrder order;
   if (!around.incidences.empty()) {
     for_every_face([&](FaceRef face, Incidence incidence, bool positive) {
-      const Vec3d into =
-          direction_into_face(scene.shape(face.shape).mesh, face.face, x0, normalize(along));
+      const Vec3d into = side_of_face(scene, face, x0, normalize(along)).into;
       order.add(incidence.rim, positive, dot(into, w) / std::fabs(dot(into, n)));
     });
   }

@@ -27,11 +27,13 @@ std::vector<EdgeMesh> united(const std::vector<Mesh>& meshes,
                              const std::vector<uint32_t>& looks = {}) {
   std::vector<EdgeMesh> objects;
   std::vector<TouchingShape> shapes;
+  std::vector<const Mesh*> pointers;
   for (uint32_t i = 0; i < meshes.size(); ++i) {
     objects.push_back(build_edge_mesh(meshes[i], true, ShapeId(i)));
     shapes.push_back({&meshes[i], looks.empty() ? 0 : looks[i]});
+    pointers.push_back(&meshes[i]);
   }
-  unite_touching_edges(shapes, {0, 0, 0}, 2, objects);
+  unite_touching_edges(shapes, find_face_pairs(pointers, {0, 0, 0}, 2), {0, 0, 0}, 2, objects);
   for (const EdgeMesh& object : objects) EXPECT_EQ(object.validate(), "");
   return objects;
 }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "limn/edgetree/edges.h"
+#include "limn/edgetree/face_pairs.h"
 
 namespace limn {
 
@@ -26,7 +27,8 @@ struct TouchingShape {
 // faces that do not touch it and are nearer to it than a ray in floats can tell, if it comes from
 // `viewer` (the camera) or from no farther away: FacesAround::near. Where nothing is so near nothing
 // changes.
-void unite_touching_edges(std::span<const TouchingShape> shapes, const Vec3d& viewer, int threads,
-                          std::vector<EdgeMesh>& objects);
+// pairs: of the shapes' faces, from find_face_pairs with the same viewer.
+void unite_touching_edges(std::span<const TouchingShape> shapes, std::span<const FacePair> pairs,
+                          const Vec3d& viewer, int threads, std::vector<EdgeMesh>& objects);
 
 }  // namespace limn
