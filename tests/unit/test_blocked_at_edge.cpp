@@ -34,7 +34,6 @@ TEST(BlockedAtEdge, AgreesWithRaysCloseBy) {
     Scene scene;
     scene.shapes.emplace_back();
     scene.shapes[0].mesh = fan(wings, rng);
-    const Mesh& mesh = scene.shapes[0].mesh;
     std::vector<FaceRef> faces;
     for (int f = 0; f < wings; ++f) faces.push_back({ShapeId(0), FaceId(f)});
     EdgeStart edge{{faces, {}}, {0, 0, -1}, {0, 0, 1}, {}};

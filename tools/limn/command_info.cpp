@@ -84,7 +84,8 @@ void print_parameter(const Parameter& parameter) {
 json describe_crossings(const Scene& scene, int threads) {
   std::vector<const Mesh*> meshes;
   for (const Shape& shape : scene.shapes) meshes.push_back(&shape.mesh);
-  const std::vector<CrossingSegment> segments = find_crossings(meshes, find_face_pairs(meshes, {}, threads), threads);
+  const std::vector<CrossingSegment> segments =
+      find_crossings(meshes, find_face_pairs(meshes, {}, threads), threads);
   std::set<ShapeId> shapes;
   for (const CrossingSegment& segment : segments)
     for (const FaceRef face : segment.faces) shapes.insert(face.shape);
