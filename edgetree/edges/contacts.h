@@ -14,8 +14,8 @@
 namespace limn {
 
 //
-// Needles may be narrower than that, and would touch along both of their sides. They touch what is in
-// their place to a millionth of their width, and are near to the rest.
+// Needles may be narrower than that, and would touch along both of their sides. They touch what is
+// in their place to a millionth of their width, and are near to the rest.
 
 // sqrt(3) * 2 * 2^-24 for each of two positions, rounded up.
 inline double touch_tolerance(double size_a, double size_b) {
@@ -35,9 +35,9 @@ struct Contact {
 
 // Nearness ends at this share of an edge's length, or of a face's longest side.
 inline constexpr double kMostNear = 0x1.0p-8;
-// An edge, and a face that is near to at least a sixteenth of it, but is not around it: nearer than the
-// reach of either's faces (face_pairs.h). A near face lies along the edge, or leaves a common corner at
-// less than a sixteenth.
+// An edge, and a face that is near to at least a sixteenth of it, but is not around it: nearer than
+// the reach of either's faces (face_pairs.h). A near face lies along the edge, or leaves a common
+// corner at less than a sixteenth.
 struct NearFace {
   EdgeRef edge;
   FaceRef face;

@@ -49,8 +49,8 @@ double reach_of(double longest_side, double blur) {
   return std::min(blur, kMostNear * longest_side);
 }
 
-// V: whether the faces around a vertex form one closed fan that covers the directions around it once,
-// seen along the mean of their normals, none of them a needle.
+// V: whether the faces around a vertex form one closed fan that covers the directions around it
+// once, seen along the mean of their normals, none of them a needle.
 class SingleFans {
  public:
   // ids: of the vertices; normals, needles: of the faces

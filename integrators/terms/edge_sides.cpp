@@ -7,8 +7,8 @@
 
 namespace limn {
 
-// A component of x0 may be off by its own rounding, one of a by that of the corner, one of `across` by
-// three roundings of |a|.
+// A component of x0 may be off by its own rounding, one of a by that of the corner, one of `across`
+// by three roundings of |a|.
 FaceSide side_of_face(const Scene& scene, FaceRef face, const Vec3d& x0, const Vec3d& along) {
   FaceSide side{face, {}};
   double best_length = 0;

@@ -27,12 +27,12 @@ struct EdgeStart {
   FaceSide start;  // where the path is
 };
 
-// x0: a point of the edge, along: its unit direction. Of a face that the edge runs through, one of the
-// two sides; the other is its opposite.
+// x0: a point of the edge, along: its unit direction. Of a face that the edge runs through, one of
+// the two sides; the other is its opposite.
 FaceSide side_of_face(const Scene& scene, FaceRef face, const Vec3d& x0, const Vec3d& along);
 
-// Whether two sides lie in one place, so that the faces overlap there: as far as double precision can
-// tell. Which of them is seen is_met_first says (limn/core/face_copies.h).
+// Whether two sides lie in one place, so that the faces overlap there: as far as double precision
+// can tell. Which of them is seen is_met_first says (limn/core/face_copies.h).
 bool overlap(const FaceSide& a, const FaceSide& b);
 
 // Calls visit(side, incidence) for every side of the faces around an edge.

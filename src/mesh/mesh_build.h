@@ -17,8 +17,8 @@ struct RawMesh {
   std::vector<FaceIndices> faces;       // F by 3, into positions
   std::vector<Vec3d> normals;           // N, of any length; not finite or zero: unusable
   std::vector<FaceIndices> normal_ids;  // F by 3, into normals or kNoNormal; empty if no normals
-  // The first position with a coordinate beyond kLargestCoordinate, and where it stands, if the file
-  // has lines and such a one.
+  // The first position with a coordinate beyond kLargestCoordinate, and where it stands, if the
+  // file has lines and such a one.
   size_t far_position = SIZE_MAX;
   SourceLocation far_where = {};
 };

@@ -82,8 +82,8 @@ TEST(BlockedAtEdge, RightAngle) {
   EXPECT_EQ(blocked(1, {1, 1, 0}), std::nullopt);
 }
 
-// Two faces that overlap in a plane, and a third one: neither of the two blocks what starts on the other,
-// and of the two the first one is met.
+// Two faces that overlap in a plane, and a third one: neither of the two blocks what starts on the
+// other, and of the two the first one is met.
 TEST(BlockedAtEdge, WhatOverlapsDoesNotBlock) {
   Rng rng(3, 2, 1);
   for (int trial = 0; trial < 200; ++trial) {

@@ -206,13 +206,11 @@ TEST(Edges, ZeroAreaIsDecidedToTheRoundingOfPositions) {
     return build_edge_mesh(make_mesh({a, b, c}, {{0, 1, 2}}), true).planes;
   };
   EXPECT_EQ(length(planes({1, 2, 3})[0].n), 0);
-  // A needle that rounding its corners explains is a line; a little wider, it is a face, and so is a
-  // small one of another shape.
+  // A needle that rounding its corners explains is a line; a little wider, it is a face, and so is
+  // a small one of another shape.
   EXPECT_EQ(length(planes({1, std::nextafter(2.0f, 3.0f), 3})[0].n), 0);
   EXPECT_NEAR(length(planes({1, 2 + 0x1.0p-17f, 3})[0].n), 1, 0x1.0p-50);
-  const Mesh far =
-      make_mesh({{9, 6, 3}, {std::nextafter(9.0f, 10.0f), 6, 3}, {9, std::nextafter(6.0f, 7.0f), 3}},
-                {{0, 1, 2}});
+  const Mesh far = make_mesh({{9, 6, 3}, {9 + 0x1p-20f, 6, 3}, {9, 6 + 0x1p-20f, 3}}, {{0, 1, 2}});
   EXPECT_NEAR(length(build_edge_mesh(far, true).planes[0].n), 1, 0x1.0p-50);
   EXPECT_EQ(length(planes({0x1.00002p-30f, 0x1.00002p-29f, 3 * 0x1.00002p-30f})[0].n), 0);
 }

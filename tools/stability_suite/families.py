@@ -78,8 +78,8 @@ def by_differences(scene, step=STEP):
 
 DIFFERENCES = "Differences of the same scene with a small fixed step."
 PLAIN = "The same shape as one clean mesh, by a long run of adaptive."
-CLOSE = ("Edges within the rounding of positions are united; what is nearer than rays can tell, seen "
-         "from the camera, is met in double precision. From farther away rays in floats decide.")
+CLOSE = ("Edges within the rounding of positions are united; what is nearer than rays from the "
+         "camera can tell is met in double precision. From farther away rays in floats decide.")
 NARROW = ("The penumbra is narrow: few points of the picture lie in it, each with a derivative of "
           "one over its width (term direct). Differences blur it by their step.")
 SET_UP = "Building the tree of edges takes longer than the run: it pays off in longer ones."

@@ -93,8 +93,8 @@ inline bool has_area(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
   return dot(n, n) > 0x1.0p-100 * (dot(e1, e1) * dot(e2, e2));
 }
 // Of a mesh, needles are lines, too: faces that are narrower than what rounding their corners to
-// floats explains (four roundings of the largest coordinate) and 16 times longer than wide. Far from
-// the origin small faces are as narrow, and mean what they are.
+// floats explains (four roundings of the largest coordinate) and 16 times longer than wide. Far
+// from the origin small faces are as narrow, and mean what they are.
 inline bool has_area(const Mesh& mesh, const FaceIndices& face) {
   const auto corner = [&](int k) { return cast<double>(mesh.positions[face[k]]); };
   const Vec3d a = corner(0), b = corner(1), c = corner(2);

@@ -25,9 +25,8 @@ struct TouchingShape {
 //  - a seam of two faces in one plane that look and move alike is no edge.
 // What touches is decided to the rounding of positions (edges/contacts.h). An edge also gets the
 // faces that do not touch it and are nearer to it than a ray in floats can tell, if it comes from
-// `viewer` (the camera) or from no farther away: FacesAround::near. Where nothing is so near nothing
-// changes.
-// pairs: of the shapes' faces, from find_face_pairs with the same viewer.
+// `viewer` (the camera) or from no farther away: FacesAround::near. Where nothing is so near
+// nothing changes. pairs: of the shapes' faces, from find_face_pairs with the same viewer.
 void unite_touching_edges(std::span<const TouchingShape> shapes, std::span<const FacePair> pairs,
                           const Vec3d& viewer, int threads, std::vector<EdgeMesh>& objects);
 
