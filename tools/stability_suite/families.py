@@ -345,7 +345,9 @@ def grazing(degrees):
 @family(
     "depth", "length of the paths", [2, 3, 4, 8, 16],
     "A box in a closed room with walls of reflectance 0.8.", DIFFERENCES,
-    "A pass of two samples per pixel, and the pilot before it, take longer than the run.",
+    "Variance, and its tail: at lengths of 8 and 16 the terms direct and boundary hold nearly all of "
+    "the squared error, and one sample alone up to 0.8 of a term's: late vertices close to the box. A "
+    "pass of two samples per pixel, and the pilot before it, take longer than the run.",
 )
 def depth(length):
     p, f = meshes.room(2.0, 1)
@@ -394,7 +396,8 @@ def in_plane(step):
     "inside", "squares along each wall", [1, 2, 4, 8, 16, 32],
     "The mesh is the room around camera, lamp and block: every point is in it, or on its planes.",
     "The room of six squares, by a long run of adaptive.",
-    "Every wall moves, and with it the light on it: the whole picture is noise of the term direct.",
+    "Every wall moves, and with it the light on it: the whole picture is noise of the term direct, "
+    "which holds 0.94 of the squared error.",
 )
 def inside(splits):
     def scene(count):
