@@ -345,9 +345,9 @@ def grazing(degrees):
 @family(
     "depth", "length of the paths", [2, 3, 4, 8, 16],
     "A box in a closed room with walls of reflectance 0.8.", DIFFERENCES,
-    "Variance, and its tail: from 8 on the terms direct and boundary hold nearly all of the squared "
-    "error, and one sample alone up to 0.8 of a term's: late vertices close to the box. A pass of "
-    "two samples per pixel, and the pilot before it, take longer than the run.",
+    "Variance, and its tail: from 8 on the terms direct and boundary hold nearly all of the "
+    "squared error, and one sample alone up to 0.8 of a term's. A pass of two samples per pixel, "
+    "and the pilot before it, take longer than the run.",
 )
 def depth(length):
     p, f = meshes.room(2.0, 1)
