@@ -126,7 +126,8 @@ std::span<const uint32_t> BoxTree::leaf(uint32_t leaf) const {
   return {&order_[begin], end - begin};
 }
 
-void BoxTree::find_leaves(const FloatBox& box, std::vector<uint32_t>& leaves) const {
+void BoxTree::find_leaves(const FloatBox& box, uint32_t first,
+                          std::vector<uint32_t>& leaves) const {
   leaves.clear();
   if (leaves_ == 0) return;
   std::array<Part, 64> stack;  // the tree is balanced: twice as many leaves, one more
@@ -134,7 +135,7 @@ void BoxTree::find_leaves(const FloatBox& box, std::vector<uint32_t>& leaves) co
   stack[depth++] = {0, 0, leaves_};
   while (depth > 0) {
     const Part part = stack[--depth];
-    if (!nodes_[part.node].overlaps(box)) continue;
+    if (part.first + part.count <= first || !nodes_[part.node].overlaps(box)) continue;
     if (part.count == 1) {
       leaves.push_back(part.first);
       continue;

@@ -42,8 +42,8 @@ class BoxTree {
   // Indices of the boxes in a leaf, and these boxes.
   std::span<const uint32_t> leaf(uint32_t leaf) const;
   const LeafBoxes& boxes(uint32_t leaf) const { return packed_[leaf]; }
-  // Sets `leaves` to those whose boxes overlap `box`, in rising order.
-  void find_leaves(const FloatBox& box, std::vector<uint32_t>& leaves) const;
+  // Sets `leaves` to those whose boxes overlap `box`, in rising order, from the leaf `first` on.
+  void find_leaves(const FloatBox& box, uint32_t first, std::vector<uint32_t>& leaves) const;
 
  private:
   struct Item {

@@ -1,13 +1,12 @@
-// Where edges lie on faces: pairs from a tree over the faces' boxes, then tests in double precision.
+// Where edges lie on faces or near to them: tests of pairs in double precision.
 #include "edgetree/edges/contacts.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <tuple>
 
-#include "edgetree/edges/box_tree.h"
 #include "limn/core/parallel.h"
 
 namespace limn {
@@ -24,14 +23,11 @@ struct Interval {
   double t0, t1;
 };
 
-double size_of(const Mesh& mesh, FaceId face) {
-  float size = 0;
-  for (const uint32_t vertex : mesh.face(face)) {
-    const Vec3f& x = mesh.positions[vertex];
-    size = std::max({size, std::fabs(x.x), std::fabs(x.y), std::fabs(x.z)});
-  }
-  return size;
-}
+// Of an edge's length, what a face is near to at least.
+constexpr double kLeastNear = 1.0 / 16;
+// What touches a needle is off by no more than this share of its width: far beyond what rounding in
+// double precision explains.
+constexpr double kMostTouch = 0x1.0p-20;
 
 // The part of the segment that lies in the triangle, seen along its normal; its sides are moved
 // outward by at least `margin`, at most sqrt(3) times that.
@@ -89,67 +85,41 @@ std::optional<Interval> common_part(const Segment& longer, const Segment& shorte
   return Interval{std::min(ends[0], ends[1]), std::max(ends[0], ends[1])};
 }
 
-// V: whether the faces around a vertex form one closed fan that covers the directions around it once,
-// seen along their mean normal. No edge at such a vertex lies on another face at it.
-std::vector<bool> single_fans(const EdgeMesh& edges, const Mesh& mesh) {
-  const size_t count = mesh.positions.size();
-  std::vector<Vec3d> axes(count);
-  std::vector<uint8_t> covers(count);
-  std::vector<bool> single(count, true);
-  for (uint32_t f = 0; f < mesh.faces.size(); ++f)
-    for (const uint32_t v : mesh.faces[f]) axes[mesh.weld[v]] += edges.planes[f].n;
-  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
-    for (int k = 0; k < 3; ++k) {
-      const uint32_t v = mesh.weld[mesh.faces[f][k]];
-      const Vec3d& axis = axes[v];
-      const Vec3d x = cast<double>(mesh.positions[v]);
-      const auto to_corner = [&](int corner) {
-        return cast<double>(mesh.positions[mesh.weld[mesh.faces[f][corner % 3]]]) - x;
-      };
-      if (!(dot(edges.planes[f].n, axis) > 0)) single[v] = false;
-      const auto turn = [&](const Vec3d& a, const Vec3d& b) { return dot(axis, cross(a, b)); };
-      const Vec3d reference =
-          cross(axis, std::fabs(axis.x) < std::fabs(axis.y) ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0});
-      const bool covered =
-          turn(to_corner(k + 1), reference) >= 0 && turn(reference, to_corner(k + 2)) > 0;
-      covers[v] = static_cast<uint8_t>(std::min(covers[v] + covered, 2));
-    }
-  }
-  for (size_t v = 0; v < count; ++v)
-    if (covers[v] != 1) single[v] = false;
-  for (const Edge& edge : edges.edges) {
-    if (edge.edge_class != EdgeClass::kBorder && edge.edge_class != EdgeClass::kIrregular) continue;
-    for (const VertexId v : edge.vertices) single[v.index()] = single[mesh.weld[v.index()]] = false;
-  }
-  return single;
-}
-
 class ContactFinder {
  public:
-  ContactFinder(std::span<const EdgeMesh> objects, std::span<const Mesh* const> meshes, int threads)
-      : objects_(objects), meshes_(meshes), threads_(threads) {
-    collect_faces();
-    collect_edges();
-  }
+  ContactFinder(std::span<const EdgeMesh> objects, std::span<const Mesh* const> meshes,
+                const Vec3d& viewer, int threads)
+      : objects_(objects), meshes_(meshes), viewer_(viewer), threads_(threads) {}
 
-  std::vector<Contact> find() {
-    const std::vector<Pair> pairs = find_pairs();
-    if (pairs.empty()) return {};
-    list_edges_of_faces(pairs);
-    std::vector<Contact> contacts;
-    for (const Pair& pair : pairs) add_contacts(pair, contacts);
+  Contacts find(std::span<const FacePair> pairs) {
+    Contacts found;
+    if (pairs.empty()) return found;
+    collect_edges();
+    std::vector<Pair> touching;
+    for (const Pair& pair : find_pairs(pairs)) {
+      if (pair.may_touch) touching.push_back(pair);
+      if (pair.is_near) found.near.push_back({pair.edge, pair.face});
+    }
+    std::sort(found.near.begin(), found.near.end(), [](const NearFace& a, const NearFace& b) {
+      return std::tuple(a.edge.object, a.edge.edge, a.face.shape, a.face.face) <
+             std::tuple(b.edge.object, b.edge.edge, b.face.shape, b.face.face);
+    });
+    if (touching.empty()) return found;
+    list_edges_of_faces(touching);
+    std::vector<Contact>& contacts = found.contacts;
+    for (const Pair& pair : touching) add_contacts(pair, contacts);
     std::sort(contacts.begin(), contacts.end(), [](const Contact& a, const Contact& b) {
       return std::tuple(a.edge.object, a.edge.edge, a.face.shape, a.face.face, a.t0) <
              std::tuple(b.edge.object, b.edge.edge, b.face.shape, b.face.face, b.t0);
     });
-    return contacts;
+    return found;
   }
 
  private:
-  using LeafCorners = std::array<FaceIndices, BoxTree::kLeaf>;
   struct Pair {
     EdgeRef edge;
     FaceRef face;
+    bool may_touch, is_near;
   };
 
   Segment segment(EdgeRef id) const {
@@ -168,47 +138,41 @@ class ContactFinder {
     const size_t object = id.object.index();
     return size_around(objects_[object], *meshes_[object], id.edge);
   }
-
-  // All faces, with their boxes and those of their corners that may be passed over.
-  void collect_faces() {
-    uint32_t first_vertex = 0;
-    for (uint32_t o = 0; o < objects_.size(); ++o) {
-      first_face_.push_back(static_cast<uint32_t>(faces_.size()));
-      first_vertex_.push_back(first_vertex);
-      const Mesh& mesh = *meshes_[o];
-      const std::vector<bool> single = single_fans(objects_[o], mesh);
-      for (uint32_t f = 0; f < objects_[o].planes.size(); ++f) {
-        faces_.push_back({ShapeId(o), FaceId(f)});
-        FaceIndices& corners = single_corners_.emplace_back();
-        for (int k = 0; k < 3; ++k) {
-          const uint32_t v = mesh.weld[mesh.faces[f][k]];
-          corners[k] = single[v] ? first_vertex + v : UINT32_MAX;
-        }
-        const double tolerance = touch_tolerance(size_of(*meshes_[o], FaceId(f)), 0);
-        boxes_.push_back(box_of(this->corners(faces_.back()), tolerance));
-      }
-      first_vertex += static_cast<uint32_t>(mesh.positions.size());
-    }
+  // How far two things that touch may be apart: the tolerance, but for needles.
+  double tolerance(EdgeRef a, EdgeRef b) const {
+    return std::min({touch_tolerance(size(a), size(b)), most_touch(a), most_touch(b)});
   }
-
-  // Twice the tolerance: a float's rounding is less than the second half.
-  static FloatBox box_of(std::span<const Vec3d> points, double tolerance) {
-    FloatBox box;
-    for (int k = 0; k < 3; ++k) {
-      double low = points[0][k], high = low;
-      for (const Vec3d& x : points) {
-        low = std::min(low, x[k]);
-        high = std::max(high, x[k]);
-      }
-      box.lower[k] = static_cast<float>(low - 2 * tolerance);
-      box.upper[k] = static_cast<float>(high + 2 * tolerance);
-    }
-    return box;
+  double tolerance(EdgeRef edge, FaceRef face) const {
+    const double most =
+        touch_tolerance(size(edge), size_of(*meshes_[face.shape.index()], face.face));
+    return std::min({most, most_touch(edge), most_touch(face)});
   }
-
+  double most_touch(FaceRef face) const {
+    const Mesh& mesh = *meshes_[face.shape.index()];
+    if (!is_needle(mesh, face.face, viewer_)) return std::numeric_limits<double>::infinity();
+    return kMostTouch * width_of(mesh, face.face);
+  }
+  double most_touch(EdgeRef id) const {
+    double most = std::numeric_limits<double>::infinity();
+    for (const FaceRef face : objects_[id.object.index()].faces_around(id.edge))
+      most = std::min(most, most_touch(face));
+    return most;
+  }
+  // Up to which distance faces are near to the edge, on its part.
+  double reach(EdgeRef id, const Segment& s) const {
+    double reach = 0;
+    for (const FaceRef face : objects_[id.object.index()].faces_around(id.edge))
+      reach = std::max(reach, blur_of(*meshes_[face.shape.index()], face.face, viewer_));
+    return std::min(reach, kMostNear * length(s.d));
+  }
   // Edges by their first face: they lie in its box.
   void collect_edges() {
-    edge_offsets_.assign(faces_.size() + 1, 0);
+    uint32_t faces = 0;
+    for (const EdgeMesh& mesh : objects_) {
+      first_face_.push_back(faces);
+      faces += static_cast<uint32_t>(mesh.planes.size());
+    }
+    edge_offsets_.assign(faces + 1, 0);
     const auto for_every_edge = [&](const auto& visit) {
       for (uint32_t o = 0; o < objects_.size(); ++o)
         for (uint32_t e = 0; e < objects_[o].edges.size(); ++e) {
@@ -218,29 +182,22 @@ class ContactFinder {
         }
     };
     for_every_edge([&](uint32_t face, EdgeRef) { ++edge_offsets_[face + 1]; });
-    for (size_t f = 0; f < faces_.size(); ++f) edge_offsets_[f + 1] += edge_offsets_[f];
+    for (size_t f = 0; f < faces; ++f) edge_offsets_[f + 1] += edge_offsets_[f];
     edges_.resize(edge_offsets_.back());
     std::vector<uint32_t> next(edge_offsets_.begin(), edge_offsets_.end() - 1);
     for_every_edge([&](uint32_t face, EdgeRef id) { edges_[next[face]++] = id; });
   }
 
-  // Pairs that may touch, in an order that does not depend on threads.
-  std::vector<Pair> find_pairs() const {
-    const BoxTree tree(boxes_, threads_);
-    constexpr uint32_t kBlock = 256;  // leaves; not tuned
-    const uint32_t blocks = (tree.leaf_count() + kBlock - 1) / kBlock;
-    // Corners in the order of the leaves.
-    std::vector<LeafCorners> corners(tree.leaf_count());
-    for (uint32_t leaf = 0; leaf < tree.leaf_count(); ++leaf)
-      for (size_t i = 0; i < tree.leaf(leaf).size(); ++i)
-        corners[leaf][i] = single_corners_[tree.leaf(leaf)[i]];
-    std::vector<std::vector<Pair>> found(blocks);
-    parallel_for(blocks, threads_, [&](size_t block) {
-      std::vector<uint32_t> leaves;
-      const auto begin = static_cast<uint32_t>(block) * kBlock;
-      for (uint32_t leaf = begin; leaf < std::min(begin + kBlock, tree.leaf_count()); ++leaf) {
-        tree.find_leaves(tree.leaf_box(leaf), leaves);
-        find_pairs_of_leaf(tree, corners, leaf, leaves, found[block]);
+  // Pairs that may touch or are near, in an order that does not depend on threads.
+  std::vector<Pair> find_pairs(std::span<const FacePair> candidates) const {
+    constexpr size_t kBlock = 4096;  // not tuned
+    std::vector<std::vector<Pair>> found((candidates.size() + kBlock - 1) / kBlock);
+    parallel_for(found.size(), threads_, [&](size_t block) {
+      const size_t begin = block * kBlock;
+      for (const FacePair& pair :
+           candidates.subspan(begin, std::min(kBlock, candidates.size() - begin))) {
+        append_pairs(pair.first, pair.second, found[block]);
+        append_pairs(pair.second, pair.first, found[block]);
       }
     });
     std::vector<Pair> pairs;
@@ -248,31 +205,37 @@ class ContactFinder {
     return pairs;
   }
 
-  void find_pairs_of_leaf(const BoxTree& tree, std::span<const LeafCorners> corners, uint32_t leaf,
-                          std::span<const uint32_t> leaves, std::vector<Pair>& pairs) const {
-    for (const uint32_t first : tree.leaf(leaf)) {
-      for (uint32_t i = edge_offsets_[first]; i < edge_offsets_[first + 1]; ++i) {
-        const EdgeRef id = edges_[i];
-        const Segment s = segment(id);
-        const double edge_size = size(id);
-        const Vec3d ends[2] = {s.a, s.at(1)};
-        const FloatBox box = box_of(ends, touch_tolerance(edge_size, 0));
-        const uint32_t first_vertex = first_vertex_[id.object.index()];
-        const auto [a, b] = objects_[id.object.index()].edge(id.edge).vertices;
-        const uint32_t from = first_vertex + a.index(), to = first_vertex + b.index();
-        for (const uint32_t other : leaves) {
-          if (!tree.leaf_box(other).overlaps(box)) continue;
-          for (uint32_t bits = tree.boxes(other).overlaps(box); bits != 0; bits &= bits - 1) {
-            const int lane = std::countr_zero(bits);
-            const FaceIndices& c = corners[other][lane];
-            if (c[0] == from || c[1] == from || c[2] == from) continue;
-            if (c[0] == to || c[1] == to || c[2] == to) continue;
-            const FaceRef face = faces_[tree.leaf(other)[lane]];
-            if (may_touch(id, s, edge_size, face)) pairs.push_back({id, face});
-          }
-        }
-      }
+  // Of the edges that have `first` as their first face, with the other one.
+  void append_pairs(FaceRef first, FaceRef other, std::vector<Pair>& pairs) const {
+    const size_t f = first_face_[first.shape.index()] + first.face.index();
+    const Mesh& mesh = *meshes_[other.shape.index()];
+    for (uint32_t i = edge_offsets_[f]; i < edge_offsets_[f + 1]; ++i) {
+      const EdgeRef id = edges_[i];
+      const Segment s = segment(id);
+      const bool near =
+          is_near(id, s, std::max(reach(id, s), reach_of(mesh, other.face, viewer_)), other);
+      const bool touching = may_touch(id, s, size(id), other);
+      if (near || touching) pairs.push_back({id, other, touching, near});
     }
+  }
+
+  bool is_near(EdgeRef id, const Segment& s, double reach, FaceRef face) const {
+    const Plane& p = plane(face);
+    const Corners c = corners(face);
+    const double d0 = dot(p.n, s.a - c[0]);
+    const double d1 = d0 + dot(p.n, s.d);
+    if (std::min(d0, d1) > reach || std::max(d0, d1) < -reach) return false;
+    if (length_squared(p.n) == 0) return false;
+    for (const FaceRef around : objects_[id.object.index()].faces_around(id.edge))
+      if (around == face) return false;
+    auto part = clip(s, c, p.n, reach);
+    if (!part) return false;
+    if (d0 != d1) {
+      const double t0 = (-reach - d0) / (d1 - d0), t1 = (reach - d0) / (d1 - d0);
+      part->t0 = std::max(part->t0, std::min(t0, t1));
+      part->t1 = std::min(part->t1, std::max(t0, t1));
+    }
+    return part->t1 - part->t0 >= kLeastNear;
   }
 
   // Looser than what decides.
@@ -317,7 +280,6 @@ class ContactFinder {
   }
 
   void add_contacts(const Pair& pair, std::vector<Contact>& contacts) const {
-    if (lies_on_edge(pair)) return;
     const size_t count = contacts.size();
     const auto first = std::lower_bound(edges_of_faces_.begin(), edges_of_faces_.end(),
                                         EdgeOfFace{pair.face, EdgeId(0)}, before);
@@ -325,29 +287,16 @@ class ContactFinder {
       if (const auto part = part_along(pair.edge, {pair.face.shape, i->edge}))
         contacts.push_back({pair.edge, pair.face, part->t0, part->t1, i->edge});
     if (contacts.size() > count) return;
-    const double tolerance = touch_tolerance(
-        size(pair.edge), size_of(*meshes_[pair.face.shape.index()], pair.face.face));
     const Corners c = corners(pair.face);
-    if (const auto part = part_on_face(segment(pair.edge), c, plane(pair.face), tolerance, 0))
+    if (const auto part = part_on_face(segment(pair.edge), c, plane(pair.face),
+                                       tolerance(pair.edge, pair.face), 0))
       contacts.push_back({pair.edge, pair.face, part->t0, part->t1, EdgeId::none()});
-  }
-
-  // Whether all corners of the face lie on the edge's line: such a needle has no side of it.
-  bool lies_on_edge(const Pair& pair) const {
-    const Segment s = segment(pair.edge);
-    const Vec3d along = normalize(s.d);
-    const double tolerance = touch_tolerance(
-        size(pair.edge), size_of(*meshes_[pair.face.shape.index()], pair.face.face));
-    double off = 0;
-    for (const Vec3d& corner : corners(pair.face))
-      off = std::max(off, length(cross(along, corner - s.a)));
-    return off <= 4 * tolerance;
   }
 
   // The part of edge a along which edge b runs. Decided for both alike.
   std::optional<Interval> part_along(EdgeRef a, EdgeRef b) const {
     const Segment s = segment(a), r = segment(b);
-    const double tolerance = touch_tolerance(size(a), size(b));
+    const double tolerance = this->tolerance(a, b);
     const double difference = length_squared(s.d) - length_squared(r.d);
     const bool longer = difference != 0
                             ? difference > 0
@@ -361,14 +310,10 @@ class ContactFinder {
 
   std::span<const EdgeMesh> objects_;
   std::span<const Mesh* const> meshes_;
+  Vec3d viewer_;
   int threads_;
-  std::vector<uint32_t> first_face_;    // of each object, in faces_
-  std::vector<FaceRef> faces_;          // of all objects
-  std::vector<FloatBox> boxes_;         // theirs
-  std::vector<uint32_t> first_vertex_;  // of each object, in a count over all
-  // Of every face, the corners with a single fan of faces, counted over all objects; else UINT32_MAX.
-  std::vector<FaceIndices> single_corners_;
-  // Edges whose first face is faces_[f]: edges_[edge_offsets_[f], edge_offsets_[f + 1]).
+  std::vector<uint32_t> first_face_;  // of each object, in a count over all
+  // Edges whose first face is the f-th of all: edges_[edge_offsets_[f], edge_offsets_[f + 1]).
   std::vector<uint32_t> edge_offsets_;
   std::vector<EdgeRef> edges_;
   std::vector<EdgeOfFace> edges_of_faces_;  // sorted
@@ -383,9 +328,9 @@ double size_around(const EdgeMesh& edges, const Mesh& mesh, EdgeId edge) {
   return size;
 }
 
-std::vector<Contact> find_contacts(std::span<const EdgeMesh> objects,
-                                   std::span<const Mesh* const> meshes, int threads) {
-  return ContactFinder(objects, meshes, threads).find();
+Contacts find_contacts(std::span<const EdgeMesh> objects, std::span<const Mesh* const> meshes,
+                       std::span<const FacePair> pairs, const Vec3d& viewer, int threads) {
+  return ContactFinder(objects, meshes, viewer, threads).find(pairs);
 }
 
 }  // namespace limn

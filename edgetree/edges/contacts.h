@@ -1,5 +1,6 @@
 #pragma once
-// Where edges of a scene lie on faces of it, to the rounding of positions.
+// Where edges of a scene lie on faces of it, to the rounding of positions, and which faces are
+// nearer to them than rays can tell.
 //
 // A position is taken to have been rounded to float twice (in a file, and after its transform): what
 // the rounding of positions of size M explains is touch_tolerance(M). M is the largest coordinate of
@@ -8,8 +9,13 @@
 #include <vector>
 
 #include "limn/edgetree/edges.h"
+#include "limn/edgetree/face_pairs.h"
 
 namespace limn {
+
+//
+// Needles may be narrower than that, and would touch along both of their sides. They touch what is
+// in their place to a millionth of their width, and are near to the rest.
 
 // sqrt(3) * 2 * 2^-24 for each of two positions, rounded up.
 inline double touch_tolerance(double size_a, double size_b) {
@@ -27,11 +33,25 @@ struct Contact {
   EdgeId along;
 };
 
-// All contacts of edges that are not flat with faces that have area and are not so thin that they
-// lie on the edge as a whole; by edge. Whether two edges run along each other is decided for the
-// two alike. meshes: of the objects.
-std::vector<Contact> find_contacts(std::span<const EdgeMesh> objects,
-                                   std::span<const Mesh* const> meshes, int threads);
+// Nearness ends at this share of an edge's length, or of a face's longest side.
+inline constexpr double kMostNear = 0x1.0p-8;
+// An edge, and a face that is near to at least a sixteenth of it, but is not around it: nearer than
+// the reach of either's faces (face_pairs.h). A near face lies along the edge, or leaves a common
+// corner at less than a sixteenth.
+struct NearFace {
+  EdgeRef edge;
+  FaceRef face;
+};
+
+struct Contacts {
+  std::vector<Contact> contacts;  // by edge
+  std::vector<NearFace> near;     // by edge; also of edges that touch the face
+};
+
+// Of edges that are not flat with faces that have area. Whether two edges run along each other is
+// decided for the two alike. meshes: of the objects; pairs, viewer: as find_face_pairs has them.
+Contacts find_contacts(std::span<const EdgeMesh> objects, std::span<const Mesh* const> meshes,
+                       std::span<const FacePair> pairs, const Vec3d& viewer, int threads);
 
 // The size of the faces of `mesh` around an edge: M above.
 double size_around(const EdgeMesh& edges, const Mesh& mesh, EdgeId edge);

@@ -2,12 +2,10 @@
 #include "limn/edgetree/crossing_curves.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <optional>
 #include <tuple>
 
-#include "edgetree/edges/box_tree.h"
 #include "edgetree/edges/contacts.h"
 #include "edgetree/edges/fold.h"
 #include "limn/core/parallel.h"
@@ -26,16 +24,6 @@ double size_of(const Triangle& triangle) {
   for (const Vec3f& x : triangle.corners)
     for (int k = 0; k < 3; ++k) size = std::max(size, std::fabs(double{x[k]}));
   return size;
-}
-
-FloatBox box_of(const Triangle& triangle) {
-  const auto& [a, b, c] = triangle.corners;
-  FloatBox box;
-  for (int k = 0; k < 3; ++k) {
-    box.lower[k] = std::min({a[k], b[k], c[k]});
-    box.upper[k] = std::max({a[k], b[k], c[k]});
-  }
-  return box;
 }
 
 // Heights of points over the plane of a triangle, times twice its area: six times the volume of the
@@ -160,66 +148,13 @@ int common_corners(const Triangle& a, const Triangle& b) {
   return count;
 }
 
-std::vector<Triangle> triangles_of(std::span<const Mesh* const> meshes) {
-  std::vector<Triangle> triangles;
-  size_t count = 0;
-  for (const Mesh* mesh : meshes) count += mesh->faces.size();
-  triangles.reserve(count);
-  for (uint32_t s = 0; s < meshes.size(); ++s)
-    for (uint32_t f = 0; f < meshes[s]->faces.size(); ++f) {
-      const auto& positions = meshes[s]->positions;
-      const auto& [a, b, c] = meshes[s]->faces[f];
-      triangles.push_back({{positions[a], positions[b], positions[c]}, {ShapeId(s), FaceId(f)}});
-    }
-  return triangles;
+Triangle triangle_of(std::span<const Mesh* const> meshes, FaceRef face) {
+  const Mesh& mesh = *meshes[face.shape.index()];
+  const auto& [a, b, c] = mesh.face(face.face);
+  return {{mesh.positions[a], mesh.positions[b], mesh.positions[c]}, face};
 }
 
 auto key(FaceRef face) { return std::pair(face.shape, face.face); }
-
-// All triangles of the scene, and pairs of them whose boxes overlap.
-class Search {
- public:
-  Search(std::vector<Triangle> triangles, int threads)
-      : triangles_(std::move(triangles)), boxes_(boxes_of(triangles_)), tree_(boxes_, threads) {}
-
-  uint32_t leaf_count() const { return tree_.leaf_count(); }
-
-  // Of pairs within the leaf, and with triangles of later ones.
-  void append_pairs_of(uint32_t leaf, std::vector<CrossingSegment>& segments) const {
-    std::vector<uint32_t> others;
-    tree_.find_leaves(tree_.leaf_box(leaf), others);
-    const auto own = tree_.leaf(leaf);
-    for (const uint32_t other : others) {
-      if (other < leaf) continue;
-      for (size_t i = 0; i < own.size(); ++i) {
-        uint32_t lanes = tree_.boxes(other).overlaps(boxes_[own[i]]);
-        if (other == leaf) lanes &= ~((2u << i) - 1);
-        for (; lanes != 0; lanes &= lanes - 1)
-          append_pair(own[i], tree_.leaf(other)[std::countr_zero(lanes)], segments);
-      }
-    }
-  }
-
- private:
-  static std::vector<FloatBox> boxes_of(const std::vector<Triangle>& triangles) {
-    std::vector<FloatBox> boxes;
-    boxes.reserve(triangles.size());
-    for (const Triangle& triangle : triangles) boxes.push_back(box_of(triangle));
-    return boxes;
-  }
-
-  void append_pair(uint32_t i, uint32_t j, std::vector<CrossingSegment>& segments) const {
-    // In the order of the shapes' faces, whatever the tree's.
-    const Triangle &a = triangles_[std::min(i, j)], &b = triangles_[std::max(i, j)];
-    // Neighbours along an edge meet there and nowhere else, or in a plane.
-    if (common_corners(a, b) > 1) return;
-    if (const auto segment = cross_faces(a, b)) segments.push_back(*segment);
-  }
-
-  std::vector<Triangle> triangles_;
-  std::vector<FloatBox> boxes_;
-  BoxTree tree_;
-};
 
 Vec3<Lanes> velocity_on(const Mesh& mesh, FaceId id, const Vec3d& normal, const Vec3d& x) {
   if (mesh.position_tangents.empty()) return {};
@@ -243,14 +178,18 @@ Vec3d normal_of(const Mesh& mesh, FaceId id) {
 
 }  // namespace
 
-std::vector<CrossingSegment> find_crossings(std::span<const Mesh* const> meshes, int threads) {
-  const Search search(triangles_of(meshes), threads);
-  constexpr uint32_t kBlock = 64;  // leaves; not tuned
-  std::vector<std::vector<CrossingSegment>> blocks((search.leaf_count() + kBlock - 1) / kBlock);
+std::vector<CrossingSegment> find_crossings(std::span<const Mesh* const> meshes,
+                                            std::span<const FacePair> pairs, int threads) {
+  constexpr size_t kBlock = 4096;  // not tuned
+  std::vector<std::vector<CrossingSegment>> blocks((pairs.size() + kBlock - 1) / kBlock);
   parallel_for(blocks.size(), threads, [&](size_t block) {
-    const auto begin = static_cast<uint32_t>(block * kBlock);
-    for (uint32_t leaf = begin; leaf < std::min(begin + kBlock, search.leaf_count()); ++leaf)
-      search.append_pairs_of(leaf, blocks[block]);
+    const size_t begin = block * kBlock;
+    for (const FacePair& pair : pairs.subspan(begin, std::min(kBlock, pairs.size() - begin))) {
+      const Triangle a = triangle_of(meshes, pair.first), b = triangle_of(meshes, pair.second);
+      // Neighbours along an edge meet there and nowhere else, or in a plane.
+      if (common_corners(a, b) > 1) continue;
+      if (const auto segment = cross_faces(a, b)) blocks[block].push_back(*segment);
+    }
   });
   std::vector<CrossingSegment> segments;
   for (const auto& block : blocks) segments.insert(segments.end(), block.begin(), block.end());

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <unordered_map>
 
+#include "edgetree/edges/contacts.h"
 #include "edgetree/edges/union_find.h"
 
 namespace limn {
@@ -51,7 +52,8 @@ uint64_t undirected_key(VertexId a, VertexId b) {
   return uint64_t{std::min(a, b).index()} << 32 | std::max(a, b).index();
 }
 
-// Sets of collinear vertices that faces of zero area tie together.
+// Sets of collinear vertices that faces of zero area tie together. Of needles, which only rounding
+// keeps from being lines, short sides say nothing of where the line runs.
 class SliverLines {
  public:
   SliverLines(const Mesh& mesh, const std::vector<VertexId>& ids,
@@ -61,7 +63,7 @@ class SliverLines {
       const FaceIndices& face = mesh.face(slivers[s]);
       for (int k = 0; k < 3; ++k) {
         const VertexId a = ids[face[k]], b = ids[face[(k + 1) % 3]];
-        if (a == b) continue;
+        if (a == b || is_across(face, k)) continue;
         const auto [found, is_new] = line_of_edge_.emplace(undirected_key(a, b), s);
         if (!is_new) lines_.join(s, found->second);
       }
@@ -90,6 +92,30 @@ class SliverLines {
   }
 
  private:
+  // Whether a side is no longer than 16 times the width of a needle.
+  bool is_across(const FaceIndices& face, int k) const {
+    Vec3d x[3];
+    for (int i = 0; i < 3; ++i) x[i] = cast<double>(mesh_.positions[face[(k + i) % 3]]);
+    if (!has_area(x[0], x[1], x[2])) return false;
+    const double longest = std::max(
+        {length_squared(x[1] - x[0]), length_squared(x[2] - x[1]), length_squared(x[0] - x[2])});
+    const double twice_area = length_squared(cross(x[1] - x[0], x[2] - x[0]));
+    return length_squared(x[1] - x[0]) * longest <= 256 * twice_area;
+  }
+
+  // Whether v lies on the side: exactly, or to the rounding of positions and not at an end.
+  bool is_on(VertexId v, VertexId from, VertexId to) const {
+    const auto position = [&](VertexId id) { return cast<double>(mesh_.positions[id.index()]); };
+    const Vec3d x = position(v), a = position(from), b = position(to);
+    if (!has_area(a, b, x)) return true;
+    double size = 0;
+    for (const Vec3d& p : {x, a, b})
+      size = std::max({size, std::fabs(p.x), std::fabs(p.y), std::fabs(p.z)});
+    const double rounding = touch_tolerance(size, size);
+    return length(cross(b - a, x - a)) <= rounding * length(b - a) && length(x - a) > rounding &&
+           length(x - b) > rounding;
+  }
+
   // Points of one line are told apart, and ordered, by the axis along which it runs longest.
   std::vector<VertexId> between(VertexId from, VertexId to,
                                 const std::vector<VertexId>& candidates) const {
@@ -101,7 +127,7 @@ class SliverLines {
     const auto along = [&](VertexId v) { return sign * position(v)[axis]; };
     std::vector<VertexId> inside;
     for (const VertexId v : candidates)
-      if (along(v) > along(from) && along(v) < along(to)) inside.push_back(v);
+      if (along(v) > along(from) && along(v) < along(to) && is_on(v, from, to)) inside.push_back(v);
     std::sort(inside.begin(), inside.end(), [&](VertexId a, VertexId b) {
       return along(a) != along(b) ? along(a) < along(b) : a < b;
     });

@@ -42,15 +42,19 @@ class Unifier {
     find_speeds();
   }
 
-  // contacts: sorted by edge.
-  void unite(std::span<const Contact> contacts) {
+  void unite(const Contacts& found) {
+    const std::span<const Contact> contacts = found.contacts;
     for (size_t begin = 0, end; begin < contacts.size(); begin = end) {
       const EdgeRef id = contacts[begin].edge;
       for (end = begin; end < contacts.size() && contacts[end].edge == id; ++end) continue;
       cut(id, contacts.subspan(begin, end - begin));
     }
-    for (uint32_t o = 0; o < objects_.size(); ++o)
-      if (const auto parts = parts_.find(o); parts != parts_.end()) rewrite(o, parts->second);
+    for (uint32_t o = 0; o < objects_.size(); ++o) {
+      const auto near = of_object(found.near, o);
+      const auto parts = parts_.find(o);
+      if (parts != parts_.end() || !near.empty())
+        rewrite(o, parts != parts_.end() ? parts->second : std::vector<Part>{}, near);
+    }
   }
 
  private:
@@ -285,8 +289,31 @@ class Unifier {
     return found->second;
   }
 
+  static std::span<const NearFace> of_object(std::span<const NearFace> near, uint32_t object) {
+    const auto [begin, end] = std::equal_range(
+        near.begin(), near.end(), NearFace{{ShapeId(object), {}}, {}},
+        [](const NearFace& a, const NearFace& b) { return a.edge.object < b.edge.object; });
+    return {begin, end};
+  }
+
+  // Appends what is near to the whole edge and not around its part.
+  static void append_near(std::span<const NearFace> near, EdgeId whole,
+                          std::span<const FaceRef> faces, EdgeMesh& mesh) {
+    const size_t before = mesh.faces_and_near.size();
+    const auto [begin, end] = std::equal_range(
+        near.begin(), near.end(), NearFace{{{}, whole}, {}},
+        [](const NearFace& a, const NearFace& b) { return a.edge.edge < b.edge.edge; });
+    if (begin != end)
+      mesh.faces_and_near.insert(mesh.faces_and_near.end(), faces.begin(), faces.end());
+    for (auto i = begin; i != end; ++i)
+      if (std::find(faces.begin(), faces.end(), i->face) == faces.end())
+        mesh.faces_and_near.push_back(i->face);
+    if (mesh.faces_and_near.size() == before + faces.size()) mesh.faces_and_near.resize(before);
+    mesh.near_offsets.push_back(static_cast<uint32_t>(mesh.faces_and_near.size()));
+  }
+
   // parts: by edge, the whole edge before its parts.
-  void rewrite(uint32_t object, std::span<const Part> parts) {
+  void rewrite(uint32_t object, std::span<const Part> parts, std::span<const NearFace> near) {
     const EdgeMesh& old = before_[object];
     EdgeMesh& mesh = objects_[object];
     struct Source {
@@ -312,12 +339,15 @@ class Unifier {
     mesh.edges.clear();
     mesh.face_offsets.assign(1, 0);
     mesh.incident_faces.clear();
+    mesh.near_offsets.assign(1, 0);
     for (const Source& source : sources) {
       mesh.edges.push_back(*source.edge);
+      const EdgeId whole = source.part
+                               ? source.part->whole
+                               : EdgeId(static_cast<uint32_t>(source.edge - old.edges.data()));
       const auto faces =
-          source.part
-              ? std::span<const FaceRef>(source.part->faces)
-              : old.faces_around(EdgeId(static_cast<uint32_t>(source.edge - old.edges.data())));
+          source.part ? std::span<const FaceRef>(source.part->faces) : old.faces_around(whole);
+      append_near(near, whole, faces, mesh);
       mesh.incident_faces.insert(mesh.incident_faces.end(), faces.begin(), faces.end());
       mesh.incidences.resize(mesh.incident_faces.size());
       if (source.part) {
@@ -330,6 +360,7 @@ class Unifier {
                     [](const Incidence& i) { return i == Incidence{}; })) {
       mesh.incidences.clear();
     }
+    if (mesh.faces_and_near.empty()) mesh.near_offsets.clear();
   }
 
   std::span<const TouchingShape> shapes_;
@@ -342,12 +373,12 @@ class Unifier {
 
 }  // namespace
 
-void unite_touching_edges(std::span<const TouchingShape> shapes, int threads,
-                          std::vector<EdgeMesh>& objects) {
+void unite_touching_edges(std::span<const TouchingShape> shapes, std::span<const FacePair> pairs,
+                          const Vec3d& viewer, int threads, std::vector<EdgeMesh>& objects) {
   std::vector<const Mesh*> meshes;
   for (const TouchingShape& shape : shapes) meshes.push_back(shape.mesh);
-  const std::vector<Contact> contacts = find_contacts(objects, meshes, threads);
-  if (!contacts.empty()) Unifier(shapes, objects).unite(contacts);
+  const Contacts found = find_contacts(objects, meshes, pairs, viewer, threads);
+  if (!found.contacts.empty() || !found.near.empty()) Unifier(shapes, objects).unite(found);
 }
 
 }  // namespace limn

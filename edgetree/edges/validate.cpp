@@ -24,6 +24,9 @@ const char* fault_of_sizes(const EdgeMesh& mesh) {
     return "offsets do not span the incident faces";
   for (size_t e = 0; e < mesh.edges.size(); ++e)
     if (mesh.face_offsets[e] >= mesh.face_offsets[e + 1]) return "an edge has no faces";
+  if (!mesh.near_offsets.empty() && (mesh.near_offsets.size() != mesh.edges.size() + 1 ||
+                                     mesh.near_offsets.back() != mesh.faces_and_near.size()))
+    return "offsets do not span the near faces";
   for (const FaceRef face : mesh.incident_faces)
     if (face.shape == mesh.shape && face.face.index() >= mesh.planes.size())
       return "an incident face is out of range";

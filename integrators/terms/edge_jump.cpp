@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "integrators/terms/near_faces.h"
 #include "limn/core/face_copies.h"
 
 namespace limn {
@@ -29,11 +30,10 @@ struct Sides {
   std::optional<FaceSide> negative, positive;
 };
 
-// Whether a face is seen before another one on the same side. Copies have one slope, but for rounding.
+// Whether a face is seen before another one on the same side.
 bool hides(const Scene& scene, const FaceSide& a, double slope_a, const FaceSide& b, double slope_b,
            const Vec3d& omega) {
-  const bool near = std::fabs(slope_a - slope_b) <= 0x1.0p-30 * (1 + std::fabs(slope_a));
-  if (near && are_copies(scene, a.face, b.face)) return is_met_first(scene, a.face, b.face, omega);
+  if (overlap(a, b)) return is_met_first(scene, a.face, b.face, omega);
   return slope_a < slope_b;
 }
 
@@ -97,8 +97,8 @@ bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView&
   ray.start = start;
   const FacesAround around = mesh.around(view.id.edge);
   fetch_faces(context.scene, around);
-  ray.skip_faces = around.faces;
-  if (part.region) {
+  ray.skip_faces = around.all;
+  if (part.region && around.near.empty()) {
     const auto lamp = part.regions->flat_faces(*part.region);
     const auto is_of_lamp = [&](FaceRef f) { return !lamp.empty() && f.shape == lamp[0].shape; };
     if (std::all_of(around.faces.begin(), around.faces.end(), is_of_lamp)) ray.skip_faces = lamp;
@@ -107,7 +107,8 @@ bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView&
   fetch_corners(context.scene, around);  // while the ray is traced
   Hit behind;
   ++rays.closest;
-  const bool found = context.tracer.closest(ray, behind);
+  const bool found =
+      closest_at_edge(context.tracer, context.scene, around, view.y, view.distance, ray, behind);
   if (found && behind.t < view.distance) return false;
 
   NoVisitor nothing;

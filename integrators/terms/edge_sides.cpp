@@ -7,19 +7,26 @@
 
 namespace limn {
 
-Vec3d direction_into_face(const Mesh& mesh, FaceId face, const Vec3d& x0, const Vec3d& along) {
-  Vec3d best{};
+// A component of x0 may be off by its own rounding, one of a by that of the corner, one of `across`
+// by three roundings of |a|.
+FaceSide side_of_face(const Scene& scene, FaceRef face, const Vec3d& x0, const Vec3d& along) {
+  FaceSide side{face, {}};
   double best_length = 0;
-  for (const Vec3d& corner : face_corners<double>(mesh, face)) {
+  for (const Vec3d& corner : face_corners<double>(scene.shape(face.shape).mesh, face.face)) {
     const Vec3d a = corner - x0;
     const Vec3d across = a - along * dot(a, along);
     const double across_length = length(across);
     if (across_length > best_length) {
       best_length = across_length;
-      best = across / across_length;
+      side.into = across / across_length;
+      side.rounding = 0x1.0p-50 * (length(x0) + length(a)) / across_length;
     }
   }
-  return best;
+  return side;
+}
+
+bool overlap(const FaceSide& a, const FaceSide& b) {
+  return length(a.into - b.into) <= a.rounding + b.rounding;
 }
 
 void RimOrder::add(uint8_t rim, bool positive, double slope) {
@@ -52,13 +59,15 @@ std::optional<FaceSide> blocked_at_edge(const Scene& scene, const EdgeStart& edg
   for_every_side(scene, edge.around, edge.x0, along, [&](const FaceSide& side, Incidence) {
     if (side.face == edge.start.face) return;
     const Vec3d& g = side.into;
-    // A copy of the face that the path starts on, to the rounding of directions, hides nothing of it.
-    if (length_squared(g - f) <= 0x1.0p-60 && are_copies(scene, side.face, edge.start.face)) return;
+    if (overlap(side, edge.start)) return;
     const double gw = turn(g, direction);
     const double r = turn(f, g) / gw;
     const double s = turn(f, direction) / gw;
     if (gw == 0 || !(r > 0) || !(s > 0)) return;
-    if (!nearest || r < nearest_r) {
+    const bool first = !nearest || (overlap(side, *nearest)
+                                        ? is_met_first(scene, side.face, nearest->face, direction)
+                                        : r < nearest_r);
+    if (first) {
       nearest = side;
       nearest_r = r;
     }

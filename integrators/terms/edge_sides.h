@@ -11,10 +11,11 @@
 namespace limn {
 
 // One side of a face beside an edge: the face, and the unit vector across the edge that lies in it
-// and points into it.
+// and points into it, with a bound of its rounding.
 struct FaceSide {
   FaceRef face;
   Vec3d into;
+  double rounding = 0;
 };
 
 // A path that starts exactly on an edge, on one of the faces around it. Its first rays never meet
@@ -26,9 +27,13 @@ struct EdgeStart {
   FaceSide start;  // where the path is
 };
 
-// `into` of FaceSide. x0: a point of the edge, along: its unit direction. Of a face that the edge
-// runs through, one of the two sides; the other is its opposite.
-Vec3d direction_into_face(const Mesh& mesh, FaceId face, const Vec3d& x0, const Vec3d& along);
+// x0: a point of the edge, along: its unit direction. Of a face that the edge runs through, one of
+// the two sides; the other is its opposite.
+FaceSide side_of_face(const Scene& scene, FaceRef face, const Vec3d& x0, const Vec3d& along);
+
+// Whether two sides lie in one place, so that the faces overlap there: as far as double precision
+// can tell. Which of them is seen is_met_first says (limn/core/face_copies.h).
+bool overlap(const FaceSide& a, const FaceSide& b);
 
 // Calls visit(side, incidence) for every side of the faces around an edge.
 template <class Visit>
@@ -37,9 +42,9 @@ void for_every_side(const Scene& scene, const FacesAround& around, const Vec3d& 
   for (size_t i = 0; i < around.faces.size(); ++i) {
     const FaceRef face = around.faces[i];
     const Incidence incidence = around.incidence(i);
-    const Vec3d into = direction_into_face(scene.shape(face.shape).mesh, face.face, x0, along);
-    visit(FaceSide{face, into}, incidence);
-    if (incidence.through) visit(FaceSide{face, -into}, incidence);
+    const FaceSide side = side_of_face(scene, face, x0, along);
+    visit(side, incidence);
+    if (incidence.through) visit(FaceSide{face, -side.into, side.rounding}, incidence);
   }
 }
 

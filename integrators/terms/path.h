@@ -8,6 +8,7 @@
 
 #include "integrators/terms/direction_field.h"
 #include "integrators/terms/edge_sides.h"
+#include "integrators/terms/near_faces.h"
 #include "limn/core/lights.h"
 #include "limn/core/ray_tracer.h"
 #include "limn/core/reverse.h"
@@ -206,7 +207,9 @@ class PathTracer {
         hit = {side->face, 0};
         return true;
       }
-      ray.skip_faces = edge->around.faces;
+      ray.skip_faces = edge->around.all;
+      ++rays_.closest;
+      return closest_at_edge(c_.tracer, c_.scene, edge->around, ray.origin, 0, ray, hit);
     }
     ++rays_.closest;
     return any ? c_.tracer.occluded(ray) : c_.tracer.closest(ray, hit);
@@ -270,12 +273,13 @@ class PathTracer {
     ray.end = light.face.value_or(FaceRef{});
     if (edge) {
       if (blocked_at_edge(c_.scene, *edge, light.wo)) return true;
-      ray.skip_faces = edge->around.faces;
+      ray.skip_faces = edge->around.all;
     }
     // Ends a float's rounding before the light, so that neighbours of the chosen face do not hide
     // the point.
     ray.t_max = light.distance * (1 - 0x1p-20);
     ++rays_.shadow;
+    if (edge) return occluded_from_edge(c_.tracer, c_.scene, edge->around, ray);
     return c_.tracer.occluded(ray);
   }
 

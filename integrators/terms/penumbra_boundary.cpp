@@ -11,6 +11,7 @@
 #include <algorithm>
 
 #include "integrators/terms/film_point.h"
+#include "integrators/terms/near_faces.h"
 #include "integrators/terms/penumbra.h"
 #include "integrators/terms/term_table.h"
 #include "integrators/terms/vertex_edges.h"
@@ -89,10 +90,11 @@ std::optional<PenumbraTerm::Drawn> PenumbraTerm::draw(double u, Rng& rng, RayCou
   const auto omega = regions_.draw_direction(lamp_edge.region, e, u1, u2);
   if (!omega) return {};
   Ray ray{e, -*omega};
-  ray.skip_faces = mesh.faces_around(id.edge);
+  const FacesAround around = mesh.around(id.edge);
+  ray.skip_faces = around.all;
   Hit hit;
   ++rays.closest;
-  if (!context_.tracer.closest(ray, hit)) return {};
+  if (!closest_at_edge(context_.tracer, context_.scene, around, e, 0, ray, hit)) return {};
   const auto corners =
       face_corners<double>(context_.scene.shape(hit.face.shape).mesh, hit.face.face);
   const Vec3d n = normalize(cross(corners[1] - corners[0], corners[2] - corners[0]));

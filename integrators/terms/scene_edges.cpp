@@ -36,8 +36,10 @@ EdgeSamplerInput make_sampler_input(const Scene& scene, int threads) {
     input.objects.push_back(build_edge_mesh(shape.mesh, black_behind, ShapeId(s)));
     meshes.push_back(&shape.mesh);
   }
-  unite_touching_edges(touching_shapes(scene), threads, input.objects);
-  const std::vector<CrossingSegment> crossings = find_crossings(meshes, threads);
+  const Vec3d pinhole = value(scene.camera.origin);
+  const std::vector<FacePair> pairs = find_face_pairs(meshes, pinhole, threads);
+  unite_touching_edges(touching_shapes(scene), pairs, pinhole, threads, input.objects);
+  const std::vector<CrossingSegment> crossings = find_crossings(meshes, pairs, threads);
   if (!crossings.empty()) input.objects.push_back(crossing_edges(meshes, crossings));
   const Lights lights(scene);
   for (const Light* light : lights.all()) light->add_triangles(input.lights);

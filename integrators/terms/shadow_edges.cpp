@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "integrators/terms/near_faces.h"
+
 namespace limn {
 namespace {
 
@@ -34,8 +36,7 @@ double lit_side(const Scene& scene, const EdgeMesh& edges, EdgeId edge, const Li
   RimOrder order;
   if (!around.incidences.empty()) {
     for_every_face([&](FaceRef face, Incidence incidence, bool positive) {
-      const Vec3d into =
-          direction_into_face(scene.shape(face.shape).mesh, face.face, x0, normalize(along));
+      const Vec3d into = side_of_face(scene, face, x0, normalize(along)).into;
       order.add(incidence.rim, positive, dot(into, w) / std::fabs(dot(into, n)));
     });
   }
@@ -145,12 +146,15 @@ std::optional<ShadowPoint> ShadowEdges::cast(const ShadowEdge& edge, double t,
   const double w_length = length(w);
   const double before = origin.infinite ? reach_ : w_length;  // of the ray, up to y
   Ray ray{y - w * (before / w_length), w / w_length};
-  ray.skip_faces = mesh.faces_around(edge.id.edge);
+  const FacesAround around = mesh.around(edge.id.edge);
+  ray.skip_faces = around.all;
   Hit hit;
   ++rays.closest;
   // Where the edge touches what it shades, to a float's rounding, the shadow starts behind the edge
   // for every viewer, who sees the edge itself.
-  if (!context_.tracer.closest(ray, hit) || hit.t <= before * (1 + 0x1p-20)) return {};
+  const bool found =
+      closest_at_edge(context_.tracer, context_.scene, around, y, before, ray, hit);
+  if (!found || hit.t <= before * (1 + 0x1p-20)) return {};
   const auto c = face_corners<double>(context_.scene.shape(hit.face.shape).mesh, hit.face.face);
   const Vec3d n = normalize(cross(c[1] - c[0], c[2] - c[0]));
   const double slope = dot(n, w);

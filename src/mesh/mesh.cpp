@@ -8,6 +8,7 @@
 
 #include "limn/core/check.h"
 #include "src/mesh/face_shape.h"
+#include "src/mesh/mesh_build.h"
 
 namespace limn {
 
@@ -38,6 +39,13 @@ void weld_positions(Mesh& mesh) {
 
 namespace {
 
+template <class S>
+std::vector<FaceShape<S>> face_shapes(const Mesh& mesh) {
+  std::vector<FaceShape<S>> shapes(mesh.faces.size());
+  for (uint32_t f = 0; f < shapes.size(); ++f) shapes[f] = face_shape<S>(mesh, FaceId(f));
+  return shapes;
+}
+
 // Shading normals as the scalar S carries them: N of them, and per vertex the horizon.
 template <class S>
 struct ShadingNormals {
@@ -64,8 +72,10 @@ void assign_normal_ids(Mesh& mesh) {
 // they cancel (fins around an axis, a sheet that is folded onto itself) to a thousandth and to what
 // rounding may have left of it, any face's normal serves: the direction of the rest says nothing, and its
 // derivative has no bound. A vertex of faces without area alone gets +Z, which nothing ever reads.
+// cancelled: how many of the latter there are, if asked for.
 template <class S>
-std::vector<Vec3<S>> computed_normals(const Mesh& mesh, const std::vector<FaceShape<S>>& shapes) {
+std::vector<Vec3<S>> computed_normals(const Mesh& mesh, const std::vector<FaceShape<S>>& shapes,
+                                      size_t* cancelled = nullptr) {
   std::vector<Vec3<S>> normals(mesh.normals.size());
   std::vector<uint32_t> any_face(mesh.normals.size(), kUnused);
   std::vector<double> angles(mesh.normals.size()), noise(mesh.normals.size());
@@ -87,6 +97,7 @@ std::vector<Vec3<S>> computed_normals(const Mesh& mesh, const std::vector<FaceSh
       normals[n] = normalize(normals[n]);
     } else {
       normals[n] = shapes[any_face[n]].normal;
+      if (cancelled) ++*cancelled;
     }
   }
   return normals;
@@ -148,8 +159,7 @@ void average_tied_slopes(const Mesh& mesh, const std::vector<FaceShape<Dual>>& s
 
 template <class S>
 ShadingNormals<S> shading_normals(const Mesh& mesh) {
-  std::vector<FaceShape<S>> shapes(mesh.faces.size());
-  for (uint32_t f = 0; f < shapes.size(); ++f) shapes[f] = face_shape<S>(mesh, FaceId(f));
+  const std::vector<FaceShape<S>> shapes = face_shapes<S>(mesh);
   ShadingNormals<S> result;
   result.normals = mesh.normal_source == NormalSource::kComputed ? computed_normals(mesh, shapes)
                                                                  : stored_normals<S>(mesh);
@@ -175,6 +185,13 @@ void store_tangents(Mesh& mesh, const ShadingNormals<Dual>& from) {
 }
 
 }  // namespace
+
+size_t count_cancelled_normals(const Mesh& mesh) {
+  if (mesh.normal_source != NormalSource::kComputed) return 0;
+  size_t cancelled = 0;
+  computed_normals(mesh, face_shapes<double>(mesh), &cancelled);
+  return cancelled;
+}
 
 void update_shading_normals(Mesh& mesh) {
   CHECK_EQ(mesh.weld.size(), mesh.positions.size());

@@ -19,9 +19,10 @@ void set_positions(Mesh& mesh, const RawMesh& raw, const Matrix4& to_world) {
     const Vec3d p = to_world.point(raw.positions[i]);
     for (int k = 0; k < 3; ++k) {
       if (std::fabs(p[k]) <= kLargestCoordinate) continue;
-      throw InputError({raw.where}, "vertex " + std::to_string(i) +
-                                        " (counted from 0) has a coordinate beyond 2e12, where "
-                                        "rays miss it in single precision: use a larger unit");
+      throw InputError(i == raw.far_position ? raw.far_where : raw.where,
+                       "vertex " + std::to_string(i) +
+                           " (counted from 0) has a coordinate beyond 2e12, where "
+                           "rays miss it in single precision: use a larger unit");
     }
     mesh.positions.push_back(cast<float>(p));
   }
@@ -218,6 +219,13 @@ Mesh build_mesh(const RawMesh& raw, const MeshOptions& options,
     check_orientation(mesh, raw.where, warnings);
   }
   update_shading_normals(mesh);
+  if (const size_t cancelled = count_cancelled_normals(mesh); cancelled > 0) {
+    warn(warnings, raw.where,
+         "at " + std::to_string(cancelled) +
+             " vertices the normals of the faces around cancel: one of them serves, and its "
+             "derivative "
+             "says nothing of the others");
+  }
   return mesh;
 }
 

@@ -17,7 +17,14 @@ struct RawMesh {
   std::vector<FaceIndices> faces;       // F by 3, into positions
   std::vector<Vec3d> normals;           // N, of any length; not finite or zero: unusable
   std::vector<FaceIndices> normal_ids;  // F by 3, into normals or kNoNormal; empty if no normals
+  // The first position with a coordinate beyond kLargestCoordinate, and where it stands, if the
+  // file has lines and such a one.
+  size_t far_position = SIZE_MAX;
+  SourceLocation far_where = {};
 };
+
+// How many vertices with computed normals have none because the normals around them cancel.
+size_t count_cancelled_normals(const Mesh& mesh);
 
 struct MeshOptions {
   Matrix4 to_world;           // invertible

@@ -62,8 +62,9 @@ class ObjWords {
   };
   // Of the word that next() gave last, or of the end that it met.
   Place where() const { return where_; }
+  SourceLocation location(const Place& place) const { return {file_, place.line, place.column}; }
   [[noreturn]] void fail(const Place& place, const std::string& message) const {
-    throw InputError({file_, place.line, place.column}, message);
+    throw InputError(location(place), message);
   }
   [[noreturn]] void fail(const std::string& message) const { fail(where_, message); }
 
@@ -175,6 +176,10 @@ class ObjReader {
       if (!std::isfinite(v)) words_.fail(begin, "vertex is not finite");
       if (std::fabs(v) > std::numeric_limits<float>::max()) {
         words_.fail(begin, "vertex: a number is beyond a float's range (3.4e38)");
+      }
+      if (std::fabs(v) > kLargestCoordinate && mesh_.far_position == SIZE_MAX) {
+        mesh_.far_position = mesh_.positions.size();
+        mesh_.far_where = words_.location(begin);
       }
     }
     return {n[0], n[1], n[2]};

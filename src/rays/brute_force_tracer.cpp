@@ -35,7 +35,7 @@ class BruteForceTracer final : public RayTracer {
       const Mesh& mesh = scene_.shapes[s].mesh;
       for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
         const FaceRef face{ShapeId(s), FaceId(f)};
-        if (is_skipped(ray, face)) continue;
+        if (is_skipped(ray, face) || !has_area(mesh, mesh.faces[f])) continue;
         const auto corner = [&](int k) { return cast<double>(mesh.positions[mesh.faces[f][k]]); };
         const double t = intersect(ray, corner(0), corner(1), corner(2));
         if (t < 0 || t <= ray.t_min || t >= nearest) continue;

@@ -63,7 +63,7 @@ const std::vector<Mistake>& mistakes() {
       {"ObjBeyondFloat", "a.obj", kTriangle + "v 0 0 1e300\nf 1 2 4\n",
        "a.obj:4:1: error: vertex: a number is beyond a float's range (3.4e38)"},
       {"ObjBeyondLimit", "a.obj", kTriangle + "v 0 0 3e12\nf 1 2 4\n",
-       "a.obj: error: vertex 3 (counted from 0) has a coordinate beyond 2e12, where "
+       "a.obj:4:1: error: vertex 3 (counted from 0) has a coordinate beyond 2e12, where "
        "rays miss it in single precision: use a larger unit"},
       {"ObjGarbage", "a.obj", "v 0 0 O\n", "a.obj:1:7: error: not a number: \"O\""},
       {"ObjShortVertex", "a.obj", "v 0 0\n", "a.obj:1:6: error: vertex needs 3 numbers, not 2"},

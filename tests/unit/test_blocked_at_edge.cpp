@@ -34,7 +34,6 @@ TEST(BlockedAtEdge, AgreesWithRaysCloseBy) {
     Scene scene;
     scene.shapes.emplace_back();
     scene.shapes[0].mesh = fan(wings, rng);
-    const Mesh& mesh = scene.shapes[0].mesh;
     std::vector<FaceRef> faces;
     for (int f = 0; f < wings; ++f) faces.push_back({ShapeId(0), FaceId(f)});
     EdgeStart edge{{faces, {}}, {0, 0, -1}, {0, 0, 1}, {}};
@@ -42,9 +41,8 @@ TEST(BlockedAtEdge, AgreesWithRaysCloseBy) {
     for (int k = 0; k < 20; ++k) {
       const FaceRef start = faces[static_cast<uint32_t>(rng.uniform() * wings)];
       const Vec3d direction = random_direction(rng);
-      const Vec3d into = direction_into_face(mesh, start.face, edge.x0, {0, 0, 1});
-      edge.start = {start, into};
-      Ray ray{Vec3d{0, 0, rng.uniform() - 0.5} + into * 1e-12, direction};
+      edge.start = side_of_face(scene, start, edge.x0, {0, 0, 1});
+      Ray ray{Vec3d{0, 0, rng.uniform() - 0.5} + edge.start.into * 1e-12, direction};
       ray.start = start;
       ray.t_max = 1e-3;
       Hit hit;
@@ -82,6 +80,34 @@ TEST(BlockedAtEdge, RightAngle) {
   EXPECT_EQ(blocked(0, {-1, -1, 0}), std::nullopt);
   EXPECT_EQ(blocked(1, {1, -1, 0}), faces[0]);
   EXPECT_EQ(blocked(1, {1, 1, 0}), std::nullopt);
+}
+
+// Two faces that overlap in a plane, and a third one: neither of the two blocks what starts on the
+// other, and of the two the first one is met.
+TEST(BlockedAtEdge, WhatOverlapsDoesNotBlock) {
+  Rng rng(3, 2, 1);
+  for (int trial = 0; trial < 200; ++trial) {
+    Scene scene;
+    for (const float size : {1.0f, 0.7f}) {
+      scene.shapes.emplace_back().mesh =
+          make_mesh({{0, 0, -1}, {0, 0, 1}, {size, 0, 0}}, {{0, 1, 2}});
+    }
+    scene.shapes.emplace_back().mesh = make_mesh({{0, 0, -1}, {0, 0, 1}, {0, 1, 0}}, {{1, 0, 2}});
+    const std::array faces = {FaceRef{ShapeId(0), FaceId(0)}, FaceRef{ShapeId(1), FaceId(0)},
+                              FaceRef{ShapeId(2), FaceId(0)}};
+    const Vec3d x0{0, 0, -1}, x1{0, 0, 1};
+    const auto blocked = [&](int start, const Vec3d& direction) {
+      const FaceSide side = side_of_face(scene, faces[start], x0, {0, 0, 1});
+      const auto found = blocked_at_edge(scene, {{faces, {}}, x0, x1, side}, direction);
+      return found ? std::optional(found->face) : std::nullopt;
+    };
+    const Vec3d direction = random_direction(rng);
+    const bool towards_third = direction.x < 0 && direction.y > 0;
+    EXPECT_EQ(blocked(0, direction), towards_third ? std::optional(faces[2]) : std::nullopt);
+    EXPECT_EQ(blocked(1, direction), towards_third ? std::optional(faces[2]) : std::nullopt);
+    const bool towards_first = direction.x > 0 && direction.y < 0;
+    EXPECT_EQ(blocked(2, direction), towards_first ? std::optional(faces[0]) : std::nullopt);
+  }
 }
 
 }  // namespace

@@ -22,7 +22,8 @@ std::vector<const Mesh*> pointers(const std::vector<Mesh>& meshes) {
 }
 
 Segments found(const std::vector<Mesh>& meshes, int threads = 1) {
-  return find_crossings(pointers(meshes), threads);
+  const auto all = pointers(meshes);
+  return find_crossings(all, find_face_pairs(all, {}, threads), threads);
 }
 
 double length_of(const Segments& segments) {

@@ -200,14 +200,18 @@ TEST(Edges, FacesWithCoincidentCornersVanish) {
   EXPECT_EQ(length(edges.planes.back().n), 0);
 }
 
-TEST(Edges, ZeroAreaIsDecidedExactly) {
-  // On a line through points that floats hold exactly, one step of the last digit matters.
+TEST(Edges, ZeroAreaIsDecidedToTheRoundingOfPositions) {
   const Vec3f a{0, 0, 0}, c{3, 6, 9};
   const auto planes = [&](const Vec3f& b) {
     return build_edge_mesh(make_mesh({a, b, c}, {{0, 1, 2}}), true).planes;
   };
   EXPECT_EQ(length(planes({1, 2, 3})[0].n), 0);
-  EXPECT_NEAR(length(planes({1, std::nextafter(2.0f, 3.0f), 3})[0].n), 1, 0x1.0p-50);
+  // A needle that rounding its corners explains is a line; a little wider, it is a face, and so is
+  // a small one of another shape.
+  EXPECT_EQ(length(planes({1, std::nextafter(2.0f, 3.0f), 3})[0].n), 0);
+  EXPECT_NEAR(length(planes({1, 2 + 0x1.0p-17f, 3})[0].n), 1, 0x1.0p-50);
+  const Mesh far = make_mesh({{9, 6, 3}, {9 + 0x1p-20f, 6, 3}, {9, 6 + 0x1p-20f, 3}}, {{0, 1, 2}});
+  EXPECT_NEAR(length(build_edge_mesh(far, true).planes[0].n), 1, 0x1.0p-50);
   EXPECT_EQ(length(planes({0x1.00002p-30f, 0x1.00002p-29f, 3 * 0x1.00002p-30f})[0].n), 0);
 }
 

@@ -139,7 +139,7 @@ TEST_P(GeneratedMesh, DoesNotCrossItself) {
   write_triangles(files.path("mesh.obj"), mesh_);
   const Mesh mesh = read_mesh(files.path("mesh.obj"), true);
   const Mesh* meshes[] = {&mesh};
-  EXPECT_TRUE(find_crossings(meshes, 1).empty());
+  EXPECT_TRUE(find_crossings(meshes, find_face_pairs(meshes, {}, 1), 1).empty());
 }
 
 INSTANTIATE_TEST_SUITE_P(, GeneratedMesh, testing::ValuesIn(cases()), [](const auto& test) {

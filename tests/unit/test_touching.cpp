@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "limn/edgetree/overlaps.h"
 #include "support/meshes.h"
 
 namespace limn {
@@ -27,11 +28,13 @@ std::vector<EdgeMesh> united(const std::vector<Mesh>& meshes,
                              const std::vector<uint32_t>& looks = {}) {
   std::vector<EdgeMesh> objects;
   std::vector<TouchingShape> shapes;
+  std::vector<const Mesh*> pointers;
   for (uint32_t i = 0; i < meshes.size(); ++i) {
     objects.push_back(build_edge_mesh(meshes[i], true, ShapeId(i)));
     shapes.push_back({&meshes[i], looks.empty() ? 0 : looks[i]});
+    pointers.push_back(&meshes[i]);
   }
-  unite_touching_edges(shapes, 2, objects);
+  unite_touching_edges(shapes, find_face_pairs(pointers, {0, 0, 0}, 2), {0, 0, 0}, 2, objects);
   for (const EdgeMesh& object : objects) EXPECT_EQ(object.validate(), "");
   return objects;
 }
@@ -110,6 +113,26 @@ TEST(Touching, TilesOfOneLookHaveNoSeam) {
   EXPECT_EQ(count(different, EdgeClass::kIrregular), 2u);
   EXPECT_EQ(length_with(different, 2), 2);
   EXPECT_EQ(length_with(different, 1), 10);
+}
+
+TEST(Overlaps, AreInOnePlaneAndMoreThanASide) {
+  const auto count = [](const Mesh& a, const Mesh& b) {
+    const Mesh* meshes[] = {&a, &b};
+    return find_overlaps(meshes, find_face_pairs(meshes, {0, 0, 5}, 1)).size();
+  };
+  Rng rng(4, 0, 0);
+  for (int i = 0; i < 20; ++i) {
+    Vec3d rows[3];
+    random_rotation(rng, rows);
+    const auto turned = [&](const Mesh& mesh) { return transformed(mesh, rows, 1, {2, 1, 0}); };
+    const Mesh tile = turned(quad({0, 0, 0}, {1, 0, 0}, {0, 1, 0}));
+    EXPECT_EQ(count(tile, turned(quad({1, 0, 0}, {1, 0, 0}, {0, 1, 0}))), 0u);
+    EXPECT_EQ(count(tile, turned(quad({0.5f, 0, 1e-3f}, {1, 0, 0}, {0, 1, 0}))), 0u);
+    EXPECT_EQ(count(tile, turned(quad({0.5f, 0, 0}, {1, 0, 0}, {0, 0, 1}))), 0u);
+    EXPECT_EQ(count(tile, tile), 2u);
+    EXPECT_GE(count(tile, turned(quad({0.5f, 0.25f, 0}, {1, 0, 0}, {0, 1, 0}))), 2u);
+    EXPECT_GE(count(tile, turned(quad({0.25f, 0.25f, 0}, {0.5f, 0, 0}, {0, 0.5f, 0}))), 2u);
+  }
 }
 
 TEST(Touching, ABoxStandsOnTheFloor) {

@@ -189,7 +189,10 @@ class Comparer {
     return ready;
   }
 
-  void write() const { write_comparison(command_.output, scene_, result_); }
+  void write(const std::vector<std::string>& warnings) {
+    result_.warnings = warnings;
+    write_comparison(command_.output, scene_, result_);
+  }
 
   const Comparison& result() const { return result_; }
 
@@ -319,7 +322,7 @@ int CompareCommand::run(const std::string& command_line) {
     fmt::print(stderr, "interrupted before there was a reference: nothing is written\n");
     return kInterrupted;
   }
-  comparer.write();
+  comparer.write(warnings.lines());
   if (!common_.quiet) print_comparison(comparer.result());
   if (!common_.json.empty()) {
     fs::copy_file(fs::path(command_.output) / "compare.json", common_.json,

@@ -1,13 +1,16 @@
 // `limn info`: what a scene holds, and what can be differentiated.
 #include <fmt/format.h>
 
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "limn/core/face_copies.h"
 #include "limn/core/parallel.h"
 #include "limn/core/parameter.h"
 #include "limn/edgetree/crossing_curves.h"
 #include "limn/edgetree/edges.h"
+#include "limn/edgetree/overlaps.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
 
@@ -81,16 +84,30 @@ void print_parameter(const Parameter& parameter) {
                  : fmt::format("  {} numbers: add :FILE, or .0.x, .0.y, ...", parameter.size));
 }
 
-json describe_crossings(const Scene& scene, int threads) {
-  std::vector<const Mesh*> meshes;
-  for (const Shape& shape : scene.shapes) meshes.push_back(&shape.mesh);
-  const std::vector<CrossingSegment> segments = find_crossings(meshes, threads);
+json describe_crossings(const Scene& scene, std::span<const Mesh* const> meshes,
+                        std::span<const FacePair> pairs, int threads) {
+  const std::vector<CrossingSegment> segments = find_crossings(meshes, pairs, threads);
   std::set<ShapeId> shapes;
   for (const CrossingSegment& segment : segments)
     for (const FaceRef face : segment.faces) shapes.insert(face.shape);
   json names = json::array();
   for (const ShapeId shape : shapes) names.push_back(shape_name(scene, shape));
   return {{"segments", segments.size()}, {"shapes", names}};
+}
+
+// Copies have a warning of their own, and a rule for which of them is seen.
+void warn_of_overlaps(const Scene& scene, std::span<const Mesh* const> meshes,
+                      std::span<const FacePair> pairs, Warnings& warnings) {
+  std::map<std::pair<ShapeId, ShapeId>, int> counts;
+  for (const auto& [a, b] : find_overlaps(meshes, pairs))
+    if (!are_copies(scene, a, b)) ++counts[{a.shape, b.shape}];
+  for (const auto& [shapes, count] : counts) {
+    warnings.add(format_warning(
+        scene.shape(shapes.second).where,
+        fmt::format("{} pairs of faces of {} and {} overlap in a plane: which of the two is seen "
+                    "there, and what it shadows, is left to rounding",
+                    count, shape_name(scene, shapes.first), shape_name(scene, shapes.second))));
+  }
 }
 
 void print_crossings(const json& crossings) {
@@ -119,8 +136,13 @@ int run_info(const CommonOptions& common) {
     report["lights"].push_back({{"name", light->id}, {"light", light->describe()}});
     fmt::print("light{}: {}\n", light->id.empty() ? "" : " " + light->id, light->describe());
   }
-  report["crossings"] = describe_crossings(scene, thread_count(common.threads));
+  std::vector<const Mesh*> meshes;
+  for (const Shape& shape : scene.shapes) meshes.push_back(&shape.mesh);
+  const int threads = thread_count(common.threads);
+  const std::vector<FacePair> pairs = find_face_pairs(meshes, value(scene.camera.origin), threads);
+  report["crossings"] = describe_crossings(scene, meshes, pairs, threads);
   print_crossings(report["crossings"]);
+  warn_of_overlaps(scene, meshes, pairs, warnings);
   fmt::print("parameters (for --wrt):\n");
   for (const Parameter& parameter : list_parameters(scene)) {
     report["parameters"].push_back(

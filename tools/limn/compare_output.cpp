@@ -177,6 +177,7 @@ json comparison_json(const Scene& scene, const Comparison& c, const Scales& scal
                  {"defines", c.defines},
                  {"parameter", c.parameter},
                  {"unit", c.unit},
+                 {"warnings", c.warnings},
                  {"width", scene.film.crop_width},
                  {"height", scene.film.crop_height},
                  {"seed", c.seed},

@@ -22,6 +22,7 @@ struct Comparison {
   Reference reference;
   std::string reference_file;
   std::vector<ComparedMethod> methods;
+  std::vector<std::string> warnings;  // of the scene
 };
 
 // Writes everything but the reference's EXRs into the folder, which exists.

@@ -78,8 +78,8 @@ def by_differences(scene, step=STEP):
 
 DIFFERENCES = "Differences of the same scene with a small fixed step."
 PLAIN = "The same shape as one clean mesh, by a long run of adaptive."
-CLOSE = ("Edges that lie within a few roundings of each other are neither united nor told apart by "
-         "a ray: light is judged to be on both sides of an edge that is covered.")
+CLOSE = ("Edges within the rounding of positions are united; what is nearer than rays from the "
+         "camera can tell is met in double precision. From farther away rays in floats decide.")
 NARROW = ("The penumbra is narrow: few points of the picture lie in it, each with a derivative of "
           "one over its width (term direct). Differences blur it by their step.")
 SET_UP = "Building the tree of edges takes longer than the run: it pays off in longer ones."
@@ -345,7 +345,9 @@ def grazing(degrees):
 @family(
     "depth", "length of the paths", [2, 3, 4, 8, 16],
     "A box in a closed room with walls of reflectance 0.8.", DIFFERENCES,
-    "A pass of two samples per pixel, and the pilot before it, take longer than the run.",
+    "Variance, and its tail: from 8 on the terms direct and boundary hold nearly all of the "
+    "squared error, and one sample alone up to 0.8 of a term's. A pass of two samples per pixel, "
+    "and the pilot before it, take longer than the run.",
 )
 def depth(length):
     p, f = meshes.room(2.0, 1)
@@ -394,7 +396,8 @@ def in_plane(step):
     "inside", "squares along each wall", [1, 2, 4, 8, 16, 32],
     "The mesh is the room around camera, lamp and block: every point is in it, or on its planes.",
     "The room of six squares, by a long run of adaptive.",
-    "Every wall moves, and with it the light on it: the whole picture is noise of the term direct.",
+    "Every wall moves, and with it the light on it: the whole picture is noise of the term direct, "
+    "which holds 0.94 of the squared error.",
 )
 def inside(splits):
     def scene(count):

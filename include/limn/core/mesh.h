@@ -1,6 +1,8 @@
 #pragma once
 // Triangle meshes: what the ray tracer, the shading and the edge samplers all read.
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -98,9 +100,21 @@ inline bool has_area(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
   const Vec3d e1 = b - a, e2 = c - a, n = cross(e1, e2);
   return dot(n, n) > 0x1.0p-100 * (dot(e1, e1) * dot(e2, e2));
 }
+// Of a mesh, needles are lines, too: faces that are narrower than what rounding their corners to
+// floats explains (four roundings of the largest coordinate) and 16 times longer than wide. Far
+// from the origin small faces are as narrow, and mean what they are.
 inline bool has_area(const Mesh& mesh, const FaceIndices& face) {
   const auto corner = [&](int k) { return cast<double>(mesh.positions[face[k]]); };
-  return has_area(corner(0), corner(1), corner(2));
+  const Vec3d a = corner(0), b = corner(1), c = corner(2);
+  if (!has_area(a, b, c)) return false;
+  const double longest =
+      std::max({length_squared(b - a), length_squared(c - b), length_squared(a - c)});
+  const double twice_area = length_squared(cross(b - a, c - a));
+  if (twice_area * 256 > longest * longest) return true;
+  double size = 0;
+  for (const Vec3d& x : {a, b, c})
+    size = std::max({size, std::fabs(x.x), std::fabs(x.y), std::fabs(x.z)});
+  return twice_area > 0x1.0p-44 * size * size * longest;
 }
 
 // Bounds of all positions referenced by faces.

@@ -6,6 +6,7 @@
 
 #include "limn/core/mesh.h"
 #include "limn/edgetree/edges.h"
+#include "limn/edgetree/face_pairs.h"
 
 namespace limn {
 
@@ -21,9 +22,10 @@ struct CrossingSegment {
 // other's plane, and they have a segment of that line in common. A corner counts as on the plane
 // where the rounding of positions to floats can explain its distance: faces that touch (in a
 // corner, along an edge, in a plane, or to rounding) do not cross. Two faces with a common corner
-// may. meshes: of the scene's shapes, whose places name them. The result does not depend on
-// `threads`; sorted by faces.
-std::vector<CrossingSegment> find_crossings(std::span<const Mesh* const> meshes, int threads);
+// may. meshes: of the scene's shapes, whose places name them; pairs: from find_face_pairs, of any
+// viewer. The result does not depend on `threads`; sorted by faces.
+std::vector<CrossingSegment> find_crossings(std::span<const Mesh* const> meshes,
+                                            std::span<const FacePair> pairs, int threads);
 
 // The velocity of the line where two faces cross, at a point x of it: across the line, with each
 // plane's normal velocity, so within the plane that their normals span. Along the line it is linear

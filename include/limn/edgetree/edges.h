@@ -60,10 +60,13 @@ struct Incidence {
   bool operator==(const Incidence&) const = default;
 };
 
-// All faces of a scene that touch an edge along its whole length.
+// All faces of a scene that touch an edge along its whole length, and those so near to it that rays
+// cannot tell on which side of it they pass (touching.h).
 struct FacesAround {
   std::span<const FaceRef> faces;
   std::span<const Incidence> incidences;  // of each; empty if all are as by default
+  std::span<const FaceRef> near = {};     // no face is in both
+  std::span<const FaceRef> all = faces;   // the faces, then the near ones
   Incidence incidence(size_t i) const { return incidences.empty() ? Incidence{} : incidences[i]; }
 };
 
@@ -94,6 +97,10 @@ struct EdgeMesh {
   std::vector<uint32_t> face_offsets;  // E + 1
   std::vector<FaceRef> incident_faces;
   std::vector<Incidence> incidences;  // of incident_faces; empty if all are as by default
+  // FacesAround::all of edge e, if faces are near to it, else nothing:
+  // faces_and_near[near_offsets[e], near_offsets[e + 1]). Both are empty if there are none at all.
+  std::vector<uint32_t> near_offsets;  // E + 1
+  std::vector<FaceRef> faces_and_near;
   // The mesh is closed and its surfaces are black from behind: a point that sees only back faces
   // sees no jump at a sharp edge, and concave edges are never silhouettes from outside.
   // United edges are irregular and stand outside of this rule.
@@ -111,9 +118,15 @@ struct EdgeMesh {
     return {incident_faces.data() + *begin, *end - *begin};
   }
   FacesAround around(EdgeId id) const {
-    const auto faces = faces_around(id);
-    if (incidences.empty()) return {faces, {}};
-    return {faces, {&incidences[face_offsets[id.index()]], faces.size()}};
+    FacesAround around{faces_around(id), {}};
+    const size_t count = around.faces.size();
+    if (!incidences.empty()) around.incidences = {&incidences[face_offsets[id.index()]], count};
+    if (!near_offsets.empty() && near_offsets[id.index() + 1] > near_offsets[id.index()]) {
+      const uint32_t *begin = &near_offsets[id.index()], *end = begin + 1;
+      around.all = {faces_and_near.data() + *begin, *end - *begin};
+      around.near = around.all.subspan(count);
+    }
+    return around;
   }
   // For edges that are looked at soon: bring into the cache the edge itself; and once that is
   // there, its ends and its faces.

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "limn/edgetree/edges.h"
+#include "limn/edgetree/face_pairs.h"
 
 namespace limn {
 
@@ -22,9 +23,11 @@ struct TouchingShape {
 //  - of parts of several edges in one place that move alike, the one of the first shape stays. If
 //    they move differently each stays, as a rim of the faces that move with it;
 //  - a seam of two faces in one plane that look and move alike is no edge.
-// What touches is decided to the rounding of positions (edges/contacts.h). Where nothing touches
-// nothing changes.
-void unite_touching_edges(std::span<const TouchingShape> shapes, int threads,
-                          std::vector<EdgeMesh>& objects);
+// What touches is decided to the rounding of positions (edges/contacts.h). An edge also gets the
+// faces that do not touch it and are nearer to it than a ray in floats can tell, if it comes from
+// `viewer` (the camera) or from no farther away: FacesAround::near. Where nothing is so near
+// nothing changes. pairs: of the shapes' faces, from find_face_pairs with the same viewer.
+void unite_touching_edges(std::span<const TouchingShape> shapes, std::span<const FacePair> pairs,
+                          const Vec3d& viewer, int threads, std::vector<EdgeMesh>& objects);
 
 }  // namespace limn

@@ -1,0 +1,237 @@
+// Faces near each other, from a tree over their boxes.
+#include "limn/edgetree/face_pairs.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "edgetree/edges/box_tree.h"
+#include "edgetree/edges/contacts.h"
+#include "edgetree/edges/half_edges.h"
+#include "limn/core/parallel.h"
+#include "limn/core/rng.h"
+
+namespace limn {
+namespace {
+
+using Corners = std::array<Vec3d, 3>;
+constexpr uint32_t kNone = UINT32_MAX;
+
+Corners corners_of(const Mesh& mesh, FaceId face) {
+  const FaceIndices& f = mesh.face(face);
+  return {cast<double>(mesh.positions[f[0]]), cast<double>(mesh.positions[f[1]]),
+          cast<double>(mesh.positions[f[2]])};
+}
+
+double size_of(const Corners& corners) {
+  double size = 0;
+  for (const Vec3d& x : corners)
+    size = std::max({size, std::fabs(x.x), std::fabs(x.y), std::fabs(x.z)});
+  return size;
+}
+
+double longest_side(const Corners& c) {
+  return std::sqrt(std::max(
+      {length_squared(c[1] - c[0]), length_squared(c[2] - c[1]), length_squared(c[0] - c[2])}));
+}
+
+double blur_of(const Corners& corners, const Vec3d& viewer) {
+  double squared = 0;
+  for (const Vec3d& x : corners) squared = std::max(squared, length_squared(x - viewer));
+  return 0x1.0p-20 * std::max(size_of(corners), std::sqrt(squared));
+}
+
+// What is near to both of its sides, at its middle.
+bool is_needle(double width, double blur) { return !(width > 16 * blur); }
+
+// How far edges may be from a face to be near to it.
+double reach_of(double longest_side, double blur) {
+  return std::min(blur, kMostNear * longest_side);
+}
+
+// V: whether the faces around a vertex form one closed fan that covers the directions around it
+// once, seen along the mean of their normals, none of them a needle.
+class SingleFans {
+ public:
+  // ids: of the vertices; normals, needles: of the faces
+  SingleFans(const Mesh& mesh, const std::vector<VertexId>& ids, std::span<const Vec3d> normals,
+             const std::vector<bool>& needles)
+      : fans_(mesh.positions.size()) {
+    for (size_t f = 0; f < mesh.faces.size(); ++f)
+      for (const uint32_t v : mesh.faces[f]) fans_[ids[v].index()].axis += normals[f];
+    for (size_t f = 0; f < mesh.faces.size(); ++f) {
+      for (int k = 0; k < 3; ++k) {
+        const auto id = [&](int corner) { return ids[mesh.faces[f][corner % 3]].index(); };
+        const auto at = [&](int corner) { return cast<double>(mesh.positions[id(corner)]); };
+        Fan& fan = fans_[id(k)];
+        // Closed, if its faces' second corners are their third ones in another order.
+        fan.open += mix_bits(id(k + 1) + 1) - mix_bits(id(k + 2) + 1);
+        const double steep = dot(normals[f], fan.axis);
+        // Not upright: the two sides of a blade may be near to each other.
+        fan.bad |= needles[f] || !(steep > 0) ||
+                   steep * steep * 256 < length_squared(normals[f]) * length_squared(fan.axis);
+        const Vec3d across = fan.across();
+        const double before = dot(at(k + 1) - at(k), across),
+                     after = dot(at(k + 2) - at(k), across);
+        fan.covers = static_cast<uint8_t>(std::min(fan.covers + (before >= 0 && after < 0), 2));
+      }
+    }
+  }
+  bool is_single(VertexId id) const {
+    const Fan& fan = fans_[id.index()];
+    return fan.covers == 1 && !fan.bad && fan.open == 0;
+  }
+
+ private:
+  struct Fan {
+    Vec3d axis;
+    uint64_t open = 0;
+    uint8_t covers = 0;
+    bool bad = false;
+    // Turning around the axis, a half-plane is passed where the product with this changes its sign,
+    // the opposite one where it changes back.
+    Vec3d across() const {
+      return std::fabs(axis.x) < std::fabs(axis.y) ? Vec3d{0, axis.z, -axis.y}
+                                                   : Vec3d{-axis.z, 0, axis.x};
+    }
+  };
+  std::vector<Fan> fans_;
+};
+
+// The corners of a leaf's faces that are in single fans, counted over all meshes; else kNone.
+struct LeafFans {
+  uint32_t corners[3][BoxTree::kLeaf];
+
+  // Bit i: the face of lane i has one of these.
+  uint32_t share(const FaceIndices& other) const {
+    uint32_t same[BoxTree::kLeaf] = {};
+    for (int k = 0; k < 3; ++k)
+      for (int j = 0; j < 3; ++j)
+        for (uint32_t lane = 0; lane < BoxTree::kLeaf; ++lane)
+          same[lane] |= (corners[j][lane] == other[k]) & (other[k] != kNone);
+    uint32_t bits = 0;
+    for (uint32_t lane = 0; lane < BoxTree::kLeaf; ++lane) bits |= same[lane] << lane;
+    return bits;
+  }
+};
+
+class PairFinder {
+ public:
+  PairFinder(std::span<const Mesh* const> meshes, const Vec3d& viewer, int threads)
+      : viewer_(viewer), threads_(threads) {
+    size_t count = 0;
+    for (const Mesh* mesh : meshes) count += mesh->faces.size();
+    faces_.reserve(count), boxes_.reserve(count), fans_.reserve(count);
+    uint32_t first_vertex = 0;
+    for (uint32_t s = 0; s < meshes.size(); ++s) {
+      add_mesh(*meshes[s], ShapeId(s), first_vertex);
+      first_vertex += static_cast<uint32_t>(meshes[s]->positions.size());
+    }
+  }
+
+  std::vector<FacePair> find() const {
+    const BoxTree tree(boxes_, threads_);
+    std::vector<LeafFans> fans(tree.leaf_count());
+    for (uint32_t leaf = 0; leaf < tree.leaf_count(); ++leaf)
+      for (size_t i = 0; i < tree.leaf(leaf).size(); ++i)
+        for (int k = 0; k < 3; ++k) fans[leaf].corners[k][i] = fans_[tree.leaf(leaf)[i]][k];
+    constexpr uint32_t kBlock = 256;  // leaves; not tuned
+    std::vector<std::vector<FacePair>> found((tree.leaf_count() + kBlock - 1) / kBlock);
+    parallel_for(found.size(), threads_, [&](size_t block) {
+      std::vector<uint32_t> leaves;
+      const auto begin = static_cast<uint32_t>(block) * kBlock;
+      for (uint32_t leaf = begin; leaf < std::min(begin + kBlock, tree.leaf_count()); ++leaf)
+        append_pairs_of(tree, fans, leaf, leaves, found[block]);
+    });
+    std::vector<FacePair> pairs;
+    for (const auto& some : found) pairs.insert(pairs.end(), some.begin(), some.end());
+    return pairs;
+  }
+
+ private:
+  void add_mesh(const Mesh& mesh, ShapeId shape, uint32_t first_vertex) {
+    const auto count = static_cast<uint32_t>(mesh.faces.size());
+    std::vector<Vec3d> normals(count);
+    std::vector<bool> needles(count);
+    for (uint32_t f = 0; f < count; ++f) {
+      const Corners c = corners_of(mesh, FaceId(f));
+      normals[f] = cross(c[1] - c[0], c[2] - c[0]);
+      const double longest = longest_side(c), blur = blur_of(c, viewer_);
+      needles[f] = is_needle(length(normals[f]) / longest, blur);
+      add_box(c, std::max(reach_of(longest, blur), touch_tolerance(size_of(c), 0)));
+      faces_.push_back({shape, FaceId(f)});
+    }
+    const std::vector<VertexId> ids = edge_vertex_ids(mesh);
+    const SingleFans fans(mesh, ids, normals, needles);
+    for (const FaceIndices& face : mesh.faces) {
+      FaceIndices& single = fans_.emplace_back();
+      for (int k = 0; k < 3; ++k) {
+        const VertexId id = ids[face[k]];
+        single[k] = fans.is_single(id) ? first_vertex + id.index() : kNone;
+      }
+    }
+  }
+
+  // Wider by twice the margin: a float's rounding is less than the second half.
+  void add_box(const Corners& c, double margin) {
+    FloatBox& box = boxes_.emplace_back();
+    for (int k = 0; k < 3; ++k) {
+      box.lower[k] = static_cast<float>(std::min({c[0][k], c[1][k], c[2][k]}) - 2 * margin);
+      box.upper[k] = static_cast<float>(std::max({c[0][k], c[1][k], c[2][k]}) + 2 * margin);
+    }
+  }
+
+  // Of pairs within the leaf, and with faces of later ones.
+  void append_pairs_of(const BoxTree& tree, std::span<const LeafFans> fans, uint32_t leaf,
+                       std::vector<uint32_t>& leaves, std::vector<FacePair>& pairs) const {
+    tree.find_leaves(tree.leaf_box(leaf), leaf, leaves);
+    const auto own = tree.leaf(leaf);
+    for (const uint32_t other : leaves) {
+      for (size_t i = 0; i < own.size(); ++i) {
+        uint32_t lanes = tree.boxes(other).overlaps(boxes_[own[i]]);
+        if (other == leaf) lanes &= ~((2u << i) - 1);
+        if (lanes == 0) continue;
+        lanes &= ~fans[other].share(fans_[own[i]]);
+        for (; lanes != 0; lanes &= lanes - 1) {
+          const uint32_t j = tree.leaf(other)[std::countr_zero(lanes)];
+          pairs.push_back({faces_[std::min(own[i], j)], faces_[std::max(own[i], j)]});
+        }
+      }
+    }
+  }
+
+  Vec3d viewer_;
+  int threads_;
+  std::vector<FaceRef> faces_;     // of all meshes
+  std::vector<FloatBox> boxes_;    // theirs
+  std::vector<FaceIndices> fans_;  // theirs, see LeafFans
+};
+
+}  // namespace
+
+std::vector<FacePair> find_face_pairs(std::span<const Mesh* const> meshes, const Vec3d& viewer,
+                                      int threads) {
+  return PairFinder(meshes, viewer, threads).find();
+}
+
+double size_of(const Mesh& mesh, FaceId face) { return size_of(corners_of(mesh, face)); }
+
+double width_of(const Mesh& mesh, FaceId face) {
+  const Corners c = corners_of(mesh, face);
+  return length(cross(c[1] - c[0], c[2] - c[0])) / longest_side(c);
+}
+
+double blur_of(const Mesh& mesh, FaceId face, const Vec3d& viewer) {
+  return blur_of(corners_of(mesh, face), viewer);
+}
+
+double reach_of(const Mesh& mesh, FaceId face, const Vec3d& viewer) {
+  const Corners c = corners_of(mesh, face);
+  return reach_of(longest_side(c), blur_of(c, viewer));
+}
+
+bool is_needle(const Mesh& mesh, FaceId face, const Vec3d& viewer) {
+  return is_needle(width_of(mesh, face), blur_of(mesh, face, viewer));
+}
+
+}  // namespace limn

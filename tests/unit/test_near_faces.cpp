@@ -1,0 +1,107 @@
+// Faces nearer to an edge than a ray of floats can tell: found, and met where they are.
+#include "integrators/terms/near_faces.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "limn/edgetree/touching.h"
+#include "support/meshes.h"
+
+namespace limn {
+namespace {
+
+// A wall with an edge along x = z = 0 that goes up from there, and a floor under it that begins at
+// x = `beside`, `below` the edge. The ends of the edge are not aligned with the floor's.
+Scene wall_and_floor(float beside, float below) {
+  Scene scene;
+  scene.shapes.resize(2);
+  scene.shapes[0].mesh = make_mesh({{0, -0.875f, 0}, {0, 0.75f, 0}, {0, 0.75f, 1}}, {{0, 1, 2}});
+  scene.shapes[1].mesh = make_mesh({{beside, -1, -below},
+                                    {beside + 2, -1, -below},
+                                    {beside + 2, 1, -below},
+                                    {beside, 1, -below}},
+                                   {{0, 1, 2}, {0, 2, 3}});
+  return scene;
+}
+
+struct United {
+  EdgeMesh mesh;  // of the wall
+  EdgeId edge;    // its lower one
+};
+
+United united(const Scene& scene, const Vec3d& viewer) {
+  std::vector<EdgeMesh> objects;
+  std::vector<TouchingShape> shapes;
+  std::vector<const Mesh*> meshes;
+  for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+    meshes.push_back(&scene.shapes[s].mesh);
+    shapes.push_back({meshes[s], s});
+    objects.push_back(build_edge_mesh(*meshes[s], false, ShapeId(s)));
+  }
+  unite_touching_edges(shapes, find_face_pairs(meshes, viewer, 1), viewer, 1, objects);
+  for (const EdgeMesh& object : objects) EXPECT_EQ(object.validate(), "");
+  United result{objects[0], EdgeId(0)};
+  while (result.mesh.position(result.mesh.edge(result.edge).vertices[0]).z != 0 ||
+         result.mesh.position(result.mesh.edge(result.edge).vertices[1]).z != 0)
+    result.edge = EdgeId(result.edge.index() + 1);
+  return result;
+}
+
+TEST(NearFaces, AreThoseThatRaysFromTheViewerCannotTell) {
+  const auto count = [](float below, double distance) {
+    const United wall = united(wall_and_floor(-0.5f, below), {0, 0, distance});
+    const FacesAround around = wall.mesh.around(wall.edge);
+    EXPECT_EQ(around.faces.size(), 1u);
+    EXPECT_EQ(around.all.size(), around.faces.size() + around.near.size());
+    return around.near.size();
+  };
+  EXPECT_EQ(count(1.5e-6f, 1), 2u);  // on both sides of the floor's diagonal
+  EXPECT_EQ(count(1e-4f, 1), 0u);
+  EXPECT_EQ(count(1e-4f, 200), 2u);
+  EXPECT_EQ(count(0.01f, 200), 0u);
+  // Beyond what is near to all of its like.
+  EXPECT_EQ(count(0.02f, 1e9), 0u);
+}
+
+TEST(NearFaces, AreMetOnTheSideWhereTheyLie) {
+  Rng rng(1, 2, 3);
+  const Vec3d viewer{2, -3, 2.5};
+  int floats_err = 0;
+  for (const float gap : {3e-6f, 2e-6f}) {
+    for (const bool beside : {false, true}) {
+      // Below the edge, or beginning behind it.
+      const Scene scene =
+          beside ? wall_and_floor(0.4f * gap, -gap / 2) : wall_and_floor(-0.5f, gap);
+      const United wall = united(scene, viewer);
+      const FacesAround around = wall.mesh.around(wall.edge);
+      ASSERT_FALSE(around.near.empty());
+      const auto tracer = make_embree_tracer(scene, 1);
+      for (int i = 0; i < 500; ++i) {
+        const Vec3d y{0, 1.4 * rng.uniform() - 0.7, 0};
+        const Vec3d p = viewer + random_direction(rng);
+        Ray ray{p, normalize(y - p)};
+        ray.skip_faces = around.all;
+        Hit hit;
+        const double distance = length(y - p);
+        const bool found = closest_at_edge(*tracer, scene, around, y, distance, ray, hit);
+        // Where the ray meets the floor's plane.
+        const double t = scene.shapes[1].mesh.positions[0].z / ray.direction.z;
+        const bool expected = t * ray.direction.x >= scene.shapes[1].mesh.positions[0].x;
+        ASSERT_EQ(found, expected) << gap << ' ' << i;
+        if (found) {
+          EXPECT_NEAR(hit.t, distance + t, 1e-9);
+        }
+        // A ray of floats that skips the wall.
+        ray.skip_faces = around.faces;
+        Hit other;
+        floats_err += tracer->closest(ray, other) != expected;
+        floats_err += expected && (other.t < distance) != (t < 0);
+      }
+    }
+  }
+  EXPECT_GT(floats_err, 0);  // else the near faces are not needed
+}
+
+}  // namespace
+}  // namespace limn
