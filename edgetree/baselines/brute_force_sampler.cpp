@@ -29,7 +29,7 @@ bool same(const Vec3<Lanes>& a, const Vec3<Lanes>& b) {
 }
 bool same(const EdgeQuery& a, const EdgeQuery& b) {
   return a.p == b.p && a.n == b.n && a.wi == b.wi && a.lobe == b.lobe &&
-         same(a.velocity, b.velocity) && same(a.turn, b.turn) && a.face == b.face;
+         same(a.velocity, b.velocity) && same(a.turn, b.turn) && a.axis == b.axis && a.face == b.face;
 }
 
 bool is_still(const Vec3<Lanes>& v) { return is_zero(v.x) && is_zero(v.y) && is_zero(v.z); }

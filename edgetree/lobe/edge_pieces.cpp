@@ -74,9 +74,10 @@ void EdgeCutter::add(const ListedEdge& edge, const EdgeMesh& mesh, double t0, do
     v0 += dot_lanes(mesh.tangent(i), m);
     v1 += dot_lanes(mesh.tangent(j), m);
   }
-  if (turns_) {  // m . (turn x w) = turn . (w x m)
-    v0 = v0 - dot_lanes(query_.turn, cross(w0, m));
-    v1 = v1 - dot_lanes(query_.turn, cross(w0 + along, m));
+  if (turns_) {
+    const auto moving = [&](const Vec3d& w) { return motion_of_directions(query_.turn, query_.axis, w); };
+    v0 = v0 - dot_lanes(moving(w0), m);
+    v1 = v1 - dot_lanes(moving(w0 + along), m);
   }
   if (is_zero(v0) && is_zero(v1)) return;
 

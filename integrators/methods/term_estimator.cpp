@@ -116,7 +116,7 @@ class TermEstimator::VertexTerms {
     const Rgb<double> weight = value(throughput);
     TurnedVertex turned;
     PathVertex vertex{surface, scattering, weight, motion ? motion->turn : Vec3<Lanes>{},
-                      bounces, step,       key,    sink_.log()};
+                      motion ? motion->axis : Vec3d{}, bounces, step,       key,    sink_.log()};
     if (held_) {
       turned = turned_at(surface, motion, bounces);
       vertex.turned = &turned;

@@ -42,7 +42,7 @@ void MotionRates::add_object(const Scene& scene, int lane, double share) {
   if (count == 0) return;
   const double radius = 0.5 * length(bounds.upper - bounds.lower);
   if (!(radius > 0)) return;
-  sources_.push_back({bounds.center(), radius, share * std::sqrt(squares / count), 0});
+  sources_.push_back({bounds.center(), radius, share * std::sqrt(squares / count), 0, false});
 }
 
 void MotionRates::add_camera(const Scene& scene, int lane, double share) {
@@ -52,7 +52,7 @@ void MotionRates::add_camera(const Scene& scene, int lane, double share) {
                           length(derivative(camera.up, lane)) +
                           std::fabs(camera.fov.d[lane]) * (kPi / 180);
   if (!(speed > 0) && !(rotation > 0)) return;
-  sources_.push_back({value(camera.origin), camera.near_clip, share * speed, share * rotation});
+  sources_.push_back({value(camera.origin), camera.near_clip, share * speed, share * rotation, true});
 }
 
 double MotionRates::at(const Vec3d& p) const {
@@ -66,7 +66,19 @@ double MotionRates::at(const Vec3d& p) const {
 
 DirectionMotion MotionRates::motion_at(const Vec3d& p, const DirectionField& field) const {
   const double unit = at(p);
-  return {field.turn * unit, field.score * unit, !is_zero(field.score), unit};
+  return {field.turn * unit, field.score * unit, !is_zero(field.score), unit, axis_at(p)};
+}
+
+Vec3d MotionRates::axis_at(const Vec3d& p) const {
+  static const bool off = getenv("NOAXIS");
+  if (off) return {};
+  if (sources_.empty()) return {};
+  for (const Source& source : sources_) {
+    if (source.is_camera || !(source.center == sources_[0].center)) return {};
+  }
+  const Vec3d to = sources_[0].center - p;
+  const double distance = length(to);
+  return distance > sources_[0].radius ? to / distance : Vec3d{};
 }
 
 }  // namespace limn

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "limn/core/scene.h"
+#include "limn/edgetree/edge_sampler.h"
 
 namespace limn {
 
@@ -22,9 +23,11 @@ struct DirectionField {
   Vec3<Lanes> score{};  // of the directions of the score that is added
 };
 
-// The direction w as it turns with an angular velocity.
-inline Vec3<Dual> turning(const Vec3d& w, const Vec3<Lanes>& turn) {
-  const Vec3<Lanes> v = cross(turn, w);
+// The direction w as it moves, see motion_of_directions.
+inline Vec3<Dual> turning(const Vec3d& w, const Vec3<Lanes>& turn, const Vec3d& axis) {
+  Vec3<Lanes> v = motion_of_directions(turn, axis, w);
+  const Lanes out = v.x * w.x + v.y * w.y + v.z * w.z;  // 0, but for rounding, where they turn
+  v = v - Vec3<Lanes>{out * w.x, out * w.y, out * w.z};
   return {{w.x, v.x}, {w.y, v.y}, {w.z, v.z}};
 }
 
@@ -33,10 +36,20 @@ struct DirectionMotion {
   Vec3<Lanes> turn{}, score{};
   bool scoring = false;  // whether the score is not zero
   double unit = 0;       // MotionRates::at the vertex
+  Vec3d axis{};
 
   // The direction w with its derivative.
-  Vec3<Dual> moving(const Vec3d& w) const { return turning(w, turn); }
-  Vec3<Dual> moving_score(const Vec3d& w) const { return turning(w, score); }
+  Vec3<Dual> moving(const Vec3d& w) const { return turning(w, turn, axis); }
+  Vec3<Dual> moving_score(const Vec3d& w) const { return turning(w, score, axis); }
+  // Of the field with the rate `turn` or `score`, over the sphere: 0 where directions turn, else that
+  // of (axis . w) (rate - w (rate . w)).
+  Lanes divergence(const Vec3<Lanes>& rate, const Vec3d& w) const {
+    const auto dot_lanes = [](const Vec3<Lanes>& a, const Vec3d& b) {
+      return a.x * b.x + a.y * b.y + a.z * b.z;
+    };
+    return dot_lanes(rate, axis) - dot_lanes(rate, w) * (3 * dot(axis, w));
+  }
+  bool diverges() const { return !(axis == Vec3d{}); }
 };
 
 // How fast what moves does so as seen from a point: the unit of all turns. One for all parameters,
@@ -52,6 +65,8 @@ class MotionRates {
   // steps; at least a bound's order of magnitude.
   double at(const Vec3d& p) const;
   DirectionMotion motion_at(const Vec3d& p, const DirectionField& field) const;
+  // Towards the one object that moves; zero where p is near it, or something else moves.
+  Vec3d axis_at(const Vec3d& p) const;
   // Nothing moves: turning would only add noise.
   bool still() const { return sources_.empty(); }
 
@@ -61,6 +76,7 @@ class MotionRates {
     double radius;    // at least; > 0
     double speed;     // root mean square over the object's vertices, or of the camera
     double rotation;  // of the camera [1 / unit of the parameter]
+    bool is_camera;
   };
   // share: the lane's step in those of the first.
   void add_object(const Scene& scene, int lane, double share);

@@ -113,7 +113,8 @@ class PathTracer {
       const auto [f, pdf] = evaluate(scattering, *wo, direction, motion);
       if (is_black(value(f))) return radiance;
       add_score(scattering, *wo, motion, value(throughput) * (1 / pdf));
-      throughput = throughput * f * (1 / pdf);
+      const Rgb<S> before = throughput;
+      throughput = throughput * stretched(f, *wo, motion) * (1 / pdf);
       step = {value(surface.p), pdf};
       Hit hit;
       const bool found = next_hit(surface, *wo, edge, hit);
@@ -131,7 +132,12 @@ class PathTracer {
         move_along_edge(surface, hit.face);
       }
       wi = -direction;
-      radiance += throughput * emitted(surface, *wo, pdf, hit.t);
+      const Rgb<S> lamp = emitted(surface, *wo, pdf, hit.t);
+      if (motion && !is_black(value(lamp))) {
+        radiance += before * scattering.eval(*wo) * lamp * (1 / pdf);
+      } else {
+        radiance += throughput * lamp;
+      }
       if (!survives_roulette(throughput, bounces + 1, key)) return radiance;
     }
   }
@@ -157,11 +163,23 @@ class PathTracer {
     if (!motion) return scattering.eval_with_pdf(w);
     return {scattering.eval(direction), scattering.pdf_solid_angle(w)};
   }
+  // Times the change of a solid angle around w.
+  static Rgb<S> stretched(const Rgb<S>& f, const Vec3d& w, const DirectionMotion* motion) {
+    if constexpr (std::is_same_v<S, Dual>) {
+      if (motion && motion->diverges()) return f * Dual(1.0, motion->divergence(motion->turn, w));
+    }
+    return f;
+  }
   void add_score(const Scattering<S>& scattering, const Vec3d& w, const DirectionMotion* motion,
                  const Rgb<double>& weight) {
     if constexpr (std::is_same_v<S, Dual>) {
       if (!motion || !motion->scoring) return;
-      const Rgb<Lanes> f = scattering.eval_derivative(motion->moving_score(w));
+      Rgb<Lanes> f = scattering.eval_derivative(motion->moving_score(w));
+      if (motion->diverges()) {
+        const Rgb<double> still = value(scattering.eval(w));
+        const Lanes divergence = motion->divergence(motion->score, w);
+        for (int c = 0; c < 3; ++c) f[c] += divergence * still[c];
+      }
       score_ = score_ + Rgb<Lanes>{f.r * weight.r, f.g * weight.g, f.b * weight.b};
     }
   }
@@ -230,13 +248,14 @@ class PathTracer {
     if (const DeltaLight* delta = light->light->delta()) {
       return delta_light(*delta, *light, surface, scattering, edge);
     }
+    if (light->face) motion = nullptr;  // what lamps emit is held
     const Vec3<S> direction = moving(light->wo, motion);
     const auto [f, bsdf_pdf] = evaluate(scattering, light->wo, direction, motion);
     if (is_black(value(f)) || shadowed(p, surface.face, *light, edge)) return {};
     const double weight = mis_weight(light->pdf, bsdf_pdf) / light->pdf;
     const Rgb<S> radiance = motion ? light->light->radiance(direction)
                                    : light->light->template drawn_radiance<S>(*light);
-    return f * radiance * weight;
+    return stretched(f, light->wo, motion) * radiance * weight;
   }
 
   // No ray meets a delta light by chance, so it has the whole weight. Its direction follows the

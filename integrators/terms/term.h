@@ -32,7 +32,8 @@ struct PathVertex {
   const SurfacePoint<Dual>& surface;
   const Scattering<Dual>& scattering;
   const Rgb<double>& throughput;   // of the path up to here
-  Vec3<Lanes> turn;                // angular velocity of directions here, see direction_field.h
+  Vec3<Lanes> turn;                // how directions move here, see EdgeQuery
+  Vec3d axis;
   int bounces;                     // how often it has scattered before
   PathStep step;                   // how it came here
   const Rng& key;                  // of the path

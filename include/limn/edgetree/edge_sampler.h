@@ -17,6 +17,15 @@
 
 namespace limn {
 
+// How directions move at a point: |w| times the velocity of the direction of w, up to a part along w,
+// which moves no edge. axis: zero, and directions turn with the angular velocity `turn`; or a unit
+// vector, and they follow points of a plane across it that move with `turn` times their distance
+// along the axis. Linear in w either way.
+inline Vec3<Lanes> motion_of_directions(const Vec3<Lanes>& turn, const Vec3d& axis, const Vec3d& w) {
+  const double along = dot(axis, w);
+  return axis == Vec3d{} ? cross(turn, w) : turn * along;
+}
+
 // Everything about the shading point that a sampler may use.
 struct EdgeQuery {
   Vec3d p;                 // world space
@@ -24,9 +33,9 @@ struct EdgeQuery {
   Vec3d wi;                // unit, towards the viewer
   LobeSummary lobe;        // of the scattering function
   Vec3<Lanes> velocity{};  // of p, per parameter; an edge's velocity relative to p counts
-  // Angular velocity of all directions at p, per parameter: a direction w moves with turn x w, and
-  // an edge that follows it is at rest.
+  // How all directions move at p, per parameter; an edge that follows them is at rest.
   Vec3<Lanes> turn{};
+  Vec3d axis{};
   // The face that p lies on, if any: its edges lie on p's horizon, where the scattering function is
   // zero, and are never drawn.
   FaceRef face = {};
@@ -37,7 +46,8 @@ struct EdgeQuery {
 inline Vec3<Lanes> relative_velocity(const EdgeMesh& mesh, VertexId vertex,
                                      const EdgeQuery& query) {
   const Vec3<Lanes> own = mesh.tangents.empty() ? Vec3<Lanes>{} : mesh.tangent(vertex);
-  return own - query.velocity - cross(query.turn, mesh.position(vertex) - query.p);
+  return own - query.velocity -
+         motion_of_directions(query.turn, query.axis, mesh.position(vertex) - query.p);
 }
 
 struct EdgeSample {
