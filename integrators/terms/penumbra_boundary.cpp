@@ -64,7 +64,7 @@ class PenumbraTerm final : public Term {
            TurnedVertex* turned, TermCost& cost, Rgb<Lanes>& sum) const;
   // How the point that the line meets slides if the viewer's directions turn.
   Vec3<Lanes> sliding(const Drawn& drawn, const Vec3d& q, const Vec3d& omega,
-                      const PathVertex& viewer) const;
+                      const TurnedVertex& viewer) const;
 
   const PathContext& context_;
   const EdgeSamplerInput& edges_;
@@ -154,21 +154,21 @@ void PenumbraTerm::add_sample(const PathVertex& viewer, const Rng& key, TermCost
         "  penumbra on face {} of shape {}:", drawn->face.face.index(), drawn->face.shape.index()));
   }
   TurnedVertex turned;
-  if (viewer.turned) turned.velocity = sliding(*drawn, q, omega, viewer);
-  add(*drawn, viewer.surface.p, turning(omega, viewer.turn, viewer.axis), viewer.throughput * f, bounces, key,
+  if (viewer.turned) turned.velocity = sliding(*drawn, q, omega, *viewer.turned);
+  add(*drawn, viewer.surface.p, turning(omega, viewer.turn), viewer.throughput * f, bounces, key,
       viewer.log, viewer.turned ? &turned : nullptr, cost, sum);
   if (viewer.turned) viewer.turned->sum = viewer.turned->sum + turned.sum;
 }
 
 Vec3<Lanes> PenumbraTerm::sliding(const Drawn& drawn, const Vec3d& q, const Vec3d& omega,
-                                  const PathVertex& viewer) const {
-  const Vec3<Lanes>& v = viewer.turned->velocity;
+                                  const TurnedVertex& viewer) const {
+  const Vec3<Lanes>& v = viewer.velocity;
   const auto turns =
       surface_on_ray<Dual>(context_.scene, drawn.face, {{q.x, v.x}, {q.y, v.y}, {q.z, v.z}},
-                           turning(omega, viewer.turned->turn, viewer.axis));
+                           turning(omega, viewer.turn));
   // What does not turn is in both.
   const auto rests =
-      surface_on_ray<Dual>(context_.scene, drawn.face, {q.x, q.y, q.z}, turning(omega, {}, {}));
+      surface_on_ray<Dual>(context_.scene, drawn.face, {q.x, q.y, q.z}, turning(omega, {}));
   return {turns.p.x.d - rests.p.x.d, turns.p.y.d - rests.p.y.d, turns.p.z.d - rests.p.z.d};
 }
 
@@ -179,7 +179,7 @@ void PenumbraTerm::add(const Drawn& drawn, const Vec3<Dual>& origin, const Vec3<
   const auto surface = surface_on_ray<Dual>(scene, drawn.face, origin, direction);
   const Scattering<Dual> scattering(surface, -direction, scene.shading);
   if (scattering.black()) return;
-  const PathVertex vertex{surface, scattering, throughput, {}, {}, bounces, {}, key, log, turned};
+  const PathVertex vertex{surface, scattering, throughput, {}, bounces, {}, key, log, turned};
   add_edge_point(context_, edges_.object(drawn.edge.edge.object), vertex, query_at(vertex),
                  drawn.edge, {&regions_, drawn.line.region}, key, cost, sum);
 }

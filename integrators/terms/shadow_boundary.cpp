@@ -288,7 +288,7 @@ void ShadowTerm::add_sample(const PathVertex& vertex, Rng rng, TermCost& cost,
     return;
   }
   const Lanes swept =
-      sweep(edge, *point, {vertex.surface.p, turning(omega, vertex.turn, vertex.axis), distance});
+      sweep(edge, *point, {vertex.surface.p, turning(omega, vertex.turn), distance});
   const Rgb<double> amount = vertex.throughput * f * jump(edge, *point, q, omega);
   if (is_zero(swept) || is_black(amount)) {
     ++cost.zero_weight;
@@ -305,8 +305,8 @@ void ShadowTerm::add_sample(const PathVertex& vertex, Rng rng, TermCost& cost,
     // What does not turn is in both.
     const Vec3<Lanes>& v = turned->velocity;
     const Viewer turns{
-        {{q.x, v.x}, {q.y, v.y}, {q.z, v.z}}, turning(omega, turned->turn, vertex.axis), distance};
-    const Viewer rests{{q.x, q.y, q.z}, turning(omega, {}, {}), distance};
+        {{q.x, v.x}, {q.y, v.y}, {q.z, v.z}}, turning(omega, turned->turn), distance};
+    const Viewer rests{{q.x, q.y, q.z}, turning(omega, {}), distance};
     const Lanes of_turns = sweep(edge, *point, turns) - sweep(edge, *point, rests);
     for (int c = 0; c < 3; ++c) turned->sum[c] += of_turns * (amount[c] / probability);
   }

@@ -17,14 +17,20 @@
 
 namespace limn {
 
-// How directions move at a point: |w| times the velocity of the direction of w, up to a part along w,
-// which moves no edge. axis: zero, and directions turn with the angular velocity `turn`; or a unit
-// vector, and they follow points of a plane across it that move with `turn` times their distance
-// along the axis. Linear in w either way.
-inline Vec3<Lanes> motion_of_directions(const Vec3<Lanes>& turn, const Vec3d& axis, const Vec3d& w) {
-  const double along = dot(axis, w);
-  return axis == Vec3d{} ? cross(turn, w) : turn * along;
-}
+// How the directions at a point move, per parameter.
+struct DirectionTurn {
+  // Their angular velocity; or, if there is an axis, the velocity of points that they follow over the
+  // distance of these along it. All such points lie in a plane across the axis.
+  Vec3<Lanes> rate{};
+  Vec3d axis{};  // unit; or zero
+
+  bool follows() const { return axis != Vec3d{}; }
+  // |w| times the velocity of the direction of w, up to a part along w, which moves no edge: linear
+  // in w.
+  Vec3<Lanes> velocity(const Vec3d& w) const {
+    return follows() ? rate * dot(axis, w) : cross(rate, w);
+  }
+};
 
 // Everything about the shading point that a sampler may use.
 struct EdgeQuery {
@@ -33,9 +39,8 @@ struct EdgeQuery {
   Vec3d wi;                // unit, towards the viewer
   LobeSummary lobe;        // of the scattering function
   Vec3<Lanes> velocity{};  // of p, per parameter; an edge's velocity relative to p counts
-  // How all directions move at p, per parameter; an edge that follows them is at rest.
-  Vec3<Lanes> turn{};
-  Vec3d axis{};
+  // An edge that moves as the directions at p do is at rest.
+  DirectionTurn turn{};
   // The face that p lies on, if any: its edges lie on p's horizon, where the scattering function is
   // zero, and are never drawn.
   FaceRef face = {};
@@ -46,8 +51,7 @@ struct EdgeQuery {
 inline Vec3<Lanes> relative_velocity(const EdgeMesh& mesh, VertexId vertex,
                                      const EdgeQuery& query) {
   const Vec3<Lanes> own = mesh.tangents.empty() ? Vec3<Lanes>{} : mesh.tangent(vertex);
-  return own - query.velocity -
-         motion_of_directions(query.turn, query.axis, mesh.position(vertex) - query.p);
+  return own - query.velocity - query.turn.velocity(mesh.position(vertex) - query.p);
 }
 
 struct EdgeSample {
