@@ -29,7 +29,8 @@ bool same(const Vec3<Lanes>& a, const Vec3<Lanes>& b) {
 }
 bool same(const EdgeQuery& a, const EdgeQuery& b) {
   return a.p == b.p && a.n == b.n && a.wi == b.wi && a.lobe == b.lobe &&
-         same(a.velocity, b.velocity) && same(a.turn, b.turn) && a.face == b.face;
+         same(a.velocity, b.velocity) && same(a.turn.rate, b.turn.rate) &&
+         a.turn.axis == b.turn.axis && a.face == b.face;
 }
 
 bool is_still(const Vec3<Lanes>& v) { return is_zero(v.x) && is_zero(v.y) && is_zero(v.z); }
@@ -106,7 +107,7 @@ class BruteForceSampler final : public EdgeSampler {
     listing.query = query;
     listing.edges.clear();
     listing.cumulative.clear();
-    const bool still = is_still(query.velocity) && is_still(query.turn);
+    const bool still = is_still(query.velocity) && is_still(query.turn.rate);
     for (uint32_t o = 0; o < input_.objects.size(); ++o) {
       if (input_.objects[o].tangents.empty() && still) continue;
       list_object(ShapeId(o), query, listing);

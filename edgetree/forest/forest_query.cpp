@@ -219,7 +219,7 @@ ForestQuery::ForestQuery(const Forest& tree, const LightClusters* clusters,
   unit = unit_of(forest, query.p);
   split(query.p, unit, p);
   speed = sum_of_speeds(query.velocity, lane_scale);
-  turn = sum_of_speeds(query.turn, lane_scale);
+  turn = sum_of_speeds(query.turn.rate, lane_scale);
 }
 
 Ints may_hold_candidates(const InnerNode& node, const ForestPoint& point) {
@@ -244,7 +244,7 @@ ForestCone::ForestCone(const Forest& forest, const EdgeQuery& query, const Direc
                        const Lanes& lane_scale)
     : point(point_of(forest, query.p)),
       at_rest(sum_of_speeds(query.velocity, lane_scale) == 0 &&
-              sum_of_speeds(query.turn, lane_scale) == 0),
+              sum_of_speeds(query.turn.rate, lane_scale) == 0),
       slack(static_cast<float>(cone.slack)),
       unit(unit_of(forest, query.p)) {
   const auto add = [&](const Vec3d& plane) {

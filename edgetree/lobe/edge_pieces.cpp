@@ -58,7 +58,8 @@ EdgeCutter::EdgeCutter(const EdgeQuery& query, const Lanes& lane_scale)
       lobe_(query.lobe, query.n, query.wi),
       widest_(widest_of(query.lobe)),
       cosine_of_widest_(std::cos(widest_)),
-      turns_(!is_zero(query.turn.x) || !is_zero(query.turn.y) || !is_zero(query.turn.z)) {}
+      turns_(!is_zero(query.turn.rate.x) || !is_zero(query.turn.rate.y) ||
+             !is_zero(query.turn.rate.z)) {}
 
 void EdgeCutter::add(const ListedEdge& edge, const EdgeMesh& mesh, double t0, double t1,
                      std::vector<EdgePiece>& pieces) const {
@@ -74,9 +75,9 @@ void EdgeCutter::add(const ListedEdge& edge, const EdgeMesh& mesh, double t0, do
     v0 += dot_lanes(mesh.tangent(i), m);
     v1 += dot_lanes(mesh.tangent(j), m);
   }
-  if (turns_) {  // m . (turn x w) = turn . (w x m)
-    v0 = v0 - dot_lanes(query_.turn, cross(w0, m));
-    v1 = v1 - dot_lanes(query_.turn, cross(w0 + along, m));
+  if (turns_) {
+    v0 = v0 - dot_lanes(query_.turn.velocity(w0), m);
+    v1 = v1 - dot_lanes(query_.turn.velocity(w0 + along), m);
   }
   if (is_zero(v0) && is_zero(v1)) return;
 

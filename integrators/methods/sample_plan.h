@@ -43,6 +43,9 @@ struct SamplePlan {
   std::vector<PixelCounts> counts;     // by cell; empty: `uniform`
   int light_samples = 1;               // at every vertex of a path but the first
   std::vector<DirectionField> fields;  // by cell; empty: directions are held
+  // Whether vertices that move fast take more samples of edges and lights, and those that few light
+  // comes from fewer.
+  bool splits = false;
 
   PixelCounts counts_at(const PixelSample& at) const;
   const DirectionField* field_at(const PixelSample& at) const {

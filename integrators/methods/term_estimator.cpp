@@ -121,27 +121,35 @@ class TermEstimator::VertexTerms {
                   int bounces, const Rng& key) {
     const Rgb<double> weight = value(throughput);
     TurnedVertex turned;
-    PathVertex vertex{surface, scattering, weight, motion ? motion->turn : Vec3<Lanes>{},
+    PathVertex vertex{surface, scattering, weight, motion ? motion->turn : DirectionTurn{},
                       bounces, step,       key,    sink_.log()};
     if (held_) {
       turned = turned_at(surface, motion, bounces);
       vertex.turned = &turned;
     }
     if (vertex.log) log_vertex(*vertex.log, surface, scattering, weight, bounces);
+    const double urgency = urgency_at(surface, weight, bounces);
     for (size_t slot = 0; slot < estimator_.slots(); ++slot) {
       const Term* term = estimator_.terms_[slot].get();
       if (!term || !term->uses_vertices()) continue;
       if (skipped(slot, key)) continue;
+      const int planned = std::max(1, static_cast<int>(counts_[slot]));
+      const int samples = rounded(planned * urgency, key.at(Purpose::kVertexSplit, bounces), slot);
+      if (samples == 0) continue;
       const Stopwatch watch;
       TermCost& cost = sink_.cost(slot);
-      const int samples = std::max(1, static_cast<int>(counts_[slot]));
       turned.sum = {};
+      Rgb<Lanes> sum;
       try {
-        term->add_at_vertex(vertex, samples, cost, sums_[slot]);
+        term->add_at_vertex(vertex, samples, cost, sum);
       } catch (const UntraceableRay&) {
-        sums_[slot] = grey(kNotFinite);
+        sum = grey(kNotFinite);
       }
-      turned_[slot] = turned_[slot] + turned.sum;
+      const double share = 1 / urgency;
+      for (int c = 0; c < 3; ++c) {
+        sums_[slot][c] += sum[c] * share;
+        turned_[slot][c] += turned.sum[c] * share;
+      }
       cost.seconds += watch.seconds();
     }
   }
@@ -153,11 +161,29 @@ class TermEstimator::VertexTerms {
   TurnedVertex turned_at(const SurfacePoint<Dual>& surface, const DirectionMotion* motion,
                          int bounces) const {
     TurnedVertex turned;
+    if (motion) turned.turn.axis = motion->turn.axis;
     for (int k = 0; k < 3; ++k) {
-      if (motion) turned.turn[k][k] = motion->unit;
+      if (motion) turned.turn.rate[k][k] = motion->unit;
       turned.velocity[k] = estimator_.turned(surface.p[k].d, held_->velocity(bounces)[k]);
     }
     return turned;
+  }
+  // How many samples the vertex takes in place of one, on average: as large as what they may add.
+  double urgency_at(const SurfacePoint<Dual>& surface, const Rgb<double>& throughput, int bounces) {
+    constexpr double kLeast = 0.125, kMost = 32;  // not tuned
+    if (!estimator_.splits_now(held_ != nullptr)) return 1;
+    const Vec3d p = value(surface.p);
+    if (bounces == 0) first_ = p;
+    const Vec3<Lanes> velocity{surface.p.x.d, surface.p.y.d, surface.p.z.d};
+    const double urgency = luminance(throughput) * estimator_.rates_.urgency(p, velocity, first_);
+    return std::clamp(urgency, kLeast, kMost);
+  }
+  // A whole number with this mean.
+  static int rounded(double mean, Rng rng, size_t slot) {
+    const double whole = std::floor(mean);
+    if (whole == mean) return static_cast<int>(mean);
+    rng = rng.at(Purpose::kVertexSplit, slot);
+    return static_cast<int>(whole) + (rng.uniform() < mean - whole ? 1 : 0);
   }
   // One decision for all vertices of a path.
   bool skipped(size_t slot, const Rng& key) const {
@@ -170,6 +196,7 @@ class TermEstimator::VertexTerms {
   SampleSink& sink_;
   std::array<Rgb<Lanes>, kMostTerms> sums_;
   std::array<Rgb<Lanes>, kMostTerms> turned_;
+  Vec3d first_;  // vertex of the path
 };
 
 void TermEstimator::add_pixel(const PixelSample& at, const Rng& key, SampleSink& sink) const {
@@ -207,7 +234,7 @@ void TermEstimator::add_vertices(const PixelSample& at, const VertexTerms& verti
 template <class Visitor>
 TermEstimator::Path TermEstimator::trace(const PixelSample& at, const Rng& key,
                                          const DirectionField* field, Visitor& visitor,
-                                         SampleLog* log) const {
+                                         SampleLog* log, bool twice) const {
   const FilmPosition film = sample_pixel_filter(scene_.film, at.x, at.y, key);
   const auto ray = camera_.ray(film.x, film.y);
   const Ray primal = camera_ray(
@@ -217,6 +244,7 @@ TermEstimator::Path TermEstimator::trace(const PixelSample& at, const Rng& key,
   PathTracer<Dual, Visitor> tracer(context_, path.rays, visitor);
   if (field) tracer.move_directions(rates_, *field);
   tracer.take_light_samples(plan_.light_samples);
+  if (splits_now(twice)) tracer.split_by(&rates_);
   try {
     path.radiance = tracer.from_ray(primal, ray.origin, ray.direction, 0, key);
   } catch (const UntraceableRay&) {
@@ -291,10 +319,10 @@ TermEstimator::Sample TermEstimator::sample(const PixelSample& at, const Rng& ke
   Path held;
   if (twice) {
     const DirectionField rest;  // as a field, so that both take the same steps
-    held = trace(at, key, &rest, motions, nullptr);
+    held = trace(at, key, &rest, motions, nullptr, twice);
   }
   VertexTerms vertices(*this, ones, twice ? &motions : nullptr, sink);
-  const Path path = trace(at, key, turns ? &turning_ : nullptr, vertices, nullptr);
+  const Path path = trace(at, key, turns ? &turning_ : nullptr, vertices, nullptr, twice);
   sink.cost(pixel_slot_).add(path.rays);
   ++sink.cost(pixel_slot_).samples;
   const auto split = [&](const Rgb<Lanes>& turning, const Rgb<Lanes>& resting) {

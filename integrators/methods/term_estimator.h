@@ -77,7 +77,9 @@ class TermEstimator final : public SampleEstimator {
   };
   template <class Visitor>
   Path trace(const PixelSample& at, const Rng& key, const DirectionField* field, Visitor& visitor,
-             SampleLog* log) const;
+             SampleLog* log, bool twice = false) const;
+  // Paths that are traced twice must take the same samples, though their vertices move otherwise.
+  bool splits_now(bool twice) const { return plan_.splits && !twice; }
   // What turns about the axes change, in the unit of MotionRates: from what lanes 1 to 3 have more
   // where directions turn in them.
   Lanes turned(const Lanes& turning, const Lanes& held) const;

@@ -269,6 +269,7 @@ class TermJob {
     const bool turns =
         method_.moves_directions && can_move_directions() && !estimator.motion_rates().still();
     SamplePlan probing;
+    probing.splits = plan.splits = method_.spreads_samples && !options_.uniform_samples;
     if (method_.spreads_samples) probing.light_samples = kPilotLights;
     estimator.set_plan(probing);
     RunSettings share = settings;

@@ -29,6 +29,25 @@ constexpr double kListCost = 1;
 constexpr double kSmall = 0.1;
 constexpr int kMostSides = 8;
 
+// A vertex whose directions are held, and the same with directions that turn. What lamps emit is seen
+// with the first, see path.h.
+struct Viewers {
+  explicit Viewers(const PathVertex& turning) : vertices{turning, turning} {
+    vertices[0].turn = {};
+    if (turning.turned) {
+      held = *turning.turned;
+      held.turn = {};
+      held.sum = {};
+      vertices[0].turned = &held;
+    }
+    queries[0] = query_at(vertices[0]);
+    queries[1] = query_at(vertices[1]);
+  }
+  PathVertex vertices[2];
+  TurnedVertex held;
+  EdgeQuery queries[2];
+};
+
 struct Drawn {
   uint32_t region;
   EdgePiece piece;
@@ -57,18 +76,19 @@ class DirectTerm final : public Term {
     std::vector<Drawn> outlines;  // of small lamps, one lamp after the other
     void clear() { others.clear(), outlines.clear(); }
   };
-  void list(const EdgeQuery& query, Lists& lists) const;
-  void add_drawn(const PathVertex& vertex, const EdgeQuery& query, int samples,
-                 const std::vector<Drawn>& drawn, TermCost& cost, Rgb<Lanes>& sum) const;
+  void list(const Viewers& viewers, Lists& lists) const;
+  void add_drawn(const Viewers& viewers, int samples, const std::vector<Drawn>& drawn,
+                 TermCost& cost, Rgb<Lanes>& sum) const;
   // Pieces [begin, end).
-  void add_outline(const PathVertex& vertex, const EdgeQuery& query, int sample, const Drawn* begin,
-                   const Drawn* end, TermCost& cost, Rgb<Lanes>& sum) const;
+  void add_outline(const Viewers& viewers, int sample, const Drawn* begin, const Drawn* end,
+                   TermCost& cost, Rgb<Lanes>& sum) const;
   // Whether the edge is a side of the lamp itself.
   bool is_own_edge(uint32_t region, EdgeRef edge) const;
   double own_share(const PathVertex& vertex, const EdgeMesh& mesh, const EdgeSample& sample,
                    uint32_t region) const;
-  void add_point(const PathVertex& vertex, const EdgeQuery& query, const Drawn& drawn, double u,
-                 double times, TermCost& cost, Rgb<Lanes>& sum) const;
+  void add_point(const Viewers& viewers, const Drawn& drawn, double u, double times, TermCost& cost,
+                 Rgb<Lanes>& sum) const;
+  size_t turns(uint32_t region) const { return regions_.shape(region).valid() ? 0 : 1; }
 
   const PathContext& context_;
   const EdgeSamplerInput& edges_;
@@ -77,13 +97,14 @@ class DirectTerm final : public Term {
   const LampEdges& lamp_edges_;
 };
 
-void DirectTerm::list(const EdgeQuery& query, Lists& lists) const {
+void DirectTerm::list(const Viewers& viewers, Lists& lists) const {
   static thread_local std::vector<ListedEdge> listed;
   static thread_local std::vector<EdgePiece> pieces;
   const auto append = [](std::vector<Drawn>& to, uint32_t k, const EdgePiece& piece, double light) {
     to.push_back({k, piece, (to.empty() ? 0 : to.back().sum) + piece.weight * light});
   };
   for (uint32_t k = 0; k < regions_.size(); ++k) {
+    const EdgeQuery& query = viewers.queries[turns(k)];
     const std::optional<DirectionCone> cone = regions_.cone(k, query.p, query.n);
     if (!cone) continue;
     listed.clear();
@@ -109,25 +130,27 @@ void DirectTerm::add_at_vertex(const PathVertex& vertex, int samples, TermCost& 
                                Rgb<Lanes>& sum) const {
   static thread_local Lists lists;
   lists.clear();
-  const EdgeQuery query = query_at(vertex);
-  list(query, lists);
+  Viewers viewers(vertex);
+  list(viewers, lists);
   if (vertex.log) {
     vertex.log->push_back(fmt::format("  direct: {} pieces of silhouettes before {} regions",
                                       lists.others.size() + lists.outlines.size(),
                                       regions_.size()));
   }
-  add_drawn(vertex, query, samples, lists.others, cost, sum);
+  add_drawn(viewers, samples, lists.others, cost, sum);
   const auto& outlines = lists.outlines;
   for (size_t begin = 0, end = 0; begin < outlines.size(); begin = end) {
     while (end < outlines.size() && outlines[end].region == outlines[begin].region) ++end;
     for (int i = 0; i < samples; ++i) {
-      add_outline(vertex, query, i, &outlines[begin], &outlines[begin] + (end - begin), cost, sum);
+      add_outline(viewers, i, &outlines[begin], &outlines[begin] + (end - begin), cost, sum);
     }
   }
+  if (vertex.turned) vertex.turned->sum = vertex.turned->sum + viewers.held.sum;
 }
 
-void DirectTerm::add_drawn(const PathVertex& vertex, const EdgeQuery& query, int samples,
-                           const std::vector<Drawn>& drawn, TermCost& cost, Rgb<Lanes>& sum) const {
+void DirectTerm::add_drawn(const Viewers& viewers, int samples, const std::vector<Drawn>& drawn,
+                           TermCost& cost, Rgb<Lanes>& sum) const {
+  const PathVertex& vertex = viewers.vertices[0];
   const int points = kPoints * samples;
   cost.samples += static_cast<uint64_t>(points);
   const double total = drawn.empty() ? 0 : drawn.back().sum;
@@ -153,21 +176,21 @@ void DirectTerm::add_drawn(const PathVertex& vertex, const EdgeQuery& query, int
     i = chosen[j];
     const double before = i == 0 ? 0 : drawn[i - 1].sum, weight = drawn[i].sum - before;
     const double u = std::clamp((target - before) / weight, 0.0, 1.0);
-    add_point(vertex, query, drawn[i], u, weight / total * kPoints, cost, sum);
+    add_point(viewers, drawn[i], u, weight / total * kPoints, cost, sum);
   }
 }
 
 // What the sides of a small lamp add cancels but for its size: none of them is left out, and all are
 // met at the same place. Of many, each is met as often as it weighs.
-void DirectTerm::add_outline(const PathVertex& vertex, const EdgeQuery& query, int sample,
-                             const Drawn* begin, const Drawn* end, TermCost& cost,
-                             Rgb<Lanes>& sum) const {
+void DirectTerm::add_outline(const Viewers& viewers, int sample, const Drawn* begin,
+                             const Drawn* end, TermCost& cost, Rgb<Lanes>& sum) const {
+  const PathVertex& vertex = viewers.vertices[0];
   Rng rng = vertex.key.copy(Purpose::kDirectCopy, sample + 1).at(Purpose::kDirect, vertex.bounces);
   const double u = rng.uniform();
   if (end - begin <= kMostSides) {
     cost.samples += static_cast<uint64_t>(end - begin);
     for (const Drawn* piece = begin; piece != end; ++piece) {
-      add_point(vertex, query, *piece, u, 1, cost, sum);
+      add_point(viewers, *piece, u, 1, cost, sum);
     }
     return;
   }
@@ -181,7 +204,7 @@ void DirectTerm::add_outline(const PathVertex& vertex, const EdgeQuery& query, i
     const double before = piece == begin ? first : (piece - 1)->sum;
     const double weight = piece->sum - before;
     const double place = std::clamp((target - before) / weight, 0.0, 1.0);
-    add_point(vertex, query, *piece, place, weight / total * kMostSides, cost, sum);
+    add_point(viewers, *piece, place, weight / total * kMostSides, cost, sum);
   }
 }
 
@@ -197,13 +220,15 @@ double DirectTerm::own_share(const PathVertex& vertex, const EdgeMesh& mesh,
 }
 
 // times: how often the piece is drawn, on average, for one sample.
-void DirectTerm::add_point(const PathVertex& vertex, const EdgeQuery& query, const Drawn& drawn,
-                           double u, double times, TermCost& cost, Rgb<Lanes>& sum) const {
+void DirectTerm::add_point(const Viewers& viewers, const Drawn& drawn, double u, double times,
+                           TermCost& cost, Rgb<Lanes>& sum) const {
+  const PathVertex& vertex = viewers.vertices[turns(drawn.region)];
   const auto [t, density] = drawn.piece.place(u);
   const EdgeSample sample{drawn.piece.edge, t, density, times};
   const EdgeMesh& mesh = edges_.object(sample.edge.object);
-  add_edge_point(context_, mesh, vertex, query, sample, {&regions_, drawn.region}, vertex.key, cost,
-                 sum, own_share(vertex, mesh, sample, drawn.region));
+  add_edge_point(context_, mesh, vertex, viewers.queries[turns(drawn.region)], sample,
+                 {&regions_, drawn.region}, vertex.key, cost, sum,
+                 own_share(vertex, mesh, sample, drawn.region));
 }
 
 }  // namespace

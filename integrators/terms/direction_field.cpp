@@ -23,7 +23,9 @@ MotionRates::MotionRates(const Scene& scene, int lanes, const Lanes& steps) {
     const double share = steps[lane] / steps[0];
     add_object(scene, lane, share);
     add_camera(scene, lane, share);
+    shares_[lane] = share;
   }
+  for (const Source& source : sources_) speed_ += source.speed;
 }
 
 // All vertices that move, as one object.
@@ -42,7 +44,7 @@ void MotionRates::add_object(const Scene& scene, int lane, double share) {
   if (count == 0) return;
   const double radius = 0.5 * length(bounds.upper - bounds.lower);
   if (!(radius > 0)) return;
-  sources_.push_back({bounds.center(), radius, share * std::sqrt(squares / count), 0});
+  sources_.push_back({bounds.center(), radius, share * std::sqrt(squares / count), 0, false});
 }
 
 void MotionRates::add_camera(const Scene& scene, int lane, double share) {
@@ -52,7 +54,8 @@ void MotionRates::add_camera(const Scene& scene, int lane, double share) {
                           length(derivative(camera.up, lane)) +
                           std::fabs(camera.fov.d[lane]) * (kPi / 180);
   if (!(speed > 0) && !(rotation > 0)) return;
-  sources_.push_back({value(camera.origin), camera.near_clip, share * speed, share * rotation});
+  sources_.push_back(
+      {value(camera.origin), camera.near_clip, share * speed, share * rotation, true});
 }
 
 double MotionRates::at(const Vec3d& p) const {
@@ -66,7 +69,32 @@ double MotionRates::at(const Vec3d& p) const {
 
 DirectionMotion MotionRates::motion_at(const Vec3d& p, const DirectionField& field) const {
   const double unit = at(p);
-  return {field.turn * unit, field.score * unit, !is_zero(field.score), unit};
+  const Vec3d axis = axis_at(p);
+  return {{field.turn * unit, axis}, {field.score * unit, axis}, !is_zero(field.score), unit};
+}
+
+double MotionRates::sliding(const Vec3<Lanes>& velocity) const {
+  double speed = 0;
+  for (int lane = 0; lane < kLanes; ++lane) {
+    if (shares_[lane] > 0) speed += shares_[lane] * length(lane_of(velocity, lane));
+  }
+  return speed_ > 0 ? speed / speed_ : 0;
+}
+
+double MotionRates::urgency(const Vec3d& p, const Vec3<Lanes>& velocity, const Vec3d& p0) const {
+  const double typical = at(p0);
+  if (!(typical > 0)) return 1;
+  return at(p) / typical + std::max(0.0, sliding(velocity) - 1);
+}
+
+Vec3d MotionRates::axis_at(const Vec3d& p) const {
+  if (sources_.empty()) return {};
+  for (const Source& source : sources_) {
+    if (source.is_camera || !(source.center == sources_[0].center)) return {};
+  }
+  const Vec3d to = sources_[0].center - p;
+  const double distance = length(to);
+  return distance > sources_[0].radius ? to / distance : Vec3d{};
 }
 
 }  // namespace limn

@@ -58,10 +58,12 @@ class PathTracer {
     rates_ = &rates;
     field_ = &field;
   }
+  // Takes more light samples at later vertices that slide fast. It must outlive the tracer.
+  void split_by(const MotionRates* rates) { splitting_ = rates; }
   // How many light samples are averaged at every vertex but the first.
   void take_light_samples(int count) { light_samples_ = count; }
-  // With two of them: half of what the first makes more than the second, at all vertices of the
-  // paths so far. It has mean zero, and half the variance of one light sample alone.
+  // With an even number of them: half of what every first makes more than the second, at all vertices
+  // of the paths so far. It has mean zero, and the variance of their mean.
   const Rgb<S>& light_difference() const { return light_difference_; }
   uint64_t later_lights() const { return later_lights_; }  // light samples behind it
   // Sum of the scores over the paths so far: has mean zero, and belongs to the interior term.
@@ -115,7 +117,8 @@ class PathTracer {
       const auto [f, pdf] = evaluate(scattering, *wo, direction, motion);
       if (is_black(value(f))) return radiance;
       add_score(scattering, *wo, motion, value(throughput) * (1 / pdf));
-      throughput = throughput * f * (1 / pdf);
+      const Rgb<S> before = throughput;
+      throughput = throughput * stretched(f, *wo, motion) * (1 / pdf);
       step = {value(surface.p), pdf};
       // Behind the last scattering only what emits counts.
       const bool last = is_complete(bounces + 1), shapes_emit = c_.lights.on_shapes();
@@ -137,7 +140,12 @@ class PathTracer {
         move_along_edge(surface, hit.face);
       }
       wi = -direction;
-      radiance += throughput * emitted(surface, *wo, pdf, hit.t);
+      const Rgb<S> lamp = emitted(surface, *wo, pdf, hit.t);
+      if (motion && !is_black(value(lamp))) {
+        radiance += before * scattering.eval(*wo) * lamp * (1 / pdf);  // held
+      } else {
+        radiance += throughput * lamp;
+      }
       if (!survives_roulette(throughput, bounces + 1, key)) return radiance;
     }
   }
@@ -157,7 +165,7 @@ class PathTracer {
   }
   static Vec3<S> moving(const Vec3d& w, const DirectionMotion* motion) {
     if constexpr (std::is_same_v<S, Dual>) {
-      if (motion) return motion->moving(w);
+      if (motion) return turning(w, motion->turn);
     }
     return {w.x, w.y, w.z};
   }
@@ -167,19 +175,41 @@ class PathTracer {
     if (!motion) return scattering.eval_with_pdf(w);
     return {scattering.eval(direction), scattering.pdf_solid_angle(w)};
   }
+  // Times the change of a solid angle around w.
+  static Rgb<S> stretched(const Rgb<S>& f, const Vec3d& w, const DirectionMotion* motion) {
+    if constexpr (std::is_same_v<S, Dual>) {
+      if (motion && motion->turn.follows()) return f * Dual(1.0, divergence(w, motion->turn));
+    }
+    return f;
+  }
   void add_score(const Scattering<S>& scattering, const Vec3d& w, const DirectionMotion* motion,
                  const Rgb<double>& weight) {
     if constexpr (std::is_same_v<S, Dual>) {
       if (!motion || !motion->scoring) return;
-      const Rgb<Lanes> f = scattering.eval_derivative(motion->moving_score(w));
+      Rgb<Lanes> f = scattering.eval_derivative(turning(w, motion->score));
+      if (motion->score.follows()) {
+        const Rgb<double> still = value(scattering.eval(w));
+        const Lanes stretch = divergence(w, motion->score);
+        for (int c = 0; c < 3; ++c) f[c] += stretch * still[c];
+      }
       score_ = score_ + Rgb<Lanes>{f.r * weight.r, f.g * weight.g, f.b * weight.b};
     }
   }
 
+  // Light samples in place of one: where a vertex slides fast, what they add is as large.
+  int splits(const SurfacePoint<S>& surface) const {
+    if constexpr (std::is_same_v<S, Dual>) {
+      constexpr double kMost = 16;  // not tuned
+      if (!splitting_) return 1;
+      const double slides = splitting_->sliding({surface.p.x.d, surface.p.y.d, surface.p.z.d});
+      return static_cast<int>(std::clamp(slides, 1.0, kMost));
+    }
+    return 1;
+  }
   void add_lights(const SurfacePoint<S>& surface, const Scattering<S>& scattering,
                   const DirectionMotion* motion, const Rgb<S>& throughput, int bounces,
                   const Rng& key, const EdgeStart* edge, Rgb<S>& radiance) {
-    const int count = bounces > 0 ? light_samples_ : 1;
+    const int count = bounces > 0 ? light_samples_ * splits(surface) : 1;
     if (bounces > 0) later_lights_ += count;
     if (count == 1) {
       radiance += throughput * direct_light(surface, scattering, motion, bounces, key, edge);
@@ -190,8 +220,7 @@ class PathTracer {
       const Rng copy = key.copy(Purpose::kLightCopy, i);
       const Rgb<S> light = share * direct_light(surface, scattering, motion, bounces, copy, edge);
       radiance += light;
-      if (i == 0) light_difference_ += light;
-      if (i == 1) light_difference_ = light_difference_ - light;
+      light_difference_ = i % 2 == 0 ? light_difference_ + light : light_difference_ - light;
     }
   }
 
@@ -244,12 +273,15 @@ class PathTracer {
     if (const DeltaLight* delta = light->light->delta()) {
       return delta_light(*delta, *light, surface, scattering, edge);
     }
+    if (light->face) motion = nullptr;  // a lamp: held
     const Vec3<S> direction = moving(light->wo, motion);
     const auto [f, bsdf_pdf] = evaluate(scattering, light->wo, direction, motion);
     if (is_black(value(f)) || shadowed(p, surface.face, *light, edge)) return {};
     const double weight = mis_weight(light->pdf, bsdf_pdf) / light->pdf;
     if constexpr (std::is_same_v<S, Dual>) {
-      if (motion) return f * light->light->radiance(direction) * weight;
+      if (motion) {
+        return stretched(f, light->wo, motion) * light->light->radiance(direction) * weight;
+      }
     }
     return f * light->light->template drawn_radiance<S>(*light) * weight;
   }
@@ -298,6 +330,7 @@ class PathTracer {
   Visitor& visitor_;
   const MotionRates* rates_ = nullptr;
   const DirectionField* field_ = nullptr;
+  const MotionRates* splitting_ = nullptr;
   DirectionMotion motion_;
   Rgb<Lanes> score_;
   int light_samples_ = 1;

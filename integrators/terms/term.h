@@ -23,7 +23,7 @@ namespace limn {
 // about the axes x, y and z, on the same samples. Lanes 0 to 2 are the axes.
 struct TurnedVertex {
   Vec3<Lanes> velocity{};  // of the vertex as it then slides [scene units per unit of the turn]
-  Vec3<Lanes> turn{};      // of directions here, in the same unit; zero but at the first vertex
+  DirectionTurn turn;      // of directions here, in the same unit; zero but at the first vertex
   Rgb<Lanes> sum{};        // added to
 };
 
@@ -32,7 +32,7 @@ struct PathVertex {
   const SurfacePoint<Dual>& surface;
   const Scattering<Dual>& scattering;
   const Rgb<double>& throughput;   // of the path up to here
-  Vec3<Lanes> turn;                // angular velocity of directions here, see direction_field.h
+  DirectionTurn turn;              // how directions move here, see direction_field.h
   int bounces;                     // how often it has scattered before
   PathStep step;                   // how it came here
   const Rng& key;                  // of the path

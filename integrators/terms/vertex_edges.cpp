@@ -28,7 +28,7 @@ void add_edge_point(const PathContext& context, const EdgeMesh& mesh, const Path
   const auto [a, b] = mesh.edge(sample.edge.edge).vertices;
   Vec3<Lanes> v = relative_velocity(mesh, a, query) * (1 - sample.t) +
                   relative_velocity(mesh, b, query) * sample.t;
-  if (share != 1) v = v * share - cross(query.turn, view.y - query.p) * (1 - share);
+  if (share != 1) v = v * share - query.turn.velocity(view.y - query.p) * (1 - share);
   const double measure =
       1 / (view.distance * view.distance * view.distance * sample.probability * sample.pdf_t);
   const Lanes weight = (v.x * view.side.x + v.y * view.side.y + v.z * view.side.z) * measure;
@@ -62,7 +62,7 @@ void add_edge_point(const PathContext& context, const EdgeMesh& mesh, const Path
   const Rgb<double> amount = vertex.throughput * f * jump;
   const Rgb<Lanes> added{weight * amount.r, weight * amount.g, weight * amount.b};
   if (TurnedVertex* turned = vertex.turned) {
-    const Vec3<Lanes> moving = turned->velocity * -share - cross(turned->turn, view.y - query.p);
+    const Vec3<Lanes> moving = turned->velocity * -share - turned->turn.velocity(view.y - query.p);
     const Lanes swept =
         (moving.x * view.side.x + moving.y * view.side.y + moving.z * view.side.z) * measure;
     for (int c = 0; c < 3; ++c) turned->sum[c] += swept * amount[c];

@@ -95,7 +95,7 @@ void expect_outlines(const EdgeSamplerInput& input, const EdgeForest& forest,
       const auto [i, j] = mesh.edge(id.edge).vertices;
       const Vec3d a = mesh.position(i) - query.p, b = mesh.position(j) - query.p;
       const bool moves =
-          !mesh.tangents.empty() || !is_zero(query.velocity.x) || !is_zero(query.turn.y);
+          !mesh.tangents.empty() || !is_zero(query.velocity.x) || !is_zero(query.turn.rate.y);
       double t0 = 0, t1 = 1;
       if (!moves || is_own_edge(input, query, id) || !is_outline(mesh, id.edge, query.p) ||
           length(cross(a, b)) == 0 || std::max(dot(query.n, a), dot(query.n, b)) <= 0 ||
@@ -128,7 +128,8 @@ TEST_P(Forests, ListOutlinesInCones) {
         query.p = random_point(input.objects[k % 2], scale, rng);
         query.n = random_direction(rng);
         if (k % 3 == 1) query.velocity.x[2] = 1;
-        if (k % 3 == 2) query.turn.y[0] = 1;
+        if (k % 3 == 2) query.turn.rate.y[0] = 1;
+        if (k % 6 == 5) query.turn.axis = random_direction(rng);
         if (k % 5 == 0) query.face = {ShapeId(k % 2), FaceId(0)};
         const Vec3d to = random_point(input.objects[k % 2], scale, rng) - query.p;
         const Vec3d axis = length(to) > 0 ? normalize(to) : random_direction(rng);

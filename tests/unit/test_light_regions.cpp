@@ -216,7 +216,8 @@ Case random_case(Rng& rng) {
   c.query.n = random_direction(rng);
   c.query.wi = normalize(c.query.n + random_direction(rng) * 0.7);
   c.query.velocity.y[1] = 0.3;
-  c.query.turn.x[2] = rng.uniform();
+  c.query.turn.rate.x[2] = rng.uniform();
+  if (rng.uniform() < 0.5) c.query.turn.axis = random_direction(rng);
   for (int i = 0; i < 2; ++i) {
     const Vec3d d = random_direction(rng);
     c.mesh.positions.push_back(c.query.p + d * (size * (0.1 + rng.uniform())));

@@ -28,7 +28,8 @@ enum class Purpose : uint64_t {
   kLightCopy,
   kDirect,
   kDirectCopy,
-  kTermRoulette
+  kTermRoulette,
+  kVertexSplit
 };
 
 // SplitMix64 started from a hash of (seed, pixel, sample): a stream for one path. `at` derives the

@@ -17,6 +17,21 @@
 
 namespace limn {
 
+// How the directions at a point move, per parameter.
+struct DirectionTurn {
+  // Their angular velocity; or, if there is an axis, the velocity of points that they follow over the
+  // distance of these along it. All such points lie in a plane across the axis.
+  Vec3<Lanes> rate{};
+  Vec3d axis{};  // unit; or zero
+
+  bool follows() const { return axis != Vec3d{}; }
+  // |w| times the velocity of the direction of w, up to a part along w, which moves no edge: linear
+  // in w.
+  Vec3<Lanes> velocity(const Vec3d& w) const {
+    return follows() ? rate * dot(axis, w) : cross(rate, w);
+  }
+};
+
 // Everything about the shading point that a sampler may use.
 struct EdgeQuery {
   Vec3d p;                 // world space
@@ -24,9 +39,8 @@ struct EdgeQuery {
   Vec3d wi;                // unit, towards the viewer
   LobeSummary lobe;        // of the scattering function
   Vec3<Lanes> velocity{};  // of p, per parameter; an edge's velocity relative to p counts
-  // Angular velocity of all directions at p, per parameter: a direction w moves with turn x w, and
-  // an edge that follows it is at rest.
-  Vec3<Lanes> turn{};
+  // An edge that moves as the directions at p do is at rest.
+  DirectionTurn turn{};
   // The face that p lies on, if any: its edges lie on p's horizon, where the scattering function is
   // zero, and are never drawn.
   FaceRef face = {};
@@ -37,7 +51,7 @@ struct EdgeQuery {
 inline Vec3<Lanes> relative_velocity(const EdgeMesh& mesh, VertexId vertex,
                                      const EdgeQuery& query) {
   const Vec3<Lanes> own = mesh.tangents.empty() ? Vec3<Lanes>{} : mesh.tangent(vertex);
-  return own - query.velocity - cross(query.turn, mesh.position(vertex) - query.p);
+  return own - query.velocity - query.turn.velocity(mesh.position(vertex) - query.p);
 }
 
 struct EdgeSample {
