@@ -32,10 +32,10 @@ void check_numbers(const Scene& scene, const std::string& name, const std::vecto
   for (const double v : value) {
     if (std::isfinite(v) && v >= least && v <= most) continue;
     const bool bounded = std::isfinite(least) || std::isfinite(most);
-    throw InputError({scene.file},
-                     fmt::format("parameter \"{}\" cannot be {:g}: it must be finite{}", name, v,
-                                 bounded ? fmt::format(" and lie in [{:g}, {:g}]", least, most)
-                                         : ""));
+    throw InputError(
+        {scene.file},
+        fmt::format("parameter \"{}\" cannot be {:g}: it must be finite{}", name, v,
+                    bounded ? fmt::format(" and lie in [{:g}, {:g}]", least, most) : ""));
   }
 }
 

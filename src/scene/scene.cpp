@@ -34,9 +34,9 @@ Scene deep_copy(const Scene& scene) {
 void set_mesh(Scene& scene, ShapeId shape, std::vector<Vec3f> positions,
               std::vector<FaceIndices> faces, std::vector<std::string>* warnings) {
   Shape& changed = scene.shapes[shape.index()];
-  changed.mesh = make_mesh(std::move(positions), std::move(faces),
-                           changed.mesh.normal_source == NormalSource::kFace, changed.where,
-                           warnings);
+  changed.mesh =
+      make_mesh(std::move(positions), std::move(faces),
+                changed.mesh.normal_source == NormalSource::kFace, changed.where, warnings);
 }
 
 }  // namespace limn

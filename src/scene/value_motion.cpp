@@ -90,8 +90,8 @@ void add_emitter_parameters(const Scene& scene, std::vector<Parameter>& list) {
     list.push_back(
         value_parameter(shape.emitter_id + ".radiance", {c.r, c.g, c.b}, [i](Scene& copy) {
           Rgb<Dual>& radiance = copy.shapes[i].radiance;
-          return ParameterRef{"radiance", {&radiance.r, &radiance.g, &radiance.b},
-                              ParameterRef::Unit::kValue, 0};
+          return ParameterRef{
+              "radiance", {&radiance.r, &radiance.g, &radiance.b}, ParameterRef::Unit::kValue, 0};
         }));
   }
   if (scene.environment && !scene.environment_id.empty()) {

@@ -137,7 +137,7 @@ void bind_compare(nb::module_& m) {
           "method's, with its standard error; None where it cannot be known.")
       .def_prop_ro(
           "image", [](const MethodView& v) { return to_pixels(v.method.image, v.width, v.height); },
-          "Of its first run in the longest time: float32, (H, W, 3).");
+          nb::rv_policy::reference, "Of its first run in the longest time: float32, (H, W, 3).");
   nb::class_<Comparison>(m, "Comparison", "What limn.compare found.")
       .def_ro("reference", &Comparison::reference, "The derivative that all are measured against.")
       .def_prop_ro(

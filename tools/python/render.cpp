@@ -41,9 +41,12 @@ Estimate render_scene(const SceneHandle& handle, std::optional<int> spp,
 void bind_render(nb::module_& m) {
   nb::class_<Estimate>(m, "Estimate",
                        "A mean over samples with its standard error. numpy takes it for its value.")
-      .def_ro("value", &Estimate::value, "The mean: float32, (H, W, 3), row 0 on top.")
-      .def_ro("stderr", &Estimate::error,
-              "Its standard error, of the same shape; NaN with fewer than two batches (spp = 1).")
+      .def_prop_ro(
+          "value", [](const Estimate& e) { return e.value; }, nb::rv_policy::reference,
+          "The mean: float32, (H, W, 3), row 0 on top.")
+      .def_prop_ro(
+          "stderr", [](const Estimate& e) { return e.error; }, nb::rv_policy::reference,
+          "Its standard error, of the same shape; NaN with fewer than two batches (spp = 1).")
       .def_ro("spp", &Estimate::spp, "Samples per pixel that were made.")
       .def_ro("seconds", &Estimate::seconds, "Seconds that the run took, set-up included.")
       .def_prop_ro(

@@ -71,13 +71,15 @@ std::vector<Vec3f> to_positions(nb::handle array) {
   return positions;
 }
 
-// Indices that no mesh can have become the largest, which no mesh has.
 std::vector<FaceIndices> to_faces(nb::handle array) {
   const auto rows = rows_of_three<int64_t>(array, "int64", "Faces");
   std::vector<FaceIndices> faces(rows.shape(0));
   for (size_t i = 0; i < rows.size(); ++i) {
     const int64_t v = rows.data()[i];
-    faces[i / 3][i % 3] = v < 0 || v > UINT32_MAX ? UINT32_MAX : static_cast<uint32_t>(v);
+    if (v < 0 || v > UINT32_MAX) {
+      throw InputError(fmt::format("Faces hold indices of vertices, from 0 on, not {}", v));
+    }
+    faces[i / 3][i % 3] = static_cast<uint32_t>(v);
   }
   return faces;
 }
@@ -151,12 +153,13 @@ void bind_mesh(nb::module_& m) {
   nb::class_<MeshView>(m, "Mesh", "The mesh of a shape as it was when it was asked for.")
       .def_prop_ro(
           "positions", [](const MeshView& v) { return view_positions(v.scene, v.shape); },
+          nb::rv_policy::reference,
           "Vertices in world space: float32, (V, 3), scene units; a view that cannot be written.")
       .def_prop_ro(
-          "faces", view_faces,
+          "faces", view_faces, nb::rv_policy::reference,
           "Indices of corners, counter-clockwise from outside: uint32, (F, 3); a view that "
           "cannot be written.")
-      .def_prop_ro("weld", view_weld,
+      .def_prop_ro("weld", view_weld, nb::rv_policy::reference,
                    "For each vertex the first one at its place: uint32, (V,). Copies of a vertex "
                    "(seams) move together in derivatives: positions[weld] keeps a mesh whole.")
       .def("__repr__", [](const MeshView& v) {
