@@ -280,6 +280,7 @@ class Unifier {
     EdgeMesh& mesh = objects_[id.object.index()];
     found->second = VertexId(static_cast<uint32_t>(mesh.positions.size()));
     mesh.positions.push_back(position(id, t));
+    mesh.cuts.push_back({edge(id).vertices, t});
     if (!mesh.tangents.empty()) mesh.tangents.push_back(velocity(id, t));
     return found->second;
   }

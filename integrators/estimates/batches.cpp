@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "integrators/estimates/splat.h"
 #include "limn/core/error.h"
 #include "limn/core/memory.h"
 #include "limn/core/parallel.h"
@@ -165,26 +166,9 @@ class BatchRunner {
 
   // Adds a sample to the pixels whose filters reach it.
   void splat(size_t slot, const FilmSample& sample, double scale) {
-    const double radius = film_.filter.radius;
-    const int x0 = std::max(film_.crop_x, static_cast<int>(std::floor(sample.x - 0.5 - radius)));
-    const int y0 = std::max(film_.crop_y, static_cast<int>(std::floor(sample.y - 0.5 - radius)));
-    const int x1 = std::min(film_.crop_x + film_.crop_width - 1,
-                            static_cast<int>(std::ceil(sample.x - 0.5 + radius)));
-    const int y1 = std::min(film_.crop_y + film_.crop_height - 1,
-                            static_cast<int>(std::ceil(sample.y - 0.5 + radius)));
-    const auto weight = [&](double offset, Film::Range range) {
-      if (offset < range.lower || offset > range.upper) return 0.0;
-      return film_.filter.eval(offset) /
-             (film_.filter.integral(range.upper) - film_.filter.integral(range.lower));
-    };
-    for (int y = y0; y <= y1; ++y) {
-      const double wy = weight(sample.y - (y + 0.5), film_.range_y(y));
-      if (wy == 0) continue;
-      for (int x = x0; x <= x1; ++x) {
-        const double wx = weight(sample.x - (x + 0.5), film_.range_x(x));
-        if (wx != 0) add(slot, pixel_index(film_, x, y), sample.value, wx * wy * scale);
-      }
-    }
+    for_every_pixel_of(film_, sample.x, sample.y, [&](int x, int y, double weight) {
+      add(slot, pixel_index(film_, x, y), sample.value, weight * scale);
+    });
   }
 
   void add(size_t slot, size_t index, const Rgb<Lanes>& value, double weight) {

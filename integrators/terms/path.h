@@ -1,6 +1,6 @@
 #pragma once
 // The path tracer, written once for any scalar: double gives radiance, Dual gives radiance and the
-// interior term of its derivative. Sampled directions, their densities and MIS weights are
+// interior term of its derivative, Var writes a tape of it. Sampled directions, their densities and MIS weights are
 // constants while the parameters move (solid-angle measure, everywhere), but for the one direction
 // of a light without extent, which follows the parameters.
 #include <atomic>
@@ -10,6 +10,7 @@
 #include "integrators/terms/edge_sides.h"
 #include "limn/core/lights.h"
 #include "limn/core/ray_tracer.h"
+#include "limn/core/reverse.h"
 #include "limn/core/rng.h"
 #include "limn/core/scene.h"
 #include "limn/core/shading.h"
@@ -79,7 +80,7 @@ class PathTracer {
   Rgb<S> escaped(const Vec3<S>& direction, int bounces) const {
     const bool hidden = bounces == 0 && c_.scene.hide_emitters;
     if (!c_.scene.environment || hidden) return {};
-    return c_.scene.environment->radiance(direction);
+    return environment_radiance<S>(*c_.scene.environment, direction);
   }
 
   // Radiance that leaves the surface along wi: emission and everything scattered within the scene's
@@ -120,7 +121,7 @@ class PathTracer {
       if (!found) {
         if (!c_.scene.environment) return radiance;
         auto sight = c_.lights.template environment<S>(*wo);
-        if (motion) sight.radiance = c_.scene.environment->radiance(direction);
+        if (motion) sight.radiance = environment_radiance<S>(*c_.scene.environment, direction);
         radiance += throughput * sight.radiance * mis_weight(pdf, sight.pdf);
         return radiance;
       }
@@ -234,9 +235,10 @@ class PathTracer {
     const auto [f, bsdf_pdf] = evaluate(scattering, light->wo, direction, motion);
     if (is_black(value(f)) || shadowed(p, surface.face, *light, edge)) return {};
     const double weight = mis_weight(light->pdf, bsdf_pdf) / light->pdf;
-    const Rgb<S> radiance = motion ? light->light->radiance(direction)
-                                   : light->light->template drawn_radiance<S>(*light);
-    return f * radiance * weight;
+    if constexpr (std::is_same_v<S, Dual>) {
+      if (motion) return f * light->light->radiance(direction) * weight;
+    }
+    return f * light->light->template drawn_radiance<S>(*light) * weight;
   }
 
   // No ray meets a delta light by chance, so it has the whole weight. Its direction follows the
@@ -244,11 +246,11 @@ class PathTracer {
   Rgb<S> delta_light(const DeltaLight& light, const LightSample& sample,
                      const SurfacePoint<S>& surface, const Scattering<S>& scattering,
                      const EdgeStart* edge) {
-    const auto arrival = light.arriving(surface.p);
-    if (!arrival) return {};
-    const Rgb<S> f = scattering.eval(arrival->wo);
+    const auto arriving = arrival<S>(light, surface.p);
+    if (!arriving) return {};
+    const Rgb<S> f = scattering.eval(arriving->wo);
     if (is_black(value(f)) || shadowed(value(surface.p), surface.face, sample, edge)) return {};
-    return f * arrival->irradiance * (1 / sample.pdf);
+    return f * arriving->irradiance * (1 / sample.pdf);
   }
 
   bool shadowed(const Vec3d& p, FaceRef start, const LightSample& light, const EdgeStart* edge) {

@@ -62,6 +62,18 @@ class CameraView {
     tan_x_ = tan(as<S>(camera.fov) * (kPi / 360)) * camera.x_factor;
   }
 
+  // With numbers of its own in place of the camera's.
+  CameraView(const Camera& camera, const Vec3<S>& origin, const Vec3<S>& left, const Vec3<S>& up,
+             const Vec3<S>& forward, const S& fov)
+      : camera_(camera), origin_(origin), left_(left), up_(up), forward_(forward) {
+    using std::tan;
+    tan_x_ = tan(fov * (kPi / 360)) * camera.x_factor;
+  }
+
+  const Vec3<S>& origin() const { return origin_; }
+  // As Camera::depth.
+  S depth(const Vec3<S>& point) const { return dot(point - origin_, forward_); }
+
   // As Camera::ray.
   CameraRay<S> ray(double x, double y) const {
     const Camera& c = camera_;
@@ -70,6 +82,17 @@ class CameraView {
     const Vec3<S> d = left_ * (tan_x_ * sx) + up_ * (tan_x_ * sy) + forward_;
     const double d_length = length(value(d));
     return {origin_, normalize(d), c.near_clip * d_length, c.far_clip * d_length};
+  }
+
+  // As Camera::project.
+  Camera::FilmPoint<S> project(const Vec3<S>& point) const {
+    const Camera& c = camera_;
+    const Vec3<S> w = point - origin_;
+    const S scale = 1.0 / (dot(w, forward_) * tan_x_);
+    const S fx = (1.0 - dot(w, left_) * scale) * 0.5 - c.offset_x;
+    const S fy =
+        (1.0 - dot(w, up_) * scale * (static_cast<double>(c.width) / c.height)) * 0.5 - c.offset_y;
+    return {fx * static_cast<double>(c.width), fy * static_cast<double>(c.height)};
   }
 
  private:
@@ -85,14 +108,7 @@ CameraRay<S> Camera::ray(double x, double y) const {
 
 template <class S>
 Camera::FilmPoint<S> Camera::project(const Vec3<S>& point) const {
-  using std::tan;
-  const S tan_x = tan(as<S>(fov) * (kPi / 360)) * x_factor;
-  const Vec3<S> w = point - as<S>(origin);
-  const S scale = 1.0 / (dot(w, as<S>(forward)) * tan_x);
-  const S fx = (1.0 - dot(w, as<S>(left)) * scale) * 0.5 - offset_x;
-  const S fy =
-      (1.0 - dot(w, as<S>(up)) * scale * (static_cast<double>(width) / height)) * 0.5 - offset_y;
-  return {fx * static_cast<double>(width), fy * static_cast<double>(height)};
+  return CameraView<S>(*this).project(point);
 }
 
 }  // namespace limn

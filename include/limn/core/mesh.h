@@ -83,6 +83,14 @@ void weld_seams(Mesh& mesh);
 // crease.
 void update_shading_normals(Mesh& mesh);
 
+// The adjoint of update_shading_normals. normals (N), horizons (V): derivatives of some number with
+// respect to them. Adds what follows for the positions to `positions` (V), at the first copy of each
+// welded vertex. Normals of the file do not follow positions: what horizons do to them is added to
+// `normals`. Where several tilts tie for a horizon, each has an equal share in it (forward mode takes
+// the middle of the least and the largest slope, which depends on the motion in no linear way).
+void pull_back_shading_normals(const Mesh& mesh, std::vector<Vec3d>& normals,
+                               const std::vector<double>& horizons, std::vector<Vec3d>& positions);
+
 // Whether a face has an area, and so a plane, as far as double precision can tell; else it is a line,
 // which no ray meets and which only ties other faces together (half_edges.h). Each product of the
 // normal is rounded once, each difference of products once more.

@@ -23,6 +23,7 @@
 
 #include "limn/core/ray_tracer.h"
 #include "limn/core/scene.h"
+#include "limn/core/slots.h"
 
 namespace limn {
 
@@ -39,7 +40,7 @@ struct SurfacePoint {
   Rgb<S> emission(const Vec3d& wi, ShadingModel model) const {
     if (!shape->is_emitter) return {};
     const double side = model == ShadingModel::kMitsuba ? dot(value(n_s), wi) : dot(n_g, wi);
-    return side > 0 ? as<S>(shape->radiance) : Rgb<S>{};
+    return side > 0 ? detail::emitter_radiance<S>(*shape, face.shape) : Rgb<S>{};
   }
 };
 
@@ -164,6 +165,10 @@ class Scattering {
     if constexpr (std::is_same_v<S, Dual>) {
       still_ = is_still(n_s_) && is_still(wi_) && is_still(horizon_) && bsdf_ && bsdf_->is_still();
     }
+    if constexpr (std::is_same_v<S, Var>) {
+      copies_ = Tape::current()->slots()->bsdfs[point.face.shape.index()][front];
+      still_ = is_still(n_s_) && is_still(wi_) && is_still(horizon_) && !copies_;
+    }
   }
 
   bool black() const { return bsdf_ == nullptr; }
@@ -176,10 +181,15 @@ class Scattering {
   template <class W>
   Rgb<S> eval(const Vec3<W>& wo) const {
     const Vec3<S> w{wo.x, wo.y, wo.z};
-    if (!limited_) return bsdf_->eval(n_, wi_, w);
+    if (!limited_) return detail::eval_bsdf<S>(*bsdf_, copies_, n_, wi_, w);
     const S factor = horizon_factor(wo);
     if (value(factor) == 0) return {};
-    return bsdf_->eval(n_, wi_, w) * factor;
+    return detail::eval_bsdf<S>(*bsdf_, copies_, n_, wi_, w) * factor;
+  }
+  // Its value alone.
+  Rgb<double> eval_value(const Vec3d& wo) const {
+    const double factor = limited_ ? horizon_value(wo) : 1;
+    return factor == 0 ? Rgb<double>{} : bsdf_->eval(value(n_), value(wi_), wo) * factor;
   }
   // The part of eval's derivative that comes from the motion of wo alone.
   Rgb<Lanes> eval_derivative(const Vec3<Dual>& wo) const {
@@ -203,7 +213,7 @@ class Scattering {
     double pdf;
   };
   Evaluation eval_with_pdf(const Vec3d& wo) const {
-    if constexpr (std::is_same_v<S, Dual>) {
+    if constexpr (!std::is_same_v<S, double>) {
       if (!still_) return {eval(wo), pdf_solid_angle(wo)};
     }
     const double factor = limited_ ? value(horizon_factor(wo)) : 1.0;
@@ -241,11 +251,19 @@ class Scattering {
     return above / width;
   }
 
+  // horizon_factor without derivatives.
+  double horizon_value(const Vec3d& wo) const {
+    const double c = dot(value(n_s_), wo), h = value(horizon_);
+    if (c <= h) return 0;
+    return std::min(1.0, (c - h) / (h * (1 - h)));
+  }
+
   Vec3<S> wi_, n_s_, n_;
   S horizon_;
   const Bsdf* bsdf_ = nullptr;
+  const SeededCopies<Bsdf>* copies_ = nullptr;  // Var: of bsdf_, if its parameters have slots
   bool limited_ = false;
-  bool still_ = false;  // Dual: no parameter of the pass moves it while wo is held
+  bool still_ = false;  // no parameter of the pass moves it while wo is held (not for double)
 };
 
 }  // namespace limn

@@ -74,11 +74,18 @@ struct Plane {
   double distance(const Vec3d& x) const { return dot(n, x) + offset; }
 };
 
+// A vertex on an edge of its mesh that was cut there: (1 - t) of its first end and t of the other.
+struct CutVertex {
+  std::array<VertexId, 2> ends;
+  double t = 0;
+};
+
 // The edges of one mesh (an object), with all that a query needs. Welded: copies of a vertex along
 // a texture seam are one vertex.
 struct EdgeMesh {
   std::vector<Vec3d> positions;       // V, world space, the floats that Embree sees
   std::vector<Vec3<Lanes>> tangents;  // V; empty where nothing moves
+  std::vector<CutVertex> cuts;        // the last of the V, where edges of other meshes end on them
   std::vector<Plane> planes;          // F, outward, double precision
   std::vector<Edge> edges;            // E
   ShapeId shape;                      // whose faces `planes` are; none for crossing curves

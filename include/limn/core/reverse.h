@@ -1,0 +1,49 @@
+#pragma once
+// What path tracing asks of surfaces, lights and cameras, answered for Var: as for double, with the
+// derivative with respect to the slots of the scene written to the tape.
+#include <optional>
+
+#include "limn/core/camera.h"
+#include "limn/core/lights.h"
+#include "limn/core/shading.h"
+#include "limn/core/slots.h"
+
+namespace limn {
+
+// One composite statement of seven outputs: p, n_s and the horizon; the derivative of
+// surface_on_ray<Dual>.
+template <>
+SurfacePoint<Var> surface_on_ray<Var>(const Scene& scene, FaceRef face, const Vec3<Var>& origin,
+                                      const Vec3<Var>& direction);
+
+template <>
+Rgb<Var> Light::drawn_radiance<Var>(const LightSample& sample) const;
+template <>
+Environment::Sight<Var> Lights::environment<Var>(const Vec3d& wo) const;
+
+// Radiance from the environment along a direction that may move.
+template <class S>
+Rgb<S> environment_radiance(const Environment& environment, const Vec3<S>& d) {
+  return environment.radiance(d);
+}
+template <>
+Rgb<Var> environment_radiance<Var>(const Environment& environment, const Vec3<Var>& d);
+
+// DeltaLight::arriving.
+template <class S>
+std::optional<Arrival<S>> arrival(const DeltaLight& light, const Vec3<S>& p) {
+  return light.arriving(p);
+}
+template <>
+std::optional<Arrival<Var>> arrival<Var>(const DeltaLight& light, const Vec3<Var>& p);
+
+// LightOrigin::v.
+Vec3<Var> light_origin(const DeltaLight& light);
+
+// The camera with its numbers as leaves of the current tape.
+CameraView<Var> camera_leaves(const Camera& camera);
+
+// Corners of a face as leaves of the current tape.
+std::array<Vec3<Var>, 3> corner_leaves(const Scene& scene, FaceRef face);
+
+}  // namespace limn

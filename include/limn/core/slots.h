@@ -1,0 +1,154 @@
+#pragma once
+// Which numbers of a scene have a place (a slot) in a gradient, and how values that a Var carries
+// come from them. Tape::slots() names those of the scene that is traced.
+#include <array>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "limn/core/scene.h"
+#include "limn/core/tape.h"
+
+namespace limn {
+
+// The first slots of a mesh's numbers; 0: they are constants. Copies of a welded vertex have the
+// slots of the first, `weld`.
+struct MeshSlots {
+  uint32_t positions = 0;  // of 3 V
+  uint32_t normals = 0;    // of 3 N
+  uint32_t horizons = 0;   // of V
+};
+
+// A copy of an object whose k-th lane carries the derivative with respect to the parameter of slot
+// k. Objects with more parameters than lanes have several copies.
+template <class T>
+struct SeededCopy {
+  std::shared_ptr<T> object;
+  std::array<uint32_t, kLanes> slots{};
+};
+template <class T>
+using SeededCopies = std::vector<SeededCopy<T>>;
+
+// The camera's own numbers: origin, left, up, forward (three each), fov.
+inline constexpr uint32_t kCameraSlots = 13;
+
+struct SceneSlots {
+  const Scene* scene = nullptr;    // must outlive this
+  uint32_t count = 1;              // all slots, with the unused first one
+  std::vector<MeshSlots> meshes;   // of each shape
+  std::vector<uint32_t> radiance;  // of each shape's emitter, all channels together; 0: constant
+  // Of what each shape shows behind and in front, null where it is constant.
+  std::vector<std::array<const SeededCopies<Bsdf>*, 2>> bsdfs;
+  std::vector<std::unique_ptr<SeededCopies<Bsdf>>> bsdf_copies;  // what those point to
+  SeededCopies<Environment> environment;
+  std::vector<std::pair<const DeltaLight*, SeededCopies<DeltaLight>>> lights;
+  uint32_t camera = 0;  // the first of kCameraSlots
+
+  const MeshSlots& mesh(ShapeId shape) const { return meshes[shape.index()]; }
+  const SeededCopies<DeltaLight>* of(const DeltaLight& light) const {
+    for (const auto& [other, copies] : lights)
+      if (other == &light) return &copies;
+    return nullptr;
+  }
+};
+
+namespace detail {
+
+inline Vec3<Dual> held(const Vec3<Var>& v) { return {v.x.v, v.y.v, v.z.v}; }
+// Moving along the axes in the first three lanes.
+inline Vec3<Dual> along_axes(const Vec3<Var>& v) {
+  return {{v.x.v, {1, 0, 0, 0}}, {v.y.v, {0, 1, 0, 0}}, {v.z.v, {0, 0, 1, 0}}};
+}
+inline Vec3<Var> leaves(const Vec3d& v, uint32_t slot) {
+  Tape& tape = *Tape::current();
+  return {Var{v.x, tape.leaf(slot)}, Var{v.y, tape.leaf(slot + 1)}, Var{v.z, tape.leaf(slot + 2)}};
+}
+
+// Three numbers (a colour, a vector) as one statement each, with partial derivatives that Dual
+// numbers know.
+class Jacobian {
+ public:
+  static constexpr int kMost = 64;  // inputs; what has so many parameters needs more
+
+  void add(uint32_t node, double a, double b, double c) {
+    if (node != 0) inputs_[count_++] = {node, {a, b, c}};
+  }
+  // f: with x moving along the axes.
+  void add(const Vec3<Var>& x, const Rgb<Dual>& f) {
+    for (int k = 0; k < 3; ++k) add(x[k].node, f.r.d[k], f.g.d[k], f.b.d[k]);
+  }
+  // f: of the seeded copy, everything else held. leaves: nodes of its slots.
+  void add(const std::array<uint32_t, kLanes>& leaves, const Rgb<Dual>& f) {
+    for (int k = 0; k < kLanes; ++k) add(leaves[k], f.r.d[k], f.g.d[k], f.b.d[k]);
+  }
+  Rgb<Var> result(const Rgb<double>& value) const {
+    Rgb<Var> r{value.r, value.g, value.b};
+    if (count_ == 0) return r;
+    Tape& tape = *Tape::current();
+    for (int c = 0; c < 3; ++c) {
+      for (int i = 0; i < count_; ++i) tape.entry(inputs_[i].node, inputs_[i].d[c]);
+      r[c].node = tape.end();
+    }
+    return r;
+  }
+
+ private:
+  struct Input {
+    uint32_t node;
+    std::array<double, 3> d;
+  };
+  std::array<Input, kMost> inputs_;
+  int count_ = 0;
+};
+
+inline std::array<uint32_t, kLanes> leaves_of(const std::array<uint32_t, kLanes>& slots) {
+  std::array<uint32_t, kLanes> nodes;
+  for (int k = 0; k < kLanes; ++k) nodes[k] = Tape::current()->leaf(slots[k]);
+  return nodes;
+}
+
+// Bsdf::eval with what the vectors and the BSDF's own parameters do to it; copies: null where they
+// are constants.
+template <class S>
+Rgb<S> eval_bsdf(const Bsdf& bsdf, const SeededCopies<Bsdf>*, const Vec3<S>& n, const Vec3<S>& wi,
+                 const Vec3<S>& wo) {
+  return bsdf.eval(n, wi, wo);
+}
+template <>
+inline Rgb<Var> eval_bsdf<Var>(const Bsdf& bsdf, const SeededCopies<Bsdf>* copies,
+                               const Vec3<Var>& n, const Vec3<Var>& wi, const Vec3<Var>& wo) {
+  Jacobian jacobian;
+  std::optional<Rgb<double>> f;
+  const auto add = [&](const Vec3<Var>& x, const auto& eval) {
+    if (is_still(x)) return;
+    const Rgb<Dual> moving = eval(along_axes(x));
+    jacobian.add(x, moving);
+    f = value(moving);
+  };
+  add(n, [&](const Vec3<Dual>& x) { return bsdf.eval(x, held(wi), held(wo)); });
+  add(wi, [&](const Vec3<Dual>& x) { return bsdf.eval(held(n), x, held(wo)); });
+  add(wo, [&](const Vec3<Dual>& x) { return bsdf.eval(held(n), held(wi), x); });
+  if (copies) {
+    for (const auto& copy : *copies) {
+      jacobian.add(leaves_of(copy.slots), copy.object->eval(held(n), held(wi), held(wo)));
+    }
+  }
+  return jacobian.result(f ? *f : bsdf.eval(value(n), value(wi), value(wo)));
+}
+
+// The radiance of a shape that emits.
+template <class S>
+Rgb<S> emitter_radiance(const Shape& shape, ShapeId /*id*/) {
+  return as<S>(shape.radiance);
+}
+template <>
+inline Rgb<Var> emitter_radiance<Var>(const Shape& shape, ShapeId id) {
+  Tape& tape = *Tape::current();
+  const uint32_t slot = tape.slots()->radiance[id.index()];
+  const Rgb<double> c = value(shape.radiance);
+  return {Var{c.r, tape.leaf(slot)}, Var{c.g, tape.leaf(slot)}, Var{c.b, tape.leaf(slot)}};
+}
+
+}  // namespace detail
+
+}  // namespace limn

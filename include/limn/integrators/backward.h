@@ -1,0 +1,93 @@
+#pragma once
+// Reverse mode: from the derivative of a loss with respect to every pixel to its derivative with
+// respect to every parameter of the scene at once, all vertices of all shapes included, with
+// standard errors. One pass costs about as much as a forward pass, however many parameters there are.
+//   dLoss/dtheta = sum over pixels and channels of A dI/dtheta,
+// A the adjoint image. dI/dtheta is that of gradient.h: the terms interior, camera, boundary and
+// shadow with directions held fixed, each unbiased, so that the sum is unbiased if A and the samples
+// of the pass are independent.
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "limn/core/image.h"
+#include "limn/core/scene.h"
+#include "limn/integrators/gradient.h"
+#include "limn/integrators/moments.h"
+#include "limn/integrators/run.h"
+
+namespace limn {
+
+struct BackwardOptions {
+  // Names as in parameter.h, arrays included (SHAPE.vertex_positions); none: all parameters of the
+  // scene.
+  std::vector<std::string> parameters;
+  // interior, camera, boundary, shadow; none: all that the scene has.
+  std::vector<std::string> terms;
+  // Every pixel gets the same number of paths. Else a quarter of them is spread evenly and the rest
+  // in proportion to |A|, summed over channels.
+  bool uniform_pixels = false;
+  int edge_samples = 1;       // at every vertex of a path, of the boundary and shadow terms each
+  double camera_samples = 1;  // points on silhouettes of the film, per path
+};
+
+// dLoss/dtheta of one parameter, per unit of the parameter (that of the loss over `unit`).
+struct ParameterAdjoint {
+  std::string name;
+  std::string unit;           // of the parameter; "" for plain numbers
+  std::vector<size_t> shape;  // of the array: {V, 3} of vertex_positions, {} of a scalar
+  // One value per number of the array, row by row. Copies of a welded vertex share its derivative
+  // equally: the derivative with respect to the position that they share is the sum of theirs.
+  Moments moments;
+};
+
+struct BackwardResult {
+  std::vector<ParameterAdjoint> parameters;  // in the order asked for
+  std::vector<TermRun> terms;                // all that the scene has
+  int64_t spp = 0;                           // paths per pixel that were finished, on average
+  double seconds = 0;
+  double setup_seconds = 0;  // edges, samplers, ray tracer
+  NonFinite non_finite;      // such contributions count as zero, and the run must end with an error
+  std::vector<std::string> warnings;
+  GradientStats stats;
+  uint64_t contributions = 0;  // numbers that were added to the gradient
+  uint64_t tape_bytes = 0;     // of the largest path: memory of one thread
+
+  // The parameter of that name; it must be there.
+  const ParameterAdjoint& of(const std::string& name) const;
+};
+
+// adjoint: crop_height by crop_width, three channels, or one that stands for the luminance.
+// settings.spp paths per pixel, in at most 16 batches, which give the standard errors; interruption
+// drops the batch in progress. settings.seconds is not looked at. The same seed gives the same bits
+// on any number of threads; memory does not grow with samples. InputError for unknown parameters or
+// terms, and for an adjoint of another size or one that is not finite.
+BackwardResult backward(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
+                        const RunSettings& settings);
+
+// How far an image is from a target, each a mean over pixels and channels.
+enum class LossKind {
+  kL2,          // (I - T)^2
+  kRelativeL2,  // (I - T)^2 / (T^2 + 0.01): weights from the target alone
+  kL1,  // |I - T|: its adjoint sign(I - T) is biased where the noise of I is not small beside
+        // I - T
+};
+// InputError that lists the known names (l2, relative-l2, l1) if there is none of this name.
+LossKind loss_kind(const std::string& name);
+
+struct LossResult {
+  double value = 0;  // may be negative where the loss is near zero: it is unbiased, but for l1
+  double error = 0;  // standard error, from the pixels' own; NaN with fewer than two batches
+  Image adjoint;     // dLoss/dI, crop_height by crop_width by 3
+  int64_t spp = 0;   // of each of the two images; 0: interrupted before there was one
+};
+
+// Renders the scene twice with settings.spp samples per pixel each, with seeds of their own that are
+// derived from settings.seed. For l2 and relative-l2 the loss is the mean of w (I - T)(I' - T), and
+// the adjoint 2 w ((I + I') / 2 - T) / N has the mean of dLoss/dI; backward() with settings.seed
+// itself is independent of both, so that the product of both is unbiased. target: crop_height by crop_width, of three
+// channels or one. InputError for another size.
+LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
+                      const RunSettings& settings);
+
+}  // namespace limn

@@ -1,0 +1,311 @@
+// The reverse pass: batches of paths and of points on the film, each a gradient of its own.
+#include "limn/integrators/backward.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "integrators/backward/contributions.h"
+#include "integrators/backward/film_adjoint.h"
+#include "integrators/backward/path_adjoint.h"
+#include "integrators/backward/pixel_choice.h"
+#include "integrators/methods/selection.h"
+#include "integrators/terms/term.h"
+#include "limn/core/error.h"
+#include "limn/core/parallel.h"
+#include "limn/edgetree/edge_sampler_types.h"
+
+namespace limn {
+
+const ParameterAdjoint& BackwardResult::of(const std::string& name) const {
+  for (const ParameterAdjoint& parameter : parameters)
+    if (parameter.name == name) return parameter;
+  throw std::logic_error("no parameter \"" + name + "\" in this result");
+}
+
+namespace {
+
+constexpr const char* kNames[kAdjointTerms] = {"interior", "camera", "boundary", "shadow"};
+constexpr size_t kTile = 256;  // paths, or points on the film; not tuned
+constexpr int kBatches = 16;   // at most: every one of them ends with the adjoint of normals
+
+std::vector<Rgb<double>> pixels_of(const Scene& scene, const Image& adjoint) {
+  const Film& film = scene.film;
+  if (adjoint.width != film.crop_width || adjoint.height != film.crop_height ||
+      (adjoint.channels != 1 && adjoint.channels != 3)) {
+    throw InputError(fmt::format(
+        "the adjoint image has {} x {} pixels of {} channels, but the film {} x {}: it must "
+        "be of the film's size, with three channels or one",
+        adjoint.width, adjoint.height, adjoint.channels, film.crop_width, film.crop_height));
+  }
+  std::vector<Rgb<double>> pixels;
+  for (int y = 0; y < adjoint.height; ++y) {
+    for (int x = 0; x < adjoint.width; ++x) {
+      Rgb<double> a;
+      for (int c = 0; c < 3; ++c) {
+        Rgb<double> unit;
+        unit[c] = 1;
+        a[c] = adjoint.channels == 3 ? adjoint.at(x, y, c) : adjoint.at(x, y, 0) * luminance(unit);
+        if (std::isfinite(a[c])) continue;
+        throw InputError(fmt::format("the adjoint image is not finite in column {}, row {}", x, y));
+      }
+      pixels.push_back(a);
+    }
+  }
+  return pixels;
+}
+
+// A tile's own figures, joined in the order of tiles.
+struct TileFigures {
+  AdjointCosts costs;
+  NonFinite bad;
+  size_t tape_bytes = 0;
+};
+
+class BackwardPass {
+ public:
+  BackwardPass(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
+               const RunSettings& settings)
+      : options_(options),
+        settings_(settings),
+        film_(scene.film, pixels_of(scene, adjoint)),
+        choice_(film_.pixels(), options.uniform_pixels),
+        parameters_(scene, options.parameters),
+        tracer_(make_embree_tracer(parameters_.scene(), settings.threads)),
+        lights_(parameters_.scene()),
+        path_{parameters_.scene(), *tracer_, lights_},
+        input_(path_, 3, {1, 1, 1, 1}, edge_sampler_type("forest"), settings.threads),
+        context_{path_, parameters_, input_.edges(),
+                 EdgeMotion(parameters_.slots(), input_.edges())} {
+    select();
+  }
+
+  BackwardResult run() {
+    result_.setup_seconds = watch_.seconds();
+    const int batches = std::clamp(settings_.spp, 1, kBatches);
+    ProgressCounter progress(settings_, watch_, steps());
+    for (int b = 0; b < batches && !progress.stopped(); ++b) {
+      const auto at = [&](int i) { return static_cast<int>(int64_t{settings_.spp} * i / batches); };
+      const PathBatch batch{settings_.seed, at(b), at(b + 1)};
+      run_batch(batch, progress);
+    }
+    finish();
+    return std::move(result_);
+  }
+
+ private:
+  void select();
+  size_t points_per_sample() const {
+    return static_cast<size_t>(
+        std::ceil(options_.camera_samples * static_cast<double>(film_.pixels().size())));
+  }
+  static size_t tiles_of(size_t samples) { return (samples + kTile - 1) / kTile; }
+  size_t steps() const;
+  void run_batch(const PathBatch& batch, ProgressCounter& progress);
+  void run_paths(const PathBatch& batch, ProgressCounter& progress, ContributionSum& sum);
+  void run_film(AdjointTerm term, const PathBatch& batch, ProgressCounter& progress,
+                ContributionSum& sum);
+  // make(sample, tape, figures, list): adds one sample; false if it was not finite. place: of a sample.
+  template <class Make, class Place>
+  void run_tiles(size_t samples, ProgressCounter& progress, ContributionSum& sum,
+                 AdjointTerm booked, const Make& make, const Place& place);
+  void finish();
+
+  Stopwatch watch_;
+  const BackwardOptions& options_;
+  const RunSettings& settings_;
+  FilmAdjoint film_;
+  PixelChoice choice_;
+  ParameterSlots parameters_;
+  std::unique_ptr<RayTracer> tracer_;
+  Lights lights_;
+  PathContext path_;
+  TermInput input_;
+  AdjointContext context_;
+  std::unique_ptr<CameraEdges> camera_;
+  std::unique_ptr<ShadowEdges> shadows_;
+  bool computed_[kAdjointTerms] = {};
+  bool on_film_[kAdjointTerms] = {};
+  TileFigures figures_;
+  BackwardResult result_;
+};
+
+void BackwardPass::select() {
+  std::vector<std::string> known(kNames, kNames + kShadow);
+  if (!parameters_.scene().delta_lights.empty()) known.emplace_back(kNames[kShadow]);
+  const auto chosen = selected_terms(known, options_.terms, parameters_.scene().file);
+  for (size_t t = 0; t < known.size(); ++t) {
+    computed_[t] = std::find(chosen.begin(), chosen.end(), known[t]) != chosen.end();
+    result_.terms.push_back({known[t], computed_[t], t != kInterior, 1, {}, {}});
+  }
+  context_.interior = computed_[kInterior];
+  context_.edge_samples = options_.edge_samples;
+  if (options_.edge_samples < 1 || !(options_.camera_samples > 0)) {
+    throw InputError("samples of edges must be positive");
+  }
+  if (computed_[kCamera]) {
+    camera_ = std::make_unique<CameraEdges>(path_, input_.edges(), 3, &parameters_.free());
+    context_.camera = camera_.get();
+    on_film_[kCamera] = !camera_->empty();
+    result_.stats.edges.emplace_back("moving on the film", camera_->size());
+    result_.stats.setup.emplace_back("edges on the film", camera_->list_seconds());
+  }
+  if (computed_[kBoundary]) {
+    const EdgeSampler& sampler = input_.edge_sampler();
+    context_.sampler = &sampler;
+    result_.stats.setup.emplace_back("edge sampler", input_.edge_sampler_seconds());
+    result_.stats.sampler_nodes = sampler.size().nodes;
+    result_.stats.sampler_bytes = sampler.size().bytes;
+  }
+  if (computed_[kShadow]) {
+    shadows_ = std::make_unique<ShadowEdges>(path_, input_.edges(), 3);
+    if (!shadows_->empty()) context_.shadows = shadows_.get();
+    const int max_depth = parameters_.scene().max_depth;
+    on_film_[kShadow] = !shadows_->empty() && (max_depth < 0 || max_depth > 1);
+    result_.stats.edges.emplace_back("of sharp shadows", shadows_->size());
+  }
+  result_.stats.setup.emplace_back("edges", input_.edges_seconds());
+  if (parameters_.scene().shading == ShadingModel::kMitsuba) {
+    result_.warnings.push_back(
+        "shading 'mitsuba' is discontinuous where no edge is: the derivative of interpolated "
+        "normals is incomplete");
+  }
+  for (const Parameter& p : parameters_.parameters()) {
+    std::vector<size_t> shape;
+    if (p.size > 1) shape = {p.size / 3, 3};
+    result_.parameters.push_back({p.name, p.unit, shape, Moments(p.size)});
+  }
+}
+
+size_t BackwardPass::steps() const {
+  const int batches = std::clamp(settings_.spp, 1, kBatches);
+  size_t steps = 0;
+  for (int b = 0; b < batches; ++b) {
+    const auto at = [&](int i) { return static_cast<int>(int64_t{settings_.spp} * i / batches); };
+    const PathBatch batch{settings_.seed, at(b), at(b + 1)};
+    steps += tiles_of(choice_.paths(batch));
+    for (const bool on : on_film_) {
+      if (on) steps += tiles_of(points_per_sample() * batch.count());
+    }
+  }
+  return steps;
+}
+
+void BackwardPass::run_batch(const PathBatch& batch, ProgressCounter& progress) {
+  ContributionSum sum(parameters_.slots().count);
+  TileFigures before = figures_;
+  if (computed_[kInterior] || computed_[kBoundary] || context_.shadows) {
+    run_paths(batch, progress, sum);
+  }
+  for (const AdjointTerm term : {kCamera, kShadow}) {
+    if (on_film_[term]) run_film(term, batch, progress, sum);
+  }
+  if (progress.stopped()) {
+    figures_ = std::move(before);
+    return;
+  }
+  auto values = parameters_.gather(sum.sums());
+  for (size_t i = 0; i < values.size(); ++i) {
+    for (double& v : values[i]) v *= batch.count();
+    result_.parameters[i].moments.add_batch(values[i], batch.count());
+  }
+  result_.contributions += sum.added();
+  result_.spp += batch.count();
+}
+
+template <class Make, class Place>
+void BackwardPass::run_tiles(size_t samples, ProgressCounter& progress, ContributionSum& sum,
+                             AdjointTerm booked, const Make& make, const Place& place) {
+  const size_t tiles = tiles_of(samples);
+  std::vector<TileFigures> figures(tiles);
+  sum.add(tiles, settings_.threads, [&](size_t tile, std::vector<Contribution>& list) {
+    if (progress.stopped()) return;
+    const Stopwatch watch;
+    Tape tape(&parameters_.slots());
+    const TapeScope scope(tape);
+    TileFigures& own = figures[tile];
+    for (size_t i = tile * kTile; i < std::min(samples, (tile + 1) * kTile); ++i) {
+      if (!make(i, tape, own, list)) own.bad.add(place(i));
+      own.tape_bytes = std::max(own.tape_bytes, tape.bytes());
+    }
+    double inside = 0;
+    for (const TermCost& cost : own.costs) inside += cost.seconds;
+    own.costs[booked].seconds += watch.seconds() - inside;
+    progress.step();
+  });
+  for (const TileFigures& own : figures) {
+    for (int t = 0; t < kAdjointTerms; ++t) figures_.costs[t].merge(own.costs[t]);
+    figures_.bad.merge(own.bad);
+    figures_.tape_bytes = std::max(figures_.tape_bytes, own.tape_bytes);
+  }
+}
+
+void BackwardPass::run_paths(const PathBatch& batch, ProgressCounter& progress,
+                             ContributionSum& sum) {
+  const Film& film = parameters_.scene().film;
+  const uint64_t width = parameters_.scene().camera.width;
+  const auto position = [&](size_t pixel) {
+    return std::pair<int, int>(film.crop_x + static_cast<int>(pixel % film.crop_width),
+                               film.crop_y + static_cast<int>(pixel / film.crop_width));
+  };
+  run_tiles(
+      choice_.paths(batch), progress, sum, kInterior,
+      [&](size_t i, Tape& tape, TileFigures& own, std::vector<Contribution>& list) {
+        const PixelPath path = choice_.path(batch, i);
+        const Rgb<double> adjoint = film_.pixels()[path.pixel] * (1 / path.expected);
+        if (is_black(adjoint)) return true;
+        const auto [x, y] = position(path.pixel);
+        const Rng key(batch.seed, y * width + x, path.sample);
+        return add_path_adjoint(context_, x, y, key, adjoint, tape, own.costs, list);
+      },
+      [&](size_t i) {
+        const PixelPath path = choice_.path(batch, i);
+        const auto [x, y] = position(path.pixel);
+        return NonFinite::Place{x, y, static_cast<int64_t>(path.sample), kNames[kInterior]};
+      });
+}
+
+void BackwardPass::run_film(AdjointTerm term, const PathBatch& batch, ProgressCounter& progress,
+                            ContributionSum& sum) {
+  const size_t count = points_per_sample() * batch.count();
+  const size_t first = points_per_sample() * batch.first;
+  const double share = 1 / static_cast<double>(count);
+  const auto add = term == kCamera ? add_camera_adjoint : add_shadow_adjoint;
+  run_tiles(
+      count, progress, sum, term,
+      [&](size_t i, Tape& tape, TileFigures& own, std::vector<Contribution>& list) {
+        const Rng key = Rng(batch.seed, UINT64_MAX, first + i)
+                            .copy(Purpose::kFilmCopy, term == kCamera ? 0 : 1);
+        const double u = (i + key.at(Purpose::kCamera, 0).uniform()) / count;
+        try {
+          return add(context_, film_, u, key, share, tape, own.costs[term], list);
+        } catch (const UntraceableRay&) {
+          return false;
+        }
+      },
+      [&](size_t i) {
+        return NonFinite::Place{-1, -1, static_cast<int64_t>(first + i), kNames[term]};
+      });
+}
+
+void BackwardPass::finish() {
+  for (size_t t = 0; t < result_.terms.size(); ++t) {
+    result_.terms[t].cost = figures_.costs[t];
+    if (t == kCamera) result_.terms[t].samples = options_.camera_samples;
+    if (t == kBoundary || t == kShadow) result_.terms[t].samples = options_.edge_samples;
+  }
+  result_.non_finite = figures_.bad;
+  result_.tape_bytes = figures_.tape_bytes;
+  result_.seconds = watch_.seconds();
+}
+
+}  // namespace
+
+BackwardResult backward(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
+                        const RunSettings& settings) {
+  return BackwardPass(scene, adjoint, options, settings).run();
+}
+
+}  // namespace limn

@@ -1,0 +1,28 @@
+#pragma once
+// Sums of contributions to a gradient: the same bits on any number of threads, in bounded memory.
+#include <functional>
+#include <vector>
+
+#include "limn/core/tape.h"
+
+namespace limn {
+
+class ContributionSum {
+ public:
+  // count: slots, with the unused first one.
+  explicit ContributionSum(uint32_t count) : sums_(count) {}
+
+  // Calls make(tile, list) for every tile, in parallel, and adds the lists in the order of tiles. Lists of
+  // `kWave` tiles are held at a time.
+  void add(size_t tiles, int threads,
+           const std::function<void(size_t, std::vector<Contribution>&)>& make);
+
+  std::vector<double>& sums() { return sums_; }
+  uint64_t added() const { return added_; }
+
+ private:
+  std::vector<double> sums_;
+  uint64_t added_ = 0;
+};
+
+}  // namespace limn

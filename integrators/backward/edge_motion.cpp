@@ -1,0 +1,67 @@
+// Edges of meshes hang on their vertices; where edges were cut, on the ends of the whole edge; curves
+// where two faces cross, on the corners of both.
+#include "integrators/backward/edge_motion.h"
+
+#include "limn/core/shading.h"
+
+namespace limn {
+
+bool EdgeMotion::moves(EdgeRef id) const {
+  if (!is_crossing(id)) return slots_.mesh(id.object).positions != 0;
+  for (const FaceRef face : input_.object(id.object).faces_around(id.edge))
+    if (slots_.mesh(face.shape).positions != 0) return true;
+  return false;
+}
+
+void EdgeMotion::contribute_end(Tape& tape, EdgeRef id, int end, const Vec3d& g) const {
+  const EdgeMesh& mesh = input_.object(id.object);
+  const VertexId vertex = mesh.edge(id.edge).vertices[end];
+  if (is_crossing(id)) {
+    contribute_crossing(tape, id, mesh.position(vertex), g);
+    return;
+  }
+  const size_t own = mesh.positions.size() - mesh.cuts.size();
+  if (vertex.index() < own) {
+    contribute_vertex(tape, id.object, vertex.index(), g);
+    return;
+  }
+  const CutVertex& cut = mesh.cuts[vertex.index() - own];
+  contribute_vertex(tape, id.object, cut.ends[0].index(), g * (1 - cut.t));
+  contribute_vertex(tape, id.object, cut.ends[1].index(), g * cut.t);
+}
+
+// See crossing_velocity(): a point x of the line moves with v = (s m x l + t l x n) / |l|^2, l = n x
+// m, with the speeds s and t of the planes along their unit normals n and m, and those are linear in
+// the corners' velocities, each with its barycentric coordinate of x.
+void EdgeMotion::contribute_crossing(Tape& tape, EdgeRef id, const Vec3d& x, const Vec3d& g) const {
+  const auto faces = input_.object(id.object).faces_around(id.edge);
+  std::array<std::array<Vec3d, 3>, 2> corners;
+  std::array<Vec3d, 2> area, unit;
+  for (int i = 0; i < 2; ++i) {
+    corners[i] = face_corners<double>(slots_.scene->shape(faces[i].shape).mesh, faces[i].face);
+    area[i] = cross(corners[i][1] - corners[i][0], corners[i][2] - corners[i][0]);
+    unit[i] = normalize(area[i]);
+  }
+  const Vec3d line = cross(unit[0], unit[1]);
+  const double scale = 1 / length_squared(line);
+  const double of_speed[2] = {dot(g, cross(unit[1], line)) * scale,
+                              dot(g, cross(line, unit[0])) * scale};
+  for (int i = 0; i < 2; ++i) {
+    const FaceIndices& face = slots_.scene->shape(faces[i].shape).mesh.face(faces[i].face);
+    for (int k = 0; k < 3; ++k) {
+      const Vec3d &a = corners[i][(k + 1) % 3], &b = corners[i][(k + 2) % 3];
+      const double weight = dot(area[i], cross(a - x, b - x)) / length_squared(area[i]);
+      contribute_vertex(tape, faces[i].shape, face[k], unit[i] * (of_speed[i] * weight));
+    }
+  }
+}
+
+void EdgeMotion::contribute_vertex(Tape& tape, ShapeId shape, uint32_t vertex,
+                                   const Vec3d& g) const {
+  const uint32_t first = slots_.mesh(shape).positions;
+  if (first == 0) return;
+  const uint32_t root = slots_.scene->shape(shape).mesh.weld[vertex];
+  for (int k = 0; k < 3; ++k) tape.contribute(first + 3 * root + k, g[k]);
+}
+
+}  // namespace limn

@@ -1,0 +1,87 @@
+// Losses of an image, with the derivative for every pixel.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "limn/core/error.h"
+#include "limn/core/names.h"
+#include "limn/integrators/backward.h"
+#include "limn/integrators/render.h"
+
+namespace limn {
+
+namespace {
+
+struct LossName {
+  const char* name;
+  LossKind kind;
+};
+constexpr LossName kLosses[] = {
+    {"l2", LossKind::kL2}, {"relative-l2", LossKind::kRelativeL2}, {"l1", LossKind::kL1}};
+
+// Of one value: the loss of two independent estimates, and the derivative of what their mean makes.
+struct ValueLoss {
+  double loss, adjoint;
+};
+ValueLoss value_loss(LossKind kind, double a, double b, double target) {
+  const double mean = 0.5 * (a + b) - target;
+  if (kind == LossKind::kL1) return {std::fabs(mean), mean > 0 ? 1.0 : mean < 0 ? -1.0 : 0.0};
+  // The constant keeps dark pixels from ruling the sum; not tuned.
+  const double weight = kind == LossKind::kL2 ? 1 : 1 / (target * target + 0.01);
+  return {weight * (a - target) * (b - target), 2 * weight * mean};
+}
+
+void check_target(const Scene& scene, const Image& target) {
+  const Film& film = scene.film;
+  if (target.width == film.crop_width && target.height == film.crop_height &&
+      (target.channels == 3 || target.channels == 1)) {
+    return;
+  }
+  throw InputError(fmt::format(
+      "the target has {} x {} pixels of {} channels, but the film {} x {}: it must be of "
+      "the film's size, with three channels or one",
+      target.width, target.height, target.channels, film.crop_width, film.crop_height));
+}
+
+}  // namespace
+
+LossKind loss_kind(const std::string& name) {
+  for (const LossName& loss : kLosses)
+    if (name == loss.name) return loss.kind;
+  throw InputError(unknown_name("loss", name, names_of(kLosses)));
+}
+
+LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
+                      const RunSettings& settings) {
+  check_target(scene, target);
+  RenderResult images[2];
+  for (int i = 0; i < 2; ++i) {
+    RunSettings own = settings;
+    own.seed = mix_bits(settings.seed + 1 + i);  // of streams that no other run with this seed has
+    images[i] = render(scene, own);
+  }
+  LossResult result;
+  result.spp = std::min(images[0].spp, images[1].spp);
+  if (images[0].non_finite.count + images[1].non_finite.count > 0) {
+    throw InputError("loss: " + images[images[0].non_finite.count == 0].non_finite.message());
+  }
+  if (result.spp == 0) return result;
+  result.adjoint = Image(target.width, target.height, 3);
+  const size_t values = images[0].radiance.size();
+  const auto average = 1 / static_cast<double>(values);
+  double variance = 0;
+  for (size_t i = 0; i < values; ++i) {
+    const double t = target.channels == 3 ? target.data[i] : target.data[i / 3];
+    const double a = images[0].radiance.mean(i), b = images[1].radiance.mean(i);
+    const ValueLoss loss = value_loss(kind, a, b, t);
+    result.value += loss.loss * average;
+    result.adjoint.data[i] = static_cast<float>(loss.adjoint * average);
+    // To first order, with half of the adjoint for each image.
+    const double slope = 0.5 * loss.adjoint * average;
+    variance += slope * slope * (images[0].radiance.variance(i) + images[1].radiance.variance(i));
+  }
+  result.error = std::sqrt(variance);
+  return result;
+}
+
+}  // namespace limn

@@ -1,0 +1,244 @@
+// Which numbers of a scene get slots, and what becomes of their derivatives.
+#include "integrators/backward/parameter_slots.h"
+
+#include <algorithm>
+
+#include "limn/core/check.h"
+
+namespace limn {
+
+namespace {
+
+std::vector<Parameter> resolved(const Scene& scene, const std::vector<std::string>& names) {
+  if (names.empty()) return list_parameters(scene);
+  std::vector<Parameter> parameters;
+  for (const std::string& name : names) parameters.push_back(find_parameter_or_array(scene, name));
+  return parameters;
+}
+
+// The object among a BSDF and those inside it that acts on one side; null if that is black.
+std::shared_ptr<Bsdf> object_of(const std::shared_ptr<Bsdf>& bsdf, const Bsdf* side) {
+  if (bsdf.get() == side) return bsdf;
+  for (const std::shared_ptr<Bsdf>& nested : bsdf->nested())
+    if (auto found = object_of(nested, side)) return found;
+  return nullptr;
+}
+
+// What scatters in a scene, each once: copies of the scene have them in the same order.
+std::vector<std::shared_ptr<Bsdf>> scatterers(const Scene& scene) {
+  std::vector<std::shared_ptr<Bsdf>> list;
+  for (const Shape& shape : scene.shapes) {
+    for (const bool front : {false, true}) {
+      const Bsdf* side = shape.bsdf->side(front);
+      if (!side) continue;
+      auto object = object_of(shape.bsdf, side);
+      CHECK(object != nullptr);
+      if (std::find(list.begin(), list.end(), object) == list.end()) list.push_back(object);
+    }
+  }
+  return list;
+}
+
+std::array<Dual*, kCameraSlots> camera_numbers(Camera& c) {
+  return {&c.origin.x, &c.origin.y, &c.origin.z,  &c.left.x,    &c.left.y,    &c.left.z, &c.up.x,
+          &c.up.y,     &c.up.z,     &c.forward.x, &c.forward.y, &c.forward.z, &c.fov};
+}
+
+// Copies of an object whose lanes carry its parameters with a slot, four of them each.
+template <class T>
+SeededCopies<T> seeded_copies(const T& object, const std::vector<uint32_t>& slots) {
+  SeededCopies<T> copies;
+  int lane = kLanes;
+  for (size_t k = 0; k < slots.size(); ++k) {
+    if (slots[k] == 0) continue;
+    if (lane == kLanes) {
+      copies.push_back({object.clone(), {}});
+      lane = 0;
+    }
+    for (Dual* v : copies.back().object->parameters()[k].values) v->d[lane] = 1;
+    copies.back().slots[lane++] = slots[k];
+  }
+  CHECK_LE(9 + kLanes * static_cast<int>(copies.size()), detail::Jacobian::kMost);
+  return copies;
+}
+
+}  // namespace
+
+// The values of a scene that a parameter may move, in an order that all copies share. Values of one
+// ParameterRef grow together, so they count as one.
+class ParameterSlots::Values {
+ public:
+  // Of the camera, then of emitting shapes, of BSDFs, the environment and the lights.
+  static std::vector<Dual*> of(Scene& scene) {
+    std::vector<Dual*> values;
+    for (Dual* v : camera_numbers(scene.camera)) values.push_back(v);
+    for (Shape& shape : scene.shapes) values.push_back(&shape.radiance.r);
+    const auto add = [&](auto& object) {
+      for (const ParameterRef& ref : object.parameters()) values.push_back(ref.values[0]);
+    };
+    for (const auto& bsdf : scatterers(scene)) add(*bsdf);
+    if (scene.environment) add(*scene.environment);
+    for (const auto& light : scene.delta_lights) add(*light);
+    return values;
+  }
+};
+
+ParameterSlots::ParameterSlots(const Scene& scene, const std::vector<std::string>& names)
+    : parameters_(resolved(scene, names)), scene_(deep_copy(scene)) {
+  slots_.scene = &scene_;
+  slots_.meshes.resize(scene.shapes.size());
+  free_.shapes.assign(scene.shapes.size(), false);
+  for (const Parameter& parameter : parameters_) {
+    dependences_.push_back(dependence_on_shape(scene, parameter));
+  }
+  add_shapes(scene);
+  add_values(scene);
+}
+
+uint32_t ParameterSlots::take(uint32_t count) {
+  const uint32_t first = slots_.count;
+  slots_.count += count;
+  return first;
+}
+
+ParameterSlots::Dependence ParameterSlots::dependence_on_shape(const Scene& scene,
+                                                               const Parameter& parameter) const {
+  Dependence dependence;
+  for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+    if (parameter.velocities(scene, ShapeId(s)).empty()) continue;
+    dependence.shape = ShapeId(s);
+    if (scene.shapes[s].mesh.normal_source != NormalSource::kGiven || parameter.size > 1) break;
+    Scene copy = deep_copy(scene);
+    parameter.seed(copy, 0);
+    for (const Vec3<Lanes>& d : copy.shapes[s].mesh.normal_tangents) {
+      dependence.normal_velocity.push_back({d.x[0], d.y[0], d.z[0]});
+    }
+    break;
+  }
+  return dependence;
+}
+
+void ParameterSlots::add_shapes(const Scene& scene) {
+  for (const Dependence& dependence : dependences_) {
+    if (dependence.shape.valid()) free_.shapes[dependence.shape.index()] = true;
+  }
+  const Vec3<Lanes> axes{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
+  for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+    if (!free_.shapes[s]) continue;
+    Mesh& mesh = scene_.shapes[s].mesh;
+    const auto count = static_cast<uint32_t>(mesh.positions.size());
+    mesh.position_tangents.assign(count, axes);
+    MeshSlots& slots = slots_.meshes[s];
+    slots.positions = take(3 * count);
+    if (mesh.normal_source == NormalSource::kFace) continue;
+    slots.normals = take(3 * static_cast<uint32_t>(mesh.normals.size()));
+    slots.horizons = take(count);
+  }
+}
+
+void ParameterSlots::add_values(const Scene& scene) {
+  // Meshes are no part of what is looked at.
+  Scene hull = deep_copy(scene);
+  for (Shape& shape : hull.shapes) shape.mesh = {};
+  std::vector<uint32_t> slot_of(Values::of(hull).size(), 0);
+  for (size_t i = 0; i < parameters_.size(); ++i) {
+    if (dependences_[i].shape.valid()) continue;
+    Scene copy = deep_copy(hull);
+    parameters_[i].seed(copy, 0);
+    const std::vector<Dual*> values = Values::of(copy);
+    for (size_t k = 0; k < values.size(); ++k) {
+      if (values[k]->d[0] == 0) continue;
+      if (k < kCameraSlots) {
+        if (slots_.camera == 0) slots_.camera = take(kCameraSlots);
+        slot_of[k] = slots_.camera + static_cast<uint32_t>(k);
+      }
+      if (slot_of[k] == 0) slot_of[k] = take(1);
+      dependences_[i].weights.push_back({slot_of[k], values[k]->d[0]});
+    }
+  }
+  free_.camera = slots_.camera != 0;
+  size_t next = kCameraSlots;
+  const auto slots_of = [&](auto& object) {
+    const size_t first = next;
+    next += object.parameters().size();
+    return std::vector<uint32_t>(slot_of.begin() + static_cast<long>(first),
+                                 slot_of.begin() + static_cast<long>(next));
+  };
+  for (size_t s = 0; s < scene_.shapes.size(); ++s) slots_.radiance.push_back(slot_of[next++]);
+  slots_.bsdfs.resize(scene_.shapes.size());
+  for (const auto& bsdf : scatterers(scene_)) {
+    auto copies = std::make_unique<SeededCopies<Bsdf>>(seeded_copies<Bsdf>(*bsdf, slots_of(*bsdf)));
+    if (copies->empty()) continue;
+    for (size_t s = 0; s < scene_.shapes.size(); ++s) {
+      for (const bool front : {false, true}) {
+        if (scene_.shapes[s].bsdf->side(front) == bsdf.get()) slots_.bsdfs[s][front] = copies.get();
+      }
+    }
+    slots_.bsdf_copies.push_back(std::move(copies));
+  }
+  if (scene_.environment) {
+    slots_.environment =
+        seeded_copies<Environment>(*scene_.environment, slots_of(*scene_.environment));
+  }
+  for (const auto& light : scene_.delta_lights) {
+    auto copies = seeded_copies<DeltaLight>(*light, slots_of(*light));
+    if (!copies.empty()) slots_.lights.emplace_back(light.get(), std::move(copies));
+  }
+  CHECK_EQ(next, slot_of.size());
+}
+
+std::vector<std::vector<double>> ParameterSlots::gather(const std::vector<double>& sums) const {
+  std::vector<std::vector<double>> values;
+  for (const Parameter& parameter : parameters_) values.emplace_back(parameter.size);
+  for (size_t i = 0; i < parameters_.size(); ++i) {
+    for (const Weight& w : dependences_[i].weights) values[i][0] += sums[w.slot] * w.weight;
+  }
+  for (uint32_t s = 0; s < free_.shapes.size(); ++s) {
+    if (free_.shapes[s]) gather_shape(ShapeId(s), sums, values);
+  }
+  return values;
+}
+
+void ParameterSlots::gather_shape(ShapeId shape, const std::vector<double>& sums,
+                                  std::vector<std::vector<double>>& values) const {
+  const Mesh& mesh = scene_.shape(shape).mesh;
+  const MeshSlots& slots = slots_.mesh(shape);
+  const auto vectors = [&](uint32_t first, size_t count) {
+    std::vector<Vec3d> list(count);
+    for (size_t i = 0; i < count; ++i) {
+      const double* at = &sums[first + 3 * i];
+      list[i] = {at[0], at[1], at[2]};
+    }
+    return list;
+  };
+  std::vector<Vec3d> positions = vectors(slots.positions, mesh.positions.size()), normals;
+  if (slots.normals != 0) {
+    normals = vectors(slots.normals, mesh.normals.size());
+    const auto first = sums.begin() + slots.horizons;
+    const std::vector<double> horizons(first, first + static_cast<long>(mesh.horizon.size()));
+    pull_back_shading_normals(mesh, normals, horizons, positions);
+  }
+  std::vector<uint32_t> copies(mesh.positions.size());
+  for (const uint32_t root : mesh.weld) ++copies[root];
+  for (size_t i = 0; i < parameters_.size(); ++i) {
+    const Dependence& dependence = dependences_[i];
+    if (dependence.shape != shape) continue;
+    if (parameters_[i].size > 1) {
+      for (size_t v = 0; v < mesh.weld.size(); ++v) {
+        const uint32_t root = mesh.weld[v];
+        for (int k = 0; k < 3; ++k) values[i][3 * v + k] = positions[root][k] / copies[root];
+      }
+      continue;
+    }
+    // Copies move together: the first one stands for all.
+    const std::vector<Vec3d> velocity = parameters_[i].velocities(scene_, shape);
+    double sum = 0;
+    for (size_t v = 0; v < positions.size(); ++v) sum += dot(positions[v], velocity[v]);
+    for (size_t n = 0; n < dependence.normal_velocity.size(); ++n) {
+      sum += dot(normals[n], dependence.normal_velocity[n]);
+    }
+    values[i][0] += sum;
+  }
+}
+
+}  // namespace limn

@@ -1,0 +1,59 @@
+#pragma once
+// From names of parameters to slots of a gradient, and back: which numbers of the scene have a slot, and
+// how the parameters' derivatives follow from those of the slots.
+#include <string>
+#include <vector>
+
+#include "integrators/terms/camera_edges.h"
+#include "limn/core/parameter.h"
+#include "limn/core/scene.h"
+#include "limn/core/slots.h"
+
+namespace limn {
+
+class ParameterSlots {
+ public:
+  // names: as BackwardOptions::parameters. InputError for unknown ones.
+  ParameterSlots(const Scene& scene, const std::vector<std::string>& names);
+  ParameterSlots(const ParameterSlots&) = delete;
+  ParameterSlots& operator=(const ParameterSlots&) = delete;
+
+  const std::vector<Parameter>& parameters() const { return parameters_; }
+  // A copy of the scene. The vertices of shapes that move have unit tangents in the first three
+  // lanes: nothing is known of their motion.
+  const Scene& scene() const { return scene_; }
+  const SceneSlots& slots() const { return slots_; }
+  const FreeMotion& free() const { return free_; }
+
+  // sums: by slot. The derivatives of each parameter's numbers.
+  std::vector<std::vector<double>> gather(const std::vector<double>& sums) const;
+
+ private:
+  // How a scalar depends on slots of values: of BSDFs, lights, the camera.
+  struct Weight {
+    uint32_t slot;
+    double weight;
+  };
+  // What a parameter moves.
+  struct Dependence {
+    ShapeId shape;                       // none: values alone
+    std::vector<Vec3d> normal_velocity;  // N, of normals of the file; empty if they stay
+    std::vector<Weight> weights;
+  };
+  class Values;
+
+  uint32_t take(uint32_t count);
+  void add_shapes(const Scene& scene);
+  void add_values(const Scene& scene);
+  Dependence dependence_on_shape(const Scene& scene, const Parameter& parameter) const;
+  void gather_shape(ShapeId shape, const std::vector<double>& sums,
+                    std::vector<std::vector<double>>& values) const;
+
+  std::vector<Parameter> parameters_;
+  std::vector<Dependence> dependences_;  // of each
+  Scene scene_;
+  SceneSlots slots_;
+  FreeMotion free_;
+};
+
+}  // namespace limn

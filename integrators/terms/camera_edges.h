@@ -1,0 +1,88 @@
+#pragma once
+// Edges seen from the pinhole, and curves where the camera's clip planes cut faces, on the film.
+#include <algorithm>
+#include <span>
+#include <vector>
+
+#include "integrators/terms/clip_curves.h"
+#include "limn/edgetree/edge_sampler.h"
+
+namespace limn {
+
+struct FilmEdge {
+  EdgeRef id;
+  static constexpr uint32_t kNoClip = UINT32_MAX;
+  uint32_t clip = kNoClip;  // the clip segment that it is, in the place of an edge
+  double t0, t1;            // the part of the edge that may reach the film
+  double depth0, depth1;    // depths of its two ends
+  double x0, y0, x1, y1;    // their film positions
+  double nx, ny;            // the film normal n
+  Lanes speed0, speed1;     // v_n there [pixels]; n points to the positive side of EdgeView::side
+  double length;            // [pixels]
+};
+
+// A point of one of them.
+struct FilmEdgePoint {
+  const FilmEdge* edge;
+  double s;        // position on the film: (1 - s) of its first end and s of the other
+  double x, y;     // film position [pixels]
+  double density;  // [1 / pixel of length]
+};
+
+// What moves where no motion is known: of these shapes every vertex by itself, and perhaps the camera.
+struct FreeMotion {
+  std::vector<bool> shapes;
+  bool camera = false;
+
+  bool moves(std::span<const FaceRef> faces) const {
+    return camera || std::any_of(faces.begin(), faces.end(),
+                                 [&](FaceRef face) { return shapes[face.shape.index()]; });
+  }
+};
+
+class CameraEdges {
+ public:
+  // free: then all that may move is listed, with the speeds of unit translations in the first three
+  // lanes (relative to the camera); null: what the scene's tangents move, with their speeds in
+  // `lanes` lanes.
+  CameraEdges(const PathContext& context, const EdgeSamplerInput& input, int lanes,
+              const FreeMotion* free = nullptr);
+
+  bool empty() const { return edges_.empty(); }
+  size_t size() const { return edges_.size(); }
+  double list_seconds() const { return list_seconds_; }
+  const ClipSegment& clip_of(const FilmEdge& edge) const { return clips_[edge.clip]; }
+
+  // The point at u in [0, 1).
+  FilmEdgePoint choose(double u) const;
+  // Where it is on its edge, in space: (1 - t) of the edge's first end and t of the other.
+  double t_of(const FilmEdgePoint& point) const;
+  // dL there; false if it is hidden.
+  bool jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& rays, Rgb<double>& jump) const;
+
+ private:
+  void add_object(ShapeId object);
+  void add_clip(uint32_t index);
+  // faces: that the edge moves with.
+  void add_if_moving(const FilmEdge& edge, std::span<const FaceRef> faces) {
+    const bool moves = free_ ? free_->moves(faces) : !is_zero(edge.speed0) || !is_zero(edge.speed1);
+    if (moves) edges_.push_back(edge);
+  }
+  bool is_hidden(const EdgeMesh& mesh, EdgeId edge) const;
+  bool clip_and_project(EdgeRef id, FilmEdge& edge) const;
+  bool clip_to_window(double x0, double x1, double y0, double y1, double& s0, double& s1) const;
+  Vec3<Dual> moving(const Vec3d& x, const Vec3<Lanes>& velocity) const;
+  bool place_on_film(const Vec3<Dual>& x0, const Vec3<Dual>& x1, const Vec3d& side,
+                     FilmEdge& edge) const;
+  void weigh(int lanes);
+
+  const PathContext& context_;
+  const EdgeSamplerInput& input_;
+  const FreeMotion* free_;
+  std::vector<ClipSegment> clips_;
+  std::vector<FilmEdge> edges_;
+  std::vector<double> cumulative_;  // probabilities of the edges, summed
+  double list_seconds_ = 0;
+};
+
+}  // namespace limn

@@ -1,0 +1,248 @@
+// Surfaces, lights and the camera as statements on a tape.
+#include "limn/core/reverse.h"
+
+namespace limn {
+
+namespace {
+
+// The corners' normals and horizons of a face.
+struct Corners {
+  std::array<uint32_t, 3> vertices, normal_ids;
+  std::array<Vec3d, 3> normals;
+  std::array<double, 3> horizons;
+
+  Corners(const Mesh& mesh, FaceId face)
+      : vertices(mesh.face(face)), normal_ids(mesh.normal_ids[face.index()]) {
+    for (int k = 0; k < 3; ++k) {
+      normals[k] = mesh.normals[normal_ids[k]];
+      horizons[k] = mesh.horizon[vertices[k]];
+    }
+  }
+};
+
+// Derivatives of the plane of a face: with respect to a point q of it, taken from the first corner,
+// to its sides e1 and e2 and to N = e1 x e2.
+struct PlaneAdjoint {
+  Vec3d q, e1, e2, n;
+};
+
+void contribute(Tape& tape, uint32_t slot, const Vec3d& g) {
+  for (int k = 0; k < 3; ++k) tape.contribute(slot + k, g[k]);
+}
+
+// Of the interpolated normal and horizon, as detail::interpolate_shading makes them.
+PlaneAdjoint pull_back_shading(Tape& tape, const Mesh& mesh, const MeshSlots& slots, FaceId face,
+                               const Vec3d& q, const Vec3d& e1, const Vec3d& e2,
+                               const Vec3d& of_normal, double of_horizon) {
+  const Corners corners(mesh, face);
+  const Vec3d n = cross(e1, e2);
+  const double inverse = 1 / dot(n, n);
+  const Vec3d x1 = cross(q, e2), x2 = cross(e1, q);
+  double b1 = dot(x1, n) * inverse, b2 = dot(x2, n) * inverse;
+  const bool middle = !(std::fabs(b1) <= 2 && std::fabs(b2) <= 2);
+  if (middle) b1 = b2 = 1.0 / 3;
+  const double b[3] = {1 - b1 - b2, b1, b2};
+  const Vec3d sum =
+      corners.normals[0] * b[0] + corners.normals[1] * b[1] + corners.normals[2] * b[2];
+  const double size = length(sum);
+  const Vec3d unit = sum / size;
+  const Vec3d of_sum = (of_normal - unit * dot(unit, of_normal)) / size;
+  double of_b[3];
+  for (int k = 0; k < 3; ++k) {
+    if (slots.normals != 0) {
+      contribute(tape, slots.normals + 3 * corners.normal_ids[k], of_sum * b[k]);
+      tape.contribute(slots.horizons + mesh.weld[corners.vertices[k]], of_horizon * b[k]);
+    }
+    of_b[k] = dot(of_sum, corners.normals[k]) + of_horizon * corners.horizons[k];
+  }
+  if (middle) return {};
+  const double of_b1 = of_b[1] - of_b[0], of_b2 = of_b[2] - of_b[0];
+  const double of_inverse = of_b1 * dot(x1, n) + of_b2 * dot(x2, n);
+  const Vec3d of_x1 = n * (of_b1 * inverse), of_x2 = n * (of_b2 * inverse);
+  PlaneAdjoint of;
+  of.q = cross(e2, of_x1) + cross(of_x2, e1);
+  of.e1 = cross(q, of_x2);
+  of.e2 = cross(of_x1, q);
+  of.n = x1 * (of_b1 * inverse) + x2 * (of_b2 * inverse) - n * (2 * of_inverse * inverse * inverse);
+  return of;
+}
+
+// The adjoint of surface_on_ray: of p = o + t d, t = (c0 - o) . N / (d . N), and of what is found at
+// p. Nodes and values: of o, then of d.
+void pull_back_surface(Tape& tape, const Tape::Composite& s) {
+  const auto read = [&](int first) {
+    return Vec3d{tape.adjoint(s.first + first), tape.adjoint(s.first + first + 1),
+                 tape.adjoint(s.first + first + 2)};
+  };
+  Vec3d of_p = read(0);
+  const Vec3d of_normal = read(3);
+  const double of_horizon = tape.adjoint(s.first + 6);
+  if (of_p == Vec3d{} && of_normal == Vec3d{} && of_horizon == 0) return;
+  const ShapeId shape(s.shape);
+  const FaceId face(s.part);
+  const Mesh& mesh = tape.slots()->scene->shape(shape).mesh;
+  const MeshSlots& slots = tape.slots()->mesh(shape);
+  const auto c = face_corners<double>(mesh, face);
+  const Vec3d o{s.values[0], s.values[1], s.values[2]}, d{s.values[3], s.values[4], s.values[5]};
+  const Vec3d e1 = c[1] - c[0], e2 = c[2] - c[0], n = cross(e1, e2);
+  const double slope = dot(n, d);
+  const double t = dot(c[0] - o, n) / slope;
+  PlaneAdjoint of;
+  if (mesh.normal_source == NormalSource::kFace) {
+    const double size = length(n);
+    const Vec3d unit = n / size;
+    of.n = (of_normal - unit * dot(unit, of_normal)) / size;
+  } else {
+    of =
+        pull_back_shading(tape, mesh, slots, face, o + d * t - c[0], e1, e2, of_normal, of_horizon);
+  }
+  of_p += of.q;
+  const double k = dot(of_p, d) / slope;
+  const Vec3d of_o = of_p - n * k, of_d = of_p * t - n * (k * t);
+  for (int i = 0; i < 3; ++i) {
+    tape.adjoint(s.nodes[i]) += of_o[i];
+    tape.adjoint(s.nodes[3 + i]) += of_d[i];
+  }
+  if (slots.positions == 0) return;
+  of.n += (c[0] - o) * k - d * (k * t);
+  of.e1 += cross(e2, of.n);
+  of.e2 += cross(of.n, e1);
+  const Vec3d of_corners[3] = {n * k - of.q - of.e1 - of.e2, of.e1, of.e2};
+  for (int i = 0; i < 3; ++i) {
+    contribute(tape, slots.positions + 3 * mesh.weld[mesh.face(face)[i]], of_corners[i]);
+  }
+}
+
+// A colour of an object's own parameters alone. eval(object): the colour with its derivatives.
+template <class T, class Eval>
+Rgb<Var> of_parameters(const SeededCopies<T>& copies, const Rgb<double>& value, const Eval& eval) {
+  detail::Jacobian jacobian;
+  for (const auto& copy : copies) jacobian.add(detail::leaves_of(copy.slots), eval(*copy.object));
+  return jacobian.result(value);
+}
+
+template <class S>
+Rgb<S> as_colour(const Vec3<S>& v) {
+  return {v.x, v.y, v.z};
+}
+
+}  // namespace
+
+template <>
+SurfacePoint<Var> surface_on_ray<Var>(const Scene& scene, FaceRef face, const Vec3<Var>& origin,
+                                      const Vec3<Var>& direction) {
+  const auto point = surface_on_ray<double>(scene, face, value(origin), value(direction));
+  const auto fixed = [](const Vec3d& v) { return Vec3<Var>{v.x, v.y, v.z}; };
+  SurfacePoint<Var> moving{point.shape, point.face,       fixed(point.p),
+                           point.n_g,   fixed(point.n_s), point.horizon};
+  Tape& tape = *Tape::current();
+  const MeshSlots& slots = tape.slots()->mesh(face.shape);
+  if (slots.positions == 0 && is_still(origin) && is_still(direction)) return moving;
+  Tape::Composite statement{0, 7, pull_back_surface, face.shape.index(), face.face.index(), {}, {}};
+  for (int k = 0; k < 3; ++k) {
+    statement.nodes[k] = origin[k].node;
+    statement.nodes[3 + k] = direction[k].node;
+    statement.values[k] = origin[k].v;
+    statement.values[3 + k] = direction[k].v;
+  }
+  const uint32_t first = tape.add(statement);
+  const bool flat = point.shape->mesh.normal_source == NormalSource::kFace;
+  for (int k = 0; k < 3; ++k) {
+    moving.p[k].node = first + k;
+    if (!flat || slots.positions != 0) moving.n_s[k].node = first + 3 + k;
+  }
+  if (!flat) moving.horizon.node = first + 6;
+  return moving;
+}
+
+template <>
+Rgb<Var> Light::drawn_radiance<Var>(const LightSample& sample) const {
+  const SceneSlots& slots = *Tape::current()->slots();
+  if (sample.face) {
+    const ShapeId shape = sample.face->shape;
+    return detail::emitter_radiance<Var>(slots.scene->shape(shape), shape);
+  }
+  return of_parameters(slots.environment, drawn_value(sample),
+                       [&](const Light& seeded) { return seeded.drawn_dual(sample); });
+}
+
+template <>
+Environment::Sight<Var> Lights::environment<Var>(const Vec3d& wo) const {
+  Environment::Sight<double> sight;
+  environment_->look(wo, sight);
+  const auto radiance = of_parameters(Tape::current()->slots()->environment, sight.radiance,
+                                      [&](const Environment& seeded) {
+                                        Environment::Sight<Dual> of;
+                                        seeded.look(wo, of);
+                                        return of.radiance;
+                                      });
+  return {radiance, sight.pdf / choices_};
+}
+
+template <>
+Rgb<Var> environment_radiance<Var>(const Environment& environment, const Vec3<Var>& d) {
+  const SeededCopies<Environment>& copies = Tape::current()->slots()->environment;
+  detail::Jacobian jacobian;
+  if (!is_still(d)) jacobian.add(d, environment.radiance(detail::along_axes(d)));
+  for (const auto& copy : copies) {
+    jacobian.add(detail::leaves_of(copy.slots), copy.object->radiance(detail::held(d)));
+  }
+  return jacobian.result(environment.radiance(value(d)));
+}
+
+template <>
+std::optional<Arrival<Var>> arrival<Var>(const DeltaLight& light, const Vec3<Var>& p) {
+  const auto at = light.arriving(value(p));
+  if (!at) return {};
+  detail::Jacobian direction, irradiance;
+  if (!is_still(p)) {
+    const auto moving = *light.arriving(detail::along_axes(p));
+    direction.add(p, as_colour(moving.wo));
+    irradiance.add(p, moving.irradiance);
+  }
+  if (const auto* copies = Tape::current()->slots()->of(light)) {
+    for (const auto& copy : *copies) {
+      const auto nodes = detail::leaves_of(copy.slots);
+      const auto seeded = *copy.object->arriving(detail::held(p));
+      direction.add(nodes, as_colour(seeded.wo));
+      irradiance.add(nodes, seeded.irradiance);
+    }
+  }
+  const Rgb<Var> wo = direction.result(as_colour(at->wo));
+  return Arrival<Var>{{wo.r, wo.g, wo.b}, irradiance.result(at->irradiance)};
+}
+
+Vec3<Var> light_origin(const DeltaLight& light) {
+  const Rgb<double> at = as_colour(value(light.origin().v));
+  const auto* copies = Tape::current()->slots()->of(light);
+  if (!copies) return {at.r, at.g, at.b};
+  const Rgb<Var> v = of_parameters(
+      *copies, at, [](const DeltaLight& seeded) { return as_colour(seeded.origin().v); });
+  return {v.r, v.g, v.b};
+}
+
+CameraView<Var> camera_leaves(const Camera& camera) {
+  const uint32_t slot = Tape::current()->slots()->camera;
+  const auto vector = [&](const Vec3<Dual>& v, uint32_t offset) {
+    return slot == 0 ? Vec3<Var>{v.x.v, v.y.v, v.z.v} : detail::leaves(value(v), slot + offset);
+  };
+  const Var fov{camera.fov.v, slot == 0 ? 0 : Tape::current()->leaf(slot + 12)};
+  return CameraView<Var>(camera, vector(camera.origin, 0), vector(camera.left, 3),
+                         vector(camera.up, 6), vector(camera.forward, 9), fov);
+}
+
+std::array<Vec3<Var>, 3> corner_leaves(const Scene& scene, FaceRef face) {
+  const Mesh& mesh = scene.shape(face.shape).mesh;
+  const MeshSlots& slots = Tape::current()->slots()->mesh(face.shape);
+  const auto corners = face_corners<double>(mesh, face.face);
+  std::array<Vec3<Var>, 3> result;
+  for (int k = 0; k < 3; ++k) {
+    const Vec3d& x = corners[k];
+    const uint32_t root = mesh.weld[mesh.face(face.face)[k]];
+    result[k] = slots.positions == 0 ? Vec3<Var>{x.x, x.y, x.z}
+                                     : detail::leaves(x, slots.positions + 3 * root);
+  }
+  return result;
+}
+
+}  // namespace limn
