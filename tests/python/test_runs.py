@@ -128,6 +128,7 @@ INTERRUPTED = """
         os.kill(os.getpid(), signal.SIGINT)
     for run in (lambda: limn.render(scene, spp=1 << 24),
                 lambda: limn.gradient(scene, "tent.scale", spp=1 << 24),
+                lambda: limn.backward(scene, [[1] * 16] * 12, spp=1 << 24),
                 lambda: limn.check(scene, "tent.scale", spp=1 << 22)):
         ticks.clear()
         stop.clear()
@@ -152,7 +153,7 @@ def test_control_c_ends_runs_and_other_threads_go_on(folder):
                            str(folder / "scene.xml")], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     rows = [line.split() for line in done.stdout.splitlines()]
-    assert len(rows) == 3
+    assert len(rows) == 4
     for late, ticks in rows:
         assert float(late) < 0.5
         assert int(ticks) > 5  # of about 80; with the GIL held there would be none

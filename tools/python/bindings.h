@@ -47,6 +47,7 @@ nb::class_<SceneHandle> bind_scene(nb::module_& m);
 void bind_parameters(nb::module_& m, nb::class_<SceneHandle>& scene);
 void bind_render(nb::module_& m);
 void bind_gradient(nb::module_& m);
+void bind_backward(nb::module_& m);
 void bind_check(nb::module_& m);
 void bind_compare(nb::module_& m);
 void bind_info(nb::module_& m);
@@ -58,6 +59,8 @@ ShapeId find_shape(const Scene& scene, const std::string& id);
 using Pixels = nb::ndarray<nb::numpy, float, nb::shape<-1, -1, -1>, nb::c_contig>;
 using Positions = nb::ndarray<nb::numpy, const float, nb::shape<-1, 3>, nb::c_contig>;
 
+// A copy; H by W by C, or H by W for one channel. Estimates are taken for their values. InputError.
+Image to_image(nb::handle array);
 // H by W by C, the image's memory with it.
 Pixels to_array(Image image);
 // A view of a shape's vertices that keeps the scene's state alive.
@@ -66,8 +69,9 @@ Positions view_positions(std::shared_ptr<const Scene> scene, ShapeId shape);
 nb::object as_array(nb::handle value, const char* dtype);
 
 // A mean with its standard error, as Python sees it.
+using Array = nb::ndarray<nb::numpy>;
 struct Estimate {
-  Pixels value, error;
+  Array value, error;
   int64_t spp = 0;
   double seconds = 0;
   std::vector<std::string> warnings;

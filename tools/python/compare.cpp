@@ -33,8 +33,8 @@ Pixels to_pixels(const std::vector<double>& values, int width, int height) {
 Estimate to_estimate(const Reference& reference, int width, int height) {
   std::vector<double> errors;
   for (const double v : reference.variance) errors.push_back(std::sqrt(v));
-  return {to_pixels(reference.image, width, height),
-          to_pixels(errors, width, height),
+  return {Array(to_pixels(reference.image, width, height)),
+          Array(to_pixels(errors, width, height)),
           reference.spp,
           reference.seconds,
           {}};

@@ -11,7 +11,12 @@ namespace limn::python {
 
 namespace {
 
-// A copy; H by W by C, or H by W for one channel. Estimates are taken for their values.
+std::string to_path(nb::handle file) {
+  return nb::cast<std::string>(nb::module_::import_("os").attr("fspath")(file));
+}
+
+}  // namespace
+
 Image to_image(nb::handle array) {
   const auto pixels =
       nb::cast<nb::ndarray<const float, nb::c_contig, nb::device::cpu>>(as_array(array, "float32"));
@@ -25,12 +30,6 @@ Image to_image(nb::handle array) {
   std::memcpy(image.data.data(), pixels.data(), pixels.size() * sizeof(float));
   return image;
 }
-
-std::string to_path(nb::handle file) {
-  return nb::cast<std::string>(nb::module_::import_("os").attr("fspath")(file));
-}
-
-}  // namespace
 
 nb::object as_array(nb::handle value, const char* dtype) {
   return nb::module_::import_("numpy").attr("ascontiguousarray")(value, dtype);

@@ -31,6 +31,7 @@ NB_MODULE(_limn, m) {
   py::bind_parameters(m, scene);
   py::bind_render(m);
   py::bind_gradient(m);
+  py::bind_backward(m);
   py::bind_check(m);
   py::bind_compare(m);
   py::bind_info(m);

@@ -9,8 +9,8 @@
 namespace limn::python {
 
 Estimate to_estimate(const Moments& moments, const Film& film, int64_t spp, double seconds) {
-  return {to_array(mean_image(moments, film.crop_width, film.crop_height)),
-          to_array(standard_error_image(moments, film.crop_width, film.crop_height)),
+  return {Array(to_array(mean_image(moments, film.crop_width, film.crop_height))),
+          Array(to_array(standard_error_image(moments, film.crop_width, film.crop_height))),
           spp,
           seconds,
           {}};
@@ -43,9 +43,11 @@ void bind_render(nb::module_& m) {
                        "A mean over samples with its standard error. numpy takes it for its value.")
       .def_prop_ro(
           "value", [](const Estimate& e) { return e.value; }, nb::rv_policy::reference,
-          "The mean: float32, (H, W, 3), row 0 on top.")
+          nb::sig("def value(self) -> numpy.ndarray"),
+          "The mean: float32, (H, W, 3), row 0 on top, of an image; float64 of parameters.")
       .def_prop_ro(
           "stderr", [](const Estimate& e) { return e.error; }, nb::rv_policy::reference,
+          nb::sig("def stderr(self) -> numpy.ndarray"),
           "Its standard error, of the same shape; NaN with fewer than two batches (spp = 1).")
       .def_ro("spp", &Estimate::spp, "Samples per pixel that were made.")
       .def_ro("seconds", &Estimate::seconds, "Seconds that the run took, set-up included.")
@@ -56,8 +58,11 @@ void bind_render(nb::module_& m) {
            nb::sig("def __array__(self, dtype: object = None, copy: bool | None = None) -> "
                    "numpy.ndarray"))
       .def("__repr__", [](const Estimate& e) {
-        return fmt::format("<limn.Estimate: ({}, {}, {}), {} spp, {:.3g} s>", e.value.shape(0),
-                           e.value.shape(1), e.value.shape(2), e.spp, e.seconds);
+        std::string shape;
+        for (size_t k = 0; k < e.value.ndim(); ++k) {
+          shape += fmt::format("{}{}", k > 0 ? ", " : "", e.value.shape(k));
+        }
+        return fmt::format("<limn.Estimate: ({}), {} spp, {:.3g} s>", shape, e.spp, e.seconds);
       });
   m.def(
       "render", render_scene, nb::arg("scene"), nb::arg("spp") = nb::none(),
