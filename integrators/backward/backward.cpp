@@ -175,7 +175,7 @@ void BackwardPass::select() {
   for (const Parameter& p : parameters_.parameters()) {
     std::vector<size_t> shape;
     if (p.size > 1) shape = {p.size / 3, 3};
-    result_.parameters.push_back({p.name, p.unit, shape, Moments(p.size)});
+    result_.parameters.push_back({p.name, p.unit, shape, Moments(p.size, options_.keep_batches)});
   }
 }
 

@@ -55,7 +55,8 @@ SeededCopies<T> seeded_copies(const T& object, const std::vector<uint32_t>& slot
       copies.push_back({object.clone(), {}});
       lane = 0;
     }
-    for (Dual* v : copies.back().object->parameters()[k].values) v->d[lane] = 1;
+    const std::vector<ParameterRef> parameters = copies.back().object->parameters();
+    for (Dual* v : parameters[k].values) v->d[lane] = 1;
     copies.back().slots[lane++] = slots[k];
   }
   CHECK_LE(9 + kLanes * static_cast<int>(copies.size()), detail::Jacobian::kMost);

@@ -216,14 +216,10 @@ class VertexArray final : public ShapeMotion {
 
  private:
   Parameter field(const Scene& scene, const Parameter& whole, const std::string& file) const {
-    const Shape& shape = scene.shape(shape_);
-    std::vector<Vec3d> field = read_field(shape, file);
-    double longest = 0;
-    for (const Vec3d& v : field) longest = std::max(longest, length(v));
-    const double diagonal = bounds_of(shape.mesh).diagonal();
-    return {whole.name + ":" + file, "times the vectors in FILE",
-            longest > 0 ? 0.01 * diagonal / longest : 0.01, 1,
-            std::make_shared<VertexField>(shape_, std::move(field))};
+    Parameter field = vertex_field(scene, shape_, read_field(scene.shape(shape_), file));
+    field.name = whole.name + ":" + file;
+    field.unit = "times the vectors in FILE";
+    return field;
   }
 
   static std::optional<Parameter> component(const Scene& scene, const Parameter& whole,
@@ -248,6 +244,15 @@ class VertexArray final : public ShapeMotion {
 };
 
 }  // namespace
+
+Parameter vertex_field(const Scene& scene, ShapeId shape, std::vector<Vec3d> field) {
+  double longest = 0;
+  for (const Vec3d& v : field) longest = std::max(longest, length(v));
+  const double diagonal = bounds_of(scene.shape(shape).mesh).diagonal();
+  return {scene.shape(shape).id + ".vertex_positions:", "times the vectors of the field",
+          longest > 0 ? 0.01 * diagonal / longest : 0.01, 1,
+          std::make_shared<VertexField>(shape, std::move(field))};
+}
 
 void add_shape_parameters(const Scene& scene, std::vector<Parameter>& list) {
   for (uint32_t i = 0; i < scene.shapes.size(); ++i) {

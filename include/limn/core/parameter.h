@@ -71,4 +71,8 @@ Parameter find_parameter(const Scene& scene, const std::string& name);
 // The same, arrays included.
 Parameter find_parameter_or_array(const Scene& scene, const std::string& name);
 
+// Moves every vertex of a shape by the parameter times its vector in `field` (V by 3), as
+// SHAPE.vertex_positions:FILE does. Copies of a vertex must have the same vector.
+Parameter vertex_field(const Scene& scene, ShapeId shape, std::vector<Vec3d> field);
+
 }  // namespace limn

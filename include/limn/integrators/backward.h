@@ -29,6 +29,7 @@ struct BackwardOptions {
   bool uniform_pixels = false;
   int edge_samples = 1;       // at every vertex of a path, of the boundary and shadow terms each
   double camera_samples = 1;  // points on silhouettes of the film, per path
+  bool keep_batches = false;  // Moments::kept of every parameter
 };
 
 // dLoss/dtheta of one parameter, per unit of the parameter (that of the loss over `unit`).
@@ -64,6 +65,20 @@ struct BackwardResult {
 // terms, and for an adjoint of another size or one that is not finite.
 BackwardResult backward(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
                         const RunSettings& settings);
+
+// One number from both modes.
+struct ReverseCheck {
+  std::string parameter;
+  double forward = 0, forward_error = 0;  // the sum of A dI/dtheta by forward mode, standard error
+  double reverse = 0, reverse_error = 0;
+  // The difference over its standard error; 0 where both are exactly the same.
+  double z = 0;
+};
+// Reverse mode against forward mode, with a random adjoint image and independent samples: all have z
+// of N(0, 1). An array stands for a smooth random field of velocities. settings.spp samples per pixel
+// in both modes, two at least. Empty if interrupted.
+std::vector<ReverseCheck> check_reverse(const Scene& scene, const BackwardOptions& options,
+                                        const RunSettings& settings);
 
 // How far an image is from a target, each a mean over pixels and channels.
 enum class LossKind {

@@ -1,0 +1,139 @@
+// Reverse mode against forward mode: the sum over pixels of a random adjoint times the derivative.
+#include <algorithm>
+#include <cmath>
+
+#include "integrators/estimates/batches.h"
+#include "integrators/methods/term_estimator.h"
+#include "limn/core/error.h"
+#include "limn/core/parameter.h"
+#include "limn/edgetree/edge_sampler_types.h"
+#include "limn/integrators/backward.h"
+
+namespace limn {
+
+namespace {
+
+Image random_adjoint(const Film& film, uint64_t seed) {
+  Image adjoint(film.crop_width, film.crop_height, 3);
+  for (size_t i = 0; i < adjoint.data.size(); ++i) {
+    adjoint.data[i] = static_cast<float>(2 * Rng(seed, i, 0).uniform() - 1);
+  }
+  return adjoint;
+}
+
+// Each component a sine of a random direction, of about a period over the shape. Copies of a vertex
+// move together.
+std::vector<Vec3d> random_field(const Mesh& mesh, uint64_t seed) {
+  Rng rng(seed, UINT64_MAX, 0);
+  const Bounds bounds = bounds_of(mesh);
+  const double scale = 2 * kPi / std::max(bounds.diagonal(), 1e-300);
+  Vec3d waves[3];
+  double phases[3];
+  for (int k = 0; k < 3; ++k) {
+    for (int j = 0; j < 3; ++j) waves[k][j] = scale * (2 * rng.uniform() - 1);
+    phases[k] = 2 * kPi * rng.uniform();
+  }
+  std::vector<Vec3d> field(mesh.positions.size());
+  for (size_t v = 0; v < field.size(); ++v) {
+    const Vec3d x = cast<double>(mesh.positions[mesh.weld[v]]) - bounds.center();
+    for (int k = 0; k < 3; ++k) field[v][k] = std::sin(dot(waves[k], x) + phases[k]);
+  }
+  return field;
+}
+
+// A parameter in forward mode, and what a gradient of reverse mode is dotted with.
+struct Compared {
+  Parameter forward;
+  std::vector<double> weights;
+};
+
+Compared compared(const Scene& scene, const Parameter& parameter, uint64_t seed) {
+  if (parameter.size == 1) return {parameter, {1.0}};
+  for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+    if (parameter.velocities(scene, ShapeId(s)).empty()) continue;
+    const std::vector<Vec3d> field = random_field(scene.shapes[s].mesh, seed);
+    std::vector<double> weights;
+    for (const Vec3d& v : field) weights.insert(weights.end(), {v.x, v.y, v.z});
+    return {vertex_field(scene, ShapeId(s), field), weights};
+  }
+  throw InputError("an array that moves no shape: " + parameter.name);
+}
+
+// Moments of dot products with the adjoint, one for each parameter.
+std::vector<Moments> forward_sums(const Scene& scene, std::span<const Parameter> parameters,
+                                  const std::vector<std::string>& terms, const Image& adjoint,
+                                  const RunSettings& settings) {
+  const EdgeSamplerType& sampler = edge_sampler_type("forest");
+  std::vector<bool> computed;
+  for (const TermType* type : terms_of(scene, sampler)) {
+    computed.push_back(terms.empty() ||
+                       std::find(terms.begin(), terms.end(), type->name) != terms.end());
+  }
+  std::vector<Moments> moments(parameters.size(), Moments(1));
+  for (size_t first = 0; first < parameters.size(); first += kLanes) {
+    const auto some =
+        parameters.subspan(first).first(std::min<size_t>(kLanes, parameters.size() - first));
+    std::vector<std::unique_ptr<SampleEstimator>> estimators;
+    estimators.push_back(
+        std::make_unique<TermEstimator>(scene, some, computed, sampler, settings.threads));
+    const Stopwatch watch;
+    run_batches(estimators, settings, watch, [&](const Batch& batch, const auto& sums) {
+      const std::vector<std::vector<double>>& images = sums[0].images;
+      for (size_t k = 0; k < some.size(); ++k) {
+        double sum = 0;
+        for (size_t image = k; image < images.size(); image += some.size()) {
+          for (size_t i = 0; i < images[image].size(); ++i) {
+            sum += adjoint.data[i] * images[image][i];
+          }
+        }
+        moments[first + k].add_batch({sum}, batch.count());
+      }
+    });
+  }
+  return moments;
+}
+
+Moments reverse_sum(const ParameterAdjoint& adjoint, const std::vector<double>& weights) {
+  Moments sum(1);
+  for (const Moments::Batch& batch : adjoint.moments.kept()) {
+    double total = 0;
+    for (size_t i = 0; i < weights.size(); ++i) total += batch.sums[i] * weights[i];
+    sum.add_batch({total}, batch.samples);
+  }
+  return sum;
+}
+
+}  // namespace
+
+std::vector<ReverseCheck> check_reverse(const Scene& scene, const BackwardOptions& options,
+                                        const RunSettings& settings) {
+  if (settings.spp < 2) throw InputError("check --reverse needs two samples per pixel");
+  const Image adjoint = random_adjoint(scene.film, mix_bits(settings.seed));
+  BackwardOptions kept = options;
+  kept.keep_batches = true;
+  const BackwardResult reverse = backward(scene, adjoint, kept, settings);
+  std::vector<Compared> list;
+  std::vector<Parameter> parameters;
+  for (const ParameterAdjoint& p : reverse.parameters) {
+    list.push_back(compared(scene, find_parameter_or_array(scene, p.name), settings.seed));
+    parameters.push_back(list.back().forward);
+  }
+  RunSettings other = settings;
+  other.seed = mix_bits(settings.seed + 3);
+  const auto sums = forward_sums(scene, parameters, options.terms, adjoint, other);
+  if (settings.interrupted && settings.interrupted->load()) return {};
+  std::vector<ReverseCheck> checks;
+  for (size_t i = 0; i < list.size(); ++i) {
+    const Moments backward_sum = reverse_sum(reverse.parameters[i], list[i].weights);
+    ReverseCheck check{reverse.parameters[i].name, sums[i].mean(0), std::sqrt(sums[i].variance(0)),
+                       backward_sum.mean(0), std::sqrt(backward_sum.variance(0))};
+    if (check.forward != check.reverse) {
+      check.z =
+          (check.reverse - check.forward) / std::hypot(check.forward_error, check.reverse_error);
+    }
+    checks.push_back(check);
+  }
+  return checks;
+}
+
+}  // namespace limn
