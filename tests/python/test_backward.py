@@ -53,7 +53,7 @@ def test_a_step_against_the_gradient_lowers_the_loss(scene):
     assert loss.adjoint.shape == (12, 16, 3)
     g = limn.backward(scene, loss.adjoint, POSITIONS, spp=32, seed=1)[POSITIONS].value
     before = scene[POSITIONS]
-    scene[POSITIONS] = before - 0.02 * g / np.abs(g).max()
+    scene[POSITIONS] = before - 0.2 * g / np.abs(g).max()
     after = limn.image_loss(scene, target, spp=32, seed=2)
     assert after.value + 3 * after.stderr < loss.value - 3 * loss.stderr
 

@@ -27,8 +27,10 @@ def test_keywords_give_values_to_names(folder):
 
 def test_text_is_as_good_as_a_file(folder, scene):
     assert same(image(limn.load_string(SCENE, folder)), image(scene))
-    with pytest.raises(limn.InputError, match=re.escape(f"{folder}/string:2:3: error: ")):
-        limn.load_string(SCENE.replace("<default ", "<defalt ", 1), folder)
+    broken = SCENE.replace("</scene>", "<lamp/></scene>")
+    line = broken[:broken.index("<lamp/>")].count("\n") + 1
+    with pytest.raises(limn.InputError, match=re.escape(f"{folder}/string:{line}:1: error: ")):
+        limn.load_string(broken, folder)
 
 
 @pytest.mark.parametrize("call, text", [
