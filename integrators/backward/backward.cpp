@@ -29,7 +29,6 @@ namespace {
 
 constexpr const char* kNames[kAdjointTerms] = {"interior", "camera", "boundary", "shadow"};
 constexpr size_t kTile = 256;  // paths, or points on the film; not tuned
-constexpr int kBatches = 16;   // at most: every one of them ends with the adjoint of normals
 
 std::vector<Rgb<double>> pixels_of(const Scene& scene, const Image& adjoint) {
   const Film& film = scene.film;
@@ -84,12 +83,9 @@ class BackwardPass {
 
   BackwardResult run() {
     result_.setup_seconds = watch_.seconds();
-    const int batches = std::clamp(settings_.spp, 1, kBatches);
     ProgressCounter progress(settings_, watch_, steps());
-    for (int b = 0; b < batches && !progress.stopped(); ++b) {
-      const auto at = [&](int i) { return static_cast<int>(int64_t{settings_.spp} * i / batches); };
-      const PathBatch batch{settings_.seed, at(b), at(b + 1)};
-      run_batch(batch, progress);
+    for (const PathBatch& batch : batches()) {
+      if (!progress.stopped()) run_batch(batch, progress);
     }
     finish();
     return std::move(result_);
@@ -102,6 +98,7 @@ class BackwardPass {
         std::ceil(options_.camera_samples * static_cast<double>(film_.pixels().size())));
   }
   static size_t tiles_of(size_t samples) { return (samples + kTile - 1) / kTile; }
+  std::vector<PathBatch> batches() const;
   size_t steps() const;
   void run_batch(const PathBatch& batch, ProgressCounter& progress);
   void run_paths(const PathBatch& batch, ProgressCounter& progress, ContributionSum& sum);
@@ -179,12 +176,17 @@ void BackwardPass::select() {
   }
 }
 
+std::vector<PathBatch> BackwardPass::batches() const {
+  const int count = std::clamp(settings_.spp, 1, std::max(1, options_.batches));
+  const auto at = [&](int i) { return static_cast<int>(int64_t{settings_.spp} * i / count); };
+  std::vector<PathBatch> list;
+  for (int b = 0; b < count; ++b) list.push_back({settings_.seed, at(b), at(b + 1)});
+  return list;
+}
+
 size_t BackwardPass::steps() const {
-  const int batches = std::clamp(settings_.spp, 1, kBatches);
   size_t steps = 0;
-  for (int b = 0; b < batches; ++b) {
-    const auto at = [&](int i) { return static_cast<int>(int64_t{settings_.spp} * i / batches); };
-    const PathBatch batch{settings_.seed, at(b), at(b + 1)};
+  for (const PathBatch& batch : batches()) {
     steps += tiles_of(choice_.paths(batch));
     for (const bool on : on_film_) {
       if (on) steps += tiles_of(points_per_sample() * batch.count());

@@ -111,6 +111,7 @@ std::vector<ReverseCheck> check_reverse(const Scene& scene, const BackwardOption
   const Image adjoint = random_adjoint(scene.film, mix_bits(settings.seed));
   BackwardOptions kept = options;
   kept.keep_batches = true;
+  kept.batches = 64;  // the more, the nearer z is to N(0, 1)
   const BackwardResult reverse = backward(scene, adjoint, kept, settings);
   std::vector<Compared> list;
   std::vector<Parameter> parameters;

@@ -6,6 +6,7 @@
 
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
+#include "limn/integrators/backward.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
 #include "tools/limn/output_files.h"
@@ -136,12 +137,16 @@ class CheckCommand final : public Command {
                    "Compare windows this many pixels apart (default: an eighth of the longer side, "
                    "at least 4)")
         ->check(CLI::Range(1, 1 << 20));
+    app.add_flag("--reverse", reverse_,
+                 "Compare reverse mode with forward mode instead: the sum over pixels of a random "
+                 "image times the derivative; an array stands for a random field");
   }
 
   int run(const std::string&) override {
     const Scene scene = load_scene(common_, warnings_);
     check_outputs({{"--json", common_.json}}, scene, field_files(parameters_));
     options_.terms = parse_terms(terms_);
+    if (reverse_) return run_reverse(scene);
     options_.samples = parse_samples(samples_);
     for (const auto& parameter : parameters_) find_parameter(scene, parameter);
     json report = json::array();
@@ -173,9 +178,42 @@ class CheckCommand final : public Command {
   }
 
  private:
+  int run_reverse(const Scene& scene) {
+    BackwardOptions options;
+    options.parameters = parameters_;
+    options.terms = options_.terms;
+    const RunSettings settings = make_settings(common_, scene, "check --reverse");
+    const std::vector<ReverseCheck> checks = check_reverse(scene, options, settings);
+    if (checks.empty()) {
+      fmt::print(stderr, "interrupted: no verdict\n");
+      return kInterrupted;
+    }
+    json report = json::array();
+    bool agree = true;
+    for (const ReverseCheck& c : checks) {
+      // Of all parameters together (Bonferroni).
+      const double p = std::min(1.0, std::erfc(std::fabs(c.z) / std::sqrt(2.0)) * checks.size());
+      fmt::print("{}: forward {:.6g} +- {:.2g}, reverse {:.6g} +- {:.2g}, z = {:.2f}{}\n",
+                 c.parameter, c.forward, c.forward_error, c.reverse, c.reverse_error, c.z,
+                 p < kCheckLevel ? ": DISAGREE" : "");
+      agree = agree && p >= kCheckLevel;
+      report.push_back({{"parameter", c.parameter},
+                        {"forward", c.forward},
+                        {"forward_stderr", number(c.forward_error)},
+                        {"reverse", c.reverse},
+                        {"reverse_stderr", number(c.reverse_error)},
+                        {"z", number(c.z)},
+                        {"p", p},
+                        {"verdict", p < kCheckLevel ? "disagree" : "agree"}});
+    }
+    write_json(common_.json, report.dump(2));
+    return agree ? kSuccess : kDisagree;
+  }
+
   CommonOptions common_;
   Warnings warnings_;
   CheckOptions options_;
+  bool reverse_ = false;
   std::vector<std::string> parameters_;
   std::string terms_, samples_ = "auto";
 };

@@ -29,6 +29,7 @@ struct BackwardOptions {
   bool uniform_pixels = false;
   int edge_samples = 1;       // at every vertex of a path, of the boundary and shadow terms each
   double camera_samples = 1;  // points on silhouettes of the film, per path
+  int batches = 16;           // at most, for standard errors; each ends with the adjoint of normals
   bool keep_batches = false;  // Moments::kept of every parameter
 };
 
@@ -59,7 +60,7 @@ struct BackwardResult {
 };
 
 // adjoint: crop_height by crop_width, three channels, or one that stands for the luminance.
-// settings.spp paths per pixel, in at most 16 batches, which give the standard errors; interruption
+// settings.spp paths per pixel, in batches that give the standard errors; interruption
 // drops the batch in progress. settings.seconds is not looked at. The same seed gives the same bits
 // on any number of threads; memory does not grow with samples. InputError for unknown parameters or
 // terms, and for an adjoint of another size or one that is not finite.

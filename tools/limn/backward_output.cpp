@@ -1,0 +1,218 @@
+// Gradients as files.
+#include "tools/limn/backward_output.h"
+
+#include <fmt/format.h>
+
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+#include "limn/core/error.h"
+#include "limn/core/parameter.h"
+#include "limn/core/shading.h"
+#include "tools/limn/command_support.h"
+
+namespace limn {
+
+namespace {
+
+using nlohmann::json;
+static_assert(std::endian::native == std::endian::little);
+
+void write_file(const std::string& file, const std::string& bytes) {
+  std::ofstream stream(file, std::ios::binary);
+  stream << bytes;
+  stream.close();  // a full disk may show only here
+  if (!stream) throw InputError({file}, "cannot be written");
+}
+
+template <class T>
+void append(std::string& bytes, const T& value) {
+  char raw[sizeof(T)];
+  std::memcpy(raw, &value, sizeof(T));
+  bytes.append(raw, sizeof(T));
+}
+
+Vec3d mean_of(const Moments& g, size_t vertex) {
+  return {g.mean(3 * vertex), g.mean(3 * vertex + 1), g.mean(3 * vertex + 2)};
+}
+
+// The mesh with its gradient (gx gy gz) and standard errors (ex ey ez) as properties of vertices.
+std::string ply_text(const Mesh& mesh, const Moments& g) {
+  std::string bytes = fmt::format("ply\nformat binary_little_endian 1.0\nelement vertex {}\n",
+                                  mesh.positions.size());
+  for (const char* name : {"x", "y", "z"}) bytes += fmt::format("property float {}\n", name);
+  for (const char* name : {"gx", "gy", "gz", "ex", "ey", "ez"})
+    bytes += fmt::format("property double {}\n", name);
+  bytes += fmt::format("element face {}\nproperty list uchar uint vertex_indices\nend_header\n",
+                       mesh.faces.size());
+  for (size_t v = 0; v < mesh.positions.size(); ++v) {
+    for (int k = 0; k < 3; ++k) append(bytes, mesh.positions[v][k]);
+    for (int k = 0; k < 3; ++k) append(bytes, g.mean(3 * v + k));
+    for (int k = 0; k < 3; ++k) append(bytes, std::sqrt(g.variance(3 * v + k)));
+  }
+  for (const FaceIndices& face : mesh.faces) {
+    append(bytes, uint8_t{3});
+    for (const uint32_t v : face) append(bytes, v);
+  }
+  return bytes;
+}
+
+// V by 3 doubles in NumPy's format, version 1.0.
+std::string npy_text(const Moments& g) {
+  std::string header =
+      fmt::format("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}, 3), }}", g.size() / 3);
+  const size_t before = 10;  // magic, version, length
+  header.append(63 - (before + header.size()) % 64, ' ');
+  header += '\n';
+  std::string bytes("\x93NUMPY\x01\x00", 8);
+  append(bytes, static_cast<uint16_t>(header.size()));
+  bytes += header;
+  for (size_t i = 0; i < g.size(); ++i) append(bytes, g.mean(i));
+  return bytes;
+}
+
+// As --wrt SHAPE.vertex_positions:FILE reads it.
+std::string field_text(const Moments& g) {
+  std::string text;
+  for (size_t v = 0; v < g.size() / 3; ++v) {
+    const Vec3d x = mean_of(g, v);
+    text += fmt::format("{:.17g} {:.17g} {:.17g}\n", x.x, x.y, x.z);
+  }
+  return text;
+}
+
+// The shape as the camera sees it, each point in the colour of the gradient along the normal: that of a
+// vertex over the area around it, so that it says the same of any mesh.
+Image picture(const Scene& scene, ShapeId shape, const Moments& g, const RayTracer& tracer) {
+  const Mesh& mesh = scene.shape(shape).mesh;
+  std::vector<Vec3d> sum(mesh.positions.size()), normal(mesh.positions.size());
+  std::vector<double> area(mesh.positions.size());
+  for (size_t v = 0; v < mesh.positions.size(); ++v) sum[mesh.weld[v]] += mean_of(g, v);
+  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+    const auto c = face_corners<double>(mesh, FaceId(f));
+    const Vec3d n = cross(c[1] - c[0], c[2] - c[0]) / 6;
+    for (const uint32_t v : mesh.faces[f]) {
+      normal[mesh.weld[v]] += n;
+      area[mesh.weld[v]] += length(n);
+    }
+  }
+  const Film& film = scene.film;
+  Image image(film.crop_width, film.crop_height, 3);
+  for (int y = 0; y < film.crop_height; ++y) {
+    for (int x = 0; x < film.crop_width; ++x) {
+      const auto ray = scene.camera.ray<double>(film.crop_x + x + 0.5, film.crop_y + y + 0.5);
+      Hit hit;
+      if (!tracer.closest({ray.origin, ray.direction, ray.t_min, ray.t_max}, hit)) continue;
+      if (hit.face.shape != shape) continue;
+      const auto c = face_corners<double>(mesh, hit.face.face);
+      const Vec3d p = ray.origin + ray.direction * hit.t;
+      const Vec3d n = cross(c[1] - c[0], c[2] - c[0]);
+      double value = 0;
+      for (int k = 0; k < 3; ++k) {
+        const Vec3d &a = c[(k + 1) % 3], &b = c[(k + 2) % 3];
+        const double weight = dot(n, cross(a - p, b - p)) / dot(n, n);
+        const uint32_t v = mesh.weld[mesh.face(hit.face.face)[k]];
+        const double size = length(normal[v]);
+        if (size > 0) value += weight * dot(sum[v], normal[v]) / (size * area[v]);
+      }
+      for (int k = 0; k < 3; ++k) image.at(x, y, k) = static_cast<float>(value);
+    }
+  }
+  return image;
+}
+
+double norm(const Moments& g) {
+  double sum = 0;
+  for (size_t i = 0; i < g.size(); ++i) sum += g.mean(i) * g.mean(i);
+  return std::sqrt(sum);
+}
+
+// Of the whole array: the root of the summed variances.
+double error_of(const Moments& g) {
+  double sum = 0;
+  for (size_t i = 0; i < g.size(); ++i) sum += g.variance(i);
+  return std::sqrt(sum);
+}
+
+// JSON has no NaN.
+json number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
+
+}  // namespace
+
+std::vector<PlannedFile> BackwardFiles::planned(const std::string& also) const {
+  std::vector<PlannedFile> files{{"-o", json}};
+  for (const Array& array : arrays) {
+    for (const std::string& file : {array.ply, array.npy, array.txt, array.png})
+      files.push_back({"-o, --wrt " + array.parameter, file});
+  }
+  files.push_back({"--json", also});
+  return files;
+}
+
+BackwardFiles plan_files(const Scene& scene, const std::vector<std::string>& parameters,
+                         const std::string& folder) {
+  const auto in_folder = [&](const std::string& name) {
+    return (std::filesystem::path(folder) / name).string();
+  };
+  BackwardFiles files;
+  files.json = in_folder("gradient.json");
+  const auto add = [&](const Parameter& parameter) {
+    if (parameter.size == 1) return;
+    for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+      if (parameter.velocities(scene, ShapeId(s)).empty()) continue;
+      files.arrays.push_back({parameter.name, ShapeId(s), in_folder(parameter.name + ".ply"),
+                              in_folder(parameter.name + ".npy"),
+                              in_folder(parameter.name + ".txt"),
+                              in_folder(parameter.name + ".png")});
+    }
+  };
+  for (const std::string& name : parameters) add(find_parameter_or_array(scene, name));
+  if (parameters.empty()) {
+    for (const Parameter& parameter : list_parameters(scene)) add(parameter);
+  }
+  return files;
+}
+
+json write_parameters(const Scene& scene, const BackwardFiles& files, const BackwardResult& result,
+                      bool quiet) {
+  const auto tracer = make_embree_tracer(scene, 1);
+  json list = json::array();
+  for (const ParameterAdjoint& p : result.parameters) {
+    if (p.shape.empty()) {
+      const double value = p.moments.mean(0), error = std::sqrt(p.moments.variance(0));
+      list.push_back(
+          {{"name", p.name}, {"unit", p.unit}, {"value", value}, {"stderr", number(error)}});
+      if (!quiet) fmt::print("{:32} {:14.6g} +- {:.2g}\n", p.name, value, error);
+      continue;
+    }
+    for (const BackwardFiles::Array& array : files.arrays) {
+      if (array.parameter != p.name) continue;
+      const Image image = picture(scene, array.shape, p.moments, *tracer);
+      const double scale = signed_scale(image);
+      write_file(array.ply, ply_text(scene.shape(array.shape).mesh, p.moments));
+      write_file(array.npy, npy_text(p.moments));
+      write_file(array.txt, field_text(p.moments));
+      write_signed_png(array.png, image, scale);
+      list.push_back({{"name", p.name},
+                      {"unit", p.unit},
+                      {"shape", p.shape},
+                      {"norm", norm(p.moments)},
+                      {"stderr", number(error_of(p.moments))},
+                      {"mesh", array.ply},
+                      {"array", array.npy},
+                      {"field", array.txt},
+                      {"picture", array.png},
+                      {"scale", scale}});
+      if (!quiet) {
+        fmt::print("{:32} {:14.6g} +- {:.2g} (length of the array), {}\n", p.name, norm(p.moments),
+                   error_of(p.moments), array.ply);
+      }
+    }
+  }
+  return list;
+}
+
+}  // namespace limn

@@ -1,0 +1,157 @@
+// `limn backward`: from a loss, or its derivative for every pixel, to the derivative for every parameter.
+#include "limn/integrators/backward.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "limn/core/error.h"
+#include "tools/limn/backward_output.h"
+#include "tools/limn/command_support.h"
+#include "tools/limn/commands.h"
+#include "tools/limn/output_files.h"
+
+namespace limn {
+namespace {
+
+using nlohmann::json;
+
+class BackwardCommand final : public Command {
+ public:
+  const char* name() const override { return "backward"; }
+  const char* description() const override {
+    return "Derivatives of a loss with respect to all parameters at once";
+  }
+
+  void add_options(CLI::App& app, bool) override {
+    add_common_options(app, common_);
+    auto* adjoint =
+        app.add_option("--adjoint", adjoint_, "Derivative of the loss for every pixel (.exr)");
+    auto* target = app.add_option("--target", target_, "Image that the loss compares with (.exr)");
+    adjoint->excludes(target);
+    app.add_option("--loss", loss_, "With --target: l2, relative-l2 or l1")->needs(target);
+    app.add_option("--wrt", options_.parameters,
+                   "Parameter, an array (SHAPE.vertex_positions) or a scalar; may be repeated "
+                   "(default: all of the scene)");
+    app.add_option("--terms", terms_, "Only these terms, as in interior,camera");
+    app.add_option("--pixels", pixels_,
+                   "Where paths go: adjoint (where the loss depends on the image) or uniform")
+        ->check(CLI::IsMember({"adjoint", "uniform"}));
+    app.add_option("--edge-samples", options_.edge_samples, "At every vertex of a path")
+        ->check(CLI::Range(1, 1 << 16));
+    app.add_option("--camera-samples", options_.camera_samples,
+                   "Points on silhouettes of the film, for each path")
+        ->check(CLI::PositiveNumber);
+    app.add_option("-o,--output", output_, "Folder to write (made if it is not there)")->required();
+    app.add_flag("--stats", stats_, "Print edges, nodes, bytes, rays by kind, where the time went");
+  }
+
+  int run(const std::string&) override {
+    const Scene scene = load_scene(common_, warnings_);
+    if (adjoint_.empty() && target_.empty()) throw InputError("give --adjoint or --target");
+    options_.terms = parse_terms(terms_);
+    options_.uniform_pixels = pixels_ == "uniform";
+    const LossKind kind = loss_kind(loss_);
+    const BackwardFiles files = plan_files(scene, options_.parameters, output_);
+    std::filesystem::create_directories(output_);
+    check_outputs(files.planned(common_.json), scene, {adjoint_.empty() ? target_ : adjoint_});
+    const RunSettings settings = make_settings(common_, scene, name());
+    LossResult loss;
+    if (target_.empty()) {
+      loss.adjoint = read_exr(adjoint_);
+    } else {
+      loss = image_loss(scene, read_exr(target_), kind, settings);
+      if (loss.spp == 0) return report_interrupted();
+      if (kind == LossKind::kL1) {
+        warnings_.add_all(
+            {"the gradient of l1 is biased where the image's noise is not small beside "
+             "its difference from the target"});
+      }
+    }
+    const BackwardResult result = backward(scene, loss.adjoint, options_, settings);
+    warnings_.add_all(result.warnings);
+    if (result.spp == 0) return report_interrupted();
+    write(scene, settings, files, loss, result);
+    return finish_status(result.non_finite, result.spp, settings.spp, "");
+  }
+
+ private:
+  static int report_interrupted() {
+    fmt::print(stderr, "interrupted before the first batch was done: nothing is written\n");
+    return kInterrupted;
+  }
+
+  void write(const Scene& scene, const RunSettings& settings, const BackwardFiles& files,
+             const LossResult& loss, const BackwardResult& result) const {
+    json report = {{"scene", scene.file},
+                   {"spp", result.spp},
+                   {"seed", settings.seed},
+                   {"threads", settings.threads},
+                   {"seconds", result.seconds},
+                   {"setup_seconds", result.setup_seconds},
+                   {"pixels", pixels_},
+                   {"warnings", warnings_.lines()},
+                   {"non_finite", result.non_finite.count}};
+    if (!target_.empty()) {
+      report["loss"] = {{"kind", loss_},
+                        {"target", target_},
+                        {"value", loss.value},
+                        {"stderr", std::isfinite(loss.error) ? json(loss.error) : json(nullptr)}};
+      if (!common_.quiet) fmt::print("{}: {:.6g} +- {:.2g}\n", loss_, loss.value, loss.error);
+    }
+    report["parameters"] = write_parameters(scene, files, result, common_.quiet);
+    if (stats_) report["stats"] = stats_json(result);
+    write_json(files.json, report.dump(2));
+    if (!common_.json.empty()) write_json(common_.json, report.dump(2));
+    if (!common_.quiet) {
+      fmt::print("{}: {} samples per pixel, {:.2f} s, of which {:.2f} s set-up\n", files.json,
+                 result.spp, result.seconds, result.setup_seconds);
+    }
+    if (stats_) print_stats(result);
+  }
+
+  static json stats_json(const BackwardResult& result) {
+    json terms = json::object();
+    for (const TermRun& term : result.terms) {
+      const TermCost& c = term.cost;
+      terms[term.name] = {{"seconds", c.seconds},         {"rays", c.rays},
+                          {"samples", c.samples},         {"no_edge", c.no_edge},
+                          {"zero_weight", c.zero_weight}, {"occluded", c.occluded},
+                          {"counted", c.counted}};
+    }
+    return {{"terms", terms},
+            {"contributions", result.contributions},
+            {"tape_bytes", result.tape_bytes},
+            {"sampler_nodes", result.stats.sampler_nodes},
+            {"sampler_bytes", result.stats.sampler_bytes}};
+  }
+
+  static void print_stats(const BackwardResult& result) {
+    for (const auto& [name, count] : result.stats.edges) fmt::print("edges {}: {}\n", name, count);
+    for (const TermRun& term : result.terms) {
+      const TermCost& c = term.cost;
+      if (c.samples == 0) continue;
+      fmt::print("{}: {} samples, {} rays, {:.3g} s of all threads\n", term.name, c.samples, c.rays,
+                 c.seconds);
+    }
+    fmt::print("{} numbers added to the gradient; the longest tape: {} bytes\n",
+               result.contributions, result.tape_bytes);
+    for (const auto& [name, seconds] : result.stats.setup) {
+      fmt::print("set-up, {}: {:.3g} s\n", name, seconds);
+    }
+  }
+
+  CommonOptions common_;
+  Warnings warnings_;
+  BackwardOptions options_;
+  std::string adjoint_, target_, output_, terms_;
+  std::string loss_ = "l2", pixels_ = "adjoint";
+  bool stats_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_backward_command() { return std::make_unique<BackwardCommand>(); }
+
+}  // namespace limn
