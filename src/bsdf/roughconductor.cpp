@@ -187,7 +187,8 @@ double read_alpha(Properties& properties) {
     }
   }
   const double alpha = properties.number(name, 0.1);
-  if (!(alpha >= 0 && alpha < kMaximumAlpha)) properties.fail(name, "the roughness must not be negative");
+  if (!(alpha >= 0 && alpha < kMaximumAlpha))
+    properties.fail(name, "the roughness must not be negative");
   return std::max(alpha, kMinimumAlpha);
 }
 
