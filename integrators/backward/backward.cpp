@@ -27,7 +27,9 @@ const ParameterAdjoint& BackwardResult::of(const std::string& name) const {
 
 namespace {
 
-constexpr const char* kNames[kAdjointTerms] = {"interior", "camera", "boundary", "shadow"};
+// AdjointTerm has the first rows of the table, in their order.
+const char* name_of(size_t term) { return term_types()[term].name; }
+
 constexpr size_t kTile = 256;  // paths, or points on the film; not tuned
 
 std::vector<Rgb<double>> pixels_of(const Scene& scene, const Image& adjoint) {
@@ -130,8 +132,10 @@ class BackwardPass {
 };
 
 void BackwardPass::select() {
-  std::vector<std::string> known(kNames, kNames + kShadow);
-  if (!parameters_.scene().delta_lights.empty()) known.emplace_back(kNames[kShadow]);
+  std::vector<std::string> known;
+  for (size_t t = 0; t < kAdjointTerms; ++t) {
+    if (term_types()[t].applies(parameters_.scene())) known.emplace_back(name_of(t));
+  }
   const auto chosen = selected_terms(known, options_.terms, parameters_.scene().file);
   for (size_t t = 0; t < known.size(); ++t) {
     computed_[t] = std::find(chosen.begin(), chosen.end(), known[t]) != chosen.end();
@@ -265,7 +269,7 @@ void BackwardPass::run_paths(const PathBatch& batch, ProgressCounter& progress,
       [&](size_t i) {
         const PixelPath path = choice_.path(batch, i);
         const auto [x, y] = position(path.pixel);
-        return NonFinite::Place{x, y, static_cast<int64_t>(path.sample), kNames[kInterior]};
+        return NonFinite::Place{x, y, static_cast<int64_t>(path.sample), name_of(kInterior)};
       });
 }
 
@@ -288,7 +292,7 @@ void BackwardPass::run_film(AdjointTerm term, const PathBatch& batch, ProgressCo
         }
       },
       [&](size_t i) {
-        return NonFinite::Place{-1, -1, static_cast<int64_t>(first + i), kNames[term]};
+        return NonFinite::Place{-1, -1, static_cast<int64_t>(first + i), name_of(term)};
       });
 }
 

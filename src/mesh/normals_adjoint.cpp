@@ -18,49 +18,67 @@ struct Faces {
   std::vector<FaceAdjoint> adjoints;
 };
 
-// The tilts that a horizon may be the largest of.
-template <class Visit>
-void for_every_tilt(const Mesh& mesh, const Faces& faces, const std::vector<double>& noise,
-                    const Visit& visit) {
-  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
-    const FaceShape<double>& shape = faces.shapes[f];
-    if (!shape.has_area) continue;
-    for (const uint32_t n : mesh.normal_ids[f]) {
-      const double sine = sine_of_tilt(mesh.normals[n], shape.normal);
-      for (const uint32_t v : mesh.faces[f]) {
-        visit(mesh.weld[v], f, n, sine, tilt_rounding(shape.rounding, noise[n]));
-      }
-    }
-  }
-}
+// The sine of the tilt of a corner's normal against its face, and how far rounding reaches.
+struct Tilt {
+  double sine = -1, rounding = 0;
+};
 
-// sine = |n x N| of a corner's normal n and a face's N.
-void pull_back_horizons(const Mesh& mesh, const std::vector<double>& at_root, Faces& faces,
-                        std::vector<Vec3d>& normals) {
+// Of each corner of each face; those of faces without area are never the largest.
+std::vector<std::array<Tilt, 3>> tilts_of(const Mesh& mesh, const Faces& faces) {
   std::vector<double> noise(mesh.normals.size());
   for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
     if (!faces.shapes[f].has_area) continue;
     for (const uint32_t n : mesh.normal_ids[f])
       noise[n] = std::max(noise[n], faces.shapes[f].rounding);
   }
+  std::vector<std::array<Tilt, 3>> tilts(mesh.faces.size());
+  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+    const FaceShape<double>& shape = faces.shapes[f];
+    if (!shape.has_area) continue;
+    for (int c = 0; c < 3; ++c) {
+      const uint32_t n = mesh.normal_ids[f][c];
+      tilts[f][c] = {sine_of_tilt(mesh.normals[n], shape.normal),
+                     tilt_rounding(shape.rounding, noise[n])};
+    }
+  }
+  return tilts;
+}
+
+// A horizon is the largest tilt of all corners of the faces around its vertex; sine = |n x N| of a
+// corner's normal n and a face's N.
+void pull_back_horizons(const Mesh& mesh, const std::vector<double>& at_root, Faces& faces,
+                        std::vector<Vec3d>& normals) {
+  const std::vector<std::array<Tilt, 3>> tilts = tilts_of(mesh, faces);
   std::vector<double> largest(at_root.size());
-  for_every_tilt(mesh, faces, noise, [&](uint32_t v, uint32_t, uint32_t, double sine, double r) {
-    largest[v] = std::max(largest[v], sine - r);
+  const auto for_every_vertex = [&](const auto& visit) {
+    for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+      if (!faces.shapes[f].has_area) continue;
+      for (const uint32_t v : mesh.faces[f]) visit(f, mesh.weld[v]);
+    }
+  };
+  for_every_vertex([&](uint32_t f, uint32_t v) {
+    for (const Tilt& tilt : tilts[f]) largest[v] = std::max(largest[v], tilt.sine - tilt.rounding);
   });
+  const auto ties_with = [&](const Tilt& tilt, uint32_t v) {
+    return tilt.sine + tilt.rounding >= largest[v];
+  };
   std::vector<uint32_t> ties(at_root.size());
-  for_every_tilt(mesh, faces, noise, [&](uint32_t v, uint32_t, uint32_t, double sine, double r) {
-    ties[v] += sine + r >= largest[v];
+  for_every_vertex([&](uint32_t f, uint32_t v) {
+    for (const Tilt& tilt : tilts[f]) ties[v] += ties_with(tilt, v);
   });
-  for_every_tilt(mesh, faces, noise,
-                 [&](uint32_t v, uint32_t f, uint32_t n, double sine, double r) {
-                   if (at_root[v] == 0 || sine + r < largest[v] || sine >= 1) return;
-                   const Vec3d across = cross(mesh.normals[n], faces.shapes[f].normal);
-                   const double size = length(across);
-                   if (size == 0) return;
-                   const Vec3d u = across * (at_root[v] / (ties[v] * size));
-                   normals[n] += cross(faces.shapes[f].normal, u);
-                   faces.adjoints[f].normal += cross(u, mesh.normals[n]);
-                 });
+  for_every_vertex([&](uint32_t f, uint32_t v) {
+    if (at_root[v] == 0) return;
+    for (int c = 0; c < 3; ++c) {
+      if (!ties_with(tilts[f][c], v) || tilts[f][c].sine >= 1) continue;
+      const uint32_t n = mesh.normal_ids[f][c];
+      const Vec3d across = cross(mesh.normals[n], faces.shapes[f].normal);
+      const double size = length(across);
+      if (size == 0) continue;
+      const Vec3d u = across * (at_root[v] / (ties[v] * size));
+      normals[n] += cross(faces.shapes[f].normal, u);
+      faces.adjoints[f].normal += cross(u, mesh.normals[n]);
+    }
+  });
 }
 
 // From normals of vertices to those of faces and their angles.

@@ -7,6 +7,7 @@
 #include "limn/core/parameter.h"
 #include "limn/integrators/backward.h"
 #include "limn/integrators/gradient.h"
+#include "limn/integrators/render.h"
 #include "support/meshes.h"
 #include "support/scenes.h"
 
@@ -164,6 +165,30 @@ TEST(Backward, AgreesInSharpShadows) {
 TEST(Backward, AgreesWhereShapesCrossAndAreCut) {
   const TempFiles files;
   expect_agreement(crossing_scene(files), 64);
+}
+
+// At the target itself both the loss and its gradient have mean zero, however noisy the images are.
+TEST(Backward, LossIsUnbiasedAtItsTarget) {
+  const TempFiles files;
+  const Scene scene = shadow_scene(files);
+  RunSettings settings;
+  settings.spp = 2048;
+  settings.threads = 2;
+  const RenderResult truth = render(scene, settings);
+  const Image target = mean_image(truth.radiance, scene.film.crop_width, scene.film.crop_height);
+  for (const char* name : {"l2", "relative-l2"}) {
+    Moments values(2);
+    BackwardOptions options;
+    options.parameters = {"clay.reflectance"};
+    settings.spp = 2;
+    for (settings.seed = 100; settings.seed < 164; ++settings.seed) {
+      const LossResult loss = image_loss(scene, target, loss_kind(name), settings);
+      const BackwardResult result = backward(scene, loss.adjoint, options, settings);
+      values.add_batch({loss.value, result.parameters[0].moments.mean(0)}, 1);
+    }
+    EXPECT_LT(std::fabs(values.mean(0)), 4.5 * std::sqrt(values.variance(0))) << name;
+    EXPECT_LT(std::fabs(values.mean(1)), 4.5 * std::sqrt(values.variance(1))) << name;
+  }
 }
 
 // Nothing changes if all shapes and the camera move together.
