@@ -29,7 +29,7 @@ class Diffuse final : public Bsdf {
   bool is_still() const override { return limn::is_still(reflectance_); }
   LobeSummary lobe() const override { return {kHemisphere, 1, max_channel(value(reflectance_))}; }
   std::vector<ParameterRef> parameters() override {
-    return {{"reflectance", {&reflectance_.r, &reflectance_.g, &reflectance_.b}}};
+    return {reflectance_parameter("reflectance", reflectance_)};
   }
   std::shared_ptr<Bsdf> clone() const override { return std::make_shared<Diffuse>(*this); }
   std::string describe() const override {

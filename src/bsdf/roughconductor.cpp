@@ -33,6 +33,7 @@ constexpr Material kMaterials[] = {
 };
 
 constexpr double kMinimumAlpha = 1e-4;  // as in Mitsuba
+constexpr double kMaximumAlpha = 1e6;
 
 // What value and density share at one pair of directions.
 template <class S>
@@ -73,8 +74,8 @@ class RoughConductor final : public Bsdf {
   }
   LobeSummary lobe() const override;
   std::vector<ParameterRef> parameters() override {
-    Rgb<Dual>& s = specular_reflectance_;
-    return {{"alpha", {&alpha_}}, {"specular_reflectance", {&s.r, &s.g, &s.b}}};
+    return {{"alpha", {&alpha_}, ParameterRef::Unit::kValue, 0, kMaximumAlpha},
+            reflectance_parameter("specular_reflectance", specular_reflectance_)};
   }
   std::shared_ptr<Bsdf> clone() const override { return std::make_shared<RoughConductor>(*this); }
   std::string describe() const override;
@@ -192,7 +193,8 @@ double read_alpha(Properties& properties) {
     }
   }
   const double alpha = properties.number(name, 0.1);
-  if (!(alpha >= 0 && alpha < 1e6)) properties.fail(name, "the roughness must not be negative");
+  if (!(alpha >= 0 && alpha < kMaximumAlpha))
+    properties.fail(name, "the roughness must not be negative");
   return std::max(alpha, kMinimumAlpha);
 }
 

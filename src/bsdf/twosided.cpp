@@ -53,7 +53,8 @@ std::vector<ParameterRef> TwoSided::parameters() {
   std::vector<ParameterRef> all;
   for (size_t i = 0; i < 2; ++i) {
     for (ParameterRef& p : sides_[i]->parameters()) {
-      all.push_back({(i == 0 ? "front." : "back.") + p.name, std::move(p.values)});
+      p.name = (i == 0 ? "front." : "back.") + p.name;
+      all.push_back(std::move(p));
     }
   }
   return all;

@@ -14,6 +14,10 @@ std::shared_ptr<Bsdf> read_twosided(Properties& properties);
 // A colour whose channels lie in [0, 1], as Mitsuba demands of reflectances.
 Rgb<double> read_reflectance(Properties& properties, const char* name, double absent);
 
+inline ParameterRef reflectance_parameter(const char* name, Rgb<Dual>& c) {
+  return {name, {&c.r, &c.g, &c.b}, ParameterRef::Unit::kValue, 0, 1};
+}
+
 inline Rgb<Dual> constant(const Rgb<double>& c) { return {c.r, c.g, c.b}; }
 
 }  // namespace limn

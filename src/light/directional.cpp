@@ -22,7 +22,7 @@ class DirectionalLight final : public DeltaLight {
   double power() const override { return luminance(value(irradiance_)); }
 
   std::vector<ParameterRef> parameters() override {
-    std::vector<ParameterRef> list{colour_parameter("irradiance", irradiance_)};
+    std::vector<ParameterRef> list{power_parameter("irradiance", irradiance_)};
     append_vector_parameters("rotate", turn_, ParameterRef::Unit::kRadians, list);
     return list;
   }

@@ -17,7 +17,7 @@ class PointLight final : public DeltaLight {
   double power() const override { return luminance(value(intensity_)); }
 
   std::vector<ParameterRef> parameters() override {
-    std::vector<ParameterRef> list{colour_parameter("intensity", intensity_)};
+    std::vector<ParameterRef> list{power_parameter("intensity", intensity_)};
     append_vector_parameters("translate", position_, ParameterRef::Unit::kLength, list);
     return list;
   }

@@ -26,9 +26,12 @@ class SpotLight final : public DeltaLight {
   double power() const override { return luminance(value(intensity_)); }
 
   std::vector<ParameterRef> parameters() override {
-    std::vector<ParameterRef> list{colour_parameter("intensity", intensity_),
-                                   {"cutoff_angle", {&cone_.cutoff}},
-                                   {"beam_width", {&cone_.beam}}};
+    std::vector<ParameterRef> list{power_parameter("intensity", intensity_),
+                                   cone_parameter("cutoff_angle", cone_.cutoff),
+                                   cone_parameter("beam_width", cone_.beam)};
+    // The beam stays narrower than the whole.
+    list[1].least = std::nextafter(cone_.beam.v, 180);
+    list[2].most = std::nextafter(cone_.cutoff.v, 0);
     append_vector_parameters("translate", position_, ParameterRef::Unit::kLength, list);
     append_vector_parameters("rotate", turn_, ParameterRef::Unit::kRadians, list);
     return list;
@@ -57,6 +60,9 @@ class SpotLight final : public DeltaLight {
     if (value(degrees) <= cone_.beam.v) return Arrival<S>{wo, full};
     const S width = as<S>(cone_.cutoff) - as<S>(cone_.beam);
     return Arrival<S>{wo, full * ((as<S>(cone_.cutoff) - degrees) / width)};
+  }
+  static ParameterRef cone_parameter(const char* name, Dual& degrees) {
+    return {name, {&degrees}, ParameterRef::Unit::kValue, 0, 180};
   }
   static double angle(double c) { return std::acos(std::clamp(c, -1.0, 1.0)); }
   static Dual angle(const Dual& c) { return acos(Dual(std::clamp(c.v, -1.0, 1.0), c.d)); }

@@ -38,8 +38,9 @@ Vec3<S> turned(const Vec3d& v, const Vec3<Dual>& angles) {
   return r;
 }
 
-inline ParameterRef colour_parameter(const char* name, Rgb<Dual>& c) {
-  return {name, {&c.r, &c.g, &c.b}};
+// What read_power() reads.
+inline ParameterRef power_parameter(const char* name, Rgb<Dual>& c) {
+  return {name, {&c.r, &c.g, &c.b}, ParameterRef::Unit::kValue, 0};
 }
 // NAME.x, NAME.y, NAME.z
 void append_vector_parameters(const char* name, Vec3<Dual>& v, ParameterRef::Unit unit,

@@ -28,22 +28,12 @@ void set_positions(Mesh& mesh, const RawMesh& raw, const Matrix4& to_world) {
   }
 }
 
-// Keeps the faces whose corners are at three distinct positions.
 void set_faces(Mesh& mesh, const RawMesh& raw, bool flip) {
-  for (size_t f = 0; f < raw.faces.size(); ++f) {
-    FaceIndices face = raw.faces[f];
-    const uint32_t a = mesh.weld[face[0]], b = mesh.weld[face[1]], c = mesh.weld[face[2]];
-    if (a == b || b == c || c == a) {
-      ++mesh.collapsed_faces;
-      continue;
-    }
-    if (flip) std::swap(face[1], face[2]);
-    mesh.faces.push_back(face);
-    if (mesh.normal_source != NormalSource::kGiven) continue;
-    FaceIndices ids = raw.normal_ids[f];
-    if (flip) std::swap(ids[1], ids[2]);
-    mesh.normal_ids.push_back(ids);
-  }
+  mesh.faces = raw.faces;
+  if (mesh.normal_source == NormalSource::kGiven) mesh.normal_ids = raw.normal_ids;
+  if (!flip) return;
+  for (FaceIndices& face : mesh.faces) std::swap(face[1], face[2]);
+  for (FaceIndices& ids : mesh.normal_ids) std::swap(ids[1], ids[2]);
 }
 
 // Returns how many faces were dropped.
@@ -91,7 +81,7 @@ void weld_needles(Mesh& mesh) {
   for (uint32_t v = 0; v < mesh.weld.size(); ++v) mesh.weld[v] = root_of(mesh, v);
 }
 
-// Faces that welded seams have closed.
+// Keeps the faces whose corners are at three distinct positions.
 void drop_collapsed(Mesh& mesh) {
   mesh.collapsed_faces += keep_faces(mesh, [&](size_t f) {
     const FaceIndices& face = mesh.faces[f];
@@ -183,6 +173,40 @@ void check_orientation(const Mesh& mesh, const SourceLocation& where,
                        : std::to_string(opposed) + " of " + std::to_string(counted) + " faces"));
 }
 
+// Welds, and leaves out what is no face: from positions, faces and ids of normals alone.
+void mend(Mesh& mesh, const SourceLocation& where, std::vector<std::string>* warnings) {
+  const std::string all = std::to_string(mesh.faces.size());
+  weld_positions(mesh);
+  drop_collapsed(mesh);
+  weld_seams(mesh);
+  weld_needles(mesh);
+  drop_collapsed(mesh);
+  if (mesh.faces.empty()) {
+    throw InputError(where, "the mesh has no faces: each of its " + all +
+                                " faces has two corners at the same position");
+  }
+  if (mesh.collapsed_faces > 0) {
+    warn(warnings, where,
+         std::to_string(mesh.collapsed_faces) + " of " + all +
+             " faces have two corners at the same position and are left out");
+  }
+  if (const size_t repeated = drop_repeated(mesh); repeated > 0) {
+    warn(warnings, where,
+         std::to_string(repeated) + " of " + all + " faces repeat another face and are left out");
+  }
+}
+
+void check_positions(const Mesh& mesh, const SourceLocation& where) {
+  for (size_t i = 0; i < mesh.positions.size(); ++i) {
+    for (int k = 0; k < 3; ++k) {
+      if (std::fabs(mesh.positions[i][k]) <= static_cast<float>(kLargestCoordinate)) continue;
+      throw InputError(where, "vertex " + std::to_string(i) +
+                                  " (counted from 0) has a coordinate that is not finite or "
+                                  "beyond 2e12");
+    }
+  }
+}
+
 }  // namespace
 
 Mesh build_mesh(const RawMesh& raw, const MeshOptions& options,
@@ -194,26 +218,8 @@ Mesh build_mesh(const RawMesh& raw, const MeshOptions& options,
   if (raw.positions.empty()) throw InputError(raw.where, "the mesh has no vertices");
   if (raw.faces.empty()) throw InputError(raw.where, "the mesh has no faces");
   set_positions(mesh, raw, options.to_world);
-  weld_positions(mesh);
   set_faces(mesh, raw, options.flip_normals);
-  weld_seams(mesh);
-  weld_needles(mesh);
-  drop_collapsed(mesh);
-  if (mesh.faces.empty()) {
-    throw InputError(raw.where, "the mesh has no faces: each of its " +
-                                    std::to_string(raw.faces.size()) +
-                                    " faces has two corners at the same position");
-  }
-  if (mesh.collapsed_faces > 0) {
-    warn(warnings, raw.where,
-         std::to_string(mesh.collapsed_faces) + " of " + std::to_string(raw.faces.size()) +
-             " faces have two corners at the same position and are left out");
-  }
-  if (const size_t repeated = drop_repeated(mesh); repeated > 0) {
-    warn(warnings, raw.where,
-         std::to_string(repeated) + " of " + std::to_string(raw.faces.size()) +
-             " faces repeat another face and are left out");
-  }
+  mend(mesh, raw.where, warnings);
   if (mesh.normal_source == NormalSource::kGiven) {
     set_given_normals(mesh, raw, options, warnings);
     check_orientation(mesh, raw.where, warnings);
@@ -227,6 +233,39 @@ Mesh build_mesh(const RawMesh& raw, const MeshOptions& options,
              "says nothing of the others");
   }
   return mesh;
+}
+
+Mesh make_mesh(std::vector<Vec3f> positions, std::vector<FaceIndices> faces, bool face_normals,
+               const SourceLocation& where, std::vector<std::string>* warnings) {
+  if (positions.empty()) throw InputError(where, "the mesh has no vertices");
+  if (faces.empty()) throw InputError(where, "the mesh has no faces");
+  for (size_t f = 0; f < faces.size(); ++f) {
+    const uint32_t largest = *std::max_element(faces[f].begin(), faces[f].end());
+    if (largest < positions.size()) continue;
+    throw InputError(where, "face " + std::to_string(f) + " (counted from 0) names vertex " +
+                                std::to_string(largest) + " of " +
+                                std::to_string(positions.size()));
+  }
+  Mesh mesh;
+  mesh.normal_source = face_normals ? NormalSource::kFace : NormalSource::kComputed;
+  mesh.faces = std::move(faces);
+  return moved_mesh(mesh, std::move(positions), where, warnings);
+}
+
+Mesh moved_mesh(const Mesh& mesh, std::vector<Vec3f> positions, const SourceLocation& where,
+                std::vector<std::string>* warnings) {
+  Mesh moved;
+  moved.normal_source = mesh.normal_source;
+  moved.positions = std::move(positions);
+  moved.faces = mesh.faces;
+  if (mesh.normal_source == NormalSource::kGiven) {
+    moved.normals = mesh.normals;
+    moved.normal_ids = mesh.normal_ids;
+  }
+  check_positions(moved, where);
+  mend(moved, where, warnings);
+  update_shading_normals(moved);
+  return moved;
 }
 
 }  // namespace limn

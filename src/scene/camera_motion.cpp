@@ -1,5 +1,7 @@
 // Motions of the camera.
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "src/scene/motion.h"
 #include "src/scene/motion_lists.h"
@@ -16,6 +18,14 @@ class CameraTranslation final : public Motion {
   }
   void move(Scene& scene, double step, size_t) const override {
     scene.camera.origin[axis_].v += step;
+  }
+  std::vector<double> numbers(const Scene& scene) const override {
+    return {scene.camera.origin[axis_].v};
+  }
+  void assign(Scene& scene, const std::string& name, const std::vector<double>& value,
+              std::vector<std::string>*) const override {
+    check_numbers(scene, name, value, 1, -kLargestCoordinate, kLargestCoordinate);
+    scene.camera.origin[axis_].v = value[0];
   }
 
  private:
@@ -50,6 +60,14 @@ class FieldOfView final : public Motion {
  public:
   void seed(Scene& scene, int lane, size_t) const override { scene.camera.fov.d[lane] += 1; }
   void move(Scene& scene, double step, size_t) const override { scene.camera.fov.v += step; }
+  std::vector<double> numbers(const Scene& scene) const override { return {scene.camera.fov.v}; }
+  void assign(Scene& scene, const std::string& name, const std::vector<double>& value,
+              std::vector<std::string>*) const override {
+    // Between 0 and 180 degrees, neither included.
+    check_numbers(scene, name, value, 1, std::numeric_limits<double>::min(),
+                  std::nextafter(180.0, 0.0));
+    scene.camera.fov.v = value[0];
+  }
 };
 
 }  // namespace

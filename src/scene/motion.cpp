@@ -1,9 +1,19 @@
 // What most motions have in common: they move no shape and are no arrays.
 #include "src/scene/motion.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 
 namespace limn {
+
+std::vector<double> Motion::numbers(const Scene&) const { return {}; }
+
+void Motion::assign(Scene& scene, const std::string& name, const std::vector<double>&,
+                    std::vector<std::string>*) const {
+  throw InputError({scene.file}, "parameter \"" + name +
+                                     "\" moves things from where they are and has no value to set");
+}
 
 std::vector<Vec3d> Motion::velocities(const Scene&, ShapeId, size_t) const { return {}; }
 
@@ -12,6 +22,22 @@ std::optional<Parameter> Motion::part(const Scene&, const Parameter&, const std:
 }
 
 std::string Motion::parts(const std::string& name) const { return name; }
+
+void check_numbers(const Scene& scene, const std::string& name, const std::vector<double>& value,
+                   size_t count, double least, double most) {
+  if (value.size() != count) {
+    throw InputError({scene.file}, fmt::format("parameter \"{}\" holds {} number{}, not {}", name,
+                                               count, count == 1 ? "" : "s", value.size()));
+  }
+  for (const double v : value) {
+    if (std::isfinite(v) && v >= least && v <= most) continue;
+    const bool bounded = std::isfinite(least) || std::isfinite(most);
+    throw InputError(
+        {scene.file},
+        fmt::format("parameter \"{}\" cannot be {:g}: it must be finite{}", name, v,
+                    bounded ? fmt::format(" and lie in [{:g}, {:g}]", least, most) : ""));
+  }
+}
 
 Vec3d unit_vector(int axis) {
   Vec3d v;

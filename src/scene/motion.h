@@ -15,6 +15,10 @@ class Motion {
   // See Parameter.
   virtual void seed(Scene& scene, int lane, size_t component) const = 0;
   virtual void move(Scene& scene, double step, size_t component) const = 0;
+  virtual std::vector<double> numbers(const Scene& scene) const;
+  // By default InputError: there are no numbers.
+  virtual void assign(Scene& scene, const std::string& name, const std::vector<double>& value,
+                      std::vector<std::string>* warnings) const;
   virtual std::vector<Vec3d> velocities(const Scene& scene, ShapeId shape, size_t component) const;
 
   // The part of an array whose name continues the array's with `rest` (":FILE", ".7.x"); nothing if
@@ -24,6 +28,10 @@ class Motion {
   // How to name a part of the array called `name`, for messages.
   virtual std::string parts(const std::string& name) const;
 };
+
+// InputError unless there are `count` numbers, all within the bounds.
+void check_numbers(const Scene& scene, const std::string& name, const std::vector<double>& value,
+                   size_t count, double least, double most);
 
 // Coordinate axis 0 to 2, and v turned about it by `angle` [radians].
 Vec3d unit_vector(int axis);

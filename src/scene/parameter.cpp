@@ -44,7 +44,7 @@ size_t edit_distance(const std::string& a, const std::string& b) {
     message += "; " + std::to_string(count) + " of " + std::to_string(scene.shapes.size()) +
                " shapes have no id and cannot be named";
   }
-  throw InputError({scene.file}, message);
+  throw UnknownParameter({scene.file}, message);
 }
 
 }  // namespace
@@ -61,6 +61,18 @@ Scene Parameter::moved(const Scene& scene, double step, size_t component) const 
   Scene copy = deep_copy(scene);
   motion->move(copy, step, component);
   return copy;
+}
+
+void Parameter::move(Scene& scene, double step, size_t component) const {
+  CHECK_LT(component, size);
+  motion->move(scene, step, component);
+}
+
+std::vector<double> Parameter::value(const Scene& scene) const { return motion->numbers(scene); }
+
+void Parameter::assign(Scene& scene, const std::vector<double>& value,
+                       std::vector<std::string>* warnings) const {
+  motion->assign(scene, name, value, warnings);
 }
 
 std::vector<Vec3d> Parameter::velocities(const Scene& scene, ShapeId shape,

@@ -31,4 +31,12 @@ Scene deep_copy(const Scene& scene) {
   return copy;
 }
 
+void set_mesh(Scene& scene, ShapeId shape, std::vector<Vec3f> positions,
+              std::vector<FaceIndices> faces, std::vector<std::string>* warnings) {
+  Shape& changed = scene.shapes[shape.index()];
+  changed.mesh =
+      make_mesh(std::move(positions), std::move(faces),
+                changed.mesh.normal_source == NormalSource::kFace, changed.where, warnings);
+}
+
 }  // namespace limn

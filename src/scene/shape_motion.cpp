@@ -182,6 +182,24 @@ class VertexArray final : public ShapeMotion {
     if (rest[0] == '.') return component(scene, whole, rest.substr(1));
     return std::nullopt;
   }
+  std::vector<double> numbers(const Scene& scene) const override {
+    std::vector<double> all;
+    for (const Vec3f& p : scene.shape(shape_).mesh.positions) {
+      for (int k = 0; k < 3; ++k) all.push_back(static_cast<double>(p[k]));
+    }
+    return all;
+  }
+  void assign(Scene& scene, const std::string& name, const std::vector<double>& value,
+              std::vector<std::string>* warnings) const override {
+    Mesh& mesh = scene.shapes[shape_.index()].mesh;
+    check_numbers(scene, name, value, 3 * mesh.positions.size(), -kLargestCoordinate,
+                  kLargestCoordinate);
+    std::vector<Vec3f> positions;
+    for (size_t i = 0; i < value.size(); i += 3) {
+      positions.push_back(cast<float>(Vec3d{value[i], value[i + 1], value[i + 2]}));
+    }
+    mesh = moved_mesh(mesh, std::move(positions), scene.shape(shape_).where, warnings);
+  }
   std::string parts(const std::string& name) const override {
     return "\"" + name + ":FILE\" for a field of vectors, \"" + name + ".0.x\" for one number";
   }

@@ -11,16 +11,30 @@ namespace limn {
 namespace {
 
 // The values in any copy of the scene: one number, or three channels that grow together (grey).
-using Values = std::function<std::vector<Dual*>(Scene&)>;
+using Values = std::function<ParameterRef(Scene&)>;
 
 class ValueMotion final : public Motion {
  public:
   explicit ValueMotion(Values values) : values_(std::move(values)) {}
   void seed(Scene& scene, int lane, size_t) const override {
-    for (Dual* v : values_(scene)) v->d[lane] += 1;
+    for (Dual* v : values_(scene).values) v->d[lane] += 1;
   }
   void move(Scene& scene, double step, size_t) const override {
-    for (Dual* v : values_(scene)) v->v += step;
+    for (Dual* v : values_(scene).values) v->v += step;
+  }
+  std::vector<double> numbers(const Scene& scene) const override {
+    std::vector<double> all;
+    // Only read: a ParameterRef of a scene that cannot change would be a second type.
+    for (const Dual* v : values_(const_cast<Scene&>(scene)).values) all.push_back(v->v);
+    return all;
+  }
+  void assign(Scene& scene, const std::string& name, const std::vector<double>& value,
+              std::vector<std::string>*) const override {
+    const ParameterRef here = values_(scene);
+    std::vector<double> numbers = value;
+    if (numbers.size() == 1) numbers.resize(here.values.size(), numbers[0]);
+    check_numbers(scene, name, numbers, here.values.size(), here.least, here.most);
+    for (size_t k = 0; k < numbers.size(); ++k) here.values[k]->v = numbers[k];
   }
 
  private:
@@ -51,7 +65,7 @@ void add_values(const std::string& id, const std::vector<ParameterRef>& values, 
     std::vector<double> now;
     for (const Dual* v : values[k].values) now.push_back(v->v);
     Parameter p = value_parameter(id + "." + values[k].name, now, [owner, k](Scene& scene) {
-      return owner(scene)->parameters()[k].values;
+      return owner(scene)->parameters()[k];
     });
     set_unit(values[k].unit, size, p);
     list.push_back(p);
@@ -76,7 +90,8 @@ void add_emitter_parameters(const Scene& scene, std::vector<Parameter>& list) {
     list.push_back(
         value_parameter(shape.emitter_id + ".radiance", {c.r, c.g, c.b}, [i](Scene& copy) {
           Rgb<Dual>& radiance = copy.shapes[i].radiance;
-          return std::vector<Dual*>{&radiance.r, &radiance.g, &radiance.b};
+          return ParameterRef{
+              "radiance", {&radiance.r, &radiance.g, &radiance.b}, ParameterRef::Unit::kValue, 0};
         }));
   }
   if (scene.environment && !scene.environment_id.empty()) {

@@ -174,8 +174,9 @@ class Describer {
 }  // namespace
 
 SceneDescription describe_scene(const std::string& file,
-                                const std::map<std::string, std::string>& defines) {
-  return Describer().describe(load_scene_tree(file, defines), file);
+                                const std::map<std::string, std::string>& defines,
+                                const std::string* text) {
+  return Describer().describe(load_scene_tree(file, defines, text), file);
 }
 
 }  // namespace limn

@@ -50,8 +50,9 @@ struct SceneDescription {
 };
 
 // Every reference is resolved. InputError for unknown elements, attributes and references, and for
-// duplicate ids and properties.
+// duplicate ids and properties. text: see load_scene_tree().
 SceneDescription describe_scene(const std::string& file,
-                                const std::map<std::string, std::string>& defines);
+                                const std::map<std::string, std::string>& defines,
+                                const std::string* text);
 
 }  // namespace limn

@@ -36,8 +36,8 @@ class TreeLoader {
   explicit TreeLoader(const std::map<std::string, std::string>& defines)
       : defines_(defines), values_(defines.begin(), defines.end()) {}
 
-  SceneTree load(const std::string& file) {
-    tree_.root = parse_file(file, {file});
+  SceneTree load(const std::string& file, const std::string* text) {
+    tree_.root = text ? parse_xml(file, *text) : parse_file(file, {file});
     expand(tree_.root, 0, true);
     check_defines(file);
     return std::move(tree_);
@@ -216,8 +216,9 @@ std::string find_input_file(const std::string& name, const std::string& mentione
 }
 
 SceneTree load_scene_tree(const std::string& file,
-                          const std::map<std::string, std::string>& defines) {
-  return TreeLoader(defines).load(file);
+                          const std::map<std::string, std::string>& defines,
+                          const std::string* text) {
+  return TreeLoader(defines).load(file, text);
 }
 
 }  // namespace limn

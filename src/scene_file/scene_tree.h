@@ -17,8 +17,10 @@ struct SceneTree {
 
 // `defines` override <default>; one that nothing refers to is an error. An included file has the
 // root <scene>, whose content takes the include's place, or any other element.
+// text: stands for the content of `file`, which need not be there; null: it is read.
 SceneTree load_scene_tree(const std::string& file,
-                          const std::map<std::string, std::string>& defines);
+                          const std::map<std::string, std::string>& defines,
+                          const std::string* text);
 
 // The first of these that exists: `name` itself if absolute; in the directory of the file that
 // mentions it; in the search path. "" if none does.

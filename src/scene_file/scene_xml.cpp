@@ -1,5 +1,6 @@
 // From the description of a scene to the scene.
 #include <cmath>
+#include <filesystem>
 #include <stdexcept>
 
 #include "limn/core/face_copies.h"
@@ -222,7 +223,15 @@ class SceneBuilder {
 
 Scene read_scene(const std::string& file, const std::map<std::string, std::string>& defines,
                  std::vector<std::string>* warnings) {
-  const SceneDescription description = describe_scene(file, defines);
+  const SceneDescription description = describe_scene(file, defines, nullptr);
+  return SceneBuilder(description, warnings).build();
+}
+
+Scene read_scene_text(const std::string& text, const std::string& folder,
+                      const std::map<std::string, std::string>& defines,
+                      std::vector<std::string>* warnings) {
+  const std::string file = (std::filesystem::path(folder) / "string").string();
+  const SceneDescription description = describe_scene(file, defines, &text);
   return SceneBuilder(description, warnings).build();
 }
 

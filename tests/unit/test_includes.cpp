@@ -195,6 +195,19 @@ TEST(Includes, OneDoorPerThirdParty) {
   }
 }
 
+// The Python module is nanobind's door, and sees what any program outside sees.
+TEST(Includes, PythonBindsContractsAlone) {
+  for (const char* folder : {"include", "src", "edgetree", "integrators", "tools", "tests"}) {
+    for (const Include& include : includes_below(folder)) {
+      const bool bindings = include.file.starts_with("tools/python/");
+      EXPECT_TRUE(bindings || !include.path.starts_with("nanobind")) << include.file;
+      if (!bindings || include.angled) continue;
+      EXPECT_TRUE(include.path.starts_with("limn/") || include.path == "tools/python/bindings.h")
+          << include.file << " includes " << include.path;
+    }
+  }
+}
+
 TEST(Includes, HeadersAreGuardedByPragmaOnce) {
   const fs::path root(LIMN_SOURCE_DIR);
   for (const char* folder : {"include", "src", "edgetree", "integrators", "tools", "tests"}) {

@@ -120,6 +120,61 @@ TEST_F(Parameters, DerivativesMatchMoves) {
   expect_derivative(scene_, "tent.vertex_positions.4.z");  // a copy: its twin moves along
 }
 
+// Of all numbers of two scenes.
+void expect_same(const Scene& a, const Scene& b, const std::string& name) {
+  const std::vector<Dual> left = numbers(a), right = numbers(b);
+  ASSERT_EQ(left.size(), right.size());
+  for (size_t i = 0; i < left.size(); ++i) EXPECT_EQ(left[i].v, right[i].v) << name << " " << i;
+}
+
+// Assigning what a value would be after a move is that move; values of arrays, too.
+TEST_F(Parameters, AssigningIsMoving) {
+  int assigned = 0;
+  for (const Parameter& p : list_parameters(scene_)) {
+    std::vector<double> value = p.value(scene_);
+    Scene other = deep_copy(scene_);
+    if (value.empty()) {
+      EXPECT_THROW(p.assign(other, {0.5}), InputError) << p.name;
+      continue;
+    }
+    ++assigned;
+    p.assign(other, value);
+    expect_same(other, scene_, p.name);
+    // The last vertex has no twin.
+    const size_t component = p.size - 1;
+    const double step = -0x1p-6;
+    for (size_t i = component; i < value.size(); ++i) {
+      value[i] += step;
+      if (p.size > 1) value[i] = static_cast<double>(static_cast<float>(value[i]));
+    }
+    p.assign(other, value);
+    EXPECT_EQ(p.value(other), value) << p.name;
+    expect_same(other, p.moved(scene_, step, component), p.name);
+    value.push_back(0);
+    EXPECT_THROW(p.assign(other, value), InputError) << p.name;
+    EXPECT_THROW(p.assign(other, {std::nan("")}), InputError) << p.name;
+  }
+  EXPECT_GT(assigned, 20);
+}
+
+// What the reader of a scene refuses.
+TEST_F(Parameters, ValuesKeepTheirBounds) {
+  for (const auto& [name, value] :
+       std::map<std::string, double>{{"metal.alpha", -0.1},
+                                     {"metal.specular_reflectance", 1.1},
+                                     {"lamp.radiance", -1},
+                                     {"bulb.intensity", -1},
+                                     {"sun.irradiance", -1},
+                                     {"torch.cutoff_angle", 10},
+                                     {"torch.beam_width", 60},
+                                     {"sensor.fov", 180}}) {
+    const Parameter p = find_parameter(scene_, name);
+    const std::vector<double> before = p.value(scene_);
+    EXPECT_THROW(p.assign(scene_, {value}), InputError) << name;
+    EXPECT_EQ(p.value(scene_), before) << name;
+  }
+}
+
 TEST_F(Parameters, AreListed) {
   std::vector<std::string> names;
   for (const Parameter& p : list_parameters(scene_)) {

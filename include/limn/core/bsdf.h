@@ -2,6 +2,7 @@
 // Scattering at a surface, seen from the front. All BSDFs are isotropic and opaque, so they are
 // functions of world-space directions and the shading normal alone: no tangent frame enters, and
 // nothing jumps where a frame would.
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -23,6 +24,9 @@ struct ParameterRef {
   std::string name;
   std::vector<Dual*> values;  // one, or the three channels
   enum class Unit { kValue, kLength, kRadians } unit = Unit::kValue;
+  // What each value may be, both ends included: what the reader of scenes takes.
+  double least = -std::numeric_limits<double>::infinity();
+  double most = std::numeric_limits<double>::infinity();
 };
 
 // A value and the density of `sample` at one pair of directions.

@@ -24,4 +24,10 @@ class InputError : public std::runtime_error {
   explicit InputError(const std::string& message);
 };
 
+// A name that no parameter of the scene has; what() lists the nearest.
+class UnknownParameter : public InputError {
+ public:
+  using InputError::InputError;
+};
+
 }  // namespace limn

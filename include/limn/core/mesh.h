@@ -117,6 +117,18 @@ inline bool has_area(const Mesh& mesh, const FaceIndices& face) {
   return twice_area > 0x1.0p-44 * size * size * longest;
 }
 
+// A mesh from arrays, mended as one from a file is: vertices at one position are welded, faces that
+// repeat or have two corners at one position are left out, and `warnings` (may be null) says so.
+// face_normals: flat shading, else normals are computed. InputError (at `where`) for positions (V by
+// 3, scene units) that are not finite or beyond kLargestCoordinate, indices that are not below V, and
+// where no face is left.
+Mesh make_mesh(std::vector<Vec3f> positions, std::vector<FaceIndices> faces, bool face_normals,
+               const SourceLocation& where, std::vector<std::string>* warnings);
+// The same from new positions and the faces of `mesh`; normals of a file stay as they are. As many
+// positions as the mesh has. Derivatives are zero.
+Mesh moved_mesh(const Mesh& mesh, std::vector<Vec3f> positions, const SourceLocation& where,
+                std::vector<std::string>* warnings);
+
 // Bounds of all positions referenced by faces.
 Bounds bounds_of(const Mesh& mesh);
 

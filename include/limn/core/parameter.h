@@ -41,6 +41,20 @@ struct Parameter {
   // rotate). Tangents are kept as they are.
   Scene moved(const Scene& scene, double step, size_t component = 0) const;
 
+  // The same in place.
+  void move(Scene& scene, double step, size_t component = 0) const;
+
+  // The numbers themselves, where the scene holds them: one, the three channels of a colour, or V by
+  // 3 coordinates. Empty for what only moves things from where they are: rotations, translations and
+  // scales of shapes, fields, single coordinates.
+  std::vector<double> value(const Scene& scene) const;
+  // Sets them in place, with all that depends on them; one number sets all channels of a colour.
+  // Positions make the mesh that a file with them would, see moved_mesh(). InputError if there are
+  // none, for another number of them, and for values that the reader of scenes would not take; the
+  // scene is then as it was.
+  void assign(Scene& scene, const std::vector<double>& value,
+              std::vector<std::string>* warnings = nullptr) const;
+
   // V by 3: the derivative of the positions of a shape's vertices; empty where the parameter moves
   // none of that shape.
   std::vector<Vec3d> velocities(const Scene& scene, ShapeId shape, size_t component = 0) const;
@@ -50,8 +64,8 @@ struct Parameter {
 // not listed apart.
 std::vector<Parameter> list_parameters(const Scene& scene);
 
-// The scalar called `name`. InputError that lists the nearest known names if there is none, or that
-// says how to name a part if it is an array; also if FILE cannot be read or does not fit the mesh.
+// The scalar called `name`. UnknownParameter that lists the nearest known names if there is none; InputError
+// that says how to name a part if it is an array; also if FILE cannot be read or does not fit the mesh.
 Parameter find_parameter(const Scene& scene, const std::string& name);
 
 // The same, arrays included.

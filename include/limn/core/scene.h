@@ -62,5 +62,15 @@ Scene deep_copy(const Scene& scene);
 // out of a mesh) are appended to `warnings`.
 Scene read_scene(const std::string& file, const std::map<std::string, std::string>& defines,
                  std::vector<std::string>* warnings);
+// The same from the XML itself. Files that it names are looked for in `folder` ("": where the
+// program runs); the file of places in errors is FOLDER/string.
+Scene read_scene_text(const std::string& text, const std::string& folder,
+                      const std::map<std::string, std::string>& defines,
+                      std::vector<std::string>* warnings);
+
+// Gives a shape another mesh: positions (V by 3, scene units) and faces (F by 3, into them). Flat
+// shapes stay flat, all others get computed normals. Warnings and InputError as make_mesh().
+void set_mesh(Scene& scene, ShapeId shape, std::vector<Vec3f> positions,
+              std::vector<FaceIndices> faces, std::vector<std::string>* warnings);
 
 }  // namespace limn

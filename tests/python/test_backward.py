@@ -1,0 +1,156 @@
+"""Reverse mode from Python: against forward mode, with its bits, and for PyTorch."""
+
+import json
+import os
+import subprocess
+
+import limn
+import numpy as np
+import pytest
+from test_scene import same
+
+POSITIONS = "tent.vertex_positions"
+
+
+@pytest.fixture
+def adjoint(scene):
+    return np.random.default_rng(3).normal(size=(scene.height, scene.width, 3)).astype(np.float32)
+
+
+# Two sides, 5 sigma: 6e-7 for each number.
+def test_reverse_dotted_with_a_motion_is_forward(scene, adjoint):
+    names = ["clay.reflectance", "lamp.radiance", "sensor.fov", "ball.translate.x", "tent.scale"]
+    reverse = limn.backward(scene, adjoint, spp=64, seed=1)
+    assert list(reverse) == list(scene.parameters)
+    forward = limn.gradient(scene, [*names, "tent.translate.y"], spp=64, seed=2)
+
+    def compare(name, value, error):
+        expected = np.vdot(adjoint, forward[name].value)
+        # Pixels of one run are as good as independent; samples of paths are.
+        spread = np.hypot(error, np.linalg.norm(adjoint * forward[name].stderr))
+        assert spread > 0
+        assert abs(value - expected) < 5 * spread, name
+
+    for name in names:
+        assert reverse[name].value.shape == () and reverse[name].value.dtype == np.float64
+        compare(name, float(reverse[name].value), float(reverse[name].stderr))
+    moved = reverse[POSITIONS]
+    assert moved.value.shape == (6, 3) and moved.stderr.shape == (6, 3)
+    assert np.array_equal(moved.value[0], moved.value[4])  # copies share
+    # The whole shape's motion is a parameter of its own, with the same samples.
+    whole = reverse["tent.translate.y"]
+    assert moved.value[:, 1].sum() == pytest.approx(float(whole.value), rel=1e-9)
+    compare("tent.translate.y", float(whole.value), float(whole.stderr))
+
+
+def run_program(folder, *words):
+    """The output's folder, and what is in its report."""
+    output = folder / "backward"
+    subprocess.run([os.environ["LIMN_PROGRAM"], "backward", str(folder / "scene.xml"), "--quiet",
+                    "-o", str(output), *words], check=True)
+    return output, json.loads((output / "gradient.json").read_text())
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_it_has_the_programs_bits(folder, scene, adjoint, threads):
+    limn.write_exr(folder / "adjoint.exr", adjoint)
+    output, told = run_program(folder, "--adjoint", str(folder / "adjoint.exr"), "--spp", "4",
+                               "--seed", "9")
+    found = limn.backward(scene, adjoint, spp=4, seed=9, threads=threads)
+    for row in told["parameters"]:
+        estimate = found[row["name"]]
+        if "array" not in row:
+            assert float(estimate.value) == row["value"] and float(estimate.stderr) == row["stderr"]
+    assert np.array_equal(np.load(output / f"{POSITIONS}.npy"), found[POSITIONS].value)
+    # With a loss, and half of what can be asked for.
+    target = np.asarray(limn.render(scene, spp=16, seed=4)) * np.float32(1.5)
+    limn.write_exr(folder / "target.exr", target)
+    output, told = run_program(folder, "--target", str(folder / "target.exr"), "--loss",
+                               "relative-l2", "--spp", "4", "--wrt", POSITIONS, "--terms",
+                               "interior,boundary", "--pixels", "uniform", "--edge-samples", "2")
+    loss = limn.image_loss(scene, target, "relative-l2", spp=4, threads=threads)
+    assert (loss.value, loss.stderr) == (told["loss"]["value"], told["loss"]["stderr"])
+    found = limn.backward(scene, loss.adjoint, POSITIONS, spp=4, terms=["interior", "boundary"],
+                          uniform_pixels=True, edge_samples=2, threads=threads)
+    assert np.array_equal(np.load(output / f"{POSITIONS}.npy"), found[POSITIONS].value)
+
+
+def test_a_step_against_the_gradient_lowers_the_loss(scene):
+    target = limn.render(scene, spp=256, seed=11)
+    scene.move("tent.translate.y", 0.2)
+    loss = limn.image_loss(scene, target, spp=32, seed=1)
+    assert loss.value > 5 * loss.stderr > 0
+    assert loss.adjoint.shape == (12, 16, 3)
+    g = limn.backward(scene, loss.adjoint, POSITIONS, spp=32, seed=1)[POSITIONS].value
+    before = scene[POSITIONS]
+    scene[POSITIONS] = before - 0.2 * g / np.abs(g).max()
+    after = limn.image_loss(scene, target, spp=32, seed=2)
+    assert after.value + 3 * after.stderr < loss.value - 3 * loss.stderr
+
+
+@pytest.mark.parametrize("call, text", [
+    (lambda s, a: limn.backward(s, a[:5]), "adjoint"),
+    (lambda s, a: limn.backward(s, a * np.nan), "adjoint"),
+    (lambda s, a: limn.backward(s, a, terms=["none"]), "term"),
+    (lambda s, a: limn.image_loss(s, a[:5]), "target"),
+    (lambda s, a: limn.image_loss(s, a, "l3"), "known: "),
+])
+def test_what_is_refused(scene, adjoint, call, text):
+    with pytest.raises(limn.InputError, match=text):
+        call(scene, adjoint)
+
+
+def test_unknown_names_are_key_errors(scene, adjoint):
+    with pytest.raises(KeyError, match="nearest"):
+        limn.backward(scene, adjoint, "tent.vertices")
+
+
+# PyTorch is not among what tests install.
+def torch_and_bridge():
+    torch = pytest.importorskip("torch")
+    import limn.torch
+
+    return torch, limn.torch
+
+
+def test_torch_gets_what_backward_finds(scene, adjoint):
+    torch, bridge = torch_and_bridge()
+    values = {POSITIONS: torch.tensor(scene[POSITIONS] + 0.05, requires_grad=True),
+              "clay.reflectance": torch.tensor([0.6, 0.5, 0.4], dtype=torch.float64,
+                                               requires_grad=True),
+              "metal.alpha": torch.tensor(0.3)}
+    before = limn.render(scene, spp=2).value
+    image = bridge.render(scene, values, spp=2, spp_grad=8, seed=4)
+    assert same(limn.render(scene, spp=2).value, before)
+    assert image.shape == (12, 16, 3) and image.dtype == torch.float32
+    (image * torch.from_numpy(adjoint)).sum().backward()
+    for name, tensor in values.items():
+        scene[name] = tensor.detach().numpy()
+    assert same(image.detach().numpy(), limn.render(scene, spp=2, seed=8).value)
+    expected = limn.backward(scene, adjoint, POSITIONS, spp=8, seed=9)[POSITIONS]
+    found = values[POSITIONS].grad
+    assert found.dtype == torch.float32
+    assert np.array_equal(found.numpy(), expected.value.astype(np.float32))
+    channels = values["clay.reflectance"].grad
+    assert channels.dtype == torch.float64 and channels.shape == (3,)
+    # Channels never mix: channel c of the forward image is what channel c of the colour does.
+    forward = limn.gradient(scene, "clay.reflectance", spp=64, seed=10)["clay.reflectance"]
+    for c in range(3):
+        one = limn.backward(scene, adjoint * np.eye(3)[c], "clay.reflectance", spp=8, seed=9)
+        assert float(channels[c]) == float(one["clay.reflectance"].value)
+        error = np.hypot(float(one["clay.reflectance"].stderr),
+                         np.linalg.norm((adjoint * forward.stderr)[..., c]))
+        expected = np.vdot(adjoint[..., c], forward.value[..., c])
+        assert abs(float(channels[c]) - expected) < 5 * error
+    assert values["metal.alpha"].grad is None
+
+
+def test_torch_refuses_motions_and_second_derivatives(scene):
+    torch, bridge = torch_and_bridge()
+    with pytest.raises(limn.InputError, match="has no value to give"):
+        bridge.render(scene, {"tent.rotate.x": torch.tensor(0.1)})
+    fov = torch.tensor(41.0, dtype=torch.float64, requires_grad=True)
+    image = bridge.render(scene, {"sensor.fov": fov}, spp=2)
+    slope, = torch.autograd.grad((image**2).sum(), fov, create_graph=True)
+    with pytest.raises(RuntimeError, match="differentiate twice"):
+        slope.backward()

@@ -1,0 +1,88 @@
+"""The module as such: names, documentation, stubs, examples, silence."""
+
+import ast
+import glob
+import inspect
+import json
+import os
+import subprocess
+import sys
+
+import limn
+import pytest
+from conftest import ROOT
+
+EXAMPLES = os.path.join(ROOT, "tools", "python", "examples")
+STUB = os.path.join(os.path.dirname(limn.__file__), "_limn.pyi")
+
+
+def public():
+    """(name, object) of all that users see, members of classes included."""
+    for name in limn.__all__:
+        thing = getattr(limn, name)
+        yield name, thing
+        if inspect.isclass(thing) and not issubclass(thing, Exception):
+            for member in (m for m in vars(thing) if not m.startswith("_")):
+                yield f"{name}.{member}", getattr(thing, member)
+
+
+def test_every_public_name_is_documented():
+    # What a mapping has needs no words of its own.
+    known = {"Parameters.keys", "Parameters.values", "Parameters.items"}
+    bare = [name for name, thing in public() if name not in known and not thing.__doc__]
+    assert bare == []
+
+
+def test_the_stub_has_every_public_name():
+    with open(STUB, encoding="utf-8") as stream:
+        tree = ast.parse(stream.read())
+    found = set()
+    for node in tree.body:
+        if isinstance(node, (ast.ClassDef, ast.FunctionDef)):
+            found.add(node.name)
+        if isinstance(node, ast.ClassDef):
+            found |= {f"{node.name}.{m.name}" for m in node.body if isinstance(m, ast.FunctionDef)}
+    errors = {"InputError", "NonFiniteError", "UnknownParameterError"}
+    assert {name for name, _ in public()} - errors <= found
+    assert os.path.exists(os.path.join(os.path.dirname(limn.__file__), "py.typed"))
+
+
+def test_importing_says_nothing_and_starts_nothing():
+    code = ("import sys, threading, limn\n"
+            "assert threading.active_count() == 1\n"
+            "assert 'torch' not in sys.modules")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout + done.stderr == ""
+
+
+# nanobind tells at the end what was not given back.
+def test_runs_print_nothing_and_leak_nothing(folder):
+    code = ("import limn\n"
+            f"s = limn.load({str(folder / 'scene.xml')!r})\n"
+            "v = s['tent.vertex_positions']; p = s.parameters; m = s.mesh('tent')\n"
+            "e = limn.gradient(s, 'tent.scale', spp=2); limn.render(s, spp=1)\n"
+            "try: s['x']\n"
+            "except KeyError: pass\n")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout + done.stderr == ""
+
+
+@pytest.mark.parametrize("file", sorted(glob.glob(os.path.join(EXAMPLES, "*.py"))),
+                         ids=os.path.basename)
+def test_examples_run(file, tmp_path):
+    done = subprocess.run([sys.executable, file, "--quick"], cwd=tmp_path, capture_output=True,
+                          text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert list(tmp_path.glob("*.png"))
+
+
+# Cells are Python: nothing of Jupyter is needed to see whether they run.
+def test_the_notebook_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = {"LIMN": ROOT}
+    with open(os.path.join(EXAMPLES, "first_steps.ipynb"), encoding="utf-8") as stream:
+        cells = json.load(stream)["cells"]
+    code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+    assert len(code) > 3
+    for cell in code:
+        exec(compile(cell, "first_steps.ipynb", "exec"), names)  # noqa: S102

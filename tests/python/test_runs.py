@@ -1,0 +1,221 @@
+"""Runs: the program's bits, threads, interruption, and what stays usable."""
+
+import json
+import os
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+
+import limn
+import numpy as np
+import pytest
+from test_scene import same
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_render_has_the_programs_bits(scene, program, threads):
+    estimate = limn.render(scene, spp=5, seed=3, threads=threads)
+    assert same(estimate.value, program("render", "--spp", "5", "--seed", "3"))
+    assert estimate.spp == 5 and estimate.seconds > 0 and estimate.warnings == []
+    assert same(limn.render(scene).value, program("render"))
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("arguments, words", [
+    ({"spp": 3, "seed": 7}, ["--spp", "3", "--seed", "7"]),
+    ({"spp": 4, "method": "li2019", "samples": [1, 0.5, 2]},
+     ["--spp", "4", "--method", "li2019", "--samples", "1,0.5,2"]),
+    ({"spp": 20, "terms": ["camera"], "samples": "uniform"},
+     ["--spp", "20", "--terms", "camera", "--samples", "uniform"]),
+    ({"spp": 2, "method": "fd", "step": 0.01}, ["--spp", "2", "--method", "fd", "--step", "0.01"]),
+])
+def test_gradient_has_the_programs_bits(folder, scene, program, threads, arguments, words):
+    name = "tent.vertex_positions.0.y"
+    gradient = limn.gradient(scene, name, threads=threads, **arguments)
+    assert list(gradient) == [name]
+    assert np.any(gradient[name].value)
+    assert same(gradient[name].value, program("gradient", "--wrt", name, *words))
+    assert same(gradient[name].stderr, limn.read_exr(folder / "program_stderr.exr"))
+
+
+def test_several_parameters_are_one_run(scene):
+    names = ["ball.translate.x", "metal.alpha", "sensor.fov", "bulb.intensity", "tent.scale"]
+    together = limn.gradient(scene, names, spp=2)
+    assert list(together) == names
+    for name in names:
+        assert np.any(together[name].value), name
+
+
+def test_estimates_are_arrays(scene):
+    estimate = limn.render(scene, spp=2)
+    assert np.shares_memory(np.asarray(estimate), estimate.value)
+    assert np.asarray(estimate, dtype=np.float64).dtype == np.float64
+    copy = np.array(estimate)
+    assert not np.shares_memory(copy, estimate.value) and same(copy, estimate.value)
+    assert same(np.asarray(estimate) * 2, estimate.value * 2)
+    assert np.isnan(limn.render(scene, spp=1).stderr).all()
+    value = estimate.value
+    del estimate
+    assert value.sum() > 0
+
+
+def test_check_and_compare_say_what_the_program_says(folder, scene):
+    check = limn.check(scene, "tent.translate.y", spp=16, threads=2)
+    words = [os.environ["LIMN_PROGRAM"], "check", str(folder / "scene.xml"), "--wrt",
+             "tent.translate.y", "--spp", "16", "--quiet", "--json", str(folder / "check.json")]
+    subprocess.run(words, capture_output=True, check=False)
+    told = json.loads((folder / "check.json").read_text())[0]
+    assert check.verdict == told["verdict"] and check.p == told["p"]
+    assert check.found == told["smallest_at"] and check.step == told["step"]
+    assert check.gradient_sum == told["gradient_sum"] and check.z_sum == told["z_sum"]
+    assert check.gradient.value.shape == check.differences.value.shape == (12, 16, 3)
+    with pytest.raises(limn.InputError, match="check needs spp of at least 2"):
+        limn.check(scene, "tent.translate.y", spp=1)
+    comparison = limn.compare(scene, "tent.translate.y", ["adaptive", "fd"], [0.05, 0.1],
+                              repeats=2, reference_seconds=0.3)
+    assert [m.name for m in comparison.methods] == ["adaptive", "fd"]
+    assert comparison.reference.value.shape == (12, 16, 3) and comparison.reference.spp > 1
+    for method in comparison.methods:
+        assert len(method.rungs) == 2 and method.rungs[1].mse[1] > 0 and method.message == ""
+        assert method.image.shape == (12, 16, 3)
+    assert comparison.methods[0].time_ratio[0] == pytest.approx(1)
+
+
+def test_info_says_what_the_program_says(folder, scene):
+    file = folder / "info.json"
+    subprocess.run([os.environ["LIMN_PROGRAM"], "info", str(folder / "scene.xml"), "--json",
+                    str(file)], capture_output=True, check=True)
+    told = json.loads(file.read_text())
+    assert told.pop("warnings") == []
+    assert limn.info(scene) == told
+
+
+def test_time_limits_and_progress(scene):
+    told = []
+    limn.gradient(scene, "tent.scale", seconds=0.4, progress=told.append)
+    assert told and told == sorted(told) and 0 < told[0] and told[-1] <= 1
+
+
+class Stop(Exception):
+    pass
+
+
+def test_an_exception_of_progress_ends_the_run(scene):
+    def stop(_):
+        raise Stop
+
+    began = time.monotonic()
+    with pytest.raises(Stop):
+        limn.render(scene, spp=1 << 24, progress=stop)
+    assert time.monotonic() - began < 5
+    assert limn.render(scene, spp=1).spp == 1
+
+
+# A process of its own: the signal goes to its main thread alone, and comes while it renders.
+INTERRUPTED = """
+    import os, signal, sys, threading, time
+    import limn
+    scene = limn.load(sys.argv[1])
+    ticks, sent, stop = [], [], threading.Event()
+    def tick():
+        while not stop.wait(0.005):
+            ticks.append(time.monotonic())
+    def kick():
+        time.sleep(0.4)
+        sent.append(time.monotonic())
+        os.kill(os.getpid(), signal.SIGINT)
+    for run in (lambda: limn.render(scene, spp=1 << 24),
+                lambda: limn.gradient(scene, "tent.scale", spp=1 << 24),
+                lambda: limn.backward(scene, [[1] * 16] * 12, spp=1 << 24),
+                lambda: limn.check(scene, "tent.scale", spp=1 << 22)):
+        for attempt in range(3):  # other work on the machine can make one late
+            ticks.clear()
+            stop.clear()
+            threads = [threading.Thread(target=f) for f in (tick, kick)]
+            for thread in threads:
+                thread.start()
+            try:
+                run()
+                sys.exit("no KeyboardInterrupt")
+            except KeyboardInterrupt:
+                late = time.monotonic() - sent[-1]
+            stop.set()
+            for thread in threads:
+                thread.join()
+            if late < 0.5:
+                break
+        assert limn.render(scene, spp=1).spp == 1
+        print(f"{late:.3f} {len(ticks)}")
+"""
+
+
+def test_control_c_ends_runs_and_other_threads_go_on(folder):
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(INTERRUPTED),
+                           str(folder / "scene.xml")], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    rows = [line.split() for line in done.stdout.splitlines()]
+    assert len(rows) == 4
+    for late, ticks in rows:
+        assert float(late) < 0.5
+        assert int(ticks) > 5  # of about 80; with the GIL held there would be none
+
+
+def test_runs_in_several_threads_are_those_in_one(scene):
+    expected = [limn.render(scene, spp=4, seed=seed).value for seed in range(4)]
+    found = [None] * 4
+
+    def run(seed):
+        found[seed] = limn.render(scene, spp=4, seed=seed).value
+
+    threads = [threading.Thread(target=run, args=(seed,)) for seed in range(4)]
+    for thread in threads:
+        thread.start()
+    scene["metal.alpha"] = 0.9  # runs that were started keep what they were started with
+    for thread in threads:
+        thread.join()
+    scene["metal.alpha"] = 0.2
+    for seed in range(4):
+        again = limn.render(scene, spp=4, seed=seed).value
+        assert same(again, expected[seed])
+
+
+def test_another_process_by_spawn_renders(folder):
+    code = ("import multiprocessing as m, sys, limn\n"
+            "def f(file): return float(limn.render(limn.load(file), spp=2).value.sum())\n"
+            "if __name__ == '__main__':\n"
+            "    a = f(sys.argv[1])\n"
+            "    with m.get_context('spawn').Pool(1) as pool: b = pool.map(f, sys.argv[1:])[0]\n"
+            "    assert a == b, (a, b)\n")
+    (folder / "spawn.py").write_text(code)
+    subprocess.run([sys.executable, str(folder / "spawn.py"), str(folder / "scene.xml")], check=True)
+
+
+def test_samples_that_are_not_finite_raise_with_the_result(folder, scene):
+    scene["lamp.radiance"] = 1e308
+    with pytest.raises(limn.NonFiniteError, match="non-finite sample") as caught:
+        limn.render(scene, spp=2)
+    assert isinstance(caught.value, ArithmeticError)
+    assert caught.value.result.value.shape == (12, 16, 3)
+    assert np.isfinite(caught.value.result.value).all()
+
+
+def resident_kilobytes():
+    with open("/proc/self/statm", encoding="ascii") as stream:
+        return int(stream.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1024
+
+
+# A scene with its views is about 60 kB here; what allocators keep is gone after the first hundred.
+def test_scenes_that_are_dropped_leave_no_memory(folder):
+    def make(count):
+        for _ in range(count):
+            scene = limn.load(folder / "scene.xml")
+            view = scene["ball.vertex_positions"]
+            scene["ball.vertex_positions"] = view
+            limn.render(scene, spp=1, threads=1)
+
+    make(50)
+    before = resident_kilobytes()
+    make(100)
+    assert resident_kilobytes() - before < 100 * 60 / 4

@@ -1,0 +1,201 @@
+"""Scenes, their parameters and meshes: in, out, and what is refused."""
+
+import os
+import re
+from collections.abc import Mapping
+
+import limn
+import numpy as np
+import pytest
+from conftest import SCENE, TENT
+
+
+def image(scene):
+    return limn.render(scene, spp=2, seed=5).value
+
+
+def same(a, b):
+    return np.array_equal(a.view(np.uint32), b.view(np.uint32))
+
+
+def test_keywords_give_values_to_names(folder):
+    scene = limn.load(os.fspath(folder / "scene.xml"), size=24, alpha=0.5)
+    assert (scene.width, scene.height, scene.spp) == (24, 12, 4)
+    assert scene["metal.alpha"] == 0.5
+    assert image(scene).shape == (12, 24, 3)
+
+
+def test_text_is_as_good_as_a_file(folder, scene):
+    assert same(image(limn.load_string(SCENE, folder)), image(scene))
+    broken = SCENE.replace("</scene>", "<lamp/></scene>")
+    line = broken[:broken.index("<lamp/>")].count("\n") + 1
+    with pytest.raises(limn.InputError, match=re.escape(f"{folder}/string:{line}:1: error: ")):
+        limn.load_string(broken, folder)
+
+
+@pytest.mark.parametrize("call, text", [
+    (lambda s, f: limn.load(f / "no.xml"), "{f}/no.xml: error: cannot read the file"),
+    (lambda s, f: limn.load(f / "scene.xml", sise=3),
+     '{f}/scene.xml: error: -D sise=3: the scene has no parameter "$sise" (known: alpha, size)'),
+    (lambda s, f: s.__setitem__("metal.alpha", -1),
+     '{f}/scene.xml: error: parameter "metal.alpha" cannot be -1: it must be finite and lie in '
+     "[0, 1e+06]"),
+    (lambda s, f: s.__setitem__("clay.reflectance", [0.5, 0.5]),
+     '{f}/scene.xml: error: parameter "clay.reflectance" holds 3 numbers, not 2'),
+    (lambda s, f: s.__setitem__("clay.reflectance", 1.5),
+     '{f}/scene.xml: error: parameter "clay.reflectance" cannot be 1.5: it must be finite and lie '
+     "in [0, 1]"),
+    (lambda s, f: s.__setitem__("sensor.fov", np.nan),
+     '{f}/scene.xml: error: parameter "sensor.fov" cannot be nan: it must be finite and lie in '
+     "[2.22507e-308, 180]"),
+    (lambda s, f: s.__setitem__("tent.rotate.x", 1),
+     '{f}/scene.xml: error: parameter "tent.rotate.x" moves things from where they are and has no '
+     "value to set"),
+    (lambda s, f: s.__setitem__("tent.vertex_positions", np.zeros((5, 3))),
+     '{f}/scene.xml: error: parameter "tent.vertex_positions" has shape (6, 3), not (5, 3)'),
+    (lambda s, f: s.__setitem__("tent.vertex_positions", np.full((6, 3), np.inf)),
+     '{f}/scene.xml: error: parameter "tent.vertex_positions" cannot be inf: it must be finite and '
+     "lie in [-2e+12, 2e+12]"),
+    (lambda s, f: s.mesh("tend"),
+     '{f}/scene.xml: error: unknown shape "tend" (known: tent, floor, ball)'),
+    (lambda s, f: s.set_mesh("tent", np.zeros((4, 2)), [[0, 1, 2]]),
+     "error: Vertices have shape (V, 3), one row each"),
+    (lambda s, f: s.set_mesh("tent", np.eye(3), [[0, 1, -1]]),
+     "error: Faces hold indices of vertices, from 0 on, not -1"),
+    (lambda s, f: s.set_mesh("tent", np.eye(3), [[0, 1, 3]]),
+     "{f}/scene.xml:15:3: error: face 0 (counted from 0) names vertex 3 of 3"),
+    (lambda s, f: setattr(s, "shading", "flat"),
+     'error: unknown shading "flat" (known: continuous, mitsuba)'),
+    (lambda s, f: limn.render(s, spp=0), "error: spp must be 1 or more"),
+    (lambda s, f: limn.render(s, threads=-1), "error: threads must be 0 (all cores) to 4096"),
+    (lambda s, f: limn.gradient(s, "tent.vertex_positions"),
+     '{f}/scene.xml: error: parameter "tent.vertex_positions" is an array of 18 numbers, and one is '
+     'wanted: "tent.vertex_positions:FILE" for a field of vectors, "tent.vertex_positions.0.x" for '
+     "one number"),
+    (lambda s, f: limn.gradient(s, "metal.alpha", samples="many"),
+     'error: unknown kind of samples "many" (known: auto, uniform); counts are a list, one for '
+     "each term"),
+    (lambda s, f: limn.write_exr(f / "a.exr", np.zeros(3)),
+     "error: an image has shape (H, W, 3), (H, W, 1) or (H, W)"),
+])
+def test_what_is_refused_and_why(folder, scene, call, text):
+    before = image(scene)
+    with pytest.raises(limn.InputError) as caught:
+        call(scene, folder)
+    assert str(caught.value) == text.replace("{f}", str(folder))
+    assert same(image(scene), before)
+
+
+def test_unknown_parameters_are_key_errors_too(scene):
+    for call in (lambda: scene["tent.translate"], lambda: scene.parameters["tent.translate"],
+                 lambda: limn.gradient(scene, ["metal.alpha", "tent.translate"]),
+                 lambda: limn.check(scene, "tent.translate"),
+                 lambda: limn.compare(scene, "tent.translate", ["fd"], [1]),
+                 lambda: scene.move("tent.translate", 1)):
+        with pytest.raises(KeyError, match="^[^'].*nearest: tent.translate.x, ") as caught:
+            call()
+        assert isinstance(caught.value, limn.InputError)
+
+
+def test_parameters_are_a_mapping(scene):
+    parameters = scene.parameters
+    assert isinstance(parameters, Mapping)
+    assert len(parameters) == len(list(parameters)) == len(dict(parameters.items()))
+    assert list(parameters) == [row["name"] for row in limn.info(scene)["parameters"]]
+    assert "tent.vertex_positions.3.y" in parameters and "tent.vertex_positions.3.y" not in list(parameters)
+    assert "nothing" not in parameters and 3 not in parameters
+    fov = parameters["sensor.fov"]
+    assert (fov.name, fov.unit, fov.shape, fov.value) == ("sensor.fov", "degrees", (), 40)
+    assert fov.natural_step == pytest.approx(0.4)
+    assert parameters["tent.vertex_positions"].shape == (6, 3)
+    assert parameters["tent.translate.x"].value is None
+    parameter = limn.load_string(SCENE.replace("tent.obj", scene.file.replace("scene.xml", "tent.obj"))).parameters["lamp.radiance"]
+    assert parameter.value.tolist() == [4, 5, 6]  # its scene is gone
+
+
+def test_every_value_comes_back(scene):
+    names = [name for name, p in scene.parameters.items() if p.value is not None]
+    assert len(names) > 12
+    for name in names:
+        value = np.asarray(scene[name])
+        other = value * (0.75 if name != "sensor.fov" else 1.5) + 0.0625
+        scene[name] = other
+        assert scene[name] == pytest.approx(other, abs=0)
+        assert np.shape(scene[name]) == np.shape(value)
+    scene["clay.reflectance"] = 0.25
+    assert scene["clay.reflectance"].tolist() == [0.25] * 3
+
+
+def test_views_cannot_be_written_and_stay_as_they_were(folder, scene):
+    view = scene["tent.vertex_positions"]
+    assert view.dtype == np.float32 and view.flags["C_CONTIGUOUS"] and not view.flags.writeable
+    assert np.shares_memory(view, scene["tent.vertex_positions"])
+    with pytest.raises(ValueError, match="read-only"):
+        view[0, 0] = 3
+    kept = view.copy()
+    scene["tent.vertex_positions"] = view + 1
+    assert np.array_equal(view, kept)
+    assert np.array_equal(scene["tent.vertex_positions"], kept + 1)
+    mesh = limn.load(folder / "scene.xml").mesh("tent")
+    assert np.array_equal(mesh.positions, kept)
+    assert mesh.faces.tolist() == [[0, 1, 2], [0, 2, 3], [4, 3, 5], [4, 5, 1]]
+    assert mesh.weld.tolist() == [0, 1, 2, 3, 0, 5]
+    with pytest.raises(AttributeError):
+        mesh.positions = kept
+
+
+# Setting positions is reading the mesh with them; nothing else of the scene is touched.
+def test_positions_make_what_a_file_with_them_makes(folder, scene):
+    moved = scene["tent.vertex_positions"] + np.float32([0.3, 0.1, -0.2])
+    lines = ["v " + " ".join(repr(float(x)) for x in row) for row in moved]
+    (folder / "moved.obj").write_text("\n".join(lines + TENT.splitlines()[6:]))
+    read = limn.load_string(SCENE.replace("tent.obj", "moved.obj"), folder)
+    untouched = image(scene)
+    assert not same(image(read), untouched)
+    other = scene.copy()
+    scene["tent.vertex_positions"] = moved
+    assert same(image(scene), image(read))
+    assert same(image(other), untouched)
+    other.set_mesh("tent", moved, scene.mesh("tent").faces)
+    assert same(image(other), image(read))
+    scene["tent.vertex_positions"] = moved - np.float32([0.3, 0.1, -0.2])
+    scene["tent.vertex_positions"] = other["tent.vertex_positions"].astype(np.float64)
+    assert same(image(scene), image(read))
+
+
+def test_a_mesh_is_mended_with_a_warning(scene):
+    positions = scene["tent.vertex_positions"]
+    faces = np.vstack([scene.mesh("tent").faces, [[1, 2, 1]]])
+    with pytest.warns(UserWarning, match="1 of 5 faces have two corners at the same position"):
+        scene.set_mesh("tent", positions, faces)
+    assert len(scene.mesh("tent").faces) == 4
+    with pytest.raises(limn.InputError, match="no faces"):
+        scene["tent.vertex_positions"] = np.zeros((6, 3))
+    assert np.array_equal(scene["tent.vertex_positions"], positions)
+
+
+def test_moving_is_what_positions_do(scene):
+    other = scene.copy()
+    scene.move("floor.translate.y", -0.25)
+    other["floor.vertex_positions"] = other["floor.vertex_positions"] - [0, 0.25, 0]
+    assert same(image(scene), image(other))
+    scene.move("sensor.fov", 2)
+    assert scene["sensor.fov"] == 42
+
+
+def test_shading_is_the_programs(scene, program):
+    scene.shading = "mitsuba"
+    assert scene.shading == "mitsuba"
+    assert same(image(scene), program("render", "--spp", "2", "--seed", "5", "--shading", "mitsuba"))
+
+
+def test_images_come_back(tmp_path):
+    pixels = np.random.default_rng(1).random((5, 7, 3), dtype=np.float32)
+    limn.write_exr(tmp_path / "a.exr", pixels)
+    assert same(limn.read_exr(tmp_path / "a.exr"), pixels)
+    limn.write_exr(tmp_path / "b.exr", pixels[:, :, 0], half=True)
+    assert limn.read_exr(tmp_path / "b.exr")[:, :, 0] == pytest.approx(pixels[:, :, 0], rel=2**-11)
+    limn.write_png(tmp_path / "a.png", pixels)
+    limn.write_signed_png(tmp_path / "b.png", pixels - 0.5, scale=0.5)
+    for name in ("a.png", "b.png"):
+        assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")

@@ -1,0 +1,132 @@
+// Reverse mode: losses, and derivatives of a loss for every parameter at once.
+#include "limn/integrators/backward.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "limn/core/error.h"
+#include "tools/python/bindings.h"
+
+namespace limn::python {
+
+namespace {
+
+using Numbers = std::vector<double>;
+
+Array to_array(Numbers numbers, const std::vector<size_t>& shape) {
+  auto* owned = new Numbers(std::move(numbers));
+  const nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<Numbers*>(p); });
+  return Array(nb::ndarray<nb::numpy, double>(owned->data(), shape.size(), shape.data(), owner));
+}
+
+Estimate to_estimate(const ParameterAdjoint& adjoint, const BackwardResult& result) {
+  Numbers errors = variances(adjoint.moments);
+  for (double& e : errors) e = std::sqrt(e);
+  return {to_array(means(adjoint.moments), adjoint.shape),
+          to_array(std::move(errors), adjoint.shape), result.spp, result.seconds, result.warnings};
+}
+
+nb::dict backward_of(const SceneHandle& handle, const Image& adjoint,
+                     const BackwardOptions& options, const RunArguments& run,
+                     const nb::object& progress) {
+  const auto scene = handle.share();
+  BackwardResult result;
+  run_job(make_settings(*scene, run), progress, [&](const RunSettings& settings) {
+    result = backward(*scene, adjoint, options, settings);
+  });
+  nb::dict estimates;
+  for (const ParameterAdjoint& a : result.parameters) {
+    estimates[nb::cast(a.name)] = nb::cast(to_estimate(a, result));
+  }
+  check_finite(result.non_finite, estimates);
+  warn_all(result.warnings);
+  return estimates;
+}
+
+void bind_loss(nb::module_& m) {
+  nb::class_<LossResult>(m, "Loss", "How far the image of a scene is from a target.")
+      .def_ro("value", &LossResult::value,
+              "A mean over pixels and channels; unbiased, hence below zero now and then near zero, "
+              "but for l1.")
+      .def_ro("stderr", &LossResult::error, "Its standard error; NaN with spp = 1.")
+      .def_ro("spp", &LossResult::spp, "Samples per pixel of each of the two images.")
+      .def_prop_ro(
+          "adjoint", [](const LossResult& r) { return python::to_array(r.adjoint); },
+          nb::rv_policy::reference, "dLoss/dImage, for limn.backward: float32, (H, W, 3).")
+      .def("__repr__", [](const LossResult& r) {
+        return fmt::format("<limn.Loss: {:.4g} +- {:.2g}>", r.value, r.error);
+      });
+  m.def(
+      "image_loss",
+      [](const SceneHandle& handle, nb::handle target, const std::string& kind,
+         std::optional<int> spp, std::optional<uint64_t> seed, int threads,
+         const nb::object& progress) {
+        const auto scene = handle.share();
+        const Image image = to_image(target);
+        const LossKind loss = loss_kind(kind);
+        LossResult result;
+        run_job(make_settings(*scene, {spp, seed, 0, threads}), progress,
+                [&](const RunSettings& settings) {
+                  result = image_loss(*scene, image, loss, settings);
+                });
+        return result;
+      },
+      nb::arg("scene"), nb::arg("target"), nb::arg("kind") = "l2", nb::arg("spp") = nb::none(),
+      nb::arg("seed") = nb::none(), nb::arg("threads") = 0, nb::arg("progress") = nb::none(),
+      nb::sig("def image_loss(scene: Scene, target: numpy.typing.ArrayLike, kind: str = 'l2', spp: "
+              "int | None = None, seed: int | None = None, threads: int = 0, progress: "
+              "collections.abc.Callable[[float], object] | None = None) -> Loss"),
+      "Renders the scene twice, independently, and compares with a target, (H, W, 3) or (H, W).\n\n"
+      "kind: \"l2\", \"relative-l2\" or \"l1\". limn.backward with the same seed and the adjoint "
+      "found "
+      "here gives an unbiased gradient of l2 and relative-l2.");
+}
+
+}  // namespace
+
+void bind_backward(nb::module_& m) {
+  bind_loss(m);
+  m.def(
+      "backward",
+      [](const SceneHandle& scene, nb::handle adjoint, const std::optional<Names>& names,
+         std::optional<int> spp, std::optional<uint64_t> seed,
+         const std::vector<std::string>& terms, bool uniform_pixels, int edge_samples,
+         double camera_samples, int threads, const nb::object& progress) {
+        BackwardOptions options;
+        if (names) options.parameters = to_list(*names);
+        options.terms = terms;
+        options.uniform_pixels = uniform_pixels;
+        options.edge_samples = edge_samples;
+        options.camera_samples = camera_samples;
+        if (edge_samples < 1) throw InputError("edge_samples must be 1 or more");
+        if (!(camera_samples > 0)) throw InputError("camera_samples must be positive");
+        return backward_of(scene, to_image(adjoint), options, {spp, seed, 0, threads}, progress);
+      },
+      nb::arg("scene"), nb::arg("adjoint"), nb::arg("names") = nb::none(),
+      nb::arg("spp") = nb::none(), nb::arg("seed") = nb::none(),
+      nb::arg("terms") = nb::make_tuple(), nb::arg("uniform_pixels") = false,
+      nb::arg("edge_samples") = 1, nb::arg("camera_samples") = 1.0, nb::arg("threads") = 0,
+      nb::arg("progress") = nb::none(),
+      nb::sig(
+          "def backward(scene: Scene, adjoint: numpy.typing.ArrayLike, names: str | "
+          "collections.abc.Sequence[str] | None = None, spp: int | None = None, seed: int | None "
+          "= None, terms: collections.abc.Sequence[str] = (), uniform_pixels: bool = False, "
+          "edge_samples: int = 1, camera_samples: float = 1, "
+          "threads: int = 0, progress: collections.abc.Callable[[float], object] | None = None) "
+          "-> dict[str, Estimate]"),
+      "Reverse mode: dLoss/dparameter of every parameter at once, from dLoss/dImage.\n\n"
+      "adjoint: (H, W, 3), or (H, W) of the luminance; independent of the samples made here "
+      "(another "
+      "seed than that of the image it came from), else the gradient is biased.\n"
+      "names: arrays as well (\"object.vertex_positions\"); None for all parameters.\n"
+      "Values are float64: (V, 3) of an array, () of a number, of the loss per unit of the "
+      "parameter. "
+      "Copies of a vertex have equal shares. Pixels are sampled in proportion to the adjoint "
+      "unless "
+      "uniform_pixels. edge_samples: at every vertex of a path; camera_samples: points on "
+      "silhouettes "
+      "of the film, for each path. The rest as limn.gradient.");
+}
+
+}  // namespace limn::python

@@ -1,0 +1,107 @@
+#pragma once
+// What the groups of bindings share. This folder is the one door to nanobind; it holds no logic: what
+// has to be computed is asked of limn/...
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/function.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/variant.h>
+#include <nanobind/stl/vector.h>
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "limn/core/scene.h"
+#include "limn/integrators/gradient.h"
+#include "limn/integrators/moments.h"
+#include "limn/integrators/run.h"
+
+namespace limn::python {
+
+namespace nb = nanobind;
+
+// A scene as Python holds it. Runs, views and parameters keep the state they were made with: a change
+// while others hold that state is made to a copy. Used with the GIL held.
+class SceneHandle {
+ public:
+  explicit SceneHandle(Scene scene) : scene_(std::make_shared<Scene>(std::move(scene))) {}
+  const Scene& get() const { return *scene_; }
+  std::shared_ptr<const Scene> share() const { return scene_; }
+  Scene& edit() {
+    if (scene_.use_count() > 1) scene_ = std::make_shared<Scene>(deep_copy(*scene_));
+    return *scene_;
+  }
+
+ private:
+  std::shared_ptr<Scene> scene_;
+};
+
+// Each group adds its names to the module.
+nb::class_<SceneHandle> bind_scene(nb::module_& m);
+void bind_parameters(nb::module_& m, nb::class_<SceneHandle>& scene);
+void bind_render(nb::module_& m);
+void bind_gradient(nb::module_& m);
+void bind_backward(nb::module_& m);
+void bind_check(nb::module_& m);
+void bind_compare(nb::module_& m);
+void bind_info(nb::module_& m);
+void bind_images(nb::module_& m);
+
+// The shape called `id`; InputError that lists the known ones.
+ShapeId find_shape(const Scene& scene, const std::string& id);
+
+using Pixels = nb::ndarray<nb::numpy, float, nb::shape<-1, -1, -1>, nb::c_contig>;
+using Positions = nb::ndarray<nb::numpy, const float, nb::shape<-1, 3>, nb::c_contig>;
+
+// A copy; H by W by C, or H by W for one channel. Estimates are taken for their values. InputError.
+Image to_image(nb::handle array);
+// H by W by C, the image's memory with it.
+Pixels to_array(Image image);
+// A view of a shape's vertices that keeps the scene's state alive.
+Positions view_positions(std::shared_ptr<const Scene> scene, ShapeId shape);
+// numpy.ascontiguousarray(value, dtype), of whatever numpy takes; numpy's errors.
+nb::object as_array(nb::handle value, const char* dtype);
+
+// A mean with its standard error, as Python sees it.
+using Array = nb::ndarray<nb::numpy>;
+struct Estimate {
+  Array value, error;
+  int64_t spp = 0;
+  double seconds = 0;
+  std::vector<std::string> warnings;
+};
+Estimate to_estimate(const Moments& moments, const Film& film, int64_t spp, double seconds);
+
+using Names = std::variant<std::string, std::vector<std::string>>;
+std::vector<std::string> to_list(const Names& names);
+// "auto", "uniform" or counts.
+using Samples = std::variant<std::string, std::vector<double>>;
+void set_samples(const Samples& samples, std::optional<SampleCounts>& counts);
+
+// What every run takes; none: what the scene asks for.
+struct RunArguments {
+  std::optional<int> spp;
+  std::optional<uint64_t> seed;
+  double seconds = 0;
+  int threads = 0;  // 0: all cores
+};
+RunSettings make_settings(const Scene& scene, const RunArguments& arguments);
+
+// Runs job(settings) on a thread of its own without the GIL, while this one looks for signals and
+// calls progress(fraction) every 50 ms. Ctrl-C, or an exception of `progress`, interrupts the job and
+// is raised when it has ended.
+void run_job(RunSettings settings, const nb::object& progress,
+             const std::function<void(const RunSettings&)>& job);
+
+// Tells Python's warnings.
+void warn_all(const std::vector<std::string>& warnings);
+// Raises limn.NonFiniteError, which carries the result, if there is a reason to.
+void check_finite(const NonFinite& bad, const nb::object& result);
+
+}  // namespace limn::python

@@ -1,0 +1,115 @@
+// A gradient against finite differences.
+#include "limn/integrators/check.h"
+
+#include <fmt/format.h>
+
+#include "limn/core/error.h"
+#include "tools/python/bindings.h"
+
+namespace limn::python {
+
+namespace {
+
+struct Check {
+  CheckResult result;
+  Estimate gradient, differences;
+};
+
+const char* verdict_name(const Check& check) {
+  switch (check.result.verdict) {
+    case Verdict::kAgree:
+      return "agree";
+    case Verdict::kDisagree:
+      return "disagree";
+    case Verdict::kCannotTell:
+      break;
+  }
+  return "cannot tell";
+}
+
+Check check_of(const SceneHandle& handle, const CheckOptions& options, const RunArguments& run,
+               const nb::object& progress) {
+  const auto scene = handle.share();
+  const RunSettings asked = make_settings(*scene, run);
+  if (asked.spp < 2) throw InputError("check needs spp of at least 2, for standard errors");
+  Check check;
+  run_job(asked, progress, [&](const RunSettings& settings) {
+    check.result = limn::check(*scene, options, settings);
+  });
+  CheckResult& r = check.result;
+  check.gradient = to_estimate(r.gradient.parameters.at(0).total, scene->film, r.gradient.spp,
+                               r.gradient.seconds);
+  check.gradient.warnings = r.gradient.warnings;
+  check.differences = to_estimate(r.differences.extrapolated.total, scene->film, r.differences.spp,
+                                  r.differences.seconds);
+  NonFinite bad = r.gradient.non_finite;
+  bad.merge(r.differences.non_finite);
+  warn_all(r.gradient.warnings);
+  check_finite(bad, nb::cast(check));
+  return check;
+}
+
+// A field of the result, by value.
+template <class Field>
+auto field(Field CheckResult::*member) {
+  return [member](const Check& c) { return c.result.*member; };
+}
+template <class Field>
+auto total(Field TotalComparison::*member) {
+  return [member](const Check& c) { return c.result.total.*member; };
+}
+
+void bind_result(nb::module_& m) {
+  nb::class_<Check>(m, "Check", "What limn.check found.")
+      .def_prop_ro("verdict", verdict_name, "\"agree\", \"disagree\" or \"cannot tell\".")
+      .def_prop_ro("p", field(&CheckResult::p),
+                   "Of the first run: windows, image and terms together.")
+      .def_prop_ro("found", field(&CheckResult::found), "Where the first run's p is smallest.")
+      .def_prop_ro("suspect", field(&CheckResult::suspect),
+                   "The term that the residual looks like most; \"\" if none is suspected.")
+      .def_prop_ro("step", field(&CheckResult::step),
+                   "Of the differences, in the parameter's unit.")
+      .def_prop_ro("needed_spp", field(&CheckResult::needed_spp),
+                   "To see an error of a fifth of all that matters.")
+      .def_prop_ro("gradient_sum", total(&TotalComparison::gradient),
+                   "Sum over the image's pixels and channels.")
+      .def_prop_ro("gradient_sum_stderr", total(&TotalComparison::gradient_error))
+      .def_prop_ro("difference_sum", total(&TotalComparison::difference))
+      .def_prop_ro("difference_sum_stderr", total(&TotalComparison::difference_error))
+      .def_prop_ro("z_sum", total(&TotalComparison::z), "(gradient - differences) / error of both.")
+      .def_ro("gradient", &Check::gradient, "The gradient: an image, (H, W, 3).")
+      .def_ro("differences", &Check::differences, "The finite differences: an image, (H, W, 3).")
+      .def("__repr__", [](const Check& c) {
+        return fmt::format("<limn.Check: {}, p = {:.2g}>", verdict_name(c), c.result.p);
+      });
+}
+
+}  // namespace
+
+void bind_check(nb::module_& m) {
+  bind_result(m);
+  m.def(
+      "check",
+      [](const SceneHandle& scene, const std::string& name, std::optional<int> spp,
+         std::optional<uint64_t> seed, const std::string& method,
+         const std::vector<std::string>& terms, const Samples& samples, double step, int block,
+         int threads, const nb::object& progress) {
+        CheckOptions options{name, method, terms, step, block, {}};
+        set_samples(samples, options.samples);
+        return check_of(scene, options, {spp, seed, 0, threads}, progress);
+      },
+      nb::arg("scene"), nb::arg("name"), nb::arg("spp") = nb::none(), nb::arg("seed") = nb::none(),
+      nb::arg("method") = "", nb::arg("terms") = nb::make_tuple(), nb::arg("samples") = "auto",
+      nb::arg("step") = 0.0, nb::arg("block") = 0, nb::arg("threads") = 0,
+      nb::arg("progress") = nb::none(),
+      nb::sig(
+          "def check(scene: Scene, name: str, spp: int | None = None, seed: int | None = None, "
+          "method: str = '', terms: collections.abc.Sequence[str] = (), samples: str | "
+          "collections.abc.Sequence[float] = 'auto', step: float = 0, block: int = 0, threads: "
+          "int = 0, progress: collections.abc.Callable[[float], object] | None = None) -> Check"),
+      "Compares a gradient with finite differences, both with their errors.\n\n"
+      "A right gradient is accused once in ten thousand times. step, block: of the differences and "
+      "of the windows [pixels]; 0: chosen. The rest as limn.gradient.");
+}
+
+}  // namespace limn::python

@@ -1,0 +1,85 @@
+// Images as arrays, and as files.
+#include "limn/core/image.h"
+
+#include <cmath>
+#include <cstring>
+
+#include "limn/core/error.h"
+#include "tools/python/bindings.h"
+
+namespace limn::python {
+
+namespace {
+
+std::string to_path(nb::handle file) {
+  return nb::cast<std::string>(nb::module_::import_("os").attr("fspath")(file));
+}
+
+}  // namespace
+
+Image to_image(nb::handle array) {
+  const auto pixels =
+      nb::cast<nb::ndarray<const float, nb::c_contig, nb::device::cpu>>(as_array(array, "float32"));
+  const size_t channels = pixels.ndim() == 3 ? pixels.shape(2) : 1;
+  if (pixels.ndim() < 2 || pixels.ndim() > 3 || (channels != 1 && channels != 3) ||
+      pixels.size() == 0 || pixels.size() / channels > static_cast<size_t>(kMaxPixels)) {
+    throw InputError("an image has shape (H, W, 3), (H, W, 1) or (H, W)");
+  }
+  Image image(static_cast<int>(pixels.shape(1)), static_cast<int>(pixels.shape(0)),
+              static_cast<int>(channels));
+  std::memcpy(image.data.data(), pixels.data(), pixels.size() * sizeof(float));
+  return image;
+}
+
+nb::object as_array(nb::handle value, const char* dtype) {
+  return nb::module_::import_("numpy").attr("ascontiguousarray")(value, dtype);
+}
+
+Pixels to_array(Image image) {
+  auto kept = std::make_unique<Image>(std::move(image));
+  const size_t shape[3] = {static_cast<size_t>(kept->height), static_cast<size_t>(kept->width),
+                           static_cast<size_t>(kept->channels)};
+  Image* owned = kept.release();
+  const nb::capsule owner(owned, [](void* p) noexcept { delete static_cast<Image*>(p); });
+  return Pixels(owned->data.data(), 3, shape, owner);
+}
+
+void bind_images(nb::module_& m) {
+  m.def(
+      "read_exr", [](nb::handle file) { return to_array(read_exr(to_path(file))); },
+      nb::arg("file"), nb::sig("def read_exr(file: str | os.PathLike[str]) -> numpy.ndarray"),
+      "Pixels of an OpenEXR image: float32, (H, W, 3), or (H, W, 1) if it has channel Y alone.");
+  m.def(
+      "write_exr",
+      [](nb::handle file, nb::handle image, bool half) {
+        write_exr(to_path(file), to_image(image), half, {});
+      },
+      nb::arg("file"), nb::arg("image"), nb::arg("half") = false,
+      nb::sig("def write_exr(file: str | os.PathLike[str], image: numpy.typing.ArrayLike, half: "
+              "bool = False) -> None"),
+      "Writes (H, W, 3), (H, W, 1) or (H, W) pixels as OpenEXR, in half precision if asked to.");
+  m.def(
+      "write_png",
+      [](nb::handle file, nb::handle image, double exposure) {
+        write_png(to_path(file), to_image(image), exposure);
+      },
+      nb::arg("file"), nb::arg("image"), nb::arg("exposure") = 1.0,
+      nb::sig(
+          "def write_png(file: str | os.PathLike[str], image: numpy.typing.ArrayLike, exposure: "
+          "float = 1.0) -> None"),
+      "Writes radiance times `exposure` as an 8-bit sRGB picture, clamped to [0, 1].");
+  m.def(
+      "write_signed_png",
+      [](nb::handle file, nb::handle image, std::optional<double> scale) {
+        const Image picture = to_image(image);
+        write_signed_png(to_path(file), picture, scale.value_or(signed_scale(picture)));
+      },
+      nb::arg("file"), nb::arg("image"), nb::arg("scale") = nb::none(),
+      nb::sig("def write_signed_png(file: str | os.PathLike[str], image: numpy.typing.ArrayLike, "
+              "scale: float | None = None) -> None"),
+      "Writes a derivative image, mean over channels: red above zero, blue below, white at "
+      "zero.\n\n"
+      "scale: the value of the full colour; None: the 99.5th percentile of what is not zero.");
+}
+
+}  // namespace limn::python

@@ -1,0 +1,69 @@
+"""Path tracing, and how its picture changes when the scene does.
+
+    import limn
+    scene = limn.load("scenes/demo.xml", width=128, height=96)
+    image = limn.render(scene, spp=64)
+    moved = limn.gradient(scene, "object.translate.y", spp=64)["object.translate.y"]
+"""
+
+from collections.abc import Mapping as _Mapping
+
+from ._limn import (
+    Check,
+    ComparedMethod,
+    Comparison,
+    Estimate,
+    Loss,
+    Mesh,
+    Parameter,
+    Parameters,
+    Rung,
+    Scene,
+    backward,
+    check,
+    compare,
+    gradient,
+    image_loss,
+    info,
+    load,
+    load_string,
+    methods,
+    read_exr,
+    render,
+    write_exr,
+    write_png,
+    write_signed_png,
+)
+from .errors import InputError, NonFiniteError, UnknownParameterError
+
+__all__ = [
+    "Check",
+    "ComparedMethod",
+    "Comparison",
+    "Estimate",
+    "InputError",
+    "Loss",
+    "Mesh",
+    "NonFiniteError",
+    "Parameter",
+    "Parameters",
+    "Rung",
+    "Scene",
+    "UnknownParameterError",
+    "backward",
+    "check",
+    "compare",
+    "gradient",
+    "image_loss",
+    "info",
+    "load",
+    "load_string",
+    "methods",
+    "read_exr",
+    "render",
+    "write_exr",
+    "write_png",
+    "write_signed_png",
+]
+
+_Mapping.register(Parameters)

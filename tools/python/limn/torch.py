@@ -1,0 +1,86 @@
+"""Pictures of a scene as PyTorch tensors that know their gradient.
+
+    v = torch.tensor(scene["ball.vertex_positions"], requires_grad=True)
+    image = limn.torch.render(scene, {"ball.vertex_positions": v}, spp=16, seed=i)
+    ((image - target) ** 2).mean().backward()       # v.grad
+
+Imports torch, which `import limn` does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import torch
+
+from . import Scene, backward, render as _render
+from .errors import InputError
+
+__all__ = ["render"]
+
+
+class _Render(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx, scene, names, spp, spp_grad, seed, threads, *tensors):
+        scene = scene.copy()
+        for name, tensor in zip(names, tensors):
+            scene[name] = tensor.detach().cpu().numpy()
+        ctx.run = scene, names, spp_grad, 2 * seed + 1, threads
+        ctx.save_for_backward(*tensors)
+        return torch.from_numpy(_render(scene, spp, 2 * seed, threads).value)
+
+    @staticmethod
+    @torch.autograd.function.once_differentiable
+    def backward(ctx, adjoint):
+        scene, names, spp, seed, threads = ctx.run
+        wanted = [n for n, need in zip(names, ctx.needs_input_grad[6:]) if need]
+        found = _pull_back(scene, wanted, adjoint.cpu().numpy(), spp, seed, threads)
+        gradients = [
+            torch.from_numpy(found[n]).to(t).reshape(t.shape) if n in found else None
+            for n, t in zip(names, ctx.saved_tensors)
+        ]
+        return (None,) * 6 + tuple(gradients)
+
+
+def _pull_back(scene, names, adjoint, spp, seed, threads):
+    """{name: float64 array of the value's shape}."""
+
+    def run(names, adjoint):
+        if not names:
+            return {}
+        found = backward(scene, adjoint, names, spp=spp, seed=seed, threads=threads)
+        return {n: np.array(e.value) for n, e in found.items()}
+
+    # limn differentiates colours along grey; channels never mix, so that an adjoint of one channel
+    # gives the derivative of that channel.
+    colours = [n for n in names if np.shape(scene[n]) == (3,)]
+    found = run([n for n in names if n not in colours], adjoint)
+    channels = [run(colours, adjoint * np.eye(3, dtype=adjoint.dtype)[c]) for c in range(3)]
+    found.update({n: np.array([float(c[n]) for c in channels]) for n in colours})
+    return found
+
+
+def render(
+    scene: Scene,
+    values: Mapping[str, torch.Tensor],
+    spp: int | None = None,
+    spp_grad: int | None = None,
+    seed: int = 0,
+    threads: int = 0,
+) -> torch.Tensor:
+    """The image of `scene` with these values in place of its own: float32, (H, W, 3).
+
+    values: tensors of the shapes that scene[name] has; the scene itself stays as it is. Parameters
+    without a value (rotations of shapes, ...) cannot be given: move the vertices.
+    spp, spp_grad: samples per pixel of the image and of its gradient; None: spp_grad as spp, spp as
+    the scene says. The image has the seed 2 * seed, the gradient 2 * seed + 1: both are independent,
+    so that the gradient is unbiased where the loss is linear in the image. For a squared difference
+    render twice with seeds of their own and take ((a - target) * (b - target)).mean().
+    """
+    names = list(values)
+    for name in names:
+        if scene[name] is None:
+            raise InputError(f'parameter "{name}" has no value to give')
+    spp_grad = spp if spp_grad is None else spp_grad
+    return _Render.apply(scene, names, spp, spp_grad, seed, threads, *values.values())

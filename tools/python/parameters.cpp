@@ -1,0 +1,164 @@
+// Parameters of a scene by name, their values in and out.
+#include "limn/core/parameter.h"
+
+#include <fmt/format.h>
+
+#include "limn/core/error.h"
+#include "tools/python/bindings.h"
+
+namespace limn::python {
+
+namespace {
+
+// A parameter of a scene as it was when it was asked for.
+struct ParameterView {
+  std::shared_ptr<const Scene> scene;
+  Parameter parameter;
+};
+
+// All of a scene, as it is.
+struct ParametersView {
+  SceneHandle* scene;  // kept alive by Python
+};
+
+ParameterView find(const SceneHandle& scene, const std::string& name) {
+  return {scene.share(), find_parameter_or_array(scene.get(), name)};
+}
+
+// The shape whose positions the parameter is; none of another parameter.
+std::optional<ShapeId> shape_of(const ParameterView& view) {
+  if (view.parameter.size == 1) return std::nullopt;
+  const std::string& name = view.parameter.name;
+  return find_shape(*view.scene, name.substr(0, name.rfind('.')));
+}
+
+nb::object value_of(const ParameterView& view) {
+  if (const auto shape = shape_of(view)) return nb::cast(view_positions(view.scene, *shape));
+  const std::vector<double> value = view.parameter.value(*view.scene);
+  if (value.empty()) return nb::none();
+  return value.size() == 1 ? nb::cast(value[0]) : as_array(nb::cast(value), "float64");
+}
+
+nb::tuple shape_tuple(const ParameterView& view) {
+  return view.parameter.size == 1 ? nb::make_tuple() : nb::make_tuple(view.parameter.size / 3, 3);
+}
+
+void check_shape(const ParameterView& view, const nb::ndarray<const double, nb::c_contig>& value) {
+  const size_t rows = view.parameter.size / 3;
+  if (view.parameter.size == 1 ||
+      (value.ndim() == 2 && value.shape(0) == rows && value.shape(1) == 3)) {
+    return;
+  }
+  std::string shape;
+  for (size_t k = 0; k < value.ndim(); ++k)
+    shape += fmt::format("{}{}", k ? ", " : "", value.shape(k));
+  throw InputError({view.scene->file}, fmt::format("parameter \"{}\" has shape ({}, 3), not ({})",
+                                                   view.parameter.name, rows, shape));
+}
+
+void assign(SceneHandle& scene, const std::string& name, nb::handle value) {
+  const auto array = nb::cast<nb::ndarray<const double, nb::c_contig, nb::device::cpu>>(
+      as_array(value, "float64"));
+  std::vector<double> numbers(array.data(), array.data() + array.size());
+  Parameter parameter;
+  {
+    const ParameterView view = find(scene, name);
+    check_shape(view, nb::ndarray<const double, nb::c_contig>(array));
+    parameter = view.parameter;
+  }
+  std::vector<std::string> warnings;
+  parameter.assign(scene.edit(), numbers, &warnings);
+  warn_all(warnings);
+}
+
+std::vector<std::string> names_of(const ParametersView& view) {
+  std::vector<std::string> names;
+  for (const Parameter& p : list_parameters(view.scene->get())) names.push_back(p.name);
+  return names;
+}
+
+std::string repr(const ParameterView& view) {
+  const Parameter& p = view.parameter;
+  return fmt::format("<limn.Parameter \"{}\"{}{}>", p.name, p.unit.empty() ? "" : ", " + p.unit,
+                     p.size == 1 ? "" : fmt::format(", shape ({}, 3)", p.size / 3));
+}
+
+nb::object view_of(const char* kind, nb::handle self) {
+  return nb::module_::import_("collections.abc").attr(kind)(self);
+}
+
+void bind_parameter(nb::module_& m) {
+  nb::class_<ParameterView>(m, "Parameter", "What a name stands for, as it was when asked for.")
+      .def_prop_ro(
+          "name", [](const ParameterView& v) { return v.parameter.name; }, "Its name.")
+      .def_prop_ro(
+          "unit", [](const ParameterView& v) { return v.parameter.unit; },
+          "Its unit: \"scene units\", \"radians\", ...; \"\" for plain numbers.")
+      .def_prop_ro(
+          "shape", shape_tuple, nb::sig("def shape(self) -> tuple[int, ...]"),
+          "Of what is differentiated: () for a number, (V, 3) for vertex positions. Colours "
+          "are numbers: their channels move together (grey) and never mix.")
+      .def_prop_ro(
+          "natural_step", [](const ParameterView& v) { return v.parameter.natural_step; },
+          "A small step: about a hundredth of what changes the picture a lot.")
+      .def_prop_ro("value", value_of, nb::sig("def value(self) -> float | numpy.ndarray | None"),
+                   "The value: a number, float64 (3,) of a colour, or float32 (V, 3), a view that "
+                   "cannot be written. None for what only moves things from where they are "
+                   "(Scene.move).")
+      .def("__repr__", repr);
+}
+
+}  // namespace
+
+void bind_parameters(nb::module_& m, nb::class_<SceneHandle>& scene) {
+  bind_parameter(m);
+  nb::class_<ParametersView>(m, "Parameters", "Mapping of names to limn.Parameter.")
+      .def("__getitem__",
+           [](const ParametersView& v, const std::string& name) { return find(*v.scene, name); })
+      .def(
+          "__iter__", [](const ParametersView& v) { return nb::iter(nb::cast(names_of(v))); },
+          nb::sig("def __iter__(self) -> collections.abc.Iterator[str]"))
+      .def("__len__",
+           [](const ParametersView& v) { return list_parameters(v.scene->get()).size(); })
+      .def("__contains__",
+           [](const ParametersView& v, nb::handle name) {
+             if (!nb::isinstance<nb::str>(name)) return false;
+             try {
+               find(*v.scene, nb::cast<std::string>(name));
+             } catch (const InputError&) {
+               return false;
+             }
+             return true;
+           })
+      .def(
+          "keys", [](nb::handle self) { return view_of("KeysView", self); },
+          nb::sig("def keys(self) -> collections.abc.KeysView[str]"))
+      .def(
+          "values", [](nb::handle self) { return view_of("ValuesView", self); },
+          nb::sig("def values(self) -> collections.abc.ValuesView[Parameter]"))
+      .def(
+          "items", [](nb::handle self) { return view_of("ItemsView", self); },
+          nb::sig("def items(self) -> collections.abc.ItemsView[str, Parameter]"))
+      .def("__repr__", [](const ParametersView& v) {
+        std::string text = "limn.Parameters:";
+        for (const std::string& name : names_of(v)) text += "\n  " + name;
+        return text;
+      });
+  scene
+      .def_prop_ro(
+          "parameters", [](SceneHandle& s) { return ParametersView{&s}; }, nb::keep_alive<0, 1>(),
+          "All that can be differentiated: a mapping of names to limn.Parameter. Parts of an "
+          "array (\"object.vertex_positions.7.x\") are found, too, but not listed.")
+      .def(
+          "__getitem__",
+          [](const SceneHandle& s, const std::string& name) { return value_of(find(s, name)); },
+          nb::arg("name"),
+          nb::sig("def __getitem__(self, name: str) -> float | numpy.ndarray | None"),
+          "The value of a parameter, see limn.Parameter.value.")
+      .def("__setitem__", assign, nb::arg("name"), nb::arg("value"),
+           nb::sig("def __setitem__(self, name: str, value: numpy.typing.ArrayLike) -> None"),
+           "Sets the value of a parameter: checked, copied; views that were taken stay as they "
+           "are.");
+}
+
+}  // namespace limn::python

@@ -1,0 +1,79 @@
+// Estimates, and images of scenes.
+#include "limn/integrators/render.h"
+
+#include <fmt/format.h>
+
+#include "limn/core/error.h"
+#include "tools/python/bindings.h"
+
+namespace limn::python {
+
+Estimate to_estimate(const Moments& moments, const Film& film, int64_t spp, double seconds) {
+  return {Array(to_array(mean_image(moments, film.crop_width, film.crop_height))),
+          Array(to_array(standard_error_image(moments, film.crop_width, film.crop_height))),
+          spp,
+          seconds,
+          {}};
+}
+
+namespace {
+
+// numpy's protocol: the values themselves unless another type or a copy is asked for.
+nb::object to_numpy(const Estimate& e, const nb::object& dtype, const nb::object& copy) {
+  nb::object value = nb::cast(e.value);
+  if (!dtype.is_none()) value = value.attr("astype")(dtype, nb::arg("copy") = false);
+  return copy.is_none() || !nb::cast<bool>(copy) ? value : value.attr("copy")();
+}
+
+Estimate render_scene(const SceneHandle& handle, std::optional<int> spp,
+                      std::optional<uint64_t> seed, int threads, const nb::object& progress) {
+  const auto scene = handle.share();
+  RenderResult result;
+  run_job(make_settings(*scene, {spp, seed, 0, threads}), progress,
+          [&](const RunSettings& settings) { result = render(*scene, settings); });
+  Estimate image = to_estimate(result.radiance, scene->film, result.spp, result.seconds);
+  check_finite(result.non_finite, nb::cast(image));
+  return image;
+}
+
+}  // namespace
+
+void bind_render(nb::module_& m) {
+  nb::class_<Estimate>(m, "Estimate",
+                       "A mean over samples with its standard error. numpy takes it for its value.")
+      .def_prop_ro(
+          "value", [](const Estimate& e) { return e.value; }, nb::rv_policy::reference,
+          nb::sig("def value(self) -> numpy.ndarray"),
+          "The mean: float32, (H, W, 3), row 0 on top, of an image; float64 of parameters.")
+      .def_prop_ro(
+          "stderr", [](const Estimate& e) { return e.error; }, nb::rv_policy::reference,
+          nb::sig("def stderr(self) -> numpy.ndarray"),
+          "Its standard error, of the same shape; NaN with fewer than two batches (spp = 1).")
+      .def_ro("spp", &Estimate::spp, "Samples per pixel that were made.")
+      .def_ro("seconds", &Estimate::seconds, "Seconds that the run took, set-up included.")
+      .def_prop_ro(
+          "warnings", [](const Estimate& e) { return e.warnings; },
+          "What the run had to say; Python's warnings told it, too.")
+      .def("__array__", to_numpy, nb::arg("dtype") = nb::none(), nb::arg("copy") = nb::none(),
+           nb::sig("def __array__(self, dtype: object = None, copy: bool | None = None) -> "
+                   "numpy.ndarray"))
+      .def("__repr__", [](const Estimate& e) {
+        std::string shape;
+        for (size_t k = 0; k < e.value.ndim(); ++k) {
+          shape += fmt::format("{}{}", k > 0 ? ", " : "", e.value.shape(k));
+        }
+        return fmt::format("<limn.Estimate: ({}), {} spp, {:.3g} s>", shape, e.spp, e.seconds);
+      });
+  m.def(
+      "render", render_scene, nb::arg("scene"), nb::arg("spp") = nb::none(),
+      nb::arg("seed") = nb::none(), nb::arg("threads") = 0, nb::arg("progress") = nb::none(),
+      nb::sig("def render(scene: Scene, spp: int | None = None, seed: int | None = None, threads: "
+              "int = 0, progress: collections.abc.Callable[[float], object] | None = None) -> "
+              "Estimate"),
+      "The image of a scene: linear RGB radiance, (H, W, 3).\n\n"
+      "spp, seed: of the scene's file if None. threads: 0 for all cores; they change no bit.\n"
+      "progress: called with the fraction done. Ctrl-C raises KeyboardInterrupt; samples that are "
+      "not finite raise limn.NonFiniteError.");
+}
+
+}  // namespace limn::python

@@ -1,0 +1,260 @@
+// Scenes: read, changed, their meshes as arrays.
+#include "limn/core/scene.h"
+
+#include <fmt/format.h>
+
+#include <cstring>
+#include <map>
+
+#include "limn/core/error.h"
+#include "limn/core/names.h"
+#include "limn/core/parameter.h"
+#include "tools/python/bindings.h"
+
+namespace limn::python {
+
+ShapeId find_shape(const Scene& scene, const std::string& id) {
+  std::vector<std::string> known;
+  for (uint32_t i = 0; i < scene.shapes.size(); ++i) {
+    if (scene.shapes[i].id.empty()) continue;
+    if (scene.shapes[i].id == id) return ShapeId(i);
+    known.push_back(scene.shapes[i].id);
+  }
+  throw InputError({scene.file}, unknown_name("shape", id, known));
+}
+
+namespace {
+
+using Kept = std::shared_ptr<const Scene>;
+
+// Keeps a state of the scene alive for a view of it.
+nb::capsule keeper(Kept scene) {
+  return nb::capsule(new Kept(std::move(scene)),
+                     [](void* p) noexcept { delete static_cast<Kept*>(p); });
+}
+
+// The mesh of a shape as it was when it was asked for.
+struct MeshView {
+  Kept scene;
+  ShapeId shape;
+  const Mesh& mesh() const { return scene->shape(shape).mesh; }
+};
+
+using Faces = nb::ndarray<nb::numpy, const uint32_t, nb::shape<-1, 3>, nb::c_contig>;
+using Indices = nb::ndarray<nb::numpy, const uint32_t, nb::shape<-1>, nb::c_contig>;
+
+Faces view_faces(const MeshView& view) {
+  const std::vector<FaceIndices>& faces = view.mesh().faces;
+  return Faces(faces.front().data(), {faces.size(), 3}, keeper(view.scene));
+}
+
+Indices view_weld(const MeshView& view) {
+  const std::vector<uint32_t>& weld = view.mesh().weld;
+  return Indices(weld.data(), {weld.size()}, keeper(view.scene));
+}
+
+template <class T>
+nb::ndarray<const T, nb::c_contig, nb::device::cpu> rows_of_three(nb::handle array,
+                                                                  const char* dtype,
+                                                                  const char* what) {
+  auto rows = nb::cast<nb::ndarray<const T, nb::c_contig, nb::device::cpu>>(as_array(array, dtype));
+  if (rows.ndim() == 2 && rows.shape(1) == 3) return rows;
+  throw InputError(std::string(what) + " have shape (" + what[0] + ", 3), one row each");
+}
+
+std::vector<Vec3f> to_positions(nb::handle array) {
+  const auto rows = rows_of_three<float>(array, "float32", "Vertices");
+  std::vector<Vec3f> positions(rows.shape(0));
+  for (size_t i = 0; i < positions.size(); ++i) {
+    positions[i] = {rows.data()[3 * i], rows.data()[3 * i + 1], rows.data()[3 * i + 2]};
+  }
+  return positions;
+}
+
+std::vector<FaceIndices> to_faces(nb::handle array) {
+  const auto rows = rows_of_three<int64_t>(array, "int64", "Faces");
+  std::vector<FaceIndices> faces(rows.shape(0));
+  for (size_t i = 0; i < rows.size(); ++i) {
+    const int64_t v = rows.data()[i];
+    if (v < 0 || v > UINT32_MAX) {
+      throw InputError(fmt::format("Faces hold indices of vertices, from 0 on, not {}", v));
+    }
+    faces[i / 3][i % 3] = static_cast<uint32_t>(v);
+  }
+  return faces;
+}
+
+// Values of $names as text; booleans as XML writes them.
+std::map<std::string, std::string> to_defines(const nb::kwargs& substitutions) {
+  std::map<std::string, std::string> defines;
+  for (const auto& [name, value] : substitutions) {
+    const std::string text = nb::isinstance<nb::bool_>(value)
+                                 ? (nb::cast<bool>(value) ? "true" : "false")
+                                 : nb::cast<std::string>(nb::str(value));
+    defines[nb::cast<std::string>(name)] = text;
+  }
+  return defines;
+}
+
+template <class Read>
+SceneHandle read(const Read& read_it) {
+  std::vector<std::string> warnings;
+  std::optional<SceneHandle> scene;
+  {
+    const nb::gil_scoped_release release;
+    scene.emplace(read_it(&warnings));
+  }
+  warn_all(warnings);
+  return std::move(*scene);
+}
+
+SceneHandle load(nb::handle file, const nb::kwargs& substitutions) {
+  const auto path = nb::cast<std::string>(nb::module_::import_("os").attr("fspath")(file));
+  const auto defines = to_defines(substitutions);
+  return read(
+      [&](std::vector<std::string>* warnings) { return read_scene(path, defines, warnings); });
+}
+
+SceneHandle load_string(const std::string& xml, nb::handle folder,
+                        const nb::kwargs& substitutions) {
+  const auto path = nb::cast<std::string>(nb::module_::import_("os").attr("fspath")(folder));
+  const auto defines = to_defines(substitutions);
+  return read([&](std::vector<std::string>* warnings) {
+    return read_scene_text(xml, path, defines, warnings);
+  });
+}
+
+std::string shading_name(const SceneHandle& scene) {
+  return scene.get().shading == ShadingModel::kMitsuba ? "mitsuba" : "continuous";
+}
+
+void set_shading(SceneHandle& scene, const std::string& name) {
+  if (name != "mitsuba" && name != "continuous") {
+    throw InputError(unknown_name("shading", name, {"continuous", "mitsuba"}));
+  }
+  scene.edit().shading = name == "mitsuba" ? ShadingModel::kMitsuba : ShadingModel::kContinuous;
+}
+
+std::vector<std::string> shape_ids(const SceneHandle& scene) {
+  std::vector<std::string> ids;
+  for (const Shape& shape : scene.get().shapes) ids.push_back(shape.id);
+  return ids;
+}
+
+std::string repr(const SceneHandle& handle) {
+  const Scene& scene = handle.get();
+  size_t faces = 0;
+  for (const Shape& shape : scene.shapes) faces += shape.mesh.faces.size();
+  return fmt::format("<limn.Scene \"{}\": {} x {} pixels, {} shapes, {} faces>", scene.file,
+                     scene.film.crop_width, scene.film.crop_height, scene.shapes.size(), faces);
+}
+
+void bind_mesh(nb::module_& m) {
+  nb::class_<MeshView>(m, "Mesh", "The mesh of a shape as it was when it was asked for.")
+      .def_prop_ro(
+          "positions", [](const MeshView& v) { return view_positions(v.scene, v.shape); },
+          nb::rv_policy::reference,
+          "Vertices in world space: float32, (V, 3), scene units; a view that cannot be written.")
+      .def_prop_ro(
+          "faces", view_faces, nb::rv_policy::reference,
+          "Indices of corners, counter-clockwise from outside: uint32, (F, 3); a view that "
+          "cannot be written.")
+      .def_prop_ro("weld", view_weld, nb::rv_policy::reference,
+                   "For each vertex the first one at its place: uint32, (V,). Copies of a vertex "
+                   "(seams) move together in derivatives: positions[weld] keeps a mesh whole.")
+      .def("__repr__", [](const MeshView& v) {
+        return fmt::format("<limn.Mesh: {} vertices, {} faces>", v.mesh().positions.size(),
+                           v.mesh().faces.size());
+      });
+}
+
+void bind_changes(nb::class_<SceneHandle>& scene) {
+  scene
+      .def(
+          "mesh",
+          [](const SceneHandle& s, const std::string& shape) {
+            return MeshView{s.share(), find_shape(s.get(), shape)};
+          },
+          nb::arg("shape"), "The mesh of the shape of this id.")
+      .def(
+          "set_mesh",
+          [](SceneHandle& s, const std::string& shape, nb::handle positions, nb::handle faces) {
+            const ShapeId id = find_shape(s.get(), shape);
+            std::vector<std::string> warnings;
+            set_mesh(s.edit(), id, to_positions(positions), to_faces(faces), &warnings);
+            warn_all(warnings);
+          },
+          nb::arg("shape"), nb::arg("positions"), nb::arg("faces"),
+          nb::sig("def set_mesh(self, shape: str, positions: numpy.typing.ArrayLike, faces: "
+                  "numpy.typing.ArrayLike) -> None"),
+          "Gives a shape another mesh, in world space: (V, 3) positions and (F, 3) indices.\n\n"
+          "Flat shapes stay flat; all others get computed normals. The mesh is mended as one from "
+          "a "
+          "file, with warnings.")
+      .def(
+          "move",
+          [](SceneHandle& s, const std::string& name, double step) {
+            const Parameter parameter = find_parameter(s.get(), name);
+            parameter.move(s.edit(), step);
+          },
+          nb::arg("name"), nb::arg("step"),
+          "Moves a parameter by `step`, in its unit, from where it is; exact for large steps.")
+      .def(
+          "copy", [](const SceneHandle& s) { return SceneHandle(s); },
+          "A scene of its own; what both share is copied when one of them changes.");
+}
+
+}  // namespace
+
+Positions view_positions(Kept scene, ShapeId shape) {
+  const std::vector<Vec3f>& positions = scene->shape(shape).mesh.positions;
+  static_assert(sizeof(Vec3f) == 3 * sizeof(float));
+  const float* first = &positions.front().x;
+  const size_t count = positions.size();
+  return Positions(first, {count, 3}, keeper(std::move(scene)));
+}
+
+nb::class_<SceneHandle> bind_scene(nb::module_& m) {
+  bind_mesh(m);
+  nb::class_<SceneHandle> scene(
+      m, "Scene",
+      "A scene: its parameters by name, and what is needed to render it.\n\n"
+      "scene[name] reads a parameter's value, scene[name] = value sets it; see `parameters`. Runs "
+      "that "
+      "were started keep the state they were started with.");
+  bind_changes(scene);
+  scene
+      .def_prop_ro(
+          "file", [](const SceneHandle& s) { return s.get().file; }, "Its XML file.")
+      .def_prop_ro(
+          "width", [](const SceneHandle& s) { return s.get().film.crop_width; },
+          "Pixels of a row of its images.")
+      .def_prop_ro(
+          "height", [](const SceneHandle& s) { return s.get().film.crop_height; },
+          "Rows of its images.")
+      .def_prop_ro(
+          "spp", [](const SceneHandle& s) { return s.get().sample_count; },
+          "Samples per pixel that the file asks for.")
+      .def_prop_ro(
+          "seed", [](const SceneHandle& s) { return s.get().seed; },
+          "The seed that the file asks for.")
+      .def_prop_ro("shapes", shape_ids, "Ids of all shapes, \"\" where the file gives none.")
+      .def_prop_rw(
+          "shading", shading_name, set_shading,
+          "How interpolated normals shade: \"continuous\", or \"mitsuba\", whose jumps are "
+          "missing from gradients.")
+      .def("__repr__", repr);
+  m.def("load", load, nb::arg("file"), nb::arg("substitutions"),
+        nb::sig("def load(file: str | os.PathLike[str], **substitutions: object) -> Scene"),
+        "Reads a scene file, the subset of Mitsuba 3's XML that scenes/README.md describes.\n\n"
+        "Keywords give values to its $names, as -D does: limn.load(\"demo.xml\", width=64). Raises "
+        "limn.InputError with file, line and column.");
+  m.def("load_string", load_string, nb::arg("xml"), nb::arg("folder") = "",
+        nb::arg("substitutions"),
+        nb::sig("def load_string(xml: str, folder: str | os.PathLike[str] = '', **substitutions: "
+                "object) -> Scene"),
+        "Reads a scene from its XML; files that it names are looked for in `folder`.");
+  return scene;
+}
+
+}  // namespace limn::python
