@@ -208,16 +208,10 @@ class Scattering {
     if (value(factor) == 0) return {};
     return detail::eval_bsdf<S>(*bsdf_, copies_, n_, wi_, w) * factor;
   }
-  // Its value alone.
+  // The value of eval for a direction that is held, at the cost of plain numbers; to rounding.
   Rgb<double> eval_value(const Vec3d& wo) const {
     const double factor = limited_ ? horizon_value(wo) : 1;
     return factor == 0 ? Rgb<double>{} : bsdf_->eval(value(n_), value(wi_), wo) * factor;
-  }
-  // The value of eval for a direction that is held, at the cost of plain numbers; to rounding.
-  Rgb<double> eval_value(const Vec3d& wo) const {
-    const double factor = limited_ ? value(horizon_factor(wo)) : 1.0;
-    if (factor == 0) return {};
-    return bsdf_->eval(value(n_), value(wi_), wo) * factor;
   }
   // The part of eval's derivative that comes from the motion of wo alone.
   Rgb<Lanes> eval_derivative(const Vec3<Dual>& wo) const {
