@@ -107,7 +107,8 @@ class Tape {
   };
   void sweep(uint32_t begin, uint32_t end);
 
-  static inline constinit thread_local Tape* current_ = nullptr;
+  // The one thread-local object of inner loops: in a shared library it would cost a call each time.
+  [[gnu::tls_model("initial-exec")]] static inline constinit thread_local Tape* current_ = nullptr;
   const SceneSlots* slots_;
   std::vector<uint32_t> ends_;  // of the entries of each node
   std::vector<Entry> entries_;
