@@ -4,6 +4,7 @@
 #include <array>
 #include <coin/ClpSimplex.hpp>
 #include <limits>
+#include <memory>
 
 namespace limn {
 namespace {
@@ -48,7 +49,9 @@ void load(const std::vector<Eigen::Vector4d>& points, Workplace& place, ClpSimpl
 }  // namespace
 
 Eigen::Vector4d separating_direction(const std::vector<Eigen::Vector4d>& points) {
-  static thread_local Workplace place;
+  // On the heap: a shared library has little room for what belongs to threads.
+  static thread_local const auto owned = std::make_unique<Workplace>();
+  Workplace& place = *owned;
   ClpSimplex simplex(place.empty);
   load(points, place, simplex);
   simplex.dual();

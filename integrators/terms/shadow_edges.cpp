@@ -152,8 +152,7 @@ std::optional<ShadowPoint> ShadowEdges::cast(const ShadowEdge& edge, double t,
   ++rays.closest;
   // Where the edge touches what it shades, to a float's rounding, the shadow starts behind the edge
   // for every viewer, who sees the edge itself.
-  const bool found =
-      closest_at_edge(context_.tracer, context_.scene, around, y, before, ray, hit);
+  const bool found = closest_at_edge(context_.tracer, context_.scene, around, y, before, ray, hit);
   if (!found || hit.t <= before * (1 + 0x1p-20)) return {};
   const auto c = face_corners<double>(context_.scene.shape(hit.face.shape).mesh, hit.face.face);
   const Vec3d n = normalize(cross(c[1] - c[0], c[2] - c[0]));

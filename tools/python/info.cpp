@@ -50,8 +50,7 @@ nb::dict describe_shape(const Scene& scene, ShapeId id) {
 nb::dict describe_crossings(const Scene& scene, int threads) {
   std::vector<const Mesh*> meshes;
   for (const Shape& shape : scene.shapes) meshes.push_back(&shape.mesh);
-  const std::vector<FacePair> pairs =
-      find_face_pairs(meshes, value(scene.camera.origin), threads);
+  const std::vector<FacePair> pairs = find_face_pairs(meshes, value(scene.camera.origin), threads);
   const std::vector<CrossingSegment> segments = find_crossings(meshes, pairs, threads);
   std::set<ShapeId> shapes;
   for (const CrossingSegment& segment : segments) {
