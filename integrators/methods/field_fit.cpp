@@ -27,6 +27,10 @@ constexpr int kJudgeRadius = 4;
 constexpr double kConvincing = 0.5;
 // Shrinks coefficients towards none: added to the diagonal, as a share of it. Not tuned.
 constexpr double kRidge = 0.05;
+// The same where a window has seen next to nothing of an unknown: against what is usual on the film,
+// as a share of it. Without it, rounding decided on coefficients of 1e12 where an edge was yet to be
+// met. Coefficients end below 5 times what is usual. Not tuned.
+constexpr double kLeast = 0.01;
 
 // Variance of the derivative plus the combination of the unknowns.
 double variance_with(const Covariances& c, int parameter, const Coefficients& b) {
@@ -39,10 +43,27 @@ double variance_with(const Covariances& c, int parameter, const Coefficients& b)
   return sum;
 }
 
+// What is known before a window is looked at: over the whole film, variances of the unknowns and of
+// the parameters' derivatives.
+struct Prior {
+  std::array<double, kUnknowns> unknowns{};
+  std::vector<double> parameters;
+
+  // Of the derivatives summed up in c, in units of those of a cell.
+  double size_of(const Covariances& c) const {
+    double sum = 0;
+    for (size_t k = 0; k < parameters.size(); ++k) {
+      if (parameters[k] > 0) sum += c.variance(static_cast<int>(k)) / parameters[k];
+    }
+    return parameters.empty() ? 0 : sum / static_cast<double>(parameters.size());
+  }
+};
+
 // Least squares with a part of the unknowns, for any of the parameters.
 class Fit {
  public:
-  Fit(const Covariances& c, const Basis& basis) : c_(c), basis_(basis) {
+  Fit(const Covariances& c, const Basis& basis, const Prior& prior)
+      : c_(c), basis_(basis), prior_(prior), size_(prior.size_of(c)) {
     if (basis.count == 3) {
       decompose(three_);
     } else {
@@ -62,7 +83,7 @@ class Fit {
     Eigen::Matrix<double, kCount, kCount> a;
     for (int i = 0; i < kCount; ++i) {
       for (int j = 0; j < kCount; ++j) a(i, j) = c_.of(basis_.first + i, basis_.first + j);
-      a(i, i) *= 1 + kRidge;
+      a(i, i) = (1 + kRidge) * a(i, i) + kLeast * size_ * prior_.unknowns[basis_.first + i];
     }
     solver.compute(a);
   }
@@ -78,6 +99,8 @@ class Fit {
 
   Covariances c_;
   Basis basis_;
+  const Prior& prior_;
+  double size_;
   Solver<3> three_;
   Solver<6> six_;
 };
@@ -121,6 +144,7 @@ class Fitter {
     // What remains of a term decides how much of the work it gets, and so how much it counts.
     for (int round = 0; round < 2; ++round) {
       weigh_terms(result.variances);
+      set_prior();
       chosen = choose();
       set_variances(chosen, result);
     }
@@ -161,6 +185,20 @@ class Fitter {
     }
   }
 
+  void set_prior() {
+    prior_ = {};
+    prior_.parameters.resize(parameters_);
+    const double share = 0.5 / static_cast<double>(grid_.size());
+    for (const CellCovariances& half : total_) {
+      for (size_t cell = 0; cell < grid_.size(); ++cell) {
+        for (int i = 0; i < kUnknowns; ++i) prior_.unknowns[i] += share * half[cell].of(i, i);
+        for (int k = 0; k < parameters_; ++k) {
+          prior_.parameters[k] += share * half[cell].variance(k);
+        }
+      }
+    }
+  }
+
   // Of all parameters and bases, with windows of one size: the cross-validated variance of a cell.
   using Left = std::vector<std::array<std::vector<double>, std::size(kBases)>>;
   Left left_by(int radius) const {
@@ -173,7 +211,7 @@ class Fitter {
       for (int x = 0; x < grid_.columns; ++x) {
         const size_t cell = y * grid_.columns + x;
         for (size_t b = 0; b < std::size(kBases); ++b) {
-          const Fit first(sums[0][x], kBases[b]), second(sums[1][x], kBases[b]);
+          const Fit first(sums[0][x], kBases[b], prior_), second(sums[1][x], kBases[b], prior_);
           for (int k = 0; k < parameters_; ++k) {
             left[k][b][cell] = 0.5 * (variance_with(total_[1][cell], k, first.of(k)) +
                                       variance_with(total_[0][cell], k, second.of(k)));
@@ -258,8 +296,8 @@ class Fitter {
             const int fit = chosen[k][first + x];
             if (!uses(fit)) continue;
             const Basis& basis = kBases[fit % std::size(kBases)];
-            visit(k, first + x, Fit(sums[0][x], basis).of(k), Fit(sums[1][x], basis).of(k),
-                  Fit(both[x], basis).of(k));
+            visit(k, first + x, Fit(sums[0][x], basis, prior_).of(k),
+                  Fit(sums[1][x], basis, prior_).of(k), Fit(both[x], basis, prior_).of(k));
           }
         }
       });
@@ -311,6 +349,7 @@ class Fitter {
   int parameters_;
   int threads_;
   std::array<CellCovariances, 2> total_;  // of all terms, weighed, from either half
+  Prior prior_;                           // of total_
 };
 
 }  // namespace

@@ -354,7 +354,8 @@ TEST_F(Program, UnknownNamesListTheKnown) {
   EXPECT_NE(refused("render " + scene_ + " --shading phong -o " + out()).find("continuous"),
             std::string::npos);
   EXPECT_NE(refused("paint " + scene_)
-                .find("limn paint: no such command (known: info, render, gradient, check, compare, "
+                .find("limn paint: no such command (known: info, render, gradient, backward, "
+                      "check, compare, "
                       "reject; limn --help tells more)"),
             std::string::npos);
   EXPECT_NE(refused("").find("limn: a command is needed (known: info"), std::string::npos);
