@@ -2,9 +2,10 @@
 // Where edges of a scene lie on faces of it, to the rounding of positions, and which faces are
 // nearer to them than rays can tell.
 //
-// A position is taken to have been rounded to float twice (in a file, and after its transform): what
-// the rounding of positions of size M explains is touch_tolerance(M). M is the largest coordinate of
-// a face, not of a vertex: a vertex near the origin was rounded where its neighbours are.
+// A position is taken to have been rounded to float twice (in a file, and after its transform):
+// what the rounding of positions of size M explains is touch_tolerance(M). M is the largest
+// coordinate of a face, not of a vertex: a vertex near the origin was rounded where its neighbours
+// are.
 #include <span>
 #include <vector>
 

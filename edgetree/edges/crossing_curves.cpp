@@ -42,8 +42,8 @@ class HeightOver {
   double of(const Vec3d& x) const { return dot(normal_, x - a_); }
 
   // How much of it rounding can explain: of the three corners and x, wherever x is over the plane
-  // (the gradient's length times 2 * 2^-24 |x|, as in fold_of); no less than lets edges lie on a face
-  // (contacts.h), so that what touches does not cross. size: of x's triangle.
+  // (the gradient's length times 2 * 2^-24 |x|, as in fold_of); no less than lets edges lie on a
+  // face (contacts.h), so that what touches does not cross. size: of x's triangle.
   double rounding(const Vec3d& x, double size) const {
     const double positions = fold_of(a_, b_, c_, x).rounding;
     return std::max(positions, touch_tolerance(size_of(triangle_), size) * length(normal_));

@@ -60,7 +60,8 @@ class Builder {
     }
   }
 
-  // By the smaller of the two ends (counted, which is faster than to compare), the larger, the face.
+  // By the smaller of the two ends (counted, which is faster than to compare), the larger, the
+  // face.
   void sort_sides(const std::vector<HalfEdge>& sides) {
     const auto low = [](const HalfEdge& s) { return std::min(s.from, s.to).index(); };
     std::vector<uint32_t> offsets(mesh_.positions.size() + 1);

@@ -106,8 +106,9 @@ struct Hull {
 };
 
 // Whether some mean of the points, with weights that are not negative, is shorter than half of
-// kMinSeparation: then no unit Z has that much with all of them (half is far beyond rounding). Wolfe's algorithm for the shortest
-// vector of a hull. It may give up: the linear programs, many for each such set, find the same.
+// kMinSeparation: then no unit Z has that much with all of them (half is far beyond rounding).
+// Wolfe's algorithm for the shortest vector of a hull. It may give up: the linear programs, many
+// for each such set, find the same.
 bool surrounds_origin(const std::vector<Vector4d>& points) {
   constexpr int kSteps = 32;  // not tuned
   Hull hull;

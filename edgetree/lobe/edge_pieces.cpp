@@ -104,8 +104,8 @@ void EdgeCutter::add(const ListedEdge& edge, const EdgeMesh& mesh, double t0, do
   }
 }
 
-// Mean over u of f_s(z / |z|) |m . v(z)| / |z|^3, with v over the distance; m is normal to the plane
-// through p and the edge, v0 and v1 are m . v at the ends of the whole edge.
+// Mean over u of f_s(z / |z|) |m . v(z)| / |z|^3, with v over the distance; m is normal to the
+// plane through p and the edge, v0 and v1 are m . v at the ends of the whole edge.
 double EdgeCutter::mean_over(const EdgePiece& piece, const Vec3d& w0, const Vec3d& along,
                              const Lanes& v0, const Lanes& v1) const {
   double sum = 0;

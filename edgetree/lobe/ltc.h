@@ -6,8 +6,8 @@
 //   value(w) = (1 - kLtcFloor) ltc(w) + kLtcFloor (n.w) / pi   where n.w > 0, else 0  [1/sr].
 //
 // The floor keeps the value positive wherever the scattering function is. Diffuse: M = identity,
-// and value is the scattering function over its albedo. Which transformed cosine it is the lobe says
-// (LobeModel::ltc); one that says none is taken for diffuse.
+// and value is the scattering function over its albedo. Which transformed cosine it is the lobe
+// says (LobeModel::ltc); one that says none is taken for diffuse.
 #include "edgetree/simd.h"
 #include "limn/core/lobe.h"
 

@@ -2,9 +2,10 @@
 //
 // Let u be a point of the box with |g(u)| <= error, and G the largest of |g_1|, |g_2|, |g_3|.
 // Moving u along the axis of G by reach = error / G at most leads to a point v of the plane, and of
-// the box widened to |v_k| <= side = 1 + reach + kMargin. So it is enough to find the range of f over
-// the polygon C of that box, and to widen it by |f(u) - f(v)| <= 2 side reach: the coefficients'
-// moduli add up to 1. Where reach is above kFar this says nothing, and nothing is rejected.
+// the box widened to |v_k| <= side = 1 + reach + kMargin. So it is enough to find the range of f
+// over the polygon C of that box, and to widen it by |f(u) - f(v)| <= 2 side reach: the
+// coefficients' moduli add up to 1. Where reach is above kFar this says nothing, and nothing is
+// rejected.
 //
 // What is left is the rounding of doubles. C holds a disc of radius kMargin / 2 around v, and is
 // convex with six sides at most. Its plane is solved for the axis of G, u_2 = alpha + beta_0 u_0 +

@@ -5,7 +5,8 @@
 // With Q_o = D D^T and D along the box's Z, the planes of the family between Q_0 and Q_1 are those
 // of the slab low <= f(u) <= high, f being a quadratic polynomial of the box's coordinates u:
 // lambda(q) of the paper is -(q . Q_f q) / (D . q)^2, and D . q is the same for all points of the
-// box. So ten coefficients and two bounds stand for two matrices, and the constant is in the bounds.
+// box. So ten coefficients and two bounds stand for two matrices, and the constant is in the
+// bounds.
 #include "edgetree/quadric/lanes.h"
 
 namespace limn {

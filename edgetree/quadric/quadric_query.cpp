@@ -20,8 +20,8 @@ struct FramePoint {
 
 // Entries of rows are off by 2^-24 of themselves (they were rounded to floats), so that a row is by
 // 2^-24 of its length, and all rows together by 2^-24; rounding of doubles, here and where the box
-// was fitted (kMinSeparation), is far below as much again. A plane of the box is as long as the rows
-// together at most, and a unit plane is longer than 1: distance_error stands for itself.
+// was fitted (kMinSeparation), is far below as much again. A plane of the box is as long as the
+// rows together at most, and a unit plane is longer than 1: distance_error stands for itself.
 QueryPlanes planes_of(const QuadricNode& node, const FramePoint& at, double slack) {
   QueryPlanes planes;
   for (int i = 0; i < 4; ++i)

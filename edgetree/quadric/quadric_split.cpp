@@ -98,8 +98,8 @@ class Splitter {
  public:
   explicit Splitter(std::span<Item> items) : items_(items) {}
 
-  // As in the forest's: appends the subtree over a range; ranges of at most `stop` items are left to
-  // `pending` as (node, lane).
+  // As in the forest's: appends the subtree over a range; ranges of at most `stop` items are left
+  // to `pending` as (node, lane).
   struct Pending {
     uint32_t node;
     uint32_t lane;

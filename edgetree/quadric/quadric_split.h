@@ -22,8 +22,8 @@ struct QuadricSplit {
 struct QuadricShape {
   std::vector<QuadricSplit> nodes;  // the root first; parents before children
   std::vector<uint32_t> order;      // ranges refer to this permutation of the wedges
-  // Subtrees that one thread made, next to each other behind all other nodes: their first nodes, and
-  // the number of all nodes.
+  // Subtrees that one thread made, next to each other behind all other nodes: their first nodes,
+  // and the number of all nodes.
   std::vector<uint32_t> parts;
 };
 

@@ -34,8 +34,8 @@ struct AdjointContext {
 
 using AdjointCosts = std::array<TermCost, kAdjointTerms>;
 
-// Puts weights on nodes of the tape and sweeps; then hands on what the ends of edges got, which stand
-// for themselves on the tape as free nodes.
+// Puts weights on nodes of the tape and sweeps; then hands on what the ends of edges got, which
+// stand for themselves on the tape as free nodes.
 class Seeds {
  public:
   void add(uint32_t node, double weight) {
@@ -68,8 +68,8 @@ class Seeds {
   std::vector<EdgePoint> points_;
 };
 
-// dL_k/dtheta where shadows' edges sweep over what a viewer sees: the node of G of shadow_boundary.cpp
-// as a statement. origin, direction: of the viewer's ray; distance: along it.
+// dL_k/dtheta where shadows' edges sweep over what a viewer sees: the node of G of
+// shadow_boundary.cpp as a statement. origin, direction: of the viewer's ray; distance: along it.
 Var shadow_sweep(const AdjointContext& context, const ShadowEdge& edge, const ShadowPoint& point,
                  const Vec3<Var>& origin, const Vec3<Var>& direction, double distance,
                  Seeds& seeds);

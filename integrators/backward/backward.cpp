@@ -106,7 +106,8 @@ class BackwardPass {
   void run_paths(const PathBatch& batch, ProgressCounter& progress, ContributionSum& sum);
   void run_film(AdjointTerm term, const PathBatch& batch, ProgressCounter& progress,
                 ContributionSum& sum);
-  // make(sample, tape, figures, list): adds one sample; false if it was not finite. place: of a sample.
+  // make(sample, tape, figures, list): adds one sample; false if it was not finite. place: of a
+  // sample.
   template <class Make, class Place>
   void run_tiles(size_t samples, ProgressCounter& progress, ContributionSum& sum,
                  AdjointTerm booked, const Make& make, const Place& place);

@@ -12,8 +12,8 @@ class ContributionSum {
   // count: slots, with the unused first one.
   explicit ContributionSum(uint32_t count) : sums_(count) {}
 
-  // Calls make(tile, list) for every tile, in parallel, and adds the lists in the order of tiles. The
-  // lists of 64 tiles are held at a time.
+  // Calls make(tile, list) for every tile, in parallel, and adds the lists in the order of tiles.
+  // The lists of 64 tiles are held at a time.
   void add(size_t tiles, int threads,
            const std::function<void(size_t, std::vector<Contribution>&)>& make);
 

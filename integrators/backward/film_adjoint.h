@@ -18,8 +18,9 @@ class FilmAdjoint {
   std::vector<Rgb<double>> pixels_;
 };
 
-// One sample: u in [0, 1), stratified over a batch, chooses the point; `key` is for everything else.
-// share: of the batch's samples, one over their number for each pixel and path. As add_path_adjoint.
+// One sample: u in [0, 1), stratified over a batch, chooses the point; `key` is for everything
+// else. share: of the batch's samples, one over their number for each pixel and path. As
+// add_path_adjoint.
 bool add_camera_adjoint(const AdjointContext& context, const FilmAdjoint& film, double u,
                         const Rng& key, double share, Tape& tape, TermCost& cost,
                         std::vector<Contribution>& contributions);

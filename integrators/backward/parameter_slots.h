@@ -1,6 +1,6 @@
 #pragma once
-// From names of parameters to slots of a gradient, and back: which numbers of the scene have a slot, and
-// how the parameters' derivatives follow from those of the slots.
+// From names of parameters to slots of a gradient, and back: which numbers of the scene have a
+// slot, and how the parameters' derivatives follow from those of the slots.
 #include <string>
 #include <vector>
 

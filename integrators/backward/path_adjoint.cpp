@@ -1,6 +1,6 @@
 // One path on the tape. At its vertices edges are drawn as in forward mode, with an importance that
-// knows no motion: the vertices of all that moves have unit tangents along the axes, the shading point
-// their opposites, if it moves, so that an edge never seems to rest beside it.
+// knows no motion: the vertices of all that moves have unit tangents along the axes, the shading
+// point their opposites, if it moves, so that an edge never seems to rest beside it.
 #include "integrators/backward/path_adjoint.h"
 
 #include <limits>

@@ -5,9 +5,9 @@
 
 namespace limn {
 
-// The path of sample `key` through pixel (x, y), weighed by `adjoint`: the pixel's, over its expected
-// number of paths. Adds to `contributions`; false if something was not finite, and then nothing is
-// added. Writes to the tape, which is cleared first.
+// The path of sample `key` through pixel (x, y), weighed by `adjoint`: the pixel's, over its
+// expected number of paths. Adds to `contributions`; false if something was not finite, and then
+// nothing is added. Writes to the tape, which is cleared first.
 bool add_path_adjoint(const AdjointContext& context, int x, int y, const Rng& key,
                       const Rgb<double>& adjoint, Tape& tape, AdjointCosts& costs,
                       std::vector<Contribution>& contributions);

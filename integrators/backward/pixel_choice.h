@@ -9,7 +9,8 @@
 
 namespace limn {
 
-// The paths of a batch: samples [first, last) of every pixel, or as many paths spread over the pixels.
+// The paths of a batch: samples [first, last) of every pixel, or as many paths spread over the
+// pixels.
 struct PathBatch {
   uint64_t seed;
   int first, last;

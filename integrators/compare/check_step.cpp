@@ -11,8 +11,8 @@
 namespace limn {
 namespace {
 
-// Steps of a ladder from the natural one down, each kFactor times the one before. It must reach well
-// below what moves in the image: where everything has moved away, no further change shows.
+// Steps of a ladder from the natural one down, each kFactor times the one before. It must reach
+// well below what moves in the image: where everything has moved away, no further change shows.
 constexpr int kTrials = 9;
 constexpr double kFactor = 4;
 constexpr int kLadders = 2;       // one below the other
@@ -25,8 +25,8 @@ constexpr double kAllowedBias = 1;
 // Var(4 D_h - D_2h) / 9 over Var(D_h) for events at moving edges: those that h sees, 2h sees too.
 constexpr double kExtrapolated = 12.5 / 9;
 
-// Below this part of a moved coordinate, a vertex moves by what rounding leaves of its way: an error
-// of 2^-10 of it.
+// Below this part of a moved coordinate, a vertex moves by what rounding leaves of its way: an
+// error of 2^-10 of it.
 constexpr double kLeastMove = 0x1p-14;
 
 // The least step that floats resolve; 0 if no vertex moves.

@@ -7,8 +7,8 @@
 
 namespace limn {
 
-// Calls visit(x, y, weight) for every pixel of the crop window whose value holds radiance at the film
-// position [pixels of the full film] with this weight [1 / pixel^2].
+// Calls visit(x, y, weight) for every pixel of the crop window whose value holds radiance at the
+// film position [pixels of the full film] with this weight [1 / pixel^2].
 template <class Visit>
 void for_every_pixel_of(const Film& film, double film_x, double film_y, const Visit& visit) {
   const double radius = film.filter.radius;

@@ -27,9 +27,9 @@ constexpr int kJudgeRadius = 4;
 constexpr double kConvincing = 0.5;
 // Shrinks coefficients towards none: added to the diagonal, as a share of it. Not tuned.
 constexpr double kRidge = 0.05;
-// The same where a window has seen next to nothing of an unknown: against what is usual on the film,
-// as a share of it. Without it, rounding decided on coefficients of 1e12 where an edge was yet to be
-// met. Coefficients end below 5 times what is usual. Not tuned.
+// The same where a window has seen next to nothing of an unknown: against what is usual on the
+// film, as a share of it. Without it, rounding decided on coefficients of 1e12 where an edge was
+// yet to be met. Coefficients end below 5 times what is usual. Not tuned.
 constexpr double kLeast = 0.01;
 
 // Variance of the derivative plus the combination of the unknowns.

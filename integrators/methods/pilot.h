@@ -17,8 +17,8 @@ inline constexpr int kPilotLights = 2;  // light samples at later vertices
 struct PilotFigures {
   int spp = 0;  // samples of every probed pixel; 0: there was no time for a pilot
   PlanGrid grid;
-  // [half][slot]: covariances of one sample, from either half of the pilot. Empty for slots that add
-  // nothing to pixels. Behind the slots stands one more: PathTracer::light_difference,
+  // [half][slot]: covariances of one sample, from either half of the pilot. Empty for slots that
+  // add nothing to pixels. Behind the slots stands one more: PathTracer::light_difference,
   // which is half of what a light sample at later vertices adds, paths taking two of them.
   std::array<std::vector<CellCovariances>, 2> halves;
   // Of slots on the film: the mean over pixels of the variance of one sample per pixel, summed over
@@ -33,9 +33,9 @@ struct PilotFigures {
   bool in_cells(size_t slot) const { return !halves[0][slot].empty(); }
 };
 
-// turns: whether turns of directions at first vertices are looked at. spp: even. settings: its limit
-// of time holds for the whole job, which `watch` has timed since it began: a pilot takes an eighth of
-// it at most.
+// turns: whether turns of directions at first vertices are looked at. spp: even. settings: its
+// limit of time holds for the whole job, which `watch` has timed since it began: a pilot takes an
+// eighth of it at most.
 PilotFigures run_pilot(const TermEstimator& estimator, bool turns, int spp,
                        const RunSettings& settings, const Stopwatch& watch);
 

@@ -15,11 +15,11 @@ Scene seeded(const Scene& scene, std::span<const Parameter> parameters) {
   return copy;
 }
 
-// In a pilot directions turn at the rate of what moves. Edges that move by it alone count for so much
-// less than those of the parameters: the first share for one parameter (not tuned), the second for
-// several. Turns draw samples away from the parameters, whose terms the pilot then takes for noisier
-// than they are: with 0.3, four at once had 1.1 to 1.2 times the squared error in a soft shadow, with
-// 0.02 1.15 times in a chandelier.
+// In a pilot directions turn at the rate of what moves. Edges that move by it alone count for so
+// much less than those of the parameters: the first share for one parameter (not tuned), the second
+// for several. Turns draw samples away from the parameters, whose terms the pilot then takes for
+// noisier than they are: with 0.3, four at once had 1.1 to 1.2 times the squared error in a soft
+// shadow, with 0.02 1.15 times in a chandelier.
 constexpr double kFreeTurnShare = 0.3, kTurnShare = 0.05;
 
 // What a sample comes to that asks for a ray which cannot be traced.

@@ -13,12 +13,14 @@
 
 namespace limn {
 
-// The rows of term_types() that the sampler has and the scene has anything of. Slots are indices into it.
+// The rows of term_types() that the sampler has and the scene has anything of. Slots are indices
+// into it.
 std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler);
 
 class TermEstimator final : public SampleEstimator {
  public:
-  // parameters: at most kLanes. computed: for each of terms_of(scene, sampler), whether it is computed.
+  // parameters: at most kLanes. computed: for each of terms_of(scene, sampler), whether it is
+  // computed.
   TermEstimator(const Scene& scene, std::span<const Parameter> parameters,
                 const std::vector<bool>& computed, const EdgeSamplerType& sampler, int threads);
   TermEstimator(const TermEstimator&) = delete;

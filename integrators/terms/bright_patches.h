@@ -18,9 +18,9 @@ struct BrightPatch {
   double luminance;  // mean over the cap
 };
 
-// Disjoint caps of a few degrees that are much brighter than the environment is on average and hold a
-// good part of its light each, the one with the most first; none for most environments. Found among
-// directions that the environment itself draws, the same each time.
+// Disjoint caps of a few degrees that are much brighter than the environment is on average and hold
+// a good part of its light each, the one with the most first; none for most environments. Found
+// among directions that the environment itself draws, the same each time.
 std::vector<BrightPatch> find_bright_patches(const Environment& environment);
 
 }  // namespace limn

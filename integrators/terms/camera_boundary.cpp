@@ -1,5 +1,5 @@
-// The boundary term of the camera: edges seen from the pinhole, and curves where its clip planes cut
-// faces, listed once, sampled on the film.
+// The boundary term of the camera: edges seen from the pinhole, and curves where its clip planes
+// cut faces, listed once, sampled on the film.
 //   dI_j/dtheta  +=  integral along the projected edges of h_j(s) dL v_n dl,
 // with s the film position [pixels], dl its length element, v_n = ds/dtheta . n the normal speed of
 // the projected edge, and dL the radiance behind the normal n minus that before it.

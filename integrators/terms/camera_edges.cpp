@@ -145,8 +145,8 @@ bool CameraEdges::clip_and_project(EdgeRef id, FilmEdge& edge) const {
                        edge);
 }
 
-// From the ends of what reaches the film. side: the normal of the plane through it and the pinhole, to
-// the positive side.
+// From the ends of what reaches the film. side: the normal of the plane through it and the pinhole,
+// to the positive side.
 bool CameraEdges::place_on_film(const Vec3<Dual>& x0, const Vec3<Dual>& x1, const Vec3d& side,
                                 FilmEdge& edge) const {
   const Camera& camera = context_.scene.camera;

@@ -29,7 +29,8 @@ struct FilmEdgePoint {
   double density;  // [1 / pixel of length]
 };
 
-// What moves where no motion is known: of these shapes every vertex by itself, and perhaps the camera.
+// What moves where no motion is known: of these shapes every vertex by itself, and perhaps the
+// camera.
 struct FreeMotion {
   std::vector<bool> shapes;
   bool camera = false;

@@ -8,9 +8,9 @@
 namespace limn {
 
 // Position of one sample of a pixel [pixels of the full film]: drawn from the reconstruction filter
-// around the pixel's center, so that every sample counts with weight one and no pixel shares samples
-// with another. The stream depends on the pixel of the full film, hence a crop repeats the full
-// image.
+// around the pixel's center, so that every sample counts with weight one and no pixel shares
+// samples with another. The stream depends on the pixel of the full film, hence a crop repeats the
+// full image.
 struct FilmPosition {
   double x, y;
 };

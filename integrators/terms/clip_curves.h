@@ -1,6 +1,6 @@
 #pragma once
-// Curves along which the camera's clip planes cut faces: what is seen jumps across them, and they move
-// with the camera and with the faces.
+// Curves along which the camera's clip planes cut faces: what is seen jumps across them, and they
+// move with the camera and with the faces.
 #include <array>
 #include <vector>
 
@@ -18,8 +18,8 @@ struct ClipSegment {
 
 std::vector<ClipSegment> find_clip_segments(const Scene& scene);
 
-// Estimates the radiance that arrives at the pinhole from where the face is cut off, just beside the
-// point `y` of the segment, minus that where the face is seen. False if y is hidden.
+// Estimates the radiance that arrives at the pinhole from where the face is cut off, just beside
+// the point `y` of the segment, minus that where the face is seen. False if y is hidden.
 bool clip_jump(const PathContext& context, const ClipSegment& segment, const Vec3d& y,
                const Rng& key, RayCount& rays, Rgb<double>& jump);
 

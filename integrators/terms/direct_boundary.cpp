@@ -1,12 +1,12 @@
-// The boundary term of light that shading points see directly from regions: all silhouettes inside a
-// region's cone are listed, and points on them drawn by what each would add.
+// The boundary term of light that shading points see directly from regions: all silhouettes inside
+// a region's cone are listed, and points on them drawn by what each would add.
 //   dL_o/dtheta  +=  sum over regions k of the sum over edges of
 //                    the integral over t of dL_k(t) f_s(w_t) J(t) dt
 // dL_k, the jump of what region k emits and p sees directly, is not zero but on outlines inside the
 // cone of directions around the region (those of the lamp itself are on its boundary). With weights
-// W_i of the pieces i of these, W their sum, N points u_j = (j + xi) / N of the cumulated weights, in
-// the order of the list, estimate the sum: each piece is drawn N W_i / W times on average. The order
-// is the trees': points that follow each other lie near each other in the scene.
+// W_i of the pieces i of these, W their sum, N points u_j = (j + xi) / N of the cumulated weights,
+// in the order of the list, estimate the sum: each piece is drawn N W_i / W times on average. The
+// order is the trees': points that follow each other lie near each other in the scene.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -22,15 +22,15 @@ namespace {
 // Points for one sample. Sixteen instead took 1.6 times the time for 0.57 of the squared error with
 // four lamps on gloss, where the list is long: what is left is the error of p within its pixel.
 constexpr int kPoints = 4;
-// What a list costs per point, in the unit of Term::work: timed as 0.2 (the sun), 1.0 (soft shadow),
-// 1.9 (CAD part), 3.3 (plant), 3.5 (four lamps), against draws of the forest.
+// What a list costs per point, in the unit of Term::work: timed as 0.2 (the sun), 1.0 (soft
+// shadow), 1.9 (CAD part), 3.3 (plant), 3.5 (four lamps), against draws of the forest.
 constexpr double kListCost = 1;
 // Lamps are small below this angle [rad], and have few sides up to this number. Not tuned.
 constexpr double kSmall = 0.1;
 constexpr int kMostSides = 8;
 
-// A vertex whose directions are held, and the same with directions that turn. What lamps emit is seen
-// with the first, see path.h.
+// A vertex whose directions are held, and the same with directions that turn. What lamps emit is
+// seen with the first, see path.h.
 struct Viewers {
   explicit Viewers(const PathVertex& turning) : vertices{turning, turning} {
     vertices[0].turn = {};
@@ -180,8 +180,8 @@ void DirectTerm::add_drawn(const Viewers& viewers, int samples, const std::vecto
   }
 }
 
-// What the sides of a small lamp add cancels but for its size: none of them is left out, and all are
-// met at the same place. Of many, each is met as often as it weighs.
+// What the sides of a small lamp add cancels but for its size: none of them is left out, and all
+// are met at the same place. Of many, each is met as often as it weighs.
 void DirectTerm::add_outline(const Viewers& viewers, int sample, const Drawn* begin,
                              const Drawn* end, TermCost& cost, Rgb<Lanes>& sum) const {
   const PathVertex& vertex = viewers.vertices[0];

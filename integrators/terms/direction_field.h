@@ -1,23 +1,23 @@
 #pragma once
 // Directions that move with the parameters: at the first vertex of a path a sampled direction w may
-// move, dw/dtheta = V(w). The substitution changes no integral over directions, so the change that it
-// makes to the interior term,
+// move, dw/dtheta = V(w). The substitution changes no integral over directions, so the change that
+// it makes to the interior term,
 //   a_V = (f L)' along V + f L div V,
 // and the change that it makes to the boundary terms, whose edges now move with v - |w| V instead
-// of v, have means that cancel. So any V gives the same mean, and that with the least variance may be
-// chosen, from other samples than those it is used for. A V that follows an object as it is seen from
-// the vertex takes its sliding hit points and its silhouettes out together.
+// of v, have means that cancel. So any V gives the same mean, and that with the least variance may
+// be chosen, from other samples than those it is used for. A V that follows an object as it is seen
+// from the vertex takes its sliding hit points and its silhouettes out together.
 //
 // V has three numbers, `turn`:
 //   - directions turn, V = turn x w, div V = 0; or,
-//   - where p sees one moving object from outside, they follow points of a plane that lies across the
-//     unit vector a towards it: with e the velocity of these over their distance along a,
+//   - where p sees one moving object from outside, they follow points of a plane that lies across
+//     the unit vector a towards it: with e the velocity of these over their distance along a,
 //     V = (a . w) (e - w (e . w)),   div V = a . e - 3 (a . w) (e . w).
-//     A plane through the circle where p sees a sphere's silhouette follows all of that, however wide
-//     it is; a turn follows its middle alone.
-// What lamps emit, seen from the vertex, is left out: those directions are held. They are the regions
-// of light (light_regions.h), whose edges have terms of their own; so nothing that follows an object
-// moves the outlines of lamps.
+//     A plane through the circle where p sees a sphere's silhouette follows all of that, however
+//     wide it is; a turn follows its middle alone.
+// What lamps emit, seen from the vertex, is left out: those directions are held. They are the
+// regions of light (light_regions.h), whose edges have terms of their own; so nothing that follows
+// an object moves the outlines of lamps.
 //
 // The score without radiance, f' along V + f div V over the density of w, has mean zero as well,
 // because f vanishes at the horizon: any multiple of it may be added.
@@ -59,8 +59,8 @@ struct DirectionMotion {
 };
 
 // How fast what moves does so as seen from a point: the unit of all turns. One for all parameters,
-// which turn directions at multiples of it: what a turn changes in a sample is then the same for all
-// of them.
+// which turn directions at multiples of it: what a turn changes in a sample is then the same for
+// all of them.
 class MotionRates {
  public:
   // scene: with its parameters seeded in the first `lanes` lanes. steps: what makes speeds of the

@@ -50,15 +50,15 @@ void for_every_side(const Scene& scene, const FacesAround& around, const Vec3d& 
 
 // In which order the rims in one place part as their faces move, seen across them from the negative
 // side to the positive one: those of faces on the negative side alone come first, the rear ones
-// before those that hide them; those of faces on the positive side alone last, the front ones first.
-// So surfaces leave gaps and do not pass through each other.
+// before those that hide them; those of faces on the positive side alone last, the front ones
+// first. So surfaces leave gaps and do not pass through each other.
 class RimOrder {
  public:
   // A face lies on this side; smaller slopes are nearer.
   void add(uint8_t rim, bool positive, double slope);
   // Whether a face is seen just beside the rim `own`, on its positive side or the other: one of the
-  // same rim on its own side only, one of a rim that comes later (or has come before) on both, if it
-  // lies on the negative (or the positive) side.
+  // same rim on its own side only, one of a rim that comes later (or has come before) on both, if
+  // it lies on the negative (or the positive) side.
   bool is_seen(uint8_t rim, bool positive, uint8_t own, bool on_positive_side) const {
     if (rim == own || rim == kNoRim) return positive == on_positive_side;
     return positive == comes_before(rim, own);

@@ -13,8 +13,8 @@ namespace {
 constexpr size_t kFewFaces = 16;
 // Lamps of more corners are taken for the box around them. Not tuned.
 constexpr size_t kFewCorners = 64;
-// Cones are wider than lamps by this angle [rad], which is beyond rounding: edges on their boundary,
-// a lamp's own among them, are inside. Not tuned.
+// Cones are wider than lamps by this angle [rad], which is beyond rounding: edges on their
+// boundary, a lamp's own among them, are inside. Not tuned.
 constexpr double kSlack = 1e-8;
 
 Vec3d corner(const Mesh& mesh, uint32_t vertex) { return cast<double>(mesh.positions[vertex]); }

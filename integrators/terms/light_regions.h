@@ -1,8 +1,8 @@
 #pragma once
 // What is emitted, split into regions of few directions each, and the rest. The jump of radiance
-// across an edge is linear in radiance: dL = sum over regions of dL_k + dL_rest, dL_k being the jump
-// of what region k emits and p sees directly. All scattered light belongs to the rest. Each part has
-// an estimator of its own: direct_boundary.cpp lists the silhouettes before a region.
+// across an edge is linear in radiance: dL = sum over regions of dL_k + dL_rest, dL_k being the
+// jump of what region k emits and p sees directly. All scattered light belongs to the rest. Each
+// part has an estimator of its own: direct_boundary.cpp lists the silhouettes before a region.
 #include <optional>
 #include <vector>
 
@@ -62,8 +62,8 @@ class LightRegions {
   // The shape of a lamp; none of a patch.
   ShapeId shape(size_t k) const { return regions_[k].shape; }
   const LampHull& hull(size_t k) const { return regions_[k].hull; }
-  // All faces of a flat lamp of few: a line meets one of them at most, also where rounding lets rays
-  // meet neighbours. Else empty.
+  // All faces of a flat lamp of few: a line meets one of them at most, also where rounding lets
+  // rays meet neighbours. Else empty.
   std::span<const FaceRef> flat_faces(size_t k) const { return regions_[k].flat_faces; }
   const DirectionCap& cap(size_t k) const { return regions_[k].cap; }
 

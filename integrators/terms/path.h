@@ -1,8 +1,8 @@
 #pragma once
 // The path tracer, written once for any scalar: double gives radiance, Dual gives radiance and the
 // interior term of its derivative, Var writes a tape of it. Sampled directions, their densities and
-// MIS weights are constants while the parameters move (solid-angle measure, everywhere), but for the
-// one direction of a light without extent, which follows the parameters.
+// MIS weights are constants while the parameters move (solid-angle measure, everywhere), but for
+// the one direction of a light without extent, which follows the parameters.
 #include <atomic>
 #include <cstdint>
 
@@ -62,8 +62,8 @@ class PathTracer {
   void split_by(const MotionRates* rates) { splitting_ = rates; }
   // How many light samples are averaged at every vertex but the first.
   void take_light_samples(int count) { light_samples_ = count; }
-  // With an even number of them: half of what every first makes more than the second, at all vertices
-  // of the paths so far. It has mean zero, and the variance of their mean.
+  // With an even number of them: half of what every first makes more than the second, at all
+  // vertices of the paths so far. It has mean zero, and the variance of their mean.
   const Rgb<S>& light_difference() const { return light_difference_; }
   uint64_t later_lights() const { return later_lights_; }  // light samples behind it
   // Sum of the scores over the paths so far: has mean zero, and belongs to the interior term.
@@ -88,9 +88,9 @@ class PathTracer {
 
   // Radiance that leaves the surface along wi: emission and everything scattered within the scene's
   // depth. edge: where the surface lies, if the path starts on an edge; it follows the path while
-  // that stays there. With x_0 the surface, w_i a direction drawn at x_i with density p_i, f_i the scattering
-  // function times cosine there, and the throughput T_k = f_0 / p_0 ... f_(k-1) / p_(k-1), one path
-  // estimates
+  // that stays there. With x_0 the surface, w_i a direction drawn at x_i with density p_i, f_i the
+  // scattering function times cosine there, and the throughput T_k = f_0 / p_0 ... f_(k-1) /
+  // p_(k-1), one path estimates
   //   L = L_e(x_0) + sum over k of T_k (E_k + f_k / p_k m_k L_e(x_(k+1))),
   //   E_k = f_k(l) / q_k(l) n_k L_e(l),
   // l a direction that light sampling draws with density q_k, and m_k = p^2 / (p^2 + q^2) and

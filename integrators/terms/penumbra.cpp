@@ -127,8 +127,8 @@ std::optional<LampEdges::Weight> LampEdges::weigh(size_t k, EdgeRef id) const {
   return weight;
 }
 
-// As for the edges of sharp shadows: half of the lines follow length times speed, half length alone,
-// since a surface or a camera that moves makes all edges count. Not tuned.
+// As for the edges of sharp shadows: half of the lines follow length times speed, half length
+// alone, since a surface or a camera that moves makes all edges count. Not tuned.
 double LampEdges::share_of(const Weight& weight) const {
   const double own = weight.length / length_;
   double share = 0;

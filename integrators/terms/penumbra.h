@@ -1,11 +1,11 @@
 #pragma once
 // Thin penumbras. In the shadow of an edge before a small lamp, or close behind an edge, the place
 // where the edge cuts into the lamp is small, and what the edge adds there is as large: samples of
-// pixels and of directions meet it ever more rarely. So what `direct` holds is found from both ends:
-// `direct` itself lists edges at the vertices that paths come to; `penumbra` draws lines from a lamp
-// through a point of an edge to a vertex, and asks who sees that (penumbra_boundary.cpp). Each
-// contribution is shared between the two by how densely they are expected to meet it (the power
-// heuristic; any shares that add up to one are right).
+// pixels and of directions meet it ever more rarely. So what `direct` holds is found from both
+// ends: `direct` itself lists edges at the vertices that paths come to; `penumbra` draws lines from
+// a lamp through a point of an edge to a vertex, and asks who sees that (penumbra_boundary.cpp).
+// Each contribution is shared between the two by how densely they are expected to meet it (the
+// power heuristic; any shares that add up to one are right).
 #include <span>
 #include <vector>
 
@@ -31,8 +31,8 @@ class LampEdges {
   };
   // u in [0, 1); there must be edges.
   Drawn draw(double u) const;
-  // Of this edge before region k; 0 if lines from there never pass it: a lamp's own edges, and edges
-  // whose two faces all of the region sees from the same side.
+  // Of this edge before region k; 0 if lines from there never pass it: a lamp's own edges, and
+  // edges whose two faces all of the region sees from the same side.
   double probability(size_t k, EdgeRef edge) const;
 
  private:

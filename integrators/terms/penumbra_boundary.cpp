@@ -21,7 +21,8 @@ namespace limn {
 namespace {
 
 // What a line costs beside its rays, which go anywhere in the scene, in the unit of Term::work:
-// timed as 1.9 (the sun), 2.1 (soft shadow, plant), 3.0 (CAD part), 3.9 (four lamps), 5.0 (concave).
+// timed as 1.9 (the sun), 2.1 (soft shadow, plant), 3.0 (CAD part), 3.9 (four lamps), 5.0
+// (concave).
 constexpr double kLineCost = 3;
 
 class PenumbraTerm final : public Term {

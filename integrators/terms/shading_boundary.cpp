@@ -1,5 +1,6 @@
 // The boundary term of shading points: some samples of it at every vertex of a path, weighed by the
-// path's throughput. What regions of light emit is left to direct_boundary.cpp, where they are apart.
+// path's throughput. What regions of light emit is left to direct_boundary.cpp, where they are
+// apart.
 //   dL_o/dtheta  +=  sum over edges of the integral over t of dL(t) f_s(w_t) J(t) dt,
 //   J(t) = det(w_0, w_1, v) / |w|^3
 #include "integrators/terms/term_table.h"

@@ -1,5 +1,5 @@
-// The boundary term of delta lights: the edges of their sharp shadows, listed as seen from the light
-// and seen in turn by the camera and by the vertices of paths.
+// The boundary term of delta lights: the edges of their sharp shadows, listed as seen from the
+// light and seen in turn by the camera and by the vertices of paths.
 //
 // A point, or parallel light, lights all or nothing of a surface: radiance jumps where a plane
 // through the light and an edge of the mesh meets what lies behind the edge. With y(t) =

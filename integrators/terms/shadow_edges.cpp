@@ -107,8 +107,8 @@ void ShadowEdges::list(const DeltaLight& light, ShapeId object) {
   }
 }
 
-// Half of the samples follow length times speed, half length alone: a surface or a viewer that moves
-// makes all shadows count. Every light and every parameter gets an equal share. Not tuned.
+// Half of the samples follow length times speed, half length alone: a surface or a viewer that
+// moves makes all shadows count. Every light and every parameter gets an equal share. Not tuned.
 void ShadowEdges::weigh(size_t first, int lanes) {
   double length = 0;
   Lanes swept;

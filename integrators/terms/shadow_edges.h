@@ -1,6 +1,6 @@
 #pragma once
-// Edges that part light from shadow, as lights without extent see them, and where their shadows fall.
-// The formulas stand in shadow_boundary.cpp.
+// Edges that part light from shadow, as lights without extent see them, and where their shadows
+// fall. The formulas stand in shadow_boundary.cpp.
 #include <optional>
 #include <vector>
 

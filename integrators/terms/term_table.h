@@ -1,6 +1,6 @@
 #pragma once
-// The terms: a factory in a file of its own each, and one row. Included by term.cpp, and by the terms for their
-// factories.
+// The terms: a factory in a file of its own each, and one row. Included by term.cpp, and by the
+// terms for their factories.
 #include "integrators/terms/term.h"
 
 namespace limn {

@@ -16,8 +16,8 @@ void add_edge_point(const PathContext& context, const EdgeMesh& mesh, const Path
                     const EdgeQuery& query, const EdgeSample& sample, const RadiancePart& part,
                     const Rng& key, TermCost& cost, Rgb<Lanes>& sum, double share = 1);
 
-// Whether something hides the face from the vertex in the unit direction omega, at that distance. One
-// shadow ray.
+// Whether something hides the face from the vertex in the unit direction omega, at that distance.
+// One shadow ray.
 bool is_hidden_from(const PathContext& context, const PathVertex& vertex, FaceRef face,
                     const Vec3d& omega, double distance, TermCost& cost);
 

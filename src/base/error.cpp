@@ -5,8 +5,8 @@ namespace limn {
 
 namespace {
 
-// Quoted input may hold anything: what would end a message or move a terminal's cursor is written as
-// \x1b, and the middle of what nobody can read is left out.
+// Quoted input may hold anything: what would end a message or move a terminal's cursor is written
+// as \x1b, and the middle of what nobody can read is left out.
 std::string printable(const std::string& message) {
   constexpr size_t kBegin = 1500, kEnd = 300;  // not tuned
   static const char* const kDigits = "0123456789abcdef";

@@ -75,8 +75,8 @@ void check_is_exr(const std::string& file) {
   }
 }
 
-// An open EXR. OpenEXR's reader in C checks sizes against the file before it believes them and blocks
-// against the size that they must have; the one in C++ does neither.
+// An open EXR. OpenEXR's reader in C checks sizes against the file before it believes them and
+// blocks against the size that they must have; the one in C++ does neither.
 class ExrFile {
  public:
   explicit ExrFile(const std::string& file) : file_(file) {
@@ -225,8 +225,8 @@ class ExrReader {
     image_.data.resize(static_cast<size_t>(lines * width_) * names_.size());
   }
 
-  // Blocks in the order of the image, those of full resolution: visit(block, x, y) with the pixel of
-  // the image where it begins.
+  // Blocks in the order of the image, those of full resolution: visit(block, x, y) with the pixel
+  // of the image where it begins.
   template <class Visit>
   void for_each_block(const Visit& visit) const {
     const bool tiled = storage_ == EXR_STORAGE_TILED;

@@ -11,8 +11,8 @@
 
 namespace limn {
 
-// Over a map of W by H texels: a point (x, y) lies x columns to the right of the center of column 0,
-// 0 <= x < W (wrapped), and y rows below the center of row 0, 0 <= y <= H - 1; rows are equally
+// Over a map of W by H texels: a point (x, y) lies x columns to the right of the center of column
+// 0, 0 <= x < W (wrapped), and y rows below the center of row 0, 0 <= y <= H - 1; rows are equally
 // spaced in the polar angle theta, from 0 to pi. The density is one in solid angle.
 //
 // A quadtree over the cells between texels. A leaf is a square of 1 to 64 cells on a side (cut at
@@ -20,8 +20,8 @@ namespace limn {
 // bilinear in azimuth and cos(theta) through the importances at its corners, each mixed with a
 // little of the mean (where one side of a cell is black, radiance falls to zero with theta but the
 // density with cos(theta), and near a pole their ratio would grow without bound). Squares are as
-// large as the importance still follows that: a smooth sky of half a million cells has some thousand
-// leaves. The density is positive wherever the importance, bilinear between texels, is.
+// large as the importance still follows that: a smooth sky of half a million cells has some
+// thousand leaves. The density is positive wherever the importance, bilinear between texels, is.
 //
 // A draw chooses a block of 64 by 64 cells, then a leaf there, each by an alias table: what is
 // bright is read often and stays at hand, while one table of all leaves would be read anywhere.

@@ -54,14 +54,15 @@ FaceShape<S> face_shape(const Mesh& mesh, FaceId face) {
   return shape;
 }
 
-// How much of a sum of face normals may be rounding alone, or is too little to say a direction. noise:
-// the sum of angles times roundings; angles: their sum.
+// How much of a sum of face normals may be rounding alone, or is too little to say a direction.
+// noise: the sum of angles times roundings; angles: their sum.
 inline double rest_of_cancelled(double noise, double angles) {
   return std::max(64 * std::numeric_limits<double>::epsilon(), std::min(noise, 0x1.0p-10 * angles));
 }
 
-// Sine of the tilt of a corner's normal against its face; 1 if it is no less than a right angle. The
-// sine is the length of the cross product, which is exact where sqrt(1 - cos^2) would lose all digits.
+// Sine of the tilt of a corner's normal against its face; 1 if it is no less than a right angle.
+// The sine is the length of the cross product, which is exact where sqrt(1 - cos^2) would lose all
+// digits.
 template <class S>
 S sine_of_tilt(const Vec3<S>& normal, const Vec3<S>& face_normal) {
   if (value(dot(normal, face_normal)) <= 0) return S(1);
@@ -69,8 +70,8 @@ S sine_of_tilt(const Vec3<S>& normal, const Vec3<S>& face_normal) {
   return sine < 1.0 ? sine : S(1);
 }
 
-// How far rounding may have turned the normal of a face against that of a corner [rad]. At most what
-// leaves the derivative of a mesh far from the origin its meaning; not tuned.
+// How far rounding may have turned the normal of a face against that of a corner [rad]. At most
+// what leaves the derivative of a mesh far from the origin its meaning; not tuned.
 inline double tilt_rounding(double face, double corner) {
   return std::min(0x1.0p-16, face + corner);
 }

@@ -70,9 +70,9 @@ void assign_normal_ids(Mesh& mesh) {
 
 // Sums of face normals weighted by corner angles (Thuermer and Wuethrich 1998), normalised. Where
 // they cancel (fins around an axis, a sheet that is folded onto itself) to a thousandth and to what
-// rounding may have left of it, any face's normal serves: the direction of the rest says nothing, and its
-// derivative has no bound. A vertex of faces without area alone gets +Z, which nothing ever reads.
-// cancelled: how many of the latter there are, if asked for.
+// rounding may have left of it, any face's normal serves: the direction of the rest says nothing,
+// and its derivative has no bound. A vertex of faces without area alone gets +Z, which nothing ever
+// reads. cancelled: how many of the latter there are, if asked for.
 template <class S>
 std::vector<Vec3<S>> computed_normals(const Mesh& mesh, const std::vector<FaceShape<S>>& shapes,
                                       size_t* cancelled = nullptr) {
@@ -131,10 +131,10 @@ void for_every_tilt(const Mesh& mesh, const std::vector<FaceShape<S>>& shapes,
   }
 }
 
-// The derivative of a maximum at a tie depends on the side. The mean of both sides stands for it, the
-// middle between the least and the largest of those that tie: what central differences come to. In
-// symmetric meshes ties are everywhere, but for the rounding of positions: what may be the largest,
-// as far as that goes, ties.
+// The derivative of a maximum at a tie depends on the side. The mean of both sides stands for it,
+// the middle between the least and the largest of those that tie: what central differences come to.
+// In symmetric meshes ties are everywhere, but for the rounding of positions: what may be the
+// largest, as far as that goes, ties.
 void average_tied_slopes(const Mesh& mesh, const std::vector<FaceShape<Dual>>& shapes,
                          const std::vector<Vec3<Dual>>& normals, std::vector<Dual>& horizon) {
   std::vector<double> noise(normals.size());

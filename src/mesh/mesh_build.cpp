@@ -59,8 +59,8 @@ uint32_t root_of(const Mesh& mesh, uint32_t v) {
 }
 
 // Corners of a face that are nearer to each other than a billionth of its longest side become one:
-// nobody sees such a face, and its sides cannot be told apart in double precision, so that its edges would
-// not cancel.
+// nobody sees such a face, and its sides cannot be told apart in double precision, so that its
+// edges would not cancel.
 void weld_needles(Mesh& mesh) {
   constexpr double kThin = 0x1.0p-30;  // not tuned
   const auto position = [&](uint32_t v) { return cast<double>(mesh.positions[v]); };

@@ -34,8 +34,9 @@ struct MeshOptions {
 
 // The transform acts in double precision before positions are rounded to float. A reflecting
 // transform turns the winding, hence the geometric normals, inside out, as Mitsuba does up to 3.9.
-// Faces whose corners coincide, to a billionth of their longest side, are left out. What was mended is appended to `warnings` (may be
-// null). InputError if no face is left or a position lies beyond kLargestCoordinate.
+// Faces whose corners coincide, to a billionth of their longest side, are left out. What was mended
+// is appended to `warnings` (may be null). InputError if no face is left or a position lies beyond
+// kLargestCoordinate.
 Mesh build_mesh(const RawMesh& raw, const MeshOptions& options, std::vector<std::string>* warnings);
 
 }  // namespace limn

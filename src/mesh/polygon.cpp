@@ -12,8 +12,8 @@ namespace {
 using Corners = std::vector<Vec3d>;
 using Triangles = std::vector<std::array<uint32_t, 3>>;
 
-// All triangles of a fan meet at a corner, and whoever looks for pairs that meet finds the square of
-// their number.
+// All triangles of a fan meet at a corner, and whoever looks for pairs that meet finds the square
+// of their number.
 constexpr size_t kLargestFan = 64;  // not tuned
 
 Vec3d doubled_area(const Vec3d& a, const Vec3d& b, const Vec3d& c) { return cross(b - a, c - a); }

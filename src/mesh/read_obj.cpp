@@ -212,8 +212,8 @@ class ObjReader {
     corner_normals_.push_back(last == 2 ? index(word, parts[2], normals_) : kNoNormal);
   }
 
-  // From 0. Indices of files count from 1 and may point ahead (checked at the end), or, if negative,
-  // backwards from the latest element.
+  // From 0. Indices of files count from 1 and may point ahead (checked at the end), or, if
+  // negative, backwards from the latest element.
   uint32_t index(std::string_view word, std::string_view part, Elements& of) {
     const std::optional<int64_t> number = parse_integer(part);
     if (!number) {

@@ -77,8 +77,8 @@ class SeamWelder {
     }
   }
 
-  // Cells of size 2^level are no smaller than the distance at which the vertex still meets others of
-  // its level or below.
+  // Cells of size 2^level are no smaller than the distance at which the vertex still meets others
+  // of its level or below.
   int level(uint32_t v) const { return std::ilogb(tolerances_[v]) + 2; }
 
   Cell cell(uint32_t v, int level) const {

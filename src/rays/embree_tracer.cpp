@@ -173,8 +173,8 @@ class EmbreeTracer final : public RayTracer {
     return ray.end.shape.valid() &&
            copies_.met(ray.end, ray.direction, ray.skip_emitters) != ray.end;
   }
-  // Relative to a ray's origin Embree rounds corners, and might meet a line. Of copies the first one
-  // stands for all.
+  // Relative to a ray's origin Embree rounds corners, and might meet a line. Of copies the first
+  // one stands for all.
   bool is_traced(const Mesh& mesh, FaceRef face) const {
     return has_area(mesh, mesh.face(face.face)) && copies_.first(face) == face;
   }

@@ -67,8 +67,8 @@ PlaneAdjoint pull_back_shading(Tape& tape, const Mesh& mesh, const MeshSlots& sl
   return of;
 }
 
-// The adjoint of surface_on_ray: of p = o + t d, t = (c0 - o) . N / (d . N), and of what is found at
-// p. Nodes and values: of o, then of d.
+// The adjoint of surface_on_ray: of p = o + t d, t = (c0 - o) . N / (d . N), and of what is found
+// at p. Nodes and values: of o, then of d.
 void pull_back_surface(Tape& tape, const Tape::Composite& s) {
   const auto read = [&](int first) {
     return Vec3d{tape.adjoint(s.first + first), tape.adjoint(s.first + first + 1),

@@ -14,8 +14,8 @@
 namespace limn {
 namespace {
 
-// No two tilts of a shaken mesh tie, and no normal lies along a plane of the axes to rounding, where a
-// frame would jump (vec.h).
+// No two tilts of a shaken mesh tie, and no normal lies along a plane of the axes to rounding,
+// where a frame would jump (vec.h).
 Mesh shaken(Mesh mesh) {
   weld_positions(mesh);
   Rng rng(1, 2, 3);

@@ -15,9 +15,10 @@ namespace {
 
 constexpr double kLevel = 1e-4;
 
-// A glowing floor at y = -1 below a camera that looks along -z, 90 degrees wide, with N by N pixels.
-// The clip planes leave its depths from n = 2 to f = 50: on the film, rows from y = -1 / n to -1 / f (in
-// half widths). A screen at depth 10 hides what lies above -1 / 20 in the left half, so the far cut.
+// A glowing floor at y = -1 below a camera that looks along -z, 90 degrees wide, with N by N
+// pixels. The clip planes leave its depths from n = 2 to f = 50: on the film, rows from y = -1 / n
+// to -1 / f (in half widths). A screen at depth 10 hides what lies above -1 / 20 in the left half,
+// so the far cut.
 class ClippedFloor : public testing::Test {
  protected:
   static constexpr int kPixels = 8;
@@ -40,7 +41,8 @@ class ClippedFloor : public testing::Test {
     return result;
   }
 
-  // rows: the derivative of the height of the near cut on the film, and of the far cut, in half widths.
+  // rows: the derivative of the height of the near cut on the film, and of the far cut, in half
+  // widths.
   static void expect(const std::string& parameter, double near, double far, bool screen = false) {
     const GradientResult result = run_blocks(scene(screen), {parameter}, 64, 1);
     const double area = kPixels * kPixels / 2.0;  // of one half width

@@ -88,8 +88,8 @@ TEST(MovingDirections, KeepTheMeanOfSeveralParameters) {
                    {"random-directions", "moving-directions", "adaptive"});
 }
 
-// The edges of a point light's shadows, seen in gloss, move against directions that turn. One pixel:
-// each seed is one turn.
+// The edges of a point light's shadows, seen in gloss, move against directions that turn. One
+// pixel: each seed is one turn.
 TEST(MovingDirections, KeepTheMeanOfSharpShadows) {
   const Scene scene = read_scene(
       std::string(LIMN_SOURCE_DIR) + "/scenes/closed_form/shadow_in_gloss.xml", {}, nullptr);

@@ -1,5 +1,5 @@
-// Regions of light: the terms "direct", "penumbra" and "boundary" of `silhouettes` together are what
-// "boundary" of `forest` is, block by block, whatever the lamps and whatever moves.
+// Regions of light: the terms "direct", "penumbra" and "boundary" of `silhouettes` together are
+// what "boundary" of `forest` is, block by block, whatever the lamps and whatever moves.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -190,7 +190,8 @@ TEST(Regions, BesideContacts) {
   EXPECT_GT(a.terms[a.term("penumbra")].cost.counted, 1000u);
 }
 
-// The body and its shadow, behind the camera, are seen in a wall alone: by the first vertices of paths.
+// The body and its shadow, behind the camera, are seen in a wall alone: by the first vertices of
+// paths.
 TEST(Regions, SeenByVertices) {
   const TempFiles files;
   SceneParts parts;

@@ -25,8 +25,8 @@ ParameterGradient run(const Scene& scene, const std::string& parameter, uint64_t
   return result.parameters[0];
 }
 
-// by_blocks: whether blocks of pixels are compared, too. Where a plane holds all that moves, those that
-// see nothing else are zero but for the rounding of cosines.
+// by_blocks: whether blocks of pixels are compared, too. Where a plane holds all that moves, those
+// that see nothing else are zero but for the rounding of cosines.
 void expect_equal(const Scene& a, const Scene& b, const std::string& parameter,
                   bool by_blocks = true) {
   constexpr int kSpp = 256;

@@ -309,8 +309,8 @@ TEST_F(Program, RepeatsOneSample) {
       std::string::npos);
 }
 
-// Samples that are not finite are an error, with the command that shows the first; what is finite is
-// kept. Here a corner touches the pinhole.
+// Samples that are not finite are an error, with the command that shows the first; what is finite
+// is kept. Here a corner touches the pinhole.
 TEST_F(Program, NonFiniteSamplesAreAnErrorThatCanBeRepeated) {
   files_.write("touching.obj", "v 0 0 0\nv 1e9 3e8 1e8\nv 1e9 0 3e8\nf 1 2 3\n");
   const std::string scene = files_.write("touching.xml", R"(<scene version="3.0.0">

@@ -22,8 +22,8 @@ bool is_diffuse(const LobeSummary& lobe) { return lobe.model == &kHemisphere; }
 bool is_ggx(const LobeSummary& lobe) { return lobe.model == &ggx_lobe(); }
 bool is_beckmann(const LobeSummary& lobe) { return lobe.model == &beckmann_lobe(); }
 
-// A lobe that the library does not know: a cosine's power about the mirror direction, whose width it
-// tells and which it takes for a GGX lobe.
+// A lobe that the library does not know: a cosine's power about the mirror direction, whose width
+// it tells and which it takes for a GGX lobe.
 class PhongLobe final : public LobeModel {
  public:
   static double power(const LobeSummary& lobe) { return 2 / (lobe.alpha * lobe.alpha); }

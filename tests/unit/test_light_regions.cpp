@@ -254,7 +254,8 @@ Lanes jacobian(const Case& c, double t) {
 }
 
 // Along one edge: the pieces tile it, each density integrates to one, and where the cosine and the
-// velocity keep their signs a weight is the integral of the modulus, lanes added up by their scales.
+// velocity keep their signs a weight is the integral of the modulus, lanes added up by their
+// scales.
 TEST(EdgePieces, WeighTheIntegralAndTileTheEdge) {
   Rng rng(32, 0, 0);
   const Lanes scale(1, 2, 0.5, 3);
@@ -334,8 +335,8 @@ TEST(EdgePieces, OfEdgesThroughThePoint) {
   }
 }
 
-// Directions towards a region follow the density that is told: integrals over it by draws are those by
-// directions of the whole sphere.
+// Directions towards a region follow the density that is told: integrals over it by draws are those
+// by directions of the whole sphere.
 TEST(LightRegions, DrawDirectionsByTheirDensity) {
   const TempFiles files;
   SceneParts parts;

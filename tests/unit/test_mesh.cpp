@@ -214,7 +214,8 @@ TEST(Normals, TiesHaveTheMeanOfBothSides) {
     for (size_t v = 0; v < 8; ++v) horizon[1][v] = (horizon[1][v] - horizon[0][v]) / (2 * h);
     return horizon[1];
   };
-  // Positions are exact. Either side is smooth: the error falls with h, so it is at most the change.
+  // Positions are exact. Either side is smooth: the error falls with h, so it is at most the
+  // change.
   const auto coarse = differences(0x1p-10), fine = differences(0x1p-11);
   for (size_t v = 0; v < 8; ++v) {
     EXPECT_NEAR(mesh.horizon_tangents[v][1], fine[v], 2 * std::fabs(coarse[v] - fine[v]) + 0x1p-40);

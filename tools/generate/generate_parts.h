@@ -42,8 +42,8 @@ Triangles tube(const Tube& tube, double h);
 // A straight tube of one radius.
 Triangles rod(const Vec3d& from, const Vec3d& to, double radius, double h);
 
-// A surface of revolution around the y axis: (r, y) from the lowest point (0, y) to the highest, a polyline whose corners
-// stay; edges are about h long.
+// A surface of revolution around the y axis: (r, y) from the lowest point (0, y) to the highest, a
+// polyline whose corners stay; edges are about h long.
 Triangles lathe(const std::vector<std::pair<double, double>>& profile, double h);
 // The same with the corners rounded off, as a spline of the points.
 Triangles smooth_lathe(const std::vector<std::pair<double, double>>& profile, double h);

@@ -84,8 +84,8 @@ std::string field_text(const Moments& g) {
   return text;
 }
 
-// The shape as the camera sees it, each point in the colour of the gradient along the normal: that of a
-// vertex over the area around it, so that it says the same of any mesh.
+// The shape as the camera sees it, each point in the colour of the gradient along the normal: that
+// of a vertex over the area around it, so that it says the same of any mesh.
 Image picture(const Scene& scene, ShapeId shape, const Moments& g, const RayTracer& tracer) {
   const Mesh& mesh = scene.shape(shape).mesh;
   std::vector<Vec3d> sum(mesh.positions.size()), normal(mesh.positions.size());

@@ -1,6 +1,6 @@
 #pragma once
-// What the groups of bindings share. This folder is the one door to nanobind; it holds no logic: what
-// has to be computed is asked of limn/...
+// What the groups of bindings share. This folder is the one door to nanobind; it holds no logic:
+// what has to be computed is asked of limn/...
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/function.h>
@@ -26,8 +26,8 @@ namespace limn::python {
 
 namespace nb = nanobind;
 
-// A scene as Python holds it. Runs, views and parameters keep the state they were made with: a change
-// while others hold that state is made to a copy. Used with the GIL held.
+// A scene as Python holds it. Runs, views and parameters keep the state they were made with: a
+// change while others hold that state is made to a copy. Used with the GIL held.
 class SceneHandle {
  public:
   explicit SceneHandle(Scene scene) : scene_(std::make_shared<Scene>(std::move(scene))) {}
@@ -94,8 +94,8 @@ struct RunArguments {
 RunSettings make_settings(const Scene& scene, const RunArguments& arguments);
 
 // Runs job(settings) on a thread of its own without the GIL, while this one looks for signals and
-// calls progress(fraction) every 50 ms. Ctrl-C, or an exception of `progress`, interrupts the job and
-// is raised when it has ended.
+// calls progress(fraction) every 50 ms. Ctrl-C, or an exception of `progress`, interrupts the job
+// and is raised when it has ended.
 void run_job(RunSettings settings, const nb::object& progress,
              const std::function<void(const RunSettings&)>& job);
 

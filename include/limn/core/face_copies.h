@@ -1,5 +1,6 @@
 #pragma once
-// Faces in one place: with the same three corners, in one shape or in several, whichever way they wind.
+// Faces in one place: with the same three corners, in one shape or in several, whichever way they
+// wind.
 #include <optional>
 #include <unordered_map>
 #include <vector>
@@ -11,8 +12,8 @@ namespace limn {
 // Whether two faces have the same corners.
 bool are_copies(const Scene& scene, FaceRef a, FaceRef b);
 
-// Of two copies, whether a ray along `direction` meets `a`: that which faces it, then an emitter, then
-// the earlier one of the file.
+// Of two copies, whether a ray along `direction` meets `a`: that which faces it, then an emitter,
+// then the earlier one of the file.
 bool is_met_first(const Scene& scene, FaceRef a, FaceRef b, const Vec3d& direction);
 
 // All copies of a scene, each with its like.

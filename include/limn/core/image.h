@@ -27,17 +27,18 @@ struct Image {
   }
 };
 
-// OpenEXR, scanline, ZIP. Channels R G B for three channels, Y for one (no other number is). Attributes are written as
-// string attributes of the header. Files are written under a temporary name and renamed, so that a
-// crash never leaves half a file. Throw InputError with the file's name.
+// OpenEXR, scanline, ZIP. Channels R G B for three channels, Y for one (no other number is).
+// Attributes are written as string attributes of the header. Files are written under a temporary
+// name and renamed, so that a crash never leaves half a file. Throw InputError with the file's
+// name.
 struct ImageAttribute {
   std::string name;
   std::string value;
 };
 void write_exr(const std::string& file, const Image& image, bool half,
                const std::vector<ImageAttribute>& attributes);
-// Any scanline or tiled EXR with channels R G B (or Y) of half or float: three channels (or one), at
-// most kMaxPixels pixels. Sizes are held against the file's before memory is taken.
+// Any scanline or tiled EXR with channels R G B (or Y) of half or float: three channels (or one),
+// at most kMaxPixels pixels. Sizes are held against the file's before memory is taken.
 Image read_exr(const std::string& file);
 // The string attributes of its header.
 std::vector<ImageAttribute> read_exr_attributes(const std::string& file);

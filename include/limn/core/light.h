@@ -1,5 +1,6 @@
 #pragma once
-// The contract of a light: what a path tracer, the edge samplers and the edges of shadows ask of it.
+// The contract of a light: what a path tracer, the edge samplers and the edges of shadows ask of
+// it.
 //
 // Directions are what is sampled: while a parameter moves the scene they are held fixed, so
 // densities are constants. A delta light (a point, a spot, a direction) has no directions to choose

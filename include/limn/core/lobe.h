@@ -1,6 +1,6 @@
 #pragma once
-// What an edge sampler may know of a BSDF without seeing it: how much it scatters at most, and which
-// transformed cosine comes near it. Only importances follow from this: whatever a lobe says,
+// What an edge sampler may know of a BSDF without seeing it: how much it scatters at most, and
+// which transformed cosine comes near it. Only importances follow from this: whatever a lobe says,
 // estimates stay unbiased as long as its bound is positive where the scattering function is.
 #include <cstdint>
 #include <optional>
@@ -28,10 +28,10 @@ struct LtcRow {
   double alpha;
 };
 
-// One kind of lobe; a constant, whose address names it, and never deleted. The class itself is the hemisphere: exact
-// for Lambert's law, and what a BSDF of which nothing is known may use with an albedo of 1 (draws
-// then follow the cosine alone). A BSDF with another lobe derives from it in its own file.
-// n: unit normal, wi: unit, towards the viewer, cos_i = n.wi > 0, wo: unit.
+// One kind of lobe; a constant, whose address names it, and never deleted. The class itself is the
+// hemisphere: exact for Lambert's law, and what a BSDF of which nothing is known may use with an
+// albedo of 1 (draws then follow the cosine alone). A BSDF with another lobe derives from it in its
+// own file. n: unit normal, wi: unit, towards the viewer, cos_i = n.wi > 0, wo: unit.
 class LobeModel {
  public:
   // Unit direction about which the scattering function falls off.

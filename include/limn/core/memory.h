@@ -10,8 +10,8 @@ namespace limn {
 // `ulimit -v` allows less. Infinity where the system does not tell.
 double free_memory();
 
-// InputError at `where` if `bytes` (64 MB or more) exceed free_memory(): "WHAT takes 12.3 GB of memory, and
-// 4.5 GB are free: REMEDY".
+// InputError at `where` if `bytes` (64 MB or more) exceed free_memory(): "WHAT takes 12.3 GB of
+// memory, and 4.5 GB are free: REMEDY".
 void require_memory(const SourceLocation& where, double bytes, const std::string& what,
                     const std::string& remedy);
 

@@ -75,8 +75,9 @@ void weld_positions(Mesh& mesh);
 
 // Welds copies of a vertex that differ by no more than the rounding of their positions (a float's,
 // twice, of the largest coordinate of a face around them), where sides of faces lie open: seams as
-// programs write them, -2.4e-16 here and 0 there. Needles between copies collapse; but where faces are
-// no larger than the rounding in any direction, their corners stay apart. `weld` must hold what weld_positions says of the faces that are left.
+// programs write them, -2.4e-16 here and 0 there. Needles between copies collapse; but where faces
+// are no larger than the rounding in any direction, their corners stay apart. `weld` must hold what
+// weld_positions says of the faces that are left.
 void weld_seams(Mesh& mesh);
 
 // Fills normals (if kComputed), horizon and their tangents from positions, faces, weld and
@@ -86,16 +87,17 @@ void weld_seams(Mesh& mesh);
 void update_shading_normals(Mesh& mesh);
 
 // The adjoint of update_shading_normals. normals (N), horizons (V): derivatives of some number with
-// respect to them. Adds what follows for the positions to `positions` (V), at the first copy of each
-// welded vertex. Normals of the file do not follow positions: what horizons do to them is added to
-// `normals`. Where several tilts tie for a horizon, each has an equal share in it (forward mode takes
-// the middle of the least and the largest slope, which depends on the motion in no linear way).
+// respect to them. Adds what follows for the positions to `positions` (V), at the first copy of
+// each welded vertex. Normals of the file do not follow positions: what horizons do to them is
+// added to `normals`. Where several tilts tie for a horizon, each has an equal share in it (forward
+// mode takes the middle of the least and the largest slope, which depends on the motion in no
+// linear way).
 void pull_back_shading_normals(const Mesh& mesh, std::vector<Vec3d>& normals,
                                const std::vector<double>& horizons, std::vector<Vec3d>& positions);
 
-// Whether a face has an area, and so a plane, as far as double precision can tell; else it is a line,
-// which no ray meets and which only ties other faces together (half_edges.h). Each product of the
-// normal is rounded once, each difference of products once more.
+// Whether a face has an area, and so a plane, as far as double precision can tell; else it is a
+// line, which no ray meets and which only ties other faces together (half_edges.h). Each product of
+// the normal is rounded once, each difference of products once more.
 inline bool has_area(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
   const Vec3d e1 = b - a, e2 = c - a, n = cross(e1, e2);
   return dot(n, n) > 0x1.0p-100 * (dot(e1, e1) * dot(e2, e2));
@@ -119,9 +121,9 @@ inline bool has_area(const Mesh& mesh, const FaceIndices& face) {
 
 // A mesh from arrays, mended as one from a file is: vertices at one position are welded, faces that
 // repeat or have two corners at one position are left out, and `warnings` (may be null) says so.
-// face_normals: flat shading, else normals are computed. InputError (at `where`) for positions (V by
-// 3, scene units) that are not finite or beyond kLargestCoordinate, indices that are not below V, and
-// where no face is left.
+// face_normals: flat shading, else normals are computed. InputError (at `where`) for positions (V
+// by 3, scene units) that are not finite or beyond kLargestCoordinate, indices that are not below
+// V, and where no face is left.
 Mesh make_mesh(std::vector<Vec3f> positions, std::vector<FaceIndices> faces, bool face_normals,
                const SourceLocation& where, std::vector<std::string>* warnings);
 // The same from new positions and the faces of `mesh`; normals of a file stay as they are. As many

@@ -44,9 +44,9 @@ struct Parameter {
   // The same in place.
   void move(Scene& scene, double step, size_t component = 0) const;
 
-  // The numbers themselves, where the scene holds them: one, the three channels of a colour, or V by
-  // 3 coordinates. Empty for what only moves things from where they are: rotations, translations and
-  // scales of shapes, fields, single coordinates.
+  // The numbers themselves, where the scene holds them: one, the three channels of a colour, or V
+  // by 3 coordinates. Empty for what only moves things from where they are: rotations, translations
+  // and scales of shapes, fields, single coordinates.
   std::vector<double> value(const Scene& scene) const;
   // Sets them in place, with all that depends on them; one number sets all channels of a colour.
   // Positions make the mesh that a file with them would, see moved_mesh(). InputError if there are
@@ -64,8 +64,9 @@ struct Parameter {
 // not listed apart.
 std::vector<Parameter> list_parameters(const Scene& scene);
 
-// The scalar called `name`. UnknownParameter that lists the nearest known names if there is none; InputError
-// that says how to name a part if it is an array; also if FILE cannot be read or does not fit the mesh.
+// The scalar called `name`. UnknownParameter that lists the nearest known names if there is none;
+// InputError that says how to name a part if it is an array; also if FILE cannot be read or does
+// not fit the mesh.
 Parameter find_parameter(const Scene& scene, const std::string& name);
 
 // The same, arrays included.

@@ -17,8 +17,8 @@ struct Ray {
   Vec3d direction;  // unit
   double t_min = 0;
   double t_max = std::numeric_limits<double>::infinity();
-  // Faces that the ray never meets: the one it starts on, the one it ends on, and those around an edge
-  // that it grazes. By id, never by distance.
+  // Faces that the ray never meets: the one it starts on, the one it ends on, and those around an
+  // edge that it grazes. By id, never by distance.
   FaceRef start = {};
   FaceRef end = {};
   std::span<const FaceRef> skip_faces = {};
@@ -40,7 +40,8 @@ class UntraceableRay final : public std::exception {
 };
 
 // Whether Embree can trace it: all numbers are finite (t_max may be infinite), and no coordinate of
-// its origin is beyond 2^60, more than any point on a face and less than where Embree stops (1.844e18).
+// its origin is beyond 2^60, more than any point on a face and less than where Embree stops
+// (1.844e18).
 inline bool is_traceable(const Ray& ray) {
   const Vec3d& o = ray.origin;
   // Sums with NaN compare false, and so does the length of a direction that has one.
@@ -57,9 +58,9 @@ class RayTracer {
   virtual bool occluded(const Ray& ray) const = 0;
 };
 
-// The scene must outlive the tracer. Far from the origin it traces in coordinates of its own: what is
-// met does not depend on where a scene lies, as far as floats hold its positions. InputError with Embree's words if it fails (out of memory,
-// unsupported machine).
+// The scene must outlive the tracer. Far from the origin it traces in coordinates of its own: what
+// is met does not depend on where a scene lies, as far as floats hold its positions. InputError
+// with Embree's words if it fails (out of memory, unsupported machine).
 std::unique_ptr<RayTracer> make_embree_tracer(const Scene& scene, int threads);
 // Every face tested in double precision: the oracle for tests.
 std::unique_ptr<RayTracer> make_brute_force_tracer(const Scene& scene);

@@ -76,8 +76,9 @@ class Tape {
     return statement.first;
   }
 
-  // Adjoints are set between start() and sweep(), those of node 0 are of no account. After the sweep
-  // contributions() holds what it found, and what composite statements and contribute() added.
+  // Adjoints are set between start() and sweep(), those of node 0 are of no account. After the
+  // sweep contributions() holds what it found, and what composite statements and contribute()
+  // added.
   void start() { adjoints_.assign(ends_.size(), 0.0); }
   double& adjoint(uint32_t node) { return adjoints_[node]; }
   void contribute(uint32_t slot, double value) {

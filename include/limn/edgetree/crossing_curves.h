@@ -33,8 +33,9 @@ std::vector<CrossingSegment> find_crossings(std::span<const Mesh* const> meshes,
 Vec3<Lanes> crossing_velocity(std::span<const Mesh* const> meshes, const CrossingSegment& segment,
                               const Vec3d& x);
 
-// The segments as edges, in their order: class kCrossing, each with two vertices, two planes and two
-// faces of its own, which lie on both sides of it. Moves as crossing_velocity says; `shape` is none.
+// The segments as edges, in their order: class kCrossing, each with two vertices, two planes and
+// two faces of its own, which lie on both sides of it. Moves as crossing_velocity says; `shape` is
+// none.
 EdgeMesh crossing_edges(std::span<const Mesh* const> meshes,
                         std::span<const CrossingSegment> segments);
 

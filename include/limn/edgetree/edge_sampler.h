@@ -19,8 +19,8 @@ namespace limn {
 
 // How the directions at a point move, per parameter.
 struct DirectionTurn {
-  // Their angular velocity; or, if there is an axis, the velocity of points that they follow over the
-  // distance of these along it. All such points lie in a plane across the axis.
+  // Their angular velocity; or, if there is an axis, the velocity of points that they follow over
+  // the distance of these along it. All such points lie in a plane across the axis.
   Vec3<Lanes> rate{};
   Vec3d axis{};  // unit; or zero
 

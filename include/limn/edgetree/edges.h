@@ -26,8 +26,8 @@ enum class EdgeClass : uint8_t {
   // Two coplanar faces (exactly, or to rounding) with equal shading normals: never a jump but on
   // their common plane.
   kFlat,
-  // Two faces of any shapes that pass through each other along it, see crossing_curves.h: treated as
-  // a jump for every point.
+  // Two faces of any shapes that pass through each other along it, see crossing_curves.h: treated
+  // as a jump for every point.
   kCrossing,
 };
 
@@ -50,12 +50,12 @@ inline constexpr uint8_t kMostRims = 8;
 
 // How a face lies around an edge.
 struct Incidence {
-  // The edge runs through the inside of the face, which therefore lies on both sides of it; else the
-  // edge is on the face's border.
+  // The edge runs through the inside of the face, which therefore lies on both sides of it; else
+  // the edge is on the face's border.
   bool through = false;
-  // Faces whose common border moves as one share a number; where there are several numbers, each has
-  // an edge of its own in this place. kNoRim: a face that the edge runs through, or that another one
-  // continues in its plane, which looks and moves alike.
+  // Faces whose common border moves as one share a number; where there are several numbers, each
+  // has an edge of its own in this place. kNoRim: a face that the edge runs through, or that
+  // another one continues in its plane, which looks and moves alike.
   uint8_t rim = 0;
   bool operator==(const Incidence&) const = default;
 };
@@ -156,8 +156,8 @@ struct EdgeRef {
   bool operator==(const EdgeRef&) const = default;
 };
 
-// mesh.weld must be filled. black_behind: the mesh's BSDF is black from behind. shape: whose mesh it
-// is. Faces without area
+// mesh.weld must be filled. black_behind: the mesh's BSDF is black from behind. shape: whose mesh
+// it is. Faces without area
 // stay in `planes` with a zero normal and have no edges: their neighbours' sides are split at the
 // corners that lie on them, so that the neighbours meet. Copies of a vertex that move differently
 // tear the surface: both rims are borders.
@@ -177,7 +177,8 @@ bool is_candidate(const EdgeMesh& mesh, EdgeId edge, const Vec3d& p);
 
 // Whether the edge is in E(p) and its faces may leave one side of it free, so that what lies behind
 // it is seen there: silhouettes of all classes, borders, irregular edges. It is E(p) without sharp
-// edges that have a face on either side as seen from p, and without those that their own mesh hides.
+// edges that have a face on either side as seen from p, and without those that their own mesh
+// hides.
 bool is_outline(const EdgeMesh& mesh, EdgeId edge, const Vec3d& p);
 
 }  // namespace limn

@@ -1,11 +1,12 @@
 #pragma once
 // Reverse mode: from the derivative of a loss with respect to every pixel to its derivative with
 // respect to every parameter of the scene at once, all vertices of all shapes included, with
-// standard errors. One pass costs about as much as a forward pass, however many parameters there are.
+// standard errors. One pass costs about as much as a forward pass, however many parameters there
+// are.
 //   dLoss/dtheta = sum over pixels and channels of A dI/dtheta,
 // A the adjoint image. dI/dtheta is that of gradient.h: the terms interior, camera, boundary and
-// shadow with directions held fixed, each unbiased, so that the sum is unbiased if A and the samples
-// of the pass are independent.
+// shadow with directions held fixed, each unbiased, so that the sum is unbiased if A and the
+// samples of the pass are independent.
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -75,9 +76,9 @@ struct ReverseCheck {
   // The difference over its standard error; 0 where both are exactly the same.
   double z = 0;
 };
-// Reverse mode against forward mode, with a random adjoint image and independent samples: all have z
-// of N(0, 1). An array stands for a smooth random field of velocities. settings.spp samples per pixel
-// in both modes, two at least. Empty if interrupted.
+// Reverse mode against forward mode, with a random adjoint image and independent samples: all have
+// z of N(0, 1). An array stands for a smooth random field of velocities. settings.spp samples per
+// pixel in both modes, two at least. Empty if interrupted.
 std::vector<ReverseCheck> check_reverse(const Scene& scene, const BackwardOptions& options,
                                         const RunSettings& settings);
 
@@ -98,11 +99,11 @@ struct LossResult {
   int64_t spp = 0;   // of each of the two images; 0: interrupted before there was one
 };
 
-// Renders the scene twice with settings.spp samples per pixel each, with seeds of their own that are
-// derived from settings.seed. For l2 and relative-l2 the loss is the mean of w (I - T)(I' - T), and
-// the adjoint 2 w ((I + I') / 2 - T) / N has the mean of dLoss/dI; backward() with settings.seed
-// itself is independent of both, so that the product of both is unbiased. target: crop_height by
-// crop_width, of three channels or one. InputError for another size.
+// Renders the scene twice with settings.spp samples per pixel each, with seeds of their own that
+// are derived from settings.seed. For l2 and relative-l2 the loss is the mean of w (I - T)(I' - T),
+// and the adjoint 2 w ((I + I') / 2 - T) / N has the mean of dLoss/dI; backward() with
+// settings.seed itself is independent of both, so that the product of both is unbiased. target:
+// crop_height by crop_width, of three channels or one. InputError for another size.
 LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
                       const RunSettings& settings);
 

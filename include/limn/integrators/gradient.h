@@ -5,7 +5,8 @@
 //             + camera   (silhouettes on the film)
 //             + boundary (silhouettes that shading points see)
 //             + shadow   (edges of sharp shadows, where the scene has lights without extent)
-//             + direct + penumbra (silhouettes that shading points see before lamps and the sun: the
+//             + direct + penumbra (silhouettes that shading points see before lamps and the sun:
+//             the
 //                         edges of soft shadows; of methods that keep this apart from boundary)
 // after Li et al. 2018 with directions held fixed in solid angle everywhere.
 #include <initializer_list>
