@@ -226,13 +226,14 @@ template <class Make, class Place>
 void BackwardPass::run_tiles(size_t samples, ProgressCounter& progress, ContributionSum& sum,
                              AdjointTerm booked, const Make& make, const Place& place) {
   const size_t tiles = tiles_of(samples);
-  std::vector<TileFigures> figures(tiles);
-  sum.add(tiles, settings_.threads, [&](size_t tile, std::vector<Contribution>& list) {
+  size_t first = 0;  // of the wave
+  std::vector<TileFigures> figures;
+  const auto make_tile = [&](size_t tile, std::vector<Contribution>& list) {
     if (progress.stopped()) return;
     const Stopwatch watch;
     Tape tape(&parameters_.slots());
     const TapeScope scope(tape);
-    TileFigures& own = figures[tile];
+    TileFigures& own = figures[tile - first];
     for (size_t i = tile * kTile; i < std::min(samples, (tile + 1) * kTile); ++i) {
       if (!make(i, tape, own, list)) own.bad.add(place(i));
       own.tape_bytes = std::max(own.tape_bytes, tape.bytes());
@@ -241,11 +242,16 @@ void BackwardPass::run_tiles(size_t samples, ProgressCounter& progress, Contribu
     for (const TermCost& cost : own.costs) inside += cost.seconds;
     own.costs[booked].seconds += watch.seconds() - inside;
     progress.step();
-  });
-  for (const TileFigures& own : figures) {
-    for (int t = 0; t < kAdjointTerms; ++t) figures_.costs[t].merge(own.costs[t]);
-    figures_.bad.merge(own.bad);
-    figures_.tape_bytes = std::max(figures_.tape_bytes, own.tape_bytes);
+  };
+  for (; first < tiles && !progress.stopped(); first += ContributionSum::kWave) {
+    const size_t last = std::min(tiles, first + ContributionSum::kWave);
+    figures.assign(last - first, {});
+    sum.add_wave(first, last, settings_.threads, make_tile);
+    for (const TileFigures& own : figures) {
+      for (int t = 0; t < kAdjointTerms; ++t) figures_.costs[t].merge(own.costs[t]);
+      figures_.bad.merge(own.bad);
+      figures_.tape_bytes = std::max(figures_.tape_bytes, own.tape_bytes);
+    }
   }
 }
 

@@ -10,7 +10,6 @@ namespace limn {
 
 namespace {
 
-constexpr size_t kWave = 64;    // tiles; not tuned
 constexpr size_t kRanges = 16;  // of slots; not tuned
 
 // A tile's contributions by ranges of slots, in their own order within each.
@@ -33,24 +32,23 @@ SortedTile sorted(const std::vector<Contribution>& list, size_t count) {
 
 }  // namespace
 
-void ContributionSum::add(size_t tiles, int threads,
-                          const std::function<void(size_t, std::vector<Contribution>&)>& make) {
-  for (size_t first = 0; first < tiles; first += kWave) {
-    std::vector<SortedTile> wave(std::min(kWave, tiles - first));
-    parallel_for(wave.size(), threads, [&](size_t i) {
-      std::vector<Contribution> list;
-      make(first + i, list);
-      wave[i] = sorted(list, sums_.size());
-    });
-    parallel_for(kRanges, threads, [&](size_t r) {
-      for (const SortedTile& tile : wave) {
-        for (size_t i = tile.begins[r]; i < tile.begins[r + 1]; ++i) {
-          sums_[tile.list[i].slot] += tile.list[i].value;
-        }
+void ContributionSum::add_wave(
+    size_t first, size_t last, int threads,
+    const std::function<void(size_t, std::vector<Contribution>&)>& make) {
+  std::vector<SortedTile> wave(last - first);
+  parallel_for(wave.size(), threads, [&](size_t i) {
+    std::vector<Contribution> list;
+    make(first + i, list);
+    wave[i] = sorted(list, sums_.size());
+  });
+  parallel_for(kRanges, threads, [&](size_t r) {
+    for (const SortedTile& tile : wave) {
+      for (size_t i = tile.begins[r]; i < tile.begins[r + 1]; ++i) {
+        sums_[tile.list[i].slot] += tile.list[i].value;
       }
-    });
-    for (const SortedTile& tile : wave) added_ += tile.list.size();
-  }
+    }
+  });
+  for (const SortedTile& tile : wave) added_ += tile.list.size();
 }
 
 }  // namespace limn

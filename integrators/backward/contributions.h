@@ -12,10 +12,12 @@ class ContributionSum {
   // count: slots, with the unused first one.
   explicit ContributionSum(uint32_t count) : sums_(count) {}
 
-  // Calls make(tile, list) for every tile, in parallel, and adds the lists in the order of tiles.
-  // The lists of 64 tiles are held at a time.
-  void add(size_t tiles, int threads,
-           const std::function<void(size_t, std::vector<Contribution>&)>& make);
+  // Calls make(tile, list) for the tiles [first, last), in parallel, and adds the lists in the order
+  // of tiles. The lists are held until then, so callers take kWave tiles at a time: a fixed number,
+  // whatever the threads.
+  static constexpr size_t kWave = 64;
+  void add_wave(size_t first, size_t last, int threads,
+                const std::function<void(size_t, std::vector<Contribution>&)>& make);
 
   std::vector<double>& sums() { return sums_; }
   uint64_t added() const { return added_; }
