@@ -5,6 +5,7 @@
 #include <bit>
 #include <cstring>
 
+#include "edgetree/forest/choose_root.h"
 #include "edgetree/forest/forest_build.h"
 #include "edgetree/forest/forest_query.h"
 #include "edgetree/forest/forest_rejection.h"
@@ -12,8 +13,6 @@
 
 namespace limn {
 namespace {
-
-double below_one(double u) { return std::clamp(u, 0.0, 0x1.fffffffffffffp-1); }
 
 // A node, the weights of its children, and their sums in pairs, fours and all.
 struct Choice {
@@ -117,26 +116,6 @@ struct EdgeForest::Impl {
     return total;
   }
 
-  // Draws a root by the uniform number u and leaves another one in it. False if no root has weight.
-  // total: root_total.
-  bool choose_root(const ForestQuery& query, double& u, Choice& chosen, double& total) const {
-    bool any = false;
-    total = 0;
-    for (NodeId root : forest.roots) {
-      const Choice next = choice_at(root, query);
-      total += next.total;
-      const double share = next.total > 0 ? next.total / total : 0;
-      if (u < share) {
-        u = below_one(u / share);
-        chosen = next;
-        any = true;
-      } else if (any) {
-        u = below_one((u - share) / (1 - share));
-      }
-    }
-    return any;
-  }
-
   // Where a draw ends: an edge, not yet tested, in a lane of an edge node.
   struct Draw {
     const EdgeNode* node;
@@ -147,7 +126,8 @@ struct EdgeForest::Impl {
   bool draw(const ForestQuery& query, double u, Draw& result) const {
     Choice choice;
     double scale;
-    if (!choose_root(query, u, choice, scale)) return false;
+    const auto at = [&](NodeId root) { return choice_at(root, query); };
+    if (!choose_root(forest.roots, at, u, choice, scale)) return false;
     result.probability = 1;
     while (true) {
       const int lane = choice.draw(u);

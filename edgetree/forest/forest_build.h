@@ -1,7 +1,9 @@
 #pragma once
 // Building the trees of the edge forest.
+#include <algorithm>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "edgetree/forest/forest_config.h"
 #include "edgetree/forest/forest_fit.h"
@@ -16,6 +18,26 @@ std::optional<ForestGroup> group_of(const EdgeMesh& mesh, const Edge& edge, bool
 // scale: EdgeSamplerInput::lane_scale.
 Wedge wedge_of(const EdgeMesh& mesh, EdgeId id, const Lanes& scale);
 Bounds bounds_of(std::span<const Wedge> wedges);
+// Calls append(wedges, object, group) for every object and group that has edges, in a fixed order;
+// trees get a slot for every edge of every object first (Forest, QuadricForest).
+template <class Trees, class Append>
+void for_every_tree(const EdgeSamplerInput& input, bool cull_concave, Trees& trees,
+                    const Append& append) {
+  for (uint32_t o = 0; o < input.objects.size(); ++o) {
+    const EdgeMesh& mesh = input.objects[o];
+    trees.extent = std::max(trees.extent, mesh.extent);
+    trees.slots.emplace_back(mesh.edges.size(), kNoParent);
+    std::vector<Wedge> groups[kForestGroups];
+    for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
+      if (const auto group = group_of(mesh, mesh.edges[e], cull_concave)) {
+        groups[static_cast<int>(*group)].push_back(wedge_of(mesh, EdgeId(e), input.lane_scale));
+      }
+    }
+    for (int g = 0; g < kForestGroups; ++g) {
+      if (!groups[g].empty()) append(groups[g], ShapeId(o), static_cast<ForestGroup>(g));
+    }
+  }
+}
 // The frame of a node whose edges fill the box: the cube [-1, 1]^3 holds it.
 NodeFrame frame_of(const Bounds& box);
 

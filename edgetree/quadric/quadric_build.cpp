@@ -220,18 +220,10 @@ uint64_t QuadricForest::bytes() const {
 QuadricForest build_quadric_forest(const EdgeSamplerInput& input, int threads,
                                    const QuadricConfig& config) {
   QuadricForest forest;
-  for (uint32_t o = 0; o < input.objects.size(); ++o) {
-    const EdgeMesh& mesh = input.objects[o];
-    forest.extent = std::max(forest.extent, mesh.extent);
-    forest.slots.emplace_back(mesh.edges.size(), kNoParent);
-    std::vector<Wedge> groups[kForestGroups];
-    for (uint32_t e = 0; e < mesh.edges.size(); ++e)
-      if (const auto group = group_of(mesh, mesh.edges[e], config.cull_concave))
-        groups[static_cast<int>(*group)].push_back(wedge_of(mesh, EdgeId(e), input.lane_scale));
-    for (int g = 0; g < kForestGroups; ++g)
-      if (!groups[g].empty())
-        append_tree(groups[g], ShapeId(o), static_cast<ForestGroup>(g), threads, config, forest);
-  }
+  for_every_tree(input, config.cull_concave, forest,
+                 [&](auto& wedges, ShapeId object, ForestGroup group) {
+                   append_tree(wedges, object, group, threads, config, forest);
+                 });
   return forest;
 }
 

@@ -3,14 +3,13 @@
 
 #include <algorithm>
 
+#include "edgetree/forest/choose_root.h"
 #include "edgetree/lobe/seen_edge.h"
 #include "edgetree/quadric/quadric_build.h"
 #include "edgetree/quadric/quadric_query.h"
 
 namespace limn {
 namespace {
-
-double below_one(double u) { return std::clamp(u, 0.0, 0x1.fffffffffffffp-1); }
 
 // A node and the weights of its children.
 struct Choice {
@@ -111,26 +110,6 @@ struct QuadricSampler::Impl {
     return total;
   }
 
-  // Draws one of the trees, whose four roots are the children of `chosen`, by the uniform number u
-  // and leaves another one in it. False if no root has weight. total: root_total.
-  bool choose_root(const QuadricQuery& query, double& u, Choice& chosen, double& total) const {
-    bool found = false;
-    total = 0;
-    for (NodeId root : forest.roots) {
-      const Choice next = choice_at(root, query);
-      total += next.total;
-      const double share = next.total > 0 ? next.total / total : 0;
-      if (u < share) {
-        u = below_one(u / share);
-        chosen = next;
-        found = true;
-      } else if (found) {
-        u = below_one((u - share) / (1 - share));
-      }
-    }
-    return found;
-  }
-
   struct Draw {
     EdgeRef edge;
     double probability = 1;
@@ -138,7 +117,8 @@ struct QuadricSampler::Impl {
   std::optional<Draw> draw(const QuadricQuery& query, double u) const {
     Choice choice;
     double scale;
-    if (!choose_root(query, u, choice, scale)) return std::nullopt;
+    const auto at = [&](NodeId root) { return choice_at(root, query); };
+    if (!choose_root(forest.roots, at, u, choice, scale)) return std::nullopt;
     Draw result;
     while (true) {
       const int lane = choice.draw(u);

@@ -351,4 +351,16 @@ CheckResult check(const Scene& scene, const CheckOptions& options, const RunSett
   return Checker(scene, options, settings, run).check();
 }
 
+const char* verdict_name(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kAgree:
+      return "agree";
+    case Verdict::kDisagree:
+      return "disagree";
+    case Verdict::kCannotTell:
+      break;
+  }
+  return "cannot tell";
+}
+
 }  // namespace limn

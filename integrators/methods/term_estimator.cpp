@@ -176,7 +176,7 @@ class TermEstimator::VertexTerms {
     if (bounces == 0) first_ = p;
     const Vec3<Lanes> velocity{surface.p.x.d, surface.p.y.d, surface.p.z.d};
     const double urgency = luminance(throughput) * estimator_.rates_.urgency(p, velocity, first_);
-    return std::clamp(urgency, kLeast, kMost);
+    return urgency < kMost ? std::max(urgency, kLeast) : kMost;  // also of what is not a number
   }
   // A whole number with this mean.
   static int rounded(double mean, Rng rng, size_t slot) {

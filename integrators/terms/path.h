@@ -202,7 +202,8 @@ class PathTracer {
       constexpr double kMost = 16;  // not tuned
       if (!splitting_) return 1;
       const double slides = splitting_->sliding({surface.p.x.d, surface.p.y.d, surface.p.z.d});
-      return static_cast<int>(std::clamp(slides, 1.0, kMost));
+      return static_cast<int>(slides < kMost ? std::max(slides, 1.0)
+                                             : kMost);  // also if not finite
     }
     return 1;
   }

@@ -16,18 +16,6 @@ namespace {
 
 using nlohmann::json;
 
-const char* verdict_name(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::kAgree:
-      return "agree";
-    case Verdict::kDisagree:
-      return "disagree";
-    case Verdict::kCannotTell:
-      break;
-  }
-  return "cannot tell";
-}
-
 std::string percent(double part) {
   return part < 10 ? fmt::format("{:.2g} %", 100 * part) : "more than all";
 }

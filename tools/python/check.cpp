@@ -15,18 +15,6 @@ struct Check {
   Estimate gradient, differences;
 };
 
-const char* verdict_name(const Check& check) {
-  switch (check.result.verdict) {
-    case Verdict::kAgree:
-      return "agree";
-    case Verdict::kDisagree:
-      return "disagree";
-    case Verdict::kCannotTell:
-      break;
-  }
-  return "cannot tell";
-}
-
 Check check_of(const SceneHandle& handle, const CheckOptions& options, const RunArguments& run,
                const nb::object& progress) {
   const auto scene = handle.share();
@@ -61,7 +49,9 @@ auto total(Field TotalComparison::*member) {
 
 void bind_result(nb::module_& m) {
   nb::class_<Check>(m, "Check", "What limn.check found.")
-      .def_prop_ro("verdict", verdict_name, "\"agree\", \"disagree\" or \"cannot tell\".")
+      .def_prop_ro(
+          "verdict", [](const Check& c) { return verdict_name(c.result.verdict); },
+          "\"agree\", \"disagree\" or \"cannot tell\".")
       .def_prop_ro("p", field(&CheckResult::p),
                    "Of the first run: windows, image and terms together.")
       .def_prop_ro("found", field(&CheckResult::found), "Where the first run's p is smallest.")
@@ -80,7 +70,8 @@ void bind_result(nb::module_& m) {
       .def_ro("gradient", &Check::gradient, "The gradient: an image, (H, W, 3).")
       .def_ro("differences", &Check::differences, "The finite differences: an image, (H, W, 3).")
       .def("__repr__", [](const Check& c) {
-        return fmt::format("<limn.Check: {}, p = {:.2g}>", verdict_name(c), c.result.p);
+        return fmt::format("<limn.Check: {}, p = {:.2g}>", verdict_name(c.result.verdict),
+                           c.result.p);
       });
 }
 

@@ -58,6 +58,8 @@ struct Confirmation {
 };
 
 enum class Verdict { kAgree, kDisagree, kCannotTell };
+// "agree", "disagree" or "cannot tell".
+const char* verdict_name(Verdict verdict);
 
 struct CheckResult {
   Verdict verdict = Verdict::kCannotTell;
