@@ -185,28 +185,24 @@ void CameraEdges::weigh(int lanes) {
   for (const FilmEdge& edge : edges_) {
     for (int k = 0; k < lanes; ++k) totals[k] += weighted_speed(edge, k);
   }
-  double sum = 0;
   for (const FilmEdge& edge : edges_) {
+    double share = 0;
     for (int k = 0; k < lanes; ++k) {
-      if (totals[k] > 0) sum += weighted_speed(edge, k) / totals[k];
+      if (totals[k] > 0) share += weighted_speed(edge, k) / totals[k];
     }
-    cumulative_.push_back(sum);
+    choice_.add(share);
   }
 }
 
 FilmEdgePoint CameraEdges::choose(double u) const {
-  const double target = u * cumulative_.back();
-  const auto found = std::upper_bound(cumulative_.begin(), cumulative_.end(), target);
-  const size_t index = std::min<size_t>(found - cumulative_.begin(), edges_.size() - 1);
-  const double below = index == 0 ? 0 : cumulative_[index - 1];
-  const double weight = cumulative_[index] - below;
-  const FilmEdge& edge = edges_[index];
+  const DiscreteDistribution::Draw draw = choice_.sample(u);
+  const FilmEdge& edge = edges_[draw.index];
   FilmEdgePoint point;
   point.edge = &edge;
-  point.s = std::clamp((target - below) / weight, 0.0, 1.0);
+  point.s = draw.fraction;
   point.x = edge.x0 + (edge.x1 - edge.x0) * point.s;
   point.y = edge.y0 + (edge.y1 - edge.y0) * point.s;
-  point.density = weight / (cumulative_.back() * edge.length);
+  point.density = draw.probability / edge.length;
   return point;
 }
 

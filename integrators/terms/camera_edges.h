@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "integrators/terms/clip_curves.h"
+#include "limn/core/discrete_distribution.h"
 #include "limn/edgetree/edge_sampler.h"
 
 namespace limn {
@@ -82,7 +83,7 @@ class CameraEdges {
   const FreeMotion* free_;
   std::vector<ClipSegment> clips_;
   std::vector<FilmEdge> edges_;
-  std::vector<double> cumulative_;  // probabilities of the edges, summed
+  DiscreteDistribution choice_;  // of an edge
   double list_seconds_ = 0;
 };
 
