@@ -43,6 +43,19 @@ int grown(int count, int64_t step, int period) {
   return static_cast<int>(std::min(std::round(count * factor), 0x1p30));
 }
 
+// Normals of a file would stay as they are while the vertices of an array move.
+void free_normals(Scene& scene, const std::string& name, std::vector<std::string>& warnings) {
+  for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+    const Mesh& mesh = scene.shapes[s].mesh;
+    if (scene.shapes[s].id + ".vertex_positions" != name) continue;
+    if (mesh.normal_source != NormalSource::kGiven) continue;
+    warnings.push_back("\"" + scene.shapes[s].id +
+                       "\" has normals of its own: they are computed from its faces instead, "
+                       "so that they follow its vertices");
+    set_mesh(scene, ShapeId(s), mesh.positions, mesh.faces, nullptr);
+  }
+}
+
 }  // namespace
 
 class Fit::Impl {
@@ -81,6 +94,7 @@ Fit::Impl::Impl(std::vector<FitView> all, const FitOptions& options, const RunSe
   for (FitView& view : views) {
     view.scene = deep_copy(view.scene);
     check_loss_images(view.scene, view.target, view.mask);
+    for (const std::string& name : options.parameters) free_normals(view.scene, name, warnings);
   }
   for (const std::string& name : options.parameters) {
     for (const FitParameter& other : parameters_) {
@@ -112,9 +126,6 @@ void Fit::Impl::check_shapes() {
                          fmt::format("\"{}\" and \"{}\" move the same vertices: fit one of them",
                                      a.name(), b.name()));
       }
-      if (views[v].scene.shape(shape).mesh.normal_source != NormalSource::kGiven) continue;
-      warnings.push_back("the mesh of \"" + a.name() +
-                         "\" has normals in its file, which stay as they are");
     }
   }
 }

@@ -46,7 +46,8 @@ struct FitBounds {
 struct FitOptions {
   // Names as in parameter.h: scalars and SHAPE.vertex_positions; at least one. Every view that has
   // a name moves with it, and one view must have it. Colours move along grey. Motions of a shape
-  // and its vertex_positions exclude each other.
+  // and its vertex_positions exclude each other; where vertices are fitted, normals of the file
+  // give way to computed ones.
   std::vector<std::string> parameters;
   std::vector<FitBounds> bounds;
   LossKind loss = LossKind::kL2;
