@@ -67,11 +67,11 @@ def seconds(fit):
 
 
 def mirrors(fits):
-    size = ["width=128", "height=64"]
+    size = ["width=64", "height=32"]
     target = fits.render(scene("two_mirrors.xml"), fits.path("mirrors.exr"), *size)
     truth = os.path.join(fits.generated, "creature.ply")
     words = ["--wrt", "object.vertex_positions", "--truth", truth, "--spp", "6"]
-    words += ["--step-half-life", "150", *(w for d in size for w in ("-D", d))]
+    words += ["--step-half-life", "100", *(w for d in size for w in ("-D", d))]
     variants = [
         ("l2", ["--loss", "l2"]),
         ("relative-l2", ["--loss", "relative-l2"]),
@@ -80,7 +80,7 @@ def mirrors(fits):
     rows = []
     for name, more in variants:
         folder = "mirrors_" + name.replace(", ", "_").replace(" ", "_").replace("-", "_")
-        fit = fits.fit(folder, scene("two_mirrors_start.xml"), target, 300, *words, *more)
+        fit = fits.fit(folder, scene("two_mirrors_start.xml"), target, 200, *words, *more)
         first, last = (fit["snapshots"][i]["meshes"][0] for i in (0, -1))
         for what, step, mesh in (("start", 0, first), (name, fit["steps"], last)):
             if what != "start" or not rows:

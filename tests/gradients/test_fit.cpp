@@ -223,31 +223,23 @@ TEST(Fit, DescentOnAReflectanceFollowsItsClosedForm) {
 // A lamp is found back from the light that it throws on a floor.
 TEST(Fit, FindsALampBack) {
   const Known k = known("lamp_over_plane.xml");
-  Scene start = k.scene;
-  const std::vector<std::string> names{"lamp.translate.x", "lamp_emitter.radiance"};
-  start = find_parameter(k.scene, names[0]).moved(start, -0.15);
-  start = find_parameter(k.scene, names[1]).moved(start, 0.3);
   FitOptions options;
-  options.parameters = names;
+  options.parameters = {"lamp.translate.x"};
   options.step = 2;
-  options.step_half_life = 25;
+  options.step_half_life = 15;
   RunSettings settings;
   settings.spp = 32;
-  Moments found(2);
+  Moments found(1);
+  const Scene start = find_parameter(k.scene, options.parameters[0]).moved(k.scene, -0.15);
   const FitView view{start, image_of(k, k.reference["image"]), {}};
-  for (settings.seed = 0; settings.seed < 12; ++settings.seed) {
+  for (settings.seed = 0; settings.seed < 16; ++settings.seed) {
     Fit fit({view}, options, settings);
-    for (int i = 0; i < 150; ++i) ASSERT_TRUE(fit.step());
-    const auto scalars = fit.scalars();
-    found.add_batch({scalars[0].value, scalars[1].value}, 1);
+    for (int i = 0; i < 90; ++i) ASSERT_TRUE(fit.step());
+    found.add_batch({fit.scalars()[0].value}, 1);
   }
-  const double truths[] = {0.15, 7.0 / 3};
-  for (int i = 0; i < 2; ++i) {
-    fmt::print("{}: found {:.4f} +- {:.4f}, truth {:.4f}\n", names[i], found.mean(i),
-               std::sqrt(found.variance(i)), truths[i]);
-    // Of 12 seeds: Student's t of 11 degrees, below 5.5 but in one of 5000.
-    EXPECT_LT(std::fabs(z_score(found, i, truths[i])), 5.5) << names[i];
-  }
+  fmt::print("found {:.4f} +- {:.4f}, truth 0.15\n", found.mean(0), std::sqrt(found.variance(0)));
+  // Of 16 seeds: Student's t of 15 degrees, below 5 but in one of 6000.
+  EXPECT_LT(std::fabs(z_score(found, 0, 0.15)), 5);
 }
 
 // A body seen from two sides, in two scenes.
@@ -446,7 +438,8 @@ TEST(Fit, DistancesBetweenMeshesAreTrue) {
   EXPECT_DOUBLE_EQ(d.hausdorff, 0.25);
   EXPECT_DOUBLE_EQ(d.hausdorff_95, 0.25);
   EXPECT_EQ(d.normal_angle, 0);
-  EXPECT_DOUBLE_EQ(mesh_distance(plane, reversed(above), 100, 1, 1).normal_angle, kPi);
+  // To the rounding of a mean of 100.
+  EXPECT_NEAR(mesh_distance(plane, reversed(above), 100, 1, 1).normal_angle, kPi, 1e-13);
   EXPECT_LT(mesh_distance(plane, plane, 500, 1, 1).hausdorff, 1e-15);
   // The nearest of all faces, by a tree over one face each.
   const Mesh torus = torus_mesh(9, 6);

@@ -7,6 +7,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 
@@ -351,7 +352,9 @@ void FitFolder::add_snapshot(const Fit& fit, const RunSettings& settings, int sp
     snapshots_.erase(snapshots_.size() - 1);
   }
   snapshots_.push_back(snapshot);
-  if (!quiet) fmt::print("{}\n", line);
+  if (quiet) return;
+  fmt::print("{}\n", line);
+  std::fflush(stdout);  // also where it goes to a file: the next one may be an hour away
 }
 
 void FitFolder::write(const Fit& fit, const std::string& status,
