@@ -24,7 +24,7 @@ TERMS = "interior,camera"  # A fit without the boundary term: what mirrors show 
 
 class Fits:
     def __init__(self, arguments):
-        self.limn, self.out = os.path.join(ROOT, "build", "limn"), arguments.output
+        self.limn, self.out = arguments.limn, arguments.output
         self.threads, self.steps = arguments.threads, arguments.steps
         self.generated = os.path.join(ROOT, "build", "generated")
 
@@ -157,6 +157,7 @@ def main():
     parser.add_argument("-o", "--output", default=os.path.join(ROOT, "out", "fits"))
     parser.add_argument("--steps", type=int, help="in place of the experiment's own number")
     parser.add_argument("--threads", type=int, help="default: all cores")
+    parser.add_argument("--limn", default=os.path.join(ROOT, "build", "limn"), help="the program")
     arguments = parser.parse_args()
     os.makedirs(arguments.output, exist_ok=True)
     head, rows = EXPERIMENTS[arguments.name](Fits(arguments))
