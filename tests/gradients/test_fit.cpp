@@ -310,6 +310,7 @@ TEST(Fit, NeitherThreadsNorABreakChangeABit) {
     Fit stopped(two_views(files), options, settings);
     EXPECT_FALSE(stopped.step());
     EXPECT_EQ(numbers(stopped), before);
+    EXPECT_EQ(stopped.steps(), 0);
   }
 }
 
