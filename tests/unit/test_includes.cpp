@@ -103,7 +103,7 @@ const std::vector<Rooms>& all_rooms() {
   static const std::vector<Rooms> rooms = {
       {"src", {"base", "mesh", "image", "bsdf", "light", "rays", "scene", "scene_file"}},
       {"edgetree", {"edges", "lobe", "light", "forest", "quadric", "baselines", "rejection"}},
-      {"integrators", {"estimates", "terms", "methods", "backward", "compare"}},
+      {"integrators", {"estimates", "terms", "methods", "backward", "fit", "compare"}},
   };
   return rooms;
 }
