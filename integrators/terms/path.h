@@ -229,7 +229,7 @@ class PathTracer {
     if constexpr (std::is_same_v<S, Dual>) {
       if (!splitting_) return 1;
       const double slides = splitting_->sliding({surface.p.x.d, surface.p.y.d, surface.p.z.d});
-      return slides < kMostSplits ? static_cast<int>(std::max(slides, 1.0))
+      return slides < kMostSplits ? static_cast<int>(std::max(slides + 0.5, 1.0))
                                   : kMostSplits;  // also if not finite
     }
     return 1;
