@@ -11,7 +11,7 @@
 
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
-#include "limn/core/shading.h"
+#include "limn/core/surface_point.h"
 #include "tools/limn/command_support.h"
 
 namespace limn {
