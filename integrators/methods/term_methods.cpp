@@ -16,6 +16,7 @@
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
 #include "limn/edgetree/edge_sampler_types.h"
+#include "limn/integrators/parts.h"
 
 namespace limn {
 namespace {
@@ -46,6 +47,16 @@ void collect(const std::vector<const std::vector<double>*>& sums, const std::vec
   g.total.add_batch(total, samples);
   g.image_sum.add_batch(sum_blocks(total, width, height, std::max(width, height)), samples);
   if (block > 0) g.total_blocks.add_batch(sum_blocks(total, width, height, block), samples);
+}
+
+// What a pilot chose: other machines must have chosen the same.
+void identify_plan(const std::vector<TermRun>& terms, BatchStore& store) {
+  std::vector<double> counts;
+  for (const TermRun& term : terms) {
+    counts.push_back(term.samples);
+    counts.insert(counts.end(), term.pixel_samples.begin(), term.pixel_samples.end());
+  }
+  store.identify("choice of the pilot", fingerprint(counts));
 }
 
 // What a method does beside sampling its terms.
@@ -106,6 +117,7 @@ class TermJob {
     GradientResult result = empty_result();
     for (size_t p = 0; p < passes_.size(); ++p) pass(p).describe(result.stats);
     plan(settings, watch, result);
+    if (settings.store) identify_plan(result.terms, *settings.store);
     result.setup_seconds = watch.seconds();
     run_batches(passes_, settings, watch, [&](const Batch& batch, const auto& sums) {
       add_batch(batch.count(), sums, result);

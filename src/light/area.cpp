@@ -1,7 +1,7 @@
 // Emitter "area": the surface of a shape shines from the front of every face.
 
 #include "limn/core/discrete_distribution.h"
-#include "limn/core/shading.h"
+#include "limn/core/surface_point.h"
 #include "src/light/types.h"
 
 namespace limn {

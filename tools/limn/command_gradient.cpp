@@ -12,6 +12,7 @@
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
 #include "tools/limn/output_files.h"
+#include "tools/limn/run_part.h"
 
 namespace limn {
 namespace {
@@ -274,6 +275,12 @@ class GradientCommand final : public Command {
                  "OUTPUT_samples_TERM.exr");
     app.add_flag("--stats", stats_, "Print edges, nodes, bytes, rays by kind, where the time went");
     add_debug_option(app, debug_);
+    add_part_option(app, common_);
+    app.get_option("--part")->excludes("--time");
+  }
+  bool join(BatchStore& store) override {
+    common_.store = &store;
+    return true;
   }
 
   int run(const std::string& command_line) override {
@@ -283,6 +290,12 @@ class GradientCommand final : public Command {
     options_.uniform_samples = samples_ == "uniform";
     if (!debug_.empty()) return trace(scene);
     for (const auto& parameter : options_.parameters) find_parameter(scene, parameter);
+    if (!common_.part.empty()) {
+      check_memory(scene);
+      return run_part(
+          common_, scene, field_files(options_.parameters), {name(), words, command_line}, output_,
+          [&](const RunSettings& part) { return gradient(scene, options_, part).non_finite; });
+    }
     for (const auto& parameter : options_.parameters) {
       outputs_.push_back(options_.parameters.size() == 1
                              ? output_

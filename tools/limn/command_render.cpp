@@ -3,6 +3,7 @@
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
 #include "tools/limn/output_files.h"
+#include "tools/limn/run_part.h"
 
 namespace limn {
 namespace {
@@ -16,6 +17,11 @@ class RenderCommand final : public Command {
     app.add_option("-o,--output", output_, "Image to write (.exr; a .png is put beside it)")
         ->required();
     add_debug_option(app, debug_);
+    add_part_option(app, common_);
+  }
+  bool join(BatchStore& store) override {
+    common_.store = &store;
+    return true;
   }
 
   int run(const std::string& command_line) override {
@@ -26,6 +32,10 @@ class RenderCommand final : public Command {
         fmt::print("{}\n", line);
       }
       return kSuccess;
+    }
+    if (!common_.part.empty()) {
+      return run_part(common_, scene, {}, {name(), words, command_line}, output_,
+                      [&](const RunSettings& part) { return render(scene, part).non_finite; });
     }
     check_output(output_);
     check_outputs({{"-o", output_}, {"-o", with_ending(output_, ".png")}, {"--json", common_.json}},

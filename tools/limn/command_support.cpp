@@ -134,6 +134,7 @@ RunSettings make_settings(const CommonOptions& common, const Scene& scene,
   settings.threads = thread_count(common.threads);
   settings.progress = progress_bar(label, common.quiet);
   settings.interrupted = &interrupt_flag();
+  settings.store = common.store;
   watch_interrupt();
   return settings;
 }

@@ -26,6 +26,8 @@ struct CommonOptions {
   std::string json;
   bool quiet = false;
   std::string shading = "continuous";
+  std::string part;             // "K/N" of --part; "": the whole run
+  BatchStore* store = nullptr;  // of `limn merge`
 };
 
 // Scene or mesh, -D, --seed, --threads, --quiet. text, type: of the input.
