@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "integrators/estimates/tiles.h"
 #include "limn/core/error.h"
@@ -52,16 +53,17 @@ class FilmRegions::Builder {
   Tile build(size_t t) const {
     const limn::Tile& tile = tiles_[t];
     std::vector<SeenFace> faces;
-    for (const uint32_t label :
-         std::span(binned_).subspan(first_binned_[t], first_binned_[t + 1] - first_binned_[t])) {
-      faces.push_back(*see(label));
+    for (size_t i = first_binned_[t]; i < first_binned_[t + 1]; ++i) {
+      faces.push_back(*see(binned_[i]));
     }
-    std::sort(faces.begin(), faces.end(), [](const SeenFace& a, const SeenFace& b) {
-      return std::pair(-a.nearest, a.label) < std::pair(-b.nearest, b.label);
-    });
+    std::vector<uint32_t> order(faces.size());
+    std::iota(order.begin(), order.end(), 0);
+    // Nearest first; labels are in order.
+    std::stable_sort(order.begin(), order.end(),
+                     [&](uint32_t a, uint32_t b) { return faces[a].nearest > faces[b].nearest; });
     const int width = tile.x1 - tile.x0, height = tile.y1 - tile.y0;
     std::vector<std::vector<uint32_t>> of_pixel(static_cast<size_t>(width) * height);
-    for (uint32_t f = 0; f < faces.size(); ++f) {
+    for (const uint32_t f : order) {
       const auto [x0, x1] = range(faces[f].lower.x, faces[f].upper.x, tile.x0, tile.x1);
       const auto [y0, y1] = range(faces[f].lower.y, faces[f].upper.y, tile.y0, tile.y1);
       for (int y = y0; y < y1; ++y) {
@@ -215,18 +217,26 @@ void FilmRegions::for_each_region(int x, int y, const Visit& visit) const {
   }
 }
 
+namespace {
+
+// How far inside a convex polygon a point is [pixels], negative outside.
+double depth_in(std::span<const PlanePoint> corners, const PlanePoint& p) {
+  double depth = 1e300;
+  for (size_t i = 0; i < corners.size(); ++i) {
+    const PlanePoint &a = corners[i], &b = corners[(i + 1) % corners.size()];
+    const double dx = b.x - a.x, dy = b.y - a.y;
+    depth = std::min(depth, (dx * (p.y - a.y) - dy * (p.x - a.x)) / std::sqrt(dx * dx + dy * dy));
+  }
+  return depth;
+}
+
+}  // namespace
+
 FaceRef FilmRegions::face_at(int x, int y, double film_x, double film_y) const {
   FaceRef face;
   double deepest = -1e300;
   for_each_region(x, y, [&](FaceRef region_face, std::span<const PlanePoint> corners) {
-    // How far inside the region the position is.
-    double depth = 1e300;
-    for (size_t i = 0; i < corners.size(); ++i) {
-      const PlanePoint &a = corners[i], &b = corners[(i + 1) % corners.size()];
-      const double dx = b.x - a.x, dy = b.y - a.y;
-      const double side = dx * (film_y - a.y) - dy * (film_x - a.x);
-      depth = std::min(depth, side / std::hypot(dx, dy));
-    }
+    const double depth = depth_in(corners, {film_x, film_y});
     if (!(depth > deepest)) return;
     deepest = depth;
     face = region_face;
@@ -299,6 +309,31 @@ std::vector<FilmRegions::Interval> FilmRegions::seen_parts(const PlanePoint& fro
     }
   }
   return united;
+}
+
+std::optional<FaceRef> FilmRegions::seen_beside(const PlanePoint& p,
+                                                std::span<const FaceRef> around) const {
+  constexpr double kBeside = 1e-8;  // pixels: ten times the rounding of regions
+  const double x = std::floor(p.x), y = std::floor(p.y);
+  const double to_border = std::min({p.x - x, x + 1 - p.x, p.y - y, y + 1 - p.y});
+  const double left = x - film_.crop_x, top = y - film_.crop_y;
+  const bool inside = left >= 0 && top >= 0 && left < film_.crop_width && top < film_.crop_height;
+  if (!inside || to_border < kBeside) return {};
+  bool edge_is_seen = false, ambiguous = false;
+  std::optional<FaceRef> other;
+  for_each_region(static_cast<int>(x), static_cast<int>(y),
+                  [&](FaceRef face, std::span<const PlanePoint> corners) {
+                    if (depth_in(corners, p) < -kBeside) return;
+                    if (std::find(around.begin(), around.end(), face) != around.end()) {
+                      edge_is_seen = true;
+                    } else {
+                      ambiguous = ambiguous || (other && *other != face);
+                      other = face;
+                    }
+                  });
+  if (!edge_is_seen || ambiguous) return {};
+  // With one of its faces on either side, nothing else is asked for.
+  return other.value_or(FaceRef{});
 }
 
 size_t FilmRegions::size() const {

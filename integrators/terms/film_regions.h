@@ -27,6 +27,11 @@ class FilmRegions {
   std::vector<Interval> seen_parts(const PlanePoint& from, const PlanePoint& to,
                                    std::span<const FaceRef> faces) const;
 
+  // Of a point of an edge on the film, the faces around which are given: what is seen beside it that
+  // is none of them (no face where nothing is). None if that cannot be told: the edge is hidden
+  // there, or within a hundred millionth of a pixel more than one other thing is seen.
+  std::optional<FaceRef> seen_beside(const PlanePoint& p, std::span<const FaceRef> around) const;
+
   size_t size() const;       // regions of all pixels
   size_t crossings() const;  // lines where faces pass through each other, pixel by pixel
   double seconds() const { return seconds_; }  // that it took to find them
@@ -44,7 +49,7 @@ class FilmRegions {
   };
   class Builder;
 
-  // visit(face, corners): for every region of a pixel of the full film.
+  // visit(face, corners): for every region of a pixel of the full film in the crop window.
   template <class Visit>
   void for_each_region(int x, int y, const Visit& visit) const;
 

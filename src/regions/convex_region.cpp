@@ -5,27 +5,55 @@
 
 namespace limn {
 
-void make_window_ring(std::vector<GridLine>& lines, Ring& ring) {
+GridCell window_cell(std::vector<GridLine>& lines) {
   constexpr auto kHalf = static_cast<int64_t>(kGridHalf);
   const std::array<GridPoint, 4> corners = {
       {{-kHalf, -kHalf}, {kHalf, -kHalf}, {kHalf, kHalf}, {-kHalf, kHalf}}};
-  ring.clear();
-  for (size_t k = 0; k < 4; ++k) {
-    const GridPoint& p = corners[k];
-    ring.push_back(
-        {{static_cast<double>(p.x), static_cast<double>(p.y)}, LineSide(lines.size(), false)});
-    lines.push_back(line_through(p, corners[(k + 1) % 4]));
+  const size_t first = lines.size();
+  for (size_t k = 0; k < 4; ++k) lines.push_back(line_through(corners[k], corners[(k + 1) % 4]));
+  const auto side = [&](size_t k) { return LineSide(first + k, false); };
+  return {corners[0], corners[2], side(0), side(1), side(2), side(3)};
+}
+
+Ring GridCell::ring() const {
+  const auto corner = [](int64_t x, int64_t y) {
+    return GridCorner{static_cast<double>(x), static_cast<double>(y)};
+  };
+  return {{corner(lower.x, lower.y), bottom},
+          {corner(upper.x, lower.y), right},
+          {corner(upper.x, upper.y), top},
+          {corner(lower.x, upper.y), left}};
+}
+
+std::pair<GridCell, GridCell> GridCell::halves(std::vector<GridLine>& lines) const {
+  const size_t line = lines.size();
+  GridCell low = *this, high = *this;
+  if (upper.x - lower.x >= upper.y - lower.y) {
+    const int64_t middle = (lower.x + upper.x) / 2;
+    lines.push_back(line_through({middle, lower.y}, {middle, upper.y}));
+    low.upper.x = high.lower.x = middle;
+    low.right = LineSide(line, false);
+    high.left = LineSide(line, true);
+  } else {
+    const int64_t middle = (lower.y + upper.y) / 2;
+    lines.push_back(line_through({lower.x, middle}, {upper.x, middle}));
+    low.upper.y = high.lower.y = middle;
+    low.top = LineSide(line, true);
+    high.bottom = LineSide(line, false);
   }
+  return {low, high};
 }
 
 void find_sides(const std::vector<GridLine>& lines, const Ring& ring, LineSide by,
                 RingSides& sides) {
   const GridLine line = by.in(lines);
+  const SideFilter filter(line);
   sides.of.clear();
   sides.positive = sides.negative = false;
   LineSide before = ring.back().side;
   for (const RingCorner& corner : ring) {
-    const int s = side_of_corner(line, corner.at, before.in(lines), corner.side.in(lines));
+    int s = filter.side_of(corner.at);
+    if (s == 0) s = exact_side(line, before.in(lines), corner.side.in(lines));
     sides.of.push_back(static_cast<int8_t>(s));
     sides.positive = sides.positive || s > 0;
     sides.negative = sides.negative || s < 0;

@@ -1,6 +1,7 @@
 #pragma once
 // A convex polygon as a ring of lines on a grid, cut by further lines.
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 #include "src/regions/grid_line.h"
@@ -31,8 +32,16 @@ struct RingCorner {
 };
 using Ring = std::vector<RingCorner>;
 
-// The square of the window, of lines that are appended.
-void make_window_ring(std::vector<GridLine>& lines, Ring& ring);
+// A part of the window between lines along its axes.
+struct GridCell {
+  GridPoint lower, upper;
+  LineSide bottom, right, top, left;
+  Ring ring() const;
+  // Cut in the middle, across its longer side, by a line that is appended.
+  std::pair<GridCell, GridCell> halves(std::vector<GridLine>& lines) const;
+};
+// The whole window, of lines that are appended.
+GridCell window_cell(std::vector<GridLine>& lines);
 
 // On which side of `by` each corner lies: 1, -1, or 0 on it.
 struct RingSides {

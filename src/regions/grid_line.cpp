@@ -2,8 +2,6 @@
 // doubles.
 #include "src/regions/grid_line.h"
 
-#include <cmath>
-
 namespace limn {
 namespace {
 
@@ -18,13 +16,6 @@ Meeting exact_meeting(const GridLine& l, const GridLine& m) {
           Wide(l.a) * m.b - Wide(m.a) * l.b};
 }
 
-int exact_side(const GridLine& line, const GridLine& l, const GridLine& m) {
-  const Meeting p = exact_meeting(l, m);
-  // Corners of regions lie in the window, so x and y are below 2^93, each product below 2^125.
-  const Wide value = line.a * p.x + line.b * p.y + line.c * p.w;
-  return value > 0 ? 1 : value < 0 ? -1 : 0;
-}
-
 }  // namespace
 
 GridCorner meet(const GridLine& l, const GridLine& m) {
@@ -33,18 +24,11 @@ GridCorner meet(const GridLine& l, const GridLine& m) {
   return {static_cast<double>(p.x) / w, static_cast<double>(p.y) / w};
 }
 
-// Each coordinate carries three roundings, c one, each product and each sum another: at most seven
-// of 2^-53 on each summand.
-int side_of_corner(const GridLine& line, const GridCorner& corner, const GridLine& l,
-                   const GridLine& m) {
-  const double ax = static_cast<double>(line.a) * corner.x;
-  const double by = static_cast<double>(line.b) * corner.y;
-  const auto c = static_cast<double>(line.c);
-  const double value = ax + by + c;
-  const double error = 0x1.0p-50 * (std::fabs(ax) + std::fabs(by) + std::fabs(c));
-  if (value > error) return 1;
-  if (value < -error) return -1;
-  return exact_side(line, l, m);
+int exact_side(const GridLine& line, const GridLine& l, const GridLine& m) {
+  const Meeting p = exact_meeting(l, m);
+  // Corners of regions lie in the window, so x and y are below 2^93, each product below 2^125.
+  const Wide value = line.a * p.x + line.b * p.y + line.c * p.w;
+  return value > 0 ? 1 : value < 0 ? -1 : 0;
 }
 
 }  // namespace limn

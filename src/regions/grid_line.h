@@ -1,5 +1,6 @@
 #pragma once
 // Lines through points of a grid, and on which side of one two others meet: exactly.
+#include <cmath>
 #include <cstdint>
 
 namespace limn {
@@ -37,9 +38,26 @@ struct GridCorner {
 // Where two lines meet that are not parallel.
 GridCorner meet(const GridLine& l, const GridLine& m);
 
-// The side of `line` on which the border of l turns left into that of m: 1, -1, or 0 if it is on
-// it. `corner`: meet(l, m).
-int side_of_corner(const GridLine& line, const GridCorner& corner, const GridLine& l,
-                   const GridLine& m);
+// The side of `line` on which the border of l turns left into that of m, within the window: 1, -1,
+// or 0 if it is on it.
+int exact_side(const GridLine& line, const GridLine& l, const GridLine& m);
+
+// The same by meet(l, m), where doubles suffice to tell; else 0. Each coordinate carries three
+// roundings, c one, each product and each sum another: at most seven of 2^-53 on each summand.
+class SideFilter {
+ public:
+  explicit SideFilter(const GridLine& line)
+      : a_(static_cast<double>(line.a)),
+        b_(static_cast<double>(line.b)),
+        c_(static_cast<double>(line.c)) {}
+  int side_of(const GridCorner& corner) const {
+    const double ax = a_ * corner.x, by = b_ * corner.y, value = ax + by + c_;
+    const double error = 0x1.0p-50 * (std::fabs(ax) + std::fabs(by) + std::fabs(c_));
+    return value > error ? 1 : value < -error ? -1 : 0;
+  }
+
+ private:
+  double a_, b_, c_;
+};
 
 }  // namespace limn

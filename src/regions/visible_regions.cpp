@@ -13,6 +13,12 @@ namespace {
 
 constexpr int kNone = -1;
 
+// A grid keeps regions from becoming long splinters, whose boxes many faces meet. Of a bumpy sphere
+// in one window each face takes, with 8192 and with 131072 of them, 4.8 and 63 us without a grid, 2.5
+// and 3.1 us with 16 faces a cell, 2.4 and 3.5 us with 4.
+constexpr size_t kFacesOfCell = 16;
+constexpr int kMostLevels = 24;
+
 // A face as the window holds it.
 struct Inserted {
   uint32_t label;
@@ -57,17 +63,19 @@ struct Crossing {
 
 class VisibleRegions::Tree {
  public:
-  void reset(const PlaneWindow& window) {
-    grid_ = WindowGrid(window);
+  void reset(const PlaneWindow& plane, size_t faces) {
+    grid_ = WindowGrid(plane);
     lines_.clear();
     faces_.clear();
     crossings_.clear();
     free_.clear();
     for (int i = static_cast<int>(nodes_.size()) - 1; i >= 0; --i) free_.push_back(i);
     leaves_ = 0;
-    root_ = new_leaf(kNone);
-    make_window_ring(lines_, nodes_[root_].ring);
-    measure(root_);
+    int levels = 0;
+    while (levels < kMostLevels && (kFacesOfCell << levels) < faces) ++levels;
+    const GridCell window = window_cell(lines_);
+    window_ = window.ring();
+    root_ = make_cells(window, levels);
   }
 
   void insert(const SeenFace& face) {
@@ -110,6 +118,17 @@ class VisibleRegions::Tree {
   }
 
  private:
+  int make_cells(const GridCell& cell, int levels) {
+    if (levels > 0) {
+      const auto [low, high] = cell.halves(lines_);
+      const int left = make_cells(low, levels - 1);
+      return join(left, make_cells(high, levels - 1));
+    }
+    const int leaf = new_leaf(kNone);
+    nodes_[leaf].ring = cell.ring();
+    measure(leaf);
+    return leaf;
+  }
   int new_leaf(int face) {
     if (free_.empty()) {
       free_.push_back(static_cast<int>(nodes_.size()));
@@ -223,7 +242,7 @@ class VisibleRegions::Tree {
     // Beyond the face errors grow with the value. Corners of faces are rounded to the grid: four
     // steps of it are no depth.
     depths.rounding = f.error * (1 + largest / f.nearest) + g.error +
-                      4 * (std::hypot(p.a, p.b) + std::hypot(q.a, q.b));
+                      4 * (std::fabs(p.a) + std::fabs(p.b) + std::fabs(q.a) + std::fabs(q.b));
     return depths;
   }
 
@@ -338,14 +357,8 @@ class VisibleRegions::Tree {
   // The newest face is seen whole: one region again, in its leaf nearest the root.
   void merge() {
     const Inserted& face = faces_.back();
-    std::vector<GridLine>& lines = lines_;
-    const size_t before = lines.size();
-    Ring window;
-    make_window_ring(lines, window);
-    lines.resize(before);
-    // The window's lines are the first four.
-    for (size_t k = 0; k < 4; ++k) window[k].side = LineSide(k, false);
-    ring_ = window;
+    const std::vector<GridLine>& lines = lines_;
+    ring_ = window_;
     size_t pieces = 0;
     for (int k = 0; k < face.line_count; ++k) {
       RingSides& sides = sides_of_line_[0];
@@ -398,6 +411,7 @@ class VisibleRegions::Tree {
   }
 
   WindowGrid grid_{PlaneWindow{}};
+  Ring window_;
   std::vector<GridLine> lines_;
   std::vector<Inserted> faces_;
   std::vector<Crossing> crossings_;
@@ -415,11 +429,12 @@ class VisibleRegions::Tree {
   std::vector<int> built_;
 };
 
-VisibleRegions::VisibleRegions(const PlaneWindow& window) : tree_(std::make_unique<Tree>()) {
-  reset(window);
+VisibleRegions::VisibleRegions(const PlaneWindow& window, size_t faces)
+    : tree_(std::make_unique<Tree>()) {
+  reset(window, faces);
 }
 VisibleRegions::~VisibleRegions() = default;
-void VisibleRegions::reset(const PlaneWindow& window) { tree_->reset(window); }
+void VisibleRegions::reset(const PlaneWindow& window, size_t faces) { tree_->reset(window, faces); }
 void VisibleRegions::insert(const SeenFace& face) { tree_->insert(face); }
 size_t VisibleRegions::size() const { return tree_->size(); }
 size_t VisibleRegions::crossings() const { return tree_->crossings(); }

@@ -273,7 +273,7 @@ void check_windows(uint64_t seed, int windows, int most_faces, Depths depths) {
     for (size_t f = 0; f < faces.size(); ++f) truth.push_back(oracle.visible_area(f));
     VisibleRegions regions(test_window());
     for (int repeat = 0; repeat < 3; ++repeat) {
-      regions.reset(test_window());
+      regions.reset(test_window(), 100 * repeat);  // with grids of 1, 8 and 16 cells
       for (const uint32_t i : order) insert(faces[i], i, regions);
       auto areas = areas_of(regions);
       double sum = 0;

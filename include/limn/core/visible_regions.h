@@ -84,11 +84,12 @@ class VisibleRegions {
  public:
   static constexpr uint32_t kNothing = UINT32_MAX;  // a label that no face has
 
-  // One region, which shows nothing.
-  explicit VisibleRegions(const PlaneWindow& window);
+  // Shows nothing: one region, or a grid of regions for `faces`, the number of faces to come. What
+  // is seen does not depend on that; with thousands of faces in one window, the time does.
+  explicit VisibleRegions(const PlaneWindow& window, size_t faces = 0);
   ~VisibleRegions();
   // As if new, but memory stays.
-  void reset(const PlaneWindow& window);
+  void reset(const PlaneWindow& window, size_t faces = 0);
 
   // Nearer faces hide others. Where depths are equal to rounding, the lower label is seen. Faces
   // that pass through each other part where their depths are equal. Regions do not depend on the
