@@ -48,13 +48,47 @@ std::span<const FaceRef> faces_that_move(const EdgeMesh& mesh, EdgeId edge) {
 }  // namespace
 
 CameraEdges::CameraEdges(const PathContext& context, const EdgeSamplerInput& input, int lanes,
-                         const FreeMotion* free)
-    : context_(context), input_(input), free_(free), clips_(find_clip_segments(context.scene)) {
+                         const FreeMotion* free, const FilmRegions* visible)
+    : context_(context),
+      input_(input),
+      free_(free),
+      visible_(visible),
+      clips_(find_clip_segments(context.scene)) {
   const Stopwatch watch;
   for (uint32_t o = 0; o < input_.objects.size(); ++o) add_object(ShapeId(o));
   for (uint32_t c = 0; c < clips_.size(); ++c) add_clip(c);
+  if (visible_) keep_seen();
   weigh(free_ ? 3 : lanes);
   list_seconds_ = watch.seconds();
+}
+
+// Lines keep their speeds where they are cut, which change linearly along them.
+void CameraEdges::keep_seen() {
+  std::vector<FilmEdge> seen;
+  for (const FilmEdge& edge : edges_) {
+    std::span<const FaceRef> faces;
+    if (edge.clip != FilmEdge::kNoClip) {
+      faces = {&clips_[edge.clip].face, 1};
+    } else {
+      faces = input_.object(edge.id.object).around(edge.id.edge).all;
+    }
+    for (const auto [s0, s1] :
+         visible_->seen_parts({edge.x0, edge.y0}, {edge.x1, edge.y1}, faces)) {
+      const auto at = [](const auto& a, const auto& b, double s) { return a * (1 - s) + b * s; };
+      const auto depth_at = [&](double s) { return 1 / at(1 / edge.depth0, 1 / edge.depth1, s); };
+      FilmEdge part = edge;
+      part.t0 = at(edge.t0, edge.t1, fraction_in_space(s0, edge.depth0, edge.depth1));
+      part.t1 = at(edge.t0, edge.t1, fraction_in_space(s1, edge.depth0, edge.depth1));
+      part.depth0 = depth_at(s0), part.depth1 = depth_at(s1);
+      part.x0 = at(edge.x0, edge.x1, s0), part.x1 = at(edge.x0, edge.x1, s1);
+      part.y0 = at(edge.y0, edge.y1, s0), part.y1 = at(edge.y0, edge.y1, s1);
+      part.speed0 = at(edge.speed0, edge.speed1, s0);
+      part.speed1 = at(edge.speed0, edge.speed1, s1);
+      part.length = edge.length * (s1 - s0);
+      seen.push_back(part);
+    }
+  }
+  edges_ = std::move(seen);
 }
 
 // Whether all faces around the edge are emitters that the camera does not see.
@@ -225,8 +259,13 @@ bool CameraEdges::jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& 
   EdgeView view;
   if (!view_edge(mesh, edge.id, t, value(camera.origin), view)) return false;
   const double cosine = dot(view.omega, value(camera.forward));
+  std::optional<FaceRef> behind;
+  const FacesAround around = mesh.around(edge.id.edge);
+  if (visible_ && around.near.empty()) {
+    behind = visible_->seen_beside({point.x, point.y}, around.faces);
+  }
   return edge_jump(context_, mesh, view, {}, camera.near_clip / cosine, camera.far_clip / cosine, 0,
-                   key, rays, jump);
+                   key, rays, jump, {}, behind ? &*behind : nullptr);
 }
 
 }  // namespace limn
