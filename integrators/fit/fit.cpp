@@ -63,6 +63,10 @@ class Fit::Impl {
  public:
   Impl(std::vector<FitView> views, const FitOptions& options, const RunSettings& settings);
 
+  void listen(const std::function<void(double)>& progress, const std::atomic<bool>* interrupted) {
+    settings_.progress = progress;
+    settings_.interrupted = interrupted;
+  }
   std::optional<FitRecord> step();
   std::vector<FitScalar> scalars() const;
   FitState state() const;
@@ -315,6 +319,10 @@ Fit::Fit(std::vector<FitView> views, const FitOptions& options, const RunSetting
 Fit::~Fit() = default;
 Fit::Fit(Fit&&) noexcept = default;
 
+void Fit::listen(const std::function<void(double)>& progress,
+                 const std::atomic<bool>* interrupted) {
+  impl_->listen(progress, interrupted);
+}
 std::optional<FitRecord> Fit::step() { return impl_->step(); }
 int64_t Fit::steps() const { return impl_->steps; }
 const std::vector<FitView>& Fit::views() const { return impl_->views; }

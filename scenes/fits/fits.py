@@ -99,7 +99,7 @@ def pose(fits):
     words = [w for n in names for w in ("--wrt", n)]
     words += [w for n, v in start.items() for w in ("-D", f"{n}={v}")]
     words += [w for d in size for w in ("-D", d)]
-    words += ["--spp", "8", "--step-half-life", "30"]
+    words += ["--spp", "8", "--step", "2", "--step-half-life", "30"]
     words += ["--truth", os.path.join(fits.generated, "creature.ply")]
     fit = fits.fit("pose", scene("two_mirrors.xml"), target, 160, *words)
     first, last = (fit["snapshots"][i]["meshes"][0] for i in (0, -1))

@@ -48,6 +48,7 @@ void bind_parameters(nb::module_& m, nb::class_<SceneHandle>& scene);
 void bind_render(nb::module_& m);
 void bind_gradient(nb::module_& m);
 void bind_backward(nb::module_& m);
+void bind_fit(nb::module_& m);
 void bind_check(nb::module_& m);
 void bind_compare(nb::module_& m);
 void bind_info(nb::module_& m);

@@ -127,6 +127,9 @@ class Fit {
   // changed then, either.
   std::optional<FitRecord> step();
 
+  // In place of what the settings said of progress and interruption; null for none.
+  void listen(const std::function<void(double)>& progress, const std::atomic<bool>* interrupted);
+
   int64_t steps() const;                      // done
   const std::vector<FitView>& views() const;  // as they are now
   std::vector<FitScalar> scalars() const;
