@@ -202,6 +202,7 @@ TEST(Includes, OneDoorPerThirdParty) {
       {"libpng", std::regex("^png.*")},
       {"pugixml", std::regex("^pugixml.*")},
       {"TBB", std::regex("^(oneapi/)?tbb/.*")},
+      {"OpenMesh", std::regex("^OpenMesh/.*")},
       {"CLP", std::regex("^(coin/|Clp|Coin).*")},
   };
   std::map<std::string, std::set<std::string>> doors;
