@@ -77,7 +77,6 @@ class PartFile {
   const std::string& name() const { return name_; }
   const Part& part() const { return part_; }
   const std::string& arguments() const { return arguments_; }
-  const std::string& text() const { return text_; }
   bool complete() const { return complete_; }
   // Where the last whole batch ends.
   int64_t end() const { return end_; }
@@ -114,7 +113,7 @@ class PartFile {
   }
 
   std::unique_ptr<std::istream> stream_;
-  std::string name_, text_, arguments_;
+  std::string name_, arguments_;
   Part part_;
   std::vector<std::pair<std::string, std::string>> identity_;
   std::map<int64_t, int64_t> batches_;  // by their first sample: where they begin
@@ -142,9 +141,8 @@ int64_t PartFile::header(const std::string& type) {
 void PartFile::read_text() {
   const std::vector<char> text = array<char>("|u1");
   if (!*stream_) fail();
-  text_.assign(text.begin(), text.end());
   end_ = stream_->tellg();
-  std::istringstream lines(text_);
+  std::istringstream lines(std::string(text.begin(), text.end()));
   std::string line;
   if (!std::getline(lines, line) || line != kTitle) fail();
   while (std::getline(lines, line)) {
@@ -225,7 +223,10 @@ void PartWriter::start(int spp) {
       before_ = open_part(file_);
     } catch (const InputError&) {  // another file of this name, to be written over
     }
-    if (before_ && before_->text() != text) before_ = nullptr;
+    if (before_ && (text_of(before_->part()) != text_of(part_) ||
+                    difference(identity(), before_->identity()))) {
+      before_ = nullptr;
+    }
   }
   if (file_.empty()) {
     out_ = std::make_unique<std::stringstream>();
