@@ -20,9 +20,10 @@ std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType&
 class TermEstimator final : public SampleEstimator {
  public:
   // parameters: at most kLanes. computed: for each of terms_of(scene, sampler), whether it is
-  // computed.
+  // computed. visible: of the film, or null.
   TermEstimator(const Scene& scene, std::span<const Parameter> parameters,
-                const std::vector<bool>& computed, const EdgeSamplerType& sampler, int threads);
+                const std::vector<bool>& computed, const EdgeSamplerType& sampler, int threads,
+                std::shared_ptr<const FilmRegions> visible = nullptr);
   TermEstimator(const TermEstimator&) = delete;
   TermEstimator& operator=(const TermEstimator&) = delete;
 
@@ -100,6 +101,7 @@ class TermEstimator final : public SampleEstimator {
   Lights lights_;
   PathContext context_;
   CameraView<Dual> camera_;
+  std::shared_ptr<const FilmRegions> visible_;
   TermInput input_;
   std::vector<const TermType*> types_;
   std::vector<std::unique_ptr<Term>> terms_;  // of each slot; null where not computed

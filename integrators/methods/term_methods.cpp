@@ -95,7 +95,8 @@ std::vector<DirectionField> random_fields(size_t count, const TermEstimator& est
 // A whole run of one method.
 class TermJob {
  public:
-  TermJob(const Scene& scene, const GradientOptions& options, const TermMethod& method, int threads)
+  TermJob(const Scene& scene, const GradientOptions& options, const TermMethod& method,
+          const RunSettings& settings)
       : scene_(scene), options_(options), method_(method), types_(terms_of(scene, method.sampler)) {
     const std::vector<std::string> chosen = selected_terms(term_names(), options.terms, scene.file);
     for (const TermType* type : types_) {
@@ -104,11 +105,15 @@ class TermJob {
     if (options.samples) check_samples(*options.samples);
     std::vector<Parameter> parameters;
     for (const auto& name : options.parameters) parameters.push_back(find_parameter(scene, name));
+    std::shared_ptr<const FilmRegions> visible;
+    if (options.exact_film) {
+      visible = std::make_shared<FilmRegions>(scene, settings.threads, settings.interrupted);
+    }
     for (size_t k = 0; k < parameters.size(); k += kLanes) {
       const auto some =
           std::span(parameters).subspan(k).first(std::min<size_t>(kLanes, parameters.size() - k));
-      passes_.push_back(
-          std::make_unique<TermEstimator>(scene, some, computed_, method.sampler, threads));
+      passes_.push_back(std::make_unique<TermEstimator>(scene, some, computed_, method.sampler,
+                                                        settings.threads, visible));
     }
   }
 
@@ -382,12 +387,12 @@ MethodType method_row(const std::string& name, const std::string& description,
   method.run = [term_method](const MethodType&, const Scene& scene, const GradientOptions& options,
                              const RunSettings& settings) {
     const Stopwatch watch;
-    return TermJob(scene, options, term_method, settings.threads).run(settings, watch);
+    return TermJob(scene, options, term_method, settings).run(settings, watch);
   };
   method.trace = [term_method](const MethodType&, const Scene& scene,
                                const GradientOptions& options, const RunSettings& settings,
                                const NonFinite::Place& place) {
-    return TermJob(scene, options, term_method, settings.threads).trace(settings, place);
+    return TermJob(scene, options, term_method, settings).trace(settings, place);
   };
   return method;
 }

@@ -90,7 +90,8 @@ Sides nearest_faces(const Scene& scene, const EdgeMesh& mesh, const EdgeView& vi
 
 bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView& view,
                FaceRef start, double t_min, double t_max, int bounces, const Rng& key,
-               RayCount& rays, Rgb<double>& jump, const RadiancePart& part) {
+               RayCount& rays, Rgb<double>& jump, const RadiancePart& part,
+               const FaceRef* known_behind) {
   Ray ray{view.p, view.omega};
   ray.t_min = t_min;
   ray.t_max = t_max;
@@ -106,10 +107,16 @@ bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView&
   ray.skip_emitters = bounces == 0 && context.scene.hide_emitters;
   fetch_corners(context.scene, around);  // while the ray is traced
   Hit behind;
-  ++rays.closest;
-  const bool found =
-      closest_at_edge(context.tracer, context.scene, around, view.y, view.distance, ray, behind);
-  if (found && behind.t < view.distance) return false;
+  bool found;
+  if (known_behind) {
+    behind.face = *known_behind;
+    found = known_behind->shape.valid();
+  } else {
+    ++rays.closest;
+    found =
+        closest_at_edge(context.tracer, context.scene, around, view.y, view.distance, ray, behind);
+    if (found && behind.t < view.distance) return false;
+  }
 
   NoVisitor nothing;
   PathTracer<double, NoVisitor> path(context, rays, nothing);

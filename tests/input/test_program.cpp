@@ -64,6 +64,62 @@ class Program : public testing::Test {
 };
 
 // An array's files: a mesh, and a field that gradient takes.
+// The same bits with and without a break; what was asked is in the folder.
+TEST_F(Program, FitsAndGoesOn) {
+  const std::string target = files_.path("target.exr"), truth = files_.path("ball.obj");
+  write_mesh(files_, "ball.obj", icosphere_mesh(1));
+  ASSERT_EQ(run("render " + scene_ + " -D glow=3 --spp 4 -o " + target).status, 0);
+  const std::string whole = files_.path("whole"), broken = files_.path("broken");
+  const std::string fit = "fit " + scene_ + " --target " + target +
+                          " --wrt screen.vertex_positions --wrt blaze.radiance --spp 2 --seed 3 "
+                          "--no-report --bounds blaze.radiance=0,7 --view '" +
+                          scene_ + ";glow=4' --target " + target + " --truth " + truth;
+  const Outcome outcome = run(fit + " --steps 4 --snapshots 2 -o " + whole);
+  ASSERT_EQ(outcome.status, 0) << outcome.text;
+  EXPECT_NE(outcome.text.find("step 4: loss "), std::string::npos) << outcome.text;
+  ASSERT_EQ(run(fit + " --steps 3 --threads 2 -o " + broken).status, 0);
+  ASSERT_EQ(run("fit --steps 4 --no-report --resume " + broken).status, 0);
+  const auto bytes = [](const std::string& file) {
+    std::ifstream stream(file, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(stream), {});
+  };
+  EXPECT_GT(bytes(whole + "/state.cbor").size(), 100u);
+  EXPECT_EQ(bytes(whole + "/state.cbor"), bytes(broken + "/state.cbor"));
+  EXPECT_EQ(bytes(whole + "/step_00004_screen.ply"), bytes(broken + "/step_00004_screen.ply"));
+  const json a = json::parse(bytes(whole + "/fit.json"));
+  const json b = json::parse(bytes(broken + "/fit.json"));
+  EXPECT_EQ(a["status"], "done");
+  ASSERT_EQ(a["history"].size(), 4u);
+  ASSERT_EQ(b["history"].size(), 4u);
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(a["history"][i]["loss"], b["history"][i]["loss"]);
+  ASSERT_EQ(a["snapshots"].size(), 3u);
+  for (const char* key : {"chamfer", "hausdorff", "normal_angle"}) {
+    EXPECT_GT(a["snapshots"][2]["meshes"][0][key].get<double>(), 0) << key;
+  }
+  for (const json& picture : a["snapshots"][0]["pictures"]) {
+    EXPECT_GT(bytes(whole + "/" + picture.get<std::string>()).size(), 60u);
+  }
+  EXPECT_EQ(bytes(whole + "/history.csv").substr(0, 29), "step,loss,stderr,step_size,ha");
+
+  const std::string again = fit + " --steps 2 -o ";
+  EXPECT_NE(refused(again + whole).find("holds a fit already"), std::string::npos);
+  EXPECT_NE(refused("fit --resume " + files_.path("nowhere")).find("no fit was interrupted"),
+            std::string::npos);
+  EXPECT_NE(refused("fit " + scene_ + " --resume " + whole).find("leave out scene"),
+            std::string::npos);
+  EXPECT_NE(refused("fit --steps 2 -o " + out()).find("give a scene"), std::string::npos);
+  const std::string start = "fit " + scene_ + " --steps 2 -o " + files_.path("other");
+  EXPECT_NE(refused(start + " --target " + target).find("give --wrt"), std::string::npos);
+  EXPECT_NE(refused(start + " --wrt blaze.radiance").find("0 --target for 1 views"),
+            std::string::npos);
+  const std::string good = start + " --wrt blaze.radiance --target " + target;
+  EXPECT_NE(refused(good + " --bounds blaze.radiance=3").find("NAME=LEAST,MOST"),
+            std::string::npos);
+  EXPECT_NE(refused(good + " --loss l3").find("unknown loss \"l3\""), std::string::npos);
+  EXPECT_NE(refused(good + " --optimiser sgd").find("known: adam-uniform, adam"),
+            std::string::npos);
+}
+
 TEST_F(Program, BackwardWritesWhatOthersRead) {
   const std::string target = out(), folder = files_.path("back");
   ASSERT_EQ(run("render " + scene_ + " --spp 2 --quiet -D glow=5,5,5 -o " + target).status, 0);
@@ -528,7 +584,7 @@ TEST_F(Program, UnknownNamesListTheKnown) {
             std::string::npos);
   EXPECT_NE(refused("paint " + scene_)
                 .find("limn paint: no such command (known: info, render, gradient, backward, "
-                      "check, compare, "
+                      "fit, check, compare, "
                       "reject; limn --help tells more)"),
             std::string::npos);
   EXPECT_NE(refused("").find("limn: a command is needed (known: info"), std::string::npos);

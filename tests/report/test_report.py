@@ -181,8 +181,9 @@ class TestReport(unittest.TestCase):
         os.makedirs(empty)
         self.fails(
             2,
-            f"{empty}: neither compare.json nor reject.json is here; make one with `limn compare"
-            f" ... -o {empty}` or `limn reject ... -o {empty}`",
+            f"{empty}: neither compare.json nor reject.json nor fit.json is here; make one with"
+            f" `limn compare ... -o {empty}`, `limn reject ... -o {empty}` or"
+            f" `limn fit ... -o {empty}`",
             empty,
         )
         folder = self.broken(lambda text: text[:40])
@@ -193,7 +194,7 @@ class TestReport(unittest.TestCase):
         folder = self.broken(lambda text: "[1]")
         self.fails(2, f"{folder}/compare.json: not a JSON object", folder)
         folder = self.broken(lambda text: text.replace('"kind": "compare"', '"kind": "bake"'))
-        self.fails(2, f'{folder}/compare.json: "kind" is "bake" (known: compare, reject)', folder)
+        self.fails(2, f'{folder}/compare.json: "kind" is "bake" (known: compare, reject, fit)', folder)
 
     def test_faulty_values_are_named_with_their_place(self):
         advice = "was the file written by another version of limn? Run its command again."

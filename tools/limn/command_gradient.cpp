@@ -274,6 +274,7 @@ class GradientCommand final : public Command {
                  "Also write how many samples of each term a sample of every pixel holds, to "
                  "OUTPUT_samples_TERM.exr");
     app.add_flag("--stats", stats_, "Print edges, nodes, bytes, rays by kind, where the time went");
+    add_film_option(app, film_);
     add_debug_option(app, debug_);
     add_part_option(app, common_);
     app.get_option("--part")->excludes("--time");
@@ -288,6 +289,7 @@ class GradientCommand final : public Command {
     options_.terms = parse_terms(terms_);
     options_.samples = parse_samples(samples_);
     options_.uniform_samples = samples_ == "uniform";
+    options_.exact_film = film_ == "exact";
     if (!debug_.empty()) return trace(scene);
     for (const auto& parameter : options_.parameters) find_parameter(scene, parameter);
     if (!common_.part.empty()) {
@@ -441,7 +443,7 @@ class GradientCommand final : public Command {
   Warnings warnings_;
   GradientOptions options_;
   std::string terms_, samples_ = "auto";
-  std::string output_, debug_;
+  std::string output_, debug_, film_ = "rays";
   double seconds_ = 0;  // 0: as many samples as are asked for
   bool stats_ = false, sample_images_ = false;
   std::vector<std::string> outputs_;  // of each parameter

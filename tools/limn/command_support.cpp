@@ -100,6 +100,14 @@ void add_term_options(CLI::App& app, std::string& terms, std::string& samples) {
       ->type_name("N,N,...");
 }
 
+void add_film_option(CLI::App& app, std::string& film) {
+  app.add_option("--film", film,
+                 "What the camera sees: by rays, or by the exact visible regions of every pixel "
+                 "(box filter)")
+      ->check(CLI::IsMember({"rays", "exact"}))
+      ->capture_default_str();
+}
+
 void add_debug_option(CLI::App& app, std::string& place) {
   app.add_option("--debug-sample", place,
                  "Do one sample alone and print all it meets: pixel and sample, or a term and its "

@@ -43,6 +43,8 @@ void add_parameter_options(CLI::App& app, std::vector<std::string>& parameters, 
 // --terms and --samples
 void add_term_options(CLI::App& app, std::string& terms, std::string& samples);
 // --debug-sample
+// "rays" or "exact".
+void add_film_option(CLI::App& app, std::string& film);
 void add_debug_option(CLI::App& app, std::string& place);
 
 // The EXR's header says what made it.
