@@ -69,6 +69,9 @@ class PartFile {
  public:
   PartFile(std::unique_ptr<std::istream> stream, std::string name)
       : stream_(std::move(stream)), name_(std::move(name)) {
+    stream_->seekg(0, std::ios::end);
+    size_ = stream_->tellg();
+    stream_->seekg(0);
     read_text();
     while (find_batch()) {
     }
@@ -77,7 +80,6 @@ class PartFile {
   const std::string& name() const { return name_; }
   const Part& part() const { return part_; }
   const std::string& arguments() const { return arguments_; }
-  const std::string& text() const { return text_; }
   bool complete() const { return complete_; }
   // Where the last whole batch ends.
   int64_t end() const { return end_; }
@@ -98,11 +100,13 @@ class PartFile {
   }
 
  private:
-  // Numbers of the array that begins here; -1 at the end of the file, or where it is cut off.
-  int64_t header(const std::string& type);
+  // Numbers of the array that begins here, whose places come next; -1 where the file ends sooner.
+  int64_t header(const std::string& type, size_t bytes);
   template <class T>
   std::vector<T> array(const std::string& type) {
-    std::vector<T> values(std::max<int64_t>(0, header(type)));
+    const int64_t count = header(type, sizeof(T));
+    if (count < 0) fail();
+    std::vector<T> values(static_cast<size_t>(count));
     stream_->read(reinterpret_cast<char*>(values.data()),
                   static_cast<std::streamsize>(values.size() * sizeof(T)));
     return values;
@@ -114,15 +118,15 @@ class PartFile {
   }
 
   std::unique_ptr<std::istream> stream_;
-  std::string name_, text_, arguments_;
+  std::string name_, arguments_;
   Part part_;
   std::vector<std::pair<std::string, std::string>> identity_;
   std::map<int64_t, int64_t> batches_;  // by their first sample: where they begin
-  int64_t end_ = 0;
+  int64_t size_ = 0, end_ = 0;          // of the file, of its last whole batch
   bool complete_ = false;
 };
 
-int64_t PartFile::header(const std::string& type) {
+int64_t PartFile::header(const std::string& type, size_t bytes) {
   char before[10];
   if (!stream_->read(before, sizeof(before))) return -1;
   if (std::memcmp(before, kMagic, 7) != 0) fail();
@@ -136,15 +140,15 @@ int64_t PartFile::header(const std::string& type) {
   if (!text.starts_with(begin)) fail();
   const char* digits = text.data() + begin.size();
   if (std::from_chars(digits, text.data() + size, count).ec != std::errc() || count < 0) fail();
-  return count;
+  const int64_t left = size_ - static_cast<int64_t>(stream_->tellg());
+  return count <= left / static_cast<int64_t>(bytes) ? count : -1;
 }
 
 void PartFile::read_text() {
   const std::vector<char> text = array<char>("|u1");
   if (!*stream_) fail();
-  text_.assign(text.begin(), text.end());
   end_ = stream_->tellg();
-  std::istringstream lines(text_);
+  std::istringstream lines(std::string(text.begin(), text.end()));
   std::string line;
   if (!std::getline(lines, line) || line != kTitle) fail();
   while (std::getline(lines, line)) {
@@ -162,21 +166,17 @@ void PartFile::read_text() {
 }
 
 bool PartFile::find_batch() {
-  stream_->seekg(0, std::ios::end);
-  const int64_t size = stream_->tellg();
   stream_->seekg(end_);
-  const int64_t counts = header("<i8");
+  const int64_t counts = header("<i8", sizeof(int64_t));
   if (counts == 0) complete_ = true;
   if (counts < 2) return false;
   int64_t first = 0;
   stream_->read(reinterpret_cast<char*>(&first), sizeof(first));
   stream_->seekg((counts - 1) * static_cast<int64_t>(sizeof(int64_t)), std::ios::cur);
-  const int64_t sums = header("<f8");
+  const int64_t sums = header("<f8", sizeof(double));
   if (sums < 0) return false;
-  const int64_t end = stream_->tellg() + sums * static_cast<int64_t>(sizeof(double));
-  if (end > size) return false;
   batches_[first] = end_;
-  end_ = end;
+  end_ = static_cast<int64_t>(stream_->tellg()) + sums * static_cast<int64_t>(sizeof(double));
   return true;
 }
 
@@ -225,7 +225,10 @@ void PartWriter::start(int spp) {
       before_ = open_part(file_);
     } catch (const InputError&) {  // another file of this name, to be written over
     }
-    if (before_ && before_->text() != text) before_ = nullptr;
+    if (before_ && (text_of(before_->part()) != text_of(part_) ||
+                    difference(identity(), before_->identity()))) {
+      before_ = nullptr;
+    }
   }
   if (file_.empty()) {
     out_ = std::make_unique<std::stringstream>();

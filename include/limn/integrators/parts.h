@@ -68,6 +68,8 @@ class PartWriter final : public BatchStore {
  public:
   // arguments: what was asked for, one line, for who joins the parts. file "": in memory.
   PartWriter(Part part, std::string arguments, std::string file);
+  PartWriter(const PartWriter&) = delete;
+  PartWriter& operator=(const PartWriter&) = delete;
   ~PartWriter() override;
 
   void start(int spp) override;
@@ -100,6 +102,8 @@ class PartReader final : public BatchStore {
   explicit PartReader(const std::vector<std::string>& files);
   // The bytes of parts in memory, in any order.
   static std::unique_ptr<PartReader> of_bytes(const std::vector<std::string>& parts);
+  PartReader(const PartReader&) = delete;
+  PartReader& operator=(const PartReader&) = delete;
   ~PartReader() override;
 
   // What was asked for.
