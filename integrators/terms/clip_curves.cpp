@@ -53,8 +53,11 @@ bool clip_jump(const PathContext& context, const ClipSegment& segment, const Vec
   const double distance = length(y - pinhole);
   Ray ray{pinhole, (y - pinhole) / distance};
   const double cosine = dot(ray.direction, value(scene.camera.forward));
-  ray.start = segment.face;
   ray.skip_emitters = scene.hide_emitters;
+  Hit cut{segment.face, distance};
+  context.tracer.settle(ray, cut);
+  if (cut.face != segment.face) return false;  // it is not seen where it is cut
+  ray.start = segment.face;
   ray.t_min = segment.at_far_plane ? scene.camera.near_clip / cosine : distance;
   ray.t_max = segment.at_far_plane ? distance : scene.camera.far_clip / cosine;
   Hit hit;
