@@ -66,14 +66,51 @@ std::optional<double> meet(const Corners& corners, const Ray& ray) {
   return dot(n, a) / slope;
 }
 
+// Wider by twice what rounding explains: a float's rounding is less than the second half.
+FloatBox box_around(const Vec3d& lower, const Vec3d& upper, double size) {
+  const double margin = 2 * touch_tolerance(size, 0);
+  FloatBox box;
+  for (int k = 0; k < 3; ++k) {
+    box.lower[k] = static_cast<float>(lower[k] - margin);
+    box.upper[k] = static_cast<float>(upper[k] + margin);
+  }
+  return box;
+}
+
+FloatBox box_of(const Corners& c) {
+  Bounds bounds;
+  for (const Vec3d& x : c) bounds.extend(x);
+  return box_around(bounds.lower, bounds.upper, size_of(c));
+}
+
+FloatBox box_of(const Mesh& mesh) {
+  const Bounds bounds = bounds_of(mesh);
+  return box_around(bounds.lower, bounds.upper, size_of({bounds.lower, bounds.upper, {}}));
+}
+
 class OverlapFinder {
  public:
-  OverlapFinder(const Scene& scene, const FaceCopies& copies) : scene_(scene) {
+  OverlapFinder(const Scene& scene, const FaceCopies& copies, FaceOverlaps::Of of) {
+    std::vector<FloatBox> shapes;
+    for (const Shape& shape : scene.shapes) shapes.push_back(box_of(shape.mesh));
     for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+      std::vector<FloatBox> others;
+      for (uint32_t i = 0; i < shapes.size(); ++i)
+        if (i != s && shapes[i].overlaps(shapes[s])) others.push_back(shapes[i]);
       const Mesh& mesh = scene.shapes[s].mesh;
       for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
         const FaceRef face{ShapeId(s), FaceId(f)};
-        if (copies.first(face) == face && has_area(mesh, mesh.faces[f])) add(face);
+        const Corners corners = corners_of(scene, face);
+        const FloatBox box = box_of(corners);
+        const auto meets = [&](const FloatBox& other) { return other.overlaps(box); };
+        if (of == FaceOverlaps::Of::kDifferentShapes &&
+            std::none_of(others.begin(), others.end(), meets))
+          continue;
+        if (copies.first(face) != face || !has_area(mesh, mesh.faces[f])) continue;
+        faces_.push_back(face);
+        boxes_.push_back(box);
+        corners_.push_back(corners);
+        normals_.push_back(normalize(normal_of(corners)));
       }
     }
   }
@@ -94,21 +131,8 @@ class OverlapFinder {
   }
 
  private:
-  void add(FaceRef face) {
-    const Corners c = corners_of(scene_, face);
-    faces_.push_back(face);
-    normals_.push_back(normalize(normal_of(c)));
-    // Wider by twice the tolerance: a float's rounding is less than the second half.
-    const double margin = 2 * touch_tolerance(size_of(c), 0);
-    FloatBox& box = boxes_.emplace_back();
-    for (int k = 0; k < 3; ++k) {
-      box.lower[k] = static_cast<float>(std::min({c[0][k], c[1][k], c[2][k]}) - margin);
-      box.upper[k] = static_cast<float>(std::max({c[0][k], c[1][k], c[2][k]}) + margin);
-    }
-  }
-
   bool overlap(uint32_t i, uint32_t j) const {
-    const Corners a = corners_of(scene_, faces_[i]), b = corners_of(scene_, faces_[j]);
+    const Corners &a = corners_[i], &b = corners_[j];
     const double tolerance = touch_tolerance(size_of(a), size_of(b));
     if (!lies_in_plane(b, a[0], normals_[i], tolerance)) return false;
     if (!lies_in_plane(a, b[0], normals_[j], tolerance)) return false;
@@ -141,18 +165,19 @@ class OverlapFinder {
     }
   }
 
-  const Scene& scene_;
   std::vector<FaceRef> faces_;  // with an area, in the order of the file
-  std::vector<Vec3d> normals_;  // theirs, unit
+  // Theirs:
   std::vector<FloatBox> boxes_;
+  std::vector<Corners> corners_;
+  std::vector<Vec3d> normals_;  // unit
   std::atomic<size_t> count_{0};
 };
 
 }  // namespace
 
-FaceOverlaps::FaceOverlaps(const Scene& scene, const FaceCopies& copies, int threads)
+FaceOverlaps::FaceOverlaps(const Scene& scene, const FaceCopies& copies, int threads, Of of)
     : scene_(&scene), copies_(&copies), overlaps_(scene.shapes.size()) {
-  std::vector<FacePair> pairs = OverlapFinder(scene, copies).find(threads);
+  std::vector<FacePair> pairs = OverlapFinder(scene, copies, of).find(threads);
   const size_t count = pairs.size();
   pairs.reserve(2 * count);
   for (size_t i = 0; i < count; ++i) pairs.push_back({pairs[i].second, pairs[i].first});
@@ -218,7 +243,8 @@ void warn_of_overlaps(const Scene& scene, std::vector<std::string>& warnings) {
   const FaceCopies copies(scene);
   warn_of_copies(scene, copies, warnings);
   std::map<std::pair<ShapeId, ShapeId>, int> counts;
-  for (const auto& [a, b] : FaceOverlaps(scene, copies, thread_count(0)).pairs()) {
+  const FaceOverlaps overlaps(scene, copies, thread_count(0), FaceOverlaps::Of::kDifferentShapes);
+  for (const auto& [a, b] : overlaps.pairs()) {
     if (a.shape == b.shape) continue;
     if (dot(normal_of(corners_of(scene, a)), normal_of(corners_of(scene, b))) > 0)
       ++counts[{a.shape, b.shape}];

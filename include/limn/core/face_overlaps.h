@@ -15,9 +15,10 @@ namespace limn {
 // than rounding explains.
 class FaceOverlaps {
  public:
+  enum class Of { kAllFaces, kDifferentShapes };  // whether faces of one shape are looked for
   // copies: of the scene; both must outlive it. Of copies the first alone is looked at. InputError
   // if there are more than kMostPairs.
-  FaceOverlaps(const Scene& scene, const FaceCopies& copies, int threads);
+  FaceOverlaps(const Scene& scene, const FaceCopies& copies, int threads, Of of = Of::kAllFaces);
 
   static constexpr size_t kMostPairs = 1 << 24;  // 0.7 GB
 
