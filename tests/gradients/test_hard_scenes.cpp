@@ -87,6 +87,22 @@ TEST(ClippedCube, AgreesWithDifferences) {
   EXPECT_TRUE(compare_moments(sum, reference).plausible(kLevel));
 }
 
+// A camera on a face that its near plane, at hardly any distance, cuts: points at a depth of zero are
+// nowhere on the film.
+TEST(NearPlane, AtThePinhole) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.width = parts.height = 3;
+  parts.origin = {0, 0, 1};
+  parts.target = {0, -0.2, 0.05};
+  parts.body = constant_light("sky", "0.4, 0.5, 0.7") +
+               obj_shape("object", write_mesh(files, "cube.obj", cube_mesh()), true, 1, {},
+                         diffuse("clay", "0.7, 0.5, 0.3"));
+  Scene scene = make_scene(files, parts);
+  scene.camera.near_clip = 1e-30;
+  run_blocks(scene, {"object.scale", "sensor.translate.y"}, 4, 1);  // all samples are finite
+}
+
 // Two shapes in one place.
 class Copies : public testing::Test {
  protected:
