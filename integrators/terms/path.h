@@ -259,7 +259,7 @@ class PathTracer {
     Ray ray{value(surface.p), wo};
     ray.start = surface.face;
     if (edge) {
-      if (const auto side = blocked_at_edge(c_.scene, *edge, wo)) {
+      if (const auto side = blocked_at_edge(c_.scene, c_.tracer, *edge, wo)) {
         edge->start = *side;
         hit = {side->face, 0};
         return true;
@@ -332,7 +332,7 @@ class PathTracer {
     ray.start = start;
     ray.end = light.face.value_or(FaceRef{});
     if (edge) {
-      if (blocked_at_edge(c_.scene, *edge, light.wo)) return true;
+      if (blocked_at_edge(c_.scene, c_.tracer, *edge, light.wo)) return true;
       ray.skip_faces = edge->around.all;
     }
     // Ends a float's rounding before the light, so that neighbours of the chosen face do not hide
