@@ -54,6 +54,8 @@ struct TermMethod {
   bool moves_directions = false;   // see direction_field.h
   bool spreads_samples = false;    // over pixels, see spread_samples
   bool random_directions = false;  // directions move by chance: to show that no mean changes
+  bool warps = false;              // directions follow the edges that they see, see warp_field.h
+  bool unbiased = false;           // the same without the bias of few rays
 };
 
 // The fewest samples of a term in one of a pixel, where they are spread: a rare event that a pilot
@@ -85,7 +87,10 @@ std::vector<DirectionField> random_fields(size_t count, const TermEstimator& est
 class TermJob {
  public:
   TermJob(const Scene& scene, const GradientOptions& options, const TermMethod& method, int threads)
-      : scene_(scene), options_(options), method_(method), types_(terms_of(scene, method.sampler)) {
+      : scene_(scene),
+        options_(options),
+        method_(method),
+        types_(terms_of(scene, method.sampler, method.warps)) {
     const std::vector<std::string> chosen = selected_terms(term_names(), options.terms, scene.file);
     for (const TermType* type : types_) {
       computed_.push_back(std::find(chosen.begin(), chosen.end(), type->name) != chosen.end());
@@ -93,11 +98,12 @@ class TermJob {
     if (options.samples) check_samples(*options.samples);
     std::vector<Parameter> parameters;
     for (const auto& name : options.parameters) parameters.push_back(find_parameter(scene, name));
+    const Warping warping{options.warp, method.unbiased};
     for (size_t k = 0; k < parameters.size(); k += kLanes) {
       const auto some =
           std::span(parameters).subspan(k).first(std::min<size_t>(kLanes, parameters.size() - k));
-      passes_.push_back(
-          std::make_unique<TermEstimator>(scene, some, computed_, method.sampler, threads));
+      passes_.push_back(std::make_unique<TermEstimator>(
+          scene, some, computed_, method.sampler, threads, method.warps ? &warping : nullptr));
     }
   }
 
@@ -111,6 +117,7 @@ class TermJob {
       add_batch(batch.count(), sums, result);
     });
     result.seconds = watch.seconds();
+    if (method_.warps) describe_warping(result);
     return result;
   }
 
@@ -134,6 +141,22 @@ class TermJob {
   }
 
  private:
+  void describe_warping(GradientResult& result) const {
+    TermCost all;
+    for (const TermRun& term : result.terms) all.merge(term.cost);
+    const auto share = [](uint64_t part, uint64_t of) {
+      return of > 0 ? static_cast<double>(part) / static_cast<double>(of) : 0;
+    };
+    result.settings.push_back({"auxiliary rays", static_cast<double>(options_.warp.rays)});
+    result.settings.push_back({"kappa", options_.warp.kappa});
+    result.settings.push_back({"directions ruled by one ray", share(all.dominated, all.warped)});
+    result.settings.push_back({"rays on an edge", static_cast<double>(all.dropped)});
+    if (pass(0).made_edges().objects.size() > scene_.shapes.size()) {
+      result.warnings.emplace_back(
+          "surfaces pass through each other: warped directions follow the surfaces, not the lines "
+          "where they cross, and what these add is not in the result");
+    }
+  }
   // What moving directions change in one term they take back in the others, and at every jump of
   // radiance there must be an edge.
   bool can_move_directions() const {
@@ -362,11 +385,15 @@ MethodType method_row(const std::string& name, const std::string& description,
   method.name = name;
   method.description = description;
   for (const TermType& type : term_types()) {
-    if (!type.regions || term_method.sampler.regions) method.terms.emplace_back(type.name);
+    if (type.regions && !term_method.sampler.regions) continue;
+    if (type.chooses_edges && term_method.warps) continue;
+    method.terms.emplace_back(type.name);
   }
   method.terms_can_be_left_out = true;
   method.ablation = term_method.sampler.ablation || term_method.random_directions;
-  method.only_sum_fixed = term_method.moves_directions || term_method.random_directions;
+  method.only_sum_fixed =
+      term_method.moves_directions || term_method.random_directions || term_method.warps;
+  method.biased = term_method.warps && !term_method.unbiased;
   method.run = [term_method](const MethodType&, const Scene& scene, const GradientOptions& options,
                              const RunSettings& settings) {
     const Stopwatch watch;
@@ -396,6 +423,15 @@ std::vector<MethodType> term_methods() {
   for (const EdgeSamplerType& type : edge_sampler_types()) {
     methods.push_back(method_row(type.name, type.description, {type}));
   }
+  const EdgeSamplerType& none = default_edge_sampler();  // of no use: no vertex chooses an edge
+  methods.push_back(method_row("was",
+                               "warped-area sampling (Bangaru et al. 2020): auxiliary rays, no "
+                               "edges but the camera's; biased, the less the more rays",
+                               {.sampler = none, .warps = true}));
+  methods.push_back(method_row("was-unbiased",
+                               "warped-area sampling without bias, by roulette over numbers of "
+                               "auxiliary rays",
+                               {.sampler = none, .warps = true, .unbiased = true}));
   methods.push_back(method_row("random-directions",
                                "silhouettes, with directions that move by chance: noise, but the "
                                "same mean",

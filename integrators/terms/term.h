@@ -38,6 +38,8 @@ struct PathVertex {
   const Rng& key;                  // of the path
   SampleLog* log = nullptr;        // null unless somebody reads it
   TurnedVertex* turned = nullptr;  // null unless a pilot asks
+  // How directions move here, in place of the turn; null where they are not warped.
+  const WarpField* warp = nullptr;
 };
 
 class Term {
@@ -126,6 +128,9 @@ struct TermType {
   int film_stream;             // tells the random numbers of terms on the film apart
   bool (*applies)(const Scene& scene);  // whether the scene has anything that the term could be of
   bool regions;  // it is of samplers that keep regions of light apart, and of no others
+  // Points of paths choose edges for it by the method's sampler: where directions are warped the
+  // interior holds what they would find.
+  bool chooses_edges;
   std::unique_ptr<Term> (*make)(TermInput& input);
 };
 // In the order of --samples and of all tables.

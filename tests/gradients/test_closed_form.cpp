@@ -168,7 +168,7 @@ bool has_boundary(const json& reference) {
 std::vector<std::tuple<std::string, std::string>> all_cases() {
   std::vector<std::tuple<std::string, std::string>> cases;
   for (const MethodType& type : method_types()) {
-    if (!type.terms_can_be_left_out) continue;
+    if (!type.terms_can_be_left_out || type.biased) continue;
     for (const json& reference : read_references()) {
       // Where shading points see no edge move, a variant of the forest has nothing to show.
       if (type.ablation && !type.only_sum_fixed && !has_boundary(reference)) continue;

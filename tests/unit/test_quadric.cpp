@@ -15,6 +15,7 @@
 #include "edgetree/quadric/quadric_fit.h"
 #include "edgetree/quadric/quadric_query.h"
 #include "edgetree/quadric/quadric_sampler.h"
+#include "limn/edgetree/quadric_chart.h"
 
 namespace limn {
 namespace {
@@ -319,6 +320,35 @@ TEST(Quadric, PairsRejectWhatBoxesKeep) {
 }
 
 // Scaling by a power of two commutes with every rounding: probabilities keep their bits.
+// What is drawn of a node are its own planes: they lie in its box and between its quadrics. Rows and
+// coefficients are floats.
+TEST(QuadricChart, HoldsThePlanesOfItsNode) {
+  EdgeSamplerInput input;
+  input.objects.push_back(build_edge_mesh(torus_mesh(40, 20), true));
+  const auto sampler = QuadricSampler::build(input, 1, QuadricConfig{});
+  const auto tree = sampler->rejection_tree();
+  const auto& charted = dynamic_cast<const ChartedTree&>(*tree);
+  int planes = 0;
+  for (uint32_t node = 0; node < tree->nodes().size(); ++node) {
+    const auto chart = charted.chart(node);
+    if (!chart) continue;
+    for (const auto& wedge : chart->edges) {
+      for (const Vec3d& u : wedge) {
+        double f = 0;
+        for (int k = 0; k < 3; ++k) {
+          EXPECT_LE(std::fabs(u[k]), 1 + 0x1p-20);
+          f += u[k] * (chart->linear[k] + chart->square[k] * u[k]) +
+               chart->product[k] * u[(k + 1) % 3] * u[(k + 2) % 3];
+        }
+        EXPECT_GE(f, chart->low - 0x1p-20);
+        EXPECT_LE(f, chart->high + 0x1p-20);
+        ++planes;
+      }
+    }
+  }
+  EXPECT_GT(planes, 1000);
+}
+
 TEST(Quadric, ProbabilitiesDoNotDependOnTheScale) {
   const auto input_at = [](double scale) {
     Mesh mesh = with_smooth_normals(torus_mesh(24, 12));

@@ -42,6 +42,12 @@ class SampleCounts {
 // "3,0.5,1"
 std::string to_string(const SampleCounts& samples);
 
+// Of methods that warp directions.
+struct WarpOptions {
+  int rays = 8;        // auxiliary rays of a direction: an even number
+  double kappa = 1e4;  // concentration of their kernel, which is kappa^(-1/2) radians wide
+};
+
 struct GradientOptions {
   std::vector<std::string> parameters;
   std::string method;              // see methods.h; "": the default
@@ -56,6 +62,7 @@ struct GradientOptions {
   bool uniform_samples = false;
   double step = 0;  // of finite differences; 0: found by a pilot
   int block = 0;    // also keep moments of sums over blocks of this many pixels
+  WarpOptions warp;
 };
 
 // Derivative images of one parameter, crop_height by crop_width by 3, per unit of the parameter.
