@@ -57,7 +57,7 @@ class QuadricRejectionTree final : public ChartedTree {
     if (id < 0 || forest_.pairs.empty()) return std::nullopt;
     const QuadricPairs& pair = forest_.pairs[id];
     QuadricChart chart{{}, {}, {}, pair.low[lane], pair.high[lane], {}};
-    if (!std::isfinite(chart.low)) return std::nullopt;
+    if (!std::isfinite(chart.low) || is_thin(id, lane)) return std::nullopt;
     for (int k = 0; k < 3; ++k) {
       chart.linear[k] = pair.linear[k][lane];
       chart.square[k] = pair.square[k][lane];
@@ -74,6 +74,15 @@ class QuadricRejectionTree final : public ChartedTree {
   }
 
  private:
+  // Whether the rounding of a lane's rows to floats is more than 2^-12 of its dual box' width.
+  bool is_thin(NodeId id, int lane) const {
+    for (int r = 1; r < 4; ++r) {
+      double square = 0;
+      for (const FourFloats& x : forest_.nodes[id].rows[r]) square += double(x[lane]) * x[lane];
+      if (square < 0x1p-24) return true;
+    }
+    return false;
+  }
   // The coordinates of a plane in a lane's dual box.
   Vec3d in_chart(NodeId id, int lane, const Plane& plane) const {
     const QuadricNode& node = forest_.nodes[id];

@@ -47,13 +47,12 @@ DirectionField turning_about_axes(const Lanes& steps, int lanes) {
 
 }  // namespace
 
-std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler,
-                                      bool warps) {
+std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler) {
   std::vector<const TermType*> types;
   bool (*asked)(const Scene&) = nullptr;  // looks at the whole environment: once for rows alike
   bool applies = false;
   for (const TermType& type : term_types()) {
-    if ((type.regions && !sampler.regions) || (type.chooses_edges && warps)) continue;
+    if (type.regions && !sampler.regions) continue;
     if (type.applies != asked) {
       asked = type.applies;
       applies = asked(scene);
@@ -78,8 +77,8 @@ TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> para
       lights_(scene_),
       context_{scene_, *tracer_, lights_},
       camera_(scene_.camera),
-      input_(context_, lanes_, lane_scale_, sampler, threads),
-      types_(terms_of(scene, sampler, warping != nullptr)),
+      input_(context_, lanes_, lane_scale_, sampler, threads, warping != nullptr),
+      types_(terms_of(scene, sampler)),
       rates_(scene_, lanes_, lane_scale_),
       turning_(turning_about_axes(lane_scale_, lanes_)) {
   for (size_t slot = 0; slot < types_.size(); ++slot) {

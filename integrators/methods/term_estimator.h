@@ -13,10 +13,9 @@
 
 namespace limn {
 
-// The rows of term_types() that the sampler has and the scene has anything of; where directions are
-// warped, without those that choose edges. Slots are indices into it.
-std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler,
-                                      bool warps = false);
+// The rows of term_types() that the sampler has and the scene has anything of. Slots are indices
+// into it.
+std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler);
 
 // How directions are warped, see warp_field.h.
 struct Warping {
@@ -26,8 +25,8 @@ struct Warping {
 
 class TermEstimator final : public SampleEstimator {
  public:
-  // parameters: at most kLanes. computed: for each of terms_of(scene, sampler, warping), whether it
-  // is computed. warping: null where directions are not warped.
+  // parameters: at most kLanes. computed: for each of terms_of(scene, sampler), whether it is
+  // computed. warping: null where directions are not warped.
   TermEstimator(const Scene& scene, std::span<const Parameter> parameters,
                 const std::vector<bool>& computed, const EdgeSamplerType& sampler, int threads,
                 const Warping* warping = nullptr);
@@ -40,8 +39,6 @@ class TermEstimator final : public SampleEstimator {
   double work(size_t slot, const TermCost& cost) const;
   void describe(GradientStats& stats) const;
   const MotionRates& motion_rates() const { return rates_; }
-  // The scene's edges, made if no term has asked.
-  const EdgeSamplerInput& made_edges() const { return *input_.made_edges(); }
   // Whether a slot's samples belong to pixels, not to the film.
   bool adds_to_pixels(size_t slot) const {
     return terms_[slot] && (terms_[slot]->uses_paths() || terms_[slot]->uses_vertices());

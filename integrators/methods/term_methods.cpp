@@ -87,10 +87,7 @@ std::vector<DirectionField> random_fields(size_t count, const TermEstimator& est
 class TermJob {
  public:
   TermJob(const Scene& scene, const GradientOptions& options, const TermMethod& method, int threads)
-      : scene_(scene),
-        options_(options),
-        method_(method),
-        types_(terms_of(scene, method.sampler, method.warps)) {
+      : scene_(scene), options_(options), method_(method), types_(terms_of(scene, method.sampler)) {
     const std::vector<std::string> chosen = selected_terms(term_names(), options.terms, scene.file);
     for (const TermType* type : types_) {
       computed_.push_back(std::find(chosen.begin(), chosen.end(), type->name) != chosen.end());
@@ -151,12 +148,8 @@ class TermJob {
     result.settings.push_back({"kappa", options_.warp.kappa});
     result.settings.push_back({"directions ruled by one ray", share(all.dominated, all.warped)});
     result.settings.push_back({"rays on an edge", static_cast<double>(all.dropped)});
-    if (pass(0).made_edges().objects.size() > scene_.shapes.size()) {
-      result.warnings.emplace_back(
-          "surfaces pass through each other: warped directions follow the surfaces, not the lines "
-          "where they cross, and what these add is not in the result");
-    }
   }
+
   // What moving directions change in one term they take back in the others, and at every jump of
   // radiance there must be an edge.
   bool can_move_directions() const {
@@ -386,13 +379,13 @@ MethodType method_row(const std::string& name, const std::string& description,
   method.description = description;
   for (const TermType& type : term_types()) {
     if (type.regions && !term_method.sampler.regions) continue;
-    if (type.chooses_edges && term_method.warps) continue;
     method.terms.emplace_back(type.name);
   }
   method.terms_can_be_left_out = true;
   method.ablation = term_method.sampler.ablation || term_method.random_directions;
   method.only_sum_fixed =
       term_method.moves_directions || term_method.random_directions || term_method.warps;
+  method.warps = term_method.warps;
   method.biased = term_method.warps && !term_method.unbiased;
   method.run = [term_method](const MethodType&, const Scene& scene, const GradientOptions& options,
                              const RunSettings& settings) {
@@ -423,15 +416,16 @@ std::vector<MethodType> term_methods() {
   for (const EdgeSamplerType& type : edge_sampler_types()) {
     methods.push_back(method_row(type.name, type.description, {type}));
   }
-  const EdgeSamplerType& none = default_edge_sampler();  // of no use: no vertex chooses an edge
+  // It chooses among few edges, where surfaces cross and touch: any will do, also one at rest.
+  const EdgeSamplerType& uniform = edge_sampler_type("uniform");
   methods.push_back(method_row("was",
-                               "warped-area sampling (Bangaru et al. 2020): auxiliary rays, no "
-                               "edges but the camera's; biased, the less the more rays",
-                               {.sampler = none, .warps = true}));
+                               "warped-area sampling (Bangaru et al. 2020): auxiliary rays in "
+                               "place of edges; biased, the less the more rays",
+                               {.sampler = uniform, .warps = true}));
   methods.push_back(method_row("was-unbiased",
                                "warped-area sampling without bias, by roulette over numbers of "
                                "auxiliary rays",
-                               {.sampler = none, .warps = true, .unbiased = true}));
+                               {.sampler = uniform, .warps = true, .unbiased = true}));
   methods.push_back(method_row("random-directions",
                                "silhouettes, with directions that move by chance: noise, but the "
                                "same mean",

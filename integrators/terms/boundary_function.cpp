@@ -39,7 +39,40 @@ void accumulate(std::vector<uint32_t>& offsets) {
   }
 }
 
+// Of the runs [offsets[e], offsets[e + 1]) of values, those of the edges that are kept.
+template <class T>
+void keep_runs(const std::vector<size_t>& kept, std::vector<uint32_t> offsets,
+               std::vector<T>& values) {
+  std::vector<T> all;
+  for (const size_t e : kept) {
+    all.insert(all.end(), values.begin() + offsets[e], values.begin() + offsets[e + 1]);
+  }
+  values = std::move(all);
+}
+void keep_offsets(const std::vector<size_t>& kept, std::vector<uint32_t>& offsets) {
+  std::vector<uint32_t> all{0};
+  for (const size_t e : kept) all.push_back(all.back() + offsets[e + 1] - offsets[e]);
+  offsets = std::move(all);
+}
+
 }  // namespace
+
+void leave_out_followed(EdgeMesh& mesh) {
+  std::vector<size_t> kept;
+  std::vector<Edge> edges;
+  for (size_t e = 0; e < mesh.edges.size(); ++e) {
+    if (is_followed(mesh.edges[e])) continue;
+    kept.push_back(e);
+    edges.push_back(mesh.edges[e]);
+  }
+  mesh.edges = std::move(edges);
+  keep_runs(kept, mesh.face_offsets, mesh.incident_faces);
+  if (!mesh.incidences.empty()) keep_runs(kept, mesh.face_offsets, mesh.incidences);
+  keep_offsets(kept, mesh.face_offsets);
+  if (mesh.near_offsets.empty()) return;
+  keep_runs(kept, mesh.near_offsets, mesh.faces_and_near);
+  keep_offsets(kept, mesh.near_offsets);
+}
 
 BoundaryFunction::BoundaryFunction(const Scene& scene, const EdgeSamplerInput& edges)
     : scene_(scene), edges_(edges), shapes_(scene.shapes.size()) {
@@ -86,7 +119,7 @@ void BoundaryFunction::list_sides() {
     const EdgeMesh& object = edges_.objects[o];
     for (uint32_t e = 0; e < object.edges.size(); ++e) {
       const Edge& edge = object.edges[e];
-      if (edge.edge_class == EdgeClass::kFlat) continue;
+      if (edge.edge_class == EdgeClass::kFlat || !is_followed(edge)) continue;
       const FacesAround around = object.around(EdgeId(e));
       for (size_t i = 0; i < around.faces.size(); ++i) {
         if (around.incidence(i).through) continue;

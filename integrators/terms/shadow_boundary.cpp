@@ -31,18 +31,6 @@ struct Viewer {
   double distance;       // to the shadow's edge
 };
 
-// As the directions of a path move at a vertex. Where they are warped they follow other edges: this
-// one moves against them.
-Vec3<Dual> moving_direction(const PathVertex& vertex, const Vec3d& omega, const Rng& key,
-                            TermCost& cost) {
-  if (!vertex.warp) return turning(omega, vertex.turn);
-  RayCount rays;
-  DirectionWarper warper(*vertex.warp, rays);
-  const DirectionMotion* motion = warper.motion(vertex.surface, omega, key.at(Purpose::kShadow, 1));
-  cost.add(rays);
-  return motion ? warped(omega, *motion->warp) : turning(omega, {});
-}
-
 class ShadowTerm final : public Term {
  public:
   explicit ShadowTerm(TermInput& input)
@@ -114,7 +102,9 @@ void ShadowTerm::add_sample(const PathVertex& vertex, Rng rng, TermCost& cost,
     return;
   }
   const Lanes swept =
-      sweep(edge, *point, {vertex.surface.p, moving_direction(vertex, omega, rng, cost), distance});
+      sweep(edge, *point,
+            {vertex.surface.p, moving_direction(vertex, omega, rng.at(Purpose::kShadow, 1), cost),
+             distance});
   const Rgb<double> amount = vertex.throughput * f * edges_.jump(edge, *point, q, omega);
   if (is_zero(swept) || is_black(amount)) {
     ++cost.zero_weight;

@@ -78,18 +78,20 @@ class Term {
 class TermInput {
  public:
   TermInput(const PathContext& path_context, int lane_count, const Lanes& lane_scales,
-            const EdgeSamplerType& sampler_type, int thread_count)
+            const EdgeSamplerType& sampler_type, int thread_count, bool warped = false)
       : context(path_context),
         lanes(lane_count),
         lane_scale(lane_scales),
         sampler(sampler_type),
-        threads(thread_count) {}
+        threads(thread_count),
+        warps(warped) {}
 
   const PathContext& context;      // the scene with its parameters seeded
   int lanes;                       // how many derivative lanes are in use
   Lanes lane_scale;                // what makes speeds of the parameters comparable
   const EdgeSamplerType& sampler;  // how shading points choose an edge
   int threads;
+  bool warps;  // whether directions are warped, see warp_field.h
 
   // Edges of all shapes (object i is shape i), light polygons and the environment, as an edge
   // sampler takes them; without the regions of light. Made when a term first asks.
@@ -98,6 +100,8 @@ class TermInput {
   const LightRegions* regions();
   // The edges before them; null if there are no regions.
   const LampEdges* lamp_edges();
+  // The edges that shading points choose among: all, but for those that warped directions follow.
+  const EdgeSamplerInput& chosen_edges();
   // What shading points choose edges by, shared by all terms. Made when a term first asks.
   const EdgeSampler& edge_sampler();
   double edge_sampler_seconds() const { return edge_sampler_seconds_; }
@@ -106,7 +110,7 @@ class TermInput {
   double edges_seconds() const { return edges_seconds_; }
 
  private:
-  std::unique_ptr<EdgeSamplerInput> edges_;
+  std::unique_ptr<EdgeSamplerInput> edges_, unfollowed_;
   std::unique_ptr<LightRegions> regions_;
   std::unique_ptr<LampEdges> lamp_edges_;
   std::unique_ptr<EdgeSampler> edge_sampler_;
@@ -128,9 +132,6 @@ struct TermType {
   int film_stream;             // tells the random numbers of terms on the film apart
   bool (*applies)(const Scene& scene);  // whether the scene has anything that the term could be of
   bool regions;  // it is of samplers that keep regions of light apart, and of no others
-  // Points of paths choose edges for it by the method's sampler: where directions are warped the
-  // interior holds what they would find.
-  bool chooses_edges;
   std::unique_ptr<Term> (*make)(TermInput& input);
 };
 // In the order of --samples and of all tables.

@@ -19,17 +19,17 @@ inline constexpr double kLeastFilmSamples = 0.125;  // not tuned
 
 inline constexpr TermType kTermTypes[] = {
     {"interior", "what slides within continuous regions", 1, true, false, true, 0, always, false,
-     false, make_interior_term},
+     make_interior_term},
     {"camera", "silhouettes on the film", kLeastFilmSamples, false, true, false, 0, always, false,
-     false, make_camera_term},
+     make_camera_term},
     {"boundary", "silhouettes that shading points see", 1, false, true, true, 0, always, false,
-     true, make_boundary_term},
-    {"shadow", "edges of sharp shadows", 1, false, true, true, 1, has_delta_lights, false, false,
+     make_boundary_term},
+    {"shadow", "edges of sharp shadows", 1, false, true, true, 1, has_delta_lights, false,
      make_shadow_term},
     {"direct", "silhouettes that shading points see before lamps and the sun", 1, false, true, true,
-     0, LightRegions::any_in, true, true, make_direct_term},
+     0, LightRegions::any_in, true, make_direct_term},
     {"penumbra", "of these, what has a thin penumbra", 1, false, true, true, 2,
-     LightRegions::any_in, true, true, make_penumbra_term},
+     LightRegions::any_in, true, make_penumbra_term},
 };
 
 }  // namespace limn

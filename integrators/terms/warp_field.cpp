@@ -114,10 +114,15 @@ AuxiliaryRay WarpField::look(const SurfacePoint<Dual>& surface, const Vec3d& w) 
   const auto corners = face_corners<double>(mesh, hit.face.face);
   const Vec3d e1 = corners[1] - corners[0], e2 = corners[2] - corners[0], n = cross(e1, e2);
   const double t = dot(corners[0] - ray.origin, n) / dot(n, w);
+  if (!(t > 0 && t <= 0x1p60)) return result;  // along a needle: by rounding, anything
   const Vec3d q = ray.origin + w * t - corners[0];
   const double inverse = 1 / dot(n, n);
   const double b1 = dot(cross(q, e2), n) * inverse, b2 = dot(cross(e1, q), n) * inverse;
-  const std::array<double, 3> place{1 - b1 - b2, b1, b2};
+  // A face that is narrower than the rounding of its points has no coordinates across: its middle
+  // stands for all.
+  const bool wide = std::fabs(b1) <= 2 && std::fabs(b2) <= 2;
+  const std::array<double, 3> place =
+      wide ? std::array{1 - b1 - b2, b1, b2} : std::array{1.0 / 3, 1.0 / 3, 1.0 / 3};
   Vec3<Lanes> v = -velocity_of(surface.p);
   if (!mesh.position_tangents.empty()) {
     const FaceIndices& vertices = mesh.face(hit.face.face);

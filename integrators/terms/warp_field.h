@@ -23,8 +23,10 @@
 // a and b the halves of the 2n rays; the mean of the sum over all levels is that of R for ever more
 // rays. Levels have no end, so that nothing is cut off; 35 rays are expected for N = 8.
 //
-// What is not seen: lines where surfaces pass through each other, whose points move as neither
-// surface does.
+// Lines where surfaces pass through each other move as neither surface does, and edges of several
+// surfaces that touch may not either. These are sampled (shading_boundary.cpp): for any V at all,
+// what edges add that move with v - |w| V makes up for the difference. The same holds for the edges
+// of sharp shadows.
 #include <cstdint>
 
 #include "integrators/terms/boundary_function.h"

@@ -18,6 +18,8 @@ STYLE = """
 .paper { border-left: 4px solid var(--line); padding-left: 14px; max-width: 88ch; }
 .role { display: block; font-size: 12.5px; color: var(--soft); font-weight: 400; }
 .wins { background: var(--best); }
+.surface { max-width: 460px; }
+.surface .picture, .surface .picture img { image-rendering: auto; }
 """
 
 
@@ -30,7 +32,13 @@ def _style():
 
 def _role(name):
     roles = {PAPER: "the paper's forest", DEFAULT: "limn's default", "mitsuba": "Zhang et al. 2023"}
-    return roles.get(name, "")
+    return roles.get(name, "\u00a0")
+
+
+def _words(text):
+    """`name` as code."""
+    pieces = text.split("`")
+    return join(*(element("code", t) if i % 2 else t for i, t in enumerate(pieces)))
 
 
 def _command(text):
@@ -73,7 +81,8 @@ class _Comparison:
             figure(self.pictures.picture("image.png", "the scene"), "the scene"),
             figure(self.pictures.picture("reference.png", "reference"), "derivative, reference"),
         ]
-        cards = [element("div", element("h4", "scene"), *shown, class_="card")]
+        title = element("h4", "scene", element("span", "\u00a0", class_="role"))
+        cards = [element("div", title, *shown, class_="card")]
         cards += [self._card(m) for m in self.methods if self.rungs[m.text("name")]]
         return join(
             element("h3", self._title()),
@@ -160,7 +169,8 @@ class _Rejection:
             "the quadrics (blue, orange) that bound the planes of the node's edges (black"
             f" segments), in the coordinates of the dual box; {chart.text('method')}"
         )
-        return [figure(self.pictures.picture("chart.png", "bounding quadrics"), words)]
+        picture = self.pictures.picture("chart.png", "bounding quadrics")
+        return [element("div", figure(picture, words), class_="surface")]
 
     def html(self):
         node = self.data.record("node")
@@ -169,7 +179,8 @@ class _Rejection:
             self.pictures.picture(self.data.text("overview"), "the mesh, the node, the slices"),
             "mesh, node, slices",
         )
-        cards = [element("div", element("h4", "patch"), overview, *self._chart(), class_="card")]
+        title = element("h4", "patch", element("span", "\u00a0", class_="role"))
+        cards = [element("div", title, overview, class_="card")]
         rows = []
         for v in self.data.records("variants"):
             name = v.text("name")
@@ -205,6 +216,7 @@ class _Rejection:
                 f" {count(node.number('edges'))} of them in the node",
             ),
             element("div", element("div", *cards, class_="cards"), class_="gallery"),
+            *self._chart(),
             table(head, rows, f"Rejection, {mesh}"),
             _command(self.data.text("command")),
         )
@@ -269,8 +281,8 @@ def _sections(paper_figures, folder):
         html = element(
             "section",
             element("h2", f"{entry.numbers}: {entry.title}"),
-            element("p", element("strong", "The paper: "), entry.shows, class_="paper"),
-            element("p", element("strong", "Here: "), entry.reading, class_="paper"),
+            element("p", element("strong", "The paper: "), _words(entry.shows), class_="paper"),
+            element("p", element("strong", "Here: "), _words(entry.reading), class_="paper"),
             *parts,
             element("p", "All of it again:"),
             _command(again),

@@ -22,7 +22,8 @@ struct QuadricChart {
 
 class ChartedTree : public RejectionTree {
  public:
-  // None for an edge by itself, where there are no quadrics, and where they never reject.
+  // None for an edge by itself, where there are no quadrics, where they never reject, and where a
+  // box is so thin that its coordinates are rounding.
   virtual std::optional<QuadricChart> chart(uint32_t node) const = 0;
 };
 
