@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "integrators/fit/fit_parameter.h"
+#include "integrators/fit/remesh.h"
 #include "limn/core/error.h"
 #include "limn/core/rng.h"
 
@@ -62,6 +63,10 @@ class Fit::Impl {
  public:
   Impl(std::vector<FitView> views, const FitOptions& options, const RunSettings& settings);
 
+  void listen(const std::function<void(double)>& progress, const std::atomic<bool>* interrupted) {
+    settings_.progress = progress;
+    settings_.interrupted = interrupted;
+  }
   std::optional<FitRecord> step();
   std::vector<FitScalar> scalars() const;
   FitState state() const;
@@ -73,6 +78,7 @@ class Fit::Impl {
 
  private:
   void check_shapes();
+  void check_remeshing();
   // Shapes of a view that some parameter moves, in the scene's order.
   std::vector<ShapeId> moved_shapes(size_t view) const;
   RunSettings view_settings(size_t view) const;
@@ -108,6 +114,7 @@ Fit::Impl::Impl(std::vector<FitView> all, const FitOptions& options, const RunSe
     throw InputError("bounds of \"" + bounds.parameter + "\", which is not fitted");
   }
   check_shapes();
+  if (!options.remesh.empty()) check_remeshing();
   if (options.loss == LossKind::kL1) {
     warnings.push_back(
         "the gradient of l1 is biased where the image's noise is not small beside its difference "
@@ -128,6 +135,28 @@ void Fit::Impl::check_shapes() {
       }
     }
   }
+}
+
+// What would fail after hours is told at once.
+void Fit::Impl::check_remeshing() {
+  if (!(options_.remesh_edge > 0.1 && options_.remesh_edge < 10)) {
+    throw InputError(
+        fmt::format("edges {:g} times as long are not within 0.1 and 10", options_.remesh_edge));
+  }
+  bool any = false;
+  for (const FitParameter& p : parameters_) {
+    for (size_t v = 0; v < views.size(); ++v) {
+      if (!p.is_array() || !p.shape(v).valid()) continue;
+      const Shape& shape = views[v].scene.shape(p.shape(v));
+      if (shape.mesh.normal_source == NormalSource::kFace) {
+        throw InputError(shape.where,
+                         "\"" + shape.id + "\" is shaded flat: remeshing would lose its edges");
+      }
+      remesh(shape.mesh, options_.remesh_edge * mean_edge_length(shape.mesh), shape.where);
+      any = true;
+    }
+  }
+  if (!any) throw InputError("there is nothing to remesh: no vertices are fitted");
 }
 
 std::vector<ShapeId> Fit::Impl::moved_shapes(size_t view) const {
@@ -195,6 +224,9 @@ std::optional<FitRecord> Fit::Impl::step() {
   if (options_.step_half_life > 0) {
     record.step_size *= std::exp2(-static_cast<double>(steps) / options_.step_half_life);
   }
+  for (const int64_t step : options_.remesh) {
+    if (step <= steps) record.step_size *= 0.8;  // not tuned
+  }
   std::vector<std::vector<double>> gradients(parameters_.size());
   for (size_t v = 0; v < views.size(); ++v) {
     if (!add_view(v, record, gradients)) return std::nullopt;
@@ -204,6 +236,13 @@ std::optional<FitRecord> Fit::Impl::step() {
                                parameters_[i].move(gradients[i], record.step_size, steps, views));
   }
   ++steps;
+  if (std::find(options_.remesh.begin(), options_.remesh.end(), steps) != options_.remesh.end()) {
+    for (FitParameter& p : parameters_) {
+      if (!p.is_array()) continue;
+      p.remesh(options_.remesh_edge, options_, views);
+      record.remeshed = true;
+    }
+  }
   for (const FitScalar& scalar : scalars()) record.values.push_back(scalar.value);
   record.seconds = watch.seconds();
   return record;
@@ -225,7 +264,8 @@ FitState Fit::Impl::state() const {
     const Scene& scene = views[v].scene;
     FitState::View view{camera_numbers(scene.camera), {}, {}};
     for (const ShapeId s : moved_shapes(v)) {
-      view.shapes.push_back({scene.shape(s).mesh.positions, scene.shape(s).mesh.normals});
+      const Mesh& mesh = scene.shape(s).mesh;
+      view.shapes.push_back({mesh.positions, mesh.normals, mesh.faces});
     }
     for (const FitParameter& p : parameters_) {
       view.values.push_back(p.in_view(v) && !p.is_array() ? p.in_view(v)->value(scene)
@@ -246,27 +286,30 @@ void Fit::Impl::restore(const FitState& state) {
     const std::vector<ShapeId> shapes = moved_shapes(v);
     check(view.camera.size() == 13 && view.shapes.size() == shapes.size() &&
           view.values.size() == parameters_.size());
-    for (size_t i = 0; i < shapes.size(); ++i) {
-      const Mesh& mesh = views[v].scene.shape(shapes[i]).mesh;
-      check(view.shapes[i].positions.size() == mesh.positions.size() &&
-            view.shapes[i].normals.size() == mesh.normals.size());
-    }
   }
-  for (size_t i = 0; i < parameters_.size(); ++i) parameters_[i].restore(state.parameters[i]);
   for (size_t v = 0; v < views.size(); ++v) {
     Scene& scene = views[v].scene;
     const FitState::View& view = state.views[v];
     const std::vector<ShapeId> shapes = moved_shapes(v);
     for (size_t i = 0; i < shapes.size(); ++i) {
+      const FitState::Shape& shape = view.shapes[i];
       Mesh& mesh = scene.shapes[shapes[i].index()].mesh;
-      mesh.positions = view.shapes[i].positions;
-      mesh.normals = view.shapes[i].normals;
+      if (shape.faces != mesh.faces) {
+        set_mesh(scene, shapes[i], shape.positions, shape.faces, nullptr);
+      }
+      check(shape.positions.size() == mesh.positions.size() &&
+            shape.normals.size() == mesh.normals.size());
+      mesh.positions = shape.positions;
+      mesh.normals = shape.normals;
       update_shading_normals(mesh);
     }
     for (size_t i = 0; i < parameters_.size(); ++i) {
       if (!view.values[i].empty()) parameters_[i].in_view(v)->assign(scene, view.values[i]);
     }
     set_camera(scene.camera, view.camera);
+  }
+  for (size_t i = 0; i < parameters_.size(); ++i) {
+    parameters_[i].restore(state.parameters[i], views);
   }
   steps = state.steps;
 }
@@ -276,6 +319,10 @@ Fit::Fit(std::vector<FitView> views, const FitOptions& options, const RunSetting
 Fit::~Fit() = default;
 Fit::Fit(Fit&&) noexcept = default;
 
+void Fit::listen(const std::function<void(double)>& progress,
+                 const std::atomic<bool>* interrupted) {
+  impl_->listen(progress, interrupted);
+}
 std::optional<FitRecord> Fit::step() { return impl_->step(); }
 int64_t Fit::steps() const { return impl_->steps; }
 const std::vector<FitView>& Fit::views() const { return impl_->views; }

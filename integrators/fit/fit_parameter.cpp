@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "integrators/fit/remesh.h"
+#include "integrators/fit/surface_tree.h"
 #include "limn/core/check.h"
 #include "limn/core/error.h"
 
@@ -52,6 +54,7 @@ FitParameter::FitParameter(const std::string& name, const std::vector<FitView>& 
     }
   }
   if (first_view_ == views.size()) throw UnknownParameter(*unknown);
+  natural_step_ = in_view_[first_view_]->natural_step;
   if (in_view_[first_view_]->size > 1) {
     find_array(views, options);
   } else {
@@ -61,14 +64,18 @@ FitParameter::FitParameter(const std::string& name, const std::vector<FitView>& 
   optimiser_.emplace(options.optimiser, numbers_.size());
 }
 
+void FitParameter::find_in_views(const std::vector<FitView>& views) {
+  for (size_t v = 0; v < views.size(); ++v) {
+    if (in_view_[v]) in_view_[v] = find_parameter_or_array(views[v].scene, name_);
+  }
+}
+
 void FitParameter::find_array(const std::vector<FitView>& views, const FitOptions& options) {
-  const auto mesh_in = [&](size_t v) -> const Mesh& {
-    return views[v].scene.shape(shapes_[v]).mesh;
-  };
-  const Mesh& mesh = mesh_in(first_view_);
+  const Mesh& first = mesh(views);
   for (size_t v = first_view_; v < views.size(); ++v) {
     if (!in_view_[v]) continue;
-    if (mesh_in(v).positions == mesh.positions && mesh_in(v).faces == mesh.faces) continue;
+    const Mesh& other = views[v].scene.shape(shapes_[v]).mesh;
+    if (other.positions == first.positions && other.faces == first.faces) continue;
     throw InputError({views[v].scene.file},
                      fmt::format("the mesh of \"{}\" is not that of {}: views of one shape must "
                                  "show the same vertices and faces",
@@ -77,10 +84,11 @@ void FitParameter::find_array(const std::vector<FitView>& views, const FitOption
   if (!(options.smoothing >= 0 && options.smoothing < 1e3)) {
     throw InputError(fmt::format("the smoothing {:g} is not in [0, 1000)", options.smoothing));
   }
-  large_steps_ = std::make_unique<LargeSteps>(mesh, options.smoothing * bounds_of(mesh).diagonal());
+  const double in_edges = options.smoothing * bounds_of(first).diagonal() / mean_edge_length(first);
+  large_steps_ = std::make_unique<LargeSteps>(first, in_edges * in_edges);
   std::vector<double> positions;
   for (const uint32_t v : large_steps_->first()) {
-    for (int k = 0; k < 3; ++k) positions.push_back(static_cast<double>(mesh.positions[v][k]));
+    for (int k = 0; k < 3; ++k) positions.push_back(static_cast<double>(first.positions[v][k]));
   }
   numbers_ = large_steps_->apply(positions);
 }
@@ -124,8 +132,7 @@ int FitParameter::move(const std::vector<double>& gradient, double size, int64_t
 
 void FitParameter::move_scalar(double gradient, double size, int64_t count,
                                std::vector<FitView>& views) {
-  const double natural = in_view_[first_view_]->natural_step;
-  double step = natural * size * optimiser_->step({natural * gradient}, count)[0];
+  double step = natural_step_ * size * optimiser_->step({natural_step_ * gradient}, count)[0];
   for (size_t v = 0; v < views.size(); ++v) {
     if (!in_view_[v]) continue;
     for (const double x : bounded_numbers(views[v], v)) {
@@ -154,10 +161,9 @@ int FitParameter::move_vertices(const std::vector<double>& gradient, double size
   }
   // The matrix is symmetric: dL/du = (I + lambda L)^-1 dL/dv.
   std::vector<double> step = large_steps_->solve(of_welded);
-  const double natural = in_view_[first_view_]->natural_step;
-  for (double& x : step) x *= natural;
+  for (double& x : step) x *= natural_step_;
   step = optimiser_->step(step, count);
-  for (double& x : step) x *= natural * size;
+  for (double& x : step) x *= natural_step_ * size;
   for (int halvings = 0; halvings < kMostHalvings; ++halvings) {
     std::vector<double> tried = numbers_;
     for (size_t i = 0; i < tried.size(); ++i) tried[i] += std::ldexp(step[i], -halvings);
@@ -200,18 +206,68 @@ FitScalar FitParameter::scalar(const std::vector<FitView>& views) const {
 }
 
 FitState::Numbers FitParameter::state() const {
-  return {numbers_, optimiser_->first, optimiser_->second};
+  FitState::Numbers state{numbers_, optimiser_->first, optimiser_->second, 0, 0};
+  if (is_array()) {
+    state.natural_step = natural_step_;
+    state.lambda = large_steps_->lambda();
+  }
+  return state;
 }
 
-void FitParameter::restore(const FitState::Numbers& numbers) {
-  if (numbers.values.size() != numbers_.size() ||
-      numbers.first.size() != optimiser_->first.size() ||
-      numbers.second.size() != optimiser_->second.size()) {
+void FitParameter::restore(const FitState::Numbers& numbers, const std::vector<FitView>& views) {
+  size_t size = 1;
+  if (is_array()) {
+    if (!(numbers.lambda >= 0)) throw InputError("the state of \"" + name_ + "\" has no lambda");
+    find_in_views(views);
+    large_steps_ = std::make_unique<LargeSteps>(mesh(views), numbers.lambda);
+    natural_step_ = numbers.natural_step;
+    size = 3 * large_steps_->size();
+  }
+  const size_t moments = optimiser_->first.empty() ? 0 : size;
+  if (numbers.values.size() != size || numbers.first.size() != moments ||
+      numbers.second.size() != moments) {
     throw InputError("the state of \"" + name_ + "\" is of another size or optimiser");
   }
   numbers_ = numbers.values;
   optimiser_->first = numbers.first;
   optimiser_->second = numbers.second;
+}
+
+void FitParameter::remesh(double edge, const FitOptions& options, std::vector<FitView>& views) {
+  const Mesh before = mesh(views);
+  const std::vector<uint32_t> welded = large_steps_->welded();
+  const Remeshed after = limn::remesh(before, edge * mean_edge_length(before),
+                                      views[first_view_].scene.shape(shapes_[first_view_]).where);
+  for (size_t v = 0; v < views.size(); ++v) {
+    if (in_view_[v]) set_mesh(views[v].scene, shapes_[v], after.positions, after.faces, nullptr);
+  }
+  find_in_views(views);
+  natural_step_ = in_view_[first_view_]->natural_step;
+  find_array(views, options);
+  if (optimiser_->first.empty()) return;
+  std::vector<double> first, second;
+  const SurfaceTree tree(before);
+  for (const uint32_t v : large_steps_->first()) {
+    const SurfaceTree::Nearest nearest = tree.nearest(cast<double>(mesh(views).positions[v]));
+    const auto c = corners_of(before, nearest.face.index());
+    const Vec3d n = cross(c[1] - c[0], c[2] - c[0]);
+    double moments[2][3] = {};
+    for (int k = 0; k < 3; ++k) {
+      const Vec3d &a = c[(k + 1) % 3], &b = c[(k + 2) % 3];
+      // Rounding may take a corner's weight below zero, where a square must not go.
+      const double weight =
+          std::max(0.0, dot(n, cross(a - nearest.point, b - nearest.point)) / dot(n, n));
+      const size_t w = 3 * size_t{welded[before.face(nearest.face)[k]]};
+      for (int axis = 0; axis < 3; ++axis) {
+        moments[0][axis] += weight * optimiser_->first[w + axis];
+        moments[1][axis] += weight * optimiser_->second[w + axis];
+      }
+    }
+    first.insert(first.end(), moments[0], moments[0] + 3);
+    second.insert(second.end(), moments[1], moments[1] + 3);
+  }
+  optimiser_->first = std::move(first);
+  optimiser_->second = std::move(second);
 }
 
 }  // namespace limn

@@ -36,10 +36,19 @@ class FitParameter {
   // Of a scalar.
   FitScalar scalar(const std::vector<FitView>& views) const;
   FitState::Numbers state() const;
-  // The sizes are those of state().
-  void restore(const FitState::Numbers& numbers);
+  // The views have their state already.
+  void restore(const FitState::Numbers& numbers, const std::vector<FitView>& views);
+
+  // New triangles for the shape of an array in all views, with edges `edge` times as long as now;
+  // the optimiser's state is interpolated.
+  void remesh(double edge, const FitOptions& options, std::vector<FitView>& views);
 
  private:
+  const Mesh& mesh(const std::vector<FitView>& views) const {
+    return views[first_view_].scene.shape(shapes_[first_view_]).mesh;
+  }
+  // Once more, after the mesh has changed.
+  void find_in_views(const std::vector<FitView>& views);
   void find_array(const std::vector<FitView>& views, const FitOptions& options);
   void find_bounds(const std::vector<FitView>& views, const FitOptions& options);
   int move_vertices(const std::vector<double>& gradient, double size, int64_t count,
@@ -53,6 +62,7 @@ class FitParameter {
   std::vector<std::optional<Parameter>> in_view_;
   std::vector<ShapeId> shapes_;
   size_t first_view_ = 0;  // that has it
+  double natural_step_ = 0;
   double least_ = 0, most_ = 0;
   std::unique_ptr<LargeSteps> large_steps_;  // of an array
   std::vector<double> numbers_;              // u of an array, or the sum of steps

@@ -22,7 +22,7 @@ Eigen::Map<const Rows> rows(const std::vector<double>& x, size_t n) {
 
 std::vector<double> numbers(const Rows& x) { return {x.data(), x.data() + x.size()}; }
 
-// Pairs of welded vertices, each once, in order.
+// Pairs of welded vertices, each once, in order; welded: what stands for each vertex.
 std::vector<std::pair<uint32_t, uint32_t>> edges_of(const Mesh& mesh,
                                                     const std::vector<uint32_t>& welded) {
   std::vector<std::pair<uint32_t, uint32_t>> edges;
@@ -39,12 +39,21 @@ std::vector<std::pair<uint32_t, uint32_t>> edges_of(const Mesh& mesh,
 
 }  // namespace
 
+double mean_edge_length(const Mesh& mesh) {
+  double sum = 0;
+  const auto edges = edges_of(mesh, mesh.weld);
+  for (const auto& [a, b] : edges) {
+    sum += length(cast<double>(mesh.positions[a]) - cast<double>(mesh.positions[b]));
+  }
+  return sum / static_cast<double>(edges.size());
+}
+
 struct LargeSteps::Factors {
   Matrix matrix;
   Eigen::SimplicialLDLT<Matrix> cholesky;
 };
 
-LargeSteps::LargeSteps(const Mesh& mesh, double length) {
+LargeSteps::LargeSteps(const Mesh& mesh, double lambda) : lambda_(lambda) {
   welded_.resize(mesh.positions.size());
   for (uint32_t v = 0; v < welded_.size(); ++v) {
     if (mesh.weld[v] == v) {
@@ -53,14 +62,8 @@ LargeSteps::LargeSteps(const Mesh& mesh, double length) {
     }
   }
   for (uint32_t v = 0; v < welded_.size(); ++v) welded_[v] = welded_[mesh.weld[v]];
-  if (length == 0) return;
+  if (lambda == 0) return;
   const auto edges = edges_of(mesh, welded_);
-  double sum = 0;
-  for (const auto& [a, b] : edges) {
-    sum += limn::length(cast<double>(mesh.positions[first_[a]]) -
-                        cast<double>(mesh.positions[first_[b]]));
-  }
-  lambda_ = length * length / (sum * sum) * static_cast<double>(edges.size() * edges.size());
   std::vector<Eigen::Triplet<double>> entries;
   for (uint32_t i = 0; i < first_.size(); ++i) entries.emplace_back(i, i, 1.0);
   for (const auto& [a, b] : edges) {

@@ -11,9 +11,8 @@ namespace limn {
 
 class LargeSteps {
  public:
-  // length: how far a step spreads, in scene units; lambda = (length / mean length of the edges)^2.
-  // mesh.weld must be filled.
-  LargeSteps(const Mesh& mesh, double length);
+  // lambda: at least 0. mesh.weld must be filled.
+  LargeSteps(const Mesh& mesh, double lambda);
   ~LargeSteps();
   LargeSteps(LargeSteps&&) noexcept;
 
@@ -36,5 +35,8 @@ class LargeSteps {
   std::vector<uint32_t> welded_, first_;
   std::unique_ptr<Factors> factors_;  // null for lambda = 0
 };
+
+// The mean length of a mesh's edges, each counted once, in scene units.
+double mean_edge_length(const Mesh& mesh);
 
 }  // namespace limn

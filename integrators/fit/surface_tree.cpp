@@ -22,23 +22,22 @@ double squared_distance(const Bounds& box, const Vec3d& p) {
   return sum;
 }
 
-double squared_distance(const Vec3d& a, const Vec3d& b, const Vec3d& p) {
+Vec3d nearest_on(const Vec3d& a, const Vec3d& b, const Vec3d& p) {
   const Vec3d ab = b - a;
-  const double t = std::clamp(dot(p - a, ab) / length_squared(ab), 0.0, 1.0);
-  return length_squared(a + ab * t - p);
+  return a + ab * std::clamp(dot(p - a, ab) / length_squared(ab), 0.0, 1.0);
 }
 
-double squared_distance(const std::array<Vec3d, 3>& c, const Vec3d& p) {
+Vec3d nearest_on(const std::array<Vec3d, 3>& c, const Vec3d& p) {
   const Vec3d n = cross(c[1] - c[0], c[2] - c[0]);
   bool inside = true;
-  double nearest = std::numeric_limits<double>::infinity();
+  Vec3d best = c[0];
   for (int k = 0; k < 3; ++k) {
     const Vec3d &a = c[k], &b = c[(k + 1) % 3];
     inside = inside && determinant(n, b - a, p - a) >= 0;
-    nearest = std::min(nearest, squared_distance(a, b, p));
+    const Vec3d found = nearest_on(a, b, p);
+    if (length_squared(found - p) < length_squared(best - p)) best = found;
   }
-  const double height = dot(n, p - c[0]);
-  return inside ? height * height / dot(n, n) : nearest;
+  return inside ? p - n * (dot(n, p - c[0]) / dot(n, n)) : best;
 }
 
 bool meets(const Bounds& box, const Vec3d& origin, const Vec3d& direction) {
@@ -118,15 +117,17 @@ void SurfaceTree::build(uint32_t node, uint32_t first, uint32_t count) {
 SurfaceTree::Nearest SurfaceTree::nearest(const Vec3d& p) const {
   double best = std::numeric_limits<double>::infinity();
   uint32_t face = faces_[0];
+  Vec3d point;
   std::vector<uint32_t> stack{0};
   while (!stack.empty()) {
     const Node& node = nodes_[stack.back()];
     stack.pop_back();
     if (squared_distance(node.bounds, p) >= best) continue;
     for (uint32_t i = node.first; i < node.first + node.count; ++i) {
-      const double d = squared_distance(corners_of(mesh_, faces_[i]), p);
-      if (d >= best) continue;
-      best = d;
+      const Vec3d found = nearest_on(corners_of(mesh_, faces_[i]), p);
+      if (length_squared(found - p) >= best) continue;
+      best = length_squared(found - p);
+      point = found;
       face = faces_[i];
     }
     if (node.count > 0) continue;
@@ -135,7 +136,7 @@ SurfaceTree::Nearest SurfaceTree::nearest(const Vec3d& p) const {
     stack.push_back(node.first + swap);
     stack.push_back(node.first + !swap);
   }
-  return {std::sqrt(best), FaceId(face)};
+  return {std::sqrt(best), FaceId(face), point};
 }
 
 int SurfaceTree::crossings(const Vec3d& origin, const Vec3d& direction, FaceId skip) const {

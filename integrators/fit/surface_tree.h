@@ -16,6 +16,7 @@ class SurfaceTree {
   struct Nearest {
     double distance = 0;  // scene units
     FaceId face;
+    Vec3d point;
   };
   Nearest nearest(const Vec3d& p) const;
 

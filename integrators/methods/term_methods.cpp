@@ -65,6 +65,8 @@ struct TermMethod {
   bool moves_directions = false;   // see direction_field.h
   bool spreads_samples = false;    // over pixels, see spread_samples
   bool random_directions = false;  // directions move by chance: to show that no mean changes
+  bool warps = false;              // directions follow the edges that they see, see warp_field.h
+  bool unbiased = false;           // the same without the bias of few rays
 };
 
 // The fewest samples of a term in one of a pixel, where they are spread: a rare event that a pilot
@@ -109,11 +111,13 @@ class TermJob {
     if (options.exact_film) {
       visible = std::make_shared<FilmRegions>(scene, settings.threads, settings.interrupted);
     }
+    const Warping warping{options.warp, method.unbiased};
     for (size_t k = 0; k < parameters.size(); k += kLanes) {
       const auto some =
           std::span(parameters).subspan(k).first(std::min<size_t>(kLanes, parameters.size() - k));
       passes_.push_back(std::make_unique<TermEstimator>(scene, some, computed_, method.sampler,
-                                                        settings.threads, visible));
+                                                        settings.threads, visible,
+                                                        method.warps ? &warping : nullptr));
     }
   }
 
@@ -128,6 +132,7 @@ class TermJob {
       add_batch(batch.count(), sums, result);
     });
     result.seconds = watch.seconds();
+    if (method_.warps) describe_warping(result);
     return result;
   }
 
@@ -151,6 +156,18 @@ class TermJob {
   }
 
  private:
+  void describe_warping(GradientResult& result) const {
+    TermCost all;
+    for (const TermRun& term : result.terms) all.merge(term.cost);
+    const auto share = [](uint64_t part, uint64_t of) {
+      return of > 0 ? static_cast<double>(part) / static_cast<double>(of) : 0;
+    };
+    result.settings.push_back({"auxiliary rays", static_cast<double>(options_.warp.rays)});
+    result.settings.push_back({"kappa", options_.warp.kappa});
+    result.settings.push_back({"directions ruled by one ray", share(all.dominated, all.warped)});
+    result.settings.push_back({"rays on an edge", static_cast<double>(all.dropped)});
+  }
+
   // What moving directions change in one term they take back in the others, and at every jump of
   // radiance there must be an edge.
   bool can_move_directions() const {
@@ -379,11 +396,15 @@ MethodType method_row(const std::string& name, const std::string& description,
   method.name = name;
   method.description = description;
   for (const TermType& type : term_types()) {
-    if (!type.regions || term_method.sampler.regions) method.terms.emplace_back(type.name);
+    if (type.regions && !term_method.sampler.regions) continue;
+    method.terms.emplace_back(type.name);
   }
   method.terms_can_be_left_out = true;
   method.ablation = term_method.sampler.ablation || term_method.random_directions;
-  method.only_sum_fixed = term_method.moves_directions || term_method.random_directions;
+  method.only_sum_fixed =
+      term_method.moves_directions || term_method.random_directions || term_method.warps;
+  method.warps = term_method.warps;
+  method.biased = term_method.warps && !term_method.unbiased;
   method.run = [term_method](const MethodType&, const Scene& scene, const GradientOptions& options,
                              const RunSettings& settings) {
     const Stopwatch watch;
@@ -413,6 +434,16 @@ std::vector<MethodType> term_methods() {
   for (const EdgeSamplerType& type : edge_sampler_types()) {
     methods.push_back(method_row(type.name, type.description, {type}));
   }
+  // It chooses among few edges, where surfaces cross and touch: any will do, also one at rest.
+  const EdgeSamplerType& uniform = edge_sampler_type("uniform");
+  methods.push_back(method_row("was",
+                               "warped-area sampling (Bangaru et al. 2020): auxiliary rays in "
+                               "place of edges; biased, the less the more rays",
+                               {.sampler = uniform, .warps = true}));
+  methods.push_back(method_row("was-unbiased",
+                               "warped-area sampling without bias, by roulette over numbers of "
+                               "auxiliary rays",
+                               {.sampler = uniform, .warps = true, .unbiased = true}));
   methods.push_back(method_row("random-directions",
                                "silhouettes, with directions that move by chance: noise, but the "
                                "same mean",

@@ -155,7 +155,11 @@ bool CameraEdges::clip_and_project(EdgeRef id, FilmEdge& edge) const {
   const double depth_b = camera.depth(b);
   double t0 = 0;
   double t1 = 1;
-  if (!clip(depth_a, depth_b - depth_a, camera.near_clip, camera.far_clip, t0, t1)) return false;
+  // Nearer than 16 roundings of depth only an edge through the pinhole itself is seen.
+  const Vec3d pinhole = value(camera.origin);
+  const double rounding = 0x1p-48 * (length(a - pinhole) + length(b - pinhole));
+  const double near = std::max(camera.near_clip, rounding);
+  if (!clip(depth_a, depth_b - depth_a, near, camera.far_clip, t0, t1)) return false;
 
   const auto at = [&](double t) { return a + (b - a) * t; };
   const auto film0 = camera.project(at(t0));
@@ -174,7 +178,6 @@ bool CameraEdges::clip_and_project(EdgeRef id, FilmEdge& edge) const {
     if (!mesh.tangents.empty()) d = mesh.tangent(ends[0]) * (1 - t) + mesh.tangent(ends[1]) * t;
     return moving(at(t), d);
   };
-  const Vec3d pinhole = value(camera.origin);
   return place_on_film(moving_at(edge.t0), moving_at(edge.t1), cross(a - pinhole, b - pinhole),
                        edge);
 }

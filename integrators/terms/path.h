@@ -2,13 +2,15 @@
 // The path tracer, written once for any scalar: double gives radiance, Dual gives radiance and the
 // interior term of its derivative, Var writes a tape of it. Sampled directions, their densities and
 // MIS weights are constants while the parameters move (solid-angle measure, everywhere), but for
-// the one direction of a light without extent, which follows the parameters.
+// directions that move on purpose (direction_field.h, warp_field.h) and the one direction of a light
+// without extent, which follows the parameters.
 #include <atomic>
 #include <cstdint>
 
 #include "integrators/terms/direction_field.h"
 #include "integrators/terms/edge_sides.h"
 #include "integrators/terms/near_faces.h"
+#include "integrators/terms/warp_field.h"
 #include "limn/core/lights.h"
 #include "limn/core/ray_tracer.h"
 #include "limn/core/reverse.h"
@@ -57,6 +59,11 @@ class PathTracer {
     static_assert(std::is_same_v<S, Dual>);
     rates_ = &rates;
     field_ = &field;
+  }
+  // The directions of all vertices move from now on. Must outlive the tracer.
+  void warp_directions(DirectionWarper& warper) {
+    static_assert(std::is_same_v<S, Dual>);
+    warper_ = &warper;
   }
   // Takes more light samples at later vertices that slide fast. It must outlive the tracer.
   void split_by(const MotionRates* rates) { splitting_ = rates; }
@@ -131,6 +138,9 @@ class PathTracer {
       const double u2 = rng.uniform();
       const auto wo = scattering.sample(u1, u2);
       if (!wo) return;
+      if constexpr (std::is_same_v<S, Dual>) {
+        if (warper_) motion = warper_->motion(surface, *wo, rng.at(Purpose::kBsdf, 1));
+      }
       const Vec3<S> direction = moving(*wo, motion);
       const auto [f, pdf] = evaluate(scattering, *wo, direction, motion);
       if (is_black(value(f))) return;
@@ -159,7 +169,7 @@ class PathTracer {
       }
       wi = -direction;
       const Rgb<S> lamp = emitted(surface, *wo, pdf, hit.t);
-      if (motion && !is_black(value(lamp))) {
+      if (motion && !motion->warp && !is_black(value(lamp))) {
         radiance += before * scattering.eval(*wo) * lamp * (1 / pdf);  // held
       } else {
         radiance += throughput * lamp;
@@ -182,7 +192,7 @@ class PathTracer {
   }
   static Vec3<S> moving(const Vec3d& w, const DirectionMotion* motion) {
     if constexpr (std::is_same_v<S, Dual>) {
-      if (motion) return turning(w, motion->turn);
+      if (motion) return motion->warp ? warped(w, *motion->warp) : turning(w, motion->turn);
     }
     return {w.x, w.y, w.z};
   }
@@ -195,6 +205,7 @@ class PathTracer {
   // Times the change of a solid angle around w.
   static Rgb<S> stretched(const Rgb<S>& f, const Vec3d& w, const DirectionMotion* motion) {
     if constexpr (std::is_same_v<S, Dual>) {
+      if (motion && motion->warp) return f * Dual(1.0, motion->warp->divergence);
       if (motion && motion->turn.follows()) return f * Dual(1.0, divergence(w, motion->turn));
     }
     return f;
@@ -259,7 +270,7 @@ class PathTracer {
     Ray ray{value(surface.p), wo};
     ray.start = surface.face;
     if (edge) {
-      if (const auto side = blocked_at_edge(c_.scene, *edge, wo)) {
+      if (const auto side = blocked_at_edge(c_.scene, c_.tracer, *edge, wo)) {
         edge->start = *side;
         hit = {side->face, 0};
         return true;
@@ -301,6 +312,9 @@ class PathTracer {
     if (const DeltaLight* delta = light->light->delta()) {
       return delta_light(*delta, *light, surface, scattering, edge);
     }
+    if constexpr (std::is_same_v<S, Dual>) {
+      if (warper_) return warped_light(*light, surface, scattering, rng);
+    }
     if (light->face) motion = nullptr;  // a lamp: held
     const Vec3<S> direction = moving(light->wo, motion);
     const auto [f, bsdf_pdf] = evaluate(scattering, light->wo, direction, motion);
@@ -312,6 +326,21 @@ class PathTracer {
       }
     }
     return f * light->light->template drawn_radiance<S>(*light) * weight;
+  }
+
+  // The same where directions are warped: auxiliary rays are traced for light that arrives.
+  Rgb<S> warped_light(const LightSample& light, const SurfacePoint<S>& surface,
+                      const Scattering<S>& scattering, const Rng& key) {
+    if (is_black(scattering.eval_value(light.wo))) return {};
+    if (shadowed(value(surface.p), surface.face, light, nullptr)) return {};
+    const DirectionMotion* motion =
+        warper_->motion(surface, light.wo, key.at(Purpose::kEmitter, 1));
+    const Vec3<S> direction = moving(light.wo, motion);
+    const auto [f, bsdf_pdf] = evaluate(scattering, light.wo, direction, motion);
+    const double weight = mis_weight(light.pdf, bsdf_pdf) / light.pdf;
+    const Rgb<S> radiance = motion && !light.face ? light.light->radiance(direction)
+                                                  : light.light->template drawn_radiance<S>(light);
+    return stretched(f, light.wo, motion) * radiance * weight;
   }
 
   // No ray meets a delta light by chance, so it has the whole weight. Its direction follows the
@@ -332,7 +361,7 @@ class PathTracer {
     ray.start = start;
     ray.end = light.face.value_or(FaceRef{});
     if (edge) {
-      if (blocked_at_edge(c_.scene, *edge, light.wo)) return true;
+      if (blocked_at_edge(c_.scene, c_.tracer, *edge, light.wo)) return true;
       ray.skip_faces = edge->around.all;
     }
     // Ends a float's rounding before the light, so that neighbours of the chosen face do not hide
@@ -361,6 +390,7 @@ class PathTracer {
   const MotionRates* rates_ = nullptr;
   const DirectionField* field_ = nullptr;
   const MotionRates* splitting_ = nullptr;
+  DirectionWarper* warper_ = nullptr;
   DirectionMotion motion_;
   Rgb<Lanes> score_;
   int light_samples_ = 1;

@@ -8,9 +8,11 @@
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "integrators/fit/large_steps.h"
 #include "integrators/fit/optimiser.h"
+#include "integrators/fit/remesh.h"
 #include "integrators/fit/surface_tree.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/mesh_distance.h"
@@ -48,7 +50,8 @@ std::vector<double> solve_dense(std::vector<std::vector<double>> a, std::vector<
 // Copies along seams are one vertex, borders and closed meshes alike.
 TEST(Fit, LargeStepsSolveWhatADenseMatrixDoes) {
   for (const Mesh& mesh : {seam_split(torus_mesh(7, 4)), grid_mesh(4), icosphere_mesh(1)}) {
-    const LargeSteps steps(mesh, 0.7);
+    const double lambda = std::pow(0.7 / mean_edge_length(mesh), 2);
+    const LargeSteps steps(mesh, lambda);
     const size_t n = steps.size();
     std::vector<std::vector<double>> matrix(n, std::vector<double>(n));
     double sum = 0, edges = 0;
@@ -62,7 +65,7 @@ TEST(Fit, LargeStepsSolveWhatADenseMatrixDoes) {
         ++edges;
       }
     }
-    EXPECT_NEAR(steps.lambda(), std::pow(0.7 / (sum / edges), 2), 1e-12 * steps.lambda());
+    EXPECT_NEAR(mean_edge_length(mesh), sum / edges, 1e-12);
     for (size_t i = 0; i < n; ++i) {
       double row = 0;
       for (double& x : matrix[i]) row += x *= steps.lambda();
@@ -435,6 +438,93 @@ TEST(Fit, RefusesWhatCannotBeFitted) {
   Fit fit(views, options, {});
   EXPECT_THROW(fit.restore({}), InputError);
   EXPECT_THROW(optimiser_kind("sgd"), InputError);
+}
+
+int euler_characteristic(const Mesh& mesh) {
+  std::set<uint32_t> vertices;
+  std::set<std::pair<uint32_t, uint32_t>> edges;
+  for (const FaceIndices& face : mesh.faces) {
+    for (int k = 0; k < 3; ++k) {
+      const auto [a, b] = std::minmax({mesh.weld[face[k]], mesh.weld[face[(k + 1) % 3]]});
+      vertices.insert(mesh.weld[face[k]]);
+      edges.emplace(a, b);
+    }
+  }
+  return static_cast<int>(vertices.size() + mesh.faces.size()) - static_cast<int>(edges.size());
+}
+
+// The surface, its topology and its border stay; edges get the length that was asked for.
+TEST(Fit, RemeshingKeepsTheSurface) {
+  if (!can_remesh()) GTEST_SKIP() << "built without OpenMesh (Debian: libopenmesh-dev)";
+  for (const Mesh& mesh : {icosphere_mesh(3), seam_split(torus_mesh(40, 20)), cap_mesh(3)}) {
+    for (const double edge : {0.6, 1.0, 1.7}) {
+      const double length = edge * mean_edge_length(mesh);
+      const Remeshed made = remesh(mesh, length, {"mesh.ply"});
+      const Mesh after = make_mesh(made.positions, made.faces);
+      EXPECT_EQ(euler_characteristic(after), euler_characteristic(mesh));
+      const auto inside_out = count_inside_out(after, 1);
+      EXPECT_EQ(inside_out.has_value(), count_inside_out(mesh, 1).has_value());
+      EXPECT_EQ(inside_out.value_or(0), 0u);
+      EXPECT_EQ(count_crossings(after, 1), 0u);
+      // Vertices lie on the surface, to floats' rounding.
+      const SurfaceTree tree(mesh);
+      for (const Vec3f& p : after.positions) {
+        EXPECT_LT(tree.nearest(cast<double>(p)).distance, 0x1p-22);
+      }
+      // Chords of a sphere of radius 0.4 at least, of the longest edge that is let be, both ways.
+      const double sag = 2 * std::pow(4.0 / 3 * std::max(edge, 1.0) * mean_edge_length(mesh), 2);
+      EXPECT_LT(mesh_distance(after, mesh, 2000, 1, 1).hausdorff, sag / (8 * 0.4));
+      EXPECT_EQ(remesh(mesh, length, {"mesh.ply"}).positions, made.positions);
+      if (mesh.faces.size() == cap_mesh(3).faces.size()) continue;  // its border keeps its edges
+      size_t good = 0, all = 0;
+      for (const FaceIndices& face : after.faces) {
+        for (int k = 0; k < 3; ++k, ++all) {
+          const double side = limn::length(cast<double>(after.positions[face[k]]) -
+                                           cast<double>(after.positions[face[(k + 1) % 3]]));
+          good += side > 0.8 * length && side < 4.0 / 3 * length;
+        }
+      }
+      EXPECT_GT(2 * good, all);
+      fmt::print("{} faces to {}: {:.1f} % of the edges within 4/5 and 4/3\n", mesh.faces.size(),
+                 after.faces.size(), 100.0 * good / all);
+    }
+  }
+  const Mesh fan = make_mesh({{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {-1, 0, 0}},
+                             {{0, 1, 2}, {0, 1, 3}, {0, 1, 4}});
+  try {
+    remesh(fan, 0.5, {"fan.ply"});
+    FAIL() << "no error";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what())
+                  .find("fan.ply: error: the mesh cannot be remeshed: it is "
+                        "not manifold at face 1"),
+              std::string::npos)
+        << error.what();
+  }
+}
+
+TEST(Fit, RemeshedFitsGoOnWithTheSameBits) {
+  if (!can_remesh()) GTEST_SKIP() << "built without OpenMesh (Debian: libopenmesh-dev)";
+  const TempFiles files;
+  FitOptions options;
+  options.parameters = {"body.vertex_positions"};
+  options.remesh = {2};
+  RunSettings settings;
+  settings.spp = 2;
+  Fit whole(two_views(files), options, settings);
+  const size_t before = whole.views()[1].scene.shapes[1].mesh.faces.size();
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(whole.step().value().remeshed, i == 1);
+  EXPECT_GT(whole.views()[1].scene.shapes[1].mesh.faces.size(), before);
+  for (const int pause : {2, 4}) {
+    Fit first(two_views(files), options, settings);
+    for (int i = 0; i < pause; ++i) ASSERT_TRUE(first.step());
+    Fit second(two_views(files), options, settings);
+    second.restore(first.state());
+    for (int i = pause; i < 5; ++i) ASSERT_TRUE(second.step());
+    EXPECT_EQ(numbers(whole), numbers(second)) << pause;
+  }
+  options.parameters = {"clay.reflectance"};
+  EXPECT_THROW(Fit(two_views(files), options, settings), InputError);
 }
 
 TEST(Fit, DistancesBetweenMeshesAreTrue) {

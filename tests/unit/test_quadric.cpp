@@ -16,6 +16,7 @@
 #include "edgetree/quadric/quadric_fit.h"
 #include "edgetree/quadric/quadric_query.h"
 #include "edgetree/quadric/quadric_sampler.h"
+#include "limn/edgetree/quadric_chart.h"
 
 namespace limn {
 namespace {
@@ -317,6 +318,36 @@ TEST(Quadric, PairsRejectWhatBoxesKeep) {
     }
   }
   EXPECT_LT(pairs, 0.96 * boxes);
+}
+
+// What is drawn of a node are its own planes: they lie in its box and between its quadrics. The rows
+// of a box are floats, whose rounding is not small against a box of few edges.
+TEST(QuadricChart, HoldsThePlanesOfItsNode) {
+  EdgeSamplerInput input;
+  input.objects.push_back(build_edge_mesh(torus_mesh(40, 20), true));
+  const auto sampler = QuadricSampler::build(input, 1, QuadricConfig{});
+  const auto tree = sampler->rejection_tree();
+  const auto& charted = dynamic_cast<const ChartedTree&>(*tree);
+  constexpr double kRounding = 0x1p-10;
+  int planes = 0;
+  for (uint32_t node = 0; node < tree->nodes().size(); ++node) {
+    const auto chart = charted.chart(node);
+    if (!chart) continue;
+    for (const auto& wedge : chart->edges) {
+      for (const Vec3d& u : wedge) {
+        double f = 0;
+        for (int k = 0; k < 3; ++k) {
+          EXPECT_LE(std::fabs(u[k]), 1 + kRounding);
+          f += u[k] * (chart->linear[k] + chart->square[k] * u[k]) +
+               chart->product[k] * u[(k + 1) % 3] * u[(k + 2) % 3];
+        }
+        EXPECT_GE(f, chart->low - kRounding);
+        EXPECT_LE(f, chart->high + kRounding);
+        ++planes;
+      }
+    }
+  }
+  EXPECT_GT(planes, 1000);
 }
 
 TEST(Quadric, ProbabilitiesDoNotDependOnTheScale) {

@@ -35,7 +35,7 @@ class FitCommand final : public Command {
   std::vector<FitView> read_views(const FitArguments& arguments);
   FitFolder open_folder();
   int loop(Fit& fit, FitFolder& folder, const RunSettings& settings);
-  void tell_halvings(const FitRecord& record) const;
+  void tell(const FitRecord& record) const;
 
   CommonOptions common_;
   Warnings warnings_;
@@ -84,6 +84,13 @@ void FitCommand::add_options(CLI::App& app, bool) {
   app.add_option("--smoothing", given_.smoothing,
                  "How far a step of a vertex spreads, over the shape's diagonal; 0: not at all")
       ->check(CLI::Range(0.0, 100.0))
+      ->capture_default_str();
+  app.add_option("--remesh", given_.remesh,
+                 "After these steps, vertices that are fitted get new triangles, as in 100,200")
+      ->delimiter(',')
+      ->check(CLI::PositiveNumber);
+  app.add_option("--remesh-edge", given_.remesh_edge, "Length of edges then, over what it was")
+      ->check(CLI::Range(0.1, 10.0))
       ->capture_default_str();
   add_sampling_options(app);
   app.add_option("--snapshots", given_.snapshots,
@@ -234,7 +241,7 @@ int FitCommand::loop(Fit& fit, FitFolder& folder, const RunSettings& settings) {
       return kInterrupted;
     }
     folder.add(*record, fit);
-    tell_halvings(*record);
+    tell(*record);
     const bool last = fit.steps() == a.steps;
     if (!last && fit.steps() % a.snapshots != 0) continue;
     folder.add_snapshot(fit, settings, kPictureSamples, common_.quiet);
@@ -243,10 +250,13 @@ int FitCommand::loop(Fit& fit, FitFolder& folder, const RunSettings& settings) {
   return kSuccess;
 }
 
-void FitCommand::tell_halvings(const FitRecord& record) const {
-  if (record.halvings == 0 || common_.quiet) return;
-  fmt::print(stderr, "step {}: halved {} times, so that no face loses its area\n", record.step,
-             record.halvings);
+void FitCommand::tell(const FitRecord& record) const {
+  if (common_.quiet) return;
+  if (record.halvings > 0) {
+    fmt::print(stderr, "step {}: halved {} times, so that no face loses its area\n", record.step,
+               record.halvings);
+  }
+  if (record.remeshed) fmt::print("step {}: remeshed\n", record.step + 1);
 }
 
 }  // namespace

@@ -262,6 +262,7 @@ class GradientCommand final : public Command {
     app.add_option("--step", options_.step,
                    "Step of finite differences (default: found by a pilot)")
         ->check(CLI::PositiveNumber);
+    add_warp_options(app, options_.warp);
     app.add_option("--time", seconds_,
                    "Seconds, set-up included: as many samples as fit, instead of --spp")
         ->check(CLI::PositiveNumber)
@@ -402,6 +403,7 @@ class GradientCommand final : public Command {
     attributes.push_back({"limn.terms", terms});
     attributes.push_back({"limn.method", result.method});
     attributes.push_back({"limn.samples", to_string(result.samples())});
+    for (const ImageAttribute& a : settings_attributes(result.settings)) attributes.push_back(a);
     attributes.push_back({kOutputAttribute, output_name(output_)});
     json parameters = json::array();
     for (size_t k = 0; k < outputs_.size(); ++k) {
@@ -414,6 +416,7 @@ class GradientCommand final : public Command {
                          {"seed", settings.seed},
                          {"threads", settings.threads},
                          {"method", result.method},
+                         {"settings", settings_json(result.settings)},
                          {"terms", terms},
                          {"samples", samples},
                          {"pilot_spp", result.pilot_spp},

@@ -79,6 +79,8 @@ void visit_arguments(Arguments& a, const Visit& visit) {
   visit("shading", a.shading);
   visit("step", a.step);
   visit("smoothing", a.smoothing);
+  visit("remesh", a.remesh);
+  visit("remesh_edge", a.remesh_edge);
   visit("camera_samples", a.camera_samples);
   visit("step_half_life", a.step_half_life);
   visit("spp_doubling", a.spp_doubling);
@@ -128,12 +130,17 @@ std::vector<Vec3<T>> vectors(const json& list) {
 json to_json(const FitState& state) {
   json j = {{"steps", state.steps}, {"parameters", json::array()}, {"views", json::array()}};
   for (const FitState::Numbers& p : state.parameters) {
-    j["parameters"].push_back({{"values", p.values}, {"first", p.first}, {"second", p.second}});
+    j["parameters"].push_back({{"values", p.values},
+                               {"first", p.first},
+                               {"second", p.second},
+                               {"natural_step", p.natural_step},
+                               {"lambda", p.lambda}});
   }
   for (const FitState::View& view : state.views) {
     json shapes = json::array();
     for (const FitState::Shape& s : view.shapes) {
-      shapes.push_back({{"positions", flat(s.positions)}, {"normals", flat(s.normals)}});
+      shapes.push_back(
+          {{"positions", flat(s.positions)}, {"normals", flat(s.normals)}, {"faces", s.faces}});
     }
     j["views"].push_back({{"camera", view.camera}, {"shapes", shapes}, {"values", view.values}});
   }
@@ -144,12 +151,14 @@ FitState state_from(const json& j) {
   FitState state;
   state.steps = j.at("steps");
   for (const json& p : j.at("parameters")) {
-    state.parameters.push_back({p.at("values"), p.at("first"), p.at("second")});
+    state.parameters.push_back(
+        {p.at("values"), p.at("first"), p.at("second"), p.at("natural_step"), p.at("lambda")});
   }
   for (const json& v : j.at("views")) {
     FitState::View view{v.at("camera"), {}, v.at("values")};
     for (const json& s : v.at("shapes")) {
-      view.shapes.push_back({vectors<float>(s.at("positions")), vectors<double>(s.at("normals"))});
+      view.shapes.push_back(
+          {vectors<float>(s.at("positions")), vectors<double>(s.at("normals")), s.at("faces")});
     }
     state.views.push_back(std::move(view));
   }
@@ -208,6 +217,8 @@ FitOptions FitArguments::options() const {
   options.step_half_life = step_half_life;
   options.spp_doubling = spp_doubling;
   options.smoothing = smoothing;
+  options.remesh = remesh;
+  options.remesh_edge = remesh_edge;
   options.loss_spp = loss_spp;
   options.backward.terms = terms;
   options.backward.uniform_pixels = pixels == "uniform";

@@ -29,6 +29,8 @@ struct FitArguments {
   std::vector<std::string> parameters, bounds, terms;
   std::string loss = "l2", optimiser = "adam-uniform", pixels = "adjoint", shading = "continuous";
   double step = 1, smoothing = 0.08, camera_samples = 1;
+  std::vector<int64_t> remesh;
+  double remesh_edge = 0.75;
   int step_half_life = 0, spp_doubling = 0, spp = 0, loss_spp = 0, edge_samples = 1;
   uint64_t seed = 0;
   int64_t steps = 0;

@@ -50,6 +50,7 @@ void bind_parts(nb::module_& m);
 void bind_render(nb::module_& m);
 void bind_gradient(nb::module_& m);
 void bind_backward(nb::module_& m);
+void bind_fit(nb::module_& m);
 void bind_check(nb::module_& m);
 void bind_compare(nb::module_& m);
 void bind_info(nb::module_& m);

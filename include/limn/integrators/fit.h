@@ -59,6 +59,11 @@ struct FitOptions {
   // The distance over which a step of a vertex spreads, over the diagonal of the shape's bounds:
   // lambda = (distance / mean length of an edge)^2. 0: vertices move one by one.
   double smoothing = 0.08;
+  // After so many steps shapes whose vertices are fitted get new triangles of one size (Botsch and
+  // Kobbelt 2004), their edges remesh_edge times as long as the mean was, and steps shrink to four
+  // fifths. Needs manifold meshes without flat shading, and OpenMesh.
+  std::vector<int64_t> remesh;
+  double remesh_edge = 0.75;
   int loss_spp = 0;  // samples per pixel of each of the two images of the loss; 0: settings.spp
   // Terms and where samples go; `parameters` is not looked at.
   BackwardOptions backward;
@@ -74,6 +79,7 @@ struct FitRecord {
   // How often it was halved so that no face lost its area or grew together with another; if 30
   // times, that shape was left where it was.
   int halvings = 0;
+  bool remeshed = false;       // after the step
   std::vector<double> values;  // of Fit::scalars(), after the step
   double seconds = 0;
 };
@@ -89,13 +95,15 @@ struct FitScalar {
 struct FitState {
   int64_t steps = 0;
   struct Numbers {
-    std::vector<double> values;         // u of an array, n by 3; sum of steps of a scalar
-    std::vector<double> first, second;  // moments of Adam; empty for gradient descent
+    std::vector<double> values;           // u of an array, n by 3; sum of steps of a scalar
+    std::vector<double> first, second;    // moments of Adam; empty for gradient descent
+    double natural_step = 0, lambda = 0;  // of an array, as they were when its mesh was made
   };
   std::vector<Numbers> parameters;  // in the order of FitOptions
   struct Shape {
-    std::vector<Vec3f> positions;  // V
-    std::vector<Vec3d> normals;    // N
+    std::vector<Vec3f> positions;    // V
+    std::vector<Vec3d> normals;      // N
+    std::vector<FaceIndices> faces;  // F by 3
   };
   struct View {
     std::vector<double> camera;               // origin, left, up, forward, fov
@@ -118,6 +126,9 @@ class Fit {
   // same bits on any number of threads. InputError where samples are not finite; nothing has
   // changed then, either.
   std::optional<FitRecord> step();
+
+  // In place of what the settings said of progress and interruption; null for none.
+  void listen(const std::function<void(double)>& progress, const std::atomic<bool>* interrupted);
 
   int64_t steps() const;                      // done
   const std::vector<FitView>& views() const;  // as they are now

@@ -77,6 +77,10 @@ struct TermCost {
   uint64_t zero_weight = 0;  // below the horizon, or without relative motion
   uint64_t occluded = 0;     // the edge point is hidden (or, for the camera, off the film)
   uint64_t counted = 0;
+  // Where directions are warped (of paths).
+  uint64_t warped = 0;     // directions whose motion auxiliary rays told
+  uint64_t dominated = 0;  // of which one ray held nine tenths of the weights
+  uint64_t dropped = 0;    // auxiliary rays on an edge to rounding
   LargestSample largest;
   void add(const RayCount& count) {
     rays += count.total();
