@@ -6,6 +6,7 @@
 #include "integrators/estimates/batches.h"
 #include "integrators/methods/radiance_estimator.h"
 #include "limn/core/error.h"
+#include "limn/integrators/parts.h"
 
 namespace limn {
 
@@ -24,6 +25,7 @@ std::unique_ptr<RadianceEstimator> make_estimator(const Scene& scene, const RunS
 
 RenderResult render(const Scene& scene, const RunSettings& settings, bool exact_film) {
   const Stopwatch watch;
+  if (settings.store) settings.store->identify("film", exact_film ? "exact" : "rays");
   std::vector<std::unique_ptr<SampleEstimator>> estimators;
   estimators.push_back(make_estimator(scene, settings, exact_film));
   check_memory(estimators);

@@ -272,6 +272,9 @@ TEST_F(Parts, ThatDoNotFitAreRefused) {
   ASSERT_EQ(run(command + " -D glow=6,5,4.5 --part 3/3 -o " + alien).status, 0);
   EXPECT_NE(merged(with_alien).find("another run than " + part(1) + ": scene is"),
             std::string::npos);
+  ASSERT_EQ(run(command + " --film exact --part 3/3 -o " + alien).status, 0);
+  EXPECT_NE(merged(with_alien).find("another run than " + part(1) + ": film is exact, there rays"),
+            std::string::npos);
   ASSERT_EQ(run(command + " --part 2/2 -o " + alien).status, 0);
   EXPECT_NE(merged(with_alien).find("is part 2/2, but " + part(1) + " is part 1/3"),
             std::string::npos);

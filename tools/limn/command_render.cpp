@@ -36,8 +36,9 @@ class RenderCommand final : public Command {
       return kSuccess;
     }
     if (!common_.part.empty()) {
-      return run_part(common_, scene, {}, {name(), words, command_line}, output_,
-                      [&](const RunSettings& part) { return render(scene, part).non_finite; });
+      return run_part(
+          common_, scene, {}, {name(), words, command_line}, output_,
+          [&](const RunSettings& part) { return render(scene, part, exact_film).non_finite; });
     }
     check_output(output_);
     check_outputs({{"-o", output_}, {"-o", with_ending(output_, ".png")}, {"--json", common_.json}},
