@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""One HTML page from folders that `limn compare` or `limn reject` wrote.
+"""One HTML page from folders that `limn compare`, `reject` or `fit` wrote.
 
     tools/report.py FOLDER             writes FOLDER/report.html
     tools/report.py FOLDER... -o FILE  all of them in one page, an overview first
@@ -77,7 +77,7 @@ def main():
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
-        "folders", nargs="+", metavar="FOLDER", help="where compare.json or reject.json lies"
+        "folders", nargs="+", metavar="FOLDER", help="where compare.json, reject.json or fit.json lies"
     )
     parser.add_argument(
         "-o",

@@ -31,16 +31,29 @@ ValueLoss value_loss(LossKind kind, double a, double b, double target) {
   return {weight * (a - target) * (b - target), 2 * weight * mean};
 }
 
-void check_target(const Scene& scene, const Image& target) {
+void check_size(const Scene& scene, const Image& image, const char* what) {
   const Film& film = scene.film;
-  if (target.width == film.crop_width && target.height == film.crop_height &&
-      (target.channels == 3 || target.channels == 1)) {
+  if (image.width == film.crop_width && image.height == film.crop_height &&
+      (image.channels == 3 || image.channels == 1)) {
     return;
   }
   throw InputError(fmt::format(
-      "the target has {} x {} pixels of {} channels, but the film {} x {}: it must be of "
+      "the {} has {} x {} pixels of {} channels, but the film {} x {}: it must be of "
       "the film's size, with three channels or one",
-      target.width, target.height, target.channels, film.crop_width, film.crop_height));
+      what, image.width, image.height, image.channels, film.crop_width, film.crop_height));
+}
+
+// Of each pixel; they add up to one over all values of the image.
+std::vector<double> pixel_weights(const Scene& scene, const Image& mask) {
+  const size_t pixels = static_cast<size_t>(scene.film.crop_width) * scene.film.crop_height;
+  std::vector<double> weights(pixels, 1);
+  double sum = 0;
+  for (size_t i = 0; i < pixels; ++i) {
+    if (!mask.data.empty()) weights[i] = mask.data[i * mask.channels];
+    sum += 3 * weights[i];
+  }
+  for (double& w : weights) w /= sum;
+  return weights;
 }
 
 }  // namespace
@@ -51,12 +64,39 @@ LossKind loss_kind(const std::string& name) {
   throw InputError(unknown_name("loss", name, names_of(kLosses)));
 }
 
+void check_loss_images(const Scene& scene, const Image& target, const Image& mask) {
+  check_size(scene, target, "target");
+  const auto place = [&](size_t pixel) {
+    return fmt::format("in column {}, row {}", pixel % target.width, pixel / target.width);
+  };
+  double sum = 0;
+  if (!mask.data.empty()) {
+    check_size(scene, mask, "mask");
+    for (size_t i = 0; i < mask.data.size(); i += mask.channels) {
+      const size_t pixel = i / mask.channels;
+      if (!(mask.data[i] >= 0 && std::isfinite(mask.data[i]))) {
+        throw InputError("the mask is negative or not finite " + place(pixel));
+      }
+      sum += mask.data[i];
+    }
+    if (sum == 0) throw InputError("the mask is zero everywhere: no pixel is left for the loss");
+  }
+  for (size_t i = 0; i < target.data.size(); ++i) {
+    const size_t pixel = i / target.channels;
+    const bool seen = mask.data.empty() || mask.data[pixel * mask.channels] > 0;
+    if (std::isfinite(target.data[i]) || !seen) continue;
+    throw InputError("the target is not finite " + place(pixel) +
+                     ": a mask that is zero there leaves it out");
+  }
+}
+
 LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
-                      const RunSettings& settings) {
-  check_target(scene, target);
+                      const RunSettings& settings, const Image& mask) {
+  check_loss_images(scene, target, mask);
   RenderResult images[2];
   for (int i = 0; i < 2; ++i) {
     RunSettings own = settings;
+    own.store = nullptr;                                   // of what the loss is for
     own.seed = mix_bits(mix_bits(settings.seed) + 1 + i);  // of streams that no other seed has
     images[i] = render(scene, own);
   }
@@ -68,16 +108,18 @@ LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
   if (result.spp == 0) return result;
   result.adjoint = Image(target.width, target.height, 3);
   const size_t values = images[0].radiance.size();
-  const auto average = 1 / static_cast<double>(values);
+  const std::vector<double> weights = pixel_weights(scene, mask);
   double variance = 0;
   for (size_t i = 0; i < values; ++i) {
+    const double weight = weights[i / 3];
+    if (weight == 0) continue;
     const double t = target.channels == 3 ? target.data[i] : target.data[i / 3];
     const double a = images[0].radiance.mean(i), b = images[1].radiance.mean(i);
     const ValueLoss loss = value_loss(kind, a, b, t);
-    result.value += loss.loss * average;
-    result.adjoint.data[i] = static_cast<float>(loss.adjoint * average);
+    result.value += weight * loss.loss;
+    result.adjoint.data[i] = static_cast<float>(weight * loss.adjoint);
     // To first order, with half of the adjoint for each image.
-    const double slope = 0.5 * loss.adjoint * average;
+    const double slope = 0.5 * weight * loss.adjoint;
     variance += slope * slope * (images[0].radiance.variance(i) + images[1].radiance.variance(i));
   }
   result.error = std::sqrt(variance);

@@ -64,7 +64,8 @@ std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType&
 
 TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> parameters,
                              const std::vector<bool>& computed, const EdgeSamplerType& sampler,
-                             int threads, const Warping* warping)
+                             int threads, std::shared_ptr<const FilmRegions> visible,
+                             const Warping* warping)
     : scene_(seeded(scene, parameters)),
       lanes_(static_cast<int>(parameters.size())),
       lane_scale_(natural_steps(parameters)),
@@ -77,10 +78,12 @@ TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> para
       lights_(scene_),
       context_{scene_, *tracer_, lights_},
       camera_(scene_.camera),
+      visible_(std::move(visible)),
       input_(context_, lanes_, lane_scale_, sampler, threads, warping != nullptr),
       types_(terms_of(scene, sampler)),
       rates_(scene_, lanes_, lane_scale_),
       turning_(turning_about_axes(lane_scale_, lanes_)) {
+  input_.visible = visible_.get();
   for (size_t slot = 0; slot < types_.size(); ++slot) {
     if (types_[slot]->traces_paths) pixel_slot_ = slot;
     terms_.push_back(computed[slot] ? types_[slot]->make(input_) : nullptr);
@@ -366,6 +369,7 @@ TermEstimator::Sample TermEstimator::sample(const PixelSample& at, const Rng& ke
 
 void TermEstimator::describe(GradientStats& stats) const {
   stats.setup.emplace_back("ray tracer", tracer_seconds_);
+  if (visible_) stats.setup.emplace_back("visible regions", visible_->seconds());
   if (const EdgeSamplerInput* edges = input_.made_edges()) {
     stats.setup.emplace_back("edges", input_.edges_seconds());
     for (const EdgeClass c : {EdgeClass::kSmooth, EdgeClass::kSharp, EdgeClass::kBorder,

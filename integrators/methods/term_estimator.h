@@ -26,9 +26,10 @@ struct Warping {
 class TermEstimator final : public SampleEstimator {
  public:
   // parameters: at most kLanes. computed: for each of terms_of(scene, sampler), whether it is
-  // computed. warping: null where directions are not warped.
+  // computed. visible: of the film, or null. warping: null where directions are not warped.
   TermEstimator(const Scene& scene, std::span<const Parameter> parameters,
                 const std::vector<bool>& computed, const EdgeSamplerType& sampler, int threads,
+                std::shared_ptr<const FilmRegions> visible = nullptr,
                 const Warping* warping = nullptr);
   TermEstimator(const TermEstimator&) = delete;
   TermEstimator& operator=(const TermEstimator&) = delete;
@@ -109,6 +110,7 @@ class TermEstimator final : public SampleEstimator {
   Lights lights_;
   PathContext context_;
   CameraView<Dual> camera_;
+  std::shared_ptr<const FilmRegions> visible_;
   TermInput input_;
   std::vector<const TermType*> types_;
   std::vector<std::unique_ptr<Term>> terms_;  // of each slot; null where not computed

@@ -16,6 +16,7 @@
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
 #include "limn/edgetree/edge_sampler_types.h"
+#include "limn/integrators/parts.h"
 
 namespace limn {
 namespace {
@@ -46,6 +47,16 @@ void collect(const std::vector<const std::vector<double>*>& sums, const std::vec
   g.total.add_batch(total, samples);
   g.image_sum.add_batch(sum_blocks(total, width, height, std::max(width, height)), samples);
   if (block > 0) g.total_blocks.add_batch(sum_blocks(total, width, height, block), samples);
+}
+
+// What a pilot chose: other machines must have chosen the same.
+void identify_plan(const std::vector<TermRun>& terms, BatchStore& store) {
+  std::vector<double> counts;
+  for (const TermRun& term : terms) {
+    counts.push_back(term.samples);
+    counts.insert(counts.end(), term.pixel_samples.begin(), term.pixel_samples.end());
+  }
+  store.identify("choice of the pilot", fingerprint(counts));
 }
 
 // What a method does beside sampling its terms.
@@ -86,7 +97,8 @@ std::vector<DirectionField> random_fields(size_t count, const TermEstimator& est
 // A whole run of one method.
 class TermJob {
  public:
-  TermJob(const Scene& scene, const GradientOptions& options, const TermMethod& method, int threads)
+  TermJob(const Scene& scene, const GradientOptions& options, const TermMethod& method,
+          const RunSettings& settings)
       : scene_(scene), options_(options), method_(method), types_(terms_of(scene, method.sampler)) {
     const std::vector<std::string> chosen = selected_terms(term_names(), options.terms, scene.file);
     for (const TermType* type : types_) {
@@ -95,12 +107,17 @@ class TermJob {
     if (options.samples) check_samples(*options.samples);
     std::vector<Parameter> parameters;
     for (const auto& name : options.parameters) parameters.push_back(find_parameter(scene, name));
+    std::shared_ptr<const FilmRegions> visible;
+    if (options.exact_film) {
+      visible = std::make_shared<FilmRegions>(scene, settings.threads, settings.interrupted);
+    }
     const Warping warping{options.warp, method.unbiased};
     for (size_t k = 0; k < parameters.size(); k += kLanes) {
       const auto some =
           std::span(parameters).subspan(k).first(std::min<size_t>(kLanes, parameters.size() - k));
-      passes_.push_back(std::make_unique<TermEstimator>(
-          scene, some, computed_, method.sampler, threads, method.warps ? &warping : nullptr));
+      passes_.push_back(std::make_unique<TermEstimator>(scene, some, computed_, method.sampler,
+                                                        settings.threads, visible,
+                                                        method.warps ? &warping : nullptr));
     }
   }
 
@@ -109,6 +126,7 @@ class TermJob {
     GradientResult result = empty_result();
     for (size_t p = 0; p < passes_.size(); ++p) pass(p).describe(result.stats);
     plan(settings, watch, result);
+    if (settings.store) identify_plan(result.terms, *settings.store);
     result.setup_seconds = watch.seconds();
     run_batches(passes_, settings, watch, [&](const Batch& batch, const auto& sums) {
       add_batch(batch.count(), sums, result);
@@ -390,12 +408,12 @@ MethodType method_row(const std::string& name, const std::string& description,
   method.run = [term_method](const MethodType&, const Scene& scene, const GradientOptions& options,
                              const RunSettings& settings) {
     const Stopwatch watch;
-    return TermJob(scene, options, term_method, settings.threads).run(settings, watch);
+    return TermJob(scene, options, term_method, settings).run(settings, watch);
   };
   method.trace = [term_method](const MethodType&, const Scene& scene,
                                const GradientOptions& options, const RunSettings& settings,
                                const NonFinite::Place& place) {
-    return TermJob(scene, options, term_method, settings.threads).trace(settings, place);
+    return TermJob(scene, options, term_method, settings).trace(settings, place);
   };
   return method;
 }

@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "integrators/terms/clip_curves.h"
+#include "integrators/terms/film_regions.h"
+#include "limn/core/discrete_distribution.h"
 #include "limn/edgetree/edge_sampler.h"
 
 namespace limn {
@@ -45,9 +47,10 @@ class CameraEdges {
  public:
   // free: then all that may move is listed, with the speeds of unit translations in the first three
   // lanes (relative to the camera); null: what the scene's tangents move, with their speeds in
-  // `lanes` lanes.
+  // `lanes` lanes. visible: of the film, to list only what is seen of edges; null: hidden parts are
+  // listed too, and found to be hidden by jump_at.
   CameraEdges(const PathContext& context, const EdgeSamplerInput& input, int lanes,
-              const FreeMotion* free = nullptr);
+              const FreeMotion* free = nullptr, const FilmRegions* visible = nullptr);
 
   bool empty() const { return edges_.empty(); }
   size_t size() const { return edges_.size(); }
@@ -75,14 +78,16 @@ class CameraEdges {
   Vec3<Dual> moving(const Vec3d& x, const Vec3<Lanes>& velocity) const;
   bool place_on_film(const Vec3<Dual>& x0, const Vec3<Dual>& x1, const Vec3d& side,
                      FilmEdge& edge) const;
+  void keep_seen();
   void weigh(int lanes);
 
   const PathContext& context_;
   const EdgeSamplerInput& input_;
   const FreeMotion* free_;
+  const FilmRegions* visible_;
   std::vector<ClipSegment> clips_;
   std::vector<FilmEdge> edges_;
-  std::vector<double> cumulative_;  // probabilities of the edges, summed
+  DiscreteDistribution choice_;  // of an edge
   double list_seconds_ = 0;
 };
 

@@ -106,43 +106,61 @@ class PathTracer {
   Rgb<S> from_surface(SurfacePoint<S> surface, Vec3<S> wi, int bounces, const Rng& key,
                       EdgeStart* edge) {
     Rgb<S> radiance = surface.emission(value(wi), c_.scene.shading);
-    Rgb<S> throughput = grey(S(1.0));
+    follow({surface, wi, grey(S(1.0)), {}}, bounces, key, edge, false, radiance);
+    return radiance;
+  }
+
+ private:
+  // A vertex of a path and how it was reached.
+  struct Arrival {
+    SurfacePoint<S> surface;
+    Vec3<S> wi;
+    Rgb<S> throughput;
     PathStep step;
-    for (;; ++bounces) {
-      if (is_complete(bounces)) return radiance;
+  };
+  // Adds what is scattered along the path. again: all but what further directions bring has been
+  // added.
+  void follow(Arrival at, int bounces, const Rng& key, EdgeStart* edge, bool again,
+              Rgb<S>& radiance) {
+    auto& [surface, wi, throughput, step] = at;
+    for (;; ++bounces, again = false) {
+      if (is_complete(bounces)) return;
       const Scattering<S> scattering(surface, wi, c_.scene.shading);
-      if (scattering.black()) return radiance;
+      if (scattering.black()) return;
       const DirectionMotion* motion = motion_at(surface, bounces);
-      visitor_(surface, scattering, throughput, motion, step, bounces, key);
-      add_lights(surface, scattering, motion, throughput, bounces, key, edge, radiance);
+      if (!again) {
+        visitor_(surface, scattering, throughput, motion, step, bounces, key);
+        add_lights(surface, scattering, motion, throughput, bounces, key, edge, radiance);
+        split(at, bounces, key, edge, radiance);
+      }
       Rng rng = key.at(Purpose::kBsdf, bounces);
       const double u1 = rng.uniform();
       const double u2 = rng.uniform();
       const auto wo = scattering.sample(u1, u2);
-      if (!wo) return radiance;
+      if (!wo) return;
       if constexpr (std::is_same_v<S, Dual>) {
         if (warper_) motion = warper_->motion(surface, *wo, rng.at(Purpose::kBsdf, 1));
       }
       const Vec3<S> direction = moving(*wo, motion);
       const auto [f, pdf] = evaluate(scattering, *wo, direction, motion);
-      if (is_black(value(f))) return radiance;
+      if (is_black(value(f))) return;
       add_score(scattering, *wo, motion, value(throughput) * (1 / pdf));
       const Rgb<S> before = throughput;
       throughput = throughput * stretched(f, *wo, motion) * (1 / pdf);
       step = {value(surface.p), pdf};
       // Behind the last scattering only what emits counts.
       const bool last = is_complete(bounces + 1), shapes_emit = c_.lights.on_shapes();
-      if (last && !shapes_emit && !c_.scene.environment) return radiance;
+      if (last && !shapes_emit && !c_.scene.environment) return;
       Hit hit;
       const bool found = next_hit(surface, *wo, edge, last && !shapes_emit, hit);
       if (!found) {
-        if (!c_.scene.environment) return radiance;
+        if (!c_.scene.environment) return;
         auto sight = c_.lights.template environment<S>(*wo);
         if (motion) sight.radiance = environment_radiance<S>(*c_.scene.environment, direction);
         radiance += throughput * sight.radiance * mis_weight(pdf, sight.pdf);
-        return radiance;
+        return;
       }
-      if (last && !(shapes_emit && c_.scene.shape(hit.face.shape).is_emitter)) return radiance;
+      if (last && !(shapes_emit && c_.scene.shape(hit.face.shape).is_emitter)) return;
       if (hit.t > 0) {
         surface = surface_on_ray<S>(c_.scene, hit.face, surface.p, direction);
         edge = nullptr;
@@ -156,11 +174,10 @@ class PathTracer {
       } else {
         radiance += throughput * lamp;
       }
-      if (!survives_roulette(throughput, bounces + 1, key)) return radiance;
+      if (!survives_roulette(throughput, bounces + 1, key)) return;
     }
   }
 
- private:
   // Whether a path that has scattered so often scatters no more.
   bool is_complete(int bounces) const {
     return c_.scene.max_depth >= 0 && bounces + 1 >= c_.scene.max_depth;
@@ -207,21 +224,31 @@ class PathTracer {
     }
   }
 
-  // Light samples in place of one: where a vertex slides fast, what they add is as large.
+  // Where a vertex slides fast, what further directions bring is as large: more of them in place of
+  // one.
+  void split(Arrival& at, int bounces, const Rng& key, EdgeStart* edge, Rgb<S>& radiance) {
+    const int copies = splits(at.surface);
+    if (copies == 1) return;
+    at.throughput = at.throughput * (1.0 / copies);
+    for (int i = 1; i < copies; ++i) {
+      // Beyond the indices of paths that share no vertex.
+      const int index = kMostPaths * (bounces + 1) + i;
+      follow(at, bounces, key.copy(Purpose::kPathCopy, index), edge, true, radiance);
+    }
+  }
   int splits(const SurfacePoint<S>& surface) const {
     if constexpr (std::is_same_v<S, Dual>) {
-      constexpr double kMost = 16;  // not tuned
       if (!splitting_) return 1;
       const double slides = splitting_->sliding({surface.p.x.d, surface.p.y.d, surface.p.z.d});
-      return static_cast<int>(slides < kMost ? std::max(slides, 1.0)
-                                             : kMost);  // also if not finite
+      return slides < kMostSplits ? static_cast<int>(std::max(slides + 0.5, 1.0))
+                                  : kMostSplits;  // also if not finite
     }
     return 1;
   }
   void add_lights(const SurfacePoint<S>& surface, const Scattering<S>& scattering,
                   const DirectionMotion* motion, const Rgb<S>& throughput, int bounces,
                   const Rng& key, const EdgeStart* edge, Rgb<S>& radiance) {
-    const int count = bounces > 0 ? light_samples_ * splits(surface) : 1;
+    const int count = (bounces > 0 ? light_samples_ : 1) * splits(surface);
     if (bounces > 0) later_lights_ += count;
     if (count == 1) {
       radiance += throughput * direct_light(surface, scattering, motion, bounces, key, edge);
@@ -243,7 +270,7 @@ class PathTracer {
     Ray ray{value(surface.p), wo};
     ray.start = surface.face;
     if (edge) {
-      if (const auto side = blocked_at_edge(c_.scene, *edge, wo)) {
+      if (const auto side = blocked_at_edge(c_.scene, c_.tracer, *edge, wo)) {
         edge->start = *side;
         hit = {side->face, 0};
         return true;
@@ -334,7 +361,7 @@ class PathTracer {
     ray.start = start;
     ray.end = light.face.value_or(FaceRef{});
     if (edge) {
-      if (blocked_at_edge(c_.scene, *edge, light.wo)) return true;
+      if (blocked_at_edge(c_.scene, c_.tracer, *edge, light.wo)) return true;
       ray.skip_faces = edge->around.all;
     }
     // Ends a float's rounding before the light, so that neighbours of the chosen face do not hide
@@ -355,6 +382,8 @@ class PathTracer {
     return true;
   }
 
+  static constexpr int kMostSplits = 16;  // not tuned
+  static constexpr int kMostPaths = 64;   // of a sample, see allocation.cpp
   const PathContext& c_;
   RayCount& rays_;
   Visitor& visitor_;

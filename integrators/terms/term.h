@@ -10,6 +10,7 @@
 #include <span>
 
 #include "integrators/estimates/sample_estimator.h"
+#include "integrators/terms/film_regions.h"
 #include "integrators/terms/light_regions.h"
 #include "integrators/terms/path.h"
 #include "integrators/terms/penumbra.h"
@@ -91,7 +92,8 @@ class TermInput {
   Lanes lane_scale;                // what makes speeds of the parameters comparable
   const EdgeSamplerType& sampler;  // how shading points choose an edge
   int threads;
-  bool warps;  // whether directions are warped, see warp_field.h
+  bool warps;                            // whether directions are warped, see warp_field.h
+  const FilmRegions* visible = nullptr;  // of the film; null: rays tell what is seen
 
   // Edges of all shapes (object i is shape i), light polygons and the environment, as an edge
   // sampler takes them; without the regions of light. Made when a term first asks.

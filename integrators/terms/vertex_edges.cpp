@@ -94,7 +94,7 @@ bool is_hidden_from(const PathContext& context, const PathVertex& vertex, FaceRe
                     const Vec3d& omega, double distance, TermCost& cost) {
   Ray ray{value(vertex.surface.p), omega};
   ray.start = vertex.surface.face;
-  ray.skip_faces = {&face, 1};
+  ray.end = face;
   ray.t_max = distance * (1 - 0x1p-20);  // as shadow rays end
   cost.add(RayCount{0, 1});
   return context.tracer.occluded(ray);

@@ -58,14 +58,16 @@ class CameraRotation final : public Motion {
 
 class FieldOfView final : public Motion {
  public:
+  // Between 0 and 180 degrees, neither included.
+  static constexpr double kLeast = std::numeric_limits<double>::min();
+  static double most() { return std::nextafter(180.0, 0.0); }
+
   void seed(Scene& scene, int lane, size_t) const override { scene.camera.fov.d[lane] += 1; }
   void move(Scene& scene, double step, size_t) const override { scene.camera.fov.v += step; }
   std::vector<double> numbers(const Scene& scene) const override { return {scene.camera.fov.v}; }
   void assign(Scene& scene, const std::string& name, const std::vector<double>& value,
               std::vector<std::string>*) const override {
-    // Between 0 and 180 degrees, neither included.
-    check_numbers(scene, name, value, 1, std::numeric_limits<double>::min(),
-                  std::nextafter(180.0, 0.0));
+    check_numbers(scene, name, value, 1, kLeast, most());
     scene.camera.fov.v = value[0];
   }
 };
@@ -81,8 +83,8 @@ void add_camera_parameters(const Scene& scene, std::vector<Parameter>& list) {
     list.push_back(
         {"sensor.rotate." + end, "radians", 0.01, 1, std::make_shared<CameraRotation>(axis)});
   }
-  list.push_back(
-      {"sensor.fov", "degrees", 0.01 * scene.camera.fov.v, 1, std::make_shared<FieldOfView>()});
+  list.push_back({"sensor.fov", "degrees", 0.01 * scene.camera.fov.v, 1,
+                  std::make_shared<FieldOfView>(), FieldOfView::kLeast, FieldOfView::most()});
 }
 
 }  // namespace limn

@@ -68,6 +68,8 @@ void add_values(const std::string& id, const std::vector<ParameterRef>& values, 
       return owner(scene)->parameters()[k];
     });
     set_unit(values[k].unit, size, p);
+    p.least = values[k].least;
+    p.most = values[k].most;
     list.push_back(p);
   }
 }
@@ -93,6 +95,7 @@ void add_emitter_parameters(const Scene& scene, std::vector<Parameter>& list) {
           return ParameterRef{
               "radiance", {&radiance.r, &radiance.g, &radiance.b}, ParameterRef::Unit::kValue, 0};
         }));
+    list.back().least = 0;
   }
   if (scene.environment && !scene.environment_id.empty()) {
     const auto owner = [](Scene& copy) { return copy.environment; };

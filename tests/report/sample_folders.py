@@ -239,6 +239,61 @@ def rejection(folder, mesh, missed=0):
         json.dump(data, out, indent=2)
 
 
+def fitting(folder, status="done"):
+    """A fit of two views, with losses below zero at its end."""
+    os.makedirs(folder, exist_ok=True)
+    steps = list(range(0, 50, 5))
+    pictures = {s: [f"step_{s:05}_view_{v}.png" for v in (0, 1)] for s in steps}
+    for s in steps:
+        for v, name in enumerate(pictures[s]):
+            write_png(os.path.join(folder, name), np.full((4, 8, 3), (s + v) / 60))
+    targets = ["view_0_target.png", "view_1_target.png"]
+    for name in targets:
+        write_png(os.path.join(folder, name), np.full((4, 8, 3), 0.9))
+    loss = [0.1 * 0.8**s - 2e-5 for s in range(45)]
+    view = {"scene": "scenes/room.xml", "defines": {}, "target": "t.exr", "mask": ""}
+    data = {
+        "kind": "fit",
+        "status": status,
+        "arguments": {
+            "views": [view, view],
+            "parameters": ["ball.vertex_positions", "clay.reflectance"],
+            "loss": "l2",
+            "optimiser": "adam-uniform",
+            "steps": 45,
+        },
+        "steps": 45,
+        "scalars": [{"name": "clay.reflectance", "unit": "", "value": 0.61234}],
+        "targets": targets,
+        "warnings": [],
+        "history": [
+            {"step": s, "loss": v, "stderr": 1e-4 if s else None, "halvings": s // 44, "seconds": 1}
+            for s, v in enumerate(loss)
+        ],
+        "snapshots": [
+            {
+                "step": s,
+                "pictures": pictures[s],
+                "meshes": [
+                    {
+                        "shape": "ball",
+                        "crossings": s,
+                        "inside_out": None if s else 0,
+                        "chamfer": 0.1 / (1 + s),
+                        "hausdorff_95": 0.2,
+                        "hausdorff": 0.3,
+                        "normal_angle": 60.0 - s,
+                    }
+                ],
+            }
+            for s in steps
+        ],
+    }
+    with open(os.path.join(folder, "fit.json"), "w") as stream:
+        json.dump(data, stream)
+    return folder
+
+
 def write_samples(folder):
     """Returns the folders made: two comparisons and a rejection."""
     folders = [os.path.join(folder, name) for name in ("mirror", "shadow", "bunny")]

@@ -9,7 +9,7 @@ import tempfile
 import unittest
 
 from needs import need_matplotlib
-from sample_folders import rejection, write_samples
+from sample_folders import fitting, rejection, write_samples
 
 need_matplotlib()
 TOOLS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "tools")
@@ -178,6 +178,29 @@ class TestReport(unittest.TestCase):
         done = run(*arguments, **environment)
         self.assertEqual((done.returncode, done.stderr), (status, f"tools/report.py: {message}\n"))
 
+    def test_a_fit_has_curves_and_a_strip(self):
+        folder = fitting(os.path.join(self.temporary.name, "fit"))
+        self.assertEqual(run(folder).returncode, 0)
+        with open(os.path.join(folder, "report.html"), encoding="utf-8") as stream:
+            page = stream.read()
+        # Seven of ten snapshots and the target, two views each; the first and the last are there.
+        self.assertEqual(page.count("<img"), 2 * 8)
+        for step in ("step 0", "step 45", "target"):
+            self.assertIn(f"<h4>{step}</h4>", page)
+        self.assertIn("clay.reflectance: 0.6123", page)
+        self.assertIn("1 steps were halved", page)
+        self.assertEqual(page.count("<svg"), 2)
+        self.assertIn("15.0°", page)
+        self.assertNotIn("goes on", page)
+        stopped = fitting(os.path.join(self.temporary.name, "stopped"), "interrupted")
+        both = os.path.join(self.temporary.name, "both.html")
+        self.assertEqual(run(folder, stopped, "-o", both).returncode, 0)
+        with open(both, encoding="utf-8") as stream:
+            page = stream.read()
+        self.assertIn("interrupted. ", page)
+        self.assertIn("<title>limn: 2 fits</title>", page)
+        self.assertNotIn('id="overview"', page)
+
     def test_faulty_input(self):
         nowhere = os.path.join(self.temporary.name, "nowhere")
         self.fails(2, f"{nowhere}: no such folder", nowhere)
@@ -185,8 +208,9 @@ class TestReport(unittest.TestCase):
         os.makedirs(empty)
         self.fails(
             2,
-            f"{empty}: neither compare.json nor reject.json is here; make one with `limn compare"
-            f" ... -o {empty}` or `limn reject ... -o {empty}`",
+            f"{empty}: neither compare.json nor reject.json nor fit.json is here; make one with"
+            f" `limn compare ... -o {empty}`, `limn reject ... -o {empty}` or"
+            f" `limn fit ... -o {empty}`",
             empty,
         )
         folder = self.broken(lambda text: text[:40])
@@ -197,7 +221,7 @@ class TestReport(unittest.TestCase):
         folder = self.broken(lambda text: "[1]")
         self.fails(2, f"{folder}/compare.json: not a JSON object", folder)
         folder = self.broken(lambda text: text.replace('"kind": "compare"', '"kind": "bake"'))
-        self.fails(2, f'{folder}/compare.json: "kind" is "bake" (known: compare, reject)', folder)
+        self.fails(2, f'{folder}/compare.json: "kind" is "bake" (known: compare, reject, fit)', folder)
 
     def test_faulty_values_are_named_with_their_place(self):
         advice = "was the file written by another version of limn? Run its command again."

@@ -69,17 +69,20 @@ TEST(NearFaces, AreMetOnTheSideWhereTheyLie) {
   const Vec3d viewer{2, -3, 2.5};
   int floats_err = 0;
   for (const float gap : {3e-6f, 2e-6f}) {
-    for (const bool beside : {false, true}) {
+    // Seen from as far away as the camera is, and from farther.
+    for (const int kind : {0, 1, 2, 3}) {
+      const bool beside = kind % 2 == 1;
+      const double far = kind < 2 ? 1 : 1000;
       // Below the edge, or beginning behind it.
-      const Scene scene =
-          beside ? wall_and_floor(0.4f * gap, -gap / 2) : wall_and_floor(-0.5f, gap);
+      Scene scene = beside ? wall_and_floor(0.4f * gap, -gap / 2) : wall_and_floor(-0.5f, gap);
+      scene.camera.origin = {viewer.x, viewer.y, viewer.z};
       const United wall = united(scene, viewer);
       const FacesAround around = wall.mesh.around(wall.edge);
       ASSERT_FALSE(around.near.empty());
       const auto tracer = make_embree_tracer(scene, 1);
       for (int i = 0; i < 500; ++i) {
         const Vec3d y{0, 1.4 * rng.uniform() - 0.7, 0};
-        const Vec3d p = viewer + random_direction(rng);
+        const Vec3d p = viewer * far + random_direction(rng);
         Ray ray{p, normalize(y - p)};
         ray.skip_faces = around.all;
         Hit hit;
@@ -89,8 +92,10 @@ TEST(NearFaces, AreMetOnTheSideWhereTheyLie) {
         const double t = scene.shapes[1].mesh.positions[0].z / ray.direction.z;
         const bool expected = t * ray.direction.x >= scene.shapes[1].mesh.positions[0].x;
         ASSERT_EQ(found, expected) << gap << ' ' << i;
-        if (found) {
+        if (found && t > 0) {
           EXPECT_NEAR(hit.t, distance + t, 1e-9);
+        } else if (found) {
+          EXPECT_LT(hit.t, distance);
         }
         // A ray of floats that skips the wall.
         ray.skip_faces = around.faces;

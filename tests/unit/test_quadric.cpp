@@ -8,6 +8,7 @@
 
 #include "../support/hard_meshes.h"
 #include "../support/meshes.h"
+#include "../support/scaled_sampler.h"
 #include "edgetree/forest/forest_build.h"
 #include "edgetree/forest/linear_program.h"
 #include "edgetree/forest/normaliser.h"
@@ -319,7 +320,6 @@ TEST(Quadric, PairsRejectWhatBoxesKeep) {
   EXPECT_LT(pairs, 0.96 * boxes);
 }
 
-// Scaling by a power of two commutes with every rounding: probabilities keep their bits.
 // What is drawn of a node are its own planes: they lie in its box and between its quadrics. The rows
 // of a box are floats, whose rounding is not small against a box of few edges.
 TEST(QuadricChart, HoldsThePlanesOfItsNode) {
@@ -360,30 +360,7 @@ TEST(Quadric, ProbabilitiesDoNotDependOnTheScale) {
          2});
     return input;
   };
-  const EdgeSamplerInput unit_input = input_at(1);
-  const auto unit = QuadricSampler::build(unit_input, 1);
-  for (const int exponent : {-80, -40, -3, 10, 45, 60}) {
-    const double scale = std::ldexp(1.0, exponent);
-    const EdgeSamplerInput input = input_at(scale);
-    const auto scaled = QuadricSampler::build(input, 1);
-    Rng rng(47, 0, 0);
-    for (int i = 0; i < 5; ++i) {
-      EdgeQuery query;
-      query.p = random_direction(rng) * 2.5;
-      query.n = query.wi = -normalize(query.p);
-      if (i % 2 == 1) query.lobe = {ggx_lobe(), 0.2, 1};
-      EdgeQuery moved = query;
-      moved.p = query.p * scale;
-      double sum = 0;
-      for (uint32_t e = 0; e < input.objects[0].edges.size(); ++e) {
-        const EdgeRef id{ShapeId(0), EdgeId(e)};
-        const double probability = unit->probability(query, id);
-        EXPECT_EQ(scaled->probability(moved, id), probability) << exponent << " " << e;
-        sum += probability;
-      }
-      EXPECT_GT(sum, 0.3) << exponent;
-    }
-  }
+  expect_same_at_all_scales<QuadricSampler>(input_at, 0.3);
 }
 
 // A square light before a box: the part of the box's solid angle that it fills.

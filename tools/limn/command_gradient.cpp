@@ -12,6 +12,7 @@
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
 #include "tools/limn/output_files.h"
+#include "tools/limn/run_part.h"
 
 namespace limn {
 namespace {
@@ -274,7 +275,14 @@ class GradientCommand final : public Command {
                  "Also write how many samples of each term a sample of every pixel holds, to "
                  "OUTPUT_samples_TERM.exr");
     app.add_flag("--stats", stats_, "Print edges, nodes, bytes, rays by kind, where the time went");
+    add_film_option(app, film_);
     add_debug_option(app, debug_);
+    add_part_option(app, common_);
+    app.get_option("--part")->excludes("--time");
+  }
+  bool join(BatchStore& store) override {
+    common_.store = &store;
+    return true;
   }
 
   int run(const std::string& command_line) override {
@@ -282,8 +290,15 @@ class GradientCommand final : public Command {
     options_.terms = parse_terms(terms_);
     options_.samples = parse_samples(samples_);
     options_.uniform_samples = samples_ == "uniform";
+    options_.exact_film = film_ == "exact";
     if (!debug_.empty()) return trace(scene);
     for (const auto& parameter : options_.parameters) find_parameter(scene, parameter);
+    if (!common_.part.empty()) {
+      check_memory(scene);
+      return run_part(
+          common_, scene, field_files(options_.parameters), {name(), words, command_line}, output_,
+          [&](const RunSettings& part) { return gradient(scene, options_, part).non_finite; });
+    }
     for (const auto& parameter : options_.parameters) {
       outputs_.push_back(options_.parameters.size() == 1
                              ? output_
@@ -431,7 +446,7 @@ class GradientCommand final : public Command {
   Warnings warnings_;
   GradientOptions options_;
   std::string terms_, samples_ = "auto";
-  std::string output_, debug_;
+  std::string output_, debug_, film_ = "rays";
   double seconds_ = 0;  // 0: as many samples as are asked for
   bool stats_ = false, sample_images_ = false;
   std::vector<std::string> outputs_;  // of each parameter

@@ -100,6 +100,14 @@ void add_term_options(CLI::App& app, std::string& terms, std::string& samples) {
       ->type_name("N,N,...");
 }
 
+void add_film_option(CLI::App& app, std::string& film) {
+  app.add_option("--film", film,
+                 "What the camera sees: by rays, or by the exact visible regions of every pixel "
+                 "(box filter)")
+      ->check(CLI::IsMember({"rays", "exact"}))
+      ->capture_default_str();
+}
+
 void add_warp_options(CLI::App& app, WarpOptions& warp) {
   app.add_option("--aux", warp.rays,
                  "Auxiliary rays of a direction (methods was, was-unbiased): an even number; the "
@@ -149,6 +157,7 @@ RunSettings make_settings(const CommonOptions& common, const Scene& scene,
   settings.threads = thread_count(common.threads);
   settings.progress = progress_bar(label, common.quiet);
   settings.interrupted = &interrupt_flag();
+  settings.store = common.store;
   watch_interrupt();
   return settings;
 }

@@ -26,6 +26,8 @@ struct CommonOptions {
   std::string json;
   bool quiet = false;
   std::string shading = "continuous";
+  std::string part;             // "K/N" of --part; "": the whole run
+  BatchStore* store = nullptr;  // of `limn merge`
 };
 
 // Scene or mesh, -D, --seed, --threads, --quiet. text, type: of the input.
@@ -43,6 +45,8 @@ void add_term_options(CLI::App& app, std::string& terms, std::string& samples);
 // --aux and --kappa
 void add_warp_options(CLI::App& app, WarpOptions& warp);
 // --debug-sample
+// "rays" or "exact".
+void add_film_option(CLI::App& app, std::string& film);
 void add_debug_option(CLI::App& app, std::string& place);
 
 // The EXR's header says what made it.

@@ -29,9 +29,11 @@ NB_MODULE(_limn, m) {
   nanobind::register_exception_translator(py::translate);
   auto scene = py::bind_scene(m);
   py::bind_parameters(m, scene);
+  py::bind_parts(m);
   py::bind_render(m);
   py::bind_gradient(m);
   py::bind_backward(m);
+  py::bind_fit(m);
   py::bind_check(m);
   py::bind_compare(m);
   py::bind_info(m);

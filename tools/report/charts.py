@@ -343,3 +343,47 @@ def false_accepts_by_depth(variants, palette):
         figure.legend(handles, labels, loc="upper left", bbox_to_anchor=(0.99, 0.9))
         figure.tight_layout()
         return _svg(figure, palette, "False accepts by depth; the numbers are in the table")
+
+
+def loss_over_steps(rows, palette):
+    """rows: (step, loss, its standard error); losses below zero are noise, and are left out."""
+    with pyplot.rc_context(STYLE):
+        figure, panel = pyplot.subplots(figsize=(7.2, 3.0))
+        shown = [(s, v, e) for s, v, e in rows if v is not None and v > 0]
+        if shown:
+            steps, losses, errors = zip(*shown)
+            ink = palette.ink("fit")
+            low = [max(v - e, 0.05 * v) for v, e in zip(losses, errors)]
+            high = [v + e for v, e in zip(losses, errors)]
+            panel.fill_between(steps, low, high, color=ink, alpha=0.25, linewidth=0)
+            panel.plot(steps, losses, color=ink)
+            panel.set_yscale("log")
+            _log_axis(panel.yaxis, min(losses), max(1.01 * min(losses), *high))
+        panel.set_xlabel("step")
+        panel.set_ylabel("loss")
+        return _svg(figure, palette, f"loss over {len(rows)} steps, with its standard error")
+
+
+def distance_over_steps(shapes, palette):
+    """shapes: name to rows (step, chamfer over diagonal, mean angle of normals in degrees)."""
+    with pyplot.rc_context(STYLE):
+        figure, panels = pyplot.subplots(1, 2, figsize=(9.6, 3.0))
+        for panel, column, title in zip(
+            panels, (1, 2), ("chamfer distance / diagonal", "angle of normals [degrees]")
+        ):
+            for (name, rows), line in zip(shapes.items(), itertools.cycle(["-", "--", ":", "-."])):
+                panel.plot(
+                    [r[0] for r in rows],
+                    [r[column] for r in rows],
+                    color=palette.ink("fit"),
+                    linestyle=line,
+                    marker="o",
+                    label=name,
+                )
+            panel.set_ylim(bottom=0)
+            panel.set_xlabel("step")
+            panel.set_title(title)
+        if len(shapes) > 1:
+            panels[0].legend()
+        figure.tight_layout()
+        return _svg(figure, palette, "distance to the true shape over steps")

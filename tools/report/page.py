@@ -4,6 +4,7 @@ import os
 
 from .colours import Palette
 from .comparison import ComparisonSection, biases
+from .fitting import FitSection
 from .markup import Markup, element, join
 from .overview import Overview
 from .rejection import RejectionSection
@@ -66,6 +67,31 @@ READING = {
             ),
         ),
     ],
+    "fit": [
+        (
+            "Loss",
+            (
+                "Mean over views, pixels and channels, from two independent images of each view, so"
+                " that it is unbiased and may come out below zero near the target (such points are"
+                " left out). Band: its standard error."
+            ),
+        ),
+        (
+            "Distance to the truth",
+            (
+                "Of points spread evenly over either surface to the nearest point of the other one:"
+                " the mean (chamfer), what 95 % do not exceed, and the largest (Hausdorff), over"
+                " the diagonal of the true mesh's bounds; and the angle between the faces there."
+            ),
+        ),
+        (
+            "Faces inside out, crossings",
+            (
+                "Faces whose front is not outside, and pairs of faces that pass through each other:"
+                " no gradient undoes either."
+            ),
+        ),
+    ],
     "reject": [
         (
             "Slices",
@@ -96,6 +122,9 @@ READING = {
 
 def _methods(results):
     for result in results:
+        if result.kind == "fit":
+            yield "fit"
+            continue
         key = "methods" if result.kind == "compare" else "variants"
         yield from (entry.text("name") for entry in result.data.records(key))
 
@@ -137,7 +166,7 @@ def _title(results, sections):
         return f"limn: {sections[0].title}"
     counts = [
         (sum(r.kind == kind for r in results), word)
-        for kind, word in (("compare", "comparison"), ("reject", "rejection test"))
+        for kind, word in (("compare", "comparison"), ("reject", "rejection test"), ("fit", "fit"))
     ]
     return "limn: " + ", ".join(f"{n} {word}{'' if n == 1 else 's'}" for n, word in counts if n)
 
@@ -149,16 +178,16 @@ def page(results):
     palette = Palette(_methods(results))
     tests = sum(1 for r in results if r.kind == "compare" for _ in biases(r.data))
     threshold = FALSE_ALARM / max(1, tests)
-    sections = [
-        (
-            ComparisonSection(r, f"part-{i}", palette, threshold)
-            if r.kind == "compare"
-            else RejectionSection(r, f"part-{i}", palette)
-        )
-        for i, r in enumerate(results)
-    ]
+    makers = {
+        "compare": lambda *a: ComparisonSection(*a, threshold),
+        "reject": RejectionSection,
+        "fit": FitSection,
+    }
+    sections = [makers[r.kind](r, f"part-{i}", palette) for i, r in enumerate(results)]
     parts = [section.html() for section in sections]
-    if len(sections) > 1:
+    # Fits have nothing in common that an overview could show.
+    overview = len(sections) > 1 and any(r.kind != "fit" for r in results)
+    if overview:
         listed = [(r, s.group, s.title) for r, s in zip(results, sections)]
         parts.insert(
             0,
@@ -182,7 +211,7 @@ def page(results):
     )
     body = element(
         "body",
-        element("header", element("h1", title), _contents(sections, len(sections) > 1)),
+        element("header", element("h1", title), _contents(sections, overview)),
         element("main", *parts, _reading({r.kind for r in results})),
     )
     missing = [name for section in sections for name in section.pictures.missing]

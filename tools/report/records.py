@@ -9,6 +9,10 @@ import os
 from .errors import ReportError
 
 
+# Of results, each a file KIND.json.
+KINDS = ("compare", "reject", "fit")
+
+
 class Record:
     """A JSON object that knows where it stands. `number` may be None: JSON has no other word for
     "undefined", and programs write null for what is not finite."""
@@ -67,7 +71,7 @@ class Record:
 
 
 class Result:
-    """One compare.json or reject.json. data: Record, folder: where its pictures lie."""
+    """One compare.json, reject.json or fit.json. data: Record, folder: where its pictures lie."""
 
     def __init__(self, folder, data):
         self.folder, self.data = folder, data
@@ -99,14 +103,16 @@ def read_folder(folder):
     """All results in a folder, at least one."""
     if not os.path.isdir(folder):
         raise ReportError(f"{folder}: no such folder")
-    files = [os.path.join(folder, f"{kind}.json") for kind in ("compare", "reject")]
+    files = [os.path.join(folder, f"{kind}.json") for kind in KINDS]
     results = [Result(folder, read_record(file)) for file in files if os.path.exists(file)]
     if not results:
         raise ReportError(
-            f"{folder}: neither compare.json nor reject.json is here; "
-            f"make one with `limn compare ... -o {folder}` or `limn reject ... -o {folder}`"
+            f"{folder}: neither compare.json nor reject.json nor fit.json is here; "
+            f"make one with `limn compare ... -o {folder}`, `limn reject ... -o {folder}` or "
+            f"`limn fit ... -o {folder}`"
         )
     for result, kind in ((r, k) for r in results for k in [r.kind]):
-        if kind not in ("compare", "reject"):
-            raise ReportError(f'{result.data.place}: "kind" is "{kind}" (known: compare, reject)')
+        if kind not in KINDS:
+            known = ", ".join(KINDS)
+            raise ReportError(f'{result.data.place}: "kind" is "{kind}" (known: {known})')
     return results

@@ -13,6 +13,7 @@
 //   BSDF.NAME, EMITTER.NAME       see their parameters()
 //
 // Capitals stand for the id of an element, or for what the user writes.
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -33,6 +34,9 @@ struct Parameter {
   double natural_step = 0;  // a small step: about a hundredth of what changes the picture a lot
   size_t size = 1;          // numbers: 1 of a scalar, 3 V of vertex_positions
   std::shared_ptr<const Motion> motion;
+  // What its numbers may be, both ends included: what assign() takes.
+  double least = -std::numeric_limits<double>::infinity();
+  double most = std::numeric_limits<double>::infinity();
 
   // Adds derivative lane `lane` of everything in the scene that the parameter moves.
   void seed(Scene& scene, int lane, size_t component = 0) const;

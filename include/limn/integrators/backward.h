@@ -48,6 +48,7 @@ struct BackwardResult {
   std::vector<ParameterAdjoint> parameters;  // in the order asked for
   std::vector<TermRun> terms;                // all that the scene has
   int64_t spp = 0;                           // paths per pixel that were finished, on average
+  int batches = 0;                           // that they came in, all of one size to a sample
   double seconds = 0;
   double setup_seconds = 0;  // edges, samplers, ray tracer
   NonFinite non_finite;      // such contributions count as zero, and the run must end with an error
@@ -62,8 +63,9 @@ struct BackwardResult {
 
 // adjoint: crop_height by crop_width, three channels, or one that stands for the luminance.
 // settings.spp paths per pixel, in batches that give the standard errors; interruption
-// drops the batch in progress. settings.seconds is not looked at. The same seed gives the same bits
-// on any number of threads; memory does not grow with samples. InputError for unknown parameters or
+// drops the batch in progress. With settings.seconds as many batches of one size as fit, two at
+// least: a run without limit with the samples and batches that the result names has the same bits.
+// The same seed gives the same bits on any number of threads; memory does not grow with samples. InputError for unknown parameters or
 // terms, and for an adjoint of another size or one that is not finite.
 BackwardResult backward(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
                         const RunSettings& settings);
@@ -103,8 +105,15 @@ struct LossResult {
 // are derived from settings.seed. For l2 and relative-l2 the loss is the mean of w (I - T)(I' - T),
 // and the adjoint 2 w ((I + I') / 2 - T) / N has the mean of dLoss/dI; backward() with
 // settings.seed itself is independent of both, so that the product of both is unbiased. target:
-// crop_height by crop_width, of three channels or one. InputError for another size.
+// crop_height by crop_width, of three channels or one. mask: what the pixels weigh in the mean, of
+// the same size with one channel, or three of which the first counts; without pixels: all alike.
+// InputError as check_loss_images().
 LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
-                      const RunSettings& settings);
+                      const RunSettings& settings, const Image& mask = {});
+
+// InputError for a target or a mask of another size than the film, for a target that is not finite
+// where the mask is not zero, and for a mask with values that are negative or not finite, or all
+// zero.
+void check_loss_images(const Scene& scene, const Image& target, const Image& mask);
 
 }  // namespace limn

@@ -13,6 +13,8 @@ from ._limn import (
     ComparedMethod,
     Comparison,
     Estimate,
+    Fit,
+    FitRecord,
     Loss,
     Mesh,
     Parameter,
@@ -34,21 +36,27 @@ from ._limn import (
     write_png,
     write_signed_png,
 )
+from .dicts import Transform, load_dict
 from .errors import InputError, NonFiniteError, UnknownParameterError
+from .parts import Part, merge, part
 
 __all__ = [
     "Check",
     "ComparedMethod",
     "Comparison",
     "Estimate",
+    "Fit",
+    "FitRecord",
     "InputError",
     "Loss",
     "Mesh",
     "NonFiniteError",
     "Parameter",
     "Parameters",
+    "Part",
     "Rung",
     "Scene",
+    "Transform",
     "UnknownParameterError",
     "backward",
     "check",
@@ -57,8 +65,11 @@ __all__ = [
     "image_loss",
     "info",
     "load",
+    "load_dict",
     "load_string",
+    "merge",
     "methods",
+    "part",
     "read_exr",
     "render",
     "write_exr",

@@ -1,0 +1,148 @@
+#pragma once
+// Fitting a scene to images: steps against the gradient of a loss, for any parameters at once, all
+// vertices of a shape included.
+//
+// The loss is the mean over views. Each step renders every view twice for the loss and its adjoint
+// image and takes the gradient with samples of their own (loss.h, backward.h), so that the gradients
+// of l2 and relative-l2 are unbiased. Vertices are moved through u = (I + lambda L) v, which spreads
+// each step over a neighbourhood (Nicolet, Jacobson, Jakob 2021, "Large Steps in Inverse Rendering
+// of Geometry", Sec. 3).
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "limn/core/image.h"
+#include "limn/core/scene.h"
+#include "limn/integrators/backward.h"
+#include "limn/integrators/run.h"
+
+namespace limn {
+
+// What becomes of a gradient g, in natural steps: those of Parameter::natural_step.
+enum class OptimiserKind {
+  kAdamUniform,      // Adam, but all numbers of an array share the largest second moment, so that
+                     // steps keep the gradient's direction (Nicolet et al. 2021, Sec. 3.4)
+  kAdam,             // Kingma and Ba 2015, without its epsilon
+  kGradientDescent,  // g itself: the size of a step is that of the loss
+};
+// InputError that lists the known names (adam-uniform, adam, gradient-descent) if there is none of
+// this name.
+OptimiserKind optimiser_kind(const std::string& name);
+
+struct FitView {
+  Scene scene;
+  Image target;  // crop_height by crop_width, of three channels or one
+  Image mask;    // weights of the pixels as in image_loss(); without pixels: all alike
+};
+
+// Values that a scalar may not leave; what the reader of scenes would refuse is never left either.
+struct FitBounds {
+  std::string parameter;
+  double least, most;
+};
+
+struct FitOptions {
+  // Names as in parameter.h: scalars and SHAPE.vertex_positions; at least one. Every view that has
+  // a name moves with it, and one view must have it. Colours move along grey. Motions of a shape
+  // and its vertex_positions exclude each other; where vertices are fitted, normals of the file
+  // give way to computed ones.
+  std::vector<std::string> parameters;
+  std::vector<FitBounds> bounds;
+  LossKind loss = LossKind::kL2;
+  OptimiserKind optimiser = OptimiserKind::kAdamUniform;
+  // Of the first step, in natural steps: 1 % of a shape's diagonal, 0.01 radians, 1 % of a value.
+  double step = 1;
+  int step_half_life = 0;  // after so many steps a step is half as long; 0: all are alike
+  int spp_doubling = 0;    // after so many steps there are twice the samples; 0: always as many
+  // The distance over which a step of a vertex spreads, over the diagonal of the shape's bounds:
+  // lambda = (distance / mean length of an edge)^2. 0: vertices move one by one.
+  double smoothing = 0.08;
+  // After so many steps shapes whose vertices are fitted get new triangles of one size (Botsch and
+  // Kobbelt 2004), their edges remesh_edge times as long as the mean was, and steps shrink to four
+  // fifths. Needs manifold meshes without flat shading, and OpenMesh.
+  std::vector<int64_t> remesh;
+  double remesh_edge = 0.75;
+  int loss_spp = 0;  // samples per pixel of each of the two images of the loss; 0: settings.spp
+  // Terms and where samples go; `parameters` is not looked at.
+  BackwardOptions backward;
+};
+
+// One step.
+struct FitRecord {
+  int64_t step = 0;  // counted from 0
+  // Before the step; mean over views. May be negative, see LossResult.
+  double loss = 0, error = 0;
+  std::vector<double> view_losses;
+  double step_size = 0;  // that was tried, in natural steps
+  // How often it was halved so that no face lost its area or grew together with another; if 30
+  // times, that shape was left where it was.
+  int halvings = 0;
+  bool remeshed = false;       // after the step
+  std::vector<double> values;  // of Fit::scalars(), after the step
+  double seconds = 0;
+};
+
+// A number that is fitted: a value of the scene (of a colour, the mean over channels), or for what
+// only moves things from where they are the sum of all steps.
+struct FitScalar {
+  std::string name, unit;
+  double value = 0;
+};
+
+// All that a later step depends on, besides what the Fit was made from.
+struct FitState {
+  int64_t steps = 0;
+  struct Numbers {
+    std::vector<double> values;           // u of an array, n by 3; sum of steps of a scalar
+    std::vector<double> first, second;    // moments of Adam; empty for gradient descent
+    double natural_step = 0, lambda = 0;  // of an array, as they were when its mesh was made
+  };
+  std::vector<Numbers> parameters;  // in the order of FitOptions
+  struct Shape {
+    std::vector<Vec3f> positions;    // V
+    std::vector<Vec3d> normals;      // N
+    std::vector<FaceIndices> faces;  // F by 3
+  };
+  struct View {
+    std::vector<double> camera;               // origin, left, up, forward, fov
+    std::vector<Shape> shapes;                // of those that are moved, in the scene's order
+    std::vector<std::vector<double>> values;  // of each parameter; empty where it has none
+  };
+  std::vector<View> views;
+};
+
+class Fit {
+ public:
+  // Copies all of it. settings: seed, threads, spp (of the gradient), interrupted; progress is
+  // called with the fraction of a step. InputError for names that no view has, arrays that differ
+  // from view to view, bounds that leave a value outside, targets and masks of another size.
+  Fit(std::vector<FitView> views, const FitOptions& options, const RunSettings& settings);
+  ~Fit();
+  Fit(Fit&&) noexcept;
+
+  // One step; nothing if it was interrupted, and then nothing has changed. The same seed gives the
+  // same bits on any number of threads. InputError where samples are not finite; nothing has
+  // changed then, either.
+  std::optional<FitRecord> step();
+
+  // In place of what the settings said of progress and interruption; null for none.
+  void listen(const std::function<void(double)>& progress, const std::atomic<bool>* interrupted);
+
+  int64_t steps() const;                      // done
+  const std::vector<FitView>& views() const;  // as they are now
+  std::vector<FitScalar> scalars() const;
+  const std::vector<std::string>& warnings() const;
+
+  // A Fit made from the same views and options that restores a state goes on with the very bits.
+  FitState state() const;
+  // InputError for the state of other parameters or meshes.
+  void restore(const FitState& state);
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace limn

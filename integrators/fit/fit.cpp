@@ -1,0 +1,334 @@
+// The loop of a fit: losses and gradients of all views, then a step of every parameter.
+#include "limn/integrators/fit.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "integrators/fit/fit_parameter.h"
+#include "integrators/fit/remesh.h"
+#include "limn/core/error.h"
+#include "limn/core/rng.h"
+
+namespace limn {
+
+namespace {
+
+std::vector<Vec3<Dual>*> camera_vectors(Camera& c) {
+  return {&c.origin, &c.left, &c.up, &c.forward};
+}
+
+std::vector<double> camera_numbers(const Camera& camera) {
+  Camera copy = camera;
+  std::vector<double> numbers;
+  for (const Vec3<Dual>* v : camera_vectors(copy)) {
+    for (int k = 0; k < 3; ++k) numbers.push_back((*v)[k].v);
+  }
+  numbers.push_back(copy.fov.v);
+  return numbers;
+}
+
+void set_camera(Camera& camera, const std::vector<double>& numbers) {
+  size_t next = 0;
+  for (Vec3<Dual>* v : camera_vectors(camera)) {
+    for (int k = 0; k < 3; ++k) (*v)[k].v = numbers[next++];
+  }
+  camera.fov.v = numbers[next];
+}
+
+// Twice as large after each `period` steps, in whole numbers.
+int grown(int count, int64_t step, int period) {
+  if (period == 0) return count;
+  const double factor = std::exp2(static_cast<double>(step) / period);
+  return static_cast<int>(std::min(std::round(count * factor), 0x1p30));
+}
+
+// Normals of a file would stay as they are while the vertices of an array move.
+void free_normals(Scene& scene, const std::string& name, std::vector<std::string>& warnings) {
+  for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+    const Mesh& mesh = scene.shapes[s].mesh;
+    if (scene.shapes[s].id + ".vertex_positions" != name) continue;
+    if (mesh.normal_source != NormalSource::kGiven) continue;
+    warnings.push_back("\"" + scene.shapes[s].id +
+                       "\" has normals of its own: they are computed from its faces instead, "
+                       "so that they follow its vertices");
+    set_mesh(scene, ShapeId(s), mesh.positions, mesh.faces, nullptr);
+  }
+}
+
+}  // namespace
+
+class Fit::Impl {
+ public:
+  Impl(std::vector<FitView> views, const FitOptions& options, const RunSettings& settings);
+
+  void listen(const std::function<void(double)>& progress, const std::atomic<bool>* interrupted) {
+    settings_.progress = progress;
+    settings_.interrupted = interrupted;
+  }
+  std::optional<FitRecord> step();
+  std::vector<FitScalar> scalars() const;
+  FitState state() const;
+  void restore(const FitState& state);
+
+  std::vector<FitView> views;
+  std::vector<std::string> warnings;
+  int64_t steps = 0;
+
+ private:
+  void check_shapes();
+  void check_remeshing();
+  // Shapes of a view that some parameter moves, in the scene's order.
+  std::vector<ShapeId> moved_shapes(size_t view) const;
+  RunSettings view_settings(size_t view) const;
+  // False: interrupted.
+  bool add_view(size_t view, FitRecord& record, std::vector<std::vector<double>>& gradients);
+
+  FitOptions options_;
+  RunSettings settings_;
+  std::vector<FitParameter> parameters_;
+};
+
+Fit::Impl::Impl(std::vector<FitView> all, const FitOptions& options, const RunSettings& settings)
+    : views(std::move(all)), options_(options), settings_(settings) {
+  if (views.empty()) throw InputError("a fit needs a view: a scene and its target");
+  if (options.parameters.empty()) throw InputError("a fit needs a parameter");
+  if (!(options.step > 0 && std::isfinite(options.step))) {
+    throw InputError(fmt::format("the step {:g} must be positive", options.step));
+  }
+  for (FitView& view : views) {
+    view.scene = deep_copy(view.scene);
+    check_loss_images(view.scene, view.target, view.mask);
+    for (const std::string& name : options.parameters) free_normals(view.scene, name, warnings);
+  }
+  for (const std::string& name : options.parameters) {
+    for (const FitParameter& other : parameters_) {
+      if (other.name() == name) throw InputError("\"" + name + "\" is given twice");
+    }
+    parameters_.emplace_back(name, views, options);
+  }
+  for (const FitBounds& bounds : options.bounds) {
+    const auto& names = options.parameters;
+    if (std::find(names.begin(), names.end(), bounds.parameter) != names.end()) continue;
+    throw InputError("bounds of \"" + bounds.parameter + "\", which is not fitted");
+  }
+  check_shapes();
+  if (!options.remesh.empty()) check_remeshing();
+  if (options.loss == LossKind::kL1) {
+    warnings.push_back(
+        "the gradient of l1 is biased where the image's noise is not small beside its difference "
+        "from the target");
+  }
+}
+
+void Fit::Impl::check_shapes() {
+  for (size_t v = 0; v < views.size(); ++v) {
+    for (const FitParameter& a : parameters_) {
+      const ShapeId shape = a.shape(v);
+      if (!a.is_array() || !shape.valid()) continue;
+      for (const FitParameter& b : parameters_) {
+        if (&a == &b || b.shape(v) != shape) continue;
+        throw InputError({views[v].scene.file},
+                         fmt::format("\"{}\" and \"{}\" move the same vertices: fit one of them",
+                                     a.name(), b.name()));
+      }
+    }
+  }
+}
+
+// What would fail after hours is told at once.
+void Fit::Impl::check_remeshing() {
+  if (!(options_.remesh_edge > 0.1 && options_.remesh_edge < 10)) {
+    throw InputError(
+        fmt::format("edges {:g} times as long are not within 0.1 and 10", options_.remesh_edge));
+  }
+  bool any = false;
+  for (const FitParameter& p : parameters_) {
+    for (size_t v = 0; v < views.size(); ++v) {
+      if (!p.is_array() || !p.shape(v).valid()) continue;
+      const Shape& shape = views[v].scene.shape(p.shape(v));
+      if (shape.mesh.normal_source == NormalSource::kFace) {
+        throw InputError(shape.where,
+                         "\"" + shape.id + "\" is shaded flat: remeshing would lose its edges");
+      }
+      remesh(shape.mesh, options_.remesh_edge * mean_edge_length(shape.mesh), shape.where);
+      any = true;
+    }
+  }
+  if (!any) throw InputError("there is nothing to remesh: no vertices are fitted");
+}
+
+std::vector<ShapeId> Fit::Impl::moved_shapes(size_t view) const {
+  std::vector<ShapeId> shapes;
+  for (uint32_t s = 0; s < views[view].scene.shapes.size(); ++s) {
+    const auto moves = [&](const FitParameter& p) { return p.shape(view) == ShapeId(s); };
+    if (std::any_of(parameters_.begin(), parameters_.end(), moves)) shapes.emplace_back(s);
+  }
+  return shapes;
+}
+
+RunSettings Fit::Impl::view_settings(size_t view) const {
+  RunSettings own = settings_;
+  own.seconds = 0;
+  own.seed = mix_bits(mix_bits(mix_bits(settings_.seed) + static_cast<uint64_t>(steps)) + view);
+  own.progress = nullptr;
+  return own;
+}
+
+bool Fit::Impl::add_view(size_t view, FitRecord& record,
+                         std::vector<std::vector<double>>& gradients) {
+  const FitView& v = views[view];
+  const double share = 1 / static_cast<double>(views.size());
+  RunSettings own = view_settings(view);
+  own.spp = grown(options_.loss_spp > 0 ? options_.loss_spp : settings_.spp, steps,
+                  options_.spp_doubling);
+  LossResult loss = image_loss(v.scene, v.target, options_.loss, own, v.mask);
+  if (loss.spp < own.spp) return false;
+  record.view_losses.push_back(loss.value);
+  record.loss += share * loss.value;
+  record.error = std::hypot(record.error, share * loss.error);
+  for (float& a : loss.adjoint.data) a = static_cast<float>(a * share);
+  BackwardOptions backward_options = options_.backward;
+  // Nobody asks for standard errors, and each batch ends with the adjoint of normals.
+  backward_options.batches = 1;
+  backward_options.parameters.clear();
+  for (const FitParameter& p : parameters_) {
+    if (p.in_view(view)) backward_options.parameters.push_back(p.name());
+  }
+  if (backward_options.parameters.empty()) return true;
+  own.spp = grown(settings_.spp, steps, options_.spp_doubling);
+  if (settings_.progress) {
+    // The two images take about a third of the time.
+    own.progress = [&](double done) {
+      settings_.progress(share * (static_cast<double>(view) + (1 + 2 * done) / 3));
+    };
+  }
+  const BackwardResult result = backward(v.scene, loss.adjoint, backward_options, own);
+  if (result.non_finite.count > 0) throw InputError("gradient: " + result.non_finite.message());
+  if (result.spp < own.spp) return false;
+  for (size_t i = 0; i < parameters_.size(); ++i) {
+    if (!parameters_[i].in_view(view)) continue;
+    const Moments& m = result.of(parameters_[i].name()).moments;
+    gradients[i].resize(m.size());
+    for (size_t k = 0; k < m.size(); ++k) gradients[i][k] += m.mean(k);
+  }
+  return true;
+}
+
+std::optional<FitRecord> Fit::Impl::step() {
+  const Stopwatch watch;
+  FitRecord record;
+  record.step = steps;
+  record.step_size = options_.step;
+  if (options_.step_half_life > 0) {
+    record.step_size *= std::exp2(-static_cast<double>(steps) / options_.step_half_life);
+  }
+  for (const int64_t step : options_.remesh) {
+    if (step <= steps) record.step_size *= 0.8;  // not tuned
+  }
+  std::vector<std::vector<double>> gradients(parameters_.size());
+  for (size_t v = 0; v < views.size(); ++v) {
+    if (!add_view(v, record, gradients)) return std::nullopt;
+  }
+  for (size_t i = 0; i < parameters_.size(); ++i) {
+    record.halvings = std::max(record.halvings,
+                               parameters_[i].move(gradients[i], record.step_size, steps, views));
+  }
+  ++steps;
+  if (std::find(options_.remesh.begin(), options_.remesh.end(), steps) != options_.remesh.end()) {
+    for (FitParameter& p : parameters_) {
+      if (!p.is_array()) continue;
+      p.remesh(options_.remesh_edge, options_, views);
+      record.remeshed = true;
+    }
+  }
+  for (const FitScalar& scalar : scalars()) record.values.push_back(scalar.value);
+  record.seconds = watch.seconds();
+  return record;
+}
+
+std::vector<FitScalar> Fit::Impl::scalars() const {
+  std::vector<FitScalar> list;
+  for (const FitParameter& p : parameters_) {
+    if (!p.is_array()) list.push_back(p.scalar(views));
+  }
+  return list;
+}
+
+FitState Fit::Impl::state() const {
+  FitState state;
+  state.steps = steps;
+  for (const FitParameter& p : parameters_) state.parameters.push_back(p.state());
+  for (size_t v = 0; v < views.size(); ++v) {
+    const Scene& scene = views[v].scene;
+    FitState::View view{camera_numbers(scene.camera), {}, {}};
+    for (const ShapeId s : moved_shapes(v)) {
+      const Mesh& mesh = scene.shape(s).mesh;
+      view.shapes.push_back({mesh.positions, mesh.normals, mesh.faces});
+    }
+    for (const FitParameter& p : parameters_) {
+      view.values.push_back(p.in_view(v) && !p.is_array() ? p.in_view(v)->value(scene)
+                                                          : std::vector<double>{});
+    }
+    state.views.push_back(std::move(view));
+  }
+  return state;
+}
+
+void Fit::Impl::restore(const FitState& state) {
+  const auto check = [](bool good) {
+    if (!good) throw InputError("the state is that of another fit: of other parameters or meshes");
+  };
+  check(state.parameters.size() == parameters_.size() && state.views.size() == views.size());
+  for (size_t v = 0; v < views.size(); ++v) {
+    const FitState::View& view = state.views[v];
+    const std::vector<ShapeId> shapes = moved_shapes(v);
+    check(view.camera.size() == 13 && view.shapes.size() == shapes.size() &&
+          view.values.size() == parameters_.size());
+  }
+  for (size_t v = 0; v < views.size(); ++v) {
+    Scene& scene = views[v].scene;
+    const FitState::View& view = state.views[v];
+    const std::vector<ShapeId> shapes = moved_shapes(v);
+    for (size_t i = 0; i < shapes.size(); ++i) {
+      const FitState::Shape& shape = view.shapes[i];
+      Mesh& mesh = scene.shapes[shapes[i].index()].mesh;
+      if (shape.faces != mesh.faces) {
+        set_mesh(scene, shapes[i], shape.positions, shape.faces, nullptr);
+      }
+      check(shape.positions.size() == mesh.positions.size() &&
+            shape.normals.size() == mesh.normals.size());
+      mesh.positions = shape.positions;
+      mesh.normals = shape.normals;
+      update_shading_normals(mesh);
+    }
+    for (size_t i = 0; i < parameters_.size(); ++i) {
+      if (!view.values[i].empty()) parameters_[i].in_view(v)->assign(scene, view.values[i]);
+    }
+    set_camera(scene.camera, view.camera);
+  }
+  for (size_t i = 0; i < parameters_.size(); ++i) {
+    parameters_[i].restore(state.parameters[i], views);
+  }
+  steps = state.steps;
+}
+
+Fit::Fit(std::vector<FitView> views, const FitOptions& options, const RunSettings& settings)
+    : impl_(std::make_unique<Impl>(std::move(views), options, settings)) {}
+Fit::~Fit() = default;
+Fit::Fit(Fit&&) noexcept = default;
+
+void Fit::listen(const std::function<void(double)>& progress,
+                 const std::atomic<bool>* interrupted) {
+  impl_->listen(progress, interrupted);
+}
+std::optional<FitRecord> Fit::step() { return impl_->step(); }
+int64_t Fit::steps() const { return impl_->steps; }
+const std::vector<FitView>& Fit::views() const { return impl_->views; }
+std::vector<FitScalar> Fit::scalars() const { return impl_->scalars(); }
+const std::vector<std::string>& Fit::warnings() const { return impl_->warnings; }
+FitState Fit::state() const { return impl_->state(); }
+void Fit::restore(const FitState& state) { impl_->restore(state); }
+
+}  // namespace limn

@@ -1,0 +1,72 @@
+#pragma once
+// One parameter of a fit: where it is in each view, and how a gradient moves it.
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "integrators/fit/large_steps.h"
+#include "integrators/fit/optimiser.h"
+#include "limn/core/parameter.h"
+#include "limn/integrators/fit.h"
+
+namespace limn {
+
+class FitParameter {
+ public:
+  // InputError if no view has the name, or views differ in what must be alike.
+  FitParameter(const std::string& name, const std::vector<FitView>& views,
+               const FitOptions& options);
+
+  const std::string& name() const { return name_; }
+  bool is_array() const { return large_steps_ != nullptr; }
+  // Null where the view does not have it.
+  const Parameter* in_view(size_t view) const {
+    return in_view_[view] ? &*in_view_[view] : nullptr;
+  }
+  // The shape of that view that it moves; none if it moves none.
+  ShapeId shape(size_t view) const { return shapes_[view]; }
+
+  // gradient: dLoss/dparameter, one value per number, copies of a welded vertex apart. Moves all
+  // views by a step of `size` natural steps; count: of steps that came before. Returns how often
+  // the step was halved.
+  int move(const std::vector<double>& gradient, double size, int64_t count,
+           std::vector<FitView>& views);
+
+  // Of a scalar.
+  FitScalar scalar(const std::vector<FitView>& views) const;
+  FitState::Numbers state() const;
+  // The views have their state already.
+  void restore(const FitState::Numbers& numbers, const std::vector<FitView>& views);
+
+  // New triangles for the shape of an array in all views, with edges `edge` times as long as now;
+  // the optimiser's state is interpolated.
+  void remesh(double edge, const FitOptions& options, std::vector<FitView>& views);
+
+ private:
+  const Mesh& mesh(const std::vector<FitView>& views) const {
+    return views[first_view_].scene.shape(shapes_[first_view_]).mesh;
+  }
+  // Once more, after the mesh has changed.
+  void find_in_views(const std::vector<FitView>& views);
+  void find_array(const std::vector<FitView>& views, const FitOptions& options);
+  void find_bounds(const std::vector<FitView>& views, const FitOptions& options);
+  int move_vertices(const std::vector<double>& gradient, double size, int64_t count,
+                    std::vector<FitView>& views);
+  bool place_vertices(const std::vector<double>& positions, std::vector<FitView>& views) const;
+  void move_scalar(double gradient, double size, int64_t count, std::vector<FitView>& views);
+  // The numbers that bounds hold for: values, or the sum of steps.
+  std::vector<double> bounded_numbers(const FitView& view, size_t index) const;
+
+  std::string name_;
+  std::vector<std::optional<Parameter>> in_view_;
+  std::vector<ShapeId> shapes_;
+  size_t first_view_ = 0;  // that has it
+  double natural_step_ = 0;
+  double least_ = 0, most_ = 0;
+  std::unique_ptr<LargeSteps> large_steps_;  // of an array
+  std::vector<double> numbers_;              // u of an array, or the sum of steps
+  std::optional<Optimiser> optimiser_;
+};
+
+}  // namespace limn

@@ -1,0 +1,62 @@
+// Adam, its variant with one scale for all numbers of an array, and plain descent.
+#include "integrators/fit/optimiser.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "limn/core/check.h"
+#include "limn/core/error.h"
+#include "limn/core/names.h"
+
+namespace limn {
+
+namespace {
+
+struct OptimiserName {
+  const char* name;
+  OptimiserKind kind;
+};
+constexpr OptimiserName kOptimisers[] = {{"adam-uniform", OptimiserKind::kAdamUniform},
+                                         {"adam", OptimiserKind::kAdam},
+                                         {"gradient-descent", OptimiserKind::kGradientDescent}};
+
+// Of the running means; Kingma and Ba's.
+constexpr double kBeta1 = 0.9, kBeta2 = 0.999;
+
+}  // namespace
+
+OptimiserKind optimiser_kind(const std::string& name) {
+  for (const OptimiserName& optimiser : kOptimisers)
+    if (name == optimiser.name) return optimiser.kind;
+  throw InputError(unknown_name("optimiser", name, names_of(kOptimisers)));
+}
+
+Optimiser::Optimiser(OptimiserKind kind, size_t size) : kind_(kind) {
+  if (kind == OptimiserKind::kGradientDescent) return;
+  first.resize(size);
+  second.resize(size);
+}
+
+std::vector<double> Optimiser::step(const std::vector<double>& gradient, int64_t count) {
+  std::vector<double> step(gradient.size());
+  if (kind_ == OptimiserKind::kGradientDescent) {
+    for (size_t i = 0; i < step.size(); ++i) step[i] = -gradient[i];
+    return step;
+  }
+  CHECK_EQ(gradient.size(), first.size());
+  for (size_t i = 0; i < step.size(); ++i) {
+    first[i] = kBeta1 * first[i] + (1 - kBeta1) * gradient[i];
+    second[i] = kBeta2 * second[i] + (1 - kBeta2) * gradient[i] * gradient[i];
+  }
+  const double largest = *std::max_element(second.begin(), second.end());
+  const auto n = static_cast<double>(count + 1);
+  const double unbias1 = 1 - std::pow(kBeta1, n), unbias2 = 1 - std::pow(kBeta2, n);
+  for (size_t i = 0; i < step.size(); ++i) {
+    const double square = kind_ == OptimiserKind::kAdamUniform ? largest : second[i];
+    // Without an epsilon: a number whose gradient was always zero rests.
+    if (square > 0) step[i] = -(first[i] / unbias1) / std::sqrt(square / unbias2);
+  }
+  return step;
+}
+
+}  // namespace limn

@@ -1,0 +1,168 @@
+#!/usr/bin/env python3
+"""Fits that show what limn fit does, each by one command; figures are in README.md beside this.
+
+    scenes/fits/fits.py mirrors   a shape from its image before two mirrors, also without boundary
+    scenes/fits/fits.py pose      place, reflectance and camera of an object together
+    scenes/fits/fits.py drift     from the very target: what noise does, and nothing else
+
+Writes OUT/NAME/ (pictures, meshes, report.html) and prints a table. A fit that is there is not run
+again; an interrupted one goes on.
+"""
+
+import argparse
+import json
+import math
+import os
+import struct
+import subprocess
+import sys
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+ROOT = os.path.dirname(os.path.dirname(HERE))
+TERMS = "interior,camera"  # A fit without the boundary term: what mirrors show has edges, too.
+
+
+class Fits:
+    def __init__(self, arguments):
+        self.limn, self.out = arguments.limn, arguments.output
+        self.threads, self.steps = arguments.threads, arguments.steps
+        self.generated = os.path.join(ROOT, "build", "generated")
+
+    def path(self, *names):
+        return os.path.join(self.out, *names)
+
+    def run(self, *words):
+        command = [self.limn, *words]
+        if self.threads:
+            command += ["--threads", str(self.threads)]
+        if subprocess.run(command, check=False).returncode != 0:
+            sys.exit(1)
+
+    def render(self, scene, file, *defines, spp=256):
+        if not os.path.exists(file):
+            words = [w for d in defines for w in ("-D", d)]
+            self.run("render", scene, *words, "--spp", str(spp), "--seed", "99", "-o", file)
+        return file
+
+    def fit(self, folder, scene, target, steps, *words):
+        """The fit's figures."""
+        file = self.path(folder, "fit.json")
+        done = json.load(open(file, encoding="utf-8")) if os.path.exists(file) else None
+        steps = self.steps or steps
+        if done and os.path.exists(self.path(folder, "state.cbor")):
+            if done["steps"] < steps:
+                self.run("fit", "--resume", self.path(folder), "--steps", str(steps))
+        else:
+            self.run("fit", scene, "--target", target, "--steps", str(steps),
+                     "-o", self.path(folder), *words)  # fmt: skip
+        return json.load(open(file, encoding="utf-8"))
+
+
+def scene(name):
+    return os.path.join(HERE, name)
+
+
+def seconds(fit):
+    return sum(h["seconds"] for h in fit["history"])
+
+
+def mirrors(fits):
+    size = ["width=96", "height=48"]
+    target = fits.render(scene("two_mirrors.xml"), fits.path("mirrors.exr"), *size)
+    truth = os.path.join(fits.generated, "creature.ply")
+    words = ["--wrt", "object.vertex_positions", "--truth", truth, "--spp", "6"]
+    words += ["--step-half-life", "150", "--remesh", "100,200"]
+    words += [w for d in size for w in ("-D", d)]
+    rows = []
+    for name, more in [("all terms", []), ("no boundary", ["--terms", TERMS])]:
+        folder = "mirrors_" + name.replace(" ", "_")
+        fit = fits.fit(folder, scene("two_mirrors_start.xml"), target, 300, *words, *more)
+        first, last = (fit["snapshots"][i]["meshes"][0] for i in (0, -1))
+        shown = [(name, fit["steps"], f"{seconds(fit):.0f}", last)]
+        if not rows:
+            shown.insert(0, ("start", 0, "", first))
+        for what, step, time, mesh in shown:
+            rows.append(
+                [what, step, f"{mesh['chamfer']:.4f}", f"{mesh['hausdorff_95']:.4f}",
+                 f"{mesh['normal_angle']:.1f}", mesh["inside_out"], mesh["crossings"], time]
+            )  # fmt: skip
+    head = ["fit", "steps", "chamfer", "95 %", "normals", "inside out", "crossings", "seconds"]
+    return head, rows
+
+
+def pose(fits):
+    size = ["width=64", "height=32"]
+    target = fits.render(scene("two_mirrors.xml"), fits.path("pose.exr"), *size, spp=1024)
+    names = [f"object.translate.{a}" for a in "xyz"] + [f"object.rotate.{a}" for a in "xyz"]
+    names += ["clay.reflectance", "sensor.translate.x"]
+    start = {"x": 0.15, "y": -0.1, "z": 0.2, "angle": 12, "clay": 0.4, "view": 0.2}
+    words = [w for n in names for w in ("--wrt", n)]
+    words += [w for n, v in start.items() for w in ("-D", f"{n}={v}")]
+    words += [w for d in size for w in ("-D", d)]
+    words += ["--spp", "8", "--step", "2", "--step-half-life", "30"]
+    words += ["--truth", os.path.join(fits.generated, "creature.ply")]
+    fit = fits.fit("pose", scene("two_mirrors.xml"), target, 160, *words)
+    first, last = (fit["snapshots"][i]["meshes"][0] for i in (0, -1))
+    rows = [["chamfer / diagonal", f"{first['chamfer']:.4f}", "0", f"{last['chamfer']:.5f}"]]
+    known = {"clay.reflectance": (0.4, 0.6), "sensor.translate.x": (0.2, 0)}
+    for s in fit["scalars"]:
+        begin, truth = known.get(s["name"], (0, ""))
+        rows.append([s["name"], begin, truth, f"{s['value']:.5f}"])
+    rows.append(["seconds", "", "", f"{seconds(fit):.0f}"])
+    return ["what", "start", "truth", "found"], rows
+
+
+def positions(file):
+    """Flat list of coordinates of a binary PLY by limn."""
+    content = open(file, "rb").read()
+    end = content.index(b"end_header\n") + 11
+    count = int(content.split(b"element vertex ")[1].split()[0])
+    return struct.unpack(f"<{3 * count}f", content[end : end + 12 * count])
+
+
+def drift(fits):
+    size = ["width=48", "height=24"]
+    target = fits.render(scene("two_mirrors.xml"), fits.path("drift.exr"), *size, spp=4096)
+    truth = os.path.join(fits.generated, "creature.ply")
+    words = ["--wrt", "object.vertex_positions", "--truth", truth, "--spp", "4", "--step", "0.02"]
+    words += [w for d in size for w in ("-D", d)]
+    moved, rows = [], []
+    for seed in (1, 2, 3, 4):
+        folder = f"drift_{seed}"
+        fit = fits.fit(folder, scene("two_mirrors.xml"), target, 100, *words, "--seed", str(seed))
+        first, last = (fit["snapshots"][i]["meshes"][0] for i in (0, -1))
+        start, end = (positions(fits.path(folder, m["file"])) for m in (first, last))
+        moved.append([b - a for a, b in zip(start, end)])
+        rows.append([f"seed {seed}", f"{last['chamfer']:.5f}", f"{last['normal_angle']:.2f}"])
+    # Systematic drift would move all seeds the same way; random walks have no angle in common.
+    norm = [math.sqrt(sum(x * x for x in m)) for m in moved]
+    angles = [
+        sum(x * y for x, y in zip(moved[i], moved[k])) / (norm[i] * norm[k])
+        for i in range(len(moved))
+        for k in range(i)
+    ]
+    rows.append(["cosines of pairs", " ".join(f"{a:.2f}" for a in angles), ""])
+    return ["fit", "chamfer / diagonal", "normals"], rows
+
+
+EXPERIMENTS = {"mirrors": mirrors, "pose": pose, "drift": drift}
+
+
+def main():
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("name", choices=EXPERIMENTS, metavar="NAME", help=", ".join(EXPERIMENTS))
+    parser.add_argument("-o", "--output", default=os.path.join(ROOT, "out", "fits"))
+    parser.add_argument("--steps", type=int, help="in place of the experiment's own number")
+    parser.add_argument("--threads", type=int, help="default: all cores")
+    parser.add_argument("--limn", default=os.path.join(ROOT, "build", "limn"), help="the program")
+    arguments = parser.parse_args()
+    os.makedirs(arguments.output, exist_ok=True)
+    head, rows = EXPERIMENTS[arguments.name](Fits(arguments))
+    for row in [head, *rows]:
+        print("  ".join(f"{cell!s:>18}" for cell in row))
+
+
+if __name__ == "__main__":
+    main()

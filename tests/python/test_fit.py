@@ -1,0 +1,59 @@
+"""Fits from Python: a value is found back, with the program's bits."""
+
+import json
+import os
+import subprocess
+
+import limn
+import numpy as np
+import pytest
+
+
+def test_a_reflectance_is_found_back(scene):
+    target = limn.render(scene, spp=256, seed=9).value
+    start = scene.copy()
+    truth = np.asarray(scene.parameters["clay.reflectance"].value)
+    start.parameters["clay.reflectance"] = truth - 0.25  # colours move along grey
+    seen = []
+    fit = limn.Fit(start, target, "clay.reflectance", spp=8, step=4, step_half_life=15, seed=1)
+    fit.run(80, callback=lambda record: seen.append(record.step))
+    assert seen == list(range(80)) and len(fit.history) == 80
+    assert abs(fit.values["clay.reflectance"] - truth.mean()) < 0.025
+    assert fit.history[-1].loss < 0.05 * fit.history[0].loss
+    left = np.asarray(start.parameters["clay.reflectance"].value)
+    assert left.mean() == pytest.approx(truth.mean() - 0.25)
+    found = fit.scenes[0].parameters["clay.reflectance"].value
+    assert float(np.mean(found)) == pytest.approx(fit.values["clay.reflectance"])
+
+
+def test_it_is_what_the_program_does(scene, tmp_path, folder):
+    target = str(tmp_path / "target.exr")
+    limn.write_exr(target, limn.render(scene, spp=4, seed=9).value * 1.2)
+    output = tmp_path / "fit"
+    subprocess.run([os.environ["LIMN_PROGRAM"], "fit", str(folder / "scene.xml"), "--quiet",
+                    "--no-report", "--target", target, "--wrt", "tent.vertex_positions", "--spp",
+                    "2", "--seed", "5", "--steps", "3", "-o", str(output)], check=True)  # fmt: skip
+    history = json.loads((output / "fit.json").read_text())["history"]
+    fit = limn.Fit(limn.load(str(folder / "scene.xml")), limn.read_exr(target),
+                   "tent.vertex_positions", spp=2, seed=5)  # fmt: skip
+    fit.run(3)
+    assert [r.loss for r in fit.history] == [r["loss"] for r in history]
+
+
+def test_errors_and_interrupts(scene):
+    target = np.zeros((scene.height, scene.width, 3))
+    with pytest.raises(limn.InputError, match="unknown optimiser"):
+        limn.Fit(scene, target, "clay.reflectance", optimiser="sgd")
+    with pytest.raises(limn.UnknownParameterError, match="clay.reflectance"):
+        limn.Fit(scene, target, "clay.reflectanse")
+    fit = limn.Fit(scene, target, "clay.reflectance", spp=64)
+
+    def stop(_):
+        raise KeyboardInterrupt
+
+    before = fit.values
+    with pytest.raises(KeyboardInterrupt):
+        fit.step(progress=stop)
+    assert len(fit.history) <= 1
+    if not fit.history:
+        assert fit.values == before

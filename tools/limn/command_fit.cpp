@@ -1,0 +1,266 @@
+// `limn fit`: parameters of a scene, vertices included, from target images.
+#include "limn/integrators/fit.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <sstream>
+
+#include "limn/core/error.h"
+#include "tools/limn/command_support.h"
+#include "tools/limn/commands.h"
+#include "tools/limn/fit_folder.h"
+#include "tools/limn/report_script.h"
+
+namespace limn {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kPictureSamples = 32;  // of a snapshot's pictures; not tuned
+
+class FitCommand final : public Command {
+ public:
+  const char* name() const override { return "fit"; }
+  const char* description() const override {
+    return "Find parameters, vertices included, from target images";
+  }
+  void add_options(CLI::App& app, bool all) override;
+  int run(const std::string&) override;
+
+ private:
+  void add_sampling_options(CLI::App& app);
+  FitArguments arguments() const;
+  std::vector<FitView> read_views(const FitArguments& arguments);
+  FitFolder open_folder();
+  int loop(Fit& fit, FitFolder& folder, const RunSettings& settings);
+  void tell(const FitRecord& record) const;
+
+  CommonOptions common_;
+  Warnings warnings_;
+  CLI::Option* steps_option_ = nullptr;
+  std::vector<std::string> targets_, masks_, views_;
+  FitArguments given_;
+  std::string output_, resume_, terms_, truth_;
+  bool no_report_ = false;
+};
+
+void FitCommand::add_options(CLI::App& app, bool) {
+  add_common_options(app, common_);
+  app.get_option("scene")->required(false);
+  app.remove_option(app.get_option("--json"));
+  app.add_option("--target", targets_, "Image to reach (.exr): one for the scene and each --view")
+      ->type_name("EXR")
+      ->allow_extra_args(false);
+  app.add_option("--mask", masks_,
+                 "Weights of its pixels (.exr), for each target in turn; \"-\" for none")
+      ->type_name("EXR")
+      ->allow_extra_args(false);
+  app.add_option("--view", views_, "A further scene that shares the parameters (repeatable)")
+      ->type_name("SCENE[;NAME=VALUE...]")
+      ->allow_extra_args(false);
+  app.add_option("--wrt", given_.parameters,
+                 "What to fit: scalars, SHAPE.vertex_positions (repeatable)")
+      ->type_name("PARAM")
+      ->allow_extra_args(false);
+  app.add_option("--bounds", given_.bounds, "What a scalar may be (repeatable)")
+      ->type_name("PARAM=LEAST,MOST")
+      ->allow_extra_args(false);
+  steps_option_ = app.add_option("--steps", given_.steps, "Steps in all")
+                      ->check(CLI::Range(int64_t{1}, int64_t{1} << 40));
+  app.add_option("--loss", given_.loss, "l2, relative-l2 or l1")->capture_default_str();
+  app.add_option("--optimiser,--optimizer", given_.optimiser,
+                 "adam-uniform (one scale for all numbers of an array), adam, gradient-descent")
+      ->capture_default_str();
+  app.add_option("--step", given_.step,
+                 "Of the first step, in natural steps: 1 % of a shape's diagonal, 0.01 radians, "
+                 "1 % of a value")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--step-half-life", given_.step_half_life,
+                 "After so many steps they are half as long (default: all are alike)")
+      ->check(CLI::Range(1, 1 << 30));
+  app.add_option("--smoothing", given_.smoothing,
+                 "How far a step of a vertex spreads, over the shape's diagonal; 0: not at all")
+      ->check(CLI::Range(0.0, 100.0))
+      ->capture_default_str();
+  app.add_option("--remesh", given_.remesh,
+                 "After these steps, vertices that are fitted get new triangles, as in 100,200")
+      ->delimiter(',')
+      ->check(CLI::PositiveNumber);
+  app.add_option("--remesh-edge", given_.remesh_edge, "Length of edges then, over what it was")
+      ->check(CLI::Range(0.1, 10.0))
+      ->capture_default_str();
+  add_sampling_options(app);
+  app.add_option("--snapshots", given_.snapshots,
+                 "Steps between snapshots: meshes, pictures, state (default: ten in all)")
+      ->check(CLI::Range(1, 1 << 30));
+  app.add_option("--truth", truth_, "The true mesh, to tell distances to it (.obj, .ply)");
+  app.add_option("-o,--output", output_, "Folder to write (made if it is not there)");
+  app.add_option("--resume", resume_,
+                 "Go on with the fit in this folder, as if it had never stopped; takes --steps, "
+                 "--threads and --quiet alone")
+      ->type_name("FOLDER");
+  app.add_flag("--no-report", no_report_, "Leave out report.html");
+}
+
+void FitCommand::add_sampling_options(CLI::App& app) {
+  app.add_option("--loss-spp", given_.loss_spp,
+                 "Samples per pixel of each of the loss's two images (default: --spp)")
+      ->check(CLI::Range(1, 1 << 30));
+  app.add_option("--spp-doubling", given_.spp_doubling,
+                 "After so many steps there are twice the samples (default: never)")
+      ->check(CLI::Range(1, 1 << 30));
+  app.add_option("--terms", terms_, "Only these terms of the gradient, as in interior,camera");
+  app.add_option("--pixels", given_.pixels,
+                 "Where paths go: adjoint (where the loss depends on the image) or uniform")
+      ->check(CLI::IsMember({"adjoint", "uniform"}))
+      ->capture_default_str();
+  app.add_option("--edge-samples", given_.edge_samples, "At every vertex of a path")
+      ->check(CLI::Range(1, 1 << 16));
+  app.add_option("--camera-samples", given_.camera_samples,
+                 "Points on silhouettes of the film, for each path")
+      ->check(CLI::PositiveNumber);
+}
+
+FitArguments FitCommand::arguments() const {
+  const auto need = [](bool there, const char* what) {
+    if (!there) throw InputError(std::string("give ") + what);
+  };
+  need(!common_.scene.empty(), "a scene, or --resume FOLDER");
+  need(!given_.parameters.empty(), "--wrt");
+  need(steps_option_->count() > 0, "--steps");
+  need(!output_.empty(), "-o FOLDER");
+  if (targets_.size() != views_.size() + 1) {
+    throw InputError(fmt::format(
+        "{} --target for {} views: each needs one, the scene's first, then those of --view in turn",
+        targets_.size(), views_.size() + 1));
+  }
+  if (masks_.size() > targets_.size()) throw InputError("there are more --mask than --target");
+  FitArguments a = given_;
+  a.terms = parse_terms(terms_);
+  a.shading = common_.shading;
+  const auto absolute = [](const std::string& file) {
+    return file.empty() ? file : fs::absolute(file).lexically_normal().string();
+  };
+  a.truth = absolute(truth_);
+  for (size_t v = 0; v < targets_.size(); ++v) {
+    ViewArguments view{common_.scene, common_.defines, absolute(targets_[v]), ""};
+    if (v > 0) {
+      std::stringstream stream(views_[v - 1]);
+      std::getline(stream, view.scene, ';');
+      for (std::string define; std::getline(stream, define, ';');) {
+        const size_t equals = define.find('=');
+        if (equals == define.npos || equals == 0) {
+          throw InputError("--view " + views_[v - 1] + ": expected SCENE;NAME=VALUE;...");
+        }
+        view.defines[define.substr(0, equals)] = define.substr(equals + 1);
+      }
+    }
+    view.scene = absolute(view.scene);
+    if (v < masks_.size() && masks_[v] != "-") view.mask = absolute(masks_[v]);
+    a.views.push_back(view);
+  }
+  if (a.snapshots == 0) a.snapshots = static_cast<int>(std::max<int64_t>(1, a.steps / 10));
+  return a;
+}
+
+std::vector<FitView> FitCommand::read_views(const FitArguments& arguments) {
+  std::vector<FitView> views;
+  for (const ViewArguments& view : arguments.views) {
+    CommonOptions common;
+    common.scene = view.scene;
+    common.defines = view.defines;
+    common.shading = arguments.shading;
+    FitView read{load_scene(common, warnings_), read_exr(view.target), {}};
+    if (!view.mask.empty()) read.mask = read_exr(view.mask);
+    views.push_back(std::move(read));
+  }
+  return views;
+}
+
+FitFolder FitCommand::open_folder() {
+  if (resume_.empty()) return {output_, arguments()};
+  if (!common_.scene.empty() || !targets_.empty() || !given_.parameters.empty() ||
+      !output_.empty()) {
+    throw InputError(
+        "--resume goes on with what its folder says: leave out scene, --target, --wrt and -o");
+  }
+  FitFolder folder = FitFolder::read(resume_);
+  if (steps_option_->count() > 0) folder.set_steps(given_.steps);
+  return folder;
+}
+
+int FitCommand::run(const std::string&) {
+  FitFolder folder = open_folder();
+  std::vector<FitView> views = read_views(folder.arguments());
+  RunSettings settings = make_settings(common_, views[0].scene, name());
+  if (resume_.empty()) {
+    folder.set_samples(settings.spp, settings.seed);
+    folder.prepare(views);
+  }
+  settings.spp = folder.arguments().spp;
+  settings.seed = folder.arguments().seed;
+  // A wrong file is told before hours of work.
+  if (!folder.arguments().truth.empty()) read_mesh(folder.arguments().truth, true);
+  const Fit* running = nullptr;
+  int64_t started = 0;
+  if (const auto bar = settings.progress) {
+    settings.progress = [&, bar](double done) {
+      const auto all = static_cast<double>(folder.arguments().steps - started);
+      bar((static_cast<double>(running->steps() - started) + done) / all);
+    };
+  }
+  Fit fit(std::move(views), folder.arguments().options(), settings);
+  running = &fit;
+  warnings_.add_all(fit.warnings());
+  if (!resume_.empty()) folder.restore(fit);
+  started = fit.steps();
+  const int status = loop(fit, folder, settings);
+  if (!no_report_) write_report(folder.name(), common_.quiet);
+  return status;
+}
+
+int FitCommand::loop(Fit& fit, FitFolder& folder, const RunSettings& settings) {
+  const FitArguments& a = folder.arguments();
+  if (fit.steps() == 0) folder.add_snapshot(fit, settings, kPictureSamples, common_.quiet);
+  while (fit.steps() < a.steps) {
+    std::optional<FitRecord> record;
+    try {
+      record = fit.step();
+    } catch (const InputError&) {
+      folder.write(fit, "failed", warnings_.lines());
+      throw;
+    }
+    if (!record) {
+      folder.add_snapshot(fit, settings, 0, common_.quiet);
+      folder.write(fit, "interrupted", warnings_.lines());
+      fmt::print(stderr, "interrupted: {} of {} steps are done; limn fit --resume {} goes on\n",
+                 fit.steps(), a.steps, folder.name());
+      return kInterrupted;
+    }
+    folder.add(*record, fit);
+    tell(*record);
+    const bool last = fit.steps() == a.steps;
+    if (!last && fit.steps() % a.snapshots != 0) continue;
+    folder.add_snapshot(fit, settings, kPictureSamples, common_.quiet);
+    folder.write(fit, last ? "done" : "running", warnings_.lines());
+  }
+  return kSuccess;
+}
+
+void FitCommand::tell(const FitRecord& record) const {
+  if (common_.quiet) return;
+  if (record.halvings > 0) {
+    fmt::print(stderr, "step {}: halved {} times, so that no face loses its area\n", record.step,
+               record.halvings);
+  }
+  if (record.remeshed) fmt::print("step {}: remeshed\n", record.step + 1);
+}
+
+}  // namespace
+
+std::unique_ptr<Command> make_fit_command() { return std::make_unique<FitCommand>(); }
+
+}  // namespace limn

@@ -1,0 +1,405 @@
+// Folders of fits: JSON for people and reports, CBOR for states, meshes and pictures.
+#include "tools/limn/fit_folder.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+
+#include "limn/core/error.h"
+#include "limn/core/parameter.h"
+#include "limn/integrators/mesh_distance.h"
+#include "limn/integrators/render.h"
+#include "tools/limn/command_support.h"
+
+namespace limn {
+
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+static_assert(std::endian::native == std::endian::little);
+
+constexpr size_t kDistanceSamples = 10000;  // on each surface; not tuned
+
+// Under another name first: a crash leaves the old file or the new one.
+void write_whole(const std::string& file, const std::string& bytes) {
+  const std::string temporary = file + ".part";
+  std::ofstream stream(temporary, std::ios::binary);
+  stream << bytes;
+  stream.close();  // a full disk may show only here
+  std::error_code failed;
+  if (stream) fs::rename(temporary, file, failed);
+  if (!stream || failed) throw InputError({file}, "cannot be written");
+}
+
+template <class T>
+void append(std::string& bytes, const T& value) {
+  const auto raw = std::bit_cast<std::array<char, sizeof(T)>>(value);
+  bytes.append(raw.data(), raw.size());
+}
+
+std::string ply_text(const Mesh& mesh) {
+  std::string bytes = fmt::format(
+      "ply\nformat binary_little_endian 1.0\nelement vertex {}\n"
+      "property float x\nproperty float y\nproperty float z\nelement face {}\n"
+      "property list uchar uint vertex_indices\nend_header\n",
+      mesh.positions.size(), mesh.faces.size());
+  for (const Vec3f& p : mesh.positions) {
+    for (int k = 0; k < 3; ++k) append(bytes, p[k]);
+  }
+  for (const FaceIndices& face : mesh.faces) {
+    append(bytes, uint8_t{3});
+    for (const uint32_t v : face) append(bytes, v);
+  }
+  return bytes;
+}
+
+// JSON has no NaN.
+json number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
+
+json to_json(const ViewArguments& v) {
+  return {{"scene", v.scene}, {"defines", v.defines}, {"target", v.target}, {"mask", v.mask}};
+}
+
+// Calls visit(name, member) for all but the views: reading and writing go over one list.
+template <class Arguments, class Visit>
+void visit_arguments(Arguments& a, const Visit& visit) {
+  visit("parameters", a.parameters);
+  visit("bounds", a.bounds);
+  visit("terms", a.terms);
+  visit("loss", a.loss);
+  visit("optimiser", a.optimiser);
+  visit("pixels", a.pixels);
+  visit("shading", a.shading);
+  visit("step", a.step);
+  visit("smoothing", a.smoothing);
+  visit("remesh", a.remesh);
+  visit("remesh_edge", a.remesh_edge);
+  visit("camera_samples", a.camera_samples);
+  visit("step_half_life", a.step_half_life);
+  visit("spp_doubling", a.spp_doubling);
+  visit("spp", a.spp);
+  visit("loss_spp", a.loss_spp);
+  visit("edge_samples", a.edge_samples);
+  visit("seed", a.seed);
+  visit("steps", a.steps);
+  visit("snapshots", a.snapshots);
+  visit("truth", a.truth);
+}
+
+json to_json(const FitArguments& a) {
+  json j;
+  visit_arguments(a, [&](const char* name, const auto& member) { j[name] = member; });
+  for (const ViewArguments& view : a.views) j["views"].push_back(to_json(view));
+  return j;
+}
+
+FitArguments arguments_from(const json& j) {
+  FitArguments a;
+  visit_arguments(a, [&](const char* name, auto& member) { j.at(name).get_to(member); });
+  for (const json& view : j.at("views")) {
+    a.views.push_back({view.at("scene"), view.at("defines"), view.at("target"), view.at("mask")});
+  }
+  return a;
+}
+
+template <class T>
+json flat(const std::vector<Vec3<T>>& vectors) {
+  json list = json::array();
+  for (const Vec3<T>& v : vectors) {
+    for (int k = 0; k < 3; ++k) list.push_back(static_cast<double>(v[k]));
+  }
+  return list;
+}
+
+template <class T>
+std::vector<Vec3<T>> vectors(const json& list) {
+  std::vector<Vec3<T>> all(list.size() / 3);
+  for (size_t i = 0; i < 3 * all.size(); ++i) {
+    all[i / 3][static_cast<int>(i % 3)] = static_cast<T>(list[i].get<double>());
+  }
+  return all;
+}
+
+json to_json(const FitState& state) {
+  json j = {{"steps", state.steps}, {"parameters", json::array()}, {"views", json::array()}};
+  for (const FitState::Numbers& p : state.parameters) {
+    j["parameters"].push_back({{"values", p.values},
+                               {"first", p.first},
+                               {"second", p.second},
+                               {"natural_step", p.natural_step},
+                               {"lambda", p.lambda}});
+  }
+  for (const FitState::View& view : state.views) {
+    json shapes = json::array();
+    for (const FitState::Shape& s : view.shapes) {
+      shapes.push_back(
+          {{"positions", flat(s.positions)}, {"normals", flat(s.normals)}, {"faces", s.faces}});
+    }
+    j["views"].push_back({{"camera", view.camera}, {"shapes", shapes}, {"values", view.values}});
+  }
+  return j;
+}
+
+FitState state_from(const json& j) {
+  FitState state;
+  state.steps = j.at("steps");
+  for (const json& p : j.at("parameters")) {
+    state.parameters.push_back(
+        {p.at("values"), p.at("first"), p.at("second"), p.at("natural_step"), p.at("lambda")});
+  }
+  for (const json& v : j.at("views")) {
+    FitState::View view{v.at("camera"), {}, v.at("values")};
+    for (const json& s : v.at("shapes")) {
+      view.shapes.push_back(
+          {vectors<float>(s.at("positions")), vectors<double>(s.at("normals")), s.at("faces")});
+    }
+    state.views.push_back(std::move(view));
+  }
+  return state;
+}
+
+std::string read_whole(const std::string& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) throw InputError({file}, "cannot be read: no fit was interrupted in this folder");
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+FitBounds parse_bounds(const std::string& text) {
+  const size_t equals = text.rfind('='), comma = text.rfind(',');
+  try {
+    if (equals == text.npos || comma == text.npos || comma < equals) throw std::logic_error("");
+    size_t used = 0;
+    const std::string low = text.substr(equals + 1, comma - equals - 1);
+    const std::string high = text.substr(comma + 1);
+    FitBounds bounds{text.substr(0, equals), std::stod(low, &used), 0};
+    if (used != low.size()) throw std::logic_error("");
+    bounds.most = std::stod(high, &used);
+    if (used != high.size()) throw std::logic_error("");
+    return bounds;
+  } catch (const std::logic_error&) {  // no number, or too large a one
+    throw InputError("--bounds: \"" + text + "\" is not NAME=LEAST,MOST, as in glow.radiance=0,5");
+  }
+}
+
+// Shapes of the first view whose vertices are fitted or moved.
+std::vector<ShapeId> fitted_shapes(const Fit& fit, const std::vector<std::string>& parameters) {
+  const Scene& scene = fit.views()[0].scene;
+  std::vector<ShapeId> shapes;
+  for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+    const auto moves = [&](const std::string& name) {
+      try {
+        return !find_parameter_or_array(scene, name).velocities(scene, ShapeId(s)).empty();
+      } catch (const UnknownParameter&) {  // of another view
+        return false;
+      }
+    };
+    if (std::any_of(parameters.begin(), parameters.end(), moves)) shapes.emplace_back(s);
+  }
+  return shapes;
+}
+
+}  // namespace
+
+FitOptions FitArguments::options() const {
+  FitOptions options;
+  options.parameters = parameters;
+  for (const std::string& text : bounds) options.bounds.push_back(parse_bounds(text));
+  options.loss = loss_kind(loss);
+  options.optimiser = optimiser_kind(optimiser);
+  options.step = step;
+  options.step_half_life = step_half_life;
+  options.spp_doubling = spp_doubling;
+  options.smoothing = smoothing;
+  options.remesh = remesh;
+  options.remesh_edge = remesh_edge;
+  options.loss_spp = loss_spp;
+  options.backward.terms = terms;
+  options.backward.uniform_pixels = pixels == "uniform";
+  options.backward.edge_samples = edge_samples;
+  options.backward.camera_samples = camera_samples;
+  return options;
+}
+
+FitFolder::FitFolder(const std::string& folder, const FitArguments& arguments)
+    : folder_(folder), arguments_(arguments) {}
+
+std::string FitFolder::file(const std::string& name) const {
+  return (fs::path(folder_) / name).string();
+}
+
+FitFolder FitFolder::read(const std::string& folder) {
+  FitFolder found(folder, {});
+  const std::string file = found.file("fit.json");
+  try {
+    const json j = json::parse(read_whole(file));
+    found.arguments_ = arguments_from(j.at("arguments"));
+    found.history_ = j.at("history");
+    found.snapshots_ = j.at("snapshots");
+  } catch (const json::exception& error) {
+    throw InputError({file}, std::string("is not what a fit writes: ") + error.what());
+  }
+  return found;
+}
+
+void FitFolder::prepare(const std::vector<FitView>& views) const {
+  std::error_code failed;
+  if (fs::exists(file("state.cbor"), failed)) {
+    throw InputError({folder_}, "holds a fit already: go on with --resume " + folder_ +
+                                    ", or take another folder");
+  }
+  fs::create_directories(folder_, failed);
+  std::vector<PlannedFile> files;
+  for (const char* name : {"fit.json", "state.cbor", "history.csv"}) {
+    files.push_back({"-o", file(name)});
+  }
+  std::vector<std::string> inputs{arguments_.truth};
+  for (const ViewArguments& view : arguments_.views) {
+    inputs.push_back(view.target);
+    inputs.push_back(view.mask);
+  }
+  for (const FitView& view : views) check_outputs(files, view.scene, inputs);
+}
+
+void FitFolder::restore(Fit& fit) {
+  const std::string name = file("state.cbor");
+  const std::string bytes = read_whole(name);
+  try {
+    fit.restore(state_from(json::from_cbor(bytes)));
+  } catch (const json::exception& error) {
+    throw InputError({name}, std::string("is not the state of a fit: ") + error.what());
+  }
+  const auto forget = [&](json& list) {
+    json kept = json::array();
+    for (const json& entry : list) {
+      if (entry.at("step").get<int64_t>() < fit.steps() + (&list == &snapshots_ ? 1 : 0)) {
+        kept.push_back(entry);
+      }
+    }
+    list = std::move(kept);
+  };
+  forget(history_);
+  forget(snapshots_);
+}
+
+void FitFolder::add(const FitRecord& r, const Fit& fit) {
+  json scalars = json::object();
+  const auto list = fit.scalars();
+  for (size_t i = 0; i < list.size(); ++i) scalars[list[i].name] = r.values[i];
+  history_.push_back({{"step", r.step},
+                      {"loss", r.loss},
+                      {"stderr", number(r.error)},
+                      {"views", r.view_losses},
+                      {"step_size", r.step_size},
+                      {"halvings", r.halvings},
+                      {"values", scalars},
+                      {"seconds", r.seconds}});
+}
+
+json FitFolder::mesh_figures(const Fit& fit, ShapeId shape, int threads) const {
+  const Shape& s = fit.views()[0].scene.shape(shape);
+  const std::string name = fmt::format("step_{:05}_{}.ply", fit.steps(), s.id);
+  write_whole(file(name), ply_text(s.mesh));
+  json figures = {{"shape", s.id}, {"file", name}, {"crossings", count_crossings(s.mesh, threads)}};
+  const auto inside_out = count_inside_out(s.mesh, threads);
+  figures["inside_out"] = inside_out ? json(*inside_out) : json(nullptr);
+  if (arguments_.truth.empty()) return figures;
+  const Mesh truth = read_mesh(arguments_.truth, true);
+  const double diagonal = bounds_of(truth).diagonal();
+  const MeshDistance d = mesh_distance(s.mesh, truth, kDistanceSamples, 0, threads);
+  figures["chamfer"] = d.chamfer / diagonal;
+  figures["hausdorff"] = d.hausdorff / diagonal;
+  figures["hausdorff_95"] = d.hausdorff_95 / diagonal;
+  figures["normal_angle"] = d.normal_angle * 180 / kPi;
+  return figures;
+}
+
+void FitFolder::add_snapshot(const Fit& fit, const RunSettings& settings, int spp, bool quiet) {
+  json snapshot = {{"step", fit.steps()}, {"meshes", json::array()}, {"pictures", json::array()}};
+  std::string line = fmt::format("step {}", fit.steps());
+  if (!history_.empty()) {
+    const json& last = history_.back();
+    line += fmt::format(": loss {:.4g}", last.at("loss").get<double>());
+    if (!last.at("stderr").is_null()) {
+      line += fmt::format(" +- {:.1g}", last.at("stderr").get<double>());
+    }
+  }
+  for (const FitScalar& s : fit.scalars()) line += fmt::format(", {} {:.6g}", s.name, s.value);
+  for (const ShapeId shape : fitted_shapes(fit, arguments_.parameters)) {
+    const json figures = mesh_figures(fit, shape, settings.threads);
+    line += fmt::format(", {}: {} crossings", figures.at("shape").get<std::string>(),
+                        figures.at("crossings").get<size_t>());
+    if (!figures.at("inside_out").is_null()) {
+      line += fmt::format(", {} faces inside out", figures.at("inside_out").get<size_t>());
+    }
+    if (figures.contains("chamfer")) {
+      line += fmt::format(", chamfer {:.4f}, normals {:.1f} degrees",
+                          figures.at("chamfer").get<double>(),
+                          figures.at("normal_angle").get<double>());
+    }
+    snapshot["meshes"].push_back(figures);
+  }
+  for (size_t v = 0; v < fit.views().size() && spp > 0; ++v) {
+    const FitView& view = fit.views()[v];
+    RunSettings own = settings;
+    own.spp = spp;
+    own.progress = nullptr;
+    const RenderResult image = render(view.scene, own);
+    if (image.spp < spp) break;  // interrupted
+    const Film& film = view.scene.film;
+    const std::string name = fmt::format("step_{:05}_view_{}.png", fit.steps(), v);
+    write_png(file(name), mean_image(image.radiance, film.crop_width, film.crop_height), 1);
+    snapshot["pictures"].push_back(name);
+    write_png(file(fmt::format("view_{}_target.png", v)), view.target, 1);
+  }
+  // A run that goes on has one of where it was interrupted.
+  if (!snapshots_.empty() && snapshots_.back().at("step") == fit.steps()) {
+    snapshots_.erase(snapshots_.size() - 1);
+  }
+  snapshots_.push_back(snapshot);
+  if (quiet) return;
+  fmt::print("{}\n", line);
+  std::fflush(stdout);  // also where it goes to a file: the next one may be an hour away
+}
+
+void FitFolder::write(const Fit& fit, const std::string& status,
+                      const std::vector<std::string>& warnings) {
+  std::string csv = "step,loss,stderr,step_size,halvings,seconds";
+  for (const FitScalar& s : fit.scalars()) csv += "," + s.name;
+  csv += "\n";
+  for (const json& r : history_) {
+    const json& error = r.at("stderr");
+    csv += fmt::format("{},{:.9g},{},{:.9g},{},{:.3f}", r.at("step").get<int64_t>(),
+                       r.at("loss").get<double>(),
+                       error.is_null() ? "" : fmt::format("{:.3g}", error.get<double>()),
+                       r.at("step_size").get<double>(), r.at("halvings").get<int>(),
+                       r.at("seconds").get<double>());
+    for (const FitScalar& s : fit.scalars()) {
+      csv += fmt::format(",{:.9g}", r.at("values").at(s.name).get<double>());
+    }
+    csv += "\n";
+  }
+  json targets = json::array(), scalars = json::array();
+  for (size_t v = 0; v < fit.views().size(); ++v) {
+    targets.push_back(fmt::format("view_{}_target.png", v));
+  }
+  for (const FitScalar& s : fit.scalars()) {
+    scalars.push_back({{"name", s.name}, {"unit", s.unit}, {"value", s.value}});
+  }
+  const json all = {
+      {"kind", "fit"},        {"status", status},    {"arguments", to_json(arguments_)},
+      {"steps", fit.steps()}, {"scalars", scalars},  {"targets", targets},
+      {"warnings", warnings}, {"history", history_}, {"snapshots", snapshots_}};
+  write_whole(file("fit.json"), all.dump(1) + "\n");
+  write_whole(file("history.csv"), csv);
+  const std::vector<uint8_t> state = json::to_cbor(to_json(fit.state()));
+  write_whole(file("state.cbor"), std::string(state.begin(), state.end()));
+}
+
+}  // namespace limn

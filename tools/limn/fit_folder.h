@@ -1,0 +1,78 @@
+#pragma once
+// The folder of a fit: what was asked, state, history, snapshots.
+//
+//   fit.json        arguments, history, snapshots, status: for reports, and for --resume
+//   state.cbor      all numbers that a later step depends on
+//   history.csv     a line per step
+//   step_N_SHAPE.ply, step_N_view_K.png, view_K_target.png
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "limn/core/mesh.h"
+#include "limn/integrators/fit.h"
+#include "tools/limn/output_files.h"
+
+namespace limn {
+
+// A view as the command line says it: "FILE" or "FILE;NAME=VALUE;...".
+struct ViewArguments {
+  std::string scene;
+  std::map<std::string, std::string> defines;
+  std::string target, mask;  // "": no mask
+};
+
+// What fixes the bits of a fit, and what is kept of it. Files have absolute names.
+struct FitArguments {
+  std::vector<ViewArguments> views;
+  std::vector<std::string> parameters, bounds, terms;
+  std::string loss = "l2", optimiser = "adam-uniform", pixels = "adjoint", shading = "continuous";
+  double step = 1, smoothing = 0.08, camera_samples = 1;
+  std::vector<int64_t> remesh;
+  double remesh_edge = 0.75;
+  int step_half_life = 0, spp_doubling = 0, spp = 0, loss_spp = 0, edge_samples = 1;
+  uint64_t seed = 0;
+  int64_t steps = 0;
+  int snapshots = 0;  // steps between two
+  std::string truth;  // a mesh; "" if none
+
+  FitOptions options() const;
+};
+
+class FitFolder {
+ public:
+  FitFolder(const std::string& folder, const FitArguments& arguments);
+  // What an earlier run has left. InputError if there is none, or it is not that of a fit.
+  static FitFolder read(const std::string& folder);
+
+  const FitArguments& arguments() const { return arguments_; }
+  const std::string& name() const { return folder_; }
+  void set_steps(int64_t steps) { arguments_.steps = steps; }
+  void set_samples(int spp, uint64_t seed) {
+    arguments_.spp = spp;
+    arguments_.seed = seed;
+  }
+  // Makes the folder; InputError if it holds a fit already, or cannot be written, or a file that
+  // the fit reads lies in its place.
+  void prepare(const std::vector<FitView>& views) const;
+  // Brings `fit` to the state in the folder, and forgets what came after.
+  void restore(Fit& fit);
+
+  void add(const FitRecord& record, const Fit& fit);
+  // Meshes and their figures, pictures of all views by `spp` samples per pixel (none: 0); says so
+  // unless quiet.
+  void add_snapshot(const Fit& fit, const RunSettings& settings, int spp, bool quiet);
+  // The state last: a crash before leaves the older one, and --resume forgets what came after it.
+  void write(const Fit& fit, const std::string& status, const std::vector<std::string>& warnings);
+
+ private:
+  std::string file(const std::string& name) const;
+  nlohmann::json mesh_figures(const Fit& fit, ShapeId shape, int threads) const;
+
+  std::string folder_;
+  FitArguments arguments_;
+  nlohmann::json history_ = nlohmann::json::array(), snapshots_ = nlohmann::json::array();
+};
+
+}  // namespace limn

@@ -1,0 +1,162 @@
+// Fits: parameters of scenes from target images.
+#include "limn/integrators/fit.h"
+
+#include <fmt/format.h>
+
+#include "limn/core/error.h"
+#include "tools/python/bindings.h"
+
+namespace limn::python {
+
+namespace {
+
+struct FitHandle {
+  Fit fit;
+  std::vector<FitRecord> history;
+};
+
+FitView to_view(const SceneHandle& scene, nb::handle target, nb::handle mask) {
+  FitView view{scene.get(), to_image(target), {}};
+  if (!mask.is_none()) view.mask = to_image(mask);
+  return view;
+}
+
+std::vector<FitView> to_views(const SceneHandle& scene, nb::handle target, nb::handle mask,
+                              const nb::sequence& more) {
+  std::vector<FitView> views{to_view(scene, target, mask)};
+  for (nb::handle item : more) {
+    const nb::tuple view = nb::tuple(item);
+    if (view.size() < 2 || view.size() > 3) {
+      throw InputError("views: each is (scene, target) or (scene, target, mask)");
+    }
+    views.push_back(to_view(nb::cast<const SceneHandle&>(view[0]), view[1],
+                            view.size() == 3 ? nb::object(view[2]) : nb::none()));
+  }
+  return views;
+}
+
+// One step on a thread of its own; Ctrl-C leaves what was done.
+FitRecord step(FitHandle& handle, const nb::object& progress) {
+  std::optional<FitRecord> record;
+  run_job({}, progress, [&](const RunSettings& settings) {
+    handle.fit.listen(settings.progress, settings.interrupted);
+    record = handle.fit.step();
+  });
+  handle.fit.listen(nullptr, nullptr);
+  handle.history.push_back(record.value());
+  return *record;
+}
+
+void run(FitHandle& handle, int steps, const nb::object& callback) {
+  for (int i = 0; i < steps; ++i) {
+    const FitRecord record = step(handle, nb::none());
+    if (!callback.is_none()) callback(record);
+  }
+}
+
+void bind_record(nb::module_& m) {
+  nb::class_<FitRecord>(m, "FitRecord", "One step of a fit.")
+      .def_ro("step", &FitRecord::step, "Counted from 0.")
+      .def_ro("loss", &FitRecord::loss,
+              "Before the step, a mean over views; unbiased, so it may be below zero.")
+      .def_ro("stderr", &FitRecord::error, "Of the loss; NaN with one sample per pixel.")
+      .def_ro("view_losses", &FitRecord::view_losses)
+      .def_ro("step_size", &FitRecord::step_size, "In natural steps.")
+      .def_ro("halvings", &FitRecord::halvings,
+              "How often the step was halved, so that no face lost its area.")
+      .def_ro("remeshed", &FitRecord::remeshed)
+      .def_ro("seconds", &FitRecord::seconds)
+      .def("__repr__", [](const FitRecord& r) {
+        return fmt::format("<limn.FitRecord: step {}, loss {:.4g} +- {:.2g}>", r.step, r.loss,
+                           r.error);
+      });
+}
+
+}  // namespace
+
+void bind_fit(nb::module_& m) {
+  bind_record(m);
+  nb::class_<FitHandle>(m, "Fit", "Parameters of scenes, moved until images meet their targets.")
+      .def(
+          "__init__",
+          [](FitHandle* self, const SceneHandle& scene, nb::handle target, const Names& names,
+             nb::handle mask, const nb::sequence& views, const std::string& loss,
+             const std::string& optimiser, double step, int step_half_life, double smoothing,
+             std::optional<int> spp, int loss_spp, const std::vector<int64_t>& remesh,
+             const std::vector<std::string>& terms, std::optional<uint64_t> seed, int threads) {
+            FitOptions options;
+            options.parameters = to_list(names);
+            options.loss = loss_kind(loss);
+            options.optimiser = optimiser_kind(optimiser);
+            options.step = step;
+            options.step_half_life = step_half_life;
+            options.smoothing = smoothing;
+            options.loss_spp = loss_spp;
+            options.remesh = remesh;
+            options.backward.terms = terms;
+            if (step_half_life < 0 || loss_spp < 0) {
+              throw InputError("step_half_life and loss_spp must not be negative");
+            }
+            const RunSettings settings = make_settings(scene.get(), {spp, seed, 0, threads});
+            Fit fit(to_views(scene, target, mask, views), options, settings);
+            warn_all(fit.warnings());
+            new (self) FitHandle{std::move(fit), {}};
+          },
+          nb::arg("scene"), nb::arg("target"), nb::arg("names"), nb::arg("mask") = nb::none(),
+          nb::arg("views") = nb::make_tuple(), nb::arg("loss") = "l2",
+          nb::arg("optimiser") = "adam-uniform", nb::arg("step") = 1.0,
+          nb::arg("step_half_life") = 0, nb::arg("smoothing") = 0.08, nb::arg("spp") = nb::none(),
+          nb::arg("loss_spp") = 0, nb::arg("remesh") = nb::make_tuple(),
+          nb::arg("terms") = nb::make_tuple(), nb::arg("seed") = nb::none(), nb::arg("threads") = 0,
+          nb::sig("def __init__(self, scene: Scene, target: numpy.typing.ArrayLike, names: str | "
+                  "collections.abc.Sequence[str], mask: numpy.typing.ArrayLike | None = None, "
+                  "views: collections.abc.Sequence[tuple] = (), loss: str = 'l2', optimiser: str = "
+                  "'adam-uniform', step: float = 1, step_half_life: int = 0, smoothing: float = "
+                  "0.08, spp: int | None = None, loss_spp: int = 0, remesh: "
+                  "collections.abc.Sequence[int] = (), terms: collections.abc.Sequence[str] = (), "
+                  "seed: int | None = None, threads: int = 0) -> None"),
+          "Copies the scene; it stays as it is.\n\n"
+          "target: (H, W, 3) or (H, W). names: scalars and arrays "
+          "(\"object.vertex_positions\").\n"
+          "mask: weights of the pixels, (H, W). views: further (scene, target) or (scene, target, "
+          "mask) that share the parameters.\n"
+          "loss: \"l2\", \"relative-l2\", \"l1\". optimiser: \"adam-uniform\", \"adam\", "
+          "\"gradient-descent\".\n"
+          "step: in natural steps (1 % of a shape's diagonal, 0.01 radians, 1 % of a value), half "
+          "as long after each step_half_life steps (0: never).\n"
+          "smoothing: how far a step of a vertex spreads, over the shape's diagonal.\n"
+          "spp: samples per pixel of the gradient, and of each of the loss's two images unless "
+          "loss_spp says otherwise. remesh: steps after which vertices get new triangles.")
+      .def("step", &step, nb::arg("progress") = nb::none(),
+           nb::sig("def step(self, progress: collections.abc.Callable[[float], object] | None = "
+                   "None) -> FitRecord"),
+           "One step; Ctrl-C leaves the fit as it was before.")
+      .def("run", &run, nb::arg("steps"), nb::arg("callback") = nb::none(),
+           nb::sig("def run(self, steps: int, callback: collections.abc.Callable[[FitRecord], "
+                   "object] | None = None) -> None"),
+           "Several steps; callback(record) after each.")
+      .def_ro("history", &FitHandle::history, "A FitRecord for each step that was done.")
+      .def_prop_ro(
+          "scenes",
+          [](const FitHandle& h) {
+            nb::list scenes;
+            for (const FitView& view : h.fit.views()) {
+              scenes.append(nb::cast(SceneHandle(deep_copy(view.scene))));
+            }
+            return scenes;
+          },
+          nb::sig("def scenes(self) -> list[Scene]"),
+          "Copies of the scenes as they are now, the first one first.")
+      .def_prop_ro(
+          "values",
+          [](const FitHandle& h) {
+            nb::dict values;
+            for (const FitScalar& s : h.fit.scalars()) values[nb::cast(s.name)] = s.value;
+            return values;
+          },
+          nb::sig("def values(self) -> dict[str, float]"),
+          "The scalars that are fitted: values (of a colour the mean over channels), or for "
+          "motions the sum of all steps.");
+}
+
+}  // namespace limn::python
