@@ -13,6 +13,7 @@
 #include "integrators/methods/pilot.h"
 #include "integrators/methods/selection.h"
 #include "integrators/methods/term_estimator.h"
+#include "integrators/terms/film_regions.h"
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
 #include "limn/edgetree/edge_sampler_types.h"
