@@ -256,7 +256,7 @@ TEST(ExactFilm, SaysWhatItNeeds) {
   options.method = "fd";
   options.exact_film = true;
   const std::string method = message([&] { gradient(scene, options, {}); });
-  EXPECT_NE(method.find("the method \"fd\" has none"), method.npos) << method;
+  EXPECT_NE(method.find("the method \"fd\" does not"), method.npos) << method;
 }
 
 }  // namespace
