@@ -22,10 +22,9 @@ void check_shading(const Scene& scene, GradientResult& result) {
 }
 
 void check_selection(const MethodType& method, const GradientOptions& options) {
-  const auto& terms = method.terms;
-  if (options.exact_film && std::find(terms.begin(), terms.end(), "camera") == terms.end()) {
-    throw InputError("the exact film is for methods with the term \"camera\": the method \"" +
-                     method.name + "\" has none");
+  if (options.exact_film && !method.terms_can_be_left_out) {
+    throw InputError("the exact film is for methods that sample edges on it: the method \"" +
+                     method.name + "\" does not");
   }
   if (options.terms.empty() || method.terms_can_be_left_out) return;
   throw InputError("terms: the method \"" + method.name + "\" has all terms in one");

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "integrators/terms/camera_path.h"
+#include "integrators/terms/film_regions.h"
 #include "integrators/terms/path_log.h"
 
 namespace limn {

@@ -13,6 +13,8 @@
 
 namespace limn {
 
+class FilmRegions;
+
 // The rows of term_types() that the sampler has and the scene has anything of. Slots are indices
 // into it.
 std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler);

@@ -13,6 +13,7 @@
 #include "integrators/methods/pilot.h"
 #include "integrators/methods/selection.h"
 #include "integrators/methods/term_estimator.h"
+#include "integrators/terms/film_regions.h"
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
 #include "limn/edgetree/edge_sampler_types.h"
@@ -298,12 +299,13 @@ class TermJob {
   SamplePlan plan_by_pilot(TermEstimator& estimator, const RunSettings& settings,
                            const Stopwatch& watch, GradientResult& result) const {
     SamplePlan plan;
+    plan.splits = method_.spreads_samples && !options_.uniform_samples;
     const int spp = pilot_samples(settings.spp);
     if (spp == 0 || (!method_.spreads_samples && terms_computed() < 2)) return plan;
     const bool turns =
         method_.moves_directions && can_move_directions() && !estimator.motion_rates().still();
     SamplePlan probing;
-    probing.splits = plan.splits = method_.spreads_samples && !options_.uniform_samples;
+    probing.splits = plan.splits;
     if (method_.spreads_samples) probing.light_samples = kPilotLights;
     estimator.set_plan(probing);
     RunSettings share = settings;

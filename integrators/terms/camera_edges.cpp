@@ -49,31 +49,24 @@ std::span<const FaceRef> faces_that_move(const EdgeMesh& mesh, EdgeId edge) {
 
 CameraEdges::CameraEdges(const PathContext& context, const EdgeSamplerInput& input, int lanes,
                          const FreeMotion* free, const FilmRegions* visible)
-    : context_(context),
-      input_(input),
-      free_(free),
-      visible_(visible),
-      clips_(find_clip_segments(context.scene)) {
+    : context_(context), input_(input), free_(free), clips_(find_clip_segments(context.scene)) {
   const Stopwatch watch;
   for (uint32_t o = 0; o < input_.objects.size(); ++o) add_object(ShapeId(o));
   for (uint32_t c = 0; c < clips_.size(); ++c) add_clip(c);
-  if (visible_) keep_seen();
+  if (visible) keep_seen(*visible);
   weigh(free_ ? 3 : lanes);
   list_seconds_ = watch.seconds();
 }
 
 // Lines keep their speeds where they are cut, which change linearly along them.
-void CameraEdges::keep_seen() {
+void CameraEdges::keep_seen(const FilmRegions& visible) {
   std::vector<FilmEdge> seen;
   for (const FilmEdge& edge : edges_) {
-    std::span<const FaceRef> faces;
-    if (edge.clip != FilmEdge::kNoClip) {
-      faces = {&clips_[edge.clip].face, 1};
-    } else {
-      faces = input_.object(edge.id.object).around(edge.id.edge).all;
-    }
-    for (const auto [s0, s1] :
-         visible_->seen_parts({edge.x0, edge.y0}, {edge.x1, edge.y1}, faces)) {
+    const bool is_clip = edge.clip != FilmEdge::kNoClip;
+    const FacesAround around = is_clip ? FacesAround{{&clips_[edge.clip].face, 1}, {}}
+                                       : input_.object(edge.id.object).around(edge.id.edge);
+    for (const auto& [s0, s1, beside] :
+         visible.seen_parts({edge.x0, edge.y0}, {edge.x1, edge.y1}, around.all)) {
       const auto at = [](const auto& a, const auto& b, double s) { return a * (1 - s) + b * s; };
       const auto depth_at = [&](double s) { return 1 / at(1 / edge.depth0, 1 / edge.depth1, s); };
       FilmEdge part = edge;
@@ -85,6 +78,7 @@ void CameraEdges::keep_seen() {
       part.speed0 = at(edge.speed0, edge.speed1, s0);
       part.speed1 = at(edge.speed0, edge.speed1, s1);
       part.length = edge.length * (s1 - s0);
+      if (around.near.empty()) part.beside = beside;
       seen.push_back(part);
     }
   }
@@ -262,13 +256,8 @@ bool CameraEdges::jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& 
   EdgeView view;
   if (!view_edge(mesh, edge.id, t, value(camera.origin), view)) return false;
   const double cosine = dot(view.omega, value(camera.forward));
-  std::optional<FaceRef> behind;
-  const FacesAround around = mesh.around(edge.id.edge);
-  if (visible_ && around.near.empty()) {
-    behind = visible_->seen_beside({point.x, point.y}, around.faces);
-  }
   return edge_jump(context_, mesh, view, {}, camera.near_clip / cosine, camera.far_clip / cosine, 0,
-                   key, rays, jump, {}, behind ? &*behind : nullptr);
+                   key, rays, jump, {}, edge.beside ? &*edge.beside : nullptr);
 }
 
 }  // namespace limn

@@ -21,6 +21,7 @@ struct FilmEdge {
   double nx, ny;            // the film normal n
   Lanes speed0, speed1;     // v_n there [pixels]; n points to the positive side of EdgeView::side
   double length;            // [pixels]
+  std::optional<FaceRef> beside = {};  // FilmRegions::SeenPart; none: a ray tells
 };
 
 // A point of one of them.
@@ -78,13 +79,12 @@ class CameraEdges {
   Vec3<Dual> moving(const Vec3d& x, const Vec3<Lanes>& velocity) const;
   bool place_on_film(const Vec3<Dual>& x0, const Vec3<Dual>& x1, const Vec3d& side,
                      FilmEdge& edge) const;
-  void keep_seen();
+  void keep_seen(const FilmRegions& visible);
   void weigh(int lanes);
 
   const PathContext& context_;
   const EdgeSamplerInput& input_;
   const FreeMotion* free_;
-  const FilmRegions* visible_;
   std::vector<ClipSegment> clips_;
   std::vector<FilmEdge> edges_;
   DiscreteDistribution choice_;  // of an edge

@@ -165,11 +165,22 @@ class FilmRegions::Builder {
     tile.crossings += regions.crossings();
     const bool whole = regions.size() == 1;
     regions.for_each([&](uint32_t label, std::span<const PlanePoint> corners) {
+      if (!whole) append_box(corners, tile.corners);
       const auto first = static_cast<uint32_t>(tile.corners.size());
       if (!whole) tile.corners.insert(tile.corners.end(), corners.begin(), corners.end());
       tile.regions.push_back(
           {face_of(label), first, static_cast<uint32_t>(tile.corners.size()) - first});
     });
+  }
+
+  static void append_box(std::span<const PlanePoint> corners, std::vector<PlanePoint>& to) {
+    PlanePoint lower = corners[0], upper = corners[0];
+    for (const PlanePoint& p : corners) {
+      lower = {std::min(lower.x, p.x), std::min(lower.y, p.y)};
+      upper = {std::max(upper.x, p.x), std::max(upper.y, p.y)};
+    }
+    to.push_back(lower);
+    to.push_back(upper);
   }
 
   const Scene& scene_;
@@ -210,19 +221,22 @@ void FilmRegions::for_each_region(int x, int y, const Visit& visit) const {
   for (uint32_t r = tile.first_region[pixel]; r < tile.first_region[pixel + 1]; ++r) {
     const Region& region = tile.regions[r];
     if (region.corner_count == 0) {
-      visit(region.face, std::span<const PlanePoint>(whole));
-    } else {
-      visit(region.face, std::span(tile.corners).subspan(region.first_corner, region.corner_count));
+      visit(region.face, whole[0], whole[2], std::span<const PlanePoint>(whole));
+      continue;
     }
+    const PlanePoint* first = &tile.corners[region.first_corner];
+    visit(region.face, first[-2], first[-1],
+          std::span<const PlanePoint>(first, region.corner_count));
   }
 }
 
 namespace {
 
-// How far inside a convex polygon a point is [pixels], negative outside.
-double depth_in(std::span<const PlanePoint> corners, const PlanePoint& p) {
+// How far inside a convex polygon a point is [pixels], negative outside; or something less than
+// `least`, if it is less.
+double depth_in(std::span<const PlanePoint> corners, const PlanePoint& p, double least) {
   double depth = 1e300;
-  for (size_t i = 0; i < corners.size(); ++i) {
+  for (size_t i = 0; i < corners.size() && depth >= least; ++i) {
     const PlanePoint &a = corners[i], &b = corners[(i + 1) % corners.size()];
     const double dx = b.x - a.x, dy = b.y - a.y;
     depth = std::min(depth, (dx * (p.y - a.y) - dy * (p.x - a.x)) / std::sqrt(dx * dx + dy * dy));
@@ -230,25 +244,34 @@ double depth_in(std::span<const PlanePoint> corners, const PlanePoint& p) {
   return depth;
 }
 
-}  // namespace
-
-FaceRef FilmRegions::face_at(int x, int y, double film_x, double film_y) const {
-  FaceRef face;
-  double deepest = -1e300;
-  for_each_region(x, y, [&](FaceRef region_face, std::span<const PlanePoint> corners) {
-    const double depth = depth_in(corners, {film_x, film_y});
-    if (!(depth > deepest)) return;
-    deepest = depth;
-    face = region_face;
-  });
-  return face;
+bool in_box(const PlanePoint& lower, const PlanePoint& upper, const PlanePoint& p, double margin) {
+  return p.x >= lower.x - margin && p.x <= upper.x + margin && p.y >= lower.y - margin &&
+         p.y <= upper.y + margin;
 }
-
-namespace {
 
 // A region may be off by the rounding of its lines to the grid, a billionth of a pixel, and film
 // positions by that of the projection.
 constexpr double kNear = 0x1p-20;
+
+}  // namespace
+
+FaceRef FilmRegions::face_at(int x, int y, double film_x, double film_y) const {
+  const PlanePoint p{film_x, film_y};
+  FaceRef face;
+  double deepest = -1e300;
+  for_each_region(x, y,
+                  [&](FaceRef region_face, const PlanePoint& lower, const PlanePoint& upper,
+                      std::span<const PlanePoint> corners) {
+                    if (!in_box(lower, upper, p, kNear)) return;
+                    const double depth = depth_in(corners, p, deepest);
+                    if (!(depth > deepest)) return;
+                    deepest = depth;
+                    face = region_face;
+                  });
+  return face;
+}
+
+namespace {
 
 // Keeps what is not farther than kNear outside of a convex polygon; false if that is nothing.
 bool clip_to(std::span<const PlanePoint> corners, const PlanePoint& from, const PlanePoint& to,
@@ -275,13 +298,20 @@ std::pair<int, int> pixels_of(double from, double to, int first, int size) {
 
 }  // namespace
 
-std::vector<FilmRegions::Interval> FilmRegions::seen_parts(const PlanePoint& from,
+std::vector<FilmRegions::SeenPart> FilmRegions::seen_parts(const PlanePoint& from,
                                                            const PlanePoint& to,
-                                                           std::span<const FaceRef> faces) const {
-  std::vector<Interval> parts;
+                                                           std::span<const FaceRef> around) const {
+  // Along which part of the edge a region is seen beside it.
+  struct Stretch {
+    double from, to;
+    FaceRef face;
+    bool own;
+  };
+  std::vector<Stretch> stretches;
+  std::vector<double> ends;
   const auto [y0, y1] = pixels_of(from.y, to.y, film_.crop_y, film_.crop_height);
   for (int y = y0; y < y1; ++y) {
-    // The part of the segment in this row.
+    // The part of the edge in this row.
     double t0 = 0, t1 = 1;
     if (const double dy = to.y - from.y; dy != 0) {
       const double a = (y - kNear - from.y) / dy, b = (y + 1 + kNear - from.y) / dy;
@@ -291,49 +321,44 @@ std::vector<FilmRegions::Interval> FilmRegions::seen_parts(const PlanePoint& fro
     const auto column = [&](double t) { return from.x + (to.x - from.x) * t; };
     const auto [x0, x1] = pixels_of(column(t0), column(t1), film_.crop_x, film_.crop_width);
     for (int x = x0; x < x1; ++x) {
-      for_each_region(x, y, [&](FaceRef face, std::span<const PlanePoint> corners) {
-        Interval part{0, 1};
-        if (std::find(faces.begin(), faces.end(), face) == faces.end()) return;
-        if (clip_to(corners, from, to, part.from, part.to)) parts.push_back(part);
+      for_each_region(x, y, [&](FaceRef face, const PlanePoint&, const PlanePoint&, auto corners) {
+        Stretch s{0, 1, face, std::find(around.begin(), around.end(), face) != around.end()};
+        if (!clip_to(corners, from, to, s.from, s.to)) return;
+        stretches.push_back(s);
+        ends.push_back(s.from);
+        ends.push_back(s.to);
       });
     }
   }
-  std::sort(parts.begin(), parts.end(),
-            [](const Interval& a, const Interval& b) { return a.from < b.from; });
-  std::vector<Interval> united;
-  for (const Interval& part : parts) {
-    if (!united.empty() && part.from <= united.back().to) {
-      united.back().to = std::max(united.back().to, part.to);
+  std::sort(ends.begin(), ends.end());
+  std::sort(stretches.begin(), stretches.end(),
+            [](const Stretch& a, const Stretch& b) { return a.from < b.from; });
+  std::vector<SeenPart> parts;
+  size_t begun = 0, over = 0;  // stretches that have begun; before `over` all have ended
+  for (size_t i = 0; i + 1 < ends.size(); ++i) {
+    if (ends[i] == ends[i + 1]) continue;
+    while (begun < stretches.size() && stretches[begun].from <= ends[i]) ++begun;
+    while (over < begun && stretches[over].to <= ends[i]) ++over;
+    bool seen = false, ambiguous = false;
+    std::optional<FaceRef> other;
+    for (size_t k = over; k < begun; ++k) {
+      const Stretch& s = stretches[k];
+      if (s.to <= ends[i]) continue;
+      seen = seen || s.own;
+      if (s.own) continue;
+      ambiguous = ambiguous || (other && *other != s.face);
+      other = s.face;
+    }
+    if (!seen) continue;
+    std::optional<FaceRef> beside = other.value_or(FaceRef{});
+    if (ambiguous) beside.reset();
+    if (!parts.empty() && parts.back().to == ends[i] && parts.back().beside == beside) {
+      parts.back().to = ends[i + 1];
     } else {
-      united.push_back(part);
+      parts.push_back({ends[i], ends[i + 1], beside});
     }
   }
-  return united;
-}
-
-std::optional<FaceRef> FilmRegions::seen_beside(const PlanePoint& p,
-                                                std::span<const FaceRef> around) const {
-  constexpr double kBeside = 1e-8;  // pixels: ten times the rounding of regions
-  const double x = std::floor(p.x), y = std::floor(p.y);
-  const double to_border = std::min({p.x - x, x + 1 - p.x, p.y - y, y + 1 - p.y});
-  const double left = x - film_.crop_x, top = y - film_.crop_y;
-  const bool inside = left >= 0 && top >= 0 && left < film_.crop_width && top < film_.crop_height;
-  if (!inside || to_border < kBeside) return {};
-  bool edge_is_seen = false, ambiguous = false;
-  std::optional<FaceRef> other;
-  for_each_region(static_cast<int>(x), static_cast<int>(y),
-                  [&](FaceRef face, std::span<const PlanePoint> corners) {
-                    if (depth_in(corners, p) < -kBeside) return;
-                    if (std::find(around.begin(), around.end(), face) != around.end()) {
-                      edge_is_seen = true;
-                    } else {
-                      ambiguous = ambiguous || (other && *other != face);
-                      other = face;
-                    }
-                  });
-  if (!edge_is_seen || ambiguous) return {};
-  // With one of its faces on either side, nothing else is asked for.
-  return other.value_or(FaceRef{});
+  return parts;
 }
 
 size_t FilmRegions::size() const {

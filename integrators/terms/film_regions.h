@@ -18,19 +18,18 @@ class FilmRegions {
   // of the full film]; none where nothing is.
   FaceRef face_at(int x, int y, double film_x, double film_y) const;
 
-  // Part of a segment, from (1 - s) of its first end and s of the other.
-  struct Interval {
+  // Part of an edge on the film, from (1 - s) of its first end and s of the other.
+  struct SeenPart {
     double from, to;
+    // What is seen beside it that is none of the edge's faces: a face, or FaceRef{} where nothing
+    // is, or where the edge has a face of its own on either side. None if that cannot be told:
+    // within a millionth of a pixel more than one other thing is seen.
+    std::optional<FaceRef> beside;
   };
-  // The parts of a segment on the film along which one of the faces is seen, at the segment or
-  // nearer to it than a millionth of a pixel; in order, without overlaps.
-  std::vector<Interval> seen_parts(const PlanePoint& from, const PlanePoint& to,
-                                   std::span<const FaceRef> faces) const;
-
-  // Of a point of an edge on the film, the faces around which are given: what is seen beside it that
-  // is none of them (no face where nothing is). None if that cannot be told: the edge is hidden
-  // there, or within a hundred millionth of a pixel more than one other thing is seen.
-  std::optional<FaceRef> seen_beside(const PlanePoint& p, std::span<const FaceRef> around) const;
+  // The parts of an edge along which one of the faces around it is seen, at the edge or nearer to it
+  // than a millionth of a pixel: no other part is seen. In order, without overlaps.
+  std::vector<SeenPart> seen_parts(const PlanePoint& from, const PlanePoint& to,
+                                   std::span<const FaceRef> around) const;
 
   size_t size() const;       // regions of all pixels
   size_t crossings() const;  // lines where faces pass through each other, pixel by pixel
@@ -39,7 +38,7 @@ class FilmRegions {
  private:
   struct Region {
     FaceRef face;
-    uint32_t first_corner, corner_count;  // no corners: the whole pixel
+    uint32_t first_corner, corner_count;  // before them the ends of their box; 0: the whole pixel
   };
   struct Tile {
     std::vector<uint32_t> first_region;  // of each of its pixels, row by row, and the end
@@ -49,7 +48,8 @@ class FilmRegions {
   };
   class Builder;
 
-  // visit(face, corners): for every region of a pixel of the full film in the crop window.
+  // visit(face, lower, upper, corners): for every region of a pixel of the full film in the crop
+  // window, with the ends of its box.
   template <class Visit>
   void for_each_region(int x, int y, const Visit& visit) const;
 

@@ -117,12 +117,13 @@ class PathTracer {
     Vec3<S> wi;
     Rgb<S> throughput;
     PathStep step;
+    int paths = 1;  // that share the vertex with this one, since some vertex slid fast
   };
   // Adds what is scattered along the path. again: all but what further directions bring has been
   // added.
   void follow(Arrival at, int bounces, const Rng& key, EdgeStart* edge, bool again,
               Rgb<S>& radiance) {
-    auto& [surface, wi, throughput, step] = at;
+    auto& [surface, wi, throughput, step, paths] = at;
     for (;; ++bounces, again = false) {
       if (is_complete(bounces)) return;
       const Scattering<S> scattering(surface, wi, c_.scene.shading);
@@ -225,10 +226,11 @@ class PathTracer {
   }
 
   // Where a vertex slides fast, what further directions bring is as large: more of them in place of
-  // one.
+  // one. What slides at one vertex does so at the next ones; kMostSplits paths have to do for all.
   void split(Arrival& at, int bounces, const Rng& key, EdgeStart* edge, Rgb<S>& radiance) {
-    const int copies = splits(at.surface);
+    const int copies = std::min(splits(at.surface), kMostSplits / at.paths);
     if (copies == 1) return;
+    at.paths *= copies;
     at.throughput = at.throughput * (1.0 / copies);
     for (int i = 1; i < copies; ++i) {
       // Beyond the indices of paths that share no vertex.

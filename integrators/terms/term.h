@@ -10,7 +10,6 @@
 #include <span>
 
 #include "integrators/estimates/sample_estimator.h"
-#include "integrators/terms/film_regions.h"
 #include "integrators/terms/light_regions.h"
 #include "integrators/terms/path.h"
 #include "integrators/terms/penumbra.h"
@@ -74,6 +73,8 @@ class Term {
   // What the term built, for people to read.
   virtual void describe(GradientStats& /*stats*/) const {}
 };
+
+class FilmRegions;
 
 // What the terms of a pass are made from. It outlives them.
 class TermInput {

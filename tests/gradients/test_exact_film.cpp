@@ -8,6 +8,7 @@
 
 #include "integrators/terms/camera_path.h"
 #include "integrators/terms/film_regions.h"
+#include "limn/core/face_copies.h"
 #include "limn/core/ray_tracer.h"
 #include "limn/integrators/gradient.h"
 #include "limn/integrators/render.h"
@@ -35,19 +36,20 @@ SceneParts crowded(const TempFiles& files) {
       {{-2, 0.3f, 1}, {2, 0.3f, 0.9f}, {2, 0.3002f, 0.9f}, {-2, 0.9f, 1}}, {{0, 1, 2}, {0, 2, 3}});
   const std::string torus = write_mesh(files, "torus.obj", torus_mesh(12, 7));
   parts.body =
-      square("floor", 5, -90, {0, 0, 0}, diffuse("chalk", "0.8, 0.7, 0.6")) +
+      square("floor", 1.5, -90, {0, 0, 0}, diffuse("chalk", "0.8, 0.7, 0.6")) +
       obj_shape("body", torus, true, 0.5, {0, 0.5, 0.1}, diffuse("clay", "0.6, 0.5, 0.4")) +
-      obj_shape("twin", torus, true, 0.5, {0, 0.5, 0.1}, diffuse("dough", "0.2, 0.9, 0.4")) +
+      obj_shape("twin", torus, true, 0.5, {0, 0.5, 0.1}, glowing("twin", "0.2, 0.9, 0.4")) +
       obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(2)), false, 0.5,
                 {0.4, 0.45, 0.2}, diffuse("snow", "0.9, 0.9, 0.9")) +
       obj_shape("needles", write_mesh(files, "needles.obj", needles), true, 1, {0, 0, 0},
                 glowing("needles", "1, 2, 3")) +
-      square("lamp", 0.6, 90, {0.4, 1.6, 1.2}, area_light("glow", "9, 8, 6"));
+      square("lamp", 0.3, 60, {-0.5, 1, -0.5}, area_light("glow", "9, 8, 6"));
   return parts;
 }
 
 size_t wrong_faces(const Scene& scene, const FilmRegions& regions, int points) {
   const auto tracer = make_brute_force_tracer(scene);
+  const FaceCopies copies(scene);
   const Film& film = scene.film;
   size_t wrong = 0;
   Rng rng(7, 0, 0);
@@ -55,7 +57,9 @@ size_t wrong_faces(const Scene& scene, const FilmRegions& regions, int points) {
     const double x = film.crop_x + film.crop_width * rng.uniform();
     const double y = film.crop_y + film.crop_height * rng.uniform();
     Hit hit;
-    tracer->closest(camera_ray(scene, scene.camera.ray<double>(x, y)), hit);
+    const Ray ray = camera_ray(scene, scene.camera.ray<double>(x, y));
+    if (tracer->closest(ray, hit))
+      hit.face = *copies.met(hit.face, ray.direction, ray.skip_emitters);
     wrong += hit.face != regions.face_at(static_cast<int>(x), static_cast<int>(y), x, y);
   }
   return wrong;
@@ -84,8 +88,11 @@ TEST(ExactFilm, FacesAreThoseOfRaysAtAllScales) {
     const TempFiles files;
     SceneParts parts;
     parts.unit = scale;
-    parts.body = obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(3)), true, scale,
-                           Vec3d{0, 0.5, 0} * scale, diffuse("snow", "0.9, 0.9, 0.9"));
+    parts.hide_emitters = true;
+    parts.body =
+        obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(3)), true, scale,
+                  Vec3d{0, 0.5, 0} * scale, diffuse("snow", "0.9, 0.9, 0.9")) +
+        square("lamp", 0.3 * scale, -30, Vec3d{0.2, 1, 3} * scale, area_light("glow", "9, 8, 6"));
     const Scene scene = make_scene(files, parts);
     EXPECT_EQ(wrong_faces(scene, FilmRegions(scene, 1), 20000), 0u) << scale;
   }
@@ -116,11 +123,16 @@ TEST(ExactFilm, ImageIsThatOfRays) {
   settings.spp = 256;
   settings.threads = 2;
   const RenderResult rays = render(scene, settings);
-  settings.seed = 5;
   const RenderResult exact = render(scene, settings, true);
   EXPECT_EQ(exact.non_finite.count, 0u);
   EXPECT_LT(exact.rays, rays.rays);
-  EXPECT_TRUE(compare_moments(exact.radiance, rays.radiance).plausible(kLevel));
+  // The very paths of rays: of 65536 samples, 0.4 are expected to pass an edge nearer than single
+  // precision can tell; six or more come once in a million times.
+  size_t others = 0;
+  for (size_t i = 0; i < exact.radiance.size(); i += 3) {
+    others += exact.radiance.mean(i) != rays.radiance.mean(i);
+  }
+  EXPECT_LT(others, 6u);
   settings.threads = 1;
   EXPECT_EQ(means(render(scene, settings, true).radiance), means(exact.radiance));
 }
@@ -181,7 +193,7 @@ TEST(ExactFilm, CameraTermIsThatOfRays) {
   }
 }
 
-// The term in closed form, wherever it is known.
+// The term in closed form, wherever it is known and not zero.
 TEST(ExactFilm, CameraTermIsExact) {
   const std::string folder = std::string(LIMN_SOURCE_DIR) + "/scenes/closed_form/";
   std::ifstream file(folder + "references.json");
@@ -190,27 +202,37 @@ TEST(ExactFilm, CameraTermIsExact) {
   for (const auto& reference : references) {
     const Scene scene = read_scene(folder + reference["file"].get<std::string>(), {}, nullptr);
     if (scene.film.filter.kind != Filter::Kind::kBox) continue;
+    std::vector<std::string> names;
+    std::vector<std::vector<double>> exact;
     for (const auto& p : reference["parameters"]) {
-      const std::string name = p["name"];
-      if (!p.contains("camera") || p["camera"].is_null() || name.find(':') != name.npos) continue;
-      const std::vector<double> exact = p["camera"];
-      const GradientResult result = camera_term(scene, {name}, true, 256);
-      const Moments& total = result.parameters[0].total;
-      ASSERT_EQ(total.size(), exact.size());
-      const double accuracy = reference["accuracy"];
-      for (size_t i = 0; i < exact.size(); ++i) {
-        const double residual = total.mean(i) - exact[i], error = std::sqrt(total.variance(i));
-        const double floor = accuracy * std::max(1.0, std::fabs(exact[i]));
+      if (!p.contains("camera") || p["camera"].is_null()) continue;
+      const auto values = p["camera"].get<std::vector<double>>();
+      if (std::all_of(values.begin(), values.end(), [](double v) { return v == 0; })) continue;
+      names.push_back(p["name"]);
+      exact.push_back(values);
+    }
+    if (names.empty()) continue;
+    const GradientResult result = camera_term(scene, names, true, 1024);
+    for (size_t k = 0; k < names.size(); ++k) {
+      const Moments& total = result.parameters[k].total;
+      ASSERT_EQ(total.size(), exact[k].size());
+      for (size_t i = 0; i < total.size(); ++i) {
+        const double residual = total.mean(i) - exact[k][i], error = std::sqrt(total.variance(i));
+        const double floor =
+            reference["accuracy"].get<double>() * std::max(1.0, std::fabs(exact[k][i]));
         if (error <= floor) {
-          EXPECT_LE(std::fabs(residual), 8 * floor) << reference["file"] << " " << name << " " << i;
+          EXPECT_LE(std::fabs(residual), 8 * floor) << names[k] << " of " << reference["file"];
         } else {
           z.push_back(normal_from_student(residual / error, total.batches() - 1));
         }
       }
     }
   }
-  EXPECT_GT(z.size(), 100u);
-  EXPECT_TRUE(summarize(z).plausible(kLevel)) << summarize(z).largest << " of " << z.size();
+  const ZSummary summary = summarize(z);
+  fmt::print("{} values, mean z {:.2f}, deviation {:.2f}, largest {:.2f}\n", summary.count,
+             summary.mean, summary.deviation, summary.largest);
+  EXPECT_GT(summary.count, 1000);
+  EXPECT_GE(summary.p_largest, 1e-6);
 }
 
 TEST(ExactFilm, SaysWhatItNeeds) {
@@ -234,7 +256,7 @@ TEST(ExactFilm, SaysWhatItNeeds) {
   options.method = "fd";
   options.exact_film = true;
   const std::string method = message([&] { gradient(scene, options, {}); });
-  EXPECT_NE(method.find("the method \"fd\" has none"), method.npos) << method;
+  EXPECT_NE(method.find("the method \"fd\" does not"), method.npos) << method;
 }
 
 }  // namespace

@@ -94,7 +94,7 @@ TEST(NearPlane, AtThePinhole) {
   SceneParts parts;
   parts.width = parts.height = 3;
   parts.origin = {0, 0, 1};
-  parts.target = {0, -0.2, 0.05};
+  parts.target = {-0.0023310243223409574, -0.20563730207678144, 0.04731135851762731};
   parts.body = constant_light("sky", "0.4, 0.5, 0.7") +
                obj_shape("object", write_mesh(files, "cube.obj", cube_mesh()), true, 1, {},
                          diffuse("clay", "0.7, 0.5, 0.3"));

@@ -128,6 +128,31 @@ TEST(MovingDirections, KeepTheMeanOfSharpShadowsByAPilot) {
   expect_same_mean(make_scene(files, parts), {"leaf.translate.x", "leaf.rotate.z"}, {"adaptive"});
 }
 
+// Seen at a grazing angle a floor that rises slides ten times as fast: its vertices take so many
+// directions in place of one.
+TEST(FastVertices, KeepTheMean) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.origin = {0, 0.5, 5};
+  parts.target = {0, 0, 0};
+  parts.fov = 15;
+  parts.width = parts.height = 8;
+  parts.body = square("floor", 2, -90, {0, 0, 0}, conductor("gloss", 0.4)) +
+               square("wall", 2, 0, {0, 1, -1.5}, diffuse("plaster", "0.7, 0.6, 0.5")) +
+               make_sky(files, "sky");
+  const Scene scene = make_scene(files, parts);
+  expect_same_mean(scene, {"floor.translate.y"}, {"adaptive"});
+  double difference = 0, variance = 0;
+  for (const char* method : {"forest", "adaptive"}) {
+    const Moments radiance = run(scene, {"floor.translate.y"}, method, 64, 5).radiance;
+    for (size_t i = 0; i < radiance.size(); ++i) {
+      difference += method[0] == 'f' ? -radiance.mean(i) : radiance.mean(i);
+      variance += radiance.variance(i);
+    }
+  }
+  EXPECT_LE(std::fabs(difference), 5 * std::sqrt(variance));
+}
+
 Scene mirror_scene(const TempFiles& files, int size) {
   SceneParts parts;
   parts.width = parts.height = size;

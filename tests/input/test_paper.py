@@ -96,7 +96,7 @@ class TestPaper(unittest.TestCase):
         self.assertEqual((done.returncode, done.stderr), (0, ""))
         self.assertEqual(self.names(), only.split(",")[:3])
         torus, given, warped = self.calls()
-        self.assertEqual((torus[0], self.value(torus, "--node-edges")), ("reject", "512"))
+        self.assertEqual((torus[0], self.value(torus, "--node-edges")), ("reject", "128"))
         self.assertTrue(os.path.exists(torus[1]))
         self.assertIn("li2019-solid", self.value(torus, "--methods").split(","))
         self.assertIn(f"mesh={mesh}", given)

@@ -142,7 +142,7 @@ json to_json(const FitState& state) {
       shapes.push_back(
           {{"positions", flat(s.positions)}, {"normals", flat(s.normals)}, {"faces", s.faces}});
     }
-    j["views"].push_back({{"camera", view.camera}, {"shapes", shapes}, {"values", view.values}});
+    j["views"].push_back({{"sensor", view.camera}, {"shapes", shapes}, {"values", view.values}});
   }
   return j;
 }
@@ -155,7 +155,7 @@ FitState state_from(const json& j) {
         {p.at("values"), p.at("first"), p.at("second"), p.at("natural_step"), p.at("lambda")});
   }
   for (const json& v : j.at("views")) {
-    FitState::View view{v.at("camera"), {}, v.at("values")};
+    FitState::View view{v.at("sensor"), {}, v.at("values")};
     for (const json& s : v.at("shapes")) {
       view.shapes.push_back(
           {vectors<float>(s.at("positions")), vectors<double>(s.at("normals")), s.at("faces")});

@@ -54,8 +54,7 @@ def draw(chart, file):
         set_limits(-1, 1)
         set_label(f"u{k + 1}")
     axes.view_init(elev=24, azim=-56)
-    figure.tight_layout()
-    figure.savefig(file)
+    figure.savefig(file, bbox_inches="tight", pad_inches=0.4)
 
 
 def main():

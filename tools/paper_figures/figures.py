@@ -43,7 +43,7 @@ def mirror(name, alpha, methods, mesh="", options=(), **more):
 def patch(name, mesh):
     """A patch of some hundred edges of a smooth mesh, and two slices of space beside it."""
     return Part(
-        name, "reject", "", methods=BOXES, options=["--node-edges", "512"], small_mesh=mesh
+        name, "reject", "", methods=BOXES, options=["--node-edges", "128"], small_mesh=mesh
     )
 
 

@@ -32,7 +32,12 @@ def _style():
 
 def _role(name):
     roles = {PAPER: "the paper's forest", DEFAULT: "limn's default", "mitsuba": "Zhang et al. 2023"}
-    return roles.get(name, "\u00a0")
+    return roles.get(name, "")
+
+
+def _head(name):
+    """Of a card; all are of one height."""
+    return element("h4", name, element("span", _role(name) or "\u00a0", class_="role"))
 
 
 def _words(text):
@@ -76,20 +81,34 @@ class _Comparison:
         mine, paper = (self._time(n)[0] if self.rungs.get(n) else None for n in (DEFAULT, PAPER))
         return paper / mine if mine and paper else None
 
+    def best(self):
+        """The method with the least time for equal error."""
+        ran = [n for n, rung in self.rungs.items() if rung and self._time(n)[0]]
+        return min(ran, key=lambda n: self._time(n)[0]) if ran else None
+
+    def is_short(self):
+        """Whether some method spent most of its time on its set-up."""
+        return any(r.number("setup_seconds") > 0.5 * r.number("seconds")
+                   for r in self.rungs.values() if r)
+
     def html(self):
         shown = [
             figure(self.pictures.picture("image.png", "the scene"), "the scene"),
             figure(self.pictures.picture("reference.png", "reference"), "derivative, reference"),
         ]
-        title = element("h4", "scene", element("span", "\u00a0", class_="role"))
-        cards = [element("div", title, *shown, class_="card")]
+        cards = [element("div", _head("scene"), *shown, class_="card")]
         cards += [self._card(m) for m in self.methods if self.rungs[m.text("name")]]
         return join(
             element("h3", self._title()),
             element("div", element("div", *cards, class_="cards"), class_="gallery"),
+            self._short() if self.is_short() else None,
             self._table(),
             _command(self.data.text("command")),
         )
+
+    def _short(self):
+        words = "Most of the time went into set-up, which decides here: more --minutes tell more."
+        return element("p", words, class_="notice")
 
     def _title(self):
         defines = {
@@ -107,7 +126,7 @@ class _Comparison:
         rung = self.rungs[name]
         return element(
             "div",
-            element("h4", name, element("span", _role(name), class_="role")),
+            _head(name),
             figure(
                 self.pictures.picture(method.text("picture"), f"derivative by {name}"),
                 f"{figures(rung.number('seconds'))} s, {count(rung.number('spp'))} samples a pixel",
@@ -123,7 +142,7 @@ class _Comparison:
         samples = self.kind == "samples"
         head = ["method", "squared error"] + (["after equal samples"] if samples else [])
         head += ["time for equal error", "set-up, s", "all, s", "bias"]
-        best = min((self._time(n)[0] or float("inf") for n, r in self.rungs.items() if r), default=0)
+        best = self.best()
         rows = []
         for method in self.methods:
             name = method.text("name")
@@ -139,7 +158,7 @@ class _Comparison:
             if samples:
                 row.append(times(self._per_sample(name)))
             ratio, error = self._time(name)
-            wins = "wins" if ratio == best else None
+            wins = "wins" if name == best else None
             row.append(element("td", times(ratio, error), class_=wins))
             row += [figures(rung.number("setup_seconds")), figures(rung.number("seconds"))]
             row.append(self._bias(rung))
@@ -179,8 +198,7 @@ class _Rejection:
             self.pictures.picture(self.data.text("overview"), "the mesh, the node, the slices"),
             "mesh, node, slices",
         )
-        title = element("h4", "patch", element("span", "\u00a0", class_="role"))
-        cards = [element("div", title, overview, class_="card")]
+        cards = [element("div", _head("patch"), overview, class_="card")]
         rows = []
         for v in self.data.records("variants"):
             name = v.text("name")
@@ -196,8 +214,7 @@ class _Rejection:
                 )
             edges = f"{count(v.number('reachable_edges'))} edges reached from one point"
             shown.append(figure(self.pictures.picture(v.text("edges_picture"), edges), edges))
-            title = element("h4", name, element("span", _role(name), class_="role"))
-            cards.append(element("div", title, *shown, class_="card"))
+            cards.append(element("div", _head(name), *shown, class_="card"))
             rows.append(
                 [
                     name,
@@ -257,7 +274,7 @@ def _sections(paper_figures, folder):
     level = FALSE_ALARM / max(1, tests)
     sections = []
     for i, entry in enumerate(paper_figures):
-        parts, factors = [], []
+        parts, factors, best = [], [], []
         for part in entry.runs:
             result = results.get(part.name)
             if result is None:
@@ -269,6 +286,7 @@ def _sections(paper_figures, folder):
             parts.append(comparison.html())
             if comparison.factor():
                 factors.append(comparison.factor())
+            best.append(comparison.best() or "–")
         if any(part.kind == "edges" for part in entry.runs):
             counted = _edges(entry.runs, folder)
             parts += [counted] if counted else []
@@ -288,19 +306,18 @@ def _sections(paper_figures, folder):
             _command(again),
             id=f"figure-{i}",
         )
-        sections.append((f"figure-{i}", entry, html, factors))
+        sections.append((f"figure-{i}", entry, html, factors, best))
     return sections, missing
 
 
 def _summary(sections):
     rows = []
-    for identifier, entry, _, factors in sections:
+    for identifier, entry, _, factors, best in sections:
         link = element("a", f"{entry.numbers}: {entry.title}", href=f"#{identifier}")
         text = ", ".join(times(f) for f in factors) if factors else "–"
-        rows.append([link, text])
-    return table(
-        ["figure", f"time of {PAPER} for the error of {DEFAULT}"], rows, "Who is right, by figure"
-    )
+        rows.append([link, text, ", ".join(best) or "–"])
+    head = ["figure", f"time of {PAPER} for the error of {DEFAULT}", "least time for equal error"]
+    return table(head, rows, "Who is right, by figure")
 
 
 def write(file, paper_figures, folder):
@@ -325,7 +342,7 @@ def write(file, paper_figures, folder):
     body = element(
         "body",
         element("header", element("h1", title), element("p", intro), _summary(sections)),
-        element("main", *(html for _, _, html, _ in sections)),
+        element("main", *(html for _, _, html, _, _ in sections)),
     )
     with open(file, "w", encoding="utf-8") as out:
         out.write(Markup("<!DOCTYPE html>\n") + element("html", head, body, lang="en"))

@@ -62,8 +62,8 @@ struct GradientOptions {
   bool uniform_samples = false;
   double step = 0;  // of finite differences; 0: found by a pilot
   int block = 0;    // also keep moments of sums over blocks of this many pixels
-  // The term "camera" draws from what is seen of edges alone, by exact visible regions of every
-  // pixel. InputError unless the film has a box filter, and for methods without that term.
+  // Edges on the film are drawn from what is seen of them alone, by exact visible regions of every
+  // pixel. InputError unless the film has a box filter, and for methods that draw none.
   bool exact_film = false;
   WarpOptions warp;
 };
