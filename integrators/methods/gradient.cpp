@@ -36,6 +36,7 @@ void identify(const MethodType& method, const GradientOptions& options, BatchSto
   store.identify("terms", join(options.terms));
   store.identify("samples", !options.samples ? (options.uniform_samples ? "uniform" : "auto")
                                              : to_string(*options.samples));
+  store.identify("warp", fmt::format("{} rays, kappa {}", options.warp.rays, options.warp.kappa));
   store.identify("film", options.exact_film ? "exact" : "rays");
   store.identify("step", fmt::format("{}", options.step));
 }

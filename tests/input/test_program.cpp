@@ -218,6 +218,12 @@ TEST_F(Parts, OfAGradientJoinToTheBitsOfOneRun) {
       files_.path("out_blaze.radiance_stderr.exr")};
   make_parts(command);
   expect_same(command, out(), files);
+  // What a method counts beside sums is in the image's header.
+  const std::string warped =
+      "gradient " + scene_ + " --method was --spp 3 --wrt screen.translate.x";
+  make_parts(warped);
+  expect_same(warped, out(), {out(), files_.path("out_stderr.exr")});
+  make_parts(command);
   // An interrupted part holds its first batches, the last of them cut off.
   std::filesystem::resize_file(part(2), std::filesystem::file_size(part(2)) * 2 / 3);
   EXPECT_NE(refused("merge " + all_parts() + " -o " + out()).find("is not complete"),

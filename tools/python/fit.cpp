@@ -110,7 +110,8 @@ void bind_fit(nb::module_& m) {
           nb::arg("terms") = nb::make_tuple(), nb::arg("seed") = nb::none(), nb::arg("threads") = 0,
           nb::sig("def __init__(self, scene: Scene, target: numpy.typing.ArrayLike, names: str | "
                   "collections.abc.Sequence[str], mask: numpy.typing.ArrayLike | None = None, "
-                  "views: collections.abc.Sequence[tuple] = (), loss: str = 'l2', optimiser: str = "
+                  "views: collections.abc.Sequence[tuple[object, ...]] = (), loss: str = 'l2', "
+                  "optimiser: str = "
                   "'adam-uniform', step: float = 1, step_half_life: int = 0, smoothing: float = "
                   "0.08, spp: int | None = None, loss_spp: int = 0, remesh: "
                   "collections.abc.Sequence[int] = (), terms: collections.abc.Sequence[str] = (), "
