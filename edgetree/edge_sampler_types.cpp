@@ -65,6 +65,8 @@ std::span<const EdgeSamplerType> edge_sampler_types() {
        make_forest<ForestConfig{.light_term = false}>, kAblation},
       {"forest-no-environment", "forest whose weights take the environment for uniform",
        make_forest<ForestConfig{.environment_term = false}>, kAblation},
+      {"li2019-solid", "li2019 with the mistake of redner, whose sphere of planes is solid",
+       make_li2019_solid_sampler, kAblation},
       {"quadric-box", "quadric without the pairs of quadrics",
        make_quadric<QuadricConfig{.quadrics = false}>, kAblation},
       {"quadric-no-lights", "quadric whose weights ignore where the lights are",

@@ -14,6 +14,8 @@
 // Where we depart: o is the center of the scene's edges (he takes the camera's place, which an edge
 // sampler does not know); the sphere-box test is exact; and a hundredth of the untransformed cosine
 // is added, so that no edge is lost where the transformed cosine is zero and the BSDF is not.
+// redner takes the sphere for solid, by mistake (Soroka et al. 2025, App. F), and so rejects less:
+// li2019-solid.
 #include <algorithm>
 #include <array>
 
@@ -40,8 +42,8 @@ struct Item {
   bool always;  // in the tree over positions alone
 };
 
-// Whether the sphere around `center` meets the box, seen as hollow.
-bool meets_sphere(const Bounds& box, const Vec3d& center, double radius) {
+// Whether the sphere around `center` meets the box.
+bool meets_sphere(const Bounds& box, const Vec3d& center, double radius, bool solid) {
   double nearest = 0;
   double farthest = 0;
   for (int i = 0; i < 3; ++i) {
@@ -54,18 +56,19 @@ bool meets_sphere(const Bounds& box, const Vec3d& center, double radius) {
   }
   // Rounding of squares: a box that touches the sphere is kept.
   const double slack = 1e-12 * (farthest + radius * radius);
-  return nearest <= radius * radius + slack && farthest >= radius * radius - slack;
+  return nearest <= radius * radius + slack && (solid || farthest >= radius * radius - slack);
 }
 
 // The planes through p, as Hough points.
 struct PlaneSphere {
   Vec3d center;
   double radius;
+  bool solid;
 
-  PlaneSphere(const Vec3d& p, const Vec3d& origin)
-      : center((p + origin) * 0.5), radius(0.5 * length(p - origin)) {}
+  PlaneSphere(const Vec3d& p, const Vec3d& origin, bool is_solid)
+      : center((p + origin) * 0.5), radius(0.5 * length(p - origin)), solid(is_solid) {}
   bool rejects(const Node& node) const {
-    return !node.always && !meets_sphere(node.planes, center, radius);
+    return !node.always && !meets_sphere(node.planes, center, radius, solid);
   }
 };
 
@@ -88,8 +91,8 @@ struct Descent {
   Frame frame;
   PlaneSphere sphere;
 
-  Descent(const EdgeQuery& q, const Vec3d& origin)
-      : query(q), lobe(q.lobe, q.n, q.wi), frame(q.n), sphere(q.p, origin) {}
+  Descent(const EdgeQuery& q, const Vec3d& origin, bool solid)
+      : query(q), lobe(q.lobe, q.n, q.wi), frame(q.n), sphere(q.p, origin, solid) {}
 
   double importance(const Node& node) const {
     if (sphere.rejects(node)) return 0;
@@ -115,8 +118,8 @@ struct Descent {
 class Li2019RejectionTree final : public RejectionTree {
  public:
   Li2019RejectionTree(const std::vector<Node>& nodes, const std::vector<Item>& items,
-                      const Vec3d& origin)
-      : tree_(nodes), origin_(origin), first_(nodes.size() > 1 ? 1 : 0) {
+                      const Vec3d& origin, bool solid)
+      : tree_(nodes), origin_(origin), solid_(solid), first_(nodes.size() > 1 ? 1 : 0) {
     for (const Item& item : items) edges_.push_back(item.id);
     std::vector<uint32_t> open;  // nodes around the next one, outermost first
     for (uint32_t i = first_; i < tree_.size(); ++i) {
@@ -130,7 +133,7 @@ class Li2019RejectionTree final : public RejectionTree {
   }
 
   bool rejects(uint32_t node, const Vec3d& p) const override {
-    return PlaneSphere(p, origin_).rejects(tree_[node + first_]);
+    return PlaneSphere(p, origin_, solid_).rejects(tree_[node + first_]);
   }
 
  private:
@@ -141,12 +144,13 @@ class Li2019RejectionTree final : public RejectionTree {
 
   const std::vector<Node>& tree_;
   Vec3d origin_;
+  bool solid_;
   uint32_t first_;
 };
 
 class Li2019Sampler final : public EdgeSampler {
  public:
-  explicit Li2019Sampler(const EdgeSamplerInput& input) : input_(input) {
+  Li2019Sampler(const EdgeSamplerInput& input, bool solid) : input_(input), solid_(solid) {
     collect();
     const auto middle = std::stable_partition(items_.begin(), items_.end(),
                                               [](const Item& item) { return item.always; });
@@ -163,7 +167,7 @@ class Li2019Sampler final : public EdgeSampler {
 
   std::optional<EdgeSample> sample(const EdgeQuery& query, Rng& rng) const override {
     if (nodes_.empty()) return std::nullopt;
-    const Descent descent(query, origin_);
+    const Descent descent(query, origin_, solid_);
     double u = rng.uniform();
     uint32_t node = 0;
     double probability = 1;
@@ -195,7 +199,7 @@ class Li2019Sampler final : public EdgeSampler {
 
   double probability(const EdgeQuery& query, EdgeRef id) const override {
     if (!is_drawn(query, id)) return 0;
-    const Descent descent(query, origin_);
+    const Descent descent(query, origin_, solid_);
     if (!(transformed_edge(descent, id).integral() > 0)) return 0;
     const uint32_t own = place(id);
     uint32_t node = 0;
@@ -211,7 +215,7 @@ class Li2019Sampler final : public EdgeSampler {
   }
 
   double pdf_t(const EdgeQuery& query, EdgeRef id, double t) const override {
-    return transformed_edge(Descent(query, origin_), id).pdf_t(t);
+    return transformed_edge(Descent(query, origin_, solid_), id).pdf_t(t);
   }
 
   // A walk down the trees costs a handful of rays.
@@ -222,7 +226,7 @@ class Li2019Sampler final : public EdgeSampler {
     return {nodes_.size(), bytes};
   }
   std::unique_ptr<RejectionTree> rejection_tree() const override {
-    return std::make_unique<Li2019RejectionTree>(nodes_, items_, origin_);
+    return std::make_unique<Li2019RejectionTree>(nodes_, items_, origin_, solid_);
   }
 
  private:
@@ -369,6 +373,7 @@ class Li2019Sampler final : public EdgeSampler {
   uint32_t& place(EdgeRef id) { return places_[id.object.index()][id.edge.index()]; }
 
   const EdgeSamplerInput& input_;
+  bool solid_;
   Vec3d origin_{};
   std::vector<Item> items_;                    // in the order of the leaves
   std::vector<std::vector<uint32_t>> places_;  // of an object's edge among the items
@@ -378,7 +383,11 @@ class Li2019Sampler final : public EdgeSampler {
 }  // namespace
 
 std::unique_ptr<EdgeSampler> make_li2019_sampler(const EdgeSamplerInput& input, int) {
-  return std::make_unique<Li2019Sampler>(input);
+  return std::make_unique<Li2019Sampler>(input, false);
+}
+
+std::unique_ptr<EdgeSampler> make_li2019_solid_sampler(const EdgeSamplerInput& input, int) {
+  return std::make_unique<Li2019Sampler>(input, true);
 }
 
 }  // namespace limn

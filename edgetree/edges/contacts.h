@@ -2,28 +2,20 @@
 // Where edges of a scene lie on faces of it, to the rounding of positions, and which faces are
 // nearer to them than rays can tell.
 //
-// A position is taken to have been rounded to float twice (in a file, and after its transform):
-// what the rounding of positions of size M explains is touch_tolerance(M). M is the largest
+// What the rounding of positions of size M explains is touch_tolerance(M). M is the largest
 // coordinate of a face, not of a vertex: a vertex near the origin was rounded where its neighbours
 // are.
 #include <span>
 #include <vector>
 
+#include "limn/core/touch.h"
 #include "limn/edgetree/edges.h"
 #include "limn/edgetree/face_pairs.h"
 
 namespace limn {
 
-//
 // Needles may be narrower than that, and would touch along both of their sides. They touch what is
 // in their place to a millionth of their width, and are near to the rest.
-
-// sqrt(3) * 2 * 2^-24 for each of two positions, rounded up.
-inline double touch_tolerance(double size_a, double size_b) {
-  return 0x1.0p-22 * (size_a + size_b);
-}
-// What is no longer than this many tolerances is a point: ends of overlaps are off by some.
-inline constexpr double kShortestTouch = 8;
 
 // A part [t0, t1] of an edge that lies on a face which is not among those around it.
 struct Contact {

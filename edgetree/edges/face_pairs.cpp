@@ -5,9 +5,9 @@
 #include <bit>
 #include <cmath>
 
-#include "edgetree/edges/box_tree.h"
 #include "edgetree/edges/contacts.h"
 #include "edgetree/edges/half_edges.h"
+#include "limn/core/box_tree.h"
 #include "limn/core/parallel.h"
 #include "limn/core/rng.h"
 

@@ -119,12 +119,12 @@ void put_rows(const DualFit& fit, int lane, Rows& rows) {
 // Fills the nodes of one tree, each on its own. ids: of the tree's nodes in the forest.
 class TreeFiller {
  public:
-  TreeFiller(const SplitTree& tree, std::span<const NodeId> ids, std::span<const Wedge> wedges,
+  TreeFiller(const ForestShape& tree, std::span<const NodeId> ids, std::span<const Wedge> wedges,
              ShapeId object, ForestGroup group, const ForestConfig& config)
       : tree_(tree), ids_(ids), wedges_(wedges), object_(object), group_(group), config_(config) {}
 
   void fill(uint32_t index, Forest& forest) const {
-    const SplitNode& split = tree_.nodes[index];
+    const SplitNode<kWidth>& split = tree_.nodes[index];
     const NodeFrame frame = frame_of(bounds_of(edges(split.range)));
     if (split.has_edges) {
       EdgeNode& node = forest.edges[~ids_[index]];
@@ -159,7 +159,8 @@ class TreeFiller {
     return fit;
   }
 
-  void fill_children(const SplitNode& split, const NodeFrame& frame, InnerNode& node) const {
+  void fill_children(const SplitNode<kWidth>& split, const NodeFrame& frame,
+                     InnerNode& node) const {
     node.child = Ints{} + kNoChild;
     const double scale = frame.inverse_radius * frame.inverse_radius;
     for (int lane = 0; lane < kWidth; ++lane) {
@@ -174,7 +175,7 @@ class TreeFiller {
     }
   }
 
-  void fill_edges(const SplitNode& split, const NodeFrame& frame, EdgeNode& node) const {
+  void fill_edges(const SplitNode<kWidth>& split, const NodeFrame& frame, EdgeNode& node) const {
     node.edge = Ints{} + kNoChild;
     const double scale = frame.inverse_radius * frame.inverse_radius;
     for (int lane = 0; lane < kWidth; ++lane) {
@@ -190,7 +191,7 @@ class TreeFiller {
     }
   }
 
-  const SplitTree& tree_;
+  const ForestShape& tree_;
   std::span<const NodeId> ids_;
   std::span<const Wedge> wedges_;
   ShapeId object_;
@@ -199,7 +200,7 @@ class TreeFiller {
 };
 
 // Makes room for the nodes of a tree and gives them their places.
-std::vector<NodeId> append_nodes(const SplitTree& tree, Forest& forest) {
+std::vector<NodeId> append_nodes(const ForestShape& tree, Forest& forest) {
   std::vector<NodeId> ids(tree.nodes.size());
   auto inner = static_cast<NodeId>(forest.inner.size());
   auto edges = static_cast<NodeId>(forest.edges.size());
@@ -247,7 +248,7 @@ void link(std::span<const NodeId> ids, Forest& forest) {
 
 void append_tree(std::span<const Wedge> wedges, ShapeId object, ForestGroup group, int threads,
                  const ForestConfig& config, Forest& forest) {
-  const SplitTree tree = split_edges(wedges, config.width, threads);
+  const ForestShape tree = split_edges(wedges, config.width, threads);
   std::vector<Wedge> sorted(wedges.size());
   parallel_for((wedges.size() + 4095) / 4096, threads, [&](size_t block) {
     for (size_t i = 4096 * block; i < std::min(wedges.size(), 4096 * (block + 1)); ++i)

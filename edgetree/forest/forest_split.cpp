@@ -7,7 +7,6 @@
 #include <numeric>
 
 #include "limn/core/bounds.h"
-#include "limn/core/parallel.h"
 
 namespace limn {
 namespace {
@@ -164,33 +163,8 @@ class Splitter {
  public:
   Splitter(std::span<Item> items, uint32_t width) : items_(items), width_(width) {}
 
-  // Appends the subtree over a range and returns its first node. Ranges of at most `stop` items
-  // below that are left to `pending` as (node, lane).
-  struct Pending {
-    uint32_t node;
-    uint32_t lane;
-  };
-  uint32_t append(EdgeRange range, uint32_t stop, std::vector<SplitNode>& nodes,
-                  std::vector<Pending>* pending) const {
-    const auto index = static_cast<uint32_t>(nodes.size());
-    nodes.push_back(node_over(range));
-    if (nodes[index].has_edges) return index;
-    for (uint32_t lane = 0; lane < width_; ++lane) {
-      const EdgeRange child = nodes[index].ranges[lane];
-      if (child.size() == 0) continue;
-      if (child.size() <= stop) {
-        pending->push_back({index, lane});
-        continue;
-      }
-      const uint32_t at = append(child, stop, nodes, pending);
-      nodes[index].children[lane] = at;
-    }
-    return index;
-  }
-
- private:
-  SplitNode node_over(EdgeRange range) const {
-    SplitNode node;
+  SplitNode<kWidth> operator()(EdgeRange range) const {
+    SplitNode<kWidth> node;
     node.range = range;
     node.has_edges = range.size() <= width_;
     if (node.has_edges) {
@@ -211,6 +185,7 @@ class Splitter {
     return node;
   }
 
+ private:
   std::span<Item> items_;
   uint32_t width_;
 };
@@ -237,28 +212,10 @@ std::vector<Item> items_of(std::span<const Wedge> wedges) {
 
 }  // namespace
 
-SplitTree split_edges(std::span<const Wedge> wedges, uint32_t width, int threads) {
+ForestShape split_edges(std::span<const Wedge> wedges, uint32_t width, int threads) {
   std::vector<Item> items = items_of(wedges);
-  const auto n = static_cast<uint32_t>(items.size());
-  const Splitter splitter(items, width);
-  constexpr uint32_t kTask = 4096;  // edges that one thread splits alone; not tuned
-  SplitTree tree;
-  std::vector<Splitter::Pending> pending;
-  splitter.append({0, n}, n > kTask ? kTask : 0, tree.nodes, &pending);
-  std::vector<std::vector<SplitNode>> parts(pending.size());
-  parallel_for(parts.size(), threads, [&](size_t i) {
-    const EdgeRange range = tree.nodes[pending[i].node].ranges[pending[i].lane];
-    splitter.append(range, 0, parts[i], nullptr);
-  });
-  for (size_t i = 0; i < parts.size(); ++i) {
-    const auto offset = static_cast<uint32_t>(tree.nodes.size());
-    tree.nodes[pending[i].node].children[pending[i].lane] = offset;
-    for (SplitNode& node : parts[i]) {
-      for (uint32_t& child : node.children)
-        if (child != 0) child += offset;
-      tree.nodes.push_back(node);
-    }
-  }
+  ForestShape tree =
+      split_tree<kWidth>(static_cast<uint32_t>(items.size()), threads, Splitter(items, width));
   for (const Item& item : items) tree.order.push_back(item.wedge);
   return tree;
 }

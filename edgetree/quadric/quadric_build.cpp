@@ -74,11 +74,11 @@ class Filler {
   // of: the summaries of the children.
   template <class Of>
   Summary summary(uint32_t index, const Of& of) const {
-    const QuadricSplit& split = shape_.nodes[index];
+    const SplitNode<kQuadricWidth>& split = shape_.nodes[index];
     Summary result;
     result.frame = frame_of(bounds_of(edges(split.range)));
     if (!quadrics_) return result;
-    if (split.is_leaf()) {
+    if (split.has_edges) {
       result.moments = moments_of(edges(split.range), result.frame);
       return result;
     }
@@ -92,8 +92,8 @@ class Filler {
 
   template <class Of>
   void fill_node(uint32_t index, const Of& of) {
-    const QuadricSplit& split = shape_.nodes[index];
-    if (split.is_leaf()) {
+    const SplitNode<kQuadricWidth>& split = shape_.nodes[index];
+    if (split.has_edges) {
       QuadricLeaf& leaf = forest_.leaves[~ids_[index]];
       leaf.object = object_;
       leaf.group = group_;
@@ -172,7 +172,7 @@ std::vector<NodeId> append_nodes(const QuadricShape& shape, bool quadrics, Quadr
   std::vector<NodeId> ids(shape.nodes.size());
   auto nodes = static_cast<NodeId>(forest.nodes.size());
   auto leaves = static_cast<NodeId>(forest.leaves.size());
-  for (size_t i = 0; i < ids.size(); ++i) ids[i] = shape.nodes[i].is_leaf() ? ~leaves++ : nodes++;
+  for (size_t i = 0; i < ids.size(); ++i) ids[i] = shape.nodes[i].has_edges ? ~leaves++ : nodes++;
   forest.nodes.resize(nodes);
   forest.leaves.resize(leaves);
   if (quadrics) forest.pairs.resize(nodes);

@@ -1,12 +1,15 @@
 // The paper's forest as a sampler: descending the trees.
 #include "edgetree/quadric/quadric_sampler.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
+#include <cmath>
 
 #include "edgetree/forest/choose_root.h"
 #include "edgetree/lobe/seen_edge.h"
 #include "edgetree/quadric/quadric_build.h"
 #include "edgetree/quadric/quadric_query.h"
+#include "limn/edgetree/quadric_chart.h"
 
 namespace limn {
 namespace {
@@ -33,7 +36,7 @@ struct Choice {
 };
 
 // Its nodes are the lanes of the forest's nodes, and the edges of leaves.
-class QuadricRejectionTree final : public RejectionTree {
+class QuadricRejectionTree final : public ChartedTree {
  public:
   QuadricRejectionTree(const EdgeSamplerInput& input, const QuadricForest& forest)
       : input_(input), forest_(forest) {
@@ -49,7 +52,51 @@ class QuadricRejectionTree final : public RejectionTree {
     return may_hold_candidates(forest_, id, QuadricPoint(forest_, p))[lane] == 0;
   }
 
+  std::optional<QuadricChart> chart(uint32_t node) const override {
+    const auto [id, lane] = slots_[node];
+    if (id < 0 || forest_.pairs.empty()) return std::nullopt;
+    const QuadricPairs& pair = forest_.pairs[id];
+    QuadricChart chart{{}, {}, {}, pair.low[lane], pair.high[lane], {}};
+    if (!std::isfinite(chart.low) || is_thin(id, lane)) return std::nullopt;
+    for (int k = 0; k < 3; ++k) {
+      chart.linear[k] = pair.linear[k][lane];
+      chart.square[k] = pair.square[k][lane];
+      chart.product[k] = pair.product[k][lane];
+    }
+    for (const EdgeRef id_of_edge : edges(node)) {
+      const EdgeMesh& mesh = input_.object(id_of_edge.object);
+      const auto& faces = mesh.edge(id_of_edge.edge).faces;
+      if (!faces[1].valid()) continue;
+      chart.edges.push_back(
+          {in_chart(id, lane, mesh.plane(faces[0])), in_chart(id, lane, mesh.plane(faces[1]))});
+    }
+    return chart;
+  }
+
  private:
+  // Whether the rounding of a lane's rows to floats is more than 2^-12 of its dual box' width.
+  bool is_thin(NodeId id, int lane) const {
+    for (int r = 1; r < 4; ++r) {
+      double square = 0;
+      for (const FourFloats& x : forest_.nodes[id].rows[r]) square += double(x[lane]) * x[lane];
+      if (square < 0x1p-24) return true;
+    }
+    return false;
+  }
+  // The coordinates of a plane in a lane's dual box.
+  Vec3d in_chart(NodeId id, int lane, const Plane& plane) const {
+    const QuadricNode& node = forest_.nodes[id];
+    Eigen::Matrix4d rows;
+    for (int r = 0; r < 4; ++r) {
+      for (int c = 0; c < 4; ++c) rows(c, r) = node.rows[r][c][lane];
+    }
+    const double offset = plane.n.x * node.origin[0] + plane.n.y * node.origin[1] +
+                          plane.n.z * node.origin[2] + plane.offset;
+    const Eigen::Vector4d u = rows.fullPivLu().solve(
+        Eigen::Vector4d(plane.n.x, plane.n.y, plane.n.z, offset * node.inverse_radius));
+    return Vec3d{u[1], u[2], u[3]} / u[0];
+  }
+
   struct Slot {
     NodeId node;
     int lane;

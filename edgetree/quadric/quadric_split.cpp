@@ -2,10 +2,10 @@
 #include "edgetree/quadric/quadric_split.h"
 
 #include <algorithm>
+#include <array>
 #include <limits>
 
 #include "limn/core/bounds.h"
-#include "limn/core/parallel.h"
 
 namespace limn {
 namespace {
@@ -98,28 +98,16 @@ class Splitter {
  public:
   explicit Splitter(std::span<Item> items) : items_(items) {}
 
-  // As in the forest's: appends the subtree over a range; ranges of at most `stop` items are left
-  // to `pending` as (node, lane).
-  struct Pending {
-    uint32_t node;
-    uint32_t lane;
-  };
-  uint32_t append(EdgeRange range, uint32_t stop, std::vector<QuadricSplit>& nodes,
-                  std::vector<Pending>* pending) const {
-    const auto index = static_cast<uint32_t>(nodes.size());
-    nodes.push_back(node_over(range));
-    if (nodes[index].is_leaf()) return index;
-    for (uint32_t lane = 0; lane < kQuadricWidth; ++lane) {
-      const EdgeRange child = nodes[index].ranges[lane];
-      if (child.size() == 0) continue;
-      if (child.size() <= stop) {
-        pending->push_back({index, lane});
-        continue;
-      }
-      const uint32_t at = append(child, stop, nodes, pending);
-      nodes[index].children[lane] = at;
-    }
-    return index;
+  SplitNode<kQuadricWidth> operator()(EdgeRange range) const {
+    SplitNode<kQuadricWidth> node;
+    node.range = range;
+    node.has_edges = range.size() <= kQuadricWidth;
+    if (node.has_edges) return node;
+    int lane = 0;
+    for (const EdgeRange part : halves(range))
+      for (const EdgeRange child : halves(part))
+        if (child.size() > 0) node.ranges[lane++] = child;
+    return node;
   }
 
  private:
@@ -127,17 +115,6 @@ class Splitter {
     if (range.size() <= kQuadricWidth) return {range, EdgeRange{}};
     const uint32_t middle = range.begin + split(items_.subspan(range.begin, range.size()));
     return {EdgeRange{range.begin, middle}, EdgeRange{middle, range.end}};
-  }
-  QuadricSplit node_over(EdgeRange range) const {
-    QuadricSplit node;
-    node.range = range;
-    if (node.is_leaf()) return node;
-    const auto parts = halves(range);
-    int lane = 0;
-    for (const EdgeRange part : parts)
-      for (const EdgeRange child : halves(part))
-        if (child.size() > 0) node.ranges[lane++] = child;
-    return node;
   }
 
   std::span<Item> items_;
@@ -167,28 +144,8 @@ std::vector<Item> items_of(std::span<const Wedge> wedges) {
 
 QuadricShape shape_of(std::span<const Wedge> wedges, int threads) {
   std::vector<Item> items = items_of(wedges);
-  const auto n = static_cast<uint32_t>(items.size());
-  const Splitter splitter(items);
-  constexpr uint32_t kTask = 4096;  // edges that one thread splits alone; not tuned
-  QuadricShape shape;
-  std::vector<Splitter::Pending> pending;
-  splitter.append({0, n}, n > kTask ? kTask : 0, shape.nodes, &pending);
-  std::vector<std::vector<QuadricSplit>> parts(pending.size());
-  parallel_for(parts.size(), threads, [&](size_t i) {
-    const EdgeRange range = shape.nodes[pending[i].node].ranges[pending[i].lane];
-    splitter.append(range, 0, parts[i], nullptr);
-  });
-  for (size_t i = 0; i < parts.size(); ++i) {
-    const auto offset = static_cast<uint32_t>(shape.nodes.size());
-    shape.parts.push_back(offset);
-    shape.nodes[pending[i].node].children[pending[i].lane] = offset;
-    for (QuadricSplit& node : parts[i]) {
-      for (uint32_t& child : node.children)
-        if (child != 0) child += offset;
-      shape.nodes.push_back(node);
-    }
-  }
-  shape.parts.push_back(static_cast<uint32_t>(shape.nodes.size()));
+  QuadricShape shape =
+      split_tree<kQuadricWidth>(static_cast<uint32_t>(items.size()), threads, Splitter(items));
   for (const Item& item : items) shape.order.push_back(item.wedge);
   return shape;
 }

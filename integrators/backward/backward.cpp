@@ -5,17 +5,22 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <optional>
 #include <stdexcept>
 
 #include "integrators/backward/contributions.h"
 #include "integrators/backward/film_adjoint.h"
 #include "integrators/backward/path_adjoint.h"
 #include "integrators/backward/pixel_choice.h"
+#include "integrators/estimates/batch_record.h"
 #include "integrators/methods/selection.h"
 #include "integrators/terms/term.h"
 #include "limn/core/error.h"
+#include "limn/core/names.h"
 #include "limn/core/parallel.h"
 #include "limn/edgetree/edge_sampler_types.h"
+#include "limn/integrators/parts.h"
 
 namespace limn {
 
@@ -58,12 +63,50 @@ std::vector<Rgb<double>> pixels_of(const Scene& scene, const Image& adjoint) {
   return pixels;
 }
 
-// A tile's own figures, joined in the order of tiles.
-struct TileFigures {
+// What tiles, or batches, cost and found beside sums, joined in their order.
+struct Figures {
   AdjointCosts costs;
   NonFinite bad;
   size_t tape_bytes = 0;
+
+  void merge(const Figures& other) {
+    for (int t = 0; t < kAdjointTerms; ++t) costs[t].merge(other.costs[t]);
+    bad.merge(other.bad);
+    tape_bytes = std::max(tape_bytes, other.tape_bytes);
+  }
 };
+
+// What a batch came to.
+struct BatchResult {
+  std::vector<std::vector<double>> sums;  // of each parameter
+  Figures figures;
+  uint64_t contributions = 0;
+};
+
+BatchRecord to_record(const PathBatch& batch, const BatchResult& result) {
+  BatchRecord record{batch.first, batch.last, {}, {}};
+  RecordWriter to(record);
+  for (const auto& sums : result.sums) to.add(sums);
+  for (const TermCost& cost : result.figures.costs) to.add(cost);
+  to.add(result.figures.bad);
+  to.add(static_cast<int64_t>(result.figures.tape_bytes));
+  to.add(static_cast<int64_t>(result.contributions));
+  return record;
+}
+
+BatchResult to_result(const BatchRecord& record, const std::vector<Parameter>& parameters) {
+  RecordReader from(record);
+  BatchResult result;
+  for (const Parameter& parameter : parameters) {
+    result.sums.push_back(from.numbers(parameter.size));
+  }
+  for (TermCost& cost : result.figures.costs) cost = from.cost();
+  result.figures.bad = from.non_finite();
+  result.figures.tape_bytes = static_cast<size_t>(from.count());
+  result.contributions = static_cast<uint64_t>(from.count());
+  from.end();
+  return result;
+}
 
 class BackwardPass {
  public:
@@ -85,9 +128,11 @@ class BackwardPass {
 
   BackwardResult run() {
     result_.setup_seconds = watch_.seconds();
-    ProgressCounter progress(settings_, watch_, steps());
-    for (const PathBatch& batch : batches()) {
-      if (!progress.stopped()) run_batch(batch, progress);
+    if (settings_.store) start(*settings_.store);
+    if (settings_.seconds > 0) {
+      run_in_time();
+    } else {
+      run_all();
     }
     finish();
     return std::move(result_);
@@ -102,7 +147,15 @@ class BackwardPass {
   static size_t tiles_of(size_t samples) { return (samples + kTile - 1) / kTile; }
   std::vector<PathBatch> batches() const;
   size_t steps() const;
-  void run_batch(const PathBatch& batch, ProgressCounter& progress);
+  void start(BatchStore& store) const;
+  BatchStore::Task task(const PathBatch& batch) const {
+    return settings_.store ? settings_.store->task(batch.first) : BatchStore::Task::kMake;
+  }
+  void run_all();
+  void run_in_time();
+  // None if stopped meanwhile.
+  std::optional<BatchResult> run_batch(const PathBatch& batch, ProgressCounter& progress);
+  void collect(const PathBatch& batch, const BatchResult& made);
   void run_paths(const PathBatch& batch, ProgressCounter& progress, ContributionSum& sum);
   void run_film(AdjointTerm term, const PathBatch& batch, ProgressCounter& progress,
                 ContributionSum& sum);
@@ -128,7 +181,8 @@ class BackwardPass {
   std::unique_ptr<ShadowEdges> shadows_;
   bool computed_[kAdjointTerms] = {};
   bool on_film_[kAdjointTerms] = {};
-  TileFigures figures_;
+  Figures batch_;  // of the batch in progress
+  Figures all_;
   BackwardResult result_;
 };
 
@@ -190,8 +244,9 @@ std::vector<PathBatch> BackwardPass::batches() const {
 }
 
 size_t BackwardPass::steps() const {
-  size_t steps = 0;
+  size_t steps = 1;
   for (const PathBatch& batch : batches()) {
+    if (task(batch) != BatchStore::Task::kMake) continue;
     steps += tiles_of(choice_.paths(batch));
     for (const bool on : on_film_) {
       if (on) steps += tiles_of(points_per_sample() * batch.count());
@@ -200,26 +255,96 @@ size_t BackwardPass::steps() const {
   return steps;
 }
 
-void BackwardPass::run_batch(const PathBatch& batch, ProgressCounter& progress) {
+void BackwardPass::start(BatchStore& store) const {
+  if (settings_.seconds > 0) {
+    throw InputError("a run in parts is given by its samples: it takes no limit of time");
+  }
+  std::vector<double> pixels;
+  for (const Rgb<double>& a : film_.pixels()) pixels.insert(pixels.end(), {a.r, a.g, a.b});
+  store.identify("method", "backward");
+  store.identify("samples per pixel", std::to_string(settings_.spp));
+  store.identify("seed", std::to_string(settings_.seed));
+  store.identify("adjoint", fingerprint(pixels));
+  store.identify("scene", fingerprint(parameters_.scene()));
+  store.identify("parameters", join(names_of(parameters_.parameters())));
+  std::vector<std::string> terms;
+  for (const TermRun& term : result_.terms)
+    if (term.computed) terms.push_back(term.name);
+  store.identify("terms", join(terms));
+  store.identify("samples",
+                 fmt::format("{} pixels, {} edges, {} on the film, {} batches",
+                             options_.uniform_pixels ? "uniform" : "adjoint", options_.edge_samples,
+                             options_.camera_samples, options_.batches));
+  store.start(settings_.spp);
+}
+
+void BackwardPass::run_all() {
+  ProgressCounter progress(settings_, watch_, steps());
+  for (const PathBatch& batch : batches()) {
+    if (task(batch) == BatchStore::Task::kLeave) continue;
+    if (progress.stopped()) break;
+    if (task(batch) == BatchStore::Task::kRead) {
+      collect(batch, to_result(settings_.store->read(batch.first), parameters_.parameters()));
+      continue;
+    }
+    const auto made = run_batch(batch, progress);
+    if (!made) break;
+    if (settings_.store) settings_.store->write(to_record(batch, *made));
+    collect(batch, *made);
+  }
+}
+
+// Batches of one size, so that a run with as many samples and batches repeats the bits. The first
+// one tells the time of a sample; where more than one fits into a batch it is thrown away.
+void BackwardPass::run_in_time() {
+  ProgressCounter progress(settings_, watch_, SIZE_MAX);
+  PathBatch batch{settings_.seed, 0, std::min(settings_.spp, 1)};
+  const Stopwatch first;
+  auto made = run_batch(batch, progress);
+  if (!made) return;
+  const double left = settings_.seconds - watch_.seconds();
+  const int most = std::max(1, std::min(options_.batches, settings_.spp));
+  const double fitting = left / std::max(first.seconds(), 1e-9) / most;
+  const int size = static_cast<int>(std::clamp(fitting, 1.0, double(settings_.spp) / most));
+  if (size == 1) collect(batch, *made);
+  const Stopwatch since;
+  for (int done = 0, next = size == 1 ? 1 : 0; next + size <= settings_.spp; next += size, ++done) {
+    const double each = done > 0 ? since.seconds() / done : size * first.seconds();
+    const bool needed = next < settings_.least_spp || result_.batches < 2;
+    if (!needed && watch_.seconds() + each > settings_.seconds) break;
+    batch = {settings_.seed, next, next + size};
+    made = run_batch(batch, progress);
+    if (!made) break;
+    collect(batch, *made);
+  }
+}
+
+std::optional<BatchResult> BackwardPass::run_batch(const PathBatch& batch,
+                                                   ProgressCounter& progress) {
   ContributionSum sum(parameters_.slots().count);
-  TileFigures before = figures_;
+  batch_ = {};
   if (computed_[kInterior] || computed_[kBoundary] || context_.shadows) {
     run_paths(batch, progress, sum);
   }
   for (const AdjointTerm term : {kCamera, kShadow}) {
     if (on_film_[term]) run_film(term, batch, progress, sum);
   }
-  if (progress.stopped()) {
-    figures_ = std::move(before);
-    return;
+  if (progress.stopped()) return std::nullopt;
+  BatchResult made{parameters_.gather(sum.sums()), batch_, sum.added()};
+  for (auto& sums : made.sums) {
+    for (double& v : sums) v *= batch.count();
   }
-  auto values = parameters_.gather(sum.sums());
-  for (size_t i = 0; i < values.size(); ++i) {
-    for (double& v : values[i]) v *= batch.count();
-    result_.parameters[i].moments.add_batch(values[i], batch.count());
+  return made;
+}
+
+void BackwardPass::collect(const PathBatch& batch, const BatchResult& made) {
+  for (size_t i = 0; i < made.sums.size(); ++i) {
+    result_.parameters[i].moments.add_batch(made.sums[i], batch.count());
   }
-  result_.contributions += sum.added();
+  all_.merge(made.figures);
+  result_.contributions += made.contributions;
   result_.spp += batch.count();
+  ++result_.batches;
 }
 
 template <class Make, class Place>
@@ -227,13 +352,13 @@ void BackwardPass::run_tiles(size_t samples, ProgressCounter& progress, Contribu
                              AdjointTerm booked, const Make& make, const Place& place) {
   const size_t tiles = tiles_of(samples);
   size_t first = 0;  // of the wave
-  std::vector<TileFigures> figures;
+  std::vector<Figures> figures;
   const auto make_tile = [&](size_t tile, std::vector<Contribution>& list) {
     if (progress.stopped()) return;
     const Stopwatch watch;
     Tape tape(&parameters_.slots());
     const TapeScope scope(tape);
-    TileFigures& own = figures[tile - first];
+    Figures& own = figures[tile - first];
     for (size_t i = tile * kTile; i < std::min(samples, (tile + 1) * kTile); ++i) {
       if (!make(i, tape, own, list)) own.bad.add(place(i));
       own.tape_bytes = std::max(own.tape_bytes, tape.bytes());
@@ -247,11 +372,7 @@ void BackwardPass::run_tiles(size_t samples, ProgressCounter& progress, Contribu
     const size_t last = std::min(tiles, first + ContributionSum::kWave);
     figures.assign(last - first, {});
     sum.add_wave(first, last, settings_.threads, make_tile);
-    for (const TileFigures& own : figures) {
-      for (int t = 0; t < kAdjointTerms; ++t) figures_.costs[t].merge(own.costs[t]);
-      figures_.bad.merge(own.bad);
-      figures_.tape_bytes = std::max(figures_.tape_bytes, own.tape_bytes);
-    }
+    for (const Figures& own : figures) batch_.merge(own);
   }
 }
 
@@ -265,7 +386,7 @@ void BackwardPass::run_paths(const PathBatch& batch, ProgressCounter& progress,
   };
   run_tiles(
       choice_.paths(batch), progress, sum, kInterior,
-      [&](size_t i, Tape& tape, TileFigures& own, std::vector<Contribution>& list) {
+      [&](size_t i, Tape& tape, Figures& own, std::vector<Contribution>& list) {
         const PixelPath path = choice_.path(batch, i);
         const Rgb<double> adjoint = film_.pixels()[path.pixel] * (1 / path.expected);
         if (is_black(adjoint)) return true;
@@ -288,7 +409,7 @@ void BackwardPass::run_film(AdjointTerm term, const PathBatch& batch, ProgressCo
   const auto add = term == kCamera ? add_camera_adjoint : add_shadow_adjoint;
   run_tiles(
       count, progress, sum, term,
-      [&](size_t i, Tape& tape, TileFigures& own, std::vector<Contribution>& list) {
+      [&](size_t i, Tape& tape, Figures& own, std::vector<Contribution>& list) {
         const Rng key = Rng(batch.seed, UINT64_MAX, first + i)
                             .copy(Purpose::kFilmCopy, term == kCamera ? 0 : 1);
         const double u = (i + key.at(Purpose::kCamera, 0).uniform()) / count;
@@ -305,12 +426,12 @@ void BackwardPass::run_film(AdjointTerm term, const PathBatch& batch, ProgressCo
 
 void BackwardPass::finish() {
   for (size_t t = 0; t < result_.terms.size(); ++t) {
-    result_.terms[t].cost = figures_.costs[t];
+    result_.terms[t].cost = all_.costs[t];
     if (t == kCamera) result_.terms[t].samples = options_.camera_samples;
     if (t == kBoundary || t == kShadow) result_.terms[t].samples = options_.edge_samples;
   }
-  result_.non_finite = figures_.bad;
-  result_.tape_bytes = figures_.tape_bytes;
+  result_.non_finite = all_.bad;
+  result_.tape_bytes = all_.tape_bytes;
   result_.seconds = watch_.seconds();
 }
 

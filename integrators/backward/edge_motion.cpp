@@ -2,7 +2,7 @@
 // curves where two faces cross, on the corners of both.
 #include "integrators/backward/edge_motion.h"
 
-#include "limn/core/shading.h"
+#include "limn/core/surface_point.h"
 
 namespace limn {
 

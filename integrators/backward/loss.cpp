@@ -96,6 +96,7 @@ LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
   RenderResult images[2];
   for (int i = 0; i < 2; ++i) {
     RunSettings own = settings;
+    own.store = nullptr;                                   // of what the loss is for
     own.seed = mix_bits(mix_bits(settings.seed) + 1 + i);  // of streams that no other seed has
     images[i] = render(scene, own);
   }

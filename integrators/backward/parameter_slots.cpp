@@ -106,8 +106,13 @@ ParameterSlots::Dependence ParameterSlots::dependence_on_shape(const Scene& scen
                                                                const Parameter& parameter) const {
   Dependence dependence;
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
-    if (parameter.velocities(scene, ShapeId(s)).empty()) continue;
+    const std::vector<Vec3d> velocity = parameter.velocities(scene, ShapeId(s));
+    if (velocity.empty()) continue;
     dependence.shape = ShapeId(s);
+    for (uint32_t v = 0; v < velocity.size() && parameter.size == 1; ++v) {
+      const Vec3d& u = velocity[v];
+      if (u.x != 0 || u.y != 0 || u.z != 0) dependence.velocity.emplace_back(v, u);
+    }
     if (scene.shapes[s].mesh.normal_source != NormalSource::kGiven || parameter.size > 1) break;
     Scene copy = deep_copy(scene);
     parameter.seed(copy, 0);
@@ -124,6 +129,7 @@ void ParameterSlots::add_shapes(const Scene& scene) {
     if (dependence.shape.valid()) free_.shapes[dependence.shape.index()] = true;
   }
   const Vec3<Lanes> axes{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
+  gathers_.resize(scene.shapes.size());
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     if (!free_.shapes[s]) continue;
     Mesh& mesh = scene_.shapes[s].mesh;
@@ -131,9 +137,12 @@ void ParameterSlots::add_shapes(const Scene& scene) {
     mesh.position_tangents.assign(count, axes);
     MeshSlots& slots = slots_.meshes[s];
     slots.positions = take(3 * count);
+    gathers_[s].copies.resize(count);
+    for (const uint32_t root : mesh.weld) ++gathers_[s].copies[root];
     if (mesh.normal_source == NormalSource::kFace) continue;
     slots.normals = take(3 * static_cast<uint32_t>(mesh.normals.size()));
     slots.horizons = take(count);
+    gathers_[s].normals.emplace(mesh);
   }
 }
 
@@ -217,10 +226,9 @@ void ParameterSlots::gather_shape(ShapeId shape, const std::vector<double>& sums
     normals = vectors(slots.normals, mesh.normals.size());
     const auto first = sums.begin() + slots.horizons;
     const std::vector<double> horizons(first, first + static_cast<long>(mesh.horizon.size()));
-    pull_back_shading_normals(mesh, normals, horizons, positions);
+    gathers_[shape.index()].normals->pull_back(normals, horizons, positions);
   }
-  std::vector<uint32_t> copies(mesh.positions.size());
-  for (const uint32_t root : mesh.weld) ++copies[root];
+  const std::vector<uint32_t>& copies = gathers_[shape.index()].copies;
   for (size_t i = 0; i < parameters_.size(); ++i) {
     const Dependence& dependence = dependences_[i];
     if (dependence.shape != shape) continue;
@@ -232,9 +240,8 @@ void ParameterSlots::gather_shape(ShapeId shape, const std::vector<double>& sums
       continue;
     }
     // Copies move together: the first one stands for all.
-    const std::vector<Vec3d> velocity = parameters_[i].velocities(scene_, shape);
     double sum = 0;
-    for (size_t v = 0; v < positions.size(); ++v) sum += dot(positions[v], velocity[v]);
+    for (const auto& [v, velocity] : dependence.velocity) sum += dot(positions[v], velocity);
     for (size_t n = 0; n < dependence.normal_velocity.size(); ++n) {
       sum += dot(normals[n], dependence.normal_velocity[n]);
     }

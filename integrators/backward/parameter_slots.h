@@ -1,10 +1,13 @@
 #pragma once
 // From names of parameters to slots of a gradient, and back: which numbers of the scene have a
 // slot, and how the parameters' derivatives follow from those of the slots.
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "integrators/terms/camera_edges.h"
+#include "limn/core/normals_adjoint.h"
 #include "limn/core/parameter.h"
 #include "limn/core/scene.h"
 #include "limn/core/slots.h"
@@ -36,9 +39,16 @@ class ParameterSlots {
   };
   // What a parameter moves.
   struct Dependence {
-    ShapeId shape;                       // none: values alone
+    ShapeId shape;  // none: values alone
+    // Of a scalar: of the vertices that it moves.
+    std::vector<std::pair<uint32_t, Vec3d>> velocity;
     std::vector<Vec3d> normal_velocity;  // N, of normals of the file; empty if they stay
     std::vector<Weight> weights;
+  };
+  // What takes the slots of a shape to its vertices.
+  struct ShapeGather {
+    std::vector<uint32_t> copies;  // of each vertex that is the first of its copies
+    std::optional<ShadingNormalsAdjoint> normals;
   };
   class Values;
 
@@ -54,6 +64,7 @@ class ParameterSlots {
   Scene scene_;
   SceneSlots slots_;
   FreeMotion free_;
+  std::vector<ShapeGather> gathers_;  // of each shape
 };
 
 }  // namespace limn

@@ -151,7 +151,7 @@ void VertexAdjoints::add_shadow(const SurfacePoint<Var>& surface, const Scatteri
   }
   Ray ray{q, omega};
   ray.start = surface.face;
-  ray.skip_faces = {&point->face, 1};
+  ray.end = point->face;
   ray.t_max = distance * (1 - 0x1p-20);  // as shadow rays end
   cost.add(RayCount{0, 1});
   if (context_.path.tracer.occluded(ray)) {

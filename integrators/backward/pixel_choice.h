@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "limn/core/discrete_distribution.h"
 #include "limn/core/film.h"
 #include "limn/core/rng.h"
 #include "limn/core/vec.h"
@@ -30,12 +31,12 @@ class PixelChoice {
   // spread evenly and the rest in proportion to the adjoint's magnitude, in strata along the rows.
   PixelChoice(const std::vector<Rgb<double>>& adjoint, bool uniform);
 
-  size_t paths(const PathBatch& batch) const { return cumulative_.size() * batch.count(); }
+  size_t paths(const PathBatch& batch) const { return choice_.size() * batch.count(); }
   PixelPath path(const PathBatch& batch, size_t index) const;
 
  private:
   bool uniform_;
-  std::vector<double> cumulative_;  // probabilities, summed
+  DiscreteDistribution choice_;
 };
 
 }  // namespace limn

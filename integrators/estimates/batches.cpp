@@ -6,10 +6,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "integrators/estimates/batch_record.h"
 #include "integrators/estimates/splat.h"
 #include "limn/core/error.h"
 #include "limn/core/memory.h"
 #include "limn/core/parallel.h"
+#include "limn/integrators/parts.h"
 
 namespace limn {
 
@@ -188,6 +190,32 @@ class BatchRunner {
   BatchSums sums_;
 };
 
+BatchStore::Task task_of(const RunSettings& settings, int64_t first) {
+  return settings.store ? settings.store->task(first) : BatchStore::Task::kMake;
+}
+
+void start(BatchStore& store, Estimators estimators, const RunSettings& settings) {
+  if (settings.seconds > 0) {
+    throw InputError("a run in parts is given by its samples: it takes no limit of time");
+  }
+  store.identify("samples per pixel", std::to_string(settings.spp));
+  store.identify("seed", std::to_string(settings.seed));
+  for (const auto& estimator : estimators) {
+    store.identify("scene", fingerprint(estimator->scene()));
+  }
+  store.start(settings.spp);
+}
+
+int batches_to_make(const RunSettings& settings, const Stopwatch& watch) {
+  if (!settings.store) return Schedule::batch_count(settings.spp);
+  int count = 0;
+  Schedule schedule(settings, watch);
+  while (schedule.next()) {
+    if (task_of(settings, schedule.first_sample()) == BatchStore::Task::kMake) ++count;
+  }
+  return std::max(1, count);
+}
+
 std::string to_text(const Rgb<Lanes>& value, int lanes) {
   std::string text;
   for (int k = 0; k < lanes; ++k) {
@@ -237,13 +265,22 @@ void check_memory(Estimators estimators) {
 
 void run_batches(Estimators estimators, const RunSettings& settings, const Stopwatch& watch,
                  const std::function<void(const Batch&, const std::vector<BatchSums>&)>& collect) {
+  if (settings.store) start(*settings.store, estimators, settings);
   ProgressCounter progress(settings, watch,
-                           steps_per_batch(estimators) * Schedule::batch_count(settings.spp));
+                           steps_per_batch(estimators) * batches_to_make(settings, watch));
   Schedule schedule(settings, watch);
   while (!progress.stopped() && schedule.next()) {
     const Batch batch{settings.seed, schedule.first_sample(), schedule.end_sample()};
-    const std::vector<BatchSums> sums = run_batch(estimators, batch, settings.threads, progress);
-    if (progress.stopped()) break;
+    const auto task = task_of(settings, batch.first);
+    if (task == BatchStore::Task::kLeave) continue;
+    std::vector<BatchSums> sums;
+    if (task == BatchStore::Task::kRead) {
+      sums = to_sums(settings.store->read(batch.first), estimators);
+    } else {
+      sums = run_batch(estimators, batch, settings.threads, progress);
+      if (progress.stopped()) break;
+      if (settings.store) settings.store->write(to_record(batch, sums));
+    }
     collect(batch, sums);
   }
 }

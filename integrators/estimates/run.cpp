@@ -42,6 +42,9 @@ void TermCost::merge(const TermCost& other) {
   zero_weight += other.zero_weight;
   occluded += other.occluded;
   counted += other.counted;
+  warped += other.warped;
+  dominated += other.dominated;
+  dropped += other.dropped;
   largest.merge(other.largest);
 }
 

@@ -21,9 +21,9 @@ struct TermFigures {
 SampleCounts best_samples(const std::vector<TermFigures>& figures);
 
 // The same for every cell. The ideal share of a cell goes with the standard deviation there; a
-// pilot knows that too badly, so the share goes with the square root of the deviation over 9 by 9
-// cells, and is a quarter of the mean at least. Counts are whole; they are as small as rounding
-// allows.
+// pilot sees that too rarely in one cell, so the variance is the mean of those over 5 by 5 and 9 by
+// 9 cells, and a share is a quarter of the mean at least. Counts are whole; they are as small as
+// rounding allows.
 void spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& grid,
                     SamplePlan& plan);
 

@@ -46,6 +46,7 @@ Step find_step(const Scene& scene, const Parameter& parameter, size_t parameters
                const RunSettings& run, double& seconds) {
   RunSettings settings = run;
   settings.progress = nullptr;
+  settings.store = nullptr;
   settings.seconds = kPilotShare * run.seconds / parameters;
   // Without a limit of time, pilot and run differ by their samples.
   if (run.seconds == 0) {

@@ -7,7 +7,9 @@
 #include <cmath>
 
 #include "limn/core/error.h"
+#include "limn/core/names.h"
 #include "limn/integrators/methods.h"
+#include "limn/integrators/parts.h"
 
 namespace limn {
 namespace {
@@ -20,8 +22,23 @@ void check_shading(const Scene& scene, GradientResult& result) {
 }
 
 void check_selection(const MethodType& method, const GradientOptions& options) {
+  const auto& terms = method.terms;
+  if (options.exact_film && std::find(terms.begin(), terms.end(), "camera") == terms.end()) {
+    throw InputError("the exact film is for methods with the term \"camera\": the method \"" +
+                     method.name + "\" has none");
+  }
   if (options.terms.empty() || method.terms_can_be_left_out) return;
   throw InputError("terms: the method \"" + method.name + "\" has all terms in one");
+}
+
+void identify(const MethodType& method, const GradientOptions& options, BatchStore& store) {
+  store.identify("method", method.name);
+  store.identify("parameters", join(options.parameters));
+  store.identify("terms", join(options.terms));
+  store.identify("samples", !options.samples ? (options.uniform_samples ? "uniform" : "auto")
+                                             : to_string(*options.samples));
+  store.identify("film", options.exact_film ? "exact" : "rays");
+  store.identify("step", fmt::format("{}", options.step));
 }
 
 }  // namespace
@@ -68,6 +85,7 @@ GradientResult gradient(const Scene& scene, const GradientOptions& options,
                         const RunSettings& settings) {
   const MethodType& method = find_method(options.method);
   check_selection(method, options);
+  if (settings.store) identify(method, options, *settings.store);
   GradientResult result = method.run(method, scene, options, settings);
   result.method = method.name;
   check_shading(scene, result);

@@ -3,14 +3,16 @@
 #include <memory>
 
 #include "integrators/estimates/sample_estimator.h"
+#include "integrators/terms/film_regions.h"
 #include "integrators/terms/path.h"
 
 namespace limn {
 
 class RadianceEstimator final : public SampleEstimator {
  public:
-  // The scene must outlive the estimator.
-  RadianceEstimator(const Scene& scene, int threads);
+  // The scene must outlive the estimator. visible: what its film shows; null: rays tell.
+  RadianceEstimator(const Scene& scene, int threads,
+                    std::shared_ptr<const FilmRegions> visible = nullptr);
 
   const Scene& scene() const override { return scene_; }
   size_t slots() const override { return 1; }
@@ -23,6 +25,7 @@ class RadianceEstimator final : public SampleEstimator {
   Lights lights_;
   PathContext context_;
   CameraView<double> camera_;
+  std::shared_ptr<const FilmRegions> visible_;
 };
 
 }  // namespace limn

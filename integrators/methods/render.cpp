@@ -6,13 +6,28 @@
 #include "integrators/estimates/batches.h"
 #include "integrators/methods/radiance_estimator.h"
 #include "limn/core/error.h"
+#include "limn/integrators/parts.h"
 
 namespace limn {
 
-RenderResult render(const Scene& scene, const RunSettings& settings) {
+namespace {
+
+std::unique_ptr<RadianceEstimator> make_estimator(const Scene& scene, const RunSettings& settings,
+                                                  bool exact_film) {
+  std::shared_ptr<const FilmRegions> visible;
+  if (exact_film) {
+    visible = std::make_shared<FilmRegions>(scene, settings.threads, settings.interrupted);
+  }
+  return std::make_unique<RadianceEstimator>(scene, settings.threads, std::move(visible));
+}
+
+}  // namespace
+
+RenderResult render(const Scene& scene, const RunSettings& settings, bool exact_film) {
   const Stopwatch watch;
+  if (settings.store) settings.store->identify("film", exact_film ? "exact" : "rays");
   std::vector<std::unique_ptr<SampleEstimator>> estimators;
-  estimators.push_back(std::make_unique<RadianceEstimator>(scene, settings.threads));
+  estimators.push_back(make_estimator(scene, settings, exact_film));
   check_memory(estimators);
   RenderResult result;
   result.radiance = Moments(film_size(scene.film));
@@ -27,11 +42,11 @@ RenderResult render(const Scene& scene, const RunSettings& settings) {
 }
 
 std::vector<std::string> trace_sample(const Scene& scene, const RunSettings& settings,
-                                      const NonFinite::Place& place) {
+                                      const NonFinite::Place& place, bool exact_film) {
   check_pixel(scene.film, place);
-  const RadianceEstimator estimator(scene, settings.threads);
+  const auto estimator = make_estimator(scene, settings, exact_film);
   SampleLog log;
-  run_pixel_sample(estimator, settings.seed, {place.x, place.y, place.sample}, log);
+  run_pixel_sample(*estimator, settings.seed, {place.x, place.y, place.sample}, log);
   return log;
 }
 

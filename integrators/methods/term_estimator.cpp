@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "integrators/terms/camera_path.h"
+#include "integrators/terms/film_regions.h"
 #include "integrators/terms/path_log.h"
 
 namespace limn {
@@ -64,7 +65,8 @@ std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType&
 
 TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> parameters,
                              const std::vector<bool>& computed, const EdgeSamplerType& sampler,
-                             int threads)
+                             int threads, std::shared_ptr<const FilmRegions> visible,
+                             const Warping* warping)
     : scene_(seeded(scene, parameters)),
       lanes_(static_cast<int>(parameters.size())),
       lane_scale_(natural_steps(parameters)),
@@ -77,16 +79,22 @@ TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> para
       lights_(scene_),
       context_{scene_, *tracer_, lights_},
       camera_(scene_.camera),
-      input_(context_, lanes_, lane_scale_, sampler, threads),
+      visible_(std::move(visible)),
+      input_(context_, lanes_, lane_scale_, sampler, threads, warping != nullptr),
       types_(terms_of(scene, sampler)),
       rates_(scene_, lanes_, lane_scale_),
       turning_(turning_about_axes(lane_scale_, lanes_)) {
+  input_.visible = visible_.get();
   for (size_t slot = 0; slot < types_.size(); ++slot) {
     if (types_[slot]->traces_paths) pixel_slot_ = slot;
     terms_.push_back(computed[slot] ? types_[slot]->make(input_) : nullptr);
     if (!terms_[slot]) continue;
     paths_ = paths_ || terms_[slot]->uses_paths();
     vertices_ = vertices_ || terms_[slot]->uses_vertices();
+  }
+  if (warping) {
+    warp_field_ = std::make_unique<WarpField>(scene_, *tracer_, input_.edges(), warping->options,
+                                              warping->unbiased);
   }
 }
 
@@ -123,6 +131,7 @@ class TermEstimator::VertexTerms {
     TurnedVertex turned;
     PathVertex vertex{surface, scattering, weight, motion ? motion->turn : DirectionTurn{},
                       bounces, step,       key,    sink_.log()};
+    vertex.warp = estimator_.warp_field_.get();
     if (held_) {
       turned = turned_at(surface, motion, bounces);
       vertex.turned = &turned;
@@ -245,11 +254,14 @@ TermEstimator::Path TermEstimator::trace(const PixelSample& at, const Rng& key,
   if (field) tracer.move_directions(rates_, *field);
   tracer.take_light_samples(plan_.light_samples);
   if (splits_now(twice)) tracer.split_by(&rates_);
+  std::optional<DirectionWarper> warper;
+  if (warp_field_) tracer.warp_directions(warper.emplace(*warp_field_, path.rays));
   try {
     path.radiance = tracer.from_ray(primal, ray.origin, ray.direction, 0, key);
   } catch (const UntraceableRay&) {
     path.radiance = grey(Dual(kNotFinite[0]));
   }
+  if (warper) path.warped = warper->count();
   path.score = tracer.score();
   path.light_difference = tracer.light_difference();
   path.later_lights = tracer.later_lights();
@@ -262,11 +274,18 @@ TermEstimator::Path TermEstimator::trace(const PixelSample& at, const Rng& key,
   return path;
 }
 
+void TermEstimator::add_cost(const Path& path, TermCost& cost) {
+  cost.add(path.rays);
+  ++cost.samples;
+  cost.warped += path.warped.fields;
+  cost.dominated += path.warped.dominated;
+  cost.dropped += path.warped.dropped;
+}
+
 // Radiance, and what the terms make of it.
 void TermEstimator::add_path(const PixelSample& at, const Path& path, double weight,
                              SampleSink& sink) const {
-  sink.cost(pixel_slot_).add(path.rays);
-  ++sink.cost(pixel_slot_).samples;
+  add_cost(path, sink.cost(pixel_slot_));
   if (!path.finite) {
     sink.reject(at, slot_name(pixel_slot_));
     return;
@@ -323,8 +342,7 @@ TermEstimator::Sample TermEstimator::sample(const PixelSample& at, const Rng& ke
   }
   VertexTerms vertices(*this, ones, twice ? &motions : nullptr, sink);
   const Path path = trace(at, key, turns ? &turning_ : nullptr, vertices, nullptr, twice);
-  sink.cost(pixel_slot_).add(path.rays);
-  ++sink.cost(pixel_slot_).samples;
+  add_cost(path, sink.cost(pixel_slot_));
   const auto split = [&](const Rgb<Lanes>& turning, const Rgb<Lanes>& resting) {
     if (!turns) return TurnedSample{turning, {}, {}};
     return TurnedSample{twice ? resting : turning, turned(turning, resting), {}};
@@ -352,6 +370,7 @@ TermEstimator::Sample TermEstimator::sample(const PixelSample& at, const Rng& ke
 
 void TermEstimator::describe(GradientStats& stats) const {
   stats.setup.emplace_back("ray tracer", tracer_seconds_);
+  if (visible_) stats.setup.emplace_back("visible regions", visible_->seconds());
   if (const EdgeSamplerInput* edges = input_.made_edges()) {
     stats.setup.emplace_back("edges", input_.edges_seconds());
     for (const EdgeClass c : {EdgeClass::kSmooth, EdgeClass::kSharp, EdgeClass::kBorder,

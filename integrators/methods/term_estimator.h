@@ -13,16 +13,26 @@
 
 namespace limn {
 
+class FilmRegions;
+
 // The rows of term_types() that the sampler has and the scene has anything of. Slots are indices
 // into it.
 std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler);
 
+// How directions are warped, see warp_field.h.
+struct Warping {
+  WarpOptions options;
+  bool unbiased = false;
+};
+
 class TermEstimator final : public SampleEstimator {
  public:
   // parameters: at most kLanes. computed: for each of terms_of(scene, sampler), whether it is
-  // computed.
+  // computed. visible: of the film, or null. warping: null where directions are not warped.
   TermEstimator(const Scene& scene, std::span<const Parameter> parameters,
-                const std::vector<bool>& computed, const EdgeSamplerType& sampler, int threads);
+                const std::vector<bool>& computed, const EdgeSamplerType& sampler, int threads,
+                std::shared_ptr<const FilmRegions> visible = nullptr,
+                const Warping* warping = nullptr);
   TermEstimator(const TermEstimator&) = delete;
   TermEstimator& operator=(const TermEstimator&) = delete;
 
@@ -75,6 +85,7 @@ class TermEstimator final : public SampleEstimator {
     Rgb<Dual> light_difference;
     uint64_t later_lights;
     RayCount rays;
+    WarpCount warped;
     bool finite;
   };
   template <class Visitor>
@@ -88,6 +99,7 @@ class TermEstimator final : public SampleEstimator {
   Rgb<Lanes> turned(const Rgb<Lanes>& turning, const Rgb<Lanes>& held) const;
   // Without what turns change in lanes 1 to 3.
   Rgb<Lanes> at_rest(const Rgb<Lanes>& turning, const Rgb<Lanes>& turned) const;
+  static void add_cost(const Path& path, TermCost& cost);
   void add_path(const PixelSample& at, const Path& path, double weight, SampleSink& sink) const;
   void add_vertices(const PixelSample& at, const VertexTerms& vertices, const PixelCounts& counts,
                     SampleSink& sink) const;
@@ -100,12 +112,14 @@ class TermEstimator final : public SampleEstimator {
   Lights lights_;
   PathContext context_;
   CameraView<Dual> camera_;
+  std::shared_ptr<const FilmRegions> visible_;
   TermInput input_;
   std::vector<const TermType*> types_;
   std::vector<std::unique_ptr<Term>> terms_;  // of each slot; null where not computed
   size_t pixel_slot_ = 0;                     // of the term that traces paths
   bool paths_ = false, vertices_ = false;     // whether some term uses them
   MotionRates rates_;
+  std::unique_ptr<WarpField> warp_field_;  // null where directions are not warped
   // What a pilot turns directions by: about the axes x, y and z in the lanes 1 to 3.
   DirectionField turning_;
   SamplePlan plan_;

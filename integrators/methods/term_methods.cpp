@@ -13,9 +13,11 @@
 #include "integrators/methods/pilot.h"
 #include "integrators/methods/selection.h"
 #include "integrators/methods/term_estimator.h"
+#include "integrators/terms/film_regions.h"
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
 #include "limn/edgetree/edge_sampler_types.h"
+#include "limn/integrators/parts.h"
 
 namespace limn {
 namespace {
@@ -48,12 +50,24 @@ void collect(const std::vector<const std::vector<double>*>& sums, const std::vec
   if (block > 0) g.total_blocks.add_batch(sum_blocks(total, width, height, block), samples);
 }
 
+// What a pilot chose: other machines must have chosen the same.
+void identify_plan(const std::vector<TermRun>& terms, BatchStore& store) {
+  std::vector<double> counts;
+  for (const TermRun& term : terms) {
+    counts.push_back(term.samples);
+    counts.insert(counts.end(), term.pixel_samples.begin(), term.pixel_samples.end());
+  }
+  store.identify("choice of the pilot", fingerprint(counts));
+}
+
 // What a method does beside sampling its terms.
 struct TermMethod {
   const EdgeSamplerType& sampler;
   bool moves_directions = false;   // see direction_field.h
   bool spreads_samples = false;    // over pixels, see spread_samples
   bool random_directions = false;  // directions move by chance: to show that no mean changes
+  bool warps = false;              // directions follow the edges that they see, see warp_field.h
+  bool unbiased = false;           // the same without the bias of few rays
 };
 
 // The fewest samples of a term in one of a pixel, where they are spread: a rare event that a pilot
@@ -84,7 +98,8 @@ std::vector<DirectionField> random_fields(size_t count, const TermEstimator& est
 // A whole run of one method.
 class TermJob {
  public:
-  TermJob(const Scene& scene, const GradientOptions& options, const TermMethod& method, int threads)
+  TermJob(const Scene& scene, const GradientOptions& options, const TermMethod& method,
+          const RunSettings& settings)
       : scene_(scene), options_(options), method_(method), types_(terms_of(scene, method.sampler)) {
     const std::vector<std::string> chosen = selected_terms(term_names(), options.terms, scene.file);
     for (const TermType* type : types_) {
@@ -93,11 +108,17 @@ class TermJob {
     if (options.samples) check_samples(*options.samples);
     std::vector<Parameter> parameters;
     for (const auto& name : options.parameters) parameters.push_back(find_parameter(scene, name));
+    std::shared_ptr<const FilmRegions> visible;
+    if (options.exact_film) {
+      visible = std::make_shared<FilmRegions>(scene, settings.threads, settings.interrupted);
+    }
+    const Warping warping{options.warp, method.unbiased};
     for (size_t k = 0; k < parameters.size(); k += kLanes) {
       const auto some =
           std::span(parameters).subspan(k).first(std::min<size_t>(kLanes, parameters.size() - k));
-      passes_.push_back(
-          std::make_unique<TermEstimator>(scene, some, computed_, method.sampler, threads));
+      passes_.push_back(std::make_unique<TermEstimator>(scene, some, computed_, method.sampler,
+                                                        settings.threads, visible,
+                                                        method.warps ? &warping : nullptr));
     }
   }
 
@@ -106,11 +127,13 @@ class TermJob {
     GradientResult result = empty_result();
     for (size_t p = 0; p < passes_.size(); ++p) pass(p).describe(result.stats);
     plan(settings, watch, result);
+    if (settings.store) identify_plan(result.terms, *settings.store);
     result.setup_seconds = watch.seconds();
     run_batches(passes_, settings, watch, [&](const Batch& batch, const auto& sums) {
       add_batch(batch.count(), sums, result);
     });
     result.seconds = watch.seconds();
+    if (method_.warps) describe_warping(result);
     return result;
   }
 
@@ -134,6 +157,18 @@ class TermJob {
   }
 
  private:
+  void describe_warping(GradientResult& result) const {
+    TermCost all;
+    for (const TermRun& term : result.terms) all.merge(term.cost);
+    const auto share = [](uint64_t part, uint64_t of) {
+      return of > 0 ? static_cast<double>(part) / static_cast<double>(of) : 0;
+    };
+    result.settings.push_back({"auxiliary rays", static_cast<double>(options_.warp.rays)});
+    result.settings.push_back({"kappa", options_.warp.kappa});
+    result.settings.push_back({"directions ruled by one ray", share(all.dominated, all.warped)});
+    result.settings.push_back({"rays on an edge", static_cast<double>(all.dropped)});
+  }
+
   // What moving directions change in one term they take back in the others, and at every jump of
   // radiance there must be an edge.
   bool can_move_directions() const {
@@ -264,12 +299,13 @@ class TermJob {
   SamplePlan plan_by_pilot(TermEstimator& estimator, const RunSettings& settings,
                            const Stopwatch& watch, GradientResult& result) const {
     SamplePlan plan;
+    plan.splits = method_.spreads_samples && !options_.uniform_samples;
     const int spp = pilot_samples(settings.spp);
     if (spp == 0 || (!method_.spreads_samples && terms_computed() < 2)) return plan;
     const bool turns =
         method_.moves_directions && can_move_directions() && !estimator.motion_rates().still();
     SamplePlan probing;
-    probing.splits = plan.splits = method_.spreads_samples && !options_.uniform_samples;
+    probing.splits = plan.splits;
     if (method_.spreads_samples) probing.light_samples = kPilotLights;
     estimator.set_plan(probing);
     RunSettings share = settings;
@@ -362,20 +398,24 @@ MethodType method_row(const std::string& name, const std::string& description,
   method.name = name;
   method.description = description;
   for (const TermType& type : term_types()) {
-    if (!type.regions || term_method.sampler.regions) method.terms.emplace_back(type.name);
+    if (type.regions && !term_method.sampler.regions) continue;
+    method.terms.emplace_back(type.name);
   }
   method.terms_can_be_left_out = true;
   method.ablation = term_method.sampler.ablation || term_method.random_directions;
-  method.only_sum_fixed = term_method.moves_directions || term_method.random_directions;
+  method.only_sum_fixed =
+      term_method.moves_directions || term_method.random_directions || term_method.warps;
+  method.warps = term_method.warps;
+  method.biased = term_method.warps && !term_method.unbiased;
   method.run = [term_method](const MethodType&, const Scene& scene, const GradientOptions& options,
                              const RunSettings& settings) {
     const Stopwatch watch;
-    return TermJob(scene, options, term_method, settings.threads).run(settings, watch);
+    return TermJob(scene, options, term_method, settings).run(settings, watch);
   };
   method.trace = [term_method](const MethodType&, const Scene& scene,
                                const GradientOptions& options, const RunSettings& settings,
                                const NonFinite::Place& place) {
-    return TermJob(scene, options, term_method, settings.threads).trace(settings, place);
+    return TermJob(scene, options, term_method, settings).trace(settings, place);
   };
   return method;
 }
@@ -396,6 +436,16 @@ std::vector<MethodType> term_methods() {
   for (const EdgeSamplerType& type : edge_sampler_types()) {
     methods.push_back(method_row(type.name, type.description, {type}));
   }
+  // It chooses among few edges, where surfaces cross and touch: any will do, also one at rest.
+  const EdgeSamplerType& uniform = edge_sampler_type("uniform");
+  methods.push_back(method_row("was",
+                               "warped-area sampling (Bangaru et al. 2020): auxiliary rays in "
+                               "place of edges; biased, the less the more rays",
+                               {.sampler = uniform, .warps = true}));
+  methods.push_back(method_row("was-unbiased",
+                               "warped-area sampling without bias, by roulette over numbers of "
+                               "auxiliary rays",
+                               {.sampler = uniform, .warps = true, .unbiased = true}));
   methods.push_back(method_row("random-directions",
                                "silhouettes, with directions that move by chance: noise, but the "
                                "same mean",

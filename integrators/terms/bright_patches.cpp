@@ -57,7 +57,8 @@ Vec3d flux_around(const std::vector<Drawn>& drawn, const Vec3d& axis) {
 
 Vec3d brightest_axis(const std::vector<Drawn>& drawn) {
   Vec3d best{};
-  const size_t step = std::max<size_t>(1, drawn.size() / kCandidates);
+  // Odd, or candidates would come from few of the grid's columns and miss what lies in others.
+  const size_t step = drawn.size() / kCandidates | 1;
   for (size_t i = 0; i < drawn.size(); i += step) {
     const Vec3d around = flux_around(drawn, drawn[i].w);
     if (length_squared(around) > length_squared(best)) best = around;

@@ -48,13 +48,41 @@ std::span<const FaceRef> faces_that_move(const EdgeMesh& mesh, EdgeId edge) {
 }  // namespace
 
 CameraEdges::CameraEdges(const PathContext& context, const EdgeSamplerInput& input, int lanes,
-                         const FreeMotion* free)
+                         const FreeMotion* free, const FilmRegions* visible)
     : context_(context), input_(input), free_(free), clips_(find_clip_segments(context.scene)) {
   const Stopwatch watch;
   for (uint32_t o = 0; o < input_.objects.size(); ++o) add_object(ShapeId(o));
   for (uint32_t c = 0; c < clips_.size(); ++c) add_clip(c);
+  if (visible) keep_seen(*visible);
   weigh(free_ ? 3 : lanes);
   list_seconds_ = watch.seconds();
+}
+
+// Lines keep their speeds where they are cut, which change linearly along them.
+void CameraEdges::keep_seen(const FilmRegions& visible) {
+  std::vector<FilmEdge> seen;
+  for (const FilmEdge& edge : edges_) {
+    const bool is_clip = edge.clip != FilmEdge::kNoClip;
+    const FacesAround around = is_clip ? FacesAround{{&clips_[edge.clip].face, 1}, {}}
+                                       : input_.object(edge.id.object).around(edge.id.edge);
+    for (const auto& [s0, s1, beside] :
+         visible.seen_parts({edge.x0, edge.y0}, {edge.x1, edge.y1}, around.all)) {
+      const auto at = [](const auto& a, const auto& b, double s) { return a * (1 - s) + b * s; };
+      const auto depth_at = [&](double s) { return 1 / at(1 / edge.depth0, 1 / edge.depth1, s); };
+      FilmEdge part = edge;
+      part.t0 = at(edge.t0, edge.t1, fraction_in_space(s0, edge.depth0, edge.depth1));
+      part.t1 = at(edge.t0, edge.t1, fraction_in_space(s1, edge.depth0, edge.depth1));
+      part.depth0 = depth_at(s0), part.depth1 = depth_at(s1);
+      part.x0 = at(edge.x0, edge.x1, s0), part.x1 = at(edge.x0, edge.x1, s1);
+      part.y0 = at(edge.y0, edge.y1, s0), part.y1 = at(edge.y0, edge.y1, s1);
+      part.speed0 = at(edge.speed0, edge.speed1, s0);
+      part.speed1 = at(edge.speed0, edge.speed1, s1);
+      part.length = edge.length * (s1 - s0);
+      if (around.near.empty()) part.beside = beside;
+      seen.push_back(part);
+    }
+  }
+  edges_ = std::move(seen);
 }
 
 // Whether all faces around the edge are emitters that the camera does not see.
@@ -121,7 +149,11 @@ bool CameraEdges::clip_and_project(EdgeRef id, FilmEdge& edge) const {
   const double depth_b = camera.depth(b);
   double t0 = 0;
   double t1 = 1;
-  if (!clip(depth_a, depth_b - depth_a, camera.near_clip, camera.far_clip, t0, t1)) return false;
+  // Nearer than 16 roundings of depth only an edge through the pinhole itself is seen.
+  const Vec3d pinhole = value(camera.origin);
+  const double rounding = 0x1p-48 * (length(a - pinhole) + length(b - pinhole));
+  const double near = std::max(camera.near_clip, rounding);
+  if (!clip(depth_a, depth_b - depth_a, near, camera.far_clip, t0, t1)) return false;
 
   const auto at = [&](double t) { return a + (b - a) * t; };
   const auto film0 = camera.project(at(t0));
@@ -140,7 +172,6 @@ bool CameraEdges::clip_and_project(EdgeRef id, FilmEdge& edge) const {
     if (!mesh.tangents.empty()) d = mesh.tangent(ends[0]) * (1 - t) + mesh.tangent(ends[1]) * t;
     return moving(at(t), d);
   };
-  const Vec3d pinhole = value(camera.origin);
   return place_on_film(moving_at(edge.t0), moving_at(edge.t1), cross(a - pinhole, b - pinhole),
                        edge);
 }
@@ -185,28 +216,24 @@ void CameraEdges::weigh(int lanes) {
   for (const FilmEdge& edge : edges_) {
     for (int k = 0; k < lanes; ++k) totals[k] += weighted_speed(edge, k);
   }
-  double sum = 0;
   for (const FilmEdge& edge : edges_) {
+    double share = 0;
     for (int k = 0; k < lanes; ++k) {
-      if (totals[k] > 0) sum += weighted_speed(edge, k) / totals[k];
+      if (totals[k] > 0) share += weighted_speed(edge, k) / totals[k];
     }
-    cumulative_.push_back(sum);
+    choice_.add(share);
   }
 }
 
 FilmEdgePoint CameraEdges::choose(double u) const {
-  const double target = u * cumulative_.back();
-  const auto found = std::upper_bound(cumulative_.begin(), cumulative_.end(), target);
-  const size_t index = std::min<size_t>(found - cumulative_.begin(), edges_.size() - 1);
-  const double below = index == 0 ? 0 : cumulative_[index - 1];
-  const double weight = cumulative_[index] - below;
-  const FilmEdge& edge = edges_[index];
+  const DiscreteDistribution::Draw draw = choice_.sample(u);
+  const FilmEdge& edge = edges_[draw.index];
   FilmEdgePoint point;
   point.edge = &edge;
-  point.s = std::clamp((target - below) / weight, 0.0, 1.0);
+  point.s = draw.fraction;
   point.x = edge.x0 + (edge.x1 - edge.x0) * point.s;
   point.y = edge.y0 + (edge.y1 - edge.y0) * point.s;
-  point.density = weight / (cumulative_.back() * edge.length);
+  point.density = draw.probability / edge.length;
   return point;
 }
 
@@ -230,7 +257,7 @@ bool CameraEdges::jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& 
   if (!view_edge(mesh, edge.id, t, value(camera.origin), view)) return false;
   const double cosine = dot(view.omega, value(camera.forward));
   return edge_jump(context_, mesh, view, {}, camera.near_clip / cosine, camera.far_clip / cosine, 0,
-                   key, rays, jump);
+                   key, rays, jump, {}, edge.beside ? &*edge.beside : nullptr);
 }
 
 }  // namespace limn

@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "integrators/terms/clip_curves.h"
+#include "integrators/terms/film_regions.h"
+#include "limn/core/discrete_distribution.h"
 #include "limn/edgetree/edge_sampler.h"
 
 namespace limn {
@@ -19,6 +21,7 @@ struct FilmEdge {
   double nx, ny;            // the film normal n
   Lanes speed0, speed1;     // v_n there [pixels]; n points to the positive side of EdgeView::side
   double length;            // [pixels]
+  std::optional<FaceRef> beside = {};  // FilmRegions::SeenPart; none: a ray tells
 };
 
 // A point of one of them.
@@ -45,9 +48,10 @@ class CameraEdges {
  public:
   // free: then all that may move is listed, with the speeds of unit translations in the first three
   // lanes (relative to the camera); null: what the scene's tangents move, with their speeds in
-  // `lanes` lanes.
+  // `lanes` lanes. visible: of the film, to list only what is seen of edges; null: hidden parts are
+  // listed too, and found to be hidden by jump_at.
   CameraEdges(const PathContext& context, const EdgeSamplerInput& input, int lanes,
-              const FreeMotion* free = nullptr);
+              const FreeMotion* free = nullptr, const FilmRegions* visible = nullptr);
 
   bool empty() const { return edges_.empty(); }
   size_t size() const { return edges_.size(); }
@@ -75,6 +79,7 @@ class CameraEdges {
   Vec3<Dual> moving(const Vec3d& x, const Vec3<Lanes>& velocity) const;
   bool place_on_film(const Vec3<Dual>& x0, const Vec3<Dual>& x1, const Vec3d& side,
                      FilmEdge& edge) const;
+  void keep_seen(const FilmRegions& visible);
   void weigh(int lanes);
 
   const PathContext& context_;
@@ -82,7 +87,7 @@ class CameraEdges {
   const FreeMotion* free_;
   std::vector<ClipSegment> clips_;
   std::vector<FilmEdge> edges_;
-  std::vector<double> cumulative_;  // probabilities of the edges, summed
+  DiscreteDistribution choice_;  // of an edge
   double list_seconds_ = 0;
 };
 

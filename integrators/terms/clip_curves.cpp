@@ -4,6 +4,13 @@
 namespace limn {
 namespace {
 
+// What rounding may make of the depth of points on a triangle, with a margin of 16 roundings.
+double depth_rounding(const Camera& camera, const std::array<Vec3d, 3>& corners) {
+  double size = 0;
+  for (const Vec3d& x : corners) size = std::max(size, length(x - value(camera.origin)));
+  return 0x1p-48 * size;
+}
+
 // Faces that a plane of this depth cuts.
 void append_segments(const Scene& scene, ShapeId shape, double clip, bool at_far_plane,
                      std::vector<ClipSegment>& segments) {
@@ -15,6 +22,8 @@ void append_segments(const Scene& scene, ShapeId shape, double clip, bool at_far
     for (int k = 0; k < 3; ++k) beyond[k] = camera.depth(corners[k]) > clip;
     if ((beyond[0] == beyond[1] && beyond[1] == beyond[2]) || !has_area(mesh, mesh.faces[f]))
       continue;
+    // Seen only by a pinhole on the face itself, as far as double precision can tell.
+    if (clip < depth_rounding(camera, corners)) continue;
     const auto moving = face_corners<Dual>(mesh, FaceId(f));
     ClipSegment segment{{shape, FaceId(f)}, at_far_plane, {}, {}};
     int count = 0;
@@ -53,8 +62,11 @@ bool clip_jump(const PathContext& context, const ClipSegment& segment, const Vec
   const double distance = length(y - pinhole);
   Ray ray{pinhole, (y - pinhole) / distance};
   const double cosine = dot(ray.direction, value(scene.camera.forward));
-  ray.start = segment.face;
   ray.skip_emitters = scene.hide_emitters;
+  Hit cut{segment.face, distance};
+  context.tracer.settle(ray, cut);
+  if (cut.face != segment.face) return false;  // it is not seen where it is cut
+  ray.start = segment.face;
   ray.t_min = segment.at_far_plane ? scene.camera.near_clip / cosine : distance;
   ray.t_max = segment.at_far_plane ? distance : scene.camera.far_clip / cosine;
   Hit hit;

@@ -51,11 +51,15 @@ inline Lanes divergence(const Vec3d& w, const DirectionTurn& turn) {
   return along(turn.axis) - along(w) * (3 * dot(turn.axis, w));
 }
 
+struct DirectionWarp;
+
 // The same at one vertex [1 / unit of the parameter].
 struct DirectionMotion {
   DirectionTurn turn, score;
   bool scoring = false;  // whether the score is not zero
   double unit = 0;       // MotionRates::at the vertex
+  // Of one direction, in place of the turn: see warp_field.h.
+  const DirectionWarp* warp = nullptr;
 };
 
 // How fast what moves does so as seen from a point: the unit of all turns. One for all parameters,

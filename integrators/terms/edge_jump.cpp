@@ -31,9 +31,9 @@ struct Sides {
 };
 
 // Whether a face is seen before another one on the same side.
-bool hides(const Scene& scene, const FaceSide& a, double slope_a, const FaceSide& b, double slope_b,
-           const Vec3d& omega) {
-  if (overlap(a, b)) return is_met_first(scene, a.face, b.face, omega);
+bool hides(const PathContext& context, const FaceSide& a, double slope_a, const FaceSide& b,
+           double slope_b, const Vec3d& omega) {
+  if (overlap(context.tracer, a, b)) return is_met_first(context.scene, a.face, b.face, omega);
   return slope_a < slope_b;
 }
 
@@ -53,8 +53,9 @@ void fetch_corners(const Scene& scene, const FacesAround& around) {
 // In the plane across the edge, a face leaves the edge along the unit vector a = alpha m + beta w,
 // with m the normal of the viewing plane through the edge and w the part of omega across the edge:
 // it lies on the side of alpha's sign, and the smaller beta / |alpha|, the nearer it is.
-Sides nearest_faces(const Scene& scene, const EdgeMesh& mesh, const EdgeView& view,
+Sides nearest_faces(const PathContext& context, const EdgeMesh& mesh, const EdgeView& view,
                     bool hide_emitters) {
+  const Scene& scene = context.scene;
   const Vec3d along = normalize(view.x1 - view.x0);
   const Vec3d across = view.omega - along * dot(view.omega, along);
   const FacesAround around = mesh.around(view.id.edge);
@@ -78,7 +79,7 @@ Sides nearest_faces(const Scene& scene, const EdgeMesh& mesh, const EdgeView& vi
     for (const bool place : {false, true}) {
       if (!order.is_seen(rim, positive, own, place)) continue;
       auto& nearest = place ? sides.positive : sides.negative;
-      if (nearest && !hides(scene, side, slope, *nearest, slopes[place], view.omega)) continue;
+      if (nearest && !hides(context, side, slope, *nearest, slopes[place], view.omega)) continue;
       nearest = side;
       slopes[place] = slope;
     }
@@ -90,7 +91,8 @@ Sides nearest_faces(const Scene& scene, const EdgeMesh& mesh, const EdgeView& vi
 
 bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView& view,
                FaceRef start, double t_min, double t_max, int bounces, const Rng& key,
-               RayCount& rays, Rgb<double>& jump, const RadiancePart& part) {
+               RayCount& rays, Rgb<double>& jump, const RadiancePart& part,
+               const FaceRef* known_behind) {
   Ray ray{view.p, view.omega};
   ray.t_min = t_min;
   ray.t_max = t_max;
@@ -106,10 +108,16 @@ bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView&
   ray.skip_emitters = bounces == 0 && context.scene.hide_emitters;
   fetch_corners(context.scene, around);  // while the ray is traced
   Hit behind;
-  ++rays.closest;
-  const bool found =
-      closest_at_edge(context.tracer, context.scene, around, view.y, view.distance, ray, behind);
-  if (found && behind.t < view.distance) return false;
+  bool found;
+  if (known_behind) {
+    behind.face = *known_behind;
+    found = known_behind->shape.valid();
+  } else {
+    ++rays.closest;
+    found =
+        closest_at_edge(context.tracer, context.scene, around, view.y, view.distance, ray, behind);
+    if (found && behind.t < view.distance) return false;
+  }
 
   NoVisitor nothing;
   PathTracer<double, NoVisitor> path(context, rays, nothing);
@@ -136,7 +144,7 @@ bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView&
     const Rgb<double> all = path.escaped(view.omega, bounces);
     return part.regions ? all - part.regions->escaped(view.omega) : all;
   };
-  const Sides sides = nearest_faces(context.scene, mesh, view, ray.skip_emitters);
+  const Sides sides = nearest_faces(context, mesh, view, ray.skip_emitters);
   jump = radiance(sides.negative) - radiance(sides.positive);
   return true;
 }

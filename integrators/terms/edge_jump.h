@@ -25,10 +25,12 @@ bool view_edge(const EdgeMesh& mesh, EdgeRef id, double t, const Vec3d& p, EdgeV
 // the edge that lie on that side, or, where there is none, what lies behind the edge: the same rule
 // for silhouettes, borders, sharp edges and edges of many faces. start: the face that p lies on;
 // t_min, t_max: where rays from p begin and end (the clip planes of a camera); bounces: how often
-// the path has scattered, p included; part: of the radiance. The unit directions and both faces are
-// exact, nothing is offset.
+// the path has scattered, p included; part: of the radiance; known_behind: y is seen, and what lies
+// behind the edge is this face, or none (null: a ray tells both). The unit directions and both
+// faces are exact, nothing is offset.
 bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView& view,
                FaceRef start, double t_min, double t_max, int bounces, const Rng& key,
-               RayCount& rays, Rgb<double>& jump, const RadiancePart& part = {});
+               RayCount& rays, Rgb<double>& jump, const RadiancePart& part = {},
+               const FaceRef* known_behind = nullptr);
 
 }  // namespace limn

@@ -7,8 +7,6 @@
 
 namespace limn {
 
-// A component of x0 may be off by its own rounding, one of a by that of the corner, one of `across`
-// by three roundings of |a|.
 FaceSide side_of_face(const Scene& scene, FaceRef face, const Vec3d& x0, const Vec3d& along) {
   FaceSide side{face, {}};
   double best_length = 0;
@@ -19,14 +17,13 @@ FaceSide side_of_face(const Scene& scene, FaceRef face, const Vec3d& x0, const V
     if (across_length > best_length) {
       best_length = across_length;
       side.into = across / across_length;
-      side.rounding = 0x1.0p-50 * (length(x0) + length(a)) / across_length;
     }
   }
   return side;
 }
 
-bool overlap(const FaceSide& a, const FaceSide& b) {
-  return length(a.into - b.into) <= a.rounding + b.rounding;
+bool overlap(const RayTracer& tracer, const FaceSide& a, const FaceSide& b) {
+  return dot(a.into, b.into) > 0 && tracer.overlap(a.face, b.face);
 }
 
 void RimOrder::add(uint8_t rim, bool positive, double slope) {
@@ -49,8 +46,8 @@ bool RimOrder::comes_before(uint8_t a, uint8_t b) const {
 // In the plane across the edge a face is a ray {s g, s >= 0} and the path starts at a point f of
 // its own face, |f| -> 0. It meets g where f + r w = s g with r, s > 0; by Cramer's rule r = (f x
 // g) / (g x w), s = (f x w) / (g x w). Lengths drop out.
-std::optional<FaceSide> blocked_at_edge(const Scene& scene, const EdgeStart& edge,
-                                        const Vec3d& direction) {
+std::optional<FaceSide> blocked_at_edge(const Scene& scene, const RayTracer& tracer,
+                                        const EdgeStart& edge, const Vec3d& direction) {
   const Vec3d along = normalize(edge.x1 - edge.x0);
   const Vec3d& f = edge.start.into;
   const auto turn = [&](const Vec3d& a, const Vec3d& b) { return dot(along, cross(a, b)); };
@@ -59,12 +56,12 @@ std::optional<FaceSide> blocked_at_edge(const Scene& scene, const EdgeStart& edg
   for_every_side(scene, edge.around, edge.x0, along, [&](const FaceSide& side, Incidence) {
     if (side.face == edge.start.face) return;
     const Vec3d& g = side.into;
-    if (overlap(side, edge.start)) return;
+    if (overlap(tracer, side, edge.start)) return;
     const double gw = turn(g, direction);
     const double r = turn(f, g) / gw;
     const double s = turn(f, direction) / gw;
     if (gw == 0 || !(r > 0) || !(s > 0)) return;
-    const bool first = !nearest || (overlap(side, *nearest)
+    const bool first = !nearest || (overlap(tracer, side, *nearest)
                                         ? is_met_first(scene, side.face, nearest->face, direction)
                                         : r < nearest_r);
     if (first) {

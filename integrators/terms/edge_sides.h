@@ -5,17 +5,17 @@
 #include <cstdint>
 #include <optional>
 
+#include "limn/core/ray_tracer.h"
 #include "limn/core/shading.h"
 #include "limn/edgetree/edges.h"
 
 namespace limn {
 
 // One side of a face beside an edge: the face, and the unit vector across the edge that lies in it
-// and points into it, with a bound of its rounding.
+// and points into it.
 struct FaceSide {
   FaceRef face;
   Vec3d into;
-  double rounding = 0;
 };
 
 // A path that starts exactly on an edge, on one of the faces around it. Its first rays never meet
@@ -31,9 +31,9 @@ struct EdgeStart {
 // the two sides; the other is its opposite.
 FaceSide side_of_face(const Scene& scene, FaceRef face, const Vec3d& x0, const Vec3d& along);
 
-// Whether two sides lie in one place, so that the faces overlap there: as far as double precision
-// can tell. Which of them is seen is_met_first says (limn/core/face_copies.h).
-bool overlap(const FaceSide& a, const FaceSide& b);
+// Whether two sides lie in one place. Which of them is seen is_met_first says
+// (limn/core/face_copies.h), as for all rays.
+bool overlap(const RayTracer& tracer, const FaceSide& a, const FaceSide& b);
 
 // Calls visit(side, incidence) for every side of the faces around an edge.
 template <class Visit>
@@ -44,7 +44,7 @@ void for_every_side(const Scene& scene, const FacesAround& around, const Vec3d& 
     const Incidence incidence = around.incidence(i);
     const FaceSide side = side_of_face(scene, face, x0, along);
     visit(side, incidence);
-    if (incidence.through) visit(FaceSide{face, -side.into, side.rounding}, incidence);
+    if (incidence.through) visit(FaceSide{face, -side.into}, incidence);
   }
 }
 
@@ -75,7 +75,7 @@ class RimOrder {
 };
 
 // The side that a ray meets at once when it leaves edge.start infinitely close to the edge, if any.
-std::optional<FaceSide> blocked_at_edge(const Scene& scene, const EdgeStart& edge,
-                                        const Vec3d& direction);
+std::optional<FaceSide> blocked_at_edge(const Scene& scene, const RayTracer& tracer,
+                                        const EdgeStart& edge, const Vec3d& direction);
 
 }  // namespace limn

@@ -24,7 +24,7 @@ std::optional<FilmPoint> film_point(const Scene& scene, FaceRef face, const Vec3
 bool is_hidden(const PathContext& context, const FilmPoint& point, FaceRef face, RayCount& rays) {
   Ray ray{value(point.ray.origin), point.omega, point.ray.t_min,
           point.distance * (1 - 0x1p-20)};  // as shadow rays end
-  ray.start = face;
+  ray.end = face;
   ray.skip_emitters = context.scene.hide_emitters;
   ++rays.shadow;
   return context.tracer.occluded(ray);

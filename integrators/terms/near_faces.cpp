@@ -34,14 +34,46 @@ std::optional<Hit> meet_near_faces(const Scene& scene, const FacesAround& around
 
 }  // namespace
 
+namespace {
+
+// closest_at_edge by two rays that start at y, back to the ray's origin and on.
+bool closest_from_edge(const RayTracer& tracer, const Scene& scene, const FacesAround& around,
+                       const Vec3d& y, double distance, const Ray& ray, Hit& hit) {
+  Ray back = ray;
+  back.origin = y;
+  back.direction = -ray.direction;
+  back.t_min = 0;
+  back.t_max = (distance - ray.t_min) * (1 - 0x1p-20);  // as shadow rays end
+  if (occluded_from_edge(tracer, scene, around, back)) {
+    hit = {{}, 0};
+    return true;
+  }
+  Ray on = ray;
+  on.origin = y;
+  on.t_min = 0;
+  on.t_max = ray.t_max - distance;
+  if (!closest_at_edge(tracer, scene, around, y, 0, on, hit)) return false;
+  hit.t += distance;
+  return true;
+}
+
+}  // namespace
+
 bool closest_at_edge(const RayTracer& tracer, const Scene& scene, const FacesAround& around,
                      const Vec3d& y, double distance, const Ray& ray, Hit& hit) {
+  // Near faces are those that rays from the camera, or from no farther away, cannot tell.
+  if (distance > length(y - value(scene.camera.origin)) && distance > ray.t_min &&
+      distance < ray.t_max)
+    return closest_from_edge(tracer, scene, around, y, distance, ray, hit);
   const bool found = tracer.closest(ray, hit);
   if (around.near.empty()) return found;
   const double to = (found ? hit.t : ray.t_max) - distance;
   auto near = meet_near_faces(scene, around, y, ray, ray.t_min - distance, std::min(to, 0.0));
   if (!near) near = meet_near_faces(scene, around, y, ray, 0, to);
-  if (near) hit = {near->face, near->t + distance};
+  if (near) {
+    hit = {near->face, near->t + distance};
+    tracer.settle(ray, hit);
+  }
   return found || near;
 }
 

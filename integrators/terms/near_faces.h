@@ -9,7 +9,7 @@ namespace limn {
 
 // As RayTracer::closest, for a ray that passes through the point y of an edge at t = `distance` (0
 // if it starts there) and that skips around.all: the near faces among them are met all the same,
-// but not at y.
+// but not at y. A hit before y may lack its face and distance (0).
 bool closest_at_edge(const RayTracer& tracer, const Scene& scene, const FacesAround& around,
                      const Vec3d& y, double distance, const Ray& ray, Hit& hit);
 // As RayTracer::occluded, for a ray that starts at a point of an edge and skips around.all.

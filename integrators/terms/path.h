@@ -2,13 +2,15 @@
 // The path tracer, written once for any scalar: double gives radiance, Dual gives radiance and the
 // interior term of its derivative, Var writes a tape of it. Sampled directions, their densities and
 // MIS weights are constants while the parameters move (solid-angle measure, everywhere), but for
-// the one direction of a light without extent, which follows the parameters.
+// directions that move on purpose (direction_field.h, warp_field.h) and the one direction of a light
+// without extent, which follows the parameters.
 #include <atomic>
 #include <cstdint>
 
 #include "integrators/terms/direction_field.h"
 #include "integrators/terms/edge_sides.h"
 #include "integrators/terms/near_faces.h"
+#include "integrators/terms/warp_field.h"
 #include "limn/core/lights.h"
 #include "limn/core/ray_tracer.h"
 #include "limn/core/reverse.h"
@@ -58,6 +60,11 @@ class PathTracer {
     rates_ = &rates;
     field_ = &field;
   }
+  // The directions of all vertices move from now on. Must outlive the tracer.
+  void warp_directions(DirectionWarper& warper) {
+    static_assert(std::is_same_v<S, Dual>);
+    warper_ = &warper;
+  }
   // Takes more light samples at later vertices that slide fast. It must outlive the tracer.
   void split_by(const MotionRates* rates) { splitting_ = rates; }
   // How many light samples are averaged at every vertex but the first.
@@ -99,40 +106,62 @@ class PathTracer {
   Rgb<S> from_surface(SurfacePoint<S> surface, Vec3<S> wi, int bounces, const Rng& key,
                       EdgeStart* edge) {
     Rgb<S> radiance = surface.emission(value(wi), c_.scene.shading);
-    Rgb<S> throughput = grey(S(1.0));
+    follow({surface, wi, grey(S(1.0)), {}}, bounces, key, edge, false, radiance);
+    return radiance;
+  }
+
+ private:
+  // A vertex of a path and how it was reached.
+  struct Arrival {
+    SurfacePoint<S> surface;
+    Vec3<S> wi;
+    Rgb<S> throughput;
     PathStep step;
-    for (;; ++bounces) {
-      if (is_complete(bounces)) return radiance;
+    int paths = 1;  // that share the vertex with this one, since some vertex slid fast
+  };
+  // Adds what is scattered along the path. again: all but what further directions bring has been
+  // added.
+  void follow(Arrival at, int bounces, const Rng& key, EdgeStart* edge, bool again,
+              Rgb<S>& radiance) {
+    auto& [surface, wi, throughput, step, paths] = at;
+    for (;; ++bounces, again = false) {
+      if (is_complete(bounces)) return;
       const Scattering<S> scattering(surface, wi, c_.scene.shading);
-      if (scattering.black()) return radiance;
+      if (scattering.black()) return;
       const DirectionMotion* motion = motion_at(surface, bounces);
-      visitor_(surface, scattering, throughput, motion, step, bounces, key);
-      add_lights(surface, scattering, motion, throughput, bounces, key, edge, radiance);
+      if (!again) {
+        visitor_(surface, scattering, throughput, motion, step, bounces, key);
+        add_lights(surface, scattering, motion, throughput, bounces, key, edge, radiance);
+        split(at, bounces, key, edge, radiance);
+      }
       Rng rng = key.at(Purpose::kBsdf, bounces);
       const double u1 = rng.uniform();
       const double u2 = rng.uniform();
       const auto wo = scattering.sample(u1, u2);
-      if (!wo) return radiance;
+      if (!wo) return;
+      if constexpr (std::is_same_v<S, Dual>) {
+        if (warper_) motion = warper_->motion(surface, *wo, rng.at(Purpose::kBsdf, 1));
+      }
       const Vec3<S> direction = moving(*wo, motion);
       const auto [f, pdf] = evaluate(scattering, *wo, direction, motion);
-      if (is_black(value(f))) return radiance;
+      if (is_black(value(f))) return;
       add_score(scattering, *wo, motion, value(throughput) * (1 / pdf));
       const Rgb<S> before = throughput;
       throughput = throughput * stretched(f, *wo, motion) * (1 / pdf);
       step = {value(surface.p), pdf};
       // Behind the last scattering only what emits counts.
       const bool last = is_complete(bounces + 1), shapes_emit = c_.lights.on_shapes();
-      if (last && !shapes_emit && !c_.scene.environment) return radiance;
+      if (last && !shapes_emit && !c_.scene.environment) return;
       Hit hit;
       const bool found = next_hit(surface, *wo, edge, last && !shapes_emit, hit);
       if (!found) {
-        if (!c_.scene.environment) return radiance;
+        if (!c_.scene.environment) return;
         auto sight = c_.lights.template environment<S>(*wo);
         if (motion) sight.radiance = environment_radiance<S>(*c_.scene.environment, direction);
         radiance += throughput * sight.radiance * mis_weight(pdf, sight.pdf);
-        return radiance;
+        return;
       }
-      if (last && !(shapes_emit && c_.scene.shape(hit.face.shape).is_emitter)) return radiance;
+      if (last && !(shapes_emit && c_.scene.shape(hit.face.shape).is_emitter)) return;
       if (hit.t > 0) {
         surface = surface_on_ray<S>(c_.scene, hit.face, surface.p, direction);
         edge = nullptr;
@@ -141,16 +170,15 @@ class PathTracer {
       }
       wi = -direction;
       const Rgb<S> lamp = emitted(surface, *wo, pdf, hit.t);
-      if (motion && !is_black(value(lamp))) {
+      if (motion && !motion->warp && !is_black(value(lamp))) {
         radiance += before * scattering.eval(*wo) * lamp * (1 / pdf);  // held
       } else {
         radiance += throughput * lamp;
       }
-      if (!survives_roulette(throughput, bounces + 1, key)) return radiance;
+      if (!survives_roulette(throughput, bounces + 1, key)) return;
     }
   }
 
- private:
   // Whether a path that has scattered so often scatters no more.
   bool is_complete(int bounces) const {
     return c_.scene.max_depth >= 0 && bounces + 1 >= c_.scene.max_depth;
@@ -165,7 +193,7 @@ class PathTracer {
   }
   static Vec3<S> moving(const Vec3d& w, const DirectionMotion* motion) {
     if constexpr (std::is_same_v<S, Dual>) {
-      if (motion) return turning(w, motion->turn);
+      if (motion) return motion->warp ? warped(w, *motion->warp) : turning(w, motion->turn);
     }
     return {w.x, w.y, w.z};
   }
@@ -178,6 +206,7 @@ class PathTracer {
   // Times the change of a solid angle around w.
   static Rgb<S> stretched(const Rgb<S>& f, const Vec3d& w, const DirectionMotion* motion) {
     if constexpr (std::is_same_v<S, Dual>) {
+      if (motion && motion->warp) return f * Dual(1.0, motion->warp->divergence);
       if (motion && motion->turn.follows()) return f * Dual(1.0, divergence(w, motion->turn));
     }
     return f;
@@ -196,21 +225,32 @@ class PathTracer {
     }
   }
 
-  // Light samples in place of one: where a vertex slides fast, what they add is as large.
+  // Where a vertex slides fast, what further directions bring is as large: more of them in place of
+  // one. What slides at one vertex does so at the next ones; kMostSplits paths have to do for all.
+  void split(Arrival& at, int bounces, const Rng& key, EdgeStart* edge, Rgb<S>& radiance) {
+    const int copies = std::min(splits(at.surface), kMostSplits / at.paths);
+    if (copies == 1) return;
+    at.paths *= copies;
+    at.throughput = at.throughput * (1.0 / copies);
+    for (int i = 1; i < copies; ++i) {
+      // Beyond the indices of paths that share no vertex.
+      const int index = kMostPaths * (bounces + 1) + i;
+      follow(at, bounces, key.copy(Purpose::kPathCopy, index), edge, true, radiance);
+    }
+  }
   int splits(const SurfacePoint<S>& surface) const {
     if constexpr (std::is_same_v<S, Dual>) {
-      constexpr double kMost = 16;  // not tuned
       if (!splitting_) return 1;
       const double slides = splitting_->sliding({surface.p.x.d, surface.p.y.d, surface.p.z.d});
-      return static_cast<int>(slides < kMost ? std::max(slides, 1.0)
-                                             : kMost);  // also if not finite
+      return slides < kMostSplits ? static_cast<int>(std::max(slides + 0.5, 1.0))
+                                  : kMostSplits;  // also if not finite
     }
     return 1;
   }
   void add_lights(const SurfacePoint<S>& surface, const Scattering<S>& scattering,
                   const DirectionMotion* motion, const Rgb<S>& throughput, int bounces,
                   const Rng& key, const EdgeStart* edge, Rgb<S>& radiance) {
-    const int count = bounces > 0 ? light_samples_ * splits(surface) : 1;
+    const int count = (bounces > 0 ? light_samples_ : 1) * splits(surface);
     if (bounces > 0) later_lights_ += count;
     if (count == 1) {
       radiance += throughput * direct_light(surface, scattering, motion, bounces, key, edge);
@@ -232,7 +272,7 @@ class PathTracer {
     Ray ray{value(surface.p), wo};
     ray.start = surface.face;
     if (edge) {
-      if (const auto side = blocked_at_edge(c_.scene, *edge, wo)) {
+      if (const auto side = blocked_at_edge(c_.scene, c_.tracer, *edge, wo)) {
         edge->start = *side;
         hit = {side->face, 0};
         return true;
@@ -274,6 +314,9 @@ class PathTracer {
     if (const DeltaLight* delta = light->light->delta()) {
       return delta_light(*delta, *light, surface, scattering, edge);
     }
+    if constexpr (std::is_same_v<S, Dual>) {
+      if (warper_) return warped_light(*light, surface, scattering, rng);
+    }
     if (light->face) motion = nullptr;  // a lamp: held
     const Vec3<S> direction = moving(light->wo, motion);
     const auto [f, bsdf_pdf] = evaluate(scattering, light->wo, direction, motion);
@@ -285,6 +328,21 @@ class PathTracer {
       }
     }
     return f * light->light->template drawn_radiance<S>(*light) * weight;
+  }
+
+  // The same where directions are warped: auxiliary rays are traced for light that arrives.
+  Rgb<S> warped_light(const LightSample& light, const SurfacePoint<S>& surface,
+                      const Scattering<S>& scattering, const Rng& key) {
+    if (is_black(scattering.eval_value(light.wo))) return {};
+    if (shadowed(value(surface.p), surface.face, light, nullptr)) return {};
+    const DirectionMotion* motion =
+        warper_->motion(surface, light.wo, key.at(Purpose::kEmitter, 1));
+    const Vec3<S> direction = moving(light.wo, motion);
+    const auto [f, bsdf_pdf] = evaluate(scattering, light.wo, direction, motion);
+    const double weight = mis_weight(light.pdf, bsdf_pdf) / light.pdf;
+    const Rgb<S> radiance = motion && !light.face ? light.light->radiance(direction)
+                                                  : light.light->template drawn_radiance<S>(light);
+    return stretched(f, light.wo, motion) * radiance * weight;
   }
 
   // No ray meets a delta light by chance, so it has the whole weight. Its direction follows the
@@ -305,7 +363,7 @@ class PathTracer {
     ray.start = start;
     ray.end = light.face.value_or(FaceRef{});
     if (edge) {
-      if (blocked_at_edge(c_.scene, *edge, light.wo)) return true;
+      if (blocked_at_edge(c_.scene, c_.tracer, *edge, light.wo)) return true;
       ray.skip_faces = edge->around.all;
     }
     // Ends a float's rounding before the light, so that neighbours of the chosen face do not hide
@@ -326,12 +384,15 @@ class PathTracer {
     return true;
   }
 
+  static constexpr int kMostSplits = 16;  // not tuned
+  static constexpr int kMostPaths = 64;   // of a sample, see allocation.cpp
   const PathContext& c_;
   RayCount& rays_;
   Visitor& visitor_;
   const MotionRates* rates_ = nullptr;
   const DirectionField* field_ = nullptr;
   const MotionRates* splitting_ = nullptr;
+  DirectionWarper* warper_ = nullptr;
   DirectionMotion motion_;
   Rgb<Lanes> score_;
   int light_samples_ = 1;

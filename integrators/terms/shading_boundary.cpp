@@ -3,6 +3,8 @@
 // apart.
 //   dL_o/dtheta  +=  sum over edges of the integral over t of dL(t) f_s(w_t) J(t) dt,
 //   J(t) = det(w_0, w_1, v) / |w|^3
+#include <algorithm>
+
 #include "integrators/terms/term_table.h"
 #include "integrators/terms/vertex_edges.h"
 
@@ -13,12 +15,14 @@ class BoundaryTerm final : public Term {
  public:
   explicit BoundaryTerm(TermInput& input)
       : context_(input.context),
-        edges_(input.edges()),
+        edges_(input.chosen_edges()),
         sampler_(input.edge_sampler()),
         build_seconds_(input.edge_sampler_seconds()),
-        part_{input.regions()} {}
+        part_{input.regions()},
+        nothing_(input.warps && std::all_of(edges_.objects.begin(), edges_.objects.end(),
+                                            [](const EdgeMesh& m) { return m.edges.empty(); })) {}
 
-  bool uses_vertices() const override { return true; }
+  bool uses_vertices() const override { return !nothing_; }
   void add_at_vertex(const PathVertex& vertex, int samples, TermCost& cost,
                      Rgb<Lanes>& sum) const override {
     if (is_left_out(vertex.bounces)) return;
@@ -54,6 +58,7 @@ class BoundaryTerm final : public Term {
   const EdgeSampler& sampler_;
   double build_seconds_;
   RadiancePart part_;
+  bool nothing_;  // warped directions follow all edges
 };
 
 void BoundaryTerm::add_sample(const PathVertex& vertex, const EdgeQuery& query, const Rng& key,

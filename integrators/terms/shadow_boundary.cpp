@@ -102,7 +102,9 @@ void ShadowTerm::add_sample(const PathVertex& vertex, Rng rng, TermCost& cost,
     return;
   }
   const Lanes swept =
-      sweep(edge, *point, {vertex.surface.p, turning(omega, vertex.turn), distance});
+      sweep(edge, *point,
+            {vertex.surface.p, moving_direction(vertex, omega, rng.at(Purpose::kShadow, 1), cost),
+             distance});
   const Rgb<double> amount = vertex.throughput * f * edges_.jump(edge, *point, q, omega);
   if (is_zero(swept) || is_black(amount)) {
     ++cost.zero_weight;

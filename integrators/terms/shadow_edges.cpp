@@ -116,24 +116,21 @@ void ShadowEdges::weigh(size_t first, int lanes) {
     length += edges_[i].angle;
     swept += edges_[i].speed * edges_[i].angle;
   }
-  double sum = cumulative_.empty() ? 0 : cumulative_.back();
   for (size_t i = first; i < edges_.size(); ++i) {
     const ShadowEdge& edge = edges_[i];
+    double share = 0;
     for (int k = 0; k < lanes; ++k) {
-      sum += edge.angle / length;
-      sum += swept[k] > 0 ? edge.speed[k] * edge.angle / swept[k] : edge.angle / length;
+      share += edge.angle / length;
+      share += swept[k] > 0 ? edge.speed[k] * edge.angle / swept[k] : edge.angle / length;
     }
-    cumulative_.push_back(sum);
+    choice_.add(share);
   }
 }
 
 const ShadowEdge& ShadowEdges::choose(double u, double& probability) const {
-  const double target = u * cumulative_.back();
-  const auto found = std::upper_bound(cumulative_.begin(), cumulative_.end(), target);
-  const size_t index = std::min<size_t>(found - cumulative_.begin(), edges_.size() - 1);
-  const double below = index == 0 ? 0 : cumulative_[index - 1];
-  probability = (cumulative_[index] - below) / cumulative_.back();
-  return edges_[index];
+  const DiscreteDistribution::Draw draw = choice_.sample(u);
+  probability = draw.probability;
+  return edges_[draw.index];
 }
 
 std::optional<ShadowPoint> ShadowEdges::cast(const ShadowEdge& edge, double t,

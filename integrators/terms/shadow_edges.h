@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "integrators/terms/path.h"
+#include "limn/core/discrete_distribution.h"
 #include "limn/edgetree/edge_sampler.h"
 
 namespace limn {
@@ -52,7 +53,7 @@ class ShadowEdges {
   const EdgeSamplerInput& input_;
   double reach_ = 0;  // longer than any line through the scene
   std::vector<ShadowEdge> edges_;
-  std::vector<double> cumulative_;  // probabilities of the edges, summed
+  DiscreteDistribution choice_;  // of an edge
   double list_seconds_ = 0;
 };
 

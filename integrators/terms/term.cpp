@@ -24,6 +24,15 @@ const EdgeSamplerInput& TermInput::edges() {
   return *edges_;
 }
 
+const EdgeSamplerInput& TermInput::chosen_edges() {
+  if (!warps) return edges();
+  if (!unfollowed_) {
+    unfollowed_ = std::make_unique<EdgeSamplerInput>(edges());
+    for (EdgeMesh& mesh : unfollowed_->objects) leave_out_followed(mesh);
+  }
+  return *unfollowed_;
+}
+
 const LightRegions* TermInput::regions() {
   edges();
   return regions_.get();
@@ -40,9 +49,9 @@ const LampEdges* TermInput::lamp_edges() {
 
 const EdgeSampler& TermInput::edge_sampler() {
   if (edge_sampler_) return *edge_sampler_;
-  edges();
+  const EdgeSamplerInput& input = chosen_edges();
   const Stopwatch watch;
-  edge_sampler_ = sampler.make(*edges_, threads);
+  edge_sampler_ = sampler.make(input, threads);
   edge_sampler_seconds_ = watch.seconds();
   return *edge_sampler_;
 }

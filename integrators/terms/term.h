@@ -38,6 +38,8 @@ struct PathVertex {
   const Rng& key;                  // of the path
   SampleLog* log = nullptr;        // null unless somebody reads it
   TurnedVertex* turned = nullptr;  // null unless a pilot asks
+  // How directions move here, in place of the turn; null where they are not warped.
+  const WarpField* warp = nullptr;
 };
 
 class Term {
@@ -72,22 +74,27 @@ class Term {
   virtual void describe(GradientStats& /*stats*/) const {}
 };
 
+class FilmRegions;
+
 // What the terms of a pass are made from. It outlives them.
 class TermInput {
  public:
   TermInput(const PathContext& path_context, int lane_count, const Lanes& lane_scales,
-            const EdgeSamplerType& sampler_type, int thread_count)
+            const EdgeSamplerType& sampler_type, int thread_count, bool warped = false)
       : context(path_context),
         lanes(lane_count),
         lane_scale(lane_scales),
         sampler(sampler_type),
-        threads(thread_count) {}
+        threads(thread_count),
+        warps(warped) {}
 
   const PathContext& context;      // the scene with its parameters seeded
   int lanes;                       // how many derivative lanes are in use
   Lanes lane_scale;                // what makes speeds of the parameters comparable
   const EdgeSamplerType& sampler;  // how shading points choose an edge
   int threads;
+  bool warps;                            // whether directions are warped, see warp_field.h
+  const FilmRegions* visible = nullptr;  // of the film; null: rays tell what is seen
 
   // Edges of all shapes (object i is shape i), light polygons and the environment, as an edge
   // sampler takes them; without the regions of light. Made when a term first asks.
@@ -96,6 +103,8 @@ class TermInput {
   const LightRegions* regions();
   // The edges before them; null if there are no regions.
   const LampEdges* lamp_edges();
+  // The edges that shading points choose among: all, but for those that warped directions follow.
+  const EdgeSamplerInput& chosen_edges();
   // What shading points choose edges by, shared by all terms. Made when a term first asks.
   const EdgeSampler& edge_sampler();
   double edge_sampler_seconds() const { return edge_sampler_seconds_; }
@@ -104,7 +113,7 @@ class TermInput {
   double edges_seconds() const { return edges_seconds_; }
 
  private:
-  std::unique_ptr<EdgeSamplerInput> edges_;
+  std::unique_ptr<EdgeSamplerInput> edges_, unfollowed_;
   std::unique_ptr<LightRegions> regions_;
   std::unique_ptr<LampEdges> lamp_edges_;
   std::unique_ptr<EdgeSampler> edge_sampler_;

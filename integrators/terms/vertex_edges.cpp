@@ -20,6 +20,16 @@ EdgeQuery query_at(const PathVertex& vertex) {
   return query;
 }
 
+Vec3<Dual> moving_direction(const PathVertex& vertex, const Vec3d& omega, const Rng& key,
+                            TermCost& cost) {
+  if (!vertex.warp) return turning(omega, vertex.turn);
+  RayCount rays;
+  DirectionWarper warper(*vertex.warp, rays);
+  const DirectionMotion* motion = warper.motion(vertex.surface, omega, key);
+  cost.add(rays);
+  return motion ? warped(omega, *motion->warp) : turning(omega, {});
+}
+
 void add_edge_point(const PathContext& context, const EdgeMesh& mesh, const PathVertex& vertex,
                     const EdgeQuery& query, const EdgeSample& sample, const RadiancePart& part,
                     const Rng& key, TermCost& cost, Rgb<Lanes>& sum, double share) {
@@ -29,6 +39,11 @@ void add_edge_point(const PathContext& context, const EdgeMesh& mesh, const Path
   Vec3<Lanes> v = relative_velocity(mesh, a, query) * (1 - sample.t) +
                   relative_velocity(mesh, b, query) * sample.t;
   if (share != 1) v = v * share - query.turn.velocity(view.y - query.p) * (1 - share);
+  if (seen && vertex.warp) {
+    const Rng rng = key.at(Purpose::kEdge, vertex.bounces).at(Purpose::kEdge, 1);
+    const Vec3<Dual> w = moving_direction(vertex, view.omega, rng, cost);
+    v = v - Vec3<Lanes>{w.x.d, w.y.d, w.z.d} * view.distance;
+  }
   const double measure =
       1 / (view.distance * view.distance * view.distance * sample.probability * sample.pdf_t);
   const Lanes weight = (v.x * view.side.x + v.y * view.side.y + v.z * view.side.z) * measure;
@@ -79,7 +94,7 @@ bool is_hidden_from(const PathContext& context, const PathVertex& vertex, FaceRe
                     const Vec3d& omega, double distance, TermCost& cost) {
   Ray ray{value(vertex.surface.p), omega};
   ray.start = vertex.surface.face;
-  ray.skip_faces = {&face, 1};
+  ray.end = face;
   ray.t_max = distance * (1 - 0x1p-20);  // as shadow rays end
   cost.add(RayCount{0, 1});
   return context.tracer.occluded(ray);

@@ -1,7 +1,7 @@
 // Emitter "area": the surface of a shape shines from the front of every face.
-#include <algorithm>
 
-#include "limn/core/shading.h"
+#include "limn/core/discrete_distribution.h"
+#include "limn/core/surface_point.h"
 #include "src/light/types.h"
 
 namespace limn {
@@ -10,20 +10,15 @@ namespace {
 class AreaLight final : public Light {
  public:
   AreaLight(const Scene& scene, ShapeId id) : shape_(scene.shape(id)), id_(id) {
-    double area = 0;
     for (uint32_t f = 0; f < shape_.mesh.faces.size(); ++f) {
       const auto c = face_corners<double>(shape_.mesh, FaceId(f));
-      area += 0.5 * length(cross(c[1] - c[0], c[2] - c[0]));
-      cumulative_.push_back(area);
+      faces_.add(0.5 * length(cross(c[1] - c[0], c[2] - c[0])));
     }
-    inverse_area_ = 1 / area;
+    inverse_area_ = 1 / faces_.sum();
   }
 
   std::optional<LightSample> sample(const Vec3d& p, double choices, Rng& rng) const override {
-    const double target = rng.uniform() * cumulative_.back();
-    const auto found = std::upper_bound(cumulative_.begin(), cumulative_.end(), target);
-    const FaceId face(static_cast<uint32_t>(
-        std::min<size_t>(found - cumulative_.begin(), cumulative_.size() - 1)));
+    const FaceId face(static_cast<uint32_t>(faces_.sample(rng.uniform()).index));
     const double root = std::sqrt(rng.uniform());
     const double b2 = root * rng.uniform();
     const auto c = face_corners<double>(shape_.mesh, face);
@@ -55,7 +50,7 @@ class AreaLight final : public Light {
  private:
   const Shape& shape_;
   ShapeId id_;
-  std::vector<double> cumulative_;  // F, of face areas
+  DiscreteDistribution faces_;  // by area
   double inverse_area_;
 };
 

@@ -1,6 +1,7 @@
 // The adjoint of shading normals and horizons: from them back to the positions of the one-ring.
+#include "limn/core/normals_adjoint.h"
+
 #include "limn/core/check.h"
-#include "limn/core/mesh.h"
 #include "src/mesh/face_shape.h"
 
 namespace limn {
@@ -13,123 +14,169 @@ struct FaceAdjoint {
   std::array<double, 3> angles{};
 };
 
-struct Faces {
-  std::vector<FaceShape<double>> shapes;
-  std::vector<FaceAdjoint> adjoints;
-};
-
 // The sine of the tilt of a corner's normal against its face, and how far rounding reaches.
 struct Tilt {
   double sine = -1, rounding = 0;
 };
 
-// Of each corner of each face; those of faces without area are never the largest.
-std::vector<std::array<Tilt, 3>> tilts_of(const Mesh& mesh, const Faces& faces) {
-  std::vector<double> noise(mesh.normals.size());
-  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
-    if (!faces.shapes[f].has_area) continue;
-    for (const uint32_t n : mesh.normal_ids[f])
-      noise[n] = std::max(noise[n], faces.shapes[f].rounding);
+// The faces around each of some items (vertices, normals), those of one item in their order.
+class FacesAround {
+ public:
+  // items_of(face): three of them.
+  template <class ItemsOf>
+  FacesAround(size_t items, size_t faces, const ItemsOf& items_of) : begins_(items + 1) {
+    for (size_t f = 0; f < faces; ++f)
+      for (const uint32_t i : items_of(f)) ++begins_[i + 1];
+    for (size_t i = 0; i < items; ++i) begins_[i + 1] += begins_[i];
+    faces_.resize(begins_.back());
+    std::vector<uint32_t> next(begins_.begin(), begins_.end() - 1);
+    for (uint32_t f = 0; f < faces; ++f)
+      for (const uint32_t i : items_of(f)) faces_[next[i]++] = f;
   }
-  std::vector<std::array<Tilt, 3>> tilts(mesh.faces.size());
-  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
-    const FaceShape<double>& shape = faces.shapes[f];
-    if (!shape.has_area) continue;
-    for (int c = 0; c < 3; ++c) {
-      const uint32_t n = mesh.normal_ids[f][c];
-      tilts[f][c] = {sine_of_tilt(mesh.normals[n], shape.normal),
-                     tilt_rounding(shape.rounding, noise[n])};
-    }
+  template <class Visit>
+  void for_each(uint32_t item, const Visit& visit) const {
+    for (uint32_t k = begins_[item]; k < begins_[item + 1]; ++k) visit(faces_[k]);
   }
-  return tilts;
+
+ private:
+  std::vector<uint32_t> begins_, faces_;
+};
+
+bool is_zero(const Vec3d& v) { return v.x == 0 && v.y == 0 && v.z == 0; }
+
+}  // namespace
+
+struct ShadingNormalsAdjoint::OfMesh {
+  explicit OfMesh(const Mesh& of);
+
+  std::array<uint32_t, 3> roots(uint32_t f) const {
+    const FaceIndices& v = mesh.faces[f];
+    return {mesh.weld[v[0]], mesh.weld[v[1]], mesh.weld[v[2]]};
+  }
+  // Those of faces without area are never the largest.
+  Tilt tilt(uint32_t f, int corner) const {
+    const uint32_t n = mesh.normal_ids[f][corner];
+    return {sine_of_tilt(mesh.normals[n], shapes[f].normal),
+            tilt_rounding(shapes[f].rounding, noise[n])};
+  }
+  bool ties_with(const Tilt& tilt, uint32_t root) const {
+    return tilt.sine + tilt.rounding >= largest[root];
+  }
+  void find_largest_tilts();
+  void add_up_normals();
+
+  std::vector<uint32_t> touched(const std::vector<double>& at_root,
+                                const std::vector<Vec3d>& of_normals) const;
+  void pull_back_horizons(const std::vector<uint32_t>& faces, const std::vector<double>& at_root,
+                          std::vector<FaceAdjoint>& adjoints, std::vector<Vec3d>& of_normals) const;
+  void pull_back_sums(const std::vector<uint32_t>& faces, const std::vector<Vec3d>& of_normals,
+                      std::vector<FaceAdjoint>& adjoints) const;
+
+  const Mesh& mesh;
+  std::vector<FaceShape<double>> shapes;
+  FacesAround around_root, around_normal;
+  // Of normals: the largest rounding around each.
+  std::vector<double> noise;
+  // Of roots: a horizon is the largest tilt of all corners of the faces around its vertex.
+  std::vector<double> largest;
+  std::vector<uint32_t> ties;
+  // Of computed normals: their sums, normalised, and the lengths of these, 0 where they cancel; a
+  // face around each.
+  std::vector<Vec3d> units;
+  std::vector<double> sizes;
+  std::vector<uint32_t> any_face;
+};
+
+ShadingNormalsAdjoint::OfMesh::OfMesh(const Mesh& of)
+    : mesh(of),
+      around_root(of.positions.size(), of.faces.size(), [this](size_t f) { return roots(f); }),
+      around_normal(of.normals.size(), of.normal_ids.size(),
+                    [this](size_t f) { return mesh.normal_ids[f]; }),
+      noise(of.normals.size()) {
+  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+    shapes.push_back(face_shape<double>(mesh, FaceId(f)));
+    if (!shapes[f].has_area) continue;
+    for (const uint32_t n : mesh.normal_ids[f]) noise[n] = std::max(noise[n], shapes[f].rounding);
+  }
+  find_largest_tilts();
+  if (mesh.normal_source == NormalSource::kComputed) add_up_normals();
 }
 
-// A horizon is the largest tilt of all corners of the faces around its vertex; sine = |n x N| of a
-// corner's normal n and a face's N.
-void pull_back_horizons(const Mesh& mesh, const std::vector<double>& at_root, Faces& faces,
-                        std::vector<Vec3d>& normals) {
-  const std::vector<std::array<Tilt, 3>> tilts = tilts_of(mesh, faces);
-  std::vector<double> largest(at_root.size());
-  const auto for_every_vertex = [&](const auto& visit) {
+void ShadingNormalsAdjoint::OfMesh::find_largest_tilts() {
+  largest.resize(mesh.positions.size());
+  ties.resize(mesh.positions.size());
+  const auto for_every_tilt = [&](const auto& visit) {
     for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
-      if (!faces.shapes[f].has_area) continue;
-      for (const uint32_t v : mesh.faces[f]) visit(f, mesh.weld[v]);
+      if (!shapes[f].has_area) continue;
+      for (int c = 0; c < 3; ++c) {
+        const Tilt t = tilt(f, c);
+        for (const uint32_t v : roots(f)) visit(t, v);
+      }
     }
   };
-  for_every_vertex([&](uint32_t f, uint32_t v) {
-    for (const Tilt& tilt : tilts[f]) largest[v] = std::max(largest[v], tilt.sine - tilt.rounding);
-  });
-  const auto ties_with = [&](const Tilt& tilt, uint32_t v) {
-    return tilt.sine + tilt.rounding >= largest[v];
-  };
-  std::vector<uint32_t> ties(at_root.size());
-  for_every_vertex([&](uint32_t f, uint32_t v) {
-    for (const Tilt& tilt : tilts[f]) ties[v] += ties_with(tilt, v);
-  });
-  for_every_vertex([&](uint32_t f, uint32_t v) {
-    if (at_root[v] == 0) return;
-    for (int c = 0; c < 3; ++c) {
-      if (!ties_with(tilts[f][c], v) || tilts[f][c].sine >= 1) continue;
-      const uint32_t n = mesh.normal_ids[f][c];
-      const Vec3d across = cross(mesh.normals[n], faces.shapes[f].normal);
-      const double size = length(across);
-      if (size == 0) continue;
-      const Vec3d u = across * (at_root[v] / (ties[v] * size));
-      normals[n] += cross(faces.shapes[f].normal, u);
-      faces.adjoints[f].normal += cross(u, mesh.normals[n]);
-    }
-  });
+  for_every_tilt(
+      [&](const Tilt& t, uint32_t v) { largest[v] = std::max(largest[v], t.sine - t.rounding); });
+  for_every_tilt([&](const Tilt& t, uint32_t v) { ties[v] += ties_with(t, v); });
 }
 
-// From normals of vertices to those of faces and their angles.
-void pull_back_sums(const Mesh& mesh, const std::vector<Vec3d>& normals, Faces& faces) {
+void ShadingNormalsAdjoint::OfMesh::add_up_normals() {
   const size_t count = mesh.normals.size();
-  std::vector<Vec3d> sums(count);
-  std::vector<uint32_t> any_face(count, kUnused);
-  std::vector<double> angles(count), noise(count);
+  units.resize(count);
+  sizes.resize(count);
+  any_face.assign(count, kUnused);
+  std::vector<double> angles(count), rounding(count);
   for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
-    const FaceShape<double>& shape = faces.shapes[f];
+    const FaceShape<double>& shape = shapes[f];
     if (!shape.has_area) continue;
     for (int c = 0; c < 3; ++c) {
       const uint32_t n = mesh.normal_ids[f][c];
-      sums[n] += shape.normal * shape.angles[c];
+      units[n] += shape.normal * shape.angles[c];
       any_face[n] = f;
       angles[n] += shape.angles[c];
-      noise[n] += shape.angles[c] * shape.rounding;
+      rounding[n] += shape.angles[c] * shape.rounding;
     }
   }
-  std::vector<Vec3d> of_sum(count);
   for (size_t n = 0; n < count; ++n) {
-    if (any_face[n] == kUnused) continue;
-    const double size = length(sums[n]);
-    if (size > rest_of_cancelled(noise[n], angles[n])) {
-      const Vec3d unit = sums[n] / size;
-      of_sum[n] = (normals[n] - unit * dot(unit, normals[n])) / size;
-    } else {
-      faces.adjoints[any_face[n]].normal += normals[n];
-    }
-  }
-  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
-    const FaceShape<double>& shape = faces.shapes[f];
-    if (!shape.has_area) continue;
-    for (int c = 0; c < 3; ++c) {
-      const Vec3d& s = of_sum[mesh.normal_ids[f][c]];
-      faces.adjoints[f].normal += s * shape.angles[c];
-      faces.adjoints[f].angles[c] += dot(s, shape.normal);
-    }
+    const double size = length(units[n]);
+    if (!(size > rest_of_cancelled(rounding[n], angles[n]))) continue;
+    sizes[n] = size;
+    units[n] = units[n] / size;
   }
 }
+
+// The faces that derivatives reach, in order.
+std::vector<uint32_t> ShadingNormalsAdjoint::OfMesh::touched(
+    const std::vector<double>& at_root, const std::vector<Vec3d>& of_normals) const {
+  std::vector<uint8_t> face(mesh.faces.size()), normal(of_normals.size());
+  for (uint32_t v = 0; v < at_root.size(); ++v) {
+    if (at_root[v] == 0) continue;
+    around_root.for_each(v, [&](uint32_t f) {
+      face[f] = true;
+      for (const uint32_t n : mesh.normal_ids[f]) normal[n] = true;
+    });
+  }
+  if (mesh.normal_source == NormalSource::kComputed) {
+    for (uint32_t n = 0; n < of_normals.size(); ++n) {
+      if (!normal[n] && is_zero(of_normals[n])) continue;
+      around_normal.for_each(n, [&](uint32_t f) { face[f] = true; });
+    }
+  }
+  std::vector<uint32_t> list;
+  for (uint32_t f = 0; f < face.size(); ++f) {
+    if (face[f] && shapes[f].has_area) list.push_back(f);
+  }
+  return list;
+}
+
+namespace {
 
 // With sides a, b, c and the doubled area |D|, D = a x b, the angles are those of (q, |D|) for q =
 // a.b, -a.c, b.c.
-void pull_back_face(const Mesh& mesh, uint32_t f, const FaceShape<double>& shape,
-                    const FaceAdjoint& adjoint, std::vector<Vec3d>& positions) {
-  std::array<uint32_t, 3> roots;
+void pull_back_face(const Mesh& mesh, const std::array<uint32_t, 3>& roots,
+                    const FaceShape<double>& shape, const FaceAdjoint& adjoint,
+                    std::vector<Vec3d>& positions) {
   std::array<Vec3d, 3> p;
-  for (int k = 0; k < 3; ++k) {
-    roots[k] = mesh.weld[mesh.faces[f][k]];
-    p[k] = cast<double>(mesh.positions[roots[k]]);
-  }
+  for (int k = 0; k < 3; ++k) p[k] = cast<double>(mesh.positions[roots[k]]);
   const Vec3d a = p[1] - p[0], b = p[2] - p[0], c = p[2] - p[1];
   const double size = length(cross(a, b));
   const double q[3] = {dot(a, b), -dot(a, c), dot(b, c)};
@@ -151,25 +198,78 @@ void pull_back_face(const Mesh& mesh, uint32_t f, const FaceShape<double>& shape
 
 }  // namespace
 
-void pull_back_shading_normals(const Mesh& mesh, std::vector<Vec3d>& normals,
-                               const std::vector<double>& horizons, std::vector<Vec3d>& positions) {
-  if (mesh.normal_source == NormalSource::kFace) return;
-  CHECK_EQ(normals.size(), mesh.normals.size());
-  CHECK_EQ(positions.size(), mesh.positions.size());
-  Faces faces;
-  faces.adjoints.resize(mesh.faces.size());
-  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
-    faces.shapes.push_back(face_shape<double>(mesh, FaceId(f)));
-  }
-  std::vector<double> at_root(horizons.size());
-  for (size_t v = 0; v < horizons.size(); ++v) at_root[mesh.weld[v]] += horizons[v];
-  pull_back_horizons(mesh, at_root, faces, normals);
-  if (mesh.normal_source == NormalSource::kComputed) pull_back_sums(mesh, normals, faces);
-  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
-    if (faces.shapes[f].has_area) {
-      pull_back_face(mesh, f, faces.shapes[f], faces.adjoints[f], positions);
+ShadingNormalsAdjoint::ShadingNormalsAdjoint(const Mesh& mesh)
+    : of_mesh_(mesh.normal_source == NormalSource::kFace ? nullptr
+                                                         : std::make_unique<OfMesh>(mesh)) {}
+ShadingNormalsAdjoint::ShadingNormalsAdjoint(ShadingNormalsAdjoint&&) noexcept = default;
+ShadingNormalsAdjoint::~ShadingNormalsAdjoint() = default;
+
+// The horizon is |n x N| of a corner's normal n and a face's N.
+void ShadingNormalsAdjoint::OfMesh::pull_back_horizons(const std::vector<uint32_t>& faces,
+                                                       const std::vector<double>& at_root,
+                                                       std::vector<FaceAdjoint>& adjoints,
+                                                       std::vector<Vec3d>& of_normals) const {
+  for (size_t i = 0; i < faces.size(); ++i) {
+    const uint32_t f = faces[i];
+    const Vec3d& face_normal = shapes[f].normal;
+    for (const uint32_t v : roots(f)) {
+      if (at_root[v] == 0) continue;
+      for (int c = 0; c < 3; ++c) {
+        const Tilt t = tilt(f, c);
+        if (!ties_with(t, v) || t.sine >= 1) continue;
+        const uint32_t n = mesh.normal_ids[f][c];
+        const Vec3d across = cross(mesh.normals[n], face_normal);
+        const double size = length(across);
+        if (size == 0) continue;
+        const Vec3d u = across * (at_root[v] / (ties[v] * size));
+        of_normals[n] += cross(face_normal, u);
+        adjoints[i].normal += cross(u, mesh.normals[n]);
+      }
     }
   }
+}
+
+// From normals of vertices to those of faces and their angles.
+void ShadingNormalsAdjoint::OfMesh::pull_back_sums(const std::vector<uint32_t>& faces,
+                                                   const std::vector<Vec3d>& of_normals,
+                                                   std::vector<FaceAdjoint>& adjoints) const {
+  for (size_t i = 0; i < faces.size(); ++i) {
+    const FaceShape<double>& shape = shapes[faces[i]];
+    for (int c = 0; c < 3; ++c) {
+      const uint32_t n = mesh.normal_ids[faces[i]][c];
+      const Vec3d& g = of_normals[n];
+      if (sizes[n] == 0) {
+        if (any_face[n] == faces[i]) adjoints[i].normal += g;
+        continue;
+      }
+      const Vec3d s = (g - units[n] * dot(units[n], g)) / sizes[n];
+      adjoints[i].normal += s * shape.angles[c];
+      adjoints[i].angles[c] += dot(s, shape.normal);
+    }
+  }
+}
+
+void ShadingNormalsAdjoint::pull_back(std::vector<Vec3d>& normals,
+                                      const std::vector<double>& horizons,
+                                      std::vector<Vec3d>& positions) const {
+  if (!of_mesh_) return;
+  const OfMesh& m = *of_mesh_;
+  CHECK_EQ(normals.size(), m.mesh.normals.size());
+  CHECK_EQ(positions.size(), m.mesh.positions.size());
+  std::vector<double> at_root(horizons.size());
+  for (size_t v = 0; v < horizons.size(); ++v) at_root[m.mesh.weld[v]] += horizons[v];
+  const std::vector<uint32_t> faces = m.touched(at_root, normals);
+  std::vector<FaceAdjoint> adjoints(faces.size());
+  m.pull_back_horizons(faces, at_root, adjoints, normals);
+  if (m.mesh.normal_source == NormalSource::kComputed) m.pull_back_sums(faces, normals, adjoints);
+  for (size_t i = 0; i < faces.size(); ++i) {
+    pull_back_face(m.mesh, m.roots(faces[i]), m.shapes[faces[i]], adjoints[i], positions);
+  }
+}
+
+void pull_back_shading_normals(const Mesh& mesh, std::vector<Vec3d>& normals,
+                               const std::vector<double>& horizons, std::vector<Vec3d>& positions) {
+  ShadingNormalsAdjoint(mesh).pull_back(normals, horizons, positions);
 }
 
 }  // namespace limn

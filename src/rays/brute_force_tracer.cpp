@@ -1,7 +1,7 @@
 // Every face tested in double precision: the oracle for Embree.
 #include <algorithm>
 
-#include "limn/core/ray_tracer.h"
+#include "limn/core/face_overlaps.h"
 
 namespace limn {
 namespace {
@@ -24,7 +24,8 @@ double intersect(const Ray& ray, const Vec3d& a, const Vec3d& b, const Vec3d& c)
 
 class BruteForceTracer final : public RayTracer {
  public:
-  explicit BruteForceTracer(const Scene& scene) : scene_(scene) {}
+  explicit BruteForceTracer(const Scene& scene)
+      : scene_(scene), copies_(scene), overlaps_(scene, copies_, 1) {}
 
   bool closest(const Ray& ray, Hit& hit) const override {
     if (!is_traceable(ray)) throw UntraceableRay();
@@ -52,6 +53,8 @@ class BruteForceTracer final : public RayTracer {
     return closest(ray, hit);
   }
 
+  bool overlap(FaceRef a, FaceRef b) const override { return overlaps_.contains(a, b); }
+
  private:
   static bool is_skipped(const Ray& ray, FaceRef face) {
     if (face == ray.start || face == ray.end) return true;
@@ -59,6 +62,8 @@ class BruteForceTracer final : public RayTracer {
   }
 
   const Scene& scene_;
+  FaceCopies copies_;
+  FaceOverlaps overlaps_;
 };
 
 }  // namespace

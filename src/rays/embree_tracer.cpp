@@ -12,7 +12,7 @@
 
 #include "limn/core/check.h"
 #include "limn/core/error.h"
-#include "limn/core/face_copies.h"
+#include "limn/core/face_overlaps.h"
 #include "limn/core/ray_tracer.h"
 
 namespace limn {
@@ -23,6 +23,8 @@ struct Context {
   const Ray* ray;
   const Scene* scene;
   const FaceCopies* copies;
+  // Faces that overlap the one where the ray starts, and the one where it ends.
+  std::span<const FaceRef> beside_start, beside_end;
 };
 
 // Whether the ray skips a face that stands for copies: what skips one of them skips all.
@@ -38,10 +40,14 @@ bool is_skipped_place(const Context& context, FaceRef face) {
 
 bool is_skipped(const Context& context, FaceRef face) {
   const Ray& ray = *context.ray;
+  const auto is_among = [&](std::span<const FaceRef> faces) {
+    return std::find(faces.begin(), faces.end(), face) != faces.end();
+  };
+  if (is_among(context.beside_start) || is_among(context.beside_end)) return true;
   if (!context.copies->empty()) return is_skipped_place(context, face);
   if (face == ray.start || face == ray.end) return true;
   if (ray.skip_emitters && context.scene->shape(face.shape).is_emitter) return true;
-  return std::find(ray.skip_faces.begin(), ray.skip_faces.end(), face) != ray.skip_faces.end();
+  return is_among(ray.skip_faces);
 }
 
 void reject_skipped(const RTCFilterFunctionNArguments* arguments) {
@@ -126,7 +132,11 @@ class EmbreeErrors {
 class EmbreeTracer final : public RayTracer {
  public:
   EmbreeTracer(const Scene& scene, int threads)
-      : scene_(scene), copies_(scene), origin_(origin_of(scene)) {
+      : scene_(scene),
+        copies_(scene),
+        overlaps_(scene, copies_, threads),
+        settles_(!copies_.empty() || !overlaps_.empty()),
+        origin_(origin_of(scene)) {
     const std::string config = "threads=" + std::to_string(threads);
     device_.reset(rtcNewDevice(config.c_str()));
     if (!device_) throw InputError("Embree cannot start on this machine");
@@ -152,14 +162,13 @@ class EmbreeTracer final : public RayTracer {
     rtcIntersect1(rtc_scene_.get(), &context.base, &query);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
     hit.face = {ShapeId(query.hit.geomID), FaceId(query.hit.primID)};
-    if (!copies_.empty()) [[unlikely]]
-      hit.face = copies_.met(hit.face, ray.direction, ray.skip_emitters).value_or(hit.face);
     hit.t = query.ray.tfar;
+    settle(ray, hit);
     return true;
   }
 
   bool occluded(const Ray& ray) const override {
-    if (!copies_.empty() && is_end_hidden(ray)) [[unlikely]]
+    if (settles_ && ray.end.shape.valid() && overlaps_.is_hidden(ray.end, ray)) [[unlikely]]
       return true;
     Context context = make_context(ray);
     RTCRay query = to_embree(ray, origin_);
@@ -167,12 +176,13 @@ class EmbreeTracer final : public RayTracer {
     return query.tfar < 0;
   }
 
- private:
-  // Whether a copy is met in the place of the face where the ray ends.
-  bool is_end_hidden(const Ray& ray) const {
-    return ray.end.shape.valid() &&
-           copies_.met(ray.end, ray.direction, ray.skip_emitters) != ray.end;
+  bool overlap(FaceRef a, FaceRef b) const override { return settles_ && overlaps_.contains(a, b); }
+  void settle(const Ray& ray, Hit& hit) const override {
+    if (settles_) [[unlikely]]
+      overlaps_.settle(ray, hit);
   }
+
+ private:
   // Relative to a ray's origin Embree rounds corners, and might meet a line. Of copies the first
   // one stands for all.
   bool is_traced(const Mesh& mesh, FaceRef face) const {
@@ -207,11 +217,17 @@ class EmbreeTracer final : public RayTracer {
     context.ray = &ray;
     context.scene = &scene_;
     context.copies = &copies_;
+    if (!overlaps_.empty()) [[unlikely]] {
+      context.beside_start = overlaps_.of(ray.start);
+      context.beside_end = overlaps_.of(ray.end);
+    }
     return context;
   }
 
   const Scene& scene_;
   FaceCopies copies_;
+  FaceOverlaps overlaps_;
+  bool settles_;         // whether faces lie in one place
   Vec3d origin_;         // of Embree's coordinates
   EmbreeErrors errors_;  // before what reports to it
   Owned<RTCDevice> device_;

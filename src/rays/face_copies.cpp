@@ -110,8 +110,13 @@ std::optional<FaceRef> FaceCopies::met(FaceRef face, const Vec3d& direction,
   return best;
 }
 
-void warn_of_copies(const Scene& scene, std::vector<std::string>& warnings) {
-  const FaceCopies copies(scene);
+std::string name_in_text(const Scene& scene, ShapeId shape) {
+  const std::string& id = scene.shape(shape).id;
+  return id.empty() ? "shape " + std::to_string(shape.index()) : "\"" + id + "\"";
+}
+
+void warn_of_copies(const Scene& scene, const FaceCopies& copies,
+                    std::vector<std::string>& warnings) {
   std::map<std::pair<ShapeId, ShapeId>, int> counts;
   for (const auto& set : copies.sets())
     for (size_t i = 0; i < set.size(); ++i)
@@ -120,10 +125,7 @@ void warn_of_copies(const Scene& scene, std::vector<std::string>& warnings) {
         if (wind_alike(corners_of(scene, set[i]), corners_of(scene, set[j])))
           ++counts[{set[j].shape, set[i].shape}];
       }
-  const auto name = [&](ShapeId id) {
-    const std::string& text = scene.shape(id).id;
-    return text.empty() ? "shape " + std::to_string(id.index()) : "\"" + text + "\"";
-  };
+  const auto name = [&](ShapeId id) { return name_in_text(scene, id); };
   for (const auto& [shapes, count] : counts) {
     warnings.push_back(format_warning(scene.shape(shapes.second).where,
                                       std::to_string(count) + " faces of " + name(shapes.second) +

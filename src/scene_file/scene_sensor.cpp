@@ -97,6 +97,7 @@ void read_film(const ObjectDescription& object, const SceneDescription& descript
   if (object.type != "hdrfilm") fail_unknown_type(object, {"hdrfilm"});
   DescribedProperties p(object, description, kNoBsdfs);
   Film& film = scene.film;
+  film.where = object.where;
   scene.camera.width = bounded_integer(p, "width", 768, 1);
   scene.camera.height = bounded_integer(p, "height", 576, 1);
   read_crop(p, scene.camera, film);
@@ -109,6 +110,7 @@ void read_film(const ObjectDescription& object, const SceneDescription& descript
   p.boolean("banner", false);
   if (const ObjectDescription* filter = p.nested("rfilter")) {
     read_filter(*filter, description, film.filter);
+    film.where = filter->where;
   }
   p.check_all_used();
 }

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <stdexcept>
 
-#include "limn/core/face_copies.h"
+#include "limn/core/face_overlaps.h"
 #include "limn/core/memory.h"
 #include "limn/core/names.h"
 #include "limn/core/scene.h"
@@ -36,7 +36,7 @@ class SceneBuilder {
       if (object->tag == "bsdf") bsdf(*object);
     }
     if (!sensor_) throw InputError(description_.where, "<scene>: there is no sensor");
-    if (warnings_) warn_of_copies(scene_, *warnings_);
+    if (warnings_) warn_of_overlaps(scene_, *warnings_);
     return std::move(scene_);
   }
 

@@ -82,6 +82,11 @@ void convert_attributes(const pugi::xml_node& node, const TextPlaces& places, Xm
   }
 }
 
+SourceLocation place_of_text(const pugi::xml_node& text, const TextPlaces& places) {
+  const size_t begin = static_cast<size_t>(text.offset_debug());
+  return places.at(places.text().find_first_not_of(" \t\r\n", begin));
+}
+
 XmlElement convert(const pugi::xml_node& node, const TextPlaces& places, int depth) {
   XmlElement element;
   element.name = node.name();
@@ -94,8 +99,7 @@ XmlElement convert(const pugi::xml_node& node, const TextPlaces& places, int dep
     if (child.type() == pugi::node_element) {
       element.children.push_back(convert(child, places, depth + 1));
     } else {
-      const size_t begin = static_cast<size_t>(child.offset_debug());
-      throw InputError(places.at(places.text().find_first_not_of(" \t\r\n", begin)),
+      throw InputError(place_of_text(child, places),
                        "<" + element.name + ">: text between elements means nothing here");
     }
   }
@@ -118,8 +122,10 @@ XmlElement parse_xml(const std::string& file, const std::string& text) {
     throw InputError(places.at(nul), "malformed XML: a byte of value 0");
   }
   pugi::xml_document document;
+  // As a fragment, or text beside the root would be dropped without a word.
   const pugi::xml_parse_result result = document.load_buffer(
-      text.data(), text.size(), pugi::parse_default | pugi::parse_doctype, pugi::encoding_utf8);
+      text.data(), text.size(), pugi::parse_default | pugi::parse_doctype | pugi::parse_fragment,
+      pugi::encoding_utf8);
   if (!result) {
     const size_t offset = std::min(static_cast<size_t>(result.offset), text.size());
     throw InputError(places.at(offset), std::string("malformed XML: ") + result.description());
@@ -130,13 +136,16 @@ XmlElement parse_xml(const std::string& file, const std::string& text) {
       throw InputError(places.at(static_cast<size_t>(child.offset_debug())),
                        "<!DOCTYPE> is not read: entities are not substituted");
     }
-    if (child.type() != pugi::node_element) continue;
+    if (child.type() != pugi::node_element) {
+      throw InputError(place_of_text(child, places), "text outside of the root element");
+    }
     if (root) {
       throw InputError(places.at(static_cast<size_t>(child.offset_debug()) - 1),
                        "a second root element <" + std::string(child.name()) + ">");
     }
     root = child;
   }
+  if (!root) throw InputError(places.at(0), "malformed XML: No document element found");
   return convert(root, places, 1);
 }
 

@@ -70,7 +70,8 @@ TEST(BestSamples, AreLimited) {
 TEST(PilotSamples, AreFewAndEvenAndNoneForShortJobs) {
   EXPECT_EQ(pilot_samples(15), 0);
   EXPECT_EQ(pilot_samples(16), 4);
-  EXPECT_EQ(pilot_samples(1024), 8);
+  EXPECT_EQ(pilot_samples(128), 16);
+  EXPECT_EQ(pilot_samples(1024), 32);
   for (int spp = 16; spp < 100; ++spp) {
     EXPECT_EQ(pilot_samples(spp) % 2, 0);
     EXPECT_LE(4 * pilot_samples(spp), spp);
@@ -78,7 +79,7 @@ TEST(PilotSamples, AreFewAndEvenAndNoneForShortJobs) {
 }
 
 // Two halves of a film of 36 by 12 cells, one with a hundred times the variance of the other.
-TEST(SpreadSamples, GoWithTheRootOfTheDeviation) {
+TEST(SpreadSamples, GoWithTheDeviation) {
   PlanGrid grid;
   grid.columns = 36;
   grid.rows = 12;
@@ -89,10 +90,11 @@ TEST(SpreadSamples, GoWithTheRootOfTheDeviation) {
   SamplePlan plan;
   spread_samples({term, {0, 0, 0.125}}, grid, plan);
   ASSERT_EQ(plan.counts.size(), grid.size());
-  // Cells whose windows lie in one half.
+  // Cells whose windows lie in one half. Deviations are 10 and 1, a quarter of their mean 1.4: 7.2,
+  // but for rounding to whole numbers. The root of the deviations' ratio would be 3.2.
   const double ratio = plan.counts[0][0] / static_cast<double>(plan.counts[35][0]);
-  EXPECT_GE(ratio, 2);
-  EXPECT_LE(ratio, 4);  // the root of ten is 3.2
+  EXPECT_GE(ratio, 4);
+  EXPECT_LE(ratio, 10);
   double sum = 0;
   for (const PixelCounts& counts : plan.counts) sum += counts[0];
   EXPECT_DOUBLE_EQ(plan.uniform[0], sum / static_cast<double>(grid.size()));

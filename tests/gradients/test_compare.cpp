@@ -211,6 +211,26 @@ TEST(Compare, AnInterruptKeepsFinishedRuns) {
   EXPECT_TRUE(results[1].image.empty());
 }
 
+// Warped-area sampling with two rays is wrong, and a comparison says so of it alone.
+TEST(Compare, SeesABias) {
+  const Scene scene = read_scene(kFolder + "lamp_in_beckmann.xml", {}, nullptr);
+  const MethodInput input{scene, "lamp.translate.x", {}, 0, 1, SampleCounts{}, {2, 100}};
+  RunSettings settings;
+  settings.seed = 5;
+  settings.spp = 32768;
+  const Reference reference = make_reference(input, settings);
+  std::vector<std::unique_ptr<DerivativeMethod>> methods;
+  for (const char* name : {"forest", "was"}) {
+    methods.push_back(std::make_unique<CountedMethod>(make_method(input, name), 8192));
+  }
+  CompareOptions options;
+  options.times = {1};
+  options.repeats = 3;
+  const auto results = compare(options, reference, methods, settings);
+  EXPECT_GT(results[0].summary[0].bias.p_largest, 1e-3);
+  EXPECT_LT(results[1].summary[0].bias.p_largest, 1e-4);
+}
+
 TEST(Methods, AreTheSamplersAndDifferences) {
   const Job job;
   std::set<std::string> names;
@@ -352,7 +372,7 @@ TEST_F(ReferenceFile, OfSomethingElseIsRefused) {
   const MethodInput edges{job_.scene, kParameter, {"camera", "boundary"}, 0, 1};
   EXPECT_NE(refusal(identify(edges, {})).find("terms (--terms)"), std::string::npos);
   EXPECT_NE(refusal(identify(job_.input, {{"spp", "3"}})).find("defines (-D)"), std::string::npos);
-  job_.scene = read_scene(kFolder + "lamp_over_plane.xml", {}, nullptr);
+  job_.scene = read_scene(kFolder + "lamp_in_beckmann.xml", {}, nullptr);
   text = refusal(identity());
   EXPECT_NE(text.find("content of the scene file"), std::string::npos) << text;
   EXPECT_NE(text.find("content of the scene's meshes and maps"), std::string::npos) << text;

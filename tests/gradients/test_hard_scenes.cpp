@@ -87,6 +87,22 @@ TEST(ClippedCube, AgreesWithDifferences) {
   EXPECT_TRUE(compare_moments(sum, reference).plausible(kLevel));
 }
 
+// A camera on a face that its near plane, at hardly any distance, cuts: points at a depth of zero are
+// nowhere on the film.
+TEST(NearPlane, AtThePinhole) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.width = parts.height = 3;
+  parts.origin = {0, 0, 1};
+  parts.target = {-0.0023310243223409574, -0.20563730207678144, 0.04731135851762731};
+  parts.body = constant_light("sky", "0.4, 0.5, 0.7") +
+               obj_shape("object", write_mesh(files, "cube.obj", cube_mesh()), true, 1, {},
+                         diffuse("clay", "0.7, 0.5, 0.3"));
+  Scene scene = make_scene(files, parts);
+  scene.camera.near_clip = 1e-30;
+  run_blocks(scene, {"object.scale", "sensor.translate.y"}, 4, 1);  // all samples are finite
+}
+
 // Two shapes in one place.
 class Copies : public testing::Test {
  protected:
@@ -186,6 +202,140 @@ TEST_F(Copies, OfBothSides) {
     for (const double value : means(render(make_scene(files, parts), settings).radiance))
       EXPECT_EQ(value, side > 0 ? 1 : 3);
   }
+}
+
+// Two tiles that overlap in a plane which no axis is in, seen head on: "first" is [-1, 1] by [-1, 1]
+// in coordinates of the plane, "second" [0, 2] by [-1/2, 1/2]. The film is 6 wide there.
+class OverlappingTiles : public testing::Test {
+ protected:
+  static constexpr int kPixels = 24;
+  static inline const Vec3d kRows[3] = {{0.6, -0.48, 0.64}, {0.8, 0.36, -0.48}, {0, 0.8, 0.6}};
+  static inline const Vec3d kOffset{0.37, 1.21, -0.53};
+
+  static Vec3d turned(const Vec3d& x) {
+    return {dot(kRows[0], x), dot(kRows[1], x), dot(kRows[2], x)};
+  }
+  static std::string tile(const std::string& id, double from, double to, double half,
+                          const std::string& inner) {
+    const auto at = [&](double x, double y) { return cast<float>(Vec3d{x, y, 0}); };
+    const Mesh mesh = make_mesh({at(from, -half), at(to, -half), at(to, half), at(from, half)},
+                                {{0, 1, 2}, {0, 2, 3}});
+    return obj_shape(id, write_mesh(files(), id + ".obj", transformed(mesh, kRows, 1, kOffset)),
+                     true, 1, {}, inner);
+  }
+  static std::string first(const std::string& inner) { return tile("first", -1, 1, 1, inner); }
+  static std::string second(const std::string& inner, double from = 0) {
+    return tile("second", from, 2, 0.5, inner);
+  }
+  static SceneParts parts(int max_depth, const std::string& body) {
+    SceneParts parts;
+    parts.max_depth = max_depth;
+    parts.origin = turned({0, 0, 3}) + kOffset;
+    parts.target = kOffset;
+    parts.fov = 90;
+    parts.width = parts.height = kPixels;
+    parts.body = body;
+    return parts;
+  }
+  static Scene scene(int max_depth, const std::string& body) {
+    return make_scene(files(), parts(max_depth, body));
+  }
+  static const TempFiles& files() {
+    static const TempFiles files;
+    return files;
+  }
+};
+
+TEST_F(OverlappingTiles, ShowTheFirst) {
+  // Where the earlier one of the file is all that a pixel can see, the other one might as well not
+  // be there: not a bit differs.
+  const std::string red = diffuse("red", "0.8, 0.2, 0.1"), blue = diffuse("blue", "0.1, 0.2, 0.8");
+  const std::string lights =
+      constant_light("sky", "0.4, 0.5, 0.7") +
+      square("lamp", 0.5, 90, turned({0, 0.3, 1.5}) + kOffset, area_light("glow", "6, 5, 4"));
+  RunSettings settings;
+  settings.spp = 16;
+  const auto image = [&](int max_depth, const std::string& body) {
+    return means(render(scene(max_depth, body), settings).radiance);
+  };
+  const std::string glow = area_light("one", "1, 1, 1");
+  const auto in_first = image(1, first(glow)), in_second = image(1, second(glow));
+  const auto one = image(3, lights + first(red)), two = image(3, lights + second(blue));
+  const auto red_first = image(3, lights + first(red) + second(blue));
+  const auto blue_first = image(3, lights + second(blue) + first(red));
+  int common = 0;
+  for (size_t i = 0; i < one.size(); ++i) {
+    if (in_first[i] == 1) {
+      EXPECT_EQ(red_first[i], one[i]) << i;
+    }
+    if (in_second[i] == 1) {
+      EXPECT_EQ(blue_first[i], two[i]) << i;
+    }
+    common += in_first[i] == 1 && in_second[i] == 1;
+  }
+  EXPECT_GE(common, 3 * 4);  // of 16 pixels that the overlap covers
+}
+
+TEST_F(OverlappingTiles, GlowAsTheFirst) {
+  // The picture has the flux L_1 4 + L_2 (2 - A), with A = 1 the area of the overlap, which grows
+  // by 1 as the first moves along the plane's x, and does not change along its y.
+  std::string motions[2];
+  for (int axis = 0; axis < 2; ++axis) {
+    std::string lines;
+    const Vec3d v = turned(axis == 0 ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0});
+    for (int i = 0; i < 4; ++i) lines += fmt::format("{} {} {}\n", v.x, v.y, v.z);
+    motions[axis] = ".vertex_positions:" + files().write(fmt::format("v{}.txt", axis), lines);
+  }
+  const Scene glowing =
+      scene(1, first(area_light("a", "1, 1, 1")) + second(area_light("b", "3, 3, 3")));
+  const double pixels = 3 * std::pow(kPixels / 6.0, 2);  // of one area, for three channels
+  const GradientResult result = run_blocks(
+      glowing, {"first" + motions[0], "second" + motions[0], "first" + motions[1]}, 64, 1);
+  const double exact[] = {-3, 3, 0};
+  for (int i = 0; i < 3; ++i) {
+    const Moments& sum = result.parameters[i].image_sum;
+    fmt::print("{} +- {}, exact {}\n", sum.mean(0), std::sqrt(sum.variance(0)), exact[i] * pixels);
+    // The jump is the same all along each edge: there is hardly any noise. Lengths of up to 4 are
+    // off by the rounding of positions, a few times 4 * 2^-24 of them.
+    EXPECT_NEAR(sum.mean(0), exact[i] * pixels, 5 * std::sqrt(sum.variance(0)) + 0x1p-20 * pixels);
+  }
+}
+
+TEST_F(OverlappingTiles, LightAsCutTilesDo) {
+  // Against a second tile that begins where the first one ends.
+  const std::string grey = "<bsdf type=\"diffuse\"/>";
+  const auto both = [&](double from) {
+    return scene(3, square("floor", 4, -90, {0, -1, 0}, diffuse("chalk", "0.75, 0.75, 0.75")) +
+                        first(grey + area_light("a", "9, 3, 1")) +
+                        second(grey + area_light("b", "1, 3, 9"), from));
+  };
+  const auto a = run_blocks(both(0), {"sensor.translate.x", "floor.translate.y"}, 32, 1);
+  const auto b = run_blocks(both(1), {"sensor.translate.x", "floor.translate.y"}, 32, 2);
+  EXPECT_TRUE(compare_moments(a.radiance, b.radiance).plausible(kLevel));
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_TRUE(compare_moments(a.parameters[i].total_blocks, b.parameters[i].total_blocks)
+                    .plausible(kLevel));
+    fmt::print("{} {}\n", a.parameters[i].image_sum.mean(0), b.parameters[i].image_sum.mean(0));
+  }
+}
+
+TEST_F(OverlappingTiles, AreWarnedOfWhereTheyFaceTheSameWay) {
+  const auto warnings = [](const std::string& body) {
+    std::vector<std::string> lines;
+    read_scene(files().write("warned.xml", scene_text(parts(1, body))), {}, &lines);
+    return lines;
+  };
+  const auto lines = warnings(first("") + second(""));
+  ASSERT_EQ(lines.size(), 1u);
+  EXPECT_NE(lines[0].find("pairs of faces of \"first\" and \"second\" overlap in a plane: those "
+                          "of \"first\" are seen there"),
+            std::string::npos)
+      << lines[0];
+  EXPECT_NE(warnings(first("") + second(area_light("b", "1, 1, 1")))[0].find("those of \"second\""),
+            std::string::npos);
+  EXPECT_EQ(warnings(first("") + second("", 1)).size(), 0u);
+  // A box on a floor.
+  EXPECT_EQ(warnings(square("floor", 4, -90, {}, "") + square("bottom", 1, 90, {}, "")).size(), 0u);
 }
 
 // A face of width 1e-23 at a distance of 1 from the origin changes nothing.

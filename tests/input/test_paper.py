@@ -88,6 +88,24 @@ class TestPaper(unittest.TestCase):
         self.assertIn("fd 12.5 +- 0.5", done.stdout)
         self.assertIn("li2019 25 %", done.stdout)
 
+    def test_figures(self):
+        cube = "".join(f"v {k & 1} {k >> 1 & 1} {k >> 2}\n" for k in range(8))
+        mesh = self.write("cube.obj", cube + "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n")
+        only = "fig7-torus,fig9-given-cube,fig10-32-rays-alpha-0.05,table2-given-cube"
+        done = self.paper("--figures", "--mesh", mesh, "--only", only)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertEqual(self.names(), only.split(",")[:3])
+        torus, given, warped = self.calls()
+        self.assertEqual((torus[0], self.value(torus, "--node-edges")), ("reject", "128"))
+        self.assertTrue(os.path.exists(torus[1]))
+        self.assertIn("li2019-solid", self.value(torus, "--methods").split(","))
+        self.assertIn(f"mesh={mesh}", given)
+        self.assertIn("format=obj", given)
+        self.assertEqual((self.value(warped, "--aux"), self.value(warped, "--kappa")), ("32", "1e5"))
+        self.assertIn("12 edges, 12 of them not concave", done.stdout)
+        self.paper("--figures", "--mesh", mesh, "--only", only)
+        self.assertEqual(len(self.calls()), 3)
+
     def test_mitsuba(self):
         self.paper("--only", "sun", "--mitsuba")
         self.assertTrue(self.value(self.calls()[0], "--methods").endswith(",mitsuba"))
@@ -146,6 +164,9 @@ class TestPaper(unittest.TestCase):
     def test_bad_arguments(self):
         for arguments, message in ((["--only", "moon"], "--only: no part is called \"moon\""),
                                    (["--minutes", "-1"], "not a positive number: -1"),
+                                   (["--mesh", "x.obj"], "--mesh: is for --figures"),
+                                   (["--figures", "--mesh", "/no/such"], "--mesh: /no/such: no such file"),
+                                   (["--figures", "--only", "cad"], "--only: no part is called \"cad\""),
                                    (["--limn", "/no/such"], "/no/such: no such program")):
             done = self.paper(*arguments)
             self.assertEqual(done.returncode, 2)

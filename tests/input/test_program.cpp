@@ -1,4 +1,5 @@
 // The program as a user meets it: exit statuses and messages.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
@@ -21,10 +22,8 @@ struct Outcome {
   std::string text;  // both streams
 };
 
-// environment: as a shell takes it before a command, "NAME=VALUE ".
-Outcome run(const std::string& arguments, const std::string& environment = "") {
-  const std::string command = environment + LIMN_PROGRAM + " " + arguments + " 2>&1";
-  FILE* pipe = popen(command.c_str(), "r");
+Outcome call(const std::string& command) {
+  FILE* pipe = popen((command + " 2>&1").c_str(), "r");
   Outcome outcome{-1, ""};
   if (!pipe) return outcome;
   std::array<char, 4096> buffer;
@@ -34,6 +33,11 @@ Outcome run(const std::string& arguments, const std::string& environment = "") {
   const int status = pclose(pipe);
   outcome.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   return outcome;
+}
+
+// environment: as a shell takes it before a command, "NAME=VALUE ".
+Outcome run(const std::string& arguments, const std::string& environment = "") {
+  return call(environment + LIMN_PROGRAM + " " + arguments);
 }
 
 class Program : public testing::Test {
@@ -137,6 +141,178 @@ TEST_F(Program, BackwardWritesWhatOthersRead) {
   EXPECT_NE(refused("backward " + scene_ + " --adjoint " + target + " --terms sky -o " + folder)
                 .find("no term \"sky\""),
             std::string::npos);
+}
+
+// A report without what clocks and threads say.
+json without_times(json report) {
+  for (const char* name : {"seconds", "setup_seconds", "threads"}) report.erase(name);
+  if (report.contains("costs")) {
+    for (auto& cost : report["costs"]) cost.erase("seconds");
+  }
+  if (report.contains("stats")) {
+    report["stats"].erase("setup_seconds");
+    for (auto& term : report["stats"]["terms"]) term.erase("seconds");
+  }
+  return report;
+}
+
+std::string bytes_of(const std::string& file) {
+  std::ifstream stream(file, std::ios::binary);
+  EXPECT_TRUE(stream) << file;
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+class Parts : public Program {
+ protected:
+  std::string part(int k) const { return files_.path(fmt::format("jobs/{}.part", k)); }
+  // Parts 1 to 3 of a command, in another order, by other numbers of threads.
+  void make_parts(const std::string& command) const {
+    for (const int k : {3, 1, 2}) {
+      // Every third as a cluster's job would.
+      const std::string threads = std::to_string(1 + k % 2), index = std::to_string(k);
+      const Outcome outcome =
+          k == 3 ? run_job(command, index, threads)
+                 : run(command + " --threads " + threads + " --part " + index + "/3 -o " + part(k));
+      ASSERT_EQ(outcome.status, 0) << outcome.text;
+      EXPECT_NE(outcome.text.find("part " + std::to_string(k) + "/3"), std::string::npos);
+    }
+  }
+  Outcome run_job(const std::string& command, const std::string& index,
+                  const std::string& threads) const {
+    return call(
+        fmt::format("SLURM_ARRAY_TASK_ID={} SLURM_ARRAY_TASK_COUNT=3 SLURM_CPUS_PER_TASK={} "
+                    "LIMN={} {}/tools/cluster/parts.sbatch {} {}",
+                    index, threads, LIMN_PROGRAM, LIMN_SOURCE_DIR, files_.path("jobs"), command));
+  }
+  std::string all_parts() const { return part(2) + " " + part(3) + " " + part(1); }
+  // The report of a run, and the bytes of its files.
+  std::pair<json, std::vector<std::string>> result_of(const std::string& command,
+                                                      const std::string& output,
+                                                      const std::vector<std::string>& files) const {
+    const std::string figures = files_.path("figures.json");
+    const Outcome outcome = run(command + " --quiet --json " + figures + " -o " + output);
+    EXPECT_EQ(outcome.status, 0) << outcome.text;
+    std::vector<std::string> bytes;
+    for (const std::string& file : files) {
+      bytes.push_back(bytes_of(file));
+      std::filesystem::remove(file);
+    }
+    return {without_times(json::parse(std::ifstream(figures))), bytes};
+  }
+  void expect_same(const std::string& command, const std::string& output,
+                   const std::vector<std::string>& files) const {
+    const auto [report, bytes] = result_of(command, output, files);
+    const auto [joined_report, joined_bytes] = result_of("merge " + all_parts(), output, files);
+    EXPECT_EQ(report, joined_report);
+    for (size_t i = 0; i < files.size(); ++i) EXPECT_TRUE(bytes[i] == joined_bytes[i]) << files[i];
+  }
+};
+
+TEST_F(Parts, OfAGradientJoinToTheBitsOfOneRun) {
+  const std::string command = "gradient " + scene_ +
+                              " --spp 20 --wrt screen.translate.x --wrt "
+                              "blaze.radiance -D glow=5,5,5";
+  const std::vector<std::string> files = {
+      files_.path("out_screen.translate.x.exr"), files_.path("out_screen.translate.x_stderr.exr"),
+      files_.path("out_screen.translate.x.png"), files_.path("out_blaze.radiance.exr"),
+      files_.path("out_blaze.radiance_stderr.exr")};
+  make_parts(command);
+  expect_same(command, out(), files);
+  // An interrupted part holds its first batches, the last of them cut off.
+  std::filesystem::resize_file(part(2), std::filesystem::file_size(part(2)) * 2 / 3);
+  EXPECT_NE(refused("merge " + all_parts() + " -o " + out()).find("is not complete"),
+            std::string::npos);
+  const std::string before = bytes_of(part(2)).substr(0, 2000);
+  ASSERT_EQ(run(command + " --part 2/3 -o " + part(2)).status, 0);
+  EXPECT_TRUE(bytes_of(part(2)).substr(0, 2000) == before);
+  expect_same(command, out(), files);
+}
+
+TEST_F(Parts, OfAReversePassAndAnImageJoinToTheBitsOfOneRun) {
+  const std::string target = files_.path("target.exr"), folder = files_.path("back");
+  ASSERT_EQ(run("render " + scene_ + " --spp 2 --quiet -D glow=5,5,5 -o " + target).status, 0);
+  ASSERT_EQ(run("backward " + scene_ + " --quiet --spp 3 --loss-only --target " + target + " -o " +
+                folder)
+                .status,
+            0);
+  const std::string adjoint = files_.path("adjoint.exr");
+  std::filesystem::rename(folder + "/adjoint.exr", adjoint);
+  const std::string command =
+      "backward " + scene_ + " --spp 7 --batches 5 --stats --adjoint " + adjoint;
+  const std::vector<std::string> files = {folder + "/screen.vertex_positions.ply",
+                                          folder + "/screen.vertex_positions.npy",
+                                          folder + "/floor.vertex_positions.png"};
+  make_parts(command);
+  expect_same(command, folder, files);
+  const std::string image = "render " + scene_ + " --spp 5";
+  make_parts(image);
+  expect_same(image, out(), {out()});
+  // With the loss in the same run: the same adjoint, the same samples.
+  EXPECT_NE(refused("backward " + scene_ + " --target " + target + " --part 1/2 -o " + part(1))
+                .find("--loss-only"),
+            std::string::npos);
+}
+
+TEST_F(Parts, ThatDoNotFitAreRefused) {
+  const std::string command = "gradient " + scene_ + " --quiet --spp 4 --wrt screen.translate.x";
+  make_parts("gradient " + scene_ + " --spp 4 --wrt screen.translate.x");
+  const auto merged = [&](const std::string& parts) {
+    return refused("merge " + parts + " -o " + out());
+  };
+  EXPECT_NE(merged(part(1) + " " + part(3)).find("part 2/3 is missing; 2 of 3 are given"),
+            std::string::npos);
+  EXPECT_NE(merged(all_parts() + " " + part(1)).find("each is needed once"), std::string::npos);
+  const std::string alien = files_.path("alien.part");
+  const std::string with_alien = part(1) + " " + part(2) + " " + alien;
+  ASSERT_EQ(run(command + " --seed 1 --part 3/3 -o " + alien).status, 0);
+  EXPECT_NE(merged(with_alien)
+                .find(alien + ": error: is a part of another run than " + part(1) +
+                      ": seed is 1, there 0"),
+            std::string::npos);
+  ASSERT_EQ(run(command + " -D glow=6,5,4.5 --part 3/3 -o " + alien).status, 0);
+  EXPECT_NE(merged(with_alien).find("another run than " + part(1) + ": scene is"),
+            std::string::npos);
+  ASSERT_EQ(run(command + " --film exact --part 3/3 -o " + alien).status, 0);
+  EXPECT_NE(merged(with_alien).find("another run than " + part(1) + ": film is exact, there rays"),
+            std::string::npos);
+  ASSERT_EQ(run(command + " --part 2/2 -o " + alien).status, 0);
+  EXPECT_NE(merged(with_alien).find("is part 2/2, but " + part(1) + " is part 1/3"),
+            std::string::npos);
+  EXPECT_NE(merged(part(1) + " " + scene_).find("is no part of a run"), std::string::npos);
+  // The scene changes after the parts are made.
+  std::ofstream(scene_, std::ios::app) << "<!-- the same scene -->\n";
+  EXPECT_EQ(run("merge " + all_parts() + " --quiet -o " + out()).status, 0);
+  std::string text = bytes_of(scene_);
+  text.replace(text.find("0.7, 0.5, 0.3"), 3, "0.8");
+  std::ofstream(scene_) << text;
+  EXPECT_NE(merged(all_parts()).find("cannot be joined here: scene was"), std::string::npos);
+  for (const char* bad : {"0/3", "4/3", "1", "1/", "a/3", "1/3/3"}) {
+    EXPECT_NE(refused(command + " --part " + bad + " -o " + alien).find("expected K/N"),
+              std::string::npos)
+        << bad;
+  }
+  EXPECT_NE(refused(command + " --part 1/3 -o " + out()).find("must end in .part"),
+            std::string::npos);
+}
+
+TEST_F(Program, ReversePassesKeepToTheirTime) {
+  const std::string folder = files_.path("back"), again = files_.path("again");
+  const std::string target = files_.path("target.exr");
+  ASSERT_EQ(run("render " + scene_ + " --spp 2 --quiet -D glow=5,5,5 -o " + target).status, 0);
+  const std::string command = "backward " + scene_ + " --quiet --adjoint " + target + " ";
+  const Outcome outcome = run(command + "--time 0.5 -o " + folder);
+  ASSERT_EQ(outcome.status, 0) << outcome.text;
+  const json timed = json::parse(std::ifstream(folder + "/gradient.json"));
+  // Its samples and batches say all.
+  ASSERT_EQ(run(command + fmt::format("--spp {} --batches {} -o {}", timed["spp"].get<int>(),
+                                      timed["batches"].get<int>(), again))
+                .status,
+            0);
+  const json same = json::parse(std::ifstream(again + "/gradient.json"));
+  EXPECT_EQ(timed["parameters"][0]["value"], same["parameters"][0]["value"]);
+  EXPECT_EQ(bytes_of(folder + "/screen.vertex_positions.npy"),
+            bytes_of(again + "/screen.vertex_positions.npy"));
+  EXPECT_GE(timed["batches"], 2);
 }
 
 TEST_F(Program, WarnsOnce) {
@@ -517,8 +693,11 @@ TEST_F(Program, WarningsAreInTheFigures) {
   SceneParts parts;
   parts.width = parts.height = 2;
   parts.body = R"(  <shape type="obj" id="a"><string name="filename" value="a.obj"/></shape>
+  <shape type="rectangle" id="b"><transform name="to_world"><translate z="1"/></transform></shape>
+  <shape type="rectangle" id="c"><transform name="to_world"><translate x="1" z="1"/></transform>
+  </shape>
 )";
-  const std::string scene = files_.write("collapsed.xml", scene_text(parts));
+  const std::string scene = files_.write("warned.xml", scene_text(parts));
   const std::string figures = files_.path("figures.json");
   const auto warnings = [&](const std::string& arguments) {
     run(arguments + " --json " + figures);
@@ -527,12 +706,13 @@ TEST_F(Program, WarningsAreInTheFigures) {
     return (report.is_array() ? report[0] : report)["warnings"];
   };
   const auto of_info = warnings("info " + scene);
-  ASSERT_EQ(of_info.size(), 1u);
+  ASSERT_EQ(of_info.size(), 2u);  // a face without area, shapes that overlap
   const std::string wrt = " --spp 2 --quiet --wrt a.translate.x";
-  EXPECT_EQ(warnings("gradient " + scene + wrt + " -o " + out())[0], of_info[0]);
+  const auto of_gradient = warnings("gradient " + scene + wrt + " -o " + out());
+  for (size_t i = 0; i < of_info.size(); ++i) EXPECT_EQ(of_gradient[i], of_info[i]);
   EXPECT_EQ(warnings("check " + scene + wrt), of_info);
   EXPECT_EQ(warnings("render " + scene + " --spp 1 --quiet -o " + out()), of_info);
-  EXPECT_EQ(warnings("check " + scene + wrt + " --shading mitsuba").size(), 2u);
+  EXPECT_EQ(warnings("check " + scene + wrt + " --shading mitsuba").size(), 3u);
 }
 
 nlohmann::json read_json(const std::string& file) {

@@ -154,3 +154,11 @@ def test_torch_refuses_motions_and_second_derivatives(scene):
     slope, = torch.autograd.grad((image**2).sum(), fov, create_graph=True)
     with pytest.raises(RuntimeError, match="differentiate twice"):
         slope.backward()
+
+
+def test_a_limit_of_time_gives_as_many_samples_as_fit(scene, adjoint):
+    name = "metal.alpha"
+    short = limn.backward(scene, adjoint, name, seconds=0.01)[name]
+    long = limn.backward(scene, adjoint, name, seconds=1)[name]
+    assert 2 <= short.spp < long.spp
+    assert np.isfinite(short.stderr) and long.stderr > 0

@@ -16,6 +16,10 @@ TOOLS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "to
 REPORT = os.path.join(TOOLS, "report.py")
 sys.path.insert(0, TOOLS)
 
+from paper_figures import meshes  # noqa: E402
+from paper_figures import page as figure_page  # noqa: E402
+from paper_figures.figures import Figure  # noqa: E402
+from paper_figures.part import Part  # noqa: E402
 from report.markup import count, element, figures, percent, with_error  # noqa: E402
 from report.overview import relative_times  # noqa: E402
 from report.records import read_folder  # noqa: E402
@@ -264,6 +268,58 @@ class TestReport(unittest.TestCase):
             self.mirror,
             PYTHONPATH=stub,
         )
+
+
+class TestFigures(unittest.TestCase):
+    """The page of tools/paper --figures."""
+
+    def test_a_figure_has_its_words_pictures_and_commands(self):
+        with tempfile.TemporaryDirectory(prefix="limn_figures_") as temporary:
+            mirror, _, bunny = write_samples(os.path.join(temporary, "runs"))
+            counted = os.path.join(temporary, "runs", "table")
+            os.makedirs(counted)
+            with open(os.path.join(counted, "edges.json"), "w") as stream:
+                json.dump({"mesh": "a/cube.obj", "edges": 12, "without_concave": 9}, stream)
+            figures = [
+                Figure("Fig. 1", "A title", "what it <shows>", "what to see",
+                       [Part("mirror", "compare", "mirror.xml", methods=["forest"])], "samples"),
+                Figure("Fig. 2", "Patches", "b", "c", [Part("bunny", "reject", "bunny.ply")]),
+                Figure("Table 3", "Edges", "d", "e", [Part("table", "edges", "cube.obj")]),
+                Figure("Fig. 4", "Not run", "f", "g", [Part("none", "compare", "no.xml")]),
+            ]
+            file = os.path.join(temporary, "figures.html")
+            runs = os.path.join(temporary, "runs")
+            missing = figure_page.write(file, figures, lambda part: os.path.join(runs, part.name))
+            with open(file, encoding="utf-8") as stream:
+                page = stream.read()
+        self.assertEqual(missing, 1)
+        for figure in figures:
+            self.assertEqual(page.count(f"{figure.numbers}: {figure.title}</h2>"), 1)
+            self.assertIn(f"tools/paper --figures --only {figure.runs[0].name}", page)
+        self.assertIn("what it &lt;shows&gt;", page)
+        self.assertIn("limn compare scenes/mirror.xml", page)
+        self.assertIn("limn reject meshes/bunny.ply", page)
+        self.assertNotIn("Picture missing", page)
+        # Scene, reference and two of each method that ran; overview and three of each variant.
+        self.assertEqual(page.count("data:image/png;base64,"), 2 + 2 * 5 + 1 + 3 * 3)
+        self.assertIn("Mitsuba is not installed", page)
+        self.assertEqual(page.count('class="bad"'), 1)  # the method that is made biased
+        self.assertIn("cube.obj</th><td>12</td><td>9</td><td>75 %", page)
+
+    def test_edges_are_counted(self):
+        cube = [(x, y, z) for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)]
+        quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+        faces = [t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))]
+        self.assertEqual(meshes.count_edges(cube, faces), (12, 0))
+        inside_out = [(a, c, b) for a, b, c in faces]
+        self.assertEqual(meshes.count_edges(cube, inside_out), (12, 12))
+        points, triangles = meshes.sphere(2000)
+        self.assertEqual(meshes.count_edges(points, triangles), (3 * len(triangles) // 2, 0))
+        # Quadrilaterals of a torus are plane, and a quarter of its edges are concave: those along
+        # the inner half of the tube.
+        points, triangles = meshes.torus(2000)
+        edges = len(triangles)
+        self.assertEqual(meshes.count_edges(points, triangles), (edges, edges // 4))
 
 
 if __name__ == "__main__":

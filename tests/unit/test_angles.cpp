@@ -1,8 +1,9 @@
-// Angles and half floats against the maths library and the format's definition.
+// Angles and half floats against the maths library and the format's definition; draws by weight.
 #include <gtest/gtest.h>
 
 #include <limits>
 
+#include "limn/core/discrete_distribution.h"
 #include "limn/core/rng.h"
 #include "src/base/angles.h"
 #include "src/base/half.h"
@@ -81,6 +82,25 @@ TEST(Halves, ChangeEverythingElse) {
   }
   EXPECT_NE(static_cast<float>(Half(131072.0f)), 131072.0f);
   EXPECT_NE(static_cast<float>(Half(1e-10f)), 1e-10f);
+}
+
+TEST(DiscreteDistribution, DrawsByWeightAndNothingOfNone) {
+  DiscreteDistribution distribution;
+  const double weights[] = {0, 1, 0, 3, 0};
+  for (const double weight : weights) distribution.add(weight);
+  EXPECT_EQ(distribution.sum(), 4);
+  int counts[5] = {};
+  constexpr int kDraws = 1 << 16;  // exact: bins of equal width
+  for (int i = 0; i < kDraws; ++i) {
+    const double u = static_cast<double>(i) / kDraws;
+    const DiscreteDistribution::Draw draw = distribution.sample(u);
+    ++counts[draw.index];
+    EXPECT_EQ(draw.probability, weights[draw.index] / 4);
+    EXPECT_EQ(draw.fraction, draw.index == 1 ? 4 * u : (4 * u - 1) / 3);
+  }
+  EXPECT_EQ(counts[1], kDraws / 4);
+  EXPECT_EQ(counts[3], kDraws / 4 * 3);
+  EXPECT_EQ(distribution.sample(std::nextafter(1.0, 0.0)).index, 3u);
 }
 
 }  // namespace

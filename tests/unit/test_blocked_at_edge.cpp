@@ -47,7 +47,7 @@ TEST(BlockedAtEdge, AgreesWithRaysCloseBy) {
       ray.t_max = 1e-3;
       Hit hit;
       const bool found = tracer->closest(ray, hit);
-      const auto side = blocked_at_edge(scene, edge, direction);
+      const auto side = blocked_at_edge(scene, *tracer, edge, direction);
       ASSERT_EQ(found, side.has_value()) << "trial " << trial << ", direction " << k;
       if (found) {
         EXPECT_EQ(hit.face, side->face);
@@ -69,9 +69,10 @@ TEST(BlockedAtEdge, RightAngle) {
       make_mesh({{0, 0, -1}, {0, 0, 1}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {1, 0, 3}});
   const std::array faces = {FaceRef{ShapeId(0), FaceId(0)}, FaceRef{ShapeId(0), FaceId(1)}};
   const Vec3d into[] = {{1, 0, 0}, {0, 1, 0}};
+  const auto tracer = make_brute_force_tracer(scene);
   const auto blocked = [&](int start, const Vec3d& direction) {
     const EdgeStart edge{{faces, {}}, {0, 0, -1}, {0, 0, 1}, {faces[start], into[start]}};
-    const auto side = blocked_at_edge(scene, edge, normalize(direction));
+    const auto side = blocked_at_edge(scene, *tracer, edge, normalize(direction));
     return side ? std::optional(side->face) : std::nullopt;
   };
   EXPECT_EQ(blocked(0, {-1, 1, 0}), faces[1]);
@@ -96,9 +97,10 @@ TEST(BlockedAtEdge, WhatOverlapsDoesNotBlock) {
     const std::array faces = {FaceRef{ShapeId(0), FaceId(0)}, FaceRef{ShapeId(1), FaceId(0)},
                               FaceRef{ShapeId(2), FaceId(0)}};
     const Vec3d x0{0, 0, -1}, x1{0, 0, 1};
+    const auto tracer = make_brute_force_tracer(scene);
     const auto blocked = [&](int start, const Vec3d& direction) {
       const FaceSide side = side_of_face(scene, faces[start], x0, {0, 0, 1});
-      const auto found = blocked_at_edge(scene, {{faces, {}}, x0, x1, side}, direction);
+      const auto found = blocked_at_edge(scene, *tracer, {{faces, {}}, x0, x1, side}, direction);
       return found ? std::optional(found->face) : std::nullopt;
     };
     const Vec3d direction = random_direction(rng);

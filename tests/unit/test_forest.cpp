@@ -7,6 +7,7 @@
 
 #include "../support/hard_meshes.h"
 #include "../support/meshes.h"
+#include "../support/scaled_sampler.h"
 #include "edgetree/forest/edge_forest.h"
 #include "edgetree/forest/forest_build.h"
 #include "edgetree/forest/forest_query.h"
@@ -258,32 +259,8 @@ EdgeSamplerInput moving_torus(double scale) {
   return {{build_edge_mesh(mesh, true)}};
 }
 
-// Scaling by a power of two commutes with every rounding: probabilities keep their bits.
 TEST(Forest, ProbabilitiesDoNotDependOnTheScale) {
-  const EdgeSamplerInput unit_input = moving_torus(1);
-  const auto unit = EdgeForest::build(unit_input, 1);
-  for (const int exponent : {-80, -40, -3, 10, 45, 60}) {
-    const double scale = std::ldexp(1.0, exponent);
-    const EdgeSamplerInput input = moving_torus(scale);
-    const auto scaled = EdgeForest::build(input, 1);
-    Rng rng(24, 0, 0);
-    for (int i = 0; i < 5; ++i) {
-      EdgeQuery query;
-      query.p = random_direction(rng) * 2.5;
-      query.n = query.wi = -normalize(query.p);
-      if (i % 2 == 1) query.lobe = {ggx_lobe(), 0.2, 1};
-      EdgeQuery moved = query;
-      moved.p = query.p * scale;
-      double sum = 0;
-      for (uint32_t e = 0; e < input.objects[0].edges.size(); ++e) {
-        const EdgeRef id{ShapeId(0), EdgeId(e)};
-        const double probability = unit->probability(query, id);
-        EXPECT_EQ(scaled->probability(moved, id), probability) << exponent << " " << e;
-        sum += probability;
-      }
-      EXPECT_GT(sum, 0.5) << exponent;
-    }
-  }
+  expect_same_at_all_scales<EdgeForest>(moving_torus, 0.5);
 }
 
 // Two floats hold a coordinate of p, scaled, to 2^-48 of it.

@@ -170,6 +170,16 @@ TEST(BrightPatches, AreTheSuns) {
   }
 }
 
+// Wherever it stands in the map's density: the sun is all that few of its columns draw.
+TEST(BrightPatches, AreFoundEverywhere) {
+  Rng rng(5, 0, 0);
+  for (int i = 0; i < 32; ++i) {
+    const Vec3d axis = random_direction(rng);
+    EXPECT_EQ(find_bright_patches(*sky_with({{axis, 3, 1000}}, 256)).size(), 1u)
+        << axis.x << ' ' << axis.y << ' ' << axis.z;
+  }
+}
+
 TEST(BrightPatches, NoneInPlainSkies) {
   EXPECT_TRUE(find_bright_patches(*make_constant_environment({1, 1, 1})).empty());
   EXPECT_TRUE(find_bright_patches(*sky_with({}, 64)).empty());

@@ -68,18 +68,23 @@ TEST(NearFaces, AreMetOnTheSideWhereTheyLie) {
   Rng rng(1, 2, 3);
   const Vec3d viewer{2, -3, 2.5};
   int floats_err = 0;
-  for (const float gap : {3e-6f, 2e-6f}) {
-    for (const bool beside : {false, true}) {
+  for (const float least : {3e-6f, 2e-6f}) {
+    // Seen from as far away as the camera is; and from farther, where rays from the camera would
+    // tell, and the floor is not among the near faces.
+    for (const int kind : {0, 1, 2, 3}) {
+      const bool beside = kind % 2 == 1;
+      const bool is_far = kind >= 2;
+      const float gap = is_far ? 40 * least : least;
       // Below the edge, or beginning behind it.
-      const Scene scene =
-          beside ? wall_and_floor(0.4f * gap, -gap / 2) : wall_and_floor(-0.5f, gap);
+      Scene scene = beside ? wall_and_floor(0.4f * gap, -gap / 2) : wall_and_floor(-0.5f, gap);
+      scene.camera.origin = {viewer.x, viewer.y, viewer.z};
       const United wall = united(scene, viewer);
       const FacesAround around = wall.mesh.around(wall.edge);
-      ASSERT_FALSE(around.near.empty());
+      ASSERT_EQ(around.near.empty(), is_far);
       const auto tracer = make_embree_tracer(scene, 1);
       for (int i = 0; i < 500; ++i) {
         const Vec3d y{0, 1.4 * rng.uniform() - 0.7, 0};
-        const Vec3d p = viewer + random_direction(rng);
+        const Vec3d p = (viewer + random_direction(rng)) * (is_far ? 1000 : 1);
         Ray ray{p, normalize(y - p)};
         ray.skip_faces = around.all;
         Hit hit;
@@ -87,9 +92,15 @@ TEST(NearFaces, AreMetOnTheSideWhereTheyLie) {
         const bool found = closest_at_edge(*tracer, scene, around, y, distance, ray, hit);
         // Where the ray meets the floor's plane.
         const double t = scene.shapes[1].mesh.positions[0].z / ray.direction.z;
-        const bool expected = t * ray.direction.x >= scene.shapes[1].mesh.positions[0].x;
+        const double inside = t * ray.direction.x - scene.shapes[1].mesh.positions[0].x;
+        const bool expected = inside >= 0;
+        // As near to its border, floats decide whether a face of size 2 is met, from anywhere.
+        if (is_far && std::fabs(inside) < 0x1p-20) continue;
         ASSERT_EQ(found, expected) << gap << ' ' << i;
         if (found) {
+          EXPECT_EQ(hit.t < distance, t < 0);
+        }
+        if (found && t > 0 && !is_far) {
           EXPECT_NEAR(hit.t, distance + t, 1e-9);
         }
         // A ray of floats that skips the wall.

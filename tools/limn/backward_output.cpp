@@ -11,7 +11,7 @@
 
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
-#include "limn/core/shading.h"
+#include "limn/core/surface_point.h"
 #include "tools/limn/command_support.h"
 
 namespace limn {
@@ -143,7 +143,7 @@ json number(double value) { return std::isfinite(value) ? json(value) : json(nul
 }  // namespace
 
 std::vector<PlannedFile> BackwardFiles::planned(const std::string& also) const {
-  std::vector<PlannedFile> files{{"-o", json}};
+  std::vector<PlannedFile> files{{"-o", json}, {"-o", adjoint}, {"-o", adjoint_picture}};
   for (const Array& array : arrays) {
     for (const std::string& file : {array.ply, array.npy, array.txt, array.png})
       files.push_back({"-o, --wrt " + array.parameter, file});
@@ -159,6 +159,8 @@ BackwardFiles plan_files(const Scene& scene, const std::vector<std::string>& par
   };
   BackwardFiles files;
   files.json = in_folder("gradient.json");
+  files.adjoint = in_folder("adjoint.exr");
+  files.adjoint_picture = in_folder("adjoint.png");
   const auto add = [&](const Parameter& parameter) {
     if (parameter.size == 1) return;
     for (uint32_t s = 0; s < scene.shapes.size(); ++s) {

@@ -19,6 +19,7 @@ struct BackwardFiles {
     std::string ply, npy, txt, png;
   };
   std::string json;
+  std::string adjoint, adjoint_picture;  // of a loss; "" where it is given
   std::vector<Array> arrays;
 
   std::vector<PlannedFile> planned(const std::string& also) const;

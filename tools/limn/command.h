@@ -3,8 +3,11 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace limn {
+
+class BatchStore;
 
 // Exit statuses.
 enum Status {
@@ -26,6 +29,11 @@ class Command {
   virtual void add_options(CLI::App& app, bool all) = 0;
   // After parsing. command_line: what was typed, for a shell. Returns an exit status.
   virtual int run(const std::string& command_line) = 0;
+  // Before run(): the batches of the run are those of the store. False for commands that no part is
+  // made of.
+  virtual bool join(BatchStore& /*store*/) { return false; }
+
+  std::vector<std::string> words;  // after the command's name, as typed
 };
 
 }  // namespace limn

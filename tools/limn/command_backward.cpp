@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -11,6 +12,7 @@
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
 #include "tools/limn/output_files.h"
+#include "tools/limn/run_part.h"
 
 namespace limn {
 namespace {
@@ -46,37 +48,47 @@ class BackwardCommand final : public Command {
     app.add_option("--batches", options_.batches,
                    "At most, for standard errors; each costs some time per vertex")
         ->check(CLI::Range(1, 1 << 16));
+    app.add_option("--time", seconds_,
+                   "Seconds, set-up and the images of a loss included: as many samples as fit, "
+                   "instead of --spp")
+        ->check(CLI::PositiveNumber)
+        ->type_name("SECONDS")
+        ->excludes("--spp");
+    app.add_flag("--loss-only", loss_only_,
+                 "With --target: write the loss and its derivative for every pixel alone")
+        ->needs(target);
     app.add_option("-o,--output", output_, "Folder to write (made if it is not there)")->required();
+    add_part_option(app, common_);
+    app.get_option("--part")->excludes("--time");
     app.add_flag("--stats", stats_, "Print edges, nodes, bytes, rays by kind, where the time went");
   }
 
-  int run(const std::string&) override {
+  bool join(BatchStore& store) override {
+    common_.store = &store;
+    return true;
+  }
+
+  int run(const std::string& command_line) override {
     const Scene scene = load_scene(common_, warnings_);
     if (adjoint_.empty() && target_.empty()) throw InputError("give --adjoint or --target");
     options_.terms = parse_terms(terms_);
     options_.uniform_pixels = pixels_ == "uniform";
     const LossKind kind = loss_kind(loss_);
-    const BackwardFiles files = plan_files(scene, options_.parameters, output_);
+    if (!common_.part.empty()) return make_part(scene, command_line);
+    files_ = plan_files(scene, options_.parameters, output_);
+    if (target_.empty()) files_.adjoint = files_.adjoint_picture = "";
     std::filesystem::create_directories(output_);
-    check_outputs(files.planned(common_.json), scene, {adjoint_.empty() ? target_ : adjoint_});
-    const RunSettings settings = make_settings(common_, scene, name());
-    LossResult loss;
-    if (target_.empty()) {
-      loss.adjoint = read_exr(adjoint_);
-    } else {
-      loss = image_loss(scene, read_exr(target_), kind, settings);
-      if (loss.spp == 0) return report_interrupted();
-      if (kind == LossKind::kL1) {
-        warnings_.add_all(
-            {"the gradient of l1 is biased where the image's noise is not small beside "
-             "its difference from the target"});
-      }
-    }
-    const BackwardResult result = backward(scene, loss.adjoint, options_, settings);
+    check_outputs(files_.planned(common_.json), scene, {adjoint_.empty() ? target_ : adjoint_});
+    const RunSettings settings = settings_of(scene);
+    const LossResult loss = loss_of(scene, kind, settings);
+    if (interrupted(settings) && !target_.empty()) return report_interrupted();
+    if (loss_only_) return write_loss_alone(scene, settings, loss);
+    const BackwardResult result = backward(scene, loss.adjoint, options_, rest_of(settings));
     warnings_.add_all(result.warnings);
     if (result.spp == 0) return report_interrupted();
-    write(scene, settings, files, loss, result);
-    return finish_status(result.non_finite, result.spp, settings.spp, "");
+    write(scene, settings, loss, result);
+    const bool all = seconds_ > 0 && !interrupted(settings);
+    return finish_status(result.non_finite, result.spp, all ? result.spp : settings.spp, "");
   }
 
  private:
@@ -85,10 +97,88 @@ class BackwardCommand final : public Command {
     return kInterrupted;
   }
 
-  void write(const Scene& scene, const RunSettings& settings, const BackwardFiles& files,
-             const LossResult& loss, const BackwardResult& result) const {
+  static bool interrupted(const RunSettings& settings) { return settings.interrupted->load(); }
+
+  int make_part(const Scene& scene, const std::string& command_line) {
+    if (adjoint_.empty()) {
+      throw InputError(
+          "--part needs --adjoint, since every part would make the images of the loss again: "
+          "limn backward ... --target T.exr --loss-only -o FOLDER writes FOLDER/adjoint.exr");
+    }
+    const Image adjoint = read_exr(adjoint_);
+    return run_part(common_, scene, {adjoint_}, {name(), words, command_line}, output_,
+                    [&](const RunSettings& part) {
+                      const BackwardResult result = backward(scene, adjoint, options_, part);
+                      warnings_.add_all(result.warnings);
+                      return result.non_finite;
+                    });
+  }
+
+  RunSettings settings_of(const Scene& scene) const {
+    RunSettings settings = make_settings(common_, scene, name());
+    if (seconds_ == 0) return settings;
+    settings.seconds = seconds_;
+    settings.spp = 1 << 30;
+    settings.least_spp = 2;  // for standard errors
+    return settings;
+  }
+  // Of the time what the loss has left.
+  RunSettings rest_of(RunSettings settings) const {
+    if (seconds_ > 0) settings.seconds = std::max(1e-3, seconds_ - watch_.seconds());
+    return settings;
+  }
+
+  LossResult loss_of(const Scene& scene, LossKind kind, RunSettings settings) {
+    LossResult loss;
+    if (target_.empty()) {
+      loss.adjoint = read_exr(adjoint_);
+      return loss;
+    }
+    settings.seconds *= kImageShare;
+    loss = image_loss(scene, read_exr(target_), kind, settings);
+    if (kind == LossKind::kL1) {
+      warnings_.add_all(
+          {"the gradient of l1 is biased where the image's noise is not small beside "
+           "its difference from the target"});
+    }
+    if (loss.spp == 0) return loss;
+    auto attributes = provenance(scene, settings, loss.spp);
+    attributes.push_back({"limn.loss", loss_});
+    attributes.push_back({"limn.target", target_});
+    write_exr(files_.adjoint, loss.adjoint, false, attributes);
+    write_signed_png(files_.adjoint_picture, loss.adjoint, signed_scale(loss.adjoint));
+    return loss;
+  }
+
+  json loss_json(const LossResult& loss) const {
+    return {{"kind", loss_},
+            {"target", target_},
+            {"value", loss.value},
+            {"stderr", std::isfinite(loss.error) ? json(loss.error) : json(nullptr)},
+            {"adjoint", files_.adjoint}};
+  }
+  void print_loss(const LossResult& loss) const {
+    if (!common_.quiet) fmt::print("{}: {:.6g} +- {:.2g}\n", loss_, loss.value, loss.error);
+  }
+
+  int write_loss_alone(const Scene& scene, const RunSettings& settings,
+                       const LossResult& loss) const {
+    print_loss(loss);
+    const json report = {{"scene", scene.file},
+                         {"spp", loss.spp},
+                         {"seed", settings.seed},
+                         {"loss", loss_json(loss)},
+                         {"warnings", warnings_.lines()}};
+    write_json(common_.json, report.dump(2));
+    if (!common_.quiet) fmt::print("{}: {} samples per pixel\n", files_.adjoint, loss.spp);
+    return kSuccess;
+  }
+
+  void write(const Scene& scene, const RunSettings& settings, const LossResult& loss,
+             const BackwardResult& result) const {
     json report = {{"scene", scene.file},
                    {"spp", result.spp},
+                   {"batches", result.batches},
                    {"seed", settings.seed},
                    {"threads", settings.threads},
                    {"seconds", result.seconds},
@@ -97,18 +187,15 @@ class BackwardCommand final : public Command {
                    {"warnings", warnings_.lines()},
                    {"non_finite", result.non_finite.count}};
     if (!target_.empty()) {
-      report["loss"] = {{"kind", loss_},
-                        {"target", target_},
-                        {"value", loss.value},
-                        {"stderr", std::isfinite(loss.error) ? json(loss.error) : json(nullptr)}};
-      if (!common_.quiet) fmt::print("{}: {:.6g} +- {:.2g}\n", loss_, loss.value, loss.error);
+      report["loss"] = loss_json(loss);
+      print_loss(loss);
     }
-    report["parameters"] = write_parameters(scene, files, result, common_.quiet);
+    report["parameters"] = write_parameters(scene, files_, result, common_.quiet);
     if (stats_) report["stats"] = stats_json(result);
-    write_json(files.json, report.dump(2));
+    write_json(files_.json, report.dump(2));
     if (!common_.json.empty()) write_json(common_.json, report.dump(2));
     if (!common_.quiet) {
-      fmt::print("{}: {} samples per pixel, {:.2f} s, of which {:.2f} s set-up\n", files.json,
+      fmt::print("{}: {} samples per pixel, {:.2f} s, of which {:.2f} s set-up\n", files_.json,
                  result.spp, result.seconds, result.setup_seconds);
     }
     if (stats_) print_stats(result);
@@ -145,12 +232,18 @@ class BackwardCommand final : public Command {
     }
   }
 
+  // Of the time, for each of the two images of a loss; not tuned.
+  static constexpr double kImageShare = 0.25;
+
+  Stopwatch watch_;
   CommonOptions common_;
   Warnings warnings_;
   BackwardOptions options_;
+  BackwardFiles files_;
   std::string adjoint_, target_, output_, terms_;
   std::string loss_ = "l2", pixels_ = "adjoint";
-  bool stats_ = false;
+  double seconds_ = 0;  // 0: as many samples as are asked for
+  bool stats_ = false, loss_only_ = false;
 };
 
 }  // namespace

@@ -33,6 +33,7 @@ struct CompareArguments {
   std::string terms;
   std::string samples = "auto";  // of each term
   double step = 0;               // of finite differences; 0: found by a pilot
+  WarpOptions warp;
   std::string output;
   bool report = true;
 };
@@ -148,7 +149,8 @@ class Comparer {
         scene_(scene),
         settings_(settings),
         input_{scene,        command.parameter,      parse_terms(command.terms),
-               command.step, block_size(scene.film), parse_samples(command.samples)},
+               command.step, block_size(scene.film), parse_samples(command.samples),
+               command.warp},
         identity_(identify(input_, common.defines)),
         kept_file_((fs::path(command.output) / "reference.exr").string()) {
     result_.command = command_line;
@@ -298,6 +300,7 @@ void CompareCommand::add_options(CLI::App& app, bool all) {
   add_term_options(app, command_.terms, command_.samples);
   app.add_option("--step", command_.step, "Step of finite differences (default: found by a pilot)")
       ->check(CLI::PositiveNumber);
+  add_warp_options(app, command_.warp);
   app.add_option("-o,--output", command_.output, "Folder to write")
       ->required()
       ->type_name("FOLDER");

@@ -12,6 +12,7 @@
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
 #include "tools/limn/output_files.h"
+#include "tools/limn/run_part.h"
 
 namespace limn {
 namespace {
@@ -261,6 +262,7 @@ class GradientCommand final : public Command {
     app.add_option("--step", options_.step,
                    "Step of finite differences (default: found by a pilot)")
         ->check(CLI::PositiveNumber);
+    add_warp_options(app, options_.warp);
     app.add_option("--time", seconds_,
                    "Seconds, set-up included: as many samples as fit, instead of --spp")
         ->check(CLI::PositiveNumber)
@@ -273,7 +275,14 @@ class GradientCommand final : public Command {
                  "Also write how many samples of each term a sample of every pixel holds, to "
                  "OUTPUT_samples_TERM.exr");
     app.add_flag("--stats", stats_, "Print edges, nodes, bytes, rays by kind, where the time went");
+    add_film_option(app, film_);
     add_debug_option(app, debug_);
+    add_part_option(app, common_);
+    app.get_option("--part")->excludes("--time");
+  }
+  bool join(BatchStore& store) override {
+    common_.store = &store;
+    return true;
   }
 
   int run(const std::string& command_line) override {
@@ -281,8 +290,15 @@ class GradientCommand final : public Command {
     options_.terms = parse_terms(terms_);
     options_.samples = parse_samples(samples_);
     options_.uniform_samples = samples_ == "uniform";
+    options_.exact_film = film_ == "exact";
     if (!debug_.empty()) return trace(scene);
     for (const auto& parameter : options_.parameters) find_parameter(scene, parameter);
+    if (!common_.part.empty()) {
+      check_memory(scene);
+      return run_part(
+          common_, scene, field_files(options_.parameters), {name(), words, command_line}, output_,
+          [&](const RunSettings& part) { return gradient(scene, options_, part).non_finite; });
+    }
     for (const auto& parameter : options_.parameters) {
       outputs_.push_back(options_.parameters.size() == 1
                              ? output_
@@ -387,6 +403,7 @@ class GradientCommand final : public Command {
     attributes.push_back({"limn.terms", terms});
     attributes.push_back({"limn.method", result.method});
     attributes.push_back({"limn.samples", to_string(result.samples())});
+    for (const ImageAttribute& a : settings_attributes(result.settings)) attributes.push_back(a);
     attributes.push_back({kOutputAttribute, output_name(output_)});
     json parameters = json::array();
     for (size_t k = 0; k < outputs_.size(); ++k) {
@@ -399,6 +416,7 @@ class GradientCommand final : public Command {
                          {"seed", settings.seed},
                          {"threads", settings.threads},
                          {"method", result.method},
+                         {"settings", settings_json(result.settings)},
                          {"terms", terms},
                          {"samples", samples},
                          {"pilot_spp", result.pilot_spp},
@@ -428,7 +446,7 @@ class GradientCommand final : public Command {
   Warnings warnings_;
   GradientOptions options_;
   std::string terms_, samples_ = "auto";
-  std::string output_, debug_;
+  std::string output_, debug_, film_ = "rays";
   double seconds_ = 0;  // 0: as many samples as are asked for
   bool stats_ = false, sample_images_ = false;
   std::vector<std::string> outputs_;  // of each parameter

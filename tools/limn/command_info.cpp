@@ -1,16 +1,13 @@
 // `limn info`: what a scene holds, and what can be differentiated.
 #include <fmt/format.h>
 
-#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "limn/core/face_copies.h"
 #include "limn/core/parallel.h"
 #include "limn/core/parameter.h"
 #include "limn/edgetree/crossing_curves.h"
 #include "limn/edgetree/edges.h"
-#include "limn/edgetree/overlaps.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
 
@@ -95,21 +92,6 @@ json describe_crossings(const Scene& scene, std::span<const Mesh* const> meshes,
   return {{"segments", segments.size()}, {"shapes", names}};
 }
 
-// Copies have a warning of their own, and a rule for which of them is seen.
-void warn_of_overlaps(const Scene& scene, std::span<const Mesh* const> meshes,
-                      std::span<const FacePair> pairs, Warnings& warnings) {
-  std::map<std::pair<ShapeId, ShapeId>, int> counts;
-  for (const auto& [a, b] : find_overlaps(meshes, pairs))
-    if (!are_copies(scene, a, b)) ++counts[{a.shape, b.shape}];
-  for (const auto& [shapes, count] : counts) {
-    warnings.add(format_warning(
-        scene.shape(shapes.second).where,
-        fmt::format("{} pairs of faces of {} and {} overlap in a plane: which of the two is seen "
-                    "there, and what it shadows, is left to rounding",
-                    count, shape_name(scene, shapes.first), shape_name(scene, shapes.second))));
-  }
-}
-
 void print_crossings(const json& crossings) {
   const size_t segments = crossings["segments"];
   if (segments == 0) return;
@@ -142,7 +124,6 @@ int run_info(const CommonOptions& common) {
   const std::vector<FacePair> pairs = find_face_pairs(meshes, value(scene.camera.origin), threads);
   report["crossings"] = describe_crossings(scene, meshes, pairs, threads);
   print_crossings(report["crossings"]);
-  warn_of_overlaps(scene, meshes, pairs, warnings);
   fmt::print("parameters (for --wrt):\n");
   for (const Parameter& parameter : list_parameters(scene)) {
     report["parameters"].push_back(

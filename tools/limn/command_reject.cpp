@@ -15,6 +15,7 @@
 #include "limn/core/names.h"
 #include "limn/core/parallel.h"
 #include "limn/edgetree/edge_sampler_types.h"
+#include "limn/edgetree/quadric_chart.h"
 #include "tools/limn/reject/reject_figures.h"
 #include "tools/limn/reject/reject_pictures.h"
 #include "tools/limn/terminal.h"
@@ -304,6 +305,25 @@ class Rejection {
     return all;
   }
 
+  // Of the chosen node, by the first method that has one.
+  json chart_json() const {
+    for (const Measured& method : measured_) {
+      const auto* tree = dynamic_cast<const ChartedTree*>(method.tree.get());
+      const auto chart = tree ? tree->chart(method.figures.match.node) : std::nullopt;
+      if (!chart) continue;
+      json edges = json::array();
+      for (const auto& [a, b] : chart->edges) edges.push_back({to_json(a), to_json(b)});
+      return {{"method", method.figures.name},
+              {"linear", chart->linear},
+              {"square", chart->square},
+              {"product", chart->product},
+              {"low", chart->low},
+              {"high", chart->high},
+              {"edges", edges}};
+    }
+    return nullptr;
+  }
+
   void write_figures() const {
     json report = {
         {"kind", "reject"},
@@ -318,6 +338,7 @@ class Rejection {
         {"point", to_json(point_)},
         {"points", queries_.size()},
         {"colors", colors_json()},
+        {"chart", chart_json()},
         {"status", is_done() ? "done" : "interrupted"}};
     const std::vector<RejectVariant> all = variants();
     for (const RejectVariant& variant : all) report["variants"].push_back(to_json(variant));

@@ -3,6 +3,7 @@
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
 #include "tools/limn/output_files.h"
+#include "tools/limn/run_part.h"
 
 namespace limn {
 namespace {
@@ -15,22 +16,34 @@ class RenderCommand final : public Command {
     add_common_options(app, common_);
     app.add_option("-o,--output", output_, "Image to write (.exr; a .png is put beside it)")
         ->required();
+    add_film_option(app, film_);
     add_debug_option(app, debug_);
+    add_part_option(app, common_);
+  }
+  bool join(BatchStore& store) override {
+    common_.store = &store;
+    return true;
   }
 
   int run(const std::string& command_line) override {
     const Scene scene = load_scene(common_, warnings_);
     const RunSettings settings = make_settings(common_, scene, name());
+    const bool exact_film = film_ == "exact";
     if (!debug_.empty()) {
-      for (const auto& line : trace_sample(scene, settings, parse_place(debug_))) {
+      for (const auto& line : trace_sample(scene, settings, parse_place(debug_), exact_film)) {
         fmt::print("{}\n", line);
       }
       return kSuccess;
     }
+    if (!common_.part.empty()) {
+      return run_part(
+          common_, scene, {}, {name(), words, command_line}, output_,
+          [&](const RunSettings& part) { return render(scene, part, exact_film).non_finite; });
+    }
     check_output(output_);
     check_outputs({{"-o", output_}, {"-o", with_ending(output_, ".png")}, {"--json", common_.json}},
                   scene);
-    const RenderResult result = render(scene, settings);
+    const RenderResult result = render(scene, settings, exact_film);
     if (result.spp == 0) {
       fmt::print(stderr, "interrupted before the first pass over the image: nothing is written\n");
       return kInterrupted;
@@ -64,7 +77,7 @@ class RenderCommand final : public Command {
 
   CommonOptions common_;
   Warnings warnings_;
-  std::string output_, debug_;
+  std::string output_, debug_, film_ = "rays";
 };
 
 }  // namespace

@@ -100,6 +100,29 @@ void add_term_options(CLI::App& app, std::string& terms, std::string& samples) {
       ->type_name("N,N,...");
 }
 
+void add_film_option(CLI::App& app, std::string& film) {
+  app.add_option("--film", film,
+                 "What the camera sees: by rays, or by the exact visible regions of every pixel "
+                 "(box filter)")
+      ->check(CLI::IsMember({"rays", "exact"}))
+      ->capture_default_str();
+}
+
+void add_warp_options(CLI::App& app, WarpOptions& warp) {
+  app.add_option("--aux", warp.rays,
+                 "Auxiliary rays of a direction (methods was, was-unbiased): an even number; the "
+                 "more, the smaller the bias of was")
+      ->check(CLI::Range(2, 1 << 20))
+      ->capture_default_str()
+      ->type_name("N");
+  app.add_option("--kappa", warp.kappa,
+                 "Concentration of their kernel, which is K^(-1/2) radians wide (methods was, "
+                 "was-unbiased)")
+      ->check(CLI::Range(1.0, 1e12))
+      ->capture_default_str()
+      ->type_name("K");
+}
+
 void add_debug_option(CLI::App& app, std::string& place) {
   app.add_option("--debug-sample", place,
                  "Do one sample alone and print all it meets: pixel and sample, or a term and its "
@@ -134,6 +157,7 @@ RunSettings make_settings(const CommonOptions& common, const Scene& scene,
   settings.threads = thread_count(common.threads);
   settings.progress = progress_bar(label, common.quiet);
   settings.interrupted = &interrupt_flag();
+  settings.store = common.store;
   watch_interrupt();
   return settings;
 }
@@ -144,6 +168,27 @@ std::vector<ImageAttribute> provenance(const Scene& scene, const RunSettings& se
           {"limn.spp", std::to_string(spp)},
           {"limn.seed", std::to_string(settings.seed)},
           {"limn.shading", scene.shading == ShadingModel::kMitsuba ? "mitsuba" : "continuous"}};
+}
+
+std::vector<ImageAttribute> settings_attributes(const std::vector<MethodSetting>& settings) {
+  std::string text;
+  for (const MethodSetting& s : settings) {
+    std::visit(
+        [&](const auto& value) {
+          text += fmt::format("{}{} {}", text.empty() ? "" : ", ", s.name, value);
+        },
+        s.value);
+  }
+  if (text.empty()) return {};
+  return {{"limn.settings", text}};
+}
+
+nlohmann::json settings_json(const std::vector<MethodSetting>& settings) {
+  nlohmann::json object = nlohmann::json::object();
+  for (const MethodSetting& s : settings) {
+    std::visit([&](const auto& value) { object[s.name] = value; }, s.value);
+  }
+  return object;
 }
 
 Image film_channels(const Scene& scene, const Image& image) {

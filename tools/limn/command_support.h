@@ -26,6 +26,8 @@ struct CommonOptions {
   std::string json;
   bool quiet = false;
   std::string shading = "continuous";
+  std::string part;             // "K/N" of --part; "": the whole run
+  BatchStore* store = nullptr;  // of `limn merge`
 };
 
 // Scene or mesh, -D, --seed, --threads, --quiet. text, type: of the input.
@@ -40,7 +42,11 @@ void add_parameter_options(CLI::App& app, std::vector<std::string>& parameters, 
                            bool all);
 // --terms and --samples
 void add_term_options(CLI::App& app, std::string& terms, std::string& samples);
+// --aux and --kappa
+void add_warp_options(CLI::App& app, WarpOptions& warp);
 // --debug-sample
+// "rays" or "exact".
+void add_film_option(CLI::App& app, std::string& film);
 void add_debug_option(CLI::App& app, std::string& place);
 
 // The EXR's header says what made it.
@@ -48,6 +54,9 @@ std::vector<ImageAttribute> provenance(const Scene& scene, const RunSettings& se
                                        int64_t spp);
 // One channel (luminance) if the scene's film asks for it.
 Image film_channels(const Scene& scene, const Image& image);
+// What the method was set up with, as "name value, ..."; none where there is nothing to say.
+std::vector<ImageAttribute> settings_attributes(const std::vector<MethodSetting>& settings);
+nlohmann::json settings_json(const std::vector<MethodSetting>& settings);
 // output with another ending: "a/b.exr", "_stderr.exr" gives "a/b_stderr.exr".
 std::string with_ending(const std::string& output, const std::string& ending);
 // Made before long work starts: InputError if the file cannot be written.

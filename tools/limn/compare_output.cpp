@@ -57,6 +57,7 @@ std::vector<ImageAttribute> image_attributes(const Scene& scene, const Compariso
   attributes.push_back({"limn.parameter", c.parameter});
   attributes.push_back({"limn.terms", c.terms});
   attributes.push_back({"limn.method", m.name});
+  for (const ImageAttribute& a : settings_attributes(m.settings)) attributes.push_back(a);
   return attributes;
 }
 
@@ -130,14 +131,6 @@ json summary_json(const RungSummary& s, const std::vector<double>& times) {
           {"bias", bias_json(s.bias)},
           {"terms", terms_json(s.term_seconds)},
           {"peak_memory_bytes", or_null(s.peak_memory_bytes)}};
-}
-
-json settings_json(const std::vector<MethodSetting>& settings) {
-  json object = json::object();
-  for (const MethodSetting& s : settings) {
-    std::visit([&](const auto& value) { object[s.name] = value; }, s.value);
-  }
-  return object;
 }
 
 const char* status_name(MethodStatus status) {

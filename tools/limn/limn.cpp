@@ -64,7 +64,9 @@ int run(int argc, char** argv) {
     return app.exit(error) == 0 ? limn::kSuccess : limn::kBadInput;
   }
   for (const auto& [sub, command] : commands) {
-    if (sub->parsed()) return command->run(command_line(argc, argv));
+    if (!sub->parsed()) continue;
+    command->words.assign(argv + 2, argv + argc);
+    return command->run(command_line(argc, argv));
   }
   return limn::kBadInput;
 }

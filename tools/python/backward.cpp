@@ -92,27 +92,33 @@ void bind_backward(nb::module_& m) {
       [](const SceneHandle& scene, nb::handle adjoint, const std::optional<Names>& names,
          std::optional<int> spp, std::optional<uint64_t> seed,
          const std::vector<std::string>& terms, bool uniform_pixels, int edge_samples,
-         double camera_samples, int threads, const nb::object& progress) {
+         double camera_samples, int batches, double seconds, int threads,
+         const nb::object& progress, BatchStore* store) {
         BackwardOptions options;
         if (names) options.parameters = to_list(*names);
         options.terms = terms;
         options.uniform_pixels = uniform_pixels;
         options.edge_samples = edge_samples;
         options.camera_samples = camera_samples;
+        options.batches = batches;
+        if (batches < 1) throw InputError("batches must be 1 or more");
         if (edge_samples < 1) throw InputError("edge_samples must be 1 or more");
         if (!(camera_samples > 0)) throw InputError("camera_samples must be positive");
-        return backward_of(scene, to_image(adjoint), options, {spp, seed, 0, threads}, progress);
+        return backward_of(scene, to_image(adjoint), options, {spp, seed, seconds, threads, store},
+                           progress);
       },
       nb::arg("scene"), nb::arg("adjoint"), nb::arg("names") = nb::none(),
       nb::arg("spp") = nb::none(), nb::arg("seed") = nb::none(),
       nb::arg("terms") = nb::make_tuple(), nb::arg("uniform_pixels") = false,
-      nb::arg("edge_samples") = 1, nb::arg("camera_samples") = 1.0, nb::arg("threads") = 0,
-      nb::arg("progress") = nb::none(),
+      nb::arg("edge_samples") = 1, nb::arg("camera_samples") = 1.0, nb::arg("batches") = 16,
+      nb::arg("seconds") = 0.0, nb::arg("threads") = 0, nb::arg("progress") = nb::none(),
+      nb::arg("_store").none() = nb::none(),
       nb::sig(
           "def backward(scene: Scene, adjoint: numpy.typing.ArrayLike, names: str | "
           "collections.abc.Sequence[str] | None = None, spp: int | None = None, seed: int | None "
           "= None, terms: collections.abc.Sequence[str] = (), uniform_pixels: bool = False, "
-          "edge_samples: int = 1, camera_samples: float = 1, "
+          "edge_samples: int = 1, camera_samples: float = 1, batches: int = 16, seconds: float = "
+          "0, "
           "threads: int = 0, progress: collections.abc.Callable[[float], object] | None = None) "
           "-> dict[str, Estimate]"),
       "Reverse mode: dLoss/dparameter of every parameter at once, from dLoss/dImage.\n\n"
@@ -126,7 +132,8 @@ void bind_backward(nb::module_& m) {
       "unless "
       "uniform_pixels. edge_samples: at every vertex of a path; camera_samples: points on "
       "silhouettes "
-      "of the film, for each path. The rest as limn.gradient.");
+      "of the film, for each path. batches: at most, for standard errors. The rest as "
+      "limn.gradient.");
 }
 
 }  // namespace limn::python

@@ -20,6 +20,7 @@
 #include "limn/core/scene.h"
 #include "limn/integrators/gradient.h"
 #include "limn/integrators/moments.h"
+#include "limn/integrators/parts.h"
 #include "limn/integrators/run.h"
 
 namespace limn::python {
@@ -45,6 +46,7 @@ class SceneHandle {
 // Each group adds its names to the module.
 nb::class_<SceneHandle> bind_scene(nb::module_& m);
 void bind_parameters(nb::module_& m, nb::class_<SceneHandle>& scene);
+void bind_parts(nb::module_& m);
 void bind_render(nb::module_& m);
 void bind_gradient(nb::module_& m);
 void bind_backward(nb::module_& m);
@@ -91,6 +93,7 @@ struct RunArguments {
   std::optional<uint64_t> seed;
   double seconds = 0;
   int threads = 0;  // 0: all cores
+  BatchStore* store = nullptr;
 };
 RunSettings make_settings(const Scene& scene, const RunArguments& arguments);
 

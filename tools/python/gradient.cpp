@@ -73,14 +73,14 @@ void bind_gradient(nb::module_& m) {
       [](const SceneHandle& scene, const Names& names, std::optional<int> spp,
          std::optional<uint64_t> seed, const std::string& method,
          const std::vector<std::string>& terms, const Samples& samples, double step, double seconds,
-         int threads, const nb::object& progress) {
+         int threads, const nb::object& progress, BatchStore* store) {
         return gradient_of(scene, {names, method, terms, samples, step},
-                           {spp, seed, seconds, threads}, progress);
+                           {spp, seed, seconds, threads, store}, progress);
       },
       nb::arg("scene"), nb::arg("names"), nb::arg("spp") = nb::none(), nb::arg("seed") = nb::none(),
       nb::arg("method") = "", nb::arg("terms") = nb::make_tuple(), nb::arg("samples") = "auto",
       nb::arg("step") = 0.0, nb::arg("seconds") = 0.0, nb::arg("threads") = 0,
-      nb::arg("progress") = nb::none(),
+      nb::arg("progress") = nb::none(), nb::arg("_store").none() = nb::none(),
       nb::sig(
           "def gradient(scene: Scene, names: str | collections.abc.Sequence[str], spp: int | None "
           "= None, seed: int | None = None, method: str = '', terms: "

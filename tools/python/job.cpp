@@ -71,6 +71,7 @@ RunSettings make_settings(const Scene& scene, const RunArguments& arguments) {
   settings.spp = arguments.spp.value_or(scene.sample_count);
   settings.seed = arguments.seed.value_or(scene.seed);
   settings.threads = thread_count(arguments.threads);
+  settings.store = arguments.store;
   if (arguments.seconds == 0) return settings;
   settings.seconds = arguments.seconds;
   settings.spp = arguments.spp.value_or(kUnlimited);

@@ -29,6 +29,7 @@ NB_MODULE(_limn, m) {
   nanobind::register_exception_translator(py::translate);
   auto scene = py::bind_scene(m);
   py::bind_parameters(m, scene);
+  py::bind_parts(m);
   py::bind_render(m);
   py::bind_gradient(m);
   py::bind_backward(m);

@@ -26,10 +26,11 @@ nb::object to_numpy(const Estimate& e, const nb::object& dtype, const nb::object
 }
 
 Estimate render_scene(const SceneHandle& handle, std::optional<int> spp,
-                      std::optional<uint64_t> seed, int threads, const nb::object& progress) {
+                      std::optional<uint64_t> seed, int threads, const nb::object& progress,
+                      BatchStore* store) {
   const auto scene = handle.share();
   RenderResult result;
-  run_job(make_settings(*scene, {spp, seed, 0, threads}), progress,
+  run_job(make_settings(*scene, {spp, seed, 0, threads, store}), progress,
           [&](const RunSettings& settings) { result = render(*scene, settings); });
   Estimate image = to_estimate(result.radiance, scene->film, result.spp, result.seconds);
   check_finite(result.non_finite, nb::cast(image));
@@ -67,6 +68,7 @@ void bind_render(nb::module_& m) {
   m.def(
       "render", render_scene, nb::arg("scene"), nb::arg("spp") = nb::none(),
       nb::arg("seed") = nb::none(), nb::arg("threads") = 0, nb::arg("progress") = nb::none(),
+      nb::arg("_store").none() = nb::none(),
       nb::sig("def render(scene: Scene, spp: int | None = None, seed: int | None = None, threads: "
               "int = 0, progress: collections.abc.Callable[[float], object] | None = None) -> "
               "Estimate"),

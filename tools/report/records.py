@@ -81,7 +81,7 @@ class Result:
         return self.data.text("kind")
 
 
-def _read(file):
+def read_record(file):
     try:
         with open(file, encoding="utf-8") as stream:
             values = json.load(stream)
@@ -104,7 +104,7 @@ def read_folder(folder):
     if not os.path.isdir(folder):
         raise ReportError(f"{folder}: no such folder")
     files = [os.path.join(folder, f"{kind}.json") for kind in KINDS]
-    results = [Result(folder, _read(file)) for file in files if os.path.exists(file)]
+    results = [Result(folder, read_record(file)) for file in files if os.path.exists(file)]
     if not results:
         raise ReportError(
             f"{folder}: neither compare.json nor reject.json nor fit.json is here; "

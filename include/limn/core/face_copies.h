@@ -2,6 +2,7 @@
 // Faces in one place: with the same three corners, in one shape or in several, whichever way they
 // wind.
 #include <optional>
+#include <string>
 #include <unordered_map>
 #include <vector>
 
@@ -48,6 +49,9 @@ class FaceCopies {
 };
 
 // One warning for every two shapes with copies that wind the same way: two surfaces in one place.
-void warn_of_copies(const Scene& scene, std::vector<std::string>& warnings);
+void warn_of_copies(const Scene& scene, const FaceCopies& copies,
+                    std::vector<std::string>& warnings);
+// The shape's id in quotes, or its number.
+std::string name_in_text(const Scene& scene, ShapeId shape);
 
 }  // namespace limn

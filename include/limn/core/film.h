@@ -2,6 +2,7 @@
 // The film: which pixels are made, and the reconstruction filter that defines them.
 #include <vector>
 
+#include "limn/core/error.h"
 #include "limn/core/image.h"
 #include "limn/core/rng.h"
 
@@ -34,6 +35,7 @@ struct Film {
   bool luminance = false;  // one channel in written files
   bool half = true;        // component_format float16
   Filter filter;
+  SourceLocation where;  // of the filter; of the film, if it names none
 
   // The part of the filter's support around the center of full-film column (or row) `pixel` where
   // samples may fall, as offsets from that center.

@@ -56,6 +56,12 @@ class RayTracer {
   // Throws UntraceableRay unless is_traceable(ray).
   virtual bool closest(const Ray& ray, Hit& hit) const = 0;
   virtual bool occluded(const Ray& ray) const = 0;
+  // Whether two faces lie in one place: with the same corners, or overlapping in a plane
+  // (face_overlaps.h).
+  virtual bool overlap(FaceRef a, FaceRef b) const = 0;
+  // Puts the face that is met (face_overlaps.h) in the place of one that is in the same place where
+  // the ray passes: what closest() returns is settled.
+  virtual void settle(const Ray& /*ray*/, Hit& /*hit*/) const {}
 };
 
 // The scene must outlive the tracer. Far from the origin it traces in coordinates of its own: what

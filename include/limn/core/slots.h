@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "limn/core/scene.h"
-#include "limn/core/tape.h"
+#include "limn/core/var.h"
 
 namespace limn {
 

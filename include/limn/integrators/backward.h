@@ -48,6 +48,7 @@ struct BackwardResult {
   std::vector<ParameterAdjoint> parameters;  // in the order asked for
   std::vector<TermRun> terms;                // all that the scene has
   int64_t spp = 0;                           // paths per pixel that were finished, on average
+  int batches = 0;                           // that they came in, all of one size to a sample
   double seconds = 0;
   double setup_seconds = 0;  // edges, samplers, ray tracer
   NonFinite non_finite;      // such contributions count as zero, and the run must end with an error
@@ -62,8 +63,9 @@ struct BackwardResult {
 
 // adjoint: crop_height by crop_width, three channels, or one that stands for the luminance.
 // settings.spp paths per pixel, in batches that give the standard errors; interruption
-// drops the batch in progress. settings.seconds is not looked at. The same seed gives the same bits
-// on any number of threads; memory does not grow with samples. InputError for unknown parameters or
+// drops the batch in progress. With settings.seconds as many batches of one size as fit, two at
+// least: a run without limit with the samples and batches that the result names has the same bits.
+// The same seed gives the same bits on any number of threads; memory does not grow with samples. InputError for unknown parameters or
 // terms, and for an adjoint of another size or one that is not finite.
 BackwardResult backward(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
                         const RunSettings& settings);

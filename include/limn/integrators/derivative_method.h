@@ -55,6 +55,7 @@ struct MethodInput {
   double step = 0;                                     // of finite differences; 0: found by a pilot
   int block = 8;                                       // pixels, of the block sums
   std::optional<SampleCounts> samples = std::nullopt;  // of the terms; none: chosen by a pilot
+  WarpOptions warp = {};
 
   GradientOptions options(const MethodType& method) const;
 };

@@ -42,6 +42,12 @@ class SampleCounts {
 // "3,0.5,1"
 std::string to_string(const SampleCounts& samples);
 
+// Of methods that warp directions.
+struct WarpOptions {
+  int rays = 8;        // auxiliary rays of a direction: an even number
+  double kappa = 1e4;  // concentration of their kernel, which is kappa^(-1/2) radians wide
+};
+
 struct GradientOptions {
   std::vector<std::string> parameters;
   std::string method;              // see methods.h; "": the default
@@ -56,6 +62,10 @@ struct GradientOptions {
   bool uniform_samples = false;
   double step = 0;  // of finite differences; 0: found by a pilot
   int block = 0;    // also keep moments of sums over blocks of this many pixels
+  // The term "camera" draws from what is seen of edges alone, by exact visible regions of every
+  // pixel. InputError unless the film has a box filter, and for methods without that term.
+  bool exact_film = false;
+  WarpOptions warp;
 };
 
 // Derivative images of one parameter, crop_height by crop_width by 3, per unit of the parameter.

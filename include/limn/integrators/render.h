@@ -14,11 +14,14 @@ struct RenderResult {
   NonFinite non_finite;
 };
 
-RenderResult render(const Scene& scene, const RunSettings& settings);
+// exact_film: paths start at points of the visible regions of every pixel, which are found once,
+// exactly (limn/core/visible_regions.h), in place of rays from the camera. InputError unless the
+// film has a box filter.
+RenderResult render(const Scene& scene, const RunSettings& settings, bool exact_film = false);
 
 // One sample done again with all it meets written down, line by line. InputError if the image has
 // no such pixel.
 std::vector<std::string> trace_sample(const Scene& scene, const RunSettings& settings,
-                                      const NonFinite::Place& place);
+                                      const NonFinite::Place& place, bool exact_film = false);
 
 }  // namespace limn

@@ -11,6 +11,8 @@
 
 namespace limn {
 
+class BatchStore;
+
 struct RunSettings {
   int spp = 4;  // samples per pixel; with a limit of time, at most this many
   // Seconds for the whole run, set-up included; 0: no limit. As many samples as fit, but at least
@@ -24,6 +26,9 @@ struct RunSettings {
   std::function<void(double)> progress;
   // Set from outside (Ctrl-C): the batch in progress is dropped, finished batches are kept.
   const std::atomic<bool>* interrupted = nullptr;
+  // Of a run whose batches several processes make (parts.h); null: all are made here. No part has a
+  // limit of time.
+  BatchStore* store = nullptr;
 };
 
 // Samples that came out infinite or not a number. They count as zero, and the run must end with an
@@ -72,6 +77,10 @@ struct TermCost {
   uint64_t zero_weight = 0;  // below the horizon, or without relative motion
   uint64_t occluded = 0;     // the edge point is hidden (or, for the camera, off the film)
   uint64_t counted = 0;
+  // Where directions are warped (of paths).
+  uint64_t warped = 0;     // directions whose motion auxiliary rays told
+  uint64_t dominated = 0;  // of which one ray held nine tenths of the weights
+  uint64_t dropped = 0;    // auxiliary rays on an edge to rounding
   LargestSample largest;
   void add(const RayCount& count) {
     rays += count.total();

@@ -36,7 +36,9 @@ from ._limn import (
     write_png,
     write_signed_png,
 )
+from .dicts import Transform, load_dict
 from .errors import InputError, NonFiniteError, UnknownParameterError
+from .parts import Part, merge, part
 
 __all__ = [
     "Check",
@@ -51,8 +53,10 @@ __all__ = [
     "NonFiniteError",
     "Parameter",
     "Parameters",
+    "Part",
     "Rung",
     "Scene",
+    "Transform",
     "UnknownParameterError",
     "backward",
     "check",
@@ -61,8 +65,11 @@ __all__ = [
     "image_loss",
     "info",
     "load",
+    "load_dict",
     "load_string",
+    "merge",
     "methods",
+    "part",
     "read_exr",
     "render",
     "write_exr",

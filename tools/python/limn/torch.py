@@ -10,8 +10,10 @@ Imports torch, which `import limn` does not.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import torch
 
 from . import Scene, backward, render as _render
@@ -22,7 +24,16 @@ __all__ = ["render"]
 
 class _Render(torch.autograd.Function):
     @staticmethod
-    def forward(ctx, scene, names, spp, spp_grad, seed, threads, *tensors):
+    def forward(
+        ctx: Any,
+        scene: Scene,
+        names: list[str],
+        spp: int | None,
+        spp_grad: int | None,
+        seed: int,
+        threads: int,
+        *tensors: Any,
+    ) -> Any:
         scene = scene.copy()
         for name, tensor in zip(names, tensors):
             scene[name] = tensor.detach().cpu().numpy()
@@ -32,7 +43,7 @@ class _Render(torch.autograd.Function):
 
     @staticmethod
     @torch.autograd.function.once_differentiable
-    def backward(ctx, adjoint):
+    def backward(ctx: Any, adjoint: Any) -> tuple[Any, ...]:
         scene, names, spp, seed, threads = ctx.run
         wanted = [n for n, need in zip(names, ctx.needs_input_grad[6:]) if need]
         found = _pull_back(scene, wanted, adjoint.cpu().numpy(), spp, seed, threads)
@@ -43,10 +54,17 @@ class _Render(torch.autograd.Function):
         return (None,) * 6 + tuple(gradients)
 
 
-def _pull_back(scene, names, adjoint, spp, seed, threads):
+def _pull_back(
+    scene: Scene,
+    names: list[str],
+    adjoint: npt.NDArray[Any],
+    spp: int | None,
+    seed: int,
+    threads: int,
+) -> dict[str, npt.NDArray[Any]]:
     """{name: float64 array of the value's shape}."""
 
-    def run(names, adjoint):
+    def run(names: list[str], adjoint: npt.NDArray[Any]) -> dict[str, npt.NDArray[Any]]:
         if not names:
             return {}
         found = backward(scene, adjoint, names, spp=spp, seed=seed, threads=threads)
@@ -54,7 +72,7 @@ def _pull_back(scene, names, adjoint, spp, seed, threads):
 
     # limn differentiates colours along grey; channels never mix, so that an adjoint of one channel
     # gives the derivative of that channel.
-    colours = [n for n in names if np.shape(scene[n]) == (3,)]
+    colours = [n for n in names if np.asarray(scene[n]).shape == (3,)]
     found = run([n for n in names if n not in colours], adjoint)
     channels = [run(colours, adjoint * np.eye(3, dtype=adjoint.dtype)[c]) for c in range(3)]
     found.update({n: np.array([float(c[n]) for c in channels]) for n in colours})

@@ -1,5 +1,5 @@
 // A tree over boxes, to find pairs that overlap.
-#include "edgetree/edges/box_tree.h"
+#include "limn/core/box_tree.h"
 
 #include <algorithm>
 #include <limits>

@@ -1,0 +1,37 @@
+#pragma once
+// Choosing one of many in proportion to weights.
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+namespace limn {
+
+// Sums of weights that are not negative; draws search them, in the logarithm of their number.
+class DiscreteDistribution {
+ public:
+  struct Draw {
+    size_t index;
+    double probability;  // of the index
+    double fraction;     // what is left of the random number [0, 1]: uniform again
+  };
+
+  void add(double weight) { sums_.push_back(sum() + weight); }
+  size_t size() const { return sums_.size(); }
+  bool empty() const { return sums_.empty(); }
+  double sum() const { return sums_.empty() ? 0 : sums_.back(); }
+
+  // u: in [0, 1). There is an entry, and one of them has a positive weight: none without is drawn.
+  Draw sample(double u) const {
+    const double target = u * sums_.back();
+    const auto found = std::upper_bound(sums_.begin(), sums_.end(), target);
+    const size_t index = std::min<size_t>(found - sums_.begin(), sums_.size() - 1);
+    const double below = index == 0 ? 0 : sums_[index - 1];
+    const double weight = sums_[index] - below;
+    return {index, weight / sums_.back(), std::clamp((target - below) / weight, 0.0, 1.0)};
+  }
+
+ private:
+  std::vector<double> sums_;
+};
+
+}  // namespace limn

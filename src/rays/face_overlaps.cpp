@@ -1,0 +1,265 @@
+// Faces that overlap in a plane, from a tree over their boxes: no line within the plane parts them.
+#include "limn/core/face_overlaps.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
+#include <cmath>
+#include <map>
+#include <optional>
+
+#include "limn/core/box_tree.h"
+#include "limn/core/parallel.h"
+#include "limn/core/touch.h"
+
+namespace limn {
+namespace {
+
+using Corners = std::array<Vec3d, 3>;
+using FacePair = std::pair<FaceRef, FaceRef>;
+
+auto place(FaceRef face) { return std::pair(face.shape, face.face); }
+
+Corners corners_of(const Scene& scene, FaceRef ref) {
+  const Mesh& mesh = scene.shape(ref.shape).mesh;
+  const FaceIndices& f = mesh.face(ref.face);
+  return {cast<double>(mesh.positions[f[0]]), cast<double>(mesh.positions[f[1]]),
+          cast<double>(mesh.positions[f[2]])};
+}
+
+double size_of(const Corners& corners) {
+  double size = 0;
+  for (const Vec3d& x : corners)
+    size = std::max({size, std::fabs(x.x), std::fabs(x.y), std::fabs(x.z)});
+  return size;
+}
+
+Vec3d normal_of(const Corners& c) { return cross(c[1] - c[0], c[2] - c[0]); }
+
+bool lies_in_plane(const Corners& corners, const Vec3d& x, const Vec3d& n, double tolerance) {
+  return std::all_of(corners.begin(), corners.end(), [&](const Vec3d& corner) {
+    return std::fabs(dot(n, corner - x)) <= tolerance;
+  });
+}
+
+// Whether `b` lies beyond a side of `a`, but for what `tolerance` explains.
+bool lies_beside(const Corners& a, const Vec3d& n, const Corners& b, double tolerance) {
+  for (int k = 0; k < 3; ++k) {
+    const Vec3d inward = normalize(cross(n, a[(k + 1) % 3] - a[k]));
+    const auto is_out = [&](const Vec3d& x) { return dot(inward, x - a[k]) <= tolerance; };
+    if (std::all_of(b.begin(), b.end(), is_out)) return true;
+  }
+  return false;
+}
+
+// Where the ray meets the triangle, its sides included: the volumes over these and the direction
+// have one sign.
+std::optional<double> meet(const Corners& corners, const Ray& ray) {
+  const Vec3d a = corners[0] - ray.origin, b = corners[1] - ray.origin, c = corners[2] - ray.origin;
+  const Vec3d& d = ray.direction;
+  const double u = dot(cross(b, c), d), v = dot(cross(c, a), d), w = dot(cross(a, b), d);
+  const bool left = u >= 0 && v >= 0 && w >= 0, right = u <= 0 && v <= 0 && w <= 0;
+  const Vec3d n = normal_of(corners);
+  const double slope = dot(n, d);
+  if (!(left || right) || slope == 0) return std::nullopt;
+  return dot(n, a) / slope;
+}
+
+// Wider by twice what rounding explains: a float's rounding is less than the second half.
+FloatBox box_around(const Vec3d& lower, const Vec3d& upper, double size) {
+  const double margin = 2 * touch_tolerance(size, 0);
+  FloatBox box;
+  for (int k = 0; k < 3; ++k) {
+    box.lower[k] = static_cast<float>(lower[k] - margin);
+    box.upper[k] = static_cast<float>(upper[k] + margin);
+  }
+  return box;
+}
+
+FloatBox box_of(const Corners& c) {
+  Bounds bounds;
+  for (const Vec3d& x : c) bounds.extend(x);
+  return box_around(bounds.lower, bounds.upper, size_of(c));
+}
+
+FloatBox box_of(const Mesh& mesh) {
+  const Bounds bounds = bounds_of(mesh);
+  return box_around(bounds.lower, bounds.upper, size_of({bounds.lower, bounds.upper, {}}));
+}
+
+class OverlapFinder {
+ public:
+  OverlapFinder(const Scene& scene, const FaceCopies& copies, FaceOverlaps::Of of) {
+    std::vector<FloatBox> shapes;
+    for (const Shape& shape : scene.shapes) shapes.push_back(box_of(shape.mesh));
+    for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+      std::vector<FloatBox> others;
+      for (uint32_t i = 0; i < shapes.size(); ++i)
+        if (i != s && shapes[i].overlaps(shapes[s])) others.push_back(shapes[i]);
+      const Mesh& mesh = scene.shapes[s].mesh;
+      for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+        const FaceRef face{ShapeId(s), FaceId(f)};
+        const Corners corners = corners_of(scene, face);
+        const FloatBox box = box_of(corners);
+        const auto meets = [&](const FloatBox& other) { return other.overlaps(box); };
+        if (of == FaceOverlaps::Of::kDifferentShapes &&
+            std::none_of(others.begin(), others.end(), meets))
+          continue;
+        if (copies.first(face) != face || !has_area(mesh, mesh.faces[f])) continue;
+        faces_.push_back(face);
+        boxes_.push_back(box);
+        corners_.push_back(corners);
+        normals_.push_back(normalize(normal_of(corners)));
+      }
+    }
+  }
+
+  std::vector<FacePair> find(int threads) {
+    const BoxTree tree(boxes_, threads);
+    constexpr uint32_t kBlock = 256;  // leaves; not tuned
+    std::vector<std::vector<FacePair>> found((tree.leaf_count() + kBlock - 1) / kBlock);
+    parallel_for(found.size(), threads, [&](size_t block) {
+      std::vector<uint32_t> leaves;
+      const auto begin = static_cast<uint32_t>(block) * kBlock;
+      for (uint32_t leaf = begin; leaf < std::min(begin + kBlock, tree.leaf_count()); ++leaf)
+        append_pairs_of(tree, leaf, leaves, found[block]);
+    });
+    std::vector<FacePair> pairs;
+    for (const auto& some : found) pairs.insert(pairs.end(), some.begin(), some.end());
+    return pairs;
+  }
+
+ private:
+  bool overlap(uint32_t i, uint32_t j) const {
+    const Corners &a = corners_[i], &b = corners_[j];
+    const double tolerance = touch_tolerance(size_of(a), size_of(b));
+    if (!lies_in_plane(b, a[0], normals_[i], tolerance)) return false;
+    if (!lies_in_plane(a, b[0], normals_[j], tolerance)) return false;
+    const double most = kShortestTouch * tolerance;
+    return !lies_beside(a, normals_[i], b, most) && !lies_beside(b, normals_[j], a, most);
+  }
+
+  // Of pairs within the leaf, and with faces of later ones.
+  void append_pairs_of(const BoxTree& tree, uint32_t leaf, std::vector<uint32_t>& leaves,
+                       std::vector<FacePair>& pairs) {
+    tree.find_leaves(tree.leaf_box(leaf), leaf, leaves);
+    const auto own = tree.leaf(leaf);
+    const size_t before = pairs.size();
+    for (const uint32_t other : leaves) {
+      for (size_t i = 0; i < own.size(); ++i) {
+        uint32_t lanes = tree.boxes(other).overlaps(boxes_[own[i]]);
+        if (other == leaf) lanes &= ~((2u << i) - 1);
+        for (; lanes != 0; lanes &= lanes - 1) {
+          const uint32_t j = tree.leaf(other)[std::countr_zero(lanes)];
+          if (overlap(own[i], j))
+            pairs.push_back({faces_[std::min(own[i], j)], faces_[std::max(own[i], j)]});
+        }
+      }
+    }
+    count_ += pairs.size() - before;
+    if (count_ > FaceOverlaps::kMostPairs) {
+      throw InputError("more than " + std::to_string(FaceOverlaps::kMostPairs) +
+                       " pairs of faces overlap in a plane, which is the limit: are shapes in the "
+                       "scene more than once?");
+    }
+  }
+
+  std::vector<FaceRef> faces_;  // with an area, in the order of the file
+  // Theirs:
+  std::vector<FloatBox> boxes_;
+  std::vector<Corners> corners_;
+  std::vector<Vec3d> normals_;  // unit
+  std::atomic<size_t> count_{0};
+};
+
+}  // namespace
+
+FaceOverlaps::FaceOverlaps(const Scene& scene, const FaceCopies& copies, int threads, Of of)
+    : scene_(&scene), copies_(&copies), overlaps_(scene.shapes.size()) {
+  std::vector<FacePair> pairs = OverlapFinder(scene, copies, of).find(threads);
+  const size_t count = pairs.size();
+  pairs.reserve(2 * count);
+  for (size_t i = 0; i < count; ++i) pairs.push_back({pairs[i].second, pairs[i].first});
+  std::sort(pairs.begin(), pairs.end(), [](const FacePair& a, const FacePair& b) {
+    return std::pair(place(a.first), place(a.second)) < std::pair(place(b.first), place(b.second));
+  });
+  others_.reserve(pairs.size());
+  for (const auto& [face, other] : pairs) {
+    overlaps_[face.shape.index()] = true;
+    const auto [range, is_new] = of_.try_emplace(key(face), Range{others_.size(), 0});
+    others_.push_back(other);
+    range->second.end = others_.size();
+  }
+}
+
+std::span<const FaceRef> FaceOverlaps::found_of(FaceRef face) const {
+  const auto found = of_.find(key(face));
+  if (found == of_.end()) return {};
+  return std::span(others_).subspan(found->second.begin, found->second.end - found->second.begin);
+}
+
+std::vector<FacePair> FaceOverlaps::pairs() const {
+  std::vector<FacePair> pairs;
+  for (uint32_t s = 0; s < scene_->shapes.size(); ++s) {
+    if (!overlaps_[s]) continue;
+    for (uint32_t f = 0; f < scene_->shapes[s].mesh.faces.size(); ++f) {
+      const FaceRef face{ShapeId(s), FaceId(f)};
+      if (copies_->first(face) != face) continue;
+      for (const FaceRef other : of(face))
+        if (place(face) < place(other)) pairs.push_back({face, other});
+    }
+  }
+  return pairs;
+}
+
+bool FaceOverlaps::contains(FaceRef a, FaceRef b) const {
+  const auto others = of(a);
+  const FaceRef first = copies_->first(b);
+  return copies_->first(a) == first ||
+         std::find(others.begin(), others.end(), first) != others.end();
+}
+
+void FaceOverlaps::settle(const Ray& ray, Hit& hit) const {
+  const auto others = of(hit.face);
+  const auto met = [&](FaceRef face) {
+    return copies_->met(face, ray.direction, ray.skip_emitters);
+  };
+  if (!copies_->empty()) hit.face = met(hit.face).value_or(hit.face);
+  for (const FaceRef other : others) {
+    const auto face = met(other);
+    if (!face || !is_met_first(*scene_, *face, hit.face, ray.direction)) continue;
+    if (const auto t = meet(corners_of(*scene_, *face), ray)) hit = {*face, *t};
+  }
+}
+
+bool FaceOverlaps::is_hidden(FaceRef face, const Ray& ray) const {
+  Hit hit{face, 0};
+  settle(ray, hit);
+  return hit.face != face;
+}
+
+void warn_of_overlaps(const Scene& scene, std::vector<std::string>& warnings) {
+  const FaceCopies copies(scene);
+  warn_of_copies(scene, copies, warnings);
+  std::map<std::pair<ShapeId, ShapeId>, int> counts;
+  const FaceOverlaps overlaps(scene, copies, thread_count(0), FaceOverlaps::Of::kDifferentShapes);
+  for (const auto& [a, b] : overlaps.pairs()) {
+    if (a.shape == b.shape) continue;
+    if (dot(normal_of(corners_of(scene, a)), normal_of(corners_of(scene, b))) > 0)
+      ++counts[{a.shape, b.shape}];
+  }
+  for (const auto& [shapes, count] : counts) {
+    const auto& [a, b] = shapes;
+    const bool second = scene.shape(b).is_emitter && !scene.shape(a).is_emitter;
+    warnings.push_back(format_warning(
+        scene.shape(b).where,
+        std::to_string(count) + (count == 1 ? " pair" : " pairs") + " of faces of " +
+            name_in_text(scene, a) + " and " + name_in_text(scene, b) +
+            " overlap in a plane: those of " + name_in_text(scene, second ? b : a) +
+            " are seen there; as one of the two moves out of the plane alone the image jumps, "
+            "which no derivative tells"));
+  }
+}
+
+}  // namespace limn

@@ -1,0 +1,63 @@
+#pragma once
+// Lines through points of a grid, and on which side of one two others meet: exactly.
+#include <cmath>
+#include <cstdint>
+
+namespace limn {
+
+// A window is 2^30 grid steps wide, its center at (0, 0). Points on lines lie at most twice as far
+// out as its sides.
+inline constexpr double kGridHalf = 0x1p29;
+inline constexpr double kGridBand = 0x1p30;
+
+struct GridPoint {
+  int64_t x, y;  // |x|, |y| <= 2^30
+  bool operator==(const GridPoint&) const = default;
+};
+
+// The half-plane a x + b y + c >= 0; |a|, |b| <= 2^31, |c| <= 2^62.
+struct GridLine {
+  int64_t a, b, c;
+  GridLine flipped() const { return {-a, -b, -c}; }
+};
+
+// What lies to the left of the way from p to q, two different points.
+inline GridLine line_through(const GridPoint& p, const GridPoint& q) {
+  const int64_t a = p.y - q.y, b = q.x - p.x;
+  return {a, b, -(a * p.x + b * p.y)};
+}
+
+// Twice the signed area of a triangle, positive if it is counter-clockwise.
+inline int64_t twice_area(const GridPoint& p, const GridPoint& q, const GridPoint& r) {
+  return (q.x - p.x) * (r.y - p.y) - (q.y - p.y) * (r.x - p.x);
+}
+
+struct GridCorner {
+  double x, y;  // to three roundings each
+};
+// Where two lines meet that are not parallel.
+GridCorner meet(const GridLine& l, const GridLine& m);
+
+// The side of `line` on which the border of l turns left into that of m, within the window: 1, -1,
+// or 0 if it is on it.
+int exact_side(const GridLine& line, const GridLine& l, const GridLine& m);
+
+// The same by meet(l, m), where doubles suffice to tell; else 0. Each coordinate carries three
+// roundings, c one, each product and each sum another: at most seven of 2^-53 on each summand.
+class SideFilter {
+ public:
+  explicit SideFilter(const GridLine& line)
+      : a_(static_cast<double>(line.a)),
+        b_(static_cast<double>(line.b)),
+        c_(static_cast<double>(line.c)) {}
+  int side_of(const GridCorner& corner) const {
+    const double ax = a_ * corner.x, by = b_ * corner.y, value = ax + by + c_;
+    const double error = 0x1.0p-50 * (std::fabs(ax) + std::fabs(by) + std::fabs(c_));
+    return value > error ? 1 : value < -error ? -1 : 0;
+  }
+
+ private:
+  double a_, b_, c_;
+};
+
+}  // namespace limn

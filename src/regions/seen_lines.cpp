@@ -1,0 +1,103 @@
+// Lines of a window through points of its grid: those of a vertex are the same for all faces.
+#include "src/regions/seen_lines.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace limn {
+namespace {
+
+// A line is told to miss the window if it does so by more than this part of the window's size:
+// far more than the rounding of its points to the grid, and far less than the band.
+constexpr double kClear = 0x1p-20;
+
+bool in_band(const PlanePoint& p) {
+  return std::fabs(p.x) <= kGridBand && std::fabs(p.y) <= kGridBand;
+}
+
+GridPoint rounded(const PlanePoint& p) {
+  const auto whole = [](double x) { return std::llround(std::clamp(x, -kGridBand, kGridBand)); };
+  return {whole(p.x), whole(p.y)};
+}
+
+// The two points where the line through p along d leaves the band; it meets the window.
+struct Exits {
+  PlanePoint back, front;
+};
+Exits leave_band(const PlanePoint& p, const PlanePoint& d) {
+  double t0 = -1e300, t1 = 1e300;
+  const auto clip = [&](double x, double slope) {
+    if (slope == 0) return;
+    const double a = (-kGridBand - x) / slope, b = (kGridBand - x) / slope;
+    t0 = std::max(t0, std::min(a, b));
+    t1 = std::min(t1, std::max(a, b));
+  };
+  clip(p.x, d.x);
+  clip(p.y, d.y);
+  return {{p.x + t0 * d.x, p.y + t0 * d.y}, {p.x + t1 * d.x, p.y + t1 * d.y}};
+}
+
+Reach reach_of(double at_center, double change) {
+  if (at_center > change * (1 + kClear)) return Reach::kHoldsAll;
+  if (at_center < -change * (1 + kClear)) return Reach::kHoldsNone;
+  return Reach::kCuts;
+}
+
+HalfPlane flipped_if(bool flip, const HalfPlane& h) {
+  if (!flip) return h;
+  if (h.reach == Reach::kCuts) return {h.reach, h.line.flipped()};
+  return {h.reach == Reach::kHoldsAll ? Reach::kHoldsNone : Reach::kHoldsAll, {}};
+}
+
+// To the left of the way between two points; `whole`: whether they are corners of a face.
+HalfPlane left_of(const PlanePoint& from, bool from_corner, const PlanePoint& to, bool to_corner) {
+  const PlanePoint d{to.x - from.x, to.y - from.y};
+  const double at_center = d.y * from.x - d.x * from.y;
+  const Reach reach = reach_of(at_center, (std::fabs(d.x) + std::fabs(d.y)) * kGridHalf);
+  if (reach != Reach::kCuts) return {reach, {}};
+  const bool keep_from = from_corner && in_band(from), keep_to = to_corner && in_band(to);
+  Exits exits{from, to};
+  if (!keep_from || !keep_to) exits = leave_band(from, d);
+  const GridPoint p = rounded(keep_from ? from : exits.back);
+  const GridPoint q = rounded(keep_to ? to : exits.front);
+  return {reach, line_through(p, q)};
+}
+
+}  // namespace
+
+int orientation_on_grid(const SeenFace& face, const WindowGrid& grid) {
+  GridPoint corners[3];
+  for (int k = 0; k < 3; ++k) {
+    const SeenFace::Side& side = face.sides[k];
+    const PlanePoint p = grid.to_grid(side.reversed ? side.to : side.from);
+    if (!in_band(p)) return face.counter_clockwise ? 1 : -1;
+    corners[k] = rounded(p);
+  }
+  const int64_t area = twice_area(corners[0], corners[1], corners[2]);
+  return area > 0 ? 1 : area < 0 ? -1 : 0;
+}
+
+HalfPlane half_plane_of(const SeenFace::Side& side, bool counter_clockwise,
+                        const WindowGrid& grid) {
+  HalfPlane h =
+      left_of(grid.to_grid(side.from), side.from_corner, grid.to_grid(side.to), side.to_corner);
+  // Both ends in one place: the two other sides meet there, and hold the face.
+  if (h.reach == Reach::kCuts && h.line.a == 0 && h.line.b == 0) return {Reach::kHoldsAll, {}};
+  return flipped_if(side.reversed == counter_clockwise, h);
+}
+
+HalfPlane half_plane_of(const PlaneFunction& f) {
+  // One order for a function and its negative.
+  const bool flip = f.a < 0 || (f.a == 0 && f.b < 0);
+  const PlaneFunction g = flip ? PlaneFunction{-f.a, -f.b, -f.c} : f;
+  const Reach reach = reach_of(g.c, (std::fabs(g.a) + std::fabs(g.b)) * kGridHalf);
+  if (reach != Reach::kCuts) return flipped_if(flip, {reach, {}});
+  const double steepness = g.a * g.a + g.b * g.b;
+  if (steepness == 0) return flipped_if(flip, {Reach::kHoldsAll, {}});
+  // The point nearest to the center; positive to the left of d.
+  const PlanePoint p{-g.c * g.a / steepness, -g.c * g.b / steepness}, d{g.b, -g.a};
+  const Exits exits = leave_band(p, d);
+  return flipped_if(flip, {reach, line_through(rounded(exits.back), rounded(exits.front))});
+}
+
+}  // namespace limn

@@ -1,0 +1,118 @@
+"""Scenes as dictionaries."""
+
+import re
+
+import limn
+import numpy as np
+import pytest
+from limn.dicts import TYPES
+from test_scene import same
+
+
+def grey(value):
+    return {"type": "rgb", "value": value}
+
+
+def scene_dict():
+    """conftest.SCENE in Mitsuba's words."""
+    transform = limn.Transform()
+    return {
+        "type": "scene",
+        "eye": {
+            "type": "perspective",
+            "fov": 40,
+            "to_world": transform.look_at([1, 3, 5], [0, 0.5, 0], up=[0, 1, 0]),
+            "sampler": {"type": "independent", "sample_count": 4},
+            "film": {"type": "hdrfilm", "width": 16, "height": np.int64(12),
+                     "component_format": "float32", "rfilter": {"type": "box"}},
+        },
+        "metal": {"type": "roughconductor", "alpha": np.float64(0.2)},
+        "clay": {"type": "diffuse", "reflectance": grey([0.7, 0.5, 0.3])},
+        "tent": {"type": "obj", "filename": "tent.obj", "surface": {"type": "ref", "id": "metal"}},
+        "floor": {"type": "rectangle",
+                  "to_world": transform.scale(4) @ transform.rotate([1, 0, 0], -90),
+                  "bsdf": {"type": "ref", "id": "clay"}},
+        "ball": {"type": "sphere", "center": (-2, 3, 1), "radius": 0.5,
+                 "emitter": {"type": "area", "radiance": grey([4, 5, 6])}},
+        "sky": {"type": "constant", "radiance": grey([0.5])},
+        "bulb": {"type": "point", "position": np.array([1, 4, 2])},
+    }
+
+
+def test_it_is_the_scene_of_the_file(folder, scene):
+    read = limn.load_dict(scene_dict(), str(folder))
+    assert same(limn.render(read).value, limn.render(scene).value)
+    # What is inside others has a name with a dot, or the one that it asks for.
+    inside = {"lamp": "ball.emitter"}
+    renamed = [".".join([inside.get(n.split(".")[0], n.split(".")[0]), *n.split(".")[1:]])
+               for n in scene.parameters]
+    assert sorted(read.parameters) == sorted(renamed)
+    named = scene_dict()
+    named["ball"]["emitter"]["id"] = "lamp"
+    assert list(limn.load_dict(named, str(folder)).parameters) == list(scene.parameters)
+
+
+def test_transforms_go_the_way_of_matrices():
+    t = limn.Transform()
+    turn = np.array([[0, 0, 1, 0], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1.0]])
+    move, half = np.eye(4), np.diag([0.5, 0.5, 0.5, 1])
+    move[:3, 3] = [1, 2, 3]
+    asked = [t.translate([1, 2, 3]).rotate([0, 1, 0], 90).scale(0.5),
+             t.translate([1, 2, 3]) @ t.rotate([0, 1, 0], 90) @ t.scale([0.5, 0.5, 0.5]),
+             limn.Transform(move) @ limn.Transform(turn) @ limn.Transform(half),
+             move @ turn @ half]
+
+    def corners(transform):
+        scene = limn.load_dict({"type": "scene", "eye": {"type": "perspective"},
+                                "box": {"type": "cube", "to_world": transform}})
+        return scene["box.vertex_positions"]
+
+    for transform in asked:
+        # To the rounding of a float of this size.
+        assert np.abs(corners(transform) - corners(asked[-1])).max() <= 4 * 2.0**-24 * 4
+
+
+@pytest.mark.parametrize("change, text", [
+    ({"ball": {"type": "sphere", "radius": -1}},
+     r"^dict\.ball\.radius: error: .*"),
+    ({"ball": {"type": "sphere", "bsdf": {"type": "diffuse", "alpha": 0.1}}},
+     r'^dict\.ball\.bsdf\.alpha: error: .*unknown parameter "alpha"'),
+    ({"ball": {"type": "globe"}}, r'^dict\.ball: error: unknown type "globe" \(known: area, '),
+    ({"ball": {"type": "sphere", "bsdf": {"type": "ref", "id": "wood"}}}, r"^dict\.ball\.bsdf: error"),
+    ({"ball": {"type": "sphere", "center": [1, 2]}},
+     r"^dict\.ball\.center: error: expected a number, a word, three numbers"),
+    ({"ball": 3}, r"^dict\.ball: error: expected a dictionary"),
+    ({"type": "shape"}, r"^dict: error: expected \{"),
+    ({"eye": {"type": "path"}}, r"^dict: error: .*there is no sensor"),
+    ({"mesh": {"type": "obj", "filename": "$none.obj"}}, r"^dict\.mesh\.filename: error: .*none\.obj"),
+])
+def test_mistakes_have_a_place(folder, change, text):
+    with pytest.raises(limn.InputError) as error:
+        limn.load_dict({**scene_dict(), **change}, str(folder))
+    assert re.match(text, str(error.value)), str(error.value)
+
+
+def test_warnings_have_a_place(tmp_path):
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 2\n")
+    with pytest.warns(UserWarning, match="1 of 2 faces"):
+        limn.load_dict({"type": "scene", "eye": {"type": "perspective"},
+                        "mesh": {"type": "obj", "filename": "a.obj"}}, str(tmp_path))
+
+
+# The reader's own words for what it knows.
+@pytest.mark.parametrize("tag", sorted(TYPES))
+def test_types_are_those_of_files(tag):
+    inside = {"film": "sensor", "sampler": "sensor", "rfilter": "film"}
+    xml = f'<{tag} type="nonsense"/>'
+    if tag in inside:
+        outer = inside[tag]
+        xml = f'<{outer} type="{TYPES[outer][0]}">{xml}</{outer}>'
+        if outer == "film":
+            xml = f'<sensor type="perspective">{xml}</sensor>'
+    known = set()
+    places = [xml, f'<shape type="cube">{xml}</shape>'] if tag == "emitter" else [xml]
+    for text in places:
+        with pytest.raises(limn.InputError, match="known: ") as error:
+            limn.load_string(f'<scene version="3.0.0">{text}</scene>')
+        known |= set(re.search(r"known: ([^)]*)", str(error.value)).group(1).split(", "))
+    assert known == set(TYPES[tag])

@@ -1,0 +1,65 @@
+"""Runs in parts, joined."""
+
+import pickle
+
+import limn
+import numpy as np
+import pytest
+from test_scene import same
+
+NAMES = ["ball.translate.x", "metal.alpha"]
+
+
+def parts_of(function, *arguments, n=3, **keywords):
+    """Sent and back, as between processes; by other threads, in another order."""
+    parts = [limn.part((k, n), function, *arguments, threads=1 + k % 2, **keywords)
+             for k in range(n, 0, -1)]
+    return pickle.loads(pickle.dumps(parts))  # noqa: S301
+
+
+@pytest.mark.parametrize("arguments", [
+    {"spp": 20},  # with a pilot
+    {"spp": 4, "method": "fd"},
+])
+def test_a_gradient_has_the_bits_of_one_run(scene, arguments):
+    joined = limn.merge(parts_of(limn.gradient, scene, NAMES, **arguments), scene)
+    alone = limn.gradient(scene, NAMES, **arguments)
+    assert list(joined) == NAMES
+    for name in NAMES:
+        assert same(joined[name].value, alone[name].value)
+        assert same(joined[name].stderr, alone[name].stderr)
+        assert joined[name].spp == alone[name].spp == arguments["spp"]
+
+
+def test_a_reverse_pass_and_an_image_have_the_bits_of_one_run(scene):
+    adjoint = np.ones((scene.height, scene.width), np.float32)
+    joined = limn.merge(parts_of(limn.backward, scene, adjoint, spp=7, batches=5), scene)
+    alone = limn.backward(scene, adjoint, spp=7, batches=5)
+    for name in scene.parameters:
+        assert np.array_equal(joined[name].value, alone[name].value)
+        assert np.array_equal(joined[name].stderr, alone[name].stderr)
+    joined = limn.merge(parts_of(limn.render, scene, spp=5), scene)
+    assert same(joined.value, limn.render(scene, spp=5).value)
+
+
+def test_parts_that_do_not_fit_are_refused(scene):
+    parts = parts_of(limn.gradient, scene, NAMES, spp=4)
+    with pytest.raises(limn.InputError, match="part 2/3 is missing; 2 of 3 are given"):
+        limn.merge([parts[0], parts[2]], scene)
+    with pytest.raises(limn.InputError, match="each is needed once"):
+        limn.merge([*parts, parts[0]], scene)
+    alien = limn.part((1, 3), limn.gradient, scene, NAMES, spp=4, seed=1)
+    with pytest.raises(limn.InputError, match="another run than .*: seed is 1, there 0"):
+        limn.merge([*parts[:2], alien], scene)
+    moved = scene.copy()
+    moved["tent.vertex_positions"] = scene["tent.vertex_positions"] * 1.01
+    with pytest.raises(limn.InputError, match="cannot be joined here: scene was"):
+        limn.merge(parts, moved)
+    with pytest.raises(limn.InputError, match="no parts are given"):
+        limn.merge([], scene)
+    with pytest.raises(limn.InputError, match="expected K/N"):
+        limn.part((4, 3), limn.render, scene, spp=4)
+    with pytest.raises(limn.InputError, match="takes no limit of time"):
+        limn.part((1, 3), limn.gradient, scene, NAMES, seconds=1)
+    with pytest.raises(limn.InputError, match="parts are made of backward, gradient, render"):
+        limn.part((1, 3), limn.check, scene, NAMES[0])

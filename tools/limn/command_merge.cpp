@@ -1,0 +1,61 @@
+// `limn merge`: joins the parts of a run that --part has made.
+#include <algorithm>
+
+#include "limn/core/error.h"
+#include "limn/integrators/parts.h"
+#include "tools/limn/commands.h"
+#include "tools/limn/run_part.h"
+
+namespace limn {
+namespace {
+
+class MergeCommand final : public Command {
+ public:
+  const char* name() const override { return "merge"; }
+  const char* description() const override {
+    return "Join the parts of a run (--part) into the files of one run";
+  }
+  void add_options(CLI::App& app, bool) override {
+    app.add_option("parts", parts_, "All parts, in any order")->required()->type_name("PART...");
+    app.add_option("-o,--output", output_, "As of the command that made the parts")->required();
+    app.add_option("--json", json_, "Write the figures for machines to this file");
+    app.add_option("--threads", threads_, "Threads of what comes before samples (default: all)");
+    app.add_flag("--quiet", quiet_, "Print nothing but errors and warnings");
+  }
+
+  int run(const std::string&) override {
+    PartReader reader(parts_);
+    const PartRequest request = parse_request(reader.arguments(), parts_.front());
+    for (const CommandMaker make : kCommands) {
+      const auto command = make();
+      if (command->name() != request.command || !command->join(reader)) continue;
+      CLI::App app;
+      command->add_options(app, true);
+      std::vector<std::string> asked = request.words;
+      asked.insert(asked.end(), {"-o", output_});
+      if (!json_.empty()) asked.insert(asked.end(), {"--json", json_});
+      if (!threads_.empty()) asked.insert(asked.end(), {"--threads", threads_});
+      if (quiet_) asked.emplace_back("--quiet");
+      std::reverse(asked.begin(), asked.end());  // as CLI11 takes them
+      try {
+        app.parse(asked);
+      } catch (const CLI::ParseError& error) {
+        throw InputError({parts_.front()}, error.what());
+      }
+      return command->run(request.line);
+    }
+    throw InputError({parts_.front()}, "is a part of \"" + request.command +
+                                           "\", which this version of limn does not join");
+  }
+
+ private:
+  std::vector<std::string> parts_;
+  std::string output_, json_, threads_;
+  bool quiet_ = false;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> make_merge_command() { return std::make_unique<MergeCommand>(); }
+
+}  // namespace limn

@@ -1,0 +1,1 @@
+"""The figures and tables of Soroka, Peters and Marschner (2025), made again: tools/paper --figures."""

@@ -1,0 +1,349 @@
+"""The page "the paper's figures": for each what the paper shows, what its method does here, what
+limn's default does, and the command that repeats it."""
+
+import os
+import shlex
+
+from report.errors import ReportError
+from report.markup import Markup, count, element, figures, join, percent, table, times, with_error
+from report.page import POLICY
+from report.pictures import Pictures, figure
+from report.records import read_folder, read_record
+
+from .figures import DEFAULT, PAPER
+
+# A page of unbiased methods marks one of them in one of a hundred pages.
+FALSE_ALARM = 0.01
+STYLE = """
+.paper { border-left: 4px solid var(--line); padding-left: 14px; max-width: 88ch; }
+.role { display: block; font-size: 12.5px; color: var(--soft); font-weight: 400; }
+.wins { background: var(--best); }
+.surface { max-width: 460px; }
+.surface .picture, .surface .picture img { image-rendering: auto; }
+"""
+
+
+def _style():
+    file = os.path.join(os.path.dirname(os.path.dirname(__file__)), "report", "style.css")
+    with open(file, encoding="utf-8") as stream:
+        rules = stream.read()
+    return Markup(rules.replace("/*light*/", "").replace("/*dark*/", "") + STYLE)
+
+
+def _role(name):
+    roles = {PAPER: "the paper's forest", DEFAULT: "limn's default", "mitsuba": "Zhang et al. 2023"}
+    return roles.get(name, "")
+
+
+def _head(name):
+    """Of a card; all are of one height."""
+    return element("h4", name, element("span", _role(name) or "\u00a0", class_="role"))
+
+
+def _words(text):
+    """`name` as code."""
+    pieces = text.split("`")
+    return join(*(element("code", t) if i % 2 else t for i, t in enumerate(pieces)))
+
+
+def _command(text):
+    return element("pre", element("code", text), class_="command")
+
+
+def _last(method):
+    rungs = method.records("summary") if method.text("status") != "missing" else []
+    return rungs[-1] if rungs else None
+
+
+class _Comparison:
+    """One compare.json. level: a bias is marked where its p is below."""
+
+    def __init__(self, result, part, kind, level):
+        self.data, self.part, self.kind, self.level = result.data, part, kind, level
+        self.pictures = Pictures(result.folder)
+        self.methods = self.data.records("methods")
+        self.rungs = {m.text("name"): _last(m) for m in self.methods}
+
+    def _time(self, name):
+        method = next(m for m in self.methods if m.text("name") == name)
+        return method.number("time_ratio"), method.number("time_ratio_stderr")
+
+    def _per_sample(self, name):
+        """Squared error after equal samples, the paper's method being 1."""
+        rung, base = self.rungs[name], self.rungs.get(PAPER)
+        if not rung or not base or not base.number("mse"):
+            return None
+        share = rung.number("mse") * rung.number("spp") / (base.number("mse") * base.number("spp"))
+        return share
+
+    def factor(self):
+        """Time that the paper's method needs for the error of limn's default."""
+        mine, paper = (self._time(n)[0] if self.rungs.get(n) else None for n in (DEFAULT, PAPER))
+        return paper / mine if mine and paper else None
+
+    def best(self):
+        """The method with the least time for equal error."""
+        ran = [n for n, rung in self.rungs.items() if rung and self._time(n)[0]]
+        return min(ran, key=lambda n: self._time(n)[0]) if ran else None
+
+    def is_short(self):
+        """Whether some method spent most of its time on its set-up."""
+        return any(r.number("setup_seconds") > 0.5 * r.number("seconds")
+                   for r in self.rungs.values() if r)
+
+    def html(self):
+        shown = [
+            figure(self.pictures.picture("image.png", "the scene"), "the scene"),
+            figure(self.pictures.picture("reference.png", "reference"), "derivative, reference"),
+        ]
+        cards = [element("div", _head("scene"), *shown, class_="card")]
+        cards += [self._card(m) for m in self.methods if self.rungs[m.text("name")]]
+        return join(
+            element("h3", self._title()),
+            element("div", element("div", *cards, class_="cards"), class_="gallery"),
+            self._short() if self.is_short() else None,
+            self._table(),
+            _command(self.data.text("command")),
+        )
+
+    def _short(self):
+        words = "Most of the time went into set-up, which decides here: more --minutes tell more."
+        return element("p", words, class_="notice")
+
+    def _title(self):
+        defines = {
+            k: v for k, v in self.data.record("defines").items() if k not in ("width", "height")
+        }
+        words = [os.path.splitext(os.path.basename(self.data.text("scene")))[0]]
+        words += [f"{k} {os.path.splitext(os.path.basename(str(v)))[0] if k == 'mesh' else v}"
+                  for k, v in defines.items() if k != "format"]
+        options = self.part.options
+        words += [f"{options[i][2:]} {options[i + 1]}" for i in range(0, len(options), 2)]
+        return ", ".join(words)
+
+    def _card(self, method):
+        name = method.text("name")
+        rung = self.rungs[name]
+        return element(
+            "div",
+            _head(name),
+            figure(
+                self.pictures.picture(method.text("picture"), f"derivative by {name}"),
+                f"{figures(rung.number('seconds'))} s, {count(rung.number('spp'))} samples a pixel",
+            ),
+            figure(
+                self.pictures.picture(method.text("error_picture"), f"error of {name}"),
+                f"error, mse {figures(rung.number('mse'))}",
+            ),
+            class_="card",
+        )
+
+    def _table(self):
+        samples = self.kind == "samples"
+        head = ["method", "squared error"] + (["after equal samples"] if samples else [])
+        head += ["time for equal error", "set-up, s", "all, s", "bias"]
+        best = self.best()
+        rows = []
+        for method in self.methods:
+            name = method.text("name")
+            rung = self.rungs[name]
+            if not rung:
+                why = f"{method.text('status')}: {method.text('message', '') or 'no run finished'}"
+                rows.append([name, element("td", why, colspan=len(head) - 1)])
+                continue
+            row = [
+                join(name, element("span", _role(name), class_="role")),
+                with_error(rung.number("mse"), rung.number("mse_stderr")),
+            ]
+            if samples:
+                row.append(times(self._per_sample(name)))
+            ratio, error = self._time(name)
+            wins = "wins" if name == best else None
+            row.append(element("td", times(ratio, error), class_=wins))
+            row += [figures(rung.number("setup_seconds")), figures(rung.number("seconds"))]
+            row.append(self._bias(rung))
+            rows.append(row)
+        return table(head, rows, f"Methods, {self._title()}")
+
+    def _bias(self, rung):
+        bias = rung.record_or_none("bias")
+        if bias is None or bias.number("p") is None:
+            return "–"
+        text = f"p {figures(bias.number('p'), 2)}"
+        return element("td", "⚠ ", text, class_="bad") if bias.number("p") < self.level else text
+
+
+class _Rejection:
+    def __init__(self, result):
+        self.data, self.pictures = result.data, Pictures(result.folder)
+
+    def _chart(self):
+        """The bounding quadrics, where there are any and a Python drew them."""
+        chart = self.data.record_or_none("chart") if "chart" in self.data.values else None
+        if not chart:
+            return []
+        if self.pictures.uri("chart.png") is None:
+            return [element("p", "The surface plot of the quadrics needs matplotlib.", class_="hint")]
+        words = (
+            "the quadrics (blue, orange) that bound the planes of the node's edges (black"
+            f" segments), in the coordinates of the dual box; {chart.text('method')}"
+        )
+        picture = self.pictures.picture("chart.png", "bounding quadrics")
+        return [element("div", figure(picture, words), class_="surface")]
+
+    def html(self):
+        node = self.data.record("node")
+        mesh = os.path.splitext(os.path.basename(self.data.text("mesh")))[0]
+        overview = figure(
+            self.pictures.picture(self.data.text("overview"), "the mesh, the node, the slices"),
+            "mesh, node, slices",
+        )
+        cards = [element("div", _head("patch"), overview, class_="card")]
+        rows = []
+        for v in self.data.records("variants"):
+            name = v.text("name")
+            shown, shares = [], []
+            for i, s in enumerate(v.records("slices")):
+                wrong, right = s.number("false_accept"), s.number("true_reject")
+                shares.append(wrong / (wrong + right) if wrong + right else None)
+                shown.append(
+                    figure(
+                        self.pictures.picture(s.text("picture"), f"slice {i + 1} of {name}"),
+                        f"slice {i + 1}: {percent(shares[-1])} of what could be rejected is not",
+                    )
+                )
+            edges = f"{count(v.number('reachable_edges'))} edges reached from one point"
+            shown.append(figure(self.pictures.picture(v.text("edges_picture"), edges), edges))
+            cards.append(element("div", _head(name), *shown, class_="card"))
+            rows.append(
+                [
+                    name,
+                    *map(percent, shares),
+                    count(v.number("reachable_edges")),
+                    count(v.number("silhouettes")),
+                    percent(v.number("hit_rate"), v.number("hit_rate_stderr")),
+                ]
+            )
+        head = ["test", "slice 1 in vain", "slice 2 in vain", "edges reached", "silhouettes",
+                "hit rate"]
+        return join(
+            element(
+                "h3",
+                f"{mesh}: {count(self.data.number('edges'))} edges,"
+                f" {count(node.number('edges'))} of them in the node",
+            ),
+            element("div", element("div", *cards, class_="cards"), class_="gallery"),
+            *self._chart(),
+            table(head, rows, f"Rejection, {mesh}"),
+            _command(self.data.text("command")),
+        )
+
+
+def _edges(parts, folder):
+    rows = []
+    for part in parts:
+        file = os.path.join(folder(part), "edges.json")
+        if not os.path.exists(file):
+            continue
+        record = read_record(file)
+        all_edges, without = record.number("edges"), record.number("without_concave")
+        name = os.path.basename(record.text("mesh"))
+        rows.append([name, f"{all_edges:,}", f"{without:,}", percent(without / all_edges)])
+    head = ["mesh", "edges", "without concave ones", "share"]
+    return table(head, rows, "Edges with and without concave ones") if rows else None
+
+
+def _sections(paper_figures, folder):
+    """(id, title, html, best sentence or None) of every figure; how many have no results."""
+    missing = 0
+    results = {}
+    for entry in paper_figures:
+        for part in entry.runs:
+            try:
+                if part.kind != "edges":
+                    results[part.name] = read_folder(folder(part))[0]
+            except ReportError:
+                pass
+    tests = sum(
+        1
+        for r in results.values()
+        if r.kind == "compare"
+        for m in r.data.records("methods")
+        if _last(m) and (_last(m).record_or_none("bias") or None)
+    )
+    level = FALSE_ALARM / max(1, tests)
+    sections = []
+    for i, entry in enumerate(paper_figures):
+        parts, factors, best = [], [], []
+        for part in entry.runs:
+            result = results.get(part.name)
+            if result is None:
+                continue
+            if result.kind == "reject":
+                parts.append(_Rejection(result).html())
+                continue
+            comparison = _Comparison(result, part, entry.table, level)
+            parts.append(comparison.html())
+            if comparison.factor():
+                factors.append(comparison.factor())
+            best.append(comparison.best() or "–")
+        if any(part.kind == "edges" for part in entry.runs):
+            counted = _edges(entry.runs, folder)
+            parts += [counted] if counted else []
+        if not parts:
+            missing += 1
+            parts = [element("p", "No results here yet.", class_="hint")]
+        again = shlex.join(
+            ["tools/paper", "--figures", "--only", ",".join(p.name for p in entry.runs)]
+        )
+        html = element(
+            "section",
+            element("h2", f"{entry.numbers}: {entry.title}"),
+            element("p", element("strong", "The paper: "), _words(entry.shows), class_="paper"),
+            element("p", element("strong", "Here: "), _words(entry.reading), class_="paper"),
+            *parts,
+            element("p", "All of it again:"),
+            _command(again),
+            id=f"figure-{i}",
+        )
+        sections.append((f"figure-{i}", entry, html, factors, best))
+    return sections, missing
+
+
+def _summary(sections):
+    rows = []
+    for identifier, entry, _, factors, best in sections:
+        link = element("a", f"{entry.numbers}: {entry.title}", href=f"#{identifier}")
+        text = ", ".join(times(f) for f in factors) if factors else "–"
+        rows.append([link, text, ", ".join(best) or "–"])
+    head = ["figure", f"time of {PAPER} for the error of {DEFAULT}", "least time for equal error"]
+    return table(head, rows, "Who is right, by figure")
+
+
+def write(file, paper_figures, folder):
+    """folder(part): where a part's results lie. Returns how many figures have none."""
+    sections, missing = _sections(paper_figures, folder)
+    title = "The paper's figures"
+    intro = (
+        "Soroka, Peters and Marschner 2025, Quadric-Based Silhouette Sampling for Differentiable"
+        f" Rendering (doi 10.1145/3731146). {PAPER}: the paper's forest, complete; {DEFAULT}:"
+        " limn's default. Derivatives: red gets brighter, blue darker; methods of one comparison"
+        " have the same time, set-up included, and one scale."
+    )
+    head = element(
+        "head",
+        element("meta", charset="utf-8"),
+        element("meta", http_equiv="Content-Security-Policy", content=POLICY),
+        element("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        element("meta", name="color-scheme", content="light dark"),
+        element("title", title),
+        element("style", _style()),
+    )
+    body = element(
+        "body",
+        element("header", element("h1", title), element("p", intro), _summary(sections)),
+        element("main", *(html for _, _, html, _, _ in sections)),
+    )
+    with open(file, "w", encoding="utf-8") as out:
+        out.write(Markup("<!DOCTYPE html>\n") + element("html", head, body, lang="en"))
+    return missing

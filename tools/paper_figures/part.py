@@ -1,0 +1,17 @@
+"""One run: a call of limn, or a count of edges."""
+
+from dataclasses import dataclass, field
+
+
+@dataclass
+class Part:
+    name: str
+    kind: str  # "compare", "reject" or "edges"
+    input: str  # scene; for "reject" and "edges" a mesh may stand here
+    parameter: str = ""
+    methods: list = field(default_factory=list)
+    defines: dict = field(default_factory=dict)
+    wide: bool = False  # four to three, not square
+    small_mesh: str = ""  # NAME FACES of a mesh to make for it: the scene's $mesh, or the input
+    needs: str = ""  # a file that may not be there
+    options: list = field(default_factory=list)  # further arguments

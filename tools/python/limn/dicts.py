@@ -1,0 +1,188 @@
+"""Scenes as dictionaries, in the words of Mitsuba's load_dict, for limn's subset."""
+
+from __future__ import annotations
+
+import numbers
+import re
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+import numpy.typing as npt
+
+from ._limn import Scene, load_string
+from .errors import InputError
+
+# The element that each type is written as: the types that the reader of files knows.
+TYPES = {
+    "integrator": ["path"],
+    "sensor": ["perspective"],
+    "film": ["hdrfilm"],
+    "rfilter": ["box", "gaussian", "tent"],
+    "sampler": ["independent"],
+    "shape": ["cube", "disk", "obj", "ply", "rectangle", "sphere"],
+    "bsdf": ["diffuse", "roughconductor", "twosided"],
+    "emitter": ["area", "constant", "directional", "envmap", "point", "spot"],
+}
+_TAGS = {type_: tag for tag, types in TYPES.items() for type_ in types}
+# What has parameters to be named.
+_NAMED = {"shape", "bsdf", "emitter"}
+
+Three = Sequence[float] | npt.NDArray[Any]
+
+
+def _three(v: float | Three) -> str:
+    values = np.atleast_1d(np.asarray(v, dtype=float))
+    return " ".join(repr(float(x)) for x in values)
+
+
+class Transform:
+    """A transformation of space, made of steps as Mitsuba's ScalarTransform4f is.
+
+        limn.Transform().translate([0, 1, 0]).rotate([0, 1, 0], 30)    # turns, then moves
+
+    `a @ b` does b first.
+    """
+
+    def __init__(self, matrix: npt.ArrayLike | None = None) -> None:
+        """The identity, or a (4, 4) or (3, 3) matrix."""
+        self._steps: tuple[tuple[str, dict[str, str]], ...] = ()
+        if matrix is not None:
+            values = np.asarray(matrix, dtype=float).reshape(-1)
+            self._steps = (("matrix", {"value": _three(values)}),)
+
+    def __matmul__(self, first: Transform) -> Transform:
+        both = Transform()
+        both._steps = first._steps + self._steps
+        return both
+
+    def _then(self, tag: str, **attributes: str) -> Transform:
+        step = Transform()
+        step._steps = ((tag, attributes),)
+        return self @ step
+
+    def translate(self, v: Three) -> Transform:
+        """Moves by v [scene units]."""
+        return self._then("translate", value=_three(v))
+
+    def rotate(self, axis: Three, angle: float) -> Transform:
+        """Turns about an axis through the origin [degrees]."""
+        return self._then("rotate", value=_three(axis), angle=repr(float(angle)))
+
+    def scale(self, v: float | Three) -> Transform:
+        """Scales by one factor, or one for each axis."""
+        return self._then("scale", value=_three(v))
+
+    def look_at(self, origin: Three, target: Three, up: Three) -> Transform:
+        """From a camera's space (+Z along the view, +Y up) to the world."""
+        return self._then("lookat", origin=_three(origin), target=_three(target), up=_three(up))
+
+
+class _Writer:
+    """XML with one element a line, and for each line what it came from."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.places: list[str] = []
+
+    def line(self, place: str, text: str) -> None:
+        self.lines.append(text)
+        self.places.append(place)
+
+    def element(self, place: str, tag: str, end: str = "/", **attributes: str) -> None:
+        words = "".join(f" {k}={quoteattr(v)}" for k, v in attributes.items())
+        self.line(place, f"<{tag}{words}{end}>")
+
+    def object(self, place: str, name: str, what: Mapping[str, Any]) -> None:
+        kind = what.get("type")
+        if kind == "ref":
+            self.element(place, "ref", id=str(what.get("id", "")))
+            return
+        if kind in ("rgb", "spectrum"):
+            self.element(place, kind, name=name, value=_three(what.get("value", ())))
+            return
+        if kind not in _TAGS:
+            known = ", ".join(sorted([*_TAGS, "ref", "rgb"]))
+            raise InputError(f'{place}: error: unknown type "{kind}" (known: {known})')
+        tag = _TAGS[kind]
+        attributes = {"type": str(kind)}
+        if tag in _NAMED:
+            attributes["id"] = str(what.get("id", place.removeprefix("dict.")))
+        self.element(place, tag, "", **attributes)
+        for key, value in what.items():
+            if key not in ("type", "id"):
+                self.value(f"{place}.{key}", key, value)
+        self.line(place, f"</{tag}>")
+
+    def value(self, place: str, name: str, value: Any) -> None:
+        if isinstance(value, Mapping):
+            self.object(place, name, value)
+        elif isinstance(value, Transform):
+            self.element(place, "transform", "", name=name)
+            for tag, attributes in value._steps:
+                self.element(place, tag, **attributes)
+            self.line(place, "</transform>")
+        elif isinstance(value, str):
+            self.element(place, "string", name=name, value=value.replace("$", r"\$"))
+        elif isinstance(value, (bool, np.bool_)):
+            self.element(place, "boolean", name=name, value="true" if value else "false")
+        elif isinstance(value, numbers.Integral):
+            self.element(place, "integer", name=name, value=str(int(value)))
+        elif isinstance(value, numbers.Real):
+            self.element(place, "float", name=name, value=repr(float(value)))
+        elif np.shape(value) == (4, 4):
+            self.value(place, name, Transform(value))
+        elif np.shape(value) == (3,):
+            self.element(place, "point", name=name, value=_three(value))
+        else:
+            raise InputError(
+                f"{place}: error: expected a number, a word, three numbers, a Transform or (4, 4) "
+                f"array, or a dictionary with a type, not {type(value).__name__}"
+            )
+
+
+def load_dict(scene: Mapping[str, Any], folder: str = "") -> Scene:
+    """Reads a scene from a dictionary, as Mitsuba's load_dict does, for limn's subset.
+
+        limn.load_dict({
+            "type": "scene",
+            "sensor": {"type": "perspective", "fov": 40,
+                       "to_world": limn.Transform().look_at([0, 1, 4], [0, 0, 0], [0, 1, 0]),
+                       "film": {"type": "hdrfilm", "width": 64, "height": 64}},
+            "ball": {"type": "sphere", "bsdf": {"type": "diffuse",
+                     "reflectance": {"type": "rgb", "value": [0.7, 0.5, 0.3]}}},
+            "sky": {"type": "constant"},
+        })
+
+    Keys are the names of shapes, materials and lights; those inside others have names with a dot
+    ("ball.bsdf.reflectance"), unless they say "id". {"type": "ref", "id": ...} names one that stands
+    before. Files are looked for in `folder`. Raises limn.InputError with the place: dict.ball.bsdf.
+    """
+    if not isinstance(scene, Mapping) or scene.get("type") != "scene":
+        raise InputError('dict: error: expected {"type": "scene", ...}')
+    writer = _Writer()
+    writer.line("dict", '<scene version="3.0.0">')
+    for name, value in scene.items():
+        if name == "type":
+            continue
+        if not isinstance(value, Mapping):
+            raise InputError(f"dict.{name}: error: expected a dictionary with a type")
+        writer.object(f"dict.{name}", name, value)
+    writer.line("dict", "</scene>")
+
+    def placed(text: str) -> str:
+        return re.sub(
+            r"[^\s\"]*string:(\d+)(:\d+)?", lambda m: writer.places[int(m.group(1)) - 1], text
+        )
+
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        try:
+            read = load_string("\n".join(writer.lines), folder)
+        except InputError as error:
+            raise type(error)(placed(str(error))) from None
+    for warning in told:
+        warnings.warn(placed(str(warning.message)), stacklevel=2)
+    return read
