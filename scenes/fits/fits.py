@@ -67,16 +67,16 @@ def seconds(fit):
 
 
 def mirrors(fits):
-    size = ["width=96", "height=48"]
+    size = ["width=64", "height=32"]
     target = fits.render(scene("two_mirrors.xml"), fits.path("mirrors.exr"), *size)
     truth = os.path.join(fits.generated, "creature.ply")
     words = ["--wrt", "object.vertex_positions", "--truth", truth, "--spp", "6"]
-    words += ["--step-half-life", "150", "--remesh", "100,200"]
+    words += ["--smoothing", "0.04", "--remesh", "75", "--snapshots", "25", "--seed", "1"]
     words += [w for d in size for w in ("-D", d)]
     rows = []
     for name, more in [("all terms", []), ("no boundary", ["--terms", TERMS])]:
         folder = "mirrors_" + name.replace(" ", "_")
-        fit = fits.fit(folder, scene("two_mirrors_start.xml"), target, 300, *words, *more)
+        fit = fits.fit(folder, scene("two_mirrors_start.xml"), target, 150, *words, *more)
         first, last = (fit["snapshots"][i]["meshes"][0] for i in (0, -1))
         shown = [(name, fit["steps"], f"{seconds(fit):.0f}", last)]
         if not rows:
