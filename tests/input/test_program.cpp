@@ -550,15 +550,16 @@ TEST_F(Program, RepeatsOneSample) {
 // Samples that are not finite are an error, with the command that shows the first; what is finite
 // is kept. Here a corner touches the pinhole.
 TEST_F(Program, NonFiniteSamplesAreAnErrorThatCanBeRepeated) {
-  files_.write("touching.obj", "v 0 0 0\nv 1e9 3e8 1e8\nv 1e9 0 3e8\nf 1 2 3\n");
-  const std::string scene = files_.write("touching.xml", R"(<scene version="3.0.0">
+  // A pixel of 1e30 changes within 1e-12: by more than a float holds.
+  files_.write("tiny.obj", "v -1e-12 -1e-12 0\nv 1e-12 -1e-12 0\nv 0 1e-12 0\nf 1 2 3\n");
+  const std::string scene = files_.write("tiny.xml", R"(<scene version="3.0.0">
 <integrator type="path"><integer name="max_depth" value="2"/></integrator>
-<sensor type="perspective"><float name="fov" value="40"/><float name="near_clip" value="1e-22"/>
-<transform name="to_world"><lookat origin="0, 0, 0" target="1, 0.3, 0.2" up="0, 1, 0"/></transform>
+<sensor type="perspective"><float name="fov" value="40"/><float name="near_clip" value="1e-14"/>
+<transform name="to_world"><lookat origin="0, 0, 4e-12" target="0, 0, 0" up="0, 1, 0"/></transform>
 <film type="hdrfilm"><integer name="width" value="4"/><integer name="height" value="4"/>
 <rfilter type="box"/></film></sensor>
-<shape type="obj" id="sheet"><string name="filename" value="touching.obj"/></shape>
-<emitter type="constant"><rgb name="radiance" value="1"/></emitter></scene>
+<shape type="obj" id="sheet"><string name="filename" value="tiny.obj"/></shape>
+<emitter type="constant"><rgb name="radiance" value="1e30"/></emitter></scene>
 )");
   const Outcome outcome =
       run("gradient " + scene + " --wrt sheet.translate.y --spp 2 --samples 1 -o " + out());
@@ -592,9 +593,8 @@ TEST_F(Program, UnknownNamesListTheKnown) {
   EXPECT_NE(refused("render " + scene_ + " --shading phong -o " + out()).find("continuous"),
             std::string::npos);
   EXPECT_NE(refused("paint " + scene_)
-                .find("limn paint: no such command (known: info, render, gradient, backward, "
-                      "fit, check, compare, "
-                      "reject; limn --help tells more)"),
+                .find("limn paint: no such command (known: info, render, gradient, backward, fit, "
+                      "merge, check, compare, reject; limn --help tells more)"),
             std::string::npos);
   EXPECT_NE(refused("").find("limn: a command is needed (known: info"), std::string::npos);
 }
