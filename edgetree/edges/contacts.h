@@ -4,7 +4,8 @@
 //
 // What the rounding of positions of size M explains is touch_tolerance(M). M is the largest
 // coordinate of a face, not of a vertex: a vertex near the origin was rounded where its neighbours
-// are.
+// are. Needles may be narrower than that, and would touch along both of their sides: they touch
+// what is in their place to a millionth of their width, and are near to the rest.
 #include <span>
 #include <vector>
 
@@ -13,9 +14,6 @@
 #include "limn/edgetree/face_pairs.h"
 
 namespace limn {
-
-// Needles may be narrower than that, and would touch along both of their sides. They touch what is
-// in their place to a millionth of their width, and are near to the rest.
 
 // A part [t0, t1] of an edge that lies on a face which is not among those around it.
 struct Contact {

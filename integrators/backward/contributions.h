@@ -12,9 +12,9 @@ class ContributionSum {
   // count: slots, with the unused first one.
   explicit ContributionSum(uint32_t count) : sums_(count) {}
 
-  // Calls make(tile, list) for the tiles [first, last), in parallel, and adds the lists in the order
-  // of tiles. The lists are held until then, so callers take kWave tiles at a time: a fixed number,
-  // whatever the threads.
+  // Calls make(tile, list) for the tiles [first, last), in parallel, and adds the lists in the
+  // order of tiles. The lists are held until then, so callers take kWave tiles at a time: a fixed
+  // number, whatever the threads.
   static constexpr size_t kWave = 64;
   void add_wave(size_t first, size_t last, int threads,
                 const std::function<void(size_t, std::vector<Contribution>&)>& make);

@@ -45,7 +45,7 @@ GradientOptions MethodInput::options(const MethodType& method) const {
   options.terms = terms;
   options.samples = samples;
   options.step = step;
-  options.warp = warp;
+  if (method.warps) options.warp = warp;
   options.block = block;
   return options;
 }

@@ -194,7 +194,8 @@ class TermEstimator::VertexTerms {
     rng = rng.at(Purpose::kVertexSplit, slot);
     return static_cast<int>(whole) + (rng.uniform() < mean - whole ? 1 : 0);
   }
-  // One decision for all vertices of a path.
+  // One decision for all vertices of a path; copies behind a vertex that slides fast make their
+  // own.
   bool skipped(size_t slot, const Rng& key) const {
     return counts_[slot] < 1 && key.at(Purpose::kTermRoulette, slot).uniform() >= counts_[slot];
   }

@@ -1,6 +1,8 @@
 // Faces in bins of pixels, and the visible regions of each.
 #include "integrators/terms/film_regions.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -8,6 +10,7 @@
 #include "integrators/estimates/tiles.h"
 #include "limn/core/error.h"
 #include "limn/core/face_copies.h"
+#include "limn/core/face_overlaps.h"
 #include "limn/core/parallel.h"
 #include "limn/core/shading.h"
 #include "limn/integrators/run.h"
@@ -35,6 +38,9 @@ void check_filter(const Film& film) {
 }
 
 constexpr size_t kChunk = 4096;  // faces at a time; not tuned
+// Of a pixel: a hundred megabytes. Thin faces behind each other, all over one pixel, make as many
+// as their number squared.
+constexpr size_t kMostRegions = 1 << 18;
 
 }  // namespace
 
@@ -42,7 +48,11 @@ constexpr size_t kChunk = 4096;  // faces at a time; not tuned
 class FilmRegions::Builder {
  public:
   Builder(const Scene& scene, std::span<const limn::Tile> tiles, int threads)
-      : scene_(scene), copies_(scene), view_(view_of(scene.camera)), tiles_(tiles) {
+      : scene_(scene),
+        copies_(scene),
+        overlaps_(scene, copies_, threads),
+        view_(view_of(scene.camera)),
+        tiles_(tiles) {
     for (const Shape& shape : scene.shapes) {
       first_label_.push_back(labels_);
       labels_ += static_cast<uint32_t>(shape.mesh.faces.size());
@@ -50,7 +60,8 @@ class FilmRegions::Builder {
     bin_faces(threads);
   }
 
-  Tile build(size_t t) const {
+  // Empty if interrupted meanwhile.
+  Tile build(size_t t, const std::atomic<bool>* interrupted) const {
     const limn::Tile& tile = tiles_[t];
     std::vector<SeenFace> faces;
     for (size_t i = first_binned_[t]; i < first_binned_[t + 1]; ++i) {
@@ -74,11 +85,16 @@ class FilmRegions::Builder {
     }
     Tile result;
     VisibleRegions regions({});
+    if (!overlaps_.empty()) regions.set_rule([&](uint32_t a, uint32_t b) { return rule(a, b); });
     for (size_t i = 0; i < of_pixel.size(); ++i) {
       const int x = tile.x0 + static_cast<int>(i) % width,
                 y = tile.y0 + static_cast<int>(i) / width;
+      if (interrupted && interrupted->load(std::memory_order_relaxed)) return {};
       regions.reset({{x + 0.5, y + 0.5}, 0.5, 0.5});
-      for (const uint32_t f : of_pixel[i]) regions.insert(faces[f]);
+      for (const uint32_t f : of_pixel[i]) {
+        regions.insert(faces[f]);
+        if (regions.size() > kMostRegions) refuse(x, y);
+      }
       append(regions, result);
     }
     result.first_region.push_back(static_cast<uint32_t>(result.regions.size()));
@@ -101,7 +117,23 @@ class FilmRegions::Builder {
 
   std::optional<SeenFace> see(uint32_t label) const {
     const FaceRef face = face_of(label);
-    return view_.face(label, face_corners<double>(scene_.shape(face.shape).mesh, face.face));
+    auto seen = view_.face(label, face_corners<double>(scene_.shape(face.shape).mesh, face.face));
+    if (seen) seen->ruled = !overlaps_.of(face).empty();
+    return seen;
+  }
+  // Of faces in one plane that which a ray would meet is seen.
+  std::optional<bool> rule(uint32_t a, uint32_t b) const {
+    const FaceRef first = face_of(a), second = face_of(b);
+    if (!overlaps_.contains(first, second)) return {};
+    const Vec3d corner = face_corners<double>(scene_.shape(first.shape).mesh, first.face)[0];
+    return is_met_first(scene_, first, second, corner - value(scene_.camera.origin));
+  }
+
+  [[noreturn]] void refuse(int x, int y) const {
+    throw InputError(scene_.film.where,
+                     fmt::format("the exact film: pixel ({}, {}) shows more than {} regions "
+                                 "(--film rays takes it)",
+                                 x, y, kMostRegions));
   }
 
   // Whether a ray from the camera can meet the face: of faces in one place one alone.
@@ -185,6 +217,7 @@ class FilmRegions::Builder {
 
   const Scene& scene_;
   FaceCopies copies_;
+  FaceOverlaps overlaps_;
   PlaneView view_;
   std::span<const limn::Tile> tiles_;
   std::vector<uint32_t> first_label_;  // of each shape: labels are faces, counted through
@@ -201,9 +234,7 @@ FilmRegions::FilmRegions(const Scene& scene, int threads, const std::atomic<bool
   const std::vector<limn::Tile> tiles = make_tiles(film_);
   const Builder builder(scene, tiles, threads);
   tiles_.resize(tiles.size());
-  parallel_for(tiles.size(), threads, [&](size_t t) {
-    if (!interrupted || !interrupted->load(std::memory_order_relaxed)) tiles_[t] = builder.build(t);
-  });
+  parallel_for(tiles.size(), threads, [&](size_t t) { tiles_[t] = builder.build(t, interrupted); });
   seconds_ = watch.seconds();
 }
 

@@ -26,8 +26,8 @@ class FilmRegions {
     // within a millionth of a pixel more than one other thing is seen.
     std::optional<FaceRef> beside;
   };
-  // The parts of an edge along which one of the faces around it is seen, at the edge or nearer to it
-  // than a millionth of a pixel: no other part is seen. In order, without overlaps.
+  // The parts of an edge along which one of the faces around it is seen, at the edge or nearer to
+  // it than a millionth of a pixel: no other part is seen. In order, without overlaps.
   std::vector<SeenPart> seen_parts(const PlanePoint& from, const PlanePoint& to,
                                    std::span<const FaceRef> around) const;
 

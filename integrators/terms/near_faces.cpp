@@ -32,10 +32,6 @@ std::optional<Hit> meet_near_faces(const Scene& scene, const FacesAround& around
   return first;
 }
 
-}  // namespace
-
-namespace {
-
 // closest_at_edge by two rays that start at y, back to the ray's origin and on.
 bool closest_from_edge(const RayTracer& tracer, const Scene& scene, const FacesAround& around,
                        const Vec3d& y, double distance, const Ray& ray, Hit& hit) {

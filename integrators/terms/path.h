@@ -2,8 +2,8 @@
 // The path tracer, written once for any scalar: double gives radiance, Dual gives radiance and the
 // interior term of its derivative, Var writes a tape of it. Sampled directions, their densities and
 // MIS weights are constants while the parameters move (solid-angle measure, everywhere), but for
-// directions that move on purpose (direction_field.h, warp_field.h) and the one direction of a light
-// without extent, which follows the parameters.
+// directions that move on purpose (direction_field.h, warp_field.h) and the one direction of a
+// light without extent, which follows the parameters.
 #include <atomic>
 #include <cstdint>
 
@@ -65,7 +65,8 @@ class PathTracer {
     static_assert(std::is_same_v<S, Dual>);
     warper_ = &warper;
   }
-  // Takes more light samples and directions at vertices that slide fast. It must outlive the tracer.
+  // Takes more light samples and directions at vertices that slide fast. It must outlive the
+  // tracer.
   void split_by(const MotionRates* rates) { splitting_ = rates; }
   // How many light samples are averaged at every vertex but the first.
   void take_light_samples(int count) { light_samples_ = count; }

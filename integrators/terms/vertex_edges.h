@@ -8,15 +8,15 @@ namespace limn {
 
 EdgeQuery query_at(const PathVertex& vertex);
 
-// The unit direction omega as directions of the path move at a vertex. Where they are warped, key is
-// for what auxiliary rays draw, and `cost` gets these.
+// The unit direction omega as directions of the path move at a vertex. Where they are warped, key
+// is for what auxiliary rays draw, and `cost` gets these.
 Vec3<Dual> moving_direction(const PathVertex& vertex, const Vec3d& omega, const Rng& key,
                             TermCost& cost);
 
 // Adds what a point on an edge contributes to the boundary integral at a vertex, over its density:
-// throughput dL(t) f_s det(w_0, w_1, v) / |w|^3 / (probability pdf_t), v against directions that move. part: of the radiance; key:
-// of the path and the sample; share: of what v is while directions are held. Books rays and what
-// became of the sample on `cost`.
+// throughput dL(t) f_s det(w_0, w_1, v) / |w|^3 / (probability pdf_t), v against directions that
+// move. part: of the radiance; key: of the path and the sample; share: of what v is while
+// directions are held. Books rays and what became of the sample on `cost`.
 void add_edge_point(const PathContext& context, const EdgeMesh& mesh, const PathVertex& vertex,
                     const EdgeQuery& query, const EdgeSample& sample, const RadiancePart& part,
                     const Rng& key, TermCost& cost, Rgb<Lanes>& sum, double share = 1);

@@ -20,8 +20,8 @@ constexpr double kReach = 6;
 constexpr double kLeastDistance = 1e-12;
 
 // The chance of going from one level to the next: work grows by 2 and variance falls by 4, away
-// from edges, so that the mean of either is finite. With 2^-5/4 variance times rays was 0.99 to 1.23
-// of what it is, in four closed forms.
+// from edges, so that the mean of either is finite. With 2^-5/4 variance times rays was 0.99 to
+// 1.23 of what it is, in four closed forms.
 const double kLevelShare = std::exp2(-1.5);
 
 Lanes along(const Vec3<Lanes>& v, const Vec3d& w) { return v.x * w.x + v.y * w.y + v.z * w.z; }
@@ -139,7 +139,7 @@ void WarpField::trace(const SurfacePoint<Dual>& surface, const Vec3d& w, uint64_
   const Frame frame(w);
   for (uint64_t i = 0; i < count; i += 2) {
     // The density exp(kappa (1 - s)) of s = 1 - cosine in [0, 2], inverted.
-    const double u = rng.uniform(), turn = 2 * kPi * rng.uniform();
+    const double u = 1 - rng.uniform(), turn = 2 * kPi * rng.uniform();
     const double density = u + (1 - u) * std::exp(-2 * options_.kappa);
     const double s = std::min(2.0, -std::log(density) / options_.kappa);
     const double sine = std::sqrt(s * (2 - s));

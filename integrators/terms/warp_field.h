@@ -13,8 +13,8 @@
 //   D = exp(kappa (1 - w . w')) - 1,
 // with the boundary function B (boundary_function.h): next to an edge K diverges there, and V tends
 // to the edge's velocity from both sides. N auxiliary rays, drawn with density ~ exp(kappa w . w'),
-// estimate numerator and denominator. They come in pairs that mirror each other about w: what is odd
-// around w cancels, of V the slope of v, of div V the gradients of K.
+// estimate numerator and denominator. They come in pairs that mirror each other about w: what is
+// odd around w cancels, of V the slope of v, of div V the gradients of K.
 //
 // A ratio of estimates is biased, by about 1 / N and more near edges: the method `was`. The method
 // `was-unbiased` takes it out by roulette over levels (Rhee and Glynn 2015): with R_n the estimate

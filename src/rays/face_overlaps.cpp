@@ -220,6 +220,11 @@ bool FaceOverlaps::contains(FaceRef a, FaceRef b) const {
          std::find(others.begin(), others.end(), first) != others.end();
 }
 
+static bool is_skipped(FaceRef face, const Ray& ray) {
+  return face == ray.start || face == ray.end ||
+         std::find(ray.skip_faces.begin(), ray.skip_faces.end(), face) != ray.skip_faces.end();
+}
+
 void FaceOverlaps::settle(const Ray& ray, Hit& hit) const {
   const auto others = of(hit.face);
   const auto met = [&](FaceRef face) {
@@ -228,7 +233,8 @@ void FaceOverlaps::settle(const Ray& ray, Hit& hit) const {
   if (!copies_->empty()) hit.face = met(hit.face).value_or(hit.face);
   for (const FaceRef other : others) {
     const auto face = met(other);
-    if (!face || !is_met_first(*scene_, *face, hit.face, ray.direction)) continue;
+    if (!face || is_skipped(*face, ray)) continue;
+    if (!is_met_first(*scene_, *face, hit.face, ray.direction)) continue;
     if (const auto t = meet(corners_of(*scene_, *face), ray)) hit = {*face, *t};
   }
 }

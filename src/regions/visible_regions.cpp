@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "src/regions/convex_region.h"
 #include "src/regions/seen_lines.h"
@@ -14,8 +15,8 @@ namespace {
 constexpr int kNone = -1;
 
 // A grid keeps regions from becoming long splinters, whose boxes many faces meet. Of a bumpy sphere
-// in one window each face takes, with 8192 and with 131072 of them, 4.8 and 63 us without a grid, 2.5
-// and 3.1 us with 16 faces a cell, 2.4 and 3.5 us with 4.
+// in one window each face takes, with 8192 and with 131072 of them, 4.8 and 63 us without a grid,
+// 2.5 and 3.1 us with 16 faces a cell, 2.4 and 3.5 us with 4.
 constexpr size_t kFacesOfCell = 16;
 constexpr int kMostLevels = 24;
 
@@ -25,6 +26,7 @@ struct Inserted {
   PlaneFunction inverse_depth;  // on the grid
   double error;                 // of it, where the face is
   double nearest;
+  bool ruled;
   LineSide lines[5];
   int line_count = 0;
 };
@@ -79,7 +81,7 @@ class VisibleRegions::Tree {
   }
 
   void insert(const SeenFace& face) {
-    if (face.nearest + face.depth_error < nodes_[root_].least) return;
+    if (!face.ruled && face.nearest + face.depth_error < nodes_[root_].least) return;
     const size_t lines_before = lines_.size(), crossings_before = crossings_.size();
     if (!prepare(face)) {
       lines_.resize(lines_before);
@@ -97,6 +99,7 @@ class VisibleRegions::Tree {
     }
   }
 
+  void set_rule(Rule rule) { rule_ = std::move(rule); }
   size_t size() const { return leaves_; }
   size_t crossings() const { return crossings_.size(); }
 
@@ -187,7 +190,12 @@ class VisibleRegions::Tree {
     int turn = seen.counter_clockwise ? 1 : -1;
     if (seen.whole) turn = orientation_on_grid(seen, grid_);
     if (turn == 0) return false;
-    Inserted face{seen.label, grid_.to_grid(seen.inverse_depth), seen.depth_error, seen.nearest, {},
+    Inserted face{seen.label,
+                  grid_.to_grid(seen.inverse_depth),
+                  seen.depth_error,
+                  seen.nearest,
+                  seen.ruled,
+                  {},
                   0};
     const auto add = [&](const HalfPlane& h) {
       if (h.reach == Reach::kCuts) {
@@ -209,7 +217,8 @@ class VisibleRegions::Tree {
   int insert_at(int index) {
     const Node& node = nodes_[index];
     if (!node.box.meets(box_)) return index;
-    if (faces_.back().nearest + faces_.back().error < node.least) {
+    const Inserted& face = faces_.back();
+    if (!face.ruled && face.nearest + face.error < node.least) {
       lost_ = true;  // if it is there at all
       return index;
     }
@@ -249,7 +258,12 @@ class VisibleRegions::Tree {
   int insert_in_leaf(int index) {
     const int face = static_cast<int>(faces_.size()) - 1;
     const int other = nodes_[index].face;
-    if (other != kNone) {
+    const std::optional<bool> wins = rule_for(face, other);
+    if (wins && !*wins) {
+      lost_ = true;
+      return index;
+    }
+    if (other != kNone && !wins) {
       const Depths depths = compare(nodes_[index].ring, other);
       if (depths.most < -depths.rounding) {
         lost_ = true;
@@ -258,7 +272,7 @@ class VisibleRegions::Tree {
     }
     size_t pieces = 0;
     if (!cut_by_face(nodes_[index].ring, pieces)) return index;
-    if (other != kNone) {
+    if (other != kNone && !wins) {
       const Depths depths = compare(ring_, other);
       const bool nearer = depths.most > depths.rounding, farther = depths.least < -depths.rounding;
       if (nearer && farther) {
@@ -273,6 +287,12 @@ class VisibleRegions::Tree {
     }
     ++gained_;
     return split(index, face, pieces);
+  }
+
+  // Whether a rule shows the first of two faces, and not the second.
+  std::optional<bool> rule_for(int face, int other) const {
+    if (!rule_ || other == kNone || !faces_[face].ruled || !faces_[other].ruled) return {};
+    return rule_(faces_[face].label, faces_[other].label);
   }
 
   // Cuts by the lines of the new face: what is inside goes to ring_, what is outside to the first
@@ -319,8 +339,9 @@ class VisibleRegions::Tree {
   // The same for both orders of two faces.
   std::pair<LineSide, HalfPlane> crossing_with(int other) {
     const int face = static_cast<int>(faces_.size()) - 1;
-    for (const Crossing& c : crossings_) {
-      if (c.first == face && c.second == other) return {LineSide(c.line, false), c.half_plane};
+    for (size_t i = crossings_.size(); i-- > 0 && crossings_[i].first == face;) {
+      const Crossing& c = crossings_[i];
+      if (c.second == other) return {LineSide(c.line, false), c.half_plane};
     }
     const PlaneFunction &p = faces_[face].inverse_depth, &q = faces_[other].inverse_depth;
     const HalfPlane h = half_plane_of(PlaneFunction{p.a - q.a, p.b - q.b, p.c - q.c});
@@ -415,6 +436,7 @@ class VisibleRegions::Tree {
   std::vector<GridLine> lines_;
   std::vector<Inserted> faces_;
   std::vector<Crossing> crossings_;
+  Rule rule_;
   std::vector<Node> nodes_;
   std::vector<int> free_;  // nodes
   int root_ = kNone;
@@ -435,6 +457,7 @@ VisibleRegions::VisibleRegions(const PlaneWindow& window, size_t faces)
 }
 VisibleRegions::~VisibleRegions() = default;
 void VisibleRegions::reset(const PlaneWindow& window, size_t faces) { tree_->reset(window, faces); }
+void VisibleRegions::set_rule(Rule rule) { tree_->set_rule(std::move(rule)); }
 void VisibleRegions::insert(const SeenFace& face) { tree_->insert(face); }
 size_t VisibleRegions::size() const { return tree_->size(); }
 size_t VisibleRegions::crossings() const { return tree_->crossings(); }

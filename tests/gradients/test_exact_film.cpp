@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -95,6 +96,43 @@ TEST(ExactFilm, FacesAreThoseOfRaysAtAllScales) {
         square("lamp", 0.3 * scale, -30, Vec3d{0.2, 1, 3} * scale, area_light("glow", "9, 8, 6"));
     const Scene scene = make_scene(files, parts);
     EXPECT_EQ(wrong_faces(scene, FilmRegions(scene, 1), 20000), 0u) << scale;
+  }
+}
+
+// Of faces in one plane, to the rounding of positions, the one that rays meet: a lamp before what
+// does not shine, else the file's first.
+TEST(ExactFilm, FacesInOnePlaneAreThoseOfRays) {
+  constexpr double kTilt = -53, kShift = 0.13;
+  const double up = std::cos(kTilt * kPi / 180), along = std::sin(kTilt * kPi / 180);
+  const std::string sheet = square("sheet", 1, kTilt, {0, 0, 0}, diffuse("chalk", "0.8, 0.7, 0.6"));
+  const Vec3d inside{0.1, kShift * up, kShift * along};
+  const std::string others[] = {
+      square("lamp", 0.5, kTilt, inside, area_light("glow", "9, 8, 6")),
+      square("patch", 0.5, kTilt, inside, diffuse("slate", "0.1, 0.2, 0.3"))};
+  const TempFiles files;
+  for (const std::string& other : others) {
+    for (const std::string& body : {sheet + other, other + sheet}) {
+      SceneParts parts;
+      parts.origin = {0.3, 2.4, 3};
+      parts.target = {0, 0, 0};
+      parts.body = body;
+      const Scene scene = make_scene(files, parts);
+      const FilmRegions regions(scene, 1);
+      const auto tracer = make_embree_tracer(scene, 1);
+      Rng rng(9, 0, 0);
+      std::array<int, 2> seen{};
+      for (int i = 0; i < 4000; ++i) {
+        const double x = 16 * rng.uniform(), y = 16 * rng.uniform();
+        Hit hit;
+        tracer->closest(camera_ray(scene, scene.camera.ray<double>(x, y)), hit);
+        EXPECT_EQ(hit.face, regions.face_at(static_cast<int>(x), static_cast<int>(y), x, y));
+        if (hit.face.shape.valid()) ++seen[hit.face.shape.index()];
+      }
+      // Behind the sheet in the file, what does not shine is hidden by it.
+      const bool hidden = body.starts_with(sheet) && &other != &others[0];
+      EXPECT_GT(seen[0], 100);
+      EXPECT_EQ(seen[1] > 0, !hidden);
+    }
   }
 }
 

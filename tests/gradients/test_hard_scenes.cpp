@@ -87,8 +87,8 @@ TEST(ClippedCube, AgreesWithDifferences) {
   EXPECT_TRUE(compare_moments(sum, reference).plausible(kLevel));
 }
 
-// A camera on a face that its near plane, at hardly any distance, cuts: points at a depth of zero are
-// nowhere on the film.
+// A camera on a face that its near plane, at hardly any distance, cuts: points at a depth of zero
+// are nowhere on the film.
 TEST(NearPlane, AtThePinhole) {
   const TempFiles files;
   SceneParts parts;
@@ -204,8 +204,8 @@ TEST_F(Copies, OfBothSides) {
   }
 }
 
-// Two tiles that overlap in a plane which no axis is in, seen head on: "first" is [-1, 1] by [-1, 1]
-// in coordinates of the plane, "second" [0, 2] by [-1/2, 1/2]. The film is 6 wide there.
+// Two tiles that overlap in a plane which no axis is in, seen head on: "first" is [-1, 1] by [-1,
+// 1] in coordinates of the plane, "second" [0, 2] by [-1/2, 1/2]. The film is 6 wide there.
 class OverlappingTiles : public testing::Test {
  protected:
   static constexpr int kPixels = 24;

@@ -252,8 +252,8 @@ struct ClosedForm {
   }
 };
 
-// A lamp of two triangles, whose corners all lie on outlines. With few rays the result is wrong, and
-// scores see it; with more it comes to the exact one.
+// A lamp of two triangles, whose corners all lie on outlines. With few rays the result is wrong,
+// and scores see it; with more it comes to the exact one.
 TEST(WarpedArea, BiasFallsWithRays) {
   const std::string parameter = "lamp.translate.x";
   const ClosedForm form("lamp_over_plane.xml", parameter);

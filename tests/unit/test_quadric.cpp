@@ -320,8 +320,8 @@ TEST(Quadric, PairsRejectWhatBoxesKeep) {
   EXPECT_LT(pairs, 0.96 * boxes);
 }
 
-// What is drawn of a node are its own planes: they lie in its box and between its quadrics. The rows
-// of a box are floats, whose rounding is not small against a box of few edges.
+// What is drawn of a node are its own planes: they lie in its box and between its quadrics. The
+// rows of a box are floats, whose rounding is not small against a box of few edges.
 TEST(QuadricChart, HoldsThePlanesOfItsNode) {
   EdgeSamplerInput input;
   input.objects.push_back(build_edge_mesh(torus_mesh(40, 20), true));

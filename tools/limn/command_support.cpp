@@ -102,8 +102,8 @@ void add_term_options(CLI::App& app, std::string& terms, std::string& samples) {
 
 void add_film_option(CLI::App& app, std::string& film) {
   app.add_option("--film", film,
-                 "What the camera sees: by rays, or by the exact visible regions of every pixel "
-                 "(box filter)")
+                 "What the camera sees, of a gradient its edges: by rays, or by the exact visible "
+                 "regions of every pixel (box filter)")
       ->check(CLI::IsMember({"rays", "exact"}))
       ->capture_default_str();
 }

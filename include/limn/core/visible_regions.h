@@ -43,6 +43,7 @@ struct SeenFace {
   bool counter_clockwise = true;      // the order of its corners on the plane
   PlaneFunction inverse_depth;        // [1 / length]; depths are positive
   double depth_error = 0;             // bound of the rounding of inverse_depth, where the face is
+  bool ruled = false;                 // the regions' rule may know it
   std::array<PlaneFunction, 2> cuts;  // it is seen only where these are not negative
   int cut_count = 0;
   PlanePoint lower, upper;  // its bounding box
@@ -90,6 +91,12 @@ class VisibleRegions {
   ~VisibleRegions();
   // As if new, but memory stays.
   void reset(const PlaneWindow& window, size_t faces = 0);
+
+  // For two labels: whether the first is seen, and not the second, wherever both are and whatever
+  // their depths; none where depths are to tell. For faces that lie in one plane to the rounding of
+  // positions, which is far above that of depths. Kept by reset(), asked for ruled faces alone.
+  using Rule = std::function<std::optional<bool>(uint32_t, uint32_t)>;
+  void set_rule(Rule rule);
 
   // Nearer faces hide others. Where depths are equal to rounding, the lower label is seen. Faces
   // that pass through each other part where their depths are equal. Regions do not depend on the

@@ -11,8 +11,8 @@
 namespace limn {
 
 // u in [-1, 1]^3. The planes of the family between the two quadrics are those with
-// low <= f(u) <= high, f(u) = sum of linear_k u_k + square_k u_k^2 + product_k u_i u_j with i, j the
-// two others than k.
+// low <= f(u) <= high, f(u) = sum of linear_k u_k + square_k u_k^2 + product_k u_i u_j with i, j
+// the two others than k.
 struct QuadricChart {
   std::array<double, 3> linear, square, product;
   double low, high;

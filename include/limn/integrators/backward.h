@@ -65,8 +65,9 @@ struct BackwardResult {
 // settings.spp paths per pixel, in batches that give the standard errors; interruption
 // drops the batch in progress. With settings.seconds as many batches of one size as fit, two at
 // least: a run without limit with the samples and batches that the result names has the same bits.
-// The same seed gives the same bits on any number of threads; memory does not grow with samples. InputError for unknown parameters or
-// terms, and for an adjoint of another size or one that is not finite.
+// The same seed gives the same bits on any number of threads; memory does not grow with samples.
+// InputError for unknown parameters or terms, and for an adjoint of another size or one that is not
+// finite.
 BackwardResult backward(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
                         const RunSettings& settings);
 

@@ -121,8 +121,9 @@ class PartReader final : public BatchStore {
   std::vector<std::unique_ptr<PartFile>> files_;
 };
 
-// A number that differs (but for chance, 2^-64) between scenes that differ: their shapes, materials,
-// lights, camera, film; of an environment's texels what 4096 directions see. Sixteen hex digits.
+// A number that differs (but for chance, 2^-64) between scenes that differ: their shapes,
+// materials, lights, camera, film; of an environment's texels what 4096 directions see. Sixteen hex
+// digits.
 std::string fingerprint(const Scene& scene);
 // The same of numbers, bit by bit.
 std::string fingerprint(const std::vector<double>& numbers);
