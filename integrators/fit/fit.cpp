@@ -6,8 +6,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "integrators/backward/adjoint_context.h"
 #include "integrators/fit/fit_parameter.h"
 #include "integrators/fit/remesh.h"
+#include "integrators/methods/selection.h"
+#include "integrators/terms/term.h"
 #include "limn/core/error.h"
 #include "limn/core/rng.h"
 
@@ -78,7 +81,10 @@ class Fit::Impl {
 
  private:
   void check_shapes();
+  void check_terms() const;
   void check_remeshing();
+  // Of a scalar; none where the view does not have it, and of motions.
+  std::vector<double> values_in(size_t view, const FitParameter& parameter) const;
   // Shapes of a view that some parameter moves, in the scene's order.
   std::vector<ShapeId> moved_shapes(size_t view) const;
   RunSettings view_settings(size_t view) const;
@@ -114,6 +120,7 @@ Fit::Impl::Impl(std::vector<FitView> all, const FitOptions& options, const RunSe
     throw InputError("bounds of \"" + bounds.parameter + "\", which is not fitted");
   }
   check_shapes();
+  check_terms();
   if (!options.remesh.empty()) check_remeshing();
   if (options.loss == LossKind::kL1) {
     warnings.push_back(
@@ -137,11 +144,27 @@ void Fit::Impl::check_shapes() {
   }
 }
 
+// Those of backward(), which would tell at the first step.
+void Fit::Impl::check_terms() const {
+  for (size_t v = 0; v < views.size(); ++v) {
+    const auto seen = [&](const FitParameter& p) { return p.in_view(v) != nullptr; };
+    if (std::none_of(parameters_.begin(), parameters_.end(), seen)) continue;
+    std::vector<std::string> known;
+    for (const TermType& type : term_types().first(kAdjointTerms)) {
+      if (type.applies(views[v].scene)) known.emplace_back(type.name);
+    }
+    selected_terms(known, options_.backward.terms, views[v].scene.file);
+  }
+}
+
 // What would fail after hours is told at once.
 void Fit::Impl::check_remeshing() {
   if (!(options_.remesh_edge > 0.1 && options_.remesh_edge < 10)) {
     throw InputError(
         fmt::format("edges {:g} times as long are not within 0.1 and 10", options_.remesh_edge));
+  }
+  for (const int64_t step : options_.remesh) {
+    if (step < 1) throw InputError(fmt::format("remeshing after {} steps: one at least", step));
   }
   bool any = false;
   for (const FitParameter& p : parameters_) {
@@ -256,6 +279,11 @@ std::vector<FitScalar> Fit::Impl::scalars() const {
   return list;
 }
 
+std::vector<double> Fit::Impl::values_in(size_t view, const FitParameter& parameter) const {
+  if (parameter.is_array() || !parameter.in_view(view)) return {};
+  return parameter.in_view(view)->value(views[view].scene);
+}
+
 FitState Fit::Impl::state() const {
   FitState state;
   state.steps = steps;
@@ -267,10 +295,7 @@ FitState Fit::Impl::state() const {
       const Mesh& mesh = scene.shape(s).mesh;
       view.shapes.push_back({mesh.positions, mesh.normals, mesh.faces});
     }
-    for (const FitParameter& p : parameters_) {
-      view.values.push_back(p.in_view(v) && !p.is_array() ? p.in_view(v)->value(scene)
-                                                          : std::vector<double>{});
-    }
+    for (const FitParameter& p : parameters_) view.values.push_back(values_in(v, p));
     state.views.push_back(std::move(view));
   }
   return state;
@@ -280,12 +305,16 @@ void Fit::Impl::restore(const FitState& state) {
   const auto check = [](bool good) {
     if (!good) throw InputError("the state is that of another fit: of other parameters or meshes");
   };
-  check(state.parameters.size() == parameters_.size() && state.views.size() == views.size());
+  check(state.steps >= 0 && state.parameters.size() == parameters_.size() &&
+        state.views.size() == views.size());
   for (size_t v = 0; v < views.size(); ++v) {
     const FitState::View& view = state.views[v];
     const std::vector<ShapeId> shapes = moved_shapes(v);
     check(view.camera.size() == 13 && view.shapes.size() == shapes.size() &&
           view.values.size() == parameters_.size());
+    for (size_t i = 0; i < parameters_.size(); ++i) {
+      check(view.values[i].size() == values_in(v, parameters_[i]).size());
+    }
   }
   for (size_t v = 0; v < views.size(); ++v) {
     Scene& scene = views[v].scene;

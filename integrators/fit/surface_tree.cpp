@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "limn/core/check.h"
+#include "limn/core/error.h"
 
 namespace limn {
 
@@ -82,7 +82,7 @@ SurfaceTree::SurfaceTree(const Mesh& mesh) : mesh_(mesh) {
   for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
     if (has_area(mesh, mesh.faces[f])) faces_.push_back(f);
   }
-  CHECK(!faces_.empty());
+  if (faces_.empty()) throw InputError("a mesh has no face with an area");
   nodes_.emplace_back();
   build(0, 0, static_cast<uint32_t>(faces_.size()));
 }

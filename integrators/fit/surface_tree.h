@@ -10,7 +10,7 @@ namespace limn {
 
 class SurfaceTree {
  public:
-  // The mesh needs a face with an area and must outlive this.
+  // The mesh must outlive this. InputError if it has no face with an area.
   explicit SurfaceTree(const Mesh& mesh);
 
   struct Nearest {

@@ -14,6 +14,7 @@
 #include "integrators/fit/optimiser.h"
 #include "integrators/fit/remesh.h"
 #include "integrators/fit/surface_tree.h"
+#include "limn/core/error.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/mesh_distance.h"
 #include "limn/integrators/render.h"
@@ -434,9 +435,18 @@ TEST(Fit, RefusesWhatCannotBeFitted) {
   other[1].scene.shapes[1].mesh.positions[0].x += 1;
   options.parameters = {"body.vertex_positions"};
   EXPECT_NE(refused(options, other).find("the same vertices and faces"), std::string::npos);
+  options.remesh = {3, 0};
+  EXPECT_NE(refused(options, views).find("after 0 steps: one at least"), std::string::npos);
+  options.remesh = {};
   options.parameters = {"clay.reflectance"};
+  options.backward.terms = {"interior", "shadow"};
+  EXPECT_NE(refused(options, views).find("no term \"shadow\" here"), std::string::npos);
+  options.backward.terms = {"interior"};
   Fit fit(views, options, {});
   EXPECT_THROW(fit.restore({}), InputError);
+  FitState damaged = fit.state();
+  damaged.views[1].values[0].pop_back();
+  EXPECT_THROW(fit.restore(damaged), InputError);
   EXPECT_THROW(optimiser_kind("sgd"), InputError);
 }
 
@@ -539,6 +549,8 @@ TEST(Fit, DistancesBetweenMeshesAreTrue) {
   // To the rounding of a mean of 100.
   EXPECT_NEAR(mesh_distance(plane, reversed(above), 100, 1, 1).normal_angle, kPi, 1e-13);
   EXPECT_LT(mesh_distance(plane, plane, 500, 1, 1).hausdorff, 1e-15);
+  for (Vec3f& p : above.positions) p.y = 0;
+  EXPECT_THROW(mesh_distance(plane, above, 10, 1, 1), InputError);
   // The nearest of all faces, by a tree over one face each.
   const Mesh torus = torus_mesh(9, 6);
   const SurfaceTree tree(torus);

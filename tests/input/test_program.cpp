@@ -40,6 +40,12 @@ Outcome run(const std::string& arguments, const std::string& environment = "") {
   return call(environment + LIMN_PROGRAM + " " + arguments);
 }
 
+std::string bytes_of(const std::string& file) {
+  std::ifstream stream(file, std::ios::binary);
+  EXPECT_TRUE(stream) << file;
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
 class Program : public testing::Test {
  protected:
   Program() {
@@ -107,6 +113,9 @@ TEST_F(Program, FitsAndGoesOn) {
             std::string::npos);
   EXPECT_NE(refused("fit " + scene_ + " --resume " + whole).find("leave out scene"),
             std::string::npos);
+  EXPECT_NE(refused("fit --spp 4 --loss l1 --no-report --resume " + whole)
+                .find("leave out --spp, --loss\n"),
+            std::string::npos);
   EXPECT_NE(refused("fit --steps 2 -o " + out()).find("give a scene"), std::string::npos);
   const std::string start = "fit " + scene_ + " --steps 2 -o " + files_.path("other");
   EXPECT_NE(refused(start + " --target " + target).find("give --wrt"), std::string::npos);
@@ -118,6 +127,86 @@ TEST_F(Program, FitsAndGoesOn) {
   EXPECT_NE(refused(good + " --loss l3").find("unknown loss \"l3\""), std::string::npos);
   EXPECT_NE(refused(good + " --optimiser sgd").find("known: adam-uniform, adam"),
             std::string::npos);
+  EXPECT_NE(refused(good + " --terms sky").find("no term \"sky\" here"), std::string::npos);
+  const std::string flat = files_.write("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
+  EXPECT_NE(refused(good + " --truth " + flat).find("flat.obj: error: has no face with an area"),
+            std::string::npos);
+  EXPECT_FALSE(std::ifstream(files_.path("other") + "/state.cbor"));
+}
+
+// A shape of the second view alone, whose id is no name of a file; a field, named from where the
+// program runs; new triangles after the last step.
+TEST_F(Program, FitsOfLaterViewsAndFields) {
+  const std::string target = files_.path("target.exr"), folder = files_.path("later");
+  ASSERT_EQ(run("render " + scene_ + " --spp 1 -o " + target).status, 0);
+  SceneParts parts;
+  parts.width = parts.height = 8;
+  const std::string ball = write_mesh(files_, "ball.obj", icosphere_mesh(1));
+  parts.body = obj_shape("a/b", ball, false, 0.4, {0, 1, 0}, diffuse("clay", "0.7, 0.5, 0.3")) +
+               square("lamp", 0.5, 90, {0.3, 2.4, 0.5}, area_light("blaze", "6, 5, 4"));
+  const std::string second = files_.write("second.xml", scene_text(parts));
+  const std::string field = "screen.vertex_positions:field.txt";
+  files_.write("field.txt", "0 0 1\n0 0 1\n0 0 1\n0 0 1\n");
+  const std::string fit = std::string("cd ") + files_.path("") + " && " + LIMN_PROGRAM + " fit " +
+                          scene_ + " --target " + target + " --view " + second + " --target " +
+                          target + " --spp 1 --steps 1 --no-report --wrt a/b.vertex_positions";
+  const Outcome outcome = call(fit + " --wrt " + field + " --bounds " + field + "=-1,1 -o later");
+  ASSERT_EQ(outcome.status, 0) << outcome.text;
+  EXPECT_GT(bytes_of(folder + "/step_00001_a_b.ply").size(), 500u);
+  EXPECT_EQ(json::parse(bytes_of(folder + "/fit.json"))["snapshots"][1]["meshes"].size(), 2u);
+  const Outcome on = run("fit --no-report --steps 2 --resume " + folder);
+  EXPECT_EQ(on.status, 0) << on.text;
+  EXPECT_NE(call(fit + " --wrt screen.vertex_positions:fit.json -o .")
+                .text.find("fit.json: error: -o would write over a file that is read"),
+            std::string::npos);
+  const Outcome remeshed = call(fit + " --remesh 5 -o remeshed");
+  if (remeshed.text.find("OpenMesh") == std::string::npos) {
+    EXPECT_NE(remeshed.text.find("--remesh 5: the fit ends before, after 1 steps"),
+              std::string::npos)
+        << remeshed.text;
+  }
+}
+
+// Steps take twice as long each, so that the interrupt comes within one, after a snapshot.
+TEST_F(Program, InterruptedFitsKeepPicturesAndTellWhatIsDamaged) {
+  const std::string target = files_.path("target.exr"), folder = files_.path("fit");
+  ASSERT_EQ(run("render " + scene_ + " --spp 1 -o " + target).status, 0);
+  const Outcome outcome =
+      call(std::string("timeout -s INT 2 ") + LIMN_PROGRAM + " fit " + scene_ + " --target " +
+           target + " --wrt blaze.radiance --spp 1 --spp-doubling 1 --steps 40 --snapshots 1 " +
+           "--no-report -o " + folder);
+  EXPECT_NE(outcome.text.find("interrupted: "), std::string::npos) << outcome.text;
+  const std::string file = folder + "/fit.json", text = bytes_of(file);
+  const json fit = json::parse(text);
+  EXPECT_EQ(fit["snapshots"].back()["step"], fit["steps"]);
+  EXPECT_EQ(fit["snapshots"].back()["pictures"].size(), 1u);
+
+  const std::string resume = "fit --no-report --resume " + folder;
+  const auto says = [&](const std::string& what) {
+    const std::string message = refused(resume);
+    EXPECT_NE(message.find(what), std::string::npos) << message;
+  };
+  const auto damage = [&](const std::string& pointer, const json& value) {
+    json damaged = fit;
+    damaged[json::json_pointer(pointer)] = value;
+    files_.write("fit/fit.json", damaged.dump());
+  };
+  damage("/arguments/views", json::array());
+  says("fit.json: error: is not what a fit writes: it has no views");
+  damage("/history/0/loss", "high");
+  says("fit.json: error: is not what this fit writes: ");
+  files_.write("fit/fit.json", text);
+  const std::string state = bytes_of(folder + "/state.cbor");
+  json other = json::from_cbor(state);
+  other["parameters"].clear();
+  const std::vector<uint8_t> bytes = json::to_cbor(other);
+  files_.write("fit/state.cbor", std::string(bytes.begin(), bytes.end()));
+  says("state.cbor: error: is the state of another fit");
+  files_.write("fit/state.cbor", state);
+  std::string changed = bytes_of(scene_);
+  changed.replace(changed.find("0.7, 0.5, 0.3"), 3, "0.6");
+  files_.write("scene.xml", changed);
+  says("scene.xml: error: is not as it was when the fit in ");
 }
 
 TEST_F(Program, BackwardWritesWhatOthersRead) {
@@ -154,12 +243,6 @@ json without_times(json report) {
     for (auto& term : report["stats"]["terms"]) term.erase("seconds");
   }
   return report;
-}
-
-std::string bytes_of(const std::string& file) {
-  std::ifstream stream(file, std::ios::binary);
-  EXPECT_TRUE(stream) << file;
-  return {std::istreambuf_iterator<char>(stream), {}};
 }
 
 class Parts : public Program {

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "limn/core/error.h"
+#include "limn/core/names.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
 #include "tools/limn/fit_folder.h"
@@ -19,6 +20,31 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kPictureSamples = 32;  // of a snapshot's pictures; not tuned
+
+// All else is in the folder.
+constexpr const char* kBesideResume[] = {"--resume", "--steps", "--threads", "--quiet",
+                                         "--no-report"};
+
+std::string absolute(const std::string& file) {
+  return file.empty() ? file : fs::absolute(file).lexically_normal().string();
+}
+
+// "SHAPE.vertex_positions:FILE" with an absolute FILE that reaches to `end`; other names as they
+// are.
+std::string with_absolute_field(const std::string& text, size_t end) {
+  const size_t colon = text.find(':');
+  if (colon >= end) return text;
+  return text.substr(0, colon + 1) + absolute(text.substr(colon + 1, end - colon - 1)) +
+         text.substr(end);
+}
+
+// InputError for a mesh that nothing has a distance to.
+void check_truth(const std::string& file) {
+  const Mesh mesh = read_mesh(file, true);
+  const auto has = [&](const FaceIndices& face) { return has_area(mesh, face); };
+  if (std::any_of(mesh.faces.begin(), mesh.faces.end(), has)) return;
+  throw InputError({file}, "has no face with an area");
+}
 
 class FitCommand final : public Command {
  public:
@@ -33,12 +59,15 @@ class FitCommand final : public Command {
   void add_sampling_options(CLI::App& app);
   FitArguments arguments() const;
   std::vector<FitView> read_views(const FitArguments& arguments);
+  void check_resume() const;
   FitFolder open_folder();
+  void warn_of_remeshing(const FitArguments& arguments);
   int loop(Fit& fit, FitFolder& folder, const RunSettings& settings);
   void tell(const FitRecord& record) const;
 
   CommonOptions common_;
   Warnings warnings_;
+  const CLI::App* app_ = nullptr;
   CLI::Option* steps_option_ = nullptr;
   std::vector<std::string> targets_, masks_, views_;
   FitArguments given_;
@@ -47,6 +76,7 @@ class FitCommand final : public Command {
 };
 
 void FitCommand::add_options(CLI::App& app, bool) {
+  app_ = &app;
   add_common_options(app, common_);
   app.get_option("scene")->required(false);
   app.remove_option(app.get_option("--json"));
@@ -100,7 +130,7 @@ void FitCommand::add_options(CLI::App& app, bool) {
   app.add_option("-o,--output", output_, "Folder to write (made if it is not there)");
   app.add_option("--resume", resume_,
                  "Go on with the fit in this folder, as if it had never stopped; takes --steps, "
-                 "--threads and --quiet alone")
+                 "--threads, --quiet and --no-report alone")
       ->type_name("FOLDER");
   app.add_flag("--no-report", no_report_, "Leave out report.html");
 }
@@ -141,12 +171,13 @@ FitArguments FitCommand::arguments() const {
   FitArguments a = given_;
   a.terms = parse_terms(terms_);
   a.shading = common_.shading;
-  const auto absolute = [](const std::string& file) {
-    return file.empty() ? file : fs::absolute(file).lexically_normal().string();
-  };
   a.truth = absolute(truth_);
+  for (std::string& name : a.parameters) name = with_absolute_field(name, name.size());
+  for (std::string& text : a.bounds) {
+    text = with_absolute_field(text, std::min(text.size(), text.rfind('=')));
+  }
   for (size_t v = 0; v < targets_.size(); ++v) {
-    ViewArguments view{common_.scene, common_.defines, absolute(targets_[v]), ""};
+    ViewArguments view{common_.scene, common_.defines, absolute(targets_[v]), "", ""};
     if (v > 0) {
       std::stringstream stream(views_[v - 1]);
       std::getline(stream, view.scene, ';');
@@ -180,13 +211,29 @@ std::vector<FitView> FitCommand::read_views(const FitArguments& arguments) {
   return views;
 }
 
+void FitCommand::check_resume() const {
+  std::vector<std::string> other;
+  for (const CLI::Option* option : app_->get_options()) {
+    const auto is = [&](const char* name) { return option->get_name() == name; };
+    if (option->count() == 0) continue;
+    if (std::any_of(std::begin(kBesideResume), std::end(kBesideResume), is)) continue;
+    other.push_back(option->get_name());
+  }
+  if (other.empty()) return;
+  throw InputError("--resume goes on with what its folder says: leave out " + limn::join(other));
+}
+
+void FitCommand::warn_of_remeshing(const FitArguments& arguments) {
+  for (const int64_t step : arguments.remesh) {
+    if (step <= arguments.steps) continue;
+    warnings_.add_all(
+        {fmt::format("--remesh {}: the fit ends before, after {} steps", step, arguments.steps)});
+  }
+}
+
 FitFolder FitCommand::open_folder() {
   if (resume_.empty()) return {output_, arguments()};
-  if (!common_.scene.empty() || !targets_.empty() || !given_.parameters.empty() ||
-      !output_.empty()) {
-    throw InputError(
-        "--resume goes on with what its folder says: leave out scene, --target, --wrt and -o");
-  }
+  check_resume();
   FitFolder folder = FitFolder::read(resume_);
   if (steps_option_->count() > 0) folder.set_steps(given_.steps);
   return folder;
@@ -199,11 +246,13 @@ int FitCommand::run(const std::string&) {
   if (resume_.empty()) {
     folder.set_samples(settings.spp, settings.seed);
     folder.prepare(views);
+  } else {
+    folder.check_scenes(views);
   }
   settings.spp = folder.arguments().spp;
   settings.seed = folder.arguments().seed;
   // A wrong file is told before hours of work.
-  if (!folder.arguments().truth.empty()) read_mesh(folder.arguments().truth, true);
+  if (!folder.arguments().truth.empty()) check_truth(folder.arguments().truth);
   const Fit* running = nullptr;
   int64_t started = 0;
   if (const auto bar = settings.progress) {
@@ -215,6 +264,7 @@ int FitCommand::run(const std::string&) {
   Fit fit(std::move(views), folder.arguments().options(), settings);
   running = &fit;
   warnings_.add_all(fit.warnings());
+  warn_of_remeshing(folder.arguments());
   if (!resume_.empty()) folder.restore(fit);
   started = fit.steps();
   const int status = loop(fit, folder, settings);
@@ -230,7 +280,8 @@ int FitCommand::loop(Fit& fit, FitFolder& folder, const RunSettings& settings) {
     try {
       record = fit.step();
     } catch (const InputError&) {
-      folder.write(fit, "failed", warnings_.lines());
+      // Before the first step there is nothing to go on with, and the folder stays free.
+      if (fit.steps() > 0) folder.write(fit, "failed", warnings_.lines());
       throw;
     }
     if (!record) {

@@ -2,7 +2,6 @@
 #include "limn/integrators/gradient.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <functional>
 
@@ -26,15 +25,6 @@ constexpr double kRulingShare = 0.1;
 constexpr double kRulingPixels = 0.5;
 
 constexpr int kUnlimited = 1 << 30;  // samples per pixel
-
-// A parameter's name as a part of a file's name.
-std::string file_part(const std::string& name) {
-  std::string part = name;
-  for (char& c : part) {
-    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '.' && c != '-') c = '_';
-  }
-  return part;
-}
 
 // 0 for a term that is not computed.
 double mean_magnitude(const Moments& moments) {

@@ -14,6 +14,7 @@
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/mesh_distance.h"
+#include "limn/integrators/parts.h"
 #include "limn/integrators/render.h"
 #include "tools/limn/command_support.h"
 
@@ -64,7 +65,11 @@ std::string ply_text(const Mesh& mesh) {
 json number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
 
 json to_json(const ViewArguments& v) {
-  return {{"scene", v.scene}, {"defines", v.defines}, {"target", v.target}, {"mask", v.mask}};
+  return {{"scene", v.scene},
+          {"defines", v.defines},
+          {"target", v.target},
+          {"mask", v.mask},
+          {"fingerprint", v.fingerprint}};
 }
 
 // Calls visit(name, member) for all but the views: reading and writing go over one list.
@@ -104,7 +109,8 @@ FitArguments arguments_from(const json& j) {
   FitArguments a;
   visit_arguments(a, [&](const char* name, auto& member) { j.at(name).get_to(member); });
   for (const json& view : j.at("views")) {
-    a.views.push_back({view.at("scene"), view.at("defines"), view.at("target"), view.at("mask")});
+    a.views.push_back({view.at("scene"), view.at("defines"), view.at("target"), view.at("mask"),
+                       view.at("fingerprint")});
   }
   return a;
 }
@@ -188,21 +194,48 @@ FitBounds parse_bounds(const std::string& text) {
   }
 }
 
-// Shapes of the first view whose vertices are fitted or moved.
-std::vector<ShapeId> fitted_shapes(const Fit& fit, const std::vector<std::string>& parameters) {
-  const Scene& scene = fit.views()[0].scene;
-  std::vector<ShapeId> shapes;
-  for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
-    const auto moves = [&](const std::string& name) {
-      try {
-        return !find_parameter_or_array(scene, name).velocities(scene, ShapeId(s)).empty();
-      } catch (const UnknownParameter&) {  // of another view
-        return false;
-      }
-    };
-    if (std::any_of(parameters.begin(), parameters.end(), moves)) shapes.emplace_back(s);
+// Shapes whose vertices are fitted or moved, each from the first view that has it.
+std::vector<const Shape*> fitted_shapes(const Fit& fit,
+                                        const std::vector<std::string>& parameters) {
+  std::vector<const Shape*> shapes;
+  for (const FitView& view : fit.views()) {
+    const Scene& scene = view.scene;
+    const std::vector<const Shape*> earlier = shapes;
+    for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+      const auto moves = [&](const std::string& name) {
+        try {
+          return !find_parameter_or_array(scene, name).velocities(scene, ShapeId(s)).empty();
+        } catch (const UnknownParameter&) {  // of another view
+          return false;
+        }
+      };
+      const auto same = [&](const Shape* other) { return other->id == scene.shapes[s].id; };
+      if (std::any_of(earlier.begin(), earlier.end(), same)) continue;
+      if (!std::any_of(parameters.begin(), parameters.end(), moves)) continue;
+      shapes.push_back(&scene.shapes[s]);
+    }
   }
   return shapes;
+}
+
+// A line per step.
+std::string csv_text(const json& history, const std::vector<FitScalar>& scalars) {
+  std::string csv = "step,loss,stderr,step_size,halvings,seconds";
+  for (const FitScalar& s : scalars) csv += "," + s.name;
+  csv += "\n";
+  for (const json& r : history) {
+    const json& error = r.at("stderr");
+    csv += fmt::format("{},{:.9g},{},{:.9g},{},{:.3f}", r.at("step").get<int64_t>(),
+                       r.at("loss").get<double>(),
+                       error.is_null() ? "" : fmt::format("{:.3g}", error.get<double>()),
+                       r.at("step_size").get<double>(), r.at("halvings").get<int>(),
+                       r.at("seconds").get<double>());
+    for (const FitScalar& s : scalars) {
+      csv += fmt::format(",{:.9g}", r.at("values").at(s.name).get<double>());
+    }
+    csv += "\n";
+  }
+  return csv;
 }
 
 }  // namespace
@@ -240,15 +273,27 @@ FitFolder FitFolder::read(const std::string& folder) {
   try {
     const json j = json::parse(read_whole(file));
     found.arguments_ = arguments_from(j.at("arguments"));
-    found.history_ = j.at("history");
-    found.snapshots_ = j.at("snapshots");
+    found.history_ = j.at("history").get<json::array_t>();
+    found.snapshots_ = j.at("snapshots").get<json::array_t>();
   } catch (const json::exception& error) {
     throw InputError({file}, std::string("is not what a fit writes: ") + error.what());
+  }
+  if (found.arguments_.views.empty()) {
+    throw InputError({file}, "is not what a fit writes: it has no views");
   }
   return found;
 }
 
-void FitFolder::prepare(const std::vector<FitView>& views) const {
+void FitFolder::check_scenes(const std::vector<FitView>& views) const {
+  for (size_t v = 0; v < views.size(); ++v) {
+    const ViewArguments& view = arguments_.views[v];
+    if (fingerprint(views[v].scene) == view.fingerprint) continue;
+    throw InputError({view.scene}, "is not as it was when the fit in " + folder_ +
+                                       " began: put it back, or begin another fit");
+  }
+}
+
+void FitFolder::prepare(const std::vector<FitView>& views) {
   std::error_code failed;
   if (fs::exists(file("state.cbor"), failed)) {
     throw InputError({folder_}, "holds a fit already: go on with --resume " + folder_ +
@@ -264,7 +309,11 @@ void FitFolder::prepare(const std::vector<FitView>& views) const {
     inputs.push_back(view.target);
     inputs.push_back(view.mask);
   }
+  for (const std::string& field : field_files(arguments_.parameters)) inputs.push_back(field);
   for (const FitView& view : views) check_outputs(files, view.scene, inputs);
+  for (size_t v = 0; v < views.size(); ++v) {
+    arguments_.views[v].fingerprint = fingerprint(views[v].scene);
+  }
 }
 
 void FitFolder::restore(Fit& fit) {
@@ -274,6 +323,8 @@ void FitFolder::restore(Fit& fit) {
     fit.restore(state_from(json::from_cbor(bytes)));
   } catch (const json::exception& error) {
     throw InputError({name}, std::string("is not the state of a fit: ") + error.what());
+  } catch (const InputError&) {
+    throw InputError({name}, "is the state of another fit: of other parameters or meshes");
   }
   const auto forget = [&](json& list) {
     json kept = json::array();
@@ -284,8 +335,14 @@ void FitFolder::restore(Fit& fit) {
     }
     list = std::move(kept);
   };
-  forget(history_);
-  forget(snapshots_);
+  try {
+    forget(history_);
+    forget(snapshots_);
+    csv_text(history_, fit.scalars());  // all that is read of them later
+  } catch (const json::exception& error) {
+    throw InputError({file("fit.json")},
+                     std::string("is not what this fit writes: ") + error.what());
+  }
 }
 
 void FitFolder::add(const FitRecord& r, const Fit& fit) {
@@ -302,9 +359,8 @@ void FitFolder::add(const FitRecord& r, const Fit& fit) {
                       {"seconds", r.seconds}});
 }
 
-json FitFolder::mesh_figures(const Fit& fit, ShapeId shape, int threads) const {
-  const Shape& s = fit.views()[0].scene.shape(shape);
-  const std::string name = fmt::format("step_{:05}_{}.ply", fit.steps(), s.id);
+json FitFolder::mesh_figures(const Shape& s, int64_t step, int threads) const {
+  const std::string name = fmt::format("step_{:05}_{}.ply", step, file_part(s.id));
   write_whole(file(name), ply_text(s.mesh));
   json figures = {{"shape", s.id}, {"file", name}, {"crossings", count_crossings(s.mesh, threads)}};
   const auto inside_out = count_inside_out(s.mesh, threads);
@@ -321,6 +377,8 @@ json FitFolder::mesh_figures(const Fit& fit, ShapeId shape, int threads) const {
 }
 
 void FitFolder::add_snapshot(const Fit& fit, const RunSettings& settings, int spp, bool quiet) {
+  const bool again = !snapshots_.empty() && snapshots_.back().at("step") == fit.steps();
+  if (again && spp == 0) return;  // its pictures stay
   json snapshot = {{"step", fit.steps()}, {"meshes", json::array()}, {"pictures", json::array()}};
   std::string line = fmt::format("step {}", fit.steps());
   if (!history_.empty()) {
@@ -331,8 +389,8 @@ void FitFolder::add_snapshot(const Fit& fit, const RunSettings& settings, int sp
     }
   }
   for (const FitScalar& s : fit.scalars()) line += fmt::format(", {} {:.6g}", s.name, s.value);
-  for (const ShapeId shape : fitted_shapes(fit, arguments_.parameters)) {
-    const json figures = mesh_figures(fit, shape, settings.threads);
+  for (const Shape* shape : fitted_shapes(fit, arguments_.parameters)) {
+    const json figures = mesh_figures(*shape, fit.steps(), settings.threads);
     line += fmt::format(", {}: {} crossings", figures.at("shape").get<std::string>(),
                         figures.at("crossings").get<size_t>());
     if (!figures.at("inside_out").is_null()) {
@@ -359,9 +417,7 @@ void FitFolder::add_snapshot(const Fit& fit, const RunSettings& settings, int sp
     write_png(file(fmt::format("view_{}_target.png", v)), view.target, 1);
   }
   // A run that goes on has one of where it was interrupted.
-  if (!snapshots_.empty() && snapshots_.back().at("step") == fit.steps()) {
-    snapshots_.erase(snapshots_.size() - 1);
-  }
+  if (again) snapshots_.erase(snapshots_.size() - 1);
   snapshots_.push_back(snapshot);
   if (quiet) return;
   fmt::print("{}\n", line);
@@ -370,21 +426,6 @@ void FitFolder::add_snapshot(const Fit& fit, const RunSettings& settings, int sp
 
 void FitFolder::write(const Fit& fit, const std::string& status,
                       const std::vector<std::string>& warnings) {
-  std::string csv = "step,loss,stderr,step_size,halvings,seconds";
-  for (const FitScalar& s : fit.scalars()) csv += "," + s.name;
-  csv += "\n";
-  for (const json& r : history_) {
-    const json& error = r.at("stderr");
-    csv += fmt::format("{},{:.9g},{},{:.9g},{},{:.3f}", r.at("step").get<int64_t>(),
-                       r.at("loss").get<double>(),
-                       error.is_null() ? "" : fmt::format("{:.3g}", error.get<double>()),
-                       r.at("step_size").get<double>(), r.at("halvings").get<int>(),
-                       r.at("seconds").get<double>());
-    for (const FitScalar& s : fit.scalars()) {
-      csv += fmt::format(",{:.9g}", r.at("values").at(s.name).get<double>());
-    }
-    csv += "\n";
-  }
   json targets = json::array(), scalars = json::array();
   for (size_t v = 0; v < fit.views().size(); ++v) {
     targets.push_back(fmt::format("view_{}_target.png", v));
@@ -397,7 +438,7 @@ void FitFolder::write(const Fit& fit, const std::string& status,
       {"steps", fit.steps()}, {"scalars", scalars},  {"targets", targets},
       {"warnings", warnings}, {"history", history_}, {"snapshots", snapshots_}};
   write_whole(file("fit.json"), all.dump(1) + "\n");
-  write_whole(file("history.csv"), csv);
+  write_whole(file("history.csv"), csv_text(history_, fit.scalars()));
   const std::vector<uint8_t> state = json::to_cbor(to_json(fit.state()));
   write_whole(file("state.cbor"), std::string(state.begin(), state.end()));
 }

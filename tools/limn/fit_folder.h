@@ -21,6 +21,7 @@ struct ViewArguments {
   std::string scene;
   std::map<std::string, std::string> defines;
   std::string target, mask;  // "": no mask
+  std::string fingerprint;   // of the scene as the fit found it
 };
 
 // What fixes the bits of a fit, and what is kept of it. Files have absolute names.
@@ -53,22 +54,25 @@ class FitFolder {
     arguments_.spp = spp;
     arguments_.seed = seed;
   }
-  // Makes the folder; InputError if it holds a fit already, or cannot be written, or a file that
-  // the fit reads lies in its place.
-  void prepare(const std::vector<FitView>& views) const;
-  // Brings `fit` to the state in the folder, and forgets what came after.
+  // Makes the folder, and notes what tells the scenes apart; InputError if it holds a fit already,
+  // or cannot be written, or a file that the fit reads lies in its place.
+  void prepare(const std::vector<FitView>& views);
+  // InputError where a scene is not as it was when the fit began.
+  void check_scenes(const std::vector<FitView>& views) const;
+  // Brings `fit` to the state in the folder, and forgets what came after. InputError that names the
+  // file which is damaged or of another fit.
   void restore(Fit& fit);
 
   void add(const FitRecord& record, const Fit& fit);
-  // Meshes and their figures, pictures of all views by `spp` samples per pixel (none: 0); says so
-  // unless quiet.
+  // Meshes and their figures, pictures of all views by `spp` samples per pixel (none: 0, and then a
+  // snapshot of this step stays as it is); says so unless quiet.
   void add_snapshot(const Fit& fit, const RunSettings& settings, int spp, bool quiet);
   // The state last: a crash before leaves the older one, and --resume forgets what came after it.
   void write(const Fit& fit, const std::string& status, const std::vector<std::string>& warnings);
 
  private:
   std::string file(const std::string& name) const;
-  nlohmann::json mesh_figures(const Fit& fit, ShapeId shape, int threads) const;
+  nlohmann::json mesh_figures(const Shape& shape, int64_t step, int threads) const;
 
   std::string folder_;
   FitArguments arguments_;

@@ -1,6 +1,7 @@
 // What a command writes: names that collide, places that cannot be written, leftovers.
 #include "tools/limn/output_files.h"
 
+#include <cctype>
 #include <filesystem>
 #include <fstream>
 
@@ -66,6 +67,14 @@ std::vector<std::string> field_files(const std::vector<std::string>& parameters)
     if (colon != std::string::npos) files.push_back(parameter.substr(colon + 1));
   }
   return files;
+}
+
+std::string file_part(const std::string& name) {
+  std::string part = name;
+  for (char& c : part) {
+    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '.' && c != '-') c = '_';
+  }
+  return part;
 }
 
 void check_outputs(const std::vector<PlannedFile>& files, const Scene& scene,

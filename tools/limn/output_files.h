@@ -21,6 +21,8 @@ void check_outputs(const std::vector<PlannedFile>& files, const Scene& scene,
                    const std::vector<std::string>& inputs = {});
 // The files in parameters' names (SHAPE.vertex_positions:FILE).
 std::vector<std::string> field_files(const std::vector<std::string>& parameters);
+// A name of the scene as a part of a file's: what is no letter, digit, dot or minus becomes "_".
+std::string file_part(const std::string& name);
 // InputError if the file cannot be written; nothing for "".
 void check_json(const std::string& file);
 

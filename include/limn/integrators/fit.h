@@ -117,7 +117,8 @@ class Fit {
  public:
   // Copies all of it. settings: seed, threads, spp (of the gradient), interrupted; progress is
   // called with the fraction of a step. InputError for names that no view has, arrays that differ
-  // from view to view, bounds that leave a value outside, targets and masks of another size.
+  // from view to view, bounds that leave a value outside, targets and masks of another size, terms
+  // that a view does not have, remeshing before the first step.
   Fit(std::vector<FitView> views, const FitOptions& options, const RunSettings& settings);
   ~Fit();
   Fit(Fit&&) noexcept;

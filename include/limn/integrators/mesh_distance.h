@@ -16,7 +16,8 @@ struct MeshDistance {
   double normal_angle = 0;  // mean angle between the faces' normals there [radians]
 };
 // samples: points on each surface, at least one, stratified by area with the random numbers of
-// `seed`. The result does not depend on `threads`. Each mesh needs a face with an area.
+// `seed`. The result does not depend on `threads`. InputError if a mesh has no face with an
+// area.
 MeshDistance mesh_distance(const Mesh& mesh, const Mesh& truth, size_t samples, uint64_t seed,
                            int threads);
 
