@@ -267,6 +267,7 @@ void BackwardPass::start(BatchStore& store) const {
   store.identify("adjoint", fingerprint(pixels));
   store.identify("scene", fingerprint(parameters_.scene()));
   store.identify("parameters", join(names_of(parameters_.parameters())));
+  store.identify("velocities", fingerprint(parameters_.scene(), parameters_.parameters()));
   std::vector<std::string> terms;
   for (const TermRun& term : result_.terms)
     if (term.computed) terms.push_back(term.name);
@@ -295,7 +296,8 @@ void BackwardPass::run_all() {
 }
 
 // Batches of one size, so that a run with as many samples and batches repeats the bits. The first
-// one tells the time of a sample; where more than one fits into a batch it is thrown away.
+// one tells the time of a sample; where more than one fits into a batch it is thrown away. Standard
+// errors need two batches, so that each takes half of the time at most.
 void BackwardPass::run_in_time() {
   ProgressCounter progress(settings_, watch_, SIZE_MAX);
   PathBatch batch{settings_.seed, 0, std::min(settings_.spp, 1)};
@@ -303,9 +305,10 @@ void BackwardPass::run_in_time() {
   auto made = run_batch(batch, progress);
   if (!made) return;
   const double left = settings_.seconds - watch_.seconds();
-  const int most = std::max(1, std::min(options_.batches, settings_.spp));
+  const int most = std::max(2, std::min(options_.batches, settings_.spp));
   const double fitting = left / std::max(first.seconds(), 1e-9) / most;
-  const int size = static_cast<int>(std::clamp(fitting, 1.0, double(settings_.spp) / most));
+  const int size =
+      static_cast<int>(std::clamp(fitting, 1.0, std::max(1.0, double(settings_.spp) / most)));
   if (size == 1) collect(batch, *made);
   const Stopwatch since;
   for (int done = 0, next = size == 1 ? 1 : 0; next + size <= settings_.spp; next += size, ++done) {

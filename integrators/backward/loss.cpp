@@ -31,16 +31,19 @@ ValueLoss value_loss(LossKind kind, double a, double b, double target) {
   return {weight * (a - target) * (b - target), 2 * weight * mean};
 }
 
-void check_size(const Scene& scene, const Image& image, const char* what) {
+void check_size(const Scene& scene, const Image& image, const char* what,
+                const std::string& place) {
   const Film& film = scene.film;
   if (image.width == film.crop_width && image.height == film.crop_height &&
       (image.channels == 3 || image.channels == 1)) {
     return;
   }
-  throw InputError(fmt::format(
-      "the {} has {} x {} pixels of {} channels, but the film {} x {}: it must be of "
-      "the film's size, with three channels or one",
-      what, image.width, image.height, image.channels, film.crop_width, film.crop_height));
+  throw InputError(
+      {place},
+      fmt::format("the {} has {} x {} pixels of {} channels, but the film {} x {}: it must be of "
+                  "the film's size, with three channels or one",
+                  what, image.width, image.height, image.channels, film.crop_width,
+                  film.crop_height));
 }
 
 // Of each pixel; they add up to one over all values of the image.
@@ -64,29 +67,37 @@ LossKind loss_kind(const std::string& name) {
   throw InputError(unknown_name("loss", name, names_of(kLosses)));
 }
 
-void check_loss_images(const Scene& scene, const Image& target, const Image& mask) {
-  check_size(scene, target, "target");
+void check_loss_images(const Scene& scene, const Image& target, const Image& mask,
+                       const std::string& target_place, const std::string& mask_place) {
+  check_size(scene, target, "target", target_place);
   const auto place = [&](size_t pixel) {
     return fmt::format("in column {}, row {}", pixel % target.width, pixel / target.width);
   };
   double sum = 0;
   if (!mask.data.empty()) {
-    check_size(scene, mask, "mask");
+    check_size(scene, mask, "mask", mask_place);
     for (size_t i = 0; i < mask.data.size(); i += mask.channels) {
       const size_t pixel = i / mask.channels;
       if (!(mask.data[i] >= 0 && std::isfinite(mask.data[i]))) {
-        throw InputError("the mask is negative or not finite " + place(pixel));
+        throw InputError({mask_place}, "the mask is negative or not finite " + place(pixel));
+      }
+      for (int c = 1; c < mask.channels; ++c) {
+        if (mask.data[i + c] == mask.data[i]) continue;
+        throw InputError({mask_place}, "the mask's channels differ " + place(pixel) +
+                                           ": it must have one channel, or three that are alike");
       }
       sum += mask.data[i];
     }
-    if (sum == 0) throw InputError("the mask is zero everywhere: no pixel is left for the loss");
+    if (sum == 0) {
+      throw InputError({mask_place}, "the mask is zero everywhere: no pixel is left for the loss");
+    }
   }
   for (size_t i = 0; i < target.data.size(); ++i) {
     const size_t pixel = i / target.channels;
     const bool seen = mask.data.empty() || mask.data[pixel * mask.channels] > 0;
     if (std::isfinite(target.data[i]) || !seen) continue;
-    throw InputError("the target is not finite " + place(pixel) +
-                     ": a mask that is zero there leaves it out");
+    throw InputError({target_place}, "the target is not finite " + place(pixel) +
+                                         ": a mask that is zero there leaves it out");
   }
 }
 

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "limn/core/light.h"
+#include "limn/core/parameter.h"
 #include "limn/core/rng.h"
 #include "limn/integrators/parts.h"
 
@@ -95,6 +96,17 @@ std::string fingerprint(const Scene& scene) {
   for (const auto& light : scene.delta_lights) {
     hash.add(light->origin().v);
     hash.add_object(*light);
+  }
+  return hash.text();
+}
+
+std::string fingerprint(const Scene& scene, const std::vector<Parameter>& parameters) {
+  Hash hash;
+  for (const Parameter& parameter : parameters) {
+    if (parameter.size > 1) continue;
+    for (size_t s = 0; s < scene.shapes.size(); ++s) {
+      hash.add(parameter.velocities(scene, ShapeId(s)));
+    }
   }
   return hash.text();
 }

@@ -67,13 +67,18 @@ void BatchStore::identify(const std::string& name, const std::string& value) {
 // Where the batches of a part are.
 class PartFile {
  public:
-  PartFile(std::unique_ptr<std::istream> stream, std::string name)
+  // damaged: what is no batch ends the whole ones, and is no error.
+  PartFile(std::unique_ptr<std::istream> stream, std::string name, bool damaged = false)
       : stream_(std::move(stream)), name_(std::move(name)) {
     stream_->seekg(0, std::ios::end);
     size_ = stream_->tellg();
     stream_->seekg(0);
     read_text();
-    while (find_batch()) {
+    try {
+      while (find_batch()) {
+      }
+    } catch (const InputError&) {
+      if (!damaged) throw;
     }
   }
 
@@ -203,10 +208,10 @@ std::unique_ptr<Difference> difference(const Identity& here, const Identity& the
 
 std::string text_of(Part part) { return fmt::format("{}/{}", part.index, part.count); }
 
-std::unique_ptr<PartFile> open_part(const std::string& file) {
+std::unique_ptr<PartFile> open_part(const std::string& file, bool damaged = false) {
   auto stream = std::make_unique<std::ifstream>(file, std::ios::binary);
   if (!*stream) throw InputError({file}, "cannot be read");
-  return std::make_unique<PartFile>(std::move(stream), file);
+  return std::make_unique<PartFile>(std::move(stream), file, damaged);
 }
 
 }  // namespace
@@ -222,14 +227,11 @@ void PartWriter::start(int spp) {
   for (const auto& [name, value] : identity()) text += name + ": " + value + "\n";
   if (!file_.empty() && std::filesystem::exists(file_) && std::filesystem::file_size(file_) > 0) {
     try {
-      before_ = open_part(file_);
+      before_ = open_part(file_, true);
     } catch (const InputError&) {  // another file of this name, to be written over
     }
-    if (before_ && (text_of(before_->part()) != text_of(part_) ||
-                    difference(identity(), before_->identity()))) {
-      before_ = nullptr;
-    }
   }
+  if (before_) check_before();
   if (file_.empty()) {
     out_ = std::make_unique<std::stringstream>();
   } else if (before_) {
@@ -240,6 +242,20 @@ void PartWriter::start(int spp) {
         std::make_unique<std::fstream>(file_, std::ios::binary | std::ios::trunc | std::ios::out);
   }
   if (!before_) append(npy("|u1", text.data(), text.size()));
+}
+
+void PartWriter::check_before() const {
+  const std::string held = text_of(before_->part()), asked = text_of(part_);
+  if (held != asked) {
+    throw InputError({file_}, fmt::format("holds part {}, and part {} is asked for: choose another "
+                                          "-o, or remove it",
+                                          held, asked));
+  }
+  if (const auto d = difference(identity(), before_->identity())) {
+    throw InputError({file_}, fmt::format("holds a part of another run: {} was {}, but now is {}; "
+                                          "choose another -o, or remove it",
+                                          d->name, d->there, d->here));
+  }
 }
 
 BatchStore::Task PartWriter::task(int64_t first) const {

@@ -8,6 +8,7 @@
 
 #include "limn/core/error.h"
 #include "limn/core/names.h"
+#include "limn/core/parameter.h"
 #include "limn/integrators/methods.h"
 #include "limn/integrators/parts.h"
 
@@ -37,9 +38,15 @@ void check_selection(const MethodType& method, const GradientOptions& options) {
   throw InputError("terms: the method \"" + method.name + "\" has all terms in one");
 }
 
-void identify(const MethodType& method, const GradientOptions& options, BatchStore& store) {
+void identify(const MethodType& method, const Scene& scene, const GradientOptions& options,
+              BatchStore& store) {
+  std::vector<Parameter> parameters;
+  for (const std::string& name : options.parameters) {
+    parameters.push_back(find_parameter(scene, name));
+  }
   store.identify("method", method.name);
   store.identify("parameters", join(options.parameters));
+  store.identify("velocities", fingerprint(scene, parameters));
   store.identify("terms", join(options.terms));
   store.identify("samples", !options.samples ? (options.uniform_samples ? "uniform" : "auto")
                                              : to_string(*options.samples));
@@ -92,7 +99,7 @@ GradientResult gradient(const Scene& scene, const GradientOptions& options,
                         const RunSettings& settings) {
   const MethodType& method = find_method(options.method);
   check_selection(method, options);
-  if (settings.store) identify(method, options, *settings.store);
+  if (settings.store) identify(method, scene, options, *settings.store);
   GradientResult result = method.run(method, scene, options, settings);
   result.method = method.name;
   check_shading(scene, result);

@@ -2,8 +2,10 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numeric>
 
+#include "limn/core/error.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/backward.h"
 #include "limn/integrators/gradient.h"
@@ -189,6 +191,35 @@ TEST(Backward, LossIsUnbiasedAtItsTarget) {
     EXPECT_LT(std::fabs(values.mean(0)), 4.5 * std::sqrt(values.variance(0))) << name;
     EXPECT_LT(std::fabs(values.mean(1)), 4.5 * std::sqrt(values.variance(1))) << name;
   }
+}
+
+TEST(Backward, LossImagesThatDoNotFitAreNamed) {
+  const TempFiles files;
+  const Scene scene = shadow_scene(files);
+  const Image target(scene.film.crop_width, scene.film.crop_height, 3);
+  const auto refused = [&](const Image& t, const Image& mask) -> std::string {
+    try {
+      check_loss_images(scene, t, mask, "t.exr", "m.exr");
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  Image mask = target;
+  EXPECT_EQ(refused(target, mask),
+            "m.exr: error: the mask is zero everywhere: no pixel is left for the loss");
+  for (float& v : mask.data) v = 1;
+  EXPECT_EQ(refused(target, mask), "");
+  mask.at(1, 2, 2) = 0;
+  EXPECT_EQ(refused(target, mask)
+                .find("m.exr: error: the mask's channels differ in column 1, "
+                      "row 2"),
+            0u);
+  Image holes = target;
+  holes.at(3, 0, 1) = NAN;
+  EXPECT_EQ(refused(holes, {}).find("t.exr: error: the target is not finite in column 3, row 0"),
+            0u);
+  EXPECT_EQ(refused(Image(1, 1, 3), {}).find("t.exr: error: the target has 1 x 1 pixels"), 0u);
 }
 
 // Nothing changes if all shapes and the camera move together.

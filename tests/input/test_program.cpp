@@ -227,6 +227,11 @@ TEST_F(Program, BackwardWritesWhatOthersRead) {
             0);
   EXPECT_NE(refused("backward " + scene_ + " -o " + folder).find("--adjoint or --target"),
             std::string::npos);
+  const std::string small = files_.path("small.exr");
+  write_exr(small, Image(2, 2, 3), false, {});
+  EXPECT_NE(refused("backward " + scene_ + " --target " + small + " -o " + folder)
+                .find(small + ": error: the target has 2 x 2 pixels"),
+            std::string::npos);
   EXPECT_NE(refused("backward " + scene_ + " --adjoint " + target + " --terms sky -o " + folder)
                 .find("no term \"sky\""),
             std::string::npos);
@@ -251,6 +256,7 @@ class Parts : public Program {
   // Parts 1 to 3 of a command, in another order, by other numbers of threads.
   void make_parts(const std::string& command) const {
     for (const int k : {3, 1, 2}) {
+      std::filesystem::remove(part(k));  // of another run
       // Every third as a cluster's job would.
       const std::string threads = std::to_string(1 + k % 2), index = std::to_string(k);
       const Outcome outcome =
@@ -314,6 +320,14 @@ TEST_F(Parts, OfAGradientJoinToTheBitsOfOneRun) {
   const std::string before = bytes_of(part(2)).substr(0, 2000);
   ASSERT_EQ(run(command + " --part 2/3 -o " + part(2)).status, 0);
   EXPECT_TRUE(bytes_of(part(2)).substr(0, 2000) == before);
+  // A damaged end: the batches before it stay, clocks and all.
+  const std::string whole = bytes_of(part(2));
+  std::filesystem::resize_file(part(2), whole.size() - 128);
+  std::ofstream(part(2), std::ios::binary | std::ios::app) << std::string(300, '\0');
+  EXPECT_NE(refused("merge " + all_parts() + " -o " + out()).find("is no part of a run"),
+            std::string::npos);
+  ASSERT_EQ(run(command + " --part 2/3 -o " + part(2)).status, 0);
+  EXPECT_TRUE(bytes_of(part(2)) == whole);
   expect_same(command, out(), files);
 }
 
@@ -353,21 +367,38 @@ TEST_F(Parts, ThatDoNotFitAreRefused) {
   EXPECT_NE(merged(all_parts() + " " + part(1)).find("each is needed once"), std::string::npos);
   const std::string alien = files_.path("alien.part");
   const std::string with_alien = part(1) + " " + part(2) + " " + alien;
-  ASSERT_EQ(run(command + " --seed 1 --part 3/3 -o " + alien).status, 0);
+  const auto make_alien = [&](const std::string& arguments) {
+    std::filesystem::remove(alien);
+    ASSERT_EQ(run(arguments + " -o " + alien).status, 0);
+  };
+  make_alien(command + " --seed 1 --part 3/3");
+  EXPECT_NE(refused(command + " --part 3/3 -o " + alien)
+                .find(alien + ": error: holds a part of another run: seed was 1, but now is 0"),
+            std::string::npos);
+  EXPECT_NE(refused(command + " --seed 1 --part 2/3 -o " + alien)
+                .find("holds part 3/3, and part 2/3 is asked for"),
+            std::string::npos);
   EXPECT_NE(merged(with_alien)
                 .find(alien + ": error: is a part of another run than " + part(1) +
                       ": seed is 1, there 0"),
             std::string::npos);
-  ASSERT_EQ(run(command + " -D glow=6,5,4.5 --part 3/3 -o " + alien).status, 0);
+  make_alien(command + " -D glow=6,5,4.5 --part 3/3");
   EXPECT_NE(merged(with_alien).find("another run than " + part(1) + ": scene is"),
             std::string::npos);
-  ASSERT_EQ(run(command + " --film exact --part 3/3 -o " + alien).status, 0);
+  make_alien(command + " --film exact --part 3/3");
   EXPECT_NE(merged(with_alien).find("another run than " + part(1) + ": film is exact, there rays"),
             std::string::npos);
-  ASSERT_EQ(run(command + " --part 2/2 -o " + alien).status, 0);
+  make_alien(command + " --part 2/2");
   EXPECT_NE(merged(with_alien).find("is part 2/2, but " + part(1) + " is part 1/3"),
             std::string::npos);
   EXPECT_NE(merged(part(1) + " " + scene_).find("is no part of a run"), std::string::npos);
+  const std::string bytes = bytes_of(part(1));
+  for (const std::string& place : {" -o " + part(1), " -o " + out() + " --json " + part(1)}) {
+    EXPECT_NE(refused("merge " + all_parts() + place).find("would write over a file that is read"),
+              std::string::npos)
+        << place;
+  }
+  EXPECT_TRUE(bytes_of(part(1)) == bytes);
   // The scene changes after the parts are made.
   std::ofstream(scene_, std::ios::app) << "<!-- the same scene -->\n";
   EXPECT_EQ(run("merge " + all_parts() + " --quiet -o " + out()).status, 0);
@@ -382,6 +413,26 @@ TEST_F(Parts, ThatDoNotFitAreRefused) {
   }
   EXPECT_NE(refused(command + " --part 1/3 -o " + out()).find("must end in .part"),
             std::string::npos);
+}
+
+// A field's file is not a part of the scene.
+TEST_F(Parts, OfOtherFieldsAreRefused) {
+  const std::string field = files_.write("field.txt", "1 0 0\n1 0 0\n1 0 0\n1 0 0\n");
+  const std::string name = " --wrt screen.vertex_positions:" + field;
+  for (const std::string& command :
+       {"gradient " + scene_ + " --spp 4" + name,
+        "backward " + scene_ + " --spp 4 --adjoint " + files_.path("adjoint.exr") + name}) {
+    ASSERT_EQ(run("render " + scene_ + " --spp 1 -o " + files_.path("adjoint.exr")).status, 0);
+    make_parts(command);
+    files_.write("field.txt", "1 0 0\n1 0 0\n1 0 0\n1 0 1\n");
+    EXPECT_NE(refused("merge " + all_parts() + " -o " + out()).find("velocities was"),
+              std::string::npos);
+    std::filesystem::remove(part(3));
+    ASSERT_EQ(run(command + " --part 3/3 -o " + part(3)).status, 0);
+    EXPECT_NE(refused("merge " + all_parts() + " -o " + out()).find("another run than"),
+              std::string::npos);
+    files_.write("field.txt", "1 0 0\n1 0 0\n1 0 0\n1 0 0\n");
+  }
 }
 
 TEST_F(Program, ReversePassesKeepToTheirTime) {

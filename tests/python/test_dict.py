@@ -83,6 +83,13 @@ def test_transforms_go_the_way_of_matrices():
      r"^dict\.ball\.center: error: expected a number, a word, three numbers"),
     ({"ball": 3}, r"^dict\.ball: error: expected a dictionary"),
     ({"type": "shape"}, r"^dict: error: expected \{"),
+    ({"ball": {"type": ["x"]}}, r'^dict\.ball: error: expected a word for "type", not \[\'x\'\]'),
+    ({"b$ll": {"type": "sphere"}}, r'^dict\.b\$ll: error: "\$" cannot be in the name'),
+    ({"ball": {"type": "sphere", "$r": 1}}, r'^dict\.ball\.\$r: error: "\$" cannot be'),
+    ({"ball": {"type": "sphere", "id": "$b"}}, r'^dict\.ball\.id: error: "\$" cannot be'),
+    ({"ball": {"type": "sphere", "bsdf": {"type": "ref", "id": "$c"}}},
+     r'^dict\.ball\.bsdf\.id: error: "\$" cannot be'),
+    ({3: {"type": "sphere"}}, r"^dict\.3: error: a name must be a word, not int"),
     ({"eye": {"type": "path"}}, r"^dict: error: .*there is no sensor"),
     ({"mesh": {"type": "obj", "filename": "$none.obj"}}, r"^dict\.mesh\.filename: error: .*none\.obj"),
 ])

@@ -54,6 +54,52 @@ def test_errors_and_interrupts(scene):
     before = fit.values
     with pytest.raises(KeyboardInterrupt):
         fit.step(progress=stop)
-    assert len(fit.history) <= 1
-    if not fit.history:
-        assert fit.values == before
+    assert len(fit.history) == (fit.values != before)
+
+
+def test_a_late_interrupt_leaves_the_step_in_the_history(scene):
+    target = np.zeros((scene.height, scene.width, 3))
+    fit = limn.Fit(scene, target, "clay.reflectance", spp=1)
+
+    def stop(_):
+        raise KeyboardInterrupt
+
+    for _ in range(100):  # the first one is late, unless the machine is very busy
+        before, steps = fit.values, len(fit.history)
+        with pytest.raises(KeyboardInterrupt):
+            fit.step(progress=stop)
+        assert len(fit.history) - steps == (fit.values != before)
+        if fit.history:
+            break
+    assert [record.step for record in fit.history] == [0]
+
+
+def test_a_fit_in_a_step_is_left_alone(scene):
+    target = np.zeros((scene.height, scene.width, 3))
+    fit = limn.Fit(scene, target, "clay.reflectance", spp=512)
+    for use in (fit.step, lambda: fit.values, lambda: fit.scenes):
+        told = []
+
+        def meddle(_, use=use, told=told):
+            with pytest.raises(limn.InputError, match="a step is under way"):
+                use()
+            told.append(1)
+
+        fit.step(progress=meddle)
+        assert told
+    assert [record.step for record in fit.history] == [0, 1, 2]
+
+
+@pytest.mark.parametrize("view, text", [
+    ((1, 2), r"^views\[0\]: error: expected \(scene, target\)"),
+    (3, r"^views\[0\]: error: expected \(scene, target\)"),
+    ("target", r"^views\[0\]: error: the target has 2 x 2 pixels"),
+    ("mask", r"^views\[0\]: error: the mask's channels differ in column 0, row 0"),
+])
+def test_views_that_do_not_fit_are_named(scene, view, text):
+    target = np.zeros((scene.height, scene.width, 3))
+    coloured = np.ones_like(target)
+    coloured[0, 0, 1] = 0
+    view = {"target": (scene, np.zeros((2, 2, 3))), "mask": (scene, target, coloured)}.get(view, view)
+    with pytest.raises(limn.InputError, match=text):
+        limn.Fit(scene, target, "clay.reflectance", views=[view])

@@ -135,7 +135,9 @@ class BackwardCommand final : public Command {
       return loss;
     }
     settings.seconds *= kImageShare;
-    loss = image_loss(scene, read_exr(target_), kind, settings);
+    const Image target = read_exr(target_);
+    check_loss_images(scene, target, {}, target_);
+    loss = image_loss(scene, target, kind, settings);
     if (kind == LossKind::kL1) {
       warnings_.add_all(
           {"the gradient of l1 is biased where the image's noise is not small beside "

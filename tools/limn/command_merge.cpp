@@ -1,9 +1,11 @@
 // `limn merge`: joins the parts of a run that --part has made.
 #include <algorithm>
+#include <filesystem>
 
 #include "limn/core/error.h"
 #include "limn/integrators/parts.h"
 #include "tools/limn/commands.h"
+#include "tools/limn/output_files.h"
 #include "tools/limn/run_part.h"
 
 namespace limn {
@@ -26,6 +28,10 @@ class MergeCommand final : public Command {
   int run(const std::string&) override {
     PartReader reader(parts_);
     const PartRequest request = parse_request(reader.arguments(), parts_.front());
+    // Of the outputs the commands know all but that they must not be the parts. -o may be a folder.
+    std::vector<PlannedFile> files{{"--json", json_}};
+    if (std::filesystem::is_regular_file(output_)) files.push_back({"-o", output_});
+    check_outputs(files, Scene(), parts_);
     for (const CommandMaker make : kCommands) {
       const auto command = make();
       if (command->name() != request.command || !command->join(reader)) continue;

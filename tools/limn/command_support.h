@@ -44,9 +44,9 @@ void add_parameter_options(CLI::App& app, std::vector<std::string>& parameters, 
 void add_term_options(CLI::App& app, std::string& terms, std::string& samples);
 // --aux and --kappa
 void add_warp_options(CLI::App& app, WarpOptions& warp);
-// --debug-sample
-// "rays" or "exact".
+// --film: "rays" or "exact"
 void add_film_option(CLI::App& app, std::string& film);
+// --debug-sample
 void add_debug_option(CLI::App& app, std::string& place);
 
 // The EXR's header says what made it.

@@ -13,6 +13,12 @@ namespace {
 struct FitHandle {
   Fit fit;
   std::vector<FitRecord> history;
+  bool busy = false;  // with a step, which lets others have the GIL; used with the GIL held
+
+  // InputError during a step.
+  void check_idle() const {
+    if (busy) throw InputError("a step is under way: wait for its end");
+  }
 };
 
 FitView to_view(const SceneHandle& scene, nb::handle target, nb::handle mask) {
@@ -25,26 +31,40 @@ std::vector<FitView> to_views(const SceneHandle& scene, nb::handle target, nb::h
                               const nb::sequence& more) {
   std::vector<FitView> views{to_view(scene, target, mask)};
   for (nb::handle item : more) {
-    const nb::tuple view = nb::tuple(item);
-    if (view.size() < 2 || view.size() > 3) {
-      throw InputError("views: each is (scene, target) or (scene, target, mask)");
+    const std::string place = fmt::format("views[{}]", views.size() - 1);
+    const nb::tuple view = nb::isinstance<nb::sequence>(item) ? nb::tuple(item) : nb::tuple();
+    if (view.size() < 2 || view.size() > 3 || !nb::isinstance<SceneHandle>(view[0])) {
+      throw InputError({place}, "expected (scene, target) or (scene, target, mask)");
     }
     views.push_back(to_view(nb::cast<const SceneHandle&>(view[0]), view[1],
                             view.size() == 3 ? nb::object(view[2]) : nb::none()));
+    const FitView& made = views.back();
+    check_loss_images(made.scene, made.target, made.mask, place, place);
   }
   return views;
 }
 
-// One step on a thread of its own; Ctrl-C leaves what was done.
+// One step on a thread of its own; Ctrl-C leaves what was done: if it came too late, the step.
 FitRecord step(FitHandle& handle, const nb::object& progress) {
+  handle.check_idle();
+  handle.busy = true;
   std::optional<FitRecord> record;
-  run_job({}, progress, [&](const RunSettings& settings) {
-    handle.fit.listen(settings.progress, settings.interrupted);
-    record = handle.fit.step();
-  });
-  handle.fit.listen(nullptr, nullptr);
-  handle.history.push_back(record.value());
-  return *record;
+  const auto end = [&] {
+    handle.fit.listen(nullptr, nullptr);
+    if (record) handle.history.push_back(*record);
+    handle.busy = false;
+  };
+  try {
+    run_job({}, progress, [&](const RunSettings& settings) {
+      handle.fit.listen(settings.progress, settings.interrupted);
+      record = handle.fit.step();
+    });
+  } catch (...) {
+    end();
+    throw;
+  }
+  end();
+  return record.value();
 }
 
 void run(FitHandle& handle, int steps, const nb::object& callback) {
@@ -100,7 +120,7 @@ void bind_fit(nb::module_& m) {
             const RunSettings settings = make_settings(scene.get(), {spp, seed, 0, threads});
             Fit fit(to_views(scene, target, mask, views), options, settings);
             warn_all(fit.warnings());
-            new (self) FitHandle{std::move(fit), {}};
+            new (self) FitHandle{std::move(fit), {}, false};
           },
           nb::arg("scene"), nb::arg("target"), nb::arg("names"), nb::arg("mask") = nb::none(),
           nb::arg("views") = nb::make_tuple(), nb::arg("loss") = "l2",
@@ -131,7 +151,8 @@ void bind_fit(nb::module_& m) {
       .def("step", &step, nb::arg("progress") = nb::none(),
            nb::sig("def step(self, progress: collections.abc.Callable[[float], object] | None = "
                    "None) -> FitRecord"),
-           "One step; Ctrl-C leaves the fit as it was before.")
+           "One step; Ctrl-C leaves the fit as it was before, or in a step's last moments as it is "
+           "after it, with the step in `history`. Meanwhile other threads may not use the fit.")
       .def("run", &run, nb::arg("steps"), nb::arg("callback") = nb::none(),
            nb::sig("def run(self, steps: int, callback: collections.abc.Callable[[FitRecord], "
                    "object] | None = None) -> None"),
@@ -140,6 +161,7 @@ void bind_fit(nb::module_& m) {
       .def_prop_ro(
           "scenes",
           [](const FitHandle& h) {
+            h.check_idle();
             nb::list scenes;
             for (const FitView& view : h.fit.views()) {
               scenes.append(nb::cast(SceneHandle(deep_copy(view.scene))));
@@ -151,6 +173,7 @@ void bind_fit(nb::module_& m) {
       .def_prop_ro(
           "values",
           [](const FitHandle& h) {
+            h.check_idle();
             nb::dict values;
             for (const FitScalar& s : h.fit.scalars()) values[nb::cast(s.name)] = s.value;
             return values;

@@ -107,14 +107,16 @@ struct LossResult {
 // and the adjoint 2 w ((I + I') / 2 - T) / N has the mean of dLoss/dI; backward() with
 // settings.seed itself is independent of both, so that the product of both is unbiased. target:
 // crop_height by crop_width, of three channels or one. mask: what the pixels weigh in the mean, of
-// the same size with one channel, or three of which the first counts; without pixels: all alike.
+// the same size with one channel, or three that are alike; without pixels: all alike.
 // InputError as check_loss_images().
 LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
                       const RunSettings& settings, const Image& mask = {});
 
 // InputError for a target or a mask of another size than the film, for a target that is not finite
 // where the mask is not zero, and for a mask with values that are negative or not finite, or all
-// zero.
-void check_loss_images(const Scene& scene, const Image& target, const Image& mask);
+// zero, or with channels that differ. target_place, mask_place: where they are from (a file, say),
+// which the message begins with.
+void check_loss_images(const Scene& scene, const Image& target, const Image& mask,
+                       const std::string& target_place = "", const std::string& mask_place = "");
 
 }  // namespace limn

@@ -20,6 +20,8 @@
 
 namespace limn {
 
+struct Parameter;
+
 // Part `index` of parts 1 to `count`: the batches whose first sample is in the index-th share of
 // all samples.
 struct Part {
@@ -63,7 +65,8 @@ class BatchStore {
 class PartFile;
 
 // Makes a part. Batches that the file holds already, of the same part of the same run, are not made
-// again; so an interrupted part goes on where it stopped. InputError if the file cannot be written.
+// again; so an interrupted part goes on where it stopped, and a damaged one before the damage.
+// InputError if the file cannot be written, or holds another part or one of another run.
 class PartWriter final : public BatchStore {
  public:
   // arguments: what was asked for, one line, for who joins the parts. file "": in memory.
@@ -85,6 +88,7 @@ class PartWriter final : public BatchStore {
   std::string bytes() const;
 
  private:
+  void check_before() const;
   void append(const std::string& bytes);
 
   Part part_;
@@ -125,6 +129,9 @@ class PartReader final : public BatchStore {
 // materials, lights, camera, film; of an environment's texels what 4096 directions see. Sixteen hex
 // digits.
 std::string fingerprint(const Scene& scene);
+// The same of how parameters move vertices, which names do not tell of fields; arrays count for
+// nothing.
+std::string fingerprint(const Scene& scene, const std::vector<Parameter>& parameters);
 // The same of numbers, bit by bit.
 std::string fingerprint(const std::vector<double>& numbers);
 

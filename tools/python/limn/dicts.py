@@ -80,6 +80,15 @@ class Transform:
         return self._then("lookat", origin=_three(origin), target=_three(target), up=_three(up))
 
 
+def _checked(place: str, name: Any) -> str:
+    """A name, which must not hold what stands for a scene's parameter."""
+    if not isinstance(name, str):
+        raise InputError(f"{place}: error: a name must be a word, not {type(name).__name__}")
+    if "$" in name:
+        raise InputError(f'{place}: error: "$" cannot be in the name "{name}"')
+    return name
+
+
 class _Writer:
     """XML with one element a line, and for each line what it came from."""
 
@@ -97,8 +106,10 @@ class _Writer:
 
     def object(self, place: str, name: str, what: Mapping[str, Any]) -> None:
         kind = what.get("type")
+        if not isinstance(kind, str):
+            raise InputError(f'{place}: error: expected a word for "type", not {kind!r}')
         if kind == "ref":
-            self.element(place, "ref", id=str(what.get("id", "")))
+            self.element(place, "ref", id=_checked(f"{place}.id", what.get("id", "")))
             return
         if kind in ("rgb", "spectrum"):
             self.element(place, kind, name=name, value=_three(what.get("value", ())))
@@ -107,13 +118,14 @@ class _Writer:
             known = ", ".join(sorted([*_TAGS, "ref", "rgb"]))
             raise InputError(f'{place}: error: unknown type "{kind}" (known: {known})')
         tag = _TAGS[kind]
-        attributes = {"type": str(kind)}
+        attributes = {"type": kind}
         if tag in _NAMED:
-            attributes["id"] = str(what.get("id", place.removeprefix("dict.")))
+            own = what.get("id", place.removeprefix("dict."))
+            attributes["id"] = _checked(f"{place}.id", own)
         self.element(place, tag, "", **attributes)
         for key, value in what.items():
             if key not in ("type", "id"):
-                self.value(f"{place}.{key}", key, value)
+                self.value(f"{place}.{key}", _checked(f"{place}.{key}", key), value)
         self.line(place, f"</{tag}>")
 
     def value(self, place: str, name: str, value: Any) -> None:
@@ -169,7 +181,7 @@ def load_dict(scene: Mapping[str, Any], folder: str = "") -> Scene:
             continue
         if not isinstance(value, Mapping):
             raise InputError(f"dict.{name}: error: expected a dictionary with a type")
-        writer.object(f"dict.{name}", name, value)
+        writer.object(f"dict.{name}", _checked(f"dict.{name}", name), value)
     writer.line("dict", "</scene>")
 
     def placed(text: str) -> str:
