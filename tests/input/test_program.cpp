@@ -128,6 +128,10 @@ TEST_F(Program, FitsAndGoesOn) {
   EXPECT_NE(refused(good + " --optimiser sgd").find("known: adam-uniform, adam"),
             std::string::npos);
   EXPECT_NE(refused(good + " --terms sky").find("no term \"sky\" here"), std::string::npos);
+  const std::string small = files_.path("small.exr");
+  write_exr(small, Image(2, 2, 3), false, {});
+  EXPECT_NE(refused(good + " --mask " + small).find(small + ": error: the mask has 2 x 2 pixels"),
+            std::string::npos);
   const std::string flat = files_.write("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
   EXPECT_NE(refused(good + " --truth " + flat).find("flat.obj: error: has no face with an area"),
             std::string::npos);

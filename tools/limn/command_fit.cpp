@@ -9,6 +9,7 @@
 
 #include "limn/core/error.h"
 #include "limn/core/names.h"
+#include "limn/integrators/backward.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
 #include "tools/limn/fit_folder.h"
@@ -206,6 +207,7 @@ std::vector<FitView> FitCommand::read_views(const FitArguments& arguments) {
     common.shading = arguments.shading;
     FitView read{load_scene(common, warnings_), read_exr(view.target), {}};
     if (!view.mask.empty()) read.mask = read_exr(view.mask);
+    check_loss_images(read.scene, read.target, read.mask, view.target, view.mask);
     views.push_back(std::move(read));
   }
   return views;
