@@ -7,6 +7,8 @@
 
 namespace limn {
 
+// A component of x0 may be off by its own rounding, one of a by that of the corner, one of `across`
+// by three roundings of |a|.
 FaceSide side_of_face(const Scene& scene, FaceRef face, const Vec3d& x0, const Vec3d& along) {
   FaceSide side{face, {}};
   double best_length = 0;
@@ -17,13 +19,15 @@ FaceSide side_of_face(const Scene& scene, FaceRef face, const Vec3d& x0, const V
     if (across_length > best_length) {
       best_length = across_length;
       side.into = across / across_length;
+      side.rounding = 0x1.0p-50 * (length(x0) + length(a)) / across_length;
     }
   }
   return side;
 }
 
 bool overlap(const RayTracer& tracer, const FaceSide& a, const FaceSide& b) {
-  return dot(a.into, b.into) > 0 && tracer.overlap(a.face, b.face);
+  return length(a.into - b.into) <= a.rounding + b.rounding ||
+         (dot(a.into, b.into) > 0 && tracer.overlap(a.face, b.face));
 }
 
 void RimOrder::add(uint8_t rim, bool positive, double slope) {

@@ -12,10 +12,11 @@
 namespace limn {
 
 // One side of a face beside an edge: the face, and the unit vector across the edge that lies in it
-// and points into it.
+// and points into it, with a bound of its rounding.
 struct FaceSide {
   FaceRef face;
   Vec3d into;
+  double rounding = 0;
 };
 
 // A path that starts exactly on an edge, on one of the faces around it. Its first rays never meet
@@ -31,8 +32,9 @@ struct EdgeStart {
 // the two sides; the other is its opposite.
 FaceSide side_of_face(const Scene& scene, FaceRef face, const Vec3d& x0, const Vec3d& along);
 
-// Whether two sides lie in one place. Which of them is seen is_met_first says
-// (limn/core/face_copies.h), as for all rays.
+// Whether two sides lie in one place: those of faces that the tracer knows to overlap, and those
+// that double precision cannot tell apart (faces in one plane, with less in common than rounding
+// explains). Which of them is seen is_met_first says (limn/core/face_copies.h), as for all rays.
 bool overlap(const RayTracer& tracer, const FaceSide& a, const FaceSide& b);
 
 // Calls visit(side, incidence) for every side of the faces around an edge.
@@ -44,7 +46,7 @@ void for_every_side(const Scene& scene, const FacesAround& around, const Vec3d& 
     const Incidence incidence = around.incidence(i);
     const FaceSide side = side_of_face(scene, face, x0, along);
     visit(side, incidence);
-    if (incidence.through) visit(FaceSide{face, -side.into}, incidence);
+    if (incidence.through) visit(FaceSide{face, -side.into, side.rounding}, incidence);
   }
 }
 
