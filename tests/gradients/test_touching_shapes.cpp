@@ -190,6 +190,26 @@ TEST(TouchingShapes, SlidingBox) {
   expect_equal(box(0), box(2e-5), "box.translate.x");
 }
 
+// Two boxes of one plan, one of which sinks into the other by less than its faces have to have in
+// common to overlap: what is seen is one box.
+TEST(TouchingShapes, BoxThatSinksByAMillionth) {
+  const auto box = [](float low, float high) {
+    const Vec3f plan[] = {
+        {0.75f, 0, 0.25f}, {0.25f, 0, -0.75f}, {-0.75f, 0, -0.25f}, {-0.25f, 0, 0.75f}};
+    const Vec3f up{0, high - low, 0}, base{0, low, 0};
+    std::vector<Quad> quads = {{plan[0] + base + up, plan[1] - plan[0], plan[3] - plan[0]},
+                               {plan[0] + base, plan[3] - plan[0], plan[1] - plan[0]}};
+    for (int k = 0; k < 4; ++k) quads.push_back({plan[k] + base, plan[(k + 1) % 4] - plan[k], up});
+    return quads;
+  };
+  Stage two, one;
+  for (Stage* stage : {&two, &one}) stage->add("floor", {kFloor}, "white");
+  two.add("lower", box(0.25f, 0.625f), "clay");
+  two.add("upper", box(0.624999f, 1), "clay");
+  one.add("whole", box(0.25f, 1), "clay");
+  expect_equal(two.scene(), one.scene(), "sensor.translate.x");
+}
+
 // A sphere whose seam and poles are copies that differ by a rounding.
 TEST(TouchingShapes, SeamOfASphere) {
   const auto sphere = [](const TempFiles& files, bool rounded) {
