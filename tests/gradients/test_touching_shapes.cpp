@@ -190,9 +190,9 @@ TEST(TouchingShapes, SlidingBox) {
   expect_equal(box(0), box(2e-5), "box.translate.x");
 }
 
-// Two boxes of one plan, one of which sinks into the other by less than its faces have to have in
-// common to overlap: what is seen is one box.
-TEST(TouchingShapes, BoxThatSinksByAMillionth) {
+// Boxes of one plan, each of which sinks into the one below by less than faces have to have in common
+// to overlap: what is seen is one box.
+TEST(TouchingShapes, BoxesThatSinkByAMillionth) {
   const auto box = [](float low, float high) {
     const Vec3f plan[] = {
         {0.75f, 0, 0.25f}, {0.25f, 0, -0.75f}, {-0.75f, 0, -0.25f}, {-0.25f, 0, 0.75f}};
@@ -202,12 +202,15 @@ TEST(TouchingShapes, BoxThatSinksByAMillionth) {
     for (int k = 0; k < 4; ++k) quads.push_back({plan[k] + base, plan[(k + 1) % 4] - plan[k], up});
     return quads;
   };
-  Stage two, one;
-  for (Stage* stage : {&two, &one}) stage->add("floor", {kFloor}, "white");
-  two.add("lower", box(0.25f, 0.625f), "clay");
-  two.add("upper", box(0.624999f, 1), "clay");
-  one.add("whole", box(0.25f, 1), "clay");
-  expect_equal(two.scene(), one.scene(), "sensor.translate.x");
+  constexpr int kBoxes = 16;
+  Stage apart, whole;
+  for (Stage* stage : {&apart, &whole}) stage->add("floor", {kFloor}, "white");
+  for (int k = 0; k < kBoxes; ++k) {
+    const float low = 0.25f + static_cast<float>(k) / kBoxes;
+    apart.add(fmt::format("box{}", k), box(low - 1e-6f, low + 1.0f / kBoxes), "clay");
+  }
+  whole.add("box", box(0.25f, 1.25f), "clay");
+  expect_equal(apart.scene(), whole.scene(), "sensor.translate.x");
 }
 
 // A sphere whose seam and poles are copies that differ by a rounding.
