@@ -87,12 +87,7 @@ RTCRay to_embree(const Ray& ray, const Vec3d& origin) {
 // between half of this and twice this lose nothing when it is subtracted (Sterbenz 1974), and the
 // origins of rays are no longer rounded to steps as coarse as the positions'.
 Vec3d origin_of(const Scene& scene) {
-  Bounds bounds;
-  for (const Shape& shape : scene.shapes) {
-    const Bounds b = bounds_of(shape.mesh);
-    bounds.extend(b.lower);
-    bounds.extend(b.upper);
-  }
+  const Bounds bounds = bounds_of(scene);
   Vec3d origin;
   if (scene.shapes.empty()) return origin;
   const Vec3d center = bounds.center();

@@ -10,6 +10,7 @@
 
 #include "limn/integrators/methods.h"
 #include "limn/integrators/statistics.h"
+#include "support/test_names.h"
 
 namespace limn {
 namespace {
@@ -142,13 +143,6 @@ std::vector<std::string> all_files() {
   std::vector<std::string> files;
   for (const json& reference : read_references()) files.push_back(reference["file"]);
   return files;
-}
-
-std::string test_name(std::string text) {
-  for (char& c : text) {
-    if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
-  }
-  return text;
 }
 
 INSTANTIATE_TEST_SUITE_P(
