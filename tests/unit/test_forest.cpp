@@ -38,8 +38,7 @@ TEST_P(Forests, ListWhatTheExactTestLists) {
   const std::vector<NamedMesh> meshes = meshes_of_all_kinds(rng);
   for (const auto& [name, mesh] : meshes) {
     for (int i = 0; i < 6; ++i) {
-      const double scale = random_scale(rng);
-      const EdgeSamplerInput input = placed_twice(mesh, i, scale, rng);
+      const auto [input, scale] = placed_twice(mesh, i, rng);
       const auto forest = EdgeForest::build(input, 1, GetParam());
       for (int k = 0; k < 60; ++k)
         expect_complete(input, *forest, random_point(input.objects[k % 2], scale, rng), name);

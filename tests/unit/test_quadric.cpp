@@ -251,8 +251,7 @@ uint64_t expect_no_edge_lost(uint64_t seed, int points) {
   uint64_t pairs = 0;
   for (const auto& [name, mesh] : meshes_of_all_kinds(rng)) {
     for (int i = 0; i < 6; ++i) {
-      const double scale = random_scale(rng);
-      const EdgeSamplerInput input = placed_twice(mesh, i, scale, rng);
+      const auto [input, scale] = placed_twice(mesh, i, rng);
       const QuadricForest forest =
           build_quadric_forest(input, 1, QuadricConfig{.cull_concave = i % 2 == 0});
       for (int k = 0; k < points; ++k)
