@@ -13,10 +13,9 @@ constexpr int kCandidates = 192;  // of which this many are tried for centers
 constexpr size_t kMostPatches = 4;
 constexpr int kMostTries = 8;
 constexpr double kWidest = 8 * kPi / 180;  // of a patch [rad]
-constexpr double kRing = 1.2;              // of a ring's inner radius: its outer one
-constexpr double kRim = 0.25;          // brightness of a ring that belongs to a cap, over the cap's
-constexpr double kMargin = 1.1;        // of the angle found
-constexpr double kLeastShare = 0.01;   // of the environment's light
+constexpr double kRing = 1.1;              // of a ring's inner radius: its outer one
+constexpr double kRim = 1.0 / 16;     // brightness of a ring that belongs to a cap, over its core's
+constexpr double kLeastShare = 0.01;  // of the environment's light
 constexpr double kLeastContrast = 16;  // over the environment's mean
 constexpr double kLeastSquare = 2;     // over that of a uniform environment of the same light
 
@@ -83,16 +82,18 @@ Cap cap_around(const std::vector<Drawn>& drawn, const Vec3d& axis, double least_
   return best;
 }
 
-// Wider by rings as long as these are bright, too: a hazy sun has a soft rim.
+// Wider by rings as long as these are bright, too: the rim of a sun is soft, by haze or by the map's
+// texels.
 Cap with_rim(const std::vector<Drawn>& drawn, const Vec3d& axis, Cap cap) {
-  while (cap.angle > 0 && cap.angle * kRing <= kWidest) {
+  const double core = cap.flux / solid_angle(cap.angle);
+  while (cap.angle * kRing <= kWidest) {
     const double wider = cap.angle * kRing;
     double flux = 0;
     for (const Drawn& d : drawn) {
-      if (angle_between(d.w, axis) < wider) flux += d.flux;
+      if (angle_between(d.w, axis) <= wider) flux += d.flux;
     }
-    const double area = solid_angle(cap.angle), ring = solid_angle(wider) - area;
-    if ((flux - cap.flux) / ring < kRim * cap.flux / area) break;
+    const double ring = solid_angle(wider) - solid_angle(cap.angle);
+    if (flux - cap.flux < kRim * core * ring) break;
     cap.angle = wider;
     cap.flux = flux;
   }
@@ -138,16 +139,17 @@ std::vector<BrightPatch> find_bright_patches(const Environment& environment) {
   const double uniform = total / (4 * kPi);
   for (int i = 0; i < kMostTries && patches.size() < kMostPatches && !drawn.empty(); ++i) {
     const Vec3d axis = brightest_axis(drawn, kLeastShare * total);
-    const Cap best = with_rim(drawn, axis, cap_around(drawn, axis, kLeastShare * total));
-    const double angle = std::min(kMargin * best.angle, kWidest);
-    const double mean = best.flux / solid_angle(angle);
-    if (!(best.square >= kLeastSquare * uniform * total) || mean < kLeastContrast * uniform) break;
-    const DirectionCap cap{axis, std::sin(angle), std::cos(angle)};
+    const Cap core = cap_around(drawn, axis, kLeastShare * total);
+    if (!(core.square >= kLeastSquare * uniform * total)) break;
+    if (core.flux < kLeastContrast * uniform * solid_angle(core.angle)) break;
+    const Cap whole = with_rim(drawn, axis, core);
+    const DirectionCap cap{axis, std::sin(whole.angle), std::cos(whole.angle)};
     const auto apart = [&](const BrightPatch& other) {
-      return angle_between(axis, other.cap.axis) > angle + std::asin(other.cap.sine);
+      return angle_between(axis, other.cap.axis) > whole.angle + std::asin(other.cap.sine);
     };
     // What is left around a patch is none, but hides others.
-    if (std::all_of(patches.begin(), patches.end(), apart)) patches.push_back({cap, mean});
+    if (std::all_of(patches.begin(), patches.end(), apart))
+      patches.push_back({cap, whole.flux / solid_angle(whole.angle)});
     std::erase_if(drawn, [&](const Drawn& d) { return cap.holds(d.w); });
   }
   return patches;
