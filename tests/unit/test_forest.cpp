@@ -165,10 +165,13 @@ ForestConfig without(bool ForestConfig::*option) {
   config.*option = false;
   return config;
 }
-INSTANTIATE_TEST_SUITE_P(Variants, Forests,
-                         testing::Values(ForestConfig{}, without(&ForestConfig::principal_axes),
-                                         without(&ForestConfig::cull_concave),
-                                         ForestConfig{.width = 2}));
+INSTANTIATE_TEST_SUITE_P(
+    Variants, Forests,
+    testing::Values(ForestConfig{}, without(&ForestConfig::principal_axes),
+                    without(&ForestConfig::cull_concave), ForestConfig{.width = 2},
+                    ForestConfig{.quadrics = ForestConfig::Quadrics::kAll, .quadrics_from = 1},
+                    ForestConfig{.quadrics = ForestConfig::Quadrics::kWherePaid,
+                                 .quadrics_from = 8}));
 
 TEST(Forest, DoesNotDependOnThreads) {
   Rng rng(22, 0, 0);
@@ -216,6 +219,7 @@ TEST(Forest, CorruptedCopiesAreFound) {
        [](Forest& f) { f.head(f.inner[0].child[1]).object = ShapeId(1); }},
       {"a height is not its children's", [](Forest& f) { ++f.inner[0].head.height; }},
       {"a node of edges is not at height 0", [](Forest& f) { f.edges[0].head.height = 1; }},
+      {"a pair of quadrics is out of range", [](Forest& f) { f.inner[0].pairs = 0; }},
       {"a speed is negative", [](Forest& f) { f.inner[0].speed[0] = -1; }},
       {"a cover is negative", [](Forest& f) { f.inner[0].cover[2][0] = -1; }},
       {"a child's box is empty", [](Forest& f) { f.inner[0].high[0] = 0; }},
