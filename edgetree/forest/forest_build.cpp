@@ -262,10 +262,10 @@ float rejected_share(InnerNode node, std::span<const ForestPoint> points,
   return without > 0 ? 1 - with / without : 0;
 }
 
-// A draw that a pair turns away from a dead end is worth a draw, and a pair costs its test whenever
-// its node is drawn. Both in nanoseconds, as edge_benchmark has them: no clock may decide here, or
-// the same seed would not give the same bits.
-constexpr float kPairTime = 100, kDrawTime = 800;
+// A draw that a pair turns away from a dead end is worth the time of a sample, of which a draw is
+// two fifths, and a pair costs its test whenever its node is looked at. Both in nanoseconds, about
+// as edge_benchmark has them: no clock may decide here, or one seed would not give the same bits.
+constexpr float kPairTime = 100, kSampleTime = 2000;
 
 void keep_what_pays(std::span<const NodeId> ids, const NodeFrame& tree, const ForestConfig& config,
                     int threads, Forest& forest) {
@@ -274,7 +274,7 @@ void keep_what_pays(std::span<const NodeId> ids, const NodeFrame& tree, const Fo
   parallel_for(ids.size(), threads, [&](size_t i) {
     if (ids[i] < 0 || forest.inner[ids[i]].pairs == kNoPairs) return;
     const float share = rejected_share(forest.inner[ids[i]], points, config);
-    pays[i] = share * kDrawTime > kPairTime;
+    pays[i] = share * kSampleTime > kPairTime;
   });
   // What is kept closes up: places only fall.
   auto kept = static_cast<uint32_t>(forest.pairs.size());
