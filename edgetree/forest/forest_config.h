@@ -23,6 +23,13 @@ struct ForestConfig {
   // nodes read.
   static constexpr int kNoHeight = -1, kEdgesOnly = 0, kAnyHeight = 255;
   int look_ahead = 2;
+  // Inner nodes have a pair of bounding quadrics beside their dual boxes, of all children that hold
+  // `quadrics_from` to kMostQuadricEdges edges: nowhere, where it pays, or everywhere. More edges
+  // are nearly never rejected, and fewer leave a box too little.
+  enum class Quadrics : uint8_t { kNone, kWherePaid, kAll };
+  static constexpr uint32_t kMostQuadricEdges = 8192;
+  Quadrics quadrics = Quadrics::kNone;
+  uint32_t quadrics_from = 32;
   // Concave smooth edges of closed one-sided meshes are left out.
   bool cull_concave = true;
 };

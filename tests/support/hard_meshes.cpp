@@ -54,6 +54,7 @@ PlacedMeshes placed_twice(const Mesh& mesh, int i, Rng& rng) {
 double random_scale(Rng& rng) { return std::exp(std::log(1e-3) + std::log(1e7) * rng.uniform()); }
 
 Vec3d random_point(const EdgeMesh& mesh, double scale, Rng& rng) {
+  // Far away, rounding leaves some meshes no edge.
   if (mesh.edges.empty()) return random_direction(rng) * scale;
   const Edge& edge = mesh.edges[static_cast<size_t>(rng.uniform() * mesh.edges.size())];
   const Vec3d a = mesh.position(edge.vertices[0]), b = mesh.position(edge.vertices[1]);

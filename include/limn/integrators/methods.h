@@ -31,6 +31,9 @@ struct MethodType {
 // The first is the default.
 const std::vector<MethodType>& method_types();
 
+// InputError if the options are not the defaults and none of the methods, by name, takes them.
+void check_warp(const WarpOptions& warp, const std::vector<std::string>& methods);
+
 // The default for ""; InputError that lists the known names if there is none of this name.
 const MethodType& find_method(const std::string& name);
 
