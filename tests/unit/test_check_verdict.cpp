@@ -4,7 +4,10 @@
 
 #include <cstdlib>
 
+#include "integrators/compare/check_scores.h"
+#include "limn/core/rng.h"
 #include "support/planted.h"
+#include "support/running_mean.h"
 
 namespace limn {
 namespace {
@@ -33,6 +36,30 @@ double visible(const CheckResult& r, const std::string& term) {
     if (power.term == term) return power.visible;
   }
   return 0;
+}
+
+// Events of size 3 in one sample of `every` lie in one place of four: their size is what the
+// variance says, however many samples a batch has.
+TEST(EventSizes, DoNotGrowWithTheBatches) {
+  for (const int every : {2, 500}) {
+    const double rate = 1.0 / every, size = 3 * (1 - rate);
+    Rng rng(7, every, 0);
+    RunningMean means;
+    for (int run = 0; run < 40; ++run) {
+      std::vector<Moments::Batch> batches;
+      for (int64_t done = 0; done < 16384;) {
+        const int64_t samples = 1 + done / 32;
+        double sum = 0;
+        for (int64_t s = 0; s < samples; ++s) sum += rng.uniform() < rate ? 3 : 0;
+        batches.push_back({{sum, 0, 0, 0}, samples});
+        done += samples;
+      }
+      const EventSizes events = event_sizes(batches);
+      means.add(events.mean);
+      EXPECT_GE(events.large, 0.5 * size);
+    }
+    EXPECT_LT(std::fabs(means.z_score(size)), 4) << every;
+  }
 }
 
 TEST(CheckVerdict, FewSamplesCannotTell) {
