@@ -254,7 +254,7 @@ bool ClosedLight::list(const LampPlane& lamp, const Receiver& receiver, Scratch&
   };
   std::stable_sort(order.begin(), order.end(),
                    [&](uint32_t i, uint32_t j) { return extent(i) > extent(j); });
-  scratch.regions.reset(window);
+  scratch.regions.reset(window, getenv("GRID") ? order.size() * atof(getenv("GRID")) : 0);
   const auto insert = [&](SeenFace& face, double inverse_depth) {
     face.inverse_depth = {0, 0, inverse_depth};
     face.nearest = inverse_depth;
@@ -291,11 +291,12 @@ class ClosedLight::View {
     std::vector<Vec3d> units;
     scratch_.regions.for_each_below(
         static_cast<uint32_t>(scratch_.lamp_faces),
-        [&](std::span<const PlanePoint> corners, std::span<const VisibleRegions::Side> sides) {
+        [&](uint32_t shown, std::span<const PlanePoint> corners,
+            std::span<const VisibleRegions::Side> sides) {
           polygon.resize(sides.size());
           units.resize(sides.size());
           for (size_t i = 0; i < sides.size(); ++i) {
-            polygon[i].normal = normal_of(sides[i]);
+            polygon[i].normal = normal_of(sides[i], shown);
             units[i] = normalize(value(polygon[i].normal));
           }
           for (size_t i = 0; i < sides.size(); ++i) {
@@ -319,8 +320,9 @@ class ClosedLight::View {
     return dot(here, there) > kAway ? here : there;
   }
 
-  // Of the plane through p and a side, positive inside.
-  Vec3<S> normal_of(const VisibleRegions::Side& side) const {
+  // Of the plane through p and a side of a region that shows the lamp's face `shown`, positive
+  // inside.
+  Vec3<S> normal_of(const VisibleRegions::Side& side, uint32_t shown) const {
     const PlaneFunction& f = side.line;
     const Vec3d rounded = lamp_.u * f.a + lamp_.v * f.b - lamp_.plane.n * f.c;
     Vec3<S> n;
@@ -328,13 +330,13 @@ class ClosedLight::View {
       const auto x = corners_of(scratch_.faces[side.label]);
       n = cross(x[side.side] - p_, x[(side.side + 1) % 3] - p_);
     } else if (side.cut >= 0) {
-      n = normal_of_cut(side);
+      n = normal_of_cut(side, shown);
     }
     const Vec3d still = value(n);
     if (still == Vec3d{}) return {S(rounded.x), S(rounded.y), S(rounded.z)};
     return dot(still, rounded) < 0 ? -n : n;
   }
-  Vec3<S> normal_of_cut(const VisibleRegions::Side& side) const {
+  Vec3<S> normal_of_cut(const VisibleRegions::Side& side, uint32_t shown) const {
     const SeenFace& face = scratch_.seen[side.label];
     if (side.label < scratch_.lamp_faces) {
       const Vec3d& n = side.cut == 0 ? receiver_.up : *receiver_.wedge;
@@ -343,7 +345,7 @@ class ClosedLight::View {
     if (!face.whole && side.cut == 0) return {};  // just before p
     // Where the face goes through the lamp's plane: of all planes through their common line that
     // through p.
-    const auto x = corners_of(scratch_.faces[side.label]), y = corners_of(lamp_.faces[0]);
+    const auto x = corners_of(scratch_.faces[side.label]), y = corners_of(scratch_.faces[shown]);
     const Vec3<S> n = cross(x[1] - x[0], x[2] - x[0]), m = cross(y[1] - y[0], y[2] - y[0]);
     return n * dot(m, p_ - y[0]) - m * dot(n, p_ - x[0]);
   }

@@ -150,7 +150,7 @@ class VisibleRegions::Tree {
         sides.push_back(of_line[corner.side.line()]);
         sides.back().line = grid_.to_plane(corner.side.in(lines_));
       }
-      visit(corners, sides);
+      visit(faces_[node.face].label, corners, sides);
     }
   }
 

@@ -17,7 +17,7 @@ class RenderCommand final : public Command {
     add_common_options(app, common_);
     app.add_option("-o,--output", output_, "Image to write (.exr; a .png is put beside it)")
         ->required();
-    app.add_option("--method", options_.method, "How: " + join(names_of(render_methods())))
+    app.add_option("--method", options_.method, "How: " + limn::join(names_of(render_methods())))
         ->capture_default_str();
     add_film_option(app, film_);
     add_debug_option(app, debug_);

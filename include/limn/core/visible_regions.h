@@ -120,7 +120,8 @@ class VisibleRegions {
   };
   // The same for regions that show a label less than `labels`, with their sides: side i begins at
   // corner i.
-  using SideVisitor = std::function<void(std::span<const PlanePoint>, std::span<const Side>)>;
+  using SideVisitor =
+      std::function<void(uint32_t, std::span<const PlanePoint>, std::span<const Side>)>;
   void for_each_below(uint32_t labels, const SideVisitor& visit) const;
 
  private:
