@@ -10,11 +10,12 @@
 namespace limn {
 
 RadianceEstimator::RadianceEstimator(const Scene& scene, int threads,
-                                     std::shared_ptr<const FilmRegions> visible)
+                                     std::shared_ptr<const FilmRegions> visible, bool closed)
     : scene_(scene),
       tracer_(make_embree_tracer(scene_, threads)),
       lights_(scene_),
-      context_{scene_, *tracer_, lights_},
+      closed_(closed ? std::make_unique<ClosedLight>(scene_, threads) : nullptr),
+      context_{scene_, *tracer_, lights_, closed_.get()},
       camera_(scene_.camera),
       visible_(std::move(visible)) {}
 

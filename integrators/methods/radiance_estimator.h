@@ -10,9 +10,10 @@ namespace limn {
 
 class RadianceEstimator final : public SampleEstimator {
  public:
-  // The scene must outlive the estimator. visible: what its film shows; null: rays tell.
+  // The scene must outlive the estimator. visible: what its film shows; null: rays tell. closed:
+  // what surfaces scatter is known in closed form, InputError if it is not.
   RadianceEstimator(const Scene& scene, int threads,
-                    std::shared_ptr<const FilmRegions> visible = nullptr);
+                    std::shared_ptr<const FilmRegions> visible = nullptr, bool closed = false);
 
   const Scene& scene() const override { return scene_; }
   size_t slots() const override { return 1; }
@@ -23,6 +24,7 @@ class RadianceEstimator final : public SampleEstimator {
   const Scene& scene_;
   std::unique_ptr<RayTracer> tracer_;
   Lights lights_;
+  std::unique_ptr<ClosedLight> closed_;  // null where paths are sampled
   PathContext context_;
   CameraView<double> camera_;
   std::shared_ptr<const FilmRegions> visible_;

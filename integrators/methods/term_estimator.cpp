@@ -48,12 +48,14 @@ DirectionField turning_about_axes(const Lanes& steps, int lanes) {
 
 }  // namespace
 
-std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler) {
+std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler,
+                                      bool closed) {
   std::vector<const TermType*> types;
   bool (*asked)(const Scene&) = nullptr;  // looks at the whole environment: once for rows alike
   bool applies = false;
   for (const TermType& type : term_types()) {
     if (type.regions && !sampler.regions) continue;
+    if (closed && type.moved_with_directions && !type.traces_paths) continue;
     if (type.applies != asked) {
       asked = type.applies;
       applies = asked(scene);
@@ -66,7 +68,7 @@ std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType&
 TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> parameters,
                              const std::vector<bool>& computed, const EdgeSamplerType& sampler,
                              int threads, std::shared_ptr<const FilmRegions> visible,
-                             const Warping* warping)
+                             const Warping* warping, bool closed)
     : scene_(seeded(scene, parameters)),
       lanes_(static_cast<int>(parameters.size())),
       lane_scale_(natural_steps(parameters)),
@@ -77,11 +79,12 @@ TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> para
         return tracer;
       }()),
       lights_(scene_),
-      context_{scene_, *tracer_, lights_},
+      closed_(closed ? std::make_unique<ClosedLight>(scene_, threads) : nullptr),
+      context_{scene_, *tracer_, lights_, closed_.get()},
       camera_(scene_.camera),
       visible_(std::move(visible)),
       input_(context_, lanes_, lane_scale_, sampler, threads, warping != nullptr),
-      types_(terms_of(scene, sampler)),
+      types_(terms_of(scene, sampler, closed)),
       rates_(scene_, lanes_, lane_scale_),
       turning_(turning_about_axes(lane_scale_, lanes_)) {
   input_.visible = visible_.get();

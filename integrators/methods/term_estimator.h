@@ -16,8 +16,9 @@ namespace limn {
 class FilmRegions;
 
 // The rows of term_types() that the sampler has and the scene has anything of. Slots are indices
-// into it.
-std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler);
+// into it. closed: with light in closed form, which holds whatever vertices see.
+std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler,
+                                      bool closed = false);
 
 // How directions are warped, see warp_field.h.
 struct Warping {
@@ -28,11 +29,12 @@ struct Warping {
 class TermEstimator final : public SampleEstimator {
  public:
   // parameters: at most kLanes. computed: for each of terms_of(scene, sampler), whether it is
-  // computed. visible: of the film, or null. warping: null where directions are not warped.
+  // computed. visible: of the film, or null. warping: null where directions are not warped. closed:
+  // what surfaces scatter is known in closed form, see closed_light.h.
   TermEstimator(const Scene& scene, std::span<const Parameter> parameters,
                 const std::vector<bool>& computed, const EdgeSamplerType& sampler, int threads,
                 std::shared_ptr<const FilmRegions> visible = nullptr,
-                const Warping* warping = nullptr);
+                const Warping* warping = nullptr, bool closed = false);
   TermEstimator(const TermEstimator&) = delete;
   TermEstimator& operator=(const TermEstimator&) = delete;
 
@@ -110,6 +112,7 @@ class TermEstimator final : public SampleEstimator {
   double tracer_seconds_ = 0;
   std::unique_ptr<RayTracer> tracer_;
   Lights lights_;
+  std::unique_ptr<ClosedLight> closed_;  // null where paths are sampled
   PathContext context_;
   CameraView<Dual> camera_;
   std::shared_ptr<const FilmRegions> visible_;

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cstdint>
 
+#include "integrators/terms/closed_light.h"
 #include "integrators/terms/direction_field.h"
 #include "integrators/terms/edge_sides.h"
 #include "integrators/terms/near_faces.h"
@@ -25,6 +26,8 @@ struct PathContext {
   const Scene& scene;
   const RayTracer& tracer;
   const Lights& lights;
+  // Takes the place of all light that is scattered; null: paths are sampled.
+  const ClosedLight* closed = nullptr;
 };
 
 // Does nothing at path vertices.
@@ -132,6 +135,12 @@ class PathTracer {
       const DirectionMotion* motion = motion_at(surface, bounces);
       if (!again) {
         visitor_(surface, scattering, throughput, motion, step, bounces, key);
+        if constexpr (!std::is_same_v<S, Var>) {
+          if (c_.closed) {
+            radiance += c_.closed->scattered(c_.tracer, surface, scattering, edge);
+            return;
+          }
+        }
         const int more = splits(surface, copies);
         add_lights(surface, scattering, motion, throughput, bounces, more, key, edge, radiance);
         if (more > 1) split(at, more, bounces, key, edge, radiance);
