@@ -18,9 +18,12 @@ class RadianceEstimator final : public SampleEstimator {
   const Scene& scene() const override { return scene_; }
   size_t slots() const override { return 1; }
   const char* slot_name(size_t) const override { return "radiance"; }
-  void add_pixel(const PixelSample& at, const Rng& key, SampleSink& sink) const override;
+  void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const override;
 
  private:
+  template <class Visitor>
+  void trace(std::span<const KeyedSample> samples, Visitor* visitor, SampleSink& sink) const;
+
   const Scene& scene_;
   std::unique_ptr<RayTracer> tracer_;
   Lights lights_;
