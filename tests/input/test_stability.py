@@ -23,7 +23,8 @@ from needs import need_matplotlib  # noqa: E402
 need_matplotlib()
 
 import numpy as np  # noqa: E402
-from stability_suite import exr, families, statistics, suite, table, verdicts  # noqa: E402
+from stability_suite import (  # noqa: E402
+    closed_form, exr, families, statistics, suite, table, verdicts)
 from stability_suite.program import Program, method_names  # noqa: E402
 from stability_suite.statistics import Estimate  # noqa: E402
 
@@ -248,6 +249,22 @@ os.execv({LIMN!r}, [{LIMN!r}] + sys.argv[1:])
         self.assertEqual(statuses["li2019"], ("crash", "SIGABRT: no output"))
         self.assertEqual(statuses["uniform"], ("crash", "exit status 2: no output"))
         self.assertEqual(statuses["forest"], ("refused", "scene.xml: error: too much"))
+
+
+class TestClosedForm(unittest.TestCase):
+    def test_runs_agree_with_it_and_would_not_if_it_were_wrong(self):
+        prism = families.meshes.prism
+        for parameter, bottom in (("object.translate.x", 0.25), ("object.translate.y", 0.0),
+                                  ("sensor.translate.x", 0.25)):
+            scene = families.table(prism(bottom, 1), depth=2, parameter=parameter)
+            truth = closed_form.derivative(scene, 12)
+            with tempfile.TemporaryDirectory(prefix="limn_stability_") as folder:
+                run = BySamples(LIMN, 1).gradient(scene.write(folder, 12), parameter, "adaptive", 64,
+                                                  5, os.path.join(folder, "run"))
+            with self.subTest(parameter=parameter):
+                self.assertGreater(statistics.bias([run.estimate], truth)["p"], 1e-4)
+                wrong = statistics.bias([run.estimate], truth.times(1.1))
+                self.assertLess(wrong["p"], 1e-4)
 
 
 class TestTool(unittest.TestCase):

@@ -14,18 +14,23 @@ from .scene import Scene, Shape, diffuse, glossy, twosided
 STEP = 0.005
 
 
+CLOSED_FORM = "closed form"
+
+
 @dataclass
 class Reference:
-    """Where the truth comes from. scene: the same shape made otherwise, or None for the point's own
-    by differences with this step. Its derivative times `factor` is the point's."""
+    """Where the truth comes from. scene: the same shape made otherwise, or None for the point's own.
+    By a formula (closed_form.py), by differences with a step, or by a long run of adaptive. Its
+    derivative times `factor` is the point's."""
 
     scene: Scene = None
     step: float = 0
     factor: float = 1
+    closed_form: bool = False
 
     @property
     def method(self):
-        return "fd" if self.step else "adaptive"
+        return CLOSED_FORM if self.closed_form else "fd" if self.step else "adaptive"
 
 
 @dataclass
@@ -76,8 +81,15 @@ def by_differences(scene, step=STEP):
     return scene, Reference(step=step)
 
 
+def by_formula(scene, clean=None, factor=1):
+    """clean: the same scene around a convex body, where the formula is taken from."""
+    return scene, Reference(scene=clean, factor=factor, closed_form=True)
+
+
 DIFFERENCES = "Differences of the same scene with a small fixed step."
 PLAIN = "The same shape as one clean mesh, by a long run of adaptive."
+FORMULA = "Closed form (direct light alone: convex shadows and faces, clipped to pixels)."
+FORMULA_OF_PLAIN = "Closed form of the same shape as one clean mesh (direct light alone)."
 CLOSE = ("Edges within the rounding of positions are united; what is nearer than rays from the "
          "camera can tell is met in double precision, and viewers farther away are looked at from "
          "the edge.")
@@ -129,20 +141,37 @@ def tiles(count):
 
 @family(
     "t-junctions", "strips of each side", [1, 2, 3, 7, 16, 61],
-    "A box whose sides are cut into strips that its lid and floor know nothing of.", PLAIN,
-    CLOSE,
+    "A box whose sides are cut into strips that its lid and floor know nothing of.",
+    FORMULA_OF_PLAIN, CLOSE,
 )
 def t_junctions(count):
-    plain = table(meshes.prism(), parameter="object.translate.y")
-    return plain.replaced("object", mesh=meshes.split_sides(count)), Reference(plain)
+    plain = table(meshes.prism(), parameter="object.translate.y", depth=2)
+    return by_formula(plain.replaced("object", mesh=meshes.split_sides(count)), plain)
 
 
 @family(
     "contact", "gap to the floor", [1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 0],
-    "A box slides along the floor, at last on it.", DIFFERENCES, NARROW,
+    "A box slides along the floor, at last on it.", FORMULA, NARROW,
 )
 def contact(gap):
-    return by_differences(table(meshes.prism(gap, gap + 0.75)))
+    return by_formula(table(meshes.prism(gap, gap + 0.75), depth=2))
+
+
+@family(
+    "hair-gaps", "gap between two boxes", [1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 0],
+    "Two boxes side by side, ever closer; the camera moves.",
+    "Up to a gap of 1e-3 differences; beyond, one box, by a long run of adaptive.",
+    "What is seen in the gap changes over its width, and hardly a sample falls into it, without "
+    "which the jumps at its two sides do not cancel. Finite differences do not see the gap.",
+)
+def hair_gaps(gap):
+    plain = table(meshes.block((0, 0, 0.5), (0.5, 0.25, 0.25)), parameter="sensor.translate.x")
+    half = 0.25 - gap / 4
+    left = meshes.block((-0.5 + half, 0, 0.5), (half, 0.25, 0.25))
+    right = meshes.block((0.5 - half, 0, 0.5), (half, 0.25, 0.25))
+    scene = plain.replaced("object", mesh=left)
+    scene.shapes.insert(1, Shape("other", right))
+    return by_differences(scene) if gap >= 1e-3 else (scene, Reference(plain))
 
 
 @family(
@@ -165,12 +194,12 @@ def zero_area(count):
 
 @family(
     "duplicates", "copies of every face", [0, 1, 3, 7, 15],
-    "A box whose every face is there several times.", PLAIN,
+    "A box whose every face is there several times.", FORMULA_OF_PLAIN,
 )
 def duplicates(count):
-    plain = table(meshes.prism())
+    plain = table(meshes.prism(), depth=2)
     p, f = plain.shape("object").mesh
-    return plain.replaced("object", mesh=(p, np.tile(f, (count + 1, 1)))), Reference(plain)
+    return by_formula(plain.replaced("object", mesh=(p, np.tile(f, (count + 1, 1)))), plain)
 
 
 @family(
@@ -228,31 +257,31 @@ def seams(distance):
 @family(
     "scale", "size of the scene", [1e-10, 1e-6, 1e-3, 1, 1e3, 1e6, 1e10],
     "The same scene in ever smaller or larger units.",
-    "The scene at scale 1, by a long run of adaptive, divided by the scale.",
+    "Closed form of the scene at scale 1 (direct light alone), divided by the scale.",
 )
 def scale(size):
-    plain = table(meshes.prism())
-    return plain.scaled(size), Reference(plain, factor=1 / size)
+    plain = table(meshes.prism(), depth=2)
+    return by_formula(plain.scaled(size), plain, 1 / size)
 
 
 @family(
     "distance", "distance from the origin", [1, 8, 64, 1024, 8192, 131072],
     "The same scene ever farther away; all positions stay exact in float.",
-    "The scene at the origin, by a long run of adaptive.",
+    "Closed form of the scene at the origin (direct light alone).",
 )
 def distance(offset):
-    plain = table(meshes.prism())
-    return plain.shifted(np.array([offset, offset, offset / 2])), Reference(plain)
+    plain = table(meshes.prism(), depth=2)
+    return by_formula(plain.shifted(np.array([offset, offset, offset / 2])), plain)
 
 
 @family(
     "small-lamps", "size of the lamp", [1, 1e-1, 1e-2, 1e-3, 1e-4],
-    "A lamp of the same power that shrinks to a point.", DIFFERENCES, NARROW,
+    "A lamp of the same power that shrinks to a point.", FORMULA, NARROW,
 )
 def small_lamps(size):
-    scene = table(meshes.prism())
+    scene = table(meshes.prism(), depth=2)
     scene.shapes[-1] = lamp(size / 2)
-    return by_differences(scene)
+    return by_formula(scene)
 
 
 @family(

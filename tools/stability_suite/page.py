@@ -23,13 +23,14 @@ READING = [
     ),
     (
         "Reference",
-        f"A run {REFERENCE} times as long, with seeds of its own, of the same shape made "
-        "otherwise, or of differences with a small fixed step; one of the former kind is itself "
-        "held against differences. Its noise is known, pixel by pixel, from its independent "
-        "batches, and is taken off the squared error. Where methods are better than that noise, "
-        "their error is the spread of the repeats, which needs no reference; what the mean of the "
-        "repeats misses beyond it is added where it is more than the reference's noise explains "
-        "(by three standard errors).",
+        "A closed form, whose error is told by a coarser one; or a run "
+        f"{REFERENCE} times as long, with seeds of its own, of the same shape made otherwise, or of "
+        "differences with a small fixed step. What is not made of differences is itself held "
+        "against them. Every family says which it has. The noise of runs is known, pixel by pixel, "
+        "from their independent batches, and is taken off the squared error. Where methods are "
+        "better than that noise, their error is the spread of the repeats, which needs no "
+        "reference; what the mean of the repeats misses beyond it is added where it is more than "
+        "the reference's noise explains (by three standard errors).",
     ),
     (
         "Bias",

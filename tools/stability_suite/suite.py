@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import statistics
-from .families import FAMILIES, STEP
-from .program import DONE, Interrupted
+from . import closed_form, statistics
+from .families import CLOSED_FORM, FAMILIES, STEP
+from .program import DONE, Interrupted, Run
 from .statistics import Estimate
 from .verdicts import verdict
 
@@ -26,6 +26,7 @@ LONGER = 3  # times the seconds of a run, where a bias is suspected
 # From whole runs of the suite.
 SUSPECTED, OVERHEAD = 0.1, 1.15
 DRAWING_SECONDS = 30
+FORMULA_SECONDS = 5  # of one closed form
 LEAST_SECONDS = 0.02
 DEFAULT_METHODS = ["adaptive", "forest", "li2019", "uniform", "fd"]
 
@@ -56,9 +57,10 @@ def run_seconds(minutes, jobs, methods, resolution=RESOLUTION):
     points = sum(len(f.values) for f in FAMILIES)
     own = {reference_identity(f, v, resolution): f.point(v)[1].method
            for f in FAMILIES for v in f.values}
-    references = len(own) + sum(method != "fd" for method in own.values())
+    formulas = sum(method == CLOSED_FORM for method in own.values())
+    references = len(own) - formulas + sum(method != "fd" for method in own.values())
     shares = points * methods * REPEATS * (1 + LONGER * SUSPECTED) + references * REFERENCE
-    left = max(60 * minutes - DRAWING_SECONDS, 30 * minutes)
+    left = max(60 * minutes - DRAWING_SECONDS - FORMULA_SECONDS * formulas / jobs, 30 * minutes)
     return max(LEAST_SECONDS, float(f"{left * jobs / OVERHEAD / shares:.3g}"))
 
 
@@ -66,7 +68,8 @@ def reference_identity(family, value, resolution):
     scene, reference = family.point(value)
     truth = reference.scene or scene
     return hashlib.sha256(
-        f"{truth.identity(resolution)} {reference.step!r}".encode()).hexdigest()[:24]
+        f"{truth.identity(resolution)} {reference.step!r} {reference.method}".encode()
+    ).hexdigest()[:24]
 
 
 class References:
@@ -106,7 +109,8 @@ class References:
         folder = os.path.join(self.folder, key)
         try:
             file = scene.write(folder, resolution)
-            run = self._run(scene, file, reference.method, 7919, folder, reference.step)
+            run = (self._by_formula(scene, resolution) if reference.closed_form else
+                   self._run(scene, file, reference.method, 7919, folder, reference.step))
             about = {"settings": self.settings, "status": run.status, "message": run.message,
                      "spp": run.spp, "seconds": run.seconds, "method": reference.method}
             if run.status == DONE and not reference.step:
@@ -120,6 +124,12 @@ class References:
                  variance=run.estimate.variance)
         os.replace(partial, self._file(key))
         return {**about, "estimate": run.estimate}
+
+    @staticmethod
+    def _by_formula(scene, resolution):
+        began = time.monotonic()
+        estimate = closed_form.derivative(scene, resolution)
+        return Run(DONE, seconds=time.monotonic() - began, estimate=estimate)
 
     def _run(self, scene, file, method, seed, folder, step):
         seconds = REFERENCE * self.settings["seconds"]
