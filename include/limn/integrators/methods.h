@@ -19,6 +19,8 @@ struct MethodType {
   bool warps = false;     // it takes GradientOptions::warp
   bool biased = false;    // its mean is not the derivative, however many samples it takes
   bool ablation = false;  // a variant that shows what a part of a method is worth
+  // InputError, with the place, for a scene that the method cannot take; null: it takes all.
+  void (*check)(const Scene&) = nullptr;
   std::function<GradientResult(const MethodType&, const Scene&, const GradientOptions&,
                                const RunSettings&)>
       run;
