@@ -1,6 +1,7 @@
 """The page "the paper's figures": for each what the paper shows, what its method does here, what
 limn's default does, and the command that repeats it."""
 
+import math
 import os
 import shlex
 
@@ -83,9 +84,20 @@ class _Comparison:
         return paper / mine if mine and paper else None
 
     def best(self):
-        """The method with the least time for equal error."""
-        ran = [n for n, rung in self.rungs.items() if rung and self._time(n)[0]]
-        return min(ran, key=lambda n: self._time(n)[0]) if ran else None
+        """The methods with the least time for equal error, but for two standard errors of the
+        logarithm of their quotient. The best comes first.
+        """
+        times_of = {n: self._time(n) for n, rung in self.rungs.items() if rung and self._time(n)[0]}
+        ranking = sorted(times_of, key=lambda n: times_of[n][0])
+        if not ranking:
+            return []
+        spread = {n: (error or 0) / ratio for n, (ratio, error) in times_of.items()}
+
+        def is_equal(name):
+            quotient = times_of[name][0] / times_of[ranking[0]][0]
+            return math.log(quotient) <= 2 * math.hypot(spread[name], spread[ranking[0]])
+
+        return [n for n in ranking if is_equal(n)]
 
     def is_short(self):
         """Whether some method spent most of its time on its set-up."""
@@ -159,7 +171,7 @@ class _Comparison:
             if samples:
                 row.append(times(self._per_sample(name)))
             ratio, error = self._time(name)
-            wins = "wins" if name == best else None
+            wins = "wins" if name in best else None
             row.append(element("td", times(ratio, error), class_=wins))
             row += [figures(rung.number("setup_seconds")), figures(rung.number("seconds"))]
             row.append(self._bias(rung))
@@ -301,7 +313,7 @@ def _sections(paper_figures, folder, command):
             parts.append(comparison.html())
             if comparison.factor():
                 factors.append(comparison.factor())
-            verdicts.append(comparison.best() or "–")
+            verdicts.append(" or ".join(comparison.best()) or "–")
         counted = _edges(entry.runs, folder)
         if counted:
             parts.append(counted[0])
