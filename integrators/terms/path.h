@@ -426,7 +426,9 @@ class PathTracer {
   Rgb<S> direct_light(Walk& walk, const Rng& key) {
     draw_light(walk, key);
     if constexpr (std::is_same_v<S, Dual>) {
-      if (warper_ && walk.light && !walk.light->light->delta()) return warped_light(walk, key);
+      if (warper_ && walk.light && !walk.light->light->delta()) {
+        return warped_light(walk, key.at(Purpose::kEmitter, walk.bounces));
+      }
     }
     weigh_light(walk);
     return !walk.light || shadowed(walk) ? Rgb<S>{} : light_value(walk);
