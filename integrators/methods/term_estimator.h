@@ -8,8 +8,9 @@
 #include "integrators/estimates/sample_estimator.h"
 #include "integrators/methods/pilot_moments.h"
 #include "integrators/methods/sample_plan.h"
-#include "integrators/terms/path.h"
 #include "integrators/terms/term.h"
+#include "integrators/terms/walk.h"
+#include "integrators/terms/warp_field.h"
 #include "limn/core/parameter.h"
 
 namespace limn {

@@ -21,29 +21,30 @@ struct Lanes {
   double operator[](int i) const { return lane[i]; }
 };
 
-inline Lanes operator+(const Lanes& a, const Lanes& b) {
+// Always inlined, as the operators of vec.h are.
+[[gnu::always_inline]] inline Lanes operator+(const Lanes& a, const Lanes& b) {
   Lanes r;
   for (int i = 0; i < kLanes; ++i) r[i] = a[i] + b[i];
   return r;
 }
-inline Lanes operator-(const Lanes& a, const Lanes& b) {
+[[gnu::always_inline]] inline Lanes operator-(const Lanes& a, const Lanes& b) {
   Lanes r;
   for (int i = 0; i < kLanes; ++i) r[i] = a[i] - b[i];
   return r;
 }
-inline Lanes operator-(const Lanes& a) {
+[[gnu::always_inline]] inline Lanes operator-(const Lanes& a) {
   Lanes r;
   for (int i = 0; i < kLanes; ++i) r[i] = -a[i];
   return r;
 }
-inline Lanes operator*(const Lanes& a, double s) {
+[[gnu::always_inline]] inline Lanes operator*(const Lanes& a, double s) {
   Lanes r;
   for (int i = 0; i < kLanes; ++i) r[i] = a[i] * s;
   return r;
 }
-inline Lanes operator*(double s, const Lanes& a) { return a * s; }
-inline Lanes operator/(const Lanes& a, double s) { return a * (1 / s); }
-inline Lanes& operator+=(Lanes& a, const Lanes& b) { return a = a + b; }
+[[gnu::always_inline]] inline Lanes operator*(double s, const Lanes& a) { return a * s; }
+[[gnu::always_inline]] inline Lanes operator/(const Lanes& a, double s) { return a * (1 / s); }
+[[gnu::always_inline]] inline Lanes& operator+=(Lanes& a, const Lanes& b) { return a = a + b; }
 inline bool is_zero(const Lanes& a) { return a[0] == 0 && a[1] == 0 && a[2] == 0 && a[3] == 0; }
 
 struct Dual {
@@ -55,31 +56,37 @@ struct Dual {
   Dual(double value, const Lanes& derivative) : v(value), d(derivative) {}
 };
 
-inline Dual operator+(const Dual& a, const Dual& b) { return {a.v + b.v, a.d + b.d}; }
-inline Dual operator-(const Dual& a, const Dual& b) { return {a.v - b.v, a.d - b.d}; }
-inline Dual operator*(const Dual& a, const Dual& b) { return {a.v * b.v, a.d * b.v + b.d * a.v}; }
-inline Dual operator/(const Dual& a, const Dual& b) {
+[[gnu::always_inline]] inline Dual operator+(const Dual& a, const Dual& b) {
+  return {a.v + b.v, a.d + b.d};
+}
+[[gnu::always_inline]] inline Dual operator-(const Dual& a, const Dual& b) {
+  return {a.v - b.v, a.d - b.d};
+}
+[[gnu::always_inline]] inline Dual operator*(const Dual& a, const Dual& b) {
+  return {a.v * b.v, a.d * b.v + b.d * a.v};
+}
+[[gnu::always_inline]] inline Dual operator/(const Dual& a, const Dual& b) {
   const double q = a.v / b.v;
   return {q, (a.d - b.d * q) / b.v};
 }
-inline Dual operator+(const Dual& a, double b) { return {a.v + b, a.d}; }
-inline Dual operator+(double a, const Dual& b) { return {a + b.v, b.d}; }
-inline Dual operator-(const Dual& a, double b) { return {a.v - b, a.d}; }
-inline Dual operator-(double a, const Dual& b) { return {a - b.v, -b.d}; }
-inline Dual operator*(const Dual& a, double b) { return {a.v * b, a.d * b}; }
-inline Dual operator*(double a, const Dual& b) { return {a * b.v, b.d * a}; }
-inline Dual operator/(const Dual& a, double b) { return {a.v / b, a.d / b}; }
-inline Dual operator/(double a, const Dual& b) {
+[[gnu::always_inline]] inline Dual operator+(const Dual& a, double b) { return {a.v + b, a.d}; }
+[[gnu::always_inline]] inline Dual operator+(double a, const Dual& b) { return {a + b.v, b.d}; }
+[[gnu::always_inline]] inline Dual operator-(const Dual& a, double b) { return {a.v - b, a.d}; }
+[[gnu::always_inline]] inline Dual operator-(double a, const Dual& b) { return {a - b.v, -b.d}; }
+[[gnu::always_inline]] inline Dual operator*(const Dual& a, double b) { return {a.v * b, a.d * b}; }
+[[gnu::always_inline]] inline Dual operator*(double a, const Dual& b) { return {a * b.v, b.d * a}; }
+[[gnu::always_inline]] inline Dual operator/(const Dual& a, double b) { return {a.v / b, a.d / b}; }
+[[gnu::always_inline]] inline Dual operator/(double a, const Dual& b) {
   const double q = a / b.v;
   return {q, -b.d * (q / b.v)};
 }
-inline Dual operator-(const Dual& a) { return {-a.v, -a.d}; }
-inline Dual& operator+=(Dual& a, const Dual& b) {
+[[gnu::always_inline]] inline Dual operator-(const Dual& a) { return {-a.v, -a.d}; }
+[[gnu::always_inline]] inline Dual& operator+=(Dual& a, const Dual& b) {
   a.v += b.v;
   a.d += b.d;
   return a;
 }
-inline Dual& operator*=(Dual& a, const Dual& b) { return a = a * b; }
+[[gnu::always_inline]] inline Dual& operator*=(Dual& a, const Dual& b) { return a = a * b; }
 
 // Comparisons look at the value alone.
 inline bool operator<(const Dual& a, const Dual& b) { return a.v < b.v; }
@@ -89,7 +96,7 @@ inline bool operator>=(const Dual& a, const Dual& b) { return a.v >= b.v; }
 inline bool operator==(const Dual& a, const Dual& b) { return a.v == b.v; }
 
 // The derivative of sqrt at 0 is taken as 0.
-inline Dual sqrt(const Dual& a) {
+[[gnu::always_inline]] inline Dual sqrt(const Dual& a) {
   const double r = std::sqrt(a.v);
   return {r, r > 0 ? a.d * (0.5 / r) : Lanes{}};
 }

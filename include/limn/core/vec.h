@@ -17,6 +17,9 @@ struct Vec3 {
 using Vec3d = Vec3<double>;
 using Vec3f = Vec3<float>;
 
+// What follows is always inlined: left to the compiler, a product of two numbers with derivatives
+// is a call that passes them through memory.
+
 // The scalars of a sum and of a product of scalars A and B (double with Dual gives Dual).
 template <class A, class B>
 using Sum = decltype(A{} + B{});
@@ -24,31 +27,31 @@ template <class A, class B>
 using Product = decltype(A{} * B{});
 
 template <class A, class B>
-auto operator+(const Vec3<A>& a, const Vec3<B>& b) {
+[[gnu::always_inline]] inline auto operator+(const Vec3<A>& a, const Vec3<B>& b) {
   return Vec3<Sum<A, B>>{a.x + b.x, a.y + b.y, a.z + b.z};
 }
 template <class A, class B>
-auto operator-(const Vec3<A>& a, const Vec3<B>& b) {
+[[gnu::always_inline]] inline auto operator-(const Vec3<A>& a, const Vec3<B>& b) {
   return Vec3<Sum<A, B>>{a.x - b.x, a.y - b.y, a.z - b.z};
 }
 template <class S>
-Vec3<S> operator-(const Vec3<S>& a) {
+[[gnu::always_inline]] inline Vec3<S> operator-(const Vec3<S>& a) {
   return {-a.x, -a.y, -a.z};
 }
 template <class A, class B>
-auto operator*(const Vec3<A>& a, const B& s) {
+[[gnu::always_inline]] inline auto operator*(const Vec3<A>& a, const B& s) {
   return Vec3<Product<A, B>>{a.x * s, a.y * s, a.z * s};
 }
 template <class A, class B>
-auto operator*(const B& s, const Vec3<A>& a) {
+[[gnu::always_inline]] inline auto operator*(const B& s, const Vec3<A>& a) {
   return a * s;
 }
 template <class A, class B>
-auto operator/(const Vec3<A>& a, const B& s) {
+[[gnu::always_inline]] inline auto operator/(const Vec3<A>& a, const B& s) {
   return Vec3<Product<A, B>>{a.x / s, a.y / s, a.z / s};
 }
 template <class S>
-Vec3<S>& operator+=(Vec3<S>& a, const Vec3<S>& b) {
+[[gnu::always_inline]] inline Vec3<S>& operator+=(Vec3<S>& a, const Vec3<S>& b) {
   a.x += b.x;
   a.y += b.y;
   a.z += b.z;
@@ -60,15 +63,15 @@ bool operator==(const Vec3<S>& a, const Vec3<S>& b) {
 }
 
 template <class A, class B>
-auto dot(const Vec3<A>& a, const Vec3<B>& b) {
+[[gnu::always_inline]] inline auto dot(const Vec3<A>& a, const Vec3<B>& b) {
   return a.x * b.x + a.y * b.y + a.z * b.z;
 }
 template <class A, class B>
-auto cross(const Vec3<A>& a, const Vec3<B>& b) {
+[[gnu::always_inline]] inline auto cross(const Vec3<A>& a, const Vec3<B>& b) {
   return Vec3<Product<A, B>>{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 template <class S>
-S length_squared(const Vec3<S>& a) {
+[[gnu::always_inline]] inline S length_squared(const Vec3<S>& a) {
   return dot(a, a);
 }
 template <class S>
@@ -121,23 +124,23 @@ Rgb<S> grey(const S& v) {
   return {v, v, v};
 }
 template <class A, class B>
-auto operator+(const Rgb<A>& a, const Rgb<B>& b) {
+[[gnu::always_inline]] inline auto operator+(const Rgb<A>& a, const Rgb<B>& b) {
   return Rgb<Sum<A, B>>{a.r + b.r, a.g + b.g, a.b + b.b};
 }
 template <class A, class B>
-auto operator-(const Rgb<A>& a, const Rgb<B>& b) {
+[[gnu::always_inline]] inline auto operator-(const Rgb<A>& a, const Rgb<B>& b) {
   return Rgb<Sum<A, B>>{a.r - b.r, a.g - b.g, a.b - b.b};
 }
 template <class A, class B>
-auto operator*(const Rgb<A>& a, const Rgb<B>& b) {
+[[gnu::always_inline]] inline auto operator*(const Rgb<A>& a, const Rgb<B>& b) {
   return Rgb<Product<A, B>>{a.r * b.r, a.g * b.g, a.b * b.b};
 }
 template <class A, class B>
-auto operator*(const Rgb<A>& a, const B& s) {
+[[gnu::always_inline]] inline auto operator*(const Rgb<A>& a, const B& s) {
   return Rgb<Product<A, B>>{a.r * s, a.g * s, a.b * s};
 }
 template <class S>
-Rgb<S>& operator+=(Rgb<S>& a, const Rgb<S>& b) {
+[[gnu::always_inline]] inline Rgb<S>& operator+=(Rgb<S>& a, const Rgb<S>& b) {
   a.r += b.r;
   a.g += b.g;
   a.b += b.b;
