@@ -155,7 +155,7 @@ TEST(Fit, LossAndItsGradientHaveTheRightMean) {
   for (size_t i = 0; i < mask.data.size(); ++i) mask.data[i] = static_cast<float>(i);
   target.data[0] = NAN;  // in the pixel of mask 0
   const std::vector<std::string> names{"lamp.translate.x", "lamp.rotate.z",
-                                       "floor_bsdf.reflectance"};
+                                       "floor_bsdf.reflectance.g"};
   double sum = 0;
   for (const float m : mask.data) sum += 3 * m;
   for (const char* name : {"l2", "relative-l2"}) {
@@ -183,9 +183,11 @@ TEST(Fit, LossAndItsGradientHaveTheRightMean) {
                100 * std::sqrt(found.variance(0)) / loss);
     EXPECT_LT(std::fabs(z_score(found, 0, loss)), 4.5) << name;
     for (size_t p = 0; p < names.size(); ++p) {
-      const std::vector<double> d = derivative(k, names[p]);
+      const bool green = names[p].ends_with(".g");  // alone: the reference moves all channels
+      const std::vector<double> d =
+          derivative(k, green ? names[p].substr(0, names[p].size() - 2) : names[p]);
       double truth = 0;
-      for (size_t i = 0; i < d.size(); ++i) truth += adjoint[i] * d[i];
+      for (size_t i = 0; i < d.size(); ++i) truth += green && i % 3 != 1 ? 0 : adjoint[i] * d[i];
       fmt::print("{} {}: z {:.2f}, error {:.1f} %\n", name, names[p], z_score(found, 1 + p, truth),
                  100 * std::sqrt(found.variance(1 + p)) / std::fabs(truth));
       EXPECT_LT(std::fabs(z_score(found, 1 + p, truth)), 4.5) << name << " " << names[p];
