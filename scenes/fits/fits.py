@@ -8,8 +8,7 @@
     scenes/fits/fits.py drift     from the very target: what noise does, and nothing else
 
 Writes OUT/NAME/ (pictures, meshes, report.html) and prints a table. A fit that is there is not run
-again; an interrupted one goes on. With --mitsuba PYTHON, a Python that has Mitsuba 3, mirrors and
-views run mitsuba_fit.py beside this, too.
+again; an interrupted one goes on.
 """
 
 import argparse
@@ -29,7 +28,6 @@ class Fits:
     def __init__(self, arguments):
         self.limn, self.out = arguments.limn, arguments.output
         self.threads, self.steps = arguments.threads, arguments.steps
-        self.mitsuba_python = arguments.mitsuba
         self.generated = os.path.join(ROOT, "build", "generated")
 
     def path(self, *names):
@@ -60,19 +58,6 @@ class Fits:
             self.run("fit", scene, "--target", target, "--steps", str(steps),
                      "-o", self.path(folder), *words)  # fmt: skip
         return json.load(open(file, encoding="utf-8"))
-
-
-    def mitsuba(self, folder, name, start, targets, steps, *words):
-        """The figures of Mitsuba's fit from the mesh `start`, in the form of a snapshot."""
-        mesh = self.path(folder, "mesh.ply")
-        if not os.path.exists(mesh):
-            command = [self.mitsuba_python, scene("mitsuba_fit.py"), scene(name), "-D", f"mesh={start}"]
-            command += [w for t in targets for w in ("--target", t)]
-            command += ["--wrt", "object", "--steps", str(self.steps or steps)]
-            if subprocess.run([*command, *words, "-o", self.path(folder)], check=False).returncode:
-                sys.exit(1)
-        with open(self.path(folder, "fit.json"), encoding="utf-8") as stream:
-            return mesh, json.load(stream)["history"]
 
 
 def scene(name):
@@ -106,18 +91,7 @@ def shape_rows(fits, name, base, targets, truth, steps, defines, words, variants
         first, last = (fit["snapshots"][i]["meshes"][0] for i in (0, -1))
         if not rows:
             rows.append(shape_row("start", 0, first, []))
-            start = fits.path(folder, first["file"])
         rows.append(shape_row(variant, fit["steps"], last, fit["history"]))
-    if fits.mitsuba_python:
-        # Of its mesh a fit of one step tells the distances.
-        count = words[words.index("--spp") + 1]
-        mesh, history = fits.mitsuba(
-            f"{name}_mitsuba", f"{base}.xml", os.path.abspath(start), targets, steps,
-            "--spp", count, "--step", "2", "--smoothing", str(smoothing), *own[: 2 * len(defines)],
-        )  # fmt: skip
-        fit = fits.fit(f"{name}_mitsuba_figures", scene(f"{base}.xml"), targets[0], 1, *own,
-                       "--spp", "1", "-D", f"mesh={mesh}", "-D", "format=ply")  # fmt: skip
-        rows.append(shape_row("mitsuba", len(history), fit["snapshots"][0]["meshes"][0], history))
     return SHAPE_HEAD, rows
 
 
@@ -156,10 +130,10 @@ def views(fits):
         for i in range(8)
     ]
     words = ["--spp", "2", "--snapshots", "25", "--seed", "1"]
-    variants = [("remeshed", ["--remesh", "40,80"]), ("no remeshing", [])]
+    variants = [("remeshed", ["--remesh", "15,30"]), ("no remeshing", [])]
     truth = "/usr/share/glmark2/models/bunny.obj"
     return shape_rows(
-        fits, "views", "eight_views", targets, truth, 120, size, words, variants, 0.1
+        fits, "views", "eight_views", targets, truth, 45, size, words, variants, 0.1
     )
 
 
@@ -232,7 +206,6 @@ def main():
     parser.add_argument("name", choices=EXPERIMENTS, metavar="NAME", help=", ".join(EXPERIMENTS))
     parser.add_argument("-o", "--output", default=os.path.join(ROOT, "out", "fits"))
     parser.add_argument("--steps", type=int, help="in place of the experiment's own number")
-    parser.add_argument("--mitsuba", metavar="PYTHON", help="that has Mitsuba 3, to run it as well")
     parser.add_argument("--threads", type=int, help="default: all cores")
     parser.add_argument("--limn", default=os.path.join(ROOT, "build", "limn"), help="the program")
     arguments = parser.parse_args()
