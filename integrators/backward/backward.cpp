@@ -98,7 +98,7 @@ BatchResult to_result(const BatchRecord& record, const std::vector<Parameter>& p
   RecordReader from(record);
   BatchResult result;
   for (const Parameter& parameter : parameters) {
-    result.sums.push_back(from.numbers(parameter.size));
+    result.sums.push_back(from.numbers(parameter.numbers()));
   }
   for (TermCost& cost : result.figures.costs) cost = from.cost();
   result.figures.bad = from.non_finite();
@@ -120,7 +120,7 @@ class BackwardPass {
         tracer_(make_embree_tracer(parameters_.scene(), settings.threads)),
         lights_(parameters_.scene()),
         path_{parameters_.scene(), *tracer_, lights_},
-        input_(path_, 3, {1, 1, 1, 1}, edge_sampler_type("forest"), settings.threads),
+        input_(path_, 3, {1, 1, 1, 1}, edge_sampler_type(options.sampler), settings.threads),
         context_{path_, parameters_, input_.edges(),
                  EdgeMotion(parameters_.slots(), input_.edges())} {
     select();
@@ -229,9 +229,8 @@ void BackwardPass::select() {
         "normals is incomplete");
   }
   for (const Parameter& p : parameters_.parameters()) {
-    std::vector<size_t> shape;
-    if (p.size > 1) shape = {p.size / 3, 3};
-    result_.parameters.push_back({p.name, p.unit, shape, Moments(p.size, options_.keep_batches)});
+    result_.parameters.push_back(
+        {p.name, p.unit, p.shape(), Moments(p.numbers(), options_.keep_batches)});
   }
 }
 
@@ -262,6 +261,7 @@ void BackwardPass::start(BatchStore& store) const {
   std::vector<double> pixels;
   for (const Rgb<double>& a : film_.pixels()) pixels.insert(pixels.end(), {a.r, a.g, a.b});
   store.identify("method", "backward");
+  store.identify("sampler", options_.sampler);
   store.identify("samples per pixel", std::to_string(settings_.spp));
   store.identify("seed", std::to_string(settings_.seed));
   store.identify("adjoint", fingerprint(pixels));

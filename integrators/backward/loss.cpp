@@ -1,7 +1,9 @@
 // Losses of an image, with the derivative for every pixel.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "limn/core/error.h"
 #include "limn/core/names.h"
@@ -101,9 +103,80 @@ void check_loss_images(const Scene& scene, const Image& target, const Image& mas
   }
 }
 
+namespace {
+
+// An image pair and its target at one size, and what each pixel weighs.
+struct Level {
+  int width, height;
+  std::vector<double> weights;       // height by width
+  std::vector<double> a, b, target;  // of 3 channels
+};
+
+// At half the size: weighted means of blocks of two by two pixels; a last row or column that is odd
+// makes blocks of its own.
+Level halved(const Level& level) {
+  Level half{(level.width + 1) / 2, (level.height + 1) / 2, {}, {}, {}, {}};
+  const size_t pixels = static_cast<size_t>(half.width) * half.height;
+  half.weights.resize(pixels);
+  for (auto* image : {&half.a, &half.b, &half.target}) image->resize(3 * pixels);
+  const std::pair<const std::vector<double>*, std::vector<double>*> images[] = {
+      {&level.a, &half.a}, {&level.b, &half.b}, {&level.target, &half.target}};
+  for (int y = 0; y < level.height; ++y) {
+    for (int x = 0; x < level.width; ++x) {
+      const size_t from = static_cast<size_t>(y) * level.width + x;
+      const size_t to = static_cast<size_t>(y / 2) * half.width + x / 2;
+      const double weight = level.weights[from];
+      if (weight == 0) continue;  // its target may be anything
+      half.weights[to] += weight;
+      for (const auto& [fine, coarse] : images) {
+        for (size_t c = 0; c < 3; ++c) (*coarse)[3 * to + c] += weight * (*fine)[3 * from + c];
+      }
+    }
+  }
+  for (size_t i = 0; i < 3 * pixels; ++i) {
+    if (half.weights[i / 3] == 0) continue;
+    for (auto* image : {&half.a, &half.b, &half.target}) (*image)[i] /= half.weights[i / 3];
+  }
+  return half;
+}
+
+// Adds `share` of the loss of a level to `loss`, and its derivative with respect to the pixels of the
+// finest level, `finest` and twice as wide `doublings` times, to `adjoint`.
+void add_level(const Level& level, const Level& finest, int doublings, LossKind kind, double share,
+               double& loss, std::vector<double>& adjoint) {
+  std::vector<double> slopes(level.a.size());
+  for (size_t i = 0; i < slopes.size(); ++i) {
+    const double weight = level.weights[i / 3];
+    if (weight == 0) continue;
+    const ValueLoss value = value_loss(kind, level.a[i], level.b[i], level.target[i]);
+    loss += share * weight * value.loss;
+    slopes[i] = share * value.adjoint;
+  }
+  for (size_t i = 0; i < adjoint.size(); ++i) {
+    const size_t x = i / 3 % finest.width >> doublings, y = i / 3 / finest.width >> doublings;
+    // A pixel's share of its block's mean, times what the block weighs.
+    adjoint[i] += finest.weights[i / 3] * slopes[3 * (y * level.width + x) + i % 3];
+  }
+}
+
+}  // namespace
+
+int most_pyramid_levels(const Scene& scene) {
+  int levels = 1;
+  for (int size = std::max(scene.film.crop_width, scene.film.crop_height); size > 1;
+       size = (size + 1) / 2) {
+    ++levels;
+  }
+  return levels;
+}
+
 LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
-                      const RunSettings& settings, const Image& mask) {
+                      const RunSettings& settings, const Image& mask, int levels) {
   check_loss_images(scene, target, mask);
+  if (levels < 1 || levels > most_pyramid_levels(scene)) {
+    throw InputError(fmt::format("a pyramid of {} levels: the film has 1 to {}", levels,
+                                 most_pyramid_levels(scene)));
+  }
   RenderResult images[2];
   for (int i = 0; i < 2; ++i) {
     RunSettings own = settings;
@@ -117,20 +190,25 @@ LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
     throw InputError("loss: " + images[images[0].non_finite.count == 0].non_finite.message());
   }
   if (result.spp == 0) return result;
-  result.adjoint = Image(target.width, target.height, 3);
   const size_t values = images[0].radiance.size();
-  const std::vector<double> weights = pixel_weights(scene, mask);
+  Level finest{target.width, target.height, pixel_weights(scene, mask), {}, {}, {}};
+  for (size_t i = 0; i < values; ++i) {
+    finest.a.push_back(images[0].radiance.mean(i));
+    finest.b.push_back(images[1].radiance.mean(i));
+    finest.target.push_back(target.channels == 3 ? target.data[i] : target.data[i / 3]);
+  }
+  std::vector<double> adjoint(values);
+  Level level = finest;
+  for (int k = 0; k < levels; ++k) {
+    if (k > 0) level = halved(level);
+    add_level(level, finest, k, kind, 1.0 / levels, result.value, adjoint);
+  }
+  result.adjoint = Image(target.width, target.height, 3);
   double variance = 0;
   for (size_t i = 0; i < values; ++i) {
-    const double weight = weights[i / 3];
-    if (weight == 0) continue;
-    const double t = target.channels == 3 ? target.data[i] : target.data[i / 3];
-    const double a = images[0].radiance.mean(i), b = images[1].radiance.mean(i);
-    const ValueLoss loss = value_loss(kind, a, b, t);
-    result.value += weight * loss.loss;
-    result.adjoint.data[i] = static_cast<float>(weight * loss.adjoint);
+    result.adjoint.data[i] = static_cast<float>(adjoint[i]);
     // To first order, with half of the adjoint for each image.
-    const double slope = 0.5 * weight * loss.adjoint;
+    const double slope = 0.5 * adjoint[i];
     variance += slope * slope * (images[0].radiance.variance(i) + images[1].radiance.variance(i));
   }
   result.error = std::sqrt(variance);

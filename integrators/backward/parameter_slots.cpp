@@ -46,11 +46,11 @@ std::array<Dual*, kCameraSlots> camera_numbers(Camera& c) {
 
 // Copies of an object whose lanes carry its parameters with a slot, four of them each.
 template <class T>
-SeededCopies<T> seeded_copies(const T& object, const std::vector<uint32_t>& slots) {
+SeededCopies<T> seeded_copies(const T& object, const std::vector<ChannelSlots>& slots) {
   SeededCopies<T> copies;
   int lane = kLanes;
   for (size_t k = 0; k < slots.size(); ++k) {
-    if (slots[k] == 0) continue;
+    if (slots[k] == ChannelSlots{}) continue;
     if (lane == kLanes) {
       copies.push_back({object.clone(), {}});
       lane = 0;
@@ -59,23 +59,26 @@ SeededCopies<T> seeded_copies(const T& object, const std::vector<uint32_t>& slot
     for (Dual* v : parameters[k].values) v->d[lane] = 1;
     copies.back().slots[lane++] = slots[k];
   }
-  CHECK_LE(9 + kLanes * static_cast<int>(copies.size()), detail::Jacobian::kMost);
+  CHECK_LE(9 + 3 * kLanes * static_cast<int>(copies.size()), detail::Jacobian::kMost);
   return copies;
 }
 
 }  // namespace
 
-// The values of a scene that a parameter may move, in an order that all copies share. Values of one
-// ParameterRef grow together, so they count as one.
+// The values of a scene that a parameter may move, in an order that all copies share.
 class ParameterSlots::Values {
  public:
   // Of the camera, then of emitting shapes, of BSDFs, the environment and the lights.
   static std::vector<Dual*> of(Scene& scene) {
     std::vector<Dual*> values;
     for (Dual* v : camera_numbers(scene.camera)) values.push_back(v);
-    for (Shape& shape : scene.shapes) values.push_back(&shape.radiance.r);
+    for (Shape& shape : scene.shapes) {
+      for (int c = 0; c < 3; ++c) values.push_back(&shape.radiance[c]);
+    }
     const auto add = [&](auto& object) {
-      for (const ParameterRef& ref : object.parameters()) values.push_back(ref.values[0]);
+      for (const ParameterRef& ref : object.parameters()) {
+        values.insert(values.end(), ref.values.begin(), ref.values.end());
+      }
     };
     for (const auto& bsdf : scatterers(scene)) add(*bsdf);
     if (scene.environment) add(*scene.environment);
@@ -163,18 +166,26 @@ void ParameterSlots::add_values(const Scene& scene) {
         slot_of[k] = slots_.camera + static_cast<uint32_t>(k);
       }
       if (slot_of[k] == 0) slot_of[k] = take(1);
-      dependences_[i].weights.push_back({slot_of[k], values[k]->d[0]});
+      // The channels of a colour are the values that it moves, in their order.
+      const size_t number = parameters_[i].colour ? dependences_[i].weights.size() : 0;
+      dependences_[i].weights.push_back({slot_of[k], values[k]->d[0], number});
     }
   }
   free_.camera = slots_.camera != 0;
   size_t next = kCameraSlots;
   const auto slots_of = [&](auto& object) {
-    const size_t first = next;
-    next += object.parameters().size();
-    return std::vector<uint32_t>(slot_of.begin() + static_cast<long>(first),
-                                 slot_of.begin() + static_cast<long>(next));
+    std::vector<ChannelSlots> slots;
+    for (const ParameterRef& ref : object.parameters()) {
+      const size_t count = ref.values.size();
+      const auto at = [&](size_t channel) { return slot_of[next + std::min(channel, count - 1)]; };
+      slots.push_back({at(0), at(1), at(2)});
+      next += count;
+    }
+    return slots;
   };
-  for (size_t s = 0; s < scene_.shapes.size(); ++s) slots_.radiance.push_back(slot_of[next++]);
+  for (size_t s = 0; s < scene_.shapes.size(); ++s, next += 3) {
+    slots_.radiance.push_back({slot_of[next], slot_of[next + 1], slot_of[next + 2]});
+  }
   slots_.bsdfs.resize(scene_.shapes.size());
   for (const auto& bsdf : scatterers(scene_)) {
     auto copies = std::make_unique<SeededCopies<Bsdf>>(seeded_copies<Bsdf>(*bsdf, slots_of(*bsdf)));
@@ -199,9 +210,9 @@ void ParameterSlots::add_values(const Scene& scene) {
 
 std::vector<std::vector<double>> ParameterSlots::gather(const std::vector<double>& sums) const {
   std::vector<std::vector<double>> values;
-  for (const Parameter& parameter : parameters_) values.emplace_back(parameter.size);
+  for (const Parameter& parameter : parameters_) values.emplace_back(parameter.numbers());
   for (size_t i = 0; i < parameters_.size(); ++i) {
-    for (const Weight& w : dependences_[i].weights) values[i][0] += sums[w.slot] * w.weight;
+    for (const Weight& w : dependences_[i].weights) values[i][w.number] += sums[w.slot] * w.weight;
   }
   for (uint32_t s = 0; s < free_.shapes.size(); ++s) {
     if (free_.shapes[s]) gather_shape(ShapeId(s), sums, values);

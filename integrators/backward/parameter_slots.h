@@ -32,10 +32,11 @@ class ParameterSlots {
   std::vector<std::vector<double>> gather(const std::vector<double>& sums) const;
 
  private:
-  // How a scalar depends on slots of values: of BSDFs, lights, the camera.
+  // How a number depends on slots of values: of BSDFs, lights, the camera.
   struct Weight {
     uint32_t slot;
     double weight;
+    size_t number;  // of the parameter, that it adds to
   };
   // What a parameter moves.
   struct Dependence {

@@ -44,18 +44,31 @@ std::vector<Vec3d> random_field(const Mesh& mesh, uint64_t seed) {
 
 // A parameter in forward mode, and what a gradient of reverse mode is dotted with.
 struct Compared {
+  std::string name;
   Parameter forward;
+  const ParameterAdjoint* reverse;
   std::vector<double> weights;
 };
 
-Compared compared(const Scene& scene, const Parameter& parameter, uint64_t seed) {
-  if (parameter.size == 1) return {parameter, {1.0}};
+// Of a colour each channel.
+std::vector<Compared> compared(const Scene& scene, const ParameterAdjoint& reverse, uint64_t seed) {
+  const Parameter parameter = find_parameter_or_array(scene, reverse.name);
+  if (parameter.colour) {
+    std::vector<Compared> channels;
+    for (size_t c = 0; c < 3; ++c) {
+      const std::string name = reverse.name + "." + "rgb"[c];
+      channels.push_back({name, find_parameter(scene, name), &reverse, std::vector<double>(3)});
+      channels.back().weights[c] = 1;
+    }
+    return channels;
+  }
+  if (parameter.size == 1) return {{reverse.name, parameter, &reverse, {1.0}}};
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     if (parameter.velocities(scene, ShapeId(s)).empty()) continue;
     const std::vector<Vec3d> field = random_field(scene.shapes[s].mesh, seed);
     std::vector<double> weights;
     for (const Vec3d& v : field) weights.insert(weights.end(), {v.x, v.y, v.z});
-    return {vertex_field(scene, ShapeId(s), field), weights};
+    return {{reverse.name, vertex_field(scene, ShapeId(s), field), &reverse, weights}};
   }
   throw InputError("an array that moves no shape: " + parameter.name);
 }
@@ -125,8 +138,10 @@ std::vector<ReverseCheck> check_reverse(const Scene& scene, const BackwardOption
   std::vector<Compared> list;
   std::vector<Parameter> parameters;
   for (const ParameterAdjoint& p : reverse.parameters) {
-    list.push_back(compared(scene, find_parameter_or_array(scene, p.name), settings.seed));
-    parameters.push_back(list.back().forward);
+    for (const Compared& one : compared(scene, p, settings.seed)) {
+      list.push_back(one);
+      parameters.push_back(one.forward);
+    }
   }
   RunSettings other = settings;
   other.seed = mix_bits(mix_bits(settings.seed) + 3);
@@ -134,8 +149,8 @@ std::vector<ReverseCheck> check_reverse(const Scene& scene, const BackwardOption
   if (settings.interrupted && settings.interrupted->load()) return {};
   std::vector<ReverseCheck> checks;
   for (size_t i = 0; i < list.size(); ++i) {
-    const Moments backward_sum = reverse_sum(reverse.parameters[i], list[i].weights);
-    ReverseCheck check{reverse.parameters[i].name, sums[i].mean(0), std::sqrt(sums[i].variance(0)),
+    const Moments backward_sum = reverse_sum(*list[i].reverse, list[i].weights);
+    ReverseCheck check{list[i].name, sums[i].mean(0), std::sqrt(sums[i].variance(0)),
                        backward_sum.mean(0), std::sqrt(backward_sum.variance(0))};
     if (check.forward != check.reverse) check.z = score(sums[i], backward_sum);
     checks.push_back(check);

@@ -81,6 +81,7 @@ class Fit::Impl {
 
  private:
   void check_shapes();
+  void check_channels() const;
   void check_terms() const;
   void check_remeshing();
   // Of a scalar; none where the view does not have it, and of motions.
@@ -88,6 +89,12 @@ class Fit::Impl {
   // Shapes of a view that some parameter moves, in the scene's order.
   std::vector<ShapeId> moved_shapes(size_t view) const;
   RunSettings view_settings(size_t view) const;
+  // What the remeshings so far have left of steps and smoothing.
+  double shrunk() const {
+    const auto done = [&](int64_t step) { return step <= steps; };
+    const auto count = std::count_if(options_.remesh.begin(), options_.remesh.end(), done);
+    return std::pow(options_.remesh_shrink, static_cast<double>(count));
+  }
   // False: interrupted.
   bool add_view(size_t view, FitRecord& record, std::vector<std::vector<double>>& gradients);
 
@@ -106,6 +113,12 @@ Fit::Impl::Impl(std::vector<FitView> all, const FitOptions& options, const RunSe
   for (FitView& view : views) {
     view.scene = deep_copy(view.scene);
     check_loss_images(view.scene, view.target, view.mask);
+    const int most = most_pyramid_levels(view.scene);
+    if (options.pyramid < 1 || options.pyramid > most) {
+      throw InputError(
+          {view.scene.file},
+          fmt::format("a pyramid of {} levels: the film has 1 to {}", options.pyramid, most));
+    }
     for (const std::string& name : options.parameters) free_normals(view.scene, name, warnings);
   }
   for (const std::string& name : options.parameters) {
@@ -120,6 +133,7 @@ Fit::Impl::Impl(std::vector<FitView> all, const FitOptions& options, const RunSe
     throw InputError("bounds of \"" + bounds.parameter + "\", which is not fitted");
   }
   check_shapes();
+  check_channels();
   check_terms();
   if (!options.remesh.empty()) check_remeshing();
   if (options.loss == LossKind::kL1) {
@@ -144,6 +158,16 @@ void Fit::Impl::check_shapes() {
   }
 }
 
+void Fit::Impl::check_channels() const {
+  for (const FitParameter& whole : parameters_) {
+    for (const FitParameter& part : parameters_) {
+      if (whole.is_array() || !part.name().starts_with(whole.name() + ".")) continue;
+      throw InputError(
+          fmt::format("\"{}\" is a channel of \"{}\": fit one of them", part.name(), whole.name()));
+    }
+  }
+}
+
 // Those of backward(), which would tell at the first step.
 void Fit::Impl::check_terms() const {
   for (size_t v = 0; v < views.size(); ++v) {
@@ -162,6 +186,10 @@ void Fit::Impl::check_remeshing() {
   if (!(options_.remesh_edge > 0.1 && options_.remesh_edge < 10)) {
     throw InputError(
         fmt::format("edges {:g} times as long are not within 0.1 and 10", options_.remesh_edge));
+  }
+  if (!(options_.remesh_shrink > 0 && options_.remesh_shrink <= 1)) {
+    throw InputError(
+        fmt::format("steps cannot shrink by {:g}: not within 0 and 1", options_.remesh_shrink));
   }
   for (const int64_t step : options_.remesh) {
     if (step < 1) throw InputError(fmt::format("remeshing after {} steps: one at least", step));
@@ -206,7 +234,7 @@ bool Fit::Impl::add_view(size_t view, FitRecord& record,
   RunSettings own = view_settings(view);
   own.spp = grown(options_.loss_spp > 0 ? options_.loss_spp : settings_.spp, steps,
                   options_.spp_doubling);
-  LossResult loss = image_loss(v.scene, v.target, options_.loss, own, v.mask);
+  LossResult loss = image_loss(v.scene, v.target, options_.loss, own, v.mask, options_.pyramid);
   if (loss.spp < own.spp) return false;
   record.view_losses.push_back(loss.value);
   record.loss += share * loss.value;
@@ -247,9 +275,7 @@ std::optional<FitRecord> Fit::Impl::step() {
   if (options_.step_half_life > 0) {
     record.step_size *= std::exp2(-static_cast<double>(steps) / options_.step_half_life);
   }
-  for (const int64_t step : options_.remesh) {
-    if (step <= steps) record.step_size *= 0.8;  // not tuned
-  }
+  record.step_size *= shrunk();
   std::vector<std::vector<double>> gradients(parameters_.size());
   for (size_t v = 0; v < views.size(); ++v) {
     if (!add_view(v, record, gradients)) return std::nullopt;
@@ -262,7 +288,7 @@ std::optional<FitRecord> Fit::Impl::step() {
   if (std::find(options_.remesh.begin(), options_.remesh.end(), steps) != options_.remesh.end()) {
     for (FitParameter& p : parameters_) {
       if (!p.is_array()) continue;
-      p.remesh(options_.remesh_edge, options_, views);
+      p.remesh(options_.remesh_edge, options_.smoothing * shrunk(), views);
       record.remeshed = true;
     }
   }
@@ -274,7 +300,8 @@ std::optional<FitRecord> Fit::Impl::step() {
 std::vector<FitScalar> Fit::Impl::scalars() const {
   std::vector<FitScalar> list;
   for (const FitParameter& p : parameters_) {
-    if (!p.is_array()) list.push_back(p.scalar(views));
+    if (p.is_array()) continue;
+    for (const FitScalar& scalar : p.scalars(views)) list.push_back(scalar);
   }
   return list;
 }

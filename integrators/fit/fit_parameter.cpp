@@ -56,12 +56,14 @@ FitParameter::FitParameter(const std::string& name, const std::vector<FitView>& 
   if (first_view_ == views.size()) throw UnknownParameter(*unknown);
   natural_step_ = in_view_[first_view_]->natural_step;
   if (in_view_[first_view_]->size > 1) {
-    find_array(views, options);
+    find_array(views, options.smoothing);
   } else {
-    numbers_ = {0};
+    numbers_.resize(in_view_[first_view_]->numbers());
   }
   find_bounds(views, options);
-  optimiser_.emplace(options.optimiser, numbers_.size());
+  // Channels of a colour are as different as two parameters: each has its own scale.
+  const bool alone = !is_array() && options.optimiser == OptimiserKind::kAdamUniform;
+  optimiser_.emplace(alone ? OptimiserKind::kAdam : options.optimiser, numbers_.size());
 }
 
 void FitParameter::find_in_views(const std::vector<FitView>& views) {
@@ -70,7 +72,7 @@ void FitParameter::find_in_views(const std::vector<FitView>& views) {
   }
 }
 
-void FitParameter::find_array(const std::vector<FitView>& views, const FitOptions& options) {
+void FitParameter::find_array(const std::vector<FitView>& views, double smoothing) {
   const Mesh& first = mesh(views);
   for (size_t v = first_view_; v < views.size(); ++v) {
     if (!in_view_[v]) continue;
@@ -81,10 +83,10 @@ void FitParameter::find_array(const std::vector<FitView>& views, const FitOption
                                  "show the same vertices and faces",
                                  name_, views[first_view_].scene.file));
   }
-  if (!(options.smoothing >= 0 && options.smoothing < 1e3)) {
-    throw InputError(fmt::format("the smoothing {:g} is not in [0, 1000)", options.smoothing));
+  if (!(smoothing >= 0 && smoothing < 1e3)) {
+    throw InputError(fmt::format("the smoothing {:g} is not in [0, 1000)", smoothing));
   }
-  const double in_edges = options.smoothing * bounds_of(first).diagonal() / mean_edge_length(first);
+  const double in_edges = smoothing * bounds_of(first).diagonal() / mean_edge_length(first);
   large_steps_ = std::make_unique<LargeSteps>(first, in_edges * in_edges);
   std::vector<double> positions;
   for (const uint32_t v : large_steps_->first()) {
@@ -126,30 +128,38 @@ std::vector<double> FitParameter::bounded_numbers(const FitView& view, size_t in
 int FitParameter::move(const std::vector<double>& gradient, double size, int64_t count,
                        std::vector<FitView>& views) {
   if (is_array()) return move_vertices(gradient, size, count, views);
-  move_scalar(gradient[0], size, count, views);
+  move_numbers(gradient, size, count, views);
   return 0;
 }
 
-void FitParameter::move_scalar(double gradient, double size, int64_t count,
-                               std::vector<FitView>& views) {
-  double step = natural_step_ * size * optimiser_->step({natural_step_ * gradient}, count)[0];
+void FitParameter::move_numbers(std::vector<double> gradient, double size, int64_t count,
+                                std::vector<FitView>& views) {
+  for (double& g : gradient) g *= natural_step_;
+  std::vector<double> step = optimiser_->step(gradient, count);
+  for (double& x : step) x *= natural_step_ * size;
   for (size_t v = 0; v < views.size(); ++v) {
     if (!in_view_[v]) continue;
-    for (const double x : bounded_numbers(views[v], v)) {
-      step = std::clamp(step, std::min(0.0, least_ - x), std::max(0.0, most_ - x));
+    const std::vector<double> now = bounded_numbers(views[v], v);
+    for (size_t k = 0; k < step.size(); ++k) {
+      const double below = std::min(0.0, least_ - now[k]), above = std::max(0.0, most_ - now[k]);
+      step[k] = std::clamp(step[k], below, above);
     }
   }
   for (size_t v = 0; v < views.size(); ++v) {
     if (!in_view_[v]) continue;
     Scene& scene = views[v].scene;
-    in_view_[v]->move(scene, step);
-    // Sums round: a value next to its bound must not pass it.
     std::vector<double> value = in_view_[v]->value(scene);
-    if (value.empty()) continue;
-    for (double& x : value) x = std::clamp(x, least_, most_);
+    if (value.empty()) {
+      in_view_[v]->move(scene, step[0]);
+      continue;
+    }
+    // Sums round: a value next to its bound must not pass it.
+    for (size_t k = 0; k < step.size(); ++k) {
+      value[k] = std::clamp(value[k] + step[k], least_, most_);
+    }
     in_view_[v]->assign(scene, value);
   }
-  numbers_[0] += step;
+  for (size_t k = 0; k < step.size(); ++k) numbers_[k] += step[k];
 }
 
 int FitParameter::move_vertices(const std::vector<double>& gradient, double size, int64_t count,
@@ -196,13 +206,17 @@ bool FitParameter::place_vertices(const std::vector<double>& positions,
   return true;
 }
 
-FitScalar FitParameter::scalar(const std::vector<FitView>& views) const {
+std::vector<FitScalar> FitParameter::scalars(const std::vector<FitView>& views) const {
   CHECK(!is_array());
   const Parameter& parameter = *in_view_[first_view_];
   const std::vector<double> numbers = bounded_numbers(views[first_view_], first_view_);
-  double sum = 0;
-  for (const double x : numbers) sum += x;
-  return {name_, parameter.unit, sum / static_cast<double>(numbers.size())};
+  if (!parameter.colour) return {{name_, parameter.unit, numbers[0], name_}};
+  std::vector<FitScalar> channels;
+  for (int c = 0; c < 3; ++c) {
+    const double x = numbers[static_cast<size_t>(c)];
+    channels.push_back({name_ + "." + "rgb"[c], parameter.unit, x, name_});
+  }
+  return channels;
 }
 
 FitState::Numbers FitParameter::state() const {
@@ -215,7 +229,7 @@ FitState::Numbers FitParameter::state() const {
 }
 
 void FitParameter::restore(const FitState::Numbers& numbers, const std::vector<FitView>& views) {
-  size_t size = 1;
+  size_t size = numbers_.size();
   if (is_array()) {
     if (!(numbers.lambda >= 0)) throw InputError("the state of \"" + name_ + "\" has no lambda");
     find_in_views(views);
@@ -233,7 +247,7 @@ void FitParameter::restore(const FitState::Numbers& numbers, const std::vector<F
   optimiser_->second = numbers.second;
 }
 
-void FitParameter::remesh(double edge, const FitOptions& options, std::vector<FitView>& views) {
+void FitParameter::remesh(double edge, double smoothing, std::vector<FitView>& views) {
   const Mesh before = mesh(views);
   const std::vector<uint32_t> welded = large_steps_->welded();
   const Remeshed after = limn::remesh(before, edge * mean_edge_length(before),
@@ -243,7 +257,7 @@ void FitParameter::remesh(double edge, const FitOptions& options, std::vector<Fi
   }
   find_in_views(views);
   natural_step_ = in_view_[first_view_]->natural_step;
-  find_array(views, options);
+  find_array(views, smoothing);
   if (optimiser_->first.empty()) return;
   std::vector<double> first, second;
   const SurfaceTree tree(before);

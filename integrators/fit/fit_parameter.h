@@ -33,15 +33,15 @@ class FitParameter {
   int move(const std::vector<double>& gradient, double size, int64_t count,
            std::vector<FitView>& views);
 
-  // Of a scalar.
-  FitScalar scalar(const std::vector<FitView>& views) const;
+  // One, or the three channels of a colour; not of an array.
+  std::vector<FitScalar> scalars(const std::vector<FitView>& views) const;
   FitState::Numbers state() const;
   // The views have their state already.
   void restore(const FitState::Numbers& numbers, const std::vector<FitView>& views);
 
-  // New triangles for the shape of an array in all views, with edges `edge` times as long as now;
-  // the optimiser's state is interpolated.
-  void remesh(double edge, const FitOptions& options, std::vector<FitView>& views);
+  // New triangles for the shape of an array in all views, with edges `edge` times as long as now,
+  // and from now on that smoothing; the optimiser's state is interpolated.
+  void remesh(double edge, double smoothing, std::vector<FitView>& views);
 
  private:
   const Mesh& mesh(const std::vector<FitView>& views) const {
@@ -49,12 +49,13 @@ class FitParameter {
   }
   // Once more, after the mesh has changed.
   void find_in_views(const std::vector<FitView>& views);
-  void find_array(const std::vector<FitView>& views, const FitOptions& options);
+  void find_array(const std::vector<FitView>& views, double smoothing);
   void find_bounds(const std::vector<FitView>& views, const FitOptions& options);
   int move_vertices(const std::vector<double>& gradient, double size, int64_t count,
                     std::vector<FitView>& views);
   bool place_vertices(const std::vector<double>& positions, std::vector<FitView>& views) const;
-  void move_scalar(double gradient, double size, int64_t count, std::vector<FitView>& views);
+  void move_numbers(std::vector<double> gradient, double size, int64_t count,
+                    std::vector<FitView>& views);
   // The numbers that bounds hold for: values, or the sum of steps.
   std::vector<double> bounded_numbers(const FitView& view, size_t index) const;
 
@@ -65,7 +66,7 @@ class FitParameter {
   double natural_step_ = 0;
   double least_ = 0, most_ = 0;
   std::unique_ptr<LargeSteps> large_steps_;  // of an array
-  std::vector<double> numbers_;              // u of an array, or the sum of steps
+  std::vector<double> numbers_;              // u of an array, or the sums of steps
   std::optional<Optimiser> optimiser_;
 };
 

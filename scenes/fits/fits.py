@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 """Fits that show what limn fit does, each by one command; figures are in README.md beside this.
 
-    scenes/fits/fits.py mirrors   a shape from its image before two mirrors, also without boundary
+    scenes/fits/fits.py mirrors   a shape from its image before two mirrors, beside other gradients
+    scenes/fits/fits.py shadows   a shape out of view, from three soft shadows
+    scenes/fits/fits.py views     a shape from eight sides
     scenes/fits/fits.py pose      place, reflectance and camera of an object together
     scenes/fits/fits.py drift     from the very target: what noise does, and nothing else
 
@@ -38,9 +40,9 @@ class Fits:
         if subprocess.run(command, check=False).returncode != 0:
             sys.exit(1)
 
-    def render(self, scene, file, *defines, spp=256):
+    def render(self, scene, file, *defines, spp=256, sensor=0):
         if not os.path.exists(file):
-            words = [w for d in defines for w in ("-D", d)]
+            words = [w for d in defines for w in ("-D", d)] + ["--sensor", str(sensor)]
             self.run("render", scene, *words, "--spp", str(spp), "--seed", "99", "-o", file)
         return file
 
@@ -62,32 +64,77 @@ def scene(name):
     return os.path.join(HERE, name)
 
 
-def seconds(fit):
-    return sum(h["seconds"] for h in fit["history"])
+def seconds(history):
+    return sum(h["seconds"] for h in history)
+
+
+SHAPE_HEAD = ["fit", "steps", "chamfer", "95 %", "normals", "inside out", "crossings", "loss", "seconds"]
+
+
+def shape_row(name, steps, mesh, history):
+    loss = sum(h["loss"] for h in history[-5:]) / len(history[-5:]) if history else 0
+    return [name, steps, f"{mesh['chamfer']:.4f}", f"{mesh['hausdorff_95']:.4f}",
+            f"{mesh['normal_angle']:.1f}", mesh["inside_out"], mesh["crossings"],
+            f"{loss:.5f}" if history else "", f"{seconds(history):.0f}"]  # fmt: skip
+
+
+def shape_rows(fits, name, base, targets, truth, steps, defines, words, variants, smoothing):
+    """Of a shape that is fitted from base_start.xml, by some variants of one command."""
+    own = [w for d in defines for w in ("-D", d)]
+    own += ["--wrt", "object.vertex_positions", "--truth", truth, "--step", "2"]
+    own += [w for t in targets[1:] for w in ("--target", t)]
+    rows = []
+    for variant, more in variants:
+        folder = f"{name}_{variant.replace(' ', '_')}"
+        fit = fits.fit(folder, scene(f"{base}_start.xml"), targets[0], steps, *own, *words,
+                       "--smoothing", str(smoothing), *more)  # fmt: skip
+        first, last = (fit["snapshots"][i]["meshes"][0] for i in (0, -1))
+        if not rows:
+            rows.append(shape_row("start", 0, first, []))
+        rows.append(shape_row(variant, fit["steps"], last, fit["history"]))
+    return SHAPE_HEAD, rows
 
 
 def mirrors(fits):
     size = ["width=64", "height=32"]
     target = fits.render(scene("two_mirrors.xml"), fits.path("mirrors.exr"), *size)
+    words = ["--spp", "6", "--snapshots", "25"]
+    remesh = ["--remesh", "75,150,225"]
+    variants = [(f"seed {i}", [*remesh, "--seed", str(i)]) for i in (1, 2, 3)]
+    variants += [
+        ("no remeshing", ["--seed", "1"]),
+        ("edges of li2019", [*remesh, "--seed", "1", "--sampler", "li2019"]),
+        ("no boundary", [*remesh, "--seed", "1", "--terms", TERMS]),
+    ]
     truth = os.path.join(fits.generated, "creature.ply")
-    words = ["--wrt", "object.vertex_positions", "--truth", truth, "--spp", "6"]
-    words += ["--smoothing", "0.04", "--remesh", "75", "--snapshots", "25", "--seed", "1"]
-    words += [w for d in size for w in ("-D", d)]
-    rows = []
-    for name, more in [("all terms", []), ("no boundary", ["--terms", TERMS])]:
-        folder = "mirrors_" + name.replace(" ", "_")
-        fit = fits.fit(folder, scene("two_mirrors_start.xml"), target, 150, *words, *more)
-        first, last = (fit["snapshots"][i]["meshes"][0] for i in (0, -1))
-        shown = [(name, fit["steps"], f"{seconds(fit):.0f}", last)]
-        if not rows:
-            shown.insert(0, ("start", 0, "", first))
-        for what, step, time, mesh in shown:
-            rows.append(
-                [what, step, f"{mesh['chamfer']:.4f}", f"{mesh['hausdorff_95']:.4f}",
-                 f"{mesh['normal_angle']:.1f}", mesh["inside_out"], mesh["crossings"], time]
-            )  # fmt: skip
-    head = ["fit", "steps", "chamfer", "95 %", "normals", "inside out", "crossings", "seconds"]
-    return head, rows
+    return shape_rows(
+        fits, "mirrors", "two_mirrors", [target], truth, 300, size, words, variants, 0.1
+    )
+
+
+def shadows(fits):
+    size = ["width=64", "height=48"]
+    target = fits.render(scene("hidden_object.xml"), fits.path("shadows.exr"), *size)
+    words = ["--spp", "6", "--remesh", "50,100", "--snapshots", "25", "--seed", "1"]
+    variants = [("adjoint pixels", []), ("uniform pixels", ["--pixels", "uniform"])]
+    truth = os.path.join(fits.generated, "creature.ply")
+    return shape_rows(
+        fits, "shadows", "hidden_object", [target], truth, 150, size, words, variants, 0.1
+    )
+
+
+def views(fits):
+    size = ["width=40"]
+    targets = [
+        fits.render(scene("eight_views.xml"), fits.path(f"view_{i}.exr"), *size, sensor=i)
+        for i in range(8)
+    ]
+    words = ["--spp", "2", "--snapshots", "25", "--seed", "1"]
+    variants = [("remeshed", ["--remesh", "15,30"]), ("no remeshing", [])]
+    truth = "/usr/share/glmark2/models/bunny.obj"
+    return shape_rows(
+        fits, "views", "eight_views", targets, truth, 45, size, words, variants, 0.1
+    )
 
 
 def pose(fits):
@@ -104,11 +151,11 @@ def pose(fits):
     fit = fits.fit("pose", scene("two_mirrors.xml"), target, 160, *words)
     first, last = (fit["snapshots"][i]["meshes"][0] for i in (0, -1))
     rows = [["chamfer / diagonal", f"{first['chamfer']:.4f}", "0", f"{last['chamfer']:.5f}"]]
-    known = {"clay.reflectance": (0.4, 0.6), "sensor.translate.x": (0.2, 0)}
+    known = {f"clay.reflectance.{c}": (0.4, 0.6) for c in "rgb"} | {"sensor.translate.x": (0.2, 0)}
     for s in fit["scalars"]:
         begin, truth = known.get(s["name"], (0, ""))
         rows.append([s["name"], begin, truth, f"{s['value']:.5f}"])
-    rows.append(["seconds", "", "", f"{seconds(fit):.0f}"])
+    rows.append(["seconds", "", "", f"{seconds(fit['history']):.0f}"])
     return ["what", "start", "truth", "found"], rows
 
 
@@ -149,7 +196,7 @@ def drift(fits):
     return ["fit", "chamfer / diagonal", "normals"], rows
 
 
-EXPERIMENTS = {"mirrors": mirrors, "pose": pose, "drift": drift}
+EXPERIMENTS = {"mirrors": mirrors, "shadows": shadows, "views": views, "pose": pose, "drift": drift}
 
 
 def main():

@@ -49,6 +49,11 @@ size_t edit_distance(const std::string& a, const std::string& b) {
 
 }  // namespace
 
+std::vector<size_t> Parameter::shape() const {
+  if (colour) return {3};
+  return size == 1 ? std::vector<size_t>{} : std::vector<size_t>{size / 3, 3};
+}
+
 void Parameter::seed(Scene& scene, int lane, size_t component) const {
   CHECK_LE(0, lane);
   CHECK_LT(lane, kLanes);
@@ -94,7 +99,7 @@ Parameter find_parameter_or_array(const Scene& scene, const std::string& name) {
   const std::vector<Parameter> list = list_parameters(scene);
   for (const Parameter& p : list) {
     if (p.name == name) return p;
-    if (p.size == 1 || !name.starts_with(p.name)) continue;
+    if (!name.starts_with(p.name)) continue;
     const auto part = p.motion->part(scene, p, name.substr(p.name.size()));
     if (part) return *part;
   }

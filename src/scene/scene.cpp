@@ -41,6 +41,23 @@ Scene deep_copy(const Scene& scene) {
   return copy;
 }
 
+void use_sensor(Scene& scene, const std::string& name) {
+  std::string known;
+  for (size_t i = 0; i < scene.sensors.size(); ++i) {
+    const Sensor& sensor = scene.sensors[i];
+    if (name == std::to_string(i) || (!name.empty() && name == sensor.id)) {
+      scene.camera = sensor.camera;
+      scene.film = sensor.film;
+      scene.sample_count = sensor.sample_count;
+      scene.seed = sensor.seed;
+      return;
+    }
+    known += (i > 0 ? ", " : "") + std::to_string(i);
+    if (!sensor.id.empty()) known += " or \"" + sensor.id + "\"";
+  }
+  throw InputError({scene.file}, "there is no sensor \"" + name + "\" (known: " + known + ")");
+}
+
 void set_mesh(Scene& scene, ShapeId shape, std::vector<Vec3f> positions,
               std::vector<FaceIndices> faces, std::vector<std::string>* warnings) {
   Shape& changed = scene.shapes[shape.index()];

@@ -36,6 +36,22 @@ class ValueMotion final : public Motion {
     check_numbers(scene, name, numbers, here.values.size(), here.least, here.most);
     for (size_t k = 0; k < numbers.size(); ++k) here.values[k]->v = numbers[k];
   }
+  std::optional<Parameter> part(const Scene&, const Parameter& whole,
+                                const std::string& rest) const override {
+    const size_t channel = std::string("rgb").find(rest.substr(std::min<size_t>(1, rest.size())));
+    if (!whole.colour || rest.size() != 2 || rest[0] != '.' || channel == std::string::npos) {
+      return std::nullopt;
+    }
+    Parameter one = whole;
+    one.name += rest;
+    one.colour = false;
+    one.motion = std::make_shared<ValueMotion>([values = values_, channel](Scene& scene) {
+      ParameterRef ref = values(scene);
+      ref.values = {ref.values[channel]};
+      return ref;
+    });
+    return one;
+  }
 
  private:
   Values values_;
@@ -46,7 +62,10 @@ Parameter value_parameter(const std::string& name, const std::vector<double>& no
                           const Values& values) {
   double largest = 0;
   for (const double v : now) largest = std::max(largest, std::fabs(v));
-  return {name, "", 0.01 * (largest > 0 ? largest : 1), 1, std::make_shared<ValueMotion>(values)};
+  Parameter parameter{name, "", 0.01 * (largest > 0 ? largest : 1), 1,
+                      std::make_shared<ValueMotion>(values)};
+  parameter.colour = now.size() == 3;
+  return parameter;
 }
 
 // size: of the scene; unused without lengths.

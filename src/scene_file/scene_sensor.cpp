@@ -93,14 +93,15 @@ void read_crop(Properties& p, const Camera& camera, Film& film) {
   require_memory(p.where(), kBytesPerPixel * static_cast<double>(pixels), size, remedy);
 }
 
-void read_film(const ObjectDescription& object, const SceneDescription& description, Scene& scene) {
+void read_film(const ObjectDescription& object, const SceneDescription& description,
+               Sensor& sensor) {
   if (object.type != "hdrfilm") fail_unknown_type(object, {"hdrfilm"});
   DescribedProperties p(object, description, kNoBsdfs);
-  Film& film = scene.film;
+  Film& film = sensor.film;
   film.where = object.where;
-  scene.camera.width = bounded_integer(p, "width", 768, 1);
-  scene.camera.height = bounded_integer(p, "height", 576, 1);
-  read_crop(p, scene.camera, film);
+  sensor.camera.width = bounded_integer(p, "width", 768, 1);
+  sensor.camera.height = bounded_integer(p, "height", 576, 1);
+  read_crop(p, sensor.camera, film);
   film.sample_border = p.boolean("sample_border", false);
   choice(p, "file_format", "openexr", {"openexr", "exr"});
   film.luminance = choice(p, "pixel_format", "rgb", {"luminance", "rgb"}) == "luminance";
@@ -116,13 +117,13 @@ void read_film(const ObjectDescription& object, const SceneDescription& descript
 }
 
 void read_sampler(const ObjectDescription& object, const SceneDescription& description,
-                  Scene& scene) {
+                  Sensor& sensor) {
   if (object.type != "independent") fail_unknown_type(object, {"independent"});
   DescribedProperties p(object, description, kNoBsdfs);
-  scene.sample_count = bounded_integer(p, "sample_count", 4, 1);
+  sensor.sample_count = bounded_integer(p, "sample_count", 4, 1);
   const int64_t seed = p.integer("seed", 0);
   if (seed < 0) p.fail("seed", "must not be negative");
-  scene.seed = static_cast<uint64_t>(seed);
+  sensor.seed = static_cast<uint64_t>(seed);
   p.check_all_used();
 }
 
@@ -198,16 +199,17 @@ void read_axes(Properties& p, Camera& camera) {
 
 }  // namespace
 
-void read_sensor(const ObjectDescription& sensor, const SceneDescription& description,
-                 Scene& scene) {
+Sensor read_sensor(const ObjectDescription& sensor, const SceneDescription& description) {
+  Sensor read;
+  read.id = sensor.id;
   if (sensor.type != "perspective") fail_unknown_type(sensor, {"perspective"});
   DescribedProperties p(sensor, description, kNoBsdfs);
-  Camera& camera = scene.camera;
+  Camera& camera = read.camera;
   if (const ObjectDescription* film = p.nested("film")) {
-    read_film(*film, description, scene);
+    read_film(*film, description, read);
   }
   if (const ObjectDescription* sampler = p.nested("sampler")) {
-    read_sampler(*sampler, description, scene);
+    read_sampler(*sampler, description, read);
   }
   read_fov(p, camera);
   read_axes(p, camera);
@@ -222,6 +224,7 @@ void read_sensor(const ObjectDescription& sensor, const SceneDescription& descri
   p.number("shutter_close", 0);
   p.number("focus_distance", camera.far_clip);
   p.check_all_used();
+  return read;
 }
 
 }  // namespace limn

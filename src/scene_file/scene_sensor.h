@@ -5,9 +5,7 @@
 
 namespace limn {
 
-// Reads `sensor` (with its film, filter and sampler) into the scene's camera, film, sample count
-// and seed.
-void read_sensor(const ObjectDescription& sensor, const SceneDescription& description,
-                 Scene& scene);
+// Reads `sensor`, with its film, filter and sampler.
+Sensor read_sensor(const ObjectDescription& sensor, const SceneDescription& description);
 
 }  // namespace limn

@@ -35,7 +35,10 @@ class SceneBuilder {
     for (const auto& object : description_.objects) {
       if (object->tag == "bsdf") bsdf(*object);
     }
-    if (!sensor_) throw InputError(description_.where, "<scene>: there is no sensor");
+    if (scene_.sensors.empty()) {
+      throw InputError(description_.where, "<scene>: there is no sensor");
+    }
+    use_sensor(scene_, "0");
     if (warnings_) warn_of_overlaps(scene_, *warnings_);
     return std::move(scene_);
   }
@@ -46,8 +49,7 @@ class SceneBuilder {
       only_one(object, "integrator", integrator_);
       read_integrator(object);
     } else if (object.tag == "sensor") {
-      only_one(object, "sensor", sensor_);
-      read_sensor(object, description_, scene_);
+      scene_.sensors.push_back(read_sensor(object, description_));
     } else if (object.tag == "shape") {
       add_shape(object);
     } else if (object.tag == "emitter") {
@@ -215,7 +217,6 @@ class SceneBuilder {
   int bsdf_depth_ = 0;
   double unasked_ = 0;  // bytes of shapes since memory was asked for
   const ObjectDescription* integrator_ = nullptr;
-  const ObjectDescription* sensor_ = nullptr;
   const ObjectDescription* environment_ = nullptr;
 };
 
@@ -225,6 +226,14 @@ Scene read_scene(const std::string& file, const std::map<std::string, std::strin
                  std::vector<std::string>* warnings) {
   const SceneDescription description = describe_scene(file, defines, nullptr);
   return SceneBuilder(description, warnings).build();
+}
+
+size_t count_sensors(const std::string& file, const std::map<std::string, std::string>& defines) {
+  size_t count = 0;
+  for (const auto& object : describe_scene(file, defines, nullptr).objects) {
+    count += object->tag == "sensor" ? 1 : 0;
+  }
+  return count;
 }
 
 Scene read_scene_text(const std::string& text, const std::string& folder,

@@ -88,10 +88,20 @@ Image random_adjoint(const Scene& scene, uint64_t seed) {
   return adjoint;
 }
 
+// Of the name of a part, 0 to 2; 3 of other names.
+size_t channel_of(const std::string& name) {
+  const std::string end = name.substr(name.size() - 2);
+  return end == ".r" ? 0 : end == ".g" ? 1 : end == ".b" ? 2 : 3;
+}
+
 // What a parameter's derivative is summed from, in magnitude.
 double magnitude(const Scene& scene, const BackwardResult& result, const std::string& name) {
-  double sum = std::fabs(result.of(name).moments.mean(0));
   const Parameter parameter = find_parameter(scene, name);
+  double sum = 0;
+  // Those of a channel are smaller than those of its colour.
+  const std::string whole = channel_of(name) < 3 ? name.substr(0, name.size() - 2) : name;
+  const Moments& m = result.of(whole).moments;
+  for (size_t i = 0; i < m.size(); ++i) sum += std::fabs(m.mean(i));
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     const std::vector<Vec3d> velocity = parameter.velocities(scene, ShapeId(s));
     if (velocity.empty()) continue;
@@ -116,15 +126,25 @@ void expect_same_interior(const Scene& scene) {
   settings.seed = 5;
   const BackwardResult reverse = backward(scene, adjoint, options, settings);
   GradientOptions forward_options;
-  for (const ParameterAdjoint& p : reverse.parameters)
-    if (p.shape.empty()) forward_options.parameters.push_back(p.name);
+  for (const ParameterAdjoint& p : reverse.parameters) {
+    if (p.shape.size() == 2) continue;
+    const bool colour = !p.shape.empty();
+    for (const char* part : {".r", ".g", ".b"}) {
+      if (colour) forward_options.parameters.push_back(p.name + part);
+    }
+    forward_options.parameters.push_back(p.name);
+  }
   forward_options.terms = {"interior"};
   forward_options.method = "forest";
   const GradientResult forward = gradient(scene, forward_options, settings);
   for (const ParameterGradient& p : forward.parameters) {
     double sum = 0;
     for (size_t k = 0; k < adjoint.data.size(); ++k) sum += adjoint.data[k] * p.total.mean(k);
-    const double found = reverse.of(p.name).moments.mean(0);
+    const size_t channel = channel_of(p.name);
+    const bool part = channel < 3;
+    const Moments& m = reverse.of(part ? p.name.substr(0, p.name.size() - 2) : p.name).moments;
+    double found = m.mean(part ? channel : 0);
+    if (!part && m.size() == 3) found += m.mean(1) + m.mean(2);  // along grey
     EXPECT_NEAR(found, sum, 1e-12 * magnitude(scene, reverse, p.name)) << p.name;
   }
 }
@@ -159,6 +179,30 @@ TEST(Backward, AgreesInMirrors) {
   expect_agreement(mirror_scene(files, false), 32);
 }
 
+// Any sampler of edges has the same mean.
+TEST(Backward, AgreesWithOtherSamplers) {
+  const TempFiles files;
+  const Scene scene = mirror_scene(files, true);
+  const Image adjoint = random_adjoint(scene, 4);
+  BackwardOptions options;
+  options.terms = {"boundary"};
+  options.parameters = {"body.translate.x", "body.translate.y", "body.scale", "lamp.translate.z"};
+  RunSettings settings;
+  settings.spp = 64;
+  const BackwardResult one = backward(scene, adjoint, options, settings);
+  options.sampler = "li2019";
+  settings.seed = 1;
+  const BackwardResult other = backward(scene, adjoint, options, settings);
+  for (const std::string& name : options.parameters) {
+    const Moments &a = one.of(name).moments, &b = other.of(name).moments;
+    EXPECT_NE(a.mean(0), b.mean(0)) << name;
+    EXPECT_LT(std::fabs(a.mean(0) - b.mean(0)), 5 * std::sqrt(a.variance(0) + b.variance(0)))
+        << name;
+  }
+  options.sampler = "oak";
+  EXPECT_THROW(backward(scene, adjoint, options, settings), InputError);
+}
+
 TEST(Backward, AgreesInSharpShadows) {
   const TempFiles files;
   expect_agreement(shadow_scene(files), 64);
@@ -191,6 +235,81 @@ TEST(Backward, LossIsUnbiasedAtItsTarget) {
     EXPECT_LT(std::fabs(values.mean(0)), 4.5 * std::sqrt(values.variance(0))) << name;
     EXPECT_LT(std::fabs(values.mean(1)), 4.5 * std::sqrt(values.variance(1))) << name;
   }
+}
+
+// The loss of a pyramid from its definition: every block of 2^k by 2^k pixels by itself.
+double pyramid_loss(const std::vector<double>& a, const std::vector<double>& b, const Image& target,
+                    const Image& mask, int levels, bool relative) {
+  const int width = target.width, height = target.height;
+  double all = 0, loss = 0;
+  for (const float w : mask.data) all += 3 * w;
+  for (int size = 1, k = 0; k < levels; ++k, size *= 2) {
+    for (int y = 0; y < height; y += size) {
+      for (int x = 0; x < width; x += size) {
+        for (int c = 0; c < 3; ++c) {
+          double weight = 0, sums[3] = {};
+          for (int i = 0; i < size * size; ++i) {
+            const int u = x + i % size, v = y + i / size;
+            if (u >= width || v >= height || mask.at(u, v, 0) == 0) continue;
+            const double w = mask.at(u, v, 0);
+            const size_t at = 3 * (static_cast<size_t>(v) * width + u) + c;
+            weight += w;
+            sums[0] += w * a[at];
+            sums[1] += w * b[at];
+            sums[2] += w * target.at(u, v, c);
+          }
+          if (weight == 0) continue;
+          for (double& sum : sums) sum /= weight;
+          const double one = (sums[0] - sums[2]) * (sums[1] - sums[2]);
+          loss += weight / all / levels * (relative ? one / (sums[2] * sums[2] + 0.01) : one);
+        }
+      }
+    }
+  }
+  return loss;
+}
+
+TEST(Backward, LossOfAPyramidIsThatOfItsBlocks) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.width = 7;
+  parts.height = 5;
+  parts.body = square("floor", 3, -90, {0, 0, 0}, diffuse("clay", ".6, .5, .4")) +
+               square("lamp", 0.8, 90, {0.5, 3.5, 1}, area_light("glow", "6, 6, 6"));
+  const Scene scene = make_scene(files, parts);
+  EXPECT_EQ(most_pyramid_levels(scene), 4);
+  RunSettings settings;
+  settings.spp = 2;
+  settings.seed = 5;
+  std::vector<std::vector<double>> images;
+  for (int i = 0; i < 2; ++i) {  // those of image_loss()
+    RunSettings own = settings;
+    own.seed = mix_bits(mix_bits(settings.seed) + 1 + i);
+    images.push_back(means(render(scene, own).radiance));
+  }
+  Image target(7, 5, 3), mask(7, 5, 1);
+  for (size_t i = 0; i < target.data.size(); ++i) target.data[i] = 0.1f * (i % 7);
+  for (size_t i = 0; i < mask.data.size(); ++i) mask.data[i] = static_cast<float>(i % 4);
+  target.at(4, 0, 1) = NAN;  // where the mask is zero
+  for (const bool relative : {false, true}) {
+    for (const int levels : {1, 2, 4}) {
+      const LossKind kind = relative ? LossKind::kRelativeL2 : LossKind::kL2;
+      const LossResult loss = image_loss(scene, target, kind, settings, mask, levels);
+      const auto exact = [&](size_t at, double step) {
+        std::vector<std::vector<double>> moved = images;
+        for (auto& image : moved) image[at] += step;
+        return pyramid_loss(moved[0], moved[1], target, mask, levels, relative);
+      };
+      EXPECT_NEAR(loss.value, exact(0, 0), 1e-12) << levels;
+      for (size_t i = 0; i < loss.adjoint.data.size(); ++i) {
+        // A parabola: its difference is the derivative.
+        const double slope = (exact(i, 0.5) - exact(i, -0.5));
+        EXPECT_NEAR(loss.adjoint.data[i], slope, 1e-7 * std::fabs(slope) + 1e-12) << levels;
+      }
+    }
+  }
+  EXPECT_THROW(image_loss(scene, target, LossKind::kL2, settings, mask, 5), InputError);
+  EXPECT_THROW(image_loss(scene, target, LossKind::kL2, settings, mask, 0), InputError);
 }
 
 TEST(Backward, LossImagesThatDoNotFitAreNamed) {

@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -138,6 +139,42 @@ TEST_F(Program, FitsAndGoesOn) {
   EXPECT_FALSE(std::ifstream(files_.path("other") + "/state.cbor"));
 }
 
+// Each sensor of a scene has its target.
+TEST_F(Program, FitsSeenBySeveralSensors) {
+  std::string text = bytes_of(scene_);
+  const size_t at = text.find("<sensor"), end = text.find("</sensor>") + 9;
+  std::string second = text.substr(at, end - at);
+  second.replace(0, 7, "<sensor id=\"side\"");
+  const size_t origin = second.find("origin=\"");
+  second.replace(origin, second.find('"', origin + 8) - origin, "origin=\"3, 1, 2");
+  text.insert(end, second);
+  const std::string both = files_.write("both.xml", text);
+  std::string targets, swapped, folder = files_.path("sensors");
+  for (const char* sensor : {"0", "side"}) {
+    const std::string file = files_.path(std::string(sensor) + ".exr");
+    ASSERT_EQ(run("render " + both + " --sensor " + sensor + " --spp 64 -o " + file).status, 0);
+    targets += " --target " + file;
+    swapped.insert(0, " --target " + file);
+  }
+  EXPECT_NE(bytes_of(files_.path("0.exr")), bytes_of(files_.path("side.exr")));
+  const std::string fit = "fit " + both + " --wrt blaze.radiance --spp 16 --steps 1 --no-report";
+  std::vector<double> losses;
+  for (const std::string& order : {targets, swapped}) {
+    folder += "_";
+    ASSERT_EQ(run(fit + order + " -o " + folder).status, 0);
+    const json first = json::parse(bytes_of(folder + "/fit.json"))["history"][0];
+    ASSERT_EQ(first["views"].size(), 2u);
+    losses.push_back(first["loss"]);
+  }
+  EXPECT_GT(losses[1], 10 * std::fabs(losses[0]));
+  EXPECT_NE(refused(fit + " --target " + files_.path("0.exr") + " -o " + files_.path("no"))
+                .find("1 --target for 2 views"),
+            std::string::npos);
+  EXPECT_NE(refused("render " + both + " --sensor top -o " + out())
+                .find("both.xml: error: there is no sensor \"top\" (known: 0, 1 or \"side\")"),
+            std::string::npos);
+}
+
 // A shape of the second view alone, whose id is no name of a file; a field, named from where the
 // program runs; new triangles after the last step.
 TEST_F(Program, FitsOfLaterViewsAndFields) {
@@ -160,6 +197,14 @@ TEST_F(Program, FitsOfLaterViewsAndFields) {
   EXPECT_EQ(json::parse(bytes_of(folder + "/fit.json"))["snapshots"][1]["meshes"].size(), 2u);
   const Outcome on = run("fit --no-report --steps 2 --resume " + folder);
   EXPECT_EQ(on.status, 0) << on.text;
+  files_.write("field.txt", "0 0 1\n0 0 1\n0 0 1\n0 0 2\n");
+  EXPECT_NE(refused("fit --no-report --steps 3 --resume " + folder)
+                .find("field.txt: error: is not as it was when the fit in "),
+            std::string::npos);
+  const Outcome backward = run("backward " + second + " --spp 1 --target " + target +
+                               " --wrt a/b.vertex_positions -o " + files_.path("back"));
+  EXPECT_EQ(backward.status, 0) << backward.text;
+  EXPECT_GT(bytes_of(files_.path("back") + "/a_b.vertex_positions.ply").size(), 500u);
   EXPECT_NE(call(fit + " --wrt screen.vertex_positions:fit.json -o .")
                 .text.find("fit.json: error: -o would write over a file that is read"),
             std::string::npos);
@@ -211,6 +256,13 @@ TEST_F(Program, InterruptedFitsKeepPicturesAndTellWhatIsDamaged) {
   changed.replace(changed.find("0.7, 0.5, 0.3"), 3, "0.6");
   files_.write("scene.xml", changed);
   says("scene.xml: error: is not as it was when the fit in ");
+  changed.replace(changed.find("0.6, 0.5, 0.3"), 3, "0.7");
+  files_.write("scene.xml", changed);
+  const Image image = read_exr(target);
+  Image other_image = image;
+  other_image.data[5] += 1;
+  write_exr(target, other_image, false, {});
+  says("target.exr: error: is not as it was when the fit in ");
 }
 
 TEST_F(Program, BackwardWritesWhatOthersRead) {

@@ -22,6 +22,26 @@ def test_render_has_the_programs_bits(scene, program, threads):
     assert same(limn.render(scene).value, program("render"))
 
 
+def test_an_estimate_computes_like_its_value(scene):
+    image = limn.render(scene, spp=2)
+    value, other = image.value, np.full_like(image.value, 0.5)
+    assert image.shape == value.shape == np.shape(image) and image.dtype == np.float32
+    assert len(image) == len(value) and same(image[2:, ..., 1], value[2:, ..., 1])
+    for found, expected in [
+        (image + other, value + other), (other + image, other + value), (1 + image, 1 + value),
+        (image - image, value - value), (2.5 - image, 2.5 - value), (other - image, other - value),
+        (image * 3, value * 3), (3 * image, 3 * value), (image / other, value / other),
+        (1 / (1 + image), 1 / (1 + value)), (1 / image[:1, :1], 1 / value[:1, :1]),
+        (-image, -value), (abs(-image), value), ((image - other) ** 2, (value - other) ** 2),
+        (image**2, value**2),
+    ]:
+        assert same(found, expected)
+    fov = limn.backward(scene, np.ones(image.shape, np.float32), "sensor.fov", spp=2)["sensor.fov"]
+    assert float(fov) == fov.value[()]
+    with pytest.raises(ValueError):
+        image + np.zeros((2, 2, 2))
+
+
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("arguments, words", [
     ({"spp": 3, "seed": 7}, ["--spp", "3", "--seed", "7"]),

@@ -199,3 +199,33 @@ def test_images_come_back(tmp_path):
     limn.write_signed_png(tmp_path / "b.png", pixels - 0.5, scale=0.5)
     for name in ("a.png", "b.png"):
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
+
+
+def test_other_sensors_are_views(scene, folder):
+    text = (folder / "scene.xml").read_text()
+    at, end = text.index("<sensor"), text.index("</sensor>") + len("</sensor>")
+    second = text[at:end].replace("<sensor", '<sensor id="side"').replace('value="40"', 'value="55"')
+    both = limn.load_string(text[:end] + second + text[end:], folder)
+    assert both.sensors == ["", "side"] and scene.sensors == [""]
+    assert same(limn.render(both, spp=1).value, limn.render(scene, spp=1).value)
+    assert both["sensor.fov"] == 40
+    both["clay.reflectance"] = [0.1, 0.2, 0.3]
+    for name in ("side", 1):
+        side = both.view(name)
+        assert side["sensor.fov"] == 55 and side["clay.reflectance"].tolist() == [0.1, 0.2, 0.3]
+    assert both["sensor.fov"] == 40
+    with pytest.raises(limn.InputError, match=r'no sensor "2" \(known: 0, 1 or "side"\)'):
+        both.view(2)
+
+
+def test_meshes_are_written(scene, tmp_path):
+    mesh = scene.mesh("tent")
+    limn.write_ply(tmp_path / "tent.ply", mesh.positions, mesh.faces)
+    again = limn.load_string(
+        '<scene version="3.0.0"><sensor type="perspective"/><shape type="ply" id="m">'
+        '<string name="filename" value="tent.ply"/></shape></scene>', tmp_path).mesh("m")
+    assert same(again.positions, mesh.positions) and same(again.faces, mesh.faces)
+    for bad in [(mesh.positions[:, :2], mesh.faces), (mesh.positions, mesh.faces + 1),
+                (mesh.positions, mesh.faces.astype(float)), (mesh.positions, mesh.faces.ravel())]:
+        with pytest.raises(limn.InputError):
+            limn.write_ply(tmp_path / "bad.ply", *bad)

@@ -191,6 +191,27 @@ TEST_F(Parameters, AreListed) {
   }
 }
 
+// Channels of a colour: each moves by itself, and is not listed.
+TEST_F(Parameters, ColoursHaveChannels) {
+  for (const char* name : {"lamp.radiance.g", "metal.specular_reflectance.b", "sun.irradiance.r"}) {
+    expect_derivative(scene_, name);
+  }
+  const Parameter green = find_parameter(scene_, "lamp.radiance.g");
+  EXPECT_EQ(green.value(scene_), std::vector<double>{2});
+  green.assign(scene_, {0.5});
+  const Parameter lamp = find_parameter(scene_, "lamp.radiance");
+  EXPECT_EQ(lamp.value(scene_), (std::vector<double>{1, 0.5, 3}));
+  EXPECT_THROW(green.assign(scene_, {-1}), InputError);
+  EXPECT_EQ(lamp.shape(), std::vector<size_t>{3});
+  EXPECT_TRUE(green.shape().empty());
+  EXPECT_EQ(find_parameter_or_array(scene_, "tent.vertex_positions").shape(),
+            (std::vector<size_t>{6, 3}));
+  for (const char* name : {"metal.alpha.r", "lamp.radiance.", "lamp.radiance.rg", "lamp.radiance.x",
+                           "lamp.radiance.g.g", "lamp.radiancer"}) {
+    EXPECT_THROW(find_parameter(scene_, name), UnknownParameter) << name;
+  }
+}
+
 // An array's components, summed over the first copies, are any motion of the shape.
 TEST_F(Parameters, ComponentsOfAnArrayAddUpToAnyMotion) {
   const Parameter array = find_parameter_or_array(scene_, "tent.vertex_positions");

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "limn/core/error.h"
 #include "limn/core/properties.h"
 #include "limn/core/scene.h"
 #include "support/temp_files.h"
@@ -191,6 +192,38 @@ TEST(Scene, IncludesReferencesAndAliases) {
   EXPECT_EQ(s.shapes[0].bsdf, s.shapes[2].bsdf);
   EXPECT_EQ(s.shapes[0].bsdf, s.bsdfs_by_id.at("mine"));
   EXPECT_EQ(s.bsdfs_by_id.count("unused"), 1u);
+}
+
+// The first sensor is the scene's; the others wait.
+TEST(Scene, HasSeveralSensors) {
+  Scene s = read(
+      "<sensor type=\"perspective\"><float name=\"fov\" value=\"30\"/></sensor>"
+      "<sensor type=\"perspective\" id=\"side\"><float name=\"fov\" value=\"60\"/>"
+      "<film type=\"hdrfilm\"><integer name=\"width\" value=\"8\"/></film>"
+      "<sampler type=\"independent\"><integer name=\"sample_count\" value=\"7\"/>"
+      "<integer name=\"seed\" value=\"5\"/></sampler></sensor>");
+  EXPECT_EQ(s.sensors.size(), 2u);
+  EXPECT_EQ(s.camera.fov.v, 30);
+  EXPECT_EQ(s.film.crop_width, 768);
+  for (const char* name : {"side", "1"}) {
+    use_sensor(s, "0");
+    EXPECT_EQ(s.camera.fov.v, 30);
+    EXPECT_EQ(s.sample_count, 4);
+    use_sensor(s, name);
+    EXPECT_EQ(s.camera.fov.v, 60);
+    EXPECT_EQ(s.film.crop_width, 8);
+    EXPECT_EQ(s.camera.width, 8);
+    EXPECT_EQ(s.sample_count, 7);
+    EXPECT_EQ(s.seed, 5u);
+  }
+  for (const char* name : {"2", "", "front"}) {
+    try {
+      use_sensor(s, name);
+      ADD_FAILURE() << name;
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find("(known: 0, 1 or \"side\")"), std::string::npos);
+    }
+  }
 }
 
 TEST(Scene, KnowsTheFilesItWasReadFrom) {

@@ -140,6 +140,26 @@ double error_of(const Moments& g) {
 // JSON has no NaN.
 json number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
 
+// A number, or the channels of a colour.
+json write_numbers(const ParameterAdjoint& p, bool quiet) {
+  json values = json::array(), errors = json::array();
+  for (size_t i = 0; i < p.moments.size(); ++i) {
+    const double value = p.moments.mean(i), error = std::sqrt(p.moments.variance(i));
+    values.push_back(value);
+    errors.push_back(number(error));
+    if (quiet) continue;
+    const std::string name = p.shape.empty() ? p.name : p.name + "." + "rgb"[i];
+    fmt::print("{:32} {:14.6g} +- {:.2g}\n", name, value, error);
+  }
+  const bool one = p.shape.empty();
+  json entry = {{"name", p.name},
+                {"unit", p.unit},
+                {"value", one ? values[0] : values},
+                {"stderr", one ? errors[0] : errors}};
+  if (!one) entry["shape"] = p.shape;
+  return entry;
+}
+
 }  // namespace
 
 std::vector<PlannedFile> BackwardFiles::planned(const std::string& also) const {
@@ -165,10 +185,10 @@ BackwardFiles plan_files(const Scene& scene, const std::vector<std::string>& par
     if (parameter.size == 1) return;
     for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
       if (parameter.velocities(scene, ShapeId(s)).empty()) continue;
-      files.arrays.push_back({parameter.name, ShapeId(s), in_folder(parameter.name + ".ply"),
-                              in_folder(parameter.name + ".npy"),
-                              in_folder(parameter.name + ".txt"),
-                              in_folder(parameter.name + ".png")});
+      const std::string name = file_part(parameter.name);
+      files.arrays.push_back({parameter.name, ShapeId(s), in_folder(name + ".ply"),
+                              in_folder(name + ".npy"), in_folder(name + ".txt"),
+                              in_folder(name + ".png")});
     }
   };
   for (const std::string& name : parameters) add(find_parameter_or_array(scene, name));
@@ -183,11 +203,8 @@ json write_parameters(const Scene& scene, const BackwardFiles& files, const Back
   const auto tracer = make_embree_tracer(scene, 1);
   json list = json::array();
   for (const ParameterAdjoint& p : result.parameters) {
-    if (p.shape.empty()) {
-      const double value = p.moments.mean(0), error = std::sqrt(p.moments.variance(0));
-      list.push_back(
-          {{"name", p.name}, {"unit", p.unit}, {"value", value}, {"stderr", number(error)}});
-      if (!quiet) fmt::print("{:32} {:14.6g} +- {:.2g}\n", p.name, value, error);
+    if (p.shape.size() < 2) {
+      list.push_back(write_numbers(p, quiet));
       continue;
     }
     for (const BackwardFiles::Array& array : files.arrays) {

@@ -33,6 +33,11 @@ class BackwardCommand final : public Command {
     auto* target = app.add_option("--target", target_, "Image that the loss compares with (.exr)");
     adjoint->excludes(target);
     app.add_option("--loss", loss_, "With --target: l2, relative-l2 or l1")->needs(target);
+    app.add_option("--pyramid", levels_,
+                   "With --target: the mean over the loss of the image as it is, at half its size, "
+                   "a quarter, ...: as many levels")
+        ->check(CLI::Range(1, 32))
+        ->needs(target);
     app.add_option("--wrt", options_.parameters,
                    "Parameter, an array (SHAPE.vertex_positions) or a scalar; may be repeated "
                    "(default: all of the scene)");
@@ -40,6 +45,9 @@ class BackwardCommand final : public Command {
     app.add_option("--pixels", pixels_,
                    "Where paths go: adjoint (where the loss depends on the image) or uniform")
         ->check(CLI::IsMember({"adjoint", "uniform"}));
+    app.add_option("--sampler", options_.sampler,
+                   "Of edges: forest, or another one to compare with")
+        ->capture_default_str();
     app.add_option("--edge-samples", options_.edge_samples, "At every vertex of a path")
         ->check(CLI::Range(1, 1 << 16));
     app.add_option("--camera-samples", options_.camera_samples,
@@ -137,7 +145,7 @@ class BackwardCommand final : public Command {
     settings.seconds *= kImageShare;
     const Image target = read_exr(target_);
     check_loss_images(scene, target, {}, target_);
-    loss = image_loss(scene, target, kind, settings);
+    loss = image_loss(scene, target, kind, settings, {}, levels_);
     if (kind == LossKind::kL1) {
       warnings_.add_all(
           {"the gradient of l1 is biased where the image's noise is not small beside "
@@ -244,6 +252,7 @@ class BackwardCommand final : public Command {
   BackwardFiles files_;
   std::string adjoint_, target_, output_, terms_;
   std::string loss_ = "l2", pixels_ = "adjoint";
+  int levels_ = 1;
   double seconds_ = 0;  // 0: as many samples as are asked for
   bool stats_ = false, loss_only_ = false;
 };

@@ -266,6 +266,7 @@ class CompareCommand final : public Command {
 
 void CompareCommand::add_options(CLI::App& app, bool all) {
   add_common_options(app, common_);
+  app.remove_option(app.get_option("--sensor"));  // Mitsuba's methods take the first
   app.add_option("--wrt", command_.parameter, "Parameter to differentiate")
       ->required()
       ->type_name("PARAM");

@@ -58,6 +58,7 @@ class FitCommand final : public Command {
 
  private:
   void add_sampling_options(CLI::App& app);
+  std::vector<ViewArguments> view_arguments() const;
   FitArguments arguments() const;
   std::vector<FitView> read_views(const FitArguments& arguments);
   void check_resume() const;
@@ -81,7 +82,9 @@ void FitCommand::add_options(CLI::App& app, bool) {
   add_common_options(app, common_);
   app.get_option("scene")->required(false);
   app.remove_option(app.get_option("--json"));
-  app.add_option("--target", targets_, "Image to reach (.exr): one for the scene and each --view")
+  app.remove_option(app.get_option("--sensor"));
+  app.add_option("--target", targets_,
+                 "Image to reach (.exr): one for each sensor of the scene, then of each --view")
       ->type_name("EXR")
       ->allow_extra_args(false);
   app.add_option("--mask", masks_,
@@ -101,8 +104,14 @@ void FitCommand::add_options(CLI::App& app, bool) {
   steps_option_ = app.add_option("--steps", given_.steps, "Steps in all")
                       ->check(CLI::Range(int64_t{1}, int64_t{1} << 40));
   app.add_option("--loss", given_.loss, "l2, relative-l2 or l1")->capture_default_str();
+  app.add_option(
+         "--pyramid", given_.pyramid,
+         "Levels: the mean over the loss of the image as it is, at half its size, a quarter, "
+         "...")
+      ->check(CLI::Range(1, 32))
+      ->capture_default_str();
   app.add_option("--optimiser,--optimizer", given_.optimiser,
-                 "adam-uniform (one scale for all numbers of an array), adam, gradient-descent")
+                 "adam-uniform (one scale for all vertices of a shape), adam, gradient-descent")
       ->capture_default_str();
   app.add_option("--step", given_.step,
                  "Of the first step, in natural steps: 1 % of a shape's diagonal, 0.01 radians, "
@@ -122,6 +131,9 @@ void FitCommand::add_options(CLI::App& app, bool) {
       ->check(CLI::PositiveNumber);
   app.add_option("--remesh-edge", given_.remesh_edge, "Length of edges then, over what it was")
       ->check(CLI::Range(0.1, 10.0))
+      ->capture_default_str();
+  app.add_option("--remesh-shrink", given_.remesh_shrink, "Steps and smoothing then, likewise")
+      ->check(CLI::Range(0.01, 1.0))
       ->capture_default_str();
   add_sampling_options(app);
   app.add_option("--snapshots", given_.snapshots,
@@ -148,11 +160,51 @@ void FitCommand::add_sampling_options(CLI::App& app) {
                  "Where paths go: adjoint (where the loss depends on the image) or uniform")
       ->check(CLI::IsMember({"adjoint", "uniform"}))
       ->capture_default_str();
+  app.add_option("--sampler", given_.sampler, "Of edges: forest, or another one to compare with")
+      ->capture_default_str();
   app.add_option("--edge-samples", given_.edge_samples, "At every vertex of a path")
       ->check(CLI::Range(1, 1 << 16));
   app.add_option("--camera-samples", given_.camera_samples,
                  "Points on silhouettes of the film, for each path")
       ->check(CLI::PositiveNumber);
+}
+
+// The scene and those of --view, each with all its sensors, in turn: a target for each.
+std::vector<ViewArguments> FitCommand::view_arguments() const {
+  std::vector<ViewArguments> scenes{{absolute(common_.scene), common_.defines, "", "", "", {}}};
+  for (const std::string& text : views_) {
+    ViewArguments view;
+    std::stringstream stream(text);
+    std::getline(stream, view.scene, ';');
+    view.scene = absolute(view.scene);
+    for (std::string define; std::getline(stream, define, ';');) {
+      const size_t equals = define.find('=');
+      if (equals == define.npos || equals == 0) {
+        throw InputError("--view " + text + ": expected SCENE;NAME=VALUE;...");
+      }
+      view.defines[define.substr(0, equals)] = define.substr(equals + 1);
+    }
+    scenes.push_back(view);
+  }
+  std::vector<ViewArguments> views;
+  for (const ViewArguments& scene : scenes) {
+    const size_t sensors = count_sensors(scene.scene, scene.defines);
+    for (size_t i = 0; i < sensors; ++i) {
+      views.push_back(scene);
+      views.back().sensor = std::to_string(i);
+    }
+  }
+  if (targets_.size() != views.size()) {
+    throw InputError(fmt::format(
+        "{} --target for {} views: each sensor of the scene needs one, then each of --view in turn",
+        targets_.size(), views.size()));
+  }
+  if (masks_.size() > targets_.size()) throw InputError("there are more --mask than --target");
+  for (size_t v = 0; v < views.size(); ++v) {
+    views[v].target = absolute(targets_[v]);
+    if (v < masks_.size() && masks_[v] != "-") views[v].mask = absolute(masks_[v]);
+  }
+  return views;
 }
 
 FitArguments FitCommand::arguments() const {
@@ -163,12 +215,6 @@ FitArguments FitCommand::arguments() const {
   need(!given_.parameters.empty(), "--wrt");
   need(steps_option_->count() > 0, "--steps");
   need(!output_.empty(), "-o FOLDER");
-  if (targets_.size() != views_.size() + 1) {
-    throw InputError(fmt::format(
-        "{} --target for {} views: each needs one, the scene's first, then those of --view in turn",
-        targets_.size(), views_.size() + 1));
-  }
-  if (masks_.size() > targets_.size()) throw InputError("there are more --mask than --target");
   FitArguments a = given_;
   a.terms = parse_terms(terms_);
   a.shading = common_.shading;
@@ -177,23 +223,7 @@ FitArguments FitCommand::arguments() const {
   for (std::string& text : a.bounds) {
     text = with_absolute_field(text, std::min(text.size(), text.rfind('=')));
   }
-  for (size_t v = 0; v < targets_.size(); ++v) {
-    ViewArguments view{common_.scene, common_.defines, absolute(targets_[v]), "", ""};
-    if (v > 0) {
-      std::stringstream stream(views_[v - 1]);
-      std::getline(stream, view.scene, ';');
-      for (std::string define; std::getline(stream, define, ';');) {
-        const size_t equals = define.find('=');
-        if (equals == define.npos || equals == 0) {
-          throw InputError("--view " + views_[v - 1] + ": expected SCENE;NAME=VALUE;...");
-        }
-        view.defines[define.substr(0, equals)] = define.substr(equals + 1);
-      }
-    }
-    view.scene = absolute(view.scene);
-    if (v < masks_.size() && masks_[v] != "-") view.mask = absolute(masks_[v]);
-    a.views.push_back(view);
-  }
+  a.views = view_arguments();
   if (a.snapshots == 0) a.snapshots = static_cast<int>(std::max<int64_t>(1, a.steps / 10));
   return a;
 }
@@ -204,6 +234,7 @@ std::vector<FitView> FitCommand::read_views(const FitArguments& arguments) {
     CommonOptions common;
     common.scene = view.scene;
     common.defines = view.defines;
+    common.sensor = view.sensor;
     common.shading = arguments.shading;
     FitView read{load_scene(common, warnings_), read_exr(view.target), {}};
     if (!view.mask.empty()) read.mask = read_exr(view.mask);
@@ -249,7 +280,7 @@ int FitCommand::run(const std::string&) {
     folder.set_samples(settings.spp, settings.seed);
     folder.prepare(views);
   } else {
-    folder.check_scenes(views);
+    folder.check_inputs(views);
   }
   settings.spp = folder.arguments().spp;
   settings.seed = folder.arguments().seed;

@@ -75,10 +75,11 @@ void print_camera(const Scene& scene) {
 
 // An array is listed once, with the number of its numbers.
 void print_parameter(const Parameter& parameter) {
-  fmt::print("  {}  [{}]{}\n", parameter.name, parameter.unit,
-             parameter.size == 1
-                 ? ""
-                 : fmt::format("  {} numbers: add :FILE, or .0.x, .0.y, ...", parameter.size));
+  std::string parts = parameter.colour ? "  all channels alike; one of them: add .r, .g or .b" : "";
+  if (parameter.size > 1) {
+    parts = fmt::format("  {} numbers: add :FILE, or .0.x, .0.y, ...", parameter.size);
+  }
+  fmt::print("  {}  [{}]{}\n", parameter.name, parameter.unit, parts);
 }
 
 json describe_crossings(const Scene& scene, std::span<const Mesh* const> meshes,

@@ -57,6 +57,9 @@ void add_input_options(CLI::App& app, CommonOptions& common, const std::string& 
 
 void add_common_options(CLI::App& app, CommonOptions& common) {
   add_input_options(app, common, "Scene file (Mitsuba 3 XML)", "SCENE");
+  app.add_option("--sensor", common.sensor,
+                 "Of several in the scene, this one (default: the first)")
+      ->type_name("ID|NUMBER");
   app.add_option("--spp", common.spp, "Samples per pixel (default: the scene's)")
       ->check(CLI::Range(1, 1 << 30));
   app.add_option("--json", common.json, "Write the figures for machines to this file");
@@ -145,6 +148,7 @@ Scene load_scene(const CommonOptions& common, Warnings& shown) {
   std::vector<std::string> warnings;
   Scene scene = read_scene(common.scene, common.defines, &warnings);
   for (const std::string& warning : warnings) shown.add(warning);
+  if (!common.sensor.empty()) use_sensor(scene, common.sensor);
   if (common.shading == "mitsuba") scene.shading = ShadingModel::kMitsuba;
   return scene;
 }

@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <set>
 
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
@@ -65,11 +66,8 @@ std::string ply_text(const Mesh& mesh) {
 json number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
 
 json to_json(const ViewArguments& v) {
-  return {{"scene", v.scene},
-          {"defines", v.defines},
-          {"target", v.target},
-          {"mask", v.mask},
-          {"fingerprint", v.fingerprint}};
+  return {{"scene", v.scene},   {"defines", v.defines}, {"sensor", v.sensor},
+          {"target", v.target}, {"mask", v.mask},       {"fingerprints", v.fingerprints}};
 }
 
 // Calls visit(name, member) for all but the views: reading and writing go over one list.
@@ -79,13 +77,16 @@ void visit_arguments(Arguments& a, const Visit& visit) {
   visit("bounds", a.bounds);
   visit("terms", a.terms);
   visit("loss", a.loss);
+  visit("pyramid", a.pyramid);
   visit("optimiser", a.optimiser);
   visit("pixels", a.pixels);
+  visit("sampler", a.sampler);
   visit("shading", a.shading);
   visit("step", a.step);
   visit("smoothing", a.smoothing);
   visit("remesh", a.remesh);
   visit("remesh_edge", a.remesh_edge);
+  visit("remesh_shrink", a.remesh_shrink);
   visit("camera_samples", a.camera_samples);
   visit("step_half_life", a.step_half_life);
   visit("spp_doubling", a.spp_doubling);
@@ -109,8 +110,8 @@ FitArguments arguments_from(const json& j) {
   FitArguments a;
   visit_arguments(a, [&](const char* name, auto& member) { j.at(name).get_to(member); });
   for (const json& view : j.at("views")) {
-    a.views.push_back({view.at("scene"), view.at("defines"), view.at("target"), view.at("mask"),
-                       view.at("fingerprint")});
+    a.views.push_back({view.at("scene"), view.at("defines"), view.at("sensor"), view.at("target"),
+                       view.at("mask"), view.at("fingerprints")});
   }
   return a;
 }
@@ -194,6 +195,28 @@ FitBounds parse_bounds(const std::string& text) {
   }
 }
 
+std::string fingerprint_of(const Image& image) {
+  std::vector<double> numbers{double(image.width), double(image.height), double(image.channels)};
+  numbers.insert(numbers.end(), image.data.begin(), image.data.end());
+  return fingerprint(numbers);
+}
+
+// Of all that a view was read from, by what it is; of fields by the parameter's name.
+std::map<std::string, std::string> fingerprints_of(const FitView& view,
+                                                   const std::vector<std::string>& parameters) {
+  std::map<std::string, std::string> all{{"scene", fingerprint(view.scene)},
+                                         {"target", fingerprint_of(view.target)},
+                                         {"mask", fingerprint_of(view.mask)}};
+  for (const std::string& name : parameters) {
+    if (field_files({name}).empty()) continue;
+    try {
+      all[name] = fingerprint(view.scene, {find_parameter(view.scene, name)});
+    } catch (const UnknownParameter&) {  // of another view
+    }
+  }
+  return all;
+}
+
 // Shapes whose vertices are fitted or moved, each from the first view that has it.
 std::vector<const Shape*> fitted_shapes(const Fit& fit,
                                         const std::vector<std::string>& parameters) {
@@ -245,6 +268,7 @@ FitOptions FitArguments::options() const {
   options.parameters = parameters;
   for (const std::string& text : bounds) options.bounds.push_back(parse_bounds(text));
   options.loss = loss_kind(loss);
+  options.pyramid = pyramid;
   options.optimiser = optimiser_kind(optimiser);
   options.step = step;
   options.step_half_life = step_half_life;
@@ -252,8 +276,10 @@ FitOptions FitArguments::options() const {
   options.smoothing = smoothing;
   options.remesh = remesh;
   options.remesh_edge = remesh_edge;
+  options.remesh_shrink = remesh_shrink;
   options.loss_spp = loss_spp;
   options.backward.terms = terms;
+  options.backward.sampler = sampler;
   options.backward.uniform_pixels = pixels == "uniform";
   options.backward.edge_samples = edge_samples;
   options.backward.camera_samples = camera_samples;
@@ -284,12 +310,21 @@ FitFolder FitFolder::read(const std::string& folder) {
   return found;
 }
 
-void FitFolder::check_scenes(const std::vector<FitView>& views) const {
+void FitFolder::check_inputs(const std::vector<FitView>& views) const {
   for (size_t v = 0; v < views.size(); ++v) {
     const ViewArguments& view = arguments_.views[v];
-    if (fingerprint(views[v].scene) == view.fingerprint) continue;
-    throw InputError({view.scene}, "is not as it was when the fit in " + folder_ +
-                                       " began: put it back, or begin another fit");
+    const auto now = fingerprints_of(views[v], arguments_.parameters);
+    const std::map<std::string, std::string> files{
+        {"scene", view.scene}, {"target", view.target}, {"mask", view.mask}};
+    for (const auto& [what, then] : view.fingerprints) {
+      const auto found = now.find(what);
+      if (found != now.end() && found->second == then) continue;
+      // A field is named by its parameter.
+      const auto file = files.find(what);
+      throw InputError({file == files.end() ? what : file->second},
+                       "is not as it was when the fit in " + folder_ +
+                           " began: put it back, or begin another fit");
+    }
   }
 }
 
@@ -312,7 +347,7 @@ void FitFolder::prepare(const std::vector<FitView>& views) {
   for (const std::string& field : field_files(arguments_.parameters)) inputs.push_back(field);
   for (const FitView& view : views) check_outputs(files, view.scene, inputs);
   for (size_t v = 0; v < views.size(); ++v) {
-    arguments_.views[v].fingerprint = fingerprint(views[v].scene);
+    arguments_.views[v].fingerprints = fingerprints_of(views[v], arguments_.parameters);
   }
 }
 
@@ -359,8 +394,7 @@ void FitFolder::add(const FitRecord& r, const Fit& fit) {
                       {"seconds", r.seconds}});
 }
 
-json FitFolder::mesh_figures(const Shape& s, int64_t step, int threads) const {
-  const std::string name = fmt::format("step_{:05}_{}.ply", step, file_part(s.id));
+json FitFolder::mesh_figures(const Shape& s, const std::string& name, int threads) const {
   write_whole(file(name), ply_text(s.mesh));
   json figures = {{"shape", s.id}, {"file", name}, {"crossings", count_crossings(s.mesh, threads)}};
   const auto inside_out = count_inside_out(s.mesh, threads);
@@ -389,8 +423,12 @@ void FitFolder::add_snapshot(const Fit& fit, const RunSettings& settings, int sp
     }
   }
   for (const FitScalar& s : fit.scalars()) line += fmt::format(", {} {:.6g}", s.name, s.value);
+  std::set<std::string> names;
   for (const Shape* shape : fitted_shapes(fit, arguments_.parameters)) {
-    const json figures = mesh_figures(*shape, fit.steps(), settings.threads);
+    std::string name = fmt::format("step_{:05}_{}", fit.steps(), file_part(shape->id));
+    // Ids that differ may be one as names of files.
+    while (!names.insert(name).second) name += "_";
+    const json figures = mesh_figures(*shape, name + ".ply", settings.threads);
     line += fmt::format(", {}: {} crossings", figures.at("shape").get<std::string>(),
                         figures.at("crossings").get<size_t>());
     if (!figures.at("inside_out").is_null()) {

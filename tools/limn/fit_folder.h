@@ -20,18 +20,22 @@ namespace limn {
 struct ViewArguments {
   std::string scene;
   std::map<std::string, std::string> defines;
+  std::string sensor;        // its number in the scene
   std::string target, mask;  // "": no mask
-  std::string fingerprint;   // of the scene as the fit found it
+  // Of the scene, the images and the fields of vertices as the fit found them.
+  std::map<std::string, std::string> fingerprints;
 };
 
 // What fixes the bits of a fit, and what is kept of it. Files have absolute names.
 struct FitArguments {
   std::vector<ViewArguments> views;
   std::vector<std::string> parameters, bounds, terms;
-  std::string loss = "l2", optimiser = "adam-uniform", pixels = "adjoint", shading = "continuous";
+  std::string loss = "l2", optimiser = "adam-uniform", pixels = "adjoint", sampler = "forest",
+              shading = "continuous";
   double step = 1, smoothing = 0.08, camera_samples = 1;
   std::vector<int64_t> remesh;
-  double remesh_edge = 0.75;
+  int pyramid = 1;
+  double remesh_edge = 0.75, remesh_shrink = 0.65;
   int step_half_life = 0, spp_doubling = 0, spp = 0, loss_spp = 0, edge_samples = 1;
   uint64_t seed = 0;
   int64_t steps = 0;
@@ -57,8 +61,8 @@ class FitFolder {
   // Makes the folder, and notes what tells the scenes apart; InputError if it holds a fit already,
   // or cannot be written, or a file that the fit reads lies in its place.
   void prepare(const std::vector<FitView>& views);
-  // InputError where a scene is not as it was when the fit began.
-  void check_scenes(const std::vector<FitView>& views) const;
+  // InputError where what the views were read from is not as it was when the fit began.
+  void check_inputs(const std::vector<FitView>& views) const;
   // Brings `fit` to the state in the folder, and forgets what came after. InputError that names the
   // file which is damaged or of another fit.
   void restore(Fit& fit);
@@ -72,7 +76,7 @@ class FitFolder {
 
  private:
   std::string file(const std::string& name) const;
-  nlohmann::json mesh_figures(const Shape& shape, int64_t step, int threads) const;
+  nlohmann::json mesh_figures(const Shape& shape, const std::string& name, int threads) const;
 
   std::string folder_;
   FitArguments arguments_;

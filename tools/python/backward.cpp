@@ -61,26 +61,31 @@ void bind_loss(nb::module_& m) {
       "image_loss",
       [](const SceneHandle& handle, nb::handle target, const std::string& kind,
          std::optional<int> spp, std::optional<uint64_t> seed, int threads,
-         const nb::object& progress) {
+         const nb::object& progress, nb::handle mask, int pyramid) {
         const auto scene = handle.share();
         const Image image = to_image(target);
         const LossKind loss = loss_kind(kind);
+        const Image weights = mask.is_none() ? Image{} : to_image(mask);
         LossResult result;
         run_job(make_settings(*scene, {spp, seed, 0, threads}), progress,
                 [&](const RunSettings& settings) {
-                  result = image_loss(*scene, image, loss, settings);
+                  result = image_loss(*scene, image, loss, settings, weights, pyramid);
                 });
         return result;
       },
       nb::arg("scene"), nb::arg("target"), nb::arg("kind") = "l2", nb::arg("spp") = nb::none(),
       nb::arg("seed") = nb::none(), nb::arg("threads") = 0, nb::arg("progress") = nb::none(),
+      nb::arg("mask") = nb::none(), nb::arg("pyramid") = 1,
       nb::sig("def image_loss(scene: Scene, target: numpy.typing.ArrayLike, kind: str = 'l2', spp: "
               "int | None = None, seed: int | None = None, threads: int = 0, progress: "
-              "collections.abc.Callable[[float], object] | None = None) -> Loss"),
+              "collections.abc.Callable[[float], object] | None = None, mask: "
+              "numpy.typing.ArrayLike | None = None, pyramid: int = 1) -> Loss"),
       "Renders the scene twice, independently, and compares with a target, (H, W, 3) or (H, W).\n\n"
       "kind: \"l2\", \"relative-l2\" or \"l1\". limn.backward with the same seed and the adjoint "
       "found "
-      "here gives an unbiased gradient of l2 and relative-l2.");
+      "here gives an unbiased gradient of l2 and relative-l2.\n"
+      "mask: what pixels weigh, (H, W). pyramid: levels, the mean over the loss of the image as it "
+      "is, at half its size, a quarter, ....");
 }
 
 }  // namespace
@@ -126,8 +131,8 @@ void bind_backward(nb::module_& m) {
       "(another "
       "seed than that of the image it came from), else the gradient is biased.\n"
       "names: arrays as well (\"object.vertex_positions\"); None for all parameters.\n"
-      "Values are float64: (V, 3) of an array, () of a number, of the loss per unit of the "
-      "parameter. "
+      "Values are float64: (V, 3) of an array, (3,) of a colour, () of a number, of the loss per "
+      "unit of the parameter. "
       "Copies of a vertex have equal shares. Pixels are sampled in proportion to the adjoint "
       "unless "
       "uniform_pixels. edge_samples: at every vertex of a path; camera_samples: points on "

@@ -68,6 +68,9 @@ Image to_image(nb::handle array);
 Pixels to_array(Image image);
 // A view of a shape's vertices that keeps the scene's state alive.
 Positions view_positions(std::shared_ptr<const Scene> scene, ShapeId shape);
+// Copies of (V, 3) vertices and (F, 3) indices of corners; InputError for other shapes.
+std::vector<Vec3f> to_positions(nb::handle array);
+std::vector<FaceIndices> to_faces(nb::handle array);
 // numpy.ascontiguousarray(value, dtype), of whatever numpy takes; numpy's errors.
 nb::object as_array(nb::handle value, const char* dtype);
 

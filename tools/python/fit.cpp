@@ -3,7 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <map>
+
 #include "limn/core/error.h"
+#include "limn/core/parallel.h"
+#include "limn/integrators/mesh_distance.h"
 #include "tools/python/bindings.h"
 
 namespace limn::python {
@@ -92,10 +96,42 @@ void bind_record(nb::module_& m) {
       });
 }
 
+void bind_distance(nb::module_& m) {
+  m.def(
+      "mesh_distance",
+      [](nb::handle positions, nb::handle faces, nb::handle true_positions, nb::handle true_faces,
+         int64_t samples, uint64_t seed) {
+        if (samples < 1) throw InputError("samples must be 1 or more");
+        const auto mesh = [](nb::handle p, nb::handle f, const char* what) {
+          return make_mesh(to_positions(p), to_faces(f), true, {what}, nullptr);
+        };
+        const Mesh a = mesh(positions, faces, "mesh");
+        const Mesh b = mesh(true_positions, true_faces, "truth");
+        const MeshDistance d =
+            mesh_distance(a, b, static_cast<size_t>(samples), seed, thread_count(0));
+        nb::dict all;
+        all["chamfer"] = d.chamfer;
+        all["hausdorff"] = d.hausdorff;
+        all["hausdorff_95"] = d.hausdorff_95;
+        all["normal_angle"] = d.normal_angle;
+        return all;
+      },
+      nb::arg("positions"), nb::arg("faces"), nb::arg("true_positions"), nb::arg("true_faces"),
+      nb::arg("samples") = 10000, nb::arg("seed") = 0,
+      nb::sig("def mesh_distance(positions: numpy.typing.ArrayLike, faces: numpy.typing.ArrayLike, "
+              "true_positions: numpy.typing.ArrayLike, true_faces: numpy.typing.ArrayLike, "
+              "samples: int = 10000, seed: int = 0) -> dict[str, float]"),
+      "How far two surfaces are apart, by points spread evenly over either.\n\n"
+      "chamfer: mean distance to the other surface [scene units], of both directions; "
+      "hausdorff_95: what 95 % of the points do not exceed, hausdorff: the largest, of the larger "
+      "direction each; normal_angle: mean angle between the faces' normals there [radians].");
+}
+
 }  // namespace
 
 void bind_fit(nb::module_& m) {
   bind_record(m);
+  bind_distance(m);
   nb::class_<FitHandle>(m, "Fit", "Parameters of scenes, moved until images meet their targets.")
       .def(
           "__init__",
@@ -103,7 +139,8 @@ void bind_fit(nb::module_& m) {
              nb::handle mask, const nb::sequence& views, const std::string& loss,
              const std::string& optimiser, double step, int step_half_life, double smoothing,
              std::optional<int> spp, int loss_spp, const std::vector<int64_t>& remesh,
-             const std::vector<std::string>& terms, std::optional<uint64_t> seed, int threads) {
+             const std::vector<std::string>& terms, std::optional<uint64_t> seed, int threads,
+             int pyramid, int spp_doubling, double remesh_edge, double remesh_shrink) {
             FitOptions options;
             options.parameters = to_list(names);
             options.loss = loss_kind(loss);
@@ -113,9 +150,13 @@ void bind_fit(nb::module_& m) {
             options.smoothing = smoothing;
             options.loss_spp = loss_spp;
             options.remesh = remesh;
+            options.remesh_edge = remesh_edge;
+            options.remesh_shrink = remesh_shrink;
+            options.pyramid = pyramid;
+            options.spp_doubling = spp_doubling;
             options.backward.terms = terms;
-            if (step_half_life < 0 || loss_spp < 0) {
-              throw InputError("step_half_life and loss_spp must not be negative");
+            if (step_half_life < 0 || loss_spp < 0 || spp_doubling < 0) {
+              throw InputError("step_half_life, spp_doubling and loss_spp must not be negative");
             }
             const RunSettings settings = make_settings(scene.get(), {spp, seed, 0, threads});
             Fit fit(to_views(scene, target, mask, views), options, settings);
@@ -128,26 +169,33 @@ void bind_fit(nb::module_& m) {
           nb::arg("step_half_life") = 0, nb::arg("smoothing") = 0.08, nb::arg("spp") = nb::none(),
           nb::arg("loss_spp") = 0, nb::arg("remesh") = nb::make_tuple(),
           nb::arg("terms") = nb::make_tuple(), nb::arg("seed") = nb::none(), nb::arg("threads") = 0,
-          nb::sig("def __init__(self, scene: Scene, target: numpy.typing.ArrayLike, names: str | "
-                  "collections.abc.Sequence[str], mask: numpy.typing.ArrayLike | None = None, "
-                  "views: collections.abc.Sequence[tuple[object, ...]] = (), loss: str = 'l2', "
-                  "optimiser: str = "
-                  "'adam-uniform', step: float = 1, step_half_life: int = 0, smoothing: float = "
-                  "0.08, spp: int | None = None, loss_spp: int = 0, remesh: "
-                  "collections.abc.Sequence[int] = (), terms: collections.abc.Sequence[str] = (), "
-                  "seed: int | None = None, threads: int = 0) -> None"),
+          nb::arg("pyramid") = 1, nb::arg("spp_doubling") = 0, nb::arg("remesh_edge") = 0.75,
+          nb::arg("remesh_shrink") = 0.65,
+          nb::sig(
+              "def __init__(self, scene: Scene, target: numpy.typing.ArrayLike, names: str | "
+              "collections.abc.Sequence[str], mask: numpy.typing.ArrayLike | None = None, "
+              "views: collections.abc.Sequence[tuple[object, ...]] = (), loss: str = 'l2', "
+              "optimiser: str = "
+              "'adam-uniform', step: float = 1, step_half_life: int = 0, smoothing: float = "
+              "0.08, spp: int | None = None, loss_spp: int = 0, remesh: "
+              "collections.abc.Sequence[int] = (), terms: collections.abc.Sequence[str] = (), "
+              "seed: int | None = None, threads: int = 0, pyramid: int = 1, spp_doubling: int = "
+              "0, remesh_edge: float = 0.75, remesh_shrink: float = 0.65) -> None"),
           "Copies the scene; it stays as it is.\n\n"
           "target: (H, W, 3) or (H, W). names: scalars and arrays "
           "(\"object.vertex_positions\").\n"
           "mask: weights of the pixels, (H, W). views: further (scene, target) or (scene, target, "
           "mask) that share the parameters.\n"
-          "loss: \"l2\", \"relative-l2\", \"l1\". optimiser: \"adam-uniform\", \"adam\", "
+          "loss: \"l2\", \"relative-l2\", \"l1\", over `pyramid` levels, see image_loss. "
+          "optimiser: \"adam-uniform\", \"adam\", "
           "\"gradient-descent\".\n"
           "step: in natural steps (1 % of a shape's diagonal, 0.01 radians, 1 % of a value), half "
           "as long after each step_half_life steps (0: never).\n"
           "smoothing: how far a step of a vertex spreads, over the shape's diagonal.\n"
           "spp: samples per pixel of the gradient, and of each of the loss's two images unless "
-          "loss_spp says otherwise. remesh: steps after which vertices get new triangles.")
+          "loss_spp says otherwise; twice as many after each spp_doubling steps (0: never).\n"
+          "remesh: steps after which vertices get new triangles, with edges remesh_edge times as "
+          "long, steps and smoothing remesh_shrink times what they were.")
       .def("step", &step, nb::arg("progress") = nb::none(),
            nb::sig("def step(self, progress: collections.abc.Callable[[float], object] | None = "
                    "None) -> FitRecord"),
@@ -174,12 +222,18 @@ void bind_fit(nb::module_& m) {
           "values",
           [](const FitHandle& h) {
             h.check_idle();
+            std::map<std::string, std::vector<double>> numbers;
+            for (const FitScalar& s : h.fit.scalars()) numbers[s.parameter].push_back(s.value);
             nb::dict values;
-            for (const FitScalar& s : h.fit.scalars()) values[nb::cast(s.name)] = s.value;
+            for (const FitScalar& s : h.fit.scalars()) {
+              const std::vector<double>& all = numbers[s.parameter];
+              values[nb::cast(s.parameter)] =
+                  all.size() == 1 ? nb::cast(all[0]) : as_array(nb::cast(all), "float64");
+            }
             return values;
           },
-          nb::sig("def values(self) -> dict[str, float]"),
-          "The scalars that are fitted: values (of a colour the mean over channels), or for "
+          nb::sig("def values(self) -> dict[str, float | numpy.ndarray]"),
+          "What is fitted, but for arrays of vertices (see scenes): numbers, colours (3,), and for "
           "motions the sum of all steps.");
 }
 

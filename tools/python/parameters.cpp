@@ -40,7 +40,7 @@ nb::object value_of(const ParameterView& view) {
 }
 
 nb::tuple shape_tuple(const ParameterView& view) {
-  return view.parameter.size == 1 ? nb::make_tuple() : nb::make_tuple(view.parameter.size / 3, 3);
+  return nb::tuple(nb::cast(view.parameter.shape()));
 }
 
 void check_shape(const ParameterView& view, const nb::ndarray<const double, nb::c_contig>& value) {
@@ -80,7 +80,8 @@ std::vector<std::string> names_of(const ParametersView& view) {
 std::string repr(const ParameterView& view) {
   const Parameter& p = view.parameter;
   return fmt::format("<limn.Parameter \"{}\"{}{}>", p.name, p.unit.empty() ? "" : ", " + p.unit,
-                     p.size == 1 ? "" : fmt::format(", shape ({}, 3)", p.size / 3));
+                     p.size > 1 ? fmt::format(", shape ({}, 3)", p.size / 3)
+                                : std::string(p.colour ? ", shape (3,)" : ""));
 }
 
 nb::object view_of(const char* kind, nb::handle self) {
@@ -96,8 +97,9 @@ void bind_parameter(nb::module_& m) {
           "Its unit: \"scene units\", \"radians\", ...; \"\" for plain numbers.")
       .def_prop_ro(
           "shape", shape_tuple, nb::sig("def shape(self) -> tuple[int, ...]"),
-          "Of what is differentiated: () for a number, (V, 3) for vertex positions. Colours "
-          "are numbers: their channels move together (grey) and never mix.")
+          "Of limn.backward's derivative: () for a number, (3,) for a colour, (V, 3) for "
+          "vertex positions. In limn.gradient all channels of a colour move alike (grey), and "
+          "NAME.r, NAME.g, NAME.b move one of them.")
       .def_prop_ro(
           "natural_step", [](const ParameterView& v) { return v.parameter.natural_step; },
           "A small step: about a hundredth of what changes the picture a lot.")
@@ -147,8 +149,9 @@ void bind_parameters(nb::module_& m, nb::class_<SceneHandle>& scene) {
   scene
       .def_prop_ro(
           "parameters", [](SceneHandle& s) { return ParametersView{&s}; }, nb::keep_alive<0, 1>(),
-          "All that can be differentiated: a mapping of names to limn.Parameter. Parts of an "
-          "array (\"object.vertex_positions.7.x\") are found, too, but not listed.")
+          "All that can be differentiated: a mapping of names to limn.Parameter. Parts "
+          "(\"object.vertex_positions.7.x\", \"clay.reflectance.r\") are found, too, but not "
+          "listed.")
       .def(
           "__getitem__",
           [](const SceneHandle& s, const std::string& name) { return value_of(find(s, name)); },

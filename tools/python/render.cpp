@@ -37,11 +37,59 @@ Estimate render_scene(const SceneHandle& handle, std::optional<int> spp,
   return image;
 }
 
+// What arrays do, done to the value: an Estimate may stand wherever its mean is meant.
+struct Operator {
+  const char *name, *signature;
+};
+#define BINARY(name) \
+  { name, "def " name "(self, other: numpy.typing.ArrayLike) -> numpy.ndarray" }
+constexpr Operator kBinary[] = {BINARY("__add__"),  BINARY("__radd__"),    BINARY("__sub__"),
+                                BINARY("__rsub__"), BINARY("__mul__"),     BINARY("__rmul__"),
+                                BINARY("__pow__"),  BINARY("__truediv__"), BINARY("__rtruediv__")};
+#undef BINARY
+constexpr Operator kUnary[] = {{"__neg__", "def __neg__(self) -> numpy.ndarray"},
+                               {"__abs__", "def __abs__(self) -> numpy.ndarray"},
+                               {"__float__", "def __float__(self) -> float"},
+                               {"__len__", "def __len__(self) -> int"}};
+
+void bind_operators(nb::class_<Estimate>& estimate) {
+  for (const Operator& op : kBinary) {
+    estimate.def(
+        op.name,
+        [name = op.name](const Estimate& e, const nb::object& other) {
+          return nb::cast(e.value).attr(name)(other);
+        },
+        nb::arg("other"), nb::sig(op.signature));
+  }
+  for (const Operator& op : kUnary) {
+    estimate.def(
+        op.name, [name = op.name](const Estimate& e) { return nb::cast(e.value).attr(name)(); },
+        nb::sig(op.signature));
+  }
+  estimate
+      .def(
+          "__getitem__",
+          [](const Estimate& e, const nb::object& key) {
+            return nb::object(nb::cast(e.value)[key]);
+          },
+          nb::arg("key"), nb::sig("def __getitem__(self, key: object) -> numpy.ndarray"))
+      .def_prop_ro(
+          "shape", [](const Estimate& e) { return nb::cast(e.value).attr("shape"); },
+          nb::sig("def shape(self) -> tuple[int, ...]"), "That of the value.")
+      .def_prop_ro(
+          "dtype", [](const Estimate& e) { return nb::cast(e.value).attr("dtype"); },
+          nb::sig("def dtype(self) -> numpy.dtype"), "That of the value.");
+}
+
 }  // namespace
 
 void bind_render(nb::module_& m) {
-  nb::class_<Estimate>(m, "Estimate",
-                       "A mean over samples with its standard error. numpy takes it for its value.")
+  nb::class_<Estimate> estimate(
+      m, "Estimate",
+      "A mean over samples with its standard error. It computes like its value, and "
+      "numpy takes it for that.");
+  bind_operators(estimate);
+  estimate
       .def_prop_ro(
           "value", [](const Estimate& e) { return e.value; }, nb::rv_policy::reference,
           nb::sig("def value(self) -> numpy.ndarray"),

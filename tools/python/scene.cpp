@@ -27,6 +27,15 @@ namespace {
 
 using Kept = std::shared_ptr<const Scene>;
 
+template <class T>
+nb::ndarray<const T, nb::c_contig, nb::device::cpu> rows_of_three(nb::handle array,
+                                                                  const char* dtype,
+                                                                  const char* what) {
+  auto rows = nb::cast<nb::ndarray<const T, nb::c_contig, nb::device::cpu>>(as_array(array, dtype));
+  if (rows.ndim() == 2 && rows.shape(1) == 3) return rows;
+  throw InputError(std::string(what) + " have shape (" + what[0] + ", 3), one row each");
+}
+
 // Keeps a state of the scene alive for a view of it.
 nb::capsule keeper(Kept scene) {
   return nb::capsule(new Kept(std::move(scene)),
@@ -51,37 +60,6 @@ Faces view_faces(const MeshView& view) {
 Indices view_weld(const MeshView& view) {
   const std::vector<uint32_t>& weld = view.mesh().weld;
   return Indices(weld.data(), {weld.size()}, keeper(view.scene));
-}
-
-template <class T>
-nb::ndarray<const T, nb::c_contig, nb::device::cpu> rows_of_three(nb::handle array,
-                                                                  const char* dtype,
-                                                                  const char* what) {
-  auto rows = nb::cast<nb::ndarray<const T, nb::c_contig, nb::device::cpu>>(as_array(array, dtype));
-  if (rows.ndim() == 2 && rows.shape(1) == 3) return rows;
-  throw InputError(std::string(what) + " have shape (" + what[0] + ", 3), one row each");
-}
-
-std::vector<Vec3f> to_positions(nb::handle array) {
-  const auto rows = rows_of_three<float>(array, "float32", "Vertices");
-  std::vector<Vec3f> positions(rows.shape(0));
-  for (size_t i = 0; i < positions.size(); ++i) {
-    positions[i] = {rows.data()[3 * i], rows.data()[3 * i + 1], rows.data()[3 * i + 2]};
-  }
-  return positions;
-}
-
-std::vector<FaceIndices> to_faces(nb::handle array) {
-  const auto rows = rows_of_three<int64_t>(array, "int64", "Faces");
-  std::vector<FaceIndices> faces(rows.shape(0));
-  for (size_t i = 0; i < rows.size(); ++i) {
-    const int64_t v = rows.data()[i];
-    if (v < 0 || v > UINT32_MAX) {
-      throw InputError(fmt::format("Faces hold indices of vertices, from 0 on, not {}", v));
-    }
-    faces[i / 3][i % 3] = static_cast<uint32_t>(v);
-  }
-  return faces;
 }
 
 // Values of $names as text; booleans as XML writes them.
@@ -200,11 +178,44 @@ void bind_changes(nb::class_<SceneHandle>& scene) {
           nb::arg("name"), nb::arg("step"),
           "Moves a parameter by `step`, in its unit, from where it is; exact for large steps.")
       .def(
+          "view",
+          [](const SceneHandle& s, const std::variant<int, std::string>& sensor) {
+            SceneHandle other(s);
+            use_sensor(other.edit(), std::holds_alternative<int>(sensor)
+                                         ? std::to_string(std::get<int>(sensor))
+                                         : std::get<std::string>(sensor));
+            return other;
+          },
+          nb::arg("sensor"), nb::sig("def view(self, sensor: int | str) -> Scene"),
+          "A copy that is seen by another sensor of the file, by number (see `sensors`) or id.")
+      .def(
           "copy", [](const SceneHandle& s) { return SceneHandle(s); },
           "A scene of its own; what both share is copied when one of them changes.");
 }
 
 }  // namespace
+
+std::vector<Vec3f> to_positions(nb::handle array) {
+  const auto rows = rows_of_three<float>(array, "float32", "Vertices");
+  std::vector<Vec3f> positions(rows.shape(0));
+  for (size_t i = 0; i < positions.size(); ++i) {
+    positions[i] = {rows.data()[3 * i], rows.data()[3 * i + 1], rows.data()[3 * i + 2]};
+  }
+  return positions;
+}
+
+std::vector<FaceIndices> to_faces(nb::handle array) {
+  const auto rows = rows_of_three<int64_t>(array, "int64", "Faces");
+  std::vector<FaceIndices> faces(rows.shape(0));
+  for (size_t i = 0; i < rows.size(); ++i) {
+    const int64_t v = rows.data()[i];
+    if (v < 0 || v > UINT32_MAX) {
+      throw InputError(fmt::format("Faces hold indices of vertices, from 0 on, not {}", v));
+    }
+    faces[i / 3][i % 3] = static_cast<uint32_t>(v);
+  }
+  return faces;
+}
 
 Positions view_positions(Kept scene, ShapeId shape) {
   const std::vector<Vec3f>& positions = scene->shape(shape).mesh.positions;
@@ -238,6 +249,15 @@ nb::class_<SceneHandle> bind_scene(nb::module_& m) {
       .def_prop_ro(
           "seed", [](const SceneHandle& s) { return s.get().seed; },
           "The seed that the file asks for.")
+      .def_prop_ro(
+          "sensors",
+          [](const SceneHandle& s) {
+            std::vector<std::string> ids;
+            for (const Sensor& sensor : s.get().sensors) ids.push_back(sensor.id);
+            return ids;
+          },
+          "Ids of the sensors of the file, \"\" where it gives none; the first is the scene's, "
+          "see view().")
       .def_prop_ro("shapes", shape_ids, "Ids of all shapes, \"\" where the file gives none.")
       .def_prop_rw(
           "shading", shading_name, set_shading,

@@ -10,7 +10,8 @@
 //   sensor.translate.x|y|z        scene units
 //   sensor.rotate.x|y|z           radians, world axes through the pinhole
 //   sensor.fov                    degrees
-//   BSDF.NAME, EMITTER.NAME       see their parameters()
+//   BSDF.NAME, EMITTER.NAME       see their parameters(); a colour: all channels alike
+//   BSDF.NAME.r|g|b, EMITTER.NAME.r|g|b  one channel of a colour
 //
 // Capitals stand for the id of an element, or for what the user writes.
 #include <limits>
@@ -37,6 +38,13 @@ struct Parameter {
   // What its numbers may be, both ends included: what assign() takes.
   double least = -std::numeric_limits<double>::infinity();
   double most = std::numeric_limits<double>::infinity();
+  // Its value has three channels. They move alike (along grey), as one number; reverse mode tells
+  // them apart all the same. NAME.r, NAME.g and NAME.b move one of them each.
+  bool colour = false;
+
+  // Of its derivative in reverse mode: {} of a number, {3} of a colour, {V, 3} of vertex_positions.
+  std::vector<size_t> shape() const;
+  size_t numbers() const { return colour ? 3 : size; }  // in that shape
 
   // Adds derivative lane `lane` of everything in the scene that the parameter moves.
   void seed(Scene& scene, int lane, size_t component = 0) const;
@@ -64,8 +72,8 @@ struct Parameter {
   std::vector<Vec3d> velocities(const Scene& scene, ShapeId shape, size_t component = 0) const;
 };
 
-// All parameters of the scene, scalars and arrays; a part of an array (one component, a field) is
-// not listed apart.
+// All parameters of the scene, scalars and arrays; a part (one component of an array, a field, a
+// channel of a colour) is not listed apart.
 std::vector<Parameter> list_parameters(const Scene& scene);
 
 // The scalar called `name`. UnknownParameter that lists the nearest known names if there is none;

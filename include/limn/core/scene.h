@@ -32,6 +32,15 @@ struct Shape {
   std::string emitter_id;  // "" if none
 };
 
+// What a <sensor> element says.
+struct Sensor {
+  std::string id;  // "" if none
+  Camera camera;
+  Film film;
+  int sample_count = 4;  // samples per pixel that it asks for
+  uint64_t seed = 0;
+};
+
 struct Scene {
   std::string file;
   std::vector<std::string> xml_files;   // the file and what it includes
@@ -41,8 +50,11 @@ struct Scene {
   int max_depth = -1;  // as in Mitsuba: 1 emission only, 2 direct light, -1 no limit
   int rr_depth = 5;    // Russian roulette from this depth on
   bool hide_emitters = false;
-  int sample_count = 4;  // samples per pixel that the file asks for
+  int sample_count = 4;  // samples per pixel that the sensor asks for
   uint64_t seed = 0;
+  std::vector<Sensor>
+      sensors;  // of the file, as they were read: use_sensor() makes one of them the
+                // scene's, at first that in front
   ShadingModel shading = ShadingModel::kContinuous;
 
   std::vector<Shape> shapes;
@@ -70,6 +82,14 @@ Scene read_scene(const std::string& file, const std::map<std::string, std::strin
 Scene read_scene_text(const std::string& text, const std::string& folder,
                       const std::map<std::string, std::string>& defines,
                       std::vector<std::string>* warnings);
+
+// Camera, film, samples and seed become those of a sensor of the file, named by its id or its number
+// from 0. InputError that lists them if there is none.
+void use_sensor(Scene& scene, const std::string& name);
+
+// How many sensors a file has. InputError where it is no scene as far as that is looked at: no mesh
+// or image is read.
+size_t count_sensors(const std::string& file, const std::map<std::string, std::string>& defines);
 
 // Gives a shape another mesh: positions (V by 3, scene units) and faces (F by 3, into them). Flat
 // shapes stay flat, all others get computed normals. Warnings and InputError as make_mesh().

@@ -19,12 +19,17 @@ struct MeshSlots {
   uint32_t horizons = 0;   // of V
 };
 
-// A copy of an object whose k-th lane carries the derivative with respect to the parameter of slot
-// k. Objects with more parameters than lanes have several copies.
+// Of each channel. The three of a colour have one each, since channels never mix; a number that
+// enters all channels has the same one three times. 0: a constant.
+using ChannelSlots = std::array<uint32_t, 3>;
+
+// A copy of an object whose k-th lane carries the derivative with respect to its parameter with the
+// k-th slots, all channels of a colour at once. Objects with more parameters than lanes have
+// several copies.
 template <class T>
 struct SeededCopy {
   std::shared_ptr<T> object;
-  std::array<uint32_t, kLanes> slots{};
+  std::array<ChannelSlots, kLanes> slots{};
 };
 template <class T>
 using SeededCopies = std::vector<SeededCopy<T>>;
@@ -33,10 +38,10 @@ using SeededCopies = std::vector<SeededCopy<T>>;
 inline constexpr uint32_t kCameraSlots = 13;
 
 struct SceneSlots {
-  const Scene* scene = nullptr;    // must outlive this
-  uint32_t count = 1;              // all slots, with the unused first one
-  std::vector<MeshSlots> meshes;   // of each shape
-  std::vector<uint32_t> radiance;  // of each shape's emitter, all channels together; 0: constant
+  const Scene* scene = nullptr;        // must outlive this
+  uint32_t count = 1;                  // all slots, with the unused first one
+  std::vector<MeshSlots> meshes;       // of each shape
+  std::vector<ChannelSlots> radiance;  // of each shape's emitter
   // Of what each shape shows behind and in front, null where it is constant.
   std::vector<std::array<const SeededCopies<Bsdf>*, 2>> bsdfs;
   std::vector<std::unique_ptr<SeededCopies<Bsdf>>> bsdf_copies;  // what those point to
@@ -78,8 +83,17 @@ class Jacobian {
     for (int k = 0; k < 3; ++k) add(x[k].node, f.r.d[k], f.g.d[k], f.b.d[k]);
   }
   // f: of the seeded copy, everything else held. leaves: nodes of its slots.
-  void add(const std::array<uint32_t, kLanes>& leaves, const Rgb<Dual>& f) {
-    for (int k = 0; k < kLanes; ++k) add(leaves[k], f.r.d[k], f.g.d[k], f.b.d[k]);
+  void add(const std::array<ChannelSlots, kLanes>& leaves, const Rgb<Dual>& f) {
+    for (int k = 0; k < kLanes; ++k) {
+      const ChannelSlots& node = leaves[k];
+      if (node[0] == node[1] && node[1] == node[2]) {
+        add(node[0], f.r.d[k], f.g.d[k], f.b.d[k]);
+        continue;
+      }
+      for (int c = 0; c < 3; ++c) {
+        add(node[c], c == 0 ? f.r.d[k] : 0, c == 1 ? f.g.d[k] : 0, c == 2 ? f.b.d[k] : 0);
+      }
+    }
   }
   Rgb<Var> result(const Rgb<double>& value) const {
     Rgb<Var> r{value.r, value.g, value.b};
@@ -101,9 +115,15 @@ class Jacobian {
   int count_ = 0;
 };
 
-inline std::array<uint32_t, kLanes> leaves_of(const std::array<uint32_t, kLanes>& slots) {
-  std::array<uint32_t, kLanes> nodes;
-  for (int k = 0; k < kLanes; ++k) nodes[k] = Tape::current()->leaf(slots[k]);
+inline ChannelSlots leaves_of(const ChannelSlots& slots) {
+  Tape& tape = *Tape::current();
+  const uint32_t first = tape.leaf(slots[0]);
+  if (slots[1] == slots[0] && slots[2] == slots[0]) return {first, first, first};
+  return {first, tape.leaf(slots[1]), tape.leaf(slots[2])};
+}
+inline std::array<ChannelSlots, kLanes> leaves_of(const std::array<ChannelSlots, kLanes>& slots) {
+  std::array<ChannelSlots, kLanes> nodes;
+  for (int k = 0; k < kLanes; ++k) nodes[k] = leaves_of(slots[k]);
   return nodes;
 }
 
@@ -143,10 +163,9 @@ Rgb<S> emitter_radiance(const Shape& shape, ShapeId /*id*/) {
 }
 template <>
 inline Rgb<Var> emitter_radiance<Var>(const Shape& shape, ShapeId id) {
-  Tape& tape = *Tape::current();
-  const uint32_t slot = tape.slots()->radiance[id.index()];
+  const ChannelSlots nodes = leaves_of(Tape::current()->slots()->radiance[id.index()]);
   const Rgb<double> c = value(shape.radiance);
-  return {Var{c.r, tape.leaf(slot)}, Var{c.g, tape.leaf(slot)}, Var{c.b, tape.leaf(slot)}};
+  return {Var{c.r, nodes[0]}, Var{c.g, nodes[1]}, Var{c.b, nodes[2]}};
 }
 
 }  // namespace detail

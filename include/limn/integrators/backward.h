@@ -28,6 +28,7 @@ struct BackwardOptions {
   // Every pixel gets the same number of paths. Else a quarter of them is spread evenly and the rest
   // in proportion to |A|, summed over channels.
   bool uniform_pixels = false;
+  std::string sampler = "forest";  // of edges, edge_sampler_types()
   int edge_samples = 1;       // at every vertex of a path, of the boundary and shadow terms each
   double camera_samples = 1;  // points on silhouettes of the film, per path
   int batches = 16;           // at most, for standard errors; each ends with the adjoint of normals
@@ -37,8 +38,10 @@ struct BackwardOptions {
 // dLoss/dtheta of one parameter, per unit of the parameter (that of the loss over `unit`).
 struct ParameterAdjoint {
   std::string name;
-  std::string unit;           // of the parameter; "" for plain numbers
-  std::vector<size_t> shape;  // of the array: {V, 3} of vertex_positions, {} of a scalar
+  std::string unit;  // of the parameter; "" for plain numbers
+  // {} of a number, {3} of a colour (of each channel; their sum is along grey), {V, 3} of
+  // vertex_positions.
+  std::vector<size_t> shape;
   // One value per number of the array, row by row. Copies of a welded vertex share its derivative
   // equally: the derivative with respect to the position that they share is the sum of theirs.
   Moments moments;
@@ -108,9 +111,15 @@ struct LossResult {
 // settings.seed itself is independent of both, so that the product of both is unbiased. target:
 // crop_height by crop_width, of three channels or one. mask: what the pixels weigh in the mean, of
 // the same size with one channel, or three that are alike; without pixels: all alike.
-// InputError as check_loss_images().
+// levels: of a pyramid, the mean over the loss of the images as they are, at half the size, a
+// quarter, ...: the coarse ones tell a shape far away where to go, and noise less. Pixels of coarse
+// levels are means of those below, weighed by the mask; so what is unbiased stays so.
+// InputError as check_loss_images(), and for fewer levels than 1 or more than
+// most_pyramid_levels().
 LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
-                      const RunSettings& settings, const Image& mask = {});
+                      const RunSettings& settings, const Image& mask = {}, int levels = 1);
+// Down to one pixel.
+int most_pyramid_levels(const Scene& scene);
 
 // InputError for a target or a mask of another size than the film, for a target that is not finite
 // where the mask is not zero, and for a mask with values that are negative or not finite, or all

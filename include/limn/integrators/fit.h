@@ -22,9 +22,10 @@ namespace limn {
 
 // What becomes of a gradient g, in natural steps: those of Parameter::natural_step.
 enum class OptimiserKind {
-  kAdamUniform,      // Adam, but all numbers of an array share the largest second moment, so that
+  kAdamUniform,      // Adam, but all vertices of a shape share the largest second moment, so that
                      // steps keep the gradient's direction (Nicolet et al. 2021, Sec. 3.4)
-  kAdam,             // Kingma and Ba 2015, without its epsilon
+  kAdam,             // Kingma and Ba 2015, without its epsilon, with a second moment that forgets
+                     // in 20 steps: gradients are noisy, and now and then very large
   kGradientDescent,  // g itself: the size of a step is that of the loss
 };
 // InputError that lists the known names (adam-uniform, adam, gradient-descent) if there is none of
@@ -45,12 +46,13 @@ struct FitBounds {
 
 struct FitOptions {
   // Names as in parameter.h: scalars and SHAPE.vertex_positions; at least one. Every view that has
-  // a name moves with it, and one view must have it. Colours move along grey. Motions of a shape
+  // a name moves with it, and one view must have it. Colours move by channels. Motions of a shape
   // and its vertex_positions exclude each other; where vertices are fitted, normals of the file
   // give way to computed ones.
   std::vector<std::string> parameters;
   std::vector<FitBounds> bounds;
   LossKind loss = LossKind::kL2;
+  int pyramid = 1;  // levels of image_loss()
   OptimiserKind optimiser = OptimiserKind::kAdamUniform;
   // Of the first step, in natural steps: 1 % of a shape's diagonal, 0.01 radians, 1 % of a value.
   double step = 1;
@@ -60,10 +62,12 @@ struct FitOptions {
   // lambda = (distance / mean length of an edge)^2. 0: vertices move one by one.
   double smoothing = 0.08;
   // After so many steps shapes whose vertices are fitted get new triangles of one size (Botsch and
-  // Kobbelt 2004), their edges remesh_edge times as long as the mean was, and steps shrink to four
-  // fifths. Needs manifold meshes without flat shading, and OpenMesh.
+  // Kobbelt 2004), their edges remesh_edge times as long as the mean was; steps and smoothing shrink
+  // by remesh_shrink, from the large to the small. Needs manifold meshes without flat shading, and
+  // OpenMesh.
   std::vector<int64_t> remesh;
   double remesh_edge = 0.75;
+  double remesh_shrink = 0.65;
   int loss_spp = 0;  // samples per pixel of each of the two images of the loss; 0: settings.spp
   // Terms and where samples go; `parameters` is not looked at.
   BackwardOptions backward;
@@ -84,18 +88,19 @@ struct FitRecord {
   double seconds = 0;
 };
 
-// A number that is fitted: a value of the scene (of a colour, the mean over channels), or for what
-// only moves things from where they are the sum of all steps.
+// A number that is fitted: a value of the scene (of a colour NAME.r, NAME.g and NAME.b), or for
+// what only moves things from where they are the sum of all steps.
 struct FitScalar {
   std::string name, unit;
   double value = 0;
+  std::string parameter;  // that it belongs to, as it was asked for
 };
 
 // All that a later step depends on, besides what the Fit was made from.
 struct FitState {
   int64_t steps = 0;
   struct Numbers {
-    std::vector<double> values;           // u of an array, n by 3; sum of steps of a scalar
+    std::vector<double> values;           // u of an array, n by 3; else the sums of steps
     std::vector<double> first, second;    // moments of Adam; empty for gradient descent
     double natural_step = 0, lambda = 0;  // of an array, as they were when its mesh was made
   };

@@ -29,6 +29,7 @@ from ._limn import (
     info,
     load,
     load_string,
+    mesh_distance,
     methods,
     read_exr,
     render,
@@ -38,6 +39,7 @@ from ._limn import (
 )
 from .dicts import Transform, load_dict
 from .errors import InputError, NonFiniteError, UnknownParameterError
+from .meshes import write_ply
 from .parts import Part, merge, part
 
 __all__ = [
@@ -68,11 +70,13 @@ __all__ = [
     "load_dict",
     "load_string",
     "merge",
+    "mesh_distance",
     "methods",
     "part",
     "read_exr",
     "render",
     "write_exr",
+    "write_ply",
     "write_png",
     "write_signed_png",
 ]

@@ -13,10 +13,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import torch
 
-from . import Scene, backward, render as _render
+from . import Scene, backward as _backward, render as _render
 from .errors import InputError
 
 __all__ = ["render"]
@@ -46,37 +45,16 @@ class _Render(torch.autograd.Function):
     def backward(ctx: Any, adjoint: Any) -> tuple[Any, ...]:
         scene, names, spp, seed, threads = ctx.run
         wanted = [n for n, need in zip(names, ctx.needs_input_grad[6:]) if need]
-        found = _pull_back(scene, wanted, adjoint.cpu().numpy(), spp, seed, threads)
+        found = (
+            _backward(scene, adjoint.cpu().numpy(), wanted, spp=spp, seed=seed, threads=threads)
+            if wanted
+            else {}
+        )
         gradients = [
-            torch.from_numpy(found[n]).to(t).reshape(t.shape) if n in found else None
+            torch.from_numpy(np.array(found[n].value)).to(t).reshape(t.shape) if n in found else None
             for n, t in zip(names, ctx.saved_tensors)
         ]
         return (None,) * 6 + tuple(gradients)
-
-
-def _pull_back(
-    scene: Scene,
-    names: list[str],
-    adjoint: npt.NDArray[Any],
-    spp: int | None,
-    seed: int,
-    threads: int,
-) -> dict[str, npt.NDArray[Any]]:
-    """{name: float64 array of the value's shape}."""
-
-    def run(names: list[str], adjoint: npt.NDArray[Any]) -> dict[str, npt.NDArray[Any]]:
-        if not names:
-            return {}
-        found = backward(scene, adjoint, names, spp=spp, seed=seed, threads=threads)
-        return {n: np.array(e.value) for n, e in found.items()}
-
-    # limn differentiates colours along grey; channels never mix, so that an adjoint of one channel
-    # gives the derivative of that channel.
-    colours = [n for n in names if np.asarray(scene[n]).shape == (3,)]
-    found = run([n for n in names if n not in colours], adjoint)
-    channels = [run(colours, adjoint * np.eye(3, dtype=adjoint.dtype)[c]) for c in range(3)]
-    found.update({n: np.array([float(c[n]) for c in channels]) for n in colours})
-    return found
 
 
 def render(
