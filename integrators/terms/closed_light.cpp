@@ -17,7 +17,7 @@ namespace {
 constexpr double kRoundings = 8 * 0x1p-24;
 // What is nearer to a point than this part of its distance from the lamp's plane does not shade it:
 // about the rounding of positions. Not tuned.
-constexpr double kNear = 0x1p-24;
+constexpr double kNear = 0x1p-26;
 // A window of outlines reaches so many steps of their grid from its middle.
 constexpr double kGridHalf = 0x1p29;
 // A window is wider than its lamp, so that the lamp's sides are inside. Not tuned.
@@ -128,6 +128,28 @@ ClosedLight::ClosedLight(const Scene& scene, int threads, By by)
   }
 }
 
+namespace {
+
+// Whether two faces of one plane stay in one, to first order and rounding.
+bool move_alike(const Mesh& mesh, FaceRef first, FaceRef second) {
+  if (mesh.position_tangents.empty()) return true;
+  const auto x = face_corners<Dual>(mesh, first.face), y = face_corners<Dual>(mesh, second.face);
+  const Vec3<Dual> n = normalize(cross(x[1] - x[0], x[2] - x[0]));
+  double speed = 0, apart = 0;
+  for (int k = 0; k < 3; ++k) {
+    const Lanes distance = dot(n, y[k] - x[0]).d;
+    for (int lane = 0; lane < kLanes; ++lane) {
+      apart = std::max(apart, std::fabs(distance[lane]));
+      for (int c = 0; c < 3; ++c) {
+        speed = std::max({speed, std::fabs(x[k][c].d[lane]), std::fabs(y[k][c].d[lane])});
+      }
+    }
+  }
+  return apart <= 1e-5 * speed;
+}
+
+}  // namespace
+
 void ClosedLight::add_lamp(ShapeId id) {
   const Shape& shape = scene_.shape(id);
   const Mesh& mesh = shape.mesh;
@@ -155,7 +177,7 @@ void ClosedLight::add_lamp(ShapeId id) {
   const size_t before = lamps_.size();
   for (const Face& face : faces) {
     const auto fits = [&](const LampPlane& lamp) {
-      return dot(lamp.plane.n, face.normal) > 0.5 &&
+      return dot(lamp.plane.n, face.normal) > 0.5 && move_alike(mesh, lamp.faces[0], face.ref) &&
              std::all_of(face.corners.begin(), face.corners.end(), [&](const Vec3d& x) {
                return std::fabs(lamp.plane.distance(x)) <= kRoundings * size;
              });
@@ -252,6 +274,13 @@ bool ClosedLight::list(const LampPlane& lamp, const Receiver& receiver, Scratch&
   scratch.items.clear();
   tree_.list(std::span(set).first(count), scratch.items);
   for (const FaceTree::Item* item : scratch.items) {
+    // What rises above the horizon by rounding alone is the receiver's own plane.
+    const auto rises = [&](const Vec3f& x) {
+      const Vec3d w = cast<double>(x) - p;
+      return dot(receiver.up, w) > 0x1p-49 * (length(p) + length(w));
+    };
+    const auto& x = item->corners;
+    if (!rises(x[0]) && !rises(x[1]) && !rises(x[2])) continue;
     if (!is_skipped(item->face, receiver)) scratch.faces.push_back(item->face);
   }
   return true;
@@ -447,15 +476,17 @@ class ClosedLight::View {
     // A corner of the face: that which is nearer to the point on the grid.
     const auto x = face_corners<double>(mesh_of(end.tag), face_of(end.tag).face);
     const uint32_t k = end.tag % Scratch::kLines;
-    const Vec3d there = towards(end.at);
+    const Vec3d there = normalize(towards(end.at));
     const Vec3d w0 = x[k] - value(p_), w1 = x[(k + 1) % 3] - value(p_);
-    const auto distance = [&](const Vec3d& w) {
-      return length_squared(w / -dot(w, lamp_.plane.n) - there);
+    const auto offset = [&](const Vec3d& w) {
+      const double distance = length(w);
+      return distance > 0 ? length_squared(w / distance - there) : 5;
     };
-    return normalize(distance(w0) <= distance(w1) ? w0 : w1);
+    return normalize(offset(w0) <= offset(w1) ? w0 : w1);
   }
   Vec3d meet(uint32_t line, uint32_t other, const ShadowOutlines::Piece& piece,
              const Vec3d& about) const {
+    if (other < line) std::swap(line, other);  // the same for both pieces to the last bit
     const Vec3d hint = towards(piece.first) + towards(piece.last);
     return meet(value(normal_of_line(line, hint)), value(normal_of_line(other, hint)), about);
   }
