@@ -408,9 +408,8 @@ MethodType method_row(const std::string& name, const std::string& description,
   }
   method.terms_can_be_left_out = true;
   method.ablation = term_method.sampler.ablation || term_method.random_directions;
-  method.only_sum_fixed =
-      term_method.moves_directions || term_method.random_directions || term_method.warps ||
-      term_method.closed;
+  method.only_sum_fixed = term_method.moves_directions || term_method.random_directions ||
+                          term_method.warps || term_method.closed;
   method.warps = term_method.warps;
   method.biased = term_method.warps && !term_method.unbiased;
   method.run = [term_method](const MethodType&, const Scene& scene, const GradientOptions& options,

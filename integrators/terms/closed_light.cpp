@@ -1,72 +1,25 @@
 // Lamps as polygons, what lies before them, and the sums over what is left.
 #include "integrators/terms/closed_light.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
+#include <tuple>
 
 #include "integrators/terms/polygon_light.h"
+#include "limn/core/shadow_outlines.h"
 #include "limn/core/visible_regions.h"
 
 namespace limn {
 namespace {
 
-// Planes of a lamp are told apart beyond so many roundings of its coordinates to floats. Not tuned.
-constexpr double kRoundings = 8 * 0x1p-24;
-// What is nearer to a point than this part of its distance from the lamp's plane does not shade it.
-// Not tuned: far below the rounding of positions, far above that of directions.
-constexpr double kNear = 0x1p-30;
+// What is nearer to a point than this part of its distance from the lamp's plane does not shade it:
+// about the rounding of positions. Not tuned.
+constexpr double kNear = 0x1p-26;
+// A window of outlines reaches so many steps of their grid from its middle.
+constexpr double kGridHalf = 0x1p29;
 // A window is wider than its lamp, so that the lamp's sides are inside. Not tuned.
 constexpr double kMargin = 0x1p-10;
 
-constexpr const char* kInstead = "use another method (render: path)";
-
-bool is_diffuse(const Bsdf& bsdf) {
-  const LobeSummary lobe = bsdf.lobe();
-  return lobe.model == &kHemisphere;
-}
-
-std::string name_of(const std::string& kind, const std::string& id) {
-  return id.empty() ? kind : fmt::format("{} \"{}\"", kind, id);
-}
-
-[[noreturn]] void refuse(const SourceLocation& where, const std::string& what) {
-  throw InputError(where, "the method \"analytic\": " + what);
-}
-
 }  // namespace
-
-void check_closed_light(const Scene& scene) {
-  if (scene.max_depth == 1) return;
-  const SourceLocation whole{scene.file};
-  if (scene.max_depth != 2) {
-    refuse(whole, fmt::format("only light that is scattered once has a closed form: set the "
-                              "integrator's max_depth to 2 (it is {}), or {}",
-                              scene.max_depth, kInstead));
-  }
-  if (scene.environment) {
-    refuse(whole, fmt::format("{}: light from all around has no closed form here: {}",
-                              name_of("emitter", scene.environment_id), kInstead));
-  }
-  for (const auto& light : scene.delta_lights) {
-    refuse(whole, fmt::format("{}: only area lights are integrated: {}",
-                              name_of("emitter", light->id), kInstead));
-  }
-  for (const Shape& shape : scene.shapes) {
-    for (const bool front : {true, false}) {
-      const Bsdf* side = shape.bsdf->side(front);
-      if (!side || is_diffuse(*side)) continue;
-      refuse(shape.where, fmt::format("{}: only diffuse surfaces have a closed form, this is "
-                                      "{}: {}",
-                                      name_of("shape", shape.id), side->describe(), kInstead));
-    }
-    const bool interpolates = shape.mesh.normal_source != NormalSource::kFace;
-    if (scene.shading == ShadingModel::kMitsuba && interpolates) {
-      refuse(shape.where, fmt::format("{}: its interpolated normals need --shading continuous",
-                                      name_of("shape", shape.id)));
-    }
-  }
-}
 
 // The point that light falls on.
 struct ClosedLight::Receiver {
@@ -79,99 +32,60 @@ struct ClosedLight::Receiver {
 };
 
 struct ClosedLight::Scratch {
+  // What lines are of a face: its sides, then where it was cut.
+  enum Line { kNearCut = 3, kFarCut, kHorizon, kWedge };
+  // The number of a line of the face with a label.
+  static constexpr uint32_t kLines = 8;
+  struct Corner {
+    Vec3d w;        // from the point
+    uint32_t line;  // of the side that begins here
+  };
+  struct CutPoint {
+    ShadowOutlines::Point at;
+    uint32_t lines[2];  // that meet there
+    Vec3d w;            // from the point
+  };
+
   std::vector<const FaceTree::Item*> items;
   std::vector<FaceRef> faces;  // by label: first the lamp's, then those before it
-  std::vector<SeenFace> seen;  // the same
   size_t lamp_faces = 0;
+  size_t uncut = 0;  // of these, those that the lamp's plane does not cut
+  PlaneWindow window;
+  double near = 0, far = 0;  // depths, towards the lamp's plane, of what is before it
+
+  // By regions.
+  std::vector<SeenFace> seen;
   std::vector<uint32_t> order;
   VisibleRegions regions{{}};
+
+  // By outlines.
+  ShadowOutlines outlines;
+  std::vector<Corner> polygon, clipped;
+  std::vector<ShadowOutlines::Point> points;
+  std::vector<uint32_t> lines;
+  std::vector<CutPoint> cut_points;
+
+  // Keeps what is not below zero in the polygon.
+  template <class Height, class OnGrid>
+  void clip(const Height& height, uint32_t line, const OnGrid& on_grid) {
+    clipped.clear();
+    for (size_t i = 0; i < polygon.size(); ++i) {
+      const Corner &here = polygon[i], &next = polygon[(i + 1) % polygon.size()];
+      const double h0 = height(here.w), h1 = height(next.w);
+      if (h0 >= 0) clipped.push_back(here);
+      if ((h0 >= 0) == (h1 >= 0)) continue;
+      // The same for both faces beside it.
+      const auto key = [](const Vec3d& w) { return std::tuple(w.x, w.y, w.z); };
+      const bool swapped = key(next.w) < key(here.w);
+      const Vec3d &x0 = swapped ? next.w : here.w, &x1 = swapped ? here.w : next.w;
+      const double a0 = swapped ? h1 : h0, a1 = swapped ? h0 : h1;
+      const Vec3d w = x0 + (x1 - x0) * (a0 / (a0 - a1));
+      clipped.push_back({w, h0 >= 0 ? line : here.line});
+      cut_points.push_back({on_grid(w), {here.line, line}, w});
+    }
+    std::swap(polygon, clipped);
+  }
 };
-
-ClosedLight::ClosedLight(const Scene& scene, int threads)
-    : scene_((check_closed_light(scene), scene)),
-      copies_(scene),
-      overlaps_(scene, copies_, threads),
-      tree_(scene) {
-  for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
-    if (scene.shapes[s].is_emitter && scene.max_depth == 2) add_lamp(ShapeId(s));
-  }
-}
-
-void ClosedLight::add_lamp(ShapeId id) {
-  const Shape& shape = scene_.shape(id);
-  const Mesh& mesh = shape.mesh;
-  struct Face {
-    FaceRef ref;
-    std::array<Vec3d, 3> corners;
-    Vec3d normal;
-    double area;
-  };
-  std::vector<Face> faces;
-  double size = 0;
-  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
-    const FaceRef ref{id, FaceId(f)};
-    if (!has_area(mesh, mesh.faces[f])) continue;
-    const auto c = face_corners<double>(mesh, ref.face);
-    const Vec3d n = cross(c[1] - c[0], c[2] - c[0]);
-    if (!copies_.empty() && copies_.met(ref, -n, false) != ref) continue;
-    faces.push_back({ref, c, normalize(n), length(n)});
-    for (const Vec3d& x : c)
-      size = std::max({size, std::fabs(x.x), std::fabs(x.y), std::fabs(x.z)});
-  }
-  // The largest face knows its plane best.
-  std::stable_sort(faces.begin(), faces.end(),
-                   [](const Face& a, const Face& b) { return a.area > b.area; });
-  const size_t before = lamps_.size();
-  for (const Face& face : faces) {
-    const auto fits = [&](const LampPlane& lamp) {
-      return dot(lamp.plane.n, face.normal) > 0.5 &&
-             std::all_of(face.corners.begin(), face.corners.end(), [&](const Vec3d& x) {
-               return std::fabs(lamp.plane.distance(x)) <= kRoundings * size;
-             });
-    };
-    auto lamp = std::find_if(lamps_.begin() + static_cast<ptrdiff_t>(before), lamps_.end(), fits);
-    if (lamp == lamps_.end()) {
-      LampPlane& added = lamps_.emplace_back();
-      added.shape = id;
-      added.plane = {face.normal, -dot(face.normal, face.corners[0])};
-      added.deviation = 2 * kRoundings * size;
-      lamp = lamps_.end() - 1;
-    }
-    lamp->faces.push_back(face.ref);
-    lamp->hull.insert(lamp->hull.end(), face.corners.begin(), face.corners.end());
-  }
-  if (lamps_.size() - before > kMostPlanes) {
-    refuse(shape.where,
-           fmt::format("{} has {} planes, at most {} are integrated: {}",
-                       name_of("shape", shape.id), lamps_.size() - before, kMostPlanes, kInstead));
-  }
-  for (size_t i = before; i < lamps_.size(); ++i) finish(lamps_[i]);
-}
-
-// The axes along which the lamp's box is smallest, and what lies in its plane before it.
-void ClosedLight::finish(LampPlane& lamp) const {
-  double least = std::numeric_limits<double>::infinity();
-  for (size_t i = 0; i < lamp.hull.size(); ++i) {
-    const size_t next = i % 3 == 2 ? i - 2 : i + 1;
-    const Vec3d side = lamp.hull[next] - lamp.hull[i];
-    const Vec3d u = normalize(side - lamp.plane.n * dot(side, lamp.plane.n));
-    const Vec3d v = cross(u, lamp.plane.n);  // (u x v) . (-n) = 1
-    double x0 = 1e300, x1 = -1e300, y0 = 1e300, y1 = -1e300;
-    for (const Vec3d& x : lamp.hull) {
-      x0 = std::min(x0, dot(u, x)), x1 = std::max(x1, dot(u, x));
-      y0 = std::min(y0, dot(v, x)), y1 = std::max(y1, dot(v, x));
-    }
-    if (!((x1 - x0) * (y1 - y0) < least)) continue;
-    least = (x1 - x0) * (y1 - y0);
-    lamp.u = u, lamp.v = v;
-    lamp.x0 = x0, lamp.x1 = x1, lamp.y0 = y0, lamp.y1 = y1;
-  }
-  for (const FaceRef face : lamp.faces) {
-    for (const FaceRef other : overlaps_.of(face)) {
-      if (is_met_first(scene_, other, face, -lamp.plane.n)) lamp.before.push_back(other);
-    }
-  }
-}
 
 bool ClosedLight::is_skipped(FaceRef face, const Receiver& receiver) const {
   if (face == receiver.face) return true;
@@ -184,7 +98,7 @@ bool ClosedLight::is_skipped(FaceRef face, const Receiver& receiver) const {
   });
 }
 
-// Finds the regions of the lamp that the point sees; false if there are none.
+// Lists the faces that may shade the lamp, after its own; false if it cannot be seen.
 bool ClosedLight::list(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const {
   const Vec3d &p = receiver.p, a = -lamp.plane.n;
   const double height = lamp.plane.distance(p);
@@ -194,56 +108,66 @@ bool ClosedLight::list(const LampPlane& lamp, const Receiver& receiver, Scratch&
   if (!above) return false;
 
   const double px = dot(lamp.u, p), py = dot(lamp.v, p);
-  PlaneWindow window;
+  PlaneWindow& window = scratch.window;
   window.center = {(0.5 * (lamp.x0 + lamp.x1) - px) / height,
                    (0.5 * (lamp.y0 + lamp.y1) - py) / height};
   window.half_width = (1 + kMargin) * 0.5 * (lamp.x1 - lamp.x0) / height;
   window.half_height = (1 + kMargin) * 0.5 * (lamp.y1 - lamp.y0) / height;
+  scratch.near = kNear * height;
+  scratch.far = height - lamp.deviation;
 
-  const double near = kNear * height, far = height - lamp.deviation;
-  constexpr double kInfinity = std::numeric_limits<double>::max();
-  const PlaneView lamp_view(p, lamp.u, lamp.v, a, near, kInfinity);
-  scratch.faces.clear();
-  scratch.seen.clear();
-  const auto add = [&](const PlaneView& view, FaceRef ref) {
-    const auto corners = face_corners<double>(scene_.shape(ref.shape).mesh, ref.face);
-    const auto face = view.face(static_cast<uint32_t>(scratch.seen.size()), corners);
-    if (!face) return;
-    scratch.faces.push_back(ref);
-    scratch.seen.push_back(*face);
-  };
-  for (const FaceRef face : lamp.faces) add(lamp_view, face);
-  scratch.lamp_faces = scratch.seen.size();
-  for (const FaceRef face : lamp.before) add(lamp_view, face);
-  if (far > near) {
-    const PlaneView view(p, lamp.u, lamp.v, a, near, far);
-    std::array<HalfSpace, 8> set;
-    size_t count = 0;
-    const auto bound = [&](const Vec3d& n, double offset) {
-      set[count++] = {n, offset - dot(n, p)};
+  scratch.faces = lamp.faces;
+  scratch.lamp_faces = lamp.faces.size();
+  scratch.faces.insert(scratch.faces.end(), lamp.before.begin(), lamp.before.end());
+  scratch.uncut = scratch.faces.size();
+  if (!(scratch.far > scratch.near)) return true;
+  std::array<HalfSpace, 8> set;
+  size_t count = 0;
+  const auto bound = [&](const Vec3d& n, double offset) { set[count++] = {n, offset - dot(n, p)}; };
+  bound(a * (window.center.x + window.half_width) - lamp.u, 0);
+  bound(lamp.u - a * (window.center.x - window.half_width), 0);
+  bound(a * (window.center.y + window.half_height) - lamp.v, 0);
+  bound(lamp.v - a * (window.center.y - window.half_height), 0);
+  bound(receiver.up, 0);
+  bound(a, 0);
+  bound(-a, scratch.far);
+  if (receiver.wedge) bound(*receiver.wedge, 0);
+  scratch.items.clear();
+  tree_.list(std::span(set).first(count), scratch.items);
+  for (const FaceTree::Item* item : scratch.items) {
+    // What rises above the horizon by rounding alone is the receiver's own plane.
+    const auto rises = [&](const Vec3f& x) {
+      const Vec3d w = cast<double>(x) - p;
+      return dot(receiver.up, w) > 0x1p-49 * (length(p) + length(w));
     };
-    bound(a * (window.center.x + window.half_width) - lamp.u, 0);
-    bound(lamp.u - a * (window.center.x - window.half_width), 0);
-    bound(a * (window.center.y + window.half_height) - lamp.v, 0);
-    bound(lamp.v - a * (window.center.y - window.half_height), 0);
-    bound(receiver.up, 0);
-    bound(a, 0);
-    bound(-a, far);
-    if (receiver.wedge) bound(*receiver.wedge, 0);
-    scratch.items.clear();
-    tree_.list(std::span(set).first(count), scratch.items);
-    for (const FaceTree::Item* item : scratch.items) {
-      if (!is_skipped(item->face, receiver)) add(view, item->face);
-    }
+    const auto& x = item->corners;
+    if (!rises(x[0]) && !rises(x[1]) && !rises(x[2])) continue;
+    if (!is_skipped(item->face, receiver)) scratch.faces.push_back(item->face);
   }
+  return true;
+}
 
-  // The largest first: what is covered already is left at once. Those before the lamp are no nearer
-  // than each other: each has a depth of its own, in the order of insertion.
+// The largest first: what is covered already is left at once. Those before the lamp are no nearer
+// than each other: each has a depth of its own, in the order of insertion.
+void ClosedLight::find_regions(const LampPlane& lamp, const Receiver& receiver,
+                               Scratch& scratch) const {
+  const Vec3d a = -lamp.plane.n;
+  const PlaneView lamp_view(receiver.p, lamp.u, lamp.v, a, scratch.near,
+                            std::numeric_limits<double>::max());
+  const PlaneView view(receiver.p, lamp.u, lamp.v, a, scratch.near,
+                       std::max(scratch.far, scratch.near));
+  scratch.seen.assign(scratch.faces.size(), {});
   std::vector<uint32_t>& order = scratch.order;
   order.clear();
-  for (size_t i = scratch.lamp_faces; i < scratch.seen.size(); ++i) {
-    order.push_back(static_cast<uint32_t>(i));
+  for (uint32_t i = 0; i < scratch.faces.size(); ++i) {
+    const FaceRef ref = scratch.faces[i];
+    const auto corners = face_corners<double>(scene_.shape(ref.shape).mesh, ref.face);
+    const auto face = (i < scratch.uncut ? lamp_view : view).face(i, corners);
+    if (!face) continue;
+    scratch.seen[i] = *face;
+    if (i >= scratch.lamp_faces) order.push_back(i);
   }
+  const PlaneWindow& window = scratch.window;
   const auto extent = [&](uint32_t i) {
     const SeenFace& face = scratch.seen[i];
     const auto overlap = [](double lower, double upper, double center, double half) {
@@ -254,7 +178,7 @@ bool ClosedLight::list(const LampPlane& lamp, const Receiver& receiver, Scratch&
   };
   std::stable_sort(order.begin(), order.end(),
                    [&](uint32_t i, uint32_t j) { return extent(i) > extent(j); });
-  scratch.regions.reset(window, getenv("GRID") ? order.size() * atof(getenv("GRID")) : 0);
+  scratch.regions.reset(window);
   const auto insert = [&](SeenFace& face, double inverse_depth) {
     face.inverse_depth = {0, 0, inverse_depth};
     face.nearest = inverse_depth;
@@ -263,6 +187,7 @@ bool ClosedLight::list(const LampPlane& lamp, const Receiver& receiver, Scratch&
   };
   for (size_t i = 0; i < scratch.lamp_faces; ++i) {
     SeenFace& face = scratch.seen[i];
+    if (face.side_count == 0) continue;
     const auto cut = [&](const Vec3d& n) {
       face.cuts[face.cut_count++] = {dot(n, lamp.u), dot(n, lamp.v), dot(n, a)};
     };
@@ -273,7 +198,59 @@ bool ClosedLight::list(const LampPlane& lamp, const Receiver& receiver, Scratch&
   for (size_t i = 0; i < order.size(); ++i) {
     insert(scratch.seen[order[i]], 3 - static_cast<double>(i) / static_cast<double>(order.size()));
   }
-  return scratch.lamp_faces > 0;
+}
+
+// False if a corner is too far out.
+bool ClosedLight::find_outlines(const LampPlane& lamp, const Receiver& receiver,
+                                Scratch& scratch) const {
+  using Point = ShadowOutlines::Point;
+  const Vec3d a = -lamp.plane.n;
+  const PlaneWindow& window = scratch.window;
+  const double x_steps = kGridHalf / window.half_width, y_steps = kGridHalf / window.half_height;
+  bool within = true;
+  const auto on_grid = [&](const Vec3d& w) {
+    const double z = dot(w, a);
+    const double x = (dot(w, lamp.u) / z - window.center.x) * x_steps;
+    const double y = (dot(w, lamp.v) / z - window.center.y) * y_steps;
+    within = within && std::fabs(x) < 0x1p60 && std::fabs(y) < 0x1p60;
+    return within ? Point{std::llround(x), std::llround(y)} : Point{0, 0};
+  };
+  const auto clip = [&](const auto& height, uint32_t line) { scratch.clip(height, line, on_grid); };
+  scratch.outlines.clear();
+  scratch.cut_points.clear();
+  for (uint32_t label = 0; label < scratch.faces.size(); ++label) {
+    const FaceRef ref = scratch.faces[label];
+    const auto corners = face_corners<double>(scene_.shape(ref.shape).mesh, ref.face);
+    const uint32_t line = label * Scratch::kLines;
+    scratch.polygon.clear();
+    for (uint32_t k = 0; k < 3; ++k) scratch.polygon.push_back({corners[k] - receiver.p, line + k});
+    const auto depth = [&](const Scratch::Corner& corner) { return dot(corner.w, a); };
+    const auto [nearest, farthest] = std::minmax(
+        {depth(scratch.polygon[0]), depth(scratch.polygon[1]), depth(scratch.polygon[2])});
+    const double near = scratch.near, far = scratch.far;
+    if (nearest < near) {
+      clip([&](const Vec3d& w) { return dot(w, a) - near; }, line + Scratch::kNearCut);
+    }
+    if (label >= scratch.uncut && farthest > far) {
+      clip([&](const Vec3d& w) { return far - dot(w, a); }, line + Scratch::kFarCut);
+    }
+    const bool of_lamp = label < scratch.lamp_faces;
+    if (of_lamp) {
+      clip([&](const Vec3d& w) { return dot(w, receiver.up); }, line + Scratch::kHorizon);
+      if (receiver.wedge) {
+        clip([&](const Vec3d& w) { return dot(w, *receiver.wedge); }, line + Scratch::kWedge);
+      }
+    }
+    scratch.points.clear();
+    scratch.lines.clear();
+    for (const Scratch::Corner& corner : scratch.polygon) {
+      scratch.points.push_back(on_grid(corner.w));
+      scratch.lines.push_back(corner.line);
+    }
+    if (!within) return false;
+    if (scratch.points.size() > 2) scratch.outlines.add(scratch.points, scratch.lines, of_lamp);
+  }
+  return true;
 }
 
 // The polygons of a lamp that a point sees, of their true lines.
@@ -281,41 +258,124 @@ template <class S>
 class ClosedLight::View {
  public:
   View(const ClosedLight& light, const LampPlane& lamp, const Receiver& receiver, const Vec3<S>& p,
-       const Scratch& scratch)
+       Scratch& scratch)
       : light_(light), lamp_(lamp), receiver_(receiver), p_(p), scratch_(scratch) {}
 
-  // visit(sides)
-  template <class Visit>
-  void for_each_polygon(const Visit& visit) const {
+  // Appends the sides of all regions: their sum is that of the whole.
+  void add_regions(std::vector<PolygonSide<S>>& all) const {
     std::vector<PolygonSide<S>> polygon;
     std::vector<Vec3d> units;
-    scratch_.regions.for_each_below(
-        static_cast<uint32_t>(scratch_.lamp_faces),
-        [&](uint32_t shown, std::span<const PlanePoint> corners,
-            std::span<const VisibleRegions::Side> sides) {
-          polygon.resize(sides.size());
-          units.resize(sides.size());
-          for (size_t i = 0; i < sides.size(); ++i) {
-            polygon[i].normal = normal_of(sides[i], shown);
-            units[i] = normalize(value(polygon[i].normal));
-          }
-          for (size_t i = 0; i < sides.size(); ++i) {
-            polygon[i].begin = meet(units[i == 0 ? sides.size() - 1 : i - 1], units[i], corners[i]);
-          }
-          visit(std::span<const PolygonSide<S>>(polygon));
-        });
+    scratch_.regions.for_each_below(static_cast<uint32_t>(scratch_.lamp_faces),
+                                    [&](uint32_t shown, std::span<const PlanePoint> corners,
+                                        std::span<const VisibleRegions::Side> sides) {
+                                      polygon.resize(sides.size());
+                                      units.resize(sides.size());
+                                      for (size_t i = 0; i < sides.size(); ++i) {
+                                        polygon[i].normal = normal_of(sides[i], shown);
+                                        units[i] = normalize(value(polygon[i].normal));
+                                      }
+                                      for (size_t i = 0; i < sides.size(); ++i) {
+                                        polygon[i].begin =
+                                            meet(units[i == 0 ? sides.size() - 1 : i - 1], units[i],
+                                                 towards(corners[i]));
+                                      }
+                                      for (size_t i = 0; i < sides.size(); ++i) {
+                                        polygon[i].end = polygon[(i + 1) % sides.size()].begin;
+                                      }
+                                      all.insert(all.end(), polygon.begin(), polygon.end());
+                                    });
+  }
+
+  void add_outlines(std::vector<PolygonSide<S>>& all) const {
+    scratch_.outlines.for_each([&](const ShadowOutlines::Piece& piece) {
+      const Vec3d first = towards(piece.first), last = towards(piece.last);
+      Vec3<S> n = normal_of_line(piece.tag, first + last);
+      const Vec3d rounded = cross(first, last);  // positive above
+      if (value(n) == Vec3d{}) n = {S(rounded.x), S(rounded.y), S(rounded.z)};
+      if ((dot(value(n), rounded) > 0) != piece.lit_above) n = -n;
+      const Vec3d from = end_of(piece, piece.from), to = end_of(piece, piece.to);
+      all.push_back(piece.lit_above ? PolygonSide<S>{n, from, to} : PolygonSide<S>{n, to, from});
+    });
   }
 
  private:
   Vec3d towards(const PlanePoint& x) const { return lamp_.u * x.x + lamp_.v * x.y - lamp_.plane.n; }
 
-  // Where two lines meet; near `corner`, where they do on the grid. Lines that are parallel to
-  // rounding meet where they do there.
-  Vec3d meet(const Vec3d& first, const Vec3d& second, const PlanePoint& corner) const {
+  Vec3d towards(const ShadowOutlines::Point& x) const {
+    const PlaneWindow& window = scratch_.window;
+    return towards(
+        PlanePoint{window.center.x + static_cast<double>(x.x) / kGridHalf * window.half_width,
+                   window.center.y + static_cast<double>(x.y) / kGridHalf * window.half_height});
+  }
+
+  // Unit direction to an end of a piece.
+  Vec3d end_of(const ShadowOutlines::Piece& piece, const ShadowOutlines::End& end) const {
+    if (end.kind == ShadowOutlines::Kind::kCrossing)
+      return meet(piece.tag, end.tag, piece, towards(end.at));
+    for (const Scratch::CutPoint& cut : scratch_.cut_points) {
+      if (cut.at == end.at) return meet(cut.lines[0], cut.lines[1], piece, cut.w);
+    }
+    // A corner of the face: that which is nearer to the point on the grid.
+    const auto x = face_corners<double>(mesh_of(end.tag), face_of(end.tag).face);
+    const uint32_t k = end.tag % Scratch::kLines;
+    const Vec3d there = normalize(towards(end.at));
+    const Vec3d w0 = x[k] - value(p_), w1 = x[(k + 1) % 3] - value(p_);
+    const auto offset = [&](const Vec3d& w) {
+      const double distance = length(w);
+      return distance > 0 ? length_squared(w / distance - there) : 5;
+    };
+    return normalize(offset(w0) <= offset(w1) ? w0 : w1);
+  }
+  Vec3d meet(uint32_t line, uint32_t other, const ShadowOutlines::Piece& piece,
+             const Vec3d& about) const {
+    if (other < line) std::swap(line, other);  // the same for both pieces to the last bit
+    const Vec3d hint = towards(piece.first) + towards(piece.last);
+    return meet(value(normal_of_line(line, hint)), value(normal_of_line(other, hint)), about);
+  }
+  FaceRef face_of(uint32_t line) const { return scratch_.faces[line / Scratch::kLines]; }
+  const Mesh& mesh_of(uint32_t line) const { return light_.scene_.shape(face_of(line).shape).mesh; }
+
+  // Of the plane through p and a line. hint: a direction on it, to tell faces of the lamp apart.
+  Vec3<S> normal_of_line(uint32_t line, const Vec3d& hint) const {
+    const uint32_t k = line % Scratch::kLines;
+    const auto constant = [](const Vec3d& n) { return Vec3<S>{S(n.x), S(n.y), S(n.z)}; };
+    if (k == Scratch::kHorizon) return constant(receiver_.up);
+    if (k == Scratch::kWedge) return constant(*receiver_.wedge);
+    if (k == Scratch::kNearCut) return {};
+    const auto x = corners_of(face_of(line));
+    if (k == Scratch::kFarCut) return normal_of_crossing(x, corners_of(lamp_face_at(hint)));
+    return cross(x[k] - p_, x[(k + 1) % 3] - p_);
+  }
+  // The face of the lamp that is seen there, or the nearest.
+  FaceRef lamp_face_at(const Vec3d& w) const {
+    FaceRef best = lamp_.faces[0];
+    double deepest = -std::numeric_limits<double>::infinity();
+    for (const FaceRef face : lamp_.faces) {
+      const auto x = face_corners<double>(light_.scene_.shape(face.shape).mesh, face.face);
+      double depth = std::numeric_limits<double>::infinity();
+      for (int k = 0; k < 3; ++k) {  // its corners run clockwise as seen from p
+        const Vec3d n = cross(x[(k + 1) % 3] - value(p_), x[k] - value(p_));
+        depth = std::min(depth, dot(n, w) / length(n));
+      }
+      if (depth > deepest) deepest = depth, best = face;
+    }
+    return best;
+  }
+  // Where a face goes through the lamp's plane: of all planes through their common line that
+  // through p.
+  Vec3<S> normal_of_crossing(const std::array<Vec3<S>, 3>& x,
+                             const std::array<Vec3<S>, 3>& y) const {
+    const Vec3<S> n = cross(x[1] - x[0], x[2] - x[0]), m = cross(y[1] - y[0], y[2] - y[0]);
+    return n * dot(m, p_ - y[0]) - m * dot(n, p_ - x[0]);
+  }
+
+  // Where two lines meet; `about` is where they do on the grid. Lines that are parallel to rounding
+  // meet where they do there.
+  static Vec3d meet(const Vec3d& n, const Vec3d& m, const Vec3d& about) {
     constexpr double kParallel = 1e-12, kAway = 0.5;  // not tuned
-    const Vec3d there = normalize(towards(corner)), line = cross(first, second);
+    const Vec3d there = normalize(about), line = cross(n, m);
     const double size = length(line);
-    if (!(size > kParallel)) return there;
+    if (!(size > kParallel * length(n) * length(m))) return there;
     const Vec3d here = line * ((dot(line, there) < 0 ? -1 : 1) / size);
     return dot(here, there) > kAway ? here : there;
   }
@@ -343,11 +403,8 @@ class ClosedLight::View {
       return {S(n.x), S(n.y), S(n.z)};
     }
     if (!face.whole && side.cut == 0) return {};  // just before p
-    // Where the face goes through the lamp's plane: of all planes through their common line that
-    // through p.
-    const auto x = corners_of(scratch_.faces[side.label]), y = corners_of(scratch_.faces[shown]);
-    const Vec3<S> n = cross(x[1] - x[0], x[2] - x[0]), m = cross(y[1] - y[0], y[2] - y[0]);
-    return n * dot(m, p_ - y[0]) - m * dot(n, p_ - x[0]);
+    return normal_of_crossing(corners_of(scratch_.faces[side.label]),
+                              corners_of(scratch_.faces[shown]));
   }
   std::array<Vec3<S>, 3> corners_of(FaceRef face) const {
     return face_corners<S>(light_.scene_.shape(face.shape).mesh, face.face);
@@ -357,7 +414,7 @@ class ClosedLight::View {
   const LampPlane& lamp_;
   const Receiver& receiver_;
   const Vec3<S>& p_;
-  const Scratch& scratch_;
+  Scratch& scratch_;
 };
 
 namespace {
@@ -387,6 +444,7 @@ template <class S>
 Rgb<S> ClosedLight::scattered(const RayTracer& tracer, const SurfacePoint<S>& surface,
                               const Scattering<S>& scattering, const EdgeStart* edge) const {
   static thread_local Scratch scratch;
+  static thread_local std::vector<PolygonSide<S>> sides;
   const bool front = dot(surface.n_g, value(scattering.wi())) > 0;
   Receiver receiver{value(surface.p), front ? surface.n_g : -surface.n_g, surface.face, edge};
   if (edge) receiver.wedge = wedge_at(scene_, tracer, *edge, receiver.up);
@@ -401,21 +459,23 @@ Rgb<S> ClosedLight::scattered(const RayTracer& tracer, const SurfacePoint<S>& su
     const Shape& shape = scene_.shape(lamp.shape);
     if (!list(lamp, receiver, scratch)) continue;
     const View<S> view(*this, lamp, receiver, surface.p, scratch);
+    sides.clear();
+    if (by_ != By::kRegions && find_outlines(lamp, receiver, scratch)) {
+      view.add_outlines(sides);
+    } else {
+      find_regions(lamp, receiver, scratch);
+      view.add_regions(sides);
+    }
+    const std::span<const PolygonSide<S>> lit(sides);
     Rgb<S> light;
     if (!bent) {
-      S cosines{};
-      view.for_each_polygon([&](const auto& polygon) {
-        cosines += ramp_integral(polygon, scattering.normal(), surface.horizon);
-      });
-      light = scattering.eval(value(scattering.normal())) * cosines;
+      light = scattering.eval(value(scattering.normal())) *
+              ramp_integral(lit, scattering.normal(), surface.horizon);
     } else {
       const Vec3d middle = lamp.u * (0.5 * (lamp.x0 + lamp.x1)) +
                            lamp.v * (0.5 * (lamp.y0 + lamp.y1)) - lamp.plane.n * lamp.plane.offset;
-      const Vec3d pole = normalize(middle - receiver.p);
-      view.for_each_polygon([&](const auto& polygon) {
-        light += polygon_integral<S>(polygon, pole, kinks,
-                                     [&](const Vec3d& w) { return scattering.eval(w); });
-      });
+      light = polygon_integral<S>(lit, normalize(middle - receiver.p), kinks,
+                                  [&](const Vec3d& w) { return scattering.eval(w); });
     }
     sum += light * as<S>(shape.radiance);
   }

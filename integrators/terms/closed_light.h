@@ -30,7 +30,9 @@ void check_closed_light(const Scene& scene);
 class ClosedLight {
  public:
   // The scene must outlive it. InputError as above, and for a lamp of more than kMostPlanes planes.
-  ClosedLight(const Scene& scene, int threads);
+  // by: how the visible part of a lamp is found; regions take much longer and are for tests.
+  enum class By { kOutlines, kRegions };
+  ClosedLight(const Scene& scene, int threads, By by = By::kOutlines);
 
   static constexpr size_t kMostPlanes = 64;  // of one lamp
 
@@ -62,11 +64,14 @@ class ClosedLight {
   void finish(LampPlane& lamp) const;
   bool is_skipped(FaceRef face, const Receiver& receiver) const;
   bool list(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;
+  void find_regions(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;
+  bool find_outlines(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;
 
   const Scene& scene_;
   FaceCopies copies_;
   FaceOverlaps overlaps_;
   FaceTree tree_;
+  By by_;
   std::vector<LampPlane> lamps_;
 };
 

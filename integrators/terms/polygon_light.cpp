@@ -107,11 +107,11 @@ template <class S, class Visit>
 void for_every_side_point(std::span<const PolygonSide<S>> sides, const Vec3d& n, const Ramp& ramp,
                           const Visit& visit) {
   const std::array<Kink, 2> kinks = {{{n, ramp.h}, {n, ramp.end}}};
-  for (size_t i = 0; i < sides.size(); ++i) {
-    const Vec3d &a = sides[i].begin, &b = sides[(i + 1) % sides.size()].begin;
-    const detail::Arc arc(value(sides[i].normal), a, b);
+  for (const PolygonSide<S>& side : sides) {
+    const Vec3d &a = side.begin, &b = side.end;
+    const detail::Arc arc(value(side.normal), a, b);
     for_every_direction(arc, a, b, kinks,
-                        [&](const Vec3d& w, double dpsi) { visit(sides[i], arc, w, dpsi); });
+                        [&](const Vec3d& w, double dpsi) { visit(side, arc, w, dpsi); });
   }
 }
 

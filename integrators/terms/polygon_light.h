@@ -14,12 +14,12 @@
 
 namespace limn {
 
-// A side of a polygon of directions as seen from a point; the next one begins where it ends,
-// counter-clockwise as seen from that point.
+// A side of a polygon of directions as seen from a point, or a piece of one. The polygon is to the
+// left, seen from that point; the sides of all its borders together are closed, in any order.
 template <class S>
 struct PolygonSide {
-  Vec3<S> normal;  // of the plane through the point and the side; of any length, positive inside
-  Vec3d begin;     // unit
+  Vec3<S> normal;    // of the plane through the point and the side; of any length, positive inside
+  Vec3d begin, end;  // unit
 };
 
 namespace detail {
@@ -44,17 +44,17 @@ struct Arc {
 // length; below its horizon n . w counts as negative.
 inline double cosine_integral(std::span<const PolygonSide<double>> sides, const Vec3d& n) {
   double sum = 0;
-  for (size_t i = 0; i < sides.size(); ++i) {
-    const detail::Arc arc(sides[i].normal, sides[i].begin, sides[(i + 1) % sides.size()].begin);
+  for (const PolygonSide<double>& side : sides) {
+    const detail::Arc arc(side.normal, side.begin, side.end);
     sum += 0.5 * arc.angle * dot(n, arc.s);
   }
   return sum;
 }
 inline Dual cosine_integral(std::span<const PolygonSide<Dual>> sides, const Vec3<Dual>& n) {
   Dual sum;
-  for (size_t i = 0; i < sides.size(); ++i) {
-    const Vec3<Dual>& normal = sides[i].normal;
-    const detail::Arc arc(value(normal), sides[i].begin, sides[(i + 1) % sides.size()].begin);
+  for (const PolygonSide<Dual>& side : sides) {
+    const Vec3<Dual>& normal = side.normal;
+    const detail::Arc arc(value(normal), side.begin, side.end);
     sum += dot(n, arc.s) * (0.5 * arc.angle);
     if (is_still(normal)) continue;
     // n . w and dN . w as c cos psi + d sin psi, and the integrals of the products of these.
@@ -167,13 +167,13 @@ template <class S, class F>
 Rgb<S> polygon_integral(std::span<const PolygonSide<S>> sides, const Vec3d& pole,
                         std::span<const Kink> kinks, const F& f) {
   Rgb<S> sum;
-  for (size_t i = 0; i < sides.size(); ++i) {
-    const Vec3d &a = sides[i].begin, &b = sides[(i + 1) % sides.size()].begin;
+  for (const PolygonSide<S>& side : sides) {
+    const Vec3d &a = side.begin, &b = side.end;
     sum += detail::triangle_integral<S>(pole, a, b, kinks, f);
     if constexpr (std::is_same_v<S, Dual>) {
-      if (is_still(sides[i].normal)) continue;
-      const detail::Arc arc(value(sides[i].normal), a, b);
-      const Rgb<Lanes> moved = detail::side_integral(sides[i].normal, arc, a, b, kinks, f);
+      if (is_still(side.normal)) continue;
+      const detail::Arc arc(value(side.normal), a, b);
+      const Rgb<Lanes> moved = detail::side_integral(side.normal, arc, a, b, kinks, f);
       for (int c = 0; c < 3; ++c) sum[c].d += moved[c];
     }
   }

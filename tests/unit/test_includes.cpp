@@ -151,6 +151,7 @@ const Strings kContracts = {"check.h",
                             "matrix.h",
                             "bounds.h",
                             "visible_regions.h",
+                            "shadow_outlines.h",
                             "mesh.h",
                             "normals_adjoint.h",
                             "lobe.h",
@@ -173,7 +174,7 @@ const Strings kContracts = {"check.h",
                             "reverse.h",
                             "parameter.h"};
 const std::map<std::string, std::string> kSeenFrom = {
-    {"base", "properties.h"}, {"regions", "visible_regions.h"}, {"mesh", "normals_adjoint.h"},
+    {"base", "properties.h"}, {"regions", "shadow_outlines.h"}, {"mesh", "normals_adjoint.h"},
     {"image", "film.h"},      {"bsdf", "properties.h"},         {"light", "lights.h"},
     {"rays", "face_tree.h"},  {"scene", "parameter.h"},         {"scene_file", "lights.h"}};
 

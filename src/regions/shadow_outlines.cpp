@@ -1,0 +1,149 @@
+// Which side lies above which, and what is between them.
+#include "limn/core/shadow_outlines.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace limn {
+namespace {
+
+using Point = ShadowOutlines::Point;
+using Wide = __int128;
+
+// Twice the area of a triangle: positive if r lies to the left of the way from p to q.
+Wide area(const Point& p, const Point& q, const Point& r) {
+  return Wide(q.x - p.x) * (r.y - p.y) - Wide(q.y - p.y) * (r.x - p.x);
+}
+int sign(Wide a) { return a > 0 ? 1 : a < 0 ? -1 : 0; }
+
+}  // namespace
+
+uint32_t& ShadowOutlines::slot_of(const Edge& edge) {
+  uint64_t h = 0x9e3779b97f4a7c15;
+  for (const int64_t v : {edge.p.x, edge.p.y, edge.q.x, edge.q.y}) {
+    h = (h ^ static_cast<uint64_t>(v)) * 0xff51afd7ed558ccd;
+    h ^= h >> 32;
+  }
+  for (size_t i = h;; ++i) {
+    uint32_t& slot = table_[i & (table_.size() - 1)];
+    if (slot == kEmpty || (sides_[slot].p == edge.p && sides_[slot].q == edge.q)) return slot;
+  }
+}
+
+// At most half of the slots are taken.
+void ShadowOutlines::grow() {
+  table_.assign(2 * table_.size(), kEmpty);
+  for (uint32_t i = 0; i < sides_.size(); ++i) slot_of(sides_[i]) = i;
+}
+
+void ShadowOutlines::clear() {
+  sides_.clear();
+  table_.assign(std::max<size_t>(table_.size(), 1024), kEmpty);
+}
+
+void ShadowOutlines::add(std::span<const Point> corners, std::span<const uint32_t> tags,
+                         bool of_lamp) {
+  Wide turn = 0;
+  for (size_t i = 2; i < corners.size(); ++i) turn += area(corners[0], corners[i - 1], corners[i]);
+  if (turn == 0) return;
+  for (size_t i = 0; i < corners.size(); ++i) {
+    const Point &a = corners[i], &b = corners[(i + 1) % corners.size()];
+    if (a == b) continue;
+    const bool forward = a < b;
+    // Inside is to the left of the way round, and above a way to the right.
+    const int change = (turn > 0) == forward ? -1 : 1;
+    const Edge edge = forward ? Edge{a, b, tags[i], 0, 0} : Edge{b, a, tags[i], 0, 0};
+    uint32_t& slot = slot_of(edge);
+    if (slot == kEmpty) {
+      slot = static_cast<uint32_t>(sides_.size());
+      sides_.push_back(edge);
+    }
+    Edge& sums = sides_[slot];
+    (of_lamp ? sums.lamp : sums.cover) += change;
+    if (2 * sides_.size() > table_.size()) grow();
+  }
+}
+
+// What side t tells of s, whose first end it may lie above, and which it may cross or touch. later:
+// which one is taken for the upper one where both lie on one line.
+void ShadowOutlines::compare(const Edge& s, uint32_t index, bool later, int& lamp, int& cover) {
+  const Edge& t = edges_[index];
+  if (t.q <= s.p || s.q <= t.p) return;
+  const bool spans_start = t.p <= s.p;
+  const auto [s_low, s_high] = std::minmax(s.p.y, s.q.y);
+  const auto [t_low, t_high] = std::minmax(t.p.y, t.q.y);
+  if (t_high < s_low) return;
+  if (t_low > s_high) {
+    if (spans_start) lamp += t.lamp, cover += t.cover;
+    return;
+  }
+  // Of the ends of s to t, and of those of t to s.
+  const Wide at_p = area(t.p, t.q, s.p), at_q = area(t.p, t.q, s.q);
+  const int p_of_t = sign(area(s.p, s.q, t.p)), q_of_t = sign(area(s.p, s.q, t.q));
+  const bool one_line = at_p == 0 && at_q == 0;
+  // Whether t is above s where both begin, and where the first of them ends.
+  const auto is_above = [&](int of_s, int of_s_else, bool from_s, int of_t, int of_t_else) {
+    if (one_line) return later;
+    if (from_s) return (of_s != 0 ? of_s : of_s_else) < 0;
+    return (of_t != 0 ? of_t : of_t_else) > 0;
+  };
+  const bool begins = is_above(sign(at_p), sign(at_q), spans_start, p_of_t, q_of_t);
+  const bool ends = is_above(sign(at_q), sign(at_p), s.q <= t.q, q_of_t, p_of_t);
+  if (spans_start && begins) lamp += t.lamp, cover += t.cover;
+  // A side that begins or ends on s.
+  const auto along = [&](const Point& x) {
+    const double dx = static_cast<double>(s.q.x - s.p.x), dy = static_cast<double>(s.q.y - s.p.y);
+    return (static_cast<double>(x.x - s.p.x) * dx + static_cast<double>(x.y - s.p.y) * dy) /
+           (dx * dx + dy * dy);
+  };
+  if (s.p < t.p && p_of_t == 0 && begins) {
+    events_.push_back({along(t.p), index, Kind::kFirst, t.lamp, t.cover});
+  }
+  if (begins != ends) {
+    const double a = static_cast<double>(at_p), b = static_cast<double>(at_q);
+    const int up = ends ? 1 : -1;
+    events_.push_back({a / (a - b), index, Kind::kCrossing, up * t.lamp, up * t.cover});
+  }
+  if (t.q < s.q && q_of_t == 0 && ends) {
+    events_.push_back({along(t.q), index, Kind::kSecond, -t.lamp, -t.cover});
+  }
+}
+
+void ShadowOutlines::for_each(const std::function<void(const Piece&)>& visit) {
+  edges_.clear();
+  for (const Edge& side : sides_) {
+    if (side.lamp != 0 || side.cover != 0) edges_.push_back(side);
+  }
+  for (uint32_t i = 0; i < edges_.size(); ++i) {
+    const Edge& s = edges_[i];
+    int lamp = 0, cover = 0;  // above it
+    events_.clear();
+    for (uint32_t j = 0; j < edges_.size(); ++j) {
+      if (j != i) compare(s, j, j > i, lamp, cover);
+    }
+    std::stable_sort(events_.begin(), events_.end(),
+                     [](const Event& a, const Event& b) { return a.at < b.at; });
+    End from{s.tag, Kind::kFirst, s.p};
+    const auto finish = [&](const End& to) {
+      const bool above = lamp > 0 && cover == 0;
+      const bool below = lamp + s.lamp > 0 && cover + s.cover == 0;
+      if (above != below) visit({s.tag, s.p, s.q, from, to, above});
+      from = to;
+    };
+    for (const Event& event : events_) {
+      const Edge& t = edges_[event.other];
+      const auto at = [&](int64_t from_s, int64_t to_s) {
+        return from_s + std::llround(event.at * static_cast<double>(to_s - from_s));
+      };
+      finish({t.tag, event.kind,
+              event.kind == Kind::kFirst    ? t.p
+              : event.kind == Kind::kSecond ? t.q
+                                            : Point{at(s.p.x, s.q.x), at(s.p.y, s.q.y)}});
+      lamp += event.lamp;
+      cover += event.cover;
+    }
+    finish({s.tag, Kind::kSecond, s.q});
+  }
+}
+
+}  // namespace limn
