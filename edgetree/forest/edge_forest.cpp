@@ -3,50 +3,15 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstring>
 
-#include "edgetree/forest/choose_root.h"
 #include "edgetree/forest/forest_build.h"
+#include "edgetree/forest/forest_choice.h"
 #include "edgetree/forest/forest_query.h"
 #include "edgetree/forest/forest_rejection.h"
 #include "edgetree/lobe/seen_edge.h"
 
 namespace limn {
 namespace {
-
-// A node, the weights of its children, and their sums in pairs, fours and all.
-struct Choice {
-  NodeId node = kNoChild;
-  float weights[kWidth];
-  double pairs[4], fours[2], total = 0;
-
-  Choice() = default;
-  Choice(NodeId id, Floats w) : node(id) {
-    static_assert(kWidth == 8);
-    std::memcpy(weights, &w, sizeof weights);
-    for (int i = 0; i < 4; ++i) pairs[i] = static_cast<double>(weights[2 * i]) + weights[2 * i + 1];
-    for (int i = 0; i < 2; ++i) fours[i] = pairs[2 * i] + pairs[2 * i + 1];
-    total = fours[0] + fours[1];
-  }
-
-  // Draws a lane by the uniform number u and leaves another one in it; total > 0. By halves, and
-  // without branches, which would depend on chance.
-  int draw(double& u) const {
-    double rest = u * total;
-    int lane = 0;
-    const auto step = [&](double left, int half) {
-      const int right = rest >= left;
-      rest -= left * right;
-      lane += half * right;
-    };
-    step(fours[0], 4);
-    step(pairs[lane / 2], 2);
-    step(weights[lane], 1);
-    while (!(weights[lane] > 0)) lane = (lane + kWidth - 1) % kWidth;  // by rounding
-    u = below_one(rest / weights[lane]);
-    return lane;
-  }
-};
 
 // The edges of a query's own face lie in its plane: most others need no look at their mesh.
 class OwnEdges {
@@ -84,36 +49,13 @@ struct EdgeForest::Impl {
     const bool lit = config.light_term && !lights.empty();
     const RadiancePyramid* environment =
         config.environment_term ? input.environment.get() : nullptr;
-    return {forest, lit ? &lights : nullptr, environment, query, input.lane_scale};
+    return {forest, lit ? &lights : nullptr, environment, query, input};
   }
-
-  // Both sampling and evaluating a probability ask here, and get the same bits.
-  Choice choice_at(NodeId id, const ForestQuery& query) const {
-    forest.fetch(id);  // all lines at once
-    if (id < 0) {
-      return {id, weigh_edges(forest.edges[~id], query)};
-    }
-    const InnerNode& node = forest.inner[id];
-    ChildWeights children = weigh_children(node, query, config.soft_weights);
-    look_ahead(node, query.point, children);
-    return {id, children.product()};
-  }
-
-  void look_ahead(const InnerNode& node, const ForestPoint& point, ChildWeights& children) const {
-    for (uint32_t lanes = bits(children.rest > 0) & node.ahead; lanes != 0; lanes &= lanes - 1) {
-      const int lane = std::countr_zero(lanes);
-      const NodeId child = node.child[lane];
-      const float unit = node.head.inverse_radius;
-      children.length[lane] =
-          child < 0 ? length_below(forest.edges[~child], point, unit)
-                    : length_below(forest.inner[child], point, config.soft_weights, unit);
-    }
-  }
-
-  double root_total(const ForestQuery& query) const {
-    double total = 0;
-    for (NodeId root : forest.roots) total += choice_at(root, query).total;
-    return total;
+  // The result holds until another query is opened by this thread.
+  const OpenNodes& open(const ForestQuery& query) const {
+    static thread_local OpenNodes nodes;
+    nodes.open(forest, config, query);
+    return nodes;
   }
 
   // Where a draw ends: an edge, not yet tested, in a lane of an edge node.
@@ -124,10 +66,11 @@ struct EdgeForest::Impl {
     EdgeRef edge() const { return node->edge_at(lane); }
   };
   bool draw(const ForestQuery& query, double u, Draw& result) const {
-    Choice choice;
-    double scale;
-    const auto at = [&](NodeId root) { return choice_at(root, query); };
-    if (!choose_root(forest.roots, at, u, choice, scale)) return false;
+    const OpenNodes& nodes = open(query);
+    if (!(nodes.total() > 0)) return false;
+    int opened = nodes.draw_root(u);
+    Choice choice = nodes.choice(opened);
+    double scale = nodes.total();
     result.probability = 1;
     while (true) {
       const int lane = choice.draw(u);
@@ -137,23 +80,28 @@ struct EdgeForest::Impl {
         result.lane = lane;
         return true;
       }
-      choice = choice_at(forest.inner[choice.node].child[lane], query);
+      if (opened != OpenNodes::kClosed) opened = nodes.child(opened, lane);
+      choice = opened != OpenNodes::kClosed
+                   ? nodes.choice(opened)
+                   : choice_at(forest, config, query, forest.inner[choice.node].child[lane]);
       scale = choice.total;
       if (!(scale > 0)) return false;
     }
   }
 
   // Probability of drawing the child in a lane of a node; multiplied from the root on, as `draw`
-  // does.
-  double probability(NodeId id, int lane, const ForestQuery& query) const {
+  // does, which has the same bits.
+  double probability(NodeId id, int lane, const ForestQuery& query, const OpenNodes& nodes) const {
     const uint32_t parent = forest.head(id).parent;
     const bool is_root = parent == kNoParent;
     const double reach = is_root ? 1
                                  : probability(static_cast<NodeId>(parent / kWidth),
-                                               static_cast<int>(parent % kWidth), query);
+                                               static_cast<int>(parent % kWidth), query, nodes);
     if (reach == 0) return 0;
-    const Choice choice = choice_at(id, query);
-    const double scale = is_root ? root_total(query) : choice.total;
+    const int opened = nodes.find(id);
+    const Choice choice =
+        opened != OpenNodes::kClosed ? nodes.choice(opened) : choice_at(forest, config, query, id);
+    const double scale = is_root ? nodes.total() : choice.total;
     return scale > 0 ? reach * (choice.weights[lane] / scale) : 0;
   }
 
@@ -224,7 +172,8 @@ double EdgeForest::probability(const EdgeQuery& query, EdgeRef id) const {
   const ForestQuery prepared = impl_->prepare(query);
   if (!impl_->accepts(query, prepared.point, node, lane)) return 0;
   if (!impl_->seen_edge(prepared.lobe, query.p, node, lane).is_seen()) return 0;
-  return impl_->probability(~static_cast<NodeId>(slot / kWidth), lane, prepared);
+  return impl_->probability(~static_cast<NodeId>(slot / kWidth), lane, prepared,
+                            impl_->open(prepared));
 }
 
 double EdgeForest::pdf_t(const EdgeQuery& query, EdgeRef id, double t) const {

@@ -184,10 +184,35 @@ Ints ends_at(const EdgeNode& node, const Vec3d& p) {
   return at;
 }
 
-// Mean of f_s times luminance over boxes.
-Floats light_through(const ForestQuery& query, const Floats3& d, const Floats3& half,
+// Lanes of the edges of the query's own face. They lie in its plane: most others need no look at
+// their mesh. Ends minus p in the query's unit.
+Ints own_edges(const EdgeNode& node, const ForestQuery& query, const Floats3& w_0,
+               const Floats3& w_1, Ints alive) {
+  const Vec3d& normal = query.own_plane->n;
+  const float m[3] = {static_cast<float>(normal.x), static_cast<float>(normal.y),
+                      static_cast<float>(normal.z)};
+  const auto height = [&](const Floats3& w) { return abs(w.x * m[0] + w.y * m[1] + w.z * m[2]); };
+  constexpr float kNearPlane = 0x1.0p-16f;  // far beyond rounding; not tuned
+  Ints own = Ints{};
+  const Ints near = alive & (max(height(w_0), height(w_1)) <= kNearPlane);
+  for (uint32_t lanes = bits(near); lanes != 0; lanes &= lanes - 1) {
+    const int lane = std::countr_zero(lanes);
+    if (is_own_edge(query.input, query.asked, node.edge_at(lane))) own[lane] = -1;
+  }
+  return own;
+}
+
+// The squared distance of the boxes from p; from inside, that to a tenth of their size.
+Floats nearest2_of(const Floats3& d, const Floats3& half) {
+  constexpr float kInside = 0.01f;  // not tuned
+  const auto outside = [](Floats x, Floats h) { return max(abs(x) - h, splat(0.0f)); };
+  const Floats3 to{outside(d.x, half.x), outside(d.y, half.y), outside(d.z, half.z)};
+  return max(dot(to, to), kInside * dot(half, half));
+}
+
+// Mean of f_s times luminance over boxes, given that of f_s.
+Floats light_through(const ForestQuery& query, Floats lobe, const Floats3& d, const Floats3& half,
                      Floats distance2, Ints alive) {
-  const Floats lobe = query.lobe.mean_over_boxes(d, half);
   if (!query.lights && !query.environment) return lobe;
   return lobe * brightness(query, d, half, sqrt(dot(half, half) / distance2), alive);
 }
@@ -232,17 +257,20 @@ static void split(const Vec3d& p, float unit, float (&parts)[2][3]) {
 
 ForestQuery::ForestQuery(const Forest& tree, const LightClusters* clusters,
                          const RadiancePyramid* pyramid, const EdgeQuery& query,
-                         const Lanes& lane_scale)
+                         const EdgeSamplerInput& scene)
     : forest(tree),
       point(point_of(forest, query.p)),
       lobe(query.lobe, query.n, query.wi),
-      environment(pyramid) {
+      environment(pyramid),
+      input(scene),
+      asked(query) {
   if (clusters) lights.emplace(*clusters, query.p);
   for (int k = 0; k < 3; ++k) n[k] = static_cast<float>(query.n[k]);
   unit = unit_of(forest, query.p);
   split(query.p, unit, p);
-  speed = sum_of_speeds(query.velocity, lane_scale);
-  turn = sum_of_speeds(query.turn.rate, lane_scale);
+  speed = sum_of_speeds(query.velocity, scene.lane_scale);
+  turn = sum_of_speeds(query.turn.rate, scene.lane_scale);
+  if (query.face.shape.valid()) own_plane = scene.object(query.face.shape).plane(query.face.face);
 }
 
 Ints may_hold_candidates(const InnerNode& node, const ForestPoint& point) {
@@ -333,7 +361,8 @@ Floats ChildWeights::product() const {
   return select((length > 0) & (rest > 0), max(length * rest, splat(kLeast)), splat(0.0f));
 }
 
-ChildWeights weigh_children(const InnerNode& node, const ForestQuery& query, bool soft) {
+ChildWeights weigh_children(const InnerNode& node, const ForestQuery& query, bool soft,
+                            Floats* doubt) {
   const FramePoint at = to_frame(node.head, query.point);
   const Floats length = length_of(node, query.point, at, soft);
   Ints alive = length > 0;
@@ -351,7 +380,12 @@ ChildWeights weigh_children(const InnerNode& node, const ForestQuery& query, boo
   // What a look ahead reads comes in while light is weighed.
   for (uint32_t lanes = bits(alive) & node.ahead; lanes != 0; lanes &= lanes - 1)
     query.forest.fetch(node.child[std::countr_zero(lanes)]);
-  const Floats rest = speed / distance2 * light_through(query, d, half, distance2, alive);
+  const Floats lobe = query.lobe.mean_over_boxes(d, half);
+  const Floats rest = speed / distance2 * light_through(query, lobe, d, half, distance2, alive);
+  if (doubt) {
+    const Floats most = query.lobe.most_in_boxes(d, half) / max(lobe, splat(kLeast));
+    *doubt = most * max(distance2 / nearest2_of(d, half), splat(1.0f));
+  }
   return {length, select(alive, max(rest, splat(kLeast)), splat(0.0f))};
 }
 
@@ -382,8 +416,10 @@ Floats weigh_edges(const EdgeNode& node, const ForestQuery& query) {
   Floats speed = query.speed + node.speed;
   if (query.turn > 0) speed = speed + query.turn / query.unit * sqrt(distance2);
   alive &= speed > 0;
+  const Floats lobe = query.lobe.mean_over_segments(d, along * splat(0.5f));
+  if (query.own_plane) alive &= ~own_edges(node, query, w_0, w_1, alive);
   const Floats weight = speed * query.unit * tangent * (l_0 + l_1) / product *
-                        light_through(query, d, half, distance2, alive);
+                        light_through(query, lobe, d, half, distance2, alive);
   return select(alive, clamp(weight, splat(kLeast), splat(kMost)), splat(0.0f));
 }
 

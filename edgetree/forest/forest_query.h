@@ -22,8 +22,9 @@ ForestPoint point_of(const Forest& forest, const Vec3d& p);
 // All that does not depend on the node.
 struct ForestQuery {
   // lights, environment: null if they are not to weigh.
+  // Input and query are kept.
   ForestQuery(const Forest& forest, const LightClusters* lights, const RadiancePyramid* environment,
-              const EdgeQuery& query, const Lanes& lane_scale);
+              const EdgeQuery& query, const EdgeSamplerInput& input);
   const Forest& forest;
   ForestPoint point;
   LtcLobe lobe;
@@ -36,6 +37,9 @@ struct ForestQuery {
   float p[2][3];  // unit * p = p[0] + p[1], to twice the precision of a float
   float speed;    // of p
   float turn;     // of the directions
+  const EdgeSamplerInput& input;
+  const EdgeQuery& asked;
+  std::optional<Plane> own_plane;  // of the query's own face, if any
 };
 
 // Lanes (-1 or 0) of the children that may hold an edge of E(p): never 0 where one does.
@@ -67,14 +71,17 @@ struct ChildWeights {
   Floats rest;    // speed, distance, lobe and light; 0 where the child is rejected
   Floats product() const;
 };
-ChildWeights weigh_children(const InnerNode& node, const ForestQuery& query, bool soft);
+// doubt, if asked for: about how many times its `rest` a child may weigh at most, since the lobe and
+// the distance change over its box; below some hundreds.
+ChildWeights weigh_children(const InnerNode& node, const ForestQuery& query, bool soft,
+                            Floats* doubt = nullptr);
 // `length` alone, for all children together and over the squared radius that `inverse_radius`
 // stands for.
 float length_below(const InnerNode& node, const ForestPoint& point, bool soft,
                    float inverse_radius);
 float length_below(const EdgeNode& node, const ForestPoint& point, float inverse_radius);
 
-// Weights of edges: not negative, 0 only where the edge cannot contribute.
+// Weights of edges: not negative, 0 only where the edge cannot contribute, and of the query's own.
 Floats weigh_edges(const EdgeNode& node, const ForestQuery& query);
 
 }  // namespace limn

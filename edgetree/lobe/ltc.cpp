@@ -40,14 +40,35 @@ Floats mean_slope(Floats middle, Floats reach, Floats z) {
   return (x1 > 0 ? 2 * middle * z2 / (a + b) : (a - b) / (2 * reach)) / (s1 * s2);
 }
 
-// Half width of the uniform distribution whose variance the box has along `row`, measured in the
+// How far a shape reaches along a row, and the square of the half width of the uniform distribution
+// that has its variance, from what its half extents are along the row, one by one. Boxes extend in
+// three directions, segments in one.
+struct Box {
+  static Floats reach(const float row[3], const Floats3& half) { return abs_dot3(row, half); }
+  static Floats width2(Floats a, Floats b, Floats c) { return a * a + b * b + c * c; }
+};
+struct Segment {
+  static Floats reach(const float row[3], const Floats3& half) { return abs(dot3(row, half)); }
+  static Floats width2(Floats a, Floats b, Floats c) { return (a + b + c) * (a + b + c); }
+};
+
+// Half width of the uniform distribution whose variance the shape has along `row`, measured in the
 // slope to `axis` around the center's slope, times z. A floor of 3 % of the lobe's width (which has
 // z for its unit) changes no mean and avoids 0 / 0.
+template <class Shape>
 Floats reach_across(const float row[3], const float axis[3], Floats slope, const Floats3& half,
                     Floats z) {
   const Floats a = (row[0] - slope * axis[0]) * half.x, b = (row[1] - slope * axis[1]) * half.y,
                c = (row[2] - slope * axis[2]) * half.z;
-  return sqrt(a * a + b * b + c * c + 1e-3f * z * z);
+  return sqrt(Shape::width2(a, b, c) + 1e-3f * z * z);
+}
+
+// Lengths relative to one between the distance and the size of a shape.
+void normalise(Floats3& center, Floats3& half) {
+  const Floats size2 = dot(center, center) + dot(half, half);
+  const Floats scale = 1 / sqrt(max(size2, splat(0x1p-126f)));
+  center = center * scale;
+  half = half * scale;
 }
 
 constexpr float kInversePi = static_cast<float>(1 / kPi);
@@ -119,32 +140,59 @@ double LtcLobe::homogeneous_value(const Vec3d& w) const {
 }
 
 Floats LtcLobe::mean_over_boxes(Floats3 center, Floats3 half) const {
-  // Lengths relative to one between the distance and the size of the box. The cosine's mean is then
-  // about the mean height, from far away to a box around p.
-  const Floats size2 = dot(center, center) + dot(half, half);
-  const Floats scale = 1 / sqrt(max(size2, splat(0x1p-126f)));
-  center = center * scale;
-  half = half * scale;
+  return mean_over<Box>(center, half);
+}
+Floats LtcLobe::mean_over_segments(Floats3 center, Floats3 half) const {
+  return mean_over<Segment>(center, half);
+}
+
+template <class Shape>
+Floats LtcLobe::mean_over(Floats3 center, Floats3 half) const {
+  // The cosine's mean is then about the mean height, from far away to a shape around p.
+  normalise(center, half);
   // Rounding stays below what is added here.
   const Floats middle = dot3(n_f_, center) + 0x1p-21f;
-  const Floats reach = abs_dot3(n_f_, half) + 0x1p-21f;
+  const Floats reach = Shape::reach(n_f_, half) + 0x1p-21f;
   const Floats cosine = mean_above_zero(middle, reach) * kInversePi;
   if (diffuse_) return cosine;
-  const Floats mixed = static_cast<float>(1 - kLtcFloor) * ltc_mean(center, half) +
+  const Floats mixed = static_cast<float>(1 - kLtcFloor) * ltc_mean<Shape>(center, half) +
                        static_cast<float>(kLtcFloor) * cosine;
   return select(middle + reach > 0, mixed, splat(0.0f));
 }
 
-// Mean of `ltc` alone; |center|^2 + |half|^2 = 1.
-Floats LtcLobe::ltc_mean(const Floats3& center, const Floats3& half) const {
+// Per box the slopes closest to the lobe's axis, and the height z above its horizon that is worst:
+// z / (r^2 + z^2)^2 is largest at z^2 = r^2 / 3. Lobes that are
+// not skewed are nowhere above their value at the axis.
+Floats LtcLobe::most_in_boxes(Floats3 center, Floats3 half) const {
+  normalise(center, half);
+  const Floats distance = sqrt(dot(center, center)), radius = sqrt(dot(half, half));
+  const Floats height = dot3(n_f_, center) + abs_dot3(n_f_, half);
+  const Floats nearest = max(distance - radius, splat(0x1p-20f));
+  const Floats cosine = clamp(height / nearest, splat(0.0f), splat(1.0f)) * kInversePi;
+  if (diffuse_) return cosine;
+  const auto outside = [&](const float row[3]) {
+    return max(abs(dot3(row, center)) - abs_dot3(row, half), splat(0.0f));
+  };
+  const Floats x = outside(rows_f_[0]), y = outside(rows_f_[1]), r2 = x * x + y * y;
   const Floats middle_z = dot3(rows_f_[2], center), reach_z = abs_dot3(rows_f_[2], half);
+  const Floats low = max(middle_z - reach_z, splat(0x1p-20f));
+  const Floats z = max(low, min(sqrt(r2 * (1.0f / 3)), middle_z + reach_z));
+  const Floats l2 = r2 + z * z, far = distance + radius;
+  const Floats peak = min(far * far * far * z / (l2 * l2), splat(1.0f)) * (det_f_ * kInversePi);
+  return static_cast<float>(1 - kLtcFloor) * peak + static_cast<float>(kLtcFloor) * cosine;
+}
+
+// Mean of `ltc` alone; |center|^2 + |half|^2 = 1.
+template <class Shape>
+Floats LtcLobe::ltc_mean(const Floats3& center, const Floats3& half) const {
+  const Floats middle_z = dot3(rows_f_[2], center), reach_z = Shape::reach(rows_f_[2], half);
   const Floats z = mean_above_zero(middle_z, reach_z);
   // 1 / z for boxes that are far from the lobe's horizon, 0 for those that meet it.
   const Floats inverse_z =
       max(middle_z - reach_z, splat(0.0f)) / max(middle_z * middle_z, splat(0x1p-126f));
   const Floats signed_x = dot3(rows_f_[0], center), signed_y = dot3(rows_f_[1], center);
-  const Floats reach_x = reach_across(rows_f_[0], rows_f_[2], signed_x * inverse_z, half, z);
-  const Floats reach_y = reach_across(rows_f_[1], rows_f_[2], signed_y * inverse_z, half, z);
+  const Floats reach_x = reach_across<Shape>(rows_f_[0], rows_f_[2], signed_x * inverse_z, half, z);
+  const Floats reach_y = reach_across<Shape>(rows_f_[1], rows_f_[2], signed_y * inverse_z, half, z);
   const Floats x = abs(signed_x), y = abs(signed_y);
 
   const Ints swap = y > x;

@@ -28,6 +28,11 @@ class LtcLobe {
   // its half extents (>= 0) given. Positive, allowing for rounding here, wherever some point of the
   // box is above the horizon.
   Floats mean_over_boxes(Floats3 center, Floats3 half) const;
+  // The same over segments, given their centers minus p and their ends minus their centers.
+  Floats mean_over_segments(Floats3 center, Floats3 half) const;
+  // About the largest `value` in each box [1/sr]; at grazing incidence it may be some times that.
+  // Tells where means say little, and is no bound.
+  Floats most_in_boxes(Floats3 center, Floats3 half) const;
 
   bool diffuse() const { return diffuse_; }
   const Vec3d& n() const { return n_; }
@@ -43,6 +48,9 @@ class LtcLobe {
  private:
   void read_table(const LtcRow& row, const Vec3d& wi);
   void prepare_boxes();
+  template <class Shape>
+  Floats mean_over(Floats3 center, Floats3 half) const;
+  template <class Shape>
   Floats ltc_mean(const Floats3& center, const Floats3& half) const;
 
   bool diffuse_;

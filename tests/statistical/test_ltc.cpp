@@ -228,6 +228,27 @@ TEST(LtcBoxes, ArePositiveAboveTheHorizon) {
   }
 }
 
+// The same for segments, half from the middle to an end.
+TEST(LtcBoxes, SegmentsArePositiveAboveTheHorizon) {
+  Rng rng(11, 0, 0);
+  const auto lane = [](double a) { return splat(static_cast<float>(a)); };
+  const auto lanes = [&](const Vec3d& v) { return Floats3{lane(v.x), lane(v.y), lane(v.z)}; };
+  for (int i = 0; i < 50000; ++i) {
+    const Case c = random_case(rng);
+    const double size = std::exp(std::log(1e6) * (rng.uniform() - 0.8));
+    const Vec3d along = random_direction(rng) * size, center = random_direction(rng);
+    const double mean = c.ltc().mean_over_segments(lanes(center), lanes(along))[0];
+    const double top = dot(c.n, center) + std::fabs(dot(c.n, along));
+    ASSERT_TRUE(std::isfinite(mean)) << i;
+    if (top > 0) {
+      EXPECT_GT(mean, 0) << i;
+    }
+    if (top < -1e-6 * (1 + size)) {
+      EXPECT_EQ(mean, 0) << i;
+    }
+  }
+}
+
 bool hits(const Vec3d& center, const Vec3d& half, const Vec3d& w) {
   double near = 0, far = 1e300;
   for (int i = 0; i < 3; ++i) {

@@ -12,6 +12,7 @@
 #include "edgetree/forest/edge_forest.h"
 #include "edgetree/forest/forest_build.h"
 #include "edgetree/forest/forest_query.h"
+#include "limn/edgetree/contribution_bound.h"
 
 namespace limn {
 namespace {
@@ -307,16 +308,69 @@ TEST(Forest, ProbabilitiesDoNotDependOnTheScale) {
 // Two floats hold a coordinate of p, scaled, to 2^-48 of it.
 TEST(Forest, QueriesKeepThePointToTwiceAFloat) {
   Rng rng(25, 0, 0);
-  const Forest forest = build_forest(moving_torus(1), 1, {});
+  const EdgeSamplerInput input = moving_torus(1);
+  const Forest forest = build_forest(input, 1, {});
   for (int i = 0; i < 100; ++i) {
     EdgeQuery query;
     query.p = random_direction(rng) * random_scale(rng);
-    const ForestQuery prepared(forest, nullptr, nullptr, query, {1, 1, 1, 1});
+    const ForestQuery prepared(forest, nullptr, nullptr, query, input);
     for (int k = 0; k < 3; ++k) {
       const double x = query.p[k] * prepared.unit;
       EXPECT_LE(std::fabs(double{prepared.p[0][k]} + prepared.p[1][k] - x), 0x1p-48 * std::fabs(x));
     }
   }
+}
+
+// Sum over edges of w^2 / P, w their exact weights for unit speeds: the second moment of a draw.
+double second_moment(const EdgeForest& forest, const EdgeSamplerInput& input,
+                     const EdgeQuery& query, double& mean) {
+  std::vector<EdgeRef> edges;
+  forest.list_silhouettes(query.p, edges);
+  const LtcLobe lobe(query.lobe, query.n, query.wi);
+  double moment = 0;
+  mean = 0;
+  for (const EdgeRef id : edges) {
+    const EdgeSegment segment = segment_of(input.object(id.object), id.edge, query);
+    const double weight = LtcEdge(lobe, segment.w_0, segment.w_1).integral() *
+                          length(cross(segment.w_0, segment.w_1));
+    if (weight == 0) continue;
+    mean += weight;
+    moment += weight * weight / forest.probability(query, id);
+  }
+  return moment;
+}
+
+// A narrow lobe that passes beside most of a mesh: nodes that are opened bring the second moment of
+// a draw near that of the exact weights, the square of the mean.
+TEST(Forest, OpensNodesForNarrowLobes) {
+  Mesh torus = torus_mesh(48, 24);
+  set_test_tangents(torus);
+  const EdgeSamplerInput input{{build_edge_mesh(torus, true)}};
+  const auto open = EdgeForest::build(input, 1),
+             closed = EdgeForest::build(input, 1, {.most_open = 0});
+  Rng rng(26, 0, 0);
+  double with = 0, without = 0;
+  constexpr int kQueries = 50;
+  for (int i = 0; i < kQueries; ++i) {
+    const EdgeMesh& mesh = input.objects[0];
+    EdgeQuery query;
+    query.n = random_direction(rng);
+    query.p = query.n * -3.0;
+    query.lobe.model = &ggx_lobe();
+    query.lobe.alpha = 0.01;
+    // Mirrored, the viewer's direction ends on the torus.
+    const auto corner =
+        static_cast<size_t>(rng.uniform() * static_cast<double>(mesh.positions.size()));
+    const Vec3d to = normalize(mesh.positions[corner] - query.p);
+    query.wi = query.n * (2 * dot(query.n, to)) - to;
+    double mean = 0;
+    const double moment = second_moment(*open, input, query, mean);
+    if (mean == 0) continue;
+    with += moment / (mean * mean) / kQueries;
+    without += second_moment(*closed, input, query, mean) / (mean * mean) / kQueries;
+  }
+  printf("second moments: %g with open nodes, %g without, 1 at best\n", with, without);
+  EXPECT_LT(with, 0.5 * without);
 }
 
 double lost_share(const EdgeForest& forest, const EdgeMesh& mesh, const EdgeQuery& query) {
