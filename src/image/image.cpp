@@ -71,8 +71,9 @@ void check_is_exr(const std::string& file) {
   }
   if (!stream.get(first)) throw InputError(SourceLocation{file}, "cannot read: the file is empty");
   if (!Imf::isOpenExrFile(file.c_str())) {
-    throw InputError(SourceLocation{file}, "is not an OpenEXR image: pictures for the eye (PNG, JPEG) "
-                                               "hold no radiance, and must be converted first");
+    throw InputError(SourceLocation{file},
+                     "is not an OpenEXR image: pictures for the eye (PNG, JPEG) "
+                     "hold no radiance, and must be converted first");
   }
 }
 

@@ -254,7 +254,6 @@ TEST(Fit, FindsALampBack) {
     for (int i = 0; i < 90; ++i) ASSERT_TRUE(fit.step());
     found.add_batch({fit.scalars()[0].value}, 1);
   }
-  fmt::print("found {:.4f} +- {:.4f}, truth 0.15\n", found.mean(0), std::sqrt(found.variance(0)));
   // Of 16 seeds: Student's t of 15 degrees, below 5 but in one of 6000.
   EXPECT_LT(std::fabs(z_score(found, 0, 0.15)), 5);
 }

@@ -21,7 +21,7 @@ struct CommonOptions {
   std::string scene;
   std::map<std::string, std::string> defines;
   std::string sensor;  // "": the first of the scene
-  int spp = 0;  // 0: the scene's
+  int spp = 0;         // 0: the scene's
   std::optional<uint64_t> seed;
   int threads = 0;  // 0: all cores
   std::string json;
