@@ -20,6 +20,7 @@ std::unique_ptr<EdgeSampler> make_quadric(const EdgeSamplerInput& input, int thr
   return QuadricSampler::build(input, threads, kConfig);
 }
 
+using Quadrics = ForestConfig::Quadrics;
 constexpr int kNoHeight = ForestConfig::kNoHeight, kEdgesOnly = ForestConfig::kEdgesOnly,
               kAnyHeight = ForestConfig::kAnyHeight;
 constexpr bool kAblation = true;
@@ -63,6 +64,10 @@ std::span<const EdgeSamplerType> edge_sampler_types() {
                                 .look_ahead = kNoHeight,
                                 .most_open = 0}>,
        kAblation},
+      {"forest-quadrics", "forest whose nodes of 32 to 8192 edges all have a pair of quadrics",
+       make_forest<ForestConfig{.quadrics = Quadrics::kAll}>, kAblation},
+      {"forest-quadrics-kept", "forest with a pair of quadrics at the nodes where it should pay",
+       make_forest<ForestConfig{.quadrics = Quadrics::kWherePaid}>, kAblation},
       {"forest-concave", "forest that keeps concave edges",
        make_forest<ForestConfig{.cull_concave = false}>, kAblation},
       {"forest-no-lights", "forest whose weights ignore where the lights are",

@@ -30,6 +30,7 @@ struct Neighbour {
   EdgeId along;             // the edge of its mesh that runs there, or none
   bool own = false;         // around the edge before it was united
   Vec3<Lanes> velocity[2];  // at the ends of the part
+  Lanes slack;              // by how much rounding of positions changes them
   uint8_t rim = 0;
 };
 
@@ -106,17 +107,41 @@ class Unifier {
            mesh.position_tangents[f[2]] * b2;
   }
 
+  // By how much the velocity of a face changes over what the rounding of its corners explains.
+  Lanes slack(FaceRef face) const {
+    const Mesh& mesh = *shapes_[face.shape.index()].mesh;
+    Lanes slack;
+    if (mesh.position_tangents.empty()) return slack;
+    const FaceIndices& f = mesh.face(face.face);
+    const Corners c = corners(face);
+    const double size = size_of(mesh, face.face), tolerance = touch_tolerance(size, size);
+    for (int s = 0; s < 3; ++s) {
+      const int next = (s + 1) % 3;
+      const double side = length(c[next] - c[s]);
+      if (side == 0) continue;
+      const Vec3<Lanes> change = mesh.position_tangents[f[next]] - mesh.position_tangents[f[s]];
+      for (int k = 0; k < 3; ++k)
+        for (int i = 0; i < kLanes; ++i)
+          slack[i] = std::max(slack[i], std::fabs(change[k][i]) * tolerance / side);
+    }
+    return slack;
+  }
+
   void find_speeds() {
     for (const TouchingShape& shape : shapes_)
       for (const Vec3<Lanes>& v : shape.mesh->position_tangents)
         for (int k = 0; k < 3; ++k)
           for (int i = 0; i < kLanes; ++i) speeds_[i] = std::max(speeds_[i], std::fabs(v[k][i]));
   }
-  // To the rounding of floats, of the fastest that moves: velocities follow from positions.
-  bool moves_alike(const Vec3<Lanes>& a, const Vec3<Lanes>& b) const {
-    for (int k = 0; k < 3; ++k)
-      for (int i = 0; i < kLanes; ++i)
-        if (std::fabs(a[k][i] - b[k][i]) > 0x1.0p-20 * speeds_[i]) return false;
+  // To the rounding of floats, of the fastest that moves, and of the places where it is: velocities
+  // follow from positions, which far from the origin are coarse.
+  bool moves_alike(const Neighbour& a, const Neighbour& b) const {
+    for (int end = 0; end < 2; ++end)
+      for (int k = 0; k < 3; ++k)
+        for (int i = 0; i < kLanes; ++i)
+          if (std::fabs(a.velocity[end][k][i] - b.velocity[end][k][i]) >
+              0x1.0p-20 * speeds_[i] + a.slack[i] + b.slack[i])
+            return false;
     return true;
   }
 
@@ -144,7 +169,7 @@ class Unifier {
     const auto add = [&](FaceRef face, EdgeId along, bool own) {
       const auto same = [&](const Neighbour& n) { return n.face == face; };
       if (std::any_of(around.begin(), around.end(), same)) return;
-      Neighbour n{face, along, own, {}, 0};
+      Neighbour n{face, along, own, {}, slack(face), 0};
       for (int i = 0; i < 2; ++i)
         n.velocity[i] =
             own ? velocity(id, i == 0 ? t0 : t1) : velocity(face, position(id, i == 0 ? t0 : t1));
@@ -213,10 +238,7 @@ class Unifier {
         n.rim = kNoRim;
         continue;
       }
-      const auto same = [&](const Neighbour* rim) {
-        return moves_alike(n.velocity[0], rim->velocity[0]) &&
-               moves_alike(n.velocity[1], rim->velocity[1]);
-      };
+      const auto same = [&](const Neighbour* rim) { return moves_alike(n, *rim); };
       const auto found = std::find_if(rims.begin(), rims.end(), same);
       n.rim = static_cast<uint8_t>(std::min<size_t>(found - rims.begin(), kMostRims - 1));
       if (found == rims.end()) rims.push_back(&n);

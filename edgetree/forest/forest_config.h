@@ -27,6 +27,13 @@ struct ForestConfig {
   // what is inside is looked at: by one look further, and before narrow lobes by opening up to this
   // many nodes of the top. With 0 neither is done.
   int most_open = 8;
+  // Inner nodes have a pair of bounding quadrics beside their dual boxes, of all children that hold
+  // `quadrics_from` to kMostQuadricEdges edges: nowhere, where it pays, or everywhere. More edges
+  // are nearly never rejected, and fewer leave a box too little.
+  enum class Quadrics : uint8_t { kNone, kWherePaid, kAll };
+  static constexpr uint32_t kMostQuadricEdges = 8192;
+  Quadrics quadrics = Quadrics::kNone;
+  uint32_t quadrics_from = 32;
   // Concave smooth edges of closed one-sided meshes are left out.
   bool cull_concave = true;
 };

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "edgetree/forest/normaliser.h"
+#include "edgetree/forest/pair_fit.h"
 
 // A plane is q = (n, signed distance of the frame's center / radius), so that q . x is the signed
 // distance of p / radius. Dividing by Z . q > 0 puts all planes on the hyperplane Z . q = 1, an
@@ -24,10 +25,6 @@ using Eigen::Vector4d;
 
 // Flat edges count a little, for the points on their plane. Not tuned.
 constexpr double kFlat = 0x1.0p-12;
-
-Vector4d dual_point(const Plane& plane, const NodeFrame& frame) {
-  return {plane.n.x, plane.n.y, plane.n.z, plane.distance(frame.center) * frame.inverse_radius};
-}
 
 // Principal axes of points, the widest first.
 Eigen::Matrix3d principal_axes(const std::vector<Vector3d>& points) {
@@ -70,6 +67,17 @@ void sum_cover(std::span<const Wedge> wedges, const std::vector<Vector3d>& point
   }
 }
 
+// points: coordinates in the box whose rows are those of `fit`, not scaled yet.
+PairFit pair_in(const NodeFrame& own, std::span<const Wedge> wedges, const NodeFrame& frame,
+                std::vector<Vector3d>& points, const DualFit& fit) {
+  const Eigen::Matrix4d change = between(frame, own);
+  const Eigen::Matrix4d quadric =
+      change.transpose() * moments_of(wedges, own).best_quadric() * change;
+  Eigen::Matrix4d columns;
+  for (int k = 0; k < 4; ++k) columns.col(k) = Vector4d::Map(fit.rows[k]);
+  return fit_pair(columns, quadric, points);
+}
+
 void scale_rows(DualFit& fit) {
   double sum = 0;
   for (const auto& row : fit.rows) sum += Vector4d::Map(row).norm();
@@ -86,8 +94,8 @@ DualFit unrejectable_fit(double cover) {
   return fit;
 }
 
-DualFit fit_dual(std::span<const Wedge> wedges, const NodeFrame& frame,
-                 const ForestConfig& config) {
+DualFit fit_dual(std::span<const Wedge> wedges, const NodeFrame& frame, const ForestConfig& config,
+                 const NodeFrame* own) {
   static thread_local std::vector<Vector4d> planes;
   static thread_local std::vector<Vector3d> points;
   planes.clear();
@@ -104,6 +112,7 @@ DualFit fit_dual(std::span<const Wedge> wedges, const NodeFrame& frame,
   for (const Vector4d& q : planes) points.push_back(basis.transpose() * q);
   fit_box(points, z, config, fit);
   sum_cover(wedges, points, fit);
+  if (own) fit.pair = pair_in(*own, wedges, frame, points, fit);
   scale_rows(fit);
   return fit;
 }

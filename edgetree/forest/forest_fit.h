@@ -5,6 +5,7 @@
 #include <span>
 
 #include "edgetree/forest/forest_config.h"
+#include "edgetree/forest/quadric_pair.h"
 #include "limn/edgetree/edges.h"
 
 namespace limn {
@@ -29,13 +30,15 @@ struct NodeFrame {
 struct DualFit {
   double rows[4][4];
   double cover[3];  // times radius^2
+  PairFit pair;
 };
 
 // Never rejects. cover: what a random plane crosses.
 DualFit unrejectable_fit(double cover);
 // Holds all planes of all wedges. In double precision: rounding to float moves rows by a relative
-// 2^-24.
-DualFit fit_dual(std::span<const Wedge> wedges, const NodeFrame& frame, const ForestConfig& config);
+// 2^-24. own: the frame of the wedges themselves, for a pair of quadrics, too; null for none.
+DualFit fit_dual(std::span<const Wedge> wedges, const NodeFrame& frame, const ForestConfig& config,
+                 const NodeFrame* own = nullptr);
 // The segment between the planes of one edge: rows 0 and 1.
 DualFit fit_edge(const Wedge& wedge, const NodeFrame& frame);
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "edgetree/forest/quadric_pair.h"
 #include "edgetree/simd.h"
 #include "limn/edgetree/edges.h"
 
@@ -23,6 +24,8 @@ inline constexpr int kForestGroups = 3;
 using NodeId = int32_t;
 inline constexpr int32_t kNoChild = INT32_MIN;
 inline constexpr uint32_t kNoParent = UINT32_MAX;
+
+inline constexpr uint32_t kNoPairs = UINT32_MAX;
 
 inline constexpr int kBoxBits = 10;
 inline constexpr int kBoxSteps = (1 << kBoxBits) - 1;
@@ -51,6 +54,12 @@ struct alignas(64) InnerNode {
   // x, then y, then z.
   Ints low, high;
   uint8_t ahead;  // bit per lane: the child weighs by its own children, see ForestConfig
+  uint32_t pairs = kNoPairs;  // index in Forest::pairs
+};
+
+// Pairs of bounding quadrics of a node's children, in the coordinates of their dual boxes.
+struct ForestPairs {
+  QuadricPairs halves[kWidth / kQuadricWidth];
 };
 
 // An edge's dual box is the segment between the planes of its faces: u_0 in [-1, 1].
@@ -71,6 +80,7 @@ struct alignas(64) EdgeNode {
 struct Forest {
   std::vector<InnerNode> inner;
   std::vector<EdgeNode> edges;
+  std::vector<ForestPairs> pairs;  // of the inner nodes that have them
   std::vector<NodeId> roots;
   double extent = 0;  // largest |x| of a position
   // [object][edge]: kWidth * edge node + lane, or kNoParent.

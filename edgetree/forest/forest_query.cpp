@@ -76,6 +76,27 @@ Ints not_rejected(ForestGroup group, Floats middle, Floats half) {
   return Ints{} - 1;
 }
 
+// Lanes whose pairs of quadrics meet the query plane. Out of line: few nodes have any.
+__attribute__((noinline)) Ints met_by_quadrics(const ForestPairs& pairs, const DualPlane& plane,
+                                               float error) {
+  Ints all;
+  for (int half = 0; half < kWidth / kQuadricWidth; ++half) {
+    QueryPlanes planes;
+    planes.error = error;
+    for (int i = 0; i < 4; ++i)
+      for (int k = 0; k < kQuadricWidth; ++k) planes.g[i][k] = plane.g[i][kQuadricWidth * half + k];
+    const Longs met = meet_pair(pairs.halves[half], planes);
+    for (int k = 0; k < kQuadricWidth; ++k)
+      all[kQuadricWidth * half + k] = static_cast<int32_t>(met[k]);
+  }
+  return all;
+}
+
+void reject_by_quadrics(const InnerNode& node, const ForestPoint& point, const DualPlane& plane,
+                        float error, Ints& alive) {
+  if (node.pairs != kNoPairs) alive &= met_by_quadrics(point.pairs[node.pairs], plane, error);
+}
+
 // The length of silhouettes that a child is expected to hold, given the query plane. With planes
 // spread evenly over the dual box, the values of g - g[0] have nearly the density of the sum of two
 // uniform numbers, one of half-width a = max |g[k]| and one of what is left of half: flat, with
@@ -94,7 +115,7 @@ Floats expected_length(const InnerNode& node, const DualPlane& plane, float erro
 }
 
 // Not positive for children that are rejected.
-Floats length_of(const InnerNode& node, const FramePoint& at, bool soft) {
+Floats length_of(const InnerNode& node, const ForestPoint& point, const FramePoint& at, bool soft) {
   const ForestGroup group = node.head.group;
   if (group == ForestGroup::kAlways) return node.cover[0];
   const DualPlane plane = dual_plane(node, at);
@@ -104,7 +125,9 @@ Floats length_of(const InnerNode& node, const FramePoint& at, bool soft) {
   } else if (soft) {
     length *= clamp(0.5f + 0.5f * plane.g[0] / plane.half, splat(kShallow), splat(1.0f));
   }
-  return select(not_rejected(group, plane.g[0], plane.half), length, splat(0.0f));
+  Ints alive = not_rejected(group, plane.g[0], plane.half);
+  reject_by_quadrics(node, point, plane, at.error, alive);
+  return select(alive, length, splat(0.0f));
 }
 
 Floats length_of(const EdgeNode& node, const FramePoint& at) {
@@ -212,7 +235,7 @@ ForestPoint point_of(const Forest& forest, const Vec3d& p) {
   farthest.extent = forest.extent;
   bool is_float = true;
   for (int k = 0; k < 3; ++k) is_float = is_float && nearest_float(p[k]) == p[k];
-  return {p, distance_error(farthest, p), is_float};
+  return {p, distance_error(farthest, p), is_float, forest.pairs.data()};
 }
 
 static float unit_of(const Forest& forest, const Vec3d& p) {
@@ -251,8 +274,11 @@ ForestQuery::ForestQuery(const Forest& tree, const LightClusters* clusters,
 }
 
 Ints may_hold_candidates(const InnerNode& node, const ForestPoint& point) {
-  const DualPlane plane = dual_plane(node, to_frame(node.head, point));
-  return (node.child != kNoChild) & not_rejected(node.head.group, plane.g[0], plane.half);
+  const FramePoint at = to_frame(node.head, point);
+  const DualPlane plane = dual_plane(node, at);
+  Ints alive = not_rejected(node.head.group, plane.g[0], plane.half);
+  reject_by_quadrics(node, point, plane, at.error, alive);
+  return (node.child != kNoChild) & alive;
 }
 
 Ints may_hold_candidates(const EdgeNode& node, const ForestPoint& point) {
@@ -291,6 +317,7 @@ Ints may_hold_outlines(const InnerNode& node, const ForestCone& cone) {
   if (node.head.group != ForestGroup::kAlways) {
     const DualPlane plane = dual_plane(node, at);
     alive &= abs(plane.g[0]) <= plane.half;
+    reject_by_quadrics(node, cone.point, plane, at.error, alive);
   }
   if (cone.at_rest) alive &= node.speed > 0;
   if (bits(alive) == 0) return alive;
@@ -337,7 +364,7 @@ Floats ChildWeights::product() const {
 ChildWeights weigh_children(const InnerNode& node, const ForestQuery& query, bool soft,
                             Floats* doubt) {
   const FramePoint at = to_frame(node.head, query.point);
-  const Floats length = length_of(node, at, soft);
+  const Floats length = length_of(node, query.point, at, soft);
   Ints alive = length > 0;
   Floats3 d, half;
   boxes_of(node, at, d, half);
@@ -399,7 +426,7 @@ Floats weigh_edges(const EdgeNode& node, const ForestQuery& query) {
 float length_below(const InnerNode& node, const ForestPoint& point, bool soft,
                    float inverse_radius) {
   const float ratio = inverse_radius / node.head.inverse_radius;
-  return sum(length_of(node, to_frame(node.head, point), soft)) * ratio * ratio;
+  return sum(length_of(node, point, to_frame(node.head, point), soft)) * ratio * ratio;
 }
 float length_below(const EdgeNode& node, const ForestPoint& point, float inverse_radius) {
   const float ratio = inverse_radius / node.head.inverse_radius;

@@ -15,6 +15,7 @@ struct ForestPoint {
   double slack;  // of distances from planes, see distance_error
   // p is representable as floats, as vertices are: it may be one.
   bool may_be_vertex = false;
+  const ForestPairs* pairs = nullptr;  // of the forest
 };
 ForestPoint point_of(const Forest& forest, const Vec3d& p);
 

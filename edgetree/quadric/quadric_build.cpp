@@ -136,14 +136,7 @@ class Filler {
       for (int k = 0; k < 4; ++k)
         forest_.nodes[id].rows[i][k][lane] = static_cast<float>(fit.rows[i][k]);
     if (forest_.pairs.empty()) return;
-    QuadricPairs& pairs = forest_.pairs[id];
-    for (int k = 0; k < 3; ++k) {
-      pairs.linear[k][lane] = fit.coefficients[k];
-      pairs.square[k][lane] = fit.coefficients[3 + k];
-      pairs.product[k][lane] = fit.coefficients[6 + k];
-    }
-    pairs.low[lane] = fit.low;
-    pairs.high[lane] = fit.high;
+    put_pair(fit.pair, lane, forest_.pairs[id]);
   }
 
   static void put_box(const Bounds& box, const NodeFrame& frame, int lane, QuadricNode& node) {

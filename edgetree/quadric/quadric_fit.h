@@ -2,7 +2,7 @@
 // What is stored of the planes of a node: its dual box and its pair of bounding quadrics.
 #include <span>
 
-#include "edgetree/quadric/plane_moments.h"
+#include "edgetree/forest/pair_fit.h"
 
 namespace limn {
 
@@ -12,10 +12,7 @@ struct QuadricFit {
   // [-1, 1]^3 along the axes t_1, t_2, t_3 that complete Z in any way (Sec. 3.2); the rows' lengths
   // add up to 1.
   double rows[4][4];
-  // As in QuadricPairs: linear, square, product. Exactly floats, with bounds rounded outward, so
-  // that all wedges of the node satisfy them.
-  float coefficients[9] = {};
-  float low, high;
+  PairFit pair;
 };
 
 // Never rejects.
@@ -23,6 +20,5 @@ QuadricFit unrejectable_quadric_fit();
 // Holds all wedges. moments: of their planes, in the frame `own`; null for no quadrics.
 QuadricFit fit_quadrics(std::span<const Wedge> wedges, const NodeFrame& frame,
                         const PlaneMoments* moments, const NodeFrame& own);
-PlaneMoments moments_of(std::span<const Wedge> wedges, const NodeFrame& frame);
 
 }  // namespace limn

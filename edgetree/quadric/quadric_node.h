@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "edgetree/forest/forest_node.h"
-#include "edgetree/quadric/quadric_pair.h"
+#include "edgetree/forest/quadric_pair.h"
 #include "limn/edgetree/edges.h"
 
 namespace limn {

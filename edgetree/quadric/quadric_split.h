@@ -3,8 +3,8 @@
 #include <span>
 
 #include "edgetree/forest/forest_fit.h"
+#include "edgetree/forest/lanes.h"
 #include "edgetree/forest/split_tree.h"
-#include "edgetree/quadric/lanes.h"
 
 namespace limn {
 

@@ -194,16 +194,14 @@ bool add_path_adjoint(const AdjointContext& context, int x, int y, const Rng& ke
   RayCount rays;
   ++costs[kInterior].samples;
   VertexAdjoints vertices(context, adjoint, tape, costs);
-  PathTracer<Var, VertexAdjoints> tracer(context.path, rays, vertices);
-  try {
-    const Rgb<Var> radiance =
-        tracer.from_ray(camera_ray(context.scene(), still), ray.origin, ray.direction, 0, key);
-    if (!is_finite(value(radiance))) return false;
-    if (context.interior) {
-      for (int c = 0; c < 3; ++c) vertices.seeds().add(radiance[c].node, adjoint[c]);
-    }
-  } catch (const UntraceableRay&) {
-    return false;
+  PathTracer<Var, VertexAdjoints> tracer(context.path, rays);
+  Walk<Var, VertexAdjoints> walk(key, 0, &vertices);
+  const StartRay<Var> start{camera_ray(context.scene(), still), ray.origin, ray.direction};
+  tracer.follow_rays({&start, 1}, {&walk, 1});
+  const Rgb<Var>& radiance = walk.sums.radiance;
+  if (walk.failed || !is_finite(value(radiance))) return false;
+  if (context.interior) {
+    for (int c = 0; c < 3; ++c) vertices.seeds().add(radiance[c].node, adjoint[c]);
   }
   costs[kInterior].add(rays);
   if (!vertices.seeds().empty()) vertices.seeds().sweep(context, tape);

@@ -11,6 +11,7 @@
 #include "integrators/compare/check_scores.h"
 #include "integrators/compare/check_step.h"
 #include "limn/core/parameter.h"
+#include "limn/integrators/methods.h"
 
 namespace limn {
 namespace {
@@ -219,6 +220,7 @@ class Checker {
     gradient_options.method = options_.method;
     gradient_options.block = fine_;
     gradient_options.samples = options_.samples;
+    gradient_options.warp = options_.warp;
     return gradient_options;
   }
 
@@ -348,6 +350,7 @@ class Checker {
 
 CheckResult check(const Scene& scene, const CheckOptions& options, const RunSettings& settings,
                   const GradientRun& run) {
+  check_warp(options.warp, {find_method(options.method).name});  // before the search for a step
   return Checker(scene, options, settings, run).check();
 }
 

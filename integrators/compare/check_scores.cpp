@@ -65,7 +65,49 @@ std::vector<double> magnitude_of_edges(const GradientResult& result, const Param
   return known;
 }
 
+// The batches of all terms of edges together.
+Batches batches_of_edges(const GradientResult& result, const ParameterGradient& g) {
+  Batches batches;
+  for (size_t t = 0; t < result.terms.size(); ++t) {
+    if (!result.terms[t].computed || !result.terms[t].edges) continue;
+    const Batches& more = g.term_blocks[t].kept();
+    if (batches.empty()) {
+      batches = more;
+      continue;
+    }
+    for (size_t b = 0; b < batches.size(); ++b)
+      for (size_t i = 0; i < batches[b].sums.size(); ++i) batches[b].sums[i] += more[b].sums[i];
+  }
+  return batches;
+}
+
 }  // namespace
+
+EventSizes event_sizes(const Batches& batches) {
+  EventSizes events;
+  if (batches.size() < 2) return events;
+  std::vector<double> means(batches[0].sums.size());
+  double samples = 0;
+  for (const Moments::Batch& batch : batches) {
+    samples += static_cast<double>(batch.samples);
+    for (size_t i = 0; i < means.size(); ++i) means[i] += batch.sums[i];
+  }
+  for (double& mean : means) mean /= samples;
+  double sizes = 0, squares = 0, cubes = 0;
+  for (const Moments::Batch& batch : batches) {
+    for (size_t i = 0; i < means.size(); ++i) {
+      const double x = batch.sums[i];
+      const double d = std::fabs(x - means[i] * static_cast<double>(batch.samples));
+      sizes += std::fabs(x);
+      squares += d * d;
+      cubes += d * d * d;
+    }
+  }
+  const double count = static_cast<double>(batches.size());
+  if (sizes > 0) events.mean = squares * count / (count - 1) / sizes;
+  if (squares > 0) events.large = cubes / squares;
+  return events;
+}
 
 Windows::Axis::Axis(int pixels, int spacing, int fine) : count((pixels + spacing - 1) / spacing) {
   for (int begin = 0; begin < pixels; begin += fine) {
@@ -122,18 +164,19 @@ Residual::Residual(const Windows& windows, const GradientResult& gradient,
   const std::vector<double> edges = magnitude_of_edges(gradient, g, of_differences);
   const double samples = static_cast<double>(g.total_blocks.samples());
   const double pixels = static_cast<double>(windows.fine()) * windows.fine();
+  const EventSizes of_edges = event_sizes(batches_of_edges(gradient, g));
+  const EventSizes of_steps = event_sizes(differences.blocks.kept());
   for (size_t i = 0; i < edges.size(); ++i) {
     rare_gradient_.magnitude.push_back(edges[i]);
-    rare_gradient_.of_mean_size.push_back(edges[i] * g.events.mean_size() / samples);
-    rare_gradient_.of_large_size.push_back(edges[i] * g.events.large_size() / samples);
+    rare_gradient_.of_mean_size.push_back(edges[i] * of_edges.mean / samples);
+    rare_gradient_.of_large_size.push_back(edges[i] * of_edges.large / samples);
     // Differences may hold all of it as events; one that has not been seen at all as large as the
     // light of a pixel, over both steps.
     const double all =
         std::max({edges[i], std::fabs(of_differences[i]), std::fabs(g.total_blocks.mean(i))});
-    const double large =
-        std::max(differences.events.large_size(), radiance[i] / pixels / (2 * step));
+    const double large = std::max(of_steps.large, radiance[i] / pixels / (2 * step));
     rare_differences_.magnitude.push_back(all);
-    rare_differences_.of_mean_size.push_back(all * differences.events.mean_size() / samples);
+    rare_differences_.of_mean_size.push_back(all * of_steps.mean / samples);
     rare_differences_.of_large_size.push_back(all * large / samples);
   }
   // A difference of two images of radiance L over 2 h is rounded to some hundred units in the last

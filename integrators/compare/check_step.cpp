@@ -118,7 +118,7 @@ Moments sum_of(const Moments& windows_or_blocks) {
 // The larger ratio of the windows and of the whole image.
 double larger_ratio(const Windows& windows, const DifferenceEstimate& at_step,
                     const Moments& changes, const Change& change, double samples, double shows) {
-  const double event = at_step.events.mean_size();
+  const double event = event_sizes(at_step.blocks.kept()).mean;
   return std::max(bias_ratio(in_windows(windows, at_step.blocks), in_windows(windows, changes),
                              change, event, samples, shows),
                   bias_ratio(at_step.image_sum, sum_of(changes), change, event, samples, shows));

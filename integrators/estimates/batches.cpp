@@ -93,14 +93,21 @@ class BatchRunner {
   void run_tile(const Tile& tile, std::vector<TermCost>& costs, NonFinite& bad) {
     const Stopwatch watch;
     SampleSink sink(film_, estimator_.lanes(), lane_scale_, sums_, costs, bad, nullptr);
+    std::vector<KeyedSample> together;
+    const auto add = [&] {
+      estimator_.add_pixels(together, sink);
+      together.clear();
+    };
     for (int y = tile.y0; y < tile.y1; ++y) {
       for (int x = tile.x0; x < tile.x1; ++x) {
         for (int s = batch_.first; s < batch_.last; ++s) {
           const PixelSample at{x, y, s};
-          estimator_.add_pixel(at, pixel_key(estimator_.scene(), batch_.seed, at), sink);
+          together.push_back({at, pixel_key(estimator_.scene(), batch_.seed, at)});
+          if (together.size() == kMostTogether) add();
         }
       }
     }
+    add();
     double booked = 0;
     for (const TermCost& cost : costs) booked += cost.seconds;
     costs[estimator_.pixel_slot()].seconds += watch.seconds() - booked;
@@ -305,7 +312,8 @@ void run_pixel_sample(const SampleEstimator& estimator, uint64_t seed, const Pix
   NonFinite bad;
   const Lanes lane_scale = estimator.lane_scale();
   SampleSink sink(film, estimator.lanes(), lane_scale, sums, costs, bad, &log);
-  estimator.add_pixel(at, pixel_key(estimator.scene(), seed, at), sink);
+  const KeyedSample one{at, pixel_key(estimator.scene(), seed, at)};
+  estimator.add_pixels({&one, 1}, sink);
   const size_t index = pixel_index(film, at.x, at.y);
   const auto rgb = [&](const std::vector<double>& image) {
     return fmt::format("({:.6g}, {:.6g}, {:.6g})", image[index], image[index + 1],

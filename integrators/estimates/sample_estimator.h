@@ -3,6 +3,7 @@
 // film as a whole adds. Batches, tiles, threads, sums, progress and interruption are the same for
 // all estimators and stand in batches.h.
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,14 @@ struct PixelSample {
   int x, y;
   int64_t s;
 };
+
+// With its stream of random numbers.
+struct KeyedSample {
+  PixelSample at;
+  Rng key;
+};
+// So many of them are worked on together at most.
+inline constexpr size_t kMostTogether = 16;
 
 // A point on a curve of the film across which radiance jumps.
 struct FilmSample {
@@ -105,11 +114,12 @@ class SampleEstimator {
   virtual int lanes() const { return 0; }
   virtual Lanes lane_scale() const { return {}; }  // natural steps of the parameters
 
-  // All that one sample of one pixel adds, to that pixel alone. Seconds that are not booked on a
-  // slot go to pixel_slot().
+  // All that at most kMostTogether samples add, each to its own pixel alone. What goes together
+  // changes no bit, nor does their number. Seconds that are not booked on a slot go to
+  // pixel_slot().
   virtual bool samples_pixels() const { return true; }
   virtual size_t pixel_slot() const { return 0; }
-  virtual void add_pixel(const PixelSample& at, const Rng& key, SampleSink& sink) const = 0;
+  virtual void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const = 0;
 
   // Samples of a slot that belong to the film as a whole: how many per pixel (0: none), and one of
   // them: `u` in [0, 1) is stratified over a batch, `key` is for everything else. False if it adds

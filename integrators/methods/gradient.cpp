@@ -27,13 +27,7 @@ void check_selection(const MethodType& method, const GradientOptions& options) {
     throw InputError("the exact film is for methods that sample edges on it: the method \"" +
                      method.name + "\" does not");
   }
-  if (!method.warps &&
-      (options.warp.rays != WarpOptions{}.rays || options.warp.kappa != WarpOptions{}.kappa)) {
-    throw InputError(
-        "auxiliary rays and their kernel (--aux, --kappa) are for the methods was and "
-        "was-unbiased: the method \"" +
-        method.name + "\" has none");
-  }
+  check_warp(options.warp, {method.name});
   if (options.terms.empty() || method.terms_can_be_left_out) return;
   throw InputError("terms: the method \"" + method.name + "\" has all terms in one");
 }

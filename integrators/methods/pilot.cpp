@@ -35,16 +35,8 @@ class PilotEstimator final : public SampleEstimator {
     return terms_.sample_film(slot, u, key, rays, sample);
   }
 
-  void add_pixel(const PixelSample& at, const Rng& key, SampleSink& sink) const override {
-    if (!grid_.is_probe(scene().film, at.x, at.y)) return;
-    const TermEstimator::Sample sample = terms_.sample(at, key, turns_, sink);
-    if (!sample.finite) return;
-    const size_t cell = grid_.index(at.x, at.y);
-    for (size_t slot = 0; slot < slots(); ++slot) {
-      if (!sums_[slot].empty()) sums_[slot].add(cell, sample.terms[slot]);
-    }
-    sums_.back().add(cell, sample.light_difference);
-    later_lights_[cell] += static_cast<uint32_t>(sample.later_lights);
+  void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const override {
+    for (const KeyedSample& sample : samples) add_pixel(sample.at, sample.key, sink);
   }
 
   const PlanGrid& grid() const { return grid_; }
@@ -59,6 +51,18 @@ class PilotEstimator final : public SampleEstimator {
   }
 
  private:
+  void add_pixel(const PixelSample& at, const Rng& key, SampleSink& sink) const {
+    if (!grid_.is_probe(scene().film, at.x, at.y)) return;
+    const TermEstimator::Sample sample = terms_.sample(at, key, turns_, sink);
+    if (!sample.finite) return;
+    const size_t cell = grid_.index(at.x, at.y);
+    for (size_t slot = 0; slot < slots(); ++slot) {
+      if (!sums_[slot].empty()) sums_[slot].add(cell, sample.terms[slot]);
+    }
+    sums_.back().add(cell, sample.light_difference);
+    later_lights_[cell] += static_cast<uint32_t>(sample.later_lights);
+  }
+
   const TermEstimator& terms_;
   PlanGrid grid_;
   bool turns_;

@@ -1,8 +1,8 @@
 // One path per sample of a pixel, in plain numbers.
 #include "integrators/methods/radiance_estimator.h"
 
-#include <limits>
 #include <utility>
+#include <vector>
 
 #include "integrators/terms/camera_path.h"
 #include "integrators/terms/path_log.h"
@@ -10,47 +10,62 @@
 namespace limn {
 
 RadianceEstimator::RadianceEstimator(const Scene& scene, int threads,
-                                     std::shared_ptr<const FilmRegions> visible)
+                                     std::shared_ptr<const FilmRegions> visible, bool closed)
     : scene_(scene),
       tracer_(make_embree_tracer(scene_, threads)),
       lights_(scene_),
-      context_{scene_, *tracer_, lights_},
+      closed_(closed ? std::make_unique<ClosedLight>(scene_, threads) : nullptr),
+      context_{scene_, *tracer_, lights_, closed_.get()},
       camera_(scene_.camera),
       visible_(std::move(visible)) {}
 
-void RadianceEstimator::add_pixel(const PixelSample& at, const Rng& key, SampleSink& sink) const {
-  const FilmPosition film = sample_pixel_filter(scene_.film, at.x, at.y, key);
-  const auto ray = camera_.ray(film.x, film.y);
-  RayCount rays;
-  const auto trace = [&](auto& visitor) {
-    PathTracer<double, std::decay_t<decltype(visitor)>> path(context_, rays, visitor);
-    try {
-      if (visible_) {
-        const FaceRef face = visible_->face_at(at.x, at.y, film.x, film.y);
-        if (!face.shape.valid()) return path.escaped(ray.direction, 0);
-        return path.from_surface(surface_on_ray(scene_, face, ray.origin, ray.direction),
-                                 -ray.direction, 0, key, nullptr);
-      }
-      return path.from_ray(camera_ray(scene_, ray), ray.origin, ray.direction, 0, key);
-    } catch (const UntraceableRay&) {
-      return grey(std::numeric_limits<double>::quiet_NaN());
-    }
-  };
-  Rgb<double> radiance;
-  if (SampleLog* log = sink.log()) {
-    log_camera_ray(*log, film.x, film.y, ray.origin, ray.direction);
-    PathLog visitor(*log);
-    radiance = trace(visitor);
+void RadianceEstimator::add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const {
+  if (sink.log()) {
+    PathLog visitor(*sink.log());
+    for (const KeyedSample& sample : samples) trace({&sample, 1}, &visitor, sink);
   } else {
-    NoVisitor nothing;
-    radiance = trace(nothing);
+    trace(samples, static_cast<NoVisitor*>(nullptr), sink);
+  }
+}
+
+template <class Visitor>
+void RadianceEstimator::trace(std::span<const KeyedSample> samples, Visitor* visitor,
+                              SampleSink& sink) const {
+  using Tracer = PathTracer<double, Visitor>;
+  static_assert(kMostTogether <= Tracer::kMostWalks);
+  RayCount rays;
+  Tracer tracer(context_, rays);
+  std::vector<typename Tracer::Walk> walks;
+  walks.reserve(samples.size());
+  std::vector<StartRay<double>> starts;
+  starts.reserve(samples.size());
+  std::vector<FilmPosition> places;
+  for (const auto& [at, key] : samples) {
+    const FilmPosition film = sample_pixel_filter(scene_.film, at.x, at.y, key);
+    const auto ray = camera_.ray(film.x, film.y);
+    if (sink.log()) log_camera_ray(*sink.log(), film.x, film.y, ray.origin, ray.direction);
+    walks.emplace_back(key, 0, visitor);
+    starts.push_back({camera_ray(scene_, ray), ray.origin, ray.direction});
+    if (visible_) places.push_back(film);
+  }
+  if (visible_) {
+    std::vector<FaceRef> faces;
+    for (size_t i = 0; i < samples.size(); ++i) {
+      faces.push_back(
+          visible_->face_at(samples[i].at.x, samples[i].at.y, places[i].x, places[i].y));
+    }
+    tracer.follow_rays(starts, faces, walks);
+  } else {
+    tracer.follow_rays(starts, walks);
   }
   sink.cost(0).add(rays);
-  ++sink.cost(0).samples;
-  if (is_finite(radiance)) {
-    sink.add_radiance(at, radiance, 1);
-  } else {
-    sink.reject(at, slot_name(0));
+  sink.cost(0).samples += samples.size();
+  for (size_t i = 0; i < samples.size(); ++i) {
+    if (!walks[i].failed && is_finite(walks[i].sums.radiance)) {
+      sink.add_radiance(samples[i].at, walks[i].sums.radiance, 1);
+    } else {
+      sink.reject(samples[i].at, slot_name(0));
+    }
   }
 }
 

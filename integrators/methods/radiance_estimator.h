@@ -10,19 +10,24 @@ namespace limn {
 
 class RadianceEstimator final : public SampleEstimator {
  public:
-  // The scene must outlive the estimator. visible: what its film shows; null: rays tell.
+  // The scene must outlive the estimator. visible: what its film shows; null: rays tell. closed:
+  // what surfaces scatter is known in closed form, InputError if it is not.
   RadianceEstimator(const Scene& scene, int threads,
-                    std::shared_ptr<const FilmRegions> visible = nullptr);
+                    std::shared_ptr<const FilmRegions> visible = nullptr, bool closed = false);
 
   const Scene& scene() const override { return scene_; }
   size_t slots() const override { return 1; }
   const char* slot_name(size_t) const override { return "radiance"; }
-  void add_pixel(const PixelSample& at, const Rng& key, SampleSink& sink) const override;
+  void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const override;
 
  private:
+  template <class Visitor>
+  void trace(std::span<const KeyedSample> samples, Visitor* visitor, SampleSink& sink) const;
+
   const Scene& scene_;
   std::unique_ptr<RayTracer> tracer_;
   Lights lights_;
+  std::unique_ptr<ClosedLight> closed_;  // null where paths are sampled
   PathContext context_;
   CameraView<double> camera_;
   std::shared_ptr<const FilmRegions> visible_;

@@ -6,28 +6,48 @@
 #include "integrators/estimates/batches.h"
 #include "integrators/methods/radiance_estimator.h"
 #include "limn/core/error.h"
+#include "limn/core/names.h"
 #include "limn/integrators/parts.h"
 
 namespace limn {
 
 namespace {
 
+constexpr RenderMethod kMethods[] = {
+    {"path", "paths, with light and BSDF samples", false},
+    {"analytic", "direct light of flat lamps on diffuse surfaces in closed form", true},
+};
+
+const RenderMethod& find_render_method(const std::string& name) {
+  for (const RenderMethod& method : kMethods) {
+    if (method.name == name) return method;
+  }
+  throw InputError(unknown_name("method", name, names_of(render_methods())));
+}
+
 std::unique_ptr<RadianceEstimator> make_estimator(const Scene& scene, const RunSettings& settings,
-                                                  bool exact_film) {
+                                                  const RenderOptions& options) {
+  const RenderMethod& method = find_render_method(options.method);
   std::shared_ptr<const FilmRegions> visible;
-  if (exact_film) {
+  if (options.exact_film) {
     visible = std::make_shared<FilmRegions>(scene, settings.threads, settings.interrupted);
   }
-  return std::make_unique<RadianceEstimator>(scene, settings.threads, std::move(visible));
+  return std::make_unique<RadianceEstimator>(scene, settings.threads, std::move(visible),
+                                             method.closed_light);
 }
 
 }  // namespace
 
-RenderResult render(const Scene& scene, const RunSettings& settings, bool exact_film) {
+std::span<const RenderMethod> render_methods() { return kMethods; }
+
+RenderResult render(const Scene& scene, const RunSettings& settings, const RenderOptions& options) {
   const Stopwatch watch;
-  if (settings.store) settings.store->identify("film", exact_film ? "exact" : "rays");
+  if (settings.store) {
+    settings.store->identify("method", options.method);
+    settings.store->identify("film", options.exact_film ? "exact" : "rays");
+  }
   std::vector<std::unique_ptr<SampleEstimator>> estimators;
-  estimators.push_back(make_estimator(scene, settings, exact_film));
+  estimators.push_back(make_estimator(scene, settings, options));
   check_memory(estimators);
   RenderResult result;
   result.radiance = Moments(film_size(scene.film));
@@ -42,9 +62,9 @@ RenderResult render(const Scene& scene, const RunSettings& settings, bool exact_
 }
 
 std::vector<std::string> trace_sample(const Scene& scene, const RunSettings& settings,
-                                      const NonFinite::Place& place, bool exact_film) {
+                                      const NonFinite::Place& place, const RenderOptions& options) {
   check_pixel(scene.film, place);
-  const auto estimator = make_estimator(scene, settings, exact_film);
+  const auto estimator = make_estimator(scene, settings, options);
   SampleLog log;
   run_pixel_sample(*estimator, settings.seed, {place.x, place.y, place.sample}, log);
   return log;

@@ -48,12 +48,14 @@ DirectionField turning_about_axes(const Lanes& steps, int lanes) {
 
 }  // namespace
 
-std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler) {
+std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler,
+                                      bool closed) {
   std::vector<const TermType*> types;
   bool (*asked)(const Scene&) = nullptr;  // looks at the whole environment: once for rows alike
   bool applies = false;
   for (const TermType& type : term_types()) {
     if (type.regions && !sampler.regions) continue;
+    if (closed && type.moved_with_directions && !type.traces_paths) continue;
     if (type.applies != asked) {
       asked = type.applies;
       applies = asked(scene);
@@ -66,7 +68,7 @@ std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType&
 TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> parameters,
                              const std::vector<bool>& computed, const EdgeSamplerType& sampler,
                              int threads, std::shared_ptr<const FilmRegions> visible,
-                             const Warping* warping)
+                             const Warping* warping, bool closed)
     : scene_(seeded(scene, parameters)),
       lanes_(static_cast<int>(parameters.size())),
       lane_scale_(natural_steps(parameters)),
@@ -77,11 +79,12 @@ TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> para
         return tracer;
       }()),
       lights_(scene_),
-      context_{scene_, *tracer_, lights_},
+      closed_(closed ? std::make_unique<ClosedLight>(scene_, threads) : nullptr),
+      context_{scene_, *tracer_, lights_, closed_.get()},
       camera_(scene_.camera),
       visible_(std::move(visible)),
       input_(context_, lanes_, lane_scale_, sampler, threads, warping != nullptr),
-      types_(terms_of(scene, sampler)),
+      types_(terms_of(scene, sampler, closed)),
       rates_(scene_, lanes_, lane_scale_),
       turning_(turning_about_axes(lane_scale_, lanes_)) {
   input_.visible = visible_.get();
@@ -163,6 +166,7 @@ class TermEstimator::VertexTerms {
     }
   }
 
+  const PixelCounts& counts() const { return counts_; }
   const Rgb<Lanes>& sum(size_t slot) const { return sums_[slot]; }
   const Rgb<Lanes>& turned(size_t slot) const { return turned_[slot]; }
 
@@ -201,7 +205,7 @@ class TermEstimator::VertexTerms {
   }
 
   const TermEstimator& estimator_;
-  const PixelCounts& counts_;
+  PixelCounts counts_;
   const VertexMotions* held_;
   SampleSink& sink_;
   std::array<Rgb<Lanes>, kMostTerms> sums_;
@@ -209,32 +213,92 @@ class TermEstimator::VertexTerms {
   Vec3d first_;  // vertex of the path
 };
 
-void TermEstimator::add_pixel(const PixelSample& at, const Rng& key, SampleSink& sink) const {
+// Paths on their way into the sums: those of several samples go side by side, and are added in
+// their order.
+class TermEstimator::Convoy {
+ public:
+  Convoy(const TermEstimator& estimator, SampleSink& sink) : estimator_(estimator), sink_(sink) {
+    walks_.reserve(kMost);
+    vertices_.reserve(kMost);
+  }
+
+  // counts: of the terms at its vertices; null for a path without.
+  void add(const PixelSample& at, const Rng& key, double weight, const PixelCounts* counts) {
+    if (walks_.size() == kMost) finish();
+    if (counts) vertices_.emplace_back(estimator_, *counts, nullptr, sink_);
+    walks_.emplace_back(key, 0, counts ? &vertices_.back() : nullptr);
+    walks_.back().field = estimator_.plan_.field_at(at);
+    places_.push_back(at);
+    weights_.push_back(weight);
+  }
+  void finish() {
+    const PathCosts costs = estimator_.trace<VertexTerms>(places_, walks_, nullptr, false);
+    add_cost(costs, walks_.size(), sink_.cost(estimator_.pixel_slot_));
+    for (size_t i = 0; i < walks_.size(); ++i) {
+      estimator_.add_path(places_[i], estimator_.path_of(walks_[i]), weights_[i], sink_);
+      if (walks_[i].visitor) estimator_.add_vertices(places_[i], *walks_[i].visitor, sink_);
+    }
+    walks_.clear();
+    vertices_.clear();
+    places_.clear();
+    weights_.clear();
+  }
+
+ private:
+  static constexpr size_t kMost = PathTracer<Dual, VertexTerms>::kMostWalks;
+
+  const TermEstimator& estimator_;
+  SampleSink& sink_;
+  std::vector<Walk<Dual, VertexTerms>> walks_;
+  std::vector<VertexTerms> vertices_;  // of the paths that have them
+  std::vector<PixelSample> places_;
+  std::vector<double> weights_;
+};
+
+void TermEstimator::add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const {
+  if (sink.log()) {
+    for (const auto& [at, key] : samples) add_logged(at, key, sink);
+    return;
+  }
+  Convoy convoy(*this, sink);
+  for (const auto& [at, key] : samples) {
+    const PixelCounts counts = plan_.counts_at(at);
+    const int paths = paths_ ? static_cast<int>(counts[pixel_slot_]) : 1;
+    for (int i = 0; i < paths; ++i) {
+      convoy.add(at, key.copy(Purpose::kPathCopy, i), 1.0 / paths,
+                 i == 0 && vertices_ ? &counts : nullptr);
+    }
+  }
+  convoy.finish();
+}
+
+// The same, path by path.
+void TermEstimator::add_logged(const PixelSample& at, const Rng& key, SampleSink& sink) const {
   const PixelCounts counts = plan_.counts_at(at);
-  const DirectionField* field = plan_.field_at(at);
   const int paths = paths_ ? static_cast<int>(counts[pixel_slot_]) : 1;
+  const auto add = [&](auto& visitor, int i) {
+    const Path path = trace_one(at, key.copy(Purpose::kPathCopy, i), plan_.field_at(at), visitor,
+                                sink.log(), sink.cost(pixel_slot_));
+    add_path(at, path, 1.0 / paths, sink);
+  };
   for (int i = 0; i < paths; ++i) {
-    const Rng path_key = key.copy(Purpose::kPathCopy, i);
-    if (i == 0 && (vertices_ || sink.log())) {
+    if (i == 0) {
       VertexTerms vertices(*this, counts, nullptr, sink);
-      add_path(at, trace(at, path_key, field, vertices, sink.log()), 1.0 / paths, sink);
-      add_vertices(at, vertices, counts, sink);
-    } else if (sink.log()) {
-      PathLog log(*sink.log());
-      add_path(at, trace(at, path_key, field, log, sink.log()), 1.0 / paths, sink);
+      add(vertices, i);
+      add_vertices(at, vertices, sink);
     } else {
-      NoVisitor nothing;
-      add_path(at, trace(at, path_key, field, nothing, nullptr), 1.0 / paths, sink);
+      PathLog log(*sink.log());
+      add(log, i);
     }
   }
 }
 
 void TermEstimator::add_vertices(const PixelSample& at, const VertexTerms& vertices,
-                                 const PixelCounts& counts, SampleSink& sink) const {
+                                 SampleSink& sink) const {
   for (size_t slot = 0; slot < terms_.size(); ++slot) {
     if (!terms_[slot] || !terms_[slot]->uses_vertices()) continue;
     if (is_finite(vertices.sum(slot))) {
-      sink.add(slot, at, vertices.sum(slot), 1.0 / counts[slot]);
+      sink.add(slot, at, vertices.sum(slot), 1.0 / vertices.counts()[slot]);
     } else {
       sink.reject(at, slot_name(slot));
     }
@@ -242,59 +306,80 @@ void TermEstimator::add_vertices(const PixelSample& at, const VertexTerms& verti
 }
 
 template <class Visitor>
-TermEstimator::Path TermEstimator::trace(const PixelSample& at, const Rng& key,
-                                         const DirectionField* field, Visitor& visitor,
-                                         SampleLog* log, bool twice) const {
-  const FilmPosition film = sample_pixel_filter(scene_.film, at.x, at.y, key);
-  const auto ray = camera_.ray(film.x, film.y);
-  const Ray primal = camera_ray(
-      scene_, CameraRay<double>{value(ray.origin), value(ray.direction), ray.t_min, ray.t_max});
-  if (log) log_camera_ray(*log, film.x, film.y, primal.origin, primal.direction);
-  Path path;
-  PathTracer<Dual, Visitor> tracer(context_, path.rays, visitor);
-  if (field) tracer.move_directions(rates_, *field);
+TermEstimator::PathCosts TermEstimator::trace(std::span<const PixelSample> places,
+                                              std::span<Walk<Dual, Visitor>> walks, SampleLog* log,
+                                              bool twice) const {
+  PathCosts costs;
+  using Tracer = PathTracer<Dual, Visitor>;
+  Tracer tracer(context_, costs.rays);
+  tracer.move_directions(rates_);
   tracer.take_light_samples(plan_.light_samples);
   if (splits_now(twice)) tracer.split_by(&rates_);
-  std::optional<DirectionWarper> warper;
-  if (warp_field_) tracer.warp_directions(warper.emplace(*warp_field_, path.rays));
-  try {
-    path.radiance = tracer.from_ray(primal, ray.origin, ray.direction, 0, key);
-  } catch (const UntraceableRay&) {
-    path.radiance = grey(Dual(kNotFinite[0]));
+  std::array<StartRay<Dual>, Tracer::kMostWalks> starts;
+  for (size_t i = 0; i < walks.size(); ++i) {
+    const FilmPosition film =
+        sample_pixel_filter(scene_.film, places[i].x, places[i].y, walks[i].key);
+    const auto ray = camera_.ray(film.x, film.y);
+    starts[i] = {camera_ray(scene_, CameraRay<double>{value(ray.origin), value(ray.direction),
+                                                      ray.t_min, ray.t_max}),
+                 ray.origin, ray.direction};
+    if (log) log_camera_ray(*log, film.x, film.y, value(ray.origin), value(ray.direction));
   }
-  if (warper) path.warped = warper->count();
-  path.score = tracer.score();
-  path.light_difference = tracer.light_difference();
-  path.later_lights = tracer.later_lights();
-  path.finite = is_finite(value(path.radiance)) && is_finite(path.score);
+  if (!warp_field_) {
+    tracer.follow_rays({starts.data(), walks.size()}, walks);
+    return costs;
+  }
+  for (size_t i = 0; i < walks.size(); ++i) {
+    DirectionWarper warper(*warp_field_, costs.rays);
+    tracer.warp_directions(warper);
+    tracer.follow_rays({&starts[i], 1}, walks.subspan(i, 1));
+    costs.warped.add(warper.count());
+  }
+  return costs;
+}
+
+template <class Visitor>
+TermEstimator::Path TermEstimator::path_of(const Walk<Dual, Visitor>& walk) const {
+  Path path{walk.sums, !walk.failed};
+  path.finite = path.finite && is_finite(value(walk.sums.radiance)) && is_finite(walk.sums.score);
   for (const auto& term : terms_) {
     if (term && term->uses_paths()) {
-      path.finite = path.finite && is_finite(term->add_path(path.radiance));
+      path.finite = path.finite && is_finite(term->add_path(walk.sums.radiance));
     }
   }
   return path;
 }
 
-void TermEstimator::add_cost(const Path& path, TermCost& cost) {
-  cost.add(path.rays);
-  ++cost.samples;
-  cost.warped += path.warped.fields;
-  cost.dominated += path.warped.dominated;
-  cost.dropped += path.warped.dropped;
+template <class Visitor>
+TermEstimator::Path TermEstimator::trace_one(const PixelSample& at, const Rng& key,
+                                             const DirectionField* field, Visitor& visitor,
+                                             SampleLog* log, TermCost& cost, bool twice) const {
+  Walk<Dual, Visitor> walk(key, 0, &visitor);
+  walk.field = field;
+  const PathCosts costs = trace<Visitor>({&at, 1}, {&walk, 1}, log, twice);
+  add_cost(costs, 1, cost);
+  return path_of(walk);
+}
+
+void TermEstimator::add_cost(const PathCosts& costs, size_t paths, TermCost& cost) {
+  cost.add(costs.rays);
+  cost.samples += paths;
+  cost.warped += costs.warped.fields;
+  cost.dominated += costs.warped.dominated;
+  cost.dropped += costs.warped.dropped;
 }
 
 // Radiance, and what the terms make of it.
 void TermEstimator::add_path(const PixelSample& at, const Path& path, double weight,
                              SampleSink& sink) const {
-  add_cost(path, sink.cost(pixel_slot_));
   if (!path.finite) {
     sink.reject(at, slot_name(pixel_slot_));
     return;
   }
-  sink.add_radiance(at, value(path.radiance), weight);
+  sink.add_radiance(at, value(path.found.radiance), weight);
   for (size_t slot = 0; slot < terms_.size(); ++slot) {
     if (terms_[slot] && terms_[slot]->uses_paths()) {
-      sink.add(slot, at, terms_[slot]->add_path(path.radiance) + path.score, weight);
+      sink.add(slot, at, terms_[slot]->add_path(path.found.radiance) + path.found.score, weight);
     }
   }
 }
@@ -339,31 +424,36 @@ TermEstimator::Sample TermEstimator::sample(const PixelSample& at, const Rng& ke
   Path held;
   if (twice) {
     const DirectionField rest;  // as a field, so that both take the same steps
-    held = trace(at, key, &rest, motions, nullptr, twice);
+    TermCost uncounted;
+    held = trace_one(at, key, &rest, motions, nullptr, uncounted, twice);
   }
   VertexTerms vertices(*this, ones, twice ? &motions : nullptr, sink);
-  const Path path = trace(at, key, turns ? &turning_ : nullptr, vertices, nullptr, twice);
-  add_cost(path, sink.cost(pixel_slot_));
+  const Path path = trace_one(at, key, turns ? &turning_ : nullptr, vertices, nullptr,
+                              sink.cost(pixel_slot_), twice);
   const auto split = [&](const Rgb<Lanes>& turning, const Rgb<Lanes>& resting) {
     if (!turns) return TurnedSample{turning, {}, {}};
     return TurnedSample{twice ? resting : turning, turned(turning, resting), {}};
   };
   const auto derivative = [](const Rgb<Dual>& x) { return Rgb<Lanes>{x.r.d, x.g.d, x.b.d}; };
-  Sample sample{value(path.radiance), {}, {}, path.later_lights, path.finite};
+  Sample sample{value(path.found.radiance),
+                {},
+                {},
+                path.found.later_lights,
+                path.finite && (!twice || held.finite)};
   sample.light_difference =
-      split(derivative(path.light_difference), derivative(held.light_difference));
+      split(derivative(path.found.light_difference), derivative(held.found.light_difference));
   for (size_t slot = 0; slot < terms_.size(); ++slot) {
     const Term* term = terms_[slot].get();
     if (!term) continue;
     TurnedSample& to = sample.terms[slot];
     if (term->uses_paths())
-      to = split(term->add_path(path.radiance), term->add_path(held.radiance));
+      to = split(term->add_path(path.found.radiance), term->add_path(held.found.radiance));
     if (term->uses_vertices()) {
       const Rgb<Lanes>& sum = vertices.sum(slot);
       to = twice ? TurnedSample{at_rest(sum, vertices.turned(slot)), vertices.turned(slot), {}}
                  : split(sum, {});
     }
-    if (turns && slot == pixel_slot_) to.scores = turned(path.score, {});
+    if (turns && slot == pixel_slot_) to.scores = turned(path.found.score, {});
     sample.finite = sample.finite && is_finite(to.value) && is_finite(to.turned);
   }
   return sample;

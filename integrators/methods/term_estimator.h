@@ -8,6 +8,7 @@
 #include "integrators/estimates/sample_estimator.h"
 #include "integrators/methods/pilot_moments.h"
 #include "integrators/methods/sample_plan.h"
+#include "integrators/terms/path.h"
 #include "integrators/terms/term.h"
 #include "limn/core/parameter.h"
 
@@ -16,8 +17,9 @@ namespace limn {
 class FilmRegions;
 
 // The rows of term_types() that the sampler has and the scene has anything of. Slots are indices
-// into it.
-std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler);
+// into it. closed: with light in closed form, which holds whatever vertices see.
+std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler,
+                                      bool closed = false);
 
 // How directions are warped, see warp_field.h.
 struct Warping {
@@ -28,11 +30,12 @@ struct Warping {
 class TermEstimator final : public SampleEstimator {
  public:
   // parameters: at most kLanes. computed: for each of terms_of(scene, sampler), whether it is
-  // computed. visible: of the film, or null. warping: null where directions are not warped.
+  // computed. visible: of the film, or null. warping: null where directions are not warped. closed:
+  // what surfaces scatter is known in closed form, see closed_light.h.
   TermEstimator(const Scene& scene, std::span<const Parameter> parameters,
                 const std::vector<bool>& computed, const EdgeSamplerType& sampler, int threads,
                 std::shared_ptr<const FilmRegions> visible = nullptr,
-                const Warping* warping = nullptr);
+                const Warping* warping = nullptr, bool closed = false);
   TermEstimator(const TermEstimator&) = delete;
   TermEstimator& operator=(const TermEstimator&) = delete;
 
@@ -67,7 +70,7 @@ class TermEstimator final : public SampleEstimator {
 
   bool samples_pixels() const override { return paths_ || vertices_; }
   size_t pixel_slot() const override { return pixel_slot_; }
-  void add_pixel(const PixelSample& at, const Rng& key, SampleSink& sink) const override;
+  void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const override;
 
   double film_samples(size_t slot) const override {
     return terms_[slot] && terms_[slot]->uses_film() ? plan_.uniform[slot] : 0;
@@ -79,18 +82,25 @@ class TermEstimator final : public SampleEstimator {
  private:
   class VertexTerms;
   class VertexMotions;
+  class Convoy;
   struct Path {
-    Rgb<Dual> radiance;
-    Rgb<Lanes> score;
-    Rgb<Dual> light_difference;
-    uint64_t later_lights;
-    RayCount rays;
-    WarpCount warped;
+    PathSums<Dual> found;
     bool finite;
   };
+  struct PathCosts {
+    RayCount rays;
+    WarpCount warped;
+  };
+  // walks[i] is a path of places[i]; at most as many as a PathTracer takes.
   template <class Visitor>
-  Path trace(const PixelSample& at, const Rng& key, const DirectionField* field, Visitor& visitor,
-             SampleLog* log, bool twice = false) const;
+  PathCosts trace(std::span<const PixelSample> places, std::span<Walk<Dual, Visitor>> walks,
+                  SampleLog* log, bool twice) const;
+  template <class Visitor>
+  Path trace_one(const PixelSample& at, const Rng& key, const DirectionField* field,
+                 Visitor& visitor, SampleLog* log, TermCost& cost, bool twice = false) const;
+  template <class Visitor>
+  Path path_of(const Walk<Dual, Visitor>& walk) const;
+  void add_logged(const PixelSample& at, const Rng& key, SampleSink& sink) const;
   // Paths that are traced twice must take the same samples, though their vertices move otherwise.
   bool splits_now(bool twice) const { return plan_.splits && !twice; }
   // What turns about the axes change, in the unit of MotionRates: from what lanes 1 to 3 have more
@@ -99,10 +109,9 @@ class TermEstimator final : public SampleEstimator {
   Rgb<Lanes> turned(const Rgb<Lanes>& turning, const Rgb<Lanes>& held) const;
   // Without what turns change in lanes 1 to 3.
   Rgb<Lanes> at_rest(const Rgb<Lanes>& turning, const Rgb<Lanes>& turned) const;
-  static void add_cost(const Path& path, TermCost& cost);
+  static void add_cost(const PathCosts& costs, size_t paths, TermCost& cost);
   void add_path(const PixelSample& at, const Path& path, double weight, SampleSink& sink) const;
-  void add_vertices(const PixelSample& at, const VertexTerms& vertices, const PixelCounts& counts,
-                    SampleSink& sink) const;
+  void add_vertices(const PixelSample& at, const VertexTerms& vertices, SampleSink& sink) const;
 
   Scene scene_;  // with its parameters seeded
   int lanes_;
@@ -110,6 +119,7 @@ class TermEstimator final : public SampleEstimator {
   double tracer_seconds_ = 0;
   std::unique_ptr<RayTracer> tracer_;
   Lights lights_;
+  std::unique_ptr<ClosedLight> closed_;  // null where paths are sampled
   PathContext context_;
   CameraView<Dual> camera_;
   std::shared_ptr<const FilmRegions> visible_;

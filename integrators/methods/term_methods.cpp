@@ -68,6 +68,7 @@ struct TermMethod {
   bool random_directions = false;  // directions move by chance: to show that no mean changes
   bool warps = false;              // directions follow the edges that they see, see warp_field.h
   bool unbiased = false;           // the same without the bias of few rays
+  bool closed = false;  // light that is scattered once in closed form, see closed_light.h
 };
 
 // The fewest samples of a term in one of a pixel, where they are spread: a rare event that a pilot
@@ -100,7 +101,10 @@ class TermJob {
  public:
   TermJob(const Scene& scene, const GradientOptions& options, const TermMethod& method,
           const RunSettings& settings)
-      : scene_(scene), options_(options), method_(method), types_(terms_of(scene, method.sampler)) {
+      : scene_(scene),
+        options_(options),
+        method_(method),
+        types_(terms_of(scene, method.sampler, method.closed)) {
     const std::vector<std::string> chosen = selected_terms(term_names(), options.terms, scene.file);
     for (const TermType* type : types_) {
       computed_.push_back(std::find(chosen.begin(), chosen.end(), type->name) != chosen.end());
@@ -116,9 +120,9 @@ class TermJob {
     for (size_t k = 0; k < parameters.size(); k += kLanes) {
       const auto some =
           std::span(parameters).subspan(k).first(std::min<size_t>(kLanes, parameters.size() - k));
-      passes_.push_back(std::make_unique<TermEstimator>(scene, some, computed_, method.sampler,
-                                                        settings.threads, visible,
-                                                        method.warps ? &warping : nullptr));
+      passes_.push_back(std::make_unique<TermEstimator>(
+          scene, some, computed_, method.sampler, settings.threads, visible,
+          method.warps ? &warping : nullptr, method.closed));
     }
   }
 
@@ -399,12 +403,14 @@ MethodType method_row(const std::string& name, const std::string& description,
   method.description = description;
   for (const TermType& type : term_types()) {
     if (type.regions && !term_method.sampler.regions) continue;
+    if (term_method.closed && type.moved_with_directions && !type.traces_paths) continue;
     method.terms.emplace_back(type.name);
   }
   method.terms_can_be_left_out = true;
   method.ablation = term_method.sampler.ablation || term_method.random_directions;
   method.only_sum_fixed =
-      term_method.moves_directions || term_method.random_directions || term_method.warps;
+      term_method.moves_directions || term_method.random_directions || term_method.warps ||
+      term_method.closed;
   method.warps = term_method.warps;
   method.biased = term_method.warps && !term_method.unbiased;
   method.run = [term_method](const MethodType&, const Scene& scene, const GradientOptions& options,
@@ -446,6 +452,11 @@ std::vector<MethodType> term_methods() {
                                "warped-area sampling without bias, by roulette over numbers of "
                                "auxiliary rays",
                                {.sampler = uniform, .warps = true, .unbiased = true}));
+  methods.push_back(method_row("analytic",
+                               "direct light of flat lamps on diffuse surfaces in closed form: "
+                               "soft shadows without noise",
+                               {.sampler = uniform, .closed = true}));
+  methods.back().check = check_closed_light;
   methods.push_back(method_row("random-directions",
                                "silhouettes, with directions that move by chance: noise, but the "
                                "same mean",

@@ -11,12 +11,13 @@ namespace {
 constexpr int kGrid = 96;         // squared: the directions that are drawn
 constexpr int kCandidates = 192;  // of which this many are tried for centers
 constexpr size_t kMostPatches = 4;
-constexpr double kWindow = 4 * kPi / 180;  // of the search [rad]
+constexpr int kMostTries = 8;
 constexpr double kWidest = 8 * kPi / 180;  // of a patch [rad]
-constexpr double kKept = 0.97;             // of what the widest one has beyond its surroundings
-constexpr double kMargin = 1.1;            // of the angle that holds it
-constexpr double kLeastShare = 0.1;        // of the environment's light
-constexpr double kLeastContrast = 16;      // over the environment's mean
+constexpr double kRing = 1.1;              // of a ring's inner radius: its outer one
+constexpr double kRim = 1.0 / 16;     // brightness of a ring that belongs to a cap, over its core's
+constexpr double kLeastShare = 0.01;  // of the environment's light
+constexpr double kLeastContrast = 16;  // over the environment's mean
+constexpr double kLeastSquare = 2;     // over that of a uniform environment of the same light
 
 struct Drawn {
   Vec3d w;
@@ -45,58 +46,86 @@ double angle_between(const Vec3d& a, const Vec3d& b) {
   return 2 * std::asin(std::min(1.0, 0.5 * length(a - b)));
 }
 
-// The flux within the window around an axis, as a vector: its length is the flux, nearly.
-Vec3d flux_around(const std::vector<Drawn>& drawn, const Vec3d& axis) {
-  const double cosine = std::cos(kWindow);
-  Vec3d sum{};
-  for (const Drawn& d : drawn) {
-    if (dot(d.w, axis) >= cosine) sum += d.w * d.flux;
-  }
-  return sum;
-}
-
-Vec3d brightest_axis(const std::vector<Drawn>& drawn) {
-  Vec3d best{};
-  // Odd, or candidates would come from few of the grid's columns and miss what lies in others.
-  const size_t step = drawn.size() / kCandidates | 1;
-  for (size_t i = 0; i < drawn.size(); i += step) {
-    const Vec3d around = flux_around(drawn, drawn[i].w);
-    if (length_squared(around) > length_squared(best)) best = around;
-  }
-  // Towards the middle of the light.
-  for (int i = 0; i < 3; ++i) best = flux_around(drawn, normalize(best));
-  return normalize(best);
-}
-
-// The least angle around the axis that holds nearly all that is there beyond the brightness of the
-// surroundings, and the flux within it.
-struct Extent {
+// A cap of constant radiance, as bright as what is there beyond the surroundings' mean.
+struct Cap {
   double angle = 0, flux = 0;
+  double square = 0;  // the integral of its squared radiance
 };
-Extent extent_around(const std::vector<Drawn>& drawn, const Vec3d& axis) {
+
+// The one around the axis that holds most of the integral of squared radiance, which is what makes
+// samples uneven: for a disc of light the disc, also where it is small and its glow is wide.
+Cap cap_around(const std::vector<Drawn>& drawn, const Vec3d& axis, double least_flux) {
   std::vector<std::pair<double, double>> near;  // angle, flux
-  double widest = 0, rim = 0;
-  constexpr double kRim = 1.25 * kWidest;
+  constexpr double kOuter = 1.25 * kWidest;
+  const double outer_cosine = std::cos(kOuter);
+  double outside = 0;
   for (const Drawn& d : drawn) {
+    if (dot(d.w, axis) < outer_cosine) continue;
     const double angle = angle_between(d.w, axis);
     if (angle < kWidest) {
       near.emplace_back(angle, d.flux);
-      widest += d.flux;
-    } else if (angle < kRim) {
-      rim += d.flux;
+    } else {
+      outside += d.flux;
     }
   }
   std::sort(near.begin(), near.end());
-  const double around = rim / (solid_angle(kRim) - solid_angle(kWidest));
-  const double wanted = kKept * (widest - around * solid_angle(kWidest));
-  Extent extent;
-  for (const auto& [angle, flux] : near) {
-    extent.flux += flux;
-    extent.angle = angle;
-    if (extent.flux - around * solid_angle(angle) >= wanted) break;
+  const double around = outside / (solid_angle(kOuter) - solid_angle(kWidest));
+  Cap best;
+  double flux = 0;
+  for (const auto& [angle, one] : near) {
+    flux += one;
+    const double wide = solid_angle(angle), beyond = flux - around * wide;
+    if (flux < least_flux || !(angle > 0) || !(beyond > 0)) continue;
+    const double square = beyond * beyond / wide;
+    if (square > best.square) best = {angle, flux, square};
   }
-  extent.angle = std::min(kMargin * extent.angle, kWidest);
-  return extent;
+  return best;
+}
+
+// Wider by rings as long as these are bright, too: the rim of a sun is soft, by haze or by the map's
+// texels.
+Cap with_rim(const std::vector<Drawn>& drawn, const Vec3d& axis, Cap cap) {
+  const double core = cap.flux / solid_angle(cap.angle);
+  while (cap.angle * kRing <= kWidest) {
+    const double wider = cap.angle * kRing;
+    double flux = 0;
+    for (const Drawn& d : drawn) {
+      if (angle_between(d.w, axis) <= wider) flux += d.flux;
+    }
+    const double ring = solid_angle(wider) - solid_angle(cap.angle);
+    if (flux - cap.flux < kRim * core * ring) break;
+    cap.angle = wider;
+    cap.flux = flux;
+  }
+  return cap;
+}
+
+// To the middle of the light within the angle.
+Vec3d centered(const std::vector<Drawn>& drawn, const Vec3d& axis, double angle) {
+  const double cosine = std::cos(angle);
+  Vec3d sum = axis * 1e-300;
+  for (const Drawn& d : drawn) {
+    if (dot(d.w, axis) >= cosine) sum += d.w * d.flux;
+  }
+  return normalize(sum);
+}
+
+Vec3d brightest_axis(const std::vector<Drawn>& drawn, double least_flux) {
+  Vec3d axis = drawn[0].w;
+  Cap best;
+  const auto try_axis = [&](const Vec3d& w) {
+    const Cap cap = cap_around(drawn, w, least_flux);
+    if (!(cap.square > best.square)) return;
+    best = cap;
+    axis = w;
+  };
+  // Odd, or candidates would come from few of the grid's columns and miss what lies in others.
+  const size_t step = drawn.size() / kCandidates | 1;
+  for (size_t i = 0; i < drawn.size(); i += step) {
+    if (best.square == 0 || dot(drawn[i].w, axis) < std::cos(best.angle)) try_axis(drawn[i].w);
+  }
+  for (int i = 0; i < 3; ++i) try_axis(centered(drawn, axis, 1.5 * best.angle));
+  return axis;
 }
 
 }  // namespace
@@ -107,18 +136,20 @@ std::vector<BrightPatch> find_bright_patches(const Environment& environment) {
   std::vector<Drawn> drawn = draw(environment);
   double total = 0;
   for (const Drawn& d : drawn) total += d.flux;
-  while (patches.size() < kMostPatches && !drawn.empty()) {
-    const Vec3d axis = brightest_axis(drawn);
-    const Extent extent = extent_around(drawn, axis);
-    if (!(extent.angle > 0) || extent.flux < kLeastShare * total) break;
-    const double mean = extent.flux / solid_angle(extent.angle);
-    if (mean < kLeastContrast * total / (4 * kPi)) break;
-    for (const BrightPatch& other : patches) {
-      const double apart = angle_between(axis, other.cap.axis);
-      if (apart <= extent.angle + std::asin(other.cap.sine)) return patches;
-    }
-    const DirectionCap cap{axis, std::sin(extent.angle), std::cos(extent.angle)};
-    patches.push_back({cap, mean});
+  const double uniform = total / (4 * kPi);
+  for (int i = 0; i < kMostTries && patches.size() < kMostPatches && !drawn.empty(); ++i) {
+    const Vec3d axis = brightest_axis(drawn, kLeastShare * total);
+    const Cap core = cap_around(drawn, axis, kLeastShare * total);
+    if (!(core.square >= kLeastSquare * uniform * total)) break;
+    if (core.flux < kLeastContrast * uniform * solid_angle(core.angle)) break;
+    const Cap whole = with_rim(drawn, axis, core);
+    const DirectionCap cap{axis, std::sin(whole.angle), std::cos(whole.angle)};
+    const auto apart = [&](const BrightPatch& other) {
+      return angle_between(axis, other.cap.axis) > whole.angle + std::asin(other.cap.sine);
+    };
+    // What is left around a patch is none, but hides others.
+    if (std::all_of(patches.begin(), patches.end(), apart))
+      patches.push_back({cap, whole.flux / solid_angle(whole.angle)});
     std::erase_if(drawn, [&](const Drawn& d) { return cap.holds(d.w); });
   }
   return patches;

@@ -74,12 +74,13 @@ bool clip_jump(const PathContext& context, const ClipSegment& segment, const Vec
   const bool found = context.tracer.closest(ray, hit);
   if (found && segment.at_far_plane) return false;
 
-  NoVisitor nothing;
-  PathTracer<double, NoVisitor> path(context, rays, nothing);
+  PathTracer<double, NoVisitor> path(context, rays);
   const Rng side_key = key.at(Purpose::kEdgeSide, 0);  // of both sides, as in edge_jump
   const auto leaving = [&](FaceRef face) {
-    return path.from_surface(surface_on_ray<double>(scene, face, pinhole, ray.direction),
-                             -ray.direction, 0, side_key, nullptr);
+    Walk<double, NoVisitor> walk(side_key, 0, nullptr);
+    path.place(walk, surface_on_ray<double>(scene, face, pinhole, ray.direction), -ray.direction);
+    path.follow_one(walk);
+    return walk.radiance();
   };
   jump = (found ? leaving(hit.face) : path.escaped(ray.direction, 0)) - leaving(segment.face);
   return true;

@@ -87,6 +87,68 @@ Sides nearest_faces(const PathContext& context, const EdgeMesh& mesh, const Edge
   return sides;
 }
 
+// Radiance on both sides of an edge, by paths that go side by side: from the nearest face, or from
+// what lies behind.
+class RadianceBeside {
+ public:
+  RadianceBeside(const PathContext& context, const EdgeView& view, int bounces, const Rng& key,
+                 RayCount& rays, const RadiancePart& part)
+      : scene_(context.scene),
+        view_(view),
+        part_(part),
+        path_(context, rays),
+        walks_{{key, bounces, nullptr}, {key, bounces, nullptr}} {}
+
+  void start_on_face(int i, const FacesAround& around, const FaceSide& side) {
+    const auto corners = face_corners<double>(scene_.shape(side.face.shape).mesh, side.face.face);
+    const Vec3d n = cross(corners[1] - corners[0], corners[2] - corners[0]);
+    edges_[i] = {around, view_.x0, view_.x1, side};
+    walks_[i].edge = &edges_[i];
+    start(i, surface_on_ray(scene_, side.face, view_.y, n));
+  }
+  void start_behind(int i, FaceRef face) {
+    start(i, surface_on_ray(scene_, face, view_.p, view_.omega));
+  }
+  void escape(int i) {
+    if (part_.region) {
+      radiance_[i] = part_.regions->escaped(*part_.region, view_.omega);
+      return;
+    }
+    radiance_[i] = path_.escaped(view_.omega, walks_[i].bounces);
+    if (part_.regions) radiance_[i] = radiance_[i] - part_.regions->escaped(view_.omega);
+  }
+  // Throws as RayTracer does.
+  Rgb<double> jump() {
+    path_.follow({going_, count_});
+    for (int i = 0; i < 2; ++i) radiance_[i] = walks_[i].radiance() + radiance_[i];
+    return radiance_[0] - radiance_[1];
+  }
+
+ private:
+  using Tracer = PathTracer<double, NoVisitor>;
+
+  void start(int i, const SurfacePoint<double>& surface) {
+    const Vec3d wi = -view_.omega;
+    if (part_.region) {
+      radiance_[i] = part_.regions->emission(*part_.region, surface, wi);
+      return;
+    }
+    if (part_.regions) radiance_[i] = Rgb<double>{} - part_.regions->emission(surface, wi);
+    path_.place(walks_[i], surface, wi);
+    going_[count_++] = &walks_[i];
+  }
+
+  const Scene& scene_;
+  const EdgeView& view_;
+  const RadiancePart& part_;
+  Tracer path_;
+  Tracer::Walk walks_[2];
+  EdgeStart edges_[2];
+  Rgb<double> radiance_[2];  // but for what the paths find
+  Tracer::Walk* going_[2];
+  size_t count_ = 0;
+};
+
 }  // namespace
 
 bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView& view,
@@ -119,33 +181,19 @@ bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView&
     if (found && behind.t < view.distance) return false;
   }
 
-  NoVisitor nothing;
-  PathTracer<double, NoVisitor> path(context, rays, nothing);
-  // Both sides share their random numbers: where they hardly differ, so do their estimates.
-  const Rng side_key = key.at(Purpose::kEdgeSide, bounces);
-  const Vec3d wi = -view.omega;
-  const auto leaving = [&](const SurfacePoint<double>& surface, EdgeStart* at) {
-    if (part.region) return part.regions->emission(*part.region, surface, wi);
-    const Rgb<double> all = path.from_surface(surface, wi, bounces, side_key, at);
-    return part.regions ? all - part.regions->emission(surface, wi) : all;
-  };
-  const auto radiance = [&](const std::optional<FaceSide>& side) {
-    if (side) {
-      const FaceRef face = side->face;
-      const auto corners = face_corners<double>(context.scene.shape(face.shape).mesh, face.face);
-      const Vec3d n = cross(corners[1] - corners[0], corners[2] - corners[0]);
-      EdgeStart edge{around, view.x0, view.x1, *side};
-      return leaving(surface_on_ray(context.scene, face, view.y, n), &edge);
-    }
-    if (found) {
-      return leaving(surface_on_ray(context.scene, behind.face, view.p, view.omega), nullptr);
-    }
-    if (part.region) return part.regions->escaped(*part.region, view.omega);
-    const Rgb<double> all = path.escaped(view.omega, bounces);
-    return part.regions ? all - part.regions->escaped(view.omega) : all;
-  };
   const Sides sides = nearest_faces(context, mesh, view, ray.skip_emitters);
-  jump = radiance(sides.negative) - radiance(sides.positive);
+  // Both sides share their random numbers: where they hardly differ, so do their estimates.
+  RadianceBeside beside(context, view, bounces, key.at(Purpose::kEdgeSide, bounces), rays, part);
+  for (int i = 0; i < 2; ++i) {
+    if (const auto& side = i == 0 ? sides.negative : sides.positive) {
+      beside.start_on_face(i, around, *side);
+    } else if (found) {
+      beside.start_behind(i, behind.face);
+    } else {
+      beside.escape(i);
+    }
+  }
+  jump = beside.jump();
   return true;
 }
 

@@ -4,9 +4,18 @@
 // MIS weights are constants while the parameters move (solid-angle measure, everywhere), but for
 // directions that move on purpose (direction_field.h, warp_field.h) and the one direction of a
 // light without extent, which follows the parameters.
-#include <atomic>
+//
+// Paths are followed side by side where there are several: each waits for its own divisions, roots
+// and reads, and a processor fills such gaps with the work of the next. A path's own steps, and so
+// its bits, do not depend on what goes beside it.
+#include <algorithm>
 #include <cstdint>
+#include <optional>
+#include <span>
+#include <type_traits>
+#include <utility>
 
+#include "integrators/terms/closed_light.h"
 #include "integrators/terms/direction_field.h"
 #include "integrators/terms/edge_sides.h"
 #include "integrators/terms/near_faces.h"
@@ -25,6 +34,8 @@ struct PathContext {
   const Scene& scene;
   const RayTracer& tracer;
   const Lights& lights;
+  // Takes the place of all light that is scattered; null: paths are sampled.
+  const ClosedLight* closed = nullptr;
 };
 
 // Does nothing at path vertices.
@@ -45,22 +56,92 @@ struct PathStep {
   double pdf = 0;  // of the direction from there [1/sr]; 0 for what the camera or an edge sees
 };
 
+// What a path has found.
+template <class S>
+struct PathSums {
+  Rgb<S> radiance;
+  Rgb<Lanes> score;  // sum of the scores: has mean zero, and belongs to the interior term
+  // With an even number of light samples: half of what every first makes more than the second, at
+  // all vertices but the first. It has mean zero, and the variance of their mean.
+  Rgb<S> light_difference;
+  uint64_t later_lights = 0;  // light samples behind it
+};
+
+// A path under way: a vertex, how it was reached, and what is asked for next.
+template <class S, class Visitor>
+struct Walk {
+  // scattered: how often the whole path has scattered before. visitor: see PathTracer; may be null.
+  Walk(const Rng& path_key, int scattered, Visitor* at_vertices)
+      : key(path_key), visitor(at_vertices), bounces(scattered) {}
+
+  Rng key;
+  Visitor* visitor;
+  const DirectionField* field = nullptr;  // by which directions at the first vertex move, if any
+  int bounces;
+  int copies = 1;             // of paths that share the beginning, this one among them
+  bool again = false;         // all but what further directions bring has been added
+  bool lit = false;           // the lights at the vertex have been
+  bool failed = false;        // it asked for a ray that cannot be traced
+  EdgeStart* edge = nullptr;  // where the surface lies, if the path starts on an edge and is there
+  SurfacePoint<S> surface;
+  Vec3<S> wi;
+  Rgb<S> throughput = grey(S(1.0));
+  PathStep step;
+  PathSums<S> sums;
+
+  std::optional<Scattering<S>> scattering;
+  const DirectionMotion* motion = nullptr;  // null where directions are held
+  struct Nothing {};
+  std::conditional_t<std::is_same_v<S, Dual>, DirectionMotion, Nothing> field_motion;
+
+  // A light that may be seen: all of what it adds but its radiance.
+  std::optional<LightSample> light;
+  const DirectionMotion* light_motion = nullptr;
+  Rgb<S> light_share;
+  double light_weight = 1;
+
+  // The next ray.
+  Vec3d wo;
+  Vec3<S> direction;  // the same as it moves
+  double pdf = 0;     // [1/sr]
+  Rgb<S> before;      // the throughput before it
+  bool last = false;  // only what emits counts behind it
+  bool found = false;
+  Hit hit;
+
+  // Throws as RayTracer does.
+  const Rgb<S>& radiance() const {
+    if (failed) throw UntraceableRay();
+    return sums.radiance;
+  }
+};
+
+// A ray on which a path starts: the primal one, with its skipped faces, and as it moves.
+template <class S>
+struct StartRay {
+  Ray ray;
+  Vec3<S> origin, direction;
+};
+
 // Visitor: called as visitor(surface, scattering, throughput, motion, step, bounces, key) at every
 // vertex where the path scatters. motion: how directions move there, null where they are held.
 template <class S, class Visitor>
 class PathTracer {
  public:
-  PathTracer(const PathContext& context, RayCount& rays, Visitor& visitor)
-      : c_(context), rays_(rays), visitor_(visitor) {}
+  using Walk = limn::Walk<S, Visitor>;
+  // Side by side.
+  static constexpr size_t kMostWalks = std::is_same_v<S, double> ? 16 : 8;
 
-  // Directions at the first vertex of the path move from now on. Both must outlive the tracer. Only
-  // where S carries derivatives.
-  void move_directions(const MotionRates& rates, const DirectionField& field) {
+  PathTracer(const PathContext& context, RayCount& rays) : c_(context), rays_(rays) {}
+
+  // By the fields of paths that have one. Must outlive the tracer. Only where S carries
+  // derivatives.
+  void move_directions(const MotionRates& rates) {
     static_assert(std::is_same_v<S, Dual>);
     rates_ = &rates;
-    field_ = &field;
   }
-  // The directions of all vertices move from now on. Must outlive the tracer.
+  // The directions of all vertices move from now on, on one path at a time. Must outlive the
+  // tracer.
   void warp_directions(DirectionWarper& warper) {
     static_assert(std::is_same_v<S, Dual>);
     warper_ = &warper;
@@ -70,128 +151,244 @@ class PathTracer {
   void split_by(const MotionRates* rates) { splitting_ = rates; }
   // How many light samples are averaged at every vertex but the first.
   void take_light_samples(int count) { light_samples_ = count; }
-  // With an even number of them: half of what every first makes more than the second, at all
-  // vertices of the paths so far. It has mean zero, and the variance of their mean.
-  const Rgb<S>& light_difference() const { return light_difference_; }
-  uint64_t later_lights() const { return later_lights_; }  // light samples behind it
-  // Sum of the scores over the paths so far: has mean zero, and belongs to the interior term.
-  const Rgb<Lanes>& score() const { return score_; }
 
-  // Radiance that arrives at the origin of a ray against its direction. `ray` is the primal ray
-  // with its skipped faces; bounces: how often the whole path has scattered before.
-  Rgb<S> from_ray(const Ray& ray, const Vec3<S>& origin, const Vec3<S>& direction, int bounces,
-                  const Rng& key) {
-    Hit hit;
-    ++rays_.closest;
-    if (!c_.tracer.closest(ray, hit)) return escaped(direction, bounces);
-    return from_surface(surface_on_ray<S>(c_.scene, hit.face, origin, direction), -direction,
-                        bounces, key, nullptr);
+  // Radiance that arrives at the origins of rays against their directions; rays[i] belongs to
+  // walks[i], at most kMostWalks of them. What cannot be traced has `failed`.
+  void follow_rays(std::span<const StartRay<S>> rays, std::span<Walk> walks) {
+    for (size_t i = 0; i < walks.size(); ++i) {
+      Walk& walk = walks[i];
+      guarded(walk, [&] {
+        ++rays_.closest;
+        walk.found = c_.tracer.closest(rays[i].ray, walk.hit);
+        return true;
+      });
+      if (walk.found) fetch_face(walk.hit.face);
+    }
+    for (const Walk& walk : walks) fetch_corners(walk);
+    follow_seen(rays, walks);
   }
-
+  // The same where it is known what they meet: faces[i], or none.
+  void follow_rays(std::span<const StartRay<S>> rays, std::span<const FaceRef> faces,
+                   std::span<Walk> walks) {
+    for (size_t i = 0; i < walks.size(); ++i) {
+      walks[i].found = faces[i].shape.valid();
+      walks[i].hit.face = faces[i];
+    }
+    follow_seen(rays, walks);
+  }
   Rgb<S> escaped(const Vec3<S>& direction, int bounces) const {
     const bool hidden = bounces == 0 && c_.scene.hide_emitters;
     if (!c_.scene.environment || hidden) return {};
     return environment_radiance<S>(*c_.scene.environment, direction);
   }
 
-  // Radiance that leaves the surface along wi: emission and everything scattered within the scene's
-  // depth. edge: where the surface lies, if the path starts on an edge; it follows the path while
-  // that stays there. With x_0 the surface, w_i a direction drawn at x_i with density p_i, f_i the
-  // scattering function times cosine there, and the throughput T_k = f_0 / p_0 ... f_(k-1) /
-  // p_(k-1), one path estimates
+  // A path that starts on a surface: the radiance that leaves it along wi, emission and everything
+  // scattered within the scene's depth. With x_0 the surface, w_i a direction drawn at x_i with
+  // density p_i, f_i the scattering function times cosine there, and the throughput T_k = f_0 / p_0
+  // ... f_(k-1) / p_(k-1), one path estimates
   //   L = L_e(x_0) + sum over k of T_k (E_k + f_k / p_k m_k L_e(x_(k+1))),
   //   E_k = f_k(l) / q_k(l) n_k L_e(l),
   // l a direction that light sampling draws with density q_k, and m_k = p^2 / (p^2 + q^2) and
   // n_k = q^2 / (p^2 + q^2) the weights of the power heuristic at either's direction (n_k = 1 for a
   // delta light). w, l, p, q, m, n are constants when S carries derivatives.
-  Rgb<S> from_surface(SurfacePoint<S> surface, Vec3<S> wi, int bounces, const Rng& key,
-                      EdgeStart* edge) {
-    Rgb<S> radiance = surface.emission(value(wi), c_.scene.shading);
-    follow({surface, wi, grey(S(1.0)), {}, 1}, bounces, key, edge, false, radiance);
-    return radiance;
+  void place(Walk& walk, const SurfacePoint<S>& surface, const Vec3<S>& wi) const {
+    walk.surface = surface;
+    walk.wi = wi;
+    walk.sums.radiance = surface.emission(value(wi), c_.scene.shading);
+  }
+  void follow_one(Walk& walk) {
+    Walk* const one = &walk;
+    follow({&one, 1});
+  }
+  // Adds all that is scattered along paths that have been placed, at most kMostWalks.
+  void follow(std::span<Walk* const> walks) {
+    Walk* going[kMostWalks];
+    size_t count = walks.size();
+    std::copy(walks.begin(), walks.end(), going);
+    const auto keep = [&](const auto& step) {
+      size_t kept = 0;
+      for (size_t i = 0; i < count; ++i) {
+        if (guarded(*going[i], [&] { return step(*going[i]); })) going[kept++] = going[i];
+      }
+      count = kept;
+    };
+    while (count > 0) {
+      keep([&](Walk& walk) { return begin_vertex(walk); });
+      for (size_t i = 0; i < count; ++i) draw_light(*going[i]);
+      for (size_t i = 0; i < count; ++i) weigh_light(*going[i]);
+      keep([&](Walk& walk) {
+        if (walk.light && shadowed(walk)) walk.light.reset();
+        return true;
+      });
+      for (size_t i = 0; i < count; ++i) add_light(*going[i]);
+      keep([&](Walk& walk) { return choose_direction(walk); });
+      keep([&](Walk& walk) { return scatter(walk); });
+      keep([&](Walk& walk) {
+        walk.found = next_hit(walk);
+        return true;
+      });
+      for (size_t i = 0; i < count; ++i) fetch_corners(*going[i]);
+      keep([&](Walk& walk) { return walk.found || escape(walk); });
+      keep([&](Walk& walk) { return arrive(walk); });
+    }
   }
 
  private:
-  // A vertex of a path and how it was reached.
-  struct Arrival {
-    SurfacePoint<S> surface;
-    Vec3<S> wi;
-    Rgb<S> throughput;
-    PathStep step;
-    int copies = 1;  // of paths that share the beginning, this one among them
-  };
-  // Adds what is scattered along the path. again: all but what further directions bring has been
-  // added.
-  void follow(Arrival at, int bounces, const Rng& key, EdgeStart* edge, bool again,
-              Rgb<S>& radiance) {
-    auto& [surface, wi, throughput, step, copies] = at;
-    for (;; ++bounces, again = false) {
-      if (is_complete(bounces)) return;
-      const Scattering<S> scattering(surface, wi, c_.scene.shading);
-      if (scattering.black()) return;
-      const DirectionMotion* motion = motion_at(surface, bounces);
-      if (!again) {
-        visitor_(surface, scattering, throughput, motion, step, bounces, key);
-        const int more = splits(surface, copies);
-        add_lights(surface, scattering, motion, throughput, bounces, more, key, edge, radiance);
-        if (more > 1) split(at, more, bounces, key, edge, radiance);
-      }
-      Rng rng = key.at(Purpose::kBsdf, bounces);
-      const double u1 = rng.uniform();
-      const double u2 = rng.uniform();
-      const auto wo = scattering.sample(u1, u2);
-      if (!wo) return;
-      if constexpr (std::is_same_v<S, Dual>) {
-        if (warper_) motion = warper_->motion(surface, *wo, rng.at(Purpose::kBsdf, 1));
-      }
-      const Vec3<S> direction = moving(*wo, motion);
-      const auto [f, pdf] = evaluate(scattering, *wo, direction, motion);
-      if (is_black(value(f))) return;
-      add_score(scattering, *wo, motion, value(throughput) * (1 / pdf));
-      const Rgb<S> before = throughput;
-      throughput = throughput * stretched(f, *wo, motion) * (1 / pdf);
-      step = {value(surface.p), pdf};
-      // Behind the last scattering only what emits counts.
-      const bool last = is_complete(bounces + 1), shapes_emit = c_.lights.on_shapes();
-      if (last && !shapes_emit && !c_.scene.environment) return;
-      Hit hit;
-      const bool found = next_hit(surface, *wo, edge, last && !shapes_emit, hit);
-      if (!found) {
-        if (!c_.scene.environment) return;
-        auto sight = c_.lights.template environment<S>(*wo);
-        if (motion) sight.radiance = environment_radiance<S>(*c_.scene.environment, direction);
-        radiance += throughput * sight.radiance * mis_weight(pdf, sight.pdf);
-        return;
-      }
-      if (last && !(shapes_emit && c_.scene.shape(hit.face.shape).is_emitter)) return;
-      if (hit.t > 0) {
-        surface = surface_on_ray<S>(c_.scene, hit.face, surface.p, direction);
-        edge = nullptr;
+  void follow_seen(std::span<const StartRay<S>> rays, std::span<Walk> walks) {
+    Walk* going[kMostWalks];
+    size_t count = 0;
+    for (size_t i = 0; i < walks.size(); ++i) {
+      Walk& walk = walks[i];
+      if (walk.failed) continue;
+      const auto& [ray, origin, direction] = rays[i];
+      if (walk.found) {
+        place(walk, surface_on_ray<S>(c_.scene, walk.hit.face, origin, direction), -direction);
+        going[count++] = &walk;
       } else {
-        move_along_edge(surface, hit.face);
+        walk.sums.radiance = escaped(direction, walk.bounces);
       }
-      wi = -direction;
-      const Rgb<S> lamp = emitted(surface, *wo, pdf, hit.t);
-      if (motion && !motion->warp && !is_black(value(lamp))) {
-        radiance += before * scattering.eval(*wo) * lamp * (1 / pdf);  // held
-      } else {
-        radiance += throughput * lamp;
-      }
-      if (!survives_roulette(throughput, bounces + 1, key)) return;
     }
+    follow({going, count});
+  }
+  template <class Step>
+  static bool guarded(Walk& walk, const Step& step) {
+    try {
+      return step();
+    } catch (const UntraceableRay&) {
+      walk.failed = true;
+      return false;
+    }
+  }
+  // Brings what says where a face lies into the cache.
+  void fetch_face(FaceRef face) const {
+    const Mesh& mesh = c_.scene.shape(face.shape).mesh;
+    __builtin_prefetch(&mesh.faces[face.face.index()]);
+    if (!mesh.normal_ids.empty()) __builtin_prefetch(&mesh.normal_ids[face.face.index()]);
+  }
+
+  // The same of its corners; it is known then.
+  void fetch_corners(const Walk& walk) const {
+    if (!walk.found || (walk.last && !c_.lights.on_shapes())) return;
+    const FaceRef face = walk.hit.face;
+    const Mesh& mesh = c_.scene.shape(face.shape).mesh;
+    for (const uint32_t vertex : mesh.face(face.face)) {
+      __builtin_prefetch(&mesh.positions[vertex]);
+      if constexpr (!std::is_same_v<S, double>) {
+        if (!mesh.position_tangents.empty()) __builtin_prefetch(&mesh.position_tangents[vertex]);
+      }
+    }
+    if (mesh.normal_source != NormalSource::kFace) detail::fetch_shading<S>(mesh, face.face);
+  }
+
+  // What comes first at a vertex, and lights where they are many; false where the path ends.
+  bool begin_vertex(Walk& walk) {
+    if (is_complete(walk.bounces)) return false;
+    walk.scattering.emplace(walk.surface, walk.wi, c_.scene.shading);
+    if (walk.scattering->black()) return false;
+    set_motion(walk);
+    walk.light.reset();
+    walk.lit = walk.again;
+    if (walk.again) {
+      walk.again = false;
+      return true;
+    }
+    if (walk.visitor) {
+      (*walk.visitor)(walk.surface, *walk.scattering, walk.throughput, walk.motion, walk.step,
+                      walk.bounces, walk.key);
+    }
+    if constexpr (!std::is_same_v<S, Var>) {
+      if (c_.closed) {
+        walk.sums.radiance +=
+            c_.closed->scattered(c_.tracer, walk.surface, *walk.scattering, walk.edge);
+        return false;
+      }
+    }
+    const int more = splits(walk.surface, walk.copies);
+    const int lights = (walk.bounces > 0 ? light_samples_ : 1) * more;
+    if (walk.bounces > 0) walk.sums.later_lights += lights;
+    walk.lit = lights > 1 || warper_;
+    if (walk.lit) add_lights(walk, lights);
+    if (more > 1) split(walk, more);
+    return true;
+  }
+  // One light, where there have been no others.
+  void draw_light(Walk& walk) const {
+    if (!walk.lit) draw_light(walk, walk.key);
+  }
+  void add_light(Walk& walk) const {
+    if (walk.light) walk.sums.radiance += walk.throughput * light_value(walk);
+  }
+  // Draws the next direction.
+  bool choose_direction(Walk& walk) {
+    Rng rng = walk.key.at(Purpose::kBsdf, walk.bounces);
+    const double u1 = rng.uniform();
+    const double u2 = rng.uniform();
+    const auto wo = walk.scattering->sample(u1, u2);
+    if (!wo) return false;
+    walk.wo = *wo;
+    if constexpr (std::is_same_v<S, Dual>) {
+      if (warper_) walk.motion = warper_->motion(walk.surface, *wo, rng.at(Purpose::kBsdf, 1));
+    }
+    return true;
+  }
+  bool scatter(Walk& walk) {
+    walk.direction = moving(walk.wo, walk.motion);
+    const auto [f, pdf] = evaluate(*walk.scattering, walk.wo, walk.direction, walk.motion);
+    if (is_black(value(f))) return false;
+    walk.pdf = pdf;
+    add_score(walk, value(walk.throughput) * (1 / pdf));
+    walk.before = walk.throughput;
+    walk.throughput = walk.throughput * stretched(f, walk.wo, walk.motion) * (1 / pdf);
+    walk.step = {value(walk.surface.p), pdf};
+    walk.last = is_complete(walk.bounces + 1);
+    return !walk.last || c_.lights.on_shapes() || c_.scene.environment;
+  }
+  // Adds what a ray sees that leaves the scene; there the path ends.
+  bool escape(Walk& walk) const {
+    if (!c_.scene.environment) return false;
+    auto sight = c_.lights.template environment<S>(walk.wo);
+    if (walk.motion) {
+      sight.radiance = environment_radiance<S>(*c_.scene.environment, walk.direction);
+    }
+    walk.sums.radiance += walk.throughput * sight.radiance * mis_weight(walk.pdf, sight.pdf);
+    return false;
+  }
+  // Goes on to what the ray meets.
+  bool arrive(Walk& walk) {
+    const DirectionMotion* motion = walk.motion;
+    Rgb<S>& radiance = walk.sums.radiance;
+    const FaceRef face = walk.hit.face;
+    if (walk.last && !(c_.lights.on_shapes() && c_.scene.shape(face.shape).is_emitter)) {
+      return false;
+    }
+    if (walk.hit.t > 0) {
+      walk.surface = surface_on_ray<S>(c_.scene, face, walk.surface.p, walk.direction);
+      walk.edge = nullptr;
+    } else {
+      move_along_edge(walk.surface, face);
+    }
+    walk.wi = -walk.direction;
+    const Rgb<S> lamp = emitted(walk.surface, walk.wo, walk.pdf, walk.hit.t);
+    if (motion && !motion->warp && !is_black(value(lamp))) {
+      radiance += walk.before * walk.scattering->eval(walk.wo) * lamp * (1 / walk.pdf);  // held
+    } else {
+      radiance += walk.throughput * lamp;
+    }
+    ++walk.bounces;
+    return survives_roulette(walk);
   }
 
   // Whether a path that has scattered so often scatters no more.
   bool is_complete(int bounces) const {
     return c_.scene.max_depth >= 0 && bounces + 1 >= c_.scene.max_depth;
   }
-  const DirectionMotion* motion_at(const SurfacePoint<S>& surface, int bounces) {
+  void set_motion(Walk& walk) const {
+    walk.motion = nullptr;
     if constexpr (std::is_same_v<S, Dual>) {
-      if (bounces > 0 || !field_) return nullptr;
-      motion_ = rates_->motion_at(value(surface.p), *field_);
-      return &motion_;
+      if (walk.bounces > 0 || !walk.field) return;
+      walk.field_motion = rates_->motion_at(value(walk.surface.p), *walk.field);
+      walk.motion = &walk.field_motion;
     }
-    return nullptr;
   }
   static Vec3<S> moving(const Vec3d& w, const DirectionMotion* motion) {
     if constexpr (std::is_same_v<S, Dual>) {
@@ -213,17 +410,18 @@ class PathTracer {
     }
     return f;
   }
-  void add_score(const Scattering<S>& scattering, const Vec3d& w, const DirectionMotion* motion,
-                 const Rgb<double>& weight) {
+  static void add_score(Walk& walk, const Rgb<double>& weight) {
     if constexpr (std::is_same_v<S, Dual>) {
+      const DirectionMotion* motion = walk.motion;
       if (!motion || !motion->scoring) return;
-      Rgb<Lanes> f = scattering.eval_derivative(turning(w, motion->score));
+      Rgb<Lanes> f = walk.scattering->eval_derivative(turning(walk.wo, motion->score));
       if (motion->score.follows()) {
-        const Rgb<double> still = value(scattering.eval(w));
-        const Lanes stretch = divergence(w, motion->score);
+        const Rgb<double> still = value(walk.scattering->eval(walk.wo));
+        const Lanes stretch = divergence(walk.wo, motion->score);
         for (int c = 0; c < 3; ++c) f[c] += stretch * still[c];
       }
-      score_ = score_ + Rgb<Lanes>{f.r * weight.r, f.g * weight.g, f.b * weight.b};
+      walk.sums.score =
+          walk.sums.score + Rgb<Lanes>{f.r * weight.r, f.g * weight.g, f.b * weight.b};
     }
   }
 
@@ -239,53 +437,55 @@ class PathTracer {
     }
     return 1;
   }
-  void split(Arrival& at, int more, int bounces, const Rng& key, EdgeStart* edge,
-             Rgb<S>& radiance) {
-    at.throughput = at.throughput * (1.0 / more);
-    at.copies *= more;
+  void split(Walk& walk, int more) {
+    walk.throughput = walk.throughput * (1.0 / more);
+    walk.copies *= more;
     for (int i = 1; i < more; ++i) {
       // Beyond the indices of paths that share no vertex.
-      const int index = kMostPaths * (bounces + 1) + i;
-      follow(at, bounces, key.copy(Purpose::kPathCopy, index), edge, true, radiance);
+      const int index = kMostPaths * (walk.bounces + 1) + i;
+      Walk copy = walk;
+      copy.key = walk.key.copy(Purpose::kPathCopy, index);
+      copy.again = true;
+      follow_one(copy);
+      if (copy.failed) throw UntraceableRay();
+      walk.sums = copy.sums;
     }
   }
-  void add_lights(const SurfacePoint<S>& surface, const Scattering<S>& scattering,
-                  const DirectionMotion* motion, const Rgb<S>& throughput, int bounces, int more,
-                  const Rng& key, const EdgeStart* edge, Rgb<S>& radiance) {
-    const int count = (bounces > 0 ? light_samples_ : 1) * more;
-    if (bounces > 0) later_lights_ += count;
-    if (count == 1) {
-      radiance += throughput * direct_light(surface, scattering, motion, bounces, key, edge);
-      return;
-    }
-    const Rgb<S> share = throughput * (1.0 / count);
+  void add_lights(Walk& walk, int count) {
+    const Rgb<S> share = walk.throughput * (1.0 / count);
+    PathSums<S>& sums = walk.sums;
     for (int i = 0; i < count; ++i) {
-      const Rng copy = key.copy(Purpose::kLightCopy, i);
-      const Rgb<S> light = share * direct_light(surface, scattering, motion, bounces, copy, edge);
-      radiance += light;
-      if (bounces == 0) continue;
-      light_difference_ = i % 2 == 0 ? light_difference_ + light : light_difference_ - light;
+      const Rng copy = walk.key.copy(Purpose::kLightCopy, i);
+      const Rgb<S> light = share * direct_light(walk, copy);
+      sums.radiance += light;
+      if (walk.bounces == 0) continue;
+      sums.light_difference =
+          i % 2 == 0 ? sums.light_difference + light : sums.light_difference - light;
     }
+    walk.light.reset();
   }
 
   // The next surface from a path vertex; hit.t = 0 for a neighbour that blocks at the edge itself.
-  // any: whether there is one suffices, and which is not said.
-  bool next_hit(const SurfacePoint<S>& surface, const Vec3d& wo, EdgeStart* edge, bool any,
-                Hit& hit) {
-    Ray ray{value(surface.p), wo};
-    ray.start = surface.face;
-    if (edge) {
-      if (const auto side = blocked_at_edge(c_.scene, c_.tracer, *edge, wo)) {
+  bool next_hit(Walk& walk) {
+    Ray ray{value(walk.surface.p), walk.wo};
+    ray.start = walk.surface.face;
+    if (EdgeStart* edge = walk.edge) {
+      if (const auto side = blocked_at_edge(c_.scene, c_.tracer, *edge, walk.wo)) {
         edge->start = *side;
-        hit = {side->face, 0};
+        walk.hit = {side->face, 0};
         return true;
       }
       ray.skip_faces = edge->around.all;
       ++rays_.closest;
-      return closest_at_edge(c_.tracer, c_.scene, edge->around, ray.origin, 0, ray, hit);
+      return closest_at_edge(c_.tracer, c_.scene, edge->around, ray.origin, 0, ray, walk.hit);
     }
     ++rays_.closest;
-    return any ? c_.tracer.occluded(ray) : c_.tracer.closest(ray, hit);
+    // Where no shape emits, what hides the environment from the last scattering need not be known.
+    const bool any = walk.last && !c_.lights.on_shapes();
+    if (any) return c_.tracer.occluded(ray);
+    const bool found = c_.tracer.closest(ray, walk.hit);
+    if (found) fetch_face(walk.hit.face);
+    return found;
   }
 
   void move_along_edge(SurfacePoint<S>& surface, FaceRef face) const {
@@ -306,38 +506,68 @@ class PathTracer {
     return radiance * mis_weight(pdf, other);
   }
 
-  Rgb<S> direct_light(const SurfacePoint<S>& surface, const Scattering<S>& scattering,
-                      const DirectionMotion* motion, int bounces, const Rng& key,
-                      const EdgeStart* edge) {
-    if (c_.lights.empty()) return {};
-    Rng rng = key.at(Purpose::kEmitter, bounces);
-    const Vec3d p = value(surface.p);
-    const auto light = c_.lights.sample(p, rng);
-    if (!light) return {};
-    if (const DeltaLight* delta = light->light->delta()) {
-      return delta_light(*delta, *light, surface, scattering, edge);
-    }
+  Rgb<S> direct_light(Walk& walk, const Rng& key) {
+    draw_light(walk, key);
     if constexpr (std::is_same_v<S, Dual>) {
-      if (warper_) return warped_light(*light, surface, scattering, rng);
+      if (warper_ && walk.light && !walk.light->light->delta()) return warped_light(walk, key);
     }
-    if (light->face) motion = nullptr;  // a lamp: held
-    const Vec3<S> direction = moving(light->wo, motion);
-    const auto [f, bsdf_pdf] = evaluate(scattering, light->wo, direction, motion);
-    if (is_black(value(f)) || shadowed(p, surface.face, *light, edge)) return {};
-    const double weight = mis_weight(light->pdf, bsdf_pdf) / light->pdf;
-    if constexpr (std::is_same_v<S, Dual>) {
-      if (motion) {
-        return stretched(f, light->wo, motion) * light->light->radiance(direction) * weight;
-      }
-    }
-    return f * light->light->template drawn_radiance<S>(*light) * weight;
+    weigh_light(walk);
+    return !walk.light || shadowed(walk) ? Rgb<S>{} : light_value(walk);
   }
 
-  // The same where directions are warped: auxiliary rays are traced for light that arrives.
-  Rgb<S> warped_light(const LightSample& light, const SurfacePoint<S>& surface,
-                      const Scattering<S>& scattering, const Rng& key) {
+  // Draws a light, if there is any.
+  void draw_light(Walk& walk, const Rng& key) const {
+    walk.light.reset();
+    if (c_.lights.empty()) return;
+    Rng rng = key.at(Purpose::kEmitter, walk.bounces);
+    walk.light = c_.lights.sample(value(walk.surface.p), rng);
+  }
+  // What the light that was drawn adds but for its radiance; none if that is black.
+  void weigh_light(Walk& walk) const {
+    if (!walk.light) return;
+    const LightSample& light = *walk.light;
+    if (const DeltaLight* delta = light.light->delta()) {
+      draw_delta(walk, *delta);
+      return;
+    }
+    walk.light_motion = light.face ? nullptr : walk.motion;  // a lamp: held
+    const Vec3<S> direction = moving(light.wo, walk.light_motion);
+    const auto [f, pdf] = evaluate(*walk.scattering, light.wo, direction, walk.light_motion);
+    walk.light_share = stretched(f, light.wo, walk.light_motion);
+    walk.light_weight = mis_weight(light.pdf, pdf) / light.pdf;
+    if (is_black(value(f))) walk.light.reset();
+  }
+  // No ray meets a delta light by chance, so it has the whole weight. Its direction follows the
+  // parameters, and f_s with it.
+  void draw_delta(Walk& walk, const DeltaLight& delta) const {
+    const auto arriving = limn::arrival<S>(delta, walk.surface.p);
+    if (arriving) {
+      const Rgb<S> f = walk.scattering->eval(arriving->wo);
+      walk.light_share = f * arriving->irradiance * (1 / walk.light->pdf);
+      if (!is_black(value(f))) return;
+    }
+    walk.light.reset();
+  }
+  Rgb<S> light_value(const Walk& walk) const {
+    const LightSample& light = *walk.light;
+    if (light.light->delta()) return walk.light_share;
+    if constexpr (std::is_same_v<S, Dual>) {
+      if (const DirectionMotion* motion = walk.light_motion) {
+        return walk.light_share * light.light->radiance(moving(light.wo, motion)) *
+               walk.light_weight;
+      }
+    }
+    return walk.light_share * light.light->template drawn_radiance<S>(light) * walk.light_weight;
+  }
+
+  // What a light adds where directions are warped: auxiliary rays are traced for light that
+  // arrives.
+  Rgb<S> warped_light(const Walk& walk, const Rng& key) {
+    const LightSample& light = *walk.light;
+    const SurfacePoint<S>& surface = walk.surface;
+    const Scattering<S>& scattering = *walk.scattering;
     if (is_black(scattering.eval_value(light.wo))) return {};
-    if (shadowed(value(surface.p), surface.face, light, nullptr)) return {};
+    if (shadowed(walk)) return {};
     const DirectionMotion* motion =
         warper_->motion(surface, light.wo, key.at(Purpose::kEmitter, 1));
     const Vec3<S> direction = moving(light.wo, motion);
@@ -348,21 +578,12 @@ class PathTracer {
     return stretched(f, light.wo, motion) * radiance * weight;
   }
 
-  // No ray meets a delta light by chance, so it has the whole weight. Its direction follows the
-  // parameters, and f_s with it.
-  Rgb<S> delta_light(const DeltaLight& light, const LightSample& sample,
-                     const SurfacePoint<S>& surface, const Scattering<S>& scattering,
-                     const EdgeStart* edge) {
-    const auto arriving = arrival<S>(light, surface.p);
-    if (!arriving) return {};
-    const Rgb<S> f = scattering.eval(arriving->wo);
-    if (is_black(value(f)) || shadowed(value(surface.p), surface.face, sample, edge)) return {};
-    return f * arriving->irradiance * (1 / sample.pdf);
-  }
-
-  bool shadowed(const Vec3d& p, FaceRef start, const LightSample& light, const EdgeStart* edge) {
+  bool shadowed(const Walk& walk) {
+    const LightSample& light = *walk.light;
+    const FaceRef start = walk.surface.face;
+    const EdgeStart* edge = walk.edge;
     if (light.face == start) return true;
-    Ray ray{p, light.wo};
+    Ray ray{value(walk.surface.p), light.wo};
     ray.start = start;
     ray.end = light.face.value_or(FaceRef{});
     if (edge) {
@@ -378,12 +599,12 @@ class PathTracer {
   }
 
   // As in Mitsuba: from rr_depth bounces on, survival with the largest throughput, at most 0.95.
-  bool survives_roulette(Rgb<S>& throughput, int bounces, const Rng& key) const {
-    if (bounces < c_.scene.rr_depth) return true;
-    const double survival = std::min(max_channel(value(throughput)), 0.95);
-    Rng rng = key.at(Purpose::kRoulette, bounces);
+  bool survives_roulette(Walk& walk) const {
+    if (walk.bounces < c_.scene.rr_depth) return true;
+    const double survival = std::min(max_channel(value(walk.throughput)), 0.95);
+    Rng rng = walk.key.at(Purpose::kRoulette, walk.bounces);
     if (rng.uniform() >= survival) return false;
-    throughput = throughput * (1 / survival);
+    walk.throughput = walk.throughput * (1 / survival);
     return true;
   }
 
@@ -393,16 +614,10 @@ class PathTracer {
   static constexpr int kMostPaths = 64;  // of a sample, see allocation.cpp
   const PathContext& c_;
   RayCount& rays_;
-  Visitor& visitor_;
   const MotionRates* rates_ = nullptr;
-  const DirectionField* field_ = nullptr;
   const MotionRates* splitting_ = nullptr;
   DirectionWarper* warper_ = nullptr;
-  DirectionMotion motion_;
-  Rgb<Lanes> score_;
   int light_samples_ = 1;
-  Rgb<S> light_difference_;
-  uint64_t later_lights_ = 0;
 };
 
 }  // namespace limn

@@ -6,20 +6,13 @@
 
 #include "integrators/terms/film_point.h"
 #include "integrators/terms/light_regions.h"
-#include "limn/core/bounds.h"
 
 namespace limn {
 
 LampEdges::LampEdges(const Scene& scene, const EdgeSamplerInput& edges, const LightRegions& regions,
                      int lanes)
     : edges_(edges), lanes_(lanes) {
-  Bounds bounds;
-  for (const Shape& shape : scene.shapes) {
-    const Bounds b = bounds_of(shape.mesh);
-    bounds.extend(b.lower);
-    bounds.extend(b.upper);
-  }
-  reach_ = bounds.diagonal();
+  reach_ = bounds_of(scene).diagonal();
   list(regions);
 }
 

@@ -61,13 +61,7 @@ Vec3<Dual> moving_vertex(const EdgeMesh& mesh, VertexId vertex) {
 ShadowEdges::ShadowEdges(const PathContext& context, const EdgeSamplerInput& input, int lanes)
     : context_(context), input_(input) {
   const Stopwatch watch;
-  Bounds bounds;
-  for (const Shape& shape : context_.scene.shapes) {
-    const Bounds b = bounds_of(shape.mesh);
-    bounds.extend(b.lower);
-    bounds.extend(b.upper);
-  }
-  reach_ = 2 * bounds.diagonal();
+  reach_ = 2 * bounds_of(context_.scene).diagonal();
   for (const auto& light : context_.scene.delta_lights) {
     const size_t first = edges_.size();
     for (uint32_t o = 0; o < input_.objects.size(); ++o) list(*light, ShapeId(o));

@@ -80,6 +80,12 @@ struct WarpCount {
   uint64_t fields = 0;     // directions whose motion rays told
   uint64_t dominated = 0;  // of which one ray held nine tenths of the weights
   uint64_t dropped = 0;    // rays on an edge to rounding
+
+  void add(const WarpCount& other) {
+    fields += other.fields;
+    dominated += other.dominated;
+    dropped += other.dropped;
+  }
 };
 
 class WarpField {

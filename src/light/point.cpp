@@ -31,11 +31,7 @@ class PointLight final : public DeltaLight {
  private:
   template <class S>
   std::optional<Arrival<S>> at(const Vec3<S>& p) const {
-    const Vec3<S> w = as<S>(position_) - p;
-    const S squared = length_squared(w);
-    if (value(squared) == 0) return {};
-    using std::sqrt;
-    return Arrival<S>{w / sqrt(squared), as<S>(intensity_) * (1.0 / squared)};
+    return arrival_from(as<S>(position_), as<S>(intensity_), p);
   }
 
   Vec3<Dual> position_;

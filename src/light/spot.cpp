@@ -48,18 +48,15 @@ class SpotLight final : public DeltaLight {
  private:
   template <class S>
   std::optional<Arrival<S>> at(const Vec3<S>& p) const {
-    const Vec3<S> w = as<S>(position_) - p;
-    const S squared = length_squared(w);
-    if (value(squared) == 0) return {};
-    using std::sqrt;
-    const Vec3<S> wo = w / sqrt(squared);
-    const S c = -dot(wo, turned<S>(axis_, turn_));
+    std::optional<Arrival<S>> arrival = arrival_from(as<S>(position_), as<S>(intensity_), p);
+    if (!arrival) return {};
+    const S c = -dot(arrival->wo, turned<S>(axis_, turn_));
     const S degrees = angle(c) * (180 / kPi);
     if (!(value(degrees) < cone_.cutoff.v)) return {};
-    const Rgb<S> full = as<S>(intensity_) * (1.0 / squared);
-    if (value(degrees) <= cone_.beam.v) return Arrival<S>{wo, full};
+    if (value(degrees) <= cone_.beam.v) return arrival;
     const S width = as<S>(cone_.cutoff) - as<S>(cone_.beam);
-    return Arrival<S>{wo, full * ((as<S>(cone_.cutoff) - degrees) / width)};
+    arrival->irradiance = arrival->irradiance * ((as<S>(cone_.cutoff) - degrees) / width);
+    return arrival;
   }
   static ParameterRef cone_parameter(const char* name, Dual& degrees) {
     return {name, {&degrees}, ParameterRef::Unit::kValue, 0, 180};

@@ -1,6 +1,8 @@
 #pragma once
 // The readers that the registry lists, one per emitter type, and what they share. Each reads an
 // element into the scene; shape: the one around it, null directly under <scene>.
+#include <optional>
+
 #include "limn/core/environment.h"
 #include "limn/core/properties.h"
 #include "limn/core/scene.h"
@@ -36,6 +38,17 @@ Vec3<S> turned(const Vec3d& v, const Vec3<Dual>& angles) {
     r[i] = a;
   }
   return r;
+}
+
+// What a source of that intensity [W/sr] at `position` gives at p; none at the source itself.
+template <class S>
+std::optional<Arrival<S>> arrival_from(const Vec3<S>& position, const Rgb<S>& intensity,
+                                       const Vec3<S>& p) {
+  const Vec3<S> w = position - p;
+  const S squared = length_squared(w);
+  if (value(squared) == 0) return {};
+  using std::sqrt;
+  return Arrival<S>{w / sqrt(squared), intensity * (1.0 / squared)};
 }
 
 // What read_power() reads.

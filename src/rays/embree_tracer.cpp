@@ -23,7 +23,7 @@ struct Context {
   const Ray* ray;
   const Scene* scene;
   const FaceCopies* copies;
-  // Faces that overlap the one where the ray starts, and the one where it ends.
+  // Faces that overlap the one where the ray starts, and the one where it ends, or are near to it.
   std::span<const FaceRef> beside_start, beside_end;
 };
 
@@ -87,12 +87,7 @@ RTCRay to_embree(const Ray& ray, const Vec3d& origin) {
 // between half of this and twice this lose nothing when it is subtracted (Sterbenz 1974), and the
 // origins of rays are no longer rounded to steps as coarse as the positions'.
 Vec3d origin_of(const Scene& scene) {
-  Bounds bounds;
-  for (const Shape& shape : scene.shapes) {
-    const Bounds b = bounds_of(shape.mesh);
-    bounds.extend(b.lower);
-    bounds.extend(b.upper);
-  }
+  const Bounds bounds = bounds_of(scene);
   Vec3d origin;
   if (scene.shapes.empty()) return origin;
   const Vec3d center = bounds.center();
@@ -160,15 +155,22 @@ class EmbreeTracer final : public RayTracer {
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     rtcIntersect1(rtc_scene_.get(), &context.base, &query);
-    if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
-    hit.face = {ShapeId(query.hit.geomID), FaceId(query.hit.primID)};
-    hit.t = query.ray.tfar;
-    settle(ray, hit);
+    const bool found = query.hit.geomID != RTC_INVALID_GEOMETRY_ID;
+    if (found) {
+      hit.face = {ShapeId(query.hit.geomID), FaceId(query.hit.primID)};
+      hit.t = query.ray.tfar;
+      settle(ray, hit);
+    }
+    if (!settles_) [[likely]]
+      return found;
+    Hit left = found ? hit : Hit{{}, ray.t_max};
+    if (!overlaps_.leave(ray, left)) return found;
+    hit = left;
     return true;
   }
 
   bool occluded(const Ray& ray) const override {
-    if (settles_ && ray.end.shape.valid() && overlaps_.is_hidden(ray.end, ray)) [[unlikely]]
+    if (settles_ && is_hidden_by_near(ray)) [[unlikely]]
       return true;
     Context context = make_context(ray);
     RTCRay query = to_embree(ray, origin_);
@@ -183,6 +185,14 @@ class EmbreeTracer final : public RayTracer {
   }
 
  private:
+  // By a face in the place where it ends, or near to where it starts or ends.
+  bool is_hidden_by_near(const Ray& ray) const {
+    if (ray.end.shape.valid() &&
+        (overlaps_.is_hidden(ray.end, ray) || overlaps_.arrives_hidden(ray)))
+      return true;
+    Hit hit{{}, ray.t_max};
+    return overlaps_.leave(ray, hit);
+  }
   // Relative to a ray's origin Embree rounds corners, and might meet a line. Of copies the first
   // one stands for all.
   bool is_traced(const Mesh& mesh, FaceRef face) const {
@@ -218,8 +228,8 @@ class EmbreeTracer final : public RayTracer {
     context.scene = &scene_;
     context.copies = &copies_;
     if (!overlaps_.empty()) [[unlikely]] {
-      context.beside_start = overlaps_.of(ray.start);
-      context.beside_end = overlaps_.of(ray.end);
+      context.beside_start = overlaps_.around(ray.start);
+      context.beside_end = overlaps_.around(ray.end);
     }
     return context;
   }

@@ -1,4 +1,5 @@
-// Faces that overlap in a plane, from a tree over their boxes: no line within the plane parts them.
+// Faces that overlap in a plane or nearly, from a tree over their boxes: no line within the plane
+// parts them.
 #include "limn/core/face_overlaps.h"
 
 #include <algorithm>
@@ -8,6 +9,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <tuple>
 
 #include "limn/core/box_tree.h"
 #include "limn/core/parallel.h"
@@ -66,9 +68,24 @@ std::optional<double> meet(const Corners& corners, const Ray& ray) {
   return dot(n, a) / slope;
 }
 
-// Wider by twice what rounding explains: a float's rounding is less than the second half.
-FloatBox box_around(const Vec3d& lower, const Vec3d& upper, double size) {
-  const double margin = 2 * touch_tolerance(size, 0);
+double longest_side(const Corners& c) {
+  return std::max({length(c[1] - c[0]), length(c[2] - c[1]), length(c[0] - c[2])});
+}
+
+// How far rays from the viewer may miss points of a face: twice 2^-20 of its distance, which is 16
+// roundings of origin, direction and products of both.
+double blur_of(const Corners& corners, const Vec3d& viewer) {
+  double distance = size_of(corners);
+  for (const Vec3d& x : corners) distance = std::max(distance, length(x - viewer));
+  return 0x1p-19 * distance;
+}
+// Of its longest side, how far from a face others are near to it at most. Not tuned: what is farther
+// is no thin layer.
+constexpr double kMostNear = 0x1p-8;
+
+// Wider by twice what rounding explains, at least: a float's rounding is less than the second half.
+FloatBox box_around(const Vec3d& lower, const Vec3d& upper, double size, double reach) {
+  const double margin = 2 * touch_tolerance(size, 0) + reach;
   FloatBox box;
   for (int k = 0; k < 3; ++k) {
     box.lower[k] = static_cast<float>(lower[k] - margin);
@@ -77,16 +94,21 @@ FloatBox box_around(const Vec3d& lower, const Vec3d& upper, double size) {
   return box;
 }
 
-FloatBox box_of(const Corners& c) {
+FloatBox box_of(const Corners& c, double reach) {
   Bounds bounds;
   for (const Vec3d& x : c) bounds.extend(x);
-  return box_around(bounds.lower, bounds.upper, size_of(c));
+  return box_around(bounds.lower, bounds.upper, size_of(c), reach);
 }
 
 FloatBox box_of(const Mesh& mesh) {
   const Bounds bounds = bounds_of(mesh);
-  return box_around(bounds.lower, bounds.upper, size_of({bounds.lower, bounds.upper, {}}));
+  return box_around(bounds.lower, bounds.upper, size_of({bounds.lower, bounds.upper, {}}), 0);
 }
+
+struct FoundPair {
+  FacePair faces;
+  bool near = false;  // not in one plane
+};
 
 class OverlapFinder {
  public:
@@ -101,7 +123,10 @@ class OverlapFinder {
       for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
         const FaceRef face{ShapeId(s), FaceId(f)};
         const Corners corners = corners_of(scene, face);
-        const FloatBox box = box_of(corners);
+        const double blur =
+            of == FaceOverlaps::Of::kAllFaces ? blur_of(corners, value(scene.camera.origin)) : 0;
+        const double most = kMostNear * longest_side(corners);
+        const FloatBox box = box_of(corners, std::min(blur, most));
         const auto meets = [&](const FloatBox& other) { return other.overlaps(box); };
         if (of == FaceOverlaps::Of::kDifferentShapes &&
             std::none_of(others.begin(), others.end(), meets))
@@ -110,39 +135,50 @@ class OverlapFinder {
         faces_.push_back(face);
         boxes_.push_back(box);
         corners_.push_back(corners);
+        reaches_.push_back({blur, most});
         normals_.push_back(normalize(normal_of(corners)));
       }
     }
   }
 
-  std::vector<FacePair> find(int threads) {
+  std::vector<FoundPair> find(int threads) {
     const BoxTree tree(boxes_, threads);
     constexpr uint32_t kBlock = 256;  // leaves; not tuned
-    std::vector<std::vector<FacePair>> found((tree.leaf_count() + kBlock - 1) / kBlock);
+    std::vector<std::vector<FoundPair>> found((tree.leaf_count() + kBlock - 1) / kBlock);
     parallel_for(found.size(), threads, [&](size_t block) {
       std::vector<uint32_t> leaves;
       const auto begin = static_cast<uint32_t>(block) * kBlock;
       for (uint32_t leaf = begin; leaf < std::min(begin + kBlock, tree.leaf_count()); ++leaf)
         append_pairs_of(tree, leaf, leaves, found[block]);
     });
-    std::vector<FacePair> pairs;
+    std::vector<FoundPair> pairs;
     for (const auto& some : found) pairs.insert(pairs.end(), some.begin(), some.end());
     return pairs;
   }
 
  private:
-  bool overlap(uint32_t i, uint32_t j) const {
+  enum class Place { kElsewhere, kInPlane, kNear };
+
+  Place place_of(uint32_t i, uint32_t j) const {
     const Corners &a = corners_[i], &b = corners_[j];
     const double tolerance = touch_tolerance(size_of(a), size_of(b));
-    if (!lies_in_plane(b, a[0], normals_[i], tolerance)) return false;
-    if (!lies_in_plane(a, b[0], normals_[j], tolerance)) return false;
+    const double reach = std::min(
+        {std::max(reaches_[i].blur, reaches_[j].blur), reaches_[i].most, reaches_[j].most});
+    const bool b_is_near = lies_in_plane(b, a[0], normals_[i], std::max(reach, tolerance));
+    const bool a_is_near = lies_in_plane(a, b[0], normals_[j], std::max(reach, tolerance));
+    if (!a_is_near && !b_is_near) return Place::kElsewhere;
     const double most = kShortestTouch * tolerance;
-    return !lies_beside(a, normals_[i], b, most) && !lies_beside(b, normals_[j], a, most);
+    if (lies_beside(a, normals_[i], b, most) || lies_beside(b, normals_[j], a, most))
+      return Place::kElsewhere;
+    if (lies_in_plane(b, a[0], normals_[i], tolerance) &&
+        lies_in_plane(a, b[0], normals_[j], tolerance))
+      return Place::kInPlane;
+    return reach > 0 ? Place::kNear : Place::kElsewhere;
   }
 
   // Of pairs within the leaf, and with faces of later ones.
   void append_pairs_of(const BoxTree& tree, uint32_t leaf, std::vector<uint32_t>& leaves,
-                       std::vector<FacePair>& pairs) {
+                       std::vector<FoundPair>& pairs) {
     tree.find_leaves(tree.leaf_box(leaf), leaf, leaves);
     const auto own = tree.leaf(leaf);
     const size_t before = pairs.size();
@@ -152,8 +188,10 @@ class OverlapFinder {
         if (other == leaf) lanes &= ~((2u << i) - 1);
         for (; lanes != 0; lanes &= lanes - 1) {
           const uint32_t j = tree.leaf(other)[std::countr_zero(lanes)];
-          if (overlap(own[i], j))
-            pairs.push_back({faces_[std::min(own[i], j)], faces_[std::max(own[i], j)]});
+          const Place place = place_of(own[i], j);
+          if (place == Place::kElsewhere) continue;
+          pairs.push_back(
+              {{faces_[std::min(own[i], j)], faces_[std::max(own[i], j)]}, place == Place::kNear});
         }
       }
     }
@@ -170,6 +208,10 @@ class OverlapFinder {
   std::vector<FloatBox> boxes_;
   std::vector<Corners> corners_;
   std::vector<Vec3d> normals_;  // unit
+  struct Reach {
+    double blur, most;
+  };
+  std::vector<Reach> reaches_;
   std::atomic<size_t> count_{0};
 };
 
@@ -177,26 +219,35 @@ class OverlapFinder {
 
 FaceOverlaps::FaceOverlaps(const Scene& scene, const FaceCopies& copies, int threads, Of of)
     : scene_(&scene), copies_(&copies), overlaps_(scene.shapes.size()) {
-  std::vector<FacePair> pairs = OverlapFinder(scene, copies, of).find(threads);
+  std::vector<FoundPair> pairs = OverlapFinder(scene, copies, of).find(threads);
   const size_t count = pairs.size();
   pairs.reserve(2 * count);
-  for (size_t i = 0; i < count; ++i) pairs.push_back({pairs[i].second, pairs[i].first});
-  std::sort(pairs.begin(), pairs.end(), [](const FacePair& a, const FacePair& b) {
-    return std::pair(place(a.first), place(a.second)) < std::pair(place(b.first), place(b.second));
+  for (size_t i = 0; i < count; ++i)
+    pairs.push_back({{pairs[i].faces.second, pairs[i].faces.first}, pairs[i].near});
+  std::sort(pairs.begin(), pairs.end(), [](const FoundPair& a, const FoundPair& b) {
+    const auto order = [](const FoundPair& pair) {
+      return std::tuple(place(pair.faces.first), pair.near, place(pair.faces.second));
+    };
+    return order(a) < order(b);
   });
   others_.reserve(pairs.size());
-  for (const auto& [face, other] : pairs) {
+  for (const FoundPair& pair : pairs) {
+    const FaceRef face = pair.faces.first;
     overlaps_[face.shape.index()] = true;
-    const auto [range, is_new] = of_.try_emplace(key(face), Range{others_.size(), 0});
-    others_.push_back(other);
-    range->second.end = others_.size();
+    Range& range =
+        of_.try_emplace(key(face), Range{others_.size(), others_.size(), 0}).first->second;
+    others_.push_back(pair.faces.second);
+    range.end = others_.size();
+    if (!pair.near) range.near = range.end;
   }
 }
 
-std::span<const FaceRef> FaceOverlaps::found_of(FaceRef face) const {
+FaceOverlaps::Found FaceOverlaps::find(FaceRef face) const {
   const auto found = of_.find(key(face));
   if (found == of_.end()) return {};
-  return std::span(others_).subspan(found->second.begin, found->second.end - found->second.begin);
+  const auto [begin, near, end] = found->second;
+  const std::span<const FaceRef> all(others_);
+  return {all.subspan(begin, near - begin), all.subspan(near, end - near)};
 }
 
 std::vector<FacePair> FaceOverlaps::pairs() const {
@@ -225,7 +276,7 @@ static bool is_skipped(FaceRef face, const Ray& ray) {
          std::find(ray.skip_faces.begin(), ray.skip_faces.end(), face) != ray.skip_faces.end();
 }
 
-void FaceOverlaps::settle(const Ray& ray, Hit& hit) const {
+void FaceOverlaps::settle_in_plane(const Ray& ray, Hit& hit) const {
   const auto others = of(hit.face);
   const auto met = [&](FaceRef face) {
     return copies_->met(face, ray.direction, ray.skip_emitters);
@@ -239,9 +290,48 @@ void FaceOverlaps::settle(const Ray& ray, Hit& hit) const {
   }
 }
 
+// The first of the faces that the ray meets between its t_min and `before`.
+std::optional<Hit> FaceOverlaps::first_of(std::span<const FaceRef> faces, const Ray& ray,
+                                          double before) const {
+  std::optional<Hit> first;
+  for (const FaceRef one : faces) {
+    const auto face = copies_->met(one, ray.direction, ray.skip_emitters);
+    if (!face || is_skipped(*face, ray)) continue;
+    const auto t = meet(corners_of(*scene_, *face), ray);
+    if (t && *t > ray.t_min && *t < (first ? first->t : before)) first = Hit{*face, *t};
+  }
+  return first;
+}
+
+void FaceOverlaps::settle(const Ray& ray, Hit& hit) const {
+  // One that is met before may itself have others before it; each is nearer than the last.
+  for (;;) {
+    const auto near = found_of(hit.face).second;
+    if (near.empty()) break;
+    const auto own = meet(corners_of(*scene_, hit.face), ray);
+    const auto first = first_of(near, ray, own.value_or(hit.t));
+    if (!first) break;
+    hit = *first;
+  }
+  settle_in_plane(ray, hit);
+}
+
+bool FaceOverlaps::leave(const Ray& ray, Hit& hit) const {
+  const auto first = first_of(found_of(ray.start).second, ray, hit.t);
+  if (first) hit = *first;
+  return first.has_value();
+}
+
+bool FaceOverlaps::arrives_hidden(const Ray& ray) const {
+  const auto near = found_of(ray.end).second;
+  if (near.empty()) return false;
+  const auto end = meet(corners_of(*scene_, ray.end), ray);
+  return end && first_of(near, ray, *end);
+}
+
 bool FaceOverlaps::is_hidden(FaceRef face, const Ray& ray) const {
   Hit hit{face, 0};
-  settle(ray, hit);
+  settle_in_plane(ray, hit);
   return hit.face != face;
 }
 

@@ -32,7 +32,7 @@ bool PlaneView::add_side(const Corner& a, const Corner& b, SeenFace& face) const
   const bool from_seen = from.z > near_, to_seen = to.z > near_;
   if (!from_seen && !to_seen) return false;
   SeenFace::Side& side = face.sides[face.side_count++];
-  side = {from.p, to.p, from_seen, to_seen, reversed};
+  side = {from.p, to.p, from_seen, to_seen, reversed, 0};
   if (from_seen && to_seen) return true;
   const double t = (near_ - from.z) / (to.z - from.z);
   (from_seen ? side.to : side.from) = project(from.w + (to.w - from.w) * t).p;
@@ -59,7 +59,9 @@ std::optional<SeenFace> PlaneView::face(uint32_t label, const std::array<Vec3d, 
   const double size = std::max({length(c[0].w), length(c[1].w), length(c[2].w)});
   face.depth_error = 0x1.0p-49 * length(e1) * length(e2) * size * face.nearest / std::fabs(d);
 
-  for (int k = 0; k < 3; ++k) add_side(c[k], c[(k + 1) % 3], face);
+  for (uint8_t k = 0; k < 3; ++k) {
+    if (add_side(c[k], c[(k + 1) % 3], face)) face.sides[face.side_count - 1].number = k;
+  }
   face.whole = nearest > near_;
   const PlaneFunction& q = face.inverse_depth;
   if (nearest <= near_) face.cuts[face.cut_count++] = {-q.a, -q.b, 1 / near_ - q.c};

@@ -21,6 +21,10 @@ class WindowGrid {
   PlanePoint to_plane(const GridCorner& p) const {
     return {center_.x + p.x / x_steps_, center_.y + p.y / y_steps_};
   }
+  PlaneFunction to_plane(const GridLine& l) const {
+    const double a = static_cast<double>(l.a) * x_steps_, b = static_cast<double>(l.b) * y_steps_;
+    return {a, b, static_cast<double>(l.c) - a * center_.x - b * center_.y};
+  }
   PlaneFunction to_grid(const PlaneFunction& f) const {
     return {f.a / x_steps_, f.b / y_steps_, f.at(center_)};
   }

@@ -28,6 +28,7 @@ struct Inserted {
   double nearest;
   bool ruled;
   LineSide lines[5];
+  int8_t numbers[5] = {};  // of its side that a line is; of a cut -1 minus its index
   int line_count = 0;
 };
 
@@ -120,6 +121,39 @@ class VisibleRegions::Tree {
     }
   }
 
+  void for_each_below(uint32_t labels, const SideVisitor& visit) const {
+    std::vector<Side> of_line(lines_.size());
+    for (const Inserted& face : faces_) {
+      for (int k = 0; k < face.line_count; ++k) {
+        Side& side = of_line[face.lines[k].line()];
+        side.label = face.label;
+        if (face.numbers[k] >= 0) side.side = face.numbers[k];
+        if (face.numbers[k] < 0) side.cut = static_cast<int8_t>(-1 - face.numbers[k]);
+      }
+    }
+    std::vector<PlanePoint> corners;
+    std::vector<Side> sides;
+    std::vector<int> stack{root_};
+    while (!stack.empty()) {
+      const Node& node = nodes_[stack.back()];
+      stack.pop_back();
+      if (!node.is_leaf()) {
+        stack.push_back(node.right);
+        stack.push_back(node.left);
+        continue;
+      }
+      if (node.face == kNone || faces_[node.face].label >= labels) continue;
+      corners.clear();
+      sides.clear();
+      for (const RingCorner& corner : node.ring) {
+        corners.push_back(grid_.to_plane(corner.at));
+        sides.push_back(of_line[corner.side.line()]);
+        sides.back().line = grid_.to_plane(corner.side.in(lines_));
+      }
+      visit(faces_[node.face].label, corners, sides);
+    }
+  }
+
  private:
   int make_cells(const GridCell& cell, int levels) {
     if (levels > 0) {
@@ -196,19 +230,21 @@ class VisibleRegions::Tree {
                   seen.nearest,
                   seen.ruled,
                   {},
+                  {},
                   0};
-    const auto add = [&](const HalfPlane& h) {
+    const auto add = [&](const HalfPlane& h, int number) {
       if (h.reach == Reach::kCuts) {
+        face.numbers[face.line_count] = static_cast<int8_t>(number);
         face.lines[face.line_count++] = LineSide(lines_.size(), false);
         lines_.push_back(h.line);
       }
       return h.reach != Reach::kHoldsNone;
     };
     for (int k = 0; k < seen.side_count; ++k) {
-      if (!add(half_plane_of(seen.sides[k], turn > 0, grid_))) return false;
+      if (!add(half_plane_of(seen.sides[k], turn > 0, grid_), seen.sides[k].number)) return false;
     }
     for (int k = 0; k < seen.cut_count; ++k) {
-      if (!add(half_plane_of(grid_.to_grid(seen.cuts[k])))) return false;
+      if (!add(half_plane_of(grid_.to_grid(seen.cuts[k])), -1 - k)) return false;
     }
     faces_.push_back(face);
     return true;
@@ -461,6 +497,9 @@ void VisibleRegions::set_rule(Rule rule) { tree_->set_rule(std::move(rule)); }
 void VisibleRegions::insert(const SeenFace& face) { tree_->insert(face); }
 size_t VisibleRegions::size() const { return tree_->size(); }
 size_t VisibleRegions::crossings() const { return tree_->crossings(); }
+void VisibleRegions::for_each_below(uint32_t labels, const SideVisitor& visit) const {
+  tree_->for_each_below(labels, visit);
+}
 void VisibleRegions::for_each(
     const std::function<void(uint32_t, std::span<const PlanePoint>)>& visit) const {
   tree_->for_each(visit);

@@ -55,13 +55,7 @@ Vec3d turned(const Vec3d& v, int axis, double angle) {
 }
 
 double scene_size(const Scene& scene) {
-  Bounds bounds;
-  for (const Shape& shape : scene.shapes) {
-    const Bounds b = bounds_of(shape.mesh);
-    bounds.extend(b.lower);
-    bounds.extend(b.upper);
-  }
-  return scene.shapes.empty() ? 1 : bounds.diagonal();
+  return scene.shapes.empty() ? 1 : bounds_of(scene).diagonal();
 }
 
 }  // namespace limn

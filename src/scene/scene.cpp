@@ -21,6 +21,16 @@ std::shared_ptr<Bsdf> copy_once(const std::shared_ptr<Bsdf>& original, BsdfCopie
 
 }  // namespace
 
+Bounds bounds_of(const Scene& scene) {
+  Bounds bounds;
+  for (const Shape& shape : scene.shapes) {
+    const Bounds b = bounds_of(shape.mesh);
+    bounds.extend(b.lower);
+    bounds.extend(b.upper);
+  }
+  return bounds;
+}
+
 Scene deep_copy(const Scene& scene) {
   Scene copy = scene;
   BsdfCopies copies;

@@ -3,40 +3,13 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "limn/integrators/check.h"
+#include "support/check_runs.h"
 #include "support/meshes.h"
 #include "support/scenes.h"
+#include "support/test_names.h"
 
 namespace limn {
 namespace {
-
-CheckResult run_check(const Scene& scene, const std::string& parameter, int spp,
-                      const std::vector<std::string>& terms = {}, const std::string& method = "") {
-  CheckOptions options;
-  options.method = method;
-  options.parameter = parameter;
-  options.terms = terms;
-  options.block = 4;
-  RunSettings settings;
-  settings.spp = spp;
-  settings.seed = 11;
-  const CheckResult r = check(scene, options, settings);
-  EXPECT_EQ(r.gradient.non_finite.count, 0u) << r.gradient.non_finite.message();
-  EXPECT_EQ(r.differences.non_finite.count, 0u) << r.differences.non_finite.message();
-  fmt::print(
-      "{:28} {:3} blocks, mean z {:6.2f}, sd {:5.2f}, max |z| {:6.2f}; image {:10.4g} +- "
-      "{:8.2g}, differences {:10.4g} +- {:8.2g}, z {:6.2f}\n",
-      parameter.substr(0, parameter.find(':')), r.windows.count, r.windows.mean,
-      r.windows.deviation, r.windows.largest, r.total.gradient, r.total.gradient_error,
-      r.total.difference, r.total.difference_error, r.total.z);
-  return r;
-}
-
-void expect_agreement(const Scene& scene, const std::string& parameter, int spp) {
-  const CheckResult r = run_check(scene, parameter, spp);
-  EXPECT_GT(r.windows.count, 0) << parameter;
-  EXPECT_NE(r.verdict, Verdict::kDisagree) << parameter << ": suspect " << r.suspect;
-}
 
 // A leaf of two triangles, bent, seen from both sides.
 Mesh leaf_mesh() {
@@ -87,13 +60,7 @@ INSTANTIATE_TEST_SUITE_P(
                     "leaf.translate.y", "floor.translate.y", "floor.rotate.x", "lamp.translate.x",
                     "lamp.rotate.z", "sensor.translate.x", "sensor.translate.z", "sensor.rotate.y",
                     "sensor.fov", "gloss.alpha", "clay.reflectance", "glow.radiance", "sky.scale"),
-    [](const auto& test) {
-      std::string name = test.param;
-      for (char& c : name) {
-        if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
-      }
-      return name;
-    });
+    name_of_string);
 
 // Each term alone left out must be noticed, and named.
 class MissingTerm : public testing::TestWithParam<std::string> {};
@@ -213,11 +180,7 @@ INSTANTIATE_TEST_SUITE_P(, Room,
                          testing::Values("box.translate.y", "box.rotate.y", "sensor.translate.x",
                                          "sensor.rotate.x", "room.translate.x", "room.scale",
                                          "lamp.translate.z", "wall.reflectance"),
-                         [](const auto& test) {
-                           std::string name = test.param;
-                           std::replace(name.begin(), name.end(), '.', '_');
-                           return name;
-                         });
+                         name_of_string);
 
 // A turned cube that shines and a ball that does not, both halfway in a glossy floor and a glossy
 // wall: the lines where they cross move on the film and in the gloss.
@@ -248,11 +211,7 @@ INSTANTIATE_TEST_SUITE_P(, CrossingSurfaces,
                                          "cube.rotate.z", "ball.translate.y", "ball.scale",
                                          "floor.translate.y", "floor.rotate.z", "wall.translate.z",
                                          "sensor.translate.x"),
-                         [](const auto& test) {
-                           std::string name = test.param;
-                           std::replace(name.begin(), name.end(), '.', '_');
-                           return name;
-                         });
+                         name_of_string);
 
 // Roulette and hidden emitters change the paths, not what they mean.
 TEST(Paths, RouletteAgrees) {

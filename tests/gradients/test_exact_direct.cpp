@@ -12,6 +12,7 @@
 #include "limn/integrators/statistics.h"
 #include "support/meshes.h"
 #include "support/scenes.h"
+#include "support/test_names.h"
 
 namespace limn {
 namespace {
@@ -254,11 +255,7 @@ TEST_P(ExactDirectOf, IsWhatIsDrawn) {
 INSTANTIATE_TEST_SUITE_P(, ExactDirectOf,
                          testing::Values("ball.translate.x", "leaf.rotate.z", "lamp.translate.y",
                                          "lamp.rotate.x", "small.translate.x", "floor.rotate.x"),
-                         [](const auto& test) {
-                           std::string name = test.param;
-                           std::replace(name.begin(), name.end(), '.', '_');
-                           return name;
-                         });
+                         name_of_string);
 
 }  // namespace
 }  // namespace limn

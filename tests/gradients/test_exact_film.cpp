@@ -161,7 +161,7 @@ TEST(ExactFilm, ImageIsThatOfRays) {
   settings.spp = 256;
   settings.threads = 2;
   const RenderResult rays = render(scene, settings);
-  const RenderResult exact = render(scene, settings, true);
+  const RenderResult exact = render(scene, settings, {.exact_film = true});
   EXPECT_EQ(exact.non_finite.count, 0u);
   EXPECT_LT(exact.rays, rays.rays);
   // The very paths of rays: of 65536 samples, 0.4 are expected to pass an edge nearer than single
@@ -172,7 +172,7 @@ TEST(ExactFilm, ImageIsThatOfRays) {
   }
   EXPECT_LT(others, 6u);
   settings.threads = 1;
-  EXPECT_EQ(means(render(scene, settings, true).radiance), means(exact.radiance));
+  EXPECT_EQ(means(render(scene, settings, {.exact_film = true}).radiance), means(exact.radiance));
 }
 
 GradientResult camera_term(const Scene& scene, const std::vector<std::string>& parameters,
@@ -286,7 +286,7 @@ TEST(ExactFilm, SaysWhatItNeeds) {
     }
     return std::string();
   };
-  const std::string filter = message([&] { render(scene, {}, true); });
+  const std::string filter = message([&] { render(scene, {}, {.exact_film = true}); });
   EXPECT_NE(filter.find("exact film needs a box filter"), filter.npos) << filter;
   EXPECT_NE(filter.find(".xml:"), filter.npos) << filter;
   GradientOptions options;

@@ -2,31 +2,13 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "limn/integrators/check.h"
+#include "support/check_runs.h"
 #include "support/meshes.h"
 #include "support/scenes.h"
+#include "support/test_names.h"
 
 namespace limn {
 namespace {
-
-CheckResult run_check(const Scene& scene, const std::string& parameter, int spp,
-                      const std::vector<std::string>& terms = {}) {
-  CheckOptions options;
-  options.parameter = parameter;
-  options.terms = terms;
-  options.block = 4;
-  RunSettings settings;
-  settings.spp = spp;
-  settings.seed = 11;
-  const CheckResult r = check(scene, options, settings);
-  EXPECT_EQ(r.gradient.non_finite.count, 0u) << r.gradient.non_finite.message();
-  EXPECT_GT(r.windows.count, 0);
-  fmt::print(
-      "{:20} {:3} blocks, sd {:5.2f}, max |z| {:6.2f}; image {:9.4g} +- {:8.2g}, z {:6.2f}\n",
-      parameter, r.windows.count, r.windows.deviation, r.windows.largest, r.total.gradient,
-      r.total.gradient_error, r.total.z);
-  return r;
-}
 
 const char* kBulb =
     R"(<emitter type="point" id="bulb"><point name="position" value="-1.2,2.2,1.1"/>
@@ -82,11 +64,7 @@ INSTANTIATE_TEST_SUITE_P(, SharpShadows,
                                          "torch.cutoff_angle", "torch.beam_width", "sun.rotate.z",
                                          "sun.irradiance", "sensor.translate.x", "sensor.rotate.y",
                                          "sensor.fov"),
-                         [](const auto& test) {
-                           std::string name = test.param;
-                           std::replace(name.begin(), name.end(), '.', '_');
-                           return name;
-                         });
+                         name_of_string);
 
 // Delta lights beside one that shapes and sky make.
 TEST(SharpShadowsBeside, OtherLights) {

@@ -749,6 +749,23 @@ TEST_F(Program, BadNumbers) {
             "error: check needs --spp of at least 2, for standard errors\n");
 }
 
+// The options of a method that is not asked for are a mistake, whatever the command.
+TEST_F(Program, AuxiliaryRaysAreForMethodsThatTraceThem) {
+  const std::string where = scene_ + " --wrt screen.translate.x --aux 4";
+  const std::string whose = "(--aux, --kappa) are for the methods was, was-unbiased: ";
+  const std::pair<std::string, std::string> mistakes[] = {
+      {"gradient " + where + " -o " + out(), "the method \"adaptive\" has none"},
+      {"check " + where + " --method fd", "the method \"fd\" has none"},
+      {"check " + where + " --reverse", "the method \"reverse mode\" has none"},
+      {"compare " + where + " --time 0.1 --methods forest,fd -o " + files_.path("folder"),
+       "none of the methods forest, fd has any"}};
+  for (const auto& [command, text] : mistakes) {
+    EXPECT_EQ(refused(command), "error: auxiliary rays and their kernel " + whose + text + "\n");
+  }
+  const std::string right = "check " + where + " --method was --spp 2";
+  EXPECT_EQ(run(right).status, 4) << run(right).text;
+}
+
 TEST_F(Program, BadSamples) {
   const std::string gradient =
       "gradient " + scene_ + " --wrt screen.translate.x --method forest -o " + out();

@@ -29,6 +29,8 @@ def test_render_has_the_programs_bits(scene, program, threads):
      ["--spp", "4", "--method", "li2019", "--samples", "1,0.5,2"]),
     ({"spp": 20, "terms": ["camera"], "samples": "uniform"},
      ["--spp", "20", "--terms", "camera", "--samples", "uniform"]),
+    ({"spp": 2, "method": "was", "aux": 4, "kappa": 1e3},
+     ["--spp", "2", "--method", "was", "--aux", "4", "--kappa", "1e3"]),
     ({"spp": 2, "method": "fd", "step": 0.01}, ["--spp", "2", "--method", "fd", "--step", "0.01"]),
 ])
 def test_gradient_has_the_programs_bits(folder, scene, program, threads, arguments, words):
@@ -73,6 +75,10 @@ def test_check_and_compare_say_what_the_program_says(folder, scene):
     assert check.gradient.value.shape == check.differences.value.shape == (12, 16, 3)
     with pytest.raises(limn.InputError, match="check needs spp of at least 2"):
         limn.check(scene, "tent.translate.y", spp=1)
+    with pytest.raises(limn.InputError, match="are for the methods was, was-unbiased"):
+        limn.check(scene, "tent.translate.y", spp=2, aux=4)
+    with pytest.raises(limn.InputError, match="none of the methods adaptive, fd has any"):
+        limn.compare(scene, "tent.translate.y", ["adaptive", "fd"], [0.05], kappa=1e3)
     comparison = limn.compare(scene, "tent.translate.y", ["adaptive", "fd"], [0.05, 0.1],
                               repeats=2, reference_seconds=0.3)
     assert [m.name for m in comparison.methods] == ["adaptive", "fd"]

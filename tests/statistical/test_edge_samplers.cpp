@@ -8,6 +8,7 @@
 #include "../support/chi_square.h"
 #include "../support/meshes.h"
 #include "../support/running_mean.h"
+#include "../support/test_names.h"
 #include "limn/core/error.h"
 #include "limn/edgetree/contribution_bound.h"
 #include "limn/edgetree/edge_sampler_types.h"
@@ -371,12 +372,7 @@ std::vector<std::string> sampler_names() {
   for (const EdgeSamplerType& type : edge_sampler_types()) names.push_back(type.name);
   return names;
 }
-INSTANTIATE_TEST_SUITE_P(All, EdgeSamplers, testing::ValuesIn(sampler_names()),
-                         [](const auto& test) {
-                           std::string name = test.param;
-                           std::replace(name.begin(), name.end(), '-', '_');
-                           return name;
-                         });
+INSTANTIATE_TEST_SUITE_P(All, EdgeSamplers, testing::ValuesIn(sampler_names()), name_of_string);
 
 TEST(EdgeSamplerTable, TheDefaultIsARowAndNoAblation) {
   EXPECT_FALSE(default_edge_sampler().ablation);

@@ -42,9 +42,20 @@ std::vector<NamedMesh> meshes_of_all_kinds(Rng& rng) {
   return meshes;
 }
 
+PlacedMeshes placed_twice(const Mesh& mesh, int i, Rng& rng) {
+  Vec3d rows[3];
+  random_rotation(rng, rows);
+  const double scale = random_scale(rng), shift = i % 2 == 0 ? 0 : 1e4 * rng.uniform();
+  const Mesh moved = transformed(mesh, rows, scale, random_direction(rng) * shift);
+  const Mesh other = transformed(mesh, rows, 0.1 * scale, {});
+  return {{{build_edge_mesh(moved, i % 3 != 0), build_edge_mesh(other, true, ShapeId(1))}}, scale};
+}
+
 double random_scale(Rng& rng) { return std::exp(std::log(1e-3) + std::log(1e7) * rng.uniform()); }
 
 Vec3d random_point(const EdgeMesh& mesh, double scale, Rng& rng) {
+  // Far away, rounding leaves some meshes no edge.
+  if (mesh.edges.empty()) return random_direction(rng) * scale;
   const Edge& edge = mesh.edges[static_cast<size_t>(rng.uniform() * mesh.edges.size())];
   const Vec3d a = mesh.position(edge.vertices[0]), b = mesh.position(edge.vertices[1]);
   const Plane& plane = mesh.plane(edge.faces[0]);

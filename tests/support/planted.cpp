@@ -86,6 +86,21 @@ Planted planted_term(const TempFiles& files, const std::string& method, const st
   return planted;
 }
 
+Planted planted_in_closed_form(const std::string& file, const std::string& parameter,
+                               const std::string& method, const std::string& term, double factor,
+                               int spp) {
+  Planted planted{fmt::format("{} of {}, {}, {} times {}", term, file, parameter, method, factor),
+                  read_scene(LIMN_SOURCE_DIR "/scenes/closed_form/" + file + ".xml", {}, nullptr),
+                  {},
+                  spp,
+                  scaled_term(term, factor),
+                  std::fabs(1 - factor),
+                  {term}};
+  planted.options.parameter = parameter;
+  planted.options.method = method;
+  return planted;
+}
+
 Planted planted_border(const TempFiles& files, int spp) {
   SceneParts parts = base_parts();
   const Mesh cube = cube_mesh();

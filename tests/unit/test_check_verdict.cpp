@@ -4,7 +4,10 @@
 
 #include <cstdlib>
 
+#include "integrators/compare/check_scores.h"
+#include "limn/core/rng.h"
 #include "support/planted.h"
+#include "support/running_mean.h"
 
 namespace limn {
 namespace {
@@ -33,6 +36,30 @@ double visible(const CheckResult& r, const std::string& term) {
     if (power.term == term) return power.visible;
   }
   return 0;
+}
+
+// Events of size 3 in one sample of `every` lie in one place of four: their size is what the
+// variance says, however many samples a batch has.
+TEST(EventSizes, DoNotGrowWithTheBatches) {
+  for (const int every : {2, 500}) {
+    const double rate = 1.0 / every, size = 3 * (1 - rate);
+    Rng rng(7, every, 0);
+    RunningMean means;
+    for (int run = 0; run < 40; ++run) {
+      std::vector<Moments::Batch> batches;
+      for (int64_t done = 0; done < 16384;) {
+        const int64_t samples = 1 + done / 32;
+        double sum = 0;
+        for (int64_t s = 0; s < samples; ++s) sum += rng.uniform() < rate ? 3 : 0;
+        batches.push_back({{sum, 0, 0, 0}, samples});
+        done += samples;
+      }
+      const EventSizes events = event_sizes(batches);
+      means.add(events.mean);
+      EXPECT_GE(events.large, 0.5 * size);
+    }
+    EXPECT_LT(std::fabs(means.z_score(size)), 4) << every;
+  }
 }
 
 TEST(CheckVerdict, FewSamplesCannotTell) {
@@ -72,43 +99,83 @@ TEST(CheckVerdict, StepDoesNotGrowWithTheFloor) {
   EXPECT_LE(step(3000), 16 * step(3));
 }
 
-// Many runs: LIMN_PLANTED_RUNS of each kind, from seed LIMN_PLANTED_FIRST on.
-TEST(CheckVerdict, PlantedDefects) {
-  const char* wanted = std::getenv("LIMN_PLANTED_RUNS");
-  if (!wanted) GTEST_SKIP() << "LIMN_PLANTED_RUNS is not set";
-  int seen = 0, found = 0, scaled = 0, named = 0, all = 0;
-  const auto count = [&](const Planted& planted, uint64_t seed) {
+// Counts over many runs with a defect, of those whose stated power covers it.
+class PlantedRuns {
+ public:
+  void add(const Planted& planted, uint64_t seed) {
+    ++all_;
     const CheckResult r = run(planted, seed);
     // Where the size is not known, the defect is meant to be seen.
     if (planted.size > 0 && visible(r, planted.terms[0]) > planted.size) return;
     const bool disagrees = r.verdict == Verdict::kDisagree;
-    ++seen;
-    found += disagrees;
+    ++seen_;
+    found_ += disagrees;
     // Other defects are no part of a term's image: they need not look like one.
     if (planted.size == 0) return;
-    ++scaled;
-    named += disagrees && names(planted, r.suspect);
-  };
+    ++scaled_;
+    named_ += disagrees && names(planted, r.suspect);
+  }
+  void expect_found() const {
+    fmt::print("{} runs, {} within the stated power: {} found; {} of {} scaled terms named\n", all_,
+               seen_, found_, named_, scaled_);
+    EXPECT_GE(found_, 0.95 * seen_);
+    EXPECT_GE(named_, 0.95 * scaled_);
+  }
+
+ private:
+  int all_ = 0, seen_ = 0, found_ = 0, scaled_ = 0, named_ = 0;
+};
+
+// A tenth of a term, which a check of so many samples says it can see.
+TEST(CheckVerdict, ATenthIsFoundAndNamed) {
+  const Planted planted = planted_in_closed_form("lamp_over_plane", "lamp.translate.x", "forest",
+                                                 "boundary", 0.9, 16384);
+  const CheckResult r = run(planted, 1);
+  EXPECT_LE(visible(r, "boundary"), 0.1);
+  EXPECT_EQ(r.verdict, Verdict::kDisagree);
+  EXPECT_EQ(r.suspect, "boundary");
+}
+
+// Many runs: LIMN_PLANTED_RUNS of each kind, from seed LIMN_PLANTED_FIRST on.
+TEST(CheckVerdict, PlantedDefects) {
+  const char* wanted = std::getenv("LIMN_PLANTED_RUNS");
+  if (!wanted) GTEST_SKIP() << "LIMN_PLANTED_RUNS is not set";
+  PlantedRuns runs;
   const TempFiles files;
-  const int runs = std::atoi(wanted);
   const char* first = std::getenv("LIMN_PLANTED_FIRST");
   const int begin = first ? std::atoi(first) : 0;
-  for (int k = begin; k < begin + runs; ++k) {
+  for (int k = begin; k < begin + std::atoi(wanted); ++k) {
     const auto seed = static_cast<uint64_t>(100 + k);
-    const char* terms[] = {"camera", "boundary", "interior"};
-    const char* methods[] = {"forest", "adaptive", "silhouettes"};
-    const std::string method = methods[k / 3 % 3];
-    const std::string term =
-        k % 3 == 1 && method != "forest" ? std::string("direct") : terms[k % 3];
-    count(planted_term(files, method, term, 0.5, 1024), seed);
-    count(planted_border(files, 1024), seed);
-    count(planted_normals(files, 256), seed);
-    all += 3;
+    runs.add(planted_border(files, 1024), seed);
+    runs.add(planted_normals(files, 256), seed);
   }
-  fmt::print("{} runs, {} within the stated power: {} found; {} of {} scaled terms named\n", all,
-             seen, found, named, scaled);
-  EXPECT_GE(found, 0.95 * seen);
-  EXPECT_GE(named, 0.95 * scaled);
+  runs.expect_found();
+}
+
+// The same of terms times 0.9, LIMN_SCALED_RUNS of each.
+TEST(CheckVerdict, TermsScaledByATenth) {
+  const char* wanted = std::getenv("LIMN_SCALED_RUNS");
+  if (!wanted) GTEST_SKIP() << "LIMN_SCALED_RUNS is not set";
+  const struct {
+    const char *file, *parameter, *method, *term;
+    int spp;
+  } kinds[] = {
+      {"lamp_over_plane", "lamp.translate.x", "forest", "boundary", 16384},
+      {"lamp_over_plane", "lamp.translate.x", "adaptive", "direct", 16384},
+      {"lamp_over_plane", "floor.rotate.x", "forest", "interior", 32768},
+      {"lamp_in_beckmann", "sensor.translate.y", "forest", "boundary", 32768},
+      {"lamp_in_ggx", "floor.rotate.x", "adaptive", "interior", 65536},
+      {"half_hidden_lamp", "lamp.translate.x", "silhouettes", "direct", 65536},
+      {"lamps_in_view_box", "near.translate.x", "adaptive", "camera", 131072},
+      {"shadow_of_spot", "object.translate.x", "forest", "shadow", 131072},
+  };
+  PlantedRuns runs;
+  for (int k = 0; k < std::atoi(wanted); ++k)
+    for (const auto& kind : kinds)
+      runs.add(
+          planted_in_closed_form(kind.file, kind.parameter, kind.method, kind.term, 0.9, kind.spp),
+          static_cast<uint64_t>(200 + k));
+  runs.expect_found();
 }
 
 }  // namespace

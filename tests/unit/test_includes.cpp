@@ -166,15 +166,16 @@ const Strings kContracts = {"check.h",
                             "face_copies.h",
                             "ray_tracer.h",
                             "face_overlaps.h",
+                            "face_tree.h",
                             "surface_point.h",
                             "shading.h",
                             "lights.h",
                             "reverse.h",
                             "parameter.h"};
 const std::map<std::string, std::string> kSeenFrom = {
-    {"base", "properties.h"},    {"regions", "visible_regions.h"}, {"mesh", "normals_adjoint.h"},
-    {"image", "film.h"},         {"bsdf", "properties.h"},         {"light", "lights.h"},
-    {"rays", "face_overlaps.h"}, {"scene", "parameter.h"},         {"scene_file", "lights.h"}};
+    {"base", "properties.h"}, {"regions", "visible_regions.h"}, {"mesh", "normals_adjoint.h"},
+    {"image", "film.h"},      {"bsdf", "properties.h"},         {"light", "lights.h"},
+    {"rays", "face_tree.h"},  {"scene", "parameter.h"},         {"scene_file", "lights.h"}};
 
 TEST(Includes, ContractsOfCoreStandInOrder) {
   const std::string core = "limn/core/";

@@ -170,6 +170,15 @@ TEST(BrightPatches, AreTheSuns) {
   }
 }
 
+// It has 2 % of the light, as little as the haze around it, and nearly all of its square.
+TEST(BrightPatches, ALowSunInHaze) {
+  const Vec3d axis{0.2, 0.1, 1};
+  const auto patches = find_bright_patches(*sky_with({{axis, 6, 9}, {axis, 0.5, 1200}}, 1024));
+  ASSERT_EQ(patches.size(), 1u);
+  EXPECT_TRUE(patches[0].cap.holds(normalize(axis)));
+  EXPECT_LT(std::asin(patches[0].cap.sine), 1.5 * kPi / 180);
+}
+
 // Wherever it stands in the map's density: the sun is all that few of its columns draw.
 TEST(BrightPatches, AreFoundEverywhere) {
   Rng rng(5, 0, 0);

@@ -114,5 +114,48 @@ TEST(NearFaces, AreMetOnTheSideWhereTheyLie) {
   EXPECT_GT(floats_err, 0);  // else the near faces are not needed
 }
 
+// Sheets above each other: the tracer meets what brute force in double precision meets.
+TEST(NearFaces, LayersAreMetInTheirOrder) {
+  Rng rng(5, 6, 7);
+  const Vec3d viewer{2, -3, 2.5};
+  int layers_met[2] = {0, 0};
+  for (const float gap : {3e-6f, 1e-5f}) {
+    Scene scene;
+    scene.camera.origin = {viewer.x, viewer.y, viewer.z};
+    scene.shapes.resize(3);
+    const auto sheet = [](float z) {
+      return make_mesh({{-1, -1, z}, {1, -1, z}, {1, 1, z}, {-1, 1, z}}, {{0, 1, 2}, {0, 2, 3}});
+    };
+    for (int s = 0; s < 3; ++s) scene.shapes[s].mesh = sheet(0.7f + s * gap);
+    const auto tracer = make_embree_tracer(scene, 1), brute = make_brute_force_tracer(scene);
+    for (int i = 0; i < 500; ++i) {
+      const Vec3d x{1.8 * rng.uniform() - 0.9, 1.8 * rng.uniform() - 0.9, 0.7};
+      const Vec3d p = i % 2 == 0 ? viewer : Vec3d{viewer.x, viewer.y, -viewer.z};
+      const Ray ray{p, normalize(x - p)};
+      Hit hit, truth;
+      ASSERT_TRUE(tracer->closest(ray, hit) && brute->closest(ray, truth));
+      EXPECT_EQ(hit.face.shape, truth.face.shape) << gap << ' ' << i;
+      EXPECT_NEAR(hit.t, truth.t, 1e-6);
+      ++layers_met[hit.face.shape.index() / 2];
+      // From the sheet in the middle: the outer ones block whatever leaves it or comes to it.
+      Ray leaving{{x.x, x.y, scene.shapes[1].mesh.positions[0].z}, normalize(p - x)};
+      leaving.start = {ShapeId(1), FaceId(x.x > x.y ? 0 : 1)};
+      EXPECT_TRUE(tracer->occluded(leaving));
+      ASSERT_TRUE(tracer->closest(leaving, hit));
+      EXPECT_EQ(hit.face.shape, truth.face.shape);
+      Ray arriving{p, -leaving.direction, 0, length(leaving.origin - p) * (1 - 0x1p-20)};
+      arriving.end = leaving.start;
+      EXPECT_TRUE(tracer->occluded(arriving));
+      // And nothing blocks those that leave on the open side.
+      Ray open{leaving.origin, leaving.direction};
+      open.origin.z = scene.shapes[p.z > 0 ? 2 : 0].mesh.positions[0].z;
+      open.start = {ShapeId(p.z > 0 ? 2 : 0), leaving.start.face};
+      EXPECT_FALSE(tracer->occluded(open));
+      EXPECT_FALSE(tracer->closest(open, hit));
+    }
+  }
+  EXPECT_GT(std::min(layers_met[0], layers_met[1]), 0);
+}
+
 }  // namespace
 }  // namespace limn

@@ -251,13 +251,7 @@ uint64_t expect_no_edge_lost(uint64_t seed, int points) {
   uint64_t pairs = 0;
   for (const auto& [name, mesh] : meshes_of_all_kinds(rng)) {
     for (int i = 0; i < 6; ++i) {
-      Vec3d rows[3];
-      random_rotation(rng, rows);
-      const double scale = random_scale(rng), shift = i % 2 == 0 ? 0 : 1e4 * rng.uniform();
-      const Mesh moved = transformed(mesh, rows, scale, random_direction(rng) * shift);
-      const Mesh other = transformed(mesh, rows, 0.1 * scale, {});
-      const EdgeSamplerInput input{
-          {build_edge_mesh(moved, i % 3 != 0), build_edge_mesh(other, true, ShapeId(1))}};
+      const auto [input, scale] = placed_twice(mesh, i, rng);
       const QuadricForest forest =
           build_quadric_forest(input, 1, QuadricConfig{.cull_concave = i % 2 == 0});
       for (int k = 0; k < points; ++k)

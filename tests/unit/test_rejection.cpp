@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "../support/meshes.h"
+#include "../support/test_names.h"
 #include "edgetree/forest/edge_forest.h"
 #include "limn/edgetree/edge_sampler_types.h"
 #include "limn/edgetree/rejection_places.h"
@@ -250,11 +251,7 @@ std::vector<EdgeSamplerType> rejecting_samplers() {
   return types;
 }
 INSTANTIATE_TEST_SUITE_P(All, RejectingSamplers, testing::ValuesIn(rejecting_samplers()),
-                         [](const auto& instance) {
-                           std::string name = instance.param.name;
-                           std::replace(name.begin(), name.end(), '-', '_');
-                           return name;
-                         });
+                         [](const auto& test) { return test_name(test.param.name); });
 
 TEST(RejectionTree, ForestsAndLiHaveOneOthersDoNot) {
   std::vector<std::string> names;

@@ -185,6 +185,39 @@ TEST(Touching, WhatMovesApartKeepsBothRims) {
   EXPECT_EQ(irregular(), 0u);
 }
 
+// A sheet of strips, cut where its neighbour is whole, far from the origin: as it turns or grows
+// there, velocities differ as much as the places do that were rounded apart.
+TEST(Touching, TJunctionsFarAwayDoNotTear) {
+  Rng rng(3, 0, 0);
+  for (int i = 0; i < 20; ++i) {
+    Vec3d rows[3];
+    random_rotation(rng, rows);
+    const Vec3d center{53.1, -17.3, 88.7};
+    const auto sheet = [&](const Mesh& flat) {
+      Mesh mesh = transformed(flat, rows, 1, center);
+      for (const Vec3f& x : mesh.positions) {
+        const Vec3d away = cast<double>(x) - center;
+        Vec3<Lanes> v;
+        for (int k = 0; k < 3; ++k) {
+          v[k][0] = away[k];
+          v[k][1] = cross(Vec3d{0, 1, 0}, away)[k];
+        }
+        mesh.position_tangents.push_back(v);
+      }
+      return mesh;
+    };
+    std::vector<Mesh> tiles{sheet(quad({-1, 0, 0}, {1, 0, 0}, {0, 1, 0})),
+                            sheet(quad({0, 0, 0}, {1, 0, 0}, {0, 0.3f, 0})),
+                            sheet(quad({0, 0.3f, 0}, {1, 0, 0}, {0, 0.7f, 0}))};
+    const auto objects = united(tiles);
+    EXPECT_NEAR(length_with(objects, 1), 6, 1e-4);  // its outline
+    EXPECT_EQ(length_with(objects, 2) + length_with(objects, 3), 0);
+    // But where they do move apart, they tear.
+    for (auto& v : tiles[1].position_tangents) v.x[0] += 1e-3;
+    EXPECT_GT(length_with(united(tiles), 2), 0.5);
+  }
+}
+
 TEST(Touching, SeamsThatWereRoundedApartAreWelded) {
   // A tetrahedron cut open along an edge, one copy of whose ends is off by a rounding.
   for (const float scale : {1e-3f, 1.0f, 1e3f}) {

@@ -118,6 +118,7 @@ class CheckCommand final : public Command {
     add_common_options(app, common_);
     add_parameter_options(app, parameters_, options_.method, all);
     add_term_options(app, terms_, samples_);
+    add_warp_options(app, options_.warp);
     app.add_option("--step", options_.step,
                    "Step of the differences (default: found in the image, by a pilot)")
         ->check(CLI::PositiveNumber);
@@ -134,6 +135,7 @@ class CheckCommand final : public Command {
     const Scene scene = load_scene(common_, warnings_);
     check_outputs({{"--json", common_.json}}, scene, field_files(parameters_));
     options_.terms = parse_terms(terms_);
+    check_warp(options_.warp, {reverse_ ? "reverse mode" : find_method(options_.method).name});
     if (reverse_) return run_reverse(scene);
     options_.samples = parse_samples(samples_);
     for (const auto& parameter : parameters_) find_parameter(scene, parameter);

@@ -309,6 +309,7 @@ void CompareCommand::add_options(CLI::App& app, bool all) {
 
 int CompareCommand::run(const std::string& command_line) {
   check_methods(command_.methods, parse_terms(command_.terms));
+  check_warp(command_.warp, command_.methods);
   if (common_.spp > 0) {
     throw InputError("--spp: methods are compared at equal time: say how long with --time");
   }

@@ -1,4 +1,5 @@
 // `limn render`: an image as EXR and PNG.
+#include "limn/core/names.h"
 #include "limn/integrators/render.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
@@ -16,6 +17,8 @@ class RenderCommand final : public Command {
     add_common_options(app, common_);
     app.add_option("-o,--output", output_, "Image to write (.exr; a .png is put beside it)")
         ->required();
+    app.add_option("--method", options_.method, "How: " + limn::join(names_of(render_methods())))
+        ->capture_default_str();
     add_film_option(app, film_);
     add_debug_option(app, debug_);
     add_part_option(app, common_);
@@ -28,9 +31,9 @@ class RenderCommand final : public Command {
   int run(const std::string& command_line) override {
     const Scene scene = load_scene(common_, warnings_);
     const RunSettings settings = make_settings(common_, scene, name());
-    const bool exact_film = film_ == "exact";
+    options_.exact_film = film_ == "exact";
     if (!debug_.empty()) {
-      for (const auto& line : trace_sample(scene, settings, parse_place(debug_), exact_film)) {
+      for (const auto& line : trace_sample(scene, settings, parse_place(debug_), options_)) {
         fmt::print("{}\n", line);
       }
       return kSuccess;
@@ -38,12 +41,12 @@ class RenderCommand final : public Command {
     if (!common_.part.empty()) {
       return run_part(
           common_, scene, {}, {name(), words, command_line}, output_,
-          [&](const RunSettings& part) { return render(scene, part, exact_film).non_finite; });
+          [&](const RunSettings& part) { return render(scene, part, options_).non_finite; });
     }
     check_output(output_);
     check_outputs({{"-o", output_}, {"-o", with_ending(output_, ".png")}, {"--json", common_.json}},
                   scene);
-    const RenderResult result = render(scene, settings, exact_film);
+    const RenderResult result = render(scene, settings, options_);
     if (result.spp == 0) {
       fmt::print(stderr, "interrupted before the first pass over the image: nothing is written\n");
       return kInterrupted;
@@ -57,6 +60,7 @@ class RenderCommand final : public Command {
     const Image image = mean_image(result.radiance, scene.film.crop_width, scene.film.crop_height);
     const std::string picture = with_ending(output_, ".png");
     auto attributes = provenance(scene, settings, result.spp);
+    attributes.push_back({"limn.method", options_.method});
     attributes.push_back({kOutputAttribute, output_name(output_)});
     remove_stale(output_, {output_});
     write_exr(output_, film_channels(scene, image), scene.film.half, attributes);
@@ -67,16 +71,21 @@ class RenderCommand final : public Command {
                  static_cast<double>(result.rays) / result.seconds / 1e6);
     }
     if (common_.json.empty()) return;
-    const nlohmann::json report = {
-        {"scene", scene.file},           {"spp", result.spp},
-        {"seed", settings.seed},         {"threads", settings.threads},
-        {"seconds", result.seconds},     {"rays", result.rays},
-        {"warnings", warnings_.lines()}, {"non_finite", result.non_finite.count}};
+    const nlohmann::json report = {{"scene", scene.file},
+                                   {"spp", result.spp},
+                                   {"method", options_.method},
+                                   {"seed", settings.seed},
+                                   {"threads", settings.threads},
+                                   {"seconds", result.seconds},
+                                   {"rays", result.rays},
+                                   {"warnings", warnings_.lines()},
+                                   {"non_finite", result.non_finite.count}};
     write_json(common_.json, report.dump(2));
   }
 
   CommonOptions common_;
   Warnings warnings_;
+  RenderOptions options_;
   std::string output_, debug_, film_ = "rays";
 };
 

@@ -63,7 +63,7 @@ def find_llvm():
     return found[-1] if found else None
 
 
-def load_mitsuba(threads):
+def load_mitsuba():
     if "DRJIT_LIBLLVM_PATH" not in os.environ:
         library = find_llvm()
         if library is not None:
@@ -85,8 +85,6 @@ def load_mitsuba(threads):
     mitsuba.set_log_level(mitsuba.LogLevel.Error)
     import drjit
 
-    if threads:
-        drjit.set_thread_count(threads)
     return mitsuba, drjit
 
 
@@ -274,6 +272,8 @@ class Renderer:
             self._scene = mi.load_file(arguments.scene, optimize=False, **defines)
         except Exception as error:
             raise Failure(BAD_INPUT, f"{arguments.scene}: {error}") from None
+        if arguments.threads:
+            dr.set_thread_count(arguments.threads)  # With one thread loading waits for itself, too.
         self._motion = Motion(mi, dr, self._scene, arguments.wrt)
         width, height = self._scene.sensors()[0].film().crop_size()
         # A power of two: other counts need other kernels.
@@ -367,7 +367,7 @@ def write(mi, dr, image, file):
 
 def run(arguments):
     parse_parameter(arguments.wrt)
-    mi, dr = load_mitsuba(arguments.threads)
+    mi, dr = load_mitsuba()
     renderer = Renderer(mi, dr, arguments)
     setup = (
         renderer.render_samples(arguments.spp)

@@ -46,13 +46,10 @@ def draw(chart, file):
     step = max(1, len(chart["edges"]) // MOST_WEDGES)
     for a, b in chart["edges"][::step]:
         axes.plot([a[i], b[i]], [a[j], b[j]], [a[up], b[up]], color="#202020", linewidth=0.6)
-    for set_limits, set_label, k in (
-        (axes.set_xlim, axes.set_xlabel, i),
-        (axes.set_ylim, axes.set_ylabel, j),
-        (axes.set_zlim, axes.set_zlabel, up),
-    ):
-        set_limits(-1, 1)
-        set_label(f"u{k + 1}")
+    for axis, k in (("x", i), ("y", j), ("z", up)):
+        getattr(axes, f"set_{axis}lim")(-1, 1)
+        getattr(axes, f"set_{axis}ticks")([-1, 0, 1])
+        getattr(axes, f"set_{axis}label")(f"u{k + 1}")
     axes.view_init(elev=24, azim=-56)
     figure.savefig(file, bbox_inches="tight", pad_inches=0.4)
 

@@ -18,6 +18,7 @@ STYLE = """
 .paper { border-left: 4px solid var(--line); padding-left: 14px; max-width: 88ch; }
 .role { display: block; font-size: 12.5px; color: var(--soft); font-weight: 400; }
 .wins { background: var(--best); }
+td.verdict { white-space: normal; max-width: 52ch; }
 .surface { max-width: 460px; }
 .surface .picture, .surface .picture img { image-rendering: auto; }
 """
@@ -191,6 +192,13 @@ class _Rejection:
         picture = self.pictures.picture("chart.png", "bounding quadrics")
         return [element("div", figure(picture, words), class_="surface")]
 
+    def verdict(self):
+        """Draws that end on an edge: limn's default, and the paper's."""
+        hits = {v.text("name"): v.number("hit_rate") for v in self.data.records("variants")}
+        mesh = os.path.basename(self.data.text("mesh")).split("_")[0]
+        shown = [f"{name} {percent(hits[name])}" for name in ("forest", PAPER) if name in hits]
+        return f"{mesh}: hits of {' and '.join(shown)}"
+
     def html(self):
         node = self.data.record("node")
         mesh = os.path.splitext(os.path.basename(self.data.text("mesh")))[0]
@@ -240,21 +248,26 @@ class _Rejection:
 
 
 def _edges(parts, folder):
-    rows = []
+    """A table and what it says; None where nothing was counted."""
+    rows, shares = [], []
     for part in parts:
         file = os.path.join(folder(part), "edges.json")
-        if not os.path.exists(file):
+        if part.kind != "edges" or not os.path.exists(file):
             continue
         record = read_record(file)
         all_edges, without = record.number("edges"), record.number("without_concave")
         name = os.path.basename(record.text("mesh"))
-        rows.append([name, f"{all_edges:,}", f"{without:,}", percent(without / all_edges)])
+        shares.append(without / all_edges)
+        rows.append([name, f"{all_edges:,}", f"{without:,}", percent(shares[-1])])
     head = ["mesh", "edges", "without concave ones", "share"]
-    return table(head, rows, "Edges with and without concave ones") if rows else None
+    if not rows:
+        return None
+    words = f"{percent(min(shares))} to {percent(max(shares))} are not concave"
+    return table(head, rows, "Edges with and without concave ones"), words
 
 
-def _sections(paper_figures, folder):
-    """(id, title, html, best sentence or None) of every figure; how many have no results."""
+def _sections(paper_figures, folder, command):
+    """(id, entry, html, factors, verdicts) of every figure; how many have no results."""
     missing = 0
     results = {}
     for entry in paper_figures:
@@ -274,28 +287,29 @@ def _sections(paper_figures, folder):
     level = FALSE_ALARM / max(1, tests)
     sections = []
     for i, entry in enumerate(paper_figures):
-        parts, factors, best = [], [], []
+        parts, factors, verdicts = [], [], []
         for part in entry.runs:
             result = results.get(part.name)
             if result is None:
                 continue
             if result.kind == "reject":
-                parts.append(_Rejection(result).html())
+                rejection = _Rejection(result)
+                parts.append(rejection.html())
+                verdicts.append(rejection.verdict())
                 continue
             comparison = _Comparison(result, part, entry.table, level)
             parts.append(comparison.html())
             if comparison.factor():
                 factors.append(comparison.factor())
-            best.append(comparison.best() or "–")
-        if any(part.kind == "edges" for part in entry.runs):
-            counted = _edges(entry.runs, folder)
-            parts += [counted] if counted else []
+            verdicts.append(comparison.best() or "–")
+        counted = _edges(entry.runs, folder)
+        if counted:
+            parts.append(counted[0])
+            verdicts.append(counted[1])
         if not parts:
             missing += 1
             parts = [element("p", "No results here yet.", class_="hint")]
-        again = shlex.join(
-            ["tools/paper", "--figures", "--only", ",".join(p.name for p in entry.runs)]
-        )
+        again = shlex.join([*command, "--only", ",".join(p.name for p in entry.runs)])
         html = element(
             "section",
             element("h2", f"{entry.numbers}: {entry.title}"),
@@ -306,23 +320,34 @@ def _sections(paper_figures, folder):
             _command(again),
             id=f"figure-{i}",
         )
-        sections.append((f"figure-{i}", entry, html, factors, best))
+        sections.append((f"figure-{i}", entry, html, factors, verdicts))
     return sections, missing
+
+
+def _joined(verdicts):
+    """Each once, and how often where that is not at once."""
+    if len(verdicts) < 2:
+        return "".join(verdicts)
+    often = {v: verdicts.count(v) for v in verdicts}
+    return ", ".join(f"{v} ({n} of {len(verdicts)})" if max(often.values()) > 1 else v
+                     for v, n in often.items())
 
 
 def _summary(sections):
     rows = []
-    for identifier, entry, _, factors, best in sections:
+    for identifier, entry, _, factors, verdicts in sections:
         link = element("a", f"{entry.numbers}: {entry.title}", href=f"#{identifier}")
-        text = ", ".join(times(f) for f in factors) if factors else "–"
-        rows.append([link, text, ", ".join(best) or "–"])
-    head = ["figure", f"time of {PAPER} for the error of {DEFAULT}", "least time for equal error"]
+        text = " to ".join(times(f) for f in sorted({min(factors), max(factors)})) if factors else "–"
+        rows.append([link, text, element("td", _joined(verdicts) or "–", class_="verdict")])
+    head = ["figure", f"time of {PAPER} for the error of {DEFAULT}",
+            "least time for equal error, or what was counted"]
     return table(head, rows, "Who is right, by figure")
 
 
-def write(file, paper_figures, folder):
-    """folder(part): where a part's results lie. Returns how many figures have none."""
-    sections, missing = _sections(paper_figures, folder)
+def write(file, paper_figures, folder, again):
+    """folder(part): where a part's results lie. again: the command, but for --only. Returns how many
+    figures have no results."""
+    sections, missing = _sections(paper_figures, folder, again)
     title = "The paper's figures"
     intro = (
         "Soroka, Peters and Marschner 2025, Quadric-Based Silhouette Sampling for Differentiable"

@@ -84,20 +84,22 @@ void bind_check(nb::module_& m) {
       [](const SceneHandle& scene, const std::string& name, std::optional<int> spp,
          std::optional<uint64_t> seed, const std::string& method,
          const std::vector<std::string>& terms, const Samples& samples, double step, int block,
-         int threads, const nb::object& progress) {
-        CheckOptions options{name, method, terms, step, block, {}};
+         int aux, double kappa, int threads, const nb::object& progress) {
+        CheckOptions options{name, method, terms, step, block, {}, {aux, kappa}};
         set_samples(samples, options.samples);
         return check_of(scene, options, {spp, seed, 0, threads}, progress);
       },
       nb::arg("scene"), nb::arg("name"), nb::arg("spp") = nb::none(), nb::arg("seed") = nb::none(),
       nb::arg("method") = "", nb::arg("terms") = nb::make_tuple(), nb::arg("samples") = "auto",
-      nb::arg("step") = 0.0, nb::arg("block") = 0, nb::arg("threads") = 0,
+      nb::arg("step") = 0.0, nb::arg("block") = 0, nb::arg("aux") = WarpOptions{}.rays,
+      nb::arg("kappa") = WarpOptions{}.kappa, nb::arg("threads") = 0,
       nb::arg("progress") = nb::none(),
-      nb::sig(
-          "def check(scene: Scene, name: str, spp: int | None = None, seed: int | None = None, "
-          "method: str = '', terms: collections.abc.Sequence[str] = (), samples: str | "
-          "collections.abc.Sequence[float] = 'auto', step: float = 0, block: int = 0, threads: "
-          "int = 0, progress: collections.abc.Callable[[float], object] | None = None) -> Check"),
+      nb::sig("def check(scene: Scene, name: str, spp: int | None = None, seed: int | None = None, "
+              "method: str = '', terms: collections.abc.Sequence[str] = (), samples: str | "
+              "collections.abc.Sequence[float] = 'auto', step: float = 0, block: int = 0, aux: int "
+              "= 8, "
+              "kappa: float = 1e4, threads: int = 0, progress: collections.abc.Callable[[float], "
+              "object] | None = None) -> Check"),
       "Compares a gradient with finite differences, both with their errors.\n\n"
       "A right gradient is accused once in ten thousand times. step, block: of the differences and "
       "of the windows [pixels]; 0: chosen. The rest as limn.gradient.");

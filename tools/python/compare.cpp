@@ -46,12 +46,14 @@ struct CompareArguments {
   std::vector<double> times;
   int repeats = 4;
   double reference_seconds = 0;
+  WarpOptions warp;
 };
 
 void check_arguments(const Scene& scene, const CompareArguments& arguments) {
   find_parameter(scene, arguments.name);
   for (const std::string& method : arguments.methods) find_method(method);
   if (arguments.methods.empty()) throw InputError("compare needs a method or more");
+  check_warp(arguments.warp, arguments.methods);
   if (arguments.repeats < 1) throw InputError("repeats must be 1 or more");
   double before = 0;
   for (const double time : arguments.times) {
@@ -75,7 +77,7 @@ Comparison compare_of(const SceneHandle& handle, const CompareArguments& argumen
   check_arguments(*scene, arguments);
   const int width = scene->film.crop_width, height = scene->film.crop_height;
   const int block = std::max(1, (std::max(width, height) + 7) / 8);
-  const MethodInput input{*scene, arguments.name, {}, 0, block};
+  const MethodInput input{*scene, arguments.name, {}, 0, block, std::nullopt, arguments.warp};
   Reference reference;
   std::vector<ComparedMethod> compared;
   run_job(make_settings(*scene, run), progress, [&](const RunSettings& settings) {
@@ -154,24 +156,29 @@ void bind_compare(nb::module_& m) {
       "compare",
       [](const SceneHandle& scene, const std::string& name, const std::vector<std::string>& methods,
          const std::vector<double>& times, int repeats, std::optional<double> reference_seconds,
-         std::optional<uint64_t> seed, int threads, const nb::object& progress) {
+         int aux, double kappa, std::optional<uint64_t> seed, int threads,
+         const nb::object& progress) {
         double runs = 0;
         for (const double time : times) runs += time * repeats;
-        return compare_of(scene,
-                          {name, methods, times, repeats, reference_seconds.value_or(4 * runs)},
-                          {{}, seed, 0, threads}, progress);
+        return compare_of(
+            scene,
+            {name, methods, times, repeats, reference_seconds.value_or(4 * runs), {aux, kappa}},
+            {{}, seed, 0, threads}, progress);
       },
       nb::arg("scene"), nb::arg("name"), nb::arg("methods"), nb::arg("times"),
       nb::arg("repeats") = 4, nb::arg("reference_seconds") = nb::none(),
+      nb::arg("aux") = WarpOptions{}.rays, nb::arg("kappa") = WarpOptions{}.kappa,
       nb::arg("seed") = nb::none(), nb::arg("threads") = 0, nb::arg("progress") = nb::none(),
       nb::sig(
           "def compare(scene: Scene, name: str, methods: collections.abc.Sequence[str], times: "
           "collections.abc.Sequence[float], repeats: int = 4, reference_seconds: float | None = "
-          "None, seed: int | None = None, threads: int = 0, progress: "
+          "None, aux: int = 8, kappa: float = 1e4, seed: int | None = None, threads: int = 0, "
+          "progress: "
           "collections.abc.Callable[[float], object] | None = None) -> Comparison"),
       "Derivative images of several methods at equal time against one long run.\n\n"
       "methods: the first is the measure of the others. times: seconds of a run, ascending.\n"
-      "reference_seconds: None for four times all runs of one method.");
+      "reference_seconds: None for four times all runs of one method. aux, kappa: as "
+      "limn.gradient, of the methods that take them.");
 }
 
 }  // namespace limn::python

@@ -33,6 +33,7 @@ struct GradientArguments {
   std::vector<std::string> terms;
   Samples samples;
   double step;
+  WarpOptions warp;
 };
 
 GradientOptions to_options(const GradientArguments& arguments) {
@@ -41,6 +42,7 @@ GradientOptions to_options(const GradientArguments& arguments) {
   options.method = arguments.method;
   options.terms = arguments.terms;
   options.step = arguments.step;
+  options.warp = arguments.warp;
   set_samples(arguments.samples, options.samples);
   const std::string* word = std::get_if<std::string>(&arguments.samples);
   options.uniform_samples = word && *word == "uniform";
@@ -72,20 +74,22 @@ void bind_gradient(nb::module_& m) {
       "gradient",
       [](const SceneHandle& scene, const Names& names, std::optional<int> spp,
          std::optional<uint64_t> seed, const std::string& method,
-         const std::vector<std::string>& terms, const Samples& samples, double step, double seconds,
-         int threads, const nb::object& progress, BatchStore* store) {
-        return gradient_of(scene, {names, method, terms, samples, step},
+         const std::vector<std::string>& terms, const Samples& samples, double step, int aux,
+         double kappa, double seconds, int threads, const nb::object& progress, BatchStore* store) {
+        return gradient_of(scene, {names, method, terms, samples, step, {aux, kappa}},
                            {spp, seed, seconds, threads, store}, progress);
       },
       nb::arg("scene"), nb::arg("names"), nb::arg("spp") = nb::none(), nb::arg("seed") = nb::none(),
       nb::arg("method") = "", nb::arg("terms") = nb::make_tuple(), nb::arg("samples") = "auto",
-      nb::arg("step") = 0.0, nb::arg("seconds") = 0.0, nb::arg("threads") = 0,
+      nb::arg("step") = 0.0, nb::arg("aux") = WarpOptions{}.rays,
+      nb::arg("kappa") = WarpOptions{}.kappa, nb::arg("seconds") = 0.0, nb::arg("threads") = 0,
       nb::arg("progress") = nb::none(), nb::arg("_store").none() = nb::none(),
       nb::sig(
           "def gradient(scene: Scene, names: str | collections.abc.Sequence[str], spp: int | None "
           "= None, seed: int | None = None, method: str = '', terms: "
           "collections.abc.Sequence[str] = (), samples: str | collections.abc.Sequence[float] = "
-          "'auto', step: float = 0, seconds: float = 0, threads: int = 0, progress: "
+          "'auto', step: float = 0, aux: int = 8, kappa: float = 1e4, seconds: float = 0, threads: "
+          "int = 0, progress: "
           "collections.abc.Callable[[float], object] | None = None) -> dict[str, Estimate]"),
       "Derivative images, (H, W, 3) radiance per unit of each parameter, all from the same "
       "samples.\n\n"
@@ -96,6 +100,8 @@ void bind_gradient(nb::module_& m) {
       "samples: \"auto\" (a pilot chooses), \"uniform\" (alike in all pixels), or what a sample of "
       "a "
       "pixel holds of each term. step: of finite differences; 0: found by a pilot.\n"
+      "aux, kappa: auxiliary rays of a direction and the concentration of their kernel (methods "
+      "was, was-unbiased).\n"
       "Raises limn.UnknownParameterError (a KeyError), limn.InputError, limn.NonFiniteError.");
   m.def(
       "methods",

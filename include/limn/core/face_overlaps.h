@@ -1,6 +1,7 @@
 #pragma once
-// Faces that overlap in a plane: rays in floats meet either of them, so that a rule has to say
-// which one is met.
+// Faces that overlap in a plane, or lie one above the other so close that rays in floats meet either
+// of them: a rule has to say which one is met, or double precision.
+#include <optional>
 #include <span>
 #include <unordered_map>
 #include <utility>
@@ -12,28 +13,38 @@
 namespace limn {
 
 // Pairs of faces that lie in one plane, to the rounding of positions, and have more of it in common
-// than rounding explains.
+// than rounding explains: one of them is met, by a rule. And pairs that lie so above each other, but
+// with all of one within 2^-19 of the camera's distance from the other's plane, and within 2^-8 of
+// either's longest side: they are *near*, and the nearer one is met, in double precision.
 class FaceOverlaps {
  public:
   enum class Of { kAllFaces, kDifferentShapes };  // whether faces of one shape are looked for
-  // copies: of the scene; both must outlive it. Of copies the first alone is looked at. InputError
-  // if there are more than kMostPairs.
+  // copies: of the scene; both must outlive it. Of copies the first alone is looked at, and near
+  // faces only among all faces. InputError if there are more than kMostPairs.
   FaceOverlaps(const Scene& scene, const FaceCopies& copies, int threads, Of of = Of::kAllFaces);
 
   static constexpr size_t kMostPairs = 1 << 24;  // 0.7 GB
 
   bool empty() const { return of_.empty(); }
-  // Each once, in the order of the file.
+  // Those in one plane, each once, in the order of the file.
   std::vector<std::pair<FaceRef, FaceRef>> pairs() const;
-  // Those that overlap `face`, or the first of its copies; none for no face.
-  std::span<const FaceRef> of(FaceRef face) const {
-    if (!face.shape.valid() || !overlaps_[face.shape.index()]) return {};
-    return found_of(copies_->first(face));
+  // Those that overlap `face`, or the first of its copies, in its plane; none for no face.
+  std::span<const FaceRef> of(FaceRef face) const { return found_of(face).first; }
+  // Those, and those that are near to it.
+  std::span<const FaceRef> around(FaceRef face) const {
+    const auto [in_plane, near] = found_of(face);
+    return {in_plane.data(), in_plane.size() + near.size()};
   }
   // Whether two faces lie in one place: copies, too.
   bool contains(FaceRef a, FaceRef b) const;
-  // Of the faces in a hit's place, copies among them, that which the ray meets (is_met_first).
+  // Of the faces in a hit's place, copies among them, that which the ray meets (is_met_first), after
+  // near ones that are met before it.
   void settle(const Ray& ray, Hit& hit) const;
+  // The first face that the ray meets of those near to the one where it starts; `hit` is changed
+  // only if that is nearer. False if there is none.
+  bool leave(const Ray& ray, Hit& hit) const;
+  // Whether the ray meets a face near to the one where it ends before it gets there.
+  bool arrives_hidden(const Ray& ray) const;
   // Whether another face is met in the place where the ray would meet `face`.
   bool is_hidden(FaceRef face, const Ray& ray) const;
 
@@ -41,14 +52,21 @@ class FaceOverlaps {
   static uint64_t key(FaceRef face) {
     return uint64_t{face.shape.index()} << 32 | face.face.index();
   }
-  std::span<const FaceRef> found_of(FaceRef face) const;
+  using Found = std::pair<std::span<const FaceRef>, std::span<const FaceRef>>;  // in plane, near
+  Found found_of(FaceRef face) const {
+    if (!face.shape.valid() || !overlaps_[face.shape.index()]) return {};
+    return find(copies_->first(face));
+  }
+  Found find(FaceRef face) const;
+  void settle_in_plane(const Ray& ray, Hit& hit) const;
+  std::optional<Hit> first_of(std::span<const FaceRef> faces, const Ray& ray, double before) const;
 
   const Scene* scene_;
   const FaceCopies* copies_;
   std::vector<bool> overlaps_;  // shapes: whether a face of theirs is in a pair
   std::vector<FaceRef> others_;
   struct Range {
-    size_t begin, end;  // in others_
+    size_t begin, near, end;  // in others_: those in the plane, then those near to it
   };
   std::unordered_map<uint64_t, Range> of_;
 };

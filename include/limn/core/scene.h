@@ -54,6 +54,9 @@ struct Scene {
   const Shape& shape(ShapeId id) const { return shapes[id.index()]; }
 };
 
+// Of all shapes; empty if there is none.
+Bounds bounds_of(const Scene& scene);
+
 // A copy that shares nothing mutable with the original.
 Scene deep_copy(const Scene& scene);
 

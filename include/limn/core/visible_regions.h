@@ -34,7 +34,8 @@ struct SeenFace {
     // Whether the ends are corners of the face; else the face was cut there, and its corner is seen
     // farther on.
     bool from_corner, to_corner;
-    bool reversed;  // the face's own order goes from `to` to `from`
+    bool reversed;   // the face's own order goes from `to` to `from`
+    uint8_t number;  // it goes from this corner of the face to the next one, in the face's order
   };
   uint32_t label = 0;
   std::array<Side, 3> sides;
@@ -109,6 +110,19 @@ class VisibleRegions {
   // visit(label, corners): for every region, in an order that depends on nothing but the
   // insertions. Corners, counter-clockwise, to four roundings of the window's size.
   void for_each(const std::function<void(uint32_t, std::span<const PlanePoint>)>& visit) const;
+
+  // A side of a region: what line it lies on. It may go on beyond the face that has made it.
+  struct Side {
+    uint32_t label = kNothing;  // a face; none: the window's own, or where faces cross
+    int8_t side = -1;           // SeenFace::Side::number of that face, or
+    int8_t cut = -1;            // index of SeenFace::cuts
+    PlaneFunction line;         // rounded to the grid; positive inside the region
+  };
+  // The same for regions that show a label less than `labels`, with their sides: side i begins at
+  // corner i.
+  using SideVisitor =
+      std::function<void(uint32_t, std::span<const PlanePoint>, std::span<const Side>)>;
+  void for_each_below(uint32_t labels, const SideVisitor& visit) const;
 
  private:
   class Tree;

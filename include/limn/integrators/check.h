@@ -15,6 +15,7 @@ struct CheckOptions {
   double step = 0;                 // of the finite differences; 0: found by a pilot
   int block = 0;                   // pixels between windows; 0: an eighth of the longer side
   std::optional<SampleCounts> samples = SampleCounts{};  // of the gradient
+  WarpOptions warp;
 };
 
 // A disagreement needs a p-value below kCheckStageLevel in two runs of their own, the second one in

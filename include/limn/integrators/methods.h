@@ -19,6 +19,8 @@ struct MethodType {
   bool warps = false;     // it takes GradientOptions::warp
   bool biased = false;    // its mean is not the derivative, however many samples it takes
   bool ablation = false;  // a variant that shows what a part of a method is worth
+  // InputError, with the place, for a scene that the method cannot take; null: it takes all.
+  void (*check)(const Scene&) = nullptr;
   std::function<GradientResult(const MethodType&, const Scene&, const GradientOptions&,
                                const RunSettings&)>
       run;
@@ -30,6 +32,9 @@ struct MethodType {
 
 // The first is the default.
 const std::vector<MethodType>& method_types();
+
+// InputError if the options are not the defaults and none of the methods, by name, takes them.
+void check_warp(const WarpOptions& warp, const std::vector<std::string>& methods);
 
 // The default for ""; InputError that lists the known names if there is none of this name.
 const MethodType& find_method(const std::string& name);

@@ -1,5 +1,9 @@
 #pragma once
 // Images of a scene.
+#include <span>
+#include <string>
+#include <vector>
+
 #include "limn/core/scene.h"
 #include "limn/integrators/moments.h"
 #include "limn/integrators/run.h"
@@ -14,14 +18,30 @@ struct RenderResult {
   NonFinite non_finite;
 };
 
-// exact_film: paths start at points of the visible regions of every pixel, which are found once,
-// exactly (limn/core/visible_regions.h), in place of rays from the camera. InputError unless the
-// film has a box filter.
-RenderResult render(const Scene& scene, const RunSettings& settings, bool exact_film = false);
+// The ways to an image.
+struct RenderMethod {
+  const char* name;
+  const char* description;
+  bool closed_light;  // light that is scattered once, in closed form (analytic)
+};
+// The first is the default.
+std::span<const RenderMethod> render_methods();
+
+struct RenderOptions {
+  std::string method = "path";  // InputError for others than render_methods()
+  // Paths start at points of the visible regions of every pixel, which are found once, exactly
+  // (limn/core/visible_regions.h), in place of rays from the camera. InputError unless the film has
+  // a box filter.
+  bool exact_film = false;
+};
+
+RenderResult render(const Scene& scene, const RunSettings& settings,
+                    const RenderOptions& options = {});
 
 // One sample done again with all it meets written down, line by line. InputError if the image has
 // no such pixel.
 std::vector<std::string> trace_sample(const Scene& scene, const RunSettings& settings,
-                                      const NonFinite::Place& place, bool exact_film = false);
+                                      const NonFinite::Place& place,
+                                      const RenderOptions& options = {});
 
 }  // namespace limn

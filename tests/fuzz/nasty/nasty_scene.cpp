@@ -67,8 +67,8 @@ class SceneWriter {
   std::string sensor() {
     const Vec3d origin = viewpoint() * unit_, target = die_.in_cube(0.3) * unit_;
     std::string film =
-        fmt::format("<film type=\"hdrfilm\">{}{}", whole("width", die_.integer(1, 6)),
-                    whole("height", die_.integer(1, 6)));
+        fmt::format("<film type=\"hdrfilm\">{}{}", whole("width", die_.integer(1, 4)),
+                    whole("height", die_.integer(1, 4)));
     film += die_.pick<std::string>(
         {"<rfilter type=\"box\"/>", "<rfilter type=\"tent\"/>", "<rfilter type=\"gaussian\"/>"});
     return "<sensor type=\"perspective\">" +

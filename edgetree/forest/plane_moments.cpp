@@ -1,5 +1,5 @@
 // Moments of planes in the frames of nodes, and the quadric that fits them.
-#include "edgetree/quadric/plane_moments.h"
+#include "edgetree/forest/plane_moments.h"
 
 #include <Eigen/Dense>
 

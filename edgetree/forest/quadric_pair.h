@@ -7,7 +7,9 @@
 // lambda(q) of the paper is -(q . Q_f q) / (D . q)^2, and D . q is the same for all points of the
 // box. So ten coefficients and two bounds stand for two matrices, and the constant is in the
 // bounds.
-#include "edgetree/quadric/lanes.h"
+#include <limits>
+
+#include "edgetree/forest/lanes.h"
 
 namespace limn {
 
@@ -18,6 +20,14 @@ struct QuadricPairs {
   FourFloats linear[3], square[3], product[3];
   FourFloats low, high;
 };
+
+// One lane of these: linear, square, product, exactly floats. By default it rejects nothing.
+struct PairFit {
+  float coefficients[9] = {};
+  float low = -std::numeric_limits<float>::infinity();
+  float high = std::numeric_limits<float>::infinity();
+};
+void put_pair(const PairFit& fit, int lane, QuadricPairs& pairs);
 
 // The query plane g_0 + g_1 u_0 + g_2 u_1 + g_3 u_2 = 0 of each lane, and a bound of what rounding
 // and `distance_error` can add to its left side.

@@ -19,7 +19,7 @@
 // above them at most. Vertices and the critical point are evaluated wherever they seem to be, which
 // does no harm if they lie in C; where the division is so ill conditioned that they are missed, the
 // curvature is below 2^-26, and f is flat to that. All of it is far below kSlack.
-#include "edgetree/quadric/quadric_pair.h"
+#include "edgetree/forest/quadric_pair.h"
 
 #include <initializer_list>
 #include <limits>
@@ -163,6 +163,16 @@ struct OnPlane {
 };
 
 }  // namespace
+
+void put_pair(const PairFit& fit, int lane, QuadricPairs& pairs) {
+  for (int k = 0; k < 3; ++k) {
+    pairs.linear[k][lane] = fit.coefficients[k];
+    pairs.square[k][lane] = fit.coefficients[3 + k];
+    pairs.product[k][lane] = fit.coefficients[6 + k];
+  }
+  pairs.low[lane] = fit.low;
+  pairs.high[lane] = fit.high;
+}
 
 Longs meet_box(const QueryPlanes& planes) {
   return abs(planes.g[0]) <= abs(planes.g[1]) + abs(planes.g[2]) + abs(planes.g[3]) + planes.error;

@@ -1,0 +1,183 @@
+#pragma once
+// Integrals over polygons of directions, and their derivatives by the motion of the polygon's
+// sides: no corner is differentiated, after
+//   d/dtheta of the integral of f over P = that of df/dtheta + sum over sides of
+//                                          the integral of f (dN . w) / |N| dpsi,
+// with N the normal of the plane through the side, positive inside, and psi the angle along it.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+
+#include "limn/core/dual.h"
+#include "limn/core/vec.h"
+
+namespace limn {
+
+// A side of a polygon of directions as seen from a point; the next one begins where it ends,
+// counter-clockwise as seen from that point.
+template <class S>
+struct PolygonSide {
+  Vec3<S> normal;  // of the plane through the point and the side; of any length, positive inside
+  Vec3d begin;     // unit
+};
+
+namespace detail {
+
+// Along the side from `from`, in an orthonormal frame: w = from cos psi + across sin psi.
+struct Arc {
+  Arc(const Vec3d& normal, const Vec3d& from, const Vec3d& to)
+      : length(limn::length(normal)),
+        s(normal / length),
+        start(from),
+        across(cross(s, from)),
+        angle(std::atan2(dot(s, cross(from, to)), dot(from, to))) {}
+  double length;  // of the normal that was given
+  Vec3d s;        // the same, of length one
+  Vec3d start, across;
+  double angle;  // signed: negative where the way runs clockwise
+};
+
+}  // namespace detail
+
+// The integral of n . w over the polygon [sr]: Lambert's formula, n . sum of angle s / 2. n: of any
+// length; below its horizon n . w counts as negative.
+inline double cosine_integral(std::span<const PolygonSide<double>> sides, const Vec3d& n) {
+  double sum = 0;
+  for (size_t i = 0; i < sides.size(); ++i) {
+    const detail::Arc arc(sides[i].normal, sides[i].begin, sides[(i + 1) % sides.size()].begin);
+    sum += 0.5 * arc.angle * dot(n, arc.s);
+  }
+  return sum;
+}
+inline Dual cosine_integral(std::span<const PolygonSide<Dual>> sides, const Vec3<Dual>& n) {
+  Dual sum;
+  for (size_t i = 0; i < sides.size(); ++i) {
+    const Vec3<Dual>& normal = sides[i].normal;
+    const detail::Arc arc(value(normal), sides[i].begin, sides[(i + 1) % sides.size()].begin);
+    sum += dot(n, arc.s) * (0.5 * arc.angle);
+    if (is_still(normal)) continue;
+    // n . w and dN . w as c cos psi + d sin psi, and the integrals of the products of these.
+    const Vec3d still = value(n);
+    const double c = dot(still, arc.start), d = dot(still, arc.across);
+    const Lanes moved_c = dot(normal, arc.start).d, moved_d = dot(normal, arc.across).d;
+    const double sine = std::sin(arc.angle), both = 0.5 * sine * sine;
+    const double twice = 0.5 * sine * std::cos(arc.angle);
+    const double cosines = 0.5 * arc.angle + twice, sines = 0.5 * arc.angle - twice;
+    sum.d +=
+        (moved_c * (c * cosines + d * both) + moved_d * (c * both + d * sines)) * (1 / arc.length);
+  }
+  return sum;
+}
+
+// Directions where a function of direction has a kink: axis . w = level, w of length one.
+struct Kink {
+  Vec3d axis;
+  double level;
+};
+
+// The integral over the polygon of c times the ramp that rises from 0 at c = h to 1 at c = h (2 - h),
+// c = n . w and 0 <= h < 1: what interpolated normals see of a cosine (limn/core/shading.h). n: unit.
+// The polygon must not hold -n. With G(c) the integral of that from c to 1, by Stokes
+//   sum over sides of n . s  the integral of G(c) / (1 - c^2) dpsi,
+// the inner one by quadrature between the ends of the ramp.
+double ramp_integral(std::span<const PolygonSide<double>> sides, const Vec3d& n, double h);
+Dual ramp_integral(std::span<const PolygonSide<Dual>> sides, const Vec3<Dual>& n, const Dual& h);
+
+namespace detail {
+
+// Gauss-Legendre points on [0, 1].
+struct QuadraturePoint {
+  double at, weight;
+};
+std::span<const QuadraturePoint> quadrature();
+
+// Where the chord from a to b meets kinks, in order, between its ends; the first is 0, the last 1.
+struct Breaks {
+  static constexpr int kMost = 16;
+  Breaks(const Vec3d& a, const Vec3d& b, std::span<const Kink> kinks);
+  std::array<double, kMost> at;
+  int count = 0;
+};
+
+template <class Visit>
+void for_every_point(const Breaks& breaks, const Visit& visit) {
+  for (int i = 0; i + 1 < breaks.count; ++i) {
+    const double from = breaks.at[i], width = breaks.at[i + 1] - from;
+    for (const QuadraturePoint& q : quadrature()) visit(from + width * q.at, width * q.weight);
+  }
+}
+
+// The integral of f over the triangle of three directions, negative if they go round clockwise.
+template <class S, class F>
+Rgb<S> triangle_integral(const Vec3d& a, const Vec3d& b, const Vec3d& c,
+                         std::span<const Kink> kinks, const F& f, int depth = 0) {
+  constexpr double kWide = 0.5;  // chords; not tuned
+  const double bc = length(c - b), ca = length(a - c), ab = length(b - a);
+  const double longest = std::max({bc, ca, ab});
+  if (longest > kWide && depth < 12) {
+    const auto halves = [&](const Vec3d& x, const Vec3d& y, const Vec3d& z) {
+      const Vec3d m = normalize(y + z);
+      return triangle_integral<S>(x, y, m, kinks, f, depth + 1) +
+             triangle_integral<S>(x, m, z, kinks, f, depth + 1);
+    };
+    return longest == bc ? halves(a, b, c) : longest == ca ? halves(b, c, a) : halves(c, a, b);
+  }
+  const double volume = determinant(a, b, c);
+  Rgb<S> sum;
+  if (volume == 0) return sum;
+  for_every_point(Breaks(b, c, kinks), [&](double t, double weight) {
+    const Vec3d end = b + (c - b) * t;
+    for_every_point(Breaks(a, end, kinks), [&](double s, double inner) {
+      const Vec3d w = a + (end - a) * s;
+      const double size = length(w);
+      sum += f(w / size) * (weight * inner * s * volume / (size * size * size));
+    });
+  });
+  return sum;
+}
+
+// The integral of f (dN . w) / |N| along a side.
+template <class F>
+Rgb<Lanes> side_integral(const Vec3<Dual>& normal, const Arc& arc, const Vec3d& a, const Vec3d& b,
+                         std::span<const Kink> kinks, const F& f, int depth = 0) {
+  constexpr double kWide = 0.5;  // not tuned
+  if (length(b - a) > kWide && depth < 12) {
+    const Vec3d m = normalize(a + b);
+    return side_integral(normal, arc, a, m, kinks, f, depth + 1) +
+           side_integral(normal, arc, m, b, kinks, f, depth + 1);
+  }
+  const double area = dot(arc.s, cross(a, b)) / arc.length;
+  Rgb<Lanes> sum;
+  for_every_point(Breaks(a, b, kinks), [&](double t, double weight) {
+    const Vec3d w = a + (b - a) * t;
+    const double size = length(w);
+    const Rgb<double> here = value(f(w / size));
+    const Lanes speed = dot(normal, w).d * (weight * area / (size * size * size));
+    for (int c = 0; c < 3; ++c) sum[c] += speed * here[c];
+  });
+  return sum;
+}
+
+}  // namespace detail
+
+// The integral over the polygon of f, a function of unit directions that is smooth but for kinks,
+// by quadrature. pole: a unit direction near the polygon.
+template <class S, class F>
+Rgb<S> polygon_integral(std::span<const PolygonSide<S>> sides, const Vec3d& pole,
+                        std::span<const Kink> kinks, const F& f) {
+  Rgb<S> sum;
+  for (size_t i = 0; i < sides.size(); ++i) {
+    const Vec3d &a = sides[i].begin, &b = sides[(i + 1) % sides.size()].begin;
+    sum += detail::triangle_integral<S>(pole, a, b, kinks, f);
+    if constexpr (std::is_same_v<S, Dual>) {
+      if (is_still(sides[i].normal)) continue;
+      const detail::Arc arc(value(sides[i].normal), a, b);
+      const Rgb<Lanes> moved = detail::side_integral(sides[i].normal, arc, a, b, kinks, f);
+      for (int c = 0; c < 3; ++c) sum[c].d += moved[c];
+    }
+  }
+  return sum;
+}
+
+}  // namespace limn

@@ -1,0 +1,16 @@
+#pragma once
+// Derivatives held against finite differences, with what was found on the test's output.
+#include <string>
+#include <vector>
+
+#include "limn/integrators/check.h"
+
+namespace limn {
+
+// By blocks of four pixels. Expects that all is finite.
+CheckResult run_check(const Scene& scene, const std::string& parameter, int spp,
+                      const std::vector<std::string>& terms = {}, const std::string& method = "");
+// Expects some blocks and no disagreement in them.
+void expect_agreement(const Scene& scene, const std::string& parameter, int spp);
+
+}  // namespace limn
