@@ -2,6 +2,7 @@
 // contribution_bound.h) and draws in proportion. Time grows with the number of faces.
 #include <algorithm>
 #include <atomic>
+#include <memory>
 
 #include "edgetree/baselines/baselines.h"
 #include "limn/edgetree/contribution_bound.h"
@@ -101,7 +102,9 @@ class BruteForceSampler final : public EdgeSampler {
   }
 
   const Listing& list(const EdgeQuery& query) const {
-    static thread_local Listing listing;
+    // On the heap: a shared library has little room for what belongs to threads.
+    static thread_local const auto owned = std::make_unique<Listing>();
+    Listing& listing = *owned;
     if (listing.sampler == serial_ && same(listing.query, query)) return listing;
     listing.sampler = serial_;
     listing.query = query;

@@ -2,6 +2,7 @@
 #include "integrators/terms/closed_light.h"
 
 #include <algorithm>
+#include <memory>
 #include <tuple>
 
 #include "integrators/terms/polygon_light.h"
@@ -443,7 +444,9 @@ std::optional<Vec3d> wedge_at(const Scene& scene, const RayTracer& tracer, const
 template <class S>
 Rgb<S> ClosedLight::scattered(const RayTracer& tracer, const SurfacePoint<S>& surface,
                               const Scattering<S>& scattering, const EdgeStart* edge) const {
-  static thread_local Scratch scratch;
+  // On the heap: a shared library has little room for what belongs to threads.
+  static thread_local const auto owned = std::make_unique<Scratch>();
+  Scratch& scratch = *owned;
   static thread_local std::vector<PolygonSide<S>> sides;
   const bool front = dot(surface.n_g, value(scattering.wi())) > 0;
   Receiver receiver{value(surface.p), front ? surface.n_g : -surface.n_g, surface.face, edge};

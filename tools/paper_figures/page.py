@@ -6,8 +6,18 @@ import os
 import shlex
 
 from report.errors import ReportError
-from report.markup import Markup, count, element, figures, join, percent, table, times, with_error
-from report.page import POLICY
+from report.markup import (
+    Markup,
+    count,
+    document,
+    element,
+    figures,
+    join,
+    percent,
+    table,
+    times,
+    with_error,
+)
 from report.pictures import Pictures, figure
 from report.records import read_folder, read_record
 
@@ -367,20 +377,12 @@ def write(file, paper_figures, folder, again):
         " limn's default. Derivatives: red gets brighter, blue darker; methods of one comparison"
         " have the same time, set-up included, and one scale."
     )
-    head = element(
-        "head",
-        element("meta", charset="utf-8"),
-        element("meta", http_equiv="Content-Security-Policy", content=POLICY),
-        element("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        element("meta", name="color-scheme", content="light dark"),
-        element("title", title),
-        element("style", _style()),
-    )
-    body = element(
-        "body",
+    page = document(
+        title,
+        _style(),
         element("header", element("h1", title), element("p", intro), _summary(sections)),
         element("main", *(html for _, _, html, _, _ in sections)),
     )
     with open(file, "w", encoding="utf-8") as out:
-        out.write(Markup("<!DOCTYPE html>\n") + element("html", head, body, lang="en"))
+        out.write(page)
     return missing

@@ -30,6 +30,25 @@ def element(name, /, *contents, **attributes):
     return Markup(f"<{name}{text}>{join(*contents)}</{name}>")
 
 
+# A page asks for nothing from outside, and could not get it: no scripts, pictures only from within.
+POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+
+
+def document(title, style, *contents):
+    """A whole page: title and style as texts, contents: of the body."""
+    head = element(
+        "head",
+        element("meta", charset="utf-8"),
+        element("meta", http_equiv="Content-Security-Policy", content=POLICY),
+        element("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        element("meta", name="color-scheme", content="light dark"),
+        element("title", title),
+        element("style", style),
+    )
+    html_element = element("html", head, element("body", *contents), lang="en")
+    return Markup("<!DOCTYPE html>\n") + html_element
+
+
 def table(head, rows, label, class_=None):
     """head: texts; rows: lists of cells whose first is the row's header. A cell may be a <td>.
     label: what it is, for those who cannot see what stands above it.

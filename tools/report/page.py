@@ -5,13 +5,9 @@ import os
 from .colours import Palette
 from .comparison import ComparisonSection, biases
 from .fitting import FitSection
-from .markup import Markup, element, join
+from .markup import Markup, document, element, join
 from .overview import Overview
 from .rejection import RejectionSection
-
-# The page asks for nothing from outside, and could not get it: no scripts, pictures only from
-# within.
-POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 
 # A report with unbiased methods only shows a false alarm of bias in one of a hundred reports.
 FALSE_ALARM = 0.01
@@ -200,19 +196,10 @@ def page(results):
         )
     title = _title(results, sections)
     style = join(Markup(_style(palette)), *(rule for s in sections for rule in s.styles))
-    head = element(
-        "head",
-        element("meta", charset="utf-8"),
-        element("meta", http_equiv="Content-Security-Policy", content=POLICY),
-        element("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        element("meta", name="color-scheme", content="light dark"),
-        element("title", title),
-        element("style", style),
-    )
-    body = element(
-        "body",
+    page = document(
+        title,
+        style,
         element("header", element("h1", title), _contents(sections, overview)),
         element("main", *parts, _reading({r.kind for r in results})),
     )
-    missing = [name for section in sections for name in section.pictures.missing]
-    return Markup("<!DOCTYPE html>\n") + element("html", head, body, lang="en"), missing
+    return page, [name for section in sections for name in section.pictures.missing]

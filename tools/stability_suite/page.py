@@ -4,7 +4,7 @@ import os
 
 from report import page as report_page
 from report.colours import Palette
-from report.markup import Markup, element, figures, join, percent, table
+from report.markup import Markup, document, element, figures, join, percent, table
 
 from . import chart
 from .statistics import LEVEL, called
@@ -163,25 +163,18 @@ def _section(output, family, records, palette):
 def html(output, records):
     palette = Palette(methods_of(records))
     title = "limn: where methods break"
-    head = element(
-        "head", element("meta", charset="utf-8"),
-        element("meta", http_equiv="Content-Security-Policy", content=report_page.POLICY),
-        element("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        element("meta", name="color-scheme", content="light dark"), element("title", title),
-        element("style", Markup(report_page._style(palette))))
     reading = element("section", element("h2", "How to read this"),
                       element("dl", *(join(element("dt", t), element("dd", d))
                                       for t, d in READING)), id="reading")
     seconds = chart.records_seconds([r for _, rs in records for r in rs])
-    body = element(
-        "body", element("header", element("h1", title)),
+    return document(
+        title, Markup(report_page._style(palette)), element("header", element("h1", title)),
         element("main",
                 element("p", "Scenes that get harder by a knob until something breaks. Derivative "
                         f"images after {seconds} s of one thread. ",
                         element("a", "How to read this", href="#reading"), "."),
                 _summary(records), _verdict_table(records),
                 *(_section(output, f, r, palette) for f, r in records), reading))
-    return Markup("<!DOCTYPE html>\n") + element("html", head, body, lang="en")
 
 
 def write(output, records):
