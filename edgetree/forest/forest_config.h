@@ -30,9 +30,9 @@ struct ForestConfig {
   static constexpr uint32_t kMostQuadricEdges = 8192;
   Quadrics quadrics = Quadrics::kNone;
   uint32_t quadrics_from = 32;
-  // Where the box of a child says little of what it weighs, because the lobe is narrow or p is near,
-  // what is inside is looked at: by one look further, and before narrow lobes by opening up to this
-  // many nodes of the top. With 0 neither is done.
+  // Where the box of a child says little of what it weighs, because the lobe is narrow or p is
+  // near, what is inside is looked at: by one look further, and before narrow lobes by opening up
+  // to this many nodes of the top. With 0 neither is done.
   int most_open = 8;
   // Concave smooth edges of closed one-sided meshes are left out.
   bool cull_concave = true;

@@ -71,8 +71,8 @@ struct ChildWeights {
   Floats rest;    // speed, distance, lobe and light; 0 where the child is rejected
   Floats product() const;
 };
-// doubt, if asked for: about how many times its `rest` a child may weigh at most, since the lobe and
-// the distance change over its box; below some hundreds.
+// doubt, if asked for: about how many times its `rest` a child may weigh at most, since the lobe
+// and the distance change over its box; below some hundreds.
 ChildWeights weigh_children(const InnerNode& node, const ForestQuery& query, bool soft,
                             Floats* doubt = nullptr);
 // `length` alone, for all children together and over the squared radius that `inverse_radius`

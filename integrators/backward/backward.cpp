@@ -120,7 +120,7 @@ class BackwardPass {
         tracer_(make_embree_tracer(parameters_.scene(), settings.threads)),
         lights_(parameters_.scene()),
         path_{parameters_.scene(), *tracer_, lights_},
-        input_(path_, 3, {1, 1, 1, 1}, edge_sampler_type(options.sampler), settings.threads),
+        input_(path_, 3, {1, 1, 1, 1}, backward_sampler(options.sampler), settings.threads),
         context_{path_, parameters_, input_.edges(),
                  EdgeMotion(parameters_.slots(), input_.edges())} {
     select();
@@ -439,6 +439,15 @@ void BackwardPass::finish() {
 }
 
 }  // namespace
+
+const EdgeSamplerType& backward_sampler(const std::string& name) {
+  const EdgeSamplerType& type = edge_sampler_type(name);
+  if (type.regions) {
+    throw InputError("reverse mode has no regions of light, which \"" + name +
+                     "\" lists: take forest");
+  }
+  return type;
+}
 
 BackwardResult backward(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
                         const RunSettings& settings) {

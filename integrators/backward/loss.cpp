@@ -140,8 +140,8 @@ Level halved(const Level& level) {
   return half;
 }
 
-// Adds `share` of the loss of a level to `loss`, and its derivative with respect to the pixels of the
-// finest level, `finest` and twice as wide `doublings` times, to `adjoint`.
+// Adds `share` of the loss of a level to `loss`, and its derivative with respect to the pixels of
+// the finest level, `finest` and twice as wide `doublings` times, to `adjoint`.
 void add_level(const Level& level, const Level& finest, int doublings, LossKind kind, double share,
                double& loss, std::vector<double>& adjoint) {
   std::vector<double> slopes(level.a.size());

@@ -170,6 +170,7 @@ void Fit::Impl::check_channels() const {
 
 // Those of backward(), which would tell at the first step.
 void Fit::Impl::check_terms() const {
+  backward_sampler(options_.backward.sampler);
   for (size_t v = 0; v < views.size(); ++v) {
     const auto seen = [&](const FitParameter& p) { return p.in_view(v) != nullptr; };
     if (std::none_of(parameters_.begin(), parameters_.end(), seen)) continue;

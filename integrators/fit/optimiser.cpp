@@ -21,8 +21,9 @@ constexpr OptimiserName kOptimisers[] = {{"adam-uniform", OptimiserKind::kAdamUn
                                          {"gradient-descent", OptimiserKind::kGradientDescent}};
 
 // Of the running means. With Kingma and Ba's 0.999 one heavy sample among the first sets the scale
-// of a thousand steps: of the shape before two mirrors (scenes/fits), the chamfer distance after 100
-// steps was then 0.029 with one seed and 0.043 with another; with 0.95 it is 0.027 with the latter.
+// of a thousand steps: of the shape before two mirrors (scenes/fits), the chamfer distance after
+// 100 steps was then 0.029 with one seed and 0.043 with another; with 0.95 it is 0.027 with the
+// latter.
 constexpr double kBeta1 = 0.9, kBeta2 = 0.95;
 
 }  // namespace

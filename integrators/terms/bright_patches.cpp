@@ -82,8 +82,8 @@ Cap cap_around(const std::vector<Drawn>& drawn, const Vec3d& axis, double least_
   return best;
 }
 
-// Wider by rings as long as these are bright, too: the rim of a sun is soft, by haze or by the map's
-// texels.
+// Wider by rings as long as these are bright, too: the rim of a sun is soft, by haze or by the
+// map's texels.
 Cap with_rim(const std::vector<Drawn>& drawn, const Vec3d& axis, Cap cap) {
   const double core = cap.flux / solid_angle(cap.angle);
   while (cap.angle * kRing <= kWidest) {
@@ -103,11 +103,11 @@ Cap with_rim(const std::vector<Drawn>& drawn, const Vec3d& axis, Cap cap) {
 // To the middle of the light within the angle.
 Vec3d centered(const std::vector<Drawn>& drawn, const Vec3d& axis, double angle) {
   const double cosine = std::cos(angle);
-  Vec3d sum = axis * 1e-300;
+  Vec3d sum{};
   for (const Drawn& d : drawn) {
     if (dot(d.w, axis) >= cosine) sum += d.w * d.flux;
   }
-  return normalize(sum);
+  return length_squared(sum) > 0 ? normalize(sum) : axis;
 }
 
 Vec3d brightest_axis(const std::vector<Drawn>& drawn, double least_flux) {

@@ -19,8 +19,8 @@ struct BrightPatch {
 };
 
 // Disjoint caps of a few degrees that are much brighter than the environment is on average and hold
-// a good part of the integral of its squared luminance each (not of its light: a low sun in haze has
-// 2 % of that, and rules the error), the one with the most first. Found among directions that the
+// a good part of the integral of its squared luminance each (not of its light: a low sun in haze
+// has 2 % of that, and rules the error), in that order. Found among directions that the
 // environment itself draws, the same each time.
 std::vector<BrightPatch> find_bright_patches(const Environment& environment);
 

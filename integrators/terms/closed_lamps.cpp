@@ -163,7 +163,9 @@ void ClosedLight::finish(LampPlane& lamp) const {
   }
   for (const FaceRef face : lamp.faces) {
     for (const FaceRef other : overlaps_.of(face)) {
-      if (is_met_first(scene_, other, face, -lamp.plane.n)) lamp.before.push_back(other);
+      lamp.in_plane.push_back(other);
+      const FaceRef met = copies_.met(other, -lamp.plane.n, false).value_or(other);
+      if (is_met_first(scene_, met, face, -lamp.plane.n)) lamp.before.push_back(met);
     }
   }
 }

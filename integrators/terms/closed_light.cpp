@@ -143,6 +143,11 @@ bool ClosedLight::list(const LampPlane& lamp, const Receiver& receiver, Scratch&
     };
     const auto& x = item->corners;
     if (!rises(x[0]) && !rises(x[1]) && !rises(x[2])) continue;
+    // What lies in the lamp's plane is before it by the rule, not by how its corners are rounded.
+    const FaceRef first = copies_.first(item->face);
+    if (std::find(lamp.in_plane.begin(), lamp.in_plane.end(), first) != lamp.in_plane.end()) {
+      continue;
+    }
     if (!is_skipped(item->face, receiver)) scratch.faces.push_back(item->face);
   }
   return true;
@@ -399,11 +404,11 @@ class ClosedLight::View {
   }
   Vec3<S> normal_of_cut(const VisibleRegions::Side& side, uint32_t shown) const {
     const SeenFace& face = scratch_.seen[side.label];
+    if (!face.whole && side.cut == 0) return {};  // just before p
     if (side.label < scratch_.lamp_faces) {
-      const Vec3d& n = side.cut == 0 ? receiver_.up : *receiver_.wedge;
+      const Vec3d& n = side.cut == (face.whole ? 0 : 1) ? receiver_.up : *receiver_.wedge;
       return {S(n.x), S(n.y), S(n.z)};
     }
-    if (!face.whole && side.cut == 0) return {};  // just before p
     return normal_of_crossing(corners_of(scratch_.faces[side.label]),
                               corners_of(scratch_.faces[shown]));
   }

@@ -22,15 +22,16 @@
 
 namespace limn {
 
-// InputError, with the place in the scene's file and what to do, for a scene that has no closed form
-// here: where anything is scattered, a max_depth other than 2, an environment, delta lights, BSDFs
-// that are not diffuse, interpolated normals after Mitsuba.
+// InputError, with the place in the scene's file and what to do, for a scene that has no closed
+// form here: where anything is scattered, a max_depth other than 2, an environment, delta lights,
+// BSDFs that are not diffuse, interpolated normals after Mitsuba.
 void check_closed_light(const Scene& scene);
 
 class ClosedLight {
  public:
   // The scene must outlive it. InputError as above, and for a lamp of more than kMostPlanes planes.
-  // by: how the visible part of a lamp is found; regions take much longer and are for tests.
+  // by: how the visible part of a lamp is found; regions take much longer; they are the oracle, and
+  // step in where a corner is too far out.
   enum class By { kOutlines, kRegions };
   ClosedLight(const Scene& scene, int threads, By by = By::kOutlines);
 
@@ -48,7 +49,8 @@ class ClosedLight {
   struct LampPlane {
     ShapeId shape;
     std::vector<FaceRef> faces;
-    std::vector<FaceRef> before;  // others in the same plane, which rays meet in their place
+    std::vector<FaceRef> in_plane;  // others in the same plane, the first of copies
+    std::vector<FaceRef> before;    // of these those which rays meet in their place
     Plane plane;
     Vec3d u, v;               // across its normal; u, v and the reversed normal are right-handed
     double x0, x1, y0, y1;    // bounds of its faces along u and v

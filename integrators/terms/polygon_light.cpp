@@ -136,7 +136,7 @@ double ramp_integral(std::span<const PolygonSide<double>> sides, const Vec3d& n,
 // Where n turns with the angular velocity r, the polygon turns back with -r.
 Dual ramp_integral(std::span<const PolygonSide<Dual>> sides, const Vec3<Dual>& normal,
                    const Dual& h) {
-  if (h.v == 0 && is_still(h)) return cosine_integral(sides, normal);
+  if (h.v == 0) return cosine_integral(sides, normal);  // the derivative by h is 0 there
   const Ramp ramp(h.v);
   const Vec3d n = value(normal);
   const Vec3<Lanes> dn{normal.x.d, normal.y.d, normal.z.d};

@@ -68,7 +68,9 @@ def seconds(history):
     return sum(h["seconds"] for h in history)
 
 
-SHAPE_HEAD = ["fit", "steps", "chamfer", "95 %", "normals", "inside out", "crossings", "loss", "seconds"]
+SHAPE_HEAD = [
+    "fit", "steps", "chamfer", "95 %", "normals", "inside out", "crossings", "loss", "seconds"
+]
 
 
 def shape_row(name, steps, mesh, history):

@@ -79,8 +79,8 @@ double blur_of(const Corners& corners, const Vec3d& viewer) {
   for (const Vec3d& x : corners) distance = std::max(distance, length(x - viewer));
   return 0x1p-19 * distance;
 }
-// Of its longest side, how far from a face others are near to it at most. Not tuned: what is farther
-// is no thin layer.
+// Of its longest side, how far from a face others are near to it at most. Not tuned: what is
+// farther is no thin layer.
 constexpr double kMostNear = 0x1p-8;
 
 // Wider by twice what rounding explains, at least: a float's rounding is less than the second half.
@@ -318,8 +318,10 @@ void FaceOverlaps::settle(const Ray& ray, Hit& hit) const {
 
 bool FaceOverlaps::leave(const Ray& ray, Hit& hit) const {
   const auto first = first_of(found_of(ray.start).second, ray, hit.t);
-  if (first) hit = *first;
-  return first.has_value();
+  if (!first) return false;
+  hit = *first;
+  settle_in_plane(ray, hit);
+  return true;
 }
 
 bool FaceOverlaps::arrives_hidden(const Ray& ray) const {

@@ -27,8 +27,8 @@ struct Inserted {
   double error;                 // of it, where the face is
   double nearest;
   bool ruled;
-  LineSide lines[5];
-  int8_t numbers[5] = {};  // of its side that a line is; of a cut -1 minus its index
+  LineSide lines[6];
+  int8_t numbers[6] = {};  // of its side that a line is; of a cut -1 minus its index
   int line_count = 0;
 };
 
@@ -481,7 +481,7 @@ class VisibleRegions::Tree {
   Box box_;
   size_t gained_ = 0;  // regions that it has taken
   bool lost_ = false;  // something may hide a part of it
-  RingSides sides_of_line_[5];
+  RingSides sides_of_line_[6];
   Ring ring_, inside_;
   std::vector<Ring> pieces_;
   std::vector<int> built_;

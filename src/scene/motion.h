@@ -21,8 +21,8 @@ class Motion {
                       std::vector<std::string>* warnings) const;
   virtual std::vector<Vec3d> velocities(const Scene& scene, ShapeId shape, size_t component) const;
 
-  // The part of an array or colour whose name continues its own with `rest` (":FILE", ".7.x", ".r");
-  // nothing if `rest` means nothing here. InputError if it means something that cannot be.
+  // The part of an array or colour whose name continues its own with `rest` (":FILE", ".7.x",
+  // ".r"); nothing if `rest` means nothing here. InputError if it means something that cannot be.
   virtual std::optional<Parameter> part(const Scene& scene, const Parameter& whole,
                                         const std::string& rest) const;
   // How to name a part of the array called `name`, for messages.

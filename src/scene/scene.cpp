@@ -41,21 +41,35 @@ Scene deep_copy(const Scene& scene) {
   return copy;
 }
 
-void use_sensor(Scene& scene, const std::string& name) {
-  std::string known;
+std::string sensor_names(const Scene& scene) {
+  std::string names;
   for (size_t i = 0; i < scene.sensors.size(); ++i) {
-    const Sensor& sensor = scene.sensors[i];
-    if (name == std::to_string(i) || (!name.empty() && name == sensor.id)) {
-      scene.camera = sensor.camera;
-      scene.film = sensor.film;
-      scene.sample_count = sensor.sample_count;
-      scene.seed = sensor.seed;
-      return;
-    }
-    known += (i > 0 ? ", " : "") + std::to_string(i);
-    if (!sensor.id.empty()) known += " or \"" + sensor.id + "\"";
+    names += (i > 0 ? ", " : "") + std::to_string(i);
+    const std::string& id = scene.sensors[i].id;
+    if (!id.empty()) names += " or \"" + id + "\"";
   }
-  throw InputError({scene.file}, "there is no sensor \"" + name + "\" (known: " + known + ")");
+  return names;
+}
+
+void use_sensor(Scene& scene, const std::string& name) {
+  const std::vector<Sensor>& sensors = scene.sensors;
+  // Numbers first: every sensor has one, and an id may look like that of another.
+  size_t at = 0;
+  while (at < sensors.size() && name != std::to_string(at)) ++at;
+  if (at == sensors.size() && !name.empty()) {
+    at = 0;
+    while (at < sensors.size() && name != sensors[at].id) ++at;
+  }
+  if (at < sensors.size()) {
+    const Sensor sensor = sensors[at];
+    scene.camera = sensor.camera;
+    scene.film = sensor.film;
+    scene.sample_count = sensor.sample_count;
+    scene.seed = sensor.seed;
+    return;
+  }
+  throw InputError({scene.file},
+                   "there is no sensor \"" + name + "\" (known: " + sensor_names(scene) + ")");
 }
 
 void set_mesh(Scene& scene, ShapeId shape, std::vector<Vec3f> positions,

@@ -199,8 +199,10 @@ TEST(Backward, AgreesWithOtherSamplers) {
     EXPECT_LT(std::fabs(a.mean(0) - b.mean(0)), 5 * std::sqrt(a.variance(0) + b.variance(0)))
         << name;
   }
-  options.sampler = "oak";
-  EXPECT_THROW(backward(scene, adjoint, options, settings), InputError);
+  for (const char* name : {"oak", "silhouettes"}) {
+    options.sampler = name;
+    EXPECT_THROW(backward(scene, adjoint, options, settings), InputError) << name;
+  }
 }
 
 TEST(Backward, AgreesInSharpShadows) {

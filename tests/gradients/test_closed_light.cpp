@@ -594,46 +594,5 @@ TEST(Analytic, ImagesAndDerivativesAreThoseOfPaths) {
   }
 }
 
-TEST(Analytic, SaysWhatItCannotTake) {
-  const TempFiles files;
-  const std::string lamp = square("lamp", 0.5, 90, {0, 2, 0}, area_light("glow", "1, 1, 1"));
-  const auto message = [&](int max_depth, const std::string& body) {
-    SceneParts parts;
-    parts.max_depth = max_depth;
-    parts.body = lamp + body;
-    const Scene scene = make_scene(files, parts);
-    try {
-      render(scene, {}, {.method = "analytic"});
-    } catch (const InputError& error) {
-      return std::string(error.what());
-    }
-    return std::string();
-  };
-  EXPECT_EQ(message(2, ""), "");
-  EXPECT_EQ(message(1, constant_light("sky", "1, 1, 1")), "");
-  const auto expect = [&](const std::string& text, const std::string& words) {
-    EXPECT_NE(text.find(words), text.npos) << text;
-  };
-  expect(message(3, ""), "set the integrator's max_depth to 2 (it is 3)");
-  expect(message(-1, ""), "(it is -1)");
-  expect(message(2, constant_light("sky", "1, 1, 1")), "emitter \"sky\": light from all around");
-  expect(message(2, R"(<emitter type="point" id="spark"/>)"),
-         "emitter \"spark\": only area lights");
-  const std::string mirror = message(2, square("floor", 1, -90, {0, 0, 0}, conductor("m", 0.1)));
-  expect(mirror, "shape \"floor\": only diffuse surfaces");
-  expect(mirror, ".xml:");
-  const std::string ball = write_mesh(files, "bulb.obj", icosphere_mesh(1));
-  expect(message(2, obj_shape("bulb", ball, true, 1, {0, 0, 0}, area_light("g", "1, 1, 1"))),
-         "shape \"bulb\" has 80 planes, at most 64");
-  GradientOptions options;
-  options.parameters = {"lamp.translate.x"};
-  options.method = "analytic";
-  options.terms = {"boundary"};
-  SceneParts parts;
-  parts.max_depth = 2;
-  parts.body = lamp;
-  EXPECT_THROW(gradient(make_scene(files, parts), options, {}), InputError);
-}
-
 }  // namespace
 }  // namespace limn

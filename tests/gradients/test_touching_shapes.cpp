@@ -190,8 +190,8 @@ TEST(TouchingShapes, SlidingBox) {
   expect_equal(box(0), box(2e-5), "box.translate.x");
 }
 
-// Boxes of one plan, each of which sinks into the one below by less than faces have to have in common
-// to overlap: what is seen is one box.
+// Boxes of one plan, each of which sinks into the one below by less than faces have to have in
+// common to overlap: what is seen is one box.
 TEST(TouchingShapes, BoxesThatSinkByAMillionth) {
   const auto box = [](float low, float high) {
     const Vec3f plan[] = {

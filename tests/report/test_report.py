@@ -289,7 +289,8 @@ class TestFigures(unittest.TestCase):
             ]
             file = os.path.join(temporary, "figures.html")
             runs = os.path.join(temporary, "runs")
-            missing = figure_page.write(file, figures, lambda part: os.path.join(runs, part.name))
+            missing = figure_page.write(file, figures, lambda part: os.path.join(runs, part.name),
+                                        ["tools/paper", "--figures"])
             with open(file, encoding="utf-8") as stream:
                 page = stream.read()
         self.assertEqual(missing, 1)

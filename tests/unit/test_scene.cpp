@@ -195,6 +195,17 @@ TEST(Scene, IncludesReferencesAndAliases) {
 }
 
 // The first sensor is the scene's; the others wait.
+// An id that is a number does not hide the sensor of that number.
+TEST(Scene, HasSensorsNamedByNumbers) {
+  Scene s = read(
+      "<sensor type=\"perspective\" id=\"1\"><float name=\"fov\" value=\"30\"/></sensor>"
+      "<sensor type=\"perspective\" id=\"2\"><float name=\"fov\" value=\"60\"/></sensor>");
+  for (const auto& [name, fov] : {std::pair{"0", 30.0}, {"1", 60.0}, {"2", 60.0}}) {
+    use_sensor(s, name);
+    EXPECT_EQ(s.camera.fov.v, fov) << name;
+  }
+}
+
 TEST(Scene, HasSeveralSensors) {
   Scene s = read(
       "<sensor type=\"perspective\"><float name=\"fov\" value=\"30\"/></sensor>"

@@ -46,7 +46,8 @@ class BackwardCommand final : public Command {
                    "Where paths go: adjoint (where the loss depends on the image) or uniform")
         ->check(CLI::IsMember({"adjoint", "uniform"}));
     app.add_option("--sampler", options_.sampler,
-                   "Of edges: forest, or another one to compare with")
+                   "Of edges: forest, or to compare with it quadric, li2019, uniform, brute or a "
+                   "variant of these")
         ->capture_default_str();
     app.add_option("--edge-samples", options_.edge_samples, "At every vertex of a path")
         ->check(CLI::Range(1, 1 << 16));
@@ -82,6 +83,7 @@ class BackwardCommand final : public Command {
     options_.terms = parse_terms(terms_);
     options_.uniform_pixels = pixels_ == "uniform";
     const LossKind kind = loss_kind(loss_);
+    backward_sampler(options_.sampler);  // told before the loss is rendered
     if (!common_.part.empty()) return make_part(scene, command_line);
     files_ = plan_files(scene, options_.parameters, output_);
     if (target_.empty()) files_.adjoint = files_.adjoint_picture = "";
@@ -155,6 +157,7 @@ class BackwardCommand final : public Command {
     auto attributes = provenance(scene, settings, loss.spp);
     attributes.push_back({"limn.loss", loss_});
     attributes.push_back({"limn.target", target_});
+    attributes.push_back({"limn.pyramid", std::to_string(levels_)});
     write_exr(files_.adjoint, loss.adjoint, false, attributes);
     write_signed_png(files_.adjoint_picture, loss.adjoint, signed_scale(loss.adjoint));
     return loss;
@@ -162,6 +165,7 @@ class BackwardCommand final : public Command {
 
   json loss_json(const LossResult& loss) const {
     return {{"kind", loss_},
+            {"pyramid", levels_},
             {"target", target_},
             {"value", loss.value},
             {"stderr", std::isfinite(loss.error) ? json(loss.error) : json(nullptr)},
@@ -194,6 +198,7 @@ class BackwardCommand final : public Command {
                    {"seconds", result.seconds},
                    {"setup_seconds", result.setup_seconds},
                    {"pixels", pixels_},
+                   {"sampler", options_.sampler},
                    {"warnings", warnings_.lines()},
                    {"non_finite", result.non_finite.count}};
     if (!target_.empty()) {

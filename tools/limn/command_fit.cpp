@@ -132,7 +132,8 @@ void FitCommand::add_options(CLI::App& app, bool) {
   app.add_option("--remesh-edge", given_.remesh_edge, "Length of edges then, over what it was")
       ->check(CLI::Range(0.1, 10.0))
       ->capture_default_str();
-  app.add_option("--remesh-shrink", given_.remesh_shrink, "Steps and smoothing then, likewise")
+  app.add_option("--remesh-shrink", given_.remesh_shrink,
+                 "After each remeshing steps and smoothing are so many times what they were")
       ->check(CLI::Range(0.01, 1.0))
       ->capture_default_str();
   add_sampling_options(app);
@@ -160,7 +161,9 @@ void FitCommand::add_sampling_options(CLI::App& app) {
                  "Where paths go: adjoint (where the loss depends on the image) or uniform")
       ->check(CLI::IsMember({"adjoint", "uniform"}))
       ->capture_default_str();
-  app.add_option("--sampler", given_.sampler, "Of edges: forest, or another one to compare with")
+  app.add_option("--sampler", given_.sampler,
+                 "Of edges: forest, or to compare with it quadric, li2019, uniform, brute or a "
+                 "variant of these")
       ->capture_default_str();
   app.add_option("--edge-samples", given_.edge_samples, "At every vertex of a path")
       ->check(CLI::Range(1, 1 << 16));

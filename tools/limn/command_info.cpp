@@ -104,11 +104,14 @@ int run_info(const CommonOptions& common) {
   Warnings warnings;
   const Scene scene = load_scene(common, warnings);
   print_camera(scene);
+  if (scene.sensors.size() > 1) fmt::print("sensors (for --sensor): {}\n", sensor_names(scene));
   fmt::print("shapes: {}\n", scene.shapes.size());
   json report = {{"scene", scene.file},
                  {"shapes", json::array()},
                  {"lights", json::array()},
-                 {"parameters", json::array()}};
+                 {"parameters", json::array()},
+                 {"sensors", json::array()}};
+  for (const Sensor& sensor : scene.sensors) report["sensors"].push_back(sensor.id);
   for (uint32_t i = 0; i < scene.shapes.size(); ++i) {
     report["shapes"].push_back(describe_shape(scene, ShapeId(i)));
     print_shape(report["shapes"].back());

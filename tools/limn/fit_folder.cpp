@@ -27,6 +27,7 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 static_assert(std::endian::native == std::endian::little);
 
+constexpr int kFormat = 2;                  // of fit.json and state.cbor; 1 did not say so
 constexpr size_t kDistanceSamples = 10000;  // on each surface; not tuned
 
 // Under another name first: a crash leaves the old file or the new one.
@@ -298,6 +299,9 @@ FitFolder FitFolder::read(const std::string& folder) {
   const std::string file = found.file("fit.json");
   try {
     const json j = json::parse(read_whole(file));
+    if (j.value("format", 0) != kFormat) {
+      throw InputError({file}, "was written by another version of limn: begin another fit");
+    }
     found.arguments_ = arguments_from(j.at("arguments"));
     found.history_ = j.at("history").get<json::array_t>();
     found.snapshots_ = j.at("snapshots").get<json::array_t>();
@@ -471,10 +475,11 @@ void FitFolder::write(const Fit& fit, const std::string& status,
   for (const FitScalar& s : fit.scalars()) {
     scalars.push_back({{"name", s.name}, {"unit", s.unit}, {"value", s.value}});
   }
-  const json all = {
-      {"kind", "fit"},        {"status", status},    {"arguments", to_json(arguments_)},
-      {"steps", fit.steps()}, {"scalars", scalars},  {"targets", targets},
-      {"warnings", warnings}, {"history", history_}, {"snapshots", snapshots_}};
+  const json all = {{"kind", "fit"},        {"format", kFormat},
+                    {"status", status},     {"arguments", to_json(arguments_)},
+                    {"steps", fit.steps()}, {"scalars", scalars},
+                    {"targets", targets},   {"warnings", warnings},
+                    {"history", history_},  {"snapshots", snapshots_}};
   write_whole(file("fit.json"), all.dump(1) + "\n");
   write_whole(file("history.csv"), csv_text(history_, fit.scalars()));
   const std::vector<uint8_t> state = json::to_cbor(to_json(fit.state()));

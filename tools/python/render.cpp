@@ -45,10 +45,13 @@ struct Operator {
   { name, "def " name "(self, other: numpy.typing.ArrayLike) -> numpy.ndarray" }
 constexpr Operator kBinary[] = {BINARY("__add__"),  BINARY("__radd__"),    BINARY("__sub__"),
                                 BINARY("__rsub__"), BINARY("__mul__"),     BINARY("__rmul__"),
-                                BINARY("__pow__"),  BINARY("__truediv__"), BINARY("__rtruediv__")};
+                                BINARY("__pow__"),  BINARY("__truediv__"), BINARY("__rtruediv__"),
+                                BINARY("__lt__"),   BINARY("__le__"),      BINARY("__gt__"),
+                                BINARY("__ge__")};
 #undef BINARY
 constexpr Operator kUnary[] = {{"__neg__", "def __neg__(self) -> numpy.ndarray"},
                                {"__abs__", "def __abs__(self) -> numpy.ndarray"},
+                               {"__bool__", "def __bool__(self) -> bool"},
                                {"__float__", "def __float__(self) -> float"},
                                {"__len__", "def __len__(self) -> int"}};
 

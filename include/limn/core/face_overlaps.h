@@ -1,6 +1,6 @@
 #pragma once
-// Faces that overlap in a plane, or lie one above the other so close that rays in floats meet either
-// of them: a rule has to say which one is met, or double precision.
+// Faces that overlap in a plane, or lie one above the other so close that rays in floats meet
+// either of them: a rule has to say which one is met, or double precision.
 #include <optional>
 #include <span>
 #include <unordered_map>
@@ -13,9 +13,9 @@
 namespace limn {
 
 // Pairs of faces that lie in one plane, to the rounding of positions, and have more of it in common
-// than rounding explains: one of them is met, by a rule. And pairs that lie so above each other, but
-// with all of one within 2^-19 of the camera's distance from the other's plane, and within 2^-8 of
-// either's longest side: they are *near*, and the nearer one is met, in double precision.
+// than rounding explains: one of them is met, by a rule. And pairs that lie so above each other,
+// but with all of one within 2^-19 of the camera's distance from the other's plane, and within 2^-8
+// of either's longest side: they are *near*, and the nearer one is met, in double precision.
 class FaceOverlaps {
  public:
   enum class Of { kAllFaces, kDifferentShapes };  // whether faces of one shape are looked for
@@ -23,7 +23,7 @@ class FaceOverlaps {
   // faces only among all faces. InputError if there are more than kMostPairs.
   FaceOverlaps(const Scene& scene, const FaceCopies& copies, int threads, Of of = Of::kAllFaces);
 
-  static constexpr size_t kMostPairs = 1 << 24;  // 0.7 GB
+  static constexpr size_t kMostPairs = 1 << 24;  // about 0.9 GB
 
   bool empty() const { return of_.empty(); }
   // Those in one plane, each once, in the order of the file.
@@ -37,8 +37,8 @@ class FaceOverlaps {
   }
   // Whether two faces lie in one place: copies, too.
   bool contains(FaceRef a, FaceRef b) const;
-  // Of the faces in a hit's place, copies among them, that which the ray meets (is_met_first), after
-  // near ones that are met before it.
+  // Of the faces in a hit's place, copies among them, that which the ray meets (is_met_first),
+  // after near ones that are met before it.
   void settle(const Ray& ray, Hit& hit) const;
   // The first face that the ray meets of those near to the one where it starts; `hit` is changed
   // only if that is nearer. False if there is none.

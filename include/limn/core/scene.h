@@ -52,9 +52,9 @@ struct Scene {
   bool hide_emitters = false;
   int sample_count = 4;  // samples per pixel that the sensor asks for
   uint64_t seed = 0;
-  std::vector<Sensor>
-      sensors;  // of the file, as they were read: use_sensor() makes one of them the
-                // scene's, at first that in front
+  // Of the file, as they were read: use_sensor() makes one of them the scene's, at first that in
+  // front.
+  std::vector<Sensor> sensors;
   ShadingModel shading = ShadingModel::kContinuous;
 
   std::vector<Shape> shapes;
@@ -83,9 +83,12 @@ Scene read_scene_text(const std::string& text, const std::string& folder,
                       const std::map<std::string, std::string>& defines,
                       std::vector<std::string>* warnings);
 
-// Camera, film, samples and seed become those of a sensor of the file, named by its id or its number
-// from 0. InputError that lists them if there is none.
+// Camera, film, samples and seed become those of a sensor of the file, named by its number from 0
+// or its id; an id that is a sensor's number stands for that one. InputError that lists them if
+// there is none.
 void use_sensor(Scene& scene, const std::string& name);
+// Their numbers and ids, as in: 0, 1 or "side".
+std::string sensor_names(const Scene& scene);
 
 // How many sensors a file has. InputError where it is no scene as far as that is looked at: no mesh
 // or image is read.

@@ -45,7 +45,7 @@ struct SeenFace {
   PlaneFunction inverse_depth;        // [1 / length]; depths are positive
   double depth_error = 0;             // bound of the rounding of inverse_depth, where the face is
   bool ruled = false;                 // the regions' rule may know it
-  std::array<PlaneFunction, 2> cuts;  // it is seen only where these are not negative
+  std::array<PlaneFunction, 3> cuts;  // it is seen only where these are not negative
   int cut_count = 0;
   PlanePoint lower, upper;  // its bounding box
   double nearest = 0;       // the largest inverse depth of its points

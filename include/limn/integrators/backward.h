@@ -13,11 +13,16 @@
 
 #include "limn/core/image.h"
 #include "limn/core/scene.h"
+#include "limn/edgetree/edge_sampler_types.h"
 #include "limn/integrators/gradient.h"
 #include "limn/integrators/moments.h"
 #include "limn/integrators/run.h"
 
 namespace limn {
+
+// The row of edge_sampler_types(). InputError if there is none, or if it leaves regions of light to
+// terms that reverse mode does not have.
+const EdgeSamplerType& backward_sampler(const std::string& name);
 
 struct BackwardOptions {
   // Names as in parameter.h, arrays included (SHAPE.vertex_positions); none: all parameters of the
@@ -28,7 +33,7 @@ struct BackwardOptions {
   // Every pixel gets the same number of paths. Else a quarter of them is spread evenly and the rest
   // in proportion to |A|, summed over channels.
   bool uniform_pixels = false;
-  std::string sampler = "forest";  // of edges, edge_sampler_types()
+  std::string sampler = "forest";  // of edges, backward_sampler()
   int edge_samples = 1;       // at every vertex of a path, of the boundary and shadow terms each
   double camera_samples = 1;  // points on silhouettes of the film, per path
   int batches = 16;           // at most, for standard errors; each ends with the adjoint of normals

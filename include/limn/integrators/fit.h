@@ -62,9 +62,9 @@ struct FitOptions {
   // lambda = (distance / mean length of an edge)^2. 0: vertices move one by one.
   double smoothing = 0.08;
   // After so many steps shapes whose vertices are fitted get new triangles of one size (Botsch and
-  // Kobbelt 2004), their edges remesh_edge times as long as the mean was; steps and smoothing shrink
-  // by remesh_shrink, from the large to the small. Needs manifold meshes without flat shading, and
-  // OpenMesh.
+  // Kobbelt 2004), their edges remesh_edge times as long as the mean was; steps and smoothing
+  // shrink by remesh_shrink, from the large to the small. Needs manifold meshes without flat
+  // shading, and OpenMesh.
   std::vector<int64_t> remesh;
   double remesh_edge = 0.75;
   double remesh_shrink = 0.65;

@@ -15,15 +15,16 @@ def write_ply(
 ) -> None:
     """Writes a mesh as binary PLY: (V, 3) positions as float32, (F, 3) indices of corners.
 
-    limn.write_ply("found.ply", mesh.positions, mesh.faces) with mesh = scene.mesh("ball"); limn.load
-    and others read it.
+    limn.write_ply("found.ply", mesh.positions, mesh.faces) with mesh = scene.mesh("ball");
+    limn.load and others read it.
     """
     points = np.asarray(positions, dtype="<f4")
     corners = np.asarray(faces)
     if points.ndim != 2 or points.shape[1] != 3:
         raise InputError(f"positions have shape (V, 3), not {points.shape}")
     if corners.ndim != 2 or corners.shape[1] != 3 or corners.dtype.kind not in "iu":
-        raise InputError(f"faces have shape (F, 3) and are integers, not {corners.shape} of {corners.dtype}")
+        what = f"{corners.shape} of {corners.dtype}"
+        raise InputError(f"faces have shape (F, 3) and are integers, not {what}")
     if corners.size and not (0 <= corners.min() and corners.max() < len(points)):
         raise InputError(f"faces name vertices {corners.min()} to {corners.max()} of {len(points)}")
     rows = np.empty(len(corners), dtype=[("count", "u1"), ("corners", "<u4", 3)])
@@ -32,6 +33,7 @@ def write_ply(
         stream.write(
             f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n"
             "property float x\nproperty float y\nproperty float z\n"
-            f"element face {len(rows)}\nproperty list uchar uint vertex_indices\nend_header\n".encode()
+            f"element face {len(rows)}\nproperty list uchar uint vertex_indices\n"
+            "end_header\n".encode()
         )
         stream.write(points.tobytes() + rows.tobytes())
