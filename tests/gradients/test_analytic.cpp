@@ -16,9 +16,9 @@ namespace {
 // about which of them is before the other.
 TEST(Analytic, LampsFlushInLargeSurfaces) {
   for (const double offset : {-21.0, 21.0}) {
-    const auto turned = [](const std::string& scale, const std::string& offset, const char* inner) {
+    const auto turned = [](const std::string& scale, const std::string& place, const char* inner) {
       return R"(<shape type="rectangle"><transform name="to_world"><scale value=")" + scale +
-             R"("/><translate )" + offset +
+             R"("/><translate )" + place +
              R"(/><rotate x="0.3" y="0.5" z="0.2" angle="37"/></transform>)" + inner + "</shape>";
     };
     const std::string text =
