@@ -66,7 +66,8 @@ nb::dict describe_crossings(const Scene& scene, int threads) {
 
 nb::dict info(const SceneHandle& handle, int threads) {
   const Scene& scene = handle.get();
-  nb::list shapes, lights, parameters;
+  nb::list shapes, lights, parameters, sensors;
+  for (const Sensor& sensor : scene.sensors) sensors.append(sensor.id);
   for (uint32_t i = 0; i < scene.shapes.size(); ++i) {
     shapes.append(describe_shape(scene, ShapeId(i)));
   }
@@ -87,6 +88,7 @@ nb::dict info(const SceneHandle& handle, int threads) {
   all["scene"] = scene.file;
   all["shapes"] = shapes;
   all["lights"] = lights;
+  all["sensors"] = sensors;
   all["crossings"] = describe_crossings(scene, thread_count(threads));
   all["parameters"] = parameters;
   return all;
