@@ -7,6 +7,7 @@
 
 #include "integrators/terms/camera_path.h"
 #include "integrators/terms/edge_jump.h"
+#include "integrators/terms/path_follow.h"
 
 namespace limn {
 namespace {

@@ -350,7 +350,9 @@ class Checker {
 
 CheckResult check(const Scene& scene, const CheckOptions& options, const RunSettings& settings,
                   const GradientRun& run) {
-  check_warp(options.warp, {find_method(options.method).name});  // before the search for a step
+  const MethodType& method = find_method(options.method);
+  if (method.check) method.check(scene);  // before the search for a step
+  check_warp(options.warp, {method.name});
   return Checker(scene, options, settings, run).check();
 }
 

@@ -23,11 +23,12 @@ void check_shading(const Scene& scene, GradientResult& result) {
       "is incomplete");
 }
 
-void check_selection(const MethodType& method, const GradientOptions& options) {
+void check_selection(const MethodType& method, const Scene& scene, const GradientOptions& options) {
   if (options.exact_film && !method.terms_can_be_left_out) {
     throw InputError("the exact film is for methods that sample edges on it: the method \"" +
                      method.name + "\" does not");
   }
+  if (method.check) method.check(scene);
   check_warp(options.warp, {method.name});
   if (options.terms.empty() || method.terms_can_be_left_out) return;
   throw InputError("terms: the method \"" + method.name + "\" has all terms in one");
@@ -93,7 +94,7 @@ double edge_magnitude(const GradientResult& result, const ParameterGradient& g, 
 GradientResult gradient(const Scene& scene, const GradientOptions& options,
                         const RunSettings& settings) {
   const MethodType& method = find_method(options.method);
-  check_selection(method, options);
+  check_selection(method, scene, options);
   if (settings.store) identify(method, scene, options, *settings.store);
   GradientResult result = method.run(method, scene, options, settings);
   result.method = method.name;
@@ -105,7 +106,7 @@ GradientResult gradient(const Scene& scene, const GradientOptions& options,
 std::vector<std::string> trace_sample(const Scene& scene, const GradientOptions& options,
                                       const RunSettings& settings, const NonFinite::Place& place) {
   const MethodType& method = find_method(options.method);
-  check_selection(method, options);
+  check_selection(method, scene, options);
   if (!method.trace) {
     throw InputError("the method \"" + method.name + "\" cannot trace single samples");
   }

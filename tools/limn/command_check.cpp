@@ -155,6 +155,7 @@ class CheckCommand final : public Command {
       warnings_.add_all(r.gradient.warnings);
       print_check(parameter, r, settings.spp);
       report.push_back(figures_json(parameter, r, settings.spp));
+      report.back()["sensor"] = sensor_name(scene);
       report.back()["warnings"] = warnings_.lines();
       // What is wrong comes before what is not known.
       if (r.verdict == Verdict::kDisagree) status = kDisagree;
@@ -188,6 +189,7 @@ class CheckCommand final : public Command {
                  p < kCheckLevel ? ": DISAGREE" : "");
       agree = agree && p >= kCheckLevel;
       report.push_back({{"parameter", c.parameter},
+                        {"sensor", sensor_name(scene)},
                         {"forward", c.forward},
                         {"forward_stderr", number(c.forward_error)},
                         {"reverse", c.reverse},
