@@ -280,11 +280,16 @@ class TestFigures(unittest.TestCase):
             os.makedirs(counted)
             with open(os.path.join(counted, "edges.json"), "w") as stream:
                 json.dump({"mesh": "a/cube.obj", "edges": 12, "without_concave": 9}, stream)
+            with open(os.path.join(counted, "draws.json"), "w") as stream:
+                row = {"name": "quadric", "draw_ns": 800, "hit_rate": 0.7, "efficiency": 0.25, "build_ms": 50,
+                       "bytes_per_edge": 70}
+                json.dump({"edges": 9000, "ray_ns": 160, "rows": [row], "command": "edge_benchmark x"}, stream)
             figures = [
                 Figure("Fig. 1", "A title", "what it <shows>", "what to see",
                        [Part("mirror", "compare", "mirror.xml", methods=["forest"])], "samples"),
                 Figure("Fig. 2", "Patches", "b", "c", [Part("bunny", "reject", "bunny.ply")]),
                 Figure("Table 3", "Edges", "d", "e", [Part("table", "edges", "cube.obj")]),
+                Figure("Its code", "draws", "d", "e", [Part("table", "draws", "cube.obj")]),
                 Figure("Fig. 4", "Not run", "f", "g", [Part("none", "compare", "no.xml")]),
             ]
             file = os.path.join(temporary, "figures.html")
@@ -305,6 +310,8 @@ class TestFigures(unittest.TestCase):
         self.assertEqual(page.count("data:image/png;base64,"), 2 + 2 * 5 + 1 + 3 * 3)
         self.assertIn("Mitsuba is not installed", page)
         self.assertEqual(page.count('class="bad"'), 1)  # the method that is made biased
+        self.assertIn("<td>800</td><td>5.00</td><td>70 %</td><td>0.250</td><td>0.0500</td><td>70.0</td>", page)
+        self.assertIn("rays a draw, 9 k edges: quadric 5.00", page)
         self.assertIn("cube.obj</th><td>12</td><td>9</td><td>75 %", page)
 
     def test_edges_are_counted(self):
