@@ -49,6 +49,12 @@ def patch(name, mesh):
     )
 
 
+def bias(method, rays):
+    options = ["--method", method] + (["--aux", str(rays)] if method != "forest" else [])
+    return Part(f"fig10-bias-{method}-{rays}", "gradient", "scenes/closed_form/lamp_over_plane.xml",
+                "lamp.translate.x", options=options)
+
+
 FIGURES = [
     Figure(
         "Figures 7 and 8",
@@ -79,11 +85,14 @@ FIGURES = [
         "The same scene in equal time by warped-area sampling with 8 and 32 auxiliary rays "
         "(kappa 1e5): noise and bias where edge sampling has little of either. No numbers.",
         "`was` is biased by design and marked where the scores see it; `was-unbiased` is the "
-        "roulette that takes the bias out.",
+        "roulette that takes the bias out. At the end the bias over rays, where the derivative is "
+        "known.",
         [mirror(f"fig10-{rays}-rays-alpha-{alpha}", alpha,
                 [PAPER, "forest", DEFAULT, "was", "was-unbiased"],
                 options=["--aux", str(rays), "--kappa", "1e5"])
-         for alpha in ("0.01", "0.05") for rays in (8, 32)],
+         for alpha in ("0.01", "0.05") for rays in (8, 32)]
+        + [bias("forest", "reference"), *(bias("was", rays) for rays in (2, 8, 32, 128)),
+           bias("was-unbiased", 8)],
     ),
     Figure(
         "Figure 11 and Table 1",
@@ -91,8 +100,8 @@ FIGURES = [
         "Mitsuba 3's projective sampling with octree guiding has less error than the paper's method "
         "for an equal budget of samples. Table 1: the paper's trees take 0.24 to 1.9 s to build and "
         "its runs 142 to 153 s, projective sampling 10 to 17 s and 18 to 32 s (16 threads).",
-        "Equal time here, set-up included, which is reading, trees and a pilot. Trees alone take "
-        "0.05 s for 9,000 edges and 0.2 s for 100,000 (one core, edgetree/FIGURES.md).",
+        "Equal time here, set-up included, which is reading, trees and a pilot. Trees alone are timed "
+        "in the next section.",
         [mirror("fig11", 0.01, [PAPER, DEFAULT, "mitsuba"], "creature 8000")],
     ),
     Figure(

@@ -21,6 +21,7 @@ from report.markup import (
 from report.pictures import Pictures, figure
 from report.records import read_folder, read_record
 
+from . import bias_chart
 from .figures import DEFAULT, PAPER
 
 # A page of unbiased methods marks one of them in one of a hundred pages.
@@ -324,7 +325,7 @@ def _sections(paper_figures, folder, command):
     for entry in paper_figures:
         for part in entry.runs:
             try:
-                if part.kind not in ("edges", "draws"):
+                if part.kind in ("compare", "reject"):
                     results[part.name] = read_folder(folder(part))[0]
             except ReportError:
                 pass
@@ -357,6 +358,7 @@ def _sections(paper_figures, folder, command):
             if comparison.factor():
                 factors.append(comparison.factor())
             verdicts.append(" or ".join(comparison.best()) or "–")
+        parts += filter(None, [bias_chart.html(entry.runs, folder)])
         counted = _edges(entry.runs, folder)
         if counted:
             parts.append(counted[0])

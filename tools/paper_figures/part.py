@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 @dataclass
 class Part:
     name: str
-    kind: str  # "compare", "reject", "draws" or "edges"
-    input: str  # scene; for the others a mesh may stand here
+    kind: str  # "compare", "gradient", "reject", "draws" or "edges"
+    input: str  # scene; for the last three a mesh may stand here
     parameter: str = ""
     methods: list = field(default_factory=list)
     defines: dict = field(default_factory=dict)
