@@ -42,7 +42,7 @@ std::optional<ForestGroup> group_of(const EdgeMesh& mesh, const Edge& edge, bool
   }
 }
 
-Wedge flat_wedge_of(const EdgeMesh& mesh, EdgeId id, const Lanes& scale) {
+Wedge wedge_of(const EdgeMesh& mesh, EdgeId id, const Lanes& scale) {
   const Edge& edge = mesh.edge(id);
   const auto [a, b] = edge.vertices;
   Wedge wedge;
@@ -50,15 +50,10 @@ Wedge flat_wedge_of(const EdgeMesh& mesh, EdgeId id, const Lanes& scale) {
   wedge.planes[1] = edge.faces[1].valid() ? mesh.plane(edge.faces[1]) : wedge.planes[0];
   wedge.ends = {mesh.position(a), mesh.position(b)};
   wedge.length = length(wedge.ends[1] - wedge.ends[0]);
-  wedge.speed = 0.5 * (speed_of(mesh, a, scale) + speed_of(mesh, b, scale));
-  wedge.edge = id;
-  return wedge;
-}
-
-Wedge wedge_of(const EdgeMesh& mesh, EdgeId id, const Lanes& scale) {
-  Wedge wedge = flat_wedge_of(mesh, id, scale);
   const Vec3d &n0 = wedge.planes[0].n, &n1 = wedge.planes[1].n;
   wedge.angle = std::atan2(length(cross(n0, n1)), dot(n0, n1));
+  wedge.speed = 0.5 * (speed_of(mesh, a, scale) + speed_of(mesh, b, scale));
+  wedge.edge = id;
   return wedge;
 }
 
@@ -128,20 +123,6 @@ void put_rows(const DualFit& fit, int lane, Rows& rows) {
     for (int k = 0; k < 4; ++k) rows[i][k][lane] = static_cast<float>(fit.rows[i][k]);
 }
 
-}  // namespace
-
-void put_edge(const Wedge& wedge, const NodeFrame& frame, int lane, EdgeNode& node) {
-  const double scale = frame.inverse_radius * frame.inverse_radius;
-  put_rows(fit_edge(wedge, frame), lane, node.rows);
-  node.length[lane] = positive(wedge.length * scale);
-  node.speed[lane] = speed_of({&wedge, 1});
-  node.edge[lane] = static_cast<int32_t>(wedge.edge.index());
-  for (int e = 0; e < 2; ++e)
-    for (int k = 0; k < 3; ++k) node.ends[e][k][lane] = static_cast<float>(wedge.ends[e][k]);
-}
-
-namespace {
-
 // Fills the nodes of one tree, each on its own. ids: of the tree's nodes in the forest.
 class TreeFiller {
  public:
@@ -210,9 +191,17 @@ class TreeFiller {
 
   void fill_edges(const SplitNode<kWidth>& split, const NodeFrame& frame, EdgeNode& node) const {
     node.edge = Ints{} + kNoChild;
+    const double scale = frame.inverse_radius * frame.inverse_radius;
     for (int lane = 0; lane < kWidth; ++lane) {
       const std::span<const Wedge> wedges = edges(split.ranges[lane]);
-      if (!wedges.empty()) put_edge(wedges[0], frame, lane, node);
+      if (wedges.empty()) continue;
+      put_rows(fit_edge(wedges[0], frame), lane, node.rows);
+      node.length[lane] = positive(wedges[0].length * scale);
+      node.speed[lane] = speed_of(wedges);
+      node.edge[lane] = static_cast<int32_t>(wedges[0].edge.index());
+      for (int e = 0; e < 2; ++e)
+        for (int k = 0; k < 3; ++k)
+          node.ends[e][k][lane] = static_cast<float>(wedges[0].ends[e][k]);
     }
   }
 

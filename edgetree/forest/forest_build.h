@@ -17,8 +17,6 @@ namespace limn {
 std::optional<ForestGroup> group_of(const EdgeMesh& mesh, const Edge& edge, bool cull_concave);
 // scale: EdgeSamplerInput::lane_scale.
 Wedge wedge_of(const EdgeMesh& mesh, EdgeId id, const Lanes& scale);
-// The same without the angle, which trees are split by and no node holds.
-Wedge flat_wedge_of(const EdgeMesh& mesh, EdgeId id, const Lanes& scale);
 Bounds bounds_of(std::span<const Wedge> wedges);
 // Calls append(wedges, object, group) for every object and group that has edges, in a fixed order;
 // trees get a slot for every edge of every object first (Forest, QuadricForest).
@@ -42,8 +40,6 @@ void for_every_tree(const EdgeSamplerInput& input, bool cull_concave, Trees& tre
 }
 // The frame of a node whose edges fill the box: the cube [-1, 1]^3 holds it.
 NodeFrame frame_of(const Bounds& box);
-// Describes an edge in a lane of a node that has this frame.
-void put_edge(const Wedge& wedge, const NodeFrame& frame, int lane, EdgeNode& node);
 
 // One tree per object and group that has edges. The result does not depend on `threads`.
 Forest build_forest(const EdgeSamplerInput& input, int threads, const ForestConfig& config);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <limits>
 #include <vector>
 
 #include "edgetree/forest/forest_build.h"
@@ -26,7 +27,11 @@ class LeafForest final : public EdgeSampler {
   LeafForest(const EdgeSamplerInput& input, int threads, LeafSize size, const ForestConfig& config)
       : input_(input), config_(config), wide_(size == LeafSize::k64) {
     const Forest whole = build_forest(input, threads, config);
-    forest_.extent = whole.extent;
+    forest_ = whole;
+    forest_.inner.clear();
+    forest_.roots.clear();
+    forest_.edges = {};
+    forest_.slots = {};
     for (const auto& slots : whole.slots) leaf_of_.emplace_back(slots.size(), kNoParent);
     for (const NodeId root : whole.roots) forest_.roots.push_back(add(whole, root, kNoParent));
     forest_.inner.shrink_to_fit();
@@ -148,11 +153,27 @@ class LeafForest final : public EdgeSampler {
     const NodeFrame frame{{leaf.center[0], leaf.center[1], leaf.center[2]}, leaf.inverse_radius};
     const EdgeMesh& mesh = input_.object(leaf.object);
     const uint32_t begin = kWidth * number, end = std::min(leaf.count, begin + kWidth);
-    for (uint32_t i = begin; i < end; ++i) {
-      const Wedge wedge = flat_wedge_of(mesh, EdgeId(edges_[leaf.first + i]), input_.lane_scale);
-      put_edge(wedge, frame, static_cast<int>(i - begin), node);
-    }
+    for (uint32_t i = begin; i < end; ++i)
+      put_edge(mesh, EdgeId(edges_[leaf.first + i]), frame, static_cast<int>(i - begin), node);
     return node;
+  }
+  // As the build does, but for speeds, which are zero.
+  static void put_edge(const EdgeMesh& mesh, EdgeId id, const NodeFrame& frame, int lane,
+                       EdgeNode& node) {
+    const Edge& edge = mesh.edge(id);
+    Wedge wedge;
+    wedge.planes[0] = mesh.plane(edge.faces[0]);
+    wedge.planes[1] = edge.faces[1].valid() ? mesh.plane(edge.faces[1]) : wedge.planes[0];
+    for (int e = 0; e < 2; ++e) wedge.ends[e] = mesh.position(edge.vertices[e]);
+    const DualFit fit = fit_edge(wedge, frame);
+    for (int i = 0; i < 2; ++i)
+      for (int k = 0; k < 4; ++k) node.rows[i][k][lane] = static_cast<float>(fit.rows[i][k]);
+    const double size = length(wedge.ends[1] - wedge.ends[0]) * frame.inverse_radius;
+    node.length[lane] = static_cast<float>(
+        std::max(size * frame.inverse_radius, double{std::numeric_limits<float>::min()}));
+    node.edge[lane] = static_cast<int32_t>(id.index());
+    for (int e = 0; e < 2; ++e)
+      for (int k = 0; k < 3; ++k) node.ends[e][k][lane] = static_cast<float>(wedge.ends[e][k]);
   }
   static uint32_t chunks(const Leaf& leaf) { return (leaf.count + kWidth - 1) / kWidth; }
 
@@ -237,7 +258,7 @@ class LeafForest final : public EdgeSampler {
   const EdgeSamplerInput& input_;
   ForestConfig config_;
   bool wide_;
-  Forest forest_;  // inner nodes and roots; ids below zero are of leaves
+  Forest forest_;  // without nodes of edges and slots; ids below zero are of leaves
   std::vector<Leaf> leaves_;
   std::vector<uint32_t> edges_;                 // of all leaves, in their order
   std::vector<std::vector<uint32_t>> leaf_of_;  // [object][edge], or kNoParent

@@ -14,8 +14,8 @@ enum class LeafSize { k8, k64 };
 // A leaf keeps its frame and the numbers of its edges alone: planes, ends and lengths are taken
 // from the mesh whenever a draw gets there, and all of its edges are weighed. Leaves of 64 are not
 // looked ahead at, which would take several times as long. Leaves of 8 draw as the forest does that
-// opens no nodes (ForestConfig::most_open 0). Of meshes without crossings, lights and environment;
-// the input must outlive it.
+// opens no nodes (ForestConfig::most_open 0). Of meshes at rest, without crossings, lights and
+// environment; the input must outlive it.
 std::unique_ptr<EdgeSampler> make_leaf_forest(const EdgeSamplerInput& input, int threads,
                                               LeafSize size, const ForestConfig& config);
 
