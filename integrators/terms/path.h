@@ -17,6 +17,7 @@
 
 #include "integrators/terms/closed_light.h"
 #include "integrators/terms/near_faces.h"
+#include "integrators/terms/viewpoint.h"
 #include "integrators/terms/walk.h"
 #include "integrators/terms/warp_field.h"
 #include "limn/core/lights.h"
@@ -467,10 +468,11 @@ class PathTracer {
     if (is_black(value(f))) walk.light.reset();
   }
   // No ray meets a delta light by chance, so it has the whole weight. Its direction follows the
-  // parameters, and f_s with it.
+  // parameters, and f_s with it. A face that it sees edge-on is dark, as its edges have it: rounding
+  // would tell which half of the face begins to be lit as the scene moves.
   void draw_delta(Walk& walk, const DeltaLight& delta) const {
     const auto arriving = limn::arrival<S>(delta, walk.surface.p);
-    if (arriving) {
+    if (arriving && std::fabs(dot(walk.surface.n_g, value(arriving->wo))) > kEdgeOn) {
       const Rgb<S> f = walk.scattering->eval(arriving->wo);
       walk.light_share = f * arriving->irradiance * (1 / walk.light->pdf);
       if (!is_black(value(f))) return;
