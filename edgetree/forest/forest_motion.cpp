@@ -2,6 +2,8 @@
 #include "edgetree/forest/forest_motion.h"
 
 #include <Eigen/Dense>
+#include <bit>
+#include <cfloat>
 #include <cmath>
 
 namespace limn {
@@ -71,31 +73,37 @@ ObjectMotion motion_of(const EdgeMesh& mesh, const Lanes& lane_scale) {
   return left <= kLinear * all ? motion : ObjectMotion{};
 }
 
-SeenMotion::SeenMotion(const ObjectMotion& object, const EdgeQuery& query, const Lanes& lane_scale,
-                       double unit) {
-  const Vec3<Lanes> own = scaled_velocity(query.velocity, lane_scale);
-  const Vec3<Lanes> there = object.velocity(query.p), at_p = there - own;
-  Vec3<Lanes> linear[3];
+ViewerMotion::ViewerMotion(const EdgeQuery& query, const Lanes& lane_scale, double unit)
+    : p(query.p), inverse_unit(1 / unit), velocity(scaled_velocity(query.velocity, lane_scale)) {
+  const DirectionTurn turn{scaled_velocity(query.turn.rate, lane_scale), query.turn.axis};
   for (int column = 0; column < 3; ++column) {
     Vec3d axis{};
-    axis[column] = 1 / unit;
-    linear[column] =
-        object.linear[column] * (1 / unit) - scaled_velocity(query.turn.velocity(axis), lane_scale);
+    axis[column] = inverse_unit;
+    linear[column] = turn.velocity(axis);
   }
+}
+
+SeenMotion::SeenMotion(const ObjectMotion& object, const ViewerMotion& viewer) {
+  const Vec3<Lanes> there = object.velocity(viewer.p), at_p = there - viewer.velocity;
+  Vec3<Lanes> linear[3];
+  for (int column = 0; column < 3; ++column)
+    linear[column] = object.linear[column] * viewer.inverse_unit - viewer.linear[column];
   for (int i = 0; i < kLanes; ++i) {
-    double squares = 0, speeds = 0;
+    double squares = 0, largest = 0;
     for (int k = 0; k < 3; ++k) {
       // Both, since it is they that are rounded.
-      speeds += std::fabs(own[k][i]) + std::fabs(there[k][i]);
+      largest += std::fabs(viewer.velocity[k][i]) + std::fabs(there[k][i]);
       for (const Vec3<Lanes>& column : linear) squares += column[k][i] * column[k][i];
     }
     const double stretch = std::sqrt(squares);
-    if (!(speeds + stretch > 0)) continue;
-    int exponent = 0;
-    std::frexp(speeds + stretch, &exponent);
-    const double inverse = std::ldexp(1, -exponent);
+    largest += stretch;
+    if (!(largest >= FLT_MIN)) continue;
+    // The power of two below it.
+    const double size =
+        std::bit_cast<double>(std::bit_cast<uint64_t>(largest) & (uint64_t{0x7ff} << 52));
+    const double inverse = 1 / size;
     Lane& lane = lanes[count++];
-    lane.size = static_cast<float>(std::ldexp(1, exponent));
+    lane.size = static_cast<float>(size);
     lane.stretch = static_cast<float>(stretch * inverse);
     for (int k = 0; k < 3; ++k) {
       lane.at_p[k] = static_cast<float>(at_p[k][i] * inverse);

@@ -29,12 +29,22 @@ struct ObjectMotion {
 // map leaves much of the motion.
 ObjectMotion motion_of(const EdgeMesh& mesh, const Lanes& lane_scale);
 
+// How p moves, and the directions there: what all objects of a query share.
+struct ViewerMotion {
+  // unit: ForestQuery::unit.
+  ViewerMotion(const EdgeQuery& query, const Lanes& lane_scale, double unit);
+  Vec3d p;
+  double inverse_unit;
+  Vec3<Lanes> velocity;   // of p, scaled
+  Vec3<Lanes> linear[3];  // of directions: as of ObjectMotion, per 1 / unit
+};
+
 // An object's velocity relative to p and to directions that turn there, in the lanes where there is
 // any.
 struct SeenMotion {
   // u(w) = size (at_p + linear w unit), w = x - p.
   struct Lane {
-    float size;  // a power of two: the rest is of the order of 1 at most
+    float size;  // a power of two: the rest is less than 2
     float at_p[3];
     float linear[3][3];  // [row][column]
     float stretch;       // Frobenius norm of `linear`
@@ -43,9 +53,7 @@ struct SeenMotion {
   Lane lanes[kLanes];
 
   SeenMotion() = default;
-  // unit: ForestQuery::unit.
-  SeenMotion(const ObjectMotion& object, const EdgeQuery& query, const Lanes& lane_scale,
-             double unit);
+  SeenMotion(const ObjectMotion& object, const ViewerMotion& viewer);
 };
 
 }  // namespace limn

@@ -292,9 +292,8 @@ Floats speed_below(const InnerNode& node, const ForestQuery& query, const DualPl
     const float stretch = lane.stretch * unit;
     const Floats within2 = (stretch * stretch / 3) * half2;
     const Floats across2 = silhouettes ? normals.along2(v, side2) : side2 * kAnyNormal;
-    const Floats speed = query.any_direction ? sqrt(v2 + within2)
-                                             : max(sqrt(across2 + within2), sqrt(v2) * kSlowest);
-    sum += (speed + kMotionRounding) * lane.size;
+    const Floats speed2 = query.any_direction ? v2 : max(across2, v2 * (kSlowest * kSlowest));
+    sum += (sqrt(speed2 + within2) + kMotionRounding) * lane.size;
   }
   return sum;
 }
@@ -304,15 +303,17 @@ Floats speed_below(const InnerNode& node, const ForestQuery& query, const DualPl
 Floats speed_of(const EdgeNode& node, const ForestQuery& query, const Floats3& w_0,
                 const Floats3& w_1, const Floats3& normal) {
   const SeenMotion& motion = query.motion_of(node.head.object);
-  const Floats half_inverse = 0.5f / max(sqrt(dot(normal, normal)), splat(kLeast));
+  const Floats quarter_inverse = 0.25f / max(dot(normal, normal), splat(kLeast));
   Floats sum = node.speed;
   for (int i = 0; i < motion.count; ++i) {
     const SeenMotion::Lane& lane = motion.lanes[i];
     const Floats3 v_0 = velocity_at(lane, w_0, 1), v_1 = velocity_at(lane, w_1, 1);
-    const Floats v = sqrt(max(dot(v_0, v_0), dot(v_1, v_1)));
-    const Floats across = (abs(dot(v_0, normal)) + abs(dot(v_1, normal))) * half_inverse;
-    const Floats speed = query.any_direction ? v : max(across, v * kSlowestEdge);
-    sum += (speed + kMotionRounding) * lane.size;
+    const Floats v2 = max(dot(v_0, v_0), dot(v_1, v_1));
+    const Floats twice = abs(dot(v_0, normal)) + abs(dot(v_1, normal));
+    const Floats across2 = twice * twice * quarter_inverse;
+    const Floats speed2 =
+        query.any_direction ? v2 : max(across2, v2 * (kSlowestEdge * kSlowestEdge));
+    sum += (sqrt(speed2) + kMotionRounding) * lane.size;
   }
   return sum;
 }
@@ -368,12 +369,13 @@ ForestQuery::ForestQuery(const Forest& tree, const LightClusters* clusters,
   for (int k = 0; k < 3; ++k) n[k] = static_cast<float>(query.n[k]);
   unit = unit_of(forest, query.p);
   split(query.p, unit, p);
+  viewer_.emplace(query, scene.lane_scale, unit);
   if (query.face.shape.valid()) own_plane = scene.object(query.face.shape).plane(query.face.face);
 }
 
 const SeenMotion& ForestQuery::motion_of(ShapeId object) const {
   if (object != seen_) {
-    motion_ = SeenMotion(forest.motions[object.index()], asked, input.lane_scale, unit);
+    motion_ = SeenMotion(forest.motions[object.index()], *viewer_);
     seen_ = object;
   }
   return motion_;

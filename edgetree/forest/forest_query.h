@@ -44,6 +44,7 @@ struct ForestQuery {
   const SeenMotion& motion_of(ShapeId object) const;
 
  private:
+  std::optional<ViewerMotion> viewer_;
   mutable ShapeId seen_;
   mutable SeenMotion motion_;
 };
