@@ -49,7 +49,9 @@ struct EdgeForest::Impl {
     const bool lit = config.light_term && !lights.empty();
     const RadiancePyramid* environment =
         config.environment_term ? input.environment.get() : nullptr;
-    return {forest, lit ? &lights : nullptr, environment, query, input};
+    ForestQuery prepared(forest, lit ? &lights : nullptr, environment, query, input);
+    prepared.any_direction = !config.normal_speed;
+    return prepared;
   }
   // The result holds until another query is opened by this thread.
   const OpenNodes& open(const ForestQuery& query) const {
