@@ -15,6 +15,7 @@ import argparse
 import json
 import math
 import os
+import resource
 import struct
 import subprocess
 import sys
@@ -34,11 +35,15 @@ class Fits:
         return os.path.join(self.out, *names)
 
     def run(self, *words):
+        """Processor time [s]."""
         command = [self.limn, *words]
         if self.threads:
             command += ["--threads", str(self.threads)]
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
         if subprocess.run(command, check=False).returncode != 0:
             sys.exit(1)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
 
     def render(self, scene, file, *defines, spp=256, sensor=0):
         if not os.path.exists(file):
@@ -47,25 +52,25 @@ class Fits:
         return file
 
     def fit(self, folder, scene, target, steps, *words):
-        """The fit's figures."""
-        file = self.path(folder, "fit.json")
+        """The fit's figures; "seconds" are those of the processor."""
+        file, times = self.path(folder, "fit.json"), self.path(folder, "seconds.json")
         done = json.load(open(file, encoding="utf-8")) if os.path.exists(file) else None
-        steps = self.steps or steps
+        steps, seconds = self.steps or steps, None
         if done and os.path.exists(self.path(folder, "state.cbor")):
             if done["steps"] < steps:
-                self.run("fit", "--resume", self.path(folder), "--steps", str(steps))
+                seconds = self.run("fit", "--resume", self.path(folder), "--steps", str(steps))
         else:
-            self.run("fit", scene, "--target", target, "--steps", str(steps),
-                     "-o", self.path(folder), *words)  # fmt: skip
-        return json.load(open(file, encoding="utf-8"))
+            seconds = self.run("fit", scene, "--target", target, "--steps", str(steps),
+                               "-o", self.path(folder), *words)  # fmt: skip
+        total = json.load(open(times, encoding="utf-8")) if os.path.exists(times) else 0
+        if seconds:
+            total += seconds
+            json.dump(total, open(times, "w", encoding="utf-8"))
+        return json.load(open(file, encoding="utf-8")) | {"seconds": total}
 
 
 def scene(name):
     return os.path.join(HERE, name)
-
-
-def seconds(history):
-    return sum(h["seconds"] for h in history)
 
 
 SHAPE_HEAD = [
@@ -73,11 +78,12 @@ SHAPE_HEAD = [
 ]
 
 
-def shape_row(name, steps, mesh, history):
+def shape_row(name, fit, mesh, steps):
+    history = fit["history"][:steps]
     loss = sum(h["loss"] for h in history[-5:]) / len(history[-5:]) if history else 0
     return [name, steps, f"{mesh['chamfer']:.4f}", f"{mesh['hausdorff_95']:.4f}",
             f"{mesh['normal_angle']:.1f}", mesh["inside_out"], mesh["crossings"],
-            f"{loss:.5f}" if history else "", f"{seconds(history):.0f}"]  # fmt: skip
+            f"{loss:.5f}" if history else "", f"{fit['seconds']:.0f}" if history else ""]  # fmt: skip
 
 
 def shape_rows(fits, name, base, targets, truth, steps, defines, words, variants, smoothing):
@@ -92,8 +98,8 @@ def shape_rows(fits, name, base, targets, truth, steps, defines, words, variants
                        "--smoothing", str(smoothing), *more)  # fmt: skip
         first, last = (fit["snapshots"][i]["meshes"][0] for i in (0, -1))
         if not rows:
-            rows.append(shape_row("start", 0, first, []))
-        rows.append(shape_row(variant, fit["steps"], last, fit["history"]))
+            rows.append(shape_row("start", fit, first, 0))
+        rows.append(shape_row(variant, fit, last, fit["steps"]))
     return SHAPE_HEAD, rows
 
 
@@ -117,8 +123,12 @@ def mirrors(fits):
 def shadows(fits):
     size = ["width=64", "height=48"]
     target = fits.render(scene("hidden_object.xml"), fits.path("shadows.exr"), *size)
-    words = ["--spp", "6", "--remesh", "50,100", "--snapshots", "25", "--seed", "1"]
-    variants = [("adjoint pixels", []), ("uniform pixels", ["--pixels", "uniform"])]
+    words = ["--spp", "6", "--remesh", "50,100", "--snapshots", "25"]
+    variants = [(f"seed {i}", ["--seed", str(i)]) for i in (1, 2, 3)]
+    variants += [
+        ("uniform pixels", ["--seed", "1", "--pixels", "uniform"]),
+        ("no boundary", ["--seed", "1", "--terms", TERMS]),
+    ]
     truth = os.path.join(fits.generated, "creature.ply")
     return shape_rows(
         fits, "shadows", "hidden_object", [target], truth, 150, size, words, variants, 0.1
@@ -131,11 +141,13 @@ def views(fits):
         fits.render(scene("eight_views.xml"), fits.path(f"view_{i}.exr"), *size, sensor=i)
         for i in range(8)
     ]
-    words = ["--spp", "2", "--snapshots", "25", "--seed", "1"]
-    variants = [("remeshed", ["--remesh", "15,30"]), ("no remeshing", [])]
+    words = ["--spp", "2", "--snapshots", "30"]
+    remesh = ["--remesh", "40,80,120"]
+    variants = [(f"seed {i}", [*remesh, "--seed", str(i)]) for i in (1, 2, 3)]
+    variants += [("no remeshing", ["--seed", "1"])]
     truth = "/usr/share/glmark2/models/bunny.obj"
     return shape_rows(
-        fits, "views", "eight_views", targets, truth, 45, size, words, variants, 0.1
+        fits, "views", "eight_views", targets, truth, 160, size, words, variants, 0.1
     )
 
 
@@ -157,7 +169,7 @@ def pose(fits):
     for s in fit["scalars"]:
         begin, truth = known.get(s["name"], (0, ""))
         rows.append([s["name"], begin, truth, f"{s['value']:.5f}"])
-    rows.append(["seconds", "", "", f"{seconds(fit['history']):.0f}"])
+    rows.append(["seconds", "", "", f"{fit['seconds']:.0f}"])
     return ["what", "start", "truth", "found"], rows
 
 

@@ -29,8 +29,8 @@ Mesh shaken(Mesh mesh) {
   return mesh;
 }
 
-// A torus over a rough mirror, a lamp, a sky.
-Scene mirror_scene(const TempFiles& files, bool face_normals, int depth = 3) {
+// A torus over a rough mirror, a lamp of that size, a sky.
+Scene mirror_scene(const TempFiles& files, bool face_normals, int depth = 3, double lamp = 0.8) {
   SceneParts parts;
   parts.max_depth = depth;
   parts.origin = {0, 2.5, 4};
@@ -40,7 +40,7 @@ Scene mirror_scene(const TempFiles& files, bool face_normals, int depth = 3) {
   parts.body =
       square("mirror", 2.5, -90, {0, 0, 0}, conductor("gloss", 0.2)) +
       obj_shape("body", mesh, face_normals, 0.6, {0, 0.9, 0}, diffuse("clay", ".6, .5, .4")) +
-      square("lamp", 0.8, 90, {0.5, 3.5, 1}, area_light("glow", "6, 6, 6")) +
+      square("lamp", lamp, 90, {0.5, 3.5, 1}, area_light("glow", "6, 6, 6")) +
       make_sky(files, "sky");
   return make_scene(files, parts);
 }
@@ -158,9 +158,11 @@ TEST(Backward, InteriorIsThatOfForwardMode) {
 }
 
 // z-scores of all parameters, whose sum of squares has as many degrees of freedom at most.
-void expect_agreement(const Scene& scene, int spp, const std::vector<std::string>& terms = {}) {
+void expect_agreement(const Scene& scene, int spp, const std::vector<std::string>& terms = {},
+                      const std::string& sampler = "forest") {
   BackwardOptions options;
   options.terms = terms;
+  options.sampler = sampler;
   RunSettings settings;
   settings.spp = spp;
   settings.seed = 3;
@@ -199,10 +201,21 @@ TEST(Backward, AgreesWithOtherSamplers) {
     EXPECT_LT(std::fabs(a.mean(0) - b.mean(0)), 5 * std::sqrt(a.variance(0) + b.variance(0)))
         << name;
   }
-  for (const char* name : {"oak", "silhouettes"}) {
-    options.sampler = name;
-    EXPECT_THROW(backward(scene, adjoint, options, settings), InputError) << name;
-  }
+  options.sampler = "oak";
+  EXPECT_THROW(backward(scene, adjoint, options, settings), InputError);
+}
+
+// Where lamps and suns are regions apart. Before the small lamp, and its sides, half of what edges
+// add is found from the lamp.
+TEST(Backward, AgreesWithRegionsOfLight) {
+  const TempFiles files;
+  const Scene large = mirror_scene(files, true);
+  expect_agreement(large, 16, {}, "silhouettes");
+  const Scene small = mirror_scene(files, false, 3, 0.05);
+  expect_agreement(small, 64, {"direct", "penumbra"}, "silhouettes");
+  BackwardOptions options;
+  options.terms = {"direct"};
+  EXPECT_THROW(backward(large, random_adjoint(large, 1), options, RunSettings{}), InputError);
 }
 
 TEST(Backward, AgreesInSharpShadows) {
