@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "integrators/methods/hair_gaps.h"
 #include "limn/core/error.h"
 #include "limn/core/names.h"
 #include "limn/core/parameter.h"
@@ -97,6 +98,7 @@ GradientResult gradient(const Scene& scene, const GradientOptions& options,
   GradientResult result = method.run(method, scene, options, settings);
   result.method = method.name;
   check_shading(scene, result);
+  warn_of_hair_gaps(scene, static_cast<double>(result.spp), settings.threads, result.warnings);
   return result;
 }
 
