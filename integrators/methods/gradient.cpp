@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "integrators/methods/hair_gaps.h"
 #include "integrators/terms/viewpoint.h"
 #include "limn/core/error.h"
 #include "limn/core/names.h"
@@ -100,6 +101,7 @@ GradientResult gradient(const Scene& scene, const GradientOptions& options,
   result.method = method.name;
   check_shading(scene, result);
   warn_of_faces_edge_on(scene, result.warnings);
+  warn_of_hair_gaps(scene, static_cast<double>(result.spp), settings.threads, result.warnings);
   return result;
 }
 
