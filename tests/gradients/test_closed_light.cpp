@@ -62,8 +62,9 @@ void expect_among(const Dual& exact, const std::vector<Dual>& quadratures, doubl
     values.push_back(q.v);
     slopes.push_back(q.d[0]);
   }
-  expect(exact.v, values, 0x1p-44 * angle * angle);  // some 500 roundings of its terms
-  expect(exact.d[0], slopes, 0x1p-44 * angle);
+  // Some 500 roundings of terms as large as the angle, and of their derivatives.
+  expect(exact.v, values, 0x1p-44 * angle);
+  expect(exact.d[0], slopes, 0x1p-44);
 }
 
 TEST(PolygonLight, IntegralsAndDerivatives) {
