@@ -61,6 +61,9 @@ void bind_result(nb::module_& m) {
                    "Of the differences, in the parameter's unit.")
       .def_prop_ro("needed_spp", field(&CheckResult::needed_spp),
                    "To see an error of a fifth of all that matters.")
+      .def_prop_ro("bends", field(&CheckResult::bends),
+                   "Whether the image bends where gradient and differences disagree: the gradient "
+                   "is the slope on one side.")
       .def_prop_ro("gradient_sum", total(&TotalComparison::gradient),
                    "Sum over the image's pixels and channels.")
       .def_prop_ro("gradient_sum_stderr", total(&TotalComparison::gradient_error))

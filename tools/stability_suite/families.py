@@ -334,7 +334,9 @@ def sun(degrees):
 
 @family(
     "intricate", "parts", [1, 10, 100, 1000],
-    "A cloud of ever more and smaller tetrahedra over a glossy floor.", DIFFERENCES, SET_UP,
+    "A cloud of ever more and smaller tetrahedra over a glossy floor.", DIFFERENCES,
+    SET_UP + " What is left at 1000 parts is spread over all that edges do: 0.40 of the squared "
+    "error is of the term camera, 0.29 of boundary, 0.23 of direct, 0.09 of penumbra.",
 )
 def intricate(count):
     p, f = meshes.scattered(count)
