@@ -7,7 +7,9 @@
 #include "integrators/backward/edge_motion.h"
 #include "integrators/backward/parameter_slots.h"
 #include "integrators/terms/camera_edges.h"
+#include "integrators/terms/direct_edges.h"
 #include "integrators/terms/path.h"
+#include "integrators/terms/penumbra_lines.h"
 #include "integrators/terms/shadow_edges.h"
 #include "limn/edgetree/edge_sampler.h"
 #include "limn/integrators/run.h"
@@ -15,7 +17,15 @@
 namespace limn {
 
 // The terms of a reverse pass, in the order of results.
-enum AdjointTerm { kInterior, kCamera, kBoundary, kShadow, kAdjointTerms };
+enum AdjointTerm { kInterior, kCamera, kBoundary, kShadow, kDirect, kPenumbra, kAdjointTerms };
+
+// What stands in for regions of light where a sampler keeps them apart.
+struct AdjointRegions {
+  const LightRegions& regions;
+  const LampEdges& lamp_edges;
+  DirectEdges direct;
+  PenumbraLines lines;
+};
 
 struct AdjointContext {
   const PathContext& path;
@@ -26,10 +36,15 @@ struct AdjointContext {
   const EdgeSampler* sampler = nullptr;
   const CameraEdges* camera = nullptr;
   const ShadowEdges* shadows = nullptr;
+  // Null where there are none; whether their terms are computed.
+  const AdjointRegions* regions = nullptr;
+  bool direct = false, penumbra = false;
   bool interior = true;
   int edge_samples = 1;
 
   const Scene& scene() const { return path.scene; }
+  // Of what arrives, what `boundary` holds.
+  RadiancePart rest() const { return {regions ? &regions->regions : nullptr}; }
 };
 
 using AdjointCosts = std::array<TermCost, kAdjointTerms>;

@@ -33,7 +33,7 @@ const ParameterAdjoint& BackwardResult::of(const std::string& name) const {
 
 namespace {
 
-// AdjointTerm has the first rows of the table, in their order.
+// AdjointTerm has the rows of the table, in their order.
 const char* name_of(size_t term) { return term_types()[term].name; }
 
 constexpr size_t kTile = 256;  // paths, or points on the film; not tuned
@@ -121,7 +121,7 @@ class BackwardPass {
         tracer_(make_embree_tracer(parameters_.scene(), settings.threads)),
         lights_(parameters_.scene()),
         path_{parameters_.scene(), *tracer_, lights_},
-        input_(path_, 3, {1, 1, 1, 1}, backward_sampler(options.sampler), settings.threads),
+        input_(path_, 3, {1, 1, 1, 1}, edge_sampler_type(options.sampler), settings.threads),
         context_{path_, parameters_, input_.edges(),
                  EdgeMotion(parameters_.slots(), input_.edges())} {
     select();
@@ -141,6 +141,7 @@ class BackwardPass {
 
  private:
   void select();
+  void select_regions();
   size_t points_per_sample() const {
     return static_cast<size_t>(
         std::ceil(options_.camera_samples * static_cast<double>(film_.pixels().size())));
@@ -180,6 +181,7 @@ class BackwardPass {
   AdjointContext context_;
   std::unique_ptr<CameraEdges> camera_;
   std::unique_ptr<ShadowEdges> shadows_;
+  std::unique_ptr<AdjointRegions> regions_;
   bool computed_[kAdjointTerms] = {};
   bool on_film_[kAdjointTerms] = {};
   Figures batch_;  // of the batch in progress
@@ -188,14 +190,18 @@ class BackwardPass {
 };
 
 void BackwardPass::select() {
-  std::vector<std::string> known;
+  std::vector<size_t> known;
+  std::vector<std::string> names;
   for (size_t t = 0; t < kAdjointTerms; ++t) {
-    if (term_types()[t].applies(parameters_.scene())) known.emplace_back(name_of(t));
+    const TermType& type = term_types()[t];
+    if (!type.applies(parameters_.scene()) || (type.regions && !input_.regions())) continue;
+    known.push_back(t);
+    names.emplace_back(type.name);
   }
-  const auto chosen = selected_terms(known, options_.terms, parameters_.scene().file);
-  for (size_t t = 0; t < known.size(); ++t) {
-    computed_[t] = std::find(chosen.begin(), chosen.end(), known[t]) != chosen.end();
-    result_.terms.push_back({known[t], computed_[t], t != kInterior, 1, {}, {}});
+  const auto chosen = selected_terms(names, options_.terms, parameters_.scene().file);
+  for (const size_t t : known) {
+    computed_[t] = std::find(chosen.begin(), chosen.end(), name_of(t)) != chosen.end();
+    result_.terms.push_back({name_of(t), computed_[t], t != kInterior, 1, {}, {}});
   }
   context_.interior = computed_[kInterior];
   context_.edge_samples = options_.edge_samples;
@@ -223,6 +229,7 @@ void BackwardPass::select() {
     on_film_[kShadow] = !shadows_->empty() && (max_depth < 0 || max_depth > 1);
     result_.stats.edges.emplace_back("of sharp shadows", shadows_->size());
   }
+  if (input_.regions()) select_regions();
   result_.stats.setup.emplace_back("edges", input_.edges_seconds());
   if (parameters_.scene().shading == ShadingModel::kMitsuba) {
     result_.warnings.push_back(
@@ -234,6 +241,21 @@ void BackwardPass::select() {
     result_.parameters.push_back(
         {p.name, p.unit, p.shape(), Moments(p.numbers(), options_.keep_batches)});
   }
+}
+
+void BackwardPass::select_regions() {
+  const EdgeSamplerInput& edges = input_.edges();
+  const LightRegions& regions = *input_.regions();
+  const LampEdges& lamp_edges = *input_.lamp_edges();
+  regions_.reset(new AdjointRegions{regions, lamp_edges,
+                                    DirectEdges(edges, input_.edge_sampler(), regions),
+                                    PenumbraLines(path_, edges, regions, lamp_edges)});
+  context_.regions = regions_.get();
+  context_.direct = computed_[kDirect];
+  context_.penumbra = computed_[kPenumbra] && lamp_edges.size() > 0;
+  const int max_depth = parameters_.scene().max_depth;
+  on_film_[kPenumbra] = context_.penumbra && (max_depth < 0 || max_depth > 1);
+  result_.stats.edges.emplace_back("before lamps", lamp_edges.size());
 }
 
 std::vector<PathBatch> BackwardPass::batches() const {
@@ -328,10 +350,11 @@ std::optional<BatchResult> BackwardPass::run_batch(const PathBatch& batch,
                                                    ProgressCounter& progress) {
   ContributionSum sum(parameters_.slots().count);
   batch_ = {};
-  if (computed_[kInterior] || computed_[kBoundary] || context_.shadows) {
+  if (computed_[kInterior] || computed_[kBoundary] || context_.shadows || context_.direct ||
+      context_.penumbra) {
     run_paths(batch, progress, sum);
   }
-  for (const AdjointTerm term : {kCamera, kShadow}) {
+  for (const AdjointTerm term : {kCamera, kShadow, kPenumbra}) {
     if (on_film_[term]) run_film(term, batch, progress, sum);
   }
   if (progress.stopped()) return std::nullopt;
@@ -411,12 +434,14 @@ void BackwardPass::run_film(AdjointTerm term, const PathBatch& batch, ProgressCo
   const size_t count = points_per_sample() * batch.count();
   const size_t first = points_per_sample() * batch.first;
   const double share = 1 / static_cast<double>(count);
-  const auto add = term == kCamera ? add_camera_adjoint : add_shadow_adjoint;
+  const auto add = term == kCamera   ? add_camera_adjoint
+                   : term == kShadow ? add_shadow_adjoint
+                                     : add_penumbra_adjoint;
   run_tiles(
       count, progress, sum, term,
       [&](size_t i, Tape& tape, Figures& own, std::vector<Contribution>& list) {
         const Rng key = Rng(batch.seed, UINT64_MAX, first + i)
-                            .copy(Purpose::kFilmCopy, term == kCamera ? 0 : 1);
+                            .copy(Purpose::kFilmCopy, term_types()[term].film_stream);
         const double u = (i + key.at(Purpose::kCamera, 0).uniform()) / count;
         try {
           return add(context_, film_, u, key, share, tape, own.costs[term], list);
@@ -430,10 +455,16 @@ void BackwardPass::run_film(AdjointTerm term, const PathBatch& batch, ProgressCo
 }
 
 void BackwardPass::finish() {
-  for (size_t t = 0; t < result_.terms.size(); ++t) {
-    result_.terms[t].cost = all_.costs[t];
-    if (t == kCamera) result_.terms[t].samples = options_.camera_samples;
-    if (t == kBoundary || t == kShadow) result_.terms[t].samples = options_.edge_samples;
+  size_t next = 0;
+  for (size_t t = 0; t < kAdjointTerms && next < result_.terms.size(); ++t) {
+    if (result_.terms[next].name != name_of(t)) continue;
+    TermRun& term = result_.terms[next++];
+    term.cost = all_.costs[t];
+    if (t == kCamera) {
+      term.samples = options_.camera_samples;
+    } else if (t != kInterior) {
+      term.samples = options_.edge_samples;
+    }
   }
   result_.non_finite = all_.bad;
   result_.tape_bytes = all_.tape_bytes;
@@ -441,15 +472,6 @@ void BackwardPass::finish() {
 }
 
 }  // namespace
-
-const EdgeSamplerType& backward_sampler(const std::string& name) {
-  const EdgeSamplerType& type = edge_sampler_type(name);
-  if (type.regions) {
-    throw InputError("reverse mode has no regions of light, which \"" + name +
-                     "\" lists: take forest");
-  }
-  return type;
-}
 
 BackwardResult backward(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
                         const RunSettings& settings) {

@@ -1,7 +1,9 @@
 // Silhouettes and sharp shadows on the film: the jump of radiance, weighed by the adjoint there,
-// pushes the film position along the curve's normal.
+// pushes the film position along the curve's normal. Where lines from lamps end in view, edges push
+// what the camera sees.
 #include "integrators/backward/film_adjoint.h"
 
+#include "integrators/backward/edge_adjoint.h"
 #include "integrators/backward/path_adjoint.h"
 #include "integrators/estimates/splat.h"
 #include "integrators/terms/film_point.h"
@@ -10,10 +12,6 @@
 namespace limn {
 
 namespace {
-
-double weighed(const Rgb<double>& adjoint, const Rgb<double>& value) {
-  return adjoint.r * value.r + adjoint.g * value.g + adjoint.b * value.b;
-}
 
 // A point of a face on a clip plane, between two corners.
 Vec3<Var> meet_clip_plane(const CameraView<Var>& camera, const Vec3<Var>& a, const Vec3<Var>& b,
@@ -113,6 +111,33 @@ bool add_shadow_adjoint(const AdjointContext& context, const FilmAdjoint& film, 
       shadow_sweep(context, edge, *point, ray.origin, ray.direction, seen->distance, seeds);
   const double scale = film_per_solid_angle(context.scene().camera, seen->omega) / probability;
   seeds.add(swept.node, (amount.r + amount.g + amount.b) * scale * share);
+  seeds.sweep(context, tape);
+  return append_finite(tape, contributions);
+}
+
+bool add_penumbra_adjoint(const AdjointContext& context, const FilmAdjoint& film, double u,
+                          const Rng& key, double share, Tape& tape, TermCost& cost,
+                          std::vector<Contribution>& contributions) {
+  tape.clear();
+  ++cost.samples;
+  const PenumbraLines& lines = context.regions->lines;
+  RayCount rays;
+  Rng rng = key.at(Purpose::kShadow, 0);
+  auto drawn = lines.draw(u, rng, rays);
+  const auto seen = drawn ? film_point(context.scene(), drawn->face, drawn->line.p) : std::nullopt;
+  const Rgb<double> adjoint = seen ? film.at(seen->x, seen->y) : Rgb<double>{};
+  const bool counts = !is_black(adjoint) && lines.complete(*drawn, {}, 0, rng) &&
+                      !is_hidden(context.path, *seen, drawn->face, rays);
+  cost.add(rays);
+  if (!counts) {
+    ++cost.zero_weight;
+    return true;
+  }
+  drawn->edge.probability /= film_per_solid_angle(context.scene().camera, seen->omega);
+  const auto ray = camera_leaves(context.scene().camera).ray(seen->x, seen->y);
+  Seeds seeds;
+  add_penumbra_line(context, *drawn, ray.origin, ray.direction, adjoint * share, 0, key, tape,
+                    seeds, cost);
   seeds.sweep(context, tape);
   return append_finite(tape, contributions);
 }

@@ -1,5 +1,6 @@
 #pragma once
-// What points on curves of the film add to a gradient: silhouettes, and edges of sharp shadows.
+// What points on the film add to a gradient: of silhouettes, of edges of shadows, and ends of lines
+// from lamps.
 #include "integrators/backward/adjoint_context.h"
 
 namespace limn {
@@ -24,6 +25,9 @@ class FilmAdjoint {
 bool add_camera_adjoint(const AdjointContext& context, const FilmAdjoint& film, double u,
                         const Rng& key, double share, Tape& tape, TermCost& cost,
                         std::vector<Contribution>& contributions);
+bool add_penumbra_adjoint(const AdjointContext& context, const FilmAdjoint& film, double u,
+                          const Rng& key, double share, Tape& tape, TermCost& cost,
+                          std::vector<Contribution>& contributions);
 bool add_shadow_adjoint(const AdjointContext& context, const FilmAdjoint& film, double u,
                         const Rng& key, double share, Tape& tape, TermCost& cost,
                         std::vector<Contribution>& contributions);

@@ -1,19 +1,13 @@
 // One path on the tape. At its vertices edges are drawn as in forward mode, with an importance that
-// knows no motion: the vertices of all that moves have unit tangents along the axes, the shading
-// point their opposites, if it moves, so that an edge never seems to rest beside it.
+// knows no motion.
 #include "integrators/backward/path_adjoint.h"
 
-#include <limits>
-
+#include "integrators/backward/edge_adjoint.h"
 #include "integrators/terms/camera_path.h"
-#include "integrators/terms/edge_jump.h"
+#include "integrators/terms/path_follow.h"
 
 namespace limn {
 namespace {
-
-double weighed(const Rgb<double>& adjoint, const Rgb<double>& value) {
-  return adjoint.r * value.r + adjoint.g * value.g + adjoint.b * value.b;
-}
 
 // The terms of edges, as the visitor of a path.
 class VertexAdjoints {
@@ -26,27 +20,32 @@ class VertexAdjoints {
         costs_(costs) {}
 
   void operator()(const SurfacePoint<Var>& surface, const Scattering<Var>& scattering,
-                  const Rgb<Var>& throughput, const DirectionMotion*, const PathStep&, int bounces,
-                  const Rng& key) {
-    const Rgb<double> weight = adjoint_ * value(throughput);
-    if (context_.sampler) add_edges(surface, scattering, weight, bounces, key);
+                  const Rgb<Var>& throughput, const DirectionMotion*, const PathStep& step,
+                  int bounces, const Rng& key) {
+    const AdjointVertex vertex{surface, scattering, adjoint_ * value(throughput), bounces};
+    const EdgeQuery query = query_at(vertex);
     const int max_depth = context_.scene().max_depth;
-    if (context_.shadows && (max_depth < 0 || bounces + 2 < max_depth)) {
-      add_shadows(surface, scattering, weight, bounces, key);
-    }
+    const bool scatters_on = max_depth < 0 || bounces + 2 < max_depth;
+    const bool regions_alone = context_.regions && context_.regions->regions.hold_all();
+    if (context_.sampler && (scatters_on || !regions_alone)) add_edges(vertex, query, key);
+    if (context_.direct) add_direct(vertex, query, step, key);
+    if (context_.shadows && scatters_on) add_shadows(vertex, key);
+    if (context_.penumbra && scatters_on) add_penumbras(vertex, key);
   }
 
   Seeds& seeds() { return seeds_; }
 
  private:
-  void add_edges(const SurfacePoint<Var>& surface, const Scattering<Var>& scattering,
-                 const Rgb<double>& weight, int bounces, const Rng& key);
-  void add_edge(const SurfacePoint<Var>& surface, const Scattering<Var>& scattering,
-                const Rgb<double>& weight, const EdgeQuery& query, int bounces, const Rng& key);
-  void add_shadows(const SurfacePoint<Var>& surface, const Scattering<Var>& scattering,
-                   const Rgb<double>& weight, int bounces, const Rng& key);
-  void add_shadow(const SurfacePoint<Var>& surface, const Scattering<Var>& scattering,
-                  const Rgb<double>& weight, Rng rng);
+  void add_edges(const AdjointVertex& vertex, const EdgeQuery& query, const Rng& key);
+  void add_direct(const AdjointVertex& vertex, const EdgeQuery& query, const PathStep& step,
+                  const Rng& key);
+  void add_shadows(const AdjointVertex& vertex, const Rng& key);
+  void add_shadow(const AdjointVertex& vertex, Rng rng);
+  void add_penumbras(const AdjointVertex& vertex, const Rng& key);
+  void add_penumbra(const AdjointVertex& vertex, const Rng& key);
+  // One shadow ray.
+  bool is_hidden_from(const AdjointVertex& vertex, FaceRef face, const Vec3d& omega,
+                      double distance, TermCost& cost) const;
 
   const AdjointContext& context_;
   Rgb<double> adjoint_;
@@ -55,79 +54,104 @@ class VertexAdjoints {
   Seeds seeds_;
 };
 
-void VertexAdjoints::add_edges(const SurfacePoint<Var>& surface, const Scattering<Var>& scattering,
-                               const Rgb<double>& weight, int bounces, const Rng& key) {
+void VertexAdjoints::add_edges(const AdjointVertex& vertex, const EdgeQuery& query,
+                               const Rng& key) {
   const Stopwatch watch;
-  EdgeQuery query;
-  query.p = value(surface.p);
-  query.n = value(scattering.normal());
-  query.wi = value(scattering.wi());
-  query.lobe = scattering.bsdf().lobe();
-  if (!is_still(surface.p)) query.velocity = {{-1, 0, 0, 0}, {0, -1, 0, 0}, {0, 0, -1, 0}};
-  query.face = surface.face;
+  const RadiancePart part = context_.rest();
+  TermCost& cost = costs_[kBoundary];
   for (int i = 0; i < context_.edge_samples; ++i) {
-    add_edge(surface, scattering, weight, query, bounces, key.copy(Purpose::kEdgeCopy, i));
+    ++cost.samples;
+    const Rng own = key.copy(Purpose::kEdgeCopy, i);
+    Rng rng = own.at(Purpose::kEdge, vertex.bounces);
+    const std::optional<EdgeSample> drawn = context_.sampler->sample(query, rng);
+    if (drawn) {
+      add_edge_point(context_, vertex, query, *drawn, part, own, 1, tape_, seeds_, cost);
+    } else {
+      ++cost.no_edge;
+    }
   }
-  costs_[kBoundary].seconds += watch.seconds();
+  cost.seconds += watch.seconds();
 }
 
-// The velocity v of the edge's point, less that of p, sweeps over directions at the rate
-// v . side / |w|^3.
-void VertexAdjoints::add_edge(const SurfacePoint<Var>& surface, const Scattering<Var>& scattering,
-                              const Rgb<double>& weight, const EdgeQuery& query, int bounces,
-                              const Rng& key) {
-  TermCost& cost = costs_[kBoundary];
+void VertexAdjoints::add_direct(const AdjointVertex& vertex, const EdgeQuery& query,
+                                const PathStep& step, const Rng& key) {
+  static thread_local DirectPieces pieces;
+  static thread_local std::vector<DirectPoint> points;
+  const Stopwatch watch;
+  TermCost& cost = costs_[kDirect];
+  const AdjointRegions& r = *context_.regions;
+  r.direct.list(query, query, pieces);
+  r.direct.draw(pieces, key, vertex.bounces, context_.edge_samples, cost, points);
+  for (const DirectPoint& point : points) {
+    const double share =
+        direct_share(context_.scene(), context_.edges, r.regions, r.lamp_edges, point.sample,
+                     point.region, query.p, vertex.surface.n_g, step, vertex.bounces);
+    add_edge_point(context_, vertex, query, point.sample, {&r.regions, point.region}, key, share,
+                   tape_, seeds_, cost);
+  }
+  cost.seconds += watch.seconds();
+}
+
+void VertexAdjoints::add_penumbras(const AdjointVertex& vertex, const Rng& key) {
+  const Stopwatch watch;
+  for (int i = 0; i < context_.edge_samples; ++i) {
+    add_penumbra(vertex, key.copy(Purpose::kShadowCopy, i));
+  }
+  costs_[kPenumbra].seconds += watch.seconds();
+}
+
+// As penumbra_boundary.cpp does, for a viewer that is no camera: the vertex before.
+void VertexAdjoints::add_penumbra(const AdjointVertex& vertex, const Rng& key) {
+  TermCost& cost = costs_[kPenumbra];
   ++cost.samples;
-  Rng rng = key.at(Purpose::kEdge, bounces);
-  const std::optional<EdgeSample> drawn = context_.sampler->sample(query, rng);
+  RayCount rays;
+  Rng rng = key.at(Purpose::kShadow, vertex.bounces);
+  const double u = rng.uniform();
+  auto drawn = context_.regions->lines.draw(u, rng, rays);
+  cost.add(rays);
   if (!drawn) {
     ++cost.no_edge;
     return;
   }
-  const EdgeMesh& mesh = context_.edges.object(drawn->edge.object);
-  EdgeView view;
-  const bool seen = view_edge(mesh, drawn->edge, drawn->t, query.p, view);
-  const bool moves = context_.motion.moves(drawn->edge) || !is_still(surface.p);
-  const Rgb<double> f =
-      seen && moves && drawn->pdf_t > 0 ? scattering.eval_value(view.omega) : Rgb<double>{};
-  if (is_black(f)) {
+  const Vec3d q = value(vertex.surface.p);
+  const Vec3d to = drawn->line.p - q;
+  const double distance = length(to);
+  const bool apart = distance > 0 && drawn->face != vertex.surface.face;
+  const Vec3d omega = apart ? to / distance : Vec3d{};
+  const double pdf = apart ? vertex.scattering.pdf_solid_angle(omega) : 0;
+  const Rgb<double> f = pdf > 0 ? vertex.scattering.eval_value(omega) : Rgb<double>{};
+  const int bounces = vertex.bounces + 1;
+  if (is_black(f) || !context_.regions->lines.complete(*drawn, {q, pdf}, bounces, rng)) {
     ++cost.zero_weight;
     return;
   }
-  RayCount rays;
-  Rgb<double> jump;
-  const bool visible =
-      edge_jump(context_.path, mesh, view, query.face, 0, std::numeric_limits<double>::infinity(),
-                bounces + 1, key, rays, jump);
-  cost.add(rays);
-  if (!visible) {
+  if (is_hidden_from(vertex, drawn->face, omega, distance, cost)) {
     ++cost.occluded;
     return;
   }
-  ++cost.counted;
-  const double measure =
-      1 / (view.distance * view.distance * view.distance * drawn->probability * drawn->pdf_t);
-  const Vec3d g = view.side * (weighed(weight, f * jump) * measure);
-  if (g == Vec3d{}) return;
-  if (context_.motion.moves(drawn->edge)) {
-    context_.motion.contribute_point(tape_, drawn->edge, drawn->t, g);
-  }
-  seeds_.add(surface.p, -g);
+  add_penumbra_line(context_, *drawn, vertex.surface.p, {omega.x, omega.y, omega.z},
+                    vertex.weight * f, bounces, key, tape_, seeds_, cost);
 }
 
-void VertexAdjoints::add_shadows(const SurfacePoint<Var>& surface,
-                                 const Scattering<Var>& scattering, const Rgb<double>& weight,
-                                 int bounces, const Rng& key) {
+bool VertexAdjoints::is_hidden_from(const AdjointVertex& vertex, FaceRef face, const Vec3d& omega,
+                                    double distance, TermCost& cost) const {
+  Ray ray{value(vertex.surface.p), omega};
+  ray.start = vertex.surface.face;
+  ray.end = face;
+  ray.t_max = distance * (1 - 0x1p-20);  // as shadow rays end
+  cost.add(RayCount{0, 1});
+  return context_.path.tracer.occluded(ray);
+}
+
+void VertexAdjoints::add_shadows(const AdjointVertex& vertex, const Rng& key) {
   const Stopwatch watch;
   for (int i = 0; i < context_.edge_samples; ++i) {
-    add_shadow(surface, scattering, weight,
-               key.copy(Purpose::kShadowCopy, i).at(Purpose::kShadow, bounces));
+    add_shadow(vertex, key.copy(Purpose::kShadowCopy, i).at(Purpose::kShadow, vertex.bounces));
   }
   costs_[kShadow].seconds += watch.seconds();
 }
 
-void VertexAdjoints::add_shadow(const SurfacePoint<Var>& surface, const Scattering<Var>& scattering,
-                                const Rgb<double>& weight, Rng rng) {
+void VertexAdjoints::add_shadow(const AdjointVertex& vertex, Rng rng) {
   TermCost& cost = costs_[kShadow];
   ++cost.samples;
   double probability;
@@ -139,29 +163,24 @@ void VertexAdjoints::add_shadow(const SurfacePoint<Var>& surface, const Scatteri
     ++cost.occluded;
     return;
   }
-  const Vec3d q = value(surface.p);
+  const Vec3d q = value(vertex.surface.p);
   const double distance = length(point->x - q);
   const Vec3d omega = (point->x - q) / distance;
-  const bool apart = distance > 0 && point->face != surface.face;
-  const Rgb<double> f = apart ? scattering.eval_value(omega) : Rgb<double>{};
+  const bool apart = distance > 0 && point->face != vertex.surface.face;
+  const Rgb<double> f = apart ? vertex.scattering.eval_value(omega) : Rgb<double>{};
   const Rgb<double> amount = is_black(f) ? f : f * context_.shadows->jump(edge, *point, q, omega);
   if (is_black(amount)) {
     ++cost.zero_weight;
     return;
   }
-  Ray ray{q, omega};
-  ray.start = surface.face;
-  ray.end = point->face;
-  ray.t_max = distance * (1 - 0x1p-20);  // as shadow rays end
-  cost.add(RayCount{0, 1});
-  if (context_.path.tracer.occluded(ray)) {
+  if (is_hidden_from(vertex, point->face, omega, distance, cost)) {
     ++cost.occluded;
     return;
   }
   ++cost.counted;
-  const Var swept = shadow_sweep(context_, edge, *point, surface.p, {omega.x, omega.y, omega.z},
-                                 distance, seeds_);
-  seeds_.add(swept.node, weighed(weight, amount) / probability);
+  const Var swept = shadow_sweep(context_, edge, *point, vertex.surface.p,
+                                 {omega.x, omega.y, omega.z}, distance, seeds_);
+  seeds_.add(swept.node, weighed(vertex.weight, amount) / probability);
 }
 
 // The ray through a film position, moving with the camera where that has slots.

@@ -75,9 +75,10 @@ std::vector<Compared> compared(const Scene& scene, const ParameterAdjoint& rever
 
 // Moments of dot products with the adjoint, one for each parameter.
 std::vector<Moments> forward_sums(const Scene& scene, std::span<const Parameter> parameters,
-                                  const std::vector<std::string>& terms, const Image& adjoint,
+                                  const BackwardOptions& options, const Image& adjoint,
                                   const RunSettings& settings) {
-  const EdgeSamplerType& sampler = edge_sampler_type("forest");
+  const EdgeSamplerType& sampler = edge_sampler_type(options.sampler);
+  const std::vector<std::string>& terms = options.terms;
   std::vector<bool> computed;
   for (const TermType* type : terms_of(scene, sampler)) {
     computed.push_back(terms.empty() ||
@@ -145,7 +146,7 @@ std::vector<ReverseCheck> check_reverse(const Scene& scene, const BackwardOption
   }
   RunSettings other = settings;
   other.seed = mix_bits(mix_bits(settings.seed) + 3);
-  const auto sums = forward_sums(scene, parameters, options.terms, adjoint, other);
+  const auto sums = forward_sums(scene, parameters, options, adjoint, other);
   if (settings.interrupted && settings.interrupted->load()) return {};
   std::vector<ReverseCheck> checks;
   for (size_t i = 0; i < list.size(); ++i) {

@@ -170,13 +170,16 @@ void Fit::Impl::check_channels() const {
 
 // Those of backward(), which would tell at the first step.
 void Fit::Impl::check_terms() const {
-  backward_sampler(options_.backward.sampler);
+  edge_sampler_type(options_.backward.sampler);
   for (size_t v = 0; v < views.size(); ++v) {
     const auto seen = [&](const FitParameter& p) { return p.in_view(v) != nullptr; };
     if (std::none_of(parameters_.begin(), parameters_.end(), seen)) continue;
     std::vector<std::string> known;
     for (const TermType& type : term_types().first(kAdjointTerms)) {
-      if (type.applies(views[v].scene)) known.emplace_back(type.name);
+      const bool apart = edge_sampler_type(options_.backward.sampler).regions;
+      if (type.applies(views[v].scene) && (apart || !type.regions)) {
+        known.emplace_back(type.name);
+      }
     }
     selected_terms(known, options_.backward.terms, views[v].scene.file);
   }

@@ -188,4 +188,14 @@ PenumbraShare penumbra_share(const Scene& scene, const EdgeSamplerInput& edges,
   return result;
 }
 
+double direct_share(const Scene& scene, const EdgeSamplerInput& edges, const LightRegions& regions,
+                    const LampEdges& lamp_edges, const EdgeSample& sample, size_t k, const Vec3d& p,
+                    const Vec3d& n, const PathStep& step, int bounces) {
+  const EdgeMesh& mesh = edges.object(sample.edge.object);
+  const auto& ends = mesh.edge(sample.edge.edge).vertices;
+  const Vec3d e = mesh.position(ends[0]) * (1 - sample.t) + mesh.position(ends[1]) * sample.t;
+  const LampLine line{k, sample.edge, e, p, n};
+  return 1 - penumbra_share(scene, edges, regions, lamp_edges, line, step, bounces).share;
+}
+
 }  // namespace limn

@@ -92,5 +92,9 @@ struct PenumbraShare {
 PenumbraShare penumbra_share(const Scene& scene, const EdgeSamplerInput& edges,
                              const LightRegions& regions, const LampEdges& lamp_edges,
                              const LampLine& line, const PathStep& step, int bounces);
+// The share of `direct` in what a point of an edge before region k adds at a vertex.
+double direct_share(const Scene& scene, const EdgeSamplerInput& edges, const LightRegions& regions,
+                    const LampEdges& lamp_edges, const EdgeSample& sample, size_t k, const Vec3d& p,
+                    const Vec3d& n, const PathStep& step, int bounces);
 
 }  // namespace limn

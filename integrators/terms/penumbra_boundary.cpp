@@ -8,11 +8,8 @@
 // directions at p changes is left to `direct`.
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "integrators/terms/film_point.h"
-#include "integrators/terms/near_faces.h"
-#include "integrators/terms/penumbra.h"
+#include "integrators/terms/penumbra_lines.h"
 #include "integrators/terms/term_table.h"
 #include "integrators/terms/vertex_edges.h"
 
@@ -31,7 +28,8 @@ class PenumbraTerm final : public Term {
       : context_(input.context),
         edges_(input.edges()),
         regions_(*input.regions()),
-        lamp_edges_(*input.lamp_edges()) {}
+        lamp_edges_(*input.lamp_edges()),
+        lines_(context_, edges_, regions_, lamp_edges_) {}
 
   bool uses_film() const override {
     const int max_depth = context_.scene.max_depth;
@@ -56,69 +54,29 @@ class PenumbraTerm final : public Term {
   }
 
  private:
-  struct Drawn {
-    EdgeSample edge;  // probability: of the edge
-    FaceRef face;     // that the line meets
-    LampLine line;
-  };
-  std::optional<Drawn> draw(double u, Rng& rng, RayCount& rays) const;
   // What a viewer sees that is no camera: the vertex before.
   void add_sample(const PathVertex& viewer, const Rng& key, TermCost& cost, Rgb<Lanes>& sum) const;
-  // Completes the density of a drawn line. False where the line belongs to `direct`; where nearly
-  // all does, mostly.
-  bool complete(Drawn& drawn, const PathStep& step, int bounces, Rng& rng) const;
   // What the drawn line adds for a path that comes along the ray with the throughput.
-  void add(const Drawn& drawn, const Vec3<Dual>& origin, const Vec3<Dual>& direction,
+  void add(const DrawnLine& drawn, const Vec3<Dual>& origin, const Vec3<Dual>& direction,
            const Rgb<double>& throughput, int bounces, const Rng& key, SampleLog* log,
            TurnedVertex* turned, TermCost& cost, Rgb<Lanes>& sum) const;
   // How the point that the line meets slides if the viewer's directions turn.
-  Vec3<Lanes> sliding(const Drawn& drawn, const Vec3d& q, const Vec3d& omega,
+  Vec3<Lanes> sliding(const DrawnLine& drawn, const Vec3d& q, const Vec3d& omega,
                       const TurnedVertex& viewer) const;
 
   const PathContext& context_;
   const EdgeSamplerInput& edges_;
   const LightRegions& regions_;
   const LampEdges& lamp_edges_;
+  PenumbraLines lines_;
 };
-
-std::optional<PenumbraTerm::Drawn> PenumbraTerm::draw(double u, Rng& rng, RayCount& rays) const {
-  const LampEdges::Drawn lamp_edge = lamp_edges_.draw(u);
-  const double t = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
-  const EdgeRef id = lamp_edge.edge;
-  const EdgeMesh& mesh = edges_.object(id.object);
-  const auto& ends = mesh.edge(id.edge).vertices;
-  const Vec3d e = mesh.position(ends[0]) * (1 - t) + mesh.position(ends[1]) * t;
-  const auto omega = regions_.draw_direction(lamp_edge.region, e, u1, u2);
-  if (!omega) return {};
-  Ray ray{e, -*omega};
-  const FacesAround around = mesh.around(id.edge);
-  ray.skip_faces = around.all;
-  Hit hit;
-  ++rays.closest;
-  if (!closest_at_edge(context_.tracer, context_.scene, around, e, 0, ray, hit)) return {};
-  const auto corners =
-      face_corners<double>(context_.scene.shape(hit.face.shape).mesh, hit.face.face);
-  const Vec3d n = normalize(cross(corners[1] - corners[0], corners[2] - corners[0]));
-  // More exactly than the ray's floats.
-  const Vec3d p = e - *omega * (dot(n, e - corners[0]) / dot(n, *omega));
-  return Drawn{{id, t, lamp_edge.probability, 1}, hit.face, {lamp_edge.region, id, e, p, n}};
-}
-
-bool PenumbraTerm::complete(Drawn& drawn, const PathStep& step, int bounces, Rng& rng) const {
-  constexpr double kLeastShare = 0.1;  // lines of less go on by roulette; not tuned
-  const auto [density, share] =
-      penumbra_share(context_.scene, edges_, regions_, lamp_edges_, drawn.line, step, bounces);
-  if (!(rng.uniform() * kLeastShare < share)) return false;
-  drawn.edge.probability *= density / std::max(share, kLeastShare);
-  return true;
-}
 
 bool PenumbraTerm::sample_film(double u, const Rng& key, RayCount& rays, FilmSample& sample) const {
   Rng rng = key.at(Purpose::kShadow, 0);
-  auto drawn = draw(u, rng, rays);
+  auto drawn = lines_.draw(u, rng, rays);
   if (!drawn) return false;
   const auto seen = film_point(context_.scene, drawn->face, drawn->line.p);
-  if (!seen || !complete(*drawn, {}, 0, rng)) return false;
+  if (!seen || !lines_.complete(*drawn, {}, 0, rng)) return false;
   if (is_hidden(context_, *seen, drawn->face, rays)) return false;
   drawn->edge.probability /= film_per_solid_angle(context_.scene.camera, seen->omega);
   TermCost cost;
@@ -137,7 +95,7 @@ void PenumbraTerm::add_sample(const PathVertex& viewer, const Rng& key, TermCost
   RayCount rays;
   Rng rng = key.at(Purpose::kShadow, viewer.bounces);
   const double u = rng.uniform();
-  auto drawn = draw(u, rng, rays);
+  auto drawn = lines_.draw(u, rng, rays);
   cost.add(rays);
   if (!drawn) {
     ++cost.no_edge;
@@ -151,7 +109,7 @@ void PenumbraTerm::add_sample(const PathVertex& viewer, const Rng& key, TermCost
   const double pdf = apart ? viewer.scattering.pdf_solid_angle(omega) : 0;
   const Rgb<double> f = pdf > 0 ? viewer.scattering.eval_value(omega) : Rgb<double>{};
   const int bounces = viewer.bounces + 1;
-  if (is_black(f) || !complete(*drawn, {q, pdf}, bounces, rng)) {
+  if (is_black(f) || !lines_.complete(*drawn, {q, pdf}, bounces, rng)) {
     ++cost.zero_weight;
     return;
   }
@@ -170,7 +128,7 @@ void PenumbraTerm::add_sample(const PathVertex& viewer, const Rng& key, TermCost
   if (viewer.turned) viewer.turned->sum = viewer.turned->sum + turned.sum;
 }
 
-Vec3<Lanes> PenumbraTerm::sliding(const Drawn& drawn, const Vec3d& q, const Vec3d& omega,
+Vec3<Lanes> PenumbraTerm::sliding(const DrawnLine& drawn, const Vec3d& q, const Vec3d& omega,
                                   const TurnedVertex& viewer) const {
   const Vec3<Lanes>& v = viewer.velocity;
   const auto turns =
@@ -182,9 +140,10 @@ Vec3<Lanes> PenumbraTerm::sliding(const Drawn& drawn, const Vec3d& q, const Vec3
   return {turns.p.x.d - rests.p.x.d, turns.p.y.d - rests.p.y.d, turns.p.z.d - rests.p.z.d};
 }
 
-void PenumbraTerm::add(const Drawn& drawn, const Vec3<Dual>& origin, const Vec3<Dual>& direction,
-                       const Rgb<double>& throughput, int bounces, const Rng& key, SampleLog* log,
-                       TurnedVertex* turned, TermCost& cost, Rgb<Lanes>& sum) const {
+void PenumbraTerm::add(const DrawnLine& drawn, const Vec3<Dual>& origin,
+                       const Vec3<Dual>& direction, const Rgb<double>& throughput, int bounces,
+                       const Rng& key, SampleLog* log, TurnedVertex* turned, TermCost& cost,
+                       Rgb<Lanes>& sum) const {
   const Scene& scene = context_.scene;
   const auto surface = surface_on_ray<Dual>(scene, drawn.face, origin, direction);
   const Scattering<Dual> scattering(surface, -direction, scene.shading);

@@ -6,6 +6,7 @@
     scenes/fits/fits.py views     a shape from eight sides
     scenes/fits/fits.py pose      place, reflectance and camera of an object together
     scenes/fits/fits.py drift     from the very target: what noise does, and nothing else
+    scenes/fits/fits.py picture   of the shapes that these found: scenes/pictures/fits.webp
 
 Writes OUT/NAME/ (pictures, meshes, report.html) and prints a table. A fit that is there is not run
 again; an interrupted one goes on.
@@ -15,12 +16,14 @@ import argparse
 import json
 import math
 import os
+import resource
 import struct
 import subprocess
 import sys
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 ROOT = os.path.dirname(os.path.dirname(HERE))
+BUNNY = "/usr/share/glmark2/models/bunny.obj"
 TERMS = "interior,camera"  # A fit without the boundary term: what mirrors show has edges, too.
 
 
@@ -34,11 +37,15 @@ class Fits:
         return os.path.join(self.out, *names)
 
     def run(self, *words):
+        """Processor time [s]."""
         command = [self.limn, *words]
         if self.threads:
             command += ["--threads", str(self.threads)]
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
         if subprocess.run(command, check=False).returncode != 0:
             sys.exit(1)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
 
     def render(self, scene, file, *defines, spp=256, sensor=0):
         if not os.path.exists(file):
@@ -47,25 +54,25 @@ class Fits:
         return file
 
     def fit(self, folder, scene, target, steps, *words):
-        """The fit's figures."""
-        file = self.path(folder, "fit.json")
+        """The fit's figures; "seconds" are those of the processor."""
+        file, times = self.path(folder, "fit.json"), self.path(folder, "seconds.json")
         done = json.load(open(file, encoding="utf-8")) if os.path.exists(file) else None
-        steps = self.steps or steps
+        steps, seconds = self.steps or steps, None
         if done and os.path.exists(self.path(folder, "state.cbor")):
             if done["steps"] < steps:
-                self.run("fit", "--resume", self.path(folder), "--steps", str(steps))
+                seconds = self.run("fit", "--resume", self.path(folder), "--steps", str(steps))
         else:
-            self.run("fit", scene, "--target", target, "--steps", str(steps),
-                     "-o", self.path(folder), *words)  # fmt: skip
-        return json.load(open(file, encoding="utf-8"))
+            seconds = self.run("fit", scene, "--target", target, "--steps", str(steps),
+                               "-o", self.path(folder), *words)  # fmt: skip
+        total = json.load(open(times, encoding="utf-8")) if os.path.exists(times) else 0
+        if seconds:
+            total += seconds
+            json.dump(total, open(times, "w", encoding="utf-8"))
+        return json.load(open(file, encoding="utf-8")) | {"seconds": total}
 
 
 def scene(name):
     return os.path.join(HERE, name)
-
-
-def seconds(history):
-    return sum(h["seconds"] for h in history)
 
 
 SHAPE_HEAD = [
@@ -73,11 +80,12 @@ SHAPE_HEAD = [
 ]
 
 
-def shape_row(name, steps, mesh, history):
+def shape_row(name, fit, mesh, steps):
+    history = fit["history"][:steps]
     loss = sum(h["loss"] for h in history[-5:]) / len(history[-5:]) if history else 0
     return [name, steps, f"{mesh['chamfer']:.4f}", f"{mesh['hausdorff_95']:.4f}",
             f"{mesh['normal_angle']:.1f}", mesh["inside_out"], mesh["crossings"],
-            f"{loss:.5f}" if history else "", f"{seconds(history):.0f}"]  # fmt: skip
+            f"{loss:.5f}" if history else "", f"{fit['seconds']:.0f}" if history else ""]  # fmt: skip
 
 
 def shape_rows(fits, name, base, targets, truth, steps, defines, words, variants, smoothing):
@@ -92,20 +100,21 @@ def shape_rows(fits, name, base, targets, truth, steps, defines, words, variants
                        "--smoothing", str(smoothing), *more)  # fmt: skip
         first, last = (fit["snapshots"][i]["meshes"][0] for i in (0, -1))
         if not rows:
-            rows.append(shape_row("start", 0, first, []))
-        rows.append(shape_row(variant, fit["steps"], last, fit["history"]))
+            rows.append(shape_row("start", fit, first, 0))
+        rows.append(shape_row(variant, fit, last, fit["steps"]))
     return SHAPE_HEAD, rows
 
 
 def mirrors(fits):
     size = ["width=64", "height=32"]
     target = fits.render(scene("two_mirrors.xml"), fits.path("mirrors.exr"), *size)
-    words = ["--spp", "6", "--snapshots", "25"]
-    remesh = ["--remesh", "75,150,225"]
+    words = ["--snapshots", "25"]
+    remesh = ["--spp", "6", "--remesh", "75,150,225"]
     variants = [(f"seed {i}", [*remesh, "--seed", str(i)]) for i in (1, 2, 3)]
     variants += [
-        ("no remeshing", ["--seed", "1"]),
-        ("edges of li2019", [*remesh, "--seed", "1", "--sampler", "li2019"]),
+        ("no remeshing", ["--spp", "6", "--seed", "1"]),
+        # As much time as the others: its draws cost less.
+        ("edges of li2019", ["--spp", "7", *remesh[2:], "--seed", "1", "--sampler", "li2019"]),
         ("no boundary", [*remesh, "--seed", "1", "--terms", TERMS]),
     ]
     truth = os.path.join(fits.generated, "creature.ply")
@@ -117,8 +126,14 @@ def mirrors(fits):
 def shadows(fits):
     size = ["width=64", "height=48"]
     target = fits.render(scene("hidden_object.xml"), fits.path("shadows.exr"), *size)
-    words = ["--spp", "6", "--remesh", "50,100", "--snapshots", "25", "--seed", "1"]
-    variants = [("adjoint pixels", []), ("uniform pixels", ["--pixels", "uniform"])]
+    words = ["--spp", "6", "--remesh", "50,100", "--snapshots", "25"]
+    lamps = ["--sampler", "silhouettes"]  # regions of light apart
+    variants = [(f"seed {i}", [*lamps, "--seed", str(i)]) for i in (1, 2, 3)]
+    variants += [
+        ("edges of forest", ["--seed", "1"]),
+        ("uniform pixels", [*lamps, "--seed", "1", "--pixels", "uniform"]),
+        ("no boundary", ["--seed", "1", "--terms", TERMS]),
+    ]
     truth = os.path.join(fits.generated, "creature.ply")
     return shape_rows(
         fits, "shadows", "hidden_object", [target], truth, 150, size, words, variants, 0.1
@@ -131,11 +146,13 @@ def views(fits):
         fits.render(scene("eight_views.xml"), fits.path(f"view_{i}.exr"), *size, sensor=i)
         for i in range(8)
     ]
-    words = ["--spp", "2", "--snapshots", "25", "--seed", "1"]
-    variants = [("remeshed", ["--remesh", "15,30"]), ("no remeshing", [])]
-    truth = "/usr/share/glmark2/models/bunny.obj"
+    words = ["--spp", "2", "--snapshots", "30"]
+    remesh = ["--remesh", "40,80,120"]
+    variants = [(f"seed {i}", [*remesh, "--seed", str(i)]) for i in (1, 2, 3)]
+    variants += [("no remeshing", ["--seed", "1"])]
+    truth = BUNNY
     return shape_rows(
-        fits, "views", "eight_views", targets, truth, 45, size, words, variants, 0.1
+        fits, "views", "eight_views", targets, truth, 160, size, words, variants, 0.1
     )
 
 
@@ -157,7 +174,7 @@ def pose(fits):
     for s in fit["scalars"]:
         begin, truth = known.get(s["name"], (0, ""))
         rows.append([s["name"], begin, truth, f"{s['value']:.5f}"])
-    rows.append(["seconds", "", "", f"{seconds(fit['history']):.0f}"])
+    rows.append(["seconds", "", "", f"{fit['seconds']:.0f}"])
     return ["what", "start", "truth", "found"], rows
 
 
@@ -198,7 +215,44 @@ def drift(fits):
     return ["fit", "chamfer / diagonal", "normals"], rows
 
 
-EXPERIMENTS = {"mirrors": mirrors, "shadows": shadows, "views": views, "pose": pose, "drift": drift}
+# A row for each: truth, start, and fits at some of their steps.
+SHOWN = [
+    ("creature.ply", [("mirrors_seed_1", 0), ("mirrors_seed_1", 75), ("mirrors_seed_1", 300),
+                      ("mirrors_edges_of_li2019", 300), ("mirrors_no_remeshing", 300),
+                      ("mirrors_no_boundary", 300)]),
+    ("creature.ply", [("shadows_seed_1", 0), ("shadows_seed_1", 50), ("shadows_seed_1", 150),
+                      ("shadows_edges_of_forest", 150), ("shadows_uniform_pixels", 150),
+                      ("shadows_no_boundary", 150)]),
+    ("bunny.obj", [("views_seed_1", 0), ("views_seed_1", 30), ("views_seed_1", 60),
+                   ("views_seed_1", 90), ("views_seed_1", 120), ("views_seed_1", 160)]),
+]  # fmt: skip
+
+
+def picture(fits):
+    from PIL import Image  # noqa: PLC0415
+
+    tile, rows, table = 128, [], []
+    for truth, shown in SHOWN:
+        true = os.path.join(fits.generated, truth) if truth.endswith("ply") else BUNNY
+        meshes = [true] + [fits.path(f, f"step_{step:05}_object.ply") for f, step in shown]
+        row = []
+        for k, mesh in enumerate(meshes):
+            file = fits.path("picture", f"{len(rows)}_{k}.exr")
+            view = [f"mesh={os.path.abspath(mesh)}", f"format={mesh[-3:]}", f"width={tile}"]
+            fits.render(scene("eight_views.xml"), file, *view, spp=64, sensor=7)
+            row.append(Image.open(file[:-3] + "png").convert("RGB"))
+        rows.append(row)
+        table.append([truth, "truth", *(f"{f} {step}" for f, step in shown)])
+    whole = Image.new("RGB", (tile * max(map(len, rows)), tile * len(rows)), "white")
+    for y, row in enumerate(rows):
+        for x, shape in enumerate(row):
+            whole.paste(shape, (tile * x, tile * y))
+    whole.save(os.path.join(ROOT, "scenes", "pictures", "fits.webp"), quality=80, method=6)
+    return ["row", *([""] * 7)], table
+
+
+EXPERIMENTS = {"mirrors": mirrors, "shadows": shadows, "views": views, "pose": pose,
+               "drift": drift, "picture": picture}  # fmt: skip
 
 
 def main():

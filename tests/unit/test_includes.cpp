@@ -138,6 +138,7 @@ TEST(Includes, NothingRunsBackUpBetweenRooms) {
 const Strings kContracts = {"check.h",
                             "error.h",
                             "memory.h",
+                            "output_file.h",
                             "vec.h",
                             "dual.h",
                             "tape.h",

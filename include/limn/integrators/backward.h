@@ -4,9 +4,8 @@
 // standard errors. One pass costs about as much as a forward pass, however many parameters there
 // are.
 //   dLoss/dtheta = sum over pixels and channels of A dI/dtheta,
-// A the adjoint image. dI/dtheta is that of gradient.h: the terms interior, camera, boundary and
-// shadow with directions held fixed, each unbiased, so that the sum is unbiased if A and the
-// samples of the pass are independent.
+// A the adjoint image. dI/dtheta is that of gradient.h: its terms with directions held fixed, each
+// unbiased, so that the sum is unbiased if A and the samples of the pass are independent.
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -20,20 +19,17 @@
 
 namespace limn {
 
-// The row of edge_sampler_types(). InputError if there is none, or if it leaves regions of light to
-// terms that reverse mode does not have.
-const EdgeSamplerType& backward_sampler(const std::string& name);
-
 struct BackwardOptions {
   // Names as in parameter.h, arrays included (SHAPE.vertex_positions); none: all parameters of the
   // scene.
   std::vector<std::string> parameters;
-  // interior, camera, boundary, shadow; none: all that the scene has.
+  // interior, camera, boundary, shadow, and direct and penumbra of samplers that keep regions of
+  // light apart; none: all that the scene has.
   std::vector<std::string> terms;
   // Every pixel gets the same number of paths. Else a quarter of them is spread evenly and the rest
   // in proportion to |A|, summed over channels.
   bool uniform_pixels = false;
-  std::string sampler = "forest";  // of edges, backward_sampler()
+  std::string sampler = "forest";  // of edges: a row of edge_sampler_types()
   int edge_samples = 1;       // at every vertex of a path, of the boundary and shadow terms each
   double camera_samples = 1;  // points on silhouettes of the film, per path
   int batches = 16;           // at most, for standard errors; each ends with the adjoint of normals

@@ -1,0 +1,117 @@
+// Lists of silhouettes before lamps and patches, and points on them.
+#include "integrators/terms/direct_edges.h"
+
+#include <algorithm>
+
+namespace limn {
+
+namespace {
+
+// Points for one sample. Sixteen instead took 1.6 times the time for 0.57 of the squared error with
+// four lamps on gloss, where the list is long: what is left is the error of p within its pixel.
+constexpr int kPoints = 4;
+// Lamps are small below this angle [rad], and have few sides up to this number. Not tuned.
+constexpr double kSmall = 0.1;
+constexpr int kMostSides = 8;
+
+DirectPoint point_at(const DirectPieces::Piece& piece, double u, double times) {
+  const auto [t, density] = piece.piece.place(u);
+  return {piece.region, {piece.piece.edge, t, density, times}};
+}
+
+}  // namespace
+
+void DirectEdges::list(const EdgeQuery& lamps, const EdgeQuery& patches, DirectPieces& to) const {
+  static thread_local std::vector<ListedEdge> listed;
+  static thread_local std::vector<EdgePiece> pieces;
+  const auto append = [](std::vector<DirectPieces::Piece>& list, uint32_t k, const EdgePiece& piece,
+                         double light) {
+    list.push_back({k, piece, (list.empty() ? 0 : list.back().sum) + piece.weight * light});
+  };
+  to.clear();
+  for (uint32_t k = 0; k < regions_.size(); ++k) {
+    const EdgeQuery& query = regions_.shape(k).valid() ? lamps : patches;
+    const std::optional<DirectionCone> cone = regions_.cone(k, query.p, query.n);
+    if (!cone) continue;
+    listed.clear();
+    pieces.clear();
+    sampler_.list_outlines(query, *cone, listed);
+    cut_edges(edges_, query, *cone, listed, pieces);
+    const bool small = regions_.shape(k).valid() &&
+                       regions_.hull(k).radius < kSmall * length(regions_.hull(k).center - query.p);
+    for (const EdgePiece& piece : pieces) {
+      const bool own = small && is_own_edge(k, piece.edge);
+      append(own ? to.outlines : to.others, k, piece, regions_.luminance(k));
+    }
+  }
+}
+
+// Whether the edge is a side of the lamp itself.
+bool DirectEdges::is_own_edge(uint32_t region, EdgeRef edge) const {
+  const auto faces = edges_.object(edge.object).faces_around(edge.edge);
+  return std::any_of(faces.begin(), faces.end(),
+                     [&](FaceRef face) { return face.shape == regions_.shape(region); });
+}
+
+void DirectEdges::draw(const DirectPieces& pieces, const Rng& key, int bounces, int samples,
+                       TermCost& cost, std::vector<DirectPoint>& points) const {
+  points.clear();
+  draw_others(pieces.others, key.at(Purpose::kDirect, bounces), kPoints * samples, cost, points);
+  const auto& outlines = pieces.outlines;
+  for (size_t begin = 0, end = 0; begin < outlines.size(); begin = end) {
+    while (end < outlines.size() && outlines[end].region == outlines[begin].region) ++end;
+    for (int i = 0; i < samples; ++i) {
+      Rng rng = key.copy(Purpose::kDirectCopy, i + 1).at(Purpose::kDirect, bounces);
+      draw_outline(&outlines[begin], &outlines[begin] + (end - begin), rng.uniform(), cost, points);
+    }
+  }
+}
+
+void DirectEdges::draw_others(const std::vector<DirectPieces::Piece>& pieces, Rng rng, int points,
+                              TermCost& cost, std::vector<DirectPoint>& drawn) const {
+  cost.samples += static_cast<uint64_t>(points);
+  const double total = pieces.empty() ? 0 : pieces.back().sum;
+  if (!(total > 0)) {
+    cost.no_edge += static_cast<uint64_t>(points);
+    return;
+  }
+  const double offset = rng.uniform();
+  size_t i = 0;
+  for (int j = 0; j < points; ++j) {
+    const double target = (j + offset) / points * total;
+    while (i + 1 < pieces.size() && pieces[i].sum <= target) ++i;
+    // What is read of its edge comes in while the points before are met.
+    const EdgeRef edge = pieces[i].piece.edge;
+    edges_.object(edge.object).fetch_ends(edge.edge);
+    const double before = i == 0 ? 0 : pieces[i - 1].sum, weight = pieces[i].sum - before;
+    const double u = std::clamp((target - before) / weight, 0.0, 1.0);
+    drawn.push_back(point_at(pieces[i], u, weight / total * kPoints));
+  }
+}
+
+// What the sides of a small lamp add cancels but for its size: none of them is left out, and all
+// are met at the same place. Of many, each is met as often as it weighs.
+void DirectEdges::draw_outline(const DirectPieces::Piece* begin, const DirectPieces::Piece* end,
+                               double u, TermCost& cost, std::vector<DirectPoint>& drawn) const {
+  if (end - begin <= kMostSides) {
+    cost.samples += static_cast<uint64_t>(end - begin);
+    for (const DirectPieces::Piece* piece = begin; piece != end; ++piece) {
+      drawn.push_back(point_at(*piece, u, 1));
+    }
+    return;
+  }
+  cost.samples += kMostSides;
+  const double first = begin->sum - begin->piece.weight * regions_.luminance(begin->region);
+  const double total = (end - 1)->sum - first;
+  const DirectPieces::Piece* piece = begin;
+  for (int j = 0; j < kMostSides; ++j) {
+    const double target = first + (j + u) / kMostSides * total;
+    while (piece + 1 != end && piece->sum <= target) ++piece;
+    const double before = piece == begin ? first : (piece - 1)->sum;
+    const double weight = piece->sum - before;
+    const double place = std::clamp((target - before) / weight, 0.0, 1.0);
+    drawn.push_back(point_at(*piece, place, weight / total * kMostSides));
+  }
+}
+
+}  // namespace limn

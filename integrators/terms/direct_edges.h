@@ -1,0 +1,60 @@
+#pragma once
+// The silhouettes before regions of light, as one point sees them, and points drawn on these by
+// what each would add. See direct_boundary.cpp for the estimator.
+#include <cstdint>
+#include <vector>
+
+#include "integrators/terms/light_regions.h"
+#include "limn/core/rng.h"
+#include "limn/edgetree/edge_pieces.h"
+#include "limn/integrators/run.h"
+
+namespace limn {
+
+// Pieces of silhouettes before regions, in the order of regions.
+struct DirectPieces {
+  struct Piece {
+    uint32_t region;
+    EdgePiece piece;
+    double sum;  // of the weights up to here
+  };
+  std::vector<Piece> others;
+  std::vector<Piece> outlines;  // sides of small lamps, one lamp after the other
+  void clear() { others.clear(), outlines.clear(); }
+};
+
+// A point on an edge. The product of its two densities is how many points lie there for one sample,
+// on average, per unit t.
+struct DirectPoint {
+  uint32_t region;
+  EdgeSample sample;
+};
+
+class DirectEdges {
+ public:
+  // All must outlive it.
+  DirectEdges(const EdgeSamplerInput& edges, const EdgeSampler& sampler,
+              const LightRegions& regions)
+      : edges_(edges), sampler_(sampler), regions_(regions) {}
+
+  // Replaces what is in `pieces`. Both queries are of the same point: directions towards lamps are
+  // held, those towards patches may turn.
+  void list(const EdgeQuery& lamps, const EdgeQuery& patches, DirectPieces& pieces) const;
+  // Replaces what is in `points`. key: of the path; books samples on `cost`.
+  void draw(const DirectPieces& pieces, const Rng& key, int bounces, int samples, TermCost& cost,
+            std::vector<DirectPoint>& points) const;
+
+ private:
+  bool is_own_edge(uint32_t region, EdgeRef edge) const;
+  void draw_others(const std::vector<DirectPieces::Piece>& pieces, Rng rng, int points,
+                   TermCost& cost, std::vector<DirectPoint>& drawn) const;
+  // Pieces [begin, end), at the place u of each.
+  void draw_outline(const DirectPieces::Piece* begin, const DirectPieces::Piece* end, double u,
+                    TermCost& cost, std::vector<DirectPoint>& drawn) const;
+
+  const EdgeSamplerInput& edges_;
+  const EdgeSampler& sampler_;
+  const LightRegions& regions_;
+};
+
+}  // namespace limn

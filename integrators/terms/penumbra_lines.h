@@ -1,0 +1,36 @@
+#pragma once
+// Lines from regions of light through points of edges, for the term `penumbra`.
+#include <optional>
+
+#include "integrators/terms/path.h"
+#include "integrators/terms/penumbra.h"
+
+namespace limn {
+
+struct DrawnLine {
+  EdgeSample edge;  // probability: of the edge, times the line's density once that is complete
+  FaceRef face;     // that the line meets
+  LampLine line;
+};
+
+class PenumbraLines {
+ public:
+  // All must outlive it.
+  PenumbraLines(const PathContext& context, const EdgeSamplerInput& edges,
+                const LightRegions& regions, const LampEdges& lamp_edges)
+      : context_(context), edges_(edges), regions_(regions), lamp_edges_(lamp_edges) {}
+
+  // u: in [0, 1), chooses the edge and its region. None if the line meets nothing.
+  std::optional<DrawnLine> draw(double u, Rng& rng, RayCount& rays) const;
+  // Completes the density of a drawn line for who sees where it ends (penumbra_share()). False
+  // where the line belongs to `direct`; where nearly all does, mostly.
+  bool complete(DrawnLine& drawn, const PathStep& step, int bounces, Rng& rng) const;
+
+ private:
+  const PathContext& context_;
+  const EdgeSamplerInput& edges_;
+  const LightRegions& regions_;
+  const LampEdges& lamp_edges_;
+};
+
+}  // namespace limn
