@@ -43,9 +43,11 @@ def comparison(errors):
     methods = []
     for name in arguments[arguments.index("--methods") + 1].split(","):
         mse, stderr, trimmed, p = errors.get(name, [1, 0, 1, 0.5])
-        rung = dict(mse=mse, mse_stderr=stderr, trimmed_mse=trimmed, relative_mse=mse / 8, seconds=2, spp=16, bias=dict(p=p))
+        rung = dict(mse=mse, trimmed_mse=trimmed, relative_mse=mse / 8, seconds=2, spp=16, bias=dict(p=p))
+        runs = [dict(time=2.5, seconds=2, mse=mse + k * stderr, trimmed_mse=trimmed) for k in (-3 ** 0.5, 0, 3 ** 0.5)]
+        runs.append(dict(time=1.25, seconds=1, mse=100, trimmed_mse=100))
         settings = dict(setup_not_counted_seconds=30.4) if name.startswith("mitsuba") else dict()
-        methods.append(dict(name=name, status="done", summary=[rung], settings=settings))
+        methods.append(dict(name=name, status="done", summary=[rung], runs=runs, settings=settings))
     return dict(methods=methods, times=[2.5], repeats=3, threads=2, width=64, height=64, command="limn compare ...",
                 reference=dict(seconds=12, method="adaptive"))
 if listed("fail"):
@@ -110,11 +112,12 @@ class TestPaper(unittest.TestCase):
     def test_figures(self):
         cube = "".join(f"v {k & 1} {k >> 1 & 1} {k >> 2}\n" for k in range(8))
         mesh = self.write("cube.obj", cube + "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n")
-        only = "fig7-torus,fig9-given-cube,fig10-32-rays-alpha-0.05,table2-given-cube"
+        only = "fig7-torus,fig9-given-cube,fig10-32-rays-alpha-0.05,fig15,table2-given-cube"
         done = self.paper("--figures", "--mesh", mesh, "--only", only)
         self.assertEqual((done.returncode, done.stderr), (0, ""))
-        self.assertEqual(self.names(), only.split(",")[:3])
-        torus, given, warped = self.calls()
+        self.assertEqual(self.names(), only.split(",")[:4])
+        torus, given, warped, chandelier = self.calls()
+        self.assertAlmostEqual(float(self.value(chandelier, "--time")), 3 * float(self.value(given, "--time")), places=4)
         self.assertEqual((torus[0], self.value(torus, "--node-edges")), ("reject", "128"))
         self.assertTrue(os.path.exists(torus[1]))
         self.assertIn("li2019-solid", self.value(torus, "--methods").split(","))
@@ -123,7 +126,7 @@ class TestPaper(unittest.TestCase):
         self.assertEqual((self.value(warped, "--aux"), self.value(warped, "--kappa")), ("32", "1e5"))
         self.assertIn("12 edges, 12 of them not concave", done.stdout)
         self.paper("--figures", "--mesh", mesh, "--only", only)
-        self.assertEqual(len(self.calls()), 3)
+        self.assertEqual(len(self.calls()), 4)
 
     def levers(self, *arguments):
         command = [word for word in self.command("--levers", *arguments) if word != "--no-report"]

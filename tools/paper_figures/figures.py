@@ -146,7 +146,7 @@ FIGURES = [
         "Here warped-area sampling has less error than plain edge sampling; finite differences less "
         "than both; directions that move along (adaptive) less than plain edge sampling.",
         [Part("fig15", "compare", "scenes/intricate.xml", UP,
-              [PAPER, "forest", DEFAULT, "was", "was-unbiased", "fd"],
+              [PAPER, "forest", DEFAULT, "was", "was-unbiased", "fd"], longer=3,
               options=["--aux", "32", "--kappa", "1e4"])],
     ),
     Figure(

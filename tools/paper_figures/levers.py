@@ -4,6 +4,7 @@ import json
 import math
 import os
 import shlex
+import statistics
 
 from .part import Part
 
@@ -58,18 +59,23 @@ class _Record:
     def rung(self, name):
         return self.methods[name]["summary"][-1] if name in self.methods else None
 
+    def products(self, name, error="mse"):
+        """Squared error times seconds of the longest runs."""
+        method = self.methods.get(name)
+        return [r[error] * r["seconds"] for r in method["runs"] if r["time"] == self.data["times"][-1]] if method else []
+
     def time(self, name, of="forest"):
-        """Time for equal error over that of another method, and its standard error; None if there is none."""
-        pair = [self.rung(name), self.rung(of)]
-        if name == of or not all(r and r["mse"] for r in pair):
+        """Time for equal error over that of another method, and its standard error, as `limn compare` has it; None
+        if there is none."""
+        means = [statistics.mean(p) if p else 0 for p in (self.products(name), self.products(of))]
+        if name == of or not all(means):
             return None
-        product = [r["mse"] * r["seconds"] for r in pair]
-        spread = math.hypot(*((r["mse_stderr"] or 0) / r["mse"] for r in pair))
-        return product[0] / product[1], product[0] / product[1] * spread
+        errors = [statistics.stdev(p) / math.sqrt(len(p)) if len(p) > 1 else 0
+                  for p in (self.products(name), self.products(of))]
+        return means[0] / means[1], means[0] / means[1] * math.hypot(*(e / m for e, m in zip(errors, means)))
 
     def trimmed(self, name, of="forest"):
-        mine, other = self.rung(name), self.rung(of)
-        return mine["trimmed_mse"] * mine["seconds"] / (other["trimmed_mse"] * other["seconds"])
+        return statistics.mean(self.products(name, "trimmed_mse")) / statistics.mean(self.products(of, "trimmed_mse"))
 
     def worst_share(self, name):
         """Of the squared error, in the worst pixels."""

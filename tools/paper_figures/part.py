@@ -14,4 +14,5 @@ class Part:
     wide: bool = False  # four to three, not square
     small_mesh: str = ""  # NAME FACES of a mesh to make for it: the scene's $mesh, or the input
     needs: str = ""  # a file that may not be there
+    longer: float = 1  # times the seconds of other comparisons: where set-up would decide
     options: list = field(default_factory=list)  # further arguments
