@@ -46,8 +46,8 @@ class BackwardCommand final : public Command {
                    "Where paths go: adjoint (where the loss depends on the image) or uniform")
         ->check(CLI::IsMember({"adjoint", "uniform"}));
     app.add_option("--sampler", options_.sampler,
-                   "Of edges: forest, or to compare with it quadric, li2019, uniform, brute or a "
-                   "variant of these")
+                   "Of edges: forest; silhouettes, which is better where shadows are soft; or to "
+                   "compare with them quadric, li2019, uniform, brute or a variant of these")
         ->capture_default_str();
     app.add_option("--edge-samples", options_.edge_samples, "At every vertex of a path")
         ->check(CLI::Range(1, 1 << 16));

@@ -162,8 +162,8 @@ void FitCommand::add_sampling_options(CLI::App& app) {
       ->check(CLI::IsMember({"adjoint", "uniform"}))
       ->capture_default_str();
   app.add_option("--sampler", given_.sampler,
-                 "Of edges: forest, or to compare with it quadric, li2019, uniform, brute or a "
-                 "variant of these")
+                 "Of edges: forest; silhouettes, which is better where shadows are soft; or to "
+                 "compare with them quadric, li2019, uniform, brute or a variant of these")
       ->capture_default_str();
   app.add_option("--edge-samples", given_.edge_samples, "At every vertex of a path")
       ->check(CLI::Range(1, 1 << 16));
