@@ -63,6 +63,8 @@ std::span<const EdgeSamplerType> edge_sampler_types() {
                                 .look_ahead = kNoHeight,
                                 .most_open = 0}>,
        kAblation},
+      {"forest-any-motion", "forest whose weights count motion along the line of sight, too",
+       make_forest<ForestConfig{.normal_speed = false}>, kAblation},
       {"forest-quadrics", "forest whose nodes of 32 to 8192 edges all have a pair of quadrics",
        make_forest<ForestConfig{.quadrics = ForestConfig::Quadrics::kAll}>, kAblation},
       {"forest-concave", "forest that keeps concave edges",

@@ -128,10 +128,7 @@ class ContactFinder {
     return {mesh.position(a), mesh.position(b) - mesh.position(a)};
   }
   Corners corners(FaceRef face) const {
-    const Mesh& mesh = *meshes_[face.shape.index()];
-    const FaceIndices& f = mesh.face(face.face);
-    return {cast<double>(mesh.positions[f[0]]), cast<double>(mesh.positions[f[1]]),
-            cast<double>(mesh.positions[f[2]])};
+    return face_corners<double>(*meshes_[face.shape.index()], face.face);
   }
   const Plane& plane(FaceRef face) const { return objects_[face.shape.index()].plane(face.face); }
   double size(EdgeRef id) const {

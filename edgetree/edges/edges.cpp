@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "edgetree/edges/fold.h"
@@ -187,20 +188,44 @@ double distance_error(const EdgeMesh& mesh, const Vec3d& p) {
   return 11 * 0x1.0p-53 * (length(p) + mesh.extent);
 }
 
-bool is_candidate(const EdgeMesh& mesh, EdgeId id, const Vec3d& p) {
-  const Edge& edge = mesh.edge(id);
+Facing facing(const EdgeMesh& mesh, FaceId face, const Vec3d& p) {
+  const double error = distance_error(mesh, p);
+  const double d = mesh.plane(face).distance(p);
+  return {d >= -error, d <= error};
+}
+
+namespace {
+
+// Whether the class of an edge tells, wherever it is seen from; else its faces do.
+std::optional<bool> known_candidate(const EdgeMesh& mesh, const Edge& edge) {
   if (edge.edge_class == EdgeClass::kBorder || edge.edge_class == EdgeClass::kIrregular ||
       edge.edge_class == EdgeClass::kCrossing)
     return true;
   if (edge.edge_class == EdgeClass::kSharp && !mesh.one_sided_closed) return true;
   if (edge.edge_class == EdgeClass::kSmooth && edge.concave && mesh.one_sided_closed) return false;
+  return {};
+}
+
+bool is_candidate(EdgeClass edge_class, Facing first, Facing second) {
+  if (edge_class == EdgeClass::kSharp) return first.front || second.front;
+  return (first.front && second.back) || (first.back && second.front);
+}
+
+}  // namespace
+
+bool is_candidate(const EdgeMesh& mesh, EdgeId id, const Vec3d& p) {
+  const Edge& edge = mesh.edge(id);
+  if (const auto known = known_candidate(mesh, edge)) return *known;
   const double error = distance_error(mesh, p);
   const double d0 = mesh.plane(edge.faces[0]).distance(p);
   const double d1 = mesh.plane(edge.faces[1]).distance(p);
-  const bool front0 = d0 >= -error, front1 = d1 >= -error;
-  if (edge.edge_class == EdgeClass::kSharp) return front0 || front1;
-  const bool back0 = d0 <= error, back1 = d1 <= error;
-  return (front0 && back1) || (back0 && front1);
+  return is_candidate(edge.edge_class, {d0 >= -error, d0 <= error}, {d1 >= -error, d1 <= error});
+}
+
+bool is_candidate(const EdgeMesh& mesh, EdgeId id, Facing first, Facing second) {
+  const Edge& edge = mesh.edge(id);
+  const auto known = known_candidate(mesh, edge);
+  return known ? *known : is_candidate(edge.edge_class, first, second);
 }
 
 bool is_outline(const EdgeMesh& mesh, EdgeId id, const Vec3d& p) {

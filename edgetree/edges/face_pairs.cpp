@@ -17,19 +17,6 @@ namespace {
 using Corners = std::array<Vec3d, 3>;
 constexpr uint32_t kNone = UINT32_MAX;
 
-Corners corners_of(const Mesh& mesh, FaceId face) {
-  const FaceIndices& f = mesh.face(face);
-  return {cast<double>(mesh.positions[f[0]]), cast<double>(mesh.positions[f[1]]),
-          cast<double>(mesh.positions[f[2]])};
-}
-
-double size_of(const Corners& corners) {
-  double size = 0;
-  for (const Vec3d& x : corners)
-    size = std::max({size, std::fabs(x.x), std::fabs(x.y), std::fabs(x.z)});
-  return size;
-}
-
 double longest_side(const Corners& c) {
   return std::sqrt(std::max(
       {length_squared(c[1] - c[0]), length_squared(c[2] - c[1]), length_squared(c[0] - c[2])}));
@@ -38,7 +25,7 @@ double longest_side(const Corners& c) {
 double blur_of(const Corners& corners, const Vec3d& viewer) {
   double squared = 0;
   for (const Vec3d& x : corners) squared = std::max(squared, length_squared(x - viewer));
-  return 0x1.0p-20 * std::max(size_of(corners), std::sqrt(squared));
+  return 0x1.0p-20 * std::max(largest_coordinate(corners), std::sqrt(squared));
 }
 
 // What is near to both of its sides, at its middle.
@@ -154,11 +141,11 @@ class PairFinder {
     std::vector<Vec3d> normals(count);
     std::vector<bool> needles(count);
     for (uint32_t f = 0; f < count; ++f) {
-      const Corners c = corners_of(mesh, FaceId(f));
+      const Corners c = face_corners<double>(mesh, FaceId(f));
       normals[f] = cross(c[1] - c[0], c[2] - c[0]);
       const double longest = longest_side(c), blur = blur_of(c, viewer_);
       needles[f] = is_needle(length(normals[f]) / longest, blur);
-      add_box(c, std::max(reach_of(longest, blur), touch_tolerance(size_of(c), 0)));
+      add_box(c, std::max(reach_of(longest, blur), touch_tolerance(largest_coordinate(c), 0)));
       faces_.push_back({shape, FaceId(f)});
     }
     const std::vector<VertexId> ids = edge_vertex_ids(mesh);
@@ -214,19 +201,21 @@ std::vector<FacePair> find_face_pairs(std::span<const Mesh* const> meshes, const
   return PairFinder(meshes, viewer, threads).find();
 }
 
-double size_of(const Mesh& mesh, FaceId face) { return size_of(corners_of(mesh, face)); }
+double size_of(const Mesh& mesh, FaceId face) {
+  return largest_coordinate(face_corners<double>(mesh, face));
+}
 
 double width_of(const Mesh& mesh, FaceId face) {
-  const Corners c = corners_of(mesh, face);
+  const Corners c = face_corners<double>(mesh, face);
   return length(cross(c[1] - c[0], c[2] - c[0])) / longest_side(c);
 }
 
 double blur_of(const Mesh& mesh, FaceId face, const Vec3d& viewer) {
-  return blur_of(corners_of(mesh, face), viewer);
+  return blur_of(face_corners<double>(mesh, face), viewer);
 }
 
 double reach_of(const Mesh& mesh, FaceId face, const Vec3d& viewer) {
-  const Corners c = corners_of(mesh, face);
+  const Corners c = face_corners<double>(mesh, face);
   return reach_of(longest_side(c), blur_of(c, viewer));
 }
 

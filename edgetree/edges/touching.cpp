@@ -82,10 +82,7 @@ class Unifier {
     return mesh.tangent(a) * (1 - t) + mesh.tangent(b) * t;
   }
   Corners corners(FaceRef face) const {
-    const Mesh& mesh = *shapes_[face.shape.index()].mesh;
-    const FaceIndices& f = mesh.face(face.face);
-    return {cast<double>(mesh.positions[f[0]]), cast<double>(mesh.positions[f[1]]),
-            cast<double>(mesh.positions[f[2]])};
+    return face_corners<double>(*shapes_[face.shape.index()].mesh, face.face);
   }
   const Plane& plane(FaceRef face) const { return before_[face.shape.index()].plane(face.face); }
   double size(EdgeRef id) const {

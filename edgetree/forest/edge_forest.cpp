@@ -49,7 +49,9 @@ struct EdgeForest::Impl {
     const bool lit = config.light_term && !lights.empty();
     const RadiancePyramid* environment =
         config.environment_term ? input.environment.get() : nullptr;
-    return {forest, lit ? &lights : nullptr, environment, query, input};
+    ForestQuery prepared(forest, lit ? &lights : nullptr, environment, query, input);
+    prepared.any_direction = !config.normal_speed;
+    return prepared;
   }
   // The result holds until another query is opened by this thread.
   const OpenNodes& open(const ForestQuery& query) const {
@@ -89,20 +91,26 @@ struct EdgeForest::Impl {
     }
   }
 
-  // Probability of drawing the child in a lane of a node; multiplied from the root on, as `draw`
-  // does, which has the same bits.
-  double probability(NodeId id, int lane, const ForestQuery& query, const OpenNodes& nodes) const {
+  // A node as one query reaches it: how likely, and which of the open ones it is, if any.
+  struct Reached {
+    double probability;
+    int opened;
+  };
+  // The child in a lane of a node; multiplied from the root on, as `draw` does, which has the same
+  // bits.
+  Reached reach(NodeId id, int lane, const ForestQuery& query, const OpenNodes& nodes) const {
     const uint32_t parent = forest.head(id).parent;
     const bool is_root = parent == kNoParent;
-    const double reach = is_root ? 1
-                                 : probability(static_cast<NodeId>(parent / kWidth),
-                                               static_cast<int>(parent % kWidth), query, nodes);
-    if (reach == 0) return 0;
-    const int opened = nodes.find(id);
+    const Reached here = is_root ? Reached{1, nodes.find_root(id)}
+                                 : reach(static_cast<NodeId>(parent / kWidth),
+                                         static_cast<int>(parent % kWidth), query, nodes);
+    if (here.probability == 0) return {0, OpenNodes::kClosed};
+    const bool is_open = here.opened != OpenNodes::kClosed;
     const Choice choice =
-        opened != OpenNodes::kClosed ? nodes.choice(opened) : choice_at(forest, config, query, id);
+        is_open ? nodes.choice(here.opened) : choice_at(forest, config, query, id);
     const double scale = is_root ? nodes.total() : choice.total;
-    return scale > 0 ? reach * (choice.weights[lane] / scale) : 0;
+    return {scale > 0 ? here.probability * (choice.weights[lane] / scale) : 0,
+            is_open ? nodes.child(here.opened, lane) : OpenNodes::kClosed};
   }
 
   // Exact test of a drawn edge; most pass without a look at the mesh.
@@ -172,8 +180,8 @@ double EdgeForest::probability(const EdgeQuery& query, EdgeRef id) const {
   const ForestQuery prepared = impl_->prepare(query);
   if (!impl_->accepts(query, prepared.point, node, lane)) return 0;
   if (!impl_->seen_edge(prepared.lobe, query.p, node, lane).is_seen()) return 0;
-  return impl_->probability(~static_cast<NodeId>(slot / kWidth), lane, prepared,
-                            impl_->open(prepared));
+  return impl_->reach(~static_cast<NodeId>(slot / kWidth), lane, prepared, impl_->open(prepared))
+      .probability;
 }
 
 double EdgeForest::pdf_t(const EdgeQuery& query, EdgeRef id, double t) const {

@@ -13,14 +13,6 @@
 namespace limn {
 namespace {
 
-double speed_of(const EdgeMesh& mesh, VertexId vertex, const Lanes& scale) {
-  if (mesh.tangents.empty()) return 0;
-  const Vec3<Lanes>& v = mesh.tangent(vertex);
-  double sum = 0;
-  for (int i = 0; i < kLanes; ++i) sum += scale[i] * std::hypot(v.x[i], v.y[i], v.z[i]);
-  return sum;
-}
-
 // The 24 leading bits: a number that a float holds. Not by a cast to float and back, because GCC 12
 // drops such a pair of casts where it makes vectors of them.
 double truncated(double x) {
@@ -42,7 +34,7 @@ std::optional<ForestGroup> group_of(const EdgeMesh& mesh, const Edge& edge, bool
   }
 }
 
-Wedge wedge_of(const EdgeMesh& mesh, EdgeId id, const Lanes& scale) {
+Wedge wedge_of(const EdgeMesh& mesh, EdgeId id) {
   const Edge& edge = mesh.edge(id);
   const auto [a, b] = edge.vertices;
   Wedge wedge;
@@ -52,7 +44,6 @@ Wedge wedge_of(const EdgeMesh& mesh, EdgeId id, const Lanes& scale) {
   wedge.length = length(wedge.ends[1] - wedge.ends[0]);
   const Vec3d &n0 = wedge.planes[0].n, &n1 = wedge.planes[1].n;
   wedge.angle = std::atan2(length(cross(n0, n1)), dot(n0, n1));
-  wedge.speed = 0.5 * (speed_of(mesh, a, scale) + speed_of(mesh, b, scale));
   wedge.edge = id;
   return wedge;
 }
@@ -346,14 +337,34 @@ void append_tree(std::span<const Wedge> wedges, ShapeId object, ForestGroup grou
   link(ids, forest);
 }
 
+// Of what an object's motion leaves of a vertex's. Motion that is wholly in there still is motion.
+double speed_of(const EdgeMesh& mesh, VertexId vertex, const Lanes& scale,
+                const ObjectMotion& motion) {
+  if (mesh.tangents.empty()) return 0;
+  const Vec3<Lanes> v = scaled_velocity(mesh.tangent(vertex), scale);
+  const double left = sum_of_speeds(v - motion.velocity(mesh.position(vertex)));
+  return sum_of_speeds(v) > 0 ? std::max(left, double{std::numeric_limits<float>::min()}) : left;
+}
+
+void set_speeds(const EdgeMesh& mesh, const Lanes& scale, const ObjectMotion& motion,
+                std::span<Wedge> wedges) {
+  for (Wedge& wedge : wedges) {
+    const auto [a, b] = mesh.edge(wedge.edge).vertices;
+    wedge.speed = 0.5 * (speed_of(mesh, a, scale, motion) + speed_of(mesh, b, scale, motion));
+  }
+}
+
 }  // namespace
 
 Forest build_forest(const EdgeSamplerInput& input, int threads, const ForestConfig& config) {
   Forest forest;
-  for_every_tree(input, config.cull_concave, forest,
-                 [&](auto& wedges, ShapeId object, ForestGroup group) {
-                   append_tree(wedges, object, group, threads, config, forest);
-                 });
+  for (const EdgeMesh& mesh : input.objects)
+    forest.motions.push_back(motion_of(mesh, input.lane_scale));
+  for_every_tree(
+      input, config.cull_concave, forest, [&](auto& wedges, ShapeId object, ForestGroup group) {
+        set_speeds(input.object(object), input.lane_scale, forest.motions[object.index()], wedges);
+        append_tree(wedges, object, group, threads, config, forest);
+      });
   return forest;
 }
 

@@ -15,8 +15,8 @@ namespace limn {
 
 // Nothing for an edge that no query needs.
 std::optional<ForestGroup> group_of(const EdgeMesh& mesh, const Edge& edge, bool cull_concave);
-// scale: EdgeSamplerInput::lane_scale.
-Wedge wedge_of(const EdgeMesh& mesh, EdgeId id, const Lanes& scale);
+// All but the speed.
+Wedge wedge_of(const EdgeMesh& mesh, EdgeId id);
 Bounds bounds_of(std::span<const Wedge> wedges);
 // Calls append(wedges, object, group) for every object and group that has edges, in a fixed order;
 // trees get a slot for every edge of every object first (Forest, QuadricForest).
@@ -30,7 +30,7 @@ void for_every_tree(const EdgeSamplerInput& input, bool cull_concave, Trees& tre
     std::vector<Wedge> groups[kForestGroups];
     for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
       if (const auto group = group_of(mesh, mesh.edges[e], cull_concave)) {
-        groups[static_cast<int>(*group)].push_back(wedge_of(mesh, EdgeId(e), input.lane_scale));
+        groups[static_cast<int>(*group)].push_back(wedge_of(mesh, EdgeId(e)));
       }
     }
     for (int g = 0; g < kForestGroups; ++g) {

@@ -164,10 +164,10 @@ int OpenNodes::draw_root(double& u) const {
   return root;
 }
 
-int OpenNodes::find(NodeId id) const {
-  for (size_t i = 0; i < nodes_.size(); ++i)
-    if (nodes_[i].choice.node == id) return static_cast<int>(i);
-  return kClosed;
+int OpenNodes::find_root(NodeId id) const {
+  int root = 0;
+  while (nodes_[static_cast<size_t>(root)].choice.node != id) ++root;
+  return root;
 }
 
 }  // namespace limn

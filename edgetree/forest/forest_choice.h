@@ -47,7 +47,8 @@ class OpenNodes {
   static constexpr int kClosed = -1;
   // The child in a lane of an open node, if that is open, too.
   int child(int node, int lane) const { return nodes_[static_cast<size_t>(node)].open[lane]; }
-  int find(NodeId id) const;
+  // A root, which is always open.
+  int find_root(NodeId id) const;
 
  private:
   struct Node {

@@ -16,6 +16,9 @@ struct ForestConfig {
   bool light_term = true;
   // The same for an environment that is not uniform.
   bool environment_term = true;
+  // Children and edges weigh by how fast they move across the line of sight; else by their speed
+  // relative to p in any direction.
+  bool normal_speed = true;
   // Children of a node, 2 to 8.
   uint32_t width = 8;
   // Children of at most this height weigh by the lengths that their own children expect, which for

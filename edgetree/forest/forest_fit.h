@@ -16,7 +16,7 @@ struct Wedge {
   std::array<Vec3d, 2> ends;
   double length = 0;
   double angle = 0;  // exterior dihedral angle
-  double speed = 0;  // mean of the two ends, lanes added up
+  double speed = 0;  // what ObjectMotion leaves: mean of the two ends, lanes added up
   EdgeId edge;
 };
 

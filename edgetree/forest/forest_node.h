@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "edgetree/forest/forest_motion.h"
 #include "edgetree/forest/quadric_pair.h"
 #include "edgetree/simd.h"
 #include "limn/edgetree/edges.h"
@@ -48,8 +49,9 @@ struct alignas(64) InnerNode {
   // a plane that crosses the box at random along axis k crosses wedges of this length on average.
   Floats cover[3];
   NodeHead head;
-  Floats speed;  // mean over the edges; 0 only if none moves
-  Ints child;    // NodeId or kNoChild
+  // Of what ObjectMotion leaves out, mean over the edges; 0 only if none moves.
+  Floats speed;
+  Ints child;  // NodeId or kNoChild
   // Boxes around the children: the cube [-1, 1]^3 of the frame is kBoxSteps wide; bits 0 to 9 are
   // x, then y, then z.
   Ints low, high;
@@ -82,7 +84,8 @@ struct Forest {
   std::vector<EdgeNode> edges;
   std::vector<ForestPairs> pairs;  // of the inner nodes that have them
   std::vector<NodeId> roots;
-  double extent = 0;  // largest |x| of a position
+  std::vector<ObjectMotion> motions;  // of the objects
+  double extent = 0;                  // largest |x| of a position
   // [object][edge]: kWidth * edge node + lane, or kNoParent.
   std::vector<std::vector<uint32_t>> slots;
 

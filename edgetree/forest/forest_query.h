@@ -34,12 +34,19 @@ struct ForestQuery {
   // A power of two that brings the scene to the size of 1: products of lengths then neither
   // overflow nor vanish, at any scale of the scene.
   float unit;
-  float p[2][3];  // unit * p = p[0] + p[1], to twice the precision of a float
-  float speed;    // of p
-  float turn;     // of the directions
+  float p[2][3];               // unit * p = p[0] + p[1], to twice the precision of a float
+  bool any_direction = false;  // motion counts in any direction, not only across the line of sight
   const EdgeSamplerInput& input;
   const EdgeQuery& asked;
   std::optional<Plane> own_plane;  // of the query's own face, if any
+
+  // How an object moves as seen from p; until another one is asked for.
+  const SeenMotion& motion_of(ShapeId object) const;
+
+ private:
+  std::optional<ViewerMotion> viewer_;
+  mutable ShapeId seen_;
+  mutable SeenMotion motion_;
 };
 
 // Lanes (-1 or 0) of the children that may hold an edge of E(p): never 0 where one does.

@@ -16,6 +16,7 @@
 #include "integrators/estimates/batch_record.h"
 #include "integrators/methods/selection.h"
 #include "integrators/terms/term.h"
+#include "integrators/terms/viewpoint.h"
 #include "limn/core/error.h"
 #include "limn/core/names.h"
 #include "limn/core/parallel.h"
@@ -235,6 +236,7 @@ void BackwardPass::select() {
         "shading 'mitsuba' is discontinuous where no edge is: the derivative of interpolated "
         "normals is incomplete");
   }
+  warn_of_faces_edge_on(parameters_.scene(), result_.warnings);
   for (const Parameter& p : parameters_.parameters()) {
     result_.parameters.push_back(
         {p.name, p.unit, p.shape(), Moments(p.numbers(), options_.keep_batches)});

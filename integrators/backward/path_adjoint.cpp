@@ -4,6 +4,7 @@
 
 #include "integrators/backward/edge_adjoint.h"
 #include "integrators/terms/camera_path.h"
+#include "integrators/terms/path_follow.h"
 
 namespace limn {
 namespace {

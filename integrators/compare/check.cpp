@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "integrators/compare/check_bend.h"
 #include "integrators/compare/check_scores.h"
 #include "integrators/compare/check_step.h"
 #include "limn/core/parameter.h"
@@ -203,7 +204,7 @@ class Checker {
       if (!confirm(windows, found, runs, result)) return interrupted(std::move(runs), result);
     }
     if (result.confirmation && result.confirmation->p < kCheckStageLevel) {
-      result.verdict = Verdict::kDisagree;
+      if (!result.bends) result.verdict = Verdict::kDisagree;
     } else if (result.needed_spp <= static_cast<double>(settings_.spp)) {
       result.verdict = Verdict::kAgree;
     }
@@ -286,13 +287,29 @@ class Checker {
     for (size_t k = 0; k < probe[0].size(); ++k) {
       probe[0][k] = probe[1][k] = 0.5 * (found.probe[0][k] + found.probe[1][k]);
     }
-    const double z = residual.score(probe).z;
+    const Score score = residual.score(probe);
+    const double z = score.z;
     const bool same_side = z * found.score.z >= 0;
     const double half = 0.5 * normal_p_value(z);
     result.confirmation = {spp, step, same_side ? half : 1 - half};
     if (std::isnan(z)) result.confirmation->p = 0;
-    if (result.confirmation->p < kCheckStageLevel) suspect_terms(residual, runs, result);
+    if (result.confirmation->p >= kCheckStageLevel) return true;
+    result.bends = explained_by_bend(windows, probe, score, step, spp);
+    if (!result.bends) suspect_terms(residual, runs, result);
     return true;
+  }
+
+  // Whether the image bends in the place of the probe, and by so much that half of it, by which a
+  // slope of one side is off the mean of both, explains what the score found.
+  bool explained_by_bend(const Windows& windows, const Probe& probe, const Score& score,
+                         double step, int64_t spp) const {
+    RunSettings settings = settings_of(spp, 1, 2);
+    settings.progress = nullptr;
+    const auto bend = find_bend(scene_, options_.parameter, step, windows, probe[0], settings);
+    if (!bend || normal_p_value(bend->z) >= kCheckStageLevel) return false;
+    const double excess = std::fabs(score.value) - 0.5 * std::fabs(bend->value);
+    const double error = std::hypot(score.error, 0.5 * bend->error);
+    return normal_p_value(std::max(0.0, excess / error)) >= kCheckStageLevel;
   }
 
   // Sets the suspicions, and the suspect among them, from the second run.
@@ -350,7 +367,9 @@ class Checker {
 
 CheckResult check(const Scene& scene, const CheckOptions& options, const RunSettings& settings,
                   const GradientRun& run) {
-  check_warp(options.warp, {find_method(options.method).name});  // before the search for a step
+  const MethodType& method = find_method(options.method);
+  if (method.check) method.check(scene);  // before the search for a step
+  check_warp(options.warp, {method.name});
   return Checker(scene, options, settings, run).check();
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "integrators/compare/edge_events.h"
 #include "limn/integrators/statistics.h"
 
 namespace limn {
@@ -65,49 +66,7 @@ std::vector<double> magnitude_of_edges(const GradientResult& result, const Param
   return known;
 }
 
-// The batches of all terms of edges together.
-Batches batches_of_edges(const GradientResult& result, const ParameterGradient& g) {
-  Batches batches;
-  for (size_t t = 0; t < result.terms.size(); ++t) {
-    if (!result.terms[t].computed || !result.terms[t].edges) continue;
-    const Batches& more = g.term_blocks[t].kept();
-    if (batches.empty()) {
-      batches = more;
-      continue;
-    }
-    for (size_t b = 0; b < batches.size(); ++b)
-      for (size_t i = 0; i < batches[b].sums.size(); ++i) batches[b].sums[i] += more[b].sums[i];
-  }
-  return batches;
-}
-
 }  // namespace
-
-EventSizes event_sizes(const Batches& batches) {
-  EventSizes events;
-  if (batches.size() < 2) return events;
-  std::vector<double> means(batches[0].sums.size());
-  double samples = 0;
-  for (const Moments::Batch& batch : batches) {
-    samples += static_cast<double>(batch.samples);
-    for (size_t i = 0; i < means.size(); ++i) means[i] += batch.sums[i];
-  }
-  for (double& mean : means) mean /= samples;
-  double sizes = 0, squares = 0, cubes = 0;
-  for (const Moments::Batch& batch : batches) {
-    for (size_t i = 0; i < means.size(); ++i) {
-      const double x = batch.sums[i];
-      const double d = std::fabs(x - means[i] * static_cast<double>(batch.samples));
-      sizes += std::fabs(x);
-      squares += d * d;
-      cubes += d * d * d;
-    }
-  }
-  const double count = static_cast<double>(batches.size());
-  if (sizes > 0) events.mean = squares * count / (count - 1) / sizes;
-  if (squares > 0) events.large = cubes / squares;
-  return events;
-}
 
 Windows::Axis::Axis(int pixels, int spacing, int fine) : count((pixels + spacing - 1) / spacing) {
   for (int begin = 0; begin < pixels; begin += fine) {
@@ -164,7 +123,7 @@ Residual::Residual(const Windows& windows, const GradientResult& gradient,
   const std::vector<double> edges = magnitude_of_edges(gradient, g, of_differences);
   const double samples = static_cast<double>(g.total_blocks.samples());
   const double pixels = static_cast<double>(windows.fine()) * windows.fine();
-  const EventSizes of_edges = event_sizes(batches_of_edges(gradient, g));
+  const EventSizes of_edges = event_sizes(batches_of_edges(gradient));
   const EventSizes of_steps = event_sizes(differences.blocks.kept());
   for (size_t i = 0; i < edges.size(); ++i) {
     rare_gradient_.magnitude.push_back(edges[i]);

@@ -80,15 +80,6 @@ class Residual {
   std::vector<double> rounding_;  // of each window, a standard deviation
 };
 
-// How large the events are that make up a derivative: a few samples of great value.
-struct EventSizes {
-  double mean = 0;   // a mean of m (per sample) comes with a variance of |m| times this
-  double large = 0;  // of those that make up most of the variance
-};
-// From the sums of batches. Of a batch of many samples the mean is no event: events are what is
-// left without it, so that their size does not grow with that of the batches.
-EventSizes event_sizes(const std::vector<Moments::Batch>& batches);
-
 // The t value whose score is z.
 double student_from_normal(double z, double degrees);
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "integrators/compare/edge_events.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/differences.h"
 #include "limn/integrators/statistics.h"

@@ -1,6 +1,8 @@
 // The rows of the table of methods, as a comparison runs them.
 #include "limn/integrators/derivative_method.h"
 
+#include "integrators/compare/edge_events.h"
+
 namespace limn {
 namespace {
 
@@ -15,7 +17,7 @@ class TableMethod final : public DerivativeMethod {
     GradientResult result = gradient(input_.scene, input_.options(type_), settings);
     MethodRun run;
     run.image = means(result.parameters[0].total);
-    run.blocks = block_sums(result.parameters[0].total_blocks, result.parameters[0].events);
+    run.blocks = block_sums(result);
     run.seconds = result.seconds;
     run.setup_seconds = result.setup_seconds;
     run.spp = result.spp;

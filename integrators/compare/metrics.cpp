@@ -145,15 +145,4 @@ std::optional<Uncertain> time_ratio(const std::vector<double>& method,
   return Uncertain{ratio, ratio * std::hypot(a.error / a.value, b.error / b.value)};
 }
 
-BlockSums block_sums(const Moments& blocks, const Events& events) {
-  BlockSums result;
-  result.sums = means(blocks);
-  if (blocks.batches() > 1) result.variances = variances(blocks);
-  result.degrees = blocks.batches() - 1;
-  if (blocks.samples() > 0) {
-    result.event = events.mean_size() / static_cast<double>(blocks.samples());
-  }
-  return result;
-}
-
 }  // namespace limn

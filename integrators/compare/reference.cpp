@@ -9,6 +9,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "integrators/compare/edge_events.h"
 #include "limn/core/error.h"
 
 namespace limn {
@@ -195,7 +196,7 @@ Reference make_reference(const MethodInput& input, const RunSettings& settings) 
   Reference r;
   r.image = means(g.total);
   r.variance = variances(g.total);
-  r.blocks = block_sums(g.total_blocks, g.events);
+  r.blocks = block_sums(result);
   for (size_t b = 0; b < g.total_blocks.size(); ++b) {
     r.edges.push_back(edge_magnitude(result, g, b));
   }

@@ -22,15 +22,6 @@ double Moments::variance(size_t i) const {
   return std::fmax(0.0, between) / (batches_ - 1) / samples_;
 }
 
-void Events::add_batch(const std::vector<double>& sums) {
-  for (size_t i = 0; i < sums.size(); i += 3) {
-    const double x = std::fabs(sums[i] + sums[i + 1] + sums[i + 2]);
-    sizes_ += x;
-    squares_ += x * x;
-    cubes_ += x * x * x;
-  }
-}
-
 std::vector<double> means(const Moments& moments) {
   std::vector<double> values(moments.size());
   for (size_t i = 0; i < values.size(); ++i) values[i] = moments.mean(i);

@@ -89,7 +89,6 @@ ParameterGradient to_gradient(const std::string& name, DifferenceEstimate& estim
   if (estimate.blocks.size() > 0) g.term_blocks = {estimate.blocks};
   g.total_blocks = std::move(estimate.blocks);
   g.image_sum = std::move(estimate.image_sum);
-  g.events = estimate.events;
   return g;
 }
 

@@ -43,7 +43,6 @@ void DifferenceEstimate::add_batch(const std::vector<double>& sums, const Film& 
   const int width = film.crop_width;
   const int height = film.crop_height;
   total.add_batch(sums, samples);
-  events.add_batch(sums);
   if (block > 0) blocks.add_batch(sum_blocks(sums, width, height, block), samples);
   image_sum.add_batch(sum_blocks(sums, width, height, std::max(width, height)), samples);
 }

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "integrators/methods/hair_gaps.h"
+#include "integrators/terms/viewpoint.h"
 #include "limn/core/error.h"
 #include "limn/core/names.h"
 #include "limn/core/parameter.h"
@@ -22,11 +24,12 @@ void check_shading(const Scene& scene, GradientResult& result) {
       "is incomplete");
 }
 
-void check_selection(const MethodType& method, const GradientOptions& options) {
+void check_selection(const MethodType& method, const Scene& scene, const GradientOptions& options) {
   if (options.exact_film && !method.terms_can_be_left_out) {
     throw InputError("the exact film is for methods that sample edges on it: the method \"" +
                      method.name + "\" does not");
   }
+  if (method.check) method.check(scene);
   check_warp(options.warp, {method.name});
   if (options.terms.empty() || method.terms_can_be_left_out) return;
   throw InputError("terms: the method \"" + method.name + "\" has all terms in one");
@@ -92,18 +95,20 @@ double edge_magnitude(const GradientResult& result, const ParameterGradient& g, 
 GradientResult gradient(const Scene& scene, const GradientOptions& options,
                         const RunSettings& settings) {
   const MethodType& method = find_method(options.method);
-  check_selection(method, options);
+  check_selection(method, scene, options);
   if (settings.store) identify(method, scene, options, *settings.store);
   GradientResult result = method.run(method, scene, options, settings);
   result.method = method.name;
   check_shading(scene, result);
+  warn_of_faces_edge_on(scene, result.warnings);
+  warn_of_hair_gaps(scene, static_cast<double>(result.spp), settings.threads, result.warnings);
   return result;
 }
 
 std::vector<std::string> trace_sample(const Scene& scene, const GradientOptions& options,
                                       const RunSettings& settings, const NonFinite::Place& place) {
   const MethodType& method = find_method(options.method);
-  check_selection(method, options);
+  check_selection(method, scene, options);
   if (!method.trace) {
     throw InputError("the method \"" + method.name + "\" cannot trace single samples");
   }

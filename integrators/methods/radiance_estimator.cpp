@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "integrators/terms/camera_path.h"
+#include "integrators/terms/path_follow.h"
 #include "integrators/terms/path_log.h"
 
 namespace limn {

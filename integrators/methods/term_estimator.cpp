@@ -5,6 +5,7 @@
 
 #include "integrators/terms/camera_path.h"
 #include "integrators/terms/film_regions.h"
+#include "integrators/terms/path_follow.h"
 #include "integrators/terms/path_log.h"
 
 namespace limn {

@@ -30,7 +30,7 @@ void collect(const std::vector<const std::vector<double>*>& sums, const std::vec
   const int height = film.crop_height;
   std::vector<double> edges(film_size(film));
   std::vector<double> total(film_size(film));
-  // Terms of edges are added up first: their sum is what counts as an event.
+  // Terms of edges by themselves first: the order of a sum decides its last bits.
   for (const bool of_edges : {true, false}) {
     for (size_t t = 0; t < terms.size(); ++t) {
       if (!sums[t] || terms[t].edges != of_edges) continue;
@@ -39,7 +39,6 @@ void collect(const std::vector<const std::vector<double>*>& sums, const std::vec
     }
   }
   for (size_t i = 0; i < total.size(); ++i) total[i] += edges[i];
-  g.events.add_batch(edges);
   for (size_t t = 0; t < terms.size(); ++t) {
     if (!sums[t]) continue;
     g.terms[t].add_batch(*sums[t], samples);

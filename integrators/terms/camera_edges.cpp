@@ -49,7 +49,11 @@ std::span<const FaceRef> faces_that_move(const EdgeMesh& mesh, EdgeId edge) {
 
 CameraEdges::CameraEdges(const PathContext& context, const EdgeSamplerInput& input, int lanes,
                          const FreeMotion* free, const FilmRegions* visible)
-    : context_(context), input_(input), free_(free), clips_(find_clip_segments(context.scene)) {
+    : context_(context),
+      input_(input),
+      free_(free),
+      viewpoint_(context.scene, {context.scene.camera.origin}),
+      clips_(find_clip_segments(context.scene)) {
   const Stopwatch watch;
   for (uint32_t o = 0; o < input_.objects.size(); ++o) add_object(ShapeId(o));
   for (uint32_t c = 0; c < clips_.size(); ++c) add_clip(c);
@@ -78,7 +82,7 @@ void CameraEdges::keep_seen(const FilmRegions& visible) {
       part.speed0 = at(edge.speed0, edge.speed1, s0);
       part.speed1 = at(edge.speed0, edge.speed1, s1);
       part.length = edge.length * (s1 - s0);
-      if (around.near.empty()) part.beside = beside;
+      if (around.near.empty() && !viewpoint_.sees_edge_on(around)) part.beside = beside;
       seen.push_back(part);
     }
   }
@@ -108,11 +112,10 @@ Vec3<Dual> CameraEdges::moving(const Vec3d& x, const Vec3<Lanes>& velocity) cons
 
 void CameraEdges::add_object(ShapeId object) {
   const EdgeMesh& mesh = input_.object(object);
-  const Vec3d pinhole = value(context_.scene.camera.origin);
   for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
     const EdgeRef id{object, EdgeId(e)};
     FilmEdge edge;
-    if (!is_candidate(mesh, id.edge, pinhole) || is_hidden(mesh, id.edge)) continue;
+    if (!viewpoint_.is_candidate(mesh, id.edge) || is_hidden(mesh, id.edge)) continue;
     if (clip_and_project(id, edge)) add_if_moving(edge, faces_that_move(mesh, id.edge));
   }
 }
@@ -253,8 +256,10 @@ bool CameraEdges::jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& 
   }
   const Camera& camera = context_.scene.camera;
   const EdgeMesh& mesh = input_.object(edge.id.object);
+  const Vec3d x = mesh.position(mesh.edge(edge.id.edge).vertices[0]);
+  const Vec3d p = value(viewpoint_.seeing(mesh.around(edge.id.edge), x).v);
   EdgeView view;
-  if (!view_edge(mesh, edge.id, t, value(camera.origin), view)) return false;
+  if (!view_edge(mesh, edge.id, t, p, view)) return false;
   const double cosine = dot(view.omega, value(camera.forward));
   return edge_jump(context_, mesh, view, {}, camera.near_clip / cosine, camera.far_clip / cosine, 0,
                    key, rays, jump, {}, edge.beside ? &*edge.beside : nullptr);

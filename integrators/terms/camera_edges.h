@@ -6,6 +6,7 @@
 
 #include "integrators/terms/clip_curves.h"
 #include "integrators/terms/film_regions.h"
+#include "integrators/terms/viewpoint.h"
 #include "limn/core/discrete_distribution.h"
 #include "limn/edgetree/edge_sampler.h"
 
@@ -49,7 +50,7 @@ class CameraEdges {
   // free: then all that may move is listed, with the speeds of unit translations in the first three
   // lanes (relative to the camera); null: what the scene's tangents move, with their speeds in
   // `lanes` lanes. visible: of the film, to list only what is seen of edges; null: hidden parts are
-  // listed too, and found to be hidden by jump_at.
+  // listed too, and found to be hidden by jump_at. Edges of faces seen edge-on: see Viewpoint.
   CameraEdges(const PathContext& context, const EdgeSamplerInput& input, int lanes,
               const FreeMotion* free = nullptr, const FilmRegions* visible = nullptr);
 
@@ -85,6 +86,7 @@ class CameraEdges {
   const PathContext& context_;
   const EdgeSamplerInput& input_;
   const FreeMotion* free_;
+  Viewpoint viewpoint_;
   std::vector<ClipSegment> clips_;
   std::vector<FilmEdge> edges_;
   DiscreteDistribution choice_;  // of an edge

@@ -1,6 +1,8 @@
 // Where the camera's clip planes cut faces.
 #include "integrators/terms/clip_curves.h"
 
+#include "integrators/terms/path_follow.h"
+
 namespace limn {
 namespace {
 

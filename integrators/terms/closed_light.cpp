@@ -43,6 +43,7 @@ struct ClosedLight::Scratch {
   };
   struct CutPoint {
     ShadowOutlines::Point at;
+    uint32_t number;    // as they were found
     uint32_t lines[2];  // that meet there
     Vec3d w;            // from the point
   };
@@ -64,7 +65,7 @@ struct ClosedLight::Scratch {
   std::vector<Corner> polygon, clipped;
   std::vector<ShadowOutlines::Point> points;
   std::vector<uint32_t> lines;
-  std::vector<CutPoint> cut_points;
+  std::vector<CutPoint> cut_points;  // by place, then number
 
   // Keeps what is not below zero in the polygon.
   template <class Height, class OnGrid>
@@ -82,9 +83,22 @@ struct ClosedLight::Scratch {
       const double a0 = swapped ? h1 : h0, a1 = swapped ? h0 : h1;
       const Vec3d w = x0 + (x1 - x0) * (a0 / (a0 - a1));
       clipped.push_back({w, h0 >= 0 ? line : here.line});
-      cut_points.push_back({on_grid(w), {here.line, line}, w});
+      const auto number = static_cast<uint32_t>(cut_points.size());
+      cut_points.push_back({on_grid(w), number, {here.line, line}, w});
     }
     std::swap(polygon, clipped);
+  }
+  void sort_cut_points() {
+    std::sort(cut_points.begin(), cut_points.end(), [](const CutPoint& a, const CutPoint& b) {
+      return std::tie(a.at, a.number) < std::tie(b.at, b.number);
+    });
+  }
+  // The first that was found at a place; null if none was.
+  const CutPoint* cut_point_at(const ShadowOutlines::Point& at) const {
+    const auto found =
+        std::lower_bound(cut_points.begin(), cut_points.end(), at,
+                         [](const CutPoint& cut, const auto& place) { return cut.at < place; });
+    return found != cut_points.end() && found->at == at ? &*found : nullptr;
   }
 };
 
@@ -256,6 +270,7 @@ bool ClosedLight::find_outlines(const LampPlane& lamp, const Receiver& receiver,
     if (!within) return false;
     if (scratch.points.size() > 2) scratch.outlines.add(scratch.points, scratch.lines, of_lamp);
   }
+  scratch.sort_cut_points();
   return true;
 }
 
@@ -318,8 +333,8 @@ class ClosedLight::View {
   Vec3d end_of(const ShadowOutlines::Piece& piece, const ShadowOutlines::End& end) const {
     if (end.kind == ShadowOutlines::Kind::kCrossing)
       return meet(piece.tag, end.tag, piece, towards(end.at));
-    for (const Scratch::CutPoint& cut : scratch_.cut_points) {
-      if (cut.at == end.at) return meet(cut.lines[0], cut.lines[1], piece, cut.w);
+    if (const Scratch::CutPoint* cut = scratch_.cut_point_at(end.at)) {
+      return meet(cut->lines[0], cut->lines[1], piece, cut->w);
     }
     // A corner of the face: that which is nearer to the point on the grid.
     const auto x = face_corners<double>(mesh_of(end.tag), face_of(end.tag).face);

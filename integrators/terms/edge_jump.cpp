@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "integrators/terms/near_faces.h"
+#include "integrators/terms/path_follow.h"
 #include "limn/core/face_copies.h"
 
 namespace limn {

@@ -10,14 +10,15 @@ namespace {
 
 // Which sides of the plane through light and edge the faces around the edge lie on. A face that is
 // seen edge-on, to the rounding of the determinant, casts no shadow of its own.
-double lit_side(const Scene& scene, const EdgeMesh& edges, EdgeId edge, const LightOrigin& light) {
+double lit_side(const Scene& scene, const EdgeMesh& edges, EdgeId edge,
+                const Viewpoint& viewpoint) {
   const auto& ends = edges.edge(edge).vertices;
   const Vec3d x0 = edges.position(ends[0]);
   const Vec3d along = edges.position(ends[1]) - x0;
-  const Vec3d w = light.through(x0);
+  const FacesAround around = edges.around(edge);
+  const Vec3d w = viewpoint.seeing(around, x0).through(x0);
   const Vec3d n = cross(w, along);
   const double scale = 8 * 0x1p-53 * length(w) * length(along);
-  const FacesAround around = edges.around(edge);
   const uint8_t own = edges.edge(edge).rim;
   bool blocked[2] = {false, false};
   const auto for_every_face = [&](const auto& visit) {
@@ -62,20 +63,22 @@ ShadowEdges::ShadowEdges(const PathContext& context, const EdgeSamplerInput& inp
     : context_(context), input_(input) {
   const Stopwatch watch;
   reach_ = 2 * bounds_of(context_.scene).diagonal();
-  for (const auto& light : context_.scene.delta_lights) {
+  for (uint32_t i = 0; i < context_.scene.delta_lights.size(); ++i) {
+    viewpoints_.emplace_back(context_.scene, context_.scene.delta_lights[i]->origin());
     const size_t first = edges_.size();
-    for (uint32_t o = 0; o < input_.objects.size(); ++o) list(*light, ShapeId(o));
+    for (uint32_t o = 0; o < input_.objects.size(); ++o) list(i, ShapeId(o));
     weigh(first, lanes);
   }
   list_seconds_ = watch.seconds();
 }
 
-void ShadowEdges::list(const DeltaLight& light, ShapeId object) {
+void ShadowEdges::list(uint32_t light, ShapeId object) {
   const EdgeMesh& mesh = input_.object(object);
-  const LightOrigin origin = light.origin();
+  const DeltaLight& of = *context_.scene.delta_lights[light];
+  const LightOrigin origin = of.origin();
   for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
-    ShadowEdge edge{&light, {object, EdgeId(e)}, 0, 0, {}};
-    edge.sign = lit_side(context_.scene, mesh, edge.id.edge, origin);
+    ShadowEdge edge{&of, light, {object, EdgeId(e)}, 0, 0, {}};
+    edge.sign = lit_side(context_.scene, mesh, edge.id.edge, viewpoints_[light]);
     if (edge.sign == 0) continue;
     const auto& ends = mesh.edge(edge.id.edge).vertices;
     const Vec3<Dual> y[2] = {moving_vertex(mesh, ends[0]), moving_vertex(mesh, ends[1])};
@@ -134,10 +137,11 @@ std::optional<ShadowPoint> ShadowEdges::cast(const ShadowEdge& edge, double t,
   const Vec3d y = mesh.position(ends[0]) * (1 - t) + mesh.position(ends[1]) * t;
   const LightOrigin origin = edge.light->origin();
   const Vec3d w = origin.through(y);
-  const double w_length = length(w);
-  const double before = origin.infinite ? reach_ : w_length;  // of the ray, up to y
-  Ray ray{y - w * (before / w_length), w / w_length};
   const FacesAround around = mesh.around(edge.id.edge);
+  const Vec3d seen = viewpoints_[edge.viewpoint].seeing(around, y).through(y);
+  const double length_seen = length(seen);
+  const double before = origin.infinite ? reach_ : length_seen;  // of the ray, up to y
+  Ray ray{y - seen * (before / length_seen), seen / length_seen};
   ray.skip_faces = around.all;
   Hit hit;
   ++rays.closest;

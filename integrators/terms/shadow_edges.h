@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "integrators/terms/path.h"
+#include "integrators/terms/viewpoint.h"
 #include "limn/core/discrete_distribution.h"
 #include "limn/edgetree/edge_sampler.h"
 
@@ -13,6 +14,7 @@ namespace limn {
 // An edge that parts light from shadow, as seen from one light.
 struct ShadowEdge {
   const DeltaLight* light;
+  uint32_t viewpoint;  // the light's, in the order of the scene
   EdgeRef id;
   double sign;   // 1: the side G > 0 is lit; -1: the other
   double angle;  // how long it is as seen from the light [rad]; at infinity [scene units]
@@ -46,12 +48,13 @@ class ShadowEdges {
                    const Vec3d& omega) const;
 
  private:
-  void list(const DeltaLight& light, ShapeId object);
+  void list(uint32_t light, ShapeId object);
   void weigh(size_t first, int lanes);
 
   const PathContext& context_;
   const EdgeSamplerInput& input_;
-  double reach_ = 0;  // longer than any line through the scene
+  std::vector<Viewpoint> viewpoints_;  // of the delta lights
+  double reach_ = 0;                   // longer than any line through the scene
   std::vector<ShadowEdge> edges_;
   DiscreteDistribution choice_;  // of an edge
   double list_seconds_ = 0;

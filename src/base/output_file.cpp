@@ -1,5 +1,5 @@
 // Files that appear whole or not at all.
-#include "src/base/output_file.h"
+#include "limn/core/output_file.h"
 
 #include <unistd.h>
 

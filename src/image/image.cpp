@@ -21,7 +21,7 @@
 #include "limn/core/check.h"
 #include "limn/core/error.h"
 #include "limn/core/memory.h"
-#include "src/base/output_file.h"
+#include "limn/core/output_file.h"
 
 namespace limn {
 namespace {

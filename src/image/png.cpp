@@ -6,7 +6,7 @@
 
 #include "limn/core/error.h"
 #include "limn/core/image.h"
-#include "src/base/output_file.h"
+#include "limn/core/output_file.h"
 
 namespace limn {
 namespace {

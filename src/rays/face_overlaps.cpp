@@ -24,17 +24,7 @@ using FacePair = std::pair<FaceRef, FaceRef>;
 auto place(FaceRef face) { return std::pair(face.shape, face.face); }
 
 Corners corners_of(const Scene& scene, FaceRef ref) {
-  const Mesh& mesh = scene.shape(ref.shape).mesh;
-  const FaceIndices& f = mesh.face(ref.face);
-  return {cast<double>(mesh.positions[f[0]]), cast<double>(mesh.positions[f[1]]),
-          cast<double>(mesh.positions[f[2]])};
-}
-
-double size_of(const Corners& corners) {
-  double size = 0;
-  for (const Vec3d& x : corners)
-    size = std::max({size, std::fabs(x.x), std::fabs(x.y), std::fabs(x.z)});
-  return size;
+  return face_corners<double>(scene.shape(ref.shape).mesh, ref.face);
 }
 
 Vec3d normal_of(const Corners& c) { return cross(c[1] - c[0], c[2] - c[0]); }
@@ -75,7 +65,7 @@ double longest_side(const Corners& c) {
 // How far rays from the viewer may miss points of a face: twice 2^-20 of its distance, which is 16
 // roundings of origin, direction and products of both.
 double blur_of(const Corners& corners, const Vec3d& viewer) {
-  double distance = size_of(corners);
+  double distance = largest_coordinate(corners);
   for (const Vec3d& x : corners) distance = std::max(distance, length(x - viewer));
   return 0x1p-19 * distance;
 }
@@ -97,12 +87,13 @@ FloatBox box_around(const Vec3d& lower, const Vec3d& upper, double size, double 
 FloatBox box_of(const Corners& c, double reach) {
   Bounds bounds;
   for (const Vec3d& x : c) bounds.extend(x);
-  return box_around(bounds.lower, bounds.upper, size_of(c), reach);
+  return box_around(bounds.lower, bounds.upper, largest_coordinate(c), reach);
 }
 
 FloatBox box_of(const Mesh& mesh) {
   const Bounds bounds = bounds_of(mesh);
-  return box_around(bounds.lower, bounds.upper, size_of({bounds.lower, bounds.upper, {}}), 0);
+  return box_around(bounds.lower, bounds.upper,
+                    largest_coordinate(std::array{bounds.lower, bounds.upper}), 0);
 }
 
 struct FoundPair {
@@ -161,7 +152,7 @@ class OverlapFinder {
 
   Place place_of(uint32_t i, uint32_t j) const {
     const Corners &a = corners_[i], &b = corners_[j];
-    const double tolerance = touch_tolerance(size_of(a), size_of(b));
+    const double tolerance = touch_tolerance(largest_coordinate(a), largest_coordinate(b));
     const double reach = std::min(
         {std::max(reaches_[i].blur, reaches_[j].blur), reaches_[i].most, reaches_[j].most});
     const bool b_is_near = lies_in_plane(b, a[0], normals_[i], std::max(reach, tolerance));

@@ -106,19 +106,11 @@ class VisibleRegions::Tree {
 
   void for_each(const std::function<void(uint32_t, std::span<const PlanePoint>)>& visit) const {
     std::vector<PlanePoint> corners;
-    std::vector<int> stack{root_};
-    while (!stack.empty()) {
-      const Node& node = nodes_[stack.back()];
-      stack.pop_back();
-      if (!node.is_leaf()) {
-        stack.push_back(node.right);
-        stack.push_back(node.left);
-        continue;
-      }
+    for_each_leaf([&](const Node& node) {
       corners.clear();
       for (const RingCorner& corner : node.ring) corners.push_back(grid_.to_plane(corner.at));
       visit(node.face == kNone ? kNothing : faces_[node.face].label, corners);
-    }
+    });
   }
 
   void for_each_below(uint32_t labels, const SideVisitor& visit) const {
@@ -133,6 +125,23 @@ class VisibleRegions::Tree {
     }
     std::vector<PlanePoint> corners;
     std::vector<Side> sides;
+    for_each_leaf([&](const Node& node) {
+      if (node.face == kNone || faces_[node.face].label >= labels) return;
+      corners.clear();
+      sides.clear();
+      for (const RingCorner& corner : node.ring) {
+        corners.push_back(grid_.to_plane(corner.at));
+        sides.push_back(of_line[corner.side.line()]);
+        sides.back().line = grid_.to_plane(corner.side.in(lines_));
+      }
+      visit(faces_[node.face].label, corners, sides);
+    });
+  }
+
+ private:
+  // From left to right.
+  template <class Visit>
+  void for_each_leaf(const Visit& visit) const {
     std::vector<int> stack{root_};
     while (!stack.empty()) {
       const Node& node = nodes_[stack.back()];
@@ -142,19 +151,9 @@ class VisibleRegions::Tree {
         stack.push_back(node.left);
         continue;
       }
-      if (node.face == kNone || faces_[node.face].label >= labels) continue;
-      corners.clear();
-      sides.clear();
-      for (const RingCorner& corner : node.ring) {
-        corners.push_back(grid_.to_plane(corner.at));
-        sides.push_back(of_line[corner.side.line()]);
-        sides.back().line = grid_.to_plane(corner.side.in(lines_));
-      }
-      visit(faces_[node.face].label, corners, sides);
+      visit(node);
     }
   }
-
- private:
   int make_cells(const GridCell& cell, int levels) {
     if (levels > 0) {
       const auto [low, high] = cell.halves(lines_);

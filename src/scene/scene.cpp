@@ -51,6 +51,12 @@ std::string sensor_names(const Scene& scene) {
   return names;
 }
 
+std::string sensor_name(const Scene& scene) {
+  const bool has_id =
+      scene.sensor < scene.sensors.size() && !scene.sensors[scene.sensor].id.empty();
+  return has_id ? scene.sensors[scene.sensor].id : std::to_string(scene.sensor);
+}
+
 void use_sensor(Scene& scene, const std::string& name) {
   const std::vector<Sensor>& sensors = scene.sensors;
   // Numbers first: every sensor has one, and an id may look like that of another.
@@ -62,6 +68,7 @@ void use_sensor(Scene& scene, const std::string& name) {
   }
   if (at < sensors.size()) {
     const Sensor sensor = sensors[at];
+    scene.sensor = at;
     scene.camera = sensor.camera;
     scene.film = sensor.film;
     scene.sample_count = sensor.sample_count;

@@ -127,11 +127,7 @@ enum Term { kInterior, kCamera, kBoundary };
 
 SceneParts base_scene(const TempFiles& files) {
   SceneParts parts;
-  parts.body = square("floor", 2.5, -90, {0, 0, 0}, conductor("gloss", 0.3)) +
-               obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(1)), false, 0.8,
-                         {0.2, 1, 0}, diffuse("clay", "0.7, 0.5, 0.3")) +
-               square("lamp", 0.5, 90, {0.3, 2.4, 0.5}, area_light("glow", "6, 5, 4")) +
-               make_sky(files, "sky");
+  parts.body = ball_over_gloss(files, 0.3);
   return parts;
 }
 

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <functional>
+
 #include "limn/integrators/gradient.h"
 #include "limn/integrators/render.h"
 #include "support/block_runs.h"
@@ -360,6 +362,124 @@ TEST(Needle, IsNotSeen) {
         run_blocks(make_scene(files, parts), {"object.translate.x"}, 16, 0).parameters[0].total);
   };
   EXPECT_EQ(sums("f 2 1 3\n"), sums(""));
+}
+
+// Where the camera or a light lies in the plane of a face, both borders of the face are one line,
+// and the derivative is that of a place beside it from where the face is not seen.
+struct EdgeOn {
+  std::string name;
+  std::string parameter;
+  // Scenes as they are with the viewpoint in the plane of a face, and so far beside it.
+  std::function<Scene(const TempFiles&, double beside)> scene;
+};
+
+std::string sun(const Vec3d& d) {
+  return fmt::format(
+      R"(<emitter type="directional"><vector name="direction" value="{},{},{}"/>
+         <rgb name="irradiance" value="2,2,2"/></emitter>)",
+      d.x, d.y, d.z);
+}
+std::string bulb(const Vec3d& p) {
+  return fmt::format(
+      R"(<emitter type="point"><point name="position" value="{},{},{}"/>
+         <rgb name="intensity" value="9,9,9"/></emitter>)",
+      p.x, p.y, p.z);
+}
+
+Scene scene_of(const TempFiles& files, double x, int max_depth, const std::string& body) {
+  SceneParts parts;
+  parts.max_depth = max_depth;
+  parts.origin = {x, 2.3, 4};
+  parts.target = {0.1, 0.4, 0};
+  parts.body = body;
+  return make_scene(files, parts);
+}
+
+// [-0.5, 0.5] x [0.25, 1.25] x [-0.5, 0.5].
+std::string box(const TempFiles& files, const std::string& inner) {
+  return obj_shape("box", write_mesh(files, "box.obj", cube_mesh()), true, 0.5, {0, 0.75, 0},
+                   inner);
+}
+std::string box_over_floor(const TempFiles& files) {
+  return box(files, diffuse("clay", "0.5, 0.5, 0.5")) +
+         square("floor", 3, -90, {0, 0, 0}, diffuse("chalk", "0.8, 0.8, 0.8"));
+}
+
+std::vector<EdgeOn> edge_on_cases() {
+  const auto glowing_box = [](const TempFiles& files, double beside) {
+    return scene_of(files, 0.5 - beside, 1, box(files, area_light("glow", "1, 1, 1")));
+  };
+  // The front and the right side of a box, and a plate behind them that ends in the same plane.
+  const auto plates = [](const TempFiles& files, double beside) {
+    const auto plate = [&](const std::string& id, const Mesh& mesh, const std::string& glow) {
+      return obj_shape(id, write_mesh(files, id + ".obj", mesh), true, 1, {},
+                       area_light(id + "glow", glow));
+    };
+    const auto quad = [](const Vec3f& a, const Vec3f& b, const Vec3f& c, const Vec3f& d) {
+      return make_mesh({a, b, c, d}, {{0, 1, 2}, {0, 2, 3}});
+    };
+    return scene_of(
+        files, 0.5 - beside, 1,
+        plate("front", quad({-.5f, 0, .5f}, {.5f, 0, .5f}, {.5f, 1, .5f}, {-.5f, 1, .5f}),
+              "1,1,1") +
+            plate("right", quad({.5f, 0, .5f}, {.5f, 0, -1}, {.5f, 1, -1}, {.5f, 1, .5f}),
+                  "3,3,3") +
+            plate("back", quad({-.5f, 0, -1}, {.5f, 0, -1}, {.5f, 1, -1}, {-.5f, 1, -1}), "2,2,2"));
+  };
+  const auto under_sun = [](const TempFiles& files, double beside) {
+    return scene_of(files, 0.3, 2, box_over_floor(files) + sun({beside, -1, 0.7 * beside}));
+  };
+  const auto under_bulb = [](const TempFiles& files, double beside) {
+    return scene_of(files, 0.3, 2, box_over_floor(files) + bulb({0.5 - beside, 2.5, 0.2}));
+  };
+  // Its side begins to be lit as the light moves on.
+  const auto lit_side = [](const TempFiles& files, double beside) {
+    return scene_of(files, 3, 2,
+                    box(files, diffuse("clay", "0.5, 0.5, 0.5")) + bulb({0.5 - beside, 2.5, 0.2}));
+  };
+  return {{"Camera", "sensor.translate.x", glowing_box},
+          {"CameraAndBox", "box.translate.x", glowing_box},
+          {"CameraAndPlates", "sensor.translate.x", plates},
+          {"SunAlong", "box.translate.x", under_sun},
+          {"SunAcross", "box.translate.z", under_sun},
+          {"Bulb", "box.translate.x", under_bulb},
+          {"BulbAtSide", "box.translate.x", lit_side}};
+}
+
+class FacesEdgeOn : public testing::TestWithParam<EdgeOn> {};
+
+TEST_P(FacesEdgeOn, AreNotThere) {
+  const TempFiles files;
+  const auto sum_at = [&](double beside) {
+    return run_blocks(GetParam().scene(files, beside), {GetParam().parameter}, 256,
+                      beside == 0 ? 1 : 2)
+        .parameters[0]
+        .image_sum;
+  };
+  const Moments at = sum_at(0), beside = sum_at(3e-3);
+  fmt::print("{} +- {}, beside {} +- {}\n", at.mean(0), std::sqrt(at.variance(0)), beside.mean(0),
+             std::sqrt(beside.variance(0)));
+  EXPECT_TRUE(compare_moments(at, beside).plausible(kLevel));
+}
+
+INSTANTIATE_TEST_SUITE_P(, FacesEdgeOn, testing::ValuesIn(edge_on_cases()),
+                         [](const auto& c) { return c.param.name; });
+
+TEST(FacesEdgeOnWarning, NamesTheViewpoint) {
+  const TempFiles files;
+  const auto warnings = [&](double x, const Vec3d& direction) {
+    return run_blocks(scene_of(files, x, 2, box_over_floor(files) + sun(direction)),
+                      {"box.translate.x"}, 1, 0)
+        .warnings;
+  };
+  EXPECT_TRUE(warnings(0.3, {0.1, -1, 0.2}).empty());
+  const auto found = warnings(0.5, {0, -1, 0});
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_NE(found[0].find("the camera lies in the plane of 2 faces"), std::string::npos)
+      << found[0];
+  EXPECT_NE(found[1].find("directional along (0, -1, 0), irradiance 2 2 2 lies in the plane of 8"),
+            std::string::npos)
+      << found[1];
 }
 
 }  // namespace

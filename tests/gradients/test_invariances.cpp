@@ -14,20 +14,6 @@ namespace {
 
 constexpr double kLevel = 1e-4;
 
-// Blocks and the whole image; b times b_scale should be a.
-void expect_equal(const ParameterGradient& a, const ParameterGradient& b, double b_scale = 1) {
-  const ZSummary blocks = compare_moments(a.total_blocks, b.total_blocks, b_scale);
-  const ZSummary image = compare_moments(a.image_sum, b.image_sum, b_scale);
-  fmt::print(
-      "{:24} {:3} blocks, mean z {:5.2f}, sd {:4.2f}, max |z| {:5.2f}; image {:9.4g} +- "
-      "{:7.2g}, other {:9.4g}, z {:5.2f}\n",
-      a.name, blocks.count, blocks.mean, blocks.deviation, blocks.largest, a.image_sum.mean(0),
-      std::sqrt(a.image_sum.variance(0)), b_scale * b.image_sum.mean(0), image.mean);
-  EXPECT_GT(blocks.count, 0);
-  EXPECT_TRUE(blocks.plausible(kLevel)) << a.name;
-  EXPECT_TRUE(image.plausible(kLevel)) << a.name;
-}
-
 // A white body above a rough mirror.
 Scene white_body(const TempFiles& files, const Mesh& mesh, bool face_normals) {
   SceneParts parts;

@@ -6,13 +6,12 @@
 #include "limn/integrators/gradient.h"
 #include "limn/integrators/methods.h"
 #include "limn/integrators/statistics.h"
+#include "support/block_runs.h"
 #include "support/meshes.h"
 #include "support/scenes.h"
 
 namespace limn {
 namespace {
-
-constexpr int kBlock = 4;
 
 // A ball over a glossy floor between a lamp and a sky.
 Scene gloss_scene(const TempFiles& files, double alpha) {
@@ -26,19 +25,14 @@ Scene gloss_scene(const TempFiles& files, double alpha) {
 }
 
 GradientResult run(const Scene& scene, const std::vector<std::string>& parameters,
-                   const std::string& method, int spp, uint64_t seed, int threads = 0,
+                   const std::string& method, int spp, uint64_t seed, int threads = 2,
                    const std::vector<std::string>& terms = {}) {
   GradientOptions options;
   options.parameters = parameters;
   options.method = method;
   options.samples = std::nullopt;
   options.terms = terms;
-  options.block = kBlock;
-  RunSettings settings;
-  settings.spp = spp;
-  settings.seed = seed;
-  settings.threads = threads > 0 ? threads : 2;
-  return gradient(scene, options, settings);
+  return run_blocks(scene, options, spp, seed, threads);
 }
 
 double mean_variance(const Moments& moments) {
@@ -261,7 +255,7 @@ TEST(MovingDirections, RestWhereTermsAreLeftOut) {
   const Scene scene = gloss_scene(files, 0.2);
   const auto interior = [&](const std::string& method) {
     const GradientResult result =
-        run(scene, {"ball.translate.y"}, method, 64, 3, 0, {"interior", "camera"});
+        run(scene, {"ball.translate.y"}, method, 64, 3, 2, {"interior", "camera"});
     return result.parameters[0].total;
   };
   const Moments a = interior("forest"), b = interior("random-directions");

@@ -5,49 +5,26 @@
 
 #include "integrators/terms/light_regions.h"
 #include "limn/core/image.h"
-#include "limn/integrators/check.h"
-#include "support/compare_moments.h"
+#include "support/block_runs.h"
+#include "support/check_runs.h"
 #include "support/meshes.h"
 #include "support/scenes.h"
 
 namespace limn {
 namespace {
 
-constexpr double kLevel = 1e-4;
-
 GradientResult run(const Scene& scene, const std::string& method,
                    const std::vector<std::string>& parameters, int spp, uint64_t seed,
-                   int threads = 0) {
+                   int threads = 1) {
   GradientOptions options;
   options.parameters = parameters;
   options.method = method;
-  options.block = 4;
   options.terms = {"boundary"};
   if (method == "silhouettes") {
     options.terms.emplace_back("direct");
     options.terms.emplace_back("penumbra");
   }
-  RunSettings settings;
-  settings.spp = spp;
-  settings.seed = seed;
-  if (threads > 0) settings.threads = threads;
-  GradientResult result = gradient(scene, options, settings);
-  EXPECT_EQ(result.non_finite.count, 0u) << result.non_finite.message();
-  return result;
-}
-
-void expect_equal(const ParameterGradient& a, const ParameterGradient& b, double b_scale = 1) {
-  const ZSummary blocks = compare_moments(a.total_blocks, b.total_blocks, b_scale);
-  const ZSummary image = compare_moments(a.image_sum, b.image_sum, b_scale);
-  fmt::print(
-      "{:20} {:3} blocks, mean z {:5.2f}, sd {:4.2f}, max |z| {:5.2f}; image {:9.4g} +- {:7.2g}, "
-      "other {:9.4g} +- {:7.2g}, z {:5.2f}\n",
-      a.name, blocks.count, blocks.mean, blocks.deviation, blocks.largest, a.image_sum.mean(0),
-      std::sqrt(a.image_sum.variance(0)), b_scale * b.image_sum.mean(0),
-      b_scale * std::sqrt(b.image_sum.variance(0)), image.mean);
-  EXPECT_GT(blocks.count, 0);
-  EXPECT_TRUE(blocks.plausible(kLevel)) << a.name;
-  EXPECT_TRUE(image.plausible(kLevel)) << a.name;
+  return run_blocks(scene, options, spp, seed, threads);
 }
 
 // A body above a floor, with whatever shines.
@@ -220,17 +197,7 @@ TEST(Regions, SeenByVertices) {
 TEST(Regions, AgreeWithDifferences) {
   const TempFiles files;
   const auto expect_right = [](const Scene& scene, const std::string& parameter, int spp) {
-    CheckOptions options;
-    options.method = "silhouettes";
-    options.parameter = parameter;
-    options.block = 4;
-    RunSettings settings;
-    settings.spp = spp;
-    settings.seed = 5;
-    const CheckResult result = check(scene, options, settings);
-    fmt::print("{:20} gradient {:8.4g} +- {:6.2g}, differences {:8.4g} +- {:6.2g}\n", parameter,
-               result.total.gradient, result.total.gradient_error, result.total.difference,
-               result.total.difference_error);
+    const CheckResult result = run_check(scene, parameter, spp, {}, "silhouettes");
     EXPECT_NE(result.verdict, Verdict::kDisagree) << parameter;
   };
   const Scene two = lit_scene(files, lights_of(files, "two"));

@@ -3,45 +3,21 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "limn/integrators/gradient.h"
-#include "support/compare_moments.h"
+#include "support/block_runs.h"
 #include "support/meshes.h"
 #include "support/scenes.h"
 
 namespace limn {
 namespace {
 
-constexpr double kLevel = 1e-4;
-
-ParameterGradient run(const Scene& scene, const std::string& parameter, uint64_t seed, int spp) {
-  GradientOptions options;
-  options.parameters = {parameter};
-  options.block = 4;
-  RunSettings settings;
-  settings.spp = spp;
-  settings.seed = seed;
-  const GradientResult result = gradient(scene, options, settings);
-  EXPECT_EQ(result.non_finite.count, 0u) << result.non_finite.message();
-  return result.parameters[0];
-}
-
 // by_blocks: whether blocks of pixels are compared, too. Where a plane holds all that moves, those
 // that see nothing else are zero but for the rounding of cosines.
 void expect_equal(const Scene& a, const Scene& b, const std::string& parameter,
                   bool by_blocks = true) {
   constexpr int kSpp = 256;
-  const ParameterGradient ga = run(a, parameter, 1, kSpp), gb = run(b, parameter, 2, kSpp);
-  const ZSummary blocks = compare_moments(ga.total_blocks, gb.total_blocks, 1);
-  const ZSummary image = compare_moments(ga.image_sum, gb.image_sum, 1);
-  fmt::print(
-      "{:20} {:3} blocks, sd {:4.2f}, max |z| {:5.2f}; {:9.4g} +- {:7.2g}, {:9.4g}, z {:5.2f}\n",
-      parameter, blocks.count, blocks.deviation, blocks.largest, ga.image_sum.mean(0),
-      std::sqrt(ga.image_sum.variance(0)), gb.image_sum.mean(0), image.mean);
-  EXPECT_GT(blocks.count, 0);
-  if (by_blocks) {
-    EXPECT_TRUE(blocks.plausible(kLevel)) << parameter;
-  }
-  EXPECT_TRUE(image.plausible(kLevel)) << parameter;
+  const GradientResult ga = run_blocks(a, {parameter}, kSpp, 1),
+                       gb = run_blocks(b, {parameter}, kSpp, 2);
+  expect_equal(ga.parameters[0], gb.parameters[0], 1, by_blocks);
 }
 
 struct Quad {

@@ -12,6 +12,7 @@
 #include "limn/integrators/compare.h"
 #include "limn/integrators/gradient.h"
 #include "limn/integrators/statistics.h"
+#include "support/block_runs.h"
 #include "support/meshes.h"
 #include "support/scenes.h"
 
@@ -174,12 +175,7 @@ GradientResult run(const Scene& scene, const std::vector<std::string>& parameter
   options.parameters = parameters;
   options.method = method;
   options.warp = warp;
-  options.block = 4;
-  RunSettings settings;
-  settings.spp = spp;
-  settings.seed = 7;
-  settings.threads = threads;
-  return gradient(scene, options, settings);
+  return run_blocks(scene, options, spp, 7, threads);
 }
 
 Scene gloss_scene(const TempFiles& files, double unit) {

@@ -6,10 +6,14 @@ import os
 import subprocess
 import sys
 import tempfile
+import types
 import unittest
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
 TOOL = os.path.join(ROOT, "tools", "mitsuba", "mitsuba_gradient.py")
+sys.path.insert(0, os.path.dirname(TOOL))
+import mitsuba_gradient  # noqa: E402
+
 SCENE = os.path.join(ROOT, "scenes", "closed_form", "cube_in_sky.xml")
 
 
@@ -72,6 +76,29 @@ class TestMitsubaGradient(unittest.TestCase):
             self.assertEqual(
                 (status, text.splitlines()[-1]), (2, f"mitsuba_gradient.py: error: {message}")
             )
+
+    def test_time_may_begin_after_the_setup(self):
+        """Thirty seconds of set-up and passes of two, by a clock of its own."""
+        for after_setup, passes, seconds, setup, left_out in ((False, 1, 32, 30, 0), (True, 5, 10, 0, 30)):
+            now = [0]
+            term = types.SimpleNamespace(name="interior", passes=0, seconds=0, pass_seconds=2)
+
+            def take(seconds, now=now):
+                now[0] += seconds
+                return [1]
+
+            def add_a_pass(term):
+                take(2)
+                term.passes += 1
+
+            renderer = mitsuba_gradient.Renderer.__new__(mitsuba_gradient.Renderer)
+            renderer._clock = types.SimpleNamespace(seconds=lambda now=now: now[0], compilation=0)
+            renderer._guiding, renderer._spp, renderer._terms = "octree", 128, [term]
+            renderer._shares, renderer._counted_pass = lambda take=take: take(30), add_a_pass
+            told = renderer.figures(renderer.render_for(10, after_setup), "3", after_setup)
+            self.assertEqual(term.passes, passes)
+            self.assertEqual((told["seconds"], told["setup_seconds"], told["setup_not_counted_seconds"]),
+                             (seconds, setup, left_out))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,7 @@
-"""tools/paper with a program in limn's place that notes how it was called."""
+"""tools/paper with a program in limn's place that notes how it was called.
+
+    test_paper.py [LIMN]    with limn itself: whether it knows the methods
+"""
 import json
 import os
 import signal
@@ -11,6 +14,8 @@ import unittest
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
 PAPER = os.path.join(ROOT, "tools", "paper")
+
+LIMN = sys.argv.pop() if len(sys.argv) > 1 and os.access(sys.argv[-1], os.X_OK) else ""
 
 # Fails for the parts named in `fail`, waits for an interrupt in those named in `wait`.
 STAND_IN = """#!{python}
@@ -25,10 +30,24 @@ def listed(file):
     path = os.path.join(here, file)
     return os.path.exists(path) and name in open(path).read().split()
 def write(status):
+    errors = os.path.join(here, "errors")
+    if arguments[0] == "compare" and os.path.exists(errors):
+        with open(os.path.join(folder, "compare.json"), "w") as out:
+            json.dump(comparison(json.load(open(errors))), out)
+        sys.exit(status)
     with open(os.path.join(folder, arguments[0] + ".json"), "w") as out:
         json.dump({{"methods": [{{"name": "forest"}}, {{"name": "fd", "time_ratio": 12.5, "time_ratio_stderr": 0.5}}],
                     "variants": [{{"name": "li2019", "hit_rate": 0.25}}]}}, out)
     sys.exit(status)
+def comparison(errors):
+    methods = []
+    for name in arguments[arguments.index("--methods") + 1].split(","):
+        mse, stderr, trimmed, p = errors.get(name, [1, 0, 1, 0.5])
+        rung = dict(mse=mse, mse_stderr=stderr, trimmed_mse=trimmed, relative_mse=mse / 8, seconds=2, spp=16, bias=dict(p=p))
+        settings = dict(setup_not_counted_seconds=30.4) if name.startswith("mitsuba") else dict()
+        methods.append(dict(name=name, status="done", summary=[rung], settings=settings))
+    return dict(methods=methods, times=[2.5], repeats=3, threads=2, width=64, height=64, command="limn compare ...",
+                reference=dict(seconds=12, method="adaptive"))
 if listed("fail"):
     print("the last words")
     sys.exit(3)
@@ -106,6 +125,62 @@ class TestPaper(unittest.TestCase):
         self.paper("--figures", "--mesh", mesh, "--only", only)
         self.assertEqual(len(self.calls()), 3)
 
+    def levers(self, *arguments):
+        command = [word for word in self.command("--levers", *arguments) if word != "--no-report"]
+        return subprocess.run(command, capture_output=True, text=True)
+
+    def test_levers(self):
+        """Method: squared error, its standard error, that without the worst pixels, p of the bias; 2 s each."""
+        self.write("errors", json.dumps({"forest": [4, 0, 4, 0.5], "adaptive": [1, 0.1, 0.6, 0.25],
+                                         "fd": [1.1, 0.11, 1.2, 1e-6], "mitsuba-after-setup": [20, 1, 12, 0.5]}))
+        done = self.levers("--only", "levers-shadow,levers-sun", "--mitsuba")
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        shadow, sun = self.calls()
+        self.assertEqual(self.value(shadow, "--methods"),
+                         "forest,silhouettes,moving-directions,adaptive,fd,mitsuba-after-setup")
+        self.assertEqual(self.value(sun, "--methods"), "forest,silhouettes,moving-directions,adaptive,fd")
+        self.assertAlmostEqual(float(self.value(sun, "--time")), 2.6, delta=0.1)
+        with open(self.path("out", "levers.md")) as stream:
+            text = stream.read()
+        self.assertIn(text, done.stdout)
+        cells = "0.5 | 0.25 ± 0 (0.25) | 0.25 ± 0 (0.25) | 0.25 ± 0.025 (0.15) | 0.28 ± 0.028 (0.3) |"
+        for title in ("soft shadow", "strong sun"):
+            self.assertIn(f"\n| {title} | {cells}\n", text)
+        self.assertIn("ahead in 0 of 2 parts; even within two standard errors: soft shadow (0.91), strong sun (0.91)", text)
+        self.assertIn("\n| soft shadow | 0.05 ± 0.0056 (0.05) | 2 | 16 | 30 |\n", text)
+        self.assertIn("Against Mitsuba after its set-up `adaptive` is ahead in 1 of 1 parts (20 times).", text)
+        self.assertIn("(8) the smallest p is 0.25 (`adaptive`, soft shadow)", text)
+        self.assertIn("Marked are finite differences in soft shadow, finite differences in strong sun.", text)
+        # 1 - 0.999 * 0.6 and 1 - 0.999: trimmed means are over the other pixels.
+        self.assertIn("`adaptive` 0.4 (soft shadow) to 0.4 (strong sun); `forest` 0.001", text)
+        again = self.levers("--only", "levers-shadow,levers-sun", "--mitsuba")
+        self.assertIn("levers-sun: finished before", again.stdout)
+        self.assertIn(text, again.stdout)
+        self.assertEqual(len(self.calls()), 2)
+
+    def test_levers_in_the_order_that_a_default_has_them(self):
+        self.paper("--only", "shadow")
+        self.paper("--levers", "--only", "levers-shadow")
+        swept, table = self.calls()
+        shown = self.value(swept, "--methods").split(",")
+        self.assertEqual([m for m in shown if m in self.value(table, "--methods").split(",")],
+                         self.value(table, "--methods").split(","))
+        self.assertEqual((self.value(swept, "--sweep"), self.value(table, "--sweep")), ("3", "1"))
+
+    @unittest.skipUnless(LIMN, "needs limn")
+    def test_the_methods_have_their_names_of_today(self):
+        sys.path.insert(0, os.path.join(ROOT, "tools"))
+        from paper_figures import figures, levers
+        names = {m for figure in figures.FIGURES for part in figure.runs if part.kind == "compare" for m in part.methods}
+        names.update(m for part in levers.parts(True) for m in part.methods)
+        self.paper()
+        for call in self.calls():
+            if call[0] == "compare":
+                names.update(self.value(call, "--methods").split(","))
+        done = subprocess.run([LIMN, "compare", self.path("none.xml"), "--wrt", "x", "--time", "1", "-o", self.path("none"),
+                               "--methods", ",".join(sorted(names))], capture_output=True, text=True)
+        self.assertIn("none.xml: error: cannot read", done.stderr)  # names come first
+
     def test_mitsuba(self):
         self.paper("--only", "sun", "--mitsuba")
         self.assertTrue(self.value(self.calls()[0], "--methods").endswith(",mitsuba"))
@@ -166,6 +241,8 @@ class TestPaper(unittest.TestCase):
                                    (["--minutes", "-1"], "not a positive number: -1"),
                                    (["--mesh", "x.obj"], "--mesh: is for --figures"),
                                    (["--figures", "--mesh", "/no/such"], "--mesh: /no/such: no such file"),
+                                   (["--levers", "--figures"], "not allowed with argument"),
+                                   (["--levers", "--only", "cad"], "--only: no part is called \"cad\""),
                                    (["--figures", "--only", "cad"], "--only: no part is called \"cad\""),
                                    (["--limn", "/no/such"], "/no/such: no such program")):
             done = self.paper(*arguments)

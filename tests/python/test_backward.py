@@ -74,11 +74,12 @@ def test_it_has_the_programs_bits(folder, scene, adjoint, threads):
     limn.write_exr(folder / "target.exr", target)
     output, told = run_program(folder, "--target", str(folder / "target.exr"), "--loss",
                                "relative-l2", "--spp", "4", "--wrt", POSITIONS, "--terms",
-                               "interior,boundary", "--pixels", "uniform", "--edge-samples", "2")
+                               "interior,boundary", "--pixels", "uniform", "--edge-samples", "2",
+                               "--sampler", "uniform")
     loss = limn.image_loss(scene, target, "relative-l2", spp=4, threads=threads)
     assert (loss.value, loss.stderr) == (told["loss"]["value"], told["loss"]["stderr"])
     found = limn.backward(scene, loss.adjoint, POSITIONS, spp=4, terms=["interior", "boundary"],
-                          uniform_pixels=True, edge_samples=2, threads=threads)
+                          uniform_pixels=True, edge_samples=2, threads=threads, sampler="uniform")
     assert np.array_equal(np.load(output / f"{POSITIONS}.npy"), found[POSITIONS].value)
 
 

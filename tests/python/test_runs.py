@@ -20,6 +20,9 @@ def test_render_has_the_programs_bits(scene, program, threads):
     assert same(estimate.value, program("render", "--spp", "5", "--seed", "3"))
     assert estimate.spp == 5 and estimate.seconds > 0 and estimate.warnings == []
     assert same(limn.render(scene).value, program("render"))
+    exact = limn.render(scene, spp=2, threads=threads, film="exact")
+    assert same(exact.value, program("render", "--spp", "2", "--film", "exact"))
+    assert not same(exact.value, limn.render(scene, spp=2).value)
 
 
 def test_an_estimate_computes_like_its_value(scene):
@@ -51,6 +54,7 @@ def test_an_estimate_computes_like_its_value(scene):
      ["--spp", "20", "--terms", "camera", "--samples", "uniform"]),
     ({"spp": 2, "method": "was", "aux": 4, "kappa": 1e3},
      ["--spp", "2", "--method", "was", "--aux", "4", "--kappa", "1e3"]),
+    ({"spp": 2, "film": "exact"}, ["--spp", "2", "--film", "exact"]),
     ({"spp": 2, "method": "fd", "step": 0.01}, ["--spp", "2", "--method", "fd", "--step", "0.01"]),
 ])
 def test_gradient_has_the_programs_bits(folder, scene, program, threads, arguments, words):
@@ -60,6 +64,16 @@ def test_gradient_has_the_programs_bits(folder, scene, program, threads, argumen
     assert np.any(gradient[name].value)
     assert same(gradient[name].value, program("gradient", "--wrt", name, *words))
     assert same(gradient[name].stderr, limn.read_exr(folder / "program_stderr.exr"))
+
+
+def test_methods_and_films_are_known_by_name(scene):
+    with pytest.raises(limn.InputError, match='unknown method "bidirectional"'):
+        limn.render(scene, method="bidirectional")
+    with pytest.raises(limn.InputError, match='the method "analytic": '):
+        limn.render(scene, method="analytic")
+    for run in (limn.render, lambda s, film: limn.gradient(s, "tent.scale", film=film)):
+        with pytest.raises(limn.InputError, match='unknown film "ray"'):
+            run(scene, film="ray")
 
 
 def test_several_parameters_are_one_run(scene):

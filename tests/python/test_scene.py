@@ -229,3 +229,8 @@ def test_meshes_are_written(scene, tmp_path):
                 (mesh.positions, mesh.faces.astype(float)), (mesh.positions, mesh.faces.ravel())]:
         with pytest.raises(limn.InputError):
             limn.write_ply(tmp_path / "bad.ply", *bad)
+    # What was there stays until the new one is whole.
+    (tmp_path / "folder.ply").mkdir()
+    with pytest.raises(OSError):
+        limn.write_ply(tmp_path / "folder.ply", mesh.positions, mesh.faces)
+    assert sorted(os.listdir(tmp_path)) == ["folder.ply", "tent.ply"]

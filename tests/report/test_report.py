@@ -280,11 +280,23 @@ class TestFigures(unittest.TestCase):
             os.makedirs(counted)
             with open(os.path.join(counted, "edges.json"), "w") as stream:
                 json.dump({"mesh": "a/cube.obj", "edges": 12, "without_concave": 9}, stream)
+            with open(os.path.join(counted, "draws.json"), "w") as stream:
+                row = {"name": "quadric", "draw_ns": 800, "hit_rate": 0.7, "efficiency": 0.25, "build_ms": 50,
+                       "bytes_per_edge": 70}
+                json.dump({"edges": 9000, "ray_ns": 160, "rows": [row], "command": "edge_benchmark x"}, stream)
+            for name, method, rays, total, error in (("b0", "forest", None, 2, 0.0), ("b1", "was", 8, 3, 0.1),
+                                                     ("b2", "was", 32, 2.2, 0.1)):
+                os.makedirs(os.path.join(temporary, "runs", name))
+                with open(os.path.join(temporary, "runs", name, "gradient.json"), "w") as stream:
+                    json.dump({"method": method, "settings": {"auxiliary rays": rays} if rays else {},
+                               "parameters": [{"sum": total, "sum_stderr": error}]}, stream)
             figures = [
                 Figure("Fig. 1", "A title", "what it <shows>", "what to see",
                        [Part("mirror", "compare", "mirror.xml", methods=["forest"])], "samples"),
                 Figure("Fig. 2", "Patches", "b", "c", [Part("bunny", "reject", "bunny.ply")]),
                 Figure("Table 3", "Edges", "d", "e", [Part("table", "edges", "cube.obj")]),
+                Figure("Its code", "draws", "d", "e", [Part("table", "draws", "cube.obj")]),
+                Figure("Fig. 5", "Bias", "d", "e", [Part(f"b{i}", "gradient", "x.xml") for i in range(3)]),
                 Figure("Fig. 4", "Not run", "f", "g", [Part("none", "compare", "no.xml")]),
             ]
             file = os.path.join(temporary, "figures.html")
@@ -296,7 +308,7 @@ class TestFigures(unittest.TestCase):
         self.assertEqual(missing, 1)
         for figure in figures:
             self.assertEqual(page.count(f"{figure.numbers}: {figure.title}</h2>"), 1)
-            self.assertIn(f"tools/paper --figures --only {figure.runs[0].name}", page)
+            self.assertIn("tools/paper --figures --only " + ",".join(r.name for r in figure.runs), page)
         self.assertIn("what it &lt;shows&gt;", page)
         self.assertIn("limn compare scenes/mirror.xml", page)
         self.assertIn("limn reject meshes/bunny.ply", page)
@@ -305,6 +317,13 @@ class TestFigures(unittest.TestCase):
         self.assertEqual(page.count("data:image/png;base64,"), 2 + 2 * 5 + 1 + 3 * 3)
         self.assertIn("Mitsuba is not installed", page)
         self.assertEqual(page.count('class="bad"'), 1)  # the method that is made biased
+        self.assertIn("<td>800</td><td>5.00</td><td>70 %</td><td>0.250</td><td>0.0500</td><td>70.0</td>", page)
+        self.assertIn("<td>8</td><td>3.00</td><td>50 ± 5 %</td><td>10.0</td>", page)
+        self.assertIn("<td>32</td><td>2.20</td><td>10 ± 5 %</td><td>2.00</td>", page)
+        # From 1 % to 100 % in 240 units: 10 % is in the middle, 50 % 120 log10(5) above it.
+        heights = re.findall(r'<circle cx="[\d.]+" cy="([\d.]+)"', page)
+        self.assertEqual([float(h) for h in heights], [52.1, 136.0])
+        self.assertIn("rays a draw, 9 k edges: quadric 5.00", page)
         self.assertIn("cube.obj</th><td>12</td><td>9</td><td>75 %", page)
 
     def test_edges_are_counted(self):

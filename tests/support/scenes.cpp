@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "limn/core/image.h"
+#include "support/meshes.h"
 
 namespace limn {
 namespace {
@@ -103,6 +104,14 @@ std::string make_sky(const TempFiles& files, const std::string& id) {
       R"(  <emitter type="envmap" id="{}"><string name="filename" value="{}"/></emitter>
 )",
       id, files.path("sky.exr"));
+}
+
+std::string ball_over_gloss(const TempFiles& files, double alpha) {
+  return square("floor", 2.5, -90, {0, 0, 0}, conductor("gloss", alpha)) +
+         obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(1)), false, 0.8,
+                   {0.2, 1, 0}, diffuse("clay", "0.7, 0.5, 0.3")) +
+         square("lamp", 0.5, 90, {0.3, 2.4, 0.5}, area_light("glow", "6, 5, 4")) +
+         make_sky(files, "sky");
 }
 
 }  // namespace limn

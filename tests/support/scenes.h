@@ -42,4 +42,8 @@ std::string conductor(const std::string& id, double alpha);  // ggx, reflects ev
 // A sky that differs in every direction, with one bright part; returns the emitter.
 std::string make_sky(const TempFiles& files, const std::string& id);
 
+// A body with a bit of everything: "ball" of "clay" over a "floor" of "gloss", with "lamp" ("glow")
+// and "sky".
+std::string ball_over_gloss(const TempFiles& files, double alpha);
+
 }  // namespace limn

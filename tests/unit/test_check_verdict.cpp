@@ -4,8 +4,10 @@
 
 #include <cstdlib>
 
-#include "integrators/compare/check_scores.h"
+#include "integrators/compare/edge_events.h"
+#include "integrators/methods/hair_gaps.h"
 #include "limn/core/rng.h"
+#include "support/meshes.h"
 #include "support/planted.h"
 #include "support/running_mean.h"
 
@@ -97,6 +99,54 @@ TEST(CheckVerdict, StepDoesNotGrowWithTheFloor) {
     return check(make_scene(files, parts), options, settings).step;
   };
   EXPECT_LE(step(3000), 16 * step(3));
+}
+
+// A panel a hundred-millionth of a radian from being edge-on to the sun is dark on one side of
+// that: its derivative is right, and no mean of both sides. A tenth of a radian away it is no bend.
+TEST(CheckVerdict, ABendIsNoError) {
+  const TempFiles files;
+  for (const double tilt : {1e-8, 0.1}) {
+    SceneParts parts;
+    parts.body = square("panel", 1, 0, {0, 1, 0}, diffuse("chalk", "0.8, 0.8, 0.8")) +
+                 square("floor", 1, -90, {0, -0.2, 1}, diffuse("clay", "0.4, 0.4, 0.4")) +
+                 fmt::format(R"(<emitter type="directional" id="sun"><vector name="direction" x="0"
+                     y="-1" z="{}"/><rgb name="irradiance" value="3, 3, 3"/></emitter>)",
+                             -tilt) +
+                 constant_light("sky", "0.3, 0.3, 0.3");
+    CheckOptions options;
+    options.parameter = "sun.rotate.x";
+    RunSettings settings;
+    settings.spp = 64;
+    settings.seed = 4;
+    const CheckResult r = check(make_scene(files, parts), options, settings);
+    EXPECT_EQ(r.bends, tilt < 0.01);
+    EXPECT_NE(r.verdict, Verdict::kDisagree);
+  }
+}
+
+// Two boxes side by side: gaps that no sample would meet are told, wider ones and none are not.
+TEST(HairGaps, AreWarnedOf) {
+  const TempFiles files;
+  const auto warnings = [&](double gap, double spp) {
+    SceneParts parts;
+    const auto box = [&](const std::string& id, double x) {
+      return obj_shape(id, write_mesh(files, id + ".obj", cube_mesh()), true, 0.5, {x, 0, 0},
+                       diffuse(id + "_chalk", "0.8, 0.8, 0.8"));
+    };
+    parts.body = box("left", -0.5) + box("right", 0.5 + gap);
+    std::vector<std::string> lines;
+    warn_of_hair_gaps(make_scene(files, parts), spp, 1, lines);
+    return lines;
+  };
+  // A pixel is 0.27 wide at a distance of six: one of 64 samples meets a gap of 0.001.
+  const auto found = warnings(1e-5, 64);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_NE(found[0].find("\"left\" and \"right\" have a gap of 1e-05 between them"),
+            std::string::npos)
+      << found[0];
+  EXPECT_TRUE(warnings(1e-5, 1e5).empty());
+  EXPECT_TRUE(warnings(0.01, 64).empty());
+  EXPECT_TRUE(warnings(0, 64).empty());
 }
 
 // Counts over many runs with a defect, of those whose stated power covers it.

@@ -4,9 +4,8 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
 
+#include "limn/core/output_file.h"
 #include "tools/generate/generate.h"
 #include "tools/generate/generate_kinds.h"
 
@@ -99,17 +98,9 @@ void write_triangles(const std::string& file, const Triangles& mesh) {
   if (!obj && !file.ends_with(".ply")) {
     throw InputError({file}, "mesh files end with .ply or .obj");
   }
-  // Under another name first: nobody reads half a file.
-  const std::string unfinished = file + ".unfinished";
-  std::ofstream out(unfinished, std::ios::binary);
-  out << (obj ? obj_bytes(mesh) : ply_bytes(mesh));
-  out.close();
-  std::error_code failed;
-  if (out) std::filesystem::rename(unfinished, file, failed);
-  if (!out || failed) {
-    std::filesystem::remove(unfinished, failed);
-    throw InputError({file}, "cannot be written");
-  }
+  OutputFile output(file);
+  output.write(obj ? obj_bytes(mesh) : ply_bytes(mesh));
+  output.commit();
 }
 
 }  // namespace limn

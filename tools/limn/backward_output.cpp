@@ -7,7 +7,6 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
@@ -20,13 +19,6 @@ namespace {
 
 using nlohmann::json;
 static_assert(std::endian::native == std::endian::little);
-
-void write_file(const std::string& file, const std::string& bytes) {
-  std::ofstream stream(file, std::ios::binary);
-  stream << bytes;
-  stream.close();  // a full disk may show only here
-  if (!stream) throw InputError({file}, "cannot be written");
-}
 
 template <class T>
 void append(std::string& bytes, const T& value) {

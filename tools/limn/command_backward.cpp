@@ -41,19 +41,7 @@ class BackwardCommand final : public Command {
     app.add_option("--wrt", options_.parameters,
                    "Parameter, an array (SHAPE.vertex_positions) or a scalar; may be repeated "
                    "(default: all of the scene)");
-    app.add_option("--terms", terms_, "Only these terms, as in interior,camera");
-    app.add_option("--pixels", pixels_,
-                   "Where paths go: adjoint (where the loss depends on the image) or uniform")
-        ->check(CLI::IsMember({"adjoint", "uniform"}));
-    app.add_option("--sampler", options_.sampler,
-                   "Of edges: forest; silhouettes, which is better where shadows are soft; or to "
-                   "compare with them quadric, li2019, uniform, brute or a variant of these")
-        ->capture_default_str();
-    app.add_option("--edge-samples", options_.edge_samples, "At every vertex of a path")
-        ->check(CLI::Range(1, 1 << 16));
-    app.add_option("--camera-samples", options_.camera_samples,
-                   "Points on silhouettes of the film, for each path")
-        ->check(CLI::PositiveNumber);
+    add_reverse_options(app, options_);
     app.add_option("--batches", options_.batches,
                    "At most, for standard errors; each costs some time per vertex")
         ->check(CLI::Range(1, 1 << 16));
@@ -80,8 +68,6 @@ class BackwardCommand final : public Command {
   int run(const std::string& command_line) override {
     const Scene scene = load_scene(common_, warnings_);
     if (adjoint_.empty() && target_.empty()) throw InputError("give --adjoint or --target");
-    options_.terms = parse_terms(terms_);
-    options_.uniform_pixels = pixels_ == "uniform";
     const LossKind kind = loss_kind(loss_);
     edge_sampler_type(options_.sampler);  // told before the loss is rendered
     if (!common_.part.empty()) return make_part(scene, command_line);
@@ -178,11 +164,9 @@ class BackwardCommand final : public Command {
   int write_loss_alone(const Scene& scene, const RunSettings& settings,
                        const LossResult& loss) const {
     print_loss(loss);
-    const json report = {{"scene", scene.file},
-                         {"spp", loss.spp},
-                         {"seed", settings.seed},
-                         {"loss", loss_json(loss)},
-                         {"warnings", warnings_.lines()}};
+    const json report = {{"scene", scene.file},     {"sensor", sensor_name(scene)},
+                         {"spp", loss.spp},         {"seed", settings.seed},
+                         {"loss", loss_json(loss)}, {"warnings", warnings_.lines()}};
     write_json(common_.json, report.dump(2));
     if (!common_.quiet) fmt::print("{}: {} samples per pixel\n", files_.adjoint, loss.spp);
     return kSuccess;
@@ -191,13 +175,14 @@ class BackwardCommand final : public Command {
   void write(const Scene& scene, const RunSettings& settings, const LossResult& loss,
              const BackwardResult& result) const {
     json report = {{"scene", scene.file},
+                   {"sensor", sensor_name(scene)},
                    {"spp", result.spp},
                    {"batches", result.batches},
                    {"seed", settings.seed},
                    {"threads", settings.threads},
                    {"seconds", result.seconds},
                    {"setup_seconds", result.setup_seconds},
-                   {"pixels", pixels_},
+                   {"pixels", options_.uniform_pixels ? kUniformPixels : kAdjointPixels},
                    {"sampler", options_.sampler},
                    {"warnings", warnings_.lines()},
                    {"non_finite", result.non_finite.count}};
@@ -255,8 +240,8 @@ class BackwardCommand final : public Command {
   Warnings warnings_;
   BackwardOptions options_;
   BackwardFiles files_;
-  std::string adjoint_, target_, output_, terms_;
-  std::string loss_ = "l2", pixels_ = "adjoint";
+  std::string adjoint_, target_, output_;
+  std::string loss_ = "l2";
   int levels_ = 1;
   double seconds_ = 0;  // 0: as many samples as are asked for
   bool stats_ = false, loss_only_ = false;

@@ -41,6 +41,12 @@ void print_verdict(const CheckResult& r, int spp) {
     fmt::print(": the differences hold {:.3g} times of it (z = {:.1f})\n", 1 + s.factor, s.z);
   } else if (r.verdict == Verdict::kAgree) {
     fmt::print("  agree\n");
+  } else if (r.bends) {
+    fmt::print(
+        "  CANNOT TELL: the image bends here, as where shapes that touch part or a face is edge-on "
+        "to "
+        "a light:\n  the gradient is the slope on one side, and differences are the mean of "
+        "both\n");
   } else {
     fmt::print("  CANNOT TELL: an error of a fifth could have hidden: take about --spp {:.2g}\n",
                std::max(r.needed_spp, spp + 1.0));
@@ -91,6 +97,7 @@ json figures_json(const std::string& name, const CheckResult& r, int spp) {
                  {"visible", visible},
                  {"shares", shares},
                  {"needed_spp", number(r.needed_spp)},
+                 {"bends", r.bends},
                  {"gradient_sum", r.total.gradient},
                  {"gradient_sum_stderr", r.total.gradient_error},
                  {"difference_sum", r.total.difference},
@@ -155,6 +162,7 @@ class CheckCommand final : public Command {
       warnings_.add_all(r.gradient.warnings);
       print_check(parameter, r, settings.spp);
       report.push_back(figures_json(parameter, r, settings.spp));
+      report.back()["sensor"] = sensor_name(scene);
       report.back()["warnings"] = warnings_.lines();
       // What is wrong comes before what is not known.
       if (r.verdict == Verdict::kDisagree) status = kDisagree;
@@ -188,6 +196,7 @@ class CheckCommand final : public Command {
                  p < kCheckLevel ? ": DISAGREE" : "");
       agree = agree && p >= kCheckLevel;
       report.push_back({{"parameter", c.parameter},
+                        {"sensor", sensor_name(scene)},
                         {"forward", c.forward},
                         {"forward_stderr", number(c.forward_error)},
                         {"reverse", c.reverse},

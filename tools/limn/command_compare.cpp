@@ -50,6 +50,7 @@ std::vector<Row> rows() {
   for (const MethodType& type : method_types()) {
     rows.push_back({type.name, type.terms_can_be_left_out, type.ablation});
   }
+  rows.push_back({kMitsubaAfterSetup, false, true});
   rows.push_back({kMitsuba, false, false});
   return rows;
 }
@@ -166,8 +167,8 @@ class Comparer {
     reference_seconds_ = command.reference_time > 0 ? command.reference_time : 4 * runs;
     methods_seconds_ = runs * static_cast<double>(command.methods.size());
     for (const std::string& name : command.methods) {
-      methods_.push_back(name == kMitsuba
-                             ? make_mitsuba_method(input_, common.defines, command.output)
+      methods_.push_back(is_mitsuba(name)
+                             ? make_mitsuba_method(name, input_, common.defines, command.output)
                              : make_method(input_, name));
     }
     take_reference();
@@ -272,7 +273,7 @@ void CompareCommand::add_options(CLI::App& app, bool all) {
       ->type_name("PARAM");
   app.add_option("--methods", command_.methods,
                  "Methods to compare, the first is the measure of the others: " + row_names(all) +
-                     " (the last where Mitsuba 3 is installed)")
+                     " (Mitsuba's where it is installed)")
       ->delimiter(',')
       ->required()
       ->type_name("A,B,...");

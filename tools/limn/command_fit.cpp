@@ -73,7 +73,7 @@ class FitCommand final : public Command {
   CLI::Option* steps_option_ = nullptr;
   std::vector<std::string> targets_, masks_, views_;
   FitArguments given_;
-  std::string output_, resume_, terms_, truth_;
+  std::string output_, resume_, truth_;
   bool no_report_ = false;
 };
 
@@ -94,7 +94,7 @@ void FitCommand::add_options(CLI::App& app, bool) {
   app.add_option("--view", views_, "A further scene that shares the parameters (repeatable)")
       ->type_name("SCENE[;NAME=VALUE...]")
       ->allow_extra_args(false);
-  app.add_option("--wrt", given_.parameters,
+  app.add_option("--wrt", given_.options.parameters,
                  "What to fit: scalars, SHAPE.vertex_positions (repeatable)")
       ->type_name("PARAM")
       ->allow_extra_args(false);
@@ -105,7 +105,7 @@ void FitCommand::add_options(CLI::App& app, bool) {
                       ->check(CLI::Range(int64_t{1}, int64_t{1} << 40));
   app.add_option("--loss", given_.loss, "l2, relative-l2 or l1")->capture_default_str();
   app.add_option(
-         "--pyramid", given_.pyramid,
+         "--pyramid", given_.options.pyramid,
          "Levels: the mean over the loss of the image as it is, at half its size, a quarter, "
          "...")
       ->check(CLI::Range(1, 32))
@@ -113,26 +113,27 @@ void FitCommand::add_options(CLI::App& app, bool) {
   app.add_option("--optimiser,--optimizer", given_.optimiser,
                  "adam-uniform (one scale for all vertices of a shape), adam, gradient-descent")
       ->capture_default_str();
-  app.add_option("--step", given_.step,
+  app.add_option("--step", given_.options.step,
                  "Of the first step, in natural steps: 1 % of a shape's diagonal, 0.01 radians, "
                  "1 % of a value")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  app.add_option("--step-half-life", given_.step_half_life,
+  app.add_option("--step-half-life", given_.options.step_half_life,
                  "After so many steps they are half as long (default: all are alike)")
       ->check(CLI::Range(1, 1 << 30));
-  app.add_option("--smoothing", given_.smoothing,
+  app.add_option("--smoothing", given_.options.smoothing,
                  "How far a step of a vertex spreads, over the shape's diagonal; 0: not at all")
       ->check(CLI::Range(0.0, 100.0))
       ->capture_default_str();
-  app.add_option("--remesh", given_.remesh,
+  app.add_option("--remesh", given_.options.remesh,
                  "After these steps, vertices that are fitted get new triangles, as in 100,200")
       ->delimiter(',')
       ->check(CLI::PositiveNumber);
-  app.add_option("--remesh-edge", given_.remesh_edge, "Length of edges then, over what it was")
+  app.add_option("--remesh-edge", given_.options.remesh_edge,
+                 "Length of edges then, over what it was")
       ->check(CLI::Range(0.1, 10.0))
       ->capture_default_str();
-  app.add_option("--remesh-shrink", given_.remesh_shrink,
+  app.add_option("--remesh-shrink", given_.options.remesh_shrink,
                  "After each remeshing steps and smoothing are so many times what they were")
       ->check(CLI::Range(0.01, 1.0))
       ->capture_default_str();
@@ -150,26 +151,13 @@ void FitCommand::add_options(CLI::App& app, bool) {
 }
 
 void FitCommand::add_sampling_options(CLI::App& app) {
-  app.add_option("--loss-spp", given_.loss_spp,
+  app.add_option("--loss-spp", given_.options.loss_spp,
                  "Samples per pixel of each of the loss's two images (default: --spp)")
       ->check(CLI::Range(1, 1 << 30));
-  app.add_option("--spp-doubling", given_.spp_doubling,
+  app.add_option("--spp-doubling", given_.options.spp_doubling,
                  "After so many steps there are twice the samples (default: never)")
       ->check(CLI::Range(1, 1 << 30));
-  app.add_option("--terms", terms_, "Only these terms of the gradient, as in interior,camera");
-  app.add_option("--pixels", given_.pixels,
-                 "Where paths go: adjoint (where the loss depends on the image) or uniform")
-      ->check(CLI::IsMember({"adjoint", "uniform"}))
-      ->capture_default_str();
-  app.add_option("--sampler", given_.sampler,
-                 "Of edges: forest; silhouettes, which is better where shadows are soft; or to "
-                 "compare with them quadric, li2019, uniform, brute or a variant of these")
-      ->capture_default_str();
-  app.add_option("--edge-samples", given_.edge_samples, "At every vertex of a path")
-      ->check(CLI::Range(1, 1 << 16));
-  app.add_option("--camera-samples", given_.camera_samples,
-                 "Points on silhouettes of the film, for each path")
-      ->check(CLI::PositiveNumber);
+  add_reverse_options(app, given_.options.backward);
 }
 
 // The scene and those of --view, each with all its sensors, in turn: a target for each.
@@ -215,14 +203,13 @@ FitArguments FitCommand::arguments() const {
     if (!there) throw InputError(std::string("give ") + what);
   };
   need(!common_.scene.empty(), "a scene, or --resume FOLDER");
-  need(!given_.parameters.empty(), "--wrt");
+  need(!given_.options.parameters.empty(), "--wrt");
   need(steps_option_->count() > 0, "--steps");
   need(!output_.empty(), "-o FOLDER");
   FitArguments a = given_;
-  a.terms = parse_terms(terms_);
   a.shading = common_.shading;
   a.truth = absolute(truth_);
-  for (std::string& name : a.parameters) name = with_absolute_field(name, name.size());
+  for (std::string& name : a.options.parameters) name = with_absolute_field(name, name.size());
   for (std::string& text : a.bounds) {
     text = with_absolute_field(text, std::min(text.size(), text.rfind('=')));
   }
@@ -233,13 +220,24 @@ FitArguments FitCommand::arguments() const {
 
 std::vector<FitView> FitCommand::read_views(const FitArguments& arguments) {
   std::vector<FitView> views;
-  for (const ViewArguments& view : arguments.views) {
-    CommonOptions common;
-    common.scene = view.scene;
-    common.defines = view.defines;
-    common.sensor = view.sensor;
-    common.shading = arguments.shading;
-    FitView read{load_scene(common, warnings_), read_exr(view.target), {}};
+  for (size_t v = 0; v < arguments.views.size(); ++v) {
+    const ViewArguments& view = arguments.views[v];
+    const auto same_scene = [&](const ViewArguments& other) {
+      return other.scene == view.scene && other.defines == view.defines;
+    };
+    FitView read;
+    if (v > 0 && same_scene(arguments.views[v - 1])) {  // by another of its sensors
+      read.scene = deep_copy(views.back().scene);
+      use_sensor(read.scene, view.sensor);
+    } else {
+      CommonOptions common;
+      common.scene = view.scene;
+      common.defines = view.defines;
+      common.sensor = view.sensor;
+      common.shading = arguments.shading;
+      read.scene = load_scene(common, warnings_);
+    }
+    read.target = read_exr(view.target);
     if (!view.mask.empty()) read.mask = read_exr(view.mask);
     check_loss_images(read.scene, read.target, read.mask, view.target, view.mask);
     views.push_back(std::move(read));
@@ -260,7 +258,7 @@ void FitCommand::check_resume() const {
 }
 
 void FitCommand::warn_of_remeshing(const FitArguments& arguments) {
-  for (const int64_t step : arguments.remesh) {
+  for (const int64_t step : arguments.options.remesh) {
     if (step <= arguments.steps) continue;
     warnings_.add_all(
         {fmt::format("--remesh {}: the fit ends before, after {} steps", step, arguments.steps)});
@@ -297,7 +295,7 @@ int FitCommand::run(const std::string&) {
       bar((static_cast<double>(running->steps() - started) + done) / all);
     };
   }
-  Fit fit(std::move(views), folder.arguments().options(), settings);
+  Fit fit(std::move(views), folder.arguments().all_options(), settings);
   running = &fit;
   warnings_.add_all(fit.warnings());
   warn_of_remeshing(folder.arguments());

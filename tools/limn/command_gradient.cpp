@@ -402,6 +402,7 @@ class GradientCommand final : public Command {
     }
     if (sample_images_) write_sample_images(scene, result, attributes);
     const json report = {{"scene", scene.file},
+                         {"sensor", sensor_name(scene)},
                          {"spp", result.spp},
                          {"seed", settings.seed},
                          {"threads", settings.threads},

@@ -72,6 +72,7 @@ class RenderCommand final : public Command {
     }
     if (common_.json.empty()) return;
     const nlohmann::json report = {{"scene", scene.file},
+                                   {"sensor", sensor_name(scene)},
                                    {"spp", result.spp},
                                    {"method", options_.method},
                                    {"seed", settings.seed},

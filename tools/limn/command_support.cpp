@@ -111,6 +111,29 @@ void add_film_option(CLI::App& app, std::string& film) {
       ->capture_default_str();
 }
 
+void add_reverse_options(CLI::App& app, BackwardOptions& options) {
+  app.add_option_function<std::string>(
+      "--terms", [&options](const std::string& list) { options.terms = parse_terms(list); },
+      "Only these terms, as in interior,camera");
+  app.add_option_function<std::string>(
+         "--pixels",
+         [&options](const std::string& pixels) {
+           options.uniform_pixels = pixels == kUniformPixels;
+         },
+         "Where paths go: adjoint (where the loss depends on the image) or uniform")
+      ->check(CLI::IsMember({kAdjointPixels, kUniformPixels}))
+      ->default_str(kAdjointPixels);
+  app.add_option("--sampler", options.sampler,
+                 "Of edges: forest; silhouettes, which is better where shadows are soft; or to "
+                 "compare with them quadric, li2019, uniform, brute or a variant of these")
+      ->capture_default_str();
+  app.add_option("--edge-samples", options.edge_samples, "At every vertex of a path")
+      ->check(CLI::Range(1, 1 << 16));
+  app.add_option("--camera-samples", options.camera_samples,
+                 "Points on silhouettes of the film, for each path")
+      ->check(CLI::PositiveNumber);
+}
+
 void add_warp_options(CLI::App& app, WarpOptions& warp) {
   app.add_option("--aux", warp.rays,
                  "Auxiliary rays of a direction (methods was, was-unbiased): an even number; the "
@@ -169,6 +192,7 @@ RunSettings make_settings(const CommonOptions& common, const Scene& scene,
 std::vector<ImageAttribute> provenance(const Scene& scene, const RunSettings& settings,
                                        int64_t spp) {
   return {{"limn.scene", scene.file},
+          {"limn.sensor", sensor_name(scene)},
           {"limn.spp", std::to_string(spp)},
           {"limn.seed", std::to_string(settings.seed)},
           {"limn.shading", scene.shading == ShadingModel::kMitsuba ? "mitsuba" : "continuous"}};
@@ -226,11 +250,7 @@ void check_output(const std::string& file) {
 }
 
 void write_json(const std::string& file, const std::string& text) {
-  if (file.empty()) return;
-  std::ofstream stream(file);
-  stream << text << "\n";
-  stream.close();  // a full disk may show only here
-  if (!stream) throw InputError({file}, "cannot be written");
+  if (!file.empty()) write_file(file, text + "\n");
 }
 
 double available_memory() {

@@ -10,6 +10,7 @@
 
 #include "limn/core/image.h"
 #include "limn/core/scene.h"
+#include "limn/integrators/backward.h"
 #include "limn/integrators/gradient.h"
 #include "limn/integrators/methods.h"
 #include "limn/integrators/run.h"
@@ -45,6 +46,9 @@ void add_parameter_options(CLI::App& app, std::vector<std::string>& parameters, 
 void add_term_options(CLI::App& app, std::string& terms, std::string& samples);
 // --aux and --kappa
 void add_warp_options(CLI::App& app, WarpOptions& warp);
+// --terms, --pixels, --sampler, --edge-samples and --camera-samples
+void add_reverse_options(CLI::App& app, BackwardOptions& options);
+inline constexpr const char *kAdjointPixels = "adjoint", *kUniformPixels = "uniform";
 // --film: "rays" or "exact"
 void add_film_option(CLI::App& app, std::string& film);
 // --debug-sample
@@ -62,7 +66,7 @@ nlohmann::json settings_json(const std::vector<MethodSetting>& settings);
 std::string with_ending(const std::string& output, const std::string& ending);
 // Made before long work starts: InputError if the file cannot be written.
 void check_output(const std::string& file);
-void write_json(const std::string& file, const std::string& text);
+void write_json(const std::string& file, const std::string& text);  // nothing for ""
 // Bytes that can be taken without paging, as the system tells; 0 if it does not.
 double available_memory();
 // "a,b" of --terms; none for "".

@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
-#include "limn/core/error.h"
 #include "tools/limn/command_support.h"
+#include "tools/limn/output_files.h"
 
 namespace limn {
 namespace {
@@ -167,6 +167,7 @@ json comparison_json(const Scene& scene, const Comparison& c, const Scales& scal
   json object = {{"kind", "compare"},
                  {"command", c.command},
                  {"scene", scene.file},
+                 {"sensor", sensor_name(scene)},
                  {"defines", c.defines},
                  {"parameter", c.parameter},
                  {"unit", c.unit},
@@ -210,7 +211,7 @@ std::vector<std::string> term_names(const Comparison& c) {
 }
 
 void write_csv(const std::string& file, const Comparison& c) {
-  std::ofstream stream(file);
+  std::ostringstream stream;
   const std::vector<std::string> names = term_names(c);
   stream << "method,time,repeat,seed,seconds,setup_seconds,spp,rays,mse,relative_mse,trimmed_mse";
   for (const std::string& name : names) stream << "," << name << "_seconds";
@@ -229,7 +230,7 @@ void write_csv(const std::string& file, const Comparison& c) {
       stream << fmt::format(",{}\n", r.run.peak_memory_bytes);
     }
   }
-  if (!stream) throw InputError({file}, "cannot be written");
+  write_file(file, stream.str());
 }
 
 // "1.23e-05 +- 4e-07"

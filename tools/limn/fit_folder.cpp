@@ -30,17 +30,6 @@ static_assert(std::endian::native == std::endian::little);
 constexpr int kFormat = 2;                  // of fit.json and state.cbor; 1 did not say so
 constexpr size_t kDistanceSamples = 10000;  // on each surface; not tuned
 
-// Under another name first: a crash leaves the old file or the new one.
-void write_whole(const std::string& file, const std::string& bytes) {
-  const std::string temporary = file + ".part";
-  std::ofstream stream(temporary, std::ios::binary);
-  stream << bytes;
-  stream.close();  // a full disk may show only here
-  std::error_code failed;
-  if (stream) fs::rename(temporary, file, failed);
-  if (!stream || failed) throw InputError({file}, "cannot be written");
-}
-
 template <class T>
 void append(std::string& bytes, const T& value) {
   const auto raw = std::bit_cast<std::array<char, sizeof(T)>>(value);
@@ -71,29 +60,30 @@ json to_json(const ViewArguments& v) {
           {"target", v.target}, {"mask", v.mask},       {"fingerprints", v.fingerprints}};
 }
 
-// Calls visit(name, member) for all but the views: reading and writing go over one list.
+// Calls visit(name, member) for all but the views and the pixels: reading and writing go over one
+// list.
 template <class Arguments, class Visit>
 void visit_arguments(Arguments& a, const Visit& visit) {
-  visit("parameters", a.parameters);
+  auto& options = a.options;
+  visit("parameters", options.parameters);
   visit("bounds", a.bounds);
-  visit("terms", a.terms);
+  visit("terms", options.backward.terms);
   visit("loss", a.loss);
-  visit("pyramid", a.pyramid);
+  visit("pyramid", options.pyramid);
   visit("optimiser", a.optimiser);
-  visit("pixels", a.pixels);
-  visit("sampler", a.sampler);
+  visit("sampler", options.backward.sampler);
   visit("shading", a.shading);
-  visit("step", a.step);
-  visit("smoothing", a.smoothing);
-  visit("remesh", a.remesh);
-  visit("remesh_edge", a.remesh_edge);
-  visit("remesh_shrink", a.remesh_shrink);
-  visit("camera_samples", a.camera_samples);
-  visit("step_half_life", a.step_half_life);
-  visit("spp_doubling", a.spp_doubling);
+  visit("step", options.step);
+  visit("smoothing", options.smoothing);
+  visit("remesh", options.remesh);
+  visit("remesh_edge", options.remesh_edge);
+  visit("remesh_shrink", options.remesh_shrink);
+  visit("camera_samples", options.backward.camera_samples);
+  visit("step_half_life", options.step_half_life);
+  visit("spp_doubling", options.spp_doubling);
   visit("spp", a.spp);
-  visit("loss_spp", a.loss_spp);
-  visit("edge_samples", a.edge_samples);
+  visit("loss_spp", options.loss_spp);
+  visit("edge_samples", options.backward.edge_samples);
   visit("seed", a.seed);
   visit("steps", a.steps);
   visit("snapshots", a.snapshots);
@@ -103,6 +93,7 @@ void visit_arguments(Arguments& a, const Visit& visit) {
 json to_json(const FitArguments& a) {
   json j;
   visit_arguments(a, [&](const char* name, const auto& member) { j[name] = member; });
+  j["pixels"] = a.options.backward.uniform_pixels ? kUniformPixels : kAdjointPixels;
   for (const ViewArguments& view : a.views) j["views"].push_back(to_json(view));
   return j;
 }
@@ -110,6 +101,7 @@ json to_json(const FitArguments& a) {
 FitArguments arguments_from(const json& j) {
   FitArguments a;
   visit_arguments(a, [&](const char* name, auto& member) { j.at(name).get_to(member); });
+  a.options.backward.uniform_pixels = j.at("pixels") == kUniformPixels;
   for (const json& view : j.at("views")) {
     a.views.push_back({view.at("scene"), view.at("defines"), view.at("sensor"), view.at("target"),
                        view.at("mask"), view.at("fingerprints")});
@@ -264,27 +256,12 @@ std::string csv_text(const json& history, const std::vector<FitScalar>& scalars)
 
 }  // namespace
 
-FitOptions FitArguments::options() const {
-  FitOptions options;
-  options.parameters = parameters;
-  for (const std::string& text : bounds) options.bounds.push_back(parse_bounds(text));
-  options.loss = loss_kind(loss);
-  options.pyramid = pyramid;
-  options.optimiser = optimiser_kind(optimiser);
-  options.step = step;
-  options.step_half_life = step_half_life;
-  options.spp_doubling = spp_doubling;
-  options.smoothing = smoothing;
-  options.remesh = remesh;
-  options.remesh_edge = remesh_edge;
-  options.remesh_shrink = remesh_shrink;
-  options.loss_spp = loss_spp;
-  options.backward.terms = terms;
-  options.backward.sampler = sampler;
-  options.backward.uniform_pixels = pixels == "uniform";
-  options.backward.edge_samples = edge_samples;
-  options.backward.camera_samples = camera_samples;
-  return options;
+FitOptions FitArguments::all_options() const {
+  FitOptions all = options;
+  for (const std::string& text : bounds) all.bounds.push_back(parse_bounds(text));
+  all.loss = loss_kind(loss);
+  all.optimiser = optimiser_kind(optimiser);
+  return all;
 }
 
 FitFolder::FitFolder(const std::string& folder, const FitArguments& arguments)
@@ -317,7 +294,7 @@ FitFolder FitFolder::read(const std::string& folder) {
 void FitFolder::check_inputs(const std::vector<FitView>& views) const {
   for (size_t v = 0; v < views.size(); ++v) {
     const ViewArguments& view = arguments_.views[v];
-    const auto now = fingerprints_of(views[v], arguments_.parameters);
+    const auto now = fingerprints_of(views[v], arguments_.options.parameters);
     const std::map<std::string, std::string> files{
         {"scene", view.scene}, {"target", view.target}, {"mask", view.mask}};
     for (const auto& [what, then] : view.fingerprints) {
@@ -348,10 +325,11 @@ void FitFolder::prepare(const std::vector<FitView>& views) {
     inputs.push_back(view.target);
     inputs.push_back(view.mask);
   }
-  for (const std::string& field : field_files(arguments_.parameters)) inputs.push_back(field);
+  for (const std::string& field : field_files(arguments_.options.parameters))
+    inputs.push_back(field);
   for (const FitView& view : views) check_outputs(files, view.scene, inputs);
   for (size_t v = 0; v < views.size(); ++v) {
-    arguments_.views[v].fingerprints = fingerprints_of(views[v], arguments_.parameters);
+    arguments_.views[v].fingerprints = fingerprints_of(views[v], arguments_.options.parameters);
   }
 }
 
@@ -399,7 +377,7 @@ void FitFolder::add(const FitRecord& r, const Fit& fit) {
 }
 
 json FitFolder::mesh_figures(const Shape& s, const std::string& name, int threads) const {
-  write_whole(file(name), ply_text(s.mesh));
+  write_file(file(name), ply_text(s.mesh));
   json figures = {{"shape", s.id}, {"file", name}, {"crossings", count_crossings(s.mesh, threads)}};
   const auto inside_out = count_inside_out(s.mesh, threads);
   figures["inside_out"] = inside_out ? json(*inside_out) : json(nullptr);
@@ -428,7 +406,7 @@ void FitFolder::add_snapshot(const Fit& fit, const RunSettings& settings, int sp
   }
   for (const FitScalar& s : fit.scalars()) line += fmt::format(", {} {:.6g}", s.name, s.value);
   std::set<std::string> names;
-  for (const Shape* shape : fitted_shapes(fit, arguments_.parameters)) {
+  for (const Shape* shape : fitted_shapes(fit, arguments_.options.parameters)) {
     std::string name = fmt::format("step_{:05}_{}", fit.steps(), file_part(shape->id));
     // Ids that differ may be one as names of files.
     while (!names.insert(name).second) name += "_";
@@ -480,10 +458,10 @@ void FitFolder::write(const Fit& fit, const std::string& status,
                     {"steps", fit.steps()}, {"scalars", scalars},
                     {"targets", targets},   {"warnings", warnings},
                     {"history", history_},  {"snapshots", snapshots_}};
-  write_whole(file("fit.json"), all.dump(1) + "\n");
-  write_whole(file("history.csv"), csv_text(history_, fit.scalars()));
+  write_file(file("fit.json"), all.dump(1) + "\n");
+  write_file(file("history.csv"), csv_text(history_, fit.scalars()));
   const std::vector<uint8_t> state = json::to_cbor(to_json(fit.state()));
-  write_whole(file("state.cbor"), std::string(state.begin(), state.end()));
+  write_file(file("state.cbor"), std::string(state.begin(), state.end()));
 }
 
 }  // namespace limn

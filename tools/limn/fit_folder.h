@@ -29,20 +29,16 @@ struct ViewArguments {
 // What fixes the bits of a fit, and what is kept of it. Files have absolute names.
 struct FitArguments {
   std::vector<ViewArguments> views;
-  std::vector<std::string> parameters, bounds, terms;
-  std::string loss = "l2", optimiser = "adam-uniform", pixels = "adjoint", sampler = "forest",
-              shading = "continuous";
-  double step = 1, smoothing = 0.08, camera_samples = 1;
-  std::vector<int64_t> remesh;
-  int pyramid = 1;
-  double remesh_edge = 0.75, remesh_shrink = 0.65;
-  int step_half_life = 0, spp_doubling = 0, spp = 0, loss_spp = 0, edge_samples = 1;
+  FitOptions options;  // but for what is said in words:
+  std::vector<std::string> bounds;
+  std::string loss = "l2", optimiser = "adam-uniform", shading = "continuous";
+  int spp = 0;
   uint64_t seed = 0;
   int64_t steps = 0;
   int snapshots = 0;  // steps between two
   std::string truth;  // a mesh; "" if none
 
-  FitOptions options() const;
+  FitOptions all_options() const;
 };
 
 class FitFolder {

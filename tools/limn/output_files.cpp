@@ -7,6 +7,7 @@
 
 #include "limn/core/error.h"
 #include "limn/core/image.h"
+#include "limn/core/output_file.h"
 
 namespace limn {
 namespace {
@@ -55,6 +56,19 @@ bool is_own(const fs::path& file, const std::string& output) {
 }
 
 }  // namespace
+
+void write_file(const std::string& file, const std::string& bytes) {
+  if (is_device(file)) {
+    std::ofstream stream(file, std::ios::binary);
+    stream << bytes;
+    stream.close();
+    if (!stream) throw InputError({file}, "cannot be written");
+    return;
+  }
+  OutputFile output(file);
+  output.write(bytes);
+  output.commit();
+}
 
 void check_json(const std::string& file) {
   if (!file.empty() && !is_device(file)) check_writable(file);

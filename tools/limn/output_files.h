@@ -26,6 +26,10 @@ std::string file_part(const std::string& name);
 // InputError if the file cannot be written; nothing for "".
 void check_json(const std::string& file);
 
+// All of a file, which appears whole or not at all; a device (/dev/stdout) takes the bytes as they
+// come. InputError if it cannot be written.
+void write_file(const std::string& file, const std::string& bytes);
+
 // Images beside `output` that an earlier run wrote for the same -o, and that are not among
 // `written`: standard errors, other parameters, counts of samples; with their pictures. Files that
 // limn did not write stay.

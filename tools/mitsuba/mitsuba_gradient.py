@@ -308,9 +308,11 @@ class Renderer:
         # A term that two passes did not see may still be there: it gets a few.
         return [max(share / largest, 0.02) for share in shares]
 
-    def render_for(self, seconds):
+    def render_for(self, seconds, after_setup):
         shares = self._shares()
         setup = self._clock.seconds()
+        if after_setup:
+            seconds += setup
         for term in self._terms:
             self._counted_pass(term)
         while True:
@@ -332,13 +334,17 @@ class Renderer:
     def image(self):
         return sum(term.sum / term.passes for term in self._terms)
 
-    def figures(self, setup, version):
+    def figures(self, setup, version, after_setup):
         samples = {term.name: term.passes * self._spp for term in self._terms}
         seconds = self._clock.seconds()
         compilation = self._clock.compilation
+        left_out = f"compilation of {compilation:.1f} s"
+        if after_setup:
+            left_out += f" and set-up of {setup:.1f} s"
         return {
-            "seconds": seconds,
-            "setup_seconds": setup,
+            "seconds": seconds - setup if after_setup else seconds,
+            "setup_seconds": 0 if after_setup else setup,
+            "setup_not_counted_seconds": setup if after_setup else 0,
             "compile_seconds": compilation,
             "spp": samples["interior"],
             "samples": samples,
@@ -347,8 +353,7 @@ class Renderer:
             "version": version,
             "peak_memory_bytes": 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss,
             "message": (
-                f"prb_projective, guiding {self._guiding}, {VARIANT}; compilation of {compilation:.1f} s not"
-                " counted"
+                f"prb_projective, guiding {self._guiding}, {VARIANT}; {left_out} not counted"
             ),
         }
 
@@ -372,15 +377,16 @@ def run(arguments):
     setup = (
         renderer.render_samples(arguments.spp)
         if arguments.spp
-        else renderer.render_for(arguments.time)
+        else renderer.render_for(arguments.time, arguments.after_setup)
     )
-    figures = renderer.figures(setup, mi.__version__)
+    figures = renderer.figures(setup, mi.__version__, arguments.after_setup)
     write(mi, dr, renderer.image(), arguments.output)
     if arguments.json:
         with open(arguments.json, "w", encoding="utf-8") as stream:
             json.dump(figures, stream, indent=2)
     print(
-        f"{arguments.output}: {figures['seconds']:.2f} s, of which {setup:.2f} s set-up; samples"
+        f"{arguments.output}: {figures['seconds']:.2f} s, of which {figures['setup_seconds']:.2f} s"
+        " set-up; samples"
         " per pixel "
         + ", ".join(f"{name} {count}" for name, count in figures["samples"].items())
         + f"; {figures['message']}"
@@ -414,6 +420,11 @@ def main():
     budget = parser.add_mutually_exclusive_group(required=True)
     budget.add_argument(
         "--time", type=positive(float), metavar="SECONDS", help="set-up included, compilation not"
+    )
+    parser.add_argument(
+        "--after-setup",
+        action="store_true",
+        help="--time begins after the set-up, which is not counted either",
     )
     budget.add_argument("--spp", type=positive(int), help="samples per pixel of each term, instead")
     parser.add_argument("--threads", type=positive(int), help="default: all cores")

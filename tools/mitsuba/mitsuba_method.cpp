@@ -19,6 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kScript = "mitsuba/mitsuba_gradient.py";
+constexpr const char* kNotCounted = "setup_not_counted_seconds";
 constexpr int kNotInstalled = 3;  // exit status of the script
 
 std::string python() {
@@ -34,16 +35,18 @@ std::string ending(const std::string& text) {
 
 class MitsubaMethod final : public DerivativeMethod {
  public:
-  MitsubaMethod(const MethodInput& input, const std::map<std::string, std::string>& defines,
-                const std::string& folder)
-      : input_(input),
+  MitsubaMethod(const std::string& name, const MethodInput& input,
+                const std::map<std::string, std::string>& defines, const std::string& folder)
+      : name_(name),
+        input_(input),
         defines_(defines),
         image_((fs::path(folder) / "mitsuba_run.exr").string()),
         report_((fs::path(folder) / "mitsuba_run.json").string()) {}
 
-  std::string name() const override { return kMitsuba; }
+  std::string name() const override { return name_; }
   std::string description() const override {
-    return "Mitsuba 3's prb_projective with octree guiding, where it is installed";
+    return std::string("Mitsuba 3's prb_projective with octree guiding, where it is installed") +
+           (after_setup() ? "; its set-up is not counted" : "");
   }
 
   MethodRun run(const RunSettings& settings) override {
@@ -70,6 +73,8 @@ class MitsubaMethod final : public DerivativeMethod {
   std::vector<MethodSetting> settings() const override { return settings_; }
 
  private:
+  bool after_setup() const { return name_ == kMitsubaAfterSetup; }
+
   std::vector<std::string> command(const RunSettings& settings) const {
     const std::string script = tool_script(kScript);
     if (script.empty()) {
@@ -89,6 +94,7 @@ class MitsubaMethod final : public DerivativeMethod {
     for (const auto& [name, value] : defines_) {
       words.insert(words.end(), {"-D", name + "=" + value});
     }
+    if (after_setup()) words.emplace_back("--after-setup");
     words.insert(words.end(), {"-o", image_, "--json", report_});
     return words;
   }
@@ -105,6 +111,9 @@ class MitsubaMethod final : public DerivativeMethod {
       const auto found = report.find(key);
       if (found == report.end() || !found->is_string() || found->empty()) continue;
       settings_.push_back({key, found->get<std::string>()});
+    }
+    if (after_setup()) {
+      settings_.push_back({kNotCounted, report.at(kNotCounted).get<double>()});
     }
     const Film& film = input_.scene.film;
     const Image image = read_exr(image_);
@@ -123,6 +132,7 @@ class MitsubaMethod final : public DerivativeMethod {
     fs::remove(report_, ignored);
   }
 
+  std::string name_;
   const MethodInput& input_;
   std::map<std::string, std::string> defines_;
   std::string image_, report_;
@@ -131,10 +141,12 @@ class MitsubaMethod final : public DerivativeMethod {
 
 }  // namespace
 
+bool is_mitsuba(const std::string& name) { return name == kMitsuba || name == kMitsubaAfterSetup; }
+
 std::unique_ptr<DerivativeMethod> make_mitsuba_method(
-    const MethodInput& input, const std::map<std::string, std::string>& defines,
-    const std::string& folder) {
-  return std::make_unique<MitsubaMethod>(input, defines, folder);
+    const std::string& name, const MethodInput& input,
+    const std::map<std::string, std::string>& defines, const std::string& folder) {
+  return std::make_unique<MitsubaMethod>(name, input, defines, folder);
 }
 
 }  // namespace limn

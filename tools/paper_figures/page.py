@@ -21,6 +21,7 @@ from report.markup import (
 from report.pictures import Pictures, figure
 from report.records import read_folder, read_record
 
+from . import bias_chart
 from .figures import DEFAULT, PAPER
 
 # A page of unbiased methods marks one of them in one of a hundred pages.
@@ -288,6 +289,35 @@ def _edges(parts, folder):
     return table(head, rows, "Edges with and without concave ones"), words
 
 
+def _draws(part, folder):
+    """A table and what it says; None where nothing was measured."""
+    file = os.path.join(folder(part), "draws.json")
+    if part.kind != "draws" or not os.path.exists(file):
+        return None
+    record = read_record(file)
+    ray = record.number("ray_ns")
+    rows, rays = [], {}
+    for row in record.records("rows"):
+        name = row.text("name")
+        rays[name] = row.number("draw_ns") / ray
+        rows.append(
+            [
+                join(name, element("span", _role(name), class_="role")),
+                figures(row.number("draw_ns")),
+                figures(rays[name]),
+                percent(row.number("hit_rate")),
+                figures(row.number("efficiency")),
+                figures(row.number("build_ms") / 1000),
+                figures(row.number("bytes_per_edge")),
+            ]
+        )
+    head = ["sampler", "draw, ns", "draw, rays", "hit rate", "efficiency", "build, s", "bytes per edge"]
+    title = f"{count(record.number('edges'))} edges; a ray takes {figures(ray)} ns"
+    shown = [f"{name} {figures(rays[name])}" for name in (PAPER, "forest") if name in rays]
+    html = join(element("h3", title), table(head, rows, "Draws"), _command(record.text("command")))
+    return html, f"rays a draw, {count(record.number('edges'))} edges: {', '.join(shown)}"
+
+
 def _sections(paper_figures, folder, command):
     """(id, entry, html, factors, verdicts) of every figure; how many have no results."""
     missing = 0
@@ -295,7 +325,7 @@ def _sections(paper_figures, folder, command):
     for entry in paper_figures:
         for part in entry.runs:
             try:
-                if part.kind != "edges":
+                if part.kind in ("compare", "reject"):
                     results[part.name] = read_folder(folder(part))[0]
             except ReportError:
                 pass
@@ -311,6 +341,10 @@ def _sections(paper_figures, folder, command):
     for i, entry in enumerate(paper_figures):
         parts, factors, verdicts = [], [], []
         for part in entry.runs:
+            drawn = _draws(part, folder)
+            if drawn:
+                parts.append(drawn[0])
+                verdicts.append(drawn[1])
             result = results.get(part.name)
             if result is None:
                 continue
@@ -324,6 +358,7 @@ def _sections(paper_figures, folder, command):
             if comparison.factor():
                 factors.append(comparison.factor())
             verdicts.append(" or ".join(comparison.best()) or "–")
+        parts += filter(None, [bias_chart.html(entry.runs, folder)])
         counted = _edges(entry.runs, folder)
         if counted:
             parts.append(counted[0])

@@ -1,4 +1,4 @@
-"""One run: a call of limn, or a count of edges."""
+"""One run: a call of limn or of edge_benchmark, or a count of edges."""
 
 from dataclasses import dataclass, field
 
@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 @dataclass
 class Part:
     name: str
-    kind: str  # "compare", "reject" or "edges"
-    input: str  # scene; for "reject" and "edges" a mesh may stand here
+    kind: str  # "compare", "gradient", "reject", "draws" or "edges"
+    input: str  # scene; for the last three a mesh may stand here
     parameter: str = ""
     methods: list = field(default_factory=list)
     defines: dict = field(default_factory=dict)

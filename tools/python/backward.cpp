@@ -98,8 +98,9 @@ void bind_backward(nb::module_& m) {
          std::optional<int> spp, std::optional<uint64_t> seed,
          const std::vector<std::string>& terms, bool uniform_pixels, int edge_samples,
          double camera_samples, int batches, double seconds, int threads,
-         const nb::object& progress, BatchStore* store) {
+         const nb::object& progress, const std::string& sampler, BatchStore* store) {
         BackwardOptions options;
+        options.sampler = sampler;
         if (names) options.parameters = to_list(*names);
         options.terms = terms;
         options.uniform_pixels = uniform_pixels;
@@ -117,15 +118,15 @@ void bind_backward(nb::module_& m) {
       nb::arg("terms") = nb::make_tuple(), nb::arg("uniform_pixels") = false,
       nb::arg("edge_samples") = 1, nb::arg("camera_samples") = 1.0, nb::arg("batches") = 16,
       nb::arg("seconds") = 0.0, nb::arg("threads") = 0, nb::arg("progress") = nb::none(),
-      nb::arg("_store").none() = nb::none(),
+      nb::arg("sampler") = BackwardOptions{}.sampler, nb::arg("_store").none() = nb::none(),
       nb::sig(
           "def backward(scene: Scene, adjoint: numpy.typing.ArrayLike, names: str | "
           "collections.abc.Sequence[str] | None = None, spp: int | None = None, seed: int | None "
           "= None, terms: collections.abc.Sequence[str] = (), uniform_pixels: bool = False, "
           "edge_samples: int = 1, camera_samples: float = 1, batches: int = 16, seconds: float = "
           "0, "
-          "threads: int = 0, progress: collections.abc.Callable[[float], object] | None = None) "
-          "-> dict[str, Estimate]"),
+          "threads: int = 0, progress: collections.abc.Callable[[float], object] | None = None, "
+          "sampler: str = 'forest') -> dict[str, Estimate]"),
       "Reverse mode: dLoss/dparameter of every parameter at once, from dLoss/dImage.\n\n"
       "adjoint: (H, W, 3), or (H, W) of the luminance; independent of the samples made here "
       "(another "
@@ -137,7 +138,9 @@ void bind_backward(nb::module_& m) {
       "unless "
       "uniform_pixels. edge_samples: at every vertex of a path; camera_samples: points on "
       "silhouettes "
-      "of the film, for each path. batches: at most, for standard errors. The rest as "
+      "of the film, for each path. sampler: of edges, \"forest\", or to compare with it "
+      "\"quadric\", "
+      "\"li2019\", \"uniform\", \"brute\". batches: at most, for standard errors. The rest as "
       "limn.gradient.");
 }
 

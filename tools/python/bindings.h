@@ -90,6 +90,9 @@ std::vector<std::string> to_list(const Names& names);
 using Samples = std::variant<std::string, std::vector<double>>;
 void set_samples(const Samples& samples, std::optional<SampleCounts>& counts);
 
+// "rays": false, "exact": true; InputError for other words.
+bool is_exact(const std::string& film);
+
 // What every run takes; none: what the scene asks for.
 struct RunArguments {
   std::optional<int> spp;

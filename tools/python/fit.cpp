@@ -2,6 +2,7 @@
 #include "limn/integrators/fit.h"
 
 #include <fmt/format.h>
+#include <nanobind/stl/map.h>
 
 #include <map>
 
@@ -140,8 +141,14 @@ void bind_fit(nb::module_& m) {
              const std::string& optimiser, double step, int step_half_life, double smoothing,
              std::optional<int> spp, int loss_spp, const std::vector<int64_t>& remesh,
              const std::vector<std::string>& terms, std::optional<uint64_t> seed, int threads,
-             int pyramid, int spp_doubling, double remesh_edge, double remesh_shrink) {
+             int pyramid, int spp_doubling, double remesh_edge, double remesh_shrink,
+             const std::map<std::string, std::pair<double, double>>& bounds,
+             const std::string& sampler) {
             FitOptions options;
+            for (const auto& [name, range] : bounds) {
+              options.bounds.push_back({name, range.first, range.second});
+            }
+            options.backward.sampler = sampler;
             options.parameters = to_list(names);
             options.loss = loss_kind(loss);
             options.optimiser = optimiser_kind(optimiser);
@@ -170,7 +177,8 @@ void bind_fit(nb::module_& m) {
           nb::arg("loss_spp") = 0, nb::arg("remesh") = nb::make_tuple(),
           nb::arg("terms") = nb::make_tuple(), nb::arg("seed") = nb::none(), nb::arg("threads") = 0,
           nb::arg("pyramid") = 1, nb::arg("spp_doubling") = 0, nb::arg("remesh_edge") = 0.75,
-          nb::arg("remesh_shrink") = 0.65,
+          nb::arg("remesh_shrink") = 0.65, nb::arg("bounds") = nb::dict(),
+          nb::arg("sampler") = BackwardOptions{}.sampler,
           nb::sig(
               "def __init__(self, scene: Scene, target: numpy.typing.ArrayLike, names: str | "
               "collections.abc.Sequence[str], mask: numpy.typing.ArrayLike | None = None, "
@@ -180,7 +188,9 @@ void bind_fit(nb::module_& m) {
               "0.08, spp: int | None = None, loss_spp: int = 0, remesh: "
               "collections.abc.Sequence[int] = (), terms: collections.abc.Sequence[str] = (), "
               "seed: int | None = None, threads: int = 0, pyramid: int = 1, spp_doubling: int = "
-              "0, remesh_edge: float = 0.75, remesh_shrink: float = 0.65) -> None"),
+              "0, remesh_edge: float = 0.75, remesh_shrink: float = 0.65, bounds: "
+              "collections.abc.Mapping[str, tuple[float, float]] = {}, sampler: str = 'forest') -> "
+              "None"),
           "Copies the scene; it stays as it is.\n\n"
           "target: (H, W, 3) or (H, W). names: scalars and arrays "
           "(\"object.vertex_positions\").\n"
@@ -195,7 +205,8 @@ void bind_fit(nb::module_& m) {
           "spp: samples per pixel of the gradient, and of each of the loss's two images unless "
           "loss_spp says otherwise; twice as many after each spp_doubling steps (0: never).\n"
           "remesh: steps after which vertices get new triangles, with edges remesh_edge times as "
-          "long, steps and smoothing remesh_shrink times what they were.")
+          "long, steps and smoothing remesh_shrink times what they were.\n"
+          "bounds: {name: (least, most)} that scalars may not leave. sampler: see limn.backward.")
       .def("step", &step, nb::arg("progress") = nb::none(),
            nb::sig("def step(self, progress: collections.abc.Callable[[float], object] | None = "
                    "None) -> FitRecord"),

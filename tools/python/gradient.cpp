@@ -34,6 +34,7 @@ struct GradientArguments {
   Samples samples;
   double step;
   WarpOptions warp;
+  std::string film;
 };
 
 GradientOptions to_options(const GradientArguments& arguments) {
@@ -43,6 +44,7 @@ GradientOptions to_options(const GradientArguments& arguments) {
   options.terms = arguments.terms;
   options.step = arguments.step;
   options.warp = arguments.warp;
+  options.exact_film = is_exact(arguments.film);
   set_samples(arguments.samples, options.samples);
   const std::string* word = std::get_if<std::string>(&arguments.samples);
   options.uniform_samples = word && *word == "uniform";
@@ -75,22 +77,25 @@ void bind_gradient(nb::module_& m) {
       [](const SceneHandle& scene, const Names& names, std::optional<int> spp,
          std::optional<uint64_t> seed, const std::string& method,
          const std::vector<std::string>& terms, const Samples& samples, double step, int aux,
-         double kappa, double seconds, int threads, const nb::object& progress, BatchStore* store) {
-        return gradient_of(scene, {names, method, terms, samples, step, {aux, kappa}},
+         double kappa, double seconds, int threads, const nb::object& progress,
+         const std::string& film, BatchStore* store) {
+        return gradient_of(scene, {names, method, terms, samples, step, {aux, kappa}, film},
                            {spp, seed, seconds, threads, store}, progress);
       },
       nb::arg("scene"), nb::arg("names"), nb::arg("spp") = nb::none(), nb::arg("seed") = nb::none(),
       nb::arg("method") = "", nb::arg("terms") = nb::make_tuple(), nb::arg("samples") = "auto",
       nb::arg("step") = 0.0, nb::arg("aux") = WarpOptions{}.rays,
       nb::arg("kappa") = WarpOptions{}.kappa, nb::arg("seconds") = 0.0, nb::arg("threads") = 0,
-      nb::arg("progress") = nb::none(), nb::arg("_store").none() = nb::none(),
+      nb::arg("progress") = nb::none(), nb::arg("film") = "rays",
+      nb::arg("_store").none() = nb::none(),
       nb::sig(
           "def gradient(scene: Scene, names: str | collections.abc.Sequence[str], spp: int | None "
           "= None, seed: int | None = None, method: str = '', terms: "
           "collections.abc.Sequence[str] = (), samples: str | collections.abc.Sequence[float] = "
           "'auto', step: float = 0, aux: int = 8, kappa: float = 1e4, seconds: float = 0, threads: "
           "int = 0, progress: "
-          "collections.abc.Callable[[float], object] | None = None) -> dict[str, Estimate]"),
+          "collections.abc.Callable[[float], object] | None = None, film: str = 'rays') -> "
+          "dict[str, Estimate]"),
       "Derivative images, (H, W, 3) radiance per unit of each parameter, all from the same "
       "samples.\n\n"
       "names: of numbers; a vertex is \"object.vertex_positions.7.x\", a field of vectors "
@@ -102,6 +107,9 @@ void bind_gradient(nb::module_& m) {
       "pixel holds of each term. step: of finite differences; 0: found by a pilot.\n"
       "aux, kappa: auxiliary rays of a direction and the concentration of their kernel (methods "
       "was, was-unbiased).\n"
+      "film: \"rays\", or \"exact\": edges on the film are drawn from what is seen of them alone "
+      "(box "
+      "filter).\n"
       "Raises limn.UnknownParameterError (a KeyError), limn.InputError, limn.NonFiniteError.");
   m.def(
       "methods",

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "limn/core/error.h"
+#include "limn/core/names.h"
 #include "tools/python/bindings.h"
 
 namespace limn::python {
@@ -14,6 +15,13 @@ Estimate to_estimate(const Moments& moments, const Film& film, int64_t spp, doub
           spp,
           seconds,
           {}};
+}
+
+bool is_exact(const std::string& film) {
+  if (film != "rays" && film != "exact") {
+    throw InputError(unknown_name("film", film, {"exact", "rays"}));
+  }
+  return film == "exact";
 }
 
 namespace {
@@ -27,11 +35,12 @@ nb::object to_numpy(const Estimate& e, const nb::object& dtype, const nb::object
 
 Estimate render_scene(const SceneHandle& handle, std::optional<int> spp,
                       std::optional<uint64_t> seed, int threads, const nb::object& progress,
-                      BatchStore* store) {
+                      const std::string& method, const std::string& film, BatchStore* store) {
+  const RenderOptions options{method, is_exact(film)};
   const auto scene = handle.share();
   RenderResult result;
   run_job(make_settings(*scene, {spp, seed, 0, threads, store}), progress,
-          [&](const RunSettings& settings) { result = render(*scene, settings); });
+          [&](const RunSettings& settings) { result = render(*scene, settings, options); });
   Estimate image = to_estimate(result.radiance, scene->film, result.spp, result.seconds);
   check_finite(result.non_finite, nb::cast(image));
   return image;
@@ -119,14 +128,17 @@ void bind_render(nb::module_& m) {
   m.def(
       "render", render_scene, nb::arg("scene"), nb::arg("spp") = nb::none(),
       nb::arg("seed") = nb::none(), nb::arg("threads") = 0, nb::arg("progress") = nb::none(),
-      nb::arg("_store").none() = nb::none(),
+      nb::arg("method") = "path", nb::arg("film") = "rays", nb::arg("_store").none() = nb::none(),
       nb::sig("def render(scene: Scene, spp: int | None = None, seed: int | None = None, threads: "
-              "int = 0, progress: collections.abc.Callable[[float], object] | None = None) -> "
-              "Estimate"),
+              "int = 0, progress: collections.abc.Callable[[float], object] | None = None, method: "
+              "str = 'path', film: str = 'rays') -> Estimate"),
       "The image of a scene: linear RGB radiance, (H, W, 3).\n\n"
       "spp, seed: of the scene's file if None. threads: 0 for all cores; they change no bit.\n"
       "progress: called with the fraction done. Ctrl-C raises KeyboardInterrupt; samples that are "
-      "not finite raise limn.NonFiniteError.");
+      "not finite raise limn.NonFiniteError.\n"
+      "method: \"path\", or \"analytic\": direct light of flat lamps on diffuse surfaces in closed "
+      "form. film: \"rays\", or \"exact\": what every pixel sees by its exact visible regions (box "
+      "filter).");
 }
 
 }  // namespace limn::python

@@ -44,6 +44,12 @@ def implausible(summary, threshold):
     return bias is not None and bias.number("p") is not None and bias.number("p") < threshold
 
 
+def errors(summary):
+    """Cells of the squared error, of the same relative to the image, and of most pixels."""
+    names = ("mse", "relative_mse", "trimmed_mse")
+    return [with_error(summary.number(n), summary.number(f"{n}_stderr")) for n in names]
+
+
 class ComparisonSection:
     """group: prefix of ids in the page. threshold: a bias' p below it is implausible, see page.py.
     """
@@ -243,9 +249,7 @@ class ComparisonSection:
                     figures(s.number("setup_seconds")),
                     count(s.number("spp")),
                     count(s.number("rays")),
-                    with_error(s.number("mse"), s.number("mse_stderr")),
-                    with_error(s.number("relative_mse"), s.number("relative_mse_stderr")),
-                    with_error(s.number("trimmed_mse"), s.number("trimmed_mse_stderr")),
+                    *errors(s),
                     self._bias(s),
                     self._terms(s),
                     f"{count(s.number('peak_memory_bytes'))}B",
@@ -312,9 +316,7 @@ class ComparisonSection:
                 figures(s.number("time")),
                 figures(s.number("seconds")),
                 count(s.number("spp")),
-                with_error(s.number("mse"), s.number("mse_stderr")),
-                with_error(s.number("relative_mse"), s.number("relative_mse_stderr")),
-                with_error(s.number("trimmed_mse"), s.number("trimmed_mse_stderr")),
+                *errors(s),
             ]
             for m in self.methods
             if finished(m)

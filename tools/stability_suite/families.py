@@ -165,7 +165,8 @@ def contact(gap):
     "which the jumps at its two sides do not cancel. Finite differences do not see the gap.",
 )
 def hair_gaps(gap):
-    plain = table(meshes.block((0, 0, 0.5), (0.5, 0.25, 0.25)), parameter="sensor.translate.x")
+    plain = table(meshes.block((0, 0, 0.5), (0.5, 0.25, 0.25)), parameter="sensor.translate.x",
+                  eye=(0.4, -3.5, 2.5))
     half = 0.25 - gap / 4
     left = meshes.block((-0.5 + half, 0, 0.5), (half, 0.25, 0.25))
     right = meshes.block((0.5 - half, 0, 0.5), (half, 0.25, 0.25))

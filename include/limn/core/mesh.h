@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "limn/core/bounds.h"
@@ -68,6 +69,21 @@ struct Mesh {
   const FaceIndices& face(FaceId id) const { return faces[id.index()]; }
   Vec3<Dual> position(VertexId id) const;
 };
+
+// Corners of a face as the scalar P.
+template <class P>
+std::array<Vec3<P>, 3> face_corners(const Mesh& mesh, FaceId face) {
+  std::array<Vec3<P>, 3> corners;
+  for (int k = 0; k < 3; ++k) {
+    const VertexId vertex(mesh.face(face)[k]);
+    if constexpr (std::is_same_v<P, double>) {
+      corners[k] = cast<double>(mesh.positions[vertex.index()]);
+    } else {
+      corners[k] = mesh.position(vertex);
+    }
+  }
+  return corners;
+}
 
 // Fills `weld` from the positions: vertices at bitwise equal coordinates (with -0 = 0) share the
 // smallest index.

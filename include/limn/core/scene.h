@@ -55,6 +55,7 @@ struct Scene {
   // Of the file, as they were read: use_sensor() makes one of them the scene's, at first that in
   // front.
   std::vector<Sensor> sensors;
+  size_t sensor = 0;  // the one that is the scene's
   ShadingModel shading = ShadingModel::kContinuous;
 
   std::vector<Shape> shapes;
@@ -89,6 +90,8 @@ Scene read_scene_text(const std::string& text, const std::string& folder,
 void use_sensor(Scene& scene, const std::string& name);
 // Their numbers and ids, as in: 0, 1 or "side".
 std::string sensor_names(const Scene& scene);
+// Of the scene's own: its id, or its number where it has none.
+std::string sensor_name(const Scene& scene);
 
 // How many sensors a file has. InputError where it is no scene as far as that is looked at: no mesh
 // or image is read.

@@ -26,21 +26,6 @@ struct SurfacePoint {
   }
 };
 
-// Corners of a face as the scalar P.
-template <class P>
-std::array<Vec3<P>, 3> face_corners(const Mesh& mesh, FaceId face) {
-  std::array<Vec3<P>, 3> corners;
-  for (int k = 0; k < 3; ++k) {
-    const VertexId vertex(mesh.face(face)[k]);
-    if constexpr (std::is_same_v<P, double>) {
-      corners[k] = cast<double>(mesh.positions[vertex.index()]);
-    } else {
-      corners[k] = mesh.position(vertex);
-    }
-  }
-  return corners;
-}
-
 namespace detail {
 
 template <class S>

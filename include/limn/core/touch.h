@@ -1,7 +1,20 @@
 #pragma once
 // What the rounding of positions explains.
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+#include "limn/core/vec.h"
 
 namespace limn {
+
+// The largest coordinate of points, without its sign.
+inline double largest_coordinate(std::span<const Vec3d> points) {
+  double largest = 0;
+  for (const Vec3d& x : points)
+    largest = std::max({largest, std::fabs(x.x), std::fabs(x.y), std::fabs(x.z)});
+  return largest;
+}
 
 // For points on two faces whose largest coordinates are these: a position is taken to have been
 // rounded to float twice, in a file and after its transform. sqrt(3) * 2 * 2^-24 for each of two

@@ -175,6 +175,15 @@ double distance_error(const EdgeMesh& mesh, const Vec3d& p);
 // one_sided_closed. Border, irregular, crossing: always. Flat: as smooth.
 bool is_candidate(const EdgeMesh& mesh, EdgeId edge, const Vec3d& p);
 
+// On which sides of a face's plane a point counts as lying: on both within the rounding of its
+// distance.
+struct Facing {
+  bool front, back;
+};
+Facing facing(const EdgeMesh& mesh, FaceId face, const Vec3d& p);
+// is_candidate of an edge with two faces, from where these are turned like that.
+bool is_candidate(const EdgeMesh& mesh, EdgeId edge, Facing first, Facing second);
+
 // Whether the edge is in E(p) and its faces may leave one side of it free, so that what lies behind
 // it is seen there: silhouettes of all classes, borders, irregular edges. It is E(p) without sharp
 // edges that have a face on either side as seen from p, and without those that their own mesh

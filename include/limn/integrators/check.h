@@ -77,9 +77,13 @@ struct CheckResult {
   std::vector<CheckPower> power;             // all terms together, then each
   double needed_spp = 0;                     // to see kCheckWanted of all that is not negligible
   std::optional<Confirmation> confirmation;  // if p < kCheckStageLevel
-  std::vector<Suspicion> suspicions;         // of each term of the gradient, if they disagree
-  std::string suspect;                       // the term with the largest |z| of these; ""
-  GradientResult gradient;                   // of the last run
+  // What would disagree is no more than half of what the image's slopes before and after the
+  // parameter's value differ by, and they do: shapes that touch and part, a face edge-on to a
+  // light. The gradient is that of one side, and the verdict kCannotTell.
+  bool bends = false;
+  std::vector<Suspicion> suspicions;  // of each term of the gradient, if they disagree
+  std::string suspect;                // the term with the largest |z| of these; ""
+  GradientResult gradient;            // of the last run
   DifferenceResult differences;
 };
 
@@ -88,7 +92,8 @@ using GradientRun =
     std::function<GradientResult(const Scene&, const GradientOptions&, const RunSettings&)>;
 
 // Differences use other seeds than the gradient, so that both are independent, and so does the
-// second run, which takes twice the samples at half the step: a step's bias would shrink there.
+// second run, which takes twice the samples at half the step: a step's bias would shrink there. Only
+// what still disagrees, and where the image does not bend, is accused.
 CheckResult check(const Scene& scene, const CheckOptions& options, const RunSettings& settings,
                   const GradientRun& run = gradient);
 

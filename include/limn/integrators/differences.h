@@ -13,7 +13,6 @@ struct DifferenceEstimate {
   Moments total;      // crop_height by crop_width by 3, per unit of the parameter
   Moments blocks;     // one value per square block of pixels: the sum over its pixels and channels
   Moments image_sum;  // one value: the sum over all pixels and channels
-  Events events;      // single samples that see the other side of a moving edge
   void add_batch(const std::vector<double>& sums, const Film& film, int block, int samples);
 };
 

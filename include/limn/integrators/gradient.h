@@ -77,7 +77,6 @@ struct ParameterGradient {
   Moments total_blocks;
   std::vector<Moments> term_blocks;
   Moments image_sum;  // one value: the sum over all pixels and channels
-  Events events;      // of all terms that sample edges together
 };
 
 // One term of a run.

@@ -34,14 +34,11 @@ struct BlockSums {
   std::vector<double> sums;
   std::vector<double> variances;  // of the sums; empty if unknown
   double degrees = 0;             // of freedom behind the variances
-  // Mean size of an event (moments.h) over the number of samples per pixel; 0 if unknown. If the
-  // method is right, edges that add m to a block's mean do so with a variance of about m times
-  // this, even where no event has come.
+  // Mean size of the events that edges make (rare samples of great value) over the number of
+  // samples per pixel; 0 if unknown. If the method is right, edges that add m to a block's mean do
+  // so with a variance of about m times this, even where no event has come.
   double event = 0;
 };
-
-// The sums of one run.
-BlockSums block_sums(const Moments& blocks, const Events& events);
 
 // z-scores of the blocks: mean over the repeats minus the reference, over the standard error of
 // both. Student's t, turned into normal scores, with the fewer degrees of freedom of the two: a few

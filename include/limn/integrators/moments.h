@@ -43,23 +43,6 @@ class Moments {
   int64_t samples_ = 0;
 };
 
-// The part of a derivative that edges make is a sum of rare events, few samples of great value: in
-// places where none has come yet, batches show no variance. But all places together show how large
-// an event is.
-class Events {
- public:
-  // sums: of a batch, H by W by 3; with one sample per pixel every pixel shows at most one event.
-  void add_batch(const std::vector<double>& sums);
-  // Over the pixels' sums x of all batches and channels; 0 if there was none. If all events are of
-  // this kind, a mean of m (per sample) comes with a variance of |m| times mean_size.
-  double mean_size() const { return sizes_ > 0 ? squares_ / sizes_ : 0; }  // sum x^2 / sum |x|
-  // The size that makes up most of the variance: sum |x|^3 / sum x^2.
-  double large_size() const { return squares_ > 0 ? cubes_ / squares_ : 0; }
-
- private:
-  double cubes_ = 0, squares_ = 0, sizes_ = 0;
-};
-
 // Means and variances of every value; variances are NaN with fewer than two batches.
 std::vector<double> means(const Moments& moments);
 std::vector<double> variances(const Moments& moments);

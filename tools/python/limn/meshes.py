@@ -29,11 +29,21 @@ def write_ply(
         raise InputError(f"faces name vertices {corners.min()} to {corners.max()} of {len(points)}")
     rows = np.empty(len(corners), dtype=[("count", "u1"), ("corners", "<u4", 3)])
     rows["count"], rows["corners"] = 3, corners
-    with open(file, "wb") as stream:
-        stream.write(
-            f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n"
-            "property float x\nproperty float y\nproperty float z\n"
-            f"element face {len(rows)}\nproperty list uchar uint vertex_indices\n"
-            "end_header\n".encode()
-        )
-        stream.write(points.tobytes() + rows.tobytes())
+    # Under another name first: nobody reads half a file.
+    unfinished = f"{os.fspath(file)}.{os.getpid()}.tmp"
+    try:
+        with open(unfinished, "wb") as stream:
+            stream.write(_header(len(points), len(rows)) + points.tobytes() + rows.tobytes())
+        os.replace(unfinished, file)
+    finally:
+        if os.path.exists(unfinished):
+            os.remove(unfinished)
+
+
+def _header(vertices: int, faces: int) -> bytes:
+    return (
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {vertices}\n"
+        "property float x\nproperty float y\nproperty float z\n"
+        f"element face {faces}\nproperty list uchar uint vertex_indices\n"
+        "end_header\n"
+    ).encode()

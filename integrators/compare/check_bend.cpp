@@ -1,0 +1,59 @@
+// Slopes of the image on both sides of a parameter's value.
+#include "integrators/compare/check_bend.h"
+
+#include <cmath>
+
+#include "limn/core/parameter.h"
+#include "limn/integrators/differences.h"
+#include "limn/integrators/statistics.h"
+
+namespace limn {
+namespace {
+
+// Adds `factor` times (I(reach) - I(0)) / reach to the batches, with negative reach on the side
+// before: a central difference around half the way. False if the run was interrupted.
+bool add_slope(const Scene& scene, const std::string& name, double reach, double factor, int block,
+               const RunSettings& settings, std::vector<Moments::Batch>& batches) {
+  const DifferenceJob job{name, {0.5 * std::fabs(reach)}, {{1}}};
+  const CentralDifferences run = central_differences(
+      find_parameter(scene, name).moved(scene, 0.5 * reach), {job}, block, settings);
+  const auto& more = run.estimates[0][0].blocks.kept();
+  if (run.spp < settings.spp || (!batches.empty() && batches.size() != more.size())) return false;
+  if (batches.empty()) {
+    batches = more;
+    for (Moments::Batch& batch : batches) batch.sums.assign(batch.sums.size(), 0.0);
+  }
+  for (size_t b = 0; b < batches.size(); ++b)
+    for (size_t i = 0; i < batches[b].sums.size(); ++i)
+      batches[b].sums[i] += factor * more[b].sums[i];
+  return true;
+}
+
+}  // namespace
+
+std::optional<Score> find_bend(const Scene& scene, const std::string& name, double step,
+                               const Windows& windows, const std::vector<double>& weights,
+                               const RunSettings& settings) {
+  // With X(r) the slope over the way r after the value minus that over r before it, X is K + c r
+  // for small r where the image bends by K, and 2 X(r) - X(2 r) = K. All from the same samples.
+  std::vector<Moments::Batch> batches;
+  for (const auto& [reach, factor] : {std::pair{step, 2.0}, {2 * step, -1.0}})
+    for (const double side : {1.0, -1.0})
+      if (!add_slope(scene, name, side * reach, side * factor, windows.fine(), settings, batches))
+        return std::nullopt;
+  const std::vector<double> of_blocks = windows.spread(weights);
+  Moments moments(1);
+  for (const Moments::Batch& batch : batches) {
+    double sum = 0;
+    for (size_t i = 0; i < of_blocks.size(); ++i) sum += of_blocks[i] * batch.sums[i];
+    moments.add_batch({sum}, batch.samples);
+  }
+  if (moments.batches() < 2) return std::nullopt;
+  Score bend;
+  bend.value = moments.mean(0);
+  bend.error = std::sqrt(moments.variance(0));
+  if (bend.value != 0) bend.z = normal_from_student(bend.value / bend.error, moments.batches() - 1);
+  return bend;
+}
+
+}  // namespace limn

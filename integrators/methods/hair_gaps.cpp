@@ -1,0 +1,177 @@
+// Gaps between shapes, from a tree over the boxes of their faces.
+#include "integrators/methods/hair_gaps.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <map>
+#include <optional>
+
+#include "limn/core/box_tree.h"
+#include "limn/core/face_copies.h"
+#include "limn/core/parallel.h"
+#include "limn/core/touch.h"
+
+namespace limn {
+namespace {
+
+using Corners = std::array<Vec3d, 3>;
+
+// Of an edge, what runs along a face at least. Not tuned.
+constexpr double kLeastPart = 1.0 / 16;
+// Faces with a longest side below this many widths of such a gap are passed over: their gap is no
+// longer than wide. Not tuned.
+constexpr double kLeastSide = 16;
+
+struct Gap {
+  double width;  // scene units
+  double pixels;
+};
+
+class GapFinder {
+ public:
+  GapFinder(const Scene& scene, double spp, int threads)
+      : scene_(scene), eye_(value(scene.camera.origin)), spp_(spp) {
+    const Camera& camera = scene.camera;
+    pixel_ = 2 * camera.x_factor * std::tan(value(camera.fov) * M_PI / 360) / camera.width;
+    for (uint32_t s = 0; s < scene.shapes.size(); ++s)
+      for (uint32_t f = 0; f < scene.shapes[s].mesh.faces.size(); ++f)
+        add_face({ShapeId(s), FaceId(f)});
+    find_pairs(threads);
+  }
+  const std::map<std::pair<ShapeId, ShapeId>, Gap>& gaps() const { return gaps_; }
+
+ private:
+  Corners corners_of(FaceRef face) const {
+    const Mesh& mesh = scene_.shape(face.shape).mesh;
+    const FaceIndices& f = mesh.face(face.face);
+    return {cast<double>(mesh.positions[f[0]]), cast<double>(mesh.positions[f[1]]),
+            cast<double>(mesh.positions[f[2]])};
+  }
+  // Of gaps that are met by one sample, with this distance from the camera and this length.
+  double widest(double distance, double length) const {
+    const double pixel = pixel_ * distance;
+    return pixel * pixel / (spp_ * length);
+  }
+  static double size_of(const Corners& c) {
+    double size = 0;
+    for (const Vec3d& x : c)
+      size = std::max({size, std::fabs(x.x), std::fabs(x.y), std::fabs(x.z)});
+    return size;
+  }
+
+  void add_face(FaceRef face) {
+    const Corners c = corners_of(face);
+    double farthest = 0, longest = 0;
+    for (int k = 0; k < 3; ++k) {
+      farthest = std::max(farthest, length(c[k] - eye_));
+      longest = std::max(longest, length(c[(k + 1) % 3] - c[k]));
+    }
+    const double reach = widest(farthest, longest);
+    if (!(longest > kLeastSide * reach) || !std::isfinite(longest)) return;
+    FloatBox& box = boxes_.emplace_back();
+    for (int k = 0; k < 3; ++k) {
+      // Twice: a float's rounding is less than the second half, or the gap is none.
+      box.lower[k] = static_cast<float>(std::min({c[0][k], c[1][k], c[2][k]}) - 2 * reach);
+      box.upper[k] = static_cast<float>(std::max({c[0][k], c[1][k], c[2][k]}) + 2 * reach);
+    }
+    faces_.push_back(face);
+  }
+
+  void find_pairs(int threads) {
+    if (faces_.empty()) return;
+    const BoxTree tree(boxes_, threads);
+    std::vector<uint32_t> leaves;
+    for (uint32_t leaf = 0; leaf < tree.leaf_count(); ++leaf) {
+      tree.find_leaves(tree.leaf_box(leaf), leaf, leaves);
+      for (const uint32_t other : leaves) {
+        for (const uint32_t i : tree.leaf(leaf)) {
+          uint32_t lanes = tree.boxes(other).overlaps(boxes_[i]);
+          for (; lanes != 0; lanes &= lanes - 1) {
+            const uint32_t j = tree.leaf(other)[std::countr_zero(lanes)];
+            if (faces_[i].shape == faces_[j].shape) continue;
+            add_gap(faces_[i], faces_[j]);
+            if (other != leaf) add_gap(faces_[j], faces_[i]);
+          }
+        }
+      }
+    }
+  }
+
+  // Of the edges of a face along the other one.
+  void add_gap(FaceRef of_edges, FaceRef along) {
+    const Corners edges = corners_of(of_edges), face = corners_of(along);
+    const double rounding = touch_tolerance(size_of(edges), size_of(face));
+    for (int k = 0; k < 3; ++k) {
+      const auto gap = gap_along(edges[k], edges[(k + 1) % 3], face, rounding);
+      if (!gap) continue;
+      const std::pair<ShapeId, ShapeId> shapes = std::minmax(of_edges.shape, along.shape);
+      const auto [found, is_new] = gaps_.insert({shapes, *gap});
+      if (!is_new && gap->pixels < found->second.pixels) found->second = *gap;
+    }
+  }
+
+  // Between the segment and the face that lies beside it, in the middle of what they share.
+  std::optional<Gap> gap_along(const Vec3d& a, const Vec3d& b, const Corners& face,
+                               double rounding) const {
+    const Vec3d normal = cross(face[1] - face[0], face[2] - face[0]);
+    const double area = length(normal);
+    if (!(area > 0)) return std::nullopt;
+    const Vec3d n = normal / area;
+    const double reach = widest(std::max(length(a - eye_), length(b - eye_)), length(b - a));
+    double from = 0, to = 1;
+    // What lies where value0 + t (value1 - value0) is at least `least`.
+    const auto clip = [&](double value0, double value1, double least) {
+      const double d0 = value0 - least, d1 = value1 - least;
+      if (d0 < 0 && d1 < 0) to = -1;
+      if (d0 < 0 && d1 >= 0) from = std::max(from, d0 / (d0 - d1));
+      if (d0 >= 0 && d1 < 0) to = std::min(to, d0 / (d0 - d1));
+    };
+    const double height0 = dot(n, a - face[0]), height1 = dot(n, b - face[0]);
+    clip(height0, height1, -reach);
+    clip(-height0, -height1, -reach);
+    for (int k = 0; k < 3; ++k) {
+      const Vec3d side = face[(k + 1) % 3] - face[k];
+      const Vec3d inward = cross(n, side) / length(side);
+      clip(dot(inward, a - face[k]), dot(inward, b - face[k]), -reach);
+    }
+    if (to - from < kLeastPart) return std::nullopt;
+    const double middle = 0.5 * (from + to);
+    const double width = std::fabs(height0 + middle * (height1 - height0));
+    // Where they part from a common corner, some of it is within rounding, and the rest is wider.
+    const double least = std::min(std::fabs(height0 + from * (height1 - height0)),
+                                  std::fabs(height0 + to * (height1 - height0)));
+    if (least <= rounding) return std::nullopt;
+    const double pixels = width / (pixel_ * length(a + middle * (b - a) - eye_));
+    return Gap{width, pixels};
+  }
+
+  const Scene& scene_;
+  Vec3d eye_;
+  double spp_;
+  double pixel_ = 0;  // of the film, at a distance of 1
+  std::vector<FaceRef> faces_;
+  std::vector<FloatBox> boxes_;
+  std::map<std::pair<ShapeId, ShapeId>, Gap> gaps_;
+};
+
+}  // namespace
+
+void warn_of_hair_gaps(const Scene& scene, double spp, int threads,
+                       std::vector<std::string>& warnings) {
+  if (scene.shapes.size() < 2 || !(spp >= 1)) return;
+  const GapFinder finder(scene, spp, threads);
+  for (const auto& [shapes, gap] : finder.gaps()) {
+    warnings.push_back(fmt::format(
+        "{} and {} have a gap of {:.2g} between them, {:.2g} of a pixel, which {:.0f} samples per "
+        "pixel can miss: derivatives there may be off by more than their errors say; close the "
+        "gap, "
+        "or take many more samples",
+        name_in_text(scene, shapes.first), name_in_text(scene, shapes.second), gap.width,
+        gap.pixels, spp));
+  }
+}
+
+}  // namespace limn

@@ -1,0 +1,137 @@
+// Which faces a viewpoint sees edge-on, and from where their edges are looked at instead.
+#include "integrators/terms/viewpoint.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "limn/core/shading.h"
+
+namespace limn {
+namespace {
+
+constexpr double kAside = 0x1p-12;
+constexpr double kNear = 4 * kAside;  // a step aside must not lead through what is so near
+// Roundings of a position to single precision, in its length.
+constexpr double kRounding = 0x1p-22;
+
+using Corners = std::array<Vec3d, 3>;
+
+// Whether a point near the plane with the unit normal n lies on the face, or nearly so.
+bool touches(const Corners& corners, const Vec3d& n, const Vec3d& p) {
+  for (int k = 0; k < 3; ++k) {
+    const Vec3d side = corners[(k + 1) % 3] - corners[k];
+    const Vec3d to = p - corners[k];
+    if (dot(cross(side, to), n) < -kNear * length(side) * length(to)) return false;
+  }
+  return true;
+}
+
+// The direction that leads to the front of planes that touch the viewpoint, behind most of the
+// others, and at a good angle from all of them; the normals are unit. Of 128 all around; not tuned.
+Vec3d direction_behind(const std::vector<Vec3d>& planes, const std::vector<Vec3d>& touching) {
+  constexpr int kCount = 128;
+  const double least = 0.05;
+  Vec3d best{};
+  double best_score = -1;
+  for (int i = 0; i < kCount; ++i) {
+    const double z = (2 * i + 1.0) / kCount - 1, phi = i * kPi * (3 - std::sqrt(5.0));
+    const double r = std::sqrt(1 - z * z);
+    const Vec3d u{r * std::cos(phi), r * std::sin(phi), z};
+    double score = 0;
+    for (const Vec3d& n : planes) {
+      const double s = -dot(n, u);
+      score += std::min(std::fabs(s), 0.25) * (s > 0 ? 2 : 1);
+    }
+    for (const Vec3d& n : touching) {
+      if (dot(n, u) < least) score *= 1e-3;
+    }
+    if (score <= best_score) continue;
+    best_score = score;
+    best = u;
+  }
+  return best;
+}
+
+// Each direction once, to a hundredth.
+void add_direction(std::vector<Vec3d>& directions, const Vec3d& n) {
+  const auto is_like = [&](const Vec3d& other) { return dot(other, n) > 1 - 0.5e-4; };
+  if (std::none_of(directions.begin(), directions.end(), is_like)) directions.push_back(n);
+}
+
+}  // namespace
+
+Viewpoint::Viewpoint(const Scene& scene, const LightOrigin& origin)
+    : origin_{{origin.v.x.v, origin.v.y.v, origin.v.z.v}, origin.infinite},
+      edge_on_(scene.shapes.size()) {
+  const Vec3d v = value(origin.v);
+  std::vector<Vec3d> planes, touching;
+  for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+    const Mesh& mesh = scene.shapes[s].mesh;
+    for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+      const Corners corners = face_corners<double>(mesh, FaceId(f));
+      const Vec3d across = cross(corners[1] - corners[0], corners[2] - corners[0]);
+      const double area = length(across);
+      const Vec3d w = origin_.through(corners[0]);
+      const double d = std::fabs(dot(across, w)), reach = area * length(w);
+      if (area == 0 || d > kNear * reach) continue;
+      const Vec3d n = across / area;
+      const double rounding = kRounding * (length(v) + length(corners[0]));
+      const bool edge_on = d <= kEdgeOn * reach + (origin.infinite ? 0 : rounding * area);
+      const bool touches_face = !origin.infinite && touches(corners, n, v);
+      if (touches_face) {
+        add_direction(touching, edge_on || dot(n, w) < 0 ? n : -n);
+      } else if (edge_on) {
+        add_direction(planes, n);
+      }
+      if (!edge_on) continue;
+      if (edge_on_[s].empty()) edge_on_[s].resize(mesh.faces.size());
+      edge_on_[s][f] = true;
+      ++edge_on_count_;
+    }
+  }
+  if (edge_on_count_ > 0) aside_ = direction_behind(planes, touching);
+}
+
+bool Viewpoint::sees_edge_on(const FacesAround& around) const {
+  return edge_on_count_ > 0 && std::any_of(around.faces.begin(), around.faces.end(),
+                                           [&](FaceRef face) { return is_edge_on(face); });
+}
+
+LightOrigin Viewpoint::seeing(const FacesAround& around, const Vec3d& y) const {
+  if (!sees_edge_on(around)) return origin_;
+  const Vec3d v = value(origin_.v);
+  const Vec3d moved = v + aside_ * (kAside * (origin_.infinite ? 1 : length(y - v)));
+  return {{moved.x, moved.y, moved.z}, origin_.infinite};
+}
+
+Facing Viewpoint::facing(const EdgeMesh& mesh, FaceId face) const {
+  const Plane& plane = mesh.plane(face);
+  if (!is_edge_on({mesh.shape, face})) return limn::facing(mesh, face, value(origin_.v));
+  const bool front = dot(plane.n, aside_) > 0;
+  return {front, !front};
+}
+
+bool Viewpoint::is_candidate(const EdgeMesh& mesh, EdgeId id) const {
+  const Edge& edge = mesh.edge(id);
+  if (edge_on_count_ == 0 || !edge.faces[1].valid())
+    return limn::is_candidate(mesh, id, value(origin_.v));
+  return limn::is_candidate(mesh, id, facing(mesh, edge.faces[0]), facing(mesh, edge.faces[1]));
+}
+
+void warn_of_faces_edge_on(const Scene& scene, std::vector<std::string>& warnings) {
+  const auto look = [&](const std::string& what, const LightOrigin& origin) {
+    const size_t count = Viewpoint(scene, origin).edge_on();
+    if (count == 0) return;
+    warnings.push_back(
+        fmt::format("{} lies in the plane of {} face{}: there the derivative has a kink, and is "
+                    "that of the side "
+                    "from which such a face is not seen; differences take the mean of both sides",
+                    what, count, count == 1 ? "" : "s"));
+  };
+  look("the camera", {scene.camera.origin});
+  for (const auto& light : scene.delta_lights) look(light->describe(), light->origin());
+}
+
+}  // namespace limn

@@ -1,0 +1,52 @@
+#pragma once
+// A place from which edges are listed once, the camera's pinhole or a delta light, and the faces
+// that are seen edge-on from there.
+#include <vector>
+
+#include "limn/core/light.h"
+#include "limn/core/scene.h"
+#include "limn/edgetree/edges.h"
+
+namespace limn {
+
+// The sine of the angle at which a face counts as seen edge-on: within it rays in floats may not
+// tell its borders apart.
+inline constexpr double kEdgeOn = 0x1p-18;
+
+// Both borders of a face in whose plane the viewpoint lies are one line, and which of them is seen
+// no ray can tell: a step aside shows one of them, or the face between them. So there the image has
+// a kink. Edges of such faces are looked at from a little aside, the same way for all, if it can be
+// on that side where the faces are seen from behind, so that their own bodies hide them. What comes
+// of it is the derivative as it is on that side: where the edges are and how fast they move is as
+// seen from the viewpoint itself.
+class Viewpoint {
+ public:
+  Viewpoint(const Scene& scene, const LightOrigin& origin);
+
+  // How many faces are seen edge-on.
+  size_t edge_on() const { return edge_on_count_; }
+  bool sees_edge_on(const FacesAround& around) const;
+  // The viewpoint, or, if a face around the edge is seen edge-on, that aside of it: by 2^-12 of the
+  // distance of y, a point of the edge; at infinity by 2^-12 rad.
+  LightOrigin seeing(const FacesAround& around, const Vec3d& y) const;
+  // limn::is_candidate, of a viewpoint that is not at infinity; faces seen edge-on are turned as
+  // they are from aside.
+  bool is_candidate(const EdgeMesh& mesh, EdgeId edge) const;
+
+ private:
+  bool is_edge_on(FaceRef face) const {
+    return edge_on_count_ > 0 && face.shape.valid() && !edge_on_[face.shape.index()].empty() &&
+           edge_on_[face.shape.index()][face.face.index()];
+  }
+  Facing facing(const EdgeMesh& mesh, FaceId face) const;
+
+  LightOrigin origin_;
+  Vec3d aside_{};                           // unit; zero if no face is seen edge-on
+  std::vector<std::vector<bool>> edge_on_;  // by shape: of each face; empty if none of them is
+  size_t edge_on_count_ = 0;
+};
+
+// One for the camera and one for each delta light that see faces edge-on.
+void warn_of_faces_edge_on(const Scene& scene, std::vector<std::string>& warnings);
+
+}  // namespace limn
