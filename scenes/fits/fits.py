@@ -116,6 +116,7 @@ def mirrors(fits):
         # As much time as the others: its draws cost less.
         ("edges of li2019", ["--spp", "7", *remesh[2:], "--seed", "1", "--sampler", "li2019"]),
         ("no boundary", [*remesh, "--seed", "1", "--terms", TERMS]),
+        ("small start", [*remesh, "--seed", "1", "-D", "radius=0.15"]),
     ]
     truth = os.path.join(fits.generated, "creature.ply")
     return shape_rows(

@@ -9,6 +9,8 @@ Imports torch, which `import limn` does not.
 
 from __future__ import annotations
 
+import atexit
+import weakref
 from collections.abc import Mapping
 from typing import Any
 
@@ -19,6 +21,23 @@ from . import Scene, backward as _backward, render as _render
 from .errors import InputError
 
 __all__ = ["render"]
+
+
+# PyTorch never frees the graphs that are alive when Python ends. Scenes are taken out of them
+# before, or nanobind would tell of a leak.
+class _Held:
+    def __init__(self, scene: Scene) -> None:
+        self.scene: Scene | None = scene
+        _all_held.add(self)
+
+
+_all_held: weakref.WeakSet[_Held] = weakref.WeakSet()
+
+
+@atexit.register
+def _let_go() -> None:
+    for held in list(_all_held):
+        held.scene = None
 
 
 class _Render(torch.autograd.Function):
@@ -36,14 +55,15 @@ class _Render(torch.autograd.Function):
         scene = scene.copy()
         for name, tensor in zip(names, tensors):
             scene[name] = tensor.detach().cpu().numpy()
-        ctx.run = scene, names, spp_grad, 2 * seed + 1, threads
+        ctx.run = _Held(scene), names, spp_grad, 2 * seed + 1, threads
         ctx.save_for_backward(*tensors)
         return torch.from_numpy(_render(scene, spp, 2 * seed, threads).value)
 
     @staticmethod
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, adjoint: Any) -> tuple[Any, ...]:
-        scene, names, spp, seed, threads = ctx.run
+        held, names, spp, seed, threads = ctx.run
+        scene = held.scene
         wanted = [n for n, need in zip(names, ctx.needs_input_grad[6:]) if need]
         found = (
             _backward(scene, adjoint.cpu().numpy(), wanted, spp=spp, seed=seed, threads=threads)
