@@ -2,6 +2,7 @@
 #include "edgetree/forest/forest_motion.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <bit>
 #include <cfloat>
 #include <cmath>
@@ -20,7 +21,7 @@ double squares_of(const Vec3<Lanes>& v) {
 }
 
 // The linear part: of the least squares the smallest, since flat and straight objects say nothing
-// of what lies beside them.
+// of what lies beside them; they are thicker than nothing by the rounding of positions alone.
 void fit_linear(const EdgeMesh& mesh, const Lanes& lane_scale, ObjectMotion& motion) {
   Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
   Eigen::Matrix<double, 3, 3 * kLanes> products = Eigen::Matrix<double, 3, 3 * kLanes>::Zero();
@@ -32,8 +33,14 @@ void fit_linear(const EdgeMesh& mesh, const Lanes& lane_scale, ObjectMotion& mot
     for (int k = 0; k < 3; ++k)
       for (int i = 0; i < kLanes; ++i) products.col(kLanes * k + i) += x * u[k][i];
   }
+  // Thin is what roundings of 2^-24 of the farthest position may explain, four times over.
+  const double rounding = 0x1p-22 * mesh.extent;
+  Eigen::CompleteOrthogonalDecomposition<Eigen::Matrix3d> decomposition;
+  const double explained = static_cast<double>(mesh.positions.size()) * rounding * rounding;
+  if (!(squares.trace() > explained)) return;
+  decomposition.setThreshold(std::max(explained / squares.trace(), 1e-12));
   const Eigen::Matrix<double, 3, 3 * kLanes> linear =
-      squares.completeOrthogonalDecomposition().solve(products);
+      decomposition.compute(squares).solve(products);
   for (int column = 0; column < 3; ++column)
     for (int k = 0; k < 3; ++k)
       for (int i = 0; i < kLanes; ++i) motion.linear[column][k][i] = linear(column, kLanes * k + i);
@@ -89,14 +96,14 @@ SeenMotion::SeenMotion(const ObjectMotion& object, const ViewerMotion& viewer) {
   for (int column = 0; column < 3; ++column)
     linear[column] = object.linear[column] * viewer.inverse_unit - viewer.linear[column];
   for (int i = 0; i < kLanes; ++i) {
-    double squares = 0, largest = 0;
+    double columns2[3] = {0, 0, 0}, largest = 0;
     for (int k = 0; k < 3; ++k) {
       // Both, since it is they that are rounded.
       largest += std::fabs(viewer.velocity[k][i]) + std::fabs(there[k][i]);
-      for (const Vec3<Lanes>& column : linear) squares += column[k][i] * column[k][i];
+      for (int column = 0; column < 3; ++column)
+        columns2[column] += linear[column][k][i] * linear[column][k][i];
     }
-    const double stretch = std::sqrt(squares);
-    largest += stretch;
+    largest += std::sqrt(columns2[0] + columns2[1] + columns2[2]);
     if (!(largest >= FLT_MIN)) continue;
     // The power of two below it.
     const double size =
@@ -104,8 +111,8 @@ SeenMotion::SeenMotion(const ObjectMotion& object, const ViewerMotion& viewer) {
     const double inverse = 1 / size;
     Lane& lane = lanes[count++];
     lane.size = static_cast<float>(size);
-    lane.stretch = static_cast<float>(stretch * inverse);
     for (int k = 0; k < 3; ++k) {
+      lane.column2[k] = static_cast<float>(columns2[k] * inverse * inverse);
       lane.at_p[k] = static_cast<float>(at_p[k][i] * inverse);
       for (int column = 0; column < 3; ++column)
         lane.linear[k][column] = static_cast<float>(linear[column][k][i] * inverse);

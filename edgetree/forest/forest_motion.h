@@ -47,7 +47,7 @@ struct SeenMotion {
     float size;  // a power of two: the rest is less than 2
     float at_p[3];
     float linear[3][3];  // [row][column]
-    float stretch;       // Frobenius norm of `linear`
+    float column2[3];    // squared lengths of its columns
   };
   int count = 0;
   Lane lanes[kLanes];

@@ -279,17 +279,23 @@ Floats speed_below(const InnerNode& node, const ForestQuery& query, const DualPl
   const SeenMotion& motion = query.motion_of(node.head.object);
   const float unit = query.unit / node.head.inverse_radius;
   const bool silhouettes = node.head.group == ForestGroup::kSilhouette;
-  const Normals normals(node, plane);
-  const Floats half2 = dot(half, half), inverse_d2 = 1 / max(dot(d, d), half2);
+  std::optional<Normals> normals;
+  if (silhouettes) normals.emplace(node, plane);
+  const Floats3 half_squares{half.x * half.x, half.y * half.y, half.z * half.z};
+  const Floats half2 = half_squares.x + half_squares.y + half_squares.z;
+  const Floats inverse_d2 = 1 / max(dot(d, d), half2);
   Floats sum = node.speed;
   for (int i = 0; i < motion.count; ++i) {
     const SeenMotion::Lane& lane = motion.lanes[i];
     const Floats3 v = velocity_at(lane, d, unit);
     const Floats v2 = dot(v, v), towards = dot(v, d);
     const Floats side2 = v2 - towards * towards * inverse_d2;
-    const float stretch = lane.stretch * unit;
-    const Floats within2 = (stretch * stretch / 3) * half2;
-    const Floats across2 = silhouettes ? normals.along2(v, side2) : side2 * kAnyNormal;
+    // Mean square over the box of what the map adds to the velocity in its middle.
+    const float third = unit * unit / 3;
+    const Floats within2 = half_squares.x * (lane.column2[0] * third) +
+                           half_squares.y * (lane.column2[1] * third) +
+                           half_squares.z * (lane.column2[2] * third);
+    const Floats across2 = normals ? normals->along2(v, side2) : side2 * kAnyNormal;
     const Floats speed2 = query.any_direction ? v2 : max(across2, v2 * (kSlowest * kSlowest));
     sum += (sqrt(speed2 + within2) + kMotionRounding) * lane.size;
   }

@@ -28,7 +28,8 @@ void add_edge_point(const AdjointContext& context, const AdjointVertex& vertex,
   const EdgeMesh& mesh = context.edges.object(sample.edge.object);
   EdgeView view;
   const bool seen = view_edge(mesh, sample.edge, sample.t, query.p, view);
-  const bool moves = context.motion.moves(sample.edge) || !is_still(vertex.surface.p);
+  const bool moves =
+      share > 0 && (context.motion.moves(sample.edge) || !is_still(vertex.surface.p));
   const Rgb<double> f =
       seen && moves && sample.pdf_t > 0 ? vertex.scattering.eval_value(view.omega) : Rgb<double>{};
   if (is_black(f)) {

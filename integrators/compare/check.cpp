@@ -294,19 +294,23 @@ class Checker {
     result.confirmation = {spp, step, same_side ? half : 1 - half};
     if (std::isnan(z)) result.confirmation->p = 0;
     if (result.confirmation->p >= kCheckStageLevel) return true;
-    result.bends = explained_by_bend(windows, probe, score, step, spp);
+    const auto bends = explained_by_bend(windows, probe, score, step, spp);
+    if (!bends) return false;
+    result.bends = *bends;
     if (!result.bends) suspect_terms(residual, runs, result);
     return true;
   }
 
   // Whether the image bends in the place of the probe, and by so much that half of it, by which a
-  // slope of one side is off the mean of both, explains what the score found.
-  bool explained_by_bend(const Windows& windows, const Probe& probe, const Score& score,
-                         double step, int64_t spp) const {
+  // slope of one side is off the mean of both, explains what the score found. None if the run was
+  // interrupted.
+  std::optional<bool> explained_by_bend(const Windows& windows, const Probe& probe,
+                                        const Score& score, double step, int64_t spp) const {
     RunSettings settings = settings_of(spp, 1, 2);
     settings.progress = nullptr;
     const auto bend = find_bend(scene_, options_.parameter, step, windows, probe[0], settings);
-    if (!bend || normal_p_value(bend->z) >= kCheckStageLevel) return false;
+    if (!bend) return std::nullopt;
+    if (normal_p_value(bend->z) >= kCheckStageLevel) return false;
     const double excess = std::fabs(score.value) - 0.5 * std::fabs(bend->value);
     const double error = std::hypot(score.error, 0.5 * bend->error);
     return normal_p_value(std::max(0.0, excess / error)) >= kCheckStageLevel;

@@ -167,8 +167,7 @@ void warn_of_hair_gaps(const Scene& scene, double spp, int threads,
     warnings.push_back(fmt::format(
         "{} and {} have a gap of {:.2g} between them, {:.2g} of a pixel, which {:.0f} samples per "
         "pixel can miss: derivatives there may be off by more than their errors say; close the "
-        "gap, "
-        "or take many more samples",
+        "gap, or take many more samples",
         name_in_text(scene, shapes.first), name_in_text(scene, shapes.second), gap.width,
         gap.pixels, spp));
   }

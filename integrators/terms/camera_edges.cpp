@@ -256,8 +256,9 @@ bool CameraEdges::jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& 
   }
   const Camera& camera = context_.scene.camera;
   const EdgeMesh& mesh = input_.object(edge.id.object);
-  const Vec3d x = mesh.position(mesh.edge(edge.id.edge).vertices[0]);
-  const Vec3d p = value(viewpoint_.seeing(mesh.around(edge.id.edge), x).v);
+  const auto& ends = mesh.edge(edge.id.edge).vertices;
+  const Vec3d y = mesh.position(ends[0]) * (1 - t) + mesh.position(ends[1]) * t;
+  const Vec3d p = value(viewpoint_.seeing(mesh.around(edge.id.edge), y).v);
   EdgeView view;
   if (!view_edge(mesh, edge.id, t, p, view)) return false;
   const double cosine = dot(view.omega, value(camera.forward));

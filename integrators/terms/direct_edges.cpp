@@ -80,7 +80,7 @@ void DirectEdges::draw_others(const std::vector<DirectPieces::Piece>& pieces, Rn
   for (int j = 0; j < points; ++j) {
     const double target = (j + offset) / points * total;
     while (i + 1 < pieces.size() && pieces[i].sum <= target) ++i;
-    // What is read of its edge comes in while the points before are met.
+    // What is read of its edge comes in while the others are drawn.
     const EdgeRef edge = pieces[i].piece.edge;
     edges_.object(edge.object).fetch_ends(edge.edge);
     const double before = i == 0 ? 0 : pieces[i - 1].sum, weight = pieces[i].sum - before;

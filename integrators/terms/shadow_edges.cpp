@@ -165,6 +165,7 @@ Rgb<double> ShadowEdges::jump(const ShadowEdge& edge, const ShadowPoint& point, 
   const Scattering<double> scattering(surface, -omega, scene.shading);
   const auto arrival = edge.light->arriving(point.x);
   if (scattering.black() || !arrival) return {};
+  if (std::fabs(dot(surface.n_g, arrival->wo)) <= kEdgeOn) return {};
   return scattering.eval(arrival->wo) * arrival->irradiance * edge.sign;
 }
 

@@ -5,18 +5,31 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "limn/core/face_copies.h"
 #include "limn/core/shading.h"
 
 namespace limn {
 namespace {
 
-constexpr double kAside = 0x1p-12;
+constexpr double kAside = 0x1p-12;    // not tuned
 constexpr double kNear = 4 * kAside;  // a step aside must not lead through what is so near
-// Roundings of a position to single precision, in its length.
-constexpr double kRounding = 0x1p-22;
+// Two roundings of a position to single precision, in its length.
+constexpr double kRounding = 0x1p-23;
 
 using Corners = std::array<Vec3d, 3>;
+
+// From p to the nearest point of the triangle's sides.
+double distance_to_sides(const Corners& corners, const Vec3d& p) {
+  double least = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < 3; ++k) {
+    const Vec3d side = corners[(k + 1) % 3] - corners[k], to = p - corners[k];
+    const double t = std::clamp(dot(to, side) / dot(side, side), 0.0, 1.0);
+    least = std::min(least, length(to - side * t));
+  }
+  return least;
+}
 
 // Whether a point near the plane with the unit normal n lies on the face, or nearly so.
 bool touches(const Corners& corners, const Vec3d& n, const Vec3d& p) {
@@ -44,6 +57,7 @@ Vec3d direction_behind(const std::vector<Vec3d>& planes, const std::vector<Vec3d
       const double s = -dot(n, u);
       score += std::min(std::fabs(s), 0.25) * (s > 0 ? 2 : 1);
     }
+    for (const Vec3d& n : touching) score += std::min(std::max(dot(n, u), 0.0), 0.25) * 2;
     for (const Vec3d& n : touching) {
       if (dot(n, u) < least) score *= 1e-3;
     }
@@ -66,6 +80,11 @@ Viewpoint::Viewpoint(const Scene& scene, const LightOrigin& origin)
     : origin_{{origin.v.x.v, origin.v.y.v, origin.v.z.v}, origin.infinite},
       edge_on_(scene.shapes.size()) {
   const Vec3d v = value(origin.v);
+  const auto farthest = [&](const Corners& corners) {
+    double most = 0;
+    for (const Vec3d& corner : corners) most = std::max(most, length(origin_.through(corner)));
+    return most;
+  };
   std::vector<Vec3d> planes, touching;
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     const Mesh& mesh = scene.shapes[s].mesh;
@@ -73,19 +92,21 @@ Viewpoint::Viewpoint(const Scene& scene, const LightOrigin& origin)
       const Corners corners = face_corners<double>(mesh, FaceId(f));
       const Vec3d across = cross(corners[1] - corners[0], corners[2] - corners[0]);
       const double area = length(across);
-      const Vec3d w = origin_.through(corners[0]);
-      const double d = std::fabs(dot(across, w)), reach = area * length(w);
-      if (area == 0 || d > kNear * reach) continue;
-      const Vec3d n = across / area;
-      const double rounding = kRounding * (length(v) + length(corners[0]));
-      const bool edge_on = d <= kEdgeOn * reach + (origin.infinite ? 0 : rounding * area);
+      if (area == 0) continue;
+      const Vec3d n = across / area, w = origin_.through(corners[0]);
+      const double d = std::fabs(dot(n, w));
+      if (d > kNear * farthest(corners)) continue;
       const bool touches_face = !origin.infinite && touches(corners, n, v);
+      const double rounding = kRounding * (length(v) + length(corners[0]));
+      const double near = origin.infinite ? 1 : distance_to_sides(corners, v);
+      const bool edge_on = d <= kEdgeOn * near + (origin.infinite ? 0 : rounding);
       if (touches_face) {
         add_direction(touching, edge_on || dot(n, w) < 0 ? n : -n);
       } else if (edge_on) {
         add_direction(planes, n);
       }
       if (!edge_on) continue;
+      if (edge_on_count_ == 0) first_ = ShapeId(s);
       if (edge_on_[s].empty()) edge_on_[s].resize(mesh.faces.size());
       edge_on_[s][f] = true;
       ++edge_on_count_;
@@ -102,7 +123,8 @@ bool Viewpoint::sees_edge_on(const FacesAround& around) const {
 LightOrigin Viewpoint::seeing(const FacesAround& around, const Vec3d& y) const {
   if (!sees_edge_on(around)) return origin_;
   const Vec3d v = value(origin_.v);
-  const Vec3d moved = v + aside_ * (kAside * (origin_.infinite ? 1 : length(y - v)));
+  // Light from infinity travels along v: it comes from the other side.
+  const Vec3d moved = v + aside_ * (kAside * (origin_.infinite ? -1 : length(y - v)));
   return {{moved.x, moved.y, moved.z}, origin_.infinite};
 }
 
@@ -122,13 +144,13 @@ bool Viewpoint::is_candidate(const EdgeMesh& mesh, EdgeId id) const {
 
 void warn_of_faces_edge_on(const Scene& scene, std::vector<std::string>& warnings) {
   const auto look = [&](const std::string& what, const LightOrigin& origin) {
-    const size_t count = Viewpoint(scene, origin).edge_on();
-    if (count == 0) return;
-    warnings.push_back(
-        fmt::format("{} lies in the plane of {} face{}: there the derivative has a kink, and is "
-                    "that of the side "
-                    "from which such a face is not seen; differences take the mean of both sides",
-                    what, count, count == 1 ? "" : "s"));
+    const Viewpoint viewpoint(scene, origin);
+    if (viewpoint.edge_on() == 0) return;
+    warnings.push_back(fmt::format(
+        "{} lies in the plane of faces ({} of them, the first of {}): there the derivative has a "
+        "kink, and is that of the side from which such a face is not seen; differences take the "
+        "mean of both sides; a little off the plane there is no kink",
+        what, viewpoint.edge_on(), name_in_text(scene, viewpoint.first())));
   };
   look("the camera", {scene.camera.origin});
   for (const auto& light : scene.delta_lights) look(light->describe(), light->origin());

@@ -25,6 +25,8 @@ class Viewpoint {
 
   // How many faces are seen edge-on.
   size_t edge_on() const { return edge_on_count_; }
+  // Whose faces are; there must be one.
+  ShapeId first() const { return first_; }
   bool sees_edge_on(const FacesAround& around) const;
   // The viewpoint, or, if a face around the edge is seen edge-on, that aside of it: by 2^-12 of the
   // distance of y, a point of the edge; at infinity by 2^-12 rad.
@@ -44,6 +46,7 @@ class Viewpoint {
   Vec3d aside_{};                           // unit; zero if no face is seen edge-on
   std::vector<std::vector<bool>> edge_on_;  // by shape: of each face; empty if none of them is
   size_t edge_on_count_ = 0;
+  ShapeId first_;  // whose face is the first of them
 };
 
 // One for the camera and one for each delta light that see faces edge-on.

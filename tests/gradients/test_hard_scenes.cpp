@@ -437,13 +437,33 @@ std::vector<EdgeOn> edge_on_cases() {
     return scene_of(files, 3, 2,
                     box(files, diffuse("clay", "0.5, 0.5, 0.5")) + bulb({0.5 - beside, 2.5, 0.2}));
   };
+  // Turning, this sun lights the upright face or not, and its shadow ends at its upper edge or at its
+  // lower one.
+  const auto wedge = [](const TempFiles& files, double beside) {
+    const Mesh mesh = make_mesh(
+        {{-.5f, 0, .5f},
+         {.5f, 0, .5f},
+         {.5f, 1, .5f},
+         {-.5f, 0, -.5f},
+         {.5f, 0, -.5f},
+         {.5f, 1, -.5f}},
+        {{0, 1, 2}, {3, 5, 4}, {0, 3, 4}, {0, 4, 1}, {1, 4, 5}, {1, 5, 2}, {0, 2, 5}, {0, 5, 3}});
+    std::string light = sun({beside, -1, 0.3});
+    light.insert(light.find('>'), " id=\"sun\"");
+    return scene_of(files, 3, 2,
+                    obj_shape("wedge", write_mesh(files, "wedge.obj", mesh), true, 1, {0, 0.3, 0},
+                              diffuse("clay", "0.5, 0.5, 0.5")) +
+                        square("floor", 3, -90, {0, 0, 0}, diffuse("chalk", "0.8, 0.8, 0.8")) +
+                        light);
+  };
   return {{"Camera", "sensor.translate.x", glowing_box},
           {"CameraAndBox", "box.translate.x", glowing_box},
           {"CameraAndPlates", "sensor.translate.x", plates},
           {"SunAlong", "box.translate.x", under_sun},
           {"SunAcross", "box.translate.z", under_sun},
           {"Bulb", "box.translate.x", under_bulb},
-          {"BulbAtSide", "box.translate.x", lit_side}};
+          {"BulbAtSide", "box.translate.x", lit_side},
+          {"SunTurns", "sun.rotate.z", wedge}};
 }
 
 class FacesEdgeOn : public testing::TestWithParam<EdgeOn> {};
@@ -475,10 +495,13 @@ TEST(FacesEdgeOnWarning, NamesTheViewpoint) {
   EXPECT_TRUE(warnings(0.3, {0.1, -1, 0.2}).empty());
   const auto found = warnings(0.5, {0, -1, 0});
   ASSERT_EQ(found.size(), 2u);
-  EXPECT_NE(found[0].find("the camera lies in the plane of 2 faces"), std::string::npos)
+  EXPECT_NE(
+      found[0].find("the camera lies in the plane of faces (2 of them, the first of \"box\")"),
+      std::string::npos)
       << found[0];
-  EXPECT_NE(found[1].find("directional along (0, -1, 0), irradiance 2 2 2 lies in the plane of 8"),
-            std::string::npos)
+  EXPECT_NE(
+      found[1].find("directional along (0, -1, 0), irradiance 2 2 2 lies in the plane of faces (8"),
+      std::string::npos)
       << found[1];
 }
 

@@ -135,13 +135,10 @@ void bind_backward(nb::module_& m) {
       "Values are float64: (V, 3) of an array, (3,) of a colour, () of a number, of the loss per "
       "unit of the parameter. "
       "Copies of a vertex have equal shares. Pixels are sampled in proportion to the adjoint "
-      "unless "
-      "uniform_pixels. edge_samples: at every vertex of a path; camera_samples: points on "
-      "silhouettes "
-      "of the film, for each path. sampler: of edges, \"forest\", or to compare with it "
-      "\"quadric\", "
-      "\"li2019\", \"uniform\", \"brute\". batches: at most, for standard errors. The rest as "
-      "limn.gradient.");
+      "unless uniform_pixels. edge_samples: at every vertex of a path; camera_samples: points on "
+      "the film, for each path. sampler: of edges, \"forest\"; \"silhouettes\", which is better "
+      "where shadows are soft; or to compare with them \"quadric\", \"li2019\", \"uniform\", "
+      "\"brute\". batches: at most, for standard errors. The rest as limn.gradient.");
 }
 
 }  // namespace limn::python

@@ -30,8 +30,8 @@ struct BackwardOptions {
   // in proportion to |A|, summed over channels.
   bool uniform_pixels = false;
   std::string sampler = "forest";  // of edges: a row of edge_sampler_types()
-  int edge_samples = 1;       // at every vertex of a path, of the boundary and shadow terms each
-  double camera_samples = 1;  // points on silhouettes of the film, per path
+  int edge_samples = 1;            // at every vertex of a path, of each term of edges
+  double camera_samples = 1;       // points on the film, per path, of each term that has some there
   int batches = 16;           // at most, for standard errors; each ends with the adjoint of normals
   bool keep_batches = false;  // Moments::kept of every parameter
 };

@@ -92,8 +92,8 @@ using GradientRun =
     std::function<GradientResult(const Scene&, const GradientOptions&, const RunSettings&)>;
 
 // Differences use other seeds than the gradient, so that both are independent, and so does the
-// second run, which takes twice the samples at half the step: a step's bias would shrink there. Only
-// what still disagrees, and where the image does not bend, is accused.
+// second run, which takes twice the samples at half the step: a step's bias would shrink there.
+// Only what still disagrees, and where the image does not bend, is accused.
 CheckResult check(const Scene& scene, const CheckOptions& options, const RunSettings& settings,
                   const GradientRun& run = gradient);
 
