@@ -476,7 +476,7 @@ TEST_P(FacesEdgeOn, AreNotThere) {
         .parameters[0]
         .image_sum;
   };
-  const Moments at = sum_at(0), beside = sum_at(3e-3);
+  const Moments at = sum_at(0), beside = sum_at(2e-4);
   fmt::print("{} +- {}, beside {} +- {}\n", at.mean(0), std::sqrt(at.variance(0)), beside.mean(0),
              std::sqrt(beside.variance(0)));
   EXPECT_TRUE(compare_moments(at, beside).plausible(kLevel));
