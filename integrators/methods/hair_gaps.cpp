@@ -11,7 +11,6 @@
 
 #include "limn/core/box_tree.h"
 #include "limn/core/face_copies.h"
-#include "limn/core/parallel.h"
 #include "limn/core/touch.h"
 
 namespace limn {
@@ -45,23 +44,13 @@ class GapFinder {
 
  private:
   Corners corners_of(FaceRef face) const {
-    const Mesh& mesh = scene_.shape(face.shape).mesh;
-    const FaceIndices& f = mesh.face(face.face);
-    return {cast<double>(mesh.positions[f[0]]), cast<double>(mesh.positions[f[1]]),
-            cast<double>(mesh.positions[f[2]])};
+    return face_corners<double>(scene_.shape(face.shape).mesh, face.face);
   }
   // Of gaps that are met by one sample, with this distance from the camera and this length.
   double widest(double distance, double length) const {
     const double pixel = pixel_ * distance;
     return pixel * pixel / (spp_ * length);
   }
-  static double size_of(const Corners& c) {
-    double size = 0;
-    for (const Vec3d& x : c)
-      size = std::max({size, std::fabs(x.x), std::fabs(x.y), std::fabs(x.z)});
-    return size;
-  }
-
   void add_face(FaceRef face) {
     const Corners c = corners_of(face);
     double farthest = 0, longest = 0;
@@ -103,7 +92,7 @@ class GapFinder {
   // Of the edges of a face along the other one.
   void add_gap(FaceRef of_edges, FaceRef along) {
     const Corners edges = corners_of(of_edges), face = corners_of(along);
-    const double rounding = touch_tolerance(size_of(edges), size_of(face));
+    const double rounding = touch_tolerance(largest_coordinate(edges), largest_coordinate(face));
     for (int k = 0; k < 3; ++k) {
       const auto gap = gap_along(edges[k], edges[(k + 1) % 3], face, rounding);
       if (!gap) continue;
@@ -140,10 +129,12 @@ class GapFinder {
     if (to - from < kLeastPart) return std::nullopt;
     const double middle = 0.5 * (from + to);
     const double width = std::fabs(height0 + middle * (height1 - height0));
-    // Where they part from a common corner, some of it is within rounding, and the rest is wider.
-    const double least = std::min(std::fabs(height0 + from * (height1 - height0)),
-                                  std::fabs(height0 + to * (height1 - height0)));
-    if (least <= rounding) return std::nullopt;
+    // Where they part from a common corner, some of it is within rounding, and the rest is wider;
+    // where one passes through the other there is none.
+    const double first = height0 + from * (height1 - height0);
+    const double last = height0 + to * (height1 - height0);
+    if (first * last <= 0 || std::min(std::fabs(first), std::fabs(last)) <= rounding)
+      return std::nullopt;
     const double pixels = width / (pixel_ * length(a + middle * (b - a) - eye_));
     return Gap{width, pixels};
   }
@@ -163,13 +154,20 @@ void warn_of_hair_gaps(const Scene& scene, double spp, int threads,
                        std::vector<std::string>& warnings) {
   if (scene.shapes.size() < 2 || !(spp >= 1)) return;
   const GapFinder finder(scene, spp, threads);
+  constexpr size_t kMost = 8;
+  size_t told = 0;
   for (const auto& [shapes, gap] : finder.gaps()) {
+    if (++told > kMost) break;
     warnings.push_back(fmt::format(
         "{} and {} have a gap of {:.2g} between them, {:.2g} of a pixel, which {:.0f} samples per "
         "pixel can miss: derivatives there may be off by more than their errors say; close the "
         "gap, or take many more samples",
         name_in_text(scene, shapes.first), name_in_text(scene, shapes.second), gap.width,
         gap.pixels, spp));
+  }
+  if (finder.gaps().size() > kMost) {
+    warnings.push_back(
+        fmt::format("{} more pairs of shapes have such gaps", finder.gaps().size() - kMost));
   }
 }
 
