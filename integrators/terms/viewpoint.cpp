@@ -106,7 +106,8 @@ Viewpoint::Viewpoint(const Scene& scene, const LightOrigin& origin)
         add_direction(planes, n);
       }
       if (!edge_on) continue;
-      if (edge_on_count_ == 0) first_ = ShapeId(s);
+      if (mesh.normal_source == NormalSource::kFace && flat_faces_++ == 0)
+        first_shape_ = ShapeId(s);
       if (edge_on_[s].empty()) edge_on_[s].resize(mesh.faces.size());
       edge_on_[s][f] = true;
       ++edge_on_count_;
@@ -145,12 +146,12 @@ bool Viewpoint::is_candidate(const EdgeMesh& mesh, EdgeId id) const {
 void warn_of_faces_edge_on(const Scene& scene, std::vector<std::string>& warnings) {
   const auto look = [&](const std::string& what, const LightOrigin& origin) {
     const Viewpoint viewpoint(scene, origin);
-    if (viewpoint.edge_on() == 0) return;
+    if (viewpoint.flat_faces() == 0) return;
     warnings.push_back(fmt::format(
         "{} lies in the plane of faces ({} of them, the first of {}): there the derivative has a "
         "kink, and is that of the side from which such a face is not seen; differences take the "
         "mean of both sides; a little off the plane there is no kink",
-        what, viewpoint.edge_on(), name_in_text(scene, viewpoint.first())));
+        what, viewpoint.flat_faces(), name_in_text(scene, viewpoint.first_shape())));
   };
   look("the camera", {scene.camera.origin});
   for (const auto& light : scene.delta_lights) look(light->describe(), light->origin());

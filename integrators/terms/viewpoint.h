@@ -23,10 +23,11 @@ class Viewpoint {
  public:
   Viewpoint(const Scene& scene, const LightOrigin& origin);
 
-  // How many faces are seen edge-on.
-  size_t edge_on() const { return edge_on_count_; }
-  // Whose faces are; there must be one.
-  ShapeId first() const { return first_; }
+  // How many flat-shaded faces are seen edge-on, and whose is the first of them. (In the plane of
+  // some face of a finely tessellated smooth surface a viewpoint lies by chance, and the kink is as
+  // small as the face.)
+  size_t flat_faces() const { return flat_faces_; }
+  ShapeId first_shape() const { return first_shape_; }
   bool sees_edge_on(const FacesAround& around) const;
   // The viewpoint, or, if a face around the edge is seen edge-on, that aside of it: by 2^-12 of the
   // distance of y, a point of the edge; at infinity by 2^-12 rad.
@@ -45,11 +46,11 @@ class Viewpoint {
   LightOrigin origin_;
   Vec3d aside_{};                           // unit; zero if no face is seen edge-on
   std::vector<std::vector<bool>> edge_on_;  // by shape: of each face; empty if none of them is
-  size_t edge_on_count_ = 0;
-  ShapeId first_;  // whose face is the first of them
+  size_t edge_on_count_ = 0, flat_faces_ = 0;
+  ShapeId first_shape_;
 };
 
-// One for the camera and one for each delta light that see faces edge-on.
+// One for the camera and one for each delta light that see flat-shaded faces edge-on.
 void warn_of_faces_edge_on(const Scene& scene, std::vector<std::string>& warnings);
 
 }  // namespace limn
