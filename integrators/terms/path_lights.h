@@ -72,14 +72,20 @@ inline void PathTracer<S, Visitor>::weigh_light(Walk& walk) const {
 }
 
 // No ray meets a delta light by chance, so it has the whole weight. Its direction follows the
-// parameters, and f_s with it. A face that it sees edge-on is dark, as its edges have it: rounding
-// would tell which half of the face begins to be lit as the scene moves.
+// parameters, and f_s with it. A face that it sees edge-on stays as dark as it is, as its edges have
+// it: rounding would tell which half of the face begins to be lit as the scene moves.
 template <class S, class Visitor>
 inline void PathTracer<S, Visitor>::draw_delta(Walk& walk, const DeltaLight& delta) const {
   const auto arriving = limn::arrival<S>(delta, walk.surface.p);
-  if (arriving && std::fabs(dot(walk.surface.n_g, value(arriving->wo))) > kEdgeOn) {
+  if (arriving) {
     const Rgb<S> f = walk.scattering->eval(arriving->wo);
     walk.light_share = f * arriving->irradiance * (1 / walk.light->pdf);
+    if constexpr (!std::is_same_v<S, double>) {
+      if (std::fabs(dot(walk.surface.n_g, value(arriving->wo))) <= kEdgeOn) {
+        const Rgb<double> held = value(walk.light_share);
+        walk.light_share = {S(held.r), S(held.g), S(held.b)};
+      }
+    }
     if (!is_black(value(f))) return;
   }
   walk.light.reset();
