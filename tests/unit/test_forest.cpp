@@ -491,6 +491,36 @@ TEST(Forest, WeighsMotionAcrossTheLineOfSight) {
   EXPECT_GT(gain.z_score(0), 5);
 }
 
+// Two flat rings, as mirror images; one is stretched across its plane, where it is a thousandth as
+// thick as wide, and moves by at most 0.4 of the speed of the other. Weights count at least a tenth
+// of the other's motion (kSlowest), so the first gets at most 4 draws for each of the other's; it
+// would get hundreds if the stretch counted along the whole ring.
+TEST(Forest, WeighsThinObjectsByWhatTheyMove) {
+  constexpr float kThin = 1e-3f;
+  EdgeSamplerInput input;
+  for (const float side : {-1.0f, 1.0f}) {
+    Mesh ring = torus_mesh(24, 12);
+    for (Vec3f& x : ring.positions) x = {x.x + 2 * side, x.y, x.z * kThin};
+    ring.position_tangents.assign(ring.positions.size(), {});
+    for (size_t v = 0; v < ring.positions.size(); ++v)
+      ring.position_tangents[v].z[0] = side < 0 ? double{ring.positions[v].z} / kThin : 1;
+    input.objects.push_back(build_edge_mesh(ring, true));
+  }
+  const auto forest = EdgeForest::build(input, 1);
+  for (const double height : {0.5, 2.0, 6.0}) {
+    EdgeQuery query;
+    query.p = {0, -height, height};
+    query.n = query.wi = -normalize(query.p);
+    double shares[2] = {0, 0};
+    for (uint32_t o = 0; o < 2; ++o)
+      for (uint32_t e = 0; e < input.objects[o].edges.size(); ++e)
+        shares[o] += forest->probability(query, {ShapeId(o), EdgeId(e)});
+    printf("thin ring %g, other %g\n", shares[0], shares[1]);
+    EXPECT_GT(shares[0], 0);
+    EXPECT_LT(shares[0], 4 * shares[1]);
+  }
+}
+
 double lost_share(const EdgeForest& forest, const EdgeMesh& mesh, const EdgeQuery& query) {
   double sum = 0;
   for (uint32_t e = 0; e < mesh.edges.size(); ++e)
