@@ -44,8 +44,6 @@ class VertexAdjoints {
   void add_penumbras(const AdjointVertex& vertex, const Rng& key);
   void add_penumbra(const AdjointVertex& vertex, const Rng& key);
   // One shadow ray.
-  bool is_hidden_from(const AdjointVertex& vertex, FaceRef face, const Vec3d& omega,
-                      double distance, TermCost& cost) const;
 
   const AdjointContext& context_;
   Rgb<double> adjoint_;
@@ -100,47 +98,13 @@ void VertexAdjoints::add_penumbras(const AdjointVertex& vertex, const Rng& key) 
   costs_[kPenumbra].seconds += watch.seconds();
 }
 
-// As penumbra_boundary.cpp does, for a viewer that is no camera: the vertex before.
 void VertexAdjoints::add_penumbra(const AdjointVertex& vertex, const Rng& key) {
   TermCost& cost = costs_[kPenumbra];
-  ++cost.samples;
-  RayCount rays;
-  Rng rng = key.at(Purpose::kShadow, vertex.bounces);
-  const double u = rng.uniform();
-  auto drawn = context_.regions->lines.draw(u, rng, rays);
-  cost.add(rays);
-  if (!drawn) {
-    ++cost.no_edge;
-    return;
-  }
-  const Vec3d q = value(vertex.surface.p);
-  const Vec3d to = drawn->line.p - q;
-  const double distance = length(to);
-  const bool apart = distance > 0 && drawn->face != vertex.surface.face;
-  const Vec3d omega = apart ? to / distance : Vec3d{};
-  const double pdf = apart ? vertex.scattering.pdf_solid_angle(omega) : 0;
-  const Rgb<double> f = pdf > 0 ? vertex.scattering.eval_value(omega) : Rgb<double>{};
-  const int bounces = vertex.bounces + 1;
-  if (is_black(f) || !context_.regions->lines.complete(*drawn, {q, pdf}, bounces, rng)) {
-    ++cost.zero_weight;
-    return;
-  }
-  if (is_hidden_from(vertex, drawn->face, omega, distance, cost)) {
-    ++cost.occluded;
-    return;
-  }
-  add_penumbra_line(context_, *drawn, vertex.surface.p, {omega.x, omega.y, omega.z},
-                    vertex.weight * f, bounces, key, tape_, seeds_, cost);
-}
-
-bool VertexAdjoints::is_hidden_from(const AdjointVertex& vertex, FaceRef face, const Vec3d& omega,
-                                    double distance, TermCost& cost) const {
-  Ray ray{value(vertex.surface.p), omega};
-  ray.start = vertex.surface.face;
-  ray.end = face;
-  ray.t_max = distance * (1 - 0x1p-20);  // as shadow rays end
-  cost.add(RayCount{0, 1});
-  return context_.path.tracer.occluded(ray);
+  const auto seen = context_.regions->lines.seen_from(vertex, key, cost);
+  if (!seen) return;
+  const auto& [drawn, omega, f] = *seen;
+  add_penumbra_line(context_, drawn, vertex.surface.p, {omega.x, omega.y, omega.z},
+                    vertex.weight * f, vertex.bounces + 1, key, tape_, seeds_, cost);
 }
 
 void VertexAdjoints::add_shadows(const AdjointVertex& vertex, const Rng& key) {
@@ -173,7 +137,7 @@ void VertexAdjoints::add_shadow(const AdjointVertex& vertex, Rng rng) {
     ++cost.zero_weight;
     return;
   }
-  if (is_hidden_from(vertex, point->face, omega, distance, cost)) {
+  if (is_hidden_from(context_.path, vertex, point->face, omega, distance, cost)) {
     ++cost.occluded;
     return;
   }

@@ -91,40 +91,18 @@ bool PenumbraTerm::sample_film(double u, const Rng& key, RayCount& rays, FilmSam
 
 void PenumbraTerm::add_sample(const PathVertex& viewer, const Rng& key, TermCost& cost,
                               Rgb<Lanes>& sum) const {
-  ++cost.samples;
-  RayCount rays;
-  Rng rng = key.at(Purpose::kShadow, viewer.bounces);
-  const double u = rng.uniform();
-  auto drawn = lines_.draw(u, rng, rays);
-  cost.add(rays);
-  if (!drawn) {
-    ++cost.no_edge;
-    return;
-  }
-  const Vec3d q = value(viewer.surface.p);
-  const Vec3d to = drawn->line.p - q;
-  const double distance = length(to);
-  const bool apart = distance > 0 && drawn->face != viewer.surface.face;
-  const Vec3d omega = apart ? to / distance : Vec3d{};
-  const double pdf = apart ? viewer.scattering.pdf_solid_angle(omega) : 0;
-  const Rgb<double> f = pdf > 0 ? viewer.scattering.eval_value(omega) : Rgb<double>{};
-  const int bounces = viewer.bounces + 1;
-  if (is_black(f) || !lines_.complete(*drawn, {q, pdf}, bounces, rng)) {
-    ++cost.zero_weight;
-    return;
-  }
-  if (is_hidden_from(context_, viewer, drawn->face, omega, distance, cost)) {
-    ++cost.occluded;
-    return;
-  }
+  const auto seen = lines_.seen_from(viewer, key, cost);
+  if (!seen) return;
+  const auto& [drawn, omega, f] = *seen;
   if (viewer.log) {
-    viewer.log->push_back(fmt::format(
-        "  penumbra on face {} of shape {}:", drawn->face.face.index(), drawn->face.shape.index()));
+    viewer.log->push_back(fmt::format("  penumbra on face {} of shape {}:", drawn.face.face.index(),
+                                      drawn.face.shape.index()));
   }
   TurnedVertex turned;
-  if (viewer.turned) turned.velocity = sliding(*drawn, q, omega, *viewer.turned);
-  add(*drawn, viewer.surface.p, turning(omega, viewer.turn), viewer.throughput * f, bounces, key,
-      viewer.log, viewer.turned ? &turned : nullptr, cost, sum);
+  if (viewer.turned)
+    turned.velocity = sliding(drawn, value(viewer.surface.p), omega, *viewer.turned);
+  add(drawn, viewer.surface.p, turning(omega, viewer.turn), viewer.throughput * f,
+      viewer.bounces + 1, key, viewer.log, viewer.turned ? &turned : nullptr, cost, sum);
   if (viewer.turned) viewer.turned->sum = viewer.turned->sum + turned.sum;
 }
 

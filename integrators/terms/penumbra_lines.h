@@ -4,6 +4,7 @@
 
 #include "integrators/terms/path.h"
 #include "integrators/terms/penumbra.h"
+#include "integrators/terms/vertex_edges.h"
 
 namespace limn {
 
@@ -11,6 +12,13 @@ struct DrawnLine {
   EdgeSample edge;  // probability: of the edge, times the line's density once that is complete
   FaceRef face;     // that the line meets
   LampLine line;
+};
+
+// The same, complete, and as a vertex of a path sees where it ends.
+struct SeenLine {
+  DrawnLine drawn;
+  Vec3d omega;    // unit, from the vertex
+  Rgb<double> f;  // of the vertex's scattering
 };
 
 class PenumbraLines {
@@ -25,6 +33,38 @@ class PenumbraLines {
   // Completes the density of a drawn line for who sees where it ends (penumbra_share()). False
   // where the line belongs to `direct`; where nearly all does, mostly.
   bool complete(DrawnLine& drawn, const PathStep& step, int bounces, Rng& rng) const;
+
+  // One drawn for a vertex (PathVertex, or that of reverse mode); books what becomes of it. None if
+  // it adds nothing there.
+  template <class Vertex>
+  std::optional<SeenLine> seen_from(const Vertex& vertex, const Rng& key, TermCost& cost) const {
+    ++cost.samples;
+    RayCount rays;
+    Rng rng = key.at(Purpose::kShadow, vertex.bounces);
+    const double u = rng.uniform();
+    auto drawn = draw(u, rng, rays);
+    cost.add(rays);
+    if (!drawn) {
+      ++cost.no_edge;
+      return {};
+    }
+    const Vec3d q = value(vertex.surface.p);
+    const Vec3d to = drawn->line.p - q;
+    const double distance = length(to);
+    const bool apart = distance > 0 && drawn->face != vertex.surface.face;
+    const Vec3d omega = apart ? to / distance : Vec3d{};
+    const double pdf = apart ? vertex.scattering.pdf_solid_angle(omega) : 0;
+    const Rgb<double> f = pdf > 0 ? vertex.scattering.eval_value(omega) : Rgb<double>{};
+    if (is_black(f) || !complete(*drawn, {q, pdf}, vertex.bounces + 1, rng)) {
+      ++cost.zero_weight;
+      return {};
+    }
+    if (is_hidden_from(context_, vertex, drawn->face, omega, distance, cost)) {
+      ++cost.occluded;
+      return {};
+    }
+    return SeenLine{*drawn, omega, f};
+  }
 
  private:
   const PathContext& context_;

@@ -90,14 +90,4 @@ void add_edge_point(const PathContext& context, const EdgeMesh& mesh, const Path
   sum = sum + added;
 }
 
-bool is_hidden_from(const PathContext& context, const PathVertex& vertex, FaceRef face,
-                    const Vec3d& omega, double distance, TermCost& cost) {
-  Ray ray{value(vertex.surface.p), omega};
-  ray.start = vertex.surface.face;
-  ray.end = face;
-  ray.t_max = distance * (1 - 0x1p-20);  // as shadow rays end
-  cost.add(RayCount{0, 1});
-  return context.tracer.occluded(ray);
-}
-
 }  // namespace limn

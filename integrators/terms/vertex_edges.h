@@ -23,7 +23,15 @@ void add_edge_point(const PathContext& context, const EdgeMesh& mesh, const Path
 
 // Whether something hides the face from the vertex in the unit direction omega, at that distance.
 // One shadow ray.
-bool is_hidden_from(const PathContext& context, const PathVertex& vertex, FaceRef face,
-                    const Vec3d& omega, double distance, TermCost& cost);
+template <class Vertex>
+bool is_hidden_from(const PathContext& context, const Vertex& vertex, FaceRef face,
+                    const Vec3d& omega, double distance, TermCost& cost) {
+  Ray ray{value(vertex.surface.p), omega};
+  ray.start = vertex.surface.face;
+  ray.end = face;
+  ray.t_max = distance * (1 - 0x1p-20);  // as shadow rays end
+  cost.add(RayCount{0, 1});
+  return context.tracer.occluded(ray);
+}
 
 }  // namespace limn
