@@ -5,6 +5,7 @@
 
 #include "integrators/estimates/batches.h"
 #include "integrators/methods/radiance_estimator.h"
+#include "integrators/methods/visibility_estimator.h"
 #include "limn/core/error.h"
 #include "limn/core/names.h"
 #include "limn/integrators/parts.h"
@@ -16,6 +17,8 @@ namespace {
 constexpr RenderMethod kMethods[] = {
     {"path", "paths, with light and BSDF samples", false},
     {"analytic", "direct light of flat lamps on diffuse surfaces in closed form", true},
+    {"silhouettes", "direct light and open sky, by lines between silhouettes", false, true},
+    {"rays", "direct light and open sky, by quasi-random rays", false, true},
 };
 
 const RenderMethod& find_render_method(const std::string& name) {
@@ -25,9 +28,21 @@ const RenderMethod& find_render_method(const std::string& name) {
   throw InputError(unknown_name("method", name, names_of(render_methods())));
 }
 
-std::unique_ptr<RadianceEstimator> make_estimator(const Scene& scene, const RunSettings& settings,
-                                                  const RenderOptions& options) {
+std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSettings& settings,
+                                                const RenderOptions& options) {
   const RenderMethod& method = find_render_method(options.method);
+  if (method.looks_around) {
+    if (options.exact_film) {
+      throw InputError(fmt::format("--film exact: not with the method \"{}\"", options.method));
+    }
+    return std::make_unique<VisibilityEstimator>(scene, settings.threads, settings.seed,
+                                                 options.method == kMethods[2].name, options);
+  }
+  if (options.what != RenderWhat::kImage) {
+    throw InputError(fmt::format("the method \"{}\" knows radiance alone: how open the sky is say "
+                                 "silhouettes and rays",
+                                 options.method));
+  }
   std::shared_ptr<const FilmRegions> visible;
   if (options.exact_film) {
     visible = std::make_shared<FilmRegions>(scene, settings.threads, settings.interrupted);
@@ -45,6 +60,9 @@ RenderResult render(const Scene& scene, const RunSettings& settings, const Rende
   if (settings.store) {
     settings.store->identify("method", options.method);
     settings.store->identify("film", options.exact_film ? "exact" : "rays");
+    settings.store->identify(
+        "what", fmt::format("{}, {} lines, {:g}, {} rays", static_cast<int>(options.what),
+                            options.lines, options.tolerance, options.rays));
   }
   std::vector<std::unique_ptr<SampleEstimator>> estimators;
   estimators.push_back(make_estimator(scene, settings, options));

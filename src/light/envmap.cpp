@@ -39,6 +39,10 @@ class MapEnvironment final : public Environment {
   bool is_uniform() const override { return false; }
   double mean_luminance() const override { return map_->mean_luminance() * scale_.v; }
 
+  std::optional<Grid> grid() const override {
+    return Grid{axes_[1], -axes_[2], axes_[0], map_->width(), map_->height()};
+  }
+
   std::vector<ParameterRef> parameters() override { return {{"scale", {&scale_}}}; }
   std::shared_ptr<Environment> clone() const override {
     return std::make_shared<MapEnvironment>(*this);

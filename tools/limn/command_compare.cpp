@@ -10,6 +10,7 @@
 #include "limn/core/parameter.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
+#include "tools/limn/compare_images.h"
 #include "tools/limn/compare_output.h"
 #include "tools/limn/output_files.h"
 #include "tools/limn/report_script.h"
@@ -36,6 +37,9 @@ struct CompareArguments {
   WarpOptions warp;
   std::string output;
   bool report = true;
+  bool images = false;  // not derivatives
+  std::string what = "image";
+  RenderOptions render;
 };
 
 // A way to compare: a row of the table of methods, or Mitsuba, which lives outside.
@@ -261,6 +265,8 @@ class CompareCommand final : public Command {
   int run(const std::string& command_line) override;
 
  private:
+  int run_images(const std::string& command_line);
+
   CommonOptions common_;
   CompareArguments command_;
 };
@@ -268,9 +274,13 @@ class CompareCommand final : public Command {
 void CompareCommand::add_options(CLI::App& app, bool all) {
   add_common_options(app, common_);
   app.remove_option(app.get_option("--sensor"));  // Mitsuba's methods take the first
-  app.add_option("--wrt", command_.parameter, "Parameter to differentiate")
-      ->required()
-      ->type_name("PARAM");
+  auto* wrt = app.add_option("--wrt", command_.parameter, "Parameter to differentiate")
+                  ->type_name("PARAM");
+  app.add_flag("--image", command_.images,
+               "Compare images, not derivatives; methods are those of render: " +
+                   image_method_names())
+      ->excludes(wrt);
+  add_image_options(app, command_.what, command_.render);
   app.add_option("--methods", command_.methods,
                  "Methods to compare, the first is the measure of the others: " + row_names(all) +
                      " (Mitsuba's where it is installed)")
@@ -309,7 +319,28 @@ void CompareCommand::add_options(CLI::App& app, bool all) {
   app.add_flag("!--no-report", command_.report, "Do not make report.html");
 }
 
+int CompareCommand::run_images(const std::string& command_line) {
+  if (common_.spp > 0) {
+    throw InputError("--spp: methods are compared at equal time: say how long with --time");
+  }
+  Warnings warnings;
+  const Scene scene = load_scene(common_, warnings);
+  make_folder(command_.output);
+  check_outputs(
+      {{"-o", (fs::path(command_.output) / "compare.json").string()}, {"--json", common_.json}},
+      scene);
+  return compare_images_command(
+      common_,
+      {command_.methods, command_.what, command_.render, make_options(command_).times,
+       command_.repeats, command_.reference_time, command_.output},
+      scene, make_settings(common_, scene, name()), warnings, command_line);
+}
+
 int CompareCommand::run(const std::string& command_line) {
+  if (command_.images) return run_images(command_line);
+  if (command_.parameter.empty()) {
+    throw InputError("--wrt: say which parameter's derivatives to compare, or --image");
+  }
   check_methods(command_.methods, parse_terms(command_.terms));
   check_warp(command_.warp, command_.methods);
   if (common_.spp > 0) {

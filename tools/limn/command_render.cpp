@@ -3,6 +3,7 @@
 #include "limn/integrators/render.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
+#include "tools/limn/compare_images.h"
 #include "tools/limn/output_files.h"
 #include "tools/limn/run_part.h"
 
@@ -19,6 +20,7 @@ class RenderCommand final : public Command {
         ->required();
     app.add_option("--method", options_.method, "How: " + limn::join(names_of(render_methods())))
         ->capture_default_str();
+    add_image_options(app, what_, options_);
     add_film_option(app, film_);
     add_debug_option(app, debug_);
     add_part_option(app, common_);
@@ -29,8 +31,9 @@ class RenderCommand final : public Command {
   }
 
   int run(const std::string& command_line) override {
-    const Scene scene = load_scene(common_, warnings_);
+    Scene scene = load_scene(common_, warnings_);
     const RunSettings settings = make_settings(common_, scene, name());
+    show(what_, scene, options_);
     options_.exact_film = film_ == "exact";
     if (!debug_.empty()) {
       for (const auto& line : trace_sample(scene, settings, parse_place(debug_), options_)) {
@@ -61,6 +64,7 @@ class RenderCommand final : public Command {
     const std::string picture = with_ending(output_, ".png");
     auto attributes = provenance(scene, settings, result.spp);
     attributes.push_back({"limn.method", options_.method});
+    if (what_ != "image") attributes.push_back({"limn.what", what_});
     attributes.push_back({kOutputAttribute, output_name(output_)});
     remove_stale(output_, {output_});
     write_exr(output_, film_channels(scene, image), scene.film.half, attributes);
@@ -75,6 +79,7 @@ class RenderCommand final : public Command {
                                    {"sensor", sensor_name(scene)},
                                    {"spp", result.spp},
                                    {"method", options_.method},
+                                   {"what", what_},
                                    {"seed", settings.seed},
                                    {"threads", settings.threads},
                                    {"seconds", result.seconds},
@@ -87,7 +92,7 @@ class RenderCommand final : public Command {
   CommonOptions common_;
   Warnings warnings_;
   RenderOptions options_;
-  std::string output_, debug_, film_ = "rays";
+  std::string output_, debug_, film_ = "rays", what_ = "image";
 };
 
 }  // namespace

@@ -39,6 +39,15 @@ class Environment : public Light {
   // Mean over the sphere of the luminance of `radiance`, exact.
   virtual double mean_luminance() const = 0;
 
+  // Radiance that is bilinear between points of a grid over azimuth and polar angle: column i lies
+  // at the azimuth 2 pi (i + 1/2) / columns from `zero` towards `quarter`, row j at the angle pi j /
+  // (rows - 1) from the pole. Unit vectors, across each other.
+  struct Grid {
+    Vec3d pole, zero, quarter;
+    int columns, rows;
+  };
+  virtual std::optional<Grid> grid() const { return std::nullopt; }
+
   virtual std::vector<ParameterRef> parameters() = 0;  // constant: radiance; envmap: scale
   virtual std::shared_ptr<Environment> clone() const = 0;
   virtual std::string describe() const = 0;

@@ -23,9 +23,21 @@ struct RenderMethod {
   const char* name;
   const char* description;
   bool closed_light;  // light that is scattered once, in closed form (analytic)
+  // One vertex that looks around: direct light, and how open its sky is (silhouettes, rays).
+  bool looks_around = false;
 };
 // The first is the default.
 std::span<const RenderMethod> render_methods();
+
+// What an image shows.
+enum class RenderWhat {
+  kImage,  // radiance [W / (m^2 sr)]
+  // Of what the camera sees, the part of the sky that nothing hides, weighed by the cosine to the
+  // shading normal over pi, and unweighed over 2 pi, both over the half sphere above the face; 1
+  // where the camera sees the sky. The same in all channels. By methods that look around alone.
+  kAmbientOcclusion,
+  kOpenness
+};
 
 struct RenderOptions {
   std::string method = "path";  // InputError for others than render_methods()
@@ -33,6 +45,13 @@ struct RenderOptions {
   // (limn/core/visible_regions.h), in place of rays from the camera. InputError unless the film has
   // a box filter.
   bool exact_film = false;
+  RenderWhat what = RenderWhat::kImage;  // InputError where the method does not know it
+  // silhouettes: lines of one pencil, at most 16384. With a tolerance above 0 they are doubled until
+  // two halves differ by at most twice this part of the result; what is left of the error is no
+  // longer without bias.
+  int lines = 16;
+  double tolerance = 0;
+  int rays = 4;  // rays: of each point, and each lamp
 };
 
 RenderResult render(const Scene& scene, const RunSettings& settings,

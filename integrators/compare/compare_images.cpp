@@ -1,0 +1,173 @@
+// A reference from independent runs, and methods in turn against it.
+#include "limn/integrators/compare_images.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "limn/core/error.h"
+#include "limn/core/rng.h"
+
+namespace limn {
+namespace {
+
+constexpr int kReferenceRuns = 8;  // whose differences tell their error; not tuned
+
+double sum_of_squares(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double x : values) sum += x * x;
+  return sum;
+}
+
+// Set-up and one sample of one pixel: InputError if the method does not know the scene.
+void try_method(const Scene& scene, const RunSettings& settings, RenderOptions options,
+                const std::string& method) {
+  options.method = method;
+  RunSettings one = settings;
+  one.progress = nullptr;
+  const NonFinite::Place corner{scene.film.crop_x, scene.film.crop_y, 0, ""};
+  trace_sample(scene, one, corner, options);
+}
+
+class ImageComparer {
+ public:
+  ImageComparer(const Scene& scene, const ImageCompareOptions& options, const RunSettings& settings)
+      : scene_(scene), options_(options), settings_(settings) {
+    for (const std::string& method : options.methods) {
+      try_method(scene, settings, options.render, method);
+    }
+    result_.reference_method = "rays";
+    try {
+      try_method(scene, settings, options.render, "rays");
+    } catch (const InputError&) {
+      result_.reference_method = "path";
+    }
+    double once = 0;
+    for (const double time : options.times) once += time;
+    all_seconds_ = options.reference_seconds +
+                   once * options.repeats * static_cast<double>(options.methods.size());
+  }
+
+  ImageComparison run() {
+    if (make_reference()) {
+      for (const double time : options_.times) compare_at(time);
+      std::stable_sort(result_.rows.begin(), result_.rows.end(),
+                       [&](const ComparedImage& a, const ComparedImage& b) {
+                         return place(a.method) < place(b.method);
+                       });
+    }
+    if (settings_.progress && !stopped()) settings_.progress(1);
+    return std::move(result_);
+  }
+
+ private:
+  bool stopped() const { return settings_.interrupted && settings_.interrupted->load(); }
+  size_t place(const std::string& method) const {
+    return std::find(options_.methods.begin(), options_.methods.end(), method) -
+           options_.methods.begin();
+  }
+
+  RenderResult one(const std::string& method, double seconds, uint64_t number) {
+    RenderOptions options = options_.render;
+    options.method = method;
+    RunSettings settings = settings_;
+    settings.spp = 1 << 30;
+    settings.seconds = seconds;
+    settings.seed = mix_bits(mix_bits(settings_.seed + 0x5eed) + number);
+    if (settings_.progress) {
+      const double from = done_ / all_seconds_, share = seconds / all_seconds_;
+      settings.progress = [this, from, share](double part) {
+        // The bar ends its line at 1.
+        settings_.progress(std::min(from + share * part, 0.9999));
+      };
+    }
+    RenderResult result = render(scene_, settings, options);
+    result_.non_finite.merge(result.non_finite);
+    done_ += seconds;
+    return result;
+  }
+
+  bool make_reference() {
+    std::vector<double> sum, squares;
+    for (int k = 0; k < kReferenceRuns; ++k) {
+      const RenderResult run =
+          one(result_.reference_method, options_.reference_seconds / kReferenceRuns, k);
+      if (stopped()) return false;
+      const std::vector<double> image = means(run.radiance);
+      sum.resize(image.size());
+      squares.resize(image.size());
+      for (size_t i = 0; i < image.size(); ++i) {
+        sum[i] += image[i];
+        squares[i] += image[i] * image[i];
+      }
+      result_.reference_spp += static_cast<int>(run.spp);
+    }
+    double variance = 0;
+    for (size_t i = 0; i < sum.size(); ++i) {
+      sum[i] /= kReferenceRuns;
+      variance += squares[i] / kReferenceRuns - sum[i] * sum[i];
+    }
+    result_.reference = std::move(sum);
+    scale_ = sum_of_squares(result_.reference);
+    if (!(scale_ > 0)) throw InputError({scene_.file}, "its image is black: nothing to compare");
+    result_.reference_squared_error = variance / (kReferenceRuns - 1) / scale_;
+    return true;
+  }
+
+  double squared_error(const std::vector<double>& image) const {
+    double sum = 0;
+    for (size_t i = 0; i < image.size(); ++i) {
+      const double d = image[i] - result_.reference[i];
+      sum += d * d;
+    }
+    return sum / scale_ - result_.reference_squared_error;
+  }
+
+  void compare_at(double time) {
+    std::vector<ComparedImage> rows(options_.methods.size());
+    std::vector<std::vector<double>> errors(rows.size());
+    for (int repeat = 0; repeat < options_.repeats; ++repeat) {
+      for (size_t m = 0; m < rows.size(); ++m) {
+        const RenderResult run = one(options_.methods[m], time, ++number_);
+        if (stopped()) break;
+        rows[m].image = means(run.radiance);
+        rows[m].seconds += run.seconds;
+        rows[m].spp += static_cast<double>(run.spp);
+        errors[m].push_back(squared_error(rows[m].image));
+      }
+      if (stopped()) break;
+    }
+    for (size_t m = 0; m < rows.size(); ++m) {
+      ComparedImage& row = rows[m];
+      const auto count = static_cast<double>(errors[m].size());
+      if (count == 0) continue;
+      row.method = options_.methods[m];
+      row.time = time;
+      row.seconds /= count;
+      row.spp /= count;
+      double squares = 0;
+      for (const double e : errors[m]) row.squared_error += e / count;
+      for (const double e : errors[m]) {
+        squares += (e - row.squared_error) * (e - row.squared_error);
+      }
+      if (count > 1) row.squared_error_stderr = std::sqrt(squares / (count * (count - 1)));
+      result_.rows.push_back(std::move(row));
+    }
+  }
+
+  const Scene& scene_;
+  const ImageCompareOptions& options_;
+  const RunSettings& settings_;
+  ImageComparison result_;
+  double all_seconds_ = 0, done_ = 0, scale_ = 0;
+  uint64_t number_ = 1000;
+};
+
+}  // namespace
+
+ImageComparison compare_images(const Scene& scene, const ImageCompareOptions& options,
+                               const RunSettings& settings) {
+  return ImageComparer(scene, options, settings).run();
+}
+
+}  // namespace limn

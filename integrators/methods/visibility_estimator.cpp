@@ -1,0 +1,232 @@
+// One point of the film and what is seen from there, by lines or by rays.
+#include "integrators/methods/visibility_estimator.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "integrators/terms/camera_path.h"
+#include "limn/core/error.h"
+
+namespace limn {
+namespace {
+
+// Dimensions of a sample's points: on the film; lines' offset, or a ray's two numbers.
+constexpr int kFilm = 0, kOffset = 2, kRay = 2;
+
+void check_rays(const Scene& scene) {
+  if (scene.max_depth != 2) {
+    throw InputError({scene.file},
+                     fmt::format("the method \"rays\": only direct light is sampled: give --what "
+                                 "direct, or set the integrator's max_depth to 2 (it is {})",
+                                 scene.max_depth));
+  }
+  for (const auto& light : scene.delta_lights) {
+    throw InputError({scene.file},
+                     fmt::format("the method \"rays\": emitter{}: only lamps with an area and "
+                                 "environments are sampled: use the method path",
+                                 light->id.empty() ? "" : " \"" + light->id + "\""));
+  }
+}
+
+}  // namespace
+
+VisibilityEstimator::VisibilityEstimator(const Scene& scene, int threads, uint64_t seed,
+                                         bool by_lines, const RenderOptions& options)
+    : scene_(scene),
+      tracer_(make_embree_tracer(scene, threads)),
+      seed_(seed),
+      options_(options),
+      camera_(scene.camera) {
+  const bool direct = options.what == RenderWhat::kImage;
+  if (by_lines) {
+    const LineOptions lines{options.lines, options.tolerance};
+    lines_ = std::make_unique<LineLight>(scene, *tracer_, threads, lines, direct);
+  } else if (direct) {
+    check_rays(scene);
+    add_lamps();
+  }
+}
+
+void VisibilityEstimator::add_lamps() {
+  for (uint32_t s = 0; s < scene_.shapes.size(); ++s) {
+    const Shape& shape = scene_.shapes[s];
+    if (!shape.is_emitter) continue;
+    RayLamp& lamp = lamps_.emplace_back();
+    lamp.shape = ShapeId(s);
+    double sum = 0;
+    for (uint32_t f = 0; f < shape.mesh.faces.size(); ++f) {
+      const auto c = face_corners<double>(shape.mesh, FaceId(f));
+      sum += 0.5 * length(cross(c[1] - c[0], c[2] - c[0]));
+      lamp.areas.push_back(sum);
+    }
+  }
+}
+
+void VisibilityEstimator::add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const {
+  RayCount rays;
+  for (const KeyedSample& one : samples) {
+    Rgb<double> radiance;
+    bool failed = false;
+    try {
+      radiance = sample(one, sink, rays);
+    } catch (const UntraceableRay&) {
+      failed = true;
+    }
+    if (!failed && is_finite(radiance)) {
+      sink.add_radiance(one.at, radiance, 1);
+    } else {
+      sink.reject(one.at, slot_name(0));
+    }
+  }
+  sink.cost(0).add(rays);
+  sink.cost(0).samples += samples.size();
+}
+
+Rgb<double> VisibilityEstimator::sample(const KeyedSample& one, SampleSink& sink,
+                                        RayCount& rays) const {
+  const auto& [at, key] = one;
+  const uint64_t pixel = static_cast<uint64_t>(at.y) << 32 | static_cast<uint32_t>(at.x);
+  const ScrambledSobol points(mix_bits(mix_bits(seed_ + 1) + pixel));
+  FilmPosition film = sample_pixel_filter(scene_.film, at.x, at.y, key);
+  if (scene_.film.filter.kind == Filter::Kind::kBox) {
+    const auto x = scene_.film.range_x(at.x), y = scene_.film.range_y(at.y);
+    film = {at.x + 0.5 + x.lower + (x.upper - x.lower) * points.at(at.s, kFilm),
+            at.y + 0.5 + y.lower + (y.upper - y.lower) * points.at(at.s, kFilm + 1)};
+  }
+  const auto start = camera_.ray(film.x, film.y);
+  const Vec3d origin = start.origin, direction = start.direction;
+  const bool image = options_.what == RenderWhat::kImage;
+  Hit hit;
+  ++rays.closest;
+  if (!tracer_->closest(camera_ray(scene_, start), hit)) {
+    if (!image) return grey(1.0);
+    const bool sky = scene_.environment && !scene_.hide_emitters;
+    return sky ? scene_.environment->radiance(direction) : Rgb<double>{};
+  }
+  const auto surface = surface_on_ray<double>(scene_, hit.face, origin, direction);
+  const Scattering<double> scattering(surface, -direction, scene_.shading);
+  const bool front = dot(surface.n_g, direction) < 0;
+  const Seen seen{surface,
+                  front ? surface.n_g : -surface.n_g,
+                  front ? surface.n_s : -surface.n_s,
+                  scattering,
+                  points,
+                  static_cast<uint64_t>(at.s),
+                  rays};
+  if (sink.log()) {
+    sink.log()->push_back(fmt::format("film {:.6f} {:.6f}: a point at ({:.9g}, {:.9g}, {:.9g})",
+                                      film.x, film.y, surface.p.x, surface.p.y, surface.p.z));
+  }
+  Rgb<double> sum;
+  if (image) {
+    sum = surface.emission(-direction, scene_.shading);
+    if (scattering.black()) return sum;
+  }
+  return sum + (lines_ ? by_lines(seen) : by_rays(seen));
+}
+
+Rgb<double> VisibilityEstimator::by_lines(const Seen& seen) const {
+  const double offset = seen.points.at(seen.sample, kOffset);
+  if (options_.what == RenderWhat::kImage) {
+    return lines_->direct(seen.surface, seen.scattering, offset);
+  }
+  const ContourPoint at = lines_->at(seen.surface, seen.up);
+  return grey(options_.what == RenderWhat::kOpenness
+                  ? lines_->openness(at, offset)
+                  : lines_->ambient_occlusion(at, seen.n, offset));
+}
+
+Rgb<double> VisibilityEstimator::by_rays(const Seen& seen) const {
+  const int count = options_.rays;
+  Rgb<double> sum;
+  for (int k = 0; k < count; ++k) {
+    const uint64_t number = seen.sample * count + k;
+    const double u1 = seen.points.at(number, kRay), u2 = seen.points.at(number, kRay + 1);
+    if (options_.what != RenderWhat::kImage) {
+      sum += sky_ray(seen, u1, u2);
+      continue;
+    }
+    if (scene_.environment) sum += sky_ray(seen, u1, u2);
+    for (size_t i = 0; i < lamps_.size(); ++i) {
+      // Of a lamp of its own: the same points, shifted.
+      const double shift = 0.61803398874989485 * static_cast<double>(i + 1);
+      const double v1 = u1 + shift - std::floor(u1 + shift);
+      sum += lamp_ray(lamps_[i], seen, v1, u2);
+    }
+  }
+  return sum * (1.0 / count);
+}
+
+bool VisibilityEstimator::is_open(const Seen& seen, const Vec3d& direction) const {
+  if (!(dot(seen.up, direction) > 0)) return false;
+  Ray ray{seen.surface.p, direction};
+  ray.start = seen.surface.face;
+  ++seen.rays.shadow;
+  return !tracer_->occluded(ray);
+}
+
+// Uniform over the half sphere for openness, by the cosine for the rest, but for maps, by which
+// they go themselves.
+Rgb<double> VisibilityEstimator::sky_ray(const Seen& seen, double u1, double u2) const {
+  const double phi = 2 * kPi * u2;
+  const auto around = [&](const Vec3d& n, double z) {
+    const double r = std::sqrt(std::fmax(0.0, 1 - z * z));
+    return Frame(n).to_world({r * std::cos(phi), r * std::sin(phi), z});
+  };
+  if (options_.what == RenderWhat::kOpenness) {
+    return grey(is_open(seen, around(seen.up, u1)) ? 1.0 : 0.0);
+  }
+  if (options_.what == RenderWhat::kAmbientOcclusion) {
+    return grey(is_open(seen, around(seen.n, std::sqrt(u1))) ? 1.0 : 0.0);
+  }
+  const Environment& sky = *scene_.environment;
+  Vec3d direction;
+  double pdf;
+  if (sky.is_uniform()) {
+    const double z = std::sqrt(u1);
+    direction = around(seen.scattering.normal(), z);
+    pdf = z / kPi;
+  } else {
+    const auto drawn = sky.sample_direction(u1, u2);
+    direction = drawn.direction;
+    pdf = drawn.pdf;
+  }
+  if (!(pdf > 0)) return {};
+  const Rgb<double> f = seen.scattering.eval(direction);
+  if (is_black(f) || !is_open(seen, direction)) return {};
+  return f * sky.radiance(direction) * (1 / pdf);
+}
+
+// Uniform over the lamp's area.
+Rgb<double> VisibilityEstimator::lamp_ray(const RayLamp& lamp, const Seen& seen, double u1,
+                                          double u2) const {
+  const Shape& shape = scene_.shape(lamp.shape);
+  const double total = lamp.areas.back(), place = u1 * total;
+  const auto above = std::upper_bound(lamp.areas.begin(), lamp.areas.end() - 1, place);
+  const auto index = static_cast<uint32_t>(above - lamp.areas.begin());
+  const double first = index > 0 ? lamp.areas[index - 1] : 0;
+  const double u = (place - first) / (lamp.areas[index] - first);
+  const FaceId face(index);
+  const auto c = face_corners<double>(shape.mesh, face);
+  const double root = std::sqrt(u);
+  const Vec3d y = c[0] + (c[1] - c[0]) * (1 - root) + (c[2] - c[0]) * (root * u2);
+  const Vec3d to = y - seen.surface.p;
+  const double distance = length(to);
+  if (distance == 0) return {};
+  const Vec3d direction = to / distance;
+  const double cosine = -dot(normalize(cross(c[1] - c[0], c[2] - c[0])), direction);
+  if (!(cosine > 0) || !(dot(seen.up, direction) > 0)) return {};
+  const Rgb<double> f = seen.scattering.eval(direction);
+  if (is_black(f)) return {};
+  Ray ray{seen.surface.p, direction};
+  ray.start = seen.surface.face;
+  ray.end = {lamp.shape, face};
+  ray.t_max = distance * (1 - 0x1p-20);
+  ++seen.rays.shadow;
+  if (tracer_->occluded(ray)) return {};
+  return f * value(shape.radiance) * (cosine * total / (distance * distance));
+}
+
+}  // namespace limn

@@ -1,0 +1,81 @@
+#pragma once
+// Visibility along lines: half great circles from a pole, cut where contours cross them.
+//
+//   w(theta) = pole cos theta + r sin theta,   r of unit length, across the pole,
+//
+// at N azimuths. On each of them W (contours.h) starts as it is at the pole and changes by a known
+// number at every crossing; the sky is open where it is zero. Places on a line are told by
+// cot theta = (pole . w) / (r . w), which falls from infinity to -infinity and needs no root.
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "integrators/terms/contours.h"
+
+namespace limn {
+
+// The pole, and how azimuths are spread: psi in [0, 1) turns stands for the direction of
+// u su cos psi + v sv sin psi, so that lines are dense where a long region of directions ends far
+// from the pole. Unit vectors, right-handed: u x v = pole.
+struct Pencil {
+  Vec3d pole, u, v;
+  double su = 1, sv = 1;
+};
+
+class Isolines {
+ public:
+  struct Line {
+    Vec3d r;        // unit
+    double weight;  // azimuth that it stands for [rad]
+  };
+  struct Crossing {
+    double cot;
+    int change;  // of W, away from the pole
+  };
+
+  // Lines at psi = (j + offset) / count, 0 <= offset < 1, and all crossings, in their order.
+  void build(const Pencil& pencil, int count, double offset, const ContourPoint& at,
+             std::span<const ContourArc> arcs);
+
+  int size() const { return static_cast<int>(lines_.size()); }
+  const Line& line(int j) const { return lines_[j]; }
+  std::span<const Crossing> crossings(int j) const {
+    return {sorted_.data() + starts_[j], sorted_.data() + starts_[j + 1]};
+  }
+  bool crossed() const { return !sorted_.empty(); }
+
+  // visit(from, to) for all ranges of cot, from > to, down to `end`, where W is zero (`open`) or
+  // where it is not. w: its value at the pole.
+  template <class Visit>
+  void for_ranges(int j, int w, double end, bool open, const Visit& visit) const {
+    double from = std::numeric_limits<double>::infinity();
+    for (const Crossing& crossing : crossings(j)) {
+      if (crossing.cot <= end) break;
+      const int next = w + crossing.change;
+      if ((w == 0) != (next == 0)) {
+        if ((w == 0) == open && from > crossing.cot) visit(from, crossing.cot);
+        from = crossing.cot;
+      }
+      w = next;
+    }
+    if ((w == 0) == open && from > end) visit(from, end);
+  }
+
+ private:
+  struct Found {
+    uint32_t line;
+    int change;
+    double cot;
+  };
+  void cross(const ContourArc& arc, double q0, double q1, const ContourPoint& at);
+
+  Pencil pencil_;
+  std::vector<Line> lines_;
+  std::vector<double> cosines_, sines_;  // of psi
+  std::vector<double> azimuths_;         // of both ends of every arc, in lines
+  std::vector<Found> found_;
+  std::vector<uint32_t> starts_;  // size() + 1
+  std::vector<Crossing> sorted_;
+};
+
+}  // namespace limn

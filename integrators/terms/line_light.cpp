@@ -1,0 +1,433 @@
+// Sums over lines: the sky, maps, lamps.
+#include "integrators/terms/line_light.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "integrators/terms/polygon_light.h"
+
+namespace limn {
+namespace {
+
+constexpr const char* kInstead = "use another method (rays, path)";
+// Lamps that are no polygon are cut into their faces. Not tuned.
+constexpr size_t kMostFaces = 64;
+
+bool is_diffuse(const Bsdf& bsdf) { return bsdf.lobe().model == &kHemisphere; }
+
+[[noreturn]] void refuse(const SourceLocation& where, const std::string& what) {
+  throw InputError(where, "the method \"silhouettes\": " + what);
+}
+
+std::string name_of(const std::string& kind, const std::string& id) {
+  return id.empty() ? kind : fmt::format("{} \"{}\"", kind, id);
+}
+
+// A place on a line, by cot theta.
+struct Place {
+  explicit Place(double cot) {
+    if (std::fabs(cot) > 1e100) {
+      c = cot > 0 ? 1 : -1, s = 0;
+    } else {
+      s = 1 / std::sqrt(1 + cot * cot);
+      c = cot * s;
+    }
+  }
+  double theta() const { return std::atan2(s, c); }
+  double c, s;
+};
+
+// The integral of n . w sin theta between two places of a line.
+double cosine_piece(double along, double across, const Place& from, const Place& to) {
+  double sum = along * 0.5 * (to.s * to.s - from.s * from.s);
+  if (across != 0) {
+    sum += across * 0.5 * ((to.theta() - to.s * to.c) - (from.theta() - from.s * from.c));
+  }
+  return sum;
+}
+
+// The integral of f(w) sin theta along the line between two angles, by quadrature between kinks
+// and over steps of at most `widest`.
+template <class F>
+Rgb<double> quadrature_piece(const Vec3d& pole, const Vec3d& r, double from, double to,
+                             double widest, std::span<const Kink> kinks, const F& f) {
+  std::array<double, 16> breaks;
+  int count = 0;
+  breaks[count++] = from;
+  for (const Kink& kink : kinks) {
+    const double a = dot(kink.axis, pole), b = dot(kink.axis, r), size = std::hypot(a, b);
+    if (!(std::fabs(kink.level) < size)) continue;
+    const double middle = std::atan2(b, a), half = std::acos(kink.level / size);
+    for (const double theta : {middle - half, middle + half, middle - half + 2 * kPi}) {
+      if (theta > from && theta < to) breaks[count++] = theta;
+    }
+  }
+  breaks[count++] = to;
+  std::sort(breaks.begin(), breaks.begin() + count);
+  Rgb<double> sum;
+  for (int i = 0; i + 1 < count; ++i) {
+    const int steps = std::max(1, static_cast<int>(std::ceil((breaks[i + 1] - breaks[i]) / widest)));
+    const double width = (breaks[i + 1] - breaks[i]) / steps;
+    for (int k = 0; k < steps; ++k) {
+      for (const auto& q : detail::quadrature()) {
+        const double theta = breaks[i] + width * (k + q.at);
+        const double c = std::cos(theta), s = std::sin(theta);
+        sum += f(pole * c + r * s) * (width * q.weight * s);
+      }
+    }
+  }
+  return sum;
+}
+
+double size_of(double x) { return std::fabs(x); }
+double size_of(const Rgb<double>& x) {
+  return std::max({std::fabs(x.r), std::fabs(x.g), std::fabs(x.b)});
+}
+
+Pencil pencil_around(const Vec3d& pole) {
+  const Frame frame(pole);
+  return {pole, frame.s, frame.t};
+}
+
+// Of lines over the half sphere around n and above `up`: n, as long as that is well above.
+Vec3d pole_between(const Vec3d& up, const Vec3d& n) { return dot(up, n) > 0.1 ? n : up; }
+
+// Cuts a polygon of directions to n . w >= 0.
+void cut(std::vector<Vec3d>& polygon, const Vec3d& n) {
+  static thread_local std::vector<Vec3d> whole;
+  whole = polygon;
+  polygon.clear();
+  for (size_t i = 0; i < whole.size(); ++i) {
+    const Vec3d &a = whole[i], &b = whole[(i + 1) % whole.size()];
+    const double at_a = dot(n, a), at_b = dot(n, b);
+    if (at_a >= 0) polygon.push_back(a);
+    if ((at_a >= 0) != (at_b >= 0)) polygon.push_back(a + (b - a) * (at_a / (at_a - at_b)));
+  }
+}
+
+// Lines from the middle of a polygon of unit directions, spread by how far its corners reach along
+// the axes of their scatter.
+Pencil pencil_inside(std::span<const Vec3d> corners) {
+  Vec3d sum;
+  for (const Vec3d& w : corners) sum += w;
+  Pencil pencil = pencil_around(normalize(sum));
+  double xx = 0, xy = 0, yy = 0;
+  for (const Vec3d& w : corners) {
+    const double c = dot(pencil.pole, w);
+    const double x = dot(pencil.u, w) / c, y = dot(pencil.v, w) / c;
+    xx += x * x, xy += x * y, yy += y * y;
+  }
+  const double angle = 0.5 * std::atan2(2 * xy, xx - yy);
+  const double c = std::cos(angle), s = std::sin(angle);
+  const Vec3d u = pencil.u * c + pencil.v * s, v = pencil.v * c - pencil.u * s;
+  const double su = std::sqrt(c * c * xx + 2 * c * s * xy + s * s * yy);
+  const double sv = std::sqrt(std::fmax(s * s * xx - 2 * c * s * xy + c * c * yy, 0));
+  // Slivers keep some width. Not tuned.
+  return {pencil.pole, u, v, su, std::fmax(sv, 0.01 * su)};
+}
+
+}  // namespace
+
+struct LineLight::Receiver {
+  Receiver(const SurfacePoint<double>& surface, const Scattering<double>& s, const ContourPoint& a)
+      : at(a), scattering(s), n(s.normal()), horizon(surface.horizon) {
+    const bool front = dot(surface.n_g, s.wi()) > 0;
+    n_s = front ? surface.n_s : -surface.n_s;
+    bent = !(n == n_s);
+    plain = !bent && horizon == 0;
+    kinks = {{{n, 0}, {n_s, horizon}, {n_s, horizon * (2 - horizon)}}};
+  }
+  // What is scattered of a lamp of radiance 1 that nothing hides. sides: of what it shows above the
+  // horizon; pole: inside.
+  Rgb<double> all_of(std::span<const PolygonSide<double>> sides, const Vec3d& pole) const {
+    if (bent) {
+      return polygon_integral<double>(sides, pole, kinks,
+                                      [&](const Vec3d& w) { return scattering.eval(w); });
+    }
+    const double sum = plain ? cosine_integral(sides, n) : ramp_integral(sides, n, horizon);
+    return scattering.eval(n) * sum;
+  }
+  ContourPoint at;
+  const Scattering<double>& scattering;
+  Vec3d n, n_s;
+  double horizon;
+  bool bent, plain;  // plain: what is scattered goes with n . w alone
+  std::array<Kink, 3> kinks;
+};
+
+struct LineLight::Scratch {
+  std::vector<ContourArc> arcs;
+  Isolines isolines;
+  std::vector<double> ends;
+  std::vector<Vec3d> polygon, planes;
+  std::vector<PolygonSide<double>> sides;
+};
+
+// On the heap: a shared library has little room for what belongs to threads.
+LineLight::Scratch& LineLight::scratch() {
+  static thread_local const auto owned = std::make_unique<Scratch>();
+  return *owned;
+}
+
+void LineLight::check(const Scene& scene) {
+  if (scene.max_depth != 2) {
+    refuse({scene.file}, fmt::format("only direct light is integrated: give --what direct, or set "
+                                     "the integrator's max_depth to 2 (it is {})",
+                                     scene.max_depth));
+  }
+  for (const auto& light : scene.delta_lights) {
+    refuse({scene.file}, fmt::format("{}: points and directions are no regions of the sky: {}",
+                                     name_of("emitter", light->id), kInstead));
+  }
+  for (const Shape& shape : scene.shapes) {
+    for (const bool front : {true, false}) {
+      const Bsdf* side = shape.bsdf->side(front);
+      if (!side || is_diffuse(*side)) continue;
+      refuse(shape.where, fmt::format("{}: only diffuse surfaces are integrated, this is {}: {}",
+                                      name_of("shape", shape.id), side->describe(), kInstead));
+    }
+    if (scene.shading == ShadingModel::kMitsuba && shape.mesh.normal_source != NormalSource::kFace) {
+      refuse(shape.where, fmt::format("{}: its interpolated normals need --shading continuous",
+                                      name_of("shape", shape.id)));
+    }
+  }
+}
+
+LineLight::LineLight(const Scene& scene, const RayTracer& tracer, int threads,
+                     const LineOptions& options, bool direct)
+    : scene_(scene), contours_(scene, tracer, threads), options_(options) {
+  if (!direct) return;
+  check(scene);
+  for (const Shape& shape : scene.shapes) {
+    if (shape.is_emitter) add_lamp(shape);
+  }
+  const Environment* sky = scene.environment.get();
+  if (sky && sky->grid()) columns_ = std::make_unique<RadianceColumns>(*sky);
+}
+
+void LineLight::add_lamp(const Shape& shape) {
+  const LampHull whole = make_lamp_hull(shape.mesh, scene_.shading);
+  double area = 0;
+  for (uint32_t f = 0; f < shape.mesh.faces.size(); ++f) {
+    const auto c = face_corners<double>(shape.mesh, FaceId(f));
+    area += 0.5 * length(cross(c[1] - c[0], c[2] - c[0]));
+  }
+  // A polygon without holes or bays.
+  if (whole.flat && area > whole.area * (1 - 1e-5)) return add_polygon(whole, shape);
+  if (shape.mesh.faces.size() > kMostFaces) {
+    refuse(shape.where,
+           fmt::format("{} is a lamp of {} faces in several planes, at most {} are integrated: {}",
+                       name_of("shape", shape.id), shape.mesh.faces.size(), kMostFaces, kInstead));
+  }
+  for (const FaceIndices& face : shape.mesh.faces) {
+    if (!has_area(shape.mesh, face)) continue;
+    Mesh one;
+    for (const uint32_t vertex : face) one.positions.push_back(shape.mesh.positions[vertex]);
+    one.faces = {{0, 1, 2}};
+    one.weld = {0, 1, 2};
+    const LampHull hull = make_lamp_hull(one, scene_.shading);
+    if (hull.flat) add_polygon(hull, shape);
+  }
+}
+
+void LineLight::add_polygon(const LampHull& hull, const Shape& shape) {
+  double size = 0;
+  for (const Vec3d& x : hull.points) {
+    size = std::max({size, std::fabs(x.x), std::fabs(x.y), std::fabs(x.z)});
+  }
+  // What is nearer than rounding of positions to floats lies in the lamp's plane.
+  const double margin = 2 * hull.deviation + 0x1p-21 * size;
+  lamps_.push_back(
+      {value(shape.radiance), hull, contours_.make_screen(hull.plane, margin, hull.points)});
+}
+
+// Over the contours in scratch(), along lines of the pencil down to where they leave the planes:
+// the sum of `piece` over what is open; or, where the whole is known and the pole is open, that
+// less what is not. w: of the pole. piece(line, from, to): for one radian of azimuth.
+template <class V, class Piece>
+V LineLight::sum_over_lines(const ContourPoint& at, const Pencil& pencil,
+                            std::span<const Vec3d> planes, int w, const V* all, double offset,
+                            const Piece& piece) const {
+  Scratch& own = scratch();
+  Isolines& lines = own.isolines;
+  const bool open = !all || w != 0;
+  const auto once = [&](int count, double shift) {
+    lines.build(pencil, count, shift, at, own.arcs);
+    V sum{};
+    for (int j = 0; j < count; ++j) {
+      const Isolines::Line& line = lines.line(j);
+      double end = -std::numeric_limits<double>::infinity();
+      for (const Vec3d& m : planes) {
+        // The pole is in front of every plane, at its rim at worst.
+        const double up = std::fmax(dot(m, pencil.pole), 1e-12);
+        end = std::fmax(end, -dot(m, line.r) / up);
+      }
+      lines.for_ranges(j, w, end, open, [&](double from, double to) {
+        sum += piece(line, Place(from), Place(to)) * line.weight;
+      });
+    }
+    return open ? sum : *all - sum;
+  };
+  int count = options_.lines;
+  V sum = once(count, offset);
+  while (options_.tolerance > 0 && 2 * count <= kMostLines) {
+    // The lines between those that there are.
+    const V other = once(count, offset < 0.5 ? offset + 0.5 : offset - 0.5);
+    const double apart = size_of(other - sum);
+    sum = (sum + other) * 0.5;
+    if (!(apart > 2 * options_.tolerance * size_of(sum))) break;
+    count *= 2;
+    offset = offset < 0.5 ? 2 * offset : 2 * offset - 1;
+  }
+  return sum;
+}
+
+double LineLight::openness(const ContourPoint& at, double offset) const {
+  Scratch& own = scratch();
+  own.arcs.clear();
+  contours_.list(at, {}, nullptr, own.arcs);
+  const int w = contours_.count(at, at.up, nullptr);
+  const double sum = sum_over_lines<double>(
+      at, pencil_around(at.up), {&at.up, 1}, w, nullptr, offset,
+      [](const Isolines::Line&, const Place& from, const Place& to) { return from.c - to.c; });
+  return sum / (2 * kPi);
+}
+
+double LineLight::ambient_occlusion(const ContourPoint& at, const Vec3d& n, double offset) const {
+  Scratch& own = scratch();
+  own.arcs.clear();
+  contours_.list(at, {}, nullptr, own.arcs);
+  const Vec3d planes[] = {at.up, n};
+  const Pencil pencil = pencil_around(pole_between(at.up, n));
+  const int w = contours_.count(at, pencil.pole, nullptr);
+  const double along = dot(n, pencil.pole);
+  const double sum = sum_over_lines<double>(
+      at, pencil, planes, w, nullptr, offset,
+      [&](const Isolines::Line& line, const Place& from, const Place& to) {
+        return cosine_piece(along, pencil.pole == n ? 0 : dot(n, line.r), from, to);
+      });
+  return sum / kPi;
+}
+
+// Of a uniform environment.
+Rgb<double> LineLight::sky_light(const Receiver& receiver, double offset) const {
+  const ContourPoint& at = receiver.at;
+  const Vec3d planes[] = {at.up, receiver.n};
+  const Pencil pencil = pencil_around(pole_between(at.up, receiver.n));
+  const int w = contours_.count(at, pencil.pole, nullptr);
+  const Rgb<double> radiance = scene_.environment->radiance(at.up);
+  if (receiver.plain) {
+    const double sum = sum_over_lines<double>(
+        at, pencil, planes, w, nullptr, offset,
+        [&](const Isolines::Line&, const Place& from, const Place& to) {
+          return cosine_piece(1, 0, from, to);
+        });
+    return receiver.scattering.eval(receiver.n) * radiance * sum;
+  }
+  const Rgb<double> sum = sum_over_lines<Rgb<double>>(
+      at, pencil, planes, w, nullptr, offset,
+      [&](const Isolines::Line& line, const Place& from, const Place& to) {
+        return quadrature_piece(pencil.pole, line.r, from.theta(), to.theta(), kPi,
+                                receiver.kinks,
+                                [&](const Vec3d& d) { return receiver.scattering.eval(d); });
+      });
+  return sum * radiance;
+}
+
+// Of a map, along its own meridians.
+Rgb<double> LineLight::map_light(const Receiver& receiver, double offset) const {
+  const ContourPoint& at = receiver.at;
+  const Environment::Grid& grid = columns_->grid();
+  const double turned = dot(at.up, grid.pole) >= 0 ? 1 : -1;
+  const Pencil pencil = pencil_around(grid.pole * turned);
+  const int w = contours_.count(at, pencil.pole, nullptr);
+  if (receiver.plain) {
+    const Vec3d planes[] = {at.up};
+    const double along = dot(receiver.n, grid.pole);
+    const Rgb<double> sum = sum_over_lines<Rgb<double>>(
+        at, pencil, planes, w, nullptr, offset,
+        [&](const Isolines::Line& line, const Place& from, const Place& to) {
+          const auto meridian = columns_->meridian(line.r);
+          const auto a = columns_->sum(meridian, from.c * turned, from.s);
+          const auto b = columns_->sum(meridian, to.c * turned, to.s);
+          const double across = dot(receiver.n, line.r);
+          return ((b.pole - a.pole) * along + (b.across - a.across) * across) * turned;
+        });
+    return receiver.scattering.eval(receiver.n) * sum;
+  }
+  const Environment& sky = *scene_.environment;
+  const Vec3d planes[] = {at.up};
+  return sum_over_lines<Rgb<double>>(
+      at, pencil, planes, w, nullptr, offset,
+      [&](const Isolines::Line& line, const Place& from, const Place& to) {
+        return quadrature_piece(
+            pencil.pole, line.r, from.theta(), to.theta(), kPi / (grid.rows - 1), receiver.kinks,
+            [&](const Vec3d& d) { return receiver.scattering.eval(d) * sky.radiance(d); });
+      });
+}
+
+Rgb<double> LineLight::lamp_light(const Lamp& lamp, const Receiver& receiver, double offset) const {
+  Scratch& own = scratch();
+  const ContourPoint& at = receiver.at;
+  const auto cone = cone_around(lamp.hull, at.p, at.up);
+  if (!cone) return {};
+  own.polygon.clear();
+  for (const Vec3d& x : lamp.hull.points) own.polygon.push_back(normalize(x - at.p));
+  cut(own.polygon, at.up);
+  if (!receiver.plain) cut(own.polygon, receiver.n);
+  if (own.polygon.size() < 3) return {};
+  // Corners run so that the inside is on the right, as directions are looked at from outside.
+  own.planes.clear();
+  own.sides.clear();
+  for (size_t i = 0; i < own.polygon.size(); ++i) {
+    const Vec3d a = normalize(own.polygon[i]);
+    const Vec3d b = normalize(own.polygon[(i + 1) % own.polygon.size()]);
+    const Vec3d inward = cross(b, a);
+    if (length_squared(inward) == 0) continue;
+    own.planes.push_back(inward);
+    own.sides.push_back({inward, b, a});
+  }
+  const Pencil pencil = pencil_inside(own.polygon);
+  const auto all = receiver.all_of(own.sides, pencil.pole);
+  own.arcs.clear();
+  contours_.list(at, *cone, &lamp.screen, own.arcs);
+  const int w = contours_.count(at, pencil.pole, &lamp.screen);
+  if (own.arcs.empty()) return w == 0 ? all * lamp.radiance : Rgb<double>{};
+  if (receiver.plain) {
+    const Rgb<double> f = receiver.scattering.eval(receiver.n);
+    const double whole = max_channel(f) > 0 ? max_channel(all) / max_channel(f) : 0;
+    const double along = dot(receiver.n, pencil.pole);
+    const double sum = sum_over_lines<double>(
+        at, pencil, own.planes, w, &whole, offset,
+        [&](const Isolines::Line& line, const Place& from, const Place& to) {
+          return cosine_piece(along, dot(receiver.n, line.r), from, to);
+        });
+    return f * lamp.radiance * sum;
+  }
+  return lamp.radiance *
+         sum_over_lines<Rgb<double>>(
+             at, pencil, own.planes, w, &all, offset,
+             [&](const Isolines::Line& line, const Place& from, const Place& to) {
+               return quadrature_piece(
+                   pencil.pole, line.r, from.theta(), to.theta(), kPi, receiver.kinks,
+                   [&](const Vec3d& d) { return receiver.scattering.eval(d); });
+             });
+}
+
+Rgb<double> LineLight::direct(const SurfacePoint<double>& surface,
+                              const Scattering<double>& scattering, double offset) const {
+  const bool front = dot(surface.n_g, scattering.wi()) > 0;
+  const Receiver receiver(surface, scattering, at(surface, front ? surface.n_g : -surface.n_g));
+  Rgb<double> sum;
+  for (const Lamp& lamp : lamps_) sum += lamp_light(lamp, receiver, offset);
+  if (!scene_.environment) return sum;
+  Scratch& own = scratch();
+  own.arcs.clear();
+  contours_.list(receiver.at, {}, nullptr, own.arcs);
+  return sum + (columns_ ? map_light(receiver, offset) : sky_light(receiver, offset));
+}
+
+}  // namespace limn

@@ -1,0 +1,78 @@
+#pragma once
+// Light that a point receives past all that is in the way, integrated along lines between contours
+// without a ray (after Nowrouzezahrai, Baran, Mitchell, Jarosz 2014): how open its sky is, and
+// direct light of area lamps, of constant environments and of maps.
+//
+// One dimension is exact, the other a sum over lines at equal distances whose offset is given:
+// uniform in [0, 1) it makes all results unbiased. Their standard error falls as lines^-1.5.
+#include <memory>
+#include <vector>
+
+#include "integrators/terms/contours.h"
+#include "integrators/terms/isolines.h"
+#include "integrators/terms/light_regions.h"
+#include "integrators/terms/radiance_columns.h"
+#include "limn/core/shading.h"
+
+namespace limn {
+
+struct LineOptions {
+  int lines = 16;  // of one pencil
+  // Above 0: lines are doubled until the results of two halves differ by at most twice this part of
+  // the result. That is no more unbiased.
+  double tolerance = 0;
+};
+inline constexpr int kMostLines = 1 << 14;
+
+class LineLight {
+ public:
+  // The scene and its tracer must outlive it. direct: whether direct() is to be asked.
+  LineLight(const Scene& scene, const RayTracer& tracer, int threads, const LineOptions& options,
+            bool direct);
+
+  // InputError, with the place in the scene's file and what to do, for a scene whose direct light
+  // lines do not know: delta lights, lamps of many faces that are not in one plane, BSDFs that are
+  // not diffuse, interpolated normals after Mitsuba, more than direct light.
+  static void check(const Scene& scene);
+
+  // The part of the directions above the face's horizon in which a ray would leave the scene.
+  double openness(const ContourPoint& at, double offset) const;
+  // The same weighed by the cosine to the shading normal n, over pi; with n = up it is 1 in the
+  // open.
+  double ambient_occlusion(const ContourPoint& at, const Vec3d& n, double offset) const;
+  // Radiance that the surface scatters towards the viewer of `scattering`, of all lights seen
+  // directly [W / (m^2 sr)].
+  Rgb<double> direct(const SurfacePoint<double>& surface, const Scattering<double>& scattering,
+                     double offset) const;
+
+  ContourPoint at(const SurfacePoint<double>& surface, const Vec3d& up) const {
+    return contours_.at(surface, up);
+  }
+
+ private:
+  struct Lamp {
+    Rgb<double> radiance;
+    LampHull hull;  // flat
+    ContourScreen screen;
+  };
+  struct Receiver;
+  struct Scratch;
+  static Scratch& scratch();
+
+  void add_lamp(const Shape& shape);
+  void add_polygon(const LampHull& hull, const Shape& shape);
+  Rgb<double> lamp_light(const Lamp& lamp, const Receiver& receiver, double offset) const;
+  Rgb<double> sky_light(const Receiver& receiver, double offset) const;
+  Rgb<double> map_light(const Receiver& receiver, double offset) const;
+  template <class V, class Piece>
+  V sum_over_lines(const ContourPoint& at, const Pencil& pencil, std::span<const Vec3d> planes,
+                   int w, const V* all, double offset, const Piece& piece) const;
+
+  const Scene& scene_;
+  Contours contours_;
+  LineOptions options_;
+  std::vector<Lamp> lamps_;
+  std::unique_ptr<RadianceColumns> columns_;  // of a map
+};
+
+}  // namespace limn

@@ -1,0 +1,437 @@
+// Visibility by lines between silhouettes: W against faces counted one by one, closed forms, rays
+// and paths, and what must not matter.
+#include "integrators/terms/line_light.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "integrators/estimates/scrambled_sobol.h"
+#include "limn/core/error.h"
+#include "limn/integrators/render.h"
+#include "support/compare_moments.h"
+#include "support/meshes.h"
+#include "support/running_mean.h"
+#include "support/scenes.h"
+
+namespace limn {
+namespace {
+
+constexpr double kLevel = 1e-4;
+
+// Shapes of a scene of tests: a floor, and meshes over it.
+struct Body {
+  Mesh mesh;
+  double scale = 1;
+  Vec3d offset{0, 0, 0};
+};
+Scene scene_of(const TempFiles& files, const std::vector<Body>& bodies, bool smooth = false,
+               const std::string& more = "", double unit = 1, const Vec3d& shift = {}) {
+  SceneParts parts;
+  parts.max_depth = 2;
+  parts.unit = unit;
+  parts.origin = parts.origin + shift * (1 / unit);
+  parts.target = parts.target + shift * (1 / unit);
+  parts.body = square("floor", 5 * unit, -90, shift, diffuse("chalk", "0.8, 0.7, 0.6")) + more;
+  for (size_t i = 0; i < bodies.size(); ++i) {
+    const std::string name = fmt::format("body{}", i);
+    parts.body += obj_shape(name, write_mesh(files, name + ".obj", bodies[i].mesh), !smooth,
+                            bodies[i].scale * unit, bodies[i].offset * unit + shift,
+                            diffuse(name + "_bsdf", "0.5, 0.6, 0.7"));
+  }
+  return make_scene(files, parts);
+}
+
+// A point of the scene's first shape, which is the floor, at (x, 0, z).
+ContourPoint on_floor(const Scene& scene, double x, double z) {
+  const Mesh& mesh = scene.shapes[0].mesh;
+  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+    const auto c = face_corners<double>(mesh, FaceId(f));
+    bool inside = true;
+    const Vec3d p{x, c[0].y, z};
+    for (int k = 0; k < 3; ++k) {
+      inside = inside && cross(c[(k + 1) % 3] - c[k], p - c[k]).y >= 0;
+    }
+    if (inside) return {p, {0, 1, 0}, {ShapeId(0), FaceId(f)}};
+  }
+  return {};
+}
+
+struct Looking {
+  Looking(const Scene& s, const LineOptions& options = {}, bool direct = false)
+      : tracer(make_embree_tracer(s, 1)), light(s, *tracer, 1, options, direct) {}
+  std::unique_ptr<RayTracer> tracer;
+  LineLight light;
+};
+
+double occlusion(const LineLight& light, const ContourPoint& at, int offsets) {
+  double sum = 0;
+  for (int k = 0; k < offsets; ++k) {
+    sum += light.ambient_occlusion(at, at.up, (k + 0.5) / offsets);
+  }
+  return sum / offsets;
+}
+
+// Faces on a ray, each by itself in long numbers, but for those that the point's own sign leaves
+// out; -1 if the ray passes within `near` of a side.
+int count_faces(const Scene& scene, const ContourPoint& at, const Vec3d& w, double near) {
+  int count = 0;
+  for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+    const Mesh& mesh = scene.shapes[s].mesh;
+    for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+      if (at.face == FaceRef{ShapeId(s), FaceId(f)}) continue;
+      const auto c = face_corners<double>(mesh, FaceId(f));
+      long double side[3];
+      for (int k = 0; k < 3; ++k) {
+        const Vec3d a = c[k] - at.p, b = c[(k + 1) % 3] - at.p;
+        const Vec3<long double> n = cross(cast<long double>(a), cast<long double>(b));
+        const long double size = std::sqrt(dot(n, n));
+        side[k] = size > 0 ? dot(n, cast<long double>(w)) / size : 0;
+      }
+      const Vec3d n = cross(c[1] - c[0], c[2] - c[0]);
+      const double d = dot(n, at.p - c[0]) / length(n);
+      if (std::fabs(d) < 1e-12) continue;
+      const double sign = d > 0 ? -1 : 1;
+      bool inside = true, close = false;
+      for (const long double x : side) {
+        inside = inside && sign * x > -near;
+        close = close || std::fabs(static_cast<double>(x)) < near;
+      }
+      if (inside && close) return -1;
+      count += inside;
+    }
+  }
+  return count;
+}
+
+std::vector<std::pair<std::string, std::vector<Body>>> hard_bodies() {
+  const Vec3d up{0.1, 1.2, -0.2};
+  return {
+      {"closed", {{torus_mesh(20, 10), 1, up}}},
+      {"concave and open", {{cap_mesh(2), 1, up}, {grid_mesh(3), 0.6, {0.5, 0.4, 0.3}}}},
+      {"inside out", {{reversed(icosphere_mesh(2)), 0.8, up}}},
+      {"crossing", {{cube_mesh(), 0.7, up}, {torus_mesh(12, 8), 0.9, up}}},
+      {"touching", {{cube_mesh(), 0.5, {0, 0.5, 0}}, {cube_mesh(), 0.25, {0, 1.25, 0}}}},
+      {"seams and copies", {{seam_split(joined(cube_mesh(), cube_mesh())), 0.6, up}}},
+      {"room", {{cube_mesh(), 8, {0, 7, 0}}, {icosphere_mesh(1), 0.7, up}}}};
+}
+
+// From one direction to any other: what contours say changes W as the faces themselves do.
+TEST(Contours, WindingIsTheNumberOfFaces) {
+  for (const auto& [name, bodies] : hard_bodies()) {
+    const TempFiles files;
+    const Scene scene = scene_of(files, bodies);
+    const auto tracer = make_embree_tracer(scene, 1);
+    const Contours contours(scene, *tracer, 1);
+    Rng rng(7, 0, 0);
+    std::vector<ContourArc> arcs;
+    Isolines lines;
+    int compared = 0, largest = 0;
+    for (int i = 0; i < 40; ++i) {
+      // On the floor (where things stand and touch, too), in the air, inside of things.
+      ContourPoint at = on_floor(scene, 2 * rng.uniform() - 1, 2 * rng.uniform() - 1);
+      if (i % 2 == 1) {
+        at = {at.p + Vec3d{0, 2 * rng.uniform(), 0}, random_direction(rng), {}};
+      }
+      arcs.clear();
+      contours.list(at, {}, nullptr, arcs);
+      Vec3d pole = random_direction(rng);
+      if (dot(pole, at.up) < 0) pole = -pole;
+      const Frame frame(pole);
+      const int at_pole = contours.count(at, pole, nullptr);
+      lines.build({pole, frame.s, frame.t}, 8, rng.uniform(), at, arcs);
+      for (int j = 0; j < 8; ++j) {
+        const Vec3d& r = lines.line(j).r;
+        const double end = -dot(at.up, r) / dot(at.up, pole);
+        for (int k = 0; k < 6; ++k) {
+          const double cot = std::tan(1.5 * (2 * rng.uniform() - 1));
+          if (cot < end) continue;
+          int w = at_pole;
+          for (const auto& crossing : lines.crossings(j)) {
+            if (crossing.cot > cot) w += crossing.change;
+          }
+          const Vec3d direction = normalize(pole * cot + r);
+          const int true_count = count_faces(scene, at, direction, 1e-9);
+          if (true_count < 0) continue;
+          ++compared;
+          largest = std::max(largest, w);
+          EXPECT_EQ(w, true_count) << name << " point " << i;
+          EXPECT_EQ(contours.count(at, direction, nullptr), true_count) << name << " point " << i;
+        }
+      }
+    }
+    EXPECT_GT(compared, 400) << name;
+    EXPECT_GE(largest, 2) << name;
+  }
+}
+
+// The cosine-weighted part of the half sphere around n that a polygon fills (Lambert), from above.
+double form_factor(const Vec3d& p, const Vec3d& n, const std::vector<Vec3d>& corners) {
+  double sum = 0;
+  for (size_t i = 0; i < corners.size(); ++i) {
+    const Vec3d a = normalize(corners[i] - p), b = normalize(corners[(i + 1) % corners.size()] - p);
+    const Vec3d s = cross(a, b);
+    sum += std::atan2(length(s), dot(a, b)) * dot(n, s) / length(s);
+  }
+  return std::fabs(sum) / (2 * kPi);
+}
+// Of a triangle, over 2 pi (Van Oosterom and Strackee 1983).
+double solid_angle(const Vec3d& p, const std::array<Vec3d, 3>& x) {
+  const Vec3d a = normalize(x[0] - p), b = normalize(x[1] - p), c = normalize(x[2] - p);
+  return 2 * std::atan2(std::fabs(determinant(a, b, c)), 1 + dot(a, b) + dot(b, c) + dot(c, a)) /
+         (2 * kPi);
+}
+
+TEST(LineLight, ClosedFormsOfOpenSky) {
+  const TempFiles files;
+  const Scene open = scene_of(files, {});
+  const ContourPoint at = on_floor(open, 0.3, 0.2);
+  const Looking nothing(open);
+  EXPECT_NEAR(nothing.light.openness(at, 0.3), 1, 1e-14);
+  EXPECT_NEAR(nothing.light.ambient_occlusion(at, at.up, 0.3), 1, 1e-14);
+
+  // A square over the floor, seen from below.
+  const Mesh roof = make_mesh({{-1, 1, -1}, {1, 1, -1}, {1, 1, 1}, {-1, 1, 1}}, {{0, 1, 2}, {0, 2, 3}});
+  const std::vector<Vec3d> corners = {{-1, 1, -1}, {1, 1, -1}, {1, 1, 1}, {-1, 1, 1}};
+  const Scene under = scene_of(files, {{roof}});
+  const Looking look(under, {.lines = 4096});
+  RunningMean cosine, plain;
+  for (int k = 0; k < 16; ++k) {
+    cosine.add(look.light.ambient_occlusion(at, at.up, (k + 0.37) / 16));
+    plain.add(look.light.openness(at, (k + 0.37) / 16));
+  }
+  const double hidden = solid_angle(at.p, {corners[0], corners[1], corners[2]}) +
+                        solid_angle(at.p, {corners[0], corners[2], corners[3]});
+  // What 4096 lines leave is far less than this; a mistake is far more.
+  EXPECT_NEAR(cosine.mean(), 1 - form_factor(at.p, at.up, corners), 1e-7);
+  EXPECT_NEAR(plain.mean(), 1 - hidden, 1e-7);
+
+  // A box without a lid: the floor inside sees the sky through it alone.
+  Mesh walls = cube_mesh();
+  std::erase_if(walls.faces, [&](const FaceIndices& face) {
+    double lowest = 1, highest = -1;
+    for (const uint32_t v : face) {
+      lowest = std::fmin(lowest, walls.positions[v].y);
+      highest = std::fmax(highest, walls.positions[v].y);
+    }
+    return lowest == highest;
+  });
+  ASSERT_EQ(walls.faces.size(), 8u);
+  const Scene box = scene_of(files, {{walls, 1, {0, 1, 0}}});
+  const Looking in_box(box, {.lines = 4096});
+  const std::vector<Vec3d> lid = {{-1, 2, -1}, {1, 2, -1}, {1, 2, 1}, {-1, 2, 1}};
+  EXPECT_NEAR(occlusion(in_box.light, at, 8), form_factor(at.p, at.up, lid), 1e-7);
+
+  // Inside a closed mesh it is black, whichever way that is turned.
+  for (const bool turned : {false, true}) {
+    const Mesh ball = turned ? reversed(icosphere_mesh(2)) : icosphere_mesh(2);
+    const Scene closed = scene_of(files, {{ball, 2, {0, 0, 0}}});
+    const Looking inside(closed);
+    EXPECT_EQ(inside.light.openness(at, 0.4), 0);
+    EXPECT_EQ(inside.light.ambient_occlusion(at, at.up, 0.4), 0);
+  }
+}
+
+// A sphere of radius R at height h fills R^2 / h^2 of the cosine-weighted sky below its center; a
+// mesh inside of it less, by its faces' arrows.
+TEST(LineLight, SphereOverPlane) {
+  const TempFiles files;
+  const Scene scene = scene_of(files, {{icosphere_mesh(5), 0.8, {0.3, 1.6, 0.2}}});
+  const Looking look(scene, {.lines = 64});
+  const double covered = 1 - occlusion(look.light, on_floor(scene, 0.3, 0.2), 4);
+  EXPECT_LT(covered, 0.25);
+  EXPECT_GT(covered, 0.25 * (1 - 2e-3));
+}
+
+// The error of unbiased sums: their mean over offsets is the limit, and they fall as lines^-1.5.
+TEST(LineLight, ConvergesAndIsUnbiased) {
+  const TempFiles files;
+  const Scene scene = scene_of(files, {{torus_mesh(40, 20), 0.9, {0.2, 1.3, -0.1}}});
+  const ContourPoint at = on_floor(scene, 0.35, -0.15);
+  const Looking fine(scene, {.lines = 1 << 14});
+  const double truth = occlusion(fine.light, at, 4);
+  double before = 0;
+  for (const int lines : {16, 64, 256}) {
+    const Looking look(scene, {.lines = lines});
+    RunningMean mean;
+    double squares = 0;
+    for (uint64_t k = 0; k < 400; ++k) {
+      Rng rng(3, k, lines);
+      const double value = look.light.ambient_occlusion(at, at.up, rng.uniform());
+      mean.add(value);
+      squares += (value - truth) * (value - truth);
+    }
+    EXPECT_LT(std::fabs(mean.z_score(truth)), 4) << lines;
+    const double error = std::sqrt(squares / 400);
+    fmt::print("{} lines: error {:.2g} of {:.4f}\n", lines, error, truth);
+    if (before > 0) {
+      EXPECT_LT(error, before / 3);
+    }
+    before = error;
+  }
+  const Looking careful(scene, {.lines = 16, .tolerance = 1e-4});
+  RunningMean mean;
+  double squares = 0;
+  for (uint64_t k = 0; k < 100; ++k) {
+    Rng rng(5, k, 0);
+    squares += std::pow(careful.light.ambient_occlusion(at, at.up, rng.uniform()) / truth - 1, 2);
+  }
+  EXPECT_LT(std::sqrt(squares / 100), 2e-4);
+}
+
+RenderResult run(const Scene& scene, const std::string& method, int spp, RenderOptions options = {},
+                 int threads = 1) {
+  RunSettings settings;
+  settings.spp = spp;
+  settings.seed = method == "silhouettes" ? 1 : 2;
+  settings.threads = threads;
+  options.method = method;
+  RenderResult result = render(scene, settings, options);
+  EXPECT_EQ(result.non_finite.count, 0u) << result.non_finite.message();
+  return result;
+}
+
+// Errors that neighbouring samples' points share make scores smaller than normal, never larger.
+void expect_alike(const RenderResult& a, const RenderResult& b, const std::string& what) {
+  std::vector<double> z;
+  double sum_a = 0, sum_b = 0, variance = 0;
+  for (size_t i = 0; i < a.radiance.size(); ++i) {
+    const double v = a.radiance.variance(i) + b.radiance.variance(i);
+    sum_a += a.radiance.mean(i), sum_b += b.radiance.mean(i), variance += v;
+  }
+  const double score = (sum_a - sum_b) / std::sqrt(variance);
+  fmt::print("{}: {:.6g} and {:.6g}, z {:.2f}\n", what, sum_a / a.radiance.size(),
+             sum_b / a.radiance.size(), score);
+  EXPECT_LT(std::fabs(score), 4) << what;
+  EXPECT_LT(std::sqrt(variance), 0.01 * sum_a) << what;
+  EXPECT_LT(compare_moments(a.radiance, b.radiance).largest, 6) << what;
+}
+
+TEST(LineLight, AgreesWithRaysAndPaths) {
+  const TempFiles files;
+  const std::string lamps = square("lamp", 0.6, 90, {0.4, 2.9, 0.3}, area_light("glow", "9, 8, 7")) +
+                            square("side", 0.5, 0, {-0.6, 1.2, -2}, area_light("low", "3, 4, 5"));
+  const std::string sky = constant_light("sky", "0.3, 0.4, 0.5");
+  const std::vector<Body> bodies = {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}},
+                                    {cube_mesh(), 0.3, {-0.9, 0.3, 0.6}}};
+  struct Case {
+    std::string name, lights;
+    bool smooth;
+  };
+  for (const Case& c : {Case{"lamps", lamps, false}, Case{"sky", sky, false},
+                        Case{"map", make_sky(files, "map"), false},
+                        Case{"smooth, lamps and sky", lamps + sky, true},
+                        Case{"smooth, map", make_sky(files, "map"), true}}) {
+    const Scene scene = scene_of(files, bodies, c.smooth, c.lights);
+    const RenderResult lines = run(scene, "silhouettes", 16);
+    expect_alike(lines, run(scene, "path", 1024), c.name + ", path");
+    expect_alike(lines, run(scene, "rays", 128), c.name + ", rays");
+  }
+  for (const RenderWhat what : {RenderWhat::kAmbientOcclusion, RenderWhat::kOpenness}) {
+    for (const bool smooth : {false, true}) {
+      const Scene scene = scene_of(files, bodies, smooth);
+      RenderOptions options;
+      options.what = what;
+      expect_alike(run(scene, "silhouettes", 16, options), run(scene, "rays", 128, options),
+                   fmt::format("open sky {}{}", static_cast<int>(what), smooth ? ", smooth" : ""));
+    }
+  }
+}
+
+// Faces behind a lamp, in its plane and through it.
+TEST(LineLight, LampsEndWhatIsBeforeThem) {
+  const TempFiles files;
+  const std::string lamp = square("lamp", 0.8, 90, {0, 2, 0}, area_light("glow", "5, 5, 5"));
+  for (const auto& [name, bodies] : std::vector<std::pair<std::string, std::vector<Body>>>{
+           {"behind", {{cube_mesh(), 0.5, {0.2, 2.9, 0}}}},
+           {"housing", {{cube_mesh(), 0.8, {0, 2.8, 0}}}},
+           {"through", {{icosphere_mesh(2), 0.5, {0.3, 2.1, 0.2}}}},
+           {"beside", {{cube_mesh(), 0.6, {1.2, 2, 0.1}}}}}) {
+    const Scene scene = scene_of(files, bodies, false, lamp);
+    expect_alike(run(scene, "silhouettes", 16), run(scene, "path", 1024), name);
+  }
+}
+
+TEST(LineLight, ScaleAndPlaceDoNotMatter) {
+  const TempFiles files;
+  const std::vector<Body> bodies = {{torus_mesh(16, 8), 0.8, {0.25, 1.125, 0}}};
+  RenderOptions options;
+  options.what = RenderWhat::kAmbientOcclusion;
+  const RenderResult plain = run(scene_of(files, bodies), "silhouettes", 2, options);
+  for (const auto& [unit, shift] : std::vector<std::pair<double, Vec3d>>{
+           {1024, {}}, {1.0 / 1024, {}}, {1, {16, -32, 64}}}) {
+    const RenderResult moved =
+        run(scene_of(files, bodies, false, "", unit, shift), "silhouettes", 2, options);
+    for (size_t i = 0; i < plain.radiance.size(); ++i) {
+      // Floats of the moved mesh are rounded, and move shadows' edges by that.
+      ASSERT_NEAR(moved.radiance.mean(i), plain.radiance.mean(i), 2e-3) << unit;
+    }
+  }
+}
+
+TEST(LineLight, ThreadsDoNotMatter) {
+  const TempFiles files;
+  const Scene scene = scene_of(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, true,
+                               make_sky(files, "map"));
+  for (const std::string method : {"silhouettes", "rays"}) {
+    const RenderResult one = run(scene, method, 3), three = run(scene, method, 3, {}, 3);
+    for (size_t i = 0; i < one.radiance.size(); ++i) {
+      ASSERT_EQ(one.radiance.mean(i), three.radiance.mean(i)) << method;
+    }
+  }
+}
+
+TEST(LineLight, SaysWhatItDoesNotKnow) {
+  const TempFiles files;
+  const auto refused = [&](const Scene& scene, RenderOptions options = {}) {
+    RunSettings settings;
+    try {
+      render(scene, settings, options);
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  RenderOptions lines, rays;
+  lines.method = "silhouettes";
+  rays.method = "rays";
+  Scene deep = scene_of(files, {});
+  deep.max_depth = 3;
+  EXPECT_NE(refused(deep, lines).find("give --what direct"), std::string::npos);
+  EXPECT_NE(refused(deep, rays).find("give --what direct"), std::string::npos);
+  const Scene point = scene_of(
+      files, {}, false,
+      R"(<emitter type="point" id="bulb"><point name="position" value="0, 3, 0"/></emitter>)");
+  EXPECT_NE(refused(point, lines).find("\"bulb\""), std::string::npos);
+  EXPECT_NE(refused(point, rays).find("\"bulb\""), std::string::npos);
+  const Scene metal = scene_of(files, {}, false, square("mirror", 1, 0, {0, 1, 0}, conductor("m", 0.1)));
+  EXPECT_NE(refused(metal, lines).find("\"mirror\""), std::string::npos);
+  EXPECT_EQ(refused(metal, rays), "");
+  const Scene ball = scene_of(files, {}, false,
+                              obj_shape("ball", write_mesh(files, "b.obj", icosphere_mesh(2)), true,
+                                        1, {0, 3, 0}, area_light("glow", "1, 1, 1")));
+  EXPECT_NE(refused(ball, lines).find("320 faces"), std::string::npos);
+  RenderOptions ao;
+  ao.what = RenderWhat::kAmbientOcclusion;
+  EXPECT_NE(refused(deep, ao).find("silhouettes and rays"), std::string::npos);
+}
+
+// Every power of two of points, from the first on, has one in each equal part of each dimension,
+// and one in each square of two that go together.
+TEST(ScrambledSobol, Stratified) {
+  for (uint64_t key = 0; key < 20; ++key) {
+    const ScrambledSobol points(key);
+    for (int d = 0; d < ScrambledSobol::kDimensions; ++d) {
+      std::vector<int> seen(64);
+      for (uint64_t i = 0; i < 64; ++i) ++seen[static_cast<int>(points.at(i, d) * 64)];
+      EXPECT_EQ(std::count(seen.begin(), seen.end(), 1), 64) << d;
+    }
+    std::vector<int> seen(64);
+    for (uint64_t i = 0; i < 64; ++i) {
+      ++seen[static_cast<int>(points.at(i, 0) * 8) * 8 + static_cast<int>(points.at(i, 1) * 8)];
+    }
+    EXPECT_EQ(std::count(seen.begin(), seen.end(), 1), 64);
+  }
+}
+
+}  // namespace
+}  // namespace limn

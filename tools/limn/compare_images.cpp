@@ -1,0 +1,162 @@
+// `limn compare --image`: what it runs, prints and writes.
+#include "tools/limn/compare_images.h"
+
+#include <cmath>
+#include <filesystem>
+#include <set>
+
+#include "limn/core/error.h"
+#include "limn/core/names.h"
+#include "limn/integrators/compare_images.h"
+#include "tools/limn/output_files.h"
+
+namespace limn {
+namespace {
+
+namespace fs = std::filesystem;
+
+void check_image_methods(const std::vector<std::string>& methods) {
+  std::set<std::string> seen;
+  for (const std::string& name : methods) {
+    const std::vector<std::string> known = names_of(render_methods());
+    if (std::find(known.begin(), known.end(), name) == known.end()) {
+      throw InputError("--methods: " + unknown_name("method", name, known));
+    }
+    if (!seen.insert(name).second) {
+      throw InputError("--methods: \"" + name + "\" is given twice");
+    }
+  }
+}
+
+// Standard error of the relative error, from that of its square.
+double relative_error(double squared) { return std::sqrt(std::fmax(squared, 0)); }
+
+void print_images(const ImageComparison& result) {
+  fmt::print("reference: {}, {} samples per pixel, relative error {:.2g}\n",
+             result.reference_method, result.reference_spp,
+             relative_error(result.reference_squared_error));
+  fmt::print("{:12} {:>8} {:>8} {:>8} {:>14} {:>10}\n", "method", "time", "seconds", "spp",
+             "relative error", "of first");
+  for (const ComparedImage& row : result.rows) {
+    double first = 0;
+    for (const ComparedImage& other : result.rows) {
+      if (other.method == result.rows[0].method && other.time == row.time) {
+        first = other.squared_error;
+      }
+    }
+    fmt::print("{:12} {:8.3g} {:8.3g} {:8.3g} {:14.3g} {:>10}\n", row.method, row.time, row.seconds,
+               row.spp, relative_error(row.squared_error),
+               first > 0 ? fmt::format("{:.3g}", relative_error(row.squared_error / first)) : "-");
+  }
+}
+
+void write_images(const ImageCompareArguments& arguments, const Scene& scene, const RunSettings& settings,
+           const ImageComparison& result, const CommonOptions& common, const Warnings& warnings,
+           const std::string& command_line) {
+  const auto path = [&](const std::string& name) {
+    return (fs::path(arguments.output) / name).string();
+  };
+  const auto write_image = [&](const std::string& name, const std::vector<double>& values,
+                               const std::string& method, int64_t spp) {
+    const Image image = to_image(values, scene.film);
+    auto attributes = provenance(scene, settings, spp);
+    attributes.push_back({"limn.method", method});
+    attributes.push_back({"limn.what", arguments.what});
+    write_exr(path(name + ".exr"), film_channels(scene, image), false, attributes);
+    write_png(path(name + ".png"), image, 1);
+  };
+  write_image("reference", result.reference, result.reference_method, result.reference_spp);
+  nlohmann::json rows = nlohmann::json::array();
+  for (size_t i = 0; i < result.rows.size(); ++i) {
+    const ComparedImage& row = result.rows[i];
+    rows.push_back({{"method", row.method},
+                    {"time", row.time},
+                    {"seconds", row.seconds},
+                    {"spp", row.spp},
+                    {"relative_squared_error", row.squared_error},
+                    {"standard_error", row.squared_error_stderr}});
+    const bool longest =
+        i + 1 == result.rows.size() || result.rows[i + 1].method != row.method;
+    if (longest) write_image(row.method, row.image, row.method, std::llround(row.spp));
+  }
+  const nlohmann::json report = {{"command", command_line},
+                                 {"scene", scene.file},
+                                 {"what", arguments.what},
+                                 {"lines", arguments.render.lines},
+                                 {"tolerance", arguments.render.tolerance},
+                                 {"rays", arguments.render.rays},
+                                 {"repeats", arguments.repeats},
+                                 {"seed", settings.seed},
+                                 {"threads", settings.threads},
+                                 {"reference",
+                                  {{"method", result.reference_method},
+                                   {"spp", result.reference_spp},
+                                   {"relative_squared_error", result.reference_squared_error}}},
+                                 {"rows", rows},
+                                 {"warnings", warnings.lines()},
+                                 {"non_finite", result.non_finite.count}};
+  write_json(path("compare.json"), report.dump(2));
+  write_json(common.json, report.dump(2));
+}
+
+}  // namespace
+
+std::string image_method_names() { return join(names_of(render_methods())); }
+
+void add_image_options(CLI::App& app, std::string& what, RenderOptions& options) {
+  app.add_option("--what", what,
+                 "What an image shows: all light; direct light alone; ambient occlusion and "
+                 "openness of the sky (methods silhouettes and rays)")
+      ->check(CLI::IsMember({"image", "direct", "ao", "openness"}))
+      ->capture_default_str();
+  app.add_option("--lines", options.lines, "silhouettes: lines through the sky, or a lamp")
+      ->check(CLI::Range(1, 1 << 14))
+      ->capture_default_str();
+  app.add_option("--tolerance", options.tolerance,
+                 "silhouettes: lines are doubled until halves differ by twice this part of the "
+                 "result (0: never)")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  app.add_option("--rays", options.rays, "rays: of each point, and each lamp")
+      ->check(CLI::Range(1, 1 << 20))
+      ->capture_default_str();
+}
+
+void show(const std::string& what, Scene& scene, RenderOptions& options) {
+  if (what == "direct") scene.max_depth = 2;
+  if (what == "ao") options.what = RenderWhat::kAmbientOcclusion;
+  if (what == "openness") options.what = RenderWhat::kOpenness;
+}
+
+int compare_images_command(const CommonOptions& common, ImageCompareArguments arguments,
+                           Scene scene, const RunSettings& settings, const Warnings& warnings,
+                           const std::string& command_line) {
+  check_image_methods(arguments.methods);
+  show(arguments.what, scene, arguments.render);
+  ImageCompareOptions options;
+  options.methods = arguments.methods;
+  options.render = arguments.render;
+  options.times = arguments.times;
+  options.repeats = arguments.repeats;
+  double once = 0;
+  for (const double time : options.times) once += time;
+  options.reference_seconds =
+      arguments.reference_time > 0 ? arguments.reference_time : 4 * once * options.repeats;
+  const ImageComparison result = compare_images(scene, options, settings);
+  const bool interrupted = settings.interrupted && settings.interrupted->load();
+  if (interrupted) fmt::print(stderr, "\n");
+  if (result.rows.empty()) {
+    fmt::print(stderr, "interrupted before a method's first run: nothing is written\n");
+    return kInterrupted;
+  }
+  if (!common.quiet) print_images(result);
+  write_images(arguments, scene, settings, result, common, warnings, command_line);
+  if (result.non_finite.count > 0) return finish_status(result.non_finite, 0, 0, "");
+  if (interrupted) {
+    fmt::print(stderr, "interrupted: {} holds all runs that were finished\n", arguments.output);
+    return kInterrupted;
+  }
+  return kSuccess;
+}
+
+}  // namespace limn

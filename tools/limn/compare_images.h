@@ -1,0 +1,34 @@
+#pragma once
+// `limn compare --image`: methods for images at equal time.
+#include <string>
+#include <vector>
+
+#include "limn/integrators/render.h"
+#include "tools/limn/command_support.h"
+
+namespace limn {
+
+struct ImageCompareArguments {
+  std::vector<std::string> methods;
+  std::string what = "image";
+  RenderOptions render;  // how methods are set up
+  std::vector<double> times;
+  int repeats = 4;
+  double reference_time = 0;  // 0: four times all runs of one method
+  std::string output;         // folder, which is there
+};
+
+// Names of methods, for help.
+std::string image_method_names();
+// Options of `render` that say what an image shows and how methods are set up.
+void add_image_options(CLI::App& app, std::string& what, RenderOptions& options);
+// Makes the scene and the options show what --what says.
+void show(const std::string& what, Scene& scene, RenderOptions& options);
+
+// Writes reference.exr, METHOD.exr of the longest time, all with PNG, and compare.json; prints a
+// table. The status of the program.
+int compare_images_command(const CommonOptions& common, ImageCompareArguments arguments,
+                           Scene scene, const RunSettings& settings, const Warnings& warnings,
+                           const std::string& command_line);
+
+}  // namespace limn
