@@ -24,7 +24,7 @@ class ScrambledSobol {
     for (uint32_t rest = place, k = 0; rest != 0; rest >>= 1, ++k) {
       if (rest & 1) bits ^= columns[k];
     }
-    return scramble_reversed(bits, hash(static_cast<uint64_t>(dimension))) * 0x1p-32;
+    return scramble(bits, hash(static_cast<uint64_t>(dimension))) * 0x1p-32;
   }
 
  private:
@@ -65,11 +65,8 @@ class ScrambledSobol {
     return (x & 0x55555555u) << 1 | (x & 0xaaaaaaaau) >> 1;
   }
   // Every bit is flipped by a hash of the bits above it.
-  static uint32_t scramble_reversed(uint32_t x, uint32_t seed) {
-    return reversed(laine_karras(reversed(x), seed));
-  }
   static uint32_t scramble(uint32_t x, uint32_t seed) {
-    return reversed(scramble_reversed(reversed(x), seed));
+    return reversed(laine_karras(reversed(x), seed));
   }
   // Lower bits change higher ones only. Constants of Burley 2020, "Practical Hash-based Owen
   // Scrambling".

@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "integrators/estimates/scrambled_sobol.h"
+#include "integrators/terms/camera_path.h"
+#include "integrators/terms/closed_light.h"
 #include "limn/core/error.h"
 #include "limn/integrators/render.h"
 #include "support/compare_moments.h"
@@ -28,6 +30,7 @@ Scene scene_of(const TempFiles& files, const std::vector<Body>& bodies, bool smo
                const std::string& more = "", double unit = 1, const Vec3d& shift = {}) {
   SceneParts parts;
   parts.max_depth = 2;
+  parts.hide_emitters = true;
   parts.unit = unit;
   parts.origin = parts.origin + shift * (1 / unit);
   parts.target = parts.target + shift * (1 / unit);
@@ -322,7 +325,7 @@ TEST(LineLight, AgreesWithRaysAndPaths) {
                         Case{"smooth, lamps and sky", lamps + sky, true},
                         Case{"smooth, map", make_sky(files, "map"), true}}) {
     const Scene scene = scene_of(files, bodies, c.smooth, c.lights);
-    const RenderResult lines = run(scene, "silhouettes", 16);
+    const RenderResult lines = run(scene, "silhouettes", 64);
     expect_alike(lines, run(scene, "path", 1024), c.name + ", path");
     expect_alike(lines, run(scene, "rays", 128), c.name + ", rays");
   }
@@ -334,6 +337,39 @@ TEST(LineLight, AgreesWithRaysAndPaths) {
       expect_alike(run(scene, "silhouettes", 16, options), run(scene, "rays", 128, options),
                    fmt::format("open sky {}{}", static_cast<int>(what), smooth ? ", smooth" : ""));
     }
+  }
+}
+
+// Point by point against what is exact (closed_light.h), through lamps, too.
+TEST(LineLight, LampsAgreeWithTheClosedForm) {
+  const TempFiles files;
+  const std::string lamps = square("lamp", 0.6, 90, {0.4, 1.9, 0.3}, area_light("glow", "9, 8, 7")) +
+                            square("side", 0.5, 20, {-0.6, 1.2, -2}, area_light("low", "3, 4, 5"));
+  for (const bool smooth : {false, true}) {
+    const Scene scene = scene_of(
+        files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}, {cube_mesh(), 0.3, {-0.9, 0.3, 0.6}}},
+        smooth, lamps);
+    const Looking look(scene, {.lines = 2048}, true);
+    const ClosedLight closed(scene, 1);
+    const CameraView<double> camera(scene.camera);
+    double worst = 0, sum = 0, apart = 0;
+    for (int i = 0; i < 24 * 24; ++i) {
+      const auto ray = camera.ray((i % 24 + 0.41) * 16 / 24, (i / 24 + 0.37) * 16 / 24);
+      Hit hit;
+      if (!look.tracer->closest(camera_ray(scene, ray), hit)) continue;
+      const auto surface =
+          surface_on_ray<double>(scene, hit.face, Vec3d(ray.origin), Vec3d(ray.direction));
+      const Scattering<double> scattering(surface, -Vec3d(ray.direction), scene.shading);
+      if (scattering.black()) continue;
+      const double exact = closed.scattered(*look.tracer, surface, scattering, nullptr).g;
+      const double found = look.light.direct(surface, scattering, 0.3).g;
+      worst = std::max(worst, std::fabs(found - exact));
+      apart += std::fabs(found - exact), sum += exact;
+    }
+    fmt::print("{} apart {:.2g}, worst {:.2g} of {:.3g}\n", smooth, apart / sum, worst, sum / 576);
+    // What 2048 lines leave.
+    EXPECT_LT(apart, 1e-4 * sum);
+    EXPECT_LT(worst, 0.02 * sum / 576);
   }
 }
 
