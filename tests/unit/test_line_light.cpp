@@ -368,8 +368,8 @@ TEST(LineLight, LampsAgreeWithTheClosedForm) {
     }
     fmt::print("{} apart {:.2g}, worst {:.2g} of {:.3g}\n", smooth, apart / sum, worst, sum / 576);
     // What 2048 lines leave.
-    EXPECT_LT(apart, 1e-4 * sum);
-    EXPECT_LT(worst, 0.02 * sum / 576);
+    EXPECT_LT(apart, 2e-5 * sum);
+    EXPECT_LT(worst, 1e-3 * sum / 576);
   }
 }
 
