@@ -39,9 +39,10 @@ std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSet
                                                  options.method == kMethods[2].name, options);
   }
   if (options.what != RenderWhat::kImage) {
-    throw InputError(fmt::format("the method \"{}\" knows radiance alone: how open the sky is say "
-                                 "silhouettes and rays",
-                                 options.method));
+    throw InputError(
+        fmt::format("the method \"{}\" knows radiance alone: how open the sky is say "
+                    "silhouettes and rays",
+                    options.method));
   }
   std::shared_ptr<const FilmRegions> visible;
   if (options.exact_film) {

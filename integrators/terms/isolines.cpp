@@ -12,9 +12,9 @@ namespace {
 // at once.
 double turns(double x, double y) {
   // atan(q) / (2 pi q) in q^2 up to 1, at Chebyshev's nodes.
-  constexpr double kAtan[] = {0x1.45f306da80e40p-3,  -0x1.b2995638c2552p-5, 0x1.04c1129078b29p-5,
-                              -0x1.7456f62a4f7bcp-6, 0x1.203ce68dcba0fp-6,  -0x1.cabbf29fc846ap-7,
-                              0x1.5df1f4a0511e3p-7,  -0x1.cdca865df2f4ep-8, 0x1.cf2e4dc55986ap-9,
+  constexpr double kAtan[] = {0x1.45f306da80e40p-3,   -0x1.b2995638c2552p-5, 0x1.04c1129078b29p-5,
+                              -0x1.7456f62a4f7bcp-6,  0x1.203ce68dcba0fp-6,  -0x1.cabbf29fc846ap-7,
+                              0x1.5df1f4a0511e3p-7,   -0x1.cdca865df2f4ep-8, 0x1.cf2e4dc55986ap-9,
                               -0x1.2afbb62673c10p-10, 0x1.69f93323740e0p-13};
   const double ax = std::fabs(x), ay = std::fabs(y);
   const double large = ax > ay ? ax : ay, small = ax > ay ? ay : ax;
@@ -64,11 +64,10 @@ void Isolines::build(const Pencil& pencil, int count, double offset, const Conto
   for (int j = count; j > 0; --j) starts_[j] = starts_[j - 1];
   starts_[0] = 0;
   for (int j = 0; j < count; ++j) {
-    std::sort(
-        sorted_.begin() + starts_[j], sorted_.begin() + starts_[j + 1],
-        [](const Crossing& a, const Crossing& b) {
-          return a.cot > b.cot || (a.cot == b.cot && a.change < b.change);
-        });
+    std::sort(sorted_.begin() + starts_[j], sorted_.begin() + starts_[j + 1],
+              [](const Crossing& a, const Crossing& b) {
+                return a.cot > b.cot || (a.cot == b.cot && a.change < b.change);
+              });
   }
 }
 

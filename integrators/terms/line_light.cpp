@@ -13,6 +13,11 @@ namespace limn {
 namespace {
 
 constexpr const char* kInstead = "use another method (rays, path)";
+// A lamp is worth so many times fewer lines than the sky, where listing contours takes longer. With
+// 4, 8, 16, 32 lines the relative error of soft_lamp.xml (64 x 64) after 1.5 s is 5.8, 3.9, 2.5, 2.8
+// parts in 1000; that of ambient occlusion under the pebble after 3 s with 8, 16, 32, 64 lines is
+// 4.6, 1.3, 0.7, 0.2 parts.
+constexpr int kSkyLines = 4;
 // Lamps that are no polygon are cut into their faces. Not tuned.
 constexpr size_t kMostFaces = 64;
 
@@ -69,7 +74,8 @@ Rgb<double> quadrature_piece(const Vec3d& pole, const Vec3d& r, double from, dou
   std::sort(breaks.begin(), breaks.begin() + count);
   Rgb<double> sum;
   for (int i = 0; i + 1 < count; ++i) {
-    const int steps = std::max(1, static_cast<int>(std::ceil((breaks[i + 1] - breaks[i]) / widest)));
+    const int steps =
+        std::max(1, static_cast<int>(std::ceil((breaks[i + 1] - breaks[i]) / widest)));
     const double width = (breaks[i + 1] - breaks[i]) / steps;
     for (int k = 0; k < steps; ++k) {
       for (const auto& q : detail::quadrature()) {
@@ -189,7 +195,8 @@ void LineLight::check(const Scene& scene) {
       refuse(shape.where, fmt::format("{}: only diffuse surfaces are integrated, this is {}: {}",
                                       name_of("shape", shape.id), side->describe(), kInstead));
     }
-    if (scene.shading == ShadingModel::kMitsuba && shape.mesh.normal_source != NormalSource::kFace) {
+    if (scene.shading == ShadingModel::kMitsuba &&
+        shape.mesh.normal_source != NormalSource::kFace) {
       refuse(shape.where, fmt::format("{}: its interpolated normals need --shading continuous",
                                       name_of("shape", shape.id)));
     }
@@ -249,12 +256,12 @@ void LineLight::add_polygon(const LampHull& hull, const Shape& shape) {
 // less what is not. w: of the pole. piece(line, from, to): for one radian of azimuth.
 template <class V, class Piece>
 V LineLight::sum_over_lines(const ContourPoint& at, const Pencil& pencil,
-                            std::span<const Vec3d> planes, int w, const V* all, double offset,
-                            const Piece& piece) const {
+                            std::span<const Vec3d> planes, int w, const V* all, int count,
+                            double offset, const Piece& piece) const {
   Scratch& own = scratch();
   Isolines& lines = own.isolines;
   const bool open = !all || w != 0;
-  const auto once = [&](int count, double shift) {
+  const auto once = [&](double shift) {
     lines.build(pencil, count, shift, at, own.arcs);
     V sum{};
     for (int j = 0; j < count; ++j) {
@@ -271,11 +278,10 @@ V LineLight::sum_over_lines(const ContourPoint& at, const Pencil& pencil,
     }
     return open ? sum : *all - sum;
   };
-  int count = options_.lines;
-  V sum = once(count, offset);
+  V sum = once(offset);
   while (options_.tolerance > 0 && 2 * count <= kMostLines) {
     // The lines between those that there are.
-    const V other = once(count, offset < 0.5 ? offset + 0.5 : offset - 0.5);
+    const V other = once(offset < 0.5 ? offset + 0.5 : offset - 0.5);
     const double apart = size_of(other - sum);
     sum = (sum + other) * 0.5;
     if (!(apart > 2 * options_.tolerance * size_of(sum))) break;
@@ -291,7 +297,7 @@ double LineLight::openness(const ContourPoint& at, double offset) const {
   contours_.list(at, {}, nullptr, own.arcs);
   const int w = contours_.count(at, at.up, nullptr);
   const double sum = sum_over_lines<double>(
-      at, pencil_around(at.up), {&at.up, 1}, w, nullptr, offset,
+      at, pencil_around(at.up), {&at.up, 1}, w, nullptr, options_.lines, offset,
       [](const Isolines::Line&, const Place& from, const Place& to) { return from.c - to.c; });
   return sum / (2 * kPi);
 }
@@ -305,7 +311,7 @@ double LineLight::ambient_occlusion(const ContourPoint& at, const Vec3d& n, doub
   const int w = contours_.count(at, pencil.pole, nullptr);
   const double along = dot(n, pencil.pole);
   const double sum = sum_over_lines<double>(
-      at, pencil, planes, w, nullptr, offset,
+      at, pencil, planes, w, nullptr, options_.lines, offset,
       [&](const Isolines::Line& line, const Place& from, const Place& to) {
         return cosine_piece(along, pencil.pole == n ? 0 : dot(n, line.r), from, to);
       });
@@ -320,18 +326,17 @@ Rgb<double> LineLight::sky_light(const Receiver& receiver, double offset) const 
   const int w = contours_.count(at, pencil.pole, nullptr);
   const Rgb<double> radiance = scene_.environment->radiance(at.up);
   if (receiver.plain) {
-    const double sum = sum_over_lines<double>(
-        at, pencil, planes, w, nullptr, offset,
-        [&](const Isolines::Line&, const Place& from, const Place& to) {
-          return cosine_piece(1, 0, from, to);
-        });
+    const double sum =
+        sum_over_lines<double>(at, pencil, planes, w, nullptr, options_.lines, offset,
+                               [&](const Isolines::Line&, const Place& from, const Place& to) {
+                                 return cosine_piece(1, 0, from, to);
+                               });
     return receiver.scattering.eval(receiver.n) * radiance * sum;
   }
   const Rgb<double> sum = sum_over_lines<Rgb<double>>(
-      at, pencil, planes, w, nullptr, offset,
+      at, pencil, planes, w, nullptr, options_.lines, offset,
       [&](const Isolines::Line& line, const Place& from, const Place& to) {
-        return quadrature_piece(pencil.pole, line.r, from.theta(), to.theta(), kPi,
-                                receiver.kinks,
+        return quadrature_piece(pencil.pole, line.r, from.theta(), to.theta(), kPi, receiver.kinks,
                                 [&](const Vec3d& d) { return receiver.scattering.eval(d); });
       });
   return sum * radiance;
@@ -348,7 +353,7 @@ Rgb<double> LineLight::map_light(const Receiver& receiver, double offset) const 
     const Vec3d planes[] = {at.up};
     const double along = dot(receiver.n, grid.pole);
     const Rgb<double> sum = sum_over_lines<Rgb<double>>(
-        at, pencil, planes, w, nullptr, offset,
+        at, pencil, planes, w, nullptr, options_.lines, offset,
         [&](const Isolines::Line& line, const Place& from, const Place& to) {
           const auto meridian = columns_->meridian(line.r);
           const auto a = columns_->sum(meridian, from.c * turned, from.s);
@@ -361,7 +366,7 @@ Rgb<double> LineLight::map_light(const Receiver& receiver, double offset) const 
   const Environment& sky = *scene_.environment;
   const Vec3d planes[] = {at.up};
   return sum_over_lines<Rgb<double>>(
-      at, pencil, planes, w, nullptr, offset,
+      at, pencil, planes, w, nullptr, options_.lines, offset,
       [&](const Isolines::Line& line, const Place& from, const Place& to) {
         return quadrature_piece(
             pencil.pole, line.r, from.theta(), to.theta(), kPi / (grid.rows - 1), receiver.kinks,
@@ -395,25 +400,26 @@ Rgb<double> LineLight::lamp_light(const Lamp& lamp, const Receiver& receiver, do
   own.arcs.clear();
   contours_.list(at, *cone, &lamp.screen, own.arcs);
   const int w = contours_.count(at, pencil.pole, &lamp.screen);
+  const int lamp_lines = std::max(1, options_.lines / kSkyLines);
   if (own.arcs.empty()) return w == 0 ? all * lamp.radiance : Rgb<double>{};
   if (receiver.plain) {
     const Rgb<double> f = receiver.scattering.eval(receiver.n);
     const double whole = max_channel(f) > 0 ? max_channel(all) / max_channel(f) : 0;
     const double along = dot(receiver.n, pencil.pole);
-    const double sum = sum_over_lines<double>(
-        at, pencil, own.planes, w, &whole, offset,
-        [&](const Isolines::Line& line, const Place& from, const Place& to) {
-          return cosine_piece(along, dot(receiver.n, line.r), from, to);
-        });
+    const double sum =
+        sum_over_lines<double>(at, pencil, own.planes, w, &whole, lamp_lines, offset,
+                               [&](const Isolines::Line& line, const Place& from, const Place& to) {
+                                 return cosine_piece(along, dot(receiver.n, line.r), from, to);
+                               });
     return f * lamp.radiance * sum;
   }
   return lamp.radiance *
          sum_over_lines<Rgb<double>>(
-             at, pencil, own.planes, w, &all, offset,
+             at, pencil, own.planes, w, &all, lamp_lines, offset,
              [&](const Isolines::Line& line, const Place& from, const Place& to) {
-               return quadrature_piece(
-                   pencil.pole, line.r, from.theta(), to.theta(), kPi, receiver.kinks,
-                   [&](const Vec3d& d) { return receiver.scattering.eval(d); });
+               return quadrature_piece(pencil.pole, line.r, from.theta(), to.theta(), kPi,
+                                       receiver.kinks,
+                                       [&](const Vec3d& d) { return receiver.scattering.eval(d); });
              });
 }
 

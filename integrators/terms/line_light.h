@@ -17,7 +17,7 @@
 namespace limn {
 
 struct LineOptions {
-  int lines = 16;  // of one pencil
+  int lines = 64;  // through the sky; a quarter of them through a lamp
   // Above 0: lines are doubled until the results of two halves differ by at most twice this part of
   // the result. That is no more unbiased.
   double tolerance = 0;
@@ -66,7 +66,7 @@ class LineLight {
   Rgb<double> map_light(const Receiver& receiver, double offset) const;
   template <class V, class Piece>
   V sum_over_lines(const ContourPoint& at, const Pencil& pencil, std::span<const Vec3d> planes,
-                   int w, const V* all, double offset, const Piece& piece) const;
+                   int w, const V* all, int count, double offset, const Piece& piece) const;
 
   const Scene& scene_;
   Contours contours_;

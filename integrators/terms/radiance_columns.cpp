@@ -61,7 +61,9 @@ RadianceColumns::Sum RadianceColumns::sum(const Meridian& at, double cos_theta,
   const int row = std::clamp(static_cast<int>(theta / step_), 0, grid_.rows - 2);
   const Moments &m = at_rows_[row], n = moments(theta, cos_theta, sin_theta);
   // Along the meridian between two columns the map is linear, too.
-  const auto mix = [&](const Rgb<double>& a, const Rgb<double>& b) { return a + (b - a) * at.share; };
+  const auto mix = [&](const Rgb<double>& a, const Rgb<double>& b) {
+    return a + (b - a) * at.share;
+  };
   const Rgb<double> here = mix(texel(at.first, row), texel(at.second, row));
   const Rgb<double> below = mix(texel(at.first, row + 1), texel(at.second, row + 1));
   const Rgb<double> slope = (below - here) * (1 / step_);

@@ -108,14 +108,13 @@ int count_faces(const Scene& scene, const ContourPoint& at, const Vec3d& w, doub
 
 std::vector<std::pair<std::string, std::vector<Body>>> hard_bodies() {
   const Vec3d up{0.1, 1.2, -0.2};
-  return {
-      {"closed", {{torus_mesh(20, 10), 1, up}}},
-      {"concave and open", {{cap_mesh(2), 1, up}, {grid_mesh(3), 0.6, {0.5, 0.4, 0.3}}}},
-      {"inside out", {{reversed(icosphere_mesh(2)), 0.8, up}}},
-      {"crossing", {{cube_mesh(), 0.7, up}, {torus_mesh(12, 8), 0.9, up}}},
-      {"touching", {{cube_mesh(), 0.5, {0, 0.5, 0}}, {cube_mesh(), 0.25, {0, 1.25, 0}}}},
-      {"seams and copies", {{seam_split(joined(cube_mesh(), cube_mesh())), 0.6, up}}},
-      {"room", {{cube_mesh(), 8, {0, 7, 0}}, {icosphere_mesh(1), 0.7, up}}}};
+  return {{"closed", {{torus_mesh(20, 10), 1, up}}},
+          {"concave and open", {{cap_mesh(2), 1, up}, {grid_mesh(3), 0.6, {0.5, 0.4, 0.3}}}},
+          {"inside out", {{reversed(icosphere_mesh(2)), 0.8, up}}},
+          {"crossing", {{cube_mesh(), 0.7, up}, {torus_mesh(12, 8), 0.9, up}}},
+          {"touching", {{cube_mesh(), 0.5, {0, 0.5, 0}}, {cube_mesh(), 0.25, {0, 1.25, 0}}}},
+          {"seams and copies", {{seam_split(joined(cube_mesh(), cube_mesh())), 0.6, up}}},
+          {"room", {{cube_mesh(), 8, {0, 7, 0}}, {icosphere_mesh(1), 0.7, up}}}};
 }
 
 // From one direction to any other: what contours say changes W as the faces themselves do.
@@ -193,7 +192,8 @@ TEST(LineLight, ClosedFormsOfOpenSky) {
   EXPECT_NEAR(nothing.light.ambient_occlusion(at, at.up, 0.3), 1, 1e-14);
 
   // A square over the floor, seen from below.
-  const Mesh roof = make_mesh({{-1, 1, -1}, {1, 1, -1}, {1, 1, 1}, {-1, 1, 1}}, {{0, 1, 2}, {0, 2, 3}});
+  const Mesh roof =
+      make_mesh({{-1, 1, -1}, {1, 1, -1}, {1, 1, 1}, {-1, 1, 1}}, {{0, 1, 2}, {0, 2, 3}});
   const std::vector<Vec3d> corners = {{-1, 1, -1}, {1, 1, -1}, {1, 1, 1}, {-1, 1, 1}};
   const Scene under = scene_of(files, {{roof}});
   const Looking look(under, {.lines = 4096});
@@ -311,8 +311,9 @@ void expect_alike(const RenderResult& a, const RenderResult& b, const std::strin
 
 TEST(LineLight, AgreesWithRaysAndPaths) {
   const TempFiles files;
-  const std::string lamps = square("lamp", 0.6, 90, {0.4, 2.9, 0.3}, area_light("glow", "9, 8, 7")) +
-                            square("side", 0.5, 0, {-0.6, 1.2, -2}, area_light("low", "3, 4, 5"));
+  const std::string lamps =
+      square("lamp", 0.6, 90, {0.4, 2.9, 0.3}, area_light("glow", "9, 8, 7")) +
+      square("side", 0.5, 0, {-0.6, 1.2, -2}, area_light("low", "3, 4, 5"));
   const std::string sky = constant_light("sky", "0.3, 0.4, 0.5");
   const std::vector<Body> bodies = {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}},
                                     {cube_mesh(), 0.3, {-0.9, 0.3, 0.6}}};
@@ -343,13 +344,14 @@ TEST(LineLight, AgreesWithRaysAndPaths) {
 // Point by point against what is exact (closed_light.h), through lamps, too.
 TEST(LineLight, LampsAgreeWithTheClosedForm) {
   const TempFiles files;
-  const std::string lamps = square("lamp", 0.6, 90, {0.4, 1.9, 0.3}, area_light("glow", "9, 8, 7")) +
-                            square("side", 0.5, 20, {-0.6, 1.2, -2}, area_light("low", "3, 4, 5"));
+  const std::string lamps =
+      square("lamp", 0.6, 90, {0.4, 1.9, 0.3}, area_light("glow", "9, 8, 7")) +
+      square("side", 0.5, 20, {-0.6, 1.2, -2}, area_light("low", "3, 4, 5"));
   for (const bool smooth : {false, true}) {
     const Scene scene = scene_of(
         files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}, {cube_mesh(), 0.3, {-0.9, 0.3, 0.6}}},
         smooth, lamps);
-    const Looking look(scene, {.lines = 2048}, true);
+    const Looking look(scene, {.lines = 8192}, true);
     const ClosedLight closed(scene, 1);
     const CameraView<double> camera(scene.camera);
     double worst = 0, sum = 0, apart = 0;
@@ -393,8 +395,8 @@ TEST(LineLight, ScaleAndPlaceDoNotMatter) {
   RenderOptions options;
   options.what = RenderWhat::kAmbientOcclusion;
   const RenderResult plain = run(scene_of(files, bodies), "silhouettes", 2, options);
-  for (const auto& [unit, shift] : std::vector<std::pair<double, Vec3d>>{
-           {1024, {}}, {1.0 / 1024, {}}, {1, {16, -32, 64}}}) {
+  for (const auto& [unit, shift] :
+       std::vector<std::pair<double, Vec3d>>{{1024, {}}, {1.0 / 1024, {}}, {1, {16, -32, 64}}}) {
     const RenderResult moved =
         run(scene_of(files, bodies, false, "", unit, shift), "silhouettes", 2, options);
     for (size_t i = 0; i < plain.radiance.size(); ++i) {
@@ -406,8 +408,8 @@ TEST(LineLight, ScaleAndPlaceDoNotMatter) {
 
 TEST(LineLight, ThreadsDoNotMatter) {
   const TempFiles files;
-  const Scene scene = scene_of(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, true,
-                               make_sky(files, "map"));
+  const Scene scene =
+      scene_of(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, true, make_sky(files, "map"));
   for (const std::string method : {"silhouettes", "rays"}) {
     const RenderResult one = run(scene, method, 3), three = run(scene, method, 3, {}, 3);
     for (size_t i = 0; i < one.radiance.size(); ++i) {
@@ -439,7 +441,8 @@ TEST(LineLight, SaysWhatItDoesNotKnow) {
       R"(<emitter type="point" id="bulb"><point name="position" value="0, 3, 0"/></emitter>)");
   EXPECT_NE(refused(point, lines).find("\"bulb\""), std::string::npos);
   EXPECT_NE(refused(point, rays).find("\"bulb\""), std::string::npos);
-  const Scene metal = scene_of(files, {}, false, square("mirror", 1, 0, {0, 1, 0}, conductor("m", 0.1)));
+  const Scene metal =
+      scene_of(files, {}, false, square("mirror", 1, 0, {0, 1, 0}, conductor("m", 0.1)));
   EXPECT_NE(refused(metal, lines).find("\"mirror\""), std::string::npos);
   EXPECT_EQ(refused(metal, rays), "");
   const Scene ball = scene_of(files, {}, false,

@@ -274,11 +274,11 @@ class CompareCommand final : public Command {
 void CompareCommand::add_options(CLI::App& app, bool all) {
   add_common_options(app, common_);
   app.remove_option(app.get_option("--sensor"));  // Mitsuba's methods take the first
-  auto* wrt = app.add_option("--wrt", command_.parameter, "Parameter to differentiate")
-                  ->type_name("PARAM");
-  app.add_flag("--image", command_.images,
-               "Compare images, not derivatives; methods are those of render: " +
-                   image_method_names())
+  auto* wrt =
+      app.add_option("--wrt", command_.parameter, "Parameter to differentiate")->type_name("PARAM");
+  app.add_flag(
+         "--image", command_.images,
+         "Compare images, not derivatives; methods are those of render: " + image_method_names())
       ->excludes(wrt);
   add_image_options(app, command_.what, command_.render);
   app.add_option("--methods", command_.methods,

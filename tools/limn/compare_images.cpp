@@ -50,9 +50,10 @@ void print_images(const ImageComparison& result) {
   }
 }
 
-void write_images(const ImageCompareArguments& arguments, const Scene& scene, const RunSettings& settings,
-           const ImageComparison& result, const CommonOptions& common, const Warnings& warnings,
-           const std::string& command_line) {
+void write_images(const ImageCompareArguments& arguments, const Scene& scene,
+                  const RunSettings& settings, const ImageComparison& result,
+                  const CommonOptions& common, const Warnings& warnings,
+                  const std::string& command_line) {
   const auto path = [&](const std::string& name) {
     return (fs::path(arguments.output) / name).string();
   };
@@ -75,8 +76,7 @@ void write_images(const ImageCompareArguments& arguments, const Scene& scene, co
                     {"spp", row.spp},
                     {"relative_squared_error", row.squared_error},
                     {"standard_error", row.squared_error_stderr}});
-    const bool longest =
-        i + 1 == result.rows.size() || result.rows[i + 1].method != row.method;
+    const bool longest = i + 1 == result.rows.size() || result.rows[i + 1].method != row.method;
     if (longest) write_image(row.method, row.image, row.method, std::llround(row.spp));
   }
   const nlohmann::json report = {{"command", command_line},
@@ -109,7 +109,8 @@ void add_image_options(CLI::App& app, std::string& what, RenderOptions& options)
                  "openness of the sky (methods silhouettes and rays)")
       ->check(CLI::IsMember({"image", "direct", "ao", "openness"}))
       ->capture_default_str();
-  app.add_option("--lines", options.lines, "silhouettes: lines through the sky, or a lamp")
+  app.add_option("--lines", options.lines,
+                 "silhouettes: lines through the sky, a quarter of them through a lamp")
       ->check(CLI::Range(1, 1 << 14))
       ->capture_default_str();
   app.add_option("--tolerance", options.tolerance,

@@ -46,10 +46,10 @@ struct RenderOptions {
   // a box filter.
   bool exact_film = false;
   RenderWhat what = RenderWhat::kImage;  // InputError where the method does not know it
-  // silhouettes: lines of one pencil, at most 16384. With a tolerance above 0 they are doubled until
-  // two halves differ by at most twice this part of the result; what is left of the error is no
-  // longer without bias.
-  int lines = 16;
+  // silhouettes: lines through the sky, at most 16384; a quarter of them through a lamp. With a
+  // tolerance above 0 they are doubled until two halves differ by at most twice this part of the
+  // result; what is left of the error is no longer without bias.
+  int lines = 64;
   double tolerance = 0;
   int rays = 4;  // rays: of each point, and each lamp
 };
