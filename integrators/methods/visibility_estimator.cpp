@@ -14,6 +14,8 @@ namespace {
 
 // Dimensions of a sample's points: on the film; lines' offset, or a ray's two numbers.
 constexpr int kFilm = 0, kOffset = 2, kRay = 2;
+// Points of the film for lamps for one for the sky, where there are both.
+constexpr int kLampPoints = 16;
 
 void check_rays(const Scene& scene) {
   if (scene.max_depth != 2) {
@@ -84,16 +86,39 @@ void VisibilityEstimator::add_pixels(std::span<const KeyedSample> samples, Sampl
   sink.cost(0).samples += samples.size();
 }
 
+// Lines through the sky take the time of some tens of those through lamps, while most of what is
+// left to the film is the rims of shadows of lamps: so these get more points of the film.
 Rgb<double> VisibilityEstimator::sample(const KeyedSample& one, SampleSink& sink,
                                         RayCount& rays) const {
-  const auto& [at, key] = one;
+  const PixelSample& at = one.at;
   const uint64_t pixel = static_cast<uint64_t>(at.y) << 32 | static_cast<uint32_t>(at.x);
-  const ScrambledSobol points(mix_bits(mix_bits(seed_ + 1) + pixel));
-  FilmPosition film = sample_pixel_filter(scene_.film, at.x, at.y, key);
+  const uint64_t key = mix_bits(mix_bits(seed_ + 1) + pixel);
+  const ScrambledSobol points(key);
+  const bool split =
+      lines_ && lines_->has_lamps() && scene_.environment && options_.what == RenderWhat::kImage;
+  if (!split) return film_point(one, points, at.s, Part::kAll, sink, rays);
+  Rgb<double> sum;
+  for (int k = 0; k < kLampPoints; ++k) {
+    sum += film_point(one, points, at.s * kLampPoints + k, Part::kNoSky, sink, rays);
+  }
+  return sum * (1.0 / kLampPoints) +
+         film_point(one, ScrambledSobol(mix_bits(key)), at.s, Part::kSky, sink, rays);
+}
+
+Rgb<double> VisibilityEstimator::film_point(const KeyedSample& one, const ScrambledSobol& points,
+                                            uint64_t number, Part part, SampleSink& sink,
+                                            RayCount& rays) const {
+  const auto& [at, key] = one;
+  FilmPosition film;
   if (scene_.film.filter.kind == Filter::Kind::kBox) {
     const auto x = scene_.film.range_x(at.x), y = scene_.film.range_y(at.y);
-    film = {at.x + 0.5 + x.lower + (x.upper - x.lower) * points.at(at.s, kFilm),
-            at.y + 0.5 + y.lower + (y.upper - y.lower) * points.at(at.s, kFilm + 1)};
+    film = {at.x + 0.5 + x.lower + (x.upper - x.lower) * points.at(number, kFilm),
+            at.y + 0.5 + y.lower + (y.upper - y.lower) * points.at(number, kFilm + 1)};
+  } else {
+    const bool first = part != Part::kNoSky || number % kLampPoints == 0;
+    const Rng rng =
+        first ? key : key.at(Purpose::kFilmCopy, static_cast<int>(number % kLampPoints));
+    film = sample_pixel_filter(scene_.film, at.x, at.y, rng);
   }
   const auto start = camera_.ray(film.x, film.y);
   const Vec3d origin = start.origin, direction = start.direction;
@@ -102,7 +127,7 @@ Rgb<double> VisibilityEstimator::sample(const KeyedSample& one, SampleSink& sink
   ++rays.closest;
   if (!tracer_->closest(camera_ray(scene_, start), hit)) {
     if (!image) return grey(1.0);
-    const bool sky = scene_.environment && !scene_.hide_emitters;
+    const bool sky = scene_.environment && !scene_.hide_emitters && part != Part::kSky;
     return sky ? scene_.environment->radiance(direction) : Rgb<double>{};
   }
   const auto surface = surface_on_ray<double>(scene_, hit.face, origin, direction);
@@ -113,7 +138,7 @@ Rgb<double> VisibilityEstimator::sample(const KeyedSample& one, SampleSink& sink
                   front ? surface.n_s : -surface.n_s,
                   scattering,
                   points,
-                  static_cast<uint64_t>(at.s),
+                  number,
                   rays};
   if (sink.log()) {
     sink.log()->push_back(fmt::format("film {:.6f} {:.6f}: a point at ({:.9g}, {:.9g}, {:.9g})",
@@ -121,16 +146,21 @@ Rgb<double> VisibilityEstimator::sample(const KeyedSample& one, SampleSink& sink
   }
   Rgb<double> sum;
   if (image) {
-    sum = surface.emission(-direction, scene_.shading);
+    if (part != Part::kSky) sum = surface.emission(-direction, scene_.shading);
     if (scattering.black()) return sum;
   }
-  return sum + (lines_ ? by_lines(seen) : by_rays(seen));
+  return sum + (lines_ ? by_lines(seen, part) : by_rays(seen));
 }
 
-Rgb<double> VisibilityEstimator::by_lines(const Seen& seen) const {
+Rgb<double> VisibilityEstimator::by_lines(const Seen& seen, Part part) const {
   const double offset = seen.points.at(seen.sample, kOffset);
   if (options_.what == RenderWhat::kImage) {
-    return lines_->direct(seen.surface, seen.scattering, offset);
+    Rgb<double> sum;
+    if (part != Part::kSky) sum = lines_->lamps(seen.surface, seen.scattering, offset);
+    if (part != Part::kNoSky) {
+      sum += lines_->environment(seen.surface, seen.scattering, offset);
+    }
+    return sum;
   }
   const ContourPoint at = lines_->at(seen.surface, seen.up);
   return grey(options_.what == RenderWhat::kOpenness

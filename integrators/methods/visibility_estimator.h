@@ -40,8 +40,13 @@ class VisibilityEstimator final : public SampleEstimator {
     std::vector<double> areas;  // summed over its faces
   };
   void add_lamps();
+  // What one point of the film shows of it all; of all but light of the environment that is
+  // scattered; of that alone.
+  enum class Part { kAll, kNoSky, kSky };
   Rgb<double> sample(const KeyedSample& at, SampleSink& sink, RayCount& rays) const;
-  Rgb<double> by_lines(const Seen& seen) const;
+  Rgb<double> film_point(const KeyedSample& at, const ScrambledSobol& points, uint64_t number,
+                         Part part, SampleSink& sink, RayCount& rays) const;
+  Rgb<double> by_lines(const Seen& seen, Part part) const;
   Rgb<double> by_rays(const Seen& seen) const;
   Rgb<double> lamp_ray(const RayLamp& lamp, const Seen& seen, double u1, double u2) const;
   Rgb<double> sky_ray(const Seen& seen, double u1, double u2) const;

@@ -7,6 +7,7 @@
 // number at every crossing; the sky is open where it is zero. Places on a line are told by
 // cot theta = (pole . w) / (r . w), which falls from infinity to -infinity and needs no root.
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 

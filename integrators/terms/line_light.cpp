@@ -423,17 +423,28 @@ Rgb<double> LineLight::lamp_light(const Lamp& lamp, const Receiver& receiver, do
              });
 }
 
-Rgb<double> LineLight::direct(const SurfacePoint<double>& surface,
-                              const Scattering<double>& scattering, double offset) const {
+LineLight::Receiver LineLight::receiver_at(const SurfacePoint<double>& surface,
+                                           const Scattering<double>& scattering) const {
   const bool front = dot(surface.n_g, scattering.wi()) > 0;
-  const Receiver receiver(surface, scattering, at(surface, front ? surface.n_g : -surface.n_g));
+  return {surface, scattering, at(surface, front ? surface.n_g : -surface.n_g)};
+}
+
+Rgb<double> LineLight::lamps(const SurfacePoint<double>& surface,
+                             const Scattering<double>& scattering, double offset) const {
+  const Receiver receiver = receiver_at(surface, scattering);
   Rgb<double> sum;
   for (const Lamp& lamp : lamps_) sum += lamp_light(lamp, receiver, offset);
-  if (!scene_.environment) return sum;
+  return sum;
+}
+
+Rgb<double> LineLight::environment(const SurfacePoint<double>& surface,
+                                   const Scattering<double>& scattering, double offset) const {
+  if (!scene_.environment) return {};
+  const Receiver receiver = receiver_at(surface, scattering);
   Scratch& own = scratch();
   own.arcs.clear();
   contours_.list(receiver.at, {}, nullptr, own.arcs);
-  return sum + (columns_ ? map_light(receiver, offset) : sky_light(receiver, offset));
+  return columns_ ? map_light(receiver, offset) : sky_light(receiver, offset);
 }
 
 }  // namespace limn

@@ -26,7 +26,7 @@ inline constexpr int kMostLines = 1 << 14;
 
 class LineLight {
  public:
-  // The scene and its tracer must outlive it. direct: whether direct() is to be asked.
+  // The scene and its tracer must outlive it. direct: whether lamps() and environment() are to be asked.
   LineLight(const Scene& scene, const RayTracer& tracer, int threads, const LineOptions& options,
             bool direct);
 
@@ -40,10 +40,13 @@ class LineLight {
   // The same weighed by the cosine to the shading normal n, over pi; with n = up it is 1 in the
   // open.
   double ambient_occlusion(const ContourPoint& at, const Vec3d& n, double offset) const;
-  // Radiance that the surface scatters towards the viewer of `scattering`, of all lights seen
-  // directly [W / (m^2 sr)].
-  Rgb<double> direct(const SurfacePoint<double>& surface, const Scattering<double>& scattering,
-                     double offset) const;
+  // Radiance that the surface scatters towards the viewer of `scattering`, of all lamps, or of the
+  // environment, seen directly [W / (m^2 sr)].
+  Rgb<double> lamps(const SurfacePoint<double>& surface, const Scattering<double>& scattering,
+                    double offset) const;
+  Rgb<double> environment(const SurfacePoint<double>& surface, const Scattering<double>& scattering,
+                          double offset) const;
+  bool has_lamps() const { return !lamps_.empty(); }
 
   ContourPoint at(const SurfacePoint<double>& surface, const Vec3d& up) const {
     return contours_.at(surface, up);
@@ -56,6 +59,8 @@ class LineLight {
     ContourScreen screen;
   };
   struct Receiver;
+  Receiver receiver_at(const SurfacePoint<double>& surface,
+                       const Scattering<double>& scattering) const;
   struct Scratch;
   static Scratch& scratch();
 

@@ -9,6 +9,7 @@
 #include "integrators/terms/camera_path.h"
 #include "integrators/terms/closed_light.h"
 #include "limn/core/error.h"
+#include "limn/integrators/compare_images.h"
 #include "limn/integrators/render.h"
 #include "support/compare_moments.h"
 #include "support/meshes.h"
@@ -364,7 +365,7 @@ TEST(LineLight, LampsAgreeWithTheClosedForm) {
       const Scattering<double> scattering(surface, -Vec3d(ray.direction), scene.shading);
       if (scattering.black()) continue;
       const double exact = closed.scattered(*look.tracer, surface, scattering, nullptr).g;
-      const double found = look.light.direct(surface, scattering, 0.3).g;
+      const double found = look.light.lamps(surface, scattering, 0.3).g;
       worst = std::max(worst, std::fabs(found - exact));
       apart += std::fabs(found - exact), sum += exact;
     }
@@ -452,6 +453,45 @@ TEST(LineLight, SaysWhatItDoesNotKnow) {
   RenderOptions ao;
   ao.what = RenderWhat::kAmbientOcclusion;
   EXPECT_NE(refused(deep, ao).find("silhouettes and rays"), std::string::npos);
+}
+
+// Rows of all methods and times; more time leaves less error; a method is no worse than its own
+// samples are apart.
+TEST(CompareImages, RowsAndErrors) {
+  const TempFiles files;
+  const Scene scene =
+      scene_of(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, false,
+               square("lamp", 0.6, 90, {0.4, 2.9, 0.3}, area_light("glow", "9, 8, 7")));
+  ImageCompareOptions options;
+  options.methods = {"path", "rays", "silhouettes"};
+  options.times = {0.02, 0.2};
+  options.repeats = 2;
+  options.reference_seconds = 1;
+  RunSettings settings;
+  settings.seed = 5;
+  const ImageComparison result = compare_images(scene, options, settings);
+  EXPECT_EQ(result.reference_method, "rays");
+  ASSERT_EQ(result.rows.size(), 6u);
+  for (int m = 0; m < 3; ++m) {
+    const ComparedImage &first = result.rows[2 * m], &second = result.rows[2 * m + 1];
+    EXPECT_EQ(first.method, options.methods[m]);
+    EXPECT_EQ(second.method, options.methods[m]);
+    EXPECT_EQ(second.time, 0.2);
+    EXPECT_GT(second.spp, first.spp);
+    EXPECT_LT(second.squared_error, first.squared_error);
+    EXPECT_EQ(second.image.size(), result.reference.size());
+    fmt::print("{} {:.3g} {:.3g}\n", second.method, first.squared_error, second.squared_error);
+  }
+  // Paths are independent: n times as many have an n-th of the squared error, and one the variance.
+  const RenderResult paths = run(scene, "path", 512);
+  double variance = 0, squares = 0;
+  for (size_t i = 0; i < paths.radiance.size(); ++i) {
+    variance += paths.radiance.variance(i) * 512;
+    squares += result.reference[i] * result.reference[i];
+  }
+  EXPECT_NEAR(result.rows[0].squared_error * result.rows[0].spp * squares / variance, 1, 0.5);
+  options.methods = {"analytic", "none"};
+  EXPECT_THROW(compare_images(scene, options, settings), InputError);
 }
 
 // Every power of two of points, from the first on, has one in each equal part of each dimension,
