@@ -29,15 +29,48 @@ double turns(double x, double y) {
 
 }  // namespace
 
+AzimuthWarp::AzimuthWarp(std::span<const double> weights) {
+  double sum = 0;
+  for (const double w : weights) sum += w;
+  const double count = static_cast<double>(weights.size());
+  double before = 0;
+  for (const double w : weights) {
+    before_.push_back(before);
+    densities_.push_back(sum > 0 ? 0.5 + 0.5 * w * count / sum : 1);
+    before += densities_.back() / count;
+  }
+  before_.push_back(1);
+}
+
+double AzimuthWarp::share(double turn) const {
+  const size_t i = part(turn);
+  const double into = turn - static_cast<double>(i) / static_cast<double>(densities_.size());
+  return std::fmin(before_[i] + into * densities_[i], before_[i + 1]);
+}
+
+double AzimuthWarp::turn(double share) const {
+  const auto above = std::upper_bound(before_.begin() + 1, before_.end() - 1, share);
+  const auto i = static_cast<size_t>(above - before_.begin()) - 1;
+  return static_cast<double>(i) / static_cast<double>(densities_.size()) +
+         (share - before_[i]) / densities_[i];
+}
+
+double Isolines::in_lines(double turn) const {
+  return (pencil_.warp ? pencil_.warp->share(turn) : turn) * size() - offset_;
+}
+
 void Isolines::build(const Pencil& pencil, int count, double offset, const ContourPoint& at,
                      std::span<const ContourArc> arcs) {
   pencil_ = pencil;
+  offset_ = offset;
   lines_.resize(count);
   cosines_.resize(count);
   sines_.resize(count);
-  const double step = 2 * kPi / count;
   for (int j = 0; j < count; ++j) {
-    const double psi = step * (j + offset);
+    const double share = (j + offset) / count;
+    const double turn = pencil.warp ? pencil.warp->turn(share) : share;
+    const double step = 2 * kPi / (count * (pencil.warp ? pencil.warp->density(turn) : 1));
+    const double psi = 2 * kPi * turn;
     const double c = cosines_[j] = std::cos(psi), s = sines_[j] = std::sin(psi);
     const double x = pencil.su * c, y = pencil.sv * s, size2 = x * x + y * y;
     lines_[j] = {(pencil.u * x + pencil.v * y) / std::sqrt(size2),
@@ -47,8 +80,7 @@ void Isolines::build(const Pencil& pencil, int count, double offset, const Conto
   for (size_t i = 0; i < arcs.size(); ++i) {
     for (const bool end : {false, true}) {
       const Vec3d& w = end ? arcs[i].w1 : arcs[i].w0;
-      azimuths_[2 * i + end] =
-          turns(dot(pencil.u, w) * pencil.sv, dot(pencil.v, w) * pencil.su) * count - offset;
+      azimuths_[2 * i + end] = turns(dot(pencil.u, w) * pencil.sv, dot(pencil.v, w) * pencil.su);
     }
   }
   found_.clear();
@@ -71,23 +103,24 @@ void Isolines::build(const Pencil& pencil, int count, double offset, const Conto
   }
 }
 
-// The arc runs the short way around the pole: q0, q1 are its ends in lines, and it meets those with
-// numbers above the one and up to the other.
-void Isolines::cross(const ContourArc& arc, double q0, double q1, const ContourPoint& at) {
+// The arc runs the short way around the pole and meets the lines with numbers above the one end's
+// and up to the other's.
+void Isolines::cross(const ContourArc& arc, double turn0, double turn1, const ContourPoint& at) {
   const int count = size();
-  double way = q1 - q0;
-  if (way > 0.5 * count) way -= count;
-  if (way < -0.5 * count) way += count;
+  double way = turn1 - turn0;
+  if (way > 0.5) way -= 1;
+  if (way < -0.5) way += 1;
   // Past the pole to rounding: on the side that a count of faces at the pole saw it.
-  if (std::fabs(way) > 0.499999 * count) {
+  if (std::fabs(way) > 0.499999) {
     const double turned =
         side_of_edge(at.p + arc.w0, at.p + arc.w1, at.p, pencil_.pole) * std::fabs(way);
-    if (turned * way < 0) way = turned > 0 ? way + count : way - count;
+    if (turned * way < 0) way = turned > 0 ? way + 1 : way - 1;
   }
   if (way == 0) return;
-  // A wound line that starts outward on the side s . pole > 0 ends on the other.
+  // What starts outward on the side s . pole > 0 ends on the other.
   const int change = way > 0 ? -arc.jump : arc.jump;
-  const double first = way > 0 ? q0 : q1, last = way > 0 ? q0 + way : q1 - way;
+  const double from = way > 0 ? turn0 : turn1, to = way > 0 ? turn1 : turn0;
+  const double first = in_lines(from), last = in_lines(to) + (to < from ? count : 0);
   const double a0 = dot(pencil_.pole, arc.w0), a1 = dot(pencil_.pole, arc.w1);
   const double x0 = dot(pencil_.u, arc.w0), x1 = dot(pencil_.u, arc.w1);
   const double y0 = dot(pencil_.v, arc.w0), y1 = dot(pencil_.v, arc.w1);

@@ -15,12 +15,31 @@
 
 namespace limn {
 
+// Azimuths spread by a density that is constant over equal parts of a turn.
+class AzimuthWarp {
+ public:
+  // weights: of each part, not negative; half of the density goes by them, half is uniform.
+  explicit AzimuthWarp(std::span<const double> weights);
+  // The share of the density before an azimuth [turns, 0 to 1]; its inverse; the density there.
+  double share(double turn) const;
+  double turn(double share) const;
+  double density(double turn) const { return densities_[part(turn)]; }
+
+ private:
+  size_t part(double turn) const {
+    const auto i = static_cast<size_t>(turn * static_cast<double>(densities_.size()));
+    return i < densities_.size() ? i : densities_.size() - 1;
+  }
+  std::vector<double> densities_, before_;
+};
+
 // The pole, and how azimuths are spread: psi in [0, 1) turns stands for the direction of
 // u su cos psi + v sv sin psi, so that lines are dense where a long region of directions ends far
 // from the pole. Unit vectors, right-handed: u x v = pole.
 struct Pencil {
   Vec3d pole, u, v;
   double su = 1, sv = 1;
+  const AzimuthWarp* warp = nullptr;  // of psi; null: none
 };
 
 class Isolines {
@@ -34,7 +53,7 @@ class Isolines {
     int change;  // of W, away from the pole
   };
 
-  // Lines at psi = (j + offset) / count, 0 <= offset < 1, and all crossings, in their order.
+  // Lines at psi = (j + offset) / count, or where the warp puts these, 0 <= offset < 1, and all crossings, in their order.
   void build(const Pencil& pencil, int count, double offset, const ContourPoint& at,
              std::span<const ContourArc> arcs);
 
@@ -68,12 +87,14 @@ class Isolines {
     int change;
     double cot;
   };
-  void cross(const ContourArc& arc, double q0, double q1, const ContourPoint& at);
+  void cross(const ContourArc& arc, double turn0, double turn1, const ContourPoint& at);
+  double in_lines(double turn) const;
 
   Pencil pencil_;
+  double offset_ = 0;
   std::vector<Line> lines_;
   std::vector<double> cosines_, sines_;  // of psi
-  std::vector<double> azimuths_;         // of both ends of every arc, in lines
+  std::vector<double> azimuths_;         // of both ends of every arc [turns]
   std::vector<Found> found_;
   std::vector<uint32_t> starts_;  // size() + 1
   std::vector<Crossing> sorted_;

@@ -212,7 +212,13 @@ LineLight::LineLight(const Scene& scene, const RayTracer& tracer, int threads,
     if (shape.is_emitter) add_lamp(shape);
   }
   const Environment* sky = scene.environment.get();
-  if (sky && sky->grid()) columns_ = std::make_unique<RadianceColumns>(*sky);
+  if (!sky || !sky->grid()) return;
+  columns_ = std::make_unique<RadianceColumns>(*sky);
+  std::vector<double> brightness = columns_->brightness();
+  for (int k = 0; k < 2; ++k) {
+    warps_.emplace_back(brightness);
+    std::reverse(brightness.begin(), brightness.end());
+  }
 }
 
 void LineLight::add_lamp(const Shape& shape) {
@@ -347,7 +353,9 @@ Rgb<double> LineLight::map_light(const Receiver& receiver, double offset) const 
   const ContourPoint& at = receiver.at;
   const Environment::Grid& grid = columns_->grid();
   const double turned = dot(at.up, grid.pole) >= 0 ? 1 : -1;
-  const Pencil pencil = pencil_around(grid.pole * turned);
+  // Around one pole azimuths run as columns do, around the other they run back.
+  const Vec3d pole = grid.pole * turned, quarter = cross(pole, grid.zero);
+  const Pencil pencil{pole, grid.zero, quarter, 1, 1, &warps_[dot(quarter, grid.quarter) < 0]};
   const int w = contours_.count(at, pencil.pole, nullptr);
   if (receiver.plain) {
     const Vec3d planes[] = {at.up};

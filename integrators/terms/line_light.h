@@ -78,6 +78,8 @@ class LineLight {
   LineOptions options_;
   std::vector<Lamp> lamps_;
   std::unique_ptr<RadianceColumns> columns_;  // of a map
+  // Lines from its pole, and from the opposite one, dense where it is bright.
+  std::vector<AzimuthWarp> warps_;
 };
 
 }  // namespace limn

@@ -45,6 +45,21 @@ RadianceColumns::RadianceColumns(const Environment& environment)
   }
 }
 
+std::vector<double> RadianceColumns::brightness() const {
+  const int columns = grid_.columns;
+  std::vector<double> own(columns), spread(columns);
+  for (int i = 0; i < columns; ++i) {
+    const Rgb<double>& sum = sums_[static_cast<size_t>(i + 1) * grid_.rows - 1].across;
+    own[i] = std::fmax(luminance(sum), 0.0);
+  }
+  // Radiance of a column reaches to the next on both sides.
+  for (int i = 0; i < columns; ++i) {
+    const int before = i > 0 ? i - 1 : columns - 1, next = i + 1 < columns ? i + 1 : 0;
+    spread[i] = 0.25 * own[before] + 0.5 * own[i] + 0.25 * own[next];
+  }
+  return spread;
+}
+
 RadianceColumns::Meridian RadianceColumns::meridian(const Vec3d& r) const {
   const double phi = std::atan2(dot(r, grid_.quarter), dot(r, grid_.zero));
   double x = phi * (grid_.columns / (2 * kPi)) - 0.5;

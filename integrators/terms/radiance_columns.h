@@ -13,6 +13,8 @@ class RadianceColumns {
   explicit RadianceColumns(const Environment& environment);
 
   const Environment::Grid& grid() const { return grid_; }
+  // How bright the map is around each column, from the azimuth of `zero` on towards `quarter`.
+  std::vector<double> brightness() const;
   // With w = pole cos theta + r sin theta, r at an azimuth: the integrals of L cos theta sin theta
   // (along the pole) and L sin^2 theta (along r) over theta from 0 [W / (m^2 sr) rad]. Exact for
   // the bilinear map, in between columns and rows, too.
