@@ -381,7 +381,8 @@ class TermJob {
       light.variance += trimmed_mean(lights) / sum;
       for (size_t i = 0; i < lights.size(); ++i) light.cells[i] += lights[i] / sum;
     }
-    if (method_.spreads_samples) {
+    // Paths that only lead to vertices take no more light than they must.
+    if (method_.spreads_samples && computed_[estimator.pixel_slot()]) {
       choose_lights(estimator.pixel_slot(), pilot, light, figures, plan);
     }
     return figures;
