@@ -69,7 +69,7 @@ class BackwardCommand final : public Command {
     const Scene scene = load_scene(common_, warnings_);
     if (adjoint_.empty() && target_.empty()) throw InputError("give --adjoint or --target");
     const LossKind kind = loss_kind(loss_);
-    edge_sampler_type(options_.sampler);  // told before the loss is rendered
+    reverse_method(options_.sampler);  // told before the loss is rendered
     if (!common_.part.empty()) return make_part(scene, command_line);
     files_ = plan_files(scene, options_.parameters, output_);
     if (target_.empty()) files_.adjoint = files_.adjoint_picture = "";
