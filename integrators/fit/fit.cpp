@@ -86,7 +86,9 @@ class Fit::Impl {
   void check_channels() const;
   void check_terms() const;
   void check_remeshing();
-  void check_exact() const;
+  // Whether parameters move edges that may be seen.
+  bool moves_on_film(size_t view) const;
+  void check_exact();
   // Of a scalar; none where the view does not have it, and of motions.
   std::vector<double> values_in(size_t view, const FitParameter& parameter) const;
   // Shapes of a view that some parameter moves, in the scene's order.
@@ -191,7 +193,7 @@ void Fit::Impl::check_channels() const {
   }
 }
 
-void Fit::Impl::check_exact() const {
+void Fit::Impl::check_exact() {
   if (!reverse_method(options_.backward.sampler).closed) {
     throw InputError(fmt::format(
         "the optimiser lbfgs compares gradients of different steps, and those of the sampler {} "
@@ -207,6 +209,32 @@ void Fit::Impl::check_exact() const {
         "its steps by itself: leave out the doubling of samples, the half-life of steps and "
         "samples of the loss");
   }
+  for (size_t v = 0; v < views.size(); ++v) {
+    if (!moves_on_film(v)) continue;
+    warnings.push_back(
+        "what is fitted moves silhouettes that the camera sees: a film sample that one of them "
+        "passes makes the loss jump, by its share of a pixel; with many samples per pixel the "
+        "steps of lbfgs get over that");
+    return;
+  }
+}
+
+// With an adjoint that is black nothing is sampled.
+bool Fit::Impl::moves_on_film(size_t view) const {
+  const Scene& scene = views[view].scene;
+  BackwardOptions options = options_.backward;
+  options.terms = {"camera"};
+  for (const FitParameter& p : parameters_) {
+    if (p.in_view(view)) options.parameters.push_back(p.name());
+  }
+  if (options.parameters.empty()) return false;
+  RunSettings own = view_settings(view);
+  own.spp = 1;
+  const Image black(scene.film.crop_width, scene.film.crop_height, 3);
+  for (const auto& [name, count] : backward(scene, black, options, own).stats.edges) {
+    if (name == "moving on the film" && count > 0) return true;
+  }
+  return false;
 }
 
 // Those of backward(), which would tell at the first step.

@@ -296,12 +296,16 @@ bool ClosedLight::find_outlines(const LampPlane& lamp, const Receiver& receiver,
   find_turns(lamp, receiver, scratch);
   for (uint32_t label = 0; label < scratch.faces.size(); ++label) {
     uint32_t cancelled = 0;
+    std::array<Vec3d, 3> corners;
     if (label >= scratch.first_item) {
-      cancelled = cancelled_sides(*scratch.items[label - scratch.first_item], scratch);
+      const FaceTree::Item& item = *scratch.items[label - scratch.first_item];
+      cancelled = cancelled_sides(item, scratch);
       if (cancelled == 7) continue;
+      for (int k = 0; k < 3; ++k) corners[k] = cast<double>(item.corners[k]);
+    } else {
+      const FaceRef ref = scratch.faces[label];
+      corners = face_corners<double>(scene_.shape(ref.shape).mesh, ref.face);
     }
-    const FaceRef ref = scratch.faces[label];
-    const auto corners = face_corners<double>(scene_.shape(ref.shape).mesh, ref.face);
     const uint32_t line = label * Scratch::kLines;
     scratch.polygon.clear();
     for (uint32_t k = 0; k < 3; ++k) scratch.polygon.push_back({corners[k] - receiver.p, line + k});

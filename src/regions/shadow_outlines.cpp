@@ -138,28 +138,37 @@ void ShadowOutlines::compare_ends(const Edge& s, uint32_t index, bool later, int
 }
 
 // Those whose bounds say that compare() may have something to tell, in their order. Rounding to
-// doubles keeps the order of integers.
+// floats keeps the order of integers.
 void ShadowOutlines::find_candidates(uint32_t i) {
-  const double x0 = bounds_.x0[i], x1 = bounds_.x1[i], y0 = bounds_.y0[i];
-  candidates_.resize(edges_.size());
+  const size_t size = edges_.size();
+  const float x0 = bounds_.x0[i], x1 = bounds_.x1[i], y0 = bounds_.y0[i];
+  const float *x0s = bounds_.x0.data(), *x1s = bounds_.x1.data(), *y1s = bounds_.y1.data();
+  near_.resize(size);
+  candidates_.resize(size);
+  uint32_t* near = near_.data();
+  // Written so that it becomes a few instructions on whole registers.
+  for (size_t j = 0; j < size; ++j) {
+    near[j] = static_cast<uint32_t>((x1s[j] >= x0) & (x0s[j] <= x1) & (y1s[j] >= y0));
+  }
+  near[i] = 0;
   size_t count = 0;
-  for (uint32_t j = 0; j < edges_.size(); ++j) {
+  for (uint32_t j = 0; j < size; ++j) {
     candidates_[count] = j;
-    count += (bounds_.x1[j] >= x0) & (bounds_.x0[j] <= x1) & (bounds_.y1[j] >= y0) & (j != i);
+    count += near[j];
   }
   candidates_.resize(count);
 }
 
 void ShadowOutlines::for_each(const std::function<void(const Piece&)>& visit) {
   edges_.clear();
-  for (auto* bounds : {&bounds_.x0, &bounds_.x1, &bounds_.y1, &bounds_.y0}) bounds->clear();
+  for (auto* bounds : {&bounds_.x0, &bounds_.x1, &bounds_.y0, &bounds_.y1}) bounds->clear();
   for (const Edge& side : sides_) {
     if (side.lamp == 0 && side.cover == 0) continue;
     edges_.push_back(side);
-    bounds_.x0.push_back(static_cast<double>(side.p.x));
-    bounds_.x1.push_back(static_cast<double>(side.q.x));
-    bounds_.y0.push_back(static_cast<double>(std::min(side.p.y, side.q.y)));
-    bounds_.y1.push_back(static_cast<double>(std::max(side.p.y, side.q.y)));
+    bounds_.x0.push_back(static_cast<float>(side.p.x));
+    bounds_.x1.push_back(static_cast<float>(side.q.x));
+    bounds_.y0.push_back(static_cast<float>(std::min(side.p.y, side.q.y)));
+    bounds_.y1.push_back(static_cast<float>(std::max(side.p.y, side.q.y)));
   }
   for (uint32_t i = 0; i < edges_.size(); ++i) {
     const Edge& s = edges_[i];

@@ -163,10 +163,9 @@ TEST(Analytic, ReverseModeIsTheDerivativeOfTheLoss) {
   const TempFiles files;
   const Image target = target_of(shadow_scene(files, true, 0.1));
   const Scene scene = shadow_scene(files, true);
-  const std::vector<std::string> names = {"body.vertex_positions", "lamp.vertex_positions",
-                                          "body.translate.x",      "body.rotate.y",
-                                          "lamp.translate.y",      "glow.radiance",
-                                          "grey.reflectance"};
+  const std::vector<std::string> names = {
+      "body.vertex_positions", "lamp.vertex_positions", "body.translate.x", "body.rotate.y",
+      "lamp.translate.y",      "glow.radiance",         "grey.reflectance"};
   const Loss at = loss_and_gradient(scene, target, names);
   const auto value_at = [&](const Parameter& p, double h) {
     Scene other = deep_copy(scene);

@@ -133,7 +133,8 @@ class BackwardCommand final : public Command {
     settings.seconds *= kImageShare;
     const Image target = read_exr(target_);
     check_loss_images(scene, target, {}, target_);
-    loss = image_loss(scene, target, kind, settings, {}, levels_);
+    loss = image_loss(scene, target, kind, settings, {}, levels_,
+                      {.method = reverse_method(options_.sampler).closed ? "analytic" : "path"});
     if (kind == LossKind::kL1) {
       warnings_.add_all(
           {"the gradient of l1 is biased where the image's noise is not small beside "

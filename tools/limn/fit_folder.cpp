@@ -379,6 +379,7 @@ void FitFolder::add(const FitRecord& r, const Fit& fit) {
                       {"views", r.view_losses},
                       {"step_size", r.step_size},
                       {"halvings", r.halvings},
+                      {"evaluations", r.evaluations},
                       {"values", scalars},
                       {"seconds", r.seconds}});
 }

@@ -56,7 +56,7 @@ class ShadowOutlines {
   };
   // What may tell something of a side: the bounds of all, side by side.
   struct Bounds {
-    std::vector<double> x0, x1, y0, y1;
+    std::vector<float> x0, x1, y0, y1;
   };
   struct Event {
     double at;  // along the edge, 0 to 1
@@ -76,8 +76,8 @@ class ShadowOutlines {
   std::vector<Edge> sides_;      // all that were added, each once
   std::vector<uint32_t> table_;  // of them, by a hash of their ends; a power of two of slots
   std::vector<Edge> edges_;
-  Bounds bounds_;                     // of edges_
-  std::vector<uint32_t> candidates_;  // of edges_
+  Bounds bounds_;  // of edges_
+  std::vector<uint32_t> near_, candidates_;
   std::vector<Event> events_;
 };
 
