@@ -2,10 +2,12 @@
 #include "limn/core/face_tree.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <tuple>
 
 #include "limn/core/bounds.h"
+#include "limn/core/check.h"
 
 namespace limn {
 namespace {
@@ -91,6 +93,7 @@ uint32_t FaceTree::build(uint32_t first, uint32_t last) {
 
 void FaceTree::list(std::span<const HalfSpace> set, std::vector<const Item*>& faces) const {
   if (nodes_.empty()) return;
+  CHECK_LT(set.size(), 32u);
   // What is not wholly inside of these half-spaces, by their bits.
   struct Visit {
     uint32_t node, cut_by;
@@ -98,8 +101,8 @@ void FaceTree::list(std::span<const HalfSpace> set, std::vector<const Item*>& fa
   const auto bit = [](size_t k) { return uint32_t{1} << k; };
   // False if the node is outside of one.
   const auto reaches = [&](const Node& node, uint32_t& cut_by) {
-    for (size_t k = 0; k < set.size(); ++k) {
-      if (!(cut_by & bit(k))) continue;
+    for (uint32_t left = cut_by; left != 0; left &= left - 1) {
+      const auto k = static_cast<size_t>(std::countr_zero(left));
       const HalfSpace& h = set[k];
       const double reach = std::fabs(h.n.x) * node.half.x + std::fabs(h.n.y) * node.half.y +
                            std::fabs(h.n.z) * node.half.z;
@@ -110,11 +113,11 @@ void FaceTree::list(std::span<const HalfSpace> set, std::vector<const Item*>& fa
     return true;
   };
   const auto leaves_out = [&](const Item& item, uint32_t cut_by) {
-    for (size_t k = 0; k < set.size(); ++k) {
-      const HalfSpace& h = set[k];
+    for (uint32_t left = cut_by; left != 0; left &= left - 1) {
+      const HalfSpace& h = set[static_cast<size_t>(std::countr_zero(left))];
       const auto outside = [&](const Vec3f& x) { return dot(h.n, cast<double>(x)) + h.offset < 0; };
       const auto& x = item.corners;
-      if ((cut_by & bit(k)) && outside(x[0]) && outside(x[1]) && outside(x[2])) return true;
+      if (outside(x[0]) && outside(x[1]) && outside(x[2])) return true;
     }
     return false;
   };
