@@ -243,6 +243,10 @@ void ClosedLight::find_turns(const LampPlane& lamp, const Receiver& receiver,
   };
   scratch.turns.resize(tree_.size());
   ++scratch.query;
+  // Farther out the grid's coordinates are themselves off by half a step.
+  constexpr double kMostSteps = 0x1p48;
+  const PlanePoint& center = scratch.window.center;
+  if (!(std::max(std::fabs(center.x), std::fabs(center.y)) * steps < kMostSteps)) return;
   for (const FaceTree::Item* item : scratch.items) {
     const Vec3d w0 = cast<double>(item->corners[0]) - p;
     const Vec3d e1 = cast<double>(item->corners[1]) - p - w0,
@@ -256,6 +260,7 @@ void ClosedLight::find_turns(const LampPlane& lamp, const Receiver& receiver,
     // the lengths in it.
     const double volume = dot(cross(e1, e2), w0);
     const double side = size_of(e1) + size_of(e2), reach = size_of(w0) + side;
+    if (!(steps * reach < kMostSteps * near)) continue;
     const double error = far * far * far * 8 * (steps * side * (near + reach) + near * near);
     const double size = std::fabs(volume) - 0x1p-46 * side * side * reach;
     if (!(size * both * near * near > error)) continue;

@@ -6,6 +6,9 @@
 
 #include <algorithm>
 
+#include "limn/core/rng.h"
+#include "support/meshes.h"
+
 namespace limn {
 namespace {
 
