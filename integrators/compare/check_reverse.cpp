@@ -89,9 +89,8 @@ std::vector<Moments> forward_sums(const Scene& scene, std::span<const Parameter>
     const auto some =
         parameters.subspan(first).first(std::min<size_t>(kLanes, parameters.size() - first));
     std::vector<std::unique_ptr<SampleEstimator>> estimators;
-    estimators.push_back(
-        std::make_unique<TermEstimator>(scene, some, computed, sampler, settings.threads, nullptr,
-                                        nullptr, closed));
+    estimators.push_back(std::make_unique<TermEstimator>(
+        scene, some, computed, sampler, settings.threads, nullptr, nullptr, closed));
     const Stopwatch watch;
     run_batches(estimators, settings, watch, [&](const Batch& batch, const auto& sums) {
       const std::vector<std::vector<double>>& images = sums[0].images;

@@ -5,6 +5,7 @@
 #include <memory>
 #include <tuple>
 
+#include "integrators/terms/closed_light_planes.h"
 #include "integrators/terms/polygon_light.h"
 #include "limn/core/reverse.h"
 #include "limn/core/shadow_outlines.h"
@@ -300,17 +301,12 @@ bool ClosedLight::find_outlines(const LampPlane& lamp, const Receiver& receiver,
   scratch.cut_points.clear();
   find_turns(lamp, receiver, scratch);
   for (uint32_t label = 0; label < scratch.faces.size(); ++label) {
-    uint32_t cancelled = 0;
-    std::array<Vec3d, 3> corners;
-    if (label >= scratch.first_item) {
-      const FaceTree::Item& item = *scratch.items[label - scratch.first_item];
-      cancelled = cancelled_sides(item, scratch);
-      if (cancelled == 7) continue;
-      for (int k = 0; k < 3; ++k) corners[k] = cast<double>(item.corners[k]);
-    } else {
-      const FaceRef ref = scratch.faces[label];
-      corners = face_corners<double>(scene_.shape(ref.shape).mesh, ref.face);
-    }
+    const bool listed = label >= scratch.first_item;
+    const uint32_t cancelled =
+        listed ? cancelled_sides(*scratch.items[label - scratch.first_item], scratch) : 0;
+    if (cancelled == 7) continue;
+    const FaceRef ref = scratch.faces[label];
+    const auto corners = face_corners<double>(scene_.shape(ref.shape).mesh, ref.face);
     const uint32_t line = label * Scratch::kLines;
     scratch.polygon.clear();
     for (uint32_t k = 0; k < 3; ++k) scratch.polygon.push_back({corners[k] - receiver.p, line + k});
@@ -345,30 +341,6 @@ bool ClosedLight::find_outlines(const LampPlane& lamp, const Receiver& receiver,
   scratch.sort_cut_points();
   return true;
 }
-
-namespace {
-
-// (b - a) x (c - a) as three statements of the tape in place of fifteen: its derivative is
-// da x (b - c) + db x (c - a) + dc x (a - b).
-Vec3<Var> triangle_normal(const Vec3<Var>& a, const Vec3<Var>& b, const Vec3<Var>& c) {
-  const Vec3d x = value(a), y = value(b), z = value(c);
-  const Vec3d n = cross(y - x, z - x);
-  if (is_still(a) && is_still(b) && is_still(c)) return {n.x, n.y, n.z};
-  Tape& tape = *Tape::current();
-  const std::pair<const Vec3<Var>*, Vec3d> parts[] = {{&a, y - z}, {&b, z - x}, {&c, x - y}};
-  Vec3<Var> normal;
-  for (int k = 0; k < 3; ++k) {
-    const int i = (k + 1) % 3, j = (k + 2) % 3;
-    for (const auto& [corner, e] : parts) {
-      tape.entry((*corner)[i].node, e[j]);
-      tape.entry((*corner)[j].node, -e[i]);
-    }
-    normal[k] = {n[k], tape.end()};
-  }
-  return normal;
-}
-
-}  // namespace
 
 // The polygons of a lamp that a point sees, of their true lines.
 template <class S>
@@ -557,29 +529,6 @@ class ClosedLight::View {
   const Vec3<S>& p_;
   Scratch& scratch_;
 };
-
-namespace {
-
-// Of the faces around an edge that rise above the start's own, which is what a point near the edge
-// sees of them: the one that rises first leaves directions w with this . w >= 0.
-std::optional<Vec3d> wedge_at(const Scene& scene, const RayTracer& tracer, const EdgeStart& edge,
-                              const Vec3d& up) {
-  const Vec3d along = normalize(edge.x1 - edge.x0);
-  const Vec3d& f = edge.start.into;
-  const auto turn = [&](const Vec3d& a, const Vec3d& b) { return dot(along, cross(a, b)); };
-  const double sign = turn(f, up) < 0 ? -1 : 1;
-  std::optional<Vec3d> wedge;
-  double nearest = -2;
-  for_every_side(scene, edge.around, edge.x0, along, [&](const FaceSide& side, Incidence) {
-    if (side.face == edge.start.face || overlap(tracer, side, edge.start)) return;
-    if (!(sign * turn(f, side.into) > 0) || !(dot(f, side.into) > nearest)) return;
-    nearest = dot(f, side.into);
-    wedge = cross(along, side.into) * -sign;
-  });
-  return wedge;
-}
-
-}  // namespace
 
 template <class S>
 Rgb<S> ClosedLight::scattered(const RayTracer& tracer, const SurfacePoint<S>& surface,
