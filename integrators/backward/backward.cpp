@@ -25,6 +25,12 @@
 
 namespace limn {
 
+ReverseMethod reverse_method(const std::string& name) {
+  // It chooses among few edges, where surfaces cross and touch: any will do.
+  if (name == "analytic") return {edge_sampler_type("uniform"), true};
+  return {edge_sampler_type(name)};
+}
+
 const ParameterAdjoint& BackwardResult::of(const std::string& name) const {
   for (const ParameterAdjoint& parameter : parameters)
     if (parameter.name == name) return parameter;
@@ -120,8 +126,12 @@ class BackwardPass {
         parameters_(scene, options.parameters),
         tracer_(make_embree_tracer(parameters_.scene(), settings.threads)),
         lights_(parameters_.scene()),
-        path_{parameters_.scene(), *tracer_, lights_},
-        input_(path_, 3, {1, 1, 1, 1}, edge_sampler_type(options.sampler), settings.threads),
+        method_(reverse_method(options.sampler)),
+        closed_(method_.closed
+                    ? std::make_unique<ClosedLight>(parameters_.scene(), settings.threads)
+                    : nullptr),
+        path_{parameters_.scene(), *tracer_, lights_, closed_.get()},
+        input_(path_, 3, {1, 1, 1, 1}, method_.sampler, settings.threads),
         context_{path_, parameters_, input_.edges(),
                  EdgeMotion(parameters_.slots(), input_.edges())} {
     select();
@@ -176,6 +186,8 @@ class BackwardPass {
   ParameterSlots parameters_;
   std::unique_ptr<RayTracer> tracer_;
   Lights lights_;
+  ReverseMethod method_;
+  std::unique_ptr<ClosedLight> closed_;  // null where paths are sampled
   PathContext path_;
   TermInput input_;
   AdjointContext context_;
@@ -195,6 +207,7 @@ void BackwardPass::select() {
   for (size_t t = 0; t < kAdjointTerms; ++t) {
     const TermType& type = term_types()[t];
     if (!type.applies(parameters_.scene()) || (type.regions && !input_.regions())) continue;
+    if (closed_ && type.moved_with_directions && !type.traces_paths) continue;
     known.push_back(t);
     names.emplace_back(type.name);
   }
@@ -391,6 +404,9 @@ void BackwardPass::run_tiles(size_t samples, ProgressCounter& progress, Contribu
       if (!make(i, tape, own, list)) own.bad.add(place(i));
       own.tape_bytes = std::max(own.tape_bytes, tape.bytes());
     }
+    // A point that sees a lamp past a mesh hangs on hundreds of numbers, most of which its
+    // neighbours hang on, too.
+    if (closed_) join_slots(list);
     double inside = 0;
     for (const TermCost& cost : own.costs) inside += cost.seconds;
     own.costs[booked].seconds += watch.seconds() - inside;

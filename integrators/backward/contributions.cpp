@@ -8,6 +8,20 @@
 
 namespace limn {
 
+void join_slots(std::vector<Contribution>& list) {
+  std::stable_sort(list.begin(), list.end(),
+                   [](const Contribution& a, const Contribution& b) { return a.slot < b.slot; });
+  size_t count = 0;
+  for (const Contribution& c : list) {
+    if (count > 0 && list[count - 1].slot == c.slot) {
+      list[count - 1].value += c.value;
+    } else {
+      list[count++] = c;
+    }
+  }
+  list.resize(count);
+}
+
 namespace {
 
 constexpr size_t kRanges = 16;  // of slots; not tuned

@@ -7,6 +7,9 @@
 
 namespace limn {
 
+// One contribution for each slot, in the order of slots: the sum, in the order of the list.
+void join_slots(std::vector<Contribution>& list);
+
 class ContributionSum {
  public:
   // count: slots, with the unused first one.

@@ -171,7 +171,8 @@ int most_pyramid_levels(const Scene& scene) {
 }
 
 LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
-                      const RunSettings& settings, const Image& mask, int levels) {
+                      const RunSettings& settings, const Image& mask, int levels,
+                      const LossImages& of) {
   check_loss_images(scene, target, mask);
   if (levels < 1 || levels > most_pyramid_levels(scene)) {
     throw InputError(fmt::format("a pyramid of {} levels: the film has 1 to {}", levels,
@@ -180,9 +181,11 @@ LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
   RenderResult images[2];
   for (int i = 0; i < 2; ++i) {
     RunSettings own = settings;
-    own.store = nullptr;                                   // of what the loss is for
-    own.seed = mix_bits(mix_bits(settings.seed) + 1 + i);  // of streams that no other seed has
-    images[i] = render(scene, own);
+    own.store = nullptr;  // of what the loss is for
+    // Of streams that no other seed has.
+    if (!of.same_samples) own.seed = mix_bits(mix_bits(settings.seed) + 1 + i);
+    const bool known = of.same_samples && i > 0;
+    images[i] = known ? images[0] : render(scene, own, {.method = of.method});
   }
   LossResult result;
   result.spp = std::min(images[0].spp, images[1].spp);
@@ -209,7 +212,8 @@ LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
     result.adjoint.data[i] = static_cast<float>(adjoint[i]);
     // To first order, with half of the adjoint for each image.
     const double slope = 0.5 * adjoint[i];
-    variance += slope * slope * (images[0].radiance.variance(i) + images[1].radiance.variance(i));
+    const double both = images[0].radiance.variance(i) + images[1].radiance.variance(i);
+    variance += slope * slope * (of.same_samples ? 2 * both : both);
   }
   result.error = std::sqrt(variance);
   return result;

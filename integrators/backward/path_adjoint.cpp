@@ -171,22 +171,27 @@ bool add_path_adjoint(const AdjointContext& context, int x, int y, const Rng& ke
                       const Rgb<double>& adjoint, Tape& tape, AdjointCosts& costs,
                       std::vector<Contribution>& contributions) {
   tape.clear();
-  const FilmPosition film = sample_pixel_filter(context.scene().film, x, y, key);
-  const auto still = context.scene().camera.ray<double>(film.x, film.y);
-  const auto ray = moving_ray(context, film, still);
-  RayCount rays;
-  ++costs[kInterior].samples;
   VertexAdjoints vertices(context, adjoint, tape, costs);
-  PathTracer<Var, VertexAdjoints> tracer(context.path, rays);
-  Walk<Var, VertexAdjoints> walk(key, 0, &vertices);
-  const StartRay<Var> start{camera_ray(context.scene(), still), ray.origin, ray.direction};
-  tracer.follow_rays({&start, 1}, {&walk, 1});
-  const Rgb<Var>& radiance = walk.sums.radiance;
-  if (walk.failed || !is_finite(value(radiance))) return false;
-  if (context.interior) {
-    for (int c = 0; c < 3; ++c) vertices.seeds().add(radiance[c].node, adjoint[c]);
+  // As in forward mode: in closed form a path takes two places of its pixel.
+  const int places = context.path.closed ? 2 : 1;
+  for (int i = 0; i < places; ++i) {
+    FilmPosition film = sample_pixel_filter(context.scene().film, x, y, key);
+    if (i > 0) film = mirrored_in_pixel(context.scene().film, x, y, film);
+    const auto still = context.scene().camera.ray<double>(film.x, film.y);
+    const auto ray = moving_ray(context, film, still);
+    RayCount rays;
+    ++costs[kInterior].samples;
+    PathTracer<Var, VertexAdjoints> tracer(context.path, rays);
+    Walk<Var, VertexAdjoints> walk(key, 0, &vertices);
+    const StartRay<Var> start{camera_ray(context.scene(), still), ray.origin, ray.direction};
+    tracer.follow_rays({&start, 1}, {&walk, 1});
+    const Rgb<Var>& radiance = walk.sums.radiance;
+    if (walk.failed || !is_finite(value(radiance))) return false;
+    if (context.interior) {
+      for (int c = 0; c < 3; ++c) vertices.seeds().add(radiance[c].node, adjoint[c] / places);
+    }
+    costs[kInterior].add(rays);
   }
-  costs[kInterior].add(rays);
   if (!vertices.seeds().empty()) vertices.seeds().sweep(context, tape);
   return append_finite(tape, contributions);
 }

@@ -77,10 +77,10 @@ std::vector<Compared> compared(const Scene& scene, const ParameterAdjoint& rever
 std::vector<Moments> forward_sums(const Scene& scene, std::span<const Parameter> parameters,
                                   const BackwardOptions& options, const Image& adjoint,
                                   const RunSettings& settings) {
-  const EdgeSamplerType& sampler = edge_sampler_type(options.sampler);
+  const auto [sampler, closed] = reverse_method(options.sampler);
   const std::vector<std::string>& terms = options.terms;
   std::vector<bool> computed;
-  for (const TermType* type : terms_of(scene, sampler)) {
+  for (const TermType* type : terms_of(scene, sampler, closed)) {
     computed.push_back(terms.empty() ||
                        std::find(terms.begin(), terms.end(), type->name) != terms.end());
   }
@@ -89,8 +89,8 @@ std::vector<Moments> forward_sums(const Scene& scene, std::span<const Parameter>
     const auto some =
         parameters.subspan(first).first(std::min<size_t>(kLanes, parameters.size() - first));
     std::vector<std::unique_ptr<SampleEstimator>> estimators;
-    estimators.push_back(
-        std::make_unique<TermEstimator>(scene, some, computed, sampler, settings.threads));
+    estimators.push_back(std::make_unique<TermEstimator>(
+        scene, some, computed, sampler, settings.threads, nullptr, nullptr, closed));
     const Stopwatch watch;
     run_batches(estimators, settings, watch, [&](const Batch& batch, const auto& sums) {
       const std::vector<std::vector<double>>& images = sums[0].images;

@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "integrators/backward/adjoint_context.h"
 #include "integrators/fit/fit_parameter.h"
+#include "integrators/fit/quasi_newton.h"
 #include "integrators/fit/remesh.h"
 #include "integrators/methods/selection.h"
 #include "integrators/terms/term.h"
@@ -84,6 +86,9 @@ class Fit::Impl {
   void check_channels() const;
   void check_terms() const;
   void check_remeshing();
+  // Whether parameters move edges that may be seen.
+  bool moves_on_film(size_t view) const;
+  void check_exact();
   // Of a scalar; none where the view does not have it, and of motions.
   std::vector<double> values_in(size_t view, const FitParameter& parameter) const;
   // Shapes of a view that some parameter moves, in the scene's order.
@@ -95,12 +100,31 @@ class Fit::Impl {
     const auto count = std::count_if(options_.remesh.begin(), options_.remesh.end(), done);
     return std::pow(options_.remesh_shrink, static_cast<double>(count));
   }
+  // The loss is a function of the parameters: all steps take the same samples.
+  bool is_exact() const { return options_.optimiser == OptimiserKind::kLbfgs; }
   // False: interrupted.
   bool add_view(size_t view, FitRecord& record, std::vector<std::vector<double>>& gradients);
+  // Loss and gradients of all views; false: interrupted.
+  bool evaluate(FitRecord& record, std::vector<std::vector<double>>& gradients);
+  void finish_step(FitRecord& record);
+
+  // Of kLbfgs.
+  struct Place {
+    FitRecord record;              // its losses
+    std::vector<double> gradient;  // of all parameters in turn, per natural step
+  };
+  std::optional<Place> place();
+  // Adds `length` times the direction; none if a face would lose its area, else what was added.
+  std::optional<std::vector<double>> advance(const std::vector<double>& direction, double length);
+  enum class Search { kFound, kNone, kInterrupted };
+  Search search_along(const std::vector<double>& direction, double first, FitRecord& record);
+  std::optional<FitRecord> quasi_newton_step();
 
   FitOptions options_;
   RunSettings settings_;
   std::vector<FitParameter> parameters_;
+  QuasiNewton quasi_newton_;
+  std::optional<Place> here_;  // of the parameters as they are, if known
 };
 
 Fit::Impl::Impl(std::vector<FitView> all, const FitOptions& options, const RunSettings& settings)
@@ -135,6 +159,7 @@ Fit::Impl::Impl(std::vector<FitView> all, const FitOptions& options, const RunSe
   check_shapes();
   check_channels();
   check_terms();
+  if (is_exact()) check_exact();
   if (!options.remesh.empty()) check_remeshing();
   if (options.loss == LossKind::kL1) {
     warnings.push_back(
@@ -168,18 +193,61 @@ void Fit::Impl::check_channels() const {
   }
 }
 
+void Fit::Impl::check_exact() {
+  if (!reverse_method(options_.backward.sampler).closed) {
+    throw InputError(fmt::format(
+        "the optimiser lbfgs compares gradients of different steps, and those of the sampler {} "
+        "are noisy: take the sampler analytic, or the optimiser adam-uniform",
+        options_.backward.sampler));
+  }
+  if (options_.loss == LossKind::kL1) {
+    throw InputError("the optimiser lbfgs needs a smooth loss: take l2 or relative-l2, not l1");
+  }
+  if (options_.spp_doubling > 0 || options_.step_half_life > 0 || options_.loss_spp > 0) {
+    throw InputError(
+        "the optimiser lbfgs minimises one function, of the same samples at every step, and finds "
+        "its steps by itself: leave out the doubling of samples, the half-life of steps and "
+        "samples of the loss");
+  }
+  for (size_t v = 0; v < views.size(); ++v) {
+    if (!moves_on_film(v)) continue;
+    warnings.push_back(
+        "what is fitted moves silhouettes that the camera sees: a film sample that one of them "
+        "passes makes the loss jump, by its share of a pixel; with many samples per pixel the "
+        "steps of lbfgs get over that");
+    return;
+  }
+}
+
+// With an adjoint that is black nothing is sampled.
+bool Fit::Impl::moves_on_film(size_t view) const {
+  const Scene& scene = views[view].scene;
+  BackwardOptions options = options_.backward;
+  options.terms = {"camera"};
+  for (const FitParameter& p : parameters_) {
+    if (p.in_view(view)) options.parameters.push_back(p.name());
+  }
+  if (options.parameters.empty()) return false;
+  RunSettings own = view_settings(view);
+  own.spp = 1;
+  const Image black(scene.film.crop_width, scene.film.crop_height, 3);
+  for (const auto& [name, count] : backward(scene, black, options, own).stats.edges) {
+    if (name == "moving on the film" && count > 0) return true;
+  }
+  return false;
+}
+
 // Those of backward(), which would tell at the first step.
 void Fit::Impl::check_terms() const {
-  edge_sampler_type(options_.backward.sampler);
+  const ReverseMethod method = reverse_method(options_.backward.sampler);
   for (size_t v = 0; v < views.size(); ++v) {
     const auto seen = [&](const FitParameter& p) { return p.in_view(v) != nullptr; };
     if (std::none_of(parameters_.begin(), parameters_.end(), seen)) continue;
     std::vector<std::string> known;
     for (const TermType& type : term_types().first(kAdjointTerms)) {
-      const bool apart = edge_sampler_type(options_.backward.sampler).regions;
-      if (type.applies(views[v].scene) && (apart || !type.regions)) {
-        known.emplace_back(type.name);
-      }
+      if (!type.applies(views[v].scene) || (type.regions && !method.sampler.regions)) continue;
+      if (method.closed && type.moved_with_directions && !type.traces_paths) continue;
+      known.emplace_back(type.name);
     }
     selected_terms(known, options_.backward.terms, views[v].scene.file);
   }
@@ -226,7 +294,8 @@ std::vector<ShapeId> Fit::Impl::moved_shapes(size_t view) const {
 RunSettings Fit::Impl::view_settings(size_t view) const {
   RunSettings own = settings_;
   own.seconds = 0;
-  own.seed = mix_bits(mix_bits(mix_bits(settings_.seed) + static_cast<uint64_t>(steps)) + view);
+  const uint64_t step = is_exact() ? 0 : static_cast<uint64_t>(steps);
+  own.seed = mix_bits(mix_bits(mix_bits(settings_.seed) + step) + view);
   own.progress = nullptr;
   return own;
 }
@@ -238,7 +307,10 @@ bool Fit::Impl::add_view(size_t view, FitRecord& record,
   RunSettings own = view_settings(view);
   own.spp = grown(options_.loss_spp > 0 ? options_.loss_spp : settings_.spp, steps,
                   options_.spp_doubling);
-  LossResult loss = image_loss(v.scene, v.target, options_.loss, own, v.mask, options_.pyramid);
+  const LossImages images{reverse_method(options_.backward.sampler).closed ? "analytic" : "path",
+                          is_exact()};
+  LossResult loss =
+      image_loss(v.scene, v.target, options_.loss, own, v.mask, options_.pyramid, images);
   if (loss.spp < own.spp) return false;
   record.view_losses.push_back(loss.value);
   record.loss += share * loss.value;
@@ -247,6 +319,7 @@ bool Fit::Impl::add_view(size_t view, FitRecord& record,
   BackwardOptions backward_options = options_.backward;
   // Nobody asks for standard errors, and each batch ends with the adjoint of normals.
   backward_options.batches = 1;
+  if (is_exact()) backward_options.uniform_pixels = true;
   backward_options.parameters.clear();
   for (const FitParameter& p : parameters_) {
     if (p.in_view(view)) backward_options.parameters.push_back(p.name());
@@ -271,7 +344,113 @@ bool Fit::Impl::add_view(size_t view, FitRecord& record,
   return true;
 }
 
+bool Fit::Impl::evaluate(FitRecord& record, std::vector<std::vector<double>>& gradients) {
+  gradients.assign(parameters_.size(), {});
+  for (size_t v = 0; v < views.size(); ++v) {
+    if (!add_view(v, record, gradients)) return false;
+  }
+  return true;
+}
+
+std::optional<Fit::Impl::Place> Fit::Impl::place() {
+  Place place;
+  std::vector<std::vector<double>> gradients;
+  if (!evaluate(place.record, gradients)) return std::nullopt;
+  for (size_t i = 0; i < parameters_.size(); ++i) {
+    const std::vector<double> own = parameters_[i].scaled(gradients[i]);
+    place.gradient.insert(place.gradient.end(), own.begin(), own.end());
+  }
+  return place;
+}
+
+std::optional<std::vector<double>> Fit::Impl::advance(const std::vector<double>& direction,
+                                                      double length) {
+  std::vector<double> added;
+  auto next = direction.begin();
+  for (FitParameter& p : parameters_) {
+    std::vector<double> step(next, next + static_cast<ptrdiff_t>(p.size()));
+    next += static_cast<ptrdiff_t>(p.size());
+    for (double& x : step) x *= length;
+    if (!p.add(step, views)) return std::nullopt;
+    added.insert(added.end(), step.begin(), step.end());
+  }
+  return added;
+}
+
+// Moves to a lower place along the direction, from here_.
+Fit::Impl::Search Fit::Impl::search_along(const std::vector<double>& direction, double first,
+                                          FitRecord& record) {
+  const FitState before = state();
+  std::optional<Place> there;
+  std::vector<double> moved;
+  double last = 0;
+  bool interrupted = false;
+  const auto evaluate_at = [&](double at) -> std::optional<LinePoint> {
+    restore(before);
+    last = at;
+    const auto added = advance(direction, at);
+    if (!added) {
+      ++record.halvings;
+      return LinePoint{at, std::numeric_limits<double>::infinity(), 0};
+    }
+    moved = *added;
+    ++record.evaluations;
+    there = place();
+    interrupted = !there;
+    if (interrupted) return std::nullopt;
+    return LinePoint{at, there->record.loss, inner_product(there->gradient, direction)};
+  };
+  const Place start = *here_;
+  const LinePoint origin{0, start.record.loss, inner_product(start.gradient, direction)};
+  std::optional<LinePoint> found;
+  if (origin.slope < 0) found = wolfe_search(evaluate_at, origin, first);
+  if (found && found->at != last) evaluate_at(found->at);
+  if (!found || interrupted) {
+    restore(before);
+    here_ = start;
+    return interrupted ? Search::kInterrupted : Search::kNone;
+  }
+  std::vector<double> change = there->gradient;
+  for (size_t i = 0; i < change.size(); ++i) change[i] -= start.gradient[i];
+  quasi_newton_.add(moved, std::move(change));
+  here_ = std::move(there);
+  return Search::kFound;
+}
+
+// Where the pairs of earlier steps lead nowhere, once more without them.
+std::optional<FitRecord> Fit::Impl::quasi_newton_step() {
+  const Stopwatch watch;
+  const bool known = here_.has_value();
+  if (!known) here_ = place();
+  if (!here_) return std::nullopt;
+  FitRecord record = here_->record;
+  record.step = steps;
+  record.evaluations = known ? 0 : 1;
+  Search search = Search::kNone;
+  while (search == Search::kNone && !record.at_rest) {
+    const std::vector<double> direction = quasi_newton_.direction(here_->gradient);
+    double largest = 0;
+    for (const double x : direction) largest = std::max(largest, std::fabs(x));
+    const bool fresh = quasi_newton_.empty();
+    // Without pairs nothing is known of the size of a step but what the user says.
+    const double first = fresh && largest > 0 ? options_.step * shrunk() / largest : 1;
+    record.step_size = first * largest;
+    search = search_along(direction, first, record);
+    if (search == Search::kInterrupted) return std::nullopt;
+    record.at_rest = search == Search::kNone && fresh;
+    if (search == Search::kNone) quasi_newton_.clear();
+  }
+  finish_step(record);
+  if (record.remeshed) {
+    here_.reset();
+    quasi_newton_.clear();
+  }
+  record.seconds = watch.seconds();
+  return record;
+}
+
 std::optional<FitRecord> Fit::Impl::step() {
+  if (is_exact()) return quasi_newton_step();
   const Stopwatch watch;
   FitRecord record;
   record.step = steps;
@@ -280,14 +459,18 @@ std::optional<FitRecord> Fit::Impl::step() {
     record.step_size *= std::exp2(-static_cast<double>(steps) / options_.step_half_life);
   }
   record.step_size *= shrunk();
-  std::vector<std::vector<double>> gradients(parameters_.size());
-  for (size_t v = 0; v < views.size(); ++v) {
-    if (!add_view(v, record, gradients)) return std::nullopt;
-  }
+  std::vector<std::vector<double>> gradients;
+  if (!evaluate(record, gradients)) return std::nullopt;
   for (size_t i = 0; i < parameters_.size(); ++i) {
     record.halvings = std::max(record.halvings,
                                parameters_[i].move(gradients[i], record.step_size, steps, views));
   }
+  finish_step(record);
+  record.seconds = watch.seconds();
+  return record;
+}
+
+void Fit::Impl::finish_step(FitRecord& record) {
   ++steps;
   if (std::find(options_.remesh.begin(), options_.remesh.end(), steps) != options_.remesh.end()) {
     for (FitParameter& p : parameters_) {
@@ -297,8 +480,6 @@ std::optional<FitRecord> Fit::Impl::step() {
     }
   }
   for (const FitScalar& scalar : scalars()) record.values.push_back(scalar.value);
-  record.seconds = watch.seconds();
-  return record;
 }
 
 std::vector<FitScalar> Fit::Impl::scalars() const {
@@ -318,6 +499,8 @@ std::vector<double> Fit::Impl::values_in(size_t view, const FitParameter& parame
 FitState Fit::Impl::state() const {
   FitState state;
   state.steps = steps;
+  state.moves = quasi_newton_.steps;
+  state.changes = quasi_newton_.changes;
   for (const FitParameter& p : parameters_) state.parameters.push_back(p.state());
   for (size_t v = 0; v < views.size(); ++v) {
     const Scene& scene = views[v].scene;
@@ -371,6 +554,15 @@ void Fit::Impl::restore(const FitState& state) {
   for (size_t i = 0; i < parameters_.size(); ++i) {
     parameters_[i].restore(state.parameters[i], views);
   }
+  size_t numbers = 0;
+  for (const FitParameter& p : parameters_) numbers += p.size();
+  check(state.moves.size() == state.changes.size());
+  for (const auto* list : {&state.moves, &state.changes}) {
+    for (const std::vector<double>& x : *list) check(x.size() == numbers);
+  }
+  quasi_newton_.steps = state.moves;
+  quasi_newton_.changes = state.changes;
+  here_.reset();
   steps = state.steps;
 }
 

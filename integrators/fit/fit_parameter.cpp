@@ -128,15 +128,27 @@ std::vector<double> FitParameter::bounded_numbers(const FitView& view, size_t in
 int FitParameter::move(const std::vector<double>& gradient, double size, int64_t count,
                        std::vector<FitView>& views) {
   if (is_array()) return move_vertices(gradient, size, count, views);
-  move_numbers(gradient, size, count, views);
+  std::vector<double> step = optimiser_->step(scaled(gradient), count);
+  for (double& x : step) x *= natural_step_ * size;
+  add_to_numbers(step, views);
   return 0;
 }
 
-void FitParameter::move_numbers(std::vector<double> gradient, double size, int64_t count,
-                                std::vector<FitView>& views) {
-  for (double& g : gradient) g *= natural_step_;
-  std::vector<double> step = optimiser_->step(gradient, count);
-  for (double& x : step) x *= natural_step_ * size;
+bool FitParameter::add(std::vector<double>& step, std::vector<FitView>& views) {
+  for (double& x : step) x *= natural_step_;
+  if (is_array()) {
+    std::vector<double> tried = numbers_;
+    for (size_t i = 0; i < tried.size(); ++i) tried[i] += step[i];
+    if (!place_vertices(large_steps_->solve(tried), views)) return false;
+    numbers_ = std::move(tried);
+  } else {
+    add_to_numbers(step, views);
+  }
+  for (double& x : step) x /= natural_step_;
+  return true;
+}
+
+void FitParameter::add_to_numbers(std::vector<double>& step, std::vector<FitView>& views) {
   for (size_t v = 0; v < views.size(); ++v) {
     if (!in_view_[v]) continue;
     const std::vector<double> now = bounded_numbers(views[v], v);
@@ -162,8 +174,12 @@ void FitParameter::move_numbers(std::vector<double> gradient, double size, int64
   for (size_t k = 0; k < step.size(); ++k) numbers_[k] += step[k];
 }
 
-int FitParameter::move_vertices(const std::vector<double>& gradient, double size, int64_t count,
-                                std::vector<FitView>& views) {
+std::vector<double> FitParameter::scaled(const std::vector<double>& gradient) const {
+  if (!is_array()) {
+    std::vector<double> step = gradient;
+    for (double& g : step) g *= natural_step_;
+    return step;
+  }
   const std::vector<uint32_t>& welded = large_steps_->welded();
   std::vector<double> of_welded(3 * large_steps_->size());
   for (size_t v = 0; v < welded.size(); ++v) {
@@ -172,7 +188,12 @@ int FitParameter::move_vertices(const std::vector<double>& gradient, double size
   // The matrix is symmetric: dL/du = (I + lambda L)^-1 dL/dv.
   std::vector<double> step = large_steps_->solve(of_welded);
   for (double& x : step) x *= natural_step_;
-  step = optimiser_->step(step, count);
+  return step;
+}
+
+int FitParameter::move_vertices(const std::vector<double>& gradient, double size, int64_t count,
+                                std::vector<FitView>& views) {
+  std::vector<double> step = optimiser_->step(scaled(gradient), count);
   for (double& x : step) x *= natural_step_ * size;
   for (int halvings = 0; halvings < kMostHalvings; ++halvings) {
     std::vector<double> tried = numbers_;

@@ -20,6 +20,7 @@ class FitParameter {
 
   const std::string& name() const { return name_; }
   bool is_array() const { return large_steps_ != nullptr; }
+  size_t size() const { return numbers_.size(); }  // numbers that steps are taken in
   // Null where the view does not have it.
   const Parameter* in_view(size_t view) const {
     return in_view_[view] ? &*in_view_[view] : nullptr;
@@ -32,6 +33,12 @@ class FitParameter {
   // the step was halved.
   int move(const std::vector<double>& gradient, double size, int64_t count,
            std::vector<FitView>& views);
+
+  // The gradient with respect to the numbers that move, per natural step.
+  std::vector<double> scaled(const std::vector<double>& gradient) const;
+  // Adds a step in natural steps, up to bounds, and makes `step` what was added. False, and nothing
+  // is changed, if a face would lose its area or grow together with another.
+  bool add(std::vector<double>& step, std::vector<FitView>& views);
 
   // One, or the three channels of a colour; not of an array.
   std::vector<FitScalar> scalars(const std::vector<FitView>& views) const;
@@ -54,8 +61,8 @@ class FitParameter {
   int move_vertices(const std::vector<double>& gradient, double size, int64_t count,
                     std::vector<FitView>& views);
   bool place_vertices(const std::vector<double>& positions, std::vector<FitView>& views) const;
-  void move_numbers(std::vector<double> gradient, double size, int64_t count,
-                    std::vector<FitView>& views);
+  // step: in the parameter's unit; cut at bounds.
+  void add_to_numbers(std::vector<double>& step, std::vector<FitView>& views);
   // The numbers that bounds hold for: values, or the sum of steps.
   std::vector<double> bounded_numbers(const FitView& view, size_t index) const;
 

@@ -18,7 +18,8 @@ struct OptimiserName {
 };
 constexpr OptimiserName kOptimisers[] = {{"adam-uniform", OptimiserKind::kAdamUniform},
                                          {"adam", OptimiserKind::kAdam},
-                                         {"gradient-descent", OptimiserKind::kGradientDescent}};
+                                         {"gradient-descent", OptimiserKind::kGradientDescent},
+                                         {"lbfgs", OptimiserKind::kLbfgs}};
 
 // Of the running means. With Kingma and Ba's 0.999 one heavy sample among the first sets the scale
 // of a thousand steps: of the shape before two mirrors (scenes/fits), the chamfer distance after
@@ -35,12 +36,13 @@ OptimiserKind optimiser_kind(const std::string& name) {
 }
 
 Optimiser::Optimiser(OptimiserKind kind, size_t size) : kind_(kind) {
-  if (kind == OptimiserKind::kGradientDescent) return;
+  if (kind == OptimiserKind::kGradientDescent || kind == OptimiserKind::kLbfgs) return;
   first.resize(size);
   second.resize(size);
 }
 
 std::vector<double> Optimiser::step(const std::vector<double>& gradient, int64_t count) {
+  CHECK(kind_ != OptimiserKind::kLbfgs);  // see QuasiNewton
   std::vector<double> step(gradient.size());
   if (kind_ == OptimiserKind::kGradientDescent) {
     for (size_t i = 0; i < step.size(); ++i) step[i] = -gradient[i];

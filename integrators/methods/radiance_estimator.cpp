@@ -21,17 +21,24 @@ RadianceEstimator::RadianceEstimator(const Scene& scene, int threads,
       visible_(std::move(visible)) {}
 
 void RadianceEstimator::add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const {
-  if (sink.log()) {
-    PathLog visitor(*sink.log());
-    for (const KeyedSample& sample : samples) trace({&sample, 1}, &visitor, sink);
-  } else {
-    trace(samples, static_cast<NoVisitor*>(nullptr), sink);
+  // In closed form what is left to chance is where in its pixel a sample lies: it takes two places.
+  for (const bool mirrored : {false, true}) {
+    if (mirrored && !closed_) break;
+    const double weight = closed_ ? 0.5 : 1;
+    if (sink.log()) {
+      PathLog visitor(*sink.log());
+      for (const KeyedSample& sample : samples) {
+        trace({&sample, 1}, mirrored, weight, &visitor, sink);
+      }
+    } else {
+      trace(samples, mirrored, weight, static_cast<NoVisitor*>(nullptr), sink);
+    }
   }
 }
 
 template <class Visitor>
-void RadianceEstimator::trace(std::span<const KeyedSample> samples, Visitor* visitor,
-                              SampleSink& sink) const {
+void RadianceEstimator::trace(std::span<const KeyedSample> samples, bool mirrored, double weight,
+                              Visitor* visitor, SampleSink& sink) const {
   using Tracer = PathTracer<double, Visitor>;
   static_assert(kMostTogether <= Tracer::kMostWalks);
   RayCount rays;
@@ -42,7 +49,8 @@ void RadianceEstimator::trace(std::span<const KeyedSample> samples, Visitor* vis
   starts.reserve(samples.size());
   std::vector<FilmPosition> places;
   for (const auto& [at, key] : samples) {
-    const FilmPosition film = sample_pixel_filter(scene_.film, at.x, at.y, key);
+    FilmPosition film = sample_pixel_filter(scene_.film, at.x, at.y, key);
+    if (mirrored) film = mirrored_in_pixel(scene_.film, at.x, at.y, film);
     const auto ray = camera_.ray(film.x, film.y);
     if (sink.log()) log_camera_ray(*sink.log(), film.x, film.y, ray.origin, ray.direction);
     walks.emplace_back(key, 0, visitor);
@@ -63,7 +71,7 @@ void RadianceEstimator::trace(std::span<const KeyedSample> samples, Visitor* vis
   sink.cost(0).samples += samples.size();
   for (size_t i = 0; i < samples.size(); ++i) {
     if (!walks[i].failed && is_finite(walks[i].sums.radiance)) {
-      sink.add_radiance(samples[i].at, walks[i].sums.radiance, 1);
+      sink.add_radiance(samples[i].at, walks[i].sums.radiance, weight);
     } else {
       sink.reject(samples[i].at, slot_name(0));
     }

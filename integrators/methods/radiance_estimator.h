@@ -22,7 +22,8 @@ class RadianceEstimator final : public SampleEstimator {
 
  private:
   template <class Visitor>
-  void trace(std::span<const KeyedSample> samples, Visitor* visitor, SampleSink& sink) const;
+  void trace(std::span<const KeyedSample> samples, bool mirrored, double weight, Visitor* visitor,
+             SampleSink& sink) const;
 
   const Scene& scene_;
   std::unique_ptr<RayTracer> tracer_;

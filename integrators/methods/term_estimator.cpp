@@ -224,20 +224,21 @@ class TermEstimator::Convoy {
   }
 
   // counts: of the terms at its vertices; null for a path without.
-  void add(const PixelSample& at, const Rng& key, double weight, const PixelCounts* counts) {
+  void add(const Place& place, const Rng& key, double weight, const PixelCounts* counts) {
     if (walks_.size() == kMost) finish();
     if (counts) vertices_.emplace_back(estimator_, *counts, nullptr, sink_);
     walks_.emplace_back(key, 0, counts ? &vertices_.back() : nullptr);
-    walks_.back().field = estimator_.plan_.field_at(at);
-    places_.push_back(at);
+    walks_.back().field = estimator_.plan_.field_at(place.at);
+    places_.push_back(place);
     weights_.push_back(weight);
   }
   void finish() {
     const PathCosts costs = estimator_.trace<VertexTerms>(places_, walks_, nullptr, false);
     add_cost(costs, walks_.size(), sink_.cost(estimator_.pixel_slot_));
     for (size_t i = 0; i < walks_.size(); ++i) {
-      estimator_.add_path(places_[i], estimator_.path_of(walks_[i]), weights_[i], sink_);
-      if (walks_[i].visitor) estimator_.add_vertices(places_[i], *walks_[i].visitor, sink_);
+      const PixelSample& at = places_[i].at;
+      estimator_.add_path(at, estimator_.path_of(walks_[i]), weights_[i], sink_);
+      if (walks_[i].visitor) estimator_.add_vertices(at, *walks_[i].visitor, sink_);
     }
     walks_.clear();
     vertices_.clear();
@@ -252,7 +253,7 @@ class TermEstimator::Convoy {
   SampleSink& sink_;
   std::vector<Walk<Dual, VertexTerms>> walks_;
   std::vector<VertexTerms> vertices_;  // of the paths that have them
-  std::vector<PixelSample> places_;
+  std::vector<Place> places_;
   std::vector<double> weights_;
 };
 
@@ -265,8 +266,9 @@ void TermEstimator::add_pixels(std::span<const KeyedSample> samples, SampleSink&
   for (const auto& [at, key] : samples) {
     const PixelCounts counts = plan_.counts_at(at);
     const int paths = paths_ ? static_cast<int>(counts[pixel_slot_]) : 1;
-    for (int i = 0; i < paths; ++i) {
-      convoy.add(at, key.copy(Purpose::kPathCopy, i), 1.0 / paths,
+    const int all = paths * places_of_path();
+    for (int i = 0; i < all; ++i) {
+      convoy.add({at, i >= paths}, key.copy(Purpose::kPathCopy, i % paths), 1.0 / all,
                  i == 0 && vertices_ ? &counts : nullptr);
     }
   }
@@ -277,12 +279,13 @@ void TermEstimator::add_pixels(std::span<const KeyedSample> samples, SampleSink&
 void TermEstimator::add_logged(const PixelSample& at, const Rng& key, SampleSink& sink) const {
   const PixelCounts counts = plan_.counts_at(at);
   const int paths = paths_ ? static_cast<int>(counts[pixel_slot_]) : 1;
+  const int all = paths * places_of_path();
   const auto add = [&](auto& visitor, int i) {
-    const Path path = trace_one(at, key.copy(Purpose::kPathCopy, i), plan_.field_at(at), visitor,
-                                sink.log(), sink.cost(pixel_slot_));
-    add_path(at, path, 1.0 / paths, sink);
+    const Path path = trace_one({at, i >= paths}, key.copy(Purpose::kPathCopy, i % paths),
+                                plan_.field_at(at), visitor, sink.log(), sink.cost(pixel_slot_));
+    add_path(at, path, 1.0 / all, sink);
   };
-  for (int i = 0; i < paths; ++i) {
+  for (int i = 0; i < all; ++i) {
     if (i == 0) {
       VertexTerms vertices(*this, counts, nullptr, sink);
       add(vertices, i);
@@ -307,7 +310,7 @@ void TermEstimator::add_vertices(const PixelSample& at, const VertexTerms& verti
 }
 
 template <class Visitor>
-TermEstimator::PathCosts TermEstimator::trace(std::span<const PixelSample> places,
+TermEstimator::PathCosts TermEstimator::trace(std::span<const Place> places,
                                               std::span<Walk<Dual, Visitor>> walks, SampleLog* log,
                                               bool twice) const {
   PathCosts costs;
@@ -318,8 +321,9 @@ TermEstimator::PathCosts TermEstimator::trace(std::span<const PixelSample> place
   if (splits_now(twice)) tracer.split_by(&rates_);
   std::array<StartRay<Dual>, Tracer::kMostWalks> starts;
   for (size_t i = 0; i < walks.size(); ++i) {
-    const FilmPosition film =
-        sample_pixel_filter(scene_.film, places[i].x, places[i].y, walks[i].key);
+    const PixelSample& at = places[i].at;
+    FilmPosition film = sample_pixel_filter(scene_.film, at.x, at.y, walks[i].key);
+    if (places[i].mirrored) film = mirrored_in_pixel(scene_.film, at.x, at.y, film);
     const auto ray = camera_.ray(film.x, film.y);
     starts[i] = {camera_ray(scene_, CameraRay<double>{value(ray.origin), value(ray.direction),
                                                       ray.t_min, ray.t_max}),
@@ -352,12 +356,12 @@ TermEstimator::Path TermEstimator::path_of(const Walk<Dual, Visitor>& walk) cons
 }
 
 template <class Visitor>
-TermEstimator::Path TermEstimator::trace_one(const PixelSample& at, const Rng& key,
+TermEstimator::Path TermEstimator::trace_one(const Place& place, const Rng& key,
                                              const DirectionField* field, Visitor& visitor,
                                              SampleLog* log, TermCost& cost, bool twice) const {
   Walk<Dual, Visitor> walk(key, 0, &visitor);
   walk.field = field;
-  const PathCosts costs = trace<Visitor>({&at, 1}, {&walk, 1}, log, twice);
+  const PathCosts costs = trace<Visitor>({&place, 1}, {&walk, 1}, log, twice);
   add_cost(costs, 1, cost);
   return path_of(walk);
 }
@@ -426,11 +430,19 @@ TermEstimator::Sample TermEstimator::sample(const PixelSample& at, const Rng& ke
   if (twice) {
     const DirectionField rest;  // as a field, so that both take the same steps
     TermCost uncounted;
-    held = trace_one(at, key, &rest, motions, nullptr, uncounted, twice);
+    held = trace_one({at}, key, &rest, motions, nullptr, uncounted, twice);
   }
   VertexTerms vertices(*this, ones, twice ? &motions : nullptr, sink);
-  const Path path = trace_one(at, key, turns ? &turning_ : nullptr, vertices, nullptr,
-                              sink.cost(pixel_slot_), twice);
+  const auto trace_at = [&](bool mirrored) {
+    return trace_one({at, mirrored}, key, turns ? &turning_ : nullptr, vertices, nullptr,
+                     sink.cost(pixel_slot_), twice);
+  };
+  Path path = trace_at(false);
+  if (places_of_path() == 2) {  // no terms are at its vertices, and no directions turn
+    const Path other = trace_at(true);
+    path.found.radiance = (path.found.radiance + other.found.radiance) * 0.5;
+    path.finite = path.finite && other.finite;
+  }
   const auto split = [&](const Rgb<Lanes>& turning, const Rgb<Lanes>& resting) {
     if (!turns) return TurnedSample{turning, {}, {}};
     return TurnedSample{twice ? resting : turning, turned(turning, resting), {}};

@@ -92,16 +92,23 @@ class TermEstimator final : public SampleEstimator {
     RayCount rays;
     WarpCount warped;
   };
+  // Where a path starts; mirrored: see mirrored_in_pixel.
+  struct Place {
+    PixelSample at;
+    bool mirrored = false;
+  };
   // walks[i] is a path of places[i]; at most as many as a PathTracer takes.
   template <class Visitor>
-  PathCosts trace(std::span<const PixelSample> places, std::span<Walk<Dual, Visitor>> walks,
+  PathCosts trace(std::span<const Place> places, std::span<Walk<Dual, Visitor>> walks,
                   SampleLog* log, bool twice) const;
   template <class Visitor>
-  Path trace_one(const PixelSample& at, const Rng& key, const DirectionField* field,
-                 Visitor& visitor, SampleLog* log, TermCost& cost, bool twice = false) const;
+  Path trace_one(const Place& place, const Rng& key, const DirectionField* field, Visitor& visitor,
+                 SampleLog* log, TermCost& cost, bool twice = false) const;
   template <class Visitor>
   Path path_of(const Walk<Dual, Visitor>& walk) const;
   void add_logged(const PixelSample& at, const Rng& key, SampleSink& sink) const;
+  // How many places of its pixel a path takes: in closed form these alone are left to chance.
+  int places_of_path() const { return closed_ ? 2 : 1; }
   // Paths that are traced twice must take the same samples, though their vertices move otherwise.
   bool splits_now(bool twice) const { return plan_.splits && !twice; }
   // What turns about the axes change, in the unit of MotionRates: from what lanes 1 to 3 have more

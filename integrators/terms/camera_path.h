@@ -23,6 +23,18 @@ inline FilmPosition sample_pixel_filter(const Film& film, int x, int y, const Rn
   return {x + 0.5 + dx, y + 0.5 + dy};
 }
 
+// The same position on the other side of the pixel's center: drawn from the filter like the first,
+// to which filters are symmetric. What is linear over the pixel is gone from the mean of both. An
+// axis along which the film's border cuts the filter keeps its offset.
+inline FilmPosition mirrored_in_pixel(const Film& film, int x, int y,
+                                      const FilmPosition& position) {
+  const auto mirrored = [](const Film::Range& range, double center, double at) {
+    return range.lower == -range.upper ? 2 * center - at : at;
+  };
+  return {mirrored(film.range_x(x), x + 0.5, position.x),
+          mirrored(film.range_y(y), y + 0.5, position.y)};
+}
+
 // The primal camera ray.
 inline Ray camera_ray(const Scene& scene, const CameraRay<double>& c) {
   Ray ray{c.origin, c.direction, c.t_min, c.t_max};

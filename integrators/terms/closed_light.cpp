@@ -5,7 +5,9 @@
 #include <memory>
 #include <tuple>
 
+#include "integrators/terms/closed_light_planes.h"
 #include "integrators/terms/polygon_light.h"
+#include "limn/core/reverse.h"
 #include "limn/core/shadow_outlines.h"
 #include "limn/core/visible_regions.h"
 
@@ -50,6 +52,7 @@ struct ClosedLight::Scratch {
 
   std::vector<const FaceTree::Item*> items;
   std::vector<FaceRef> faces;  // by label: first the lamp's, then those before it
+  size_t first_item = 0;       // from this label on they are those of `items`
   size_t lamp_faces = 0;
   size_t uncut = 0;  // of these, those that the lamp's plane does not cut
   PlaneWindow window;
@@ -62,6 +65,10 @@ struct ClosedLight::Scratch {
 
   // By outlines.
   ShadowOutlines outlines;
+  // Of each item of the tree twice the query that last told which way round it is seen, and one
+  // more if it is seen from behind.
+  std::vector<uint64_t> turns;
+  uint64_t query = 0;
   std::vector<Corner> polygon, clipped;
   std::vector<ShadowOutlines::Point> points;
   std::vector<uint32_t> lines;
@@ -134,7 +141,8 @@ bool ClosedLight::list(const LampPlane& lamp, const Receiver& receiver, Scratch&
   scratch.faces = lamp.faces;
   scratch.lamp_faces = lamp.faces.size();
   scratch.faces.insert(scratch.faces.end(), lamp.before.begin(), lamp.before.end());
-  scratch.uncut = scratch.faces.size();
+  scratch.uncut = scratch.first_item = scratch.faces.size();
+  scratch.items.clear();
   if (!(scratch.far > scratch.near)) return true;
   std::array<HalfSpace, 8> set;
   size_t count = 0;
@@ -147,8 +155,8 @@ bool ClosedLight::list(const LampPlane& lamp, const Receiver& receiver, Scratch&
   bound(a, 0);
   bound(-a, scratch.far);
   if (receiver.wedge) bound(*receiver.wedge, 0);
-  scratch.items.clear();
   tree_.list(std::span(set).first(count), scratch.items);
+  size_t kept = 0;
   for (const FaceTree::Item* item : scratch.items) {
     // What rises above the horizon by rounding alone is the receiver's own plane.
     const auto rises = [&](const Vec3f& x) {
@@ -162,8 +170,11 @@ bool ClosedLight::list(const LampPlane& lamp, const Receiver& receiver, Scratch&
     if (std::find(lamp.in_plane.begin(), lamp.in_plane.end(), first) != lamp.in_plane.end()) {
       continue;
     }
-    if (!is_skipped(item->face, receiver)) scratch.faces.push_back(item->face);
+    if (is_skipped(item->face, receiver)) continue;
+    scratch.faces.push_back(item->face);
+    scratch.items[kept++] = item;
   }
+  scratch.items.resize(kept);
   return true;
 }
 
@@ -220,6 +231,56 @@ void ClosedLight::find_regions(const LampPlane& lamp, const Receiver& receiver,
   }
 }
 
+// Which way round faces are seen on the grid, where doubles tell. A side between two that are
+// turned alike cancels, so that most faces need not be looked at any closer.
+void ClosedLight::find_turns(const LampPlane& lamp, const Receiver& receiver,
+                             Scratch& scratch) const {
+  const Vec3d a = -lamp.plane.n, &p = receiver.p;
+  const double x_steps = kGridHalf / scratch.window.half_width,
+               y_steps = kGridHalf / scratch.window.half_height;
+  const double steps = std::max(x_steps, y_steps), both = x_steps * y_steps;
+  const auto size_of = [](const Vec3d& x) {
+    return std::fabs(x.x) + std::fabs(x.y) + std::fabs(x.z);
+  };
+  scratch.turns.resize(tree_.size());
+  ++scratch.query;
+  // Farther out the grid's coordinates are themselves off by half a step.
+  constexpr double kMostSteps = 0x1p48;
+  const PlanePoint& center = scratch.window.center;
+  if (!(std::max(std::fabs(center.x), std::fabs(center.y)) * steps < kMostSteps)) return;
+  for (const FaceTree::Item* item : scratch.items) {
+    const Vec3d w0 = cast<double>(item->corners[0]) - p;
+    const Vec3d e1 = cast<double>(item->corners[1]) - p - w0,
+                e2 = cast<double>(item->corners[2]) - p - w0;
+    const double z0 = dot(w0, a), z1 = z0 + dot(e1, a), z2 = z0 + dot(e2, a);
+    const auto [near, far] = std::minmax({z0, z1, z2});
+    if (near < scratch.near || far > scratch.far) continue;  // it is cut
+    // On the grid twice the area is det(w0, w1, w2) both / (z0 z1 z2). Corners are rounded by less
+    // than one step, and a side's coordinates are below `steps` |e| (near + |w|) / near^2, so that
+    // rounding changes it by at most 8 of that and 8 more; the determinant's own is below 2^-46 of
+    // the lengths in it.
+    const double volume = dot(cross(e1, e2), w0);
+    const double side = size_of(e1) + size_of(e2), reach = size_of(w0) + side;
+    if (!(steps * reach < kMostSteps * near)) continue;
+    const double error = far * far * far * 8 * (steps * side * (near + reach) + near * near);
+    const double size = std::fabs(volume) - 0x1p-46 * side * side * reach;
+    if (!(size * both * near * near > error)) continue;
+    scratch.turns[tree_.index_of(*item)] = 2 * scratch.query + (volume > 0 ? 1 : 0);
+  }
+}
+
+// By bits: the sides of a face that cancel.
+uint32_t ClosedLight::cancelled_sides(const FaceTree::Item& item, const Scratch& scratch) const {
+  const uint64_t turn = scratch.turns[tree_.index_of(item)];
+  if (turn < 2 * scratch.query) return 0;
+  uint32_t sides = 0;
+  for (uint32_t k = 0; k < 3; ++k) {
+    const uint32_t other = item.neighbours[k];
+    if (other != FaceTree::kNone && scratch.turns[other] == turn) sides |= 1u << k;
+  }
+  return sides;
+}
+
 // False if a corner is too far out.
 bool ClosedLight::find_outlines(const LampPlane& lamp, const Receiver& receiver,
                                 Scratch& scratch) const {
@@ -238,7 +299,12 @@ bool ClosedLight::find_outlines(const LampPlane& lamp, const Receiver& receiver,
   const auto clip = [&](const auto& height, uint32_t line) { scratch.clip(height, line, on_grid); };
   scratch.outlines.clear();
   scratch.cut_points.clear();
+  find_turns(lamp, receiver, scratch);
   for (uint32_t label = 0; label < scratch.faces.size(); ++label) {
+    const bool listed = label >= scratch.first_item;
+    const uint32_t cancelled =
+        listed ? cancelled_sides(*scratch.items[label - scratch.first_item], scratch) : 0;
+    if (cancelled == 7) continue;
     const FaceRef ref = scratch.faces[label];
     const auto corners = face_corners<double>(scene_.shape(ref.shape).mesh, ref.face);
     const uint32_t line = label * Scratch::kLines;
@@ -268,7 +334,9 @@ bool ClosedLight::find_outlines(const LampPlane& lamp, const Receiver& receiver,
       scratch.lines.push_back(corner.line);
     }
     if (!within) return false;
-    if (scratch.points.size() > 2) scratch.outlines.add(scratch.points, scratch.lines, of_lamp);
+    if (scratch.points.size() > 2) {
+      scratch.outlines.add(scratch.points, scratch.lines, of_lamp, cancelled);
+    }
   }
   scratch.sort_cut_points();
   return true;
@@ -310,7 +378,7 @@ class ClosedLight::View {
   void add_outlines(std::vector<PolygonSide<S>>& all) const {
     scratch_.outlines.for_each([&](const ShadowOutlines::Piece& piece) {
       const Vec3d first = towards(piece.first), last = towards(piece.last);
-      Vec3<S> n = normal_of_line(piece.tag, first + last);
+      Vec3<S> n = normal_of_line<S>(piece.tag, first + last);
       const Vec3d rounded = cross(first, last);  // positive above
       if (value(n) == Vec3d{}) n = {S(rounded.x), S(rounded.y), S(rounded.z)};
       if ((dot(value(n), rounded) > 0) != piece.lit_above) n = -n;
@@ -351,21 +419,22 @@ class ClosedLight::View {
              const Vec3d& about) const {
     if (other < line) std::swap(line, other);  // the same for both pieces to the last bit
     const Vec3d hint = towards(piece.first) + towards(piece.last);
-    return meet(value(normal_of_line(line, hint)), value(normal_of_line(other, hint)), about);
+    return meet(normal_of_line<double>(line, hint), normal_of_line<double>(other, hint), about);
   }
   FaceRef face_of(uint32_t line) const { return scratch_.faces[line / Scratch::kLines]; }
   const Mesh& mesh_of(uint32_t line) const { return light_.scene_.shape(face_of(line).shape).mesh; }
 
   // Of the plane through p and a line. hint: a direction on it, to tell faces of the lamp apart.
-  Vec3<S> normal_of_line(uint32_t line, const Vec3d& hint) const {
+  template <class T>
+  Vec3<T> normal_of_line(uint32_t line, const Vec3d& hint) const {
     const uint32_t k = line % Scratch::kLines;
-    const auto constant = [](const Vec3d& n) { return Vec3<S>{S(n.x), S(n.y), S(n.z)}; };
+    const auto constant = [](const Vec3d& n) { return Vec3<T>{T(n.x), T(n.y), T(n.z)}; };
     if (k == Scratch::kHorizon) return constant(receiver_.up);
     if (k == Scratch::kWedge) return constant(*receiver_.wedge);
     if (k == Scratch::kNearCut) return {};
-    const auto x = corners_of(face_of(line));
-    if (k == Scratch::kFarCut) return normal_of_crossing(x, corners_of(lamp_face_at(hint)));
-    return cross(x[k] - p_, x[(k + 1) % 3] - p_);
+    const auto x = corners_of<T>(face_of(line));
+    if (k == Scratch::kFarCut) return normal_of_crossing<T>(x, corners_of<T>(lamp_face_at(hint)));
+    return plane_normal<T>(x[k], x[(k + 1) % 3]);
   }
   // The face of the lamp that is seen there, or the nearest.
   FaceRef lamp_face_at(const Vec3d& w) const {
@@ -384,10 +453,11 @@ class ClosedLight::View {
   }
   // Where a face goes through the lamp's plane: of all planes through their common line that
   // through p.
-  Vec3<S> normal_of_crossing(const std::array<Vec3<S>, 3>& x,
-                             const std::array<Vec3<S>, 3>& y) const {
-    const Vec3<S> n = cross(x[1] - x[0], x[2] - x[0]), m = cross(y[1] - y[0], y[2] - y[0]);
-    return n * dot(m, p_ - y[0]) - m * dot(n, p_ - x[0]);
+  template <class T>
+  Vec3<T> normal_of_crossing(const std::array<Vec3<T>, 3>& x,
+                             const std::array<Vec3<T>, 3>& y) const {
+    const Vec3<T> n = cross(x[1] - x[0], x[2] - x[0]), m = cross(y[1] - y[0], y[2] - y[0]);
+    return n * dot(m, point<T>() - y[0]) - m * dot(n, point<T>() - x[0]);
   }
 
   // Where two lines meet; `about` is where they do on the grid. Lines that are parallel to rounding
@@ -408,8 +478,8 @@ class ClosedLight::View {
     const Vec3d rounded = lamp_.u * f.a + lamp_.v * f.b - lamp_.plane.n * f.c;
     Vec3<S> n;
     if (side.side >= 0) {
-      const auto x = corners_of(scratch_.faces[side.label]);
-      n = cross(x[side.side] - p_, x[(side.side + 1) % 3] - p_);
+      const auto x = corners_of<S>(scratch_.faces[side.label]);
+      n = plane_normal<S>(x[side.side], x[(side.side + 1) % 3]);
     } else if (side.cut >= 0) {
       n = normal_of_cut(side, shown);
     }
@@ -424,11 +494,33 @@ class ClosedLight::View {
       const Vec3d& n = side.cut == (face.whole ? 0 : 1) ? receiver_.up : *receiver_.wedge;
       return {S(n.x), S(n.y), S(n.z)};
     }
-    return normal_of_crossing(corners_of(scratch_.faces[side.label]),
-                              corners_of(scratch_.faces[shown]));
+    return normal_of_crossing<S>(corners_of<S>(scratch_.faces[side.label]),
+                                 corners_of<S>(scratch_.faces[shown]));
   }
-  std::array<Vec3<S>, 3> corners_of(FaceRef face) const {
-    return face_corners<S>(light_.scene_.shape(face.shape).mesh, face.face);
+  template <class T>
+  std::array<Vec3<T>, 3> corners_of(FaceRef face) const {
+    if constexpr (std::is_same_v<T, Var>) {
+      return corner_leaves(light_.scene_, face);
+    } else {
+      return face_corners<T>(light_.scene_.shape(face.shape).mesh, face.face);
+    }
+  }
+  // The point that light falls on: as it moves, or where it is.
+  template <class T>
+  decltype(auto) point() const {
+    if constexpr (std::is_same_v<T, S>) {
+      return (p_);
+    } else {
+      return (receiver_.p);
+    }
+  }
+  template <class T>
+  Vec3<T> plane_normal(const Vec3<T>& x0, const Vec3<T>& x1) const {
+    if constexpr (std::is_same_v<T, Var>) {
+      return triangle_normal(p_, x0, x1);
+    } else {
+      return cross(x0 - point<T>(), x1 - point<T>());
+    }
   }
 
   const ClosedLight& light_;
@@ -437,29 +529,6 @@ class ClosedLight::View {
   const Vec3<S>& p_;
   Scratch& scratch_;
 };
-
-namespace {
-
-// Of the faces around an edge that rise above the start's own, which is what a point near the edge
-// sees of them: the one that rises first leaves directions w with this . w >= 0.
-std::optional<Vec3d> wedge_at(const Scene& scene, const RayTracer& tracer, const EdgeStart& edge,
-                              const Vec3d& up) {
-  const Vec3d along = normalize(edge.x1 - edge.x0);
-  const Vec3d& f = edge.start.into;
-  const auto turn = [&](const Vec3d& a, const Vec3d& b) { return dot(along, cross(a, b)); };
-  const double sign = turn(f, up) < 0 ? -1 : 1;
-  std::optional<Vec3d> wedge;
-  double nearest = -2;
-  for_every_side(scene, edge.around, edge.x0, along, [&](const FaceSide& side, Incidence) {
-    if (side.face == edge.start.face || overlap(tracer, side, edge.start)) return;
-    if (!(sign * turn(f, side.into) > 0) || !(dot(f, side.into) > nearest)) return;
-    nearest = dot(f, side.into);
-    wedge = cross(along, side.into) * -sign;
-  });
-  return wedge;
-}
-
-}  // namespace
 
 template <class S>
 Rgb<S> ClosedLight::scattered(const RayTracer& tracer, const SurfacePoint<S>& surface,
@@ -500,7 +569,7 @@ Rgb<S> ClosedLight::scattered(const RayTracer& tracer, const SurfacePoint<S>& su
       light = polygon_integral<S>(lit, normalize(middle - receiver.p), kinks,
                                   [&](const Vec3d& w) { return scattering.eval(w); });
     }
-    sum += light * as<S>(shape.radiance);
+    sum += light * detail::emitter_radiance<S>(shape, lamp.shape);
   }
   return sum;
 }
@@ -509,5 +578,7 @@ template Rgb<double> ClosedLight::scattered(const RayTracer&, const SurfacePoint
                                             const Scattering<double>&, const EdgeStart*) const;
 template Rgb<Dual> ClosedLight::scattered(const RayTracer&, const SurfacePoint<Dual>&,
                                           const Scattering<Dual>&, const EdgeStart*) const;
+template Rgb<Var> ClosedLight::scattered(const RayTracer&, const SurfacePoint<Var>&,
+                                         const Scattering<Var>&, const EdgeStart*) const;
 
 }  // namespace limn

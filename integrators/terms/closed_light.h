@@ -67,6 +67,8 @@ class ClosedLight {
   bool is_skipped(FaceRef face, const Receiver& receiver) const;
   bool list(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;
   void find_regions(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;
+  void find_turns(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;
+  uint32_t cancelled_sides(const FaceTree::Item& item, const Scratch& scratch) const;
   bool find_outlines(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;
 
   const Scene& scene_;

@@ -25,12 +25,10 @@ inline bool PathTracer<S, Visitor>::begin_vertex(Walk& walk) {
     (*walk.visitor)(walk.surface, *walk.scattering, walk.throughput, walk.motion, walk.step,
                     walk.bounces, walk.key);
   }
-  if constexpr (!std::is_same_v<S, Var>) {
-    if (c_.closed) {
-      walk.sums.radiance +=
-          c_.closed->scattered(c_.tracer, walk.surface, *walk.scattering, walk.edge);
-      return false;
-    }
+  if (c_.closed) {
+    walk.sums.radiance +=
+        c_.closed->scattered(c_.tracer, walk.surface, *walk.scattering, walk.edge);
+    return false;
   }
   const int more = splits(walk.surface, walk.copies);
   const int lights = (walk.bounces > 0 ? light_samples_ : 1) * more;

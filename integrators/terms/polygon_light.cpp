@@ -133,7 +133,17 @@ double ramp_integral(std::span<const PolygonSide<double>> sides, const Vec3d& n,
   return sum;
 }
 
-// Where n turns with the angular velocity r, the polygon turns back with -r.
+namespace {
+
+// Where n turns with the angular velocity r, the polygon turns back with -r; with r = n x dn
+// -(r x s) . w is (dn . s) (n . w) - (n . s) (dn . w): the slope by n of what a side adds, over the
+// value of the ramp.
+Vec3d turned_back(const detail::Arc& arc, const Vec3d& n, const Vec3d& w) {
+  return arc.s * dot(n, w) - w * dot(n, arc.s);
+}
+
+}  // namespace
+
 Dual ramp_integral(std::span<const PolygonSide<Dual>> sides, const Vec3<Dual>& normal,
                    const Dual& h) {
   if (h.v == 0) return cosine_integral(sides, normal);  // the derivative by h is 0 there
@@ -152,11 +162,39 @@ Dual ramp_integral(std::span<const PolygonSide<Dual>> sides, const Vec3<Dual>& n
           sum.v += ramp.integral(c) / sine2 * across;
           sum.d += h.d * (ramp.integral_by_h(c) / sine2 * across);
         }
-        // -(r x s) . w with r = n x dn is (dn . s) (n . w) - (n . s) (dn . w).
-        const Lanes turned = dot(dn, arc.s) * c - dot(dn, w) * dot(n, arc.s);
-        sum.d += (dot(side.normal, w).d * (1 / arc.length) + turned) * (ramp.value(c) * dpsi);
+        sum.d += (dot(side.normal, w).d * (1 / arc.length) + dot(dn, turned_back(arc, n, w))) *
+                 (ramp.value(c) * dpsi);
       });
   return sum;
+}
+
+// One statement of the tape.
+Var ramp_integral(std::span<const PolygonSide<Var>> sides, const Vec3<Var>& normal, const Var& h) {
+  if (h.v == 0) return cosine_integral(sides, normal);  // the derivative by h is 0 there
+  const Ramp ramp(h.v);
+  const Vec3d n = value(normal);
+  Tape& tape = *Tape::current();
+  double sum = 0, by_h = 0;
+  Vec3d by_n;
+  for_every_side_point(
+      sides, n, ramp,
+      [&](const PolygonSide<Var>& side, const detail::Arc& arc, const Vec3d& w, double dpsi) {
+        const double c = dot(n, w), sine2 = squared_sine(n, w);
+        const double across = dot(n, arc.s) * dpsi;
+        if (c >= ramp.end) {
+          sum += 0.5 * across;
+        } else {
+          sum += ramp.integral(c) / sine2 * across;
+          by_h += ramp.integral_by_h(c) / sine2 * across;
+        }
+        const double weight = ramp.value(c) * dpsi;
+        if (weight == 0) return;
+        by_n += turned_back(arc, n, w) * weight;
+        detail::add_entries(tape, side.normal, w * (weight / arc.length));
+      });
+  detail::add_entries(tape, normal, by_n);
+  tape.entry(h.node, by_h);
+  return {sum, tape.end()};
 }
 
 }  // namespace limn

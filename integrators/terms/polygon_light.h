@@ -10,6 +10,7 @@
 #include <span>
 
 #include "limn/core/dual.h"
+#include "limn/core/var.h"
 #include "limn/core/vec.h"
 
 namespace limn {
@@ -50,24 +51,47 @@ inline double cosine_integral(std::span<const PolygonSide<double>> sides, const 
   }
   return sum;
 }
+namespace detail {
+
+// The integral of (n . w) w / |N| along a side, whose product with dN is what its motion adds.
+inline Vec3d cosine_slope(const Arc& arc, const Vec3d& n) {
+  // n . w as c cos psi + d sin psi, and the integrals of its products with cos psi and sin psi.
+  const double c = dot(n, arc.start), d = dot(n, arc.across);
+  const double sine = std::sin(arc.angle), both = 0.5 * sine * sine;
+  const double twice = 0.5 * sine * std::cos(arc.angle);
+  const double cosines = 0.5 * arc.angle + twice, sines = 0.5 * arc.angle - twice;
+  return (arc.start * (c * cosines + d * both) + arc.across * (c * both + d * sines)) *
+         (1 / arc.length);
+}
+
+// Of a statement of the tape: what three nodes add to its result.
+inline void add_entries(Tape& tape, const Vec3<Var>& x, const Vec3d& slope) {
+  for (int k = 0; k < 3; ++k) tape.entry(x[k].node, slope[k]);
+}
+
+}  // namespace detail
+
 inline Dual cosine_integral(std::span<const PolygonSide<Dual>> sides, const Vec3<Dual>& n) {
   Dual sum;
   for (const PolygonSide<Dual>& side : sides) {
-    const Vec3<Dual>& normal = side.normal;
-    const detail::Arc arc(value(normal), side.begin, side.end);
+    const detail::Arc arc(value(side.normal), side.begin, side.end);
     sum += dot(n, arc.s) * (0.5 * arc.angle);
-    if (is_still(normal)) continue;
-    // n . w and dN . w as c cos psi + d sin psi, and the integrals of the products of these.
-    const Vec3d still = value(n);
-    const double c = dot(still, arc.start), d = dot(still, arc.across);
-    const Lanes moved_c = dot(normal, arc.start).d, moved_d = dot(normal, arc.across).d;
-    const double sine = std::sin(arc.angle), both = 0.5 * sine * sine;
-    const double twice = 0.5 * sine * std::cos(arc.angle);
-    const double cosines = 0.5 * arc.angle + twice, sines = 0.5 * arc.angle - twice;
-    sum.d +=
-        (moved_c * (c * cosines + d * both) + moved_d * (c * both + d * sines)) * (1 / arc.length);
+    if (!is_still(side.normal)) sum.d += dot(side.normal, detail::cosine_slope(arc, value(n))).d;
   }
   return sum;
+}
+// One statement of the tape.
+inline Var cosine_integral(std::span<const PolygonSide<Var>> sides, const Vec3<Var>& n) {
+  Tape& tape = *Tape::current();
+  Vec3d sum;
+  for (const PolygonSide<Var>& side : sides) {
+    const detail::Arc arc(value(side.normal), side.begin, side.end);
+    sum += arc.s * (0.5 * arc.angle);
+    if (is_still(side.normal)) continue;
+    detail::add_entries(tape, side.normal, detail::cosine_slope(arc, value(n)));
+  }
+  detail::add_entries(tape, n, sum);
+  return {dot(value(n), sum), tape.end()};
 }
 
 // Directions where a function of direction has a kink: axis . w = level, w of length one.
@@ -83,6 +107,7 @@ struct Kink {
 // the inner one by quadrature between the ends of the ramp.
 double ramp_integral(std::span<const PolygonSide<double>> sides, const Vec3d& n, double h);
 Dual ramp_integral(std::span<const PolygonSide<Dual>> sides, const Vec3<Dual>& n, const Dual& h);
+Var ramp_integral(std::span<const PolygonSide<Var>> sides, const Vec3<Var>& n, const Var& h);
 
 namespace detail {
 
@@ -137,26 +162,40 @@ Rgb<S> triangle_integral(const Vec3d& a, const Vec3d& b, const Vec3d& c,
   return sum;
 }
 
-// The integral of f (dN . w) / |N| along a side.
+// The integral of f w / |N| along a side, for each channel.
 template <class F>
-Rgb<Lanes> side_integral(const Vec3<Dual>& normal, const Arc& arc, const Vec3d& a, const Vec3d& b,
-                         std::span<const Kink> kinks, const F& f, int depth = 0) {
+std::array<Vec3d, 3> side_slopes(const Arc& arc, const Vec3d& a, const Vec3d& b,
+                                 std::span<const Kink> kinks, const F& f, int depth = 0) {
   constexpr double kWide = 0.5;  // not tuned
+  std::array<Vec3d, 3> sum = {};
   if (length(b - a) > kWide && depth < 12) {
     const Vec3d m = normalize(a + b);
-    return side_integral(normal, arc, a, m, kinks, f, depth + 1) +
-           side_integral(normal, arc, m, b, kinks, f, depth + 1);
+    sum = side_slopes(arc, a, m, kinks, f, depth + 1);
+    const std::array<Vec3d, 3> rest = side_slopes(arc, m, b, kinks, f, depth + 1);
+    for (int c = 0; c < 3; ++c) sum[c] += rest[c];
+    return sum;
   }
   const double area = dot(arc.s, cross(a, b)) / arc.length;
-  Rgb<Lanes> sum;
   for_every_point(Breaks(a, b, kinks), [&](double t, double weight) {
     const Vec3d w = a + (b - a) * t;
     const double size = length(w);
     const Rgb<double> here = value(f(w / size));
-    const Lanes speed = dot(normal, w).d * (weight * area / (size * size * size));
-    for (int c = 0; c < 3; ++c) sum[c] += speed * here[c];
+    for (int c = 0; c < 3; ++c) sum[c] += w * (here[c] * (weight * area / (size * size * size)));
   });
   return sum;
+}
+
+inline void add_motion(const Vec3<Dual>& normal, const std::array<Vec3d, 3>& slopes,
+                       Rgb<Dual>& sum) {
+  for (int c = 0; c < 3; ++c) sum[c].d += dot(normal, slopes[c]).d;
+}
+inline void add_motion(const Vec3<Var>& normal, const std::array<Vec3d, 3>& slopes, Rgb<Var>& sum) {
+  Tape& tape = *Tape::current();
+  for (int c = 0; c < 3; ++c) {
+    tape.entry(sum[c].node, 1);
+    add_entries(tape, normal, slopes[c]);
+    sum[c].node = tape.end();
+  }
 }
 
 }  // namespace detail
@@ -170,11 +209,10 @@ Rgb<S> polygon_integral(std::span<const PolygonSide<S>> sides, const Vec3d& pole
   for (const PolygonSide<S>& side : sides) {
     const Vec3d &a = side.begin, &b = side.end;
     sum += detail::triangle_integral<S>(pole, a, b, kinks, f);
-    if constexpr (std::is_same_v<S, Dual>) {
+    if constexpr (!std::is_same_v<S, double>) {
       if (is_still(side.normal)) continue;
       const detail::Arc arc(value(side.normal), a, b);
-      const Rgb<Lanes> moved = detail::side_integral(side.normal, arc, a, b, kinks, f);
-      for (int c = 0; c < 3; ++c) sum[c].d += moved[c];
+      detail::add_motion(side.normal, detail::side_slopes(arc, a, b, kinks, f), sum);
     }
   }
   return sum;

@@ -3,6 +3,7 @@
 
     scenes/fits/fits.py mirrors   a shape from its image before two mirrors, beside other gradients
     scenes/fits/fits.py shadows   a shape out of view, from three soft shadows
+    scenes/fits/fits.py exact     the same from a loss without noise, by L-BFGS and by Adam
     scenes/fits/fits.py views     a shape from eight sides
     scenes/fits/fits.py pose      place, reflectance and camera of an object together
     scenes/fits/fits.py drift     from the very target: what noise does, and nothing else
@@ -47,10 +48,11 @@ class Fits:
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
 
-    def render(self, scene, file, *defines, spp=256, sensor=0):
+    def render(self, scene, file, *defines, spp=256, sensor=0, method="path"):
         if not os.path.exists(file):
             words = [w for d in defines for w in ("-D", d)] + ["--sensor", str(sensor)]
-            self.run("render", scene, *words, "--spp", str(spp), "--seed", "99", "-o", file)
+            words += ["--method", method, "--spp", str(spp), "--seed", "99"]
+            self.run("render", scene, *words, "-o", file)
         return file
 
     def fit(self, folder, scene, target, steps, *words):
@@ -138,6 +140,24 @@ def shadows(fits):
     truth = os.path.join(fits.generated, "creature.ply")
     return shape_rows(
         fits, "shadows", "hidden_object", [target], truth, 150, size, words, variants, 0.1
+    )
+
+
+def exact(fits):
+    size = ["width=64", "height=48"]
+    target = fits.render(
+        scene("hidden_object.xml"), fits.path("exact.exr"), *size, spp=8, method="analytic"
+    )
+    words = ["--spp", "1", "--snapshots", "15", "--sampler", "analytic"]
+    newton = ["--optimiser", "lbfgs"]
+    variants = [
+        ("lbfgs", newton),
+        ("lbfgs remeshed", [*newton, "--remesh", "15,30"]),
+        ("adam", []),
+    ]
+    truth = os.path.join(fits.generated, "creature.ply")
+    return shape_rows(
+        fits, "exact", "hidden_object", [target], truth, 45, size, words, variants, 0.1
     )
 
 
@@ -252,7 +272,7 @@ def picture(fits):
     return ["row", *([""] * 7)], table
 
 
-EXPERIMENTS = {"mirrors": mirrors, "shadows": shadows, "views": views, "pose": pose,
+EXPERIMENTS = {"mirrors": mirrors, "shadows": shadows, "exact": exact, "views": views, "pose": pose,
                "drift": drift, "picture": picture}  # fmt: skip
 
 

@@ -10,11 +10,21 @@ namespace {
 using Point = ShadowOutlines::Point;
 using Wide = __int128;
 
+// Corners of a window's width around it and nearer: products of their differences are below 2^62.
+constexpr int64_t kNarrow = int64_t{1} << 30;
+
 // Twice the area of a triangle: positive if r lies to the left of the way from p to q.
-Wide area(const Point& p, const Point& q, const Point& r) {
-  return Wide(q.x - p.x) * (r.y - p.y) - Wide(q.y - p.y) * (r.x - p.x);
+template <class Integer>
+Integer area(const Point& p, const Point& q, const Point& r) {
+  return Integer(q.x - p.x) * (r.y - p.y) - Integer(q.y - p.y) * (r.x - p.x);
 }
-int sign(Wide a) { return a > 0 ? 1 : a < 0 ? -1 : 0; }
+bool is_narrow(const Point& p) {
+  return p.x > -kNarrow && p.x < kNarrow && p.y > -kNarrow && p.y < kNarrow;
+}
+template <class Integer>
+int sign(Integer a) {
+  return a > 0 ? 1 : a < 0 ? -1 : 0;
+}
 
 }  // namespace
 
@@ -42,17 +52,21 @@ void ShadowOutlines::clear() {
 }
 
 void ShadowOutlines::add(std::span<const Point> corners, std::span<const uint32_t> tags,
-                         bool of_lamp) {
+                         bool of_lamp, uint32_t cancelled) {
   Wide turn = 0;
-  for (size_t i = 2; i < corners.size(); ++i) turn += area(corners[0], corners[i - 1], corners[i]);
+  for (size_t i = 2; i < corners.size(); ++i) {
+    turn += area<Wide>(corners[0], corners[i - 1], corners[i]);
+  }
   if (turn == 0) return;
   for (size_t i = 0; i < corners.size(); ++i) {
     const Point &a = corners[i], &b = corners[(i + 1) % corners.size()];
-    if (a == b) continue;
+    if (a == b || (cancelled >> i & 1)) continue;
     const bool forward = a < b;
     // Inside is to the left of the way round, and above a way to the right.
     const int change = (turn > 0) == forward ? -1 : 1;
-    const Edge edge = forward ? Edge{a, b, tags[i], 0, 0} : Edge{b, a, tags[i], 0, 0};
+    const bool narrow = is_narrow(a) && is_narrow(b);
+    const Edge edge =
+        forward ? Edge{a, b, tags[i], 0, 0, narrow} : Edge{b, a, tags[i], 0, 0, narrow};
     uint32_t& slot = slot_of(edge);
     if (slot == kEmpty) {
       slot = static_cast<uint32_t>(sides_.size());
@@ -77,9 +91,23 @@ void ShadowOutlines::compare(const Edge& s, uint32_t index, bool later, int& lam
     if (spans_start) lamp += t.lamp, cover += t.cover;
     return;
   }
+  if (s.narrow && t.narrow) {
+    compare_ends<int64_t>(s, index, later, lamp, cover);
+  } else {
+    compare_ends<Wide>(s, index, later, lamp, cover);
+  }
+}
+
+// Where neither lies wholly above the other.
+template <class Integer>
+void ShadowOutlines::compare_ends(const Edge& s, uint32_t index, bool later, int& lamp,
+                                  int& cover) {
+  const Edge& t = edges_[index];
+  const bool spans_start = t.p <= s.p;
   // Of the ends of s to t, and of those of t to s.
-  const Wide at_p = area(t.p, t.q, s.p), at_q = area(t.p, t.q, s.q);
-  const int p_of_t = sign(area(s.p, s.q, t.p)), q_of_t = sign(area(s.p, s.q, t.q));
+  const Integer at_p = area<Integer>(t.p, t.q, s.p), at_q = area<Integer>(t.p, t.q, s.q);
+  const int p_of_t = sign(area<Integer>(s.p, s.q, t.p)),
+            q_of_t = sign(area<Integer>(s.p, s.q, t.q));
   const bool one_line = at_p == 0 && at_q == 0;
   // Whether t is above s where both begin, and where the first of them ends.
   const auto is_above = [&](int of_s, int of_s_else, bool from_s, int of_t, int of_t_else) {
@@ -109,18 +137,45 @@ void ShadowOutlines::compare(const Edge& s, uint32_t index, bool later, int& lam
   }
 }
 
+// Those whose bounds say that compare() may have something to tell, in their order. Rounding to
+// floats keeps the order of integers.
+void ShadowOutlines::find_candidates(uint32_t i) {
+  const size_t size = edges_.size();
+  const float x0 = bounds_.x0[i], x1 = bounds_.x1[i], y0 = bounds_.y0[i];
+  const float *x0s = bounds_.x0.data(), *x1s = bounds_.x1.data(), *y1s = bounds_.y1.data();
+  near_.resize(size);
+  candidates_.resize(size);
+  uint32_t* near = near_.data();
+  // Written so that it becomes a few instructions on whole registers.
+  for (size_t j = 0; j < size; ++j) {
+    near[j] = static_cast<uint32_t>((x1s[j] >= x0) & (x0s[j] <= x1) & (y1s[j] >= y0));
+  }
+  near[i] = 0;
+  size_t count = 0;
+  for (uint32_t j = 0; j < size; ++j) {
+    candidates_[count] = j;
+    count += near[j];
+  }
+  candidates_.resize(count);
+}
+
 void ShadowOutlines::for_each(const std::function<void(const Piece&)>& visit) {
   edges_.clear();
+  for (auto* bounds : {&bounds_.x0, &bounds_.x1, &bounds_.y0, &bounds_.y1}) bounds->clear();
   for (const Edge& side : sides_) {
-    if (side.lamp != 0 || side.cover != 0) edges_.push_back(side);
+    if (side.lamp == 0 && side.cover == 0) continue;
+    edges_.push_back(side);
+    bounds_.x0.push_back(static_cast<float>(side.p.x));
+    bounds_.x1.push_back(static_cast<float>(side.q.x));
+    bounds_.y0.push_back(static_cast<float>(std::min(side.p.y, side.q.y)));
+    bounds_.y1.push_back(static_cast<float>(std::max(side.p.y, side.q.y)));
   }
   for (uint32_t i = 0; i < edges_.size(); ++i) {
     const Edge& s = edges_[i];
     int lamp = 0, cover = 0;  // above it
     events_.clear();
-    for (uint32_t j = 0; j < edges_.size(); ++j) {
-      if (j != i) compare(s, j, j > i, lamp, cover);
-    }
+    find_candidates(i);
+    for (const uint32_t j : candidates_) compare(s, j, j > i, lamp, cover);
     std::stable_sort(events_.begin(), events_.end(),
                      [](const Event& a, const Event& b) { return a.at < b.at; });
     End from{s.tag, Kind::kFirst, s.p};

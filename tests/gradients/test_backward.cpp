@@ -92,6 +92,25 @@ Scene crossing_scene(const TempFiles& files) {
   return scene;
 }
 
+// What `analytic` takes: bodies of both kinds of normals before lamps, one of which goes through
+// its lamp, and one that the camera sees at grazing angles.
+Scene lamps_scene(const TempFiles& files) {
+  SceneParts parts;
+  parts.max_depth = 2;
+  parts.origin = {0, 2.5, 4};
+  parts.target = {0, 0.5, 0};
+  const std::string ring = write_mesh(files, "ring.obj", shaken(torus_mesh(9, 5)));
+  const std::string ball = write_mesh(files, "ball.obj", shaken(icosphere_mesh(1)));
+  const std::string spear = write_mesh(files, "spear.obj", shaken(cube_mesh()));
+  parts.body =
+      square("floor", 3, -90, {0, 0, 0}, diffuse("grey", ".5, .5, .5")) +
+      obj_shape("ring", ring, true, 0.6, {0, 0.9, 0}, diffuse("clay", ".6, .5, .4")) +
+      obj_shape("ball", ball, false, 0.5, {-0.8, 0.4, 0.6}, diffuse("blue", ".1, .2, .8")) +
+      obj_shape("spear", spear, true, 0.2, {0.6, 3.5, 1}, diffuse("red", ".8, .2, .1")) +
+      square("lamp", 0.8, 90, {0.5, 3.5, 1}, area_light("glow", "6, 6, 6"));
+  return make_scene(files, parts);
+}
+
 Image random_adjoint(const Scene& scene, uint64_t seed) {
   Image adjoint(scene.film.crop_width, scene.film.crop_height, 3);
   for (size_t i = 0; i < adjoint.data.size(); ++i) {
@@ -127,8 +146,9 @@ double magnitude(const Scene& scene, const BackwardResult& result, const std::st
 }
 
 // With the same samples interior terms are equal, to rounding.
-void expect_same_interior(const Scene& scene) {
+void expect_same_interior(const Scene& scene, const std::string& sampler = "forest") {
   BackwardOptions options;
+  options.sampler = sampler;
   options.terms = {"interior"};
   options.uniform_pixels = true;
   for (const Parameter& p : list_parameters(scene)) options.parameters.push_back(p.name);
@@ -147,7 +167,7 @@ void expect_same_interior(const Scene& scene) {
     forward_options.parameters.push_back(p.name);
   }
   forward_options.terms = {"interior"};
-  forward_options.method = "forest";
+  forward_options.method = sampler;
   const GradientResult forward = gradient(scene, forward_options, settings);
   for (const ParameterGradient& p : forward.parameters) {
     double sum = 0;
@@ -167,6 +187,7 @@ TEST(Backward, InteriorIsThatOfForwardMode) {
   expect_same_interior(mirror_scene(files, false));
   expect_same_interior(shadow_scene(files));
   expect_same_interior(crossing_scene(files));
+  expect_same_interior(lamps_scene(files), "analytic");
 }
 
 // z-scores of all parameters, whose sum of squares has as many degrees of freedom at most.
@@ -211,6 +232,14 @@ TEST(Backward, AgreesWithOtherSamplers) {
   }
   options.sampler = "oak";
   EXPECT_THROW(backward(scene, adjoint, options, settings), InputError);
+}
+
+// Light in closed form, and silhouettes on the film with jumps in closed form.
+TEST(Backward, AgreesWithLightInClosedForm) {
+  const TempFiles files;
+  BackwardOptions options;
+  options.sampler = "analytic";
+  expect_agreement(lamps_scene(files), 16, options);
 }
 
 // Where lamps and suns are regions apart. Before a small lamp most is found from there.

@@ -69,7 +69,7 @@ class BackwardCommand final : public Command {
     const Scene scene = load_scene(common_, warnings_);
     if (adjoint_.empty() && target_.empty()) throw InputError("give --adjoint or --target");
     const LossKind kind = loss_kind(loss_);
-    edge_sampler_type(options_.sampler);  // told before the loss is rendered
+    reverse_method(options_.sampler);  // told before the loss is rendered
     if (!common_.part.empty()) return make_part(scene, command_line);
     files_ = plan_files(scene, options_.parameters, output_);
     if (target_.empty()) files_.adjoint = files_.adjoint_picture = "";
@@ -133,7 +133,8 @@ class BackwardCommand final : public Command {
     settings.seconds *= kImageShare;
     const Image target = read_exr(target_);
     check_loss_images(scene, target, {}, target_);
-    loss = image_loss(scene, target, kind, settings, {}, levels_);
+    loss = image_loss(scene, target, kind, settings, {}, levels_,
+                      {.method = reverse_method(options_.sampler).closed ? "analytic" : "path"});
     if (kind == LossKind::kL1) {
       warnings_.add_all(
           {"the gradient of l1 is biased where the image's noise is not small beside "

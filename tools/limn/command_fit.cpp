@@ -111,7 +111,8 @@ void FitCommand::add_options(CLI::App& app, bool) {
       ->check(CLI::Range(1, 32))
       ->capture_default_str();
   app.add_option("--optimiser,--optimizer", given_.optimiser,
-                 "adam-uniform (one scale for all vertices of a shape), adam, gradient-descent")
+                 "adam-uniform (one scale for all vertices of a shape), adam, gradient-descent; "
+                 "with --sampler analytic lbfgs: the loss as a function, without noise")
       ->capture_default_str();
   app.add_option("--step", given_.options.step,
                  "Of the first step, in natural steps: 1 % of a shape's diagonal, 0.01 radians, "
@@ -327,16 +328,20 @@ int FitCommand::loop(Fit& fit, FitFolder& folder, const RunSettings& settings) {
     }
     folder.add(*record, fit);
     tell(*record);
-    const bool last = fit.steps() == a.steps;
+    const bool last = fit.steps() == a.steps || record->at_rest;
     if (!last && fit.steps() % a.snapshots != 0) continue;
     folder.add_snapshot(fit, settings, kPictureSamples, common_.quiet);
     folder.write(fit, last ? "done" : "running", warnings_.lines());
+    if (record->at_rest) break;
   }
   return kSuccess;
 }
 
 void FitCommand::tell(const FitRecord& record) const {
   if (common_.quiet) return;
+  if (record.at_rest) {
+    fmt::print("step {}: at rest, no lower loss was found along the gradient\n", record.step);
+  }
   if (record.halvings > 0) {
     fmt::print(stderr, "step {}: halved {} times, so that no face loses its area\n", record.step,
                record.halvings);

@@ -124,8 +124,10 @@ void add_reverse_options(CLI::App& app, BackwardOptions& options) {
       ->check(CLI::IsMember({kAdjointPixels, kUniformPixels}))
       ->default_str(kAdjointPixels);
   app.add_option("--sampler", options.sampler,
-                 "Of edges: forest; silhouettes, which is better where shadows are soft; or to "
-                 "compare with them quadric, li2019, uniform, brute or a variant of these")
+                 "Of edges: forest; silhouettes, which is better where shadows are soft; analytic: "
+                 "no edges, but the light of flat lamps in closed form (diffuse surfaces, "
+                 "max_depth 2); or to compare with them quadric, li2019, uniform, brute or a "
+                 "variant of these")
       ->capture_default_str();
   app.add_option("--edge-samples", options.edge_samples, "At every vertex of a path")
       ->check(CLI::Range(1, 1 << 16));

@@ -128,7 +128,11 @@ std::vector<Vec3<T>> vectors(const json& list) {
 }
 
 json to_json(const FitState& state) {
-  json j = {{"steps", state.steps}, {"parameters", json::array()}, {"views", json::array()}};
+  json j = {{"steps", state.steps},
+            {"parameters", json::array()},
+            {"views", json::array()},
+            {"moves", state.moves},
+            {"changes", state.changes}};
   for (const FitState::Numbers& p : state.parameters) {
     j["parameters"].push_back({{"values", p.values},
                                {"first", p.first},
@@ -150,6 +154,9 @@ json to_json(const FitState& state) {
 FitState state_from(const json& j) {
   FitState state;
   state.steps = j.at("steps");
+  // Folders of before there was lbfgs have none.
+  state.moves = j.value("moves", state.moves);
+  state.changes = j.value("changes", state.changes);
   for (const json& p : j.at("parameters")) {
     state.parameters.push_back(
         {p.at("values"), p.at("first"), p.at("second"), p.at("natural_step"), p.at("lambda")});
@@ -372,6 +379,7 @@ void FitFolder::add(const FitRecord& r, const Fit& fit) {
                       {"views", r.view_losses},
                       {"step_size", r.step_size},
                       {"halvings", r.halvings},
+                      {"evaluations", r.evaluations},
                       {"values", scalars},
                       {"seconds", r.seconds}});
 }

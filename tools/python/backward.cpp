@@ -137,7 +137,8 @@ void bind_backward(nb::module_& m) {
       "Copies of a vertex have equal shares. Pixels are sampled in proportion to the adjoint "
       "unless uniform_pixels. edge_samples: at every vertex of a path; camera_samples: points on "
       "the film, for each path. sampler: of edges, \"forest\"; \"silhouettes\", which is better "
-      "where shadows are soft; or to compare with them \"quadric\", \"li2019\", \"uniform\", "
+      "where shadows are soft; \"analytic\": none, but the light of flat lamps in closed form; or "
+      "to compare with them \"quadric\", \"li2019\", \"uniform\", "
       "\"brute\". batches: at most, for standard errors. The rest as limn.gradient.");
 }
 

@@ -76,6 +76,7 @@ void run(FitHandle& handle, int steps, const nb::object& callback) {
   for (int i = 0; i < steps; ++i) {
     const FitRecord record = step(handle, nb::none());
     if (!callback.is_none()) callback(record);
+    if (record.at_rest) return;
   }
 }
 
@@ -90,6 +91,9 @@ void bind_record(nb::module_& m) {
       .def_ro("halvings", &FitRecord::halvings,
               "How often the step was halved, so that no face lost its area.")
       .def_ro("remeshed", &FitRecord::remeshed)
+      .def_ro("evaluations", &FitRecord::evaluations, "Losses and gradients that the step took.")
+      .def_ro("at_rest", &FitRecord::at_rest,
+              "Of lbfgs: no lower loss was found, and nothing was moved.")
       .def_ro("seconds", &FitRecord::seconds)
       .def("__repr__", [](const FitRecord& r) {
         return fmt::format("<limn.FitRecord: step {}, loss {:.4g} +- {:.2g}>", r.step, r.loss,
@@ -198,7 +202,9 @@ void bind_fit(nb::module_& m) {
           "mask) that share the parameters.\n"
           "loss: \"l2\", \"relative-l2\", \"l1\", over `pyramid` levels, see image_loss. "
           "optimiser: \"adam-uniform\", \"adam\", "
-          "\"gradient-descent\".\n"
+          "\"gradient-descent\", or with the sampler \"analytic\" \"lbfgs\", which takes the loss "
+          "as "
+          "a function without noise.\n"
           "step: in natural steps (1 % of a shape's diagonal, 0.01 radians, 1 % of a value), half "
           "as long after each step_half_life steps (0: never).\n"
           "smoothing: how far a step of a vertex spreads, over the shape's diagonal.\n"

@@ -25,8 +25,10 @@ class ShadowOutlines {
 
   void clear();
   // A convex polygon, either way round, of the lamp or before it; tags[i] is the side from corner i
-  // to the next one. Corners in one place are allowed.
-  void add(std::span<const Point> corners, std::span<const uint32_t> tags, bool of_lamp);
+  // to the next one. Corners in one place are allowed. cancelled: bit i stands for side i, which is
+  // left out; it must cancel with one of another polygon that is left out, too.
+  void add(std::span<const Point> corners, std::span<const uint32_t> tags, bool of_lamp,
+           uint32_t cancelled = 0);
 
   enum class Kind : uint8_t { kFirst, kSecond, kCrossing };
   // Where a piece ends: at an end of the side `tag` (the first or second of its lexicographic
@@ -50,6 +52,11 @@ class ShadowOutlines {
     Point p, q;  // p < q
     uint32_t tag;
     int lamp, cover;  // how much more there is below than above
+    bool narrow;      // both ends are near the window: 64 bits decide
+  };
+  // What may tell something of a side: the bounds of all, side by side.
+  struct Bounds {
+    std::vector<float> x0, x1, y0, y1;
   };
   struct Event {
     double at;  // along the edge, 0 to 1
@@ -58,6 +65,9 @@ class ShadowOutlines {
     int lamp, cover;  // how much more is above after it
   };
   void compare(const Edge& s, uint32_t t, bool later, int& lamp, int& cover);
+  template <class Integer>
+  void compare_ends(const Edge& s, uint32_t t, bool later, int& lamp, int& cover);
+  void find_candidates(uint32_t i);
 
   void grow();
   uint32_t& slot_of(const Edge& edge);
@@ -66,6 +76,8 @@ class ShadowOutlines {
   std::vector<Edge> sides_;      // all that were added, each once
   std::vector<uint32_t> table_;  // of them, by a hash of their ends; a power of two of slots
   std::vector<Edge> edges_;
+  Bounds bounds_;  // of edges_
+  std::vector<uint32_t> near_, candidates_;
   std::vector<Event> events_;
 };
 

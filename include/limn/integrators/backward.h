@@ -29,12 +29,22 @@ struct BackwardOptions {
   // Every pixel gets the same number of paths. Else a quarter of them is spread evenly and the rest
   // in proportion to |A|, summed over channels.
   bool uniform_pixels = false;
-  std::string sampler = "forest";  // of edges: a row of edge_sampler_types()
-  int edge_samples = 1;            // at every vertex of a path, of each term of edges
-  double camera_samples = 1;       // points on the film, per path, of each term that has some there
+  // Of edges: a row of edge_sampler_types(). Or "analytic": no edges at vertices of paths, but light
+  // in closed form, as the method of that name in forward mode, with its scenes.
+  std::string sampler = "forest";
+  int edge_samples = 1;       // at every vertex of a path, of each term of edges
+  double camera_samples = 1;  // points on the film, per path, of each term that has some there
   int batches = 16;           // at most, for standard errors; each ends with the adjoint of normals
   bool keep_batches = false;  // Moments::kept of every parameter
 };
+
+// What a name of BackwardOptions::sampler stands for. InputError that lists the known names if
+// there is none of this name.
+struct ReverseMethod {
+  const EdgeSamplerType& sampler;
+  bool closed = false;  // light in closed form
+};
+ReverseMethod reverse_method(const std::string& name);
 
 // dLoss/dtheta of one parameter, per unit of the parameter (that of the loss over `unit`).
 struct ParameterAdjoint {
@@ -106,6 +116,16 @@ struct LossResult {
   int64_t spp = 0;   // of each of the two images; 0: interrupted before there was one
 };
 
+// What a loss is told from.
+struct LossImages {
+  std::string method = "path";  // of render()
+  // One image in place of two, of the samples of settings.seed: those that backward() takes, too,
+  // with uniform pixels and one batch. Where light is known in closed form the loss is then a
+  // function of the scene, and backward() gives its derivative. It is larger than that of the
+  // image's mean by what these samples miss.
+  bool same_samples = false;
+};
+
 // Renders the scene twice with settings.spp samples per pixel each, with seeds of their own that
 // are derived from settings.seed. For l2 and relative-l2 the loss is the mean of w (I - T)(I' - T),
 // and the adjoint 2 w ((I + I') / 2 - T) / N has the mean of dLoss/dI; backward() with
@@ -118,7 +138,8 @@ struct LossResult {
 // InputError as check_loss_images(), and for fewer levels than 1 or more than
 // most_pyramid_levels().
 LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
-                      const RunSettings& settings, const Image& mask = {}, int levels = 1);
+                      const RunSettings& settings, const Image& mask = {}, int levels = 1,
+                      const LossImages& of = {});
 // Down to one pixel.
 int most_pyramid_levels(const Scene& scene);
 

@@ -27,9 +27,15 @@ enum class OptimiserKind {
   kAdam,             // Kingma and Ba 2015, without its epsilon, with a second moment that forgets
                      // in 20 steps: gradients are noisy, and now and then very large
   kGradientDescent,  // g itself: the size of a step is that of the loss
+  // Limited-memory BFGS (Nocedal and Wright 2006, 7.2), with a line search to Wolfe's conditions. It
+  // compares losses and gradients of different steps, which noise would make worthless: so it needs
+  // light in closed form (the sampler "analytic"), takes the same samples at every step, one image
+  // for the loss, and minimises that function of the parameters. Not for l1, nor with more samples
+  // as steps go on.
+  kLbfgs,
 };
-// InputError that lists the known names (adam-uniform, adam, gradient-descent) if there is none of
-// this name.
+// InputError that lists the known names (adam-uniform, adam, gradient-descent, lbfgs) if there is
+// none of this name.
 OptimiserKind optimiser_kind(const std::string& name);
 
 struct FitView {
@@ -84,6 +90,8 @@ struct FitRecord {
   // times, that shape was left where it was.
   int halvings = 0;
   bool remeshed = false;       // after the step
+  int evaluations = 1;         // losses and gradients that the step took
+  bool at_rest = false;        // of kLbfgs: no lower loss was found, and nothing was moved
   std::vector<double> values;  // of Fit::scalars(), after the step
   double seconds = 0;
 };
@@ -105,6 +113,8 @@ struct FitState {
     double natural_step = 0, lambda = 0;  // of an array, as they were when its mesh was made
   };
   std::vector<Numbers> parameters;  // in the order of FitOptions
+  // Of kLbfgs: the last steps and changes of the gradient, the oldest first.
+  std::vector<std::vector<double>> moves, changes;
   struct Shape {
     std::vector<Vec3f> positions;    // V
     std::vector<Vec3d> normals;      // N

@@ -1,0 +1,43 @@
+#pragma once
+// Minimising a function whose values and derivatives are exact: limited-memory BFGS, and a line
+// search to Wolfe's conditions. After Nocedal and Wright 2006, "Numerical Optimization",
+// algorithms 7.4, 3.5 and 3.6.
+#include <functional>
+#include <optional>
+#include <vector>
+
+namespace limn {
+
+// A sum of products; of vectors of one size.
+double inner_product(const std::vector<double>& a, const std::vector<double>& b);
+
+class QuasiNewton {
+ public:
+  static constexpr size_t kMemory = 10;  // pairs; not tuned
+
+  // Along which the function falls: minus the gradient times an estimate of the inverse Hessian;
+  // without any pair minus the gradient itself.
+  std::vector<double> direction(const std::vector<double>& gradient) const;
+  // A step that was taken and by how much the gradient changed. Left out where the function is not
+  // convex along the step.
+  void add(std::vector<double> step, std::vector<double> change);
+  bool empty() const { return steps.empty(); }
+  void clear();
+
+  std::vector<std::vector<double>> steps, changes;  // the oldest first
+};
+
+// A function along a line: its value, and its derivative by the place on the line.
+struct LinePoint {
+  double at = 0, value = 0, slope = 0;
+};
+
+// A place where the value is at most start.value + 1e-4 at start.slope, and the slope at most 0.9
+// of that of the start in magnitude, or if there is none, one where the value is lower. evaluate:
+// at a place; a value that is not finite says that nothing is there; none: stop. first: the first
+// place to look at. start.slope must be negative. None if none was found in 20 evaluations.
+std::optional<LinePoint> wolfe_search(
+    const std::function<std::optional<LinePoint>(double)>& evaluate, const LinePoint& start,
+    double first);
+
+}  // namespace limn
