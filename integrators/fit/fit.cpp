@@ -304,7 +304,6 @@ std::optional<FitRecord> Fit::Impl::step() {
 std::vector<FitScalar> Fit::Impl::scalars() const {
   std::vector<FitScalar> list;
   for (const FitParameter& p : parameters_) {
-    if (p.is_array()) continue;
     for (const FitScalar& scalar : p.scalars(views)) list.push_back(scalar);
   }
   return list;

@@ -73,6 +73,7 @@ FitRecord step(FitHandle& handle, const nb::object& progress) {
 }
 
 void run(FitHandle& handle, int steps, const nb::object& callback) {
+  if (steps < 0) throw InputError("steps must not be negative");
   for (int i = 0; i < steps; ++i) {
     const FitRecord record = step(handle, nb::none());
     if (!callback.is_none()) callback(record);
