@@ -135,7 +135,7 @@ std::vector<std::string> texel_names(const Scene& scene, const Image& field,
   const std::string file = files.path("texels.exr"), name = scene.environment_id + ".data";
   write_exr(file, field, false, {});
   std::vector<std::string> names{name + ":" + file};
-  for (const char* part : {".0.0.r", ".2.5.g", ".2.4.b", ".3.15.r", ".7.9.g", ".4.0.b"}) {
+  for (const char* part : {".0.0.r", ".2.5.g", ".2.4.b", ".3.15.r", ".3.9.g", ".4.0.b"}) {
     names.push_back(name + part);
   }
   return names;

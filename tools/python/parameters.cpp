@@ -139,8 +139,9 @@ void bind_parameters(nb::module_& m, nb::class_<SceneHandle>& scene) {
            })
       .def(
           "get",
-          [](nb::handle self, nb::handle name, nb::object otherwise) {
-            return self.contains(name) ? nb::object(self[name]) : otherwise;
+          [](nb::handle self, const std::string& name, nb::handle otherwise) {
+            const nb::object mapping = nb::module_::import_("collections.abc").attr("Mapping");
+            return nb::object(mapping.attr("get")(self, name, otherwise));
           },
           nb::arg("name"), nb::arg("default") = nb::none(),
           nb::sig("def get(self, name: str, default: object = None) -> Parameter | object"),
