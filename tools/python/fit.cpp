@@ -245,7 +245,8 @@ void bind_fit(nb::module_& m) {
             return values;
           },
           nb::sig("def values(self) -> dict[str, float | numpy.ndarray]"),
-          "What is fitted, but for arrays of vertices (see scenes): numbers, colours (3,), and for "
+          "What is fitted, but for arrays (vertices, texels: see scenes): numbers, colours (3,), "
+          "and for "
           "motions the sum of all steps.");
 }
 
