@@ -45,15 +45,16 @@ Scene mirror_scene(const TempFiles& files, bool face_normals, int depth = 3) {
   return make_scene(files, parts);
 }
 
-// A body close over a floor, before a small lamp.
-Scene penumbra_scene(const TempFiles& files) {
+// A body close over a floor, before a lamp of that size and of one power.
+Scene penumbra_scene(const TempFiles& files, double size) {
   SceneParts parts;
   parts.max_depth = 3;
   parts.origin = {0, 3, 4};
   const std::string mesh = write_mesh(files, "body.obj", shaken(torus_mesh(8, 5)));
+  const std::string radiance = fmt::format("{}", 3.6 / (size * size));
   parts.body = square("floor", 3, -90, {0, 0, 0}, diffuse("grey", ".5, .5, .5")) +
                obj_shape("body", mesh, true, 0.6, {0, 0.3, 0}, diffuse("clay", ".6, .5, .4")) +
-               square("lamp", 0.02, 90, {0.5, 3.5, 1}, area_light("glow", "9000, 9000, 9000"));
+               square("lamp", size, 90, {0.5, 3.5, 1}, area_light("glow", radiance));
   return make_scene(files, parts);
 }
 
@@ -316,7 +317,8 @@ TEST(Backward, AgreesWithOtherSamplers) {
   EXPECT_THROW(backward(scene, adjoint, options, settings), InputError);
 }
 
-// Where lamps and suns are regions apart. Before a small lamp most is found from there.
+// Where lamps and suns are regions apart. Before a small lamp most is found from there, before a
+// larger one half of it: with the whole of both z is 7.
 TEST(Backward, AgreesWithRegionsOfLight) {
   const TempFiles files;
   const Scene large = mirror_scene(files, true);
@@ -325,7 +327,9 @@ TEST(Backward, AgreesWithRegionsOfLight) {
   expect_agreement(large, 16, options);
   options.terms = {"direct", "penumbra"};
   options.parameters = {"body.translate.x", "body.translate.y", "body.translate.z", "body.scale"};
-  expect_agreement(penumbra_scene(files), 512, options);
+  expect_agreement(penumbra_scene(files, 0.02), 256, options);
+  options.parameters = {"body.translate.y"};
+  expect_agreement(penumbra_scene(files, 0.1), 1024, options);
   options.sampler = "forest";
   EXPECT_THROW(backward(large, random_adjoint(large, 1), options, RunSettings{}), InputError);
 }
