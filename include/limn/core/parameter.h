@@ -61,9 +61,9 @@ struct Parameter {
   // The same in place.
   void move(Scene& scene, double step, size_t component = 0) const;
 
-  // The numbers themselves, where the scene holds them: one, the three channels of a colour, V by 3
-  // coordinates, or H by W by 3 texels. Empty for what only moves things from where they are: rotations, translations
-  // and scales of shapes, fields, single coordinates.
+  // The numbers themselves, where the scene holds them: one, the three channels of a colour, all of
+  // an array. Empty for what only moves things from where they are: rotations, translations and
+  // scales of shapes, fields, single coordinates and texels.
   std::vector<double> value(const Scene& scene) const;
   // Sets them in place, with all that depends on them; one number sets all channels of a colour.
   // Positions make the mesh that a file with them would, see moved_mesh(). InputError if there are

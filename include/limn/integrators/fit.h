@@ -38,7 +38,7 @@ struct FitView {
   Image mask;    // weights of the pixels as in image_loss(); without pixels: all alike
 };
 
-// Values that a scalar, or any texel of a map, may not leave; what the reader of scenes would refuse is never left either.
+// What scalars and texels may not leave; what the reader of scenes would refuse is never left.
 struct FitBounds {
   std::string parameter;
   double least, most;
