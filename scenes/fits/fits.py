@@ -291,6 +291,8 @@ def main():
     parser.add_argument("--threads", type=int, help="default: all cores")
     parser.add_argument("--limn", default=os.path.join(ROOT, "build", "limn"), help="the program")
     arguments = parser.parse_args()
+    if arguments.only and arguments.name in ("drift", "picture"):
+        parser.error(f"--only: {arguments.name} is one whole")
     os.makedirs(arguments.output, exist_ok=True)
     head, rows = EXPERIMENTS[arguments.name](Fits(arguments))
     for row in [head, *rows]:
