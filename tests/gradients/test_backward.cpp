@@ -521,9 +521,7 @@ TEST(Backward, CommonTranslationSumsToZero) {
   }
 }
 
-TEST(Backward, ThreadsChangeNoBit) {
-  const TempFiles files;
-  const Scene scene = shadow_scene(files);
+void expect_the_same_bits(const Scene& scene) {
   const Image adjoint = random_adjoint(scene, 4);
   std::vector<std::vector<double>> all;
   for (const int threads : {1, 2, 7}) {
@@ -545,6 +543,12 @@ TEST(Backward, ThreadsChangeNoBit) {
   }
   EXPECT_EQ(all[0], all[1]);
   EXPECT_EQ(all[0], all[2]);
+}
+
+TEST(Backward, ThreadsChangeNoBit) {
+  const TempFiles files;
+  expect_the_same_bits(shadow_scene(files));
+  expect_the_same_bits(mirror_scene(files, false, 2));
 }
 
 }  // namespace
