@@ -93,10 +93,11 @@ ParameterSlots::ParameterSlots(const Scene& scene, const std::vector<std::string
   slots_.meshes.resize(scene.shapes.size());
   free_.shapes.assign(scene.shapes.size(), false);
   for (const Parameter& parameter : parameters_) {
-    dependences_.push_back(dependence_on_shape(scene, parameter));
+    dependences_.push_back(dependence_of(scene, parameter));
   }
   add_shapes(scene);
   add_values(scene);
+  add_texels(scene);
 }
 
 uint32_t ParameterSlots::take(uint32_t count) {
@@ -105,9 +106,20 @@ uint32_t ParameterSlots::take(uint32_t count) {
   return first;
 }
 
-ParameterSlots::Dependence ParameterSlots::dependence_on_shape(const Scene& scene,
-                                                               const Parameter& parameter) const {
+ParameterSlots::Dependence ParameterSlots::dependence_of(const Scene& scene,
+                                                         const Parameter& parameter) const {
   Dependence dependence;
+  if (parameter.array.size() == 3) {
+    dependence.texels = true;
+    return dependence;
+  }
+  if (parameter.array.empty()) {
+    const Image velocity = parameter.texel_velocities(scene);
+    dependence.texels = !velocity.data.empty();
+    for (uint32_t k = 0; k < velocity.data.size(); ++k) {
+      if (velocity.data[k] != 0) dependence.texel_velocity.emplace_back(k, velocity.data[k]);
+    }
+  }
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     const std::vector<Vec3d> velocity = parameter.velocities(scene, ShapeId(s));
     if (velocity.empty()) continue;
@@ -155,7 +167,7 @@ void ParameterSlots::add_values(const Scene& scene) {
   for (Shape& shape : hull.shapes) shape.mesh = {};
   std::vector<uint32_t> slot_of(Values::of(hull).size(), 0);
   for (size_t i = 0; i < parameters_.size(); ++i) {
-    if (dependences_[i].shape.valid()) continue;
+    if (dependences_[i].shape.valid() || dependences_[i].texels) continue;
     Scene copy = deep_copy(hull);
     parameters_[i].seed(copy, 0);
     const std::vector<Dual*> values = Values::of(copy);
@@ -208,11 +220,23 @@ void ParameterSlots::add_values(const Scene& scene) {
   CHECK_EQ(next, slot_of.size());
 }
 
+void ParameterSlots::add_texels(const Scene& scene) {
+  bool any = false;
+  for (const Dependence& dependence : dependences_) any |= dependence.texels;
+  if (!any) return;
+  const Environment::Map map = scene.environment->map();
+  slots_.texels = take(3 * static_cast<uint32_t>(map.width * map.height));
+}
+
 std::vector<std::vector<double>> ParameterSlots::gather(const std::vector<double>& sums) const {
   std::vector<std::vector<double>> values;
   for (const Parameter& parameter : parameters_) values.emplace_back(parameter.numbers());
   for (size_t i = 0; i < parameters_.size(); ++i) {
     for (const Weight& w : dependences_[i].weights) values[i][w.number] += sums[w.slot] * w.weight;
+    if (!dependences_[i].texels) continue;
+    const double* texels = &sums[slots_.texels];
+    if (parameters_[i].size > 1) values[i].assign(texels, texels + parameters_[i].size);
+    for (const auto& [k, v] : dependences_[i].texel_velocity) values[i][0] += texels[k] * v;
   }
   for (uint32_t s = 0; s < free_.shapes.size(); ++s) {
     if (free_.shapes[s]) gather_shape(ShapeId(s), sums, values);

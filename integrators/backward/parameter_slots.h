@@ -45,6 +45,8 @@ class ParameterSlots {
     std::vector<std::pair<uint32_t, Vec3d>> velocity;
     std::vector<Vec3d> normal_velocity;  // N, of normals of the file; empty if they stay
     std::vector<Weight> weights;
+    bool texels = false;                                      // all of the environment's map
+    std::vector<std::pair<uint32_t, double>> texel_velocity;  // of a scalar: of those it moves
   };
   // What takes the slots of a shape to its vertices.
   struct ShapeGather {
@@ -56,7 +58,8 @@ class ParameterSlots {
   uint32_t take(uint32_t count);
   void add_shapes(const Scene& scene);
   void add_values(const Scene& scene);
-  Dependence dependence_on_shape(const Scene& scene, const Parameter& parameter) const;
+  void add_texels(const Scene& scene);
+  Dependence dependence_of(const Scene& scene, const Parameter& parameter) const;
   void gather_shape(ShapeId shape, const std::vector<double>& sums,
                     std::vector<std::vector<double>>& values) const;
 

@@ -42,6 +42,22 @@ std::vector<Vec3d> random_field(const Mesh& mesh, uint64_t seed) {
   return field;
 }
 
+// As smooth over the map's rows and columns, positive and negative; channels differ.
+Image random_texels(const Environment::Map& map, uint64_t seed) {
+  Rng rng(seed, UINT64_MAX, 1);
+  Image field(map.width, map.height, 3);
+  for (int c = 0; c < 3; ++c) {
+    const double phase = 2 * kPi * rng.uniform(), tilt = 2 * kPi * (2 * rng.uniform() - 1);
+    for (int y = 0; y < map.height; ++y) {
+      for (int x = 0; x < map.width; ++x) {
+        const double turn = 2 * kPi * x / map.width + tilt * y / map.height + phase;
+        field.at(x, y, c) = static_cast<float>(map.mean * std::sin(turn));
+      }
+    }
+  }
+  return field;
+}
+
 // A parameter in forward mode, and what a gradient of reverse mode is dotted with.
 struct Compared {
   std::string name;
@@ -63,6 +79,13 @@ std::vector<Compared> compared(const Scene& scene, const ParameterAdjoint& rever
     return channels;
   }
   if (parameter.size == 1) return {{reverse.name, parameter, &reverse, {1.0}}};
+  if (parameter.array.size() == 3) {
+    const Image field = random_texels(scene.environment->map(), seed);
+    return {{reverse.name,
+             texel_field(scene, field),
+             &reverse,
+             {field.data.begin(), field.data.end()}}};
+  }
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     if (parameter.velocities(scene, ShapeId(s)).empty()) continue;
     const std::vector<Vec3d> field = random_field(scene.shapes[s].mesh, seed);
@@ -70,7 +93,7 @@ std::vector<Compared> compared(const Scene& scene, const ParameterAdjoint& rever
     for (const Vec3d& v : field) weights.insert(weights.end(), {v.x, v.y, v.z});
     return {{reverse.name, vertex_field(scene, ShapeId(s), field), &reverse, weights}};
   }
-  throw InputError("an array that moves no shape: " + parameter.name);
+  throw std::logic_error("an array that moves no shape: " + parameter.name);
 }
 
 // Moments of dot products with the adjoint, one for each parameter.

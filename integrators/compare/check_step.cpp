@@ -30,7 +30,22 @@ constexpr double kExtrapolated = 12.5 / 9;
 // error of 2^-10 of it.
 constexpr double kLeastMove = 0x1p-14;
 
-// The least step that floats resolve; 0 if no vertex moves.
+// The same of texels, where the fastest decide: radiance is linear in them, so that a step too large
+// for others does no harm.
+double least_texel_step(const Scene& scene, const Parameter& parameter) {
+  const Image velocities = parameter.texel_velocities(scene);
+  if (velocities.data.empty()) return 0;
+  const Image texels = scene.environment->texels();
+  double moving = 0, speed = 0;
+  for (size_t i = 0; i < velocities.data.size(); ++i) {
+    const double v = std::fabs(double{velocities.data[i]});
+    moving = std::max(moving, v * std::fabs(double{texels.data[i]}));
+    speed = std::max(speed, v);
+  }
+  return speed > 0 ? kLeastMove * moving / (speed * speed) : 0;
+}
+
+// The least step that floats resolve; 0 if neither vertices nor texels move.
 double least_step(const Scene& scene, const Parameter& parameter) {
   double place = 0, speed = 0;
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
@@ -44,7 +59,7 @@ double least_step(const Scene& scene, const Parameter& parameter) {
       }
     }
   }
-  return speed > 0 ? kLeastMove * place / speed : 0;
+  return speed > 0 ? kLeastMove * place / speed : least_texel_step(scene, parameter);
 }
 
 // The differences at every step of a ladder, and what changes from each to the next.

@@ -107,6 +107,7 @@ std::string fingerprint(const Scene& scene, const std::vector<Parameter>& parame
     for (size_t s = 0; s < scene.shapes.size(); ++s) {
       hash.add(parameter.velocities(scene, ShapeId(s)));
     }
+    for (const float v : parameter.texel_velocities(scene).data) hash.add(double{v});
   }
   return hash.text();
 }

@@ -485,7 +485,6 @@ void Fit::Impl::finish_step(FitRecord& record) {
 std::vector<FitScalar> Fit::Impl::scalars() const {
   std::vector<FitScalar> list;
   for (const FitParameter& p : parameters_) {
-    if (p.is_array()) continue;
     for (const FitScalar& scalar : p.scalars(views)) list.push_back(scalar);
   }
   return list;

@@ -55,14 +55,15 @@ FitParameter::FitParameter(const std::string& name, const std::vector<FitView>& 
   }
   if (first_view_ == views.size()) throw UnknownParameter(*unknown);
   natural_step_ = in_view_[first_view_]->natural_step;
-  if (in_view_[first_view_]->size > 1) {
+  if (in_view_[first_view_]->array.size() == 2) {
     find_array(views, options.smoothing);
   } else {
-    numbers_.resize(in_view_[first_view_]->numbers());
+    find_numbers(views);
   }
   find_bounds(views, options);
-  // Channels of a colour are as different as two parameters: each has its own scale.
-  const bool alone = !is_array() && options.optimiser == OptimiserKind::kAdamUniform;
+  // Channels of a colour are as different as two parameters: each has its own scale. Texels that
+  // few paths meet have noise alone, which a scale of their own would make as large as any step.
+  const bool alone = !is_array() && !is_map() && options.optimiser == OptimiserKind::kAdamUniform;
   optimiser_.emplace(alone ? OptimiserKind::kAdam : options.optimiser, numbers_.size());
 }
 
@@ -70,6 +71,17 @@ void FitParameter::find_in_views(const std::vector<FitView>& views) {
   for (size_t v = 0; v < views.size(); ++v) {
     if (in_view_[v]) in_view_[v] = find_parameter_or_array(views[v].scene, name_);
   }
+}
+
+void FitParameter::find_numbers(const std::vector<FitView>& views) {
+  const Parameter& first = *in_view_[first_view_];
+  for (size_t v = first_view_; v < views.size(); ++v) {
+    if (!in_view_[v] || in_view_[v]->array == first.array) continue;
+    throw InputError({views[v].scene.file},
+                     fmt::format("the map of \"{}\" has another size than that of {}", name_,
+                                 views[first_view_].scene.file));
+  }
+  numbers_.resize(first.numbers());
 }
 
 void FitParameter::find_array(const std::vector<FitView>& views, double smoothing) {
@@ -228,7 +240,7 @@ bool FitParameter::place_vertices(const std::vector<double>& positions,
 }
 
 std::vector<FitScalar> FitParameter::scalars(const std::vector<FitView>& views) const {
-  CHECK(!is_array());
+  if (is_array() || is_map()) return {};
   const Parameter& parameter = *in_view_[first_view_];
   const std::vector<double> numbers = bounded_numbers(views[first_view_], first_view_);
   if (!parameter.colour) return {{name_, parameter.unit, numbers[0], name_}};

@@ -19,7 +19,8 @@ class FitParameter {
                const FitOptions& options);
 
   const std::string& name() const { return name_; }
-  bool is_array() const { return large_steps_ != nullptr; }
+  bool is_array() const { return large_steps_ != nullptr; }                 // of vertices
+  bool is_map() const { return in_view_[first_view_]->array.size() == 3; }  // of texels
   size_t size() const { return numbers_.size(); }  // numbers that steps are taken in
   // Null where the view does not have it.
   const Parameter* in_view(size_t view) const {
@@ -40,7 +41,7 @@ class FitParameter {
   // is changed, if a face would lose its area or grow together with another.
   bool add(std::vector<double>& step, std::vector<FitView>& views);
 
-  // One, or the three channels of a colour; not of an array.
+  // One, or the three channels of a colour; none of an array or a map.
   std::vector<FitScalar> scalars(const std::vector<FitView>& views) const;
   FitState::Numbers state() const;
   // The views have their state already.
@@ -57,6 +58,7 @@ class FitParameter {
   // Once more, after the mesh has changed.
   void find_in_views(const std::vector<FitView>& views);
   void find_array(const std::vector<FitView>& views, double smoothing);
+  void find_numbers(const std::vector<FitView>& views);
   void find_bounds(const std::vector<FitView>& views, const FitOptions& options);
   int move_vertices(const std::vector<double>& gradient, double size, int64_t count,
                     std::vector<FitView>& views);

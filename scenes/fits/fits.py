@@ -10,7 +10,7 @@
     scenes/fits/fits.py picture   of the shapes that these found: scenes/pictures/fits.webp
 
 Writes OUT/NAME/ (pictures, meshes, report.html) and prints a table. A fit that is there is not run
-again; an interrupted one goes on.
+again; an interrupted one goes on. --only 'seed 2,seed 3' runs and prints these fits alone.
 """
 
 import argparse
@@ -32,10 +32,19 @@ class Fits:
     def __init__(self, arguments):
         self.limn, self.out = arguments.limn, arguments.output
         self.threads, self.steps = arguments.threads, arguments.steps
+        self.only = arguments.only.split(",") if arguments.only else None
         self.generated = os.path.join(ROOT, "build", "generated")
 
     def path(self, *names):
         return os.path.join(self.out, *names)
+
+    def chosen(self, variants):
+        """Those of (name, options) that --only names."""
+        known = [name for name, _ in variants]
+        unknown = [name for name in self.only or [] if name not in known]
+        if unknown:
+            sys.exit(f"--only: no fit {unknown[0]!r}; there are {', '.join(known)}")
+        return [v for v in variants if not self.only or v[0] in self.only]
 
     def run(self, *words):
         """Processor time [s]."""
@@ -56,7 +65,7 @@ class Fits:
         return file
 
     def fit(self, folder, scene, target, steps, *words):
-        """The fit's figures; "seconds" are those of the processor."""
+        """The fit's figures; "seconds" are those of the processor, None where another ran it."""
         file, times = self.path(folder, "fit.json"), self.path(folder, "seconds.json")
         done = json.load(open(file, encoding="utf-8")) if os.path.exists(file) else None
         steps, seconds = self.steps or steps, None
@@ -66,11 +75,11 @@ class Fits:
         else:
             seconds = self.run("fit", scene, "--target", target, "--steps", str(steps),
                                "-o", self.path(folder), *words)  # fmt: skip
-        total = json.load(open(times, encoding="utf-8")) if os.path.exists(times) else 0
-        if seconds:
-            total += seconds
-            json.dump(total, open(times, "w", encoding="utf-8"))
-        return json.load(open(file, encoding="utf-8")) | {"seconds": total}
+        known = json.load(open(times, encoding="utf-8")) if os.path.exists(times) else None
+        if seconds and (known is not None or not done):
+            known = (known or 0) + seconds
+            json.dump(known, open(times, "w", encoding="utf-8"))
+        return json.load(open(file, encoding="utf-8")) | {"seconds": known}
 
 
 def scene(name):
@@ -82,12 +91,16 @@ SHAPE_HEAD = [
 ]
 
 
+def seconds_of(fit):
+    return "not known" if fit["seconds"] is None else f"{fit['seconds']:.0f}"
+
+
 def shape_row(name, fit, mesh, steps):
     history = fit["history"][:steps]
     loss = sum(h["loss"] for h in history[-5:]) / len(history[-5:]) if history else 0
     return [name, steps, f"{mesh['chamfer']:.4f}", f"{mesh['hausdorff_95']:.4f}",
             f"{mesh['normal_angle']:.1f}", mesh["inside_out"], mesh["crossings"],
-            f"{loss:.5f}" if history else "", f"{fit['seconds']:.0f}" if history else ""]  # fmt: skip
+            f"{loss:.5f}" if history else "", seconds_of(fit) if history else ""]  # fmt: skip
 
 
 def shape_rows(fits, name, base, targets, truth, steps, defines, words, variants, smoothing):
@@ -96,7 +109,7 @@ def shape_rows(fits, name, base, targets, truth, steps, defines, words, variants
     own += ["--wrt", "object.vertex_positions", "--truth", truth, "--step", "2"]
     own += [w for t in targets[1:] for w in ("--target", t)]
     rows = []
-    for variant, more in variants:
+    for variant, more in fits.chosen(variants):
         folder = f"{name}_{variant.replace(' ', '_')}"
         fit = fits.fit(folder, scene(f"{base}_start.xml"), targets[0], steps, *own, *words,
                        "--smoothing", str(smoothing), *more)  # fmt: skip
@@ -170,7 +183,10 @@ def views(fits):
     words = ["--spp", "2", "--snapshots", "30"]
     remesh = ["--remesh", "40,80,120"]
     variants = [(f"seed {i}", [*remesh, "--seed", str(i)]) for i in (1, 2, 3)]
-    variants += [("no remeshing", ["--seed", "1"])]
+    variants += [
+        (f"no remeshing{seed}", ["--seed", i])
+        for seed, i in (("", "1"), (" 2", "2"), (" 3", "3"))
+    ]
     truth = BUNNY
     return shape_rows(
         fits, "views", "eight_views", targets, truth, 160, size, words, variants, 0.1
@@ -188,15 +204,23 @@ def pose(fits):
     words += [w for d in size for w in ("-D", d)]
     words += ["--spp", "8", "--step", "2", "--step-half-life", "30"]
     words += ["--truth", os.path.join(fits.generated, "creature.ply")]
-    fit = fits.fit("pose", scene("two_mirrors.xml"), target, 160, *words)
-    first, last = (fit["snapshots"][i]["meshes"][0] for i in (0, -1))
-    rows = [["chamfer / diagonal", f"{first['chamfer']:.4f}", "0", f"{last['chamfer']:.5f}"]]
+    variants = fits.chosen([(f"seed {i}", ["--seed", str(i)]) for i in (1, 2, 3)])
     known = {f"clay.reflectance.{c}": (0.4, 0.6) for c in "rgb"} | {"sensor.translate.x": (0.2, 0)}
-    for s in fit["scalars"]:
-        begin, truth = known.get(s["name"], (0, ""))
-        rows.append([s["name"], begin, truth, f"{s['value']:.5f}"])
-    rows.append(["seconds", "", "", f"{fit['seconds']:.0f}"])
-    return ["what", "start", "truth", "found"], rows
+    rows = []
+    for name, seed in variants:
+        folder = f"pose_{name.replace(' ', '_')}"
+        fit = fits.fit(folder, scene("two_mirrors.xml"), target, 160, *words, *seed)
+        first, last = (fit["snapshots"][i]["meshes"][0] for i in (0, -1))
+        if not rows:
+            rows = [["chamfer / diagonal", f"{first['chamfer']:.4f}", "0"]]
+            for s in fit["scalars"]:
+                rows.append([s["name"], *known.get(s["name"], (0, ""))])
+            rows.append(["seconds", "", ""])
+        found = [last["chamfer"], *(s["value"] for s in fit["scalars"])]
+        for row, number in zip(rows, found):
+            row.append(f"{number:.5f}")
+        rows[-1].append(seconds_of(fit))
+    return ["what", "start", "truth", *(name for name, _ in variants)], rows
 
 
 def positions(file):
@@ -283,9 +307,12 @@ def main():
     parser.add_argument("name", choices=EXPERIMENTS, metavar="NAME", help=", ".join(EXPERIMENTS))
     parser.add_argument("-o", "--output", default=os.path.join(ROOT, "out", "fits"))
     parser.add_argument("--steps", type=int, help="in place of the experiment's own number")
+    parser.add_argument("--only", metavar="FITS", help="of the experiment's, with commas between")
     parser.add_argument("--threads", type=int, help="default: all cores")
     parser.add_argument("--limn", default=os.path.join(ROOT, "build", "limn"), help="the program")
     arguments = parser.parse_args()
+    if arguments.only and arguments.name in ("drift", "picture"):
+        parser.error(f"--only: {arguments.name} is one whole")
     os.makedirs(arguments.output, exist_ok=True)
     head, rows = EXPERIMENTS[arguments.name](Fits(arguments))
     for row in [head, *rows]:

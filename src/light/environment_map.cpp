@@ -14,16 +14,16 @@ float importance_of(const Rgb<double>& c) {
 
 }  // namespace
 
-EnvironmentMap::EnvironmentMap(const Image& image)
+EnvironmentMap::EnvironmentMap(const Image& image, bool sampled)
     : width_(image.width), height_(std::max(2, image.height)) {
   const bool halves = std::all_of(image.data.begin(), image.data.end(),
                                   [](float v) { return static_cast<float>(Half(v)) == v; });
   if (!halves) texels_.emplace<1>();
-  std::visit([&](auto& texels) { fill(image, texels); }, texels_);
+  std::visit([&](auto& texels) { fill(image, sampled, texels); }, texels_);
 }
 
 template <class Number>
-void EnvironmentMap::fill(const Image& image, HugePageVector<Texel<Number>>& texels) {
+void EnvironmentMap::fill(const Image& image, bool sampled, HugePageVector<Texel<Number>>& texels) {
   texels.reserve(static_cast<size_t>(width_) * height_);
   std::vector<float> importance;
   for (int y = 0; y < height_; ++y) {
@@ -32,11 +32,14 @@ void EnvironmentMap::fill(const Image& image, HugePageVector<Texel<Number>>& tex
       for (int c = 0; c < 3; ++c) {
         const float v = image.at(x, std::min(y, image.height - 1), image.channels == 3 ? c : 0);
         rgb[c] = v;
+        mean_magnitude_ += std::fabs(rgb[c]);
       }
       texels.push_back({Number(rgb.r), Number(rgb.g), Number(rgb.b), Number(0.0f)});
       importance.push_back(importance_of(rgb));
     }
   }
+  mean_magnitude_ /= 3.0 * static_cast<double>(texels.size());
+  if (!sampled) return;
   if (*std::max_element(importance.begin(), importance.end()) == 0) {
     importance.assign(importance.size(), 1.0f);
   }
@@ -59,6 +62,26 @@ EnvironmentMap::Drawn EnvironmentMap::sample(double u1, double u2) const {
 
 double EnvironmentMap::pdf_solid_angle(const Place<double>& place, const Vec3d& d) const {
   return density_->pdf(column_of(place.x), row_of(place.y), place.x, d.y);
+}
+
+Image EnvironmentMap::texels() const {
+  Image image(width_, height_, 3);
+  with_texels([&](const auto* texels) {
+    for (size_t i = 0; i < image.data.size(); ++i) {
+      image.data[i] = static_cast<float>(texels[i / 3][i % 3]);
+    }
+  });
+  return image;
+}
+
+std::array<Environment::TexelWeight, 4> EnvironmentMap::weights(const Place<double>& place) const {
+  const int column = column_of(place.x), row = row_of(place.y), next = next_column(column);
+  const double s = place.x - column, t = place.y - row;
+  const auto at = [&](int x, int y) { return static_cast<uint32_t>(index(x, y)); };
+  return {{{at(column, row), (1 - s) * (1 - t)},
+           {at(next, row), s * (1 - t)},
+           {at(column, row + 1), (1 - s) * t},
+           {at(next, row + 1), s * t}}};
 }
 
 // Along the azimuth a row's mean is its texels' mean; between two rows it is linear in theta, and

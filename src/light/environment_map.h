@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "limn/core/dual.h"
+#include "limn/core/environment.h"
 #include "limn/core/image.h"
 #include "limn/core/vec.h"
 #include "src/base/angles.h"
@@ -27,8 +28,9 @@ namespace limn {
 // A cell is the patch between four neighbouring texels; there are W by H - 1.
 class EnvironmentMap {
  public:
-  // One or three channels; at least one texel, all finite. A single row stands for all.
-  explicit EnvironmentMap(const Image& image);
+  // One or three channels; at least one texel, all finite. A single row stands for all. sampled:
+  // else directions cannot be drawn.
+  explicit EnvironmentMap(const Image& image, bool sampled = true);
 
   // Where a direction lies: columns to the right of the center of column 0, in [0, W); rows below
   // row 0, in [0, H - 1].
@@ -53,11 +55,16 @@ class EnvironmentMap {
   // place: of d. [1/sr]
   double pdf_solid_angle(const Place<double>& place, const Vec3d& d) const;
 
+  // See Environment.
+  Image texels() const;
+  std::array<Environment::TexelWeight, 4> weights(const Place<double>& place) const;
+
   // The exact mean over the sphere of the luminance of `radiance`.
   double mean_luminance() const;
 
   int width() const { return width_; }
   int height() const { return height_; }
+  double mean_magnitude() const { return mean_magnitude_; }  // of the texels' channels
 
  private:
   // Red, green, blue; filled up so that a texel never lies across two lines of a cache.
@@ -76,7 +83,7 @@ class EnvironmentMap {
   int next_column(int column) const { return column + 1 == width_ ? 0 : column + 1; }
   double polar_angle(int row) const { return kPi * row / (height_ - 1); }
   template <class Number>
-  void fill(const Image& image, HugePageVector<Texel<Number>>& texels);
+  void fill(const Image& image, bool sampled, HugePageVector<Texel<Number>>& texels);
   // The cell's first column and row; rounding may put a place on the border behind it.
   int column_of(double x) const { return std::min(static_cast<int>(x), width_ - 1); }
   int row_of(double y) const { return std::clamp(static_cast<int>(y), 0, height_ - 2); }
@@ -84,6 +91,7 @@ class EnvironmentMap {
   int width_ = 0;
   int height_ = 0;  // at least 2
   Texels texels_;   // height_ x width_
+  double mean_magnitude_ = 0;
   std::optional<MapDensity> density_;
 };
 

@@ -21,7 +21,8 @@ class MapEnvironment final : public Environment {
     return map_->radiance(map_->locate(map_from_world(d))) * scale_.v;
   }
   Rgb<Dual> radiance(const Vec3<Dual>& d) const override {
-    return map_->radiance(map_->locate(map_from_world(d))) * scale_;
+    const auto place = map_->locate(map_from_world(d));
+    return moving({value(place.x), value(place.y)}, map_->radiance(place) * scale_);
   }
   Drawn sample_direction(double u1, double u2) const override {
     const EnvironmentMap::Drawn drawn = map_->sample(u1, u2);
@@ -35,7 +36,10 @@ class MapEnvironment final : public Environment {
     return map_->pdf_solid_angle(map_->locate(v), v);
   }
   void look(const Vec3d& d, Sight<double>& sight) const override { look(d, scale_.v, sight); }
-  void look(const Vec3d& d, Sight<Dual>& sight) const override { look(d, scale_, sight); }
+  void look(const Vec3d& d, Sight<Dual>& sight) const override {
+    look(d, scale_, sight);
+    if (texels_move_) sight.radiance = moving(map_->locate(map_from_world(d)), sight.radiance);
+  }
   bool is_uniform() const override { return false; }
   double mean_luminance() const override { return map_->mean_luminance() * scale_.v; }
 
@@ -44,6 +48,27 @@ class MapEnvironment final : public Environment {
   }
 
   std::vector<ParameterRef> parameters() override { return {{"scale", {&scale_}}}; }
+  Map map() const override { return {map_->width(), map_->height(), map_->mean_magnitude()}; }
+  Image texels() const override { return map_->texels(); }
+  void set_texels(const Image& texels) override {
+    map_ = std::make_shared<EnvironmentMap>(texels);
+    if (!file_.ends_with(kChanged)) file_ += kChanged;
+  }
+  void add_texel_tangents(const Image& velocity, int lane) override {
+    auto& tangents = tangents_[static_cast<size_t>(lane)];
+    Image sum = velocity;
+    if (tangents) {
+      const Image before = tangents->texels();
+      for (size_t i = 0; i < sum.data.size(); ++i) sum.data[i] += before.data[i];
+    }
+    tangents = std::make_shared<EnvironmentMap>(sum, false);
+    texels_move_ = true;
+  }
+  std::array<TexelWeight, 4> texel_weights(const Vec3d& d) const override {
+    auto weights = map_->weights(map_->locate(map_from_world(d)));
+    for (TexelWeight& w : weights) w.weight *= scale_.v;
+    return weights;
+  }
   std::shared_ptr<Environment> clone() const override {
     return std::make_shared<MapEnvironment>(*this);
   }
@@ -57,7 +82,20 @@ class MapEnvironment final : public Environment {
     return map_->radiance<double>({sample.place[0], sample.place[1]}) * scale_.v;
   }
   Rgb<Dual> drawn_dual(const LightSample& sample) const override {
-    return map_->radiance<double>({sample.place[0], sample.place[1]}) * scale_;
+    const EnvironmentMap::Place<double> place{sample.place[0], sample.place[1]};
+    return moving(place, map_->radiance<double>(place) * scale_);
+  }
+  static constexpr const char* kChanged = ", changed";
+
+  // What moves the texels, added.
+  Rgb<Dual> moving(const EnvironmentMap::Place<double>& place, Rgb<Dual> radiance) const {
+    if (!texels_move_) return radiance;
+    for (int lane = 0; lane < kLanes; ++lane) {
+      if (!tangents_[static_cast<size_t>(lane)]) continue;
+      const Rgb<double> v = tangents_[static_cast<size_t>(lane)]->radiance(place);
+      for (int c = 0; c < 3; ++c) radiance[c].d[lane] += v[c] * scale_.v;
+    }
+    return radiance;
   }
   template <class S>
   void look(const Vec3d& d, const S& scale, Sight<S>& sight) const {
@@ -74,6 +112,9 @@ class MapEnvironment final : public Environment {
   Vec3d axes_[3];  // of the map, in the world
   Dual scale_;
   std::string file_;
+  bool texels_move_ = false;
+  std::array<std::shared_ptr<const EnvironmentMap>, kLanes>
+      tangents_;  // none: that lane holds them
 };
 
 void check_finite(const Image& image, const std::string& file) {

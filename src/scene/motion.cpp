@@ -1,4 +1,4 @@
-// What most motions have in common: they move no shape and are no arrays.
+// What most motions have in common: they move no shape and are no arrays; one number of an array.
 #include "src/scene/motion.h"
 
 #include <fmt/format.h>
@@ -6,6 +6,37 @@
 #include <cmath>
 
 namespace limn {
+
+namespace {
+
+class OneComponent final : public Motion {
+ public:
+  OneComponent(std::shared_ptr<const Motion> array, size_t component)
+      : array_(std::move(array)), component_(component) {}
+
+  void seed(Scene& scene, int lane, size_t) const override {
+    array_->seed(scene, lane, component_);
+  }
+  void move(Scene& scene, double step, size_t) const override {
+    array_->move(scene, step, component_);
+  }
+  std::vector<Vec3d> velocities(const Scene& scene, ShapeId shape, size_t) const override {
+    return array_->velocities(scene, shape, component_);
+  }
+  Image texel_velocities(const Scene& scene, size_t) const override {
+    return array_->texel_velocities(scene, component_);
+  }
+
+ private:
+  std::shared_ptr<const Motion> array_;
+  size_t component_;
+};
+
+}  // namespace
+
+std::shared_ptr<const Motion> one_component(std::shared_ptr<const Motion> array, size_t component) {
+  return std::make_shared<OneComponent>(std::move(array), component);
+}
 
 std::vector<double> Motion::numbers(const Scene&) const { return {}; }
 
@@ -16,6 +47,8 @@ void Motion::assign(Scene& scene, const std::string& name, const std::vector<dou
 }
 
 std::vector<Vec3d> Motion::velocities(const Scene&, ShapeId, size_t) const { return {}; }
+
+Image Motion::texel_velocities(const Scene&, size_t) const { return {}; }
 
 std::optional<Parameter> Motion::part(const Scene&, const Parameter&, const std::string&) const {
   return std::nullopt;

@@ -1,5 +1,6 @@
 #pragma once
 // What a parameter does to a scene: one class per kind of motion.
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,6 +21,7 @@ class Motion {
   virtual void assign(Scene& scene, const std::string& name, const std::vector<double>& value,
                       std::vector<std::string>* warnings) const;
   virtual std::vector<Vec3d> velocities(const Scene& scene, ShapeId shape, size_t component) const;
+  virtual Image texel_velocities(const Scene& scene, size_t component) const;
 
   // The part of an array or colour whose name continues its own with `rest` (":FILE", ".7.x",
   // ".r"); nothing if `rest` means nothing here. InputError if it means something that cannot be.
@@ -28,6 +30,9 @@ class Motion {
   // How to name a part of the array called `name`, for messages.
   virtual std::string parts(const std::string& name) const;
 };
+
+// One number of an array.
+std::shared_ptr<const Motion> one_component(std::shared_ptr<const Motion> array, size_t component);
 
 // InputError unless there are `count` numbers, all within the bounds.
 void check_numbers(const Scene& scene, const std::string& name, const std::vector<double>& value,

@@ -11,5 +11,6 @@ void add_shape_parameters(const Scene& scene, std::vector<Parameter>& list);    
 void add_camera_parameters(const Scene& scene, std::vector<Parameter>& list);   // camera_motion.cpp
 void add_bsdf_parameters(const Scene& scene, std::vector<Parameter>& list);     // value_motion.cpp
 void add_emitter_parameters(const Scene& scene, std::vector<Parameter>& list);  // value_motion.cpp
+void add_texel_parameters(const Scene& scene, std::vector<Parameter>& list);    // texel_motion.cpp
 
 }  // namespace limn

@@ -51,7 +51,7 @@ size_t edit_distance(const std::string& a, const std::string& b) {
 
 std::vector<size_t> Parameter::shape() const {
   if (colour) return {3};
-  return size == 1 ? std::vector<size_t>{} : std::vector<size_t>{size / 3, 3};
+  return array;
 }
 
 void Parameter::seed(Scene& scene, int lane, size_t component) const {
@@ -86,12 +86,18 @@ std::vector<Vec3d> Parameter::velocities(const Scene& scene, ShapeId shape,
   return motion->velocities(scene, shape, component);
 }
 
+Image Parameter::texel_velocities(const Scene& scene, size_t component) const {
+  CHECK_LT(component, size);
+  return motion->texel_velocities(scene, component);
+}
+
 std::vector<Parameter> list_parameters(const Scene& scene) {
   std::vector<Parameter> list;
   add_shape_parameters(scene, list);
   add_camera_parameters(scene, list);
   add_bsdf_parameters(scene, list);
   add_emitter_parameters(scene, list);
+  add_texel_parameters(scene, list);
   return list;
 }
 

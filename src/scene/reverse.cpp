@@ -121,6 +121,33 @@ Rgb<Var> of_parameters(const SeededCopies<T>& copies, const Rgb<double>& value, 
   return jacobian.result(value);
 }
 
+// The adjoint of with_texels(): nodes and direction are those of the statement.
+void pull_back_texels(Tape& tape, const Tape::Composite& s) {
+  const double a[3] = {tape.adjoint(s.first), tape.adjoint(s.first + 1), tape.adjoint(s.first + 2)};
+  if (a[0] == 0 && a[1] == 0 && a[2] == 0) return;
+  const SceneSlots& slots = *tape.slots();
+  const Vec3d d{s.values[0], s.values[1], s.values[2]};
+  for (uint32_t c = 0; c < 3; ++c) tape.adjoint(s.nodes[c]) += a[c];
+  for (const auto& [texel, weight] : slots.scene->environment->texel_weights(d)) {
+    for (uint32_t c = 0; c < 3; ++c) tape.contribute(slots.texels + 3 * texel + c, weight * a[c]);
+  }
+}
+
+// Radiance of the environment from d, which is held, as its texels make it besides.
+Rgb<Var> with_texels(const Vec3d& d, Rgb<Var> radiance) {
+  Tape& tape = *Tape::current();
+  if (tape.slots()->texels == 0) return radiance;
+  const uint32_t first = tape.add({0,
+                                   3,
+                                   pull_back_texels,
+                                   0,
+                                   0,
+                                   {radiance.r.node, radiance.g.node, radiance.b.node, 0, 0, 0},
+                                   {d.x, d.y, d.z, 0, 0, 0}});
+  for (int c = 0; c < 3; ++c) radiance[c].node = first + static_cast<uint32_t>(c);
+  return radiance;
+}
+
 template <class S>
 Rgb<S> as_colour(const Vec3<S>& v) {
   return {v.x, v.y, v.z};
@@ -162,8 +189,9 @@ Rgb<Var> Light::drawn_radiance<Var>(const LightSample& sample) const {
     const ShapeId shape = sample.face->shape;
     return detail::emitter_radiance<Var>(slots.scene->shape(shape), shape);
   }
-  return of_parameters(slots.environment, drawn_value(sample),
-                       [&](const Light& seeded) { return seeded.drawn_dual(sample); });
+  return with_texels(sample.wo,
+                     of_parameters(slots.environment, drawn_value(sample),
+                                   [&](const Light& seeded) { return seeded.drawn_dual(sample); }));
 }
 
 template <>
@@ -176,7 +204,7 @@ Environment::Sight<Var> Lights::environment<Var>(const Vec3d& wo) const {
                                         seeded.look(wo, of);
                                         return of.radiance;
                                       });
-  return {radiance, sight.pdf / choices_};
+  return {with_texels(wo, radiance), sight.pdf / choices_};
 }
 
 template <>
@@ -187,7 +215,7 @@ Rgb<Var> environment_radiance<Var>(const Environment& environment, const Vec3<Va
   for (const auto& copy : copies) {
     jacobian.add(detail::leaves_of(copy.slots), copy.object->radiance(detail::held(d)));
   }
-  return jacobian.result(environment.radiance(value(d)));
+  return with_texels(value(d), jacobian.result(environment.radiance(value(d))));
 }
 
 template <>

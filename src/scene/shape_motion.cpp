@@ -148,27 +148,6 @@ std::vector<Vec3d> read_field(const Shape& shape, const std::string& file) {
   return v;
 }
 
-// Vertex 2's y of an array.
-class OneComponent final : public Motion {
- public:
-  OneComponent(std::shared_ptr<const Motion> array, size_t component)
-      : array_(std::move(array)), component_(component) {}
-
-  void seed(Scene& scene, int lane, size_t) const override {
-    array_->seed(scene, lane, component_);
-  }
-  void move(Scene& scene, double step, size_t) const override {
-    array_->move(scene, step, component_);
-  }
-  std::vector<Vec3d> velocities(const Scene& scene, ShapeId shape, size_t) const override {
-    return array_->velocities(scene, shape, component_);
-  }
-
- private:
-  std::shared_ptr<const Motion> array_;
-  size_t component_;
-};
-
 // All coordinates of all vertices. A component moves its vertex with all copies, so that the mesh
 // stays whole; the derivative along a field is the sum over first copies (weld[i] == i).
 class VertexArray final : public ShapeMotion {
@@ -237,7 +216,7 @@ class VertexArray final : public ShapeMotion {
     }
     const size_t component = static_cast<size_t>(*vertex) * 3 + axis;
     return Parameter{whole.name + "." + text, whole.unit, whole.natural_step, 1,
-                     std::make_shared<OneComponent>(whole.motion, component)};
+                     one_component(whole.motion, component)};
   }
 
   ShapeId shape_;
@@ -270,6 +249,7 @@ void add_shape_parameters(const Scene& scene, std::vector<Parameter>& list) {
     list.push_back({shape.id + ".scale", "factor", 0.01, 1, std::make_shared<ShapeScaling>(id)});
     list.push_back({shape.id + ".vertex_positions", "scene units", step,
                     3 * shape.mesh.positions.size(), std::make_shared<VertexArray>(id)});
+    list.back().array = {shape.mesh.positions.size(), 3};
   }
 }
 

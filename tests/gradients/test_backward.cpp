@@ -45,15 +45,16 @@ Scene mirror_scene(const TempFiles& files, bool face_normals, int depth = 3) {
   return make_scene(files, parts);
 }
 
-// A body close over a floor, before a small lamp.
-Scene penumbra_scene(const TempFiles& files) {
+// A body close over a floor, before a lamp of that size and of one power.
+Scene penumbra_scene(const TempFiles& files, double size) {
   SceneParts parts;
   parts.max_depth = 3;
   parts.origin = {0, 3, 4};
   const std::string mesh = write_mesh(files, "body.obj", shaken(torus_mesh(8, 5)));
+  const std::string radiance = fmt::format("{}", 3.6 / (size * size));
   parts.body = square("floor", 3, -90, {0, 0, 0}, diffuse("grey", ".5, .5, .5")) +
                obj_shape("body", mesh, true, 0.6, {0, 0.3, 0}, diffuse("clay", ".6, .5, .4")) +
-               square("lamp", 0.02, 90, {0.5, 3.5, 1}, area_light("glow", "9000, 9000, 9000"));
+               square("lamp", size, 90, {0.5, 3.5, 1}, area_light("glow", radiance));
   return make_scene(files, parts);
 }
 
@@ -130,7 +131,8 @@ double magnitude(const Scene& scene, const BackwardResult& result, const std::st
   const Parameter parameter = find_parameter(scene, name);
   double sum = 0;
   // Those of a channel are smaller than those of its colour.
-  const std::string whole = channel_of(name) < 3 ? name.substr(0, name.size() - 2) : name;
+  const bool channel = channel_of(name) < 3 && parameter.texel_velocities(scene).data.empty();
+  const std::string whole = channel ? name.substr(0, name.size() - 2) : name;
   const Moments& m = result.of(whole).moments;
   for (size_t i = 0; i < m.size(); ++i) sum += std::fabs(m.mean(i));
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
@@ -145,6 +147,29 @@ double magnitude(const Scene& scene, const BackwardResult& result, const std::st
   return sum;
 }
 
+// Some texels by their names in forward mode, and all of them along a random field, against those of
+// reverse mode.
+std::vector<std::string> texel_names(const Scene& scene, const Image& field,
+                                     const TempFiles& files) {
+  if (!scene.environment || scene.environment->map().width == 0) return {};
+  const std::string file = files.path("texels.exr"), name = scene.environment_id + ".data";
+  write_exr(file, field, false, {});
+  std::vector<std::string> names{name + ":" + file};
+  for (const char* part : {".0.0.r", ".2.5.g", ".2.4.b", ".3.15.r", ".3.9.g", ".4.0.b"}) {
+    names.push_back(name + part);
+  }
+  return names;
+}
+
+Image random_field(const Scene& scene) {
+  const Environment::Map map = scene.environment ? scene.environment->map() : Environment::Map{};
+  Image field(map.width, map.height, 3);
+  for (size_t i = 0; i < field.data.size(); ++i) {
+    field.data[i] = static_cast<float>(Rng(8, i, 0).uniform() - 0.5);
+  }
+  return field;
+}
+
 // With the same samples interior terms are equal, to rounding.
 void expect_same_interior(const Scene& scene, const std::string& sampler = "forest") {
   BackwardOptions options;
@@ -152,6 +177,10 @@ void expect_same_interior(const Scene& scene, const std::string& sampler = "fore
   options.terms = {"interior"};
   options.uniform_pixels = true;
   for (const Parameter& p : list_parameters(scene)) options.parameters.push_back(p.name);
+  const TempFiles files;
+  const Image field = random_field(scene);
+  const std::vector<std::string> of_texels = texel_names(scene, field, files);
+  for (const std::string& name : of_texels) options.parameters.push_back(name);
   const Image adjoint = random_adjoint(scene, 1);
   RunSettings settings;
   settings.spp = 8;
@@ -159,7 +188,7 @@ void expect_same_interior(const Scene& scene, const std::string& sampler = "fore
   const BackwardResult reverse = backward(scene, adjoint, options, settings);
   GradientOptions forward_options;
   for (const ParameterAdjoint& p : reverse.parameters) {
-    if (p.shape.size() == 2) continue;
+    if (p.shape.size() > 1) continue;
     const bool colour = !p.shape.empty();
     for (const char* part : {".r", ".g", ".b"}) {
       if (colour) forward_options.parameters.push_back(p.name + part);
@@ -172,12 +201,24 @@ void expect_same_interior(const Scene& scene, const std::string& sampler = "fore
   for (const ParameterGradient& p : forward.parameters) {
     double sum = 0;
     for (size_t k = 0; k < adjoint.data.size(); ++k) sum += adjoint.data[k] * p.total.mean(k);
+    const bool texel = std::find(of_texels.begin(), of_texels.end(), p.name) != of_texels.end();
     const size_t channel = channel_of(p.name);
-    const bool part = channel < 3;
+    const bool part = channel < 3 && !texel;
     const Moments& m = reverse.of(part ? p.name.substr(0, p.name.size() - 2) : p.name).moments;
     double found = m.mean(part ? channel : 0);
     if (!part && m.size() == 3) found += m.mean(1) + m.mean(2);  // along grey
     EXPECT_NEAR(found, sum, 1e-12 * magnitude(scene, reverse, p.name)) << p.name;
+    if (!texel) continue;
+    EXPECT_NE(sum, 0) << p.name;
+    // The array has the same numbers.
+    const Image velocity = find_parameter(scene, p.name).texel_velocities(scene);
+    const Moments& all = reverse.of(scene.environment_id + ".data").moments;
+    double dotted = 0, size = 0;
+    for (size_t i = 0; i < all.size(); ++i) {
+      dotted += velocity.data[i] * all.mean(i);
+      size += std::fabs(velocity.data[i] * all.mean(i));
+    }
+    EXPECT_NEAR(dotted, sum, 1e-12 * size) << p.name;
   }
 }
 
@@ -188,6 +229,69 @@ TEST(Backward, InteriorIsThatOfForwardMode) {
   expect_same_interior(shadow_scene(files));
   expect_same_interior(crossing_scene(files));
   expect_same_interior(lamps_scene(files), "analytic");
+}
+
+// A diffuse floor and nothing else under a map: the derivative of its radiance with respect to a
+// texel is the integral of that texel's weight times the cosine over pi, whatever the map holds. A
+// black one is drawn from evenly, a lower half that is black never.
+TEST(Backward, TexelsOverAFloorHaveTheirClosedForm) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.max_depth = 2;
+  parts.origin = {0, 3, 0.5};
+  parts.target = {0, 0, 0};
+  parts.width = parts.height = 4;
+  for (const bool black : {false, true}) {
+    Image map(6, 5, 3);
+    for (size_t i = 0; i < map.data.size() && !black; ++i) {
+      map.data[i] = i < 9 * 6 ? static_cast<float>(0.2 + Rng(2, i, 0).uniform()) : 0;
+    }
+    const std::string file = files.path(black ? "black.exr" : "map.exr");
+    write_exr(file, map, false, {});
+    parts.body = square("floor", 50, -90, {0, 0, 0}, diffuse("grey", ".5, .25, 1")) +
+                 R"(<emitter type="envmap" id="sky"><string name="filename" value=")" + file +
+                 R"("/><float name="scale" value="2"/></emitter>)";
+    const Scene scene = make_scene(files, parts);
+    Image adjoint(4, 4, 3);
+    for (float& a : adjoint.data) a = 1.0f / 16;
+    BackwardOptions options;
+    options.parameters = {"sky.data", "sky.scale"};
+    options.batches = 1024;
+    RunSettings settings;
+    settings.spp = 1024;
+    settings.threads = 2;
+    const BackwardResult result = backward(scene, adjoint, options, settings);
+    std::vector<double> truth(map.data.size());
+    constexpr int kPoints = 400;  // of Gauss' kind would be too much: midpoints, to 1e-5
+    for (int i = 0; i < kPoints; ++i) {
+      for (int k = 0; k < 4 * kPoints; ++k) {
+        const double y = (i + 0.5) / kPoints, r = std::sqrt(1 - y * y);
+        const double phi = 2 * kPi * (k + 0.5) / (4 * kPoints);
+        const Vec3d d{r * std::cos(phi), y, r * std::sin(phi)};
+        for (const auto& [texel, weight] : scene.environment->texel_weights(d)) {
+          const double share = weight * y / kPi * 2 * kPi / (4.0 * kPoints * kPoints);
+          const double reflectance[3] = {0.5, 0.25, 1};
+          for (size_t c = 0; c < 3; ++c) truth[3 * texel + c] += share * reflectance[c];
+        }
+      }
+    }
+    const Moments& m = result.parameters[0].moments;
+    double along = 0, squares = 0, count = 0;
+    for (size_t i = 0; i < truth.size(); ++i) {
+      along += m.mean(i) * map.data[i];
+      if (truth[i] == 0) {
+        EXPECT_EQ(m.mean(i), 0);
+        continue;
+      }
+      const double z = (m.mean(i) - truth[i]) / std::sqrt(m.variance(i));
+      EXPECT_LT(std::fabs(z), 5) << i;
+      squares += z * z;
+      ++count;
+    }
+    fmt::print("{} texels: mean square of z {:.2f}\n", count / 3, squares / count);
+    // The image is linear in the map: with scale 2, half of the sum of texels times derivatives.
+    EXPECT_NEAR(along / 2, result.parameters[1].moments.mean(0), 1e-9 * std::fabs(along));
+  }
 }
 
 // z-scores of all parameters, whose sum of squares has as many degrees of freedom at most.
@@ -242,7 +346,8 @@ TEST(Backward, AgreesWithLightInClosedForm) {
   expect_agreement(lamps_scene(files), 16, options);
 }
 
-// Where lamps and suns are regions apart. Before a small lamp most is found from there.
+// Where lamps and suns are regions apart. Before a small lamp most is found from there, before a
+// larger one half of it: with the whole of both z is 7.
 TEST(Backward, AgreesWithRegionsOfLight) {
   const TempFiles files;
   const Scene large = mirror_scene(files, true);
@@ -251,9 +356,35 @@ TEST(Backward, AgreesWithRegionsOfLight) {
   expect_agreement(large, 16, options);
   options.terms = {"direct", "penumbra"};
   options.parameters = {"body.translate.x", "body.translate.y", "body.translate.z", "body.scale"};
-  expect_agreement(penumbra_scene(files), 512, options);
+  expect_agreement(penumbra_scene(files, 0.02), 256, options);
+  options.parameters = {"body.translate.y"};
+  expect_agreement(penumbra_scene(files, 0.1), 1024, options);
   options.sampler = "forest";
   EXPECT_THROW(backward(large, random_adjoint(large, 1), options, RunSettings{}), InputError);
+}
+
+// A low sun of one texel is a region, too: what an object hides of it and what it shows.
+TEST(Backward, AgreesWithBrightPatches) {
+  const TempFiles files;
+  Image map(64, 32, 3);
+  for (float& v : map.data) v = 0.3f;
+  for (int c = 0; c < 3; ++c) map.at(40, 10, c) = 2000;
+  write_exr(files.path("sun.exr"), map, false, {});
+  SceneParts parts;
+  parts.max_depth = 3;
+  parts.origin = {0, 3, 4};
+  const std::string mesh = write_mesh(files, "body.obj", shaken(torus_mesh(8, 5)));
+  parts.body = square("floor", 3, -90, {0, 0, 0}, diffuse("grey", ".5, .5, .5")) +
+               obj_shape("body", mesh, true, 0.6, {0, 0.9, 0}, diffuse("clay", ".6, .5, .4")) +
+               R"(<emitter type="envmap" id="sky"><string name="filename" value=")" +
+               files.path("sun.exr") + R"("/></emitter>)";
+  const Scene scene = make_scene(files, parts);
+  BackwardOptions options;
+  options.sampler = "silhouettes";
+  expect_agreement(scene, 32, options);
+  options.terms = {"direct"};
+  options.parameters = {"body.translate.x", "body.translate.y", "body.translate.z", "body.scale"};
+  expect_agreement(scene, 256, options);
 }
 
 TEST(Backward, AgreesInSharpShadows) {
@@ -419,9 +550,7 @@ TEST(Backward, CommonTranslationSumsToZero) {
   }
 }
 
-TEST(Backward, ThreadsChangeNoBit) {
-  const TempFiles files;
-  const Scene scene = shadow_scene(files);
+void expect_the_same_bits(const Scene& scene) {
   const Image adjoint = random_adjoint(scene, 4);
   std::vector<std::vector<double>> all;
   for (const int threads : {1, 2, 7}) {
@@ -443,6 +572,12 @@ TEST(Backward, ThreadsChangeNoBit) {
   }
   EXPECT_EQ(all[0], all[1]);
   EXPECT_EQ(all[0], all[2]);
+}
+
+TEST(Backward, ThreadsChangeNoBit) {
+  const TempFiles files;
+  expect_the_same_bits(shadow_scene(files));
+  expect_the_same_bits(mirror_scene(files, false, 2));
 }
 
 }  // namespace

@@ -10,7 +10,7 @@ import pytest
 
 
 def test_a_colour_is_found_back(scene):
-    target = limn.render(scene, spp=256, seed=9).value
+    target = limn.render(scene, spp=1024, seed=9).value
     start = scene.copy()
     truth = scene["clay.reflectance"]
     begin = truth + [-0.25, 0.2, 0.1]
@@ -19,14 +19,9 @@ def test_a_colour_is_found_back(scene):
     fit = limn.Fit(start, target, "clay.reflectance", spp=8, step=8, step_half_life=6, seed=1)
     fit.run(30, callback=lambda record: seen.append(record.step))
     assert seen == list(range(30)) and len(fit.history) == 30
-    first, last = fit.history[0], fit.history[-1]
-    assert first.loss - last.loss > 5 * np.hypot(first.stderr, last.stderr)
-    # Its picture is as near to the target as that of the truth, and in no channel it is farther
-    # than where it began.
-    found, true = (limn.image_loss(s, target, spp=64, seed=i)
-                   for i, s in enumerate((fit.scenes[0], scene)))  # fmt: skip
-    assert found.value - true.value < 5 * np.hypot(found.stderr, true.stderr)
-    assert (abs(fit.values["clay.reflectance"] - truth) < abs(begin - truth)).all()
+    # Steps end before the last of Adam's overshoot is gone: eight seeds leave 0.125, 0.06 and 0.08
+    # of the way, and are within 0.01 of one another.
+    assert (abs(fit.values["clay.reflectance"] - truth) < 0.2 * abs(begin - truth)).all()
     np.testing.assert_array_equal(start["clay.reflectance"], begin)
     np.testing.assert_array_equal(fit.scenes[0]["clay.reflectance"], fit.values["clay.reflectance"])
 
@@ -40,19 +35,58 @@ def test_bounds_hold(scene):
     assert fit.values["clay.reflectance"].min() == least
 
 
-def test_it_is_what_the_program_does(scene, tmp_path, folder):
-    target = str(tmp_path / "target.exr")
-    limn.write_exr(target, limn.render(scene, spp=4, seed=9).value * 1.2)
-    output = tmp_path / "fit"
+VALUES = ["clay.reflectance", "lamp.radiance"]
+BOUNDS = {"clay.reflectance": (0.25, 0.75), "lamp.radiance": (3.99, 7)}
+
+
+# Every option changes what three steps find: the first loss, which has no step, the values at last.
+@pytest.mark.parametrize("names, options, words", [
+    (["tent.vertex_positions"], {}, []),
+    (["tent.vertex_positions"], {"sampler": "uniform"}, ["--sampler", "uniform"]),
+    (["tent.vertex_positions"], {"smoothing": 0.3}, ["--smoothing", "0.3"]),
+    (["tent.vertex_positions"], {"terms": ["interior"]}, ["--terms", "interior"]),
+    (VALUES, {"loss": "relative-l2"}, ["--loss", "relative-l2"]),
+    (VALUES, {"pyramid": 2}, ["--pyramid", "2"]),
+    (VALUES, {"mask": True}, ["--mask", "mask.exr"]),
+    (VALUES, {"optimiser": "gradient-descent"}, ["--optimiser", "gradient-descent"]),
+    (VALUES, {"step": 3}, ["--step", "3"]),
+    (VALUES, {"step_half_life": 1}, ["--step-half-life", "1"]),
+    (VALUES, {"spp_doubling": 1}, ["--spp-doubling", "1"]),
+    (VALUES, {"loss_spp": 3}, ["--loss-spp", "3"]),
+    (VALUES, {"bounds": BOUNDS, "step": 9},
+     ["--step", "9", "--bounds", "clay.reflectance=0.25,0.75", "--bounds", "lamp.radiance=3.99,7"]),
+], ids=lambda x: " ".join(x) if isinstance(x, (list, dict)) else None)  # fmt: skip
+def test_it_is_what_the_program_does(scene, tmp_path, folder, monkeypatch, names, options, words):
+    monkeypatch.chdir(tmp_path)
+    limn.write_exr("target.exr", limn.render(scene, spp=4, seed=9).value * 1.2)
+    mask = np.random.default_rng(2).random((scene.height, scene.width), dtype=np.float32)
+    limn.write_exr("mask.exr", mask)
+    if "mask" in options:
+        options = {"mask": mask}
+
+    def found(own):
+        fit = limn.Fit(scene, limn.read_exr("target.exr"), names, spp=2, seed=5, **own)
+        fit.run(3)
+        return [r.loss for r in fit.history], [fit.scenes[0][n].tolist() for n in names], fit
+
     subprocess.run([os.environ["LIMN_PROGRAM"], "fit", str(folder / "scene.xml"), "--quiet",
-                    "--no-report", "--target", target, "--wrt", "tent.vertex_positions", "--spp",
-                    "2", "--seed", "5", "--steps", "3", "--sampler", "uniform", "-o", str(output)],
+                    "--no-report", "--target", "target.exr", "--spp", "2", "--seed", "5", "--steps",
+                    "3", "-o", "fit", *words, *[w for n in names for w in ("--wrt", n)]],
                    check=True)  # fmt: skip
-    history = json.loads((output / "fit.json").read_text())["history"]
-    fit = limn.Fit(limn.load(str(folder / "scene.xml")), limn.read_exr(target),
-                   "tent.vertex_positions", spp=2, seed=5, sampler="uniform")  # fmt: skip
-    fit.run(3)
-    assert [r.loss for r in fit.history] == [r["loss"] for r in history]
+    told = json.loads((tmp_path / "fit" / "fit.json").read_text())
+    losses, values, fit = found(options)
+    assert losses == [r["loss"] for r in told["history"]]
+    scalars = [s["value"] for s in told["scalars"]]
+    if scalars:
+        assert np.ravel(values).tolist() == scalars
+    else:
+        mesh = limn.load_string(
+            '<scene version="3.0.0"><sensor type="perspective"/><shape type="ply" id="m">'
+            '<string name="filename" value="step_00003_tent.ply"/></shape></scene>',
+            tmp_path / "fit").mesh("m")  # fmt: skip
+        assert mesh.positions.tolist() == values[0]
+    if options:
+        assert found({})[:2] != (losses, values)
 
 
 def test_errors_and_interrupts(scene):

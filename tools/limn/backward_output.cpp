@@ -52,10 +52,11 @@ std::string ply_text(const Mesh& mesh, const Moments& g) {
   return bytes;
 }
 
-// V by 3 doubles in NumPy's format, version 1.0.
-std::string npy_text(const Moments& g) {
-  std::string header =
-      fmt::format("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}, 3), }}", g.size() / 3);
+// Doubles in NumPy's format, version 1.0.
+std::string npy_text(const ParameterAdjoint& p) {
+  const Moments& g = p.moments;
+  std::string header = fmt::format("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}), }}",
+                                   fmt::join(p.shape, ", "));
   const size_t before = 10;  // magic, version, length
   header.append(63 - (before + header.size()) % 64, ' ');
   header += '\n';
@@ -74,6 +75,16 @@ std::string field_text(const Moments& g) {
     text += fmt::format("{:.17g} {:.17g} {:.17g}\n", x.x, x.y, x.z);
   }
   return text;
+}
+
+// Of texels: H by W by 3.
+Image to_map(const ParameterAdjoint& p, bool errors) {
+  Image map(static_cast<int>(p.shape[1]), static_cast<int>(p.shape[0]), 3);
+  for (size_t i = 0; i < map.data.size(); ++i) {
+    const double v = errors ? std::sqrt(p.moments.variance(i)) : p.moments.mean(i);
+    map.data[i] = static_cast<float>(v);
+  }
+  return map;
 }
 
 // The shape as the camera sees it, each point in the colour of the gradient along the normal: that
@@ -157,8 +168,9 @@ json write_numbers(const ParameterAdjoint& p, bool quiet) {
 std::vector<PlannedFile> BackwardFiles::planned(const std::string& also) const {
   std::vector<PlannedFile> files{{"-o", json}, {"-o", adjoint}, {"-o", adjoint_picture}};
   for (const Array& array : arrays) {
-    for (const std::string& file : {array.ply, array.npy, array.txt, array.png})
-      files.push_back({"-o, --wrt " + array.parameter, file});
+    for (const std::string& file :
+         {array.ply, array.npy, array.txt, array.png, array.exr, array.stderr_exr})
+      if (!file.empty()) files.push_back({"-o, --wrt " + array.parameter, file});
   }
   files.push_back({"--json", also});
   return files;
@@ -175,12 +187,18 @@ BackwardFiles plan_files(const Scene& scene, const std::vector<std::string>& par
   files.adjoint_picture = in_folder("adjoint.png");
   const auto add = [&](const Parameter& parameter) {
     if (parameter.size == 1) return;
+    const std::string name = file_part(parameter.name);
+    if (parameter.array.size() == 3) {
+      files.arrays.push_back({parameter.name, ShapeId(), "", in_folder(name + ".npy"), "",
+                              in_folder(name + ".png"), in_folder(name + ".exr"),
+                              in_folder(name + "_stderr.exr")});
+      return;
+    }
     for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
       if (parameter.velocities(scene, ShapeId(s)).empty()) continue;
-      const std::string name = file_part(parameter.name);
       files.arrays.push_back({parameter.name, ShapeId(s), in_folder(name + ".ply"),
                               in_folder(name + ".npy"), in_folder(name + ".txt"),
-                              in_folder(name + ".png")});
+                              in_folder(name + ".png"), "", ""});
     }
   };
   for (const std::string& name : parameters) add(find_parameter_or_array(scene, name));
@@ -189,6 +207,54 @@ BackwardFiles plan_files(const Scene& scene, const std::vector<std::string>& par
   }
   return files;
 }
+
+namespace {
+
+// What both kinds of arrays have.
+json describe_array(const ParameterAdjoint& p, const BackwardFiles::Array& array, double scale,
+                    const std::string& main_file, bool quiet) {
+  if (!quiet) {
+    fmt::print("{:32} {:14.6g} +- {:.2g} (length of the array), {}\n", p.name, norm(p.moments),
+               error_of(p.moments), main_file);
+  }
+  return {{"name", p.name},
+          {"unit", p.unit},
+          {"shape", p.shape},
+          {"norm", norm(p.moments)},
+          {"stderr", number(error_of(p.moments))},
+          {"array", array.npy},
+          {"picture", array.png},
+          {"scale", scale}};
+}
+
+json write_vertices(const Scene& scene, const ParameterAdjoint& p,
+                    const BackwardFiles::Array& array, const RayTracer& tracer, bool quiet) {
+  const Image image = picture(scene, array.shape, p.moments, tracer);
+  const double scale = signed_scale(image);
+  write_file(array.ply, ply_text(scene.shape(array.shape).mesh, p.moments));
+  write_file(array.npy, npy_text(p));
+  write_file(array.txt, field_text(p.moments));
+  write_signed_png(array.png, image, scale);
+  json entry = describe_array(p, array, scale, array.ply, quiet);
+  entry["mesh"] = array.ply;
+  entry["field"] = array.txt;
+  return entry;
+}
+
+// A field that --wrt EMITTER.data:FILE reads.
+json write_texels(const ParameterAdjoint& p, const BackwardFiles::Array& array, bool quiet) {
+  const Image map = to_map(p, false);
+  const double scale = signed_scale(map);
+  write_exr(array.exr, map, false, {});
+  if (p.moments.batches() > 1) write_exr(array.stderr_exr, to_map(p, true), false, {});
+  write_file(array.npy, npy_text(p));
+  write_signed_png(array.png, map, scale);
+  json entry = describe_array(p, array, scale, array.exr, quiet);
+  entry["field"] = array.exr;
+  return entry;
+}
+
+}  // namespace
 
 json write_parameters(const Scene& scene, const BackwardFiles& files, const BackwardResult& result,
                       bool quiet) {
@@ -201,26 +267,8 @@ json write_parameters(const Scene& scene, const BackwardFiles& files, const Back
     }
     for (const BackwardFiles::Array& array : files.arrays) {
       if (array.parameter != p.name) continue;
-      const Image image = picture(scene, array.shape, p.moments, *tracer);
-      const double scale = signed_scale(image);
-      write_file(array.ply, ply_text(scene.shape(array.shape).mesh, p.moments));
-      write_file(array.npy, npy_text(p.moments));
-      write_file(array.txt, field_text(p.moments));
-      write_signed_png(array.png, image, scale);
-      list.push_back({{"name", p.name},
-                      {"unit", p.unit},
-                      {"shape", p.shape},
-                      {"norm", norm(p.moments)},
-                      {"stderr", number(error_of(p.moments))},
-                      {"mesh", array.ply},
-                      {"array", array.npy},
-                      {"field", array.txt},
-                      {"picture", array.png},
-                      {"scale", scale}});
-      if (!quiet) {
-        fmt::print("{:32} {:14.6g} +- {:.2g} (length of the array), {}\n", p.name, norm(p.moments),
-                   error_of(p.moments), array.ply);
-      }
+      list.push_back(array.shape.valid() ? write_vertices(scene, p, array, *tracer, quiet)
+                                         : write_texels(p, array, quiet));
     }
   }
   return list;

@@ -12,11 +12,12 @@
 namespace limn {
 
 struct BackwardFiles {
-  // Of one array, named after it: FOLDER/object.vertex_positions.ply, ...
+  // Of one array, named after it: FOLDER/object.vertex_positions.ply, ... Of texels there are exr,
+  // stderr_exr, npy and png; of vertices the others.
   struct Array {
     std::string parameter;
-    ShapeId shape;
-    std::string ply, npy, txt, png;
+    ShapeId shape;  // none of texels
+    std::string ply, npy, txt, png, exr, stderr_exr;
   };
   std::string json;
   std::string adjoint, adjoint_picture;  // of a loss; "" where it is given

@@ -133,9 +133,11 @@ class CheckCommand final : public Command {
                    "Compare windows this many pixels apart (default: an eighth of the longer side, "
                    "at least 4)")
         ->check(CLI::Range(1, 1 << 20));
-    app.add_flag("--reverse", reverse_,
-                 "Compare reverse mode with forward mode instead: the sum over pixels of a random "
-                 "image times the derivative; an array stands for a random field");
+    app.add_flag(
+        "--reverse", reverse_,
+        "Compare reverse mode with forward mode instead: the sum over pixels of a random "
+        "image times the derivative; an array stands for a random field. --sampler is then "
+        "that of backward");
   }
 
   int run(const std::string&) override {
@@ -180,6 +182,8 @@ class CheckCommand final : public Command {
     BackwardOptions options;
     options.parameters = parameters_;
     options.terms = options_.terms;
+    // The default method moves directions, which reverse mode does not.
+    if (options_.method != CheckOptions{}.method) options.sampler = options_.method;
     const RunSettings settings = make_settings(common_, scene, "check --reverse");
     const std::vector<ReverseCheck> checks = check_reverse(scene, options, settings);
     if (checks.empty()) {

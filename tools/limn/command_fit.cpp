@@ -30,7 +30,7 @@ std::string absolute(const std::string& file) {
   return file.empty() ? file : fs::absolute(file).lexically_normal().string();
 }
 
-// "SHAPE.vertex_positions:FILE" with an absolute FILE that reaches to `end`; other names as they
+// A field ("SHAPE.vertex_positions:FILE") with an absolute FILE that reaches to `end`; other names as they
 // are.
 std::string with_absolute_field(const std::string& text, size_t end) {
   const size_t colon = text.find(':');
@@ -94,8 +94,9 @@ void FitCommand::add_options(CLI::App& app, bool) {
   app.add_option("--view", views_, "A further scene that shares the parameters (repeatable)")
       ->type_name("SCENE[;NAME=VALUE...]")
       ->allow_extra_args(false);
-  app.add_option("--wrt", given_.options.parameters,
-                 "What to fit: scalars, SHAPE.vertex_positions (repeatable)")
+  app.add_option(
+         "--wrt", given_.options.parameters,
+         "What to fit: scalars, SHAPE.vertex_positions, the texels EMITTER.data (repeatable)")
       ->type_name("PARAM")
       ->allow_extra_args(false);
   app.add_option("--bounds", given_.bounds, "What a scalar may be (repeatable)")

@@ -77,7 +77,8 @@ void print_camera(const Scene& scene) {
 void print_parameter(const Parameter& parameter) {
   std::string parts = parameter.colour ? "  all channels alike; one of them: add .r, .g or .b" : "";
   if (parameter.size > 1) {
-    parts = fmt::format("  {} numbers: add :FILE, or .0.x, .0.y, ...", parameter.size);
+    parts = fmt::format("  {} numbers: add :FILE, or {}", parameter.size,
+                        parameter.array.size() == 3 ? ".0.0.r, .0.0.g, ..." : ".0.x, .0.y, ...");
   }
   fmt::print("  {}  [{}]{}\n", parameter.name, parameter.unit, parts);
 }

@@ -217,6 +217,17 @@ std::map<std::string, std::string> fingerprints_of(const FitView& view,
   return all;
 }
 
+// The first view with that map of texels; null if the name is another kind of parameter.
+const Scene* with_map(const Fit& fit, const std::string& name) {
+  for (const FitView& view : fit.views()) {
+    try {
+      if (find_parameter_or_array(view.scene, name).array.size() == 3) return &view.scene;
+    } catch (const UnknownParameter&) {  // of another view
+    }
+  }
+  return nullptr;
+}
+
 // Shapes whose vertices are fitted or moved, each from the first view that has it.
 std::vector<const Shape*> fitted_shapes(const Fit& fit,
                                         const std::vector<std::string>& parameters) {
@@ -430,6 +441,16 @@ void FitFolder::add_snapshot(const Fit& fit, const RunSettings& settings, int sp
                           figures.at("normal_angle").get<double>());
     }
     snapshot["meshes"].push_back(figures);
+  }
+  for (const std::string& name : arguments_.options.parameters) {
+    const Scene* scene = with_map(fit, name);
+    if (!scene) continue;
+    std::string base = fmt::format("step_{:05}_{}", fit.steps(), file_part(name));
+    while (!names.insert(base).second) base += "_";
+    const Image texels = scene->environment->texels();
+    write_exr(file(base + ".exr"), texels, false, {});
+    write_png(file(base + ".png"), texels, 1);
+    snapshot["maps"].push_back({{"name", name}, {"file", base + ".exr"}});
   }
   for (size_t v = 0; v < fit.views().size() && spp > 0; ++v) {
     const FitView& view = fit.views()[v];

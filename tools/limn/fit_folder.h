@@ -4,7 +4,7 @@
 //   fit.json        arguments, history, snapshots, status: for reports, and for --resume
 //   state.cbor      all numbers that a later step depends on
 //   history.csv     a line per step
-//   step_N_SHAPE.ply, step_N_view_K.png, view_K_target.png
+//   step_N_SHAPE.ply, step_N_EMITTER.data.exr, step_N_view_K.png, view_K_target.png
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string>

@@ -73,6 +73,7 @@ FitRecord step(FitHandle& handle, const nb::object& progress) {
 }
 
 void run(FitHandle& handle, int steps, const nb::object& callback) {
+  if (steps < 0) throw InputError("steps must not be negative");
   for (int i = 0; i < steps; ++i) {
     const FitRecord record = step(handle, nb::none());
     if (!callback.is_none()) callback(record);
@@ -250,7 +251,8 @@ void bind_fit(nb::module_& m) {
             return values;
           },
           nb::sig("def values(self) -> dict[str, float | numpy.ndarray]"),
-          "What is fitted, but for arrays of vertices (see scenes): numbers, colours (3,), and for "
+          "What is fitted, but for arrays (vertices, texels: see scenes): numbers, colours (3,), "
+          "and for "
           "motions the sum of all steps.");
 }
 

@@ -27,13 +27,16 @@ ParameterView find(const SceneHandle& scene, const std::string& name) {
 
 // The shape whose positions the parameter is; none of another parameter.
 std::optional<ShapeId> shape_of(const ParameterView& view) {
-  if (view.parameter.size == 1) return std::nullopt;
+  if (view.parameter.array.size() != 2) return std::nullopt;
   const std::string& name = view.parameter.name;
   return find_shape(*view.scene, name.substr(0, name.rfind('.')));
 }
 
 nb::object value_of(const ParameterView& view) {
   if (const auto shape = shape_of(view)) return nb::cast(view_positions(view.scene, *shape));
+  if (view.parameter.array.size() == 3) {
+    return nb::cast(to_array(view.scene->environment->texels()));
+  }
   const std::vector<double> value = view.parameter.value(*view.scene);
   if (value.empty()) return nb::none();
   return value.size() == 1 ? nb::cast(value[0]) : as_array(nb::cast(value), "float64");
@@ -43,17 +46,19 @@ nb::tuple shape_tuple(const ParameterView& view) {
   return nb::tuple(nb::cast(view.parameter.shape()));
 }
 
+std::string shape_text(const std::vector<size_t>& shape) {
+  return fmt::format("({}{})", fmt::join(shape, ", "), shape.size() == 1 ? "," : "");
+}
+
+// A colour may be one number, of all channels.
 void check_shape(const ParameterView& view, const nb::ndarray<const double, nb::c_contig>& value) {
-  const size_t rows = view.parameter.size / 3;
-  if (view.parameter.size == 1 ||
-      (value.ndim() == 2 && value.shape(0) == rows && value.shape(1) == 3)) {
-    return;
-  }
-  std::string shape;
-  for (size_t k = 0; k < value.ndim(); ++k)
-    shape += fmt::format("{}{}", k ? ", " : "", value.shape(k));
-  throw InputError({view.scene->file}, fmt::format("parameter \"{}\" has shape ({}, 3), not ({})",
-                                                   view.parameter.name, rows, shape));
+  const std::vector<size_t>& shape = view.parameter.array;
+  std::vector<size_t> given;
+  for (size_t k = 0; k < value.ndim(); ++k) given.push_back(value.shape(k));
+  if (shape.empty() || given == shape) return;
+  throw InputError({view.scene->file},
+                   fmt::format("parameter \"{}\" has shape {}, not {}", view.parameter.name,
+                               shape_text(shape), shape_text(given)));
 }
 
 void assign(SceneHandle& scene, const std::string& name, nb::handle value) {
@@ -80,8 +85,7 @@ std::vector<std::string> names_of(const ParametersView& view) {
 std::string repr(const ParameterView& view) {
   const Parameter& p = view.parameter;
   return fmt::format("<limn.Parameter \"{}\"{}{}>", p.name, p.unit.empty() ? "" : ", " + p.unit,
-                     p.size > 1 ? fmt::format(", shape ({}, 3)", p.size / 3)
-                                : std::string(p.colour ? ", shape (3,)" : ""));
+                     p.shape().empty() ? "" : ", shape " + shape_text(p.shape()));
 }
 
 nb::object view_of(const char* kind, nb::handle self) {
@@ -95,17 +99,18 @@ void bind_parameter(nb::module_& m) {
       .def_prop_ro(
           "unit", [](const ParameterView& v) { return v.parameter.unit; },
           "Its unit: \"scene units\", \"radians\", ...; \"\" for plain numbers.")
-      .def_prop_ro(
-          "shape", shape_tuple, nb::sig("def shape(self) -> tuple[int, ...]"),
-          "Of limn.backward's derivative: () for a number, (3,) for a colour, (V, 3) for "
-          "vertex positions. In limn.gradient all channels of a colour move alike (grey), and "
-          "NAME.r, NAME.g, NAME.b move one of them.")
+      .def_prop_ro("shape", shape_tuple, nb::sig("def shape(self) -> tuple[int, ...]"),
+                   "Of limn.backward's derivative: () for a number, (3,) for a colour, (V, 3) for "
+                   "vertex positions, (H, W, 3) for the texels of an envmap. In limn.gradient all "
+                   "channels of a colour move alike (grey), and "
+                   "NAME.r, NAME.g, NAME.b move one of them.")
       .def_prop_ro(
           "natural_step", [](const ParameterView& v) { return v.parameter.natural_step; },
           "A small step: about a hundredth of what changes the picture a lot.")
       .def_prop_ro("value", value_of, nb::sig("def value(self) -> float | numpy.ndarray | None"),
                    "The value: a number, float64 (3,) of a colour, or float32 (V, 3), a view that "
-                   "cannot be written. None for what only moves things from where they are "
+                   "cannot be written; a float32 (H, W, 3) copy of texels. None for what only "
+                   "moves things from where they are "
                    "(Scene.move).")
       .def("__repr__", repr);
 }
@@ -133,6 +138,15 @@ void bind_parameters(nb::module_& m, nb::class_<SceneHandle>& scene) {
              return true;
            })
       .def(
+          "get",
+          [](nb::handle self, const std::string& name, nb::handle otherwise) {
+            const nb::object mapping = nb::module_::import_("collections.abc").attr("Mapping");
+            return nb::object(mapping.attr("get")(self, name, otherwise));
+          },
+          nb::arg("name"), nb::arg("default") = nb::none(),
+          nb::sig("def get(self, name: str, default: object = None) -> Parameter | object"),
+          "The parameter, or `default` if there is none of this name.")
+      .def(
           "keys", [](nb::handle self) { return view_of("KeysView", self); },
           nb::sig("def keys(self) -> collections.abc.KeysView[str]"))
       .def(
@@ -150,7 +164,8 @@ void bind_parameters(nb::module_& m, nb::class_<SceneHandle>& scene) {
       .def_prop_ro(
           "parameters", [](SceneHandle& s) { return ParametersView{&s}; }, nb::keep_alive<0, 1>(),
           "All that can be differentiated: a mapping of names to limn.Parameter. Parts "
-          "(\"object.vertex_positions.7.x\", \"clay.reflectance.r\") are found, too, but not "
+          "(\"object.vertex_positions.7.x\", \"clay.reflectance.r\", \"sky.data.0.5.g\") are "
+          "found, too, but not "
           "listed.")
       .def(
           "__getitem__",

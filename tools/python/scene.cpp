@@ -190,7 +190,11 @@ void bind_changes(nb::class_<SceneHandle>& scene) {
           "A copy that is seen by another sensor of the file, by number (see `sensors`) or id.")
       .def(
           "copy", [](const SceneHandle& s) { return SceneHandle(s); },
-          "A scene of its own; what both share is copied when one of them changes.");
+          "A scene of its own; what both share is copied when one of them changes.")
+      .def("__copy__", [](const SceneHandle& s) { return SceneHandle(s); })
+      .def(
+          "__deepcopy__", [](const SceneHandle& s, const nb::dict&) { return SceneHandle(s); },
+          nb::arg("memo"));
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "limn/core/image.h"
 #include "limn/core/light.h"
 
 namespace limn {
@@ -49,6 +50,29 @@ class Environment : public Light {
   virtual std::optional<Grid> grid() const { return std::nullopt; }
 
   virtual std::vector<ParameterRef> parameters() = 0;  // constant: radiance; envmap: scale
+
+  // A map of texels that radiance is linear in; 0 by 0 where it is not that of a map, and then none
+  // of what follows may be called. A map of a single row holds it twice: it stands for all.
+  struct Map {
+    int width = 0, height = 0;
+    double mean = 0;  // of the magnitudes of the texels
+  };
+  virtual Map map() const { return {}; }
+  // Height by width by 3, row 0 on top, as the file has them, without the map's scale.
+  virtual Image texels() const { return {}; }
+  // The map with other texels, as a file with them would make it: what directions are drawn in
+  // proportion to changes with them. As many as there are, all finite.
+  virtual void set_texels(const Image& /*texels*/) {}
+  // Adds `velocity`, of texels, to what derivative lane `lane` of the radiance carries.
+  virtual void add_texel_tangents(const Image& /*velocity*/, int /*lane*/) {}
+  // The radiance from the unit direction d is the sum of four texels so weighed, in each channel
+  // alike; texel: counted row by row from the top.
+  struct TexelWeight {
+    uint32_t texel;
+    double weight;
+  };
+  virtual std::array<TexelWeight, 4> texel_weights(const Vec3d& /*d*/) const { return {}; }
+
   virtual std::shared_ptr<Environment> clone() const = 0;
   virtual std::string describe() const = 0;
 

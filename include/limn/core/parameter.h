@@ -10,6 +10,9 @@
 //   sensor.translate.x|y|z        scene units
 //   sensor.rotate.x|y|z           radians, world axes through the pinhole
 //   sensor.fov                    degrees
+//   EMITTER.data                  an array, the H by W by 3 texels of an envmap, without its scale
+//   EMITTER.data.ROW.COLUMN.r|g|b one of them, counted from 0, row 0 on top
+//   EMITTER.data:FILE             moves every texel by the parameter times that of an EXR
 //   BSDF.NAME, EMITTER.NAME       see their parameters(); a colour: all channels alike
 //   BSDF.NAME.r|g|b, EMITTER.NAME.r|g|b  one channel of a colour
 //
@@ -19,6 +22,7 @@
 #include <string>
 #include <vector>
 
+#include "limn/core/image.h"
 #include "limn/core/scene.h"
 
 namespace limn {
@@ -33,7 +37,7 @@ struct Parameter {
   std::string name;
   std::string unit;
   double natural_step = 0;  // a small step: about a hundredth of what changes the picture a lot
-  size_t size = 1;          // numbers: 1 of a scalar, 3 V of vertex_positions
+  size_t size = 1;          // numbers: 1 of a scalar, 3 V of vertex_positions, 3 H W of texels
   std::shared_ptr<const Motion> motion;
   // What its numbers may be, both ends included: what assign() takes.
   double least = -std::numeric_limits<double>::infinity();
@@ -41,8 +45,9 @@ struct Parameter {
   // Its value has three channels. They move alike (along grey), as one number; reverse mode tells
   // them apart all the same. NAME.r, NAME.g and NAME.b move one of them each.
   bool colour = false;
+  std::vector<size_t> array = {};  // {V, 3} of vertex_positions, {H, W, 3} of texels; {} of scalars
 
-  // Of its derivative in reverse mode: {} of a number, {3} of a colour, {V, 3} of vertex_positions.
+  // Of its derivative in reverse mode: {} of a number, {3} of a colour, `array` of an array.
   std::vector<size_t> shape() const;
   size_t numbers() const { return colour ? 3 : size; }  // in that shape
 
@@ -56,9 +61,9 @@ struct Parameter {
   // The same in place.
   void move(Scene& scene, double step, size_t component = 0) const;
 
-  // The numbers themselves, where the scene holds them: one, the three channels of a colour, or V
-  // by 3 coordinates. Empty for what only moves things from where they are: rotations, translations
-  // and scales of shapes, fields, single coordinates.
+  // The numbers themselves, where the scene holds them: one, the three channels of a colour, all of
+  // an array. Empty for what only moves things from where they are: rotations, translations and
+  // scales of shapes, fields, single coordinates and texels.
   std::vector<double> value(const Scene& scene) const;
   // Sets them in place, with all that depends on them; one number sets all channels of a colour.
   // Positions make the mesh that a file with them would, see moved_mesh(). InputError if there are
@@ -70,6 +75,9 @@ struct Parameter {
   // V by 3: the derivative of the positions of a shape's vertices; empty where the parameter moves
   // none of that shape.
   std::vector<Vec3d> velocities(const Scene& scene, ShapeId shape, size_t component = 0) const;
+
+  // H by W by 3: the derivative of the environment's texels; empty where the parameter moves none.
+  Image texel_velocities(const Scene& scene, size_t component = 0) const;
 };
 
 // All parameters of the scene, scalars and arrays; a part (one component of an array, a field, a
@@ -87,5 +95,9 @@ Parameter find_parameter_or_array(const Scene& scene, const std::string& name);
 // Moves every vertex of a shape by the parameter times its vector in `field` (V by 3), as
 // SHAPE.vertex_positions:FILE does. Copies of a vertex must have the same vector.
 Parameter vertex_field(const Scene& scene, ShapeId shape, std::vector<Vec3d> field);
+
+// Moves every texel of the environment's map by the parameter times its value in `field` (H by W by
+// 3), as EMITTER.data:FILE does.
+Parameter texel_field(const Scene& scene, const Image& field);
 
 }  // namespace limn

@@ -48,6 +48,7 @@ struct SceneSlots {
   SeededCopies<Environment> environment;
   std::vector<std::pair<const DeltaLight*, SeededCopies<DeltaLight>>> lights;
   uint32_t camera = 0;  // the first of kCameraSlots
+  uint32_t texels = 0;  // the first of those of the environment's map, row by row; 0: constants
 
   const MeshSlots& mesh(ShapeId shape) const { return meshes[shape.index()]; }
   const SeededCopies<DeltaLight>* of(const DeltaLight& light) const {

@@ -44,14 +44,14 @@ struct FitView {
   Image mask;    // weights of the pixels as in image_loss(); without pixels: all alike
 };
 
-// Values that a scalar may not leave; what the reader of scenes would refuse is never left either.
+// What scalars and texels may not leave; what the reader of scenes would refuse is never left.
 struct FitBounds {
   std::string parameter;
   double least, most;
 };
 
 struct FitOptions {
-  // Names as in parameter.h: scalars and SHAPE.vertex_positions; at least one. Every view that has
+  // Names as in parameter.h: scalars, SHAPE.vertex_positions, EMITTER.data; at least one. Every view that has
   // a name moves with it, and one view must have it. Colours move by channels. Motions of a shape
   // and its vertex_positions exclude each other; where vertices are fitted, normals of the file
   // give way to computed ones.
@@ -123,7 +123,7 @@ struct FitState {
   struct View {
     std::vector<double> camera;               // origin, left, up, forward, fov
     std::vector<Shape> shapes;                // of those that are moved, in the scene's order
-    std::vector<std::vector<double>> values;  // of each parameter; empty where it has none
+    std::vector<std::vector<double>> values;  // of each parameter but vertices; empty: it has none
   };
   std::vector<View> views;
 };

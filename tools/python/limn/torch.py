@@ -54,7 +54,8 @@ class _Render(torch.autograd.Function):
     ) -> Any:
         scene = scene.copy()
         for name, tensor in zip(names, tensors):
-            scene[name] = tensor.detach().cpu().numpy()
+            # Through float64: numpy does not know bfloat16.
+            scene[name] = tensor.detach().to("cpu", torch.float64).numpy()
         ctx.run = _Held(scene), names, spp_grad, 2 * seed + 1, threads
         ctx.save_for_backward(*tensors)
         return torch.from_numpy(_render(scene, spp, 2 * seed, threads).value)
@@ -71,10 +72,30 @@ class _Render(torch.autograd.Function):
             else {}
         )
         gradients = [
-            torch.from_numpy(np.array(found[n].value)).to(t).reshape(t.shape) if n in found else None
+            _gradient(found[n].value, t) if n in found else None
             for n, t in zip(names, ctx.saved_tensors)
         ]
         return (None,) * 6 + tuple(gradients)
+
+
+def _gradient(value: Any, tensor: Any) -> Any:
+    # One number sets all channels of a colour.
+    value = np.array(value if value.size == tensor.numel() else value.sum())
+    return torch.from_numpy(value).to(tensor).reshape(tensor.shape)
+
+
+def _check(scene: Scene, values: Mapping[str, torch.Tensor]) -> None:
+    if not isinstance(scene, Scene):
+        raise TypeError(f"scene is a {type(scene).__name__}, not a limn.Scene (see limn.load)")
+    if not isinstance(values, Mapping):
+        raise TypeError(f"values is a {type(values).__name__}, not a mapping of names to tensors")
+    for name, tensor in values.items():
+        if scene[name] is None:
+            raise InputError(f'parameter "{name}" has no value to give')
+        if not isinstance(tensor, torch.Tensor):
+            raise TypeError(f'values["{name}"] is a {type(tensor).__name__}, not a torch.Tensor')
+        if tensor.is_complex():
+            raise TypeError(f'values["{name}"] is complex: parameters are real numbers')
 
 
 def render(
@@ -87,16 +108,15 @@ def render(
 ) -> torch.Tensor:
     """The image of `scene` with these values in place of its own: float32, (H, W, 3).
 
-    values: tensors of the shapes that scene[name] has; the scene itself stays as it is. Parameters
-    without a value (rotations of shapes, ...) cannot be given: move the vertices.
+    values: tensors of the shapes that scene[name] has, of any real dtype and on any device (the
+    image is on the CPU); one number sets all channels of a colour. The scene itself stays as it is.
+    Parameters without a value (rotations of shapes, ...) cannot be given: move the vertices.
     spp, spp_grad: samples per pixel of the image and of its gradient; None: spp_grad as spp, spp as
     the scene says. The image has the seed 2 * seed, the gradient 2 * seed + 1: both are independent,
     so that the gradient is unbiased where the loss is linear in the image. For a squared difference
     render twice with seeds of their own and take ((a - target) * (b - target)).mean().
     """
+    _check(scene, values)
     names = list(values)
-    for name in names:
-        if scene[name] is None:
-            raise InputError(f'parameter "{name}" has no value to give')
     spp_grad = spp if spp_grad is None else spp_grad
     return _Render.apply(scene, names, spp, spp_grad, seed, threads, *values.values())

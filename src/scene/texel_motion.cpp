@@ -1,0 +1,144 @@
+// Motions of the texels of an environment's map: along a field, one by one.
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "limn/core/check.h"
+#include "limn/core/environment.h"
+#include "src/base/text.h"
+#include "src/scene/motion.h"
+#include "src/scene/motion_lists.h"
+
+namespace limn {
+
+namespace {
+
+// Radiance is linear in texels, so that moves are exact but for the rounding of a float.
+class TexelMotion : public Motion {
+ public:
+  void seed(Scene& scene, int lane, size_t component) const final {
+    scene.environment->add_texel_tangents(texel_velocities(scene, component), lane);
+  }
+  void move(Scene& scene, double step, size_t component) const final {
+    Image texels = scene.environment->texels();
+    const Image velocities = texel_velocities(scene, component);
+    for (size_t i = 0; i < texels.data.size(); ++i) {
+      texels.data[i] = static_cast<float>(double{texels.data[i]} + step * velocities.data[i]);
+    }
+    scene.environment->set_texels(texels);
+  }
+};
+
+class TexelField final : public TexelMotion {
+ public:
+  explicit TexelField(Image field) : field_(std::move(field)) {}
+  Image texel_velocities(const Scene&, size_t) const override { return field_; }
+
+ private:
+  Image field_;  // H by W by 3
+};
+
+// As many channels as a map has: grey moves all alike.
+Image read_texel_field(const Environment::Map& map, const std::string& file) {
+  const Image image = read_exr(file);
+  if (image.width != map.width || image.height != map.height) {
+    throw InputError({file}, fmt::format("the field has {} x {} texels, but the environment's map "
+                                         "{} x {}",
+                                         image.width, image.height, map.width, map.height));
+  }
+  Image field(image.width, image.height, 3);
+  for (size_t i = 0; i < field.data.size(); ++i) {
+    field.data[i] = image.channels == 3 ? image.data[i] : image.data[i / 3];
+    if (std::isfinite(field.data[i])) continue;
+    throw InputError({file}, fmt::format("the field is not finite in column {}, row {}",
+                                         i / 3 % image.width, i / 3 / image.width));
+  }
+  return field;
+}
+
+// A hundredth of the mean magnitude of the texels: of the largest, a sun, it would be a new sky.
+double natural_step_of(const Environment::Map& map) {
+  return map.mean > 0 ? 0.01 * map.mean : 0.01;
+}
+
+class TexelArray final : public TexelMotion {
+ public:
+  std::optional<Parameter> part(const Scene& scene, const Parameter& whole,
+                                const std::string& rest) const override {
+    if (rest.size() < 2) return std::nullopt;
+    if (rest[0] == ':') {
+      const std::string file = rest.substr(1);
+      Parameter field = texel_field(scene, read_texel_field(scene.environment->map(), file));
+      field.name = whole.name + rest;
+      field.unit = "times the texels in FILE";
+      return field;
+    }
+    return rest[0] == '.' ? component(scene, whole, rest.substr(1)) : std::nullopt;
+  }
+  std::vector<double> numbers(const Scene& scene) const override {
+    const Image texels = scene.environment->texels();
+    return {texels.data.begin(), texels.data.end()};
+  }
+  void assign(Scene& scene, const std::string& name, const std::vector<double>& value,
+              std::vector<std::string>*) const override {
+    Image texels = scene.environment->texels();
+    constexpr double kLargest = std::numeric_limits<float>::max();
+    check_numbers(scene, name, value, texels.data.size(), -kLargest, kLargest);
+    for (size_t i = 0; i < value.size(); ++i) texels.data[i] = static_cast<float>(value[i]);
+    scene.environment->set_texels(texels);
+  }
+  std::string parts(const std::string& name) const override {
+    return "\"" + name + ":FILE\" for a map of changes, \"" + name + ".0.0.r\" for one number";
+  }
+  Image texel_velocities(const Scene& scene, size_t component) const override {
+    const Environment::Map map = scene.environment->map();
+    Image unit(map.width, map.height, 3);
+    unit.data[component] = 1;
+    return unit;
+  }
+
+ private:
+  static std::optional<Parameter> component(const Scene& scene, const Parameter& whole,
+                                            const std::string& text) {
+    const std::vector<std::string_view> words = split(text, ".");
+    if (words.size() != 3 || words[2].size() != 1) return std::nullopt;
+    const std::optional<int64_t> row = parse_integer(words[0]), column = parse_integer(words[1]);
+    const size_t channel = std::string_view("rgb").find(words[2][0]);
+    if (!row || !column || channel > 2) return std::nullopt;
+    const auto height = static_cast<int64_t>(whole.array[0]);
+    const auto width = static_cast<int64_t>(whole.array[1]);
+    if (*row < 0 || *row >= height || *column < 0 || *column >= width) {
+      throw InputError({scene.file},
+                       fmt::format("parameter \"{}.{}\": the map has rows 0 to {} and columns 0 "
+                                   "to {}",
+                                   whole.name, text, height - 1, width - 1));
+    }
+    const auto index = static_cast<size_t>(*row * width + *column) * 3 + channel;
+    return Parameter{whole.name + "." + text, whole.unit, whole.natural_step, 1,
+                     one_component(whole.motion, index)};
+  }
+};
+
+}  // namespace
+
+Parameter texel_field(const Scene& scene, const Image& field) {
+  const Environment::Map map = scene.environment->map();
+  CHECK_EQ(field.data.size(), 3 * static_cast<size_t>(map.width) * map.height);
+  double largest = 0;
+  for (const float v : field.data) largest = std::max(largest, std::fabs(double{v}));
+  return {scene.environment_id + ".data:", "times the texels of the field",
+          largest > 0 ? natural_step_of(map) / largest : 0.01, 1,
+          std::make_shared<TexelField>(field)};
+}
+
+void add_texel_parameters(const Scene& scene, std::vector<Parameter>& list) {
+  if (!scene.environment || scene.environment_id.empty()) return;
+  const Environment::Map map = scene.environment->map();
+  if (map.width == 0) return;
+  const auto height = static_cast<size_t>(map.height), width = static_cast<size_t>(map.width);
+  list.push_back({scene.environment_id + ".data", "", natural_step_of(map), 3 * height * width,
+                  std::make_shared<TexelArray>()});
+  list.back().array = {height, width, 3};
+}
+
+}  // namespace limn
