@@ -25,6 +25,14 @@ const RenderMethod& find_render_method(const std::string& name) {
   throw InputError(unknown_name("method", name, names_of(render_methods())));
 }
 
+bool is_even(const std::string& sampler) {
+  for (const char* name : kRenderSamplers) {
+    if (name == sampler) return name == kRenderSamplers[0];
+  }
+  throw InputError(
+      unknown_name("sampler", sampler, {std::begin(kRenderSamplers), std::end(kRenderSamplers)}));
+}
+
 std::unique_ptr<RadianceEstimator> make_estimator(const Scene& scene, const RunSettings& settings,
                                                   const RenderOptions& options) {
   const RenderMethod& method = find_render_method(options.method);
@@ -33,7 +41,7 @@ std::unique_ptr<RadianceEstimator> make_estimator(const Scene& scene, const RunS
     visible = std::make_shared<FilmRegions>(scene, settings.threads, settings.interrupted);
   }
   return std::make_unique<RadianceEstimator>(scene, settings.threads, std::move(visible),
-                                             method.closed_light);
+                                             method.closed_light, is_even(options.sampler));
 }
 
 }  // namespace
@@ -44,6 +52,7 @@ RenderResult render(const Scene& scene, const RunSettings& settings, const Rende
   const Stopwatch watch;
   if (settings.store) {
     settings.store->identify("method", options.method);
+    settings.store->identify("sampler", options.sampler);
     settings.store->identify("film", options.exact_film ? "exact" : "rays");
   }
   std::vector<std::unique_ptr<SampleEstimator>> estimators;

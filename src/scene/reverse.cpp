@@ -167,7 +167,7 @@ Rgb<Var> Light::drawn_radiance<Var>(const LightSample& sample) const {
 }
 
 template <>
-Environment::Sight<Var> Lights::environment<Var>(const Vec3d& wo) const {
+Environment::Sight<Var> Lights::environment<Var>(const Place& place, const Vec3d& wo) const {
   Environment::Sight<double> sight;
   environment_->look(wo, sight);
   const auto radiance = of_parameters(Tape::current()->slots()->environment, sight.radiance,
@@ -176,7 +176,7 @@ Environment::Sight<Var> Lights::environment<Var>(const Vec3d& wo) const {
                                         seeded.look(wo, of);
                                         return of.radiance;
                                       });
-  return {radiance, sight.pdf / choices_};
+  return {radiance, sight.pdf / choices(place, area_lights_.size())};
 }
 
 template <>

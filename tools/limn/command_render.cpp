@@ -19,6 +19,12 @@ class RenderCommand final : public Command {
         ->required();
     app.add_option("--method", options_.method, "How: " + limn::join(names_of(render_methods())))
         ->capture_default_str();
+    options_.sampler = kRenderSamplers[0];
+    app.add_option("--sampler", options_.sampler,
+                   "Numbers of a pixel's samples: even (Sobol' points, scrambled), or independent")
+        ->check(CLI::IsMember(
+            std::vector<std::string>(std::begin(kRenderSamplers), std::end(kRenderSamplers))))
+        ->capture_default_str();
     add_film_option(app, film_);
     add_debug_option(app, debug_);
     add_part_option(app, common_);
@@ -61,6 +67,7 @@ class RenderCommand final : public Command {
     const std::string picture = with_ending(output_, ".png");
     auto attributes = provenance(scene, settings, result.spp);
     attributes.push_back({"limn.method", options_.method});
+    attributes.push_back({"limn.sampler", options_.sampler});
     attributes.push_back({kOutputAttribute, output_name(output_)});
     remove_stale(output_, {output_});
     write_exr(output_, film_channels(scene, image), scene.film.half, attributes);
@@ -75,6 +82,7 @@ class RenderCommand final : public Command {
                                    {"sensor", sensor_name(scene)},
                                    {"spp", result.spp},
                                    {"method", options_.method},
+                                   {"sampler", options_.sampler},
                                    {"seed", settings.seed},
                                    {"threads", settings.threads},
                                    {"seconds", result.seconds},

@@ -27,12 +27,19 @@ struct RenderMethod {
 // The first is the default.
 std::span<const RenderMethod> render_methods();
 
+// Where the random numbers of a pixel's samples come from, by Mitsuba's and pbrt's names.
+inline constexpr const char* kRenderSamplers[] = {"padded-sobol", "independent"};
+
 struct RenderOptions {
   std::string method = "path";  // InputError for others than render_methods()
   // Paths start at points of the visible regions of every pixel, which are found once, exactly
   // (limn/core/visible_regions.h), in place of rays from the camera. InputError unless the film has
   // a box filter.
   bool exact_film = false;
+  // InputError for others than kRenderSamplers. Scrambled Sobol' points fill a pixel's ranges
+  // evenly: a third of the squared error, mostly; but `radiance` then has variances that are too
+  // large, as batches are not independent.
+  std::string sampler = "independent";
 };
 
 RenderResult render(const Scene& scene, const RunSettings& settings,
