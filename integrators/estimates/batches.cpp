@@ -17,9 +17,10 @@ namespace limn {
 
 namespace {
 
-Rng pixel_key(const Scene& scene, uint64_t seed, const PixelSample& at) {
-  return {seed, static_cast<uint64_t>(at.y) * scene.camera.width + at.x,
-          static_cast<uint64_t>(at.s)};
+Rng pixel_key(const SampleEstimator& estimator, uint64_t seed, const PixelSample& at) {
+  const uint64_t pixel = static_cast<uint64_t>(at.y) * estimator.scene().camera.width + at.x;
+  if (estimator.is_even()) return Rng::even(seed, pixel, static_cast<uint32_t>(at.s));
+  return {seed, pixel, static_cast<uint64_t>(at.s)};
 }
 
 // A slot's samples of the film over a batch: the same whole number per sample per pixel in every
@@ -102,7 +103,7 @@ class BatchRunner {
       for (int x = tile.x0; x < tile.x1; ++x) {
         for (int s = batch_.first; s < batch_.last; ++s) {
           const PixelSample at{x, y, s};
-          together.push_back({at, pixel_key(estimator_.scene(), batch_.seed, at)});
+          together.push_back({at, pixel_key(estimator_, batch_.seed, at)});
           if (together.size() == kMostTogether) add();
         }
       }
@@ -312,7 +313,7 @@ void run_pixel_sample(const SampleEstimator& estimator, uint64_t seed, const Pix
   NonFinite bad;
   const Lanes lane_scale = estimator.lane_scale();
   SampleSink sink(film, estimator.lanes(), lane_scale, sums, costs, bad, &log);
-  const KeyedSample one{at, pixel_key(estimator.scene(), seed, at)};
+  const KeyedSample one{at, pixel_key(estimator, seed, at)};
   estimator.add_pixels({&one, 1}, sink);
   const size_t index = pixel_index(film, at.x, at.y);
   const auto rgb = [&](const std::vector<double>& image) {

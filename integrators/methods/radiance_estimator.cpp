@@ -11,14 +11,16 @@
 namespace limn {
 
 RadianceEstimator::RadianceEstimator(const Scene& scene, int threads,
-                                     std::shared_ptr<const FilmRegions> visible, bool closed)
+                                     std::shared_ptr<const FilmRegions> visible, bool closed,
+                                     bool even)
     : scene_(scene),
       tracer_(make_embree_tracer(scene_, threads)),
       lights_(scene_),
       closed_(closed ? std::make_unique<ClosedLight>(scene_, threads) : nullptr),
       context_{scene_, *tracer_, lights_, closed_.get()},
       camera_(scene_.camera),
-      visible_(std::move(visible)) {}
+      visible_(std::move(visible)),
+      even_(even) {}
 
 void RadianceEstimator::add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const {
   // In closed form what is left to chance is where in its pixel a sample lies: it takes two places.

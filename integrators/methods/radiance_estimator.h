@@ -11,13 +11,15 @@ namespace limn {
 class RadianceEstimator final : public SampleEstimator {
  public:
   // The scene must outlive the estimator. visible: what its film shows; null: rays tell. closed:
-  // what surfaces scatter is known in closed form, InputError if it is not.
+  // what surfaces scatter is known in closed form, InputError if it is not. even: see is_even().
   RadianceEstimator(const Scene& scene, int threads,
-                    std::shared_ptr<const FilmRegions> visible = nullptr, bool closed = false);
+                    std::shared_ptr<const FilmRegions> visible = nullptr, bool closed = false,
+                    bool even = false);
 
   const Scene& scene() const override { return scene_; }
   size_t slots() const override { return 1; }
   const char* slot_name(size_t) const override { return "radiance"; }
+  bool is_even() const override { return even_; }
   void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const override;
 
  private:
@@ -32,6 +34,7 @@ class RadianceEstimator final : public SampleEstimator {
   PathContext context_;
   CameraView<double> camera_;
   std::shared_ptr<const FilmRegions> visible_;
+  bool even_;
 };
 
 }  // namespace limn

@@ -28,6 +28,14 @@ const RenderMethod& find_render_method(const std::string& name) {
   throw InputError(unknown_name("method", name, names_of(render_methods())));
 }
 
+bool is_even(const std::string& sampler) {
+  for (const char* name : kRenderSamplers) {
+    if (name == sampler) return name == kRenderSamplers[0];
+  }
+  throw InputError(
+      unknown_name("sampler", sampler, {std::begin(kRenderSamplers), std::end(kRenderSamplers)}));
+}
+
 std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSettings& settings,
                                                 const RenderOptions& options) {
   const RenderMethod& method = find_render_method(options.method);
@@ -49,7 +57,7 @@ std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSet
     visible = std::make_shared<FilmRegions>(scene, settings.threads, settings.interrupted);
   }
   return std::make_unique<RadianceEstimator>(scene, settings.threads, std::move(visible),
-                                             method.closed_light);
+                                             method.closed_light, is_even(options.sampler));
 }
 
 }  // namespace
@@ -60,6 +68,7 @@ RenderResult render(const Scene& scene, const RunSettings& settings, const Rende
   const Stopwatch watch;
   if (settings.store) {
     settings.store->identify("method", options.method);
+    settings.store->identify("sampler", options.sampler);
     settings.store->identify("film", options.exact_film ? "exact" : "rays");
     settings.store->identify(
         "what", fmt::format("{}, {} lines, {:g}, {} rays", static_cast<int>(options.what),

@@ -127,8 +127,7 @@ class PathTracer {
   bool arrive(Walk& walk);
   void set_motion(Walk& walk) const;
   int splits(const SurfacePoint<S>& surface, int copies) const;
-  Rgb<S> emitted(const SurfacePoint<S>& surface, const Vec3d& wo, double pdf,
-                 double distance) const;
+  Rgb<S> emitted(const Walk& walk) const;
   bool survives_roulette(Walk& walk) const;
   // path_rays.h
   bool next_hit(Walk& walk);

@@ -15,6 +15,7 @@ inline bool PathTracer<S, Visitor>::begin_vertex(Walk& walk) {
   walk.scattering.emplace(walk.surface, walk.wi, c_.scene.shading);
   if (walk.scattering->black()) return false;
   set_motion(walk);
+  walk.lights = c_.lights.at(value(walk.surface.p));
   walk.light.reset();
   walk.lit = walk.again;
   if (walk.again) {
@@ -72,7 +73,7 @@ inline bool PathTracer<S, Visitor>::scatter(Walk& walk) {
 template <class S, class Visitor>
 inline bool PathTracer<S, Visitor>::escape(Walk& walk) const {
   if (!c_.scene.environment) return false;
-  auto sight = c_.lights.template environment<S>(walk.wo);
+  auto sight = c_.lights.template environment<S>(walk.lights, walk.wo);
   if (walk.motion) {
     sight.radiance = environment_radiance<S>(*c_.scene.environment, walk.direction);
   }
@@ -96,7 +97,7 @@ inline bool PathTracer<S, Visitor>::arrive(Walk& walk) {
     move_along_edge(walk.surface, face);
   }
   walk.wi = -walk.direction;
-  const Rgb<S> lamp = emitted(walk.surface, walk.wo, walk.pdf, walk.hit.t);
+  const Rgb<S> lamp = emitted(walk);
   if (motion && !motion->warp && !is_black(value(lamp))) {
     radiance += walk.before * walk.scattering->eval(walk.wo) * lamp * (1 / walk.pdf);  // held
   } else {
@@ -131,14 +132,15 @@ inline int PathTracer<S, Visitor>::splits(const SurfacePoint<S>& surface, int co
 }
 
 template <class S, class Visitor>
-inline Rgb<S> PathTracer<S, Visitor>::emitted(const SurfacePoint<S>& surface, const Vec3d& wo,
-                                              double pdf, double distance) const {
-  const Rgb<S> radiance = surface.emission(-wo, c_.scene.shading);
+inline Rgb<S> PathTracer<S, Visitor>::emitted(const Walk& walk) const {
+  const SurfacePoint<S>& surface = walk.surface;
+  const double distance = walk.hit.t;
+  const Rgb<S> radiance = surface.emission(-walk.wo, c_.scene.shading);
   if (is_black(value(radiance))) return radiance;
   // A face around an edge that is met at distance 0 is never drawn by light sampling.
-  const LightView view{wo, distance, surface.n_g};
-  const double other = distance > 0 ? c_.lights.pdf(surface.face.shape, view) : 0;
-  return radiance * mis_weight(pdf, other);
+  const LightView view{walk.wo, distance, surface.n_g};
+  const double other = distance > 0 ? c_.lights.pdf(walk.lights, surface.face.shape, view) : 0;
+  return radiance * mis_weight(walk.pdf, other);
 }
 
 // As in Mitsuba: from rr_depth bounces on, survival with the largest throughput, at most 0.95.

@@ -40,7 +40,8 @@ class PenumbraLines {
   std::optional<SeenLine> seen_from(const Vertex& vertex, const Rng& key, TermCost& cost) const {
     ++cost.samples;
     RayCount rays;
-    Rng rng = key.at(Purpose::kShadow, vertex.bounces);
+    // Not the numbers of the term `shadow` there.
+    Rng rng = key.at(Purpose::kShadow, vertex.bounces).at(Purpose::kDirect, 0);
     const double u = rng.uniform();
     auto drawn = draw(u, rng, rays);
     cost.add(rays);

@@ -6,7 +6,7 @@
 
 #include "integrators/terms/direction_field.h"
 #include "integrators/terms/edge_sides.h"
-#include "limn/core/light.h"
+#include "limn/core/lights.h"
 #include "limn/core/ray_tracer.h"
 #include "limn/core/rng.h"
 #include "limn/core/shading.h"
@@ -57,6 +57,7 @@ struct Walk {
   struct Nothing {};
   std::conditional_t<std::is_same_v<S, Dual>, DirectionMotion, Nothing> field_motion;
 
+  Lights::Place lights;  // the vertex, for them
   // A light that may be seen: all of what it adds but its radiance.
   std::optional<LightSample> light;
   const DirectionMotion* light_motion = nullptr;

@@ -2,9 +2,16 @@
 #include "limn/core/lights.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace limn {
+namespace {
+
+// How often any light is drawn, all alike: what would send most may be hidden.
+constexpr double kAny = 0.25;
+
+}  // namespace
 
 std::optional<LightSample> DeltaLight::sample(const Vec3d& p, double choices, Rng&) const {
   const auto arrival = arriving(p);
@@ -26,22 +33,82 @@ std::optional<LightSample> Environment::sample(const Vec3d&, double choices, Rng
 }
 
 Lights::Lights(const Scene& scene)
-    : of_shape_(scene.shapes.size(), nullptr), environment_(scene.environment.get()) {
+    : of_shape_(scene.shapes.size()), environment_(scene.environment.get()) {
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     if (!scene.shapes[s].is_emitter) continue;
     area_lights_.push_back(make_area_light(scene, ShapeId(s)));
-    of_shape_[s] = area_lights_.back().get();
-    all_.push_back(of_shape_[s]);
+    of_shape_[s] = all_.size();
+    all_.push_back(area_lights_.back().get());
   }
   if (environment_) all_.push_back(environment_);
   for (const auto& light : scene.delta_lights) all_.push_back(light.get());
-  choices_ = static_cast<double>(all_.size());
+  if (all_.size() < 2) return;
+  for (const auto& lamp : area_lights_) reaches_.push_back(reach_of(*lamp));
+  if (environment_) {
+    Reach& reach = reaches_.emplace_back();
+    reach.constant = kPi * std::max(environment_->mean_luminance(), 0.0);
+  }
 }
 
-std::optional<LightSample> Lights::sample(const Vec3d& p, Rng& rng) const {
-  const double choice = rng.uniform() * choices_;
-  const size_t index = std::min(static_cast<size_t>(choice), all_.size() - 1);
-  return all_[index]->sample(p, choices_, rng);
+Lights::Reach Lights::reach_of(const Light& lamp) {
+  std::vector<LightTriangle> triangles;
+  lamp.add_triangles(triangles);
+  Reach reach;
+  double area = 0;
+  for (const LightTriangle& triangle : triangles) {
+    const auto& c = triangle.corners;
+    const Vec3d n = cross(c[1] - c[0], c[2] - c[0]) * 0.5;
+    reach.facing = reach.facing + n;
+    reach.center = reach.center + (c[0] + c[1] + c[2]) * (length(n) / 3);
+    reach.luminance = triangle.luminance;
+    area += length(n);
+  }
+  reach.center = reach.center / area;
+  reach.rest = (area - length(reach.facing)) / 4;
+  reach.spread = area / kPi;
+  return reach;
+}
+
+// What a surface that faces the light would get, if nothing were in the way: exact on the axis of a
+// disk and far from a sphere.
+double Lights::estimate(size_t light, const Vec3d& p) const {
+  if (light >= reaches_.size()) {
+    const auto arrival = all_[light]->delta()->arriving(p);
+    return arrival ? luminance(arrival->irradiance) : 0;
+  }
+  const Reach& reach = reaches_[light];
+  const Vec3d to = p - reach.center;
+  const double squared = length_squared(to);
+  const double shown = std::max(dot(reach.facing, to), 0.0) / std::sqrt(squared + reach.spread);
+  return reach.constant + reach.luminance * (shown + reach.rest) / (squared + reach.spread);
+}
+
+Lights::Place Lights::at(const Vec3d& p) const {
+  Place place{p};
+  if (all_.size() < 2) return place;
+  for (size_t k = 0; k < all_.size(); ++k) place.sum += estimate(k, p);
+  if (!std::isfinite(place.sum)) place.sum = 0;
+  return place;
+}
+
+double Lights::choices(const Place& place, size_t light) const {
+  const auto count = static_cast<double>(all_.size());
+  if (!(place.sum > 0)) return count;
+  return 1 / (kAny / count + (1 - kAny) * estimate(light, place.p) / place.sum);
+}
+
+std::optional<LightSample> Lights::sample(const Place& place, Rng& rng) const {
+  const double u = rng.uniform();
+  const double any = place.sum > 0 ? kAny : 1;
+  const size_t last = all_.size() - 1;
+  size_t light = 0;
+  if (u < any) {
+    light = std::min(static_cast<size_t>(u / any * static_cast<double>(all_.size())), last);
+  } else {
+    double left = (u - any) / (1 - any) * place.sum;
+    while (light < last && (left -= estimate(light, place.p)) >= 0) ++light;
+  }
+  return all_[light]->sample(place.p, choices(place, light), rng);
 }
 
 }  // namespace limn

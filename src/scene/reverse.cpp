@@ -195,7 +195,7 @@ Rgb<Var> Light::drawn_radiance<Var>(const LightSample& sample) const {
 }
 
 template <>
-Environment::Sight<Var> Lights::environment<Var>(const Vec3d& wo) const {
+Environment::Sight<Var> Lights::environment<Var>(const Place& place, const Vec3d& wo) const {
   Environment::Sight<double> sight;
   environment_->look(wo, sight);
   const auto radiance = of_parameters(Tape::current()->slots()->environment, sight.radiance,
@@ -204,7 +204,7 @@ Environment::Sight<Var> Lights::environment<Var>(const Vec3d& wo) const {
                                         seeded.look(wo, of);
                                         return of.radiance;
                                       });
-  return {with_texels(wo, radiance), sight.pdf / choices_};
+  return {with_texels(wo, radiance), sight.pdf / choices(place, area_lights_.size())};
 }
 
 template <>

@@ -56,6 +56,24 @@ TEST_P(Furnace, RadianceIsKnown) {
   EXPECT_GE(z.p_largest, kLevel);
 }
 
+// The same by even numbers: images of other seeds are independent.
+TEST_P(Furnace, RadianceByEvenNumbersIsKnown) {
+  const TempFiles files;
+  const Scene scene = room(files, GetParam().mesh, GetParam().depth, GetParam().roulette);
+  RunSettings settings;
+  settings.spp = 32;
+  Moments images(12);
+  for (settings.seed = 0; settings.seed < 16; ++settings.seed) {
+    images.add_batch(means(render(scene, settings, {.sampler = "padded-sobol"}).radiance), 1);
+  }
+  const ZSummary z =
+      compare_moments(images, std::vector<double>(images.size(), GetParam().radiance()));
+  fmt::print("{:16} {:3} values, mean z {:5.2f}, sd {:4.2f}, max |z| {:5.2f}\n", GetParam().name,
+             z.count, z.mean, z.deviation, z.largest);
+  EXPECT_GT(z.count, 0);
+  EXPECT_GE(z.p_largest, kLevel);
+}
+
 INSTANTIATE_TEST_SUITE_P(, Furnace,
                          testing::Values(Case{"cube", cube_mesh(), -1, 5},
                                          Case{"cube_early", cube_mesh(), -1, 1},

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numeric>
 
 #include "support/scenes.h"
 
@@ -64,8 +65,9 @@ TEST(DeltaLights, ADirectionComesFromInfinity) {
   }
 }
 
-// Every light is equally likely: shapes in their order, the environment, then delta lights.
-TEST(Lights, AreChosenUniformly) {
+// Shapes in their order, the environment, then delta lights; each as often as its density says, which
+// is the one that is asked for.
+TEST(Lights, AreDrawnAsOftenAsTheirDensitiesSay) {
   const TempFiles files;
   const Scene scene = scene_with(
       files, R"(<emitter type="directional"/><emitter type="constant"/><emitter type="point"/>)" +
@@ -74,24 +76,60 @@ TEST(Lights, AreChosenUniformly) {
   ASSERT_EQ(lights.all().size(), 4u);
   EXPECT_EQ(lights.all()[1], scene.environment.get());
   EXPECT_EQ(lights.all()[2], scene.delta_lights[0].get());
-  const Vec3d p{0.3, 1, 0.2};
+  const Lights::Place place = lights.at({0.3, 1, 0.2});
   const int draws = 40000;
   std::vector<int> counts(4);
+  std::vector<double> expected(4);
   Rng rng(4, 5, 6);
   for (int i = 0; i < draws; ++i) {
-    const auto sample = lights.sample(p, rng);
+    const auto sample = lights.sample(place, rng);
     ASSERT_TRUE(sample);
     const auto which = std::ranges::find(lights.all(), sample->light) - lights.all().begin();
     ++counts[which];
     EXPECT_EQ(sample->face.has_value(), which == 0);
     const LightView lamp{sample->wo, sample->distance, Vec3d{0, -1, 0}};
-    const double expected = which == 0   ? lights.pdf(ShapeId(0), lamp)
-                            : which == 1 ? lights.pdf_environment(sample->wo)
-                                         : 0.25;
-    EXPECT_DOUBLE_EQ(sample->pdf, expected);
+    if (which > 1) {
+      expected[which] = sample->pdf;
+    } else {
+      const double pdf = which == 0 ? lights.pdf(place, ShapeId(0), lamp)
+                                    : lights.pdf_environment(place, sample->wo);
+      EXPECT_DOUBLE_EQ(sample->pdf, pdf);
+      expected[which] = pdf / lights.all()[which]->pdf(lamp, 1);
+    }
   }
-  // Binomial, five standard errors.
-  for (const int count : counts) EXPECT_NEAR(count, draws / 4, 5 * std::sqrt(draws * 3 / 16.0));
+  EXPECT_NEAR(std::accumulate(expected.begin(), expected.end(), 0.0), 1, 1e-12);
+  for (int k = 0; k < 4; ++k) {
+    // Binomial, five standard errors.
+    EXPECT_NEAR(counts[k], draws * expected[k],
+                5 * std::sqrt(draws * expected[k] * (1 - expected[k])));
+  }
+}
+
+// By irradiance on a surface that faces them: 1 / d^2 of points, the closed form of a small lamp from
+// its front, nothing from its back. What is expected to send nothing is drawn now and then.
+TEST(Lights, AreDrawnByWhatTheySend) {
+  const TempFiles files;
+  const Scene scene = scene_with(
+      files, R"(<emitter type="point"><point name="position" x="0" y="0" z="0"/></emitter>)" +
+                 square("lamp", 0.01, 90, {0, 3, 0}, area_light("glow", "20, 20, 20")));
+  const Lights lights(scene);
+  const auto chance = [&](double y) {  // of the lamp
+    Rng rng(7, 8, 9);
+    const Lights::Place place = lights.at({0, y, 0});
+    while (true) {
+      const auto sample = lights.sample(place, rng);
+      if (sample && !sample->face) return 1 - sample->pdf;
+    }
+  };
+  const double least = chance(4);
+  EXPECT_GT(least, 0);
+  EXPECT_LT(least, 0.25);
+  const auto expected = [&](double lamp, double point) {
+    return least + (1 - 2 * least) * lamp / (lamp + point);
+  };
+  const double area = 4e-4;
+  EXPECT_NEAR(chance(1), expected(20 * area / 4, 1), 1e-6);
+  EXPECT_NEAR(chance(2), expected(20 * area, 0.25), 1e-5);
 }
 
 TEST(Lights, OfASceneWithoutAnyAreEmpty) {

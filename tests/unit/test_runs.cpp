@@ -7,6 +7,7 @@
 #include "limn/integrators/render.h"
 #include "support/compare_moments.h"
 #include "support/meshes.h"
+#include "support/running_mean.h"
 #include "support/scenes.h"
 
 namespace limn {
@@ -51,6 +52,9 @@ TEST_P(Threads, SameBits) {
   const Scene scene = make_scene(files, small_scene(files));
   expect_same(render(scene, run_settings(4)).radiance,
               render(scene, run_settings(4, GetParam())).radiance);
+  const RenderOptions even{.sampler = "padded-sobol"};
+  expect_same(render(scene, run_settings(4), even).radiance,
+              render(scene, run_settings(4, GetParam()), even).radiance);
   const GradientResult a = run_gradient(scene, run_settings(4));
   const GradientResult b = run_gradient(scene, run_settings(4, GetParam()));
   expect_same(a.radiance, b.radiance);
@@ -68,6 +72,72 @@ TEST_P(Threads, SameBits) {
 }
 
 INSTANTIATE_TEST_SUITE_P(, Threads, testing::Values(2, 7));
+
+// Of 64 samples that follow each other one lies in every box of 1/64, 1/32 by 1/2, ..., 1 by 1/64.
+TEST(EvenNumbers, FillBoxes) {
+  constexpr int kLog = 6, kCount = 1 << kLog;
+  for (const uint32_t first : {0, kCount, 5 * kCount}) {
+    for (int wide = 0; wide <= kLog; ++wide) {
+      std::vector<int> boxes(kCount);
+      for (uint32_t s = first; s < first + kCount; ++s) {
+        Rng rng = Rng::even(1, 2, s).at(Purpose::kBsdf, 3);
+        const auto column = static_cast<int>(rng.uniform() * (1 << wide));
+        const auto row = static_cast<int>(rng.uniform() * (kCount >> wide));
+        ++boxes[(column << (kLog - wide)) + row];
+      }
+      EXPECT_EQ(boxes, std::vector<int>(kCount, 1)) << first << ' ' << wide;
+    }
+  }
+}
+
+// Over pixels, a sample's numbers are those of independent streams: in their means, and by pairs
+// within a purpose, of two purposes, and of two depths.
+TEST(EvenNumbers, AreUniformAndUnrelated) {
+  std::vector<RunningMean> means(6), products(36);
+  for (int pixel = 0; pixel < 20000; ++pixel) {
+    const Rng key = Rng::even(3, pixel, 5);
+    std::vector<double> centered;
+    for (const auto& [purpose, depth] :
+         {std::pair{Purpose::kBsdf, 0}, {Purpose::kEmitter, 0}, {Purpose::kEmitter, 1}}) {
+      Rng rng = key.at(purpose, depth);
+      for (int k = 0; k < 2; ++k) centered.push_back(rng.uniform() - 0.5);
+    }
+    for (int i = 0; i < 6; ++i) {
+      means[i].add(centered[i]);
+      for (int j = 0; j <= i; ++j) products[6 * i + j].add(centered[i] * centered[j]);
+    }
+  }
+  for (int i = 0; i < 6; ++i) {
+    EXPECT_LT(std::fabs(means[i].z_score(0)), 4.5) << i;
+    for (int j = 0; j <= i; ++j) {
+      EXPECT_LT(std::fabs(products[6 * i + j].z_score(i == j ? 1.0 / 12 : 0)), 4.5) << i << j;
+    }
+  }
+}
+
+// Images of other seeds are independent, so that they tell the true error: it is less than half of
+// that of independent samples, and is no more than what batches say.
+TEST(EvenNumbers, MakeImagesWithLessError) {
+  const TempFiles files;
+  const Scene scene = make_scene(files, small_scene(files));
+  RunSettings settings = run_settings(16);
+  Moments images(size_t{3} * scene.film.crop_width * scene.film.crop_height), others = images;
+  double claimed = 0;
+  for (; settings.seed < 11; ++settings.seed) {
+    const Moments even = render(scene, settings, {.sampler = "padded-sobol"}).radiance;
+    images.add_batch(means(even), 1);
+    others.add_batch(means(render(scene, settings).radiance), 1);
+    for (size_t i = 0; i < even.size(); ++i) claimed += even.variance(i);
+  }
+  double true_one = 0, independent = 0;
+  for (size_t i = 0; i < images.size(); ++i) {
+    true_one += images.variance(i) * 64;
+    independent += others.variance(i) * 64;
+  }
+  EXPECT_LT(true_one, 0.5 * independent);
+  EXPECT_LT(true_one, claimed);
+  EXPECT_GE(compare_moments(images, others).p_largest, 1e-5);
+}
 
 TEST(Seeds, Matter) {
   const TempFiles files;

@@ -45,7 +45,7 @@ void record_path(const Scene& scene, const RayTracer& tracer, const Lights& ligh
     const auto surface = surface_on_ray<double>(scene, hit.face, ray.origin, ray.direction);
     const Scattering<double> scattering(surface, -ray.direction, scene.shading);
     if (scattering.black()) return;
-    const auto light = lights.empty() ? std::nullopt : lights.sample(surface.p, rng);
+    const auto light = lights.empty() ? std::nullopt : lights.sample(lights.at(surface.p), rng);
     if (light && light->face != hit.face && !is_black(scattering.eval(light->wo))) {
       Ray shadow{surface.p, light->wo};
       shadow.start = hit.face;

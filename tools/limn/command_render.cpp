@@ -21,6 +21,12 @@ class RenderCommand final : public Command {
     app.add_option("--method", options_.method, "How: " + limn::join(names_of(render_methods())))
         ->capture_default_str();
     add_image_options(app, what_, options_);
+    options_.sampler = kRenderSamplers[0];
+    app.add_option("--sampler", options_.sampler,
+                   "Numbers of a pixel's samples: even (Sobol' points, scrambled), or independent")
+        ->check(CLI::IsMember(
+            std::vector<std::string>(std::begin(kRenderSamplers), std::end(kRenderSamplers))))
+        ->capture_default_str();
     add_film_option(app, film_);
     add_debug_option(app, debug_);
     add_part_option(app, common_);
@@ -65,6 +71,7 @@ class RenderCommand final : public Command {
     auto attributes = provenance(scene, settings, result.spp);
     attributes.push_back({"limn.method", options_.method});
     if (what_ != "image") attributes.push_back({"limn.what", what_});
+    attributes.push_back({"limn.sampler", options_.sampler});
     attributes.push_back({kOutputAttribute, output_name(output_)});
     remove_stale(output_, {output_});
     write_exr(output_, film_channels(scene, image), scene.film.half, attributes);
@@ -80,6 +87,7 @@ class RenderCommand final : public Command {
                                    {"spp", result.spp},
                                    {"method", options_.method},
                                    {"what", what_},
+                                   {"sampler", options_.sampler},
                                    {"seed", settings.seed},
                                    {"threads", settings.threads},
                                    {"seconds", result.seconds},

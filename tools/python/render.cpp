@@ -35,8 +35,9 @@ nb::object to_numpy(const Estimate& e, const nb::object& dtype, const nb::object
 
 Estimate render_scene(const SceneHandle& handle, std::optional<int> spp,
                       std::optional<uint64_t> seed, int threads, const nb::object& progress,
-                      const std::string& method, const std::string& film, BatchStore* store) {
-  const RenderOptions options{method, is_exact(film)};
+                      const std::string& method, const std::string& film,
+                      const std::string& sampler, BatchStore* store) {
+  const RenderOptions options{method, is_exact(film), sampler};
   const auto scene = handle.share();
   RenderResult result;
   run_job(make_settings(*scene, {spp, seed, 0, threads, store}), progress,
@@ -128,17 +129,20 @@ void bind_render(nb::module_& m) {
   m.def(
       "render", render_scene, nb::arg("scene"), nb::arg("spp") = nb::none(),
       nb::arg("seed") = nb::none(), nb::arg("threads") = 0, nb::arg("progress") = nb::none(),
-      nb::arg("method") = "path", nb::arg("film") = "rays", nb::arg("_store").none() = nb::none(),
+      nb::arg("method") = "path", nb::arg("film") = "rays", nb::arg("sampler") = kRenderSamplers[0],
+      nb::arg("_store").none() = nb::none(),
       nb::sig("def render(scene: Scene, spp: int | None = None, seed: int | None = None, threads: "
               "int = 0, progress: collections.abc.Callable[[float], object] | None = None, method: "
-              "str = 'path', film: str = 'rays') -> Estimate"),
+              "str = 'path', film: str = 'rays', sampler: str = 'padded-sobol') -> Estimate"),
       "The image of a scene: linear RGB radiance, (H, W, 3).\n\n"
       "spp, seed: of the scene's file if None. threads: 0 for all cores; they change no bit.\n"
       "progress: called with the fraction done. Ctrl-C raises KeyboardInterrupt; samples that are "
       "not finite raise limn.NonFiniteError.\n"
       "method: \"path\", or \"analytic\": direct light of flat lamps on diffuse surfaces in closed "
       "form. film: \"rays\", or \"exact\": what every pixel sees by its exact visible regions (box "
-      "filter).");
+      "filter).\n"
+      "sampler: \"padded-sobol\", even numbers, with which stderr is an upper bound, or "
+      "\"independent\".");
 }
 
 }  // namespace limn::python

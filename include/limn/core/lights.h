@@ -9,8 +9,9 @@
 
 namespace limn {
 
-// Chooses one light uniformly: every emitting shape is one, in their order, then the environment,
-// then the delta lights in the order of the file. The scene must outlive it.
+// Chooses one light at a point, mostly in proportion to what each would send there if nothing were in
+// the way, now and then any (lights.cpp). Every emitting shape is one, in their order, then the
+// environment, then the delta lights in the order of the file. The scene must outlive it.
 class Lights {
  public:
   explicit Lights(const Scene& scene);
@@ -20,31 +21,54 @@ class Lights {
   bool on_shapes() const { return !area_lights_.empty(); }
   std::span<const Light* const> all() const { return all_; }
 
+  // A point, and what all lights together would send there [W / m^2, of luminance]. What is asked
+  // for often at one point needs it once.
+  struct Place {
+    Vec3d p;
+    double sum = 0;
+  };
+  Place at(const Vec3d& p) const;
+
   // None: a sample of value zero (see Light::sample).
-  std::optional<LightSample> sample(const Vec3d& p, Rng& rng) const;
-  // The density [1/sr] with which `sample` draws what a ray sees: an emitting shape, or, where it
-  // leaves the scene, the environment (there must be one).
-  double pdf(ShapeId shape, const LightView& view) const {
-    return of_shape_[shape.index()]->pdf(view, choices_);
+  std::optional<LightSample> sample(const Place& place, Rng& rng) const;
+  // The density [1/sr] with which `sample` draws what a ray from there sees: an emitting shape, or,
+  // where it leaves the scene, the environment (there must be one).
+  double pdf(const Place& place, ShapeId shape, const LightView& view) const {
+    const size_t light = of_shape_[shape.index()];
+    return all_[light]->pdf(view, choices(place, light));
   }
-  double pdf_environment(const Vec3d& wo) const {
-    return environment_->pdf_solid_angle(wo) / choices_;
+  double pdf_environment(const Place& place, const Vec3d& wo) const {
+    return environment_->pdf_solid_angle(wo) / choices(place, area_lights_.size());
   }
   // With the radiance that a ray along the held direction wo sees there.
   template <class S>
-  Environment::Sight<S> environment(const Vec3d& wo) const {
+  Environment::Sight<S> environment(const Place& place, const Vec3d& wo) const {
     Environment::Sight<S> sight;
     environment_->look(wo, sight);
-    sight.pdf /= choices_;
+    sight.pdf /= choices(place, area_lights_.size());
     return sight;
   }
 
  private:
+  // What an estimate of a light's irradiance takes.
+  struct Reach {
+    Vec3d center;          // of its area
+    Vec3d facing;          // sum of its faces' normals times their areas
+    double rest = 0;       // a quarter of the area that this leaves: what all sides see of it
+    double spread = 0;     // its area over pi, so that nothing is infinite near it
+    double luminance = 0;  // of its radiance
+    double constant = 0;   // irradiance, alike everywhere
+  };
+  static Reach reach_of(const Light& lamp);
+  double estimate(size_t light, const Vec3d& p) const;
+  // One over the probability of a light.
+  double choices(const Place& place, size_t light) const;
+
   std::vector<std::unique_ptr<Light>> area_lights_;
   std::vector<const Light*> all_;
-  std::vector<const Light*> of_shape_;  // null where a shape emits nothing
-  const Environment* environment_;      // null if none
-  double choices_;                      // how many there are
+  std::vector<Reach> reaches_;      // of all but delta lights
+  std::vector<size_t> of_shape_;    // which light it is; any number where a shape emits nothing
+  const Environment* environment_;  // null if none
 };
 
 }  // namespace limn

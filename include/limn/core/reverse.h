@@ -19,7 +19,7 @@ SurfacePoint<Var> surface_on_ray<Var>(const Scene& scene, FaceRef face, const Ve
 template <>
 Rgb<Var> Light::drawn_radiance<Var>(const LightSample& sample) const;
 template <>
-Environment::Sight<Var> Lights::environment<Var>(const Vec3d& wo) const;
+Environment::Sight<Var> Lights::environment<Var>(const Place& place, const Vec3d& wo) const;
 
 // Radiance from the environment along a direction that may move.
 template <class S>

@@ -40,23 +40,45 @@ class Rng {
   Rng(uint64_t seed, uint64_t pixel, uint64_t sample)
       : key_(mix_bits(mix_bits(mix_bits(seed + kGolden) + pixel + kGolden) + sample + kGolden)),
         state_(key_) {}
+  // The same of a pixel's samples that fill their ranges evenly together: for every purpose and
+  // depth, sample n takes the n-th of the Sobol' points of a pixel, scrambled by chance (rng.cpp).
+  // Any one sample is as random as that of another stream; several are not independent.
+  static Rng even(uint64_t seed, uint64_t pixel, uint32_t sample) {
+    Rng rng(mix_bits(mix_bits(seed + kGolden) + pixel + kGolden));
+    rng.sample_ = sample;
+    rng.dimension_ = 0;
+    return rng;
+  }
 
   Rng at(Purpose purpose, uint64_t depth) const {
-    return Rng(mix_bits(key_ + kGolden * (1 + static_cast<uint64_t>(purpose) + 64 * depth)));
+    Rng rng(mix_bits(key_ + kGolden * (1 + static_cast<uint64_t>(purpose) + 64 * depth)));
+    rng.sample_ = sample_;
+    rng.dimension_ = dimension_ < 0 ? -1 : 0;
+    return rng;
   }
   // The stream of one of several samples of the same kind; the first is this one itself.
   Rng copy(Purpose purpose, int index) const { return index == 0 ? *this : at(purpose, index); }
-  // Uniform in [0, 1), 53 bits.
+  // Uniform in [0, 1): 53 bits; 32 of what is even.
   double uniform() {
-    state_ += kGolden;
-    return static_cast<double>(mix_bits(state_) >> 11) * 0x1.0p-53;
+    if (dimension_ >= 0) return even_uniform();
+    return static_cast<double>(next() >> 11) * 0x1.0p-53;
   }
 
  private:
   explicit Rng(uint64_t key) : key_(key), state_(key) {}
+  uint64_t next() {
+    state_ += kGolden;
+    return mix_bits(state_);
+  }
+  double even_uniform();
+
   static constexpr uint64_t kGolden = 0x9e3779b97f4a7c15ull;
   uint64_t key_;
   uint64_t state_;
+  // Of even streams alone.
+  uint32_t sample_ = 0;
+  uint32_t place_ = 0;  // of the sample among the points of these dimensions
+  int dimension_ = -1;  // the next; -1 for independent numbers
 };
 
 }  // namespace limn

@@ -39,6 +39,9 @@ enum class RenderWhat {
   kOpenness
 };
 
+// Where the random numbers of a pixel's samples come from, by Mitsuba's and pbrt's names.
+inline constexpr const char* kRenderSamplers[] = {"padded-sobol", "independent"};
+
 struct RenderOptions {
   std::string method = "path";  // InputError for others than render_methods()
   // Paths start at points of the visible regions of every pixel, which are found once, exactly
@@ -52,6 +55,10 @@ struct RenderOptions {
   int lines = 64;
   double tolerance = 0;
   int rays = 4;  // rays: of each point, and each lamp
+  // InputError for others than kRenderSamplers. Scrambled Sobol' points fill a pixel's ranges
+  // evenly: a third of the squared error, mostly; but `radiance` then has variances that are too
+  // large, as batches are not independent.
+  std::string sampler = "independent";
 };
 
 RenderResult render(const Scene& scene, const RunSettings& settings,
