@@ -14,9 +14,9 @@
 #include "integrators/backward/path_adjoint.h"
 #include "integrators/backward/pixel_choice.h"
 #include "integrators/estimates/batch_record.h"
+#include "integrators/methods/hair_gaps.h"
 #include "integrators/methods/selection.h"
 #include "integrators/terms/term.h"
-#include "integrators/terms/viewpoint.h"
 #include "limn/core/error.h"
 #include "limn/core/names.h"
 #include "limn/core/parallel.h"
@@ -120,7 +120,8 @@ class BackwardPass {
         parameters_(scene, options.parameters),
         tracer_(make_embree_tracer(parameters_.scene(), settings.threads)),
         lights_(parameters_.scene()),
-        path_{parameters_.scene(), *tracer_, lights_},
+        viewpoints_(parameters_.scene()),
+        path_{parameters_.scene(), *tracer_, lights_, nullptr, &viewpoints_},
         input_(path_, 3, {1, 1, 1, 1}, edge_sampler_type(options.sampler), settings.threads),
         context_{path_, parameters_, input_.edges(),
                  EdgeMotion(parameters_.slots(), input_.edges())} {
@@ -176,6 +177,7 @@ class BackwardPass {
   ParameterSlots parameters_;
   std::unique_ptr<RayTracer> tracer_;
   Lights lights_;
+  Viewpoints viewpoints_;
   PathContext path_;
   TermInput input_;
   AdjointContext context_;
@@ -236,7 +238,7 @@ void BackwardPass::select() {
         "shading 'mitsuba' is discontinuous where no edge is: the derivative of interpolated "
         "normals is incomplete");
   }
-  warn_of_faces_edge_on(parameters_.scene(), result_.warnings);
+  warn_of_faces_edge_on(parameters_.scene(), viewpoints_, result_.warnings);
   for (const Parameter& p : parameters_.parameters()) {
     result_.parameters.push_back(
         {p.name, p.unit, p.shape(), Moments(p.numbers(), options_.keep_batches)});
@@ -468,6 +470,10 @@ void BackwardPass::finish() {
   }
   result_.non_finite = all_.bad;
   result_.tape_bytes = all_.tape_bytes;
+  if (result_.spp > 0) {
+    warn_of_hair_gaps(parameters_.scene(), static_cast<double>(result_.spp), settings_.threads,
+                      result_.warnings);
+  }
   result_.seconds = watch_.seconds();
 }
 

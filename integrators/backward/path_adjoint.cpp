@@ -137,7 +137,8 @@ void VertexAdjoints::add_shadow(const AdjointVertex& vertex, Rng rng) {
     ++cost.zero_weight;
     return;
   }
-  if (is_hidden_from(context_.path, vertex, point->face, omega, distance, cost)) {
+  const Vec3d inside = point->inside - q;
+  if (is_hidden_from(context_.path, vertex, point->face, normalize(inside), length(inside), cost)) {
     ++cost.occluded;
     return;
   }

@@ -129,6 +129,7 @@ class TermJob {
     check_memory(passes_);
     GradientResult result = empty_result();
     for (size_t p = 0; p < passes_.size(); ++p) pass(p).describe(result.stats);
+    warn_of_faces_edge_on(scene_, pass(0).viewpoints(), result.warnings);
     plan(settings, watch, result);
     if (settings.store) identify_plan(result.terms, *settings.store);
     result.setup_seconds = watch.seconds();

@@ -64,7 +64,6 @@ ShadowEdges::ShadowEdges(const PathContext& context, const EdgeSamplerInput& inp
   const Stopwatch watch;
   reach_ = 2 * bounds_of(context_.scene).diagonal();
   for (uint32_t i = 0; i < context_.scene.delta_lights.size(); ++i) {
-    viewpoints_.emplace_back(context_.scene, context_.scene.delta_lights[i]->origin());
     const size_t first = edges_.size();
     for (uint32_t o = 0; o < input_.objects.size(); ++o) list(i, ShapeId(o));
     weigh(first, lanes);
@@ -78,7 +77,7 @@ void ShadowEdges::list(uint32_t light, ShapeId object) {
   const LightOrigin origin = of.origin();
   for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
     ShadowEdge edge{&of, light, {object, EdgeId(e)}, 0, 0, {}};
-    edge.sign = lit_side(context_.scene, mesh, edge.id.edge, viewpoints_[light]);
+    edge.sign = lit_side(context_.scene, mesh, edge.id.edge, context_.viewpoints->lights[light]);
     if (edge.sign == 0) continue;
     const auto& ends = mesh.edge(edge.id.edge).vertices;
     const Vec3<Dual> y[2] = {moving_vertex(mesh, ends[0]), moving_vertex(mesh, ends[1])};
@@ -138,7 +137,9 @@ std::optional<ShadowPoint> ShadowEdges::cast(const ShadowEdge& edge, double t,
   const LightOrigin origin = edge.light->origin();
   const Vec3d w = origin.through(y);
   const FacesAround around = mesh.around(edge.id.edge);
-  const Vec3d seen = viewpoints_[edge.viewpoint].seeing(around, y).through(y);
+  const Viewpoint& viewpoint = context_.viewpoints->lights[edge.viewpoint];
+  const bool edge_on = viewpoint.sees_edge_on(around);
+  const Vec3d seen = (edge_on ? viewpoint.seeing(around, y) : viewpoint.hardly_aside(y)).through(y);
   const double length_seen = length(seen);
   const double before = origin.infinite ? reach_ : length_seen;  // of the ray, up to y
   Ray ray{y - seen * (before / length_seen), seen / length_seen};
@@ -155,7 +156,7 @@ std::optional<ShadowPoint> ShadowEdges::cast(const ShadowEdge& edge, double t,
   const double s = dot(n, c[0] - y) / slope;
   const double m = (origin.infinite ? 1 : 1 + s) / std::fabs(slope);
   if (!std::isfinite(m)) return {};
-  return ShadowPoint{hit.face, y + w * s, m};
+  return ShadowPoint{hit.face, y + w * s, m, ray.origin + ray.direction * hit.t};
 }
 
 Rgb<double> ShadowEdges::jump(const ShadowEdge& edge, const ShadowPoint& point, const Vec3d& q,

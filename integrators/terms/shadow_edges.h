@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "integrators/terms/path.h"
-#include "integrators/terms/viewpoint.h"
 #include "limn/core/discrete_distribution.h"
 #include "limn/edgetree/edge_sampler.h"
 
@@ -25,7 +24,8 @@ struct ShadowEdge {
 struct ShadowPoint {
   FaceRef face;
   Vec3d x;
-  double m;  // see above
+  double m;      // see above
+  Vec3d inside;  // a point of the face that is hardly aside of x, where rays tell whether x is seen
 };
 
 // Of an edge mesh, with its tangents.
@@ -53,8 +53,7 @@ class ShadowEdges {
 
   const PathContext& context_;
   const EdgeSamplerInput& input_;
-  std::vector<Viewpoint> viewpoints_;  // of the delta lights
-  double reach_ = 0;                   // longer than any line through the scene
+  double reach_ = 0;  // longer than any line through the scene
   std::vector<ShadowEdge> edges_;
   DiscreteDistribution choice_;  // of an edge
   double list_seconds_ = 0;
