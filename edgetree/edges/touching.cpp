@@ -43,7 +43,7 @@ class Unifier {
     find_speeds();
   }
 
-  void unite(const Contacts& found) {
+  std::vector<ContactLine> unite(const Contacts& found) {
     const std::span<const Contact> contacts = found.contacts;
     for (size_t begin = 0, end; begin < contacts.size(); begin = end) {
       const EdgeRef id = contacts[begin].edge;
@@ -56,6 +56,14 @@ class Unifier {
       if (parts != parts_.end() || !near.empty())
         rewrite(o, parts != parts_.end() ? parts->second : std::vector<Part>{}, near);
     }
+    for (ContactLine& line : lines_) {
+      for (const NearFace& near : of_object(found.near, line.edge.object.index())) {
+        const auto begin = line.faces.begin(), end = line.faces.end();
+        if (near.edge == line.edge && std::find(begin, end, near.face) == end)
+          line.near.push_back(near.face);
+      }
+    }
+    return std::move(lines_);
   }
 
  private:
@@ -191,7 +199,7 @@ class Unifier {
   }
 
   // False if the part is no edge, or another one stands for it.
-  bool unite_part(EdgeRef id, std::vector<Neighbour>& around, Part& part) const {
+  bool unite_part(EdgeRef id, std::vector<Neighbour>& around, Part& part) {
     // In an order that all edges in this place agree on.
     std::sort(around.begin(), around.end(), [](const Neighbour& a, const Neighbour& b) {
       return std::tuple(a.face.shape, a.face.face) < std::tuple(b.face.shape, b.face.face);
@@ -205,6 +213,12 @@ class Unifier {
     mark_planes(id, around);
     if (std::none_of(around.begin(), around.end(), [&](const auto& n) { return n.rim == rim; }))
       return false;
+    if (const Neighbour* standing = find_standing(around)) {
+      const EdgeMesh& mesh = objects_[id.object.index()];
+      const auto [a, b] = part.edge.vertices;
+      lines_.push_back(contact_line(id, {mesh.position(a), mesh.position(b)}, *standing, around));
+      return false;
+    }
     part.edge.rim = rim;
     part.edge.edge_class = EdgeClass::kIrregular;
     part.edge.concave = false;
@@ -220,6 +234,49 @@ class Unifier {
     const bool has_second = around[1].face.shape == id.object;
     part.edge.faces[1] = has_second ? around[1].face.face : FaceId::none();
     return true;
+  }
+
+  // The one of the edge's own faces that stands on all others in one plane, if these come towards
+  // it or leave it.
+  const Neighbour* find_standing(const std::vector<Neighbour>& around) const {
+    const auto parallel = [&](const Neighbour& a, const Neighbour& b) {
+      return length(cross(plane(a.face).n, plane(b.face).n)) <= 0x1.0p-12;  // as agree()
+    };
+    const auto under =
+        std::find_if(around.begin(), around.end(), [](const auto& n) { return !n.own; });
+    const Neighbour *standing = nullptr, *own = nullptr;
+    for (const Neighbour& n : around) {
+      if (!n.own && (n.rim != kNoRim || !parallel(n, *under))) return nullptr;
+      if (!n.own) continue;
+      own = &n;
+      if (parallel(n, *under)) continue;
+      if (standing) return nullptr;
+      standing = &n;
+    }
+    if (!standing) return nullptr;
+    const Vec3d& normal = plane(under->face).n;
+    for (int end = 0; end < 2; ++end) {
+      const Lanes apart = dot(own->velocity[end] - under->velocity[end], normal);
+      for (int i = 0; i < kLanes; ++i)
+        if (std::fabs(apart[i]) > 0x1.0p-20 * speeds_[i] + own->slack[i] + under->slack[i])
+          return standing;
+    }
+    return nullptr;
+  }
+
+  static ContactLine contact_line(EdgeRef id, const std::array<Vec3d, 2>& ends,
+                                  const Neighbour& standing, const std::vector<Neighbour>& around) {
+    ContactLine line{id, ends, {}, {}};
+    const auto add = [&](const Neighbour& n) {
+      line.faces.push_back(n.face);
+      line.incidences.push_back({!n.along.valid(), n.own ? uint8_t{0} : kNoRim});
+    };
+    add(standing);
+    for (const Neighbour& n : around)
+      if (!n.own) add(n);
+    for (const Neighbour& n : around)
+      if (n.own && &n != &standing) add(n);
+    return line;
   }
 
   static size_t rank(const Neighbour& n, EdgeRef id, std::span<const FaceRef> faces) {
@@ -387,17 +444,20 @@ class Unifier {
   const std::vector<EdgeMesh> before_;
   Lanes speeds_;                                 // the largest component of a velocity
   std::map<uint32_t, std::vector<Part>> parts_;  // by object
+  std::vector<ContactLine> lines_;
   std::map<std::tuple<ShapeId, EdgeId, double>, VertexId> cuts_;
 };
 
 }  // namespace
 
-void unite_touching_edges(std::span<const TouchingShape> shapes, std::span<const FacePair> pairs,
-                          const Vec3d& viewer, int threads, std::vector<EdgeMesh>& objects) {
+std::vector<ContactLine> unite_touching_edges(std::span<const TouchingShape> shapes,
+                                              std::span<const FacePair> pairs, const Vec3d& viewer,
+                                              int threads, std::vector<EdgeMesh>& objects) {
   std::vector<const Mesh*> meshes;
   for (const TouchingShape& shape : shapes) meshes.push_back(shape.mesh);
   const Contacts found = find_contacts(objects, meshes, pairs, viewer, threads);
-  if (!found.contacts.empty() || !found.near.empty()) Unifier(shapes, objects).unite(found);
+  if (found.contacts.empty() && found.near.empty()) return {};
+  return Unifier(shapes, objects).unite(found);
 }
 
 }  // namespace limn

@@ -16,6 +16,7 @@
 #include "integrators/estimates/batch_record.h"
 #include "integrators/methods/hair_gaps.h"
 #include "integrators/methods/selection.h"
+#include "integrators/terms/scene_edges.h"
 #include "integrators/terms/term.h"
 #include "limn/core/error.h"
 #include "limn/core/names.h"
@@ -238,6 +239,7 @@ void BackwardPass::select() {
         "shading 'mitsuba' is discontinuous where no edge is: the derivative of interpolated "
         "normals is incomplete");
   }
+  warn_of_contacts(parameters_.scene(), input_.made_edges(), result_.warnings);
   warn_of_faces_edge_on(parameters_.scene(), viewpoints_, result_.warnings);
   for (const Parameter& p : parameters_.parameters()) {
     result_.parameters.push_back(

@@ -137,8 +137,8 @@ void VertexAdjoints::add_shadow(const AdjointVertex& vertex, Rng rng) {
     ++cost.zero_weight;
     return;
   }
-  const Vec3d inside = point->inside - q;
-  if (is_hidden_from(context_.path, vertex, point->face, normalize(inside), length(inside), cost)) {
+  const Vec3d way = point->target(q) - q;
+  if (is_hidden_from(context_.path, vertex, point->face, normalize(way), length(way), cost)) {
     ++cost.occluded;
     return;
   }

@@ -45,6 +45,7 @@ class TermEstimator final : public SampleEstimator {
   // What samples of a slot cost, see Term::work.
   double work(size_t slot, const TermCost& cost) const;
   void describe(GradientStats& stats) const;
+  const EdgeSamplerInput* edges() const { return input_.made_edges(); }
   const Viewpoints& viewpoints() const { return viewpoints_; }
   const MotionRates& motion_rates() const { return rates_; }
   // Whether a slot's samples belong to pixels, not to the film.

@@ -2,6 +2,8 @@
 #include "integrators/terms/shadow_edges.h"
 
 #include <algorithm>
+#include <array>
+#include <limits>
 
 #include "integrators/terms/near_faces.h"
 
@@ -48,6 +50,16 @@ double lit_side(const Scene& scene, const EdgeMesh& edges, EdgeId edge,
     }
   });
   return blocked[0] == blocked[1] ? 0 : blocked[0] ? 1 : -1;
+}
+
+// The distance from a point of a face to the nearest line of its sides.
+double depth_of(const std::array<Vec3d, 3>& corners, const Vec3d& x) {
+  double least = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < 3; ++k) {
+    const Vec3d side = corners[(k + 1) % 3] - corners[k];
+    least = std::min(least, length(cross(side, x - corners[k])) / length(side));
+  }
+  return least;
 }
 
 }  // namespace
@@ -156,7 +168,10 @@ std::optional<ShadowPoint> ShadowEdges::cast(const ShadowEdge& edge, double t,
   const double s = dot(n, c[0] - y) / slope;
   const double m = (origin.infinite ? 1 : 1 + s) / std::fabs(slope);
   if (!std::isfinite(m)) return {};
-  return ShadowPoint{hit.face, y + w * s, m, ray.origin + ray.direction * hit.t};
+  const Vec3d inside = ray.origin + ray.direction * hit.t;
+  const Vec3d center = (c[0] + c[1] + c[2]) * (1.0 / 3);
+  return ShadowPoint{hit.face, y + w * s,          m, inside, depth_of(c, inside),
+                     center,   depth_of(c, center)};
 }
 
 Rgb<double> ShadowEdges::jump(const ShadowEdge& edge, const ShadowPoint& point, const Vec3d& q,

@@ -1,6 +1,7 @@
 #pragma once
 // Edges that part light from shadow, as lights without extent see them, and where their shadows
 // fall. The formulas stand in shadow_boundary.cpp.
+#include <algorithm>
 #include <optional>
 #include <vector>
 
@@ -24,8 +25,21 @@ struct ShadowEdge {
 struct ShadowPoint {
   FaceRef face;
   Vec3d x;
-  double m;      // see above
-  Vec3d inside;  // a point of the face that is hardly aside of x, where rays tell whether x is seen
+  double m;  // see above
+  // A point of the face hardly aside of x, how far it is from the nearest side, and the same of the
+  // face's center.
+  Vec3d inside;
+  double depth;
+  Vec3d center;
+  double center_depth;
+
+  // Where a viewer at q sends a ray to learn whether x is seen: on the face, and off its sides by
+  // more than a ray ends before it, so that a neighbour at whose edge x lies may hide it.
+  Vec3d target(const Vec3d& q) const {
+    const double wanted = 0x1p-17 * length(inside - q);
+    return depth >= wanted ? inside
+                           : inside + (center - inside) * std::min(1.0, wanted / center_depth);
+  }
 };
 
 // Of an edge mesh, with its tangents.

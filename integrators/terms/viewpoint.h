@@ -34,7 +34,7 @@ class Viewpoint {
   // distance of y, a point of the edge; at infinity by 2^-12 rad.
   LightOrigin seeing(const FacesAround& around, const Vec3d& y) const;
   // Where light is looked for from y, a point beside an edge, and where shadows of y are cast from,
-  // if the edge is that of no face seen edge-on: as little aside as floats can tell, by 2^-16 of
+  // if the edge is that of no face seen edge-on: as little aside as floats can tell, by 2^-15 of
   // the distance. So wherever a shadow ends along an edge of what it falls on, all terms have it
   // end on the same side.
   LightOrigin hardly_aside(const Vec3d& y) const;

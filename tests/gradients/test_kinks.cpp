@@ -1,5 +1,5 @@
 // Viewpoints where the derivative has a kink: the camera or a light in the plane of a face, shadows
-// that end along an edge. What is computed is the derivative a step aside.
+// that end along an edge, things that stand on others. What is computed is the derivative a step aside.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -268,6 +268,87 @@ TEST_P(ShadowsAlongEdges, InReverse) {
 }
 
 INSTANTIATE_TEST_SUITE_P(, ShadowsAlongEdges, testing::ValuesIn(along_edge_cases()),
+                         [](const auto& c) { return c.param.name; });
+
+// A thing that stands on a floor ends where it touches it. Pressed together or drawn apart they have
+// one slope and another; what is computed is the one of things pressed together, as they are where
+// the thing stands a little deeper.
+struct Standing {
+  std::string name;
+  std::function<std::string(const TempFiles&)> mesh;  // its file; its lowest points are at 0
+  std::string light;
+  bool mirrored = false;  // the floor is glossy
+};
+
+std::vector<Standing> standing_cases() {
+  const auto cube = [](const TempFiles& files) {
+    Mesh mesh = cube_mesh();
+    for (Vec3f& x : mesh.positions) x.y += 1;
+    return write_mesh(files, "thing.obj", mesh);
+  };
+  const auto roof = [](const TempFiles& files) {  // with slanted sides
+    return write_mesh(
+        files, "thing.obj",
+        make_mesh({{-1, 0, -1}, {1, 0, -1}, {1, 0, 1}, {-1, 0, 1}, {0.2f, 2, 0}},
+                  {{0, 1, 2}, {0, 2, 3}, {1, 0, 4}, {2, 1, 4}, {3, 2, 4}, {0, 3, 4}}));
+  };
+  const auto screen = [](const TempFiles& files) {  // one sheet
+    return write_mesh(files, "thing.obj",
+                      make_mesh({{-1, 0, 0.3f}, {1, 0, -0.3f}, {1, 2, -0.3f}, {-1, 2, 0.3f}},
+                                {{0, 1, 2}, {0, 2, 3}}));
+  };
+  const std::string sky = constant_light("sky", "0.4, 0.5, 0.7");
+  const std::string lamp = square("lamp", 0.5, 90, {0.9, 2.6, 1.5}, area_light("glow", "6, 5, 4"));
+  return {{"BoxUnderSun", cube, sun({0.3, -1, -0.2})},
+          {"BoxUnderLamp", cube, lamp},
+          {"BoxOnGloss", cube, sky, true},
+          {"RoofUnderSky", roof, sky},
+          {"ScreenUnderBulb", screen, bulb({0.7, 2, 1.6})}};
+}
+
+class StandsOnAFloor : public testing::TestWithParam<Standing> {
+ protected:
+  // depth: of the thing's lowest points under the floor.
+  Scene scene(double depth) const {
+    const TempFiles files;
+    const Standing& c = GetParam();
+    SceneParts parts;
+    parts.origin = {0.6, 1.8, 3.4};
+    parts.target = {0, 0.3, 0};
+    parts.body =
+        c.light +
+        obj_shape("thing", c.mesh(files), true, 0.4, {0, -depth, 0},
+                  "<bsdf type=\"twosided\">" + diffuse("clay", "0.5, 0.5, 0.5") + "</bsdf>") +
+        square("floor", 2, -90, {0, 0, 0},
+               c.mirrored ? conductor("gloss", 0.3) : diffuse("chalk", "0.8, 0.8, 0.8"));
+    return make_scene(files, parts);
+  }
+  const std::vector<std::string> parameters_{"thing.translate.y", "thing.rotate.z",
+                                             "floor.translate.y", "thing.translate.x"};
+};
+
+TEST_P(StandsOnAFloor, AsIfPressed) {
+  const GradientResult at = run_blocks(scene(0), parameters_, 96, 1);
+  const GradientResult pressed = run_blocks(scene(1e-4), parameters_, 96, 2);
+  for (size_t p = 0; p < parameters_.size(); ++p)
+    expect_equal(at.parameters[p], pressed.parameters[p]);
+  EXPECT_NE(at.warnings.at(0).find("\"thing\" stands on \"floor\""), std::string::npos);
+}
+
+TEST_P(StandsOnAFloor, InReverse) {
+  BackwardOptions options;
+  options.parameters = {"thing.translate.y"};
+  RunSettings settings;
+  settings.spp = 64;
+  settings.threads = 1;
+  for (const ReverseCheck& c : check_reverse(scene(0), options, settings)) {
+    fmt::print("{}: {:g} +- {:.2g}, {:g} +- {:.2g}\n", c.parameter, c.forward, c.forward_error,
+               c.reverse, c.reverse_error);
+    EXPECT_GT(normal_p_value(c.z), kLevel / 20);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(, StandsOnAFloor, testing::ValuesIn(standing_cases()),
                          [](const auto& c) { return c.param.name; });
 
 }  // namespace

@@ -149,6 +149,31 @@ TEST(HairGaps, AreWarnedOf) {
   EXPECT_TRUE(warnings(0, 64).empty());
 }
 
+// The same as one mesh, with any number of threads; and a mesh without gaps, whose faces all touch.
+TEST(HairGaps, AreWarnedOfWithinAShape) {
+  const TempFiles files;
+  Mesh both = cube_mesh();
+  const auto count = static_cast<uint32_t>(both.positions.size());
+  const Mesh cube = both;
+  for (const Vec3f& x : cube.positions) both.positions.push_back({x.x + 2 + 1e-4f, x.y, x.z});
+  for (const FaceIndices& f : cube.faces)
+    both.faces.push_back({f[0] + count, f[1] + count, f[2] + count});
+  const auto warnings = [&](const Mesh& mesh, int threads) {
+    SceneParts parts;
+    parts.body = obj_shape("pair", write_mesh(files, "pair.obj", mesh), true, 0.5, {},
+                           diffuse("chalk", "0.8, 0.8, 0.8"));
+    std::vector<std::string> lines;
+    warn_of_hair_gaps(make_scene(files, parts), 64, threads, lines);
+    return lines;
+  };
+  const auto found = warnings(both, 1);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_NE(found[0].find("\"pair\" has a gap of 5e-05 between its own faces"), std::string::npos)
+      << found[0];
+  EXPECT_EQ(warnings(both, 3), found);
+  EXPECT_TRUE(warnings(cube, 1).empty());
+}
+
 // Counts over many runs with a defect, of those whose stated power covers it.
 class PlantedRuns {
  public:
