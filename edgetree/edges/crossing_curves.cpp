@@ -274,6 +274,7 @@ EdgeMesh crossing_edges(std::span<const Mesh* const> meshes,
   if (near) result.near_offsets.assign(segments.size() + 1, 0);
   for (const ContactLine& line : contacts) {
     append_line(meshes, {{line.faces[0], line.faces[1]}, line.ends}, moves, result);
+    result.edges.back().rim = line.rim;
     append(result.incident_faces, line.faces);
     append(result.incidences, line.incidences);
     end_faces();

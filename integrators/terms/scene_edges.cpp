@@ -69,11 +69,11 @@ void warn_of_contacts(const Scene& scene, const EdgeSamplerInput* edges,
   for (uint32_t e = 0; e < lines.edges.size(); ++e) {
     const FacesAround around = lines.around(EdgeId(e));
     if (around.incidence(0).through) continue;  // they cross
-    pairs.insert({around.faces[0].shape, around.faces[1].shape});
+    pairs.insert(std::minmax(around.faces[0].shape, around.faces[1].shape));
   }
   for (const auto& shapes : pairs) {
     const std::string text = fmt::format(
-        "{} stands on {}, and one moves towards the other or away from it: the derivative is that "
+        "{} and {} touch, and one moves towards the other or away from it: the derivative is that "
         "of pressing them together; apart, light comes in between, and the slope is another one "
         "(differences take the mean of both)",
         name_in_text(scene, shapes.first), name_in_text(scene, shapes.second));

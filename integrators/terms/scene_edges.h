@@ -13,8 +13,8 @@ namespace limn {
 // on `threads`.
 EdgeSamplerInput make_sampler_input(const Scene& scene, int threads);
 
-// One for each pair of shapes of which one stands on the other and comes towards it or leaves it
-// (ContactLine); none twice. edges: of the scene, in motion; null: none.
+// One for each pair of shapes that touch and move towards each other or apart (ContactLine); none
+// twice. edges: of the scene, in motion; null: none.
 void warn_of_contacts(const Scene& scene, const EdgeSamplerInput* edges,
                       std::vector<std::string>& warnings);
 

@@ -277,7 +277,7 @@ struct Standing {
   std::string name;
   std::function<std::string(const TempFiles&)> mesh;  // its file; its lowest points are at 0
   std::string light;
-  bool mirrored = false;  // the floor is glossy
+  enum { kMatt, kGlossy, kBox } floor = kMatt;  // kBox: of the same width as the thing
 };
 
 std::vector<Standing> standing_cases() {
@@ -301,7 +301,8 @@ std::vector<Standing> standing_cases() {
   const std::string lamp = square("lamp", 0.5, 90, {0.9, 2.6, 1.5}, area_light("glow", "6, 5, 4"));
   return {{"BoxUnderSun", cube, sun({0.3, -1, -0.2})},
           {"BoxUnderLamp", cube, lamp},
-          {"BoxOnGloss", cube, sky, true},
+          {"BoxOnGloss", cube, sky, Standing::kGlossy},
+          {"BoxOnBox", cube, sun({0.3, -1, -0.45}), Standing::kBox},
           {"RoofUnderSky", roof, sky},
           {"ScreenUnderBulb", screen, bulb({0.7, 2, 1.6})}};
 }
@@ -319,8 +320,12 @@ class StandsOnAFloor : public testing::TestWithParam<Standing> {
         c.light +
         obj_shape("thing", c.mesh(files), true, 0.4, {0, -depth, 0},
                   "<bsdf type=\"twosided\">" + diffuse("clay", "0.5, 0.5, 0.5") + "</bsdf>") +
-        square("floor", 2, -90, {0, 0, 0},
-               c.mirrored ? conductor("gloss", 0.3) : diffuse("chalk", "0.8, 0.8, 0.8"));
+        (c.floor == Standing::kBox
+             ? obj_shape("floor", write_mesh(files, "floor.obj", cube_mesh()), true, 0.4,
+                         {0, -0.4, 0}, diffuse("chalk", "0.8, 0.8, 0.8"))
+             : square("floor", 2, -90, {0, 0, 0},
+                      c.floor == Standing::kGlossy ? conductor("gloss", 0.3)
+                                                   : diffuse("chalk", "0.8, 0.8, 0.8")));
     return make_scene(files, parts);
   }
   const std::vector<std::string> parameters_{"thing.translate.y", "thing.rotate.z",
@@ -332,7 +337,7 @@ TEST_P(StandsOnAFloor, AsIfPressed) {
   const GradientResult pressed = run_blocks(scene(1e-4), parameters_, 96, 2);
   for (size_t p = 0; p < parameters_.size(); ++p)
     expect_equal(at.parameters[p], pressed.parameters[p]);
-  EXPECT_NE(at.warnings.at(0).find("\"thing\" stands on \"floor\""), std::string::npos);
+  EXPECT_NE(at.warnings.at(0).find("\"thing\" and \"floor\" touch"), std::string::npos);
 }
 
 TEST_P(StandsOnAFloor, InReverse) {

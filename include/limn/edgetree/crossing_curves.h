@@ -34,11 +34,12 @@ Vec3<Lanes> crossing_velocity(std::span<const Mesh* const> meshes, const Crossin
                               const Vec3d& x);
 
 // A part of an edge of a shape that stands on faces of others, which come towards it or leave it:
-// the bottom of a box on a floor that is lifted or pressed. As it is pressed, the box ends where it
-// crosses the floor, and that line moves as crossing_velocity says.
+// the bottom of a box on a floor that is lifted or pressed, or on an equal box. As it is pressed,
+// the box ends where it crosses the floor, and that line moves as crossing_velocity says.
 struct ContactLine {
   EdgeRef edge;
   std::array<Vec3d, 2> ends;
+  uint8_t rim = 0;
   // All faces around it (edges.h): first the one that stands, then one that it stands on.
   std::vector<FaceRef> faces;
   std::vector<Incidence> incidences;
