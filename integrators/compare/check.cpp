@@ -294,7 +294,7 @@ class Checker {
     result.confirmation = {spp, step, same_side ? half : 1 - half};
     if (std::isnan(z)) result.confirmation->p = 0;
     if (result.confirmation->p >= kCheckStageLevel) return true;
-    const auto bends = explained_by_bend(windows, probe, score, step, spp);
+    const auto bends = explained_by_bend(windows, probe, score, step, spp, runs.gradient.at_kink);
     if (!bends) return false;
     result.bends = *bends;
     if (!result.bends) suspect_terms(residual, runs, result);
@@ -305,7 +305,8 @@ class Checker {
   // slope of one side is off the mean of both, explains what the score found. A quarter of the
   // samples tells most cases. None if the run was interrupted.
   std::optional<bool> explained_by_bend(const Windows& windows, const Probe& probe,
-                                        const Score& score, double step, int64_t spp) const {
+                                        const Score& score, double step, int64_t spp,
+                                        bool at_kink) const {
     const double surely = limit_of_level(kCheckLevel);
     for (const bool last : {false, true}) {
       const auto bend = find_bend(scene_, options_.parameter, step, windows, probe[0],
@@ -321,7 +322,8 @@ class Checker {
       if (explained && std::fabs(bend->z) >= surely) return true;
       if (!explains(std::fabs(bend->value) + surely * bend->error, score.error)) return false;
     }
-    return false;
+    // Where there is a kink, it need not be shown again, but must not be too small.
+    return at_kink;
   }
 
   // Sets the suspicions, and the suspect among them, from the second run.

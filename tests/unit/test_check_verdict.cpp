@@ -124,6 +124,34 @@ TEST(CheckVerdict, ABendIsNoError) {
   }
 }
 
+// A box on an equal one that is lifted or pressed: its derivative is that of pressing, far from the
+// mean of both slopes, and is not accused.
+TEST(CheckVerdict, ContactIsNoError) {
+  const TempFiles files;
+  const auto cube = [](const std::string& id, double height, double grey) {
+    return fmt::format(R"(<shape type="cube" id="{}"><transform name="to_world"><scale value="0.4"/>
+                          <translate y="{}"/></transform>)",
+                       id, height) +
+           diffuse(id + "_clay", fmt::format("{0}, {0}, {0}", grey)) + "</shape>";
+  };
+  SceneParts parts;
+  parts.origin = {-1.2711, 2.0267, 3.4731};
+  parts.target = {0, 0.7, 0};
+  parts.fov = 35;
+  parts.body = square("floor", 4, -90, {0, 0, 0}, diffuse("chalk", "0.4, 0.4, 0.7")) +
+               cube("low", 0.4, 0.5) + cube("up", 1.2, 0.8) + constant_light("sky", "1, 1, 1");
+  CheckOptions options;
+  options.parameter = "up.translate.y";
+  options.method = "forest";
+  RunSettings settings;
+  settings.spp = 192;
+  settings.seed = 1;
+  const CheckResult r = check(make_scene(files, parts), options, settings);
+  EXPECT_LT(r.p, kCheckStageLevel);
+  EXPECT_TRUE(r.bends);
+  EXPECT_EQ(r.verdict, Verdict::kCannotTell);
+}
+
 // Two boxes side by side: gaps that no sample would meet are told, wider ones and none are not.
 TEST(HairGaps, AreWarnedOf) {
   const TempFiles files;
