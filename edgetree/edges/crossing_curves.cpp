@@ -222,31 +222,68 @@ Vec3<Lanes> crossing_velocity(std::span<const Mesh* const> meshes, const Crossin
   return {component(0), component(1), component(2)};
 }
 
+namespace {
+
+// The line where two faces of a segment meet, without the faces around it.
+void append_line(std::span<const Mesh* const> meshes, const CrossingSegment& segment, bool moves,
+                 EdgeMesh& edges) {
+  const auto first = static_cast<uint32_t>(edges.positions.size());
+  Edge edge;
+  edge.edge_class = EdgeClass::kCrossing;
+  for (int i = 0; i < 2; ++i) {
+    const Vec3d& x = segment.ends[i];
+    const FaceRef face = segment.faces[i];
+    const Vec3d n = normalize(normal_of(*meshes[face.shape.index()], face.face));
+    edge.vertices[i] = VertexId(first + i);
+    edge.faces[i] = FaceId(first + i);
+    edges.positions.push_back(x);
+    if (moves) edges.tangents.push_back(crossing_velocity(meshes, segment, x));
+    edges.planes.push_back({n, -dot(n, x)});
+    edges.extent = std::max(edges.extent, length(x));
+  }
+  edges.edges.push_back(edge);
+}
+
+template <class Items>
+void append(std::vector<typename Items::value_type>& list, const Items& items) {
+  list.insert(list.end(), items.begin(), items.end());
+}
+
+}  // namespace
+
 EdgeMesh crossing_edges(std::span<const Mesh* const> meshes,
-                        std::span<const CrossingSegment> segments) {
+                        std::span<const CrossingSegment> segments,
+                        std::span<const ContactLine> contacts) {
   EdgeMesh result;
   const bool moves = std::any_of(meshes.begin(), meshes.end(),
                                  [](const Mesh* mesh) { return !mesh->position_tangents.empty(); });
-  result.face_offsets.push_back(0);
+  const auto end_faces = [&] {
+    result.face_offsets.push_back(static_cast<uint32_t>(result.incident_faces.size()));
+  };
+  end_faces();
   for (const CrossingSegment& segment : segments) {
-    const auto first = static_cast<uint32_t>(result.positions.size());
-    Edge edge;
-    edge.edge_class = EdgeClass::kCrossing;
-    for (int i = 0; i < 2; ++i) {
-      const Vec3d& x = segment.ends[i];
-      const FaceRef face = segment.faces[i];
-      const Vec3d n = normalize(normal_of(*meshes[face.shape.index()], face.face));
-      edge.vertices[i] = VertexId(first + i);
-      edge.faces[i] = FaceId(first + i);
-      result.positions.push_back(x);
-      if (moves) result.tangents.push_back(crossing_velocity(meshes, segment, x));
-      result.planes.push_back({n, -dot(n, x)});
+    append_line(meshes, segment, moves, result);
+    for (const FaceRef face : segment.faces) {
       result.incident_faces.push_back(face);
       result.incidences.push_back({.through = true, .rim = kNoRim});
-      result.extent = std::max(result.extent, length(x));
     }
-    result.edges.push_back(edge);
-    result.face_offsets.push_back(static_cast<uint32_t>(result.incident_faces.size()));
+    end_faces();
+  }
+  const bool near = std::any_of(contacts.begin(), contacts.end(),
+                                [](const ContactLine& line) { return !line.near.empty(); });
+  if (near) result.near_offsets.assign(segments.size() + 1, 0);
+  for (const ContactLine& line : contacts) {
+    append_line(meshes, {{line.faces[0], line.faces[1]}, line.ends}, moves, result);
+    result.edges.back().rim = line.rim;
+    append(result.incident_faces, line.faces);
+    append(result.incidences, line.incidences);
+    end_faces();
+    if (!near) continue;
+    if (!line.near.empty()) {
+      append(result.faces_and_near, line.faces);
+      append(result.faces_and_near, line.near);
+    }
+    result.near_offsets.push_back(static_cast<uint32_t>(result.faces_and_near.size()));
   }
   return result;
 }

@@ -43,7 +43,7 @@ class Unifier {
     find_speeds();
   }
 
-  void unite(const Contacts& found) {
+  std::vector<ContactLine> unite(const Contacts& found) {
     const std::span<const Contact> contacts = found.contacts;
     for (size_t begin = 0, end; begin < contacts.size(); begin = end) {
       const EdgeRef id = contacts[begin].edge;
@@ -56,6 +56,14 @@ class Unifier {
       if (parts != parts_.end() || !near.empty())
         rewrite(o, parts != parts_.end() ? parts->second : std::vector<Part>{}, near);
     }
+    for (ContactLine& line : lines_) {
+      for (const NearFace& near : of_object(found.near, line.edge.object.index())) {
+        const auto begin = line.faces.begin(), end = line.faces.end();
+        if (near.edge == line.edge && std::find(begin, end, near.face) == end)
+          line.near.push_back(near.face);
+      }
+    }
+    return std::move(lines_);
   }
 
  private:
@@ -191,7 +199,7 @@ class Unifier {
   }
 
   // False if the part is no edge, or another one stands for it.
-  bool unite_part(EdgeRef id, std::vector<Neighbour>& around, Part& part) const {
+  bool unite_part(EdgeRef id, std::vector<Neighbour>& around, Part& part) {
     // In an order that all edges in this place agree on.
     std::sort(around.begin(), around.end(), [](const Neighbour& a, const Neighbour& b) {
       return std::tuple(a.face.shape, a.face.face) < std::tuple(b.face.shape, b.face.face);
@@ -205,6 +213,12 @@ class Unifier {
     mark_planes(id, around);
     if (std::none_of(around.begin(), around.end(), [&](const auto& n) { return n.rim == rim; }))
       return false;
+    if (const auto pressed = find_pressed(id, around)) {
+      const EdgeMesh& mesh = objects_[id.object.index()];
+      const auto [a, b] = part.edge.vertices;
+      lines_.push_back(contact_line(id, {mesh.position(a), mesh.position(b)}, *pressed, around));
+      return false;
+    }
     part.edge.rim = rim;
     part.edge.edge_class = EdgeClass::kIrregular;
     part.edge.concave = false;
@@ -220,6 +234,97 @@ class Unifier {
     const bool has_second = around[1].face.shape == id.object;
     part.edge.faces[1] = has_second ? around[1].face.face : FaceId::none();
     return true;
+  }
+
+  // Of an edge's own faces the one that stands, and of others one that it stands on.
+  struct Pressed {
+    const Neighbour *standing, *under;
+  };
+
+  // Where what is around comes towards the edge's own faces or leaves them: these stand on the
+  // inside of all others, or on a body whose edge is in the same place.
+  std::optional<Pressed> find_pressed(EdgeRef id, const std::vector<Neighbour>& around) const {
+    auto pressed = standing_inside(around);
+    if (!pressed) pressed = standing_flush(id, around);
+    if (!pressed) return std::nullopt;
+    const auto& [own, under] = *pressed;
+    for (int end = 0; end < 2; ++end) {
+      const Lanes apart = dot(own->velocity[end] - under->velocity[end], plane(under->face).n);
+      for (int i = 0; i < kLanes; ++i)
+        if (std::fabs(apart[i]) > 0x1.0p-20 * speeds_[i] + own->slack[i] + under->slack[i])
+          return pressed;
+    }
+    return std::nullopt;
+  }
+
+  bool parallel(const Neighbour& a, const Neighbour& b) const {
+    return length(cross(plane(a.face).n, plane(b.face).n)) <= 0x1.0p-12;  // as agree()
+  }
+
+  // One face stands; others lie in one plane and have no rim.
+  std::optional<Pressed> standing_inside(const std::vector<Neighbour>& around) const {
+    const auto under =
+        std::find_if(around.begin(), around.end(), [](const auto& n) { return !n.own; });
+    const Neighbour* standing = nullptr;
+    for (const Neighbour& n : around) {
+      if (!n.own && (n.rim != kNoRim || !parallel(n, *under))) return std::nullopt;
+      if (!n.own || parallel(n, *under)) continue;
+      if (standing) return std::nullopt;
+      standing = &n;
+    }
+    if (!standing) return std::nullopt;
+    return Pressed{standing, &*under};
+  }
+
+  // Two bodies with two faces each, one of them against one of the other's. An upright one on one
+  // that is upright or gets wider ends in the other's plane as they are pressed together: there
+  // both rims are one. Of two upright ones the later shape does, since faces in one place show the
+  // first.
+  std::optional<Pressed> standing_flush(EdgeRef id, const std::vector<Neighbour>& around) const {
+    if (around.size() != 4) return std::nullopt;
+    const Vec3d x0 = position(id, 0), along = position(id, 1) - x0;
+    const auto inside = [&](const Neighbour& n, const Neighbour& of) {
+      return dot(cross(plane(n.face).n, along), far_corner(of.face, x0, x0 + along) - x0);
+    };
+    const auto meet = [&](const Neighbour& a, const Neighbour& b) {
+      return parallel(a, b) && dot(plane(a.face).n, plane(b.face).n) < 0 &&
+             inside(a, a) * inside(a, b) > 0;
+    };
+    for (const Neighbour& cap : around) {
+      for (const Neighbour& under : around) {
+        if (!cap.own || under.own || cap.rim == under.rim || !meet(cap, under)) continue;
+        const Neighbour *standing = nullptr, *other = nullptr;
+        for (const Neighbour& n : around) {
+          if (&n == &cap || &n == &under) continue;
+          (n.own ? standing : other) = &n;
+        }
+        if (!standing || !other || standing->rim != cap.rim || other->rim != under.rim ||
+            other->face.shape != under.face.shape || under.face.shape == id.object)
+          return std::nullopt;
+        const double own_lean = dot(plane(standing->face).n, plane(under.face).n);
+        const double lean = dot(plane(other->face).n, plane(cap.face).n);
+        const double rounding = 0x1.0p-12;
+        const bool later = under.face.shape < id.object;
+        if (std::fabs(own_lean) > rounding || lean > (later ? rounding : -rounding))
+          return std::nullopt;
+        return Pressed{standing, &under};
+      }
+    }
+    return std::nullopt;
+  }
+
+  static ContactLine contact_line(EdgeRef id, const std::array<Vec3d, 2>& ends,
+                                  const Pressed& pressed, const std::vector<Neighbour>& around) {
+    ContactLine line{id, ends, pressed.standing->rim, {}, {}};
+    const auto add = [&](const Neighbour& n) {
+      line.faces.push_back(n.face);
+      line.incidences.push_back({!n.along.valid(), n.rim});
+    };
+    add(*pressed.standing);
+    add(*pressed.under);
+    for (const Neighbour& n : around)
+      if (&n != pressed.standing && &n != pressed.under) add(n);
+    return line;
   }
 
   static size_t rank(const Neighbour& n, EdgeRef id, std::span<const FaceRef> faces) {
@@ -387,17 +492,20 @@ class Unifier {
   const std::vector<EdgeMesh> before_;
   Lanes speeds_;                                 // the largest component of a velocity
   std::map<uint32_t, std::vector<Part>> parts_;  // by object
+  std::vector<ContactLine> lines_;
   std::map<std::tuple<ShapeId, EdgeId, double>, VertexId> cuts_;
 };
 
 }  // namespace
 
-void unite_touching_edges(std::span<const TouchingShape> shapes, std::span<const FacePair> pairs,
-                          const Vec3d& viewer, int threads, std::vector<EdgeMesh>& objects) {
+std::vector<ContactLine> unite_touching_edges(std::span<const TouchingShape> shapes,
+                                              std::span<const FacePair> pairs, const Vec3d& viewer,
+                                              int threads, std::vector<EdgeMesh>& objects) {
   std::vector<const Mesh*> meshes;
   for (const TouchingShape& shape : shapes) meshes.push_back(shape.mesh);
   const Contacts found = find_contacts(objects, meshes, pairs, viewer, threads);
-  if (!found.contacts.empty() || !found.near.empty()) Unifier(shapes, objects).unite(found);
+  if (found.contacts.empty() && found.near.empty()) return {};
+  return Unifier(shapes, objects).unite(found);
 }
 
 }  // namespace limn

@@ -66,14 +66,17 @@ const char* fault_of_faces(const EdgeMesh& mesh, EdgeId id) {
   return nullptr;
 }
 
-// Of curves where faces cross: both lie on both sides of it, whichever shapes they are of.
+// Of curves where faces cross: both lie on both sides of it, whichever shapes they are of. Of lines
+// of contact the first ends there, and others may be around.
 const char* fault_of_crossing(const EdgeMesh& mesh, EdgeId id) {
   if (mesh.shape.valid()) return "a mesh has an edge where faces cross";
   const FacesAround around = mesh.around(id);
-  if (around.faces.size() != 2) return "other than two faces cross";
+  if (around.faces.size() < 2) return "less than two faces cross";
+  const bool contact = !around.incidence(0).through;
+  if (!contact && around.faces.size() > 2) return "more than two faces cross";
   for (size_t i = 0; i < 2; ++i) {
     if (!around.faces[i].shape.valid()) return "a face that crosses is of no shape";
-    if (around.incidence(i) != Incidence{.through = true, .rim = kNoRim})
+    if (!contact && around.incidence(i) != Incidence{.through = true, .rim = kNoRim})
       return "a face that crosses ends there";
     if (mesh.edge(id).faces[i].index() >= mesh.planes.size()) return "a plane is out of range";
   }

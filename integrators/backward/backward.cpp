@@ -14,9 +14,10 @@
 #include "integrators/backward/path_adjoint.h"
 #include "integrators/backward/pixel_choice.h"
 #include "integrators/estimates/batch_record.h"
+#include "integrators/methods/hair_gaps.h"
 #include "integrators/methods/selection.h"
+#include "integrators/terms/scene_edges.h"
 #include "integrators/terms/term.h"
-#include "integrators/terms/viewpoint.h"
 #include "limn/core/error.h"
 #include "limn/core/names.h"
 #include "limn/core/parallel.h"
@@ -130,7 +131,8 @@ class BackwardPass {
         closed_(method_.closed
                     ? std::make_unique<ClosedLight>(parameters_.scene(), settings.threads)
                     : nullptr),
-        path_{parameters_.scene(), *tracer_, lights_, closed_.get()},
+        viewpoints_(parameters_.scene()),
+        path_{parameters_.scene(), *tracer_, lights_, closed_.get(), &viewpoints_},
         input_(path_, 3, {1, 1, 1, 1}, method_.sampler, settings.threads),
         context_{path_, parameters_, input_.edges(),
                  EdgeMotion(parameters_.slots(), input_.edges())} {
@@ -188,6 +190,7 @@ class BackwardPass {
   Lights lights_;
   ReverseMethod method_;
   std::unique_ptr<ClosedLight> closed_;  // null where paths are sampled
+  Viewpoints viewpoints_;
   PathContext path_;
   TermInput input_;
   AdjointContext context_;
@@ -249,7 +252,8 @@ void BackwardPass::select() {
         "shading 'mitsuba' is discontinuous where no edge is: the derivative of interpolated "
         "normals is incomplete");
   }
-  warn_of_faces_edge_on(parameters_.scene(), result_.warnings);
+  warn_of_contacts(parameters_.scene(), input_.made_edges(), result_.warnings);
+  warn_of_faces_edge_on(parameters_.scene(), viewpoints_, result_.warnings);
   for (const Parameter& p : parameters_.parameters()) {
     result_.parameters.push_back(
         {p.name, p.unit, p.shape(), Moments(p.numbers(), options_.keep_batches)});
@@ -484,6 +488,10 @@ void BackwardPass::finish() {
   }
   result_.non_finite = all_.bad;
   result_.tape_bytes = all_.tape_bytes;
+  if (result_.spp > 0) {
+    warn_of_hair_gaps(parameters_.scene(), static_cast<double>(result_.spp), settings_.threads,
+                      result_.warnings);
+  }
   result_.seconds = watch_.seconds();
 }
 

@@ -98,7 +98,10 @@ bool add_shadow_adjoint(const AdjointContext& context, const FilmAdjoint& film, 
     amount = film.at(seen->x, seen->y) *
              context.shadows->jump(edge, *point, value(seen->ray.origin), seen->omega);
   }
-  const bool counts = !is_black(amount) && !is_hidden(context.path, *seen, point->face, rays);
+  const bool counts =
+      !is_black(amount) &&
+      !is_hidden(context.path, aimed_at(*seen, point->target(value(seen->ray.origin))), point->face,
+                 rays);
   cost.add(rays);
   if (!counts) {
     ++cost.occluded;

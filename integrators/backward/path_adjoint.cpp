@@ -137,7 +137,8 @@ void VertexAdjoints::add_shadow(const AdjointVertex& vertex, Rng rng) {
     ++cost.zero_weight;
     return;
   }
-  if (is_hidden_from(context_.path, vertex, point->face, omega, distance, cost)) {
+  const Vec3d way = point->target(q) - q;
+  if (is_hidden_from(context_.path, vertex, point->face, normalize(way), length(way), cost)) {
     ++cost.occluded;
     return;
   }

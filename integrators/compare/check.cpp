@@ -294,7 +294,7 @@ class Checker {
     result.confirmation = {spp, step, same_side ? half : 1 - half};
     if (std::isnan(z)) result.confirmation->p = 0;
     if (result.confirmation->p >= kCheckStageLevel) return true;
-    const auto bends = explained_by_bend(windows, probe, score, step, spp);
+    const auto bends = explained_by_bend(windows, probe, score, step, spp, runs.gradient.at_kink);
     if (!bends) return false;
     result.bends = *bends;
     if (!result.bends) suspect_terms(residual, runs, result);
@@ -302,18 +302,28 @@ class Checker {
   }
 
   // Whether the image bends in the place of the probe, and by so much that half of it, by which a
-  // slope of one side is off the mean of both, explains what the score found. None if the run was
-  // interrupted.
+  // slope of one side is off the mean of both, explains what the score found. A quarter of the
+  // samples tells most cases. None if the run was interrupted.
   std::optional<bool> explained_by_bend(const Windows& windows, const Probe& probe,
-                                        const Score& score, double step, int64_t spp) const {
-    RunSettings settings = settings_of(spp, 1, 2);
-    settings.progress = nullptr;
-    const auto bend = find_bend(scene_, options_.parameter, step, windows, probe[0], settings);
-    if (!bend) return std::nullopt;
-    if (normal_p_value(bend->z) >= kCheckStageLevel) return false;
-    const double excess = std::fabs(score.value) - 0.5 * std::fabs(bend->value);
-    const double error = std::hypot(score.error, 0.5 * bend->error);
-    return normal_p_value(std::max(0.0, excess / error)) >= kCheckStageLevel;
+                                        const Score& score, double step, int64_t spp,
+                                        bool at_kink) const {
+    const double surely = limit_of_level(kCheckLevel);
+    for (const bool last : {false, true}) {
+      const auto bend = find_bend(scene_, options_.parameter, step, windows, probe[0],
+                                  settings_of(last ? spp : (spp + 3) / 4, 1, last ? 3 : 2));
+      if (!bend) return std::nullopt;
+      const auto explains = [&](double most, double error) {
+        const double excess = std::fabs(score.value) - 0.5 * most;
+        return normal_p_value(std::max(0.0, excess / error)) >= kCheckStageLevel;
+      };
+      const bool explained =
+          explains(std::fabs(bend->value), std::hypot(score.error, 0.5 * bend->error));
+      // What is no bend passes for one, and so forgives an error, with the level of the check.
+      if (explained && std::fabs(bend->z) >= surely) return true;
+      if (!explains(std::fabs(bend->value) + surely * bend->error, score.error)) return false;
+    }
+    // Where there is a kink, it need not be shown again, but must not be too small.
+    return at_kink;
   }
 
   // Sets the suspicions, and the suspect among them, from the second run.

@@ -29,18 +29,32 @@ bool add_slope(const Scene& scene, const std::string& name, double reach, double
   return true;
 }
 
+// With X(r) the slope over the way r after the value minus that over r before it, X is K + c r for
+// small r where the image bends by K, and 2 X(r) - X(2 r) = K. All from the same samples. No
+// batches if the run was interrupted.
+std::vector<Moments::Batch> bend_of_blocks(const Scene& scene, const std::string& name, double step,
+                                           int block, const RunSettings& settings) {
+  std::vector<Moments::Batch> batches;
+  RunSettings own = settings;
+  int done = 0;
+  if (settings.progress) {
+    own.progress = [&](double part) { settings.progress(0.25 * (done + part)); };
+  }
+  for (const auto& [reach, factor] : {std::pair{step, 2.0}, {2 * step, -1.0}}) {
+    for (const double side : {1.0, -1.0}) {
+      if (!add_slope(scene, name, side * reach, side * factor, block, own, batches)) return {};
+      ++done;
+    }
+  }
+  return batches;
+}
+
 }  // namespace
 
 std::optional<Score> find_bend(const Scene& scene, const std::string& name, double step,
                                const Windows& windows, const std::vector<double>& weights,
                                const RunSettings& settings) {
-  // With X(r) the slope over the way r after the value minus that over r before it, X is K + c r
-  // for small r where the image bends by K, and 2 X(r) - X(2 r) = K. All from the same samples.
-  std::vector<Moments::Batch> batches;
-  for (const auto& [reach, factor] : {std::pair{step, 2.0}, {2 * step, -1.0}})
-    for (const double side : {1.0, -1.0})
-      if (!add_slope(scene, name, side * reach, side * factor, windows.fine(), settings, batches))
-        return std::nullopt;
+  const auto batches = bend_of_blocks(scene, name, step, windows.fine(), settings);
   const std::vector<double> of_blocks = windows.spread(weights);
   Moments moments(1);
   for (const Moments::Batch& batch : batches) {

@@ -11,6 +11,7 @@
 #include "integrators/fit/fit_parameter.h"
 #include "integrators/fit/quasi_newton.h"
 #include "integrators/fit/remesh.h"
+#include "integrators/methods/hair_gaps.h"
 #include "integrators/methods/selection.h"
 #include "integrators/terms/term.h"
 #include "limn/core/error.h"
@@ -161,6 +162,8 @@ Fit::Impl::Impl(std::vector<FitView> all, const FitOptions& options, const RunSe
   check_terms();
   if (is_exact()) check_exact();
   if (!options.remesh.empty()) check_remeshing();
+  // As it is before the first step; views differ in little but the camera.
+  warn_of_hair_gaps(views[0].scene, settings.spp, settings.threads, warnings);
   if (options.loss == LossKind::kL1) {
     warnings.push_back(
         "the gradient of l1 is biased where the image's noise is not small beside its difference "

@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "integrators/methods/hair_gaps.h"
-#include "integrators/terms/viewpoint.h"
 #include "limn/core/error.h"
 #include "limn/core/names.h"
 #include "limn/core/parameter.h"
@@ -100,7 +99,6 @@ GradientResult gradient(const Scene& scene, const GradientOptions& options,
   GradientResult result = method.run(method, scene, options, settings);
   result.method = method.name;
   check_shading(scene, result);
-  warn_of_faces_edge_on(scene, result.warnings);
   warn_of_hair_gaps(scene, static_cast<double>(result.spp), settings.threads, result.warnings);
   return result;
 }

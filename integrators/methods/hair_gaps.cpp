@@ -1,4 +1,4 @@
-// Gaps between shapes, from a tree over the boxes of their faces.
+// Gaps between shapes, and within one, from a tree over the boxes of their faces.
 #include "integrators/methods/hair_gaps.h"
 
 #include <fmt/format.h>
@@ -7,10 +7,12 @@
 #include <bit>
 #include <cmath>
 #include <map>
+#include <mutex>
 #include <optional>
 
 #include "limn/core/box_tree.h"
 #include "limn/core/face_copies.h"
+#include "limn/core/parallel.h"
 #include "limn/core/touch.h"
 
 namespace limn {
@@ -23,11 +25,21 @@ constexpr double kLeastPart = 1.0 / 16;
 // Faces with a longest side below this many widths of such a gap are passed over: their gap is no
 // longer than wide. Not tuned.
 constexpr double kLeastSide = 16;
+// Of the tree, that one thread takes at a time. Not tuned.
+constexpr size_t kLeaves = 256;
 
 struct Gap {
-  double width;  // scene units
   double pixels;
+  double width;  // scene units
+  auto operator<=>(const Gap&) const = default;
 };
+// The narrowest of each pair of shapes, or of one with itself.
+using Gaps = std::map<std::pair<ShapeId, ShapeId>, Gap>;
+
+void keep_narrowest(Gaps& gaps, const std::pair<ShapeId, ShapeId>& shapes, const Gap& gap) {
+  const auto [found, is_new] = gaps.insert({shapes, gap});
+  if (!is_new) found->second = std::min(found->second, gap);
+}
 
 class GapFinder {
  public:
@@ -40,7 +52,7 @@ class GapFinder {
         add_face({ShapeId(s), FaceId(f)});
     find_pairs(threads);
   }
-  const std::map<std::pair<ShapeId, ShapeId>, Gap>& gaps() const { return gaps_; }
+  const Gaps& gaps() const { return gaps_; }
 
  private:
   Corners corners_of(FaceRef face) const {
@@ -72,33 +84,54 @@ class GapFinder {
   void find_pairs(int threads) {
     if (faces_.empty()) return;
     const BoxTree tree(boxes_, threads);
-    std::vector<uint32_t> leaves;
-    for (uint32_t leaf = 0; leaf < tree.leaf_count(); ++leaf) {
-      tree.find_leaves(tree.leaf_box(leaf), leaf, leaves);
-      for (const uint32_t other : leaves) {
-        for (const uint32_t i : tree.leaf(leaf)) {
-          uint32_t lanes = tree.boxes(other).overlaps(boxes_[i]);
-          for (; lanes != 0; lanes &= lanes - 1) {
-            const uint32_t j = tree.leaf(other)[std::countr_zero(lanes)];
-            if (faces_[i].shape == faces_[j].shape) continue;
-            add_gap(faces_[i], faces_[j]);
-            if (other != leaf) add_gap(faces_[j], faces_[i]);
-          }
+    const size_t parts = (tree.leaf_count() + kLeaves - 1) / kLeaves;
+    std::mutex merging;
+    parallel_for(parts, threads, [&](size_t part) {
+      Gaps found;
+      const uint32_t first = static_cast<uint32_t>(part * kLeaves);
+      const uint32_t last = std::min<uint32_t>(first + kLeaves, tree.leaf_count());
+      std::vector<uint32_t> leaves;
+      for (uint32_t leaf = first; leaf < last; ++leaf) add_pairs(tree, leaf, leaves, found);
+      // The least of all, whatever their order.
+      const std::lock_guard lock(merging);
+      for (const auto& [shapes, gap] : found) keep_narrowest(gaps_, shapes, gap);
+    });
+  }
+
+  void add_pairs(const BoxTree& tree, uint32_t leaf, std::vector<uint32_t>& leaves,
+                 Gaps& gaps) const {
+    tree.find_leaves(tree.leaf_box(leaf), leaf, leaves);
+    for (const uint32_t other : leaves) {
+      for (const uint32_t i : tree.leaf(leaf)) {
+        uint32_t lanes = tree.boxes(other).overlaps(boxes_[i]);
+        for (; lanes != 0; lanes &= lanes - 1) {
+          const uint32_t j = tree.leaf(other)[std::countr_zero(lanes)];
+          if (i == j || are_neighbours(faces_[i], faces_[j])) continue;
+          add_gap(faces_[i], faces_[j], gaps);
+          if (other != leaf) add_gap(faces_[j], faces_[i], gaps);
         }
       }
     }
   }
 
+  // Whether two faces of one shape share a vertex.
+  bool are_neighbours(FaceRef a, FaceRef b) const {
+    if (a.shape != b.shape) return false;
+    const Mesh& mesh = scene_.shape(a.shape).mesh;
+    const auto& of_b = mesh.face(b.face);
+    const auto is_of_b = [&](uint32_t v) {
+      return std::find(of_b.begin(), of_b.end(), v) != of_b.end();
+    };
+    return std::any_of(mesh.face(a.face).begin(), mesh.face(a.face).end(), is_of_b);
+  }
+
   // Of the edges of a face along the other one.
-  void add_gap(FaceRef of_edges, FaceRef along) {
+  void add_gap(FaceRef of_edges, FaceRef along, Gaps& gaps) const {
     const Corners edges = corners_of(of_edges), face = corners_of(along);
     const double rounding = touch_tolerance(largest_coordinate(edges), largest_coordinate(face));
     for (int k = 0; k < 3; ++k) {
       const auto gap = gap_along(edges[k], edges[(k + 1) % 3], face, rounding);
-      if (!gap) continue;
-      const std::pair<ShapeId, ShapeId> shapes = std::minmax(of_edges.shape, along.shape);
-      const auto [found, is_new] = gaps_.insert({shapes, *gap});
-      if (!is_new && gap->pixels < found->second.pixels) found->second = *gap;
+      if (gap) keep_narrowest(gaps, std::minmax(of_edges.shape, along.shape), *gap);
     }
   }
 
@@ -136,7 +169,7 @@ class GapFinder {
     if (first * last <= 0 || std::min(std::fabs(first), std::fabs(last)) <= rounding)
       return std::nullopt;
     const double pixels = width / (pixel_ * length(a + middle * (b - a) - eye_));
-    return Gap{width, pixels};
+    return Gap{pixels, width};
   }
 
   const Scene& scene_;
@@ -145,25 +178,28 @@ class GapFinder {
   double pixel_ = 0;  // of the film, at a distance of 1
   std::vector<FaceRef> faces_;
   std::vector<FloatBox> boxes_;
-  std::map<std::pair<ShapeId, ShapeId>, Gap> gaps_;
+  Gaps gaps_;
 };
 
 }  // namespace
 
 void warn_of_hair_gaps(const Scene& scene, double spp, int threads,
                        std::vector<std::string>& warnings) {
-  if (scene.shapes.size() < 2 || !(spp >= 1)) return;
+  if (!(spp >= 1)) return;
   const GapFinder finder(scene, spp, threads);
   constexpr size_t kMost = 8;
   size_t told = 0;
   for (const auto& [shapes, gap] : finder.gaps()) {
     if (++told > kMost) break;
     warnings.push_back(fmt::format(
-        "{} and {} have a gap of {:.2g} between them, {:.2g} of a pixel, which {:.0f} samples per "
-        "pixel can miss: derivatives there may be off by more than their errors say; close the "
-        "gap, or take many more samples",
-        name_in_text(scene, shapes.first), name_in_text(scene, shapes.second), gap.width,
-        gap.pixels, spp));
+        "{} a gap of {:.2g} between {}, {:.2g} of a pixel, which {:.0f} samples per pixel can "
+        "miss: "
+        "derivatives there may be off by more than their errors say; close the gap, or take many "
+        "more samples",
+        shapes.first == shapes.second ? name_in_text(scene, shapes.first) + " has"
+                                      : name_in_text(scene, shapes.first) + " and " +
+                                            name_in_text(scene, shapes.second) + " have",
+        gap.width, shapes.first == shapes.second ? "its own faces" : "them", gap.pixels, spp));
   }
   if (finder.gaps().size() > kMost) {
     warnings.push_back(

@@ -1,5 +1,5 @@
 #pragma once
-// Gaps between shapes that are too narrow for a run's samples.
+// Gaps between shapes, and between faces of one, that are too narrow for a run's samples.
 #include <string>
 #include <vector>
 
@@ -7,7 +7,7 @@
 
 namespace limn {
 
-// A warning for each pair of shapes whose faces lie along each other with a gap so narrow that,
+// A warning for each pair of shapes, or shape by itself, whose faces lie along each other with a gap so narrow that,
 // with `spp` samples per pixel, all of it is met by less than one, if it faces the camera. Its part
 // in a derivative is then missing from the standard error, too: the two sides of a gap of width g
 // move what is seen in it over by 1 / g, however small g is. Gaps within what rounding of positions

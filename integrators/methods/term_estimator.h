@@ -45,6 +45,8 @@ class TermEstimator final : public SampleEstimator {
   // What samples of a slot cost, see Term::work.
   double work(size_t slot, const TermCost& cost) const;
   void describe(GradientStats& stats) const;
+  const EdgeSamplerInput* edges() const { return input_.made_edges(); }
+  const Viewpoints& viewpoints() const { return viewpoints_; }
   const MotionRates& motion_rates() const { return rates_; }
   // Whether a slot's samples belong to pixels, not to the film.
   bool adds_to_pixels(size_t slot) const {
@@ -128,6 +130,7 @@ class TermEstimator final : public SampleEstimator {
   std::unique_ptr<RayTracer> tracer_;
   Lights lights_;
   std::unique_ptr<ClosedLight> closed_;  // null where paths are sampled
+  Viewpoints viewpoints_;
   PathContext context_;
   CameraView<Dual> camera_;
   std::shared_ptr<const FilmRegions> visible_;

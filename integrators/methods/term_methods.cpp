@@ -14,6 +14,7 @@
 #include "integrators/methods/selection.h"
 #include "integrators/methods/term_estimator.h"
 #include "integrators/terms/film_regions.h"
+#include "integrators/terms/scene_edges.h"
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
 #include "limn/edgetree/edge_sampler_types.h"
@@ -128,7 +129,13 @@ class TermJob {
   GradientResult run(const RunSettings& settings, const Stopwatch& watch) {
     check_memory(passes_);
     GradientResult result = empty_result();
-    for (size_t p = 0; p < passes_.size(); ++p) pass(p).describe(result.stats);
+    const size_t warned = result.warnings.size();
+    for (size_t p = 0; p < passes_.size(); ++p) {
+      pass(p).describe(result.stats);
+      warn_of_contacts(scene_, pass(p).edges(), result.warnings);
+    }
+    warn_of_faces_edge_on(scene_, pass(0).viewpoints(), result.warnings);
+    result.at_kink = result.warnings.size() > warned;
     plan(settings, watch, result);
     if (settings.store) identify_plan(result.terms, *settings.store);
     result.setup_seconds = watch.seconds();

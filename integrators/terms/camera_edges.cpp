@@ -52,7 +52,7 @@ CameraEdges::CameraEdges(const PathContext& context, const EdgeSamplerInput& inp
     : context_(context),
       input_(input),
       free_(free),
-      viewpoint_(context.scene, {context.scene.camera.origin}),
+      viewpoint_(context.viewpoints->camera),
       clips_(find_clip_segments(context.scene)) {
   const Stopwatch watch;
   for (uint32_t o = 0; o < input_.objects.size(); ++o) add_object(ShapeId(o));

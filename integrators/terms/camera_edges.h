@@ -6,7 +6,7 @@
 
 #include "integrators/terms/clip_curves.h"
 #include "integrators/terms/film_regions.h"
-#include "integrators/terms/viewpoint.h"
+#include "integrators/terms/path.h"
 #include "limn/core/discrete_distribution.h"
 #include "limn/edgetree/edge_sampler.h"
 
@@ -86,7 +86,7 @@ class CameraEdges {
   const PathContext& context_;
   const EdgeSamplerInput& input_;
   const FreeMotion* free_;
-  Viewpoint viewpoint_;
+  const Viewpoint& viewpoint_;
   std::vector<ClipSegment> clips_;
   std::vector<FilmEdge> edges_;
   DiscreteDistribution choice_;  // of an edge

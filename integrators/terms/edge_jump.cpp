@@ -136,6 +136,7 @@ class RadianceBeside {
     }
     if (part_.regions) radiance_[i] = Rgb<double>{} - part_.regions->emission(surface, wi);
     path_.place(walks_[i], surface, wi);
+    walks_[i].beside_edge = true;
     going_[count_++] = &walks_[i];
   }
 

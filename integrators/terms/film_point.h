@@ -18,6 +18,13 @@ struct FilmPoint {
 // outside the film and the filter around it, before or behind the clip planes, on an emitter that
 // the camera does not see.
 std::optional<FilmPoint> film_point(const Scene& scene, FaceRef face, const Vec3d& x);
+// The same seen at x, a point nearby.
+inline FilmPoint aimed_at(FilmPoint point, const Vec3d& x) {
+  const Vec3d way = x - value(point.ray.origin);
+  point.distance = length(way);
+  point.omega = way / point.distance;
+  return point;
+}
 // One shadow ray.
 bool is_hidden(const PathContext& context, const FilmPoint& point, FaceRef face, RayCount& rays);
 

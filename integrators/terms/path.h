@@ -14,6 +14,7 @@
 
 #include "integrators/terms/closed_light.h"
 #include "integrators/terms/near_faces.h"
+#include "integrators/terms/viewpoint.h"
 #include "integrators/terms/walk.h"
 #include "integrators/terms/warp_field.h"
 #include "limn/core/lights.h"
@@ -32,6 +33,8 @@ struct PathContext {
   const Lights& lights;
   // Takes the place of all light that is scattered; null: paths are sampled.
   const ClosedLight* closed = nullptr;
+  // From where edges are looked at; needed where paths start beside edges.
+  const Viewpoints* viewpoints = nullptr;
 };
 
 // Does nothing at path vertices.

@@ -70,8 +70,11 @@ inline bool PathTracer<S, Visitor>::shadowed(const Walk& walk) {
   Ray ray{value(walk.surface.p), light.wo};
   ray.start = start;
   ray.end = light.face.value_or(FaceRef{});
+  // Beside an edge a shadow may end to the very rounding, if the light has no extent.
+  const DeltaLight* delta = walk.beside_edge ? light.light->delta() : nullptr;
+  if (delta) ray.direction = c_.viewpoints->of(*delta).towards(ray.origin);
   if (edge) {
-    if (blocked_at_edge(c_.scene, c_.tracer, *edge, light.wo)) return true;
+    if (blocked_at_edge(c_.scene, c_.tracer, *edge, ray.direction)) return true;
     ray.skip_faces = edge->around.all;
   }
   // Ends a float's rounding before the light, so that neighbours of the chosen face do not hide

@@ -93,6 +93,7 @@ inline bool PathTracer<S, Visitor>::arrive(Walk& walk) {
   if (walk.hit.t > 0) {
     walk.surface = surface_on_ray<S>(c_.scene, face, walk.surface.p, walk.direction);
     walk.edge = nullptr;
+    walk.beside_edge = false;
   } else {
     move_along_edge(walk.surface, face);
   }

@@ -1,9 +1,13 @@
 // Edges, light polygons and the environment of a scene, for edge samplers.
 #include "integrators/terms/scene_edges.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <map>
+#include <set>
 
+#include "limn/core/face_copies.h"
 #include "limn/core/lights.h"
 #include "limn/edgetree/crossing_curves.h"
 #include "limn/edgetree/touching.h"
@@ -38,9 +42,11 @@ EdgeSamplerInput make_sampler_input(const Scene& scene, int threads) {
   }
   const Vec3d pinhole = value(scene.camera.origin);
   const std::vector<FacePair> pairs = find_face_pairs(meshes, pinhole, threads);
-  unite_touching_edges(touching_shapes(scene), pairs, pinhole, threads, input.objects);
+  const std::vector<ContactLine> contacts =
+      unite_touching_edges(touching_shapes(scene), pairs, pinhole, threads, input.objects);
   const std::vector<CrossingSegment> crossings = find_crossings(meshes, pairs, threads);
-  if (!crossings.empty()) input.objects.push_back(crossing_edges(meshes, crossings));
+  if (!crossings.empty() || !contacts.empty())
+    input.objects.push_back(crossing_edges(meshes, crossings, contacts));
   const Lights lights(scene);
   for (const Light* light : lights.all()) light->add_triangles(input.lights);
   if (!scene.environment) return input;
@@ -53,6 +59,27 @@ EdgeSamplerInput make_sampler_input(const Scene& scene, int threads) {
     input.environment = std::make_shared<RadiancePyramid>(brightness, 8, 2);
   }
   return input;
+}
+
+void warn_of_contacts(const Scene& scene, const EdgeSamplerInput* edges,
+                      std::vector<std::string>& warnings) {
+  if (!edges || edges->objects.empty() || edges->objects.back().shape.valid()) return;
+  const EdgeMesh& lines = edges->objects.back();
+  std::set<std::pair<ShapeId, ShapeId>> pairs;
+  for (uint32_t e = 0; e < lines.edges.size(); ++e) {
+    const FacesAround around = lines.around(EdgeId(e));
+    if (around.incidence(0).through) continue;  // they cross
+    pairs.insert(std::minmax(around.faces[0].shape, around.faces[1].shape));
+  }
+  for (const auto& shapes : pairs) {
+    const std::string text = fmt::format(
+        "{} and {} touch, and one moves towards the other or away from it: the derivative is that "
+        "of pressing them together; apart, light comes in between, and the slope is another one "
+        "(differences take the mean of both)",
+        name_in_text(scene, shapes.first), name_in_text(scene, shapes.second));
+    if (std::find(warnings.begin(), warnings.end(), text) == warnings.end())
+      warnings.push_back(text);
+  }
 }
 
 }  // namespace limn

@@ -1,5 +1,8 @@
 #pragma once
 // A scene's edges as edge samplers take them.
+#include <string>
+#include <vector>
+
 #include "limn/core/scene.h"
 #include "limn/edgetree/edge_sampler.h"
 
@@ -9,5 +12,10 @@ namespace limn {
 // surfaces cross (if any do), light polygons and the environment's mean. The result does not depend
 // on `threads`.
 EdgeSamplerInput make_sampler_input(const Scene& scene, int threads);
+
+// One for each pair of shapes that touch and move towards each other or apart (ContactLine); none
+// twice. edges: of the scene, in motion; null: none.
+void warn_of_contacts(const Scene& scene, const EdgeSamplerInput* edges,
+                      std::vector<std::string>& warnings);
 
 }  // namespace limn

@@ -110,7 +110,8 @@ void ShadowTerm::add_sample(const PathVertex& vertex, Rng rng, TermCost& cost,
     ++cost.zero_weight;
     return;
   }
-  if (is_hidden_from(context_, vertex, point->face, omega, distance, cost)) {
+  const Vec3d way = point->target(q) - q;
+  if (is_hidden_from(context_, vertex, point->face, normalize(way), length(way), cost)) {
     ++cost.occluded;
     return;
   }
@@ -146,7 +147,9 @@ bool ShadowTerm::sample_film(double u, const Rng& key, RayCount& rays, FilmSampl
   const Lanes swept = sweep(edge, *point, {seen->ray.origin, seen->ray.direction, seen->distance});
   const Rgb<double> amount = edges_.jump(edge, *point, value(seen->ray.origin), seen->omega);
   if (is_zero(swept) || is_black(amount)) return false;
-  if (is_hidden(context_, *seen, point->face, rays)) return false;
+  if (is_hidden(context_, aimed_at(*seen, point->target(value(seen->ray.origin))), point->face,
+                rays))
+    return false;
   sample.x = seen->x;
   sample.y = seen->y;
   const Lanes weight =

@@ -2,6 +2,8 @@
 #include "integrators/terms/shadow_edges.h"
 
 #include <algorithm>
+#include <array>
+#include <limits>
 
 #include "integrators/terms/near_faces.h"
 
@@ -50,6 +52,16 @@ double lit_side(const Scene& scene, const EdgeMesh& edges, EdgeId edge,
   return blocked[0] == blocked[1] ? 0 : blocked[0] ? 1 : -1;
 }
 
+// The distance from a point of a face to the nearest line of its sides.
+double depth_of(const std::array<Vec3d, 3>& corners, const Vec3d& x) {
+  double least = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < 3; ++k) {
+    const Vec3d side = corners[(k + 1) % 3] - corners[k];
+    least = std::min(least, length(cross(side, x - corners[k])) / length(side));
+  }
+  return least;
+}
+
 }  // namespace
 
 Vec3<Dual> moving_vertex(const EdgeMesh& mesh, VertexId vertex) {
@@ -64,7 +76,6 @@ ShadowEdges::ShadowEdges(const PathContext& context, const EdgeSamplerInput& inp
   const Stopwatch watch;
   reach_ = 2 * bounds_of(context_.scene).diagonal();
   for (uint32_t i = 0; i < context_.scene.delta_lights.size(); ++i) {
-    viewpoints_.emplace_back(context_.scene, context_.scene.delta_lights[i]->origin());
     const size_t first = edges_.size();
     for (uint32_t o = 0; o < input_.objects.size(); ++o) list(i, ShapeId(o));
     weigh(first, lanes);
@@ -78,7 +89,7 @@ void ShadowEdges::list(uint32_t light, ShapeId object) {
   const LightOrigin origin = of.origin();
   for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
     ShadowEdge edge{&of, light, {object, EdgeId(e)}, 0, 0, {}};
-    edge.sign = lit_side(context_.scene, mesh, edge.id.edge, viewpoints_[light]);
+    edge.sign = lit_side(context_.scene, mesh, edge.id.edge, context_.viewpoints->lights[light]);
     if (edge.sign == 0) continue;
     const auto& ends = mesh.edge(edge.id.edge).vertices;
     const Vec3<Dual> y[2] = {moving_vertex(mesh, ends[0]), moving_vertex(mesh, ends[1])};
@@ -138,7 +149,9 @@ std::optional<ShadowPoint> ShadowEdges::cast(const ShadowEdge& edge, double t,
   const LightOrigin origin = edge.light->origin();
   const Vec3d w = origin.through(y);
   const FacesAround around = mesh.around(edge.id.edge);
-  const Vec3d seen = viewpoints_[edge.viewpoint].seeing(around, y).through(y);
+  const Viewpoint& viewpoint = context_.viewpoints->lights[edge.viewpoint];
+  const bool edge_on = viewpoint.sees_edge_on(around);
+  const Vec3d seen = (edge_on ? viewpoint.seeing(around, y) : viewpoint.hardly_aside(y)).through(y);
   const double length_seen = length(seen);
   const double before = origin.infinite ? reach_ : length_seen;  // of the ray, up to y
   Ray ray{y - seen * (before / length_seen), seen / length_seen};
@@ -155,7 +168,10 @@ std::optional<ShadowPoint> ShadowEdges::cast(const ShadowEdge& edge, double t,
   const double s = dot(n, c[0] - y) / slope;
   const double m = (origin.infinite ? 1 : 1 + s) / std::fabs(slope);
   if (!std::isfinite(m)) return {};
-  return ShadowPoint{hit.face, y + w * s, m};
+  const Vec3d inside = ray.origin + ray.direction * hit.t;
+  const Vec3d center = (c[0] + c[1] + c[2]) * (1.0 / 3);
+  return ShadowPoint{hit.face, y + w * s,          m, inside, depth_of(c, inside),
+                     center,   depth_of(c, center)};
 }
 
 Rgb<double> ShadowEdges::jump(const ShadowEdge& edge, const ShadowPoint& point, const Vec3d& q,

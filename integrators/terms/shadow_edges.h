@@ -1,11 +1,11 @@
 #pragma once
 // Edges that part light from shadow, as lights without extent see them, and where their shadows
 // fall. The formulas stand in shadow_boundary.cpp.
+#include <algorithm>
 #include <optional>
 #include <vector>
 
 #include "integrators/terms/path.h"
-#include "integrators/terms/viewpoint.h"
 #include "limn/core/discrete_distribution.h"
 #include "limn/edgetree/edge_sampler.h"
 
@@ -26,6 +26,20 @@ struct ShadowPoint {
   FaceRef face;
   Vec3d x;
   double m;  // see above
+  // A point of the face hardly aside of x, how far it is from the nearest side, and the same of the
+  // face's center.
+  Vec3d inside;
+  double depth;
+  Vec3d center;
+  double center_depth;
+
+  // Where a viewer at q sends a ray to learn whether x is seen: on the face, and off its sides by
+  // more than a ray ends before it, so that a neighbour at whose edge x lies may hide it.
+  Vec3d target(const Vec3d& q) const {
+    const double wanted = 0x1p-17 * length(inside - q);
+    return depth >= wanted ? inside
+                           : inside + (center - inside) * std::min(1.0, wanted / center_depth);
+  }
 };
 
 // Of an edge mesh, with its tangents.
@@ -53,8 +67,7 @@ class ShadowEdges {
 
   const PathContext& context_;
   const EdgeSamplerInput& input_;
-  std::vector<Viewpoint> viewpoints_;  // of the delta lights
-  double reach_ = 0;                   // longer than any line through the scene
+  double reach_ = 0;  // longer than any line through the scene
   std::vector<ShadowEdge> edges_;
   DiscreteDistribution choice_;  // of an edge
   double list_seconds_ = 0;

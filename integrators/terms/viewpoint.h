@@ -1,6 +1,7 @@
 #pragma once
 // A place from which edges are listed once, the camera's pinhole or a delta light, and the faces
 // that are seen edge-on from there.
+#include <unordered_map>
 #include <vector>
 
 #include "limn/core/light.h"
@@ -32,6 +33,13 @@ class Viewpoint {
   // The viewpoint, or, if a face around the edge is seen edge-on, that aside of it: by 2^-12 of the
   // distance of y, a point of the edge; at infinity by 2^-12 rad.
   LightOrigin seeing(const FacesAround& around, const Vec3d& y) const;
+  // Where light is looked for from y, a point beside an edge, and where shadows of y are cast from,
+  // if the edge is that of no face seen edge-on: as little aside as floats can tell, by 2^-15 of
+  // the distance. So wherever a shadow ends along an edge of what it falls on, all terms have it
+  // end on the same side.
+  LightOrigin hardly_aside(const Vec3d& y) const;
+  // The unit direction in which light from there arrives at y, turned around.
+  Vec3d towards(const Vec3d& y) const;
   // limn::is_candidate, of a viewpoint that is not at infinity; faces seen edge-on are turned as
   // they are from aside.
   bool is_candidate(const EdgeMesh& mesh, EdgeId edge) const;
@@ -42,15 +50,28 @@ class Viewpoint {
            edge_on_[face.shape.index()][face.face.index()];
   }
   Facing facing(const EdgeMesh& mesh, FaceId face) const;
+  LightOrigin aside(const Vec3d& y, double by) const;
 
   LightOrigin origin_;
-  Vec3d aside_{};                           // unit; zero if no face is seen edge-on
+  Vec3d aside_;                             // unit
   std::vector<std::vector<bool>> edge_on_;  // by shape: of each face; empty if none of them is
   size_t edge_on_count_ = 0, flat_faces_ = 0;
   ShapeId first_shape_;
 };
 
+// Of all places from which edges of a scene are listed.
+struct Viewpoints {
+  explicit Viewpoints(const Scene& scene);
+
+  const Viewpoint& of(const DeltaLight& light) const { return lights[numbers.at(&light)]; }
+
+  Viewpoint camera;
+  std::vector<Viewpoint> lights;  // delta lights, in the order of the scene
+  std::unordered_map<const DeltaLight*, size_t> numbers;
+};
+
 // One for the camera and one for each delta light that see flat-shaded faces edge-on.
-void warn_of_faces_edge_on(const Scene& scene, std::vector<std::string>& warnings);
+void warn_of_faces_edge_on(const Scene& scene, const Viewpoints& viewpoints,
+                           std::vector<std::string>& warnings);
 
 }  // namespace limn

@@ -46,6 +46,7 @@ struct Walk {
   bool lit = false;           // the lights at the vertex have been
   bool failed = false;        // it asked for a ray that cannot be traced
   EdgeStart* edge = nullptr;  // where the surface lies, if the path starts on an edge and is there
+  bool beside_edge = false;   // the path starts on an edge, or just beside it as seen, and is there
   SurfacePoint<S> surface;
   Vec3<S> wi;
   Rgb<S> throughput = grey(S(1.0));

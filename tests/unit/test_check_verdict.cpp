@@ -124,6 +124,34 @@ TEST(CheckVerdict, ABendIsNoError) {
   }
 }
 
+// A box on an equal one that is lifted or pressed: its derivative is that of pressing, far from the
+// mean of both slopes, and is not accused.
+TEST(CheckVerdict, ContactIsNoError) {
+  const TempFiles files;
+  const auto cube = [](const std::string& id, double height, double grey) {
+    return fmt::format(R"(<shape type="cube" id="{}"><transform name="to_world"><scale value="0.4"/>
+                          <translate y="{}"/></transform>)",
+                       id, height) +
+           diffuse(id + "_clay", fmt::format("{0}, {0}, {0}", grey)) + "</shape>";
+  };
+  SceneParts parts;
+  parts.origin = {-1.2711, 2.0267, 3.4731};
+  parts.target = {0, 0.7, 0};
+  parts.fov = 35;
+  parts.body = square("floor", 4, -90, {0, 0, 0}, diffuse("chalk", "0.4, 0.4, 0.7")) +
+               cube("low", 0.4, 0.5) + cube("up", 1.2, 0.8) + constant_light("sky", "1, 1, 1");
+  CheckOptions options;
+  options.parameter = "up.translate.y";
+  options.method = "forest";
+  RunSettings settings;
+  settings.spp = 192;
+  settings.seed = 1;
+  const CheckResult r = check(make_scene(files, parts), options, settings);
+  EXPECT_LT(r.p, kCheckStageLevel);
+  EXPECT_TRUE(r.bends);
+  EXPECT_EQ(r.verdict, Verdict::kCannotTell);
+}
+
 // Two boxes side by side: gaps that no sample would meet are told, wider ones and none are not.
 TEST(HairGaps, AreWarnedOf) {
   const TempFiles files;
@@ -147,6 +175,31 @@ TEST(HairGaps, AreWarnedOf) {
   EXPECT_TRUE(warnings(1e-5, 1e5).empty());
   EXPECT_TRUE(warnings(0.01, 64).empty());
   EXPECT_TRUE(warnings(0, 64).empty());
+}
+
+// The same as one mesh, with any number of threads; and a mesh without gaps, whose faces all touch.
+TEST(HairGaps, AreWarnedOfWithinAShape) {
+  const TempFiles files;
+  Mesh both = cube_mesh();
+  const auto count = static_cast<uint32_t>(both.positions.size());
+  const Mesh cube = both;
+  for (const Vec3f& x : cube.positions) both.positions.push_back({x.x + 2 + 1e-4f, x.y, x.z});
+  for (const FaceIndices& f : cube.faces)
+    both.faces.push_back({f[0] + count, f[1] + count, f[2] + count});
+  const auto warnings = [&](const Mesh& mesh, int threads) {
+    SceneParts parts;
+    parts.body = obj_shape("pair", write_mesh(files, "pair.obj", mesh), true, 0.5, {},
+                           diffuse("chalk", "0.8, 0.8, 0.8"));
+    std::vector<std::string> lines;
+    warn_of_hair_gaps(make_scene(files, parts), 64, threads, lines);
+    return lines;
+  };
+  const auto found = warnings(both, 1);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_NE(found[0].find("\"pair\" has a gap of 5e-05 between its own faces"), std::string::npos)
+      << found[0];
+  EXPECT_EQ(warnings(both, 3), found);
+  EXPECT_TRUE(warnings(cube, 1).empty());
 }
 
 // Counts over many runs with a defect, of those whose stated power covers it.

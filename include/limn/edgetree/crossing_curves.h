@@ -33,10 +33,24 @@ std::vector<CrossingSegment> find_crossings(std::span<const Mesh* const> meshes,
 Vec3<Lanes> crossing_velocity(std::span<const Mesh* const> meshes, const CrossingSegment& segment,
                               const Vec3d& x);
 
-// The segments as edges, in their order: class kCrossing, each with two vertices, two planes and
-// two faces of its own, which lie on both sides of it. Moves as crossing_velocity says; `shape` is
-// none.
+// A part of an edge of a shape that stands on faces of others, which come towards it or leave it:
+// the bottom of a box on a floor that is lifted or pressed, or on an equal box. As it is pressed,
+// the box ends where it crosses the floor, and that line moves as crossing_velocity says.
+struct ContactLine {
+  EdgeRef edge;
+  std::array<Vec3d, 2> ends;
+  uint8_t rim = 0;
+  // All faces around it (edges.h): first the one that stands, then one that it stands on.
+  std::vector<FaceRef> faces;
+  std::vector<Incidence> incidences;
+  std::vector<FaceRef> near = {};  // FacesAround::near
+};
+
+// The segments as edges, in their order, then the lines of contact: class kCrossing, each with two
+// vertices, two planes and two faces of its own, which segments have on both sides of them. Moves
+// as crossing_velocity says; `shape` is none.
 EdgeMesh crossing_edges(std::span<const Mesh* const> meshes,
-                        std::span<const CrossingSegment> segments);
+                        std::span<const CrossingSegment> segments,
+                        std::span<const ContactLine> contacts = {});
 
 }  // namespace limn

@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "limn/edgetree/crossing_curves.h"
 #include "limn/edgetree/edges.h"
 #include "limn/edgetree/face_pairs.h"
 
@@ -23,11 +24,15 @@ struct TouchingShape {
 //  - of parts of several edges in one place that move alike, the one of the first shape stays. If
 //    they move differently each stays, as a rim of the faces that move with it;
 //  - a seam of two faces in one plane that look and move alike is no edge.
+// Parts on which one face stands on the inside of others, or on another body edge on edge, where
+// these come towards it or leave it, are left out of the objects and returned: contact that tightens (ContactLine). Contact that loosens
+// would open a gap, in which the light is another one.
 // What touches is decided to the rounding of positions (edges/contacts.h). An edge also gets the
 // faces that do not touch it and are nearer to it than a ray in floats can tell, if it comes from
 // `viewer` (the camera) or from no farther away: FacesAround::near. Where nothing is so near
 // nothing changes. pairs: of the shapes' faces, from find_face_pairs with the same viewer.
-void unite_touching_edges(std::span<const TouchingShape> shapes, std::span<const FacePair> pairs,
-                          const Vec3d& viewer, int threads, std::vector<EdgeMesh>& objects);
+std::vector<ContactLine> unite_touching_edges(std::span<const TouchingShape> shapes,
+                                              std::span<const FacePair> pairs, const Vec3d& viewer,
+                                              int threads, std::vector<EdgeMesh>& objects);
 
 }  // namespace limn

@@ -115,6 +115,8 @@ struct GradientResult {
   NonFinite non_finite;
   std::vector<MethodSetting> settings;
   std::vector<std::string> warnings;
+  // Warnings tell of kinks: the derivative is that of one side.
+  bool at_kink = false;
   GradientStats stats;
 
   SampleCounts samples() const;

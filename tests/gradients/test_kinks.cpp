@@ -1,0 +1,360 @@
+// Viewpoints where the derivative has a kink: the camera or a light in the plane of a face, shadows
+// that end along an edge, things that stand on others. What is computed is the derivative a step aside.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "limn/integrators/backward.h"
+#include "limn/integrators/statistics.h"
+#include "support/block_runs.h"
+#include "support/compare_moments.h"
+#include "support/meshes.h"
+#include "support/scenes.h"
+
+namespace limn {
+namespace {
+
+constexpr double kLevel = 1e-4;
+
+// Where the camera or a light lies in the plane of a face, both borders of the face are one line,
+// and the derivative is that of a place beside it from where the face is not seen.
+struct EdgeOn {
+  std::string name;
+  std::string parameter;
+  // Scenes as they are with the viewpoint in the plane of a face, and so far beside it.
+  std::function<Scene(const TempFiles&, double beside)> scene;
+};
+
+std::string sun(const Vec3d& d) {
+  return fmt::format(
+      R"(<emitter type="directional"><vector name="direction" value="{},{},{}"/>
+         <rgb name="irradiance" value="2,2,2"/></emitter>)",
+      d.x, d.y, d.z);
+}
+std::string bulb(const Vec3d& p) {
+  return fmt::format(
+      R"(<emitter type="point"><point name="position" value="{},{},{}"/>
+         <rgb name="intensity" value="9,9,9"/></emitter>)",
+      p.x, p.y, p.z);
+}
+
+Scene scene_of(const TempFiles& files, double x, int max_depth, const std::string& body) {
+  SceneParts parts;
+  parts.max_depth = max_depth;
+  parts.origin = {x, 2.3, 4};
+  parts.target = {0.1, 0.4, 0};
+  parts.body = body;
+  return make_scene(files, parts);
+}
+
+// [-0.5, 0.5] x [0.25, 1.25] x [-0.5, 0.5].
+std::string box(const TempFiles& files, const std::string& inner) {
+  return obj_shape("box", write_mesh(files, "box.obj", cube_mesh()), true, 0.5, {0, 0.75, 0},
+                   inner);
+}
+std::string box_over_floor(const TempFiles& files) {
+  return box(files, diffuse("clay", "0.5, 0.5, 0.5")) +
+         square("floor", 3, -90, {0, 0, 0}, diffuse("chalk", "0.8, 0.8, 0.8"));
+}
+
+std::vector<EdgeOn> edge_on_cases() {
+  const auto glowing_box = [](const TempFiles& files, double beside) {
+    return scene_of(files, 0.5 - beside, 1, box(files, area_light("glow", "1, 1, 1")));
+  };
+  // The front and the right side of a box, and a plate behind them that ends in the same plane.
+  const auto plates = [](const TempFiles& files, double beside) {
+    const auto plate = [&](const std::string& id, const Mesh& mesh, const std::string& glow) {
+      return obj_shape(id, write_mesh(files, id + ".obj", mesh), true, 1, {},
+                       area_light(id + "glow", glow));
+    };
+    const auto quad = [](const Vec3f& a, const Vec3f& b, const Vec3f& c, const Vec3f& d) {
+      return make_mesh({a, b, c, d}, {{0, 1, 2}, {0, 2, 3}});
+    };
+    return scene_of(
+        files, 0.5 - beside, 1,
+        plate("front", quad({-.5f, 0, .5f}, {.5f, 0, .5f}, {.5f, 1, .5f}, {-.5f, 1, .5f}),
+              "1,1,1") +
+            plate("right", quad({.5f, 0, .5f}, {.5f, 0, -1}, {.5f, 1, -1}, {.5f, 1, .5f}),
+                  "3,3,3") +
+            plate("back", quad({-.5f, 0, -1}, {.5f, 0, -1}, {.5f, 1, -1}, {-.5f, 1, -1}), "2,2,2"));
+  };
+  const auto under_sun = [](const TempFiles& files, double beside) {
+    return scene_of(files, 0.3, 2, box_over_floor(files) + sun({beside, -1, 0.7 * beside}));
+  };
+  const auto under_bulb = [](const TempFiles& files, double beside) {
+    return scene_of(files, 0.3, 2, box_over_floor(files) + bulb({0.5 - beside, 2.5, 0.2}));
+  };
+  // Its side begins to be lit as the light moves on.
+  const auto lit_side = [](const TempFiles& files, double beside) {
+    return scene_of(files, 3, 2,
+                    box(files, diffuse("clay", "0.5, 0.5, 0.5")) + bulb({0.5 - beside, 2.5, 0.2}));
+  };
+  // Turning, this sun lights the upright face or not, and its shadow ends at its upper edge or at its
+  // lower one.
+  const auto wedge = [](const TempFiles& files, double beside) {
+    const Mesh mesh = make_mesh(
+        {{-.5f, 0, .5f},
+         {.5f, 0, .5f},
+         {.5f, 1, .5f},
+         {-.5f, 0, -.5f},
+         {.5f, 0, -.5f},
+         {.5f, 1, -.5f}},
+        {{0, 1, 2}, {3, 5, 4}, {0, 3, 4}, {0, 4, 1}, {1, 4, 5}, {1, 5, 2}, {0, 2, 5}, {0, 5, 3}});
+    std::string light = sun({beside, -1, 0.3});
+    light.insert(light.find('>'), " id=\"sun\"");
+    return scene_of(files, 3, 2,
+                    obj_shape("wedge", write_mesh(files, "wedge.obj", mesh), true, 1, {0, 0.3, 0},
+                              diffuse("clay", "0.5, 0.5, 0.5")) +
+                        square("floor", 3, -90, {0, 0, 0}, diffuse("chalk", "0.8, 0.8, 0.8")) +
+                        light);
+  };
+  return {{"Camera", "sensor.translate.x", glowing_box},
+          {"CameraAndBox", "box.translate.x", glowing_box},
+          {"CameraAndPlates", "sensor.translate.x", plates},
+          {"SunAlong", "box.translate.x", under_sun},
+          {"SunAcross", "box.translate.z", under_sun},
+          {"Bulb", "box.translate.x", under_bulb},
+          {"BulbAtSide", "box.translate.x", lit_side},
+          {"SunTurns", "sun.rotate.z", wedge}};
+}
+
+class FacesEdgeOn : public testing::TestWithParam<EdgeOn> {};
+
+TEST_P(FacesEdgeOn, AreNotThere) {
+  const TempFiles files;
+  const auto sum_at = [&](double beside) {
+    return run_blocks(GetParam().scene(files, beside), {GetParam().parameter}, 256,
+                      beside == 0 ? 1 : 2)
+        .parameters[0]
+        .image_sum;
+  };
+  const Moments at = sum_at(0), beside = sum_at(2e-4);
+  fmt::print("{} +- {}, beside {} +- {}\n", at.mean(0), std::sqrt(at.variance(0)), beside.mean(0),
+             std::sqrt(beside.variance(0)));
+  EXPECT_TRUE(compare_moments(at, beside).plausible(kLevel));
+}
+
+INSTANTIATE_TEST_SUITE_P(, FacesEdgeOn, testing::ValuesIn(edge_on_cases()),
+                         [](const auto& c) { return c.param.name; });
+
+TEST(FacesEdgeOnWarning, NamesTheViewpoint) {
+  const TempFiles files;
+  const auto warnings = [&](double x, const Vec3d& direction) {
+    return run_blocks(scene_of(files, x, 2, box_over_floor(files) + sun(direction)),
+                      {"box.translate.x"}, 1, 0)
+        .warnings;
+  };
+  EXPECT_TRUE(warnings(0.3, {0.1, -1, 0.2}).empty());
+  const auto found = warnings(0.5, {0, -1, 0});
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_NE(
+      found[0].find("the camera lies in the plane of faces (2 of them, the first of \"box\")"),
+      std::string::npos)
+      << found[0];
+  EXPECT_NE(
+      found[1].find("directional along (0, -1, 0), irradiance 2 2 2 lies in the plane of faces (8"),
+      std::string::npos)
+      << found[1];
+}
+
+// Where the shadow of a plate ends along an edge of what it falls on, or out of sight behind the
+// plate, and the same with the light so far beside, on the side that counts.
+struct AlongEdge {
+  std::string name;
+  std::vector<std::string> parameters;
+  std::function<Scene(const TempFiles&, double beside)> scene;
+};
+
+constexpr Vec3d kSide{0.3701, 0.7851, 0.4967};  // Viewpoint's
+
+// A light that shines through y on x, from the height h.
+std::string bulb_through(double h, const Vec3d& y, const Vec3d& x, double beside) {
+  std::string light = bulb(x + (y - x) * (h / (y.y - x.y)) + kSide * beside);
+  light.insert(light.find('>'), " id=\"bulb\"");
+  return light;
+}
+
+std::vector<AlongEdge> along_edge_cases() {
+  const auto seen_from = [](const TempFiles& files, const Vec3d& origin, const std::string& body) {
+    SceneParts parts;
+    parts.max_depth = 2;
+    parts.origin = origin;
+    parts.target = {0.1, 0.3, 0};
+    parts.body = body;
+    return make_scene(files, parts);
+  };
+  const auto plate = [](double z, double height) {
+    return square("plate", 0.5, -90, {0, height, z}, diffuse("black", "0, 0, 0"));
+  };
+  const auto floor = [](double size) {
+    return square("floor", size, -90, {0, 0, 0}, diffuse("chalk", "0.8, 0.8, 0.8"));
+  };
+  const Vec3d high{0.3, 2.3, 4}, low{0.3, 0.6, 4};
+  // Up to the border, and from the border on.
+  const auto border = [=](double z, double height) {
+    return [=](const TempFiles& files, double beside) {
+      const Vec3d y{0, height, 1 - height};
+      return seen_from(files, high,
+                       floor(1) + plate(y.z + z, height) + bulb_through(1.5, y, {0, 0, 1}, beside));
+    };
+  };
+  const auto wall = [=](const TempFiles& files, double beside) {
+    return seen_from(files, high,
+                     floor(1) + plate(0, 0.5) +
+                         square("wall", 1, 0, {0, 1, -1}, diffuse("paint", "0.3, 0.5, 0.6")) +
+                         bulb_through(1.5, {0, 0.5, -0.5}, {0, 0, -1}, beside));
+  };
+  const auto step = [=](const Vec3d& origin) {
+    return [=](const TempFiles& files, double beside) {
+      return seen_from(files, origin,
+                       floor(3) +
+                           obj_shape("step", write_mesh(files, "step.obj", cube_mesh()), true, 0.5,
+                                     {0, 0.5, 0}, diffuse("clay", "0.5, 0.5, 0.5")) +
+                           plate(0.125, 1.25) +
+                           bulb_through(1, {0, 1.25, 0.625}, {0, 1, 0.5}, beside));
+    };
+  };
+  const auto under_sun = [=](const TempFiles& files, double beside) {
+    std::string light = sun(Vec3d{0.2, -1, 0.5} - kSide * beside);
+    light.insert(light.find('>'), " id=\"sun\"");
+    return seen_from(files, high, floor(1) + plate(0.25, 0.5) + light);
+  };
+  const auto flash = [=](const TempFiles& files, double beside) {
+    return seen_from(files, high, floor(3) + plate(0, 0.5) + bulb(high + kSide * beside));
+  };
+  const auto stack = [=](const TempFiles& files, double beside) {
+    return seen_from(files, high,
+                     floor(3) + plate(0, 0.5) +
+                         square("upper", 0.5, -90, {0.2, 1, -0.5}, "<ref id=\"black\"/>") +
+                         bulb_through(1.5, {0, 0.5, 0.5}, {0, 0, 1}, beside));
+  };
+  return {{"Border", {"plate.translate.z", "sensor.translate.z"}, border(-0.5, 0.5)},
+          {"BorderOn", {"plate.translate.z", "bulb.translate.y"}, border(0.5, 0.5)},
+          {"BorderNear", {"plate.translate.z", "floor.translate.y"}, border(-0.5, 0.02)},
+          {"Wall", {"plate.translate.z", "wall.translate.z"}, wall},
+          {"Step", {"plate.translate.z", "step.translate.z"}, step(high)},
+          {"StepSeenFromBelow", {"plate.translate.z", "step.translate.z"}, step(low)},
+          {"Sun", {"plate.translate.z", "sun.rotate.x"}, under_sun},
+          {"Flash", {"plate.translate.x", "sensor.translate.x"}, flash},
+          {"Stack", {"plate.translate.z", "upper.translate.z"}, stack}};
+}
+
+class ShadowsAlongEdges : public testing::TestWithParam<AlongEdge> {};
+
+TEST_P(ShadowsAlongEdges, AreThoseOfALightBeside) {
+  const TempFiles files;
+  const auto run = [&](double beside) {
+    return run_blocks(GetParam().scene(files, beside), GetParam().parameters, 256,
+                      beside == 0 ? 1 : 2);
+  };
+  const GradientResult at = run(0), beside = run(2e-4);
+  for (size_t p = 0; p < at.parameters.size(); ++p)
+    expect_equal(at.parameters[p], beside.parameters[p]);
+}
+
+TEST_P(ShadowsAlongEdges, InReverse) {
+  const TempFiles files;
+  BackwardOptions options;
+  options.parameters = GetParam().parameters;
+  RunSettings settings;
+  settings.spp = 64;
+  settings.threads = 1;
+  for (const ReverseCheck& c : check_reverse(GetParam().scene(files, 0), options, settings)) {
+    fmt::print("{}: {:g} +- {:.2g}, {:g} +- {:.2g}\n", c.parameter, c.forward, c.forward_error,
+               c.reverse, c.reverse_error);
+    EXPECT_GT(normal_p_value(c.z), kLevel / 20);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(, ShadowsAlongEdges, testing::ValuesIn(along_edge_cases()),
+                         [](const auto& c) { return c.param.name; });
+
+// A thing that stands on a floor ends where it touches it. Pressed together or drawn apart they have
+// one slope and another; what is computed is the one of things pressed together, as they are where
+// the thing stands a little deeper.
+struct Standing {
+  std::string name;
+  std::function<std::string(const TempFiles&)> mesh;  // its file; its lowest points are at 0
+  std::string light;
+  enum { kMatt, kGlossy, kBox } floor = kMatt;  // kBox: of the same width as the thing
+};
+
+std::vector<Standing> standing_cases() {
+  const auto cube = [](const TempFiles& files) {
+    Mesh mesh = cube_mesh();
+    for (Vec3f& x : mesh.positions) x.y += 1;
+    return write_mesh(files, "thing.obj", mesh);
+  };
+  const auto roof = [](const TempFiles& files) {  // with slanted sides
+    return write_mesh(
+        files, "thing.obj",
+        make_mesh({{-1, 0, -1}, {1, 0, -1}, {1, 0, 1}, {-1, 0, 1}, {0.2f, 2, 0}},
+                  {{0, 1, 2}, {0, 2, 3}, {1, 0, 4}, {2, 1, 4}, {3, 2, 4}, {0, 3, 4}}));
+  };
+  const auto screen = [](const TempFiles& files) {  // one sheet
+    return write_mesh(files, "thing.obj",
+                      make_mesh({{-1, 0, 0.3f}, {1, 0, -0.3f}, {1, 2, -0.3f}, {-1, 2, 0.3f}},
+                                {{0, 1, 2}, {0, 2, 3}}));
+  };
+  const std::string sky = constant_light("sky", "0.4, 0.5, 0.7");
+  const std::string lamp = square("lamp", 0.5, 90, {0.9, 2.6, 1.5}, area_light("glow", "6, 5, 4"));
+  return {{"BoxUnderSun", cube, sun({0.3, -1, -0.2})},
+          {"BoxUnderLamp", cube, lamp},
+          {"BoxOnGloss", cube, sky, Standing::kGlossy},
+          {"BoxOnBox", cube, sun({0.3, -1, -0.45}), Standing::kBox},
+          {"RoofUnderSky", roof, sky},
+          {"ScreenUnderBulb", screen, bulb({0.7, 2, 1.6})}};
+}
+
+class StandsOnAFloor : public testing::TestWithParam<Standing> {
+ protected:
+  // depth: of the thing's lowest points under the floor.
+  Scene scene(double depth) const {
+    const TempFiles files;
+    const Standing& c = GetParam();
+    SceneParts parts;
+    parts.origin = {0.6, 1.8, 3.4};
+    parts.target = {0, 0.3, 0};
+    parts.body =
+        c.light +
+        obj_shape("thing", c.mesh(files), true, 0.4, {0, -depth, 0},
+                  "<bsdf type=\"twosided\">" + diffuse("clay", "0.5, 0.5, 0.5") + "</bsdf>") +
+        (c.floor == Standing::kBox
+             ? obj_shape("floor", write_mesh(files, "floor.obj", cube_mesh()), true, 0.4,
+                         {0, -0.4, 0}, diffuse("chalk", "0.8, 0.8, 0.8"))
+             : square("floor", 2, -90, {0, 0, 0},
+                      c.floor == Standing::kGlossy ? conductor("gloss", 0.3)
+                                                   : diffuse("chalk", "0.8, 0.8, 0.8")));
+    return make_scene(files, parts);
+  }
+  const std::vector<std::string> parameters_{"thing.translate.y", "thing.rotate.z",
+                                             "floor.translate.y", "thing.translate.x"};
+};
+
+TEST_P(StandsOnAFloor, AsIfPressed) {
+  const GradientResult at = run_blocks(scene(0), parameters_, 96, 1);
+  const GradientResult pressed = run_blocks(scene(1e-4), parameters_, 96, 2);
+  for (size_t p = 0; p < parameters_.size(); ++p)
+    expect_equal(at.parameters[p], pressed.parameters[p]);
+  EXPECT_NE(at.warnings.at(0).find("\"thing\" and \"floor\" touch"), std::string::npos);
+}
+
+TEST_P(StandsOnAFloor, InReverse) {
+  BackwardOptions options;
+  options.parameters = {"thing.translate.y"};
+  RunSettings settings;
+  settings.spp = 64;
+  settings.threads = 1;
+  for (const ReverseCheck& c : check_reverse(scene(0), options, settings)) {
+    fmt::print("{}: {:g} +- {:.2g}, {:g} +- {:.2g}\n", c.parameter, c.forward, c.forward_error,
+               c.reverse, c.reverse_error);
+    EXPECT_GT(normal_p_value(c.z), kLevel / 20);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(, StandsOnAFloor, testing::ValuesIn(standing_cases()),
+                         [](const auto& c) { return c.param.name; });
+
+}  // namespace
+}  // namespace limn
