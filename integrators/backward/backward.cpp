@@ -120,7 +120,8 @@ class BackwardPass {
         parameters_(scene, options.parameters),
         tracer_(make_embree_tracer(parameters_.scene(), settings.threads)),
         lights_(parameters_.scene()),
-        path_{parameters_.scene(), *tracer_, lights_},
+        mirrored_(MirroredLight::make(parameters_.scene())),
+        path_{parameters_.scene(), *tracer_, lights_, nullptr, mirrored_.get()},
         input_(path_, 3, {1, 1, 1, 1}, edge_sampler_type(options.sampler), settings.threads),
         context_{path_, parameters_, input_.edges(),
                  EdgeMotion(parameters_.slots(), input_.edges())} {
@@ -176,6 +177,7 @@ class BackwardPass {
   ParameterSlots parameters_;
   std::unique_ptr<RayTracer> tracer_;
   Lights lights_;
+  std::unique_ptr<MirroredLight> mirrored_;  // null where nothing mirrors
   PathContext path_;
   TermInput input_;
   AdjointContext context_;

@@ -16,7 +16,8 @@ RadianceEstimator::RadianceEstimator(const Scene& scene, int threads,
       tracer_(make_embree_tracer(scene_, threads)),
       lights_(scene_),
       closed_(closed ? std::make_unique<ClosedLight>(scene_, threads) : nullptr),
-      context_{scene_, *tracer_, lights_, closed_.get()},
+      mirrored_(MirroredLight::make(scene_)),
+      context_{scene_, *tracer_, lights_, closed_.get(), mirrored_.get()},
       camera_(scene_.camera),
       visible_(std::move(visible)) {}
 

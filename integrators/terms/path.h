@@ -32,6 +32,8 @@ struct PathContext {
   const Lights& lights;
   // Takes the place of all light that is scattered; null: paths are sampled.
   const ClosedLight* closed = nullptr;
+  // What a share of directions is drawn from; null: none.
+  const MirroredLight* mirrored = nullptr;
 };
 
 // Does nothing at path vertices.
@@ -130,6 +132,10 @@ class PathTracer {
   Rgb<S> emitted(const SurfacePoint<S>& surface, const Vec3d& wo, double pdf,
                  double distance) const;
   bool survives_roulette(Walk& walk) const;
+  // The density of the next direction at w, of which scattering alone has this one.
+  double density(const Walk& walk, const Vec3d& w, double scattered) const {
+    return c_.mirrored ? c_.mirrored->pdf(walk.mixture, w, scattered) : scattered;
+  }
   // path_rays.h
   bool next_hit(Walk& walk);
   bool shadowed(const Walk& walk);
