@@ -132,7 +132,9 @@ class BackwardPass {
                     ? std::make_unique<ClosedLight>(parameters_.scene(), settings.threads)
                     : nullptr),
         viewpoints_(parameters_.scene()),
-        path_{parameters_.scene(), *tracer_, lights_, closed_.get(), &viewpoints_},
+        mirrored_(MirroredLight::make(parameters_.scene())),
+        path_{parameters_.scene(), *tracer_, lights_, closed_.get(), &viewpoints_,
+              mirrored_.get()},
         input_(path_, 3, {1, 1, 1, 1}, method_.sampler, settings.threads),
         context_{path_, parameters_, input_.edges(),
                  EdgeMotion(parameters_.slots(), input_.edges())} {
@@ -191,6 +193,7 @@ class BackwardPass {
   ReverseMethod method_;
   std::unique_ptr<ClosedLight> closed_;  // null where paths are sampled
   Viewpoints viewpoints_;
+  std::unique_ptr<MirroredLight> mirrored_;  // null where nothing mirrors
   PathContext path_;
   TermInput input_;
   AdjointContext context_;

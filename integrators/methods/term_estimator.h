@@ -131,6 +131,7 @@ class TermEstimator final : public SampleEstimator {
   Lights lights_;
   std::unique_ptr<ClosedLight> closed_;  // null where paths are sampled
   Viewpoints viewpoints_;
+  std::unique_ptr<MirroredLight> mirrored_;  // null where nothing mirrors
   PathContext context_;
   CameraView<Dual> camera_;
   std::shared_ptr<const FilmRegions> visible_;

@@ -35,6 +35,8 @@ struct PathContext {
   const ClosedLight* closed = nullptr;
   // From where edges are looked at; needed where paths start beside edges.
   const Viewpoints* viewpoints = nullptr;
+  // What a share of directions is drawn from; null: none.
+  const MirroredLight* mirrored = nullptr;
 };
 
 // Does nothing at path vertices.
@@ -132,6 +134,10 @@ class PathTracer {
   int splits(const SurfacePoint<S>& surface, int copies) const;
   Rgb<S> emitted(const Walk& walk) const;
   bool survives_roulette(Walk& walk) const;
+  // The density of the next direction at w, of which scattering alone has this one.
+  double density(const Walk& walk, const Vec3d& w, double scattered) const {
+    return c_.mirrored ? c_.mirrored->pdf(walk.mixture, w, scattered) : scattered;
+  }
   // path_rays.h
   bool next_hit(Walk& walk);
   bool shadowed(const Walk& walk);

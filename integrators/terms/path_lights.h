@@ -67,7 +67,7 @@ inline void PathTracer<S, Visitor>::weigh_light(Walk& walk) const {
   const Vec3<S> direction = detail::moving<S>(light.wo, walk.light_motion);
   const auto [f, pdf] = detail::evaluate(*walk.scattering, light.wo, direction, walk.light_motion);
   walk.light_share = detail::stretched(f, light.wo, walk.light_motion);
-  walk.light_weight = mis_weight(light.pdf, pdf) / light.pdf;
+  walk.light_weight = mis_weight(light.pdf, density(walk, light.wo, pdf)) / light.pdf;
   if (is_black(value(f))) walk.light.reset();
 }
 
@@ -116,7 +116,7 @@ inline Rgb<S> PathTracer<S, Visitor>::warped_light(const Walk& walk, const Rng& 
   const DirectionMotion* motion = warper_->motion(surface, light.wo, key.at(Purpose::kEmitter, 1));
   const Vec3<S> direction = detail::moving<S>(light.wo, motion);
   const auto [f, bsdf_pdf] = detail::evaluate(scattering, light.wo, direction, motion);
-  const double weight = mis_weight(light.pdf, bsdf_pdf) / light.pdf;
+  const double weight = mis_weight(light.pdf, density(walk, light.wo, bsdf_pdf)) / light.pdf;
   const Rgb<S> radiance = motion && !light.face ? light.light->radiance(direction)
                                                 : light.light->template drawn_radiance<S>(light);
   return detail::stretched(f, light.wo, motion) * radiance * weight;

@@ -16,6 +16,8 @@ inline bool PathTracer<S, Visitor>::begin_vertex(Walk& walk) {
   if (walk.scattering->black()) return false;
   set_motion(walk);
   walk.lights = c_.lights.at(value(walk.surface.p));
+  walk.mixture = mixture_at(c_.mirrored, walk.surface, *walk.scattering,
+                            !is_complete(walk.bounces + 1));
   walk.light.reset();
   walk.lit = walk.again;
   if (walk.again) {
@@ -46,7 +48,13 @@ inline bool PathTracer<S, Visitor>::choose_direction(Walk& walk) {
   Rng rng = walk.key.at(Purpose::kBsdf, walk.bounces);
   const double u1 = rng.uniform();
   const double u2 = rng.uniform();
-  const auto wo = walk.scattering->sample(u1, u2);
+  const auto wo = [&] {
+    if (walk.mixture.share == 0) return walk.scattering->sample(u1, u2);
+    const double u = rng.uniform();
+    return u < walk.mixture.share
+               ? c_.mirrored->sample(walk.mixture, u / walk.mixture.share, u1, u2)
+               : walk.scattering->sample(u1, u2);
+  }();
   if (!wo) return false;
   walk.wo = *wo;
   if constexpr (std::is_same_v<S, Dual>) {
@@ -58,8 +66,10 @@ inline bool PathTracer<S, Visitor>::choose_direction(Walk& walk) {
 template <class S, class Visitor>
 inline bool PathTracer<S, Visitor>::scatter(Walk& walk) {
   walk.direction = detail::moving<S>(walk.wo, walk.motion);
-  const auto [f, pdf] = detail::evaluate(*walk.scattering, walk.wo, walk.direction, walk.motion);
+  const auto [f, scattered] =
+      detail::evaluate(*walk.scattering, walk.wo, walk.direction, walk.motion);
   if (is_black(value(f))) return false;
+  const double pdf = density(walk, walk.wo, scattered);
   walk.pdf = pdf;
   detail::add_score<S>(walk, value(walk.throughput) * (1 / pdf));
   walk.before = walk.throughput;

@@ -54,7 +54,10 @@ class PenumbraLines {
     const double distance = length(to);
     const bool apart = distance > 0 && drawn->face != vertex.surface.face;
     const Vec3d omega = apart ? to / distance : Vec3d{};
-    const double pdf = apart ? vertex.scattering.pdf_solid_angle(omega) : 0;
+    double pdf = apart ? vertex.scattering.pdf_solid_angle(omega) : 0;
+    if (const MirroredLight* mirrored = context_.mirrored) {
+      pdf = mirrored->pdf(mirrored->mixture(vertex.surface, vertex.scattering), omega, pdf);
+    }
     const Rgb<double> f = pdf > 0 ? vertex.scattering.eval_value(omega) : Rgb<double>{};
     if (is_black(f) || !complete(*drawn, {q, pdf}, vertex.bounces + 1, rng)) {
       ++cost.zero_weight;

@@ -6,6 +6,7 @@
 
 #include "integrators/terms/direction_field.h"
 #include "integrators/terms/edge_sides.h"
+#include "integrators/terms/mirrored_light.h"
 #include "limn/core/lights.h"
 #include "limn/core/ray_tracer.h"
 #include "limn/core/rng.h"
@@ -66,6 +67,7 @@ struct Walk {
   double light_weight = 1;
 
   // The next ray.
+  MirroredLight::Mixture mixture;  // that its direction is drawn from
   Vec3d wo;
   Vec3<S> direction;  // the same as it moves
   double pdf = 0;     // [1/sr]

@@ -1,0 +1,172 @@
+// The sun's glare on flat gloss: a share of directions is drawn there, and nothing else changes.
+#include "integrators/terms/mirrored_light.h"
+
+#include <gtest/gtest.h>
+
+#include "integrators/terms/path_follow.h"
+#include "support/block_runs.h"
+#include "support/environment_maps.h"
+#include "support/meshes.h"
+#include "support/running_mean.h"
+#include "support/scenes.h"
+
+namespace limn {
+namespace {
+
+// A dim sky with a sun of this radius.
+std::string sun_in_sky(const TempFiles& files, double degrees) {
+  Image map(512, 256, 3);
+  const Vec3d sun = normalize(Vec3d{0.5, 0.5, 0.4});
+  for (int y = 0; y < map.height; ++y) {
+    for (int x = 0; x < map.width; ++x) {
+      const Vec3d w = test::map_direction((x + 0.5) / map.width,
+                                          static_cast<double>(y) / (map.height - 1));
+      const bool lit = dot(w, sun) > std::cos(degrees * kPi / 180);
+      for (int c = 0; c < 3; ++c) map.at(x, y, c) = lit ? 400.0f : 0.2f + 0.1f * c;
+    }
+  }
+  write_exr(files.path("sun.exr"), map, false, {});
+  return R"(  <emitter type="envmap" id="sky"><string name="filename" value=")" +
+         files.path("sun.exr") + "\"/></emitter>\n";
+}
+
+// A wall and a body over gloss.
+Scene scene_with(const TempFiles& files, double alpha, double sun) {
+  SceneParts parts;
+  parts.max_depth = 3;
+  parts.origin = {0.3, 1.5, 3.5};
+  parts.target = {0, 0.5, 0};
+  parts.body = square("floor", 2, -90, {0, 0, 0}, conductor("gloss", alpha)) +
+               square("wall", 1, 0, {0, 1, -1}, diffuse("paint", "0.8, 0.7, 0.6")) +
+               obj_shape("body", write_mesh(files, "body.obj", torus_mesh(10, 6)), true, 0.5,
+                         {0, 0.7, 0.1}, diffuse("clay", "0.6, 0.5, 0.4")) +
+               sun_in_sky(files, sun);
+  return make_scene(files, parts);
+}
+
+struct Case {
+  double alpha, sun;  // radius [degrees]
+};
+// Lobes wider than the sun, and narrower.
+constexpr Case kCases[] = {{0.05, 1}, {0.02, 4}};
+
+struct Point {
+  Point(const Scene& scene, const RayTracer& tracer, const Vec3d& origin, const Vec3d& direction) {
+    Hit hit;
+    EXPECT_TRUE(tracer.closest({origin, direction}, hit));
+    surface = surface_on_ray<double>(scene, hit.face, origin, direction);
+    wi = -direction;
+  }
+  SurfacePoint<double> surface;
+  Vec3d wi;
+};
+
+// Draws of the images are as their density says: means of some functions by draws, and by the
+// density over uniform directions.
+TEST(MirroredLight, DrawsFromItsDensity) {
+  const TempFiles files;
+  for (const auto& [alpha, sun] : kCases) {
+    const Scene scene = scene_with(files, alpha, sun);
+    const auto tracer = make_embree_tracer(scene, 1);
+    const auto mirrored = MirroredLight::make(scene);
+    ASSERT_TRUE(mirrored);
+    const Point at(scene, *tracer, {0.2, 0.8, 1}, {0, 0, -1});
+    const Scattering<double> scattering(at.surface, at.wi, scene.shading);
+    MirroredLight::Mixture mixture = mirrored->mixture(at.surface, scattering);
+    EXPECT_GT(mixture.share, 0.01);
+    EXPECT_LT(mixture.share, 0.5);
+    mixture.share = 1;  // of the images alone
+    constexpr int kDraws = 400000;
+    const auto functions = [](const Vec3d& w) {
+      return std::array{1.0, w.x, w.y * w.z, std::cos(40 * w.x), std::cos(40 * w.y)};
+    };
+    std::array<RunningMean, 5> drawn, expected;
+    Rng rng(3, 0, 0);
+    for (int i = 0; i < kDraws; ++i) {
+      const double u = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
+      const auto w = mirrored->sample(mixture, u, u1, u2);
+      const auto of_draw = functions(w.value_or(Vec3d{}));
+      // Within a cone around the glare, which holds all but what the lobe's tail has.
+      const double y = 2 * rng.uniform() - 1, phi = 2 * kPi * rng.uniform();
+      const double s = std::sqrt(1 - y * y);
+      const Vec3d other{s * std::cos(phi), y, s * std::sin(phi)};
+      const double weight = 4 * kPi * mirrored->pdf(mixture, other, 0);
+      const auto of_other = functions(other);
+      for (size_t k = 0; k < drawn.size(); ++k) {
+        drawn[k].add(w ? of_draw[k] : 0);
+        expected[k].add(weight * of_other[k]);
+      }
+    }
+    for (size_t k = 0; k < drawn.size(); ++k) {
+      const double error = std::hypot(drawn[k].standard_error(), expected[k].standard_error());
+      EXPECT_LT(std::fabs(drawn[k].mean() - expected[k].mean()), 4.5 * error) << k;
+    }
+  }
+}
+
+// Radiance from points of the wall with and without: the same mean, and squares that are ruled no
+// more by paths that meet the glare by chance.
+TEST(MirroredLight, ChangesNoMean) {
+  const TempFiles files;
+  for (const auto& [alpha, sun] : kCases) {
+    const Scene scene = scene_with(files, alpha, sun);
+    const auto tracer = make_embree_tracer(scene, 1);
+    const Lights lights(scene);
+    const auto mirrored = MirroredLight::make(scene);
+    RunningMean means[2], squares[2];
+    Rng rng(5, 0, 0);
+    for (int i = 0; i < 40000; ++i) {
+      const Point at(scene, *tracer, {1.6 * rng.uniform() - 0.8, 0.2 + 1.6 * rng.uniform(), 0.9},
+                     {0, 0, -1});
+      for (const bool on : {false, true}) {
+        const PathContext context{scene, *tracer, lights, nullptr, nullptr,
+                                  on ? mirrored.get() : nullptr};
+        RayCount rays;
+        PathTracer<double, NoVisitor> paths(context, rays);
+        Walk<double, NoVisitor> walk(Rng(7, static_cast<uint64_t>(i), on), 0, nullptr);
+        paths.place(walk, at.surface, at.wi);
+        paths.follow_one(walk);
+        const double value = walk.radiance().g;
+        means[on].add(value);
+        squares[on].add(value * value);
+      }
+    }
+    const double error = std::hypot(means[0].standard_error(), means[1].standard_error());
+    EXPECT_LT(std::fabs(means[0].mean() - means[1].mean()), 4.5 * error) << alpha;
+    EXPECT_LT(squares[1].mean() + 3 * squares[1].standard_error(), squares[0].mean()) << alpha;
+  }
+}
+
+// The shares of lines that are found from the sun know of it, in forward mode's terms.
+TEST(MirroredLight, RegionsAddUpToTheForest) {
+  const TempFiles files;
+  const Scene scene = scene_with(files, 0.05, 1);
+  GradientOptions options;
+  options.parameters = {"body.translate.x", "floor.rotate.x"};
+  options.terms = {"boundary"};
+  options.method = "forest";
+  const GradientResult forest = run_blocks(scene, options, 4096, 2, 0);
+  options.method = "silhouettes";
+  options.terms = {"boundary", "direct", "penumbra"};
+  const GradientResult regions = run_blocks(scene, options, 512, 1, 0);
+  for (size_t k = 0; k < options.parameters.size(); ++k) {
+    expect_equal(regions.parameters[k], forest.parameters[k]);
+  }
+}
+
+// Nothing to mirror, nothing to see it by: no share, and no image changes.
+TEST(MirroredLight, IsNotWhereNothingMirrors) {
+  const TempFiles files;
+  EXPECT_FALSE(MirroredLight::make(scene_with(files, 0.6, 1)));
+  const Scene scene = scene_with(files, 0.05, 1);
+  const auto tracer = make_embree_tracer(scene, 1);
+  // Below the floor.
+  const Point below(scene, *tracer, {0.2, -0.5, 0}, {0, 1, 0});
+  const Scattering<double> scattering(below.surface, below.wi, scene.shading);
+  if (!scattering.black()) {
+    EXPECT_EQ(MirroredLight::make(scene)->mixture(below.surface, scattering).share, 0);
+  }
+}
+
+}  // namespace
+}  // namespace limn
