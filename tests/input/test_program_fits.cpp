@@ -1,0 +1,260 @@
+// Reverse passes and fits by the program: what they write, and how they go on.
+#include <cmath>
+
+#include "support/program.h"
+
+namespace limn {
+namespace {
+
+// The same bits with and without a break; what was asked is in the folder.
+TEST_F(Program, FitsAndGoesOn) {
+  const std::string target = files_.path("target.exr"), truth = files_.path("ball.obj");
+  write_mesh(files_, "ball.obj", icosphere_mesh(1));
+  ASSERT_EQ(run("render " + scene_ + " -D glow=3 --spp 4 -o " + target).status, 0);
+  const std::string whole = files_.path("whole"), broken = files_.path("broken");
+  const std::string fit = "fit " + scene_ + " --target " + target +
+                          " --wrt screen.vertex_positions --wrt blaze.radiance --spp 2 --seed 3 "
+                          "--no-report --bounds blaze.radiance=0,7 --view '" +
+                          scene_ + ";glow=4' --target " + target + " --truth " + truth;
+  const Outcome outcome = run(fit + " --steps 4 --snapshots 2 -o " + whole);
+  ASSERT_EQ(outcome.status, 0) << outcome.text;
+  EXPECT_NE(outcome.text.find("step 4: loss "), std::string::npos) << outcome.text;
+  ASSERT_EQ(run(fit + " --steps 3 --threads 2 -o " + broken).status, 0);
+  ASSERT_EQ(run("fit --steps 4 --no-report --resume " + broken).status, 0);
+  const auto bytes = [](const std::string& file) {
+    std::ifstream stream(file, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(stream), {});
+  };
+  EXPECT_GT(bytes(whole + "/state.cbor").size(), 100u);
+  EXPECT_EQ(bytes(whole + "/state.cbor"), bytes(broken + "/state.cbor"));
+  EXPECT_EQ(bytes(whole + "/step_00004_screen.ply"), bytes(broken + "/step_00004_screen.ply"));
+  const json a = json::parse(bytes(whole + "/fit.json"));
+  const json b = json::parse(bytes(broken + "/fit.json"));
+  EXPECT_EQ(a["status"], "done");
+  ASSERT_EQ(a["history"].size(), 4u);
+  ASSERT_EQ(b["history"].size(), 4u);
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(a["history"][i]["loss"], b["history"][i]["loss"]);
+  ASSERT_EQ(a["snapshots"].size(), 3u);
+  for (const char* key : {"chamfer", "hausdorff", "normal_angle"}) {
+    EXPECT_GT(a["snapshots"][2]["meshes"][0][key].get<double>(), 0) << key;
+  }
+  for (const json& picture : a["snapshots"][0]["pictures"]) {
+    EXPECT_GT(bytes(whole + "/" + picture.get<std::string>()).size(), 60u);
+  }
+  EXPECT_EQ(bytes(whole + "/history.csv").substr(0, 29), "step,loss,stderr,step_size,ha");
+
+  const std::string again = fit + " --steps 2 -o ";
+  EXPECT_NE(refused(again + whole).find("holds a fit already"), std::string::npos);
+  EXPECT_NE(refused("fit --resume " + files_.path("nowhere")).find("no fit was interrupted"),
+            std::string::npos);
+  EXPECT_NE(refused("fit " + scene_ + " --resume " + whole).find("leave out scene"),
+            std::string::npos);
+  EXPECT_NE(refused("fit --spp 4 --loss l1 --no-report --resume " + whole)
+                .find("leave out --spp, --loss\n"),
+            std::string::npos);
+  EXPECT_NE(refused("fit --steps 2 -o " + out()).find("give a scene"), std::string::npos);
+  const std::string start = "fit " + scene_ + " --steps 2 -o " + files_.path("other");
+  EXPECT_NE(refused(start + " --target " + target).find("give --wrt"), std::string::npos);
+  EXPECT_NE(refused(start + " --wrt blaze.radiance").find("0 --target for 1 views"),
+            std::string::npos);
+  const std::string good = start + " --wrt blaze.radiance --target " + target;
+  EXPECT_NE(refused(good + " --bounds blaze.radiance=3").find("NAME=LEAST,MOST"),
+            std::string::npos);
+  EXPECT_NE(refused(good + " --loss l3").find("unknown loss \"l3\""), std::string::npos);
+  EXPECT_NE(refused(good + " --optimiser sgd").find("known: adam-uniform, adam"),
+            std::string::npos);
+  EXPECT_NE(refused(good + " --terms sky").find("no term \"sky\" here"), std::string::npos);
+  const std::string small = files_.path("small.exr");
+  write_exr(small, Image(2, 2, 3), false, {});
+  EXPECT_NE(refused(good + " --mask " + small).find(small + ": error: the mask has 2 x 2 pixels"),
+            std::string::npos);
+  const std::string flat = files_.write("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
+  EXPECT_NE(refused(good + " --truth " + flat).find("flat.obj: error: has no face with an area"),
+            std::string::npos);
+  EXPECT_FALSE(std::ifstream(files_.path("other") + "/state.cbor"));
+}
+
+// Each sensor of a scene has its target.
+TEST_F(Program, FitsSeenBySeveralSensors) {
+  std::string text = bytes_of(scene_);
+  const size_t at = text.find("<sensor"), end = text.find("</sensor>") + 9;
+  std::string second = text.substr(at, end - at);
+  second.replace(0, 7, "<sensor id=\"side\"");
+  const size_t origin = second.find("origin=\"");
+  second.replace(origin, second.find('"', origin + 8) - origin, "origin=\"3, 1, 2");
+  text.insert(end, second);
+  const std::string both = files_.write("both.xml", text);
+  std::string targets, swapped, folder = files_.path("sensors");
+  for (const char* sensor : {"0", "side"}) {
+    const std::string file = files_.path(std::string(sensor) + ".exr");
+    const std::string told = files_.path("told.json");
+    ASSERT_EQ(
+        run("render " + both + " --sensor " + sensor + " --spp 64 --json " + told + " -o " + file)
+            .status,
+        0);
+    EXPECT_EQ(json::parse(bytes_of(told))["sensor"], sensor);
+    EXPECT_EQ(attribute_of(file, "limn.sensor"), sensor);
+    targets += " --target " + file;
+    swapped.insert(0, " --target " + file);
+  }
+  EXPECT_NE(bytes_of(files_.path("0.exr")), bytes_of(files_.path("side.exr")));
+  const std::string fit = "fit " + both + " --wrt blaze.radiance --spp 16 --steps 1 --no-report";
+  std::vector<double> losses, variances;
+  for (const std::string& order : {targets, swapped}) {
+    folder += "_";
+    ASSERT_EQ(run(fit + order + " -o " + folder).status, 0);
+    const json first = json::parse(bytes_of(folder + "/fit.json"))["history"][0];
+    ASSERT_EQ(first["views"].size(), 2u);
+    losses.push_back(first["loss"]);
+    variances.push_back(std::pow(first["stderr"].get<double>(), 2));
+  }
+  EXPECT_GT(losses[1] - losses[0], 5 * std::sqrt(variances[0] + variances[1]));
+  EXPECT_NE(refused(fit + " --target " + files_.path("0.exr") + " -o " + files_.path("no"))
+                .find("1 --target for 2 views"),
+            std::string::npos);
+  EXPECT_NE(refused("render " + both + " --sensor top -o " + out())
+                .find("both.xml: error: there is no sensor \"top\" (known: 0, 1 or \"side\")"),
+            std::string::npos);
+}
+
+// A shape of the second view alone, whose id is no name of a file; a field, named from where the
+// program runs; new triangles after the last step.
+TEST_F(Program, FitsOfLaterViewsAndFields) {
+  const std::string target = files_.path("target.exr"), folder = files_.path("later");
+  ASSERT_EQ(run("render " + scene_ + " --spp 1 -o " + target).status, 0);
+  SceneParts parts;
+  parts.width = parts.height = 8;
+  const std::string ball = write_mesh(files_, "ball.obj", icosphere_mesh(1));
+  parts.body = obj_shape("a/b", ball, false, 0.4, {0, 1, 0}, diffuse("clay", "0.7, 0.5, 0.3")) +
+               square("lamp", 0.5, 90, {0.3, 2.4, 0.5}, area_light("blaze", "6, 5, 4"));
+  const std::string second = files_.write("second.xml", scene_text(parts));
+  const std::string field = "screen.vertex_positions:field.txt";
+  files_.write("field.txt", "0 0 1\n0 0 1\n0 0 1\n0 0 1\n");
+  const std::string fit = std::string("cd ") + files_.path("") + " && " + LIMN_PROGRAM + " fit " +
+                          scene_ + " --target " + target + " --view " + second + " --target " +
+                          target + " --spp 1 --steps 1 --no-report --wrt a/b.vertex_positions";
+  const Outcome outcome = call(fit + " --wrt " + field + " --bounds " + field + "=-1,1 -o later");
+  ASSERT_EQ(outcome.status, 0) << outcome.text;
+  EXPECT_GT(bytes_of(folder + "/step_00001_a_b.ply").size(), 500u);
+  EXPECT_EQ(json::parse(bytes_of(folder + "/fit.json"))["snapshots"][1]["meshes"].size(), 2u);
+  const Outcome on = run("fit --no-report --steps 2 --resume " + folder);
+  EXPECT_EQ(on.status, 0) << on.text;
+  files_.write("field.txt", "0 0 1\n0 0 1\n0 0 1\n0 0 2\n");
+  EXPECT_NE(refused("fit --no-report --steps 3 --resume " + folder)
+                .find("field.txt: error: is not as it was when the fit in "),
+            std::string::npos);
+  const Outcome backward = run("backward " + second + " --spp 1 --target " + target +
+                               " --wrt a/b.vertex_positions -o " + files_.path("back"));
+  EXPECT_EQ(backward.status, 0) << backward.text;
+  EXPECT_GT(bytes_of(files_.path("back") + "/a_b.vertex_positions.ply").size(), 500u);
+  EXPECT_NE(call(fit + " --wrt screen.vertex_positions:fit.json -o .")
+                .text.find("fit.json: error: -o would write over a file that is read"),
+            std::string::npos);
+  const Outcome remeshed = call(fit + " --remesh 5 -o remeshed");
+  if (remeshed.text.find("OpenMesh") == std::string::npos) {
+    EXPECT_NE(remeshed.text.find("--remesh 5: the fit ends before, after 1 steps"),
+              std::string::npos)
+        << remeshed.text;
+  }
+}
+
+// Steps take twice as long each, so that the interrupt comes within one, after a snapshot.
+TEST_F(Program, InterruptedFitsKeepPicturesAndTellWhatIsDamaged) {
+  const std::string target = files_.path("target.exr"), folder = files_.path("fit");
+  ASSERT_EQ(run("render " + scene_ + " --spp 1 -o " + target).status, 0);
+  const Outcome outcome =
+      call(std::string("timeout -s INT 2 ") + LIMN_PROGRAM + " fit " + scene_ + " --target " +
+           target + " --wrt blaze.radiance --spp 1 --spp-doubling 1 --steps 40 --snapshots 1 " +
+           "--no-report -o " + folder);
+  EXPECT_NE(outcome.text.find("interrupted: "), std::string::npos) << outcome.text;
+  const std::string file = folder + "/fit.json", text = bytes_of(file);
+  const json fit = json::parse(text);
+  EXPECT_EQ(fit["snapshots"].back()["step"], fit["steps"]);
+  EXPECT_EQ(fit["snapshots"].back()["pictures"].size(), 1u);
+
+  const std::string resume = "fit --no-report --resume " + folder;
+  const auto says = [&](const std::string& what) {
+    const std::string message = refused(resume);
+    EXPECT_NE(message.find(what), std::string::npos) << message;
+  };
+  const auto damage = [&](const std::string& pointer, const json& value) {
+    json damaged = fit;
+    damaged[json::json_pointer(pointer)] = value;
+    files_.write("fit/fit.json", damaged.dump());
+  };
+  damage("/arguments/views", json::array());
+  says("fit.json: error: is not what a fit writes: it has no views");
+  damage("/history/0/loss", "high");
+  says("fit.json: error: is not what this fit writes: ");
+  files_.write("fit/fit.json", text);
+  const std::string state = bytes_of(folder + "/state.cbor");
+  json other = json::from_cbor(state);
+  other["parameters"].clear();
+  const std::vector<uint8_t> bytes = json::to_cbor(other);
+  files_.write("fit/state.cbor", std::string(bytes.begin(), bytes.end()));
+  says("state.cbor: error: is the state of another fit");
+  files_.write("fit/state.cbor", state);
+  std::string changed = bytes_of(scene_);
+  changed.replace(changed.find("0.7, 0.5, 0.3"), 3, "0.6");
+  files_.write("scene.xml", changed);
+  says("scene.xml: error: is not as it was when the fit in ");
+  changed.replace(changed.find("0.6, 0.5, 0.3"), 3, "0.7");
+  files_.write("scene.xml", changed);
+  const Image image = read_exr(target);
+  Image other_image = image;
+  other_image.data[5] += 1;
+  write_exr(target, other_image, false, {});
+  says("target.exr: error: is not as it was when the fit in ");
+}
+
+// An array's files: a mesh, and a field that gradient takes.
+TEST_F(Program, BackwardWritesWhatOthersRead) {
+  const std::string target = out(), folder = files_.path("back");
+  ASSERT_EQ(run("render " + scene_ + " --spp 2 --quiet -D glow=5,5,5 -o " + target).status, 0);
+  const Outcome outcome = run("backward " + scene_ + " --spp 2 --target " + target +
+                              " --wrt screen.vertex_positions --wrt blaze.radiance -o " + folder);
+  ASSERT_EQ(outcome.status, 0) << outcome.text;
+  const json report = json::parse(std::ifstream(folder + "/gradient.json"));
+  ASSERT_EQ(report["parameters"].size(), 2u);
+  EXPECT_EQ(report["parameters"][0]["shape"], json({4, 3}));
+  EXPECT_GT(report["loss"]["value"], 0);
+  const std::string array = folder + "/screen.vertex_positions";
+  EXPECT_EQ(read_mesh(array + ".ply", true).positions.size(), 4u);
+  EXPECT_EQ(run("gradient " + scene_ + " --spp 1 --quiet --wrt screen.vertex_positions:" + array +
+                ".txt -o " + out())
+                .status,
+            0);
+  EXPECT_NE(refused("backward " + scene_ + " -o " + folder).find("--adjoint or --target"),
+            std::string::npos);
+  const std::string small = files_.path("small.exr");
+  write_exr(small, Image(2, 2, 3), false, {});
+  EXPECT_NE(refused("backward " + scene_ + " --target " + small + " -o " + folder)
+                .find(small + ": error: the target has 2 x 2 pixels"),
+            std::string::npos);
+  EXPECT_NE(refused("backward " + scene_ + " --adjoint " + target + " --terms sky -o " + folder)
+                .find("no term \"sky\""),
+            std::string::npos);
+}
+
+TEST_F(Program, ReversePassesKeepToTheirTime) {
+  const std::string folder = files_.path("back"), again = files_.path("again");
+  const std::string target = files_.path("target.exr");
+  ASSERT_EQ(run("render " + scene_ + " --spp 2 --quiet -D glow=5,5,5 -o " + target).status, 0);
+  const std::string command = "backward " + scene_ + " --quiet --adjoint " + target + " ";
+  const Outcome outcome = run(command + "--time 0.5 -o " + folder);
+  ASSERT_EQ(outcome.status, 0) << outcome.text;
+  const json timed = json::parse(std::ifstream(folder + "/gradient.json"));
+  // Its samples and batches say all.
+  ASSERT_EQ(run(command + fmt::format("--spp {} --batches {} -o {}", timed["spp"].get<int>(),
+                                      timed["batches"].get<int>(), again))
+                .status,
+            0);
+  const json same = json::parse(std::ifstream(again + "/gradient.json"));
+  EXPECT_EQ(timed["parameters"][0]["value"], same["parameters"][0]["value"]);
+  EXPECT_EQ(bytes_of(folder + "/screen.vertex_positions.npy"),
+            bytes_of(again + "/screen.vertex_positions.npy"));
+  EXPECT_GE(timed["batches"], 2);
+}
+
+}  // namespace
+}  // namespace limn
