@@ -593,7 +593,7 @@ TEST(CompareImages, Rows) {
       EXPECT_EQ(row.image.size(), result.reference.size());
     }
   }
-  Scene shiny = scene_of(files, {});
+  Scene shiny = scene_of(files, {}, false, constant_light("sky", "1, 1, 1"));
   shiny.max_depth = 3;
   options.methods = {"path"};
   const ImageComparison by_paths = compare_images(shiny, options, settings);
