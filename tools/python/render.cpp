@@ -37,7 +37,10 @@ Estimate render_scene(const SceneHandle& handle, std::optional<int> spp,
                       std::optional<uint64_t> seed, int threads, const nb::object& progress,
                       const std::string& method, const std::string& film,
                       const std::string& sampler, BatchStore* store) {
-  const RenderOptions options{method, is_exact(film), sampler};
+  RenderOptions options;
+  options.method = method;
+  options.exact_film = is_exact(film);
+  options.sampler = sampler;
   const auto scene = handle.share();
   RenderResult result;
   run_job(make_settings(*scene, {spp, seed, 0, threads, store}), progress,
