@@ -83,9 +83,7 @@ std::span<const RenderMethod> render_methods() { return kMethods; }
 
 RenderResult render(const Scene& scene, const RunSettings& settings, const RenderOptions& options) {
   const Stopwatch watch;
-  if (settings.store) {
-    identify(*settings.store, options);
-  }
+  if (settings.store) identify(*settings.store, options);
   std::vector<std::unique_ptr<SampleEstimator>> estimators;
   estimators.push_back(make_estimator(scene, settings, options));
   check_memory(estimators);

@@ -23,9 +23,9 @@ constexpr int kSkyLines = 4;
 // Lamps that are no polygon are cut into their faces. Not tuned.
 constexpr size_t kMostFaces = 64;
 
-// With fewer lines both halves can miss the same thing and agree: a tolerance asks for as many at
-// least. Under the torus of the tests at a tolerance of 1e-3 from 1, 2, 4, 8 lines the error is
-// FILLIN of the result.
+// Few lines can miss the same thing and agree: a tolerance asks for as many at least. Of a cube that
+// fills a tenth of the azimuths the largest error of 100 offsets at a tolerance of 1e-3 is 0.13 from
+// one line, and 1.1e-3 from 8 (test_line_light).
 constexpr int kFewestLines = 8;
 
 // A place on a line, by cot theta.

@@ -66,53 +66,6 @@ class Parts : public Program {
   }
 };
 
-class Parts : public Program {
- protected:
-  std::string part(int k) const { return files_.path(fmt::format("jobs/{}.part", k)); }
-  // Parts 1 to 3 of a command, in another order, by other numbers of threads.
-  void make_parts(const std::string& command) const {
-    for (const int k : {3, 1, 2}) {
-      std::filesystem::remove(part(k));  // of another run
-      // Every third as a cluster's job would.
-      const std::string threads = std::to_string(1 + k % 2), index = std::to_string(k);
-      const Outcome outcome =
-          k == 3 ? run_job(command, index, threads)
-                 : run(command + " --threads " + threads + " --part " + index + "/3 -o " + part(k));
-      ASSERT_EQ(outcome.status, 0) << outcome.text;
-      EXPECT_NE(outcome.text.find("part " + std::to_string(k) + "/3"), std::string::npos);
-    }
-  }
-  Outcome run_job(const std::string& command, const std::string& index,
-                  const std::string& threads) const {
-    return call(
-        fmt::format("SLURM_ARRAY_TASK_ID={} SLURM_ARRAY_TASK_COUNT=3 SLURM_CPUS_PER_TASK={} "
-                    "LIMN={} {}/tools/cluster/parts.sbatch {} {}",
-                    index, threads, LIMN_PROGRAM, LIMN_SOURCE_DIR, files_.path("jobs"), command));
-  }
-  std::string all_parts() const { return part(2) + " " + part(3) + " " + part(1); }
-  // The report of a run, and the bytes of its files.
-  std::pair<json, std::vector<std::string>> result_of(const std::string& command,
-                                                      const std::string& output,
-                                                      const std::vector<std::string>& files) const {
-    const std::string figures = files_.path("figures.json");
-    const Outcome outcome = run(command + " --quiet --json " + figures + " -o " + output);
-    EXPECT_EQ(outcome.status, 0) << outcome.text;
-    std::vector<std::string> bytes;
-    for (const std::string& file : files) {
-      bytes.push_back(bytes_of(file));
-      std::filesystem::remove(file);
-    }
-    return {without_times(json::parse(std::ifstream(figures))), bytes};
-  }
-  void expect_same(const std::string& command, const std::string& output,
-                   const std::vector<std::string>& files) const {
-    const auto [report, bytes] = result_of(command, output, files);
-    const auto [joined_report, joined_bytes] = result_of("merge " + all_parts(), output, files);
-    EXPECT_EQ(report, joined_report);
-    for (size_t i = 0; i < files.size(); ++i) EXPECT_TRUE(bytes[i] == joined_bytes[i]) << files[i];
-  }
-};
-
 TEST_F(Parts, OfAGradientJoinToTheBitsOfOneRun) {
   const std::string command = "gradient " + scene_ +
                               " --spp 20 --wrt screen.translate.x --wrt "
