@@ -457,6 +457,45 @@ TEST(LineLight, LampsOfNoExtent) {
   EXPECT_NEAR(sum / (0.7 / kPi * 8 * seen), 1, 1e-4);
 }
 
+// Interpolated normals under a map, against a sum over the whole sphere: rows of the map, where it
+// has kinks, end pieces of the quadrature.
+TEST(LineLight, MapsOverTurnedNormals) {
+  const TempFiles files;
+  const std::string file =
+      files.write("tilted.obj",
+                  "v -4 -1.2 -4\nv 4 1.2 -4\nv 4 1.2 4\nv -4 -1.2 4\nvn 0 1 0.1\n"
+                  "f 1//1 3//1 2//1\nf 1//1 4//1 3//1\n");
+  const Scene scene =
+      scene_of(files, {}, false,
+               obj_shape("tilted", file, false, 1, {0, 3, 0}, diffuse("clay", "0.7, 0.5, 0.3")) +
+                   make_sky(files, "map"));
+  const Vec3d down{0, -1, 0};
+  const auto surface =
+      surface_on_ray<double>(scene, {ShapeId(1), FaceId(0)}, Vec3d{0.1, 6, -0.2}, down);
+  const Scattering<double> scattering(surface, -down, scene.shading);
+  ASSERT_GT(surface.horizon, 0.1);
+  const Looking look(scene, {.lines = 512}, true);
+  double found = 0;
+  for (int k = 0; k < 64; ++k) {
+    found += look.light.environment(surface, scattering, (k + 0.4) / 64).g / 64;
+  }
+  constexpr int kRows = 700, kColumns = 1400;
+  double sum = 0;
+  for (int j = 0; j < kRows; ++j) {
+    const double theta = kPi * (j + 0.5) / kRows, c = std::cos(theta), s = std::sin(theta);
+    for (int i = 0; i < kColumns; ++i) {
+      const double phi = 2 * kPi * (i + 0.5) / kColumns;
+      const Vec3d d{s * std::cos(phi), c, s * std::sin(phi)};
+      const double f = scattering.eval(d).g;
+      if (f > 0) sum += f * scene.environment->radiance(d).g * s;
+    }
+  }
+  sum *= 2 * kPi * kPi / kRows / kColumns;
+  fmt::print("map over turned normals: {:.8g} and {:.8g}\n", found, sum);
+  // The sum over the sphere is right to 1e-7; what lines leave is far less than a mistake.
+  EXPECT_NEAR(found / sum, 1, 1e-5);
+}
+
 // Faces behind a lamp, in its plane and through it.
 TEST(LineLight, LampsEndWhatIsBeforeThem) {
   const TempFiles files;
