@@ -133,8 +133,7 @@ class BackwardPass {
                     : nullptr),
         viewpoints_(parameters_.scene()),
         mirrored_(closed_ ? nullptr : MirroredLight::make(parameters_.scene())),
-        path_{parameters_.scene(), *tracer_, lights_, closed_.get(), &viewpoints_,
-              mirrored_.get()},
+        path_{parameters_.scene(), *tracer_, lights_, closed_.get(), &viewpoints_, mirrored_.get()},
         input_(path_, 3, {1, 1, 1, 1}, method_.sampler, settings.threads),
         context_{path_, parameters_, input_.edges(),
                  EdgeMotion(parameters_.slots(), input_.edges())} {
