@@ -16,8 +16,8 @@ inline bool PathTracer<S, Visitor>::begin_vertex(Walk& walk) {
   if (walk.scattering->black()) return false;
   set_motion(walk);
   walk.lights = c_.lights.at(value(walk.surface.p));
-  walk.mixture = mixture_at(c_.mirrored, walk.surface, *walk.scattering,
-                            !is_complete(walk.bounces + 1));
+  walk.mixture =
+      mixture_at(c_.mirrored, walk.surface, *walk.scattering, !is_complete(walk.bounces + 1));
   walk.light.reset();
   walk.lit = walk.again;
   if (walk.again) {
@@ -147,7 +147,9 @@ inline Rgb<S> PathTracer<S, Visitor>::emitted(const Walk& walk) const {
   const SurfacePoint<S>& surface = walk.surface;
   const double distance = walk.hit.t;
   const Rgb<S> radiance = surface.emission(-walk.wo, c_.scene.shading);
-  if (is_black(value(radiance))) return radiance;
+  bool dark = is_black(value(radiance));
+  if constexpr (!std::is_same_v<S, double>) dark = dark && is_still(radiance);
+  if (dark) return radiance;
   // A face around an edge that is met at distance 0 is never drawn by light sampling.
   const LightView view{walk.wo, distance, surface.n_g};
   const double other = distance > 0 ? c_.lights.pdf(walk.lights, surface.face.shape, view) : 0;
