@@ -100,7 +100,6 @@ double Lights::choices(const Place& place, size_t light) const {
 }
 
 std::optional<LightSample> Lights::sample(const Place& place, Rng& rng) const {
-  if (all_.size() == 1) return all_[0]->sample(place.p, 1, rng);  // no number is lost
   const double u = rng.uniform();
   const double any = place.sum > 0 ? kAny : 1;
   const size_t last = all_.size() - 1;
