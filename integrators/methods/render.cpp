@@ -39,6 +39,7 @@ bool is_even(const std::string& sampler) {
 std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSettings& settings,
                                                 const RenderOptions& options) {
   const RenderMethod& method = find_render_method(options.method);
+  const bool even = is_even(options.sampler);  // checked for all
   if (method.looks_around) {
     if (options.exact_film) {
       throw InputError(fmt::format("--film exact: not with the method \"{}\"", options.method));
@@ -57,7 +58,7 @@ std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSet
     visible = std::make_shared<FilmRegions>(scene, settings.threads, settings.interrupted);
   }
   return std::make_unique<RadianceEstimator>(scene, settings.threads, std::move(visible),
-                                             method.closed_light, is_even(options.sampler));
+                                             method.closed_light, even);
 }
 
 // What the method reads of the options: parts that differ elsewhere are of one run.

@@ -148,7 +148,9 @@ inline Rgb<S> PathTracer<S, Visitor>::emitted(const Walk& walk) const {
   const SurfacePoint<S>& surface = walk.surface;
   const double distance = walk.hit.t;
   const Rgb<S> radiance = surface.emission(-walk.wo, c_.scene.shading);
-  if (is_black(value(radiance))) return radiance;
+  bool dark = is_black(value(radiance));
+  if constexpr (!std::is_same_v<S, double>) dark = dark && is_still(radiance);
+  if (dark) return radiance;
   // A face around an edge that is met at distance 0 is never drawn by light sampling.
   const LightView view{walk.wo, distance, surface.n_g};
   const double other = distance > 0 ? c_.lights.pdf(walk.lights, surface.face.shape, view) : 0;

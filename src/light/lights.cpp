@@ -46,7 +46,8 @@ Lights::Lights(const Scene& scene)
   for (const auto& lamp : area_lights_) reaches_.push_back(reach_of(*lamp));
   if (environment_) {
     Reach& reach = reaches_.emplace_back();
-    reach.constant = kPi * std::max(environment_->mean_luminance(), 0.0);
+    reach.spread = 1;  // any: it has no area, but no place is its center
+    reach.constant = kPi * std::fabs(environment_->mean_luminance());
   }
 }
 
@@ -70,17 +71,18 @@ Lights::Reach Lights::reach_of(const Light& lamp) {
 }
 
 // What a surface that faces the light would get, if nothing were in the way: exact on the axis of a
-// disk and far from a sphere.
+// disk and far from a sphere. Never negative, though finite differences about 0 make lights that are.
 double Lights::estimate(size_t light, const Vec3d& p) const {
   if (light >= reaches_.size()) {
     const auto arrival = all_[light]->delta()->arriving(p);
-    return arrival ? luminance(arrival->irradiance) : 0;
+    return arrival ? std::fabs(luminance(arrival->irradiance)) : 0;
   }
   const Reach& reach = reaches_[light];
   const Vec3d to = p - reach.center;
   const double squared = length_squared(to);
-  const double shown = std::max(dot(reach.facing, to), 0.0) / std::sqrt(squared + reach.spread);
-  return reach.constant + reach.luminance * (shown + reach.rest) / (squared + reach.spread);
+  const double shown = squared > 0 ? std::max(dot(reach.facing, to), 0.0) / std::sqrt(squared) : 0;
+  return reach.constant +
+         std::fabs(reach.luminance) * (shown + reach.rest) / (squared + reach.spread);
 }
 
 Lights::Place Lights::at(const Vec3d& p) const {

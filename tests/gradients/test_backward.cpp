@@ -314,6 +314,33 @@ TEST(Backward, AgreesInMirrors) {
   expect_agreement(mirror_scene(files, false), 32);
 }
 
+// The image is linear in a lamp's radiance, so that its derivative does not depend on it: no less of a
+// lamp that is black, as fits may begin.
+TEST(Backward, OfABlackLamp) {
+  const TempFiles files;
+  const auto scene_of = [&](const char* radiance) {
+    SceneParts parts;
+    parts.body = square("floor", 2, -90, {0, 0, 0}, conductor("gloss", 0.3)) +
+                 square("lamp", 0.7, 90, {0, 1.5, 0}, area_light("glow", radiance));
+    return make_scene(files, parts);
+  };
+  GradientOptions options;
+  options.parameters = {"glow.radiance"};
+  options.block = 16;
+  RunSettings settings;
+  settings.spp = 64;
+  const auto forward = [&](const char* radiance) {
+    return gradient(scene_of(radiance), options, settings).parameters[0].total_blocks;
+  };
+  const Moments black = forward("0"), bright = forward("2");
+  EXPECT_GT(black.mean(0), 0);
+  EXPECT_LT(std::fabs(black.mean(0) - bright.mean(0)),
+            5 * std::sqrt(black.variance(0) + bright.variance(0)));
+  BackwardOptions reverse;
+  reverse.parameters = options.parameters;
+  expect_agreement(scene_of("0"), 256, reverse);
+}
+
 // Any sampler of edges has the same mean.
 TEST(Backward, AgreesWithOtherSamplers) {
   const TempFiles files;

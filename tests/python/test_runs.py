@@ -17,11 +17,13 @@ from test_scene import same
 @pytest.mark.parametrize("threads", [1, 2])
 def test_render_has_the_programs_bits(scene, program, threads):
     estimate = limn.render(scene, spp=5, seed=3, threads=threads)
-    assert same(estimate.value, program("render", "--spp", "5", "--seed", "3"))
+    independent = ("--sampler", "independent")
+    assert same(estimate.value, program("render", "--spp", "5", "--seed", "3", *independent))
     assert estimate.spp == 5 and estimate.seconds > 0 and estimate.warnings == []
-    assert same(limn.render(scene).value, program("render"))
+    assert same(limn.render(scene).value, program("render", *independent))
+    assert same(limn.render(scene, sampler="padded-sobol").value, program("render"))
     exact = limn.render(scene, spp=2, threads=threads, film="exact")
-    assert same(exact.value, program("render", "--spp", "2", "--film", "exact"))
+    assert same(exact.value, program("render", "--spp", "2", "--film", "exact", *independent))
 
 
 def test_an_estimate_computes_like_its_value(scene):
@@ -84,6 +86,9 @@ def test_what_a_camera_sees_looks_around(scene):
 def test_methods_and_films_are_known_by_name(scene, folder):
     with pytest.raises(limn.InputError, match='unknown method "bidirectional"'):
         limn.render(scene, method="bidirectional")
+    for method in ("path", "rays"):
+        with pytest.raises(limn.InputError, match='unknown sampler "sobel"'):
+            limn.render(scene, method=method, sampler="sobel")
     with pytest.raises(limn.InputError, match='the method "analytic": '):
         limn.render(scene, method="analytic")
     for run in (limn.render, lambda s, film: limn.gradient(s, "tent.scale", film=film)):

@@ -186,7 +186,8 @@ def test_moving_is_what_positions_do(scene):
 def test_shading_is_the_programs(scene, program):
     scene.shading = "mitsuba"
     assert scene.shading == "mitsuba"
-    assert same(image(scene), program("render", "--spp", "2", "--seed", "5", "--shading", "mitsuba"))
+    assert same(image(scene), program("render", "--spp", "2", "--seed", "5", "--shading", "mitsuba",
+                                      "--sampler", "independent"))
 
 
 def test_images_come_back(tmp_path):

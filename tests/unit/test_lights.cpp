@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "limn/core/parameter.h"
 #include "support/scenes.h"
 
 namespace limn {
@@ -67,11 +68,7 @@ TEST(DeltaLights, ADirectionComesFromInfinity) {
 
 // Shapes in their order, the environment, then delta lights; each as often as its density says, which
 // is the one that is asked for.
-TEST(Lights, AreDrawnAsOftenAsTheirDensitiesSay) {
-  const TempFiles files;
-  const Scene scene = scene_with(
-      files, R"(<emitter type="directional"/><emitter type="constant"/><emitter type="point"/>)" +
-                 square("lamp", 1, 90, {0, 3, 0}, area_light("glow", "1, 1, 1")));
+void expect_draws_of_densities(const Scene& scene) {
   const Lights lights(scene);
   ASSERT_EQ(lights.all().size(), 4u);
   EXPECT_EQ(lights.all()[1], scene.environment.get());
@@ -105,6 +102,20 @@ TEST(Lights, AreDrawnAsOftenAsTheirDensitiesSay) {
   }
 }
 
+TEST(Lights, AreDrawnAsOftenAsTheirDensitiesSay) {
+  const TempFiles files;
+  const Scene scene =
+      scene_with(files, R"(<emitter type="directional"/><emitter type="constant"/>
+                <emitter type="point" id="dot"/>)" +
+                            square("lamp", 1, 90, {0, 3, 0}, area_light("glow", "1, 1, 1")));
+  expect_draws_of_densities(scene);
+  // As finite differences move what is dark.
+  for (const char* name : {"glow.radiance", "dot.intensity"}) {
+    SCOPED_TRACE(name);
+    expect_draws_of_densities(find_parameter(scene, name).moved(scene, -1.2));
+  }
+}
+
 // By irradiance on a surface that faces them: 1 / d^2 of points, the closed form of a small lamp from
 // its front, nothing from its back. What is expected to send nothing is drawn now and then.
 TEST(Lights, AreDrawnByWhatTheySend) {
@@ -130,6 +141,22 @@ TEST(Lights, AreDrawnByWhatTheySend) {
   const double area = 4e-4;
   EXPECT_NEAR(chance(1), expected(20 * area / 4, 1), 1e-6);
   EXPECT_NEAR(chance(2), expected(20 * area, 0.25), 1e-5);
+}
+
+// Of a lamp as large as a disk of radius 1, also right in front of it: pi L / (d^2 + 1) on its axis.
+TEST(Lights, AreDrawnByWhatLargeLampsSend) {
+  const TempFiles files;
+  const Scene scene = scene_with(
+      files, R"(<emitter type="constant"/>)" + square("lamp", std::sqrt(kPi) / 2, 90, {0, 3, 0},
+                                                      area_light("glow", "20, 20, 20")));
+  const Lights lights(scene);
+  for (const double d : {3.0, 1.0, 0.1, 0.001}) {
+    const Lights::Place place = lights.at({0, 3 - d, 0});
+    const double chance =
+        lights.pdf_environment(place, {0, 1, 0}) / lights.all()[1]->pdf({{0, 1, 0}, 1, {}}, 1);
+    const double lamp = 20 / (d * d + 1), sky = 1;
+    EXPECT_NEAR(chance, 0.125 + 0.75 * sky / (lamp + sky), 1e-6) << d;
+  }
 }
 
 TEST(Lights, OfASceneWithoutAnyAreEmpty) {

@@ -120,18 +120,15 @@ TEST(EvenNumbers, AreUniformAndUnrelated) {
 }
 
 // Images of other seeds are independent, so that they tell the true error: it is less than half of
-// that of independent samples, and is no more than what batches say.
+// that of independent samples. What batches differ by does not tell it.
 TEST(EvenNumbers, MakeImagesWithLessError) {
   const TempFiles files;
   const Scene scene = make_scene(files, small_scene(files));
   RunSettings settings = run_settings(16);
   Moments images(size_t{3} * scene.film.crop_width * scene.film.crop_height), others = images;
-  double claimed = 0;
   for (; settings.seed < 11; ++settings.seed) {
-    const Moments even = render(scene, settings, {.sampler = "padded-sobol"}).radiance;
-    images.add_batch(means(even), 1);
+    images.add_batch(means(render(scene, settings, {.sampler = "padded-sobol"}).radiance), 1);
     others.add_batch(means(render(scene, settings).radiance), 1);
-    for (size_t i = 0; i < even.size(); ++i) claimed += even.variance(i);
   }
   double true_one = 0, independent = 0;
   for (size_t i = 0; i < images.size(); ++i) {
@@ -139,7 +136,6 @@ TEST(EvenNumbers, MakeImagesWithLessError) {
     independent += others.variance(i) * 64;
   }
   EXPECT_LT(true_one, 0.5 * independent);
-  EXPECT_LT(true_one, claimed);
   EXPECT_GE(compare_moments(images, others).p_largest, 1e-5);
 }
 

@@ -1,4 +1,6 @@
 // `limn render`: an image as EXR and PNG.
+#include <algorithm>
+
 #include "limn/core/names.h"
 #include "limn/integrators/render.h"
 #include "tools/limn/command_support.h"
@@ -70,10 +72,15 @@ class RenderCommand final : public Command {
  private:
   void check_options() const {
     check_image_options(*app_, {options_.method});
-    for (const RenderMethod& method : render_methods()) {
-      if (method.name != options_.method || !method.looks_around) continue;
-      refuse_options(*app_, {"--sampler"}, fmt::format("the method {} has its own", method.name));
+    if (!has_sampler()) {
+      refuse_options(*app_, {"--sampler"},
+                     fmt::format("the method {} has its own", options_.method));
     }
+  }
+  bool has_sampler() const {
+    return std::ranges::none_of(render_methods(), [&](const RenderMethod& method) {
+      return method.name == options_.method && method.looks_around;
+    });
   }
   void write(const Scene& scene, const RunSettings& settings, const RenderResult& result) const {
     const Image image = mean_image(result.radiance, scene.film.crop_width, scene.film.crop_height);
@@ -81,7 +88,7 @@ class RenderCommand final : public Command {
     auto attributes = provenance(scene, settings, result.spp);
     attributes.push_back({"limn.method", options_.method});
     if (what_ != "image") attributes.push_back({"limn.what", what_});
-    attributes.push_back({"limn.sampler", options_.sampler});
+    if (has_sampler()) attributes.push_back({"limn.sampler", options_.sampler});
     attributes.push_back({kOutputAttribute, output_name(output_)});
     remove_stale(output_, {output_});
     write_exr(output_, film_channels(scene, image), scene.film.half, attributes);
@@ -92,18 +99,18 @@ class RenderCommand final : public Command {
                  static_cast<double>(result.rays) / result.seconds / 1e6);
     }
     if (common_.json.empty()) return;
-    const nlohmann::json report = {{"scene", scene.file},
-                                   {"sensor", sensor_name(scene)},
-                                   {"spp", result.spp},
-                                   {"method", options_.method},
-                                   {"what", what_},
-                                   {"sampler", options_.sampler},
-                                   {"seed", settings.seed},
-                                   {"threads", settings.threads},
-                                   {"seconds", result.seconds},
-                                   {"rays", result.rays},
-                                   {"warnings", warnings_.lines()},
-                                   {"non_finite", result.non_finite.count}};
+    nlohmann::json report = {{"scene", scene.file},
+                             {"sensor", sensor_name(scene)},
+                             {"spp", result.spp},
+                             {"method", options_.method},
+                             {"what", what_},
+                             {"seed", settings.seed},
+                             {"threads", settings.threads},
+                             {"seconds", result.seconds},
+                             {"rays", result.rays},
+                             {"warnings", warnings_.lines()},
+                             {"non_finite", result.non_finite.count}};
+    if (has_sampler()) report["sampler"] = options_.sampler;
     write_json(common_.json, report.dump(2));
   }
 

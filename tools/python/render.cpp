@@ -153,13 +153,14 @@ void bind_render(nb::module_& m) {
   m.def(
       "render", render_scene, nb::arg("scene"), nb::arg("spp") = nb::none(),
       nb::arg("seed") = nb::none(), nb::arg("threads") = 0, nb::arg("progress") = nb::none(),
-      nb::arg("method") = "path", nb::arg("film") = "rays", nb::arg("sampler") = kRenderSamplers[0],
-      nb::arg("what") = "image", nb::arg("lines") = 64, nb::arg("tolerance") = 0.0,
-      nb::arg("rays") = 4, nb::arg("_store").none() = nb::none(),
+      nb::arg("method") = "path", nb::arg("film") = "rays",
+      nb::arg("sampler") = RenderOptions().sampler, nb::arg("what") = "image",
+      nb::arg("lines") = 64, nb::arg("tolerance") = 0.0, nb::arg("rays") = 4,
+      nb::arg("_store").none() = nb::none(),
       nb::sig(
           "def render(scene: Scene, spp: int | None = None, seed: int | None = None, threads: "
           "int = 0, progress: collections.abc.Callable[[float], object] | None = None, method: "
-          "str = 'path', film: str = 'rays', sampler: str = 'padded-sobol', what: str = 'image', "
+          "str = 'path', film: str = 'rays', sampler: str = 'independent', what: str = 'image', "
           "lines: int = 64, tolerance: float = 0.0, rays: int = 4) -> Estimate"),
       "The image of a scene: linear RGB radiance, (H, W, 3).\n\n"
       "spp, seed: of the scene's file if None. threads: 0 for all cores; they change no bit.\n"
@@ -174,8 +175,9 @@ void bind_render(nb::module_& m) {
       "each point for each lamp and the sky.\n"
       "film: \"rays\", or \"exact\": what every pixel sees by its exact visible regions (box "
       "filter).\n"
-      "sampler: \"padded-sobol\", even numbers, with which stderr is an upper bound, or "
-      "\"independent\"; silhouettes and rays are always even.");
+      "sampler: \"independent\", or \"padded-sobol\", even numbers: a third of the squared error, "
+      "mostly, but stderr is then neither the error nor a bound of it (compare images of several "
+      "seeds instead). silhouettes and rays always have even numbers.");
 }
 
 }  // namespace limn::python

@@ -41,7 +41,8 @@ enum class RenderWhat {
   kOpenness
 };
 
-// Where the random numbers of a pixel's samples come from, by Mitsuba's and pbrt's names.
+// Where the random numbers of a pixel's samples come from, by Mitsuba's and pbrt's names. The first is
+// what `limn render` takes, the second that of RenderOptions and Python, where variances are asked for.
 inline constexpr const char* kRenderSamplers[] = {"padded-sobol", "independent"};
 
 struct RenderOptions {
@@ -59,8 +60,10 @@ struct RenderOptions {
   double tolerance = 0;
   int rays = 4;  // rays: of each point for each lamp and the sky, 1 to 2^20
   // InputError for others than kRenderSamplers. Scrambled Sobol' points fill a pixel's ranges
-  // evenly: a third of the squared error, mostly; but `radiance` then has variances that are too
-  // large, as batches are not independent. Methods that look around have no other sampler.
+  // evenly: a third of the squared error, mostly; but batches are then not independent, and the
+  // variances of `radiance` are no error, nor a bound of it: mostly too large, at times too small.
+  // Images of other seeds are independent. Methods that look around take no notice of it: all their
+  // numbers are even, with the same variances.
   std::string sampler = "independent";
 };
 
