@@ -36,6 +36,9 @@ struct BackwardOptions {
   double camera_samples = 1;  // points on the film, per path, of each term that has some there
   int batches = 16;           // at most, for standard errors; each ends with the adjoint of normals
   bool keep_batches = false;  // Moments::kept of every parameter
+  // Warnings of gaps that samples miss. To look for them takes a tree over all faces; runs that
+  // follow each other need it once.
+  bool find_gaps = true;
 };
 
 // What a name of BackwardOptions::sampler stands for. InputError that lists the known names if
