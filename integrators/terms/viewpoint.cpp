@@ -73,8 +73,8 @@ Vec3d direction_behind(const std::vector<Vec3d>& planes, const std::vector<Vec3d
   return best;
 }
 
-// Whether a parameter moves the viewpoint out of the plane of the face that it lies in, or the plane
-// away from it: to more than what rounding makes of a motion within the plane.
+// Whether a parameter moves the viewpoint out of the plane of the face that it lies in, or the
+// plane away from it: by more than what rounding makes of a motion within the plane.
 bool crosses(const Mesh& mesh, FaceId face, const LightOrigin& origin) {
   const auto corners = face_corners<Dual>(mesh, face);
   const Vec3<Dual> across = cross(corners[1] - corners[0], corners[2] - corners[0]);
@@ -86,8 +86,7 @@ bool crosses(const Mesh& mesh, FaceId face, const LightOrigin& origin) {
     };
     const double speed = dot(rate(across), w) + dot(n, rate(to));
     const double turning = length(rate(across)) * length(w);
-    const double moving =
-        length(rate(origin.v)) + (origin.infinite ? 0 : length(rate(corners[0])));
+    const double moving = length(rate(origin.v)) + (origin.infinite ? 0 : length(rate(corners[0])));
     if (std::fabs(speed) > kEdgeOn * (turning + length(n) * moving)) return true;
   }
   return false;
@@ -185,9 +184,9 @@ Viewpoints::Viewpoints(const Scene& scene) : camera(scene, {scene.camera.origin}
 }
 
 bool Viewpoints::cross_planes() const {
-  return camera.crosses_planes() || std::any_of(lights.begin(), lights.end(), [](const auto& light) {
-           return light.crosses_planes();
-         });
+  return camera.crosses_planes() ||
+         std::any_of(lights.begin(), lights.end(),
+                     [](const auto& light) { return light.crosses_planes(); });
 }
 
 void warn_of_faces_edge_on(const Scene& scene, const Viewpoints& viewpoints,
