@@ -144,7 +144,7 @@ TEST(FacesEdgeOnKink, IsOfMotionAcrossThePlane) {
   const TempFiles files;
   const auto at_kink = [&](double x, const Vec3d& direction, const std::string& parameter) {
     const std::string light =
-        sun(direction) + square("screen", 0.3, 50, {0.8, 0.7, 0.6}, "<ref id=\"chalk\"/>");
+        sun(direction) + square("screen", 0.3, 50, {1.5, 0.7, 0.6}, "<ref id=\"chalk\"/>");
     return run_blocks(scene_of(files, x, 2, box_over_floor(files) + light), {parameter}, 1, 0)
         .at_kink;
   };
@@ -366,8 +366,9 @@ TEST_P(StandsOnAFloor, AsIfPressed) {
   if (GetParam().analytic) options.method = "analytic";
   const GradientResult at = run_blocks(scene(0), options, 96, 1);
   const GradientResult pressed = run_blocks(scene(1e-4), options, 96, 2);
+  // In closed form blocks that see the top alone are zero but for rounding.
   for (size_t p = 0; p < parameters_.size(); ++p)
-    expect_equal(at.parameters[p], pressed.parameters[p]);
+    expect_equal(at.parameters[p], pressed.parameters[p], 1, !GetParam().analytic);
   EXPECT_NE(at.warnings.at(0).find("\"thing\" and \"floor\" touch"), std::string::npos);
 }
 
