@@ -490,7 +490,7 @@ void BackwardPass::finish() {
   }
   result_.non_finite = all_.bad;
   result_.tape_bytes = all_.tape_bytes;
-  if (result_.spp > 0) {
+  if (result_.spp > 0 && options_.find_gaps) {
     warn_of_hair_gaps(parameters_.scene(), static_cast<double>(result_.spp), settings_.threads,
                       result_.warnings);
   }

@@ -322,6 +322,7 @@ bool Fit::Impl::add_view(size_t view, FitRecord& record,
   BackwardOptions backward_options = options_.backward;
   // Nobody asks for standard errors, and each batch ends with the adjoint of normals.
   backward_options.batches = 1;
+  backward_options.find_gaps = false;  // told before the first step
   if (is_exact()) backward_options.uniform_pixels = true;
   backward_options.parameters.clear();
   for (const FitParameter& p : parameters_) {
