@@ -29,7 +29,12 @@ namespace limn {
 ReverseMethod reverse_method(const std::string& name) {
   // It chooses among few edges, where surfaces cross and touch: any will do.
   if (name == "analytic") return {edge_sampler_type("uniform"), true};
-  return {edge_sampler_type(name)};
+  for (const EdgeSamplerType& type : edge_sampler_types()) {
+    if (type.name == name) return {type};
+  }
+  std::vector<std::string> known = names_of(edge_sampler_types());
+  known.emplace_back("analytic");
+  throw InputError(unknown_name("edge sampler", name, known));
 }
 
 const ParameterAdjoint& BackwardResult::of(const std::string& name) const {
@@ -133,8 +138,7 @@ class BackwardPass {
                     : nullptr),
         viewpoints_(parameters_.scene()),
         mirrored_(MirroredLight::make(parameters_.scene())),
-        path_{parameters_.scene(), *tracer_, lights_, closed_.get(), &viewpoints_,
-              mirrored_.get()},
+        path_{parameters_.scene(), *tracer_, lights_, closed_.get(), &viewpoints_, mirrored_.get()},
         input_(path_, 3, {1, 1, 1, 1}, method_.sampler, settings.threads),
         context_{path_, parameters_, input_.edges(),
                  EdgeMotion(parameters_.slots(), input_.edges())} {
