@@ -9,9 +9,11 @@ void refuse_light(const std::string& method, const SourceLocation& where, const 
   throw InputError(where, fmt::format("the method \"{}\": {}", method, what));
 }
 
-std::string shape_in_text(const Shape& shape) {
-  return shape.id.empty() ? "shape" : fmt::format("shape \"{}\"", shape.id);
+std::string name_in_text(const std::string& kind, const std::string& id) {
+  return id.empty() ? kind : fmt::format("{} \"{}\"", kind, id);
 }
+
+std::string shape_in_text(const Shape& shape) { return name_in_text("shape", shape.id); }
 
 void check_direct_light(const Scene& scene, const std::string& method) {
   const SourceLocation whole{scene.file};
@@ -23,9 +25,9 @@ void check_direct_light(const Scene& scene, const std::string& method) {
   }
   for (const auto& light : scene.delta_lights) {
     refuse_light(method, whole,
-                 fmt::format("emitter{}: only lamps with an area and environments are known: use "
-                             "the method path",
-                             light->id.empty() ? "" : " \"" + light->id + "\""));
+                 fmt::format("{}: only lamps with an area and environments are known: use the "
+                             "method path",
+                             name_in_text("emitter", light->id)));
   }
   if (scene.shading != ShadingModel::kMitsuba) return;
   for (const Shape& shape : scene.shapes) {
