@@ -29,7 +29,12 @@ namespace limn {
 ReverseMethod reverse_method(const std::string& name) {
   // It chooses among few edges, where surfaces cross and touch: any will do.
   if (name == "analytic") return {edge_sampler_type("uniform"), true};
-  return {edge_sampler_type(name)};
+  for (const EdgeSamplerType& type : edge_sampler_types()) {
+    if (type.name == name) return {type};
+  }
+  std::vector<std::string> known = names_of(edge_sampler_types());
+  known.emplace_back("analytic");
+  throw InputError(unknown_name("edge sampler", name, known));
 }
 
 const ParameterAdjoint& BackwardResult::of(const std::string& name) const {
@@ -490,7 +495,7 @@ void BackwardPass::finish() {
   }
   result_.non_finite = all_.bad;
   result_.tape_bytes = all_.tape_bytes;
-  if (result_.spp > 0) {
+  if (result_.spp > 0 && options_.find_gaps) {
     warn_of_hair_gaps(parameters_.scene(), static_cast<double>(result_.spp), settings_.threads,
                       result_.warnings);
   }

@@ -30,8 +30,8 @@ constexpr double kExtrapolated = 12.5 / 9;
 // error of 2^-10 of it.
 constexpr double kLeastMove = 0x1p-14;
 
-// The same of texels, where the fastest decide: radiance is linear in them, so that a step too large
-// for others does no harm.
+// The same of texels, where the fastest decide: radiance is linear in them, so that a step too
+// large for others does no harm.
 double least_texel_step(const Scene& scene, const Parameter& parameter) {
   const Image velocities = parameter.texel_velocities(scene);
   if (velocities.data.empty()) return 0;

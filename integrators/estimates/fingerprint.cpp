@@ -47,6 +47,8 @@ class Hash {
     }
   }
   void add_environment(Environment& environment) {
+    // One texel of many may lie between the directions.
+    for (const float texel : environment.texels().data) add(double{texel});
     constexpr int kDirections = 4096;  // in a spiral
     for (int i = 0; i < kDirections; ++i) {
       const double z = 1 - (2 * i + 1.0) / kDirections;

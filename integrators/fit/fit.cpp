@@ -5,11 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "integrators/backward/adjoint_context.h"
-#include "integrators/fit/fit_parameter.h"
-#include "integrators/fit/quasi_newton.h"
+#include "integrators/fit/fit_impl.h"
 #include "integrators/fit/remesh.h"
 #include "integrators/methods/hair_gaps.h"
 #include "integrators/methods/selection.h"
@@ -43,6 +41,10 @@ void set_camera(Camera& camera, const std::vector<double>& numbers) {
   camera.fov.v = numbers[next];
 }
 
+[[noreturn]] void refuse_state() {
+  throw InputError("the state is that of another fit: of other parameters or meshes");
+}
+
 // Twice as large after each `period` steps, in whole numbers.
 int grown(int count, int64_t step, int period) {
   if (period == 0) return count;
@@ -64,69 +66,6 @@ void free_normals(Scene& scene, const std::string& name, std::vector<std::string
 }
 
 }  // namespace
-
-class Fit::Impl {
- public:
-  Impl(std::vector<FitView> views, const FitOptions& options, const RunSettings& settings);
-
-  void listen(const std::function<void(double)>& progress, const std::atomic<bool>* interrupted) {
-    settings_.progress = progress;
-    settings_.interrupted = interrupted;
-  }
-  std::optional<FitRecord> step();
-  std::vector<FitScalar> scalars() const;
-  FitState state() const;
-  void restore(const FitState& state);
-
-  std::vector<FitView> views;
-  std::vector<std::string> warnings;
-  int64_t steps = 0;
-
- private:
-  void check_shapes();
-  void check_channels() const;
-  void check_terms() const;
-  void check_remeshing();
-  // Whether parameters move edges that may be seen.
-  bool moves_on_film(size_t view) const;
-  void check_exact();
-  // Of a scalar; none where the view does not have it, and of motions.
-  std::vector<double> values_in(size_t view, const FitParameter& parameter) const;
-  // Shapes of a view that some parameter moves, in the scene's order.
-  std::vector<ShapeId> moved_shapes(size_t view) const;
-  RunSettings view_settings(size_t view) const;
-  // What the remeshings so far have left of steps and smoothing.
-  double shrunk() const {
-    const auto done = [&](int64_t step) { return step <= steps; };
-    const auto count = std::count_if(options_.remesh.begin(), options_.remesh.end(), done);
-    return std::pow(options_.remesh_shrink, static_cast<double>(count));
-  }
-  // The loss is a function of the parameters: all steps take the same samples.
-  bool is_exact() const { return options_.optimiser == OptimiserKind::kLbfgs; }
-  // False: interrupted.
-  bool add_view(size_t view, FitRecord& record, std::vector<std::vector<double>>& gradients);
-  // Loss and gradients of all views; false: interrupted.
-  bool evaluate(FitRecord& record, std::vector<std::vector<double>>& gradients);
-  void finish_step(FitRecord& record);
-
-  // Of kLbfgs.
-  struct Place {
-    FitRecord record;              // its losses
-    std::vector<double> gradient;  // of all parameters in turn, per natural step
-  };
-  std::optional<Place> place();
-  // Adds `length` times the direction; none if a face would lose its area, else what was added.
-  std::optional<std::vector<double>> advance(const std::vector<double>& direction, double length);
-  enum class Search { kFound, kNone, kInterrupted };
-  Search search_along(const std::vector<double>& direction, double first, FitRecord& record);
-  std::optional<FitRecord> quasi_newton_step();
-
-  FitOptions options_;
-  RunSettings settings_;
-  std::vector<FitParameter> parameters_;
-  QuasiNewton quasi_newton_;
-  std::optional<Place> here_;  // of the parameters as they are, if known
-};
 
 Fit::Impl::Impl(std::vector<FitView> all, const FitOptions& options, const RunSettings& settings)
     : views(std::move(all)), options_(options), settings_(settings) {
@@ -189,36 +128,17 @@ void Fit::Impl::check_shapes() {
 void Fit::Impl::check_channels() const {
   for (const FitParameter& whole : parameters_) {
     for (const FitParameter& part : parameters_) {
+      for (size_t v = 0; v < views.size(); ++v) {
+        if (&whole == &part || !whole.is_map()) break;
+        if (!whole.moves_texels(v) || !part.moves_texels(v)) continue;
+        throw InputError({views[v].scene.file},
+                         fmt::format("\"{}\" and \"{}\" move the same texels: fit one of them",
+                                     whole.name(), part.name()));
+      }
       if (whole.is_array() || !part.name().starts_with(whole.name() + ".")) continue;
       throw InputError(
           fmt::format("\"{}\" is a channel of \"{}\": fit one of them", part.name(), whole.name()));
     }
-  }
-}
-
-void Fit::Impl::check_exact() {
-  if (!reverse_method(options_.backward.sampler).closed) {
-    throw InputError(fmt::format(
-        "the optimiser lbfgs compares gradients of different steps, and those of the sampler {} "
-        "are noisy: take the sampler analytic, or the optimiser adam-uniform",
-        options_.backward.sampler));
-  }
-  if (options_.loss == LossKind::kL1) {
-    throw InputError("the optimiser lbfgs needs a smooth loss: take l2 or relative-l2, not l1");
-  }
-  if (options_.spp_doubling > 0 || options_.step_half_life > 0 || options_.loss_spp > 0) {
-    throw InputError(
-        "the optimiser lbfgs minimises one function, of the same samples at every step, and finds "
-        "its steps by itself: leave out the doubling of samples, the half-life of steps and "
-        "samples of the loss");
-  }
-  for (size_t v = 0; v < views.size(); ++v) {
-    if (!moves_on_film(v)) continue;
-    warnings.push_back(
-        "what is fitted moves silhouettes that the camera sees: a film sample that one of them "
-        "passes makes the loss jump, by its share of a pixel; with many samples per pixel the "
-        "steps of lbfgs get over that");
-    return;
   }
 }
 
@@ -322,6 +242,7 @@ bool Fit::Impl::add_view(size_t view, FitRecord& record,
   BackwardOptions backward_options = options_.backward;
   // Nobody asks for standard errors, and each batch ends with the adjoint of normals.
   backward_options.batches = 1;
+  backward_options.find_gaps = false;  // told before the first step
   if (is_exact()) backward_options.uniform_pixels = true;
   backward_options.parameters.clear();
   for (const FitParameter& p : parameters_) {
@@ -353,103 +274,6 @@ bool Fit::Impl::evaluate(FitRecord& record, std::vector<std::vector<double>>& gr
     if (!add_view(v, record, gradients)) return false;
   }
   return true;
-}
-
-std::optional<Fit::Impl::Place> Fit::Impl::place() {
-  Place place;
-  std::vector<std::vector<double>> gradients;
-  if (!evaluate(place.record, gradients)) return std::nullopt;
-  for (size_t i = 0; i < parameters_.size(); ++i) {
-    const std::vector<double> own = parameters_[i].scaled(gradients[i]);
-    place.gradient.insert(place.gradient.end(), own.begin(), own.end());
-  }
-  return place;
-}
-
-std::optional<std::vector<double>> Fit::Impl::advance(const std::vector<double>& direction,
-                                                      double length) {
-  std::vector<double> added;
-  auto next = direction.begin();
-  for (FitParameter& p : parameters_) {
-    std::vector<double> step(next, next + static_cast<ptrdiff_t>(p.size()));
-    next += static_cast<ptrdiff_t>(p.size());
-    for (double& x : step) x *= length;
-    if (!p.add(step, views)) return std::nullopt;
-    added.insert(added.end(), step.begin(), step.end());
-  }
-  return added;
-}
-
-// Moves to a lower place along the direction, from here_.
-Fit::Impl::Search Fit::Impl::search_along(const std::vector<double>& direction, double first,
-                                          FitRecord& record) {
-  const FitState before = state();
-  std::optional<Place> there;
-  std::vector<double> moved;
-  double last = 0;
-  bool interrupted = false;
-  const auto evaluate_at = [&](double at) -> std::optional<LinePoint> {
-    restore(before);
-    last = at;
-    const auto added = advance(direction, at);
-    if (!added) {
-      ++record.halvings;
-      return LinePoint{at, std::numeric_limits<double>::infinity(), 0};
-    }
-    moved = *added;
-    ++record.evaluations;
-    there = place();
-    interrupted = !there;
-    if (interrupted) return std::nullopt;
-    return LinePoint{at, there->record.loss, inner_product(there->gradient, direction)};
-  };
-  const Place start = *here_;
-  const LinePoint origin{0, start.record.loss, inner_product(start.gradient, direction)};
-  std::optional<LinePoint> found;
-  if (origin.slope < 0) found = wolfe_search(evaluate_at, origin, first);
-  if (found && found->at != last) evaluate_at(found->at);
-  if (!found || interrupted) {
-    restore(before);
-    here_ = start;
-    return interrupted ? Search::kInterrupted : Search::kNone;
-  }
-  std::vector<double> change = there->gradient;
-  for (size_t i = 0; i < change.size(); ++i) change[i] -= start.gradient[i];
-  quasi_newton_.add(moved, std::move(change));
-  here_ = std::move(there);
-  return Search::kFound;
-}
-
-// Where the pairs of earlier steps lead nowhere, once more without them.
-std::optional<FitRecord> Fit::Impl::quasi_newton_step() {
-  const Stopwatch watch;
-  const bool known = here_.has_value();
-  if (!known) here_ = place();
-  if (!here_) return std::nullopt;
-  FitRecord record = here_->record;
-  record.step = steps;
-  record.evaluations = known ? 0 : 1;
-  Search search = Search::kNone;
-  while (search == Search::kNone && !record.at_rest) {
-    const std::vector<double> direction = quasi_newton_.direction(here_->gradient);
-    double largest = 0;
-    for (const double x : direction) largest = std::max(largest, std::fabs(x));
-    const bool fresh = quasi_newton_.empty();
-    // Without pairs nothing is known of the size of a step but what the user says.
-    const double first = fresh && largest > 0 ? options_.step * shrunk() / largest : 1;
-    record.step_size = first * largest;
-    search = search_along(direction, first, record);
-    if (search == Search::kInterrupted) return std::nullopt;
-    record.at_rest = search == Search::kNone && fresh;
-    if (search == Search::kNone) quasi_newton_.clear();
-  }
-  finish_step(record);
-  if (record.remeshed) {
-    here_.reset();
-    quasi_newton_.clear();
-  }
-  record.seconds = watch.seconds();
-  return record;
 }
 
 std::optional<FitRecord> Fit::Impl::step() {
@@ -493,6 +317,11 @@ std::vector<FitScalar> Fit::Impl::scalars() const {
   return list;
 }
 
+bool Fit::Impl::moves_texels(size_t view) const {
+  return std::any_of(parameters_.begin(), parameters_.end(),
+                     [&](const FitParameter& p) { return p.moves_texels(view) && !p.is_map(); });
+}
+
 std::vector<double> Fit::Impl::values_in(size_t view, const FitParameter& parameter) const {
   if (parameter.is_array() || !parameter.in_view(view)) return {};
   return parameter.in_view(view)->value(views[view].scene);
@@ -506,23 +335,30 @@ FitState Fit::Impl::state() const {
   for (const FitParameter& p : parameters_) state.parameters.push_back(p.state());
   for (size_t v = 0; v < views.size(); ++v) {
     const Scene& scene = views[v].scene;
-    FitState::View view{camera_numbers(scene.camera), {}, {}};
+    FitState::View view{camera_numbers(scene.camera), {}, {}, {}};
     for (const ShapeId s : moved_shapes(v)) {
       const Mesh& mesh = scene.shape(s).mesh;
       view.shapes.push_back({mesh.positions, mesh.normals, mesh.faces});
     }
     for (const FitParameter& p : parameters_) view.values.push_back(values_in(v, p));
+    if (moves_texels(v)) view.texels = scene.environment->texels().data;
     state.views.push_back(std::move(view));
   }
   return state;
 }
 
-void Fit::Impl::restore(const FitState& state) {
+void Fit::Impl::check_state(const FitState& state) const {
   const auto check = [](bool good) {
-    if (!good) throw InputError("the state is that of another fit: of other parameters or meshes");
+    if (!good) refuse_state();
   };
   check(state.steps >= 0 && state.parameters.size() == parameters_.size() &&
         state.views.size() == views.size());
+  size_t numbers = 0;
+  for (const FitState::Numbers& p : state.parameters) numbers += p.values.size();
+  check(state.moves.size() == state.changes.size());
+  for (const auto* list : {&state.moves, &state.changes}) {
+    for (const std::vector<double>& x : *list) check(x.size() == numbers);
+  }
   for (size_t v = 0; v < views.size(); ++v) {
     const FitState::View& view = state.views[v];
     const std::vector<ShapeId> shapes = moved_shapes(v);
@@ -531,7 +367,31 @@ void Fit::Impl::restore(const FitState& state) {
     for (size_t i = 0; i < parameters_.size(); ++i) {
       check(view.values[i].size() == values_in(v, parameters_[i]).size());
     }
+    for (size_t i = 0; i < shapes.size(); ++i) {
+      const FitState::Shape& shape = view.shapes[i];
+      const Mesh& mesh = views[v].scene.shape(shapes[i]).mesh;
+      if (shape.faces != mesh.faces) continue;  // it gets new triangles
+      check(shape.positions.size() == mesh.positions.size() &&
+            shape.normals.size() == mesh.normals.size());
+    }
+    check(view.texels.size() ==
+          (moves_texels(v) ? views[v].scene.environment->texels().data.size() : 0));
   }
+}
+
+void Fit::Impl::restore(const FitState& state) {
+  check_state(state);
+  const FitState before = this->state();
+  try {
+    put(state);
+  } catch (...) {  // a mesh or a value that cannot be
+    put(before);
+    throw;
+  }
+}
+
+void Fit::Impl::put(const FitState& state) {
+  std::vector<bool> remeshed(parameters_.size());
   for (size_t v = 0; v < views.size(); ++v) {
     Scene& scene = views[v].scene;
     const FitState::View& view = state.views[v];
@@ -541,9 +401,11 @@ void Fit::Impl::restore(const FitState& state) {
       Mesh& mesh = scene.shapes[shapes[i].index()].mesh;
       if (shape.faces != mesh.faces) {
         set_mesh(scene, shapes[i], shape.positions, shape.faces, nullptr);
+        for (size_t k = 0; k < parameters_.size(); ++k) {
+          if (parameters_[k].shape(v) == shapes[i]) remeshed[k] = true;
+        }
+        if (shape.normals.size() != mesh.normals.size()) refuse_state();
       }
-      check(shape.positions.size() == mesh.positions.size() &&
-            shape.normals.size() == mesh.normals.size());
       mesh.positions = shape.positions;
       mesh.normals = shape.normals;
       update_shading_normals(mesh);
@@ -551,16 +413,15 @@ void Fit::Impl::restore(const FitState& state) {
     for (size_t i = 0; i < parameters_.size(); ++i) {
       if (!view.values[i].empty()) parameters_[i].in_view(v)->assign(scene, view.values[i]);
     }
+    if (!view.texels.empty()) {
+      Image texels = scene.environment->texels();
+      texels.data = view.texels;
+      scene.environment->set_texels(texels);
+    }
     set_camera(scene.camera, view.camera);
   }
   for (size_t i = 0; i < parameters_.size(); ++i) {
-    parameters_[i].restore(state.parameters[i], views);
-  }
-  size_t numbers = 0;
-  for (const FitParameter& p : parameters_) numbers += p.size();
-  check(state.moves.size() == state.changes.size());
-  for (const auto* list : {&state.moves, &state.changes}) {
-    for (const std::vector<double>& x : *list) check(x.size() == numbers);
+    parameters_[i].restore(state.parameters[i], views, remeshed[i]);
   }
   quasi_newton_.steps = state.moves;
   quasi_newton_.changes = state.changes;

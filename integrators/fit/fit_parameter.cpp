@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "integrators/fit/remesh.h"
 #include "integrators/fit/surface_tree.h"
@@ -38,7 +39,11 @@ std::optional<Mesh> moved_whole(const Shape& shape, std::vector<Vec3f> positions
 
 FitParameter::FitParameter(const std::string& name, const std::vector<FitView>& views,
                            const FitOptions& options)
-    : name_(name), in_view_(views.size()), shapes_(views.size()), first_view_(views.size()) {
+    : name_(name),
+      in_view_(views.size()),
+      shapes_(views.size()),
+      moves_texels_(views.size()),
+      first_view_(views.size()) {
   std::optional<UnknownParameter> unknown;
   for (size_t v = 0; v < views.size(); ++v) {
     const Scene& scene = views[v].scene;
@@ -49,6 +54,7 @@ FitParameter::FitParameter(const std::string& name, const std::vector<FitView>& 
       continue;
     }
     first_view_ = std::min(first_view_, v);
+    moves_texels_[v] = !in_view_[v]->texel_velocities(scene).data.empty();
     for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
       if (!in_view_[v]->velocities(scene, ShapeId(s)).empty()) shapes_[v] = ShapeId(s);
     }
@@ -112,7 +118,8 @@ void FitParameter::find_bounds(const std::vector<FitView>& views, const FitOptio
   most_ = in_view_[first_view_]->most;
   for (const FitBounds& bounds : options.bounds) {
     if (bounds.parameter != name_) continue;
-    if (is_array()) throw InputError("\"" + name_ + "\" is an array: bounds are for scalars");
+    if (is_array())
+      throw InputError("\"" + name_ + "\" has no bounds: they are for scalars and texels");
     if (!(bounds.least <= bounds.most)) {
       throw InputError(fmt::format("bounds of \"{}\": {:g} is not below {:g}", name_, bounds.least,
                                    bounds.most));
@@ -177,13 +184,37 @@ void FitParameter::add_to_numbers(std::vector<double>& step, std::vector<FitView
       in_view_[v]->move(scene, step[0]);
       continue;
     }
-    // Sums round: a value next to its bound must not pass it.
-    for (size_t k = 0; k < step.size(); ++k) {
-      value[k] = std::clamp(value[k] + step[k], least_, most_);
-    }
+    for (size_t k = 0; k < step.size(); ++k) value[k] = bounded_sum(value[k], step[k]);
     in_view_[v]->assign(scene, value);
   }
-  for (size_t k = 0; k < step.size(); ++k) numbers_[k] += step[k];
+  const bool has_values = !in_view_[first_view_]->value(views[first_view_].scene).empty();
+  for (size_t k = 0; k < step.size(); ++k) {
+    numbers_[k] = has_values ? numbers_[k] + step[k] : bounded_sum(numbers_[k], step[k]);
+  }
+}
+
+// Sums round: a value next to its bound must not pass it, and one that was stopped is there.
+double FitParameter::bounded_sum(double now, double step) const {
+  if (step == least_ - now) return least_;
+  if (step == most_ - now) return most_;
+  return std::clamp(now + step, least_, most_);
+}
+
+std::vector<double> FitParameter::lengths_to_bounds(const std::vector<double>& direction,
+                                                    const std::vector<FitView>& views) const {
+  std::vector<double> lengths(direction.size(), std::numeric_limits<double>::infinity());
+  if (is_array()) return lengths;
+  for (size_t v = 0; v < views.size(); ++v) {
+    if (!in_view_[v]) continue;
+    const std::vector<double> now = bounded_numbers(views[v], v);
+    for (size_t k = 0; k < direction.size(); ++k) {
+      const double d = direction[k] * natural_step_;
+      if (d == 0) continue;
+      const double length = ((d < 0 ? least_ : most_) - now[k]) / d;
+      lengths[k] = std::min(lengths[k], std::max(0.0, length));
+    }
+  }
+  return lengths;
 }
 
 std::vector<double> FitParameter::scaled(const std::vector<double>& gradient) const {
@@ -261,12 +292,16 @@ FitState::Numbers FitParameter::state() const {
   return state;
 }
 
-void FitParameter::restore(const FitState::Numbers& numbers, const std::vector<FitView>& views) {
+void FitParameter::restore(const FitState::Numbers& numbers, const std::vector<FitView>& views,
+                           bool remeshed) {
   size_t size = numbers_.size();
   if (is_array()) {
     if (!(numbers.lambda >= 0)) throw InputError("the state of \"" + name_ + "\" has no lambda");
-    find_in_views(views);
-    large_steps_ = std::make_unique<LargeSteps>(mesh(views), numbers.lambda);
+    if (remeshed) find_in_views(views);
+    // The matrix is of lambda and the triangles alone; to factor it takes longer than a step.
+    if (remeshed || numbers.lambda != large_steps_->lambda()) {
+      large_steps_ = std::make_unique<LargeSteps>(mesh(views), numbers.lambda);
+    }
     natural_step_ = numbers.natural_step;
     size = 3 * large_steps_->size();
   }

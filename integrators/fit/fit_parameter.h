@@ -26,6 +26,8 @@ class FitParameter {
   const Parameter* in_view(size_t view) const {
     return in_view_[view] ? &*in_view_[view] : nullptr;
   }
+  // Whether it moves texels of that view's environment.
+  bool moves_texels(size_t view) const { return moves_texels_[view]; }
   // The shape of that view that it moves; none if it moves none.
   ShapeId shape(size_t view) const { return shapes_[view]; }
 
@@ -37,15 +39,19 @@ class FitParameter {
 
   // The gradient with respect to the numbers that move, per natural step.
   std::vector<double> scaled(const std::vector<double>& gradient) const;
+  // The lengths along a direction in natural steps after which bounds hold its numbers, at least 0;
+  // infinite where none does.
+  std::vector<double> lengths_to_bounds(const std::vector<double>& direction,
+                                        const std::vector<FitView>& views) const;
   // Adds a step in natural steps, up to bounds, and makes `step` what was added. False, and nothing
-  // is changed, if a face would lose its area or grow together with another.
+  // but `step` is changed, if a face would lose its area or grow together with another.
   bool add(std::vector<double>& step, std::vector<FitView>& views);
 
   // One, or the three channels of a colour; none of an array or a map.
   std::vector<FitScalar> scalars(const std::vector<FitView>& views) const;
   FitState::Numbers state() const;
-  // The views have their state already.
-  void restore(const FitState::Numbers& numbers, const std::vector<FitView>& views);
+  // The views have their state already; remeshed: with other triangles than before.
+  void restore(const FitState::Numbers& numbers, const std::vector<FitView>& views, bool remeshed);
 
   // New triangles for the shape of an array in all views, with edges `edge` times as long as now,
   // and from now on that smoothing; the optimiser's state is interpolated.
@@ -65,12 +71,15 @@ class FitParameter {
   bool place_vertices(const std::vector<double>& positions, std::vector<FitView>& views) const;
   // step: in the parameter's unit; cut at bounds.
   void add_to_numbers(std::vector<double>& step, std::vector<FitView>& views);
+  // What a number is after a step within bounds.
+  double bounded_sum(double now, double step) const;
   // The numbers that bounds hold for: values, or the sum of steps.
   std::vector<double> bounded_numbers(const FitView& view, size_t index) const;
 
   std::string name_;
   std::vector<std::optional<Parameter>> in_view_;
   std::vector<ShapeId> shapes_;
+  std::vector<bool> moves_texels_;
   size_t first_view_ = 0;  // that has it
   double natural_step_ = 0;
   double least_ = 0, most_ = 0;

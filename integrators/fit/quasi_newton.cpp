@@ -54,6 +54,19 @@ void QuasiNewton::add(std::vector<double> step, std::vector<double> change) {
   changes.erase(changes.begin());
 }
 
+QuasiNewton QuasiNewton::without(const std::vector<bool>& held) const {
+  if (std::find(held.begin(), held.end(), true) == held.end()) return *this;
+  const auto kept = [&](std::vector<double> x) {
+    for (size_t i = 0; i < x.size(); ++i) {
+      if (held[i]) x[i] = 0;
+    }
+    return x;
+  };
+  QuasiNewton free;
+  for (size_t i = 0; i < steps.size(); ++i) free.add(kept(steps[i]), kept(changes[i]));
+  return free;
+}
+
 void QuasiNewton::clear() {
   steps.clear();
   changes.clear();
@@ -87,7 +100,7 @@ std::optional<LinePoint> wolfe_search(
   constexpr double kDecrease = 1e-4, kFlat = 0.9;  // Nocedal and Wright's
   constexpr int kMostEvaluations = 20;
   const auto is_low = [&](const LinePoint& p) {
-    return p.value <= start.value + kDecrease * (p.at - start.at) * start.slope;
+    return p.value <= start.value + kDecrease * ((p.at - start.at) * start.slope - p.held);
   };
   const auto is_flat = [&](const LinePoint& p) {
     return std::fabs(p.slope) <= -kFlat * start.slope;

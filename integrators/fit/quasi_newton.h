@@ -21,6 +21,8 @@ class QuasiNewton {
   // A step that was taken and by how much the gradient changed. Left out where the function is not
   // convex along the step.
   void add(std::vector<double> step, std::vector<double> change);
+  // As if the numbers that are marked had never been moved.
+  QuasiNewton without(const std::vector<bool>& held) const;
   bool empty() const { return steps.empty(); }
   void clear();
 
@@ -30,10 +32,12 @@ class QuasiNewton {
 // A function along a line: its value, and its derivative by the place on the line.
 struct LinePoint {
   double at = 0, value = 0, slope = 0;
+  // What bounds kept back, of the change (at - start.at) start.slope that the start foretells.
+  double held = 0;
 };
 
-// A place where the value is at most start.value + 1e-4 at start.slope, and the slope at most 0.9
-// of that of the start in magnitude, or if there is none, one where the value is lower. evaluate:
+// A place where the value is at most start.value + 1e-4 (at start.slope - held), and the slope at
+// most 0.9 of that of the start in magnitude, or if there is none, one where the value is lower. evaluate:
 // at a place; a value that is not finite says that nothing is there; none: stop. first: the first
 // place to look at. start.slope must be negative. None if none was found in 20 evaluations.
 std::optional<LinePoint> wolfe_search(

@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <mutex>
+#include <numeric>
 #include <optional>
 
 #include "limn/core/box_tree.h"
@@ -41,10 +43,48 @@ void keep_narrowest(Gaps& gaps, const std::pair<ShapeId, ShapeId>& shapes, const
   if (!is_new) found->second = std::min(found->second, gap);
 }
 
+// Which faces of a mesh belong to a part of its surface that is closed: every side of a face is
+// that of another one, the other way round.
+std::vector<bool> closed_faces(const Mesh& mesh) {
+  struct Side {
+    uint32_t from, to;
+    auto operator<=>(const Side&) const = default;
+  };
+  std::vector<uint32_t> part(mesh.positions.size());  // a forest over welded vertices
+  std::iota(part.begin(), part.end(), 0u);
+  const auto root = [&](uint32_t v) {
+    while (part[v] != v) v = part[v] = part[part[v]];
+    return v;
+  };
+  std::vector<Side> sides, others;
+  for (const FaceIndices& face : mesh.faces) {
+    for (int k = 0; k < 3; ++k) {
+      const uint32_t a = mesh.weld[face[k]], b = mesh.weld[face[(k + 1) % 3]];
+      sides.push_back({a, b});
+      others.push_back({b, a});
+      part[root(a)] = root(b);
+    }
+  }
+  std::sort(sides.begin(), sides.end());
+  std::sort(others.begin(), others.end());
+  std::vector<Side> open;
+  std::set_symmetric_difference(sides.begin(), sides.end(), others.begin(), others.end(),
+                                std::back_inserter(open));
+  std::vector<bool> is_open(part.size());
+  for (const Side& side : open) is_open[root(side.from)] = true;
+  std::vector<bool> closed;
+  for (const FaceIndices& face : mesh.faces) closed.push_back(!is_open[root(mesh.weld[face[0]])]);
+  return closed;
+}
+
 class GapFinder {
  public:
   GapFinder(const Scene& scene, double spp, int threads)
-      : scene_(scene), eye_(value(scene.camera.origin)), spp_(spp) {
+      : scene_(scene),
+        eye_(value(scene.camera.origin)),
+        spp_(spp),
+        once_(scene.shapes.size()),
+        closed_(scene.shapes.size()) {
     const Camera& camera = scene.camera;
     pixel_ = 2 * camera.x_factor * std::tan(value(camera.fov) * M_PI / 360) / camera.width;
     for (uint32_t s = 0; s < scene.shapes.size(); ++s)
@@ -114,15 +154,37 @@ class GapFinder {
     }
   }
 
-  // Whether two faces of one shape share a vertex.
+  // Whether two faces of one shape share a vertex. Copies of it have several normals or places in a
+  // texture.
   bool are_neighbours(FaceRef a, FaceRef b) const {
     if (a.shape != b.shape) return false;
     const Mesh& mesh = scene_.shape(a.shape).mesh;
     const auto& of_b = mesh.face(b.face);
     const auto is_of_b = [&](uint32_t v) {
-      return std::find(of_b.begin(), of_b.end(), v) != of_b.end();
+      return std::any_of(of_b.begin(), of_b.end(),
+                         [&](uint32_t w) { return mesh.weld[w] == mesh.weld[v]; });
     };
     return std::any_of(mesh.face(a.face).begin(), mesh.face(a.face).end(), is_of_b);
+  }
+
+  bool is_closed(FaceRef face) const {
+    const size_t s = face.shape.index();
+    std::call_once(once_[s], [&] { closed_[s] = closed_faces(scene_.shape(face.shape).mesh); });
+    return closed_[s][face.face.index()];
+  }
+
+  // Whether what lies between the edges of one face and another one, of the same shape, is the
+  // inside of a body that the first or the other bounds. height: of the edges above the other face.
+  bool is_inside(FaceRef of_edges, FaceRef along, double height, double rounding) const {
+    const auto normal = [](const Corners& c) { return cross(c[1] - c[0], c[2] - c[0]); };
+    const Corners c = corners_of(of_edges);
+    const Vec3d n = normal(c), m = normalize(normal(corners_of(along)));
+    double longest = 0;
+    for (int k = 0; k < 3; ++k) longest = std::max(longest, length(c[(k + 1) % 3] - c[k]));
+    // Of the faces around an edge one at least looks towards what is in front of it. One that looks
+    // along the other face does not: rounding tilts it by so much over its width.
+    const bool looks_there = dot(n, m) * (height > 0 ? -1 : 1) > rounding * longest;
+    return (height < 0 && is_closed(along)) || (!looks_there && is_closed(of_edges));
   }
 
   // Of the edges of a face along the other one.
@@ -131,13 +193,21 @@ class GapFinder {
     const double rounding = touch_tolerance(largest_coordinate(edges), largest_coordinate(face));
     for (int k = 0; k < 3; ++k) {
       const auto gap = gap_along(edges[k], edges[(k + 1) % 3], face, rounding);
-      if (gap) keep_narrowest(gaps, std::minmax(of_edges.shape, along.shape), *gap);
+      if (!gap) continue;
+      if (of_edges.shape == along.shape && is_inside(of_edges, along, gap->height, rounding))
+        continue;
+      keep_narrowest(gaps, std::minmax(of_edges.shape, along.shape),
+                     {gap->pixels, std::fabs(gap->height)});
     }
   }
 
+  struct Beside {
+    double pixels;
+    double height;  // of the segment above the face; below zero behind it
+  };
   // Between the segment and the face that lies beside it, in the middle of what they share.
-  std::optional<Gap> gap_along(const Vec3d& a, const Vec3d& b, const Corners& face,
-                               double rounding) const {
+  std::optional<Beside> gap_along(const Vec3d& a, const Vec3d& b, const Corners& face,
+                                  double rounding) const {
     const Vec3d normal = cross(face[1] - face[0], face[2] - face[0]);
     const double area = length(normal);
     if (!(area > 0)) return std::nullopt;
@@ -161,15 +231,15 @@ class GapFinder {
     }
     if (to - from < kLeastPart) return std::nullopt;
     const double middle = 0.5 * (from + to);
-    const double width = std::fabs(height0 + middle * (height1 - height0));
+    const double height = height0 + middle * (height1 - height0);
     // Where they part from a common corner, some of it is within rounding, and the rest is wider;
     // where one passes through the other there is none.
     const double first = height0 + from * (height1 - height0);
     const double last = height0 + to * (height1 - height0);
     if (first * last <= 0 || std::min(std::fabs(first), std::fabs(last)) <= rounding)
       return std::nullopt;
-    const double pixels = width / (pixel_ * length(a + middle * (b - a) - eye_));
-    return Gap{pixels, width};
+    const double pixels = std::fabs(height) / (pixel_ * length(a + middle * (b - a) - eye_));
+    return Beside{pixels, height};
   }
 
   const Scene& scene_;
@@ -178,6 +248,9 @@ class GapFinder {
   double pixel_ = 0;  // of the film, at a distance of 1
   std::vector<FaceRef> faces_;
   std::vector<FloatBox> boxes_;
+  // Of each shape that is asked for: see closed_faces.
+  mutable std::vector<std::once_flag> once_;
+  mutable std::vector<std::vector<bool>> closed_;
   Gaps gaps_;
 };
 
@@ -193,9 +266,8 @@ void warn_of_hair_gaps(const Scene& scene, double spp, int threads,
     if (++told > kMost) break;
     warnings.push_back(fmt::format(
         "{} a gap of {:.2g} between {}, {:.2g} of a pixel, which {:.0f} samples per pixel can "
-        "miss: "
-        "derivatives there may be off by more than their errors say; close the gap, or take many "
-        "more samples",
+        "miss: derivatives there may be off by more than their errors say; close the gap, or take "
+        "many more samples",
         shapes.first == shapes.second ? name_in_text(scene, shapes.first) + " has"
                                       : name_in_text(scene, shapes.first) + " and " +
                                             name_in_text(scene, shapes.second) + " have",

@@ -134,8 +134,10 @@ class TermJob {
       pass(p).describe(result.stats);
       warn_of_contacts(scene_, pass(p).edges(), result.warnings);
     }
-    warn_of_faces_edge_on(scene_, pass(0).viewpoints(), result.warnings);
     result.at_kink = result.warnings.size() > warned;
+    warn_of_faces_edge_on(scene_, pass(0).viewpoints(), result.warnings);
+    for (size_t p = 0; p < passes_.size(); ++p)
+      result.at_kink = result.at_kink || pass(p).viewpoints().cross_planes();
     plan(settings, watch, result);
     if (settings.store) identify_plan(result.terms, *settings.store);
     result.setup_seconds = watch.seconds();

@@ -255,10 +255,13 @@ void ClosedLight::find_turns(const LampPlane& lamp, const Receiver& receiver,
     const double z0 = dot(w0, a), z1 = z0 + dot(e1, a), z2 = z0 + dot(e2, a);
     const auto [near, far] = std::minmax({z0, z1, z2});
     if (near < scratch.near || far > scratch.far) continue;  // it is cut
-    // On the grid twice the area is det(w0, w1, w2) both / (z0 z1 z2). Corners are rounded by less
-    // than one step, and a side's coordinates are below `steps` |e| (near + |w|) / near^2, so that
-    // rounding changes it by at most 8 of that and 8 more; the determinant's own is below 2^-46 of
-    // the lengths in it.
+    // On the grid twice the area is det(w0, w1, w2) both / (z0 z1 z2). A side's coordinates are
+    // below `steps` |e| (near + |w|) / near^2. Corners are rounded to the grid by less than one
+    // step, which changes the area by at most 8 of that and 8 more; the determinant's own rounding
+    // is below 2^-46 of the lengths in it. Before, the quotients are rounded: as if a corner were
+    // moved by 3 * 2^-53 |w|. That is at most 9 * 2^-53 reach^2 side in the determinant, where
+    // `error`, over both near^2, is 8 near reach side / steps at least: 2^-45 reach^2 side by
+    // the limit on steps below.
     const double volume = dot(cross(e1, e2), w0);
     const double side = size_of(e1) + size_of(e2), reach = size_of(w0) + side;
     if (!(steps * reach < kMostSteps * near)) continue;
@@ -269,10 +272,16 @@ void ClosedLight::find_turns(const LampPlane& lamp, const Receiver& receiver,
   }
 }
 
+// Whether it was found to be whole, turned one way. Then it must not be cut: cancelled sides are
+// those of the whole face.
+bool ClosedLight::has_turn(const FaceTree::Item& item, const Scratch& scratch) const {
+  return scratch.turns[tree_.index_of(item)] >= 2 * scratch.query;
+}
+
 // By bits: the sides of a face that cancel.
 uint32_t ClosedLight::cancelled_sides(const FaceTree::Item& item, const Scratch& scratch) const {
+  if (!has_turn(item, scratch)) return 0;
   const uint64_t turn = scratch.turns[tree_.index_of(item)];
-  if (turn < 2 * scratch.query) return 0;
   uint32_t sides = 0;
   for (uint32_t k = 0; k < 3; ++k) {
     const uint32_t other = item.neighbours[k];
@@ -302,8 +311,8 @@ bool ClosedLight::find_outlines(const LampPlane& lamp, const Receiver& receiver,
   find_turns(lamp, receiver, scratch);
   for (uint32_t label = 0; label < scratch.faces.size(); ++label) {
     const bool listed = label >= scratch.first_item;
-    const uint32_t cancelled =
-        listed ? cancelled_sides(*scratch.items[label - scratch.first_item], scratch) : 0;
+    const FaceTree::Item* item = listed ? scratch.items[label - scratch.first_item] : nullptr;
+    const uint32_t cancelled = item ? cancelled_sides(*item, scratch) : 0;
     if (cancelled == 7) continue;
     const FaceRef ref = scratch.faces[label];
     const auto corners = face_corners<double>(scene_.shape(ref.shape).mesh, ref.face);
@@ -314,10 +323,12 @@ bool ClosedLight::find_outlines(const LampPlane& lamp, const Receiver& receiver,
     const auto [nearest, farthest] = std::minmax(
         {depth(scratch.polygon[0]), depth(scratch.polygon[1]), depth(scratch.polygon[2])});
     const double near = scratch.near, far = scratch.far;
-    if (nearest < near) {
+    // Not by these depths, which may be rounded otherwise than those that its turn was found by.
+    const bool whole = item && has_turn(*item, scratch);
+    if (!whole && nearest < near) {
       clip([&](const Vec3d& w) { return dot(w, a) - near; }, line + Scratch::kNearCut);
     }
-    if (label >= scratch.uncut && farthest > far) {
+    if (!whole && label >= scratch.uncut && farthest > far) {
       clip([&](const Vec3d& w) { return far - dot(w, a); }, line + Scratch::kFarCut);
     }
     const bool of_lamp = label < scratch.lamp_faces;

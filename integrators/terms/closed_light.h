@@ -38,7 +38,7 @@ class ClosedLight {
   static constexpr size_t kMostPlanes = 64;  // of one lamp
 
   // Radiance that the surface scatters towards the viewer of `scattering`, of all lamps [W / (m^2
-  // sr)]; with its derivative where S is Dual. edge: where the point lies, if on an edge: the limit
+  // sr)]; with its derivative where S is Dual or Var. edge: where the point lies, if on an edge: the limit
   // from its own face.
   template <class S>
   Rgb<S> scattered(const RayTracer& tracer, const SurfacePoint<S>& surface,
@@ -68,6 +68,7 @@ class ClosedLight {
   bool list(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;
   void find_regions(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;
   void find_turns(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;
+  bool has_turn(const FaceTree::Item& item, const Scratch& scratch) const;
   uint32_t cancelled_sides(const FaceTree::Item& item, const Scratch& scratch) const;
   bool find_outlines(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;
 

@@ -2,6 +2,7 @@
 // The path tracer's rays between vertices, also those that start on an edge, and what is brought
 // into the cache for them. Included by path_follow.h.
 #include "integrators/terms/path.h"
+#include "limn/core/check.h"
 
 namespace limn {
 
@@ -72,7 +73,10 @@ inline bool PathTracer<S, Visitor>::shadowed(const Walk& walk) {
   ray.end = light.face.value_or(FaceRef{});
   // Beside an edge a shadow may end to the very rounding, if the light has no extent.
   const DeltaLight* delta = walk.beside_edge ? light.light->delta() : nullptr;
-  if (delta) ray.direction = c_.viewpoints->of(*delta).towards(ray.origin);
+  if (delta) {
+    CHECK(c_.viewpoints);
+    ray.direction = c_.viewpoints->of(*delta).towards(ray.origin);
+  }
   if (edge) {
     if (blocked_at_edge(c_.scene, c_.tracer, *edge, ray.direction)) return true;
     ray.skip_faces = edge->around.all;

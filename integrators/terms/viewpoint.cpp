@@ -73,6 +73,25 @@ Vec3d direction_behind(const std::vector<Vec3d>& planes, const std::vector<Vec3d
   return best;
 }
 
+// Whether a parameter moves the viewpoint out of the plane of the face that it lies in, or the
+// plane away from it: by more than what rounding makes of a motion within the plane.
+bool crosses(const Mesh& mesh, FaceId face, const LightOrigin& origin) {
+  const auto corners = face_corners<Dual>(mesh, face);
+  const Vec3<Dual> across = cross(corners[1] - corners[0], corners[2] - corners[0]);
+  const Vec3<Dual> to = origin.through(corners[0]);
+  const Vec3d n = value(across), w = value(to);
+  for (int lane = 0; lane < kLanes; ++lane) {
+    const auto rate = [&](const Vec3<Dual>& x) {
+      return Vec3d{x.x.d[lane], x.y.d[lane], x.z.d[lane]};
+    };
+    const double speed = dot(rate(across), w) + dot(n, rate(to));
+    const double turning = length(rate(across)) * length(w);
+    const double moving = length(rate(origin.v)) + (origin.infinite ? 0 : length(rate(corners[0])));
+    if (std::fabs(speed) > kEdgeOn * (turning + length(n) * moving)) return true;
+  }
+  return false;
+}
+
 // Each direction once, to a hundredth.
 void add_direction(std::vector<Vec3d>& directions, const Vec3d& n) {
   const auto is_like = [&](const Vec3d& other) { return dot(other, n) > 1 - 0.5e-4; };
@@ -111,8 +130,10 @@ Viewpoint::Viewpoint(const Scene& scene, const LightOrigin& origin)
         add_direction(planes, n);
       }
       if (!edge_on) continue;
-      if (mesh.normal_source == NormalSource::kFace && flat_faces_++ == 0)
-        first_shape_ = ShapeId(s);
+      if (mesh.normal_source == NormalSource::kFace) {
+        if (flat_faces_++ == 0) first_shape_ = ShapeId(s);
+        crosses_planes_ = crosses_planes_ || crosses(mesh, FaceId(f), origin);
+      }
       if (edge_on_[s].empty()) edge_on_[s].resize(mesh.faces.size());
       edge_on_[s][f] = true;
       ++edge_on_count_;
@@ -160,6 +181,12 @@ Viewpoints::Viewpoints(const Scene& scene) : camera(scene, {scene.camera.origin}
     numbers.emplace(light.get(), lights.size());
     lights.emplace_back(scene, light->origin());
   }
+}
+
+bool Viewpoints::cross_planes() const {
+  return camera.crosses_planes() ||
+         std::any_of(lights.begin(), lights.end(),
+                     [](const auto& light) { return light.crosses_planes(); });
 }
 
 void warn_of_faces_edge_on(const Scene& scene, const Viewpoints& viewpoints,

@@ -29,6 +29,8 @@ class Viewpoint {
   // small as the face.)
   size_t flat_faces() const { return flat_faces_; }
   ShapeId first_shape() const { return first_shape_; }
+  // Whether a parameter moves the viewpoint and the plane of one of them past each other.
+  bool crosses_planes() const { return crosses_planes_; }
   bool sees_edge_on(const FacesAround& around) const;
   // The viewpoint, or, if a face around the edge is seen edge-on, that aside of it: by 2^-12 of the
   // distance of y, a point of the edge; at infinity by 2^-12 rad.
@@ -56,6 +58,7 @@ class Viewpoint {
   Vec3d aside_;                             // unit
   std::vector<std::vector<bool>> edge_on_;  // by shape: of each face; empty if none of them is
   size_t edge_on_count_ = 0, flat_faces_ = 0;
+  bool crosses_planes_ = false;
   ShapeId first_shape_;
 };
 
@@ -64,6 +67,8 @@ struct Viewpoints {
   explicit Viewpoints(const Scene& scene);
 
   const Viewpoint& of(const DeltaLight& light) const { return lights[numbers.at(&light)]; }
+  // Whether any of them does.
+  bool cross_planes() const;
 
   Viewpoint camera;
   std::vector<Viewpoint> lights;  // delta lights, in the order of the scene

@@ -104,19 +104,25 @@ def shape_row(name, fit, mesh, steps):
 
 
 def shape_rows(fits, name, base, targets, truth, steps, defines, words, variants, smoothing):
-    """Of a shape that is fitted from base_start.xml, by some variants of one command."""
+    """Of a shape that is fitted from base_start.xml, by some variants of one command.
+
+    steps: in all; or of each variant those to show, the last in all.
+    """
     own = [w for d in defines for w in ("-D", d)]
-    own += ["--wrt", "object.vertex_positions", "--truth", truth, "--step", "2"]
+    own += ["--wrt", "object.vertex_positions", "--truth", truth]
     own += [w for t in targets[1:] for w in ("--target", t)]
     rows = []
     for variant, more in fits.chosen(variants):
         folder = f"{name}_{variant.replace(' ', '_')}"
-        fit = fits.fit(folder, scene(f"{base}_start.xml"), targets[0], steps, *own, *words,
-                       "--smoothing", str(smoothing), *more)  # fmt: skip
-        first, last = (fit["snapshots"][i]["meshes"][0] for i in (0, -1))
+        shown = steps[variant] if isinstance(steps, dict) else [steps]
+        step = [] if "--step" in more else ["--step", "2"]
+        fit = fits.fit(folder, scene(f"{base}_start.xml"), targets[0], shown[-1], *own, *words,
+                       *step, "--smoothing", str(smoothing), *more)  # fmt: skip
+        meshes = {s["step"]: s["meshes"][0] for s in fit["snapshots"]}
         if not rows:
-            rows.append(shape_row("start", fit, first, 0))
-        rows.append(shape_row(variant, fit, last, fit["steps"]))
+            rows.append(shape_row("start", fit, meshes[0], 0))
+        for at in [s for s in shown[:-1] if s in meshes and s < fit["steps"]] + [fit["steps"]]:
+            rows.append(shape_row(variant, fit, meshes[at], at))
     return SHAPE_HEAD, rows
 
 
@@ -161,8 +167,9 @@ def exact(fits):
     target = fits.render(
         scene("hidden_object.xml"), fits.path("exact.exr"), *size, spp=8, method="analytic"
     )
-    words = ["--spp", "1", "--snapshots", "15", "--sampler", "analytic"]
-    newton = ["--optimiser", "lbfgs"]
+    words = ["--spp", "1", "--snapshots", "10", "--sampler", "analytic"]
+    newton = ["--optimiser", "lbfgs", "--step", "1"]
+    steps = {"lbfgs": [10, 20, 40], "lbfgs remeshed": [45], "adam": [20, 60]}
     variants = [
         ("lbfgs", newton),
         ("lbfgs remeshed", [*newton, "--remesh", "15,30"]),
@@ -170,7 +177,7 @@ def exact(fits):
     ]
     truth = os.path.join(fits.generated, "creature.ply")
     return shape_rows(
-        fits, "exact", "hidden_object", [target], truth, 45, size, words, variants, 0.1
+        fits, "exact", "hidden_object", [target], truth, steps, size, words, variants, 0.1
     )
 
 

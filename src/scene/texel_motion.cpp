@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <limits>
 
 #include "limn/core/check.h"
 #include "limn/core/environment.h"
@@ -13,6 +14,8 @@ namespace limn {
 
 namespace {
 
+constexpr double kLargest = std::numeric_limits<float>::max();  // of a texel
+
 // Radiance is linear in texels, so that moves are exact but for the rounding of a float.
 class TexelMotion : public Motion {
  public:
@@ -23,7 +26,13 @@ class TexelMotion : public Motion {
     Image texels = scene.environment->texels();
     const Image velocities = texel_velocities(scene, component);
     for (size_t i = 0; i < texels.data.size(); ++i) {
-      texels.data[i] = static_cast<float>(double{texels.data[i]} + step * velocities.data[i]);
+      const double moved = double{texels.data[i]} + step * velocities.data[i];
+      if (!(std::fabs(moved) <= kLargest)) {
+        throw InputError({scene.file}, fmt::format("a step of {:g} along texels of \"{}.data\" is "
+                                                   "too long: their values must be finite",
+                                                   step, scene.environment_id));
+      }
+      texels.data[i] = static_cast<float>(moved);
     }
     scene.environment->set_texels(texels);
   }
@@ -38,17 +47,20 @@ class TexelField final : public TexelMotion {
   Image field_;  // H by W by 3
 };
 
-// As many channels as a map has: grey moves all alike.
+// As many channels as a map has: grey moves all alike. A map of one row is kept as two.
 Image read_texel_field(const Environment::Map& map, const std::string& file) {
   const Image image = read_exr(file);
-  if (image.width != map.width || image.height != map.height) {
+  const bool one_row = image.height == 1 && map.height == 2;
+  if (image.width != map.width || (image.height != map.height && !one_row)) {
     throw InputError({file}, fmt::format("the field has {} x {} texels, but the environment's map "
                                          "{} x {}",
                                          image.width, image.height, map.width, map.height));
   }
   Image field(image.width, image.height, 3);
+  const size_t pixels = static_cast<size_t>(image.width) * image.height;
   for (size_t i = 0; i < field.data.size(); ++i) {
-    field.data[i] = image.channels == 3 ? image.data[i] : image.data[i / 3];
+    const size_t k = i % (3 * pixels);
+    field.data[i] = image.channels == 3 ? image.data[k] : image.data[k / 3];
     if (std::isfinite(field.data[i])) continue;
     throw InputError({file}, fmt::format("the field is not finite in column {}, row {}",
                                          i / 3 % image.width, i / 3 / image.width));
@@ -82,7 +94,6 @@ class TexelArray final : public TexelMotion {
   void assign(Scene& scene, const std::string& name, const std::vector<double>& value,
               std::vector<std::string>*) const override {
     Image texels = scene.environment->texels();
-    constexpr double kLargest = std::numeric_limits<float>::max();
     check_numbers(scene, name, value, texels.data.size(), -kLargest, kLargest);
     for (size_t i = 0; i < value.size(); ++i) texels.data[i] = static_cast<float>(value[i]);
     scene.environment->set_texels(texels);

@@ -147,8 +147,8 @@ double magnitude(const Scene& scene, const BackwardResult& result, const std::st
   return sum;
 }
 
-// Some texels by their names in forward mode, and all of them along a random field, against those of
-// reverse mode.
+// Some texels by their names in forward mode, and all of them along a random field, against those
+// of reverse mode.
 std::vector<std::string> texel_names(const Scene& scene, const Image& field,
                                      const TempFiles& files) {
   if (!scene.environment || scene.environment->map().width == 0) return {};
@@ -289,6 +289,8 @@ TEST(Backward, TexelsOverAFloorHaveTheirClosedForm) {
       ++count;
     }
     fmt::print("{} texels: mean square of z {:.2f}\n", count / 3, squares / count);
+    // Channels have one z, and of texels each four share paths.
+    EXPECT_LT(squares / count, 1 + 5 * std::sqrt(2 / (count / 12)));
     // The image is linear in the map: with scale 2, half of the sum of texels times derivatives.
     EXPECT_NEAR(along / 2, result.parameters[1].moments.mean(0), 1e-9 * std::fabs(along));
   }

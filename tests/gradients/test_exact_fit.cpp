@@ -227,6 +227,7 @@ TEST(Fit, QuasiNewtonStepsGoDown) {
   settings.threads = 1;
   Fit other({shadow_view(files)}, exact_options(), settings);
   double first = 0, last = 0;
+  int resumed = 0;
   for (int i = 0; i < 12; ++i) {
     if (i == 6) other.restore(fit.state());
     const auto record = fit.step();
@@ -234,6 +235,7 @@ TEST(Fit, QuasiNewtonStepsGoDown) {
     if (i >= 6) {
       const auto again = other.step();
       ASSERT_TRUE(again);
+      ++resumed;
       EXPECT_EQ(again->loss, record->loss);
       EXPECT_EQ(again->values, record->values);
     }
@@ -245,6 +247,7 @@ TEST(Fit, QuasiNewtonStepsGoDown) {
     last = record->loss;
     if (record->at_rest) break;
   }
+  EXPECT_GT(resumed, 0);
   const std::vector<FitScalar> found = fit.scalars();
   fmt::print("loss {:.3g} to {:.3g}, x {:.4f}, z {:.4f}, radiance {:.3f} {:.3f} {:.3f}\n", first,
              last, found[0].value, found[1].value, found[2].value, found[3].value, found[4].value);
@@ -275,6 +278,12 @@ TEST(Fit, QuasiNewtonRefusesNoise) {
   options = exact_options();
   options.spp_doubling = 4;
   refuses(options, "doubling");
+  options = exact_options();
+  options.step_half_life = 4;
+  refuses(options, "half-life");
+  options = exact_options();
+  options.loss_spp = 4;
+  refuses(options, "samples of the loss");
 }
 
 }  // namespace

@@ -74,6 +74,49 @@ TEST_F(Program, FitsAndGoesOn) {
   EXPECT_FALSE(std::ifstream(files_.path("other") + "/state.cbor"));
 }
 
+// Pairs of steps and changes are in the folder, too; at rest there is nothing to go on with.
+TEST_F(Program, FitsByLbfgsGoOn) {
+  std::string text = bytes_of(scene_);
+  const std::string depth = "name=\"max_depth\" value=\"";
+  ASSERT_NE(text.find(depth), text.npos);
+  text[text.find(depth) + depth.size()] = '2';  // direct light alone has a closed form
+  const std::string scene = files_.write("direct.xml", text);
+  const std::string target = files_.path("target.exr");
+  ASSERT_EQ(run("render " + scene + " -D glow=3 --spp 4 -o " + target).status, 0);
+  const std::string fit = "fit " + scene + " --target " + target +
+                          " --wrt blaze.radiance --wrt clay.reflectance --spp 1 --no-report "
+                          "--sampler analytic --optimiser lbfgs -o ";
+  const std::string whole = files_.path("whole"), broken = files_.path("broken");
+  const Outcome outcome = run(fit + whole + " --steps 5");
+  ASSERT_EQ(outcome.status, 0) << outcome.text;
+  ASSERT_EQ(run(fit + broken + " --steps 3").status, 0);
+  ASSERT_EQ(run("fit --steps 5 --no-report --resume " + broken).status, 0);
+  const std::string state = bytes_of(whole + "/state.cbor");
+  EXPECT_EQ(state, bytes_of(broken + "/state.cbor"));
+  EXPECT_GT(json::from_cbor(state)["moves"].size(), 2u);
+  const json told = read_json(whole + "/fit.json");
+  EXPECT_EQ(told["arguments"]["pixels"], "uniform");
+  EXPECT_EQ(told["history"].back()["at_rest"], false);
+  EXPECT_NE(refused(fit + files_.path("other") + " --steps 3 --pixels adjoint").find("lbfgs takes"),
+            std::string::npos);
+
+  // Nothing but its bounds to go to.
+  const std::string held = files_.path("held");
+  const std::string rests = "fit " + scene + " -D glow=3 --target " + target +
+                            " --wrt blaze.radiance --bounds blaze.radiance=3,3 --spp 1 "
+                            "--no-report --sampler analytic --optimiser lbfgs --steps 9 -o " +
+                            held;
+  ASSERT_EQ(run(rests).status, 0);
+  const json end = read_json(held + "/fit.json");
+  ASSERT_EQ(end["history"].size(), 1u);
+  EXPECT_EQ(end["history"][0]["at_rest"], true);
+  EXPECT_EQ(end["status"], "done");
+  const Outcome again = run("fit --no-report --resume " + held);
+  EXPECT_EQ(again.status, 0);
+  EXPECT_NE(again.text.find("at rest"), std::string::npos) << again.text;
+  EXPECT_EQ(read_json(held + "/fit.json")["history"].size(), 1u);
+}
+
 // Each sensor of a scene has its target.
 TEST_F(Program, FitsSeenBySeveralSensors) {
   std::string text = bytes_of(scene_);

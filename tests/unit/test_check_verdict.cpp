@@ -152,6 +152,27 @@ TEST(CheckVerdict, ContactIsNoError) {
   EXPECT_EQ(r.verdict, Verdict::kCannotTell);
 }
 
+// A camera in the plane of a lamp, both at rest, forgives no defect elsewhere, not even one that
+// the bends' noise would leave open at a kink.
+TEST(CheckVerdict, FacesEdgeOnAtRestForgiveNothing) {
+  const TempFiles files;
+  for (const bool at_kink : {false, true}) {
+    Planted planted = planted_term(files, "forest", "boundary", 0.6, 256);
+    planted.scene.camera.origin.y = Dual(2.5);
+    planted.run = [=, run = planted.run](const auto& scene, const auto& options,
+                                         const auto& settings) {
+      GradientResult result = run(scene, options, settings);
+      EXPECT_FALSE(result.at_kink);
+      EXPECT_FALSE(result.warnings.empty());
+      result.at_kink = at_kink;
+      return result;
+    };
+    const CheckResult r = run(planted, 5);
+    EXPECT_EQ(r.bends, at_kink);
+    EXPECT_EQ(r.verdict, at_kink ? Verdict::kCannotTell : Verdict::kDisagree);
+  }
+}
+
 // Two boxes side by side: gaps that no sample would meet are told, wider ones and none are not.
 TEST(HairGaps, AreWarnedOf) {
   const TempFiles files;
@@ -200,6 +221,67 @@ TEST(HairGaps, AreWarnedOfWithinAShape) {
       << found[0];
   EXPECT_EQ(warnings(both, 3), found);
   EXPECT_TRUE(warnings(cube, 1).empty());
+}
+
+// The thickness of a plate is no gap, however its faces are cut; the slit between two of them is
+// one, and what an open one leaves between its sheets.
+TEST(HairGaps, AreNotInSolids) {
+  const TempFiles files;
+  const auto plate = [](float lower, float upper, uint32_t open) {
+    // The upper face has a vertex in its middle, so that opposite faces share no side's ends.
+    std::vector<Vec3f> x;
+    for (const float y : {lower, upper})
+      for (const auto& [s, t] : {std::pair{-1.f, -1.f}, {1.f, -1.f}, {1.f, 1.f}, {-1.f, 1.f}})
+        x.push_back({s, y, t});
+    x.push_back({0.3f, upper, 0.1f});
+    std::vector<FaceIndices> faces{{0, 1, 2}, {0, 2, 3}};
+    for (uint32_t k = 0; k < 4; ++k) {
+      const uint32_t n = (k + 1) % 4;
+      faces.push_back({k + 4, 8, n + 4});
+      if (k < open) continue;
+      faces.push_back({k, k + 4, n});
+      faces.push_back({n, k + 4, n + 4});
+    }
+    return make_mesh(x, faces);
+  };
+  const auto warnings = [&](const Mesh& mesh) {
+    SceneParts parts;
+    parts.body = obj_shape("plate", write_mesh(files, "plate.obj", mesh), true, 0.5, {},
+                           diffuse("chalk", "0.8, 0.8, 0.8"));
+    std::vector<std::string> lines;
+    warn_of_hair_gaps(make_scene(files, parts), 64, 2, lines);
+    return lines;
+  };
+  const Mesh thin = plate(0, 1e-4f, 0);
+  EXPECT_TRUE(warnings(thin).empty());
+  EXPECT_EQ(warnings(plate(0, 1e-4f, 4)).size(), 1u);
+  // One side alone is open.
+  EXPECT_EQ(warnings(plate(0, 1e-4f, 1)).size(), 1u);
+  const auto slit = warnings(joined(thin, plate(3e-4f, 4e-4f, 0)));
+  ASSERT_EQ(slit.size(), 1u);
+  EXPECT_NE(slit[0].find("\"plate\" has a gap of 0.0001 between its own faces"), std::string::npos)
+      << slit[0];
+}
+
+// Faces that share a corner are neighbours also where it has a copy for each of them.
+TEST(HairGaps, AreNotBetweenNeighbours) {
+  const TempFiles files;
+  // Two sheets that part by a hair from a corner on, with copies of it.
+  const auto wedge = [](bool apart) {
+    const float y = apart ? 1e-4f : 0;
+    return make_mesh({{-1, 0, 0}, {1, 0, -1}, {1, 0, 1}, {-1, y, 0}, {1, 1e-4f, -1}, {1, 1e-4f, 1}},
+                     {{0, 1, 2}, {3, 4, 5}});
+  };
+  const auto count = [&](const Mesh& mesh) {
+    SceneParts parts;
+    parts.body = obj_shape("sheets", write_mesh(files, "sheets.obj", mesh), true, 0.5, {},
+                           diffuse("chalk", "0.8, 0.8, 0.8"));
+    std::vector<std::string> lines;
+    warn_of_hair_gaps(make_scene(files, parts), 64, 1, lines);
+    return lines.size();
+  };
+  EXPECT_EQ(count(wedge(false)), 0u);
+  EXPECT_EQ(count(wedge(true)), 1u);
 }
 
 // Counts over many runs with a defect, of those whose stated power covers it.

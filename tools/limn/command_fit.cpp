@@ -30,8 +30,8 @@ std::string absolute(const std::string& file) {
   return file.empty() ? file : fs::absolute(file).lexically_normal().string();
 }
 
-// A field ("SHAPE.vertex_positions:FILE") with an absolute FILE that reaches to `end`; other names as they
-// are.
+// A field ("SHAPE.vertex_positions:FILE") with an absolute FILE that reaches to `end`; other names
+// as they are.
 std::string with_absolute_field(const std::string& text, size_t end) {
   const size_t colon = text.find(':');
   if (colon >= end) return text;
@@ -99,7 +99,7 @@ void FitCommand::add_options(CLI::App& app, bool) {
          "What to fit: scalars, SHAPE.vertex_positions, the texels EMITTER.data (repeatable)")
       ->type_name("PARAM")
       ->allow_extra_args(false);
-  app.add_option("--bounds", given_.bounds, "What a scalar may be (repeatable)")
+  app.add_option("--bounds", given_.bounds, "What a scalar or the texels may be (repeatable)")
       ->type_name("PARAM=LEAST,MOST")
       ->allow_extra_args(false);
   steps_option_ = app.add_option("--steps", given_.steps, "Steps in all")
@@ -216,6 +216,13 @@ FitArguments FitCommand::arguments() const {
     text = with_absolute_field(text, std::min(text.size(), text.rfind('=')));
   }
   a.views = view_arguments();
+  if (a.optimiser == "lbfgs") {
+    if (app_->get_option("--pixels")->count() > 0 && !a.options.backward.uniform_pixels) {
+      throw InputError("--pixels adjoint: lbfgs takes the same samples in all pixels, --pixels " +
+                       std::string(kUniformPixels));
+    }
+    a.options.backward.uniform_pixels = true;
+  }
   if (a.snapshots == 0) a.snapshots = static_cast<int>(std::max<int64_t>(1, a.steps / 10));
   return a;
 }
@@ -311,7 +318,8 @@ int FitCommand::run(const std::string&) {
 int FitCommand::loop(Fit& fit, FitFolder& folder, const RunSettings& settings) {
   const FitArguments& a = folder.arguments();
   if (fit.steps() == 0) folder.add_snapshot(fit, settings, kPictureSamples, common_.quiet);
-  while (fit.steps() < a.steps) {
+  if (folder.at_rest(fit)) fmt::print(stderr, "the fit is at rest: no step is left to take\n");
+  while (fit.steps() < a.steps && !folder.at_rest(fit)) {
     std::optional<FitRecord> record;
     try {
       record = fit.step();
@@ -329,11 +337,10 @@ int FitCommand::loop(Fit& fit, FitFolder& folder, const RunSettings& settings) {
     }
     folder.add(*record, fit);
     tell(*record);
-    const bool last = fit.steps() == a.steps || record->at_rest;
+    const bool last = fit.steps() >= a.steps || folder.at_rest(fit);
     if (!last && fit.steps() % a.snapshots != 0) continue;
     folder.add_snapshot(fit, settings, kPictureSamples, common_.quiet);
     folder.write(fit, last ? "done" : "running", warnings_.lines());
-    if (record->at_rest) break;
   }
   return kSuccess;
 }

@@ -146,7 +146,10 @@ json to_json(const FitState& state) {
       shapes.push_back(
           {{"positions", flat(s.positions)}, {"normals", flat(s.normals)}, {"faces", s.faces}});
     }
-    j["views"].push_back({{"sensor", view.camera}, {"shapes", shapes}, {"values", view.values}});
+    j["views"].push_back({{"sensor", view.camera},
+                          {"shapes", shapes},
+                          {"values", view.values},
+                          {"texels", view.texels}});
   }
   return j;
 }
@@ -162,7 +165,9 @@ FitState state_from(const json& j) {
         {p.at("values"), p.at("first"), p.at("second"), p.at("natural_step"), p.at("lambda")});
   }
   for (const json& v : j.at("views")) {
-    FitState::View view{v.at("sensor"), {}, v.at("values")};
+    // Folders of before texels were fitted have none.
+    FitState::View view{
+        v.at("sensor"), {}, v.at("values"), v.value("texels", std::vector<float>())};
     for (const json& s : v.at("shapes")) {
       view.shapes.push_back(
           {vectors<float>(s.at("positions")), vectors<double>(s.at("normals")), s.at("faces")});
@@ -279,6 +284,8 @@ FitOptions FitArguments::all_options() const {
   for (const std::string& text : bounds) all.bounds.push_back(parse_bounds(text));
   all.loss = loss_kind(loss);
   all.optimiser = optimiser_kind(optimiser);
+  // A fit at rest goes on to its next remeshing: it must not go past its end.
+  std::erase_if(all.remesh, [&](int64_t step) { return step > steps; });
   return all;
 }
 
@@ -380,6 +387,13 @@ void FitFolder::restore(Fit& fit) {
   }
 }
 
+bool FitFolder::at_rest(const Fit& fit) const {
+  if (history_.empty() || !history_.back().value("at_rest", false)) return false;
+  const auto& remesh = arguments_.options.remesh;
+  return std::none_of(remesh.begin(), remesh.end(),
+                      [&](int64_t step) { return step > fit.steps() && step <= arguments_.steps; });
+}
+
 void FitFolder::add(const FitRecord& r, const Fit& fit) {
   json scalars = json::object();
   const auto list = fit.scalars();
@@ -391,6 +405,7 @@ void FitFolder::add(const FitRecord& r, const Fit& fit) {
                       {"step_size", r.step_size},
                       {"halvings", r.halvings},
                       {"evaluations", r.evaluations},
+                      {"at_rest", r.at_rest},
                       {"values", scalars},
                       {"seconds", r.seconds}});
 }

@@ -63,6 +63,8 @@ class FitFolder {
   // file which is damaged or of another fit.
   void restore(Fit& fit);
 
+  // Whether its last step found nothing lower, and no remeshing is left before the end.
+  bool at_rest(const Fit& fit) const;
   void add(const FitRecord& record, const Fit& fit);
   // Meshes and their figures, pictures of all views by `spp` samples per pixel (none: 0, and then a
   // snapshot of this step stays as it is); says so unless quiet.

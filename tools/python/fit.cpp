@@ -93,8 +93,10 @@ void bind_record(nb::module_& m) {
               "How often the step was halved, so that no face lost its area.")
       .def_ro("remeshed", &FitRecord::remeshed)
       .def_ro("evaluations", &FitRecord::evaluations, "Losses and gradients that the step took.")
-      .def_ro("at_rest", &FitRecord::at_rest,
-              "Of lbfgs: no lower loss was found, and nothing was moved.")
+      .def_ro(
+          "at_rest", &FitRecord::at_rest,
+          "Of lbfgs: no lower loss was found, nothing was moved, and no remeshing is left. Where "
+          "one is, the fit goes on to it at once, and steps with it.")
       .def_ro("seconds", &FitRecord::seconds)
       .def("__repr__", [](const FitRecord& r) {
         return fmt::format("<limn.FitRecord: step {}, loss {:.4g} +- {:.2g}>", r.step, r.loss,

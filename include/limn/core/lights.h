@@ -9,8 +9,8 @@
 
 namespace limn {
 
-// Chooses one light at a point, mostly in proportion to what each would send there if nothing were in
-// the way, now and then any (lights.cpp). Every emitting shape is one, in their order, then the
+// Chooses one light at a point, mostly in proportion to what each would send there if nothing were
+// in the way, now and then any (lights.cpp). Every emitting shape is one, in their order, then the
 // environment, then the delta lights in the order of the file. The scene must outlive it.
 class Lights {
  public:

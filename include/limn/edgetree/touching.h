@@ -25,8 +25,8 @@ struct TouchingShape {
 //    they move differently each stays, as a rim of the faces that move with it;
 //  - a seam of two faces in one plane that look and move alike is no edge.
 // Parts on which one face stands on the inside of others, or on another body edge on edge, where
-// these come towards it or leave it, are left out of the objects and returned: contact that tightens (ContactLine). Contact that loosens
-// would open a gap, in which the light is another one.
+// these come towards it or leave it, are left out of the objects and returned: contact that
+// tightens (ContactLine). Contact that loosens would open a gap, in which the light is another one.
 // What touches is decided to the rounding of positions (edges/contacts.h). An edge also gets the
 // faces that do not touch it and are nearer to it than a ray in floats can tell, if it comes from
 // `viewer` (the camera) or from no farther away: FacesAround::near. Where nothing is so near

@@ -29,13 +29,16 @@ struct BackwardOptions {
   // Every pixel gets the same number of paths. Else a quarter of them is spread evenly and the rest
   // in proportion to |A|, summed over channels.
   bool uniform_pixels = false;
-  // Of edges: a row of edge_sampler_types(). Or "analytic": no edges at vertices of paths, but light
-  // in closed form, as the method of that name in forward mode, with its scenes.
+  // Of edges: a row of edge_sampler_types(). Or "analytic": no edges at vertices of paths, but
+  // light in closed form, as the method of that name in forward mode, with its scenes.
   std::string sampler = "forest";
   int edge_samples = 1;       // at every vertex of a path, of each term of edges
   double camera_samples = 1;  // points on the film, per path, of each term that has some there
   int batches = 16;           // at most, for standard errors; each ends with the adjoint of normals
   bool keep_batches = false;  // Moments::kept of every parameter
+  // Warnings of gaps that samples miss. To look for them takes a tree over all faces; runs that
+  // follow each other need it once.
+  bool find_gaps = true;
 };
 
 // What a name of BackwardOptions::sampler stands for. InputError that lists the known names if

@@ -29,8 +29,11 @@ enum class OptimiserKind {
   kGradientDescent,  // g itself: the size of a step is that of the loss
   // Limited-memory BFGS (Nocedal and Wright 2006, 7.2), with a line search to Wolfe's conditions. It
   // compares losses and gradients of different steps, which noise would make worthless: so it needs
-  // light in closed form (the sampler "analytic"), takes the same samples at every step, one image
-  // for the loss, and minimises that function of the parameters. Not for l1, nor with more samples
+  // light in closed form (the sampler "analytic"), takes the same samples at every step, alike in
+  // all pixels, one image for the loss, and minimises that function of the parameters. Its
+  // derivative is the term "interior"; where silhouettes that the camera sees are moved, the term
+  // "camera" adds an estimate of their part of the mean image's, which the function itself does not
+  // have. Numbers at a bound that would go on past it are held. Not for l1, nor with more samples
   // as steps go on.
   kLbfgs,
 };
@@ -51,10 +54,10 @@ struct FitBounds {
 };
 
 struct FitOptions {
-  // Names as in parameter.h: scalars, SHAPE.vertex_positions, EMITTER.data; at least one. Every view that has
-  // a name moves with it, and one view must have it. Colours move by channels. Motions of a shape
-  // and its vertex_positions exclude each other; where vertices are fitted, normals of the file
-  // give way to computed ones.
+  // Names as in parameter.h: scalars, SHAPE.vertex_positions, EMITTER.data; at least one. Every view
+  // that has a name moves with it, and one view must have it. Colours move by channels. Motions of
+  // a shape and its vertex_positions exclude each other, as do motions of texels and all of them;
+  // where vertices are fitted, normals of the file give way to computed ones.
   std::vector<std::string> parameters;
   std::vector<FitBounds> bounds;
   LossKind loss = LossKind::kL2;
@@ -89,9 +92,11 @@ struct FitRecord {
   // How often it was halved so that no face lost its area or grew together with another; if 30
   // times, that shape was left where it was.
   int halvings = 0;
-  bool remeshed = false;       // after the step
-  int evaluations = 1;         // losses and gradients that the step took
-  bool at_rest = false;        // of kLbfgs: no lower loss was found, and nothing was moved
+  bool remeshed = false;  // after the step
+  int evaluations = 1;    // losses and gradients that the step took
+  // Of kLbfgs: no lower loss was found, nothing was moved, and no remeshing is left. Where one is,
+  // the fit goes on to it at once, and steps() with it.
+  bool at_rest = false;
   std::vector<double> values;  // of Fit::scalars(), after the step
   double seconds = 0;
 };
@@ -124,6 +129,7 @@ struct FitState {
     std::vector<double> camera;               // origin, left, up, forward, fov
     std::vector<Shape> shapes;                // of those that are moved, in the scene's order
     std::vector<std::vector<double>> values;  // of each parameter but vertices; empty: it has none
+    std::vector<float> texels;  // H by W by 3, of a map that motions without values move
   };
   std::vector<View> views;
 };

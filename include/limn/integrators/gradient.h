@@ -115,7 +115,7 @@ struct GradientResult {
   NonFinite non_finite;
   std::vector<MethodSetting> settings;
   std::vector<std::string> warnings;
-  // Warnings tell of kinks: the derivative is that of one side.
+  // A parameter moves the scene across a kink (see warnings): the derivative is one of a side.
   bool at_kink = false;
   GradientStats stats;
 

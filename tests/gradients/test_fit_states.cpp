@@ -1,0 +1,264 @@
+// What fits keep and go back to: states of texels and vertices, bounds that hold numbers, steps that
+// end before their time.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+
+#include "limn/core/error.h"
+#include "limn/core/parameter.h"
+#include "limn/core/rng.h"
+#include "limn/integrators/fit.h"
+#include "limn/integrators/render.h"
+#include "support/meshes.h"
+#include "support/scenes.h"
+
+namespace limn {
+namespace {
+
+Scene sky_scene(const TempFiles& files, const Image& map) {
+  SceneParts parts;
+  parts.max_depth = 2;
+  parts.origin = {0, 3, 0.5};
+  parts.target = {0, 0, 0};
+  parts.width = parts.height = 4;
+  write_exr(files.path("map.exr"), map, false, {});
+  parts.body = square("floor", 50, -90, {0, 0, 0}, diffuse("grey", ".5, .25, 1")) +
+               R"(<emitter type="envmap" id="sky"><string name="filename" value=")" +
+               files.path("map.exr") + R"("/></emitter>)";
+  return make_scene(files, parts);
+}
+
+Image random_map(uint64_t seed) {
+  Image map(6, 5, 3);
+  for (size_t i = 0; i < map.data.size(); ++i) {
+    map.data[i] = static_cast<float>(0.2 + Rng(seed, i, 0).uniform());
+  }
+  return map;
+}
+
+void expect_refused(const std::vector<FitView>& views, const FitOptions& options,
+                    const std::string& what) {
+  try {
+    const Fit fit(views, options, {});
+    ADD_FAILURE() << what << " was taken";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find(what), std::string::npos) << error.what();
+  }
+}
+
+// A field and one texel have no values: the sky itself is what is kept.
+TEST(Fit, StatesKeepTheSky) {
+  const TempFiles files;
+  const std::string field = files.path("field.exr");
+  write_exr(field, random_map(2), false, {});
+  const FitView view{sky_scene(files, random_map(1)), Image(4, 4, 3), {}};
+  FitOptions options;
+  options.parameters = {"sky.data:" + field, "sky.data.1.2.g"};
+  options.step = 3;
+  RunSettings settings;
+  settings.spp = 4;
+  settings.threads = 2;
+  Fit fit({view}, options, settings), other({view}, options, settings);
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(fit.step());
+  const auto sky = [](const Fit& f) { return f.views()[0].scene.environment->texels().data; };
+  const FitState state = fit.state();
+  FitState wrong = state;
+  wrong.views[0].texels.pop_back();
+  const std::vector<float> first = sky(other);
+  EXPECT_THROW(other.restore(wrong), InputError);
+  EXPECT_EQ(sky(other), first);
+  other.restore(state);
+  EXPECT_EQ(sky(other), sky(fit));
+  EXPECT_NE(sky(other), first);
+  const auto record = fit.step(), again = other.step();
+  EXPECT_EQ(record->loss, again->loss);
+  EXPECT_EQ(record->values, again->values);
+  EXPECT_EQ(sky(other), sky(fit));
+
+  options.parameters = {"sky.data", "sky.data:" + field};
+  expect_refused({view}, options, "move the same texels");
+  options.parameters = {"sky.data.1.2.g", "sky.data"};
+  expect_refused({view}, options, "move the same texels");
+  Scene scene = deep_copy(view.scene);
+  EXPECT_THROW(find_parameter(scene, "sky.data.1.2.g").move(scene, 1e39), InputError);
+  EXPECT_EQ(scene.environment->texels().data, first);
+}
+
+// A body out of view, a lamp, and the shadow on the floor.
+Scene shadow_scene(const TempFiles& files, double x, double z = 0.2, bool many = false) {
+  SceneParts parts;
+  parts.max_depth = 2;
+  parts.origin = {0, 2.5, 4};
+  parts.target = {0, 0, 0.3};
+  parts.film = R"(<rfilter type="box"/>)";
+  const std::string mesh = write_mesh(files, "body.obj", torus_mesh(9, 5));
+  const std::string grid = write_mesh(files, "lamp.obj", grid_mesh(8));
+  parts.body = square("floor", 3, -90, {0, 0, 0}, diffuse("grey", ".5, .6, .7")) +
+               obj_shape("body", mesh, false, 0.5, {x, 3.2, z}, diffuse("clay", ".6, .5, .4"));
+  const std::string light = area_light("glow", "16, 15, 14");
+  parts.body += many ? obj_shape("lamp", grid, false, 0.4, {0.1, 5, 0}, light)
+                     : square("lamp", 0.4, 90, {0.1, 5, 0}, light);
+  return make_scene(files, parts);
+}
+
+Image target_of(const Scene& scene) {
+  RunSettings settings;
+  settings.spp = 2;
+  settings.seed = 9;
+  return to_image(means(render(scene, settings, {.method = "analytic"}).radiance), scene.film);
+}
+
+FitOptions exact_options(const std::vector<std::string>& parameters) {
+  FitOptions options;
+  options.parameters = parameters;
+  options.optimiser = OptimiserKind::kLbfgs;
+  options.backward.sampler = "analytic";
+  options.step = 5;
+  return options;
+}
+
+RunSettings quick() {
+  RunSettings settings;
+  settings.spp = 1;
+  settings.threads = 2;
+  return settings;
+}
+
+std::vector<Vec3f> body_of(const Fit& fit, size_t view = 0) {
+  for (const Shape& shape : fit.views()[view].scene.shapes) {
+    if (shape.id == "body") return shape.mesh.positions;
+  }
+  return {};
+}
+
+// Held by its bound a number is as if it were not fitted: the others end where they do without it,
+// with no more evaluations than that takes.
+TEST(Fit, QuasiNewtonStopsAtBounds) {
+  const TempFiles files;
+  const Image target = target_of(shadow_scene(files, 0.3));
+  FitOptions options = exact_options({"body.translate.x", "body.translate.z", "glow.radiance"});
+  // The truth is at x 0.25; red begins at a bound, and is pulled past it.
+  options.bounds = {{"body.translate.x", -1, 0.1}, {"glow.radiance", 0, 16}};
+  Fit bounded({{shadow_scene(files, 0.05), target, {}}}, options, quick());
+  options = exact_options({"body.translate.z", "glow.radiance"});
+  options.bounds = {{"glow.radiance", 0, 16}};
+  Fit without({{shadow_scene(files, 0.15), target, {}}}, options, quick());
+  const auto run = [](Fit& fit) {
+    std::pair<double, int> end{0, 0};
+    double last = INFINITY;
+    for (int i = 0; i < 15; ++i) {
+      const auto record = fit.step();
+      end = {record->loss, end.second + record->evaluations};
+      EXPECT_LE(record->loss, last);
+      last = record->loss;
+      if (record->at_rest) return end;
+    }
+    return end;
+  };
+  const auto a = run(bounded), b = run(without);
+  const std::vector<FitScalar> found = bounded.scalars(), truth = without.scalars();
+  EXPECT_EQ(found[0].value, 0.1);
+  fmt::print("loss {:.10g} and {:.10g}, evaluations {} and {}\n", a.first, b.first, a.second,
+             b.second);
+  for (size_t i = 0; i < truth.size(); ++i) {
+    fmt::print("{} {:.8g} {:.8g}\n", truth[i].name, found[i + 1].value, truth[i].value);
+  }
+  // Far below what the search has gained, and what the bound costs.
+  EXPECT_NEAR(a.first, b.first, 1e-3 * b.first);
+  EXPECT_LE(a.second, 2 * b.second);
+}
+
+// Vertices seen by their shadow from two sides: down at every step, to the same bits from a state,
+// before and after new triangles.
+TEST(Fit, QuasiNewtonMovesVertices) {
+  const TempFiles files;
+  FitOptions options = exact_options({"body.vertex_positions", "glow.radiance"});
+  options.remesh = {3};
+  options.step = 1;
+  std::vector<FitView> views;
+  for (int i = 0; i < 2; ++i) {
+    const Image target = target_of(shadow_scene(files, 0.3, 0.2));
+    views.push_back({shadow_scene(files, 0.1, 0.1), target, {}});
+    for (FitView& view : views) view.scene.camera.origin.x.v += 0.1 * i;
+  }
+  Fit fit(views, options, quick());
+  RunSettings settings = quick();
+  settings.threads = 1;
+  std::optional<Fit> other;
+  double last = INFINITY;
+  for (int i = 0; i < 6; ++i) {
+    // Each time from a state, of the same mesh or another.
+    other.emplace(views, options, settings);
+    other->restore(fit.state());
+    const auto record = fit.step(), again = other->step();
+    ASSERT_TRUE(record && again);
+    EXPECT_EQ(record->loss, again->loss);
+    EXPECT_EQ(record->values, again->values);
+    EXPECT_EQ(body_of(fit, 1), body_of(*other, 1));
+    EXPECT_EQ(body_of(fit, 0), body_of(fit, 1));
+    EXPECT_EQ(record->remeshed, i == 2);
+    EXPECT_LT(record->loss, last) << i;
+    last = record->remeshed ? INFINITY : record->loss;
+  }
+}
+
+// Of an interrupted search nothing is left, nor of one that fails: here a flat lamp would be bent
+// into more planes than are known in closed form.
+TEST(Fit, QuasiNewtonGoesBack) {
+  const TempFiles files;
+  const Image target = target_of(shadow_scene(files, 0.3));
+  const FitOptions options = exact_options({"body.vertex_positions"});
+  const FitView view{shadow_scene(files, 0.05), target, {}};
+  Fit fit({view}, options, quick()), other({view}, options, quick());
+  ASSERT_TRUE(fit.step() && other.step());
+  const std::vector<Vec3f> before = body_of(fit);
+  // The next place is known: the first evaluation is of the search.
+  std::atomic<bool> interrupted = false;
+  int calls = 0;
+  bool moved = false;
+  fit.listen(
+      [&](double) {
+        ++calls;
+        moved = moved || body_of(fit) != before;
+        interrupted = true;
+      },
+      &interrupted);
+  EXPECT_FALSE(fit.step());
+  EXPECT_GT(calls, 0);
+  EXPECT_TRUE(moved);
+  EXPECT_TRUE(body_of(fit) == before);
+  EXPECT_EQ(fit.steps(), 1);
+  fit.listen(nullptr, nullptr);
+  const auto record = fit.step(), again = other.step();
+  EXPECT_EQ(record->loss, again->loss);
+  EXPECT_EQ(body_of(fit), body_of(other));
+
+  FitOptions bent = exact_options({"body.translate.x", "lamp.vertex_positions"});
+  Fit failing({{shadow_scene(files, 0.05, 0.2, true), target, {}}}, bent, quick());
+  const auto lamp = [&] { return failing.views()[0].scene.shapes.back().mesh.positions; };
+  const std::vector<Vec3f> flat = lamp();
+  EXPECT_THROW(failing.step(), InputError);
+  EXPECT_EQ(failing.steps(), 0);
+  EXPECT_TRUE(lamp() == flat);
+  EXPECT_EQ(failing.scalars()[0].value, 0);
+}
+
+// What the image does not know of rests at once, but for the new triangles that were asked for.
+TEST(Fit, QuasiNewtonRemeshesBeforeItRests) {
+  const TempFiles files;
+  const Scene scene = shadow_scene(files, 40);
+  FitOptions options = exact_options({"body.vertex_positions"});
+  options.remesh = {4, 1};
+  Fit fit({{scene, target_of(scene), {}}}, options, quick());
+  for (const int64_t steps : {1, 4, 5}) {
+    const auto record = fit.step();
+    EXPECT_EQ(fit.steps(), steps);
+    EXPECT_EQ(record->remeshed, steps < 5);
+    EXPECT_EQ(record->at_rest, steps == 5);
+  }
+}
+
+}  // namespace
+}  // namespace limn
