@@ -13,12 +13,6 @@ namespace {
 
 constexpr int kReferenceRuns = 8;  // whose differences tell their error; not tuned
 
-double sum_of_squares(const std::vector<double>& values) {
-  double sum = 0;
-  for (const double x : values) sum += x * x;
-  return sum;
-}
-
 // Set-up and one sample of one pixel: InputError if the method does not know the scene.
 void try_method(const Scene& scene, const RunSettings& settings, RenderOptions options,
                 const std::string& method) {
@@ -39,8 +33,9 @@ class ImageComparer {
     result_.reference_method = "rays";
     try {
       try_method(scene, settings, options.render, "rays");
-    } catch (const InputError&) {
+    } catch (const InputError& error) {
       result_.reference_method = "path";
+      result_.not_by_rays = error.what();
     }
     double once = 0;
     for (const double time : options.times) once += time;
@@ -83,44 +78,31 @@ class ImageComparer {
     }
     RenderResult result = render(scene_, settings, options);
     result_.non_finite.merge(result.non_finite);
+    for (const std::string& warning : result.warnings) {
+      const auto& told = result_.warnings;
+      if (std::find(told.begin(), told.end(), method + ": " + warning) != told.end()) continue;
+      result_.warnings.push_back(method + ": " + warning);
+    }
     done_ += seconds;
     return result;
   }
 
   bool make_reference() {
-    std::vector<double> sum, squares;
+    std::vector<std::vector<double>> runs;
     for (int k = 0; k < kReferenceRuns; ++k) {
       const RenderResult run =
           one(result_.reference_method, options_.reference_seconds / kReferenceRuns, k);
       if (stopped()) return false;
-      const std::vector<double> image = means(run.radiance);
-      sum.resize(image.size());
-      squares.resize(image.size());
-      for (size_t i = 0; i < image.size(); ++i) {
-        sum[i] += image[i];
-        squares[i] += image[i] * image[i];
-      }
+      runs.push_back(means(run.radiance));
       result_.reference_spp += static_cast<int>(run.spp);
     }
-    double variance = 0;
-    for (size_t i = 0; i < sum.size(); ++i) {
-      sum[i] /= kReferenceRuns;
-      variance += squares[i] / kReferenceRuns - sum[i] * sum[i];
+    reference_ = mean_of_runs(runs);
+    if (!(reference_.scale > 0)) {
+      throw InputError({scene_.file}, "its image is black: nothing to compare");
     }
-    result_.reference = std::move(sum);
-    scale_ = sum_of_squares(result_.reference);
-    if (!(scale_ > 0)) throw InputError({scene_.file}, "its image is black: nothing to compare");
-    result_.reference_squared_error = variance / (kReferenceRuns - 1) / scale_;
+    result_.reference = reference_.mean;
+    result_.reference_squared_error = reference_.squared_error / reference_.scale;
     return true;
-  }
-
-  double squared_error(const std::vector<double>& image) const {
-    double sum = 0;
-    for (size_t i = 0; i < image.size(); ++i) {
-      const double d = image[i] - result_.reference[i];
-      sum += d * d;
-    }
-    return sum / scale_ - result_.reference_squared_error;
   }
 
   void compare_at(double time) {
@@ -133,7 +115,7 @@ class ImageComparer {
         rows[m].image = means(run.radiance);
         rows[m].seconds += run.seconds;
         rows[m].spp += static_cast<double>(run.spp);
-        errors[m].push_back(squared_error(rows[m].image));
+        errors[m].push_back(relative_squared_error(rows[m].image, reference_));
       }
       if (stopped()) break;
     }
@@ -159,11 +141,35 @@ class ImageComparer {
   const ImageCompareOptions& options_;
   const RunSettings& settings_;
   ImageComparison result_;
-  double all_seconds_ = 0, done_ = 0, scale_ = 0;
+  ReferenceImage reference_;
+  double all_seconds_ = 0, done_ = 0;
   uint64_t number_ = 1000;
 };
 
 }  // namespace
+
+ReferenceImage mean_of_runs(const std::vector<std::vector<double>>& runs) {
+  const auto count = static_cast<double>(runs.size());
+  ReferenceImage reference;
+  reference.mean.resize(runs.at(0).size());
+  for (size_t i = 0; i < reference.mean.size(); ++i) {
+    double& mean = reference.mean[i];
+    for (const std::vector<double>& run : runs) mean += run[i] / count;
+    reference.scale += mean * mean;
+    for (const std::vector<double>& run : runs) {
+      reference.squared_error += (run[i] - mean) * (run[i] - mean) / (count * (count - 1));
+    }
+  }
+  return reference;
+}
+
+double relative_squared_error(const std::vector<double>& image, const ReferenceImage& reference) {
+  double sum = 0;
+  for (size_t i = 0; i < image.size(); ++i) {
+    sum += (image[i] - reference.mean[i]) * (image[i] - reference.mean[i]);
+  }
+  return (sum - reference.squared_error) / reference.scale;
+}
 
 ImageComparison compare_images(const Scene& scene, const ImageCompareOptions& options,
                                const RunSettings& settings) {

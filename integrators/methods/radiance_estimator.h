@@ -30,7 +30,7 @@ class RadianceEstimator final : public SampleEstimator {
   const Scene& scene_;
   std::unique_ptr<RayTracer> tracer_;
   Lights lights_;
-  std::unique_ptr<ClosedLight> closed_;  // null where paths are sampled
+  std::unique_ptr<ClosedLight> closed_;      // null where paths are sampled
   std::unique_ptr<MirroredLight> mirrored_;  // null where nothing mirrors
   PathContext context_;
   CameraView<double> camera_;

@@ -17,7 +17,7 @@ namespace {
 constexpr RenderMethod kMethods[] = {
     {"path", "paths, with light and BSDF samples", false},
     {"analytic", "direct light of flat lamps on diffuse surfaces in closed form", true},
-    {"silhouettes", "direct light and open sky, by lines between silhouettes", false, true},
+    {"silhouettes", "direct light and open sky, by lines between silhouettes", false, true, true},
     {"rays", "direct light and open sky, by quasi-random rays", false, true},
 };
 
@@ -44,7 +44,7 @@ std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSet
       throw InputError(fmt::format("--film exact: not with the method \"{}\"", options.method));
     }
     return std::make_unique<VisibilityEstimator>(scene, settings.threads, settings.seed,
-                                                 options.method == kMethods[2].name, options);
+                                                 method.by_lines, options);
   }
   if (options.what != RenderWhat::kImage) {
     throw InputError(
@@ -60,20 +60,30 @@ std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSet
                                              method.closed_light, is_even(options.sampler));
 }
 
+// What the method reads of the options: parts that differ elsewhere are of one run.
+void identify(BatchStore& store, const RenderOptions& options) {
+  const RenderMethod& method = find_render_method(options.method);
+  store.identify("method", options.method);
+  if (!method.looks_around) {
+    store.identify("sampler", options.sampler);
+    store.identify("film", options.exact_film ? "exact" : "rays");
+    return;
+  }
+  store.identify("what", fmt::format("{}", static_cast<int>(options.what)));
+  if (method.by_lines) {
+    store.identify("lines", fmt::format("{}, tolerance {}", options.lines, options.tolerance));
+  } else {
+    store.identify("rays", fmt::format("{}", options.rays));
+  }
+}
+
 }  // namespace
 
 std::span<const RenderMethod> render_methods() { return kMethods; }
 
 RenderResult render(const Scene& scene, const RunSettings& settings, const RenderOptions& options) {
   const Stopwatch watch;
-  if (settings.store) {
-    settings.store->identify("method", options.method);
-    settings.store->identify("sampler", options.sampler);
-    settings.store->identify("film", options.exact_film ? "exact" : "rays");
-    settings.store->identify(
-        "what", fmt::format("{}, {} lines, {:g}, {} rays", static_cast<int>(options.what),
-                            options.lines, options.tolerance, options.rays));
-  }
+  if (settings.store) identify(*settings.store, options);
   std::vector<std::unique_ptr<SampleEstimator>> estimators;
   estimators.push_back(make_estimator(scene, settings, options));
   check_memory(estimators);
@@ -85,6 +95,12 @@ RenderResult render(const Scene& scene, const RunSettings& settings, const Rende
     result.non_finite.merge(sums[0].non_finite);
     result.spp += batch.count();
   });
+  const auto* around = dynamic_cast<const VisibilityEstimator*>(estimators[0].get());
+  if (around && around->missed() > 0) {
+    result.warnings.push_back(fmt::format(
+        "{} integrals did not reach the tolerance {} with {} lines: ask for a larger one",
+        around->missed(), options.tolerance, kMostLines));
+  }
   result.seconds = watch.seconds();
   return result;
 }

@@ -7,28 +7,29 @@
 #include <cmath>
 
 #include "integrators/terms/camera_path.h"
+#include "integrators/terms/direct_light_check.h"
 #include "limn/core/error.h"
 
 namespace limn {
 namespace {
 
-// Dimensions of a sample's points: on the film; lines' offset, or a ray's two numbers.
-constexpr int kFilm = 0, kOffset = 2, kRay = 2;
-// Points of the film for lamps for one for the sky, where there are both.
+// Points of the film for lamps for one for the sky, where there are both. Not tuned.
 constexpr int kLampPoints = 16;
+constexpr int kMostRays = 1 << 20;
 
-void check_rays(const Scene& scene) {
-  if (scene.max_depth != 2) {
-    throw InputError({scene.file},
-                     fmt::format("the method \"rays\": only direct light is sampled: give --what "
-                                 "direct, or set the integrator's max_depth to 2 (it is {})",
-                                 scene.max_depth));
-  }
-  for (const auto& light : scene.delta_lights) {
-    throw InputError({scene.file},
-                     fmt::format("the method \"rays\": emitter{}: only lamps with an area and "
-                                 "environments are sampled: use the method path",
-                                 light->id.empty() ? "" : " \"" + light->id + "\""));
+void check_options(const RenderOptions& options, bool by_lines) {
+  const auto check = [](const char* name, auto value, auto least, auto most) {
+    if (value >= least && value <= most) return;
+    throw InputError(fmt::format("{}: {} is not from {} to {}", name, value, least, most));
+  };
+  if (!by_lines) return check("rays", options.rays, 1, kMostRays);
+  check("lines", options.lines, 1, kMostLines);
+  check("tolerance", options.tolerance, 0.0, 1.0);
+  if (options.tolerance > 0 && 2 * options.lines > kMostLines) {
+    throw InputError(
+        fmt::format("tolerance: {} lines can not be doubled (there are {} at most): "
+                    "start with fewer",
+                    options.lines, kMostLines));
   }
 }
 
@@ -42,11 +43,12 @@ VisibilityEstimator::VisibilityEstimator(const Scene& scene, int threads, uint64
       options_(options),
       camera_(scene.camera) {
   const bool direct = options.what == RenderWhat::kImage;
+  check_options(options, by_lines);
   if (by_lines) {
     const LineOptions lines{options.lines, options.tolerance};
     lines_ = std::make_unique<LineLight>(scene, *tracer_, threads, lines, direct);
   } else if (direct) {
-    check_rays(scene);
+    check_direct_light(scene, "rays");
     add_lamps();
   }
 }
@@ -91,35 +93,26 @@ void VisibilityEstimator::add_pixels(std::span<const KeyedSample> samples, Sampl
 Rgb<double> VisibilityEstimator::sample(const KeyedSample& one, SampleSink& sink,
                                         RayCount& rays) const {
   const PixelSample& at = one.at;
-  const uint64_t pixel = static_cast<uint64_t>(at.y) << 32 | static_cast<uint32_t>(at.x);
-  const uint64_t key = mix_bits(mix_bits(seed_ + 1) + pixel);
-  const ScrambledSobol points(key);
   const bool split =
       lines_ && lines_->has_lamps() && scene_.environment && options_.what == RenderWhat::kImage;
-  if (!split) return film_point(one, points, at.s, Part::kAll, sink, rays);
+  if (!split) return film_point(at, at.s, Part::kAll, sink, rays);
   Rgb<double> sum;
   for (int k = 0; k < kLampPoints; ++k) {
-    sum += film_point(one, points, at.s * kLampPoints + k, Part::kNoSky, sink, rays);
+    sum += film_point(at, at.s * kLampPoints + k, Part::kNoSky, sink, rays);
   }
-  return sum * (1.0 / kLampPoints) +
-         film_point(one, ScrambledSobol(mix_bits(key)), at.s, Part::kSky, sink, rays);
+  return sum * (1.0 / kLampPoints) + film_point(at, at.s, Part::kSky, sink, rays);
 }
 
-Rgb<double> VisibilityEstimator::film_point(const KeyedSample& one, const ScrambledSobol& points,
-                                            uint64_t number, Part part, SampleSink& sink,
-                                            RayCount& rays) const {
-  const auto& [at, key] = one;
-  FilmPosition film;
-  if (scene_.film.filter.kind == Filter::Kind::kBox) {
-    const auto x = scene_.film.range_x(at.x), y = scene_.film.range_y(at.y);
-    film = {at.x + 0.5 + x.lower + (x.upper - x.lower) * points.at(number, kFilm),
-            at.y + 0.5 + y.lower + (y.upper - y.lower) * points.at(number, kFilm + 1)};
-  } else {
-    const bool first = part != Part::kNoSky || number % kLampPoints == 0;
-    const Rng rng =
-        first ? key : key.at(Purpose::kFilmCopy, static_cast<int>(number % kLampPoints));
-    film = sample_pixel_filter(scene_.film, at.x, at.y, rng);
-  }
+Rng VisibilityEstimator::even(const PixelSample& at, uint64_t number, Part part) const {
+  const uint64_t pixel = static_cast<uint64_t>(at.y) << 32 | static_cast<uint32_t>(at.x);
+  // Beyond 2^32 points another scrambling starts.
+  const uint64_t stream = (number >> 32) * 2 + (part == Part::kSky);
+  return Rng::even(mix_bits(seed_) + stream, pixel, static_cast<uint32_t>(number));
+}
+
+Rgb<double> VisibilityEstimator::film_point(const PixelSample& at, uint64_t number, Part part,
+                                            SampleSink& sink, RayCount& rays) const {
+  const FilmPosition film = sample_pixel_filter(scene_.film, at.x, at.y, even(at, number, part));
   const auto start = camera_.ray(film.x, film.y);
   const Vec3d origin = start.origin, direction = start.direction;
   const bool image = options_.what == RenderWhat::kImage;
@@ -137,7 +130,7 @@ Rgb<double> VisibilityEstimator::film_point(const KeyedSample& one, const Scramb
                   front ? surface.n_g : -surface.n_g,
                   front ? surface.n_s : -surface.n_s,
                   scattering,
-                  points,
+                  at,
                   number,
                   rays};
   if (sink.log()) {
@@ -149,11 +142,11 @@ Rgb<double> VisibilityEstimator::film_point(const KeyedSample& one, const Scramb
     if (part != Part::kSky) sum = surface.emission(-direction, scene_.shading);
     if (scattering.black()) return sum;
   }
-  return sum + (lines_ ? by_lines(seen, part) : by_rays(seen));
+  return sum + (lines_ ? by_lines(seen, part) : by_rays(seen, part));
 }
 
 Rgb<double> VisibilityEstimator::by_lines(const Seen& seen, Part part) const {
-  const double offset = seen.points.at(seen.sample, kOffset);
+  const double offset = even(seen.at, seen.number, part).at(Purpose::kDirect, 0).uniform();
   if (options_.what == RenderWhat::kImage) {
     Rgb<double> sum;
     if (part != Part::kSky) sum = lines_->lamps(seen.surface, seen.scattering, offset);
@@ -168,22 +161,17 @@ Rgb<double> VisibilityEstimator::by_lines(const Seen& seen, Part part) const {
                   : lines_->ambient_occlusion(at, seen.n, offset));
 }
 
-Rgb<double> VisibilityEstimator::by_rays(const Seen& seen) const {
+Rgb<double> VisibilityEstimator::by_rays(const Seen& seen, Part part) const {
   const int count = options_.rays;
+  const bool sky = options_.what != RenderWhat::kImage || scene_.environment;
   Rgb<double> sum;
   for (int k = 0; k < count; ++k) {
-    const uint64_t number = seen.sample * count + k;
-    const double u1 = seen.points.at(number, kRay), u2 = seen.points.at(number, kRay + 1);
-    if (options_.what != RenderWhat::kImage) {
-      sum += sky_ray(seen, u1, u2);
-      continue;
-    }
-    if (scene_.environment) sum += sky_ray(seen, u1, u2);
-    for (size_t i = 0; i < lamps_.size(); ++i) {
-      // Of a lamp of its own: the same points, shifted.
-      const double shift = 0.61803398874989485 * static_cast<double>(i + 1);
-      const double v1 = u1 + shift - std::floor(u1 + shift);
-      sum += lamp_ray(lamps_[i], seen, v1, u2);
+    const Rng key = even(seen.at, seen.number * count + k, part);
+    // The sky and every lamp have points of their own.
+    for (size_t i = sky ? 0 : 1; i <= lamps_.size(); ++i) {
+      Rng rng = key.at(Purpose::kEmitter, i);
+      const double u1 = rng.uniform(), u2 = rng.uniform();
+      sum += i == 0 ? sky_ray(seen, u1, u2) : lamp_ray(lamps_[i - 1], seen, u1, u2);
     }
   }
   return sum * (1.0 / count);

@@ -1,11 +1,10 @@
 #pragma once
 // How open the sky is and direct light, at what a camera sees: by lines between silhouettes, or by
-// rays at quasi-random points. Film positions are quasi-random, too.
+// rays. All random numbers of a pixel are even (Rng::even).
 #include <memory>
 #include <vector>
 
 #include "integrators/estimates/sample_estimator.h"
-#include "integrators/estimates/scrambled_sobol.h"
 #include "integrators/terms/line_light.h"
 #include "limn/core/camera.h"
 #include "limn/integrators/render.h"
@@ -15,15 +14,18 @@ namespace limn {
 class VisibilityEstimator final : public SampleEstimator {
  public:
   // The scene must outlive it. seed: of the run. InputError where the method does not know the
-  // scene's light, see LineLight::check; by rays only for more than direct light and for delta
-  // lights.
+  // scene's light, see LineLight::check, by rays check_direct_light; and for options out of range.
   VisibilityEstimator(const Scene& scene, int threads, uint64_t seed, bool by_lines,
                       const RenderOptions& options);
 
   const Scene& scene() const override { return scene_; }
   size_t slots() const override { return 1; }
+  bool is_even() const override { return true; }
   const char* slot_name(size_t) const override { return "radiance"; }
   void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const override;
+
+  // Sums over lines that ended above the tolerance, so far.
+  int64_t missed() const { return lines_ ? lines_->missed() : 0; }
 
  private:
   // What one point sees.
@@ -31,8 +33,8 @@ class VisibilityEstimator final : public SampleEstimator {
     const SurfacePoint<double>& surface;
     Vec3d up, n;  // geometric and shading normal, towards the viewer
     const Scattering<double>& scattering;
-    const ScrambledSobol& points;
-    uint64_t sample;
+    const PixelSample& at;
+    uint64_t number;  // of the point of the film among the pixel's
     RayCount& rays;
   };
   struct RayLamp {
@@ -44,10 +46,12 @@ class VisibilityEstimator final : public SampleEstimator {
   // scattered; of that alone.
   enum class Part { kAll, kNoSky, kSky };
   Rgb<double> sample(const KeyedSample& at, SampleSink& sink, RayCount& rays) const;
-  Rgb<double> film_point(const KeyedSample& at, const ScrambledSobol& points, uint64_t number,
-                         Part part, SampleSink& sink, RayCount& rays) const;
+  Rgb<double> film_point(const PixelSample& at, uint64_t number, Part part, SampleSink& sink,
+                         RayCount& rays) const;
+  // The stream of a pixel's point of the film, or of a ray from there.
+  Rng even(const PixelSample& at, uint64_t number, Part part) const;
   Rgb<double> by_lines(const Seen& seen, Part part) const;
-  Rgb<double> by_rays(const Seen& seen) const;
+  Rgb<double> by_rays(const Seen& seen, Part part) const;
   Rgb<double> lamp_ray(const RayLamp& lamp, const Seen& seen, double u1, double u2) const;
   Rgb<double> sky_ray(const Seen& seen, double u1, double u2) const;
   bool is_open(const Seen& seen, const Vec3d& direction) const;

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "integrators/terms/closed_light.h"
+#include "integrators/terms/direct_light_check.h"
 
 namespace limn {
 namespace {
@@ -17,12 +18,8 @@ bool is_diffuse(const Bsdf& bsdf) {
   return lobe.model == &kHemisphere;
 }
 
-std::string name_of(const std::string& kind, const std::string& id) {
-  return id.empty() ? kind : fmt::format("{} \"{}\"", kind, id);
-}
-
 [[noreturn]] void refuse(const SourceLocation& where, const std::string& what) {
-  throw InputError(where, "the method \"analytic\": " + what);
+  refuse_light("analytic", where, what);
 }
 
 }  // namespace
@@ -37,11 +34,11 @@ void check_closed_light(const Scene& scene) {
   }
   if (scene.environment) {
     refuse(whole, fmt::format("{}: light from all around has no closed form here: {}",
-                              name_of("emitter", scene.environment_id), kInstead));
+                              name_in_text("emitter", scene.environment_id), kInstead));
   }
   for (const auto& light : scene.delta_lights) {
     refuse(whole, fmt::format("{}: only area lights are integrated: {}",
-                              name_of("emitter", light->id), kInstead));
+                              name_in_text("emitter", light->id), kInstead));
   }
   for (const Shape& shape : scene.shapes) {
     for (const bool front : {true, false}) {
@@ -49,12 +46,12 @@ void check_closed_light(const Scene& scene) {
       if (!side || is_diffuse(*side)) continue;
       refuse(shape.where, fmt::format("{}: only diffuse surfaces have a closed form, this is "
                                       "{}: {}",
-                                      name_of("shape", shape.id), side->describe(), kInstead));
+                                      shape_in_text(shape), side->describe(), kInstead));
     }
     const bool interpolates = shape.mesh.normal_source != NormalSource::kFace;
     if (scene.shading == ShadingModel::kMitsuba && interpolates) {
       refuse(shape.where, fmt::format("{}: its interpolated normals need --shading continuous",
-                                      name_of("shape", shape.id)));
+                                      shape_in_text(shape)));
     }
   }
 }
@@ -137,8 +134,8 @@ void ClosedLight::add_lamp(ShapeId id) {
   }
   if (lamps_.size() - before > kMostPlanes) {
     refuse(shape.where,
-           fmt::format("{} has {} planes, at most {} are integrated: {}",
-                       name_of("shape", shape.id), lamps_.size() - before, kMostPlanes, kInstead));
+           fmt::format("{} has {} planes, at most {} are integrated: {}", shape_in_text(shape),
+                       lamps_.size() - before, kMostPlanes, kInstead));
   }
   for (size_t i = before; i < lamps_.size(); ++i) finish(lamps_[i]);
 }

@@ -2,6 +2,7 @@
 #include "integrators/terms/contours.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <tuple>
 
@@ -130,7 +131,7 @@ int Contours::count(const ContourPoint& at, const Vec3d& direction,
   items.clear();
   const Vec3d unit = normalize(direction);
   const Frame frame(unit);
-  // Wider than rounding.
+  // Wider than rounding. Not tuned.
   const double slack = 0x1p-40 * (extent_ + length(at.p));
   std::array<HalfSpace, 5> around;
   int k = 0;

@@ -64,7 +64,6 @@ class Contours {
   // What passes through a polygon. corners: of a convex one, counter-clockwise seen from before it.
   ContourScreen make_screen(const Plane& plane, double margin,
                             std::span<const Vec3d> corners) const;
-  uint64_t bytes() const { return sampler_->size().bytes; }
 
  private:
   int sign(FaceRef face, const ContourPoint& at) const;

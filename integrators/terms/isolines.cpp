@@ -121,6 +121,7 @@ void Isolines::cross(const ContourArc& arc, double turn0, double turn1, const Co
   const int change = way > 0 ? -arc.jump : arc.jump;
   const double from = way > 0 ? turn0 : turn1, to = way > 0 ? turn1 : turn0;
   const double first = in_lines(from), last = in_lines(to) + (to < from ? count : 0);
+  if (std::floor(first) + 1 > last) return;
   const double a0 = dot(pencil_.pole, arc.w0), a1 = dot(pencil_.pole, arc.w1);
   const double x0 = dot(pencil_.u, arc.w0), x1 = dot(pencil_.u, arc.w1);
   const double y0 = dot(pencil_.v, arc.w0), y1 = dot(pencil_.v, arc.w1);

@@ -6,6 +6,7 @@
 // at N azimuths. On each of them W (contours.h) starts as it is at the pole and changes by a known
 // number at every crossing; the sky is open where it is zero. Places on a line are told by
 // cot theta = (pole . w) / (r . w), which falls from infinity to -infinity and needs no root.
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -18,7 +19,8 @@ namespace limn {
 // Azimuths spread by a density that is constant over equal parts of a turn.
 class AzimuthWarp {
  public:
-  // weights: of each part, not negative; half of the density goes by them, half is uniform.
+  // weights: of each part, not negative; half of the density goes by them, half is uniform
+  // (not tuned).
   explicit AzimuthWarp(std::span<const double> weights);
   // The share of the density before an azimuth [turns, 0 to 1]; its inverse; the density there.
   double share(double turn) const;
@@ -53,7 +55,8 @@ class Isolines {
     int change;  // of W, away from the pole
   };
 
-  // Lines at psi = (j + offset) / count, or where the warp puts these, 0 <= offset < 1, and all crossings, in their order.
+  // Lines at psi = (j + offset) / count, or where the warp puts these, 0 <= offset < 1, and all
+  // crossings, in their order.
   void build(const Pencil& pencil, int count, double offset, const ContourPoint& at,
              std::span<const ContourArc> arcs);
 
@@ -62,19 +65,18 @@ class Isolines {
   std::span<const Crossing> crossings(int j) const {
     return {sorted_.data() + starts_[j], sorted_.data() + starts_[j + 1]};
   }
-  bool crossed() const { return !sorted_.empty(); }
 
-  // visit(from, to) for all ranges of cot, from > to, down to `end`, where W is zero (`open`) or
-  // where it is not. w: its value at the pole.
+  // visit(from, to) for all ranges of cot, from > to, from `start` down to `end`, where W is zero
+  // (`open`) or where it is not. w: its value at the pole.
   template <class Visit>
-  void for_ranges(int j, int w, double end, bool open, const Visit& visit) const {
-    double from = std::numeric_limits<double>::infinity();
+  void for_ranges(int j, int w, double start, double end, bool open, const Visit& visit) const {
+    double from = start;
     for (const Crossing& crossing : crossings(j)) {
       if (crossing.cot <= end) break;
       const int next = w + crossing.change;
       if ((w == 0) != (next == 0)) {
         if ((w == 0) == open && from > crossing.cot) visit(from, crossing.cot);
-        from = crossing.cot;
+        from = std::fmin(start, crossing.cot);
       }
       w = next;
     }

@@ -5,7 +5,9 @@
 //
 // One dimension is exact, the other a sum over lines at equal distances whose offset is given:
 // uniform in [0, 1) it makes all results unbiased. Their standard error falls as lines^-1.5.
+#include <atomic>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "integrators/terms/contours.h"
@@ -18,21 +20,22 @@ namespace limn {
 
 struct LineOptions {
   int lines = 64;  // through the sky; a quarter of them through a lamp
-  // Above 0: lines are doubled until the results of two halves differ by at most twice this part of
-  // the result. That is no more unbiased.
+  // Above 0: lines, 8 at least, are doubled until the results of two halves differ by at most twice
+  // this part of the result, or until there are kMostLines. That is no more unbiased.
   double tolerance = 0;
 };
 inline constexpr int kMostLines = 1 << 14;
 
 class LineLight {
  public:
-  // The scene and its tracer must outlive it. direct: whether lamps() and environment() are to be asked.
+  // The scene and its tracer must outlive it. direct: whether lamps() and environment() are to be
+  // asked; InputError where check() says so, and for lamps that lie in one place.
   LineLight(const Scene& scene, const RayTracer& tracer, int threads, const LineOptions& options,
             bool direct);
 
   // InputError, with the place in the scene's file and what to do, for a scene whose direct light
-  // lines do not know: delta lights, lamps of many faces that are not in one plane, BSDFs that are
-  // not diffuse, interpolated normals after Mitsuba, more than direct light.
+  // lines do not know: delta lights, BSDFs that are not diffuse, interpolated normals after
+  // Mitsuba, more than direct light, environments that are neither constant nor a map.
   static void check(const Scene& scene);
 
   // The part of the directions above the face's horizon in which a ray would leave the scene.
@@ -47,6 +50,8 @@ class LineLight {
   Rgb<double> environment(const SurfacePoint<double>& surface, const Scattering<double>& scattering,
                           double offset) const;
   bool has_lamps() const { return !lamps_.empty(); }
+  // How many sums ended at kMostLines above the tolerance, so far.
+  int64_t missed() const { return missed_; }
 
   ContourPoint at(const SurfacePoint<double>& surface, const Vec3d& up) const {
     return contours_.at(surface, up);
@@ -64,6 +69,7 @@ class LineLight {
   struct Scratch;
   static Scratch& scratch();
 
+  void check_overlaps(int threads) const;
   void add_lamp(const Shape& shape);
   void add_polygon(const LampHull& hull, const Shape& shape);
   Rgb<double> lamp_light(const Lamp& lamp, const Receiver& receiver, double offset) const;
@@ -80,6 +86,7 @@ class LineLight {
   std::unique_ptr<RadianceColumns> columns_;  // of a map
   // Lines from its pole, and from the opposite one, dense where it is bright.
   std::vector<AzimuthWarp> warps_;
+  mutable std::atomic<int64_t> missed_{0};
 };
 
 }  // namespace limn

@@ -10,10 +10,12 @@ namespace limn {
 namespace {
 
 // None of these is tuned.
-constexpr double kWidest = 0.35;      // of a lobe that is worth it [rad]
-constexpr size_t kMostFaces = 256;    // of a mesh that is looked through for flat parts
-constexpr double kFlat = 0x1p-16;     // how far a plane's points may lie off, over the mesh's size
-constexpr double kLeastHeight = 1e-3;  // of the light, and of points over a flat part's radius
+constexpr double kWidest = 0.35;       // of a lobe that is worth it [rad]
+constexpr size_t kMostFaces = 256;     // of a mesh that is looked through for flat parts
+constexpr double kFlat = 0x1p-16;      // how far a plane's points may lie off, over the mesh's size
+constexpr double kLeastHeight = 1e-3;  // of the light over the plane: the sine of its elevation
+// What is rounding of a point in the plane, over the flat part's radius.
+constexpr double kInPlane = 0x1p-20;
 
 // Any two unit vectors that are orthogonal to n and to each other.
 std::array<Vec3d, 2> across(const Vec3d& n) {
@@ -126,7 +128,7 @@ void MirroredLight::add(const FlatPart& part, const Bsdf& bsdf, const Vec3d& nor
 // Whether p may see the image within the flat part.
 bool MirroredLight::reaches(const Image& image, const Vec3d& p) {
   const double height = dot(p - image.center, image.normal);
-  if (!(height > kLeastHeight * image.radius)) return false;
+  if (!(height > kInPlane * image.radius)) return false;
   const auto meets = [&](const Vec3d& w) {
     const Vec3d hit = p + w * (height / -dot(w, image.normal));
     return length(hit - image.center) <= image.radius;

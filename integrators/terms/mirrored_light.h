@@ -6,6 +6,7 @@
 // those into which the floor scatters the sun's light, and where light and floor are flat and far
 // they are the same for all points. So a share of a vertex's directions is drawn from there: a
 // mixture of densities, which changes no mean.
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -46,6 +47,7 @@ class MirroredLight {
       sum += power;
     }
     for (int i = 0; i < mixture.count; ++i) mixture.part[i] /= sum;
+    // Five times as much gave the same error in the demo.
     if (sum > 0) mixture.share = std::min(sum / (sum + mean_), kMostShare);
     return mixture;
   }
@@ -55,8 +57,7 @@ class MirroredLight {
   std::optional<Vec3d> sample(const Mixture& mixture, double u, double u1, double u2) const;
 
  private:
-  // Shares of five times as much gave the same error in the demo.
-  static constexpr double kMostShare = 0.5;
+  static constexpr double kMostShare = 0.5;  // not tuned
   // A light in a flat part of a surface.
   struct Image {
     const Bsdf* bsdf;
@@ -67,7 +68,7 @@ class MirroredLight {
     Vec3d center;   // of a sphere around the flat part
     double radius;
     double irradiance;  // of the light, across it
-    double cone;  // cosine of the angle of the directions, if these are uniform; else > 1
+    double cone;        // cosine of the angle of the directions, if these are uniform; else > 1
   };
   struct FlatPart;
   MirroredLight() = default;

@@ -15,9 +15,6 @@ inline bool PathTracer<S, Visitor>::begin_vertex(Walk& walk) {
   walk.scattering.emplace(walk.surface, walk.wi, c_.scene.shading);
   if (walk.scattering->black()) return false;
   set_motion(walk);
-  walk.lights = c_.lights.at(value(walk.surface.p));
-  walk.mixture = mixture_at(c_.mirrored, walk.surface, *walk.scattering,
-                            !is_complete(walk.bounces + 1));
   walk.light.reset();
   walk.lit = walk.again;
   if (walk.again) {
@@ -33,6 +30,10 @@ inline bool PathTracer<S, Visitor>::begin_vertex(Walk& walk) {
         c_.closed->scattered(c_.tracer, walk.surface, *walk.scattering, walk.edge);
     return false;
   }
+  // Copies have both from the path that they are of.
+  walk.lights = c_.lights.at(value(walk.surface.p));
+  walk.mixture =
+      mixture_at(c_.mirrored, walk.surface, *walk.scattering, !is_complete(walk.bounces + 1));
   const int more = splits(walk.surface, walk.copies);
   const int lights = (walk.bounces > 0 ? light_samples_ : 1) * more;
   if (walk.bounces > 0) walk.sums.later_lights += lights;

@@ -55,7 +55,7 @@ class PenumbraLines {
     const bool apart = distance > 0 && drawn->face != vertex.surface.face;
     const Vec3d omega = apart ? to / distance : Vec3d{};
     double pdf = apart ? vertex.scattering.pdf_solid_angle(omega) : 0;
-    if (const MirroredLight* mirrored = context_.mirrored) {
+    if (const MirroredLight* mirrored = context_.mirrored; mirrored && pdf > 0) {
       pdf = mirrored->pdf(mirrored->mixture(vertex.surface, vertex.scattering), omega, pdf);
     }
     const Rgb<double> f = pdf > 0 ? vertex.scattering.eval_value(omega) : Rgb<double>{};

@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "limn/core/memory.h"
+#include "limn/core/parallel.h"
+
 namespace limn {
 
 // Antiderivatives of cos sin, sin^2 and of theta times these.
@@ -13,19 +16,22 @@ RadianceColumns::Moments RadianceColumns::moments(double theta, double c, double
           0.25 * theta * theta - 0.25 * theta * sine2 - 0.125 * cosine2};
 }
 
-RadianceColumns::RadianceColumns(const Environment& environment)
+RadianceColumns::RadianceColumns(const Environment& environment, int threads)
     : grid_(environment.grid().value()), step_(kPi / (grid_.rows - 1)) {
   const int rows = grid_.rows;
+  require_memory({},
+                 static_cast<double>(grid_.columns) * rows * (sizeof(Rgb<double>) + sizeof(Sum)),
+                 "the sums over the environment's map", "use a smaller map, or another method");
   texels_.resize(static_cast<size_t>(grid_.columns) * rows);
   sums_.resize(texels_.size());
   for (int j = 0; j < rows; ++j) {
     const double theta = step_ * j;
     at_rows_.push_back(moments(theta, std::cos(theta), std::sin(theta)));
   }
-  for (int i = 0; i < grid_.columns; ++i) {
-    const double phi = 2 * kPi * (i + 0.5) / grid_.columns;
+  parallel_for(grid_.columns, threads, [&](size_t i) {
+    const double phi = 2 * kPi * (static_cast<double>(i) + 0.5) / grid_.columns;
     const Vec3d r = grid_.zero * std::cos(phi) + grid_.quarter * std::sin(phi);
-    const size_t column = static_cast<size_t>(i) * rows;
+    const size_t column = i * rows;
     for (int j = 0; j < rows; ++j) {
       // At the poles radiance depends on the azimuth of approach: a direction next to it tells.
       const double theta = std::clamp(step_ * j, 1e-7, kPi - 1e-7);
@@ -42,7 +48,7 @@ RadianceColumns::RadianceColumns(const Environment& environment)
           before.across + level * (n.across - m.across) +
               slope * (n.across_linear - m.across_linear)};
     }
-  }
+  });
 }
 
 std::vector<double> RadianceColumns::brightness() const {

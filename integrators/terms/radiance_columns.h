@@ -9,8 +9,9 @@ namespace limn {
 
 class RadianceColumns {
  public:
-  // The environment must have a grid; nothing is kept of it. Two colours for every texel.
-  explicit RadianceColumns(const Environment& environment);
+  // The environment must have a grid; nothing is kept of it. Three colours for every texel:
+  // InputError if memory does not hold them.
+  RadianceColumns(const Environment& environment, int threads);
 
   const Environment::Grid& grid() const { return grid_; }
   // How bright the map is around each column, from the azimuth of `zero` on towards `quarter`.

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "integrators/terms/path_follow.h"
+#include "limn/integrators/backward.h"
 #include "support/block_runs.h"
 #include "support/environment_maps.h"
 #include "support/meshes.h"
@@ -19,8 +20,8 @@ std::string sun_in_sky(const TempFiles& files, double degrees, float sky = 1) {
   const Vec3d sun = normalize(Vec3d{0.5, 0.5, 0.4});
   for (int y = 0; y < map.height; ++y) {
     for (int x = 0; x < map.width; ++x) {
-      const Vec3d w = test::map_direction((x + 0.5) / map.width,
-                                          static_cast<double>(y) / (map.height - 1));
+      const Vec3d w =
+          test::map_direction((x + 0.5) / map.width, static_cast<double>(y) / (map.height - 1));
       const bool lit = dot(w, sun) > std::cos(degrees * kPi / 180);
       for (int c = 0; c < 3; ++c) map.at(x, y, c) = lit ? 400.0f : sky * (0.2f + 0.1f * c);
     }
@@ -61,8 +62,8 @@ struct Point {
   Vec3d wi;
 };
 
-// Draws of the images are as their density says: means of some functions by draws, and by the
-// density over uniform directions.
+// Draws of the images are as their density says: means of functions that are zero but in a cone
+// around the glare, by draws, and by the density over directions that are uniform in the cone.
 TEST(MirroredLight, DrawsFromItsDensity) {
   const TempFiles files;
   for (const auto& [alpha, sun] : kCases) {
@@ -76,28 +77,34 @@ TEST(MirroredLight, DrawsFromItsDensity) {
     EXPECT_GT(mixture.share, 0.01);
     EXPECT_LT(mixture.share, 0.5);
     mixture.share = 1;  // of the images alone
-    constexpr int kDraws = 400000;
-    const auto functions = [](const Vec3d& w) {
-      return std::array{1.0, w.x, w.y * w.z, std::cos(40 * w.x), std::cos(40 * w.y)};
+    const Vec3d x = normalize(Vec3d{0.5, -0.5, 0.4}), y = normalize(cross(x, Vec3d{0, 0, 1})),
+                z = cross(x, y);
+    const double cone = 0.25;  // radians
+    const auto functions = [&](const Vec3d& w) {
+      const double u = dot(w, y) / cone, v = dot(w, z) / cone;
+      if (dot(w, x) < std::cos(cone)) return std::array<double, 5>{};
+      return std::array{1.0, u, v, u * u - v * v, std::cos(8 * u) * std::cos(8 * v)};
     };
     std::array<RunningMean, 5> drawn, expected;
     Rng rng(3, 0, 0);
-    for (int i = 0; i < kDraws; ++i) {
+    for (int i = 0; i < 400000; ++i) {
       const double u = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
       const auto w = mirrored->sample(mixture, u, u1, u2);
-      const auto of_draw = functions(w.value_or(Vec3d{}));
-      const double y = 2 * rng.uniform() - 1, phi = 2 * kPi * rng.uniform();
-      const double s = std::sqrt(1 - y * y);
-      const Vec3d other{s * std::cos(phi), y, s * std::sin(phi)};
-      const double weight = 4 * kPi * mirrored->pdf(mixture, other, 0);
+      const auto of_draw = functions(w.value_or(-x));
+      const double c = 1 - rng.uniform() * (1 - std::cos(cone)), phi = 2 * kPi * rng.uniform();
+      const double s = std::sqrt(1 - c * c);
+      const Vec3d other = x * c + y * (s * std::cos(phi)) + z * (s * std::sin(phi));
+      const double weight = 2 * kPi * (1 - std::cos(cone)) * mirrored->pdf(mixture, other, 0);
       const auto of_other = functions(other);
       for (size_t k = 0; k < drawn.size(); ++k) {
-        drawn[k].add(w ? of_draw[k] : 0);
+        drawn[k].add(of_draw[k]);
         expected[k].add(weight * of_other[k]);
       }
     }
+    EXPECT_GT(drawn[0].mean(), 0.5);
     for (size_t k = 0; k < drawn.size(); ++k) {
       const double error = std::hypot(drawn[k].standard_error(), expected[k].standard_error());
+      EXPECT_LT(error, 0.01);
       EXPECT_LT(std::fabs(drawn[k].mean() - expected[k].mean()), 4.5 * error) << k;
     }
   }
@@ -118,8 +125,8 @@ TEST(MirroredLight, ChangesNoMean) {
       const Point at(scene, *tracer, {1.6 * rng.uniform() - 0.8, 0.2 + 1.6 * rng.uniform(), 0.9},
                      {0, 0, -1});
       for (const bool on : {false, true}) {
-        const PathContext context{scene, *tracer, lights, nullptr, nullptr,
-                                  on ? mirrored.get() : nullptr};
+        const PathContext context{scene,   *tracer, lights,
+                                  nullptr, nullptr, on ? mirrored.get() : nullptr};
         RayCount rays;
         PathTracer<double, NoVisitor> paths(context, rays);
         Walk<double, NoVisitor> walk(Rng(7, static_cast<uint64_t>(i), on), 0, nullptr);
@@ -136,33 +143,72 @@ TEST(MirroredLight, ChangesNoMean) {
   }
 }
 
-// What the camera sees of a wall is the glare in which a body's shadow lies. Lines from the sun share
-// that with points of the shadow by the density of the wall's directions: with that of its
-// scattering alone z is PLANT.
+// With the same samples reverse mode has the interior term of forward mode, to rounding: it draws the
+// same directions with the same densities.
+TEST(MirroredLight, InReverse) {
+  const TempFiles files;
+  const Scene scene = scene_with(files, 0.05, 1);
+  RunSettings settings;
+  settings.spp = 8;
+  settings.seed = 5;
+  settings.threads = 1;
+  GradientOptions forward_options;
+  forward_options.parameters = {"wall.rotate.y", "floor.rotate.x", "gloss.alpha"};
+  forward_options.terms = {"interior"};
+  forward_options.method = "forest";
+  const GradientResult forward = gradient(scene, forward_options, settings);
+  Image adjoint(scene.film.crop_width, scene.film.crop_height, 3);
+  for (size_t i = 0; i < adjoint.data.size(); ++i) {
+    adjoint.data[i] = static_cast<float>(Rng(8, i, 0).uniform() - 0.5);
+  }
+  BackwardOptions options;
+  options.parameters = forward_options.parameters;
+  options.terms = {"interior"};
+  options.uniform_pixels = true;
+  const BackwardResult reverse = backward(scene, adjoint, options, settings);
+  for (const ParameterGradient& p : forward.parameters) {
+    double sum = 0, size = 0;
+    for (size_t k = 0; k < adjoint.data.size(); ++k) {
+      const double one = adjoint.data[k] * p.total.mean(k);
+      sum += one;
+      size += std::fabs(one);
+    }
+    EXPECT_GT(size, 0);
+    EXPECT_NEAR(reverse.of(p.name).moments.mean(0), sum, 1e-11 * size) << p.name;
+  }
+}
+
+// Lines from the sun share with points of a shadow by the density of directions before it. The floor
+// as a mesh of too many faces to be looked through has none of the glare's: where a wall sees the
+// shadow of a body in it, what both terms find together must be the same.
 TEST(MirroredLight, LinesFromTheSunKnowOfIt) {
   const TempFiles files;
-  SceneParts parts;
-  parts.max_depth = 3;
-  parts.origin = {0, 0.8, 0.6};
-  parts.target = {0, 0.8, -1};
-  parts.fov = 50;
-  parts.width = parts.height = 8;
-  parts.body = square("floor", 2, -90, {0, 0, 0.5}, conductor("gloss", 0.1)) +
-               square("wall", 2, 0, {0, 1, -1}, diffuse("paint", "0.9, 0.9, 0.9")) +
-               obj_shape("body", write_mesh(files, "body.obj", cube_mesh()), true, 0.3,
-                         {0.5, 0.9, 1}, diffuse("soot", "0, 0, 0")) +
-               sun_in_sky(files, 2, 0.001f);
-  const Scene scene = make_scene(files, parts);
   GradientOptions options;
   options.parameters = {"body.translate.y"};
-  options.terms = {"boundary"};
-  options.method = "forest";
-  const GradientResult forest = run_blocks(scene, options, 8192, 2);
+  options.terms = {"direct", "penumbra"};
   options.method = "silhouettes";
-  options.terms = {"boundary", "direct", "penumbra"};
-  const GradientResult regions = run_blocks(scene, options, 1024, 1);
-  for (size_t t = 0; t < regions.terms.size(); ++t) if (regions.terms[t].computed) { double m = 0; const Moments& x = regions.parameters[0].terms[t]; for (size_t i = 0; i < x.size(); ++i) m += x.mean(i); fmt::print("{} {}\n", regions.terms[t].name, m); }
-  expect_equal(regions.parameters[0], forest.parameters[0]);
+  std::vector<GradientResult> found;
+  for (const bool coarse : {true, false}) {
+    SceneParts parts;
+    parts.max_depth = 3;
+    parts.origin = {0, 0.8, 0.6};
+    parts.target = {0, 0.8, -1};
+    parts.fov = 50;
+    parts.width = parts.height = 8;
+    Mesh mesh = grid_mesh(coarse ? 1 : 12);
+    for (Vec3f& p : mesh.positions) p = {p.x, 0, -p.y};
+    mesh = make_mesh(mesh.positions, mesh.faces);
+    parts.body = obj_shape("floor", write_mesh(files, "floor.obj", mesh), true, 2, {0, 0, 0.5},
+                           conductor("gloss", 0.03)) +
+                 square("wall", 2, 0, {0, 1, -1}, diffuse("paint", "0.9, 0.9, 0.9")) +
+                 obj_shape("body", write_mesh(files, "body.obj", cube_mesh()), true, 0.3,
+                           {0.5, 0.9, 1}, diffuse("soot", "0, 0, 0")) +
+                 sun_in_sky(files, 2, 0.001f);
+    const Scene scene = make_scene(files, parts);
+    EXPECT_EQ(MirroredLight::make(scene) != nullptr, coarse);
+    found.push_back(run_blocks(scene, options, coarse ? 1024 : 4096, coarse));
+  }
+  expect_equal(found[0].parameters[0], found[1].parameters[0]);
 }
 
 // Nothing to mirror, nothing to see it by: no share, and no image changes.

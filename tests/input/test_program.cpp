@@ -153,6 +153,28 @@ TEST_F(Program, ComparesOnlyWhatItKnows) {
   EXPECT_FALSE(std::filesystem::exists(files_.path("folder")));
 }
 
+// What a method or a kind of comparison does not read is refused.
+TEST_F(Program, OptionsOfOthersAreRefused) {
+  const std::string images = "compare " + scene_ + " --image --time 0.1 -o " + files_.path("f");
+  const std::string fields =
+      "compare " + scene_ + " --wrt screen.scale --methods fd --time 0.1 -o " + files_.path("f");
+  const std::string render = "render " + scene_ + " --what ao -o " + out();
+  for (const auto& [words, option] : std::vector<std::pair<std::string, std::string>>{
+           {"render " + scene_ + " --lines 8 -o " + out(), "--lines"},
+           {render + " --method rays --tolerance 0.1", "--tolerance"},
+           {render + " --method silhouettes --rays 2", "--rays"},
+           {render + " --method rays --sampler independent", "--sampler"},
+           {fields + " --what ao", "--what"},
+           {fields + " --rays 2", "--rays"},
+           {images + " --methods rays --lines 2", "--lines"},
+           {images + " --methods path --reference x.exr", "--reference"},
+           {images + " --methods path --no-report", "--no-report"}}) {
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.status, 2) << outcome.text;
+    EXPECT_NE(outcome.text.find(option + ": "), std::string::npos) << words << '\n' << outcome.text;
+  }
+}
+
 TEST_F(Program, ChecksBothWays) {
   const std::string check = "check " + scene_ + " --spp 2048 --block 2 --wrt screen.translate.y";
   const Outcome right = run(check);

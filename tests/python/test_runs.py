@@ -65,6 +65,22 @@ def test_gradient_has_the_programs_bits(folder, scene, program, threads, argumen
     assert same(gradient[name].stderr, limn.read_exr(folder / "program_stderr.exr"))
 
 
+def test_what_a_camera_sees_looks_around(scene):
+    with pytest.raises(limn.InputError, match='"bulb"'):
+        limn.render(scene, method="rays", what="direct")
+    by_lines = limn.render(scene, spp=2, method="silhouettes", what="ao", lines=16, tolerance=0.01)
+    assert np.all(by_lines.value >= -1e-6) and np.all(by_lines.value <= 1 + 1e-6)
+    by_rays = limn.render(scene, spp=64, method="rays", what="ao")
+    assert abs(np.mean(by_lines.value) - np.mean(by_rays.value)) < 0.02
+    with pytest.raises(limn.InputError, match='unknown what "sky"'):
+        limn.render(scene, what="sky")
+    for wrong in ({"lines": 0}, {"tolerance": -1.0}):
+        with pytest.raises(limn.InputError, match=next(iter(wrong))):
+            limn.render(scene, method="silhouettes", what="ao", **wrong)
+    with pytest.raises(limn.InputError, match="what: direct"):
+        limn.render(scene, method="rays")
+
+
 def test_methods_and_films_are_known_by_name(scene, folder):
     with pytest.raises(limn.InputError, match='unknown method "bidirectional"'):
         limn.render(scene, method="bidirectional")

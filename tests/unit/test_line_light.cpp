@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "integrators/estimates/scrambled_sobol.h"
 #include "integrators/terms/camera_path.h"
 #include "integrators/terms/closed_light.h"
 #include "limn/core/error.h"
@@ -18,8 +17,6 @@
 
 namespace limn {
 namespace {
-
-constexpr double kLevel = 1e-4;
 
 // Shapes of a scene of tests: a floor, and meshes over it.
 struct Body {
@@ -246,6 +243,34 @@ TEST(LineLight, SphereOverPlane) {
   EXPECT_GT(covered, 0.25 * (1 - 2e-3));
 }
 
+RenderResult run(const Scene& scene, const std::string& method, int spp, RenderOptions options = {},
+                 int threads = 1) {
+  RunSettings settings;
+  settings.spp = spp;
+  settings.seed = method == "silhouettes" ? 1 : 2;
+  settings.threads = threads;
+  options.method = method;
+  RenderResult result = render(scene, settings, options);
+  EXPECT_EQ(result.non_finite.count, 0u) << result.non_finite.message();
+  return result;
+}
+
+// Errors that neighbouring samples' points share make scores smaller than normal, never larger.
+void expect_alike(const RenderResult& a, const RenderResult& b, const std::string& what) {
+  std::vector<double> z;
+  double sum_a = 0, sum_b = 0, variance = 0;
+  for (size_t i = 0; i < a.radiance.size(); ++i) {
+    const double v = a.radiance.variance(i) + b.radiance.variance(i);
+    sum_a += a.radiance.mean(i), sum_b += b.radiance.mean(i), variance += v;
+  }
+  const double score = (sum_a - sum_b) / std::sqrt(variance);
+  fmt::print("{}: {:.6g} and {:.6g}, z {:.2f}\n", what, sum_a / a.radiance.size(),
+             sum_b / a.radiance.size(), score);
+  EXPECT_LT(std::fabs(score), 4) << what;
+  EXPECT_LT(std::sqrt(variance), 0.01 * sum_a) << what;
+  EXPECT_LT(compare_moments(a.radiance, b.radiance).largest, 6) << what;
+}
+
 // The error of unbiased sums: their mean over offsets is the limit, and they fall as lines^-1.5.
 TEST(LineLight, ConvergesAndIsUnbiased) {
   const TempFiles files;
@@ -280,34 +305,47 @@ TEST(LineLight, ConvergesAndIsUnbiased) {
     squares += std::pow(careful.light.ambient_occlusion(at, at.up, rng.uniform()) / truth - 1, 2);
   }
   EXPECT_LT(std::sqrt(squares / 100), 2e-4);
-}
-
-RenderResult run(const Scene& scene, const std::string& method, int spp, RenderOptions options = {},
-                 int threads = 1) {
-  RunSettings settings;
-  settings.spp = spp;
-  settings.seed = method == "silhouettes" ? 1 : 2;
-  settings.threads = threads;
-  options.method = method;
-  RenderResult result = render(scene, settings, options);
-  EXPECT_EQ(result.non_finite.count, 0u) << result.non_finite.message();
-  return result;
-}
-
-// Errors that neighbouring samples' points share make scores smaller than normal, never larger.
-void expect_alike(const RenderResult& a, const RenderResult& b, const std::string& what) {
-  std::vector<double> z;
-  double sum_a = 0, sum_b = 0, variance = 0;
-  for (size_t i = 0; i < a.radiance.size(); ++i) {
-    const double v = a.radiance.variance(i) + b.radiance.variance(i);
-    sum_a += a.radiance.mean(i), sum_b += b.radiance.mean(i), variance += v;
+  EXPECT_EQ(careful.light.missed(), 0);
+  // A single line and the next both miss what a tenth of them meet, and agree.
+  const Scene slim = scene_of(files, {{cube_mesh(), 0.3, {0.9, 1, 0}}});
+  const Looking slim_fine(slim, {.lines = 1 << 12});
+  const double slim_truth = occlusion(slim_fine.light, at, 4);
+  for (const int lines : {1, 8}) {
+    const Looking few(slim, {.lines = lines, .tolerance = 1e-3});
+    double worst = 0;
+    for (int k = 0; k < 100; ++k) {
+      const double value = few.light.ambient_occlusion(at, at.up, (k + 0.5) / 100);
+      worst = std::max(worst, std::fabs(value / slim_truth - 1));
+    }
+    fmt::print("from {} lines to 1e-3: worst {:.2g}\n", lines, worst);
+    EXPECT_LT(worst, 0.01) << lines;
   }
-  const double score = (sum_a - sum_b) / std::sqrt(variance);
-  fmt::print("{}: {:.6g} and {:.6g}, z {:.2f}\n", what, sum_a / a.radiance.size(),
-             sum_b / a.radiance.size(), score);
-  EXPECT_LT(std::fabs(score), 4) << what;
-  EXPECT_LT(std::sqrt(variance), 0.01 * sum_a) << what;
-  EXPECT_LT(compare_moments(a.radiance, b.radiance).largest, 6) << what;
+  const Looking hopeless(scene, {.lines = 16, .tolerance = 1e-15});
+  hopeless.light.ambient_occlusion(at, at.up, 0.3);
+  EXPECT_EQ(hopeless.light.missed(), 1);
+  RenderOptions options;
+  options.what = RenderWhat::kAmbientOcclusion;
+  options.tolerance = 0.01;
+  EXPECT_TRUE(run(scene, "silhouettes", 1, options).warnings.empty());
+}
+
+// The file's normals may turn past the face: what lies below it is no part of their sky.
+TEST(LineLight, NormalsTurnedPastTheFace) {
+  const TempFiles files;
+  const double turned = 100 * kPi / 180;
+  const std::string file =
+      files.write("turned.obj", fmt::format("v -4 0 -4\nv 4 0 -4\nv 4 0 4\nv -4 0 4\nvn 0 {} {}\n"
+                                            "f 1//1 3//1 2//1\nf 1//1 4//1 3//1\n",
+                                            std::cos(turned), std::sin(turned)));
+  const std::string ground =
+      obj_shape("ground", file, false, 1, {0, 0.1, 0}, diffuse("clay", "0.5, 0.5, 0.5"));
+  RenderOptions options;
+  options.what = RenderWhat::kAmbientOcclusion;
+  const RenderResult open = run(scene_of(files, {}, false, ground), "silhouettes", 1, options);
+  const size_t middle = (8 * 16 + 8) * 3;
+  EXPECT_NEAR(open.radiance.mean(middle), (1 + std::cos(turned)) / 2, 1e-4);
+  const Scene scene = scene_of(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, false, ground);
+  expect_alike(run(scene, "silhouettes", 16, options), run(scene, "rays", 128, options), "turned");
 }
 
 TEST(LineLight, AgreesWithRaysAndPaths) {
@@ -343,38 +381,119 @@ TEST(LineLight, AgreesWithRaysAndPaths) {
   }
 }
 
-// Point by point against what is exact (closed_light.h), through lamps, too.
+// Point by point against what is exact (closed_light.h).
+void expect_closed_form(const Scene& scene) {
+  const Looking look(scene, {.lines = 8192}, true);
+  const ClosedLight closed(scene, 1);
+  const CameraView<double> camera(scene.camera);
+  double worst = 0, sum = 0, apart = 0;
+  for (int i = 0; i < 24 * 24; ++i) {
+    const auto ray = camera.ray((i % 24 + 0.41) * 16 / 24, (i / 24 + 0.37) * 16 / 24);
+    Hit hit;
+    if (!look.tracer->closest(camera_ray(scene, ray), hit)) continue;
+    const auto surface =
+        surface_on_ray<double>(scene, hit.face, Vec3d(ray.origin), Vec3d(ray.direction));
+    const Scattering<double> scattering(surface, -Vec3d(ray.direction), scene.shading);
+    if (scattering.black()) continue;
+    const double exact = closed.scattered(*look.tracer, surface, scattering, nullptr).g;
+    const double found = look.light.lamps(surface, scattering, 0.3).g;
+    worst = std::max(worst, std::fabs(found - exact));
+    apart += std::fabs(found - exact), sum += exact;
+  }
+  fmt::print("apart {:.2g}, worst {:.2g} of {:.3g}\n", apart / sum, worst, sum / 576);
+  EXPECT_GT(sum, 0);
+  // What 2048 lines leave.
+  EXPECT_LT(apart, 2e-5 * sum);
+  EXPECT_LT(worst, 1e-3 * sum / 576);
+}
+
+// Through lamps, too.
 TEST(LineLight, LampsAgreeWithTheClosedForm) {
   const TempFiles files;
   const std::string lamps =
       square("lamp", 0.6, 90, {0.4, 1.9, 0.3}, area_light("glow", "9, 8, 7")) +
       square("side", 0.5, 20, {-0.6, 1.2, -2}, area_light("low", "3, 4, 5"));
   for (const bool smooth : {false, true}) {
-    const Scene scene = scene_of(
+    expect_closed_form(scene_of(
         files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}, {cube_mesh(), 0.3, {-0.9, 0.3, 0.6}}},
-        smooth, lamps);
-    const Looking look(scene, {.lines = 8192}, true);
-    const ClosedLight closed(scene, 1);
-    const CameraView<double> camera(scene.camera);
-    double worst = 0, sum = 0, apart = 0;
-    for (int i = 0; i < 24 * 24; ++i) {
-      const auto ray = camera.ray((i % 24 + 0.41) * 16 / 24, (i / 24 + 0.37) * 16 / 24);
-      Hit hit;
-      if (!look.tracer->closest(camera_ray(scene, ray), hit)) continue;
-      const auto surface =
-          surface_on_ray<double>(scene, hit.face, Vec3d(ray.origin), Vec3d(ray.direction));
-      const Scattering<double> scattering(surface, -Vec3d(ray.direction), scene.shading);
-      if (scattering.black()) continue;
-      const double exact = closed.scattered(*look.tracer, surface, scattering, nullptr).g;
-      const double found = look.light.lamps(surface, scattering, 0.3).g;
-      worst = std::max(worst, std::fabs(found - exact));
-      apart += std::fabs(found - exact), sum += exact;
-    }
-    fmt::print("{} apart {:.2g}, worst {:.2g} of {:.3g}\n", smooth, apart / sum, worst, sum / 576);
-    // What 2048 lines leave.
-    EXPECT_LT(apart, 2e-5 * sum);
-    EXPECT_LT(worst, 1e-3 * sum / 576);
+        smooth, lamps));
   }
+}
+
+// A finely cut rectangle is a rectangle, and does not shine behind itself.
+TEST(LineLight, LampsOfManyFacesHaveOneFront) {
+  const TempFiles files;
+  Mesh down = grid_mesh(4);
+  for (Vec3f& x : down.positions) x = {x.x, 0, x.y};
+  for (const bool turned : {false, true}) {
+    const std::string file = write_mesh(files, "grid.obj", turned ? reversed(down) : down);
+    expect_closed_form(scene_of(
+        files, {{cube_mesh(), 0.3, {-0.9, 0.3, 0.6}}, {torus_mesh(8, 6), 0.3, {0.3, 1.7, -1}}},
+        false,
+        square("wall", 3, 0, {0, 1, -2}, diffuse("plaster", "0.5, 0.5, 0.5")) +
+            obj_shape("lamp", file, true, 0.7, {0.2, 1.2, -0.4}, area_light("glow", "9, 8, 7"))));
+  }
+}
+
+// Half of a lamp of 1e-7 rad is hidden: lines end where it does.
+TEST(LineLight, LampsOfNoExtent) {
+  const TempFiles files;
+  const double size = 5e-7, edge = 1e-7;
+  Mesh screen;
+  screen.positions = {{-1, 0, -1}, {1e-7f, 0, -1}, {1e-7f, 0, 1}, {-1, 0, 1}};
+  const Mesh half = make_mesh(screen.positions, {{0, 1, 2}, {0, 2, 3}});
+  const Scene scene = scene_of(files, {{half, 1, {0, 5, 0}}}, false,
+                               square("lamp", size, 90, {0, 10, 0}, area_light("glow", "9, 8, 7")));
+  const ContourPoint at = on_floor(scene, 0, 0);
+  const auto surface = surface_on_ray<double>(scene, at.face, Vec3d{0, 1, 0}, Vec3d{0, -1, 0});
+  const Scattering<double> scattering(surface, {0, 1, 0}, scene.shading);
+  const Looking look(scene, {.lines = 1024}, true);
+  double sum = 0;
+  for (int k = 0; k < 16; ++k) {
+    sum += look.light.lamps(surface, scattering, (k + 0.5) / 16).g / 16;
+  }
+  // What is seen past the screen, at twice its distance.
+  const double seen = (size - 2 * edge) * 2 * size / 100;
+  EXPECT_NEAR(sum / (0.7 / kPi * 8 * seen), 1, 1e-4);
+}
+
+// Interpolated normals under a map, against a sum over the whole sphere: rows of the map, where it
+// has kinks, end pieces of the quadrature.
+TEST(LineLight, MapsOverTurnedNormals) {
+  const TempFiles files;
+  const std::string file =
+      files.write("tilted.obj",
+                  "v -4 -1.2 -4\nv 4 1.2 -4\nv 4 1.2 4\nv -4 -1.2 4\nvn 0 1 0.1\n"
+                  "f 1//1 3//1 2//1\nf 1//1 4//1 3//1\n");
+  const Scene scene =
+      scene_of(files, {}, false,
+               obj_shape("tilted", file, false, 1, {0, 3, 0}, diffuse("clay", "0.7, 0.5, 0.3")) +
+                   make_sky(files, "map"));
+  const Vec3d down{0, -1, 0};
+  const auto surface =
+      surface_on_ray<double>(scene, {ShapeId(1), FaceId(0)}, Vec3d{0.1, 6, -0.2}, down);
+  const Scattering<double> scattering(surface, -down, scene.shading);
+  ASSERT_GT(surface.horizon, 0.1);
+  const Looking look(scene, {.lines = 512}, true);
+  double found = 0;
+  for (int k = 0; k < 64; ++k) {
+    found += look.light.environment(surface, scattering, (k + 0.4) / 64).g / 64;
+  }
+  constexpr int kRows = 700, kColumns = 1400;
+  double sum = 0;
+  for (int j = 0; j < kRows; ++j) {
+    const double theta = kPi * (j + 0.5) / kRows, c = std::cos(theta), s = std::sin(theta);
+    for (int i = 0; i < kColumns; ++i) {
+      const double phi = 2 * kPi * (i + 0.5) / kColumns;
+      const Vec3d d{s * std::cos(phi), c, s * std::sin(phi)};
+      const double f = scattering.eval(d).g;
+      if (f > 0) sum += f * scene.environment->radiance(d).g * s;
+    }
+  }
+  sum *= 2 * kPi * kPi / kRows / kColumns;
+  fmt::print("map over turned normals: {:.8g} and {:.8g}\n", found, sum);
+  // The sum over the sphere is right to 1e-7; what lines leave is far less than a mistake.
+  EXPECT_NEAR(found / sum, 1, 1e-5);
 }
 
 // Faces behind a lamp, in its plane and through it.
@@ -436,8 +555,8 @@ TEST(LineLight, SaysWhatItDoesNotKnow) {
   rays.method = "rays";
   Scene deep = scene_of(files, {});
   deep.max_depth = 3;
-  EXPECT_NE(refused(deep, lines).find("give --what direct"), std::string::npos);
-  EXPECT_NE(refused(deep, rays).find("give --what direct"), std::string::npos);
+  EXPECT_NE(refused(deep, lines).find("what: direct"), std::string::npos);
+  EXPECT_NE(refused(deep, rays).find("what: direct"), std::string::npos);
   const Scene point = scene_of(
       files, {}, false,
       R"(<emitter type="point" id="bulb"><point name="position" value="0, 3, 0"/></emitter>)");
@@ -450,69 +569,104 @@ TEST(LineLight, SaysWhatItDoesNotKnow) {
   const Scene ball = scene_of(files, {}, false,
                               obj_shape("ball", write_mesh(files, "b.obj", icosphere_mesh(2)), true,
                                         1, {0, 3, 0}, area_light("glow", "1, 1, 1")));
-  EXPECT_NE(refused(ball, lines).find("320 faces"), std::string::npos);
+  EXPECT_NE(refused(ball, lines).find("has 320 of these"), std::string::npos);
+  Scene bent = scene_of(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, true);
+  bent.shading = ShadingModel::kMitsuba;
+  EXPECT_NE(refused(bent, lines).find("\"body0\""), std::string::npos);
+  EXPECT_NE(refused(bent, rays).find("\"body0\""), std::string::npos);
+  const std::string glow = area_light("glow", "1, 1, 1");
+  const auto lamps = [&](double angle, double x, double y) {
+    return scene_of(files, {}, false,
+                    square("lamp", 1, 90, {0, 2, 0}, glow) +
+                        square("other", 1, angle, {x, y, 0}, area_light("light", "1, 2, 3")));
+  };
+  EXPECT_NE(refused(lamps(90, 0, 2), lines).find("in one place"), std::string::npos);
+  EXPECT_NE(refused(lamps(90, 0.5, 2), lines).find("\"other\""), std::string::npos);
+  for (const Scene& fine : {lamps(-90, 0, 2), lamps(90, 2, 2), lamps(90, 0.5, 2.5)}) {
+    EXPECT_EQ(refused(fine, lines), "");
+  }
+  EXPECT_EQ(refused(lamps(90, 0.5, 2), rays), "");
+  const Scene plain = scene_of(files, {});
+  for (const int count : {0, -1, kMostLines + 1}) {
+    RenderOptions wrong = lines;
+    wrong.lines = count;
+    EXPECT_NE(refused(plain, wrong).find("lines: "), std::string::npos) << count;
+  }
+  for (const double tolerance : {std::nan(""), -1.0, 2.0}) {
+    RenderOptions wrong = lines;
+    wrong.tolerance = tolerance;
+    EXPECT_NE(refused(plain, wrong).find("tolerance: "), std::string::npos) << tolerance;
+  }
+  RenderOptions full = lines, none = rays;
+  full.lines = kMostLines;
+  EXPECT_EQ(refused(plain, full), "");
+  full.tolerance = 0.1;
+  EXPECT_NE(refused(plain, full).find("doubled"), std::string::npos);
+  none.rays = 0;
+  EXPECT_NE(refused(plain, none).find("rays: 0"), std::string::npos);
   RenderOptions ao;
   ao.what = RenderWhat::kAmbientOcclusion;
   EXPECT_NE(refused(deep, ao).find("silhouettes and rays"), std::string::npos);
 }
 
-// Rows of all methods and times; more time leaves less error; a method is no worse than its own
-// samples are apart.
-TEST(CompareImages, RowsAndErrors) {
+// Rows of all methods and times, whatever the clock gives each of them.
+TEST(CompareImages, Rows) {
   const TempFiles files;
   const Scene scene =
       scene_of(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, false,
                square("lamp", 0.6, 90, {0.4, 2.9, 0.3}, area_light("glow", "9, 8, 7")));
   ImageCompareOptions options;
   options.methods = {"path", "rays", "silhouettes"};
-  options.times = {0.02, 0.2};
-  options.repeats = 3;
-  options.reference_seconds = 1;
+  options.times = {0.001, 0.01};
+  options.repeats = 2;
+  options.reference_seconds = 0.01;
   RunSettings settings;
   settings.seed = 5;
   const ImageComparison result = compare_images(scene, options, settings);
   EXPECT_EQ(result.reference_method, "rays");
+  EXPECT_EQ(result.not_by_rays, "");
+  EXPECT_GE(result.reference_spp, 8);
   ASSERT_EQ(result.rows.size(), 6u);
   for (int m = 0; m < 3; ++m) {
-    const ComparedImage &first = result.rows[2 * m], &second = result.rows[2 * m + 1];
-    EXPECT_EQ(first.method, options.methods[m]);
-    EXPECT_EQ(second.method, options.methods[m]);
-    EXPECT_EQ(second.time, 0.2);
-    EXPECT_GT(second.spp, first.spp);
-    EXPECT_LT(second.squared_error, first.squared_error);
-    EXPECT_EQ(second.image.size(), result.reference.size());
-    fmt::print("{} {:.3g} {:.3g}\n", second.method, first.squared_error, second.squared_error);
+    for (int t = 0; t < 2; ++t) {
+      const ComparedImage& row = result.rows[2 * m + t];
+      EXPECT_EQ(row.method, options.methods[m]);
+      EXPECT_EQ(row.time, options.times[t]);
+      EXPECT_GE(row.spp, 1);
+      EXPECT_EQ(row.image.size(), result.reference.size());
+    }
   }
-  // Paths are independent: n times as many have an n-th of the squared error, and one the variance.
-  const RenderResult paths = run(scene, "path", 512);
-  double variance = 0, squares = 0;
-  for (size_t i = 0; i < paths.radiance.size(); ++i) {
-    variance += paths.radiance.variance(i) * 512;
-    squares += result.reference[i] * result.reference[i];
-  }
-  const double times = result.rows[1].squared_error * result.rows[1].spp * squares / variance;
-  EXPECT_GT(times, 0.5);
-  EXPECT_LT(times, 2);
+  Scene shiny = scene_of(files, {}, false, constant_light("sky", "1, 1, 1"));
+  shiny.max_depth = 3;
+  options.methods = {"path"};
+  const ImageComparison by_paths = compare_images(shiny, options, settings);
+  EXPECT_EQ(by_paths.reference_method, "path");
+  EXPECT_NE(by_paths.not_by_rays.find("max_depth"), std::string::npos);
   options.methods = {"analytic", "none"};
   EXPECT_THROW(compare_images(scene, options, settings), InputError);
 }
 
-// Every power of two of points, from the first on, has one in each equal part of each dimension,
-// and one in each square of two that go together.
-TEST(ScrambledSobol, Stratified) {
-  for (uint64_t key = 0; key < 20; ++key) {
-    const ScrambledSobol points(key);
-    for (int d = 0; d < ScrambledSobol::kDimensions; ++d) {
-      std::vector<int> seen(64);
-      for (uint64_t i = 0; i < 64; ++i) ++seen[static_cast<int>(points.at(i, d) * 64)];
-      EXPECT_EQ(std::count(seen.begin(), seen.end(), 1), 64) << d;
-    }
-    std::vector<int> seen(64);
-    for (uint64_t i = 0; i < 64; ++i) {
-      ++seen[static_cast<int>(points.at(i, 0) * 8) * 8 + static_cast<int>(points.at(i, 1) * 8)];
-    }
-    EXPECT_EQ(std::count(seen.begin(), seen.end(), 1), 64);
+// Images of known variance: what the reference's own error adds is taken out.
+TEST(CompareImages, ErrorsOfKnownVariance) {
+  Rng rng(3, 1, 4);
+  const auto image = [&](double sigma) {
+    std::vector<double> values(3000);
+    for (double& x : values) x = 2 + sigma * std::sqrt(12) * (rng.uniform() - 0.5);
+    return values;
+  };
+  RunningMean own, same, better;
+  for (int i = 0; i < 200; ++i) {
+    std::vector<std::vector<double>> runs;
+    for (int k = 0; k < 4; ++k) runs.push_back(image(0.2));
+    const ReferenceImage reference = mean_of_runs(runs);
+    own.add(reference.squared_error / reference.scale);
+    same.add(relative_squared_error(image(0.2), reference));
+    better.add(relative_squared_error(image(0), reference));
   }
+  // Of 4, scale adding its own noise in the fifth digit.
+  EXPECT_LT(std::fabs(own.z_score(0.01 / 4 / (1 + 0.01 / 4))), 4);
+  EXPECT_LT(std::fabs(same.z_score(0.01 / (1 + 0.01 / 4))), 4);
+  EXPECT_LT(std::fabs(better.z_score(0)), 4);
 }
 
 }  // namespace

@@ -269,9 +269,11 @@ class CompareCommand final : public Command {
 
   CommonOptions common_;
   CompareArguments command_;
+  CLI::App* app_ = nullptr;
 };
 
 void CompareCommand::add_options(CLI::App& app, bool all) {
+  app_ = &app;
   add_common_options(app, common_);
   app.remove_option(app.get_option("--sensor"));  // Mitsuba's methods take the first
   auto* wrt =
@@ -281,6 +283,7 @@ void CompareCommand::add_options(CLI::App& app, bool all) {
          "Compare images, not derivatives; methods are those of render: " + image_method_names())
       ->excludes(wrt);
   add_image_options(app, command_.what, command_.render);
+  command_.render.sampler = kRenderSamplers[0];
   app.add_option("--methods", command_.methods,
                  "Methods to compare, the first is the measure of the others: " + row_names(all) +
                      " (Mitsuba's where it is installed)")
@@ -320,6 +323,13 @@ void CompareCommand::add_options(CLI::App& app, bool all) {
 }
 
 int CompareCommand::run_images(const std::string& command_line) {
+  refuse_options(
+      *app_, {"--reference", "--terms", "--samples", "--step", "--aux", "--kappa", "--no-report"},
+      "derivatives alone have that: not with --image");
+  // The reference is made by rays.
+  std::vector<std::string> methods = command_.methods;
+  methods.emplace_back("rays");
+  check_image_options(*app_, methods);
   if (common_.spp > 0) {
     throw InputError("--spp: methods are compared at equal time: say how long with --time");
   }
@@ -338,6 +348,8 @@ int CompareCommand::run_images(const std::string& command_line) {
 
 int CompareCommand::run(const std::string& command_line) {
   if (command_.images) return run_images(command_line);
+  refuse_options(*app_, {"--what", "--lines", "--tolerance", "--rays"},
+                 "images alone have that: only with --image");
   if (command_.parameter.empty()) {
     throw InputError("--wrt: say which parameter's derivatives to compare, or --image");
   }

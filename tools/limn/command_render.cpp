@@ -15,6 +15,7 @@ class RenderCommand final : public Command {
   const char* name() const override { return "render"; }
   const char* description() const override { return "Render the image"; }
   void add_options(CLI::App& app, bool) override {
+    app_ = &app;
     add_common_options(app, common_);
     app.add_option("-o,--output", output_, "Image to write (.exr; a .png is put beside it)")
         ->required();
@@ -37,6 +38,7 @@ class RenderCommand final : public Command {
   }
 
   int run(const std::string& command_line) override {
+    check_options();
     Scene scene = load_scene(common_, warnings_);
     const RunSettings settings = make_settings(common_, scene, name());
     show(what_, scene, options_);
@@ -60,11 +62,19 @@ class RenderCommand final : public Command {
       fmt::print(stderr, "interrupted before the first pass over the image: nothing is written\n");
       return kInterrupted;
     }
+    warnings_.add_all(result.warnings);
     write(scene, settings, result);
     return finish_status(result.non_finite, result.spp, settings.spp, command_line);
   }
 
  private:
+  void check_options() const {
+    check_image_options(*app_, {options_.method});
+    for (const RenderMethod& method : render_methods()) {
+      if (method.name != options_.method || !method.looks_around) continue;
+      refuse_options(*app_, {"--sampler"}, fmt::format("the method {} has its own", method.name));
+    }
+  }
   void write(const Scene& scene, const RunSettings& settings, const RenderResult& result) const {
     const Image image = mean_image(result.radiance, scene.film.crop_width, scene.film.crop_height);
     const std::string picture = with_ending(output_, ".png");
@@ -100,6 +110,7 @@ class RenderCommand final : public Command {
   CommonOptions common_;
   Warnings warnings_;
   RenderOptions options_;
+  CLI::App* app_ = nullptr;
   std::string output_, debug_, film_ = "rays", what_ = "image";
 };
 

@@ -1,6 +1,7 @@
 // `limn compare --image`: what it runs, prints and writes.
 #include "tools/limn/compare_images.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <set>
@@ -28,14 +29,24 @@ void check_image_methods(const std::vector<std::string>& methods) {
   }
 }
 
-// Standard error of the relative error, from that of its square.
+// What rounding of a difference, or a reference that is no better, leaves below zero counts as zero.
 double relative_error(double squared) { return std::sqrt(std::fmax(squared, 0)); }
+
+// With its standard error, from that of its square.
+std::string error_in_text(const ImageComparison& result, const ComparedImage& row) {
+  if (!(row.squared_error > 0)) {
+    return fmt::format("< {:.2g}", relative_error(result.reference_squared_error));
+  }
+  const double error = relative_error(row.squared_error);
+  return fmt::format("{:.3g} +- {:.1g}", error, row.squared_error_stderr / (2 * error));
+}
 
 void print_images(const ImageComparison& result) {
   fmt::print("reference: {}, {} samples per pixel, relative error {:.2g}\n",
              result.reference_method, result.reference_spp,
              relative_error(result.reference_squared_error));
-  fmt::print("{:12} {:>8} {:>8} {:>8} {:>14} {:>10}\n", "method", "time", "seconds", "spp",
+  if (!result.not_by_rays.empty()) fmt::print("(not rays: {})\n", result.not_by_rays);
+  fmt::print("{:12} {:>8} {:>8} {:>8} {:>18} {:>10}\n", "method", "time", "seconds", "spp",
              "relative error", "of first");
   for (const ComparedImage& row : result.rows) {
     double first = 0;
@@ -44,9 +55,10 @@ void print_images(const ImageComparison& result) {
         first = other.squared_error;
       }
     }
-    fmt::print("{:12} {:8.3g} {:8.3g} {:8.3g} {:14.3g} {:>10}\n", row.method, row.time, row.seconds,
-               row.spp, relative_error(row.squared_error),
-               first > 0 ? fmt::format("{:.3g}", relative_error(row.squared_error / first)) : "-");
+    const bool known = first > 0 && row.squared_error > 0;
+    fmt::print("{:12} {:8.3g} {:8.3g} {:8.3g} {:>18} {:>10}\n", row.method, row.time, row.seconds,
+               row.spp, error_in_text(result, row),
+               known ? fmt::format("{:.3g}", relative_error(row.squared_error / first)) : "-");
   }
 }
 
@@ -123,6 +135,23 @@ void add_image_options(CLI::App& app, std::string& what, RenderOptions& options)
       ->capture_default_str();
 }
 
+void refuse_options(const CLI::App& app, const std::vector<std::string>& names,
+                    const std::string& why) {
+  for (const std::string& name : names) {
+    if (app.count(name) > 0) throw InputError(name + ": " + why);
+  }
+}
+
+void check_image_options(const CLI::App& app, const std::vector<std::string>& methods) {
+  const auto has = [&](const char* name) {
+    return std::find(methods.begin(), methods.end(), name) != methods.end();
+  };
+  if (!has("silhouettes")) {
+    refuse_options(app, {"--lines", "--tolerance"}, "an option of the method silhouettes alone");
+  }
+  if (!has("rays")) refuse_options(app, {"--rays"}, "an option of the method rays alone");
+}
+
 void show(const std::string& what, Scene& scene, RenderOptions& options) {
   if (what == "direct") scene.max_depth = 2;
   if (what == "ao") options.what = RenderWhat::kAmbientOcclusion;
@@ -130,7 +159,7 @@ void show(const std::string& what, Scene& scene, RenderOptions& options) {
 }
 
 int compare_images_command(const CommonOptions& common, ImageCompareArguments arguments,
-                           Scene scene, const RunSettings& settings, const Warnings& warnings,
+                           Scene scene, const RunSettings& settings, Warnings& warnings,
                            const std::string& command_line) {
   check_image_methods(arguments.methods);
   show(arguments.what, scene, arguments.render);
@@ -146,6 +175,7 @@ int compare_images_command(const CommonOptions& common, ImageCompareArguments ar
   const ImageComparison result = compare_images(scene, options, settings);
   const bool interrupted = settings.interrupted && settings.interrupted->load();
   if (interrupted) fmt::print(stderr, "\n");
+  warnings.add_all(result.warnings);
   if (result.rows.empty()) {
     fmt::print(stderr, "interrupted before a method's first run: nothing is written\n");
     return kInterrupted;

@@ -33,19 +33,40 @@ nb::object to_numpy(const Estimate& e, const nb::object& dtype, const nb::object
   return copy.is_none() || !nb::cast<bool>(copy) ? value : value.attr("copy")();
 }
 
+void show(const std::string& what, std::shared_ptr<const Scene>& scene, RenderOptions& options) {
+  if (what == "ao") {
+    options.what = RenderWhat::kAmbientOcclusion;
+  } else if (what == "openness") {
+    options.what = RenderWhat::kOpenness;
+  } else if (what == "direct") {
+    auto direct = std::make_shared<Scene>(*scene);
+    direct->max_depth = 2;
+    scene = std::move(direct);
+  } else if (what != "image") {
+    throw InputError(unknown_name("what", what, {"image", "direct", "ao", "openness"}));
+  }
+}
+
 Estimate render_scene(const SceneHandle& handle, std::optional<int> spp,
                       std::optional<uint64_t> seed, int threads, const nb::object& progress,
                       const std::string& method, const std::string& film,
-                      const std::string& sampler, BatchStore* store) {
+                      const std::string& sampler, const std::string& what, int lines,
+                      double tolerance, int rays, BatchStore* store) {
   RenderOptions options;
   options.method = method;
   options.exact_film = is_exact(film);
   options.sampler = sampler;
-  const auto scene = handle.share();
+  options.lines = lines;
+  options.tolerance = tolerance;
+  options.rays = rays;
+  auto scene = handle.share();
+  show(what, scene, options);
   RenderResult result;
   run_job(make_settings(*scene, {spp, seed, 0, threads, store}), progress,
           [&](const RunSettings& settings) { result = render(*scene, settings, options); });
   Estimate image = to_estimate(result.radiance, scene->film, result.spp, result.seconds);
+  image.warnings = result.warnings;
+  warn_all(result.warnings);
   check_finite(result.non_finite, nb::cast(image));
   return image;
 }
@@ -133,19 +154,28 @@ void bind_render(nb::module_& m) {
       "render", render_scene, nb::arg("scene"), nb::arg("spp") = nb::none(),
       nb::arg("seed") = nb::none(), nb::arg("threads") = 0, nb::arg("progress") = nb::none(),
       nb::arg("method") = "path", nb::arg("film") = "rays", nb::arg("sampler") = kRenderSamplers[0],
-      nb::arg("_store").none() = nb::none(),
-      nb::sig("def render(scene: Scene, spp: int | None = None, seed: int | None = None, threads: "
-              "int = 0, progress: collections.abc.Callable[[float], object] | None = None, method: "
-              "str = 'path', film: str = 'rays', sampler: str = 'padded-sobol') -> Estimate"),
+      nb::arg("what") = "image", nb::arg("lines") = 64, nb::arg("tolerance") = 0.0,
+      nb::arg("rays") = 4, nb::arg("_store").none() = nb::none(),
+      nb::sig(
+          "def render(scene: Scene, spp: int | None = None, seed: int | None = None, threads: "
+          "int = 0, progress: collections.abc.Callable[[float], object] | None = None, method: "
+          "str = 'path', film: str = 'rays', sampler: str = 'padded-sobol', what: str = 'image', "
+          "lines: int = 64, tolerance: float = 0.0, rays: int = 4) -> Estimate"),
       "The image of a scene: linear RGB radiance, (H, W, 3).\n\n"
       "spp, seed: of the scene's file if None. threads: 0 for all cores; they change no bit.\n"
       "progress: called with the fraction done. Ctrl-C raises KeyboardInterrupt; samples that are "
       "not finite raise limn.NonFiniteError.\n"
       "method: \"path\", or \"analytic\": direct light of flat lamps on diffuse surfaces in closed "
-      "form. film: \"rays\", or \"exact\": what every pixel sees by its exact visible regions (box "
+      "form; \"silhouettes\" and \"rays\": what the camera sees looks around, by lines between "
+      "silhouettes or by rays.\n"
+      "what: \"image\", \"direct\" (direct light alone), \"ao\" and \"openness\" (of the sky; "
+      "silhouettes and rays). lines, tolerance: of silhouettes, through the sky (a quarter through "
+      "a lamp), doubled until halves differ by twice this part of the result (0: never). rays: of "
+      "each point for each lamp and the sky.\n"
+      "film: \"rays\", or \"exact\": what every pixel sees by its exact visible regions (box "
       "filter).\n"
       "sampler: \"padded-sobol\", even numbers, with which stderr is an upper bound, or "
-      "\"independent\".");
+      "\"independent\"; silhouettes and rays are always even.");
 }
 
 }  // namespace limn::python

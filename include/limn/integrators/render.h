@@ -16,6 +16,7 @@ struct RenderResult {
   uint64_t rays = 0;
   double seconds = 0;
   NonFinite non_finite;
+  std::vector<std::string> warnings;
 };
 
 // The ways to an image.
@@ -25,6 +26,7 @@ struct RenderMethod {
   bool closed_light;  // light that is scattered once, in closed form (analytic)
   // One vertex that looks around: direct light, and how open its sky is (silhouettes, rays).
   bool looks_around = false;
+  bool by_lines = false;  // between silhouettes, not by rays
 };
 // The first is the default.
 std::span<const RenderMethod> render_methods();
@@ -49,15 +51,16 @@ struct RenderOptions {
   // a box filter.
   bool exact_film = false;
   RenderWhat what = RenderWhat::kImage;  // InputError where the method does not know it
-  // silhouettes: lines through the sky, at most 16384; a quarter of them through a lamp. With a
-  // tolerance above 0 they are doubled until two halves differ by at most twice this part of the
-  // result; what is left of the error is no longer without bias.
+  // silhouettes: lines through the sky, 1 to 16384; a quarter of them through a lamp. With a
+  // tolerance above 0 (at most 1) they, 8 at least, are doubled until two halves differ by at most
+  // twice this part of the result, or until there are 16384, which RenderResult::warnings tells;
+  // what is left of the error is no longer without bias. InputError for others.
   int lines = 64;
   double tolerance = 0;
-  int rays = 4;  // rays: of each point, and each lamp
+  int rays = 4;  // rays: of each point for each lamp and the sky, 1 to 2^20
   // InputError for others than kRenderSamplers. Scrambled Sobol' points fill a pixel's ranges
   // evenly: a third of the squared error, mostly; but `radiance` then has variances that are too
-  // large, as batches are not independent.
+  // large, as batches are not independent. Methods that look around have no other sampler.
   std::string sampler = "independent";
 };
 
