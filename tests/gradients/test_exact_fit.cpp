@@ -272,6 +272,8 @@ TEST(Fit, QuasiNewtonRefusesNoise) {
   FitOptions options = exact_options();
   options.backward.sampler = "forest";
   refuses(options, "sampler forest");
+  options.backward.sampler = "analitic";
+  refuses(options, ", analytic");
   options = exact_options();
   options.loss = LossKind::kL1;
   refuses(options, "smooth loss");
