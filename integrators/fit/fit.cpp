@@ -146,7 +146,7 @@ void Fit::Impl::check_channels() const {
 bool Fit::Impl::moves_on_film(size_t view) const {
   const Scene& scene = views[view].scene;
   BackwardOptions options = options_.backward;
-  options.terms = {"camera"};
+  options.terms = {term_types()[kCamera].name};
   for (const FitParameter& p : parameters_) {
     if (p.in_view(view)) options.parameters.push_back(p.name());
   }

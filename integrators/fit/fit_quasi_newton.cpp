@@ -5,7 +5,9 @@
 #include <cmath>
 #include <limits>
 
+#include "integrators/backward/adjoint_context.h"
 #include "integrators/fit/fit_impl.h"
+#include "integrators/terms/term.h"
 #include "limn/core/error.h"
 
 namespace limn {
@@ -27,8 +29,8 @@ void Fit::Impl::check_exact() {
         "samples of the loss");
   }
   const std::vector<std::string>& terms = options_.backward.terms;
-  const bool camera =
-      terms.empty() || std::find(terms.begin(), terms.end(), "camera") != terms.end();
+  const bool camera = terms.empty() || std::find(terms.begin(), terms.end(),
+                                                 term_types()[kCamera].name) != terms.end();
   for (size_t v = 0; v < views.size(); ++v) {
     if (!moves_on_film(v)) continue;
     warnings.push_back(

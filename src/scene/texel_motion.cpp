@@ -56,14 +56,14 @@ Image read_texel_field(const Environment::Map& map, const std::string& file) {
                                          "{} x {}",
                                          image.width, image.height, map.width, map.height));
   }
-  Image field(image.width, image.height, 3);
+  Image field(map.width, map.height, 3);
   const size_t pixels = static_cast<size_t>(image.width) * image.height;
   for (size_t i = 0; i < field.data.size(); ++i) {
     const size_t k = i % (3 * pixels);
     field.data[i] = image.channels == 3 ? image.data[k] : image.data[k / 3];
     if (std::isfinite(field.data[i])) continue;
     throw InputError({file}, fmt::format("the field is not finite in column {}, row {}",
-                                         i / 3 % image.width, i / 3 / image.width));
+                                         k / 3 % image.width, k / 3 / image.width));
   }
   return field;
 }

@@ -31,9 +31,9 @@ enum class OptimiserKind {
   // compares losses and gradients of different steps, which noise would make worthless: so it needs
   // light in closed form (the sampler "analytic"), takes the same samples at every step, alike in
   // all pixels, one image for the loss, and minimises that function of the parameters. Its
-  // derivative is the term "interior"; where silhouettes that the camera sees are moved, the term
-  // "camera" adds an estimate of their part of the mean image's, which the function itself does not
-  // have. Numbers at a bound that would go on past it are held. Not for l1, nor with more samples
+  // derivative is the term "interior"; where silhouettes that the camera sees are moved, their term
+  // adds an estimate of their part of the mean image's, which the function itself does not have.
+  // Numbers at a bound that would go on past it are held. Not for l1, nor with more samples
   // as steps go on.
   kLbfgs,
 };
