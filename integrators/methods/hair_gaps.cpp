@@ -27,6 +27,9 @@ constexpr double kLeastPart = 1.0 / 16;
 // Faces with a longest side below this many widths of such a gap are passed over: their gap is no
 // longer than wide. Not tuned.
 constexpr double kLeastSide = 16;
+// Within one shape a gap is told where it is this long [pixels]: creases of scanned meshes, whose
+// edges are shorter, would be told of in most of them. Not tuned.
+constexpr double kLeastLength = 1;
 // Of the tree, that one thread takes at a time. Not tuned.
 constexpr size_t kLeaves = 256;
 
@@ -194,8 +197,10 @@ class GapFinder {
     for (int k = 0; k < 3; ++k) {
       const auto gap = gap_along(edges[k], edges[(k + 1) % 3], face, rounding);
       if (!gap) continue;
-      if (of_edges.shape == along.shape && is_inside(of_edges, along, gap->height, rounding))
+      if (of_edges.shape == along.shape &&
+          (gap->length < kLeastLength || is_inside(of_edges, along, gap->height, rounding))) {
         continue;
+      }
       keep_narrowest(gaps, std::minmax(of_edges.shape, along.shape),
                      {gap->pixels, std::fabs(gap->height)});
     }
@@ -204,6 +209,7 @@ class GapFinder {
   struct Beside {
     double pixels;
     double height;  // of the segment above the face; below zero behind it
+    double length;  // of what they share [pixels]
   };
   // Between the segment and the face that lies beside it, in the middle of what they share.
   std::optional<Beside> gap_along(const Vec3d& a, const Vec3d& b, const Corners& face,
@@ -238,8 +244,8 @@ class GapFinder {
     const double last = height0 + to * (height1 - height0);
     if (first * last <= 0 || std::min(std::fabs(first), std::fabs(last)) <= rounding)
       return std::nullopt;
-    const double pixels = std::fabs(height) / (pixel_ * length(a + middle * (b - a) - eye_));
-    return Beside{pixels, height};
+    const double pixel = pixel_ * length(a + middle * (b - a) - eye_);
+    return Beside{std::fabs(height) / pixel, height, (to - from) * length(b - a) / pixel};
   }
 
   const Scene& scene_;
