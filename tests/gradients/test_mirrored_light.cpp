@@ -180,7 +180,8 @@ TEST(MirroredLight, InReverse) {
 
 // Lines from the sun share with points of a shadow by the density of directions before it. The floor
 // as a mesh of too many faces to be looked through has none of the glare's: where a wall sees the
-// shadow of a body in it, what both terms find together must be the same.
+// shadow of a body in it, what both terms find together must be the same (with lines that know
+// nothing of the glare z is 6.6).
 TEST(MirroredLight, LinesFromTheSunKnowOfIt) {
   const TempFiles files;
   GradientOptions options;
@@ -199,14 +200,14 @@ TEST(MirroredLight, LinesFromTheSunKnowOfIt) {
     for (Vec3f& p : mesh.positions) p = {p.x, 0, -p.y};
     mesh = make_mesh(mesh.positions, mesh.faces);
     parts.body = obj_shape("floor", write_mesh(files, "floor.obj", mesh), true, 2, {0, 0, 0.5},
-                           conductor("gloss", 0.03)) +
+                           conductor("gloss", 0.2)) +
                  square("wall", 2, 0, {0, 1, -1}, diffuse("paint", "0.9, 0.9, 0.9")) +
                  obj_shape("body", write_mesh(files, "body.obj", cube_mesh()), true, 0.3,
                            {0.5, 0.9, 1}, diffuse("soot", "0, 0, 0")) +
-                 sun_in_sky(files, 2, 0.001f);
+                 sun_in_sky(files, 4, 0.001f);
     const Scene scene = make_scene(files, parts);
     EXPECT_EQ(MirroredLight::make(scene) != nullptr, coarse);
-    found.push_back(run_blocks(scene, options, coarse ? 1024 : 4096, coarse));
+    found.push_back(run_blocks(scene, options, 8192, coarse));
   }
   expect_equal(found[0].parameters[0], found[1].parameters[0]);
 }
