@@ -194,7 +194,7 @@ void bind_changes(nb::class_<SceneHandle>& scene) {
       .def("__copy__", [](const SceneHandle& s) { return SceneHandle(s); })
       .def(
           "__deepcopy__", [](const SceneHandle& s, const nb::dict&) { return SceneHandle(s); },
-          nb::arg("memo"));
+          nb::arg("memo"), nb::sig("def __deepcopy__(self, memo: dict[int, object]) -> Scene"));
 }
 
 }  // namespace
