@@ -30,7 +30,6 @@ std::array<Vec3d, 2> across(const Vec3d& n) {
 struct MirroredLight::FlatPart {
   Vec3d point, normal;
   Bounds bounds;
-  double area = 0;
 };
 
 std::vector<MirroredLight::FlatPart> MirroredLight::flat_parts(const Mesh& mesh) {
@@ -52,11 +51,10 @@ std::vector<MirroredLight::FlatPart> MirroredLight::flat_parts(const Mesh& mesh)
     };
     auto part = std::find_if(parts.begin(), parts.end(), lies_in);
     if (part == parts.end()) {
-      parts.push_back({corners[0], n / twice, {}, 0});
+      parts.push_back({corners[0], n / twice, {}});
       part = parts.end() - 1;
     }
     for (const Vec3d& p : corners) part->bounds.extend(p);
-    part->area += 0.5 * twice;
   }
   return parts;
 }
