@@ -32,6 +32,7 @@ struct AdjointContext {
   const ParameterSlots& parameters;
   const EdgeSamplerInput& edges;
   EdgeMotion motion;
+  FilterTable filter;
   // Null where the term is not computed.
   const EdgeSampler* sampler = nullptr;
   const CameraEdges* camera = nullptr;

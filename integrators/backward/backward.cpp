@@ -141,7 +141,7 @@ class BackwardPass {
         path_{parameters_.scene(), *tracer_, lights_, closed_.get(), &viewpoints_, mirrored_.get()},
         input_(path_, 3, {1, 1, 1, 1}, method_.sampler, settings.threads),
         context_{path_, parameters_, input_.edges(),
-                 EdgeMotion(parameters_.slots(), input_.edges())} {
+                 EdgeMotion(parameters_.slots(), input_.edges()), FilterTable(scene.film.filter)} {
     select();
   }
 

@@ -176,7 +176,7 @@ bool add_path_adjoint(const AdjointContext& context, int x, int y, const Rng& ke
   // As in forward mode: in closed form a path takes two places of its pixel.
   const int places = context.path.closed ? 2 : 1;
   for (int i = 0; i < places; ++i) {
-    FilmPosition film = sample_pixel_filter(context.scene().film, x, y, key);
+    FilmPosition film = sample_pixel_filter(context.scene().film, context.filter, x, y, key);
     if (i > 0) film = mirrored_in_pixel(context.scene().film, x, y, film);
     const auto still = context.scene().camera.ray<double>(film.x, film.y);
     const auto ray = moving_ray(context, film, still);

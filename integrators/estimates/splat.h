@@ -2,6 +2,7 @@
 // From a point of the film to the pixels whose reconstruction filters reach it.
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "limn/core/film.h"
 
@@ -23,11 +24,15 @@ void for_every_pixel_of(const Film& film, double film_x, double film_y, const Vi
     return film.filter.eval(offset) /
            (film.filter.integral(range.upper) - film.filter.integral(range.lower));
   };
+  std::vector<double> columns;
+  for (int x = x0; x <= x1; ++x) {
+    columns.push_back(weight(film_x - (x + 0.5), film.range_x(x)));
+  }
   for (int y = y0; y <= y1; ++y) {
     const double wy = weight(film_y - (y + 0.5), film.range_y(y));
     if (wy == 0) continue;
     for (int x = x0; x <= x1; ++x) {
-      const double wx = weight(film_x - (x + 0.5), film.range_x(x));
+      const double wx = columns[static_cast<size_t>(x - x0)];
       if (wx != 0) visit(x, y, wx * wy);
     }
   }

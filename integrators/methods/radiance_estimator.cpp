@@ -20,6 +20,7 @@ RadianceEstimator::RadianceEstimator(const Scene& scene, int threads,
       mirrored_(closed ? nullptr : MirroredLight::make(scene_)),
       context_{scene_, *tracer_, lights_, closed_.get(), nullptr, mirrored_.get()},
       camera_(scene_.camera),
+      filter_(scene_.film.filter),
       visible_(std::move(visible)),
       even_(even) {}
 
@@ -48,16 +49,18 @@ void RadianceEstimator::trace(std::span<const KeyedSample> samples, bool mirrore
   Tracer tracer(context_, rays);
   std::vector<typename Tracer::Walk> walks;
   walks.reserve(samples.size());
-  std::vector<StartRay<double>> starts;
-  starts.reserve(samples.size());
+  std::vector<StartRay<double>> starts(samples.size());
   std::vector<FilmPosition> places;
   for (const auto& [at, key] : samples) {
-    FilmPosition film = sample_pixel_filter(scene_.film, at.x, at.y, key);
+    FilmPosition film = sample_pixel_filter(scene_.film, filter_, at.x, at.y, key);
     if (mirrored) film = mirrored_in_pixel(scene_.film, at.x, at.y, film);
     const auto ray = camera_.ray(film.x, film.y);
     if (sink.log()) log_camera_ray(*sink.log(), film.x, film.y, ray.origin, ray.direction);
     walks.emplace_back(key, 0, visitor);
-    starts.push_back({camera_ray(scene_, ray), ray.origin, ray.direction});
+    StartRay<double>& start = starts[walks.size() - 1];
+    renew(start.ray, [&] { return camera_ray(scene_, ray); });
+    start.origin = ray.origin;
+    start.direction = ray.direction;
     if (visible_) places.push_back(film);
   }
   if (visible_) {

@@ -34,6 +34,7 @@ class RadianceEstimator final : public SampleEstimator {
   std::unique_ptr<MirroredLight> mirrored_;  // null where nothing mirrors
   PathContext context_;
   CameraView<double> camera_;
+  FilterTable filter_;
   std::shared_ptr<const FilmRegions> visible_;
   bool even_;
 };

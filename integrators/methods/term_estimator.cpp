@@ -85,6 +85,7 @@ TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> para
       mirrored_(closed ? nullptr : MirroredLight::make(scene_)),
       context_{scene_, *tracer_, lights_, closed_.get(), &viewpoints_, mirrored_.get()},
       camera_(scene_.camera),
+      filter_(scene_.film.filter),
       visible_(std::move(visible)),
       input_(context_, lanes_, lane_scale_, sampler, threads, warping != nullptr),
       types_(terms_of(scene, sampler, closed)),
@@ -324,7 +325,7 @@ TermEstimator::PathCosts TermEstimator::trace(std::span<const Place> places,
   std::array<StartRay<Dual>, Tracer::kMostWalks> starts;
   for (size_t i = 0; i < walks.size(); ++i) {
     const PixelSample& at = places[i].at;
-    FilmPosition film = sample_pixel_filter(scene_.film, at.x, at.y, walks[i].key);
+    FilmPosition film = sample_pixel_filter(scene_.film, filter_, at.x, at.y, walks[i].key);
     if (places[i].mirrored) film = mirrored_in_pixel(scene_.film, at.x, at.y, film);
     const auto ray = camera_.ray(film.x, film.y);
     starts[i] = {camera_ray(scene_, CameraRay<double>{value(ray.origin), value(ray.direction),

@@ -134,6 +134,7 @@ class TermEstimator final : public SampleEstimator {
   std::unique_ptr<MirroredLight> mirrored_;  // null where nothing mirrors
   PathContext context_;
   CameraView<Dual> camera_;
+  FilterTable filter_;
   std::shared_ptr<const FilmRegions> visible_;
   TermInput input_;
   std::vector<const TermType*> types_;

@@ -41,7 +41,8 @@ VisibilityEstimator::VisibilityEstimator(const Scene& scene, int threads, uint64
       tracer_(make_embree_tracer(scene, threads)),
       seed_(seed),
       options_(options),
-      camera_(scene.camera) {
+      camera_(scene.camera),
+      filter_(scene.film.filter) {
   const bool direct = options.what == RenderWhat::kImage;
   check_options(options, by_lines);
   if (by_lines) {
@@ -112,7 +113,8 @@ Rng VisibilityEstimator::even(const PixelSample& at, uint64_t number, Part part)
 
 Rgb<double> VisibilityEstimator::film_point(const PixelSample& at, uint64_t number, Part part,
                                             SampleSink& sink, RayCount& rays) const {
-  const FilmPosition film = sample_pixel_filter(scene_.film, at.x, at.y, even(at, number, part));
+  const FilmPosition film =
+      sample_pixel_filter(scene_.film, filter_, at.x, at.y, even(at, number, part));
   const auto start = camera_.ray(film.x, film.y);
   const Vec3d origin = start.origin, direction = start.direction;
   const bool image = options_.what == RenderWhat::kImage;

@@ -63,6 +63,7 @@ class VisibilityEstimator final : public SampleEstimator {
   std::unique_ptr<LineLight> lines_;  // null: by rays
   std::vector<RayLamp> lamps_;
   CameraView<double> camera_;
+  FilterTable filter_;
 };
 
 }  // namespace limn

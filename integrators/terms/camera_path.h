@@ -10,16 +10,17 @@ namespace limn {
 // Position of one sample of a pixel [pixels of the full film]: drawn from the reconstruction filter
 // around the pixel's center, so that every sample counts with weight one and no pixel shares
 // samples with another. The stream depends on the pixel of the full film, hence a crop repeats the
-// full image.
+// full image. filter: the film's.
 struct FilmPosition {
   double x, y;
 };
-inline FilmPosition sample_pixel_filter(const Film& film, int x, int y, const Rng& key) {
+inline FilmPosition sample_pixel_filter(const Film& film, const FilterTable& filter, int x, int y,
+                                        const Rng& key) {
   Rng rng = key.at(Purpose::kFilm, 0);
   const auto columns = film.range_x(x);
   const auto rows = film.range_y(y);
-  const double dx = film.filter.sample(columns.lower, columns.upper, rng);
-  const double dy = film.filter.sample(rows.lower, rows.upper, rng);
+  const double dx = filter.quantile(columns.lower, columns.upper, rng.uniform());
+  const double dy = filter.quantile(rows.lower, rows.upper, rng.uniform());
   return {x + 0.5 + dx, y + 0.5 + dy};
 }
 

@@ -122,6 +122,7 @@ class PathTracer {
     return c_.scene.max_depth >= 0 && bounces + 1 >= c_.scene.max_depth;
   }
   // path_follow.h
+  void place(Walk& walk, const Vec3<S>& wi) const;
   void follow_seen(std::span<const StartRay<S>> rays, std::span<Walk> walks);
   void split(Walk& walk, int more);
   // path_vertices.h. Those that return bool say whether the path goes on.
@@ -144,6 +145,7 @@ class PathTracer {
   void move_along_edge(SurfacePoint<S>& surface, FaceRef face) const;
   void fetch_face(FaceRef face) const;
   void fetch_corners(const Walk& walk) const;
+  void fetch_next(Walk& walk) const;
   // path_lights.h
   void draw_light(Walk& walk) const;
   void draw_light(Walk& walk, const Rng& key) const;

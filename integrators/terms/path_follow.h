@@ -50,8 +50,13 @@ template <class S, class Visitor>
 inline void PathTracer<S, Visitor>::place(Walk& walk, const SurfacePoint<S>& surface,
                                           const Vec3<S>& wi) const {
   walk.surface = surface;
+  place(walk, wi);
+}
+
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::place(Walk& walk, const Vec3<S>& wi) const {
   walk.wi = wi;
-  walk.sums.radiance = surface.emission(value(wi), c_.scene.shading);
+  walk.sums.radiance = walk.surface.emission(value(wi), c_.scene.shading);
 }
 
 template <class S, class Visitor>
@@ -82,7 +87,7 @@ inline void PathTracer<S, Visitor>::follow(std::span<Walk* const> walks) {
       walk.found = next_hit(walk);
       return true;
     });
-    for (size_t i = 0; i < count; ++i) fetch_corners(*going[i]);
+    for (size_t i = 0; i < count; ++i) fetch_next(*going[i]);
     keep([&](Walk& walk) { return walk.found || escape(walk); });
     keep([&](Walk& walk) { return arrive(walk); });
   }
@@ -97,9 +102,11 @@ inline void PathTracer<S, Visitor>::follow_seen(std::span<const StartRay<S>> ray
   for (size_t i = 0; i < walks.size(); ++i) {
     Walk& walk = walks[i];
     if (walk.failed) continue;
-    const auto& [ray, origin, direction] = rays[i];
+    const Vec3<S>&origin = rays[i].origin, &direction = rays[i].direction;
     if (walk.found) {
-      place(walk, surface_on_ray<S>(c_.scene, walk.hit.face, origin, direction), -direction);
+      renew(walk.surface,
+            [&] { return surface_on_ray<S>(c_.scene, walk.hit.face, origin, direction); });
+      place(walk, -direction);
       going[count++] = &walk;
     } else {
       walk.sums.radiance = escaped(direction, walk.bounces);

@@ -51,7 +51,7 @@ inline void PathTracer<S, Visitor>::draw_light(Walk& walk, const Rng& key) const
   walk.light.reset();
   if (c_.lights.empty()) return;
   Rng rng = key.at(Purpose::kEmitter, walk.bounces);
-  walk.light = c_.lights.sample(walk.lights, rng);
+  renew(walk.light, [&] { return c_.lights.sample(walk.lights, rng); });
 }
 
 // What the light that was drawn adds but for its radiance; none if that is black.

@@ -62,6 +62,16 @@ inline void PathTracer<S, Visitor>::fetch_corners(const Walk& walk) const {
   if (mesh.normal_source != NormalSource::kFace) detail::fetch_shading<S>(mesh, face.face);
 }
 
+// What the next step reads of where the ray ends.
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::fetch_next(Walk& walk) const {
+  if (walk.found) {
+    fetch_corners(walk);
+  } else if (c_.scene.environment) {
+    walk.sky = c_.scene.environment->find(walk.wo);
+  }
+}
+
 template <class S, class Visitor>
 inline bool PathTracer<S, Visitor>::shadowed(const Walk& walk) {
   const LightSample& light = *walk.light;

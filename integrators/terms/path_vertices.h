@@ -31,9 +31,10 @@ inline bool PathTracer<S, Visitor>::begin_vertex(Walk& walk) {
     return false;
   }
   // Copies have both from the path that they are of.
-  walk.lights = c_.lights.at(value(walk.surface.p));
-  walk.mixture =
-      mixture_at(c_.mirrored, walk.surface, *walk.scattering, !is_complete(walk.bounces + 1));
+  renew(walk.lights, [&] { return c_.lights.at(value(walk.surface.p)); });
+  renew(walk.mixture, [&] {
+    return mixture_at(c_.mirrored, walk.surface, *walk.scattering, !is_complete(walk.bounces + 1));
+  });
   const int more = splits(walk.surface, walk.copies);
   const int lights = (walk.bounces > 0 ? light_samples_ : 1) * more;
   if (walk.bounces > 0) walk.sums.later_lights += lights;
@@ -84,7 +85,7 @@ inline bool PathTracer<S, Visitor>::scatter(Walk& walk) {
 template <class S, class Visitor>
 inline bool PathTracer<S, Visitor>::escape(Walk& walk) const {
   if (!c_.scene.environment) return false;
-  auto sight = c_.lights.template environment<S>(walk.lights, walk.wo);
+  auto sight = c_.lights.template environment<S>(walk.lights, walk.wo, walk.sky);
   if (walk.motion) {
     sight.radiance = environment_radiance<S>(*c_.scene.environment, walk.direction);
   }
@@ -102,7 +103,8 @@ inline bool PathTracer<S, Visitor>::arrive(Walk& walk) {
     return false;
   }
   if (walk.hit.t > 0) {
-    walk.surface = surface_on_ray<S>(c_.scene, face, walk.surface.p, walk.direction);
+    const Vec3<S> from = walk.surface.p;
+    renew(walk.surface, [&] { return surface_on_ray<S>(c_.scene, face, from, walk.direction); });
     walk.edge = nullptr;
     walk.beside_edge = false;
   } else {

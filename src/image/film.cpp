@@ -41,10 +41,9 @@ double Filter::integral(double x) const {
 }
 
 // Inversion of the integral by Newton's method, kept inside a shrinking bracket: exact to rounding
-// for every filter, and one random number per sample.
-double Filter::sample(double lower, double upper, Rng& rng) const {
+// for every filter.
+double Filter::quantile(double lower, double upper, double u) const {
   DCHECK_LT(integral(lower), integral(upper));
-  const double u = rng.uniform();
   if (kind == Kind::kBox) return lower + u * (upper - lower);
   const double target = integral(lower) + u * (integral(upper) - integral(lower));
   double a = lower, b = upper;
@@ -63,6 +62,52 @@ double Filter::sample(double lower, double upper, Rng& rng) const {
     x = next;
   }
   return x;
+}
+
+// Chebyshev's, on [0, 1].
+const FilterTable::Piece& FilterTable::nodes() {
+  static const Piece kAll = [] {
+    Piece all;
+    for (int i = 0; i < kNodes; ++i) all[i] = 0.5 - 0.5 * std::cos(kPi * (i + 0.5) / kNodes);
+    return all;
+  }();
+  return kAll;
+}
+
+FilterTable::FilterTable(const Filter& filter)
+    : filter_(filter), total_(filter.integral(filter.radius)) {
+  if (filter.kind == Filter::Kind::kBox) return;
+  const Piece& t = nodes();
+  for (int k = 0; k < kPieces; ++k) {
+    Piece c;
+    for (int i = 0; i < kNodes; ++i) {
+      const double root = (k + t[i]) / kPieces;
+      c[i] = filter.quantile(-filter.radius, filter.radius, 0.5 * root * root);
+    }
+    for (int order = 1; order < kNodes; ++order) {
+      for (int i = kNodes - 1; i >= order; --i) c[i] = (c[i] - c[i - 1]) / (t[i] - t[i - order]);
+    }
+    pieces_.push_back(c);
+  }
+}
+
+double FilterTable::integral(double x) const {
+  return x <= -filter_.radius ? 0 : x >= filter_.radius ? total_ : filter_.integral(x);
+}
+
+double FilterTable::quantile(double lower, double upper, double u) const {
+  if (pieces_.empty()) return lower + u * (upper - lower);
+  const double start = integral(lower);
+  const double below = start + u * (integral(upper) - start);
+  const bool left = below < total_ - below;
+  const double root = std::sqrt(std::max(0.0, 2 * (left ? below : total_ - below) / total_));
+  const int k = std::min(static_cast<int>(root * kPieces), kPieces - 1);
+  const double t = root * kPieces - k;
+  const Piece& c = pieces_[static_cast<size_t>(k)];
+  const Piece& at = nodes();
+  double x = c[kNodes - 1];
+  for (int i = kNodes - 2; i >= 0; --i) x = c[i] + (t - at[i]) * x;
+  return std::clamp(left ? x : -x, lower, upper);
 }
 
 namespace {

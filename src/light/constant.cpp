@@ -21,10 +21,12 @@ class ConstantEnvironment final : public Environment {
     return {{r * azimuth.cos, r * azimuth.sin, z}, kDensity, {}};
   }
   double pdf_solid_angle(const Vec3d&) const override { return kDensity; }
-  void look(const Vec3d&, Sight<double>& sight) const override {
+  void look(const Vec3d&, const std::array<double, 2>&, Sight<double>& sight) const override {
     sight = {value(radiance_), kDensity};
   }
-  void look(const Vec3d&, Sight<Dual>& sight) const override { sight = {radiance_, kDensity}; }
+  void look(const Vec3d&, const std::array<double, 2>&, Sight<Dual>& sight) const override {
+    sight = {radiance_, kDensity};
+  }
   bool is_uniform() const override { return true; }
   double mean_luminance() const override { return luminance(value(radiance_)); }
 

@@ -46,18 +46,27 @@ void EnvironmentMap::fill(const Image& image, bool sampled, HugePageVector<Texel
   density_.emplace(width_, height_, importance);
 }
 
+void EnvironmentMap::fetch_texels(int column, int row) const {
+  with_texels([&](const auto* texels) {
+    __builtin_prefetch(&texels[index(column, row)]);
+    __builtin_prefetch(&texels[index(column, row + 1)]);
+  });
+}
+
 EnvironmentMap::Drawn EnvironmentMap::sample(double u1, double u2) const {
   const MapDensity::Drawn drawn = density_->sample(u1, u2);
   const double sin_theta = std::sqrt(std::max(0.0, 1 - drawn.cos_theta * drawn.cos_theta));
   const SinCos azimuth = sin_cos_of_turns((drawn.x + 0.5) / width_);
   const double x = drawn.x < width_ ? drawn.x : 0;
   const Place<double> place{x, angle_of(sin_theta, drawn.cos_theta) * ((height_ - 1) / kPi)};
-  const int column = column_of(place.x), row = row_of(place.y);
-  with_texels([&](const auto* texels) {
-    __builtin_prefetch(&texels[index(column, row)]);
-    __builtin_prefetch(&texels[index(column, row + 1)]);
-  });
+  fetch_texels(column_of(place.x), row_of(place.y));
   return {{azimuth.sin * sin_theta, drawn.cos_theta, -azimuth.cos * sin_theta}, place, drawn.pdf};
+}
+
+void EnvironmentMap::fetch(const Place<double>& place) const {
+  const int column = column_of(place.x), row = row_of(place.y);
+  fetch_texels(column, row);
+  density_->fetch(column, row);
 }
 
 double EnvironmentMap::pdf_solid_angle(const Place<double>& place, const Vec3d& d) const {

@@ -42,6 +42,8 @@ class EnvironmentMap {
   Place<S> locate(const Vec3<S>& d) const;
   template <class S>
   Rgb<S> radiance(const Place<S>& place) const;
+  // Asks for what `radiance` and `pdf_solid_angle` read there.
+  void fetch(const Place<double>& place) const;
 
   // The density follows the luminance of the absolute values of the texels: it is positive
   // wherever radiance is not zero, negative texels included. An all-black map is sampled uniformly.
@@ -50,7 +52,7 @@ class EnvironmentMap {
     Place<double> place;
     double pdf;  // [1/sr]
   };
-  // Asks for the texels there, so that they are at hand when radiance is.
+  // Asks for the texels there.
   Drawn sample(double u1, double u2) const;
   // place: of d. [1/sr]
   double pdf_solid_angle(const Place<double>& place, const Vec3d& d) const;
@@ -80,6 +82,7 @@ class EnvironmentMap {
     if (const auto* halves = std::get_if<0>(&texels_)) return f(halves->data());
     return f(std::get<1>(texels_).data());
   }
+  void fetch_texels(int column, int row) const;
   int next_column(int column) const { return column + 1 == width_ ? 0 : column + 1; }
   double polar_angle(int row) const { return kPi * row / (height_ - 1); }
   template <class Number>

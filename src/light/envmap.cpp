@@ -35,10 +35,18 @@ class MapEnvironment final : public Environment {
     const Vec3d v = map_from_world(d);
     return map_->pdf_solid_angle(map_->locate(v), v);
   }
-  void look(const Vec3d& d, Sight<double>& sight) const override { look(d, scale_.v, sight); }
-  void look(const Vec3d& d, Sight<Dual>& sight) const override {
-    look(d, scale_, sight);
-    if (texels_move_) sight.radiance = moving(map_->locate(map_from_world(d)), sight.radiance);
+  std::array<double, 2> find(const Vec3d& d) const override {
+    const auto place = map_->locate(map_from_world(d));
+    map_->fetch(place);
+    return {place.x, place.y};
+  }
+  void look(const Vec3d& d, const std::array<double, 2>& place,
+            Sight<double>& sight) const override {
+    look(d, {place[0], place[1]}, scale_.v, sight);
+  }
+  void look(const Vec3d& d, const std::array<double, 2>& place, Sight<Dual>& sight) const override {
+    look(d, {place[0], place[1]}, scale_, sight);
+    if (texels_move_) sight.radiance = moving({place[0], place[1]}, sight.radiance);
   }
   bool is_uniform() const override { return false; }
   double mean_luminance() const override { return map_->mean_luminance() * scale_.v; }
@@ -98,10 +106,10 @@ class MapEnvironment final : public Environment {
     return radiance;
   }
   template <class S>
-  void look(const Vec3d& d, const S& scale, Sight<S>& sight) const {
-    const Vec3d v = map_from_world(d);
-    const auto place = map_->locate(v);
-    sight = {map_->radiance(place) * scale, map_->pdf_solid_angle(place, v)};
+  void look(const Vec3d& d, const EnvironmentMap::Place<double>& place, const S& scale,
+            Sight<S>& sight) const {
+    sight.radiance = map_->radiance(place) * scale;
+    sight.pdf = map_->pdf_solid_angle(place, map_from_world(d));
   }
   template <class S>
   Vec3<S> map_from_world(const Vec3<S>& d) const {

@@ -46,7 +46,6 @@ Lights::Lights(const Scene& scene)
   for (const auto& lamp : area_lights_) reaches_.push_back(reach_of(*lamp));
   if (environment_) {
     Reach& reach = reaches_.emplace_back();
-    reach.spread = 1;  // any: it has no area, but no place is its center
     reach.constant = kPi * std::fabs(environment_->mean_luminance());
   }
 }
@@ -78,6 +77,7 @@ double Lights::estimate(size_t light, const Vec3d& p) const {
     return arrival ? std::fabs(luminance(arrival->irradiance)) : 0;
   }
   const Reach& reach = reaches_[light];
+  if (reach.luminance == 0) return reach.constant;
   const Vec3d to = p - reach.center;
   const double squared = length_squared(to);
   const double shown = squared > 0 ? std::max(dot(reach.facing, to), 0.0) / std::sqrt(squared) : 0;
@@ -88,7 +88,11 @@ double Lights::estimate(size_t light, const Vec3d& p) const {
 Lights::Place Lights::at(const Vec3d& p) const {
   Place place{p};
   if (all_.size() < 2) return place;
-  for (size_t k = 0; k < all_.size(); ++k) place.sum += estimate(k, p);
+  for (size_t k = 0; k < all_.size(); ++k) {
+    const double of_light = estimate(k, p);
+    if (k < place.first.size()) place.first[k] = of_light;
+    place.sum += of_light;
+  }
   if (!std::isfinite(place.sum)) place.sum = 0;
   return place;
 }
@@ -96,7 +100,7 @@ Lights::Place Lights::at(const Vec3d& p) const {
 double Lights::choices(const Place& place, size_t light) const {
   const auto count = static_cast<double>(all_.size());
   if (!(place.sum > 0)) return count;
-  return 1 / (kAny / count + (1 - kAny) * estimate(light, place.p) / place.sum);
+  return 1 / (kAny / count + (1 - kAny) * estimate(light, place) / place.sum);
 }
 
 std::optional<LightSample> Lights::sample(const Place& place, Rng& rng) const {
@@ -108,7 +112,7 @@ std::optional<LightSample> Lights::sample(const Place& place, Rng& rng) const {
     light = std::min(static_cast<size_t>(u / any * static_cast<double>(all_.size())), last);
   } else {
     double left = (u - any) / (1 - any) * place.sum;
-    while (light < last && (left -= estimate(light, place.p)) >= 0) ++light;
+    while (light < last && (left -= estimate(light, place)) >= 0) ++light;
   }
   return all_[light]->sample(place.p, choices(place, light), rng);
 }

@@ -37,6 +37,10 @@ class MapDensity {
   Drawn sample(double u1, double u2) const;
   // column, row: the cell of (x, y). cos_theta: that of y. [1/sr]
   double pdf(int column, int row, double x, double cos_theta) const;
+  // Asks for what `pdf` reads of that cell.
+  void fetch(int column, int row) const {
+    __builtin_prefetch(&leaf(square(column, row), column, row));
+  }
 
   size_t leaf_count() const { return leaves_.size(); }
 

@@ -195,13 +195,14 @@ Rgb<Var> Light::drawn_radiance<Var>(const LightSample& sample) const {
 }
 
 template <>
-Environment::Sight<Var> Lights::environment<Var>(const Place& place, const Vec3d& wo) const {
+Environment::Sight<Var> Lights::environment<Var>(const Place& place, const Vec3d& wo,
+                                                 const std::array<double, 2>& at) const {
   Environment::Sight<double> sight;
-  environment_->look(wo, sight);
+  environment_->look(wo, at, sight);
   const auto radiance = of_parameters(Tape::current()->slots()->environment, sight.radiance,
                                       [&](const Environment& seeded) {
                                         Environment::Sight<Dual> of;
-                                        seeded.look(wo, of);
+                                        seeded.look(wo, at, of);
                                         return of.radiance;
                                       });
   return {with_texels(wo, radiance), sight.pdf / choices(place, area_lights_.size())};

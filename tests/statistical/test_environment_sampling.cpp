@@ -72,8 +72,9 @@ void expect_same_look(const Environment& map, const Environment::Drawn& drawn) {
   const Vec3d& d = drawn.direction;
   Environment::Sight<double> sight;
   Environment::Sight<Dual> dual;
-  map.look(d, sight);
-  map.look(d, dual);
+  const auto place = map.find(d);
+  map.look(d, place, sight);
+  map.look(d, place, dual);
   LightSample sample{d};
   sample.place = drawn.place;
   EXPECT_NEAR(drawn.pdf, map.pdf_solid_angle(d), 1e-8 * drawn.pdf);

@@ -26,14 +26,20 @@ class Environment : public Light {
   virtual Drawn sample_direction(double u1, double u2) const = 0;
   virtual double pdf_solid_angle(const Vec3d& d) const = 0;
 
-  // Radiance from a unit direction that is held, and its density, found at once.
+  // Where a unit direction lies, in an environment's own terms (see LightSample). What `look` reads
+  // there is asked for, so that it is at hand some work later.
+  virtual std::array<double, 2> find(const Vec3d& /*d*/) const { return {}; }
+  // Radiance from a unit direction that is held, and its density, found at once. place: that of
+  // `find`.
   template <class S>
   struct Sight {
     Rgb<S> radiance;  // derivatives: those of the environment's own parameters alone
     double pdf;       // [1/sr]
   };
-  virtual void look(const Vec3d& d, Sight<double>& sight) const = 0;
-  virtual void look(const Vec3d& d, Sight<Dual>& sight) const = 0;
+  virtual void look(const Vec3d& d, const std::array<double, 2>& place,
+                    Sight<double>& sight) const = 0;
+  virtual void look(const Vec3d& d, const std::array<double, 2>& place,
+                    Sight<Dual>& sight) const = 0;
 
   // Whether the radiance is the same from all directions.
   virtual bool is_uniform() const = 0;

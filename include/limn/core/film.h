@@ -1,10 +1,10 @@
 #pragma once
 // The film: which pixels are made, and the reconstruction filter that defines them.
+#include <array>
 #include <vector>
 
 #include "limn/core/error.h"
 #include "limn/core/image.h"
-#include "limn/core/rng.h"
 
 namespace limn {
 
@@ -18,9 +18,31 @@ struct Filter {
   double eval(double x) const;
   // Integral of the filter from -radius to x.
   double integral(double x) const;
-  // An offset in [lower, upper], a part of [-radius, radius] that holds more than zero of the
-  // filter, with density eval(x) / (integral(upper) - integral(lower)).
-  double sample(double lower, double upper, Rng& rng) const;
+  // The offset in [lower, upper], a part of [-radius, radius] that holds more than zero of the
+  // filter, below which a part u of what it holds there lies. To rounding; see FilterTable for many.
+  double quantile(double lower, double upper, double u) const;
+};
+
+// Quantiles of a filter, tabulated. With q the integral up to x < 0, x is a smooth function of
+// sqrt(q), at the end of the filter too, and polynomials stand for it between knots.
+class FilterTable {
+ public:
+  explicit FilterTable(const Filter& filter);
+
+  // Filter::quantile to rounding: for u uniform in [0, 1) an offset with the density
+  // eval(x) / (integral(upper) - integral(lower)).
+  double quantile(double lower, double upper, double u) const;
+
+ private:
+  static constexpr int kPieces = 32;
+  static constexpr int kNodes = 8;  // with 32 pieces no gaussian is further off than by rounding
+  using Piece = std::array<double, kNodes>;
+  static const Piece& nodes();
+  double integral(double x) const;
+
+  Filter filter_;
+  double total_;               // the whole integral
+  std::vector<Piece> pieces_;  // Newton's divided differences
 };
 
 // A pixel's value is the filter's weighted mean of the radiance over the film: I_j = sum over the

@@ -1,5 +1,6 @@
 #pragma once
 // All lights of a scene, one of which is chosen at a time.
+#include <array>
 #include <memory>
 #include <span>
 #include <vector>
@@ -26,6 +27,7 @@ class Lights {
   struct Place {
     Vec3d p;
     double sum = 0;
+    std::array<double, 4> first{};  // of the first lights, each by itself; how many is not tuned
   };
   Place at(const Vec3d& p) const;
 
@@ -40,11 +42,12 @@ class Lights {
   double pdf_environment(const Place& place, const Vec3d& wo) const {
     return environment_->pdf_solid_angle(wo) / choices(place, area_lights_.size());
   }
-  // With the radiance that a ray along the held direction wo sees there.
+  // With the radiance that a ray along the held direction wo sees there. at: Environment::find.
   template <class S>
-  Environment::Sight<S> environment(const Place& place, const Vec3d& wo) const {
+  Environment::Sight<S> environment(const Place& place, const Vec3d& wo,
+                                    const std::array<double, 2>& at) const {
     Environment::Sight<S> sight;
-    environment_->look(wo, sight);
+    environment_->look(wo, at, sight);
     sight.pdf /= choices(place, area_lights_.size());
     return sight;
   }
@@ -61,6 +64,9 @@ class Lights {
   };
   static Reach reach_of(const Light& lamp);
   double estimate(size_t light, const Vec3d& p) const;
+  double estimate(size_t light, const Place& place) const {
+    return light < place.first.size() ? place.first[light] : estimate(light, place.p);
+  }
   // One over the probability of a light.
   double choices(const Place& place, size_t light) const;
 

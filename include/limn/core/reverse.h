@@ -19,7 +19,8 @@ SurfacePoint<Var> surface_on_ray<Var>(const Scene& scene, FaceRef face, const Ve
 template <>
 Rgb<Var> Light::drawn_radiance<Var>(const LightSample& sample) const;
 template <>
-Environment::Sight<Var> Lights::environment<Var>(const Place& place, const Vec3d& wo) const;
+Environment::Sight<Var> Lights::environment<Var>(const Place& place, const Vec3d& wo,
+                                                 const std::array<double, 2>& at) const;
 
 // Radiance from the environment along a direction that may move.
 template <class S>

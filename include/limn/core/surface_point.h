@@ -130,7 +130,8 @@ SurfacePoint<S> surface_on_ray(const Scene& scene, FaceRef face, const Vec3<S>& 
       return point;
     }
     if (is_still(origin) && is_still(direction) && mesh.normal_tangents.empty()) {
-      return detail::as_dual(surface_on_ray<double>(scene, face, value(origin), value(direction)));
+      point = detail::as_dual(surface_on_ray<double>(scene, face, value(origin), value(direction)));
+      return point;
     }
   }
   detail::place_on_plane<S, double>(mesh, origin, direction, point);
