@@ -2,6 +2,7 @@
 #include "limn/core/film.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "limn/core/check.h"
@@ -78,11 +79,13 @@ FilterTable::FilterTable(const Filter& filter)
     : filter_(filter), total_(filter.integral(filter.radius)) {
   if (filter.kind == Filter::Kind::kBox) return;
   const Piece& t = nodes();
-  for (int k = 0; k < kPieces; ++k) {
+  constexpr int kPieces = 1 << kPieceBits;
+  for (int k = 0; k < kPowers * kPieces; ++k) {
+    const double power = std::ldexp(1.0, k / kPieces - kPowers);
     Piece c;
     for (int i = 0; i < kNodes; ++i) {
-      const double root = (k + t[i]) / kPieces;
-      c[i] = filter.quantile(-filter.radius, filter.radius, 0.5 * root * root);
+      const double part = power * (1 + (k % kPieces + t[i]) / kPieces);  // of the left half
+      c[i] = filter.quantile(-filter.radius, filter.radius, 0.5 * part);
     }
     for (int order = 1; order < kNodes; ++order) {
       for (int i = kNodes - 1; i >= order; --i) c[i] = (c[i] - c[i - 1]) / (t[i] - t[i - order]);
@@ -100,10 +103,15 @@ double FilterTable::quantile(double lower, double upper, double u) const {
   const double start = integral(lower);
   const double below = start + u * (integral(upper) - start);
   const bool left = below < total_ - below;
-  const double root = std::sqrt(std::max(0.0, 2 * (left ? below : total_ - below) / total_));
-  const int k = std::min(static_cast<int>(root * kPieces), kPieces - 1);
-  const double t = root * kPieces - k;
-  const Piece& c = pieces_[static_cast<size_t>(k)];
+  const double part = std::min(2 * (left ? below : total_ - below) / total_, 1 - 0x1p-53);
+  // A piece is the exponent and the first bits after it.
+  constexpr int kRest = 52 - kPieceBits;
+  const auto bits = std::bit_cast<uint64_t>(part);
+  constexpr uint64_t kFirst = uint64_t{1023 - kPowers} << kPieceBits;
+  if (!(part >= 0) || bits >> kRest < kFirst) return filter_.quantile(lower, upper, u);
+  const Piece& c = pieces_[(bits >> kRest) - kFirst];
+  const double t =
+      static_cast<double>(bits & ((uint64_t{1} << kRest) - 1)) * (1.0 / (uint64_t{1} << kRest));
   const Piece& at = nodes();
   double x = c[kNodes - 1];
   for (int i = kNodes - 2; i >= 0; --i) x = c[i] + (t - at[i]) * x;

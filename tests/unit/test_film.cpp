@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "limn/core/film.h"
+#include "limn/core/rng.h"
 
 namespace limn {
 namespace {

@@ -23,8 +23,8 @@ struct Filter {
   double quantile(double lower, double upper, double u) const;
 };
 
-// Quantiles of a filter, tabulated. With q the integral up to x < 0, x is a smooth function of
-// sqrt(q), at the end of the filter too, and polynomials stand for it between knots.
+// Quantiles of a filter, tabulated: between knots polynomials in the integral up to x < 0 stand for
+// x. Knots are so many to each power of two, as x goes with the root of the integral at the end.
 class FilterTable {
  public:
   explicit FilterTable(const Filter& filter);
@@ -34,15 +34,17 @@ class FilterTable {
   double quantile(double lower, double upper, double u) const;
 
  private:
-  static constexpr int kPieces = 32;
-  static constexpr int kNodes = 8;  // with 32 pieces no gaussian is further off than by rounding
+  // No gaussian is off by more than rounding with these.
+  static constexpr int kNodes = 9;      // of a piece
+  static constexpr int kPieceBits = 3;  // the logarithm of the pieces of a power of two
+  static constexpr int kPowers = 24;    // of two; what lies further out is not tabulated
   using Piece = std::array<double, kNodes>;
   static const Piece& nodes();
   double integral(double x) const;
 
   Filter filter_;
   double total_;               // the whole integral
-  std::vector<Piece> pieces_;  // Newton's divided differences
+  std::vector<Piece> pieces_;  // Newton's divided differences; none for a box
 };
 
 // A pixel's value is the filter's weighted mean of the radiance over the film: I_j = sum over the
