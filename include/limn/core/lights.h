@@ -28,6 +28,9 @@ class Lights {
     double sum = 0;
   };
   Place at(const Vec3d& p) const;
+  // About what a surface at p that faces a light (its number in all()) would get from it, if
+  // nothing were in the way [W / m^2, of luminance].
+  double estimate(size_t light, const Vec3d& p) const;
 
   // None: a sample of value zero (see Light::sample).
   std::optional<LightSample> sample(const Place& place, Rng& rng) const;
@@ -60,7 +63,6 @@ class Lights {
     double constant = 0;   // irradiance, alike everywhere
   };
   static Reach reach_of(const Light& lamp);
-  double estimate(size_t light, const Vec3d& p) const;
   // One over the probability of a light.
   double choices(const Place& place, size_t light) const;
 
