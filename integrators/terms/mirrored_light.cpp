@@ -10,9 +10,9 @@ namespace limn {
 namespace {
 
 // None of these is tuned.
-constexpr double kWidest = 0.35;       // of a lobe that is worth it [rad]
-constexpr size_t kMostFaces = 256;     // of a mesh that is looked through for flat parts
-constexpr double kFlat = 0x1p-16;      // how far a plane's points may lie off, over the mesh's size
+constexpr double kWidest = 0.35;    // of a lobe that is worth it [rad]
+constexpr size_t kMostFaces = 256;  // of a mesh that is looked through for flat parts
+constexpr double kFlat = 0x1p-16;   // how far a plane's points may lie off, over the mesh's size
 // Of the light over the plane: the sine of its elevation, or its height over the flat part's radius.
 constexpr double kLeastHeight = 1e-3;
 // What lights send comes back from other surfaces with this share of it.

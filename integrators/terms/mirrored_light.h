@@ -52,8 +52,7 @@ class MirroredLight {
     for (const Image& image : images_) {
       Glare& glare = mixture.glare[mixture.count];
       if (!sees(image, value(surface.p), glare)) continue;
-      const double power =
-          luminance(scattering.eval_value(glare.toward)) * glare.irradiance;
+      const double power = luminance(scattering.eval_value(glare.toward)) * glare.irradiance;
       if (!(power > 0)) continue;
       mixture.part[mixture.count++] = power;
       sum += power;
@@ -63,6 +62,8 @@ class MirroredLight {
     if (sum > 0) mixture.share = std::min(sum / (sum + elsewhere_), kMostShare);
     return mixture;
   }
+  // Luminance of what is seen beside the glare, about.
+  double elsewhere() const { return elsewhere_; }
   // The density at the unit direction w [1/sr], of which scattering alone has this one there.
   static double pdf(const Mixture& mixture, const Vec3d& w, double scattered);
   // Of directions of one glare.
@@ -81,10 +82,10 @@ class MirroredLight {
     double width = 0, albedo = 0;  // of the lobe
     bool infinite = false;         // the light is
     Vec3d light;                   // its center, or the unit direction towards it
-    double size = 0;               // radius of a sphere around it; at infinity the sine of its angle
-    std::optional<size_t> lamp;    // which of all lights it is; none: a patch
-    double irradiance = 0;         // across it, at the part's center
-    double light_in_part = 0;      // how much of it falls on the part
+    double size = 0;             // radius of a sphere around it; at infinity the sine of its angle
+    std::optional<size_t> lamp;  // which of all lights it is; none: a patch
+    double irradiance = 0;       // across it, at the part's center
+    double light_in_part = 0;    // how much of it falls on the part
   };
   struct FlatPart;
   explicit MirroredLight(const Lights& lights) : lights_(lights) {}
@@ -95,7 +96,7 @@ class MirroredLight {
 
   const Lights& lights_;
   std::vector<Image> images_;
-  double elsewhere_ = 0;  // luminance of what else is seen, about
+  double elsewhere_ = 0;
 };
 
 // Of a vertex behind which the path scatters again; none at others.
