@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include "integrators/terms/glare_edges.h"
 #include "integrators/terms/path_follow.h"
+#include "integrators/terms/vertex_edges.h"
+#include "limn/core/parameter.h"
 #include "limn/integrators/backward.h"
 #include "support/block_runs.h"
 #include "support/environment_maps.h"
@@ -143,7 +146,7 @@ TEST(MirroredLight, ChangesNoMean) {
     const auto mirrored = MirroredLight::make(scene, lights);
     RunningMean means[2], squares[2];
     Rng rng(5, 0, 0);
-    for (int i = 0; i < 40000; ++i) {
+    for (int i = 0; i < 200000; ++i) {
       const Point at(scene, *tracer, {1.6 * rng.uniform() - 0.8, 0.2 + 1.6 * rng.uniform(), 0.9},
                      {0, 0, -1});
       for (const bool on : {false, true}) {
@@ -275,6 +278,81 @@ TEST(MirroredLight, EdgesBeforeTheGlare) {
     fmt::print("squared error {:.3g}, without {:.3g}\n", squared_error(0), squared_error(1));
     EXPECT_LT(3 * squared_error(0), squared_error(1)) << sun;
   }
+}
+
+// Where points of outlines are drawn before glare and where they are left out elsewhere is the same:
+// the length of all that is left out, in parts of edges, by draws and by looking everywhere. Caps of
+// two lamps overlap; a cube has sharp edges both of whose faces are seen, which are left to others.
+TEST(MirroredLight, EdgesAreDrawnWhereTheyAreLeftOut) {
+  const TempFiles files;
+  SceneParts parts;
+  const std::string second =
+      R"(  <emitter type="point"><point name="position" value="0.6, 1.3, 1.4"/>
+    <rgb name="intensity" value="6, 6, 6"/></emitter>)";
+  parts.body = square("floor", 2, -90, {0, 0, 0}, conductor("gloss", 0.05)) +
+               square("wall", 1, 0, {0, 1, -1}, diffuse("paint", "0.8, 0.7, 0.6")) +
+               obj_shape("cube", write_mesh(files, "cube.obj", cube_mesh()), true, 0.1,
+                         {0.1, 0.3, -0.5}, diffuse("clay", "0.6, 0.5, 0.4")) +
+               obj_shape("ring", write_mesh(files, "ring.obj", torus_mesh(10, 6)), true, 0.2,
+                         {0.2, 0.35, -0.45}, diffuse("soot", "0.1, 0.1, 0.1")) +
+               lamp_in_sky(0) + second;
+  Scene scene = make_scene(files, parts);
+  find_parameter(scene, "wall.translate.z").seed(scene, 0);
+  const auto tracer = make_embree_tracer(scene, 1);
+  const Lights lights(scene);
+  const PathContext context{scene, *tracer, lights};
+  TermInput input(context, 1, {1, 1, 1, 1}, edge_sampler_type("forest"), 1);
+  const auto mirrored = MirroredLight::make(scene, lights);
+  ASSERT_TRUE(mirrored);
+  const GlareEdges glare(input.edges(), input.edge_sampler(), *mirrored);
+  RunningMean drawn, left_out;
+  Rng rng(11, 0, 0);
+  int views = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const Vec3<Dual> origin{0.6 * rng.uniform() - 0.3, 0.5 + 0.6 * rng.uniform(), 0.9};
+    const Vec3<Dual> forward{0.0, 0.0, -1.0};
+    Hit hit;
+    // Bodies are below most points; what they hide is not asked.
+    if (!tracer->closest({value(origin), value(forward)}, hit) || hit.face.shape != ShapeId(1))
+      continue;
+    const auto surface = surface_on_ray<Dual>(scene, hit.face, origin, forward);
+    const Scattering<Dual> scattering(surface, -forward, scene.shading);
+    const Rgb<double> one = grey(1.0);
+    const PathVertex vertex{surface, scattering, one, {}, 0, {}, rng};
+    const EdgeQuery query = query_at(vertex);
+    GlareEdges::View view;
+    glare.list(vertex, query, view);
+    views += view.count;
+    constexpr int kSamples = 4;
+    std::vector<DirectPoint> points;
+    TermCost cost;
+    glare.draw(view, query, Rng(12, static_cast<uint64_t>(i), 0), kSamples, cost, points);
+    double length = 0, expected = 0;
+    for (const auto& [region, sample] : points) {
+      EXPECT_TRUE(glare.hold(view, query, sample));
+      length += 1 / (sample.probability * sample.pdf_t * kSamples);
+    }
+    for (uint32_t o = 0; o < input.edges().objects.size(); ++o) {
+      const EdgeMesh& mesh = input.edges().objects[o];
+      for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
+        const EdgeRef edge{ShapeId(o), EdgeId(e)};
+        if (!is_candidate(mesh, edge.edge, query.p) || is_own_edge(input.edges(), query, edge))
+          continue;
+        constexpr int kPlaces = 16;
+        for (int k = 0; k < kPlaces; ++k) {
+          const double t = (k + rng.uniform()) / kPlaces;
+          if (glare.hold(view, query, {edge, t, 1, 1})) expected += 1.0 / kPlaces;
+        }
+      }
+    }
+    drawn.add(length);
+    left_out.add(expected);
+  }
+  const double error = std::hypot(drawn.standard_error(), left_out.standard_error());
+  fmt::print("{} views: drawn {:.4f} +- {:.2g}, left out {:.4f} +- {:.2g}\n", views, drawn.mean(),
+             drawn.standard_error(), left_out.mean(), left_out.standard_error());
+  EXPECT_GT(views, 1000);
+  EXPECT_LT(std::fabs(drawn.mean() - left_out.mean()), 4.5 * error);
 }
 
 // Nothing to mirror, nothing to see it by: no share, and no image changes.
