@@ -90,11 +90,13 @@ void BoundaryTerm::add_before_glare(const PathVertex& vertex, const EdgeQuery& q
     vertex.log->push_back(
         fmt::format("  {} pieces of silhouettes before glare", view.pieces.size()));
   }
-  glare_->draw(view, query, vertex.key.at(Purpose::kGlare, vertex.bounces), samples, cost, points);
+  // Not the numbers of `direct`, whose copies begin with the first.
+  const Rng key = vertex.key.at(Purpose::kDirectCopy, 0);
+  glare_->draw(view, query, key.at(Purpose::kDirect, vertex.bounces), samples, cost, points);
   for (size_t i = 0; i < points.size(); ++i) {
     const EdgeSample& sample = points[i].sample;
     add_edge_point(context_, edges_.object(sample.edge.object), vertex, query, sample, part_,
-                   vertex.key.copy(Purpose::kGlare, static_cast<int>(i) + 1), cost, sum);
+                   key.copy(Purpose::kEdgeCopy, static_cast<int>(i)), cost, sum);
   }
 }
 

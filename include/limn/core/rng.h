@@ -29,8 +29,7 @@ enum class Purpose : uint64_t {
   kDirect,
   kDirectCopy,
   kTermRoulette,
-  kVertexSplit,
-  kGlare
+  kVertexSplit
 };
 
 // SplitMix64 started from a hash of (seed, pixel, sample): a stream for one path. `at` derives the
