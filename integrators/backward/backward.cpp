@@ -137,7 +137,7 @@ class BackwardPass {
                     ? std::make_unique<ClosedLight>(parameters_.scene(), settings.threads)
                     : nullptr),
         viewpoints_(parameters_.scene()),
-        mirrored_(closed_ ? nullptr : MirroredLight::make(parameters_.scene())),
+        mirrored_(closed_ ? nullptr : MirroredLight::make(parameters_.scene(), lights_)),
         path_{parameters_.scene(), *tracer_, lights_, closed_.get(), &viewpoints_, mirrored_.get()},
         input_(path_, 3, {1, 1, 1, 1}, method_.sampler, settings.threads),
         context_{path_, parameters_, input_.edges(),

@@ -82,7 +82,7 @@ TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> para
       lights_(scene_),
       closed_(closed ? std::make_unique<ClosedLight>(scene_, threads) : nullptr),
       viewpoints_(scene_),
-      mirrored_(closed ? nullptr : MirroredLight::make(scene_)),
+      mirrored_(closed ? nullptr : MirroredLight::make(scene_, lights_)),
       context_{scene_, *tracer_, lights_, closed_.get(), &viewpoints_, mirrored_.get()},
       camera_(scene_.camera),
       filter_(scene_.film.filter),

@@ -21,6 +21,30 @@ DirectPoint point_at(const DirectPieces::Piece& piece, double u, double times) {
 
 }  // namespace
 
+void draw_pieces(const EdgeSamplerInput& edges, const std::vector<DirectPieces::Piece>& pieces,
+                 Rng rng, int points, int samples, TermCost& cost,
+                 std::vector<DirectPoint>& drawn) {
+  const int count = points * samples;
+  cost.samples += static_cast<uint64_t>(count);
+  const double total = pieces.empty() ? 0 : pieces.back().sum;
+  if (!(total > 0)) {
+    cost.no_edge += static_cast<uint64_t>(count);
+    return;
+  }
+  const double offset = rng.uniform();
+  size_t i = 0;
+  for (int j = 0; j < count; ++j) {
+    const double target = (j + offset) / count * total;
+    while (i + 1 < pieces.size() && pieces[i].sum <= target) ++i;
+    // What is read of its edge comes in while the others are drawn.
+    const EdgeRef edge = pieces[i].piece.edge;
+    edges.object(edge.object).fetch_ends(edge.edge);
+    const double before = i == 0 ? 0 : pieces[i - 1].sum, weight = pieces[i].sum - before;
+    const double u = std::clamp((target - before) / weight, 0.0, 1.0);
+    drawn.push_back(point_at(pieces[i], u, weight / total * points));
+  }
+}
+
 void DirectEdges::list(const EdgeQuery& lamps, const EdgeQuery& patches, DirectPieces& to) const {
   static thread_local std::vector<ListedEdge> listed;
   static thread_local std::vector<EdgePiece> pieces;
@@ -56,7 +80,8 @@ bool DirectEdges::is_own_edge(uint32_t region, EdgeRef edge) const {
 void DirectEdges::draw(const DirectPieces& pieces, const Rng& key, int bounces, int samples,
                        TermCost& cost, std::vector<DirectPoint>& points) const {
   points.clear();
-  draw_others(pieces.others, key.at(Purpose::kDirect, bounces), kPoints * samples, cost, points);
+  draw_pieces(edges_, pieces.others, key.at(Purpose::kDirect, bounces), kPoints, samples, cost,
+              points);
   const auto& outlines = pieces.outlines;
   for (size_t begin = 0, end = 0; begin < outlines.size(); begin = end) {
     while (end < outlines.size() && outlines[end].region == outlines[begin].region) ++end;
@@ -64,28 +89,6 @@ void DirectEdges::draw(const DirectPieces& pieces, const Rng& key, int bounces, 
       Rng rng = key.copy(Purpose::kDirectCopy, i + 1).at(Purpose::kDirect, bounces);
       draw_outline(&outlines[begin], &outlines[begin] + (end - begin), rng.uniform(), cost, points);
     }
-  }
-}
-
-void DirectEdges::draw_others(const std::vector<DirectPieces::Piece>& pieces, Rng rng, int points,
-                              TermCost& cost, std::vector<DirectPoint>& drawn) const {
-  cost.samples += static_cast<uint64_t>(points);
-  const double total = pieces.empty() ? 0 : pieces.back().sum;
-  if (!(total > 0)) {
-    cost.no_edge += static_cast<uint64_t>(points);
-    return;
-  }
-  const double offset = rng.uniform();
-  size_t i = 0;
-  for (int j = 0; j < points; ++j) {
-    const double target = (j + offset) / points * total;
-    while (i + 1 < pieces.size() && pieces[i].sum <= target) ++i;
-    // What is read of its edge comes in while the others are drawn.
-    const EdgeRef edge = pieces[i].piece.edge;
-    edges_.object(edge.object).fetch_ends(edge.edge);
-    const double before = i == 0 ? 0 : pieces[i - 1].sum, weight = pieces[i].sum - before;
-    const double u = std::clamp((target - before) / weight, 0.0, 1.0);
-    drawn.push_back(point_at(pieces[i], u, weight / total * kPoints));
   }
 }
 

@@ -30,6 +30,11 @@ struct DirectPoint {
   EdgeSample sample;
 };
 
+// Appends to `drawn` as many points, stratified over the weights; `points` for each of `samples`.
+// Books them.
+void draw_pieces(const EdgeSamplerInput& edges, const std::vector<DirectPieces::Piece>& pieces,
+                 Rng rng, int points, int samples, TermCost& cost, std::vector<DirectPoint>& drawn);
+
 class DirectEdges {
  public:
   // All must outlive it.
@@ -46,8 +51,6 @@ class DirectEdges {
 
  private:
   bool is_own_edge(uint32_t region, EdgeRef edge) const;
-  void draw_others(const std::vector<DirectPieces::Piece>& pieces, Rng rng, int points,
-                   TermCost& cost, std::vector<DirectPoint>& drawn) const;
   // Pieces [begin, end), at the place u of each.
   void draw_outline(const DirectPieces::Piece* begin, const DirectPieces::Piece* end, double u,
                     TermCost& cost, std::vector<DirectPoint>& drawn) const;

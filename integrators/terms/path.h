@@ -137,7 +137,7 @@ class PathTracer {
   bool survives_roulette(Walk& walk) const;
   // The density of the next direction at w, of which scattering alone has this one.
   double density(const Walk& walk, const Vec3d& w, double scattered) const {
-    return c_.mirrored ? c_.mirrored->pdf(walk.mixture, w, scattered) : scattered;
+    return c_.mirrored ? MirroredLight::pdf(walk.mixture, w, scattered) : scattered;
   }
   // path_rays.h
   bool next_hit(Walk& walk);

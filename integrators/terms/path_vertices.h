@@ -54,7 +54,7 @@ inline bool PathTracer<S, Visitor>::choose_direction(Walk& walk) {
     if (walk.mixture.share == 0) return walk.scattering->sample(u1, u2);
     const double u = rng.uniform();
     return u < walk.mixture.share
-               ? c_.mirrored->sample(walk.mixture, u / walk.mixture.share, u1, u2)
+               ? MirroredLight::sample(walk.mixture, u / walk.mixture.share, u1, u2)
                : walk.scattering->sample(u1, u2);
   }();
   if (!wo) return false;

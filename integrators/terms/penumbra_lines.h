@@ -56,7 +56,7 @@ class PenumbraLines {
     const Vec3d omega = apart ? to / distance : Vec3d{};
     double pdf = apart ? vertex.scattering.pdf_solid_angle(omega) : 0;
     if (const MirroredLight* mirrored = context_.mirrored; mirrored && pdf > 0) {
-      pdf = mirrored->pdf(mirrored->mixture(vertex.surface, vertex.scattering), omega, pdf);
+      pdf = MirroredLight::pdf(mirrored->mixture(vertex.surface, vertex.scattering), omega, pdf);
     }
     const Rgb<double> f = pdf > 0 ? vertex.scattering.eval_value(omega) : Rgb<double>{};
     if (is_black(f) || !complete(*drawn, {q, pdf}, vertex.bounces + 1, rng)) {

@@ -3,8 +3,12 @@
 // apart.
 //   dL_o/dtheta  +=  sum over edges of the integral over t of dL(t) f_s(w_t) J(t) dt,
 //   J(t) = det(w_0, w_1, v) / |w|^3
-#include <algorithm>
+#include <fmt/format.h>
 
+#include <algorithm>
+#include <optional>
+
+#include "integrators/terms/glare_edges.h"
 #include "integrators/terms/term_table.h"
 #include "integrators/terms/vertex_edges.h"
 
@@ -20,15 +24,21 @@ class BoundaryTerm final : public Term {
         build_seconds_(input.edge_sampler_seconds()),
         part_{input.regions()},
         nothing_(input.warps && std::all_of(edges_.objects.begin(), edges_.objects.end(),
-                                            [](const EdgeMesh& m) { return m.edges.empty(); })) {}
+                                            [](const EdgeMesh& m) { return m.edges.empty(); })) {
+    if (context_.mirrored) glare_.emplace(edges_, sampler_, *context_.mirrored);
+  }
 
   bool uses_vertices() const override { return !nothing_; }
   void add_at_vertex(const PathVertex& vertex, int samples, TermCost& cost,
                      Rgb<Lanes>& sum) const override {
     if (is_left_out(vertex.bounces)) return;
+    static thread_local GlareEdges::View view;
     const EdgeQuery query = query_at(vertex);
+    const bool looks = glare_ && scatters_again(vertex.bounces);
+    if (looks) add_before_glare(vertex, query, samples, view, cost, sum);
     for (int i = 0; i < samples; ++i) {
-      add_sample(vertex, query, vertex.key.copy(Purpose::kEdgeCopy, i), cost, sum);
+      add_sample(vertex, query, vertex.key.copy(Purpose::kEdgeCopy, i), looks ? &view : nullptr,
+                 cost, sum);
     }
   }
 
@@ -50,25 +60,59 @@ class BoundaryTerm final : public Term {
     const int max_depth = context_.scene.max_depth;
     return part_.regions && part_.regions->hold_all() && max_depth >= 0 && bounces + 2 >= max_depth;
   }
-  void add_sample(const PathVertex& vertex, const EdgeQuery& query, const Rng& key, TermCost& cost,
-                  Rgb<Lanes>& sum) const;
+  // Whether what a direction from a vertex meets is lit by what it scatters.
+  bool scatters_again(int bounces) const {
+    const int max_depth = context_.scene.max_depth;
+    return max_depth < 0 || bounces + 2 < max_depth;
+  }
+  // view: replaced.
+  void add_before_glare(const PathVertex& vertex, const EdgeQuery& query, int samples,
+                        GlareEdges::View& view, TermCost& cost, Rgb<Lanes>& sum) const;
+  // view: what is left out, if anything.
+  void add_sample(const PathVertex& vertex, const EdgeQuery& query, const Rng& key,
+                  const GlareEdges::View* view, TermCost& cost, Rgb<Lanes>& sum) const;
 
   const PathContext& context_;
   const EdgeSamplerInput& edges_;
   const EdgeSampler& sampler_;
   double build_seconds_;
   RadiancePart part_;
-  bool nothing_;  // warped directions follow all edges
+  std::optional<GlareEdges> glare_;  // none where nothing mirrors
+  bool nothing_;                     // warped directions follow all edges
 };
 
+void BoundaryTerm::add_before_glare(const PathVertex& vertex, const EdgeQuery& query, int samples,
+                                    GlareEdges::View& view, TermCost& cost, Rgb<Lanes>& sum) const {
+  static thread_local std::vector<DirectPoint> points;
+  glare_->list(vertex, query, view);
+  if (view.count == 0) return;
+  if (vertex.log) {
+    vertex.log->push_back(
+        fmt::format("  {} pieces of silhouettes before glare", view.pieces.size()));
+  }
+  // Not the numbers of `direct`, whose copies begin with the first.
+  const Rng key = vertex.key.at(Purpose::kDirectCopy, 0);
+  glare_->draw(view, query, key.at(Purpose::kDirect, vertex.bounces), samples, cost, points);
+  for (size_t i = 0; i < points.size(); ++i) {
+    const EdgeSample& sample = points[i].sample;
+    add_edge_point(context_, edges_.object(sample.edge.object), vertex, query, sample, part_,
+                   key.copy(Purpose::kEdgeCopy, static_cast<int>(i)), cost, sum);
+  }
+}
+
 void BoundaryTerm::add_sample(const PathVertex& vertex, const EdgeQuery& query, const Rng& key,
-                              TermCost& cost, Rgb<Lanes>& sum) const {
+                              const GlareEdges::View* view, TermCost& cost, Rgb<Lanes>& sum) const {
   ++cost.samples;
   Rng rng = key.at(Purpose::kEdge, vertex.bounces);
   const std::optional<EdgeSample> drawn = sampler_.sample(query, rng);
   if (!drawn) {
     ++cost.no_edge;
     if (vertex.log) vertex.log->push_back("  edge: none found");
+    return;
+  }
+  if (view && glare_->hold(*view, query, *drawn)) {
+    ++cost.zero_weight;
+    if (vertex.log) vertex.log->push_back("  edge: before glare, left to others");
     return;
   }
   add_edge_point(context_, edges_.object(drawn->edge.object), vertex, query, *drawn, part_, key,

@@ -42,7 +42,6 @@ Lights::Lights(const Scene& scene)
   }
   if (environment_) all_.push_back(environment_);
   for (const auto& light : scene.delta_lights) all_.push_back(light.get());
-  if (all_.size() < 2) return;
   for (const auto& lamp : area_lights_) reaches_.push_back(reach_of(*lamp));
   if (environment_) {
     Reach& reach = reaches_.emplace_back();

@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include "integrators/terms/glare_edges.h"
 #include "integrators/terms/path_follow.h"
+#include "integrators/terms/vertex_edges.h"
+#include "limn/core/parameter.h"
 #include "limn/integrators/backward.h"
 #include "support/block_runs.h"
 #include "support/environment_maps.h"
@@ -31,8 +34,25 @@ std::string sun_in_sky(const TempFiles& files, double degrees, float sky = 1) {
          files.path("sun.exr") + "\"/></emitter>\n";
 }
 
+// A dim sky, and a lamp of this radius, or a point if that is 0.
+std::string lamp_in_sky(double radius) {
+  const std::string place = "name=\"center\" value=\"0.4, 1.3, 1.4\"/>";
+  const std::string lamp =
+      radius > 0 ? "<shape type=\"sphere\" id=\"lamp\"><point " + place +
+                       "<float name=\"radius\" value=\"" + std::to_string(radius) + "\"/>" +
+                       area_light("glow", "3000, 3000, 3000") + "</shape>\n"
+                 : R"(<emitter type="point" id="lamp"><point name="position" value="0.4, 1.3, 1.4"/>
+                      <rgb name="intensity" value="6, 6, 6"/></emitter>)";
+  return lamp + constant_light("sky", "0.2, 0.3, 0.4");
+}
+
+// What shines: the sun in a map, of this radius in degrees, or a lamp of this radius.
+std::string light_of(const TempFiles& files, double sun, double lamp) {
+  return sun > 0 ? sun_in_sky(files, sun) : lamp_in_sky(lamp);
+}
+
 // A wall and a body over gloss.
-Scene scene_with(const TempFiles& files, double alpha, double sun) {
+Scene scene_with(const TempFiles& files, double alpha, double sun, double lamp = 0) {
   SceneParts parts;
   parts.max_depth = 3;
   parts.origin = {0.3, 1.5, 3.5};
@@ -41,15 +61,20 @@ Scene scene_with(const TempFiles& files, double alpha, double sun) {
                square("wall", 1, 0, {0, 1, -1}, diffuse("paint", "0.8, 0.7, 0.6")) +
                obj_shape("body", write_mesh(files, "body.obj", torus_mesh(10, 6)), true, 0.5,
                          {0, 0.7, 0.1}, diffuse("clay", "0.6, 0.5, 0.4")) +
-               sun_in_sky(files, sun);
+               light_of(files, sun, lamp);
   return make_scene(files, parts);
 }
 
 struct Case {
-  double alpha, sun;  // radius [degrees]
+  double alpha, sun, lamp;  // radius of the sun [degrees], or of a lamp
+  Vec3d glare;              // as DrawsFromItsDensity sees it
 };
-// Lobes wider than the sun, and narrower.
-constexpr Case kCases[] = {{0.05, 1}, {0.02, 4}};
+// Lobes wider than the light, and narrower; a point.
+const Case kCases[] = {{0.05, 1, 0, {0.5, -0.5, 0.4}},
+                       {0.02, 4, 0, {0.5, -0.5, 0.4}},
+                       {0.05, 0, 0.02, {0.2, -2.1, 2.4}},
+                       {0.02, 0, 0.2, {0.2, -2.1, 2.4}},
+                       {0.1, 0, 0, {0.2, -2.1, 2.4}}};
 
 struct Point {
   Point(const Scene& scene, const RayTracer& tracer, const Vec3d& origin, const Vec3d& direction) {
@@ -66,10 +91,11 @@ struct Point {
 // around the glare, by draws, and by the density over directions that are uniform in the cone.
 TEST(MirroredLight, DrawsFromItsDensity) {
   const TempFiles files;
-  for (const auto& [alpha, sun] : kCases) {
-    const Scene scene = scene_with(files, alpha, sun);
+  for (const auto& [alpha, sun, lamp, glare] : kCases) {
+    const Scene scene = scene_with(files, alpha, sun, lamp);
     const auto tracer = make_embree_tracer(scene, 1);
-    const auto mirrored = MirroredLight::make(scene);
+    const Lights lights(scene);
+    const auto mirrored = MirroredLight::make(scene, lights);
     ASSERT_TRUE(mirrored);
     const Point at(scene, *tracer, {0.2, 0.8, 1}, {0, 0, -1});
     const Scattering<double> scattering(at.surface, at.wi, scene.shading);
@@ -77,8 +103,7 @@ TEST(MirroredLight, DrawsFromItsDensity) {
     EXPECT_GT(mixture.share, 0.01);
     EXPECT_LT(mixture.share, 0.5);
     mixture.share = 1;  // of the images alone
-    const Vec3d x = normalize(Vec3d{0.5, -0.5, 0.4}), y = normalize(cross(x, Vec3d{0, 0, 1})),
-                z = cross(x, y);
+    const Vec3d x = normalize(glare), y = normalize(cross(x, Vec3d{0, 0, 1})), z = cross(x, y);
     const double cone = 0.25;  // radians
     const auto functions = [&](const Vec3d& w) {
       const double u = dot(w, y) / cone, v = dot(w, z) / cone;
@@ -89,12 +114,12 @@ TEST(MirroredLight, DrawsFromItsDensity) {
     Rng rng(3, 0, 0);
     for (int i = 0; i < 400000; ++i) {
       const double u = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
-      const auto w = mirrored->sample(mixture, u, u1, u2);
+      const auto w = MirroredLight::sample(mixture, u, u1, u2);
       const auto of_draw = functions(w.value_or(-x));
       const double c = 1 - rng.uniform() * (1 - std::cos(cone)), phi = 2 * kPi * rng.uniform();
       const double s = std::sqrt(1 - c * c);
       const Vec3d other = x * c + y * (s * std::cos(phi)) + z * (s * std::sin(phi));
-      const double weight = 2 * kPi * (1 - std::cos(cone)) * mirrored->pdf(mixture, other, 0);
+      const double weight = 2 * kPi * (1 - std::cos(cone)) * MirroredLight::pdf(mixture, other, 0);
       const auto of_other = functions(other);
       for (size_t k = 0; k < drawn.size(); ++k) {
         drawn[k].add(of_draw[k]);
@@ -114,14 +139,14 @@ TEST(MirroredLight, DrawsFromItsDensity) {
 // more by paths that meet the glare by chance.
 TEST(MirroredLight, ChangesNoMean) {
   const TempFiles files;
-  for (const auto& [alpha, sun] : kCases) {
-    const Scene scene = scene_with(files, alpha, sun);
+  for (const auto& [alpha, sun, lamp, glare] : kCases) {
+    const Scene scene = scene_with(files, alpha, sun, lamp);
     const auto tracer = make_embree_tracer(scene, 1);
     const Lights lights(scene);
-    const auto mirrored = MirroredLight::make(scene);
+    const auto mirrored = MirroredLight::make(scene, lights);
     RunningMean means[2], squares[2];
     Rng rng(5, 0, 0);
-    for (int i = 0; i < 40000; ++i) {
+    for (int i = 0; i < 200000; ++i) {
       const Point at(scene, *tracer, {1.6 * rng.uniform() - 0.8, 0.2 + 1.6 * rng.uniform(), 0.9},
                      {0, 0, -1});
       for (const bool on : {false, true}) {
@@ -147,34 +172,36 @@ TEST(MirroredLight, ChangesNoMean) {
 // same directions with the same densities.
 TEST(MirroredLight, InReverse) {
   const TempFiles files;
-  const Scene scene = scene_with(files, 0.05, 1);
-  RunSettings settings;
-  settings.spp = 8;
-  settings.seed = 5;
-  settings.threads = 1;
-  GradientOptions forward_options;
-  forward_options.parameters = {"wall.rotate.y", "floor.rotate.x", "gloss.alpha"};
-  forward_options.terms = {"interior"};
-  forward_options.method = "forest";
-  const GradientResult forward = gradient(scene, forward_options, settings);
-  Image adjoint(scene.film.crop_width, scene.film.crop_height, 3);
-  for (size_t i = 0; i < adjoint.data.size(); ++i) {
-    adjoint.data[i] = static_cast<float>(Rng(8, i, 0).uniform() - 0.5);
-  }
-  BackwardOptions options;
-  options.parameters = forward_options.parameters;
-  options.terms = {"interior"};
-  options.uniform_pixels = true;
-  const BackwardResult reverse = backward(scene, adjoint, options, settings);
-  for (const ParameterGradient& p : forward.parameters) {
-    double sum = 0, size = 0;
-    for (size_t k = 0; k < adjoint.data.size(); ++k) {
-      const double one = adjoint.data[k] * p.total.mean(k);
-      sum += one;
-      size += std::fabs(one);
+  for (const bool sun : {true, false}) {
+    const Scene scene = scene_with(files, 0.05, sun ? 1 : 0, 0.02);
+    RunSettings settings;
+    settings.spp = 8;
+    settings.seed = 5;
+    settings.threads = 1;
+    GradientOptions forward_options;
+    forward_options.parameters = {"wall.rotate.y", "floor.rotate.x", "gloss.alpha"};
+    forward_options.terms = {"interior"};
+    forward_options.method = "forest";
+    const GradientResult forward = gradient(scene, forward_options, settings);
+    Image adjoint(scene.film.crop_width, scene.film.crop_height, 3);
+    for (size_t i = 0; i < adjoint.data.size(); ++i) {
+      adjoint.data[i] = static_cast<float>(Rng(8, i, 0).uniform() - 0.5);
     }
-    EXPECT_GT(size, 0);
-    EXPECT_NEAR(reverse.of(p.name).moments.mean(0), sum, 1e-11 * size) << p.name;
+    BackwardOptions options;
+    options.parameters = forward_options.parameters;
+    options.terms = {"interior"};
+    options.uniform_pixels = true;
+    const BackwardResult reverse = backward(scene, adjoint, options, settings);
+    for (const ParameterGradient& p : forward.parameters) {
+      double sum = 0, size = 0;
+      for (size_t k = 0; k < adjoint.data.size(); ++k) {
+        const double one = adjoint.data[k] * p.total.mean(k);
+        sum += one;
+        size += std::fabs(one);
+      }
+      EXPECT_GT(size, 0);
+      EXPECT_NEAR(reverse.of(p.name).moments.mean(0), sum, 1e-11 * size) << p.name;
+    }
   }
 }
 
@@ -206,21 +233,139 @@ TEST(MirroredLight, LinesFromTheSunKnowOfIt) {
                            {0.5, 0.9, 1}, diffuse("soot", "0, 0, 0")) +
                  sun_in_sky(files, 4, 0.001f);
     const Scene scene = make_scene(files, parts);
-    EXPECT_EQ(MirroredLight::make(scene) != nullptr, coarse);
+    EXPECT_EQ(MirroredLight::make(scene, Lights(scene)) != nullptr, coarse);
     found.push_back(run_blocks(scene, options, 8192, coarse));
   }
   expect_equal(found[0].parameters[0], found[1].parameters[0]);
 }
 
+// Edges before the glare are drawn by themselves, and left out elsewhere: with a floor of too many
+// faces to be looked through, edges that know nothing of the glare find the same, and have tails.
+TEST(MirroredLight, EdgesBeforeTheGlare) {
+  const TempFiles files;
+  GradientOptions options;
+  options.parameters = {"body.translate.x"};
+  options.terms = {"boundary"};
+  options.method = "silhouettes";
+  for (const bool sun : {true, false}) {
+    std::vector<GradientResult> found;
+    for (const bool coarse : {true, false}) {
+      SceneParts parts;
+      parts.max_depth = 3;
+      parts.origin = {0, 0.8, 0.6};
+      parts.target = {0, 0.8, -1};
+      parts.fov = 50;
+      parts.width = parts.height = 8;
+      Mesh mesh = grid_mesh(coarse ? 1 : 12);
+      for (Vec3f& p : mesh.positions) p = {p.x, 0, -p.y};
+      mesh = make_mesh(mesh.positions, mesh.faces);
+      parts.body = obj_shape("floor", write_mesh(files, "floor.obj", mesh), true, 2, {0, 0, 0.5},
+                             conductor("gloss", sun ? 0.1 : 0.04)) +
+                   square("wall", 2, 0, {0, 1, -1}, diffuse("paint", "0.9, 0.9, 0.9")) +
+                   obj_shape("body", write_mesh(files, "body.obj", cube_mesh()), true, 0.2,
+                             {0.2, 0.4, -0.5}, diffuse("clay", "0.7, 0.7, 0.7")) +
+                   light_of(files, sun ? 2 : 0, 0.02);
+      const Scene scene = make_scene(files, parts);
+      found.push_back(run_blocks(scene, options, 4096, coarse));
+    }
+    expect_equal(found[0].parameters[0], found[1].parameters[0]);
+    const auto squared_error = [&](int i) {
+      const Moments& total = found[i].parameters[0].total;
+      double sum = 0;
+      for (size_t k = 0; k < total.size(); ++k) sum += total.variance(k);
+      return sum;
+    };
+    fmt::print("squared error {:.3g}, without {:.3g}\n", squared_error(0), squared_error(1));
+    EXPECT_LT(3 * squared_error(0), squared_error(1)) << sun;
+  }
+}
+
+// Where points of outlines are drawn before glare and where they are left out elsewhere is the same:
+// the length of all that is left out, in parts of edges, by draws and by looking everywhere. Caps of
+// two lamps overlap; a cube has sharp edges both of whose faces are seen, which are left to others.
+TEST(MirroredLight, EdgesAreDrawnWhereTheyAreLeftOut) {
+  const TempFiles files;
+  SceneParts parts;
+  const std::string second =
+      R"(  <emitter type="point"><point name="position" value="0.6, 1.3, 1.4"/>
+    <rgb name="intensity" value="6, 6, 6"/></emitter>)";
+  parts.body = square("floor", 2, -90, {0, 0, 0}, conductor("gloss", 0.05)) +
+               square("wall", 1, 0, {0, 1, -1}, diffuse("paint", "0.8, 0.7, 0.6")) +
+               obj_shape("cube", write_mesh(files, "cube.obj", cube_mesh()), true, 0.1,
+                         {0.1, 0.3, -0.5}, diffuse("clay", "0.6, 0.5, 0.4")) +
+               obj_shape("ring", write_mesh(files, "ring.obj", torus_mesh(10, 6)), true, 0.2,
+                         {0.2, 0.35, -0.45}, diffuse("soot", "0.1, 0.1, 0.1")) +
+               lamp_in_sky(0) + second;
+  Scene scene = make_scene(files, parts);
+  find_parameter(scene, "wall.translate.z").seed(scene, 0);
+  const auto tracer = make_embree_tracer(scene, 1);
+  const Lights lights(scene);
+  const PathContext context{scene, *tracer, lights};
+  TermInput input(context, 1, {1, 1, 1, 1}, edge_sampler_type("forest"), 1);
+  const auto mirrored = MirroredLight::make(scene, lights);
+  ASSERT_TRUE(mirrored);
+  const GlareEdges glare(input.edges(), input.edge_sampler(), *mirrored);
+  RunningMean drawn, left_out;
+  Rng rng(11, 0, 0);
+  int views = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const Vec3<Dual> origin{0.6 * rng.uniform() - 0.3, 0.5 + 0.6 * rng.uniform(), 0.9};
+    const Vec3<Dual> forward{0.0, 0.0, -1.0};
+    Hit hit;
+    // Bodies are below most points; what they hide is not asked.
+    if (!tracer->closest({value(origin), value(forward)}, hit) || hit.face.shape != ShapeId(1))
+      continue;
+    const auto surface = surface_on_ray<Dual>(scene, hit.face, origin, forward);
+    const Scattering<Dual> scattering(surface, -forward, scene.shading);
+    const Rgb<double> one = grey(1.0);
+    const PathVertex vertex{surface, scattering, one, {}, 0, {}, rng};
+    const EdgeQuery query = query_at(vertex);
+    GlareEdges::View view;
+    glare.list(vertex, query, view);
+    views += view.count;
+    constexpr int kSamples = 4;
+    std::vector<DirectPoint> points;
+    TermCost cost;
+    glare.draw(view, query, Rng(12, static_cast<uint64_t>(i), 0), kSamples, cost, points);
+    double length = 0, expected = 0;
+    for (const auto& [region, sample] : points) {
+      EXPECT_TRUE(glare.hold(view, query, sample));
+      length += 1 / (sample.probability * sample.pdf_t * kSamples);
+    }
+    for (uint32_t o = 0; o < input.edges().objects.size(); ++o) {
+      const EdgeMesh& mesh = input.edges().objects[o];
+      for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
+        const EdgeRef edge{ShapeId(o), EdgeId(e)};
+        if (!is_candidate(mesh, edge.edge, query.p) || is_own_edge(input.edges(), query, edge))
+          continue;
+        constexpr int kPlaces = 16;
+        for (int k = 0; k < kPlaces; ++k) {
+          const double t = (k + rng.uniform()) / kPlaces;
+          if (glare.hold(view, query, {edge, t, 1, 1})) expected += 1.0 / kPlaces;
+        }
+      }
+    }
+    drawn.add(length);
+    left_out.add(expected);
+  }
+  const double error = std::hypot(drawn.standard_error(), left_out.standard_error());
+  fmt::print("{} views: drawn {:.4f} +- {:.2g}, left out {:.4f} +- {:.2g}\n", views, drawn.mean(),
+             drawn.standard_error(), left_out.mean(), left_out.standard_error());
+  EXPECT_GT(views, 1000);
+  EXPECT_LT(std::fabs(drawn.mean() - left_out.mean()), 4.5 * error);
+}
+
 // Nothing to mirror, nothing to see it by: no share, and no image changes.
 TEST(MirroredLight, IsNotWhereNothingMirrors) {
   const TempFiles files;
-  EXPECT_FALSE(MirroredLight::make(scene_with(files, 0.6, 1)));
+  const Scene rough = scene_with(files, 0.6, 1);
+  EXPECT_FALSE(MirroredLight::make(rough, Lights(rough)));
   const Scene scene = scene_with(files, 0.05, 1);
+  const Lights lights(scene);
   const auto tracer = make_embree_tracer(scene, 1);
   Point at(scene, *tracer, {0.2, 0.8, 1}, {0, 0, -1});
   const Scattering<double> scattering(at.surface, at.wi, scene.shading);
-  const auto mirrored = MirroredLight::make(scene);
+  const auto mirrored = MirroredLight::make(scene, lights);
   EXPECT_GT(mirrored->mixture(at.surface, scattering).share, 0);
   at.surface.p.y = -0.5;  // below the floor
   EXPECT_EQ(mirrored->mixture(at.surface, scattering).share, 0);

@@ -30,6 +30,9 @@ class Lights {
     std::array<double, 4> first{};  // of the first lights, each by itself; how many is not tuned
   };
   Place at(const Vec3d& p) const;
+  // About what a surface at p that faces a light (its number in all()) would get from it, if
+  // nothing were in the way [W / m^2, of luminance].
+  double estimate(size_t light, const Vec3d& p) const;
 
   // None: a sample of value zero (see Light::sample).
   std::optional<LightSample> sample(const Place& place, Rng& rng) const;
@@ -63,7 +66,6 @@ class Lights {
     double constant = 0;   // irradiance, alike everywhere
   };
   static Reach reach_of(const Light& lamp);
-  double estimate(size_t light, const Vec3d& p) const;
   double estimate(size_t light, const Place& place) const {
     return light < place.first.size() ? place.first[light] : estimate(light, place.p);
   }

@@ -1,0 +1,47 @@
+#pragma once
+// Edges before the glare of small lights on flat gloss (mirrored_light.h), as one point sees them.
+// A path that passes them at the glare is a hundred times as bright as others, of which the weights
+// of edge samplers know nothing. So within a cap of directions around each glare outlines are
+// listed and drawn by what they would add, and other samplers leave these out.
+#include <optional>
+#include <vector>
+
+#include "integrators/terms/bright_patches.h"
+#include "integrators/terms/direct_edges.h"
+#include "integrators/terms/mirrored_light.h"
+#include "integrators/terms/term.h"
+
+namespace limn {
+
+class GlareEdges {
+ public:
+  // All must outlive it. mirrored: not null.
+  GlareEdges(const EdgeSamplerInput& edges, const EdgeSampler& sampler,
+             const MirroredLight& mirrored)
+      : edges_(edges), sampler_(sampler), mirrored_(mirrored) {}
+
+  // What one point sees.
+  struct View {
+    int count = 0;  // of caps that hold something in motion
+    std::array<DirectionCap, MirroredLight::kMostImages> caps;
+    std::vector<DirectPieces::Piece> pieces;  // `region` is the cap
+  };
+  // Replaces what is in `view`. query: of the vertex.
+  void list(const PathVertex& vertex, const EdgeQuery& query, View& view) const;
+  // Whether points drawn from the view stand for this one, of an edge that may be seen.
+  bool hold(const View& view, const EdgeQuery& query, const EdgeSample& sample) const;
+  // Replaces what is in `points`, those that the view stands for.
+  void draw(const View& view, const EdgeQuery& query, const Rng& rng, int samples, TermCost& cost,
+            std::vector<DirectPoint>& points) const;
+
+ private:
+  Vec3d direction(const EdgeQuery& query, const EdgeSample& sample) const;
+  // The first cap that holds a direction.
+  static std::optional<uint32_t> cap_of(const View& view, const Vec3d& omega);
+
+  const EdgeSamplerInput& edges_;
+  const EdgeSampler& sampler_;
+  const MirroredLight& mirrored_;
+};
+
+}  // namespace limn
