@@ -16,6 +16,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <set>
 #include <tuple>
 
 #include "edgetree/edges/contacts.h"
@@ -43,7 +44,7 @@ class Unifier {
     find_speeds();
   }
 
-  std::vector<ContactLine> unite(const Contacts& found) {
+  TouchingMotion unite(const Contacts& found) {
     const std::span<const Contact> contacts = found.contacts;
     for (size_t begin = 0, end; begin < contacts.size(); begin = end) {
       const EdgeRef id = contacts[begin].edge;
@@ -63,7 +64,7 @@ class Unifier {
           line.near.push_back(near.face);
       }
     }
-    return std::move(lines_);
+    return {std::move(lines_), {parting_.begin(), parting_.end()}};
   }
 
  private:
@@ -219,6 +220,7 @@ class Unifier {
       lines_.push_back(contact_line(id, {mesh.position(a), mesh.position(b)}, *pressed, around));
       return false;
     }
+    add_parting(id, around);
     part.edge.rim = rim;
     part.edge.edge_class = EdgeClass::kIrregular;
     part.edge.concave = false;
@@ -234,6 +236,35 @@ class Unifier {
     const bool has_second = around[1].face.shape == id.object;
     part.edge.faces[1] = has_second ? around[1].face.face : FaceId::none();
     return true;
+  }
+
+  void add_parting(EdgeRef id, const std::vector<Neighbour>& around) {
+    const Vec3d along = normalize(position(id, 1) - position(id, 0));
+    for (size_t i = 0; i < around.size(); ++i)
+      for (size_t j = 0; j < i; ++j) {
+        const auto [first, second] = std::minmax(around[i].face.shape, around[j].face.shape);
+        if (part_from(around[i], around[j], along)) parting_.insert({first, second});
+      }
+  }
+
+  // Whether a gap opens between two faces to one side of the present, and they pass through each
+  // other to the other side: two borders that move differently across their line, or a border that
+  // moves against the plane of what has none there. What slides along that does not.
+  bool part_from(const Neighbour& a, const Neighbour& b, const Vec3d& along) const {
+    if (a.rim == b.rim) return false;
+    const Neighbour* const plain = a.rim == kNoRim ? &a : b.rim == kNoRim ? &b : nullptr;
+    for (int end = 0; end < 2; ++end) {
+      const Vec3<Lanes> apart = a.velocity[end] - b.velocity[end];
+      const Lanes normal = plain ? dot(apart, plane(plain->face).n) : Lanes{};
+      const Lanes sliding = dot(apart, along);
+      for (int i = 0; i < kLanes; ++i) {
+        double most = std::fabs(normal[i]);
+        for (int k = 0; k < 3 && !plain; ++k)
+          most = std::max(most, std::fabs(apart[k][i] - along[k] * sliding[i]));
+        if (most > 0x1.0p-20 * speeds_[i] + a.slack[i] + b.slack[i]) return true;
+      }
+    }
+    return false;
   }
 
   // Of an edge's own faces the one that stands, and of others one that it stands on.
@@ -493,14 +524,15 @@ class Unifier {
   Lanes speeds_;                                 // the largest component of a velocity
   std::map<uint32_t, std::vector<Part>> parts_;  // by object
   std::vector<ContactLine> lines_;
+  std::set<std::array<ShapeId, 2>> parting_;
   std::map<std::tuple<ShapeId, EdgeId, double>, VertexId> cuts_;
 };
 
 }  // namespace
 
-std::vector<ContactLine> unite_touching_edges(std::span<const TouchingShape> shapes,
-                                              std::span<const FacePair> pairs, const Vec3d& viewer,
-                                              int threads, std::vector<EdgeMesh>& objects) {
+TouchingMotion unite_touching_edges(std::span<const TouchingShape> shapes,
+                                    std::span<const FacePair> pairs, const Vec3d& viewer,
+                                    int threads, std::vector<EdgeMesh>& objects) {
   std::vector<const Mesh*> meshes;
   for (const TouchingShape& shape : shapes) meshes.push_back(shape.mesh);
   const Contacts found = find_contacts(objects, meshes, pairs, viewer, threads);
