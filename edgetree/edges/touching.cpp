@@ -189,7 +189,9 @@ class Unifier {
 
     Part part{id.edge, edge(id), {}, {}};
     part.edge.vertices = {vertex_at(id, t0), vertex_at(id, t1)};
-    if (around.back().own) {  // nothing touches here
+    const bool flat = edge(id).edge_class == EdgeClass::kFlat;
+    if (around.back().own || flat) {
+      if (!around.back().own) add_crossing(id, part.edge, around);
       const auto faces = before_[id.object.index()].faces_around(id.edge);
       part.faces.assign(faces.begin(), faces.end());
       part.incidences.resize(faces.size());
@@ -197,6 +199,29 @@ class Unifier {
       return;
     }
     parts_[id.object.index()].push_back(std::move(part));
+  }
+
+  // Where a plane of several faces passes through another one along their common edges, no face has
+  // corners on both sides (crossing_curves.h), and no edge is a border.
+  void add_crossing(EdgeRef id, const Edge& part, std::vector<Neighbour>& around) {
+    number_rims(around);
+    mark_planes(id, around);
+    const auto own =
+        std::find_if(around.begin(), around.end(), [](const auto& n) { return n.own; });
+    const Neighbour* other = nullptr;
+    for (Neighbour& n : around) {
+      if (n.own) n.rim = kNoRim;
+      if (n.rim != kNoRim) return;  // its edge is a border
+      const EdgeRef along{n.face.shape, n.along};
+      if (n.along.valid() && std::tuple(along.object, along.edge) < std::tuple(id.object, id.edge))
+        return;  // added by the other
+      if (!n.own && !other && !parallel(n, *own)) other = &n;
+    }
+    if (!other) return;
+    const EdgeMesh& mesh = objects_[id.object.index()];
+    const auto [a, b] = part.vertices;
+    lines_.push_back(
+        contact_line(id, {mesh.position(a), mesh.position(b)}, {&*own, other}, around));
   }
 
   // False if the part is no edge, or another one stands for it.
@@ -212,8 +237,10 @@ class Unifier {
     for (const Neighbour& n : around)
       if (n.rim == rim && stands_for(n, id)) return false;
     mark_planes(id, around);
-    if (std::none_of(around.begin(), around.end(), [&](const auto& n) { return n.rim == rim; }))
+    if (std::none_of(around.begin(), around.end(), [&](const auto& n) { return n.rim == rim; })) {
+      add_crossing(id, part.edge, around);
       return false;
+    }
     if (const auto pressed = find_pressed(id, around)) {
       const EdgeMesh& mesh = objects_[id.object.index()];
       const auto [a, b] = part.edge.vertices;
@@ -273,9 +300,9 @@ class Unifier {
   };
 
   // Where what is around comes towards the edge's own faces or leaves them: these stand on the
-  // inside of all others, or on a body whose edge is in the same place.
+  // inside of all others, or end there half sunk in them, or stand on a body whose edge is in the same place.
   std::optional<Pressed> find_pressed(EdgeRef id, const std::vector<Neighbour>& around) const {
-    auto pressed = standing_inside(around);
+    auto pressed = standing_inside(id, around);
     if (!pressed) pressed = standing_flush(id, around);
     if (!pressed) return std::nullopt;
     const auto& [own, under] = *pressed;
@@ -292,19 +319,22 @@ class Unifier {
     return length(cross(plane(a.face).n, plane(b.face).n)) <= 0x1.0p-12;  // as agree()
   }
 
-  // One face stands; others lie in one plane and have no rim.
-  std::optional<Pressed> standing_inside(const std::vector<Neighbour>& around) const {
+  // One face stands, or one on either side of the others, which lie in one plane and have no rim:
+  // then that in front of them, as the body is sunk.
+  std::optional<Pressed> standing_inside(EdgeRef id, const std::vector<Neighbour>& around) const {
     const auto under =
         std::find_if(around.begin(), around.end(), [](const auto& n) { return !n.own; });
-    const Neighbour* standing = nullptr;
+    const Vec3d x0 = position(id, 0), x1 = position(id, 1);
+    const Neighbour* standing[2] = {nullptr, nullptr};  // behind, in front
     for (const Neighbour& n : around) {
       if (!n.own && (n.rim != kNoRim || !parallel(n, *under))) return std::nullopt;
       if (!n.own || parallel(n, *under)) continue;
-      if (standing) return std::nullopt;
-      standing = &n;
+      const bool in_front = dot(plane(under->face).n, far_corner(n.face, x0, x1) - x0) > 0;
+      if (standing[in_front]) return std::nullopt;
+      standing[in_front] = &n;
     }
-    if (!standing) return std::nullopt;
-    return Pressed{standing, &*under};
+    if (!standing[0] && !standing[1]) return std::nullopt;
+    return Pressed{standing[1] ? standing[1] : standing[0], &*under};
   }
 
   // Two bodies with two faces each, one of them against one of the other's. An upright one on one

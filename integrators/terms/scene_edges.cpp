@@ -73,7 +73,7 @@ std::set<ShapePair> pressed_pairs(const EdgeSamplerInput& edges) {
   const EdgeMesh& lines = edges.objects.back();
   for (uint32_t e = 0; e < lines.edges.size(); ++e) {
     const FacesAround around = lines.around(EdgeId(e));
-    if (around.incidence(0).through) continue;
+    if (around.incidence(0).rim == kNoRim) continue;
     const auto [first, second] = std::minmax(around.faces[0].shape, around.faces[1].shape);
     pairs.insert({first, second});
   }

@@ -333,6 +333,12 @@ std::vector<Standing> standing_cases() {
                       make_mesh({{-1, 0, 0.3f}, {1, 0, -0.3f}, {1, 2, -0.3f}, {-1, 2, 0.3f}},
                                 {{0, 1, 2}, {0, 2, 3}}));
   };
+  // Half sunk: with edges in the floor, and faces above and under it.
+  const auto diamond = [](const TempFiles& files) {
+    Mesh mesh = cube_mesh();
+    for (Vec3f& x : mesh.positions) x = {1.2f * x.x + 0.4f * x.z, x.y - x.z, x.y + x.z};
+    return write_mesh(files, "thing.obj", mesh);
+  };
   const std::string sky = constant_light("sky", "0.4, 0.5, 0.7");
   const std::string lamp = square("lamp", 0.5, 90, {0.9, 2.6, 1.5}, area_light("glow", "6, 5, 4"));
   return {{"BoxUnderSun", cube, sun({0.3, -1, -0.2})},
@@ -341,6 +347,8 @@ std::vector<Standing> standing_cases() {
           {"BoxOnGloss", cube, sky, Standing::kGlossy},
           {"BoxOnBox", cube, sun({0.3, -1, -0.45}), Standing::kBox},
           {"RoofUnderSky", roof, sky},
+          {"HalfSunkUnderSky", diamond, sky},
+          {"HalfSunkUnderSun", diamond, sun({0.3, -1, -0.2})},
           {"ScreenUnderBulb", screen, bulb({0.7, 2, 1.6})}};
 }
 
