@@ -151,8 +151,8 @@ TEST(TouchingShapes, TilesThatPart) {
   };
   expect_equal(tiles(0), tiles(2e-5f), "right.translate.x", false);
   expect_equal(tiles(0), tiles(2e-5f), "left.translate.x", false);
-  expect_equal(tiles(0), tiles(2e-5f), "right.translate.y");
-  expect_equal(tiles(0), tiles(2e-5f), "right.rotate.y");
+  expect_equal(tiles(0), tiles(2e-5f), "right.translate.y", false);
+  expect_equal(tiles(0), tiles(2e-5f), "right.rotate.y", false);
   expect_equal(tiles(0), tiles(2e-5f), "sensor.translate.x");
 }
 
