@@ -174,7 +174,6 @@ class ContactFinder {
       for (uint32_t o = 0; o < objects_.size(); ++o)
         for (uint32_t e = 0; e < objects_[o].edges.size(); ++e) {
           const Edge& edge = objects_[o].edges[e];
-          if (edge.edge_class == EdgeClass::kFlat) continue;
           visit(first_face_[o] + edge.faces[0].index(), EdgeRef{ShapeId(o), EdgeId(e)});
         }
     };
@@ -209,7 +208,10 @@ class ContactFinder {
     for (uint32_t i = edge_offsets_[f]; i < edge_offsets_[f + 1]; ++i) {
       const EdgeRef id = edges_[i];
       const Segment s = segment(id);
+      const bool flat = objects_[id.object.index()].edge(id.edge).edge_class == EdgeClass::kFlat;
+      if (flat && length(cross(plane(first).n, plane(other).n)) <= 0x1.0p-12) continue;
       const bool near =
+          !flat &&
           is_near(id, s, std::max(reach(id, s), reach_of(mesh, other.face, viewer_)), other);
       const bool touching = may_touch(id, s, size(id), other);
       if (near || touching) pairs.push_back({id, other, touching, near});

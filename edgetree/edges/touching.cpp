@@ -16,6 +16,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <set>
 #include <tuple>
 
 #include "edgetree/edges/contacts.h"
@@ -43,7 +44,7 @@ class Unifier {
     find_speeds();
   }
 
-  std::vector<ContactLine> unite(const Contacts& found) {
+  TouchingMotion unite(const Contacts& found) {
     const std::span<const Contact> contacts = found.contacts;
     for (size_t begin = 0, end; begin < contacts.size(); begin = end) {
       const EdgeRef id = contacts[begin].edge;
@@ -63,7 +64,7 @@ class Unifier {
           line.near.push_back(near.face);
       }
     }
-    return std::move(lines_);
+    return {std::move(lines_), {parting_.begin(), parting_.end()}};
   }
 
  private:
@@ -188,7 +189,9 @@ class Unifier {
 
     Part part{id.edge, edge(id), {}, {}};
     part.edge.vertices = {vertex_at(id, t0), vertex_at(id, t1)};
-    if (around.back().own) {  // nothing touches here
+    const bool flat = edge(id).edge_class == EdgeClass::kFlat;
+    if (around.back().own || flat) {
+      if (!around.back().own) add_crossing(id, part.edge, around);
       const auto faces = before_[id.object.index()].faces_around(id.edge);
       part.faces.assign(faces.begin(), faces.end());
       part.incidences.resize(faces.size());
@@ -196,6 +199,29 @@ class Unifier {
       return;
     }
     parts_[id.object.index()].push_back(std::move(part));
+  }
+
+  // Where a plane of several faces passes through another one along their common edges, no face has
+  // corners on both sides (crossing_curves.h), and no edge is a border.
+  void add_crossing(EdgeRef id, const Edge& part, std::vector<Neighbour>& around) {
+    number_rims(around);
+    mark_planes(id, around);
+    const auto own =
+        std::find_if(around.begin(), around.end(), [](const auto& n) { return n.own; });
+    const Neighbour* other = nullptr;
+    for (Neighbour& n : around) {
+      if (n.own) n.rim = kNoRim;
+      if (n.rim != kNoRim) return;  // its edge is a border
+      const EdgeRef along{n.face.shape, n.along};
+      if (n.along.valid() && std::tuple(along.object, along.edge) < std::tuple(id.object, id.edge))
+        return;  // added by the other
+      if (!n.own && !other && !parallel(n, *own)) other = &n;
+    }
+    if (!other) return;
+    const EdgeMesh& mesh = objects_[id.object.index()];
+    const auto [a, b] = part.vertices;
+    lines_.push_back(
+        contact_line(id, {mesh.position(a), mesh.position(b)}, {&*own, other}, around));
   }
 
   // False if the part is no edge, or another one stands for it.
@@ -211,14 +237,17 @@ class Unifier {
     for (const Neighbour& n : around)
       if (n.rim == rim && stands_for(n, id)) return false;
     mark_planes(id, around);
-    if (std::none_of(around.begin(), around.end(), [&](const auto& n) { return n.rim == rim; }))
+    if (std::none_of(around.begin(), around.end(), [&](const auto& n) { return n.rim == rim; })) {
+      add_crossing(id, part.edge, around);
       return false;
+    }
     if (const auto pressed = find_pressed(id, around)) {
       const EdgeMesh& mesh = objects_[id.object.index()];
       const auto [a, b] = part.edge.vertices;
       lines_.push_back(contact_line(id, {mesh.position(a), mesh.position(b)}, *pressed, around));
       return false;
     }
+    add_parting(id, around);
     part.edge.rim = rim;
     part.edge.edge_class = EdgeClass::kIrregular;
     part.edge.concave = false;
@@ -236,15 +265,44 @@ class Unifier {
     return true;
   }
 
+  void add_parting(EdgeRef id, const std::vector<Neighbour>& around) {
+    const Vec3d along = normalize(position(id, 1) - position(id, 0));
+    for (size_t i = 0; i < around.size(); ++i)
+      for (size_t j = 0; j < i; ++j) {
+        const auto [first, second] = std::minmax(around[i].face.shape, around[j].face.shape);
+        if (part_from(around[i], around[j], along)) parting_.insert({first, second});
+      }
+  }
+
+  // Whether a gap opens between two faces to one side of the present, and they pass through each
+  // other to the other side: two borders that move differently across their line, or a border that
+  // moves against the plane of what has none there. What slides along that does not.
+  bool part_from(const Neighbour& a, const Neighbour& b, const Vec3d& along) const {
+    if (a.rim == b.rim) return false;
+    const Neighbour* const plain = a.rim == kNoRim ? &a : b.rim == kNoRim ? &b : nullptr;
+    for (int end = 0; end < 2; ++end) {
+      const Vec3<Lanes> apart = a.velocity[end] - b.velocity[end];
+      const Lanes normal = plain ? dot(apart, plane(plain->face).n) : Lanes{};
+      const Lanes sliding = dot(apart, along);
+      for (int i = 0; i < kLanes; ++i) {
+        double most = std::fabs(normal[i]);
+        for (int k = 0; k < 3 && !plain; ++k)
+          most = std::max(most, std::fabs(apart[k][i] - along[k] * sliding[i]));
+        if (most > 0x1.0p-20 * speeds_[i] + a.slack[i] + b.slack[i]) return true;
+      }
+    }
+    return false;
+  }
+
   // Of an edge's own faces the one that stands, and of others one that it stands on.
   struct Pressed {
     const Neighbour *standing, *under;
   };
 
   // Where what is around comes towards the edge's own faces or leaves them: these stand on the
-  // inside of all others, or on a body whose edge is in the same place.
+  // inside of all others, or end there half sunk in them, or stand on a body whose edge is in the same place.
   std::optional<Pressed> find_pressed(EdgeRef id, const std::vector<Neighbour>& around) const {
-    auto pressed = standing_inside(around);
+    auto pressed = standing_inside(id, around);
     if (!pressed) pressed = standing_flush(id, around);
     if (!pressed) return std::nullopt;
     const auto& [own, under] = *pressed;
@@ -261,19 +319,22 @@ class Unifier {
     return length(cross(plane(a.face).n, plane(b.face).n)) <= 0x1.0p-12;  // as agree()
   }
 
-  // One face stands; others lie in one plane and have no rim.
-  std::optional<Pressed> standing_inside(const std::vector<Neighbour>& around) const {
+  // One face stands, or one on either side of the others, which lie in one plane and have no rim:
+  // then that in front of them, as the body is sunk.
+  std::optional<Pressed> standing_inside(EdgeRef id, const std::vector<Neighbour>& around) const {
     const auto under =
         std::find_if(around.begin(), around.end(), [](const auto& n) { return !n.own; });
-    const Neighbour* standing = nullptr;
+    const Vec3d x0 = position(id, 0), x1 = position(id, 1);
+    const Neighbour* standing[2] = {nullptr, nullptr};  // behind, in front
     for (const Neighbour& n : around) {
       if (!n.own && (n.rim != kNoRim || !parallel(n, *under))) return std::nullopt;
       if (!n.own || parallel(n, *under)) continue;
-      if (standing) return std::nullopt;
-      standing = &n;
+      const bool in_front = dot(plane(under->face).n, far_corner(n.face, x0, x1) - x0) > 0;
+      if (standing[in_front]) return std::nullopt;
+      standing[in_front] = &n;
     }
-    if (!standing) return std::nullopt;
-    return Pressed{standing, &*under};
+    if (!standing[0] && !standing[1]) return std::nullopt;
+    return Pressed{standing[1] ? standing[1] : standing[0], &*under};
   }
 
   // Two bodies with two faces each, one of them against one of the other's. An upright one on one
@@ -493,14 +554,15 @@ class Unifier {
   Lanes speeds_;                                 // the largest component of a velocity
   std::map<uint32_t, std::vector<Part>> parts_;  // by object
   std::vector<ContactLine> lines_;
+  std::set<std::array<ShapeId, 2>> parting_;
   std::map<std::tuple<ShapeId, EdgeId, double>, VertexId> cuts_;
 };
 
 }  // namespace
 
-std::vector<ContactLine> unite_touching_edges(std::span<const TouchingShape> shapes,
-                                              std::span<const FacePair> pairs, const Vec3d& viewer,
-                                              int threads, std::vector<EdgeMesh>& objects) {
+TouchingMotion unite_touching_edges(std::span<const TouchingShape> shapes,
+                                    std::span<const FacePair> pairs, const Vec3d& viewer,
+                                    int threads, std::vector<EdgeMesh>& objects) {
   std::vector<const Mesh*> meshes;
   for (const TouchingShape& shape : shapes) meshes.push_back(shape.mesh);
   const Contacts found = find_contacts(objects, meshes, pairs, viewer, threads);

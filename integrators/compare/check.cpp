@@ -316,11 +316,14 @@ class Checker {
         const double excess = std::fabs(score.value) - 0.5 * most;
         return normal_p_value(std::max(0.0, excess / error)) >= kCheckStageLevel;
       };
+      const Score& sum = bend->sum;
       const bool explained =
-          explains(std::fabs(bend->value), std::hypot(score.error, 0.5 * bend->error));
+          explains(std::fabs(sum.value), std::hypot(score.error, 0.5 * sum.error));
       // What is no bend passes for one, and so forgives an error, with the level of the check.
-      if (explained && std::fabs(bend->z) >= surely) return true;
-      if (!explains(std::fabs(bend->value) + surely * bend->error, score.error)) return false;
+      if (explained && std::fabs(sum.z) >= surely) return true;
+      double most = std::fabs(sum.value) + surely * sum.error;
+      if (at_kink) most = std::max(most, bend->most + surely * bend->most_error);
+      if (!explains(most, score.error)) return false;
     }
     // Where there is a kink, it need not be shown again, but must not be too small.
     return at_kink;

@@ -51,22 +51,30 @@ std::vector<Moments::Batch> bend_of_blocks(const Scene& scene, const std::string
 
 }  // namespace
 
-std::optional<Score> find_bend(const Scene& scene, const std::string& name, double step,
-                               const Windows& windows, const std::vector<double>& weights,
-                               const RunSettings& settings) {
+std::optional<Bend> find_bend(const Scene& scene, const std::string& name, double step,
+                              const Windows& windows, const std::vector<double>& weights,
+                              const RunSettings& settings) {
   const auto batches = bend_of_blocks(scene, name, step, windows.fine(), settings);
   const std::vector<double> of_blocks = windows.spread(weights);
-  Moments moments(1);
+  Moments moments(1), single(windows.size());
   for (const Moments::Batch& batch : batches) {
     double sum = 0;
     for (size_t i = 0; i < of_blocks.size(); ++i) sum += of_blocks[i] * batch.sums[i];
     moments.add_batch({sum}, batch.samples);
+    single.add_batch(windows.gather(batch.sums), batch.samples);
   }
   if (moments.batches() < 2) return std::nullopt;
-  Score bend;
-  bend.value = moments.mean(0);
-  bend.error = std::sqrt(moments.variance(0));
-  if (bend.value != 0) bend.z = normal_from_student(bend.value / bend.error, moments.batches() - 1);
+  Bend bend;
+  bend.sum.value = moments.mean(0);
+  bend.sum.error = std::sqrt(moments.variance(0));
+  if (bend.sum.value != 0)
+    bend.sum.z = normal_from_student(bend.sum.value / bend.sum.error, moments.batches() - 1);
+  double variance = 0;
+  for (size_t k = 0; k < weights.size(); ++k) {
+    bend.most += std::fabs(weights[k] * single.mean(k));
+    variance += weights[k] * weights[k] * single.variance(k);
+  }
+  bend.most_error = std::sqrt(variance);
   return bend;
 }
 

@@ -10,12 +10,18 @@
 
 namespace limn {
 
-// The slope after the parameter's value minus the slope before it, in a weighted sum of windows
-// (Score::value, error and z), from one-sided differences over 2 step and step. What grows in
-// proportion to the step is taken off: an image that is curved does not bend. weights: one for each
-// window. None if the run was interrupted.
-std::optional<Score> find_bend(const Scene& scene, const std::string& parameter, double step,
-                               const Windows& windows, const std::vector<double>& weights,
-                               const RunSettings& settings);
+struct Bend {
+  Score sum;  // of a weighted sum of windows
+  // The sum of the bends of single windows without their signs: what parts in several places may
+  // bend one up and another down.
+  double most = 0, most_error = 0;
+};
+
+// The slope after the parameter's value minus the slope before it, from one-sided differences over
+// 2 step and step. What grows in proportion to the step is taken off: an image that is curved does
+// not bend. weights: one for each window. None if the run was interrupted.
+std::optional<Bend> find_bend(const Scene& scene, const std::string& parameter, double step,
+                              const Windows& windows, const std::vector<double>& weights,
+                              const RunSettings& settings);
 
 }  // namespace limn

@@ -2,6 +2,7 @@
 #include "integrators/terms/camera_edges.h"
 
 #include "integrators/terms/edge_jump.h"
+#include "integrators/terms/film_lines.h"
 
 namespace limn {
 namespace {
@@ -57,9 +58,23 @@ CameraEdges::CameraEdges(const PathContext& context, const EdgeSamplerInput& inp
   const Stopwatch watch;
   for (uint32_t o = 0; o < input_.objects.size(); ++o) add_object(ShapeId(o));
   for (uint32_t c = 0; c < clips_.size(); ++c) add_clip(c);
+  const bool any = std::find(moves_.begin(), moves_.end(), true) != moves_.end();
+  if (any && !visible) {  // regions know which is before which
+    const std::vector<bool> in_line = find_edges_in_line(edges_, context.scene.camera);
+    for (size_t e = 0; e < edges_.size(); ++e) edges_[e].in_line = in_line[e];
+  }
+  keep_moving();
   if (visible) keep_seen(*visible);
   weigh(free_ ? 3 : lanes);
   list_seconds_ = watch.seconds();
+}
+
+void CameraEdges::keep_moving() {
+  size_t kept = 0;
+  for (size_t e = 0; e < edges_.size(); ++e)
+    if (moves_[e]) edges_[kept++] = edges_[e];
+  edges_.resize(kept);
+  moves_ = {};
 }
 
 // Lines keep their speeds where they are cut, which change linearly along them.
@@ -116,7 +131,7 @@ void CameraEdges::add_object(ShapeId object) {
     const EdgeRef id{object, EdgeId(e)};
     FilmEdge edge;
     if (!viewpoint_.is_candidate(mesh, id.edge) || is_hidden(mesh, id.edge)) continue;
-    if (clip_and_project(id, edge)) add_if_moving(edge, faces_that_move(mesh, id.edge));
+    if (clip_and_project(id, edge)) add(edge, faces_that_move(mesh, id.edge));
   }
 }
 
@@ -138,7 +153,7 @@ void CameraEdges::add_clip(uint32_t index) {
   Vec3d side = cross(value(a) - value(camera.origin), value(b) - value(camera.origin));
   if (dot(side, clips_[index].into_view) < 0) side = -side;
   if (place_on_film(at(edge.t0), at(edge.t1), side, edge)) {
-    add_if_moving(edge, {&clips_[index].face, 1});
+    add(edge, {&clips_[index].face, 1});
   }
 }
 
@@ -258,7 +273,9 @@ bool CameraEdges::jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& 
   const EdgeMesh& mesh = input_.object(edge.id.object);
   const auto& ends = mesh.edge(edge.id.edge).vertices;
   const Vec3d y = mesh.position(ends[0]) * (1 - t) + mesh.position(ends[1]) * t;
-  const Vec3d p = value(viewpoint_.seeing(mesh.around(edge.id.edge), y).v);
+  const LightOrigin origin =
+      edge.in_line ? viewpoint_.aside(y) : viewpoint_.seeing(mesh.around(edge.id.edge), y);
+  const Vec3d p = value(origin.v);
   EdgeView view;
   if (!view_edge(mesh, edge.id, t, p, view)) return false;
   const double cosine = dot(view.omega, value(camera.forward));

@@ -23,6 +23,7 @@ struct FilmEdge {
   Lanes speed0, speed1;     // v_n there [pixels]; n points to the positive side of EdgeView::side
   double length;            // [pixels]
   std::optional<FaceRef> beside = {};  // FilmRegions::SeenPart; none: a ray tells
+  bool in_line = false;                // film_lines.h
 };
 
 // A point of one of them.
@@ -50,7 +51,8 @@ class CameraEdges {
   // free: then all that may move is listed, with the speeds of unit translations in the first three
   // lanes (relative to the camera); null: what the scene's tangents move, with their speeds in
   // `lanes` lanes. visible: of the film, to list only what is seen of edges; null: hidden parts are
-  // listed too, and found to be hidden by jump_at. Edges of faces seen edge-on: see Viewpoint.
+  // listed too, and found to be hidden by jump_at. Edges of faces seen edge-on, and edges
+  // behind others in one line: see Viewpoint.
   CameraEdges(const PathContext& context, const EdgeSamplerInput& input, int lanes,
               const FreeMotion* free = nullptr, const FilmRegions* visible = nullptr);
 
@@ -70,9 +72,10 @@ class CameraEdges {
   void add_object(ShapeId object);
   void add_clip(uint32_t index);
   // faces: that the edge moves with.
-  void add_if_moving(const FilmEdge& edge, std::span<const FaceRef> faces) {
+  void add(const FilmEdge& edge, std::span<const FaceRef> faces) {
     const bool moves = free_ ? free_->moves(faces) : !is_zero(edge.speed0) || !is_zero(edge.speed1);
-    if (moves) edges_.push_back(edge);
+    edges_.push_back(edge);
+    moves_.push_back(moves);
   }
   bool is_hidden(const EdgeMesh& mesh, EdgeId edge) const;
   bool clip_and_project(EdgeRef id, FilmEdge& edge) const;
@@ -80,6 +83,7 @@ class CameraEdges {
   Vec3<Dual> moving(const Vec3d& x, const Vec3<Lanes>& velocity) const;
   bool place_on_film(const Vec3<Dual>& x0, const Vec3<Dual>& x1, const Vec3d& side,
                      FilmEdge& edge) const;
+  void keep_moving();
   void keep_seen(const FilmRegions& visible);
   void weigh(int lanes);
 
@@ -89,6 +93,7 @@ class CameraEdges {
   const Viewpoint& viewpoint_;
   std::vector<ClipSegment> clips_;
   std::vector<FilmEdge> edges_;
+  std::vector<bool> moves_;      // of all edges, until those that do not are dropped
   DiscreteDistribution choice_;  // of an edge
   double list_seconds_ = 0;
 };

@@ -42,11 +42,12 @@ EdgeSamplerInput make_sampler_input(const Scene& scene, int threads) {
   }
   const Vec3d pinhole = value(scene.camera.origin);
   const std::vector<FacePair> pairs = find_face_pairs(meshes, pinhole, threads);
-  const std::vector<ContactLine> contacts =
+  const auto [contacts, parting] =
       unite_touching_edges(touching_shapes(scene), pairs, pinhole, threads, input.objects);
   const std::vector<CrossingSegment> crossings = find_crossings(meshes, pairs, threads);
   if (!crossings.empty() || !contacts.empty())
     input.objects.push_back(crossing_edges(meshes, crossings, contacts));
+  input.parting = parting;
   const Lights lights(scene);
   for (const Light* light : lights.all()) light->add_triangles(input.lights);
   if (!scene.environment) return input;
@@ -61,25 +62,60 @@ EdgeSamplerInput make_sampler_input(const Scene& scene, int threads) {
   return input;
 }
 
-void warn_of_contacts(const Scene& scene, const EdgeSamplerInput* edges,
-                      std::vector<std::string>& warnings) {
-  if (!edges || edges->objects.empty() || edges->objects.back().shape.valid()) return;
-  const EdgeMesh& lines = edges->objects.back();
-  std::set<std::pair<ShapeId, ShapeId>> pairs;
+namespace {
+
+using ShapePair = std::array<ShapeId, 2>;
+
+// Those of lines of contact, not of crossings.
+std::set<ShapePair> pressed_pairs(const EdgeSamplerInput& edges) {
+  std::set<ShapePair> pairs;
+  if (edges.objects.empty() || edges.objects.back().shape.valid()) return pairs;
+  const EdgeMesh& lines = edges.objects.back();
   for (uint32_t e = 0; e < lines.edges.size(); ++e) {
     const FacesAround around = lines.around(EdgeId(e));
-    if (around.incidence(0).through) continue;  // they cross
-    pairs.insert(std::minmax(around.faces[0].shape, around.faces[1].shape));
+    if (around.incidence(0).rim == kNoRim) continue;
+    const auto [first, second] = std::minmax(around.faces[0].shape, around.faces[1].shape);
+    pairs.insert({first, second});
   }
-  for (const auto& shapes : pairs) {
-    const std::string text = fmt::format(
-        "{} and {} touch, and one moves towards the other or away from it: the derivative is that "
-        "of pressing them together; apart, light comes in between, and the slope is another one "
-        "(differences take the mean of both)",
-        name_in_text(scene, shapes.first), name_in_text(scene, shapes.second));
+  return pairs;
+}
+
+std::string pair_in_text(const Scene& scene, const ShapePair& pair) {
+  const std::string first = name_in_text(scene, pair[0]);
+  if (pair[0] == pair[1]) return fmt::format("faces of {}", first);
+  return fmt::format("{} and {}", first, name_in_text(scene, pair[1]));
+}
+
+}  // namespace
+
+void warn_of_contacts(const Scene& scene, const EdgeSamplerInput* edges,
+                      std::vector<std::string>& warnings) {
+  if (!edges) return;
+  const auto warn = [&](const std::string& text) {
     if (std::find(warnings.begin(), warnings.end(), text) == warnings.end())
       warnings.push_back(text);
+  };
+  const std::set<ShapePair> pressed = pressed_pairs(*edges);
+  for (const ShapePair& pair : pressed) {
+    warn(fmt::format(
+        "{} touch, and one moves towards the other or away from it: the derivative is that of "
+        "pressing them together; apart, light comes in between, and the slope is another one "
+        "(differences take the mean of both)",
+        pair_in_text(scene, pair)));
   }
+  constexpr size_t kMost = 8;
+  size_t told = 0;
+  for (const ShapePair& pair : edges->parting) {
+    if (pressed.count(pair) || ++told > kMost) continue;
+    warn(fmt::format(
+        "{} touch along an edge and move apart or through each other: there the image has a kink, "
+        "and the derivative is that beside a hair's gap between them, which may be the slope of "
+        "neither side (differences take the mean of both); farther apart, or moved together, there "
+        "is no kink",
+        pair_in_text(scene, pair)));
+  }
+  if (told > kMost)
+    warn(fmt::format("{} more pairs of shapes touch and part like that", told - kMost));
 }
 
 }  // namespace limn

@@ -148,8 +148,10 @@ bool Viewpoint::sees_edge_on(const FacesAround& around) const {
 }
 
 LightOrigin Viewpoint::seeing(const FacesAround& around, const Vec3d& y) const {
-  return sees_edge_on(around) ? aside(y, kAside) : origin_;
+  return sees_edge_on(around) ? aside(y) : origin_;
 }
+
+LightOrigin Viewpoint::aside(const Vec3d& y) const { return aside(y, kAside); }
 
 LightOrigin Viewpoint::hardly_aside(const Vec3d& y) const { return aside(y, kHardly); }
 

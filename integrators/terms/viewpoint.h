@@ -18,7 +18,8 @@ inline constexpr double kEdgeOn = 0x1p-18;
 // no ray can tell: a step aside shows one of them, or the face between them. So there the image has
 // a kink. Edges of such faces are looked at from a little aside, the same way for all, if it can be
 // on that side where the faces are seen from behind, so that their own bodies hide them. What comes
-// of it is the derivative as it is on that side: where the edges are and how fast they move is as
+// of it is the derivative as it is on that side (so are edges that lie behind others in one line,
+// film_lines.h): where the edges are and how fast they move is as
 // seen from the viewpoint itself.
 class Viewpoint {
  public:
@@ -35,6 +36,8 @@ class Viewpoint {
   // The viewpoint, or, if a face around the edge is seen edge-on, that aside of it: by 2^-12 of the
   // distance of y, a point of the edge; at infinity by 2^-12 rad.
   LightOrigin seeing(const FacesAround& around, const Vec3d& y) const;
+  // That aside of it, for y.
+  LightOrigin aside(const Vec3d& y) const;
   // Where light is looked for from y, a point beside an edge, and where shadows of y are cast from,
   // if the edge is that of no face seen edge-on: as little aside as floats can tell, by 2^-15 of
   // the distance. So wherever a shadow ends along an edge of what it falls on, all terms have it

@@ -184,7 +184,8 @@ TEST(FacesEdgeOnWarning, NamesTheViewpoint) {
 }
 
 // Where the shadow of a plate ends along an edge of what it falls on, or out of sight behind the
-// plate, and the same with the light so far beside, on the side that counts.
+// plate, or the camera sees edges in one line, and the same with the light or the camera so far
+// beside, on the side that counts.
 struct AlongEdge {
   std::string name;
   std::vector<std::string> parameters;
@@ -254,7 +255,16 @@ std::vector<AlongEdge> along_edge_cases() {
                          square("upper", 0.5, -90, {0.2, 1, -0.5}, "<ref id=\"black\"/>") +
                          bulb_through(1.5, {0, 0.5, 0.5}, {0, 0, 1}, beside));
   };
-  return {{"Border", {"plate.translate.z", "sensor.translate.z"}, border(-0.5, 0.5)},
+  const auto rims = [=](const TempFiles& files, double beside) {
+    const auto sheet = [](const std::string& id, double z) {
+      return square(id, 0.5, 0, {0, 0.5, z}, diffuse(id + "_paint", "0.6, 0.4, 0.5"));
+    };
+    return seen_from(files, Vec3d{0.3, 1, 4} + kSide * beside,
+                     sheet("front", 0.5) + sheet("back", -1) + floor(3) +
+                         constant_light("sky", "0.4, 0.5, 0.7"));
+  };
+  return {{"Rims", {"sensor.translate.y", "front.translate.y", "back.translate.y"}, rims},
+          {"Border", {"plate.translate.z", "sensor.translate.z"}, border(-0.5, 0.5)},
           {"BorderOn", {"plate.translate.z", "bulb.translate.y"}, border(0.5, 0.5)},
           {"BorderNear", {"plate.translate.z", "floor.translate.y"}, border(-0.5, 0.02)},
           {"Wall", {"plate.translate.z", "wall.translate.z"}, wall},
@@ -265,9 +275,9 @@ std::vector<AlongEdge> along_edge_cases() {
           {"Stack", {"plate.translate.z", "upper.translate.z"}, stack}};
 }
 
-class ShadowsAlongEdges : public testing::TestWithParam<AlongEdge> {};
+class AlongEdges : public testing::TestWithParam<AlongEdge> {};
 
-TEST_P(ShadowsAlongEdges, AreThoseOfALightBeside) {
+TEST_P(AlongEdges, AsFromBeside) {
   const TempFiles files;
   const auto run = [&](double beside) {
     return run_blocks(GetParam().scene(files, beside), GetParam().parameters, 256,
@@ -278,7 +288,7 @@ TEST_P(ShadowsAlongEdges, AreThoseOfALightBeside) {
     expect_equal(at.parameters[p], beside.parameters[p]);
 }
 
-TEST_P(ShadowsAlongEdges, InReverse) {
+TEST_P(AlongEdges, InReverse) {
   const TempFiles files;
   BackwardOptions options;
   options.parameters = GetParam().parameters;
@@ -292,7 +302,7 @@ TEST_P(ShadowsAlongEdges, InReverse) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(, ShadowsAlongEdges, testing::ValuesIn(along_edge_cases()),
+INSTANTIATE_TEST_SUITE_P(, AlongEdges, testing::ValuesIn(along_edge_cases()),
                          [](const auto& c) { return c.param.name; });
 
 // A thing that stands on a floor ends where it touches it. Pressed together or drawn apart they
@@ -323,6 +333,12 @@ std::vector<Standing> standing_cases() {
                       make_mesh({{-1, 0, 0.3f}, {1, 0, -0.3f}, {1, 2, -0.3f}, {-1, 2, 0.3f}},
                                 {{0, 1, 2}, {0, 2, 3}}));
   };
+  // Half sunk: with edges in the floor, and faces above and under it.
+  const auto diamond = [](const TempFiles& files) {
+    Mesh mesh = cube_mesh();
+    for (Vec3f& x : mesh.positions) x = {1.2f * x.x + 0.4f * x.z, x.y - x.z, x.y + x.z};
+    return write_mesh(files, "thing.obj", mesh);
+  };
   const std::string sky = constant_light("sky", "0.4, 0.5, 0.7");
   const std::string lamp = square("lamp", 0.5, 90, {0.9, 2.6, 1.5}, area_light("glow", "6, 5, 4"));
   return {{"BoxUnderSun", cube, sun({0.3, -1, -0.2})},
@@ -331,6 +347,8 @@ std::vector<Standing> standing_cases() {
           {"BoxOnGloss", cube, sky, Standing::kGlossy},
           {"BoxOnBox", cube, sun({0.3, -1, -0.45}), Standing::kBox},
           {"RoofUnderSky", roof, sky},
+          {"HalfSunkUnderSky", diamond, sky},
+          {"HalfSunkUnderSun", diamond, sun({0.3, -1, -0.2})},
           {"ScreenUnderBulb", screen, bulb({0.7, 2, 1.6})}};
 }
 
@@ -388,6 +406,35 @@ TEST_P(StandsOnAFloor, InReverse) {
 
 INSTANTIATE_TEST_SUITE_P(, StandsOnAFloor, testing::ValuesIn(standing_cases()),
                          [](const auto& c) { return c.param.name; });
+
+// Sheets whose common edges part, or pass through each other, are told of, as long as they do.
+TEST(PartingSheets, AreToldOf) {
+  const TempFiles files;
+  const auto run = [&](const std::string& parameter) {
+    SceneParts parts;
+    parts.origin = {0.6, 1.8, 3.4};
+    const auto tile = [](const std::string& id, double x) {
+      return square(id, 0.5, -90, {x, 0, 0}, diffuse(id + "_clay", "0.5, 0.4, 0.3"));
+    };
+    parts.body = tile("left", -0.5) + tile("right", 0.5) +
+                 square("wall", 0.5, 0, {-0.5, 0.5, -0.5}, diffuse("paint", "0.3, 0.5, 0.6")) +
+                 square("shelf", 0.25, -90, {0.5, 0.3, 0}, diffuse("wood", "0.6, 0.4, 0.2")) +
+                 constant_light("sky", "0.4, 0.5, 0.7");
+    return run_blocks(make_scene(files, parts), {parameter}, 1, 0);
+  };
+  for (const char* parameter : {"right.translate.x", "right.translate.y", "right.rotate.y",
+                                "wall.translate.y", "left.rotate.y", "left.scale"}) {
+    const GradientResult r = run(parameter);
+    EXPECT_TRUE(r.at_kink) << parameter;
+    ASSERT_FALSE(r.warnings.empty()) << parameter;
+    EXPECT_NE(r.warnings[0].find("touch along an edge"), std::string::npos) << r.warnings[0];
+  }
+  for (const char* parameter : {"shelf.translate.x", "sensor.translate.x", "right.translate.z"}) {
+    const GradientResult r = run(parameter);
+    EXPECT_FALSE(r.at_kink) << parameter;
+    EXPECT_TRUE(r.warnings.empty()) << parameter << ": " << r.warnings[0];
+  }
+}
 
 }  // namespace
 }  // namespace limn

@@ -151,6 +151,8 @@ TEST(TouchingShapes, TilesThatPart) {
   };
   expect_equal(tiles(0), tiles(2e-5f), "right.translate.x", false);
   expect_equal(tiles(0), tiles(2e-5f), "left.translate.x", false);
+  expect_equal(tiles(0), tiles(2e-5f), "right.translate.y", false);
+  expect_equal(tiles(0), tiles(2e-5f), "right.rotate.y", false);
   expect_equal(tiles(0), tiles(2e-5f), "sensor.translate.x");
 }
 
@@ -187,6 +189,33 @@ TEST(TouchingShapes, BoxesThatSinkByAMillionth) {
   }
   whole.add("box", box(0.25f, 1.25f), "clay");
   expect_equal(apart.scene(), whole.scene(), "sensor.translate.x");
+}
+
+// Where a surface passes through another one exactly along edges of it that are none, as its faces
+// lie in one plane: rows of a box, a seam of tiles.
+TEST(TouchingShapes, CrossingAlongSeams) {
+  Stage rows, whole, tiles, floor;
+  std::vector<Quad> halves;
+  for (const auto& [c, a, b] : kCube) {
+    if (a.y == 0 && b.y == 0) {
+      halves.push_back({c, a, b});
+      continue;
+    }
+    const Vec3f up = a.y == 0 ? b : a, along = a.y == 0 ? a : b;
+    for (const Vec3f& corner : {c, c + up * 0.5f})
+      halves.push_back(a.y == 0 ? Quad{corner, along, up * 0.5f} : Quad{corner, up * 0.5f, along});
+  }
+  for (Stage* stage : {&rows, &whole}) stage->add("floor", {kFloor}, "white");
+  rows.add("box", halves, "clay", 0.5, {0.15, 0, 0.2});
+  whole.add("box", kCube, "clay", 0.5, {0.15, 0, 0.2});
+  for (const char* parameter : {"sensor.translate.x", "box.translate.x", "box.rotate.y"})
+    expect_equal(rows.scene(), whole.scene(), parameter);
+  const Quad wall{{-2, -1, -1}, {4, 0, 0}, {0, 2, 0}};
+  for (Stage* stage : {&tiles, &floor}) stage->add("wall", {wall}, "clay");
+  tiles.add("front", {{{-3, 0, 3}, {6, 0, 0}, {0, 0, -4}}}, "white");
+  tiles.add("back", {{{-3, 0, -1}, {6, 0, 0}, {0, 0, -2}}}, "white");
+  floor.add("floor", {kFloor}, "white");
+  expect_equal(tiles.scene(), floor.scene(), "sensor.translate.y");
 }
 
 // A sphere whose seam and poles are copies that differ by a rounding.

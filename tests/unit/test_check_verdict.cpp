@@ -152,6 +152,36 @@ TEST(CheckVerdict, ContactIsNoError) {
   EXPECT_EQ(r.verdict, Verdict::kCannotTell);
 }
 
+// A wall between two others that slides along itself: a gap opens at one end as it goes there, at
+// the other end as it comes back.
+TEST(CheckVerdict, SheetsThatPartAreNoError) {
+  const TempFiles files;
+  const auto side = [](const std::string& id, double angle, double x, const std::string& grey) {
+    return fmt::format(R"(<shape type="rectangle" id="{}"><transform name="to_world">
+                          <scale x="1" y="0.5"/><rotate y="1" angle="{}"/>
+                          <translate x="{}" y="0.5"/></transform>)",
+                       id, angle, x) +
+           diffuse(id + "_paint", grey) + "</shape>";
+  };
+  SceneParts parts;
+  parts.origin = {0.6, 1.8, 3.4};
+  parts.target = {0, 0.2, 0};
+  parts.width = parts.height = 24;
+  parts.body =
+      square("floor", 2, -90, {0, 0, 0}, diffuse("chalk", "0.8, 0.8, 0.8")) +
+      R"(<shape type="rectangle" id="back"><transform name="to_world"><scale x="1" y="0.5"/>
+         <translate y="0.5" z="-1"/></transform><bsdf type="diffuse"/></shape>)" +
+      side("left", 90, -1, "0.5, 0.3, 0.3") + side("right", -90, 1, "0.8, 0.8, 0.8") +
+      constant_light("sky", "0.4, 0.5, 0.7");
+  CheckOptions options;
+  options.parameter = "back.translate.x";
+  RunSettings settings;
+  settings.spp = 256;
+  const CheckResult r = check(make_scene(files, parts), options, settings);
+  EXPECT_LT(r.p, kCheckStageLevel);
+  EXPECT_EQ(r.verdict, Verdict::kCannotTell);
+}
+
 // A camera in the plane of a lamp, both at rest, forgives no defect elsewhere, not even one that
 // the bends' noise would leave open at a kink.
 TEST(CheckVerdict, FacesEdgeOnAtRestForgiveNothing) {

@@ -65,6 +65,8 @@ struct EdgeSample {
 struct EdgeSamplerInput {
   // Of the scene's shapes, in their order; then the curves where they cross, if any.
   std::vector<EdgeMesh> objects;
+  // Pairs of shapes that touch and part, see TouchingMotion.
+  std::vector<std::array<ShapeId, 2>> parting = {};
   std::vector<LightTriangle> lights = {};
   double environment_luminance = 0;  // mean over the sphere
   // How it is spread over directions; null if it is uniform or absent.

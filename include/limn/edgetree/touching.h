@@ -1,5 +1,6 @@
 #pragma once
 // Edges that touch faces or edges of any shape of a scene, united.
+#include <array>
 #include <span>
 #include <vector>
 
@@ -16,6 +17,12 @@ struct TouchingShape {
   uint32_t look = 0;
 };
 
+// What touches and moves differently.
+struct TouchingMotion {
+  std::vector<ContactLine> pressed;
+  std::vector<std::array<ShapeId, 2>> parting;  // ascending; twice the same: a shape from itself
+};
+
 // Rewrites the edges of all objects (object i is shape i, as build_edge_mesh made it) so that edges
 // in one place are one edge, and every edge knows all faces that touch it:
 //  - an edge is split where faces that it lies on begin and end: at ends of other edges that run
@@ -27,12 +34,14 @@ struct TouchingShape {
 // Parts on which one face stands on the inside of others, or on another body edge on edge, where
 // these come towards it or leave it, are left out of the objects and returned: contact that
 // tightens (ContactLine). Contact that loosens would open a gap, in which the light is another one.
+// Other shapes whose common edges part, or pass through each other, as they move are named: there
+// the image has a kink, and each rim keeps what it would add beside a gap (touching.cpp).
 // What touches is decided to the rounding of positions (edges/contacts.h). An edge also gets the
 // faces that do not touch it and are nearer to it than a ray in floats can tell, if it comes from
 // `viewer` (the camera) or from no farther away: FacesAround::near. Where nothing is so near
 // nothing changes. pairs: of the shapes' faces, from find_face_pairs with the same viewer.
-std::vector<ContactLine> unite_touching_edges(std::span<const TouchingShape> shapes,
-                                              std::span<const FacePair> pairs, const Vec3d& viewer,
-                                              int threads, std::vector<EdgeMesh>& objects);
+TouchingMotion unite_touching_edges(std::span<const TouchingShape> shapes,
+                                    std::span<const FacePair> pairs, const Vec3d& viewer,
+                                    int threads, std::vector<EdgeMesh>& objects);
 
 }  // namespace limn
