@@ -52,14 +52,18 @@ VisibilityEstimator::VisibilityEstimator(const Scene& scene, const RunSettings& 
       camera_(scene.camera) {
   const bool direct = options.what == RenderWhat::kImage;
   check_options(options, method.by_lines);
+  const bool chooses = method.chooses && options.tolerance == 0;
+  std::shared_ptr<const Environment> sky = scene.environment;
+  if (chooses && direct && sky) split_ = split_environment(*sky);
+  if (split_) sky = split_->rest;
   if (method.by_lines) {
     const LineOptions lines{options.lines, options.tolerance};
-    lines_ = std::make_unique<LineLight>(scene, *tracer_, settings.threads, lines, direct);
+    lines_ = std::make_unique<LineLight>(scene, *tracer_, settings.threads, lines, direct, sky);
   } else if (direct) {
     check_direct_light(scene, method.name);
   }
   if (direct) add_lamps();
-  if (!method.chooses || options.tolerance > 0) {
+  if (!chooses) {
     plan_ = fixed_plan(method.by_lines);
     return;
   }
@@ -74,9 +78,12 @@ VisibilityEstimator::VisibilityEstimator(const Scene& scene, const RunSettings& 
 }
 
 std::vector<VisibilityPart> VisibilityEstimator::parts() const {
-  if (options_.what != RenderWhat::kImage || lamps_.empty()) return {VisibilityPart::kSky};
-  if (!scene_.environment) return {VisibilityPart::kLamps};
-  return {VisibilityPart::kLamps, VisibilityPart::kSky};
+  if (options_.what != RenderWhat::kImage) return {VisibilityPart::kSky};
+  std::vector<VisibilityPart> parts;
+  if (!lamps_.empty() || !scene_.environment) parts.push_back(VisibilityPart::kLamps);
+  if (split_) parts.push_back(VisibilityPart::kPatches);
+  if (scene_.environment) parts.push_back(VisibilityPart::kSky);
+  return parts;
 }
 
 VisibilityPlan VisibilityEstimator::fixed_plan(bool by_lines) const {
@@ -237,17 +244,22 @@ Rgb<double> VisibilityEstimator::by_lines(const Seen& seen) const {
 Rgb<double> VisibilityEstimator::by_rays(const Seen& seen) const {
   const Point& point = seen.point;
   const int count = point.rays;
-  const bool sky = point.has(VisibilityPart::kSky) &&
-                   (options_.what != RenderWhat::kImage || scene_.environment);
+  const Environment* sky = scene_.environment.get();
+  if (split_) {
+    const bool patches = point.part == VisibilityPart::kPatches;
+    sky = patches ? split_->patches.get() : split_->rest.get();
+  }
+  const bool looks_up = point.part != VisibilityPart::kLamps &&
+                        (options_.what != RenderWhat::kImage || sky != nullptr);
   const size_t end = point.has(VisibilityPart::kLamps) ? lamps_.size() + 1 : 1;
   Rgb<double> sum;
   for (int k = 0; k < count; ++k) {
     const Rng key = even(point, point.seed_of_look, point.number * count + k);
     // The sky and every lamp have points of their own.
-    for (size_t i = sky ? 0 : 1; i < end; ++i) {
+    for (size_t i = looks_up ? 0 : 1; i < end; ++i) {
       Rng rng = key.at(Purpose::kEmitter, i);
       const double u1 = rng.uniform(), u2 = rng.uniform();
-      sum += i == 0 ? sky_ray(seen, u1, u2) : lamp_ray(lamps_[i - 1], seen, u1, u2);
+      sum += i == 0 ? sky_ray(sky, seen, u1, u2) : lamp_ray(lamps_[i - 1], seen, u1, u2);
     }
   }
   return sum * (1.0 / count);
@@ -263,7 +275,8 @@ bool VisibilityEstimator::is_open(const Seen& seen, const Vec3d& direction) cons
 
 // Uniform over the half sphere for openness, by the cosine for the rest, but for maps, by which
 // they go themselves.
-Rgb<double> VisibilityEstimator::sky_ray(const Seen& seen, double u1, double u2) const {
+Rgb<double> VisibilityEstimator::sky_ray(const Environment* sky, const Seen& seen, double u1,
+                                         double u2) const {
   const double phi = 2 * kPi * u2;
   const auto around = [&](const Vec3d& n, double z) {
     const double r = std::sqrt(std::fmax(0.0, 1 - z * z));
@@ -275,22 +288,21 @@ Rgb<double> VisibilityEstimator::sky_ray(const Seen& seen, double u1, double u2)
   if (options_.what == RenderWhat::kAmbientOcclusion) {
     return grey(is_open(seen, around(seen.n, std::sqrt(u1))) ? 1.0 : 0.0);
   }
-  const Environment& sky = *scene_.environment;
   Vec3d direction;
   double pdf;
-  if (sky.is_uniform()) {
+  if (sky->is_uniform()) {
     const double z = std::sqrt(u1);
     direction = around(seen.scattering.normal(), z);
     pdf = z / kPi;
   } else {
-    const auto drawn = sky.sample_direction(u1, u2);
+    const auto drawn = sky->sample_direction(u1, u2);
     direction = drawn.direction;
     pdf = drawn.pdf;
   }
   if (!(pdf > 0)) return {};
   const Rgb<double> f = seen.scattering.eval(direction);
   if (is_black(f) || !is_open(seen, direction)) return {};
-  return f * sky.radiance(direction) * (1 / pdf);
+  return f * sky->radiance(direction) * (1 / pdf);
 }
 
 // Uniform over the lamp's area.

@@ -8,6 +8,7 @@
 #include "integrators/methods/visibility_plan.h"
 #include "integrators/terms/camera_path.h"
 #include "integrators/terms/line_light.h"
+#include "integrators/terms/split_environment.h"
 #include "limn/core/camera.h"
 #include "limn/integrators/render.h"
 
@@ -65,13 +66,15 @@ class VisibilityEstimator final : public SampleEstimator {
   Rgb<double> by_lines(const Seen& seen) const;
   Rgb<double> by_rays(const Seen& seen) const;
   Rgb<double> lamp_ray(const RayLamp& lamp, const Seen& seen, double u1, double u2) const;
-  Rgb<double> sky_ray(const Seen& seen, double u1, double u2) const;
+  // sky: of an image.
+  Rgb<double> sky_ray(const Environment* sky, const Seen& seen, double u1, double u2) const;
   bool is_open(const Seen& seen, const Vec3d& direction) const;
 
   const Scene& scene_;
   std::unique_ptr<RayTracer> tracer_;
   uint64_t seed_;
   RenderOptions options_;
+  std::optional<SplitEnvironment> split_;
   std::unique_ptr<LineLight> lines_;  // null: by rays alone
   std::vector<RayLamp> lamps_;
   CameraView<double> camera_;

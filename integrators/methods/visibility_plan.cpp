@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "limn/core/parallel.h"
 
@@ -27,6 +28,7 @@ constexpr int kCell = 8;  // the side of a cell [pixels]; not tuned
 // Rays of a look in the pilot; its points are as many as take the time of the two looks by lines,
 // within these. Not tuned.
 constexpr int kPilotRays = 4;
+constexpr double kPatchCost = 512;  // in place of that time where there are no lines
 constexpr double kFewestPoints = 32, kMostPilotPoints = 1024;
 constexpr std::array<int, 4> kRays = {1, 2, 4, 8};  // that a point may have
 // Means are over windows of 5 by 5 and 9 by 9 cells: the few edges that make most of what a pilot by
@@ -153,7 +155,10 @@ class Pilot {
 
   Figures look_at(const PixelSample& at, VisibilityPart part) const {
     Figures result;
-    {
+    if (part == VisibilityPart::kPatches) {
+      result.lines = std::numeric_limits<double>::infinity();
+      result.line_cost = kPatchCost;
+    } else {
       const VisibilityProbe a = probe_(at, part, 0, 0, 0, -1), b = probe_(at, part, 0, 0, 1, 0),
                             c = probe_(at, part, 0, 0, 2, 1);
       result.lines = square(a.value + c.value - b.value * 2) / 6;

@@ -14,8 +14,9 @@ namespace limn {
 // What of an image has points of the film of its own.
 enum class VisibilityPart {
   kAll,
-  kLamps,  // and what shines at the camera
-  kSky,    // what surfaces scatter of the environment, or how open it is
+  kLamps,    // and what shines at the camera
+  kPatches,  // what surfaces scatter of small bright patches of the environment: by rays
+  kSky       // of all else of it, or how open it is
 };
 
 struct VisibilityLook {

@@ -258,17 +258,17 @@ void LineLight::check_overlaps(int threads) const {
 }
 
 LineLight::LineLight(const Scene& scene, const RayTracer& tracer, int threads,
-                     const LineOptions& options, bool direct)
-    : scene_(scene), contours_(scene, tracer, threads), options_(options) {
+                     const LineOptions& options, bool direct,
+                     std::shared_ptr<const Environment> sky)
+    : scene_(scene), contours_(scene, tracer, threads), options_(options), sky_(std::move(sky)) {
   if (!direct) return;
   check(scene);
   for (const Shape& shape : scene.shapes) {
     if (shape.is_emitter) add_lamp(shape);
   }
   if (has_lamps()) check_overlaps(threads);
-  const Environment* sky = scene.environment.get();
-  if (!sky || !sky->grid()) return;
-  columns_ = std::make_unique<RadianceColumns>(*sky, threads);
+  if (!sky_ || !sky_->grid()) return;
+  columns_ = std::make_unique<RadianceColumns>(*sky_, threads);
   std::vector<double> brightness = columns_->brightness();
   for (int k = 0; k < 2; ++k) {
     warps_.emplace_back(brightness);
@@ -397,7 +397,7 @@ Rgb<double> LineLight::sky_light(const Receiver& receiver, double offset) const 
   const Vec3d planes[] = {at.up, receiver.n};
   const Pencil pencil = pencil_around(pole_between(at.up, receiver.n));
   const int w = contours_.count(at, pencil.pole, nullptr);
-  const Rgb<double> radiance = scene_.environment->radiance(at.up);
+  const Rgb<double> radiance = sky_->radiance(at.up);
   if (receiver.plain) {
     const double sum =
         sum_over_lines<double>(at, pencil, planes, w, nullptr, options_.lines, offset,
@@ -444,7 +444,7 @@ Rgb<double> LineLight::map_light(const Receiver& receiver, double offset) const 
   }
   // What interpolated normals see is the cosine but for a narrow ramp at their horizon, and for all
   // of it where they are bent.
-  const Environment& sky = *scene_.environment;
+  const Environment& sky = *sky_;
   const double row = kPi / (grid.rows - 1);
   const auto piece = [&](const Isolines::Line& line, const Place& a, const Place& b) {
     const auto meridian = columns_->meridian(line.r);
@@ -533,7 +533,7 @@ Rgb<double> LineLight::lamps(const SurfacePoint<double>& surface,
 
 Rgb<double> LineLight::environment(const SurfacePoint<double>& surface,
                                    const Scattering<double>& scattering, double offset) const {
-  if (!scene_.environment) return {};
+  if (!sky_) return {};
   const Receiver receiver = receiver_at(surface, scattering);
   list(receiver.at, {}, nullptr);
   return columns_ ? map_light(receiver, offset) : sky_light(receiver, offset);

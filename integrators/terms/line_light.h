@@ -37,9 +37,10 @@ struct LineWork {
 class LineLight {
  public:
   // The scene and its tracer must outlive it. direct: whether lamps() and environment() are to be
-  // asked; InputError where check() says so, and for lamps that lie in one place.
+  // asked; InputError where check() says so, and for lamps that lie in one place. sky: what
+  // environment() is to integrate, the scene's own or a part of it; none: nothing.
   LineLight(const Scene& scene, const RayTracer& tracer, int threads, const LineOptions& options,
-            bool direct);
+            bool direct, std::shared_ptr<const Environment> sky);
 
   // InputError, with the place in the scene's file and what to do, for a scene whose direct light
   // lines do not know: delta lights, BSDFs that are not diffuse, interpolated normals after
@@ -95,6 +96,7 @@ class LineLight {
   Contours contours_;
   LineOptions options_;
   std::vector<Lamp> lamps_;
+  std::shared_ptr<const Environment> sky_;
   std::unique_ptr<RadianceColumns> columns_;  // of a map
   // Lines from its pole, and from the opposite one, dense where it is bright.
   std::vector<AzimuthWarp> warps_;
