@@ -389,7 +389,7 @@ TEST(LineLight, AgreesWithRaysAndPaths) {
     expect_alike(lines, run(scene, "path", 512), c.name + ", path");
     const RenderResult rays = run(scene, "rays", 64);
     expect_alike(lines, rays, c.name + ", rays");
-    expect_alike(run(scene, "silhouettes", 32), rays, c.name + ", silhouettes");
+    expect_alike(run(scene, "silhouettes", 64), rays, c.name + ", silhouettes");
   }
   for (const RenderWhat what : {RenderWhat::kAmbientOcclusion, RenderWhat::kOpenness}) {
     for (const bool smooth : {false, true}) {
