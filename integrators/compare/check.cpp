@@ -222,6 +222,7 @@ class Checker {
     gradient_options.block = fine_;
     gradient_options.samples = options_.samples;
     gradient_options.warp = options_.warp;
+    gradient_options.exact_film = options_.exact_film;
     return gradient_options;
   }
 
@@ -385,7 +386,9 @@ class Checker {
 CheckResult check(const Scene& scene, const CheckOptions& options, const RunSettings& settings,
                   const GradientRun& run) {
   const MethodType& method = find_method(options.method);
-  if (method.check) method.check(scene);  // before the search for a step
+  // Before the search for a step.
+  if (method.check) method.check(scene);
+  if (options.exact_film) check_exact_film(scene, method.name);
   check_warp(options.warp, {method.name});
   return Checker(scene, options, settings, run).check();
 }

@@ -13,10 +13,19 @@ namespace {
 
 constexpr int kReferenceRuns = 8;  // whose differences tell their error; not tuned
 
+// The exact film is for those that take it.
+RenderOptions with_method(RenderOptions options, const std::string& name) {
+  options.method = name;
+  for (const RenderMethod& method : render_methods()) {
+    if (method.name == name && method.looks_around) options.exact_film = false;
+  }
+  return options;
+}
+
 // Set-up and one sample of one pixel: InputError if the method does not know the scene.
-void try_method(const Scene& scene, const RunSettings& settings, RenderOptions options,
+void try_method(const Scene& scene, const RunSettings& settings, const RenderOptions& given,
                 const std::string& method) {
-  options.method = method;
+  const RenderOptions options = with_method(given, method);
   RunSettings one = settings;
   one.progress = nullptr;
   const NonFinite::Place corner{scene.film.crop_x, scene.film.crop_y, 0, ""};
@@ -62,9 +71,7 @@ class ImageComparer {
            options_.methods.begin();
   }
 
-  RenderResult one(const std::string& method, double seconds, uint64_t number) {
-    RenderOptions options = options_.render;
-    options.method = method;
+  RenderResult one(const RenderOptions& options, double seconds, uint64_t number) {
     RunSettings settings = settings_;
     settings.spp = 1 << 30;
     settings.seconds = seconds;
@@ -80,8 +87,10 @@ class ImageComparer {
     result_.non_finite.merge(result.non_finite);
     for (const std::string& warning : result.warnings) {
       const auto& told = result_.warnings;
-      if (std::find(told.begin(), told.end(), method + ": " + warning) != told.end()) continue;
-      result_.warnings.push_back(method + ": " + warning);
+      const std::string line = options.method + ": " + warning;
+      if (std::find(told.begin(), told.end(), line) == told.end()) {
+        result_.warnings.push_back(line);
+      }
     }
     done_ += seconds;
     return result;
@@ -89,9 +98,10 @@ class ImageComparer {
 
   bool make_reference() {
     std::vector<std::vector<double>> runs;
+    RenderOptions options = with_method(options_.render, result_.reference_method);
+    options.exact_film = false;
     for (int k = 0; k < kReferenceRuns; ++k) {
-      const RenderResult run =
-          one(result_.reference_method, options_.reference_seconds / kReferenceRuns, k);
+      const RenderResult run = one(options, options_.reference_seconds / kReferenceRuns, k);
       if (stopped()) return false;
       runs.push_back(means(run.radiance));
       result_.reference_spp += static_cast<int>(run.spp);
@@ -110,7 +120,8 @@ class ImageComparer {
     std::vector<std::vector<double>> errors(rows.size());
     for (int repeat = 0; repeat < options_.repeats; ++repeat) {
       for (size_t m = 0; m < rows.size(); ++m) {
-        const RenderResult run = one(options_.methods[m], time, ++number_);
+        const RenderResult run =
+            one(with_method(options_.render, options_.methods[m]), time, ++number_);
         if (stopped()) break;
         rows[m].image = means(run.radiance);
         rows[m].seconds += run.seconds;

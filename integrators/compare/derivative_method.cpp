@@ -14,7 +14,8 @@ class TableMethod final : public DerivativeMethod {
   std::string description() const override { return type_.description; }
 
   MethodRun run(const RunSettings& settings) override {
-    GradientResult result = gradient(input_.scene, input_.options(type_), settings);
+    const GradientOptions options = input_.options(type_);
+    GradientResult result = gradient(input_.scene, options, settings);
     MethodRun run;
     run.image = means(result.parameters[0].total);
     run.blocks = block_sums(result);
@@ -27,6 +28,7 @@ class TableMethod final : public DerivativeMethod {
     }
     run.non_finite = result.non_finite;
     settings_ = std::move(result.settings);
+    if (options.exact_film) settings_.push_back({"film", "exact"});
     return run;
   }
 
@@ -49,6 +51,7 @@ GradientOptions MethodInput::options(const MethodType& method) const {
   options.step = step;
   if (method.warps) options.warp = warp;
   options.block = block;
+  options.exact_film = exact_film && method.terms_can_be_left_out;
   return options;
 }
 

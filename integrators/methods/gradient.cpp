@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "integrators/methods/hair_gaps.h"
+#include "integrators/terms/film_regions.h"
 #include "limn/core/error.h"
 #include "limn/core/names.h"
 #include "limn/core/parameter.h"
@@ -24,10 +25,7 @@ void check_shading(const Scene& scene, GradientResult& result) {
 }
 
 void check_selection(const MethodType& method, const Scene& scene, const GradientOptions& options) {
-  if (options.exact_film && !method.terms_can_be_left_out) {
-    throw InputError("the exact film is for methods that sample edges on it: the method \"" +
-                     method.name + "\" does not");
-  }
+  if (options.exact_film) check_exact_film(scene, method.name);
   if (method.check) method.check(scene);
   check_warp(options.warp, {method.name});
   if (options.terms.empty() || method.terms_can_be_left_out) return;
@@ -52,6 +50,15 @@ void identify(const MethodType& method, const Scene& scene, const GradientOption
 }
 
 }  // namespace
+
+void check_exact_film(const Scene& scene, const std::string& name) {
+  const MethodType& method = find_method(name);
+  if (!method.terms_can_be_left_out) {
+    throw InputError("the exact film is for methods that sample edges on it: the method \"" +
+                     method.name + "\" does not");
+  }
+  FilmRegions::check(scene.film);
+}
 
 bool SampleCounts::operator==(const SampleCounts& other) const {
   for (size_t t = 0; t < std::max(size(), other.size()); ++t) {

@@ -17,7 +17,8 @@ namespace {
 constexpr RenderMethod kMethods[] = {
     {"path", "paths, with light and BSDF samples", false},
     {"analytic", "direct light of flat lamps on diffuse surfaces in closed form", true},
-    {"silhouettes", "direct light and open sky, by lines between silhouettes", false, true, true},
+    {"silhouettes", "as lines, and as rays where these are better", false, true, true, true},
+    {"lines", "direct light and open sky, by lines between silhouettes", false, true, true},
     {"rays", "direct light and open sky, by quasi-random rays", false, true},
 };
 
@@ -44,8 +45,7 @@ std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSet
     if (options.exact_film) {
       throw InputError(fmt::format("--film exact: not with the method \"{}\"", options.method));
     }
-    return std::make_unique<VisibilityEstimator>(scene, settings.threads, settings.seed,
-                                                 method.by_lines, options);
+    return std::make_unique<VisibilityEstimator>(scene, settings, method, options);
   }
   if (options.what != RenderWhat::kImage) {
     throw InputError(

@@ -1,4 +1,4 @@
-// One point of the film and what is seen from there, by lines or by rays.
+// The points of a pixel and what is seen from there, by lines or by rays.
 #include "integrators/methods/visibility_estimator.h"
 
 #include <fmt/format.h>
@@ -13,9 +13,17 @@
 namespace limn {
 namespace {
 
-// Points of the film for lamps for one for the sky, where there are both. Not tuned.
+// By lines alone: points of the film for lamps for one for the sky, where there are both. Lines
+// through the sky take the time of some tens of those through lamps, while most of what is left to
+// the film is the rims of shadows of lamps. Not tuned.
 constexpr int kLampPoints = 16;
 constexpr int kMostRays = 1 << 20;
+// What a pilot counts, in units of a ray (0.17 us): a point of the film besides its ray, and
+// LineWork, as fitted to the times of the points of cad.xml, plant.xml, sun.xml, soft_shadow.xml and
+// soft_lamp.xml; means over each of these come out within a quarter.
+constexpr double kPointCost = 1.5, kListCost = 12, kArcCost = 0.7, kCrossingCost = 1.8,
+                 kEvaluationCost = 0.45;
+constexpr uint64_t kPilotSeed = 0x9170;
 
 void check_options(const RenderOptions& options, bool by_lines) {
   const auto check = [](const char* name, auto value, auto least, auto most) {
@@ -35,23 +43,85 @@ void check_options(const RenderOptions& options, bool by_lines) {
 
 }  // namespace
 
-VisibilityEstimator::VisibilityEstimator(const Scene& scene, int threads, uint64_t seed,
-                                         bool by_lines, const RenderOptions& options)
+VisibilityEstimator::VisibilityEstimator(const Scene& scene, const RunSettings& settings,
+                                         const RenderMethod& method, const RenderOptions& options)
     : scene_(scene),
-      tracer_(make_embree_tracer(scene, threads)),
-      seed_(seed),
+      tracer_(make_embree_tracer(scene, settings.threads)),
+      seed_(settings.seed),
       options_(options),
       camera_(scene.camera),
       filter_(scene.film.filter) {
   const bool direct = options.what == RenderWhat::kImage;
-  check_options(options, by_lines);
-  if (by_lines) {
+  check_options(options, method.by_lines);
+  const bool chooses = method.chooses && options.tolerance == 0;
+  std::shared_ptr<const Environment> sky = scene.environment;
+  if (chooses && direct && sky) split_ = split_environment(*sky);
+  if (split_) sky = split_->rest;
+  if (method.by_lines) {
     const LineOptions lines{options.lines, options.tolerance};
-    lines_ = std::make_unique<LineLight>(scene, *tracer_, threads, lines, direct);
+    lines_ = std::make_unique<LineLight>(scene, *tracer_, settings.threads, lines, direct, sky);
   } else if (direct) {
-    check_direct_light(scene, "rays");
-    add_lamps();
+    check_direct_light(scene, method.name);
   }
+  if (direct) add_lamps();
+  if (!chooses) {
+    plan_ = fixed_plan(method.by_lines);
+    return;
+  }
+  const std::vector<VisibilityPart> all = parts();
+  plan_ = plan_visibility(
+      scene.film, all, settings.threads, settings.interrupted,
+      [&](const PixelSample& at, VisibilityPart part, int rays, uint64_t number, uint64_t replicate,
+          double reach) {
+        const uint64_t seed = mix_bits(seed_ + kPilotSeed);
+        return probe({at, part, number, rays, part == all[0], seed, seed + replicate, reach});
+      });
+}
+
+std::vector<VisibilityPart> VisibilityEstimator::parts() const {
+  if (options_.what != RenderWhat::kImage) return {VisibilityPart::kSky};
+  std::vector<VisibilityPart> parts;
+  if (!lamps_.empty() || !scene_.environment) parts.push_back(VisibilityPart::kLamps);
+  if (split_) parts.push_back(VisibilityPart::kPatches);
+  if (scene_.environment) parts.push_back(VisibilityPart::kSky);
+  return parts;
+}
+
+VisibilityPlan VisibilityEstimator::fixed_plan(bool by_lines) const {
+  VisibilityPlan plan;
+  const Film& film = scene_.film;
+  plan.grid.x0 = film.crop_x, plan.grid.y0 = film.crop_y;
+  plan.grid.cell = std::max(film.crop_width, film.crop_height);
+  if (!by_lines) {
+    plan.parts = {VisibilityPart::kAll};
+    plan.looks = {{options_.rays, 1}};
+    return plan;
+  }
+  plan.parts = parts();
+  plan.looks.assign(plan.parts.size(), {});
+  if (plan.parts.size() > 1) plan.looks[0].points = kLampPoints;
+  return plan;
+}
+
+VisibilityProbe VisibilityEstimator::probe(const Point& point) const {
+  const LineWork before = LineLight::work();
+  RayCount rays;
+  VisibilityProbe result;
+  const FilmPosition film = place(point);
+  result.x = film.x, result.y = film.y;
+  try {
+    result.value = film_point(point, nullptr, rays);
+  } catch (const UntraceableRay&) {
+    // The run itself tells of it.
+  }
+  const LineWork& after = LineLight::work();
+  result.point_cost = kPointCost + static_cast<double>(rays.closest);
+  result.cost = result.point_cost + static_cast<double>(rays.shadow) +
+                kListCost * static_cast<double>(after.lists - before.lists) +
+                kArcCost * static_cast<double>(after.arcs - before.arcs) +
+                kCrossingCost * static_cast<double>(after.crossings - before.crossings) +
+                kEvaluationCost * static_cast<double>(after.evaluations - before.evaluations);
+  return result;
 }
 
 void VisibilityEstimator::add_lamps() {
@@ -75,7 +145,7 @@ void VisibilityEstimator::add_pixels(std::span<const KeyedSample> samples, Sampl
     Rgb<double> radiance;
     bool failed = false;
     try {
-      radiance = sample(one, sink, rays);
+      radiance = sample(one.at, sink.log(), rays);
     } catch (const UntraceableRay&) {
       failed = true;
     }
@@ -89,32 +159,40 @@ void VisibilityEstimator::add_pixels(std::span<const KeyedSample> samples, Sampl
   sink.cost(0).samples += samples.size();
 }
 
-// Lines through the sky take the time of some tens of those through lamps, while most of what is
-// left to the film is the rims of shadows of lamps: so these get more points of the film.
-Rgb<double> VisibilityEstimator::sample(const KeyedSample& one, SampleSink& sink,
+Rgb<double> VisibilityEstimator::sample(const PixelSample& at, SampleLog* log,
                                         RayCount& rays) const {
-  const PixelSample& at = one.at;
-  const bool split =
-      lines_ && lines_->has_lamps() && scene_.environment && options_.what == RenderWhat::kImage;
-  if (!split) return film_point(at, at.s, Part::kAll, sink, rays);
-  Rgb<double> sum;
-  for (int k = 0; k < kLampPoints; ++k) {
-    sum += film_point(at, at.s * kLampPoints + k, Part::kNoSky, sink, rays);
+  Rgb<double> all;
+  for (size_t i = 0; i < plan_.parts.size(); ++i) {
+    const VisibilityLook& look = plan_.look(at.x, at.y, i);
+    Rgb<double> sum;
+    for (int k = 0; k < look.points; ++k) {
+      const uint64_t number = at.s * look.points + k;
+      sum += film_point({at, plan_.parts[i], number, look.rays, i == 0, seed_, seed_}, log, rays);
+    }
+    all += sum * (1.0 / look.points);
   }
-  return sum * (1.0 / kLampPoints) + film_point(at, at.s, Part::kSky, sink, rays);
+  return all;
 }
 
-Rng VisibilityEstimator::even(const PixelSample& at, uint64_t number, Part part) const {
+Rng VisibilityEstimator::even(const Point& point, uint64_t seed, uint64_t number) {
+  const PixelSample& at = point.at;
   const uint64_t pixel = static_cast<uint64_t>(at.y) << 32 | static_cast<uint32_t>(at.x);
   // Beyond 2^32 points another scrambling starts.
-  const uint64_t stream = (number >> 32) * 2 + (part == Part::kSky);
-  return Rng::even(mix_bits(seed_) + stream, pixel, static_cast<uint32_t>(number));
+  const uint64_t stream = (number >> 32) * 4 + static_cast<uint64_t>(point.part);
+  return Rng::even(mix_bits(seed) + stream, pixel, static_cast<uint32_t>(number));
 }
 
-Rgb<double> VisibilityEstimator::film_point(const PixelSample& at, uint64_t number, Part part,
-                                            SampleSink& sink, RayCount& rays) const {
-  const FilmPosition film =
-      sample_pixel_filter(scene_.film, filter_, at.x, at.y, even(at, number, part));
+FilmPosition VisibilityEstimator::place(const Point& point) const {
+  const double x = point.at.x + 0.5, y = point.at.y + 0.5;
+  const FilmPosition whole = sample_pixel_filter(scene_.film, point.at.x, point.at.y,
+                                                 even(point, point.seed, point.number));
+  if (point.reach == 1) return whole;
+  return {x + point.reach * (whole.x - x), y + point.reach * (whole.y - y)};
+}
+
+Rgb<double> VisibilityEstimator::film_point(const Point& point, SampleLog* log,
+                                            RayCount& rays) const {
+  const FilmPosition film = place(point);
   const auto start = camera_.ray(film.x, film.y);
   const Vec3d origin = start.origin, direction = start.direction;
   const bool image = options_.what == RenderWhat::kImage;
@@ -122,37 +200,38 @@ Rgb<double> VisibilityEstimator::film_point(const PixelSample& at, uint64_t numb
   ++rays.closest;
   if (!tracer_->closest(camera_ray(scene_, start), hit)) {
     if (!image) return grey(1.0);
-    const bool sky = scene_.environment && !scene_.hide_emitters && part != Part::kSky;
+    const bool sky = scene_.environment && !scene_.hide_emitters && point.shows;
     return sky ? scene_.environment->radiance(direction) : Rgb<double>{};
   }
   const auto surface = surface_on_ray<double>(scene_, hit.face, origin, direction);
   const Scattering<double> scattering(surface, -direction, scene_.shading);
   const bool front = dot(surface.n_g, direction) < 0;
-  const Seen seen{surface,
-                  front ? surface.n_g : -surface.n_g,
-                  front ? surface.n_s : -surface.n_s,
-                  scattering,
-                  at,
-                  number,
-                  rays};
-  if (sink.log()) {
-    sink.log()->push_back(fmt::format("film {:.6f} {:.6f}: a point at ({:.9g}, {:.9g}, {:.9g})",
-                                      film.x, film.y, surface.p.x, surface.p.y, surface.p.z));
+  const Seen seen{
+      point,      surface, front ? surface.n_g : -surface.n_g, front ? surface.n_s : -surface.n_s,
+      scattering, rays};
+  if (log) {
+    log->push_back(fmt::format("film {:.6f} {:.6f}: a point at ({:.9g}, {:.9g}, {:.9g}), {}",
+                               film.x, film.y, surface.p.x, surface.p.y, surface.p.z,
+                               point.rays > 0 ? "by rays" : "by lines"));
   }
   Rgb<double> sum;
   if (image) {
-    if (part != Part::kSky) sum = surface.emission(-direction, scene_.shading);
+    if (point.shows) sum = surface.emission(-direction, scene_.shading);
     if (scattering.black()) return sum;
   }
-  return sum + (lines_ ? by_lines(seen, part) : by_rays(seen, part));
+  return sum + (point.rays > 0 ? by_rays(seen) : by_lines(seen));
 }
 
-Rgb<double> VisibilityEstimator::by_lines(const Seen& seen, Part part) const {
-  const double offset = even(seen.at, seen.number, part).at(Purpose::kDirect, 0).uniform();
+Rgb<double> VisibilityEstimator::by_lines(const Seen& seen) const {
+  const Point& point = seen.point;
+  const double offset =
+      even(point, point.seed_of_look, point.number).at(Purpose::kDirect, 0).uniform();
   if (options_.what == RenderWhat::kImage) {
     Rgb<double> sum;
-    if (part != Part::kSky) sum = lines_->lamps(seen.surface, seen.scattering, offset);
-    if (part != Part::kNoSky) {
+    if (point.has(VisibilityPart::kLamps)) {
+      sum = lines_->lamps(seen.surface, seen.scattering, offset);
+    }
+    if (point.has(VisibilityPart::kSky)) {
       sum += lines_->environment(seen.surface, seen.scattering, offset);
     }
     return sum;
@@ -163,17 +242,25 @@ Rgb<double> VisibilityEstimator::by_lines(const Seen& seen, Part part) const {
                   : lines_->ambient_occlusion(at, seen.n, offset));
 }
 
-Rgb<double> VisibilityEstimator::by_rays(const Seen& seen, Part part) const {
-  const int count = options_.rays;
-  const bool sky = options_.what != RenderWhat::kImage || scene_.environment;
+Rgb<double> VisibilityEstimator::by_rays(const Seen& seen) const {
+  const Point& point = seen.point;
+  const int count = point.rays;
+  const Environment* sky = scene_.environment.get();
+  if (split_) {
+    const bool patches = point.part == VisibilityPart::kPatches;
+    sky = patches ? split_->patches.get() : split_->rest.get();
+  }
+  const bool looks_up = point.part != VisibilityPart::kLamps &&
+                        (options_.what != RenderWhat::kImage || sky != nullptr);
+  const size_t end = point.has(VisibilityPart::kLamps) ? lamps_.size() + 1 : 1;
   Rgb<double> sum;
   for (int k = 0; k < count; ++k) {
-    const Rng key = even(seen.at, seen.number * count + k, part);
+    const Rng key = even(point, point.seed_of_look, point.number * count + k);
     // The sky and every lamp have points of their own.
-    for (size_t i = sky ? 0 : 1; i <= lamps_.size(); ++i) {
+    for (size_t i = looks_up ? 0 : 1; i < end; ++i) {
       Rng rng = key.at(Purpose::kEmitter, i);
       const double u1 = rng.uniform(), u2 = rng.uniform();
-      sum += i == 0 ? sky_ray(seen, u1, u2) : lamp_ray(lamps_[i - 1], seen, u1, u2);
+      sum += i == 0 ? sky_ray(sky, seen, u1, u2) : lamp_ray(lamps_[i - 1], seen, u1, u2);
     }
   }
   return sum * (1.0 / count);
@@ -189,7 +276,8 @@ bool VisibilityEstimator::is_open(const Seen& seen, const Vec3d& direction) cons
 
 // Uniform over the half sphere for openness, by the cosine for the rest, but for maps, by which
 // they go themselves.
-Rgb<double> VisibilityEstimator::sky_ray(const Seen& seen, double u1, double u2) const {
+Rgb<double> VisibilityEstimator::sky_ray(const Environment* sky, const Seen& seen, double u1,
+                                         double u2) const {
   const double phi = 2 * kPi * u2;
   const auto around = [&](const Vec3d& n, double z) {
     const double r = std::sqrt(std::fmax(0.0, 1 - z * z));
@@ -201,22 +289,21 @@ Rgb<double> VisibilityEstimator::sky_ray(const Seen& seen, double u1, double u2)
   if (options_.what == RenderWhat::kAmbientOcclusion) {
     return grey(is_open(seen, around(seen.n, std::sqrt(u1))) ? 1.0 : 0.0);
   }
-  const Environment& sky = *scene_.environment;
   Vec3d direction;
   double pdf;
-  if (sky.is_uniform()) {
+  if (sky->is_uniform()) {
     const double z = std::sqrt(u1);
     direction = around(seen.scattering.normal(), z);
     pdf = z / kPi;
   } else {
-    const auto drawn = sky.sample_direction(u1, u2);
+    const auto drawn = sky->sample_direction(u1, u2);
     direction = drawn.direction;
     pdf = drawn.pdf;
   }
   if (!(pdf > 0)) return {};
   const Rgb<double> f = seen.scattering.eval(direction);
   if (is_black(f) || !is_open(seen, direction)) return {};
-  return f * sky.radiance(direction) * (1 / pdf);
+  return f * sky->radiance(direction) * (1 / pdf);
 }
 
 // Uniform over the lamp's area.

@@ -1,11 +1,14 @@
 #pragma once
-// How open the sky is and direct light, at what a camera sees: by lines between silhouettes, or by
-// rays. All random numbers of a pixel are even (Rng::even).
+// How open the sky is and direct light, at what a camera sees: by lines between silhouettes, by
+// rays, or by what a pilot finds to be better. All random numbers of a pixel are even (Rng::even).
 #include <memory>
 #include <vector>
 
 #include "integrators/estimates/sample_estimator.h"
+#include "integrators/methods/visibility_plan.h"
+#include "integrators/terms/camera_path.h"
 #include "integrators/terms/line_light.h"
+#include "integrators/terms/split_environment.h"
 #include "limn/core/camera.h"
 #include "limn/integrators/render.h"
 
@@ -13,9 +16,9 @@ namespace limn {
 
 class VisibilityEstimator final : public SampleEstimator {
  public:
-  // The scene must outlive it. seed: of the run. InputError where the method does not know the
-  // scene's light, see LineLight::check, by rays check_direct_light; and for options out of range.
-  VisibilityEstimator(const Scene& scene, int threads, uint64_t seed, bool by_lines,
+  // The scene must outlive it. InputError where the method does not know the scene's light, see
+  // LineLight::check, by rays check_direct_light; and for options out of range.
+  VisibilityEstimator(const Scene& scene, const RunSettings& settings, const RenderMethod& method,
                       const RenderOptions& options);
 
   const Scene& scene() const override { return scene_; }
@@ -28,13 +31,23 @@ class VisibilityEstimator final : public SampleEstimator {
   int64_t missed() const { return lines_ ? lines_->missed() : 0; }
 
  private:
-  // What one point sees.
+  // A point of the film: which of a pixel's, what of the light it is for, and by what numbers.
+  struct Point {
+    PixelSample at;
+    VisibilityPart part;
+    uint64_t number;  // among the pixel's of this part
+    int rays;         // 0: by lines
+    bool shows;       // what shines at the camera belongs to it
+    uint64_t seed, seed_of_look;
+    double reach = 1;  // from the pixel's center, of the way to where it would be
+    bool has(VisibilityPart p) const { return part == p || part == VisibilityPart::kAll; }
+  };
+  // What it sees.
   struct Seen {
+    const Point& point;
     const SurfacePoint<double>& surface;
     Vec3d up, n;  // geometric and shading normal, towards the viewer
     const Scattering<double>& scattering;
-    const PixelSample& at;
-    uint64_t number;  // of the point of the film among the pixel's
     RayCount& rays;
   };
   struct RayLamp {
@@ -42,28 +55,31 @@ class VisibilityEstimator final : public SampleEstimator {
     std::vector<double> areas;  // summed over its faces
   };
   void add_lamps();
-  // What one point of the film shows of it all; of all but light of the environment that is
-  // scattered; of that alone.
-  enum class Part { kAll, kNoSky, kSky };
-  Rgb<double> sample(const KeyedSample& at, SampleSink& sink, RayCount& rays) const;
-  Rgb<double> film_point(const PixelSample& at, uint64_t number, Part part, SampleSink& sink,
-                         RayCount& rays) const;
-  // The stream of a pixel's point of the film, or of a ray from there.
-  Rng even(const PixelSample& at, uint64_t number, Part part) const;
-  Rgb<double> by_lines(const Seen& seen, Part part) const;
-  Rgb<double> by_rays(const Seen& seen, Part part) const;
+  std::vector<VisibilityPart> parts() const;
+  VisibilityPlan fixed_plan(bool by_lines) const;
+  VisibilityProbe probe(const Point& point) const;
+  Rgb<double> sample(const PixelSample& at, SampleLog* log, RayCount& rays) const;
+  FilmPosition place(const Point& point) const;
+  Rgb<double> film_point(const Point& point, SampleLog* log, RayCount& rays) const;
+  // The stream of a point, or of a ray from there.
+  static Rng even(const Point& point, uint64_t seed, uint64_t number);
+  Rgb<double> by_lines(const Seen& seen) const;
+  Rgb<double> by_rays(const Seen& seen) const;
   Rgb<double> lamp_ray(const RayLamp& lamp, const Seen& seen, double u1, double u2) const;
-  Rgb<double> sky_ray(const Seen& seen, double u1, double u2) const;
+  // sky: of an image.
+  Rgb<double> sky_ray(const Environment* sky, const Seen& seen, double u1, double u2) const;
   bool is_open(const Seen& seen, const Vec3d& direction) const;
 
   const Scene& scene_;
   std::unique_ptr<RayTracer> tracer_;
   uint64_t seed_;
   RenderOptions options_;
-  std::unique_ptr<LineLight> lines_;  // null: by rays
+  std::optional<SplitEnvironment> split_;
+  std::unique_ptr<LineLight> lines_;  // null: by rays alone
   std::vector<RayLamp> lamps_;
   CameraView<double> camera_;
   FilterTable filter_;
+  VisibilityPlan plan_;
 };
 
 }  // namespace limn

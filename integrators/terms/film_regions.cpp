@@ -30,19 +30,19 @@ PlaneView view_of(const Camera& camera) {
   return {value(camera.origin), u, v, a, camera.near_clip, camera.far_clip};
 }
 
-void check_filter(const Film& film) {
-  if (film.filter.kind == Filter::Kind::kBox && film.filter.radius == 0.5) return;
-  throw InputError(film.where,
-                   "the exact film needs a box filter, <rfilter type=\"box\"/>: a pixel is what is "
-                   "seen within it (--film rays takes every filter)");
-}
-
 constexpr size_t kChunk = 4096;  // faces at a time; not tuned
 // Of a pixel: a hundred megabytes. Thin faces behind each other, all over one pixel, make as many
 // as their number squared.
 constexpr size_t kMostRegions = 1 << 18;
 
 }  // namespace
+
+void FilmRegions::check(const Film& film) {
+  if (film.filter.kind == Filter::Kind::kBox && film.filter.radius == 0.5) return;
+  throw InputError(film.where,
+                   "the exact film needs a box filter, <rfilter type=\"box\"/>: a pixel is what is "
+                   "seen within it (--film rays takes every filter)");
+}
 
 // Which faces may be seen in which tile, and the regions of a tile.
 class FilmRegions::Builder {
@@ -229,7 +229,7 @@ class FilmRegions::Builder {
 
 FilmRegions::FilmRegions(const Scene& scene, int threads, const std::atomic<bool>* interrupted)
     : film_(scene.film) {
-  check_filter(film_);
+  check(film_);
   const Stopwatch watch;
   const std::vector<limn::Tile> tiles = make_tiles(film_);
   const Builder builder(scene, tiles, threads);

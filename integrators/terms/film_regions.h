@@ -13,6 +13,7 @@ class FilmRegions {
   // The scene must outlive it. Empty if interrupted meanwhile (null: never). InputError, with the
   // filter's place, unless the filter is a box.
   FilmRegions(const Scene& scene, int threads, const std::atomic<bool>* interrupted = nullptr);
+  static void check(const Film& film);  // the filter
 
   // The face that is seen at a film position in the pixel (x, y) of the crop window [all in pixels
   // of the full film]; none where nothing is.

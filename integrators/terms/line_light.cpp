@@ -38,8 +38,12 @@ struct Place {
       c = cot * s;
     }
   }
+  static Place at(double theta) { return {std::cos(theta), std::sin(theta)}; }
   double theta() const { return std::atan2(s, c); }
   double c, s;
+
+ private:
+  Place(double cosine, double sine) : c(cosine), s(sine) {}
 };
 
 // The integral of n . w sin theta between two places of a line.
@@ -51,36 +55,53 @@ double cosine_piece(double along, double across, const Place& from, const Place&
   return sum;
 }
 
-// The integral of f(w) sin theta along the line between two angles, by quadrature between kinks
-// and between multiples of `step`.
+// Angles between which nothing on a line has a kink: from, to, and kinks in between.
+struct Breaks {
+  Breaks(const Vec3d& pole, const Vec3d& r, double from, double to, std::span<const Kink> kinks) {
+    angles[count++] = from;
+    for (const Kink& kink : kinks) {
+      const double a = dot(kink.axis, pole), b = dot(kink.axis, r), size = std::hypot(a, b);
+      if (!(std::fabs(kink.level) < size)) continue;
+      const double middle = std::atan2(b, a), half = std::acos(kink.level / size);
+      for (const double theta : {middle - half, middle + half, middle - half + 2 * kPi}) {
+        if (theta > from && theta < to) angles[count++] = theta;
+      }
+    }
+    angles[count++] = to;
+    std::sort(angles.begin(), angles.begin() + count);
+  }
+  std::array<double, 16> angles;
+  int count = 0;
+};
+
+// The integral of f(w) sin theta along the line between two angles, by quadrature between
+// multiples of `step`. Counts how often it asks f.
+template <class F>
+Rgb<double> smooth_piece(const Vec3d& pole, const Vec3d& r, double from, double to, double step,
+                         int64_t& asked, const F& f) {
+  Rgb<double> sum;
+  double start = from;
+  for (double k = std::floor(start / step) + 1; start < to; ++k) {
+    const double end = std::min(k * step, to), width = end - start;
+    for (const auto& q : detail::quadrature()) {
+      const double theta = start + width * q.at;
+      const double c = std::cos(theta), s = std::sin(theta);
+      sum += f(pole * c + r * s) * (width * q.weight * s);
+      ++asked;
+    }
+    start = end;
+  }
+  return sum;
+}
+
+// The same where f has kinks.
 template <class F>
 Rgb<double> quadrature_piece(const Vec3d& pole, const Vec3d& r, double from, double to, double step,
-                             std::span<const Kink> kinks, const F& f) {
-  std::array<double, 16> breaks;
-  int count = 0;
-  breaks[count++] = from;
-  for (const Kink& kink : kinks) {
-    const double a = dot(kink.axis, pole), b = dot(kink.axis, r), size = std::hypot(a, b);
-    if (!(std::fabs(kink.level) < size)) continue;
-    const double middle = std::atan2(b, a), half = std::acos(kink.level / size);
-    for (const double theta : {middle - half, middle + half, middle - half + 2 * kPi}) {
-      if (theta > from && theta < to) breaks[count++] = theta;
-    }
-  }
-  breaks[count++] = to;
-  std::sort(breaks.begin(), breaks.begin() + count);
+                             std::span<const Kink> kinks, int64_t& asked, const F& f) {
+  const Breaks breaks(pole, r, from, to, kinks);
   Rgb<double> sum;
-  for (int i = 0; i + 1 < count; ++i) {
-    double start = breaks[i];
-    for (double k = std::floor(start / step) + 1; start < breaks[i + 1]; ++k) {
-      const double end = std::min(k * step, breaks[i + 1]), width = end - start;
-      for (const auto& q : detail::quadrature()) {
-        const double theta = start + width * q.at;
-        const double c = std::cos(theta), s = std::sin(theta);
-        sum += f(pole * c + r * s) * (width * q.weight * s);
-      }
-      start = end;
-    }
+  for (int i = 0; i + 1 < breaks.count; ++i) {
+    sum += smooth_piece(pole, r, breaks.angles[i], breaks.angles[i + 1], step, asked, f);
   }
   return sum;
 }
@@ -141,7 +162,7 @@ struct LineLight::Receiver {
     n_s = front ? surface.n_s : -surface.n_s;
     bent = !(n == n_s);
     plain = !bent && horizon == 0;
-    kinks = {{{n, 0}, {n_s, horizon}, {n_s, horizon * (2 - horizon)}}};
+    kinks = {{{n, 0}, {n_s, horizon}, {n_s, ramp_end()}}};
   }
   // What is scattered of a lamp of radiance 1 that nothing hides. sides: of what it shows above the
   // horizon; pole: inside.
@@ -153,6 +174,7 @@ struct LineLight::Receiver {
     const double sum = plain ? cosine_integral(sides, n) : ramp_integral(sides, n, horizon);
     return scattering.eval(n) * sum;
   }
+  double ramp_end() const { return horizon * (2 - horizon); }
   ContourPoint at;
   const Scattering<double>& scattering;
   Vec3d n, n_s;
@@ -164,7 +186,7 @@ struct LineLight::Receiver {
 struct LineLight::Scratch {
   std::vector<ContourArc> arcs;
   Isolines isolines;
-  std::vector<double> ends;
+  LineWork work;
   std::vector<Vec3d> polygon, planes;
   std::vector<PolygonSide<double>> sides;
 };
@@ -173,6 +195,17 @@ struct LineLight::Scratch {
 LineLight::Scratch& LineLight::scratch() {
   static thread_local const auto owned = std::make_unique<Scratch>();
   return *owned;
+}
+
+const LineWork& LineLight::work() { return scratch().work; }
+
+void LineLight::list(const ContourPoint& at, const DirectionCone& cone,
+                     const ContourScreen* screen) const {
+  Scratch& own = scratch();
+  own.arcs.clear();
+  contours_.list(at, cone, screen, own.arcs);
+  ++own.work.lists;
+  own.work.arcs += static_cast<int64_t>(own.arcs.size());
 }
 
 void LineLight::check(const Scene& scene) {
@@ -225,17 +258,17 @@ void LineLight::check_overlaps(int threads) const {
 }
 
 LineLight::LineLight(const Scene& scene, const RayTracer& tracer, int threads,
-                     const LineOptions& options, bool direct)
-    : scene_(scene), contours_(scene, tracer, threads), options_(options) {
+                     const LineOptions& options, bool direct,
+                     std::shared_ptr<const Environment> sky)
+    : scene_(scene), contours_(scene, tracer, threads), options_(options), sky_(std::move(sky)) {
   if (!direct) return;
   check(scene);
   for (const Shape& shape : scene.shapes) {
     if (shape.is_emitter) add_lamp(shape);
   }
   if (has_lamps()) check_overlaps(threads);
-  const Environment* sky = scene.environment.get();
-  if (!sky || !sky->grid()) return;
-  columns_ = std::make_unique<RadianceColumns>(*sky, threads);
+  if (!sky_ || !sky_->grid()) return;
+  columns_ = std::make_unique<RadianceColumns>(*sky_, threads);
   std::vector<double> brightness = columns_->brightness();
   for (int k = 0; k < 2; ++k) {
     warps_.emplace_back(brightness);
@@ -295,6 +328,7 @@ V LineLight::sum_over_lines(const ContourPoint& at, const Pencil& pencil,
   const bool open = !all || w != 0;
   const auto once = [&](double shift) {
     lines.build(pencil, count, shift, at, own.arcs);
+    own.work.crossings += lines.all_crossings();
     V sum{};
     for (int j = 0; j < count; ++j) {
       const Isolines::Line& line = lines.line(j);
@@ -335,9 +369,7 @@ V LineLight::sum_over_lines(const ContourPoint& at, const Pencil& pencil,
 }
 
 double LineLight::openness(const ContourPoint& at, double offset) const {
-  Scratch& own = scratch();
-  own.arcs.clear();
-  contours_.list(at, {}, nullptr, own.arcs);
+  list(at, {}, nullptr);
   const int w = contours_.count(at, at.up, nullptr);
   const double sum = sum_over_lines<double>(
       at, pencil_around(at.up), {&at.up, 1}, w, nullptr, options_.lines, offset,
@@ -346,9 +378,7 @@ double LineLight::openness(const ContourPoint& at, double offset) const {
 }
 
 double LineLight::ambient_occlusion(const ContourPoint& at, const Vec3d& n, double offset) const {
-  Scratch& own = scratch();
-  own.arcs.clear();
-  contours_.list(at, {}, nullptr, own.arcs);
+  list(at, {}, nullptr);
   const Vec3d planes[] = {at.up, n};
   const Pencil pencil = pencil_around(pole_between(at.up, n));
   const int w = contours_.count(at, pencil.pole, nullptr);
@@ -367,7 +397,7 @@ Rgb<double> LineLight::sky_light(const Receiver& receiver, double offset) const 
   const Vec3d planes[] = {at.up, receiver.n};
   const Pencil pencil = pencil_around(pole_between(at.up, receiver.n));
   const int w = contours_.count(at, pencil.pole, nullptr);
-  const Rgb<double> radiance = scene_.environment->radiance(at.up);
+  const Rgb<double> radiance = sky_->radiance(at.up);
   if (receiver.plain) {
     const double sum =
         sum_over_lines<double>(at, pencil, planes, w, nullptr, options_.lines, offset,
@@ -380,6 +410,7 @@ Rgb<double> LineLight::sky_light(const Receiver& receiver, double offset) const 
       at, pencil, planes, w, nullptr, options_.lines, offset,
       [&](const Isolines::Line& line, const Place& from, const Place& to) {
         return quadrature_piece(pencil.pole, line.r, from.theta(), to.theta(), kPi, receiver.kinks,
+                                scratch().work.evaluations,
                                 [&](const Vec3d& d) { return receiver.scattering.eval(d); });
       });
   return sum * radiance;
@@ -394,29 +425,46 @@ Rgb<double> LineLight::map_light(const Receiver& receiver, double offset) const 
   const Vec3d pole = grid.pole * turned, quarter = cross(pole, grid.zero);
   const Pencil pencil{pole, grid.zero, quarter, 1, 1, &warps_[dot(quarter, grid.quarter) < 0]};
   const int w = contours_.count(at, pencil.pole, nullptr);
+  const auto cosine = [&](const RadianceColumns::Meridian& meridian, const Vec3d& r,
+                          const Place& from, const Place& to) {
+    const auto a = columns_->sum(meridian, from.c * turned, from.s);
+    const auto b = columns_->sum(meridian, to.c * turned, to.s);
+    const double along = dot(receiver.n, grid.pole), across = dot(receiver.n, r);
+    return ((b.pole - a.pole) * along + (b.across - a.across) * across) * turned;
+  };
+  const Rgb<double> scale = receiver.scattering.eval(receiver.n);
+  const Vec3d planes[] = {at.up};
   if (receiver.plain) {
-    const Vec3d planes[] = {at.up};
-    const double along = dot(receiver.n, grid.pole);
     const Rgb<double> sum = sum_over_lines<Rgb<double>>(
         at, pencil, planes, w, nullptr, options_.lines, offset,
-        [&](const Isolines::Line& line, const Place& from, const Place& to) {
-          const auto meridian = columns_->meridian(line.r);
-          const auto a = columns_->sum(meridian, from.c * turned, from.s);
-          const auto b = columns_->sum(meridian, to.c * turned, to.s);
-          const double across = dot(receiver.n, line.r);
-          return ((b.pole - a.pole) * along + (b.across - a.across) * across) * turned;
+        [&](const Isolines::Line& line, const Place& a, const Place& b) {
+          return cosine(columns_->meridian(line.r), line.r, a, b);
         });
-    return receiver.scattering.eval(receiver.n) * sum;
+    return scale * sum;
   }
-  const Environment& sky = *scene_.environment;
-  const Vec3d planes[] = {at.up};
-  return sum_over_lines<Rgb<double>>(
-      at, pencil, planes, w, nullptr, options_.lines, offset,
-      [&](const Isolines::Line& line, const Place& from, const Place& to) {
-        return quadrature_piece(
-            pencil.pole, line.r, from.theta(), to.theta(), kPi / (grid.rows - 1), receiver.kinks,
+  // What interpolated normals see is the cosine but for a narrow ramp at their horizon, and for all
+  // of it where they are bent.
+  const Environment& sky = *sky_;
+  const double row = kPi / (grid.rows - 1);
+  const auto piece = [&](const Isolines::Line& line, const Place& a, const Place& b) {
+    const auto meridian = columns_->meridian(line.r);
+    const Breaks breaks(pencil.pole, line.r, a.theta(), b.theta(), receiver.kinks);
+    Rgb<double> sum;
+    for (int i = 0; i + 1 < breaks.count; ++i) {
+      const double from = breaks.angles[i], to = breaks.angles[i + 1], middle = 0.5 * (from + to);
+      const double c =
+          dot(receiver.n_s, pencil.pole * std::cos(middle) + line.r * std::sin(middle));
+      if (receiver.bent || (c > receiver.horizon && c < receiver.ramp_end())) {
+        sum += smooth_piece(
+            pencil.pole, line.r, from, to, row, scratch().work.evaluations,
             [&](const Vec3d& d) { return receiver.scattering.eval(d) * sky.radiance(d); });
-      });
+      } else if (c > receiver.horizon) {
+        sum += scale * cosine(meridian, line.r, Place::at(from), Place::at(to));
+      }
+    }
+    return sum;
+  };
+  return sum_over_lines<Rgb<double>>(at, pencil, planes, w, nullptr, options_.lines, offset, piece);
 }
 
 Rgb<double> LineLight::lamp_light(const Lamp& lamp, const Receiver& receiver, double offset) const {
@@ -444,8 +492,7 @@ Rgb<double> LineLight::lamp_light(const Lamp& lamp, const Receiver& receiver, do
   }
   const Pencil pencil = pencil_inside(own.polygon);
   const auto all = receiver.all_of(own.sides, pencil.pole);
-  own.arcs.clear();
-  contours_.list(at, *cone, &lamp.screen, own.arcs);
+  list(at, *cone, &lamp.screen);
   const int w = contours_.count(at, pencil.pole, &lamp.screen);
   const int lamp_lines = std::max(1, options_.lines / kSkyLines);
   if (own.arcs.empty()) return w == 0 ? all * lamp.radiance : Rgb<double>{};
@@ -465,7 +512,7 @@ Rgb<double> LineLight::lamp_light(const Lamp& lamp, const Receiver& receiver, do
              at, pencil, own.planes, w, &all, lamp_lines, offset,
              [&](const Isolines::Line& line, const Place& from, const Place& to) {
                return quadrature_piece(pencil.pole, line.r, from.theta(), to.theta(), kPi,
-                                       receiver.kinks,
+                                       receiver.kinks, own.work.evaluations,
                                        [&](const Vec3d& d) { return receiver.scattering.eval(d); });
              });
 }
@@ -486,11 +533,9 @@ Rgb<double> LineLight::lamps(const SurfacePoint<double>& surface,
 
 Rgb<double> LineLight::environment(const SurfacePoint<double>& surface,
                                    const Scattering<double>& scattering, double offset) const {
-  if (!scene_.environment) return {};
+  if (!sky_) return {};
   const Receiver receiver = receiver_at(surface, scattering);
-  Scratch& own = scratch();
-  own.arcs.clear();
-  contours_.list(receiver.at, {}, nullptr, own.arcs);
+  list(receiver.at, {}, nullptr);
   return columns_ ? map_light(receiver, offset) : sky_light(receiver, offset);
 }
 

@@ -26,12 +26,21 @@ struct LineOptions {
 };
 inline constexpr int kMostLines = 1 << 14;
 
+// What sums over lines have to do, in numbers that are the same on all machines.
+struct LineWork {
+  int64_t lists = 0;        // of contours, in the sky or before a lamp
+  int64_t arcs = 0;         // that these have
+  int64_t crossings = 0;    // of arcs and lines
+  int64_t evaluations = 0;  // by quadrature
+};
+
 class LineLight {
  public:
   // The scene and its tracer must outlive it. direct: whether lamps() and environment() are to be
-  // asked; InputError where check() says so, and for lamps that lie in one place.
+  // asked; InputError where check() says so, and for lamps that lie in one place. sky: what
+  // environment() is to integrate, the scene's own or a part of it; none: nothing.
   LineLight(const Scene& scene, const RayTracer& tracer, int threads, const LineOptions& options,
-            bool direct);
+            bool direct, std::shared_ptr<const Environment> sky);
 
   // InputError, with the place in the scene's file and what to do, for a scene whose direct light
   // lines do not know: delta lights, BSDFs that are not diffuse, interpolated normals after
@@ -52,6 +61,8 @@ class LineLight {
   bool has_lamps() const { return !lamps_.empty(); }
   // How many sums ended at kMostLines above the tolerance, so far.
   int64_t missed() const { return missed_; }
+  // What the calling thread has done so far, for all of them.
+  static const LineWork& work();
 
   ContourPoint at(const SurfacePoint<double>& surface, const Vec3d& up) const {
     return contours_.at(surface, up);
@@ -69,6 +80,8 @@ class LineLight {
   struct Scratch;
   static Scratch& scratch();
 
+  // All contours into scratch(), counted.
+  void list(const ContourPoint& at, const DirectionCone& cone, const ContourScreen* screen) const;
   void check_overlaps(int threads) const;
   void add_lamp(const Shape& shape);
   void add_polygon(const LampHull& hull, const Shape& shape);
@@ -83,6 +96,7 @@ class LineLight {
   Contours contours_;
   LineOptions options_;
   std::vector<Lamp> lamps_;
+  std::shared_ptr<const Environment> sky_;
   std::unique_ptr<RadianceColumns> columns_;  // of a map
   // Lines from its pole, and from the opposite one, dense where it is bright.
   std::vector<AzimuthWarp> warps_;

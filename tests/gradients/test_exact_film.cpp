@@ -11,6 +11,9 @@
 #include "integrators/terms/film_regions.h"
 #include "limn/core/face_copies.h"
 #include "limn/core/ray_tracer.h"
+#include "limn/integrators/check.h"
+#include "limn/integrators/compare.h"
+#include "limn/integrators/compare_images.h"
 #include "limn/integrators/gradient.h"
 #include "limn/integrators/render.h"
 #include "support/compare_moments.h"
@@ -273,6 +276,69 @@ TEST(ExactFilm, CameraTermIsExact) {
   EXPECT_GE(summary.p_largest, 1e-6);
 }
 
+// A check looks at the very gradient that is asked for: only the exact film hides no sample.
+TEST(ExactFilm, IsChecked) {
+  const TempFiles files;
+  const Scene scene = make_scene(files, crowded(files));
+  RunSettings settings;
+  settings.spp = 16;
+  CheckOptions options;
+  options.parameter = "ball.translate.y";
+  options.method = "forest";
+  options.terms = {"camera"};
+  options.step = 0.01;
+  const auto occluded = [&](bool exact) {
+    options.exact_film = exact;
+    bool was = !exact;
+    const auto run = [&](const Scene& s, const GradientOptions& o, const RunSettings& r) {
+      was = o.exact_film;
+      return gradient(s, o, r);
+    };
+    const CheckResult result = check(scene, options, settings, run);
+    EXPECT_EQ(was, exact);
+    const TermCost& cost = result.gradient.terms[result.gradient.term("camera")].cost;
+    return static_cast<double>(cost.occluded) / static_cast<double>(cost.samples);
+  };
+  EXPECT_LT(occluded(true), 0.01);
+  EXPECT_GT(occluded(false), 0.1);
+}
+
+// Of the methods of one table those that draw edges on the film take it; differences do not, nor
+// does a reference.
+TEST(ExactFilm, IsCompared) {
+  const TempFiles files;
+  const Scene scene = make_scene(files, crowded(files));
+  MethodInput input{scene, "ball.translate.y"};
+  RunSettings settings;
+  settings.spp = 4;
+  for (const bool exact : {false, true}) {
+    input.exact_film = exact;
+    for (const std::string name : {"forest", "fd"}) {
+      const bool takes = exact && name == "forest";
+      EXPECT_EQ(input.options(find_method(name)).exact_film, takes);
+      const auto method = make_method(input, name);
+      EXPECT_GT(method->run(settings).spp, 0);
+      bool told = false;
+      for (const MethodSetting& setting : method->settings()) told = told || setting.name == "film";
+      EXPECT_EQ(told, takes) << name;
+    }
+  }
+  settings.seed = 4;
+  const Reference with = make_reference(input, settings);
+  input.exact_film = false;
+  EXPECT_EQ(with.image, make_reference(input, settings).image);
+  ImageCompareOptions images;
+  images.methods = {"path", "rays"};
+  images.render.exact_film = true;
+  images.render.what = RenderWhat::kImage;
+  images.times = {0.001};
+  images.repeats = 1;
+  images.reference_seconds = 0.01;
+  Scene direct = scene;
+  direct.max_depth = 2;
+  EXPECT_EQ(compare_images(direct, images, settings).rows.size(), 2u);
+}
+
 TEST(ExactFilm, SaysWhatItNeeds) {
   const TempFiles files;
   SceneParts parts = crowded(files);
@@ -295,6 +361,12 @@ TEST(ExactFilm, SaysWhatItNeeds) {
   options.exact_film = true;
   const std::string method = message([&] { gradient(scene, options, {}); });
   EXPECT_NE(method.find("the method \"fd\" does not"), method.npos) << method;
+  CheckOptions checked;
+  checked.parameter = "body.translate.x";
+  checked.exact_film = true;
+  EXPECT_EQ(message([&] { check(scene, checked, {}); }), filter);
+  checked.method = "fd";
+  EXPECT_EQ(message([&] { check(scene, checked, {}); }), method);
 }
 
 }  // namespace

@@ -5,6 +5,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "integrators/terms/camera_path.h"
 #include "integrators/terms/closed_light.h"
 #include "limn/core/error.h"
@@ -59,7 +61,7 @@ ContourPoint on_floor(const Scene& scene, double x, double z) {
 
 struct Looking {
   Looking(const Scene& s, const LineOptions& options = {}, bool direct = false)
-      : tracer(make_embree_tracer(s, 1)), light(s, *tracer, 1, options, direct) {}
+      : tracer(make_embree_tracer(s, 1)), light(s, *tracer, 1, options, direct, s.environment) {}
   std::unique_ptr<RayTracer> tracer;
   LineLight light;
 };
@@ -247,7 +249,7 @@ RenderResult run(const Scene& scene, const std::string& method, int spp, RenderO
                  int threads = 1) {
   RunSettings settings;
   settings.spp = spp;
-  settings.seed = method == "silhouettes" ? 1 : 2;
+  settings.seed = method == "lines" ? 1 : method == "silhouettes" ? 3 : 2;
   settings.threads = threads;
   options.method = method;
   RenderResult result = render(scene, settings, options);
@@ -326,7 +328,7 @@ TEST(LineLight, ConvergesAndIsUnbiased) {
   RenderOptions options;
   options.what = RenderWhat::kAmbientOcclusion;
   options.tolerance = 0.01;
-  EXPECT_TRUE(run(scene, "silhouettes", 1, options).warnings.empty());
+  EXPECT_TRUE(run(scene, "lines", 1, options).warnings.empty());
 }
 
 // The file's normals may turn past the face: what lies below it is no part of their sky.
@@ -341,11 +343,26 @@ TEST(LineLight, NormalsTurnedPastTheFace) {
       obj_shape("ground", file, false, 1, {0, 0.1, 0}, diffuse("clay", "0.5, 0.5, 0.5"));
   RenderOptions options;
   options.what = RenderWhat::kAmbientOcclusion;
-  const RenderResult open = run(scene_of(files, {}, false, ground), "silhouettes", 1, options);
+  const RenderResult open = run(scene_of(files, {}, false, ground), "lines", 1, options);
   const size_t middle = (8 * 16 + 8) * 3;
   EXPECT_NEAR(open.radiance.mean(middle), (1 + std::cos(turned)) / 2, 1e-4);
   const Scene scene = scene_of(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, false, ground);
-  expect_alike(run(scene, "silhouettes", 16, options), run(scene, "rays", 128, options), "turned");
+  expect_alike(run(scene, "lines", 16, options), run(scene, "rays", 128, options), "turned");
+}
+
+// A sky with a sun.
+std::string make_sun(const TempFiles& files, const std::string& id) {
+  Image map(64, 32, 3);
+  for (int c = 0; c < 3; ++c) {
+    for (int y = 0; y < map.height; ++y) {
+      for (int x = 0; x < map.width; ++x) map.at(x, y, c) = static_cast<float>(0.1 + 0.1 * c);
+    }
+    map.at(40, 8, c) = map.at(41, 8, c) = map.at(40, 9, c) = 150;
+  }
+  write_exr(files.path("sun.exr"), map, false, {});
+  return fmt::format(
+      R"(  <emitter type="envmap" id="{}"><string name="filename" value="{}"/></emitter>)", id,
+      files.path("sun.exr"));
 }
 
 TEST(LineLight, AgreesWithRaysAndPaths) {
@@ -363,19 +380,23 @@ TEST(LineLight, AgreesWithRaysAndPaths) {
   };
   for (const Case& c : {Case{"lamps", lamps, false, 64}, Case{"sky", sky, false, 16},
                         Case{"map", make_sky(files, "map"), false, 16},
+                        Case{"sun", make_sun(files, "sun"), false, 16},
+                        Case{"lamps and sun", lamps + make_sun(files, "sun"), false, 8},
                         Case{"smooth, lamps and sky", lamps + sky, true, 4},
                         Case{"smooth, map", make_sky(files, "map"), true, 8}}) {
     const Scene scene = scene_of(files, bodies, c.smooth, c.lights);
-    const RenderResult lines = run(scene, "silhouettes", c.spp);
+    const RenderResult lines = run(scene, "lines", c.spp);
     expect_alike(lines, run(scene, "path", 512), c.name + ", path");
-    expect_alike(lines, run(scene, "rays", 64), c.name + ", rays");
+    const RenderResult rays = run(scene, "rays", 64);
+    expect_alike(lines, rays, c.name + ", rays");
+    expect_alike(run(scene, "silhouettes", 64), rays, c.name + ", silhouettes");
   }
   for (const RenderWhat what : {RenderWhat::kAmbientOcclusion, RenderWhat::kOpenness}) {
     for (const bool smooth : {false, true}) {
       const Scene scene = scene_of(files, bodies, smooth);
       RenderOptions options;
       options.what = what;
-      expect_alike(run(scene, "silhouettes", 16, options), run(scene, "rays", 128, options),
+      expect_alike(run(scene, "lines", 16, options), run(scene, "rays", 128, options),
                    fmt::format("open sky {}{}", static_cast<int>(what), smooth ? ", smooth" : ""));
     }
   }
@@ -506,7 +527,7 @@ TEST(LineLight, LampsEndWhatIsBeforeThem) {
            {"through", {{icosphere_mesh(2), 0.5, {0.3, 2.1, 0.2}}}},
            {"beside", {{cube_mesh(), 0.6, {1.2, 2, 0.1}}}}}) {
     const Scene scene = scene_of(files, bodies, false, lamp);
-    expect_alike(run(scene, "silhouettes", 16), run(scene, "path", 1024), name);
+    expect_alike(run(scene, "lines", 16), run(scene, "path", 1024), name);
   }
 }
 
@@ -515,11 +536,11 @@ TEST(LineLight, ScaleAndPlaceDoNotMatter) {
   const std::vector<Body> bodies = {{torus_mesh(16, 8), 0.8, {0.25, 1.125, 0}}};
   RenderOptions options;
   options.what = RenderWhat::kAmbientOcclusion;
-  const RenderResult plain = run(scene_of(files, bodies), "silhouettes", 2, options);
+  const RenderResult plain = run(scene_of(files, bodies), "lines", 2, options);
   for (const auto& [unit, shift] :
        std::vector<std::pair<double, Vec3d>>{{1024, {}}, {1.0 / 1024, {}}, {1, {16, -32, 64}}}) {
     const RenderResult moved =
-        run(scene_of(files, bodies, false, "", unit, shift), "silhouettes", 2, options);
+        run(scene_of(files, bodies, false, "", unit, shift), "lines", 2, options);
     for (size_t i = 0; i < plain.radiance.size(); ++i) {
       // Floats of the moved mesh are rounded, and move shadows' edges by that.
       ASSERT_NEAR(moved.radiance.mean(i), plain.radiance.mean(i), 2e-3) << unit;
@@ -527,11 +548,43 @@ TEST(LineLight, ScaleAndPlaceDoNotMatter) {
   }
 }
 
+// What a pixel's samples are made of, as written down.
+std::set<std::string> ways(const Scene& scene, const RenderOptions& options, int x, int y) {
+  RunSettings settings;
+  settings.seed = 3;
+  std::set<std::string> found;
+  for (const std::string& line : trace_sample(scene, settings, {x, y, 0, ""}, options)) {
+    for (const std::string way : {"by lines", "by rays"}) {
+      if (line.ends_with(way)) found.insert(way);
+    }
+  }
+  return found;
+}
+
+// Both in one image, and without bias.
+TEST(LineLight, SilhouettesTakeWhatIsBetter) {
+  const TempFiles files;
+  const Scene scene =
+      scene_of(files, {{icosphere_mesh(5), 0.8, {0.2, 1.1, 0}}}, false,
+               square("lamp", 0.6, 90, {0.4, 2.9, 0.3}, area_light("glow", "9, 8, 7")) +
+                   constant_light("sky", "0.3, 0.4, 0.5"));
+  RenderOptions options;
+  options.method = "silhouettes";
+  using Ways = std::set<std::string>;
+  EXPECT_EQ(ways(scene, options, 8, 12), (Ways{"by lines", "by rays"}));
+  expect_alike(run(scene, "silhouettes", 16), run(scene, "rays", 64), "both");
+  options.tolerance = 0.01;
+  EXPECT_EQ(ways(scene, options, 8, 12), Ways{"by lines"});
+  options.method = "rays";
+  options.tolerance = 0;
+  EXPECT_EQ(ways(scene, options, 8, 12), Ways{"by rays"});
+}
+
 TEST(LineLight, ThreadsDoNotMatter) {
   const TempFiles files;
   const Scene scene =
       scene_of(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, true, make_sky(files, "map"));
-  for (const std::string method : {"silhouettes", "rays"}) {
+  for (const std::string method : {"lines", "rays", "silhouettes"}) {
     const RenderResult one = run(scene, method, 3), three = run(scene, method, 3, {}, 3);
     for (size_t i = 0; i < one.radiance.size(); ++i) {
       ASSERT_EQ(one.radiance.mean(i), three.radiance.mean(i)) << method;

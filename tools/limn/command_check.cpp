@@ -77,7 +77,7 @@ void print_check(const std::string& name, const CheckResult& r, int spp) {
 // JSON has no infinity.
 json number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
 
-json figures_json(const std::string& name, const CheckResult& r, int spp) {
+json figures_json(const std::string& name, const std::string& film, const CheckResult& r, int spp) {
   json samples = json::object(), visible = json::object(), shares = json::object();
   for (const TermRun& term : r.gradient.terms) samples[term.name] = term.samples;
   for (const CheckPower& power : r.power) {
@@ -87,6 +87,7 @@ json figures_json(const std::string& name, const CheckResult& r, int spp) {
   }
   json report = {{"parameter", name},
                  {"method", r.gradient.method},
+                 {"film", film},
                  {"step", r.step},
                  {"spp", spp},
                  {"samples", samples},
@@ -126,6 +127,7 @@ class CheckCommand final : public Command {
     add_parameter_options(app, parameters_, options_.method, all);
     add_term_options(app, terms_, samples_);
     add_warp_options(app, options_.warp);
+    add_film_option(app, film_);
     app.add_option("--step", options_.step,
                    "Step of the differences (default: found in the image, by a pilot)")
         ->check(CLI::PositiveNumber);
@@ -145,6 +147,10 @@ class CheckCommand final : public Command {
     check_outputs({{"--json", common_.json}}, scene, field_files(parameters_));
     options_.terms = parse_terms(terms_);
     check_warp(options_.warp, {reverse_ ? "reverse mode" : find_method(options_.method).name});
+    options_.exact_film = film_ == "exact";
+    if (reverse_ && options_.exact_film) {
+      throw InputError("--film exact: reverse mode has its film by rays");
+    }
     if (reverse_) return run_reverse(scene);
     options_.samples = parse_samples(samples_);
     for (const auto& parameter : parameters_) find_parameter(scene, parameter);
@@ -163,7 +169,7 @@ class CheckCommand final : public Command {
       }
       warnings_.add_all(r.gradient.warnings);
       print_check(parameter, r, settings.spp);
-      report.push_back(figures_json(parameter, r, settings.spp));
+      report.push_back(figures_json(parameter, film_, r, settings.spp));
       report.back()["sensor"] = sensor_name(scene);
       report.back()["warnings"] = warnings_.lines();
       // What is wrong comes before what is not known.
@@ -218,7 +224,7 @@ class CheckCommand final : public Command {
   CheckOptions options_;
   bool reverse_ = false;
   std::vector<std::string> parameters_;
-  std::string terms_, samples_ = "auto";
+  std::string terms_, samples_ = "auto", film_ = "rays";
 };
 
 }  // namespace

@@ -35,6 +35,7 @@ struct CompareArguments {
   std::string samples = "auto";  // of each term
   double step = 0;               // of finite differences; 0: found by a pilot
   WarpOptions warp;
+  std::string film = "rays";
   std::string output;
   bool report = true;
   bool images = false;  // not derivatives
@@ -85,6 +86,17 @@ void check_methods(const std::vector<std::string>& names, const std::vector<std:
                        "\" has all terms in one: leave it out of --methods, or leave out --terms");
     }
   }
+}
+
+// Methods that draw no edges on the film take rays: one at least must.
+void check_exact_films(const Scene& scene, const std::vector<std::string>& names) {
+  const std::vector<Row> known = rows();
+  for (const std::string& name : names) {
+    const auto row =
+        std::find_if(known.begin(), known.end(), [&](const Row& r) { return r.name == name; });
+    if (row->terms_can_be_left_out) return check_exact_film(scene, name);
+  }
+  throw InputError("--film exact: none of --methods draws edges on the film");
 }
 
 void make_folder(const std::string& folder) {
@@ -155,7 +167,7 @@ class Comparer {
         settings_(settings),
         input_{scene,        command.parameter,      parse_terms(command.terms),
                command.step, block_size(scene.film), parse_samples(command.samples),
-               command.warp},
+               command.warp, command.film == "exact"},
         identity_(identify(input_, common.defines)),
         kept_file_((fs::path(command.output) / "reference.exr").string()) {
     result_.command = command_line;
@@ -316,6 +328,7 @@ void CompareCommand::add_options(CLI::App& app, bool all) {
   app.add_option("--step", command_.step, "Step of finite differences (default: found by a pilot)")
       ->check(CLI::PositiveNumber);
   add_warp_options(app, command_.warp);
+  add_film_option(app, command_.film);
   app.add_option("-o,--output", command_.output, "Folder to write")
       ->required()
       ->type_name("FOLDER");
@@ -327,6 +340,7 @@ int CompareCommand::run_images(const std::string& command_line) {
       *app_, {"--reference", "--terms", "--samples", "--step", "--aux", "--kappa", "--no-report"},
       "derivatives alone have that: not with --image");
   // The reference is made by rays.
+  command_.render.exact_film = command_.film == "exact";
   std::vector<std::string> methods = command_.methods;
   methods.emplace_back("rays");
   check_image_options(*app_, methods);
@@ -361,6 +375,7 @@ int CompareCommand::run(const std::string& command_line) {
   Warnings warnings;
   const Scene scene = load_scene(common_, warnings);
   find_parameter(scene, command_.parameter);
+  if (command_.film == "exact") check_exact_films(scene, command_.methods);
   make_folder(command_.output);
   check_outputs(
       {{"-o", (fs::path(command_.output) / "compare.json").string()}, {"--json", common_.json}},

@@ -123,12 +123,12 @@ void add_image_options(CLI::App& app, std::string& what, RenderOptions& options)
       ->check(CLI::IsMember({"image", "direct", "ao", "openness"}))
       ->capture_default_str();
   app.add_option("--lines", options.lines,
-                 "silhouettes: lines through the sky, a quarter of them through a lamp")
+                 "silhouettes, lines: lines through the sky, a quarter of them through a lamp")
       ->check(CLI::Range(1, 1 << 14))
       ->capture_default_str();
   app.add_option("--tolerance", options.tolerance,
-                 "silhouettes: lines are doubled until halves differ by twice this part of the "
-                 "result (0: never)")
+                 "silhouettes, lines: lines are doubled until halves differ by twice this part of "
+                 "the result (0: never)")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   app.add_option("--rays", options.rays, "rays: of each point, and each lamp")
@@ -147,8 +147,9 @@ void check_image_options(const CLI::App& app, const std::vector<std::string>& me
   const auto has = [&](const char* name) {
     return std::find(methods.begin(), methods.end(), name) != methods.end();
   };
-  if (!has("silhouettes")) {
-    refuse_options(app, {"--lines", "--tolerance"}, "an option of the method silhouettes alone");
+  if (!has("silhouettes") && !has("lines")) {
+    refuse_options(app, {"--lines", "--tolerance"},
+                   "an option of the methods silhouettes and lines alone");
   }
   if (!has("rays")) refuse_options(app, {"--rays"}, "an option of the method rays alone");
 }

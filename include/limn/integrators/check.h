@@ -16,6 +16,7 @@ struct CheckOptions {
   int block = 0;                   // pixels between windows; 0: an eighth of the longer side
   std::optional<SampleCounts> samples = SampleCounts{};  // of the gradient
   WarpOptions warp;
+  bool exact_film = false;  // of the gradient, see GradientOptions; differences take rays
 };
 
 // A disagreement needs a p-value below kCheckStageLevel in two runs of their own, the second one in

@@ -127,6 +127,9 @@ struct GradientResult {
 // The magnitude of what terms of edges add to one block of g, a parameter of the result.
 double edge_magnitude(const GradientResult& result, const ParameterGradient& g, size_t block);
 
+// InputError unless the method draws edges on the film and the film has a box filter.
+void check_exact_film(const Scene& scene, const std::string& method);
+
 // Parameters are differentiated in passes of kLanes over the same samples. InputError for unknown
 // parameters, methods or terms, for a method that cannot leave terms out, and for counts that are
 // not positive.

@@ -24,9 +24,10 @@ struct RenderMethod {
   const char* name;
   const char* description;
   bool closed_light;  // light that is scattered once, in closed form (analytic)
-  // One vertex that looks around: direct light, and how open its sky is (silhouettes, rays).
+  // One vertex that looks around: direct light, and how open its sky is (silhouettes, lines, rays).
   bool looks_around = false;
-  bool by_lines = false;  // between silhouettes, not by rays
+  bool by_lines = false;  // between silhouettes
+  bool chooses = false;   // between these and rays
 };
 // The first is the default.
 std::span<const RenderMethod> render_methods();
