@@ -83,10 +83,8 @@ std::vector<Compared> compared(const Scene& scene, const Parameter& parameter, s
   if (parameter.size == 1) return {{parameter.name, parameter, place, {1.0}}};
   if (parameter.array.size() == 3) {
     const Image field = random_texels(scene.environment->map(), seed);
-    return {{parameter.name,
-             texel_field(scene, field),
-             place,
-             {field.data.begin(), field.data.end()}}};
+    return {
+        {parameter.name, texel_field(scene, field), place, {field.data.begin(), field.data.end()}}};
   }
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     if (parameter.velocities(scene, ShapeId(s)).empty()) continue;

@@ -88,7 +88,7 @@ namespace {
 using EstimatorList = std::vector<std::unique_ptr<SampleEstimator>>;
 
 EstimatorList estimators_of(const Scene& scene, const RunSettings& settings,
-                         const RenderOptions& options) {
+                            const RenderOptions& options) {
   EstimatorList estimators;
   estimators.push_back(make_estimator(scene, settings, options));
   check_memory(estimators);
@@ -96,8 +96,8 @@ EstimatorList estimators_of(const Scene& scene, const RunSettings& settings,
 }
 
 // watch: runs since the job began.
-RenderResult run(const EstimatorList& estimators, const RunSettings& settings, const Stopwatch& watch,
-                 size_t size) {
+RenderResult run(const EstimatorList& estimators, const RunSettings& settings,
+                 const Stopwatch& watch, size_t size) {
   RenderResult result;
   result.radiance = Moments(size);
   run_batches(estimators, settings, watch, [&](const Batch& batch, const auto& sums) {

@@ -45,8 +45,9 @@ TEST(ReverseSamples, PixelsByASteepAdjointHaveTheMeanOfEvenOnes) {
   const Scene scene = scene_under(files, make_sky(files, "sky"));
   const Image adjoint = steep_adjoint(scene);
   BackwardOptions options;
-  options.parameters = {"body.translate.x",  "body.translate.y",   "body.translate.z", "body.scale",
-                        "clay.reflectance.r", "sensor.translate.y", "glow.radiance.g"};
+  options.parameters = {"body.translate.x", "body.translate.y",   "body.translate.z",
+                        "body.scale",       "clay.reflectance.r", "sensor.translate.y",
+                        "glow.radiance.g"};
   options.batches = 64;
   RunSettings settings;
   settings.spp = 256;
@@ -97,8 +98,11 @@ TEST(ReverseSamples, ACheckKeepsNoBatchesOfTexels) {
   Image map(512, 256, 3);
   for (float& v : map.data) v = 0.5f;
   write_exr(files.path("sky.exr"), map, false, {});
-  const Scene scene = scene_under(files, R"(<emitter type="envmap" id="sky"><string name="filename" value=")" +
-                                       files.path("sky.exr") + R"("/></emitter>)", 4);
+  const Scene scene =
+      scene_under(files,
+                  R"(<emitter type="envmap" id="sky"><string name="filename" value=")" +
+                      files.path("sky.exr") + R"("/></emitter>)",
+                  4);
   BackwardOptions options;
   options.parameters = {"sky.data"};
   options.terms = {"interior"};
