@@ -121,6 +121,19 @@ BatchResult to_result(const BatchRecord& record, const std::vector<Parameter>& p
   return result;
 }
 
+constexpr int kMostSamples = 1 << 16;  // so that their products with paths are numbers
+
+void check_samples(const BackwardOptions& options) {
+  if (options.edge_samples < 1 || options.edge_samples > kMostSamples) {
+    throw InputError(fmt::format("{} edges at a vertex of a path: there may be 1 to {}",
+                                 options.edge_samples, kMostSamples));
+  }
+  if (!(options.camera_samples > 0 && options.camera_samples <= kMostSamples)) {
+    throw InputError(fmt::format("{:g} points on the film for a path: more than 0, {} at most",
+                                 options.camera_samples, kMostSamples));
+  }
+}
+
 class BackwardPass {
  public:
   BackwardPass(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
@@ -228,9 +241,7 @@ void BackwardPass::select() {
   }
   context_.interior = computed_[kInterior];
   context_.edge_samples = options_.edge_samples;
-  if (options_.edge_samples < 1 || !(options_.camera_samples > 0)) {
-    throw InputError("samples of edges must be positive");
-  }
+  check_samples(options_);
   if (computed_[kCamera]) {
     camera_ = std::make_unique<CameraEdges>(path_, input_.edges(), 3, &parameters_.free());
     context_.camera = camera_.get();
@@ -262,8 +273,7 @@ void BackwardPass::select() {
   warn_of_contacts(parameters_.scene(), input_.made_edges(), result_.warnings);
   warn_of_faces_edge_on(parameters_.scene(), viewpoints_, result_.warnings);
   for (const Parameter& p : parameters_.parameters()) {
-    result_.parameters.push_back(
-        {p.name, p.unit, p.shape(), Moments(p.numbers(), options_.keep_batches)});
+    result_.parameters.push_back({p.name, p.unit, p.shape(), Moments(p.numbers())});
   }
 }
 
@@ -393,6 +403,7 @@ void BackwardPass::collect(const PathBatch& batch, const BatchResult& made) {
   for (size_t i = 0; i < made.sums.size(); ++i) {
     result_.parameters[i].moments.add_batch(made.sums[i], batch.count());
   }
+  if (options_.each_batch) options_.each_batch(batch.count(), made.sums);
   all_.merge(made.figures);
   result_.contributions += made.contributions;
   result_.spp += batch.count();

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <utility>
 
+#include "integrators/methods/render_seeds.h"
 #include "limn/core/error.h"
 #include "limn/core/names.h"
 #include "limn/integrators/backward.h"
-#include "limn/integrators/render.h"
 
 namespace limn {
 
@@ -178,26 +178,23 @@ LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
     throw InputError(fmt::format("a pyramid of {} levels: the film has 1 to {}", levels,
                                  most_pyramid_levels(scene)));
   }
-  RenderResult images[2];
-  for (int i = 0; i < 2; ++i) {
-    RunSettings own = settings;
-    own.store = nullptr;  // of what the loss is for
-    // Of streams that no other seed has.
-    if (!of.same_samples) own.seed = mix_bits(mix_bits(settings.seed) + 1 + i);
-    const bool known = of.same_samples && i > 0;
-    images[i] = known ? images[0] : render(scene, own, {.method = of.method});
-  }
+  std::vector<uint64_t> seeds{settings.seed};
+  // Of streams that no other seed has.
+  const uint64_t stream = mix_bits(settings.seed);
+  if (!of.same_samples) seeds = {mix_bits(stream + 1), mix_bits(stream + 2)};
+  const auto rendered = render_seeds(scene, settings, seeds, {.method = of.method});
+  const RenderResult &a = rendered.front(), &b = rendered.back();
   LossResult result;
-  result.spp = std::min(images[0].spp, images[1].spp);
-  if (images[0].non_finite.count + images[1].non_finite.count > 0) {
-    throw InputError("loss: " + images[images[0].non_finite.count == 0].non_finite.message());
+  result.spp = std::min(a.spp, b.spp);
+  if (a.non_finite.count + b.non_finite.count > 0) {
+    throw InputError("loss: " + (a.non_finite.count > 0 ? a : b).non_finite.message());
   }
   if (result.spp == 0) return result;
-  const size_t values = images[0].radiance.size();
+  const size_t values = a.radiance.size();
   Level finest{target.width, target.height, pixel_weights(scene, mask), {}, {}, {}};
   for (size_t i = 0; i < values; ++i) {
-    finest.a.push_back(images[0].radiance.mean(i));
-    finest.b.push_back(images[1].radiance.mean(i));
+    finest.a.push_back(a.radiance.mean(i));
+    finest.b.push_back(b.radiance.mean(i));
     finest.target.push_back(target.channels == 3 ? target.data[i] : target.data[i / 3]);
   }
   std::vector<double> adjoint(values);
@@ -212,7 +209,7 @@ LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
     result.adjoint.data[i] = static_cast<float>(adjoint[i]);
     // To first order, with half of the adjoint for each image.
     const double slope = 0.5 * adjoint[i];
-    const double both = images[0].radiance.variance(i) + images[1].radiance.variance(i);
+    const double both = a.radiance.variance(i) + b.radiance.variance(i);
     variance += slope * slope * (of.same_samples ? 2 * both : both);
   }
   result.error = std::sqrt(variance);

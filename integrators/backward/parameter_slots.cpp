@@ -7,14 +7,15 @@
 
 namespace limn {
 
-namespace {
-
-std::vector<Parameter> resolved(const Scene& scene, const std::vector<std::string>& names) {
+std::vector<Parameter> reverse_parameters(const Scene& scene,
+                                          const std::vector<std::string>& names) {
   if (names.empty()) return list_parameters(scene);
   std::vector<Parameter> parameters;
   for (const std::string& name : names) parameters.push_back(find_parameter_or_array(scene, name));
   return parameters;
 }
+
+namespace {
 
 // The object among a BSDF and those inside it that acts on one side; null if that is black.
 std::shared_ptr<Bsdf> object_of(const std::shared_ptr<Bsdf>& bsdf, const Bsdf* side) {
@@ -88,7 +89,7 @@ class ParameterSlots::Values {
 };
 
 ParameterSlots::ParameterSlots(const Scene& scene, const std::vector<std::string>& names)
-    : parameters_(resolved(scene, names)), scene_(deep_copy(scene)) {
+    : parameters_(reverse_parameters(scene, names)), scene_(deep_copy(scene)) {
   slots_.scene = &scene_;
   slots_.meshes.resize(scene.shapes.size());
   free_.shapes.assign(scene.shapes.size(), false);

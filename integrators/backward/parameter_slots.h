@@ -14,6 +14,10 @@
 
 namespace limn {
 
+// Those that BackwardOptions::parameters names. InputError for unknown ones.
+std::vector<Parameter> reverse_parameters(const Scene& scene,
+                                          const std::vector<std::string>& names);
+
 class ParameterSlots {
  public:
   // names: as BackwardOptions::parameters. InputError for unknown ones.

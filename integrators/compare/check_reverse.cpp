@@ -1,7 +1,9 @@
 // Reverse mode against forward mode: the sum over pixels of a random adjoint times the derivative.
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
+#include "integrators/backward/parameter_slots.h"
 #include "integrators/estimates/batches.h"
 #include "integrators/methods/term_estimator.h"
 #include "limn/core/error.h"
@@ -58,40 +60,38 @@ Image random_texels(const Environment::Map& map, uint64_t seed) {
   return field;
 }
 
-// A parameter in forward mode, and what a gradient of reverse mode is dotted with.
+// A parameter in forward mode, and what the numbers of one in reverse mode are dotted with.
 struct Compared {
   std::string name;
   Parameter forward;
-  const ParameterAdjoint* reverse;
+  size_t reverse;  // place of that one
   std::vector<double> weights;
 };
 
 // Of a colour each channel.
-std::vector<Compared> compared(const Scene& scene, const ParameterAdjoint& reverse, uint64_t seed) {
-  const Parameter parameter = find_parameter_or_array(scene, reverse.name);
+std::vector<Compared> compared(const Scene& scene, const Parameter& parameter, size_t place,
+                               uint64_t seed) {
   if (parameter.colour) {
     std::vector<Compared> channels;
     for (size_t c = 0; c < 3; ++c) {
-      const std::string name = reverse.name + "." + "rgb"[c];
-      channels.push_back({name, find_parameter(scene, name), &reverse, std::vector<double>(3)});
+      const std::string name = parameter.name + "." + "rgb"[c];
+      channels.push_back({name, find_parameter(scene, name), place, std::vector<double>(3)});
       channels.back().weights[c] = 1;
     }
     return channels;
   }
-  if (parameter.size == 1) return {{reverse.name, parameter, &reverse, {1.0}}};
+  if (parameter.size == 1) return {{parameter.name, parameter, place, {1.0}}};
   if (parameter.array.size() == 3) {
     const Image field = random_texels(scene.environment->map(), seed);
-    return {{reverse.name,
-             texel_field(scene, field),
-             &reverse,
-             {field.data.begin(), field.data.end()}}};
+    return {
+        {parameter.name, texel_field(scene, field), place, {field.data.begin(), field.data.end()}}};
   }
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     if (parameter.velocities(scene, ShapeId(s)).empty()) continue;
     const std::vector<Vec3d> field = random_field(scene.shapes[s].mesh, seed);
     std::vector<double> weights;
     for (const Vec3d& v : field) weights.insert(weights.end(), {v.x, v.y, v.z});
-    return {{reverse.name, vertex_field(scene, ShapeId(s), field), &reverse, weights}};
+    return {{parameter.name, vertex_field(scene, ShapeId(s), field), place, weights}};
   }
   throw std::logic_error("an array that moves no shape: " + parameter.name);
 }
@@ -131,14 +131,23 @@ std::vector<Moments> forward_sums(const Scene& scene, std::span<const Parameter>
   return moments;
 }
 
-Moments reverse_sum(const ParameterAdjoint& adjoint, const std::vector<double>& weights) {
-  Moments sum(1);
-  for (const Moments::Batch& batch : adjoint.moments.kept()) {
-    double total = 0;
-    for (size_t i = 0; i < weights.size(); ++i) total += batch.sums[i] * weights[i];
-    sum.add_batch({total}, batch.samples);
-  }
-  return sum;
+// Moments of dot products by reverse mode, one for each of `list`. Of batches nothing else is kept.
+std::vector<Moments> reverse_sums(const Scene& scene, const std::vector<Compared>& list,
+                                  const BackwardOptions& options, const Image& adjoint,
+                                  const RunSettings& settings) {
+  std::vector<Moments> moments(list.size(), Moments(1));
+  BackwardOptions own = options;
+  own.batches = 64;  // not tuned: many degrees of freedom
+  own.each_batch = [&](int samples, const std::vector<std::vector<double>>& sums) {
+    for (size_t i = 0; i < list.size(); ++i) {
+      const std::vector<double>& numbers = sums[list[i].reverse];
+      const auto& weights = list[i].weights;
+      const double sum = std::inner_product(weights.begin(), weights.end(), numbers.begin(), 0.0);
+      moments[i].add_batch({sum}, samples);
+    }
+  };
+  backward(scene, adjoint, own, settings);
+  return moments;
 }
 
 // The difference of two means as a standard normal z: Student's t with Welch's degrees of freedom.
@@ -155,28 +164,25 @@ std::vector<ReverseCheck> check_reverse(const Scene& scene, const BackwardOption
                                         const RunSettings& settings) {
   if (settings.spp < 2) throw InputError("check --reverse needs two samples per pixel");
   const Image adjoint = random_adjoint(scene.film, mix_bits(settings.seed));
-  BackwardOptions kept = options;
-  kept.keep_batches = true;
-  kept.batches = 64;  // not tuned: many degrees of freedom
-  const BackwardResult reverse = backward(scene, adjoint, kept, settings);
   std::vector<Compared> list;
   std::vector<Parameter> parameters;
-  for (const ParameterAdjoint& p : reverse.parameters) {
-    for (const Compared& one : compared(scene, p, settings.seed)) {
+  const std::vector<Parameter> asked = reverse_parameters(scene, options.parameters);
+  for (size_t place = 0; place < asked.size(); ++place) {
+    for (const Compared& one : compared(scene, asked[place], place, settings.seed)) {
       list.push_back(one);
       parameters.push_back(one.forward);
     }
   }
+  const auto reverse = reverse_sums(scene, list, options, adjoint, settings);
   RunSettings other = settings;
   other.seed = mix_bits(mix_bits(settings.seed) + 3);
   const auto sums = forward_sums(scene, parameters, options, adjoint, other);
   if (settings.interrupted && settings.interrupted->load()) return {};
   std::vector<ReverseCheck> checks;
   for (size_t i = 0; i < list.size(); ++i) {
-    const Moments backward_sum = reverse_sum(*list[i].reverse, list[i].weights);
     ReverseCheck check{list[i].name, sums[i].mean(0), std::sqrt(sums[i].variance(0)),
-                       backward_sum.mean(0), std::sqrt(backward_sum.variance(0))};
-    if (check.forward != check.reverse) check.z = score(sums[i], backward_sum);
+                       reverse[i].mean(0), std::sqrt(reverse[i].variance(0))};
+    if (check.forward != check.reverse) check.z = score(sums[i], reverse[i]);
     checks.push_back(check);
   }
   return checks;

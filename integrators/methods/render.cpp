@@ -5,6 +5,7 @@
 
 #include "integrators/estimates/batches.h"
 #include "integrators/methods/radiance_estimator.h"
+#include "integrators/methods/render_seeds.h"
 #include "integrators/methods/visibility_estimator.h"
 #include "limn/core/error.h"
 #include "limn/core/names.h"
@@ -82,28 +83,64 @@ void identify(BatchStore& store, const RenderOptions& options) {
 
 std::span<const RenderMethod> render_methods() { return kMethods; }
 
-RenderResult render(const Scene& scene, const RunSettings& settings, const RenderOptions& options) {
-  const Stopwatch watch;
-  if (settings.store) identify(*settings.store, options);
-  std::vector<std::unique_ptr<SampleEstimator>> estimators;
+namespace {
+
+using EstimatorList = std::vector<std::unique_ptr<SampleEstimator>>;
+
+EstimatorList estimators_of(const Scene& scene, const RunSettings& settings,
+                            const RenderOptions& options) {
+  EstimatorList estimators;
   estimators.push_back(make_estimator(scene, settings, options));
   check_memory(estimators);
+  return estimators;
+}
+
+// watch: runs since the job began.
+RenderResult run(const EstimatorList& estimators, const RunSettings& settings,
+                 const Stopwatch& watch, size_t size) {
   RenderResult result;
-  result.radiance = Moments(film_size(scene.film));
+  result.radiance = Moments(size);
   run_batches(estimators, settings, watch, [&](const Batch& batch, const auto& sums) {
     result.radiance.add_batch(sums[0].radiance, batch.count());
     result.rays += sums[0].costs[0].rays;
     result.non_finite.merge(sums[0].non_finite);
     result.spp += batch.count();
   });
+  result.seconds = watch.seconds();
+  return result;
+}
+
+}  // namespace
+
+RenderResult render(const Scene& scene, const RunSettings& settings, const RenderOptions& options) {
+  const Stopwatch watch;
+  if (settings.store) identify(*settings.store, options);
+  const EstimatorList estimators = estimators_of(scene, settings, options);
+  RenderResult result = run(estimators, settings, watch, film_size(scene.film));
   const auto* around = dynamic_cast<const VisibilityEstimator*>(estimators[0].get());
   if (around && around->missed() > 0) {
     result.warnings.push_back(fmt::format(
         "{} integrals did not reach the tolerance {} with {} lines: ask for a larger one",
         around->missed(), options.tolerance, kMostLines));
   }
-  result.seconds = watch.seconds();
   return result;
+}
+
+std::vector<RenderResult> render_seeds(const Scene& scene, const RunSettings& settings,
+                                       std::span<const uint64_t> seeds,
+                                       const RenderOptions& options) {
+  if (find_render_method(options.method).looks_around) {
+    throw InputError(fmt::format("the method \"{}\" makes no radiance", options.method));
+  }
+  RunSettings own = settings;
+  own.store = nullptr;
+  const EstimatorList estimators = estimators_of(scene, own, options);
+  std::vector<RenderResult> results;
+  for (const uint64_t seed : seeds) {
+    own.seed = seed;
+    results.push_back(run(estimators, own, Stopwatch(), film_size(scene.film)));
+  }
+  return results;
 }
 
 std::vector<std::string> trace_sample(const Scene& scene, const RunSettings& settings,

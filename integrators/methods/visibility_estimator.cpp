@@ -184,7 +184,7 @@ Rng VisibilityEstimator::even(const Point& point, uint64_t seed, uint64_t number
 
 FilmPosition VisibilityEstimator::place(const Point& point) const {
   const double x = point.at.x + 0.5, y = point.at.y + 0.5;
-  const FilmPosition whole = sample_pixel_filter(scene_.film, point.at.x, point.at.y,
+  const FilmPosition whole = sample_pixel_filter(scene_.film, filter_, point.at.x, point.at.y,
                                                  even(point, point.seed, point.number));
   if (point.reach == 1) return whole;
   return {x + point.reach * (whole.x - x), y + point.reach * (whole.y - y)};

@@ -335,6 +335,17 @@ TEST_F(Program, AuxiliaryRaysAreForMethodsThatTraceThem) {
   EXPECT_EQ(run(right).status, 4) << run(right).text;
 }
 
+// Whose samplers are other ones than the default method.
+TEST_F(Program, ACheckOfReverseModeNeedsNoSampler) {
+  const std::string check = "check " + scene_ + " --wrt screen.translate.x --spp 16 --reverse";
+  for (const char* more : {"", " --sampler uniform"}) {
+    const auto [status, text] = run(check + more);
+    EXPECT_EQ(status, 0) << text;
+    EXPECT_NE(text.find("screen.translate.x: forward"), std::string::npos) << text;
+  }
+  EXPECT_NE(refused(check + " --sampler fd").find("unknown edge sampler"), std::string::npos);
+}
+
 TEST_F(Program, BadSamples) {
   const std::string gradient =
       "gradient " + scene_ + " --wrt screen.translate.x --method forest -o " + out();

@@ -54,6 +54,19 @@ class Package(unittest.TestCase):
                    if a == "-isystem" or a.startswith("-I")]
         self.assertEqual([os.path.normpath(f) for f in folders], [os.path.join(PREFIX, "include")])
 
+    # As wheels are built. GCC warns of lanes in signatures only where it makes code of them.
+    def test_lanes_compile_for_any_processor_of_the_kind(self):
+        folder = os.path.join(WORK, "portable")
+        run(CMAKE, "-S", ROOT, "-B", folder, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Debug",
+            "-DLIMN_NATIVE=OFF")
+        with open(os.path.join(folder, "compile_commands.json"), encoding="utf-8") as stream:
+            commands = {c["file"]: c["command"] for c in json.load(stream)}
+        command = commands[os.path.join(ROOT, "edgetree", "lobe", "ltc.cpp")]
+        self.assertNotIn("-march", command)
+        done = subprocess.run(command, shell=True, cwd=folder, text=True,
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+        self.assertEqual(done.returncode, 0, done.stdout)
+
     # Files of the package name no folder of the source or of the build.
     def test_package_can_be_moved(self):
         for folder, _, names in os.walk(os.path.join(PREFIX, "lib")):

@@ -1,6 +1,7 @@
 """Reverse mode from Python: against forward mode, with its bits, and for PyTorch."""
 
 import json
+import math
 import os
 import subprocess
 
@@ -100,6 +101,9 @@ def test_a_step_against_the_gradient_lowers_the_loss(scene):
     (lambda s, a: limn.backward(s, a[:5]), "adjoint"),
     (lambda s, a: limn.backward(s, a * np.nan), "adjoint"),
     (lambda s, a: limn.backward(s, a, terms=["none"]), "term"),
+    (lambda s, a: limn.backward(s, a, edge_samples=0), "edges at a vertex"),
+    (lambda s, a: limn.backward(s, a, camera_samples=math.inf), "points on the film"),
+    (lambda s, a: limn.backward(s, a, camera_samples=math.nan), "points on the film"),
     (lambda s, a: limn.image_loss(s, a[:5]), "target"),
     (lambda s, a: limn.image_loss(s, a, "l3"), "known: "),
 ])

@@ -26,6 +26,19 @@ def test_a_colour_is_found_back(scene):
     np.testing.assert_array_equal(fit.scenes[0]["clay.reflectance"], fit.values["clay.reflectance"])
 
 
+def test_one_call_is_a_fit_and_its_run(scene):
+    target = limn.render(scene, spp=64, seed=9)
+    seen = []
+    one = limn.fit(scene, target, "clay.reflectance", 3, lambda record: seen.append(record.step),
+                   spp=2, seed=1, step=5)  # fmt: skip
+    other = limn.Fit(scene, target, "clay.reflectance", spp=2, seed=1, step=5)
+    other.run(3)
+    assert seen == [0, 1, 2]
+    np.testing.assert_array_equal(one.values["clay.reflectance"], other.values["clay.reflectance"])
+    with pytest.raises(TypeError, match="sppp"):
+        limn.fit(scene, target, "clay.reflectance", 1, sppp=2)
+
+
 def test_bounds_hold(scene):
     least = scene["clay.reflectance"].min() - 0.01  # the target is black, and no step so short
     target = np.zeros((scene.height, scene.width, 3))

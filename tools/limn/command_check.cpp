@@ -189,7 +189,7 @@ class CheckCommand final : public Command {
     options.parameters = parameters_;
     options.terms = options_.terms;
     // The default method moves directions, which reverse mode does not.
-    if (options_.method != CheckOptions{}.method) options.sampler = options_.method;
+    if (options_.method != method_types().front().name) options.sampler = options_.method;
     const RunSettings settings = make_settings(common_, scene, "check --reverse");
     const std::vector<ReverseCheck> checks = check_reverse(scene, options, settings);
     if (checks.empty()) {

@@ -108,17 +108,16 @@ void bind_backward(nb::module_& m) {
         options.camera_samples = camera_samples;
         options.batches = batches;
         if (batches < 1) throw InputError("batches must be 1 or more");
-        if (edge_samples < 1) throw InputError("edge_samples must be 1 or more");
-        if (!(camera_samples > 0)) throw InputError("camera_samples must be positive");
         return backward_of(scene, to_image(adjoint), options, {spp, seed, seconds, threads, store},
                            progress);
       },
       nb::arg("scene"), nb::arg("adjoint"), nb::arg("names") = nb::none(),
       nb::arg("spp") = nb::none(), nb::arg("seed") = nb::none(),
       nb::arg("terms") = nb::make_tuple(), nb::arg("uniform_pixels") = false,
-      nb::arg("edge_samples") = 1, nb::arg("camera_samples") = 1.0, nb::arg("batches") = 16,
-      nb::arg("seconds") = 0.0, nb::arg("threads") = 0, nb::arg("progress") = nb::none(),
-      nb::arg("sampler") = BackwardOptions{}.sampler, nb::arg("_store").none() = nb::none(),
+      nb::arg("edge_samples") = 1, nb::arg("camera_samples") = BackwardOptions{}.camera_samples,
+      nb::arg("batches") = 16, nb::arg("seconds") = 0.0, nb::arg("threads") = 0,
+      nb::arg("progress") = nb::none(), nb::arg("sampler") = BackwardOptions{}.sampler,
+      nb::arg("_store").none() = nb::none(),
       nb::sig(
           "def backward(scene: Scene, adjoint: numpy.typing.ArrayLike, names: str | "
           "collections.abc.Sequence[str] | None = None, spp: int | None = None, seed: int | None "

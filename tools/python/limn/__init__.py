@@ -39,6 +39,7 @@ from ._limn import (
 )
 from .dicts import Transform, load_dict
 from .errors import InputError, NonFiniteError, UnknownParameterError
+from .fits import fit
 from .meshes import write_ply
 from .parts import Part, merge, part
 
@@ -63,6 +64,7 @@ __all__ = [
     "backward",
     "check",
     "compare",
+    "fit",
     "gradient",
     "image_loss",
     "info",
