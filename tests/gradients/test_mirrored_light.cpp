@@ -280,6 +280,25 @@ TEST(MirroredLight, EdgesBeforeTheGlare) {
   }
 }
 
+// Of all that the view stands for, in parts of edges.
+double length_held(const GlareEdges& glare, const EdgeSamplerInput& edges,
+                   const GlareEdges::View& view, const EdgeQuery& query, Rng& rng) {
+  constexpr int kPlaces = 16;
+  double sum = 0;
+  for (uint32_t o = 0; o < edges.objects.size(); ++o) {
+    const EdgeMesh& mesh = edges.objects[o];
+    for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
+      const EdgeRef edge{ShapeId(o), EdgeId(e)};
+      if (!is_candidate(mesh, edge.edge, query.p) || is_own_edge(edges, query, edge)) continue;
+      for (int k = 0; k < kPlaces; ++k) {
+        const double t = (k + rng.uniform()) / kPlaces;
+        if (glare.hold(view, query, {edge, t, 1, 1})) sum += 1.0 / kPlaces;
+      }
+    }
+  }
+  return sum;
+}
+
 // Where points of outlines are drawn before glare and where they are left out elsewhere is the same:
 // the length of all that is left out, in parts of edges, by draws and by looking everywhere. Caps of
 // two lamps overlap; a cube has sharp edges both of whose faces are seen, which are left to others.
@@ -327,26 +346,13 @@ TEST(MirroredLight, EdgesAreDrawnWhereTheyAreLeftOut) {
     std::vector<DirectPoint> points;
     TermCost cost;
     glare.draw(view, query, Rng(12, static_cast<uint64_t>(i), 0), kSamples, cost, points);
-    double length = 0, expected = 0;
+    double length = 0;
     for (const auto& [region, sample] : points) {
       EXPECT_TRUE(glare.hold(view, query, sample));
       length += 1 / (sample.probability * sample.pdf_t * kSamples);
     }
-    for (uint32_t o = 0; o < input.edges().objects.size(); ++o) {
-      const EdgeMesh& mesh = input.edges().objects[o];
-      for (uint32_t e = 0; e < mesh.edges.size(); ++e) {
-        const EdgeRef edge{ShapeId(o), EdgeId(e)};
-        if (!is_candidate(mesh, edge.edge, query.p) || is_own_edge(input.edges(), query, edge))
-          continue;
-        constexpr int kPlaces = 16;
-        for (int k = 0; k < kPlaces; ++k) {
-          const double t = (k + rng.uniform()) / kPlaces;
-          if (glare.hold(view, query, {edge, t, 1, 1})) expected += 1.0 / kPlaces;
-        }
-      }
-    }
     drawn.add(length);
-    left_out.add(expected);
+    left_out.add(length_held(glare, input.edges(), view, query, rng));
   }
   const double error = std::hypot(drawn.standard_error(), left_out.standard_error());
   fmt::print("{} views: drawn {:.4f} +- {:.2g}, left out {:.4f} +- {:.2g}\n", views, drawn.mean(),
