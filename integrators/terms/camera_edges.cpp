@@ -121,7 +121,7 @@ void CameraEdges::add_object(ShapeId object) {
 }
 
 void CameraEdges::add_clip(uint32_t index) {
-  const auto& [a, b] = clips_[index].ends;
+  const Vec3<Dual>&a = clips_[index].ends[0], &b = clips_[index].ends[1];
   const Camera& camera = context_.scene.camera;
   const auto film_a = camera.project(value(a));
   const auto film_b = camera.project(value(b));

@@ -35,7 +35,7 @@ uint32_t LeafBoxes::overlaps(const FloatBox& box) const {
   int32_t apart[kLanes] = {};
   for (int k = 0; k < 3; ++k)
     for (uint32_t lane = 0; lane < kLanes; ++lane)
-      apart[lane] |= (lower[k][lane] > box.upper[k]) | (box.lower[k] > upper[k][lane]);
+      apart[lane] |= int{lower[k][lane] > box.upper[k]} | int{box.lower[k] > upper[k][lane]};
   uint32_t bits = 0;
   for (uint32_t lane = 0; lane < kLanes; ++lane)
     bits |= static_cast<uint32_t>(!apart[lane]) << lane;
