@@ -14,7 +14,7 @@ RadianceEstimator::RadianceEstimator(const Scene& scene, int threads,
                                      std::shared_ptr<const FilmRegions> visible, bool closed,
                                      bool even)
     : scene_(scene),
-      tracer_(make_embree_tracer(scene_, threads)),
+      tracer_(make_embree_tracer(scene_, threads, visible ? visible->faces() : nullptr)),
       lights_(scene_),
       closed_(closed ? std::make_unique<ClosedLight>(scene_, threads) : nullptr),
       mirrored_(closed ? nullptr : MirroredLight::make(scene_, lights_)),

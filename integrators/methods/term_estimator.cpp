@@ -75,7 +75,7 @@ TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> para
       lane_scale_(natural_steps(parameters)),
       tracer_([&] {
         const Stopwatch watch;
-        auto tracer = make_embree_tracer(scene_, threads);
+        auto tracer = make_embree_tracer(scene_, threads, visible ? visible->faces() : nullptr);
         tracer_seconds_ = watch.seconds();
         return tracer;
       }()),

@@ -9,8 +9,6 @@
 
 #include "integrators/estimates/tiles.h"
 #include "limn/core/error.h"
-#include "limn/core/face_copies.h"
-#include "limn/core/face_overlaps.h"
 #include "limn/core/parallel.h"
 #include "limn/core/shading.h"
 #include "limn/integrators/run.h"
@@ -47,10 +45,11 @@ void FilmRegions::check(const Film& film) {
 // Which faces may be seen in which tile, and the regions of a tile.
 class FilmRegions::Builder {
  public:
-  Builder(const Scene& scene, std::span<const limn::Tile> tiles, int threads)
+  Builder(const Scene& scene, const FacesInPlace& faces, std::span<const limn::Tile> tiles,
+          int threads)
       : scene_(scene),
-        copies_(scene),
-        overlaps_(scene, copies_, threads),
+        copies_(faces.copies),
+        overlaps_(faces.overlaps),
         view_(view_of(scene.camera)),
         tiles_(tiles) {
     for (const Shape& shape : scene.shapes) {
@@ -216,8 +215,8 @@ class FilmRegions::Builder {
   }
 
   const Scene& scene_;
-  FaceCopies copies_;
-  FaceOverlaps overlaps_;
+  const FaceCopies& copies_;
+  const FaceOverlaps& overlaps_;
   PlaneView view_;
   std::span<const limn::Tile> tiles_;
   std::vector<uint32_t> first_label_;  // of each shape: labels are faces, counted through
@@ -232,7 +231,8 @@ FilmRegions::FilmRegions(const Scene& scene, int threads, const std::atomic<bool
   check(film_);
   const Stopwatch watch;
   const std::vector<limn::Tile> tiles = make_tiles(film_);
-  const Builder builder(scene, tiles, threads);
+  faces_ = std::make_shared<FacesInPlace>(scene, threads);
+  const Builder builder(scene, *faces_, tiles, threads);
   tiles_.resize(tiles.size());
   parallel_for(tiles.size(), threads, [&](size_t t) { tiles_[t] = builder.build(t, interrupted); });
   seconds_ = watch.seconds();

@@ -1,8 +1,10 @@
 #pragma once
 // What every pixel of a film with a box filter shows: its visible regions, found once.
 #include <atomic>
+#include <memory>
 #include <vector>
 
+#include "limn/core/faces_in_place.h"
 #include "limn/core/scene.h"
 #include "limn/core/visible_regions.h"
 
@@ -14,6 +16,8 @@ class FilmRegions {
   // filter's place, unless the filter is a box.
   FilmRegions(const Scene& scene, int threads, const std::atomic<bool>* interrupted = nullptr);
   static void check(const Film& film);  // the filter
+  // What it had to find of the scene's faces, for a tracer to share.
+  std::shared_ptr<const FacesInPlace> faces() const { return faces_; }
 
   // The face that is seen at a film position in the pixel (x, y) of the crop window [all in pixels
   // of the full film]; none where nothing is.
@@ -55,6 +59,7 @@ class FilmRegions {
   void for_each_region(int x, int y, const Visit& visit) const;
 
   const Film& film_;
+  std::shared_ptr<const FacesInPlace> faces_;
   std::vector<Tile> tiles_;  // as make_tiles lists them
   double seconds_ = 0;
 };

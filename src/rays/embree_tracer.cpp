@@ -12,7 +12,7 @@
 
 #include "limn/core/check.h"
 #include "limn/core/error.h"
-#include "limn/core/face_overlaps.h"
+#include "limn/core/faces_in_place.h"
 #include "limn/core/ray_tracer.h"
 
 namespace limn {
@@ -126,10 +126,11 @@ class EmbreeErrors {
 
 class EmbreeTracer final : public RayTracer {
  public:
-  EmbreeTracer(const Scene& scene, int threads)
+  EmbreeTracer(const Scene& scene, int threads, std::shared_ptr<const FacesInPlace> faces)
       : scene_(scene),
-        copies_(scene),
-        overlaps_(scene, copies_, threads),
+        faces_(faces ? std::move(faces) : std::make_shared<FacesInPlace>(scene, threads)),
+        copies_(faces_->copies),
+        overlaps_(faces_->overlaps),
         settles_(!copies_.empty() || !overlaps_.empty()),
         origin_(origin_of(scene)) {
     const std::string config = "threads=" + std::to_string(threads);
@@ -235,8 +236,9 @@ class EmbreeTracer final : public RayTracer {
   }
 
   const Scene& scene_;
-  FaceCopies copies_;
-  FaceOverlaps overlaps_;
+  std::shared_ptr<const FacesInPlace> faces_;
+  const FaceCopies& copies_;
+  const FaceOverlaps& overlaps_;
   bool settles_;         // whether faces lie in one place
   Vec3d origin_;         // of Embree's coordinates
   EmbreeErrors errors_;  // before what reports to it
@@ -247,7 +249,12 @@ class EmbreeTracer final : public RayTracer {
 }  // namespace
 
 std::unique_ptr<RayTracer> make_embree_tracer(const Scene& scene, int threads) {
-  return std::make_unique<EmbreeTracer>(scene, threads);
+  return make_embree_tracer(scene, threads, nullptr);
+}
+
+std::unique_ptr<RayTracer> make_embree_tracer(const Scene& scene, int threads,
+                                              std::shared_ptr<const FacesInPlace> faces) {
+  return std::make_unique<EmbreeTracer>(scene, threads, std::move(faces));
 }
 
 }  // namespace limn

@@ -1,0 +1,24 @@
+#pragma once
+// What is known of faces that lie in one place, found once for all who ask.
+#include <memory>
+
+#include "limn/core/face_copies.h"
+#include "limn/core/face_overlaps.h"
+#include "limn/core/ray_tracer.h"
+
+namespace limn {
+
+// The scene must outlive it.
+struct FacesInPlace {
+  FacesInPlace(const Scene& scene, int threads) : copies(scene), overlaps(scene, copies, threads) {}
+  FacesInPlace(const FacesInPlace&) = delete;
+  FacesInPlace& operator=(const FacesInPlace&) = delete;
+  FaceCopies copies;
+  FaceOverlaps overlaps;
+};
+
+// make_embree_tracer with these found before, for the same positions; null: it finds them.
+std::unique_ptr<RayTracer> make_embree_tracer(const Scene& scene, int threads,
+                                              std::shared_ptr<const FacesInPlace> faces);
+
+}  // namespace limn
