@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "edgetree/forest/forest_config.h"
+#include "edgetree/bounds/forest_config.h"
 #include "limn/edgetree/edge_sampler.h"
 
 namespace limn {

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "edgetree/forest/forest_config.h"
-#include "edgetree/forest/forest_fit.h"
+#include "edgetree/bounds/forest_config.h"
+#include "edgetree/bounds/forest_fit.h"
 #include "edgetree/forest/forest_node.h"
 #include "limn/core/bounds.h"
 #include "limn/edgetree/edge_sampler.h"

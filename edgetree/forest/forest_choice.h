@@ -3,8 +3,8 @@
 // weight says little.
 #include <vector>
 
+#include "edgetree/bounds/forest_config.h"
 #include "edgetree/forest/choose_root.h"
-#include "edgetree/forest/forest_config.h"
 #include "edgetree/forest/forest_query.h"
 
 namespace limn {

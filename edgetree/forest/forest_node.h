@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "edgetree/bounds/quadric_pair.h"
 #include "edgetree/forest/forest_motion.h"
-#include "edgetree/forest/quadric_pair.h"
 #include "edgetree/simd.h"
 #include "limn/edgetree/edges.h"
 

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <span>
 
-#include "edgetree/forest/forest_fit.h"
-#include "edgetree/forest/split_tree.h"
+#include "edgetree/bounds/forest_fit.h"
+#include "edgetree/bounds/split_tree.h"
 #include "edgetree/simd.h"
 
 namespace limn {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "edgetree/forest/normaliser.h"
+#include "edgetree/bounds/normaliser.h"
 
 namespace limn {
 namespace {

@@ -2,7 +2,7 @@
 // What is stored of the planes of a node: its dual box and its pair of bounding quadrics.
 #include <span>
 
-#include "edgetree/forest/pair_fit.h"
+#include "edgetree/bounds/pair_fit.h"
 
 namespace limn {
 

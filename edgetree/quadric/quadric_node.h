@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "edgetree/bounds/quadric_pair.h"
 #include "edgetree/forest/forest_node.h"
-#include "edgetree/forest/quadric_pair.h"
 #include "limn/edgetree/edges.h"
 
 namespace limn {

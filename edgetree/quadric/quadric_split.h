@@ -2,9 +2,9 @@
 // The shape of the paper's trees: which edges share a node (Sec. 4.1).
 #include <span>
 
-#include "edgetree/forest/forest_fit.h"
-#include "edgetree/forest/lanes.h"
-#include "edgetree/forest/split_tree.h"
+#include "edgetree/bounds/forest_fit.h"
+#include "edgetree/bounds/lanes.h"
+#include "edgetree/bounds/split_tree.h"
 
 namespace limn {
 

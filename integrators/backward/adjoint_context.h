@@ -6,9 +6,9 @@
 
 #include "integrators/backward/edge_motion.h"
 #include "integrators/backward/parameter_slots.h"
+#include "integrators/paths/path.h"
 #include "integrators/terms/camera_edges.h"
 #include "integrators/terms/direct_edges.h"
-#include "integrators/terms/path.h"
 #include "integrators/terms/penumbra_lines.h"
 #include "integrators/terms/shadow_edges.h"
 #include "limn/edgetree/edge_sampler.h"

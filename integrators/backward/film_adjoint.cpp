@@ -6,7 +6,7 @@
 #include "integrators/backward/edge_adjoint.h"
 #include "integrators/backward/path_adjoint.h"
 #include "integrators/estimates/splat.h"
-#include "integrators/terms/film_point.h"
+#include "integrators/film/film_point.h"
 #include "limn/core/reverse.h"
 
 namespace limn {

@@ -3,8 +3,8 @@
 #include "integrators/backward/path_adjoint.h"
 
 #include "integrators/backward/edge_adjoint.h"
-#include "integrators/terms/camera_path.h"
-#include "integrators/terms/path_follow.h"
+#include "integrators/paths/camera_path.h"
+#include "integrators/paths/path_follow.h"
 
 namespace limn {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "integrators/backward/parameter_slots.h"
 #include "integrators/estimates/batches.h"
-#include "integrators/methods/term_estimator.h"
+#include "integrators/pilot/term_estimator.h"
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
 #include "limn/edgetree/edge_sampler_types.h"

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "integrators/film/film_regions.h"
 #include "integrators/methods/hair_gaps.h"
-#include "integrators/terms/film_regions.h"
 #include "limn/core/error.h"
 #include "limn/core/names.h"
 #include "limn/core/parameter.h"

@@ -4,9 +4,9 @@
 #include <utility>
 #include <vector>
 
-#include "integrators/terms/camera_path.h"
-#include "integrators/terms/path_follow.h"
-#include "integrators/terms/path_log.h"
+#include "integrators/paths/camera_path.h"
+#include "integrators/paths/path_follow.h"
+#include "integrators/paths/path_log.h"
 
 namespace limn {
 

@@ -3,8 +3,8 @@
 #include <memory>
 
 #include "integrators/estimates/sample_estimator.h"
-#include "integrators/terms/film_regions.h"
-#include "integrators/terms/path.h"
+#include "integrators/film/film_regions.h"
+#include "integrators/paths/path.h"
 
 namespace limn {
 

@@ -7,14 +7,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "integrators/edges/scene_edges.h"
 #include "integrators/estimates/batches.h"
-#include "integrators/methods/allocation.h"
-#include "integrators/methods/field_fit.h"
-#include "integrators/methods/pilot.h"
+#include "integrators/film/film_regions.h"
 #include "integrators/methods/selection.h"
-#include "integrators/methods/term_estimator.h"
-#include "integrators/terms/film_regions.h"
-#include "integrators/terms/scene_edges.h"
+#include "integrators/pilot/allocation.h"
+#include "integrators/pilot/field_fit.h"
+#include "integrators/pilot/pilot.h"
+#include "integrators/pilot/term_estimator.h"
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
 #include "limn/edgetree/edge_sampler_types.h"

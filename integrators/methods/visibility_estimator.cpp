@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "integrators/terms/camera_path.h"
-#include "integrators/terms/direct_light_check.h"
+#include "integrators/lights/direct_light_check.h"
+#include "integrators/paths/camera_path.h"
 #include "limn/core/error.h"
 
 namespace limn {

@@ -4,11 +4,11 @@
 #include <memory>
 #include <vector>
 
+#include "integrators/contours/line_light.h"
 #include "integrators/estimates/sample_estimator.h"
-#include "integrators/methods/visibility_plan.h"
-#include "integrators/terms/camera_path.h"
-#include "integrators/terms/line_light.h"
-#include "integrators/terms/split_environment.h"
+#include "integrators/lights/split_environment.h"
+#include "integrators/paths/camera_path.h"
+#include "integrators/pilot/visibility_plan.h"
 #include "limn/core/camera.h"
 #include "limn/integrators/render.h"
 

@@ -4,9 +4,9 @@
 #include <span>
 #include <vector>
 
-#include "integrators/terms/clip_curves.h"
-#include "integrators/terms/film_regions.h"
-#include "integrators/terms/path.h"
+#include "integrators/film/clip_curves.h"
+#include "integrators/film/film_regions.h"
+#include "integrators/paths/path.h"
 #include "limn/core/discrete_distribution.h"
 #include "limn/edgetree/edge_sampler.h"
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "integrators/terms/light_regions.h"
+#include "integrators/lights/light_regions.h"
 #include "limn/core/rng.h"
 #include "limn/edgetree/edge_pieces.h"
 #include "limn/integrators/run.h"

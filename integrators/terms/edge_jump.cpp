@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "integrators/terms/near_faces.h"
-#include "integrators/terms/path_follow.h"
+#include "integrators/edges/near_faces.h"
+#include "integrators/paths/path_follow.h"
 #include "limn/core/face_copies.h"
 
 namespace limn {

@@ -1,7 +1,7 @@
 #pragma once
 // The jump of incident radiance across an edge, as seen from a point.
-#include "integrators/terms/light_regions.h"
-#include "integrators/terms/path.h"
+#include "integrators/lights/light_regions.h"
+#include "integrators/paths/path.h"
 #include "limn/edgetree/edge_sampler.h"
 
 namespace limn {

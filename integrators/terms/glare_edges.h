@@ -6,9 +6,9 @@
 #include <optional>
 #include <vector>
 
-#include "integrators/terms/bright_patches.h"
+#include "integrators/lights/bright_patches.h"
+#include "integrators/lights/mirrored_light.h"
 #include "integrators/terms/direct_edges.h"
-#include "integrators/terms/mirrored_light.h"
 #include "integrators/terms/term.h"
 
 namespace limn {

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <bit>
 
-#include "integrators/terms/film_point.h"
-#include "integrators/terms/light_regions.h"
+#include "integrators/film/film_point.h"
+#include "integrators/lights/light_regions.h"
 
 namespace limn {
 

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "integrators/terms/path.h"
+#include "integrators/paths/path.h"
 #include "limn/edgetree/edge_sampler.h"
 
 namespace limn {

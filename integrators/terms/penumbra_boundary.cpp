@@ -8,7 +8,7 @@
 // directions at p changes is left to `direct`.
 #include <fmt/format.h>
 
-#include "integrators/terms/film_point.h"
+#include "integrators/film/film_point.h"
 #include "integrators/terms/penumbra_lines.h"
 #include "integrators/terms/term_table.h"
 #include "integrators/terms/vertex_edges.h"

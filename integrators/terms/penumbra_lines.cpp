@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "integrators/terms/light_regions.h"
-#include "integrators/terms/near_faces.h"
+#include "integrators/edges/near_faces.h"
+#include "integrators/lights/light_regions.h"
 
 namespace limn {
 

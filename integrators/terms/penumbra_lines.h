@@ -2,7 +2,7 @@
 // Lines from regions of light through points of edges, for the term `penumbra`.
 #include <optional>
 
-#include "integrators/terms/path.h"
+#include "integrators/paths/path.h"
 #include "integrators/terms/penumbra.h"
 #include "integrators/terms/vertex_edges.h"
 

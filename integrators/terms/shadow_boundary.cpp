@@ -16,7 +16,7 @@
 // infinity, which follows from dx/dt = m n x (dw/dt x w) (and |n x N| is G's slope on the surface).
 #include <fmt/format.h>
 
-#include "integrators/terms/film_point.h"
+#include "integrators/film/film_point.h"
 #include "integrators/terms/shadow_edges.h"
 #include "integrators/terms/term_table.h"
 #include "integrators/terms/vertex_edges.h"

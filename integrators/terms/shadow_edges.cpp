@@ -5,7 +5,7 @@
 #include <array>
 #include <limits>
 
-#include "integrators/terms/near_faces.h"
+#include "integrators/edges/near_faces.h"
 
 namespace limn {
 namespace {

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "integrators/terms/path.h"
+#include "integrators/paths/path.h"
 #include "limn/core/discrete_distribution.h"
 #include "limn/edgetree/edge_sampler.h"
 

@@ -1,7 +1,7 @@
 // The table of terms, and what they are made from.
 #include "integrators/terms/term.h"
 
-#include "integrators/terms/scene_edges.h"
+#include "integrators/edges/scene_edges.h"
 #include "integrators/terms/term_table.h"
 
 namespace limn {

@@ -10,8 +10,8 @@
 #include <span>
 
 #include "integrators/estimates/sample_estimator.h"
-#include "integrators/terms/light_regions.h"
-#include "integrators/terms/path.h"
+#include "integrators/lights/light_regions.h"
+#include "integrators/paths/path.h"
 #include "integrators/terms/penumbra.h"
 #include "limn/core/dual.h"
 #include "limn/edgetree/edge_sampler_types.h"

@@ -2,7 +2,7 @@
 // choice goes the right way.
 #include <gtest/gtest.h>
 
-#include "integrators/methods/allocation.h"
+#include "integrators/pilot/allocation.h"
 #include "limn/core/error.h"
 #include "limn/integrators/check.h"
 #include "support/meshes.h"

@@ -1,13 +1,13 @@
 // Light in closed form: against formulas, lamps sampled point by point, differences of itself; what
 // must not matter; whole images and derivatives against those of paths.
-#include "integrators/terms/closed_light.h"
+#include "integrators/lights/closed_light.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "integrators/terms/scene_edges.h"
+#include "integrators/edges/scene_edges.h"
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/gradient.h"

@@ -7,8 +7,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "integrators/terms/camera_path.h"
-#include "integrators/terms/film_regions.h"
+#include "integrators/film/film_regions.h"
+#include "integrators/paths/camera_path.h"
 #include "limn/core/face_copies.h"
 #include "limn/core/ray_tracer.h"
 #include "limn/integrators/check.h"

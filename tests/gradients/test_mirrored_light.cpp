@@ -1,10 +1,10 @@
 // The sun's glare on flat gloss: a share of directions is drawn there, and nothing else changes.
-#include "integrators/terms/mirrored_light.h"
+#include "integrators/lights/mirrored_light.h"
 
 #include <gtest/gtest.h>
 
+#include "integrators/paths/path_follow.h"
 #include "integrators/terms/glare_edges.h"
-#include "integrators/terms/path_follow.h"
 #include "integrators/terms/vertex_edges.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/backward.h"

@@ -2,7 +2,7 @@
 // most of the variance.
 #include <gtest/gtest.h>
 
-#include "integrators/methods/term_estimator.h"
+#include "integrators/pilot/term_estimator.h"
 #include "limn/integrators/gradient.h"
 #include "limn/integrators/methods.h"
 #include "limn/integrators/statistics.h"

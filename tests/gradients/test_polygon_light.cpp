@@ -1,6 +1,6 @@
 // Integrals over polygons of directions: closed forms against quadratures, derivatives against
 // differences.
-#include "integrators/terms/polygon_light.h"
+#include "integrators/lights/polygon_light.h"
 
 #include <gtest/gtest.h>
 

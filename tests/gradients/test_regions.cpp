@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "integrators/terms/light_regions.h"
+#include "integrators/lights/light_regions.h"
 #include "limn/core/image.h"
 #include "support/block_runs.h"
 #include "support/check_runs.h"

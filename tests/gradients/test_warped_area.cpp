@@ -5,8 +5,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "integrators/terms/scene_edges.h"
-#include "integrators/terms/warp_field.h"
+#include "integrators/edges/scene_edges.h"
+#include "integrators/paths/warp_field.h"
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/compare.h"

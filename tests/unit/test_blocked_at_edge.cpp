@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "integrators/terms/path.h"
+#include "integrators/paths/path.h"
 #include "support/meshes.h"
 #include "support/scenes.h"
 

@@ -104,8 +104,11 @@ struct Rooms {
 const std::vector<Rooms>& all_rooms() {
   static const std::vector<Rooms> rooms = {
       {"src", {"base", "regions", "mesh", "image", "bsdf", "light", "rays", "scene", "scene_file"}},
-      {"edgetree", {"edges", "lobe", "light", "forest", "quadric", "baselines", "rejection"}},
-      {"integrators", {"estimates", "terms", "methods", "backward", "fit", "compare"}},
+      {"edgetree",
+       {"edges", "lobe", "light", "bounds", "forest", "quadric", "baselines", "rejection"}},
+      {"integrators",
+       {"estimates", "edges", "lights", "contours", "paths", "film", "terms", "pilot", "methods",
+        "backward", "fit", "compare"}},
   };
   return rooms;
 }

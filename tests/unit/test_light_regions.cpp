@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "integrators/terms/light_regions.h"
-#include "integrators/terms/split_environment.h"
+#include "integrators/lights/light_regions.h"
+#include "integrators/lights/split_environment.h"
 #include "limn/edgetree/edge_pieces.h"
 #include "support/environment_maps.h"
 #include "support/meshes.h"

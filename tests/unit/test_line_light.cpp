@@ -1,14 +1,14 @@
 // Visibility by lines between silhouettes: W against faces counted one by one, closed forms, rays
 // and paths, and what must not matter.
-#include "integrators/terms/line_light.h"
+#include "integrators/contours/line_light.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <set>
 
-#include "integrators/terms/camera_path.h"
-#include "integrators/terms/closed_light.h"
+#include "integrators/lights/closed_light.h"
+#include "integrators/paths/camera_path.h"
 #include "limn/core/error.h"
 #include "limn/integrators/compare_images.h"
 #include "limn/integrators/render.h"

@@ -1,5 +1,5 @@
 // Faces nearer to an edge than a ray of floats can tell: found, and met where they are.
-#include "integrators/terms/near_faces.h"
+#include "integrators/edges/near_faces.h"
 
 #include <gtest/gtest.h>
 

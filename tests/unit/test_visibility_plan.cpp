@@ -1,5 +1,5 @@
 // What a pilot takes for a part of the light, told by looks whose variances and costs are known.
-#include "integrators/methods/visibility_plan.h"
+#include "integrators/pilot/visibility_plan.h"
 
 #include <gtest/gtest.h>
 

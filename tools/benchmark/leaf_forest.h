@@ -2,7 +2,7 @@
 // An experiment: the edge forest with leaves of many edges in place of nodes of edges.
 #include <memory>
 
-#include "edgetree/forest/forest_config.h"
+#include "edgetree/bounds/forest_config.h"
 #include "limn/edgetree/edge_sampler.h"
 
 namespace limn {

@@ -1,0 +1,106 @@
+#pragma once
+// Light that a point receives past all that is in the way, integrated along lines between contours
+// without a ray (after Nowrouzezahrai, Baran, Mitchell, Jarosz 2014): how open its sky is, and
+// direct light of area lamps, of constant environments and of maps.
+//
+// One dimension is exact, the other a sum over lines at equal distances whose offset is given:
+// uniform in [0, 1) it makes all results unbiased. Their standard error falls as lines^-1.5.
+#include <atomic>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "integrators/contours/contours.h"
+#include "integrators/contours/isolines.h"
+#include "integrators/contours/radiance_columns.h"
+#include "integrators/lights/light_regions.h"
+#include "limn/core/shading.h"
+
+namespace limn {
+
+struct LineOptions {
+  int lines = 64;  // through the sky; a quarter of them through a lamp
+  // Above 0: lines, 8 at least, are doubled until the results of two halves differ by at most twice
+  // this part of the result, or until there are kMostLines. That is no more unbiased.
+  double tolerance = 0;
+};
+inline constexpr int kMostLines = 1 << 14;
+
+// What sums over lines have to do, in numbers that are the same on all machines.
+struct LineWork {
+  int64_t lists = 0;        // of contours, in the sky or before a lamp
+  int64_t arcs = 0;         // that these have
+  int64_t crossings = 0;    // of arcs and lines
+  int64_t evaluations = 0;  // by quadrature
+};
+
+class LineLight {
+ public:
+  // The scene and its tracer must outlive it. direct: whether lamps() and environment() are to be
+  // asked; InputError where check() says so, and for lamps that lie in one place. sky: what
+  // environment() is to integrate, the scene's own or a part of it; none: nothing.
+  LineLight(const Scene& scene, const RayTracer& tracer, int threads, const LineOptions& options,
+            bool direct, std::shared_ptr<const Environment> sky);
+
+  // InputError, with the place in the scene's file and what to do, for a scene whose direct light
+  // lines do not know: delta lights, BSDFs that are not diffuse, interpolated normals after
+  // Mitsuba, more than direct light, environments that are neither constant nor a map.
+  static void check(const Scene& scene);
+
+  // The part of the directions above the face's horizon in which a ray would leave the scene.
+  double openness(const ContourPoint& at, double offset) const;
+  // The same weighed by the cosine to the shading normal n, over pi; with n = up it is 1 in the
+  // open.
+  double ambient_occlusion(const ContourPoint& at, const Vec3d& n, double offset) const;
+  // Radiance that the surface scatters towards the viewer of `scattering`, of all lamps, or of the
+  // environment, seen directly [W / (m^2 sr)].
+  Rgb<double> lamps(const SurfacePoint<double>& surface, const Scattering<double>& scattering,
+                    double offset) const;
+  Rgb<double> environment(const SurfacePoint<double>& surface, const Scattering<double>& scattering,
+                          double offset) const;
+  bool has_lamps() const { return !lamps_.empty(); }
+  // How many sums ended at kMostLines above the tolerance, so far.
+  int64_t missed() const { return missed_; }
+  // What the calling thread has done so far, for all of them.
+  static const LineWork& work();
+
+  ContourPoint at(const SurfacePoint<double>& surface, const Vec3d& up) const {
+    return contours_.at(surface, up);
+  }
+
+ private:
+  struct Lamp {
+    Rgb<double> radiance;
+    LampHull hull;  // flat
+    ContourScreen screen;
+  };
+  struct Receiver;
+  Receiver receiver_at(const SurfacePoint<double>& surface,
+                       const Scattering<double>& scattering) const;
+  struct Scratch;
+  static Scratch& scratch();
+
+  // All contours into scratch(), counted.
+  void list(const ContourPoint& at, const DirectionCone& cone, const ContourScreen* screen) const;
+  void check_overlaps(int threads) const;
+  void add_lamp(const Shape& shape);
+  void add_polygon(const LampHull& hull, const Shape& shape);
+  Rgb<double> lamp_light(const Lamp& lamp, const Receiver& receiver, double offset) const;
+  Rgb<double> sky_light(const Receiver& receiver, double offset) const;
+  Rgb<double> map_light(const Receiver& receiver, double offset) const;
+  template <class V, class Piece>
+  V sum_over_lines(const ContourPoint& at, const Pencil& pencil, std::span<const Vec3d> planes,
+                   int w, const V* all, int count, double offset, const Piece& piece) const;
+
+  const Scene& scene_;
+  Contours contours_;
+  LineOptions options_;
+  std::vector<Lamp> lamps_;
+  std::shared_ptr<const Environment> sky_;
+  std::unique_ptr<RadianceColumns> columns_;  // of a map
+  // Lines from its pole, and from the opposite one, dense where it is bright.
+  std::vector<AzimuthWarp> warps_;
+  mutable std::atomic<int64_t> missed_{0};
+};
+
+}  // namespace limn

@@ -1,0 +1,121 @@
+// Edges, light polygons and the environment of a scene, for edge samplers.
+#include "integrators/edges/scene_edges.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "limn/core/face_copies.h"
+#include "limn/core/lights.h"
+#include "limn/edgetree/crossing_curves.h"
+#include "limn/edgetree/touching.h"
+
+namespace limn {
+
+namespace {
+
+// Shapes look alike if they share a BSDF; every emitter looks like itself alone.
+std::vector<TouchingShape> touching_shapes(const Scene& scene) {
+  std::vector<TouchingShape> shapes;
+  std::map<const Bsdf*, uint32_t> first_of_bsdf;
+  for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+    const Shape& shape = scene.shapes[s];
+    const uint32_t look =
+        shape.is_emitter ? s : first_of_bsdf.emplace(shape.bsdf.get(), s).first->second;
+    shapes.push_back({&shape.mesh, look});
+  }
+  return shapes;
+}
+
+}  // namespace
+
+EdgeSamplerInput make_sampler_input(const Scene& scene, int threads) {
+  EdgeSamplerInput input;
+  std::vector<const Mesh*> meshes;
+  for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+    const Shape& shape = scene.shapes[s];
+    const bool black_behind = shape.bsdf->side(false) == nullptr;
+    input.objects.push_back(build_edge_mesh(shape.mesh, black_behind, ShapeId(s)));
+    meshes.push_back(&shape.mesh);
+  }
+  const Vec3d pinhole = value(scene.camera.origin);
+  const std::vector<FacePair> pairs = find_face_pairs(meshes, pinhole, threads);
+  const auto [contacts, parting] =
+      unite_touching_edges(touching_shapes(scene), pairs, pinhole, threads, input.objects);
+  const std::vector<CrossingSegment> crossings = find_crossings(meshes, pairs, threads);
+  if (!crossings.empty() || !contacts.empty())
+    input.objects.push_back(crossing_edges(meshes, crossings, contacts));
+  input.parting = parting;
+  const Lights lights(scene);
+  for (const Light* light : lights.all()) light->add_triangles(input.lights);
+  if (!scene.environment) return input;
+  const Environment& environment = *scene.environment;
+  input.environment_luminance = environment.mean_luminance();
+  if (!environment.is_uniform()) {
+    const auto brightness = [&](const Vec3d& d) {
+      return std::max(0.0, luminance(environment.radiance(d)));
+    };
+    input.environment = std::make_shared<RadiancePyramid>(brightness, 8, 2);
+  }
+  return input;
+}
+
+namespace {
+
+using ShapePair = std::array<ShapeId, 2>;
+
+// Those of lines of contact, not of crossings.
+std::set<ShapePair> pressed_pairs(const EdgeSamplerInput& edges) {
+  std::set<ShapePair> pairs;
+  if (edges.objects.empty() || edges.objects.back().shape.valid()) return pairs;
+  const EdgeMesh& lines = edges.objects.back();
+  for (uint32_t e = 0; e < lines.edges.size(); ++e) {
+    const FacesAround around = lines.around(EdgeId(e));
+    if (around.incidence(0).rim == kNoRim) continue;
+    const auto [first, second] = std::minmax(around.faces[0].shape, around.faces[1].shape);
+    pairs.insert({first, second});
+  }
+  return pairs;
+}
+
+std::string pair_in_text(const Scene& scene, const ShapePair& pair) {
+  const std::string first = name_in_text(scene, pair[0]);
+  if (pair[0] == pair[1]) return fmt::format("faces of {}", first);
+  return fmt::format("{} and {}", first, name_in_text(scene, pair[1]));
+}
+
+}  // namespace
+
+void warn_of_contacts(const Scene& scene, const EdgeSamplerInput* edges,
+                      std::vector<std::string>& warnings) {
+  if (!edges) return;
+  const auto warn = [&](const std::string& text) {
+    if (std::find(warnings.begin(), warnings.end(), text) == warnings.end())
+      warnings.push_back(text);
+  };
+  const std::set<ShapePair> pressed = pressed_pairs(*edges);
+  for (const ShapePair& pair : pressed) {
+    warn(fmt::format(
+        "{} touch, and one moves towards the other or away from it: the derivative is that of "
+        "pressing them together; apart, light comes in between, and the slope is another one "
+        "(differences take the mean of both)",
+        pair_in_text(scene, pair)));
+  }
+  constexpr size_t kMost = 8;
+  size_t told = 0;
+  for (const ShapePair& pair : edges->parting) {
+    if (pressed.count(pair) || ++told > kMost) continue;
+    warn(fmt::format(
+        "{} touch along an edge and move apart or through each other: there the image has a kink, "
+        "and the derivative is that beside a hair's gap between them, which may be the slope of "
+        "neither side (differences take the mean of both); farther apart, or moved together, there "
+        "is no kink",
+        pair_in_text(scene, pair)));
+  }
+  if (told > kMost)
+    warn(fmt::format("{} more pairs of shapes touch and part like that", told - kMost));
+}
+
+}  // namespace limn

@@ -1,0 +1,41 @@
+// From a point of the scene to the film.
+#include "integrators/film/film_point.h"
+
+namespace limn {
+
+std::optional<FilmPoint> film_point(const Scene& scene, FaceRef face, const Vec3d& x) {
+  if (scene.hide_emitters && scene.shape(face.shape).is_emitter) return {};
+  const Camera& camera = scene.camera;
+  const double depth = camera.depth(x);
+  if (!(depth > camera.near_clip && depth < camera.far_clip)) return {};
+  const auto film = camera.project(x);
+  const double border = scene.film.filter.radius;
+  if (film.x < scene.film.crop_x - border || film.y < scene.film.crop_y - border ||
+      film.x > scene.film.crop_x + scene.film.crop_width + border ||
+      film.y > scene.film.crop_y + scene.film.crop_height + border) {
+    return {};
+  }
+  FilmPoint point{film.x, film.y, camera.ray<Dual>(film.x, film.y), {}, 0};
+  point.omega = value(point.ray.direction);
+  point.distance = length(x - value(point.ray.origin));
+  return point;
+}
+
+bool is_hidden(const PathContext& context, const FilmPoint& point, FaceRef face, RayCount& rays) {
+  Ray ray{value(point.ray.origin), point.omega, point.ray.t_min,
+          point.distance * (1 - 0x1p-20)};  // as shadow rays end
+  ray.end = face;
+  ray.skip_emitters = context.scene.hide_emitters;
+  ++rays.shadow;
+  return context.tracer.occluded(ray);
+}
+
+// ds = (W / (2 tan_x))^2 / cos^3 domega, with W the film's width in pixels, tan_x that of half its
+// field of view, and cos to the optical axis.
+double film_per_solid_angle(const Camera& camera, const Vec3d& omega) {
+  const double cosine = dot(omega, value(camera.forward));
+  const double scale = camera.width / (2 * std::tan(camera.fov.v * (kPi / 360)) * camera.x_factor);
+  return scale * scale / (cosine * cosine * cosine);
+}
+
+}  // namespace limn

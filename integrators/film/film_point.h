@@ -1,0 +1,34 @@
+#pragma once
+// Points of the scene as the camera sees them, for terms that find points elsewhere than along the
+// camera's rays.
+#include <optional>
+
+#include "integrators/paths/path.h"
+
+namespace limn {
+
+struct FilmPoint {
+  double x, y;          // film position [pixels of the full film]
+  CameraRay<Dual> ray;  // through it
+  Vec3d omega;          // its unit direction
+  double distance;      // along it
+};
+
+// Where a point of a face is on the film, if nothing hides it. None where no pixel can use it:
+// outside the film and the filter around it, before or behind the clip planes, on an emitter that
+// the camera does not see.
+std::optional<FilmPoint> film_point(const Scene& scene, FaceRef face, const Vec3d& x);
+// The same seen at x, a point nearby.
+inline FilmPoint aimed_at(FilmPoint point, const Vec3d& x) {
+  const Vec3d way = x - value(point.ray.origin);
+  point.distance = length(way);
+  point.omega = way / point.distance;
+  return point;
+}
+// One shadow ray.
+bool is_hidden(const PathContext& context, const FilmPoint& point, FaceRef face, RayCount& rays);
+
+// How much film a direction takes [pixels^2 / sr].
+double film_per_solid_angle(const Camera& camera, const Vec3d& omega);
+
+}  // namespace limn

@@ -1,0 +1,158 @@
+// Caps around the directions where an environment's own samples crowd.
+#include "integrators/lights/bright_patches.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace limn {
+namespace {
+
+// None of these is tuned.
+constexpr int kGrid = 96;         // squared: the directions that are drawn
+constexpr int kCandidates = 192;  // of which this many are tried for centers
+constexpr size_t kMostPatches = 4;
+constexpr int kMostTries = 8;
+constexpr double kWidest = 8 * kPi / 180;  // of a patch [rad]
+constexpr double kRing = 1.1;              // of a ring's inner radius: its outer one
+constexpr double kRim = 1.0 / 16;     // brightness of a ring that belongs to a cap, over its core's
+constexpr double kLeastShare = 0.01;  // of the environment's light
+constexpr double kLeastContrast = 16;  // over the environment's mean
+constexpr double kLeastSquare = 2;     // over that of a uniform environment of the same light
+
+struct Drawn {
+  Vec3d w;
+  double flux;  // luminance over density [W / m^2]
+};
+
+// A point of the unit square for each cell of a grid, stratified, with the cells' corners left out
+// of step by the golden ratio: a map's own cells are then met at all their places.
+std::vector<Drawn> draw(const Environment& environment) {
+  std::vector<Drawn> drawn;
+  constexpr double kGolden = 0.6180339887498949, kSilver = 0.4142135623730951;
+  for (int i = 0; i < kGrid * kGrid; ++i) {
+    const double u = (i % kGrid + std::fmod((i + 1) * kGolden, 1.0)) / kGrid;
+    const double v = (i / kGrid + std::fmod((i + 1) * kSilver, 1.0)) / kGrid;
+    const auto [w, pdf, place] = environment.sample_direction(u, v);
+    const double density = pdf * kGrid * kGrid;
+    const double value = luminance(environment.radiance(w));
+    if (density > 0 && value > 0) drawn.push_back({w, value / density});
+  }
+  return drawn;
+}
+
+double solid_angle(double angle) { return 4 * kPi * std::pow(std::sin(0.5 * angle), 2); }
+
+double angle_between(const Vec3d& a, const Vec3d& b) {
+  return 2 * std::asin(std::min(1.0, 0.5 * length(a - b)));
+}
+
+// A cap of constant radiance, as bright as what is there beyond the surroundings' mean.
+struct Cap {
+  double angle = 0, flux = 0;
+  double square = 0;  // the integral of its squared radiance
+};
+
+// The one around the axis that holds most of the integral of squared radiance, which is what makes
+// samples uneven: for a disc of light the disc, also where it is small and its glow is wide.
+Cap cap_around(const std::vector<Drawn>& drawn, const Vec3d& axis, double least_flux) {
+  std::vector<std::pair<double, double>> near;  // angle, flux
+  constexpr double kOuter = 1.25 * kWidest;
+  const double outer_cosine = std::cos(kOuter);
+  double outside = 0;
+  for (const Drawn& d : drawn) {
+    if (dot(d.w, axis) < outer_cosine) continue;
+    const double angle = angle_between(d.w, axis);
+    if (angle < kWidest) {
+      near.emplace_back(angle, d.flux);
+    } else {
+      outside += d.flux;
+    }
+  }
+  std::sort(near.begin(), near.end());
+  const double around = outside / (solid_angle(kOuter) - solid_angle(kWidest));
+  Cap best;
+  double flux = 0;
+  for (const auto& [angle, one] : near) {
+    flux += one;
+    const double wide = solid_angle(angle), beyond = flux - around * wide;
+    if (flux < least_flux || !(angle > 0) || !(beyond > 0)) continue;
+    const double square = beyond * beyond / wide;
+    if (square > best.square) best = {angle, flux, square};
+  }
+  return best;
+}
+
+// Wider by rings as long as these are bright, too: the rim of a sun is soft, by haze or by the
+// map's texels.
+Cap with_rim(const std::vector<Drawn>& drawn, const Vec3d& axis, Cap cap) {
+  const double core = cap.flux / solid_angle(cap.angle);
+  while (cap.angle * kRing <= kWidest) {
+    const double wider = cap.angle * kRing;
+    double flux = 0;
+    for (const Drawn& d : drawn) {
+      if (angle_between(d.w, axis) <= wider) flux += d.flux;
+    }
+    const double ring = solid_angle(wider) - solid_angle(cap.angle);
+    if (flux - cap.flux < kRim * core * ring) break;
+    cap.angle = wider;
+    cap.flux = flux;
+  }
+  return cap;
+}
+
+// To the middle of the light within the angle.
+Vec3d centered(const std::vector<Drawn>& drawn, const Vec3d& axis, double angle) {
+  const double cosine = std::cos(angle);
+  Vec3d sum{};
+  for (const Drawn& d : drawn) {
+    if (dot(d.w, axis) >= cosine) sum += d.w * d.flux;
+  }
+  return length_squared(sum) > 0 ? normalize(sum) : axis;
+}
+
+Vec3d brightest_axis(const std::vector<Drawn>& drawn, double least_flux) {
+  Vec3d axis = drawn[0].w;
+  Cap best;
+  const auto try_axis = [&](const Vec3d& w) {
+    const Cap cap = cap_around(drawn, w, least_flux);
+    if (!(cap.square > best.square)) return;
+    best = cap;
+    axis = w;
+  };
+  // Odd, or candidates would come from few of the grid's columns and miss what lies in others.
+  const size_t step = drawn.size() / kCandidates | 1;
+  for (size_t i = 0; i < drawn.size(); i += step) {
+    if (best.square == 0 || dot(drawn[i].w, axis) < std::cos(best.angle)) try_axis(drawn[i].w);
+  }
+  for (int i = 0; i < 3; ++i) try_axis(centered(drawn, axis, 1.5 * best.angle));
+  return axis;
+}
+
+}  // namespace
+
+std::vector<BrightPatch> find_bright_patches(const Environment& environment) {
+  std::vector<BrightPatch> patches;
+  if (environment.is_uniform()) return patches;
+  std::vector<Drawn> drawn = draw(environment);
+  double total = 0;
+  for (const Drawn& d : drawn) total += d.flux;
+  const double uniform = total / (4 * kPi);
+  for (int i = 0; i < kMostTries && patches.size() < kMostPatches && !drawn.empty(); ++i) {
+    const Vec3d axis = brightest_axis(drawn, kLeastShare * total);
+    const Cap core = cap_around(drawn, axis, kLeastShare * total);
+    if (!(core.square >= kLeastSquare * uniform * total)) break;
+    if (core.flux < kLeastContrast * uniform * solid_angle(core.angle)) break;
+    const Cap whole = with_rim(drawn, axis, core);
+    const DirectionCap cap{axis, std::sin(whole.angle), std::cos(whole.angle)};
+    const auto apart = [&](const BrightPatch& other) {
+      return angle_between(axis, other.cap.axis) > whole.angle + std::asin(other.cap.sine);
+    };
+    // What is left around a patch is none, but hides others.
+    if (std::all_of(patches.begin(), patches.end(), apart))
+      patches.push_back({cap, whole.flux / solid_angle(whole.angle)});
+    std::erase_if(drawn, [&](const Drawn& d) { return cap.holds(d.w); });
+  }
+  return patches;
+}
+
+}  // namespace limn

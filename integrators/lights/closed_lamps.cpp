@@ -1,0 +1,170 @@
+// Which scenes have their light in closed form, and the planes of their lamps.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "integrators/lights/closed_light.h"
+#include "integrators/lights/direct_light_check.h"
+
+namespace limn {
+namespace {
+
+// Planes of a lamp are told apart beyond so many roundings of its coordinates to floats. Not tuned.
+constexpr double kRoundings = 8 * 0x1p-24;
+constexpr const char* kInstead = "use another method (render: path)";
+
+bool is_diffuse(const Bsdf& bsdf) {
+  const LobeSummary lobe = bsdf.lobe();
+  return lobe.model == &kHemisphere;
+}
+
+[[noreturn]] void refuse(const SourceLocation& where, const std::string& what) {
+  refuse_light("analytic", where, what);
+}
+
+}  // namespace
+
+void check_closed_light(const Scene& scene) {
+  if (scene.max_depth == 1) return;
+  const SourceLocation whole{scene.file};
+  if (scene.max_depth != 2) {
+    refuse(whole, fmt::format("only light that is scattered once has a closed form: set the "
+                              "integrator's max_depth to 2 (it is {}), or {}",
+                              scene.max_depth, kInstead));
+  }
+  if (scene.environment) {
+    refuse(whole, fmt::format("{}: light from all around has no closed form here: {}",
+                              name_in_text("emitter", scene.environment_id), kInstead));
+  }
+  for (const auto& light : scene.delta_lights) {
+    refuse(whole, fmt::format("{}: only area lights are integrated: {}",
+                              name_in_text("emitter", light->id), kInstead));
+  }
+  for (const Shape& shape : scene.shapes) {
+    for (const bool front : {true, false}) {
+      const Bsdf* side = shape.bsdf->side(front);
+      if (!side || is_diffuse(*side)) continue;
+      refuse(shape.where, fmt::format("{}: only diffuse surfaces have a closed form, this is "
+                                      "{}: {}",
+                                      shape_in_text(shape), side->describe(), kInstead));
+    }
+    const bool interpolates = shape.mesh.normal_source != NormalSource::kFace;
+    if (scene.shading == ShadingModel::kMitsuba && interpolates) {
+      refuse(shape.where, fmt::format("{}: its interpolated normals need --shading continuous",
+                                      shape_in_text(shape)));
+    }
+  }
+}
+
+ClosedLight::ClosedLight(const Scene& scene, int threads, By by)
+    : scene_((check_closed_light(scene), scene)),
+      copies_(scene),
+      overlaps_(scene, copies_, threads),
+      tree_(scene),
+      by_(by) {
+  for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+    if (scene.shapes[s].is_emitter && scene.max_depth == 2) add_lamp(ShapeId(s));
+  }
+}
+
+namespace {
+
+// Whether two faces of one plane stay in one, to first order and rounding.
+bool move_alike(const Mesh& mesh, FaceRef first, FaceRef second) {
+  if (mesh.position_tangents.empty()) return true;
+  const auto x = face_corners<Dual>(mesh, first.face), y = face_corners<Dual>(mesh, second.face);
+  const Vec3<Dual> n = normalize(cross(x[1] - x[0], x[2] - x[0]));
+  double speed = 0, apart = 0;
+  for (int k = 0; k < 3; ++k) {
+    const Lanes distance = dot(n, y[k] - x[0]).d;
+    for (int lane = 0; lane < kLanes; ++lane) {
+      apart = std::max(apart, std::fabs(distance[lane]));
+      for (int c = 0; c < 3; ++c) {
+        speed = std::max({speed, std::fabs(x[k][c].d[lane]), std::fabs(y[k][c].d[lane])});
+      }
+    }
+  }
+  return apart <= 1e-5 * speed;
+}
+
+}  // namespace
+
+void ClosedLight::add_lamp(ShapeId id) {
+  const Shape& shape = scene_.shape(id);
+  const Mesh& mesh = shape.mesh;
+  struct Face {
+    FaceRef ref;
+    std::array<Vec3d, 3> corners;
+    Vec3d normal;
+    double area;
+  };
+  std::vector<Face> faces;
+  double size = 0;
+  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+    const FaceRef ref{id, FaceId(f)};
+    if (!has_area(mesh, mesh.faces[f])) continue;
+    const auto c = face_corners<double>(mesh, ref.face);
+    const Vec3d n = cross(c[1] - c[0], c[2] - c[0]);
+    if (!copies_.empty() && copies_.met(ref, -n, false) != ref) continue;
+    faces.push_back({ref, c, normalize(n), length(n)});
+    for (const Vec3d& x : c)
+      size = std::max({size, std::fabs(x.x), std::fabs(x.y), std::fabs(x.z)});
+  }
+  // The largest face knows its plane best.
+  std::stable_sort(faces.begin(), faces.end(),
+                   [](const Face& a, const Face& b) { return a.area > b.area; });
+  const size_t before = lamps_.size();
+  for (const Face& face : faces) {
+    const auto fits = [&](const LampPlane& lamp) {
+      return dot(lamp.plane.n, face.normal) > 0.5 && move_alike(mesh, lamp.faces[0], face.ref) &&
+             std::all_of(face.corners.begin(), face.corners.end(), [&](const Vec3d& x) {
+               return std::fabs(lamp.plane.distance(x)) <= kRoundings * size;
+             });
+    };
+    auto lamp = std::find_if(lamps_.begin() + static_cast<ptrdiff_t>(before), lamps_.end(), fits);
+    if (lamp == lamps_.end()) {
+      LampPlane& added = lamps_.emplace_back();
+      added.shape = id;
+      added.plane = {face.normal, -dot(face.normal, face.corners[0])};
+      added.deviation = 2 * kRoundings * size;
+      lamp = lamps_.end() - 1;
+    }
+    lamp->faces.push_back(face.ref);
+    lamp->hull.insert(lamp->hull.end(), face.corners.begin(), face.corners.end());
+  }
+  if (lamps_.size() - before > kMostPlanes) {
+    refuse(shape.where,
+           fmt::format("{} has {} planes, at most {} are integrated: {}", shape_in_text(shape),
+                       lamps_.size() - before, kMostPlanes, kInstead));
+  }
+  for (size_t i = before; i < lamps_.size(); ++i) finish(lamps_[i]);
+}
+
+// The axes along which the lamp's box is smallest, and what lies in its plane before it.
+void ClosedLight::finish(LampPlane& lamp) const {
+  double least = std::numeric_limits<double>::infinity();
+  for (size_t i = 0; i < lamp.hull.size(); ++i) {
+    const size_t next = i % 3 == 2 ? i - 2 : i + 1;
+    const Vec3d side = lamp.hull[next] - lamp.hull[i];
+    const Vec3d u = normalize(side - lamp.plane.n * dot(side, lamp.plane.n));
+    const Vec3d v = cross(u, lamp.plane.n);  // (u x v) . (-n) = 1
+    double x0 = 1e300, x1 = -1e300, y0 = 1e300, y1 = -1e300;
+    for (const Vec3d& x : lamp.hull) {
+      x0 = std::min(x0, dot(u, x)), x1 = std::max(x1, dot(u, x));
+      y0 = std::min(y0, dot(v, x)), y1 = std::max(y1, dot(v, x));
+    }
+    if (!((x1 - x0) * (y1 - y0) < least)) continue;
+    least = (x1 - x0) * (y1 - y0);
+    lamp.u = u, lamp.v = v;
+    lamp.x0 = x0, lamp.x1 = x1, lamp.y0 = y0, lamp.y1 = y1;
+  }
+  for (const FaceRef face : lamp.faces) {
+    for (const FaceRef other : overlaps_.of(face)) {
+      lamp.in_plane.push_back(other);
+      const FaceRef met = copies_.met(other, -lamp.plane.n, false).value_or(other);
+      if (is_met_first(scene_, met, face, -lamp.plane.n)) lamp.before.push_back(met);
+    }
+  }
+}
+
+}  // namespace limn

@@ -1,0 +1,595 @@
+// Lamps as polygons, what lies before them, and the sums over what is left.
+#include "integrators/lights/closed_light.h"
+
+#include <algorithm>
+#include <memory>
+#include <tuple>
+
+#include "integrators/lights/closed_light_planes.h"
+#include "integrators/lights/polygon_light.h"
+#include "limn/core/reverse.h"
+#include "limn/core/shadow_outlines.h"
+#include "limn/core/visible_regions.h"
+
+namespace limn {
+namespace {
+
+// What is nearer to a point than this part of its distance from the lamp's plane does not shade it:
+// about the rounding of positions. Not tuned.
+constexpr double kNear = 0x1p-26;
+// A window of outlines reaches so many steps of their grid from its middle.
+constexpr double kGridHalf = 0x1p29;
+// A window is wider than its lamp, so that the lamp's sides are inside. Not tuned.
+constexpr double kMargin = 0x1p-10;
+
+}  // namespace
+
+// The point that light falls on.
+struct ClosedLight::Receiver {
+  Vec3d p;
+  Vec3d up;  // unit, of its face, towards the viewer
+  FaceRef face;
+  const EdgeStart* edge;
+  // Of a point on an edge: another face there leaves directions w with wedge . w >= 0.
+  std::optional<Vec3d> wedge = {};
+};
+
+struct ClosedLight::Scratch {
+  // What lines are of a face: its sides, then where it was cut.
+  enum Line { kNearCut = 3, kFarCut, kHorizon, kWedge };
+  // The number of a line of the face with a label.
+  static constexpr uint32_t kLines = 8;
+  struct Corner {
+    Vec3d w;        // from the point
+    uint32_t line;  // of the side that begins here
+  };
+  struct CutPoint {
+    ShadowOutlines::Point at;
+    uint32_t number;    // as they were found
+    uint32_t lines[2];  // that meet there
+    Vec3d w;            // from the point
+  };
+
+  std::vector<const FaceTree::Item*> items;
+  std::vector<FaceRef> faces;  // by label: first the lamp's, then those before it
+  size_t first_item = 0;       // from this label on they are those of `items`
+  size_t lamp_faces = 0;
+  size_t uncut = 0;  // of these, those that the lamp's plane does not cut
+  PlaneWindow window;
+  double near = 0, far = 0;  // depths, towards the lamp's plane, of what is before it
+
+  // By regions.
+  std::vector<SeenFace> seen;
+  std::vector<uint32_t> order;
+  VisibleRegions regions{{}};
+
+  // By outlines.
+  ShadowOutlines outlines;
+  // Of each item of the tree twice the query that last told which way round it is seen, and one
+  // more if it is seen from behind.
+  std::vector<uint64_t> turns;
+  uint64_t query = 0;
+  std::vector<Corner> polygon, clipped;
+  std::vector<ShadowOutlines::Point> points;
+  std::vector<uint32_t> lines;
+  std::vector<CutPoint> cut_points;  // by place, then number
+
+  // Keeps what is not below zero in the polygon.
+  template <class Height, class OnGrid>
+  void clip(const Height& height, uint32_t line, const OnGrid& on_grid) {
+    clipped.clear();
+    for (size_t i = 0; i < polygon.size(); ++i) {
+      const Corner &here = polygon[i], &next = polygon[(i + 1) % polygon.size()];
+      const double h0 = height(here.w), h1 = height(next.w);
+      if (h0 >= 0) clipped.push_back(here);
+      if ((h0 >= 0) == (h1 >= 0)) continue;
+      // The same for both faces beside it.
+      const auto key = [](const Vec3d& w) { return std::tuple(w.x, w.y, w.z); };
+      const bool swapped = key(next.w) < key(here.w);
+      const Vec3d &x0 = swapped ? next.w : here.w, &x1 = swapped ? here.w : next.w;
+      const double a0 = swapped ? h1 : h0, a1 = swapped ? h0 : h1;
+      const Vec3d w = x0 + (x1 - x0) * (a0 / (a0 - a1));
+      clipped.push_back({w, h0 >= 0 ? line : here.line});
+      const auto number = static_cast<uint32_t>(cut_points.size());
+      cut_points.push_back({on_grid(w), number, {here.line, line}, w});
+    }
+    std::swap(polygon, clipped);
+  }
+  void sort_cut_points() {
+    std::sort(cut_points.begin(), cut_points.end(), [](const CutPoint& a, const CutPoint& b) {
+      return std::tie(a.at, a.number) < std::tie(b.at, b.number);
+    });
+  }
+  // The first that was found at a place; null if none was.
+  const CutPoint* cut_point_at(const ShadowOutlines::Point& at) const {
+    const auto found =
+        std::lower_bound(cut_points.begin(), cut_points.end(), at,
+                         [](const CutPoint& cut, const auto& place) { return cut.at < place; });
+    return found != cut_points.end() && found->at == at ? &*found : nullptr;
+  }
+};
+
+bool ClosedLight::is_skipped(FaceRef face, const Receiver& receiver) const {
+  if (face == receiver.face) return true;
+  const bool alone = copies_.empty() && overlaps_.empty();
+  if (!alone && overlaps_.contains(receiver.face, face)) return true;
+  if (!receiver.edge) return false;
+  const auto& around = receiver.edge->around.faces;
+  return std::any_of(around.begin(), around.end(), [&](FaceRef other) {
+    return face == other || (!alone && overlaps_.contains(other, face));
+  });
+}
+
+// Lists the faces that may shade the lamp, after its own; false if it cannot be seen.
+bool ClosedLight::list(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const {
+  const Vec3d &p = receiver.p, a = -lamp.plane.n;
+  const double height = lamp.plane.distance(p);
+  if (!(height > 0)) return false;
+  const bool above = std::any_of(lamp.hull.begin(), lamp.hull.end(),
+                                 [&](const Vec3d& x) { return dot(receiver.up, x - p) > 0; });
+  if (!above) return false;
+
+  const double px = dot(lamp.u, p), py = dot(lamp.v, p);
+  PlaneWindow& window = scratch.window;
+  window.center = {(0.5 * (lamp.x0 + lamp.x1) - px) / height,
+                   (0.5 * (lamp.y0 + lamp.y1) - py) / height};
+  window.half_width = (1 + kMargin) * 0.5 * (lamp.x1 - lamp.x0) / height;
+  window.half_height = (1 + kMargin) * 0.5 * (lamp.y1 - lamp.y0) / height;
+  scratch.near = kNear * height;
+  scratch.far = height - lamp.deviation;
+
+  scratch.faces = lamp.faces;
+  scratch.lamp_faces = lamp.faces.size();
+  scratch.faces.insert(scratch.faces.end(), lamp.before.begin(), lamp.before.end());
+  scratch.uncut = scratch.first_item = scratch.faces.size();
+  scratch.items.clear();
+  if (!(scratch.far > scratch.near)) return true;
+  std::array<HalfSpace, 8> set;
+  size_t count = 0;
+  const auto bound = [&](const Vec3d& n, double offset) { set[count++] = {n, offset - dot(n, p)}; };
+  bound(a * (window.center.x + window.half_width) - lamp.u, 0);
+  bound(lamp.u - a * (window.center.x - window.half_width), 0);
+  bound(a * (window.center.y + window.half_height) - lamp.v, 0);
+  bound(lamp.v - a * (window.center.y - window.half_height), 0);
+  bound(receiver.up, 0);
+  bound(a, 0);
+  bound(-a, scratch.far);
+  if (receiver.wedge) bound(*receiver.wedge, 0);
+  tree_.list(std::span(set).first(count), scratch.items);
+  size_t kept = 0;
+  for (const FaceTree::Item* item : scratch.items) {
+    // What rises above the horizon by rounding alone is the receiver's own plane.
+    const auto rises = [&](const Vec3f& x) {
+      const Vec3d w = cast<double>(x) - p;
+      return dot(receiver.up, w) > 0x1p-49 * (length(p) + length(w));
+    };
+    const auto& x = item->corners;
+    if (!rises(x[0]) && !rises(x[1]) && !rises(x[2])) continue;
+    // What lies in the lamp's plane is before it by the rule, not by how its corners are rounded.
+    const FaceRef first = copies_.first(item->face);
+    if (std::find(lamp.in_plane.begin(), lamp.in_plane.end(), first) != lamp.in_plane.end()) {
+      continue;
+    }
+    if (is_skipped(item->face, receiver)) continue;
+    scratch.faces.push_back(item->face);
+    scratch.items[kept++] = item;
+  }
+  scratch.items.resize(kept);
+  return true;
+}
+
+// The largest first: what is covered already is left at once. Those before the lamp are no nearer
+// than each other: each has a depth of its own, in the order of insertion.
+void ClosedLight::find_regions(const LampPlane& lamp, const Receiver& receiver,
+                               Scratch& scratch) const {
+  const Vec3d a = -lamp.plane.n;
+  const PlaneView lamp_view(receiver.p, lamp.u, lamp.v, a, scratch.near,
+                            std::numeric_limits<double>::max());
+  const PlaneView view(receiver.p, lamp.u, lamp.v, a, scratch.near,
+                       std::max(scratch.far, scratch.near));
+  scratch.seen.assign(scratch.faces.size(), {});
+  std::vector<uint32_t>& order = scratch.order;
+  order.clear();
+  for (uint32_t i = 0; i < scratch.faces.size(); ++i) {
+    const FaceRef ref = scratch.faces[i];
+    const auto corners = face_corners<double>(scene_.shape(ref.shape).mesh, ref.face);
+    const auto face = (i < scratch.uncut ? lamp_view : view).face(i, corners);
+    if (!face) continue;
+    scratch.seen[i] = *face;
+    if (i >= scratch.lamp_faces) order.push_back(i);
+  }
+  const PlaneWindow& window = scratch.window;
+  const auto extent = [&](uint32_t i) {
+    const SeenFace& face = scratch.seen[i];
+    const auto overlap = [](double lower, double upper, double center, double half) {
+      return std::min(upper, center + half) - std::max(lower, center - half);
+    };
+    return overlap(face.lower.x, face.upper.x, window.center.x, window.half_width) *
+           overlap(face.lower.y, face.upper.y, window.center.y, window.half_height);
+  };
+  std::stable_sort(order.begin(), order.end(),
+                   [&](uint32_t i, uint32_t j) { return extent(i) > extent(j); });
+  scratch.regions.reset(window);
+  const auto insert = [&](SeenFace& face, double inverse_depth) {
+    face.inverse_depth = {0, 0, inverse_depth};
+    face.nearest = inverse_depth;
+    face.depth_error = 0;
+    scratch.regions.insert(face);
+  };
+  for (size_t i = 0; i < scratch.lamp_faces; ++i) {
+    SeenFace& face = scratch.seen[i];
+    if (face.side_count == 0) continue;
+    const auto cut = [&](const Vec3d& n) {
+      face.cuts[face.cut_count++] = {dot(n, lamp.u), dot(n, lamp.v), dot(n, a)};
+    };
+    cut(receiver.up);
+    if (receiver.wedge) cut(*receiver.wedge);
+    insert(face, 1);
+  }
+  for (size_t i = 0; i < order.size(); ++i) {
+    insert(scratch.seen[order[i]], 3 - static_cast<double>(i) / static_cast<double>(order.size()));
+  }
+}
+
+// Which way round faces are seen on the grid, where doubles tell. A side between two that are
+// turned alike cancels, so that most faces need not be looked at any closer.
+void ClosedLight::find_turns(const LampPlane& lamp, const Receiver& receiver,
+                             Scratch& scratch) const {
+  const Vec3d a = -lamp.plane.n, &p = receiver.p;
+  const double x_steps = kGridHalf / scratch.window.half_width,
+               y_steps = kGridHalf / scratch.window.half_height;
+  const double steps = std::max(x_steps, y_steps), both = x_steps * y_steps;
+  const auto size_of = [](const Vec3d& x) {
+    return std::fabs(x.x) + std::fabs(x.y) + std::fabs(x.z);
+  };
+  scratch.turns.resize(tree_.size());
+  ++scratch.query;
+  // Farther out the grid's coordinates are themselves off by half a step.
+  constexpr double kMostSteps = 0x1p48;
+  const PlanePoint& center = scratch.window.center;
+  if (!(std::max(std::fabs(center.x), std::fabs(center.y)) * steps < kMostSteps)) return;
+  for (const FaceTree::Item* item : scratch.items) {
+    const Vec3d w0 = cast<double>(item->corners[0]) - p;
+    const Vec3d e1 = cast<double>(item->corners[1]) - p - w0,
+                e2 = cast<double>(item->corners[2]) - p - w0;
+    const double z0 = dot(w0, a), z1 = z0 + dot(e1, a), z2 = z0 + dot(e2, a);
+    const auto [near, far] = std::minmax({z0, z1, z2});
+    if (near < scratch.near || far > scratch.far) continue;  // it is cut
+    // On the grid twice the area is det(w0, w1, w2) both / (z0 z1 z2). A side's coordinates are
+    // below `steps` |e| (near + |w|) / near^2. Corners are rounded to the grid by less than one
+    // step, which changes the area by at most 8 of that and 8 more; the determinant's own rounding
+    // is below 2^-46 of the lengths in it. Before, the quotients are rounded: as if a corner were
+    // moved by 3 * 2^-53 |w|. That is at most 9 * 2^-53 reach^2 side in the determinant, where
+    // `error`, over both near^2, is 8 near reach side / steps at least: 2^-45 reach^2 side by
+    // the limit on steps below.
+    const double volume = dot(cross(e1, e2), w0);
+    const double side = size_of(e1) + size_of(e2), reach = size_of(w0) + side;
+    if (!(steps * reach < kMostSteps * near)) continue;
+    const double error = far * far * far * 8 * (steps * side * (near + reach) + near * near);
+    const double size = std::fabs(volume) - 0x1p-46 * side * side * reach;
+    if (!(size * both * near * near > error)) continue;
+    scratch.turns[tree_.index_of(*item)] = 2 * scratch.query + (volume > 0 ? 1 : 0);
+  }
+}
+
+// Whether it was found to be whole, turned one way. Then it must not be cut: cancelled sides are
+// those of the whole face.
+bool ClosedLight::has_turn(const FaceTree::Item& item, const Scratch& scratch) const {
+  return scratch.turns[tree_.index_of(item)] >= 2 * scratch.query;
+}
+
+// By bits: the sides of a face that cancel.
+uint32_t ClosedLight::cancelled_sides(const FaceTree::Item& item, const Scratch& scratch) const {
+  if (!has_turn(item, scratch)) return 0;
+  const uint64_t turn = scratch.turns[tree_.index_of(item)];
+  uint32_t sides = 0;
+  for (uint32_t k = 0; k < 3; ++k) {
+    const uint32_t other = item.neighbours[k];
+    if (other != FaceTree::kNone && scratch.turns[other] == turn) sides |= 1u << k;
+  }
+  return sides;
+}
+
+// False if a corner is too far out.
+bool ClosedLight::find_outlines(const LampPlane& lamp, const Receiver& receiver,
+                                Scratch& scratch) const {
+  using Point = ShadowOutlines::Point;
+  const Vec3d a = -lamp.plane.n;
+  const PlaneWindow& window = scratch.window;
+  const double x_steps = kGridHalf / window.half_width, y_steps = kGridHalf / window.half_height;
+  bool within = true;
+  const auto on_grid = [&](const Vec3d& w) {
+    const double z = dot(w, a);
+    const double x = (dot(w, lamp.u) / z - window.center.x) * x_steps;
+    const double y = (dot(w, lamp.v) / z - window.center.y) * y_steps;
+    within = within && std::fabs(x) < 0x1p60 && std::fabs(y) < 0x1p60;
+    return within ? Point{std::llround(x), std::llround(y)} : Point{0, 0};
+  };
+  const auto clip = [&](const auto& height, uint32_t line) { scratch.clip(height, line, on_grid); };
+  scratch.outlines.clear();
+  scratch.cut_points.clear();
+  find_turns(lamp, receiver, scratch);
+  for (uint32_t label = 0; label < scratch.faces.size(); ++label) {
+    const bool listed = label >= scratch.first_item;
+    const FaceTree::Item* item = listed ? scratch.items[label - scratch.first_item] : nullptr;
+    const uint32_t cancelled = item ? cancelled_sides(*item, scratch) : 0;
+    if (cancelled == 7) continue;
+    const FaceRef ref = scratch.faces[label];
+    const auto corners = face_corners<double>(scene_.shape(ref.shape).mesh, ref.face);
+    const uint32_t line = label * Scratch::kLines;
+    scratch.polygon.clear();
+    for (uint32_t k = 0; k < 3; ++k) scratch.polygon.push_back({corners[k] - receiver.p, line + k});
+    const auto depth = [&](const Scratch::Corner& corner) { return dot(corner.w, a); };
+    const auto [nearest, farthest] = std::minmax(
+        {depth(scratch.polygon[0]), depth(scratch.polygon[1]), depth(scratch.polygon[2])});
+    const double near = scratch.near, far = scratch.far;
+    // Not by these depths, which may be rounded otherwise than those that its turn was found by.
+    const bool whole = item && has_turn(*item, scratch);
+    if (!whole && nearest < near) {
+      clip([&](const Vec3d& w) { return dot(w, a) - near; }, line + Scratch::kNearCut);
+    }
+    if (!whole && label >= scratch.uncut && farthest > far) {
+      clip([&](const Vec3d& w) { return far - dot(w, a); }, line + Scratch::kFarCut);
+    }
+    const bool of_lamp = label < scratch.lamp_faces;
+    if (of_lamp) {
+      clip([&](const Vec3d& w) { return dot(w, receiver.up); }, line + Scratch::kHorizon);
+      if (receiver.wedge) {
+        clip([&](const Vec3d& w) { return dot(w, *receiver.wedge); }, line + Scratch::kWedge);
+      }
+    }
+    scratch.points.clear();
+    scratch.lines.clear();
+    for (const Scratch::Corner& corner : scratch.polygon) {
+      scratch.points.push_back(on_grid(corner.w));
+      scratch.lines.push_back(corner.line);
+    }
+    if (!within) return false;
+    if (scratch.points.size() > 2) {
+      scratch.outlines.add(scratch.points, scratch.lines, of_lamp, cancelled);
+    }
+  }
+  scratch.sort_cut_points();
+  return true;
+}
+
+// The polygons of a lamp that a point sees, of their true lines.
+template <class S>
+class ClosedLight::View {
+ public:
+  View(const ClosedLight& light, const LampPlane& lamp, const Receiver& receiver, const Vec3<S>& p,
+       Scratch& scratch)
+      : light_(light), lamp_(lamp), receiver_(receiver), p_(p), scratch_(scratch) {}
+
+  // Appends the sides of all regions: their sum is that of the whole.
+  void add_regions(std::vector<PolygonSide<S>>& all) const {
+    std::vector<PolygonSide<S>> polygon;
+    std::vector<Vec3d> units;
+    scratch_.regions.for_each_below(static_cast<uint32_t>(scratch_.lamp_faces),
+                                    [&](uint32_t shown, std::span<const PlanePoint> corners,
+                                        std::span<const VisibleRegions::Side> sides) {
+                                      polygon.resize(sides.size());
+                                      units.resize(sides.size());
+                                      for (size_t i = 0; i < sides.size(); ++i) {
+                                        polygon[i].normal = normal_of(sides[i], shown);
+                                        units[i] = normalize(value(polygon[i].normal));
+                                      }
+                                      for (size_t i = 0; i < sides.size(); ++i) {
+                                        polygon[i].begin =
+                                            meet(units[i == 0 ? sides.size() - 1 : i - 1], units[i],
+                                                 towards(corners[i]));
+                                      }
+                                      for (size_t i = 0; i < sides.size(); ++i) {
+                                        polygon[i].end = polygon[(i + 1) % sides.size()].begin;
+                                      }
+                                      all.insert(all.end(), polygon.begin(), polygon.end());
+                                    });
+  }
+
+  void add_outlines(std::vector<PolygonSide<S>>& all) const {
+    scratch_.outlines.for_each([&](const ShadowOutlines::Piece& piece) {
+      const Vec3d first = towards(piece.first), last = towards(piece.last);
+      Vec3<S> n = normal_of_line<S>(piece.tag, first + last);
+      const Vec3d rounded = cross(first, last);  // positive above
+      if (value(n) == Vec3d{}) n = {S(rounded.x), S(rounded.y), S(rounded.z)};
+      if ((dot(value(n), rounded) > 0) != piece.lit_above) n = -n;
+      const Vec3d from = end_of(piece, piece.from), to = end_of(piece, piece.to);
+      all.push_back(piece.lit_above ? PolygonSide<S>{n, from, to} : PolygonSide<S>{n, to, from});
+    });
+  }
+
+ private:
+  Vec3d towards(const PlanePoint& x) const { return lamp_.u * x.x + lamp_.v * x.y - lamp_.plane.n; }
+
+  Vec3d towards(const ShadowOutlines::Point& x) const {
+    const PlaneWindow& window = scratch_.window;
+    return towards(
+        PlanePoint{window.center.x + static_cast<double>(x.x) / kGridHalf * window.half_width,
+                   window.center.y + static_cast<double>(x.y) / kGridHalf * window.half_height});
+  }
+
+  // Unit direction to an end of a piece.
+  Vec3d end_of(const ShadowOutlines::Piece& piece, const ShadowOutlines::End& end) const {
+    if (end.kind == ShadowOutlines::Kind::kCrossing)
+      return meet(piece.tag, end.tag, piece, towards(end.at));
+    if (const Scratch::CutPoint* cut = scratch_.cut_point_at(end.at)) {
+      return meet(cut->lines[0], cut->lines[1], piece, cut->w);
+    }
+    // A corner of the face: that which is nearer to the point on the grid.
+    const auto x = face_corners<double>(mesh_of(end.tag), face_of(end.tag).face);
+    const uint32_t k = end.tag % Scratch::kLines;
+    const Vec3d there = normalize(towards(end.at));
+    const Vec3d w0 = x[k] - value(p_), w1 = x[(k + 1) % 3] - value(p_);
+    const auto offset = [&](const Vec3d& w) {
+      const double distance = length(w);
+      return distance > 0 ? length_squared(w / distance - there) : 5;
+    };
+    return normalize(offset(w0) <= offset(w1) ? w0 : w1);
+  }
+  Vec3d meet(uint32_t line, uint32_t other, const ShadowOutlines::Piece& piece,
+             const Vec3d& about) const {
+    if (other < line) std::swap(line, other);  // the same for both pieces to the last bit
+    const Vec3d hint = towards(piece.first) + towards(piece.last);
+    return meet(normal_of_line<double>(line, hint), normal_of_line<double>(other, hint), about);
+  }
+  FaceRef face_of(uint32_t line) const { return scratch_.faces[line / Scratch::kLines]; }
+  const Mesh& mesh_of(uint32_t line) const { return light_.scene_.shape(face_of(line).shape).mesh; }
+
+  // Of the plane through p and a line. hint: a direction on it, to tell faces of the lamp apart.
+  template <class T>
+  Vec3<T> normal_of_line(uint32_t line, const Vec3d& hint) const {
+    const uint32_t k = line % Scratch::kLines;
+    const auto constant = [](const Vec3d& n) { return Vec3<T>{T(n.x), T(n.y), T(n.z)}; };
+    if (k == Scratch::kHorizon) return constant(receiver_.up);
+    if (k == Scratch::kWedge) return constant(*receiver_.wedge);
+    if (k == Scratch::kNearCut) return {};
+    const auto x = corners_of<T>(face_of(line));
+    if (k == Scratch::kFarCut) return normal_of_crossing<T>(x, corners_of<T>(lamp_face_at(hint)));
+    return plane_normal<T>(x[k], x[(k + 1) % 3]);
+  }
+  // The face of the lamp that is seen there, or the nearest.
+  FaceRef lamp_face_at(const Vec3d& w) const {
+    FaceRef best = lamp_.faces[0];
+    double deepest = -std::numeric_limits<double>::infinity();
+    for (const FaceRef face : lamp_.faces) {
+      const auto x = face_corners<double>(light_.scene_.shape(face.shape).mesh, face.face);
+      double depth = std::numeric_limits<double>::infinity();
+      for (int k = 0; k < 3; ++k) {  // its corners run clockwise as seen from p
+        const Vec3d n = cross(x[(k + 1) % 3] - value(p_), x[k] - value(p_));
+        depth = std::min(depth, dot(n, w) / length(n));
+      }
+      if (depth > deepest) deepest = depth, best = face;
+    }
+    return best;
+  }
+  // Where a face goes through the lamp's plane: of all planes through their common line that
+  // through p.
+  template <class T>
+  Vec3<T> normal_of_crossing(const std::array<Vec3<T>, 3>& x,
+                             const std::array<Vec3<T>, 3>& y) const {
+    const Vec3<T> n = cross(x[1] - x[0], x[2] - x[0]), m = cross(y[1] - y[0], y[2] - y[0]);
+    return n * dot(m, point<T>() - y[0]) - m * dot(n, point<T>() - x[0]);
+  }
+
+  // Where two lines meet; `about` is where they do on the grid. Lines that are parallel to rounding
+  // meet where they do there.
+  static Vec3d meet(const Vec3d& n, const Vec3d& m, const Vec3d& about) {
+    constexpr double kParallel = 1e-12, kAway = 0.5;  // not tuned
+    const Vec3d there = normalize(about), line = cross(n, m);
+    const double size = length(line);
+    if (!(size > kParallel * length(n) * length(m))) return there;
+    const Vec3d here = line * ((dot(line, there) < 0 ? -1 : 1) / size);
+    return dot(here, there) > kAway ? here : there;
+  }
+
+  // Of the plane through p and a side of a region that shows the lamp's face `shown`, positive
+  // inside.
+  Vec3<S> normal_of(const VisibleRegions::Side& side, uint32_t shown) const {
+    const PlaneFunction& f = side.line;
+    const Vec3d rounded = lamp_.u * f.a + lamp_.v * f.b - lamp_.plane.n * f.c;
+    Vec3<S> n;
+    if (side.side >= 0) {
+      const auto x = corners_of<S>(scratch_.faces[side.label]);
+      n = plane_normal<S>(x[side.side], x[(side.side + 1) % 3]);
+    } else if (side.cut >= 0) {
+      n = normal_of_cut(side, shown);
+    }
+    const Vec3d still = value(n);
+    if (still == Vec3d{}) return {S(rounded.x), S(rounded.y), S(rounded.z)};
+    return dot(still, rounded) < 0 ? -n : n;
+  }
+  Vec3<S> normal_of_cut(const VisibleRegions::Side& side, uint32_t shown) const {
+    const SeenFace& face = scratch_.seen[side.label];
+    if (!face.whole && side.cut == 0) return {};  // just before p
+    if (side.label < scratch_.lamp_faces) {
+      const Vec3d& n = side.cut == (face.whole ? 0 : 1) ? receiver_.up : *receiver_.wedge;
+      return {S(n.x), S(n.y), S(n.z)};
+    }
+    return normal_of_crossing<S>(corners_of<S>(scratch_.faces[side.label]),
+                                 corners_of<S>(scratch_.faces[shown]));
+  }
+  template <class T>
+  std::array<Vec3<T>, 3> corners_of(FaceRef face) const {
+    if constexpr (std::is_same_v<T, Var>) {
+      return corner_leaves(light_.scene_, face);
+    } else {
+      return face_corners<T>(light_.scene_.shape(face.shape).mesh, face.face);
+    }
+  }
+  // The point that light falls on: as it moves, or where it is.
+  template <class T>
+  decltype(auto) point() const {
+    if constexpr (std::is_same_v<T, S>) {
+      return (p_);
+    } else {
+      return (receiver_.p);
+    }
+  }
+  template <class T>
+  Vec3<T> plane_normal(const Vec3<T>& x0, const Vec3<T>& x1) const {
+    if constexpr (std::is_same_v<T, Var>) {
+      return triangle_normal(p_, x0, x1);
+    } else {
+      return cross(x0 - point<T>(), x1 - point<T>());
+    }
+  }
+
+  const ClosedLight& light_;
+  const LampPlane& lamp_;
+  const Receiver& receiver_;
+  const Vec3<S>& p_;
+  Scratch& scratch_;
+};
+
+template <class S>
+Rgb<S> ClosedLight::scattered(const RayTracer& tracer, const SurfacePoint<S>& surface,
+                              const Scattering<S>& scattering, const EdgeStart* edge) const {
+  // On the heap: a shared library has little room for what belongs to threads.
+  static thread_local const auto owned = std::make_unique<Scratch>();
+  Scratch& scratch = *owned;
+  static thread_local std::vector<PolygonSide<S>> sides;
+  const bool front = dot(surface.n_g, value(scattering.wi())) > 0;
+  Receiver receiver{value(surface.p), front ? surface.n_g : -surface.n_g, surface.face, edge};
+  if (edge) receiver.wedge = wedge_at(scene_, tracer, *edge, receiver.up);
+  const Vec3d n_s = front ? value(surface.n_s) : -value(surface.n_s);
+  // At the rim of smooth surfaces normals are bent, and two of them enter the scattering function.
+  const bool bent = !(value(scattering.normal()) == n_s);
+  const double horizon = value(surface.horizon);
+  const std::array<Kink, 3> kinks = {
+      {{value(scattering.normal()), 0}, {n_s, horizon}, {n_s, horizon * (2 - horizon)}}};
+  Rgb<S> sum;
+  for (const LampPlane& lamp : lamps_) {
+    const Shape& shape = scene_.shape(lamp.shape);
+    if (!list(lamp, receiver, scratch)) continue;
+    const View<S> view(*this, lamp, receiver, surface.p, scratch);
+    sides.clear();
+    if (by_ != By::kRegions && find_outlines(lamp, receiver, scratch)) {
+      view.add_outlines(sides);
+    } else {
+      find_regions(lamp, receiver, scratch);
+      view.add_regions(sides);
+    }
+    const std::span<const PolygonSide<S>> lit(sides);
+    Rgb<S> light;
+    if (!bent) {
+      light = scattering.eval(value(scattering.normal())) *
+              ramp_integral(lit, scattering.normal(), surface.horizon);
+    } else {
+      const Vec3d middle = lamp.u * (0.5 * (lamp.x0 + lamp.x1)) +
+                           lamp.v * (0.5 * (lamp.y0 + lamp.y1)) - lamp.plane.n * lamp.plane.offset;
+      light = polygon_integral<S>(lit, normalize(middle - receiver.p), kinks,
+                                  [&](const Vec3d& w) { return scattering.eval(w); });
+    }
+    sum += light * detail::emitter_radiance<S>(shape, lamp.shape);
+  }
+  return sum;
+}
+
+template Rgb<double> ClosedLight::scattered(const RayTracer&, const SurfacePoint<double>&,
+                                            const Scattering<double>&, const EdgeStart*) const;
+template Rgb<Dual> ClosedLight::scattered(const RayTracer&, const SurfacePoint<Dual>&,
+                                          const Scattering<Dual>&, const EdgeStart*) const;
+template Rgb<Var> ClosedLight::scattered(const RayTracer&, const SurfacePoint<Var>&,
+                                         const Scattering<Var>&, const EdgeStart*) const;
+
+}  // namespace limn

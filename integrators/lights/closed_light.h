@@ -1,0 +1,83 @@
+#pragma once
+// Direct light of flat lamps on diffuse surfaces in closed form: what a lamp's polygon sends to a
+// point past all that is in between, without a ray and without chance. The value is a continuous
+// function of the scene, and its derivative that of the same function.
+//
+// The part of a lamp that a point sees is found by exact regions of the lamp's plane
+// (limn/core/visible_regions.h). Lines decide there on a grid; what is added up are the true lines,
+// planes through the point and an edge, and the points where these meet. So differences of values
+// are clean, and cuts between regions cancel. Flat-shaded receivers have Lambert's formula,
+// interpolated normals a quadrature over the regions.
+//
+// After Zhou, Wu, Ramamoorthi, Yan 2021 (5.2), with derivatives by the motion of lines in place of
+// those of corners.
+#include <optional>
+#include <vector>
+
+#include "integrators/edges/edge_sides.h"
+#include "limn/core/face_copies.h"
+#include "limn/core/face_overlaps.h"
+#include "limn/core/face_tree.h"
+#include "limn/core/shading.h"
+
+namespace limn {
+
+// InputError, with the place in the scene's file and what to do, for a scene that has no closed
+// form here: where anything is scattered, a max_depth other than 2, an environment, delta lights,
+// BSDFs that are not diffuse, interpolated normals after Mitsuba.
+void check_closed_light(const Scene& scene);
+
+class ClosedLight {
+ public:
+  // The scene must outlive it. InputError as above, and for a lamp of more than kMostPlanes planes.
+  // by: how the visible part of a lamp is found; regions take much longer; they are the oracle, and
+  // step in where a corner is too far out.
+  enum class By { kOutlines, kRegions };
+  ClosedLight(const Scene& scene, int threads, By by = By::kOutlines);
+
+  static constexpr size_t kMostPlanes = 64;  // of one lamp
+
+  // Radiance that the surface scatters towards the viewer of `scattering`, of all lamps [W / (m^2
+  // sr)]; with its derivative where S is Dual or Var. edge: where the point lies, if on an edge: the limit
+  // from its own face.
+  template <class S>
+  Rgb<S> scattered(const RayTracer& tracer, const SurfacePoint<S>& surface,
+                   const Scattering<S>& scattering, const EdgeStart* edge) const;
+
+ private:
+  // Faces of one lamp in one plane.
+  struct LampPlane {
+    ShapeId shape;
+    std::vector<FaceRef> faces;
+    std::vector<FaceRef> in_plane;  // others in the same plane, the first of copies
+    std::vector<FaceRef> before;    // of these those which rays meet in their place
+    Plane plane;
+    Vec3d u, v;               // across its normal; u, v and the reversed normal are right-handed
+    double x0, x1, y0, y1;    // bounds of its faces along u and v
+    double deviation;         // how far corners may lie off the plane
+    std::vector<Vec3d> hull;  // corners of the faces
+  };
+  struct Receiver;
+  struct Scratch;
+  template <class S>
+  class View;
+
+  void add_lamp(ShapeId shape);
+  void finish(LampPlane& lamp) const;
+  bool is_skipped(FaceRef face, const Receiver& receiver) const;
+  bool list(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;
+  void find_regions(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;
+  void find_turns(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;
+  bool has_turn(const FaceTree::Item& item, const Scratch& scratch) const;
+  uint32_t cancelled_sides(const FaceTree::Item& item, const Scratch& scratch) const;
+  bool find_outlines(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;
+
+  const Scene& scene_;
+  FaceCopies copies_;
+  FaceOverlaps overlaps_;
+  FaceTree tree_;
+  By by_;
+  std::vector<LampPlane> lamps_;
+};
+
+}  // namespace limn

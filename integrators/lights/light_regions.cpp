@@ -1,0 +1,352 @@
+// Lamps as regions of light: their hulls, and cones around these.
+#include "integrators/lights/light_regions.h"
+
+#include <algorithm>
+
+#include "limn/core/bounds.h"
+#include "limn/core/light.h"
+
+namespace limn {
+namespace {
+
+// Lamps of more faces are not asked whether p is behind all of them. Not tuned.
+constexpr size_t kFewFaces = 16;
+// Lamps of more corners are taken for the box around them. Not tuned.
+constexpr size_t kFewCorners = 64;
+// Cones are wider than lamps by this angle [rad], which is beyond rounding: edges on their
+// boundary, a lamp's own among them, are inside. Not tuned.
+constexpr double kSlack = 1e-8;
+
+Vec3d corner(const Mesh& mesh, uint32_t vertex) { return cast<double>(mesh.positions[vertex]); }
+
+std::vector<Vec3d> distinct_corners(const Mesh& mesh) {
+  std::vector<uint32_t> ids;
+  for (const FaceIndices& face : mesh.faces) {
+    for (const uint32_t vertex : face) ids.push_back(mesh.weld[vertex]);
+  }
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  std::vector<Vec3d> corners;
+  for (const uint32_t id : ids) corners.push_back(corner(mesh, id));
+  return corners;
+}
+
+// Planes of faces that have an area.
+std::vector<Plane> face_planes(const Mesh& mesh) {
+  std::vector<Plane> planes;
+  for (const FaceIndices& face : mesh.faces) {
+    const Vec3d a = corner(mesh, face[0]);
+    const Vec3d n = cross(corner(mesh, face[1]) - a, corner(mesh, face[2]) - a);
+    const double n_length = length(n);
+    if (n_length > 0) planes.push_back({n / n_length, -dot(n, a) / n_length});
+  }
+  return planes;
+}
+
+struct Point2 {
+  double x, y;
+};
+double turn(const Point2& a, const Point2& b, const Point2& c) {
+  return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+}
+
+// The convex hull, counter-clockwise (Andrew's monotone chain). What turns by less than
+// `tolerance`, an area, is left out.
+std::vector<Point2> convex_hull(std::vector<Point2> points, double tolerance) {
+  std::sort(points.begin(), points.end(), [](const Point2& a, const Point2& b) {
+    return a.x < b.x || (a.x == b.x && a.y < b.y);
+  });
+  std::vector<Point2> hull;
+  const auto walk = [&](auto begin, auto end) {
+    const size_t first = hull.size();
+    for (auto p = begin; p != end; ++p) {
+      while (hull.size() >= first + 2 && turn(hull[hull.size() - 2], hull.back(), *p) <= tolerance)
+        hull.pop_back();
+      hull.push_back(*p);
+    }
+    hull.pop_back();
+  };
+  walk(points.begin(), points.end());
+  walk(points.rbegin(), points.rend());
+  return hull;
+}
+
+// How far points of the plane reach out of a convex polygon.
+double reach_out(const std::vector<Point2>& points, const std::vector<Point2>& polygon) {
+  double reach = 0;
+  for (size_t i = 0; i < polygon.size(); ++i) {
+    const Point2 &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+    const double side = std::hypot(b.x - a.x, b.y - a.y);
+    for (const Point2& p : points) reach = std::max(reach, -turn(a, b, p) / side);
+  }
+  return reach;
+}
+
+// Makes a flat lamp a polygon; leaves the others as they are.
+void flatten(const std::vector<Plane>& faces, LampHull& hull) {
+  constexpr double kFlat = 1e-5;  // of the radius; not tuned
+  if (faces.empty() || hull.radius == 0) return;
+  const Frame frame(faces[0].n);
+  for (const Plane& face : faces) {
+    if (dot(face.n, frame.n) < 0.5) return;
+  }
+  std::vector<Point2> points;
+  double deviation = 0;
+  for (const Vec3d& x : hull.points) {
+    const Vec3d local = frame.to_local(x - hull.center);
+    points.push_back({local.x, local.y});
+    deviation = std::max(deviation, std::fabs(faces[0].distance(x)));
+  }
+  if (deviation > kFlat * hull.radius) return;
+  const double area = hull.radius * hull.radius;
+  const std::vector<Point2> polygon = convex_hull(points, 1e-12 * area);
+  if (polygon.size() < 3 || polygon.size() > DirectionCone::kMostPlanes) return;
+  hull.flat = true;
+  hull.plane = faces[0];
+  hull.deviation = deviation + reach_out(points, polygon);
+  hull.points.clear();
+  hull.area = 0;
+  for (size_t i = 2; i < polygon.size(); ++i) {
+    hull.area += 0.5 * turn(polygon[0], polygon[i - 1], polygon[i]);
+  }
+  const Vec3d middle = hull.center - frame.n * faces[0].distance(hull.center);
+  for (const Point2& p : polygon) hull.points.push_back(middle + frame.s * p.x + frame.t * p.y);
+}
+
+DirectionCone around_polygon(const LampHull& lamp, const Vec3d& p, double height) {
+  DirectionCone cone;
+  const double nearest = std::max(height, length(lamp.center - p) - lamp.radius);
+  cone.slack = kSlack + 2 * lamp.deviation / nearest;
+  for (size_t i = 0; i < lamp.points.size(); ++i) {
+    const Vec3d a = lamp.points[i] - p, b = lamp.points[(i + 1) % lamp.points.size()] - p;
+    const Vec3d m = cross(b, a);
+    const double m_length = length(m);
+    // Where a side points at p its plane is not known, and left out.
+    if (m_length > 1e-9 * length(a) * length(b)) cone.add(m / m_length);
+  }
+  return cone;
+}
+
+// The octagon around the points as seen from p; no planes where they fill nearly a hemisphere.
+DirectionCone around_points(const LampHull& lamp, const Vec3d& p) {
+  DirectionCone cone;
+  cone.slack = kSlack;
+  const Vec3d to = lamp.center - p;
+  const double distance = length(to);
+  if (distance == 0) return cone;
+  const Frame frame(to / distance);
+  constexpr int kSides = DirectionCone::kMostPlanes;
+  double support[kSides];
+  std::fill_n(support, kSides, -1e300);
+  const double d = std::sqrt(0.5);
+  const double cosines[kSides] = {1, d, 0, -d, -1, -d, 0, d};
+  for (const Vec3d& x : lamp.points) {
+    const Vec3d w = frame.to_local(x - p);
+    if (w.z <= 0.05 * length(w)) return cone;
+    for (int k = 0; k < kSides; ++k) {
+      const double along = cosines[k] * w.x + cosines[(k + 6) % kSides] * w.y;
+      support[k] = std::max(support[k], along / w.z);
+    }
+  }
+  for (int k = 0; k < kSides; ++k) {
+    const Vec3d out = frame.s * cosines[k] + frame.t * cosines[(k + 6) % kSides];
+    cone.add(normalize(frame.n * support[k] - out));
+  }
+  return cone;
+}
+
+}  // namespace
+
+LampHull make_lamp_hull(const Mesh& mesh, ShadingModel shading) {
+  LampHull hull;
+  hull.points = distinct_corners(mesh);
+  Bounds bounds;
+  for (const Vec3d& x : hull.points) bounds.extend(x);
+  hull.center = bounds.center();
+  for (const Vec3d& x : hull.points) hull.radius = std::max(hull.radius, length(x - hull.center));
+  for (const FaceIndices& face : mesh.faces) {
+    const Vec3d a = corner(mesh, face[0]);
+    hull.area += 0.5 * length(cross(corner(mesh, face[1]) - a, corner(mesh, face[2]) - a));
+  }
+  const std::vector<Plane> faces = face_planes(mesh);
+  // Interpolated normals let a lamp shine behind its faces.
+  const bool by_planes =
+      shading == ShadingModel::kContinuous || mesh.normal_source == NormalSource::kFace;
+  if (by_planes && faces.size() <= kFewFaces) hull.faces = faces;
+  flatten(faces, hull);
+  if (hull.flat || hull.points.size() <= kFewCorners) return hull;
+  hull.points.clear();
+  for (int i = 0; i < 8; ++i) {
+    const auto at = [&](int k) { return (i >> k & 1) != 0 ? bounds.upper[k] : bounds.lower[k]; };
+    hull.points.push_back({at(0), at(1), at(2)});
+  }
+  return hull;
+}
+
+std::optional<DirectionCone> cone_around(const LampHull& lamp, const Vec3d& p, const Vec3d& n) {
+  const auto behind = [&](const Plane& face) { return face.distance(p) <= 0; };
+  if (!lamp.faces.empty() && std::all_of(lamp.faces.begin(), lamp.faces.end(), behind)) return {};
+  const auto below = [&](const Vec3d& x) { return dot(n, x - p) + lamp.deviation <= 0; };
+  if (std::all_of(lamp.points.begin(), lamp.points.end(), below)) return {};
+  if (!lamp.flat) return around_points(lamp, p);
+  const double height = lamp.plane.distance(p);
+  return height > 0 ? around_polygon(lamp, p, height) : DirectionCone{};
+}
+
+// The octagon around the cap.
+std::optional<DirectionCone> cone_around(const DirectionCap& cap, const Vec3d& n) {
+  if (dot(n, cap.axis) <= -cap.sine) return {};
+  DirectionCone cone;
+  cone.slack = kSlack;
+  const Frame frame(cap.axis);
+  for (int k = 0; k < DirectionCone::kMostPlanes; ++k) {
+    const double a = 2 * kPi * k / DirectionCone::kMostPlanes;
+    const Vec3d out = frame.s * std::cos(a) + frame.t * std::sin(a);
+    cone.add(cap.axis * cap.sine - out * cap.cosine);
+  }
+  return cone;
+}
+
+LightRegions::LightRegions(const Scene& scene) : scene_(scene) {
+  for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+    const Shape& shape = scene.shapes[s];
+    if (!shape.is_emitter) continue;
+    const double mean = limn::luminance(value(shape.radiance));
+    Region& region = regions_.emplace_back();
+    region.shape = ShapeId(s);
+    region.luminance = mean;
+    region.hull = make_lamp_hull(shape.mesh, scene.shading);
+    if (!region.hull.flat || shape.mesh.faces.size() > kFewFaces) continue;
+    for (uint32_t f = 0; f < shape.mesh.faces.size(); ++f) {
+      region.flat_faces.push_back({region.shape, FaceId(f)});
+    }
+  }
+  hold_all_ = !scene.environment;
+  leave_out_dim_lamps();
+  if (!scene.environment) return;
+  for (const BrightPatch& patch : find_bright_patches(*scene.environment)) {
+    Region& region = regions_.emplace_back();
+    region.luminance = patch.luminance;
+    region.cap = patch.cap;
+  }
+}
+
+void LightRegions::leave_out_dim_lamps() {
+  constexpr size_t kMost = 16;  // not tuned
+  if (regions_.size() <= kMost) return;
+  const auto light = [](const Region& region) { return region.luminance * region.hull.area; };
+  std::vector<double> lights;
+  for (const Region& region : regions_) lights.push_back(light(region));
+  std::nth_element(lights.begin(), lights.begin() + kMost, lights.end(), std::greater<>());
+  for (Region& region : regions_) region.lists_edges = light(region) > lights[kMost];
+}
+
+bool LightRegions::any_in(const Scene& scene) {
+  for (const Shape& shape : scene.shapes) {
+    if (shape.is_emitter) return true;
+  }
+  return scene.environment && !find_bright_patches(*scene.environment).empty();
+}
+
+namespace {
+
+double cap_solid_angle(const DirectionCap& cap) {
+  return 2 * kPi * cap.sine * cap.sine / (1 + cap.cosine);
+}
+
+// A point of a convex polygon, uniform: of a fan of triangles.
+Vec3d draw_in_polygon(const LampHull& lamp, double u1, double u2) {
+  const Vec3d& a = lamp.points[0];
+  double left = u1 * lamp.area;
+  for (size_t i = 2;; ++i) {
+    const Vec3d b = lamp.points[i - 1] - a, c = lamp.points[i] - a;
+    const double part = 0.5 * length(cross(b, c));
+    if (left >= part && i + 1 < lamp.points.size()) {
+      left -= part;
+      continue;
+    }
+    const double root = std::sqrt(std::min(left / part, 1.0));
+    return a + b * (root * (1 - u2)) + c * (root * u2);
+  }
+}
+
+bool is_in_polygon(const LampHull& lamp, const Vec3d& y) {
+  for (size_t i = 0; i < lamp.points.size(); ++i) {
+    const Vec3d &a = lamp.points[i], &b = lamp.points[(i + 1) % lamp.points.size()];
+    if (dot(cross(b - a, y - a), lamp.plane.n) < 0) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+std::optional<DirectionCap> LightRegions::cap_around(const Region& region, const Vec3d& x) const {
+  if (!region.shape.valid()) return region.cap;
+  const Vec3d to = region.hull.center - x;
+  const double distance = length(to), sine = region.hull.radius / distance;
+  if (!(sine > 0 && sine < 1)) return {};
+  return DirectionCap{to / distance, sine, std::sqrt(1 - sine * sine)};
+}
+
+std::optional<Vec3d> LightRegions::draw_direction(size_t k, const Vec3d& x, double u1,
+                                                  double u2) const {
+  const Region& region = regions_[k];
+  if (region.hull.flat) {
+    if (!(region.hull.plane.distance(x) > 0)) return {};
+    return normalize(draw_in_polygon(region.hull, u1, u2) - x);
+  }
+  const auto cap = cap_around(region, x);
+  if (!cap) return {};
+  const double below = u1 * cap->sine * cap->sine / (1 + cap->cosine);  // 1 - the cosine
+  const double sine = std::sqrt(below * (2 - below));
+  const Frame frame(cap->axis);
+  return frame.n * (1 - below) + frame.s * (sine * std::cos(2 * kPi * u2)) +
+         frame.t * (sine * std::sin(2 * kPi * u2));
+}
+
+double LightRegions::direction_pdf(size_t k, const Vec3d& x, const Vec3d& w) const {
+  const Region& region = regions_[k];
+  if (region.hull.flat) {
+    const double height = region.hull.plane.distance(x), cosine = -dot(region.hull.plane.n, w);
+    if (!(height > 0 && cosine > 0)) return 0;
+    const double distance = height / cosine;
+    if (!is_in_polygon(region.hull, x + w * distance)) return 0;
+    return distance * distance / (region.hull.area * cosine);
+  }
+  const auto cap = cap_around(region, x);
+  return cap && cap->holds(w) ? 1 / cap_solid_angle(*cap) : 0;
+}
+
+Rgb<double> LightRegions::emission(size_t k, const SurfacePoint<double>& surface,
+                                   const Vec3d& wi) const {
+  if (surface.face.shape != regions_[k].shape) return {};
+  return surface.emission(wi, scene_.shading);
+}
+
+Rgb<double> LightRegions::emission(const SurfacePoint<double>& surface, const Vec3d& wi) const {
+  return surface.emission(wi, scene_.shading);
+}
+
+Rgb<double> LightRegions::escaped(size_t k, const Vec3d& w) const {
+  const Region& region = regions_[k];
+  if (region.shape.valid() || !region.cap.holds(w)) return {};
+  return scene_.environment->radiance(w);
+}
+
+Rgb<double> LightRegions::escaped(const Vec3d& w) const {
+  for (const Region& region : regions_) {
+    if (!region.shape.valid() && region.cap.holds(w)) return scene_.environment->radiance(w);
+  }
+  return {};
+}
+
+void LightRegions::leave_out(EdgeSamplerInput& input) const {
+  input.lights.clear();
+  if (!input.environment) return;
+  const auto brightness = [&](const Vec3d& w) {
+    return std::max(0.0, limn::luminance(scene_.environment->radiance(w) - escaped(w)));
+  };
+  input.environment = std::make_shared<RadiancePyramid>(brightness, 8, 2);
+}
+
+}  // namespace limn

@@ -1,0 +1,250 @@
+// Where flat glossy surfaces mirror lamps and the bright patches of an environment.
+#include "integrators/lights/mirrored_light.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "limn/core/bounds.h"
+
+namespace limn {
+namespace {
+
+// None of these is tuned.
+constexpr double kWidest = 0.35;    // of a lobe that is worth it [rad]
+constexpr size_t kMostFaces = 256;  // of a mesh that is looked through for flat parts
+constexpr double kFlat = 0x1p-16;   // how far a plane's points may lie off, over the mesh's size
+// Of the light over the plane: the sine of its elevation, or its height over the flat part's radius.
+constexpr double kLeastHeight = 1e-3;
+// What lights send comes back from other surfaces with this share of it.
+constexpr double kScattered = 0.5;
+// What is rounding of a point in the plane, over the flat part's radius.
+constexpr double kInPlane = 0x1p-20;
+
+// Any two unit vectors that are orthogonal to n and to each other.
+std::array<Vec3d, 2> across(const Vec3d& n) {
+  const Vec3d other = std::fabs(n.x) < 0.5 ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0};
+  const Vec3d a = normalize(cross(n, other));
+  return {a, cross(n, a)};
+}
+
+// Where a far light's glare looks the same from, over the height of the point, which is the origin.
+Vec3d start_of(const MirroredLight::Glare& glare) {
+  return glare.toward * ((1 - glare.nearness) / -dot(glare.toward, glare.normal));
+}
+
+}  // namespace
+
+// Faces in one plane.
+struct MirroredLight::FlatPart {
+  Vec3d point, normal;
+  Bounds bounds;
+};
+
+std::vector<MirroredLight::FlatPart> MirroredLight::flat_parts(const Mesh& mesh) {
+  std::vector<FlatPart> parts;
+  if (mesh.faces.size() > kMostFaces) return parts;
+  Bounds all;
+  for (const Vec3f& p : mesh.positions) all.extend(cast<double>(p));
+  const double off = kFlat * length(all.upper - all.lower);
+  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+    const auto corners = face_corners<double>(mesh, FaceId(f));
+    const Vec3d n = cross(corners[1] - corners[0], corners[2] - corners[0]);
+    const double twice = length(n);
+    if (!(twice > 0)) continue;
+    const auto lies_in = [&](const FlatPart& part) {
+      return dot(part.normal, n) > 0 &&
+             std::all_of(corners.begin(), corners.end(), [&](const Vec3d& p) {
+               return std::fabs(dot(p - part.point, part.normal)) <= off;
+             });
+    };
+    auto part = std::find_if(parts.begin(), parts.end(), lies_in);
+    if (part == parts.end()) {
+      parts.push_back({corners[0], n / twice, {}});
+      part = parts.end() - 1;
+    }
+    for (const Vec3d& p : corners) part->bounds.extend(p);
+  }
+  return parts;
+}
+
+std::unique_ptr<MirroredLight> MirroredLight::make(const Scene& scene, const Lights& lights) {
+  const auto narrow = [](const Bsdf* bsdf) {
+    return bsdf && bsdf->lobe().model->width(bsdf->lobe()) < kWidest;
+  };
+  const auto may_mirror = [&](const Shape& shape) {
+    return narrow(shape.bsdf->side(true)) || narrow(shape.bsdf->side(false));
+  };
+  if (scene.max_depth == 1 || scene.max_depth == 2 ||
+      std::none_of(scene.shapes.begin(), scene.shapes.end(), may_mirror)) {
+    return nullptr;
+  }
+  std::unique_ptr<MirroredLight> result(new MirroredLight(lights));
+  const std::vector<Image> sources = result->find_lights(scene);
+  if (sources.empty()) return nullptr;
+  for (const Shape& shape : scene.shapes) {
+    if (!may_mirror(shape)) continue;
+    for (const FlatPart& part : flat_parts(shape.mesh)) {
+      for (const bool front : {true, false}) {
+        const Bsdf* bsdf = shape.bsdf->side(front);
+        if (!narrow(bsdf)) continue;
+        for (const Image& source : sources) {
+          result->add(part, *bsdf, front ? part.normal : -part.normal, source);
+        }
+      }
+    }
+  }
+  if (result->images_.empty()) return nullptr;
+  return result;
+}
+
+// All that is small and bright, in no surface yet; sets what else is seen.
+std::vector<MirroredLight::Image> MirroredLight::find_lights(const Scene& scene) {
+  std::vector<Image> found;
+  const Vec3d middle = bounds_of(scene).center();
+  const auto add_lamp = [&](size_t number, bool infinite, const Vec3d& light, double size) {
+    Image& image = found.emplace_back();
+    image.infinite = infinite;
+    image.light = light;
+    image.size = size;
+    image.lamp = number;
+    image.irradiance = lights_.estimate(number, middle);
+    if (std::isfinite(image.irradiance)) elsewhere_ += kScattered / kPi * image.irradiance;
+  };
+  size_t number = 0;
+  for (const Shape& shape : scene.shapes) {
+    if (!shape.is_emitter) continue;
+    Bounds bounds;
+    double squared = 0;
+    for (const Vec3f& x : shape.mesh.positions) bounds.extend(cast<double>(x));
+    for (const Vec3f& x : shape.mesh.positions) {
+      squared = std::max(squared, length_squared(cast<double>(x) - bounds.center()));
+    }
+    add_lamp(number++, false, bounds.center(), std::sqrt(squared));
+  }
+  if (scene.environment) ++number;
+  for (const auto& delta : scene.delta_lights) {
+    const LightOrigin origin = delta->origin();
+    add_lamp(number++, origin.infinite, origin.infinite ? -value(origin.v) : value(origin.v), 0);
+  }
+  if (!scene.environment) return found;
+  elsewhere_ += scene.environment->mean_luminance();
+  for (const BrightPatch& patch : find_bright_patches(*scene.environment)) {
+    Image& image = found.emplace_back();
+    image.infinite = true;
+    image.light = patch.cap.axis;
+    image.size = patch.cap.sine;
+    image.irradiance = patch.luminance * 2 * kPi * (1 - patch.cap.cosine);
+  }
+  return found;
+}
+
+// Keeps those that mirror the most light.
+void MirroredLight::add(const FlatPart& part, const Bsdf& bsdf, const Vec3d& normal,
+                        const Image& source) {
+  Image image = source;
+  image.bsdf = &bsdf;
+  image.normal = normal;
+  image.center = part.bounds.center();
+  image.radius = 0.5 * part.bounds.diagonal();
+  const Vec3d to = image.infinite ? image.light : image.light - image.center;
+  const double height = dot(to, normal);
+  if (!(height > kLeastHeight * (image.infinite ? 1 : image.radius))) return;
+  image.albedo = std::min(bsdf.lobe().albedo, 1.0);
+  image.width = bsdf.lobe().model->width(bsdf.lobe());
+  if (image.lamp) image.irradiance = lights_.estimate(*image.lamp, image.center);
+  image.light_in_part = image.irradiance * height / length(to) * image.radius * image.radius;
+  images_.push_back(image);
+  std::stable_sort(images_.begin(), images_.end(), [](const Image& a, const Image& b) {
+    return a.light_in_part > b.light_in_part;
+  });
+  if (images_.size() > kMostImages) images_.pop_back();
+}
+
+// Whether p may see the image within the flat part. A near lamp's is that of a far one from a
+// nearer point: where w meets the plane, the half vector turns with w as seen from p and as seen
+// from the lamp, at the distances a and b, together as for a far light at the distance
+// a b / (a + b).
+bool MirroredLight::sees(const Image& image, const Vec3d& p, Glare& glare) const {
+  const Vec3d& n = image.normal;
+  const double height = dot(p - image.center, n);
+  if (!(height > kInPlane * image.radius)) return false;
+  double size = image.size;  // of the light, as the angle that its mirror image has from p
+  if (image.infinite) {
+    glare.light = image.light;
+    glare.nearness = 1;
+    glare.toward = image.light - n * (2 * dot(image.light, n));
+  } else {
+    const double lamp_height = dot(image.light - image.center, n);
+    const Vec3d to = image.light - n * (2 * lamp_height) - p;
+    const double distance = length(to);
+    glare.toward = to / distance;
+    glare.light = glare.toward - n * (2 * dot(glare.toward, n));
+    glare.nearness = lamp_height / (lamp_height + height);
+    size /= distance;
+  }
+  // A half vector that turns turns what is mirrored twice as far.
+  const double lobe = 2 * image.width * glare.nearness;
+  const double spread = std::min(lobe + size, 0.5 * kPi);
+  const auto hit_of = [&](const Vec3d& w) { return p + w * (height / -dot(w, n)); };
+  const Vec3d shown = hit_of(glare.toward);
+  const auto is_inside = [&](const Vec3d& x) { return length(x - image.center) <= image.radius; };
+  if (!is_inside(shown)) {
+    // The steepest direction in which it is still bright.
+    const double sine = -dot(glare.toward, n), turn = std::sin(spread), rest = std::cos(spread);
+    const Vec3d along = glare.toward + n * sine;
+    const double cosine = length(along);
+    const double level = cosine * rest - sine * turn;
+    const Vec3d steep =
+        level > 0 ? along * (level / cosine) - n * (sine * rest + cosine * turn) : -n;
+    if (!is_inside(hit_of(steep))) return false;
+  }
+  glare.bsdf = image.bsdf;
+  glare.normal = n;
+  glare.half_angle = 2 * lobe + size;
+  // Where the light is wider than the lobe, its image is about as wide as the light.
+  glare.cone = lobe < 2 * size ? std::cos(spread) : 2;
+  glare.irradiance = image.albedo * glare.nearness * glare.nearness *
+                     (image.lamp ? lights_.estimate(*image.lamp, shown) : image.irradiance);
+  return true;
+}
+
+// From a point over the plane by `nearness` in place of 1 in the same line of sight, the light is
+// scattered as that of a far one; then the solid angle is that at the point itself.
+double MirroredLight::pdf(const Glare& glare, const Vec3d& w) {
+  if (glare.cone <= 1) {
+    return dot(w, glare.toward) >= glare.cone ? 1 / (2 * kPi * (1 - glare.cone)) : 0;
+  }
+  const double cosine = -dot(w, glare.normal);
+  if (!(cosine > 0)) return 0;
+  const Vec3d x = w / cosine, from = start_of(glare), d = x - from;
+  const double l = length(d), ratio = 1 / (cosine * l);
+  return glare.nearness * ratio * ratio * ratio *
+         glare.bsdf->pdf_solid_angle(glare.normal, glare.light, d / -l);
+}
+
+double MirroredLight::pdf(const Mixture& mixture, const Vec3d& w, double scattered) {
+  if (mixture.share == 0) return scattered;
+  double sum = 0;
+  for (int i = 0; i < mixture.count; ++i) sum += mixture.part[i] * pdf(mixture.glare[i], w);
+  return mixture.share * sum + (1 - mixture.share) * scattered;
+}
+
+std::optional<Vec3d> MirroredLight::sample(const Mixture& mixture, double u, double u1, double u2) {
+  int i = 0;
+  while (i + 1 < mixture.count && u >= mixture.part[i]) u -= mixture.part[i++];
+  const Glare& glare = mixture.glare[i];
+  if (glare.cone <= 1) {
+    const double cosine = 1 - u1 * (1 - glare.cone);
+    const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
+    const auto [a, b] = across(glare.toward);
+    return glare.toward * cosine + a * (sine * std::cos(2 * kPi * u2)) +
+           b * (sine * std::sin(2 * kPi * u2));
+  }
+  const auto scattered = glare.bsdf->sample(glare.normal, glare.light, u1, u2);
+  if (!scattered) return {};
+  const double height = dot(*scattered, glare.normal);
+  if (!(height > 0)) return {};
+  return normalize(start_of(glare) - *scattered * (glare.nearness / height));
+}
+
+}  // namespace limn

@@ -1,0 +1,110 @@
+#pragma once
+// Small bright lights as flat glossy surfaces show them. A diffuse point sees the glare of the sun,
+// or of a lamp, on a glossy floor within a few degrees; its own scattering finds these once in a
+// hundred samples, and each is then a hundred times as bright as the rest: they ruled the squared
+// error of whole images. Scattering functions are reciprocal, so the directions of the glare are
+// those into which the floor scatters the light; where it is far away they are the same from all
+// points, and a near lamp is seen as a far one would be from a nearer point. So a share of a
+// vertex's directions is drawn from there: a mixture of densities, which changes no mean.
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "integrators/lights/bright_patches.h"
+#include "limn/core/lights.h"
+#include "limn/core/scene.h"
+#include "limn/core/shading.h"
+
+namespace limn {
+
+class MirroredLight {
+ public:
+  static constexpr size_t kMostImages = 4;  // not tuned
+  // A light in a flat part of a surface, as one point sees it.
+  struct Glare {
+    const Bsdf* bsdf;   // of the surface
+    Vec3d normal;       // unit, of its lit side
+    Vec3d light;        // unit, from where a perfect mirror would show it towards the light
+    Vec3d toward;       // unit, from the point to there
+    double nearness;    // how far a far light's glare would be seen from, over the distance there
+    double half_angle;  // of the cap of directions that holds most of it [rad]
+    double cone;        // cosine of the angle of the directions, if these are uniform; else > 1
+    double irradiance;  // of its light at the point, across it, without what hides it
+  };
+  // The part that a vertex takes of its directions from each glare.
+  struct Mixture {
+    double share = 0;  // of all together; 0: from the scattering function alone
+    int count = 0;
+    std::array<Glare, kMostImages> glare{};
+    std::array<double, kMostImages> part{};  // sum to 1
+  };
+
+  // Both must outlive it. Null where the scene has no such light or surface.
+  static std::unique_ptr<MirroredLight> make(const Scene& scene, const Lights& lights);
+
+  template <class S>
+  Mixture mixture(const SurfacePoint<S>& surface, const Scattering<S>& scattering) const {
+    Mixture mixture;
+    double sum = 0;
+    for (const Image& image : images_) {
+      Glare& glare = mixture.glare[mixture.count];
+      if (!sees(image, value(surface.p), glare)) continue;
+      const double power = luminance(scattering.eval_value(glare.toward)) * glare.irradiance;
+      if (!(power > 0)) continue;
+      mixture.part[mixture.count++] = power;
+      sum += power;
+    }
+    for (int i = 0; i < mixture.count; ++i) mixture.part[i] /= sum;
+    // Five times as much gave the same error in the demo.
+    if (sum > 0) mixture.share = std::min(sum / (sum + elsewhere_), kMostShare);
+    return mixture;
+  }
+  // Luminance of what is seen beside the glare, about.
+  double elsewhere() const { return elsewhere_; }
+  // The density at the unit direction w [1/sr], of which scattering alone has this one there.
+  static double pdf(const Mixture& mixture, const Vec3d& w, double scattered);
+  // Of directions of one glare.
+  static double pdf(const Glare& glare, const Vec3d& w);
+  // A direction of the glares, from three numbers in [0, 1).
+  static std::optional<Vec3d> sample(const Mixture& mixture, double u, double u1, double u2);
+
+ private:
+  static constexpr double kMostShare = 0.5;  // not tuned
+  // A light in a flat part of a surface.
+  struct Image {
+    const Bsdf* bsdf = nullptr;
+    Vec3d normal;  // unit, of the lit side
+    Vec3d center;  // of a sphere around the flat part
+    double radius = 0;
+    double width = 0, albedo = 0;  // of the lobe
+    bool infinite = false;         // the light is
+    Vec3d light;                   // its center, or the unit direction towards it
+    double size = 0;             // radius of a sphere around it; at infinity the sine of its angle
+    std::optional<size_t> lamp;  // which of all lights it is; none: a patch
+    double irradiance = 0;       // across it, at the part's center
+    double light_in_part = 0;    // how much of it falls on the part
+  };
+  struct FlatPart;
+  explicit MirroredLight(const Lights& lights) : lights_(lights) {}
+  std::vector<Image> find_lights(const Scene& scene);
+  void add(const FlatPart& part, const Bsdf& bsdf, const Vec3d& normal, const Image& source);
+  static std::vector<FlatPart> flat_parts(const Mesh& mesh);
+  bool sees(const Image& image, const Vec3d& p, Glare& glare) const;
+
+  const Lights& lights_;
+  std::vector<Image> images_;
+  double elsewhere_ = 0;
+};
+
+// Of a vertex behind which the path scatters again; none at others.
+template <class S>
+MirroredLight::Mixture mixture_at(const MirroredLight* mirrored, const SurfacePoint<S>& surface,
+                                  const Scattering<S>& scattering, bool scatters_again) {
+  return mirrored && scatters_again ? mirrored->mixture(surface, scattering)
+                                    : MirroredLight::Mixture{};
+}
+
+}  // namespace limn

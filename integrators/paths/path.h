@@ -1,0 +1,172 @@
+#pragma once
+// The path tracer, written once for any scalar: double gives radiance, Dual gives radiance and the
+// interior term of its derivative, Var writes a tape of it. Sampled directions, their densities and
+// MIS weights are constants while the parameters move (solid-angle measure, everywhere), but for
+// directions that move on purpose (direction_field.h, warp_field.h) and the one direction of a
+// light without extent, which follows the parameters.
+//
+// Paths are followed side by side where there are several: each waits for its own divisions, roots
+// and reads, and a processor fills such gaps with the work of the next. A path's own steps, and so
+// its bits, do not depend on what goes beside it.
+#include <cstdint>
+#include <span>
+#include <type_traits>
+
+#include "integrators/edges/near_faces.h"
+#include "integrators/edges/viewpoint.h"
+#include "integrators/lights/closed_light.h"
+#include "integrators/paths/walk.h"
+#include "integrators/paths/warp_field.h"
+#include "limn/core/lights.h"
+#include "limn/core/ray_tracer.h"
+#include "limn/core/reverse.h"
+#include "limn/core/rng.h"
+#include "limn/core/scene.h"
+#include "limn/core/shading.h"
+#include "limn/integrators/run.h"
+
+namespace limn {
+
+struct PathContext {
+  const Scene& scene;
+  const RayTracer& tracer;
+  const Lights& lights;
+  // Takes the place of all light that is scattered; null: paths are sampled.
+  const ClosedLight* closed = nullptr;
+  // From where edges are looked at; needed where paths start beside edges.
+  const Viewpoints* viewpoints = nullptr;
+  // What a share of directions is drawn from; null: none.
+  const MirroredLight* mirrored = nullptr;
+};
+
+// Does nothing at path vertices.
+struct NoVisitor {
+  template <class... A>
+  void operator()(const A&...) const {}
+};
+
+inline double mis_weight(double pdf, double other) {
+  // Power heuristic; written so that huge densities do not overflow.
+  const double ratio = other / pdf;
+  return 1 / (1 + ratio * ratio);
+}
+
+// Where S and Visitor are chosen, path_follow.h is included, which has what is declared here.
+// Visitor: called as visitor(surface, scattering, throughput, motion, step, bounces, key) at every
+// vertex where the path scatters. motion: how directions move there, null where they are held.
+template <class S, class Visitor>
+class PathTracer {
+ public:
+  using Walk = limn::Walk<S, Visitor>;
+  // Side by side. With derivatives 1, 3 and 8 took 1.05, 1.02 and 1.01 of the time that a gradient
+  // of the demo had taken path by path; 16 is not tuned.
+  static constexpr size_t kMostWalks = std::is_same_v<S, double> ? 16 : 8;
+
+  PathTracer(const PathContext& context, RayCount& rays) : c_(context), rays_(rays) {}
+
+  // By the fields of paths that have one. Must outlive the tracer. Only where S carries
+  // derivatives.
+  void move_directions(const MotionRates& rates) {
+    static_assert(std::is_same_v<S, Dual>);
+    rates_ = &rates;
+  }
+  // The directions of all vertices move from now on, on one path at a time. Must outlive the
+  // tracer.
+  void warp_directions(DirectionWarper& warper) {
+    static_assert(std::is_same_v<S, Dual>);
+    warper_ = &warper;
+  }
+  // Takes more light samples and directions at vertices that slide fast. It must outlive the
+  // tracer.
+  void split_by(const MotionRates* rates) { splitting_ = rates; }
+  // How many light samples are averaged at every vertex but the first.
+  void take_light_samples(int count) { light_samples_ = count; }
+
+  // Radiance that arrives at the origins of rays against their directions; rays[i] belongs to
+  // walks[i], at most kMostWalks of them. What cannot be traced has `failed`.
+  void follow_rays(std::span<const StartRay<S>> rays, std::span<Walk> walks);
+  // The same where it is known what they meet: faces[i], or none.
+  void follow_rays(std::span<const StartRay<S>> rays, std::span<const FaceRef> faces,
+                   std::span<Walk> walks);
+  Rgb<S> escaped(const Vec3<S>& direction, int bounces) const;
+
+  // A path that starts on a surface: the radiance that leaves it along wi, emission and everything
+  // scattered within the scene's depth. With x_0 the surface, w_i a direction drawn at x_i with
+  // density p_i, f_i the scattering function times cosine there, and the throughput T_k = f_0 / p_0
+  // ... f_(k-1) / p_(k-1), one path estimates
+  //   L = L_e(x_0) + sum over k of T_k (E_k + f_k / p_k m_k L_e(x_(k+1))),
+  //   E_k = f_k(l) / q_k(l) n_k L_e(l),
+  // l a direction that light sampling draws with density q_k, and m_k = p^2 / (p^2 + q^2) and
+  // n_k = q^2 / (p^2 + q^2) the weights of the power heuristic at either's direction (n_k = 1 for a
+  // delta light). w, l, p, q, m, n are constants when S carries derivatives.
+  void place(Walk& walk, const SurfacePoint<S>& surface, const Vec3<S>& wi) const;
+  void follow_one(Walk& walk) {
+    Walk* const one = &walk;
+    follow({&one, 1});
+  }
+  // Adds all that is scattered along paths that have been placed, at most kMostWalks.
+  void follow(std::span<Walk* const> walks);
+
+ private:
+  template <class Step>
+  static bool guarded(Walk& walk, const Step& step) {
+    try {
+      return step();
+    } catch (const UntraceableRay&) {
+      walk.failed = true;
+      return false;
+    }
+  }
+  // Whether a path that has scattered so often scatters no more.
+  bool is_complete(int bounces) const {
+    return c_.scene.max_depth >= 0 && bounces + 1 >= c_.scene.max_depth;
+  }
+  // path_follow.h
+  void place(Walk& walk, const Vec3<S>& wi) const;
+  void follow_seen(std::span<const StartRay<S>> rays, std::span<Walk> walks);
+  void split(Walk& walk, int more);
+  // path_vertices.h. Those that return bool say whether the path goes on.
+  bool begin_vertex(Walk& walk);
+  bool choose_direction(Walk& walk);
+  bool scatter(Walk& walk);
+  bool escape(Walk& walk) const;
+  bool arrive(Walk& walk);
+  void set_motion(Walk& walk) const;
+  int splits(const SurfacePoint<S>& surface, int copies) const;
+  Rgb<S> emitted(const Walk& walk) const;
+  bool survives_roulette(Walk& walk) const;
+  // The density of the next direction at w, of which scattering alone has this one.
+  double density(const Walk& walk, const Vec3d& w, double scattered) const {
+    return c_.mirrored ? MirroredLight::pdf(walk.mixture, w, scattered) : scattered;
+  }
+  // path_rays.h
+  bool next_hit(Walk& walk);
+  bool shadowed(const Walk& walk);
+  void move_along_edge(SurfacePoint<S>& surface, FaceRef face) const;
+  void fetch_face(FaceRef face) const;
+  void fetch_corners(const Walk& walk) const;
+  void fetch_next(Walk& walk) const;
+  // path_lights.h
+  void draw_light(Walk& walk) const;
+  void draw_light(Walk& walk, const Rng& key) const;
+  void weigh_light(Walk& walk) const;
+  void draw_delta(Walk& walk, const DeltaLight& delta) const;
+  Rgb<S> light_value(const Walk& walk) const;
+  void add_light(Walk& walk) const;
+  void add_lights(Walk& walk, int count);
+  Rgb<S> direct_light(Walk& walk, const Rng& key);
+  Rgb<S> warped_light(const Walk& walk, const Rng& key);
+
+  // With 64, squared error times rays was 1.5 times as large under a moving camera, and the same
+  // elsewhere.
+  static constexpr int kMostSplits = 16;
+  static constexpr int kMostPaths = 64;  // of a sample, see allocation.cpp
+  const PathContext& c_;
+  RayCount& rays_;
+  const MotionRates* rates_ = nullptr;
+  const MotionRates* splitting_ = nullptr;
+  DirectionWarper* warper_ = nullptr;
+  int light_samples_ = 1;
+};
+
+}  // namespace limn

@@ -1,0 +1,134 @@
+#pragma once
+// The path tracer's paths, side by side: from rays or surfaces to their ends. Included by each .cpp
+// that follows paths; it brings all that path.h declares.
+#include <algorithm>
+
+#include "integrators/paths/path.h"
+#include "integrators/paths/path_lights.h"
+#include "integrators/paths/path_rays.h"
+#include "integrators/paths/path_vertices.h"
+#include "limn/core/check.h"
+
+namespace limn {
+
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::follow_rays(std::span<const StartRay<S>> rays,
+                                                std::span<Walk> walks) {
+  DCHECK_LE(walks.size(), kMostWalks);
+  for (size_t i = 0; i < walks.size(); ++i) {
+    Walk& walk = walks[i];
+    guarded(walk, [&] {
+      ++rays_.closest;
+      walk.found = c_.tracer.closest(rays[i].ray, walk.hit);
+      return true;
+    });
+    if (walk.found) fetch_face(walk.hit.face);
+  }
+  for (const Walk& walk : walks) fetch_corners(walk);
+  follow_seen(rays, walks);
+}
+
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::follow_rays(std::span<const StartRay<S>> rays,
+                                                std::span<const FaceRef> faces,
+                                                std::span<Walk> walks) {
+  for (size_t i = 0; i < walks.size(); ++i) {
+    walks[i].found = faces[i].shape.valid();
+    walks[i].hit.face = faces[i];
+  }
+  follow_seen(rays, walks);
+}
+
+template <class S, class Visitor>
+inline Rgb<S> PathTracer<S, Visitor>::escaped(const Vec3<S>& direction, int bounces) const {
+  const bool hidden = bounces == 0 && c_.scene.hide_emitters;
+  if (!c_.scene.environment || hidden) return {};
+  return environment_radiance<S>(*c_.scene.environment, direction);
+}
+
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::place(Walk& walk, const SurfacePoint<S>& surface,
+                                          const Vec3<S>& wi) const {
+  walk.surface = surface;
+  place(walk, wi);
+}
+
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::place(Walk& walk, const Vec3<S>& wi) const {
+  walk.wi = wi;
+  walk.sums.radiance = walk.surface.emission(value(wi), c_.scene.shading);
+}
+
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::follow(std::span<Walk* const> walks) {
+  DCHECK_LE(walks.size(), kMostWalks);
+  Walk* going[kMostWalks];
+  size_t count = walks.size();
+  std::copy(walks.begin(), walks.end(), going);
+  const auto keep = [&](const auto& step) {
+    size_t kept = 0;
+    for (size_t i = 0; i < count; ++i) {
+      if (guarded(*going[i], [&] { return step(*going[i]); })) going[kept++] = going[i];
+    }
+    count = kept;
+  };
+  while (count > 0) {
+    keep([&](Walk& walk) { return begin_vertex(walk); });
+    for (size_t i = 0; i < count; ++i) draw_light(*going[i]);
+    for (size_t i = 0; i < count; ++i) weigh_light(*going[i]);
+    keep([&](Walk& walk) {
+      if (walk.light && shadowed(walk)) walk.light.reset();
+      return true;
+    });
+    for (size_t i = 0; i < count; ++i) add_light(*going[i]);
+    keep([&](Walk& walk) { return choose_direction(walk); });
+    keep([&](Walk& walk) { return scatter(walk); });
+    keep([&](Walk& walk) {
+      walk.found = next_hit(walk);
+      return true;
+    });
+    for (size_t i = 0; i < count; ++i) fetch_next(*going[i]);
+    keep([&](Walk& walk) { return walk.found || escape(walk); });
+    keep([&](Walk& walk) { return arrive(walk); });
+  }
+}
+
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::follow_seen(std::span<const StartRay<S>> rays,
+                                                std::span<Walk> walks) {
+  DCHECK_LE(walks.size(), kMostWalks);
+  Walk* going[kMostWalks];
+  size_t count = 0;
+  for (size_t i = 0; i < walks.size(); ++i) {
+    Walk& walk = walks[i];
+    if (walk.failed) continue;
+    const Vec3<S>&origin = rays[i].origin, &direction = rays[i].direction;
+    if (walk.found) {
+      renew(walk.surface,
+            [&] { return surface_on_ray<S>(c_.scene, walk.hit.face, origin, direction); });
+      place(walk, -direction);
+      going[count++] = &walk;
+    } else {
+      walk.sums.radiance = escaped(direction, walk.bounces);
+    }
+  }
+  follow({going, count});
+}
+
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::split(Walk& walk, int more) {
+  walk.throughput = walk.throughput * (1.0 / more);
+  walk.copies *= more;
+  for (int i = 1; i < more; ++i) {
+    // Beyond the indices of paths that share no vertex.
+    const int index = kMostPaths * (walk.bounces + 1) + i;
+    Walk copy = walk;
+    copy.key = walk.key.copy(Purpose::kPathCopy, index);
+    copy.again = true;
+    follow_one(copy);
+    if (copy.failed) throw UntraceableRay();
+    walk.sums = copy.sums;
+  }
+}
+
+}  // namespace limn

@@ -1,0 +1,125 @@
+#pragma once
+// The path tracer's light sampling: one light drawn at a vertex, weighed against the direction that
+// the surface would have sampled. Included by path_follow.h.
+#include "integrators/edges/viewpoint.h"
+#include "integrators/paths/path.h"
+#include "integrators/paths/path_directions.h"
+
+namespace limn {
+
+// One light, where there have been no others.
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::draw_light(Walk& walk) const {
+  if (!walk.lit) draw_light(walk, walk.key);
+}
+
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::add_light(Walk& walk) const {
+  if (walk.light) walk.sums.radiance += walk.throughput * light_value(walk);
+}
+
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::add_lights(Walk& walk, int count) {
+  const Rgb<S> share = walk.throughput * (1.0 / count);
+  PathSums<S>& sums = walk.sums;
+  for (int i = 0; i < count; ++i) {
+    const Rng copy = walk.key.copy(Purpose::kLightCopy, i);
+    const Rgb<S> light = share * direct_light(walk, copy);
+    sums.radiance += light;
+    if (walk.bounces == 0) continue;
+    sums.light_difference =
+        i % 2 == 0 ? sums.light_difference + light : sums.light_difference - light;
+  }
+  walk.light.reset();
+}
+
+template <class S, class Visitor>
+inline Rgb<S> PathTracer<S, Visitor>::direct_light(Walk& walk, const Rng& key) {
+  draw_light(walk, key);
+  if constexpr (std::is_same_v<S, Dual>) {
+    if (warper_ && walk.light && !walk.light->light->delta()) {
+      return warped_light(walk, key.at(Purpose::kEmitter, walk.bounces));
+    }
+  }
+  weigh_light(walk);
+  return !walk.light || shadowed(walk) ? Rgb<S>{} : light_value(walk);
+}
+
+// Draws a light, if there is any.
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::draw_light(Walk& walk, const Rng& key) const {
+  walk.light.reset();
+  if (c_.lights.empty()) return;
+  Rng rng = key.at(Purpose::kEmitter, walk.bounces);
+  renew(walk.light, [&] { return c_.lights.sample(walk.lights, rng); });
+}
+
+// What the light that was drawn adds but for its radiance; none if that is black.
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::weigh_light(Walk& walk) const {
+  if (!walk.light) return;
+  const LightSample& light = *walk.light;
+  if (const DeltaLight* delta = light.light->delta()) {
+    draw_delta(walk, *delta);
+    return;
+  }
+  walk.light_motion = light.face ? nullptr : walk.motion;  // a lamp: held
+  const Vec3<S> direction = detail::moving<S>(light.wo, walk.light_motion);
+  const auto [f, pdf] = detail::evaluate(*walk.scattering, light.wo, direction, walk.light_motion);
+  walk.light_share = detail::stretched(f, light.wo, walk.light_motion);
+  walk.light_weight = mis_weight(light.pdf, density(walk, light.wo, pdf)) / light.pdf;
+  if (is_black(value(f))) walk.light.reset();
+}
+
+// No ray meets a delta light by chance, so it has the whole weight. Its direction follows the
+// parameters, and f_s with it. A face that it sees edge-on stays as dark as it is, as its edges have
+// it: rounding would tell which half of the face begins to be lit as the scene moves.
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::draw_delta(Walk& walk, const DeltaLight& delta) const {
+  const auto arriving = limn::arrival<S>(delta, walk.surface.p);
+  if (arriving) {
+    const Rgb<S> f = walk.scattering->eval(arriving->wo);
+    walk.light_share = f * arriving->irradiance * (1 / walk.light->pdf);
+    if constexpr (!std::is_same_v<S, double>) {
+      if (std::fabs(dot(walk.surface.n_g, value(arriving->wo))) <= kEdgeOn) {
+        const Rgb<double> held = value(walk.light_share);
+        walk.light_share = {S(held.r), S(held.g), S(held.b)};
+      }
+    }
+    if (!is_black(value(f))) return;
+  }
+  walk.light.reset();
+}
+
+template <class S, class Visitor>
+inline Rgb<S> PathTracer<S, Visitor>::light_value(const Walk& walk) const {
+  const LightSample& light = *walk.light;
+  if (light.light->delta()) return walk.light_share;
+  if constexpr (std::is_same_v<S, Dual>) {
+    if (const DirectionMotion* motion = walk.light_motion) {
+      return walk.light_share * light.light->radiance(detail::moving<S>(light.wo, motion)) *
+             walk.light_weight;
+    }
+  }
+  return walk.light_share * light.light->template drawn_radiance<S>(light) * walk.light_weight;
+}
+
+// What a light adds where directions are warped: auxiliary rays are traced for light that
+// arrives.
+template <class S, class Visitor>
+inline Rgb<S> PathTracer<S, Visitor>::warped_light(const Walk& walk, const Rng& key) {
+  const LightSample& light = *walk.light;
+  const SurfacePoint<S>& surface = walk.surface;
+  const Scattering<S>& scattering = *walk.scattering;
+  if (is_black(scattering.eval_value(light.wo))) return {};
+  if (shadowed(walk)) return {};
+  const DirectionMotion* motion = warper_->motion(surface, light.wo, key.at(Purpose::kEmitter, 1));
+  const Vec3<S> direction = detail::moving<S>(light.wo, motion);
+  const auto [f, bsdf_pdf] = detail::evaluate(scattering, light.wo, direction, motion);
+  const double weight = mis_weight(light.pdf, density(walk, light.wo, bsdf_pdf)) / light.pdf;
+  const Rgb<S> radiance = motion && !light.face ? light.light->radiance(direction)
+                                                : light.light->template drawn_radiance<S>(light);
+  return detail::stretched(f, light.wo, motion) * radiance * weight;
+}
+
+}  // namespace limn

@@ -1,0 +1,102 @@
+#pragma once
+// The path tracer's rays between vertices, also those that start on an edge, and what is brought
+// into the cache for them. Included by path_follow.h.
+#include "integrators/paths/path.h"
+#include "limn/core/check.h"
+
+namespace limn {
+
+// The next surface from a path vertex; hit.t = 0 for a neighbour that blocks at the edge itself.
+template <class S, class Visitor>
+inline bool PathTracer<S, Visitor>::next_hit(Walk& walk) {
+  Ray ray{value(walk.surface.p), walk.wo};
+  ray.start = walk.surface.face;
+  if (EdgeStart* edge = walk.edge) {
+    if (const auto side = blocked_at_edge(c_.scene, c_.tracer, *edge, walk.wo)) {
+      edge->start = *side;
+      walk.hit = {side->face, 0};
+      return true;
+    }
+    ray.skip_faces = edge->around.all;
+    ++rays_.closest;
+    return closest_at_edge(c_.tracer, c_.scene, edge->around, ray.origin, 0, ray, walk.hit);
+  }
+  ++rays_.closest;
+  // Where no shape emits, what hides the environment from the last scattering need not be known.
+  const bool any = walk.last && !c_.lights.on_shapes();
+  if (any) return c_.tracer.occluded(ray);
+  const bool found = c_.tracer.closest(ray, walk.hit);
+  if (found) fetch_face(walk.hit.face);
+  return found;
+}
+
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::move_along_edge(SurfacePoint<S>& surface, FaceRef face) const {
+  // Only primal paths start on edges, so the point itself does not change.
+  const Vec3<S> p = surface.p;
+  const auto corners = face_corners<double>(c_.scene.shape(face.shape).mesh, face.face);
+  const Vec3d n = cross(corners[1] - corners[0], corners[2] - corners[0]);
+  surface = surface_on_ray<S>(c_.scene, face, p, Vec3<S>{n.x, n.y, n.z});
+}
+
+// Brings what says where a face lies into the cache.
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::fetch_face(FaceRef face) const {
+  const Mesh& mesh = c_.scene.shape(face.shape).mesh;
+  __builtin_prefetch(&mesh.faces[face.face.index()]);
+  if (!mesh.normal_ids.empty()) __builtin_prefetch(&mesh.normal_ids[face.face.index()]);
+}
+
+// The same of its corners; it is known then.
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::fetch_corners(const Walk& walk) const {
+  if (!walk.found || (walk.last && !c_.lights.on_shapes())) return;
+  const FaceRef face = walk.hit.face;
+  const Mesh& mesh = c_.scene.shape(face.shape).mesh;
+  for (const uint32_t vertex : mesh.face(face.face)) {
+    __builtin_prefetch(&mesh.positions[vertex]);
+    if constexpr (!std::is_same_v<S, double>) {
+      if (!mesh.position_tangents.empty()) __builtin_prefetch(&mesh.position_tangents[vertex]);
+    }
+  }
+  if (mesh.normal_source != NormalSource::kFace) detail::fetch_shading<S>(mesh, face.face);
+}
+
+// What the next step reads of where the ray ends.
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::fetch_next(Walk& walk) const {
+  if (walk.found) {
+    fetch_corners(walk);
+  } else if (c_.scene.environment) {
+    walk.sky = c_.scene.environment->find(walk.wo);
+  }
+}
+
+template <class S, class Visitor>
+inline bool PathTracer<S, Visitor>::shadowed(const Walk& walk) {
+  const LightSample& light = *walk.light;
+  const FaceRef start = walk.surface.face;
+  const EdgeStart* edge = walk.edge;
+  if (light.face == start) return true;
+  Ray ray{value(walk.surface.p), light.wo};
+  ray.start = start;
+  ray.end = light.face.value_or(FaceRef{});
+  // Beside an edge a shadow may end to the very rounding, if the light has no extent.
+  const DeltaLight* delta = walk.beside_edge ? light.light->delta() : nullptr;
+  if (delta) {
+    CHECK(c_.viewpoints);
+    ray.direction = c_.viewpoints->of(*delta).towards(ray.origin);
+  }
+  if (edge) {
+    if (blocked_at_edge(c_.scene, c_.tracer, *edge, ray.direction)) return true;
+    ray.skip_faces = edge->around.all;
+  }
+  // Ends a float's rounding before the light, so that neighbours of the chosen face do not hide
+  // the point.
+  ray.t_max = light.distance * (1 - 0x1p-20);
+  ++rays_.shadow;
+  if (edge) return occluded_from_edge(c_.tracer, c_.scene, edge->around, ray);
+  return c_.tracer.occluded(ray);
+}
+
+}  // namespace limn

@@ -1,0 +1,173 @@
+#pragma once
+// The path tracer at a vertex: what is scattered there, the next direction, what emits where it
+// ends, roulette. Included by path_follow.h.
+#include <algorithm>
+
+#include "integrators/paths/path.h"
+#include "integrators/paths/path_directions.h"
+
+namespace limn {
+
+// What comes first at a vertex, and lights where they are many; false where the path ends.
+template <class S, class Visitor>
+inline bool PathTracer<S, Visitor>::begin_vertex(Walk& walk) {
+  if (is_complete(walk.bounces)) return false;
+  walk.scattering.emplace(walk.surface, walk.wi, c_.scene.shading);
+  if (walk.scattering->black()) return false;
+  set_motion(walk);
+  walk.light.reset();
+  walk.lit = walk.again;
+  if (walk.again) {
+    walk.again = false;
+    return true;
+  }
+  if (walk.visitor) {
+    (*walk.visitor)(walk.surface, *walk.scattering, walk.throughput, walk.motion, walk.step,
+                    walk.bounces, walk.key);
+  }
+  if (c_.closed) {
+    walk.sums.radiance +=
+        c_.closed->scattered(c_.tracer, walk.surface, *walk.scattering, walk.edge);
+    return false;
+  }
+  // Copies have both from the path that they are of.
+  renew(walk.lights, [&] { return c_.lights.at(value(walk.surface.p)); });
+  renew(walk.mixture, [&] {
+    return mixture_at(c_.mirrored, walk.surface, *walk.scattering, !is_complete(walk.bounces + 1));
+  });
+  const int more = splits(walk.surface, walk.copies);
+  const int lights = (walk.bounces > 0 ? light_samples_ : 1) * more;
+  if (walk.bounces > 0) walk.sums.later_lights += lights;
+  walk.lit = lights > 1 || warper_;
+  if (walk.lit) add_lights(walk, lights);
+  if (more > 1) split(walk, more);
+  return true;
+}
+
+// Draws the next direction.
+template <class S, class Visitor>
+inline bool PathTracer<S, Visitor>::choose_direction(Walk& walk) {
+  Rng rng = walk.key.at(Purpose::kBsdf, walk.bounces);
+  const double u1 = rng.uniform();
+  const double u2 = rng.uniform();
+  const auto wo = [&] {
+    if (walk.mixture.share == 0) return walk.scattering->sample(u1, u2);
+    const double u = rng.uniform();
+    return u < walk.mixture.share
+               ? MirroredLight::sample(walk.mixture, u / walk.mixture.share, u1, u2)
+               : walk.scattering->sample(u1, u2);
+  }();
+  if (!wo) return false;
+  walk.wo = *wo;
+  if constexpr (std::is_same_v<S, Dual>) {
+    if (warper_) walk.motion = warper_->motion(walk.surface, *wo, rng.at(Purpose::kBsdf, 1));
+  }
+  return true;
+}
+
+template <class S, class Visitor>
+inline bool PathTracer<S, Visitor>::scatter(Walk& walk) {
+  walk.direction = detail::moving<S>(walk.wo, walk.motion);
+  const auto [f, scattered] =
+      detail::evaluate(*walk.scattering, walk.wo, walk.direction, walk.motion);
+  if (is_black(value(f))) return false;
+  const double pdf = density(walk, walk.wo, scattered);
+  walk.pdf = pdf;
+  detail::add_score<S>(walk, value(walk.throughput) * (1 / pdf));
+  walk.before = walk.throughput;
+  walk.throughput = walk.throughput * detail::stretched(f, walk.wo, walk.motion) * (1 / pdf);
+  walk.step = {value(walk.surface.p), pdf};
+  walk.last = is_complete(walk.bounces + 1);
+  return !walk.last || c_.lights.on_shapes() || c_.scene.environment;
+}
+
+// Adds what a ray sees that leaves the scene; there the path ends.
+template <class S, class Visitor>
+inline bool PathTracer<S, Visitor>::escape(Walk& walk) const {
+  if (!c_.scene.environment) return false;
+  auto sight = c_.lights.template environment<S>(walk.lights, walk.wo, walk.sky);
+  if (walk.motion) {
+    sight.radiance = environment_radiance<S>(*c_.scene.environment, walk.direction);
+  }
+  walk.sums.radiance += walk.throughput * sight.radiance * mis_weight(walk.pdf, sight.pdf);
+  return false;
+}
+
+// Goes on to what the ray meets.
+template <class S, class Visitor>
+inline bool PathTracer<S, Visitor>::arrive(Walk& walk) {
+  const DirectionMotion* motion = walk.motion;
+  Rgb<S>& radiance = walk.sums.radiance;
+  const FaceRef face = walk.hit.face;
+  if (walk.last && !(c_.lights.on_shapes() && c_.scene.shape(face.shape).is_emitter)) {
+    return false;
+  }
+  if (walk.hit.t > 0) {
+    const Vec3<S> from = walk.surface.p;
+    renew(walk.surface, [&] { return surface_on_ray<S>(c_.scene, face, from, walk.direction); });
+    walk.edge = nullptr;
+    walk.beside_edge = false;
+  } else {
+    move_along_edge(walk.surface, face);
+  }
+  walk.wi = -walk.direction;
+  const Rgb<S> lamp = emitted(walk);
+  if (motion && !motion->warp && !is_black(value(lamp))) {
+    radiance += walk.before * walk.scattering->eval(walk.wo) * lamp * (1 / walk.pdf);  // held
+  } else {
+    radiance += walk.throughput * lamp;
+  }
+  ++walk.bounces;
+  return survives_roulette(walk);
+}
+
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::set_motion(Walk& walk) const {
+  walk.motion = nullptr;
+  if constexpr (std::is_same_v<S, Dual>) {
+    if (walk.bounces > 0 || !walk.field) return;
+    walk.field_motion = rates_->motion_at(value(walk.surface.p), *walk.field);
+    walk.motion = &walk.field_motion;
+  }
+}
+
+// Where a vertex slides fast, what further directions bring is as large: more of them in place of
+// one. Paths of one beginning are so many at most, however deep they go.
+template <class S, class Visitor>
+inline int PathTracer<S, Visitor>::splits(const SurfacePoint<S>& surface, int copies) const {
+  if constexpr (std::is_same_v<S, Dual>) {
+    if (!splitting_) return 1;
+    const int most = kMostSplits / copies;
+    const double slides = splitting_->sliding({surface.p.x.d, surface.p.y.d, surface.p.z.d});
+    return slides < most ? static_cast<int>(std::max(slides + 0.5, 1.0))
+                         : most;  // also if not finite
+  }
+  return 1;
+}
+
+template <class S, class Visitor>
+inline Rgb<S> PathTracer<S, Visitor>::emitted(const Walk& walk) const {
+  const SurfacePoint<S>& surface = walk.surface;
+  const double distance = walk.hit.t;
+  const Rgb<S> radiance = surface.emission(-walk.wo, c_.scene.shading);
+  bool dark = is_black(value(radiance));
+  if constexpr (!std::is_same_v<S, double>) dark = dark && is_still(radiance);
+  if (dark) return radiance;
+  // A face around an edge that is met at distance 0 is never drawn by light sampling.
+  const LightView view{walk.wo, distance, surface.n_g};
+  const double other = distance > 0 ? c_.lights.pdf(walk.lights, surface.face.shape, view) : 0;
+  return radiance * mis_weight(walk.pdf, other);
+}
+
+// As in Mitsuba: from rr_depth bounces on, survival with the largest throughput, at most 0.95.
+template <class S, class Visitor>
+inline bool PathTracer<S, Visitor>::survives_roulette(Walk& walk) const {
+  if (walk.bounces < c_.scene.rr_depth) return true;
+  const double survival = std::min(max_channel(value(walk.throughput)), 0.95);
+  Rng rng = walk.key.at(Purpose::kRoulette, walk.bounces);
+  if (rng.uniform() >= survival) return false;
+  walk.throughput = walk.throughput * (1 / survival);
+  return true;
+}
+
+}  // namespace limn

@@ -1,0 +1,105 @@
+#pragma once
+// A path under way, over any scalar: what the path tracer (path.h) keeps of it from one step to the
+// next.
+#include <array>
+#include <new>
+#include <optional>
+#include <type_traits>
+
+#include "integrators/edges/edge_sides.h"
+#include "integrators/lights/mirrored_light.h"
+#include "integrators/paths/direction_field.h"
+#include "limn/core/lights.h"
+#include "limn/core/ray_tracer.h"
+#include "limn/core/rng.h"
+#include "limn/core/shading.h"
+
+namespace limn {
+
+// How a path came to a vertex.
+struct PathStep {
+  Vec3d from;      // the vertex before
+  double pdf = 0;  // of the direction from there [1/sr]; 0 for what the camera or an edge sees
+};
+
+// What a path has found.
+template <class S>
+struct PathSums {
+  Rgb<S> radiance;
+  Rgb<Lanes> score;  // sum of the scores: has mean zero, and belongs to the interior term
+  // With an even number of light samples: half of what every first makes more than the second, at
+  // all vertices but the first. It has mean zero, and the variance of their mean.
+  Rgb<S> light_difference;
+  uint64_t later_lights = 0;  // light samples behind it
+};
+
+// A path under way: a vertex, how it was reached, and what is asked for next.
+template <class S, class Visitor>
+struct Walk {
+  // scattered: how often the whole path has scattered before. visitor: see PathTracer; may be null.
+  Walk(const Rng& path_key, int scattered, Visitor* at_vertices)
+      : key(path_key), visitor(at_vertices), bounces(scattered) {}
+
+  Rng key;
+  Visitor* visitor;
+  const DirectionField* field = nullptr;  // by which directions at the first vertex move, if any
+  int bounces;
+  int copies = 1;             // of paths that share the beginning, this one among them
+  bool again = false;         // all but what further directions bring has been added
+  bool lit = false;           // the lights at the vertex have been
+  bool failed = false;        // it asked for a ray that cannot be traced
+  EdgeStart* edge = nullptr;  // where the surface lies, if the path starts on an edge and is there
+  bool beside_edge = false;   // the path starts on an edge, or just beside it as seen, and is there
+  SurfacePoint<S> surface;
+  Vec3<S> wi;
+  Rgb<S> throughput = grey(S(1.0));
+  PathStep step;
+  PathSums<S> sums;
+
+  std::optional<Scattering<S>> scattering;
+  const DirectionMotion* motion = nullptr;  // null where directions are held
+  struct Nothing {};
+  std::conditional_t<std::is_same_v<S, Dual>, DirectionMotion, Nothing> field_motion;
+
+  Lights::Place lights;  // the vertex, for them
+  // A light that may be seen: all of what it adds but its radiance.
+  std::optional<LightSample> light;
+  const DirectionMotion* light_motion = nullptr;
+  Rgb<S> light_share;
+  double light_weight = 1;
+
+  // The next ray.
+  MirroredLight::Mixture mixture;  // that its direction is drawn from
+  Vec3d wo;
+  Vec3<S> direction;  // the same as it moves
+  double pdf = 0;     // [1/sr]
+  Rgb<S> before;      // the throughput before it
+  bool last = false;  // only what emits counts behind it
+  bool found = false;
+  Hit hit;
+  std::array<double, 2> sky{};  // where it leaves the scene: Environment::find
+
+  // Throws as RayTracer does.
+  const Rgb<S>& radiance() const {
+    if (failed) throw UntraceableRay();
+    return sums.radiance;
+  }
+};
+
+// Puts what make() returns in the place of `old`, where it is made. To make it elsewhere and copy it
+// costs more than it looks like: the wide loads of a copy wait until the narrow stores just before
+// them are in the cache. make() must not read `old`.
+template <class T, class Make>
+[[gnu::always_inline]] inline void renew(T& old, const Make& make) {
+  static_assert(std::is_trivially_destructible_v<T>);
+  ::new (static_cast<void*>(&old)) T(make());
+}
+
+// A ray on which a path starts: the primal one, with its skipped faces, and as it moves.
+template <class S>
+struct StartRay {
+  Ray ray;
+  Vec3<S> origin, direction;
+};
+
+}  // namespace limn

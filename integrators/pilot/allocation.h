@@ -1,0 +1,44 @@
+#pragma once
+// How a job's work is shared among the terms of a derivative, and among the pixels.
+#include <vector>
+
+#include "integrators/pilot/sample_plan.h"
+
+namespace limn {
+
+// What a pilot tells of one sample of a term, in units that all terms share.
+struct TermFigures {
+  double variance = 0;  // a mean over pixels, without the thousandth of them that varies most
+  double cost = 0;
+  double least = 1;  // the fewest samples it can have in a sample of a pixel
+  // The variance in every cell of a grid; empty for a term of the film.
+  std::vector<double> cells = {};
+};
+
+// After equal time, the squared error goes with (sum of variance / samples) times (sum of cost *
+// samples). Its minimum is at samples ~ sqrt(variance / cost); this is the best of the small counts
+// in use: at most eight, so that a pilot that saw too little of a term starves it no further.
+SampleCounts best_samples(const std::vector<TermFigures>& figures);
+
+// The same for every cell. The ideal share of a cell goes with the standard deviation there; a
+// pilot sees that too rarely in one cell, so the variance is the mean of those over 5 by 5 and 9 by
+// 9 cells, and a share is a quarter of the mean at least. Counts are whole; they are as small as
+// rounding allows.
+void spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& grid,
+                    SamplePlan& plan);
+
+// Light samples of a path: what one of them adds to its variance, and what it costs.
+struct LightFigures {
+  double variance = 0, cost = 0;
+};
+// How many light samples of each path, of 1, 2, 4 and 8, give the least product of what a path is
+// left with and what it costs. variance, cost: of a path without any.
+int best_light_samples(double variance, double cost, const LightFigures& light);
+
+// Without the thousandth of the values that is largest: single bright samples would rule a choice.
+double trimmed_mean(std::vector<double> values);
+
+// Samples per pixel of a pilot for a job of `spp`, even; 0 if the job is too short for one.
+int pilot_samples(int spp);
+
+}  // namespace limn

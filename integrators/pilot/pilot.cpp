@@ -1,0 +1,176 @@
+// The pilot: second moments of single samples, pixel by pixel.
+#include "integrators/pilot/pilot.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace limn {
+namespace {
+
+constexpr size_t kMostProbes = 65536;  // a film of 256 by 256 has them all; not tuned
+
+// The samples of probed pixels go into sums; only what belongs to the film goes on.
+class PilotEstimator final : public SampleEstimator {
+ public:
+  PilotEstimator(const TermEstimator& terms, bool turns)
+      : terms_(terms), grid_(terms.scene().film, kMostProbes), turns_(turns) {
+    for (size_t slot = 0; slot < terms.slots(); ++slot) {
+      sums_.emplace_back(terms.adds_to_pixels(slot) ? grid_.size() : 0, terms.lanes());
+    }
+    sums_.emplace_back(grid_.size(), terms.lanes());
+    later_lights_.resize(grid_.size());
+  }
+
+  const Scene& scene() const override { return terms_.scene(); }
+  size_t slots() const override { return terms_.slots(); }
+  const char* slot_name(size_t slot) const override { return terms_.slot_name(slot); }
+  int lanes() const override { return terms_.lanes(); }
+  Lanes lane_scale() const override { return terms_.lane_scale(); }
+  bool samples_pixels() const override { return terms_.samples_pixels(); }
+  size_t pixel_slot() const override { return terms_.pixel_slot(); }
+  double film_samples(size_t slot) const override { return terms_.film_samples(slot); }
+  int film_stream(size_t slot) const override { return terms_.film_stream(slot); }
+  bool sample_film(size_t slot, double u, const Rng& key, RayCount& rays,
+                   FilmSample& sample) const override {
+    return terms_.sample_film(slot, u, key, rays, sample);
+  }
+
+  void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const override {
+    for (const KeyedSample& sample : samples) add_pixel(sample.at, sample.key, sink);
+  }
+
+  const PlanGrid& grid() const { return grid_; }
+  uint64_t later_lights() const {
+    return std::accumulate(later_lights_.begin(), later_lights_.end(), uint64_t{0});
+  }
+  // Of the samples since the last call.
+  std::vector<CellCovariances> take_covariances(int samples) {
+    std::vector<CellCovariances> result;
+    for (CellSums& sums : sums_) result.push_back(sums.take(samples));
+    return result;
+  }
+
+ private:
+  void add_pixel(const PixelSample& at, const Rng& key, SampleSink& sink) const {
+    if (!grid_.is_probe(scene().film, at.x, at.y)) return;
+    const TermEstimator::Sample sample = terms_.sample(at, key, turns_, sink);
+    if (!sample.finite) return;
+    const size_t cell = grid_.index(at.x, at.y);
+    for (size_t slot = 0; slot < slots(); ++slot) {
+      if (!sums_[slot].empty()) sums_[slot].add(cell, sample.terms[slot]);
+    }
+    sums_.back().add(cell, sample.light_difference);
+    later_lights_[cell] += static_cast<uint32_t>(sample.later_lights);
+  }
+
+  const TermEstimator& terms_;
+  PlanGrid grid_;
+  bool turns_;
+  // Of every slot; a cell is written by the thread of its tile alone.
+  mutable std::vector<CellSums> sums_;
+  mutable std::vector<uint32_t> later_lights_;
+};
+
+// Sums up batches.
+class PilotRun {
+ public:
+  PilotRun(const TermEstimator& terms, std::unique_ptr<PilotEstimator> pilot)
+      : terms_(terms), costs_(terms.slots()) {
+    for (size_t i = 0; i < terms.slots() * terms.lanes(); ++i) {
+      film_.emplace_back(film_size(terms.scene().film));
+    }
+    estimators_.push_back(std::move(pilot));
+  }
+
+  // Samples [first, last); false if interrupted.
+  bool run(const RunSettings& settings, int first, int last, const Stopwatch& watch) {
+    RunSettings quiet = settings;
+    quiet.progress = nullptr;
+    ProgressCounter progress(quiet, watch, 1);
+    constexpr uint64_t kStream = 0x9110;  // any number
+    const Batch batch{mix_bits(settings.seed + kStream), first, last};
+    const auto sums = run_batch(estimators_, batch, settings.threads, progress);
+    if (sums.empty()) return false;
+    for (size_t slot = 0; slot < costs_.size(); ++slot) costs_[slot].merge(sums[0].costs[slot]);
+    for (size_t i = 0; i < film_.size(); ++i) film_[i].add_batch(sums[0].images[i], last - first);
+    return true;
+  }
+
+  std::vector<double> work(int spp, size_t probes) const {
+    std::vector<double> work;
+    for (size_t slot = 0; slot < costs_.size(); ++slot) {
+      const size_t pixels = terms_.adds_to_pixels(slot) ? probes : film_size(film()) / 3;
+      work.push_back(terms_.work(slot, costs_[slot]) / (static_cast<double>(spp) * pixels));
+    }
+    return work;
+  }
+
+  // A thousandth of the pixels, those with the largest variance, is left out: single bright samples
+  // would rule the choice.
+  Lanes film_variance(size_t slot) const {
+    Lanes result;
+    for (int lane = 0; lane < terms_.lanes(); ++lane) {
+      const Moments& moments = film_[slot * terms_.lanes() + lane];
+      std::vector<double> variances(moments.size() / 3);
+      for (size_t i = 0; i < moments.size(); ++i) {
+        variances[i / 3] += moments.variance(i) * static_cast<double>(moments.samples());
+      }
+      std::sort(variances.begin(), variances.end());
+      const size_t kept = variances.size() - variances.size() / 1000;
+      for (size_t i = 0; i < kept; ++i) result[lane] += variances[i] / static_cast<double>(kept);
+    }
+    return result;
+  }
+
+ private:
+  const Film& film() const { return terms_.scene().film; }
+
+  const TermEstimator& terms_;
+  std::vector<std::unique_ptr<SampleEstimator>> estimators_;
+  std::vector<TermCost> costs_;
+  std::vector<Moments> film_;
+};
+
+}  // namespace
+
+std::vector<double> PilotFigures::variances(size_t slot, int lane) const {
+  std::vector<double> result;
+  for (size_t cell = 0; cell < grid.size(); ++cell) {
+    result.push_back(0.5 *
+                     (halves[0][slot][cell].variance(lane) + halves[1][slot][cell].variance(lane)));
+  }
+  return result;
+}
+
+PilotFigures run_pilot(const TermEstimator& estimator, bool turns, int spp,
+                       const RunSettings& settings, const Stopwatch& watch) {
+  PilotFigures figures;
+  auto owned = std::make_unique<PilotEstimator>(estimator, turns);
+  PilotEstimator& pilot = *owned;
+  PilotRun run(estimator, std::move(owned));
+  const double began = watch.seconds();
+  if (!run.run(settings, 0, 1, watch)) return figures;
+  if (settings.seconds > 0) {
+    const double each = watch.seconds() - began;
+    const int fitting = static_cast<int>(std::min(settings.seconds / 8 / each, 1e6));
+    spp = std::min(spp, fitting) / 2 * 2;
+    if (spp < 4) return figures;
+  }
+  const int half = spp / 2;
+  if (half > 1 && !run.run(settings, 1, half, watch)) return figures;
+  figures.halves[0] = pilot.take_covariances(half);
+  if (!run.run(settings, half, spp, watch)) return figures;
+  figures.halves[1] = pilot.take_covariances(half);
+  figures.spp = spp;
+  figures.grid = pilot.grid();
+  figures.work = run.work(spp, figures.grid.size());
+  figures.light_work = static_cast<double>(pilot.later_lights()) /
+                       (kPilotLights * static_cast<double>(spp) * figures.grid.size());
+  for (size_t slot = 0; slot < estimator.slots(); ++slot) {
+    figures.film_variance.push_back(estimator.film_samples(slot) > 0 ? run.film_variance(slot)
+                                                                     : Lanes{});
+  }
+  return figures;
+}
+
+}  // namespace limn

@@ -1,0 +1,42 @@
+#pragma once
+// The pilot of a run: a few samples of every pixel, or of one pixel in every cell of a large film,
+// for choices about the others. Its random numbers are its own, and its samples are thrown away: a
+// choice that depends on the samples it is made for would bias them.
+#include <array>
+#include <vector>
+
+#include "integrators/estimates/batches.h"
+#include "integrators/pilot/pilot_moments.h"
+#include "integrators/pilot/sample_plan.h"
+#include "integrators/pilot/term_estimator.h"
+
+namespace limn {
+
+inline constexpr int kPilotLights = 2;  // light samples at later vertices
+
+struct PilotFigures {
+  int spp = 0;  // samples of every probed pixel; 0: there was no time for a pilot
+  PlanGrid grid;
+  // [half][slot]: covariances of one sample, from either half of the pilot. Empty for slots that
+  // add nothing to pixels. Behind the slots stands one more: PathTracer::light_difference,
+  // which is half of what a light sample at later vertices adds, paths taking two of them.
+  std::array<std::vector<CellCovariances>, 2> halves;
+  // Of slots on the film: the mean over pixels of the variance of one sample per pixel, summed over
+  // channels, of each lane.
+  std::vector<Lanes> film_variance;
+  // Of one sample of a slot, in every cell.
+  std::vector<double> variances(size_t slot, int lane) const;
+  double light_work = 0;     // of one light sample at all later vertices of a path
+  std::vector<double> work;  // of one sample of a pixel, of every slot, see Term::work
+
+  // Whether a slot's samples belong to pixels.
+  bool in_cells(size_t slot) const { return !halves[0][slot].empty(); }
+};
+
+// turns: whether turns of directions at first vertices are looked at. spp: even. settings: its
+// limit of time holds for the whole job, which `watch` has timed since it began: a pilot takes an
+// eighth of it at most.
+PilotFigures run_pilot(const TermEstimator& estimator, bool turns, int spp,
+                       const RunSettings& settings, const Stopwatch& watch);
+
+}  // namespace limn

@@ -1,0 +1,495 @@
+// One sample of a pixel: its paths, the first of which carries the terms at vertices.
+#include "integrators/pilot/term_estimator.h"
+
+#include <limits>
+
+#include "integrators/film/film_regions.h"
+#include "integrators/paths/camera_path.h"
+#include "integrators/paths/path_follow.h"
+#include "integrators/paths/path_log.h"
+
+namespace limn {
+namespace {
+
+Scene seeded(const Scene& scene, std::span<const Parameter> parameters) {
+  Scene copy = deep_copy(scene);
+  for (size_t k = 0; k < parameters.size(); ++k) parameters[k].seed(copy, static_cast<int>(k));
+  return copy;
+}
+
+// In a pilot directions turn at the rate of what moves. Edges that move by it alone count for so
+// much less than those of the parameters: the first share for one parameter (not tuned), the second
+// for several. Turns draw samples away from the parameters, whose terms the pilot then takes for
+// noisier than they are: with 0.3, four at once had 1.1 to 1.2 times the squared error in a soft
+// shadow, with 0.02 1.15 times in a chandelier.
+constexpr double kFreeTurnShare = 0.3, kTurnShare = 0.05;
+
+// What a sample comes to that asks for a ray which cannot be traced.
+const double kNan = std::numeric_limits<double>::quiet_NaN();
+const Lanes kNotFinite{kNan, kNan, kNan, kNan};
+
+Lanes natural_steps(std::span<const Parameter> parameters) {
+  // A pilot lets directions turn in lanes that are free.
+  const double free = kFreeTurnShare * parameters[0].natural_step;
+  Lanes steps{free, free, free, free};
+  for (size_t k = 0; k < parameters.size(); ++k) {
+    steps[static_cast<int>(k)] = parameters[k].natural_step;
+  }
+  return steps;
+}
+
+// Alike in comparable units in all lanes; with one parameter by the unit of MotionRates.
+DirectionField turning_about_axes(const Lanes& steps, int lanes) {
+  const double share = lanes == 1 ? kFreeTurnShare : kTurnShare;
+  DirectionField field;
+  for (int k = 0; k < 3; ++k) field.turn[k][k + 1] = share * steps[0] / steps[k + 1];
+  field.score = field.turn;
+  return field;
+}
+
+}  // namespace
+
+std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler,
+                                      bool closed) {
+  std::vector<const TermType*> types;
+  bool (*asked)(const Scene&) = nullptr;  // looks at the whole environment: once for rows alike
+  bool applies = false;
+  for (const TermType& type : term_types()) {
+    if (type.regions && !sampler.regions) continue;
+    if (closed && type.moved_with_directions && !type.traces_paths) continue;
+    if (type.applies != asked) {
+      asked = type.applies;
+      applies = asked(scene);
+    }
+    if (applies) types.push_back(&type);
+  }
+  return types;
+}
+
+TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> parameters,
+                             const std::vector<bool>& computed, const EdgeSamplerType& sampler,
+                             int threads, std::shared_ptr<const FilmRegions> visible,
+                             const Warping* warping, bool closed)
+    : scene_(seeded(scene, parameters)),
+      lanes_(static_cast<int>(parameters.size())),
+      lane_scale_(natural_steps(parameters)),
+      tracer_([&] {
+        const Stopwatch watch;
+        auto tracer = make_embree_tracer(scene_, threads, visible ? visible->faces() : nullptr);
+        tracer_seconds_ = watch.seconds();
+        return tracer;
+      }()),
+      lights_(scene_),
+      closed_(closed ? std::make_unique<ClosedLight>(scene_, threads) : nullptr),
+      viewpoints_(scene_),
+      mirrored_(closed ? nullptr : MirroredLight::make(scene_, lights_)),
+      context_{scene_, *tracer_, lights_, closed_.get(), &viewpoints_, mirrored_.get()},
+      camera_(scene_.camera),
+      filter_(scene_.film.filter),
+      visible_(std::move(visible)),
+      input_(context_, lanes_, lane_scale_, sampler, threads, warping != nullptr),
+      types_(terms_of(scene, sampler, closed)),
+      rates_(scene_, lanes_, lane_scale_),
+      turning_(turning_about_axes(lane_scale_, lanes_)) {
+  input_.visible = visible_.get();
+  for (size_t slot = 0; slot < types_.size(); ++slot) {
+    if (types_[slot]->traces_paths) pixel_slot_ = slot;
+    terms_.push_back(computed[slot] ? types_[slot]->make(input_) : nullptr);
+    if (!terms_[slot]) continue;
+    paths_ = paths_ || terms_[slot]->uses_paths();
+    vertices_ = vertices_ || terms_[slot]->uses_vertices();
+  }
+  if (warping) {
+    warp_field_ = std::make_unique<WarpField>(scene_, *tracer_, input_.edges(), warping->options,
+                                              warping->unbiased);
+  }
+}
+
+double TermEstimator::work(size_t slot, const TermCost& cost) const {
+  return terms_[slot] ? terms_[slot]->work(cost) : static_cast<double>(cost.rays);
+}
+
+// How the vertices of a path move; the visitor of a path.
+class TermEstimator::VertexMotions {
+ public:
+  void operator()(const SurfacePoint<Dual>& surface, const Scattering<Dual>&, const Rgb<Dual>&,
+                  const DirectionMotion*, const PathStep&, int, const Rng&) {
+    velocities_.push_back({surface.p.x.d, surface.p.y.d, surface.p.z.d});
+  }
+  const Vec3<Lanes>& velocity(int bounces) const { return velocities_.at(bounces); }
+
+ private:
+  std::vector<Vec3<Lanes>> velocities_;
+};
+
+// The terms at vertices, as the visitor of a path.
+class TermEstimator::VertexTerms {
+ public:
+  // held: how the vertices of the path move while its directions are held, if what turns change is
+  // asked for; else null.
+  VertexTerms(const TermEstimator& estimator, const PixelCounts& counts, const VertexMotions* held,
+              SampleSink& sink)
+      : estimator_(estimator), counts_(counts), held_(held), sink_(sink), sums_(), turned_() {}
+
+  void operator()(const SurfacePoint<Dual>& surface, const Scattering<Dual>& scattering,
+                  const Rgb<Dual>& throughput, const DirectionMotion* motion, const PathStep& step,
+                  int bounces, const Rng& key) {
+    const Rgb<double> weight = value(throughput);
+    TurnedVertex turned;
+    PathVertex vertex{surface, scattering, weight, motion ? motion->turn : DirectionTurn{},
+                      bounces, step,       key,    sink_.log()};
+    vertex.warp = estimator_.warp_field_.get();
+    if (held_) {
+      turned = turned_at(surface, motion, bounces);
+      vertex.turned = &turned;
+    }
+    if (vertex.log) log_vertex(*vertex.log, surface, scattering, weight, bounces);
+    const double urgency = urgency_at(surface, weight, bounces);
+    for (size_t slot = 0; slot < estimator_.slots(); ++slot) {
+      const Term* term = estimator_.terms_[slot].get();
+      if (!term || !term->uses_vertices()) continue;
+      if (skipped(slot, key)) continue;
+      const int planned = std::max(1, static_cast<int>(counts_[slot]));
+      const int samples = rounded(planned * urgency, key.at(Purpose::kVertexSplit, bounces), slot);
+      if (samples == 0) continue;
+      const Stopwatch watch;
+      TermCost& cost = sink_.cost(slot);
+      turned.sum = {};
+      Rgb<Lanes> sum;
+      try {
+        term->add_at_vertex(vertex, samples, cost, sum);
+      } catch (const UntraceableRay&) {
+        sum = grey(kNotFinite);
+      }
+      const double share = 1 / urgency;
+      for (int c = 0; c < 3; ++c) {
+        sums_[slot][c] += sum[c] * share;
+        turned_[slot][c] += turned.sum[c] * share;
+      }
+      cost.seconds += watch.seconds();
+    }
+  }
+
+  const PixelCounts& counts() const { return counts_; }
+  const Rgb<Lanes>& sum(size_t slot) const { return sums_[slot]; }
+  const Rgb<Lanes>& turned(size_t slot) const { return turned_[slot]; }
+
+ private:
+  TurnedVertex turned_at(const SurfacePoint<Dual>& surface, const DirectionMotion* motion,
+                         int bounces) const {
+    TurnedVertex turned;
+    if (motion) turned.turn.axis = motion->turn.axis;
+    for (int k = 0; k < 3; ++k) {
+      if (motion) turned.turn.rate[k][k] = motion->unit;
+      turned.velocity[k] = estimator_.turned(surface.p[k].d, held_->velocity(bounces)[k]);
+    }
+    return turned;
+  }
+  // How many samples the vertex takes in place of one, on average: as large as what they may add.
+  double urgency_at(const SurfacePoint<Dual>& surface, const Rgb<double>& throughput, int bounces) {
+    constexpr double kLeast = 0.125, kMost = 32;  // not tuned
+    if (!estimator_.splits_now(held_ != nullptr)) return 1;
+    const Vec3d p = value(surface.p);
+    if (bounces == 0) first_ = p;
+    const Vec3<Lanes> velocity{surface.p.x.d, surface.p.y.d, surface.p.z.d};
+    const double urgency = luminance(throughput) * estimator_.rates_.urgency(p, velocity, first_);
+    return urgency < kMost ? std::max(urgency, kLeast) : kMost;  // also of what is not a number
+  }
+  // A whole number with this mean.
+  static int rounded(double mean, Rng rng, size_t slot) {
+    const double whole = std::floor(mean);
+    if (whole == mean) return static_cast<int>(mean);
+    rng = rng.at(Purpose::kVertexSplit, slot);
+    return static_cast<int>(whole) + (rng.uniform() < mean - whole ? 1 : 0);
+  }
+  // One decision for all vertices of a path; copies behind a vertex that slides fast make their
+  // own.
+  bool skipped(size_t slot, const Rng& key) const {
+    return counts_[slot] < 1 && key.at(Purpose::kTermRoulette, slot).uniform() >= counts_[slot];
+  }
+
+  const TermEstimator& estimator_;
+  PixelCounts counts_;
+  const VertexMotions* held_;
+  SampleSink& sink_;
+  std::array<Rgb<Lanes>, kMostTerms> sums_;
+  std::array<Rgb<Lanes>, kMostTerms> turned_;
+  Vec3d first_;  // vertex of the path
+};
+
+// Paths on their way into the sums: those of several samples go side by side, and are added in
+// their order.
+class TermEstimator::Convoy {
+ public:
+  Convoy(const TermEstimator& estimator, SampleSink& sink) : estimator_(estimator), sink_(sink) {
+    walks_.reserve(kMost);
+    vertices_.reserve(kMost);
+  }
+
+  // counts: of the terms at its vertices; null for a path without.
+  void add(const Place& place, const Rng& key, double weight, const PixelCounts* counts) {
+    if (walks_.size() == kMost) finish();
+    if (counts) vertices_.emplace_back(estimator_, *counts, nullptr, sink_);
+    walks_.emplace_back(key, 0, counts ? &vertices_.back() : nullptr);
+    walks_.back().field = estimator_.plan_.field_at(place.at);
+    places_.push_back(place);
+    weights_.push_back(weight);
+  }
+  void finish() {
+    const PathCosts costs = estimator_.trace<VertexTerms>(places_, walks_, nullptr, false);
+    add_cost(costs, walks_.size(), sink_.cost(estimator_.pixel_slot_));
+    for (size_t i = 0; i < walks_.size(); ++i) {
+      const PixelSample& at = places_[i].at;
+      estimator_.add_path(at, estimator_.path_of(walks_[i]), weights_[i], sink_);
+      if (walks_[i].visitor) estimator_.add_vertices(at, *walks_[i].visitor, sink_);
+    }
+    walks_.clear();
+    vertices_.clear();
+    places_.clear();
+    weights_.clear();
+  }
+
+ private:
+  static constexpr size_t kMost = PathTracer<Dual, VertexTerms>::kMostWalks;
+
+  const TermEstimator& estimator_;
+  SampleSink& sink_;
+  std::vector<Walk<Dual, VertexTerms>> walks_;
+  std::vector<VertexTerms> vertices_;  // of the paths that have them
+  std::vector<Place> places_;
+  std::vector<double> weights_;
+};
+
+void TermEstimator::add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const {
+  if (sink.log()) {
+    for (const auto& [at, key] : samples) add_logged(at, key, sink);
+    return;
+  }
+  Convoy convoy(*this, sink);
+  for (const auto& [at, key] : samples) {
+    const PixelCounts counts = plan_.counts_at(at);
+    const int paths = paths_ ? static_cast<int>(counts[pixel_slot_]) : 1;
+    const int all = paths * places_of_path();
+    for (int i = 0; i < all; ++i) {
+      convoy.add({at, i >= paths}, key.copy(Purpose::kPathCopy, i % paths), 1.0 / all,
+                 i == 0 && vertices_ ? &counts : nullptr);
+    }
+  }
+  convoy.finish();
+}
+
+// The same, path by path.
+void TermEstimator::add_logged(const PixelSample& at, const Rng& key, SampleSink& sink) const {
+  const PixelCounts counts = plan_.counts_at(at);
+  const int paths = paths_ ? static_cast<int>(counts[pixel_slot_]) : 1;
+  const int all = paths * places_of_path();
+  const auto add = [&](auto& visitor, int i) {
+    const Path path = trace_one({at, i >= paths}, key.copy(Purpose::kPathCopy, i % paths),
+                                plan_.field_at(at), visitor, sink.log(), sink.cost(pixel_slot_));
+    add_path(at, path, 1.0 / all, sink);
+  };
+  for (int i = 0; i < all; ++i) {
+    if (i == 0) {
+      VertexTerms vertices(*this, counts, nullptr, sink);
+      add(vertices, i);
+      add_vertices(at, vertices, sink);
+    } else {
+      PathLog log(*sink.log());
+      add(log, i);
+    }
+  }
+}
+
+void TermEstimator::add_vertices(const PixelSample& at, const VertexTerms& vertices,
+                                 SampleSink& sink) const {
+  for (size_t slot = 0; slot < terms_.size(); ++slot) {
+    if (!terms_[slot] || !terms_[slot]->uses_vertices()) continue;
+    if (is_finite(vertices.sum(slot))) {
+      sink.add(slot, at, vertices.sum(slot), 1.0 / vertices.counts()[slot]);
+    } else {
+      sink.reject(at, slot_name(slot));
+    }
+  }
+}
+
+template <class Visitor>
+TermEstimator::PathCosts TermEstimator::trace(std::span<const Place> places,
+                                              std::span<Walk<Dual, Visitor>> walks, SampleLog* log,
+                                              bool twice) const {
+  PathCosts costs;
+  using Tracer = PathTracer<Dual, Visitor>;
+  Tracer tracer(context_, costs.rays);
+  tracer.move_directions(rates_);
+  tracer.take_light_samples(plan_.light_samples);
+  if (splits_now(twice)) tracer.split_by(&rates_);
+  std::array<StartRay<Dual>, Tracer::kMostWalks> starts;
+  for (size_t i = 0; i < walks.size(); ++i) {
+    const PixelSample& at = places[i].at;
+    FilmPosition film = sample_pixel_filter(scene_.film, filter_, at.x, at.y, walks[i].key);
+    if (places[i].mirrored) film = mirrored_in_pixel(scene_.film, at.x, at.y, film);
+    const auto ray = camera_.ray(film.x, film.y);
+    starts[i] = {camera_ray(scene_, CameraRay<double>{value(ray.origin), value(ray.direction),
+                                                      ray.t_min, ray.t_max}),
+                 ray.origin, ray.direction};
+    if (log) log_camera_ray(*log, film.x, film.y, value(ray.origin), value(ray.direction));
+  }
+  if (!warp_field_) {
+    tracer.follow_rays({starts.data(), walks.size()}, walks);
+    return costs;
+  }
+  for (size_t i = 0; i < walks.size(); ++i) {
+    DirectionWarper warper(*warp_field_, costs.rays);
+    tracer.warp_directions(warper);
+    tracer.follow_rays({&starts[i], 1}, walks.subspan(i, 1));
+    costs.warped.add(warper.count());
+  }
+  return costs;
+}
+
+template <class Visitor>
+TermEstimator::Path TermEstimator::path_of(const Walk<Dual, Visitor>& walk) const {
+  Path path{walk.sums, !walk.failed};
+  path.finite = path.finite && is_finite(value(walk.sums.radiance)) && is_finite(walk.sums.score);
+  for (const auto& term : terms_) {
+    if (term && term->uses_paths()) {
+      path.finite = path.finite && is_finite(term->add_path(walk.sums.radiance));
+    }
+  }
+  return path;
+}
+
+template <class Visitor>
+TermEstimator::Path TermEstimator::trace_one(const Place& place, const Rng& key,
+                                             const DirectionField* field, Visitor& visitor,
+                                             SampleLog* log, TermCost& cost, bool twice) const {
+  Walk<Dual, Visitor> walk(key, 0, &visitor);
+  walk.field = field;
+  const PathCosts costs = trace<Visitor>({&place, 1}, {&walk, 1}, log, twice);
+  add_cost(costs, 1, cost);
+  return path_of(walk);
+}
+
+void TermEstimator::add_cost(const PathCosts& costs, size_t paths, TermCost& cost) {
+  cost.add(costs.rays);
+  cost.samples += paths;
+  cost.warped += costs.warped.fields;
+  cost.dominated += costs.warped.dominated;
+  cost.dropped += costs.warped.dropped;
+}
+
+// Radiance, and what the terms make of it.
+void TermEstimator::add_path(const PixelSample& at, const Path& path, double weight,
+                             SampleSink& sink) const {
+  if (!path.finite) {
+    sink.reject(at, slot_name(pixel_slot_));
+    return;
+  }
+  sink.add_radiance(at, value(path.found.radiance), weight);
+  for (size_t slot = 0; slot < terms_.size(); ++slot) {
+    if (terms_[slot] && terms_[slot]->uses_paths()) {
+      sink.add(slot, at, terms_[slot]->add_path(path.found.radiance) + path.found.score, weight);
+    }
+  }
+}
+
+bool TermEstimator::sample_film(size_t slot, double u, const Rng& key, RayCount& rays,
+                                FilmSample& sample) const {
+  try {
+    return terms_[slot]->sample_film(u, key, rays, sample);
+  } catch (const UntraceableRay&) {
+    sample.value = grey(kNotFinite);
+    return true;
+  }
+}
+
+Lanes TermEstimator::turned(const Lanes& turning, const Lanes& held) const {
+  Lanes result;
+  for (int k = 0; k < 3; ++k) {
+    result[k] = (turning[k + 1] - held[k + 1]) / turning_.turn[k][k + 1];
+  }
+  return result;
+}
+Rgb<Lanes> TermEstimator::turned(const Rgb<Lanes>& turning, const Rgb<Lanes>& held) const {
+  return {turned(turning.r, held.r), turned(turning.g, held.g), turned(turning.b, held.b)};
+}
+Rgb<Lanes> TermEstimator::at_rest(const Rgb<Lanes>& turning, const Rgb<Lanes>& turned) const {
+  Rgb<Lanes> result = turning;
+  for (int c = 0; c < 3; ++c) {
+    for (int k = 0; k < 3; ++k) result[c][k + 1] -= turning_.turn[k][k + 1] * turned[c][k];
+  }
+  return result;
+}
+
+// All that turns change is linear in them. With one parameter they have lanes of their own. With
+// more a path is traced twice, first with directions at rest; but terms at vertices draw edges by
+// how fast these move, so they are asked for both at once.
+TermEstimator::Sample TermEstimator::sample(const PixelSample& at, const Rng& key, bool turns,
+                                            SampleSink& sink) const {
+  PixelCounts ones;
+  ones.fill(1);
+  const bool twice = turns && lanes_ > 1;
+  VertexMotions motions;
+  Path held;
+  if (twice) {
+    const DirectionField rest;  // as a field, so that both take the same steps
+    TermCost uncounted;
+    held = trace_one({at}, key, &rest, motions, nullptr, uncounted, twice);
+  }
+  VertexTerms vertices(*this, ones, twice ? &motions : nullptr, sink);
+  const auto trace_at = [&](bool mirrored) {
+    return trace_one({at, mirrored}, key, turns ? &turning_ : nullptr, vertices, nullptr,
+                     sink.cost(pixel_slot_), twice);
+  };
+  Path path = trace_at(false);
+  if (places_of_path() == 2) {  // no terms are at its vertices, and no directions turn
+    const Path other = trace_at(true);
+    path.found.radiance = (path.found.radiance + other.found.radiance) * 0.5;
+    path.finite = path.finite && other.finite;
+  }
+  const auto split = [&](const Rgb<Lanes>& turning, const Rgb<Lanes>& resting) {
+    if (!turns) return TurnedSample{turning, {}, {}};
+    return TurnedSample{twice ? resting : turning, turned(turning, resting), {}};
+  };
+  const auto derivative = [](const Rgb<Dual>& x) { return Rgb<Lanes>{x.r.d, x.g.d, x.b.d}; };
+  Sample sample{value(path.found.radiance),
+                {},
+                {},
+                path.found.later_lights,
+                path.finite && (!twice || held.finite)};
+  sample.light_difference =
+      split(derivative(path.found.light_difference), derivative(held.found.light_difference));
+  for (size_t slot = 0; slot < terms_.size(); ++slot) {
+    const Term* term = terms_[slot].get();
+    if (!term) continue;
+    TurnedSample& to = sample.terms[slot];
+    if (term->uses_paths())
+      to = split(term->add_path(path.found.radiance), term->add_path(held.found.radiance));
+    if (term->uses_vertices()) {
+      const Rgb<Lanes>& sum = vertices.sum(slot);
+      to = twice ? TurnedSample{at_rest(sum, vertices.turned(slot)), vertices.turned(slot), {}}
+                 : split(sum, {});
+    }
+    if (turns && slot == pixel_slot_) to.scores = turned(path.found.score, {});
+    sample.finite = sample.finite && is_finite(to.value) && is_finite(to.turned);
+  }
+  return sample;
+}
+
+void TermEstimator::describe(GradientStats& stats) const {
+  stats.setup.emplace_back("ray tracer", tracer_seconds_);
+  if (visible_) stats.setup.emplace_back("visible regions", visible_->seconds());
+  if (const EdgeSamplerInput* edges = input_.made_edges()) {
+    stats.setup.emplace_back("edges", input_.edges_seconds());
+    for (const EdgeClass c : {EdgeClass::kSmooth, EdgeClass::kSharp, EdgeClass::kBorder,
+                              EdgeClass::kIrregular, EdgeClass::kFlat, EdgeClass::kCrossing}) {
+      uint64_t count = 0;
+      for (const EdgeMesh& object : edges->objects) count += object.count(c);
+      stats.edges.emplace_back(edge_class_name(c), count);
+    }
+  }
+  for (const auto& term : terms_) {
+    if (term) term->describe(stats);
+  }
+}
+
+}  // namespace limn

@@ -1,0 +1,151 @@
+#pragma once
+// The terms of a derivative image as one estimator: up to kLanes parameters of one scene.
+#include <array>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "integrators/estimates/sample_estimator.h"
+#include "integrators/paths/walk.h"
+#include "integrators/paths/warp_field.h"
+#include "integrators/pilot/pilot_moments.h"
+#include "integrators/pilot/sample_plan.h"
+#include "integrators/terms/term.h"
+#include "limn/core/parameter.h"
+
+namespace limn {
+
+class FilmRegions;
+
+// The rows of term_types() that the sampler has and the scene has anything of. Slots are indices
+// into it. closed: with light in closed form, which holds whatever vertices see.
+std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler,
+                                      bool closed = false);
+
+// How directions are warped, see warp_field.h.
+struct Warping {
+  WarpOptions options;
+  bool unbiased = false;
+};
+
+class TermEstimator final : public SampleEstimator {
+ public:
+  // parameters: at most kLanes. computed: for each of terms_of(scene, sampler), whether it is
+  // computed. visible: of the film, or null. warping: null where directions are not warped. closed:
+  // what surfaces scatter is known in closed form, see closed_light.h.
+  TermEstimator(const Scene& scene, std::span<const Parameter> parameters,
+                const std::vector<bool>& computed, const EdgeSamplerType& sampler, int threads,
+                std::shared_ptr<const FilmRegions> visible = nullptr,
+                const Warping* warping = nullptr, bool closed = false);
+  TermEstimator(const TermEstimator&) = delete;
+  TermEstimator& operator=(const TermEstimator&) = delete;
+
+  // What samples hold from now on.
+  void set_plan(SamplePlan plan) { plan_ = std::move(plan); }
+  // What samples of a slot cost, see Term::work.
+  double work(size_t slot, const TermCost& cost) const;
+  void describe(GradientStats& stats) const;
+  const EdgeSamplerInput* edges() const { return input_.made_edges(); }
+  const Viewpoints& viewpoints() const { return viewpoints_; }
+  const MotionRates& motion_rates() const { return rates_; }
+  // Whether a slot's samples belong to pixels, not to the film.
+  bool adds_to_pixels(size_t slot) const {
+    return terms_[slot] && (terms_[slot]->uses_paths() || terms_[slot]->uses_vertices());
+  }
+
+  // One path with one sample of every term at its vertices.
+  struct Sample {
+    Rgb<double> radiance;
+    std::array<TurnedSample, kMostTerms> terms;  // of each slot; zero for those of the film
+    TurnedSample light_difference;               // see PathTracer
+    uint64_t later_lights;
+    bool finite;
+  };
+  // Takes light_samples of the plan, which must be two for a light_difference. turns: whether turns
+  // of directions at the first vertex are looked at; the values are those of directions at rest.
+  Sample sample(const PixelSample& at, const Rng& key, bool turns, SampleSink& sink) const;
+
+  const Scene& scene() const override { return scene_; }
+  size_t slots() const override { return types_.size(); }
+  const char* slot_name(size_t slot) const override { return types_[slot]->name; }
+  int lanes() const override { return lanes_; }
+  Lanes lane_scale() const override { return lane_scale_; }
+
+  bool samples_pixels() const override { return paths_ || vertices_; }
+  size_t pixel_slot() const override { return pixel_slot_; }
+  void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const override;
+
+  double film_samples(size_t slot) const override {
+    return terms_[slot] && terms_[slot]->uses_film() ? plan_.uniform[slot] : 0;
+  }
+  int film_stream(size_t slot) const override { return types_[slot]->film_stream; }
+  bool sample_film(size_t slot, double u, const Rng& key, RayCount& rays,
+                   FilmSample& sample) const override;
+
+ private:
+  class VertexTerms;
+  class VertexMotions;
+  class Convoy;
+  struct Path {
+    PathSums<Dual> found;
+    bool finite;
+  };
+  struct PathCosts {
+    RayCount rays;
+    WarpCount warped;
+  };
+  // Where a path starts; mirrored: see mirrored_in_pixel.
+  struct Place {
+    PixelSample at;
+    bool mirrored = false;
+  };
+  // walks[i] is a path of places[i]; at most as many as a PathTracer takes.
+  template <class Visitor>
+  PathCosts trace(std::span<const Place> places, std::span<Walk<Dual, Visitor>> walks,
+                  SampleLog* log, bool twice) const;
+  template <class Visitor>
+  Path trace_one(const Place& place, const Rng& key, const DirectionField* field, Visitor& visitor,
+                 SampleLog* log, TermCost& cost, bool twice = false) const;
+  template <class Visitor>
+  Path path_of(const Walk<Dual, Visitor>& walk) const;
+  void add_logged(const PixelSample& at, const Rng& key, SampleSink& sink) const;
+  // How many places of its pixel a path takes: in closed form these alone are left to chance.
+  int places_of_path() const { return closed_ ? 2 : 1; }
+  // Paths that are traced twice must take the same samples, though their vertices move otherwise.
+  bool splits_now(bool twice) const { return plan_.splits && !twice; }
+  // What turns about the axes change, in the unit of MotionRates: from what lanes 1 to 3 have more
+  // where directions turn in them.
+  Lanes turned(const Lanes& turning, const Lanes& held) const;
+  Rgb<Lanes> turned(const Rgb<Lanes>& turning, const Rgb<Lanes>& held) const;
+  // Without what turns change in lanes 1 to 3.
+  Rgb<Lanes> at_rest(const Rgb<Lanes>& turning, const Rgb<Lanes>& turned) const;
+  static void add_cost(const PathCosts& costs, size_t paths, TermCost& cost);
+  void add_path(const PixelSample& at, const Path& path, double weight, SampleSink& sink) const;
+  void add_vertices(const PixelSample& at, const VertexTerms& vertices, SampleSink& sink) const;
+
+  Scene scene_;  // with its parameters seeded
+  int lanes_;
+  Lanes lane_scale_;
+  double tracer_seconds_ = 0;
+  std::unique_ptr<RayTracer> tracer_;
+  Lights lights_;
+  std::unique_ptr<ClosedLight> closed_;  // null where paths are sampled
+  Viewpoints viewpoints_;
+  std::unique_ptr<MirroredLight> mirrored_;  // null where nothing mirrors
+  PathContext context_;
+  CameraView<Dual> camera_;
+  FilterTable filter_;
+  std::shared_ptr<const FilmRegions> visible_;
+  TermInput input_;
+  std::vector<const TermType*> types_;
+  std::vector<std::unique_ptr<Term>> terms_;  // of each slot; null where not computed
+  size_t pixel_slot_ = 0;                     // of the term that traces paths
+  bool paths_ = false, vertices_ = false;     // whether some term uses them
+  MotionRates rates_;
+  std::unique_ptr<WarpField> warp_field_;  // null where directions are not warped
+  // What a pilot turns directions by: about the axes x, y and z in the lanes 1 to 3.
+  DirectionField turning_;
+  SamplePlan plan_;
+};
+
+}  // namespace limn
