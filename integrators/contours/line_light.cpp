@@ -14,7 +14,6 @@
 namespace limn {
 namespace {
 
-constexpr const char* kMethod = "silhouettes";
 // A lamp is worth so many times fewer lines than the sky, where listing contours takes longer. With
 // 4, 8, 16, 32 lines the relative error of soft_lamp.xml (64 x 64) after 1.5 s is 5.8, 3.9, 2.5, 2.8
 // parts in 1000; that of ambient occlusion under the pebble after 3 s with 8, 16, 32, 64 lines is
@@ -208,13 +207,13 @@ void LineLight::list(const ContourPoint& at, const DirectionCone& cone,
   own.work.arcs += static_cast<int64_t>(own.arcs.size());
 }
 
-void LineLight::check(const Scene& scene) {
-  check_direct_light(scene, kMethod);
+void LineLight::check(const Scene& scene, const std::string& method) {
+  check_direct_light(scene, method);
   for (const Shape& shape : scene.shapes) {
     for (const bool front : {true, false}) {
       const Bsdf* side = shape.bsdf->side(front);
       if (!side || side->lobe().model == &kHemisphere) continue;
-      refuse_light(kMethod, shape.where,
+      refuse_light(method, shape.where,
                    fmt::format("{}: only diffuse surfaces are integrated, this is {}: use another "
                                "method (rays, path)",
                                shape_in_text(shape), side->describe()));
@@ -222,7 +221,7 @@ void LineLight::check(const Scene& scene) {
   }
   const Environment* sky = scene.environment.get();
   if (sky && !sky->is_uniform() && !sky->grid()) {
-    refuse_light(kMethod, {scene.file},
+    refuse_light(method, {scene.file},
                  fmt::format("the environment is neither constant nor a map, but {}: use another "
                              "method (rays, path)",
                              sky->describe()));
@@ -248,7 +247,7 @@ void LineLight::check_overlaps(int threads) const {
         if (is_met_first(scene_, met, first, towards)) first = met;
       }
       if (first == face) continue;
-      refuse_light(kMethod, shape.where,
+      refuse_light(options_.method, shape.where,
                    fmt::format("{}: its face {} lies in one place with face {} of {}, which hides "
                                "it: leave one of them out, or use another method (rays, path)",
                                shape_in_text(shape), f, first.face.index(),
@@ -262,7 +261,7 @@ LineLight::LineLight(const Scene& scene, const RayTracer& tracer, int threads,
                      std::shared_ptr<const Environment> sky)
     : scene_(scene), contours_(scene, tracer, threads), options_(options), sky_(std::move(sky)) {
   if (!direct) return;
-  check(scene);
+  check(scene, options_.method);
   for (const Shape& shape : scene.shapes) {
     if (shape.is_emitter) add_lamp(shape);
   }
@@ -286,7 +285,7 @@ void LineLight::add_lamp(const Shape& shape) {
   // A polygon without holes or bays, to rounding of its corners to floats. Not tuned.
   if (whole.flat && area > whole.area * (1 - 1e-5)) return add_polygon(whole, shape);
   if (shape.mesh.faces.size() > kMostFaces) {
-    refuse_light(kMethod, shape.where,
+    refuse_light(options_.method, shape.where,
                  fmt::format("{}: this lamp is no flat convex polygon of at most {} corners, so it "
                              "is taken face by face, and has {} of these where at most {} are "
                              "integrated: use another method (rays, path)",

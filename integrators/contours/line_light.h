@@ -8,6 +8,7 @@
 #include <atomic>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "integrators/contours/contours.h"
@@ -23,6 +24,7 @@ struct LineOptions {
   // Above 0: lines, 8 at least, are doubled until the results of two halves differ by at most twice
   // this part of the result, or until there are kMostLines. That is no more unbiased.
   double tolerance = 0;
+  std::string method = "lines";  // that errors name
 };
 inline constexpr int kMostLines = 1 << 14;
 
@@ -45,7 +47,7 @@ class LineLight {
   // InputError, with the place in the scene's file and what to do, for a scene whose direct light
   // lines do not know: delta lights, BSDFs that are not diffuse, interpolated normals after
   // Mitsuba, more than direct light, environments that are neither constant nor a map.
-  static void check(const Scene& scene);
+  static void check(const Scene& scene, const std::string& method);
 
   // The part of the directions above the face's horizon in which a ray would leave the scene.
   double openness(const ContourPoint& at, double offset) const;

@@ -273,6 +273,8 @@ void check_memory(Estimators estimators) {
 
 void run_batches(Estimators estimators, const RunSettings& settings, const Stopwatch& watch,
                  const std::function<void(const Batch&, const std::vector<BatchSums>&)>& collect) {
+  // What an interrupted pilot chose is no part of a run.
+  if (settings.interrupted && settings.interrupted->load()) return;
   if (settings.store) start(*settings.store, estimators, settings);
   ProgressCounter progress(settings, watch,
                            steps_per_batch(estimators) * batches_to_make(settings, watch));

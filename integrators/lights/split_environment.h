@@ -14,7 +14,7 @@ struct SplitEnvironment {
 };
 
 // None for an environment that is no map, or has no such patches (bright_patches.h) of at least one
-// texel.
-std::optional<SplitEnvironment> split_environment(const Environment& environment);
+// texel. InputError if memory does not hold two maps more.
+std::optional<SplitEnvironment> split_environment(const Environment& environment, int threads);
 
 }  // namespace limn

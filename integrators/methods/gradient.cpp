@@ -60,6 +60,15 @@ void check_exact_film(const Scene& scene, const std::string& name) {
   FilmRegions::check(scene.film);
 }
 
+void check_exact_films(const Scene& scene, const std::vector<std::string>& methods) {
+  for (const MethodType& type : method_types()) {
+    const bool asked = std::find(methods.begin(), methods.end(), type.name) != methods.end();
+    if (asked && type.terms_can_be_left_out) return FilmRegions::check(scene.film);
+  }
+  throw InputError("the exact film is for methods that sample edges on it: none of these does: " +
+                   join(methods));
+}
+
 bool SampleCounts::operator==(const SampleCounts& other) const {
   for (size_t t = 0; t < std::max(size(), other.size()); ++t) {
     if ((*this)[t] != other[t]) return false;

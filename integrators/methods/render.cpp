@@ -30,6 +30,14 @@ const RenderMethod& find_render_method(const std::string& name) {
   throw InputError(unknown_name("method", name, names_of(render_methods())));
 }
 
+std::vector<RenderMethod> looking_around() {
+  std::vector<RenderMethod> methods;
+  for (const RenderMethod& method : kMethods) {
+    if (method.looks_around) methods.push_back(method);
+  }
+  return methods;
+}
+
 bool is_even(const std::string& sampler) {
   for (const char* name : kRenderSamplers) {
     if (name == sampler) return name == kRenderSamplers[0];
@@ -50,9 +58,8 @@ std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSet
   }
   if (options.what != RenderWhat::kImage) {
     throw InputError(
-        fmt::format("the method \"{}\" knows radiance alone: how open the sky is say "
-                    "silhouettes and rays",
-                    options.method));
+        fmt::format("the method \"{}\" knows radiance alone: how open the sky is say {}",
+                    options.method, join(names_of(looking_around()))));
   }
   std::shared_ptr<const FilmRegions> visible;
   if (options.exact_film) {
@@ -116,8 +123,12 @@ RenderResult render(const Scene& scene, const RunSettings& settings, const Rende
   const Stopwatch watch;
   if (settings.store) identify(*settings.store, options);
   const EstimatorList estimators = estimators_of(scene, settings, options);
-  RenderResult result = run(estimators, settings, watch, film_size(scene.film));
   const auto* around = dynamic_cast<const VisibilityEstimator*>(estimators[0].get());
+  if (settings.store && around) {
+    // Other machines must have chosen the same.
+    settings.store->identify("choice of the pilot", fingerprint(around->choice()));
+  }
+  RenderResult result = run(estimators, settings, watch, film_size(scene.film));
   if (around && around->missed() > 0) {
     result.warnings.push_back(fmt::format(
         "{} integrals did not reach the tolerance {} with {} lines: ask for a larger one",

@@ -55,10 +55,10 @@ VisibilityEstimator::VisibilityEstimator(const Scene& scene, const RunSettings& 
   check_options(options, method.by_lines);
   const bool chooses = method.chooses && options.tolerance == 0;
   std::shared_ptr<const Environment> sky = scene.environment;
-  if (chooses && direct && sky) split_ = split_environment(*sky);
+  if (chooses && direct && sky) split_ = split_environment(*sky, settings.threads);
   if (split_) sky = split_->rest;
   if (method.by_lines) {
-    const LineOptions lines{options.lines, options.tolerance};
+    const LineOptions lines{options.lines, options.tolerance, method.name};
     lines_ = std::make_unique<LineLight>(scene, *tracer_, settings.threads, lines, direct, sky);
   } else if (direct) {
     check_direct_light(scene, method.name);
@@ -101,6 +101,14 @@ VisibilityPlan VisibilityEstimator::fixed_plan(bool by_lines) const {
   plan.looks.assign(plan.parts.size(), {});
   if (plan.parts.size() > 1) plan.looks[0].points = kLampPoints;
   return plan;
+}
+
+std::vector<double> VisibilityEstimator::choice() const {
+  std::vector<double> numbers;
+  for (const VisibilityLook& look : plan_.looks) {
+    numbers.insert(numbers.end(), {double(look.rays), double(look.points)});
+  }
+  return numbers;
 }
 
 VisibilityProbe VisibilityEstimator::probe(const Point& point) const {

@@ -27,6 +27,8 @@ class VisibilityEstimator final : public SampleEstimator {
   const char* slot_name(size_t) const override { return "radiance"; }
   void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const override;
 
+  // Rays and points, by cell of the film and by part.
+  std::vector<double> choice() const;
   // Sums over lines that ended above the tolerance, so far.
   int64_t missed() const { return lines_ ? lines_->missed() : 0; }
 

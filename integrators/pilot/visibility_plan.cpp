@@ -16,6 +16,7 @@
 #include <cmath>
 #include <limits>
 
+#include "integrators/estimates/tiles.h"
 #include "limn/core/parallel.h"
 
 namespace limn {
@@ -25,7 +26,7 @@ namespace {
 // of what jumps over a square.
 constexpr double kEven = 1.5;
 constexpr int kCell = 8;  // the side of a cell [pixels]; not tuned
-// Rays of a look in the pilot; its points are as many as take the time of the two looks by lines,
+// Rays of a look in the pilot; its points are as many as take the time of two looks by lines,
 // within these. Not tuned.
 constexpr int kPilotRays = 4;
 constexpr double kPatchCost = 512;  // in place of that time where there are no lines
@@ -36,11 +37,13 @@ constexpr std::array<int, 4> kRays = {1, 2, 4, 8};  // that a point may have
 // with 10 times the standard error at the end doubled that of the image.
 constexpr int kRadii[] = {2, 4};
 constexpr double kWindow = 25;
-constexpr double kSurely = 2;    // standard errors
-constexpr double kMargin = 1.5;  // lines must be so much better: they can be worse than they look
+constexpr double kSurely = 2;  // standard errors; not tuned
+// Lines must be so much better: they can be worse than they look. Not tuned.
+constexpr double kMargin = 1.5;
 // Each cell has this part of the mean time of all at least: what a pilot has not seen may be there.
+// Not tuned.
 constexpr double kLeastTime = 0.25;
-constexpr int kMostPoints = 256;
+constexpr int kMostPoints = 256;  // not tuned
 // See allocation.cpp.
 constexpr double kRounding = 1.1;
 
@@ -153,14 +156,23 @@ class Pilot {
  private:
   Figures& figures(size_t cell, size_t part) { return figures_[cell * parts_.size() + part]; }
 
+  // As a run has it, where a sample that is not finite adds nothing: it must not become the mean of
+  // all.
+  VisibilityProbe probe(const PixelSample& at, VisibilityPart part, int rays, uint64_t number,
+                        uint64_t replicate, double reach) const {
+    VisibilityProbe result = probe_(at, part, rays, number, replicate, reach);
+    if (!is_finite(result.value)) result.value = {};
+    return result;
+  }
+
   Figures look_at(const PixelSample& at, VisibilityPart part) const {
     Figures result;
     if (part == VisibilityPart::kPatches) {
       result.lines = std::numeric_limits<double>::infinity();
       result.line_cost = kPatchCost;
     } else {
-      const VisibilityProbe a = probe_(at, part, 0, 0, 0, -1), b = probe_(at, part, 0, 0, 1, 0),
-                            c = probe_(at, part, 0, 0, 2, 1);
+      const VisibilityProbe a = probe(at, part, 0, 0, 0, -1), b = probe(at, part, 0, 0, 1, 0),
+                            c = probe(at, part, 0, 0, 2, 1);
       result.lines = square(a.value + c.value - b.value * 2) / 6;
       result.line_cost = (a.cost + b.cost + c.cost) / 3;
     }
@@ -168,8 +180,8 @@ class Pilot {
     double cost = 0, of_points = 0, count = 0, wanted = kFewestPoints;
     while (count < wanted) {
       const auto number = static_cast<uint64_t>(count++);
-      const VisibilityProbe a = probe_(at, part, kPilotRays, number, 0, 1);
-      const VisibilityProbe b = probe_(at, part, kPilotRays, number, 1, 1);
+      const VisibilityProbe a = probe(at, part, kPilotRays, number, 0, 1);
+      const VisibilityProbe b = probe(at, part, kPilotRays, number, 1, 1);
       looks.add(a, b);
       cost += (a.cost + b.cost) / 2;
       of_points += (a.point_cost + b.point_cost) / 2;

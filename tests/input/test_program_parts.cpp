@@ -125,6 +125,32 @@ TEST_F(Parts, OfAReversePassAndAnImageJoinToTheBitsOfOneRun) {
             std::string::npos);
 }
 
+// Lines and rays as a pilot chose them, which every part and the joining run must have alike.
+TEST_F(Parts, OfSilhouettesHaveOnePlan) {
+  const std::string command = "render " + scene_ + " --method silhouettes --what direct --spp 5";
+  make_parts(command);
+  expect_same(command, out(), {out()});
+  // As of a machine whose pilot chose otherwise.
+  const auto choose_otherwise = [&](int k) {
+    std::string bytes = bytes_of(part(k));
+    const std::string name = "choice of the pilot: ";
+    const size_t at = bytes.find(name);
+    ASSERT_NE(at, std::string::npos);
+    char& digit = bytes[at + name.size()];
+    digit = digit == '0' ? '1' : '0';
+    std::ofstream(part(k), std::ios::binary) << bytes;
+  };
+  choose_otherwise(2);
+  const auto merged = [&] { return refused("merge " + all_parts() + " -o " + out()); };
+  EXPECT_NE(merged().find("another run than " + part(2) + ": choice of the pilot is"),
+            std::string::npos);
+  EXPECT_NE(refused(command + " --part 2/3 -o " + part(2)).find("choice of the pilot was"),
+            std::string::npos);
+  choose_otherwise(1);
+  choose_otherwise(3);
+  EXPECT_NE(merged().find("cannot be joined here: choice of the pilot was"), std::string::npos);
+}
+
 TEST_F(Parts, ThatDoNotFitAreRefused) {
   const std::string command = "gradient " + scene_ + " --quiet --spp 4 --wrt screen.translate.x";
   make_parts("gradient " + scene_ + " --spp 4 --wrt screen.translate.x");

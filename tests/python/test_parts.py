@@ -38,8 +38,9 @@ def test_a_reverse_pass_and_an_image_have_the_bits_of_one_run(scene):
     for name in scene.parameters:
         assert np.array_equal(joined[name].value, alone[name].value)
         assert np.array_equal(joined[name].stderr, alone[name].stderr)
-    joined = limn.merge(parts_of(limn.render, scene, spp=5), scene)
-    assert same(joined.value, limn.render(scene, spp=5).value)
+    for options in ({}, {"method": "silhouettes", "what": "ao"}):
+        joined = limn.merge(parts_of(limn.render, scene, spp=5, **options), scene)
+        assert same(joined.value, limn.render(scene, spp=5, **options).value)
 
 
 def test_parts_that_do_not_fit_are_refused(scene):

@@ -70,7 +70,7 @@ def test_gradient_has_the_programs_bits(folder, scene, program, threads, argumen
 def test_what_a_camera_sees_looks_around(scene):
     with pytest.raises(limn.InputError, match='"bulb"'):
         limn.render(scene, method="rays", what="direct")
-    by_lines = limn.render(scene, spp=2, method="silhouettes", what="ao", lines=16, tolerance=0.01)
+    by_lines = limn.render(scene, spp=2, method="lines", what="ao", lines=16, tolerance=0.01)
     assert np.all(by_lines.value >= -1e-6) and np.all(by_lines.value <= 1 + 1e-6)
     by_rays = limn.render(scene, spp=64, method="rays", what="ao")
     assert abs(np.mean(by_lines.value) - np.mean(by_rays.value)) < 0.02
@@ -130,6 +130,13 @@ def test_check_and_compare_say_what_the_program_says(folder, scene):
     assert check.found == told["smallest_at"] and check.step == told["step"]
     assert check.gradient_sum == told["gradient_sum"] and check.z_sum == told["z_sum"]
     assert check.gradient.value.shape == check.differences.value.shape == (12, 16, 3)
+    exact = limn.check(scene, "tent.translate.y", spp=16, film="exact")
+    subprocess.run([*words, "--film", "exact"], capture_output=True, check=False)
+    told = json.loads((folder / "check.json").read_text())[0]
+    assert told["film"] == "exact" and exact.gradient_sum == told["gradient_sum"]
+    assert exact.gradient_sum != check.gradient_sum
+    with pytest.raises(limn.InputError, match="none of these does: fd"):
+        limn.compare(scene, "tent.translate.y", ["fd"], [0.05], film="exact")
     with pytest.raises(limn.InputError, match="check needs spp of at least 2"):
         limn.check(scene, "tent.translate.y", spp=1)
     with pytest.raises(limn.InputError, match="are for the methods was, was-unbiased"):

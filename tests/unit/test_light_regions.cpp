@@ -195,7 +195,7 @@ TEST(BrightPatches, SplitTheMap) {
   Rng rng(6, 0, 0);
   for (const Vec3d& axis : {Vec3d{1, 1, 0.3}, Vec3d{0.05, 1, 0}, Vec3d{0.01, 0.3, -1}}) {
     const auto sky = sky_with({{axis, 3, 1000}}, 256);
-    const auto split = split_environment(*sky);
+    const auto split = split_environment(*sky, 2);
     ASSERT_TRUE(split);
     const double angle = 3 * kPi / 180, texel = 2 * kPi / 128;
     for (int i = 0; i < 3000; ++i) {
@@ -217,8 +217,8 @@ TEST(BrightPatches, SplitTheMap) {
       EXPECT_GT(dot(split->patches->sample_direction(u, v).direction, normalize(axis)), 0.98);
     }
   }
-  EXPECT_FALSE(split_environment(*sky_with({}, 64)));
-  EXPECT_FALSE(split_environment(*make_constant_environment({1, 1, 1})));
+  EXPECT_FALSE(split_environment(*sky_with({}, 64), 1));
+  EXPECT_FALSE(split_environment(*make_constant_environment({1, 1, 1}), 1));
 }
 
 TEST(BrightPatches, NoneInPlainSkies) {

@@ -8,9 +8,11 @@
 #include <set>
 
 #include "integrators/lights/closed_light.h"
+#include "integrators/lights/split_environment.h"
 #include "integrators/paths/camera_path.h"
 #include "limn/core/error.h"
 #include "limn/integrators/compare_images.h"
+#include "limn/integrators/parts.h"
 #include "limn/integrators/render.h"
 #include "support/compare_moments.h"
 #include "support/meshes.h"
@@ -385,6 +387,9 @@ TEST(LineLight, AgreesWithRaysAndPaths) {
                         Case{"smooth, lamps and sky", lamps + sky, true, 4},
                         Case{"smooth, map", make_sky(files, "map"), true, 8}}) {
     const Scene scene = scene_of(files, bodies, c.smooth, c.lights);
+    const bool sun = c.name.find("sun") != std::string::npos;
+    const bool split = scene.environment && split_environment(*scene.environment, 1).has_value();
+    ASSERT_EQ(split, sun) << c.name;
     const RenderResult lines = run(scene, "lines", c.spp);
     expect_alike(lines, run(scene, "path", 512), c.name + ", path");
     const RenderResult rays = run(scene, "rays", 64);
@@ -580,29 +585,84 @@ TEST(LineLight, SilhouettesTakeWhatIsBetter) {
   EXPECT_EQ(ways(scene, options, 8, 12), Ways{"by rays"});
 }
 
+// Lamps, bright patches and the rest of the sky have plans of their own.
 TEST(LineLight, ThreadsDoNotMatter) {
   const TempFiles files;
-  const Scene scene =
-      scene_of(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, true, make_sky(files, "map"));
-  for (const std::string method : {"lines", "rays", "silhouettes"}) {
-    const RenderResult one = run(scene, method, 3), three = run(scene, method, 3, {}, 3);
-    for (size_t i = 0; i < one.radiance.size(); ++i) {
-      ASSERT_EQ(one.radiance.mean(i), three.radiance.mean(i)) << method;
+  const std::string lamp = square("lamp", 0.6, 90, {0.4, 2.9, 0.3}, area_light("glow", "9, 8, 7"));
+  for (const std::string& lights : {make_sky(files, "map"), lamp + make_sun(files, "sun")}) {
+    const Scene scene = scene_of(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, true, lights);
+    for (const std::string method : {"lines", "rays", "silhouettes"}) {
+      const RenderResult one = run(scene, method, 3), three = run(scene, method, 3, {}, 3);
+      for (size_t i = 0; i < one.radiance.size(); ++i) {
+        ASSERT_EQ(one.radiance.mean(i), three.radiance.mean(i)) << method;
+      }
     }
   }
 }
 
+// Films of a single pixel, and crops whose cells begin elsewhere.
+TEST(LineLight, SilhouettesOfPartsOfAFilm) {
+  const TempFiles files;
+  Scene scene = scene_of(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, false,
+                         square("lamp", 0.6, 90, {0.4, 2.9, 0.3}, area_light("glow", "9, 8, 7")) +
+                             make_sun(files, "sun"));
+  Film& film = scene.film;
+  film.crop_x = 5, film.crop_y = 3, film.crop_width = 10, film.crop_height = 12;
+  expect_alike(run(scene, "silhouettes", 64), run(scene, "rays", 256), "crop");
+  film.crop_x = 9, film.crop_y = 11, film.crop_width = film.crop_height = 1;
+  expect_alike(run(scene, "silhouettes", 256), run(scene, "rays", 1024), "one pixel");
+}
+
+// A store that an interrupted pilot's choice must not reach.
+TEST(LineLight, InterruptedPilotsAreNoPartOfARun) {
+  class Store final : public BatchStore {
+   public:
+    void start(int) override { started = true; }
+    Task task(int64_t) const override { return Task::kMake; }
+    BatchRecord read(int64_t) override { return {}; }
+    void write(const BatchRecord&) override {}
+    bool started = false;
+  };
+  const TempFiles files;
+  const Scene scene = scene_of(files, {}, false, constant_light("sky", "1, 1, 1"));
+  RenderOptions options;
+  options.method = "silhouettes";
+  for (const bool stop : {true, false}) {
+    const std::atomic<bool> interrupted = stop;
+    Store store;
+    RunSettings settings;
+    settings.spp = 1;
+    settings.store = &store;
+    settings.interrupted = &interrupted;
+    render(scene, settings, options);
+    EXPECT_EQ(store.started, !stop);
+  }
+}
+
+std::string refusal(const Scene& scene, const RenderOptions& options) {
+  try {
+    render(scene, {}, options);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+// Of silhouettes; lines must be told the same under their own name.
+std::string refused(const Scene& scene, RenderOptions options) {
+  const std::string text = refusal(scene, options), own = "\"silhouettes\"";
+  if (options.method != "silhouettes") return text;
+  options.method = "lines";
+  std::string expected = text;
+  if (const size_t at = text.find(own); at != std::string::npos) {
+    expected.replace(at, own.size(), "\"lines\"");
+  }
+  EXPECT_EQ(refusal(scene, options), expected);
+  return text;
+}
+
 TEST(LineLight, SaysWhatItDoesNotKnow) {
   const TempFiles files;
-  const auto refused = [&](const Scene& scene, RenderOptions options = {}) {
-    RunSettings settings;
-    try {
-      render(scene, settings, options);
-    } catch (const InputError& error) {
-      return std::string(error.what());
-    }
-    return std::string();
-  };
   RenderOptions lines, rays;
   lines.method = "silhouettes";
   rays.method = "rays";
@@ -659,7 +719,7 @@ TEST(LineLight, SaysWhatItDoesNotKnow) {
   EXPECT_NE(refused(plain, none).find("rays: 0"), std::string::npos);
   RenderOptions ao;
   ao.what = RenderWhat::kAmbientOcclusion;
-  EXPECT_NE(refused(deep, ao).find("silhouettes and rays"), std::string::npos);
+  EXPECT_NE(refused(deep, ao).find("say silhouettes, lines, rays"), std::string::npos);
 }
 
 // Rows of all methods and times, whatever the clock gives each of them.

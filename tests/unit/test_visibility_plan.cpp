@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <cmath>
+
 #include "limn/core/rng.h"
 
 namespace limn {
@@ -40,6 +43,11 @@ struct Looker {
     return probe;
   }
 };
+
+VisibilityPlan plan_of(const Film& film, const Looker& looker,
+                       const std::atomic<bool>* interrupted = nullptr) {
+  return plan_visibility(film, kParts, 1, interrupted, looker);
+}
 
 VisibilityPlan plan(const Looker& looker, int width = 256, int height = 64, int threads = 1) {
   return plan_visibility(make_film(width, height), kParts, threads, nullptr, looker);
@@ -90,6 +98,74 @@ TEST(VisibilityPlan, RaysTellOfEdgesThatLinesHaveMissed) {
   EXPECT_GT(found.look(60, 30, 0).rays, 0);
   const VisibilityPlan blind = plan(static_cast<const Looker&>(looker));
   EXPECT_EQ(blind.look(60, 30, 0).rays, 0);
+}
+
+// One sample that is not finite, by rays or by lines, changes little.
+TEST(VisibilityPlan, OneBadSampleDoesNotSpoilIt) {
+  struct Broken : Looker {
+    double bad = 0;
+    bool by_rays = false;
+    VisibilityProbe operator()(const PixelSample& at, VisibilityPart part, int rays,
+                               uint64_t number, uint64_t replicate, double reach) const {
+      VisibilityProbe probe = Looker::operator()(at, part, rays, number, replicate, reach);
+      if (at.x / 8 == 5 && at.y / 8 == 5 && number == 0 && replicate == 1 &&
+          (rays > 0) == by_rays) {
+        probe.value.g = bad;
+      }
+      return probe;
+    }
+  };
+  Broken looker;
+  looker.smooth_until = 128;
+  const VisibilityPlan right = plan(static_cast<const Looker&>(looker));
+  for (const double bad : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
+    for (const bool by_rays : {true, false}) {
+      looker.bad = bad, looker.by_rays = by_rays;
+      const VisibilityPlan found = plan_visibility(make_film(256, 64), kParts, 1, nullptr, looker);
+      // Behind the windows of means that it lies in all is as it was.
+      for (const int x : {4, 252}) {
+        EXPECT_EQ(found.look(x, 4, 0).rays, right.look(x, 4, 0).rays) << bad << by_rays;
+      }
+      EXPECT_GT(found.look(252, 30, 0).points, 4 * found.look(4, 30, 0).points) << bad << by_rays;
+    }
+  }
+}
+
+// Cells count from the crop's corner, and pixels from the film's.
+TEST(VisibilityPlan, CropsHaveTheirOwnCells) {
+  Looker looker;
+  looker.smooth_until = 99 + 128;
+  Film film = make_film(258, 35);
+  film.crop_x = 99, film.crop_y = 203;
+  const VisibilityPlan found = plan_of(film, looker);
+  EXPECT_EQ(found.grid.x0, 99);
+  EXPECT_EQ(found.grid.y0, 203);
+  ASSERT_EQ(found.looks.size(), 33u * 5);
+  EXPECT_EQ(&found.look(99, 203, 0), &found.looks.front());
+  EXPECT_EQ(&found.look(356, 237, 0), &found.looks.back());
+  EXPECT_EQ(found.look(99, 220, 0).rays, 0);
+  EXPECT_GT(found.look(356, 220, 0).rays, 0);
+}
+
+TEST(VisibilityPlan, FilmsOfLessThanACell) {
+  Looker looker;
+  for (const auto& [width, height] : {std::pair{1, 1}, {3, 1}, {1, 20}}) {
+    looker.smooth_until = 1000;
+    EXPECT_EQ(plan(looker, width, height).look(width - 1, height - 1, 0).rays, 0);
+    looker.smooth_until = 0;
+    EXPECT_GT(plan(looker, width, height).look(width - 1, height - 1, 0).rays, 0);
+  }
+}
+
+// What an interrupt leaves has all that a plan has.
+TEST(VisibilityPlan, Interrupted) {
+  const std::atomic<bool> interrupted = true;
+  const VisibilityPlan found = plan_of(make_film(65, 37), {}, &interrupted);
+  ASSERT_EQ(found.looks.size(), 9u * 5);
+  for (const VisibilityLook& look : found.looks) {
+    EXPECT_GE(look.rays, 0);
+    EXPECT_EQ(look.points, 1);
+  }
 }
 
 TEST(VisibilityPlan, ThreadsDoNotMatter) {

@@ -88,17 +88,6 @@ void check_methods(const std::vector<std::string>& names, const std::vector<std:
   }
 }
 
-// Methods that draw no edges on the film take rays: one at least must.
-void check_exact_films(const Scene& scene, const std::vector<std::string>& names) {
-  const std::vector<Row> known = rows();
-  for (const std::string& name : names) {
-    const auto row =
-        std::find_if(known.begin(), known.end(), [&](const Row& r) { return r.name == name; });
-    if (row->terms_can_be_left_out) return check_exact_film(scene, name);
-  }
-  throw InputError("--film exact: none of --methods draws edges on the film");
-}
-
 void make_folder(const std::string& folder) {
   std::error_code failed;
   fs::create_directories(folder, failed);
@@ -344,6 +333,7 @@ int CompareCommand::run_images(const std::string& command_line) {
   std::vector<std::string> methods = command_.methods;
   methods.emplace_back("rays");
   check_image_options(*app_, methods);
+  check_image_methods(command_.methods, command_.render.exact_film);
   if (common_.spp > 0) {
     throw InputError("--spp: methods are compared at equal time: say how long with --time");
   }

@@ -16,19 +16,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void check_image_methods(const std::vector<std::string>& methods) {
-  std::set<std::string> seen;
-  for (const std::string& name : methods) {
-    const std::vector<std::string> known = names_of(render_methods());
-    if (std::find(known.begin(), known.end(), name) == known.end()) {
-      throw InputError("--methods: " + unknown_name("method", name, known));
-    }
-    if (!seen.insert(name).second) {
-      throw InputError("--methods: \"" + name + "\" is given twice");
-    }
-  }
-}
-
 // What rounding of a difference, or a reference that is no better, leaves below zero counts as zero.
 double relative_error(double squared) { return std::sqrt(std::fmax(squared, 0)); }
 
@@ -95,6 +82,7 @@ void write_images(const ImageCompareArguments& arguments, const Scene& scene,
                                  {"scene", scene.file},
                                  {"what", arguments.what},
                                  {"sampler", arguments.render.sampler},
+                                 {"film", arguments.render.exact_film ? "exact" : "rays"},
                                  {"lines", arguments.render.lines},
                                  {"tolerance", arguments.render.tolerance},
                                  {"rays", arguments.render.rays},
@@ -119,7 +107,7 @@ std::string image_method_names() { return join(names_of(render_methods())); }
 void add_image_options(CLI::App& app, std::string& what, RenderOptions& options) {
   app.add_option("--what", what,
                  "What an image shows: all light; direct light alone; ambient occlusion and "
-                 "openness of the sky (methods silhouettes and rays)")
+                 "openness of the sky (methods silhouettes, lines and rays)")
       ->check(CLI::IsMember({"image", "direct", "ao", "openness"}))
       ->capture_default_str();
   app.add_option("--lines", options.lines,
@@ -154,6 +142,26 @@ void check_image_options(const CLI::App& app, const std::vector<std::string>& me
   if (!has("rays")) refuse_options(app, {"--rays"}, "an option of the method rays alone");
 }
 
+void check_image_methods(const std::vector<std::string>& methods, bool exact_film) {
+  std::set<std::string> seen;
+  bool any_film = false;
+  for (const std::string& name : methods) {
+    const auto known = render_methods();
+    const auto method = std::find_if(known.begin(), known.end(),
+                                     [&](const RenderMethod& row) { return row.name == name; });
+    if (method == known.end()) {
+      throw InputError("--methods: " + unknown_name("method", name, names_of(known)));
+    }
+    if (!seen.insert(name).second) {
+      throw InputError("--methods: \"" + name + "\" is given twice");
+    }
+    any_film = any_film || !method->looks_around;
+  }
+  if (exact_film && !any_film) {
+    throw InputError("--film exact: none of --methods takes it; path and analytic do");
+  }
+}
+
 void show(const std::string& what, Scene& scene, RenderOptions& options) {
   if (what == "direct") scene.max_depth = 2;
   if (what == "ao") options.what = RenderWhat::kAmbientOcclusion;
@@ -163,7 +171,6 @@ void show(const std::string& what, Scene& scene, RenderOptions& options) {
 int compare_images_command(const CommonOptions& common, ImageCompareArguments arguments,
                            Scene scene, const RunSettings& settings, Warnings& warnings,
                            const std::string& command_line) {
-  check_image_methods(arguments.methods);
   show(arguments.what, scene, arguments.render);
   ImageCompareOptions options;
   options.methods = arguments.methods;

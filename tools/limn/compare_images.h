@@ -24,6 +24,8 @@ std::string image_method_names();
 void add_image_options(CLI::App& app, std::string& what, RenderOptions& options);
 // InputError for options of methods that are not among `methods` and do not make the reference.
 void check_image_options(const CLI::App& app, const std::vector<std::string>& methods);
+// InputError for methods that are unknown or given twice, and for the exact film if none takes it.
+void check_image_methods(const std::vector<std::string>& methods, bool exact_film);
 // InputError if any of these was given; why: the rest of the sentence.
 void refuse_options(const CLI::App& app, const std::vector<std::string>& names,
                     const std::string& why);

@@ -87,8 +87,8 @@ void bind_check(nb::module_& m) {
       [](const SceneHandle& scene, const std::string& name, std::optional<int> spp,
          std::optional<uint64_t> seed, const std::string& method,
          const std::vector<std::string>& terms, const Samples& samples, double step, int block,
-         int aux, double kappa, int threads, const nb::object& progress) {
-        CheckOptions options{name, method, terms, step, block, {}, {aux, kappa}};
+         int aux, double kappa, int threads, const nb::object& progress, const std::string& film) {
+        CheckOptions options{name, method, terms, step, block, {}, {aux, kappa}, is_exact(film)};
         set_samples(samples, options.samples);
         return check_of(scene, options, {spp, seed, 0, threads}, progress);
       },
@@ -96,13 +96,13 @@ void bind_check(nb::module_& m) {
       nb::arg("method") = "", nb::arg("terms") = nb::make_tuple(), nb::arg("samples") = "auto",
       nb::arg("step") = 0.0, nb::arg("block") = 0, nb::arg("aux") = WarpOptions{}.rays,
       nb::arg("kappa") = WarpOptions{}.kappa, nb::arg("threads") = 0,
-      nb::arg("progress") = nb::none(),
+      nb::arg("progress") = nb::none(), nb::arg("film") = "rays",
       nb::sig("def check(scene: Scene, name: str, spp: int | None = None, seed: int | None = None, "
               "method: str = '', terms: collections.abc.Sequence[str] = (), samples: str | "
               "collections.abc.Sequence[float] = 'auto', step: float = 0, block: int = 0, aux: int "
               "= 8, "
               "kappa: float = 1e4, threads: int = 0, progress: collections.abc.Callable[[float], "
-              "object] | None = None) -> Check"),
+              "object] | None = None, film: str = 'rays') -> Check"),
       "Compares a gradient with finite differences, both with their errors.\n\n"
       "A right gradient is accused once in ten thousand times. step, block: of the differences and "
       "of the windows [pixels]; 0: chosen. The rest as limn.gradient.");

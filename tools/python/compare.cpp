@@ -47,6 +47,7 @@ struct CompareArguments {
   int repeats = 4;
   double reference_seconds = 0;
   WarpOptions warp;
+  bool exact_film = false;
 };
 
 void check_arguments(const Scene& scene, const CompareArguments& arguments) {
@@ -54,6 +55,7 @@ void check_arguments(const Scene& scene, const CompareArguments& arguments) {
   for (const std::string& method : arguments.methods) find_method(method);
   if (arguments.methods.empty()) throw InputError("compare needs a method or more");
   check_warp(arguments.warp, arguments.methods);
+  if (arguments.exact_film) check_exact_films(scene, arguments.methods);
   if (arguments.repeats < 1) throw InputError("repeats must be 1 or more");
   double before = 0;
   for (const double time : arguments.times) {
@@ -77,7 +79,8 @@ Comparison compare_of(const SceneHandle& handle, const CompareArguments& argumen
   check_arguments(*scene, arguments);
   const int width = scene->film.crop_width, height = scene->film.crop_height;
   const int block = std::max(1, (std::max(width, height) + 7) / 8);
-  const MethodInput input{*scene, arguments.name, {}, 0, block, std::nullopt, arguments.warp};
+  const MethodInput input{*scene,         arguments.name,      {}, 0, block, std::nullopt,
+                          arguments.warp, arguments.exact_film};
   Reference reference;
   std::vector<ComparedMethod> compared;
   run_job(make_settings(*scene, run), progress, [&](const RunSettings& settings) {
@@ -157,28 +160,35 @@ void bind_compare(nb::module_& m) {
       [](const SceneHandle& scene, const std::string& name, const std::vector<std::string>& methods,
          const std::vector<double>& times, int repeats, std::optional<double> reference_seconds,
          int aux, double kappa, std::optional<uint64_t> seed, int threads,
-         const nb::object& progress) {
+         const nb::object& progress, const std::string& film) {
         double runs = 0;
         for (const double time : times) runs += time * repeats;
-        return compare_of(
-            scene,
-            {name, methods, times, repeats, reference_seconds.value_or(4 * runs), {aux, kappa}},
-            {{}, seed, 0, threads}, progress);
+        return compare_of(scene,
+                          {name,
+                           methods,
+                           times,
+                           repeats,
+                           reference_seconds.value_or(4 * runs),
+                           {aux, kappa},
+                           is_exact(film)},
+                          {{}, seed, 0, threads}, progress);
       },
       nb::arg("scene"), nb::arg("name"), nb::arg("methods"), nb::arg("times"),
       nb::arg("repeats") = 4, nb::arg("reference_seconds") = nb::none(),
       nb::arg("aux") = WarpOptions{}.rays, nb::arg("kappa") = WarpOptions{}.kappa,
       nb::arg("seed") = nb::none(), nb::arg("threads") = 0, nb::arg("progress") = nb::none(),
+      nb::arg("film") = "rays",
       nb::sig(
           "def compare(scene: Scene, name: str, methods: collections.abc.Sequence[str], times: "
           "collections.abc.Sequence[float], repeats: int = 4, reference_seconds: float | None = "
           "None, aux: int = 8, kappa: float = 1e4, seed: int | None = None, threads: int = 0, "
           "progress: "
-          "collections.abc.Callable[[float], object] | None = None) -> Comparison"),
+          "collections.abc.Callable[[float], object] | None = None, film: str = 'rays') -> "
+          "Comparison"),
       "Derivative images of several methods at equal time against one long run.\n\n"
       "methods: the first is the measure of the others. times: seconds of a run, ascending.\n"
-      "reference_seconds: None for four times all runs of one method. aux, kappa: as "
-      "limn.gradient, of the methods that take them.");
+      "reference_seconds: None for four times all runs of one method. aux, kappa, film: as "
+      "limn.gradient, of the methods that take them; references have their film by rays.");
 }
 
 }  // namespace limn::python

@@ -167,17 +167,22 @@ void bind_render(nb::module_& m) {
       "progress: called with the fraction done. Ctrl-C raises KeyboardInterrupt; samples that are "
       "not finite raise limn.NonFiniteError.\n"
       "method: \"path\", or \"analytic\": direct light of flat lamps on diffuse surfaces in closed "
-      "form; \"silhouettes\" and \"rays\": what the camera sees looks around, by lines between "
-      "silhouettes or by rays.\n"
+      "form; \"lines\" and \"rays\": what the camera sees looks around, by lines between "
+      "silhouettes or by rays; \"silhouettes\": by what a pilot finds to be better, part by part "
+      "of "
+      "the image.\n"
       "what: \"image\", \"direct\" (direct light alone), \"ao\" and \"openness\" (of the sky; "
-      "silhouettes and rays). lines, tolerance: of silhouettes, through the sky (a quarter through "
-      "a lamp), doubled until halves differ by twice this part of the result (0: never). rays: of "
-      "each point for each lamp and the sky.\n"
+      "silhouettes, lines and rays). lines, tolerance: of lines and silhouettes, through the sky "
+      "(a "
+      "quarter through a lamp), doubled until halves differ by twice this part of the result (0: "
+      "never; above it silhouettes takes lines alone). rays: of the method rays, from each point "
+      "for "
+      "each lamp and the sky.\n"
       "film: \"rays\", or \"exact\": what every pixel sees by its exact visible regions (box "
       "filter).\n"
       "sampler: \"independent\", or \"padded-sobol\", even numbers: a third of the squared error, "
       "mostly, but stderr is then neither the error nor a bound of it (compare images of several "
-      "seeds instead). silhouettes and rays always have even numbers.");
+      "seeds instead). silhouettes, lines and rays always have even numbers.");
 }
 
 }  // namespace limn::python

@@ -129,6 +129,8 @@ double edge_magnitude(const GradientResult& result, const ParameterGradient& g, 
 
 // InputError unless the method draws edges on the film and the film has a box filter.
 void check_exact_film(const Scene& scene, const std::string& method);
+// The same unless one of them does, at least: others take rays.
+void check_exact_films(const Scene& scene, const std::vector<std::string>& methods);
 
 // Parameters are differentiated in passes of kLanes over the same samples. InputError for unknown
 // parameters, methods or terms, for a method that cannot leave terms out, and for counts that are
