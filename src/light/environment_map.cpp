@@ -26,6 +26,7 @@ template <class Number>
 void EnvironmentMap::fill(const Image& image, bool sampled, HugePageVector<Texel<Number>>& texels) {
   texels.reserve(static_cast<size_t>(width_) * height_);
   std::vector<float> importance;
+  importance.reserve(texels.capacity());
   for (int y = 0; y < height_; ++y) {
     for (int x = 0; x < width_; ++x) {
       Rgb<double> rgb;
