@@ -527,28 +527,6 @@ TEST(Backward, LossOfAPyramidIsThatOfItsBlocks) {
                InputError);
 }
 
-// However long the set-up takes, it is part of the limit: with an eighth of it for each of two
-// images they get the fewest samples there may be.
-TEST(Backward, SetUpIsPartOfALossesTime) {
-  const TempFiles files;
-  SceneParts parts;
-  parts.width = parts.height = 1;
-  parts.body = obj_shape("body", write_mesh(files, "body.obj", torus_mesh(128, 64)), false, 0.6,
-                         {0, 0.9, 0}, diffuse("clay", ".6, .5, .4")) +
-               square("lamp", 0.8, 90, {0.5, 3.5, 1}, area_light("glow", "6, 6, 6"));
-  const Scene scene = make_scene(files, parts);
-  RunSettings settings;
-  settings.threads = 1;
-  settings.spp = 1;
-  double setup = 1;
-  for (int i = 0; i < 3; ++i) setup = std::min(setup, render(scene, settings).seconds);
-  settings.spp = 1 << 30;
-  settings.least_spp = 2;
-  settings.seconds = setup / 8;
-  const Image target(1, 1, 3);
-  EXPECT_EQ(image_loss(scene, target, LossKind::kL2, settings).spp, 2);
-}
-
 TEST(Backward, LossImagesThatDoNotFitAreNamed) {
   const TempFiles files;
   const Scene scene = shadow_scene(files);
