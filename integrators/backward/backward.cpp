@@ -128,9 +128,11 @@ void check_samples(const BackwardOptions& options) {
     throw InputError(fmt::format("{} edges at a vertex of a path: there may be 1 to {}",
                                  options.edge_samples, kMostSamples));
   }
-  if (!(options.camera_samples > 0 && options.camera_samples <= kMostSamples)) {
+  const double camera = options.camera_samples == 0 ? 1 : options.camera_samples;
+  for (const double samples : {camera, options.shadow_samples}) {
+    if (samples > 0 && samples <= kMostSamples) continue;
     throw InputError(fmt::format("{:g} points on the film for a path: more than 0, {} at most",
-                                 options.camera_samples, kMostSamples));
+                                 samples, kMostSamples));
   }
 }
 
@@ -173,9 +175,15 @@ class BackwardPass {
  private:
   void select();
   void select_regions();
-  size_t points_per_sample() const {
+  // Of a term with points on the film: how many, for each path.
+  double film_samples(size_t term) const {
+    if (term != kCamera) return options_.shadow_samples;
+    if (options_.camera_samples > 0) return options_.camera_samples;
+    return closed_ ? 1 : 0.25;  // where nothing else is noisy, these points are what is
+  }
+  size_t points_per_sample(size_t term) const {
     return static_cast<size_t>(
-        std::ceil(options_.camera_samples * static_cast<double>(film_.pixels().size())));
+        std::ceil(film_samples(term) * static_cast<double>(film_.pixels().size())));
   }
   static size_t tiles_of(size_t samples) { return (samples + kTile - 1) / kTile; }
   std::vector<PathBatch> batches() const;
@@ -305,8 +313,8 @@ size_t BackwardPass::steps() const {
   for (const PathBatch& batch : batches()) {
     if (task(batch) != BatchStore::Task::kMake) continue;
     steps += tiles_of(choice_.paths(batch));
-    for (const bool on : on_film_) {
-      if (on) steps += tiles_of(points_per_sample() * batch.count());
+    for (size_t t = 0; t < kAdjointTerms; ++t) {
+      if (on_film_[t]) steps += tiles_of(points_per_sample(t) * batch.count());
     }
   }
   return steps;
@@ -331,9 +339,9 @@ void BackwardPass::start(BatchStore& store) const {
     if (term.computed) terms.push_back(term.name);
   store.identify("terms", join(terms));
   store.identify("samples",
-                 fmt::format("{} pixels, {} edges, {} on the film, {} batches",
+                 fmt::format("{} pixels, {} edges, {} on the film, {} of shadows, {} batches",
                              options_.uniform_pixels ? "uniform" : "adjoint", options_.edge_samples,
-                             options_.camera_samples, options_.batches));
+                             film_samples(kCamera), options_.shadow_samples, options_.batches));
   store.start(settings_.spp);
 }
 
@@ -469,8 +477,8 @@ void BackwardPass::run_paths(const PathBatch& batch, ProgressCounter& progress,
 
 void BackwardPass::run_film(AdjointTerm term, const PathBatch& batch, ProgressCounter& progress,
                             ContributionSum& sum) {
-  const size_t count = points_per_sample() * batch.count();
-  const size_t first = points_per_sample() * batch.first;
+  const size_t count = points_per_sample(term) * batch.count();
+  const size_t first = points_per_sample(term) * batch.first;
   const double share = 1 / static_cast<double>(count);
   const auto add = term == kCamera   ? add_camera_adjoint
                    : term == kShadow ? add_shadow_adjoint
@@ -498,8 +506,8 @@ void BackwardPass::finish() {
     if (result_.terms[next].name != name_of(t)) continue;
     TermRun& term = result_.terms[next++];
     term.cost = all_.costs[t];
-    if (t == kCamera) {
-      term.samples = options_.camera_samples;
+    if (on_film_[t] || t == kCamera) {
+      term.samples = film_samples(t);
     } else if (t != kInterior) {
       term.samples = options_.edge_samples;
     }

@@ -159,6 +159,14 @@ void add_level(const Level& level, const Level& finest, int doublings, LossKind 
   }
 }
 
+void check_method(const std::string& name) {
+  std::vector<std::string> known;
+  for (const RenderMethod& method : render_methods())
+    if (!method.looks_around) known.emplace_back(method.name);
+  if (std::ranges::find(known, name) != known.end()) return;
+  throw InputError(unknown_name("method for the images of a loss", name, known));
+}
+
 }  // namespace
 
 int most_pyramid_levels(const Scene& scene) {
@@ -178,6 +186,7 @@ LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
     throw InputError(fmt::format("a pyramid of {} levels: the film has 1 to {}", levels,
                                  most_pyramid_levels(scene)));
   }
+  check_method(of.method);
   std::vector<uint64_t> seeds{settings.seed};
   // Of streams that no other seed has.
   const uint64_t stream = mix_bits(settings.seed);

@@ -114,8 +114,8 @@ class SampleEstimator {
   virtual int lanes() const { return 0; }
   virtual Lanes lane_scale() const { return {}; }  // natural steps of the parameters
 
-  // Whether the numbers of a pixel's samples are even (Rng::even). What batches differ by is then no
-  // error, nor a bound of it.
+  // Whether the numbers of a pixel's samples are even (Rng::even). What batches differ by is then
+  // no error, nor a bound of it.
   virtual bool is_even() const { return false; }
   // All that at most kMostTogether samples add, each to its own pixel alone. What goes together
   // changes no bit, nor does their number. Seconds that are not booked on a slot go to

@@ -37,9 +37,10 @@ struct LinePoint {
 };
 
 // A place where the value is at most start.value + 1e-4 (at start.slope - held), and the slope at
-// most 0.9 of that of the start in magnitude, or if there is none, one where the value is lower. evaluate:
-// at a place; a value that is not finite says that nothing is there; none: stop. first: the first
-// place to look at. start.slope must be negative. None if none was found in 20 evaluations.
+// most 0.9 of that of the start in magnitude, or if there is none, one where the value is lower.
+// evaluate: at a place; a value that is not finite says that nothing is there; none: stop. first:
+// the first place to look at. start.slope must be negative. None if none was found in 20
+// evaluations.
 std::optional<LinePoint> wolfe_search(
     const std::function<std::optional<LinePoint>(double)>& evaluate, const LinePoint& start,
     double first);

@@ -38,8 +38,8 @@ class ClosedLight {
   static constexpr size_t kMostPlanes = 64;  // of one lamp
 
   // Radiance that the surface scatters towards the viewer of `scattering`, of all lamps [W / (m^2
-  // sr)]; with its derivative where S is Dual or Var. edge: where the point lies, if on an edge: the limit
-  // from its own face.
+  // sr)]; with its derivative where S is Dual or Var. edge: where the point lies, if on an edge:
+  // the limit from its own face.
   template <class S>
   Rgb<S> scattered(const RayTracer& tracer, const SurfacePoint<S>& surface,
                    const Scattering<S>& scattering, const EdgeStart* edge) const;

@@ -3,10 +3,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "integrators/estimates/batches.h"
 #include "integrators/methods/radiance_estimator.h"
 #include "integrators/methods/render_seeds.h"
 #include "integrators/methods/visibility_estimator.h"
+#include "limn/core/check.h"
 #include "limn/core/error.h"
 #include "limn/core/names.h"
 #include "limn/integrators/parts.h"
@@ -140,12 +143,16 @@ RenderResult render(const Scene& scene, const RunSettings& settings, const Rende
 std::vector<RenderResult> render_seeds(const Scene& scene, const RunSettings& settings,
                                        std::span<const uint64_t> seeds,
                                        const RenderOptions& options) {
-  if (find_render_method(options.method).looks_around) {
-    throw InputError(fmt::format("the method \"{}\" makes no radiance", options.method));
-  }
+  // The estimators of others hold their seed.
+  CHECK(!find_render_method(options.method).looks_around);
+  const Stopwatch watch;
   RunSettings own = settings;
   own.store = nullptr;
   const EstimatorList estimators = estimators_of(scene, own, options);
+  if (settings.seconds > 0) {
+    const double setup = watch.seconds() / static_cast<double>(seeds.size());
+    own.seconds = std::max(1e-9, settings.seconds - setup);
+  }
   std::vector<RenderResult> results;
   for (const uint64_t seed : seeds) {
     own.seed = seed;

@@ -72,8 +72,8 @@ inline void PathTracer<S, Visitor>::weigh_light(Walk& walk) const {
 }
 
 // No ray meets a delta light by chance, so it has the whole weight. Its direction follows the
-// parameters, and f_s with it. A face that it sees edge-on stays as dark as it is, as its edges have
-// it: rounding would tell which half of the face begins to be lit as the scene moves.
+// parameters, and f_s with it. A face that it sees edge-on stays as dark as it is, as its edges
+// have it: rounding would tell which half of the face begins to be lit as the scene moves.
 template <class S, class Visitor>
 inline void PathTracer<S, Visitor>::draw_delta(Walk& walk, const DeltaLight& delta) const {
   const auto arriving = limn::arrival<S>(delta, walk.surface.p);

@@ -42,16 +42,16 @@ struct VisibilityProbe {
   double point_cost = 0;  // of the point itself
   double cost = 0;        // with its look
 };
-// number: of the point; replicates look around from it by independent lines or rays. reach: 1, or of
-// the way from the pixel's center to the point. Thread-safe.
+// number: of the point; replicates look around from it by independent lines or rays. reach: 1, or
+// of the way from the pixel's center to the point. Thread-safe.
 using VisibilityProbing =
     std::function<VisibilityProbe(const PixelSample& at, VisibilityPart part, int rays,
                                   uint64_t number, uint64_t replicate, double reach)>;
 
 // In every cell and for every part what has the least product of variance and cost, each the mean
-// over the cell and its surroundings, and so many points that the error of the image after equal time
-// is least. A pilot looks at one pixel of each cell of 8 by 8. Costs are counted, so that a seed
-// gives the same plan everywhere.
+// over the cell and its surroundings, and so many points that the error of the image after equal
+// time is least. A pilot looks at one pixel of each cell of 8 by 8. Costs are counted, so that a
+// seed gives the same plan everywhere.
 VisibilityPlan plan_visibility(const Film& film, std::span<const VisibilityPart> parts, int threads,
                                const std::atomic<bool>* interrupted,
                                const VisibilityProbing& probe);

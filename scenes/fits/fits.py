@@ -75,7 +75,8 @@ class Fits:
         else:
             # Four times the default: what the figures in README.md were taken with.
             seconds = self.run("fit", scene, "--target", target, "--steps", str(steps),
-                               "--camera-samples", "1", "-o", self.path(folder), *words)  # fmt: skip
+                               "--camera-samples", "1", "-o", self.path(folder),
+                               *words)  # fmt: skip
         known = json.load(open(times, encoding="utf-8")) if os.path.exists(times) else None
         if seconds and (known is not None or not done):
             known = (known or 0) + seconds

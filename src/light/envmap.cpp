@@ -1,6 +1,7 @@
 // Emitter "envmap": radiance from all directions, from an image.
 #include <fmt/format.h>
 
+#include "limn/core/check.h"
 #include "src/light/environment_map.h"
 #include "src/light/types.h"
 
@@ -108,6 +109,7 @@ class MapEnvironment final : public Environment {
   template <class S>
   void look(const Vec3d& d, const EnvironmentMap::Place<double>& place, const S& scale,
             Sight<S>& sight) const {
+    DCHECK(find(d) == (std::array<double, 2>{place.x, place.y}));
     sight.radiance = map_->radiance(place) * scale;
     sight.pdf = map_->pdf_solid_angle(place, map_from_world(d));
   }

@@ -523,6 +523,8 @@ TEST(Backward, LossOfAPyramidIsThatOfItsBlocks) {
   }
   EXPECT_THROW(image_loss(scene, target, LossKind::kL2, settings, mask, 5), InputError);
   EXPECT_THROW(image_loss(scene, target, LossKind::kL2, settings, mask, 0), InputError);
+  EXPECT_THROW(image_loss(scene, target, LossKind::kL2, settings, mask, 1, {.method = "rays"}),
+               InputError);
 }
 
 TEST(Backward, LossImagesThatDoNotFitAreNamed) {

@@ -56,6 +56,10 @@ BOUNDS = {"clay.reflectance": (0.25, 0.75), "lamp.radiance": (3.99, 7)}
 @pytest.mark.parametrize("names, options, words", [
     (["tent.vertex_positions"], {}, []),
     (["tent.vertex_positions"], {"sampler": "uniform"}, ["--sampler", "uniform"]),
+    (["tent.vertex_positions"], {"camera_samples": 2}, ["--camera-samples", "2"]),
+    (["tent.vertex_positions"], {"shadow_samples": 2}, ["--shadow-samples", "2"]),
+    (["tent.vertex_positions"], {"edge_samples": 3}, ["--edge-samples", "3"]),
+    (["tent.vertex_positions"], {"uniform_pixels": True}, ["--pixels", "uniform"]),
     (["tent.vertex_positions"], {"smoothing": 0.3}, ["--smoothing", "0.3"]),
     (["tent.vertex_positions"], {"terms": ["interior"]}, ["--terms", "interior"]),
     (VALUES, {"loss": "relative-l2"}, ["--loss", "relative-l2"]),

@@ -9,6 +9,7 @@ import subprocess
 import sys
 
 import limn
+import numpy as np
 import pytest
 from conftest import ROOT
 
@@ -46,6 +47,43 @@ def test_the_stub_has_every_public_name():
     assert len(bound) > 20
     assert {name for name, _ in public() if name.split(".")[0] in bound} <= found
     assert os.path.exists(os.path.join(os.path.dirname(limn.__file__), "py.typed"))
+
+
+def stub_defaults(name, function):
+    """The defaults that the stub tells of a function, or of a class's method."""
+    with open(STUB, encoding="utf-8") as stream:
+        nodes = ast.parse(stream.read()).body
+    for part in (name, function):
+        found = [n for n in nodes if getattr(n, "name", None) == part]
+        if part == function or not isinstance(found[0], ast.ClassDef):
+            break
+        nodes = found[0].body
+    arguments = found[0].args
+    names = [a.arg for a in arguments.args][-len(arguments.defaults):]
+    return {n: ast.literal_eval(d) for n, d in zip(names, arguments.defaults)}
+
+
+# A signature is a text beside the code: what it says must be what is done without a word.
+def test_the_stubs_defaults_are_those_of_the_code(scene):
+    own = {"spp": 4, "seed": 3}
+    adjoint = np.random.default_rng(3).normal(size=(scene.height, scene.width, 3))
+    told = stub_defaults("backward", "backward") | own
+    assert {"edge_samples", "camera_samples", "shadow_samples", "batches", "sampler"} <= set(told)
+    plain, said = limn.backward(scene, adjoint, **own), limn.backward(scene, adjoint, **told)
+    for name in plain:
+        np.testing.assert_array_equal(plain[name].value, said[name].value)
+        np.testing.assert_array_equal(plain[name].stderr, said[name].stderr)
+    more = limn.backward(scene, adjoint, **{**told, "camera_samples": 1})
+    moved = "tent.vertex_positions"
+    assert (more[moved].value != plain[moved].value).any()
+    target = np.zeros((scene.height, scene.width, 3))
+    told = stub_defaults("Fit", "__init__") | own
+    assert {"edge_samples", "camera_samples", "uniform_pixels", "step"} <= set(told)
+    fits = [limn.Fit(scene, target, moved, **o) for o in (own, told)]
+    for fit in fits:
+        fit.run(1)
+    assert fits[0].history[0].loss == fits[1].history[0].loss
+    np.testing.assert_array_equal(*(fit.scenes[0][moved] for fit in fits))
 
 
 # PyTorch may not be there, and has no types of its own for what is subclassed.

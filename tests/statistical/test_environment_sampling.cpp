@@ -7,6 +7,7 @@
 #include "support/chi_square.h"
 #include "support/environment_maps.h"
 #include "support/quadrature.h"
+#include "support/scenes.h"
 
 namespace limn {
 namespace {
@@ -85,6 +86,16 @@ void expect_same_look(const Environment& map, const Environment::Drawn& drawn) {
   EXPECT_EQ(map.drawn_radiance<Dual>(sample).r.v, map.drawn_radiance<double>(sample).r);
   EXPECT_EQ(sight.radiance.r, map.radiance(d).r);
   EXPECT_EQ(dual.radiance.r.v, sight.radiance.r);
+}
+
+// In debug builds; without a place of its own a walk would see one texel everywhere.
+TEST(EnvironmentSamplingDeathTest, AMapIsLookedAtWhereItsDirectionLies) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.body = make_sky(files, "sky");
+  const Scene scene = make_scene(files, parts);
+  Environment::Sight<double> sight;
+  EXPECT_DEBUG_DEATH(scene.environment->look(normalize(Vec3d{1, 2, 3}), {}, sight), "find");
 }
 
 TEST(EnvironmentSampling, MatchesItsDensity) {

@@ -66,36 +66,39 @@ TEST(DeltaLights, ADirectionComesFromInfinity) {
   }
 }
 
-// Shapes in their order, the environment, then delta lights; each as often as its density says, which
-// is the one that is asked for.
-void expect_draws_of_densities(const Scene& scene) {
+// `lamps` shapes in their order, all squares that face down, the environment, then delta lights; each
+// as often as its density says, which is the one that is asked for.
+void expect_draws_of_densities(const Scene& scene, size_t lamps) {
   const Lights lights(scene);
-  ASSERT_EQ(lights.all().size(), 4u);
-  EXPECT_EQ(lights.all()[1], scene.environment.get());
-  EXPECT_EQ(lights.all()[2], scene.delta_lights[0].get());
+  const size_t all = lights.all().size();
+  ASSERT_EQ(all, lamps + 1 + scene.delta_lights.size());
+  EXPECT_EQ(lights.all()[lamps], scene.environment.get());
+  EXPECT_EQ(lights.all()[lamps + 1], scene.delta_lights[0].get());
   const Lights::Place place = lights.at({0.3, 1, 0.2});
   const int draws = 40000;
-  std::vector<int> counts(4);
-  std::vector<double> expected(4);
+  std::vector<int> counts(all);
+  std::vector<double> expected(all);
   Rng rng(4, 5, 6);
   for (int i = 0; i < draws; ++i) {
     const auto sample = lights.sample(place, rng);
     ASSERT_TRUE(sample);
-    const auto which = std::ranges::find(lights.all(), sample->light) - lights.all().begin();
+    const auto which =
+        static_cast<size_t>(std::ranges::find(lights.all(), sample->light) - lights.all().begin());
     ++counts[which];
-    EXPECT_EQ(sample->face.has_value(), which == 0);
+    EXPECT_EQ(sample->face.has_value(), which < lamps);
     const LightView lamp{sample->wo, sample->distance, Vec3d{0, -1, 0}};
-    if (which > 1) {
+    if (which > lamps) {
       expected[which] = sample->pdf;
     } else {
-      const double pdf = which == 0 ? lights.pdf(place, ShapeId(0), lamp)
-                                    : lights.pdf_environment(place, sample->wo);
+      const double pdf = which < lamps
+                             ? lights.pdf(place, ShapeId(static_cast<uint32_t>(which)), lamp)
+                             : lights.pdf_environment(place, sample->wo);
       EXPECT_DOUBLE_EQ(sample->pdf, pdf);
       expected[which] = pdf / lights.all()[which]->pdf(lamp, 1);
     }
   }
   EXPECT_NEAR(std::accumulate(expected.begin(), expected.end(), 0.0), 1, 1e-12);
-  for (int k = 0; k < 4; ++k) {
+  for (size_t k = 0; k < all; ++k) {
     // Binomial, five standard errors.
     EXPECT_NEAR(counts[k], draws * expected[k],
                 5 * std::sqrt(draws * expected[k] * (1 - expected[k])));
@@ -108,12 +111,31 @@ TEST(Lights, AreDrawnAsOftenAsTheirDensitiesSay) {
       scene_with(files, R"(<emitter type="directional"/><emitter type="constant"/>
                 <emitter type="point" id="dot"/>)" +
                             square("lamp", 1, 90, {0, 3, 0}, area_light("glow", "1, 1, 1")));
-  expect_draws_of_densities(scene);
+  expect_draws_of_densities(scene, 1);
   // As finite differences move what is dark.
   for (const char* name : {"glow.radiance", "dot.intensity"}) {
     SCOPED_TRACE(name);
-    expect_draws_of_densities(find_parameter(scene, name).moved(scene, -1.2));
+    expect_draws_of_densities(find_parameter(scene, name).moved(scene, -1.2), 1);
   }
+}
+
+// What is kept of a place is kept of the first four.
+TEST(Lights, MoreThanFourAreDrawnAsOftenAsTheirDensitiesSay) {
+  const TempFiles files;
+  const std::string sky = R"(<emitter type="constant"/><emitter type="directional"/>)";
+  std::string dots, lamps;
+  for (const char* x : {"-1", "0.5", "2"}) {
+    dots += std::string(R"(<emitter type="point"><point name="position" y="2" z="0" x=")") + x +
+            R"("/></emitter>)";
+  }
+  for (int i = 0; i < 6; ++i) {
+    const std::string glow = std::to_string(1 + 3 * i);
+    lamps += square("lamp" + std::to_string(i), 0.3, 90, {i - 3.0, 3, 0},
+                    area_light("glow" + std::to_string(i), glow + ", 1, 1"));
+  }
+  const std::string lamp = square("lamp", 1, 90, {0, 3, 0}, area_light("glow", "1, 1, 1"));
+  expect_draws_of_densities(scene_with(files, sky + dots + lamp), 1);
+  expect_draws_of_densities(scene_with(files, sky + lamps), 6);
 }
 
 // By irradiance on a surface that faces them: 1 / d^2 of points, the closed form of a small lamp from

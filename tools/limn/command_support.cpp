@@ -130,10 +130,16 @@ void add_reverse_options(CLI::App& app, BackwardOptions& options) {
                  "variant of these")
       ->capture_default_str();
   app.add_option("--edge-samples", options.edge_samples, "At every vertex of a path")
-      ->check(CLI::Range(1, 1 << 16));
+      ->check(CLI::Range(1, 1 << 16))
+      ->capture_default_str();
   app.add_option("--camera-samples", options.camera_samples,
                  "Points on silhouettes of the film, for each path")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::PositiveNumber)
+      ->default_str("0.25, 1 with --sampler analytic");
+  app.add_option("--shadow-samples", options.shadow_samples,
+                 "Points on edges of shadows in view (terms shadow, penumbra), for each path")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
 }
 
 void add_warp_options(CLI::App& app, WarpOptions& warp) {

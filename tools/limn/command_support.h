@@ -46,7 +46,7 @@ void add_parameter_options(CLI::App& app, std::vector<std::string>& parameters, 
 void add_term_options(CLI::App& app, std::string& terms, std::string& samples);
 // --aux and --kappa
 void add_warp_options(CLI::App& app, WarpOptions& warp);
-// --terms, --pixels, --sampler, --edge-samples and --camera-samples
+// --terms, --pixels, --sampler, --edge-samples, --camera-samples and --shadow-samples
 void add_reverse_options(CLI::App& app, BackwardOptions& options);
 inline constexpr const char *kAdjointPixels = "adjoint", *kUniformPixels = "uniform";
 // --film: "rays" or "exact"

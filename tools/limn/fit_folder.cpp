@@ -79,6 +79,7 @@ void visit_arguments(Arguments& a, const Visit& visit) {
   visit("remesh_edge", options.remesh_edge);
   visit("remesh_shrink", options.remesh_shrink);
   visit("camera_samples", options.backward.camera_samples);
+  visit("shadow_samples", options.backward.shadow_samples);
   visit("step_half_life", options.step_half_life);
   visit("spp_doubling", options.spp_doubling);
   visit("spp", a.spp);
@@ -98,7 +99,9 @@ json to_json(const FitArguments& a) {
   return j;
 }
 
-FitArguments arguments_from(const json& j) {
+FitArguments arguments_from(json j) {
+  // Of fits from before shadows had a number of their own: that of the camera was theirs.
+  if (!j.contains("shadow_samples")) j["shadow_samples"] = j.at("camera_samples");
   FitArguments a;
   visit_arguments(a, [&](const char* name, auto& member) { j.at(name).get_to(member); });
   a.options.backward.uniform_pixels = j.at("pixels") == kUniformPixels;

@@ -97,7 +97,7 @@ void bind_backward(nb::module_& m) {
       [](const SceneHandle& scene, nb::handle adjoint, const std::optional<Names>& names,
          std::optional<int> spp, std::optional<uint64_t> seed,
          const std::vector<std::string>& terms, bool uniform_pixels, int edge_samples,
-         double camera_samples, int batches, double seconds, int threads,
+         double camera_samples, double shadow_samples, int batches, double seconds, int threads,
          const nb::object& progress, const std::string& sampler, BatchStore* store) {
         BackwardOptions options;
         options.sampler = sampler;
@@ -106,6 +106,7 @@ void bind_backward(nb::module_& m) {
         options.uniform_pixels = uniform_pixels;
         options.edge_samples = edge_samples;
         options.camera_samples = camera_samples;
+        options.shadow_samples = shadow_samples;
         options.batches = batches;
         if (batches < 1) throw InputError("batches must be 1 or more");
         return backward_of(scene, to_image(adjoint), options, {spp, seed, seconds, threads, store},
@@ -115,16 +116,16 @@ void bind_backward(nb::module_& m) {
       nb::arg("spp") = nb::none(), nb::arg("seed") = nb::none(),
       nb::arg("terms") = nb::make_tuple(), nb::arg("uniform_pixels") = false,
       nb::arg("edge_samples") = 1, nb::arg("camera_samples") = BackwardOptions{}.camera_samples,
-      nb::arg("batches") = 16, nb::arg("seconds") = 0.0, nb::arg("threads") = 0,
-      nb::arg("progress") = nb::none(), nb::arg("sampler") = BackwardOptions{}.sampler,
-      nb::arg("_store").none() = nb::none(),
+      nb::arg("shadow_samples") = BackwardOptions{}.shadow_samples, nb::arg("batches") = 16,
+      nb::arg("seconds") = 0.0, nb::arg("threads") = 0, nb::arg("progress") = nb::none(),
+      nb::arg("sampler") = BackwardOptions{}.sampler, nb::arg("_store").none() = nb::none(),
       nb::sig(
           "def backward(scene: Scene, adjoint: numpy.typing.ArrayLike, names: str | "
           "collections.abc.Sequence[str] | None = None, spp: int | None = None, seed: int | None "
           "= None, terms: collections.abc.Sequence[str] = (), uniform_pixels: bool = False, "
-          "edge_samples: int = 1, camera_samples: float = 1, batches: int = 16, seconds: float = "
-          "0, "
-          "threads: int = 0, progress: collections.abc.Callable[[float], object] | None = None, "
+          "edge_samples: int = 1, camera_samples: float = 0, shadow_samples: float = 1, "
+          "batches: int = 16, seconds: float = 0, threads: int = 0, progress: "
+          "collections.abc.Callable[[float], object] | None = None, "
           "sampler: str = 'forest') -> dict[str, Estimate]"),
       "Reverse mode: dLoss/dparameter of every parameter at once, from dLoss/dImage.\n\n"
       "adjoint: (H, W, 3), or (H, W) of the luminance; independent of the samples made here "
@@ -135,7 +136,9 @@ void bind_backward(nb::module_& m) {
       "unit of the parameter. "
       "Copies of a vertex have equal shares. Pixels are sampled in proportion to the adjoint "
       "unless uniform_pixels. edge_samples: at every vertex of a path; camera_samples: points on "
-      "the film, for each path. sampler: of edges, \"forest\"; \"silhouettes\", which is better "
+      "silhouettes of the film, for each path (0: a quarter, one with \"analytic\"); "
+      "shadow_samples: on edges of shadows there. sampler: of edges, \"forest\"; \"silhouettes\", "
+      "which is better "
       "where shadows are soft; \"analytic\": none, but the light of flat lamps in closed form; or "
       "to compare with them \"quadric\", \"li2019\", \"uniform\", "
       "\"brute\". batches: at most, for standard errors. The rest as limn.gradient.");

@@ -150,12 +150,17 @@ void bind_fit(nb::module_& m) {
              const std::vector<std::string>& terms, std::optional<uint64_t> seed, int threads,
              int pyramid, int spp_doubling, double remesh_edge, double remesh_shrink,
              const std::map<std::string, std::pair<double, double>>& bounds,
-             const std::string& sampler) {
+             const std::string& sampler, bool uniform_pixels, int edge_samples,
+             double camera_samples, double shadow_samples) {
             FitOptions options;
             for (const auto& [name, range] : bounds) {
               options.bounds.push_back({name, range.first, range.second});
             }
             options.backward.sampler = sampler;
+            options.backward.uniform_pixels = uniform_pixels;
+            options.backward.edge_samples = edge_samples;
+            options.backward.camera_samples = camera_samples;
+            options.backward.shadow_samples = shadow_samples;
             options.parameters = to_list(names);
             options.loss = loss_kind(loss);
             options.optimiser = optimiser_kind(optimiser);
@@ -185,7 +190,9 @@ void bind_fit(nb::module_& m) {
           nb::arg("terms") = nb::make_tuple(), nb::arg("seed") = nb::none(), nb::arg("threads") = 0,
           nb::arg("pyramid") = 1, nb::arg("spp_doubling") = 0, nb::arg("remesh_edge") = 0.75,
           nb::arg("remesh_shrink") = 0.65, nb::arg("bounds") = nb::dict(),
-          nb::arg("sampler") = BackwardOptions{}.sampler,
+          nb::arg("sampler") = BackwardOptions{}.sampler, nb::arg("uniform_pixels") = false,
+          nb::arg("edge_samples") = 1, nb::arg("camera_samples") = BackwardOptions{}.camera_samples,
+          nb::arg("shadow_samples") = BackwardOptions{}.shadow_samples,
           nb::sig(
               "def __init__(self, scene: Scene, target: numpy.typing.ArrayLike, names: str | "
               "collections.abc.Sequence[str], mask: numpy.typing.ArrayLike | None = None, "
@@ -196,8 +203,9 @@ void bind_fit(nb::module_& m) {
               "collections.abc.Sequence[int] = (), terms: collections.abc.Sequence[str] = (), "
               "seed: int | None = None, threads: int = 0, pyramid: int = 1, spp_doubling: int = "
               "0, remesh_edge: float = 0.75, remesh_shrink: float = 0.65, bounds: "
-              "collections.abc.Mapping[str, tuple[float, float]] = {}, sampler: str = 'forest') -> "
-              "None"),
+              "collections.abc.Mapping[str, tuple[float, float]] = {}, sampler: str = 'forest', "
+              "uniform_pixels: bool = False, edge_samples: int = 1, camera_samples: float = 0, "
+              "shadow_samples: float = 1) -> None"),
           "Copies the scene; it stays as it is.\n\n"
           "target: (H, W, 3) or (H, W). names: scalars and arrays "
           "(\"object.vertex_positions\").\n"
@@ -215,7 +223,8 @@ void bind_fit(nb::module_& m) {
           "loss_spp says otherwise; twice as many after each spp_doubling steps (0: never).\n"
           "remesh: steps after which vertices get new triangles, with edges remesh_edge times as "
           "long, steps and smoothing remesh_shrink times what they were.\n"
-          "bounds: {name: (least, most)} that scalars may not leave. sampler: see limn.backward.")
+          "bounds: {name: (least, most)} that scalars may not leave. sampler, uniform_pixels, "
+          "edge_samples, camera_samples, shadow_samples: of the gradient, see limn.backward.")
       .def("step", &step, nb::arg("progress") = nb::none(),
            nb::sig("def step(self, progress: collections.abc.Callable[[float], object] | None = "
                    "None) -> FitRecord"),

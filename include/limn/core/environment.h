@@ -47,8 +47,8 @@ class Environment : public Light {
   virtual double mean_luminance() const = 0;
 
   // Radiance that is bilinear between points of a grid over azimuth and polar angle: column i lies
-  // at the azimuth 2 pi (i + 1/2) / columns from `zero` towards `quarter`, row j at the angle pi j /
-  // (rows - 1) from the pole. Unit vectors, across each other.
+  // at the azimuth 2 pi (i + 1/2) / columns from `zero` towards `quarter`, row j at the angle pi j
+  // / (rows - 1) from the pole. Unit vectors, across each other.
   struct Grid {
     Vec3d pole, zero, quarter;
     int columns, rows;

@@ -19,7 +19,8 @@ struct Filter {
   // Integral of the filter from -radius to x.
   double integral(double x) const;
   // The offset in [lower, upper], a part of [-radius, radius] that holds more than zero of the
-  // filter, below which a part u of what it holds there lies. To rounding; see FilterTable for many.
+  // filter, below which a part u of what it holds there lies. To rounding; see FilterTable for
+  // many.
   double quantile(double lower, double upper, double u) const;
 };
 

@@ -34,11 +34,11 @@ struct BackwardOptions {
   // light in closed form, as the method of that name in forward mode, with its scenes.
   std::string sampler = "forest";
   int edge_samples = 1;  // at every vertex of a path, of each term of edges; 65536 at most
-  // Points on the film, per path, of each term that has some there; 65536 at most. A quarter in place of one
-  // takes 0.64 to 1 of the time in six fits and scenes, and 0.62 to 1.01 of variance times time of
-  // the vertex gradient as optimisers smooth it.
-  double camera_samples = 0.25;
-  int batches = 16;  // at most, for standard errors; each ends with the adjoint of normals
+  // Points on the film, per path, of `camera`; 65536 at most. 0: a quarter, and with "analytic" one
+  // (README.md of integrators/backward has what other numbers did).
+  double camera_samples = 0;
+  double shadow_samples = 1;  // the same of each of `shadow` and `penumbra`, but more than 0
+  int batches = 16;           // at most, for standard errors; each ends with the adjoint of normals
   // Called with every finished batch, in their order: its samples per pixel, and times these what
   // the parameters came to, number by number.
   std::function<void(int samples, const std::vector<std::vector<double>>& sums)> each_batch;
@@ -89,8 +89,8 @@ struct BackwardResult {
 // drops the batch in progress. With settings.seconds as many batches of one size as fit, two at
 // least: a run without limit with the samples and batches that the result names has the same bits.
 // The same seed gives the same bits on any number of threads; memory does not grow with samples.
-// InputError for unknown parameters or terms, numbers of samples out of range, and for an adjoint of
-// another size or one that is not finite.
+// InputError for unknown parameters or terms, numbers of samples out of range, and for an adjoint
+// of another size or one that is not finite.
 BackwardResult backward(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
                         const RunSettings& settings);
 
@@ -127,7 +127,7 @@ struct LossResult {
 
 // What a loss is told from.
 struct LossImages {
-  std::string method = "path";  // of render()
+  std::string method = "path";  // of render(), but for those that look around
   // One image in place of two, of the samples of settings.seed: those that backward() takes, too,
   // with uniform pixels and one batch. Where light is known in closed form the loss is then a
   // function of the scene, and backward() gives its derivative. It is larger than that of the
@@ -144,8 +144,8 @@ struct LossImages {
 // levels: of a pyramid, the mean over the loss of the images as they are, at half the size, a
 // quarter, ...: the coarse ones tell a shape far away where to go, and noise less. Pixels of coarse
 // levels are means of those below, weighed by the mask; so what is unbiased stays so.
-// InputError as check_loss_images(), and for fewer levels than 1 or more than
-// most_pyramid_levels().
+// InputError as check_loss_images(), for other methods, and for fewer levels than 1 or more than
+// most_pyramid_levels(). settings.seconds: of each image, with half of the set-up.
 LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
                       const RunSettings& settings, const Image& mask = {}, int levels = 1,
                       const LossImages& of = {});

@@ -27,10 +27,10 @@ enum class OptimiserKind {
   kAdam,             // Kingma and Ba 2015, without its epsilon, with a second moment that forgets
                      // in 20 steps: gradients are noisy, and now and then very large
   kGradientDescent,  // g itself: the size of a step is that of the loss
-  // Limited-memory BFGS (Nocedal and Wright 2006, 7.2), with a line search to Wolfe's conditions. It
-  // compares losses and gradients of different steps, which noise would make worthless: so it needs
-  // light in closed form (the sampler "analytic"), takes the same samples at every step, alike in
-  // all pixels, one image for the loss, and minimises that function of the parameters. Its
+  // Limited-memory BFGS (Nocedal and Wright 2006, 7.2), with a line search to Wolfe's conditions.
+  // It compares losses and gradients of different steps, which noise would make worthless: so it
+  // needs light in closed form (the sampler "analytic"), takes the same samples at every step,
+  // alike in all pixels, one image for the loss, and minimises that function of the parameters. Its
   // derivative is the term "interior"; where silhouettes that the camera sees are moved, their term
   // adds an estimate of their part of the mean image's, which the function itself does not have.
   // Numbers at a bound that would go on past it are held. Not for l1, nor with more samples
@@ -54,10 +54,10 @@ struct FitBounds {
 };
 
 struct FitOptions {
-  // Names as in parameter.h: scalars, SHAPE.vertex_positions, EMITTER.data; at least one. Every view
-  // that has a name moves with it, and one view must have it. Colours move by channels. Motions of
-  // a shape and its vertex_positions exclude each other, as do motions of texels and all of them;
-  // where vertices are fitted, normals of the file give way to computed ones.
+  // Names as in parameter.h: scalars, SHAPE.vertex_positions, EMITTER.data; at least one. Every
+  // view that has a name moves with it, and one view must have it. Colours move by channels.
+  // Motions of a shape and its vertex_positions exclude each other, as do motions of texels and all
+  // of them; where vertices are fitted, normals of the file give way to computed ones.
   std::vector<std::string> parameters;
   std::vector<FitBounds> bounds;
   LossKind loss = LossKind::kL2;

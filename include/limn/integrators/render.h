@@ -42,8 +42,9 @@ enum class RenderWhat {
   kOpenness
 };
 
-// Where the random numbers of a pixel's samples come from, by Mitsuba's and pbrt's names. The first is
-// what `limn render` takes, the second that of RenderOptions and Python, where variances are asked for.
+// Where the random numbers of a pixel's samples come from, by Mitsuba's and pbrt's names. The first
+// is what `limn render` takes, the second that of RenderOptions and Python, where variances are
+// asked for.
 inline constexpr const char* kRenderSamplers[] = {"padded-sobol", "independent"};
 
 struct RenderOptions {

@@ -18,9 +18,9 @@ def fit(
 ) -> Fit:
     """Moves parameters towards a target for some steps: Fit(scene, target, names, ...).run(steps).
 
-    options: those of limn.Fit; callback(record) after each step. What came of it is in the `scenes`,
-    `values` and `history` of what is returned. To keep what Ctrl-C leaves, make a limn.Fit and call
-    its run().
+    options: those of limn.Fit; callback(record) after each step. What came of it is in the
+    `scenes`, `values` and `history` of what is returned. To keep what Ctrl-C leaves, make a
+    limn.Fit and call its run().
     """
     made = Fit(scene, target, names, **options)
     made.run(steps, callback)
