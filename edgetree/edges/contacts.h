@@ -39,8 +39,9 @@ struct Contacts {
   std::vector<NearFace> near;     // by edge; also of edges that touch the face
 };
 
-// Of edges with faces that have area; of flat edges with faces in other planes alone, and none near. Whether two edges run along each other is
-// decided for the two alike. meshes: of the objects; pairs, viewer: as find_face_pairs has them.
+// Of edges with faces that have area; of flat edges with faces in other planes alone, and none
+// near. Whether two edges run along each other is decided for the two alike. meshes: of the
+// objects; pairs, viewer: as find_face_pairs has them.
 Contacts find_contacts(std::span<const EdgeMesh> objects, std::span<const Mesh* const> meshes,
                        std::span<const FacePair> pairs, const Vec3d& viewer, int threads);
 
