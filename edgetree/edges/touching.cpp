@@ -39,8 +39,9 @@ using Corners = std::array<Vec3d, 3>;
 
 class Unifier {
  public:
-  Unifier(std::span<const TouchingShape> shapes, std::vector<EdgeMesh>& objects)
-      : shapes_(shapes), objects_(objects), before_(objects) {
+  Unifier(std::span<const TouchingShape> shapes, const Vec3d& viewer,
+          std::vector<EdgeMesh>& objects)
+      : shapes_(shapes), viewer_(viewer), objects_(objects), before_(objects) {
     find_speeds();
   }
 
@@ -300,7 +301,8 @@ class Unifier {
   };
 
   // Where what is around comes towards the edge's own faces or leaves them: these stand on the
-  // inside of all others, or end there half sunk in them, or stand on a body whose edge is in the same place.
+  // inside of all others, or end there half sunk in them, or stand on a body whose edge is in the
+  // same place.
   std::optional<Pressed> find_pressed(EdgeRef id, const std::vector<Neighbour>& around) const {
     auto pressed = standing_inside(id, around);
     if (!pressed) pressed = standing_flush(id, around);
@@ -320,16 +322,19 @@ class Unifier {
   }
 
   // One face stands, or one on either side of the others, which lie in one plane and have no rim:
-  // then that in front of them, as the body is sunk.
+  // then that on the viewer's side, as seen from where the body is sunk. (Which way the plane's
+  // faces are wound does not matter: they may be seen from both sides.)
   std::optional<Pressed> standing_inside(EdgeRef id, const std::vector<Neighbour>& around) const {
     const auto under =
         std::find_if(around.begin(), around.end(), [](const auto& n) { return !n.own; });
     const Vec3d x0 = position(id, 0), x1 = position(id, 1);
+    const Vec3d n_under = plane(under->face).n;
+    const Vec3d up = dot(n_under, viewer_ - x0) < 0 ? -n_under : n_under;
     const Neighbour* standing[2] = {nullptr, nullptr};  // behind, in front
     for (const Neighbour& n : around) {
       if (!n.own && (n.rim != kNoRim || !parallel(n, *under))) return std::nullopt;
       if (!n.own || parallel(n, *under)) continue;
-      const bool in_front = dot(plane(under->face).n, far_corner(n.face, x0, x1) - x0) > 0;
+      const bool in_front = dot(up, far_corner(n.face, x0, x1) - x0) > 0;
       if (standing[in_front]) return std::nullopt;
       standing[in_front] = &n;
     }
@@ -549,6 +554,7 @@ class Unifier {
   }
 
   std::span<const TouchingShape> shapes_;
+  const Vec3d viewer_;
   std::vector<EdgeMesh>& objects_;
   const std::vector<EdgeMesh> before_;
   Lanes speeds_;                                 // the largest component of a velocity
@@ -567,7 +573,7 @@ TouchingMotion unite_touching_edges(std::span<const TouchingShape> shapes,
   for (const TouchingShape& shape : shapes) meshes.push_back(shape.mesh);
   const Contacts found = find_contacts(objects, meshes, pairs, viewer, threads);
   if (found.contacts.empty() && found.near.empty()) return {};
-  return Unifier(shapes, objects).unite(found);
+  return Unifier(shapes, viewer, objects).unite(found);
 }
 
 }  // namespace limn

@@ -13,7 +13,7 @@ namespace limn {
 struct Bend {
   Score sum;  // of a weighted sum of windows
   // The sum of the bends of single windows without their signs: what parts in several places may
-  // bend one up and another down.
+  // bend one up and another down. Noise adds nothing to it in the mean (but may make it negative).
   double most = 0, most_error = 0;
 };
 

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "integrators/edges/scene_edges.h"
 #include "integrators/estimates/batches.h"
 #include "integrators/film/film_regions.h"
 #include "integrators/methods/selection.h"
@@ -132,7 +131,7 @@ class TermJob {
     const size_t warned = result.warnings.size();
     for (size_t p = 0; p < passes_.size(); ++p) {
       pass(p).describe(result.stats);
-      warn_of_contacts(scene_, pass(p).edges(), result.warnings);
+      pass(p).warn_of_kinks(result.warnings);
     }
     result.at_kink = result.warnings.size() > warned;
     warn_of_faces_edge_on(scene_, pass(0).viewpoints(), result.warnings);

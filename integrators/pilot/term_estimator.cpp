@@ -1,8 +1,10 @@
 // One sample of a pixel: its paths, the first of which carries the terms at vertices.
 #include "integrators/pilot/term_estimator.h"
 
+#include <algorithm>
 #include <limits>
 
+#include "integrators/edges/scene_edges.h"
 #include "integrators/film/film_regions.h"
 #include "integrators/paths/camera_path.h"
 #include "integrators/paths/path_follow.h"
@@ -473,6 +475,16 @@ TermEstimator::Sample TermEstimator::sample(const PixelSample& at, const Rng& ke
     sample.finite = sample.finite && is_finite(to.value) && is_finite(to.turned);
   }
   return sample;
+}
+
+void TermEstimator::warn_of_kinks(std::vector<std::string>& warnings) const {
+  std::vector<std::string> more;
+  warn_of_contacts(scene_, edges(), more);
+  for (const auto& term : terms_)
+    if (term) term->warn_of_kinks(scene_, more);
+  for (const std::string& text : more)
+    if (std::find(warnings.begin(), warnings.end(), text) == warnings.end())
+      warnings.push_back(text);
 }
 
 void TermEstimator::describe(GradientStats& stats) const {

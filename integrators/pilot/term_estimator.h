@@ -44,6 +44,8 @@ class TermEstimator final : public SampleEstimator {
   void set_plan(SamplePlan plan) { plan_ = std::move(plan); }
   // What samples of a slot cost, see Term::work.
   double work(size_t slot, const TermCost& cost) const;
+  // Adds what to tell of kinks that the parameters move the scene across: none twice.
+  void warn_of_kinks(std::vector<std::string>& warnings) const;
   void describe(GradientStats& stats) const;
   const EdgeSamplerInput* edges() const { return input_.made_edges(); }
   const Viewpoints& viewpoints() const { return viewpoints_; }

@@ -4,8 +4,11 @@
 // with s the film position [pixels], dl its length element, v_n = ds/dtheta . n the normal speed of
 // the projected edge, and dL the radiance behind the normal n minus that before it.
 
+#include <fmt/format.h>
+
 #include "integrators/terms/camera_edges.h"
 #include "integrators/terms/term_table.h"
+#include "limn/core/face_copies.h"
 
 namespace limn {
 namespace {
@@ -26,6 +29,19 @@ class CameraTerm final : public Term {
     const Lanes speed = (edge.speed0 * (1 - point.s) + edge.speed1 * point.s) / point.density;
     sample.value = {speed * jump.r, speed * jump.g, speed * jump.b};
     return true;
+  }
+  void warn_of_kinks(const Scene& scene, std::vector<std::string>& warnings) const override {
+    if (!edges_.parting()) return;
+    const auto [first, second] = *edges_.parting();
+    const std::string whose = first == second
+                                  ? fmt::format("edges of {}", name_in_text(scene, first))
+                                  : fmt::format("edges of {} and {}", name_in_text(scene, first),
+                                                name_in_text(scene, second));
+    warnings.push_back(fmt::format(
+        "the camera sees {} in one line, one behind the other, and they move past each other: "
+        "where both are seen the derivative has a kink, and is that of a camera a little aside; "
+        "differences take the mean of both sides",
+        whose));
   }
   void describe(GradientStats& stats) const override {
     stats.setup.emplace_back("edges on the film", edges_.list_seconds());

@@ -2,7 +2,6 @@
 #include "integrators/terms/camera_edges.h"
 
 #include "integrators/terms/edge_jump.h"
-#include "integrators/terms/film_lines.h"
 
 namespace limn {
 namespace {
@@ -58,29 +57,28 @@ CameraEdges::CameraEdges(const PathContext& context, const EdgeSamplerInput& inp
   const Stopwatch watch;
   for (uint32_t o = 0; o < input_.objects.size(); ++o) add_object(ShapeId(o));
   for (uint32_t c = 0; c < clips_.size(); ++c) add_clip(c);
-  const bool any = std::find(moves_.begin(), moves_.end(), true) != moves_.end();
-  if (any && !visible) {  // regions know which is before which
-    const std::vector<bool> in_line = find_edges_in_line(edges_, context.scene.camera);
-    for (size_t e = 0; e < edges_.size(); ++e) edges_[e].in_line = in_line[e];
-  }
-  keep_moving();
+  find_in_line();
   if (visible) keep_seen(*visible);
   weigh(free_ ? 3 : lanes);
   list_seconds_ = watch.seconds();
 }
 
-void CameraEdges::keep_moving() {
-  size_t kept = 0;
-  for (size_t e = 0; e < edges_.size(); ++e)
-    if (moves_[e]) edges_[kept++] = edges_[e];
-  edges_.resize(kept);
-  moves_ = {};
+void CameraEdges::find_in_line() {
+  const EdgesInLine found = find_edges_in_line(edges_, resting_, context_.scene.camera);
+  for (size_t e = 0; e < edges_.size(); ++e) edges_[e].in_line = found.in_line[e];
+  parting_ = found.parting;
+  resting_ = {};
 }
 
-// Lines keep their speeds where they are cut, which change linearly along them.
+// Lines keep their speeds where they are cut, which change linearly along them. Of edges in one
+// line a place aside sees other parts than the camera, where the regions are.
 void CameraEdges::keep_seen(const FilmRegions& visible) {
   std::vector<FilmEdge> seen;
   for (const FilmEdge& edge : edges_) {
+    if (edge.in_line) {
+      seen.push_back(edge);
+      continue;
+    }
     const bool is_clip = edge.clip != FilmEdge::kNoClip;
     const FacesAround around = is_clip ? FacesAround{{&clips_[edge.clip].face, 1}, {}}
                                        : input_.object(edge.id.object).around(edge.id.edge);
@@ -142,6 +140,7 @@ void CameraEdges::add_clip(uint32_t index) {
   const auto film_b = camera.project(value(b));
   FilmEdge edge;
   edge.clip = index;
+  edge.shape = clips_[index].face.shape;
   edge.t0 = 0;
   edge.t1 = 1;
   // The plane is parallel to the film: fractions are the same on both.
@@ -183,6 +182,8 @@ bool CameraEdges::clip_and_project(EdgeRef id, FilmEdge& edge) const {
   if (!clip_to_window(film0.x, film1.x, film0.y, film1.y, s0, s1)) return false;
 
   edge.id = id;
+  const FacesAround around = mesh.around(id.edge);
+  if (!viewpoint_.sees_edge_on(around)) edge.shape = around.faces[0].shape;
   edge.t0 = t0 + (t1 - t0) * fraction_in_space(s0, z0, z1);
   edge.t1 = t0 + (t1 - t0) * fraction_in_space(s1, z0, z1);
   const auto moving_at = [&](double t) {

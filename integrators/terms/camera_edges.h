@@ -7,21 +7,18 @@
 #include "integrators/film/clip_curves.h"
 #include "integrators/film/film_regions.h"
 #include "integrators/paths/path.h"
+#include "integrators/terms/film_lines.h"
 #include "limn/core/discrete_distribution.h"
 #include "limn/edgetree/edge_sampler.h"
 
 namespace limn {
 
-struct FilmEdge {
+struct FilmEdge : FilmLine {
   EdgeRef id;
   static constexpr uint32_t kNoClip = UINT32_MAX;
   uint32_t clip = kNoClip;  // the clip segment that it is, in the place of an edge
-  double t0, t1;            // the part of the edge that may reach the film
-  double depth0, depth1;    // depths of its two ends
-  double x0, y0, x1, y1;    // their film positions
-  double nx, ny;            // the film normal n
+  double t0, t1;            // the part of the edge that may reach the film: its ends
   Lanes speed0, speed1;     // v_n there [pixels]; n points to the positive side of EdgeView::side
-  double length;            // [pixels]
   std::optional<FaceRef> beside = {};  // FilmRegions::SeenPart; none: a ray tells
   bool in_line = false;                // film_lines.h
 };
@@ -59,6 +56,8 @@ class CameraEdges {
   bool empty() const { return edges_.empty(); }
   size_t size() const { return edges_.size(); }
   double list_seconds() const { return list_seconds_; }
+  // Whose they are, of edges in one line that move past each other: EdgesInLine::parting.
+  const std::optional<std::array<ShapeId, 2>>& parting() const { return parting_; }
   const ClipSegment& clip_of(const FilmEdge& edge) const { return clips_[edge.clip]; }
 
   // The point at u in [0, 1).
@@ -74,8 +73,11 @@ class CameraEdges {
   // faces: that the edge moves with.
   void add(const FilmEdge& edge, std::span<const FaceRef> faces) {
     const bool moves = free_ ? free_->moves(faces) : !is_zero(edge.speed0) || !is_zero(edge.speed1);
-    edges_.push_back(edge);
-    moves_.push_back(moves);
+    if (moves) {
+      edges_.push_back(edge);
+    } else {
+      resting_.push_back(edge);
+    }
   }
   bool is_hidden(const EdgeMesh& mesh, EdgeId edge) const;
   bool clip_and_project(EdgeRef id, FilmEdge& edge) const;
@@ -83,7 +85,7 @@ class CameraEdges {
   Vec3<Dual> moving(const Vec3d& x, const Vec3<Lanes>& velocity) const;
   bool place_on_film(const Vec3<Dual>& x0, const Vec3<Dual>& x1, const Vec3d& side,
                      FilmEdge& edge) const;
-  void keep_moving();
+  void find_in_line();
   void keep_seen(const FilmRegions& visible);
   void weigh(int lanes);
 
@@ -92,8 +94,9 @@ class CameraEdges {
   const FreeMotion* free_;
   const Viewpoint& viewpoint_;
   std::vector<ClipSegment> clips_;
-  std::vector<FilmEdge> edges_;
-  std::vector<bool> moves_;      // of all edges, until those that do not are dropped
+  std::vector<FilmEdge> edges_;    // that move
+  std::vector<FilmLine> resting_;  // until what is in line with them is found
+  std::optional<std::array<ShapeId, 2>> parting_;
   DiscreteDistribution choice_;  // of an edge
   double list_seconds_ = 0;
 };

@@ -1,17 +1,40 @@
 #pragma once
 // Edges that lie behind others in one line, as the camera sees them.
+#include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "limn/core/camera.h"
+#include "limn/core/ids.h"
 
 namespace limn {
 
 struct FilmEdge;
 
-// For each edge whether another one, at another depth, is in the same line on the film to what rays
-// in floats can tell, for a part of it. No face need be edge-on for that: sheets or open vessels
-// whose rims are as high as the camera. (What touches is in one place, and is not meant.)
-std::vector<bool> find_edges_in_line(std::span<const FilmEdge> edges, const Camera& camera);
+// A segment of the film.
+struct FilmLine {
+  double x0, y0, x1, y1;  // its ends [pixels]
+  double nx, ny;          // unit, across it
+  double length;          // [pixels]
+  double depth0, depth1;  // of its ends
+  ShapeId shape = {};     // whose it is; none: of a face that is seen edge-on (Viewpoint)
+};
+
+struct EdgesInLine {
+  // Of each edge whether it is in one line with another one.
+  std::vector<bool> in_line;
+  // Whose they are, of two that move past each other, across their line: the image has a kink if
+  // both are seen. In order; faces that are seen edge-on are left out.
+  std::optional<std::array<ShapeId, 2>> parting;
+};
+
+// Which of the `moving` edges are in the same line on the film as another one, or as one of the
+// `resting` ones, to what rays in floats can tell, for a part of it, at a depth that differs by a
+// five-hundredth. (What is less far apart is hardly told apart from a place aside of the camera,
+// too: such edges are both seen.) No face need be edge-on for that: sheets or open vessels whose
+// rims are as high as the camera. (What touches is in one place, and is not meant.)
+EdgesInLine find_edges_in_line(std::span<const FilmEdge> moving, std::span<const FilmLine> resting,
+                               const Camera& camera);
 
 }  // namespace limn

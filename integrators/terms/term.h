@@ -70,6 +70,9 @@ class Term {
   // on every machine, so that choices that follow from it are.
   virtual double work(const TermCost& cost) const { return static_cast<double>(cost.rays); }
 
+  // Adds what to tell of kinks that the parameters move this term across.
+  virtual void warn_of_kinks(const Scene& /*scene*/, std::vector<std::string>& /*warnings*/) const {
+  }
   // What the term built, for people to read.
   virtual void describe(GradientStats& /*stats*/) const {}
 };

@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 
+#include "integrators/terms/camera_edges.h"
 #include "limn/integrators/backward.h"
 #include "limn/integrators/statistics.h"
 #include "support/block_runs.h"
@@ -190,6 +192,7 @@ struct AlongEdge {
   std::string name;
   std::vector<std::string> parameters;
   std::function<Scene(const TempFiles&, double beside)> scene;
+  bool exact_film = false;
 };
 
 constexpr Vec3d kSide{0.3701, 0.7851, 0.4967};  // Viewpoint's
@@ -263,7 +266,25 @@ std::vector<AlongEdge> along_edge_cases() {
                      sheet("front", 0.5) + sheet("back", -1) + floor(3) +
                          constant_light("sky", "0.4, 0.5, 0.7"));
   };
+  // Nearer than the other one the first sheet ends where the second, above the camera, begins.
+  const auto sign = [=](const TempFiles& files, double beside) {
+    const auto sheet = [](const std::string& id, double y, double z) {
+      return square(id, 0.5, 0, {0, y, z}, diffuse(id + "_paint", "0.6, 0.4, 0.5"));
+    };
+    return seen_from(files, Vec3d{0.3, 1, 4} + kSide * beside,
+                     sheet("front", 0.5, 0.5) + sheet("back", 1.5, -1) + floor(3) +
+                         constant_light("sky", "0.4, 0.5, 0.7"));
+  };
   return {{"Rims", {"sensor.translate.y", "front.translate.y", "back.translate.y"}, rims},
+          {"RimsOnExactFilm",
+           {"sensor.translate.y", "front.translate.y", "back.translate.y"},
+           rims,
+           true},
+          {"Sign", {"sensor.translate.y", "front.translate.y", "back.translate.y"}, sign},
+          {"SignOnExactFilm",
+           {"sensor.translate.y", "front.translate.y", "back.translate.y"},
+           sign,
+           true},
           {"Border", {"plate.translate.z", "sensor.translate.z"}, border(-0.5, 0.5)},
           {"BorderOn", {"plate.translate.z", "bulb.translate.y"}, border(0.5, 0.5)},
           {"BorderNear", {"plate.translate.z", "floor.translate.y"}, border(-0.5, 0.02)},
@@ -280,8 +301,10 @@ class AlongEdges : public testing::TestWithParam<AlongEdge> {};
 TEST_P(AlongEdges, AsFromBeside) {
   const TempFiles files;
   const auto run = [&](double beside) {
-    return run_blocks(GetParam().scene(files, beside), GetParam().parameters, 256,
-                      beside == 0 ? 1 : 2);
+    GradientOptions options;
+    options.parameters = GetParam().parameters;
+    options.exact_film = GetParam().exact_film;
+    return run_blocks(GetParam().scene(files, beside), options, 256, beside == 0 ? 1 : 2);
   };
   const GradientResult at = run(0), beside = run(2e-4);
   for (size_t p = 0; p < at.parameters.size(); ++p)
@@ -305,6 +328,74 @@ TEST_P(AlongEdges, InReverse) {
 INSTANTIATE_TEST_SUITE_P(, AlongEdges, testing::ValuesIn(along_edge_cases()),
                          [](const auto& c) { return c.param.name; });
 
+// Edges that the camera sees in one line and that move past each other are told of, as long as
+// they do, and as they are seen.
+TEST(EdgesInLine, AreToldOf) {
+  const TempFiles files;
+  const auto cases = along_edge_cases();
+  const auto& sign_scene = std::find_if(cases.begin(), cases.end(), [](const auto& c) {
+                             return c.name == "Sign";
+                           })->scene;
+  const auto run = [&](const std::string& parameter, double beside, bool exact_film) {
+    GradientOptions options;
+    options.parameters = {parameter};
+    options.exact_film = exact_film;
+    return run_blocks(sign_scene(files, beside), options, 1, 0);
+  };
+  for (const bool exact_film : {false, true}) {
+    for (const char* parameter : {"sensor.translate.y", "back.translate.y", "back.rotate.z"}) {
+      const GradientResult r = run(parameter, 0, exact_film);
+      EXPECT_TRUE(r.at_kink) << parameter;
+      ASSERT_EQ(r.warnings.size(), 1u) << parameter;
+      EXPECT_NE(r.warnings[0].find("edges of \"front\" and \"back\" in one line"),
+                std::string::npos)
+          << r.warnings[0];
+      EXPECT_FALSE(run(parameter, 2e-4, exact_film).at_kink) << parameter;
+    }
+    for (const char* parameter : {"sensor.translate.z", "sensor.rotate.x", "back.translate.x"}) {
+      const GradientResult r = run(parameter, 0, exact_film);
+      EXPECT_FALSE(r.at_kink) << parameter;
+      EXPECT_TRUE(r.warnings.empty()) << parameter;
+    }
+  }
+}
+
+// Rims of many short edges behind each other, which seen so lie in one oblique line.
+TEST(EdgesInLine, AreFoundHoweverShort) {
+  const auto rim = [](int count, double depth, double shift) {
+    std::vector<FilmEdge> edges(count);
+    const Vec3d from{13, 200, 0}, along = normalize(Vec3d{0.8, -0.6, 0});
+    for (int k = 0; k < count; ++k) {
+      const auto at = [&](int i) {
+        const Vec3d x = from + along * (100 * depth * i / count + shift);
+        // As floats round them.
+        return Vec3d{static_cast<float>(x.x), static_cast<float>(x.y), 0};
+      };
+      const Vec3d a = at(k), b = at(k + 1);
+      FilmEdge& e = edges[k];
+      e.x0 = a.x, e.y0 = a.y, e.x1 = b.x, e.y1 = b.y;
+      e.length = length(b - a);
+      e.nx = (b.y - a.y) / e.length, e.ny = -(b.x - a.x) / e.length;
+      e.depth0 = e.depth1 = depth;
+      e.shape = ShapeId(static_cast<uint32_t>(depth));
+    }
+    return edges;
+  };
+  Camera camera;
+  camera.width = camera.height = 256;
+  for (const int count : {1, 32, 1024, 30000}) {
+    std::vector<FilmEdge> moving = rim(count, 2, 0);
+    const std::vector<FilmEdge> behind = rim(count, 3, -0.37), beside = rim(8, 2, 300);
+    const std::vector<FilmLine> resting(behind.begin(), behind.end());
+    moving.insert(moving.end(), beside.begin(), beside.end());
+    const EdgesInLine found = find_edges_in_line(moving, resting, camera);
+    ASSERT_EQ(found.in_line.size(), moving.size());
+    const auto in_line = std::count(found.in_line.begin(), found.in_line.end(), true);
+    EXPECT_EQ(in_line, count) << count;
+    EXPECT_FALSE(found.parting);
+  }
+}
+
 // A thing that stands on a floor ends where it touches it. Pressed together or drawn apart they
 // have one slope and another; what is computed is the one of things pressed together, as they are
 // where the thing stands a little deeper.
@@ -312,8 +403,10 @@ struct Standing {
   std::string name;
   std::function<std::string(const TempFiles&)> mesh;  // its file; its lowest points are at 0
   std::string light;
-  enum { kMatt, kGlossy, kBox } floor = kMatt;  // kBox: of the same width as the thing
-  bool analytic = false;                        // light in closed form
+  // kBox: of the same width as the thing. kTurned: wound the other way, with both sides matt, as
+  // kBelow is, which is seen from below.
+  enum { kMatt, kGlossy, kBox, kTurned, kBelow } floor = kMatt;
+  bool analytic = false;  // light in closed form
 };
 
 std::vector<Standing> standing_cases() {
@@ -349,12 +442,15 @@ std::vector<Standing> standing_cases() {
           {"RoofUnderSky", roof, sky},
           {"HalfSunkUnderSky", diamond, sky},
           {"HalfSunkUnderSun", diamond, sun({0.3, -1, -0.2})},
+          {"HalfSunkInTurnedFloor", diamond, sky, Standing::kTurned},
+          {"HalfSunkSeenFromBelow", diamond, sky, Standing::kBelow},
+          {"RoofOnTurnedFloor", roof, sky, Standing::kTurned},
           {"ScreenUnderBulb", screen, bulb({0.7, 2, 1.6})}};
 }
 
 class StandsOnAFloor : public testing::TestWithParam<Standing> {
  protected:
-  // depth: of the thing's lowest points under the floor.
+  // depth: of the thing's lowest points under the floor, as it is seen.
   Scene scene(double depth) const {
     const TempFiles files;
     const Standing& c = GetParam();
@@ -362,16 +458,24 @@ class StandsOnAFloor : public testing::TestWithParam<Standing> {
     parts.origin = {0.6, 1.8, 3.4};
     parts.target = {0, 0.3, 0};
     if (c.analytic) parts.max_depth = 2;
+    if (c.floor == Standing::kBelow) {
+      parts.origin.y = -parts.origin.y;
+      depth = -depth;
+    }
+    const std::string chalk = diffuse("chalk", "0.8, 0.8, 0.8");
+    const std::string both_sides = "<bsdf type=\"twosided\">" + chalk + "</bsdf>";
+    const std::string square_floor =
+        c.floor == Standing::kGlossy   ? square("floor", 2, -90, {0, 0, 0}, conductor("gloss", 0.3))
+        : c.floor == Standing::kTurned ? square("floor", 2, 90, {0, 0, 0}, both_sides)
+        : c.floor == Standing::kBelow  ? square("floor", 2, -90, {0, 0, 0}, both_sides)
+                                       : square("floor", 2, -90, {0, 0, 0}, chalk);
     parts.body =
         c.light +
         obj_shape("thing", c.mesh(files), true, 0.4, {0, -depth, 0},
                   "<bsdf type=\"twosided\">" + diffuse("clay", "0.5, 0.5, 0.5") + "</bsdf>") +
-        (c.floor == Standing::kBox
-             ? obj_shape("floor", write_mesh(files, "floor.obj", cube_mesh()), true, 0.4,
-                         {0, -0.4, 0}, diffuse("chalk", "0.8, 0.8, 0.8"))
-             : square("floor", 2, -90, {0, 0, 0},
-                      c.floor == Standing::kGlossy ? conductor("gloss", 0.3)
-                                                   : diffuse("chalk", "0.8, 0.8, 0.8")));
+        (c.floor == Standing::kBox ? obj_shape("floor", write_mesh(files, "floor.obj", cube_mesh()),
+                                               true, 0.4, {0, -0.4, 0}, chalk)
+                                   : square_floor);
     return make_scene(files, parts);
   }
   const std::vector<std::string> parameters_{"thing.translate.y", "thing.rotate.z",

@@ -67,13 +67,16 @@ GradientRun scaled_term(const std::string& term, double factor) {
   };
 }
 
-Planted planted_term(const TempFiles& files, const std::string& method, const std::string& term,
-                     double factor, int spp) {
+namespace {
+
+// more: further shapes.
+Planted planted_ball(const TempFiles& files, const Mesh& ball, const std::string& more,
+                     const std::string& method, const std::string& term, double factor, int spp) {
   SceneParts parts = base_parts();
   parts.body = square("floor", 3, -90, {0, 0, 0}, diffuse("chalk", "0.8, 0.8, 0.8")) +
-               obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(1)), false, 0.8,
-                         {0, 1, 0}, diffuse("clay", "0.3, 0.2, 0.2")) +
-               square("lamp", 1, 90, {0, 2.5, 1}, area_light("glow", "5, 5, 5"));
+               obj_shape("ball", write_mesh(files, "ball.obj", ball), false, 0.8, {0, 1, 0},
+                         diffuse("clay", "0.3, 0.2, 0.2")) +
+               square("lamp", 1, 90, {0, 2.5, 1}, area_light("glow", "5, 5, 5")) + more;
   Planted planted{fmt::format("{} of {} times {}", term, method, factor),
                   make_scene(files, parts),
                   {},
@@ -84,6 +87,25 @@ Planted planted_term(const TempFiles& files, const std::string& method, const st
   planted.options.parameter = "ball.translate.y";
   planted.options.method = method;
   return planted;
+}
+
+}  // namespace
+
+Planted planted_term(const TempFiles& files, const std::string& method, const std::string& term,
+                     double factor, int spp) {
+  return planted_ball(files, icosphere_mesh(1), "", method, term, factor, spp);
+}
+
+Planted planted_beside_kink(const TempFiles& files, const std::string& method,
+                            const std::string& term, double factor, int spp) {
+  const auto tile = [](float x) {
+    const float y = -0.8f, z = -0.5f, size = 0.25f;
+    return make_mesh({{x, y, z}, {x, y, z + size}, {x + size, y, z + size}, {x + size, y, z}},
+                     {{0, 1, 2}, {0, 2, 3}});
+  };
+  const std::string other = obj_shape("tile", write_mesh(files, "tile.obj", tile(-2.25f)), false,
+                                      0.8, {0, 1, 0}, diffuse("slate", "0.5, 0.5, 0.6"));
+  return planted_ball(files, joined(icosphere_mesh(1), tile(-2)), other, method, term, factor, spp);
 }
 
 Planted planted_in_closed_form(const std::string& file, const std::string& parameter,

@@ -23,6 +23,9 @@ GradientRun scaled_term(const std::string& term, double factor);
 // A term of a small scene with a ball, a floor and a lamp, scaled.
 Planted planted_term(const TempFiles& files, const std::string& method, const std::string& term,
                      double factor, int spp);
+// The same with a small tile that moves with the ball, away from another one at its side.
+Planted planted_beside_kink(const TempFiles& files, const std::string& method,
+                            const std::string& term, double factor, int spp);
 // A term of one of scenes/closed_form (without .xml), scaled. These have few pixels.
 Planted planted_in_closed_form(const std::string& file, const std::string& parameter,
                                const std::string& method, const std::string& term, double factor,

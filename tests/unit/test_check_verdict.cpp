@@ -2,8 +2,10 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdlib>
 
+#include "integrators/compare/check_bend.h"
 #include "integrators/compare/edge_events.h"
 #include "integrators/methods/hair_gaps.h"
 #include "limn/core/rng.h"
@@ -200,6 +202,34 @@ TEST(CheckVerdict, FacesEdgeOnAtRestForgiveNothing) {
     const CheckResult r = run(planted, 5);
     EXPECT_EQ(r.bends, at_kink);
     EXPECT_EQ(r.verdict, at_kink ? Verdict::kCannotTell : Verdict::kDisagree);
+  }
+}
+
+// Where nothing bends, neither do the magnitudes of many windows add up to much.
+TEST(Bends, AreNotMadeOfNoise) {
+  const TempFiles files;
+  const Planted planted = planted_term(files, "forest", "camera", 1, 64);
+  const Windows windows(planted.scene.film, 2, 1);
+  RunSettings settings;
+  settings.spp = planted.spp;
+  settings.seed = 8;
+  const auto bend = find_bend(planted.scene, planted.options.parameter, 0.01, windows,
+                              std::vector<double>(windows.size(), 1), settings);
+  ASSERT_TRUE(bend);
+  fmt::print("{} windows: {} +- {}\n", windows.size(), bend->most, bend->most_error);
+  EXPECT_LT(std::fabs(bend->most), 4 * bend->most_error);
+}
+
+// Two tiles that part in a corner of the picture are a kink, and forgive no defect elsewhere.
+TEST(CheckVerdict, AKinkElsewhereForgivesNothing) {
+  const TempFiles files;
+  for (const char* term : {"interior", "boundary"}) {
+    const Planted planted = planted_beside_kink(files, "forest", term, 0.6, 1024);
+    const CheckResult r = run(planted, 5);
+    EXPECT_TRUE(r.gradient.at_kink);
+    EXPECT_FALSE(r.bends) << planted.name;
+    EXPECT_EQ(r.verdict, Verdict::kDisagree) << planted.name;
+    EXPECT_EQ(r.suspect, term);
   }
 }
 

@@ -34,6 +34,7 @@ struct TouchingMotion {
 // Parts on which one face stands on the inside of others, or on another body edge on edge, where
 // these come towards it or leave it, are left out of the objects and returned: contact that
 // tightens (ContactLine). Contact that loosens would open a gap, in which the light is another one.
+// Of a body half sunk in a face the part on the viewer's side of that counts.
 // Other shapes whose common edges part, or pass through each other, as they move are named: there
 // the image has a kink, and each rim keeps what it would add beside a gap (touching.cpp).
 // What touches is decided to the rounding of positions (edges/contacts.h). An edge also gets the
