@@ -16,6 +16,11 @@ constexpr size_t kMostFaces = 256;  // of a mesh that is looked through for flat
 constexpr double kFlat = 0x1p-16;   // how far a plane's points may lie off, over the mesh's size
 // Of the light over the plane: the sine of its elevation, or its height over the flat part's radius.
 constexpr double kLeastHeight = 1e-3;
+// What is seen of surfaces in the light of lamps, over what these send to the mean one without what
+// hides them. What stands in the light is more in view than the mean: with 0.5 edges of a teapot
+// under two lamps on gloss were listed where it does not pay, and the squared error times time was
+// 9 times as large (5 seeds; without the noisiest hundredth 1.6 times).
+constexpr double kLit = 1.5;
 // Of a shape, where it is asked what lamps send there; of few faces each has several.
 constexpr size_t kPairs = 32;
 constexpr double kApart = 0.1;  // two of a pair, over an edge
@@ -176,7 +181,7 @@ std::vector<MirroredLight::Image> MirroredLight::find_lights(const Scene& scene)
     const LightOrigin origin = delta->origin();
     add_lamp(number++, origin.infinite, origin.infinite ? -value(origin.v) : value(origin.v), 0);
   }
-  lit_ = kScattered / kPi * mean_irradiance(scene, lights_, lamps);
+  lit_ = kLit / kPi * mean_irradiance(scene, lights_, lamps);
   if (!scene.environment) return found;
   environment_ = scene.environment->mean_luminance();
   for (const BrightPatch& patch : find_bright_patches(*scene.environment)) {

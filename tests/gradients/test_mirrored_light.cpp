@@ -451,24 +451,6 @@ TEST(MirroredLight, OrderIsThatOfTheFile) {
   }
 }
 
-// A lamp far above a floor of tiny size over its distance: cones that are narrower than 1 - cos can
-// tell keep finite densities.
-TEST(MirroredLight, NarrowConesAreFinite) {
-  const TempFiles files;
-  const std::string far =
-      "<shape type=\"sphere\"><point name=\"center\" value=\"0, 2e6, 0\"/>"
-      "<float name=\"radius\" value=\"0.01\"/>" +
-      area_light("glow", "1e20, 1e20, 1e20") + "</shape>\n";
-  WallPoint wall(files, far, 1e-9);
-  ASSERT_TRUE(wall.mirrored);
-  ASSERT_EQ(wall.mixture.count, 1);
-  const auto w = MirroredLight::sample(wall.mixture, 0.5, 0.5, 0.3);
-  ASSERT_TRUE(w);
-  EXPECT_NEAR(length(*w), 1, 1e-12);
-  const double pdf = MirroredLight::pdf(wall.mixture.glare[0], *w);
-  EXPECT_TRUE(std::isfinite(pdf) && pdf > 0) << pdf;
-}
-
 // Nothing to mirror, nothing to see it by: no share, and no image changes.
 TEST(MirroredLight, IsNotWhereNothingMirrors) {
   const TempFiles files;
