@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "limn/core/bounds.h"
 
@@ -15,10 +16,20 @@ constexpr size_t kMostFaces = 256;  // of a mesh that is looked through for flat
 constexpr double kFlat = 0x1p-16;   // how far a plane's points may lie off, over the mesh's size
 // Of the light over the plane: the sine of its elevation, or its height over the flat part's radius.
 constexpr double kLeastHeight = 1e-3;
-// What lights send comes back from other surfaces with this share of it.
-constexpr double kScattered = 0.5;
+// What is seen of surfaces in the light of lamps, over what these send to the mean one without what
+// hides them. What stands in the light is more in view than the mean: with 0.5 edges of a teapot
+// under two lamps on gloss were listed where it does not pay, and the squared error times time was
+// 9 times as large (5 seeds; without the noisiest hundredth 1.6 times).
+constexpr double kLit = 1.5;
+// Of a shape, where it is asked what lamps send there; of few faces each has several.
+constexpr size_t kPairs = 32;
+constexpr double kApart = 0.1;  // two of a pair, over an edge
 // What is rounding of a point in the plane, over the flat part's radius.
 constexpr double kInPlane = 0x1p-20;
+// Flat parts that get this share of the light of another are as bright as it.
+constexpr double kAlike = 0.9;
+// The least angle of a cone of directions [rad]: those within narrower ones are lost by rounding.
+constexpr double kLeastCone = 1e-6;
 
 // Any two unit vectors that are orthogonal to n and to each other.
 std::array<Vec3d, 2> across(const Vec3d& n) {
@@ -30,6 +41,51 @@ std::array<Vec3d, 2> across(const Vec3d& n) {
 // Where a far light's glare looks the same from, over the height of the point, which is the origin.
 Vec3d start_of(const MirroredLight::Glare& glare) {
   return glare.toward * ((1 - glare.nearness) / -dot(glare.toward, glare.normal));
+}
+
+// 1 - cos(angle).
+double versine(double angle) {
+  const double sine = std::sin(0.5 * angle);
+  return 2 * sine * sine;
+}
+
+// The lesser of what a lamp sends to two near places of a face: it may hang just over one.
+double irradiance_of(const std::array<Vec3d, 3>& corners, size_t pair, size_t lamp,
+                     const Lights& lights) {
+  // The additive recurrence of the plastic number.
+  const auto n = static_cast<double>(pair);
+  double u = std::fmod(0.5 + 0.7548776662466927 * n, 1);
+  double v = std::fmod(0.5 + 0.5698402909980532 * n, 1);
+  if (u + v > 1) {
+    u = 1 - u;
+    v = 1 - v;
+  }
+  const Vec3d edge = corners[1] - corners[0];
+  const Vec3d p = corners[0] + edge * u + (corners[2] - corners[0]) * v;
+  return std::min(lights.estimate(lamp, p), lights.estimate(lamp, p + edge * kApart));
+}
+
+// What lamps send to surfaces, in the mean over the shapes: a wide ground counts no more than what
+// stands on it. Places move with the faces, so that it is continuous in what moves these.
+double mean_irradiance(const Scene& scene, const Lights& lights, const std::vector<size_t>& lamps) {
+  double sum = 0;
+  size_t count = 0;
+  for (const Shape& shape : scene.shapes) {
+    const size_t faces = shape.mesh.faces.size();
+    if (shape.is_emitter || faces == 0) continue;
+    const size_t step = (faces + kPairs - 1) / kPairs, pairs = std::max<size_t>(1, kPairs / faces);
+    const auto places = static_cast<double>((faces + step - 1) / step * pairs);
+    for (size_t f = 0; f < faces; f += step) {
+      const auto corners = face_corners<double>(shape.mesh, FaceId(static_cast<uint32_t>(f)));
+      for (size_t pair = 0; pair < pairs; ++pair) {
+        for (const size_t lamp : lamps) {
+          sum += irradiance_of(corners, pair, lamp, lights) / places;
+        }
+      }
+    }
+    ++count;
+  }
+  return count > 0 ? sum / static_cast<double>(count) : 0;
 }
 
 }  // namespace
@@ -100,15 +156,14 @@ std::unique_ptr<MirroredLight> MirroredLight::make(const Scene& scene, const Lig
 // All that is small and bright, in no surface yet; sets what else is seen.
 std::vector<MirroredLight::Image> MirroredLight::find_lights(const Scene& scene) {
   std::vector<Image> found;
-  const Vec3d middle = bounds_of(scene).center();
+  std::vector<size_t> lamps;
   const auto add_lamp = [&](size_t number, bool infinite, const Vec3d& light, double size) {
     Image& image = found.emplace_back();
     image.infinite = infinite;
     image.light = light;
     image.size = size;
     image.lamp = number;
-    image.irradiance = lights_.estimate(number, middle);
-    if (std::isfinite(image.irradiance)) elsewhere_ += kScattered / kPi * image.irradiance;
+    lamps.push_back(number);
   };
   size_t number = 0;
   for (const Shape& shape : scene.shapes) {
@@ -126,19 +181,23 @@ std::vector<MirroredLight::Image> MirroredLight::find_lights(const Scene& scene)
     const LightOrigin origin = delta->origin();
     add_lamp(number++, origin.infinite, origin.infinite ? -value(origin.v) : value(origin.v), 0);
   }
+  lit_ = kLit / kPi * mean_irradiance(scene, lights_, lamps);
   if (!scene.environment) return found;
-  elsewhere_ += scene.environment->mean_luminance();
+  environment_ = scene.environment->mean_luminance();
   for (const BrightPatch& patch : find_bright_patches(*scene.environment)) {
     Image& image = found.emplace_back();
     image.infinite = true;
     image.light = patch.cap.axis;
     image.size = patch.cap.sine;
-    image.irradiance = patch.luminance * 2 * kPi * (1 - patch.cap.cosine);
+    const double rise = patch.cap.sine * patch.cap.sine / (1 + patch.cap.cosine);
+    image.irradiance = patch.luminance * 2 * kPi * rise;
   }
   return found;
 }
 
-// Keeps those that mirror the most light.
+// Keeps those that mirror the most light; of what is about alike the first. Neither the choice nor
+// the order may hang on small differences: the scenes of a finite difference would draw directions
+// of different lamps with the same numbers.
 void MirroredLight::add(const FlatPart& part, const Bsdf& bsdf, const Vec3d& normal,
                         const Image& source) {
   Image image = source;
@@ -154,10 +213,12 @@ void MirroredLight::add(const FlatPart& part, const Bsdf& bsdf, const Vec3d& nor
   if (image.lamp) image.irradiance = lights_.estimate(*image.lamp, image.center);
   image.light_in_part = image.irradiance * height / length(to) * image.radius * image.radius;
   images_.push_back(image);
-  std::stable_sort(images_.begin(), images_.end(), [](const Image& a, const Image& b) {
-    return a.light_in_part > b.light_in_part;
-  });
-  if (images_.size() > kMostImages) images_.pop_back();
+  if (images_.size() <= kMostImages) return;
+  size_t least = images_.size() - 1;
+  for (size_t i = least; i-- > 0;) {
+    if (images_[i].light_in_part < kAlike * images_[least].light_in_part) least = i;
+  }
+  images_.erase(images_.begin() + static_cast<std::ptrdiff_t>(least));
 }
 
 // Whether p may see the image within the flat part. A near lamp's is that of a far one from a
@@ -202,7 +263,7 @@ bool MirroredLight::sees(const Image& image, const Vec3d& p, Glare& glare) const
   glare.normal = n;
   glare.half_angle = 2 * lobe + size;
   // Where the light is wider than the lobe, its image is about as wide as the light.
-  glare.cone = lobe < 2 * size ? std::cos(spread) : 2;
+  glare.cone = lobe < 2 * size ? versine(std::max(spread, kLeastCone)) : 0;
   glare.irradiance = image.albedo * glare.nearness * glare.nearness *
                      (image.lamp ? lights_.estimate(*image.lamp, shown) : image.irradiance);
   return true;
@@ -211,8 +272,8 @@ bool MirroredLight::sees(const Image& image, const Vec3d& p, Glare& glare) const
 // From a point over the plane by `nearness` in place of 1 in the same line of sight, the light is
 // scattered as that of a far one; then the solid angle is that at the point itself.
 double MirroredLight::pdf(const Glare& glare, const Vec3d& w) {
-  if (glare.cone <= 1) {
-    return dot(w, glare.toward) >= glare.cone ? 1 / (2 * kPi * (1 - glare.cone)) : 0;
+  if (glare.cone > 0) {
+    return length_squared(w - glare.toward) <= 2 * glare.cone ? 1 / (2 * kPi * glare.cone) : 0;
   }
   const double cosine = -dot(w, glare.normal);
   if (!(cosine > 0)) return 0;
@@ -233,11 +294,10 @@ std::optional<Vec3d> MirroredLight::sample(const Mixture& mixture, double u, dou
   int i = 0;
   while (i + 1 < mixture.count && u >= mixture.part[i]) u -= mixture.part[i++];
   const Glare& glare = mixture.glare[i];
-  if (glare.cone <= 1) {
-    const double cosine = 1 - u1 * (1 - glare.cone);
-    const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
+  if (glare.cone > 0) {
+    const double rise = u1 * glare.cone, sine = std::sqrt(rise * (2 - rise));
     const auto [a, b] = across(glare.toward);
-    return glare.toward * cosine + a * (sine * std::cos(2 * kPi * u2)) +
+    return glare.toward * (1 - rise) + a * (sine * std::cos(2 * kPi * u2)) +
            b * (sine * std::sin(2 * kPi * u2));
   }
   const auto scattered = glare.bsdf->sample(glare.normal, glare.light, u1, u2);

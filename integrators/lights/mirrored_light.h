@@ -8,6 +8,7 @@
 // vertex's directions is drawn from there: a mixture of densities, which changes no mean.
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -31,12 +32,13 @@ class MirroredLight {
     Vec3d toward;       // unit, from the point to there
     double nearness;    // how far a far light's glare would be seen from, over the distance there
     double half_angle;  // of the cap of directions that holds most of it [rad]
-    double cone;        // cosine of the angle of the directions, if these are uniform; else > 1
+    double cone;        // 1 - the cosine of the angle of directions that are uniform; 0: others are
     double irradiance;  // of its light at the point, across it, without what hides it
   };
   // The part that a vertex takes of its directions from each glare.
   struct Mixture {
-    double share = 0;  // of all together; 0: from the scattering function alone
+    double share = 0;      // of all together; 0: from the scattering function alone
+    double elsewhere = 0;  // luminance of what is seen beside them, about, if any is seen
     int count = 0;
     std::array<Glare, kMostImages> glare{};
     std::array<double, kMostImages> part{};  // sum to 1
@@ -48,7 +50,7 @@ class MirroredLight {
   template <class S>
   Mixture mixture(const SurfacePoint<S>& surface, const Scattering<S>& scattering) const {
     Mixture mixture;
-    double sum = 0;
+    double sum = 0, of_lamps = 0;
     for (const Image& image : images_) {
       Glare& glare = mixture.glare[mixture.count];
       if (!sees(image, value(surface.p), glare)) continue;
@@ -56,14 +58,16 @@ class MirroredLight {
       if (!(power > 0)) continue;
       mixture.part[mixture.count++] = power;
       sum += power;
+      if (image.lamp) of_lamps += glare.irradiance;
     }
+    if (!(sum > 0)) return mixture;
     for (int i = 0; i < mixture.count; ++i) mixture.part[i] /= sum;
+    mixture.elsewhere = environment_ + std::max(lit_, kScattered / kPi * of_lamps);
     // Five times as much gave the same error in the demo.
-    if (sum > 0) mixture.share = std::min(sum / (sum + elsewhere_), kMostShare);
+    const double share = sum / (sum + mixture.elsewhere);
+    if (std::isfinite(share)) mixture.share = std::min(share, kMostShare);
     return mixture;
   }
-  // Luminance of what is seen beside the glare, about.
-  double elsewhere() const { return elsewhere_; }
   // The density at the unit direction w [1/sr], of which scattering alone has this one there.
   static double pdf(const Mixture& mixture, const Vec3d& w, double scattered);
   // Of directions of one glare.
@@ -73,6 +77,8 @@ class MirroredLight {
 
  private:
   static constexpr double kMostShare = 0.5;  // not tuned
+  // What lamps send comes back from other surfaces with this share of it. Not tuned.
+  static constexpr double kScattered = 0.5;
   // A light in a flat part of a surface.
   struct Image {
     const Bsdf* bsdf = nullptr;
@@ -95,8 +101,9 @@ class MirroredLight {
   bool sees(const Image& image, const Vec3d& p, Glare& glare) const;
 
   const Lights& lights_;
-  std::vector<Image> images_;
-  double elsewhere_ = 0;
+  std::vector<Image> images_;  // in the order in which they are found
+  double environment_ = 0;     // mean luminance of it
+  double lit_ = 0;             // and of surfaces by lamps, about
 };
 
 // Of a vertex behind which the path scatters again; none at others.

@@ -11,6 +11,8 @@ namespace {
 constexpr int kPoints = 2;
 // Wider glare is left to other samplers: lists would be long. Not tuned.
 constexpr double kWidest = 0.5;
+// And narrower: by rounding a direction would lie in its cap or not.
+constexpr double kNarrowest = 1e-6;
 // What a piece weighs at least, over what it would if the glare filled its cap evenly.
 constexpr double kEven = 0.1;
 // Glare is looked for if it is this many times as bright as what else is seen. With any
@@ -27,10 +29,10 @@ void GlareEdges::list(const PathVertex& vertex, const EdgeQuery& query, View& vi
   const MirroredLight::Mixture mixture = mirrored_.mixture(vertex.surface, vertex.scattering);
   for (int i = 0; i < mixture.count; ++i) {
     const MirroredLight::Glare& glare = mixture.glare[i];
-    if (!(glare.half_angle < kWidest)) continue;
+    if (!(glare.half_angle > kNarrowest && glare.half_angle < kWidest)) continue;
     const DirectionCap cap{glare.toward, std::sin(glare.half_angle), std::cos(glare.half_angle)};
-    const double solid_angle = 2 * kPi * (1 - cap.cosine);
-    if (!(glare.irradiance > kBright * solid_angle * mirrored_.elsewhere())) continue;
+    const double solid_angle = 2 * kPi * cap.sine * cap.sine / (1 + cap.cosine);
+    if (!(glare.irradiance > kBright * solid_angle * mixture.elsewhere)) continue;
     const std::optional<DirectionCone> cone = cone_around(cap, query.n);
     if (!cone) continue;
     listed.clear();

@@ -1,6 +1,7 @@
 // The sun's glare on flat gloss: a share of directions is drawn there, and nothing else changes.
 #include "integrators/lights/mirrored_light.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "integrators/paths/path_follow.h"
@@ -359,6 +360,95 @@ TEST(MirroredLight, EdgesAreDrawnWhereTheyAreLeftOut) {
              drawn.standard_error(), left_out.mean(), left_out.standard_error());
   EXPECT_GT(views, 1000);
   EXPECT_LT(std::fabs(drawn.mean() - left_out.mean()), 4.5 * error);
+}
+
+// What a point of a wall makes of the glare on the floor before it, of these delta lights.
+struct WallPoint {
+  WallPoint(const TempFiles& files, const std::string& emitters, double gloss = 0.05)
+      : scene(make(files, emitters, gloss)), lights(scene) {
+    const auto tracer = make_embree_tracer(scene, 1);
+    mirrored = MirroredLight::make(scene, lights);
+    const Point at(scene, *tracer, {0.2, 0.8, 1.5}, {0, 0, -1});
+    if (mirrored)
+      mixture = mirrored->mixture(at.surface, Scattering<double>(at.surface, at.wi, scene.shading));
+  }
+  static Scene make(const TempFiles& files, const std::string& emitters, double gloss) {
+    SceneParts parts;
+    parts.body = square("floor", 2, -90, {0, 0, 0}, conductor("gloss", gloss)) +
+                 square("wall", 1, 0, {0, 1, -1}, diffuse("paint", "0.3, 0.3, 0.3")) + emitters;
+    return make_scene(files, parts);
+  }
+  Scene scene;
+  Lights lights;
+  std::unique_ptr<MirroredLight> mirrored;
+  MirroredLight::Mixture mixture;
+};
+
+std::string bulb(const Vec3d& p, double intensity) {
+  return fmt::format(R"(<emitter type="point"><point name="position" value="{}, {}, {}"/>
+                        <rgb name="intensity" value="{}"/></emitter>)",
+                     p.x, p.y, p.z, intensity);
+}
+
+std::string spot(const Vec3d& p, const Vec3d& target, double cutoff, double intensity) {
+  return fmt::format(
+      R"(<emitter type="spot"><rgb name="intensity" value="{}"/>
+         <float name="cutoff_angle" value="{}"/><transform name="to_world">
+         <lookat origin="{}, {}, {}" target="{}, {}, {}" up="0, 0, 1"/></transform></emitter>)",
+      intensity, cutoff, p.x, p.y, p.z, target.x, target.y, target.z);
+}
+
+// The share that a glare takes follows what lamps light about the point, wherever they hang or look.
+TEST(MirroredLight, ShareFollowsWhatIsLitAround) {
+  const TempFiles files;
+  // (0, 1, 0) is the middle of the scene: no place is special.
+  const double in_middle = WallPoint(files, bulb({0, 1, 0}, 5)).mixture.share;
+  const double beside = WallPoint(files, bulb({0, 1, 1e-3}, 5)).mixture.share;
+  EXPECT_GT(in_middle, 0.02);
+  EXPECT_LT(in_middle, 0.45);
+  EXPECT_NEAR(beside, in_middle, 1e-3);
+  // A lamp that lights where the glare is, and neither the middle nor the point: more than of a bulb
+  // in the same place, and yet no more than of what its light makes of other surfaces.
+  const Vec3d high{0.2, 1.2, 1};
+  const std::string down = spot(high, {0.2, 0, -0.2}, 15, 5);
+  const MirroredLight::Mixture lit = WallPoint(files, down).mixture;
+  ASSERT_EQ(lit.count, 1);
+  EXPECT_GT(lit.share, WallPoint(files, bulb(high, 5)).mixture.share);
+  EXPECT_LT(lit.share, 0.45);
+  // A weak glare beside a strong lamp that lights the wall alone, and is not mirrored.
+  const std::string strong = spot({0.2, 1.5, 1}, {0.2, 0.8, -1}, 10, 5000);
+  const MirroredLight::Mixture weak = WallPoint(files, bulb({0, 1, 0}, 1) + strong).mixture;
+  ASSERT_EQ(weak.count, 1);
+  EXPECT_GT(weak.share, 0);
+  EXPECT_LT(10 * weak.share, in_middle);
+}
+
+// Two scenes of a finite difference draw the same glare with the same number: neither which lamps
+// are kept nor their order hangs on which of equal ones is brighter by the difference.
+TEST(MirroredLight, OrderIsThatOfTheFile) {
+  const TempFiles files;
+  for (const int lamps : {2, 6}) {
+    std::vector<MirroredLight::Mixture> found;
+    for (const double shift : {-1e-4, 0.0, 1e-4}) {
+      std::string emitters;
+      for (int i = 0; i < lamps; ++i) {
+        const double angle = 2 * kPi * (i + 0.5) / lamps;
+        // The last one is brighter than the others.
+        emitters += bulb({shift + 0.7 * std::sin(angle), 1.3, 0.7 * std::cos(angle)},
+                         lamps == 6 && i == 5 ? 20 : 6);
+      }
+      found.push_back(WallPoint(files, emitters, 0.2).mixture);
+    }
+    ASSERT_EQ(found[1].count, std::min(lamps, 4));
+    for (const size_t other : {size_t{0}, size_t{2}}) {
+      ASSERT_EQ(found[other].count, found[1].count);
+      for (int i = 0; i < found[1].count; ++i) {
+        EXPECT_LT(length(found[other].glare[i].toward - found[1].glare[i].toward), 1e-3) << i;
+      }
+    }
+    // The brightest is among them though it comes last.
+    EXPECT_TRUE(lamps == 2 || found[1].part[3] > found[1].part[2]);
+  }
 }
 
 // Nothing to mirror, nothing to see it by: no share, and no image changes.
