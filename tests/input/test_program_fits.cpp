@@ -202,6 +202,16 @@ TEST_F(Program, FitsOfLaterViewsAndFields) {
 }
 
 // Steps take twice as long each, so that the interrupt comes within one, after a snapshot.
+// `timeout` and job schedulers send a process its signal, and then to its group.
+TEST_F(Program, SignalsThatComeAtOnceAreOneInterrupt) {
+  const std::string image = files_.path("long.exr");
+  const Outcome outcome =
+      call(std::string("{ ") + LIMN_PROGRAM + " render " + scene_ + " --spp 100000000 -o " + image +
+           " & sleep 1; kill -INT $!; sleep 0.01; kill -INT $!; wait $!; }");
+  EXPECT_NE(outcome.text.find("interrupted: "), std::string::npos) << outcome.text;
+  EXPECT_TRUE(std::filesystem::exists(image));
+}
+
 TEST_F(Program, InterruptedFitsKeepPicturesAndTellWhatIsDamaged) {
   const std::string target = files_.path("target.exr"), folder = files_.path("fit");
   ASSERT_EQ(run("render " + scene_ + " --spp 1 -o " + target).status, 0);

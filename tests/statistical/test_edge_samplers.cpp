@@ -105,7 +105,8 @@ EdgeSamplerInput test_input(const Mesh& mesh) {
   Mesh first = mesh, second = transformed(mesh, identity, 0.5, {1.2, 0.1, -0.4});
   set_test_tangents(first);
   set_test_tangents(second);
-  return {{build_edge_mesh(first, true), build_edge_mesh(second, true, ShapeId(1))}, {}, 1};
+  return {.objects = {build_edge_mesh(first, true), build_edge_mesh(second, true, ShapeId(1))},
+          .environment_luminance = 1};
 }
 
 template <class F>
@@ -365,7 +366,8 @@ TEST_P(EdgeSamplers, NeverDrawTheOwnFace) {
 TEST_P(EdgeSamplers, HoldWithoutEdges) {
   Rng rng(19, 0, 0);
   const EdgeSamplerInput nothing;
-  const EdgeSamplerInput still{{build_edge_mesh(cube_mesh(), true)}, {}, 1};
+  const EdgeSamplerInput still{.objects = {build_edge_mesh(cube_mesh(), true)},
+                               .environment_luminance = 1};
   EdgeQuery q = random_query(rng);
   q.velocity = {};
   EXPECT_FALSE(make(nothing)->sample(q, rng));

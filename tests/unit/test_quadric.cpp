@@ -348,7 +348,7 @@ TEST(Quadric, ProbabilitiesDoNotDependOnTheScale) {
   const auto input_at = [](double scale) {
     Mesh mesh = with_smooth_normals(torus_mesh(24, 12));
     for (Vec3f& x : mesh.positions) x = x * static_cast<float>(scale);
-    EdgeSamplerInput input{{build_edge_mesh(mesh, true)}, {}, 1};
+    EdgeSamplerInput input{.objects = {build_edge_mesh(mesh, true)}, .environment_luminance = 1};
     input.lights.push_back(
         {{{-scale, -scale, 4 * scale}, {scale, 2 * scale, 4 * scale}, {scale, -scale, 4 * scale}},
          2});

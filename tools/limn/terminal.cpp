@@ -7,18 +7,31 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <cstdint>
 #include <cstdio>
+#include <ctime>
 #include <memory>
 
 namespace limn {
 namespace {
 
 std::atomic<bool> g_interrupted{false};
+std::atomic<int64_t> g_first{0};  // when it was set [ns]
 
-void on_interrupt(int) {
-  g_interrupted.store(true);
-  std::signal(SIGINT, SIG_DFL);
-  std::signal(SIGTERM, SIG_DFL);
+// `timeout` and job schedulers send a process its signal, and then to its group, it among them:
+// what comes at once is one request.
+void on_interrupt(int signal) {
+  constexpr int64_t kSecond = 1'000'000'000;
+  timespec time;
+  clock_gettime(CLOCK_MONOTONIC, &time);
+  const int64_t now = time.tv_sec * kSecond + time.tv_nsec;
+  int64_t first = 0;
+  if (g_first.compare_exchange_strong(first, now)) {
+    g_interrupted.store(true);
+  } else if (now - first > kSecond / 2) {
+    std::signal(signal, SIG_DFL);
+    std::raise(signal);
+  }
 }
 
 std::string duration(double seconds) {
