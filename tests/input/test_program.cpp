@@ -433,7 +433,7 @@ TEST_F(Program, SigtermWritesWhatIsDone) {
 
 // Every warning of `info` stands in the figures of a run, too.
 TEST_F(Program, WarningsAreInTheFigures) {
-  files_.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 2\n");
+  files_.write("a.obj", "v 0.3 0.2 0\nv 1.1 0.2 0\nv 0.3 0.9 0\nf 1 2 3\nf 1 2 2\n");
   SceneParts parts;
   parts.width = parts.height = 2;
   parts.body = R"(  <shape type="obj" id="a"><string name="filename" value="a.obj"/></shape>
