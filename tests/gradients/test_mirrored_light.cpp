@@ -206,6 +206,26 @@ TEST(MirroredLight, InReverse) {
   }
 }
 
+// A film that sees the wall of these scenes alone.
+SceneParts before_the_wall() {
+  SceneParts parts;
+  parts.max_depth = 3;
+  parts.origin = {0, 0.8, 0.6};
+  parts.target = {0, 0.8, -1};
+  parts.fov = 50;
+  parts.width = parts.height = 8;
+  return parts;
+}
+
+// Of too many faces to be looked through for flat parts, unless it is coarse.
+std::string gloss_floor(const TempFiles& files, bool coarse, double alpha) {
+  Mesh mesh = grid_mesh(coarse ? 1 : 12);
+  for (Vec3f& p : mesh.positions) p = {p.x, 0, -p.y};
+  mesh = make_mesh(mesh.positions, mesh.faces);
+  return obj_shape("floor", write_mesh(files, "floor.obj", mesh), true, 2, {0, 0, 0.5},
+                   conductor("gloss", alpha));
+}
+
 // Lines from the sun share with points of a shadow by the density of directions before it. The floor
 // as a mesh of too many faces to be looked through has none of the glare's: where a wall sees the
 // shadow of a body in it, what both terms find together must be the same (with lines that know
@@ -218,17 +238,8 @@ TEST(MirroredLight, LinesFromTheSunKnowOfIt) {
   options.method = "silhouettes";
   std::vector<GradientResult> found;
   for (const bool coarse : {true, false}) {
-    SceneParts parts;
-    parts.max_depth = 3;
-    parts.origin = {0, 0.8, 0.6};
-    parts.target = {0, 0.8, -1};
-    parts.fov = 50;
-    parts.width = parts.height = 8;
-    Mesh mesh = grid_mesh(coarse ? 1 : 12);
-    for (Vec3f& p : mesh.positions) p = {p.x, 0, -p.y};
-    mesh = make_mesh(mesh.positions, mesh.faces);
-    parts.body = obj_shape("floor", write_mesh(files, "floor.obj", mesh), true, 2, {0, 0, 0.5},
-                           conductor("gloss", 0.2)) +
+    SceneParts parts = before_the_wall();
+    parts.body = gloss_floor(files, coarse, 0.2) +
                  square("wall", 2, 0, {0, 1, -1}, diffuse("paint", "0.9, 0.9, 0.9")) +
                  obj_shape("body", write_mesh(files, "body.obj", cube_mesh()), true, 0.3,
                            {0.5, 0.9, 1}, diffuse("soot", "0, 0, 0")) +
@@ -251,17 +262,8 @@ TEST(MirroredLight, EdgesBeforeTheGlare) {
   for (const bool sun : {true, false}) {
     std::vector<GradientResult> found;
     for (const bool coarse : {true, false}) {
-      SceneParts parts;
-      parts.max_depth = 3;
-      parts.origin = {0, 0.8, 0.6};
-      parts.target = {0, 0.8, -1};
-      parts.fov = 50;
-      parts.width = parts.height = 8;
-      Mesh mesh = grid_mesh(coarse ? 1 : 12);
-      for (Vec3f& p : mesh.positions) p = {p.x, 0, -p.y};
-      mesh = make_mesh(mesh.positions, mesh.faces);
-      parts.body = obj_shape("floor", write_mesh(files, "floor.obj", mesh), true, 2, {0, 0, 0.5},
-                             conductor("gloss", sun ? 0.1 : 0.04)) +
+      SceneParts parts = before_the_wall();
+      parts.body = gloss_floor(files, coarse, sun ? 0.1 : 0.04) +
                    square("wall", 2, 0, {0, 1, -1}, diffuse("paint", "0.9, 0.9, 0.9")) +
                    obj_shape("body", write_mesh(files, "body.obj", cube_mesh()), true, 0.2,
                              {0.2, 0.4, -0.5}, diffuse("clay", "0.7, 0.7, 0.7")) +
