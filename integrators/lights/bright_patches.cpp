@@ -128,16 +128,14 @@ Vec3d brightest_axis(const std::vector<Drawn>& drawn, double least_flux) {
   return axis;
 }
 
-}  // namespace
-
-std::vector<BrightPatch> find_bright_patches(const Environment& environment) {
+std::vector<BrightPatch> first_patches(const Environment& environment, size_t most) {
   std::vector<BrightPatch> patches;
   if (environment.is_uniform()) return patches;
   std::vector<Drawn> drawn = draw(environment);
   double total = 0;
   for (const Drawn& d : drawn) total += d.flux;
   const double uniform = total / (4 * kPi);
-  for (int i = 0; i < kMostTries && patches.size() < kMostPatches && !drawn.empty(); ++i) {
+  for (int i = 0; i < kMostTries && patches.size() < most && !drawn.empty(); ++i) {
     const Vec3d axis = brightest_axis(drawn, kLeastShare * total);
     const Cap core = cap_around(drawn, axis, kLeastShare * total);
     if (!(core.square >= kLeastSquare * uniform * total)) break;
@@ -153,6 +151,16 @@ std::vector<BrightPatch> find_bright_patches(const Environment& environment) {
     std::erase_if(drawn, [&](const Drawn& d) { return cap.holds(d.w); });
   }
   return patches;
+}
+
+}  // namespace
+
+std::vector<BrightPatch> find_bright_patches(const Environment& environment) {
+  return first_patches(environment, kMostPatches);
+}
+
+bool has_bright_patch(const Environment& environment) {
+  return !first_patches(environment, 1).empty();
 }
 
 }  // namespace limn

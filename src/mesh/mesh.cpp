@@ -2,6 +2,7 @@
 #include "limn/core/mesh.h"
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 #include <numeric>
 #include <tuple>
@@ -9,6 +10,7 @@
 #include "limn/core/check.h"
 #include "src/mesh/face_shape.h"
 #include "src/mesh/mesh_build.h"
+#include "src/mesh/shading_tangents.h"
 
 namespace limn {
 
@@ -184,6 +186,16 @@ void store_tangents(Mesh& mesh, const ShadingNormals<Dual>& from) {
   for (size_t i = 0; i < from.horizon.size(); ++i) mesh.horizon_tangents[i] = from.horizon[i].d;
 }
 
+// Whether all vertices have one velocity, to the bit: then no face turns, and all derivatives of
+// normals and horizons are zero.
+bool moves_as_one(const Mesh& mesh) {
+  const auto& tangents = mesh.position_tangents;
+  const auto alike = [&](const Vec3<Lanes>& t) {
+    return std::memcmp(&t, &tangents[0], sizeof(t)) == 0;
+  };
+  return std::all_of(tangents.begin(), tangents.end(), alike);
+}
+
 }  // namespace
 
 size_t count_cancelled_normals(const Mesh& mesh) {
@@ -196,13 +208,17 @@ size_t count_cancelled_normals(const Mesh& mesh) {
 void update_shading_normals(Mesh& mesh) {
   CHECK_EQ(mesh.weld.size(), mesh.positions.size());
   if (mesh.normal_source == NormalSource::kFace) return;
-  const bool computed = mesh.normal_source == NormalSource::kComputed;
-  if (computed) assign_normal_ids(mesh);
+  if (mesh.normal_source == NormalSource::kComputed) assign_normal_ids(mesh);
   ShadingNormals<double> values = shading_normals<double>(mesh);
   mesh.normals = std::move(values.normals);
   mesh.horizon = std::move(values.horizon);
-  const bool still = mesh.position_tangents.empty() && (computed || mesh.normal_tangents.empty());
-  if (still) {
+  update_shading_tangents(mesh);
+}
+
+void update_shading_tangents(Mesh& mesh) {
+  if (mesh.normal_source == NormalSource::kFace) return;
+  const bool computed = mesh.normal_source == NormalSource::kComputed;
+  if (moves_as_one(mesh) && (computed || mesh.normal_tangents.empty())) {
     mesh.normal_tangents.clear();
     mesh.horizon_tangents.clear();
   } else {
