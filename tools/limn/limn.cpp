@@ -47,14 +47,17 @@ void check_command(const CLI::App& app, int argc, char** argv) {
       limn::known_names(known) + "; limn --help tells more)");
 }
 
-// Has glibc ask for pages of 2 MB wherever it takes memory, which it settles before main: the program
-// starts anew, with that wish in its environment. Small arrays profit as well as large ones, and
-// set-up meets an eighth of the page faults: a gradient of 24 x 24 pixels at 24 samples takes 0.91
-// of the time (demo, set-up included). Who has other wishes in GLIBC_TUNABLES keeps them; under a
+// Has glibc ask for pages of 2 MB wherever it takes memory, and keep arrays of up to 32 MB that are
+// given back for the next ones. It settles that before main: the program starts anew, with the wish
+// in its environment. Small arrays profit as well as large ones, and set-up meets a twentieth of
+// the page faults (scenes/FIGURES.md). Who has other wishes in GLIBC_TUNABLES keeps them; under a
 // tool that does not follow into the second start any value there prevents it.
 void use_huge_pages([[maybe_unused]] char** argv) {
 #ifdef __GLIBC__
-  constexpr const char *kName = "GLIBC_TUNABLES", *kWish = "glibc.malloc.hugetlb=1";
+  constexpr const char* kName = "GLIBC_TUNABLES";
+  constexpr const char* kWish =
+      "glibc.malloc.hugetlb=1:glibc.malloc.mmap_threshold=33554432:"
+      "glibc.malloc.trim_threshold=268435456";
   const char* wish = std::getenv(kName);
   if (wish) {
     if (std::string(wish) == kWish) unsetenv(kName);  // not for programs that this one starts
