@@ -200,7 +200,7 @@ TEST(Normals, StayWhereAllMovesAsOne) {
   mesh.faces.push_back({8, 9, 10});
   weld_positions(mesh);
   update_shading_normals(mesh);
-  ASSERT_EQ(mesh.normal_tangents.size(), 9u);
+  ASSERT_EQ(mesh.normal_tangents.size(), 11u);
   for (size_t n = 0; n < 8; ++n)
     for (int k = 0; k < 3; ++k)
       for (int lane = 0; lane < kLanes; ++lane) EXPECT_EQ(mesh.normal_tangents[n][k][lane], 0);
