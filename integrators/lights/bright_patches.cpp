@@ -58,16 +58,18 @@ Cap cap_around(const std::vector<Drawn>& drawn, const Vec3d& axis, double least_
   std::vector<std::pair<double, double>> near;  // angle, flux
   constexpr double kOuter = 1.25 * kWidest;
   const double outer_cosine = std::cos(kOuter);
-  double outside = 0;
+  double inside = 0, outside = 0;
   for (const Drawn& d : drawn) {
     if (dot(d.w, axis) < outer_cosine) continue;
     const double angle = angle_between(d.w, axis);
     if (angle < kWidest) {
       near.emplace_back(angle, d.flux);
+      inside += d.flux;
     } else {
       outside += d.flux;
     }
   }
+  if (inside < 0.999 * least_flux) return {};  // beyond rounding: no cap here has enough
   std::sort(near.begin(), near.end());
   const double around = outside / (solid_angle(kOuter) - solid_angle(kWidest));
   Cap best;
