@@ -2,6 +2,8 @@
 #include "edgetree/forest/forest_split.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -20,27 +22,21 @@ constexpr float kPosition = 8;
 
 // Where an edge is, and where its normals point: close in both means rejected together.
 struct Item {
-  float key[kAxes];
-  uint32_t wedge;
+  Floats key;  // of the axes; behind them the wedge's bits, and zero
+
+  uint32_t wedge() const { return std::bit_cast<uint32_t>(key[kAxes]); }
 };
 
 struct Extent {
-  float low[kAxes], high[kAxes];
-  Extent() {
-    std::fill_n(low, kAxes, std::numeric_limits<float>::max());
-    std::fill_n(high, kAxes, std::numeric_limits<float>::lowest());
-  }
+  Floats low = splat(std::numeric_limits<float>::max());
+  Floats high = splat(std::numeric_limits<float>::lowest());
   void add(const Item& item) {
-    for (int k = 0; k < kAxes; ++k) {
-      low[k] = std::min(low[k], item.key[k]);
-      high[k] = std::max(high[k], item.key[k]);
-    }
+    low = min(low, item.key);
+    high = max(high, item.key);
   }
   void add(const Extent& other) {
-    for (int k = 0; k < kAxes; ++k) {
-      low[k] = std::min(low[k], other.low[k]);
-      high[k] = std::max(high[k], other.high[k]);
-    }
+    low = min(low, other.low);
+    high = max(high, other.high);
   }
   // Grows with the chance that a plane through a random point cuts the set, and with how much its
   // edges differ in distance and direction from there.
@@ -109,28 +105,49 @@ Cut best_bin(std::span<const Item> items, const Extent& extent) {
   return best;
 }
 
-void sort_along(std::span<Item> items, int axis) {
-  std::sort(items.begin(), items.end(), [axis](const Item& a, const Item& b) {
-    return a.key[axis] != b.key[axis] ? a.key[axis] < b.key[axis] : a.wedge < b.wedge;
-  });
-}
+// Few items in an order: numbers that rise with it, and in their low halves places.
+using Order = std::array<uint64_t, kSortBelow>;
+uint64_t numbered(uint32_t rising, uint32_t place) { return uint64_t{rising} << 32 | place; }
+uint32_t place_in(uint64_t number) { return static_cast<uint32_t>(number); }
 
-// Few items: any place in the sorted order that leaves full nodes of edges.
-Cut best_place(std::span<Item> items, uint32_t width) {
+// Sorts few items without moving them.
+class FewItems {
+ public:
+  explicit FewItems(std::span<const Item> items) : items_(items) {
+    for (uint32_t i = 0; i < items.size(); ++i) by_wedge_[i] = numbered(items[i].wedge(), i);
+    std::sort(by_wedge_.begin(), by_wedge_.begin() + items.size());
+  }
+  // By the key, ties by the wedge. The order's places are for `at`.
+  void sort_along(int axis, Order& order) const {
+    for (uint32_t i = 0; i < items_.size(); ++i) {
+      const auto bits = std::bit_cast<uint32_t>(at(i).key[axis] + 0.0f);  // -0 is 0
+      order[i] = numbered(bits >> 31 ? ~bits : bits | 1u << 31, i);
+    }
+    std::sort(order.begin(), order.begin() + items_.size());
+  }
+  const Item& at(uint64_t number) const { return items_[place_in(by_wedge_[place_in(number)])]; }
+
+ private:
+  std::span<const Item> items_;
+  Order by_wedge_;
+};
+
+// Any place in the sorted order that leaves full nodes of edges.
+Cut best_place(const FewItems& items, uint32_t n, uint32_t width) {
   Cut best;
-  const auto n = static_cast<uint32_t>(items.size());
   const uint32_t step = n > width ? width : 1;
   for (int axis = 0; axis < kAxes; ++axis) {
-    sort_along(items, axis);
+    Order order;
+    items.sort_along(axis, order);
     float right_cost[kSortBelow];
     Extent right;
     for (uint32_t i = n - 1; i > 0; --i) {
-      right.add(items[i]);
-      right_cost[i] = right.measure() * static_cast<float>(n - i);
+      right.add(items.at(order[i]));
+      if (i % step == 0) right_cost[i] = right.measure() * static_cast<float>(n - i);
     }
     Extent left;
     for (uint32_t i = 1; i < n; ++i) {
-      left.add(items[i - 1]);
+      left.add(items.at(order[i - 1]));
       if (i % step != 0) continue;
       const float cost = left.measure() * static_cast<float>(i) + right_cost[i];
       if (cost < best.cost) best = {cost, axis, i};
@@ -139,14 +156,21 @@ Cut best_place(std::span<Item> items, uint32_t width) {
   return best;
 }
 
+uint32_t split_few(std::span<Item> items, uint32_t width) {
+  const FewItems few(items);
+  const Cut cut = best_place(few, static_cast<uint32_t>(items.size()), width);
+  Order order;
+  few.sort_along(cut.axis, order);
+  std::array<Item, kSortBelow> sorted;
+  for (size_t i = 0; i < items.size(); ++i) sorted[i] = few.at(order[i]);
+  std::copy_n(sorted.begin(), items.size(), items.begin());
+  return cut.bin;
+}
+
 // Reorders the items and returns how many go left: at least one, and not all.
 uint32_t split(std::span<Item> items, uint32_t width) {
   const auto n = static_cast<uint32_t>(items.size());
-  if (n < kSortBelow) {
-    const Cut cut = best_place(items, width);
-    sort_along(items, cut.axis);
-    return cut.bin;
-  }
+  if (n < kSortBelow) return split_few(items, width);
   Extent extent;
   for (const Item& item : items) extent.add(item);
   const Cut cut = best_bin(items, extent);
@@ -205,7 +229,7 @@ std::vector<Item> items_of(std::span<const Wedge> wedges) {
       items[i].key[k] = static_cast<float>(x[k]);
       items[i].key[k + 3] = static_cast<float>(n[k]);
     }
-    items[i].wedge = i;
+    items[i].key[kAxes] = std::bit_cast<float>(i);
   }
   return items;
 }
@@ -216,7 +240,7 @@ ForestShape split_edges(std::span<const Wedge> wedges, uint32_t width, int threa
   std::vector<Item> items = items_of(wedges);
   ForestShape tree =
       split_tree<kWidth>(static_cast<uint32_t>(items.size()), threads, Splitter(items, width));
-  for (const Item& item : items) tree.order.push_back(item.wedge);
+  for (const Item& item : items) tree.order.push_back(item.wedge());
   return tree;
 }
 

@@ -102,8 +102,9 @@ std::vector<Moments> forward_sums(const Scene& scene, std::span<const Parameter>
                                   const RunSettings& settings) {
   const auto [sampler, closed] = reverse_method(options.sampler);
   const std::vector<std::string>& terms = options.terms;
+  const std::vector<const TermType*> types = terms_of(scene, sampler, closed);
   std::vector<bool> computed;
-  for (const TermType* type : terms_of(scene, sampler, closed)) {
+  for (const TermType* type : types) {
     computed.push_back(terms.empty() ||
                        std::find(terms.begin(), terms.end(), type->name) != terms.end());
   }
@@ -113,7 +114,7 @@ std::vector<Moments> forward_sums(const Scene& scene, std::span<const Parameter>
         parameters.subspan(first).first(std::min<size_t>(kLanes, parameters.size() - first));
     std::vector<std::unique_ptr<SampleEstimator>> estimators;
     estimators.push_back(std::make_unique<TermEstimator>(
-        scene, some, computed, sampler, settings.threads, nullptr, nullptr, closed));
+        scene, some, types, computed, sampler, settings.threads, nullptr, nullptr, closed));
     const Stopwatch watch;
     run_batches(estimators, settings, watch, [&](const Batch& batch, const auto& sums) {
       const std::vector<std::vector<double>>& images = sums[0].images;

@@ -31,7 +31,7 @@ std::vector<TouchingShape> touching_shapes(const Scene& scene) {
 
 }  // namespace
 
-EdgeSamplerInput make_sampler_input(const Scene& scene, int threads) {
+EdgeSamplerInput make_scene_edges(const Scene& scene, int threads) {
   EdgeSamplerInput input;
   std::vector<const Mesh*> meshes;
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
@@ -48,18 +48,24 @@ EdgeSamplerInput make_sampler_input(const Scene& scene, int threads) {
   if (!crossings.empty() || !contacts.empty())
     input.objects.push_back(crossing_edges(meshes, crossings, contacts));
   input.parting = parting;
+  if (scene.environment) input.environment_luminance = scene.environment->mean_luminance();
+  return input;
+}
+
+EdgeSamplerInput make_sampler_input(const Scene& scene, int threads) {
+  EdgeSamplerInput input = make_scene_edges(scene, threads);
+  add_light(scene, input);
+  return input;
+}
+
+void add_light(const Scene& scene, EdgeSamplerInput& input) {
   const Lights lights(scene);
   for (const Light* light : lights.all()) light->add_triangles(input.lights);
-  if (!scene.environment) return input;
-  const Environment& environment = *scene.environment;
-  input.environment_luminance = environment.mean_luminance();
-  if (!environment.is_uniform()) {
-    const auto brightness = [&](const Vec3d& d) {
-      return std::max(0.0, luminance(environment.radiance(d)));
-    };
-    input.environment = std::make_shared<RadiancePyramid>(brightness, 8, 2);
-  }
-  return input;
+  if (!scene.environment || scene.environment->is_uniform()) return;
+  const auto brightness = [&](const Vec3d& d) {
+    return std::max(0.0, luminance(scene.environment->radiance(d)));
+  };
+  input.environment = std::make_shared<RadiancePyramid>(brightness, 8, 2);
 }
 
 namespace {

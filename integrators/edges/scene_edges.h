@@ -12,6 +12,9 @@ namespace limn {
 // surfaces cross (if any do), light polygons and the environment's mean. The result does not depend
 // on `threads`.
 EdgeSamplerInput make_sampler_input(const Scene& scene, int threads);
+// The same in two steps: all but light polygons and the environment over directions; and these.
+EdgeSamplerInput make_scene_edges(const Scene& scene, int threads);
+void add_light(const Scene& scene, EdgeSamplerInput& input);
 
 // One for each pair of shapes that touch and move towards each other or apart (ContactLine); none
 // twice. edges: of the scene, in motion; null: none.

@@ -58,16 +58,18 @@ Cap cap_around(const std::vector<Drawn>& drawn, const Vec3d& axis, double least_
   std::vector<std::pair<double, double>> near;  // angle, flux
   constexpr double kOuter = 1.25 * kWidest;
   const double outer_cosine = std::cos(kOuter);
-  double outside = 0;
+  double inside = 0, outside = 0;
   for (const Drawn& d : drawn) {
     if (dot(d.w, axis) < outer_cosine) continue;
     const double angle = angle_between(d.w, axis);
     if (angle < kWidest) {
       near.emplace_back(angle, d.flux);
+      inside += d.flux;
     } else {
       outside += d.flux;
     }
   }
+  if (inside < 0.999 * least_flux) return {};  // beyond rounding: no cap here has enough
   std::sort(near.begin(), near.end());
   const double around = outside / (solid_angle(kOuter) - solid_angle(kWidest));
   Cap best;
@@ -128,16 +130,14 @@ Vec3d brightest_axis(const std::vector<Drawn>& drawn, double least_flux) {
   return axis;
 }
 
-}  // namespace
-
-std::vector<BrightPatch> find_bright_patches(const Environment& environment) {
+std::vector<BrightPatch> first_patches(const Environment& environment, size_t most) {
   std::vector<BrightPatch> patches;
   if (environment.is_uniform()) return patches;
   std::vector<Drawn> drawn = draw(environment);
   double total = 0;
   for (const Drawn& d : drawn) total += d.flux;
   const double uniform = total / (4 * kPi);
-  for (int i = 0; i < kMostTries && patches.size() < kMostPatches && !drawn.empty(); ++i) {
+  for (int i = 0; i < kMostTries && patches.size() < most && !drawn.empty(); ++i) {
     const Vec3d axis = brightest_axis(drawn, kLeastShare * total);
     const Cap core = cap_around(drawn, axis, kLeastShare * total);
     if (!(core.square >= kLeastSquare * uniform * total)) break;
@@ -153,6 +153,16 @@ std::vector<BrightPatch> find_bright_patches(const Environment& environment) {
     std::erase_if(drawn, [&](const Drawn& d) { return cap.holds(d.w); });
   }
   return patches;
+}
+
+}  // namespace
+
+std::vector<BrightPatch> find_bright_patches(const Environment& environment) {
+  return first_patches(environment, kMostPatches);
+}
+
+bool has_bright_patch(const Environment& environment) {
+  return !first_patches(environment, 1).empty();
 }
 
 }  // namespace limn

@@ -23,5 +23,7 @@ struct BrightPatch {
 // has 2 % of that, and rules the error), in that order. Found among directions that the
 // environment itself draws, the same each time.
 std::vector<BrightPatch> find_bright_patches(const Environment& environment);
+// Whether there is any: that asks for less work.
+bool has_bright_patch(const Environment& environment);
 
 }  // namespace limn

@@ -245,7 +245,7 @@ bool LightRegions::any_in(const Scene& scene) {
   for (const Shape& shape : scene.shapes) {
     if (shape.is_emitter) return true;
   }
-  return scene.environment && !find_bright_patches(*scene.environment).empty();
+  return scene.environment && has_bright_patch(*scene.environment);
 }
 
 namespace {
@@ -340,9 +340,8 @@ Rgb<double> LightRegions::escaped(const Vec3d& w) const {
   return {};
 }
 
-void LightRegions::leave_out(EdgeSamplerInput& input) const {
-  input.lights.clear();
-  if (!input.environment) return;
+void LightRegions::add_rest(EdgeSamplerInput& input) const {
+  if (!scene_.environment || scene_.environment->is_uniform()) return;
   const auto brightness = [&](const Vec3d& w) {
     return std::max(0.0, limn::luminance(scene_.environment->radiance(w) - escaped(w)));
   };

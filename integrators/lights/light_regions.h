@@ -75,8 +75,8 @@ class LightRegions {
   Rgb<double> escaped(size_t k, const Vec3d& w) const;
   Rgb<double> escaped(const Vec3d& w) const;
 
-  // Takes the regions' light out of what edge samplers weigh by.
-  void leave_out(EdgeSamplerInput& input) const;
+  // What edge samplers weigh by, but for the regions' light. input: without light.
+  void add_rest(EdgeSamplerInput& input) const;
 
  private:
   struct Region {

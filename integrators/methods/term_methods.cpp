@@ -120,7 +120,7 @@ class TermJob {
       const auto some =
           std::span(parameters).subspan(k).first(std::min<size_t>(kLanes, parameters.size() - k));
       passes_.push_back(std::make_unique<TermEstimator>(
-          scene, some, computed_, method.sampler, settings.threads, visible,
+          scene, some, types_, computed_, method.sampler, settings.threads, visible,
           method.warps ? &warping : nullptr, method.closed));
     }
   }

@@ -69,6 +69,7 @@ std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType&
 }
 
 TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> parameters,
+                             const std::vector<const TermType*>& types,
                              const std::vector<bool>& computed, const EdgeSamplerType& sampler,
                              int threads, std::shared_ptr<const FilmRegions> visible,
                              const Warping* warping, bool closed)
@@ -90,7 +91,7 @@ TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> para
       filter_(scene_.film.filter),
       visible_(std::move(visible)),
       input_(context_, lanes_, lane_scale_, sampler, threads, warping != nullptr),
-      types_(terms_of(scene, sampler, closed)),
+      types_(types),
       rates_(scene_, lanes_, lane_scale_),
       turning_(turning_about_axes(lane_scale_, lanes_)) {
   input_.visible = visible_.get();

@@ -30,11 +30,12 @@ struct Warping {
 
 class TermEstimator final : public SampleEstimator {
  public:
-  // parameters: at most kLanes. computed: for each of terms_of(scene, sampler), whether it is
-  // computed. visible: of the film, or null. warping: null where directions are not warped. closed:
-  // what surfaces scatter is known in closed form, see closed_light.h.
+  // parameters: at most kLanes. types: terms_of the scene. computed: for each of them, whether it
+  // is computed. visible: of the film, or null. warping: null where directions are not warped.
+  // closed: what surfaces scatter is known in closed form, see closed_light.h.
   TermEstimator(const Scene& scene, std::span<const Parameter> parameters,
-                const std::vector<bool>& computed, const EdgeSamplerType& sampler, int threads,
+                const std::vector<const TermType*>& types, const std::vector<bool>& computed,
+                const EdgeSamplerType& sampler, int threads,
                 std::shared_ptr<const FilmRegions> visible = nullptr,
                 const Warping* warping = nullptr, bool closed = false);
   TermEstimator(const TermEstimator&) = delete;

@@ -13,13 +13,17 @@ std::span<const TermType> term_types() { return kTermTypes; }
 const EdgeSamplerInput& TermInput::edges() {
   if (edges_) return *edges_;
   const Stopwatch watch;
-  edges_ = std::make_unique<EdgeSamplerInput>(make_sampler_input(context.scene, threads));
+  edges_ = std::make_unique<EdgeSamplerInput>(make_scene_edges(context.scene, threads));
   edges_->lane_scale = lane_scale;
   if (sampler.regions) {
     regions_ = std::make_unique<LightRegions>(context.scene);
     if (regions_->empty()) regions_.reset();
   }
-  if (regions_) regions_->leave_out(*edges_);
+  if (regions_) {
+    regions_->add_rest(*edges_);
+  } else {
+    add_light(context.scene, *edges_);
+  }
   edges_seconds_ = watch.seconds();
   return *edges_;
 }

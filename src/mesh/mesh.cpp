@@ -2,6 +2,7 @@
 #include "limn/core/mesh.h"
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 #include <numeric>
 #include <tuple>
@@ -9,6 +10,7 @@
 #include "limn/core/check.h"
 #include "src/mesh/face_shape.h"
 #include "src/mesh/mesh_build.h"
+#include "src/mesh/shading_tangents.h"
 
 namespace limn {
 
@@ -51,6 +53,7 @@ template <class S>
 struct ShadingNormals {
   std::vector<Vec3<S>> normals;
   std::vector<S> horizon;
+  size_t cancelled = 0;  // see computed_normals
 };
 
 // Slots of the computed normals: one per welded vertex that a face uses.
@@ -72,10 +75,10 @@ void assign_normal_ids(Mesh& mesh) {
 // they cancel (fins around an axis, a sheet that is folded onto itself) to a thousandth and to what
 // rounding may have left of it, any face's normal serves: the direction of the rest says nothing,
 // and its derivative has no bound. A vertex of faces without area alone gets +Z, which nothing ever
-// reads. cancelled: how many of the latter there are, if asked for.
+// reads. cancelled: how many cancel.
 template <class S>
 std::vector<Vec3<S>> computed_normals(const Mesh& mesh, const std::vector<FaceShape<S>>& shapes,
-                                      size_t* cancelled = nullptr) {
+                                      size_t& cancelled) {
   std::vector<Vec3<S>> normals(mesh.normals.size());
   std::vector<uint32_t> any_face(mesh.normals.size(), kUnused);
   std::vector<double> angles(mesh.normals.size()), noise(mesh.normals.size());
@@ -97,7 +100,7 @@ std::vector<Vec3<S>> computed_normals(const Mesh& mesh, const std::vector<FaceSh
       normals[n] = normalize(normals[n]);
     } else {
       normals[n] = shapes[any_face[n]].normal;
-      if (cancelled) ++*cancelled;
+      ++cancelled;
     }
   }
   return normals;
@@ -161,8 +164,9 @@ template <class S>
 ShadingNormals<S> shading_normals(const Mesh& mesh) {
   const std::vector<FaceShape<S>> shapes = face_shapes<S>(mesh);
   ShadingNormals<S> result;
-  result.normals = mesh.normal_source == NormalSource::kComputed ? computed_normals(mesh, shapes)
-                                                                 : stored_normals<S>(mesh);
+  result.normals = mesh.normal_source == NormalSource::kComputed
+                       ? computed_normals(mesh, shapes, result.cancelled)
+                       : stored_normals<S>(mesh);
   std::vector<S> at_root(mesh.positions.size(), S(0));
   for_every_tilt(mesh, shapes, result.normals, std::vector<double>(result.normals.size()),
                  [&](uint32_t v, const S& sine, double) {
@@ -184,25 +188,35 @@ void store_tangents(Mesh& mesh, const ShadingNormals<Dual>& from) {
   for (size_t i = 0; i < from.horizon.size(); ++i) mesh.horizon_tangents[i] = from.horizon[i].d;
 }
 
-}  // namespace
-
-size_t count_cancelled_normals(const Mesh& mesh) {
-  if (mesh.normal_source != NormalSource::kComputed) return 0;
-  size_t cancelled = 0;
-  computed_normals(mesh, face_shapes<double>(mesh), &cancelled);
-  return cancelled;
+// Whether all vertices have one velocity, to the bit: then no face turns, and all derivatives of
+// normals and horizons are zero.
+bool moves_as_one(const Mesh& mesh) {
+  const auto& tangents = mesh.position_tangents;
+  const auto alike = [&](const Vec3<Lanes>& t) {
+    return std::memcmp(&t, &tangents[0], sizeof(t)) == 0;
+  };
+  return std::all_of(tangents.begin(), tangents.end(), alike);
 }
 
-void update_shading_normals(Mesh& mesh) {
+}  // namespace
+
+void update_shading_normals(Mesh& mesh) { fill_shading_normals(mesh); }
+
+size_t fill_shading_normals(Mesh& mesh) {
   CHECK_EQ(mesh.weld.size(), mesh.positions.size());
-  if (mesh.normal_source == NormalSource::kFace) return;
-  const bool computed = mesh.normal_source == NormalSource::kComputed;
-  if (computed) assign_normal_ids(mesh);
+  if (mesh.normal_source == NormalSource::kFace) return 0;
+  if (mesh.normal_source == NormalSource::kComputed) assign_normal_ids(mesh);
   ShadingNormals<double> values = shading_normals<double>(mesh);
   mesh.normals = std::move(values.normals);
   mesh.horizon = std::move(values.horizon);
-  const bool still = mesh.position_tangents.empty() && (computed || mesh.normal_tangents.empty());
-  if (still) {
+  update_shading_tangents(mesh);
+  return values.cancelled;
+}
+
+void update_shading_tangents(Mesh& mesh) {
+  if (mesh.normal_source == NormalSource::kFace) return;
+  const bool computed = mesh.normal_source == NormalSource::kComputed;
+  if (moves_as_one(mesh) && (computed || mesh.normal_tangents.empty())) {
     mesh.normal_tangents.clear();
     mesh.horizon_tangents.clear();
   } else {

@@ -224,8 +224,7 @@ Mesh build_mesh(const RawMesh& raw, const MeshOptions& options,
     set_given_normals(mesh, raw, options, warnings);
     check_orientation(mesh, raw.where, warnings);
   }
-  update_shading_normals(mesh);
-  if (const size_t cancelled = count_cancelled_normals(mesh); cancelled > 0) {
+  if (const size_t cancelled = fill_shading_normals(mesh); cancelled > 0) {
     warn(warnings, raw.where,
          "at " + std::to_string(cancelled) +
              " vertices the normals of the faces around cancel: one of them serves, and its "

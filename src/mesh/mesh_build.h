@@ -23,8 +23,9 @@ struct RawMesh {
   SourceLocation far_where = {};
 };
 
-// How many vertices with computed normals have none because the normals around them cancel.
-size_t count_cancelled_normals(const Mesh& mesh);
+// update_shading_normals, and at how many vertices computed normals are none of their own because
+// the normals around them cancel.
+size_t fill_shading_normals(Mesh& mesh);
 
 struct MeshOptions {
   Matrix4 to_world;           // invertible

@@ -2,7 +2,11 @@
 #include "limn/core/box_tree.h"
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
+#ifdef __AVX__
+#include <immintrin.h>
+#endif
 
 #include "limn/core/parallel.h"
 
@@ -31,15 +35,23 @@ void LeafBoxes::set(uint32_t lane, const FloatBox& box) {
 }
 
 uint32_t LeafBoxes::overlaps(const FloatBox& box) const {
-  // Written so that it becomes a few instructions on whole registers.
-  int32_t apart[kLanes] = {};
-  for (int k = 0; k < 3; ++k)
-    for (uint32_t lane = 0; lane < kLanes; ++lane)
-      apart[lane] |= int{lower[k][lane] > box.upper[k]} | int{box.lower[k] > upper[k][lane]};
+  using Eight [[gnu::vector_size(4 * kLanes)]] = float;
+  using Mask [[gnu::vector_size(4 * kLanes)]] = int32_t;
+  Mask apart{};
+  for (int k = 0; k < 3; ++k) {
+    Eight low, high;
+    std::memcpy(&low, lower[k], sizeof(low));
+    std::memcpy(&high, upper[k], sizeof(high));
+    apart |= (low > box.upper[k]) | (high < box.lower[k]);
+  }
+#ifdef __AVX__
+  return static_cast<uint32_t>(~_mm256_movemask_ps(reinterpret_cast<__m256>(apart)) & 255);
+#else
   uint32_t bits = 0;
   for (uint32_t lane = 0; lane < kLanes; ++lane)
     bits |= static_cast<uint32_t>(!apart[lane]) << lane;
   return bits;
+#endif
 }
 
 BoxTree::BoxTree(std::span<const FloatBox> boxes, int threads)

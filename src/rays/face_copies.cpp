@@ -77,11 +77,17 @@ FaceCopies::FaceCopies(const Scene& scene) : scene_(scene) {
   size_t count = 0;
   for (const Shape& shape : scene.shapes) count += shape.mesh.faces.size();
   numbers.reserve(count);
+  // Most numbers share their last bits with no other's, and need not be sorted.
+  std::vector<bool> met(16 * std::bit_ceil(count)), met_again(met.size());
+  const auto bits = [&](uint64_t number) { return number & (met.size() - 1); };
   for (uint32_t s = 0; s < scene.shapes.size(); ++s)
     for (uint32_t f = 0; f < scene.shapes[s].mesh.faces.size(); ++f) {
       const FaceRef face{ShapeId(s), FaceId(f)};
-      numbers.push_back({number_of(corners_of(scene, face)), face});
+      const uint64_t number = number_of(corners_of(scene, face));
+      (met[bits(number)] ? met_again : met)[bits(number)] = true;
+      numbers.push_back({number, face});
     }
+  std::erase_if(numbers, [&](const auto& one) { return !met_again[bits(one.first)]; });
   std::sort(numbers.begin(), numbers.end(), [](const auto& a, const auto& b) {
     return std::pair(a.first, place(a.second)) < std::pair(b.first, place(b.second));
   });

@@ -104,12 +104,14 @@ struct FoundPair {
 class OverlapFinder {
  public:
   OverlapFinder(const Scene& scene, const FaceCopies& copies, FaceOverlaps::Of of) {
+    if (of == FaceOverlaps::Of::kAllFaces) reserve(scene);
     std::vector<FloatBox> shapes;
     for (const Shape& shape : scene.shapes) shapes.push_back(box_of(shape.mesh));
     for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
       std::vector<FloatBox> others;
       for (uint32_t i = 0; i < shapes.size(); ++i)
         if (i != s && shapes[i].overlaps(shapes[s])) others.push_back(shapes[i]);
+      if (of == FaceOverlaps::Of::kDifferentShapes && others.empty()) continue;
       const Mesh& mesh = scene.shapes[s].mesh;
       for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
         const FaceRef face{ShapeId(s), FaceId(f)};
@@ -123,11 +125,9 @@ class OverlapFinder {
             std::none_of(others.begin(), others.end(), meets))
           continue;
         if (copies.first(face) != face || !has_area(mesh, mesh.faces[f])) continue;
-        faces_.push_back(face);
+        faces_.push_back({face, corners, normalize(normal_of(corners)), blur, most,
+                          largest_coordinate(corners)});
         boxes_.push_back(box);
-        corners_.push_back(corners);
-        reaches_.push_back({blur, most});
-        normals_.push_back(normalize(normal_of(corners)));
       }
     }
   }
@@ -149,21 +149,34 @@ class OverlapFinder {
 
  private:
   enum class Place { kElsewhere, kInPlane, kNear };
+  // With an area.
+  struct Face {
+    FaceRef ref;
+    Corners corners;
+    Vec3d normal;             // unit
+    double blur, most, size;  // most: how far what is near to it is; size: see touch_tolerance
+  };
 
-  Place place_of(uint32_t i, uint32_t j) const {
-    const Corners &a = corners_[i], &b = corners_[j];
-    const double tolerance = touch_tolerance(largest_coordinate(a), largest_coordinate(b));
-    const double reach = std::min(
-        {std::max(reaches_[i].blur, reaches_[j].blur), reaches_[i].most, reaches_[j].most});
-    const bool b_is_near = lies_in_plane(b, a[0], normals_[i], std::max(reach, tolerance));
-    const bool a_is_near = lies_in_plane(a, b[0], normals_[j], std::max(reach, tolerance));
-    if (!a_is_near && !b_is_near) return Place::kElsewhere;
+  void reserve(const Scene& scene) {
+    size_t count = 0;
+    for (const Shape& shape : scene.shapes) count += shape.mesh.faces.size();
+    faces_.reserve(count);
+    boxes_.reserve(count);
+  }
+
+  static Place place_of(const Face& a, const Face& b) {
+    const double tolerance = touch_tolerance(a.size, b.size);
+    const double reach = std::min({std::max(a.blur, b.blur), a.most, b.most});
+    const auto in_plane = [](const Face& face, const Face& other, double distance) {
+      return lies_in_plane(other.corners, face.corners[0], face.normal, distance);
+    };
+    const double near = std::max(reach, tolerance);
+    if (!in_plane(a, b, near) && !in_plane(b, a, near)) return Place::kElsewhere;
     const double most = kShortestTouch * tolerance;
-    if (lies_beside(a, normals_[i], b, most) || lies_beside(b, normals_[j], a, most))
+    if (lies_beside(a.corners, a.normal, b.corners, most) ||
+        lies_beside(b.corners, b.normal, a.corners, most))
       return Place::kElsewhere;
-    if (lies_in_plane(b, a[0], normals_[i], tolerance) &&
-        lies_in_plane(a, b[0], normals_[j], tolerance))
-      return Place::kInPlane;
+    if (in_plane(a, b, tolerance) && in_plane(b, a, tolerance)) return Place::kInPlane;
     return reach > 0 ? Place::kNear : Place::kElsewhere;
   }
 
@@ -179,10 +192,10 @@ class OverlapFinder {
         if (other == leaf) lanes &= ~((2u << i) - 1);
         for (; lanes != 0; lanes &= lanes - 1) {
           const uint32_t j = tree.leaf(other)[std::countr_zero(lanes)];
-          const Place place = place_of(own[i], j);
+          const Place place = place_of(faces_[own[i]], faces_[j]);
           if (place == Place::kElsewhere) continue;
-          pairs.push_back(
-              {{faces_[std::min(own[i], j)], faces_[std::max(own[i], j)]}, place == Place::kNear});
+          const auto [first, second] = std::minmax(own[i], j);
+          pairs.push_back({{faces_[first].ref, faces_[second].ref}, place == Place::kNear});
         }
       }
     }
@@ -194,15 +207,8 @@ class OverlapFinder {
     }
   }
 
-  std::vector<FaceRef> faces_;  // with an area, in the order of the file
-  // Theirs:
-  std::vector<FloatBox> boxes_;
-  std::vector<Corners> corners_;
-  std::vector<Vec3d> normals_;  // unit
-  struct Reach {
-    double blur, most;
-  };
-  std::vector<Reach> reaches_;
+  std::vector<Face> faces_;      // in the order of the file
+  std::vector<FloatBox> boxes_;  // theirs
   std::atomic<size_t> count_{0};
 };
 

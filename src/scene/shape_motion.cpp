@@ -4,6 +4,7 @@
 
 #include "limn/core/check.h"
 #include "src/base/text.h"
+#include "src/mesh/shading_tangents.h"
 #include "src/scene/motion.h"
 #include "src/scene/motion_lists.h"
 
@@ -28,7 +29,7 @@ class ShapeMotion : public Motion {
     Mesh& mesh = scene.shapes[shape_.index()].mesh;
     add_to_lane(mesh.position_tangents, lane, vertex_velocities(mesh, component));
     if (mesh.normal_source == NormalSource::kGiven) seed_given_normals(mesh, lane);
-    update_shading_normals(mesh);
+    update_shading_tangents(mesh);
   }
   void move(Scene& scene, double step, size_t component) const final {
     Mesh& mesh = scene.shapes[shape_.index()].mesh;

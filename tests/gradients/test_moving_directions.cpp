@@ -191,7 +191,7 @@ TEST(MovingDirections, AreAlikeForSeveralParameters) {
   constexpr int kSamples = 2000;
   const auto samples_of = [&](int count) {
     const std::vector<Parameter> parameters(count, parameter);
-    TermEstimator estimator(scene, parameters, computed, sampler, 1);
+    TermEstimator estimator(scene, parameters, terms, computed, sampler, 1);
     SamplePlan plan;
     plan.light_samples = 2;
     estimator.set_plan(plan);

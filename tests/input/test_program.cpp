@@ -6,6 +6,24 @@
 namespace limn {
 namespace {
 
+#ifdef __GLIBC__
+// Large pages are asked for by a second start, once; not where the user has other wishes.
+TEST_F(Program, StartsAnewForLargePages) {
+  const auto starts = [](const std::string& environment) {
+    const std::string said =
+        run("--version", "env -u GLIBC_TUNABLES LD_DEBUG=statistics " + environment).text;
+    const std::string once = "total startup time";
+    size_t count = 0;
+    for (size_t at = said.find(once); at != std::string::npos; at = said.find(once, at + 1))
+      ++count;
+    return count;
+  };
+  EXPECT_EQ(starts(""), 2u);
+  EXPECT_EQ(starts("GLIBC_TUNABLES= "), 1u);
+  EXPECT_EQ(starts("GLIBC_TUNABLES=glibc.malloc.hugetlb=0 "), 1u);
+}
+#endif
+
 TEST_F(Program, WarnsOnce) {
   const std::string mesh = files_.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 2\n");
   SceneParts parts;

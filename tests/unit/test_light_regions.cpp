@@ -231,6 +231,15 @@ TEST(BrightPatches, NoneInPlainSkies) {
   EXPECT_TRUE(find_bright_patches(*sky_with({{{1, 1, 0}, 1, 100}}, 512)).empty());
 }
 
+TEST(BrightPatches, AreThereWhereTheyAreFound) {
+  for (const double radiance : {0, 5, 20, 100, 1000, 100000}) {
+    const auto sky = sky_with({{{1, 1, 0}, 3, radiance}}, 256);
+    EXPECT_EQ(has_bright_patch(*sky), !find_bright_patches(*sky).empty()) << radiance;
+  }
+  EXPECT_TRUE(has_bright_patch(*sky_with({{{1, 1, 0}, 3, 1000}}, 256)));
+  EXPECT_FALSE(has_bright_patch(*make_constant_environment({1, 1, 1})));
+}
+
 // Every direction of a cap above the horizon is inside its cone, and few others.
 TEST(BrightPatches, ConesHoldTheirCaps) {
   Rng rng(33, 0, 0);

@@ -184,6 +184,31 @@ TEST(Normals, TangentsMatchDifferences) {
   }
 }
 
+// Where a mesh moves as one its derivatives are not worked out. They are what they come to where a
+// face that touches nothing moves on its own: zero, to the bit.
+TEST(Normals, StayWhereAllMovesAsOne) {
+  Mesh mesh = with_smooth_normals(cube_mesh());
+  mesh.normal_source = NormalSource::kComputed;
+  mesh.position_tangents.assign(8, {{1, 2, 3, 4}, {0.1, 0.7, 0, 0}, {-1, 0, 0, 1}});
+  update_shading_normals(mesh);
+  EXPECT_TRUE(mesh.normal_tangents.empty());
+  EXPECT_TRUE(mesh.horizon_tangents.empty());
+  for (const float x : {5, 6, 5}) {
+    mesh.positions.push_back({x, mesh.positions.size() == 10 ? 1.0f : 0.0f, 0});
+    mesh.position_tangents.push_back({{}, {}, {x, 0, 0, 0}});
+  }
+  mesh.faces.push_back({8, 9, 10});
+  weld_positions(mesh);
+  update_shading_normals(mesh);
+  ASSERT_EQ(mesh.normal_tangents.size(), 11u);
+  for (size_t n = 0; n < 8; ++n)
+    for (int k = 0; k < 3; ++k)
+      for (int lane = 0; lane < kLanes; ++lane) EXPECT_EQ(mesh.normal_tangents[n][k][lane], 0);
+  for (size_t v = 0; v < 8; ++v)
+    for (int lane = 0; lane < kLanes; ++lane) EXPECT_EQ(mesh.horizon_tangents[v][lane], 0);
+  EXPECT_NE(mesh.normal_tangents[8].x[0], 0);
+}
+
 // The cube of four vertices up and four down; all faces around a vertex tilt alike.
 Mesh moving_cube(const Vec3d (&rows)[3]) {
   Mesh mesh = transformed(with_smooth_normals(cube_mesh()), rows, 1, {});
