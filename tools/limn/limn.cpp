@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdlib>
+#include <filesystem>
 
 #include "limn/core/error.h"
 #include "limn/core/names.h"
@@ -63,8 +64,10 @@ void use_huge_pages([[maybe_unused]] char** argv) {
     if (std::string(wish) == kWish) unsetenv(kName);  // not for programs that this one starts
   } else if (getauxval(AT_SECURE) == 0) {             // else the wish would be taken away each time
     setenv(kName, kWish, 1);
-    execv("/proc/self/exe", argv);
-    unsetenv(kName);  // no such file: as it is, then
+    std::error_code none;
+    const std::string self = std::filesystem::read_symlink("/proc/self/exe", none).string();
+    execv(self.c_str(), argv);  // by its own name, which tools like pkill go by
+    unsetenv(kName);            // no such file: as it is, then
   }
 #endif
 }
