@@ -1,3 +1,4 @@
+// Bodies over a floor, and runs of the methods that look around.
 #include "support/over_floor.h"
 
 #include <fmt/format.h>
