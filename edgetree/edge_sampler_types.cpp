@@ -73,6 +73,8 @@ std::span<const EdgeSamplerType> edge_sampler_types() {
        make_forest<ForestConfig{.light_term = false}>, kAblation},
       {"forest-no-environment", "forest whose weights take the environment for uniform",
        make_forest<ForestConfig{.environment_term = false}>, kAblation},
+      {"dual-bvh", "brute that finds its candidates by a hierarchy over pairs of planes in 4D",
+       make_dual_bvh_sampler, kAblation},
       {"li2019-solid", "li2019 with the mistake of redner, whose sphere of planes is solid",
        make_li2019_solid_sampler, kAblation},
       {"quadric-box", "quadric without the pairs of quadrics",

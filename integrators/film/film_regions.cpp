@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "integrators/estimates/tiles.h"
 #include "limn/core/error.h"
@@ -42,6 +41,65 @@ void FilmRegions::check(const Film& film) {
                    "seen within it (--film rays takes every filter)");
 }
 
+namespace {
+
+// Whole pixels that may see [from, to], which may be off by rounding.
+std::pair<int, int> pixels_that_see(double from, double to, int first, int last) {
+  constexpr double kRounding = 0x1p-20;  // pixels; films are far smaller than 2^30
+  return {static_cast<int>(std::clamp<double>(std::floor(from - kRounding), first, last)),
+          static_cast<int>(std::clamp<double>(std::floor(to + kRounding) + 1, first, last))};
+}
+
+// The faces of every pixel of a tile, nearest first.
+class PixelLists {
+ public:
+  struct Entry {
+    uint32_t face;   // an index
+    double nearest;  // inverse depth that it does not exceed
+  };
+  // In the faces' order where they are equally near.
+  PixelLists(const std::vector<SeenFace>& faces, const Tile& tile)
+      : tile_(tile), first_(static_cast<size_t>(tile.y1 - tile.y0) * (tile.x1 - tile.x0) + 2, 0) {
+    std::vector<Entry> order(faces.size());
+    for (uint32_t f = 0; f < faces.size(); ++f) {
+      order[f] = {f, faces[f].nearest + faces[f].depth_error};
+      for_each_pixel(faces[f], [&](size_t pixel) { ++first_[pixel + 2]; });
+    }
+    std::sort(order.begin(), order.end(), [](const Entry& a, const Entry& b) {
+      return a.nearest != b.nearest ? a.nearest > b.nearest : a.face < b.face;
+    });
+    for (size_t i = 2; i < first_.size(); ++i) first_[i] += first_[i - 1];
+    entries_.resize(first_.back());
+    for (const Entry& entry : order) {
+      for_each_pixel(faces[entry.face],
+                     [&](size_t pixel) { entries_[first_[pixel + 1]++] = entry; });
+    }
+  }
+  std::span<const Entry> of(int x, int y) const {
+    const size_t pixel = index(x, y);
+    return std::span(entries_).subspan(first_[pixel], first_[pixel + 1] - first_[pixel]);
+  }
+
+ private:
+  size_t index(int x, int y) const {
+    return static_cast<size_t>(y - tile_.y0) * (tile_.x1 - tile_.x0) + (x - tile_.x0);
+  }
+  template <class Visit>
+  void for_each_pixel(const SeenFace& face, const Visit& visit) const {
+    const auto [x0, x1] = pixels_that_see(face.lower.x, face.upper.x, tile_.x0, tile_.x1);
+    const auto [y0, y1] = pixels_that_see(face.lower.y, face.upper.y, tile_.y0, tile_.y1);
+    for (int y = y0; y < y1; ++y) {
+      for (int x = x0; x < x1; ++x) visit(index(x, y));
+    }
+  }
+
+  const Tile& tile_;
+  std::vector<size_t> first_;  // entry of every pixel, and the end
+  std::vector<Entry> entries_;
+};
+
+}  // namespace
+
 // Which faces may be seen in which tile, and the regions of a tile.
 class FilmRegions::Builder {
  public:
@@ -62,50 +120,37 @@ class FilmRegions::Builder {
   // Empty if interrupted meanwhile.
   Tile build(size_t t, const std::atomic<bool>* interrupted) const {
     const limn::Tile& tile = tiles_[t];
-    std::vector<SeenFace> faces;
-    for (size_t i = first_binned_[t]; i < first_binned_[t + 1]; ++i) {
-      faces.push_back(*see(binned_[i]));
-    }
-    std::vector<uint32_t> order(faces.size());
-    std::iota(order.begin(), order.end(), 0);
-    // Nearest first; labels are in order.
-    std::stable_sort(order.begin(), order.end(),
-                     [&](uint32_t a, uint32_t b) { return faces[a].nearest > faces[b].nearest; });
-    const int width = tile.x1 - tile.x0, height = tile.y1 - tile.y0;
-    std::vector<std::vector<uint32_t>> of_pixel(static_cast<size_t>(width) * height);
-    for (const uint32_t f : order) {
-      const auto [x0, x1] = range(faces[f].lower.x, faces[f].upper.x, tile.x0, tile.x1);
-      const auto [y0, y1] = range(faces[f].lower.y, faces[f].upper.y, tile.y0, tile.y1);
-      for (int y = y0; y < y1; ++y) {
-        for (int x = x0; x < x1; ++x) {
-          of_pixel[static_cast<size_t>(y - tile.y0) * width + (x - tile.x0)].push_back(f);
-        }
-      }
-    }
+    const std::vector<SeenFace> faces = seen_in(t);
+    const PixelLists lists(faces, tile);
+    const bool ruled =
+        std::any_of(faces.begin(), faces.end(), [](const SeenFace& f) { return f.ruled; });
     Tile result;
     VisibleRegions regions({});
-    if (!overlaps_.empty()) regions.set_rule([&](uint32_t a, uint32_t b) { return rule(a, b); });
-    for (size_t i = 0; i < of_pixel.size(); ++i) {
-      const int x = tile.x0 + static_cast<int>(i) % width,
-                y = tile.y0 + static_cast<int>(i) / width;
-      if (interrupted && interrupted->load(std::memory_order_relaxed)) return {};
-      regions.reset({{x + 0.5, y + 0.5}, 0.5, 0.5});
-      for (const uint32_t f : of_pixel[i]) {
-        regions.insert(faces[f]);
-        if (regions.size() > kMostRegions) refuse(x, y);
+    if (ruled) regions.set_rule([&](uint32_t a, uint32_t b) { return rule(a, b); });
+    for (int y = tile.y0; y < tile.y1; ++y) {
+      for (int x = tile.x0; x < tile.x1; ++x) {
+        if (interrupted && interrupted->load(std::memory_order_relaxed)) return {};
+        regions.reset({{x + 0.5, y + 0.5}, 0.5, 0.5});
+        for (const auto& [f, nearest] : lists.of(x, y)) {
+          if (!ruled && nearest < regions.hidden_below()) break;
+          regions.insert(faces[f]);
+          if (regions.size() > kMostRegions) refuse(x, y);
+        }
+        append(regions, result);
       }
-      append(regions, result);
     }
     result.first_region.push_back(static_cast<uint32_t>(result.regions.size()));
     return result;
   }
 
  private:
-  // Whole pixels that may see [from, to], which may be off by rounding.
-  static std::pair<int, int> range(double from, double to, int first, int last) {
-    constexpr double kRounding = 0x1p-20;  // pixels; films are far smaller than 2^30
-    return {static_cast<int>(std::clamp<double>(std::floor(from - kRounding), first, last)),
-            static_cast<int>(std::clamp<double>(std::floor(to + kRounding) + 1, first, last))};
+  std::vector<SeenFace> seen_in(size_t t) const {
+    std::vector<SeenFace> faces;
+    faces.reserve(first_binned_[t + 1] - first_binned_[t]);
+    for (size_t i = first_binned_[t]; i < first_binned_[t + 1]; ++i) {
+      faces.push_back(*see(binned_[i]));
+    }
+    return faces;
   }
 
   FaceRef face_of(uint32_t label) const {
@@ -164,10 +209,10 @@ class FilmRegions::Builder {
       for (auto label = static_cast<uint32_t>(c * kChunk); label < end; ++label) {
         const auto seen = see(label);
         if (!seen || !is_met(label)) continue;
-        const auto x =
-            range(seen->lower.x, seen->upper.x, film.crop_x, film.crop_x + film.crop_width);
-        const auto y =
-            range(seen->lower.y, seen->upper.y, film.crop_y, film.crop_y + film.crop_height);
+        const auto x = pixels_that_see(seen->lower.x, seen->upper.x, film.crop_x,
+                                       film.crop_x + film.crop_width);
+        const auto y = pixels_that_see(seen->lower.y, seen->upper.y, film.crop_y,
+                                       film.crop_y + film.crop_height);
         if (x.first >= x.second || y.first >= y.second) continue;
         const auto [x0, x1] = tiles_of(x, film.crop_x);
         const auto [y0, y1] = tiles_of(y, film.crop_y);

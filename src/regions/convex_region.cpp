@@ -15,14 +15,15 @@ GridCell window_cell(std::vector<GridLine>& lines) {
   return {corners[0], corners[2], side(0), side(1), side(2), side(3)};
 }
 
-Ring GridCell::ring() const {
+void GridCell::to_ring(Ring& ring) const {
   const auto corner = [](int64_t x, int64_t y) {
     return GridCorner{static_cast<double>(x), static_cast<double>(y)};
   };
-  return {{corner(lower.x, lower.y), bottom},
-          {corner(upper.x, lower.y), right},
-          {corner(upper.x, upper.y), top},
-          {corner(lower.x, upper.y), left}};
+  ring.clear();
+  ring.push_back({corner(lower.x, lower.y), bottom});
+  ring.push_back({corner(upper.x, lower.y), right});
+  ring.push_back({corner(upper.x, upper.y), top});
+  ring.push_back({corner(lower.x, upper.y), left});
 }
 
 std::pair<GridCell, GridCell> GridCell::halves(std::vector<GridLine>& lines) const {
@@ -48,43 +49,53 @@ void find_sides(const std::vector<GridLine>& lines, const Ring& ring, LineSide b
                 RingSides& sides) {
   const GridLine line = by.in(lines);
   const SideFilter filter(line);
-  sides.of.clear();
-  sides.positive = sides.negative = false;
-  LineSide before = ring.back().side;
-  for (const RingCorner& corner : ring) {
-    int s = filter.side_of(corner.at);
-    if (s == 0) s = exact_side(line, before.in(lines), corner.side.in(lines));
-    sides.of.push_back(static_cast<int8_t>(s));
-    sides.positive = sides.positive || s > 0;
-    sides.negative = sides.negative || s < 0;
-    before = corner.side;
-  }
-}
-
-namespace {
-
-// The part on the side of sign `sign`, whose new side is `closing`.
-void take_part(const std::vector<GridLine>& lines, const Ring& ring, LineSide closing,
-               const RingSides& sides, int sign, Ring& part) {
-  part.clear();
   const size_t n = ring.size();
+  sides.of.resize(n);
+  int positive = 0, negative = 0;
   for (size_t i = 0; i < n; ++i) {
-    const int here = sides.of[i] * sign, next = sides.of[(i + 1) % n] * sign;
-    if (here <= 0 && next <= 0) continue;
-    const RingCorner& corner = ring[i];
-    const auto crossing = [&] { return meet(corner.side.in(lines), closing.in(lines)); };
-    part.push_back({here < 0 ? crossing() : corner.at, corner.side});
-    if (next < 0) part.push_back({crossing(), closing});
-    if (next == 0) part.push_back({ring[(i + 1) % n].at, closing});
+    const int s = filter.side_of(ring[i].at);
+    sides.of[i] = static_cast<int8_t>(s);
+    positive += s > 0;
+    negative += s < 0;
   }
+  if (static_cast<size_t>(positive) + negative < n) {
+    for (size_t i = 0; i < n; ++i) {
+      if (sides.of[i] != 0) continue;
+      const LineSide before = ring[i == 0 ? n - 1 : i - 1].side;
+      const int s = exact_side(line, before.in(lines), ring[i].side.in(lines));
+      sides.of[i] = static_cast<int8_t>(s);
+      positive += s > 0;
+      negative += s < 0;
+    }
+  }
+  sides.positive = positive > 0;
+  sides.negative = negative > 0;
 }
-
-}  // namespace
 
 void cut_ring(const std::vector<GridLine>& lines, const Ring& ring, LineSide by,
               const RingSides& sides, Ring& inside, Ring& outside) {
-  take_part(lines, ring, by, sides, 1, inside);
-  take_part(lines, ring, by.other(), sides, -1, outside);
+  inside.clear();
+  outside.clear();
+  const GridLine line = by.in(lines);
+  const size_t n = ring.size();
+  for (size_t i = 0; i < n; ++i) {
+    const RingCorner& corner = ring[i];
+    const RingCorner& after = ring[i + 1 < n ? i + 1 : 0];
+    const int here = sides.of[i], next = sides.of[i + 1 < n ? i + 1 : 0];
+    if (here * next < 0) {
+      // The part before the crossing ends there, with a new side; the other one begins there.
+      const GridCorner crossing = meet(corner.side.in(lines), line);
+      Ring& ends = here > 0 ? inside : outside;
+      Ring& begins = here > 0 ? outside : inside;
+      ends.push_back(corner);
+      ends.push_back({crossing, here > 0 ? by : by.other()});
+      begins.push_back({crossing, corner.side});
+    } else if (here != 0 || next != 0) {
+      Ring& part = here + next > 0 ? inside : outside;
+      part.push_back(corner);
+      if (next == 0) part.push_back({after.at, here > 0 ? by : by.other()});
+    }
+  }
 }
 
 }  // namespace limn

@@ -36,7 +36,7 @@ using Ring = std::vector<RingCorner>;
 struct GridCell {
   GridPoint lower, upper;
   LineSide bottom, right, top, left;
-  Ring ring() const;
+  void to_ring(Ring& ring) const;
   // Cut in the middle, across its longer side, by a line that is appended.
   std::pair<GridCell, GridCell> halves(std::vector<GridLine>& lines) const;
 };

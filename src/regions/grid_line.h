@@ -19,6 +19,7 @@ struct GridPoint {
 struct GridLine {
   int64_t a, b, c;
   GridLine flipped() const { return {-a, -b, -c}; }
+  bool operator==(const GridLine&) const = default;
 };
 
 // What lies to the left of the way from p to q, two different points.
@@ -46,14 +47,20 @@ int exact_side(const GridLine& line, const GridLine& l, const GridLine& m);
 // roundings, c one, each product and each sum another: at most seven of 2^-53 on each summand.
 class SideFilter {
  public:
+  SideFilter() = default;
   explicit SideFilter(const GridLine& line)
       : a_(static_cast<double>(line.a)),
         b_(static_cast<double>(line.b)),
         c_(static_cast<double>(line.c)) {}
+  // Without a branch: corners at random would make it wrong every other time.
   int side_of(const GridCorner& corner) const {
     const double ax = a_ * corner.x, by = b_ * corner.y, value = ax + by + c_;
     const double error = 0x1.0p-50 * (std::fabs(ax) + std::fabs(by) + std::fabs(c_));
-    return value > error ? 1 : value < -error ? -1 : 0;
+    return static_cast<int>(value > error) - static_cast<int>(value < -error);
+  }
+  // The corner of a box that lies farthest from the positive side.
+  GridCorner rearmost(const GridCorner& lower, const GridCorner& upper) const {
+    return {a_ > 0 ? lower.x : upper.x, b_ > 0 ? lower.y : upper.y};
   }
 
  private:

@@ -16,7 +16,7 @@ bool in_band(const PlanePoint& p) {
 }
 
 GridPoint rounded(const PlanePoint& p) {
-  const auto whole = [](double x) { return std::llround(std::clamp(x, -kGridBand, kGridBand)); };
+  const auto whole = [](double x) { return std::llrint(std::clamp(x, -kGridBand, kGridBand)); };
   return {whole(p.x), whole(p.y)};
 }
 
@@ -63,20 +63,6 @@ HalfPlane left_of(const PlanePoint& from, bool from_corner, const PlanePoint& to
   return {reach, line_through(p, q)};
 }
 
-}  // namespace
-
-int orientation_on_grid(const SeenFace& face, const WindowGrid& grid) {
-  GridPoint corners[3];
-  for (int k = 0; k < 3; ++k) {
-    const SeenFace::Side& side = face.sides[k];
-    const PlanePoint p = grid.to_grid(side.reversed ? side.to : side.from);
-    if (!in_band(p)) return face.counter_clockwise ? 1 : -1;
-    corners[k] = rounded(p);
-  }
-  const int64_t area = twice_area(corners[0], corners[1], corners[2]);
-  return area > 0 ? 1 : area < 0 ? -1 : 0;
-}
-
 HalfPlane half_plane_of(const SeenFace::Side& side, bool counter_clockwise,
                         const WindowGrid& grid) {
   HalfPlane h =
@@ -84,6 +70,58 @@ HalfPlane half_plane_of(const SeenFace::Side& side, bool counter_clockwise,
   // Both ends in one place: the two other sides meet there, and hold the face.
   if (h.reach == Reach::kCuts && h.line.a == 0 && h.line.b == 0) return {Reach::kHoldsAll, {}};
   return flipped_if(side.reversed == counter_clockwise, h);
+}
+
+// How a line through two points of the grid meets the window.
+Reach reach_of(const GridLine& line) {
+  const int64_t most = (std::abs(line.a) + std::abs(line.b)) << 29;  // without c, in the window
+  if (line.c >= most) return Reach::kHoldsAll;
+  return line.c <= -most ? Reach::kHoldsNone : Reach::kCuts;
+}
+
+bool add(const HalfPlane& h, int number, FaceLines& lines) {
+  if (h.reach == Reach::kCuts) {
+    lines.numbers[lines.count] = static_cast<int8_t>(number);
+    lines.lines[lines.count++] = h.line;
+  }
+  return h.reach != Reach::kHoldsNone;
+}
+
+// The same as side by side, of a face with all corners in the band: all in whole numbers.
+bool add_sides(const SeenFace& face, const GridPoint (&corners)[3], FaceLines& lines) {
+  const int64_t area = twice_area(corners[0], corners[1], corners[2]);
+  if (area == 0) return false;
+  for (int k = 0; k < 3; ++k) {
+    const GridPoint &p = corners[k], &q = corners[(k + 1) % 3];
+    const GridLine line = area > 0 ? line_through(p, q) : line_through(q, p);
+    if (!add({reach_of(line), line}, face.sides[k].number, lines)) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+bool lines_of(const SeenFace& face, const WindowGrid& grid, FaceLines& lines) {
+  GridPoint corners[3];
+  bool on_grid = face.whole;
+  for (int k = 0; k < 3 && on_grid; ++k) {
+    const SeenFace::Side& side = face.sides[k];
+    const PlanePoint p = grid.to_grid(side.reversed ? side.to : side.from);
+    on_grid = in_band(p);
+    if (on_grid) corners[k] = rounded(p);
+  }
+  if (on_grid) {
+    if (!add_sides(face, corners, lines)) return false;
+  } else {
+    for (int k = 0; k < face.side_count; ++k) {
+      const SeenFace::Side& side = face.sides[k];
+      if (!add(half_plane_of(side, face.counter_clockwise, grid), side.number, lines)) return false;
+    }
+  }
+  for (int k = 0; k < face.cut_count; ++k) {
+    if (!add(half_plane_of(grid.to_grid(face.cuts[k])), -1 - k, lines)) return false;
+  }
+  return true;
 }
 
 HalfPlane half_plane_of(const PlaneFunction& f) {

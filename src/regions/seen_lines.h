@@ -41,12 +41,15 @@ struct HalfPlane {
   GridLine line;  // if it cuts
 };
 
-// Which way the face's corners go round, as its corners on the grid say, if all are within the
-// band: 1, -1, or 0 if it has no area there.
-int orientation_on_grid(const SeenFace& face, const WindowGrid& grid);
+// The lines of a face that cut the window.
+struct FaceLines {
+  GridLine lines[6];  // the face lies on their positive side
+  int8_t numbers[6];  // the side that it is, SeenFace::Side::number; of a cut -1 minus its index
+  int count = 0;
+};
+// False if the face does not reach into the window, or has no area on its grid.
+bool lines_of(const SeenFace& face, const WindowGrid& grid, FaceLines& lines);
 
-// What is on the face's side of one of its sides.
-HalfPlane half_plane_of(const SeenFace::Side& side, bool counter_clockwise, const WindowGrid& grid);
 // Where a function on the grid is not negative. Its negative gives the same line, flipped.
 HalfPlane half_plane_of(const PlaneFunction& f);
 

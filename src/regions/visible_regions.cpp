@@ -28,7 +28,8 @@ struct Inserted {
   double nearest;
   bool ruled;
   LineSide lines[6];
-  int8_t numbers[6] = {};  // of its side that a line is; of a cut -1 minus its index
+  SideFilter filters[6];   // of the lines
+  int8_t numbers[6] = {};  // FaceLines::numbers
   int line_count = 0;
 };
 
@@ -43,6 +44,8 @@ struct Box {
     extend(b.x1, b.y1);
   }
   bool meets(const Box& b) const { return x0 <= b.x1 && b.x0 <= x1 && y0 <= b.y1 && b.y0 <= y1; }
+  GridCorner lower() const { return {x0, y0}; }
+  GridCorner upper() const { return {x1, y1}; }
 };
 
 // A region is a leaf.
@@ -72,12 +75,12 @@ class VisibleRegions::Tree {
     faces_.clear();
     crossings_.clear();
     free_.clear();
-    for (int i = static_cast<int>(nodes_.size()) - 1; i >= 0; --i) free_.push_back(i);
+    used_ = 0;
     leaves_ = 0;
     int levels = 0;
     while (levels < kMostLevels && (kFacesOfCell << levels) < faces) ++levels;
     const GridCell window = window_cell(lines_);
-    window_ = window.ring();
+    window.to_ring(window_);
     root_ = make_cells(window, levels);
   }
 
@@ -102,10 +105,11 @@ class VisibleRegions::Tree {
 
   void set_rule(Rule rule) { rule_ = std::move(rule); }
   size_t size() const { return leaves_; }
+  double hidden_below() const { return nodes_[root_].least; }
   size_t crossings() const { return crossings_.size(); }
 
   void for_each(const std::function<void(uint32_t, std::span<const PlanePoint>)>& visit) const {
-    std::vector<PlanePoint> corners;
+    std::vector<PlanePoint>& corners = corners_;
     for_each_leaf([&](const Node& node) {
       corners.clear();
       for (const RingCorner& corner : node.ring) corners.push_back(grid_.to_plane(corner.at));
@@ -142,7 +146,8 @@ class VisibleRegions::Tree {
   // From left to right.
   template <class Visit>
   void for_each_leaf(const Visit& visit) const {
-    std::vector<int> stack{root_};
+    std::vector<int>& stack = stack_;
+    stack.assign(1, root_);
     while (!stack.empty()) {
       const Node& node = nodes_[stack.back()];
       stack.pop_back();
@@ -161,17 +166,18 @@ class VisibleRegions::Tree {
       return join(left, make_cells(high, levels - 1));
     }
     const int leaf = new_leaf(kNone);
-    nodes_[leaf].ring = cell.ring();
+    cell.to_ring(nodes_[leaf].ring);
     measure(leaf);
     return leaf;
   }
   int new_leaf(int face) {
-    if (free_.empty()) {
-      free_.push_back(static_cast<int>(nodes_.size()));
+    int node = static_cast<int>(used_);
+    if (!free_.empty()) {
+      node = free_.back();
+      free_.pop_back();
+    } else if (++used_ > nodes_.size()) {
       nodes_.emplace_back();
     }
-    const int node = free_.back();
-    free_.pop_back();
     nodes_[node].left = nodes_[node].right = kNone;
     nodes_[node].face = face;
     ++leaves_;
@@ -220,32 +226,24 @@ class VisibleRegions::Tree {
     if (!box_.meets({-kGridHalf - 1, -kGridHalf - 1, kGridHalf + 1, kGridHalf + 1})) return false;
     // Corners are rounded to the grid.
     box_ = {lower.x - 2, lower.y - 2, upper.x + 2, upper.y + 2};
-    int turn = seen.counter_clockwise ? 1 : -1;
-    if (seen.whole) turn = orientation_on_grid(seen, grid_);
-    if (turn == 0) return false;
-    Inserted face{seen.label,
-                  grid_.to_grid(seen.inverse_depth),
-                  seen.depth_error,
-                  seen.nearest,
-                  seen.ruled,
-                  {},
-                  {},
-                  0};
-    const auto add = [&](const HalfPlane& h, int number) {
-      if (h.reach == Reach::kCuts) {
-        face.numbers[face.line_count] = static_cast<int8_t>(number);
-        face.lines[face.line_count++] = LineSide(lines_.size(), false);
-        lines_.push_back(h.line);
-      }
-      return h.reach != Reach::kHoldsNone;
-    };
-    for (int k = 0; k < seen.side_count; ++k) {
-      if (!add(half_plane_of(seen.sides[k], turn > 0, grid_), seen.sides[k].number)) return false;
+    FaceLines lines;
+    if (!lines_of(seen, grid_, lines)) return false;
+    faces_.push_back({seen.label,
+                      grid_.to_grid(seen.inverse_depth),
+                      seen.depth_error,
+                      seen.nearest,
+                      seen.ruled,
+                      {},
+                      {},
+                      {},
+                      lines.count});
+    Inserted& face = faces_.back();
+    for (int k = 0; k < lines.count; ++k) {
+      face.numbers[k] = lines.numbers[k];
+      face.filters[k] = SideFilter(lines.lines[k]);
+      face.lines[k] = LineSide(lines_.size(), false);
+      lines_.push_back(lines.lines[k]);
     }
-    for (int k = 0; k < seen.cut_count; ++k) {
-      if (!add(half_plane_of(grid_.to_grid(seen.cuts[k])), -1 - k)) return false;
-    }
-    faces_.push_back(face);
     return true;
   }
 
@@ -258,12 +256,25 @@ class VisibleRegions::Tree {
       return index;
     }
     if (node.is_leaf()) return insert_in_leaf(index);
+    const size_t gained_before = gained_;
     const int left = insert_at(node.left);
     const int right = insert_at(nodes_[index].right);
+    if (gained_ == gained_before) return index;
     nodes_[index].left = left;
     nodes_[index].right = right;
     measure(index);
     return index;
+  }
+
+  // Whether two faces lie on either side of one line, as neighbours of a mesh do.
+  bool are_beside(const Inserted& f, const Inserted& g) const {
+    for (int i = 0; i < f.line_count; ++i) {
+      const GridLine line = f.lines[i].other().in(lines_);
+      for (int j = 0; j < g.line_count; ++j) {
+        if (line == g.lines[j].in(lines_)) return true;
+      }
+    }
+    return false;
   }
 
   // Depths at the corners of a ring: the new face's minus those of another.
@@ -293,6 +304,7 @@ class VisibleRegions::Tree {
   int insert_in_leaf(int index) {
     const int face = static_cast<int>(faces_.size()) - 1;
     const int other = nodes_[index].face;
+    if (other != kNone && are_beside(faces_[face], faces_[other])) return index;
     const std::optional<bool> wins = rule_for(face, other);
     if (wins && !*wins) {
       lost_ = true;
@@ -306,7 +318,7 @@ class VisibleRegions::Tree {
       }
     }
     size_t pieces = 0;
-    if (!cut_by_face(nodes_[index].ring, pieces)) return index;
+    if (!cut_by_face(nodes_[index], pieces)) return index;
     if (other != kNone && !wins) {
       const Depths depths = compare(ring_, other);
       const bool nearer = depths.most > depths.rounding, farther = depths.least < -depths.rounding;
@@ -332,13 +344,20 @@ class VisibleRegions::Tree {
 
   // Cuts by the lines of the new face: what is inside goes to ring_, what is outside to the first
   // `pieces` of pieces_. False if nothing is inside.
-  bool cut_by_face(const Ring& ring, size_t& pieces) {
+  bool cut_by_face(const Node& leaf, size_t& pieces) {
     const Inserted& face = faces_.back();
     for (int k = 0; k < face.line_count; ++k) {
-      find_sides(lines_, ring, face.lines[k], sides_of_line_[k]);
-      if (!sides_of_line_[k].positive) return false;
+      const SideFilter& filter = face.filters[k];
+      RingSides& sides = sides_of_line_[k];
+      if (filter.side_of(filter.rearmost(leaf.box.lower(), leaf.box.upper())) > 0) {
+        sides.positive = true;
+        sides.negative = false;
+        continue;
+      }
+      find_sides(lines_, leaf.ring, face.lines[k], sides);
+      if (!sides.positive) return false;
     }
-    ring_ = ring;
+    ring_ = leaf.ring;
     for (int k = 0; k < face.line_count; ++k) {
       RingSides& sides = sides_of_line_[k];
       if (!sides.negative) continue;
@@ -473,7 +492,8 @@ class VisibleRegions::Tree {
   std::vector<Crossing> crossings_;
   Rule rule_;
   std::vector<Node> nodes_;
-  std::vector<int> free_;  // nodes
+  size_t used_ = 0;        // the first of them, but for
+  std::vector<int> free_;  // these
   int root_ = kNone;
   size_t leaves_ = 0;
   // Of the insertion in progress, which is that of the last face.
@@ -484,6 +504,9 @@ class VisibleRegions::Tree {
   Ring ring_, inside_;
   std::vector<Ring> pieces_;
   std::vector<int> built_;
+  // Of a visit.
+  mutable std::vector<PlanePoint> corners_;
+  mutable std::vector<int> stack_;
 };
 
 VisibleRegions::VisibleRegions(const PlaneWindow& window, size_t faces)
@@ -495,6 +518,7 @@ void VisibleRegions::reset(const PlaneWindow& window, size_t faces) { tree_->res
 void VisibleRegions::set_rule(Rule rule) { tree_->set_rule(std::move(rule)); }
 void VisibleRegions::insert(const SeenFace& face) { tree_->insert(face); }
 size_t VisibleRegions::size() const { return tree_->size(); }
+double VisibleRegions::hidden_below() const { return tree_->hidden_below(); }
 size_t VisibleRegions::crossings() const { return tree_->crossings(); }
 void VisibleRegions::for_each_below(uint32_t labels, const SideVisitor& visit) const {
   tree_->for_each_below(labels, visit);

@@ -258,6 +258,7 @@ TEST(RejectionTree, ForestsAndLiHaveOneOthersDoNot) {
   for (const EdgeSamplerType& type : rejecting_samplers()) names.push_back(type.name);
   EXPECT_NE(std::find(names.begin(), names.end(), "forest"), names.end());
   EXPECT_NE(std::find(names.begin(), names.end(), "li2019"), names.end());
+  EXPECT_NE(std::find(names.begin(), names.end(), "dual-bvh"), names.end());
   EXPECT_EQ(std::find(names.begin(), names.end(), "brute"), names.end());
 }
 

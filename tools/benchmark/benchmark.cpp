@@ -4,12 +4,16 @@
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <ctime>
 #include <vector>
 
+#include "integrators/film/film_regions.h"
 #include "limn/core/lights.h"
 #include "limn/core/ray_tracer.h"
 #include "limn/core/shading.h"
+#include "limn/core/visible_regions.h"
 #include "limn/integrators/methods.h"
 #include "limn/integrators/render.h"
 
@@ -213,17 +217,95 @@ void add_gradient_benchmarks(const Bench& bench, const std::string& parameter) {
   }
 }
 
-Scene read_at_fixed_size(const std::string& file) {
+Scene read_at_size(const std::string& file, const std::string& size) {
   std::vector<std::string> warnings;
   try {
-    return read_scene(file, {{"width", "128"}, {"height", "128"}}, &warnings);
+    return read_scene(file, {{"width", size}, {"height", size}}, &warnings);
   } catch (const InputError&) {  // a scene without these two names
     return read_scene(file, {}, &warnings);
   }
 }
 
+// The visible regions of the scene's film at 256 x 256, and in turn paths of two bounces at most.
+// of_paths: their time over that of one such path a pixel.
+void add_film_benchmark(const std::string& file) {
+  benchmark::RegisterBenchmark(
+      "regions/film",
+      [file](benchmark::State& state) {
+        Scene scene = read_at_size(file, "256");
+        scene.film.filter = {Filter::Kind::kBox, 0.5};
+        scene.max_depth = 2;
+        constexpr int kSamples = 8;
+        double regions = 0, places = 0, paths = 0;
+        for (auto _ : state) {
+          const ProcessorTime before;
+          benchmark::DoNotOptimize(FacesInPlace(scene, 1).overlaps.empty());
+          places += before.seconds();
+          const ProcessorTime film;
+          benchmark::DoNotOptimize(FilmRegions(scene, 1).size());
+          state.SetIterationTime(film.seconds());
+          regions += film.seconds();
+          const ProcessorTime one;
+          render(scene, one_thread(1));
+          const double set_up = one.seconds();
+          const ProcessorTime more;
+          render(scene, one_thread(1 + kSamples));
+          paths += (more.seconds() - set_up) / kSamples;
+        }
+        // Faces in one place are found for every tracer, and shared with it.
+        state.counters["of_paths"] = (regions - places) / paths;
+      })
+      ->Unit(benchmark::kMillisecond)
+      ->UseManualTime();
+}
+
+// A sphere with bumps that fills a window.
+void insert_bumpy_sphere(int around, VisibleRegions& regions) {
+  const PlaneView view({0, 0, 4}, {0.25, 0, 0}, {0, 0.25, 0}, {0, 0, -1}, 0.1, 100);
+  const auto corner = [&](int i, int j) {
+    const double phi = 2 * kPi * i / around, theta = 2 * kPi * j / around;
+    const double r = 1 + 0.05 * std::sin(20 * phi) * std::sin(20 * theta);
+    return Vec3d{std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi),
+                 std::cos(theta)} *
+           r;
+  };
+  std::vector<SeenFace> faces;
+  for (int i = 0; i < around; ++i) {
+    for (int j = 0; j < around / 2; ++j) {
+      const Vec3d a = corner(i, j), b = corner(i + 1, j), c = corner(i + 1, j + 1),
+                  d = corner(i, j + 1);
+      for (const std::array<Vec3d, 3>& face : {std::array{a, b, c}, std::array{a, c, d}}) {
+        const auto seen = view.face(static_cast<uint32_t>(faces.size()), face);
+        if (seen) faces.push_back(*seen);
+      }
+    }
+  }
+  std::sort(faces.begin(), faces.end(),
+            [](const SeenFace& a, const SeenFace& b) { return a.nearest > b.nearest; });
+  for (const SeenFace& face : faces) regions.insert(face);
+}
+
+// A whole mesh in one window: how the time grows with its faces.
+void add_window_benchmarks() {
+  for (const int around : {100, 316, 1000}) {
+    benchmark::RegisterBenchmark(
+        fmt::format("regions/window/{}", around * around).c_str(),
+        [around](benchmark::State& state) {
+          for (auto _ : state) {
+            const ProcessorTime time;
+            VisibleRegions regions({}, static_cast<size_t>(around) * around);
+            insert_bumpy_sphere(around, regions);
+            state.SetIterationTime(time.seconds());
+            state.counters["us_per_face"] = 1e6 * time.seconds() / (around * around);
+          }
+        })
+        ->Unit(benchmark::kMillisecond)
+        ->UseManualTime();
+  }
+}
+
 int run(const std::string& file) {
-  Bench bench{read_at_fixed_size(file), nullptr, {}};
+  Bench bench{read_at_size(file, "128"), nullptr, {}};
   bench.tracer = make_embree_tracer(bench.scene, 1);
   bench.tape = record_rays(bench.scene, *bench.tracer, 4);
   const std::string parameter = bench.scene.shapes.empty() || bench.scene.shapes.front().id.empty()
@@ -232,6 +314,8 @@ int run(const std::string& file) {
   add_ray_benchmarks(bench);
   add_render_benchmark(bench);
   add_gradient_benchmarks(bench, parameter);
+  add_film_benchmark(file);
+  add_window_benchmarks();
   benchmark::AddCustomContext("scene", file);
   benchmark::AddCustomContext("parameter", parameter);
   benchmark::RunSpecifiedBenchmarks();

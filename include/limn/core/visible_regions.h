@@ -105,6 +105,9 @@ class VisibleRegions {
   void insert(const SeenFace& face);
 
   size_t size() const;
+  // The inverse depth below which nothing is seen any more: faces whose `nearest` and `depth_error`
+  // sum to less change nothing, unless they are ruled.
+  double hidden_below() const;
   // Lines along which faces were found to cross.
   size_t crossings() const;
   // visit(label, corners): for every region, in an order that depends on nothing but the

@@ -1,0 +1,37 @@
+#pragma once
+// Samplers that list all of E(p), weigh each edge by a bound of its contribution (see
+// contribution_bound.h) and draw in proportion. They differ in how they find E(p).
+#include <cstdint>
+#include <vector>
+
+#include "limn/edgetree/contribution_bound.h"
+#include "limn/edgetree/edge_sampler.h"
+
+namespace limn {
+
+class ListingSampler : public EdgeSampler {
+ public:
+  std::optional<EdgeSample> sample(const EdgeQuery& query, Rng& rng) const final;
+  double probability(const EdgeQuery& query, EdgeRef id) const final;
+  double pdf_t(const EdgeQuery& query, EdgeRef id, double t) const final;
+
+ protected:
+  explicit ListingSampler(const EdgeSamplerInput& input);
+
+  // Writes the edges of an object that are in E(p), each once, in an order that depends on the
+  // object and p alone. `found` is empty before. Thread-safe.
+  virtual void find_candidates(ShapeId object, const Vec3d& p,
+                               std::vector<uint32_t>& found) const = 0;
+
+  const EdgeSamplerInput& input_;
+
+ private:
+  struct Listing;
+  const Listing& list(const EdgeQuery& query) const;
+  void list_object(ShapeId object, const EdgeQuery& query, Listing& listing) const;
+  EdgeBound bound_of(const EdgeQuery& query, EdgeRef id) const;
+
+  uint64_t serial_;
+};
+
+}  // namespace limn
