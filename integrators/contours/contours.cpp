@@ -54,6 +54,11 @@ ContourPoint Contours::at(const SurfacePoint<double>& surface, const Vec3d& up) 
   return {surface.p - plane.n * plane.distance(surface.p), up, surface.face};
 }
 
+double Contours::rounding(const ContourPoint& at, ShapeId shape) const {
+  return distance_error(input_.object(at.face.shape), at.p) +
+         distance_error(input_.object(shape), at.p);
+}
+
 int Contours::sign(FaceRef face, const ContourPoint& at) const {
   if (face == at.face) return 0;
   const EdgeMesh& mesh = input_.object(face.shape);

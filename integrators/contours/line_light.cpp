@@ -262,8 +262,8 @@ LineLight::LineLight(const Scene& scene, const RayTracer& tracer, int threads,
     : scene_(scene), contours_(scene, tracer, threads), options_(options), sky_(std::move(sky)) {
   if (!direct) return;
   check(scene, options_.method);
-  for (const Shape& shape : scene.shapes) {
-    if (shape.is_emitter) add_lamp(shape);
+  for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+    if (scene.shapes[s].is_emitter) add_lamp(ShapeId(s));
   }
   if (has_lamps()) check_overlaps(threads);
   if (!sky_ || !sky_->grid()) return;
@@ -275,15 +275,20 @@ LineLight::LineLight(const Scene& scene, const RayTracer& tracer, int threads,
   }
 }
 
-void LineLight::add_lamp(const Shape& shape) {
+void LineLight::add_lamp(ShapeId id) {
+  const Shape& shape = scene_.shape(id);
   const LampHull whole = make_lamp_hull(shape.mesh, scene_.shading);
+  std::vector<FaceRef> faces;
   double area = 0;
   for (uint32_t f = 0; f < shape.mesh.faces.size(); ++f) {
     const auto c = face_corners<double>(shape.mesh, FaceId(f));
+    faces.push_back({id, FaceId(f)});
     area += 0.5 * length(cross(c[1] - c[0], c[2] - c[0]));
   }
   // A polygon without holes or bays, to rounding of its corners to floats. Not tuned.
-  if (whole.flat && area > whole.area * (1 - 1e-5)) return add_polygon(whole, shape);
+  if (whole.flat && area > whole.area * (1 - 1e-5)) {
+    return add_polygon(whole, id, std::move(faces));
+  }
   if (shape.mesh.faces.size() > kMostFaces) {
     refuse_light(options_.method, shape.where,
                  fmt::format("{}: this lamp is no flat convex polygon of at most {} corners, so it "
@@ -292,18 +297,19 @@ void LineLight::add_lamp(const Shape& shape) {
                              shape_in_text(shape), DirectionCone::kMostPlanes,
                              shape.mesh.faces.size(), kMostFaces));
   }
-  for (const FaceIndices& face : shape.mesh.faces) {
+  for (const FaceRef ref : faces) {
+    const FaceIndices& face = shape.mesh.face(ref.face);
     if (!has_area(shape.mesh, face)) continue;
     Mesh one;
     for (const uint32_t vertex : face) one.positions.push_back(shape.mesh.positions[vertex]);
     one.faces = {{0, 1, 2}};
     one.weld = {0, 1, 2};
     const LampHull hull = make_lamp_hull(one, scene_.shading);
-    if (hull.flat) add_polygon(hull, shape);
+    if (hull.flat) add_polygon(hull, id, {ref});
   }
 }
 
-void LineLight::add_polygon(const LampHull& hull, const Shape& shape) {
+void LineLight::add_polygon(const LampHull& hull, ShapeId id, std::vector<FaceRef> faces) {
   double size = 0;
   for (const Vec3d& x : hull.points) {
     size = std::max({size, std::fabs(x.x), std::fabs(x.y), std::fabs(x.z)});
@@ -311,8 +317,8 @@ void LineLight::add_polygon(const LampHull& hull, const Shape& shape) {
   // What is nearer than rounding of positions to floats lies in the lamp's plane, wherever the
   // scene lies: at 1e4 from the origin that is 5e-3. Not tuned.
   const double margin = 2 * hull.deviation + 0x1p-21 * size;
-  lamps_.push_back(
-      {value(shape.radiance), hull, contours_.make_screen(hull.plane, margin, hull.points)});
+  lamps_.push_back({value(scene_.shape(id).radiance), hull,
+                    contours_.make_screen(hull.plane, margin, hull.points), std::move(faces)});
 }
 
 // Over the contours in scratch(), along lines of the pencil as far as they are before all planes:
@@ -469,7 +475,17 @@ Rgb<double> LineLight::map_light(const Receiver& receiver, double offset) const 
 Rgb<double> LineLight::lamp_light(const Lamp& lamp, const Receiver& receiver, double offset) const {
   Scratch& own = scratch();
   const ContourPoint& at = receiver.at;
-  if (!(lamp.hull.plane.distance(at.p) > 0)) return {};
+  // What lies in the lamp's own plane, as its back does, gets nothing of it, however it is rounded;
+  // nor does a point above whose horizon no more than rounding of the lamp is seen.
+  const double rounding = contours_.rounding(at, lamp.faces[0].shape);
+  if (!(lamp.hull.plane.distance(at.p) > rounding)) return {};
+  if (std::none_of(lamp.hull.points.begin(), lamp.hull.points.end(),
+                   [&](const Vec3d& x) { return dot(at.up, x - at.p) > rounding; })) {
+    return {};
+  }
+  for (const FaceRef face : lamp.faces) {
+    if (contours_.in_one_place(face, at.face)) return {};
+  }
   const auto cone = cone_around(lamp.hull, at.p, at.up);
   if (!cone) return {};
   own.polygon.clear();

@@ -75,6 +75,7 @@ class LineLight {
     Rgb<double> radiance;
     LampHull hull;  // flat
     ContourScreen screen;
+    std::vector<FaceRef> faces;
   };
   struct Receiver;
   Receiver receiver_at(const SurfacePoint<double>& surface,
@@ -85,8 +86,8 @@ class LineLight {
   // All contours into scratch(), counted.
   void list(const ContourPoint& at, const DirectionCone& cone, const ContourScreen* screen) const;
   void check_overlaps(int threads) const;
-  void add_lamp(const Shape& shape);
-  void add_polygon(const LampHull& hull, const Shape& shape);
+  void add_lamp(ShapeId id);
+  void add_polygon(const LampHull& hull, ShapeId id, std::vector<FaceRef> faces);
   Rgb<double> lamp_light(const Lamp& lamp, const Receiver& receiver, double offset) const;
   Rgb<double> sky_light(const Receiver& receiver, double offset) const;
   Rgb<double> map_light(const Receiver& receiver, double offset) const;

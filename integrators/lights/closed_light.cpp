@@ -109,15 +109,16 @@ struct ClosedLight::Scratch {
   }
 };
 
+bool ClosedLight::in_one_place(FaceRef a, FaceRef b) const {
+  return a == b || (!(copies_.empty() && overlaps_.empty()) && overlaps_.contains(a, b));
+}
+
 bool ClosedLight::is_skipped(FaceRef face, const Receiver& receiver) const {
-  if (face == receiver.face) return true;
-  const bool alone = copies_.empty() && overlaps_.empty();
-  if (!alone && overlaps_.contains(receiver.face, face)) return true;
+  if (in_one_place(receiver.face, face)) return true;
   if (!receiver.edge) return false;
   const auto& around = receiver.edge->around.faces;
-  return std::any_of(around.begin(), around.end(), [&](FaceRef other) {
-    return face == other || (!alone && overlaps_.contains(other, face));
-  });
+  return std::any_of(around.begin(), around.end(),
+                     [&](FaceRef other) { return in_one_place(other, face); });
 }
 
 // Lists the faces that may shade the lamp, after its own; false if it cannot be seen.
@@ -125,6 +126,9 @@ bool ClosedLight::list(const LampPlane& lamp, const Receiver& receiver, Scratch&
   const Vec3d &p = receiver.p, a = -lamp.plane.n;
   const double height = lamp.plane.distance(p);
   if (!(height > 0)) return false;
+  // What lies in the lamp's own plane, as its back does, gets nothing of it, however it is rounded.
+  const auto holds = [&](FaceRef face) { return in_one_place(receiver.face, face); };
+  if (std::any_of(lamp.faces.begin(), lamp.faces.end(), holds)) return false;
   const bool above = std::any_of(lamp.hull.begin(), lamp.hull.end(),
                                  [&](const Vec3d& x) { return dot(receiver.up, x - p) > 0; });
   if (!above) return false;

@@ -64,6 +64,7 @@ class ClosedLight {
 
   void add_lamp(ShapeId shape);
   void finish(LampPlane& lamp) const;
+  bool in_one_place(FaceRef a, FaceRef b) const;
   bool is_skipped(FaceRef face, const Receiver& receiver) const;
   bool list(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;
   void find_regions(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;

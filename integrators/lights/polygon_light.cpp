@@ -122,6 +122,7 @@ double squared_sine(const Vec3d& n, const Vec3d& w) { return length_squared(cros
 
 double ramp_integral(std::span<const PolygonSide<double>> sides, const Vec3d& n, double h) {
   if (h == 0) return cosine_integral(sides, n);
+  if (h >= 1) return 0;
   const Ramp ramp(h);
   double sum = 0;
   for_every_side_point(
@@ -147,6 +148,7 @@ Vec3d turned_back(const detail::Arc& arc, const Vec3d& n, const Vec3d& w) {
 Dual ramp_integral(std::span<const PolygonSide<Dual>> sides, const Vec3<Dual>& normal,
                    const Dual& h) {
   if (h.v == 0) return cosine_integral(sides, normal);  // the derivative by h is 0 there
+  if (h.v >= 1) return {};
   const Ramp ramp(h.v);
   const Vec3d n = value(normal);
   const Vec3<Lanes> dn{normal.x.d, normal.y.d, normal.z.d};
@@ -171,6 +173,7 @@ Dual ramp_integral(std::span<const PolygonSide<Dual>> sides, const Vec3<Dual>& n
 // One statement of the tape.
 Var ramp_integral(std::span<const PolygonSide<Var>> sides, const Vec3<Var>& normal, const Var& h) {
   if (h.v == 0) return cosine_integral(sides, normal);  // the derivative by h is 0 there
+  if (h.v >= 1) return {};
   const Ramp ramp(h.v);
   const Vec3d n = value(normal);
   Tape& tape = *Tape::current();

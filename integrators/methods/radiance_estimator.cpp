@@ -24,6 +24,15 @@ RadianceEstimator::RadianceEstimator(const Scene& scene, int threads,
       visible_(std::move(visible)),
       even_(even) {}
 
+RadianceEstimator::RadianceEstimator(const Scene& moved, const Choices& choices, int threads)
+    : scene_(moved),
+      tracer_(make_embree_tracer(scene_, threads)),
+      lights_(scene_, &choices.lights),
+      context_{scene_, *tracer_, lights_, nullptr, nullptr, choices.mirrored.get()},
+      camera_(scene_.camera),
+      filter_(scene_.film.filter),
+      even_(false) {}
+
 void RadianceEstimator::add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const {
   // In closed form what is left to chance is where in its pixel a sample lies: it takes two places.
   for (const bool mirrored : {false, true}) {

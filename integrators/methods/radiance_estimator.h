@@ -16,6 +16,17 @@ class RadianceEstimator final : public SampleEstimator {
                     std::shared_ptr<const FilmRegions> visible = nullptr, bool closed = false,
                     bool even = false);
 
+  // Which light and which share of the directions paths draw, as a scene has it before it moves.
+  // The scene must outlive it.
+  struct Choices {
+    explicit Choices(const Scene& scene)
+        : lights(scene), mirrored(MirroredLight::make(scene, lights)) {}
+    Lights lights;
+    std::unique_ptr<MirroredLight> mirrored;
+  };
+  // Of a scene that has moved, by the choices of the one that has not (limn/core/lights.h).
+  RadianceEstimator(const Scene& moved, const Choices& choices, int threads);
+
   const Scene& scene() const override { return scene_; }
   size_t slots() const override { return 1; }
   const char* slot_name(size_t) const override { return "radiance"; }

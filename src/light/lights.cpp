@@ -32,8 +32,8 @@ std::optional<LightSample> Environment::sample(const Vec3d&, double choices, Rng
                      drawn.place};
 }
 
-Lights::Lights(const Scene& scene)
-    : of_shape_(scene.shapes.size()), environment_(scene.environment.get()) {
+Lights::Lights(const Scene& scene, const Lights* chosen_by)
+    : of_shape_(scene.shapes.size()), environment_(scene.environment.get()), chosen_by_(chosen_by) {
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     if (!scene.shapes[s].is_emitter) continue;
     area_lights_.push_back(make_area_light(scene, ShapeId(s)));
@@ -71,6 +71,7 @@ Lights::Reach Lights::reach_of(const Light& lamp) {
 // What a surface that faces the light would get, if nothing were in the way: exact on the axis of a
 // disk and far from a sphere. Never negative, though finite differences about 0 make lights that are.
 double Lights::estimate(size_t light, const Vec3d& p) const {
+  if (chosen_by_) return chosen_by_->estimate(light, p);
   if (light >= reaches_.size()) {
     const auto arrival = all_[light]->delta()->arriving(p);
     return arrival ? std::fabs(luminance(arrival->irradiance)) : 0;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "limn/integrators/differences.h"
 #include "support/check_runs.h"
 #include "support/meshes.h"
 #include "support/scenes.h"
@@ -212,6 +213,30 @@ INSTANTIATE_TEST_SUITE_P(, CrossingSurfaces,
                                          "floor.translate.y", "floor.rotate.z", "wall.translate.z",
                                          "sensor.translate.x"),
                          name_of_string);
+
+// Light is linear in a lamp's radiance, and so is what few samples make of it, whatever the step: the
+// lights and the glare that they draw are those of the scene as it is.
+TEST(Differences, DrawLightsAlike) {
+  const TempFiles files;
+  SceneParts parts = mixed_scene(files);
+  parts.body += R"(<emitter type="point" id="spark"><point name="position" value="-1,2,1"/>
+                   <rgb name="intensity" value="2,3,4"/></emitter>)";
+  const Scene scene = make_scene(files, parts);
+  RunSettings settings;
+  settings.spp = 4;
+  for (const char* name : {"glow.radiance", "spark.intensity", "sky.scale"}) {
+    const CentralDifferences run =
+        central_differences(scene, {{name, {0.5, 1e-4}, {{1, 0}, {0, 1}}}}, 0, settings);
+    const Moments &wide = run.estimates[0][0].total, &narrow = run.estimates[0][1].total;
+    double largest = 0, apart = 0;
+    for (size_t i = 0; i < wide.size(); ++i) {
+      largest = std::max(largest, std::fabs(wide.mean(i)));
+      apart = std::max(apart, std::fabs(wide.mean(i) - narrow.mean(i)));
+    }
+    EXPECT_GT(largest, 0) << name;
+    EXPECT_LT(apart, 1e-6 * largest) << name;
+  }
+}
 
 // Roulette and hidden emitters change the paths, not what they mean.
 TEST(Paths, RouletteAgrees) {

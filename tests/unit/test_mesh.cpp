@@ -345,8 +345,32 @@ TEST(Shapes, FlippingAndMirroring) {
     return signed_volume(shape_mesh("<shape type=\"cube\">" + body + "</shape>"));
   };
   EXPECT_DOUBLE_EQ(cube(flip), -8);
-  EXPECT_DOUBLE_EQ(cube(mirror), -8);
-  EXPECT_DOUBLE_EQ(cube(flip + mirror), 8);
+  // The outside of Mitsuba's own flat shapes stays outside (seen in its images, 3.9.1).
+  const std::string turned = "<transform name=\"to_world\"><scale z=\"-1\"/></transform>";
+  EXPECT_DOUBLE_EQ(cube(mirror), 8);
+  EXPECT_DOUBLE_EQ(cube(flip + mirror), -8);
+  EXPECT_DOUBLE_EQ(cube(turned), 8);
+  for (const char* type : {"rectangle", "disk"}) {
+    const auto up = [&](const std::string& body) {
+      return area_vector(
+                 shape_mesh("<shape type=\"" + std::string(type) + "\">" + body + "</shape>"))
+          .z;
+    };
+    EXPECT_GT(up(mirror), 3);
+    EXPECT_LT(up(flip + mirror), -3);
+    EXPECT_LT(up(turned), -3);
+    EXPECT_GT(up(flip + turned), 3);
+  }
+  // A sphere is turned inside out, normals and all.
+  for (const bool flipped : {false, true}) {
+    const Mesh ball =
+        shape_mesh("<shape type=\"sphere\">" + (flipped ? flip : "") + mirror + "</shape>");
+    EXPECT_EQ(signed_volume(ball) > 0, flipped);
+    for (size_t f = 0; f < ball.faces.size(); f += 100) {
+      const Vec3d p = cast<double>(ball.positions[ball.faces[f][0]]);
+      EXPECT_EQ(dot(ball.normals[ball.normal_ids[f][0]], p) > 0, flipped);
+    }
+  }
   const Mesh sphere = shape_mesh("<shape type=\"sphere\">" + flip + "</shape>");
   for (size_t f = 0; f < sphere.faces.size(); f += 100) {
     for (int c = 0; c < 3; ++c) {

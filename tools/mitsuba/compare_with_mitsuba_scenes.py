@@ -27,6 +27,7 @@ FOV = '<float name="fov" value="40"/>'
 SIZE = '<integer name="width" value="{}"/><integer name="height" value="{}"/>'
 BOX = '<rfilter type="box"/>'
 GREY = '<bsdf type="diffuse"><rgb name="reflectance" value="0.7,0.5,0.3"/></bsdf>'
+CLAY = '<bsdf type="diffuse"><rgb name="reflectance" value="0.6,0.4,0.5"/></bsdf>'
 CUBE = """<shape type="cube"><transform name="to_world"><scale value="0.6"/><rotate y="1" angle="30"/>
     <translate x="-1" y="0.8"/></transform><bsdf type="diffuse"/></shape>"""
 LAMP = """<shape type="rectangle"><transform name="to_world"><rotate x="1" angle="{angle}"/>
@@ -152,6 +153,12 @@ def cases(folder):
     yield "hide_emitters", {"integrator": DEPTH.format(3, 1000) +
                             '<boolean name="hide_emitters" value="true"/>',
                             "objects": CUBE + VISIBLE_LAMP}, []
+    for axis, kind in itertools.product("xz", ("rectangle", "disk", "cube", "sphere")):
+        for flip in ("false", "true"):
+            mirrored = f"""<shape type="{kind}"><boolean name="flip_normals" value="{flip}"/>
+                <transform name="to_world"><scale {axis}="-1"/><scale value="0.9"/><rotate y="1" angle="15"/>
+                <translate x="0.3" y="1" z="0.5"/></transform>{CLAY}</shape>"""
+            yield f"mirrored {kind} {axis} flip {flip}", {"objects": mirrored}, []
     for kind, bsdf in (("diffuse", GREY), ("twosided", f'<bsdf type="twosided">{GREY}</bsdf>'),
                        ("ggx", CONDUCTOR.format(distribution="ggx", alpha=0.15))):
         mesh = MESH.format(file=sphere, flat="false", scale=0.8, bsdf=bsdf)

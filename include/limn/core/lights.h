@@ -15,7 +15,11 @@ namespace limn {
 // environment, then the delta lights in the order of the file. The scene must outlive it.
 class Lights {
  public:
-  explicit Lights(const Scene& scene);
+  // chosen_by: lights of the same scene as it was before it moved, by which one is chosen; null: by
+  // these. Differences choose alike in both scenes: else a light is another one now and then, by
+  // much for one over the step, and what is as much in all other samples is the whole derivative
+  // as long as that has not happened. They must outlive it.
+  explicit Lights(const Scene& scene, const Lights* chosen_by = nullptr);
 
   bool empty() const { return all_.empty(); }
   // Whether any shape emits.
@@ -77,6 +81,7 @@ class Lights {
   std::vector<Reach> reaches_;      // of all but delta lights
   std::vector<size_t> of_shape_;    // which light it is; any number where a shape emits nothing
   const Environment* environment_;  // null if none
+  const Lights* chosen_by_;         // null if these
 };
 
 }  // namespace limn
