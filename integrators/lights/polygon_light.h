@@ -101,8 +101,9 @@ struct Kink {
 };
 
 // The integral over the polygon of c times the ramp that rises from 0 at c = h to 1 at c = h (2 -
-// h), c = n . w and h >= 0: what interpolated normals see of a cosine (limn/core/shading.h), nothing
-// where h is 1, at a right angle to their face. n: unit. The polygon must not hold -n. With G(c) the integral of that from c to 1, by Stokes
+// h), c = n . w and h >= 0: what interpolated normals see of a cosine (limn/core/shading.h),
+// nothing where h is 1, at a right angle to their face. n: unit. The polygon must not hold -n. With
+// G(c) the integral of that from c to 1, by Stokes
 //   sum over sides of n . s  the integral of G(c) / (1 - c^2) dpsi,
 // the inner one by quadrature between the ends of the ramp.
 double ramp_integral(std::span<const PolygonSide<double>> sides, const Vec3d& n, double h);

@@ -3,6 +3,9 @@
 
 #include <sys/resource.h>
 #include <unistd.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include <algorithm>
 #include <cstdint>
@@ -62,7 +65,11 @@ void require_memory(const SourceLocation& where, double bytes, const std::string
                     const std::string& remedy) {
   constexpr double kWorthAsking = 0x1p26;  // not tuned: asking takes 50 microseconds
   if (bytes < kWorthAsking) return;
-  const double free = free_memory();
+  double free = free_memory();
+#ifdef __GLIBC__
+  // What this program has given back, the C library may still hold.
+  if (bytes > free && malloc_trim(0) != 0) free = free_memory();
+#endif
   if (bytes <= free) return;
   throw InputError(where, what + " takes " + in_gigabytes(bytes) + " of memory, and " +
                               in_gigabytes(free) + " are free: " + remedy);

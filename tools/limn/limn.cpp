@@ -62,7 +62,8 @@ void use_huge_pages([[maybe_unused]] char** argv) {
   const char* wish = std::getenv(kName);
   if (wish) {
     if (std::string(wish) == kWish) unsetenv(kName);  // not for programs that this one starts
-  } else if (getauxval(AT_SECURE) == 0) {             // else the wish would be taken away each time
+  } else if (getauxval(AT_SECURE) == 0 &&             // else the wish would be taken away each time
+             getauxval(AT_BASE) != 0) {  // else the loader was started, with this as its program
     setenv(kName, kWish, 1);
     std::error_code none;
     const std::string self = std::filesystem::read_symlink("/proc/self/exe", none).string();
