@@ -144,7 +144,8 @@ class BackwardPass {
         settings_(settings),
         film_(scene.film, pixels_of(scene, adjoint)),
         choice_(film_.pixels(), options.uniform_pixels),
-        parameters_(scene, options.parameters),
+        parameters_(scene, options.found.empty() ? reverse_parameters(scene, options.parameters)
+                                                 : options.found),
         tracer_(make_embree_tracer(parameters_.scene(), settings.threads)),
         lights_(parameters_.scene()),
         method_(reverse_method(options.sampler)),

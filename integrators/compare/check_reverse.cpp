@@ -88,8 +88,16 @@ std::vector<Compared> compared(const Scene& scene, const Parameter& parameter, s
   }
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     if (parameter.velocities(scene, ShapeId(s)).empty()) continue;
-    const std::vector<Vec3d> field = random_field(scene.shapes[s].mesh, seed);
+    std::vector<Vec3d> field = random_field(scene.shapes[s].mesh, seed);
     std::vector<double> weights;
+    const std::vector<Vec3d> directions = parameter.directions(scene);
+    if (!directions.empty()) {
+      for (size_t v = 0; v < field.size(); ++v) {
+        weights.push_back(field[v].x);
+        field[v] = directions[v] * weights[v];
+      }
+      return {{parameter.name, vertex_field(scene, ShapeId(s), field), place, weights}};
+    }
     for (const Vec3d& v : field) weights.insert(weights.end(), {v.x, v.y, v.z});
     return {{parameter.name, vertex_field(scene, ShapeId(s), field), place, weights}};
   }

@@ -114,8 +114,8 @@ Triangles gear(const Gear& gear, int faces) {
 
 }  // namespace
 
-Triangles make_gear(int faces) { return gear({18, 6, 0.11, 0.16, 0.34, 0.74, 0.16}, faces); }
+Triangles make_gear(int faces) { return gear({12, 4, 0.15, 0.16, 0.32, 0.68, 0.16}, faces); }
 
-Triangles make_pinion(int faces) { return gear({10, 0, 0.17, 0.26, 0.4, 0.7, 0.3}, faces); }
+Triangles make_pinion(int faces) { return gear({8, 0, 0.2, 0.26, 0.4, 0.66, 0.3}, faces); }
 
 }  // namespace limn
