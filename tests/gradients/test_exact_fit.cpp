@@ -166,7 +166,7 @@ TEST(Analytic, ReverseModeIsTheDerivativeOfTheLoss) {
   const std::vector<std::string> names = {
       "body.vertex_positions", "lamp.vertex_positions", "body.translate.x",
       "body.rotate.y",         "lamp.translate.y",      "glow.radiance",
-      "grey.reflectance",      "body.displacement",     "body.displacement.7"};
+      "grey.reflectance",      "body.displacement",     "body.displacement.2"};
   const Loss at = loss_and_gradient(scene, target, names);
   const auto value_at = [&](const Parameter& p, double h) {
     Scene other = deep_copy(scene);
