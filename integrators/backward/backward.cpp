@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "integrators/backward/contributions.h"
+#include "integrators/backward/faces_pass.h"
 #include "integrators/backward/film_adjoint.h"
 #include "integrators/backward/path_adjoint.h"
 #include "integrators/backward/pixel_choice.h"
@@ -49,32 +50,6 @@ namespace {
 const char* name_of(size_t term) { return term_types()[term].name; }
 
 constexpr size_t kTile = 256;  // paths, or points on the film; not tuned
-
-std::vector<Rgb<double>> pixels_of(const Scene& scene, const Image& adjoint) {
-  const Film& film = scene.film;
-  if (adjoint.width != film.crop_width || adjoint.height != film.crop_height ||
-      (adjoint.channels != 1 && adjoint.channels != 3)) {
-    throw InputError(fmt::format(
-        "the adjoint image has {} x {} pixels of {} channels, but the film {} x {}: it must "
-        "be of the film's size, with three channels or one",
-        adjoint.width, adjoint.height, adjoint.channels, film.crop_width, film.crop_height));
-  }
-  std::vector<Rgb<double>> pixels;
-  for (int y = 0; y < adjoint.height; ++y) {
-    for (int x = 0; x < adjoint.width; ++x) {
-      Rgb<double> a;
-      for (int c = 0; c < 3; ++c) {
-        Rgb<double> unit;
-        unit[c] = 1;
-        a[c] = adjoint.channels == 3 ? adjoint.at(x, y, c) : adjoint.at(x, y, 0) * luminance(unit);
-        if (std::isfinite(a[c])) continue;
-        throw InputError(fmt::format("the adjoint image is not finite in column {}, row {}", x, y));
-      }
-      pixels.push_back(a);
-    }
-  }
-  return pixels;
-}
 
 // What tiles, or batches, cost and found beside sums, joined in their order.
 struct Figures {
@@ -142,10 +117,9 @@ class BackwardPass {
                const RunSettings& settings)
       : options_(options),
         settings_(settings),
-        film_(scene.film, pixels_of(scene, adjoint)),
+        film_(scene.film, adjoint_pixels(scene, adjoint)),
         choice_(film_.pixels(), options.uniform_pixels),
-        parameters_(scene, options.found.empty() ? reverse_parameters(scene, options.parameters)
-                                                 : options.found),
+        parameters_(scene, reverse_parameters(scene, options)),
         tracer_(make_embree_tracer(parameters_.scene(), settings.threads)),
         lights_(parameters_.scene()),
         method_(reverse_method(options.sampler)),
@@ -526,6 +500,10 @@ void BackwardPass::finish() {
 
 BackwardResult backward(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
                         const RunSettings& settings) {
+  check_points(options.points, reverse_method(options.sampler).closed, options.sampler);
+  if (options.points == FilmPoints::kFaces) {
+    return backward_over_faces(scene, adjoint, options, settings_for(options.points, settings));
+  }
   return BackwardPass(scene, adjoint, options, settings).run();
 }
 

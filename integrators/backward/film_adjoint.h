@@ -6,6 +6,9 @@
 namespace limn {
 
 // dLoss/dI, crop_height by crop_width, as points of the film see it.
+// Of the crop's pixels, row by row. InputError for an image of another size, or not finite.
+std::vector<Rgb<double>> adjoint_pixels(const Scene& scene, const Image& adjoint);
+
 class FilmAdjoint {
  public:
   FilmAdjoint(const Film& film, std::vector<Rgb<double>> pixels)

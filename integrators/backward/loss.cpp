@@ -190,8 +190,9 @@ LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
   std::vector<uint64_t> seeds{settings.seed};
   // Of streams that no other seed has.
   const uint64_t stream = mix_bits(settings.seed);
-  if (!of.same_samples) seeds = {mix_bits(stream + 1), mix_bits(stream + 2)};
-  const auto rendered = render_seeds(scene, settings, seeds, {.method = of.method});
+  if (!of.one_image()) seeds = {mix_bits(stream + 1), mix_bits(stream + 2)};
+  const auto rendered =
+      render_seeds(scene, settings, seeds, {.method = of.method, .points = of.points});
   const RenderResult &a = rendered.front(), &b = rendered.back();
   LossResult result;
   result.spp = std::min(a.spp, b.spp);
@@ -219,7 +220,7 @@ LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
     // To first order, with half of the adjoint for each image.
     const double slope = 0.5 * adjoint[i];
     const double both = a.radiance.variance(i) + b.radiance.variance(i);
-    variance += slope * slope * (of.same_samples ? 2 * both : both);
+    variance += slope * slope * (of.one_image() ? 2 * both : both);
   }
   result.error = std::sqrt(variance);
   return result;

@@ -8,11 +8,12 @@
 
 namespace limn {
 
-std::vector<Parameter> reverse_parameters(const Scene& scene,
-                                          const std::vector<std::string>& names) {
-  if (names.empty()) return list_parameters(scene);
+std::vector<Parameter> reverse_parameters(const Scene& scene, const BackwardOptions& options) {
+  if (!options.found.empty()) return options.found;
+  if (options.parameters.empty()) return list_parameters(scene);
   std::vector<Parameter> parameters;
-  for (const std::string& name : names) parameters.push_back(find_parameter_or_array(scene, name));
+  for (const std::string& name : options.parameters)
+    parameters.push_back(find_parameter_or_array(scene, name));
   return parameters;
 }
 

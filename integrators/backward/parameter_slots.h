@@ -11,12 +11,12 @@
 #include "limn/core/parameter.h"
 #include "limn/core/scene.h"
 #include "limn/core/slots.h"
+#include "limn/integrators/backward.h"
 
 namespace limn {
 
-// Those that BackwardOptions::parameters names. InputError for unknown ones.
-std::vector<Parameter> reverse_parameters(const Scene& scene,
-                                          const std::vector<std::string>& names);
+// Those that the options ask for. InputError for unknown ones.
+std::vector<Parameter> reverse_parameters(const Scene& scene, const BackwardOptions& options);
 
 class ParameterSlots {
  public:

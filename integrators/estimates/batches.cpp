@@ -95,6 +95,7 @@ class BatchRunner {
     const Stopwatch watch;
     SampleSink sink(film_, estimator_.lanes(), lane_scale_, sums_, costs, bad, nullptr);
     std::vector<KeyedSample> together;
+    const size_t most = estimator_.together();
     const auto add = [&] {
       estimator_.add_pixels(together, sink);
       together.clear();
@@ -104,7 +105,7 @@ class BatchRunner {
         for (int s = batch_.first; s < batch_.last; ++s) {
           const PixelSample at{x, y, s};
           together.push_back({at, pixel_key(estimator_, batch_.seed, at)});
-          if (together.size() == kMostTogether) add();
+          if (together.size() == most) add();
         }
       }
     }

@@ -26,7 +26,7 @@ struct KeyedSample {
   PixelSample at;
   Rng key;
 };
-// So many of them are worked on together at most.
+// So many of them are worked on together at most, but for estimators that say otherwise.
 inline constexpr size_t kMostTogether = 16;
 
 // A point on a curve of the film across which radiance jumps.
@@ -117,11 +117,12 @@ class SampleEstimator {
   // Whether the numbers of a pixel's samples are even (Rng::even). What batches differ by is then
   // no error, nor a bound of it.
   virtual bool is_even() const { return false; }
-  // All that at most kMostTogether samples add, each to its own pixel alone. What goes together
-  // changes no bit, nor does their number. Seconds that are not booked on a slot go to
+  // All that at most together() samples of one tile add, each to its own pixel alone. What goes
+  // together changes no bit, nor does their number. Seconds that are not booked on a slot go to
   // pixel_slot().
   virtual bool samples_pixels() const { return true; }
   virtual size_t pixel_slot() const { return 0; }
+  virtual size_t together() const { return kMostTogether; }
   virtual void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const = 0;
 
   // Samples of a slot that belong to the film as a whole: how many per pixel (0: none), and one of

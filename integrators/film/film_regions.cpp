@@ -1,241 +1,67 @@
-// Faces in bins of pixels, and the visible regions of each.
+// The visible regions of every pixel, as they are looked up.
 #include "integrators/film/film_regions.h"
-
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
-#include "integrators/estimates/tiles.h"
-#include "limn/core/error.h"
+#include "integrators/film/pixel_regions.h"
 #include "limn/core/parallel.h"
-#include "limn/core/shading.h"
 #include "limn/integrators/run.h"
 
 namespace limn {
 namespace {
 
-// The film's plane: (x, y) in pixels of the full film.
-PlaneView view_of(const Camera& camera) {
-  const auto through = [&](double x, double y) {
-    const Vec3d d = camera.ray<double>(x, y).direction;
-    return d / dot(d, value(camera.forward));
-  };
-  const Vec3d a = through(0, 0);
-  const Vec3d u = (through(camera.width, 0) - a) / double(camera.width);
-  const Vec3d v = (through(0, camera.height) - a) / double(camera.height);
-  return {value(camera.origin), u, v, a, camera.near_clip, camera.far_clip};
-}
-
-constexpr size_t kChunk = 4096;  // faces at a time; not tuned
-// Of a pixel: a hundred megabytes. Thin faces behind each other, all over one pixel, make as many
-// as their number squared.
-constexpr size_t kMostRegions = 1 << 18;
+constexpr RegionsUser kUser{"the exact film", "--film rays"};
 
 }  // namespace
 
-void FilmRegions::check(const Film& film) {
-  if (film.filter.kind == Filter::Kind::kBox && film.filter.radius == 0.5) return;
-  throw InputError(film.where,
-                   "the exact film needs a box filter, <rfilter type=\"box\"/>: a pixel is what is "
-                   "seen within it (--film rays takes every filter)");
-}
-
-// Which faces may be seen in which tile, and the regions of a tile.
-class FilmRegions::Builder {
- public:
-  Builder(const Scene& scene, const FacesInPlace& faces, std::span<const limn::Tile> tiles,
-          int threads)
-      : scene_(scene),
-        copies_(faces.copies),
-        overlaps_(faces.overlaps),
-        view_(view_of(scene.camera)),
-        tiles_(tiles) {
-    for (const Shape& shape : scene.shapes) {
-      first_label_.push_back(labels_);
-      labels_ += static_cast<uint32_t>(shape.mesh.faces.size());
-    }
-    bin_faces(threads);
-  }
-
-  // Empty if interrupted meanwhile.
-  Tile build(size_t t, const std::atomic<bool>* interrupted) const {
-    const limn::Tile& tile = tiles_[t];
-    std::vector<SeenFace> faces;
-    for (size_t i = first_binned_[t]; i < first_binned_[t + 1]; ++i) {
-      faces.push_back(*see(binned_[i]));
-    }
-    std::vector<uint32_t> order(faces.size());
-    std::iota(order.begin(), order.end(), 0);
-    // Nearest first; labels are in order.
-    std::stable_sort(order.begin(), order.end(),
-                     [&](uint32_t a, uint32_t b) { return faces[a].nearest > faces[b].nearest; });
-    const int width = tile.x1 - tile.x0, height = tile.y1 - tile.y0;
-    std::vector<std::vector<uint32_t>> of_pixel(static_cast<size_t>(width) * height);
-    for (const uint32_t f : order) {
-      const auto [x0, x1] = range(faces[f].lower.x, faces[f].upper.x, tile.x0, tile.x1);
-      const auto [y0, y1] = range(faces[f].lower.y, faces[f].upper.y, tile.y0, tile.y1);
-      for (int y = y0; y < y1; ++y) {
-        for (int x = x0; x < x1; ++x) {
-          of_pixel[static_cast<size_t>(y - tile.y0) * width + (x - tile.x0)].push_back(f);
-        }
-      }
-    }
-    Tile result;
-    VisibleRegions regions({});
-    if (!overlaps_.empty()) regions.set_rule([&](uint32_t a, uint32_t b) { return rule(a, b); });
-    for (size_t i = 0; i < of_pixel.size(); ++i) {
-      const int x = tile.x0 + static_cast<int>(i) % width,
-                y = tile.y0 + static_cast<int>(i) / width;
-      if (interrupted && interrupted->load(std::memory_order_relaxed)) return {};
-      regions.reset({{x + 0.5, y + 0.5}, 0.5, 0.5});
-      for (const uint32_t f : of_pixel[i]) {
-        regions.insert(faces[f]);
-        if (regions.size() > kMostRegions) refuse(x, y);
-      }
-      append(regions, result);
-    }
-    result.first_region.push_back(static_cast<uint32_t>(result.regions.size()));
-    return result;
-  }
-
- private:
-  // Whole pixels that may see [from, to], which may be off by rounding.
-  static std::pair<int, int> range(double from, double to, int first, int last) {
-    constexpr double kRounding = 0x1p-20;  // pixels; films are far smaller than 2^30
-    return {static_cast<int>(std::clamp<double>(std::floor(from - kRounding), first, last)),
-            static_cast<int>(std::clamp<double>(std::floor(to + kRounding) + 1, first, last))};
-  }
-
-  FaceRef face_of(uint32_t label) const {
-    if (label == VisibleRegions::kNothing) return {};
-    const auto shape = std::upper_bound(first_label_.begin(), first_label_.end(), label) - 1;
-    return {ShapeId(static_cast<uint32_t>(shape - first_label_.begin())), FaceId(label - *shape)};
-  }
-
-  std::optional<SeenFace> see(uint32_t label) const {
-    const FaceRef face = face_of(label);
-    auto seen = view_.face(label, face_corners<double>(scene_.shape(face.shape).mesh, face.face));
-    if (seen) seen->ruled = !overlaps_.of(face).empty();
-    return seen;
-  }
-  // Of faces in one plane that which a ray would meet is seen.
-  std::optional<bool> rule(uint32_t a, uint32_t b) const {
-    const FaceRef first = face_of(a), second = face_of(b);
-    if (!overlaps_.contains(first, second)) return {};
-    const Vec3d corner = face_corners<double>(scene_.shape(first.shape).mesh, first.face)[0];
-    return is_met_first(scene_, first, second, corner - value(scene_.camera.origin));
-  }
-
-  [[noreturn]] void refuse(int x, int y) const {
-    throw InputError(scene_.film.where,
-                     fmt::format("the exact film: pixel ({}, {}) shows more than {} regions "
-                                 "(--film rays takes it)",
-                                 x, y, kMostRegions));
-  }
-
-  // Whether a ray from the camera can meet the face: of faces in one place one alone.
-  bool is_met(uint32_t label) const {
-    const FaceRef face = face_of(label);
-    const Shape& shape = scene_.shape(face.shape);
-    if (scene_.hide_emitters && shape.is_emitter) return false;
-    if (!has_area(shape.mesh, shape.mesh.face(face.face))) return false;
-    if (copies_.empty()) return true;
-    const Vec3d towards =
-        face_corners<double>(shape.mesh, face.face)[0] - value(scene_.camera.origin);
-    return copies_.met(face, towards, scene_.hide_emitters) == face;
-  }
-
-  void bin_faces(int threads) {
-    struct Found {
-      uint32_t label;
-      int x0, x1, y0, y1;  // tiles
-    };
-    const Film& film = scene_.film;
-    const int columns = (film.crop_width + kTileSize - 1) / kTileSize;
-    const auto tiles_of = [](std::pair<int, int> pixels, int origin) {
-      return std::pair((pixels.first - origin) / kTileSize,
-                       (pixels.second - origin + kTileSize - 1) / kTileSize);
-    };
-    std::vector<std::vector<Found>> found((labels_ + kChunk - 1) / kChunk);
-    parallel_for(found.size(), threads, [&](size_t c) {
-      const auto end = static_cast<uint32_t>(std::min<size_t>(labels_, (c + 1) * kChunk));
-      for (auto label = static_cast<uint32_t>(c * kChunk); label < end; ++label) {
-        const auto seen = see(label);
-        if (!seen || !is_met(label)) continue;
-        const auto x =
-            range(seen->lower.x, seen->upper.x, film.crop_x, film.crop_x + film.crop_width);
-        const auto y =
-            range(seen->lower.y, seen->upper.y, film.crop_y, film.crop_y + film.crop_height);
-        if (x.first >= x.second || y.first >= y.second) continue;
-        const auto [x0, x1] = tiles_of(x, film.crop_x);
-        const auto [y0, y1] = tiles_of(y, film.crop_y);
-        found[c].push_back({label, x0, x1, y0, y1});
-      }
-    });
-    const auto for_every_tile = [&](const auto& visit) {
-      for (const auto& chunk : found) {
-        for (const Found& f : chunk) {
-          for (int y = f.y0; y < f.y1; ++y) {
-            for (int x = f.x0; x < f.x1; ++x) visit(static_cast<size_t>(y) * columns + x, f.label);
-          }
-        }
-      }
-    };
-    first_binned_.resize(tiles_.size() + 1);
-    for_every_tile([&](size_t tile, uint32_t) { ++first_binned_[tile + 1]; });
-    for (size_t t = 0; t < tiles_.size(); ++t) first_binned_[t + 1] += first_binned_[t];
-    binned_.resize(first_binned_.back());
-    std::vector<size_t> next(first_binned_.begin(), first_binned_.end() - 1);
-    for_every_tile([&](size_t tile, uint32_t label) { binned_[next[tile]++] = label; });
-  }
-
-  void append(const VisibleRegions& regions, Tile& tile) const {
-    tile.first_region.push_back(static_cast<uint32_t>(tile.regions.size()));
-    tile.crossings += regions.crossings();
-    const bool whole = regions.size() == 1;
-    regions.for_each([&](uint32_t label, std::span<const PlanePoint> corners) {
-      if (!whole) append_box(corners, tile.corners);
-      const auto first = static_cast<uint32_t>(tile.corners.size());
-      if (!whole) tile.corners.insert(tile.corners.end(), corners.begin(), corners.end());
-      tile.regions.push_back(
-          {face_of(label), first, static_cast<uint32_t>(tile.corners.size()) - first});
-    });
-  }
-
-  static void append_box(std::span<const PlanePoint> corners, std::vector<PlanePoint>& to) {
-    PlanePoint lower = corners[0], upper = corners[0];
-    for (const PlanePoint& p : corners) {
-      lower = {std::min(lower.x, p.x), std::min(lower.y, p.y)};
-      upper = {std::max(upper.x, p.x), std::max(upper.y, p.y)};
-    }
-    to.push_back(lower);
-    to.push_back(upper);
-  }
-
-  const Scene& scene_;
-  const FaceCopies& copies_;
-  const FaceOverlaps& overlaps_;
-  PlaneView view_;
-  std::span<const limn::Tile> tiles_;
-  std::vector<uint32_t> first_label_;  // of each shape: labels are faces, counted through
-  uint32_t labels_ = 0;
-  // Labels in order: of tile t those from first_binned_[t] to first_binned_[t + 1].
-  std::vector<size_t> first_binned_;
-  std::vector<uint32_t> binned_;
-};
+void FilmRegions::check(const Film& film) { PixelRegions::check(film, kUser); }
 
 FilmRegions::FilmRegions(const Scene& scene, int threads, const std::atomic<bool>* interrupted)
     : film_(scene.film) {
-  check(film_);
   const Stopwatch watch;
-  const std::vector<limn::Tile> tiles = make_tiles(film_);
   faces_ = std::make_shared<FacesInPlace>(scene, threads);
-  const Builder builder(scene, *faces_, tiles, threads);
-  tiles_.resize(tiles.size());
-  parallel_for(tiles.size(), threads, [&](size_t t) { tiles_[t] = builder.build(t, interrupted); });
+  const PixelRegions pixels(scene, *faces_, threads, kUser);
+  tiles_.resize(pixels.tiles().size());
+  parallel_for(tiles_.size(), threads, [&](size_t t) {
+    Tile& tile = tiles_[t];
+    const bool done = pixels.for_each_pixel(
+        t, interrupted, [](int, int) { return true; },
+        [&](int, int, const VisibleRegions& regions) { append(pixels, regions, tile); });
+    if (done) {
+      tile.first_region.push_back(static_cast<uint32_t>(tile.regions.size()));
+    } else {
+      tile = {};
+    }
+  });
   seconds_ = watch.seconds();
+}
+
+namespace {
+
+void append_box(std::span<const PlanePoint> corners, std::vector<PlanePoint>& to) {
+  PlanePoint lower = corners[0], upper = corners[0];
+  for (const PlanePoint& p : corners) {
+    lower = {std::min(lower.x, p.x), std::min(lower.y, p.y)};
+    upper = {std::max(upper.x, p.x), std::max(upper.y, p.y)};
+  }
+  to.push_back(lower);
+  to.push_back(upper);
+}
+
+}  // namespace
+
+void FilmRegions::append(const PixelRegions& pixels, const VisibleRegions& regions, Tile& tile) {
+  tile.first_region.push_back(static_cast<uint32_t>(tile.regions.size()));
+  tile.crossings += regions.crossings();
+  const bool whole = regions.size() == 1;
+  regions.for_each([&](uint32_t label, std::span<const PlanePoint> corners) {
+    if (!whole) append_box(corners, tile.corners);
+    const auto first = static_cast<uint32_t>(tile.corners.size());
+    if (!whole) tile.corners.insert(tile.corners.end(), corners.begin(), corners.end());
+    tile.regions.push_back(
+        {pixels.face_of(label), first, static_cast<uint32_t>(tile.corners.size()) - first});
+  });
 }
 
 template <class Visit>

@@ -10,6 +10,8 @@
 
 namespace limn {
 
+class PixelRegions;
+
 class FilmRegions {
  public:
   // The scene must outlive it. Empty if interrupted meanwhile (null: never). InputError, with the
@@ -51,7 +53,7 @@ class FilmRegions {
     std::vector<PlanePoint> corners;  // counter-clockwise as (x, y) [pixels of the full film]
     size_t crossings = 0;
   };
-  class Builder;
+  static void append(const PixelRegions& pixels, const VisibleRegions& regions, Tile& tile);
 
   // visit(face, lower, upper, corners): for every region of a pixel of the full film in the crop
   // window, with the ends of its box.

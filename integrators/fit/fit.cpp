@@ -9,6 +9,7 @@
 #include "integrators/backward/adjoint_context.h"
 #include "integrators/fit/fit_impl.h"
 #include "integrators/fit/remesh.h"
+#include "integrators/methods/faces_estimator.h"
 #include "integrators/methods/hair_gaps.h"
 #include "integrators/methods/selection.h"
 #include "integrators/terms/term.h"
@@ -103,7 +104,9 @@ Fit::Impl::Impl(std::vector<FitView> all, const FitOptions& options, const RunSe
   if (is_exact()) check_exact();
   if (!options.remesh.empty()) check_remeshing();
   // As it is before the first step; views differ in little but the camera.
-  warn_of_hair_gaps(views[0].scene, settings.spp, settings.threads, warnings);
+  if (!over_faces()) {
+    warn_of_hair_gaps(views[0].scene, settings.spp, settings.threads, warnings);
+  }
   if (options.loss == LossKind::kL1) {
     warnings.push_back(
         "the gradient of l1 is biased where the image's noise is not small beside its difference "
@@ -164,11 +167,14 @@ bool Fit::Impl::moves_on_film(size_t view) const {
 // Those of backward(), which would tell at the first step.
 void Fit::Impl::check_terms() const {
   const ReverseMethod method = reverse_method(options_.backward.sampler);
+  check_points(options_.backward.points, method.closed, options_.backward.sampler);
   for (size_t v = 0; v < views.size(); ++v) {
     const auto seen = [&](const FitParameter& p) { return p.in_view(v) != nullptr; };
     if (std::none_of(parameters_.begin(), parameters_.end(), seen)) continue;
     std::vector<std::string> known;
+    if (over_faces()) known.emplace_back(kFacesTerm);
     for (const TermType& type : term_types().first(kAdjointTerms)) {
+      if (over_faces()) break;
       if (!type.applies(views[v].scene) || (type.regions && !method.sampler.regions)) continue;
       if (method.closed && type.moved_with_directions && !type.traces_paths) continue;
       known.emplace_back(type.name);
@@ -222,7 +228,7 @@ std::vector<ShapeId> Fit::Impl::moved_shapes(size_t view) const {
 }
 
 RunSettings Fit::Impl::view_settings(size_t view) const {
-  RunSettings own = settings_;
+  RunSettings own = settings_for(options_.backward.points, settings_);
   own.seconds = 0;
   const uint64_t step = is_exact() ? 0 : static_cast<uint64_t>(steps);
   own.seed = mix_bits(mix_bits(mix_bits(settings_.seed) + step) + view);
@@ -230,15 +236,18 @@ RunSettings Fit::Impl::view_settings(size_t view) const {
   return own;
 }
 
+int Fit::Impl::samples_of(int first) const {
+  return over_faces() ? 1 : grown(first, steps, options_.spp_doubling);
+}
+
 bool Fit::Impl::add_view(size_t view, FitRecord& record,
                          std::vector<std::vector<double>>& gradients) {
   const FitView& v = views[view];
   const double share = 1 / static_cast<double>(views.size());
   RunSettings own = view_settings(view);
-  own.spp = grown(options_.loss_spp > 0 ? options_.loss_spp : settings_.spp, steps,
-                  options_.spp_doubling);
+  own.spp = samples_of(options_.loss_spp > 0 ? options_.loss_spp : settings_.spp);
   const LossImages images{reverse_method(options_.backward.sampler).closed ? "analytic" : "path",
-                          is_exact()};
+                          options_.backward.points, is_exact()};
   LossResult loss =
       image_loss(v.scene, v.target, options_.loss, own, v.mask, options_.pyramid, images);
   if (loss.spp < own.spp) return false;
@@ -257,7 +266,7 @@ bool Fit::Impl::add_view(size_t view, FitRecord& record,
     if (p.in_view(view)) backward_options.found.push_back(*p.in_view(view));
   }
   if (backward_options.found.empty()) return true;
-  own.spp = grown(settings_.spp, steps, options_.spp_doubling);
+  own.spp = samples_of(settings_.spp);
   if (settings_.progress) {
     // The two images take about a third of the time.
     own.progress = [&](double done) {

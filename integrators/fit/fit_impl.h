@@ -59,6 +59,9 @@ class Fit::Impl {
   }
   // The loss is a function of the parameters: all steps take the same samples.
   bool is_exact() const { return options_.optimiser == OptimiserKind::kLbfgs; }
+  bool over_faces() const { return options_.backward.points == FilmPoints::kFaces; }
+  // Per pixel, of this step, if there were so many at the first one.
+  int samples_of(int first) const;
   // False: interrupted.
   bool add_view(size_t view, FitRecord& record, std::vector<std::vector<double>>& gradients);
   // Loss and gradients of all views; false: interrupted.

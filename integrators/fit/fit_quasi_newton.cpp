@@ -28,6 +28,7 @@ void Fit::Impl::check_exact() {
         "its steps by itself: leave out the doubling of samples, the half-life of steps and "
         "samples of the loss");
   }
+  if (over_faces()) return;  // all silhouettes are in the losses and their gradients
   const std::vector<std::string>& terms = options_.backward.terms;
   const bool camera = terms.empty() || std::find(terms.begin(), terms.end(),
                                                  term_types()[kCamera].name) != terms.end();

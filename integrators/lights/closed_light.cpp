@@ -365,25 +365,24 @@ class ClosedLight::View {
   void add_regions(std::vector<PolygonSide<S>>& all) const {
     std::vector<PolygonSide<S>> polygon;
     std::vector<Vec3d> units;
-    scratch_.regions.for_each_below(static_cast<uint32_t>(scratch_.lamp_faces),
-                                    [&](uint32_t shown, std::span<const PlanePoint> corners,
-                                        std::span<const VisibleRegions::Side> sides) {
-                                      polygon.resize(sides.size());
-                                      units.resize(sides.size());
-                                      for (size_t i = 0; i < sides.size(); ++i) {
-                                        polygon[i].normal = normal_of(sides[i], shown);
-                                        units[i] = normalize(value(polygon[i].normal));
-                                      }
-                                      for (size_t i = 0; i < sides.size(); ++i) {
-                                        polygon[i].begin =
-                                            meet(units[i == 0 ? sides.size() - 1 : i - 1], units[i],
-                                                 towards(corners[i]));
-                                      }
-                                      for (size_t i = 0; i < sides.size(); ++i) {
-                                        polygon[i].end = polygon[(i + 1) % sides.size()].begin;
-                                      }
-                                      all.insert(all.end(), polygon.begin(), polygon.end());
-                                    });
+    scratch_.regions.for_each_below(
+        scratch_.lamp_faces, [&](uint32_t shown, std::span<const PlanePoint> corners,
+                                 std::span<const VisibleRegions::Side> sides) {
+          polygon.resize(sides.size());
+          units.resize(sides.size());
+          for (size_t i = 0; i < sides.size(); ++i) {
+            polygon[i].normal = normal_of(sides[i], shown);
+            units[i] = normalize(value(polygon[i].normal));
+          }
+          for (size_t i = 0; i < sides.size(); ++i) {
+            polygon[i].begin =
+                meet(units[i == 0 ? sides.size() - 1 : i - 1], units[i], towards(corners[i]));
+          }
+          for (size_t i = 0; i < sides.size(); ++i) {
+            polygon[i].end = polygon[(i + 1) % sides.size()].begin;
+          }
+          all.insert(all.end(), polygon.begin(), polygon.end());
+        });
   }
 
   void add_outlines(std::vector<PolygonSide<S>>& all) const {

@@ -28,6 +28,7 @@ void check_selection(const MethodType& method, const Scene& scene, const Gradien
   if (options.exact_film) check_exact_film(scene, method.name);
   if (method.check) method.check(scene);
   check_warp(options.warp, {method.name});
+  check_points(options.points, method.closed_light, method.name);
   if (options.terms.empty() || method.terms_can_be_left_out) return;
   throw InputError("terms: the method \"" + method.name + "\" has all terms in one");
 }
@@ -46,6 +47,7 @@ void identify(const MethodType& method, const Scene& scene, const GradientOption
                                              : to_string(*options.samples));
   store.identify("warp", fmt::format("{} rays, kappa {}", options.warp.rays, options.warp.kappa));
   store.identify("film", options.exact_film ? "exact" : "rays");
+  store.identify("points", name_of(options.points));
   store.identify("step", fmt::format("{}", options.step));
 }
 
@@ -115,6 +117,7 @@ GradientResult gradient(const Scene& scene, const GradientOptions& options,
   GradientResult result = method.run(method, scene, options, settings);
   result.method = method.name;
   check_shading(scene, result);
+  if (options.points == FilmPoints::kFaces) return result;
   warn_of_hair_gaps(scene, static_cast<double>(result.spp), settings.threads, result.warnings);
   return result;
 }

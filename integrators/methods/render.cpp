@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "integrators/estimates/batches.h"
+#include "integrators/methods/faces_estimator.h"
 #include "integrators/methods/radiance_estimator.h"
 #include "integrators/methods/render_seeds.h"
 #include "integrators/methods/visibility_estimator.h"
@@ -53,6 +54,14 @@ std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSet
                                                 const RenderOptions& options) {
   const RenderMethod& method = find_render_method(options.method);
   const bool even = is_even(options.sampler);  // checked for all
+  check_points(options.points, method.closed_light, options.method);
+  if (options.points == FilmPoints::kFaces) {
+    if (options.exact_film)
+      throw InputError(
+          "--film exact is for random points: --points faces "
+          "has its own");
+    return std::make_unique<FacesEstimator>(scene, std::span<const Parameter>(), settings.threads);
+  }
   if (method.looks_around) {
     if (options.exact_film) {
       throw InputError(fmt::format("--film exact: not with the method \"{}\"", options.method));
@@ -79,6 +88,7 @@ void identify(BatchStore& store, const RenderOptions& options) {
   if (!method.looks_around) {
     store.identify("sampler", options.sampler);
     store.identify("film", options.exact_film ? "exact" : "rays");
+    store.identify("points", name_of(options.points));
     return;
   }
   store.identify("what", fmt::format("{}", static_cast<int>(options.what)));
@@ -107,11 +117,15 @@ EstimatorList estimators_of(const Scene& scene, const RunSettings& settings,
 
 // watch: runs since the job began.
 RenderResult run(const EstimatorList& estimators, const RunSettings& settings,
-                 const Stopwatch& watch, size_t size) {
+                 const Stopwatch& watch, size_t size, FilmPoints points) {
   RenderResult result;
   result.radiance = Moments(size);
   run_batches(estimators, settings, watch, [&](const Batch& batch, const auto& sums) {
-    result.radiance.add_batch(sums[0].radiance, batch.count());
+    if (points == FilmPoints::kFaces) {
+      result.radiance.add_exact(sums[0].radiance);
+    } else {
+      result.radiance.add_batch(sums[0].radiance, batch.count());
+    }
     result.rays += sums[0].costs[0].rays;
     result.non_finite.merge(sums[0].non_finite);
     result.spp += batch.count();
@@ -122,8 +136,9 @@ RenderResult run(const EstimatorList& estimators, const RunSettings& settings,
 
 }  // namespace
 
-RenderResult render(const Scene& scene, const RunSettings& settings, const RenderOptions& options) {
+RenderResult render(const Scene& scene, const RunSettings& asked, const RenderOptions& options) {
   const Stopwatch watch;
+  const RunSettings settings = settings_for(options.points, asked);
   if (settings.store) identify(*settings.store, options);
   const EstimatorList estimators = estimators_of(scene, settings, options);
   const auto* around = dynamic_cast<const VisibilityEstimator*>(estimators[0].get());
@@ -131,7 +146,7 @@ RenderResult render(const Scene& scene, const RunSettings& settings, const Rende
     // Other machines must have chosen the same.
     settings.store->identify("choice of the pilot", fingerprint(around->choice()));
   }
-  RenderResult result = run(estimators, settings, watch, film_size(scene.film));
+  RenderResult result = run(estimators, settings, watch, film_size(scene.film), options.points);
   if (around && around->missed() > 0) {
     result.warnings.push_back(fmt::format(
         "{} integrals did not reach the tolerance {} with {} lines: ask for a larger one",
@@ -146,17 +161,17 @@ std::vector<RenderResult> render_seeds(const Scene& scene, const RunSettings& se
   // The estimators of others hold their seed.
   CHECK(!find_render_method(options.method).looks_around);
   const Stopwatch watch;
-  RunSettings own = settings;
+  RunSettings own = settings_for(options.points, settings);
   own.store = nullptr;
   const EstimatorList estimators = estimators_of(scene, own, options);
-  if (settings.seconds > 0) {
+  if (own.seconds > 0) {
     const double setup = watch.seconds() / static_cast<double>(seeds.size());
     own.seconds = std::max(1e-9, settings.seconds - setup);
   }
   std::vector<RenderResult> results;
   for (const uint64_t seed : seeds) {
     own.seed = seed;
-    results.push_back(run(estimators, own, Stopwatch(), film_size(scene.film)));
+    results.push_back(run(estimators, own, Stopwatch(), film_size(scene.film), options.points));
   }
   return results;
 }

@@ -9,6 +9,7 @@
 
 #include "integrators/estimates/batches.h"
 #include "integrators/film/film_regions.h"
+#include "integrators/methods/faces_method.h"
 #include "integrators/methods/selection.h"
 #include "integrators/pilot/allocation.h"
 #include "integrators/pilot/field_fit.h"
@@ -418,16 +419,19 @@ MethodType method_row(const std::string& name, const std::string& description,
   method.ablation = term_method.sampler.ablation || term_method.random_directions;
   method.only_sum_fixed = term_method.moves_directions || term_method.random_directions ||
                           term_method.warps || term_method.closed;
+  method.closed_light = term_method.closed;
   method.warps = term_method.warps;
   method.biased = term_method.warps && !term_method.unbiased;
   method.run = [term_method](const MethodType&, const Scene& scene, const GradientOptions& options,
                              const RunSettings& settings) {
     const Stopwatch watch;
+    if (options.points == FilmPoints::kFaces) return run_faces(scene, options, settings);
     return TermJob(scene, options, term_method, settings).run(settings, watch);
   };
   method.trace = [term_method](const MethodType&, const Scene& scene,
                                const GradientOptions& options, const RunSettings& settings,
                                const NonFinite::Place& place) {
+    if (options.points == FilmPoints::kFaces) return trace_faces(scene, options, place);
     return TermJob(scene, options, term_method, settings).trace(settings, place);
   };
   return method;

@@ -113,8 +113,12 @@ class VisibleRegions::Tree {
     });
   }
 
-  void for_each_below(uint32_t labels, const SideVisitor& visit) const {
+  void for_each_below(uint64_t labels, const SideVisitor& visit) const {
     std::vector<Side> of_line(lines_.size());
+    for (const Crossing& crossing : crossings_) {
+      of_line[crossing.line].label = faces_[crossing.first].label;
+      of_line[crossing.line].other = faces_[crossing.second].label;
+    }
     for (const Inserted& face : faces_) {
       for (int k = 0; k < face.line_count; ++k) {
         Side& side = of_line[face.lines[k].line()];
@@ -126,7 +130,8 @@ class VisibleRegions::Tree {
     std::vector<PlanePoint> corners;
     std::vector<Side> sides;
     for_each_leaf([&](const Node& node) {
-      if (node.face == kNone || faces_[node.face].label >= labels) return;
+      const uint32_t shown = node.face == kNone ? kNothing : faces_[node.face].label;
+      if (shown >= labels) return;
       corners.clear();
       sides.clear();
       for (const RingCorner& corner : node.ring) {
@@ -134,7 +139,7 @@ class VisibleRegions::Tree {
         sides.push_back(of_line[corner.side.line()]);
         sides.back().line = grid_.to_plane(corner.side.in(lines_));
       }
-      visit(faces_[node.face].label, corners, sides);
+      visit(shown, corners, sides);
     });
   }
 
@@ -496,7 +501,7 @@ void VisibleRegions::set_rule(Rule rule) { tree_->set_rule(std::move(rule)); }
 void VisibleRegions::insert(const SeenFace& face) { tree_->insert(face); }
 size_t VisibleRegions::size() const { return tree_->size(); }
 size_t VisibleRegions::crossings() const { return tree_->crossings(); }
-void VisibleRegions::for_each_below(uint32_t labels, const SideVisitor& visit) const {
+void VisibleRegions::for_each_below(uint64_t labels, const SideVisitor& visit) const {
   tree_->for_each_below(labels, visit);
 }
 void VisibleRegions::for_each(

@@ -170,11 +170,13 @@ Image random_field(const Scene& scene) {
   return field;
 }
 
-// With the same samples interior terms are equal, to rounding.
-void expect_same_interior(const Scene& scene, const std::string& sampler = "forest") {
+// With the same samples interior terms are equal, to rounding; over faces all there is.
+void expect_same_interior(const Scene& scene, const std::string& sampler = "forest",
+                          FilmPoints points = FilmPoints::kRandom) {
   BackwardOptions options;
   options.sampler = sampler;
-  options.terms = {"interior"};
+  options.points = points;
+  options.terms = {points == FilmPoints::kFaces ? "faces" : "interior"};
   options.uniform_pixels = true;
   for (const Parameter& p : list_parameters(scene)) options.parameters.push_back(p.name);
   const TempFiles files;
@@ -195,8 +197,9 @@ void expect_same_interior(const Scene& scene, const std::string& sampler = "fore
     }
     forward_options.parameters.push_back(p.name);
   }
-  forward_options.terms = {"interior"};
+  forward_options.terms = options.terms;
   forward_options.method = sampler;
+  forward_options.points = points;
   const GradientResult forward = gradient(scene, forward_options, settings);
   for (const ParameterGradient& p : forward.parameters) {
     double sum = 0;
@@ -229,6 +232,15 @@ TEST(Backward, InteriorIsThatOfForwardMode) {
   expect_same_interior(shadow_scene(files));
   expect_same_interior(crossing_scene(files));
   expect_same_interior(lamps_scene(files), "analytic");
+}
+
+// Faces that go through each other and are cut by a clip plane among them.
+TEST(Backward, FacesAreThoseOfForwardMode) {
+  const TempFiles files;
+  Scene scene = lamps_scene(files);
+  expect_same_interior(scene, "analytic", FilmPoints::kFaces);
+  scene.camera.near_clip = 4;
+  expect_same_interior(scene, "analytic", FilmPoints::kFaces);
 }
 
 // A diffuse floor and nothing else under a map: the derivative of its radiance with respect to a

@@ -218,6 +218,92 @@ TEST(Analytic, ReverseModeIsTheDerivativeOfTheLoss) {
               1e-12 * magnitude_of(names[0]));
 }
 
+// A body in view over its shadow.
+Scene seen_scene(const TempFiles& files, double shift = 0) {
+  SceneParts parts;
+  parts.max_depth = 2;
+  parts.origin = {0, 2.5, 4};
+  parts.target = {0, 0.5, 0.3};
+  parts.film = R"(<rfilter type="box"/>)";
+  const std::string mesh = write_mesh(files, "seen.obj", torus_mesh(9, 5));
+  parts.body =
+      square("floor", 3, -90, {0, 0, 0}, diffuse("grey", ".5, .6, .7")) +
+      obj_shape("body", mesh, true, 0.5, {0.3 + shift, 1.2, 0.2}, diffuse("clay", ".6, .5, .4")) +
+      square("lamp", 0.4, 90, {0.1, 5, 0}, area_light("glow", "16, 15, 14"));
+  return make_scene(files, parts);
+}
+
+Image faces_image(const Scene& scene) {
+  return to_image(
+      means(render(scene, {}, {.method = "analytic", .points = FilmPoints::kFaces}).radiance),
+      scene.film);
+}
+
+// Over faces the loss is a function of what moves silhouettes in view, too. The camera's numbers
+// are doubles, so that differences are clean; the adjoint is written as floats.
+TEST(Analytic, OverFacesSilhouettesInViewAreInTheLoss) {
+  const TempFiles files;
+  const Image target = faces_image(seen_scene(files, 0.1));
+  const Scene scene = seen_scene(files);
+  const LossImages images{.method = "analytic", .points = FilmPoints::kFaces};
+  const LossResult at = image_loss(scene, target, LossKind::kL2, {}, {}, 1, images);
+  EXPECT_EQ(at.error, 0);
+  BackwardOptions options;
+  options.sampler = "analytic";
+  options.points = FilmPoints::kFaces;
+  const BackwardResult d = backward(scene, at.adjoint, options, {});
+  for (const char* name : {"sensor.translate.x", "sensor.translate.y", "sensor.rotate.z",
+                           "sensor.fov", "clay.reflectance", "glow.radiance"}) {
+    const Parameter p = find_parameter(scene, name);
+    const auto loss_at = [&](double h) {
+      return image_loss(p.moved(scene, h), target, LossKind::kL2, {}, {}, 1, images).value;
+    };
+    const double h = 0x1p-14;
+    const double expected = (loss_at(h) - loss_at(-h)) / (2 * h);
+    const Moments& m = d.of(name).moments;
+    double found = 0;
+    for (size_t i = 0; i < m.size(); ++i) found += m.mean(i);
+    fmt::print("{:20} {:14.9g} {:14.9g}\n", name, found, expected);
+    EXPECT_NEAR(found, expected, 2e-6 * std::fabs(expected)) << name;
+  }
+}
+
+// Nothing is to be warned of, and the truth, whose loss is 0, is found to the rounding of
+// positions.
+TEST(Fit, QuasiNewtonOverFacesFindsWhatIsInView) {
+  const TempFiles files;
+  FitOptions options;
+  options.parameters = {"body.translate.x", "body.translate.z", "glow.radiance"};
+  options.optimiser = OptimiserKind::kLbfgs;
+  options.backward.sampler = "analytic";
+  options.backward.points = FilmPoints::kFaces;
+  options.step = 2;
+  RunSettings settings;
+  settings.threads = 2;
+  Fit fit({{seen_scene(files, -0.15), faces_image(seen_scene(files)), {}}}, options, settings);
+  EXPECT_TRUE(fit.warnings().empty());
+  double first = 0, last = 0;
+  for (int i = 0; i < 30; ++i) {
+    const auto record = fit.step();
+    ASSERT_TRUE(record);
+    EXPECT_EQ(record->error, 0);
+    if (i == 0) first = record->loss;
+    if (i > 0) EXPECT_LE(record->loss, last);
+    last = record->loss;
+    if (record->at_rest) break;
+  }
+  const std::vector<FitScalar> found = fit.scalars();
+  fmt::print("loss {:.3g} to {:.3g}, x {:.6f}, z {:.6f}, radiance {:.5f}\n", first, last,
+             found[0].value, found[1].value, found[2].value);
+  EXPECT_LT(last, 1e-8 * first);
+  EXPECT_NEAR(found[0].value, 0.15, 1e-4);
+  EXPECT_NEAR(found[1].value, 0, 1e-4);
+  EXPECT_NEAR(found[2].value, 16, 1e-2);
+  options.backward.points = FilmPoints::kRandom;
+  const Fit noisy({{seen_scene(files), faces_image(seen_scene(files)), {}}}, options, settings);
+  EXPECT_FALSE(noisy.warnings().empty());
+}
+
 FitView shadow_view(const TempFiles& files, double shift = -0.25) {
   const Scene truth = shadow_scene(files, false);
   return {shadow_scene(files, false, shift), target_of(truth), {}};

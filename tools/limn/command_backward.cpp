@@ -27,6 +27,7 @@ class BackwardCommand final : public Command {
   }
 
   void add_options(CLI::App& app, bool) override {
+    app_ = &app;
     add_common_options(app, common_);
     auto* adjoint =
         app.add_option("--adjoint", adjoint_, "Derivative of the loss for every pixel (.exr)");
@@ -69,7 +70,11 @@ class BackwardCommand final : public Command {
     const Scene scene = load_scene(common_, warnings_);
     if (adjoint_.empty() && target_.empty()) throw InputError("give --adjoint or --target");
     const LossKind kind = loss_kind(loss_);
-    reverse_method(options_.sampler);  // told before the loss is rendered
+    // Told before the loss is rendered.
+    check_points(options_.points, reverse_method(options_.sampler).closed, options_.sampler);
+    refuse_samples(*app_, options_.points,
+                   {"--spp", "--time", "--batches", "--pixels", "--edge-samples",
+                    "--camera-samples", "--shadow-samples"});
     if (!common_.part.empty()) return make_part(scene, command_line);
     files_ = plan_files(scene, options_.parameters, output_);
     if (target_.empty()) files_.adjoint = files_.adjoint_picture = "";
@@ -111,7 +116,7 @@ class BackwardCommand final : public Command {
   }
 
   RunSettings settings_of(const Scene& scene) const {
-    RunSettings settings = make_settings(common_, scene, name());
+    RunSettings settings = settings_for(options_.points, make_settings(common_, scene, name()));
     if (seconds_ == 0) return settings;
     settings.seconds = seconds_;
     settings.spp = 1 << 30;
@@ -134,7 +139,8 @@ class BackwardCommand final : public Command {
     const Image target = read_exr(target_);
     check_loss_images(scene, target, {}, target_);
     loss = image_loss(scene, target, kind, settings, {}, levels_,
-                      {.method = reverse_method(options_.sampler).closed ? "analytic" : "path"});
+                      {.method = reverse_method(options_.sampler).closed ? "analytic" : "path",
+                       .points = options_.points});
     if (kind == LossKind::kL1) {
       warnings_.add_all(
           {"the gradient of l1 is biased where the image's noise is not small beside "
@@ -185,6 +191,7 @@ class BackwardCommand final : public Command {
                    {"setup_seconds", result.setup_seconds},
                    {"pixels", options_.uniform_pixels ? kUniformPixels : kAdjointPixels},
                    {"sampler", options_.sampler},
+                   {"points", name_of(options_.points)},
                    {"warnings", warnings_.lines()},
                    {"non_finite", result.non_finite.count}};
     if (!target_.empty()) {
@@ -237,6 +244,7 @@ class BackwardCommand final : public Command {
   static constexpr double kImageShare = 0.25;
 
   Stopwatch watch_;
+  CLI::App* app_ = nullptr;
   CommonOptions common_;
   Warnings warnings_;
   BackwardOptions options_;

@@ -123,11 +123,13 @@ class CheckCommand final : public Command {
   const char* description() const override { return "Compare a gradient with finite differences"; }
 
   void add_options(CLI::App& app, bool all) override {
+    app_ = &app;
     add_common_options(app, common_);
     add_parameter_options(app, parameters_, options_.method, all);
     add_term_options(app, terms_, samples_);
     add_warp_options(app, options_.warp);
     add_film_option(app, film_);
+    add_points_option(app, points_);
     app.add_option("--step", options_.step,
                    "Step of the differences (default: found in the image, by a pilot)")
         ->check(CLI::PositiveNumber);
@@ -151,6 +153,8 @@ class CheckCommand final : public Command {
     if (reverse_ && options_.exact_film) {
       throw InputError("--film exact: reverse mode has its film by rays");
     }
+    refuse_samples(*app_, points_, {"--spp", "--samples", "--block", "--reverse"});
+    if (points_ == FilmPoints::kFaces) return run_faces(scene);
     if (reverse_) return run_reverse(scene);
     options_.samples = parse_samples(samples_);
     for (const auto& parameter : parameters_) find_parameter(scene, parameter);
@@ -184,6 +188,42 @@ class CheckCommand final : public Command {
   }
 
  private:
+  int run_faces(const Scene& scene) {
+    json report = json::array();
+    int status = kSuccess;
+    for (const auto& parameter : parameters_) {
+      options_.parameter = parameter;
+      const FacesCheck r =
+          check_faces(scene, options_, make_settings(common_, scene, "check " + parameter));
+      if (r.interrupted) {
+        fmt::print(stderr, "interrupted: no verdict\n");
+        return kInterrupted;
+      }
+      warnings_.add_all(r.gradient.warnings);
+      fmt::print(
+          "{}: sum over the image: gradient {:.8g}, differences {:.8g} (step {:.3g})\n"
+          "  they differ by {:.2g} of the derivative, the differences of two steps by {:.2g}: {}\n",
+          parameter, r.gradient_sum, r.difference_sum, r.step, r.error, r.known,
+          verdict_name(r.verdict));
+      report.push_back({{"parameter", parameter},
+                        {"method", r.gradient.method},
+                        {"points", name_of(points_)},
+                        {"step", r.step},
+                        {"verdict", verdict_name(r.verdict)},
+                        {"gradient_sum", r.gradient_sum},
+                        {"difference_sum", r.difference_sum},
+                        {"error", r.error},
+                        {"known", number(r.known)},
+                        {"sensor", sensor_name(scene)},
+                        {"warnings", warnings_.lines()}});
+      if (r.verdict == Verdict::kDisagree) status = kDisagree;
+      if (r.verdict == Verdict::kCannotTell && status == kSuccess) status = kCannotTell;
+      if (const int s = finish_status(r.gradient.non_finite, 1, 1, "")) status = s;
+    }
+    write_json(common_.json, report.dump(2));
+    return status;
+  }
+
   int run_reverse(const Scene& scene) {
     BackwardOptions options;
     options.parameters = parameters_;
@@ -221,6 +261,8 @@ class CheckCommand final : public Command {
 
   CommonOptions common_;
   Warnings warnings_;
+  CLI::App* app_ = nullptr;
+  FilmPoints points_ = FilmPoints::kRandom;
   CheckOptions options_;
   bool reverse_ = false;
   std::vector<std::string> parameters_;

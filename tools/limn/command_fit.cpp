@@ -217,6 +217,9 @@ FitArguments FitCommand::arguments() const {
     text = with_absolute_field(text, std::min(text.size(), text.rfind('=')));
   }
   a.views = view_arguments();
+  refuse_samples(*app_, a.options.backward.points,
+                 {"--spp", "--loss-spp", "--spp-doubling", "--pixels", "--edge-samples",
+                  "--camera-samples", "--shadow-samples"});
   if (a.optimiser == "lbfgs") {
     if (app_->get_option("--pixels")->count() > 0 && !a.options.backward.uniform_pixels) {
       throw InputError("--pixels adjoint: lbfgs takes the same samples in all pixels, --pixels " +

@@ -246,6 +246,7 @@ class GradientCommand final : public Command {
   const char* description() const override { return "Derivative images, with standard errors"; }
 
   void add_options(CLI::App& app, bool all) override {
+    app_ = &app;
     add_common_options(app, common_);
     add_parameter_options(app, options_.parameters, options_.method, all);
     add_term_options(app, terms_, samples_);
@@ -266,6 +267,7 @@ class GradientCommand final : public Command {
                  "OUTPUT_samples_TERM.exr");
     app.add_flag("--stats", stats_, "Print edges, nodes, bytes, rays by kind, where the time went");
     add_film_option(app, film_);
+    add_points_option(app, options_.points);
     add_debug_option(app, debug_);
     add_part_option(app, common_);
     app.get_option("--part")->excludes("--time");
@@ -277,6 +279,7 @@ class GradientCommand final : public Command {
 
   int run(const std::string& command_line) override {
     const Scene scene = load_scene(common_, warnings_);
+    refuse_samples(*app_, options_.points, {"--spp", "--time", "--samples", "--sample-images"});
     options_.terms = parse_terms(terms_);
     options_.samples = parse_samples(samples_);
     options_.uniform_samples = samples_ == "uniform";
@@ -297,7 +300,7 @@ class GradientCommand final : public Command {
     }
     check_outputs(planned_files(), scene, field_files(options_.parameters));
     check_memory(scene);
-    RunSettings settings = make_settings(common_, scene, name());
+    RunSettings settings = settings_for(options_.points, make_settings(common_, scene, name()));
     if (seconds_ > 0) {
       settings.seconds = seconds_;
       settings.spp = kUnlimited;
@@ -435,6 +438,7 @@ class GradientCommand final : public Command {
 
   CommonOptions common_;
   Warnings warnings_;
+  CLI::App* app_ = nullptr;
   GradientOptions options_;
   std::string terms_, samples_ = "auto";
   std::string output_, debug_, film_ = "rays";

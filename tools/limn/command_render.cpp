@@ -31,6 +31,7 @@ class RenderCommand final : public Command {
             std::vector<std::string>(std::begin(kRenderSamplers), std::end(kRenderSamplers))))
         ->capture_default_str();
     add_film_option(app, film_);
+    add_points_option(app, options_.points);
     add_debug_option(app, debug_);
     add_part_option(app, common_);
   }
@@ -42,7 +43,8 @@ class RenderCommand final : public Command {
   int run(const std::string& command_line) override {
     check_options();
     Scene scene = load_scene(common_, warnings_);
-    const RunSettings settings = make_settings(common_, scene, name());
+    const RunSettings settings =
+        settings_for(options_.points, make_settings(common_, scene, name()));
     show(what_, scene, options_);
     options_.exact_film = film_ == "exact";
     if (!debug_.empty()) {
@@ -72,12 +74,21 @@ class RenderCommand final : public Command {
  private:
   void check_options() const {
     check_image_options(*app_, {options_.method});
-    if (!has_sampler()) {
+    refuse_samples(*app_, options_.points, {"--spp", "--sampler"});
+    if (!has_sampler() && options_.points == FilmPoints::kRandom) {
       refuse_options(*app_, {"--sampler"},
                      fmt::format("the method {} has its own", options_.method));
     }
   }
+  const RenderMethod& method() const {
+    const auto methods = render_methods();
+    return *std::ranges::find_if(
+        methods, [&](const RenderMethod& method) { return method.name == options_.method; });
+  }
+  bool has_points() const { return method().closed_light; }
+  // Of a method that is not known yet render() tells.
   bool has_sampler() const {
+    if (options_.points == FilmPoints::kFaces) return false;
     return std::ranges::none_of(render_methods(), [&](const RenderMethod& method) {
       return method.name == options_.method && method.looks_around;
     });
@@ -89,6 +100,7 @@ class RenderCommand final : public Command {
     attributes.push_back({"limn.method", options_.method});
     if (what_ != "image") attributes.push_back({"limn.what", what_});
     if (has_sampler()) attributes.push_back({"limn.sampler", options_.sampler});
+    if (has_points()) attributes.push_back({"limn.points", name_of(options_.points)});
     attributes.push_back({kOutputAttribute, output_name(output_)});
     remove_stale(output_, {output_});
     write_exr(output_, film_channels(scene, image), scene.film.half, attributes);
@@ -111,6 +123,7 @@ class RenderCommand final : public Command {
                              {"warnings", warnings_.lines()},
                              {"non_finite", result.non_finite.count}};
     if (has_sampler()) report["sampler"] = options_.sampler;
+    if (has_points()) report["points"] = name_of(options_.points);
     write_json(common_.json, report.dump(2));
   }
 

@@ -103,6 +103,27 @@ void add_term_options(CLI::App& app, std::string& terms, std::string& samples) {
       ->type_name("N,N,...");
 }
 
+void add_points_option(CLI::App& app, FilmPoints& points) {
+  app.add_option_function<std::string>(
+         "--points", [&points](const std::string& name) { points = film_points(name); },
+         "Where light in closed form (analytic) is looked for: at random points of a pixel, or "
+         "once "
+         "for each face that it shows, times the area of that: no noise, and the exact derivative "
+         "of its own image, off by the square of a pixel (box filter; takes no samples)")
+      ->check(
+          CLI::IsMember(std::vector<std::string>(std::begin(kFilmPoints), std::end(kFilmPoints))))
+      ->default_str(kFilmPoints[0]);
+}
+
+void refuse_samples(const CLI::App& app, FilmPoints points,
+                    const std::vector<std::string>& options) {
+  if (points != FilmPoints::kFaces) return;
+  for (const std::string& name : options) {
+    if (app.count(name) == 0) continue;
+    throw InputError(name + ": --points faces takes no samples");
+  }
+}
+
 void add_film_option(CLI::App& app, std::string& film) {
   app.add_option("--film", film,
                  "What the camera sees, of a gradient its edges: by rays, or by the exact visible "
@@ -129,6 +150,7 @@ void add_reverse_options(CLI::App& app, BackwardOptions& options) {
                  "max_depth 2); or to compare with them quadric, li2019, uniform, brute or a "
                  "variant of these")
       ->capture_default_str();
+  add_points_option(app, options.points);
   app.add_option("--edge-samples", options.edge_samples, "At every vertex of a path")
       ->check(CLI::Range(1, 1 << 16))
       ->capture_default_str();

@@ -49,6 +49,11 @@ void add_warp_options(CLI::App& app, WarpOptions& warp);
 // --terms, --pixels, --sampler, --edge-samples, --camera-samples and --shadow-samples
 void add_reverse_options(CLI::App& app, BackwardOptions& options);
 inline constexpr const char *kAdjointPixels = "adjoint", *kUniformPixels = "uniform";
+// --points, for light in closed form
+void add_points_option(CLI::App& app, FilmPoints& points);
+// InputError if one of the options was given, which faces have no use for.
+void refuse_samples(const CLI::App& app, FilmPoints points,
+                    const std::vector<std::string>& options);
 // --film: "rays" or "exact"
 void add_film_option(CLI::App& app, std::string& film);
 // --debug-sample

@@ -94,6 +94,7 @@ void visit_arguments(Arguments& a, const Visit& visit) {
 json to_json(const FitArguments& a) {
   json j;
   visit_arguments(a, [&](const char* name, const auto& member) { j[name] = member; });
+  j["points"] = name_of(a.options.backward.points);
   j["pixels"] = a.options.backward.uniform_pixels ? kUniformPixels : kAdjointPixels;
   for (const ViewArguments& view : a.views) j["views"].push_back(to_json(view));
   return j;
@@ -104,6 +105,7 @@ FitArguments arguments_from(json j) {
   if (!j.contains("shadow_samples")) j["shadow_samples"] = j.at("camera_samples");
   FitArguments a;
   visit_arguments(a, [&](const char* name, auto& member) { j.at(name).get_to(member); });
+  if (j.contains("points")) a.options.backward.points = film_points(j.at("points"));
   a.options.backward.uniform_pixels = j.at("pixels") == kUniformPixels;
   for (const json& view : j.at("views")) {
     a.views.push_back({view.at("scene"), view.at("defines"), view.at("sensor"), view.at("target"),

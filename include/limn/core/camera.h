@@ -74,14 +74,35 @@ class CameraView {
   // As Camera::depth.
   S depth(const Vec3<S>& point) const { return dot(point - origin_, forward_); }
 
-  // As Camera::ray.
-  CameraRay<S> ray(double x, double y) const {
+  const Vec3<S>& forward() const { return forward_; }
+  bool is_still() const {
+    using limn::is_still;
+    return is_still(origin_) && is_still(left_) && is_still(up_) && is_still(forward_) &&
+           is_still(tan_x_);
+  }
+
+  // As Camera::ray. X: S, or double where the film position is held.
+  template <class X>
+  CameraRay<S> ray(const X& x, const X& y) const {
     const Camera& c = camera_;
-    const double sx = 1 - 2 * (x / c.width + c.offset_x);
-    const double sy = (1 - 2 * (y / c.height + c.offset_y)) * c.height / c.width;
+    const X sx = 1.0 - 2.0 * (x / static_cast<double>(c.width) + c.offset_x);
+    const X sy = (1.0 - 2.0 * (y / static_cast<double>(c.height) + c.offset_y)) *
+                 static_cast<double>(c.height) / static_cast<double>(c.width);
     const Vec3<S> d = left_ * (tan_x_ * sx) + up_ * (tan_x_ * sy) + forward_;
     const double d_length = length(value(d));
     return {origin_, normalize(d), c.near_clip * d_length, c.far_clip * d_length};
+  }
+
+  // The direction of ray(x + dx, y + dy) is that of a + dx u + dy v, whose depth is 1.
+  struct Plane {
+    Vec3<S> u, v, a;
+  };
+  Plane plane(double x, double y) const {
+    const Camera& c = camera_;
+    const double sx = 1 - 2 * (x / c.width + c.offset_x);
+    const double sy = (1 - 2 * (y / c.height + c.offset_y)) * c.height / c.width;
+    const S step = tan_x_ * (-2.0 / c.width);
+    return {left_ * step, up_ * step, left_ * (tan_x_ * sx) + up_ * (tan_x_ * sy) + forward_};
   }
 
   // As Camera::project.

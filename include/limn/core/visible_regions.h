@@ -113,16 +113,17 @@ class VisibleRegions {
 
   // A side of a region: what line it lies on. It may go on beyond the face that has made it.
   struct Side {
-    uint32_t label = kNothing;  // a face; none: the window's own, or where faces cross
+    uint32_t label = kNothing;  // a face; none: the window's own
     int8_t side = -1;           // SeenFace::Side::number of that face, or
-    int8_t cut = -1;            // index of SeenFace::cuts
+    int8_t cut = -1;            // index of SeenFace::cuts, or
+    uint32_t other = kNothing;  // the face that it crosses there
     PlaneFunction line;         // rounded to the grid; positive inside the region
   };
   // The same for regions that show a label less than `labels`, with their sides: side i begins at
-  // corner i.
+  // corner i. kNothing counts as a label.
   using SideVisitor =
       std::function<void(uint32_t, std::span<const PlanePoint>, std::span<const Side>)>;
-  void for_each_below(uint32_t labels, const SideVisitor& visit) const;
+  void for_each_below(uint64_t labels, const SideVisitor& visit) const;
 
  private:
   class Tree;

@@ -36,6 +36,9 @@ struct BackwardOptions {
   // Of edges: a row of edge_sampler_types(). Or "analytic": no edges at vertices of paths, but
   // light in closed form, as the method of that name in forward mode, with its scenes.
   std::string sampler = "forest";
+  // With "analytic" and faces there is one term, `faces`, and no numbers of samples, no batches and
+  // no standard errors but 0; InputError for faces with another sampler, and in parts.
+  FilmPoints points = FilmPoints::kRandom;
   int edge_samples = 1;  // at every vertex of a path, of each term of edges; 65536 at most
   // Points on the film, per path, of `camera`; 65536 at most. 0: a quarter, and with "analytic" one
   // (README.md of integrators/backward has what other numbers did).
@@ -130,12 +133,14 @@ struct LossResult {
 
 // What a loss is told from.
 struct LossImages {
-  std::string method = "path";  // of render(), but for those that look around
+  std::string method = "path";              // of render(), but for those that look around
+  FilmPoints points = FilmPoints::kRandom;  // of faces there is one image
   // One image in place of two, of the samples of settings.seed: those that backward() takes, too,
   // with uniform pixels and one batch. Where light is known in closed form the loss is then a
   // function of the scene, and backward() gives its derivative. It is larger than that of the
   // image's mean by what these samples miss.
   bool same_samples = false;
+  bool one_image() const { return same_samples || points == FilmPoints::kFaces; }
 };
 
 // Renders the scene twice with settings.spp samples per pixel each, with seeds of their own that

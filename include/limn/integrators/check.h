@@ -98,4 +98,21 @@ using GradientRun =
 CheckResult check(const Scene& scene, const CheckOptions& options, const RunSettings& settings,
                   const GradientRun& run = gradient);
 
+// Where a pixel is made of its faces (FilmPoints::kFaces) nothing is left to chance: the gradient is
+// held against central differences of the very image, at steps from options.step (0: the natural
+// one) down, of which the one is taken where they change least from step to step.
+struct FacesCheck {
+  GradientResult gradient;
+  double step = 0;
+  double gradient_sum = 0, difference_sum = 0;  // over the image
+  // The root of the squared difference of both images, and of how the differences change from one
+  // step to the next, summed over the image; over that of the larger one.
+  double error = 0, known = 0;
+  Verdict verdict = Verdict::kCannotTell;
+  bool interrupted = false;
+};
+// Takes no notice of samples, blocks and warps.
+FacesCheck check_faces(const Scene& scene, const CheckOptions& options,
+                       const RunSettings& settings);
+
 }  // namespace limn

@@ -18,6 +18,7 @@
 
 #include "limn/core/scene.h"
 #include "limn/edgetree/edges.h"
+#include "limn/integrators/film_points.h"
 #include "limn/integrators/moments.h"
 #include "limn/integrators/run.h"
 
@@ -65,6 +66,9 @@ struct GradientOptions {
   // Edges on the film are drawn from what is seen of them alone, by exact visible regions of every
   // pixel. InputError unless the film has a box filter, and for methods that draw none.
   bool exact_film = false;
+  // InputError for others than random where the method has no light in closed form. With faces the
+  // terms are one, `faces`, and there are no samples of terms.
+  FilmPoints points = FilmPoints::kRandom;
   WarpOptions warp;
 };
 

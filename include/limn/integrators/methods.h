@@ -16,9 +16,10 @@ struct MethodType {
   bool terms_can_be_left_out = false;
   // What terms hold by themselves depends on choices that the run makes; their sum does not.
   bool only_sum_fixed = false;
-  bool warps = false;     // it takes GradientOptions::warp
-  bool biased = false;    // its mean is not the derivative, however many samples it takes
-  bool ablation = false;  // a variant that shows what a part of a method is worth
+  bool closed_light = false;  // it takes GradientOptions::points
+  bool warps = false;         // it takes GradientOptions::warp
+  bool biased = false;        // its mean is not the derivative, however many samples it takes
+  bool ablation = false;      // a variant that shows what a part of a method is worth
   // InputError, with the place, for a scene that the method cannot take; null: it takes all.
   void (*check)(const Scene&) = nullptr;
   std::function<GradientResult(const MethodType&, const Scene&, const GradientOptions&,

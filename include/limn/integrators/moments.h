@@ -23,6 +23,11 @@ class Moments {
 
   // sums: one value per element, the sum over `samples` samples.
   void add_batch(const std::vector<double>& sums, int64_t samples);
+  // A value that no chance is in: as two batches that are alike, so that its variance is 0.
+  void add_exact(const std::vector<double>& values) {
+    add_batch(values, 1);
+    add_batch(values, 1);
+  }
   double mean(size_t i) const { return samples_ > 0 ? sums_[i] / samples_ : 0; }
   // The variance of the mean; needs two batches.
   double variance(size_t i) const;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "limn/core/scene.h"
+#include "limn/integrators/film_points.h"
 #include "limn/integrators/moments.h"
 #include "limn/integrators/run.h"
 
@@ -53,7 +54,8 @@ struct RenderOptions {
   // (limn/core/visible_regions.h), in place of rays from the camera. InputError unless the film has
   // a box filter.
   bool exact_film = false;
-  RenderWhat what = RenderWhat::kImage;  // InputError where the method does not know it
+  FilmPoints points = FilmPoints::kRandom;  // InputError for others where light is sampled
+  RenderWhat what = RenderWhat::kImage;     // InputError where the method does not know it
   // silhouettes, lines: lines through the sky, 1 to 16384; a quarter of them through a lamp. With a
   // tolerance above 0 (at most 1) they, 8 at least, are doubled until two halves differ by at most
   // twice this part of the result, or until there are 16384, which RenderResult::warnings tells;
