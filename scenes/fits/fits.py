@@ -81,9 +81,9 @@ class Fits:
                 seconds = self.run("fit", "--resume", self.path(folder), "--steps", str(steps))
         else:
             # Four times the default: what the figures in README.md were taken with.
+            samples = [] if "--points" in words else ["--camera-samples", "1"]
             seconds = self.run("fit", scene, "--target", target, "--steps", str(steps),
-                               "--camera-samples", "1", "-o", self.path(folder),
-                               *words)  # fmt: skip
+                               *samples, "-o", self.path(folder), *words)  # fmt: skip
         known = json.load(open(times, encoding="utf-8")) if os.path.exists(times) else None
         if seconds and (known is not None or not done):
             known = (known or 0) + seconds
@@ -285,7 +285,7 @@ NEWTON = [*FUNCTION, "--optimiser", "lbfgs"]
 def curve(fit):
     """After each step that was begun: losses and gradients so far, processor seconds, loss.
 
-    Every step evaluates one loss and gradient, but for those of L-BFGS, which say how many.
+    Every step takes one of both, but for those of L-BFGS, which say how many they took.
     """
     points, count = [], 0
     for step in fit["history"]:
@@ -304,16 +304,29 @@ def reached(fit, part):
     return None
 
 
+def targets_of(fits, name, base, defines, sensors=1):
+    """For each sensor the image as a function of the scene, and what samples have in the mean."""
+    lists = []
+    for kind, more in (("", {"points": "faces"}), ("_mean", {"spp": 32})):
+        lists.append([
+            fits.render(scene(base), fits.path(f"{name}{kind}_{i}.exr"), *fits.size, *defines,
+                        sensor=i, method="analytic", **more)
+            for i in range(sensors)
+        ])  # fmt: skip
+    return lists
+
+
 def compare(fits, name, base, targets, defines, parameters, variants, error):
     """A row for each of (name, steps, options); error(folder, fit): of the parameters at last."""
     rows = []
     chosen = fits.chosen([(variant, (steps, more)) for variant, steps, more in variants])
     for variant, (steps, more) in chosen:
         folder = f"{name}_{variant.replace(' ', '_')}"
+        own = targets[0] if "analytic" in more else targets[1]
         words = [w for p in parameters for w in ("--wrt", p)]
         words += [w for d in [*fits.size, *defines] for w in ("-D", d)]
-        words += [w for t in targets[1:] for w in ("--target", t)]
-        fit = fits.fit(folder, scene(base), targets[0], steps, *words, *more)
+        words += [w for t in own[1:] for w in ("--target", t)]
+        fit = fits.fit(folder, scene(base), own[0], steps, *words, *more)
         first = fit["history"][0]["loss"]
         cells = [variant, fit["steps"], f"{fit['history'][-1]['loss'] / first:.1e}"]
         for part in (0.1, 0.01, 0.001):
@@ -338,16 +351,14 @@ TREE = 20  # degrees from the start to the truth
 
 
 def tree(fits):
-    target = fits.render(
-        scene("tree_shadow.xml"), fits.path("tree.exr"), *fits.size, f"turn={TREE}",
-        method="analytic", points="faces")  # fmt: skip
+    targets = targets_of(fits, "tree", "tree_shadow.xml", [f"turn={TREE}"])
     noisy = ["--spp", "16", "--step", "3", "--step-half-life", "25", "--seed", "1"]
     variants = [
         ("lbfgs", 8, [*NEWTON, "--step", "5"]),
-        ("adam", 60, [*FUNCTION, "--optimiser", "adam", "--step", "3", "--step-half-life", "15"]),
-        ("adam of forest", 100, noisy),
+        ("adam", 30, [*FUNCTION, "--optimiser", "adam", "--step", "4", "--step-half-life", "8"]),
+        ("adam of forest", 60, noisy),
     ]
-    return compare(fits, "tree", "tree_shadow.xml", [target], [], ["object.rotate.y"], variants,
+    return compare(fits, "tree", "tree_shadow.xml", targets, [], ["object.rotate.y"], variants,
                    angles([math.radians(TREE)]))  # fmt: skip
 
 
@@ -356,18 +367,16 @@ GEARS = [11, -9, 12, -12, 8, 10, -11, 16, -18, 17, -15, 18, -17, 17, -16]
 
 
 def gears(fits):
-    target = fits.render(
-        scene("gears.xml"), fits.path("gears.exr"), *fits.size, method="analytic", points="faces"
-    )
+    targets = targets_of(fits, "gears", "gears.xml", [])
     start = [f"off_{i}={a}" for i, a in enumerate(GEARS)]
     names = [f"gear_{i}.rotate.y" for i in range(len(GEARS))]
-    noisy = ["--spp", "16", "--step", "2", "--step-half-life", "30", "--seed", "1"]
+    noisy = ["--spp", "16", "--step", "4", "--step-half-life", "20", "--seed", "1"]
     variants = [
-        ("lbfgs", 40, [*NEWTON, "--step", "2"]),
-        ("adam", 120, [*FUNCTION, "--optimiser", "adam", "--step", "2", "--step-half-life", "30"]),
-        ("adam of forest", 150, noisy),
+        ("lbfgs", 28, [*NEWTON, "--step", "5"]),
+        ("adam", 80, [*FUNCTION, "--optimiser", "adam", "--step", "4", "--step-half-life", "20"]),
+        ("adam of forest", 80, noisy),
     ]
-    return compare(fits, "gears", "gears.xml", [target], start, names, variants,
+    return compare(fits, "gears", "gears.xml", targets, start, names, variants,
                    angles([math.radians(-a) for a in GEARS]))  # fmt: skip
 
 
@@ -415,11 +424,7 @@ def normals(places, faces):
 def displacement(fits):
     mesh, truth = stone(fits)
     shape = [f"mesh={os.path.abspath(mesh)}", "format=obj"]
-    targets = [
-        fits.render(scene("displacement.xml"), fits.path(f"stone_{i}.exr"), *fits.size,
-                    *shape, sensor=i, method="analytic", points="faces")
-        for i in range(8)
-    ]  # fmt: skip
+    targets = targets_of(fits, "stone", "displacement.xml", shape, 8)
 
     def error(folder, fit):
         found = positions(fits.path(folder, fit["snapshots"][-1]["meshes"][0]["file"]))
@@ -429,9 +434,9 @@ def displacement(fits):
     even = ["--smoothing", "0"]
     noisy = ["--spp", "4", "--step", "2", "--step-half-life", "40", "--seed", "1"]
     variants = [
-        ("lbfgs", 60, [*even, *NEWTON, "--step", "1"]),
-        ("adam", 160, [*even, *FUNCTION, "--step", "2", "--step-half-life", "40"]),
-        ("adam of forest", 160, [*even, *noisy]),
+        ("lbfgs", 40, [*even, *NEWTON, "--step", "1"]),
+        ("adam", 100, [*even, *FUNCTION, "--step", "2", "--step-half-life", "30"]),
+        ("adam of forest", 100, [*even, *noisy]),
     ]
     return compare(fits, "displacement", "displacement.xml", targets, [],
                    ["object.displacement"], variants, error)  # fmt: skip

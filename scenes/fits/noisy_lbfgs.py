@@ -68,7 +68,7 @@ def main():
     parser.add_argument("--evaluations", type=int, default=60, help="at most, of loss and gradient")
     parser.add_argument("-o", "--output", default=os.path.join(ROOT, "out", "fits"))
     arguments = parser.parse_args()
-    target = os.path.join(arguments.output, f"{arguments.name}.exr")
+    target = os.path.join(arguments.output, f"{arguments.name}_mean_0.exr")
     noisy = Noisy(arguments.name, target, arguments.seeds == "new")
     # The scale of losses is not that of steps: without one its first step is as long as a gradient.
     first, gradient = noisy(np.zeros(len(noisy.names)))
