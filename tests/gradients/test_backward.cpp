@@ -5,11 +5,9 @@
 #include <cmath>
 #include <numeric>
 
-#include "limn/core/error.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/backward.h"
 #include "limn/integrators/gradient.h"
-#include "limn/integrators/render.h"
 #include "support/meshes.h"
 #include "support/scenes.h"
 
@@ -436,136 +434,6 @@ TEST(Backward, AgreesInSharpShadows) {
 TEST(Backward, AgreesWhereShapesCrossAndAreCut) {
   const TempFiles files;
   expect_agreement(crossing_scene(files), 64);
-}
-
-// At the target itself both the loss and its gradient have mean zero, however noisy the images are.
-TEST(Backward, LossIsUnbiasedAtItsTarget) {
-  const TempFiles files;
-  const Scene scene = shadow_scene(files);
-  RunSettings settings;
-  settings.spp = 2048;
-  settings.threads = 2;
-  const RenderResult truth = render(scene, settings);
-  const Image target = mean_image(truth.radiance, scene.film.crop_width, scene.film.crop_height);
-  for (const char* name : {"l2", "relative-l2"}) {
-    Moments values(2);
-    BackwardOptions options;
-    options.parameters = {"clay.reflectance"};
-    settings.spp = 2;
-    for (settings.seed = 100; settings.seed < 164; ++settings.seed) {
-      const LossResult loss = image_loss(scene, target, loss_kind(name), settings);
-      const BackwardResult result = backward(scene, loss.adjoint, options, settings);
-      values.add_batch({loss.value, result.parameters[0].moments.mean(0)}, 1);
-    }
-    EXPECT_LT(std::fabs(values.mean(0)), 4.5 * std::sqrt(values.variance(0))) << name;
-    EXPECT_LT(std::fabs(values.mean(1)), 4.5 * std::sqrt(values.variance(1))) << name;
-  }
-}
-
-// The loss of a pyramid from its definition: every block of 2^k by 2^k pixels by itself.
-double pyramid_loss(const std::vector<double>& a, const std::vector<double>& b, const Image& target,
-                    const Image& mask, int levels, bool relative) {
-  const int width = target.width, height = target.height;
-  double all = 0, loss = 0;
-  for (const float w : mask.data) all += 3 * w;
-  for (int size = 1, k = 0; k < levels; ++k, size *= 2) {
-    for (int y = 0; y < height; y += size) {
-      for (int x = 0; x < width; x += size) {
-        for (int c = 0; c < 3; ++c) {
-          double weight = 0, sums[3] = {};
-          for (int i = 0; i < size * size; ++i) {
-            const int u = x + i % size, v = y + i / size;
-            if (u >= width || v >= height || mask.at(u, v, 0) == 0) continue;
-            const double w = mask.at(u, v, 0);
-            const size_t at = 3 * (static_cast<size_t>(v) * width + u) + c;
-            weight += w;
-            sums[0] += w * a[at];
-            sums[1] += w * b[at];
-            sums[2] += w * target.at(u, v, c);
-          }
-          if (weight == 0) continue;
-          for (double& sum : sums) sum /= weight;
-          const double one = (sums[0] - sums[2]) * (sums[1] - sums[2]);
-          loss += weight / all / levels * (relative ? one / (sums[2] * sums[2] + 0.01) : one);
-        }
-      }
-    }
-  }
-  return loss;
-}
-
-TEST(Backward, LossOfAPyramidIsThatOfItsBlocks) {
-  const TempFiles files;
-  SceneParts parts;
-  parts.width = 7;
-  parts.height = 5;
-  parts.body = square("floor", 3, -90, {0, 0, 0}, diffuse("clay", ".6, .5, .4")) +
-               square("lamp", 0.8, 90, {0.5, 3.5, 1}, area_light("glow", "6, 6, 6"));
-  const Scene scene = make_scene(files, parts);
-  EXPECT_EQ(most_pyramid_levels(scene), 4);
-  RunSettings settings;
-  settings.spp = 2;
-  settings.seed = 5;
-  std::vector<std::vector<double>> images;
-  for (int i = 0; i < 2; ++i) {  // those of image_loss()
-    RunSettings own = settings;
-    own.seed = mix_bits(mix_bits(settings.seed) + 1 + i);
-    images.push_back(means(render(scene, own).radiance));
-  }
-  Image target(7, 5, 3), mask(7, 5, 1);
-  for (size_t i = 0; i < target.data.size(); ++i) target.data[i] = 0.1f * (i % 7);
-  for (size_t i = 0; i < mask.data.size(); ++i) mask.data[i] = static_cast<float>(i % 4);
-  target.at(4, 0, 1) = NAN;  // where the mask is zero
-  for (const bool relative : {false, true}) {
-    for (const int levels : {1, 2, 4}) {
-      const LossKind kind = relative ? LossKind::kRelativeL2 : LossKind::kL2;
-      const LossResult loss = image_loss(scene, target, kind, settings, mask, levels);
-      const auto exact = [&](size_t at, double step) {
-        std::vector<std::vector<double>> moved = images;
-        for (auto& image : moved) image[at] += step;
-        return pyramid_loss(moved[0], moved[1], target, mask, levels, relative);
-      };
-      EXPECT_NEAR(loss.value, exact(0, 0), 1e-12) << levels;
-      for (size_t i = 0; i < loss.adjoint.data.size(); ++i) {
-        // A parabola: its difference is the derivative.
-        const double slope = (exact(i, 0.5) - exact(i, -0.5));
-        EXPECT_NEAR(loss.adjoint.data[i], slope, 1e-7 * std::fabs(slope) + 1e-12) << levels;
-      }
-    }
-  }
-  EXPECT_THROW(image_loss(scene, target, LossKind::kL2, settings, mask, 5), InputError);
-  EXPECT_THROW(image_loss(scene, target, LossKind::kL2, settings, mask, 0), InputError);
-  EXPECT_THROW(image_loss(scene, target, LossKind::kL2, settings, mask, 1, {.method = "rays"}),
-               InputError);
-}
-
-TEST(Backward, LossImagesThatDoNotFitAreNamed) {
-  const TempFiles files;
-  const Scene scene = shadow_scene(files);
-  const Image target(scene.film.crop_width, scene.film.crop_height, 3);
-  const auto refused = [&](const Image& t, const Image& mask) -> std::string {
-    try {
-      check_loss_images(scene, t, mask, "t.exr", "m.exr");
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "";
-  };
-  Image mask = target;
-  EXPECT_EQ(refused(target, mask),
-            "m.exr: error: the mask is zero everywhere: no pixel is left for the loss");
-  for (float& v : mask.data) v = 1;
-  EXPECT_EQ(refused(target, mask), "");
-  mask.at(1, 2, 2) = 0;
-  EXPECT_EQ(refused(target, mask)
-                .find("m.exr: error: the mask's channels differ in column 1, "
-                      "row 2"),
-            0u);
-  Image holes = target;
-  holes.at(3, 0, 1) = NAN;
-  EXPECT_EQ(refused(holes, {}).find("t.exr: error: the target is not finite in column 3, row 0"),
-            0u);
-  EXPECT_EQ(refused(Image(1, 1, 3), {}).find("t.exr: error: the target has 1 x 1 pixels"), 0u);
 }
 
 // Nothing changes if all shapes and the camera move together.

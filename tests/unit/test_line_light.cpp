@@ -1,50 +1,17 @@
-// Visibility by lines between silhouettes: W against faces counted one by one, closed forms, rays
-// and paths, and what must not matter.
+// Visibility by lines between silhouettes: W against faces counted one by one, closed forms, what
+// must not matter.
 #include "integrators/contours/line_light.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include <set>
-
 #include "integrators/lights/closed_light.h"
-#include "integrators/lights/split_environment.h"
 #include "integrators/paths/camera_path.h"
-#include "limn/core/error.h"
-#include "limn/integrators/compare_images.h"
-#include "limn/integrators/parts.h"
-#include "limn/integrators/render.h"
-#include "support/compare_moments.h"
-#include "support/meshes.h"
+#include "support/over_floor.h"
 #include "support/running_mean.h"
-#include "support/scenes.h"
 
 namespace limn {
 namespace {
-
-// Shapes of a scene of tests: a floor, and meshes over it.
-struct Body {
-  Mesh mesh;
-  double scale = 1;
-  Vec3d offset{0, 0, 0};
-};
-Scene scene_of(const TempFiles& files, const std::vector<Body>& bodies, bool smooth = false,
-               const std::string& more = "", double unit = 1, const Vec3d& shift = {}) {
-  SceneParts parts;
-  parts.max_depth = 2;
-  parts.hide_emitters = true;
-  parts.unit = unit;
-  parts.origin = parts.origin + shift * (1 / unit);
-  parts.target = parts.target + shift * (1 / unit);
-  parts.body = square("floor", 5 * unit, -90, shift, diffuse("chalk", "0.8, 0.7, 0.6")) + more;
-  for (size_t i = 0; i < bodies.size(); ++i) {
-    const std::string name = fmt::format("body{}", i);
-    parts.body += obj_shape(name, write_mesh(files, name + ".obj", bodies[i].mesh), !smooth,
-                            bodies[i].scale * unit, bodies[i].offset * unit + shift,
-                            diffuse(name + "_bsdf", "0.5, 0.6, 0.7"));
-  }
-  return make_scene(files, parts);
-}
 
 // A point of the scene's first shape, which is the floor, at (x, 0, z).
 ContourPoint on_floor(const Scene& scene, double x, double z) {
@@ -123,7 +90,7 @@ std::vector<std::pair<std::string, std::vector<Body>>> hard_bodies() {
 TEST(Contours, WindingIsTheNumberOfFaces) {
   for (const auto& [name, bodies] : hard_bodies()) {
     const TempFiles files;
-    const Scene scene = scene_of(files, bodies);
+    const Scene scene = over_floor(files, bodies);
     const auto tracer = make_embree_tracer(scene, 1);
     const Contours contours(scene, *tracer, 1);
     Rng rng(7, 0, 0);
@@ -187,7 +154,7 @@ double solid_angle(const Vec3d& p, const std::array<Vec3d, 3>& x) {
 
 TEST(LineLight, ClosedFormsOfOpenSky) {
   const TempFiles files;
-  const Scene open = scene_of(files, {});
+  const Scene open = over_floor(files, {});
   const ContourPoint at = on_floor(open, 0.3, 0.2);
   const Looking nothing(open);
   EXPECT_NEAR(nothing.light.openness(at, 0.3), 1, 1e-14);
@@ -197,7 +164,7 @@ TEST(LineLight, ClosedFormsOfOpenSky) {
   const Mesh roof =
       make_mesh({{-1, 1, -1}, {1, 1, -1}, {1, 1, 1}, {-1, 1, 1}}, {{0, 1, 2}, {0, 2, 3}});
   const std::vector<Vec3d> corners = {{-1, 1, -1}, {1, 1, -1}, {1, 1, 1}, {-1, 1, 1}};
-  const Scene under = scene_of(files, {{roof}});
+  const Scene under = over_floor(files, {{roof}});
   const Looking look(under, {.lines = 4096});
   RunningMean cosine, plain;
   for (int k = 0; k < 16; ++k) {
@@ -221,7 +188,7 @@ TEST(LineLight, ClosedFormsOfOpenSky) {
     return lowest == highest;
   });
   ASSERT_EQ(walls.faces.size(), 8u);
-  const Scene box = scene_of(files, {{walls, 1, {0, 1, 0}}});
+  const Scene box = over_floor(files, {{walls, 1, {0, 1, 0}}});
   const Looking in_box(box, {.lines = 4096});
   const std::vector<Vec3d> lid = {{-1, 2, -1}, {1, 2, -1}, {1, 2, 1}, {-1, 2, 1}};
   EXPECT_NEAR(occlusion(in_box.light, at, 8), form_factor(at.p, at.up, lid), 1e-7);
@@ -229,7 +196,7 @@ TEST(LineLight, ClosedFormsOfOpenSky) {
   // Inside a closed mesh it is black, whichever way that is turned.
   for (const bool turned : {false, true}) {
     const Mesh ball = turned ? reversed(icosphere_mesh(2)) : icosphere_mesh(2);
-    const Scene closed = scene_of(files, {{ball, 2, {0, 0, 0}}});
+    const Scene closed = over_floor(files, {{ball, 2, {0, 0, 0}}});
     const Looking inside(closed);
     EXPECT_EQ(inside.light.openness(at, 0.4), 0);
     EXPECT_EQ(inside.light.ambient_occlusion(at, at.up, 0.4), 0);
@@ -240,45 +207,17 @@ TEST(LineLight, ClosedFormsOfOpenSky) {
 // mesh inside of it less, by its faces' arrows.
 TEST(LineLight, SphereOverPlane) {
   const TempFiles files;
-  const Scene scene = scene_of(files, {{icosphere_mesh(5), 0.8, {0.3, 1.6, 0.2}}});
+  const Scene scene = over_floor(files, {{icosphere_mesh(5), 0.8, {0.3, 1.6, 0.2}}});
   const Looking look(scene, {.lines = 64});
   const double covered = 1 - occlusion(look.light, on_floor(scene, 0.3, 0.2), 4);
   EXPECT_LT(covered, 0.25);
   EXPECT_GT(covered, 0.25 * (1 - 2e-3));
 }
 
-RenderResult run(const Scene& scene, const std::string& method, int spp, RenderOptions options = {},
-                 int threads = 1) {
-  RunSettings settings;
-  settings.spp = spp;
-  settings.seed = method == "lines" ? 1 : method == "silhouettes" ? 3 : 2;
-  settings.threads = threads;
-  options.method = method;
-  RenderResult result = render(scene, settings, options);
-  EXPECT_EQ(result.non_finite.count, 0u) << result.non_finite.message();
-  return result;
-}
-
-// Errors that neighbouring samples' points share make scores smaller than normal, never larger.
-void expect_alike(const RenderResult& a, const RenderResult& b, const std::string& what) {
-  std::vector<double> z;
-  double sum_a = 0, sum_b = 0, variance = 0;
-  for (size_t i = 0; i < a.radiance.size(); ++i) {
-    const double v = a.radiance.variance(i) + b.radiance.variance(i);
-    sum_a += a.radiance.mean(i), sum_b += b.radiance.mean(i), variance += v;
-  }
-  const double score = (sum_a - sum_b) / std::sqrt(variance);
-  fmt::print("{}: {:.6g} and {:.6g}, z {:.2f}\n", what, sum_a / a.radiance.size(),
-             sum_b / a.radiance.size(), score);
-  EXPECT_LT(std::fabs(score), 4) << what;
-  EXPECT_LT(std::sqrt(variance), 0.01 * sum_a) << what;
-  EXPECT_LT(compare_moments(a.radiance, b.radiance).largest, 6) << what;
-}
-
 // The error of unbiased sums: their mean over offsets is the limit, and they fall as lines^-1.5.
 TEST(LineLight, ConvergesAndIsUnbiased) {
   const TempFiles files;
-  const Scene scene = scene_of(files, {{torus_mesh(40, 20), 0.9, {0.2, 1.3, -0.1}}});
+  const Scene scene = over_floor(files, {{torus_mesh(40, 20), 0.9, {0.2, 1.3, -0.1}}});
   const ContourPoint at = on_floor(scene, 0.35, -0.15);
   const Looking fine(scene, {.lines = 1 << 14});
   const double truth = occlusion(fine.light, at, 4);
@@ -311,7 +250,7 @@ TEST(LineLight, ConvergesAndIsUnbiased) {
   EXPECT_LT(std::sqrt(squares / 100), 2e-4);
   EXPECT_EQ(careful.light.missed(), 0);
   // A single line and the next both miss what a tenth of them meet, and agree.
-  const Scene slim = scene_of(files, {{cube_mesh(), 0.3, {0.9, 1, 0}}});
+  const Scene slim = over_floor(files, {{cube_mesh(), 0.3, {0.9, 1, 0}}});
   const Looking slim_fine(slim, {.lines = 1 << 12});
   const double slim_truth = occlusion(slim_fine.light, at, 4);
   for (const int lines : {1, 8}) {
@@ -345,66 +284,11 @@ TEST(LineLight, NormalsTurnedPastTheFace) {
       obj_shape("ground", file, false, 1, {0, 0.1, 0}, diffuse("clay", "0.5, 0.5, 0.5"));
   RenderOptions options;
   options.what = RenderWhat::kAmbientOcclusion;
-  const RenderResult open = run(scene_of(files, {}, false, ground), "lines", 1, options);
+  const RenderResult open = run(over_floor(files, {}, false, ground), "lines", 1, options);
   const size_t middle = (8 * 16 + 8) * 3;
   EXPECT_NEAR(open.radiance.mean(middle), (1 + std::cos(turned)) / 2, 1e-4);
-  const Scene scene = scene_of(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, false, ground);
+  const Scene scene = over_floor(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, false, ground);
   expect_alike(run(scene, "lines", 16, options), run(scene, "rays", 128, options), "turned");
-}
-
-// A sky with a sun.
-std::string make_sun(const TempFiles& files, const std::string& id) {
-  Image map(64, 32, 3);
-  for (int c = 0; c < 3; ++c) {
-    for (int y = 0; y < map.height; ++y) {
-      for (int x = 0; x < map.width; ++x) map.at(x, y, c) = static_cast<float>(0.1 + 0.1 * c);
-    }
-    map.at(40, 8, c) = map.at(41, 8, c) = map.at(40, 9, c) = 150;
-  }
-  write_exr(files.path("sun.exr"), map, false, {});
-  return fmt::format(
-      R"(  <emitter type="envmap" id="{}"><string name="filename" value="{}"/></emitter>)", id,
-      files.path("sun.exr"));
-}
-
-TEST(LineLight, AgreesWithRaysAndPaths) {
-  const TempFiles files;
-  const std::string lamps =
-      square("lamp", 0.6, 90, {0.4, 2.9, 0.3}, area_light("glow", "9, 8, 7")) +
-      square("side", 0.5, 0, {-0.6, 1.2, -2}, area_light("low", "3, 4, 5"));
-  const std::string sky = constant_light("sky", "0.3, 0.4, 0.5");
-  const std::vector<Body> bodies = {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}},
-                                    {cube_mesh(), 0.3, {-0.9, 0.3, 0.6}}};
-  struct Case {
-    std::string name, lights;
-    bool smooth;
-    int spp;
-  };
-  for (const Case& c : {Case{"lamps", lamps, false, 64}, Case{"sky", sky, false, 16},
-                        Case{"map", make_sky(files, "map"), false, 16},
-                        Case{"sun", make_sun(files, "sun"), false, 16},
-                        Case{"lamps and sun", lamps + make_sun(files, "sun"), false, 8},
-                        Case{"smooth, lamps and sky", lamps + sky, true, 4},
-                        Case{"smooth, map", make_sky(files, "map"), true, 8}}) {
-    const Scene scene = scene_of(files, bodies, c.smooth, c.lights);
-    const bool sun = c.name.find("sun") != std::string::npos;
-    const bool split = scene.environment && split_environment(*scene.environment, 1).has_value();
-    ASSERT_EQ(split, sun) << c.name;
-    const RenderResult lines = run(scene, "lines", c.spp);
-    expect_alike(lines, run(scene, "path", 512), c.name + ", path");
-    const RenderResult rays = run(scene, "rays", 64);
-    expect_alike(lines, rays, c.name + ", rays");
-    expect_alike(run(scene, "silhouettes", 64), rays, c.name + ", silhouettes");
-  }
-  for (const RenderWhat what : {RenderWhat::kAmbientOcclusion, RenderWhat::kOpenness}) {
-    for (const bool smooth : {false, true}) {
-      const Scene scene = scene_of(files, bodies, smooth);
-      RenderOptions options;
-      options.what = what;
-      expect_alike(run(scene, "lines", 16, options), run(scene, "rays", 128, options),
-                   fmt::format("open sky {}{}", static_cast<int>(what), smooth ? ", smooth" : ""));
-    }
-  }
 }
 
 // Point by point against what is exact (closed_light.h).
@@ -440,7 +324,7 @@ TEST(LineLight, LampsAgreeWithTheClosedForm) {
       square("lamp", 0.6, 90, {0.4, 1.9, 0.3}, area_light("glow", "9, 8, 7")) +
       square("side", 0.5, 20, {-0.6, 1.2, -2}, area_light("low", "3, 4, 5"));
   for (const bool smooth : {false, true}) {
-    expect_closed_form(scene_of(
+    expect_closed_form(over_floor(
         files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}, {cube_mesh(), 0.3, {-0.9, 0.3, 0.6}}},
         smooth, lamps));
   }
@@ -453,7 +337,7 @@ TEST(LineLight, LampsOfManyFacesHaveOneFront) {
   for (Vec3f& x : down.positions) x = {x.x, 0, x.y};
   for (const bool turned : {false, true}) {
     const std::string file = write_mesh(files, "grid.obj", turned ? reversed(down) : down);
-    expect_closed_form(scene_of(
+    expect_closed_form(over_floor(
         files, {{cube_mesh(), 0.3, {-0.9, 0.3, 0.6}}, {torus_mesh(8, 6), 0.3, {0.3, 1.7, -1}}},
         false,
         square("wall", 3, 0, {0, 1, -2}, diffuse("plaster", "0.5, 0.5, 0.5")) +
@@ -468,8 +352,9 @@ TEST(LineLight, LampsOfNoExtent) {
   Mesh screen;
   screen.positions = {{-1, 0, -1}, {1e-7f, 0, -1}, {1e-7f, 0, 1}, {-1, 0, 1}};
   const Mesh half = make_mesh(screen.positions, {{0, 1, 2}, {0, 2, 3}});
-  const Scene scene = scene_of(files, {{half, 1, {0, 5, 0}}}, false,
-                               square("lamp", size, 90, {0, 10, 0}, area_light("glow", "9, 8, 7")));
+  const Scene scene =
+      over_floor(files, {{half, 1, {0, 5, 0}}}, false,
+                 square("lamp", size, 90, {0, 10, 0}, area_light("glow", "9, 8, 7")));
   const ContourPoint at = on_floor(scene, 0, 0);
   const auto surface = surface_on_ray<double>(scene, at.face, Vec3d{0, 1, 0}, Vec3d{0, -1, 0});
   const Scattering<double> scattering(surface, {0, 1, 0}, scene.shading);
@@ -492,9 +377,9 @@ TEST(LineLight, MapsOverTurnedNormals) {
                   "v -4 -1.2 -4\nv 4 1.2 -4\nv 4 1.2 4\nv -4 -1.2 4\nvn 0 1 0.1\n"
                   "f 1//1 3//1 2//1\nf 1//1 4//1 3//1\n");
   const Scene scene =
-      scene_of(files, {}, false,
-               obj_shape("tilted", file, false, 1, {0, 3, 0}, diffuse("clay", "0.7, 0.5, 0.3")) +
-                   make_sky(files, "map"));
+      over_floor(files, {}, false,
+                 obj_shape("tilted", file, false, 1, {0, 3, 0}, diffuse("clay", "0.7, 0.5, 0.3")) +
+                     make_sky(files, "map"));
   const Vec3d down{0, -1, 0};
   const auto surface =
       surface_on_ray<double>(scene, {ShapeId(1), FaceId(0)}, Vec3d{0.1, 6, -0.2}, down);
@@ -531,7 +416,7 @@ TEST(LineLight, LampsEndWhatIsBeforeThem) {
            {"housing", {{cube_mesh(), 0.8, {0, 2.8, 0}}}},
            {"through", {{icosphere_mesh(2), 0.5, {0.3, 2.1, 0.2}}}},
            {"beside", {{cube_mesh(), 0.6, {1.2, 2, 0.1}}}}}) {
-    const Scene scene = scene_of(files, bodies, false, lamp);
+    const Scene scene = over_floor(files, bodies, false, lamp);
     expect_alike(run(scene, "lines", 16), run(scene, "path", 1024), name);
   }
 }
@@ -541,245 +426,16 @@ TEST(LineLight, ScaleAndPlaceDoNotMatter) {
   const std::vector<Body> bodies = {{torus_mesh(16, 8), 0.8, {0.25, 1.125, 0}}};
   RenderOptions options;
   options.what = RenderWhat::kAmbientOcclusion;
-  const RenderResult plain = run(scene_of(files, bodies), "lines", 2, options);
+  const RenderResult plain = run(over_floor(files, bodies), "lines", 2, options);
   for (const auto& [unit, shift] :
        std::vector<std::pair<double, Vec3d>>{{1024, {}}, {1.0 / 1024, {}}, {1, {16, -32, 64}}}) {
     const RenderResult moved =
-        run(scene_of(files, bodies, false, "", unit, shift), "lines", 2, options);
+        run(over_floor(files, bodies, false, "", unit, shift), "lines", 2, options);
     for (size_t i = 0; i < plain.radiance.size(); ++i) {
       // Floats of the moved mesh are rounded, and move shadows' edges by that.
       ASSERT_NEAR(moved.radiance.mean(i), plain.radiance.mean(i), 2e-3) << unit;
     }
   }
-}
-
-// What a pixel's samples are made of, as written down.
-std::set<std::string> ways(const Scene& scene, const RenderOptions& options, int x, int y) {
-  RunSettings settings;
-  settings.seed = 3;
-  std::set<std::string> found;
-  for (const std::string& line : trace_sample(scene, settings, {x, y, 0, ""}, options)) {
-    for (const std::string way : {"by lines", "by rays"}) {
-      if (line.ends_with(way)) found.insert(way);
-    }
-  }
-  return found;
-}
-
-// Both in one image, and without bias.
-TEST(LineLight, SilhouettesTakeWhatIsBetter) {
-  const TempFiles files;
-  const Scene scene =
-      scene_of(files, {{icosphere_mesh(5), 0.8, {0.2, 1.1, 0}}}, false,
-               square("lamp", 0.6, 90, {0.4, 2.9, 0.3}, area_light("glow", "9, 8, 7")) +
-                   constant_light("sky", "0.3, 0.4, 0.5"));
-  RenderOptions options;
-  options.method = "silhouettes";
-  using Ways = std::set<std::string>;
-  EXPECT_EQ(ways(scene, options, 8, 12), (Ways{"by lines", "by rays"}));
-  expect_alike(run(scene, "silhouettes", 16), run(scene, "rays", 64), "both");
-  options.tolerance = 0.01;
-  EXPECT_EQ(ways(scene, options, 8, 12), Ways{"by lines"});
-  options.method = "rays";
-  options.tolerance = 0;
-  EXPECT_EQ(ways(scene, options, 8, 12), Ways{"by rays"});
-}
-
-// Lamps, bright patches and the rest of the sky have plans of their own.
-TEST(LineLight, ThreadsDoNotMatter) {
-  const TempFiles files;
-  const std::string lamp = square("lamp", 0.6, 90, {0.4, 2.9, 0.3}, area_light("glow", "9, 8, 7"));
-  for (const std::string& lights : {make_sky(files, "map"), lamp + make_sun(files, "sun")}) {
-    const Scene scene = scene_of(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, true, lights);
-    for (const std::string method : {"lines", "rays", "silhouettes"}) {
-      const RenderResult one = run(scene, method, 3), three = run(scene, method, 3, {}, 3);
-      for (size_t i = 0; i < one.radiance.size(); ++i) {
-        ASSERT_EQ(one.radiance.mean(i), three.radiance.mean(i)) << method;
-      }
-    }
-  }
-}
-
-// Films of a single pixel, and crops whose cells begin elsewhere.
-TEST(LineLight, SilhouettesOfPartsOfAFilm) {
-  const TempFiles files;
-  Scene scene = scene_of(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, false,
-                         square("lamp", 0.6, 90, {0.4, 2.9, 0.3}, area_light("glow", "9, 8, 7")) +
-                             make_sun(files, "sun"));
-  Film& film = scene.film;
-  film.crop_x = 5, film.crop_y = 3, film.crop_width = 10, film.crop_height = 12;
-  expect_alike(run(scene, "silhouettes", 64), run(scene, "rays", 256), "crop");
-  film.crop_x = 9, film.crop_y = 11, film.crop_width = film.crop_height = 1;
-  expect_alike(run(scene, "silhouettes", 256), run(scene, "rays", 1024), "one pixel");
-}
-
-// A store that an interrupted pilot's choice must not reach.
-TEST(LineLight, InterruptedPilotsAreNoPartOfARun) {
-  class Store final : public BatchStore {
-   public:
-    void start(int) override { started = true; }
-    Task task(int64_t) const override { return Task::kMake; }
-    BatchRecord read(int64_t) override { return {}; }
-    void write(const BatchRecord&) override {}
-    bool started = false;
-  };
-  const TempFiles files;
-  const Scene scene = scene_of(files, {}, false, constant_light("sky", "1, 1, 1"));
-  RenderOptions options;
-  options.method = "silhouettes";
-  for (const bool stop : {true, false}) {
-    const std::atomic<bool> interrupted = stop;
-    Store store;
-    RunSettings settings;
-    settings.spp = 1;
-    settings.store = &store;
-    settings.interrupted = &interrupted;
-    render(scene, settings, options);
-    EXPECT_EQ(store.started, !stop);
-  }
-}
-
-std::string refusal(const Scene& scene, const RenderOptions& options) {
-  try {
-    render(scene, {}, options);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
-
-// Of silhouettes; lines must be told the same under their own name.
-std::string refused(const Scene& scene, RenderOptions options) {
-  const std::string text = refusal(scene, options), own = "\"silhouettes\"";
-  if (options.method != "silhouettes") return text;
-  options.method = "lines";
-  std::string expected = text;
-  if (const size_t at = text.find(own); at != std::string::npos) {
-    expected.replace(at, own.size(), "\"lines\"");
-  }
-  EXPECT_EQ(refusal(scene, options), expected);
-  return text;
-}
-
-TEST(LineLight, SaysWhatItDoesNotKnow) {
-  const TempFiles files;
-  RenderOptions lines, rays;
-  lines.method = "silhouettes";
-  rays.method = "rays";
-  Scene deep = scene_of(files, {});
-  deep.max_depth = 3;
-  EXPECT_NE(refused(deep, lines).find("what: direct"), std::string::npos);
-  EXPECT_NE(refused(deep, rays).find("what: direct"), std::string::npos);
-  const Scene point = scene_of(
-      files, {}, false,
-      R"(<emitter type="point" id="bulb"><point name="position" value="0, 3, 0"/></emitter>)");
-  EXPECT_NE(refused(point, lines).find("\"bulb\""), std::string::npos);
-  EXPECT_NE(refused(point, rays).find("\"bulb\""), std::string::npos);
-  const Scene metal =
-      scene_of(files, {}, false, square("mirror", 1, 0, {0, 1, 0}, conductor("m", 0.1)));
-  EXPECT_NE(refused(metal, lines).find("\"mirror\""), std::string::npos);
-  EXPECT_EQ(refused(metal, rays), "");
-  const Scene ball = scene_of(files, {}, false,
-                              obj_shape("ball", write_mesh(files, "b.obj", icosphere_mesh(2)), true,
-                                        1, {0, 3, 0}, area_light("glow", "1, 1, 1")));
-  EXPECT_NE(refused(ball, lines).find("has 320 of these"), std::string::npos);
-  Scene bent = scene_of(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, true);
-  bent.shading = ShadingModel::kMitsuba;
-  EXPECT_NE(refused(bent, lines).find("\"body0\""), std::string::npos);
-  EXPECT_NE(refused(bent, rays).find("\"body0\""), std::string::npos);
-  const std::string glow = area_light("glow", "1, 1, 1");
-  const auto lamps = [&](double angle, double x, double y) {
-    return scene_of(files, {}, false,
-                    square("lamp", 1, 90, {0, 2, 0}, glow) +
-                        square("other", 1, angle, {x, y, 0}, area_light("light", "1, 2, 3")));
-  };
-  EXPECT_NE(refused(lamps(90, 0, 2), lines).find("in one place"), std::string::npos);
-  EXPECT_NE(refused(lamps(90, 0.5, 2), lines).find("\"other\""), std::string::npos);
-  for (const Scene& fine : {lamps(-90, 0, 2), lamps(90, 2, 2), lamps(90, 0.5, 2.5)}) {
-    EXPECT_EQ(refused(fine, lines), "");
-  }
-  EXPECT_EQ(refused(lamps(90, 0.5, 2), rays), "");
-  const Scene plain = scene_of(files, {});
-  for (const int count : {0, -1, kMostLines + 1}) {
-    RenderOptions wrong = lines;
-    wrong.lines = count;
-    EXPECT_NE(refused(plain, wrong).find("lines: "), std::string::npos) << count;
-  }
-  for (const double tolerance : {std::nan(""), -1.0, 2.0}) {
-    RenderOptions wrong = lines;
-    wrong.tolerance = tolerance;
-    EXPECT_NE(refused(plain, wrong).find("tolerance: "), std::string::npos) << tolerance;
-  }
-  RenderOptions full = lines, none = rays;
-  full.lines = kMostLines;
-  EXPECT_EQ(refused(plain, full), "");
-  full.tolerance = 0.1;
-  EXPECT_NE(refused(plain, full).find("doubled"), std::string::npos);
-  none.rays = 0;
-  EXPECT_NE(refused(plain, none).find("rays: 0"), std::string::npos);
-  RenderOptions ao;
-  ao.what = RenderWhat::kAmbientOcclusion;
-  EXPECT_NE(refused(deep, ao).find("say silhouettes, lines, rays"), std::string::npos);
-}
-
-// Rows of all methods and times, whatever the clock gives each of them.
-TEST(CompareImages, Rows) {
-  const TempFiles files;
-  const Scene scene =
-      scene_of(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, false,
-               square("lamp", 0.6, 90, {0.4, 2.9, 0.3}, area_light("glow", "9, 8, 7")));
-  ImageCompareOptions options;
-  options.methods = {"path", "rays", "silhouettes"};
-  options.times = {0.001, 0.01};
-  options.repeats = 2;
-  options.reference_seconds = 0.01;
-  RunSettings settings;
-  settings.seed = 5;
-  const ImageComparison result = compare_images(scene, options, settings);
-  EXPECT_EQ(result.reference_method, "rays");
-  EXPECT_EQ(result.not_by_rays, "");
-  EXPECT_GE(result.reference_spp, 8);
-  ASSERT_EQ(result.rows.size(), 6u);
-  for (int m = 0; m < 3; ++m) {
-    for (int t = 0; t < 2; ++t) {
-      const ComparedImage& row = result.rows[2 * m + t];
-      EXPECT_EQ(row.method, options.methods[m]);
-      EXPECT_EQ(row.time, options.times[t]);
-      EXPECT_GE(row.spp, 1);
-      EXPECT_EQ(row.image.size(), result.reference.size());
-    }
-  }
-  Scene shiny = scene_of(files, {}, false, constant_light("sky", "1, 1, 1"));
-  shiny.max_depth = 3;
-  options.methods = {"path"};
-  const ImageComparison by_paths = compare_images(shiny, options, settings);
-  EXPECT_EQ(by_paths.reference_method, "path");
-  EXPECT_NE(by_paths.not_by_rays.find("max_depth"), std::string::npos);
-  options.methods = {"analytic", "none"};
-  EXPECT_THROW(compare_images(scene, options, settings), InputError);
-}
-
-// Images of known variance: what the reference's own error adds is taken out.
-TEST(CompareImages, ErrorsOfKnownVariance) {
-  Rng rng(3, 1, 4);
-  const auto image = [&](double sigma) {
-    std::vector<double> values(3000);
-    for (double& x : values) x = 2 + sigma * std::sqrt(12) * (rng.uniform() - 0.5);
-    return values;
-  };
-  RunningMean own, same, better;
-  for (int i = 0; i < 200; ++i) {
-    std::vector<std::vector<double>> runs;
-    for (int k = 0; k < 4; ++k) runs.push_back(image(0.2));
-    const ReferenceImage reference = mean_of_runs(runs);
-    own.add(reference.squared_error / reference.scale);
-    same.add(relative_squared_error(image(0.2), reference));
-    better.add(relative_squared_error(image(0), reference));
-  }
-  // Of 4, scale adding its own noise in the fifth digit.
-  EXPECT_LT(std::fabs(own.z_score(0.01 / 4 / (1 + 0.01 / 4))), 4);
-  EXPECT_LT(std::fabs(same.z_score(0.01 / (1 + 0.01 / 4))), 4);
-  EXPECT_LT(std::fabs(better.z_score(0)), 4);
 }
 
 }  // namespace

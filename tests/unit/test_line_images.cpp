@@ -1,0 +1,289 @@
+// Images by lines between silhouettes against rays and paths: methods, parts of films, refusals.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <set>
+
+#include "integrators/contours/line_light.h"
+#include "integrators/lights/split_environment.h"
+#include "limn/core/error.h"
+#include "limn/integrators/compare_images.h"
+#include "limn/integrators/parts.h"
+#include "support/over_floor.h"
+#include "support/running_mean.h"
+
+namespace limn {
+namespace {
+
+TEST(LineImages, AgreesWithRaysAndPaths) {
+  const TempFiles files;
+  const std::string lamps =
+      square("lamp", 0.6, 90, {0.4, 2.9, 0.3}, area_light("glow", "9, 8, 7")) +
+      square("side", 0.5, 0, {-0.6, 1.2, -2}, area_light("low", "3, 4, 5"));
+  const std::string sky = constant_light("sky", "0.3, 0.4, 0.5");
+  const std::vector<Body> bodies = {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}},
+                                    {cube_mesh(), 0.3, {-0.9, 0.3, 0.6}}};
+  struct Case {
+    std::string name, lights;
+    bool smooth;
+    int spp;
+  };
+  for (const Case& c : {Case{"lamps", lamps, false, 64}, Case{"sky", sky, false, 16},
+                        Case{"map", make_sky(files, "map"), false, 16},
+                        Case{"sun", make_sun(files, "sun"), false, 16},
+                        Case{"lamps and sun", lamps + make_sun(files, "sun"), false, 8},
+                        Case{"smooth, lamps and sky", lamps + sky, true, 4},
+                        Case{"smooth, map", make_sky(files, "map"), true, 8}}) {
+    const Scene scene = over_floor(files, bodies, c.smooth, c.lights);
+    const bool sun = c.name.find("sun") != std::string::npos;
+    const bool split = scene.environment && split_environment(*scene.environment, 1).has_value();
+    ASSERT_EQ(split, sun) << c.name;
+    const RenderResult lines = run(scene, "lines", c.spp);
+    expect_alike(lines, run(scene, "path", 512), c.name + ", path");
+    const RenderResult rays = run(scene, "rays", 64);
+    expect_alike(lines, rays, c.name + ", rays");
+    expect_alike(run(scene, "silhouettes", 64), rays, c.name + ", silhouettes");
+  }
+  for (const RenderWhat what : {RenderWhat::kAmbientOcclusion, RenderWhat::kOpenness}) {
+    for (const bool smooth : {false, true}) {
+      const Scene scene = over_floor(files, bodies, smooth);
+      RenderOptions options;
+      options.what = what;
+      expect_alike(run(scene, "lines", 16, options), run(scene, "rays", 128, options),
+                   fmt::format("open sky {}{}", static_cast<int>(what), smooth ? ", smooth" : ""));
+    }
+  }
+}
+
+// What a pixel's samples are made of, as written down.
+std::set<std::string> ways(const Scene& scene, const RenderOptions& options, int x, int y) {
+  RunSettings settings;
+  settings.seed = 3;
+  std::set<std::string> found;
+  for (const std::string& line : trace_sample(scene, settings, {x, y, 0, ""}, options)) {
+    for (const std::string way : {"by lines", "by rays"}) {
+      if (line.ends_with(way)) found.insert(way);
+    }
+  }
+  return found;
+}
+
+// Both in one image, and without bias.
+TEST(LineImages, SilhouettesTakeWhatIsBetter) {
+  const TempFiles files;
+  const Scene scene =
+      over_floor(files, {{icosphere_mesh(5), 0.8, {0.2, 1.1, 0}}}, false,
+                 square("lamp", 0.6, 90, {0.4, 2.9, 0.3}, area_light("glow", "9, 8, 7")) +
+                     constant_light("sky", "0.3, 0.4, 0.5"));
+  RenderOptions options;
+  options.method = "silhouettes";
+  using Ways = std::set<std::string>;
+  EXPECT_EQ(ways(scene, options, 8, 12), (Ways{"by lines", "by rays"}));
+  expect_alike(run(scene, "silhouettes", 16), run(scene, "rays", 64), "both");
+  options.tolerance = 0.01;
+  EXPECT_EQ(ways(scene, options, 8, 12), Ways{"by lines"});
+  options.method = "rays";
+  options.tolerance = 0;
+  EXPECT_EQ(ways(scene, options, 8, 12), Ways{"by rays"});
+}
+
+// Lamps, bright patches and the rest of the sky have plans of their own.
+TEST(LineImages, ThreadsDoNotMatter) {
+  const TempFiles files;
+  const std::string lamp = square("lamp", 0.6, 90, {0.4, 2.9, 0.3}, area_light("glow", "9, 8, 7"));
+  for (const std::string& lights : {make_sky(files, "map"), lamp + make_sun(files, "sun")}) {
+    const Scene scene = over_floor(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, true, lights);
+    for (const std::string method : {"lines", "rays", "silhouettes"}) {
+      const RenderResult one = run(scene, method, 3), three = run(scene, method, 3, {}, 3);
+      for (size_t i = 0; i < one.radiance.size(); ++i) {
+        ASSERT_EQ(one.radiance.mean(i), three.radiance.mean(i)) << method;
+      }
+    }
+  }
+}
+
+// Films of a single pixel, and crops whose cells begin elsewhere.
+TEST(LineImages, SilhouettesOfPartsOfAFilm) {
+  const TempFiles files;
+  Scene scene = over_floor(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, false,
+                           square("lamp", 0.6, 90, {0.4, 2.9, 0.3}, area_light("glow", "9, 8, 7")) +
+                               make_sun(files, "sun"));
+  Film& film = scene.film;
+  film.crop_x = 5, film.crop_y = 3, film.crop_width = 10, film.crop_height = 12;
+  expect_alike(run(scene, "silhouettes", 64), run(scene, "rays", 256), "crop");
+  film.crop_x = 9, film.crop_y = 11, film.crop_width = film.crop_height = 1;
+  expect_alike(run(scene, "silhouettes", 256), run(scene, "rays", 1024), "one pixel");
+}
+
+// A store that an interrupted pilot's choice must not reach.
+TEST(LineImages, InterruptedPilotsAreNoPartOfARun) {
+  class Store final : public BatchStore {
+   public:
+    void start(int) override { started = true; }
+    Task task(int64_t) const override { return Task::kMake; }
+    BatchRecord read(int64_t) override { return {}; }
+    void write(const BatchRecord&) override {}
+    bool started = false;
+  };
+  const TempFiles files;
+  const Scene scene = over_floor(files, {}, false, constant_light("sky", "1, 1, 1"));
+  RenderOptions options;
+  options.method = "silhouettes";
+  for (const bool stop : {true, false}) {
+    const std::atomic<bool> interrupted = stop;
+    Store store;
+    RunSettings settings;
+    settings.spp = 1;
+    settings.store = &store;
+    settings.interrupted = &interrupted;
+    render(scene, settings, options);
+    EXPECT_EQ(store.started, !stop);
+  }
+}
+
+std::string refusal(const Scene& scene, const RenderOptions& options) {
+  try {
+    render(scene, {}, options);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+// Of silhouettes; lines must be told the same under their own name.
+std::string refused(const Scene& scene, RenderOptions options) {
+  const std::string text = refusal(scene, options), own = "\"silhouettes\"";
+  if (options.method != "silhouettes") return text;
+  options.method = "lines";
+  std::string expected = text;
+  if (const size_t at = text.find(own); at != std::string::npos) {
+    expected.replace(at, own.size(), "\"lines\"");
+  }
+  EXPECT_EQ(refusal(scene, options), expected);
+  return text;
+}
+
+TEST(LineImages, SaysWhatItDoesNotKnow) {
+  const TempFiles files;
+  RenderOptions lines, rays;
+  lines.method = "silhouettes";
+  rays.method = "rays";
+  Scene deep = over_floor(files, {});
+  deep.max_depth = 3;
+  EXPECT_NE(refused(deep, lines).find("what: direct"), std::string::npos);
+  EXPECT_NE(refused(deep, rays).find("what: direct"), std::string::npos);
+  const Scene point = over_floor(
+      files, {}, false,
+      R"(<emitter type="point" id="bulb"><point name="position" value="0, 3, 0"/></emitter>)");
+  EXPECT_NE(refused(point, lines).find("\"bulb\""), std::string::npos);
+  EXPECT_NE(refused(point, rays).find("\"bulb\""), std::string::npos);
+  const Scene metal =
+      over_floor(files, {}, false, square("mirror", 1, 0, {0, 1, 0}, conductor("m", 0.1)));
+  EXPECT_NE(refused(metal, lines).find("\"mirror\""), std::string::npos);
+  EXPECT_EQ(refused(metal, rays), "");
+  const Scene ball = over_floor(files, {}, false,
+                                obj_shape("ball", write_mesh(files, "b.obj", icosphere_mesh(2)),
+                                          true, 1, {0, 3, 0}, area_light("glow", "1, 1, 1")));
+  EXPECT_NE(refused(ball, lines).find("has 320 of these"), std::string::npos);
+  Scene bent = over_floor(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, true);
+  bent.shading = ShadingModel::kMitsuba;
+  EXPECT_NE(refused(bent, lines).find("\"body0\""), std::string::npos);
+  EXPECT_NE(refused(bent, rays).find("\"body0\""), std::string::npos);
+  const std::string glow = area_light("glow", "1, 1, 1");
+  const auto lamps = [&](double angle, double x, double y) {
+    return over_floor(files, {}, false,
+                      square("lamp", 1, 90, {0, 2, 0}, glow) +
+                          square("other", 1, angle, {x, y, 0}, area_light("light", "1, 2, 3")));
+  };
+  EXPECT_NE(refused(lamps(90, 0, 2), lines).find("in one place"), std::string::npos);
+  EXPECT_NE(refused(lamps(90, 0.5, 2), lines).find("\"other\""), std::string::npos);
+  for (const Scene& fine : {lamps(-90, 0, 2), lamps(90, 2, 2), lamps(90, 0.5, 2.5)}) {
+    EXPECT_EQ(refused(fine, lines), "");
+  }
+  EXPECT_EQ(refused(lamps(90, 0.5, 2), rays), "");
+  const Scene plain = over_floor(files, {});
+  for (const int count : {0, -1, kMostLines + 1}) {
+    RenderOptions wrong = lines;
+    wrong.lines = count;
+    EXPECT_NE(refused(plain, wrong).find("lines: "), std::string::npos) << count;
+  }
+  for (const double tolerance : {std::nan(""), -1.0, 2.0}) {
+    RenderOptions wrong = lines;
+    wrong.tolerance = tolerance;
+    EXPECT_NE(refused(plain, wrong).find("tolerance: "), std::string::npos) << tolerance;
+  }
+  RenderOptions full = lines, none = rays;
+  full.lines = kMostLines;
+  EXPECT_EQ(refused(plain, full), "");
+  full.tolerance = 0.1;
+  EXPECT_NE(refused(plain, full).find("doubled"), std::string::npos);
+  none.rays = 0;
+  EXPECT_NE(refused(plain, none).find("rays: 0"), std::string::npos);
+  RenderOptions ao;
+  ao.what = RenderWhat::kAmbientOcclusion;
+  EXPECT_NE(refused(deep, ao).find("say silhouettes, lines, rays"), std::string::npos);
+}
+
+// Rows of all methods and times, whatever the clock gives each of them.
+TEST(CompareImages, Rows) {
+  const TempFiles files;
+  const Scene scene =
+      over_floor(files, {{torus_mesh(16, 8), 0.8, {0.2, 1.1, 0}}}, false,
+                 square("lamp", 0.6, 90, {0.4, 2.9, 0.3}, area_light("glow", "9, 8, 7")));
+  ImageCompareOptions options;
+  options.methods = {"path", "rays", "silhouettes"};
+  options.times = {0.001, 0.01};
+  options.repeats = 2;
+  options.reference_seconds = 0.01;
+  RunSettings settings;
+  settings.seed = 5;
+  const ImageComparison result = compare_images(scene, options, settings);
+  EXPECT_EQ(result.reference_method, "rays");
+  EXPECT_EQ(result.not_by_rays, "");
+  EXPECT_GE(result.reference_spp, 8);
+  ASSERT_EQ(result.rows.size(), 6u);
+  for (int m = 0; m < 3; ++m) {
+    for (int t = 0; t < 2; ++t) {
+      const ComparedImage& row = result.rows[2 * m + t];
+      EXPECT_EQ(row.method, options.methods[m]);
+      EXPECT_EQ(row.time, options.times[t]);
+      EXPECT_GE(row.spp, 1);
+      EXPECT_EQ(row.image.size(), result.reference.size());
+    }
+  }
+  Scene shiny = over_floor(files, {}, false, constant_light("sky", "1, 1, 1"));
+  shiny.max_depth = 3;
+  options.methods = {"path"};
+  const ImageComparison by_paths = compare_images(shiny, options, settings);
+  EXPECT_EQ(by_paths.reference_method, "path");
+  EXPECT_NE(by_paths.not_by_rays.find("max_depth"), std::string::npos);
+  options.methods = {"analytic", "none"};
+  EXPECT_THROW(compare_images(scene, options, settings), InputError);
+}
+
+// Images of known variance: what the reference's own error adds is taken out.
+TEST(CompareImages, ErrorsOfKnownVariance) {
+  Rng rng(3, 1, 4);
+  const auto image = [&](double sigma) {
+    std::vector<double> values(3000);
+    for (double& x : values) x = 2 + sigma * std::sqrt(12) * (rng.uniform() - 0.5);
+    return values;
+  };
+  RunningMean own, same, better;
+  for (int i = 0; i < 200; ++i) {
+    std::vector<std::vector<double>> runs;
+    for (int k = 0; k < 4; ++k) runs.push_back(image(0.2));
+    const ReferenceImage reference = mean_of_runs(runs);
+    own.add(reference.squared_error / reference.scale);
+    same.add(relative_squared_error(image(0.2), reference));
+    better.add(relative_squared_error(image(0), reference));
+  }
+  // Of 4, scale adding its own noise in the fifth digit.
+  EXPECT_LT(std::fabs(own.z_score(0.01 / 4 / (1 + 0.01 / 4))), 4);
+  EXPECT_LT(std::fabs(same.z_score(0.01 / (1 + 0.01 / 4))), 4);
+  EXPECT_LT(std::fabs(better.z_score(0)), 4);
+}
+
+}  // namespace
+}  // namespace limn
