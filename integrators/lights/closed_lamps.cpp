@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 
 #include "integrators/lights/closed_light.h"
 #include "integrators/lights/direct_light_check.h"
@@ -56,14 +57,41 @@ void check_closed_light(const Scene& scene) {
   }
 }
 
+namespace {
+
+uint64_t next_number() {
+  static std::atomic<uint64_t> last = 0;
+  return ++last;
+}
+
+}  // namespace
+
+ClosedLight::Places::Places(const Scene& scene, int threads)
+    : number(next_number()), copies(scene), overlaps(scene, copies, threads), tree(scene) {}
+
 ClosedLight::ClosedLight(const Scene& scene, int threads, By by)
     : scene_((check_closed_light(scene), scene)),
-      copies_(scene),
-      overlaps_(scene, copies_, threads),
-      tree_(scene),
+      places_(std::make_shared<Places>(scene, threads)),
+      copies_(places_->copies),
+      overlaps_(places_->overlaps),
+      tree_(places_->tree),
       by_(by) {
-  for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
-    if (scene.shapes[s].is_emitter && scene.max_depth == 2) add_lamp(ShapeId(s));
+  add_lamps();
+}
+
+ClosedLight::ClosedLight(const Scene& scene, const ClosedLight& same)
+    : scene_(scene),
+      places_(same.places_),
+      copies_(places_->copies),
+      overlaps_(places_->overlaps),
+      tree_(places_->tree),
+      by_(same.by_) {
+  add_lamps();
+}
+
+void ClosedLight::add_lamps() {
+  for (uint32_t s = 0; s < scene_.shapes.size(); ++s) {
+    if (scene_.shapes[s].is_emitter && scene_.max_depth == 2) add_lamp(ShapeId(s));
   }
 }
 

@@ -2,14 +2,13 @@
 #include "integrators/lights/closed_light.h"
 
 #include <algorithm>
+#include <array>
 #include <memory>
-#include <tuple>
 
 #include "integrators/lights/closed_light_planes.h"
+#include "integrators/lights/closed_light_scratch.h"
 #include "integrators/lights/polygon_light.h"
 #include "limn/core/reverse.h"
-#include "limn/core/shadow_outlines.h"
-#include "limn/core/visible_regions.h"
 
 namespace limn {
 namespace {
@@ -21,93 +20,10 @@ constexpr double kNear = 0x1p-26;
 constexpr double kGridHalf = 0x1p29;
 // A window is wider than its lamp, so that the lamp's sides are inside. Not tuned.
 constexpr double kMargin = 0x1p-10;
+// Lamps of which is kept what a point has seen. Not tuned.
+constexpr size_t kHeld = 8;
 
 }  // namespace
-
-// The point that light falls on.
-struct ClosedLight::Receiver {
-  Vec3d p;
-  Vec3d up;  // unit, of its face, towards the viewer
-  FaceRef face;
-  const EdgeStart* edge;
-  // Of a point on an edge: another face there leaves directions w with wedge . w >= 0.
-  std::optional<Vec3d> wedge = {};
-};
-
-struct ClosedLight::Scratch {
-  // What lines are of a face: its sides, then where it was cut.
-  enum Line { kNearCut = 3, kFarCut, kHorizon, kWedge };
-  // The number of a line of the face with a label.
-  static constexpr uint32_t kLines = 8;
-  struct Corner {
-    Vec3d w;        // from the point
-    uint32_t line;  // of the side that begins here
-  };
-  struct CutPoint {
-    ShadowOutlines::Point at;
-    uint32_t number;    // as they were found
-    uint32_t lines[2];  // that meet there
-    Vec3d w;            // from the point
-  };
-
-  std::vector<const FaceTree::Item*> items;
-  std::vector<FaceRef> faces;  // by label: first the lamp's, then those before it
-  size_t first_item = 0;       // from this label on they are those of `items`
-  size_t lamp_faces = 0;
-  size_t uncut = 0;  // of these, those that the lamp's plane does not cut
-  PlaneWindow window;
-  double near = 0, far = 0;  // depths, towards the lamp's plane, of what is before it
-
-  // By regions.
-  std::vector<SeenFace> seen;
-  std::vector<uint32_t> order;
-  VisibleRegions regions{{}};
-
-  // By outlines.
-  ShadowOutlines outlines;
-  // Of each item of the tree twice the query that last told which way round it is seen, and one
-  // more if it is seen from behind.
-  std::vector<uint64_t> turns;
-  uint64_t query = 0;
-  std::vector<Corner> polygon, clipped;
-  std::vector<ShadowOutlines::Point> points;
-  std::vector<uint32_t> lines;
-  std::vector<CutPoint> cut_points;  // by place, then number
-
-  // Keeps what is not below zero in the polygon.
-  template <class Height, class OnGrid>
-  void clip(const Height& height, uint32_t line, const OnGrid& on_grid) {
-    clipped.clear();
-    for (size_t i = 0; i < polygon.size(); ++i) {
-      const Corner &here = polygon[i], &next = polygon[(i + 1) % polygon.size()];
-      const double h0 = height(here.w), h1 = height(next.w);
-      if (h0 >= 0) clipped.push_back(here);
-      if ((h0 >= 0) == (h1 >= 0)) continue;
-      // The same for both faces beside it.
-      const auto key = [](const Vec3d& w) { return std::tuple(w.x, w.y, w.z); };
-      const bool swapped = key(next.w) < key(here.w);
-      const Vec3d &x0 = swapped ? next.w : here.w, &x1 = swapped ? here.w : next.w;
-      const double a0 = swapped ? h1 : h0, a1 = swapped ? h0 : h1;
-      const Vec3d w = x0 + (x1 - x0) * (a0 / (a0 - a1));
-      clipped.push_back({w, h0 >= 0 ? line : here.line});
-      const auto number = static_cast<uint32_t>(cut_points.size());
-      cut_points.push_back({on_grid(w), number, {here.line, line}, w});
-    }
-    std::swap(polygon, clipped);
-  }
-  void sort_cut_points() {
-    std::sort(cut_points.begin(), cut_points.end(), [](const CutPoint& a, const CutPoint& b) {
-      return std::tie(a.at, a.number) < std::tie(b.at, b.number);
-    });
-  }
-  // The first that was found at a place; null if none was.
-  const CutPoint* cut_point_at(const ShadowOutlines::Point& at) const {
-    const auto found =
-        std::lower_bound(cut_points.begin(), cut_points.end(), at,
-                         [](const CutPoint& cut, const auto& place) { return cut.at < place; });
-    return found != cut_points.end() && found->at == at ? &*found : nullptr;
-  }
-};
 
 bool ClosedLight::is_skipped(FaceRef face, const Receiver& receiver) const {
   if (face == receiver.face) return true;
@@ -540,12 +456,26 @@ class ClosedLight::View {
   Scratch& scratch_;
 };
 
+// What the point sees of the lamp, in the scratch; as it is there if the same was asked for last.
+void ClosedLight::find(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const {
+  Scratch::Found& last = scratch.last;
+  const bool same = last.places == places_->number && last.by == by_ && last.p == receiver.p &&
+                    last.up == receiver.up && last.face == receiver.face && !receiver.edge &&
+                    last.lamp == lamp.faces;
+  if (same) return;
+  last = {
+      receiver.edge ? 0 : places_->number, by_, receiver.p, receiver.up, receiver.face, lamp.faces};
+  scratch.seen_at_all = list(lamp, receiver, scratch);
+  if (!scratch.seen_at_all) return;
+  scratch.by_outlines = by_ != By::kRegions && find_outlines(lamp, receiver, scratch);
+  if (!scratch.by_outlines) find_regions(lamp, receiver, scratch);
+}
+
 template <class S>
 Rgb<S> ClosedLight::scattered(const RayTracer& tracer, const SurfacePoint<S>& surface,
                               const Scattering<S>& scattering, const EdgeStart* edge) const {
   // On the heap: a shared library has little room for what belongs to threads.
-  static thread_local const auto owned = std::make_unique<Scratch>();
-  Scratch& scratch = *owned;
+  static thread_local const auto owned = std::make_unique<std::array<Scratch, kHeld>>();
   static thread_local std::vector<PolygonSide<S>> sides;
   const bool front = dot(surface.n_g, value(scattering.wi())) > 0;
   Receiver receiver{value(surface.p), front ? surface.n_g : -surface.n_g, surface.face, edge};
@@ -557,15 +487,17 @@ Rgb<S> ClosedLight::scattered(const RayTracer& tracer, const SurfacePoint<S>& su
   const std::array<Kink, 3> kinks = {
       {{value(scattering.normal()), 0}, {n_s, horizon}, {n_s, horizon * (2 - horizon)}}};
   Rgb<S> sum;
-  for (const LampPlane& lamp : lamps_) {
+  for (size_t i = 0; i < lamps_.size(); ++i) {
+    const LampPlane& lamp = lamps_[i];
     const Shape& shape = scene_.shape(lamp.shape);
-    if (!list(lamp, receiver, scratch)) continue;
+    Scratch& scratch = (*owned)[i % kHeld];
+    find(lamp, receiver, scratch);
+    if (!scratch.seen_at_all) continue;
     const View<S> view(*this, lamp, receiver, surface.p, scratch);
     sides.clear();
-    if (by_ != By::kRegions && find_outlines(lamp, receiver, scratch)) {
+    if (scratch.by_outlines) {
       view.add_outlines(sides);
     } else {
-      find_regions(lamp, receiver, scratch);
       view.add_regions(sides);
     }
     const std::span<const PolygonSide<S>> lit(sides);

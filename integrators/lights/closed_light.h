@@ -11,6 +11,8 @@
 //
 // After Zhou, Wu, Ramamoorthi, Yan 2021 (5.2), with derivatives by the motion of lines in place of
 // those of corners.
+#include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -34,6 +36,9 @@ class ClosedLight {
   // step in where a corner is too far out.
   enum class By { kOutlines, kRegions };
   ClosedLight(const Scene& scene, int threads, By by = By::kOutlines);
+  // Of the same scene with other tangents: what is where is known already. A point that one of both
+  // was asked for last costs the other little.
+  ClosedLight(const Scene& scene, const ClosedLight& same);
 
   static constexpr size_t kMostPlanes = 64;  // of one lamp
 
@@ -57,11 +62,20 @@ class ClosedLight {
     double deviation;         // how far corners may lie off the plane
     std::vector<Vec3d> hull;  // corners of the faces
   };
+  // What does not depend on tangents.
+  struct Places {
+    Places(const Scene& scene, int threads);
+    uint64_t number;  // no other has it
+    FaceCopies copies;
+    FaceOverlaps overlaps;
+    FaceTree tree;
+  };
   struct Receiver;
   struct Scratch;
   template <class S>
   class View;
 
+  void add_lamps();
   void add_lamp(ShapeId shape);
   void finish(LampPlane& lamp) const;
   bool is_skipped(FaceRef face, const Receiver& receiver) const;
@@ -71,11 +85,13 @@ class ClosedLight {
   bool has_turn(const FaceTree::Item& item, const Scratch& scratch) const;
   uint32_t cancelled_sides(const FaceTree::Item& item, const Scratch& scratch) const;
   bool find_outlines(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;
+  void find(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;
 
   const Scene& scene_;
-  FaceCopies copies_;
-  FaceOverlaps overlaps_;
-  FaceTree tree_;
+  std::shared_ptr<const Places> places_;
+  const FaceCopies& copies_;
+  const FaceOverlaps& overlaps_;
+  const FaceTree& tree_;
   By by_;
   std::vector<LampPlane> lamps_;
 };

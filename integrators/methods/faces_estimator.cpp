@@ -1,6 +1,8 @@
 // Faces of a pixel, each with the light at its centroid.
 #include "integrators/methods/faces_estimator.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "integrators/paths/camera_path.h"
@@ -12,13 +14,15 @@ namespace limn {
 void check_faces_film(const Film& film) { PixelRegions::check(film, kFacesUser); }
 
 struct FacesEstimator::Group {
-  Group(const Scene& of, std::span<const Parameter> parameters, int threads,
+  // first: the group before all others, if there is one.
+  Group(const Scene& of, std::span<const Parameter> parameters, int threads, const Group* first,
         const RayTracer& tracer, const Lights& lights)
       : scene(deep_copy(of)) {
     for (size_t k = 0; k < parameters.size(); ++k) {
       parameters[k].seed(scene, static_cast<int>(k));
     }
-    closed = std::make_unique<ClosedLight>(scene, threads);
+    closed = first ? std::make_unique<ClosedLight>(scene, *first->closed)
+                   : std::make_unique<ClosedLight>(scene, threads);
     view = std::make_unique<CameraView<Dual>>(scene.camera);
     context.reset(new PathContext{scene, tracer, lights, closed.get()});
   }
@@ -39,7 +43,8 @@ FacesEstimator::FacesEstimator(const Scene& scene, std::span<const Parameter> pa
       view_(scene.camera) {
   for (size_t k = 0; k < parameters.size(); k += kLanes) {
     const auto some = parameters.subspan(k).first(std::min<size_t>(kLanes, parameters.size() - k));
-    groups_.push_back(std::make_unique<Group>(scene, some, threads, *tracer_, lights_));
+    const Group* first = groups_.empty() ? nullptr : groups_[0].get();
+    groups_.push_back(std::make_unique<Group>(scene, some, threads, first, *tracer_, lights_));
   }
   for (int k = 0; k < lanes_; ++k) lane_scale_[k] = parameters[k].natural_step;
   if (groups_.empty()) closed_ = std::make_unique<ClosedLight>(scene, threads);
@@ -47,54 +52,56 @@ FacesEstimator::FacesEstimator(const Scene& scene, std::span<const Parameter> pa
 
 FacesEstimator::~FacesEstimator() = default;
 
-// What faces show of themselves, times what light they send: of one pixel.
+// Adds what a face shows of itself, times the light that it sends; false if that is not finite.
 template <class S>
-void FacesEstimator::add_parts(const PixelParts& parts, const Scene& scene,
-                               const CameraView<S>& view, const PathContext& context, size_t slot,
-                               const KeyedSample& sample, SampleSink& sink) const {
-  using Tracer = PathTracer<S, NoVisitor>;
+bool FacesEstimator::add_part(const PixelParts& parts, size_t i, const Scene& scene,
+                              const CameraView<S>& view, const PathContext& context, SampleLog* log,
+                              Rgb<S>& sum) const {
+  const FacePart<S> part = parts.part(i, scene, view);
+  const CameraRay<S> ray = view.ray(part.x, part.y);
+  if (log) {
+    log->push_back(fmt::format("area {:.6g} pixels", value(part.area)));
+    log_camera_ray(*log, value(part.x), value(part.y), value(ray.origin), value(ray.direction));
+  }
   RayCount rays;
-  Tracer tracer(context, rays);
-  Rgb<S> sum;
-  bool finite = true;
-  for (size_t first = 0; first < parts.size(); first += Tracer::kMostWalks) {
-    const size_t count = std::min(parts.size() - first, Tracer::kMostWalks);
-    std::array<StartRay<S>, Tracer::kMostWalks> starts;
-    std::array<FaceRef, Tracer::kMostWalks> faces;
-    std::array<S, Tracer::kMostWalks> areas;
-    std::vector<typename Tracer::Walk> walks;
-    for (size_t i = 0; i < count; ++i) {
-      const FacePart<S> part = parts.part(first + i, scene, view);
-      const CameraRay<S> ray = view.ray(part.x, part.y);
-      if (sink.log()) {
-        log_camera_ray(*sink.log(), value(part.x), value(part.y), value(ray.origin),
-                       value(ray.direction));
-      }
-      starts[i].origin = ray.origin;
-      starts[i].direction = ray.direction;
-      faces[i] = part.face;
-      areas[i] = part.area;
-      walks.emplace_back(sample.key, 0, nullptr);
+  PathTracer<S, NoVisitor> tracer(context, rays);
+  Walk<S, NoVisitor> walk(Rng(0, 0, 0), 0, nullptr);
+  const StartRay<S> start{{}, ray.origin, ray.direction};
+  tracer.follow_rays({&start, 1}, {&part.face, 1}, {&walk, 1});
+  sum += walk.sums.radiance * part.area;
+  return !walk.failed;
+}
+
+bool FacesEstimator::add_image(const PixelParts& parts, const PixelSample& at,
+                               SampleSink& sink) const {
+  const PathContext context{scene_, *tracer_, lights_, closed_.get()};
+  Rgb<double> sum;
+  for (size_t i = 0; i < parts.size(); ++i) {
+    if (!add_part(parts, i, scene_, view_, context, sink.log(), sum)) return false;
+  }
+  if (!is_finite(sum)) return false;
+  sink.add_radiance(at, sum, 1);
+  return true;
+}
+
+// Face by face: what one group has found of the light there the next one takes.
+bool FacesEstimator::add_derivatives(const PixelParts& parts, const PixelSample& at,
+                                     SampleSink& sink) const {
+  std::vector<Rgb<Dual>> sums(groups_.size());
+  for (size_t i = 0; i < parts.size(); ++i) {
+    for (size_t g = 0; g < groups_.size(); ++g) {
+      const Group& group = *groups_[g];
+      SampleLog* log = g == 0 ? sink.log() : nullptr;
+      if (!add_part(parts, i, group.scene, *group.view, *group.context, log, sums[g])) return false;
     }
-    tracer.follow_rays({starts.data(), count}, {faces.data(), count}, walks);
-    for (size_t i = 0; i < count; ++i) {
-      finite = finite && !walks[i].failed;
-      sum += walks[i].sums.radiance * areas[i];
-    }
   }
-  finite = finite && is_finite(value(sum));
-  Rgb<Lanes> derivative;
-  if constexpr (std::is_same_v<S, Dual>) {
-    derivative = {sum.r.d, sum.g.d, sum.b.d};
-    finite = finite && is_finite(derivative);
+  for (size_t g = 0; g < groups_.size(); ++g) {
+    const Rgb<Lanes> derivative{sums[g].r.d, sums[g].g.d, sums[g].b.d};
+    if (!is_finite(value(sums[g])) || !is_finite(derivative)) return false;
+    if (g == 0) sink.add_radiance(at, value(sums[0]), 1);
+    sink.add(g, at, derivative, 1);
   }
-  sink.cost(slot).samples += parts.size();
-  if (!finite) {
-    sink.reject(sample.at, kFacesTerm);
-    return;
-  }
-  if (slot == 0) sink.add_radiance(sample.at, value(sum), 1);
-  if (lanes_ > 0) sink.add(slot, sample.at, derivative, 1);
+  return true;
 }
 
 void FacesEstimator::add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const {
@@ -104,26 +111,21 @@ void FacesEstimator::add_pixels(std::span<const KeyedSample> samples, SampleSink
   const auto place = [&](int x, int y) {
     return static_cast<size_t>(y - tile.y0) * (tile.x1 - tile.x0) + (x - tile.x0);
   };
-  std::vector<std::vector<const KeyedSample*>> of_pixel(static_cast<size_t>(tile.x1 - tile.x0) *
-                                                        (tile.y1 - tile.y0));
+  std::vector<const PixelSample*> of_pixel(static_cast<size_t>(tile.x1 - tile.x0) *
+                                           (tile.y1 - tile.y0));
   for (const KeyedSample& sample : samples) {
-    of_pixel[place(sample.at.x, sample.at.y)].push_back(&sample);
+    of_pixel[place(sample.at.x, sample.at.y)] = &sample.at;
   }
   PixelParts parts(scene_, pixels_);
   pixels_.for_each_pixel(
-      t, nullptr, [&](int x, int y) { return !of_pixel[place(x, y)].empty(); },
+      t, nullptr, [&](int x, int y) { return of_pixel[place(x, y)] != nullptr; },
       [&](int x, int y, const VisibleRegions& regions) {
+        const PixelSample& at = *of_pixel[place(x, y)];
         parts.find(x, y, regions, !groups_.empty());
-        for (const KeyedSample* sample : of_pixel[place(x, y)]) {
-          if (groups_.empty()) {
-            const PathContext context{scene_, *tracer_, lights_, closed_.get()};
-            add_parts(parts, scene_, view_, context, 0, *sample, sink);
-          }
-          for (size_t g = 0; g < groups_.size(); ++g) {
-            const Group& group = *groups_[g];
-            add_parts(parts, group.scene, *group.view, *group.context, g, *sample, sink);
-          }
-        }
+        sink.cost(0).samples += parts.size();
+        const bool finite =
+            groups_.empty() ? add_image(parts, at, sink) : add_derivatives(parts, at, sink);
+        if (!finite) sink.reject(at, kFacesTerm);
       });
 }
 

@@ -20,7 +20,7 @@ inline constexpr RegionsUser kFacesUser{"a film seen by its faces", "--points ra
 // InputError unless the film has a box filter.
 void check_faces_film(const Film& film);
 
-// Every sample of a pixel is the same. Slot g holds the derivatives for the parameters from g
+// A pixel has one sample. Slot g holds the derivatives for the parameters from g
 // kLanes on; without parameters there is one slot without derivatives.
 class FacesEstimator final : public SampleEstimator {
  public:
@@ -41,9 +41,11 @@ class FacesEstimator final : public SampleEstimator {
   struct Group;
 
   template <class S>
-  void add_parts(const PixelParts& parts, const Scene& scene, const CameraView<S>& view,
-                 const PathContext& context, size_t slot, const KeyedSample& sample,
-                 SampleSink& sink) const;
+  bool add_part(const PixelParts& parts, size_t i, const Scene& scene, const CameraView<S>& view,
+                const PathContext& context, SampleLog* log, Rgb<S>& sum) const;
+  // Of a pixel; false if it is not finite, and then nothing is added.
+  bool add_image(const PixelParts& parts, const PixelSample& at, SampleSink& sink) const;
+  bool add_derivatives(const PixelParts& parts, const PixelSample& at, SampleSink& sink) const;
 
   const Scene& scene_;
   int lanes_;

@@ -288,7 +288,9 @@ TEST(Fit, QuasiNewtonOverFacesFindsWhatIsInView) {
     ASSERT_TRUE(record);
     EXPECT_EQ(record->error, 0);
     if (i == 0) first = record->loss;
-    if (i > 0) EXPECT_LE(record->loss, last);
+    if (i > 0) {
+      EXPECT_LE(record->loss, last);
+    }
     last = record->loss;
     if (record->at_rest) break;
   }

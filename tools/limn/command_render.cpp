@@ -105,7 +105,9 @@ class RenderCommand final : public Command {
     remove_stale(output_, {output_});
     write_exr(output_, film_channels(scene, image), scene.film.half, attributes);
     write_png(picture, image, 1);
-    if (!common_.quiet) {
+    if (!common_.quiet && options_.points == FilmPoints::kFaces) {
+      fmt::print("{} and {}: of visible faces, {:.2f} s\n", output_, picture, result.seconds);
+    } else if (!common_.quiet) {
       fmt::print("{} and {}: {} samples per pixel, {:.2f} s, {:.3g} million rays per second\n",
                  output_, picture, result.spp, result.seconds,
                  static_cast<double>(result.rays) / result.seconds / 1e6);

@@ -33,6 +33,7 @@ enum class OptimiserKind {
   // alike in all pixels, one image for the loss, and minimises that function of the parameters. Its
   // derivative is the term "interior"; where silhouettes that the camera sees are moved, their term
   // adds an estimate of their part of the mean image's, which the function itself does not have.
+  // Over faces (FilmPoints) the function has it, and the gradient is its own.
   // Numbers at a bound that would go on past it are held. Not for l1, nor with more samples
   // as steps go on.
   kLbfgs,
