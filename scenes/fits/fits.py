@@ -296,12 +296,16 @@ def curve(fit):
 
 
 def reached(fit, part):
-    """Losses and gradients, and seconds, until the loss is that part of the first."""
-    points = curve(fit)
-    for count, seconds, loss in points:
-        if loss <= part * points[0][2]:
-            return count, seconds
-    return None
+    """Losses and gradients, and seconds, from which on the loss is at most that part of the first.
+
+    None where it never stays there.
+    """
+    points, found = curve(fit), None
+    for count, seconds, loss in reversed(points):
+        if loss > part * points[0][2]:
+            break
+        found = count, seconds
+    return found
 
 
 def targets_of(fits, name, base, defines, sensors=1):
