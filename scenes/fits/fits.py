@@ -283,13 +283,13 @@ NEWTON = [*FUNCTION, "--optimiser", "lbfgs"]
 
 
 def curve(fit):
-    """After each step that was begun: losses and gradients so far, processor seconds, loss.
+    """At each step: losses and gradients so far, processor seconds, loss.
 
     Every step takes one of both, but for those of L-BFGS, which say how many they took.
     """
     points, count = [], 0
-    for step in fit["history"]:
-        points.append((max(1, count), step["loss"]))
+    for number, step in enumerate(fit["history"], 1):
+        points.append((max(number, count), step["loss"]))
         count += step["evaluations"]
     each = (fit["seconds"] or 0) / max(1, count)
     return [(k, k * each, loss) for k, loss in points]
@@ -359,7 +359,7 @@ def tree(fits):
     noisy = ["--spp", "16", "--step", "3", "--step-half-life", "25", "--seed", "1"]
     variants = [
         ("lbfgs", 8, [*NEWTON, "--step", "5"]),
-        ("adam", 30, [*FUNCTION, "--optimiser", "adam", "--step", "4", "--step-half-life", "8"]),
+        ("adam", 45, [*FUNCTION, "--optimiser", "adam", "--step", "3", "--step-half-life", "12"]),
         ("adam of forest", 60, noisy),
     ]
     return compare(fits, "tree", "tree_shadow.xml", targets, [], ["object.rotate.y"], variants,
@@ -455,8 +455,10 @@ def curves(fits):
     names, rows = ["tree", "gears", "displacement"], []
     figure, panels = pyplot.subplots(len(names), 2, figsize=(9, 8), sharey="row")
     for name, (by_count, by_time) in zip(names, panels):
-        for variant in ("lbfgs", "adam", "adam of forest"):
+        for variant in ("lbfgs", "adam", "adam of forest", "lbfgs of forest same"):
             folder = fits.path(f"{name}_{variant.replace(' ', '_')}")
+            if not os.path.exists(folder):
+                continue
             fit = json.load(open(os.path.join(folder, "fit.json"), encoding="utf-8"))
             times = os.path.join(folder, "seconds.json")
             fit["seconds"] = json.load(open(times, encoding="utf-8"))
@@ -472,7 +474,7 @@ def curves(fits):
             panel.grid(alpha=0.3)
     panels[-1][0].set_xlabel("losses and gradients")
     panels[-1][1].set_xlabel("seconds of the processor")
-    panels[0][0].legend(frameon=False)
+    panels[1][0].legend(frameon=False)
     figure.tight_layout()
     file = os.path.join(ROOT, "scenes", "pictures", "fit_curves.webp")
     figure.savefig(file, dpi=90, pil_kwargs={"quality": 80, "method": 6})
