@@ -119,7 +119,7 @@ class BackwardPass {
         settings_(settings),
         film_(scene.film, adjoint_pixels(scene, adjoint)),
         choice_(film_.pixels(), options.uniform_pixels),
-        parameters_(scene, options.parameters),
+        parameters_(scene, reverse_parameters(scene, options)),
         tracer_(make_embree_tracer(parameters_.scene(), settings.threads)),
         lights_(parameters_.scene()),
         method_(reverse_method(options.sampler)),

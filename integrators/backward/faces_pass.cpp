@@ -23,7 +23,7 @@ class FacesPass {
         settings_(settings),
         film_((check_faces_film(scene.film), scene.film)),
         adjoint_(adjoint_pixels(scene, adjoint)),
-        parameters_(scene, options.parameters),
+        parameters_(scene, reverse_parameters(scene, options)),
         faces_(std::make_shared<FacesInPlace>(parameters_.scene(), settings.threads)),
         pixels_(parameters_.scene(), *faces_, settings.threads, kFacesUser),
         tracer_(make_embree_tracer(parameters_.scene(), settings.threads, faces_)),

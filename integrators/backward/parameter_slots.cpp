@@ -2,16 +2,18 @@
 #include "integrators/backward/parameter_slots.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "limn/core/check.h"
 
 namespace limn {
 
-std::vector<Parameter> reverse_parameters(const Scene& scene,
-                                          const std::vector<std::string>& names) {
-  if (names.empty()) return list_parameters(scene);
+std::vector<Parameter> reverse_parameters(const Scene& scene, const BackwardOptions& options) {
+  if (!options.found.empty()) return options.found;
+  if (options.parameters.empty()) return list_parameters(scene);
   std::vector<Parameter> parameters;
-  for (const std::string& name : names) parameters.push_back(find_parameter_or_array(scene, name));
+  for (const std::string& name : options.parameters)
+    parameters.push_back(find_parameter_or_array(scene, name));
   return parameters;
 }
 
@@ -88,8 +90,8 @@ class ParameterSlots::Values {
   }
 };
 
-ParameterSlots::ParameterSlots(const Scene& scene, const std::vector<std::string>& names)
-    : parameters_(reverse_parameters(scene, names)), scene_(deep_copy(scene)) {
+ParameterSlots::ParameterSlots(const Scene& scene, std::vector<Parameter> parameters)
+    : parameters_(std::move(parameters)), scene_(deep_copy(scene)) {
   slots_.scene = &scene_;
   slots_.meshes.resize(scene.shapes.size());
   free_.shapes.assign(scene.shapes.size(), false);
@@ -125,6 +127,7 @@ ParameterSlots::Dependence ParameterSlots::dependence_of(const Scene& scene,
     const std::vector<Vec3d> velocity = parameter.velocities(scene, ShapeId(s));
     if (velocity.empty()) continue;
     dependence.shape = ShapeId(s);
+    dependence.directions = parameter.directions(scene);
     for (uint32_t v = 0; v < velocity.size() && parameter.size == 1; ++v) {
       const Vec3d& u = velocity[v];
       if (u.x != 0 || u.y != 0 || u.z != 0) dependence.velocity.emplace_back(v, u);
@@ -268,6 +271,11 @@ void ParameterSlots::gather_shape(ShapeId shape, const std::vector<double>& sums
   for (size_t i = 0; i < parameters_.size(); ++i) {
     const Dependence& dependence = dependences_[i];
     if (dependence.shape != shape) continue;
+    for (size_t v = 0; v < dependence.directions.size(); ++v) {
+      const uint32_t root = mesh.weld[v];
+      values[i][v] = dot(positions[root], dependence.directions[v]) / copies[root];
+    }
+    if (!dependence.directions.empty()) continue;
     if (parameters_[i].size > 1) {
       for (size_t v = 0; v < mesh.weld.size(); ++v) {
         const uint32_t root = mesh.weld[v];

@@ -11,17 +11,16 @@
 #include "limn/core/parameter.h"
 #include "limn/core/scene.h"
 #include "limn/core/slots.h"
+#include "limn/integrators/backward.h"
 
 namespace limn {
 
-// Those that BackwardOptions::parameters names. InputError for unknown ones.
-std::vector<Parameter> reverse_parameters(const Scene& scene,
-                                          const std::vector<std::string>& names);
+// Those that the options ask for. InputError for unknown ones.
+std::vector<Parameter> reverse_parameters(const Scene& scene, const BackwardOptions& options);
 
 class ParameterSlots {
  public:
-  // names: as BackwardOptions::parameters. InputError for unknown ones.
-  ParameterSlots(const Scene& scene, const std::vector<std::string>& names);
+  ParameterSlots(const Scene& scene, std::vector<Parameter> parameters);
   ParameterSlots(const ParameterSlots&) = delete;
   ParameterSlots& operator=(const ParameterSlots&) = delete;
 
@@ -48,6 +47,7 @@ class ParameterSlots {
     // Of a scalar: of the vertices that it moves.
     std::vector<std::pair<uint32_t, Vec3d>> velocity;
     std::vector<Vec3d> normal_velocity;  // N, of normals of the file; empty if they stay
+    std::vector<Vec3d> directions;       // V, of displacements
     std::vector<Weight> weights;
     bool texels = false;                                      // all of the environment's map
     std::vector<std::pair<uint32_t, double>> texel_velocity;  // of a scalar: of those it moves

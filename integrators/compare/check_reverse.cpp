@@ -88,8 +88,16 @@ std::vector<Compared> compared(const Scene& scene, const Parameter& parameter, s
   }
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     if (parameter.velocities(scene, ShapeId(s)).empty()) continue;
-    const std::vector<Vec3d> field = random_field(scene.shapes[s].mesh, seed);
+    std::vector<Vec3d> field = random_field(scene.shapes[s].mesh, seed);
     std::vector<double> weights;
+    const std::vector<Vec3d> directions = parameter.directions(scene);
+    if (!directions.empty()) {
+      for (size_t v = 0; v < field.size(); ++v) {
+        weights.push_back(field[v].x);
+        field[v] = directions[v] * weights[v];
+      }
+      return {{parameter.name, vertex_field(scene, ShapeId(s), field), place, weights}};
+    }
     for (const Vec3d& v : field) weights.insert(weights.end(), {v.x, v.y, v.z});
     return {{parameter.name, vertex_field(scene, ShapeId(s), field), place, weights}};
   }
@@ -167,7 +175,7 @@ std::vector<ReverseCheck> check_reverse(const Scene& scene, const BackwardOption
   const Image adjoint = random_adjoint(scene.film, mix_bits(settings.seed));
   std::vector<Compared> list;
   std::vector<Parameter> parameters;
-  const std::vector<Parameter> asked = reverse_parameters(scene, options.parameters);
+  const std::vector<Parameter> asked = reverse_parameters(scene, options);
   for (size_t place = 0; place < asked.size(); ++place) {
     for (const Compared& one : compared(scene, asked[place], place, settings.seed)) {
       list.push_back(one);

@@ -57,7 +57,8 @@ int grown(int count, int64_t step, int period) {
 void free_normals(Scene& scene, const std::string& name, std::vector<std::string>& warnings) {
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     const Mesh& mesh = scene.shapes[s].mesh;
-    if (scene.shapes[s].id + ".vertex_positions" != name) continue;
+    const std::string& id = scene.shapes[s].id;
+    if (id + ".vertex_positions" != name && id + ".displacement" != name) continue;
     if (mesh.normal_source != NormalSource::kGiven) continue;
     warnings.push_back("\"" + scene.shapes[s].id +
                        "\" has normals of its own: they are computed from its faces instead, "
@@ -197,6 +198,12 @@ void Fit::Impl::check_remeshing() {
   }
   bool any = false;
   for (const FitParameter& p : parameters_) {
+    if (p.is_displacement()) {
+      throw InputError(fmt::format(
+          "\"{}\" moves the vertices that the shape has at first, and remeshing makes others: fit "
+          "its vertex_positions, or leave out the remeshing",
+          p.name()));
+    }
     for (size_t v = 0; v < views.size(); ++v) {
       if (!p.is_array() || !p.shape(v).valid()) continue;
       const Shape& shape = views[v].scene.shape(p.shape(v));
@@ -253,11 +260,12 @@ bool Fit::Impl::add_view(size_t view, FitRecord& record,
   backward_options.batches = 1;
   backward_options.find_gaps = false;  // told before the first step
   if (is_exact()) backward_options.uniform_pixels = true;
-  backward_options.parameters.clear();
+  // As they were found at the start: what shapes turn about does not wander.
+  backward_options.found.clear();
   for (const FitParameter& p : parameters_) {
-    if (p.in_view(view)) backward_options.parameters.push_back(p.name());
+    if (p.in_view(view)) backward_options.found.push_back(*p.in_view(view));
   }
-  if (backward_options.parameters.empty()) return true;
+  if (backward_options.found.empty()) return true;
   own.spp = samples_of(settings_.spp);
   if (settings_.progress) {
     // The two images take about a third of the time.

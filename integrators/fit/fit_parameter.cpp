@@ -61,7 +61,8 @@ FitParameter::FitParameter(const std::string& name, const std::vector<FitView>& 
   }
   if (first_view_ == views.size()) throw UnknownParameter(*unknown);
   natural_step_ = in_view_[first_view_]->natural_step;
-  if (in_view_[first_view_]->array.size() == 2) {
+  const size_t dimensions = in_view_[first_view_]->array.size();
+  if (dimensions == 1 || dimensions == 2) {
     find_array(views, options.smoothing);
   } else {
     find_numbers(views);
@@ -106,6 +107,16 @@ void FitParameter::find_array(const std::vector<FitView>& views, double smoothin
   }
   const double in_edges = smoothing * bounds_of(first).diagonal() / mean_edge_length(first);
   large_steps_ = std::make_unique<LargeSteps>(first, in_edges * in_edges);
+  if (in_view_[first_view_]->array.size() == 1) {
+    const std::vector<Vec3d> directions =
+        in_view_[first_view_]->directions(views[first_view_].scene);
+    for (const uint32_t v : large_steps_->first()) {
+      start_.push_back(cast<double>(first.positions[v]));
+      along_.push_back(directions[v]);
+    }
+    numbers_.resize(large_steps_->size());
+    return;
+  }
   std::vector<double> positions;
   for (const uint32_t v : large_steps_->first()) {
     for (int k = 0; k < 3; ++k) positions.push_back(static_cast<double>(first.positions[v][k]));
@@ -224,9 +235,10 @@ std::vector<double> FitParameter::scaled(const std::vector<double>& gradient) co
     return step;
   }
   const std::vector<uint32_t>& welded = large_steps_->welded();
-  std::vector<double> of_welded(3 * large_steps_->size());
+  const size_t each = is_displacement() ? 1 : 3;
+  std::vector<double> of_welded(numbers_.size());
   for (size_t v = 0; v < welded.size(); ++v) {
-    for (int k = 0; k < 3; ++k) of_welded[3 * welded[v] + k] += gradient[3 * v + k];
+    for (size_t k = 0; k < each; ++k) of_welded[each * welded[v] + k] += gradient[each * v + k];
   }
   // The matrix is symmetric: dL/du = (I + lambda L)^-1 dL/dv.
   std::vector<double> step = large_steps_->solve(of_welded);
@@ -248,12 +260,13 @@ int FitParameter::move_vertices(const std::vector<double>& gradient, double size
   return kMostHalvings;
 }
 
-bool FitParameter::place_vertices(const std::vector<double>& positions,
+bool FitParameter::place_vertices(const std::vector<double>& vertices,
                                   std::vector<FitView>& views) const {
   std::vector<Vec3f> all;
-  for (const uint32_t w : large_steps_->welded()) {
-    const double* x = &positions[3 * size_t{w}];
-    all.push_back(cast<float>(Vec3d{x[0], x[1], x[2]}));
+  for (const size_t w : large_steps_->welded()) {
+    const double* x = &vertices[is_displacement() ? w : 3 * w];
+    all.push_back(
+        cast<float>(is_displacement() ? start_[w] + along_[w] * *x : Vec3d{x[0], x[1], x[2]}));
   }
   Scene& first = views[first_view_].scene;
   std::optional<Mesh> moved = moved_whole(first.shape(shapes_[first_view_]), all);
@@ -303,7 +316,7 @@ void FitParameter::restore(const FitState::Numbers& numbers, const std::vector<F
       large_steps_ = std::make_unique<LargeSteps>(mesh(views), numbers.lambda);
     }
     natural_step_ = numbers.natural_step;
-    size = 3 * large_steps_->size();
+    size = (is_displacement() ? 1 : 3) * large_steps_->size();
   }
   const size_t moments = optimiser_->first.empty() ? 0 : size;
   if (numbers.values.size() != size || numbers.first.size() != moments ||

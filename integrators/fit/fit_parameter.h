@@ -20,6 +20,7 @@ class FitParameter {
 
   const std::string& name() const { return name_; }
   bool is_array() const { return large_steps_ != nullptr; }                 // of vertices
+  bool is_displacement() const { return !along_.empty(); }                  // an array, too
   bool is_map() const { return in_view_[first_view_]->array.size() == 3; }  // of texels
   size_t size() const { return numbers_.size(); }  // numbers that steps are taken in
   // Null where the view does not have it.
@@ -68,7 +69,8 @@ class FitParameter {
   void find_bounds(const std::vector<FitView>& views, const FitOptions& options);
   int move_vertices(const std::vector<double>& gradient, double size, int64_t count,
                     std::vector<FitView>& views);
-  bool place_vertices(const std::vector<double>& positions, std::vector<FitView>& views) const;
+  // vertices: their positions, or how far they are displaced.
+  bool place_vertices(const std::vector<double>& vertices, std::vector<FitView>& views) const;
   // step: in the parameter's unit; cut at bounds.
   void add_to_numbers(std::vector<double>& step, std::vector<FitView>& views);
   // What a number is after a step within bounds.
@@ -84,6 +86,7 @@ class FitParameter {
   double natural_step_ = 0;
   double least_ = 0, most_ = 0;
   std::unique_ptr<LargeSteps> large_steps_;  // of an array
+  std::vector<Vec3d> start_, along_;         // of displacements, for each welded vertex
   std::vector<double> numbers_;              // u of an array, or the sums of steps
   std::optional<Optimiser> optimiser_;
 };

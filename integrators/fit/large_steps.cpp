@@ -14,13 +14,19 @@ namespace {
 
 using Matrix = Eigen::SparseMatrix<double>;
 using Rows = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
+using Column = Eigen::VectorXd;
 
-Eigen::Map<const Rows> rows(const std::vector<double>& x, size_t n) {
-  CHECK_EQ(x.size(), 3 * n);
-  return {x.data(), static_cast<Eigen::Index>(n), 3};
+template <class Matrix>
+Eigen::Map<const Matrix> rows(const std::vector<double>& x, size_t n) {
+  constexpr int kColumns = Matrix::ColsAtCompileTime;
+  CHECK_EQ(x.size(), kColumns * n);
+  return {x.data(), static_cast<Eigen::Index>(n), kColumns};
 }
 
-std::vector<double> numbers(const Rows& x) { return {x.data(), x.data() + x.size()}; }
+template <class Matrix>
+std::vector<double> numbers(const Matrix& x) {
+  return {x.data(), x.data() + x.size()};
+}
 
 // Pairs of welded vertices, each once, in order; welded: what stands for each vertex.
 std::vector<std::pair<uint32_t, uint32_t>> edges_of(const Mesh& mesh,
@@ -86,12 +92,14 @@ LargeSteps::LargeSteps(LargeSteps&&) noexcept = default;
 
 std::vector<double> LargeSteps::apply(const std::vector<double>& x) const {
   if (!factors_) return x;
-  return numbers(factors_->matrix * rows(x, size()));
+  if (x.size() == size()) return numbers<Column>(factors_->matrix * rows<Column>(x, size()));
+  return numbers<Rows>(factors_->matrix * rows<Rows>(x, size()));
 }
 
 std::vector<double> LargeSteps::solve(const std::vector<double>& x) const {
   if (!factors_) return x;
-  return numbers(factors_->cholesky.solve(rows(x, size())));
+  if (x.size() == size()) return numbers<Column>(factors_->cholesky.solve(rows<Column>(x, size())));
+  return numbers<Rows>(factors_->cholesky.solve(rows<Rows>(x, size())));
 }
 
 }  // namespace limn

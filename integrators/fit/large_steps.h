@@ -23,7 +23,7 @@ class LargeSteps {
   // For each welded one the first of its copies.
   const std::vector<uint32_t>& first() const { return first_; }
 
-  // n by 3, row by row: (I + lambda L) x.
+  // n by 3, row by row, or n by 1: (I + lambda L) x.
   std::vector<double> apply(const std::vector<double>& x) const;
   // (I + lambda L)^-1 x, by Cholesky factors. The matrix is symmetric: it takes gradients of v to
   // those of u, and u to v.

@@ -7,6 +7,10 @@
     scenes/fits/fits.py views     a shape from eight sides
     scenes/fits/fits.py pose      place, reflectance and camera of an object together
     scenes/fits/fits.py drift     from the very target: what noise does, and nothing else
+    scenes/fits/fits.py tree      how far a tree is turned, from its shadow
+    scenes/fits/fits.py gears     how far each of fifteen gears is turned, from their shadows
+    scenes/fits/fits.py displacement  162 vertices along their normals, from eight sides
+    scenes/fits/fits.py curves    of these three: scenes/pictures/fit_curves.webp
     scenes/fits/fits.py picture   of the shapes that these found: scenes/pictures/fits.webp
 
 Writes OUT/NAME/ (pictures, meshes, report.html) and prints a table. A fit that is there is not run
@@ -32,6 +36,8 @@ class Fits:
     def __init__(self, arguments):
         self.limn, self.out = arguments.limn, arguments.output
         self.threads, self.steps = arguments.threads, arguments.steps
+        n = arguments.size
+        self.size = [f"width={n}", f"height={n}"] if n else []
         self.only = arguments.only.split(",") if arguments.only else None
         self.generated = os.path.join(ROOT, "build", "generated")
 
@@ -57,10 +63,11 @@ class Fits:
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
 
-    def render(self, scene, file, *defines, spp=256, sensor=0, method="path"):
+    def render(self, scene, file, *defines, spp=256, sensor=0, method="path", points=None):
         if not os.path.exists(file):
             words = [w for d in defines for w in ("-D", d)] + ["--sensor", str(sensor)]
-            words += ["--method", method, "--spp", str(spp), "--seed", "99"]
+            words += ["--method", method, "--seed", "99"]
+            words += ["--points", points] if points else ["--spp", str(spp)]
             self.run("render", scene, *words, "-o", file)
         return file
 
@@ -74,9 +81,9 @@ class Fits:
                 seconds = self.run("fit", "--resume", self.path(folder), "--steps", str(steps))
         else:
             # Four times the default: what the figures in README.md were taken with.
+            samples = [] if "--points" in words else ["--camera-samples", "1"]
             seconds = self.run("fit", scene, "--target", target, "--steps", str(steps),
-                               "--camera-samples", "1", "-o", self.path(folder),
-                               *words)  # fmt: skip
+                               *samples, "-o", self.path(folder), *words)  # fmt: skip
         known = json.load(open(times, encoding="utf-8")) if os.path.exists(times) else None
         if seconds and (known is not None or not done):
             known = (known or 0) + seconds
@@ -269,6 +276,211 @@ def drift(fits):
     return ["fit", "chamfer / diagonal", "normals"], rows
 
 
+# What the sampler "analytic" and the optimiser "lbfgs" make of a loss, beside Adam and beside
+# gradients with noise. Steps of Adam are halved as they go on, or it would end in circles.
+FUNCTION = ["--sampler", "analytic", "--points", "faces"]
+NEWTON = [*FUNCTION, "--optimiser", "lbfgs"]
+
+
+def curve(fit):
+    """At each step: losses and gradients so far, processor seconds, loss.
+
+    Every step takes one of both, but for those of L-BFGS, which say how many they took.
+    """
+    points, count = [], 0
+    for number, step in enumerate(fit["history"], 1):
+        points.append((max(number, count), step["loss"]))
+        count += step["evaluations"]
+    each = (fit["seconds"] or 0) / max(1, count)
+    return [(k, k * each, loss) for k, loss in points]
+
+
+def reached(fit, part):
+    """Losses and gradients, and seconds, from which on the loss is at most that part of the first.
+
+    None where it never stays there.
+    """
+    points, found = curve(fit), None
+    for count, seconds, loss in reversed(points):
+        if loss > part * points[0][2]:
+            break
+        found = count, seconds
+    return found
+
+
+def targets_of(fits, name, base, defines, sensors=1):
+    """For each sensor the image as a function of the scene, and what samples have in the mean."""
+    lists = []
+    for kind, more in (("", {"points": "faces"}), ("_mean", {"spp": 32})):
+        lists.append([
+            fits.render(scene(base), fits.path(f"{name}{kind}_{i}.exr"), *fits.size, *defines,
+                        sensor=i, method="analytic", **more)
+            for i in range(sensors)
+        ])  # fmt: skip
+    return lists
+
+
+def compare(fits, name, base, targets, defines, parameters, variants, error):
+    """A row for each of (name, steps, options); error(folder, fit): of the parameters at last."""
+    rows = []
+    chosen = fits.chosen([(variant, (steps, more)) for variant, steps, more in variants])
+    for variant, (steps, more) in chosen:
+        folder = f"{name}_{variant.replace(' ', '_')}"
+        own = targets[0] if "analytic" in more else targets[1]
+        words = [w for p in parameters for w in ("--wrt", p)]
+        words += [w for d in [*fits.size, *defines] for w in ("-D", d)]
+        words += [w for t in own[1:] for w in ("--target", t)]
+        fit = fits.fit(folder, scene(base), own[0], steps, *words, *more)
+        first = fit["history"][0]["loss"]
+        cells = [variant, fit["steps"], f"{fit['history'][-1]['loss'] / first:.1e}"]
+        for part in (0.1, 0.01, 0.001):
+            at = reached(fit, part)
+            cells.append(f"{at[0]}, {at[1]:.0f} s" if at else "not")
+        rows.append([*cells, error(folder, fit), seconds_of(fit)])
+    return ["fit", "steps", "last / first loss", "to 1/10", "to 1/100", "to 1/1000", "error",
+            "seconds"], rows  # fmt: skip
+
+
+def angles(truths):
+    """The root of the mean squared error of angles, in degrees."""
+
+    def error(_, fit):
+        squares = [(s["value"] - t) ** 2 for s, t in zip(fit["scalars"], truths)]
+        return f"{math.degrees(math.sqrt(sum(squares) / len(squares))):.3f} degrees"
+
+    return error
+
+
+TREE = 20  # degrees from the start to the truth
+
+
+def tree(fits):
+    targets = targets_of(fits, "tree", "tree_shadow.xml", [f"turn={TREE}"])
+    noisy = ["--spp", "16", "--step", "3", "--step-half-life", "25", "--seed", "1"]
+    variants = [
+        ("lbfgs", 8, [*NEWTON, "--step", "5"]),
+        ("adam", 45, [*FUNCTION, "--optimiser", "adam", "--step", "3", "--step-half-life", "12"]),
+        ("adam of forest", 60, noisy),
+    ]
+    return compare(fits, "tree", "tree_shadow.xml", targets, [], ["object.rotate.y"], variants,
+                   angles([math.radians(TREE)]))  # fmt: skip
+
+
+# By how many degrees each gear is off at the start.
+GEARS = [11, -9, 12, -12, 8, 10, -11, 16, -18, 17, -15, 18, -17, 17, -16]
+
+
+def gears(fits):
+    targets = targets_of(fits, "gears", "gears.xml", [])
+    start = [f"off_{i}={a}" for i, a in enumerate(GEARS)]
+    names = [f"gear_{i}.rotate.y" for i in range(len(GEARS))]
+    noisy = ["--spp", "16", "--step", "4", "--step-half-life", "20", "--seed", "1"]
+    variants = [
+        ("lbfgs", 28, [*NEWTON, "--step", "5"]),
+        ("adam", 80, [*FUNCTION, "--optimiser", "adam", "--step", "4", "--step-half-life", "20"]),
+        ("adam of forest", 80, noisy),
+    ]
+    return compare(fits, "gears", "gears.xml", targets, start, names, variants,
+                   angles([math.radians(-a) for a in GEARS]))  # fmt: skip
+
+
+def stone(fits):
+    """The ball's vertices, and the mesh whose vertices lie elsewhere along its normals."""
+    ball = os.path.join(fits.generated, "ball.ply")
+    content = open(ball, "rb").read()
+    flat = positions(ball)
+    places = [flat[i : i + 3] for i in range(0, len(flat), 3)]
+    faces = [struct.unpack("<3i", content[i : i + 12])
+             for i in range(len(content) - 13 * 320 + 1, len(content), 13)]  # fmt: skip
+    directions = normals(places, faces)
+    moved = []
+    for p, n in zip(places, directions):
+        by = 0.16 * math.sin(3 * p[0] + 1) * math.cos(2.5 * p[1]) + 0.1 * math.sin(4 * p[2] + 2)
+        moved.append([x + by * d for x, d in zip(p, n)])
+    file = fits.path("stone.obj")
+    lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in moved]
+    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces]
+    open(file, "w", encoding="utf-8").write("\n".join(lines) + "\n")
+    return file, moved
+
+
+def normals(places, faces):
+    """Of vertices: the mean of those of the faces around, weighted by their angles there."""
+
+    def unit(v):
+        size = math.sqrt(sum(x * x for x in v))
+        return [x / size for x in v]
+
+    def cross(a, b):
+        return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+    sums = [[0, 0, 0] for _ in places]
+    for face in faces:
+        for k in range(3):
+            at, b, c = (places[face[(k + i) % 3]] for i in range(3))
+            u, v = (unit([x - y for x, y in zip(p, at)]) for p in (b, c))
+            angle = math.acos(sum(x * y for x, y in zip(u, v)))
+            for i, x in enumerate(unit(cross(u, v))):
+                sums[face[k]][i] += angle * x
+    return [unit(s) for s in sums]
+
+
+def displacement(fits):
+    mesh, truth = stone(fits)
+    shape = [f"mesh={os.path.abspath(mesh)}", "format=obj"]
+    targets = targets_of(fits, "stone", "displacement.xml", shape, 8)
+
+    def error(folder, fit):
+        found = positions(fits.path(folder, fit["snapshots"][-1]["meshes"][0]["file"]))
+        squares = [(a - b) ** 2 for a, b in zip(found, [x for v in truth for x in v])]
+        return f"{math.sqrt(sum(squares) / len(truth)):.4f}"
+
+    even = ["--smoothing", "0"]
+    noisy = ["--spp", "4", "--step", "2", "--step-half-life", "40", "--seed", "1"]
+    variants = [
+        ("lbfgs", 40, [*even, *NEWTON, "--step", "1"]),
+        ("adam", 100, [*even, *FUNCTION, "--step", "2", "--step-half-life", "30"]),
+        ("adam of forest", 100, [*even, *noisy]),
+    ]
+    return compare(fits, "displacement", "displacement.xml", targets, [],
+                   ["object.displacement"], variants, error)  # fmt: skip
+
+
+def curves(fits):
+    import matplotlib  # noqa: PLC0415
+
+    matplotlib.use("agg")
+    from matplotlib import pyplot  # noqa: PLC0415
+
+    names, rows = ["tree", "gears", "displacement"], []
+    figure, panels = pyplot.subplots(len(names), 2, figsize=(9, 8), sharey="row")
+    for name, (by_count, by_time) in zip(names, panels):
+        for variant in ("lbfgs", "adam", "adam of forest", "lbfgs of forest same"):
+            folder = fits.path(f"{name}_{variant.replace(' ', '_')}")
+            if not os.path.exists(folder):
+                continue
+            fit = json.load(open(os.path.join(folder, "fit.json"), encoding="utf-8"))
+            times = os.path.join(folder, "seconds.json")
+            fit["seconds"] = json.load(open(times, encoding="utf-8"))
+            points = [p for p in curve(fit) if p[2] > 0]
+            first = fit["history"][0]["loss"]
+            for panel, x in ((by_count, 0), (by_time, 1)):
+                panel.plot([p[x] for p in points], [p[2] / first for p in points], label=variant)
+            rows.append([name, variant, f"{points[-1][2] / first:.1e}"])
+        by_count.set_ylabel(f"{name}: loss over the first")
+        for panel in (by_count, by_time):
+            panel.set_yscale("log")
+            panel.set_xscale("log")
+            panel.grid(alpha=0.3)
+    panels[-1][0].set_xlabel("losses and gradients")
+    panels[-1][1].set_xlabel("seconds of the processor")
+    panels[1][0].legend(frameon=False)
+    figure.tight_layout()
+    file = os.path.join(ROOT, "scenes", "pictures", "fit_curves.webp")
+    figure.savefig(file, dpi=90, pil_kwargs={"quality": 80, "method": 6})
+    return ["scene", "fit", "last / first loss"], rows
+
+
 # A row for each: truth, start, and fits at some of their steps.
 SHOWN = [
     ("creature.ply", [("mirrors_seed_1", 0), ("mirrors_seed_1", 75), ("mirrors_seed_1", 300),
@@ -306,7 +518,8 @@ def picture(fits):
 
 
 EXPERIMENTS = {"mirrors": mirrors, "shadows": shadows, "exact": exact, "views": views, "pose": pose,
-               "drift": drift, "picture": picture}  # fmt: skip
+               "drift": drift, "tree": tree, "gears": gears, "displacement": displacement,
+               "curves": curves, "picture": picture}  # fmt: skip
 
 
 def main():
@@ -316,11 +529,12 @@ def main():
     parser.add_argument("name", choices=EXPERIMENTS, metavar="NAME", help=", ".join(EXPERIMENTS))
     parser.add_argument("-o", "--output", default=os.path.join(ROOT, "out", "fits"))
     parser.add_argument("--steps", type=int, help="in place of the experiment's own number")
+    parser.add_argument("--size", type=int, help="pixels a side: of tree, gears, displacement")
     parser.add_argument("--only", metavar="FITS", help="of the experiment's, with commas between")
     parser.add_argument("--threads", type=int, help="default: all cores")
     parser.add_argument("--limn", default=os.path.join(ROOT, "build", "limn"), help="the program")
     arguments = parser.parse_args()
-    if arguments.only and arguments.name in ("drift", "picture"):
+    if arguments.only and arguments.name in ("drift", "curves", "picture"):
         parser.error(f"--only: {arguments.name} is one whole")
     os.makedirs(arguments.output, exist_ok=True)
     head, rows = EXPERIMENTS[arguments.name](Fits(arguments))

@@ -23,6 +23,11 @@ class Motion {
   virtual std::vector<Vec3d> velocities(const Scene& scene, ShapeId shape, size_t component) const;
   virtual Image texel_velocities(const Scene& scene, size_t component) const;
 
+  // This motion with what it takes from the scene as it is there; null: it takes nothing later.
+  virtual std::shared_ptr<const Motion> held(const Scene&) const { return nullptr; }
+  // See Parameter.
+  virtual std::vector<Vec3d> directions(const Scene&) const { return {}; }
+
   // The part of an array or colour whose name continues its own with `rest` (":FILE", ".7.x",
   // ".r"); nothing if `rest` means nothing here. InputError if it means something that cannot be.
   virtual std::optional<Parameter> part(const Scene& scene, const Parameter& whole,

@@ -86,6 +86,10 @@ std::vector<Vec3d> Parameter::velocities(const Scene& scene, ShapeId shape,
   return motion->velocities(scene, shape, component);
 }
 
+std::vector<Vec3d> Parameter::directions(const Scene& scene) const {
+  return motion->directions(scene);
+}
+
 Image Parameter::texel_velocities(const Scene& scene, size_t component) const {
   CHECK_LT(component, size);
   return motion->texel_velocities(scene, component);
@@ -104,7 +108,11 @@ std::vector<Parameter> list_parameters(const Scene& scene) {
 Parameter find_parameter_or_array(const Scene& scene, const std::string& name) {
   const std::vector<Parameter> list = list_parameters(scene);
   for (const Parameter& p : list) {
-    if (p.name == name) return p;
+    if (p.name == name) {
+      Parameter found = p;
+      if (const auto held = p.motion->held(scene)) found.motion = held;
+      return found;
+    }
     if (!name.starts_with(p.name)) continue;
     const auto part = p.motion->part(scene, p, name.substr(p.name.size()));
     if (part) return *part;

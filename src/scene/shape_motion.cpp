@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "limn/core/check.h"
+#include "limn/core/displacement.h"
 #include "src/base/text.h"
 #include "src/mesh/shading_tangents.h"
 #include "src/scene/motion.h"
@@ -68,18 +69,19 @@ class ShapeTranslation final : public ShapeMotion {
   int axis_;
 };
 
-// About the center of the shape's bounds.
+// About a point of the world, so that steps add up: the bounds of a shape that turns have their
+// center here and there.
 class ShapeRotation final : public ShapeMotion {
  public:
-  ShapeRotation(ShapeId shape, int axis) : ShapeMotion(shape), axis_(axis) {}
+  ShapeRotation(ShapeId shape, int axis, const Vec3d& center)
+      : ShapeMotion(shape), axis_(axis), center_(center) {}
 
  protected:
   std::vector<Vec3d> vertex_velocities(const Mesh& mesh, size_t) const override {
-    const Vec3d center = bounds_of(mesh).center();
     std::vector<Vec3d> velocities;
     velocities.reserve(mesh.positions.size());
     for (const Vec3f& p : mesh.positions) {
-      velocities.push_back(cross(unit_vector(axis_), cast<double>(p) - center));
+      velocities.push_back(cross(unit_vector(axis_), cast<double>(p) - center_));
     }
     return velocities;
   }
@@ -89,9 +91,8 @@ class ShapeRotation final : public ShapeMotion {
     add_to_lane(mesh.normal_tangents, lane, turns);
   }
   void move_vertices(Mesh& mesh, double step, size_t) const override {
-    const Vec3d center = bounds_of(mesh).center();
     for (Vec3f& p : mesh.positions) {
-      p = cast<float>(center + turned(cast<double>(p) - center, axis_, step));
+      p = cast<float>(center_ + turned(cast<double>(p) - center_, axis_, step));
     }
     if (mesh.normal_source != NormalSource::kGiven) return;
     for (Vec3d& n : mesh.normals) n = turned(n, axis_, step);
@@ -99,21 +100,24 @@ class ShapeRotation final : public ShapeMotion {
 
  private:
   int axis_;
+  Vec3d center_;
 };
 
-// About the center of the shape's bounds.
+// About a point of the world.
 class ShapeScaling final : public ShapeMotion {
  public:
-  using ShapeMotion::ShapeMotion;
+  ShapeScaling(ShapeId shape, const Vec3d& center) : ShapeMotion(shape), center_(center) {}
 
  protected:
   std::vector<Vec3d> vertex_velocities(const Mesh& mesh, size_t) const override {
-    const Vec3d center = bounds_of(mesh).center();
     std::vector<Vec3d> velocities;
     velocities.reserve(mesh.positions.size());
-    for (const Vec3f& p : mesh.positions) velocities.push_back(cast<double>(p) - center);
+    for (const Vec3f& p : mesh.positions) velocities.push_back(cast<double>(p) - center_);
     return velocities;
   }
+
+ private:
+  Vec3d center_;
 };
 
 class VertexField final : public ShapeMotion {
@@ -147,6 +151,12 @@ std::vector<Vec3d> read_field(const Shape& shape, const std::string& file) {
                                  "\" are at the same position but move apart");
   }
   return v;
+}
+
+void check_vertex(const Scene& scene, const std::string& name, int64_t vertex, size_t count) {
+  if (vertex >= 0 && vertex < static_cast<int64_t>(count)) return;
+  throw InputError({scene.file}, "parameter \"" + name + "\": the mesh has vertices 0 to " +
+                                     std::to_string(count - 1));
 }
 
 // All coordinates of all vertices. A component moves its vertex with all copies, so that the mesh
@@ -209,18 +219,57 @@ class VertexArray final : public ShapeMotion {
     const std::optional<int64_t> vertex = parse_integer(words[0]);
     const size_t axis = std::string_view("xyz").find(words[1][0]);
     if (!vertex || axis > 2) return std::nullopt;
-    const auto count = static_cast<int64_t>(whole.size / 3);
-    if (*vertex < 0 || *vertex >= count) {
-      throw InputError({scene.file}, "parameter \"" + whole.name + "." + text +
-                                         "\": the mesh has vertices 0 to " +
-                                         std::to_string(count - 1));
-    }
+    check_vertex(scene, whole.name + "." + text, *vertex, whole.size / 3);
     const size_t component = static_cast<size_t>(*vertex) * 3 + axis;
     return Parameter{whole.name + "." + text, whole.unit, whole.natural_step, 1,
                      one_component(whole.motion, component)};
   }
 
   ShapeId shape_;
+};
+
+// All vertices, each along its normal. A component moves its vertex with all copies.
+class VertexDisplacement final : public ShapeMotion {
+ public:
+  // held: the normals, V; empty: those that the mesh has by then.
+  explicit VertexDisplacement(ShapeId shape, std::vector<Vec3d> held = {})
+      : ShapeMotion(shape), shape_(shape), held_(std::move(held)) {}
+
+  std::shared_ptr<const Motion> held(const Scene& scene) const override {
+    return std::make_shared<VertexDisplacement>(shape_, of(scene.shape(shape_).mesh));
+  }
+  std::vector<Vec3d> directions(const Scene& scene) const override {
+    return of(scene.shape(shape_).mesh);
+  }
+  std::optional<Parameter> part(const Scene& scene, const Parameter& whole,
+                                const std::string& rest) const override {
+    if (rest.size() < 2 || rest[0] != '.') return std::nullopt;
+    const std::optional<int64_t> vertex = parse_integer(rest.substr(1));
+    if (!vertex) return std::nullopt;
+    check_vertex(scene, whole.name + rest, *vertex, whole.size);
+    return Parameter{whole.name + rest, whole.unit, whole.natural_step, 1,
+                     one_component(held(scene), static_cast<size_t>(*vertex))};
+  }
+  std::string parts(const std::string& name) const override {
+    return "\"" + name + ".0\" for one number";
+  }
+
+ protected:
+  std::vector<Vec3d> vertex_velocities(const Mesh& mesh, size_t component) const override {
+    std::vector<Vec3d> velocities = of(mesh);
+    for (size_t i = 0; i < velocities.size(); ++i) {
+      if (mesh.weld[i] != mesh.weld[component]) velocities[i] = {};
+    }
+    return velocities;
+  }
+
+ private:
+  std::vector<Vec3d> of(const Mesh& mesh) const {
+    return held_.empty() ? displacement_directions(mesh) : held_;
+  }
+
+  ShapeId shape_;
+  std::vector<Vec3d> held_;
 };
 
 }  // namespace
@@ -239,18 +288,23 @@ void add_shape_parameters(const Scene& scene, std::vector<Parameter>& list) {
     const ShapeId id(i);
     const Shape& shape = scene.shape(id);
     if (shape.id.empty()) continue;
-    const double step = 0.01 * bounds_of(shape.mesh).diagonal();
+    const Bounds bounds = bounds_of(shape.mesh);
+    const double step = 0.01 * bounds.diagonal();
     for (int axis = 0; axis < 3; ++axis) {
       const std::string end(1, "xyz"[axis]);
       list.push_back({shape.id + ".translate." + end, "scene units", step, 1,
                       std::make_shared<ShapeTranslation>(id, axis)});
       list.push_back({shape.id + ".rotate." + end, "radians", 0.01, 1,
-                      std::make_shared<ShapeRotation>(id, axis)});
+                      std::make_shared<ShapeRotation>(id, axis, bounds.center())});
     }
-    list.push_back({shape.id + ".scale", "factor", 0.01, 1, std::make_shared<ShapeScaling>(id)});
+    list.push_back({shape.id + ".scale", "factor", 0.01, 1,
+                    std::make_shared<ShapeScaling>(id, bounds.center())});
     list.push_back({shape.id + ".vertex_positions", "scene units", step,
                     3 * shape.mesh.positions.size(), std::make_shared<VertexArray>(id)});
     list.back().array = {shape.mesh.positions.size(), 3};
+    list.push_back({shape.id + ".displacement", "scene units", step, shape.mesh.positions.size(),
+                    std::make_shared<VertexDisplacement>(id)});
+    list.back().array = {shape.mesh.positions.size()};
   }
 }
 

@@ -164,8 +164,9 @@ TEST(Analytic, ReverseModeIsTheDerivativeOfTheLoss) {
   const Image target = target_of(shadow_scene(files, true, 0.1));
   const Scene scene = shadow_scene(files, true);
   const std::vector<std::string> names = {
-      "body.vertex_positions", "lamp.vertex_positions", "body.translate.x", "body.rotate.y",
-      "lamp.translate.y",      "glow.radiance",         "grey.reflectance"};
+      "body.vertex_positions", "lamp.vertex_positions", "body.translate.x",
+      "body.rotate.y",         "lamp.translate.y",      "glow.radiance",
+      "grey.reflectance",      "body.displacement",     "body.displacement.2"};
   const Loss at = loss_and_gradient(scene, target, names);
   const auto value_at = [&](const Parameter& p, double h) {
     Scene other = deep_copy(scene);
@@ -181,7 +182,7 @@ TEST(Analytic, ReverseModeIsTheDerivativeOfTheLoss) {
   // Coordinates below 8 are rounded to floats by 2^-22 at most.
   const double rounding = 0x1p-22 * (magnitude_of(names[0]) + magnitude_of(names[1]));
   for (const std::string& name : names) {
-    if (name == names[0] || name == names[1]) continue;
+    if (name == names[0] || name == names[1] || name == "body.displacement") continue;
     const Parameter p = find_parameter(scene, name);
     const auto difference = [&](double h) { return (value_at(p, h) - value_at(p, -h)) / (2 * h); };
     const double h = 0x1p-4 * p.natural_step;
@@ -189,11 +190,26 @@ TEST(Analytic, ReverseModeIsTheDerivativeOfTheLoss) {
     const Moments& m = at.gradient.of(name).moments;
     double found = 0;
     for (size_t i = 0; i < m.size(); ++i) found += m.mean(i);
-    const bool moves = name.find("late") != name.npos || name.find("rotate") != name.npos;
+    const bool moves = name.starts_with("body.") || name.starts_with("lamp.");
     const double error = moves ? rounding / h : 1e-8 * std::fabs(expected);
     fmt::print("{:20} {:12.8g} {:12.8g} +- {:.2g}\n", name, found, expected, error);
     EXPECT_NEAR(found, expected, error) << name;
   }
+  // All displacements at once, each by its own amount.
+  const Parameter array = find_parameter_or_array(scene, "body.displacement");
+  const Moments& displaced = at.gradient.of(array.name).moments;
+  const auto amount = [](size_t v) { return std::sin(1 + 3 * static_cast<double>(v)); };
+  const auto displaced_by = [&](double h) {
+    Scene other = deep_copy(scene);
+    for (size_t v = 0; v < array.size; ++v) array.move(other, h * amount(v), v);
+    return loss_and_gradient(other, target, {"grey.reflectance"}).loss.value;
+  };
+  const auto difference = [&](double h) { return (displaced_by(h) - displaced_by(-h)) / (2 * h); };
+  const double h = 0x1p-4 * array.natural_step;
+  double found = 0;
+  ASSERT_EQ(displaced.size(), array.size);
+  for (size_t v = 0; v < array.size; ++v) found += displaced.mean(v) * amount(v);
+  EXPECT_NEAR(found, (4 * difference(h) - difference(2 * h)) / 3, rounding / h);
   // One velocity of the vertices: a translation.
   const Moments& v = at.gradient.of(names[0]).moments;
   double along = 0;

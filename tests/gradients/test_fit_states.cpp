@@ -229,6 +229,67 @@ TEST(Fit, QuasiNewtonMovesVertices) {
   }
 }
 
+// Vertices stay on the normals that they had at the start, losses fall, and a state goes on with
+// the same bits.
+TEST(Fit, QuasiNewtonDisplacesVertices) {
+  const TempFiles files;
+  FitOptions options = exact_options({"body.displacement", "glow.radiance"});
+  options.step = 1;
+  const FitView view{shadow_scene(files, 0.1, 0.1), target_of(shadow_scene(files, 0.3, 0.2)), {}};
+  const std::vector<Vec3d> along =
+      find_parameter_or_array(view.scene, "body.displacement").directions(view.scene);
+  Fit fit({view}, options, quick());
+  const std::vector<Vec3f> start = body_of(fit);
+  std::optional<Fit> other;
+  double last = INFINITY, moved = 0;
+  for (int i = 0; i < 5; ++i) {
+    other.emplace(std::vector<FitView>{view}, options, quick());
+    other->restore(fit.state());
+    const auto record = fit.step(), again = other->step();
+    ASSERT_TRUE(record && again);
+    EXPECT_EQ(record->loss, again->loss);
+    EXPECT_EQ(body_of(fit), body_of(*other));
+    EXPECT_LT(record->loss, last) << i;
+    last = record->loss;
+  }
+  const std::vector<Vec3f> now = body_of(fit);
+  for (size_t v = 0; v < now.size(); ++v) {
+    const Vec3d d = cast<double>(now[v]) - cast<double>(start[v]);
+    // Coordinates below 4, each rounded to a float.
+    EXPECT_LT(length(cross(d, along[v])), 0x1p-21) << v;
+    moved = std::max(moved, length(d));
+  }
+  EXPECT_GT(moved, 0.01);
+
+  options.remesh = {2};
+  expect_refused({view}, options, "fit its vertex_positions");
+  options.remesh.clear();
+  options.parameters = {"body.displacement", "body.rotate.y"};
+  expect_refused({view}, options, "move the same vertices");
+}
+
+// A fit turns a shape about one point, however its bounds change: the gradient of every step is
+// about it, too, so that what was turned by so much is where one turn takes it.
+TEST(Fit, TurnsAddUp) {
+  const TempFiles files;
+  const FitOptions options = exact_options({"body.rotate.z"});
+  const Scene scene = shadow_scene(files, 0.1);
+  const Parameter turn = find_parameter(scene, "body.rotate.z");
+  Fit fit({{scene, target_of(turn.moved(scene, 0.7)), {}}}, options, quick());
+  for (int i = 0; i < 4; ++i) ASSERT_TRUE(fit.step());
+  const double angle = fit.scalars()[0].value;
+  EXPECT_GT(angle, 0.2);
+  const Scene once = turn.moved(scene, angle);
+  for (const Shape& shape : once.shapes) {
+    if (shape.id != "body") continue;
+    for (size_t v = 0; v < shape.mesh.positions.size(); ++v) {
+      const Vec3d d = cast<double>(shape.mesh.positions[v]) - cast<double>(body_of(fit)[v]);
+      // Coordinates below 8, rounded to floats at every step.
+      EXPECT_LT(length(d), 0x1p-18) << v;
+    }
+  }
+}
+
 // Of an interrupted search nothing is left, nor of one that fails: here a flat lamp would be bent
 // into more planes than are known in closed form.
 TEST(Fit, QuasiNewtonGoesBack) {

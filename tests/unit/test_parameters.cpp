@@ -118,6 +118,8 @@ TEST_F(Parameters, DerivativesMatchMoves) {
   expect_derivative(scene_, "tent.vertex_positions:" + field_);
   expect_derivative(scene_, "tent.vertex_positions.2.y");
   expect_derivative(scene_, "tent.vertex_positions.4.z");  // a copy: its twin moves along
+  expect_derivative(scene_, "tent.displacement.2");
+  expect_derivative(scene_, "tent.displacement.4");
 }
 
 // Of all numbers of two scenes.
@@ -182,11 +184,11 @@ TEST_F(Parameters, AreListed) {
     EXPECT_GT(p.natural_step, 0) << p.name;
   }
   for (const char* name :
-       {"tent.translate.x", "ball.rotate.z", "ball.scale", "tent.vertex_positions",
-        "sensor.translate.y", "sensor.rotate.x", "sensor.fov", "metal.alpha", "both.alpha",
-        "lamp.radiance", "sky.radiance", "bulb.translate.x", "bulb.intensity", "torch.translate.z",
-        "torch.rotate.x", "torch.cutoff_angle", "torch.beam_width", "sun.rotate.y",
-        "sun.irradiance"}) {
+       {"tent.translate.x",   "ball.rotate.z",      "ball.scale",        "tent.vertex_positions",
+        "ball.displacement",  "sensor.translate.y", "sensor.rotate.x",   "sensor.fov",
+        "metal.alpha",        "both.alpha",         "lamp.radiance",     "sky.radiance",
+        "bulb.translate.x",   "bulb.intensity",     "torch.translate.z", "torch.rotate.x",
+        "torch.cutoff_angle", "torch.beam_width",   "sun.rotate.y",      "sun.irradiance"}) {
     EXPECT_EQ(std::count(names.begin(), names.end(), name), 1) << name;
   }
 }
@@ -316,10 +318,73 @@ TEST_F(Parameters, ArraysSayHowToNameAPart) {
                  "\"tent.vertex_positions.0.x\" for one number");
   EXPECT_EQ(message_of(scene_, "tent.vertex_positions.6.x"),
             at + "parameter \"tent.vertex_positions.6.x\": the mesh has vertices 0 to 5");
+  EXPECT_EQ(message_of(scene_, "tent.displacement"),
+            at + "parameter \"tent.displacement\" is an array of 6 numbers, and one is wanted: "
+                 "\"tent.displacement.0\" for one number");
+  EXPECT_EQ(message_of(scene_, "tent.displacement.6"),
+            at + "parameter \"tent.displacement.6\": the mesh has vertices 0 to 5");
+  EXPECT_EQ(message_of(scene_, "tent.displacement.-1"),
+            at + "parameter \"tent.displacement.-1\": the mesh has vertices 0 to 5");
   for (const char* name :
        {"tent.vertex_positions:", "tent.vertex_positions.1", "tent.vertex_positions.1.w",
-        "tent.vertex_positions.x.1", "tent.vertex_positionsx", "tent.vertex_positions.-1.xy"}) {
+        "tent.vertex_positions.x.1", "tent.vertex_positionsx", "tent.vertex_positions.-1.xy",
+        "tent.displacement.", "tent.displacement.x", "tent.displacement.1.x",
+        "tent.displacement:"}) {
     EXPECT_TRUE(message_of(scene_, name).starts_with(at + "unknown parameter")) << name;
+  }
+}
+
+// The bounds of a shape that turns have their center here and there: all steps go about one point.
+TEST_F(Parameters, StepsOfATurnAddUp) {
+  for (const char* name : {"tent.rotate.x", "tent.rotate.y", "tent.rotate.z"}) {
+    const Parameter turn = find_parameter(scene_, name);
+    const Scene once = turn.moved(scene_, 1.2);
+    const Scene half = turn.moved(scene_, 0.5);
+    const Scene twice = turn.moved(half, 0.7);
+    const Vec3d there = bounds_of(half.shapes[0].mesh).center();
+    EXPECT_GT(length(there - bounds_of(scene_.shapes[0].mesh).center()), 0.01) << name;
+    const auto &a = once.shapes[0].mesh.positions, &b = twice.shapes[0].mesh.positions;
+    for (size_t v = 0; v < a.size(); ++v) {
+      // Coordinates below 4 are rounded to floats twice.
+      EXPECT_LT(length(cast<double>(a[v]) - cast<double>(b[v])), 0x1p-20) << name;
+    }
+  }
+}
+
+// Along the mean normal of the faces around a vertex, weighted by their angles there, for any
+// shading; found once, the directions stay while the vertices go on.
+TEST_F(Parameters, DisplacementsGoAlongNormals) {
+  const Mesh& mesh = scene_.shapes[0].mesh;
+  std::vector<Vec3d> expected(mesh.positions.size());
+  for (const FaceIndices& face : mesh.faces) {
+    Vec3d c[3];
+    for (int k = 0; k < 3; ++k) c[k] = cast<double>(mesh.positions[face[k]]);
+    const Vec3d n = normalize(cross(c[1] - c[0], c[2] - c[0]));
+    for (int k = 0; k < 3; ++k) {
+      const Vec3d a = normalize(c[(k + 1) % 3] - c[k]), b = normalize(c[(k + 2) % 3] - c[k]);
+      expected[mesh.weld[face[k]]] += n * std::acos(dot(a, b));
+    }
+  }
+  for (const bool flat : {false, true}) {
+    Scene scene = deep_copy(scene_);
+    if (flat) scene.shapes[0].mesh.normal_source = NormalSource::kFace;
+    const Parameter array = find_parameter_or_array(scene, "tent.displacement");
+    EXPECT_EQ(array.shape(), std::vector<size_t>{6});
+    EXPECT_TRUE(array.value(scene).empty());
+    for (size_t v = 0; v < array.size; ++v) {
+      const std::vector<Vec3d> velocities = array.velocities(scene, ShapeId(0), v);
+      for (size_t i = 0; i < velocities.size(); ++i) {
+        const bool moves = mesh.weld[i] == mesh.weld[v];
+        const Vec3d wanted = moves ? normalize(expected[mesh.weld[v]]) : Vec3d{};
+        EXPECT_LT(length(velocities[i] - wanted), 1e-12) << v << " " << i;
+      }
+    }
+    const std::vector<Vec3d> held = array.directions(scene);
+    array.move(scene, 0.4, 2);
+    EXPECT_EQ(array.directions(scene), held);
+    const Parameter now = find_parameter_or_array(scene, "tent.displacement");
+    EXPECT_NE(now.directions(scene), held);
+    EXPECT_TRUE(array.velocities(scene, ShapeId(1)).empty());
   }
 }
 

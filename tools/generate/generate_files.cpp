@@ -26,6 +26,11 @@ std::span<const MeshKind> mesh_kinds() {
       {"bracket", "a CAD part with bores, a boss and chamfers, for face_normals", 20000, 2000, true,
        1, 5, make_bracket},
       {"plant", "open leaves on closed stems in a pot", 30000, 5000, false, 69, 0, make_plant},
+      {"tree", "a trunk, branches and open leaves", 24000, 9000, false, 1001, 0, make_tree},
+      {"gear", "12 teeth, 4 spokes and a bore, about the z axis", 3000, 1500, true, 1, 5,
+       make_gear},
+      {"pinion", "8 teeth and a bore, about the z axis", 1500, 1000, true, 1, 1, make_pinion},
+      {"ball", "a sphere of few faces, nearly alike", 320, 80, true, 1, 0, make_ball},
   };
   return kinds;
 }

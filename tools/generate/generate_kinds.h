@@ -13,6 +13,10 @@ Triangles make_harp(int faces);
 Triangles make_chandelier(int faces);
 Triangles make_bracket(int faces);
 Triangles make_plant(int faces);
+Triangles make_tree(int faces);
+Triangles make_gear(int faces);
+Triangles make_pinion(int faces);
+Triangles make_ball(int faces);
 
 Image make_soft_sky();
 Image make_sun_sky();

@@ -3,11 +3,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
 
+#include "limn/core/displacement.h"
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
 #include "limn/core/surface_point.h"
@@ -27,12 +29,34 @@ void append(std::string& bytes, const T& value) {
   bytes.append(raw, sizeof(T));
 }
 
-Vec3d mean_of(const Moments& g, size_t vertex) {
-  return {g.mean(3 * vertex), g.mean(3 * vertex + 1), g.mean(3 * vertex + 2)};
+// V vectors and their standard errors; those of displacements lie along the vertices' normals.
+struct VertexGradient {
+  std::vector<Vec3d> mean, error;
+};
+
+VertexGradient of_vertices(const Mesh& mesh, const ParameterAdjoint& p) {
+  const Moments& g = p.moments;
+  VertexGradient vectors;
+  if (p.shape.size() == 1) {
+    const std::vector<Vec3d> directions = displacement_directions(mesh);
+    for (size_t v = 0; v < g.size(); ++v) {
+      const Vec3d& n = directions[v];
+      vectors.mean.push_back(n * g.mean(v));
+      const double e = std::sqrt(g.variance(v));
+      vectors.error.push_back({std::fabs(n.x) * e, std::fabs(n.y) * e, std::fabs(n.z) * e});
+    }
+    return vectors;
+  }
+  for (size_t v = 0; v < g.size(); v += 3) {
+    vectors.mean.push_back({g.mean(v), g.mean(v + 1), g.mean(v + 2)});
+    vectors.error.push_back(
+        {std::sqrt(g.variance(v)), std::sqrt(g.variance(v + 1)), std::sqrt(g.variance(v + 2))});
+  }
+  return vectors;
 }
 
 // The mesh with its gradient (gx gy gz) and standard errors (ex ey ez) as properties of vertices.
-std::string ply_text(const Mesh& mesh, const Moments& g) {
+std::string ply_text(const Mesh& mesh, const VertexGradient& g) {
   std::string bytes = fmt::format("ply\nformat binary_little_endian 1.0\nelement vertex {}\n",
                                   mesh.positions.size());
   for (const char* name : {"x", "y", "z"}) bytes += fmt::format("property float {}\n", name);
@@ -42,8 +66,8 @@ std::string ply_text(const Mesh& mesh, const Moments& g) {
                        mesh.faces.size());
   for (size_t v = 0; v < mesh.positions.size(); ++v) {
     for (int k = 0; k < 3; ++k) append(bytes, mesh.positions[v][k]);
-    for (int k = 0; k < 3; ++k) append(bytes, g.mean(3 * v + k));
-    for (int k = 0; k < 3; ++k) append(bytes, std::sqrt(g.variance(3 * v + k)));
+    for (int k = 0; k < 3; ++k) append(bytes, g.mean[v][k]);
+    for (int k = 0; k < 3; ++k) append(bytes, g.error[v][k]);
   }
   for (const FaceIndices& face : mesh.faces) {
     append(bytes, uint8_t{3});
@@ -68,10 +92,9 @@ std::string npy_text(const ParameterAdjoint& p) {
 }
 
 // As --wrt SHAPE.vertex_positions:FILE reads it.
-std::string field_text(const Moments& g) {
+std::string field_text(const VertexGradient& g) {
   std::string text;
-  for (size_t v = 0; v < g.size() / 3; ++v) {
-    const Vec3d x = mean_of(g, v);
+  for (const Vec3d& x : g.mean) {
     text += fmt::format("{:.17g} {:.17g} {:.17g}\n", x.x, x.y, x.z);
   }
   return text;
@@ -89,11 +112,11 @@ Image to_map(const ParameterAdjoint& p, bool errors) {
 
 // The shape as the camera sees it, each point in the colour of the gradient along the normal: that
 // of a vertex over the area around it, so that it says the same of any mesh.
-Image picture(const Scene& scene, ShapeId shape, const Moments& g, const RayTracer& tracer) {
+Image picture(const Scene& scene, ShapeId shape, const VertexGradient& g, const RayTracer& tracer) {
   const Mesh& mesh = scene.shape(shape).mesh;
   std::vector<Vec3d> sum(mesh.positions.size()), normal(mesh.positions.size());
   std::vector<double> area(mesh.positions.size());
-  for (size_t v = 0; v < mesh.positions.size(); ++v) sum[mesh.weld[v]] += mean_of(g, v);
+  for (size_t v = 0; v < mesh.positions.size(); ++v) sum[mesh.weld[v]] += g.mean[v];
   for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
     const auto c = face_corners<double>(mesh, FaceId(f));
     const Vec3d n = cross(c[1] - c[0], c[2] - c[0]) / 6;
@@ -229,11 +252,12 @@ json describe_array(const ParameterAdjoint& p, const BackwardFiles::Array& array
 
 json write_vertices(const Scene& scene, const ParameterAdjoint& p,
                     const BackwardFiles::Array& array, const RayTracer& tracer, bool quiet) {
-  const Image image = picture(scene, array.shape, p.moments, tracer);
+  const VertexGradient gradient = of_vertices(scene.shape(array.shape).mesh, p);
+  const Image image = picture(scene, array.shape, gradient, tracer);
   const double scale = signed_scale(image);
-  write_file(array.ply, ply_text(scene.shape(array.shape).mesh, p.moments));
+  write_file(array.ply, ply_text(scene.shape(array.shape).mesh, gradient));
   write_file(array.npy, npy_text(p));
-  write_file(array.txt, field_text(p.moments));
+  write_file(array.txt, field_text(gradient));
   write_signed_png(array.png, image, scale);
   json entry = describe_array(p, array, scale, array.ply, quiet);
   entry["mesh"] = array.ply;
@@ -261,14 +285,14 @@ json write_parameters(const Scene& scene, const BackwardFiles& files, const Back
   const auto tracer = make_embree_tracer(scene, 1);
   json list = json::array();
   for (const ParameterAdjoint& p : result.parameters) {
-    if (p.shape.size() < 2) {
+    const auto array = std::find_if(files.arrays.begin(), files.arrays.end(),
+                                    [&](const auto& a) { return a.parameter == p.name; });
+    if (array == files.arrays.end()) {
       list.push_back(write_numbers(p, quiet));
-      continue;
-    }
-    for (const BackwardFiles::Array& array : files.arrays) {
-      if (array.parameter != p.name) continue;
-      list.push_back(array.shape.valid() ? write_vertices(scene, p, array, *tracer, quiet)
-                                         : write_texels(p, array, quiet));
+    } else if (array->shape.valid()) {
+      list.push_back(write_vertices(scene, p, *array, *tracer, quiet));
+    } else {
+      list.push_back(write_texels(p, *array, quiet));
     }
   }
   return list;

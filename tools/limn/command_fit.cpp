@@ -94,9 +94,10 @@ void FitCommand::add_options(CLI::App& app, bool) {
   app.add_option("--view", views_, "A further scene that shares the parameters (repeatable)")
       ->type_name("SCENE[;NAME=VALUE...]")
       ->allow_extra_args(false);
-  app.add_option(
-         "--wrt", given_.options.parameters,
-         "What to fit: scalars, SHAPE.vertex_positions, the texels EMITTER.data (repeatable)")
+  app.add_option("--wrt", given_.options.parameters,
+                 "What to fit: scalars, SHAPE.vertex_positions, SHAPE.displacement (along "
+                 "normals), the texels "
+                 "EMITTER.data (repeatable)")
       ->type_name("PARAM")
       ->allow_extra_args(false);
   app.add_option("--bounds", given_.bounds, "What a scalar or the texels may be (repeatable)")

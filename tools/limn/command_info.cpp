@@ -76,7 +76,9 @@ void print_camera(const Scene& scene) {
 // An array is listed once, with the number of its numbers.
 void print_parameter(const Parameter& parameter) {
   std::string parts = parameter.colour ? "  all channels alike; one of them: add .r, .g or .b" : "";
-  if (parameter.size > 1) {
+  if (parameter.array.size() == 1) {
+    parts = fmt::format("  {} numbers: one of them: add .0, .1, ...", parameter.size);
+  } else if (parameter.size > 1) {
     parts = fmt::format("  {} numbers: add :FILE, or {}", parameter.size,
                         parameter.array.size() == 3 ? ".0.0.r, .0.0.g, ..." : ".0.x, .0.y, ...");
   }

@@ -101,7 +101,8 @@ void bind_parameter(nb::module_& m) {
           "Its unit: \"scene units\", \"radians\", ...; \"\" for plain numbers.")
       .def_prop_ro("shape", shape_tuple, nb::sig("def shape(self) -> tuple[int, ...]"),
                    "Of limn.backward's derivative: () for a number, (3,) for a colour, (V, 3) for "
-                   "vertex positions, (H, W, 3) for the texels of an envmap. In limn.gradient all "
+                   "vertex positions, (V,) for displacements, (H, W, 3) for the texels of an "
+                   "envmap. In limn.gradient all "
                    "channels of a colour move alike (grey), and "
                    "NAME.r, NAME.g, NAME.b move one of them.")
       .def_prop_ro(

@@ -7,6 +7,9 @@
 //   SHAPE.vertex_positions        scene units: an array, the V by 3 coordinates of its vertices
 //   SHAPE.vertex_positions.V.x|y|z  one of them: vertex V (from 0) with its copies
 //   SHAPE.vertex_positions:FILE   moves every vertex by the parameter times its vector in FILE
+//   SHAPE.displacement            scene units: an array, how far each of its V vertices goes along
+//                                 its normal (displacement.h)
+//   SHAPE.displacement.V          one of them: vertex V (from 0) with its copies
 //   sensor.translate.x|y|z        scene units
 //   sensor.rotate.x|y|z           radians, world axes through the pinhole
 //   sensor.fov                    degrees
@@ -30,14 +33,16 @@ namespace limn {
 class Motion;
 
 // What a name stands for in a scene, resolved once. It holds indices and ids, no pointers into the
-// scene, so it serves every deep copy of that scene as well. Copies of a Parameter are cheap.
+// scene, so it serves every deep copy of that scene as well, also after it has moved on: what a
+// shape turns about, and the normals that its vertices are displaced along, stay as they were. Copies of a Parameter are cheap.
 // `component` counts the numbers of an array, row by row (vertex 2's y: 2 * 3 + 1); of a scalar it
 // is 0.
 struct Parameter {
   std::string name;
   std::string unit;
   double natural_step = 0;  // a small step: about a hundredth of what changes the picture a lot
-  size_t size = 1;          // numbers: 1 of a scalar, 3 V of vertex_positions, 3 H W of texels
+  size_t size = 1;  // numbers: 1 of a scalar, 3 V of vertex_positions, V of displacement, 3 H W of
+                    // texels
   std::shared_ptr<const Motion> motion;
   // What its numbers may be, both ends included: what assign() takes.
   double least = -std::numeric_limits<double>::infinity();
@@ -45,7 +50,7 @@ struct Parameter {
   // Its value has three channels. They move alike (along grey), as one number; reverse mode tells
   // them apart all the same. NAME.r, NAME.g and NAME.b move one of them each.
   bool colour = false;
-  std::vector<size_t> array = {};  // {V, 3} of vertex_positions, {H, W, 3} of texels; {} of scalars
+  std::vector<size_t> array = {};  // {V, 3}, {V}, {H, W, 3}; {} of scalars
 
   // Of its derivative in reverse mode: {} of a number, {3} of a colour, `array` of an array.
   std::vector<size_t> shape() const;
@@ -75,6 +80,9 @@ struct Parameter {
   // V by 3: the derivative of the positions of a shape's vertices; empty where the parameter moves
   // none of that shape.
   std::vector<Vec3d> velocities(const Scene& scene, ShapeId shape, size_t component = 0) const;
+
+  // V vectors along which the vertices of the shape go that the parameter displaces; empty of others.
+  std::vector<Vec3d> directions(const Scene& scene) const;
 
   // H by W by 3: the derivative of the environment's texels; empty where the parameter moves none.
   Image texel_velocities(const Scene& scene, size_t component = 0) const;

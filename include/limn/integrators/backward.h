@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "limn/core/image.h"
+#include "limn/core/parameter.h"
 #include "limn/core/scene.h"
 #include "limn/edgetree/edge_sampler_types.h"
 #include "limn/integrators/gradient.h"
@@ -24,6 +25,8 @@ struct BackwardOptions {
   // Names as in parameter.h, arrays included (SHAPE.vertex_positions); none: all parameters of the
   // scene.
   std::vector<std::string> parameters;
+  // In place of names: parameters that were found before, in this scene or where it was then.
+  std::vector<Parameter> found;
   // interior, camera, boundary, shadow, and direct and penumbra of samplers that keep regions of
   // light apart; none: all that the scene has.
   std::vector<std::string> terms;
@@ -63,7 +66,7 @@ struct ParameterAdjoint {
   std::string name;
   std::string unit;  // of the parameter; "" for plain numbers
   // {} of a number, {3} of a colour (of each channel; their sum is along grey), {V, 3} of
-  // vertex_positions.
+  // vertex_positions, {V} of displacement.
   std::vector<size_t> shape;
   // One value per number of the array, row by row. Copies of a welded vertex share its derivative
   // equally: the derivative with respect to the position that they share is the sum of theirs.

@@ -55,9 +55,10 @@ struct FitBounds {
 };
 
 struct FitOptions {
-  // Names as in parameter.h: scalars, SHAPE.vertex_positions, EMITTER.data; at least one. Every
+  // Names as in parameter.h: scalars, SHAPE.vertex_positions, SHAPE.displacement (along the normals
+  // as they are at the start), EMITTER.data; at least one. Every
   // view that has a name moves with it, and one view must have it. Colours move by channels.
-  // Motions of a shape and its vertex_positions exclude each other, as do motions of texels and all
+  // Motions of a shape, its vertex_positions and its displacement exclude each other, as do motions of texels and all
   // of them; where vertices are fitted, normals of the file give way to computed ones.
   std::vector<std::string> parameters;
   std::vector<FitBounds> bounds;
@@ -114,7 +115,7 @@ struct FitScalar {
 struct FitState {
   int64_t steps = 0;
   struct Numbers {
-    std::vector<double> values;           // u of an array, n by 3; else the sums of steps
+    std::vector<double> values;           // u of an array, n by 3 or n; else the sums of steps
     std::vector<double> first, second;    // moments of Adam; empty for gradient descent
     double natural_step = 0, lambda = 0;  // of an array, as they were when its mesh was made
   };
