@@ -10,8 +10,12 @@ namespace limn {
 
 std::vector<Parameter> reverse_parameters(const Scene& scene, const BackwardOptions& options) {
   if (!options.found.empty()) return options.found;
-  if (options.parameters.empty()) return list_parameters(scene);
   std::vector<Parameter> parameters;
+  if (options.parameters.empty()) {
+    parameters = list_parameters(scene);
+    std::erase_if(parameters, [](const Parameter& p) { return p.repeats; });
+    return parameters;
+  }
   for (const std::string& name : options.parameters)
     parameters.push_back(find_parameter_or_array(scene, name));
   return parameters;

@@ -260,7 +260,8 @@ bool Fit::Impl::add_view(size_t view, FitRecord& record,
   backward_options.batches = 1;
   backward_options.find_gaps = false;  // told before the first step
   if (is_exact()) backward_options.uniform_pixels = true;
-  // As they were found at the start: what shapes turn about does not wander.
+  // Those of the fit: what shapes turn about is taken along by its translations, and does not
+  // wander.
   backward_options.found.clear();
   for (const FitParameter& p : parameters_) {
     if (p.in_view(view)) backward_options.found.push_back(*p.in_view(view));
@@ -283,6 +284,16 @@ bool Fit::Impl::add_view(size_t view, FitRecord& record,
     for (size_t k = 0; k < m.size(); ++k) gradients[i][k] += m.mean(k);
   }
   return true;
+}
+
+void Fit::Impl::carry(const FitParameter& moved) {
+  for (size_t v = 0; v < views.size(); ++v) {
+    const ShapeId shape = moved.shape(v);
+    if (!shape.valid()) continue;
+    ShapePose pose;
+    for (const FitParameter& p : parameters_) p.add_to_pose(pose, v, shape);
+    for (FitParameter& p : parameters_) p.follow(pose, v, shape);
+  }
 }
 
 bool Fit::Impl::evaluate(FitRecord& record, std::vector<std::vector<double>>& gradients) {
@@ -308,6 +319,7 @@ std::optional<FitRecord> Fit::Impl::step() {
   for (size_t i = 0; i < parameters_.size(); ++i) {
     record.halvings = std::max(record.halvings,
                                parameters_[i].move(gradients[i], record.step_size, steps, views));
+    carry(parameters_[i]);
   }
   finish_step(record);
   record.seconds = watch.seconds();
@@ -364,6 +376,13 @@ FitState Fit::Impl::state() const {
   return state;
 }
 
+// Displacements are of the vertices that there were at the start.
+bool Fit::Impl::may_remesh(size_t view, ShapeId shape) const {
+  return std::any_of(parameters_.begin(), parameters_.end(), [&](const FitParameter& p) {
+    return p.shape(view) == shape && p.is_array() && !p.is_displacement();
+  });
+}
+
 void Fit::Impl::check_state(const FitState& state) const {
   const auto check = [](bool good) {
     if (!good) refuse_state();
@@ -387,7 +406,10 @@ void Fit::Impl::check_state(const FitState& state) const {
     for (size_t i = 0; i < shapes.size(); ++i) {
       const FitState::Shape& shape = view.shapes[i];
       const Mesh& mesh = views[v].scene.shape(shapes[i]).mesh;
-      if (shape.faces != mesh.faces) continue;  // it gets new triangles
+      if (shape.faces != mesh.faces) {  // it gets new triangles
+        check(may_remesh(v, shapes[i]));
+        continue;
+      }
       check(shape.positions.size() == mesh.positions.size() &&
             shape.normals.size() == mesh.normals.size());
     }
@@ -440,6 +462,7 @@ void Fit::Impl::put(const FitState& state) {
   for (size_t i = 0; i < parameters_.size(); ++i) {
     parameters_[i].restore(state.parameters[i], views, remeshed[i]);
   }
+  for (const FitParameter& p : parameters_) carry(p);
   quasi_newton_.steps = state.moves;
   quasi_newton_.changes = state.changes;
   here_.reset();

@@ -46,6 +46,8 @@ class Fit::Impl {
   bool moves_texels(size_t view) const;
   // Half done where it throws.
   void put(const FitState& state);
+  // Whether the shape may have other triangles than at the start.
+  bool may_remesh(size_t view, ShapeId shape) const;
   // InputError for the state of another fit.
   void check_state(const FitState& state) const;
   // Shapes of a view that some parameter moves, in the scene's order.
@@ -66,6 +68,8 @@ class Fit::Impl {
   bool add_view(size_t view, FitRecord& record, std::vector<std::vector<double>>& gradients);
   // Loss and gradients of all views; false: interrupted.
   bool evaluate(FitRecord& record, std::vector<std::vector<double>>& gradients);
+  // After a step of one parameter: what its shape turns about and is scaled about goes along.
+  void carry(const FitParameter& moved);
   void finish_step(FitRecord& record);
 
   // Of kLbfgs, in fit_quasi_newton.cpp.

@@ -204,6 +204,17 @@ void FitParameter::add_to_numbers(std::vector<double>& step, std::vector<FitView
   }
 }
 
+void FitParameter::add_to_pose(ShapePose& pose, size_t view, ShapeId shape) const {
+  if (shapes_[view] != shape || numbers_.size() != 1) return;
+  const ShapePose each = in_view_[view]->pose_per_unit(shape);
+  pose.moved += each.moved * numbers_[0];
+  pose.grown += each.grown * numbers_[0];
+}
+
+void FitParameter::follow(const ShapePose& pose, size_t view, ShapeId shape) {
+  if (shapes_[view] == shape) in_view_[view] = in_view_[view]->at(pose);
+}
+
 // Sums round: a value next to its bound must not pass it, and one that was stopped is there.
 double FitParameter::bounded_sum(double now, double step) const {
   if (step == least_ - now) return least_;
@@ -322,6 +333,13 @@ void FitParameter::restore(const FitState::Numbers& numbers, const std::vector<F
   if (numbers.values.size() != size || numbers.first.size() != moments ||
       numbers.second.size() != moments) {
     throw InputError("the state of \"" + name_ + "\" is of another size or optimiser");
+  }
+  const Parameter& first = *in_view_[first_view_];
+  if (!is_array() && first.value(views[first_view_].scene).empty()) {
+    for (const double x : numbers.values) {
+      if (x >= first.least && x <= first.most) continue;
+      throw InputError(fmt::format("the state of \"{}\" has {:g}, which it cannot be", name_, x));
+    }
   }
   numbers_ = numbers.values;
   optimiser_->first = numbers.first;

@@ -48,6 +48,11 @@ class FitParameter {
   // but `step` is changed, if a face would lose its area or grow together with another.
   bool add(std::vector<double>& step, std::vector<FitView>& views);
 
+  // Adds what its steps so far have done to a shape of that view as a whole.
+  void add_to_pose(ShapePose& pose, size_t view, ShapeId shape) const;
+  // From now on it moves that shape from there.
+  void follow(const ShapePose& pose, size_t view, ShapeId shape);
+
   // One, or the three channels of a colour; none of an array or a map.
   std::vector<FitScalar> scalars(const std::vector<FitView>& views) const;
   FitState::Numbers state() const;

@@ -27,6 +27,10 @@ class Motion {
   virtual std::shared_ptr<const Motion> held(const Scene&) const { return nullptr; }
   // See Parameter.
   virtual std::vector<Vec3d> directions(const Scene&) const { return {}; }
+  // See Parameter.
+  virtual ShapePose pose_per_unit(ShapeId /*shape*/) const { return {}; }
+  // This motion of the shape after it was moved; null: it is no other there.
+  virtual std::shared_ptr<const Motion> at(const ShapePose&) const { return nullptr; }
 
   // The part of an array or colour whose name continues its own with `rest` (":FILE", ".7.x",
   // ".r"); nothing if `rest` means nothing here. InputError if it means something that cannot be.

@@ -90,6 +90,14 @@ std::vector<Vec3d> Parameter::directions(const Scene& scene) const {
   return motion->directions(scene);
 }
 
+ShapePose Parameter::pose_per_unit(ShapeId shape) const { return motion->pose_per_unit(shape); }
+
+Parameter Parameter::at(const ShapePose& pose) const {
+  Parameter there = *this;
+  if (auto moved = motion->at(pose)) there.motion = std::move(moved);
+  return there;
+}
+
 Image Parameter::texel_velocities(const Scene& scene, size_t component) const {
   CHECK_LT(component, size);
   return motion->texel_velocities(scene, component);

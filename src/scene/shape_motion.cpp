@@ -13,6 +13,9 @@ namespace limn {
 
 namespace {
 
+// A shape that a fit scales does not shrink to a point, of which no step would bring it back.
+constexpr double kLeastScale = 0.01;  // not tuned
+
 void add_to_lane(std::vector<Vec3<Lanes>>& tangents, int lane,
                  const std::vector<Vec3d>& velocities) {
   tangents.resize(velocities.size());
@@ -41,8 +44,12 @@ class ShapeMotion : public Motion {
     if (shape != shape_) return {};
     return vertex_velocities(scene.shape(shape_).mesh, component);
   }
+  ShapePose pose_per_unit(ShapeId shape) const final {
+    return shape == shape_ ? own_pose_per_unit() : ShapePose{};
+  }
 
  protected:
+  virtual ShapePose own_pose_per_unit() const { return {}; }
   virtual std::vector<Vec3d> vertex_velocities(const Mesh& mesh, size_t component) const = 0;
   virtual void seed_given_normals(Mesh&, int /*lane*/) const {}
   virtual void move_vertices(Mesh& mesh, double step, size_t component) const {
@@ -64,17 +71,27 @@ class ShapeTranslation final : public ShapeMotion {
   std::vector<Vec3d> vertex_velocities(const Mesh& mesh, size_t) const override {
     return std::vector<Vec3d>(mesh.positions.size(), unit_vector(axis_));
   }
+  ShapePose own_pose_per_unit() const override { return {unit_vector(axis_), 0}; }
 
  private:
   int axis_;
 };
 
-// About a point of the world, so that steps add up: the bounds of a shape that turns have their
-// center here and there.
+// About a point that only translations take along, so that steps add up: the bounds of a shape that
+// turns have their center here and there.
 class ShapeRotation final : public ShapeMotion {
  public:
-  ShapeRotation(ShapeId shape, int axis, const Vec3d& center)
-      : ShapeMotion(shape), axis_(axis), center_(center) {}
+  // center: at the start; pose: since then.
+  ShapeRotation(ShapeId shape, int axis, const Vec3d& center, const ShapePose& pose = {})
+      : ShapeMotion(shape),
+        shape_(shape),
+        axis_(axis),
+        start_(center),
+        center_(center + pose.moved) {}
+
+  std::shared_ptr<const Motion> at(const ShapePose& pose) const override {
+    return std::make_shared<ShapeRotation>(shape_, axis_, start_, pose);
+  }
 
  protected:
   std::vector<Vec3d> vertex_velocities(const Mesh& mesh, size_t) const override {
@@ -99,25 +116,39 @@ class ShapeRotation final : public ShapeMotion {
   }
 
  private:
+  ShapeId shape_;
   int axis_;
-  Vec3d center_;
+  Vec3d start_, center_;
 };
 
-// About a point of the world.
+// About the same point, in sizes of the start.
 class ShapeScaling final : public ShapeMotion {
  public:
-  ShapeScaling(ShapeId shape, const Vec3d& center) : ShapeMotion(shape), center_(center) {}
+  // center: at the start; pose: since then.
+  ShapeScaling(ShapeId shape, const Vec3d& center, const ShapePose& pose = {})
+      : ShapeMotion(shape),
+        shape_(shape),
+        start_(center),
+        center_(center + pose.moved),
+        size_(1 + pose.grown) {}
+
+  std::shared_ptr<const Motion> at(const ShapePose& pose) const override {
+    return std::make_shared<ShapeScaling>(shape_, start_, pose);
+  }
 
  protected:
   std::vector<Vec3d> vertex_velocities(const Mesh& mesh, size_t) const override {
     std::vector<Vec3d> velocities;
     velocities.reserve(mesh.positions.size());
-    for (const Vec3f& p : mesh.positions) velocities.push_back(cast<double>(p) - center_);
+    for (const Vec3f& p : mesh.positions) velocities.push_back((cast<double>(p) - center_) / size_);
     return velocities;
   }
+  ShapePose own_pose_per_unit() const override { return {{}, 1}; }
 
  private:
-  Vec3d center_;
+  ShapeId shape_;
+  Vec3d start_, center_;
+  double size_;
 };
 
 class VertexField final : public ShapeMotion {
@@ -299,12 +330,14 @@ void add_shape_parameters(const Scene& scene, std::vector<Parameter>& list) {
     }
     list.push_back({shape.id + ".scale", "factor", 0.01, 1,
                     std::make_shared<ShapeScaling>(id, bounds.center())});
+    list.back().least = kLeastScale - 1;
     list.push_back({shape.id + ".vertex_positions", "scene units", step,
                     3 * shape.mesh.positions.size(), std::make_shared<VertexArray>(id)});
     list.back().array = {shape.mesh.positions.size(), 3};
     list.push_back({shape.id + ".displacement", "scene units", step, shape.mesh.positions.size(),
                     std::make_shared<VertexDisplacement>(id)});
     list.back().array = {shape.mesh.positions.size()};
+    list.back().repeats = true;
   }
 }
 

@@ -403,6 +403,27 @@ TEST(Backward, AgreesWithLightInClosedForm) {
   expect_agreement(lamps_scene(files), 16, options);
 }
 
+// Displacements tell nothing that the vertices do not: they are taken by name.
+TEST(Backward, AllIsWithoutWhatRepeats) {
+  const TempFiles files;
+  const Scene scene = lamps_scene(files);
+  BackwardOptions options;
+  RunSettings settings;
+  settings.spp = 1;
+  const Image adjoint = random_adjoint(scene, 1);
+  std::vector<std::string> all, expected;
+  for (const ParameterAdjoint& p : backward(scene, adjoint, options, settings).parameters) {
+    all.push_back(p.name);
+  }
+  for (const Parameter& p : list_parameters(scene)) {
+    if (!p.name.ends_with(".displacement")) expected.push_back(p.name);
+  }
+  EXPECT_LT(expected.size(), list_parameters(scene).size());
+  EXPECT_EQ(all, expected);
+  options.parameters = {"ring.displacement"};
+  EXPECT_EQ(backward(scene, adjoint, options, settings).parameters.size(), 1u);
+}
+
 // Where lamps and suns are regions apart. Before a small lamp most is found from there, before a
 // larger one half of it: with the whole of both z is 7.
 TEST(Backward, AgreesWithRegionsOfLight) {

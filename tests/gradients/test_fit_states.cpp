@@ -1,5 +1,5 @@
-// What fits keep and go back to: states of texels and vertices, bounds that hold numbers, steps that
-// end before their time.
+// What fits keep and go back to: states of texels and vertices, bounds that hold numbers, steps
+// that end before their time.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -287,6 +287,67 @@ TEST(Fit, TurnsAddUp) {
       // Coordinates below 8, rounded to floats at every step.
       EXPECT_LT(length(d), 0x1p-18) << v;
     }
+  }
+}
+
+// Translated, turned and scaled in turns, a shape is where the sums of all steps take it at once;
+// a state goes on with the same bits. A state of another mesh is none of this fit.
+TEST(Fit, SumsOfStepsAreThePose) {
+  const TempFiles files;
+  const std::vector<std::string> names{"body.translate.x", "body.rotate.z", "body.scale"};
+  const std::vector<double> truth{0.3, 0.4, 0.3};
+  const Scene scene = shadow_scene(files, 0.1);
+  Scene there = deep_copy(scene);
+  for (const size_t i : {1, 2, 0}) find_parameter(scene, names[i]).move(there, truth[i]);
+  const FitView view{scene, target_of(there), {}};
+  for (const OptimiserKind optimiser : {OptimiserKind::kLbfgs, OptimiserKind::kAdam}) {
+    FitOptions options = exact_options(names);
+    options.optimiser = optimiser;
+    Fit fit({view}, options, quick());
+    std::optional<Fit> other;
+    for (int i = 0; i < 6; ++i) {
+      other.emplace(std::vector<FitView>{view}, options, quick());
+      other->restore(fit.state());
+      ASSERT_TRUE(fit.step() && other->step());
+      EXPECT_EQ(body_of(fit), body_of(*other));
+    }
+    const std::vector<FitScalar> sums = fit.scalars();
+    // The swing of a shape that is turned about where it was: beyond rounding.
+    EXPECT_GT(std::fabs(sums[0].value * sums[1].value), 1e-3);
+    EXPECT_GT(std::fabs(sums[2].value), 0.01);
+    fmt::print("x {:.4f}, turned by {:.4f}, scaled by {:.4f}\n", sums[0].value, sums[1].value,
+               sums[2].value);
+    Scene once = deep_copy(scene);
+    for (const size_t i : {1, 2, 0}) find_parameter(scene, names[i]).move(once, sums[i].value);
+    const Fit expected({{once, view.target, {}}}, options, quick());
+    const std::vector<Vec3f> a = body_of(expected), b = body_of(fit);
+    for (size_t v = 0; v < a.size(); ++v) {
+      // Coordinates below 8, rounded to floats three times a step.
+      EXPECT_LT(length(cast<double>(a[v]) - cast<double>(b[v])), 0x1p-17) << v;
+    }
+  }
+}
+
+// What is not fitted keeps its triangles, and displacements are of those of the start: a state with
+// others is refused, and nothing is changed.
+TEST(Fit, StatesOfOtherMeshesAreRefused) {
+  const TempFiles files;
+  const FitView view{shadow_scene(files, 0.1), target_of(shadow_scene(files, 0.3)), {}};
+  for (const char* name : {"body.displacement", "body.rotate.y", "body.vertex_positions"}) {
+    FitOptions options = exact_options({name});
+    options.step = 1;
+    Fit fit({view}, options, quick());
+    const std::vector<Vec3f> before = body_of(fit);
+    FitState state = fit.state();
+    ASSERT_EQ(state.views[0].shapes.size(), 1u);
+    state.views[0].shapes[0].faces.pop_back();
+    if (std::string_view(name) == "body.vertex_positions") {
+      EXPECT_NO_THROW(fit.restore(state));
+      continue;
+    }
+    EXPECT_THROW(fit.restore(state), InputError) << name;
+    EXPECT_EQ(body_of(fit), before);
+    EXPECT_TRUE(fit.step());
   }
 }
 

@@ -277,6 +277,14 @@ TEST_F(Program, BackwardWritesWhatOthersRead) {
                 ".txt -o " + out())
                 .status,
             0);
+  const std::string all = files_.path("all"), command = "backward " + scene_ + " --spp 1 --target ";
+  ASSERT_EQ(run(command + target + " -o " + all).status, 0);
+  EXPECT_TRUE(std::filesystem::exists(all + "/screen.vertex_positions.npy"));
+  for (const json& p : json::parse(std::ifstream(all + "/gradient.json"))["parameters"]) {
+    EXPECT_EQ(p["name"].get<std::string>().find("displacement"), std::string::npos);
+  }
+  ASSERT_EQ(run(command + target + " --wrt screen.displacement -o " + all).status, 0);
+  EXPECT_TRUE(std::filesystem::exists(all + "/screen.displacement.npy"));
   EXPECT_NE(refused("backward " + scene_ + " -o " + folder).find("--adjoint or --target"),
             std::string::npos);
   const std::string small = files_.path("small.exr");

@@ -22,7 +22,8 @@ def adjoint(scene):
 def test_reverse_dotted_with_a_motion_is_forward(scene, adjoint):
     names = ["clay.reflectance", "lamp.radiance", "sensor.fov", "ball.translate.x", "tent.scale"]
     reverse = limn.backward(scene, adjoint, spp=64, seed=1)
-    assert list(reverse) == list(scene.parameters)
+    # Displacements repeat what vertices have.
+    assert list(reverse) == [n for n in scene.parameters if not n.endswith(".displacement")]
     forward = limn.gradient(scene, [*names, "tent.translate.y"], spp=64, seed=2)
 
     def compare(name, value, error):

@@ -39,6 +39,27 @@ def test_one_call_is_a_fit_and_its_run(scene):
         limn.fit(scene, target, "clay.reflectance", 1, sppp=2)
 
 
+def test_vertices_go_along_their_normals(scene):
+    target = limn.render(scene, spp=64, seed=9)
+    start = scene.copy()
+    start.move("tent.translate.y", 0.2)
+    before = start["tent.vertex_positions"].astype(float)
+    fit = limn.fit(start, target, "tent.displacement", 3, spp=4, seed=1, step=2)
+    moved = fit.scenes[0]["tent.vertex_positions"] - before
+    assert np.linalg.norm(moved, axis=1).max() > 1e-3
+    # What backward finds for vertices, along the normals, is what it finds for displacements.
+    adjoint = limn.image_loss(start, target, spp=4).adjoint
+    names = ["tent.vertex_positions", "tent.displacement"]
+    found = limn.backward(start, adjoint, names, spp=4, seed=3)
+    vertices, along = (found[n].value for n in names)
+    assert along.shape == start.parameters["tent.displacement"].shape == (len(before),)
+    going = moved / np.linalg.norm(moved, axis=1, keepdims=True)
+    assert abs(along).max() > 0
+    np.testing.assert_allclose(abs((vertices * going).sum(axis=1)), abs(along), rtol=1e-3,
+                               atol=1e-5 * abs(along).max())
+    np.testing.assert_array_equal(moved[0], moved[4])  # copies stay together
+
+
 def test_bounds_hold(scene):
     least = scene["clay.reflectance"].min() - 0.01  # the target is black, and no step so short
     target = np.zeros((scene.height, scene.width, 3))

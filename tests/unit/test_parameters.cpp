@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 
 #include "limn/core/parameter.h"
 #include "support/temp_files.h"
@@ -348,6 +349,48 @@ TEST_F(Parameters, StepsOfATurnAddUp) {
       // Coordinates below 4 are rounded to floats twice.
       EXPECT_LT(length(cast<double>(a[v]) - cast<double>(b[v])), 0x1p-20) << name;
     }
+  }
+}
+
+// Translations take along what a shape turns about and is scaled about, scales are in sizes of the
+// start: steps in turns are one turn, one scale and one translation.
+TEST_F(Parameters, StepsInTurnsAddUp) {
+  const ShapeId tent(0);
+  const std::vector<std::pair<const char*, double>> steps{
+      {"tent.translate.x", 0.5}, {"tent.rotate.y", 0.7},     {"tent.scale", 0.4},
+      {"tent.translate.z", -1},  {"tent.translate.x", -0.2}, {"tent.scale", -0.6},
+      {"tent.rotate.y", -1.1}};
+  Scene stepped = deep_copy(scene_);
+  std::map<std::string, double> sums;
+  for (const auto& [name, step] : steps) {
+    ShapePose pose;
+    for (const auto& [other, sum] : sums) {
+      const ShapePose each = find_parameter(scene_, other).pose_per_unit(tent);
+      pose.moved += each.moved * sum;
+      pose.grown += each.grown * sum;
+    }
+    const Parameter there = find_parameter(scene_, name).at(pose);
+    // The derivative is that of the steps.
+    const Scene more = there.moved(stepped, 1e-3), less = there.moved(stepped, -1e-3);
+    const std::vector<Vec3d> velocities = there.velocities(stepped, tent);
+    for (size_t v = 0; v < velocities.size(); ++v) {
+      const Vec3d difference = cast<double>(more.shapes[0].mesh.positions[v]) -
+                               cast<double>(less.shapes[0].mesh.positions[v]);
+      // Coordinates below 4 in floats, over steps of 0.002; a turn's third derivative.
+      EXPECT_LT(length(difference / 2e-3 - velocities[v]), 1e-3) << name << " " << v;
+    }
+    there.move(stepped, step);
+    sums[name] += step;
+  }
+  Scene once = deep_copy(scene_);
+  for (const char* name : {"tent.rotate.y", "tent.scale", "tent.translate.x", "tent.translate.z"}) {
+    find_parameter(scene_, name).move(once, sums[name]);
+  }
+  EXPECT_EQ(find_parameter(scene_, "tent.scale").pose_per_unit(ShapeId(1)).grown, 0);
+  const auto &a = once.shapes[0].mesh.positions, &b = stepped.shapes[0].mesh.positions;
+  for (size_t v = 0; v < a.size(); ++v) {
+    // Coordinates below 4 are rounded to floats seven times.
+    EXPECT_LT(length(cast<double>(a[v]) - cast<double>(b[v])), 0x1p-18) << v;
   }
 }
 

@@ -226,7 +226,9 @@ BackwardFiles plan_files(const Scene& scene, const std::vector<std::string>& par
   };
   for (const std::string& name : parameters) add(find_parameter_or_array(scene, name));
   if (parameters.empty()) {
-    for (const Parameter& parameter : list_parameters(scene)) add(parameter);
+    for (const Parameter& parameter : list_parameters(scene)) {
+      if (!parameter.repeats) add(parameter);
+    }
   }
   return files;
 }

@@ -41,7 +41,7 @@ class BackwardCommand final : public Command {
         ->needs(target);
     app.add_option("--wrt", options_.parameters,
                    "Parameter, an array (SHAPE.vertex_positions) or a scalar; may be repeated "
-                   "(default: all of the scene)");
+                   "(default: all of the scene but displacements, which repeat vertex_positions)");
     add_reverse_options(app, options_);
     app.add_option("--batches", options_.batches,
                    "At most, for standard errors; each costs some time per vertex")

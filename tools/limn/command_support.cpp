@@ -107,9 +107,9 @@ void add_points_option(CLI::App& app, FilmPoints& points) {
   app.add_option_function<std::string>(
          "--points", [&points](const std::string& name) { points = film_points(name); },
          "Where light in closed form (analytic) is looked for: at random points of a pixel, or "
-         "once "
-         "for each face that it shows, times the area of that: no noise, and the exact derivative "
-         "of its own image, off by the square of a pixel (box filter; takes no samples)")
+         "once for each face that it shows, times the area of that: no noise, and the exact "
+         "derivative of its own image, which differs from the true one by what happens within "
+         "pixels (box filter; takes no samples)")
       ->check(
           CLI::IsMember(std::vector<std::string>(std::begin(kFilmPoints), std::end(kFilmPoints))))
       ->default_str(kFilmPoints[0]);

@@ -3,7 +3,8 @@
 //
 //   SHAPE.translate.x|y|z         scene units
 //   SHAPE.rotate.x|y|z            radians, world axes through the center of its bounds
-//   SHAPE.scale                   factor - 1, about the center of its bounds
+//   SHAPE.scale                   factor - 1, about the center of its bounds; in fits not below
+//                                 -0.99
 //   SHAPE.vertex_positions        scene units: an array, the V by 3 coordinates of its vertices
 //   SHAPE.vertex_positions.V.x|y|z  one of them: vertex V (from 0) with its copies
 //   SHAPE.vertex_positions:FILE   moves every vertex by the parameter times its vector in FILE
@@ -32,9 +33,17 @@ namespace limn {
 
 class Motion;
 
+// How a shape as a whole has moved since a parameter was found: the point that it turns about and
+// is scaled about by `moved` [scene units], and its size by the factor 1 + `grown`.
+struct ShapePose {
+  Vec3d moved;
+  double grown = 0;
+};
+
 // What a name stands for in a scene, resolved once. It holds indices and ids, no pointers into the
 // scene, so it serves every deep copy of that scene as well, also after it has moved on: what a
-// shape turns about, and the normals that its vertices are displaced along, stay as they were. Copies of a Parameter are cheap.
+// shape turns about (but see at()), and the normals that its vertices are displaced along, stay as
+// they were. Copies of a Parameter are cheap.
 // `component` counts the numbers of an array, row by row (vertex 2's y: 2 * 3 + 1); of a scalar it
 // is 0.
 struct Parameter {
@@ -51,6 +60,9 @@ struct Parameter {
   // them apart all the same. NAME.r, NAME.g and NAME.b move one of them each.
   bool colour = false;
   std::vector<size_t> array = {};  // {V, 3}, {V}, {H, W, 3}; {} of scalars
+  // Its derivative is that of another array in other coordinates (displacement: of
+  // vertex_positions): where all parameters are asked for it is left out.
+  bool repeats = false;
 
   // Of its derivative in reverse mode: {} of a number, {3} of a colour, `array` of an array.
   std::vector<size_t> shape() const;
@@ -81,8 +93,17 @@ struct Parameter {
   // none of that shape.
   std::vector<Vec3d> velocities(const Scene& scene, ShapeId shape, size_t component = 0) const;
 
-  // V vectors along which the vertices of the shape go that the parameter displaces; empty of others.
+  // V vectors along which the vertices of the shape go that the parameter displaces; empty of
+  // others.
   std::vector<Vec3d> directions(const Scene& scene) const;
+
+  // How one unit of it moves the shape as a whole: the unit vector of translations, a grown of 1 of
+  // scales, else nothing.
+  ShapePose pose_per_unit(ShapeId shape) const;
+  // The same parameter where the shape that it moves has another pose than where it was found:
+  // rotations and scales go about the point that is taken along, scales in sizes of then. So steps
+  // of translations, of turns about one axis and of scales add up, in whatever order they come.
+  Parameter at(const ShapePose& pose) const;
 
   // H by W by 3: the derivative of the environment's texels; empty where the parameter moves none.
   Image texel_velocities(const Scene& scene, size_t component = 0) const;

@@ -23,7 +23,7 @@ namespace limn {
 
 struct BackwardOptions {
   // Names as in parameter.h, arrays included (SHAPE.vertex_positions); none: all parameters of the
-  // scene.
+  // scene but those that repeat others (Parameter::repeats).
   std::vector<std::string> parameters;
   // In place of names: parameters that were found before, in this scene or where it was then.
   std::vector<Parameter> found;

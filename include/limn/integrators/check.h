@@ -98,8 +98,8 @@ using GradientRun =
 CheckResult check(const Scene& scene, const CheckOptions& options, const RunSettings& settings,
                   const GradientRun& run = gradient);
 
-// Where a pixel is made of its faces (FilmPoints::kFaces) nothing is left to chance: the gradient is
-// held against central differences of the very image, at steps from options.step (0: the natural
+// Where a pixel is made of its faces (FilmPoints::kFaces) nothing is left to chance: the gradient
+// is held against central differences of the very image, at steps from options.step (0: the natural
 // one) down, of which the one is taken where they change least from step to step.
 struct FacesCheck {
   GradientResult gradient;

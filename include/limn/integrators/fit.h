@@ -56,10 +56,10 @@ struct FitBounds {
 
 struct FitOptions {
   // Names as in parameter.h: scalars, SHAPE.vertex_positions, SHAPE.displacement (along the normals
-  // as they are at the start), EMITTER.data; at least one. Every
-  // view that has a name moves with it, and one view must have it. Colours move by channels.
-  // Motions of a shape, its vertex_positions and its displacement exclude each other, as do motions of texels and all
-  // of them; where vertices are fitted, normals of the file give way to computed ones.
+  // as they are at the start), EMITTER.data; at least one. Every view that has a name moves with
+  // it, and one view must have it. Colours move by channels. Motions of a shape, its
+  // vertex_positions and its displacement exclude each other, as do motions of texels and all of
+  // them; where vertices are fitted, normals of the file give way to computed ones.
   std::vector<std::string> parameters;
   std::vector<FitBounds> bounds;
   LossKind loss = LossKind::kL2;
