@@ -1,4 +1,5 @@
-// Quadrature over polygons of directions: points, and where integrands have kinks.
+// Lambert's formula, and quadrature over polygons of directions: points, and where integrands have
+// kinks.
 #include "integrators/lights/polygon_light.h"
 
 namespace limn::detail {
@@ -62,6 +63,57 @@ Breaks::Breaks(const Vec3d& a, const Vec3d& b, std::span<const Kink> kinks) {
 namespace limn {
 namespace {
 
+// The integral of (n . w) w / |N| along a side, whose product with dN is what its motion adds.
+Vec3d cosine_slope(const detail::Arc& arc, const Vec3d& n) {
+  // n . w as c cos psi + d sin psi, and the integrals of its products with cos psi and sin psi.
+  const double c = dot(n, arc.start), d = dot(n, arc.across);
+  const double sine = std::sin(arc.angle), both = 0.5 * sine * sine;
+  const double twice = 0.5 * sine * std::cos(arc.angle);
+  const double cosines = 0.5 * arc.angle + twice, sines = 0.5 * arc.angle - twice;
+  return (arc.start * (c * cosines + d * both) + arc.across * (c * both + d * sines)) *
+         (1 / arc.length);
+}
+
+// The sum of angle s / 2 over the sides. add_side(side, slope): by the normal of a side that moves.
+template <class S, class AddSide>
+Vec3d half_angles(std::span<const PolygonSide<S>> sides, const Vec3d& n, const AddSide& add_side) {
+  Vec3d sum;
+  for (const PolygonSide<S>& side : sides) {
+    const detail::Arc arc(value(side.normal), side.begin, side.end);
+    sum += arc.s * (0.5 * arc.angle);
+    if constexpr (!std::is_same_v<S, double>) {
+      if (!is_still(side.normal)) add_side(side, cosine_slope(arc, n));
+    }
+  }
+  return sum;
+}
+
+}  // namespace
+
+double cosine_integral(std::span<const PolygonSide<double>> sides, const Vec3d& n) {
+  return dot(n, half_angles(sides, n, [](const auto&, const Vec3d&) {}));
+}
+
+Dual cosine_integral(std::span<const PolygonSide<Dual>> sides, const Vec3<Dual>& n) {
+  Dual moved;
+  const Vec3d sum = half_angles(sides, value(n), [&](const auto& side, const Vec3d& slope) {
+    moved.d += dot(side.normal, slope).d;
+  });
+  return dot(n, sum) + moved;
+}
+
+// One statement of the tape.
+Var cosine_integral(std::span<const PolygonSide<Var>> sides, const Vec3<Var>& n) {
+  Tape& tape = *Tape::current();
+  const Vec3d sum = half_angles(sides, value(n), [&](const auto& side, const Vec3d& slope) {
+    detail::add_entries(tape, side.normal, slope);
+  });
+  detail::add_entries(tape, n, sum);
+  return {dot(value(n), sum), tape.end()};
+}
+
+namespace {
+
 // c times the ramp, its integral G from c to 1, and that one's derivative with respect to h.
 struct Ramp {
   explicit Ramp(double horizon) : h(horizon), end(h * (2 - h)), width(h * (1 - h)) {}
@@ -103,38 +155,8 @@ void for_every_direction(const detail::Arc& arc, const Vec3d& a, const Vec3d& b,
   });
 }
 
-template <class S, class Visit>
-void for_every_side_point(std::span<const PolygonSide<S>> sides, const Vec3d& n, const Ramp& ramp,
-                          const Visit& visit) {
-  const std::array<Kink, 2> kinks = {{{n, ramp.h}, {n, ramp.end}}};
-  for (const PolygonSide<S>& side : sides) {
-    const Vec3d &a = side.begin, &b = side.end;
-    const detail::Arc arc(value(side.normal), a, b);
-    for_every_direction(arc, a, b, kinks,
-                        [&](const Vec3d& w, double dpsi) { visit(side, arc, w, dpsi); });
-  }
-}
-
 // 1 - c^2 as the square of a sine, without cancellation.
 double squared_sine(const Vec3d& n, const Vec3d& w) { return length_squared(cross(n, w)); }
-
-}  // namespace
-
-double ramp_integral(std::span<const PolygonSide<double>> sides, const Vec3d& n, double h) {
-  if (h == 0) return cosine_integral(sides, n);
-  if (h >= 1) return 0;
-  const Ramp ramp(h);
-  double sum = 0;
-  for_every_side_point(
-      sides, n, ramp, [&](const auto&, const detail::Arc& arc, const Vec3d& w, double dpsi) {
-        const double c = dot(n, w);
-        const double potential = c >= ramp.end ? 0.5 : ramp.integral(c) / squared_sine(n, w);
-        sum += dot(n, arc.s) * potential * dpsi;
-      });
-  return sum;
-}
-
-namespace {
 
 // Where n turns with the angular velocity r, the polygon turns back with -r; with r = n x dn
 // -(r x s) . w is (dn . s) (n . w) - (n . s) (dn . w): the slope by n of what a side adds, over the
@@ -143,61 +165,70 @@ Vec3d turned_back(const detail::Arc& arc, const Vec3d& n, const Vec3d& w) {
   return arc.s * dot(n, w) - w * dot(n, arc.s);
 }
 
+// An integral, and its slopes by the ramp's begin and the normal.
+struct RampSums {
+  double value = 0, by_h = 0;
+  Vec3d by_n;
+};
+// 0 < h < 1. add_side(side, slope): by the normal of a side.
+template <class S, class AddSide>
+RampSums ramp_sums(std::span<const PolygonSide<S>> sides, const Vec3d& n, double h,
+                   const AddSide& add_side) {
+  const Ramp ramp(h);
+  const std::array<Kink, 2> kinks = {{{n, ramp.h}, {n, ramp.end}}};
+  RampSums sums;
+  for (const PolygonSide<S>& side : sides) {
+    const detail::Arc arc(value(side.normal), side.begin, side.end);
+    for_every_direction(arc, side.begin, side.end, kinks, [&](const Vec3d& w, double dpsi) {
+      const double c = dot(n, w), across = dot(n, arc.s) * dpsi;
+      if (c >= ramp.end) {
+        sums.value += 0.5 * across;
+      } else {
+        const double over = across / squared_sine(n, w);
+        sums.value += ramp.integral(c) * over;
+        sums.by_h += ramp.integral_by_h(c) * over;
+      }
+      const double weight = ramp.value(c) * dpsi;
+      if (weight == 0) return;
+      sums.by_n += turned_back(arc, n, w) * weight;
+      add_side(side, w * (weight / arc.length));
+    });
+  }
+  return sums;
+}
+
 }  // namespace
+
+double ramp_integral(std::span<const PolygonSide<double>> sides, const Vec3d& n, double h) {
+  if (h == 0) return cosine_integral(sides, n);
+  if (h >= 1) return 0;
+  return ramp_sums(sides, n, h, [](const auto&, const Vec3d&) {}).value;
+}
 
 Dual ramp_integral(std::span<const PolygonSide<Dual>> sides, const Vec3<Dual>& normal,
                    const Dual& h) {
   if (h.v == 0) return cosine_integral(sides, normal);  // the derivative by h is 0 there
   if (h.v >= 1) return {};
-  const Ramp ramp(h.v);
-  const Vec3d n = value(normal);
-  const Vec3<Lanes> dn{normal.x.d, normal.y.d, normal.z.d};
-  Dual sum;
-  for_every_side_point(
-      sides, n, ramp,
-      [&](const PolygonSide<Dual>& side, const detail::Arc& arc, const Vec3d& w, double dpsi) {
-        const double c = dot(n, w), sine2 = squared_sine(n, w);
-        const double across = dot(n, arc.s) * dpsi;
-        if (c >= ramp.end) {
-          sum.v += 0.5 * across;
-        } else {
-          sum.v += ramp.integral(c) / sine2 * across;
-          sum.d += h.d * (ramp.integral_by_h(c) / sine2 * across);
-        }
-        sum.d += (dot(side.normal, w).d * (1 / arc.length) + dot(dn, turned_back(arc, n, w))) *
-                 (ramp.value(c) * dpsi);
-      });
-  return sum;
+  Dual result;
+  const RampSums sums = ramp_sums(
+      sides, value(normal), h.v,
+      [&](const auto& side, const Vec3d& slope) { result.d += dot(side.normal, slope).d; });
+  result.v = sums.value;
+  result.d += h.d * sums.by_h + dot(normal, sums.by_n).d;
+  return result;
 }
 
 // One statement of the tape.
 Var ramp_integral(std::span<const PolygonSide<Var>> sides, const Vec3<Var>& normal, const Var& h) {
   if (h.v == 0) return cosine_integral(sides, normal);  // the derivative by h is 0 there
   if (h.v >= 1) return {};
-  const Ramp ramp(h.v);
-  const Vec3d n = value(normal);
   Tape& tape = *Tape::current();
-  double sum = 0, by_h = 0;
-  Vec3d by_n;
-  for_every_side_point(
-      sides, n, ramp,
-      [&](const PolygonSide<Var>& side, const detail::Arc& arc, const Vec3d& w, double dpsi) {
-        const double c = dot(n, w), sine2 = squared_sine(n, w);
-        const double across = dot(n, arc.s) * dpsi;
-        if (c >= ramp.end) {
-          sum += 0.5 * across;
-        } else {
-          sum += ramp.integral(c) / sine2 * across;
-          by_h += ramp.integral_by_h(c) / sine2 * across;
-        }
-        const double weight = ramp.value(c) * dpsi;
-        if (weight == 0) return;
-        by_n += turned_back(arc, n, w) * weight;
-        detail::add_entries(tape, side.normal, w * (weight / arc.length));
-      });
-  detail::add_entries(tape, normal, by_n);
-  tape.entry(h.node, by_h);
-  return {sum, tape.end()};
+  const RampSums sums = ramp_sums(
+      sides, value(normal), h.v,
+      [&](const auto& side, const Vec3d& slope) { detail::add_entries(tape, side.normal, slope); });
+  detail::add_entries(tape, normal, sums.by_n);
+  tape.entry(h.node, sums.by_h);
+  return {sums.value, tape.end()};
 }
 
 }  // namespace limn

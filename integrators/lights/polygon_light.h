@@ -43,26 +43,11 @@ struct Arc {
 
 // The integral of n . w over the polygon [sr]: Lambert's formula, n . sum of angle s / 2. n: of any
 // length; below its horizon n . w counts as negative.
-inline double cosine_integral(std::span<const PolygonSide<double>> sides, const Vec3d& n) {
-  double sum = 0;
-  for (const PolygonSide<double>& side : sides) {
-    const detail::Arc arc(side.normal, side.begin, side.end);
-    sum += 0.5 * arc.angle * dot(n, arc.s);
-  }
-  return sum;
-}
-namespace detail {
+double cosine_integral(std::span<const PolygonSide<double>> sides, const Vec3d& n);
+Dual cosine_integral(std::span<const PolygonSide<Dual>> sides, const Vec3<Dual>& n);
+Var cosine_integral(std::span<const PolygonSide<Var>> sides, const Vec3<Var>& n);
 
-// The integral of (n . w) w / |N| along a side, whose product with dN is what its motion adds.
-inline Vec3d cosine_slope(const Arc& arc, const Vec3d& n) {
-  // n . w as c cos psi + d sin psi, and the integrals of its products with cos psi and sin psi.
-  const double c = dot(n, arc.start), d = dot(n, arc.across);
-  const double sine = std::sin(arc.angle), both = 0.5 * sine * sine;
-  const double twice = 0.5 * sine * std::cos(arc.angle);
-  const double cosines = 0.5 * arc.angle + twice, sines = 0.5 * arc.angle - twice;
-  return (arc.start * (c * cosines + d * both) + arc.across * (c * both + d * sines)) *
-         (1 / arc.length);
-}
+namespace detail {
 
 // Of a statement of the tape: what three nodes add to its result.
 inline void add_entries(Tape& tape, const Vec3<Var>& x, const Vec3d& slope) {
@@ -70,29 +55,6 @@ inline void add_entries(Tape& tape, const Vec3<Var>& x, const Vec3d& slope) {
 }
 
 }  // namespace detail
-
-inline Dual cosine_integral(std::span<const PolygonSide<Dual>> sides, const Vec3<Dual>& n) {
-  Dual sum;
-  for (const PolygonSide<Dual>& side : sides) {
-    const detail::Arc arc(value(side.normal), side.begin, side.end);
-    sum += dot(n, arc.s) * (0.5 * arc.angle);
-    if (!is_still(side.normal)) sum.d += dot(side.normal, detail::cosine_slope(arc, value(n))).d;
-  }
-  return sum;
-}
-// One statement of the tape.
-inline Var cosine_integral(std::span<const PolygonSide<Var>> sides, const Vec3<Var>& n) {
-  Tape& tape = *Tape::current();
-  Vec3d sum;
-  for (const PolygonSide<Var>& side : sides) {
-    const detail::Arc arc(value(side.normal), side.begin, side.end);
-    sum += arc.s * (0.5 * arc.angle);
-    if (is_still(side.normal)) continue;
-    detail::add_entries(tape, side.normal, detail::cosine_slope(arc, value(n)));
-  }
-  detail::add_entries(tape, n, sum);
-  return {dot(value(n), sum), tape.end()};
-}
 
 // Directions where a function of direction has a kink: axis . w = level, w of length one.
 struct Kink {
