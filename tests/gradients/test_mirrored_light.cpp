@@ -453,6 +453,39 @@ TEST(MirroredLight, OrderIsThatOfTheFile) {
   }
 }
 
+// The scenes of a finite difference draw by the glare of the one between them: a panel that has left
+// its old plane by the step must not see what its other side mirrored there.
+TEST(MirroredLight, PanelsSeeNothingInThemselves) {
+  const TempFiles files;
+  const auto panel_at = [&](double height) {
+    SceneParts parts;
+    parts.max_depth = 3;
+    const std::string both = R"(<bsdf type="twosided">)" + conductor("gloss", 0.1) + "</bsdf>";
+    parts.body = square("panel", 1, -90, {0, height, 0}, both) +
+                 square("wall", 3, 0, {0, 0, -2}, diffuse("paint", "0.8, 0.7, 0.6")) +
+                 bulb({0, 1, 0.3}, 6) + bulb({0, -1, 0.3}, 6);
+    return make_scene(files, parts);
+  };
+  const Scene still = panel_at(0);
+  const Lights lights(still);
+  const auto mirrored = MirroredLight::make(still, lights);
+  ASSERT_TRUE(mirrored);
+  for (const double height : {-1e-3, 0.0, 1e-3}) {
+    const Scene moved = panel_at(height);
+    const auto tracer = make_embree_tracer(moved, 1);
+    const auto share = [&](const Vec3d& origin, const Vec3d& direction) {
+      const Point at(moved, *tracer, origin, direction);
+      const Scattering<double> scattering(at.surface, at.wi, moved.shading);
+      return mirrored->mixture(at.surface, scattering).share;
+    };
+    for (const double side : {1.0, -1.0}) {
+      const Vec3d origin{0, side, -0.3};  // where the lamp that is before it shows itself
+      EXPECT_EQ(share(origin, normalize(Vec3d{0, 0, 0} - origin)), 0);
+      EXPECT_GT(share({0, side * 0.5, 0}, {0, 0, -1}), 0);  // the wall
+    }
+  }
+}
+
 // Nothing to mirror, nothing to see it by: no share, and no image changes.
 TEST(MirroredLight, IsNotWhereNothingMirrors) {
   const TempFiles files;
