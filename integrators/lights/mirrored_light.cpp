@@ -199,8 +199,8 @@ std::vector<MirroredLight::Image> MirroredLight::find_lights(const Scene& scene)
 }
 
 // Keeps those that mirror the most light; of what is about alike the first. Neither the choice nor
-// the order may hang on small differences: the scenes of a finite difference would draw directions
-// of different lamps with the same numbers.
+// the order may hang on small differences: with the same numbers images of nearly the same scene
+// are to draw directions of the same lamps.
 void MirroredLight::add(const FlatPart& part, const Bsdf& bsdf, const Vec3d& normal,
                         const Image& source) {
   Image image = source;

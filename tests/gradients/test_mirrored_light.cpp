@@ -425,7 +425,7 @@ TEST(MirroredLight, ShareFollowsWhatIsLitAround) {
   EXPECT_LT(10 * weak.share, in_middle);
 }
 
-// Two scenes of a finite difference draw the same glare with the same number: neither which lamps
+// Images of nearly the same scene draw the same glare with the same number: neither which lamps
 // are kept nor their order hangs on which of equal ones is brighter by the difference.
 TEST(MirroredLight, OrderIsThatOfTheFile) {
   const TempFiles files;
