@@ -41,6 +41,12 @@ class BruteForceSampler final : public ListingSampler {
   }
 
  private:
+  // Grows alone: what is resized anew is written twice.
+  struct Scratch {
+    std::vector<uint8_t> sides;        // of the faces
+    std::vector<uint32_t> candidates;  // and one more
+  };
+
   static Packed pack(const EdgeMesh& mesh) {
     Packed packed;
     for (const Plane& plane : mesh.planes) {
@@ -83,19 +89,19 @@ class BruteForceSampler final : public ListingSampler {
   // No branch depends on the data.
   void find_candidates(ShapeId object, const Vec3d& p,
                        std::vector<uint32_t>& found) const override {
-    static thread_local const auto owned = std::make_unique<std::vector<uint8_t>>();
-    std::vector<uint8_t>& sides = *owned;
+    static thread_local const auto owned = std::make_unique<Scratch>();
+    auto& [sides, candidates] = *owned;
     const Packed& packed = packed_[object.index()];
     sides.resize(std::max(sides.size(), packed.x.size()));
-    found.resize(packed.faces.size() + 1);
+    candidates.resize(std::max(candidates.size(), packed.faces.size() + 1));
     find_sides(packed, distance_error(input_.object(object), p), p, sides.data());
-    size_t count = 0;
+    uint32_t* end = candidates.data();
     for (uint32_t e = 0; e < packed.faces.size(); ++e) {
       const auto [a, b] = packed.faces[e];
-      found[count] = e;
-      count += ((sides[a] | sides[b]) & packed.needed[e]) == packed.needed[e];
+      *end = e;
+      end += ((sides[a] | sides[b]) & packed.needed[e]) == packed.needed[e];
     }
-    found.resize(count);
+    found.assign(candidates.data(), end);
   }
 
   std::vector<Packed> packed_;

@@ -54,7 +54,6 @@ class Contours {
 
   // The point on the plane of its own face, as near as numbers allow.
   ContourPoint at(const SurfacePoint<double>& surface, const Vec3d& up) const;
-  bool in_one_place(FaceRef a, FaceRef b) const { return a == b || tracer_.overlap(a, b); }
   // What rounding may add to distances of the point from planes of a shape, and to those of the
   // shape's corners from the plane of the point's face.
   double rounding(const ContourPoint& at, ShapeId shape) const;

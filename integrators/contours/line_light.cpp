@@ -9,7 +9,6 @@
 
 #include "integrators/lights/direct_light_check.h"
 #include "integrators/lights/polygon_light.h"
-#include "limn/core/face_overlaps.h"
 
 namespace limn {
 namespace {
@@ -228,10 +227,12 @@ void LineLight::check(const Scene& scene, const std::string& method) {
   }
 }
 
-// Rays meet one of the lamps that lie in one place, while here each would shine whole.
-void LineLight::check_overlaps(int threads) const {
+// What lies in a lamp's place; an error if that is another lamp: rays meet one of them, while here
+// each would shine whole.
+void LineLight::find_overlaps(int threads) {
   const FaceCopies copies(scene_);
   const FaceOverlaps overlaps(scene_, copies, threads);
+  for (Lamp& lamp : lamps_) lamp.in_place = overlaps.in_place_of(lamp.faces);
   for (uint32_t s = 0; s < scene_.shapes.size(); ++s) {
     const Shape& shape = scene_.shapes[s];
     if (!shape.is_emitter) continue;
@@ -265,7 +266,7 @@ LineLight::LineLight(const Scene& scene, const RayTracer& tracer, int threads,
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     if (scene.shapes[s].is_emitter) add_lamp(ShapeId(s));
   }
-  if (has_lamps()) check_overlaps(threads);
+  if (has_lamps()) find_overlaps(threads);
   if (!sky_ || !sky_->grid()) return;
   columns_ = std::make_unique<RadianceColumns>(*sky_, threads);
   std::vector<double> brightness = columns_->brightness();
@@ -317,8 +318,11 @@ void LineLight::add_polygon(const LampHull& hull, ShapeId id, std::vector<FaceRe
   // What is nearer than rounding of positions to floats lies in the lamp's plane, wherever the
   // scene lies: at 1e4 from the origin that is 5e-3. Not tuned.
   const double margin = 2 * hull.deviation + 0x1p-21 * size;
-  lamps_.push_back({value(scene_.shape(id).radiance), hull,
-                    contours_.make_screen(hull.plane, margin, hull.points), std::move(faces)});
+  lamps_.push_back({value(scene_.shape(id).radiance),
+                    hull,
+                    contours_.make_screen(hull.plane, margin, hull.points),
+                    std::move(faces),
+                    {}});
 }
 
 // Over the contours in scratch(), along lines of the pencil as far as they are before all planes:
@@ -483,9 +487,7 @@ Rgb<double> LineLight::lamp_light(const Lamp& lamp, const Receiver& receiver, do
                    [&](const Vec3d& x) { return dot(at.up, x - at.p) > rounding; })) {
     return {};
   }
-  for (const FaceRef face : lamp.faces) {
-    if (contours_.in_one_place(face, at.face)) return {};
-  }
+  if (lamp.in_place.contains(at.face)) return {};
   const auto cone = cone_around(lamp.hull, at.p, at.up);
   if (!cone) return {};
   own.polygon.clear();

@@ -15,6 +15,7 @@
 #include "integrators/contours/isolines.h"
 #include "integrators/contours/radiance_columns.h"
 #include "integrators/lights/light_regions.h"
+#include "limn/core/face_overlaps.h"
 #include "limn/core/shading.h"
 
 namespace limn {
@@ -76,6 +77,7 @@ class LineLight {
     LampHull hull;  // flat
     ContourScreen screen;
     std::vector<FaceRef> faces;
+    FaceOverlaps::Set in_place;  // these, and what overlaps them in their plane
   };
   struct Receiver;
   Receiver receiver_at(const SurfacePoint<double>& surface,
@@ -85,7 +87,7 @@ class LineLight {
 
   // All contours into scratch(), counted.
   void list(const ContourPoint& at, const DirectionCone& cone, const ContourScreen* screen) const;
-  void check_overlaps(int threads) const;
+  void find_overlaps(int threads);
   void add_lamp(ShapeId id);
   void add_polygon(const LampHull& hull, ShapeId id, std::vector<FaceRef> faces);
   Rgb<double> lamp_light(const Lamp& lamp, const Receiver& receiver, double offset) const;

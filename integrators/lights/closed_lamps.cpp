@@ -186,9 +186,9 @@ void ClosedLight::finish(LampPlane& lamp) const {
     lamp.u = u, lamp.v = v;
     lamp.x0 = x0, lamp.x1 = x1, lamp.y0 = y0, lamp.y1 = y1;
   }
+  lamp.in_place = overlaps_.in_place_of(lamp.faces);
   for (const FaceRef face : lamp.faces) {
     for (const FaceRef other : overlaps_.of(face)) {
-      lamp.in_plane.push_back(other);
       const FaceRef met = copies_.met(other, -lamp.plane.n, false).value_or(other);
       if (is_met_first(scene_, met, face, -lamp.plane.n)) lamp.before.push_back(met);
     }

@@ -42,12 +42,11 @@ bool ClosedLight::list(const LampPlane& lamp, const Receiver& receiver, Scratch&
   const Vec3d &p = receiver.p, a = -lamp.plane.n;
   const double height = lamp.plane.distance(p);
   if (!(height > 0)) return false;
-  // What lies in the lamp's own plane, as its back does, gets nothing of it, however it is rounded.
-  const auto holds = [&](FaceRef face) { return in_one_place(receiver.face, face); };
-  if (std::any_of(lamp.faces.begin(), lamp.faces.end(), holds)) return false;
   const bool above = std::any_of(lamp.hull.begin(), lamp.hull.end(),
                                  [&](const Vec3d& x) { return dot(receiver.up, x - p) > 0; });
   if (!above) return false;
+  // What lies in the lamp's own plane, as its back does, gets nothing of it, however it is rounded.
+  if (lamp.in_place.contains(receiver.face)) return false;
 
   const double px = dot(lamp.u, p), py = dot(lamp.v, p);
   PlaneWindow& window = scratch.window;
@@ -86,11 +85,7 @@ bool ClosedLight::list(const LampPlane& lamp, const Receiver& receiver, Scratch&
     const auto& x = item->corners;
     if (!rises(x[0]) && !rises(x[1]) && !rises(x[2])) continue;
     // What lies in the lamp's plane is before it by the rule, not by how its corners are rounded.
-    const FaceRef first = copies_.first(item->face);
-    if (std::find(lamp.in_plane.begin(), lamp.in_plane.end(), first) != lamp.in_plane.end()) {
-      continue;
-    }
-    if (is_skipped(item->face, receiver)) continue;
+    if (lamp.in_place.contains(item->face) || is_skipped(item->face, receiver)) continue;
     scratch.faces.push_back(item->face);
     scratch.items[kept++] = item;
   }

@@ -54,8 +54,8 @@ class ClosedLight {
   struct LampPlane {
     ShapeId shape;
     std::vector<FaceRef> faces;
-    std::vector<FaceRef> in_plane;  // others in the same plane, the first of copies
-    std::vector<FaceRef> before;    // of these those which rays meet in their place
+    FaceOverlaps::Set in_place;   // these, and what overlaps them in their plane
+    std::vector<FaceRef> before;  // of these others those which rays meet in their place
     Plane plane;
     Vec3d u, v;               // across its normal; u, v and the reversed normal are right-handed
     double x0, x1, y0, y1;    // bounds of its faces along u and v

@@ -11,9 +11,8 @@ namespace limn {
 namespace {
 
 // None of these is tuned.
-constexpr double kWidest = 0.35;    // of a lobe that is worth it [rad]
-constexpr size_t kMostFaces = 256;  // of a mesh that is looked through for flat parts
-constexpr double kFlat = 0x1p-16;   // how far a plane's points may lie off, over the mesh's size
+constexpr double kWidest = 0.35;   // of a lobe that is worth it [rad]
+constexpr double kFlat = 0x1p-16;  // how far a plane's points may lie off, over the mesh's size
 // Of the light over the plane: the sine of its elevation, or its height over the flat part's radius.
 constexpr double kLeastHeight = 1e-3;
 // What is seen of surfaces in the light of lamps, over what these send to the mean one without what
@@ -92,11 +91,13 @@ double mean_irradiance(const Scene& scene, const Lights& lights, const std::vect
 
 // Faces in one plane.
 struct MirroredLight::FlatPart {
+  ShapeId shape;
   Vec3d point, normal;
   Bounds bounds;
+  std::bitset<kMostFaces> faces;
 };
 
-std::vector<MirroredLight::FlatPart> MirroredLight::flat_parts(const Mesh& mesh) {
+std::vector<MirroredLight::FlatPart> MirroredLight::flat_parts(const Mesh& mesh, ShapeId shape) {
   std::vector<FlatPart> parts;
   if (mesh.faces.size() > kMostFaces) return parts;
   Bounds all;
@@ -115,9 +116,10 @@ std::vector<MirroredLight::FlatPart> MirroredLight::flat_parts(const Mesh& mesh)
     };
     auto part = std::find_if(parts.begin(), parts.end(), lies_in);
     if (part == parts.end()) {
-      parts.push_back({corners[0], n / twice, {}});
+      parts.push_back({shape, corners[0], n / twice, {}, {}});
       part = parts.end() - 1;
     }
+    part->faces.set(f);
     for (const Vec3d& p : corners) part->bounds.extend(p);
   }
   return parts;
@@ -137,9 +139,10 @@ std::unique_ptr<MirroredLight> MirroredLight::make(const Scene& scene, const Lig
   std::unique_ptr<MirroredLight> result(new MirroredLight(lights));
   const std::vector<Image> sources = result->find_lights(scene);
   if (sources.empty()) return nullptr;
-  for (const Shape& shape : scene.shapes) {
+  for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+    const Shape& shape = scene.shapes[s];
     if (!may_mirror(shape)) continue;
-    for (const FlatPart& part : flat_parts(shape.mesh)) {
+    for (const FlatPart& part : flat_parts(shape.mesh, ShapeId(s))) {
       for (const bool front : {true, false}) {
         const Bsdf* bsdf = shape.bsdf->side(front);
         if (!narrow(bsdf)) continue;
@@ -196,11 +199,13 @@ std::vector<MirroredLight::Image> MirroredLight::find_lights(const Scene& scene)
 }
 
 // Keeps those that mirror the most light; of what is about alike the first. Neither the choice nor
-// the order may hang on small differences: the scenes of a finite difference would draw directions
-// of different lamps with the same numbers.
+// the order may hang on small differences: with the same numbers images of nearly the same scene
+// are to draw directions of the same lamps.
 void MirroredLight::add(const FlatPart& part, const Bsdf& bsdf, const Vec3d& normal,
                         const Image& source) {
   Image image = source;
+  image.shape = part.shape;
+  image.faces = part.faces;
   image.bsdf = &bsdf;
   image.normal = normal;
   image.center = part.bounds.center();

@@ -8,6 +8,7 @@
 // vertex's directions is drawn from there: a mixture of densities, which changes no mean.
 #include <algorithm>
 #include <array>
+#include <bitset>
 #include <cmath>
 #include <cstdint>
 #include <memory>
@@ -53,7 +54,7 @@ class MirroredLight {
     double sum = 0, of_lamps = 0;
     for (const Image& image : images_) {
       Glare& glare = mixture.glare[mixture.count];
-      if (!sees(image, value(surface.p), glare)) continue;
+      if (image.holds(surface.face) || !sees(image, value(surface.p), glare)) continue;
       const double power = luminance(scattering.eval_value(glare.toward)) * glare.irradiance;
       if (!(power > 0)) continue;
       mixture.part[mixture.count++] = power;
@@ -79,8 +80,13 @@ class MirroredLight {
   static constexpr double kMostShare = 0.5;  // not tuned
   // What lamps send comes back from other surfaces with this share of it. Not tuned.
   static constexpr double kScattered = 0.5;
+  static constexpr size_t kMostFaces = 256;  // of a mesh that is looked through for flat parts
   // A light in a flat part of a surface.
   struct Image {
+    // What lies in the part sees nothing in it, wherever the part has moved since.
+    bool holds(FaceRef face) const { return face.shape == shape && faces[face.face.index()]; }
+    ShapeId shape;
+    std::bitset<kMostFaces> faces;
     const Bsdf* bsdf = nullptr;
     Vec3d normal;  // unit, of the lit side
     Vec3d center;  // of a sphere around the flat part
@@ -97,7 +103,7 @@ class MirroredLight {
   explicit MirroredLight(const Lights& lights) : lights_(lights) {}
   std::vector<Image> find_lights(const Scene& scene);
   void add(const FlatPart& part, const Bsdf& bsdf, const Vec3d& normal, const Image& source);
-  static std::vector<FlatPart> flat_parts(const Mesh& mesh);
+  static std::vector<FlatPart> flat_parts(const Mesh& mesh, ShapeId shape);
   bool sees(const Image& image, const Vec3d& p, Glare& glare) const;
 
   const Lights& lights_;

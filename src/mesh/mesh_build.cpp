@@ -168,8 +168,7 @@ void check_orientation(const Mesh& mesh, const SourceLocation& where,
   const bool nearly_all = opposed * 20 >= counted * 19;
   warn(warnings, where,
        "the vertex normals oppose the winding of " +
-           (nearly_all ? "(nearly) all faces; the file is inside out for one of the two, or its "
-                         "transform mirrors it"
+           (nearly_all ? "(nearly) all faces; the file is inside out for one of the two"
                        : std::to_string(opposed) + " of " + std::to_string(counted) + " faces"));
 }
 
@@ -209,6 +208,12 @@ void check_positions(const Mesh& mesh, const SourceLocation& where) {
 
 }  // namespace
 
+bool mirrors(const Matrix4& to_world) {
+  const auto& m = to_world.m;
+  return determinant(Vec3d{m[0][0], m[0][1], m[0][2]}, Vec3d{m[1][0], m[1][1], m[1][2]},
+                     Vec3d{m[2][0], m[2][1], m[2][2]}) < 0;
+}
+
 Mesh build_mesh(const RawMesh& raw, const MeshOptions& options,
                 std::vector<std::string>* warnings) {
   Mesh mesh;
@@ -218,9 +223,10 @@ Mesh build_mesh(const RawMesh& raw, const MeshOptions& options,
   if (raw.positions.empty()) throw InputError(raw.where, "the mesh has no vertices");
   if (raw.faces.empty()) throw InputError(raw.where, "the mesh has no faces");
   set_positions(mesh, raw, options.to_world);
-  set_faces(mesh, raw, options.flip_normals);
+  const bool given = mesh.normal_source == NormalSource::kGiven;
+  set_faces(mesh, raw, options.flip_normals != (given && mirrors(options.to_world)));
   mend(mesh, raw.where, warnings);
-  if (mesh.normal_source == NormalSource::kGiven) {
+  if (given) {
     set_given_normals(mesh, raw, options, warnings);
     check_orientation(mesh, raw.where, warnings);
   }

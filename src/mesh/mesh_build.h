@@ -33,8 +33,12 @@ struct MeshOptions {
   bool flip_normals = false;  // reverse faces and normals
 };
 
-// The transform acts in double precision before positions are rounded to float. A reflecting
-// transform turns the winding, hence the geometric normals, inside out, as Mitsuba does up to 3.9.
+// Whether the transform is a reflection, whatever it is beside that.
+bool mirrors(const Matrix4& to_world);
+
+// The transform acts in double precision before positions are rounded to float. Where it mirrors,
+// computed normals and those of faces turn with the winding, so that the outside is inside, as in
+// Mitsuba up to 3.9; given normals keep their outside, and the faces are wound anew.
 // Faces whose corners coincide, to a billionth of their longest side, are left out. What was mended
 // is appended to `warnings` (may be null). InputError if no face is left or a position lies beyond
 // kLargestCoordinate.

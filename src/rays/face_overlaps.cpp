@@ -268,6 +268,27 @@ bool FaceOverlaps::contains(FaceRef a, FaceRef b) const {
          std::find(others.begin(), others.end(), first) != others.end();
 }
 
+FaceOverlaps::Set FaceOverlaps::in_place_of(std::span<const FaceRef> faces) const {
+  Set set;
+  const auto sort = [&] {
+    std::sort(set.keys_.begin(), set.keys_.end());
+    set.keys_.erase(std::unique(set.keys_.begin(), set.keys_.end()), set.keys_.end());
+  };
+  for (const FaceRef face : faces) {
+    set.keys_.push_back(key(copies_->first(face)));
+    for (const FaceRef other : of(face)) set.keys_.push_back(key(other));
+  }
+  sort();
+  std::vector<uint64_t> copies;
+  for (const auto& alike : copies_->sets()) {
+    if (!set.contains(alike.front())) continue;
+    for (const FaceRef face : alike) copies.push_back(key(face));
+  }
+  set.keys_.insert(set.keys_.end(), copies.begin(), copies.end());
+  sort();
+  return set;
+}
+
 static bool is_skipped(FaceRef face, const Ray& ray) {
   return face == ray.start || face == ray.end ||
          std::find(ray.skip_faces.begin(), ray.skip_faces.end(), face) != ray.skip_faces.end();

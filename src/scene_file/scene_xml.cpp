@@ -143,12 +143,6 @@ class SceneBuilder {
     return options;
   }
 
-  static bool mirrors(const Matrix4& to_world) {
-    const auto& m = to_world.m;
-    return determinant(Vec3d{m[0][0], m[0][1], m[0][2]}, Vec3d{m[1][0], m[1][1], m[1][2]},
-                       Vec3d{m[2][0], m[2][1], m[2][2]}) < 0;
-  }
-
   // The shape's mesh in its own space; sets `options`.
   RawMesh read_geometry(DescribedProperties& p, MeshOptions& options) {
     const std::string& type = p.type();
@@ -160,7 +154,7 @@ class SceneBuilder {
     }
     options = read_mesh_options(p, false);
     // Flat shapes have the normals of their faces. Where they are mirrored their outside stays
-    // outside, as in Mitsuba, which transforms their normals; meshes and spheres are turned.
+    // outside, as in Mitsuba, which transforms their normals.
     options.face_normals = type != "sphere";
     if (options.face_normals && mirrors(options.to_world)) {
       options.flip_normals = !options.flip_normals;
@@ -185,12 +179,9 @@ class SceneBuilder {
       place.m[i][i] = radius;
       place.m[i][3] = center[i];
     }
-    RawMesh sphere = make_sphere();
-    if (mirrors(options.to_world)) {
-      for (Vec3d& n : sphere.normals) n = -n;
-    }
+    if (mirrors(options.to_world)) options.flip_normals = !options.flip_normals;  // as in Mitsuba
     options.to_world = options.to_world * place;
-    return sphere;
+    return make_sphere();
   }
 
   // What shapes take beside what they have taken already, asked for now and then.

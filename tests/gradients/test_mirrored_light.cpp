@@ -425,7 +425,7 @@ TEST(MirroredLight, ShareFollowsWhatIsLitAround) {
   EXPECT_LT(10 * weak.share, in_middle);
 }
 
-// Two scenes of a finite difference draw the same glare with the same number: neither which lamps
+// Images of nearly the same scene draw the same glare with the same number: neither which lamps
 // are kept nor their order hangs on which of equal ones is brighter by the difference.
 TEST(MirroredLight, OrderIsThatOfTheFile) {
   const TempFiles files;
@@ -450,6 +450,39 @@ TEST(MirroredLight, OrderIsThatOfTheFile) {
     }
     // The brightest is among them though it comes last.
     EXPECT_TRUE(lamps == 2 || found[1].part[3] > found[1].part[2]);
+  }
+}
+
+// The scenes of a finite difference draw by the glare of the one between them: a panel that has left
+// its old plane by the step must not see what its other side mirrored there.
+TEST(MirroredLight, PanelsSeeNothingInThemselves) {
+  const TempFiles files;
+  const auto panel_at = [&](double height) {
+    SceneParts parts;
+    parts.max_depth = 3;
+    const std::string both = R"(<bsdf type="twosided">)" + conductor("gloss", 0.1) + "</bsdf>";
+    parts.body = square("panel", 1, -90, {0, height, 0}, both) +
+                 square("wall", 3, 0, {0, 0, -2}, diffuse("paint", "0.8, 0.7, 0.6")) +
+                 bulb({0, 1, 0.3}, 6) + bulb({0, -1, 0.3}, 6);
+    return make_scene(files, parts);
+  };
+  const Scene still = panel_at(0);
+  const Lights lights(still);
+  const auto mirrored = MirroredLight::make(still, lights);
+  ASSERT_TRUE(mirrored);
+  for (const double height : {-1e-3, 0.0, 1e-3}) {
+    const Scene moved = panel_at(height);
+    const auto tracer = make_embree_tracer(moved, 1);
+    const auto share = [&](const Vec3d& origin, const Vec3d& direction) {
+      const Point at(moved, *tracer, origin, direction);
+      const Scattering<double> scattering(at.surface, at.wi, moved.shading);
+      return mirrored->mixture(at.surface, scattering).share;
+    };
+    for (const double side : {1.0, -1.0}) {
+      const Vec3d origin{0, side, -0.3};  // where the lamp that is before it shows itself
+      EXPECT_EQ(share(origin, normalize(Vec3d{0, 0, 0} - origin)), 0);
+      EXPECT_GT(share({0, side * 0.5, 0}, {0, 0, -1}), 0);  // the wall
+    }
   }
 }
 

@@ -371,6 +371,28 @@ TEST(Shapes, FlippingAndMirroring) {
       EXPECT_EQ(dot(ball.normals[ball.normal_ids[f][0]], p) > 0, flipped);
     }
   }
+  // So is a mesh with computed normals; one with normals of its file keeps its outside, and faces
+  // that read none of them are turned.
+  const TempFiles files;
+  const std::string plain = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+  const std::string bare = files.write("bare.obj", plain + "f 1 2 3\n");
+  const std::string with = files.write("with.obj", plain + "vn 0 0 1\nf 1//1 2//1 3//1\n");
+  const std::string flat = "<boolean name=\"face_normals\" value=\"true\"/>";
+  const auto facing = [&](const std::string& file, const std::string& body) {
+    const Mesh mesh = shape_mesh("<shape type=\"obj\"><string name=\"filename\" value=\"" + file +
+                                 "\"/>" + body + "</shape>");
+    const double up = area_vector(mesh).z;
+    for (const FaceIndices& ids : mesh.normal_ids) {
+      EXPECT_EQ(mesh.normals[ids[0]].z, up > 0 ? 1 : -1);
+    }
+    return up;
+  };
+  EXPECT_EQ(facing(bare, mirror), -0.5);
+  EXPECT_EQ(facing(bare, flip + mirror), 0.5);
+  EXPECT_EQ(facing(with, mirror), 0.5);
+  EXPECT_EQ(facing(with, turned), -0.5);
+  EXPECT_EQ(facing(with, flip + mirror), -0.5);
+  EXPECT_EQ(facing(with, flat + mirror), -0.5);
   const Mesh sphere = shape_mesh("<shape type=\"sphere\">" + flip + "</shape>");
   for (size_t f = 0; f < sphere.faces.size(); f += 100) {
     for (int c = 0; c < 3; ++c) {

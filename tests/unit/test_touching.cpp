@@ -139,6 +139,38 @@ TEST(Overlaps, AreInOnePlaneAndMoreThanASide) {
   }
 }
 
+TEST(Overlaps, InOnePlaceWithSome) {
+  Scene scene;
+  scene.shapes.resize(4);
+  scene.shapes[0].mesh = grid_mesh(4);
+  scene.shapes[1].mesh = grid_mesh(4);  // copies
+  const Vec3d rows[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  scene.shapes[2].mesh = transformed(grid_mesh(3), rows, 1, {0.1, 0.3, 0});
+  scene.shapes[3].mesh = transformed(grid_mesh(3), rows, 1, {0.1, 0.3, 1});
+  const FaceCopies copies(scene);
+  const FaceOverlaps overlaps(scene, copies, 1);
+  std::vector<FaceRef> all;
+  for (uint32_t s = 0; s < 4; ++s)
+    for (uint32_t f = 0; f < scene.shapes[s].mesh.faces.size(); ++f)
+      all.push_back({ShapeId(s), FaceId(f)});
+  Rng rng(8, 0, 0);
+  size_t found = 0;
+  for (int i = 0; i < 20; ++i) {
+    std::vector<FaceRef> some;
+    for (int k = 0; k < i % 4; ++k)
+      some.push_back(all[static_cast<size_t>(rng.uniform() * static_cast<double>(all.size()))]);
+    const FaceOverlaps::Set set = overlaps.in_place_of(some);
+    for (const FaceRef face : all) {
+      const bool expected = std::any_of(some.begin(), some.end(), [&](FaceRef one) {
+        return one == face || overlaps.contains(one, face);
+      });
+      EXPECT_EQ(set.contains(face), expected);
+      found += expected;
+    }
+  }
+  EXPECT_GT(found, 100u);
+}
+
 TEST(Touching, ABoxStandsOnTheFloor) {
   Rng rng(2, 0, 0);
   for (int i = 0; i < 20; ++i) {

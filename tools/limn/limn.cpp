@@ -52,9 +52,10 @@ void check_command(const CLI::App& app, int argc, char** argv) {
 // given back for the next ones. It settles that before main: the program starts anew, with the wish
 // in its environment. Small arrays profit as well as large ones, and set-up meets a twentieth of
 // the page faults (scenes/FIGURES.md). Who has other wishes in GLIBC_TUNABLES keeps them; under a
-// tool that does not follow into the second start any value there prevents it.
+// tool that does not follow into the second start any value there prevents it. Help and version
+// need none, and the malloc of sanitizers knows no such wish.
 void use_huge_pages([[maybe_unused]] char** argv) {
-#ifdef __GLIBC__
+#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
   constexpr const char* kName = "GLIBC_TUNABLES";
   constexpr const char* kWish =
       "glibc.malloc.hugetlb=1:glibc.malloc.mmap_threshold=33554432:"
@@ -62,8 +63,9 @@ void use_huge_pages([[maybe_unused]] char** argv) {
   const char* wish = std::getenv(kName);
   if (wish) {
     if (std::string(wish) == kWish) unsetenv(kName);  // not for programs that this one starts
-  } else if (getauxval(AT_SECURE) == 0 &&             // else the wish would be taken away each time
-             getauxval(AT_BASE) != 0) {  // else the loader was started, with this as its program
+  } else if (argv[0] && argv[1] && argv[1][0] != '-' &&
+             getauxval(AT_SECURE) == 0 &&  // else the wish would be taken away each time
+             getauxval(AT_BASE) != 0) {    // else the loader was started, with this as its program
     setenv(kName, kWish, 1);
     std::error_code none;
     const std::string self = std::filesystem::read_symlink("/proc/self/exe", none).string();

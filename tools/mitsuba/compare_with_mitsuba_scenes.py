@@ -28,6 +28,7 @@ SIZE = '<integer name="width" value="{}"/><integer name="height" value="{}"/>'
 BOX = '<rfilter type="box"/>'
 GREY = '<bsdf type="diffuse"><rgb name="reflectance" value="0.7,0.5,0.3"/></bsdf>'
 CLAY = '<bsdf type="diffuse"><rgb name="reflectance" value="0.6,0.4,0.5"/></bsdf>'
+GLOW = '<emitter type="area"><rgb name="radiance" value="2,3,1"/></emitter>'
 CUBE = """<shape type="cube"><transform name="to_world"><scale value="0.6"/><rotate y="1" angle="30"/>
     <translate x="-1" y="0.8"/></transform><bsdf type="diffuse"/></shape>"""
 LAMP = """<shape type="rectangle"><transform name="to_world"><rotate x="1" angle="{angle}"/>
@@ -58,8 +59,8 @@ MESH = """<shape type="obj"><string name="filename" value="{file}"/>
     <translate x="0.8" y="0.9"/></transform>{bsdf}</shape>"""
 
 
-def write_sphere(file, rings, columns):
-    """A coarse unit sphere without normals; the vertices are shared."""
+def write_sphere(file, rings, columns, normals=False):
+    """A coarse unit sphere, without normals or with the sphere's own; the vertices are shared."""
     lines = ["v 0 1 0"]
     for i, j in itertools.product(range(1, rings), range(columns)):
         a, b = np.pi * i / rings, 2 * np.pi * j / columns
@@ -73,6 +74,24 @@ def write_sphere(file, rings, columns):
         for i in range(1, rings - 1):
             lines += [f"f {at(i, j)} {at(i + 1, j)} {at(i + 1, j + 1)}",
                       f"f {at(i, j)} {at(i + 1, j + 1)} {at(i, j + 1)}"]
+    if normals:
+        lines = [f"f {' '.join(f'{v}//{v}' for v in line.split()[1:])}" if line[0] == "f" else
+                 f"{line}\n{line.replace('v', 'vn')}" for line in lines]
+    with open(file, "w") as out:
+        out.write("\n".join(lines) + "\n")
+
+
+def write_octahedron(file):
+    """A PLY file; its vertices have the normals of their faces."""
+    corners = []
+    for x, y, z in itertools.product((1, -1), repeat=3):
+        face = np.diag([x, y, z])[::x * y * z]
+        corners += [[*corner, x, y, z] for corner in face]
+    kinds = "".join(f"property float {n}\n" for n in ("x", "y", "z", "nx", "ny", "nz"))
+    lines = [f"ply\nformat ascii 1.0\nelement vertex 24\n{kinds}element face 8\n"
+             "property list uchar int vertex_index\nend_header"]
+    lines += [" ".join(map(str, corner)) for corner in corners]
+    lines += [f"3 {i} {i + 1} {i + 2}" for i in range(0, 24, 3)]
     with open(file, "w") as out:
         out.write("\n".join(lines) + "\n")
 
@@ -100,6 +119,10 @@ def cases(folder):
     sphere = os.path.join(folder, "sphere.obj")
     sky = os.path.join(folder, "sky.exr")
     write_sphere(sphere, 5, 8)
+    smooth = os.path.join(folder, "smooth.obj")
+    write_sphere(smooth, 5, 8, normals=True)
+    octahedron = os.path.join(folder, "octahedron.ply")
+    write_octahedron(octahedron)
     write_sky(sky, 32, 16)
     envmap = f"""<emitter type="envmap"><string name="filename" value="{sky}"/>
         <float name="scale" value="1.5"/><transform name="to_world"><rotate x="1" angle="50"/>
@@ -153,12 +176,20 @@ def cases(folder):
     yield "hide_emitters", {"integrator": DEPTH.format(3, 1000) +
                             '<boolean name="hide_emitters" value="true"/>',
                             "objects": CUBE + VISIBLE_LAMP}, []
-    for axis, kind in itertools.product("xz", ("rectangle", "disk", "cube", "sphere")):
-        for flip in ("false", "true"):
-            mirrored = f"""<shape type="{kind}"><boolean name="flip_normals" value="{flip}"/>
+    shapes = {kind: f'<shape type="{kind}">' for kind in ("rectangle", "disk", "cube", "sphere")}
+    for kind, file in (("obj", sphere), ("obj with normals", smooth),
+                       ("ply with normals", octahedron)):
+        shapes[kind] = f"""<shape type="{kind[:3]}"><string name="filename" value="{file}"/>"""
+    for (kind, start), flip in itertools.product(shapes.items(), ("false", "true")):
+        kinds = [("x", "", CLAY), ("z", "", CLAY)]
+        # Light of interpolated normals differs by up to a percent, mirrored or not.
+        kinds += [] if kind.startswith("obj") else [("x", " lamp", GLOW)]
+        for axis, of, on in kinds:
+            mirrored = f"""{start}<boolean name="flip_normals" value="{flip}"/>
                 <transform name="to_world"><scale {axis}="-1"/><scale value="0.9"/><rotate y="1" angle="15"/>
-                <translate x="0.3" y="1" z="0.5"/></transform>{CLAY}</shape>"""
-            yield f"mirrored {kind} {axis} flip {flip}", {"objects": mirrored}, []
+                <translate x="0.3" y="1" z="0.5"/></transform>{on}</shape>"""
+            yield f"mirrored {kind}{of} {axis} flip {flip}", {"objects": mirrored}, \
+                ["--shading", "mitsuba"] if kind.startswith("obj") else []
     for kind, bsdf in (("diffuse", GREY), ("twosided", f'<bsdf type="twosided">{GREY}</bsdf>'),
                        ("ggx", CONDUCTOR.format(distribution="ggx", alpha=0.15))):
         mesh = MESH.format(file=sphere, flat="false", scale=0.8, bsdf=bsdf)

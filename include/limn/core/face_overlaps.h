@@ -1,6 +1,7 @@
 #pragma once
 // Faces that overlap in a plane, or lie one above the other so close that rays in floats meet
 // either of them: a rule has to say which one is met, or double precision.
+#include <algorithm>
 #include <optional>
 #include <span>
 #include <unordered_map>
@@ -37,6 +38,19 @@ class FaceOverlaps {
   }
   // Whether two faces lie in one place: copies, too.
   bool contains(FaceRef a, FaceRef b) const;
+  // Faces that are asked for one by one: the time goes with the logarithm of their number.
+  class Set {
+   public:
+    bool contains(FaceRef face) const {
+      return std::binary_search(keys_.begin(), keys_.end(), key(face));
+    }
+
+   private:
+    friend FaceOverlaps;
+    std::vector<uint64_t> keys_;  // sorted
+  };
+  // Those that lie in one place with any of `faces`, as contains() says, and these themselves.
+  Set in_place_of(std::span<const FaceRef> faces) const;
   // Of the faces in a hit's place, copies among them, that which the ray meets (is_met_first),
   // after near ones that are met before it.
   void settle(const Ray& ray, Hit& hit) const;
