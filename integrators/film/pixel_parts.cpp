@@ -16,6 +16,11 @@ namespace {
 // rounding there. Not tuned.
 constexpr double kFar = 0.25;
 
+// Below this area [pixels^2] a centroid is rounding. What lies on a border has no area but sides
+// that sweep one: it is taken for kNoArea, far below rounding, with the middle of its box for a
+// centroid, whose motion tells, to first order, the light where the sides are. Not tuned.
+constexpr double kLeastArea = 0x1p-40, kNoArea = 0x1p-56;
+
 // Of what the middle of a side adds, by how many steps of the grid it lies within the window: half
 // on the pixel's border, one step in, as in the pixel beyond.
 double share_of(const PlanePoint& middle) {
@@ -224,16 +229,17 @@ void PixelParts::find(int x, int y, const VisibleRegions& regions, bool moving) 
 template <class S>
 FacePart<S> PixelParts::part(size_t i, const Scene& seeded, const CameraView<S>& view) const {
   const Part& part = parts_[i];
+  const bool has_area = std::fabs(part.area) > kLeastArea;
+  const double area = has_area ? part.area : kNoArea;
   // Within the box that holds it: of a sliver it may be off by rounding.
   const auto centroid = [&](double moment, double from, double to) {
-    const double c = moment / part.area;
-    return c >= from && c <= to ? c : 0.5 * (from + to);
+    const double c = moment / area;
+    return has_area && c >= from && c <= to ? c : 0.5 * (from + to);
   };
   const double x = centroid(part.mx, part.x0, part.x1), y = centroid(part.my, part.y0, part.y1);
-  FacePart<S> result{pixels_.face_of(part.label), part.area, center_.x + x, center_.y + y};
+  FacePart<S> result{pixels_.face_of(part.label), area, center_.x + x, center_.y + y};
   if constexpr (!std::is_same_v<S, double>) {
-    const bool has_centroid = part.area > 0x1p-60;
-    const double inverse = has_centroid ? 1 / part.area : 0;
+    const double inverse = 1 / area;
     const bool still_camera = view.is_still();
     const auto plane = view.plane(center_.x, center_.y);
     std::vector<std::pair<Vec3<S>, const Weights*>> lines;

@@ -45,7 +45,7 @@ class PixelParts {
   size_t size() const { return parts_.size(); }
 
   // seeded: the scene, with tangents for Dual; for Var that of the tape's slots. view: of its
-  // camera. The derivative of a centroid is not looked at where the area is below 2^-60.
+  // camera.
   template <class S>
   FacePart<S> part(size_t i, const Scene& seeded, const CameraView<S>& view) const;
 

@@ -210,8 +210,8 @@ class BackwardCommand final : public Command {
     write_json(files_.json, report.dump(2));
     if (!common_.json.empty()) write_json(common_.json, report.dump(2));
     if (!common_.quiet) {
-      fmt::print("{}: {}, {:.2f} s, of which {:.2f} s set-up\n", files_.json,
-                 work_of(result.spp), result.seconds, result.setup_seconds);
+      fmt::print("{}: {}, {:.2f} s, of which {:.2f} s set-up\n", files_.json, work_of(result.spp),
+                 result.seconds, result.setup_seconds);
     }
     if (stats_) print_stats(result);
   }
