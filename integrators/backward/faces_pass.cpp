@@ -31,8 +31,6 @@ class FacesPass {
         closed_(parameters_.scene(), settings.threads),
         path_{parameters_.scene(), *tracer_, lights_, &closed_} {
     selected_terms({kFacesTerm}, options.terms, scene.file);
-    if (!settings.store) return;
-    throw InputError("a run over faces is one pass without samples: it has no parts");
   }
 
   BackwardResult run() {
@@ -92,13 +90,17 @@ class FacesPass {
         t, settings_.interrupted, [&](int x, int y) { return !is_black(adjoint_at(x, y)); },
         [&](int x, int y, const VisibleRegions& regions) {
           parts.find(x, y, regions, true);
-          for (size_t i = 0; i < parts.size(); ++i) {
-            ++figures.cost.samples;
-            if (!add_part(parts, i, adjoint_at(x, y), tape, list)) {
-              figures.bad.add({x, y, 0, kFacesTerm});
-            }
+          figures.cost.samples += parts.size();
+          const size_t before = list.size();
+          bool finite = true;
+          for (size_t i = 0; i < parts.size() && finite; ++i) {
+            finite = add_part(parts, i, adjoint_at(x, y), tape, list);
             figures.tape_bytes = std::max<uint64_t>(figures.tape_bytes, tape.bytes());
           }
+          if (finite) return;
+          // Nothing of the pixel, as in forward mode.
+          list.resize(before);
+          figures.bad.add({x, y, 0, kFacesTerm});
         });
     join_slots(list);
     figures.cost.seconds += watch.seconds();

@@ -16,6 +16,22 @@ namespace {
 // rounding there. Not tuned.
 constexpr double kFar = 0.25;
 
+// Below this area [pixels^2] a centroid is rounding. What lies on a border has no area but sides
+// that sweep one: it is taken for kNoArea, far below rounding, with the middle of its box for a
+// centroid, whose motion tells, to first order, the light where the sides are. Not tuned.
+constexpr double kLeastArea = 0x1p-40, kNoArea = 0x1p-56;
+
+// Of what the middle of a side adds, by how many steps of the grid it lies within the window: half
+// on the pixel's border, one step in, as in the pixel beyond.
+double share_of(const PlanePoint& middle) {
+  double share = 1;
+  for (const double t : {middle.x, middle.y}) {
+    const double steps = std::round((0.5 + kPixelMargin - std::fabs(t)) / kPixelMargin);
+    share *= std::clamp(0.5 * steps, 0.0, 1.0);
+  }
+  return share;
+}
+
 double at(const Vec3d& line, const PlanePoint& p) { return line.x * p.x + line.y * p.y + line.z; }
 
 PlanePoint foot(const Vec3d& line, const PlanePoint& p) {
@@ -100,8 +116,9 @@ Vec3<S> PixelParts::line(const Scene& scene, const CameraView<S>& view,
 
 PixelParts::TrueSide PixelParts::true_side(const Side& side) const {
   const PlaneFunction& f = side.line;
+  const auto sign = [](double x) { return x > 0 ? 1.0 : x < 0 ? -1.0 : 0.0; };
+  if (side.label == VisibleRegions::kNothing) return {{sign(f.a), sign(f.b), 0.5}, true, false};
   const Vec3d rounded{f.a, f.b, f.at(center_)};
-  if (side.label == VisibleRegions::kNothing) return {rounded, true, false};
   const Vec3d l = line<double>(scene_, view_, plane_, side);
   const double along = l.x * rounded.x + l.y * rounded.y;
   if (!(along != 0)) return {rounded, true, false};  // an edge seen end-on
@@ -114,9 +131,11 @@ void PixelParts::add_region(uint32_t label, std::span<const PlanePoint> corners,
   ring_.clear();
   for (const Side& side : sides) ring_.push_back(true_side(side));
   corners_.clear();
+  const auto on_grid = [&](size_t i) {
+    return PlanePoint{corners[i % n].x - center_.x, corners[i % n].y - center_.y};
+  };
   for (size_t i = 0; i < n; ++i) {
-    const PlanePoint rounded{corners[i].x - center_.x, corners[i].y - center_.y};
-    corners_.push_back(meet(ring_[i == 0 ? n - 1 : i - 1].line, ring_[i].line, rounded));
+    corners_.push_back(meet(ring_[i == 0 ? n - 1 : i - 1].line, ring_[i].line, on_grid(i)));
   }
   Part& part = parts_.emplace_back(Part{label});
   const PlanePoint& first = corners_[0];
@@ -134,7 +153,9 @@ void PixelParts::add_region(uint32_t label, std::span<const PlanePoint> corners,
     const double along = std::hypot(side.line.x, side.line.y);
     // Signed: where the true lines have another order than those of the grid, it runs back.
     const double length = ((q.x - p.x) * side.line.y - (q.y - p.y) * side.line.x) / along;
-    const double scale = (side.flipped ? -1 : 1) * length / along;
+    const PlanePoint from = on_grid(i), to = on_grid(i + 1);
+    const double share = share_of({0.5 * (from.x + to.x), 0.5 * (from.y + to.y)});
+    const double scale = (side.flipped ? -share : share) * length / along;
     const double x = 0.5 * (p.x + q.x), y = 0.5 * (p.y + q.y);
     const double dx = 0.5 * (q.x - p.x), dy = 0.5 * (q.y - p.y);
     const double xx = x * x + dx * dx / 3, xy = x * y + dx * dy / 3, yy = y * y + dy * dy / 3;
@@ -208,16 +229,17 @@ void PixelParts::find(int x, int y, const VisibleRegions& regions, bool moving) 
 template <class S>
 FacePart<S> PixelParts::part(size_t i, const Scene& seeded, const CameraView<S>& view) const {
   const Part& part = parts_[i];
+  const bool has_area = std::fabs(part.area) > kLeastArea;
+  const double area = has_area ? part.area : kNoArea;
   // Within the box that holds it: of a sliver it may be off by rounding.
   const auto centroid = [&](double moment, double from, double to) {
-    const double c = moment / part.area;
-    return c >= from && c <= to ? c : 0.5 * (from + to);
+    const double c = moment / area;
+    return has_area && c >= from && c <= to ? c : 0.5 * (from + to);
   };
   const double x = centroid(part.mx, part.x0, part.x1), y = centroid(part.my, part.y0, part.y1);
-  FacePart<S> result{pixels_.face_of(part.label), part.area, center_.x + x, center_.y + y};
+  FacePart<S> result{pixels_.face_of(part.label), area, center_.x + x, center_.y + y};
   if constexpr (!std::is_same_v<S, double>) {
-    const bool has_centroid = part.area > 0x1p-60;
-    const double inverse = has_centroid ? 1 / part.area : 0;
+    const double inverse = 1 / area;
     const bool still_camera = view.is_still();
     const auto plane = view.plane(center_.x, center_.y);
     std::vector<std::pair<Vec3<S>, const Weights*>> lines;

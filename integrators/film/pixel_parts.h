@@ -8,6 +8,11 @@
 // an edge, or through the line where two planes meet. So values of different scenes differ by what
 // has moved, not by rounding to the grid, and the derivative is that of the very value. After Zhou,
 // Wu, Ramamoorthi, Yan 2021, with lines in place of corners.
+//
+// A line on the border of two pixels moves into one or the other, and the area that it sweeps is
+// this one's alone: each pixel has a kink there, their sum has none. What is told is the mean of
+// both sides, half in each pixel. So regions are found a step of the grid beyond the pixel, where
+// such a line is inside of both, and are cut by the pixel's own border where they are summed.
 #include <vector>
 
 #include "integrators/film/pixel_regions.h"
@@ -15,6 +20,9 @@
 #include "limn/core/var.h"
 
 namespace limn {
+
+// How far regions reach beyond a pixel [pixels]: a step of their grid.
+inline constexpr double kPixelMargin = 0x1p-30;
 
 // The visible part of a face in a pixel, in one piece or several.
 template <class S>
@@ -27,6 +35,7 @@ struct FacePart {
 // Of one pixel at a time.
 class PixelParts {
  public:
+  // pixels: those of a user with the margin kPixelMargin.
   PixelParts(const Scene& scene, const PixelRegions& pixels)
       : scene_(scene), pixels_(pixels), view_(scene.camera), plane_(view_.plane(0, 0)) {}
 
@@ -36,7 +45,7 @@ class PixelParts {
   size_t size() const { return parts_.size(); }
 
   // seeded: the scene, with tangents for Dual; for Var that of the tape's slots. view: of its
-  // camera. The derivative of a centroid is not looked at where the area is below 2^-60.
+  // camera.
   template <class S>
   FacePart<S> part(size_t i, const Scene& seeded, const CameraView<S>& view) const;
 
@@ -58,7 +67,7 @@ class PixelParts {
     Side line;
     Weights weights;
   };
-  // A side of a region, its line positive inside. still: it lies on the pixel's border.
+  // A side of a region, its line positive inside. still: it is the pixel's own border.
   struct TrueSide {
     Vec3d line;
     bool still, flipped;

@@ -130,7 +130,7 @@ bool PixelRegions::for_each_pixel(size_t t, const std::atomic<bool>* interrupted
     for (int x = tile.x0; x < tile.x1; ++x) {
       if (interrupted && interrupted->load(std::memory_order_relaxed)) return false;
       if (!wanted(x, y)) continue;
-      regions.reset({{x + 0.5, y + 0.5}, 0.5, 0.5});
+      regions.reset({{x + 0.5, y + 0.5}, 0.5 + user_.margin, 0.5 + user_.margin});
       for (const auto& [f, nearest] : lists.of(x, y)) {
         if (!ruled && nearest < regions.hidden_below()) break;
         regions.insert(faces[f]);
@@ -163,6 +163,7 @@ std::optional<SeenFace> PixelRegions::see(uint32_t label) const {
   if (seen) seen->ruled = !overlaps_.of(face).empty();
   return seen;
 }
+
 // Of faces in one plane that which a ray would meet is seen.
 std::optional<bool> PixelRegions::rule(uint32_t a, uint32_t b) const {
   const FaceRef first = face_of(a), second = face_of(b);

@@ -107,7 +107,7 @@ Fit::Impl::Impl(std::vector<FitView> all, const FitOptions& options, const RunSe
   if (!over_faces()) {
     warn_of_hair_gaps(views[0].scene, settings.spp, settings.threads, warnings);
   }
-  if (options.loss == LossKind::kL1) {
+  if (options.loss == LossKind::kL1 && !over_faces()) {
     warnings.push_back(
         "the gradient of l1 is biased where the image's noise is not small beside its difference "
         "from the target");

@@ -149,7 +149,7 @@ void ClosedLight::find_regions(const LampPlane& lamp, const Receiver& receiver,
 // Which way round faces are seen on the grid, where doubles tell. A side between two that are
 // turned alike cancels, so that most faces need not be looked at any closer.
 void ClosedLight::find_turns(const LampPlane& lamp, const Receiver& receiver,
-                             Scratch& scratch) const {
+                             const Scratch& scratch, Turns& turns) const {
   const Vec3d a = -lamp.plane.n, &p = receiver.p;
   const double x_steps = kGridHalf / scratch.window.half_width,
                y_steps = kGridHalf / scratch.window.half_height;
@@ -157,8 +157,8 @@ void ClosedLight::find_turns(const LampPlane& lamp, const Receiver& receiver,
   const auto size_of = [](const Vec3d& x) {
     return std::fabs(x.x) + std::fabs(x.y) + std::fabs(x.z);
   };
-  scratch.turns.resize(tree_.size());
-  ++scratch.query;
+  turns.of.resize(tree_.size());
+  ++turns.query;
   // Farther out the grid's coordinates are themselves off by half a step.
   constexpr double kMostSteps = 0x1p48;
   const PlanePoint& center = scratch.window.center;
@@ -183,31 +183,31 @@ void ClosedLight::find_turns(const LampPlane& lamp, const Receiver& receiver,
     const double error = far * far * far * 8 * (steps * side * (near + reach) + near * near);
     const double size = std::fabs(volume) - 0x1p-46 * side * side * reach;
     if (!(size * both * near * near > error)) continue;
-    scratch.turns[tree_.index_of(*item)] = 2 * scratch.query + (volume > 0 ? 1 : 0);
+    turns.of[tree_.index_of(*item)] = 2 * turns.query + (volume > 0 ? 1 : 0);
   }
 }
 
 // Whether it was found to be whole, turned one way. Then it must not be cut: cancelled sides are
 // those of the whole face.
-bool ClosedLight::has_turn(const FaceTree::Item& item, const Scratch& scratch) const {
-  return scratch.turns[tree_.index_of(item)] >= 2 * scratch.query;
+bool ClosedLight::has_turn(const FaceTree::Item& item, const Turns& turns) const {
+  return turns.of[tree_.index_of(item)] >= 2 * turns.query;
 }
 
 // By bits: the sides of a face that cancel.
-uint32_t ClosedLight::cancelled_sides(const FaceTree::Item& item, const Scratch& scratch) const {
-  if (!has_turn(item, scratch)) return 0;
-  const uint64_t turn = scratch.turns[tree_.index_of(item)];
+uint32_t ClosedLight::cancelled_sides(const FaceTree::Item& item, const Turns& turns) const {
+  if (!has_turn(item, turns)) return 0;
+  const uint64_t turn = turns.of[tree_.index_of(item)];
   uint32_t sides = 0;
   for (uint32_t k = 0; k < 3; ++k) {
     const uint32_t other = item.neighbours[k];
-    if (other != FaceTree::kNone && scratch.turns[other] == turn) sides |= 1u << k;
+    if (other != FaceTree::kNone && turns.of[other] == turn) sides |= 1u << k;
   }
   return sides;
 }
 
 // False if a corner is too far out.
-bool ClosedLight::find_outlines(const LampPlane& lamp, const Receiver& receiver,
-                                Scratch& scratch) const {
+bool ClosedLight::find_outlines(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch,
+                                Turns& turns) const {
   using Point = ShadowOutlines::Point;
   const Vec3d a = -lamp.plane.n;
   const PlaneWindow& window = scratch.window;
@@ -223,11 +223,11 @@ bool ClosedLight::find_outlines(const LampPlane& lamp, const Receiver& receiver,
   const auto clip = [&](const auto& height, uint32_t line) { scratch.clip(height, line, on_grid); };
   scratch.outlines.clear();
   scratch.cut_points.clear();
-  find_turns(lamp, receiver, scratch);
+  find_turns(lamp, receiver, scratch, turns);
   for (uint32_t label = 0; label < scratch.faces.size(); ++label) {
     const bool listed = label >= scratch.first_item;
     const FaceTree::Item* item = listed ? scratch.items[label - scratch.first_item] : nullptr;
-    const uint32_t cancelled = item ? cancelled_sides(*item, scratch) : 0;
+    const uint32_t cancelled = item ? cancelled_sides(*item, turns) : 0;
     if (cancelled == 7) continue;
     const FaceRef ref = scratch.faces[label];
     const auto corners = face_corners<double>(scene_.shape(ref.shape).mesh, ref.face);
@@ -239,7 +239,7 @@ bool ClosedLight::find_outlines(const LampPlane& lamp, const Receiver& receiver,
         {depth(scratch.polygon[0]), depth(scratch.polygon[1]), depth(scratch.polygon[2])});
     const double near = scratch.near, far = scratch.far;
     // Not by these depths, which may be rounded otherwise than those that its turn was found by.
-    const bool whole = item && has_turn(*item, scratch);
+    const bool whole = item && has_turn(*item, turns);
     if (!whole && nearest < near) {
       clip([&](const Vec3d& w) { return dot(w, a) - near; }, line + Scratch::kNearCut);
     }
@@ -456,17 +456,23 @@ class ClosedLight::View {
 };
 
 // What the point sees of the lamp, in the scratch; as it is there if the same was asked for last.
-void ClosedLight::find(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const {
+void ClosedLight::find(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch,
+                       Turns& turns) const {
   Scratch::Found& last = scratch.last;
-  const bool same = last.places == places_->number && last.by == by_ && last.p == receiver.p &&
-                    last.up == receiver.up && last.face == receiver.face && !receiver.edge &&
-                    last.lamp == lamp.faces;
-  if (same) return;
-  last = {
-      receiver.edge ? 0 : places_->number, by_, receiver.p, receiver.up, receiver.face, lamp.faces};
+  const bool held = holds() && !receiver.edge;
+  if (held && last.places == places_->number && last.by == by_ && last.p == receiver.p &&
+      last.up == receiver.up && last.face == receiver.face && last.lamp == lamp.faces) {
+    return;
+  }
+  last.places = 0;
+  if (held) {
+    last.places = places_->number;
+    last.by = by_, last.p = receiver.p, last.up = receiver.up, last.face = receiver.face;
+    last.lamp.assign(lamp.faces.begin(), lamp.faces.end());
+  }
   scratch.seen_at_all = list(lamp, receiver, scratch);
   if (!scratch.seen_at_all) return;
-  scratch.by_outlines = by_ != By::kRegions && find_outlines(lamp, receiver, scratch);
+  scratch.by_outlines = by_ != By::kRegions && find_outlines(lamp, receiver, scratch, turns);
   if (!scratch.by_outlines) find_regions(lamp, receiver, scratch);
 }
 
@@ -474,7 +480,11 @@ template <class S>
 Rgb<S> ClosedLight::scattered(const RayTracer& tracer, const SurfacePoint<S>& surface,
                               const Scattering<S>& scattering, const EdgeStart* edge) const {
   // On the heap: a shared library has little room for what belongs to threads.
-  static thread_local const auto owned = std::make_unique<std::array<Scratch, kHeld>>();
+  struct Space {
+    std::array<Scratch, kHeld> of_lamps;
+    Turns turns;
+  };
+  static thread_local const auto space = std::make_unique<Space>();
   static thread_local std::vector<PolygonSide<S>> sides;
   const bool front = dot(surface.n_g, value(scattering.wi())) > 0;
   Receiver receiver{value(surface.p), front ? surface.n_g : -surface.n_g, surface.face, edge};
@@ -489,8 +499,8 @@ Rgb<S> ClosedLight::scattered(const RayTracer& tracer, const SurfacePoint<S>& su
   for (size_t i = 0; i < lamps_.size(); ++i) {
     const LampPlane& lamp = lamps_[i];
     const Shape& shape = scene_.shape(lamp.shape);
-    Scratch& scratch = (*owned)[i % kHeld];
-    find(lamp, receiver, scratch);
+    Scratch& scratch = space->of_lamps[holds() ? i % kHeld : 0];
+    find(lamp, receiver, scratch, space->turns);
     if (!scratch.seen_at_all) continue;
     const View<S> view(*this, lamp, receiver, surface.p, scratch);
     sides.clear();

@@ -71,6 +71,7 @@ class ClosedLight {
     FaceTree tree;
   };
   struct Receiver;
+  struct Turns;
   struct Scratch;
   template <class S>
   class View;
@@ -82,11 +83,15 @@ class ClosedLight {
   bool is_skipped(FaceRef face, const Receiver& receiver) const;
   bool list(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;
   void find_regions(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;
-  void find_turns(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;
-  bool has_turn(const FaceTree::Item& item, const Scratch& scratch) const;
-  uint32_t cancelled_sides(const FaceTree::Item& item, const Scratch& scratch) const;
-  bool find_outlines(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;
-  void find(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;
+  void find_turns(const LampPlane& lamp, const Receiver& receiver, const Scratch& scratch,
+                  Turns& turns) const;
+  bool has_turn(const FaceTree::Item& item, const Turns& turns) const;
+  uint32_t cancelled_sides(const FaceTree::Item& item, const Turns& turns) const;
+  bool find_outlines(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch,
+                     Turns& turns) const;
+  // Whether what a point has seen of a lamp is kept: for others of the same scene.
+  bool holds() const { return places_.use_count() > 1; }
+  void find(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch, Turns& turns) const;
 
   const Scene& scene_;
   std::shared_ptr<const Places> places_;

@@ -20,6 +20,15 @@ struct ClosedLight::Receiver {
   std::optional<Vec3d> wedge = {};
 };
 
+// Which way round faces are seen, while outlines are found: as large as the tree, so there is one
+// for all lamps.
+struct ClosedLight::Turns {
+  // Of each item of the tree twice the query that last told it, and one more if it is seen from
+  // behind.
+  std::vector<uint64_t> of;
+  uint64_t query = 0;
+};
+
 struct ClosedLight::Scratch {
   // What the rest holds: of the lamp whose faces are the first of `faces`, as seen by a point.
   struct Found {
@@ -61,10 +70,6 @@ struct ClosedLight::Scratch {
 
   // By outlines.
   ShadowOutlines outlines;
-  // Of each item of the tree twice the query that last told which way round it is seen, and one
-  // more if it is seen from behind.
-  std::vector<uint64_t> turns;
-  uint64_t query = 0;
   std::vector<Corner> polygon, clipped;
   std::vector<ShadowOutlines::Point> points;
   std::vector<uint32_t> lines;

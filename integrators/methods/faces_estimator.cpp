@@ -95,12 +95,14 @@ bool FacesEstimator::add_derivatives(const PixelParts& parts, const PixelSample&
       if (!add_part(parts, i, group.scene, *group.view, *group.context, log, sums[g])) return false;
     }
   }
-  for (size_t g = 0; g < groups_.size(); ++g) {
-    const Rgb<Lanes> derivative{sums[g].r.d, sums[g].g.d, sums[g].b.d};
-    if (!is_finite(value(sums[g])) || !is_finite(derivative)) return false;
-    if (g == 0) sink.add_radiance(at, value(sums[0]), 1);
-    sink.add(g, at, derivative, 1);
+  const auto derivative = [](const Rgb<Dual>& sum) {
+    return Rgb<Lanes>{sum.r.d, sum.g.d, sum.b.d};
+  };
+  for (const Rgb<Dual>& sum : sums) {
+    if (!is_finite(value(sum)) || !is_finite(derivative(sum))) return false;
   }
+  sink.add_radiance(at, value(sums[0]), 1);
+  for (size_t g = 0; g < groups_.size(); ++g) sink.add(g, at, derivative(sums[g]), 1);
   return true;
 }
 

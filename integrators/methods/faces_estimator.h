@@ -15,7 +15,8 @@
 namespace limn {
 
 inline constexpr const char* kFacesTerm = "faces";
-inline constexpr RegionsUser kFacesUser{"a film seen by its faces", "--points random"};
+inline constexpr RegionsUser kFacesUser{"a film seen by its faces", "--points random",
+                                        kPixelMargin};
 
 // InputError unless the film has a box filter.
 void check_faces_film(const Film& film);

@@ -27,6 +27,9 @@ void check_points(FilmPoints points, bool closed_light, const std::string& metho
 
 RunSettings settings_for(FilmPoints points, RunSettings settings) {
   if (points != FilmPoints::kFaces) return settings;
+  if (settings.store) {
+    throw InputError("--points faces is one pass without samples: it has no parts");
+  }
   settings.spp = 1;
   settings.least_spp = 1;
   settings.seconds = 0;

@@ -47,7 +47,6 @@ void identify(const MethodType& method, const Scene& scene, const GradientOption
                                              : to_string(*options.samples));
   store.identify("warp", fmt::format("{} rays, kappa {}", options.warp.rays, options.warp.kappa));
   store.identify("film", options.exact_film ? "exact" : "rays");
-  store.identify("points", name_of(options.points));
   store.identify("step", fmt::format("{}", options.step));
 }
 

@@ -55,6 +55,11 @@ std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSet
   const RenderMethod& method = find_render_method(options.method);
   const bool even = is_even(options.sampler);  // checked for all
   check_points(options.points, method.closed_light, options.method);
+  if (!method.looks_around && options.what != RenderWhat::kImage) {
+    throw InputError(
+        fmt::format("the method \"{}\" knows radiance alone: how open the sky is say {}",
+                    options.method, join(names_of(looking_around()))));
+  }
   if (options.points == FilmPoints::kFaces) {
     if (options.exact_film)
       throw InputError(
@@ -67,11 +72,6 @@ std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSet
       throw InputError(fmt::format("--film exact: not with the method \"{}\"", options.method));
     }
     return std::make_unique<VisibilityEstimator>(scene, settings, method, options);
-  }
-  if (options.what != RenderWhat::kImage) {
-    throw InputError(
-        fmt::format("the method \"{}\" knows radiance alone: how open the sky is say {}",
-                    options.method, join(names_of(looking_around()))));
   }
   std::shared_ptr<const FilmRegions> visible;
   if (options.exact_film) {
@@ -88,7 +88,6 @@ void identify(BatchStore& store, const RenderOptions& options) {
   if (!method.looks_around) {
     store.identify("sampler", options.sampler);
     store.identify("film", options.exact_film ? "exact" : "rays");
-    store.identify("points", name_of(options.points));
     return;
   }
   store.identify("what", fmt::format("{}", static_cast<int>(options.what)));

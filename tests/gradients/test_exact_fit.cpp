@@ -306,6 +306,39 @@ TEST(Fit, QuasiNewtonOverFacesFindsWhatIsInView) {
   EXPECT_FALSE(noisy.warnings().empty());
 }
 
+// A square whose sides lie on borders of pixels goes either way.
+TEST(Fit, QuasiNewtonOverFacesLeavesBordersOfPixels) {
+  const TempFiles files;
+  const auto lamp_at = [&](double x, double y) {
+    SceneParts parts;
+    parts.max_depth = 1;
+    parts.origin = {0, 0, 8};
+    parts.target = {0, 0, 0};
+    parts.fov = 2 * std::atan(0.25) * 180 / kPi;
+    parts.width = parts.height = 8;
+    parts.film = R"(<rfilter type="box"/>)";
+    parts.body = square("lamp", 1, 0, {x, y, 0}, area_light("glow", "3, 2, 1"));
+    return make_scene(files, parts);
+  };
+  FitOptions options;
+  options.parameters = {"lamp.translate.x", "lamp.translate.y"};
+  options.optimiser = OptimiserKind::kLbfgs;
+  options.backward.sampler = "analytic";
+  options.backward.points = FilmPoints::kFaces;
+  for (const double x : {0.3, -0.3}) {
+    const double y = -0.7 * x;
+    Fit fit({{lamp_at(0, 0), faces_image(lamp_at(x, y)), {}}}, options, {});
+    for (int i = 0; i < 30; ++i) {
+      const auto record = fit.step();
+      ASSERT_TRUE(record);
+      EXPECT_TRUE(i > 0 || !record->at_rest);
+      if (record->at_rest) break;
+    }
+    EXPECT_NEAR(fit.scalars()[0].value, x, 1e-4);
+    EXPECT_NEAR(fit.scalars()[1].value, y, 1e-4);
+  }
+}
+
 FitView shadow_view(const TempFiles& files, double shift = -0.25) {
   const Scene truth = shadow_scene(files, false);
   return {shadow_scene(files, false, shift), target_of(truth), {}};

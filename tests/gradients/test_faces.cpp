@@ -10,6 +10,7 @@
 #include "limn/integrators/backward.h"
 #include "limn/integrators/check.h"
 #include "limn/integrators/gradient.h"
+#include "limn/integrators/parts.h"
 #include "limn/integrators/render.h"
 #include "support/meshes.h"
 #include "support/scenes.h"
@@ -153,8 +154,10 @@ TEST(Faces, TJunctionsAreTight) {
   }
 }
 
-// A lamp right behind another of the same outline, as the camera sees it: one step aside it shows.
-TEST(Faces, WhatBeginsToShowHasAOneSidedDerivative) {
+// A lamp right behind another of the same outline, as the camera sees it: one step aside it shows,
+// whichever way. The line between them is told to be the front's, which stands still: the slope in
+// the middle of both.
+TEST(Faces, WhatIsAboutToShowIsStill) {
   const TempFiles files;
   SceneParts parts = facing(1, 4);
   parts.body = square("front", 0.5, 0, {0, 0, 4}, area_light("dim", "1, 1, 1")) +
@@ -167,8 +170,80 @@ TEST(Faces, WhatBeginsToShowHasAOneSidedDerivative) {
   const double before = (here - image_of(p.moved(scene, -0x1p-8))[0]) * 0x1p8;
   EXPECT_NEAR(after, 9 * 2 / 16.0, 1e-3);
   EXPECT_NEAR(before, -9 * 2 / 16.0, 1e-3);
-  // One of both, or that of neither showing.
-  EXPECT_LE(std::fabs(d), std::fabs(after) + 1e-3);
+  EXPECT_EQ(d, 0);
+}
+
+double sum_of(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double v : values) sum += v;
+  return sum;
+}
+
+// Of a sum over pixels, at steps that floats hold exactly. There is no kink in it: each way it
+// changes alike.
+void expect_one_slope(const Scene& scene, const std::string& name, double told, double error) {
+  const Parameter p = find_parameter(scene, name);
+  const double h = 0x1p-14, here = sum_of(image_of(scene));
+  const double after = (sum_of(image_of(p.moved(scene, h))) - here) / h,
+               before = (here - sum_of(image_of(p.moved(scene, -h)))) / h;
+  EXPECT_NEAR(after, told, error) << name;
+  EXPECT_NEAR(before, told, error) << name;
+}
+
+// The corners of the lamp are those of pixels, so that its sides lie on borders, and the seam
+// between its faces leads through corners. What a side sweeps falls into one pixel or the other:
+// half of it is told in each, and their sum is the sum's derivative.
+TEST(Faces, HalfOfABordersMotionIsInEachPixel) {
+  const TempFiles files;
+  SceneParts parts = facing(4, 4);
+  parts.body = square("lamp", 1, 0, {0, 0, 0}, area_light("glow", "3, 2, 1"));
+  const Scene scene = make_scene(files, parts);
+  const std::vector<std::string> names = {"lamp.translate.x", "lamp.translate.y", "lamp.scale",
+                                          "sensor.translate.x", "sensor.fov"};
+  const GradientResult d = gradient_of(scene, names);
+  const double sides[] = {-0.5, -0.5, 0.5, 0.5}, fills[] = {0, 1, 1, 0};
+  // Of the half width of what the camera sees, 8 tan(fov / 2), by degrees.
+  const double wider = 8 * (1 + 1 / 16.0) * 0.5 * kPi / 180;
+  for (int y = 0; y < 4; ++y) {
+    for (int x = 0; x < 4; ++x) {
+      const size_t green = 3 * (4 * y + x) + 1;
+      const double h = fills[y], w = fills[x];
+      const double grows = 2 * (h * std::fabs(sides[x]) + w * std::fabs(sides[y]));
+      const double expected[] = {2 * h * sides[x], -2 * w * sides[y], grows, -2 * h * sides[x],
+                                 -grows * wider / 2};
+      for (size_t k = 0; k < names.size(); ++k) {
+        EXPECT_NEAR(d.parameters[k].total.mean(green), expected[k], 1e-6)
+            << names[k] << " " << x << " " << y;
+      }
+    }
+  }
+  // Of the second order a step of 2^-14 leaves some 1e-3.
+  for (size_t k = 0; k < names.size(); ++k) {
+    expect_one_slope(scene, names[k], sum_of(means(d.parameters[k].total)), 3e-3);
+  }
+  for (const char* name : {"lamp.vertex_positions.0.x", "lamp.vertex_positions.3.y"}) {
+    const std::vector<double> told = derivative_of(scene, name);
+    EXPECT_GT(size_of(told), 1);
+    expect_one_slope(scene, name, sum_of(told), 1e-3);
+    const Parameter p = find_parameter(scene, name);
+    EXPECT_LT(size_of(minus(difference_of(scene, p, 0x1p-14), told)), 1e-3) << name;
+  }
+}
+
+// The same whichever side of the border rounding may take it to, and wherever on the film.
+TEST(Faces, BordersAreFoundDespiteRounding) {
+  const TempFiles files;
+  for (const double off : {0.0, 1e-11, -1e-11, 2e-11, -2e-11}) {
+    SceneParts parts = facing(64, 4);
+    parts.body = square("lamp", 1, 0, {0, 0, 0}, area_light("glow", "1, 1, 1"));
+    Scene scene = make_scene(files, parts);
+    for (int k = 0; k < 3; ++k) scene.camera.origin[k].v += off * (k == 0);
+    const std::vector<double> d = derivative_of(scene, "lamp.translate.x");
+    for (int x : {15, 16, 47, 48}) {
+      EXPECT_NEAR(d[3 * (64 * 20 + x)], (x < 32 ? -0.5 : 0.5) * 16, 1e-4) << off << " " << x;
+    }
+    EXPECT_NEAR(sum_of(d), 0, 1e-6);
+  }
 }
 
 // Behind others nothing that moves is seen, and nothing comes of it, not even rounding.
@@ -234,14 +309,53 @@ void expect_own_differences(const Scene& scene, const std::vector<std::string>& 
   }
 }
 
+// Of every kind.
+const std::vector<std::string> kOfEveryKind = {"ring.translate.x",
+                                               "ball.translate.y",
+                                               "block.translate.z",
+                                               "floor.translate.y",
+                                               "lamp.translate.x",
+                                               "seen.translate.x",
+                                               "ring.vertex_positions.5.x",
+                                               "ball.vertex_positions.8.y",
+                                               "sensor.translate.x",
+                                               "sensor.translate.z",
+                                               "sensor.rotate.y",
+                                               "sensor.fov",
+                                               "clay.reflectance",
+                                               "grey.reflectance.g",
+                                               "glow.radiance",
+                                               "shine.radiance"};
+
 TEST(Faces, DerivativesAreThoseOfTheImage) {
   const TempFiles files;
+  expect_own_differences(crowd(files, 12, 0, false), kOfEveryKind);
+}
+
+// A plate with its sides on borders of pixels before a wall, or a wall of faces whose seams lie
+// there. What differences of kinks miss goes with the step.
+TEST(Faces, DerivativesOfAlignedBodiesAreThoseOfTheImage) {
+  const TempFiles files;
+  const std::string wall = write_mesh(files, "wall.obj", grid_mesh(16));
+  const auto scene_of = [&](const std::string& bodies) {
+    SceneParts parts = facing(16, 4);
+    parts.max_depth = 2;
+    parts.body =
+        bodies + square("lamp", 0.7, 180, {0.53, 0.41, 10}, area_light("glow", "60, 50, 40"));
+    return make_scene(files, parts);
+  };
+  const std::string grey = diffuse("grey", ".5, .6, .7"), red = diffuse("red", ".8, .2, .1");
   expect_own_differences(
-      crowd(files, 12, 0, false),
-      {"ring.translate.x", "ball.translate.y", "block.translate.z", "floor.translate.y",
-       "lamp.translate.x", "seen.translate.x", "ring.vertex_positions.5.x",
-       "ball.vertex_positions.8.y", "sensor.translate.x", "sensor.translate.z", "sensor.rotate.y",
-       "sensor.fov", "clay.reflectance", "grey.reflectance.g", "glow.radiance", "shine.radiance"});
+      scene_of(square("wall", 2.5, 10, {0.1, 0, 0}, area_light("dim", ".5, .6, .7")) +
+               square("plate", 0.5, 0, {0, 0, 4}, area_light("bright", "3, 2, 5"))),
+      {"plate.translate.x", "plate.translate.y", "plate.scale", "sensor.translate.x", "sensor.fov",
+       "dim.radiance"},
+      1e-4);
+  expect_own_differences(scene_of(obj_shape("wall", wall, true, 2, {0, 0, 0}, grey) +
+                                  square("plate", 0.5, 0, {0.06, 0.04, 4}, red)),
+                         {"plate.translate.x", "plate.translate.y", "plate.scale",
+                          "wall.translate.z", "sensor.translate.x", "sensor.rotate.z"},
+                         1e-4);
 }
 
 // At the rim of smooth bodies light is a quadrature, good to 1e-4 of what these few points send.
@@ -258,10 +372,30 @@ TEST(Faces, DerivativesAtAClipPlaneAreThoseOfTheImage) {
                                  "sensor.rotate.x", "sensor.fov"});
 }
 
-// What vertices say along a rotation is what the rotation says.
-TEST(Faces, ForwardAndReverseAreOne) {
+// The numbers of an array that a single coordinate, or a channel, is one of.
+double reverse_of(const BackwardResult& result, const std::string& name) {
+  for (const char* array : {".vertex_positions.", ".reflectance."}) {
+    const size_t at = name.find(array);
+    if (at == std::string::npos) continue;
+    const std::string whole = name.substr(0, at + std::string(array).size() - 1);
+    const std::string rest = name.substr(at + std::string(array).size());
+    const size_t channel = std::string("xyzrgb").find(rest.back()) % 3;
+    const size_t row = rest.size() > 1 ? std::stoul(rest) : 0;
+    return result.of(whole).moments.mean(3 * row + channel);
+  }
+  const Moments& m = result.of(name).moments;
+  double sum = 0;
+  for (size_t i = 0; i < m.size(); ++i) sum += m.mean(i);
+  return sum;
+}
+
+// Reverse mode finds all at once what forward mode finds one by one; at a clip plane, too.
+class ForwardAndReverse : public testing::TestWithParam<double> {};
+INSTANTIATE_TEST_SUITE_P(Faces, ForwardAndReverse, testing::Values(0, 4.25));
+
+TEST_P(ForwardAndReverse, AreOne) {
   const TempFiles files;
-  const Scene scene = crowd(files);
+  const Scene scene = crowd(files, 12, GetParam());
   Image adjoint(12, 12, 3);
   for (size_t i = 0; i < adjoint.data.size(); ++i) {
     adjoint.data[i] = static_cast<float>(Rng(5, i, 0).uniform() - 0.5);
@@ -276,14 +410,16 @@ TEST(Faces, ForwardAndReverseAreOne) {
     EXPECT_EQ(means(one.parameters[p].moments), means(three.parameters[p].moments));
     EXPECT_EQ(one.parameters[p].moments.variance(0), 0);
   }
-  for (const char* name : {"ring.rotate.y", "ball.scale", "sensor.rotate.z", "seen.rotate.x"}) {
+  std::vector<std::string> names = kOfEveryKind;
+  names.insert(names.end(), {"ring.rotate.y", "ball.scale", "sensor.rotate.z", "seen.rotate.x"});
+  for (const std::string& name : names) {
     const std::vector<double> d = derivative_of(scene, name);
     double sum = 0, size = 0;
     for (size_t i = 0; i < d.size(); ++i) {
       sum += d[i] * adjoint.data[i];
       size += std::fabs(d[i] * adjoint.data[i]);
     }
-    EXPECT_NEAR(one.of(name).moments.mean(0), sum, 1e-12 * size) << name;
+    EXPECT_NEAR(reverse_of(one, name), sum, 1e-12 * size) << name;
     EXPECT_NE(sum, 0) << name;
   }
 }
@@ -394,6 +530,69 @@ TEST(Faces, ChecksAgainstItsOwnImage) {
   EXPECT_LT(good.error, 1e-5);
 }
 
+// What is a hundredth off is told, and so is what differences cannot be trusted to have found.
+TEST(Faces, ChecksTellWhatIsOff) {
+  const TempFiles files;
+  const Scene scene = crowd(files, 12, 0, false);
+  const auto checked = [&](double factor, double step) {
+    CheckOptions options;
+    options.method = "analytic";
+    options.parameter = "ring.translate.x";
+    options.step = step;
+    return check_faces(scene, options, threads(1),
+                       [&](const Scene& s, const GradientOptions& o, const RunSettings& r) {
+                         GradientResult result = gradient(s, o, r);
+                         std::vector<double> image = means(result.parameters[0].total);
+                         for (double& v : image) v *= factor;
+                         result.parameters[0].total = Moments(image.size());
+                         result.parameters[0].total.add_exact(image);
+                         return result;
+                       });
+  };
+  EXPECT_EQ(checked(1, 0x1p-6).verdict, Verdict::kAgree);
+  EXPECT_EQ(checked(1.01, 0x1p-6).verdict, Verdict::kDisagree);
+  // Positions are floats: such steps are rounded by a part of them.
+  const FacesCheck small = checked(1, 3e-6);
+  EXPECT_GT(small.known, 1e-3);
+  EXPECT_LT(small.known, 0.2);
+  EXPECT_EQ(small.verdict, Verdict::kCannotTell);
+}
+
+// A pixel that is not finite adds nothing, whichever of many parameters or faces it is by.
+TEST(Faces, NothingIsAddedOfPixelsThatAreNotFinite) {
+  const TempFiles files;
+  SceneParts parts = facing(2, 2);
+  const auto lamp = [](const char* id, double x, const char* light) {
+    return square(id, 0.2, 0, {x, 0.5, 0}, area_light(std::string("of_") + id, light));
+  };
+  parts.body = lamp("a", -0.75, "1, 1, 1") + lamp("b", -0.3, "1, 1, 1") + lamp("c", 0.5, "1, 1, 1");
+  Scene scene = make_scene(files, parts);
+  find_parameter(scene, "of_b.radiance").move(scene, 1e300);  // more than files hold
+  std::string field;
+  for (size_t v = 0; v < scene.shapes[1].mesh.positions.size(); ++v) field += "1e38 0 0\n";
+  GradientOptions options;
+  options.parameters = {"of_a.radiance", "of_b.radiance", "of_c.radiance", "sensor.translate.x",
+                        "b.vertex_positions:" + files.write("far.txt", field)};
+  options.method = "analytic";
+  options.points = FilmPoints::kFaces;
+  const GradientResult d = gradient(scene, options, threads(1));
+  EXPECT_EQ(d.non_finite.count, 1u);
+  EXPECT_EQ(d.radiance.mean(0), 0);
+  for (const ParameterGradient& g : d.parameters) EXPECT_EQ(g.total.mean(0), 0) << g.name;
+  EXPECT_NEAR(d.parameters[2].total.mean(3), 0.16, 1e-6);
+
+  Image adjoint(2, 2, 3);
+  for (float& v : adjoint.data) v = 1;
+  for (int c = 0; c < 3; ++c) adjoint.data[c] = 1e38F;
+  BackwardOptions reverse;
+  reverse.sampler = "analytic";
+  reverse.points = FilmPoints::kFaces;
+  const BackwardResult r = backward(scene, adjoint, reverse, threads(1));
+  EXPECT_EQ(r.non_finite.count, 1u);
+  EXPECT_EQ(r.of("of_a.radiance").moments.mean(0), 0);
+  EXPECT_NEAR(r.of("of_c.radiance").moments.mean(0), 0.16, 1e-6);
+}
+
 TEST(Faces, RefusesWhatHasNone) {
   const TempFiles files;
   SceneParts parts = facing(2, 2);
@@ -408,11 +607,30 @@ TEST(Faces, RefusesWhatHasNone) {
   };
   const Scene scene = make_scene(files, parts);
   refuses([&] { render(scene, {}, {.points = FilmPoints::kFaces}); }, "\"path\" samples it");
+  refuses(
+      [&] {
+        render(scene, {},
+               {.method = "analytic",
+                .points = FilmPoints::kFaces,
+                .what = RenderWhat::kAmbientOcclusion});
+      },
+      "knows radiance alone");
   GradientOptions options;
   options.parameters = {"glow.radiance"};
   options.points = FilmPoints::kFaces;
   refuses([&] { gradient(scene, options, {}); }, "samples it");
   options.method = "analytic";
+  PartWriter writer({1, 2}, "", "");
+  RunSettings part;
+  part.store = &writer;
+  const char* kNoParts = "it has no parts";
+  refuses([&] { render(scene, part, {.method = "analytic", .points = FilmPoints::kFaces}); },
+          kNoParts);
+  refuses([&] { gradient(scene, options, part); }, kNoParts);
+  BackwardOptions reverse;
+  reverse.sampler = "analytic";
+  reverse.points = FilmPoints::kFaces;
+  refuses([&] { backward(scene, Image(2, 2, 3), reverse, part); }, kNoParts);
   options.terms = {"camera"};
   refuses([&] { gradient(scene, options, {}); }, "terms of this scene: faces");
   parts.film = R"(<rfilter type="gaussian"/>)";

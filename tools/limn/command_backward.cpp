@@ -74,7 +74,7 @@ class BackwardCommand final : public Command {
     check_points(options_.points, reverse_method(options_.sampler).closed, options_.sampler);
     refuse_samples(*app_, options_.points,
                    {"--spp", "--time", "--batches", "--pixels", "--edge-samples",
-                    "--camera-samples", "--shadow-samples"});
+                    "--camera-samples", "--shadow-samples", "--part"});
     if (!common_.part.empty()) return make_part(scene, command_line);
     files_ = plan_files(scene, options_.parameters, output_);
     if (target_.empty()) files_.adjoint = files_.adjoint_picture = "";
@@ -96,6 +96,11 @@ class BackwardCommand final : public Command {
   static int report_interrupted() {
     fmt::print(stderr, "interrupted before the first batch was done: nothing is written\n");
     return kInterrupted;
+  }
+
+  bool over_faces() const { return options_.points == FilmPoints::kFaces; }
+  std::string work_of(int64_t spp) const {
+    return over_faces() ? "of visible faces" : fmt::format("{} samples per pixel", spp);
   }
 
   static bool interrupted(const RunSettings& settings) { return settings.interrupted->load(); }
@@ -141,7 +146,7 @@ class BackwardCommand final : public Command {
     loss = image_loss(scene, target, kind, settings, {}, levels_,
                       {.method = reverse_method(options_.sampler).closed ? "analytic" : "path",
                        .points = options_.points});
-    if (kind == LossKind::kL1) {
+    if (kind == LossKind::kL1 && !over_faces()) {
       warnings_.add_all(
           {"the gradient of l1 is biased where the image's noise is not small beside "
            "its difference from the target"});
@@ -175,7 +180,7 @@ class BackwardCommand final : public Command {
                          {"spp", loss.spp},         {"seed", settings.seed},
                          {"loss", loss_json(loss)}, {"warnings", warnings_.lines()}};
     write_json(common_.json, report.dump(2));
-    if (!common_.quiet) fmt::print("{}: {} samples per pixel\n", files_.adjoint, loss.spp);
+    if (!common_.quiet) fmt::print("{}: {}\n", files_.adjoint, work_of(loss.spp));
     return kSuccess;
   }
 
@@ -189,11 +194,13 @@ class BackwardCommand final : public Command {
                    {"threads", settings.threads},
                    {"seconds", result.seconds},
                    {"setup_seconds", result.setup_seconds},
-                   {"pixels", options_.uniform_pixels ? kUniformPixels : kAdjointPixels},
                    {"sampler", options_.sampler},
                    {"points", name_of(options_.points)},
                    {"warnings", warnings_.lines()},
                    {"non_finite", result.non_finite.count}};
+    if (!over_faces()) {  // of a film seen by its faces every pixel is looked at
+      report["pixels"] = options_.uniform_pixels ? kUniformPixels : kAdjointPixels;
+    }
     if (!target_.empty()) {
       report["loss"] = loss_json(loss);
       print_loss(loss);
@@ -203,8 +210,8 @@ class BackwardCommand final : public Command {
     write_json(files_.json, report.dump(2));
     if (!common_.json.empty()) write_json(common_.json, report.dump(2));
     if (!common_.quiet) {
-      fmt::print("{}: {} samples per pixel, {:.2f} s, of which {:.2f} s set-up\n", files_.json,
-                 result.spp, result.seconds, result.setup_seconds);
+      fmt::print("{}: {}, {:.2f} s, of which {:.2f} s set-up\n", files_.json, work_of(result.spp),
+                 result.seconds, result.setup_seconds);
     }
     if (stats_) print_stats(result);
   }

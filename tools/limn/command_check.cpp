@@ -218,7 +218,7 @@ class CheckCommand final : public Command {
                         {"warnings", warnings_.lines()}});
       if (r.verdict == Verdict::kDisagree) status = kDisagree;
       if (r.verdict == Verdict::kCannotTell && status == kSuccess) status = kCannotTell;
-      if (const int s = finish_status(r.gradient.non_finite, 1, 1, "")) status = s;
+      if (const int s = finish_status(r.non_finite, 1, 1, "")) status = s;
     }
     write_json(common_.json, report.dump(2));
     return status;

@@ -279,7 +279,8 @@ class GradientCommand final : public Command {
 
   int run(const std::string& command_line) override {
     const Scene scene = load_scene(common_, warnings_);
-    refuse_samples(*app_, options_.points, {"--spp", "--time", "--samples", "--sample-images"});
+    refuse_samples(*app_, options_.points,
+                   {"--spp", "--time", "--samples", "--sample-images", "--part"});
     options_.terms = parse_terms(terms_);
     options_.samples = parse_samples(samples_);
     options_.uniform_samples = samples_ == "uniform";

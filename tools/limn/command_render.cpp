@@ -74,7 +74,7 @@ class RenderCommand final : public Command {
  private:
   void check_options() const {
     check_image_options(*app_, {options_.method});
-    refuse_samples(*app_, options_.points, {"--spp", "--sampler"});
+    refuse_samples(*app_, options_.points, {"--spp", "--sampler", "--part"});
     if (!has_sampler() && options_.points == FilmPoints::kRandom) {
       refuse_options(*app_, {"--sampler"},
                      fmt::format("the method {} has its own", options_.method));

@@ -22,7 +22,8 @@ inline const char* name_of(FilmPoints points) { return kFilmPoints[static_cast<i
 // InputError for others than random where light is not in closed form. method: the one asked for.
 void check_points(FilmPoints points, bool closed_light, const std::string& method);
 
-// Those of a run over these points: of faces there is one pass, and no limit of time.
+// Those of a run over these points: of faces there is one pass, and no limit of time. InputError
+// for a part of a run over faces.
 RunSettings settings_for(FilmPoints points, RunSettings settings);
 
 }  // namespace limn
