@@ -10,8 +10,9 @@ enum class FilmPoints {
   kRandom,  // samples, as every method
   // One point for each face that a pixel shows, at the centroid of what is seen of it, times the
   // area of that: no chance is left, and an image is a continuous function of the scene whose exact
-  // derivative is that which is told, silhouettes in view included. How far it is off falls with the
-  // size of a pixel (integrators/film/README.md). Needs a box filter. Numbers of samples, seeds and limits of time are not looked at.
+  // derivative is that which is told, silhouettes in view included. How far it is off falls with
+  // the size of a pixel (integrators/film/README.md). Needs a box filter. Numbers of samples, seeds
+  // and limits of time are not looked at.
   kFaces
 };
 inline constexpr const char* kFilmPoints[] = {"random", "faces"};  // by their numbers
