@@ -13,9 +13,7 @@ namespace {
 constexpr int kSteps = 6;
 constexpr double kShrink = 0.25;
 
-// What is told as exact is confirmed by differences that are known this well alone. In the scenes
-// of scenes/ they are, to 1e-5 and better, but where positions are floats and the derivative is
-// small. Not tuned.
+// What is told as exact is confirmed only by differences that are known this well. Not tuned.
 constexpr double kWanted = 1e-3;
 
 double size_of(const std::vector<double>& values) {
