@@ -11,6 +11,7 @@
     scenes/fits/fits.py gears     how far each of fifteen gears is turned, from their shadows
     scenes/fits/fits.py displacement  162 vertices along their normals, from eight sides
     scenes/fits/fits.py curves    of these three: scenes/pictures/fit_curves.webp
+    scenes/fits/fits.py films     of these three: scenes/pictures/fit_films.webp
     scenes/fits/fits.py picture   of the shapes that these found: scenes/pictures/fits.webp
 
 Writes OUT/NAME/ (pictures, meshes, report.html) and prints a table. A fit that is there is not run
@@ -481,6 +482,29 @@ def curves(fits):
     return ["scene", "fit", "last / first loss"], rows
 
 
+def films(fits):
+    """What L-BFGS shows at some of its steps, and what it is to meet."""
+    import matplotlib  # noqa: PLC0415
+
+    matplotlib.use("agg")
+    from matplotlib import pyplot  # noqa: PLC0415
+
+    shown = {"tree": (0, 1, 2, 4, 8), "gears": (0, 8, 12, 16, 28), "displacement": (0, 4, 8, 16, 40)}
+    columns = max(map(len, shown.values())) + 1
+    figure, panels = pyplot.subplots(len(shown), columns, figsize=(9, 4.9))
+    for (name, steps), row in zip(shown.items(), panels):
+        files = [f"step_{step:05}_view_0.png" for step in steps] + ["view_0_target.png"]
+        for panel, file, title in zip(row, files, [*(f"{name}, {s}" for s in steps), "target"]):
+            image = pyplot.imread(fits.path(f"{name}_lbfgs", file))
+            panel.imshow(image, interpolation="nearest")
+            panel.set_title(title, fontsize=8)
+            panel.axis("off")
+    figure.tight_layout(pad=0.4)
+    file = os.path.join(ROOT, "scenes", "pictures", "fit_films.webp")
+    figure.savefig(file, dpi=90, pil_kwargs={"quality": 85, "method": 6})
+    return ["scene", "steps"], [[name, *steps] for name, steps in shown.items()]
+
+
 # A row for each: truth, start, and fits at some of their steps.
 SHOWN = [
     ("creature.ply", [("mirrors_seed_1", 0), ("mirrors_seed_1", 75), ("mirrors_seed_1", 300),
@@ -519,7 +543,7 @@ def picture(fits):
 
 EXPERIMENTS = {"mirrors": mirrors, "shadows": shadows, "exact": exact, "views": views, "pose": pose,
                "drift": drift, "tree": tree, "gears": gears, "displacement": displacement,
-               "curves": curves, "picture": picture}  # fmt: skip
+               "curves": curves, "films": films, "picture": picture}  # fmt: skip
 
 
 def main():
@@ -534,7 +558,7 @@ def main():
     parser.add_argument("--threads", type=int, help="default: all cores")
     parser.add_argument("--limn", default=os.path.join(ROOT, "build", "limn"), help="the program")
     arguments = parser.parse_args()
-    if arguments.only and arguments.name in ("drift", "curves", "picture"):
+    if arguments.only and arguments.name in ("drift", "curves", "films", "picture"):
         parser.error(f"--only: {arguments.name} is one whole")
     os.makedirs(arguments.output, exist_ok=True)
     head, rows = EXPERIMENTS[arguments.name](Fits(arguments))

@@ -477,8 +477,13 @@ void FitFolder::add_snapshot(const Fit& fit, const RunSettings& settings, int sp
     RunSettings own = settings;
     own.spp = spp;
     own.progress = nullptr;
-    const RenderResult image = render(view.scene, own);
-    if (image.spp < spp) break;  // interrupted
+    // Where the fit sees a function without noise, so do its pictures.
+    RenderOptions seen;
+    seen.points = arguments_.options.backward.points;
+    const bool faces = seen.points == FilmPoints::kFaces;
+    if (faces) seen.method = "analytic";
+    const RenderResult image = render(view.scene, own, seen);
+    if (image.spp < (faces ? 1 : spp)) break;  // interrupted
     const Film& film = view.scene.film;
     const std::string name = fmt::format("step_{:05}_view_{}.png", fit.steps(), v);
     write_png(file(name), mean_image(image.radiance, film.crop_width, film.crop_height), 1);
