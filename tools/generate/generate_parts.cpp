@@ -256,4 +256,19 @@ Vec3d spline(const std::vector<Vec3d>& points, double t) {
          (b * 3.0 - a - c * 3.0 + d) * (0.5 * u * u * u);
 }
 
+void add_blade_faces(int rows, int columns, Triangles& mesh) {
+  const auto at = [&](int i, int k) {
+    return static_cast<uint32_t>(1 + (i - 1) * (columns + 1) + k);
+  };
+  const auto tip = static_cast<uint32_t>(mesh.positions.size() - 1);
+  for (int k = 0; k < columns; ++k) {
+    mesh.faces.push_back({0, at(1, k), at(1, k + 1)});
+    for (int i = 1; i + 1 < rows; ++i) {
+      mesh.faces.push_back({at(i, k), at(i + 1, k), at(i + 1, k + 1)});
+      mesh.faces.push_back({at(i, k), at(i + 1, k + 1), at(i, k + 1)});
+    }
+    mesh.faces.push_back({at(rows - 1, k), tip, at(rows - 1, k + 1)});
+  }
+}
+
 }  // namespace limn

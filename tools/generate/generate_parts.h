@@ -63,4 +63,8 @@ double arc_length(const std::function<Vec3d(double)>& position);
 // As many steps as `h` fits into `length`, but at least `fewest`.
 int steps(double length, double h, int fewest);
 
+// Faces between two ends that are points, the first and the last position, and rows - 1 rows of
+// columns + 1 points between them: blades, leaves.
+void add_blade_faces(int rows, int columns, Triangles& mesh);
+
 }  // namespace limn

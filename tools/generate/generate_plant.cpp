@@ -63,18 +63,7 @@ Triangles blade(const Growth& g, double h) {
     }
   }
   mesh.positions.push_back(blade_point(g, 1, 0));
-  const auto at = [&](int i, int k) {
-    return static_cast<uint32_t>(1 + (i - 1) * (columns + 1) + k);
-  };
-  const uint32_t tip = static_cast<uint32_t>(mesh.positions.size() - 1);
-  for (int k = 0; k < columns; ++k) {
-    mesh.faces.push_back({0, at(1, k), at(1, k + 1)});
-    for (int i = 1; i + 1 < rows; ++i) {
-      mesh.faces.push_back({at(i, k), at(i + 1, k), at(i + 1, k + 1)});
-      mesh.faces.push_back({at(i, k), at(i + 1, k + 1), at(i, k + 1)});
-    }
-    mesh.faces.push_back({at(rows - 1, k), tip, at(rows - 1, k + 1)});
-  }
+  add_blade_faces(rows, columns, mesh);
   return mesh;
 }
 

@@ -49,16 +49,7 @@ Triangles leaf(const Vec3d& foot, const Vec3d& along, const Vec3d& across, doubl
     }
   }
   mesh.positions.push_back(foot + along * size);
-  const auto at = [](int row, int k) { return static_cast<uint32_t>(3 * row - 2 + k); };
-  const auto tip = static_cast<uint32_t>(mesh.positions.size() - 1);
-  for (int k = 0; k < 2; ++k) {
-    mesh.faces.push_back({0, at(1, k), at(1, k + 1)});
-    for (int i = 1; i + 1 < rows; ++i) {
-      mesh.faces.push_back({at(i, k), at(i + 1, k), at(i + 1, k + 1)});
-      mesh.faces.push_back({at(i, k), at(i + 1, k + 1), at(i, k + 1)});
-    }
-    mesh.faces.push_back({at(rows - 1, k), tip, at(rows - 1, k + 1)});
-  }
+  add_blade_faces(rows, 2, mesh);
   return mesh;
 }
 
