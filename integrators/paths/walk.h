@@ -2,7 +2,6 @@
 // A path under way, over any scalar: what the path tracer (path.h) keeps of it from one step to the
 // next.
 #include <array>
-#include <new>
 #include <optional>
 #include <type_traits>
 
@@ -11,6 +10,7 @@
 #include "integrators/paths/direction_field.h"
 #include "limn/core/lights.h"
 #include "limn/core/ray_tracer.h"
+#include "limn/core/renew.h"
 #include "limn/core/rng.h"
 #include "limn/core/shading.h"
 
@@ -85,15 +85,6 @@ struct Walk {
     return sums.radiance;
   }
 };
-
-// Puts what make() returns in the place of `old`, where it is made. To make it elsewhere and copy
-// it costs more than it looks like: the wide loads of a copy wait until the narrow stores just
-// before them are in the cache. make() must not read `old`.
-template <class T, class Make>
-[[gnu::always_inline]] inline void renew(T& old, const Make& make) {
-  static_assert(std::is_trivially_destructible_v<T>);
-  ::new (static_cast<void*>(&old)) T(make());
-}
 
 // A ray on which a path starts: the primal one, with its skipped faces, and as it moves.
 template <class S>

@@ -17,10 +17,11 @@ class AreaLight final : public Light {
     inverse_area_ = 1 / faces_.sum();
   }
 
-  std::optional<LightSample> sample(const Vec3d& p, double choices, Rng& rng) const override {
-    const FaceId face(static_cast<uint32_t>(faces_.sample(rng.uniform()).index));
-    const double root = std::sqrt(rng.uniform());
-    const double b2 = root * rng.uniform();
+  std::optional<LightSample> sample(const Vec3d& p, double choices,
+                                    const LightNumbers& u) const override {
+    const FaceId face(static_cast<uint32_t>(faces_.sample(u[0]).index));
+    const double root = std::sqrt(u[1]);
+    const double b2 = root * u[2];
     const auto c = face_corners<double>(shape_.mesh, face);
     const Vec3d y = c[0] + (c[1] - c[0]) * (1 - root) + (c[2] - c[0]) * b2;
     const double distance = length(y - p);

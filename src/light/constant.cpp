@@ -14,11 +14,13 @@ class ConstantEnvironment final : public Environment {
 
   Rgb<double> radiance(const Vec3<double>&) const override { return value(radiance_); }
   Rgb<Dual> radiance(const Vec3<Dual>&) const override { return radiance_; }
-  Drawn sample_direction(double u1, double u2) const override {
-    const double z = 1 - 2 * u1;
-    const double r = std::sqrt(std::max(0.0, 1 - z * z));
-    const SinCos azimuth = sin_cos_of_turns(u2);
-    return {{r * azimuth.cos, r * azimuth.sin, z}, kDensity, {}};
+  void sample_directions(std::span<const Numbers> u, std::span<Drawn> drawn) const override {
+    for (size_t i = 0; i < u.size(); ++i) {
+      const double z = 1 - 2 * u[i][0];
+      const double r = std::sqrt(std::max(0.0, 1 - z * z));
+      const SinCos azimuth = sin_cos_of_turns(u[i][1]);
+      drawn[i] = {{r * azimuth.cos, r * azimuth.sin, z}, kDensity, {}};
+    }
   }
   double pdf_solid_angle(const Vec3d&) const override { return kDensity; }
   void look(const Vec3d&, const std::array<double, 2>&, Sight<double>& sight) const override {

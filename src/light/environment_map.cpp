@@ -54,14 +54,18 @@ void EnvironmentMap::fetch_texels(int column, int row) const {
   });
 }
 
-EnvironmentMap::Drawn EnvironmentMap::sample(double u1, double u2) const {
-  const MapDensity::Drawn drawn = density_->sample(u1, u2);
-  const double sin_theta = std::sqrt(std::max(0.0, 1 - drawn.cos_theta * drawn.cos_theta));
-  const SinCos azimuth = sin_cos_of_turns((drawn.x + 0.5) / width_);
-  const double x = drawn.x < width_ ? drawn.x : 0;
-  const Place<double> place{x, angle_of(sin_theta, drawn.cos_theta) * ((height_ - 1) / kPi)};
-  fetch_texels(column_of(place.x), row_of(place.y));
-  return {{azimuth.sin * sin_theta, drawn.cos_theta, -azimuth.cos * sin_theta}, place, drawn.pdf};
+EnvironmentMap::Drawn EnvironmentMap::sample(const wide::Doubles& u1,
+                                             const wide::Doubles& u2) const {
+  using wide::Doubles;
+  const auto [x, cos_theta, pdf] = density_->sample(u1, u2);
+  const Doubles sin_theta = sqrt(wide::max(1 - cos_theta * cos_theta, 0));
+  const auto [sine, cosine] = sin_cos_of_turns((x + 0.5) * (1.0 / width_));
+  const Place<Doubles> place{select(x < width_, x, 0),
+                             angle_of(sin_theta, cos_theta) * ((height_ - 1) / kPi)};
+  for (int i = 0; i < wide::kWidth; ++i) {
+    fetch_texels(column_of(place.x[i]), row_of(place.y[i]));
+  }
+  return {{sine * sin_theta, cos_theta, -cosine * sin_theta}, place, pdf};
 }
 
 void EnvironmentMap::fetch(const Place<double>& place) const {

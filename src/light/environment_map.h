@@ -47,13 +47,14 @@ class EnvironmentMap {
 
   // The density follows the luminance of the absolute values of the texels: it is positive
   // wherever radiance is not zero, negative texels included. An all-black map is sampled uniformly.
+  // Of eight draws at once.
   struct Drawn {
-    Vec3d direction;
-    Place<double> place;
-    double pdf;  // [1/sr]
+    wide::Vec direction;
+    Place<wide::Doubles> place;
+    wide::Doubles pdf;  // [1/sr]
   };
   // Asks for the texels there.
-  Drawn sample(double u1, double u2) const;
+  Drawn sample(const wide::Doubles& u1, const wide::Doubles& u2) const;
   // place: of d. [1/sr]
   double pdf_solid_angle(const Place<double>& place, const Vec3d& d) const;
 

@@ -25,13 +25,7 @@ class MapEnvironment final : public Environment {
     const auto place = map_->locate(map_from_world(d));
     return moving({value(place.x), value(place.y)}, map_->radiance(place) * scale_);
   }
-  Drawn sample_direction(double u1, double u2) const override {
-    const EnvironmentMap::Drawn drawn = map_->sample(u1, u2);
-    const Vec3d& v = drawn.direction;
-    return {axes_[0] * v.x + axes_[1] * v.y + axes_[2] * v.z,
-            drawn.pdf,
-            {drawn.place.x, drawn.place.y}};
-  }
+  void sample_directions(std::span<const Numbers> u, std::span<Drawn> drawn) const override;
   double pdf_solid_angle(const Vec3d& d) const override {
     const Vec3d v = map_from_world(d);
     return map_->pdf_solid_angle(map_->locate(v), v);
@@ -126,6 +120,21 @@ class MapEnvironment final : public Environment {
   std::array<std::shared_ptr<const EnvironmentMap>, kLanes>
       tangents_;  // none: that lane holds them
 };
+
+void MapEnvironment::sample_directions(std::span<const Numbers> u, std::span<Drawn> drawn) const {
+  wide::for_blocks(u.size(), [&](size_t first, size_t last) {
+    const auto number = [&](int k) {
+      return wide::gather([&](int i) { return u[std::min(first + i, last - 1)][k]; });
+    };
+    const EnvironmentMap::Drawn map = map_->sample(number(0), number(1));
+    const wide::Vec& v = map.direction;
+    const wide::Vec w = axes_[0] * v.x + axes_[1] * v.y + axes_[2] * v.z;
+    for (size_t i = first; i < last; ++i) {
+      const int k = static_cast<int>(i - first);
+      drawn[i] = {wide::lane(w, k), map.pdf[k], {map.place.x[k], map.place.y[k]}};
+    }
+  });
+}
 
 void check_finite(const Image& image, const std::string& file) {
   for (int y = 0; y < image.height; ++y) {

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <limits>
 
+#include "limn/core/check.h"
+#include "limn/core/renew.h"
+
 namespace limn {
 namespace {
 
@@ -13,7 +16,8 @@ constexpr double kAny = 0.25;
 
 }  // namespace
 
-std::optional<LightSample> DeltaLight::sample(const Vec3d& p, double choices, Rng&) const {
+std::optional<LightSample> DeltaLight::sample(const Vec3d& p, double choices,
+                                              const LightNumbers&) const {
   const auto arrival = arriving(p);
   if (!arrival) return {};
   const LightOrigin from = origin();
@@ -22,10 +26,7 @@ std::optional<LightSample> DeltaLight::sample(const Vec3d& p, double choices, Rn
   return LightSample{arrival->wo, distance, 1 / choices, {}, this};
 }
 
-std::optional<LightSample> Environment::sample(const Vec3d&, double choices, Rng& rng) const {
-  const double u1 = rng.uniform();
-  const double u2 = rng.uniform();
-  const Drawn drawn = sample_direction(u1, u2);
+std::optional<LightSample> Environment::light_sample(const Drawn& drawn, double choices) const {
   const double density = drawn.pdf / choices;
   if (!(density > 0)) return {};
   return LightSample{drawn.direction, std::numeric_limits<double>::infinity(), density, {}, this,
@@ -103,18 +104,53 @@ double Lights::choices(const Place& place, size_t light) const {
   return 1 / (kAny / count + (1 - kAny) * estimate(light, place) / place.sum);
 }
 
-std::optional<LightSample> Lights::sample(const Place& place, Rng& rng) const {
-  const double u = rng.uniform();
+size_t Lights::choose(const Place& place, double u) const {
   const double any = place.sum > 0 ? kAny : 1;
   const size_t last = all_.size() - 1;
-  size_t light = 0;
   if (u < any) {
-    light = std::min(static_cast<size_t>(u / any * static_cast<double>(all_.size())), last);
-  } else {
-    double left = (u - any) / (1 - any) * place.sum;
-    while (light < last && (left -= estimate(light, place)) >= 0) ++light;
+    return std::min(static_cast<size_t>(u / any * static_cast<double>(all_.size())), last);
   }
-  return all_[light]->sample(place.p, choices(place, light), rng);
+  size_t light = 0;
+  double left = (u - any) / (1 - any) * place.sum;
+  while (light < last && (left -= estimate(light, place)) >= 0) ++light;
+  return light;
+}
+
+void Lights::sample(std::span<const Draw> draws, std::span<const Numbers> u) const {
+  constexpr size_t kMost = 16;
+  DCHECK_LE(draws.size(), kMost);
+  // What the environment draws, it draws at once.
+  Environment::Numbers numbers[kMost];
+  Environment::Drawn drawn[kMost];
+  size_t of[kMost], count = 0;
+  for (size_t i = 0; i < draws.size(); ++i) {
+    const Place& place = *draws[i].place;
+    const size_t light = choose(place, u[i][0]);
+    if (environment_ && light == area_lights_.size()) {
+      of[count] = i;
+      numbers[count++] = {u[i][1], u[i][2]};
+    } else {
+      renew(*draws[i].sample, [&] {
+        return all_[light]->sample(place.p, choices(place, light), {u[i][1], u[i][2], u[i][3]});
+      });
+    }
+  }
+  if (count == 0) return;
+  environment_->sample_directions({numbers, count}, {drawn, count});
+  for (size_t k = 0; k < count; ++k) {
+    const Draw& draw = draws[of[k]];
+    const double share = choices(*draw.place, area_lights_.size());
+    renew(*draw.sample, [&] { return environment_->light_sample(drawn[k], share); });
+  }
+}
+
+std::optional<LightSample> Lights::sample(const Place& place, Rng& rng) const {
+  Numbers u;
+  for (double& number : u) number = rng.uniform();
+  std::optional<LightSample> sample;
+  const Draw draw{&place, &sample};
+  this->sample({&draw, 1}, {&u, 1});
+  return sample;
 }
 
 }  // namespace limn

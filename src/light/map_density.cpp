@@ -2,8 +2,10 @@
 #include "src/light/map_density.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
+#include <type_traits>
 
 #include "limn/core/vec.h"
 #include "src/base/angles.h"
@@ -19,11 +21,15 @@ constexpr double kMeanShare = 1.0 / 16;  // see MapDensity
 constexpr double kExcessOfWhole = 3e-6;
 constexpr double kExcess = 0.3;
 
-double mix(double a, double b, double t) { return a + (b - a) * t; }
+template <class T>
+T mix(const std::type_identity_t<T>& a, const std::type_identity_t<T>& b, const T& t) {
+  return a + (b - a) * t;
+}
 
 // Inverts the integral of the density a + (b - a) x on [0, 1], up to a factor; a + b > 0.
-double sample_linear(double a, double b, double u) {
-  return std::min(1.0, u * (a + b) / (a + std::sqrt(a * a * (1 - u) + b * b * u)));
+wide::Doubles sample_linear(const wide::Doubles& a, const wide::Doubles& b,
+                            const wide::Doubles& u) {
+  return wide::min(u * (a + b) / (a + sqrt(a * a * (1 - u) + b * b * u)), 1);
 }
 
 int sum_of(const std::array<uint8_t, 4>& c) { return c[0] + c[1] + c[2] + c[3]; }
@@ -298,32 +304,52 @@ std::vector<MapDensity::Slot> MapDensity::make_slots(std::span<const double> wei
 }
 
 template <class SlotOf>
-uint32_t MapDensity::choose(SlotOf slot_of, uint32_t count, double& u) {
-  const double place = u * count;
-  const uint32_t index = std::min(static_cast<uint32_t>(place), count - 1);
-  const Slot slot = slot_of(index);
-  u = place - index;
-  // Without branches, which would be guessed wrongly every other time.
-  const double share = slot.share, from = choose_above(share, u, 0, share);
-  const uint32_t chosen[2] = {slot.alias, index};
-  const uint32_t item = chosen[u < share];
-  u = (u - from) / choose_above(share, u, share, 1 - slot.share);
-  return item;
+[[gnu::always_inline]] inline wide::Ints MapDensity::choose(const SlotOf& slot_of,
+                                                            const wide::Ints& first,
+                                                            const wide::Ints& count,
+                                                            wide::Doubles& u) {
+  using wide::Doubles, wide::Ints;
+  const Doubles place = u * wide::to_doubles(count);
+  const Ints index = wide::min(wide::truncated(place), count - 1), at = first + index;
+  const Doubles share = wide::gather([&](int i) { return slot_of(at[i]).share; });
+  const Ints alias =
+      wide::gather_ints([&](int i) { return static_cast<int32_t>(slot_of(at[i]).alias); });
+  u = place - wide::to_doubles(index);
+  const wide::Mask own = u < share;
+  u = (u - select(own, 0, share)) / select(own, share, 1 - share);
+  return first + wide::select(own, index, alias);
 }
 
-MapDensity::Drawn MapDensity::sample(double u1, double u2) const {
-  const uint32_t b = choose([&](uint32_t i) { return block_slots_[i]; },
-                            static_cast<uint32_t>(blocks_.size()), u1);
-  const Block block = blocks_[b];
-  const Leaf* leaves = &leaves_[block.first];
-  const Leaf& leaf = leaves[choose([&](uint32_t i) { return leaves[i].slot; }, block.count, u1)];
-  const Patch p = patch(leaf.column, leaf.row, leaf.log);
-  const Corners& c = leaf.corners;
-  const double t = sample_linear(c[0] + c[1], c[2] + c[3], u1);
-  const double left = mix(c[0], c[2], t), right = mix(c[1], c[3], t);
-  const double s = sample_linear(left, right, u2);
-  return {p.x0 + s * (p.x1 - p.x0), mix(cos_theta_[p.y0], cos_theta_[p.y1], t),
-          mix(left, right, s) * leaf.scale * inverse_total_};
+MapDensity::Drawn MapDensity::sample(const wide::Doubles& u1, const wide::Doubles& u2) const {
+  using wide::Doubles, wide::gather, wide::gather_ints, wide::Ints, wide::to_doubles;
+  Doubles u = u1;
+  const Ints b = choose([&](int i) { return block_slots_[static_cast<size_t>(i)]; }, Ints{},
+                        Ints{} + static_cast<int>(blocks_.size()), u);
+  const auto block = [&](int i) { return blocks_[static_cast<size_t>(b[i])]; };
+  const Ints first = gather_ints([&](int i) { return static_cast<int32_t>(block(i).first); });
+  const Ints count = gather_ints([&](int i) { return static_cast<int32_t>(block(i).count); });
+  const Ints l =
+      choose([&](int i) { return leaves_[static_cast<size_t>(i)].slot; }, first, count, u);
+  const auto leaf = [&](int i) { return leaves_[static_cast<size_t>(l[i])]; };
+  // As `patch` has it.
+  const Ints log = gather_ints([&](int i) { return static_cast<int32_t>(leaf(i).log); });
+  const Ints side = (Ints{} + 1) << log;
+  const Ints x0 = -side & gather_ints([&](int i) { return static_cast<int32_t>(leaf(i).column); });
+  const Ints y0 = -side & gather_ints([&](int i) { return static_cast<int32_t>(leaf(i).row); });
+  const Ints x1 = wide::min(x0 + side, Ints{} + width_);
+  const Ints y1 = wide::min(y0 + side, Ints{} + (height_ - 1));
+  const auto cosine = [&](const Ints& row) {
+    return gather([&](int i) { return cos_theta_[static_cast<size_t>(row[i])]; });
+  };
+  const Ints corners = gather_ints([&](int i) { return std::bit_cast<int32_t>(leaf(i).corners); });
+  const auto corner = [&](int k) { return to_doubles(corners >> 8 * k & 255); };
+  const Doubles c0 = corner(0), c1 = corner(1), c2 = corner(2), c3 = corner(3);
+  const Doubles t = sample_linear(c0 + c1, c2 + c3, u);
+  const Doubles left = mix(c0, c2, t), right = mix(c1, c3, t);
+  const Doubles s = sample_linear(left, right, u2);
+  const Doubles scale = gather([&](int i) { return leaf(i).scale; });
+  return {to_doubles(x0) + s * to_doubles(x1 - x0), mix(cosine(y0), cosine(y1), t),
+          mix(left, right, s) * scale * inverse_total_};
 }
 
 double MapDensity::pdf(int column, int row, double x, double cos_theta) const {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "src/base/huge_pages.h"
+#include "src/base/wide.h"
 
 namespace limn {
 
@@ -30,11 +31,13 @@ class MapDensity {
   // importance: height by width, finite, not negative, one at least positive; height at least 2.
   MapDensity(int width, int height, std::span<const float> importance);
 
+  // Of eight draws at once: a draw is a chain of reads, roots and divisions, most of which one
+  // alone would wait for.
   struct Drawn {
-    double x, cos_theta, pdf;  // pdf [1/sr]
+    wide::Doubles x, cos_theta, pdf;  // pdf [1/sr]
   };
-  // From two numbers in [0, 1).
-  Drawn sample(double u1, double u2) const;
+  // From two numbers in [0, 1) for each.
+  Drawn sample(const wide::Doubles& u1, const wide::Doubles& u2) const;
   // column, row: the cell of (x, y). cos_theta: that of y. [1/sr]
   double pdf(int column, int row, double x, double cos_theta) const;
   // Asks for what `pdf` reads of that cell.
@@ -89,9 +92,11 @@ class MapDensity {
   double mass(const Leaf& leaf) const;         // its integral, before it is normalised
   void build_aliases();
   static std::vector<Slot> make_slots(std::span<const double> weights, double total);
-  // The item that u chooses; u becomes uniform again. slot_of: the slot of an index.
+  // The items that u chooses, from `first` on; u becomes uniform again. slot_of: the slot of an
+  // item.
   template <class SlotOf>
-  static uint32_t choose(SlotOf slot_of, uint32_t count, double& u);
+  static wide::Ints choose(const SlotOf& slot_of, const wide::Ints& first, const wide::Ints& count,
+                           wide::Doubles& u);
   class Builder;
 
   int width_, height_, grid_width_;

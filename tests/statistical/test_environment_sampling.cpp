@@ -115,19 +115,51 @@ TEST(EnvironmentSampling, MatchesItsDensity) {
     EXPECT_NEAR(sum, 1, 1e-8) << c.name;
     std::vector<double> observed(expected.size(), 0);
     Rng rng(1, 2, 3);
-    for (int i = 0; i < kSamples; ++i) {
-      const double u1 = rng.uniform();
-      const double u2 = rng.uniform();
-      const Environment::Drawn drawn = map->sample_direction(u1, u2);
-      const Vec3d& d = drawn.direction;
-      EXPECT_NEAR(length(d), 1, 1e-14);
-      if (i < 1000) expect_same_look(*map, drawn);
-      ++observed[bins.bin(apply_transposed(turn, d))];
+    std::array<Environment::Numbers, 10> u;
+    std::array<Environment::Drawn, 10> drawn;
+    static_assert(kSamples % 10 == 0);
+    for (int i = 0; i < kSamples; i += 10) {
+      for (auto& pair : u) pair = {rng.uniform(), rng.uniform()};
+      map->sample_directions(u, drawn);
+      for (const auto& one : drawn) {
+        EXPECT_NEAR(length(one.direction), 1, 1e-14);
+        if (i < 1000) expect_same_look(*map, one);
+        ++observed[bins.bin(apply_transposed(turn, one.direction))];
+      }
     }
     const test::ChiSquare result = test::chi_square_test(observed, expected);
     EXPECT_GT(result.p_value, threshold)
         << c.name << ": chi-square " << result.statistic << " with " << result.degrees_of_freedom
         << " degrees of freedom";
+  }
+}
+
+// To the bit, however many are drawn at once, and wherever among them.
+TEST(EnvironmentSampling, DirectionsDoNotDependOnThoseBesideThem) {
+  std::vector<std::shared_ptr<const Environment>> skies;
+  for (const MapCase& c : test::map_cases()) {
+    skies.push_back(test::make_envmap(c.image, 3, test::some_rotation()));
+  }
+  const TempFiles files;
+  SceneParts parts;
+  parts.body = R"(<emitter type="constant"/>)";
+  skies.push_back(make_scene(files, parts).environment);
+  for (const auto& sky : skies) {
+    Rng rng(7, 8, 9);
+    std::vector<Environment::Numbers> u(17);
+    for (auto& pair : u) pair = {rng.uniform(), rng.uniform()};
+    u[3] = {0, 0}, u[11] = {std::nextafter(1, 0), std::nextafter(1, 0)};
+    for (size_t count = 0; count <= u.size(); ++count) {
+      std::vector<Environment::Drawn> drawn(count);
+      sky->sample_directions(std::span(u).last(count), drawn);
+      for (size_t i = 0; i < count; ++i) {
+        const auto& [u1, u2] = u[u.size() - count + i];
+        const Environment::Drawn alone = sky->sample_direction(u1, u2);
+        for (int k = 0; k < 3; ++k) EXPECT_EQ(drawn[i].direction[k], alone.direction[k]);
+        EXPECT_EQ(drawn[i].pdf, alone.pdf);
+        EXPECT_EQ(drawn[i].place, alone.place);
+      }
+    }
   }
 }
 

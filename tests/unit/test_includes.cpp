@@ -139,6 +139,7 @@ TEST(Includes, NothingRunsBackUpBetweenRooms) {
 // The contracts of limn/core, lowest first: each includes only earlier ones. A room of src sees
 // contracts up to the one given.
 const Strings kContracts = {"check.h",
+                            "renew.h",
                             "error.h",
                             "memory.h",
                             "output_file.h",

@@ -61,8 +61,7 @@ TEST(DeltaLights, ADirectionComesFromInfinity) {
     const auto a = light->arriving(Vec3d{100, -1e6, 3});
     EXPECT_NEAR(a->wo.y, 1, 1e-15);
     EXPECT_EQ(a->irradiance.r, 3);
-    Rng rng(1, 2, 3);
-    EXPECT_TRUE(std::isinf(light->sample({0, 0, 0}, 2, rng)->distance));
+    EXPECT_TRUE(std::isinf(light->sample({0, 0, 0}, 2, {})->distance));
   }
 }
 
@@ -136,6 +135,47 @@ TEST(Lights, MoreThanFourAreDrawnAsOftenAsTheirDensitiesSay) {
   const std::string lamp = square("lamp", 1, 90, {0, 3, 0}, area_light("glow", "1, 1, 1"));
   expect_draws_of_densities(scene_with(files, sky + dots + lamp), 1);
   expect_draws_of_densities(scene_with(files, sky + lamps), 6);
+}
+
+// To the bit, lights of every kind among each other; what was in a sample's place is gone.
+TEST(Lights, DrawnAtOnceAreThoseDrawnAlone) {
+  const TempFiles files;
+  const std::string bodies[] = {
+      R"(<emitter type="constant"/><emitter type="directional"/><emitter type="point"/>)" +
+          square("lamp", 1, 90, {0, 3, 0}, area_light("glow", "1, 1, 1")),
+      R"(<emitter type="constant"/>)",
+      square("lamp", 1, 90, {0, 3, 0}, area_light("glow", "1, 1, 1"))};
+  for (const std::string& body : bodies) {
+    const Scene scene = scene_with(files, body);
+    const Lights lights(scene);
+    const size_t most = 16;
+    std::vector<Lights::Place> places;
+    for (size_t i = 0; i < most; ++i) {  // some above the lamp, which does not shine on them
+      places.push_back(lights.at({0.1 * i, 0.4 * i, 0.2}));
+    }
+    for (size_t round = 0; round < 50; ++round) {
+      std::vector<Lights::Numbers> u(round % (most + 1));
+      std::vector<std::optional<LightSample>> samples(u.size(), LightSample{});
+      std::vector<Lights::Draw> draws;
+      for (size_t i = 0; i < u.size(); ++i) {
+        Rng rng(round, i, 3);
+        for (double& number : u[i]) number = rng.uniform();
+        draws.push_back({&places[i], &samples[i]});
+      }
+      lights.sample(draws, u);
+      for (size_t i = 0; i < u.size(); ++i) {
+        Rng rng(round, i, 3);
+        const auto alone = lights.sample(places[i], rng);
+        ASSERT_EQ(samples[i].has_value(), alone.has_value());
+        if (!alone) continue;
+        EXPECT_EQ(samples[i]->light, alone->light);
+        EXPECT_EQ(samples[i]->wo.x, alone->wo.x);
+        EXPECT_EQ(samples[i]->distance, alone->distance);
+        EXPECT_EQ(samples[i]->pdf, alone->pdf);
+        EXPECT_EQ(samples[i]->place, alone->place);
+      }
+    }
+  }
 }
 
 // By irradiance on a surface that faces them: 1 / d^2 of points, the closed form of a small lamp from

@@ -77,6 +77,36 @@ TEST_P(Threads, SameBits) {
 
 INSTANTIATE_TEST_SUITE_P(, Threads, testing::Values(2, 7));
 
+// Of one to seventeen streams at once: to the bit what each gives by itself.
+TEST(Numbers, DrawnAtOnceAreThoseOfTheStreams) {
+  for (const bool even : {false, true}) {
+    std::vector<Rng> keys;
+    std::vector<Rng::Stream> streams;
+    for (uint32_t i = 0; i < 17; ++i) {
+      keys.push_back(even ? Rng::even(1, i / 3, 1000003 * i) : Rng(1, i / 3, i));
+    }
+    for (uint64_t i = 0; i < 17; ++i) streams.push_back({&keys[i], i * i});
+    for (size_t count = 0; count <= streams.size(); ++count) {
+      std::vector<std::array<double, 4>> numbers(count);
+      Rng::draw(Purpose::kEmitter, std::span(streams).first(count), numbers.data());
+      std::array<double, 1> one;
+      for (size_t i = 0; i < count; ++i) {
+        Rng rng = keys[i].at(Purpose::kEmitter, streams[i].depth);
+        for (const double number : numbers[i]) EXPECT_EQ(number, rng.uniform()) << i << even;
+        Rng::draw(Purpose::kEmitter, std::span(streams).subspan(i, 1), &one);
+        EXPECT_EQ(one[0], numbers[i][0]);
+      }
+    }
+  }
+}
+
+TEST(Numbers, ShortOnesAreMixedAsLongOnes) {
+  for (const uint32_t number : {0u, 1u, 77u, UINT32_MAX}) {
+    EXPECT_EQ(mix_bits(number), mix_bits(uint64_t{number}));
+    EXPECT_TRUE(number == 0 || mix_bits(number) >> 32 != 0);
+  }
+}
+
 // Of 64 samples that follow each other one lies in every box of 1/64, 1/32 by 1/2, ..., 1 by 1/64.
 TEST(EvenNumbers, FillBoxes) {
   constexpr int kLog = 6, kCount = 1 << kLog;

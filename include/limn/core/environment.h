@@ -2,6 +2,7 @@
 // Light from infinity, from all directions: what a ray sees that leaves the scene.
 #include <array>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -23,7 +24,15 @@ class Environment : public Light {
     double pdf;
     std::array<double, 2> place;  // see LightSample
   };
-  virtual Drawn sample_direction(double u1, double u2) const = 0;
+  using Numbers = std::array<double, 2>;
+  // drawn[i] from u[i]; what is drawn does not depend on what is drawn beside it.
+  virtual void sample_directions(std::span<const Numbers> u, std::span<Drawn> drawn) const = 0;
+  Drawn sample_direction(double u1, double u2) const {
+    const Numbers u{u1, u2};
+    Drawn drawn;
+    sample_directions({&u, 1}, {&drawn, 1});
+    return drawn;
+  }
   virtual double pdf_solid_angle(const Vec3d& d) const = 0;
 
   // Where a unit direction lies, in an environment's own terms (see LightSample). What `look` reads
@@ -82,7 +91,12 @@ class Environment : public Light {
   virtual std::shared_ptr<Environment> clone() const = 0;
   virtual std::string describe() const = 0;
 
-  std::optional<LightSample> sample(const Vec3d& p, double choices, Rng& rng) const final;
+  // As a sample, where `choices` lights are equally likely; none where the density is 0.
+  std::optional<LightSample> light_sample(const Drawn& drawn, double choices) const;
+  std::optional<LightSample> sample(const Vec3d&, double choices,
+                                    const LightNumbers& u) const final {
+    return light_sample(sample_direction(u[0], u[1]), choices);
+  }
   double pdf(const LightView& view, double choices) const final {
     return pdf_solid_angle(view.wo) / choices;
   }

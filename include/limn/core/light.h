@@ -44,13 +44,17 @@ struct LightView {
   Vec3d n_g;        // unit geometric normal there; unused for light from infinity
 };
 
+// What one sample of a light is drawn from: in [0, 1).
+using LightNumbers = std::array<double, 3>;
+
 class Light {
  public:
   virtual ~Light() = default;
 
   // A direction from p to the light, where `choices` lights are equally likely. None if the point
   // that was drawn does not shine on p: a sample of value zero.
-  virtual std::optional<LightSample> sample(const Vec3d& p, double choices, Rng& rng) const = 0;
+  virtual std::optional<LightSample> sample(const Vec3d& p, double choices,
+                                            const LightNumbers& u) const = 0;
   // The density [1/sr] with which `sample` draws this view; 0 of a delta light.
   virtual double pdf(const LightView& view, double choices) const = 0;
 
@@ -118,7 +122,8 @@ class DeltaLight : public Light {
   virtual std::shared_ptr<DeltaLight> clone() const = 0;
   virtual std::string describe() const = 0;  // one line for `limn info`
 
-  std::optional<LightSample> sample(const Vec3d& p, double choices, Rng& rng) const final;
+  std::optional<LightSample> sample(const Vec3d& p, double choices,
+                                    const LightNumbers& u) const final;
   double pdf(const LightView&, double) const final { return 0; }
   Rgb<double> radiance(const Vec3<double>&) const final { return {}; }
   Rgb<Dual> radiance(const Vec3<Dual>&) const final { return {}; }

@@ -38,7 +38,15 @@ class Lights {
   // nothing were in the way [W / m^2, of luminance].
   double estimate(size_t light, const Vec3d& p) const;
 
-  // None: a sample of value zero (see Light::sample).
+  // One number for the choice of a light, the others for what it draws.
+  using Numbers = std::array<double, 1 + std::tuple_size_v<LightNumbers>>;
+  // A light to be drawn at a place. None: a sample of value zero (see Light::sample).
+  struct Draw {
+    const Place* place;
+    std::optional<LightSample>* sample;
+  };
+  // draws[i] from u[i]; at most 16 of them.
+  void sample(std::span<const Draw> draws, std::span<const Numbers> u) const;
   std::optional<LightSample> sample(const Place& place, Rng& rng) const;
   // The density [1/sr] with which `sample` draws what a ray from there sees: an emitting shape, or,
   // where it leaves the scene, the environment (there must be one).
@@ -73,6 +81,7 @@ class Lights {
   double estimate(size_t light, const Place& place) const {
     return light < place.first.size() ? place.first[light] : estimate(light, place.p);
   }
+  size_t choose(const Place& place, double u) const;
   // One over the probability of a light.
   double choices(const Place& place, size_t light) const;
 

@@ -1,16 +1,26 @@
 #pragma once
 // Random streams keyed by what they are for, so that no result depends on threads or on the order
 // of work.
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 
 namespace limn {
 
-// Bijective 64-bit finaliser (Stafford's variant 13, as in SplitMix64).
-inline uint64_t mix_bits(uint64_t z) {
+namespace detail {
+// Word: 64 bits, or several of them side by side.
+template <class Word>
+[[gnu::always_inline]] inline Word mix_words(Word z) {
   z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
   z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
   return z ^ (z >> 31);
 }
+}  // namespace detail
+
+// Bijective 64-bit finaliser (Stafford's variant 13, as in SplitMix64). No template, which would
+// take a shorter number as it is.
+inline uint64_t mix_bits(uint64_t z) { return detail::mix_words(z); }
 
 enum class Purpose : uint64_t {
   kFilm,
@@ -51,13 +61,25 @@ class Rng {
   }
 
   Rng at(Purpose purpose, uint64_t depth) const {
-    Rng rng(mix_bits(key_ + kGolden * (1 + static_cast<uint64_t>(purpose) + 64 * depth)));
+    Rng rng(mix_bits(key_ + kGolden * place_of(purpose, depth)));
     rng.sample_ = sample_;
     rng.dimension_ = dimension_ < 0 ? -1 : 0;
     return rng;
   }
   // The stream of one of several samples of the same kind; the first is this one itself.
   Rng copy(Purpose purpose, int index) const { return index == 0 ? *this : at(purpose, index); }
+  // The stream key.at(purpose, depth).
+  struct Stream {
+    const Rng* key;
+    uint64_t depth;
+  };
+  // numbers[i]: the first that `uniform` of streams[i] gives. The keys are all even, or none is.
+  template <size_t kCount>
+  static void draw(Purpose purpose, std::span<const Stream> streams,
+                   std::array<double, kCount>* numbers) {
+    static_assert(kCount <= kDimensions);
+    if (!streams.empty()) draw(purpose, streams, kCount, numbers->data());
+  }
   // Uniform in [0, 1): 53 bits; 32 of what is even.
   double uniform() {
     if (dimension_ >= 0) return even_uniform();
@@ -70,8 +92,15 @@ class Rng {
     state_ += kGolden;
     return mix_bits(state_);
   }
+  template <class Word>
+  static Word place_of(Purpose purpose, const Word& depth) {
+    return 1 + static_cast<uint64_t>(purpose) + 64 * depth;
+  }
   double even_uniform();
+  // numbers: streams.size() by count.
+  static void draw(Purpose purpose, std::span<const Stream> streams, size_t count, double* numbers);
 
+  static constexpr int kDimensions = 4;
   static constexpr uint64_t kGolden = 0x9e3779b97f4a7c15ull;
   uint64_t key_;
   uint64_t state_;
