@@ -1,6 +1,7 @@
 // One path per sample of a pixel, in plain numbers.
 #include "integrators/methods/radiance_estimator.h"
 
+#include <array>
 #include <utility>
 #include <vector>
 
@@ -9,6 +10,19 @@
 #include "integrators/paths/path_log.h"
 
 namespace limn {
+namespace {
+
+// From which samples are placed on the film: of each its own, drawn at once.
+std::array<std::array<double, 2>, kMostTogether> film_numbers(
+    std::span<const KeyedSample> samples) {
+  Rng::Stream streams[kMostTogether];
+  for (size_t i = 0; i < samples.size(); ++i) streams[i] = {&samples[i].key, 0};
+  std::array<std::array<double, 2>, kMostTogether> numbers;
+  Rng::draw(Purpose::kFilm, {streams, samples.size()}, numbers.data());
+  return numbers;
+}
+
+}  // namespace
 
 RadianceEstimator::RadianceEstimator(const Scene& scene, int threads,
                                      std::shared_ptr<const FilmRegions> visible, bool closed,
@@ -60,8 +74,10 @@ void RadianceEstimator::trace(std::span<const KeyedSample> samples, bool mirrore
   walks.reserve(samples.size());
   std::vector<StartRay<double>> starts(samples.size());
   std::vector<FilmPosition> places;
+  const auto numbers = film_numbers(samples);
   for (const auto& [at, key] : samples) {
-    FilmPosition film = sample_pixel_filter(scene_.film, filter_, at.x, at.y, key);
+    FilmPosition film =
+        sample_pixel_filter(scene_.film, filter_, at.x, at.y, numbers[walks.size()]);
     if (mirrored) film = mirrored_in_pixel(scene_.film, at.x, at.y, film);
     const auto ray = camera_.ray(film.x, film.y);
     if (sink.log()) log_camera_ray(*sink.log(), film.x, film.y, ray.origin, ray.direction);

@@ -1,5 +1,7 @@
 #pragma once
 // Where a path starts: a position in a pixel's filter, and the camera's ray through it.
+#include <array>
+
 #include "limn/core/film.h"
 #include "limn/core/ray_tracer.h"
 #include "limn/core/rng.h"
@@ -15,13 +17,18 @@ struct FilmPosition {
   double x, y;
 };
 inline FilmPosition sample_pixel_filter(const Film& film, const FilterTable& filter, int x, int y,
-                                        const Rng& key) {
-  Rng rng = key.at(Purpose::kFilm, 0);
+                                        const std::array<double, 2>& u) {
   const auto columns = film.range_x(x);
   const auto rows = film.range_y(y);
-  const double dx = filter.quantile(columns.lower, columns.upper, rng.uniform());
-  const double dy = filter.quantile(rows.lower, rows.upper, rng.uniform());
+  const double dx = filter.quantile(columns.lower, columns.upper, u[0]);
+  const double dy = filter.quantile(rows.lower, rows.upper, u[1]);
   return {x + 0.5 + dx, y + 0.5 + dy};
+}
+inline FilmPosition sample_pixel_filter(const Film& film, const FilterTable& filter, int x, int y,
+                                        const Rng& key) {
+  Rng rng = key.at(Purpose::kFilm, 0);
+  const double u = rng.uniform();
+  return sample_pixel_filter(film, filter, x, y, {u, rng.uniform()});
 }
 
 // The same position on the other side of the pixel's center: drawn from the filter like the first,

@@ -127,6 +127,7 @@ class PathTracer {
   void split(Walk& walk, int more);
   // path_vertices.h. Those that return bool say whether the path goes on.
   bool begin_vertex(Walk& walk);
+  void draw_numbers(std::span<Walk* const> walks) const;
   bool choose_direction(Walk& walk);
   bool scatter(Walk& walk);
   bool escape(Walk& walk) const;
@@ -147,7 +148,7 @@ class PathTracer {
   void fetch_corners(const Walk& walk) const;
   void fetch_next(Walk& walk) const;
   // path_lights.h
-  void draw_light(Walk& walk) const;
+  void draw_lights(std::span<Walk* const> walks) const;
   void draw_light(Walk& walk, const Rng& key) const;
   void weigh_light(Walk& walk) const;
   void draw_delta(Walk& walk, const DeltaLight& delta) const;

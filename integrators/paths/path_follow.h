@@ -74,13 +74,14 @@ inline void PathTracer<S, Visitor>::follow(std::span<Walk* const> walks) {
   };
   while (count > 0) {
     keep([&](Walk& walk) { return begin_vertex(walk); });
-    for (size_t i = 0; i < count; ++i) draw_light(*going[i]);
+    draw_lights({going, count});
     for (size_t i = 0; i < count; ++i) weigh_light(*going[i]);
     keep([&](Walk& walk) {
       if (walk.light && shadowed(walk)) walk.light.reset();
       return true;
     });
     for (size_t i = 0; i < count; ++i) add_light(*going[i]);
+    draw_numbers({going, count});
     keep([&](Walk& walk) { return choose_direction(walk); });
     keep([&](Walk& walk) { return scatter(walk); });
     keep([&](Walk& walk) {

@@ -7,10 +7,21 @@
 
 namespace limn {
 
-// One light, where there have been no others.
+// One light for each, if there is any, where there have been no others.
 template <class S, class Visitor>
-inline void PathTracer<S, Visitor>::draw_light(Walk& walk) const {
-  if (!walk.lit) draw_light(walk, walk.key);
+inline void PathTracer<S, Visitor>::draw_lights(std::span<Walk* const> walks) const {
+  if (c_.lights.empty()) return;
+  Rng::Stream streams[kMostWalks];
+  Lights::Draw draws[kMostWalks];
+  size_t count = 0;
+  for (Walk* const walk : walks) {
+    if (walk->lit) continue;
+    streams[count] = {&walk->key, static_cast<uint64_t>(walk->bounces)};
+    draws[count++] = {&walk->lights, &walk->light};
+  }
+  Lights::Numbers u[kMostWalks];
+  Rng::draw(Purpose::kEmitter, {streams, count}, u);
+  c_.lights.sample({draws, count}, {u, count});
 }
 
 template <class S, class Visitor>

@@ -44,23 +44,46 @@ inline bool PathTracer<S, Visitor>::begin_vertex(Walk& walk) {
   return true;
 }
 
+// Draws what the next directions are drawn from; the third number only where there is a choice.
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::draw_numbers(std::span<Walk* const> walks) const {
+  Rng::Stream streams[kMostWalks];
+  bool mixed = false;
+  for (size_t i = 0; i < walks.size(); ++i) {
+    streams[i] = {&walks[i]->key, static_cast<uint64_t>(walks[i]->bounces)};
+    mixed |= walks[i]->mixture.share != 0;
+  }
+  const auto draw = [&]<size_t kCount>(std::integral_constant<size_t, kCount>) {
+    std::array<double, kCount> u[kMostWalks];
+    Rng::draw(Purpose::kBsdf, {streams, walks.size()}, u);
+    for (size_t i = 0; i < walks.size(); ++i) {
+      std::copy(u[i].begin(), u[i].end(), walks[i]->u.begin());
+    }
+  };
+  if (mixed) {
+    draw(std::integral_constant<size_t, 3>());
+  } else {
+    draw(std::integral_constant<size_t, 2>());
+  }
+}
+
 // Draws the next direction.
 template <class S, class Visitor>
 inline bool PathTracer<S, Visitor>::choose_direction(Walk& walk) {
-  Rng rng = walk.key.at(Purpose::kBsdf, walk.bounces);
-  const double u1 = rng.uniform();
-  const double u2 = rng.uniform();
+  const auto& u = walk.u;
   const auto wo = [&] {
-    if (walk.mixture.share == 0) return walk.scattering->sample(u1, u2);
-    const double u = rng.uniform();
-    return u < walk.mixture.share
-               ? MirroredLight::sample(walk.mixture, u / walk.mixture.share, u1, u2)
-               : walk.scattering->sample(u1, u2);
+    if (walk.mixture.share == 0) return walk.scattering->sample(u[0], u[1]);
+    return u[2] < walk.mixture.share
+               ? MirroredLight::sample(walk.mixture, u[2] / walk.mixture.share, u[0], u[1])
+               : walk.scattering->sample(u[0], u[1]);
   }();
   if (!wo) return false;
   walk.wo = *wo;
   if constexpr (std::is_same_v<S, Dual>) {
-    if (warper_) walk.motion = warper_->motion(walk.surface, *wo, rng.at(Purpose::kBsdf, 1));
+    if (warper_) {
+      const Rng key = walk.key.at(Purpose::kBsdf, walk.bounces).at(Purpose::kBsdf, 1);
+      walk.motion = warper_->motion(walk.surface, *wo, key);
+    }
   }
   return true;
 }
