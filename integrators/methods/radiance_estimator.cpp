@@ -8,6 +8,7 @@
 #include "integrators/paths/camera_path.h"
 #include "integrators/paths/path_follow.h"
 #include "integrators/paths/path_log.h"
+#include "limn/core/check.h"
 
 namespace limn {
 namespace {
@@ -70,23 +71,29 @@ void RadianceEstimator::trace(std::span<const KeyedSample> samples, bool mirrore
   static_assert(kMostTogether <= Tracer::kMostWalks);
   RayCount rays;
   Tracer tracer(context_, rays);
+  DCHECK_LE(samples.size(), kMostTogether);
+  // Step by step for all of them, like the paths themselves (path.h).
+  const auto numbers = film_numbers(samples);
+  std::array<FilmPosition, kMostTogether> places;
+  for (size_t i = 0; i < samples.size(); ++i) {
+    const PixelSample& at = samples[i].at;
+    places[i] = sample_pixel_filter(scene_.film, filter_, at.x, at.y, numbers[i]);
+    if (mirrored) places[i] = mirrored_in_pixel(scene_.film, at.x, at.y, places[i]);
+  }
+  std::array<StartRay<double>, kMostTogether> starts;
+  for (size_t i = 0; i < samples.size(); ++i) {
+    const auto ray = camera_.ray(places[i].x, places[i].y);
+    renew(starts[i].ray, [&] { return camera_ray(scene_, ray); });
+    starts[i].origin = ray.origin;
+    starts[i].direction = ray.direction;
+  }
   std::vector<typename Tracer::Walk> walks;
   walks.reserve(samples.size());
-  std::vector<StartRay<double>> starts(samples.size());
-  std::vector<FilmPosition> places;
-  const auto numbers = film_numbers(samples);
-  for (const auto& [at, key] : samples) {
-    FilmPosition film =
-        sample_pixel_filter(scene_.film, filter_, at.x, at.y, numbers[walks.size()]);
-    if (mirrored) film = mirrored_in_pixel(scene_.film, at.x, at.y, film);
-    const auto ray = camera_.ray(film.x, film.y);
-    if (sink.log()) log_camera_ray(*sink.log(), film.x, film.y, ray.origin, ray.direction);
-    walks.emplace_back(key, 0, visitor);
-    StartRay<double>& start = starts[walks.size() - 1];
-    renew(start.ray, [&] { return camera_ray(scene_, ray); });
-    start.origin = ray.origin;
-    start.direction = ray.direction;
-    if (visible_) places.push_back(film);
+  for (size_t i = 0; i < samples.size(); ++i) {
+    walks.emplace_back(samples[i].key, 0, visitor);
+    if (sink.log()) {
+      log_camera_ray(*sink.log(), places[i].x, places[i].y, starts[i].origin, starts[i].direction);
+    }
   }
   if (visible_) {
     std::vector<FaceRef> faces;
@@ -94,9 +101,9 @@ void RadianceEstimator::trace(std::span<const KeyedSample> samples, bool mirrore
       faces.push_back(
           visible_->face_at(samples[i].at.x, samples[i].at.y, places[i].x, places[i].y));
     }
-    tracer.follow_rays(starts, faces, walks);
+    tracer.follow_rays({starts.data(), walks.size()}, faces, walks);
   } else {
-    tracer.follow_rays(starts, walks);
+    tracer.follow_rays({starts.data(), walks.size()}, walks);
   }
   sink.cost(0).add(rays);
   sink.cost(0).samples += samples.size();
