@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace limn {
 namespace {
@@ -84,18 +85,20 @@ Cap cap_around(const std::vector<Drawn>& drawn, const Vec3d& axis, double least_
   return best;
 }
 
-// Wider by rings as long as these are bright, too: the rim of a sun is soft, by haze or by the
-// map's texels.
-Cap with_rim(const std::vector<Drawn>& drawn, const Vec3d& axis, Cap cap) {
-  const double core = cap.flux / solid_angle(cap.angle);
+double flux_within(const std::vector<Drawn>& drawn, const Vec3d& axis, double angle) {
+  double flux = 0;
+  for (const Drawn& d : drawn) {
+    if (angle_between(d.w, axis) <= angle) flux += d.flux;
+  }
+  return flux;
+}
+
+// Wider by rings as long as these are as bright as `least`.
+Cap with_rim(const std::vector<Drawn>& drawn, const Vec3d& axis, Cap cap, double least) {
   while (cap.angle * kRing <= kWidest) {
-    const double wider = cap.angle * kRing;
-    double flux = 0;
-    for (const Drawn& d : drawn) {
-      if (angle_between(d.w, axis) <= wider) flux += d.flux;
-    }
+    const double wider = cap.angle * kRing, flux = flux_within(drawn, axis, wider);
     const double ring = solid_angle(wider) - solid_angle(cap.angle);
-    if (flux - cap.flux < kRim * core * ring) break;
+    if (flux - cap.flux < least * ring) break;
     cap.angle = wider;
     cap.flux = flux;
   }
@@ -130,6 +133,26 @@ Vec3d brightest_axis(const std::vector<Drawn>& drawn, double least_flux) {
   return axis;
 }
 
+DirectionCap cap_of(const Vec3d& axis, double angle) {
+  return {axis, std::sin(angle), std::cos(angle)};
+}
+
+// What glows around a sun: as bright as a sixteenth of what is nearest, and as a patch must be.
+// Weighed like the sun it would take nearly all samples; left to the rest, which is drawn without a
+// look at what stands before it, it would rule the error there.
+std::optional<BrightPatch> glow_around(const std::vector<Drawn>& drawn, const Vec3d& axis,
+                                       const Cap& sun, double uniform) {
+  const double nearest = flux_within(drawn, axis, kRing * sun.angle) - sun.flux;
+  const double ring = solid_angle(kRing * sun.angle) - solid_angle(sun.angle);
+  const double least = std::max(kRim * nearest / ring, kLeastContrast * uniform);
+  const Cap whole = with_rim(drawn, axis, sun, least);
+  if (whole.angle == sun.angle) return {};
+  const double flux = whole.flux - sun.flux;
+  const double wide = solid_angle(whole.angle) - solid_angle(sun.angle);
+  if (!(flux * flux > kLeastSquare * 4 * kPi * uniform * uniform * wide)) return {};
+  return BrightPatch{cap_of(axis, whole.angle), flux / wide, std::cos(sun.angle)};
+}
+
 std::vector<BrightPatch> first_patches(const Environment& environment, size_t most) {
   std::vector<BrightPatch> patches;
   if (environment.is_uniform()) return patches;
@@ -137,20 +160,30 @@ std::vector<BrightPatch> first_patches(const Environment& environment, size_t mo
   double total = 0;
   for (const Drawn& d : drawn) total += d.flux;
   const double uniform = total / (4 * kPi);
-  for (int i = 0; i < kMostTries && patches.size() < most && !drawn.empty(); ++i) {
+  size_t suns = 0;
+  for (int i = 0; i < kMostTries && suns < most && !drawn.empty(); ++i) {
     const Vec3d axis = brightest_axis(drawn, kLeastShare * total);
     const Cap core = cap_around(drawn, axis, kLeastShare * total);
     if (!(core.square >= kLeastSquare * uniform * total)) break;
     if (core.flux < kLeastContrast * uniform * solid_angle(core.angle)) break;
-    const Cap whole = with_rim(drawn, axis, core);
-    const DirectionCap cap{axis, std::sin(whole.angle), std::cos(whole.angle)};
-    const auto apart = [&](const BrightPatch& other) {
-      return angle_between(axis, other.cap.axis) > whole.angle + std::asin(other.cap.sine);
+    // The rim of a sun is soft, by haze or by the map's texels.
+    const Cap whole = with_rim(drawn, axis, core, kRim * core.flux / solid_angle(core.angle));
+    const DirectionCap cap = cap_of(axis, whole.angle);
+    const auto is_apart = [&](const DirectionCap& from_others) {
+      return std::all_of(patches.begin(), patches.end(), [&](const BrightPatch& other) {
+        return angle_between(axis, other.cap.axis) >
+               std::asin(from_others.sine) + std::asin(other.cap.sine);
+      });
     };
+    const auto glow = glow_around(drawn, axis, whole, uniform);
+    const bool glows = glow && is_apart(glow->cap);
     // What is left around a patch is none, but hides others.
-    if (std::all_of(patches.begin(), patches.end(), apart))
+    if (is_apart(cap)) {
       patches.push_back({cap, whole.flux / solid_angle(whole.angle)});
-    std::erase_if(drawn, [&](const Drawn& d) { return cap.holds(d.w); });
+      if (glows) patches.push_back(*glow);
+      ++suns;
+    }
+    std::erase_if(drawn, [&](const Drawn& d) { return (glows ? glow->cap : cap).holds(d.w); });
   }
   return patches;
 }

@@ -15,12 +15,19 @@ struct DirectionCap {
 
 struct BrightPatch {
   DirectionCap cap;
-  double luminance;  // mean over the cap
+  double luminance;  // mean over what it holds
+  // The cosine of the part around the axis that belongs to another patch: the sun in its
+  // glow. None: no cosine is so large.
+  double inner_cosine = 2;
+
+  bool is_ring() const { return inner_cosine <= 1; }
+  bool holds(const Vec3d& w) const { return cap.holds(w) && dot(w, cap.axis) < inner_cosine; }
 };
 
-// Disjoint caps of a few degrees that are much brighter than the environment is on average and hold
-// a good part of the integral of its squared luminance each (not of its light: a low sun in haze
-// has 2 % of that, and rules the error), in that order. Found among directions that the
+// Caps of a few degrees that are much brighter than the environment is on average and hold a good
+// part of the integral of its squared luminance each (not of its light: a low sun in haze has 2 %
+// of that, and rules the error), in that order; behind each the ring around it, if what glows there
+// is such a part by itself. No two hold the same direction. Found among directions that the
 // environment itself draws, the same each time.
 std::vector<BrightPatch> find_bright_patches(const Environment& environment);
 // Whether there is any: that asks for less work.

@@ -227,7 +227,7 @@ LightRegions::LightRegions(const Scene& scene) : scene_(scene) {
   for (const BrightPatch& patch : find_bright_patches(*scene.environment)) {
     Region& region = regions_.emplace_back();
     region.luminance = patch.luminance;
-    region.cap = patch.cap;
+    region.patch = patch;
   }
 }
 
@@ -281,7 +281,7 @@ bool is_in_polygon(const LampHull& lamp, const Vec3d& y) {
 }  // namespace
 
 std::optional<DirectionCap> LightRegions::cap_around(const Region& region, const Vec3d& x) const {
-  if (!region.shape.valid()) return region.cap;
+  if (!region.shape.valid()) return region.patch.cap;
   const Vec3d to = region.hull.center - x;
   const double distance = length(to), sine = region.hull.radius / distance;
   if (!(sine > 0 && sine < 1)) return {};
@@ -329,13 +329,13 @@ Rgb<double> LightRegions::emission(const SurfacePoint<double>& surface, const Ve
 
 Rgb<double> LightRegions::escaped(size_t k, const Vec3d& w) const {
   const Region& region = regions_[k];
-  if (region.shape.valid() || !region.cap.holds(w)) return {};
+  if (region.shape.valid() || !region.patch.holds(w)) return {};
   return scene_.environment->radiance(w);
 }
 
 Rgb<double> LightRegions::escaped(const Vec3d& w) const {
   for (const Region& region : regions_) {
-    if (!region.shape.valid() && region.cap.holds(w)) return scene_.environment->radiance(w);
+    if (!region.shape.valid() && region.patch.holds(w)) return scene_.environment->radiance(w);
   }
   return {};
 }

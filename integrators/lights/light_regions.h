@@ -48,7 +48,7 @@ class LightRegions {
   // Its directions from p above the horizon of n; none if it does not shine there.
   std::optional<DirectionCone> cone(size_t k, const Vec3d& p, const Vec3d& n) const {
     const Region& region = regions_[k];
-    return region.shape.valid() ? cone_around(region.hull, p, n) : cone_around(region.cap, n);
+    return region.shape.valid() ? cone_around(region.hull, p, n) : cone_around(region.patch.cap, n);
   }
 
   // A direction from x in which the region may be: uniform on the polygon of a flat lamp, else over
@@ -65,7 +65,7 @@ class LightRegions {
   // All faces of a flat lamp of few: a line meets one of them at most, also where rounding lets
   // rays meet neighbours. Else empty.
   std::span<const FaceRef> flat_faces(size_t k) const { return regions_[k].flat_faces; }
-  const DirectionCap& cap(size_t k) const { return regions_[k].cap; }
+  const DirectionCap& cap(size_t k) const { return regions_[k].patch.cap; }
 
   // What a surface emits towards the unit direction wi as part of region k.
   Rgb<double> emission(size_t k, const SurfacePoint<double>& surface, const Vec3d& wi) const;
@@ -83,7 +83,7 @@ class LightRegions {
     ShapeId shape;  // none: a patch of the environment
     double luminance;
     LampHull hull;
-    DirectionCap cap;
+    BrightPatch patch;
     std::vector<FaceRef> flat_faces;
     bool lists_edges = true;
   };

@@ -188,6 +188,7 @@ std::vector<MirroredLight::Image> MirroredLight::find_lights(const Scene& scene)
   if (!scene.environment) return found;
   environment_ = scene.environment->mean_luminance();
   for (const BrightPatch& patch : find_bright_patches(*scene.environment)) {
+    if (patch.is_ring()) continue;  // its middle is dark
     Image& image = found.emplace_back();
     image.infinite = true;
     image.light = patch.cap.axis;

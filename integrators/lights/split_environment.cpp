@@ -38,7 +38,7 @@ std::optional<SplitEnvironment> split_environment(const Environment& environment
     for (int i = 0; i < grid->columns; ++i) {
       const Vec3d w = grid->pole * c + around[i] * s;
       const bool bright = std::any_of(found.begin(), found.end(),
-                                      [&](const BrightPatch& patch) { return patch.cap.holds(w); });
+                                      [&](const BrightPatch& patch) { return patch.holds(w); });
       if (bright) any = true;
       for (int k = 0; k < 3; ++k) (bright ? rest : patches).at(i, j, k) = 0;
     }

@@ -85,25 +85,50 @@ std::string lights_of(const TempFiles& files, const std::string& name) {
   return above + make_sky(files, "sky");
 }
 
-// A sun of 3 degrees in a dim sky, and a small one beside the zenith.
-std::string two_suns(const TempFiles& files) {
+struct Disc {
+  Vec3d axis;
+  double angle;  // [degrees]
+  double radiance = 500;
+};
+
+// Discs in a dim sky; where they overlap, the last.
+std::string sky_with(const TempFiles& files, const std::vector<Disc>& discs) {
   Image map(512, 256, 3);
-  const std::pair<Vec3d, double> suns[] = {{{0.5, 0.8, 0.4}, 3}, {{-0.2, 1, 0.1}, 1.5}};
   for (int y = 0; y < map.height; ++y) {
     for (int x = 0; x < map.width; ++x) {
       const double phi = 2 * kPi * (x + 0.5) / map.width, theta = kPi * y / (map.height - 1);
       const Vec3d w{std::sin(phi) * std::sin(theta), std::cos(theta),
                     -std::cos(phi) * std::sin(theta)};
       for (int c = 0; c < 3; ++c) map.at(x, y, c) = 0.2f + 0.1f * static_cast<float>(c);
-      for (const auto& [axis, angle] : suns) {
+      for (const auto& [axis, angle, radiance] : discs) {
         if (dot(w, normalize(axis)) < std::cos(angle * kPi / 180)) continue;
-        for (int c = 0; c < 3; ++c) map.at(x, y, c) = 500.0f - 50.0f * static_cast<float>(c);
+        for (int c = 0; c < 3; ++c) {
+          map.at(x, y, c) = static_cast<float>(radiance * (1 - 0.1 * c));
+        }
       }
     }
   }
   write_exr(files.path("suns.exr"), map, false, {});
   return R"(  <emitter type="envmap" id="sky"><string name="filename" value=")" +
          files.path("suns.exr") + "\"/></emitter>\n";
+}
+
+// A sun of 3 degrees, and a small one beside the zenith.
+std::string two_suns(const TempFiles& files) {
+  return sky_with(files, {{{0.5, 0.8, 0.4}, 3}, {{-0.2, 1, 0.1}, 1.5}});
+}
+
+// What glows around a sun is a region of its own, with a hole where the sun is.
+TEST(Regions, AGlowIsOne) {
+  const TempFiles files;
+  const Vec3d axis{0.5, 0.8, 0.4};
+  const Scene scene = lit_scene(files, sky_with(files, {{axis, 7, 300}, {axis, 2.5, 6000}}));
+  ASSERT_EQ(LightRegions(scene).size(), 2u);
+  const std::vector<std::string> parameters = {"body.translate.x", "floor.rotate.x",
+                                               "body.rotate.z", "body.scale"};
+  const GradientResult a = run(scene, "silhouettes", parameters, 256, 1);
+  const GradientResult b = run(scene, "forest", parameters, 1024, 2);
+  for (size_t k = 0; k < parameters.size(); ++k) expect_equal(a.parameters[k], b.parameters[k]);
 }
 
 // The object before the sun, and a lamp beside it.

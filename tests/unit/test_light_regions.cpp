@@ -151,7 +151,9 @@ TEST(BrightPatches, AreTheSuns) {
       {{{1, 1, 0.3}, 2, 4000}, {{-1, 0.4, 0.2}, 3, 1000}}  // two
   };
   for (const std::vector<Disc>& discs : skies) {
-    const auto patches = find_bright_patches(*sky_with(discs, 1024));
+    auto patches = find_bright_patches(*sky_with(discs, 1024));
+    // Texels blur the rim of a small disc: that may be a ring.
+    std::erase_if(patches, [](const BrightPatch& patch) { return patch.is_ring(); });
     ASSERT_EQ(patches.size(), discs.size());
     for (const BrightPatch& patch : patches) {
       double apart = 10;
@@ -178,6 +180,43 @@ TEST(BrightPatches, ALowSunInHaze) {
   ASSERT_EQ(patches.size(), 1u);
   EXPECT_TRUE(patches[0].cap.holds(normalize(axis)));
   EXPECT_LT(std::asin(patches[0].cap.sine), 1.5 * kPi / 180);
+}
+
+// A sun of half a degree whose glow falls off to six: the steep part is a ring of its own, what is
+// wide and dim is none. Each direction belongs to one patch at most.
+TEST(BrightPatches, AGlowAroundTheSun) {
+  const Vec3d axis = normalize(Vec3d{0.2, 0.4, 1});
+  const auto sky =
+      sky_with({{axis, 6, 5}, {axis, 1.6, 200}, {axis, 0.9, 800}, {axis, 0.5, 3e4}}, 2048);
+  const auto patches = find_bright_patches(*sky);
+  ASSERT_EQ(patches.size(), 2u);
+  EXPECT_FALSE(patches[0].is_ring());
+  EXPECT_TRUE(patches[1].is_ring());
+  EXPECT_EQ(patches[1].inner_cosine, patches[0].cap.cosine);
+  const auto beside = [&](double degrees) {
+    const double angle = degrees * kPi / 180;
+    return axis * std::cos(angle) + Frame(axis).s * std::sin(angle);
+  };
+  const auto held = [&](double degrees) {
+    return std::pair(patches[0].holds(beside(degrees)), patches[1].holds(beside(degrees)));
+  };
+  EXPECT_EQ(held(0.4), std::pair(true, false));
+  EXPECT_EQ(held(1.3), std::pair(false, true));
+  EXPECT_EQ(held(3), std::pair(false, false));
+  for (double angle = 0; angle < 3; angle += 0.01) {
+    EXPECT_FALSE(held(angle).first && held(angle).second) << angle;
+  }
+  EXPECT_GT(patches[1].luminance, 100);
+  EXPECT_LT(patches[1].luminance, 800);
+  // All regions together hold what each does.
+  Scene scene;
+  scene.environment = sky;
+  const LightRegions regions(scene);
+  ASSERT_EQ(regions.size(), 2u);
+  for (double angle = 0; angle < 3; angle += 0.01) {
+    const Vec3d w = beside(angle);
+    EXPECT_EQ(regions.escaped(0, w).g + regions.escaped(1, w).g, regions.escaped(w).g) << angle;
+  }
 }
 
 // Wherever it stands in the map's density: the sun is all that few of its columns draw.
