@@ -242,6 +242,13 @@ void bind_fit(nb::module_& m) {
            nb::sig("def run(self, steps: int, callback: collections.abc.Callable[[FitRecord], "
                    "object] | None = None) -> None"),
            "Several steps; callback(record) after each.")
+      .def("__repr__",
+           [](const FitHandle& handle) {
+             const std::vector<FitRecord>& done = handle.history;
+             if (done.empty()) return std::string("<limn.Fit: no steps>");
+             return fmt::format("<limn.Fit: {} steps, loss {:.4g} +- {:.2g}>", done.size(),
+                                done.back().loss, done.back().error);
+           })
       .def_ro("history", &FitHandle::history, "A FitRecord for each step that was done.")
       .def_prop_ro(
           "scenes",

@@ -147,6 +147,11 @@ void bind_render(nb::module_& m) {
                    "numpy.ndarray"))
       .def("__repr__", [](const Estimate& e) {
         std::string shape;
+        if (e.value.ndim() == 0) {
+          return fmt::format("<limn.Estimate: {:.6g} +- {:.2g}, {} spp, {:.3g} s>",
+                             *static_cast<const double*>(e.value.data()),
+                             *static_cast<const double*>(e.error.data()), e.spp, e.seconds);
+        }
         for (size_t k = 0; k < e.value.ndim(); ++k) {
           shape += fmt::format("{}{}", k > 0 ? ", " : "", e.value.shape(k));
         }
