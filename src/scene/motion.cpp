@@ -43,7 +43,8 @@ std::vector<double> Motion::numbers(const Scene&) const { return {}; }
 void Motion::assign(Scene& scene, const std::string& name, const std::vector<double>&,
                     std::vector<std::string>*) const {
   throw InputError({scene.file}, "parameter \"" + name +
-                                     "\" moves things from where they are and has no value to set");
+                                     "\" moves things from where they are and has no value to set: "
+                                     "move it by a step");
 }
 
 std::vector<Vec3d> Motion::velocities(const Scene&, ShapeId, size_t) const { return {}; }

@@ -7,23 +7,31 @@ namespace limn {
 namespace {
 
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-// Large pages are asked for by a second start, once; not where the user has other wishes, or where
-// no command is given.
+// Large pages are asked for by a second start, once, by whatever name the first one goes and with
+// no standard input, too; not where the user has other wishes, or where no command is given.
 TEST_F(Program, StartsAnewForLargePages) {
   const auto starts = [](const std::string& environment,
-                         const std::string& arguments = "render --help") {
-    const std::string said =
-        run(arguments, "env -u GLIBC_TUNABLES LD_DEBUG=statistics " + environment).text;
-    const std::string once = "total startup time";
+                         const std::string& command = LIMN_PROGRAM " render --help") {
+    const Outcome outcome =
+        call("env -u GLIBC_TUNABLES LD_DEBUG=statistics " + environment + " " + command);
+    EXPECT_EQ(outcome.status, 0) << outcome.text;
+    const std::string once = "total startup time", &said = outcome.text;
     size_t count = 0;
     for (size_t at = said.find(once); at != std::string::npos; at = said.find(once, at + 1))
       ++count;
     return count;
   };
   EXPECT_EQ(starts(""), 2u);
-  EXPECT_EQ(starts("", "--version"), 1u);
-  EXPECT_EQ(starts("GLIBC_TUNABLES= "), 1u);
-  EXPECT_EQ(starts("GLIBC_TUNABLES=glibc.malloc.hugetlb=0 "), 1u);
+  EXPECT_EQ(starts("", LIMN_PROGRAM " render --help <&-"), 2u);
+  std::filesystem::create_symlink(LIMN_PROGRAM, files_.path("by_path"));
+  EXPECT_EQ(starts("PATH=" + files_.path(""), "by_path render --help"), 2u);
+  EXPECT_EQ(starts("", LIMN_PROGRAM " --version"), 1u);
+  EXPECT_EQ(starts("GLIBC_TUNABLES="), 1u);
+  EXPECT_EQ(starts("GLIBC_TUNABLES=glibc.malloc.hugetlb=0"), 1u);
+  const std::string loader = "/lib64/ld-linux-x86-64.so.2";  // it would start itself
+  if (std::filesystem::exists(loader)) {
+    EXPECT_EQ(starts("", loader + " " LIMN_PROGRAM " render --help"), 1u);
+  }
 }
 #endif
 
@@ -243,6 +251,19 @@ TEST_F(Program, ChecksAnyMethod) {
                                 " --wrt screen.translate.y");
     EXPECT_TRUE(outcome.status == 0 || outcome.status == 4) << method << outcome.text;
   }
+}
+
+// What it tells to take can be taken: a whole number, more than there were.
+TEST_F(Program, CheckTellsHowManySamplesToTake) {
+  const std::string said =
+      run("check " + scene_ + " --spp 16 --wrt screen.translate.y --samples 1,1,1").text;
+  const std::string before = "take about --spp ";
+  const size_t at = said.find(before);
+  ASSERT_NE(at, std::string::npos) << said;
+  const std::string number =
+      said.substr(at + before.size(), said.find('\n', at) - at - before.size());
+  EXPECT_EQ(number.find_first_not_of("0123456789"), std::string::npos) << number;
+  EXPECT_GT(std::stoi(number), 100) << said;
 }
 
 // A sample done again adds what it added in its run: with one sample per pixel, the pixel's value.

@@ -98,6 +98,17 @@ def test_a_step_against_the_gradient_lowers_the_loss(scene):
     assert after.value + 3 * after.stderr < loss.value - 3 * loss.stderr
 
 
+def test_what_prints_say(scene, adjoint):
+    name = "tent.translate.x"
+    slope = limn.backward(scene, adjoint, name, spp=4)[name]
+    assert repr(slope).startswith(f"<limn.Estimate: {float(slope):.6g} +- {slope.stderr:.2g}, 4 spp")
+    assert repr(limn.render(scene, spp=2)).startswith("<limn.Estimate: (12, 16, 3), 2 spp")
+    fit = limn.Fit(scene, adjoint, name, spp=2)
+    assert repr(fit) == "<limn.Fit: no steps>"
+    loss = fit.step().loss
+    assert repr(fit).startswith(f"<limn.Fit: 1 steps, loss {loss:.4g} +- ")
+
+
 @pytest.mark.parametrize("call, text", [
     (lambda s, a: limn.backward(s, a[:5]), "adjoint"),
     (lambda s, a: limn.backward(s, a * np.nan), "adjoint"),

@@ -16,8 +16,15 @@ namespace {
 
 using nlohmann::json;
 
+// Two digits, as can be typed: 1.2, 58, 5800.
+std::string two_digits(double value) {
+  const double unit = std::pow(10, std::floor(std::log10(value)) - 1);
+  if (!(value >= 10 && std::isfinite(value))) return fmt::format("{:.2g}", value);
+  return fmt::format("{:.0f}", std::round(value / unit) * unit);
+}
+
 std::string percent(double part) {
-  return part < 10 ? fmt::format("{:.2g} %", 100 * part) : "more than all";
+  return part < 10 ? two_digits(100 * part) + " %" : "more than all";
 }
 
 // "2.1 % of the whole; 1.9 % of interior, 6 % of camera"
@@ -48,8 +55,8 @@ void print_verdict(const CheckResult& r, int spp) {
         "a light:\n  the gradient is the slope on one side, and differences are the mean of "
         "both\n");
   } else {
-    fmt::print("  CANNOT TELL: an error of a fifth could have hidden: take about --spp {:.2g}\n",
-               std::max(r.needed_spp, spp + 1.0));
+    fmt::print("  CANNOT TELL: an error of a fifth could have hidden: take about --spp {}\n",
+               two_digits(std::max(r.needed_spp, 1.1 * spp)));
   }
 }
 

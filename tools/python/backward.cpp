@@ -61,34 +61,53 @@ void bind_loss(nb::module_& m) {
       "image_loss",
       [](const SceneHandle& handle, nb::handle target, const std::string& kind,
          std::optional<int> spp, std::optional<uint64_t> seed, int threads,
-         const nb::object& progress, nb::handle mask, int pyramid) {
+         const nb::object& progress, nb::handle mask, int pyramid, const std::string& method,
+         const std::string& points) {
         const auto scene = handle.share();
+        const LossImages images{method, to_points(points, {{"spp", spp.has_value()}})};
         const Image image = to_image(target);
         const LossKind loss = loss_kind(kind);
         const Image weights = mask.is_none() ? Image{} : to_image(mask);
         LossResult result;
         run_job(make_settings(*scene, {spp, seed, 0, threads}), progress,
                 [&](const RunSettings& settings) {
-                  result = image_loss(*scene, image, loss, settings, weights, pyramid);
+                  result = image_loss(*scene, image, loss, settings, weights, pyramid, images);
                 });
         return result;
       },
       nb::arg("scene"), nb::arg("target"), nb::arg("kind") = "l2", nb::arg("spp") = nb::none(),
       nb::arg("seed") = nb::none(), nb::arg("threads") = 0, nb::arg("progress") = nb::none(),
-      nb::arg("mask") = nb::none(), nb::arg("pyramid") = 1,
-      nb::sig("def image_loss(scene: Scene, target: numpy.typing.ArrayLike, kind: str = 'l2', spp: "
-              "int | None = None, seed: int | None = None, threads: int = 0, progress: "
-              "collections.abc.Callable[[float], object] | None = None, mask: "
-              "numpy.typing.ArrayLike | None = None, pyramid: int = 1) -> Loss"),
+      nb::arg("mask") = nb::none(), nb::arg("pyramid") = 1, nb::arg("method") = "path",
+      nb::arg("points") = "random",
+      nb::sig(
+          "def image_loss(scene: Scene, target: numpy.typing.ArrayLike, kind: str = 'l2', spp: "
+          "int | None = None, seed: int | None = None, threads: int = 0, progress: "
+          "collections.abc.Callable[[float], object] | None = None, mask: "
+          "numpy.typing.ArrayLike | None = None, pyramid: int = 1, method: str = 'path', points: "
+          "str = 'random') -> Loss"),
       "Renders the scene twice, independently, and compares with a target, (H, W, 3) or (H, W).\n\n"
       "kind: \"l2\", \"relative-l2\" or \"l1\". limn.backward with the same seed and the adjoint "
       "found "
       "here gives an unbiased gradient of l2 and relative-l2.\n"
       "mask: what pixels weigh, (H, W). pyramid: levels, the mean over the loss of the image as it "
-      "is, at half its size, a quarter, ....");
+      "is, at half its size, a quarter, ....\n"
+      "method, points: of the images, \"path\" or \"analytic\", see limn.render. With points "
+      "\"faces\" there is one image, the loss is a function without noise, and limn.backward with "
+      "the same points gives its gradient.");
 }
 
 }  // namespace
+
+FilmPoints to_points(const std::string& name, const BackwardOptions& options,
+                     std::vector<SampleKeyword> samples) {
+  const BackwardOptions unasked;
+  samples.insert(samples.end(),
+                 {{"uniform_pixels", options.uniform_pixels},
+                  {"edge_samples", options.edge_samples != unasked.edge_samples},
+                  {"camera_samples", options.camera_samples != unasked.camera_samples},
+                  {"shadow_samples", options.shadow_samples != unasked.shadow_samples}});
+  return to_points(name, samples);
+}
 
 void bind_backward(nb::module_& m) {
   bind_loss(m);
@@ -98,7 +117,8 @@ void bind_backward(nb::module_& m) {
          std::optional<int> spp, std::optional<uint64_t> seed,
          const std::vector<std::string>& terms, bool uniform_pixels, int edge_samples,
          double camera_samples, double shadow_samples, int batches, double seconds, int threads,
-         const nb::object& progress, const std::string& sampler, BatchStore* store) {
+         const nb::object& progress, const std::string& sampler, const std::string& points,
+         BatchStore* store) {
         BackwardOptions options;
         options.sampler = sampler;
         if (names) options.parameters = to_list(*names);
@@ -108,6 +128,9 @@ void bind_backward(nb::module_& m) {
         options.camera_samples = camera_samples;
         options.shadow_samples = shadow_samples;
         options.batches = batches;
+        options.points = to_points(
+            points, options,
+            {{"spp", spp.has_value()}, {"seconds", seconds != 0}, {"batches", batches != 16}});
         if (batches < 1) throw InputError("batches must be 1 or more");
         return backward_of(scene, to_image(adjoint), options, {spp, seed, seconds, threads, store},
                            progress);
@@ -118,7 +141,8 @@ void bind_backward(nb::module_& m) {
       nb::arg("edge_samples") = 1, nb::arg("camera_samples") = BackwardOptions{}.camera_samples,
       nb::arg("shadow_samples") = BackwardOptions{}.shadow_samples, nb::arg("batches") = 16,
       nb::arg("seconds") = 0.0, nb::arg("threads") = 0, nb::arg("progress") = nb::none(),
-      nb::arg("sampler") = BackwardOptions{}.sampler, nb::arg("_store").none() = nb::none(),
+      nb::arg("sampler") = BackwardOptions{}.sampler, nb::arg("points") = "random",
+      nb::arg("_store").none() = nb::none(),
       nb::sig(
           "def backward(scene: Scene, adjoint: numpy.typing.ArrayLike, names: str | "
           "collections.abc.Sequence[str] | None = None, spp: int | None = None, seed: int | None "
@@ -126,7 +150,7 @@ void bind_backward(nb::module_& m) {
           "edge_samples: int = 1, camera_samples: float = 0, shadow_samples: float = 1, "
           "batches: int = 16, seconds: float = 0, threads: int = 0, progress: "
           "collections.abc.Callable[[float], object] | None = None, "
-          "sampler: str = 'forest') -> dict[str, Estimate]"),
+          "sampler: str = 'forest', points: str = 'random') -> dict[str, Estimate]"),
       "Reverse mode: dLoss/dparameter of every parameter at once, from dLoss/dImage.\n\n"
       "adjoint: (H, W, 3), or (H, W) of the luminance; independent of the samples made here "
       "(another "
@@ -143,7 +167,10 @@ void bind_backward(nb::module_& m) {
       "which is better "
       "where shadows are soft; \"analytic\": none, but the light of flat lamps in closed form; or "
       "to compare with them \"quadric\", \"li2019\", \"uniform\", "
-      "\"brute\". batches: at most, for standard errors. The rest as limn.gradient.");
+      "\"brute\". batches: at most, for standard errors.\n"
+      "points: \"faces\", with the sampler analytic: of the image that limn.render makes with "
+      "these "
+      "points, exactly, without samples. The rest as limn.gradient.");
 }
 
 }  // namespace limn::python

@@ -18,6 +18,8 @@
 #include <vector>
 
 #include "limn/core/scene.h"
+#include "limn/integrators/backward.h"
+#include "limn/integrators/film_points.h"
 #include "limn/integrators/gradient.h"
 #include "limn/integrators/moments.h"
 #include "limn/integrators/parts.h"
@@ -88,10 +90,22 @@ using Names = std::variant<std::string, std::vector<std::string>>;
 std::vector<std::string> to_list(const Names& names);
 // "auto", "uniform" or counts.
 using Samples = std::variant<std::string, std::vector<double>>;
+bool is_auto(const Samples& samples);
 void set_samples(const Samples& samples, std::optional<SampleCounts>& counts);
 
 // "rays": false, "exact": true; InputError for other words.
 bool is_exact(const std::string& film);
+
+// A keyword that tells of samples, and whether it was given.
+struct SampleKeyword {
+  const char* name;
+  bool given;
+};
+// "random" or "faces"; InputError for other words, and for faces with one of these keywords.
+FilmPoints to_points(const std::string& name, const std::vector<SampleKeyword>& samples);
+// The same of a reverse pass, with the keywords that its options are from.
+FilmPoints to_points(const std::string& name, const BackwardOptions& options,
+                     std::vector<SampleKeyword> samples);
 
 // What every run takes; none: what the scene asks for.
 struct RunArguments {

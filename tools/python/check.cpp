@@ -37,6 +37,28 @@ Check check_of(const SceneHandle& handle, const CheckOptions& options, const Run
   return check;
 }
 
+// The same of faces, which no chance is in.
+struct ExactCheck {
+  FacesCheck result;
+  Estimate gradient;
+};
+
+ExactCheck check_exactly(const SceneHandle& handle, const CheckOptions& options,
+                         const RunArguments& run, const nb::object& progress) {
+  const auto scene = handle.share();
+  ExactCheck check;
+  run_job(make_settings(*scene, run), progress, [&](const RunSettings& settings) {
+    check.result = check_faces(*scene, options, settings);
+  });
+  const GradientResult& gradient = check.result.gradient;
+  check.gradient =
+      to_estimate(gradient.parameters.at(0).total, scene->film, gradient.spp, gradient.seconds);
+  check.gradient.warnings = gradient.warnings;
+  warn_all(gradient.warnings);
+  check_finite(check.result.non_finite, nb::cast(check));
+  return check;
+}
+
 // A field of the result, by value.
 template <class Field>
 auto field(Field CheckResult::*member) {
@@ -78,34 +100,75 @@ void bind_result(nb::module_& m) {
       });
 }
 
+template <class Field>
+auto exact(Field FacesCheck::*member) {
+  return [member](const ExactCheck& c) { return c.result.*member; };
+}
+
+void bind_exact_result(nb::module_& m) {
+  nb::class_<ExactCheck>(m, "FacesCheck", "What limn.check found of points \"faces\".")
+      .def_prop_ro(
+          "verdict", [](const ExactCheck& c) { return verdict_name(c.result.verdict); },
+          "\"agree\", \"disagree\" or \"cannot tell\".")
+      .def_prop_ro("error", exact(&FacesCheck::error),
+                   "By how much of the derivative the gradient and the differences differ.")
+      .def_prop_ro("known", exact(&FacesCheck::known),
+                   "By how much of it the differences of two steps differ.")
+      .def_prop_ro("step", exact(&FacesCheck::step), "Of the differences, in the parameter's unit.")
+      .def_prop_ro("gradient_sum", exact(&FacesCheck::gradient_sum),
+                   "Sum over the image's pixels and channels.")
+      .def_prop_ro("difference_sum", exact(&FacesCheck::difference_sum))
+      .def_ro("gradient", &ExactCheck::gradient, "The gradient: an image, (H, W, 3).")
+      .def("__repr__", [](const ExactCheck& c) {
+        return fmt::format("<limn.FacesCheck: {}, error = {:.2g}>", verdict_name(c.result.verdict),
+                           c.result.error);
+      });
+}
+
+nb::object check_scene(const SceneHandle& scene, CheckOptions options, const Samples& samples,
+                       const std::string& points, const RunArguments& run,
+                       const nb::object& progress) {
+  set_samples(samples, options.samples);
+  const FilmPoints over = to_points(points, {{"spp", run.spp.has_value()},
+                                             {"samples", !is_auto(samples)},
+                                             {"block", options.block != 0}});
+  if (over == FilmPoints::kFaces) return nb::cast(check_exactly(scene, options, run, progress));
+  return nb::cast(check_of(scene, options, run, progress));
+}
+
 }  // namespace
 
 void bind_check(nb::module_& m) {
   bind_result(m);
+  bind_exact_result(m);
   m.def(
       "check",
       [](const SceneHandle& scene, const std::string& name, std::optional<int> spp,
          std::optional<uint64_t> seed, const std::string& method,
          const std::vector<std::string>& terms, const Samples& samples, double step, int block,
-         int aux, double kappa, int threads, const nb::object& progress, const std::string& film) {
-        CheckOptions options{name, method, terms, step, block, {}, {aux, kappa}, is_exact(film)};
-        set_samples(samples, options.samples);
-        return check_of(scene, options, {spp, seed, 0, threads}, progress);
+         int aux, double kappa, int threads, const nb::object& progress, const std::string& film,
+         const std::string& points) {
+        return check_scene(scene,
+                           {name, method, terms, step, block, {}, {aux, kappa}, is_exact(film)},
+                           samples, points, {spp, seed, 0, threads}, progress);
       },
       nb::arg("scene"), nb::arg("name"), nb::arg("spp") = nb::none(), nb::arg("seed") = nb::none(),
       nb::arg("method") = "", nb::arg("terms") = nb::make_tuple(), nb::arg("samples") = "auto",
       nb::arg("step") = 0.0, nb::arg("block") = 0, nb::arg("aux") = WarpOptions{}.rays,
       nb::arg("kappa") = WarpOptions{}.kappa, nb::arg("threads") = 0,
-      nb::arg("progress") = nb::none(), nb::arg("film") = "rays",
+      nb::arg("progress") = nb::none(), nb::arg("film") = "rays", nb::arg("points") = "random",
       nb::sig("def check(scene: Scene, name: str, spp: int | None = None, seed: int | None = None, "
               "method: str = '', terms: collections.abc.Sequence[str] = (), samples: str | "
               "collections.abc.Sequence[float] = 'auto', step: float = 0, block: int = 0, aux: int "
               "= 8, "
               "kappa: float = 1e4, threads: int = 0, progress: collections.abc.Callable[[float], "
-              "object] | None = None, film: str = 'rays') -> Check"),
+              "object] | None = None, film: str = 'rays', points: str = 'random') -> Check | "
+              "FacesCheck"),
       "Compares a gradient with finite differences, both with their errors.\n\n"
       "A right gradient is accused once in ten thousand times. step, block: of the differences and "
-      "of the windows [pixels]; 0: chosen. The rest as limn.gradient.");
+      "of the windows [pixels]; 0: chosen.\n"
+      "points: \"faces\", with the method analytic: the exact gradient of that image against "
+      "differences of it; what comes back is then a FacesCheck. The rest as limn.gradient.");
 }
 
 }  // namespace limn::python

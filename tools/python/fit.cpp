@@ -151,7 +151,7 @@ void bind_fit(nb::module_& m) {
              int pyramid, int spp_doubling, double remesh_edge, double remesh_shrink,
              const std::map<std::string, std::pair<double, double>>& bounds,
              const std::string& sampler, bool uniform_pixels, int edge_samples,
-             double camera_samples, double shadow_samples) {
+             double camera_samples, double shadow_samples, const std::string& points) {
             FitOptions options;
             for (const auto& [name, range] : bounds) {
               options.bounds.push_back({name, range.first, range.second});
@@ -161,6 +161,10 @@ void bind_fit(nb::module_& m) {
             options.backward.edge_samples = edge_samples;
             options.backward.camera_samples = camera_samples;
             options.backward.shadow_samples = shadow_samples;
+            options.backward.points = to_points(points, options.backward,
+                                                {{"spp", spp.has_value()},
+                                                 {"loss_spp", loss_spp != 0},
+                                                 {"spp_doubling", spp_doubling != 0}});
             options.parameters = to_list(names);
             options.loss = loss_kind(loss);
             options.optimiser = optimiser_kind(optimiser);
@@ -193,6 +197,7 @@ void bind_fit(nb::module_& m) {
           nb::arg("sampler") = BackwardOptions{}.sampler, nb::arg("uniform_pixels") = false,
           nb::arg("edge_samples") = 1, nb::arg("camera_samples") = BackwardOptions{}.camera_samples,
           nb::arg("shadow_samples") = BackwardOptions{}.shadow_samples,
+          nb::arg("points") = "random",
           nb::sig(
               "def __init__(self, scene: Scene, target: numpy.typing.ArrayLike, names: str | "
               "collections.abc.Sequence[str], mask: numpy.typing.ArrayLike | None = None, "
@@ -205,7 +210,7 @@ void bind_fit(nb::module_& m) {
               "0, remesh_edge: float = 0.75, remesh_shrink: float = 0.65, bounds: "
               "collections.abc.Mapping[str, tuple[float, float]] = {}, sampler: str = 'forest', "
               "uniform_pixels: bool = False, edge_samples: int = 1, camera_samples: float = 0, "
-              "shadow_samples: float = 1) -> None"),
+              "shadow_samples: float = 1, points: str = 'random') -> None"),
           "Copies the scene; it stays as it is.\n\n"
           "target: (H, W, 3) or (H, W). names: scalars and arrays "
           "(\"object.vertex_positions\").\n"
@@ -224,7 +229,10 @@ void bind_fit(nb::module_& m) {
           "remesh: steps after which vertices get new triangles, with edges remesh_edge times as "
           "long, steps and smoothing remesh_shrink times what they were.\n"
           "bounds: {name: (least, most)} that scalars may not leave. sampler, uniform_pixels, "
-          "edge_samples, camera_samples, shadow_samples: of the gradient, see limn.backward.")
+          "edge_samples, camera_samples, shadow_samples: of the gradient, see limn.backward.\n"
+          "points: \"faces\", with the sampler analytic: losses and gradients of images made of "
+          "their "
+          "visible faces, without samples; lbfgs gets farthest with them.")
       .def("step", &step, nb::arg("progress") = nb::none(),
            nb::sig("def step(self, progress: collections.abc.Callable[[float], object] | None = "
                    "None) -> FitRecord"),
@@ -234,6 +242,13 @@ void bind_fit(nb::module_& m) {
            nb::sig("def run(self, steps: int, callback: collections.abc.Callable[[FitRecord], "
                    "object] | None = None) -> None"),
            "Several steps; callback(record) after each.")
+      .def("__repr__",
+           [](const FitHandle& handle) {
+             const std::vector<FitRecord>& done = handle.history;
+             if (done.empty()) return std::string("<limn.Fit: no steps>");
+             return fmt::format("<limn.Fit: {} steps, loss {:.4g} +- {:.2g}>", done.size(),
+                                done.back().loss, done.back().error);
+           })
       .def_ro("history", &FitHandle::history, "A FitRecord for each step that was done.")
       .def_prop_ro(
           "scenes",

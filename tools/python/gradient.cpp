@@ -13,6 +13,11 @@ std::vector<std::string> to_list(const Names& names) {
   return one ? std::vector<std::string>{*one} : std::get<std::vector<std::string>>(names);
 }
 
+bool is_auto(const Samples& samples) {
+  const std::string* word = std::get_if<std::string>(&samples);
+  return word && *word == "auto";
+}
+
 void set_samples(const Samples& samples, std::optional<SampleCounts>& counts) {
   const std::string* word = std::get_if<std::string>(&samples);
   if (word && *word != "auto" && *word != "uniform") {
@@ -35,6 +40,7 @@ struct GradientArguments {
   double step;
   WarpOptions warp;
   std::string film;
+  FilmPoints points;
 };
 
 GradientOptions to_options(const GradientArguments& arguments) {
@@ -45,6 +51,7 @@ GradientOptions to_options(const GradientArguments& arguments) {
   options.step = arguments.step;
   options.warp = arguments.warp;
   options.exact_film = is_exact(arguments.film);
+  options.points = arguments.points;
   set_samples(arguments.samples, options.samples);
   const std::string* word = std::get_if<std::string>(&arguments.samples);
   options.uniform_samples = word && *word == "uniform";
@@ -78,15 +85,18 @@ void bind_gradient(nb::module_& m) {
          std::optional<uint64_t> seed, const std::string& method,
          const std::vector<std::string>& terms, const Samples& samples, double step, int aux,
          double kappa, double seconds, int threads, const nb::object& progress,
-         const std::string& film, BatchStore* store) {
-        return gradient_of(scene, {names, method, terms, samples, step, {aux, kappa}, film},
+         const std::string& film, const std::string& points, BatchStore* store) {
+        const FilmPoints over = to_points(
+            points,
+            {{"spp", spp.has_value()}, {"seconds", seconds != 0}, {"samples", !is_auto(samples)}});
+        return gradient_of(scene, {names, method, terms, samples, step, {aux, kappa}, film, over},
                            {spp, seed, seconds, threads, store}, progress);
       },
       nb::arg("scene"), nb::arg("names"), nb::arg("spp") = nb::none(), nb::arg("seed") = nb::none(),
       nb::arg("method") = "", nb::arg("terms") = nb::make_tuple(), nb::arg("samples") = "auto",
       nb::arg("step") = 0.0, nb::arg("aux") = WarpOptions{}.rays,
       nb::arg("kappa") = WarpOptions{}.kappa, nb::arg("seconds") = 0.0, nb::arg("threads") = 0,
-      nb::arg("progress") = nb::none(), nb::arg("film") = "rays",
+      nb::arg("progress") = nb::none(), nb::arg("film") = "rays", nb::arg("points") = "random",
       nb::arg("_store").none() = nb::none(),
       nb::sig(
           "def gradient(scene: Scene, names: str | collections.abc.Sequence[str], spp: int | None "
@@ -94,8 +104,8 @@ void bind_gradient(nb::module_& m) {
           "collections.abc.Sequence[str] = (), samples: str | collections.abc.Sequence[float] = "
           "'auto', step: float = 0, aux: int = 8, kappa: float = 1e4, seconds: float = 0, threads: "
           "int = 0, progress: "
-          "collections.abc.Callable[[float], object] | None = None, film: str = 'rays') -> "
-          "dict[str, Estimate]"),
+          "collections.abc.Callable[[float], object] | None = None, film: str = 'rays', "
+          "points: str = 'random') -> dict[str, Estimate]"),
       "Derivative images, (H, W, 3) radiance per unit of each parameter, all from the same "
       "samples.\n\n"
       "names: of numbers; a vertex is \"object.vertex_positions.7.x\", a field of vectors "
@@ -110,6 +120,8 @@ void bind_gradient(nb::module_& m) {
       "film: \"rays\", or \"exact\": edges on the film are drawn from what is seen of them alone "
       "(box "
       "filter).\n"
+      "points: \"faces\", with the method analytic: of the image that limn.render makes with these "
+      "points, exactly, without samples.\n"
       "Raises limn.UnknownParameterError (a KeyError), limn.InputError, limn.NonFiniteError.");
   m.def(
       "methods",

@@ -61,6 +61,16 @@ void attend(const nb::object& progress, double done, double& told) {
 
 }  // namespace
 
+FilmPoints to_points(const std::string& name, const std::vector<SampleKeyword>& samples) {
+  const FilmPoints points = film_points(name);
+  if (points == FilmPoints::kRandom) return points;
+  for (const SampleKeyword& keyword : samples) {
+    if (!keyword.given) continue;
+    throw InputError(std::string(keyword.name) + ": points \"" + name + "\" take no samples");
+  }
+  return points;
+}
+
 RunSettings make_settings(const Scene& scene, const RunArguments& arguments) {
   if (arguments.spp && *arguments.spp < 1) throw InputError("spp must be 1 or more");
   if (!(arguments.seconds >= 0)) throw InputError("seconds must not be negative");

@@ -51,8 +51,10 @@ Estimate render_scene(const SceneHandle& handle, std::optional<int> spp,
                       std::optional<uint64_t> seed, int threads, const nb::object& progress,
                       const std::string& method, const std::string& film,
                       const std::string& sampler, const std::string& what, int lines,
-                      double tolerance, int rays, BatchStore* store) {
+                      double tolerance, int rays, const std::string& points, BatchStore* store) {
   RenderOptions options;
+  options.points = to_points(
+      points, {{"spp", spp.has_value()}, {"sampler", sampler != RenderOptions().sampler}});
   options.method = method;
   options.exact_film = is_exact(film);
   options.sampler = sampler;
@@ -145,6 +147,11 @@ void bind_render(nb::module_& m) {
                    "numpy.ndarray"))
       .def("__repr__", [](const Estimate& e) {
         std::string shape;
+        if (e.value.ndim() == 0) {
+          return fmt::format("<limn.Estimate: {:.6g} +- {:.2g}, {} spp, {:.3g} s>",
+                             *static_cast<const double*>(e.value.data()),
+                             *static_cast<const double*>(e.error.data()), e.spp, e.seconds);
+        }
         for (size_t k = 0; k < e.value.ndim(); ++k) {
           shape += fmt::format("{}{}", k > 0 ? ", " : "", e.value.shape(k));
         }
@@ -156,12 +163,13 @@ void bind_render(nb::module_& m) {
       nb::arg("method") = "path", nb::arg("film") = "rays",
       nb::arg("sampler") = RenderOptions().sampler, nb::arg("what") = "image",
       nb::arg("lines") = 64, nb::arg("tolerance") = 0.0, nb::arg("rays") = 4,
-      nb::arg("_store").none() = nb::none(),
+      nb::arg("points") = "random", nb::arg("_store").none() = nb::none(),
       nb::sig(
           "def render(scene: Scene, spp: int | None = None, seed: int | None = None, threads: "
           "int = 0, progress: collections.abc.Callable[[float], object] | None = None, method: "
           "str = 'path', film: str = 'rays', sampler: str = 'independent', what: str = 'image', "
-          "lines: int = 64, tolerance: float = 0.0, rays: int = 4) -> Estimate"),
+          "lines: int = 64, tolerance: float = 0.0, rays: int = 4, points: str = 'random') -> "
+          "Estimate"),
       "The image of a scene: linear RGB radiance, (H, W, 3).\n\n"
       "spp, seed: of the scene's file if None. threads: 0 for all cores; they change no bit.\n"
       "progress: called with the fraction done. Ctrl-C raises KeyboardInterrupt; samples that are "
@@ -182,7 +190,11 @@ void bind_render(nb::module_& m) {
       "filter).\n"
       "sampler: \"independent\", or \"padded-sobol\", even numbers: a third of the squared error, "
       "mostly, but stderr is then neither the error nor a bound of it (compare images of several "
-      "seeds instead). silhouettes, lines and rays always have even numbers.");
+      "seeds instead). silhouettes, lines and rays always have even numbers.\n"
+      "points: of analytic, \"random\", or \"faces\": a pixel is made of the faces that it shows, "
+      "without samples and noise (stderr is 0), and its image has an exact derivative: that of "
+      "limn.gradient, limn.image_loss, limn.backward and limn.Fit with the same points (box "
+      "filter).");
 }
 
 }  // namespace limn::python
