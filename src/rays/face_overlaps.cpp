@@ -215,7 +215,13 @@ class OverlapFinder {
 }  // namespace
 
 FaceOverlaps::FaceOverlaps(const Scene& scene, const FaceCopies& copies, int threads, Of of)
-    : scene_(&scene), copies_(&copies), overlaps_(scene.shapes.size()) {
+    : scene_(&scene), copies_(&copies) {
+  size_t faces = 0;
+  for (const Shape& shape : scene.shapes) {
+    first_numbers_.push_back(faces);
+    faces += shape.mesh.faces.size();
+  }
+  has_others_.resize(faces);
   std::vector<FoundPair> pairs = OverlapFinder(scene, copies, of).find(threads);
   const size_t count = pairs.size();
   pairs.reserve(2 * count);
@@ -230,12 +236,16 @@ FaceOverlaps::FaceOverlaps(const Scene& scene, const FaceCopies& copies, int thr
   others_.reserve(pairs.size());
   for (const FoundPair& pair : pairs) {
     const FaceRef face = pair.faces.first;
-    overlaps_[face.shape.index()] = true;
+    has_others_[number(face)] = true;
     Range& range =
         of_.try_emplace(key(face), Range{others_.size(), others_.size(), 0}).first->second;
     others_.push_back(pair.faces.second);
     range.end = others_.size();
     if (!pair.near) range.near = range.end;
+  }
+  for (const std::vector<FaceRef>& alike : copies.sets()) {
+    if (!has_others_[number(alike.front())]) continue;
+    for (const FaceRef copy : alike) has_others_[number(copy)] = true;
   }
 }
 
@@ -250,10 +260,9 @@ FaceOverlaps::Found FaceOverlaps::find(FaceRef face) const {
 std::vector<FacePair> FaceOverlaps::pairs() const {
   std::vector<FacePair> pairs;
   for (uint32_t s = 0; s < scene_->shapes.size(); ++s) {
-    if (!overlaps_[s]) continue;
     for (uint32_t f = 0; f < scene_->shapes[s].mesh.faces.size(); ++f) {
       const FaceRef face{ShapeId(s), FaceId(f)};
-      if (copies_->first(face) != face) continue;
+      if (!has_others_[number(face)] || copies_->first(face) != face) continue;
       for (const FaceRef other : of(face))
         if (place(face) < place(other)) pairs.push_back({face, other});
     }

@@ -68,8 +68,11 @@ class FaceOverlaps {
   }
   using Found = std::pair<std::span<const FaceRef>, std::span<const FaceRef>>;  // in plane, near
   Found found_of(FaceRef face) const {
-    if (!face.shape.valid() || !overlaps_[face.shape.index()]) return {};
+    if (!face.shape.valid() || !has_others_[number(face)]) return {};
     return find(copies_->first(face));
+  }
+  size_t number(FaceRef face) const {
+    return first_numbers_[face.shape.index()] + face.face.index();
   }
   Found find(FaceRef face) const;
   void settle_in_plane(const Ray& ray, Hit& hit) const;
@@ -77,7 +80,10 @@ class FaceOverlaps {
 
   const Scene* scene_;
   const FaceCopies* copies_;
-  std::vector<bool> overlaps_;  // shapes: whether a face of theirs is in a pair
+  std::vector<size_t> first_numbers_;  // of each shape's faces
+  // Whether a face, or one that it is a copy of, is in a pair: asked twice for every ray, mostly of
+  // faces that are in none.
+  std::vector<bool> has_others_;
   std::vector<FaceRef> others_;
   struct Range {
     size_t begin, near, end;  // in others_: those in the plane, then those near to it
