@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "integrators/compare/check_step.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/check.h"
 #include "limn/integrators/render.h"
@@ -15,6 +16,9 @@ constexpr double kShrink = 0.25;
 
 // What is told as exact is confirmed only by differences that are known this well. Not tuned.
 constexpr double kWanted = 1e-3;
+
+// Of images, over what they hold: some hundred units in the last place.
+constexpr double kImageRounding = 0x1p-44;
 
 double size_of(const std::vector<double>& values) {
   double sum = 0;
@@ -66,14 +70,19 @@ FacesCheck check_faces(const Scene& scene, const CheckOptions& options, const Ru
   std::vector<double> before, best;
   double least = INFINITY;
   for (int i = 0; i < kSteps; ++i, step *= kShrink) {
-    std::vector<double> differences = minus(image_at(step), image_at(-step));
+    std::vector<double> differences = image_at(step);
+    // Steps at which nothing moves any more do not change either.
+    const double rounding = kImageRounding * size_of(differences) / step +
+                            rounding_of_moves(scene, parameter, step) * size_of(told);
+    differences = minus(std::move(differences), image_at(-step));
     for (double& d : differences) d /= 2 * step;
     if (interrupted()) {
       result.interrupted = true;
       return result;
     }
     if (settings.progress) settings.progress((i + 1.0) / kSteps);
-    const double change = before.empty() ? INFINITY : size_of(minus(differences, before));
+    const double change =
+        before.empty() ? INFINITY : std::max(size_of(minus(differences, before)), rounding);
     if (best.empty() || change < least) {
       least = change;
       best = differences;

@@ -27,8 +27,8 @@ constexpr double kAllowedBias = 1;
 constexpr double kExtrapolated = 12.5 / 9;
 
 // Below this part of a moved coordinate, a vertex moves by what rounding leaves of its way: an
-// error of 2^-10 of it.
-constexpr double kLeastMove = 0x1p-14;
+// error of kRounding of it.
+constexpr double kLeastMove = 0x1p-14, kRounding = 0x1p-10;
 
 // The same of texels, where the fastest decide: radiance is linear in them, so that a step too
 // large for others does no harm.
@@ -192,6 +192,10 @@ double find_check_step(const Scene& scene, const std::string& parameter, const W
     largest = job.steps.front();
   }
   return power_of_two_below(std::min(std::max(step, 2 * least), moved.natural_step));
+}
+
+double rounding_of_moves(const Scene& scene, const Parameter& parameter, double step) {
+  return kRounding * least_step(scene, parameter) / step;
 }
 
 double reduced_step(const DifferenceResult& differences, double step, const Windows& windows) {

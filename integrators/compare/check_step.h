@@ -1,6 +1,7 @@
 #pragma once
 // The step at which a gradient is checked against differences.
 #include "integrators/compare/check_scores.h"
+#include "limn/core/parameter.h"
 #include "limn/core/scene.h"
 #include "limn/integrators/run.h"
 
@@ -16,5 +17,9 @@ double find_check_step(const Scene& scene, const std::string& parameter, const W
 // The same judged by the run itself, which sees more than the pilot: the step if the run's bias is
 // small enough, else a smaller one.
 double reduced_step(const DifferenceResult& differences, double step, const Windows& windows);
+
+// What the rounding of moved positions and texels, which are floats, makes of differences at a step,
+// over the derivative: about 2^-24 of what moves over its way. 0 where nothing of these moves.
+double rounding_of_moves(const Scene& scene, const Parameter& parameter, double step);
 
 }  // namespace limn

@@ -136,7 +136,7 @@ std::unique_ptr<MirroredLight> MirroredLight::make(const Scene& scene, const Lig
       std::none_of(scene.shapes.begin(), scene.shapes.end(), may_mirror)) {
     return nullptr;
   }
-  std::unique_ptr<MirroredLight> result(new MirroredLight(lights));
+  std::unique_ptr<MirroredLight> result(new MirroredLight(scene, lights));
   const std::vector<Image> sources = result->find_lights(scene);
   if (sources.empty()) return nullptr;
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {

@@ -48,14 +48,16 @@ class MirroredLight {
   // Both must outlive it. Null where the scene has no such light or surface.
   static std::unique_ptr<MirroredLight> make(const Scene& scene, const Lights& lights);
 
+  // surface: of the same scene, or of it as it has moved, where the materials that it had count.
   template <class S>
   Mixture mixture(const SurfacePoint<S>& surface, const Scattering<S>& scattering) const {
     Mixture mixture;
     double sum = 0, of_lamps = 0;
+    const Bsdf& bsdf = *scene_.shape(surface.face.shape).bsdf->side(scattering.front());
     for (const Image& image : images_) {
       Glare& glare = mixture.glare[mixture.count];
       if (image.holds(surface.face) || !sees(image, value(surface.p), glare)) continue;
-      const double power = luminance(scattering.eval_value(glare.toward)) * glare.irradiance;
+      const double power = luminance(scattering.eval_value(bsdf, glare.toward)) * glare.irradiance;
       if (!(power > 0)) continue;
       mixture.part[mixture.count++] = power;
       sum += power;
@@ -100,12 +102,13 @@ class MirroredLight {
     double light_in_part = 0;    // how much of it falls on the part
   };
   struct FlatPart;
-  explicit MirroredLight(const Lights& lights) : lights_(lights) {}
+  MirroredLight(const Scene& scene, const Lights& lights) : scene_(scene), lights_(lights) {}
   std::vector<Image> find_lights(const Scene& scene);
   void add(const FlatPart& part, const Bsdf& bsdf, const Vec3d& normal, const Image& source);
   static std::vector<FlatPart> flat_parts(const Mesh& mesh, ShapeId shape);
   bool sees(const Image& image, const Vec3d& p, Glare& glare) const;
 
+  const Scene& scene_;
   const Lights& lights_;
   std::vector<Image> images_;  // in the order in which they are found
   double environment_ = 0;     // mean luminance of it

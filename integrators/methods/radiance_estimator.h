@@ -16,11 +16,13 @@ class RadianceEstimator final : public SampleEstimator {
                     std::shared_ptr<const FilmRegions> visible = nullptr, bool closed = false,
                     bool even = false);
 
-  // Which light and which share of the directions paths draw, as a scene has it before it moves.
+  // Which light and which share of the directions paths draw, and how they end, as a scene has it
+  // before it moves.
   // The scene must outlive it.
   struct Choices {
     explicit Choices(const Scene& scene)
-        : lights(scene), mirrored(MirroredLight::make(scene, lights)) {}
+        : unmoved(scene), lights(scene), mirrored(MirroredLight::make(scene, lights)) {}
+    const Scene& unmoved;
     Lights lights;
     std::unique_ptr<MirroredLight> mirrored;
   };

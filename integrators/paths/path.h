@@ -37,6 +37,10 @@ struct PathContext {
   const Viewpoints* viewpoints = nullptr;
   // What a share of directions is drawn from; null: none.
   const MirroredLight* mirrored = nullptr;
+  // Of differences: the scene before it moved, by whose materials roulette is played; null: by the
+  // throughput. Else what a material changes cancels in all paths that survive in both images, and
+  // the whole derivative is in the few that survive in one, by much over the step.
+  const Scene* unmoved = nullptr;
 };
 
 // Does nothing at path vertices.
@@ -135,6 +139,7 @@ class PathTracer {
   void set_motion(Walk& walk) const;
   int splits(const SurfacePoint<S>& surface, int copies) const;
   Rgb<S> emitted(const Walk& walk) const;
+  double unmoved_albedo(const Walk& walk) const;
   bool survives_roulette(Walk& walk) const;
   // The density of the next direction at w, of which scattering alone has this one.
   double density(const Walk& walk, const Vec3d& w, double scattered) const {

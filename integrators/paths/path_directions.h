@@ -9,6 +9,17 @@
 
 namespace limn::detail {
 
+// Whether nothing comes of it: what is black now, as a black surface's light is, may still begin to
+// shine as a parameter grows.
+template <class S>
+inline bool stays_black(const Rgb<S>& c) {
+  if constexpr (std::is_same_v<S, double>) {
+    return is_black(c);
+  } else {
+    return is_black(value(c)) && is_still(c);
+  }
+}
+
 // w as it moves.
 template <class S>
 inline Vec3<S> moving(const Vec3d& w, const DirectionMotion* motion) {

@@ -79,7 +79,7 @@ inline void PathTracer<S, Visitor>::weigh_light(Walk& walk) const {
   const auto [f, pdf] = detail::evaluate(*walk.scattering, light.wo, direction, walk.light_motion);
   walk.light_share = detail::stretched(f, light.wo, walk.light_motion);
   walk.light_weight = mis_weight(light.pdf, density(walk, light.wo, pdf)) / light.pdf;
-  if (is_black(value(f))) walk.light.reset();
+  if (detail::stays_black(f)) walk.light.reset();
 }
 
 // No ray meets a delta light by chance, so it has the whole weight. Its direction follows the
@@ -97,7 +97,7 @@ inline void PathTracer<S, Visitor>::draw_delta(Walk& walk, const DeltaLight& del
         walk.light_share = {S(held.r), S(held.g), S(held.b)};
       }
     }
-    if (!is_black(value(f))) return;
+    if (!detail::stays_black(f)) return;
   }
   walk.light.reset();
 }
@@ -122,7 +122,7 @@ inline Rgb<S> PathTracer<S, Visitor>::warped_light(const Walk& walk, const Rng& 
   const LightSample& light = *walk.light;
   const SurfacePoint<S>& surface = walk.surface;
   const Scattering<S>& scattering = *walk.scattering;
-  if (is_black(scattering.eval_value(light.wo))) return {};
+  if (detail::stays_black(scattering.eval(light.wo))) return {};
   if (shadowed(walk)) return {};
   const DirectionMotion* motion = warper_->motion(surface, light.wo, key.at(Purpose::kEmitter, 1));
   const Vec3<S> direction = detail::moving<S>(light.wo, motion);

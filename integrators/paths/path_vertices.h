@@ -21,7 +21,8 @@ inline bool PathTracer<S, Visitor>::begin_vertex(Walk& walk) {
     walk.again = false;
     return true;
   }
-  if (walk.visitor) {
+  // Edges behind a black surface show nothing, also if it begins to shine.
+  if (walk.visitor && !is_black(value(walk.throughput))) {
     (*walk.visitor)(walk.surface, *walk.scattering, walk.throughput, walk.motion, walk.step,
                     walk.bounces, walk.key);
   }
@@ -93,12 +94,13 @@ inline bool PathTracer<S, Visitor>::scatter(Walk& walk) {
   walk.direction = detail::moving<S>(walk.wo, walk.motion);
   const auto [f, scattered] =
       detail::evaluate(*walk.scattering, walk.wo, walk.direction, walk.motion);
-  if (is_black(value(f))) return false;
+  if (detail::stays_black(f)) return false;
   const double pdf = density(walk, walk.wo, scattered);
   walk.pdf = pdf;
   detail::add_score<S>(walk, value(walk.throughput) * (1 / pdf));
   walk.before = walk.throughput;
   walk.throughput = walk.throughput * detail::stretched(f, walk.wo, walk.motion) * (1 / pdf);
+  if (c_.unmoved) walk.albedo *= unmoved_albedo(walk);
   walk.step = {value(walk.surface.p), pdf};
   walk.last = is_complete(walk.bounces + 1);
   return !walk.last || c_.lights.on_shapes() || c_.scene.environment;
@@ -173,23 +175,34 @@ inline Rgb<S> PathTracer<S, Visitor>::emitted(const Walk& walk) const {
   const SurfacePoint<S>& surface = walk.surface;
   const double distance = walk.hit.t;
   const Rgb<S> radiance = surface.emission(-walk.wo, c_.scene.shading);
-  bool dark = is_black(value(radiance));
-  if constexpr (!std::is_same_v<S, double>) dark = dark && is_still(radiance);
-  if (dark) return radiance;
+  if (detail::stays_black(radiance)) return radiance;
   // A face around an edge that is met at distance 0 is never drawn by light sampling.
   const LightView view{walk.wo, distance, surface.n_g};
   const double other = distance > 0 ? c_.lights.pdf(walk.lights, surface.face.shape, view) : 0;
   return radiance * mis_weight(walk.pdf, other);
 }
 
+// A surface that is black before it moves need not be afterwards.
+template <class S, class Visitor>
+inline double PathTracer<S, Visitor>::unmoved_albedo(const Walk& walk) const {
+  constexpr double kLeast = 0.1;  // not tuned
+  const Shape& shape = c_.unmoved->shape(walk.surface.face.shape);
+  const Bsdf* bsdf = shape.bsdf->side(walk.scattering->front());
+  return std::clamp(bsdf->lobe().albedo, kLeast, 1.0);
+}
+
 // As in Mitsuba: from rr_depth bounces on, survival with the largest throughput, at most 0.95.
 template <class S, class Visitor>
 inline bool PathTracer<S, Visitor>::survives_roulette(Walk& walk) const {
   if (walk.bounces < c_.scene.rr_depth) return true;
-  const double survival = std::min(max_channel(value(walk.throughput)), 0.95);
+  constexpr double kBlack = 0.5;  // of a path that is not bright yet; not tuned
+  const double throughput = max_channel(value(walk.throughput));
+  const double largest = c_.unmoved ? walk.albedo : throughput != 0 ? throughput : kBlack;
+  const double survival = std::min(largest, 0.95);
   Rng rng = walk.key.at(Purpose::kRoulette, walk.bounces);
   if (rng.uniform() >= survival) return false;
   walk.throughput = walk.throughput * (1 / survival);
+  walk.albedo /= survival;
   return true;
 }
 

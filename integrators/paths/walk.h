@@ -53,6 +53,7 @@ struct Walk {
   SurfacePoint<S> surface;
   Vec3<S> wi;
   Rgb<S> throughput = grey(S(1.0));
+  double albedo = 1;  // bounds it, by the materials of PathContext::unmoved
   PathStep step;
   PathSums<S> sums;
 

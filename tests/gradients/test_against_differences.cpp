@@ -214,6 +214,26 @@ INSTANTIATE_TEST_SUITE_P(, CrossingSurfaces,
                                          "sensor.translate.x"),
                          name_of_string);
 
+// The largest difference of any pixel at the wider of two steps, and the largest change from there to
+// the other.
+struct Steps {
+  double largest = 0, apart = 0;
+};
+Steps at_two_steps(const Scene& scene, const std::string& name, double wide, double narrow,
+                   int spp) {
+  RunSettings settings;
+  settings.spp = spp;
+  const CentralDifferences run =
+      central_differences(scene, {{name, {wide, narrow}, {{1, 0}, {0, 1}}}}, 0, settings);
+  const Moments &at_wide = run.estimates[0][0].total, &at_narrow = run.estimates[0][1].total;
+  Steps steps;
+  for (size_t i = 0; i < at_wide.size(); ++i) {
+    steps.largest = std::max(steps.largest, std::fabs(at_wide.mean(i)));
+    steps.apart = std::max(steps.apart, std::fabs(at_wide.mean(i) - at_narrow.mean(i)));
+  }
+  return steps;
+}
+
 // Light is linear in a lamp's radiance, and so is what few samples make of it, whatever the step: the
 // lights and the glare that they draw are those of the scene as it is.
 TEST(Differences, DrawLightsAlike) {
@@ -222,19 +242,49 @@ TEST(Differences, DrawLightsAlike) {
   parts.body += R"(<emitter type="point" id="spark"><point name="position" value="-1,2,1"/>
                    <rgb name="intensity" value="2,3,4"/></emitter>)";
   const Scene scene = make_scene(files, parts);
-  RunSettings settings;
-  settings.spp = 4;
   for (const char* name : {"glow.radiance", "spark.intensity", "sky.scale"}) {
-    const CentralDifferences run =
-        central_differences(scene, {{name, {0.5, 1e-4}, {{1, 0}, {0, 1}}}}, 0, settings);
-    const Moments &wide = run.estimates[0][0].total, &narrow = run.estimates[0][1].total;
-    double largest = 0, apart = 0;
-    for (size_t i = 0; i < wide.size(); ++i) {
-      largest = std::max(largest, std::fabs(wide.mean(i)));
-      apart = std::max(apart, std::fabs(wide.mean(i) - narrow.mean(i)));
-    }
-    EXPECT_GT(largest, 0) << name;
-    EXPECT_LT(apart, 1e-6 * largest) << name;
+    const Steps steps = at_two_steps(scene, name, 0.5, 1e-4, 4);
+    EXPECT_GT(steps.largest, 0) << name;
+    EXPECT_LT(steps.apart, 1e-6 * steps.largest) << name;
+  }
+}
+
+// Radiance is a polynomial of reflectances, so differences change with the square of a small step:
+// no path ends in one of the images alone, or goes to the glare in one of them alone.
+TEST(Differences, GoAlikeWhateverTheMaterials) {
+  const TempFiles files;
+  SceneParts parts = mixed_scene(files);
+  parts.max_depth = 6;
+  parts.rr_depth = 1;
+  const Scene scene = make_scene(files, parts);
+  for (const char* name : {"clay.reflectance", "chalk.reflectance", "green.reflectance"}) {
+    const Steps steps = at_two_steps(scene, name, 1e-3, 1e-5, 64);
+    EXPECT_GT(steps.largest, 0) << name;
+    EXPECT_LT(steps.apart, 1e-4 * steps.largest) << name;
+  }
+}
+
+// The image begins to shine as the reflectance of black surfaces grows: by lamps, the sky and lights
+// without extent, straight and by way of others, whatever roulette makes of paths that end there.
+TEST(Paths, BlackSurfacesBeginToShine) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.max_depth = 4;
+  parts.rr_depth = 1;
+  parts.origin = {1, 2.5, 5};
+  parts.body = square("floor", 2.5, -90, {0, 0, 0}, diffuse("soot", "0, 0, 0")) +
+               square("wall", 2, 0, {0, 1, -1}, diffuse("chalk", "0.8, 0.7, 0.6")) +
+               obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(1)), false, 0.5,
+                         {0.7, 0.6, 0.3}, diffuse("coal", "0, 0, 0")) +
+               square("lamp", 0.4, 90, {0.3, 2.4, 0.5}, area_light("glow", "6, 5, 4")) +
+               make_sky(files, "sky") +
+               R"(<emitter type="point" id="spark"><point name="position" value="-1,2,1"/>
+                  <rgb name="intensity" value="2,3,4"/></emitter>)";
+  const Scene scene = make_scene(files, parts);
+  for (const char* name : {"soot.reflectance", "coal.reflectance"}) {
+    const CheckResult r = run_check(scene, name, 256);
+    EXPECT_EQ(r.verdict, Verdict::kAgree) << name;
+    EXPECT_GT(r.total.gradient, 1) << name;
   }
 }
 

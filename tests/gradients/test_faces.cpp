@@ -556,6 +556,28 @@ TEST(Faces, ChecksTellWhatIsOff) {
   EXPECT_GT(small.known, 1e-3);
   EXPECT_LT(small.known, 0.2);
   EXPECT_EQ(small.verdict, Verdict::kCannotTell);
+  // Nothing moves at all: differences of two steps are alike.
+  EXPECT_EQ(checked(1, 1e-12).verdict, Verdict::kCannotTell);
+}
+
+// Light is linear in a reflectance, and about black two steps agree to the last bit: what the gradient
+// is rounded to is no error.
+TEST(Faces, ChecksAllowForRounding) {
+  const TempFiles files;
+  Scene scene = crowd(files, 12, 0, false);
+  CheckOptions options;
+  options.method = "analytic";
+  int checked = 0;
+  for (const Parameter& parameter : list_parameters(scene)) {
+    if (!parameter.name.ends_with("reflectance")) continue;
+    parameter.assign(scene, {0});
+    options.parameter = parameter.name;
+    const FacesCheck r = check_faces(scene, options, threads(1));
+    EXPECT_EQ(r.verdict, Verdict::kAgree) << parameter.name;
+    EXPECT_LT(r.error, 1e-9) << parameter.name;
+    ++checked;
+  }
+  EXPECT_GT(checked, 1);
 }
 
 // A pixel that is not finite adds nothing, whichever of many parameters or faces it is by.

@@ -209,7 +209,8 @@ class CheckCommand final : public Command {
       warnings_.add_all(r.gradient.warnings);
       fmt::print(
           "{}: sum over the image: gradient {:.8g}, differences {:.8g} (step {:.3g})\n"
-          "  they differ by {:.2g} of the derivative, the differences of two steps by {:.2g}: {}\n",
+          "  they differ by {:.2g} of the derivative, of which differences know all but {:.2g}: "
+          "{}\n",
           parameter, r.gradient_sum, r.difference_sum, r.step, r.error, r.known,
           verdict_name(r.verdict));
       report.push_back({{"parameter", parameter},

@@ -34,9 +34,9 @@ class Scattering {
   Scattering(const SurfacePoint<S>& point, const Vec3<S>& wi, ShadingModel model)
       : wi_(wi), n_s_(point.n_s), horizon_(point.horizon) {
     const bool mitsuba = model == ShadingModel::kMitsuba;
-    const bool front = dot(mitsuba ? value(point.n_s) : point.n_g, value(wi)) > 0;
-    bsdf_ = point.shape->bsdf->side(front);
-    if (!front) n_s_ = -n_s_;
+    front_ = dot(mitsuba ? value(point.n_s) : point.n_g, value(wi)) > 0;
+    bsdf_ = point.shape->bsdf->side(front_);
+    if (!front_) n_s_ = -n_s_;
     n_ = n_s_;
     limited_ = !mitsuba && point.shape->mesh.normal_source != NormalSource::kFace;
     if (limited_) bend();
@@ -44,12 +44,13 @@ class Scattering {
       still_ = is_still(n_s_) && is_still(wi_) && is_still(horizon_) && bsdf_ && bsdf_->is_still();
     }
     if constexpr (std::is_same_v<S, Var>) {
-      copies_ = Tape::current()->slots()->bsdfs[point.face.shape.index()][front];
+      copies_ = Tape::current()->slots()->bsdfs[point.face.shape.index()][front_];
       still_ = is_still(n_s_) && is_still(wi_) && is_still(horizon_) && !copies_;
     }
   }
 
   bool black() const { return bsdf_ == nullptr; }
+  bool front() const { return front_; }  // which side of the surface is seen
   const Bsdf& bsdf() const { return *bsdf_; }
   const Vec3<S>& normal() const { return n_; }
   const Vec3<S>& wi() const { return wi_; }
@@ -65,9 +66,11 @@ class Scattering {
     return detail::eval_bsdf<S>(*bsdf_, copies_, n_, wi_, w) * factor;
   }
   // The value of eval for a direction that is held, at the cost of plain numbers; to rounding.
-  Rgb<double> eval_value(const Vec3d& wo) const {
+  Rgb<double> eval_value(const Vec3d& wo) const { return eval_value(*bsdf_, wo); }
+  // The same if the surface were of another material.
+  Rgb<double> eval_value(const Bsdf& bsdf, const Vec3d& wo) const {
     const double factor = limited_ ? horizon_value(wo) : 1;
-    return factor == 0 ? Rgb<double>{} : bsdf_->eval(value(n_), value(wi_), wo) * factor;
+    return factor == 0 ? Rgb<double>{} : bsdf.eval(value(n_), value(wi_), wo) * factor;
   }
   // The part of eval's derivative that comes from the motion of wo alone.
   Rgb<Lanes> eval_derivative(const Vec3<Dual>& wo) const {
@@ -140,6 +143,7 @@ class Scattering {
   S horizon_;
   const Bsdf* bsdf_ = nullptr;
   const SeededCopies<Bsdf>* copies_ = nullptr;  // Var: of bsdf_, if its parameters have slots
+  bool front_ = false;
   bool limited_ = false;
   bool still_ = false;  // no parameter of the pass moves it while wo is held (not for double)
 };

@@ -108,7 +108,7 @@ struct FacesCheck {
   double step = 0;
   double gradient_sum = 0, difference_sum = 0;  // over the image
   // The root of the squared difference of both images, and of how the differences change from one
-  // step to the next, summed over the image; over that of the larger one.
+  // step to the next or are rounded, summed over the image; over that of the larger one.
   double error = 0, known = 0;
   Verdict verdict = Verdict::kCannotTell;
   bool interrupted = false;
