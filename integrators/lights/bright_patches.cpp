@@ -93,12 +93,17 @@ double flux_within(const std::vector<Drawn>& drawn, const Vec3d& axis, double an
   return flux;
 }
 
-// Wider by rings as long as these are as bright as `least`.
+// Wider by rings as long as these are as bright as `least`, and none far brighter than the one
+// before it: there is another sun.
 Cap with_rim(const std::vector<Drawn>& drawn, const Vec3d& axis, Cap cap, double least) {
+  constexpr double kOtherSun = 2;  // not tuned
+  double before = cap.flux / solid_angle(cap.angle);
   while (cap.angle * kRing <= kWidest) {
     const double wider = cap.angle * kRing, flux = flux_within(drawn, axis, wider);
     const double ring = solid_angle(wider) - solid_angle(cap.angle);
-    if (flux - cap.flux < least * ring) break;
+    const double luminance = (flux - cap.flux) / ring;
+    if (luminance < least || luminance > kOtherSun * before) break;
+    before = luminance;
     cap.angle = wider;
     cap.flux = flux;
   }
@@ -146,9 +151,10 @@ std::optional<BrightPatch> glow_around(const std::vector<Drawn>& drawn, const Ve
   const double ring = solid_angle(kRing * sun.angle) - solid_angle(sun.angle);
   const double least = std::max(kRim * nearest / ring, kLeastContrast * uniform);
   const Cap whole = with_rim(drawn, axis, sun, least);
-  if (whole.angle == sun.angle) return {};
   const double flux = whole.flux - sun.flux;
   const double wide = solid_angle(whole.angle) - solid_angle(sun.angle);
+  // A narrow one is the sun's rim, blurred by texels: its edges are the sun's.
+  if (wide < solid_angle(sun.angle)) return {};
   if (!(flux * flux > kLeastSquare * 4 * kPi * uniform * uniform * wide)) return {};
   return BrightPatch{cap_of(axis, whole.angle), flux / wide, std::cos(sun.angle)};
 }

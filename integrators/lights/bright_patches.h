@@ -15,13 +15,14 @@ struct DirectionCap {
 
 struct BrightPatch {
   DirectionCap cap;
-  double luminance;  // mean over what it holds
+  double luminance = 0;  // mean over what it holds
   // The cosine of the part around the axis that belongs to another patch: the sun in its
   // glow. None: no cosine is so large.
   double inner_cosine = 2;
 
   bool is_ring() const { return inner_cosine <= 1; }
   bool holds(const Vec3d& w) const { return cap.holds(w) && dot(w, cap.axis) < inner_cosine; }
+  double inner_versine() const { return is_ring() ? 1 - inner_cosine : 0; }
 };
 
 // Caps of a few degrees that are much brighter than the environment is on average and hold a good

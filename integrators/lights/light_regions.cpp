@@ -297,7 +297,9 @@ std::optional<Vec3d> LightRegions::draw_direction(size_t k, const Vec3d& x, doub
   }
   const auto cap = cap_around(region, x);
   if (!cap) return {};
-  const double below = u1 * cap->sine * cap->sine / (1 + cap->cosine);  // 1 - the cosine
+  const double inner = region.patch.inner_versine(),
+               whole = cap->sine * cap->sine / (1 + cap->cosine);
+  const double below = inner + u1 * (whole - inner);  // 1 - the cosine
   const double sine = std::sqrt(below * (2 - below));
   const Frame frame(cap->axis);
   return frame.n * (1 - below) + frame.s * (sine * std::cos(2 * kPi * u2)) +
@@ -314,7 +316,9 @@ double LightRegions::direction_pdf(size_t k, const Vec3d& x, const Vec3d& w) con
     return distance * distance / (region.hull.area * cosine);
   }
   const auto cap = cap_around(region, x);
-  return cap && cap->holds(w) ? 1 / cap_solid_angle(*cap) : 0;
+  if (!cap || !cap->holds(w)) return 0;
+  if (dot(w, cap->axis) >= region.patch.inner_cosine) return 0;
+  return 1 / (cap_solid_angle(*cap) - 2 * kPi * region.patch.inner_versine());
 }
 
 Rgb<double> LightRegions::emission(size_t k, const SurfacePoint<double>& surface,

@@ -65,7 +65,8 @@ class LightRegions {
   // All faces of a flat lamp of few: a line meets one of them at most, also where rounding lets
   // rays meet neighbours. Else empty.
   std::span<const FaceRef> flat_faces(size_t k) const { return regions_[k].flat_faces; }
-  const DirectionCap& cap(size_t k) const { return regions_[k].patch.cap; }
+  const BrightPatch& patch(size_t k) const { return regions_[k].patch; }
+  const DirectionCap& cap(size_t k) const { return patch(k).cap; }
 
   // What a surface emits towards the unit direction wi as part of region k.
   Rgb<double> emission(size_t k, const SurfacePoint<double>& surface, const Vec3d& wi) const;

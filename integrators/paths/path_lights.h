@@ -10,6 +10,7 @@ namespace limn {
 // One light for each, if there is any, where there have been no others.
 template <class S, class Visitor>
 inline void PathTracer<S, Visitor>::draw_lights(std::span<Walk* const> walks) const {
+  static_assert(kMostWalks <= Lights::kMostDraws);
   if (c_.lights.empty()) return;
   Rng::Stream streams[kMostWalks];
   Lights::Draw draws[kMostWalks];

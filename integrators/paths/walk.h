@@ -70,7 +70,7 @@ struct Walk {
   double light_weight = 1;
 
   // The next ray.
-  std::array<double, 3> u;         // from which its direction is drawn
+  std::array<double, 3> u{};       // from which its direction is drawn
   MirroredLight::Mixture mixture;  // that its direction is drawn from
   Vec3d wo;
   Vec3<S> direction;  // the same as it moves

@@ -74,7 +74,8 @@ LampEdges::Sight LampEdges::sight_of(const LightRegions& regions, size_t k) cons
     sight.infinite = true;
     sight.v = cap.axis;
     sight.radius = cap.sine;
-    sight.light = regions.luminance(k) * cap.sine * cap.sine * kPi;
+    const double hole = regions.patch(k).inner_versine();
+    sight.light = regions.luminance(k) * (cap.sine * cap.sine - hole * (2 - hole)) * kPi;
   }
   sight.listed = sight.listed && sight.radius > 0 && sight.light > 0;
   return sight;

@@ -125,6 +125,7 @@ double Rng::even_uniform() {
 }
 
 void Rng::draw(Purpose purpose, std::span<const Stream> streams, size_t count, double* numbers) {
+  static_assert(Rng::kDimensions == limn::kDimensions);
   const bool even = streams[0].key->dimension_ >= 0;
   wide::for_blocks(streams.size(), [&](size_t first, size_t last) {
     const auto stream = [&](int i) -> const Stream& {

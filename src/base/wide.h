@@ -1,14 +1,14 @@
 #pragma once
 // Eight numbers side by side (vector extension of GCC and Clang): the same step of eight paths.
 // Arithmetic works lane by lane, alike in each: what a lane comes to does not depend on the others,
-// which may hold anything. Without wide registers the compiler splits them; nothing else changes.
+// which may hold anything. Without wide registers the compiler splits them: per lane the same steps.
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 
 #include "limn/core/vec.h"
 
-// How such numbers are passed depends on the processor; here all that take them are inlined.
+// How such numbers are passed depends on the processor: none are, by value, between files.
 #pragma GCC diagnostic ignored "-Wpsabi"
 
 namespace limn::wide {

@@ -117,12 +117,12 @@ size_t Lights::choose(const Place& place, double u) const {
 }
 
 void Lights::sample(std::span<const Draw> draws, std::span<const Numbers> u) const {
-  constexpr size_t kMost = 16;
-  DCHECK_LE(draws.size(), kMost);
+  DCHECK_LE(draws.size(), kMostDraws);
+  DCHECK_EQ(draws.size(), u.size());
   // What the environment draws, it draws at once.
-  Environment::Numbers numbers[kMost];
-  Environment::Drawn drawn[kMost];
-  size_t of[kMost], count = 0;
+  Environment::Numbers numbers[kMostDraws];
+  Environment::Drawn drawn[kMostDraws];
+  size_t of[kMostDraws], count = 0;
   for (size_t i = 0; i < draws.size(); ++i) {
     const Place& place = *draws[i].place;
     const size_t light = choose(place, u[i][0]);

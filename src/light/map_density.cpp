@@ -341,6 +341,7 @@ MapDensity::Drawn MapDensity::sample(const wide::Doubles& u1, const wide::Double
   const auto cosine = [&](const Ints& row) {
     return gather([&](int i) { return cos_theta_[static_cast<size_t>(row[i])]; });
   };
+  static_assert(std::endian::native == std::endian::little);
   const Ints corners = gather_ints([&](int i) { return std::bit_cast<int32_t>(leaf(i).corners); });
   const auto corner = [&](int k) { return to_doubles(corners >> 8 * k & 255); };
   const Doubles c0 = corner(0), c1 = corner(1), c2 = corner(2), c3 = corner(3);

@@ -151,9 +151,7 @@ TEST(BrightPatches, AreTheSuns) {
       {{{1, 1, 0.3}, 2, 4000}, {{-1, 0.4, 0.2}, 3, 1000}}  // two
   };
   for (const std::vector<Disc>& discs : skies) {
-    auto patches = find_bright_patches(*sky_with(discs, 1024));
-    // Texels blur the rim of a small disc: that may be a ring.
-    std::erase_if(patches, [](const BrightPatch& patch) { return patch.is_ring(); });
+    const auto patches = find_bright_patches(*sky_with(discs, 1024));
     ASSERT_EQ(patches.size(), discs.size());
     for (const BrightPatch& patch : patches) {
       double apart = 10;
@@ -216,6 +214,23 @@ TEST(BrightPatches, AGlowAroundTheSun) {
   for (double angle = 0; angle < 3; angle += 0.01) {
     const Vec3d w = beside(angle);
     EXPECT_EQ(regions.escaped(0, w).g + regions.escaped(1, w).g, regions.escaped(w).g) << angle;
+  }
+}
+
+// A second sun within the first one's haze is a patch of its own.
+TEST(BrightPatches, ASunInTheGlowOfAnother) {
+  const Vec3d first = normalize(Vec3d{0.2, 0.4, 1});
+  const double apart = 4 * kPi / 180;
+  const Vec3d second = first * std::cos(apart) + Frame(first).s * std::sin(apart);
+  const auto patches = find_bright_patches(
+      *sky_with({{first, 7, 150}, {first, 0.8, 3e4}, {second, 0.8, 2e4}}, 2048));
+  for (const Vec3d& sun : {first, second}) {
+    EXPECT_EQ(std::count_if(patches.begin(), patches.end(),
+                            [&](const BrightPatch& patch) {
+                              return !patch.is_ring() && patch.holds(sun) &&
+                                     patch.cap.sine < std::sin(2 * kPi / 180);
+                            }),
+              1);
   }
 }
 
@@ -436,6 +451,31 @@ TEST(EdgePieces, OfEdgesThroughThePoint) {
 
 // Directions towards a region follow the density that is told: integrals over it by draws are those
 // by directions of the whole sphere.
+// Directions towards a sun and towards what glows around it: within it, and evenly.
+TEST(LightRegions, DrawWithinASunAndItsGlow) {
+  const Vec3d sun = normalize(Vec3d{0.2, 0.4, 1});
+  Scene scene;
+  scene.environment =
+      sky_with({{sun, 6, 5}, {sun, 1.6, 200}, {sun, 0.9, 800}, {sun, 0.5, 3e4}}, 2048);
+  const LightRegions regions(scene);
+  ASSERT_EQ(regions.size(), 2u);
+  ASSERT_TRUE(regions.patch(1).is_ring());
+  constexpr int kSteps = 1000;
+  for (size_t k = 0; k < 2; ++k) {
+    const BrightPatch& patch = regions.patch(k);
+    const double outer = 1 - patch.cap.cosine, inner = patch.inner_versine();
+    for (int i = 0; i < kSteps; ++i) {
+      const double u = (i + 0.5) / kSteps;
+      const auto w = regions.draw_direction(k, {}, u, 0.3);
+      ASSERT_TRUE(w);
+      EXPECT_TRUE(patch.holds(*w)) << k << " " << u;
+      EXPECT_NEAR(1 - dot(*w, patch.cap.axis), inner + u * (outer - inner), 1e-12);
+      EXPECT_NEAR(regions.direction_pdf(k, {}, *w) * 2 * kPi * (outer - inner), 1, 1e-9);
+    }
+  }
+  EXPECT_EQ(regions.direction_pdf(1, {}, regions.patch(0).cap.axis), 0);
+}
+
 TEST(LightRegions, DrawDirectionsByTheirDensity) {
   const TempFiles files;
   SceneParts parts;

@@ -23,6 +23,14 @@ std::string two_digits(double value) {
   return fmt::format("{:.0f}", std::round(value / unit) * unit);
 }
 
+// What else to ask for where `spp` samples per pixel tell nothing.
+std::string advice(double needed_spp, int spp) {
+  const double more = std::ceil(std::max(needed_spp, 1.1 * spp));
+  if (more < 1e9) return "take about --spp " + two_digits(more);
+  return fmt::format("{} samples per pixel are too few to tell how many it takes, try --spp {:.0f}",
+                     spp, std::min(100.0 * spp, 1e9));
+}
+
 std::string percent(double part) {
   return part < 10 ? two_digits(100 * part) + " %" : "more than all";
 }
@@ -55,8 +63,8 @@ void print_verdict(const CheckResult& r, int spp) {
         "a light:\n  the gradient is the slope on one side, and differences are the mean of "
         "both\n");
   } else {
-    fmt::print("  CANNOT TELL: an error of a fifth could have hidden: take about --spp {}\n",
-               two_digits(std::max(r.needed_spp, 1.1 * spp)));
+    fmt::print("  CANNOT TELL: an error of a fifth could have hidden: {}\n",
+               advice(r.needed_spp, spp));
   }
 }
 

@@ -45,7 +45,8 @@ class Lights {
     const Place* place;
     std::optional<LightSample>* sample;
   };
-  // draws[i] from u[i]; at most 16 of them.
+  // draws[i] from u[i]; at most kMostDraws of them.
+  static constexpr size_t kMostDraws = 16;
   void sample(std::span<const Draw> draws, std::span<const Numbers> u) const;
   std::optional<LightSample> sample(const Place& place, Rng& rng) const;
   // The density [1/sr] with which `sample` draws what a ray from there sees: an emitting shape, or,

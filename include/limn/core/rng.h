@@ -93,7 +93,7 @@ class Rng {
     return mix_bits(state_);
   }
   template <class Word>
-  static Word place_of(Purpose purpose, const Word& depth) {
+  [[gnu::always_inline]] static inline Word place_of(Purpose purpose, const Word& depth) {
     return 1 + static_cast<uint64_t>(purpose) + 64 * depth;
   }
   double even_uniform();
