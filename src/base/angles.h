@@ -76,7 +76,7 @@ struct SinCosOf {
   T sin, cos;
 };
 using SinCos = SinCosOf<double>;
-// Of an angle in turns, 0 to 1.
+// Of an angle in turns, 0 to 1.5.
 inline SinCos sin_cos_of_turns(double turns) {
   const int quarter = static_cast<int>(4 * turns + 0.5);
   const double r = turns - 0.25 * quarter, r2 = r * r;
