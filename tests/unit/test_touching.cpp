@@ -169,6 +169,15 @@ TEST(Overlaps, InOnePlaceWithSome) {
     }
   }
   EXPECT_GT(found, 100u);
+  // What overlaps a face overlaps its copy.
+  size_t others = 0;
+  for (uint32_t f = 0; f < scene.shapes[0].mesh.faces.size(); ++f) {
+    const auto of_first = overlaps.of({ShapeId(0), FaceId(f)});
+    const auto of_copy = overlaps.of({ShapeId(1), FaceId(f)});
+    EXPECT_TRUE(std::equal(of_first.begin(), of_first.end(), of_copy.begin(), of_copy.end())) << f;
+    others += of_first.size();
+  }
+  EXPECT_GT(others, 0u);
 }
 
 TEST(Touching, ABoxStandsOnTheFloor) {
