@@ -178,7 +178,9 @@ class BatchRunner {
   // Adds a sample to the pixels whose filters reach it.
   void splat(size_t slot, const FilmSample& sample, double scale) {
     for_every_pixel_of(film_, sample.x, sample.y, [&](int x, int y, double weight) {
-      add(slot, pixel_index(film_, x, y), sample.value, weight * scale);
+      const FilmMotion* motion = estimator_.film_motion(x, y);
+      add(slot, pixel_index(film_, x, y), motion ? sample.value_for(*motion) : sample.value,
+          weight * scale);
     });
   }
 

@@ -3,6 +3,7 @@
 // film as a whole adds. Batches, tiles, threads, sums, progress and interruption are the same for
 // all estimators and stand in batches.h.
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -29,11 +30,29 @@ struct KeyedSample {
 // So many of them are worked on together at most, but for estimators that say otherwise.
 inline constexpr size_t kMostTogether = 16;
 
+// How the positions of a pixel's samples on the film move [pixels per unit of the parameter], see
+// film_motion.h.
+struct FilmMotion {
+  Lanes x, y;
+};
+
+// Of a pixel of the full film; null where its positions are held.
+using FilmMotionAt = std::function<const FilmMotion*(int x, int y)>;
+
 // A point on a curve of the film across which radiance jumps.
 struct FilmSample {
   double x, y;       // film position [pixels]
   Rgb<Lanes> value;  // jump times normal speed of the curve [pixels per unit of the parameter],
                      // over the density of the sample [1 / pixel of length]
+  // The same of a curve that moves by a pixel along x, or y, against the positions of samples.
+  Rgb<double> along_x{}, along_y{};
+
+  // For a pixel whose positions move so.
+  Rgb<Lanes> value_for(const FilmMotion& motion) const {
+    Rgb<Lanes> result = value;
+    for (int c = 0; c < 3; ++c) result[c] += motion.x * -along_x[c] + motion.y * -along_y[c];
+    return result;
+  }
 };
 
 // What a sample met, line by line, for reading.
@@ -129,6 +148,8 @@ class SampleEstimator {
   // them: `u` in [0, 1) is stratified over a batch, `key` is for everything else. False if it adds
   // nothing.
   virtual double film_samples(size_t /*slot*/) const { return 0; }
+  // How the positions of a pixel's samples on the film move; null if they are held.
+  virtual const FilmMotion* film_motion(int /*x*/, int /*y*/) const { return nullptr; }
   // Tells the streams of different slots apart.
   virtual int film_stream(size_t /*slot*/) const { return 0; }
   virtual bool sample_film(size_t /*slot*/, double /*u*/, const Rng& /*key*/, RayCount& /*rays*/,

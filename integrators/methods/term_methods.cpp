@@ -13,6 +13,7 @@
 #include "integrators/methods/selection.h"
 #include "integrators/pilot/allocation.h"
 #include "integrators/pilot/field_fit.h"
+#include "integrators/pilot/film_fit.h"
 #include "integrators/pilot/pilot.h"
 #include "integrators/pilot/term_estimator.h"
 #include "limn/core/error.h"
@@ -96,6 +97,24 @@ std::vector<DirectionField> random_fields(size_t count, const TermEstimator& est
   return fields;
 }
 
+// The same of positions on the film.
+std::vector<FilmMotion> random_motions(size_t count, const TermEstimator& estimator,
+                                       uint64_t seed) {
+  constexpr uint64_t kStream = 0xf117;  // any number
+  const Lanes steps = estimator.lane_scale();
+  const double speed = film_speed(estimator);
+  std::vector<FilmMotion> motions(count);
+  for (size_t i = 0; i < count; ++i) {
+    Rng rng(mix_bits(seed + kStream), i, 0);
+    for (Lanes* v : {&motions[i].x, &motions[i].y}) {
+      for (int lane = 0; lane < estimator.lanes(); ++lane) {
+        (*v)[lane] = speed * rng.uniform() * steps[0] / steps[lane];
+      }
+    }
+  }
+  return motions;
+}
+
 // A whole run of one method.
 class TermJob {
  public:
@@ -104,7 +123,8 @@ class TermJob {
       : scene_(scene),
         options_(options),
         method_(method),
-        types_(terms_of(scene, method.sampler, method.closed)) {
+        moves_film_((method.spreads_samples || method.random_directions) && !options.exact_film),
+        types_(terms_of(scene, method.sampler, method.closed, moves_film_)) {
     const std::vector<std::string> chosen = selected_terms(term_names(), options.terms, scene.file);
     for (const TermType* type : types_) {
       computed_.push_back(std::find(chosen.begin(), chosen.end(), type->name) != chosen.end());
@@ -122,7 +142,7 @@ class TermJob {
           std::span(parameters).subspan(k).first(std::min<size_t>(kLanes, parameters.size() - k));
       passes_.push_back(std::make_unique<TermEstimator>(
           scene, some, types_, computed_, method.sampler, settings.threads, visible,
-          method.warps ? &warping : nullptr, method.closed));
+          method.warps ? &warping : nullptr, method.closed, moves_film_));
     }
   }
 
@@ -189,6 +209,11 @@ class TermJob {
     }
     return scene_.shading == ShadingModel::kContinuous;
   }
+  // The same of positions on the film, which change all terms.
+  bool can_move_film() const {
+    return moves_film_ && scene_.shading == ShadingModel::kContinuous &&
+           std::find(computed_.begin(), computed_.end(), false) == computed_.end();
+  }
   int64_t terms_computed() const { return std::count(computed_.begin(), computed_.end(), true); }
   TermEstimator& pass(size_t p) const { return static_cast<TermEstimator&>(*passes_[p]); }
 
@@ -238,6 +263,7 @@ class TermJob {
       if (method_.random_directions && can_move_directions()) {
         plan.grid = PlanGrid(scene_.film, film_size(scene_.film));
         plan.fields = random_fields(plan.grid.size(), pass(p), settings.seed);
+        if (can_move_film()) plan.film = random_motions(plan.grid.size(), pass(p), settings.seed);
       }
       for (size_t t = 0; t < types_.size(); ++t) {
         means[t] += plan.uniform[t] / static_cast<double>(passes_.size());
@@ -318,8 +344,15 @@ class TermJob {
         method_.moves_directions && can_move_directions() && !estimator.motion_rates().still();
     SamplePlan probing;
     probing.splits = plan.splits;
+    if (can_move_film() && method_.spreads_samples && !estimator.motion_rates().still() &&
+        estimator.lanes() <= kMostFilmParameters) {
+      FilmFit film = fit_film(estimator, probing, film_pilot_samples(settings.spp), settings, watch);
+      probing.grid = film.grid;
+      probing.film = std::move(film.motion);
+    }
     if (method_.spreads_samples) probing.light_samples = kPilotLights;
-    estimator.set_plan(probing);
+    std::vector<FilmMotion> film = probing.film;
+    estimator.set_plan(std::move(probing));
     RunSettings share = settings;
     share.seconds /= static_cast<double>(passes_.size());
     const PilotFigures pilot = run_pilot(estimator, turns, spp, share, watch);
@@ -334,6 +367,7 @@ class TermJob {
       plan.uniform = best_samples(figures);
     }
     plan.grid = pilot.grid;
+    plan.film = std::move(film);
     plan.fields = std::move(fit.fields);
     return plan;
   }
@@ -400,6 +434,7 @@ class TermJob {
   const Scene& scene_;
   const GradientOptions& options_;
   TermMethod method_;
+  bool moves_film_;  // whether positions on the film may move
   std::vector<const TermType*> types_;
   std::vector<bool> computed_;  // of each term
   std::vector<std::unique_ptr<SampleEstimator>> passes_;
@@ -412,6 +447,7 @@ MethodType method_row(const std::string& name, const std::string& description,
   method.description = description;
   for (const TermType& type : term_types()) {
     if (type.regions && !term_method.sampler.regions) continue;
+    if (type.moved_film && !term_method.spreads_samples && !term_method.random_directions) continue;
     if (term_method.closed && type.moved_with_directions && !type.traces_paths) continue;
     method.terms.emplace_back(type.name);
   }

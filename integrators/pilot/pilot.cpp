@@ -7,8 +7,6 @@
 namespace limn {
 namespace {
 
-constexpr size_t kMostProbes = 65536;  // a film of 256 by 256 has them all; not tuned
-
 // The samples of probed pixels go into sums; only what belongs to the film goes on.
 class PilotEstimator final : public SampleEstimator {
  public:
@@ -35,6 +33,7 @@ class PilotEstimator final : public SampleEstimator {
     return terms_.sample_film(slot, u, key, rays, sample);
   }
 
+  const FilmMotion* film_motion(int x, int y) const override { return terms_.film_motion(x, y); }
   void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const override {
     for (const KeyedSample& sample : samples) add_pixel(sample.at, sample.key, sink);
   }

@@ -12,6 +12,7 @@
 
 namespace limn {
 
+inline constexpr size_t kMostProbes = 65536;  // a film of 256 by 256 has them all; not tuned
 inline constexpr int kPilotLights = 2;  // light samples at later vertices
 
 struct PilotFigures {

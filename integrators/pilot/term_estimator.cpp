@@ -52,12 +52,13 @@ DirectionField turning_about_axes(const Lanes& steps, int lanes) {
 }  // namespace
 
 std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler,
-                                      bool closed) {
+                                      bool closed, bool moved_film) {
   std::vector<const TermType*> types;
   bool (*asked)(const Scene&) = nullptr;  // looks at the whole environment: once for rows alike
   bool applies = false;
   for (const TermType& type : term_types()) {
     if (type.regions && !sampler.regions) continue;
+    if (type.moved_film && !moved_film) continue;
     if (closed && type.moved_with_directions && !type.traces_paths) continue;
     if (type.applies != asked) {
       asked = type.applies;
@@ -72,7 +73,7 @@ TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> para
                              const std::vector<const TermType*>& types,
                              const std::vector<bool>& computed, const EdgeSamplerType& sampler,
                              int threads, std::shared_ptr<const FilmRegions> visible,
-                             const Warping* warping, bool closed)
+                             const Warping* warping, bool closed, bool moved_film)
     : scene_(seeded(scene, parameters)),
       lanes_(static_cast<int>(parameters.size())),
       lane_scale_(natural_steps(parameters)),
@@ -90,8 +91,9 @@ TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> para
       camera_(scene_.camera),
       filter_(scene_.film.filter),
       visible_(std::move(visible)),
-      input_(context_, lanes_, lane_scale_, sampler, threads, warping != nullptr),
+      input_(context_, lanes_, lane_scale_, sampler, threads, warping != nullptr, moved_film),
       types_(types),
+      moves_film_(moved_film),
       rates_(scene_, lanes_, lane_scale_),
       turning_(turning_about_axes(lane_scale_, lanes_)) {
   input_.visible = visible_.get();
@@ -105,6 +107,17 @@ TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> para
   if (warping) {
     warp_field_ = std::make_unique<WarpField>(scene_, *tracer_, input_.edges(), warping->options,
                                               warping->unbiased);
+  }
+}
+
+void TermEstimator::set_plan(SamplePlan plan) {
+  const bool moved = !plan_.film.empty();
+  plan_ = std::move(plan);
+  if (!moves_film_ || (plan_.film.empty() && !moved)) return;
+  FilmMotionAt motion;
+  if (!plan_.film.empty()) motion = [this](int x, int y) { return film_motion(x, y); };
+  for (const auto& term : terms_) {
+    if (term) term->move_film(motion);
   }
 }
 
@@ -279,6 +292,44 @@ void TermEstimator::add_pixels(std::span<const KeyedSample> samples, SampleSink&
     }
   }
   convoy.finish();
+  add_moved_pixels(samples, sink);
+}
+
+// Of terms that move with positions on the film by themselves.
+void TermEstimator::add_moved_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const {
+  for (size_t slot = 0; slot < terms_.size(); ++slot) {
+    const Term* term = terms_[slot].get();
+    if (!term || !term->uses_moved_pixels()) continue;
+    const Stopwatch watch;
+    std::vector<MovedPixel> pixels;
+    std::vector<double> weights;
+    const auto finish = [&] {
+      std::array<Rgb<Lanes>, kMostMovedPixels> sums{};
+      term->add_at_pixels(pixels, sink.cost(slot), {sums.data(), pixels.size()});
+      for (size_t i = 0; i < pixels.size(); ++i) {
+        if (is_finite(sums[i])) {
+          sink.add(slot, pixels[i].at, sums[i], weights[i]);
+        } else {
+          sink.reject(pixels[i].at, slot_name(slot));
+        }
+      }
+      pixels.clear();
+      weights.clear();
+    };
+    for (const auto& [at, key] : samples) {
+      const FilmMotion* motion = plan_.film_motion(at.x, at.y);
+      if (!motion || (is_zero(motion->x) && is_zero(motion->y))) continue;
+      const double count = plan_.counts_at(at)[slot];
+      if (count < 1 && key.at(Purpose::kTermRoulette, slot).uniform() >= count) continue;
+      for (int i = 0; i < std::max(1, static_cast<int>(count)); ++i) {
+        if (pixels.size() == kMostMovedPixels) finish();
+        pixels.push_back({at, key.at(Purpose::kFilmCopy, i), *motion});
+        weights.push_back(1 / count);
+      }
+    }
+    finish();
+    sink.cost(slot).seconds += watch.seconds();
+  }
 }
 
 // The same, path by path.
@@ -301,6 +352,8 @@ void TermEstimator::add_logged(const PixelSample& at, const Rng& key, SampleSink
       add(log, i);
     }
   }
+  const KeyedSample sample{at, key};
+  add_moved_pixels({&sample, 1}, sink);
 }
 
 void TermEstimator::add_vertices(const PixelSample& at, const VertexTerms& vertices,
@@ -330,7 +383,9 @@ TermEstimator::PathCosts TermEstimator::trace(std::span<const Place> places,
     const PixelSample& at = places[i].at;
     FilmPosition film = sample_pixel_filter(scene_.film, filter_, at.x, at.y, walks[i].key);
     if (places[i].mirrored) film = mirrored_in_pixel(scene_.film, at.x, at.y, film);
-    const auto ray = camera_.ray(film.x, film.y);
+    const FilmMotion* motion = plan_.film_motion(at.x, at.y);
+    const auto ray = motion ? camera_.ray(Dual(film.x, motion->x), Dual(film.y, motion->y))
+                            : camera_.ray(film.x, film.y);
     starts[i] = {camera_ray(scene_, CameraRay<double>{value(ray.origin), value(ray.direction),
                                                       ray.t_min, ray.t_max}),
                  ray.origin, ray.direction};
@@ -472,10 +527,21 @@ TermEstimator::Sample TermEstimator::sample(const PixelSample& at, const Rng& ke
       to = twice ? TurnedSample{at_rest(sum, vertices.turned(slot)), vertices.turned(slot), {}}
                  : split(sum, {});
     }
+    if (term->uses_moved_pixels()) to.value = sample_moved_pixel(slot, at, key, sink);
     if (turns && slot == pixel_slot_) to.scores = turned(path.found.score, {});
     sample.finite = sample.finite && is_finite(to.value) && is_finite(to.turned);
   }
   return sample;
+}
+
+Rgb<Lanes> TermEstimator::sample_moved_pixel(size_t slot, const PixelSample& at, const Rng& key,
+                                             SampleSink& sink) const {
+  Rgb<Lanes> sum;
+  const FilmMotion& motion = *film_motion(at.x, at.y);
+  if (is_zero(motion.x) && is_zero(motion.y)) return sum;
+  const MovedPixel pixel{at, key.at(Purpose::kFilmCopy, 0), motion};
+  terms_[slot]->add_at_pixels({&pixel, 1}, sink.cost(slot), {&sum, 1});
+  return sum;
 }
 
 void TermEstimator::warn_of_kinks(std::vector<std::string>& warnings) const {

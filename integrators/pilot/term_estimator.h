@@ -18,9 +18,10 @@ namespace limn {
 class FilmRegions;
 
 // The rows of term_types() that the sampler has and the scene has anything of. Slots are indices
-// into it. closed: with light in closed form, which holds whatever vertices see.
+// into it. closed: with light in closed form, which holds whatever vertices see. moved_film:
+// positions on the film may move.
 std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler,
-                                      bool closed = false);
+                                      bool closed = false, bool moved_film = false);
 
 // How directions are warped, see warp_field.h.
 struct Warping {
@@ -37,12 +38,12 @@ class TermEstimator final : public SampleEstimator {
                 const std::vector<const TermType*>& types, const std::vector<bool>& computed,
                 const EdgeSamplerType& sampler, int threads,
                 std::shared_ptr<const FilmRegions> visible = nullptr,
-                const Warping* warping = nullptr, bool closed = false);
+                const Warping* warping = nullptr, bool closed = false, bool moved_film = false);
   TermEstimator(const TermEstimator&) = delete;
   TermEstimator& operator=(const TermEstimator&) = delete;
 
   // What samples hold from now on.
-  void set_plan(SamplePlan plan) { plan_ = std::move(plan); }
+  void set_plan(SamplePlan plan);
   // What samples of a slot cost, see Term::work.
   double work(size_t slot, const TermCost& cost) const;
   // Adds what to tell of kinks that the parameters move the scene across: none twice.
@@ -53,7 +54,8 @@ class TermEstimator final : public SampleEstimator {
   const MotionRates& motion_rates() const { return rates_; }
   // Whether a slot's samples belong to pixels, not to the film.
   bool adds_to_pixels(size_t slot) const {
-    return terms_[slot] && (terms_[slot]->uses_paths() || terms_[slot]->uses_vertices());
+    return terms_[slot] && (terms_[slot]->uses_paths() || terms_[slot]->uses_vertices() ||
+                            terms_[slot]->uses_moved_pixels());
   }
 
   // One path with one sample of every term at its vertices.
@@ -84,6 +86,7 @@ class TermEstimator final : public SampleEstimator {
   int film_stream(size_t slot) const override { return types_[slot]->film_stream; }
   bool sample_film(size_t slot, double u, const Rng& key, RayCount& rays,
                    FilmSample& sample) const override;
+  const FilmMotion* film_motion(int x, int y) const override { return plan_.film_motion(x, y); }
 
  private:
   class VertexTerms;
@@ -111,6 +114,9 @@ class TermEstimator final : public SampleEstimator {
                  SampleLog* log, TermCost& cost, bool twice = false) const;
   template <class Visitor>
   Path path_of(const Walk<Dual, Visitor>& walk) const;
+  void add_moved_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const;
+  Rgb<Lanes> sample_moved_pixel(size_t slot, const PixelSample& at, const Rng& key,
+                                SampleSink& sink) const;
   void add_logged(const PixelSample& at, const Rng& key, SampleSink& sink) const;
   // How many places of its pixel a path takes: in closed form these alone are left to chance.
   int places_of_path() const { return closed_ ? 2 : 1; }
@@ -144,6 +150,7 @@ class TermEstimator final : public SampleEstimator {
   std::vector<std::unique_ptr<Term>> terms_;  // of each slot; null where not computed
   size_t pixel_slot_ = 0;                     // of the term that traces paths
   bool paths_ = false, vertices_ = false;     // whether some term uses them
+  bool moves_film_;                           // whether a plan may
   MotionRates rates_;
   std::unique_ptr<WarpField> warp_field_;  // null where directions are not warped
   // What a pilot turns directions by: about the axes x, y and z in the lanes 1 to 3.

@@ -16,7 +16,8 @@ namespace {
 class CameraTerm final : public Term {
  public:
   explicit CameraTerm(TermInput& input)
-      : edges_(input.context, input.edges(), input.lanes, nullptr, input.visible) {}
+      : edges_(input.context, input.edges(), input.lanes, nullptr, input.visible,
+               input.moves_film) {}
 
   bool uses_film() const override { return !edges_.empty(); }
   bool sample_film(double u, const Rng& key, RayCount& rays, FilmSample& sample) const override {
@@ -28,8 +29,11 @@ class CameraTerm final : public Term {
     const FilmEdge& edge = *point.edge;
     const Lanes speed = (edge.speed0 * (1 - point.s) + edge.speed1 * point.s) / point.density;
     sample.value = {speed * jump.r, speed * jump.g, speed * jump.b};
+    sample.along_x = jump * (edge.nx / point.density);
+    sample.along_y = jump * (edge.ny / point.density);
     return true;
   }
+  void move_film(const FilmMotionAt& motion) override { edges_.move_film(motion); }
   void warn_of_kinks(const Scene& scene, std::vector<std::string>& warnings) const override {
     if (!edges_.parting()) return;
     const auto [first, second] = *edges_.parting();

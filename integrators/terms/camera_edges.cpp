@@ -1,6 +1,7 @@
 // Listing what moves on the film, drawing points of it, the jump of radiance there.
 #include "integrators/terms/camera_edges.h"
 
+#include "integrators/estimates/splat.h"
 #include "integrators/terms/edge_jump.h"
 
 namespace limn {
@@ -35,9 +36,73 @@ double fraction_in_space(double s, double depth0, double depth1) {
   return s * depth0 / ((1 - s) * depth1 + s * depth0);
 }
 
-double weighted_speed(const FilmEdge& edge, int lane) {
-  return edge.length * std::max(std::fabs(edge.speed0[lane]), std::fabs(edge.speed1[lane]));
+// Where positions move, edges are drawn in pieces of so many pixels at most. Not tuned.
+constexpr double kPieceLength = 2;
+// The share of its motion against all pixels around it in how likely a piece is drawn; the rest goes
+// by those that see its middle. Not tuned.
+constexpr double kAllAround = 0.1;
+
+Lanes larger(const Lanes& a, const Lanes& b) {
+  Lanes result;
+  for (int k = 0; k < kLanes; ++k) result[k] = std::max(std::fabs(a[k]), std::fabs(b[k]));
+  return result;
 }
+
+// The root mean square, over the pixels that see a piece of an edge, of how fast it moves against
+// their positions. Positive wherever that is not zero for one of them.
+class SpeedAgainstFilm {
+ public:
+  SpeedAgainstFilm(const Film& film, const FilmMotionAt& motion) : film_(film), motion_(motion) {}
+
+  Lanes of(const FilmEdge& edge, double s0, double s1) const {
+    const auto at = [&](double a, double b, double s) { return a + (b - a) * s; };
+    const double x0 = at(edge.x0, edge.x1, s0), x1 = at(edge.x0, edge.x1, s1);
+    const double y0 = at(edge.y0, edge.y1, s0), y1 = at(edge.y0, edge.y1, s1);
+    const Lanes v0 = edge.speed0 * (1 - s0) + edge.speed1 * s0;
+    const Lanes v1 = edge.speed0 * (1 - s1) + edge.speed1 * s1;
+    Lanes around, seen;
+    double count = 0, weights = 0;
+    const auto square = [&](int x, int y) {
+      Lanes along;
+      if (const FilmMotion* m = motion_(x, y)) along = m->x * edge.nx + m->y * edge.ny;
+      Lanes fastest = larger(v0 - along, v1 - along);
+      for (int k = 0; k < kLanes; ++k) fastest[k] *= fastest[k];
+      return fastest;
+    };
+    const auto [first_x, last_x] = pixels(x0, x1, film_.crop_x, film_.crop_width);
+    const auto [first_y, last_y] = pixels(y0, y1, film_.crop_y, film_.crop_height);
+    for (int y = first_y; y <= last_y; ++y) {
+      for (int x = first_x; x <= last_x; ++x) {
+        around += square(x, y);
+        ++count;
+      }
+    }
+    for_every_pixel_of(film_, 0.5 * (x0 + x1), 0.5 * (y0 + y1), [&](int x, int y, double weight) {
+      seen += square(x, y) * weight;
+      weights += weight;
+    });
+    Lanes result;
+    for (int k = 0; k < kLanes; ++k) {
+      double mean = count > 0 ? kAllAround * around[k] / count : 0;
+      if (weights > 0) mean += (1 - kAllAround) * seen[k] / weights;
+      result[k] = std::sqrt(mean);
+    }
+    return result;
+  }
+
+ private:
+  // That may see something between two places.
+  std::pair<int, int> pixels(double a, double b, int begin, int count) const {
+    const double radius = film_.filter.radius;
+    const double first = std::floor(std::min(a, b) - 0.5 - radius);
+    const double last = std::ceil(std::max(a, b) - 0.5 + radius);
+    return {static_cast<int>(std::max<double>(begin, first)),
+            static_cast<int>(std::min<double>(begin + count - 1, last))};
+  }
+
+  const Film& film_;
+  const FilmMotionAt& motion_;
+};
 
 // The faces whose vertices an edge hangs on: of its own mesh, or, where two faces cross, both.
 std::span<const FaceRef> faces_that_move(const EdgeMesh& mesh, EdgeId edge) {
@@ -48,10 +113,12 @@ std::span<const FaceRef> faces_that_move(const EdgeMesh& mesh, EdgeId edge) {
 }  // namespace
 
 CameraEdges::CameraEdges(const PathContext& context, const EdgeSamplerInput& input, int lanes,
-                         const FreeMotion* free, const FilmRegions* visible)
+                         const FreeMotion* free, const FilmRegions* visible, bool all)
     : context_(context),
       input_(input),
+      lanes_(free ? 3 : lanes),
       free_(free),
+      all_(all),
       viewpoint_(context.viewpoints->camera),
       clips_(find_clip_segments(context.scene)) {
   const Stopwatch watch;
@@ -59,7 +126,7 @@ CameraEdges::CameraEdges(const PathContext& context, const EdgeSamplerInput& inp
   for (uint32_t c = 0; c < clips_.size(); ++c) add_clip(c);
   find_in_line();
   if (visible) keep_seen(*visible);
-  weigh(free_ ? 3 : lanes);
+  weigh({});
   list_seconds_ = watch.seconds();
 }
 
@@ -228,17 +295,37 @@ bool CameraEdges::place_on_film(const Vec3<Dual>& x0, const Vec3<Dual>& x1, cons
   return true;
 }
 
+void CameraEdges::move_film(const FilmMotionAt& motion) {
+  lanes_ = kLanes;
+  weigh(motion);
+}
+
+void CameraEdges::add_pieces(uint32_t index, const FilmMotionAt& motion) {
+  const FilmEdge& edge = edges_[index];
+  if (!motion) {
+    pieces_.push_back({index, 0, 1, larger(edge.speed0, edge.speed1) * edge.length});
+    return;
+  }
+  const SpeedAgainstFilm speed(context_.scene.film, motion);
+  const int count = static_cast<int>(std::ceil(std::max(1.0, edge.length / kPieceLength)));
+  for (int i = 0; i < count; ++i) {
+    const double s0 = static_cast<double>(i) / count, s1 = static_cast<double>(i + 1) / count;
+    pieces_.push_back({index, s0, s1, speed.of(edge, s0, s1) * (edge.length * (s1 - s0))});
+  }
+}
+
 // Projected length times speed: exact but for the jump itself. Every parameter gets an equal
 // share of the samples, whatever its unit.
-void CameraEdges::weigh(int lanes) {
+void CameraEdges::weigh(const FilmMotionAt& motion) {
+  pieces_.clear();
+  choice_ = {};
+  for (uint32_t e = 0; e < edges_.size(); ++e) add_pieces(e, motion);
   Lanes totals;
-  for (const FilmEdge& edge : edges_) {
-    for (int k = 0; k < lanes; ++k) totals[k] += weighted_speed(edge, k);
-  }
-  for (const FilmEdge& edge : edges_) {
+  for (const Piece& piece : pieces_) totals += piece.weight;
+  for (const Piece& piece : pieces_) {
     double share = 0;
-    for (int k = 0; k < lanes; ++k) {
-      if (totals[k] > 0) share += weighted_speed(edge, k) / totals[k];
+    for (int k = 0; k < lanes_; ++k) {
+      if (totals[k] > 0) share += piece.weight[k] / totals[k];
     }
     choice_.add(share);
   }
@@ -246,13 +333,14 @@ void CameraEdges::weigh(int lanes) {
 
 FilmEdgePoint CameraEdges::choose(double u) const {
   const DiscreteDistribution::Draw draw = choice_.sample(u);
-  const FilmEdge& edge = edges_[draw.index];
+  const Piece& piece = pieces_[draw.index];
+  const FilmEdge& edge = edges_[piece.edge];
   FilmEdgePoint point;
   point.edge = &edge;
-  point.s = draw.fraction;
+  point.s = piece.s0 + (piece.s1 - piece.s0) * draw.fraction;
   point.x = edge.x0 + (edge.x1 - edge.x0) * point.s;
   point.y = edge.y0 + (edge.y1 - edge.y0) * point.s;
-  point.density = draw.probability / edge.length;
+  point.density = draw.probability / (edge.length * (piece.s1 - piece.s0));
   return point;
 }
 

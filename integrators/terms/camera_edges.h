@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "integrators/estimates/sample_estimator.h"
 #include "integrators/film/clip_curves.h"
 #include "integrators/film/film_regions.h"
 #include "integrators/paths/path.h"
@@ -49,11 +50,18 @@ class CameraEdges {
   // lanes (relative to the camera); null: what the scene's tangents move, with their speeds in
   // `lanes` lanes. visible: of the film, to list only what is seen of edges; null: hidden parts are
   // listed too, and found to be hidden by jump_at. Edges of faces seen edge-on, and edges
-  // behind others in one line: see Viewpoint.
+  // behind others in one line: see Viewpoint. all: edges at rest are listed, too, for
+  // move_film.
   CameraEdges(const PathContext& context, const EdgeSamplerInput& input, int lanes,
-              const FreeMotion* free = nullptr, const FilmRegions* visible = nullptr);
+              const FreeMotion* free = nullptr, const FilmRegions* visible = nullptr,
+              bool all = false);
 
-  bool empty() const { return edges_.empty(); }
+  // Edges are drawn by how fast they move against positions on the film, which may move from now
+  // on; an empty function: they are held.
+  void move_film(const FilmMotionAt& motion);
+
+  // Whether none moves.
+  bool empty() const { return !(choice_.sum() > 0); }
   size_t size() const { return edges_.size(); }
   double list_seconds() const { return list_seconds_; }
   // Whose they are, of edges in one line that move past each other: EdgesInLine::parting.
@@ -73,7 +81,7 @@ class CameraEdges {
   // faces: that the edge moves with.
   void add(const FilmEdge& edge, std::span<const FaceRef> faces) {
     const bool moves = free_ ? free_->moves(faces) : !is_zero(edge.speed0) || !is_zero(edge.speed1);
-    if (moves) {
+    if (moves || all_) {
       edges_.push_back(edge);
     } else {
       resting_.push_back(edge);
@@ -87,17 +95,28 @@ class CameraEdges {
                      FilmEdge& edge) const;
   void find_in_line();
   void keep_seen(const FilmRegions& visible);
-  void weigh(int lanes);
+  void weigh(const FilmMotionAt& motion);
+  void add_pieces(uint32_t edge, const FilmMotionAt& motion);
+
+  // A part of an edge that is drawn alike: [s0, s1] of it.
+  struct Piece {
+    uint32_t edge;
+    double s0, s1;
+    Lanes weight;
+  };
 
   const PathContext& context_;
   const EdgeSamplerInput& input_;
+  int lanes_;
   const FreeMotion* free_;
+  bool all_;
   const Viewpoint& viewpoint_;
   std::vector<ClipSegment> clips_;
   std::vector<FilmEdge> edges_;    // that move
   std::vector<FilmLine> resting_;  // until what is in line with them is found
   std::optional<std::array<ShapeId, 2>> parting_;
-  DiscreteDistribution choice_;  // of an edge
+  std::vector<Piece> pieces_;
+  DiscreteDistribution choice_;  // of a piece
   double list_seconds_ = 0;
 };
 

@@ -49,6 +49,7 @@ class PenumbraTerm final : public Term {
   double work(const TermCost& cost) const override {
     return static_cast<double>(cost.rays) + kLineCost * static_cast<double>(cost.samples);
   }
+  void move_film(const FilmMotionAt& motion) override { moves_film_ = motion != nullptr; }
   void describe(GradientStats& stats) const override {
     stats.edges.emplace_back("before lamps", lamp_edges_.size());
   }
@@ -60,15 +61,16 @@ class PenumbraTerm final : public Term {
   void add(const DrawnLine& drawn, const Vec3<Dual>& origin, const Vec3<Dual>& direction,
            const Rgb<double>& throughput, int bounces, const Rng& key, SampleLog* log,
            TurnedVertex* turned, TermCost& cost, Rgb<Lanes>& sum) const;
-  // How the point that the line meets slides if the viewer's directions turn.
-  Vec3<Lanes> sliding(const DrawnLine& drawn, const Vec3d& q, const Vec3d& omega,
-                      const TurnedVertex& viewer) const;
+  // How the point that the line meets slides if the viewer's ray moves so, but for what it does if
+  // the ray rests.
+  Vec3<Lanes> sliding(const DrawnLine& drawn, const Vec3<Dual>& q, const Vec3<Dual>& omega) const;
 
   const PathContext& context_;
   const EdgeSamplerInput& edges_;
   const LightRegions& regions_;
   const LampEdges& lamp_edges_;
   PenumbraLines lines_;
+  bool moves_film_ = false;
 };
 
 bool PenumbraTerm::sample_film(double u, const Rng& key, RayCount& rays, FilmSample& sample) const {
@@ -81,11 +83,20 @@ bool PenumbraTerm::sample_film(double u, const Rng& key, RayCount& rays, FilmSam
   drawn->edge.probability /= film_per_solid_angle(context_.scene.camera, seen->omega);
   TermCost cost;
   Rgb<Lanes> sum;
-  add(*drawn, seen->ray.origin, seen->ray.direction, grey(1.0), 0, key, nullptr, nullptr, cost,
-      sum);
+  TurnedVertex shifted;
+  if (moves_film_) {
+    const auto ray = shifted_ray(context_.scene.camera, *seen);
+    shifted.velocity = sliding(*drawn, ray.origin, ray.direction);
+  }
+  add(*drawn, seen->ray.origin, seen->ray.direction, grey(1.0), 0, key, nullptr,
+      moves_film_ ? &shifted : nullptr, cost, sum);
   rays.closest += cost.rays - cost.shadow_rays;
   rays.shadow += cost.shadow_rays;
   sample = {seen->x, seen->y, sum};
+  for (int c = 0; c < 3; ++c) {
+    sample.along_x[c] = -shifted.sum[c][0];
+    sample.along_y[c] = -shifted.sum[c][1];
+  }
   return cost.counted > 0;
 }
 
@@ -99,23 +110,24 @@ void PenumbraTerm::add_sample(const PathVertex& viewer, const Rng& key, TermCost
                                       drawn.face.shape.index()));
   }
   TurnedVertex turned;
-  if (viewer.turned)
-    turned.velocity = sliding(drawn, value(viewer.surface.p), omega, *viewer.turned);
+  if (viewer.turned) {
+    const Vec3<Lanes>& v = viewer.turned->velocity;
+    const Vec3d q = value(viewer.surface.p);
+    turned.velocity = sliding(drawn, {{q.x, v.x}, {q.y, v.y}, {q.z, v.z}},
+                              turning(omega, viewer.turned->turn));
+  }
   add(drawn, viewer.surface.p, turning(omega, viewer.turn), viewer.throughput * f,
       viewer.bounces + 1, key, viewer.log, viewer.turned ? &turned : nullptr, cost, sum);
   if (viewer.turned) viewer.turned->sum = viewer.turned->sum + turned.sum;
 }
 
-Vec3<Lanes> PenumbraTerm::sliding(const DrawnLine& drawn, const Vec3d& q, const Vec3d& omega,
-                                  const TurnedVertex& viewer) const {
-  const Vec3<Lanes>& v = viewer.velocity;
-  const auto turns =
-      surface_on_ray<Dual>(context_.scene, drawn.face, {{q.x, v.x}, {q.y, v.y}, {q.z, v.z}},
-                           turning(omega, viewer.turn));
-  // What does not turn is in both.
+Vec3<Lanes> PenumbraTerm::sliding(const DrawnLine& drawn, const Vec3<Dual>& q,
+                                  const Vec3<Dual>& omega) const {
+  const auto at_rest = [](const Vec3<Dual>& v) { return Vec3<Dual>{v.x.v, v.y.v, v.z.v}; };
+  const auto moves = surface_on_ray<Dual>(context_.scene, drawn.face, q, omega);
   const auto rests =
-      surface_on_ray<Dual>(context_.scene, drawn.face, {q.x, q.y, q.z}, turning(omega, {}));
-  return {turns.p.x.d - rests.p.x.d, turns.p.y.d - rests.p.y.d, turns.p.z.d - rests.p.z.d};
+      surface_on_ray<Dual>(context_.scene, drawn.face, at_rest(q), at_rest(omega));
+  return {moves.p.x.d - rests.p.x.d, moves.p.y.d - rests.p.y.d, moves.p.z.d - rests.p.z.d};
 }
 
 void PenumbraTerm::add(const DrawnLine& drawn, const Vec3<Dual>& origin,

@@ -34,7 +34,9 @@ struct Viewer {
 class ShadowTerm final : public Term {
  public:
   explicit ShadowTerm(TermInput& input)
-      : context_(input.context), input_(input.edges()), edges_(context_, input_, input.lanes) {}
+      : context_(input.context),
+        input_(input.edges()),
+        edges_(context_, input_, input.lanes) {}
 
   bool uses_vertices() const override { return !edges_.empty(); }
   void add_at_vertex(const PathVertex& vertex, int samples, TermCost& cost,
@@ -53,6 +55,7 @@ class ShadowTerm final : public Term {
   }
   bool sample_film(double u, const Rng& key, RayCount& rays, FilmSample& sample) const override;
 
+  void move_film(const FilmMotionAt& motion) override { moves_film_ = motion != nullptr; }
   void describe(GradientStats& stats) const override {
     stats.setup.emplace_back("edges of sharp shadows", edges_.list_seconds());
     stats.edges.emplace_back("of sharp shadows", edges_.size());
@@ -66,6 +69,7 @@ class ShadowTerm final : public Term {
   const PathContext& context_;
   const EdgeSamplerInput& input_;
   ShadowEdges edges_;
+  bool moves_film_ = false;
 };
 
 Lanes ShadowTerm::sweep(const ShadowEdge& edge, const ShadowPoint& point,
@@ -146,15 +150,25 @@ bool ShadowTerm::sample_film(double u, const Rng& key, RayCount& rays, FilmSampl
   if (!seen) return false;
   const Lanes swept = sweep(edge, *point, {seen->ray.origin, seen->ray.direction, seen->distance});
   const Rgb<double> amount = edges_.jump(edge, *point, value(seen->ray.origin), seen->omega);
-  if (is_zero(swept) || is_black(amount)) return false;
+  if ((is_zero(swept) && !moves_film_) || is_black(amount)) return false;
   if (is_hidden(context_, aimed_at(*seen, point->target(value(seen->ray.origin))), point->face,
                 rays))
     return false;
   sample.x = seen->x;
   sample.y = seen->y;
-  const Lanes weight =
-      swept * (film_per_solid_angle(context_.scene.camera, seen->omega) / probability);
+  const double share = film_per_solid_angle(context_.scene.camera, seen->omega) / probability;
+  const Lanes weight = swept * share;
   sample.value = {weight * amount.r, weight * amount.g, weight * amount.b};
+  if (moves_film_) {
+    const auto ray = shifted_ray(context_.scene.camera, *seen);
+    const auto at_rest = [](const Vec3<Dual>& v) { return Vec3<Dual>{v.x.v, v.y.v, v.z.v}; };
+    // What moves by itself is in both.
+    const Lanes by_film =
+        sweep(edge, *point, {at_rest(ray.origin), at_rest(ray.direction), seen->distance}) -
+        sweep(edge, *point, {ray.origin, ray.direction, seen->distance});
+    sample.along_x = amount * (by_film[0] * share);
+    sample.along_y = amount * (by_film[1] * share);
+  }
   return true;
 }
 

@@ -42,6 +42,14 @@ struct PathVertex {
   const WarpField* warp = nullptr;
 };
 
+// A sample of a pixel whose positions on the film move.
+struct MovedPixel {
+  PixelSample at;
+  Rng key;
+  const FilmMotion& motion;
+};
+inline constexpr size_t kMostMovedPixels = 8;
+
 class Term {
  public:
   virtual ~Term() = default;
@@ -56,6 +64,14 @@ class Term {
   virtual bool uses_vertices() const { return false; }
   virtual void add_at_vertex(const PathVertex& /*vertex*/, int /*samples*/, TermCost& /*cost*/,
                              Rgb<Lanes>& /*sum*/) const {}
+
+  // Whether moving positions of a pixel's samples add something by themselves. add_at_pixels takes
+  // one sample for each of at most kMostMovedPixels pixels, and sets sums[i] to that of pixels[i].
+  virtual bool uses_moved_pixels() const { return false; }
+  virtual void add_at_pixels(std::span<const MovedPixel> /*pixels*/, TermCost& /*cost*/,
+                             std::span<Rgb<Lanes>> /*sums*/) const {}
+  // How positions on the film move from now on; an empty function: they are held.
+  virtual void move_film(const FilmMotionAt& /*motion*/) {}
 
   // Whether the film holds curves to sample. sample_film draws a point: u in [0, 1), stratified
   // over a batch, chooses the curve and the point on it; `key` is for everything else. False if
@@ -83,13 +99,15 @@ class FilmRegions;
 class TermInput {
  public:
   TermInput(const PathContext& path_context, int lane_count, const Lanes& lane_scales,
-            const EdgeSamplerType& sampler_type, int thread_count, bool warped = false)
+            const EdgeSamplerType& sampler_type, int thread_count, bool warped = false,
+            bool film_moves = false)
       : context(path_context),
         lanes(lane_count),
         lane_scale(lane_scales),
         sampler(sampler_type),
         threads(thread_count),
-        warps(warped) {}
+        warps(warped),
+        moves_film(film_moves) {}
 
   const PathContext& context;      // the scene with its parameters seeded
   int lanes;                       // how many derivative lanes are in use
@@ -97,6 +115,7 @@ class TermInput {
   const EdgeSamplerType& sampler;  // how shading points choose an edge
   int threads;
   bool warps;                            // whether directions are warped, see warp_field.h
+  bool moves_film;                       // whether Term::move_film may be called
   const FilmRegions* visible = nullptr;  // of the film; null: rays tell what is seen
 
   // Edges of all shapes (object i is shape i), light polygons and the environment, as an edge
@@ -138,11 +157,12 @@ struct TermType {
   int film_stream;             // tells the random numbers of terms on the film apart
   bool (*applies)(const Scene& scene);  // whether the scene has anything that the term could be of
   bool regions;  // it is of samplers that keep regions of light apart, and of no others
+  bool moved_film;  // it is of methods that move positions on the film, and of no others
   std::unique_ptr<Term> (*make)(TermInput& input);
 };
 // In the order of --samples and of all tables.
 std::span<const TermType> term_types();
 // Sums of all terms are kept on the stack.
-inline constexpr size_t kMostTerms = 6;
+inline constexpr size_t kMostTerms = 7;
 
 }  // namespace limn

@@ -11,6 +11,7 @@ std::unique_ptr<Term> make_boundary_term(TermInput& input);
 std::unique_ptr<Term> make_shadow_term(TermInput& input);
 std::unique_ptr<Term> make_direct_term(TermInput& input);
 std::unique_ptr<Term> make_penumbra_term(TermInput& input);
+std::unique_ptr<Term> make_filter_term(TermInput& input);
 
 inline bool always(const Scene&) { return true; }
 inline bool has_delta_lights(const Scene& scene) { return !scene.delta_lights.empty(); }
@@ -19,17 +20,19 @@ inline constexpr double kLeastFilmSamples = 0.125;  // not tuned
 
 inline constexpr TermType kTermTypes[] = {
     {"interior", "what slides within continuous regions", 1, true, false, true, 0, always, false,
-     make_interior_term},
+     false, make_interior_term},
     {"camera", "silhouettes on the film", kLeastFilmSamples, false, true, false, 0, always, false,
-     make_camera_term},
+     false, make_camera_term},
     {"boundary", "silhouettes that shading points see", 1, false, true, true, 0, always, false,
-     make_boundary_term},
-    {"shadow", "edges of sharp shadows", 1, false, true, true, 1, has_delta_lights, false,
+     false, make_boundary_term},
+    {"shadow", "edges of sharp shadows", 1, false, true, true, 1, has_delta_lights, false, false,
      make_shadow_term},
     {"direct", "silhouettes that shading points see before lamps and the sun", 1, false, true, true,
-     0, LightRegions::any_in, true, make_direct_term},
+     0, LightRegions::any_in, true, false, make_direct_term},
     {"penumbra", "of these, what has a thin penumbra", 1, false, true, true, 2,
-     LightRegions::any_in, true, make_penumbra_term},
+     LightRegions::any_in, true, false, make_penumbra_term},
+    {"filter", "what pixels lose and gain at their rims, where positions follow what they see", 1,
+     false, false, false, 0, always, false, true, make_filter_term},
 };
 
 }  // namespace limn

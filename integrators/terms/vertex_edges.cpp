@@ -57,7 +57,7 @@ void add_edge_point(const PathContext& context, const EdgeMesh& mesh, const Path
   // A density may round to zero at the very horizon.
   const Rgb<double> f =
       seen && sample.pdf_t > 0 ? vertex.scattering.eval_value(view.omega) : Rgb<double>{};
-  if (is_zero(weight) || is_black(f)) {
+  if ((is_zero(weight) && !vertex.turned) || is_black(f)) {
     ++cost.zero_weight;
     if (vertex.log) vertex.log->push_back("    no weight");
     return;
