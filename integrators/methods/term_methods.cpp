@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "integrators/estimates/batches.h"
 #include "integrators/film/film_regions.h"
@@ -75,6 +76,10 @@ struct TermMethod {
 // The fewest samples of a term in one of a pixel, where they are spread: a rare event that a pilot
 // has not seen must not cost more than this. Not tuned.
 constexpr double kLeastSamples = 0.125;
+
+// Where turns of directions are looked at, too, positions on the film move if that leaves less than
+// this share of squared error times work. Not tuned.
+constexpr double kFilmConvincing = 0.9;
 
 // A turn and a score of every pixel and parameter, of the order of what moves. Their means are not
 // zero: otherwise a change of the derivative that they should not make would go unseen in sums over
@@ -344,32 +349,100 @@ class TermJob {
         method_.moves_directions && can_move_directions() && !estimator.motion_rates().still();
     SamplePlan probing;
     probing.splits = plan.splits;
-    if (can_move_film() && method_.spreads_samples && !estimator.motion_rates().still() &&
-        estimator.lanes() <= kMostFilmParameters) {
-      FilmFit film = fit_film(estimator, probing, film_pilot_samples(settings.spp), settings, watch);
-      probing.grid = film.grid;
-      probing.film = std::move(film.motion);
-    }
     if (method_.spreads_samples) probing.light_samples = kPilotLights;
-    std::vector<FilmMotion> film = probing.film;
-    estimator.set_plan(std::move(probing));
     RunSettings share = settings;
     share.seconds /= static_cast<double>(passes_.size());
-    const PilotFigures pilot = run_pilot(estimator, turns, spp, share, watch);
+    Probed probed;
+    const FilmFit film = fit_film_of(estimator, probing, share, watch);
+    if (!film.motion.empty()) {
+      probing.grid = film.grid;
+      probing.film = film.motion;
+      probed = probe(estimator, probing, turns, spp, share, watch);
+      // Turns of directions may take out as much, and leave less to positions.
+      SamplePlan held = probing;
+      held.film.clear();
+      share.seconds /= 2;
+      if (turns && probed.pilot.spp > 0) {
+        Probed other = probe(estimator, held, turns, std::max(4, spp / 4 * 2), share, watch);
+        if (other.pilot.spp > 0 && error_times_work(estimator, probed) >
+                                       kFilmConvincing * error_times_work(estimator, other)) {
+          probed = std::move(other);
+          probing.film.clear();
+        }
+      }
+    } else {
+      probed = probe(estimator, probing, turns, spp, share, watch);
+    }
+    const auto& [pilot, fit] = probed;
     if (pilot.spp == 0) return plan;
     result.pilot_spp = pilot.spp;
-    FieldFit fit;
-    if (turns) fit = fit_fields(pilot, estimator.lanes(), settings.threads);
-    const std::vector<TermFigures> figures = figures_of(estimator, pilot, fit, plan);
+    const std::vector<TermFigures> figures = figures_of(estimator, probed, plan);
     if (method_.spreads_samples && !options_.uniform_samples) {
       spread_samples(figures, pilot.grid, plan);
     } else {
       plan.uniform = best_samples(figures);
     }
     plan.grid = pilot.grid;
-    plan.film = std::move(film);
-    plan.fields = std::move(fit.fields);
+    plan.film = std::move(probing.film);
+    plan.fields = fit.fields;
     return plan;
+  }
+
+  // Positions are held where the result is empty.
+  FilmFit fit_film_of(TermEstimator& estimator, const SamplePlan& plan, const RunSettings& settings,
+                      const Stopwatch& watch) const {
+    const int spp = film_pilot_samples(settings.spp);
+    if (spp == 0 || !method_.spreads_samples || !can_move_film() ||
+        estimator.motion_rates().still() || estimator.lanes() > kMostFilmParameters) {
+      return {};
+    }
+    return fit_film(estimator, plan, spp, settings, watch);
+  }
+
+  // What a pilot found with a plan.
+  struct Probed {
+    PilotFigures pilot;
+    FieldFit fit;
+  };
+  static Probed probe(TermEstimator& estimator, const SamplePlan& plan, bool turns, int spp,
+                      const RunSettings& settings, const Stopwatch& watch) {
+    estimator.set_plan(plan);
+    Probed probed{run_pilot(estimator, turns, spp, settings, watch), {}};
+    if (turns && probed.pilot.spp > 0)
+      probed.fit = fit_fields(probed.pilot, estimator.lanes(), settings.threads);
+    return probed;
+  }
+
+  // Squared error after equal time, where samples are shared out best among terms: of every
+  // parameter, as a geometric mean.
+  double error_times_work(const TermEstimator& estimator, const Probed& probed) const {
+    double product = 1;
+    for (int lane = 0; lane < estimator.lanes(); ++lane) {
+      std::vector<std::vector<double>> cells(types_.size());
+      const std::vector<double> variances = variances_of(probed, lane, cells);
+      double sum = 0;
+      for (size_t t = 0; t < types_.size(); ++t)
+        sum += std::sqrt(std::max(variances[t], 0.0) * probed.pilot.work[t]);
+      if (sum > 0) product *= std::pow(sum, 2.0 / estimator.lanes());
+    }
+    return product;
+  }
+
+  // Of one sample of every term: means over the film, and in cells where it has them.
+  std::vector<double> variances_of(const Probed& probed, int lane,
+                                   std::vector<std::vector<double>>& cells) const {
+    const auto& [pilot, fit] = probed;
+    std::vector<double> means(types_.size());
+    for (size_t t = 0; t < types_.size(); ++t) {
+      const double film = pilot.film_variance[t][lane];
+      means[t] = film;
+      if (!pilot.in_cells(t)) continue;
+      // Some terms have samples of both kinds.
+      cells[t] = fit.variances.empty() ? pilot.variances(t, lane) : fit.variances[lane][t];
+      means[t] += trimmed_mean(cells[t]);
+      for (double& cell : cells[t]) cell += film;
+    }
+    return means;
   }
 
   // The pilot's paths took two light samples at later vertices; `light` is half of what one adds.
@@ -387,8 +460,9 @@ class TermJob {
 
   // Each parameter counts alike: its variances are divided by their sum. Sets the plan's light
   // samples.
-  std::vector<TermFigures> figures_of(const TermEstimator& estimator, const PilotFigures& pilot,
-                                      const FieldFit& fit, SamplePlan& plan) const {
+  std::vector<TermFigures> figures_of(const TermEstimator& estimator, const Probed& probed,
+                                      SamplePlan& plan) const {
+    const auto& [pilot, fit] = probed;
     TermFigures light;
     light.cells.resize(pilot.grid.size());
     std::vector<TermFigures> figures(types_.size());
@@ -400,20 +474,8 @@ class TermJob {
     }
     for (int lane = 0; lane < estimator.lanes(); ++lane) {
       std::vector<std::vector<double>> cells(figures.size());
-      std::vector<double> means(figures.size());
-      double sum = 0;
-      for (size_t t = 0; t < figures.size(); ++t) {
-        if (figures[t].cells.empty()) {
-          means[t] = pilot.film_variance[t][lane];
-        } else {
-          cells[t] = fit.variances.empty() ? pilot.variances(t, lane) : fit.variances[lane][t];
-          // Some terms have samples of both kinds.
-          const double film = pilot.film_variance[t][lane];
-          means[t] = trimmed_mean(cells[t]) + film;
-          for (double& cell : cells[t]) cell += film;
-        }
-        sum += means[t];
-      }
+      const std::vector<double> means = variances_of(probed, lane, cells);
+      const double sum = std::accumulate(means.begin(), means.end(), 0.0);
       if (!(sum > 0)) continue;
       for (size_t t = 0; t < figures.size(); ++t) {
         figures[t].variance += means[t] / sum;

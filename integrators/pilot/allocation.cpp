@@ -209,6 +209,6 @@ int pilot_samples(int spp) {
   return std::clamp(spp / 8, 4, 32) / 2 * 2;
 }
 
-int film_pilot_samples(int spp) { return std::clamp(spp / 16, 4, 16) / 2 * 2; }
+int film_pilot_samples(int spp) { return spp < 32 ? 0 : std::clamp(spp / 8, 4, 32) / 2 * 2; }
 
 }  // namespace limn

@@ -1,33 +1,61 @@
 #pragma once
 // How positions on the film move: chosen for every cell by a pilot of its own, which comes before
 // the other one. With positions that move by V (terms/filter.cpp) a derivative changes by V times
-// an amount D whose mean is zero: what all other terms add where the film moves under the scene,
-// edges at rest included, less what the pixels lose and gain at their rims. So V is a control
-// variate's coefficient, any one is right, and one that follows what a pixel sees takes out most of
-// what slides and is covered there, of shadows and mirror images as well.
+// an amount whose mean is zero: what all other terms add where the film moves under the scene,
+// edges at rest included, less what the pixels lose and gain at their rims. So V is the coefficient
+// of a control variate: any one is right, and one that follows what a pixel sees takes out most of
+// what slides and is covered there, shadows and mirror images as well.
 #include <vector>
 
-#include "integrators/estimates/batches.h"
 #include "integrators/pilot/sample_plan.h"
 #include "integrators/pilot/term_estimator.h"
 
 namespace limn {
 
+// The film takes two lanes behind those of the parameters.
+inline constexpr int kMostFilmParameters = kLanes - 2;
+
 struct FilmFit {
-  int spp = 0;                     // samples of every probed pixel; 0: there was no time
   PlanGrid grid;                   // that of run_pilot
   std::vector<FilmMotion> motion;  // by cell; empty if positions are better held everywhere
 };
 
-// So many parameters can be probed at once: the film takes two lanes.
-inline constexpr int kMostFilmParameters = kLanes - 2;
+// A pilot of at most spp samples of every probed pixel: even, and at least 4. The estimator has
+// kMostFilmParameters at most, and is left with a plan that is of no use. settings, watch: as of
+// run_pilot; it takes a sixteenth of a limit of time. Deterministic on any number of threads.
+FilmFit fit_film(TermEstimator& estimator, const SamplePlan& plan, int spp,
+                 const RunSettings& settings, const Stopwatch& watch);
 
 // How fast, about, what moves does so on the film [pixels per unit of the first parameter].
 double film_speed(const TermEstimator& estimator);
 
-// plan: what samples hold meanwhile. The estimator has it, with other motions, afterwards. spp, settings, watch: as of
-// run_pilot. Deterministic on any number of threads.
-FilmFit fit_film(TermEstimator& estimator, SamplePlan plan, int spp, const RunSettings& settings,
-                 const Stopwatch& watch);
+// All terms with two lanes more than there are parameters, at every other of the pixels that a
+// pilot probes: fits are made over windows of cells.
+class FilmProbe final : public SampleEstimator {
+ public:
+  // Both must outlive it.
+  FilmProbe(const TermEstimator& terms, const PlanGrid& grid);
+
+  const Scene& scene() const override { return terms_.scene(); }
+  size_t slots() const override { return terms_.slots(); }
+  const char* slot_name(size_t slot) const override { return terms_.slot_name(slot); }
+  int lanes() const override { return terms_.lanes() + 2; }
+  Lanes lane_scale() const override { return terms_.lane_scale(); }
+  bool samples_pixels() const override { return terms_.samples_pixels(); }
+  size_t pixel_slot() const override { return terms_.pixel_slot(); }
+  void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const override;
+  double film_samples(size_t slot) const override { return terms_.film_samples(slot); }
+  int film_stream(size_t slot) const override { return terms_.film_stream(slot); }
+  bool sample_film(size_t slot, double u, const Rng& key, RayCount& rays,
+                   FilmSample& sample) const override {
+    return terms_.sample_film(slot, u, key, rays, sample);
+  }
+  const FilmMotion* film_motion(int x, int y) const override { return terms_.film_motion(x, y); }
+  bool looks_at(int x, int y) const;
+
+ private:
+  const TermEstimator& terms_;
+  const PlanGrid& grid_;
+};
 
 }  // namespace limn

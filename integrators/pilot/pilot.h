@@ -13,7 +13,7 @@
 namespace limn {
 
 inline constexpr size_t kMostProbes = 65536;  // a film of 256 by 256 has them all; not tuned
-inline constexpr int kPilotLights = 2;  // light samples at later vertices
+inline constexpr int kPilotLights = 2;        // light samples at later vertices
 
 struct PilotFigures {
   int spp = 0;  // samples of every probed pixel; 0: there was no time for a pilot

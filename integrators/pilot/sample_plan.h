@@ -43,7 +43,7 @@ struct SamplePlan {
   std::vector<PixelCounts> counts;     // by cell; empty: `uniform`
   int light_samples = 1;               // at every vertex of a path but the first
   std::vector<DirectionField> fields;  // by cell; empty: directions are held
-  std::vector<FilmMotion> film;  // by cell: positions on the film; empty: they are held
+  std::vector<FilmMotion> film;        // by cell: positions on the film; empty: they are held
   // Whether vertices that move fast take more samples of edges and lights and more directions, and
   // those that little light comes from fewer edges.
   bool splits = false;

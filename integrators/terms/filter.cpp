@@ -56,8 +56,8 @@ class FilterTerm final : public Term {
   }
 
  private:
-  // Paths without derivatives take so much of the time of others. Timed as TODO.
-  static constexpr double kRayCost = 0.4;
+  // Rays of paths without derivatives take so much of the time of others.
+  static constexpr double kRayCost = 0.5;
 
   struct Pair {
     FilmPosition left, right;
@@ -89,9 +89,8 @@ FilterTerm::Pair FilterTerm::draw(const MovedPixel& pixel) const {
     const double x = is_x ? offset : other, y = is_x ? other : offset;
     return FilmPosition{pixel.at.x + 0.5 + x, pixel.at.y + 0.5 + y};
   };
-  const double peak =
-      film_.filter.eval(0) /
-      (film_.filter.integral(along.upper) - film_.filter.integral(along.lower));
+  const double peak = film_.filter.eval(0) /
+                      (film_.filter.integral(along.upper) - film_.filter.integral(along.lower));
   return {place(std::max(-half, along.lower)), place(std::min(half, along.upper)),
           (is_x ? pixel.motion.x * (peak / share_x) : pixel.motion.y * (peak / (1 - share_x)))};
 }

@@ -113,8 +113,8 @@ void PenumbraTerm::add_sample(const PathVertex& viewer, const Rng& key, TermCost
   if (viewer.turned) {
     const Vec3<Lanes>& v = viewer.turned->velocity;
     const Vec3d q = value(viewer.surface.p);
-    turned.velocity = sliding(drawn, {{q.x, v.x}, {q.y, v.y}, {q.z, v.z}},
-                              turning(omega, viewer.turned->turn));
+    turned.velocity =
+        sliding(drawn, {{q.x, v.x}, {q.y, v.y}, {q.z, v.z}}, turning(omega, viewer.turned->turn));
   }
   add(drawn, viewer.surface.p, turning(omega, viewer.turn), viewer.throughput * f,
       viewer.bounces + 1, key, viewer.log, viewer.turned ? &turned : nullptr, cost, sum);
@@ -125,8 +125,7 @@ Vec3<Lanes> PenumbraTerm::sliding(const DrawnLine& drawn, const Vec3<Dual>& q,
                                   const Vec3<Dual>& omega) const {
   const auto at_rest = [](const Vec3<Dual>& v) { return Vec3<Dual>{v.x.v, v.y.v, v.z.v}; };
   const auto moves = surface_on_ray<Dual>(context_.scene, drawn.face, q, omega);
-  const auto rests =
-      surface_on_ray<Dual>(context_.scene, drawn.face, at_rest(q), at_rest(omega));
+  const auto rests = surface_on_ray<Dual>(context_.scene, drawn.face, at_rest(q), at_rest(omega));
   return {moves.p.x.d - rests.p.x.d, moves.p.y.d - rests.p.y.d, moves.p.z.d - rests.p.z.d};
 }
 

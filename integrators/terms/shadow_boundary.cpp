@@ -34,9 +34,7 @@ struct Viewer {
 class ShadowTerm final : public Term {
  public:
   explicit ShadowTerm(TermInput& input)
-      : context_(input.context),
-        input_(input.edges()),
-        edges_(context_, input_, input.lanes) {}
+      : context_(input.context), input_(input.edges()), edges_(context_, input_, input.lanes) {}
 
   bool uses_vertices() const override { return !edges_.empty(); }
   void add_at_vertex(const PathVertex& vertex, int samples, TermCost& cost,

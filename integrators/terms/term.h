@@ -156,7 +156,7 @@ struct TermType {
   bool moved_with_directions;  // its mean changes where directions move, see direction_field.h
   int film_stream;             // tells the random numbers of terms on the film apart
   bool (*applies)(const Scene& scene);  // whether the scene has anything that the term could be of
-  bool regions;  // it is of samplers that keep regions of light apart, and of no others
+  bool regions;     // it is of samplers that keep regions of light apart, and of no others
   bool moved_film;  // it is of methods that move positions on the film, and of no others
   std::unique_ptr<Term> (*make)(TermInput& input);
 };

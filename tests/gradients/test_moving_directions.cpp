@@ -5,9 +5,8 @@
 #include "integrators/pilot/term_estimator.h"
 #include "limn/integrators/gradient.h"
 #include "limn/integrators/methods.h"
-#include "limn/integrators/statistics.h"
-#include "support/block_runs.h"
 #include "support/meshes.h"
+#include "support/same_mean.h"
 #include "support/scenes.h"
 
 namespace limn {
@@ -24,44 +23,10 @@ Scene gloss_scene(const TempFiles& files, double alpha) {
   return make_scene(files, parts);
 }
 
-GradientResult run(const Scene& scene, const std::vector<std::string>& parameters,
-                   const std::string& method, int spp, uint64_t seed, int threads = 2,
-                   const std::vector<std::string>& terms = {}) {
-  GradientOptions options;
-  options.parameters = parameters;
-  options.method = method;
-  options.samples = std::nullopt;
-  options.terms = terms;
-  return run_blocks(scene, options, spp, seed, threads);
-}
-
 double mean_variance(const Moments& moments) {
   double sum = 0;
   for (size_t i = 0; i < moments.size(); ++i) sum += moments.variance(i);
   return sum / static_cast<double>(moments.size());
-}
-
-// z-scores of the differences of block sums between a method and the plain forest.
-void expect_same_mean(const Scene& scene, const std::vector<std::string>& parameters,
-                      const std::vector<std::string>& methods) {
-  const GradientResult plain = run(scene, parameters, "forest", 256, 1);
-  for (const std::string& method : methods) {
-    const GradientResult moving = run(scene, parameters, method, 256, 2);
-    for (size_t k = 0; k < parameters.size(); ++k) {
-      const Moments &a = plain.parameters[k].total_blocks, &b = moving.parameters[k].total_blocks;
-      std::vector<double> z;
-      for (size_t i = 0; i < a.size(); ++i) {
-        const double variance = a.variance(i) + b.variance(i);
-        if (variance > 0) z.push_back((a.mean(i) - b.mean(i)) / std::sqrt(variance));
-      }
-      const ZSummary summary = summarize(z);
-      const std::string label = method + " " + parameters[k];
-      EXPECT_GE(summary.count, 4) << label;
-      EXPECT_GE(summary.p_largest, 1e-6) << label << ": " << summary.largest;
-      EXPECT_LE(std::fabs(summary.mean) * std::sqrt(static_cast<double>(summary.count)), 5)
-          << label;
-    }
-  }
 }
 
 TEST(MovingDirections, KeepTheMean) {
@@ -137,7 +102,7 @@ TEST(FastVertices, KeepTheMean) {
   expect_same_mean(scene, {"floor.translate.y"}, {"adaptive"});
   double difference = 0, variance = 0;
   for (const char* method : {"forest", "adaptive"}) {
-    const Moments radiance = run(scene, {"floor.translate.y"}, method, 64, 5).radiance;
+    const Moments radiance = run_method(scene, {"floor.translate.y"}, method, 64, 5).radiance;
     for (size_t i = 0; i < radiance.size(); ++i) {
       difference += method[0] == 'f' ? -radiance.mean(i) : radiance.mean(i);
       variance += radiance.variance(i);
@@ -161,7 +126,7 @@ TEST(MovingDirections, TakeOutWhatSlides) {
   const TempFiles files;
   const Scene scene = mirror_scene(files, 32);
   const auto variance_times_rays = [&](const std::string& method) {
-    const GradientResult result = run(scene, {"ball.translate.y"}, method, 64, 3);
+    const GradientResult result = run_method(scene, {"ball.translate.y"}, method, 64, 3);
     uint64_t rays = 0;
     for (const auto& term : result.terms) rays += term.cost.rays;
     const Moments& total = result.parameters[0].total;
@@ -239,8 +204,8 @@ TEST(MovingDirections, TakeOutWhatSlidesForEveryParameter) {
   const TempFiles files;
   const Scene scene = mirror_scene(files, 32);
   const std::vector<std::string> parameters = {"ball.translate.y", "ball.translate.z"};
-  const GradientResult moving = run(scene, parameters, "moving-directions", 128, 3);
-  const GradientResult held = run(scene, parameters, "silhouettes", 128, 3);
+  const GradientResult moving = run_method(scene, parameters, "moving-directions", 128, 3);
+  const GradientResult held = run_method(scene, parameters, "silhouettes", 128, 3);
   for (size_t k = 0; k < parameters.size(); ++k) {
     EXPECT_LT(2 * mean_variance(moving.parameters[k].total),
               mean_variance(held.parameters[k].total))
@@ -254,7 +219,7 @@ TEST(MovingDirections, RestWhereTermsAreLeftOut) {
   const Scene scene = gloss_scene(files, 0.2);
   const auto interior = [&](const std::string& method) {
     const GradientResult result =
-        run(scene, {"ball.translate.y"}, method, 64, 3, 2, {"interior", "camera"});
+        run_method(scene, {"ball.translate.y"}, method, 64, 3, 2, {"interior", "camera"});
     return result.parameters[0].total;
   };
   const Moments a = interior("forest"), b = interior("random-directions");
@@ -267,10 +232,10 @@ TEST(MovingDirections, SameBitsOnAnyNumberOfThreads) {
   for (const std::vector<std::string>& parameters :
        {std::vector<std::string>{"ball.translate.y"},
         std::vector<std::string>{"ball.translate.y", "ball.rotate.x", "sensor.translate.x"}}) {
-    const GradientResult one = run(scene, parameters, "adaptive", 32, 5, 1);
+    const GradientResult one = run_method(scene, parameters, "adaptive", 32, 5, 1);
     EXPECT_GT(one.pilot_spp, 0);
     for (const int threads : {2, 5}) {
-      const GradientResult many = run(scene, parameters, "adaptive", 32, 5, threads);
+      const GradientResult many = run_method(scene, parameters, "adaptive", 32, 5, threads);
       for (size_t k = 0; k < parameters.size(); ++k) {
         const Moments &a = one.parameters[k].total, &b = many.parameters[k].total;
         for (size_t i = 0; i < a.size(); ++i) {

@@ -1,0 +1,154 @@
+// Positions on the film that move: whatever they do, the mean stays; and where detail slides, they
+// take out most of the variance.
+#include <gtest/gtest.h>
+
+#include "integrators/estimates/batches.h"
+#include "integrators/pilot/film_fit.h"
+#include "integrators/pilot/term_estimator.h"
+#include "limn/edgetree/edge_sampler_types.h"
+#include "support/meshes.h"
+#include "support/same_mean.h"
+#include "support/scenes.h"
+
+namespace limn {
+namespace {
+
+const char* const kFilters[] = {R"(<rfilter type="box"/>)", R"(<rfilter type="tent"/>)",
+                                R"(<rfilter type="gaussian"/>)",
+                                R"(<rfilter type="gaussian"/><boolean name="sample_border"
+                                   value="true"/>)"};
+
+// Edges on the film, of sharp and of soft shadows, in gloss; more at rest than move.
+std::string ball_and_screens(const TempFiles& files) {
+  return square("floor", 2.5, -90, {0, 0, 0}, conductor("gloss", 0.3)) +
+         square("wall", 2, 0, {0, 1, -1.5}, diffuse("plaster", "0.7, 0.7, 0.7")) +
+         square("screen", 0.3, 20, {-0.8, 0.9, -0.3}, diffuse("soot", "0.1, 0.1, 0.1")) +
+         obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(1)), true, 0.4,
+                   {0.4, 0.8, 0.2}, diffuse("clay", "0.7, 0.5, 0.3")) +
+         square("lamp", 0.2, 90, {0.3, 2.4, 0.5}, area_light("glow", "30, 25, 20")) +
+         R"(<emitter type="point" id="bulb"><point name="position" value="-1.5,3.2,1.6"/>
+            <rgb name="intensity" value="5,5,5"/></emitter>)" +
+         make_sky(files, "sky");
+}
+
+Scene scene_with(const TempFiles& files, const std::string& film, int size) {
+  SceneParts parts;
+  parts.film = film;
+  parts.width = parts.height = size;
+  parts.body = ball_and_screens(files);
+  return make_scene(files, parts);
+}
+
+// Nothing moves but positions on the film, by the same everywhere: what all terms add, `filter`
+// against the others, has mean zero. Also where the film ends and cuts filters.
+TEST(FilmMotion, TakesBackWhatItAdds) {
+  const TempFiles files;
+  for (const char* filter : kFilters) {
+    const Scene scene = scene_with(files, filter, 8);
+    const EdgeSamplerType& sampler = edge_sampler_type("silhouettes");
+    const auto terms = terms_of(scene, sampler, false, true);
+    const Parameter parameter = find_parameter(scene, "ball.translate.y");
+    TermEstimator estimator(scene, {&parameter, 1}, terms, std::vector<bool>(terms.size(), true),
+                            sampler, 2, nullptr, nullptr, false, true);
+    SamplePlan plan;
+    plan.grid = PlanGrid(scene.film, film_size(scene.film));
+    FilmMotion motion;
+    motion.x[1] = 1, motion.y[2] = 1;
+    plan.film.assign(plan.grid.size(), motion);
+    estimator.set_plan(plan);
+    constexpr int kBatches = 200;
+    const size_t size = film_size(scene.film);
+    std::vector<Moments> sums, rims;
+    for (int lane = 0; lane < 2; ++lane) sums.emplace_back(size), rims.emplace_back(size);
+    std::vector<std::unique_ptr<SampleEstimator>> one;
+    auto owned = std::make_unique<FilmProbe>(estimator, plan.grid);
+    const FilmProbe& probe = *owned;
+    one.push_back(std::move(owned));
+    const Stopwatch watch;
+    RunSettings settings;
+    ProgressCounter progress(settings, watch, kBatches);
+    for (int b = 0; b < kBatches; ++b) {
+      const auto found = run_batch(one, {11, 8 * b, 8 * b + 8}, 2, progress);
+      ASSERT_EQ(found.size(), 1u);
+      EXPECT_EQ(found[0].non_finite.count, 0u);
+      for (int lane = 0; lane < 2; ++lane) {
+        std::vector<double> sum(size);
+        for (size_t slot = 0; slot < terms.size(); ++slot) {
+          const auto& image = found[0].images[slot * 3 + 1 + lane];
+          for (size_t i = 0; i < size; ++i) sum[i] += image[i];
+          if (terms[slot]->name == std::string("filter")) rims[lane].add_batch(image, 8);
+        }
+        sums[lane].add_batch(sum, 8);
+      }
+    }
+    for (int lane = 0; lane < 2; ++lane) {
+      std::vector<double> z, of_rims;
+      for (size_t i = 0; i < size; i += 3) {
+        if (!probe.looks_at(static_cast<int>(i / 3) % 8, static_cast<int>(i / 3) / 8)) continue;
+        z.push_back(sums[lane].mean(i) / std::sqrt(sums[lane].variance(i)));
+        of_rims.push_back(rims[lane].mean(i) / std::sqrt(rims[lane].variance(i)));
+      }
+      const ZSummary summary = summarize(z);
+      EXPECT_GE(summary.p_largest, 1e-5) << filter << lane << ": " << summary.largest;
+      EXPECT_LE(std::fabs(summary.mean) * std::sqrt(static_cast<double>(summary.count)), 5)
+          << filter << lane;
+      // There is something to take back.
+      EXPECT_LT(summarize(of_rims).p_largest, 1e-9) << filter << lane;
+    }
+  }
+}
+
+TEST(FilmMotion, KeepsTheMean) {
+  const TempFiles files;
+  for (const char* filter : kFilters) {
+    const Scene scene = scene_with(files, filter, 8);
+    expect_same_mean(scene, {"ball.translate.x"}, {"random-directions", "adaptive"}, 512);
+    expect_same_mean(scene, {"sensor.rotate.y", "bulb.translate.x"},
+                     {"random-directions", "adaptive"}, 512);
+  }
+}
+
+// A fence of bars thinner than pixels, that slides before a floor.
+std::string fence() {
+  std::string body = square("floor", 4, -90, {0, 0, 0}, diffuse("stone", "0.7, 0.7, 0.7")) +
+                     square("lamp", 0.6, 90, {0.5, 4, 1}, area_light("glow", "20, 18, 15"));
+  return body;
+}
+Mesh bars(int count) {
+  std::vector<Vec3f> positions;
+  std::vector<FaceIndices> faces;
+  for (int i = 0; i < count; ++i) {
+    const float x = -2 + 4.0f * static_cast<float>(i) / static_cast<float>(count);
+    const float w = 1.5f / static_cast<float>(count);
+    for (const float y : {0.1f, 1.2f}) {
+      positions.push_back({x, y, 0});
+      positions.push_back({x + w, y, 0});
+    }
+    const auto first = static_cast<uint32_t>(4 * i);
+    faces.push_back({first, first + 1, first + 3});
+    faces.push_back({first, first + 3, first + 2});
+  }
+  return make_mesh(positions, faces);
+}
+
+TEST(FilmMotion, TakesOutDetailThatSlides) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.width = parts.height = 24;
+  parts.body = fence() + obj_shape("bars", write_mesh(files, "bars.obj", bars(60)), true, 1,
+                                   {0, 0, 0.5}, diffuse("wood", "0.3, 0.2, 0.1"));
+  const Scene scene = make_scene(files, parts);
+  const auto variance_times_rays = [&](const std::string& method) {
+    const GradientResult result = run_method(scene, {"bars.translate.x"}, method, 64, 3);
+    uint64_t rays = 0;
+    for (const auto& term : result.terms) rays += term.cost.rays;
+    const Moments& total = result.parameters[0].total;
+    double sum = 0;
+    for (size_t i = 0; i < total.size(); ++i) sum += total.variance(i);
+    return sum * static_cast<double>(rays);
+  };
+  EXPECT_LT(2 * variance_times_rays("adaptive"), variance_times_rays("moving-directions"));
+}
+
+}  // namespace
+}  // namespace limn
