@@ -67,6 +67,15 @@ double MotionRates::at(const Vec3d& p) const {
   return rate;
 }
 
+double MotionRates::in_view(const Vec3d& p, double distance) const {
+  double rate = 0;
+  for (const Source& source : sources_) {
+    const double to = source.is_camera ? distance : length(source.center - p);
+    rate += source.speed / std::max(to, source.radius) + source.rotation;
+  }
+  return rate;
+}
+
 DirectionMotion MotionRates::motion_at(const Vec3d& p, const DirectionField& field) const {
   const double unit = at(p);
   const Vec3d axis = axis_at(p);

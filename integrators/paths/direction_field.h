@@ -74,6 +74,8 @@ class MotionRates {
   // Angular velocity at p [1 / unit of the first parameter], summed over the parameters with their
   // steps; at least a bound's order of magnitude.
   double at(const Vec3d& p) const;
+  // The same as the camera sees it at p, if what it sees is so far away.
+  double in_view(const Vec3d& p, double distance) const;
   DirectionMotion motion_at(const Vec3d& p, const DirectionField& field) const;
   // How fast a vertex moves in units of what moves by itself: where a path meets a surface at a
   // grazing angle, it slides faster than any object.

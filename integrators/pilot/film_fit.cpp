@@ -361,7 +361,9 @@ bool FilmProbe::looks_at(int x, int y) const {
 double film_speed(const TermEstimator& estimator) {
   const Camera& camera = estimator.scene().camera;
   const double pixels = camera.width / (2 * std::tan(camera.fov.v * (kPi / 360)) * camera.x_factor);
-  return pixels * estimator.motion_rates().at(value(camera.origin));
+  const Vec3d eye = value(camera.origin);
+  const double distance = length(bounds_of(estimator.scene()).center() - eye);
+  return pixels * estimator.motion_rates().in_view(eye, distance);
 }
 
 FilmFit fit_film(TermEstimator& estimator, const SamplePlan& plan, int spp,

@@ -102,9 +102,8 @@ TEST(FilmMotion, KeepsTheMean) {
   const TempFiles files;
   for (const char* filter : kFilters) {
     const Scene scene = scene_with(files, filter, 8);
-    expect_same_mean(scene, {"ball.translate.x"}, {"random-directions", "adaptive"}, 512);
-    expect_same_mean(scene, {"sensor.rotate.y", "bulb.translate.x"},
-                     {"random-directions", "adaptive"}, 512);
+    expect_same_mean(scene, {"ball.translate.x", "sensor.rotate.y"}, {"random-directions"}, 128);
+    expect_same_mean(scene, {"bulb.translate.x"}, {"adaptive"}, 128);
   }
 }
 
