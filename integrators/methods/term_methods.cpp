@@ -16,6 +16,7 @@
 #include "integrators/pilot/field_fit.h"
 #include "integrators/pilot/film_fit.h"
 #include "integrators/pilot/pilot.h"
+#include "integrators/pilot/random_motion.h"
 #include "integrators/pilot/term_estimator.h"
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
@@ -80,45 +81,6 @@ constexpr double kLeastSamples = 0.125;
 // Where turns of directions are looked at, too, positions on the film move if that leaves less than
 // this share of squared error times work. Not tuned.
 constexpr double kFilmConvincing = 0.9;
-
-// A turn and a score of every pixel and parameter, of the order of what moves. Their means are not
-// zero: otherwise a change of the derivative that they should not make would go unseen in sums over
-// pixels.
-std::vector<DirectionField> random_fields(size_t count, const TermEstimator& estimator,
-                                          uint64_t seed) {
-  constexpr uint64_t kStream = 0xf1e1d;  // any number
-  const Lanes steps = estimator.lane_scale();
-  std::vector<DirectionField> fields(count);
-  for (size_t i = 0; i < count; ++i) {
-    Rng rng(mix_bits(seed + kStream), i, 0);
-    for (Vec3<Lanes>* v : {&fields[i].turn, &fields[i].score}) {
-      for (int k = 0; k < 3; ++k) {
-        for (int lane = 0; lane < estimator.lanes(); ++lane) {
-          (*v)[k][lane] = rng.uniform() * steps[0] / steps[lane];
-        }
-      }
-    }
-  }
-  return fields;
-}
-
-// The same of positions on the film.
-std::vector<FilmMotion> random_motions(size_t count, const TermEstimator& estimator,
-                                       uint64_t seed) {
-  constexpr uint64_t kStream = 0xf117;  // any number
-  const Lanes steps = estimator.lane_scale();
-  const double speed = film_speed(estimator);
-  std::vector<FilmMotion> motions(count);
-  for (size_t i = 0; i < count; ++i) {
-    Rng rng(mix_bits(seed + kStream), i, 0);
-    for (Lanes* v : {&motions[i].x, &motions[i].y}) {
-      for (int lane = 0; lane < estimator.lanes(); ++lane) {
-        (*v)[lane] = speed * rng.uniform() * steps[0] / steps[lane];
-      }
-    }
-  }
-  return motions;
-}
 
 // A whole run of one method.
 class TermJob {
@@ -264,7 +226,7 @@ class TermJob {
     for (size_t p = 0; p < passes_.size(); ++p) {
       SamplePlan plan;
       plan.uniform = options_.samples.value_or(SampleCounts{});
-      if (!options_.samples) plan = plan_by_pilot(pass(p), settings, watch, result);
+      if (!options_.samples) plan = plan_by_pilot(p, settings, watch, result);
       if (method_.random_directions && can_move_directions()) {
         plan.grid = PlanGrid(scene_.film, film_size(scene_.film));
         plan.fields = random_fields(plan.grid.size(), pass(p), settings.seed);
@@ -339,8 +301,9 @@ class TermJob {
   }
 
   // watch: since the job began.
-  SamplePlan plan_by_pilot(TermEstimator& estimator, const RunSettings& settings,
-                           const Stopwatch& watch, GradientResult& result) const {
+  SamplePlan plan_by_pilot(size_t p, const RunSettings& settings, const Stopwatch& watch,
+                           GradientResult& result) const {
+    TermEstimator& estimator = pass(p);
     SamplePlan plan;
     plan.splits = method_.spreads_samples && !options_.uniform_samples;
     const int spp = pilot_samples(settings.spp);
@@ -353,7 +316,7 @@ class TermJob {
     RunSettings share = settings;
     share.seconds /= static_cast<double>(passes_.size());
     Probed probed;
-    const FilmFit film = fit_film_of(estimator, probing, share, watch);
+    const FilmFit film = fit_film_of(p, probing, share, watch);
     if (!film.motion.empty()) {
       probing.grid = film.grid;
       probing.film = film.motion;
@@ -388,15 +351,48 @@ class TermJob {
     return plan;
   }
 
-  // Positions are held where the result is empty.
-  FilmFit fit_film_of(TermEstimator& estimator, const SamplePlan& plan, const RunSettings& settings,
+  // Positions are held where the result is empty. More parameters than the film leaves lanes for
+  // are looked at two by two, as long as these gain.
+  FilmFit fit_film_of(size_t p, const SamplePlan& plan, const RunSettings& settings,
                       const Stopwatch& watch) const {
+    TermEstimator& estimator = pass(p);
     const int spp = film_pilot_samples(settings.spp);
     if (spp == 0 || !method_.spreads_samples || !can_move_film() ||
-        estimator.motion_rates().still() || estimator.lanes() > kMostFilmParameters) {
+        estimator.motion_rates().still()) {
       return {};
     }
-    return fit_film(estimator, plan, spp, settings, watch);
+    if (estimator.lanes() <= kMostFilmParameters) {
+      return fit_film(estimator, plan, spp, settings, watch);
+    }
+    FilmFit fit;
+    const auto parameters = parameters_of(p);
+    for (int first = 0; first < estimator.lanes(); first += kMostFilmParameters) {
+      const auto some =
+          std::span(parameters)
+              .subspan(first, std::min(kMostFilmParameters, estimator.lanes() - first));
+      TermEstimator two(scene_, some, types_, computed_, method_.sampler, settings.threads, nullptr,
+                        nullptr, false, true);
+      if (two.motion_rates().still()) continue;
+      const FilmFit part = fit_film(two, plan, spp, settings, watch);
+      if (part.motion.empty()) break;
+      fit.grid = part.grid;
+      fit.motion.resize(part.motion.size());
+      for (size_t cell = 0; cell < fit.motion.size(); ++cell) {
+        for (size_t k = 0; k < some.size(); ++k) {
+          fit.motion[cell].x[first + k] = part.motion[cell].x[k];
+          fit.motion[cell].y[first + k] = part.motion[cell].y[k];
+        }
+      }
+    }
+    return fit;
+  }
+
+  std::vector<Parameter> parameters_of(size_t p) const {
+    std::vector<Parameter> parameters;
+    for (int k = 0; k < pass(p).lanes(); ++k) {
+      parameters.push_back(find_parameter(scene_, options_.parameters[p * kLanes + k]));
+    }
+    return parameters;
   }
 
   // What a pilot found with a plan.

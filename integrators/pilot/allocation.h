@@ -40,7 +40,7 @@ double trimmed_mean(std::vector<double> values);
 
 // Samples per pixel of a pilot for a job of `spp`, even; 0 if the job is too short for one.
 int pilot_samples(int spp);
-// The same of the pilot that finds how positions on the film move, which may stop after four.
+// The same of the pilot that finds how positions on the film move, of every other pixel.
 int film_pilot_samples(int spp);
 
 }  // namespace limn

@@ -11,13 +11,14 @@
 namespace limn {
 namespace {
 
+// So many samples are taken of every other cell, then of the rest. Even.
+constexpr int kTurn = 4;
 constexpr int kRadii[] = {1, 2, 4};
 constexpr int kJudgeRadius = 4;
 // Motion must leave less than this share of what is left by positions that are held: over 9 by 9
 // cells of their variance, over the film of squared error times work. Not tuned.
 constexpr double kConvincing = 0.8;
-// A pilot that has found more than this left after 4, 8 or 16 samples looks no further. Not
-// tuned.
+// A pilot that has found more than this left after 4, 8 or 16 samples looks no further. Not tuned.
 constexpr double kHopeless = 0.97;
 // As in field_fit.cpp.
 constexpr double kRidge = 0.05, kLeast = 0.01;
@@ -285,19 +286,19 @@ class FilmPilot {
     if (sums.empty()) sums.assign(estimator_.slots(), SlotSums(entries_, grid_.size()));
     for (size_t slot = 0; slot < estimator_.slots(); ++slot) {
       costs_[slot].merge(found[0].costs[slot]);
-      add(&found[0].images[slot * entries_.figures()], sums[slot]);
+      add(number, &found[0].images[slot * entries_.figures()], sums[slot]);
     }
     ++samples_;
     return true;
   }
   int samples() const { return samples_; }
 
-  // samples() must be even, and at least 4.
+  // samples() must be 4, or a multiple of 8.
   FilmFitter fit() const {
     std::array<std::vector<CellMatrices>, 2> slots;
     for (int half = 0; half < 2; ++half) {
       for (const SlotSums& sums : sums_[half])
-        slots[half].push_back(sums.covariances(samples_ / 2));
+        slots[half].push_back(sums.covariances(std::max(kTurn / 2, samples_ / 4)));
     }
     std::vector<double> work;
     for (size_t slot = 0; slot < estimator_.slots(); ++slot) {
@@ -315,11 +316,11 @@ class FilmPilot {
   const Film& film() const { return estimator_.scene().film; }
 
   // images: of every figure.
-  void add(const std::vector<double>* images, SlotSums& sums) const {
+  void add(int number, const std::vector<double>* images, SlotSums& sums) const {
     std::vector<Rgb<double>> figures(entries_.figures());
     for (int y = film().crop_y; y < film().crop_y + film().crop_height; ++y) {
       for (int x = film().crop_x; x < film().crop_x + film().crop_width; ++x) {
-        if (!probe_->looks_at(x, y)) continue;
+        if (!probe_->looks_at({x, y, number})) continue;
         const size_t index = pixel_index(film(), x, y);
         for (int i = 0; i < entries_.figures(); ++i) {
           const double* at = &images[i][index];
@@ -348,14 +349,14 @@ FilmProbe::FilmProbe(const TermEstimator& terms, const PlanGrid& grid)
 void FilmProbe::add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const {
   std::vector<KeyedSample> probes;
   for (const KeyedSample& sample : samples) {
-    if (looks_at(sample.at.x, sample.at.y)) probes.push_back(sample);
+    if (looks_at(sample.at)) probes.push_back(sample);
   }
   terms_.add_pixels(probes, sink);
 }
 
-bool FilmProbe::looks_at(int x, int y) const {
-  const int column = (x - grid_.x0) / grid_.cell, row = (y - grid_.y0) / grid_.cell;
-  return (column + row) % 2 == 0 && grid_.is_probe(scene().film, x, y);
+bool FilmProbe::looks_at(const PixelSample& at) const {
+  const int column = (at.x - grid_.x0) / grid_.cell, row = (at.y - grid_.y0) / grid_.cell;
+  return (column + row + at.s / kTurn) % 2 == 0 && grid_.is_probe(scene().film, at.x, at.y);
 }
 
 double film_speed(const TermEstimator& estimator) {
@@ -386,8 +387,8 @@ FilmFit fit_film(TermEstimator& estimator, const SamplePlan& plan, int spp,
     const int samples = pilot.samples();
     if (samples == 1 && settings.seconds > 0) {
       const double each = watch.seconds() - began;
-      spp = std::min(spp, static_cast<int>(std::min(settings.seconds / 16 / each, 1e6)) / 2 * 2);
-      if (spp < 4) return fit;
+      spp = std::min(spp, static_cast<int>(std::min(settings.seconds / 16 / each, 1e6)) / 8 * 8);
+      if (spp == 0) return fit;
     }
     const bool looks = samples == 4 || samples == 8 || samples == 16;
     if (looks && samples < spp && pilot.fit().left() > kHopeless) return fit;

@@ -20,7 +20,7 @@ struct FilmFit {
   std::vector<FilmMotion> motion;  // by cell; empty if positions are better held everywhere
 };
 
-// A pilot of at most spp samples of every probed pixel: even, and at least 4. The estimator has
+// A pilot of at most spp samples of every other probed pixel: a multiple of 8. The estimator has
 // kMostFilmParameters at most, and is left with a plan that is of no use. settings, watch: as of
 // run_pilot; it takes a sixteenth of a limit of time. Deterministic on any number of threads.
 FilmFit fit_film(TermEstimator& estimator, const SamplePlan& plan, int spp,
@@ -29,8 +29,8 @@ FilmFit fit_film(TermEstimator& estimator, const SamplePlan& plan, int spp,
 // How fast, about, what moves does so on the film [pixels per unit of the first parameter].
 double film_speed(const TermEstimator& estimator);
 
-// All terms with two lanes more than there are parameters, at every other of the pixels that a
-// pilot probes: fits are made over windows of cells.
+// All terms with two lanes more than there are parameters, at the pixels that a pilot probes: four
+// samples at every other one, then four at the rest, and so on.
 class FilmProbe final : public SampleEstimator {
  public:
   // Both must outlive it.
@@ -51,7 +51,7 @@ class FilmProbe final : public SampleEstimator {
     return terms_.sample_film(slot, u, key, rays, sample);
   }
   const FilmMotion* film_motion(int x, int y) const override { return terms_.film_motion(x, y); }
-  bool looks_at(int x, int y) const;
+  bool looks_at(const PixelSample& at) const;
 
  private:
   const TermEstimator& terms_;

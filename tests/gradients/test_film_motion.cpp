@@ -56,19 +56,17 @@ TEST(FilmMotion, TakesBackWhatItAdds) {
     motion.x[1] = 1, motion.y[2] = 1;
     plan.film.assign(plan.grid.size(), motion);
     estimator.set_plan(plan);
-    constexpr int kBatches = 200;
+    constexpr int kBatches = 100;
     const size_t size = film_size(scene.film);
     std::vector<Moments> sums, rims;
     for (int lane = 0; lane < 2; ++lane) sums.emplace_back(size), rims.emplace_back(size);
     std::vector<std::unique_ptr<SampleEstimator>> one;
-    auto owned = std::make_unique<FilmProbe>(estimator, plan.grid);
-    const FilmProbe& probe = *owned;
-    one.push_back(std::move(owned));
+    one.push_back(std::make_unique<FilmProbe>(estimator, plan.grid));
     const Stopwatch watch;
     RunSettings settings;
     ProgressCounter progress(settings, watch, kBatches);
     for (int b = 0; b < kBatches; ++b) {
-      const auto found = run_batch(one, {11, 8 * b, 8 * b + 8}, 2, progress);
+      const auto found = run_batch(one, {11, 16 * b, 16 * b + 16}, 2, progress);
       ASSERT_EQ(found.size(), 1u);
       EXPECT_EQ(found[0].non_finite.count, 0u);
       for (int lane = 0; lane < 2; ++lane) {
@@ -84,7 +82,6 @@ TEST(FilmMotion, TakesBackWhatItAdds) {
     for (int lane = 0; lane < 2; ++lane) {
       std::vector<double> z, of_rims;
       for (size_t i = 0; i < size; i += 3) {
-        if (!probe.looks_at(static_cast<int>(i / 3) % 8, static_cast<int>(i / 3) / 8)) continue;
         z.push_back(sums[lane].mean(i) / std::sqrt(sums[lane].variance(i)));
         of_rims.push_back(rims[lane].mean(i) / std::sqrt(rims[lane].variance(i)));
       }
