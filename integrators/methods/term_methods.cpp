@@ -82,6 +82,13 @@ constexpr double kLeastSamples = 0.125;
 // this share of squared error times work. Not tuned.
 constexpr double kFilmConvincing = 0.9;
 
+// Of the shorter one of two pilots that are to be compared. Not tuned.
+constexpr int kHeldSamples = 6;
+// Samples per pixel, and the share of the time that one set-up takes, of runs that are long enough
+// for more estimators. Not tuned.
+constexpr int kLongRun = 256;
+constexpr double kSetupShare = 1.0 / 32;
+
 // A whole run of one method.
 class TermJob {
  public:
@@ -326,7 +333,7 @@ class TermJob {
       held.film.clear();
       share.seconds /= 2;
       if (turns && probed.pilot.spp > 0) {
-        Probed other = probe(estimator, held, turns, std::max(4, spp / 4 * 2), share, watch);
+        Probed other = probe(estimator, held, turns, std::min(spp, kHeldSamples), share, watch);
         if (other.pilot.spp > 0 && error_times_work(estimator, probed) >
                                        kFilmConvincing * error_times_work(estimator, other)) {
           probed = std::move(other);
@@ -352,7 +359,8 @@ class TermJob {
   }
 
   // Positions are held where the result is empty. More parameters than the film leaves lanes for
-  // are looked at two by two, as long as these gain.
+  // are looked at two by two, by estimators of their own: only in runs that are long against what
+  // it takes to set them up.
   FilmFit fit_film_of(size_t p, const SamplePlan& plan, const RunSettings& settings,
                       const Stopwatch& watch) const {
     TermEstimator& estimator = pass(p);
@@ -364,7 +372,10 @@ class TermJob {
     if (estimator.lanes() <= kMostFilmParameters) {
       return fit_film(estimator, plan, spp, settings, watch);
     }
+    const bool is_long = settings.seconds > 0 ? watch.seconds() < kSetupShare * settings.seconds
+                                              : settings.spp >= kLongRun;
     FilmFit fit;
+    if (!is_long) return fit;
     const auto parameters = parameters_of(p);
     for (int first = 0; first < estimator.lanes(); first += kMostFilmParameters) {
       const auto some =
@@ -374,7 +385,7 @@ class TermJob {
                         nullptr, false, true);
       if (two.motion_rates().still()) continue;
       const FilmFit part = fit_film(two, plan, spp, settings, watch);
-      if (part.motion.empty()) break;
+      if (part.motion.empty()) continue;
       fit.grid = part.grid;
       fit.motion.resize(part.motion.size());
       for (size_t cell = 0; cell < fit.motion.size(); ++cell) {

@@ -267,7 +267,7 @@ class FilmPilot {
  public:
   FilmPilot(const TermEstimator& estimator, const PlanGrid& grid)
       : estimator_(estimator), grid_(grid), entries_(estimator.lanes()) {
-    auto probe = std::make_unique<FilmProbe>(estimator, grid);
+    auto probe = std::make_unique<FilmProbe>(estimator, grid, kTurn);
     probe_ = probe.get();
     probes_.push_back(std::move(probe));
     costs_.resize(estimator.slots());
@@ -343,8 +343,8 @@ class FilmPilot {
 
 }  // namespace
 
-FilmProbe::FilmProbe(const TermEstimator& terms, const PlanGrid& grid)
-    : terms_(terms), grid_(grid) {}
+FilmProbe::FilmProbe(const TermEstimator& terms, const PlanGrid& grid, int turn)
+    : terms_(terms), grid_(grid), turn_(turn) {}
 
 void FilmProbe::add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const {
   std::vector<KeyedSample> probes;
@@ -356,7 +356,7 @@ void FilmProbe::add_pixels(std::span<const KeyedSample> samples, SampleSink& sin
 
 bool FilmProbe::looks_at(const PixelSample& at) const {
   const int column = (at.x - grid_.x0) / grid_.cell, row = (at.y - grid_.y0) / grid_.cell;
-  return (column + row + at.s / kTurn) % 2 == 0 && grid_.is_probe(scene().film, at.x, at.y);
+  return (column + row + at.s / turn_) % 2 == 0 && grid_.is_probe(scene().film, at.x, at.y);
 }
 
 double film_speed(const TermEstimator& estimator) {

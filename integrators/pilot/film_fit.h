@@ -29,12 +29,12 @@ FilmFit fit_film(TermEstimator& estimator, const SamplePlan& plan, int spp,
 // How fast, about, what moves does so on the film [pixels per unit of the first parameter].
 double film_speed(const TermEstimator& estimator);
 
-// All terms with two lanes more than there are parameters, at the pixels that a pilot probes: four
-// samples at every other one, then four at the rest, and so on.
+// All terms with two lanes more than there are parameters, at the pixels that a pilot probes: `turn`
+// samples at every other one, then as many at the rest, and so on.
 class FilmProbe final : public SampleEstimator {
  public:
   // Both must outlive it.
-  FilmProbe(const TermEstimator& terms, const PlanGrid& grid);
+  FilmProbe(const TermEstimator& terms, const PlanGrid& grid, int turn);
 
   const Scene& scene() const override { return terms_.scene(); }
   size_t slots() const override { return terms_.slots(); }
@@ -56,6 +56,7 @@ class FilmProbe final : public SampleEstimator {
  private:
   const TermEstimator& terms_;
   const PlanGrid& grid_;
+  int turn_;
 };
 
 }  // namespace limn
