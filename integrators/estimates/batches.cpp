@@ -124,7 +124,7 @@ class BatchRunner {
   static constexpr size_t kChunk = 1024;  // not tuned
 
   void run_film(size_t slot) {
-    constexpr size_t kHeld = 1024 * kChunk;  // samples in memory, 120 bytes each; not tuned
+    constexpr size_t kHeld = 1024 * kChunk;  // samples in memory, 170 bytes each; not tuned
     const FilmBatch batch(estimator_, slot, batch_.first, batch_.count());
     for (size_t begin = 0; begin < batch.count && !progress_.stopped(); begin += kHeld) {
       add_film_samples(slot, batch, begin, std::min(batch.count, begin + kHeld));

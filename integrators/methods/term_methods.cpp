@@ -175,6 +175,15 @@ class TermJob {
     result.settings.push_back({"rays on an edge", static_cast<double>(all.dropped)});
   }
 
+  static void describe_film(const std::vector<FilmMotion>& film, GradientResult& result) {
+    const auto moving = std::count_if(film.begin(), film.end(), [](const FilmMotion& motion) {
+      return !is_zero(motion.x) || !is_zero(motion.y);
+    });
+    const double share = static_cast<double>(moving) / static_cast<double>(film.size());
+    result.settings.push_back(
+        {"share of the pixels whose positions move", std::round(share * 100) / 100});
+  }
+
   // What moving directions change in one term they take back in the others, and at every jump of
   // radiance there must be an edge.
   bool can_move_directions() const {
@@ -243,6 +252,7 @@ class TermJob {
         means[t] += plan.uniform[t] / static_cast<double>(passes_.size());
       }
       add_pixel_samples(plan, result);
+      if (!options_.samples && !plan.film.empty()) describe_film(plan.film, result);
       pass(p).set_plan(std::move(plan));
     }
     for (size_t t = 0; t < types_.size(); ++t) result.terms[t].samples = means[t];

@@ -127,6 +127,8 @@ CameraEdges::CameraEdges(const PathContext& context, const EdgeSamplerInput& inp
   find_in_line();
   if (visible) keep_seen(*visible);
   weigh({});
+  moving_ = std::count_if(pieces_.begin(), pieces_.end(),
+                          [](const Piece& piece) { return !is_zero(piece.weight); });
   list_seconds_ = watch.seconds();
 }
 

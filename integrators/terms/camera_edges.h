@@ -62,7 +62,8 @@ class CameraEdges {
 
   // Whether none moves.
   bool empty() const { return !(choice_.sum() > 0); }
-  size_t size() const { return edges_.size(); }
+  // Those that move while positions are held.
+  size_t size() const { return moving_; }
   double list_seconds() const { return list_seconds_; }
   // Whose they are, of edges in one line that move past each other: EdgesInLine::parting.
   const std::optional<std::array<ShapeId, 2>>& parting() const { return parting_; }
@@ -112,7 +113,8 @@ class CameraEdges {
   bool all_;
   const Viewpoint& viewpoint_;
   std::vector<ClipSegment> clips_;
-  std::vector<FilmEdge> edges_;    // that move
+  std::vector<FilmEdge> edges_;  // that move, or all
+  size_t moving_ = 0;
   std::vector<FilmLine> resting_;  // until what is in line with them is found
   std::optional<std::array<ShapeId, 2>> parting_;
   std::vector<Piece> pieces_;
