@@ -68,10 +68,12 @@ struct TermMethod {
   const EdgeSamplerType& sampler;
   bool moves_directions = false;   // see direction_field.h
   bool spreads_samples = false;    // over pixels, see spread_samples
-  bool random_directions = false;  // directions move by chance: to show that no mean changes
-  bool warps = false;              // directions follow the edges that they see, see warp_field.h
-  bool unbiased = false;           // the same without the bias of few rays
-  bool closed = false;  // light that is scattered once in closed form, see closed_light.h
+  bool moves_film = false;         // positions on the film, see film_fit.h
+  bool random_directions = false;  // directions and positions move by chance: no mean may change
+  bool ablation = false;
+  bool warps = false;     // directions follow the edges that they see, see warp_field.h
+  bool unbiased = false;  // the same without the bias of few rays
+  bool closed = false;    // light that is scattered once in closed form, see closed_light.h
 };
 
 // The fewest samples of a term in one of a pixel, where they are spread: a rare event that a pilot
@@ -82,8 +84,7 @@ constexpr double kLeastSamples = 0.125;
 // this share of squared error times work. Not tuned.
 constexpr double kFilmConvincing = 0.9;
 
-// Of the shorter one of two pilots that are to be compared. Not tuned.
-constexpr int kHeldSamples = 6;
+constexpr int kHeldSamples = 6;  // of the pilot that this is compared with; not tuned
 // Samples per pixel, and the share of the time that one set-up takes, of runs that are long enough
 // for more estimators. Not tuned.
 constexpr int kLongRun = 256;
@@ -97,7 +98,7 @@ class TermJob {
       : scene_(scene),
         options_(options),
         method_(method),
-        moves_film_((method.spreads_samples || method.random_directions) && !options.exact_film),
+        moves_film_(method.moves_film && !options.exact_film),
         types_(terms_of(scene, method.sampler, method.closed, moves_film_)) {
     const std::vector<std::string> chosen = selected_terms(term_names(), options.terms, scene.file);
     for (const TermType* type : types_) {
@@ -180,8 +181,7 @@ class TermJob {
       return !is_zero(motion.x) || !is_zero(motion.y);
     });
     const double share = static_cast<double>(moving) / static_cast<double>(film.size());
-    result.settings.push_back(
-        {"share of the pixels whose positions move", std::round(share * 100) / 100});
+    result.settings.push_back({"positions move in a share of", std::round(share * 100) / 100});
   }
 
   // What moving directions change in one term they take back in the others, and at every jump of
@@ -338,8 +338,7 @@ class TermJob {
       probing.grid = film.grid;
       probing.film = film.motion;
       probed = probe(estimator, probing, turns, spp, share, watch);
-      // Turns of directions may take out as much, and leave less to positions.
-      SamplePlan held = probing;
+      SamplePlan held = probing;  // turns of directions may take out as much by themselves
       held.film.clear();
       share.seconds /= 2;
       if (turns && probed.pilot.spp > 0) {
@@ -375,8 +374,7 @@ class TermJob {
                       const Stopwatch& watch) const {
     TermEstimator& estimator = pass(p);
     const int spp = film_pilot_samples(settings.spp);
-    if (spp == 0 || !method_.spreads_samples || !can_move_film() ||
-        estimator.motion_rates().still()) {
+    if (spp == 0 || !can_move_film() || estimator.motion_rates().still()) {
       return {};
     }
     if (estimator.lanes() <= kMostFilmParameters) {
@@ -526,12 +524,12 @@ MethodType method_row(const std::string& name, const std::string& description,
   method.description = description;
   for (const TermType& type : term_types()) {
     if (type.regions && !term_method.sampler.regions) continue;
-    if (type.moved_film && !term_method.spreads_samples && !term_method.random_directions) continue;
+    if (type.moved_film && !term_method.moves_film) continue;
     if (term_method.closed && type.moved_with_directions && !type.traces_paths) continue;
     method.terms.emplace_back(type.name);
   }
   method.terms_can_be_left_out = true;
-  method.ablation = term_method.sampler.ablation || term_method.random_directions;
+  method.ablation = term_method.sampler.ablation || term_method.ablation;
   method.only_sum_fixed = term_method.moves_directions || term_method.random_directions ||
                           term_method.warps || term_method.closed;
   method.closed_light = term_method.closed;
@@ -559,12 +557,20 @@ std::vector<MethodType> term_methods() {
   std::vector<MethodType> methods;
   methods.push_back(
       method_row("adaptive",
-                 "silhouettes, with directions that move along with what they see and "
-                 "samples where the error is",
-                 {silhouettes, true, true}));
+                 "silhouettes, with directions and positions on the film that move along with what "
+                 "they see and samples where the error is",
+                 {.sampler = silhouettes,
+                  .moves_directions = true,
+                  .spreads_samples = true,
+                  .moves_film = true}));
+  methods.push_back(method_row("held-positions", "adaptive, with positions on the film held",
+                               {.sampler = silhouettes,
+                                .moves_directions = true,
+                                .spreads_samples = true,
+                                .ablation = true}));
   methods.push_back(method_row("moving-directions",
                                "silhouettes, with directions that move along with what they see",
-                               {silhouettes, true, false}));
+                               {.sampler = silhouettes, .moves_directions = true}));
   for (const EdgeSamplerType& type : edge_sampler_types()) {
     methods.push_back(method_row(type.name, type.description, {type}));
   }
@@ -583,10 +589,11 @@ std::vector<MethodType> term_methods() {
                                "soft shadows without noise",
                                {.sampler = uniform, .closed = true}));
   methods.back().check = check_closed_light;
-  methods.push_back(method_row("random-directions",
-                               "silhouettes, with directions that move by chance: noise, but the "
-                               "same mean",
-                               {silhouettes, false, false, true}));
+  methods.push_back(method_row(
+      "random-directions",
+      "silhouettes, with directions and positions on the film that move by "
+      "chance: noise, but the same mean",
+      {.sampler = silhouettes, .moves_film = true, .random_directions = true, .ablation = true}));
   return methods;
 }
 

@@ -364,7 +364,8 @@ double film_speed(const TermEstimator& estimator) {
   const double pixels = camera.width / (2 * std::tan(camera.fov.v * (kPi / 360)) * camera.x_factor);
   const Vec3d eye = value(camera.origin);
   const double distance = length(bounds_of(estimator.scene()).center() - eye);
-  return pixels * estimator.motion_rates().in_view(eye, distance);
+  // Without shapes there are no bounds.
+  return pixels * estimator.motion_rates().in_view(eye, std::isfinite(distance) ? distance : 0);
 }
 
 FilmFit fit_film(TermEstimator& estimator, const SamplePlan& plan, int spp,
@@ -373,6 +374,7 @@ FilmFit fit_film(TermEstimator& estimator, const SamplePlan& plan, int spp,
   fit.grid = PlanGrid(estimator.scene().film, kMostProbes);
   const int parameters = estimator.lanes();
   const double unit = film_speed(estimator);
+  if (!(unit > 0) || !std::isfinite(unit)) return fit;
   FilmMotion probing;  // in the free lanes behind the parameters'
   probing.x[parameters] = probing.y[parameters + 1] = unit;
   SamplePlan moving = plan;

@@ -102,7 +102,7 @@ class TestPaper(unittest.TestCase):
         mirror, shadow, reject = self.calls()
         self.assertEqual(mirror[:2], ["compare", "scenes/rough_mirror.xml"])
         self.assertIn("alpha=0.2", mirror)
-        self.assertEqual(self.value(shadow, "--methods"), "forest,silhouettes,moving-directions,adaptive,forest-no-lights,li2019,uniform,fd")
+        self.assertEqual(self.value(shadow, "--methods"), "forest,silhouettes,moving-directions,held-positions,adaptive,forest-no-lights,li2019,uniform,fd")
         self.assertEqual(self.value(shadow, "--time"), self.value(mirror, "--time"))
         self.assertEqual(self.value(shadow, "--seed"), "7")
         self.assertEqual(reject[:2], ["reject", "build/generated/pebble.ply"])
@@ -140,8 +140,8 @@ class TestPaper(unittest.TestCase):
         self.assertEqual((done.returncode, done.stderr), (0, ""))
         shadow, sun = self.calls()
         self.assertEqual(self.value(shadow, "--methods"),
-                         "forest,silhouettes,moving-directions,adaptive,fd,mitsuba-after-setup")
-        self.assertEqual(self.value(sun, "--methods"), "forest,silhouettes,moving-directions,adaptive,fd")
+                         "forest,silhouettes,moving-directions,held-positions,adaptive,fd,mitsuba-after-setup")
+        self.assertEqual(self.value(sun, "--methods"), "forest,silhouettes,moving-directions,held-positions,adaptive,fd")
         self.assertAlmostEqual(float(self.value(sun, "--time")), 2.6, delta=0.1)
         with open(self.path("out", "levers.md")) as stream:
             text = stream.read()
