@@ -7,6 +7,7 @@
 
 #include "integrators/pilot/allocation.h"
 #include "integrators/pilot/pilot.h"
+#include "limn/core/parallel.h"
 
 namespace limn {
 namespace {
@@ -110,8 +111,12 @@ class FilmFitter {
  public:
   // slots: [half][slot]. work: of a sample of each slot.
   FilmFitter(const PlanGrid& grid, const Entries& entries,
-             std::array<std::vector<CellMatrices>, 2> slots, std::vector<double> work)
-      : grid_(grid), entries_(entries), slots_(std::move(slots)), work_(std::move(work)) {}
+             std::array<std::vector<CellMatrices>, 2> slots, std::vector<double> work, int threads)
+      : grid_(grid),
+        entries_(entries),
+        slots_(std::move(slots)),
+        work_(std::move(work)),
+        threads_(threads) {}
 
   void run() {
     const double held =
@@ -219,13 +224,14 @@ class FilmFitter {
     }
     for (const int radius : kRadii) {
       std::array<CellMatrices, 3> windows;  // over either half, and over both
-      for (size_t i = 0; i < entries_.size(); ++i) {
+      for (CellMatrices& matrices : windows) matrices.resize(entries_.size());
+      parallel_for(entries_.size(), threads_, [&](size_t i) {
         for (int half = 0; half < 2; ++half)
-          windows[half].push_back(window_means(grid_, total_[half][i], radius));
-        windows[2].push_back(windows[0][i]);
+          windows[half][i] = window_means(grid_, total_[half][i], radius);
+        windows[2][i] = windows[0][i];
         for (size_t cell = 0; cell < grid_.size(); ++cell)
           windows[2][i][cell] += windows[1][i][cell];
-      }
+      });
       for (int k = 0; k < entries_.parameters(); ++k) try_windows(windows, k, least[k], fits[k]);
     }
     return fits;
@@ -255,6 +261,7 @@ class FilmFitter {
   Entries entries_;
   std::array<std::vector<CellMatrices>, 2> slots_;
   std::vector<double> work_;
+  int threads_;
   std::array<CellMatrices, 2> total_;  // of all slots, weighed
   std::vector<double> usual_;          // its means over the film
   Fits fits_;
@@ -294,7 +301,7 @@ class FilmPilot {
   int samples() const { return samples_; }
 
   // samples() must be 4, or a multiple of 8.
-  FilmFitter fit() const {
+  FilmFitter fit(int threads) const {
     std::array<std::vector<CellMatrices>, 2> slots;
     for (int half = 0; half < 2; ++half) {
       for (const SlotSums& sums : sums_[half])
@@ -307,7 +314,7 @@ class FilmPilot {
       work.push_back(estimator_.work(slot, costs_[slot]) /
                      (static_cast<double>(samples_) * static_cast<double>(pixels)));
     }
-    FilmFitter fitter(grid_, entries_, std::move(slots), std::move(work));
+    FilmFitter fitter(grid_, entries_, std::move(slots), std::move(work), threads);
     fitter.run();
     return fitter;
   }
@@ -393,9 +400,9 @@ FilmFit fit_film(TermEstimator& estimator, const SamplePlan& plan, int spp,
       if (spp == 0) return fit;
     }
     const bool looks = samples == 4 || samples == 8 || samples == 16;
-    if (looks && samples < spp && pilot.fit().left() > kHopeless) return fit;
+    if (looks && samples < spp && pilot.fit(settings.threads).left() > kHopeless) return fit;
   }
-  const FilmFitter fitter = pilot.fit();
+  const FilmFitter fitter = pilot.fit(settings.threads);
   if (fitter.left() > kConvincing) return fit;
   fit.motion.resize(fit.grid.size());
   for (size_t cell = 0; cell < fit.grid.size(); ++cell) {
