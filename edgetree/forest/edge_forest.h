@@ -18,6 +18,9 @@ class EdgeForest final : public EdgeSampler {
   ~EdgeForest() override;
 
   std::optional<EdgeSample> sample(const EdgeQuery& query, Rng& rng) const override;
+  // Stratified: draws of one query are in the order of the trees, and walk down them together.
+  void sample_several(const EdgeQuery& query, std::span<Rng> rngs,
+                      std::vector<std::optional<EdgeSample>>& samples) const override;
   double probability(const EdgeQuery& query, EdgeRef edge) const override;
   double pdf_t(const EdgeQuery& query, EdgeRef edge, double t) const override;
   bool list_outlines(const EdgeQuery& query, const DirectionCone& cone,
