@@ -103,14 +103,13 @@ void BoundaryTerm::add_before_glare(const PathVertex& vertex, const EdgeQuery& q
 void BoundaryTerm::add_draws(const PathVertex& vertex, const EdgeQuery& query, int samples,
                              const GlareEdges::View* view, TermCost& cost,
                              Rgb<Lanes>& sum) const {
-  static thread_local std::vector<Rng> rngs;
   static thread_local std::vector<std::optional<EdgeSample>> drawn;
-  const auto key = [&](int i) { return vertex.key.copy(Purpose::kEdgeCopy, i); };
-  rngs.clear();
-  for (int i = 0; i < samples; ++i) rngs.push_back(key(i).at(Purpose::kEdge, vertex.bounces));
-  sampler_.sample_several(query, rngs, drawn);
+  draw_edges(sampler_, query, vertex.key, vertex.bounces, samples, drawn);
   cost.samples += drawn.size();
-  for (int i = 0; i < samples; ++i) add_draw(vertex, query, drawn[i], key(i), view, cost, sum);
+  for (int i = 0; i < samples; ++i) {
+    const Rng key = vertex.key.copy(Purpose::kEdgeCopy, i);
+    add_draw(vertex, query, drawn[i], key, view, cost, sum);
+  }
 }
 
 void BoundaryTerm::add_draw(const PathVertex& vertex, const EdgeQuery& query,

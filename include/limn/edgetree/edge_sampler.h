@@ -108,9 +108,9 @@ class EdgeSampler {
   // that grows per query.
   virtual std::optional<EdgeSample> sample(const EdgeQuery& query, Rng& rng) const = 0;
 
-  // One draw from every stream, in `samples`. Each by itself is drawn as `sample` draws it, and one
-  // alone has its bits; several may share their work, and may be spread more evenly than independent
-  // ones are.
+  // Replaces `samples` by one draw from every stream. The sum of any function over them has the mean
+  // of as many draws by `sample`, and one stream alone gives its bits; but several may share their
+  // work and be spread more evenly than independent ones, so that all must count alike.
   virtual void sample_several(const EdgeQuery& query, std::span<Rng> rngs,
                               std::vector<std::optional<EdgeSample>>& samples) const {
     samples.clear();
