@@ -101,8 +101,7 @@ void BoundaryTerm::add_before_glare(const PathVertex& vertex, const EdgeQuery& q
 }
 
 void BoundaryTerm::add_draws(const PathVertex& vertex, const EdgeQuery& query, int samples,
-                             const GlareEdges::View* view, TermCost& cost,
-                             Rgb<Lanes>& sum) const {
+                             const GlareEdges::View* view, TermCost& cost, Rgb<Lanes>& sum) const {
   static thread_local std::vector<std::optional<EdgeSample>> drawn;
   draw_edges(sampler_, query, vertex.key, vertex.bounces, samples, drawn);
   cost.samples += drawn.size();

@@ -394,7 +394,7 @@ TEST_P(EdgeSamplers, EstimateTheSumOverAllEdges) {
       RunningMean estimate, several;
       for (int k = 0; k < 20000; ++k) estimate.add(value_of(sampler->sample(q, rng)));
       std::vector<std::optional<EdgeSample>> samples;
-      for (int k = 0; k < 4000; ++k) {
+      for (int k = 0; k < 1500; ++k) {
         std::vector<Rng> rngs;
         for (int j = 0; j < 5; ++j) rngs.emplace_back(24 + i, k, j);
         sampler->sample_several(q, rngs, samples);
