@@ -60,35 +60,28 @@ struct EdgeForest::Impl {
     return nodes;
   }
 
-  // Where a draw ends: an edge, not yet tested, in a lane of an edge node.
-  struct Draw {
-    const EdgeNode* node;
-    int lane;
-    double probability;
-    EdgeRef edge() const { return node->edge_at(lane); }
-  };
-  bool draw(const ForestQuery& query, double u, Draw& result) const {
-    const OpenNodes& nodes = open(query);
-    if (!(nodes.total() > 0)) return false;
-    int opened = nodes.draw_root(u);
-    Choice choice = nodes.choice(opened);
-    double scale = nodes.total();
-    result.probability = 1;
-    while (true) {
-      const int lane = choice.draw(u);
-      result.probability *= choice.weights[lane] / scale;
-      if (choice.node < 0) {
-        result.node = &forest.edges[~choice.node];
-        result.lane = lane;
-        return true;
-      }
-      if (opened != OpenNodes::kClosed) opened = nodes.child(opened, lane);
-      choice = opened != OpenNodes::kClosed
-                   ? nodes.choice(opened)
-                   : choice_at(forest, config, query, forest.inner[choice.node].child[lane]);
-      scale = choice.total;
-      if (!(scale > 0)) return false;
-    }
+  // Ready to draw; holds until another query is asked about by this thread.
+  ForestWalk& walk(const ForestQuery& query) const {
+    static thread_local ForestWalk walk;
+    walk.begin(forest, config, query, open(query));
+    return walk;
+  }
+  // The edge where a walk ends, if it is one of E(p), and the point on it.
+  std::optional<EdgeSample> finish(const EdgeQuery& query, const ForestQuery& prepared,
+                                   const ForestWalk::End& end, double u_t) const {
+    if (!end.node) return std::nullopt;
+    const EdgeRef id = end.edge();
+    const EdgeMesh& mesh = input.object(id.object);
+    mesh.fetch_edge(id.edge);  // for what follows this draw
+    if (!accepts(query, prepared.point, *end.node, end.lane)) return std::nullopt;
+    const SeenEdge edge = seen_edge(prepared.lobe, query.p, *end.node, end.lane);
+    if (!edge.is_seen()) return std::nullopt;
+    EdgeSample sample{id, edge.sample_t(u_t), end.probability, 0};
+    mesh.fetch_ends(id.edge);
+    sample.pdf_t = edge.pdf_t(sample.t);
+    // Nothing where the density is lost to rounding, on an edge that lies in the horizon.
+    if (!(sample.pdf_t > 0)) return std::nullopt;
+    return sample;
   }
 
   // A node as one query reaches it: how likely, and which of the open ones it is, if any.
@@ -154,22 +147,29 @@ std::unique_ptr<EdgeForest> EdgeForest::build(const EdgeSamplerInput& input, int
 }
 
 std::optional<EdgeSample> EdgeForest::sample(const EdgeQuery& query, Rng& rng) const {
-  const double u_edge = rng.uniform(), u_t = rng.uniform();
   const ForestQuery prepared = impl_->prepare(query);
-  Impl::Draw draw;
-  if (!impl_->draw(prepared, u_edge, draw)) return std::nullopt;
-  const EdgeRef id = draw.edge();
-  const EdgeMesh& mesh = impl_->input.object(id.object);
-  mesh.fetch_edge(id.edge);  // for what follows this draw
-  if (!impl_->accepts(query, prepared.point, *draw.node, draw.lane)) return std::nullopt;
-  const SeenEdge edge = impl_->seen_edge(prepared.lobe, query.p, *draw.node, draw.lane);
-  if (!edge.is_seen()) return std::nullopt;
-  EdgeSample sample{id, edge.sample_t(u_t), draw.probability, 0};
-  mesh.fetch_ends(id.edge);
-  sample.pdf_t = edge.pdf_t(sample.t);
-  // Nothing where the density is lost to rounding, on an edge that lies in the horizon.
-  if (!(sample.pdf_t > 0)) return std::nullopt;
-  return sample;
+  const double u_edge = rng.uniform(), u_t = rng.uniform();
+  return impl_->finish(query, prepared, impl_->walk(prepared).draw(u_edge), u_t);
+}
+
+// The numbers that choose edges are one for each of as many equal parts of [0, 1). What is left of
+// such a number on its edge is as even where several fall on that edge: with a shift by chance that
+// they have in common it chooses the point.
+void EdgeForest::sample_several(const EdgeQuery& query, std::span<Rng> rngs,
+                                std::vector<std::optional<EdgeSample>>& samples) const {
+  samples.clear();
+  if (rngs.empty()) return;
+  const ForestQuery prepared = impl_->prepare(query);
+  ForestWalk& walk = impl_->walk(prepared);
+  const auto count = static_cast<double>(rngs.size());
+  double shift = 0;
+  for (size_t i = 0; i < rngs.size(); ++i) {
+    const double u_edge = (static_cast<double>(i) + rngs[i].uniform()) / count;
+    if (i == 0) shift = rngs[i].uniform();
+    const ForestWalk::End end = walk.draw(below_one(u_edge));
+    const double u_t = rngs.size() == 1 ? shift : end.rest + shift;
+    samples.push_back(impl_->finish(query, prepared, end, u_t < 1 ? u_t : below_one(u_t - 1)));
+  }
 }
 
 double EdgeForest::probability(const EdgeQuery& query, EdgeRef id) const {

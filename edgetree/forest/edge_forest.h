@@ -18,12 +18,17 @@ class EdgeForest final : public EdgeSampler {
   ~EdgeForest() override;
 
   std::optional<EdgeSample> sample(const EdgeQuery& query, Rng& rng) const override;
+  // Stratified: draws of one query are in the order of the trees, and walk down them together.
+  void sample_several(const EdgeQuery& query, std::span<Rng> rngs,
+                      std::vector<std::optional<EdgeSample>>& samples) const override;
   double probability(const EdgeQuery& query, EdgeRef edge) const override;
   double pdf_t(const EdgeQuery& query, EdgeRef edge, double t) const override;
   bool list_outlines(const EdgeQuery& query, const DirectionCone& cone,
                      std::vector<ListedEdge>& edges) const override;
-  // A walk down the trees costs a handful of rays.
-  double draw_cost() const override { return 5; }
+  // A walk down the trees costs a handful of rays, and less where several draws share it: against
+  // 5, which one alone takes, squared error times time falls to 0.81 (mirrors in a corner), 0.88
+  // (near mirror), 0.92 (demo), and rises to 1.07 at most (harp, 1.03 in view); 2 gains no more.
+  double draw_cost() const override { return 3; }
   SamplerSize size() const override;
   std::unique_ptr<RejectionTree> rejection_tree() const override;
 

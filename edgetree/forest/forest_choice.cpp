@@ -170,4 +170,44 @@ int OpenNodes::find_root(NodeId id) const {
   return root;
 }
 
+void ForestWalk::begin(const Forest& forest, const ForestConfig& config, const ForestQuery& query,
+                       const OpenNodes& open) {
+  forest_ = &forest;
+  config_ = &config;
+  query_ = &query;
+  open_ = &open;
+  for (Choice& known : way_) known.node = kNoChild;
+}
+
+// Holds until the next call.
+const Choice& ForestWalk::choice(size_t depth, NodeId id) {
+  if (depth >= way_.size()) way_.resize(depth + 1);
+  Choice& known = way_[depth];
+  if (known.node != id) known = choice_at(*forest_, *config_, *query_, id);
+  return known;
+}
+
+ForestWalk::End ForestWalk::draw(double u) {
+  End end;
+  if (!(open_->total() > 0)) return end;
+  int opened = open_->draw_root(u);
+  const Choice* choice = &open_->choice(opened);
+  double scale = open_->total();
+  for (size_t depth = 0;; ++depth) {
+    const int lane = choice->draw(u);
+    end.probability *= choice->weights[lane] / scale;
+    if (choice->node < 0) {
+      end.node = &forest_->edges[~choice->node];
+      end.lane = lane;
+      end.rest = u;
+      return end;
+    }
+    const NodeId child = forest_->inner[choice->node].child[lane];
+    if (opened != OpenNodes::kClosed) opened = open_->child(opened, lane);
+    choice = opened != OpenNodes::kClosed ? &open_->choice(opened) : &this->choice(depth, child);
+    scale = choice->total;
+    if (!(scale > 0)) return end;
+  }
+}
+
 }  // namespace limn

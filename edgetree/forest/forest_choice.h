@@ -75,4 +75,34 @@ class OpenNodes {
   double total_ = 0;
 };
 
+// Draws of one query: from the roots down to an edge. Where a draw comes by nodes that the one
+// before it came by, their weights are known, so that draws in the order of the trees weigh no node
+// twice.
+class ForestWalk {
+ public:
+  // Where a draw ends: an edge, not yet tested, in a lane of an edge node; no node if it ends
+  // before.
+  struct End {
+    const EdgeNode* node = nullptr;
+    int lane = 0;
+    double probability = 1;
+    double rest = 0;  // uniform in [0, 1), whatever the edge
+    EdgeRef edge() const { return node->edge_at(lane); }
+  };
+  // All are kept.
+  void begin(const Forest& forest, const ForestConfig& config, const ForestQuery& query,
+             const OpenNodes& open);
+  // By the uniform number u.
+  End draw(double u);
+
+ private:
+  const Choice& choice(size_t depth, NodeId id);
+
+  const Forest* forest_ = nullptr;
+  const ForestConfig* config_ = nullptr;
+  const ForestQuery* query_ = nullptr;
+  const OpenNodes* open_ = nullptr;
+  std::vector<Choice> way_;  // of the last draw that came so deep, by depth
+};
+
 }  // namespace limn

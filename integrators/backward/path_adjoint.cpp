@@ -5,6 +5,7 @@
 #include "integrators/backward/edge_adjoint.h"
 #include "integrators/paths/camera_path.h"
 #include "integrators/paths/path_follow.h"
+#include "integrators/terms/vertex_edges.h"
 
 namespace limn {
 namespace {
@@ -54,16 +55,16 @@ class VertexAdjoints {
 
 void VertexAdjoints::add_edges(const AdjointVertex& vertex, const EdgeQuery& query,
                                const Rng& key) {
+  static thread_local std::vector<std::optional<EdgeSample>> drawn;
   const Stopwatch watch;
   const RadiancePart part = context_.rest();
   TermCost& cost = costs_[kBoundary];
-  for (int i = 0; i < context_.edge_samples; ++i) {
-    ++cost.samples;
-    const Rng own = key.copy(Purpose::kEdgeCopy, i);
-    Rng rng = own.at(Purpose::kEdge, vertex.bounces);
-    const std::optional<EdgeSample> drawn = context_.sampler->sample(query, rng);
-    if (drawn) {
-      add_edge_point(context_, vertex, query, *drawn, part, own, 1, tape_, seeds_, cost);
+  draw_edges(*context_.sampler, query, key, vertex.bounces, context_.edge_samples, drawn);
+  cost.samples += drawn.size();
+  for (size_t i = 0; i < drawn.size(); ++i) {
+    if (drawn[i]) {
+      const Rng own = key.copy(Purpose::kEdgeCopy, static_cast<int>(i));
+      add_edge_point(context_, vertex, query, *drawn[i], part, own, 1, tape_, seeds_, cost);
     } else {
       ++cost.no_edge;
     }

@@ -36,10 +36,7 @@ class BoundaryTerm final : public Term {
     const EdgeQuery query = query_at(vertex);
     const bool looks = glare_ && scatters_again(vertex.bounces);
     if (looks) add_before_glare(vertex, query, samples, view, cost, sum);
-    for (int i = 0; i < samples; ++i) {
-      add_sample(vertex, query, vertex.key.copy(Purpose::kEdgeCopy, i), looks ? &view : nullptr,
-                 cost, sum);
-    }
+    add_draws(vertex, query, samples, looks ? &view : nullptr, cost, sum);
   }
 
   double work(const TermCost& cost) const override {
@@ -69,8 +66,11 @@ class BoundaryTerm final : public Term {
   void add_before_glare(const PathVertex& vertex, const EdgeQuery& query, int samples,
                         GlareEdges::View& view, TermCost& cost, Rgb<Lanes>& sum) const;
   // view: what is left out, if anything.
-  void add_sample(const PathVertex& vertex, const EdgeQuery& query, const Rng& key,
-                  const GlareEdges::View* view, TermCost& cost, Rgb<Lanes>& sum) const;
+  void add_draws(const PathVertex& vertex, const EdgeQuery& query, int samples,
+                 const GlareEdges::View* view, TermCost& cost, Rgb<Lanes>& sum) const;
+  void add_draw(const PathVertex& vertex, const EdgeQuery& query,
+                const std::optional<EdgeSample>& drawn, const Rng& key,
+                const GlareEdges::View* view, TermCost& cost, Rgb<Lanes>& sum) const;
 
   const PathContext& context_;
   const EdgeSamplerInput& edges_;
@@ -100,11 +100,20 @@ void BoundaryTerm::add_before_glare(const PathVertex& vertex, const EdgeQuery& q
   }
 }
 
-void BoundaryTerm::add_sample(const PathVertex& vertex, const EdgeQuery& query, const Rng& key,
-                              const GlareEdges::View* view, TermCost& cost, Rgb<Lanes>& sum) const {
-  ++cost.samples;
-  Rng rng = key.at(Purpose::kEdge, vertex.bounces);
-  const std::optional<EdgeSample> drawn = sampler_.sample(query, rng);
+void BoundaryTerm::add_draws(const PathVertex& vertex, const EdgeQuery& query, int samples,
+                             const GlareEdges::View* view, TermCost& cost, Rgb<Lanes>& sum) const {
+  static thread_local std::vector<std::optional<EdgeSample>> drawn;
+  draw_edges(sampler_, query, vertex.key, vertex.bounces, samples, drawn);
+  cost.samples += drawn.size();
+  for (int i = 0; i < samples; ++i) {
+    const Rng key = vertex.key.copy(Purpose::kEdgeCopy, i);
+    add_draw(vertex, query, drawn[i], key, view, cost, sum);
+  }
+}
+
+void BoundaryTerm::add_draw(const PathVertex& vertex, const EdgeQuery& query,
+                            const std::optional<EdgeSample>& drawn, const Rng& key,
+                            const GlareEdges::View* view, TermCost& cost, Rgb<Lanes>& sum) const {
   if (!drawn) {
     ++cost.no_edge;
     if (vertex.log) vertex.log->push_back("  edge: none found");

@@ -30,6 +30,16 @@ Vec3<Dual> moving_direction(const PathVertex& vertex, const Vec3d& omega, const 
   return motion ? warped(omega, *motion->warp) : turning(omega, {});
 }
 
+void draw_edges(const EdgeSampler& sampler, const EdgeQuery& query, const Rng& key, int bounces,
+                int count, std::vector<std::optional<EdgeSample>>& drawn) {
+  static thread_local std::vector<Rng> rngs;
+  rngs.clear();
+  for (int i = 0; i < count; ++i) {
+    rngs.push_back(key.copy(Purpose::kEdgeCopy, i).at(Purpose::kEdge, bounces));
+  }
+  sampler.sample_several(query, rngs, drawn);
+}
+
 void add_edge_point(const PathContext& context, const EdgeMesh& mesh, const PathVertex& vertex,
                     const EdgeQuery& query, const EdgeSample& sample, const RadiancePart& part,
                     const Rng& key, TermCost& cost, Rgb<Lanes>& sum, double share) {

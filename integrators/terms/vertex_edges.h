@@ -13,6 +13,11 @@ EdgeQuery query_at(const PathVertex& vertex);
 Vec3<Dual> moving_direction(const PathVertex& vertex, const Vec3d& omega, const Rng& key,
                             TermCost& cost);
 
+// Replaces `drawn` by draws at a vertex of the path that `key` is of, as many as asked for: draw i
+// by the path's copy i.
+void draw_edges(const EdgeSampler& sampler, const EdgeQuery& query, const Rng& key, int bounces,
+                int count, std::vector<std::optional<EdgeSample>>& drawn);
+
 // Adds what a point on an edge contributes to the boundary integral at a vertex, over its density:
 // throughput dL(t) f_s det(w_0, w_1, v) / |w|^3 / (probability pdf_t), v against directions that
 // move. part: of the radiance; key: of the path and the sample; share: of what v is while

@@ -250,6 +250,74 @@ TEST_P(EdgeSamplers, DrawAsTheyState) {
   }
 }
 
+// Draws that share their work, or are spread, still come as often as they state.
+TEST_P(EdgeSamplers, SeveralAtOnceAreDrawnAsTheyState) {
+  Rng rng(20, 0, 0);
+  std::vector<std::optional<EdgeSample>> samples;
+  for (const auto& [name, mesh] : test_meshes()) {
+    const EdgeSamplerInput input = test_input(mesh);
+    const auto sampler = make(input);
+    for (const int several : {2, 7}) {
+      const EdgeQuery q = random_query(rng);
+      const int rounds = (edge_sampler_type(GetParam()).ablation ? 5000 : 20000) / several;
+      std::vector<double> stated, expected;
+      std::vector<size_t> begin;  // of an object's cells
+      double sum = 0;
+      for_every_edge(input, [&](EdgeRef id) {
+        if (id.edge == EdgeId(0)) begin.push_back(expected.size());
+        stated.push_back(sampler->probability(q, id));
+        sum += stated.back();
+        expected.push_back(stated.back() * rounds * several);
+      });
+      expected.push_back((1 - sum) * rounds * several);  // failures
+      if (expected.back() < 1e-6) expected.back() = 0;
+      std::vector<double> observed(expected.size());
+      for (int k = 0; k < rounds; ++k) {
+        std::vector<Rng> rngs;
+        for (int i = 0; i < several; ++i) rngs.emplace_back(21, k, i);
+        sampler->sample_several(q, rngs, samples);
+        ASSERT_EQ(samples.size(), rngs.size());
+        for (const auto& s : samples) {
+          if (!s) {
+            ++observed.back();
+            continue;
+          }
+          const size_t cell = begin[s->edge.object.index()] + s->edge.edge.index();
+          ++observed[cell];
+          ASSERT_EQ(s->probability, stated[cell]) << name;
+          ASSERT_EQ(s->pdf_t, sampler->pdf_t(q, s->edge, s->t)) << name;
+        }
+      }
+      // Evenly spread draws differ less from what is expected than the test's independent ones.
+      EXPECT_GT(test::chi_square_test(observed, expected).p_value, kSignificance)
+          << name << " " << several;
+    }
+  }
+}
+
+TEST_P(EdgeSamplers, OneOfSeveralIsOneAlone) {
+  Rng rng(22, 0, 0);
+  const EdgeSamplerInput input = test_input(torus_mesh(12, 8));
+  const auto sampler = make(input);
+  std::vector<std::optional<EdgeSample>> samples(3);
+  for (uint64_t i = 0; i < 100; ++i) {
+    const EdgeQuery q = random_query(rng);
+    Rng alone(23, i, 0), several(23, i, 0);
+    const auto s = sampler->sample(q, alone);
+    sampler->sample_several(q, {&several, 1}, samples);
+    ASSERT_EQ(samples.size(), 1u);
+    ASSERT_EQ(samples[0].has_value(), s.has_value());
+    EXPECT_EQ(several.uniform(), alone.uniform());
+    if (!s) continue;
+    EXPECT_EQ(samples[0]->edge, s->edge);
+    EXPECT_EQ(samples[0]->t, s->t);
+    EXPECT_EQ(samples[0]->probability, s->probability);
+    EXPECT_EQ(samples[0]->pdf_t, s->pdf_t);
+    sampler->sample_several(q, {}, samples);
+    EXPECT_TRUE(samples.empty());
+  }
+}
+
 TEST_P(EdgeSamplers, MissNoEdgeThatContributes) {
   Rng rng(15, 0, 0);
   for (const auto& [name, mesh] : test_meshes()) {
@@ -318,15 +386,25 @@ TEST_P(EdgeSamplers, EstimateTheSumOverAllEdges) {
         if (is_candidate(input.object(id.object), id.edge, q.p))
           exact += integral(q, segment_of(input.object(id.object), id.edge, q), 400);
       });
-      RunningMean estimate;
-      for (int k = 0; k < 20000; ++k) {
-        const auto s = sampler->sample(q, rng);
-        const EdgeSegment segment =
-            s ? segment_of(input.object(s->edge.object), s->edge.edge, q) : EdgeSegment{};
-        estimate.add(s ? integrand(q, segment, s->t) / (s->probability * s->pdf_t) : 0);
+      const auto value_of = [&](const std::optional<EdgeSample>& s) {
+        if (!s) return 0.0;
+        const EdgeSegment segment = segment_of(input.object(s->edge.object), s->edge.edge, q);
+        return integrand(q, segment, s->t) / (s->probability * s->pdf_t);
+      };
+      RunningMean estimate, several;
+      for (int k = 0; k < 20000; ++k) estimate.add(value_of(sampler->sample(q, rng)));
+      std::vector<std::optional<EdgeSample>> samples;
+      for (int k = 0; k < 1500; ++k) {
+        std::vector<Rng> rngs;
+        for (int j = 0; j < 5; ++j) rngs.emplace_back(24 + i, k, j);
+        sampler->sample_several(q, rngs, samples);
+        double mean = 0;
+        for (const auto& s : samples) mean += value_of(s) / 5;
+        several.add(mean);
       }
       if (exact > 0) {
         EXPECT_LT(std::fabs(estimate.z_score(exact)), 5) << name << " " << i;
+        EXPECT_LT(std::fabs(several.z_score(exact)), 5) << name << " " << i;
       }
     }
   }
@@ -373,6 +451,40 @@ TEST_P(EdgeSamplers, HoldWithoutEdges) {
   EXPECT_FALSE(make(nothing)->sample(q, rng));
   if (GetParam() == "brute") {
     EXPECT_FALSE(make(still)->sample(q, rng));
+  }
+}
+
+// Of n draws of a query an edge of probability P has n P, but for the parts at the ends of its own;
+// and its points are as even along it.
+TEST(EdgeForestDraws, AreSpreadEvenly) {
+  Rng rng(25, 0, 0);
+  const EdgeSamplerInput input = test_input(cube_mesh());
+  const auto sampler = make_edge_sampler("forest", input, 1);
+  constexpr int kDraws = 2000, kCells = 4000;
+  std::vector<std::optional<EdgeSample>> samples;
+  for (uint64_t i = 0; i < 10; ++i) {
+    const EdgeQuery q = random_query(rng);
+    std::vector<Rng> rngs;
+    for (uint64_t k = 0; k < kDraws; ++k) rngs.emplace_back(26, i, k);
+    sampler->sample_several(q, rngs, samples);
+    for_every_edge(input, [&](EdgeRef id) {
+      const double probability = sampler->probability(q, id);
+      std::vector<double> places;
+      for (const auto& s : samples)
+        if (s && s->edge == id) places.push_back(s->t);
+      const auto count = static_cast<double>(places.size());
+      EXPECT_LE(std::fabs(count - kDraws * probability), 2);
+      if (places.size() < 20) return;
+      // The midpoint rule misses what the density jumps by in a few cells.
+      std::sort(places.begin(), places.end());
+      double below = 0;
+      for (int c = 0; c < kCells; ++c) {
+        below += sampler->pdf_t(q, id, (c + 0.5) / kCells) / kCells;
+        const auto found = std::upper_bound(places.begin(), places.end(), (c + 1.0) / kCells);
+        const auto share = static_cast<double>(found - places.begin());
+        ASSERT_LE(std::fabs(share - count * below), 4 + 0.01 * count) << i;
+      }
+    });
   }
 }
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "limn/core/lobe.h"
@@ -106,6 +107,15 @@ class EdgeSampler {
   // `probability` over all edges, and counts as a sample of value zero. Thread-safe, no allocation
   // that grows per query.
   virtual std::optional<EdgeSample> sample(const EdgeQuery& query, Rng& rng) const = 0;
+
+  // Replaces `samples` by one draw from every stream. The sum of any function over them has the mean
+  // of as many draws by `sample`, and one stream alone gives its bits; but several may share their
+  // work and be spread more evenly than independent ones, so that all must count alike.
+  virtual void sample_several(const EdgeQuery& query, std::span<Rng> rngs,
+                              std::vector<std::optional<EdgeSample>>& samples) const {
+    samples.clear();
+    for (Rng& rng : rngs) samples.push_back(sample(query, rng));
+  }
 
   // P(e) for this query, without sampling: what `sample` reports when it returns this edge. Zero
   // only where the edge cannot contribute.
