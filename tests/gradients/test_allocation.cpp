@@ -75,6 +75,8 @@ TEST(PilotSamples, AreFewAndEvenAndNoneForShortJobs) {
   for (int spp = 16; spp < 100; ++spp) {
     EXPECT_EQ(pilot_samples(spp) % 2, 0);
     EXPECT_LE(4 * pilot_samples(spp), spp);
+    EXPECT_EQ(film_pilot_samples(spp) % 8, 0);
+    EXPECT_LE(4 * film_pilot_samples(spp), spp);
   }
 }
 
