@@ -72,6 +72,7 @@ void RadianceEstimator::trace(std::span<const KeyedSample> samples, bool mirrore
   static_assert(kMostTogether <= Tracer::kMostWalks);
   RayCount rays;
   Tracer tracer(context_, rays);
+  tracer.work_wide();
   DCHECK_LE(samples.size(), kMostTogether);
   // Step by step for all of them, like the paths themselves (path.h).
   const auto numbers = film_numbers(samples);

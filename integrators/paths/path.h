@@ -83,6 +83,12 @@ class PathTracer {
   // Takes more light samples and directions at vertices that slide fast. It must outlive the
   // tracer.
   void split_by(const MotionRates* rates) { splitting_ = rates; }
+  // Many paths are followed, hardly ever one or two: their steps are taken in eight lanes. What a
+  // path comes to differs from the other way in rounding.
+  void work_wide() {
+    static_assert(std::is_same_v<S, double>);
+    wide_ = true;
+  }
   // How many light samples are averaged at every vertex but the first.
   void take_light_samples(int count) { light_samples_ = count; }
 
@@ -132,8 +138,11 @@ class PathTracer {
   // path_vertices.h. Those that return bool say whether the path goes on.
   bool begin_vertex(Walk& walk);
   void draw_numbers(std::span<Walk* const> walks) const;
+  bool draw_mirrored(Walk& walk) const;
   bool choose_direction(Walk& walk);
   bool scatter(Walk& walk);
+  using Evaluation = typename Scattering<S>::Evaluation;
+  bool scatter(Walk& walk, const Evaluation& evaluation);
   bool escape(Walk& walk) const;
   bool arrive(Walk& walk);
   void set_motion(Walk& walk) const;
@@ -145,6 +154,12 @@ class PathTracer {
   double density(const Walk& walk, const Vec3d& w, double scattered) const {
     return c_.mirrored ? MirroredLight::pdf(walk.mixture, w, scattered) : scattered;
   }
+  // path_wide.h. For plain numbers.
+  void weigh_lights_wide(std::span<Walk* const> walks) const;
+  size_t scatter_wide(std::span<Walk*> walks);
+  template <class Direction>
+  void evaluate_wide(std::span<Walk* const> walks, const Direction& direction,
+                     Evaluation* evaluations) const;
   // path_rays.h
   bool next_hit(Walk& walk);
   bool shadowed(const Walk& walk);
@@ -155,7 +170,9 @@ class PathTracer {
   // path_lights.h
   void draw_lights(std::span<Walk* const> walks) const;
   void draw_light(Walk& walk, const Rng& key) const;
+  void weigh_lights(std::span<Walk* const> walks) const;
   void weigh_light(Walk& walk) const;
+  void weigh_light(Walk& walk, const Evaluation& evaluation) const;
   void draw_delta(Walk& walk, const DeltaLight& delta) const;
   Rgb<S> light_value(const Walk& walk) const;
   void add_light(Walk& walk) const;
@@ -173,6 +190,7 @@ class PathTracer {
   const MotionRates* splitting_ = nullptr;
   DirectionWarper* warper_ = nullptr;
   int light_samples_ = 1;
+  bool wide_ = false;
 };
 
 }  // namespace limn

@@ -7,6 +7,7 @@
 #include "integrators/paths/path_lights.h"
 #include "integrators/paths/path_rays.h"
 #include "integrators/paths/path_vertices.h"
+#include "integrators/paths/path_wide.h"
 #include "limn/core/check.h"
 
 namespace limn {
@@ -75,15 +76,20 @@ inline void PathTracer<S, Visitor>::follow(std::span<Walk* const> walks) {
   while (count > 0) {
     keep([&](Walk& walk) { return begin_vertex(walk); });
     draw_lights({going, count});
-    for (size_t i = 0; i < count; ++i) weigh_light(*going[i]);
+    weigh_lights({going, count});
     keep([&](Walk& walk) {
       if (walk.light && shadowed(walk)) walk.light.reset();
       return true;
     });
     for (size_t i = 0; i < count; ++i) add_light(*going[i]);
     draw_numbers({going, count});
-    keep([&](Walk& walk) { return choose_direction(walk); });
-    keep([&](Walk& walk) { return scatter(walk); });
+    if constexpr (std::is_same_v<S, double>) {
+      if (wide_) count = scatter_wide({going, count});
+    }
+    if (!wide_) {
+      keep([&](Walk& walk) { return choose_direction(walk); });
+      keep([&](Walk& walk) { return scatter(walk); });
+    }
     keep([&](Walk& walk) {
       walk.found = next_hit(walk);
       return true;
