@@ -82,9 +82,11 @@ void RadianceEstimator::trace(std::span<const KeyedSample> samples, bool mirrore
     places[i] = sample_pixel_filter(scene_.film, filter_, at.x, at.y, numbers[i]);
     if (mirrored) places[i] = mirrored_in_pixel(scene_.film, at.x, at.y, places[i]);
   }
+  std::array<CameraRay<double>, kMostTogether> camera_rays;
+  find_rays(camera_, {places.data(), samples.size()}, camera_rays);
   std::array<StartRay<double>, kMostTogether> starts;
   for (size_t i = 0; i < samples.size(); ++i) {
-    const auto ray = camera_.ray(places[i].x, places[i].y);
+    const CameraRay<double>& ray = camera_rays[i];
     renew(starts[i].ray, [&] { return camera_ray(scene_, ray); });
     starts[i].origin = ray.origin;
     starts[i].direction = ray.direction;

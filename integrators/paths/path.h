@@ -15,6 +15,7 @@
 #include "integrators/edges/near_faces.h"
 #include "integrators/edges/viewpoint.h"
 #include "integrators/lights/closed_light.h"
+#include "integrators/paths/path_context.h"
 #include "integrators/paths/walk.h"
 #include "integrators/paths/warp_field.h"
 #include "limn/core/lights.h"
@@ -27,34 +28,6 @@
 
 namespace limn {
 
-struct PathContext {
-  const Scene& scene;
-  const RayTracer& tracer;
-  const Lights& lights;
-  // Takes the place of all light that is scattered; null: paths are sampled.
-  const ClosedLight* closed = nullptr;
-  // From where edges are looked at; needed where paths start beside edges.
-  const Viewpoints* viewpoints = nullptr;
-  // What a share of directions is drawn from; null: none.
-  const MirroredLight* mirrored = nullptr;
-  // Of differences: the scene before it moved, by whose materials roulette is played; null: by the
-  // throughput. Else what a material changes cancels in all paths that survive in both images, and
-  // the whole derivative is in the few that survive in one, by much over the step.
-  const Scene* unmoved = nullptr;
-};
-
-// Does nothing at path vertices.
-struct NoVisitor {
-  template <class... A>
-  void operator()(const A&...) const {}
-};
-
-inline double mis_weight(double pdf, double other) {
-  // Power heuristic; written so that huge densities do not overflow.
-  const double ratio = other / pdf;
-  return 1 / (1 + ratio * ratio);
-}
-
 // Where S and Visitor are chosen, path_follow.h is included, which has what is declared here.
 // Visitor: called as visitor(surface, scattering, throughput, motion, step, bounces, key) at every
 // vertex where the path scatters. motion: how directions move there, null where they are held.
@@ -62,9 +35,10 @@ template <class S, class Visitor>
 class PathTracer {
  public:
   using Walk = limn::Walk<S, Visitor>;
+  static constexpr bool kPlain = std::is_same_v<S, double>;
   // Side by side. With derivatives 1, 3 and 8 took 1.05, 1.02 and 1.01 of the time that a gradient
   // of the demo had taken path by path; 16 is not tuned.
-  static constexpr size_t kMostWalks = std::is_same_v<S, double> ? 16 : 8;
+  static constexpr size_t kMostWalks = kPlain ? 16 : 8;
 
   PathTracer(const PathContext& context, RayCount& rays) : c_(context), rays_(rays) {}
 
@@ -86,7 +60,7 @@ class PathTracer {
   // Many paths are followed, hardly ever one or two: their steps are taken in eight lanes. What a
   // path comes to differs from the other way in rounding.
   void work_wide() {
-    static_assert(std::is_same_v<S, double>);
+    static_assert(kPlain);
     wide_ = true;
   }
   // How many light samples are averaged at every vertex but the first.
@@ -131,6 +105,10 @@ class PathTracer {
   bool is_complete(int bounces) const {
     return c_.scene.max_depth >= 0 && bounces + 1 >= c_.scene.max_depth;
   }
+  // Whether a ray that meets nothing sees any light.
+  bool shows_sky(int bounces) const {
+    return c_.scene.environment && !(bounces == 0 && c_.scene.hide_emitters);
+  }
   // path_follow.h
   void place(Walk& walk, const Vec3<S>& wi) const;
   void follow_seen(std::span<const StartRay<S>> rays, std::span<Walk> walks);
@@ -157,9 +135,14 @@ class PathTracer {
   // path_wide.h. For plain numbers.
   void weigh_lights_wide(std::span<Walk* const> walks) const;
   size_t scatter_wide(std::span<Walk*> walks);
-  template <class Direction>
+  void place_lights_wide(std::span<Walk* const> walks) const;
+  template <class Direction, class Then>
   void evaluate_wide(std::span<Walk* const> walks, const Direction& direction,
-                     Evaluation* evaluations) const;
+                     const Then& then) const;
+  void find_sky_wide(std::span<Walk* const> walks) const;
+  template <class Rest>
+  void see_sky_wide(std::span<const StartRay<S>> rays, std::span<Walk> walks,
+                    const Rest& rest) const;
   // path_rays.h
   bool next_hit(Walk& walk);
   bool shadowed(const Walk& walk);

@@ -42,8 +42,7 @@ inline void PathTracer<S, Visitor>::follow_rays(std::span<const StartRay<S>> ray
 
 template <class S, class Visitor>
 inline Rgb<S> PathTracer<S, Visitor>::escaped(const Vec3<S>& direction, int bounces) const {
-  const bool hidden = bounces == 0 && c_.scene.hide_emitters;
-  if (!c_.scene.environment || hidden) return {};
+  if (!shows_sky(bounces)) return {};
   return environment_radiance<S>(*c_.scene.environment, direction);
 }
 
@@ -74,6 +73,9 @@ inline void PathTracer<S, Visitor>::follow(std::span<Walk* const> walks) {
     count = kept;
   };
   while (count > 0) {
+    if constexpr (kPlain) {
+      if (wide_) place_lights_wide({going, count});
+    }
     keep([&](Walk& walk) { return begin_vertex(walk); });
     draw_lights({going, count});
     weigh_lights({going, count});
@@ -83,7 +85,7 @@ inline void PathTracer<S, Visitor>::follow(std::span<Walk* const> walks) {
     });
     for (size_t i = 0; i < count; ++i) add_light(*going[i]);
     draw_numbers({going, count});
-    if constexpr (std::is_same_v<S, double>) {
+    if constexpr (kPlain) {
       if (wide_) count = scatter_wide({going, count});
     }
     if (!wide_) {
@@ -95,6 +97,9 @@ inline void PathTracer<S, Visitor>::follow(std::span<Walk* const> walks) {
       return true;
     });
     for (size_t i = 0; i < count; ++i) fetch_next(*going[i]);
+    if constexpr (kPlain) {
+      if (wide_) find_sky_wide({going, count});
+    }
     keep([&](Walk& walk) { return walk.found || escape(walk); });
     keep([&](Walk& walk) { return arrive(walk); });
   }
@@ -106,19 +111,25 @@ inline void PathTracer<S, Visitor>::follow_seen(std::span<const StartRay<S>> ray
   DCHECK_LE(walks.size(), kMostWalks);
   Walk* going[kMostWalks];
   size_t count = 0;
-  for (size_t i = 0; i < walks.size(); ++i) {
-    Walk& walk = walks[i];
-    if (walk.failed) continue;
-    const Vec3<S>&origin = rays[i].origin, &direction = rays[i].direction;
-    if (walk.found) {
-      renew(walk.surface,
-            [&] { return surface_on_ray<S>(c_.scene, walk.hit.face, origin, direction); });
-      place(walk, -direction);
-      going[count++] = &walk;
-    } else {
-      walk.sums.radiance = escaped(direction, walk.bounces);
+  const auto begin = [&] {
+    for (size_t i = 0; i < walks.size(); ++i) {
+      Walk& walk = walks[i];
+      if (walk.failed) continue;
+      const Vec3<S>&origin = rays[i].origin, &direction = rays[i].direction;
+      if (walk.found) {
+        renew(walk.surface,
+              [&] { return surface_on_ray<S>(c_.scene, walk.hit.face, origin, direction); });
+        place(walk, -direction);
+        going[count++] = &walk;
+      } else if (!wide_) {
+        walk.sums.radiance = escaped(direction, walk.bounces);
+      }
     }
+  };
+  if constexpr (kPlain) {
+    if (wide_) see_sky_wide(rays, walks, begin);
   }
+  if (!wide_) begin();
   follow({going, count});
 }
 

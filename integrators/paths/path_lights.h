@@ -68,7 +68,7 @@ inline void PathTracer<S, Visitor>::draw_light(Walk& walk, const Rng& key) const
 
 template <class S, class Visitor>
 inline void PathTracer<S, Visitor>::weigh_lights(std::span<Walk* const> walks) const {
-  if constexpr (std::is_same_v<S, double>) {
+  if constexpr (kPlain) {
     if (wide_) {
       weigh_lights_wide(walks);
       return;
@@ -88,8 +88,7 @@ inline void PathTracer<S, Visitor>::weigh_light(Walk& walk) const {
   }
   walk.light_motion = light.face ? nullptr : walk.motion;  // a lamp: held
   const Vec3<S> direction = detail::moving<S>(light.wo, walk.light_motion);
-  weigh_light(walk,
-              detail::evaluate(*walk.scattering, light.wo, direction, walk.light_motion));
+  weigh_light(walk, detail::evaluate(*walk.scattering, light.wo, direction, walk.light_motion));
 }
 
 // evaluation: at the light's direction as it moves.

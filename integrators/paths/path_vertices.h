@@ -32,7 +32,7 @@ inline bool PathTracer<S, Visitor>::begin_vertex(Walk& walk) {
     return false;
   }
   // Copies have both from the path that they are of.
-  renew(walk.lights, [&] { return c_.lights.at(value(walk.surface.p)); });
+  if (!wide_) renew(walk.lights, [&] { return c_.lights.at(value(walk.surface.p)); });
   renew(walk.mixture, [&] {
     return mixture_at(c_.mirrored, walk.surface, *walk.scattering, !is_complete(walk.bounces + 1));
   });
@@ -97,8 +97,7 @@ inline bool PathTracer<S, Visitor>::choose_direction(Walk& walk) {
 template <class S, class Visitor>
 inline bool PathTracer<S, Visitor>::scatter(Walk& walk) {
   walk.direction = detail::moving<S>(walk.wo, walk.motion);
-  return scatter(walk,
-                 detail::evaluate(*walk.scattering, walk.wo, walk.direction, walk.motion));
+  return scatter(walk, detail::evaluate(*walk.scattering, walk.wo, walk.direction, walk.motion));
 }
 
 // evaluation: at walk.direction, which is walk.wo as it moves.

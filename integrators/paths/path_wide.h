@@ -1,53 +1,67 @@
 #pragma once
-// The path tracer's steps in eight lanes. Included by path_follow.h.
-#include "integrators/paths/by_bsdf.h"
+// The path tracer's steps in eight lanes, in plain numbers. Included by path_follow.h.
 #include "integrators/paths/path.h"
+#include "limn/core/grouped.h"
 
 namespace limn {
 
-// evaluations[i]: of the direction *direction(walk) of the i-th walk; null: none is asked for.
+// Of the vertices that will scatter.
 template <class S, class Visitor>
-template <class Direction>
+inline void PathTracer<S, Visitor>::place_lights_wide(std::span<Walk* const> walks) const {
+  if (c_.closed) return;
+  const Vec3d* points[kMostWalks];
+  Lights::Place* places[kMostWalks];
+  size_t count = 0;
+  for (Walk* const walk : walks) {
+    if (is_complete(walk->bounces)) continue;
+    points[count] = &walk->surface.p;
+    places[count++] = &walk->lights;
+  }
+  c_.lights.at({points, count}, {places, count});
+}
+
+// then(i, evaluation): of the direction *direction(walk) of the i-th walk.
+template <class S, class Visitor>
+template <class Direction, class Then>
 inline void PathTracer<S, Visitor>::evaluate_wide(std::span<Walk* const> walks,
                                                   const Direction& direction,
-                                                  Evaluation* evaluations) const {
-  ByBsdf<Bsdf::Evaluation, kMostWalks> asked;
+                                                  const Then& then) const {
+  Grouped<Bsdf, Bsdf::Evaluation, kMostWalks> asked;
   BsdfValue values[kMostWalks];
   for (size_t i = 0; i < walks.size(); ++i) {
     const Vec3d* const wo = direction(*walks[i]);
     const Scattering<S>& scattering = *walks[i]->scattering;
     // Many lights lie behind a surface: lanes are not spent on them.
-    if (!wo || !(dot(scattering.normal(), *wo) > 0)) continue;
+    if (!(dot(scattering.normal(), *wo) > 0)) continue;
     asked.add(scattering.bsdf(), {&scattering.normal(), &scattering.wi(), wo, &values[i]});
   }
   asked.for_each([](const Bsdf& bsdf, auto items) { bsdf.eval_with_pdf_each(items); });
   for (size_t i = 0; i < walks.size(); ++i) {
-    const Vec3d* const wo = direction(*walks[i]);
-    if (wo) evaluations[i] = walks[i]->scattering->limited(*wo, values[i]);
+    then(i, walks[i]->scattering->limited(*direction(*walks[i]), values[i]));
   }
 }
 
 template <class S, class Visitor>
 inline void PathTracer<S, Visitor>::weigh_lights_wide(std::span<Walk* const> walks) const {
-  Evaluation evaluations[kMostWalks];
-  const auto is_asked = [](const Walk& walk) { return walk.light && !walk.light->light->delta(); };
-  evaluate_wide(
-      walks, [&](const Walk& walk) { return is_asked(walk) ? &walk.light->wo : nullptr; },
-      evaluations);
-  for (size_t i = 0; i < walks.size(); ++i) {
-    Walk& walk = *walks[i];
-    if (is_asked(walk)) {
-      weigh_light(walk, evaluations[i]);
+  Walk* lit[kMostWalks];
+  size_t count = 0;
+  for (Walk* const walk : walks) {
+    if (!walk->light) continue;
+    if (walk->light->light->delta()) {
+      weigh_light(*walk);
     } else {
-      weigh_light(walk);
+      lit[count++] = walk;
     }
   }
+  evaluate_wide(
+      {lit, count}, [](const Walk& walk) { return &walk.light->wo; },
+      [&](size_t i, const Evaluation& evaluation) { weigh_light(*lit[i], evaluation); });
 }
 
 // Draws the next directions and scatters into them: how many go on, which are the first then.
 template <class S, class Visitor>
 inline size_t PathTracer<S, Visitor>::scatter_wide(std::span<Walk*> walks) {
-  ByBsdf<Bsdf::Draw, kMostWalks> draws;
+  Grouped<Bsdf, Bsdf::Draw, kMostWalks> draws;
   for (Walk* const walk : walks) {
     if (draw_mirrored(*walk)) continue;
     const Scattering<S>& scattering = *walk->scattering;
@@ -55,21 +69,50 @@ inline size_t PathTracer<S, Visitor>::scatter_wide(std::span<Walk*> walks) {
               {&scattering.normal(), &scattering.wi(), walk->u.data(), &walk->wo});
   }
   draws.for_each([](const Bsdf& bsdf, auto items) { bsdf.sample_each(items); });
-  const auto keep = [&](const auto& step) {
-    size_t kept = 0;
-    for (size_t i = 0; i < walks.size(); ++i) {
-      if (step(i)) walks[kept++] = walks[i];
-    }
-    walks = walks.first(kept);
-  };
-  keep([&](size_t i) { return !(walks[i]->wo == Vec3d{}); });
-  Evaluation evaluations[kMostWalks];
-  evaluate_wide(walks, [](const Walk& walk) { return &walk.wo; }, evaluations);
-  keep([&](size_t i) {
-    walks[i]->direction = walks[i]->wo;
-    return scatter(*walks[i], evaluations[i]);
-  });
-  return walks.size();
+  size_t drawn = 0, kept = 0;
+  for (Walk* const walk : walks) {
+    if (!(walk->wo == Vec3d{})) walks[drawn++] = walk;
+  }
+  evaluate_wide(
+      walks.first(drawn), [](const Walk& walk) { return &walk.wo; },
+      [&](size_t i, const Evaluation& evaluation) {
+        walks[i]->direction = walks[i]->wo;
+        if (scatter(*walks[i], evaluation)) walks[kept++] = walks[i];
+      });
+  return kept;
+}
+
+// Where rays along walk.wo leave the scene.
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::find_sky_wide(std::span<Walk* const> walks) const {
+  if (!c_.scene.environment) return;
+  Environment::Found found[kMostWalks];
+  size_t count = 0;
+  for (Walk* const walk : walks) {
+    if (!walk->found) found[count++] = {&walk->wo, &walk->sky};
+  }
+  c_.scene.environment->find_each({found, count});
+}
+
+// What the camera's rays see that meet nothing; `rest`, while that is fetched.
+template <class S, class Visitor>
+template <class Rest>
+inline void PathTracer<S, Visitor>::see_sky_wide(std::span<const StartRay<S>> rays,
+                                                 std::span<Walk> walks, const Rest& rest) const {
+  Walk* leaving[kMostWalks];
+  size_t count = 0;
+  for (size_t i = 0; i < walks.size(); ++i) {
+    Walk& walk = walks[i];
+    if (walk.found || walk.failed || !shows_sky(walk.bounces)) continue;
+    walk.wo = rays[i].direction;
+    leaving[count++] = &walk;
+  }
+  find_sky_wide({leaving, count});
+  rest();
+  for (size_t i = 0; i < count; ++i) {
+    Walk& walk = *leaving[i];
+    walk.sums.radiance = c_.scene.environment->radiance_at(walk.wo, walk.sky);
+  }
 }
 
 }  // namespace limn
