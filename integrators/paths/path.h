@@ -59,9 +59,12 @@ class PathTracer {
   void split_by(const MotionRates* rates) { splitting_ = rates; }
   // Many paths are followed, hardly ever one or two: their steps are taken in eight lanes. What a
   // path comes to differs from the other way in rounding.
-  void work_wide() {
+  // Scattering functions only where `glossy`: of diffuse ones alone images took 1.01 to 1.05 of the
+  // time.
+  void work_wide(bool glossy) {
     static_assert(kPlain);
     wide_ = true;
+    scatters_wide_ = glossy;
   }
   // How many light samples are averaged at every vertex but the first.
   void take_light_samples(int count) { light_samples_ = count; }
@@ -174,6 +177,7 @@ class PathTracer {
   DirectionWarper* warper_ = nullptr;
   int light_samples_ = 1;
   bool wide_ = false;
+  bool scatters_wide_ = false;
 };
 
 }  // namespace limn

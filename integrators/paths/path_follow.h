@@ -86,9 +86,9 @@ inline void PathTracer<S, Visitor>::follow(std::span<Walk* const> walks) {
     for (size_t i = 0; i < count; ++i) add_light(*going[i]);
     draw_numbers({going, count});
     if constexpr (kPlain) {
-      if (wide_) count = scatter_wide({going, count});
+      if (scatters_wide_) count = scatter_wide({going, count});
     }
-    if (!wide_) {
+    if (!scatters_wide_) {
       keep([&](Walk& walk) { return choose_direction(walk); });
       keep([&](Walk& walk) { return scatter(walk); });
     }

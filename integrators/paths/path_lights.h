@@ -69,7 +69,7 @@ inline void PathTracer<S, Visitor>::draw_light(Walk& walk, const Rng& key) const
 template <class S, class Visitor>
 inline void PathTracer<S, Visitor>::weigh_lights(std::span<Walk* const> walks) const {
   if constexpr (kPlain) {
-    if (wide_) {
+    if (scatters_wide_) {
       weigh_lights_wide(walks);
       return;
     }
