@@ -110,11 +110,15 @@ void Lights::at(std::span<const Vec3d* const> p, std::span<Place* const> places)
     chosen_by_->at(p, places);
     return;
   }
+  if (all_.size() < 2) {
+    for (size_t i = 0; i < p.size(); ++i) *places[i] = Place{*p[i]};
+    return;
+  }
   wide::for_blocks(p.size(), [&](size_t first, size_t last) {
     const auto of = [&](int i) { return p[std::min(first + i, last - 1)]; };
     const wide::Vec points = wide::gather_vectors(of);
     Place some[wide::kWidth];
-    for (size_t k = 0; all_.size() > 1 && k < all_.size(); ++k) {
+    for (size_t k = 0; k < all_.size(); ++k) {
       const auto of_light = [&] {
         if (k < reaches_.size()) return estimate(reaches_[k], points);
         return wide::gather([&](int i) { return estimate(k, *of(i)); });
