@@ -1,6 +1,7 @@
 // One path per sample of a pixel, in plain numbers.
 #include "integrators/methods/radiance_estimator.h"
 
+#include <algorithm>
 #include <array>
 #include <utility>
 #include <vector>
@@ -23,6 +24,14 @@ std::array<std::array<double, 2>, kMostTogether> film_numbers(
   return numbers;
 }
 
+// Whether any material is worth lanes.
+bool is_glossy(const Scene& scene) {
+  return std::ranges::any_of(scene.shapes, [](const Shape& shape) {
+    const auto is_ggx = [](const Bsdf* side) { return side && side->lobe().model == &ggx_lobe(); };
+    return is_ggx(shape.bsdf->side(true)) || is_ggx(shape.bsdf->side(false));
+  });
+}
+
 }  // namespace
 
 RadianceEstimator::RadianceEstimator(const Scene& scene, int threads,
@@ -37,7 +46,8 @@ RadianceEstimator::RadianceEstimator(const Scene& scene, int threads,
       camera_(scene_.camera),
       filter_(scene_.film.filter),
       visible_(std::move(visible)),
-      even_(even) {}
+      even_(even),
+      glossy_(is_glossy(scene_)) {}
 
 RadianceEstimator::RadianceEstimator(const Scene& moved, const Choices& choices, int threads)
     : scene_(moved),
@@ -47,7 +57,8 @@ RadianceEstimator::RadianceEstimator(const Scene& moved, const Choices& choices,
                &choices.unmoved},
       camera_(scene_.camera),
       filter_(scene_.film.filter),
-      even_(false) {}
+      even_(false),
+      glossy_(is_glossy(scene_)) {}
 
 void RadianceEstimator::add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const {
   // In closed form what is left to chance is where in its pixel a sample lies: it takes two places.
@@ -72,6 +83,7 @@ void RadianceEstimator::trace(std::span<const KeyedSample> samples, bool mirrore
   static_assert(kMostTogether <= Tracer::kMostWalks);
   RayCount rays;
   Tracer tracer(context_, rays);
+  tracer.work_wide(glossy_);
   DCHECK_LE(samples.size(), kMostTogether);
   // Step by step for all of them, like the paths themselves (path.h).
   const auto numbers = film_numbers(samples);
@@ -81,9 +93,11 @@ void RadianceEstimator::trace(std::span<const KeyedSample> samples, bool mirrore
     places[i] = sample_pixel_filter(scene_.film, filter_, at.x, at.y, numbers[i]);
     if (mirrored) places[i] = mirrored_in_pixel(scene_.film, at.x, at.y, places[i]);
   }
+  std::array<CameraRay<double>, kMostTogether> camera_rays;
+  find_rays(camera_, {places.data(), samples.size()}, camera_rays);
   std::array<StartRay<double>, kMostTogether> starts;
   for (size_t i = 0; i < samples.size(); ++i) {
-    const auto ray = camera_.ray(places[i].x, places[i].y);
+    const CameraRay<double>& ray = camera_rays[i];
     renew(starts[i].ray, [&] { return camera_ray(scene_, ray); });
     starts[i].origin = ray.origin;
     starts[i].direction = ray.direction;

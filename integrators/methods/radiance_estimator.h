@@ -50,6 +50,7 @@ class RadianceEstimator final : public SampleEstimator {
   FilterTable filter_;
   std::shared_ptr<const FilmRegions> visible_;
   bool even_;
+  bool glossy_;
 };
 
 }  // namespace limn

@@ -13,9 +13,7 @@ namespace limn {
 // around the pixel's center, so that every sample counts with weight one and no pixel shares
 // samples with another. The stream depends on the pixel of the full film, hence a crop repeats the
 // full image. filter: the film's.
-struct FilmPosition {
-  double x, y;
-};
+using FilmPosition = Camera::FilmPoint<double>;
 inline FilmPosition sample_pixel_filter(const Film& film, const FilterTable& filter, int x, int y,
                                         const std::array<double, 2>& u) {
   const auto columns = film.range_x(x);

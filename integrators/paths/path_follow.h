@@ -7,6 +7,7 @@
 #include "integrators/paths/path_lights.h"
 #include "integrators/paths/path_rays.h"
 #include "integrators/paths/path_vertices.h"
+#include "integrators/paths/path_wide.h"
 #include "limn/core/check.h"
 
 namespace limn {
@@ -41,8 +42,7 @@ inline void PathTracer<S, Visitor>::follow_rays(std::span<const StartRay<S>> ray
 
 template <class S, class Visitor>
 inline Rgb<S> PathTracer<S, Visitor>::escaped(const Vec3<S>& direction, int bounces) const {
-  const bool hidden = bounces == 0 && c_.scene.hide_emitters;
-  if (!c_.scene.environment || hidden) return {};
+  if (!shows_sky(bounces)) return {};
   return environment_radiance<S>(*c_.scene.environment, direction);
 }
 
@@ -73,22 +73,33 @@ inline void PathTracer<S, Visitor>::follow(std::span<Walk* const> walks) {
     count = kept;
   };
   while (count > 0) {
+    if constexpr (kPlain) {
+      if (wide_) place_lights_wide({going, count});
+    }
     keep([&](Walk& walk) { return begin_vertex(walk); });
     draw_lights({going, count});
-    for (size_t i = 0; i < count; ++i) weigh_light(*going[i]);
+    weigh_lights({going, count});
     keep([&](Walk& walk) {
       if (walk.light && shadowed(walk)) walk.light.reset();
       return true;
     });
     for (size_t i = 0; i < count; ++i) add_light(*going[i]);
     draw_numbers({going, count});
-    keep([&](Walk& walk) { return choose_direction(walk); });
-    keep([&](Walk& walk) { return scatter(walk); });
+    if constexpr (kPlain) {
+      if (scatters_wide_) count = scatter_wide({going, count});
+    }
+    if (!scatters_wide_) {
+      keep([&](Walk& walk) { return choose_direction(walk); });
+      keep([&](Walk& walk) { return scatter(walk); });
+    }
     keep([&](Walk& walk) {
       walk.found = next_hit(walk);
       return true;
     });
     for (size_t i = 0; i < count; ++i) fetch_next(*going[i]);
+    if constexpr (kPlain) {
+      if (wide_) find_sky_wide({going, count});
+    }
     keep([&](Walk& walk) { return walk.found || escape(walk); });
     keep([&](Walk& walk) { return arrive(walk); });
   }
@@ -100,19 +111,25 @@ inline void PathTracer<S, Visitor>::follow_seen(std::span<const StartRay<S>> ray
   DCHECK_LE(walks.size(), kMostWalks);
   Walk* going[kMostWalks];
   size_t count = 0;
-  for (size_t i = 0; i < walks.size(); ++i) {
-    Walk& walk = walks[i];
-    if (walk.failed) continue;
-    const Vec3<S>&origin = rays[i].origin, &direction = rays[i].direction;
-    if (walk.found) {
-      renew(walk.surface,
-            [&] { return surface_on_ray<S>(c_.scene, walk.hit.face, origin, direction); });
-      place(walk, -direction);
-      going[count++] = &walk;
-    } else {
-      walk.sums.radiance = escaped(direction, walk.bounces);
+  const auto begin = [&] {
+    for (size_t i = 0; i < walks.size(); ++i) {
+      Walk& walk = walks[i];
+      if (walk.failed) continue;
+      const Vec3<S>&origin = rays[i].origin, &direction = rays[i].direction;
+      if (walk.found) {
+        renew(walk.surface,
+              [&] { return surface_on_ray<S>(c_.scene, walk.hit.face, origin, direction); });
+        place(walk, -direction);
+        going[count++] = &walk;
+      } else if (!wide_) {
+        walk.sums.radiance = escaped(direction, walk.bounces);
+      }
     }
+  };
+  if constexpr (kPlain) {
+    if (wide_) see_sky_wide(rays, walks, begin);
   }
+  if (!wide_) begin();
   follow({going, count});
 }
 

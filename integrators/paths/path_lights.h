@@ -66,6 +66,17 @@ inline void PathTracer<S, Visitor>::draw_light(Walk& walk, const Rng& key) const
   renew(walk.light, [&] { return c_.lights.sample(walk.lights, rng); });
 }
 
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::weigh_lights(std::span<Walk* const> walks) const {
+  if constexpr (kPlain) {
+    if (scatters_wide_) {
+      weigh_lights_wide(walks);
+      return;
+    }
+  }
+  for (Walk* const walk : walks) weigh_light(*walk);
+}
+
 // What the light that was drawn adds but for its radiance; none if that is black.
 template <class S, class Visitor>
 inline void PathTracer<S, Visitor>::weigh_light(Walk& walk) const {
@@ -77,7 +88,15 @@ inline void PathTracer<S, Visitor>::weigh_light(Walk& walk) const {
   }
   walk.light_motion = light.face ? nullptr : walk.motion;  // a lamp: held
   const Vec3<S> direction = detail::moving<S>(light.wo, walk.light_motion);
-  const auto [f, pdf] = detail::evaluate(*walk.scattering, light.wo, direction, walk.light_motion);
+  weigh_light(walk, detail::evaluate(*walk.scattering, light.wo, direction, walk.light_motion));
+}
+
+// evaluation: at the light's direction as it moves.
+template <class S, class Visitor>
+[[gnu::always_inline]] inline void PathTracer<S, Visitor>::weigh_light(
+    Walk& walk, const Evaluation& evaluation) const {
+  const LightSample& light = *walk.light;
+  const auto& [f, pdf] = evaluation;
   walk.light_share = detail::stretched(f, light.wo, walk.light_motion);
   walk.light_weight = mis_weight(light.pdf, density(walk, light.wo, pdf)) / light.pdf;
   if (detail::stays_black(f)) walk.light.reset();

@@ -67,7 +67,7 @@ template <class S, class Visitor>
 inline void PathTracer<S, Visitor>::fetch_next(Walk& walk) const {
   if (walk.found) {
     fetch_corners(walk);
-  } else if (c_.scene.environment) {
+  } else if (c_.scene.environment && !wide_) {
     walk.sky = c_.scene.environment->find(walk.wo);
   }
 }

@@ -32,7 +32,7 @@ inline bool PathTracer<S, Visitor>::begin_vertex(Walk& walk) {
     return false;
   }
   // Copies have both from the path that they are of.
-  renew(walk.lights, [&] { return c_.lights.at(value(walk.surface.p)); });
+  if (!wide_) renew(walk.lights, [&] { return c_.lights.at(value(walk.surface.p)); });
   renew(walk.mixture, [&] {
     return mixture_at(c_.mirrored, walk.surface, *walk.scattering, !is_complete(walk.bounces + 1));
   });
@@ -68,22 +68,27 @@ inline void PathTracer<S, Visitor>::draw_numbers(std::span<Walk* const> walks) c
   }
 }
 
+// Draws the next direction towards what is mirrored, if its turn has come.
+template <class S, class Visitor>
+inline bool PathTracer<S, Visitor>::draw_mirrored(Walk& walk) const {
+  const auto& u = walk.u;
+  if (walk.mixture.share == 0 || !(u[2] < walk.mixture.share)) return false;
+  const auto wo = MirroredLight::sample(walk.mixture, u[2] / walk.mixture.share, u[0], u[1]);
+  walk.wo = wo.value_or(Vec3d{});
+  return true;
+}
+
 // Draws the next direction.
 template <class S, class Visitor>
 inline bool PathTracer<S, Visitor>::choose_direction(Walk& walk) {
-  const auto& u = walk.u;
-  const auto wo = [&] {
-    if (walk.mixture.share == 0) return walk.scattering->sample(u[0], u[1]);
-    return u[2] < walk.mixture.share
-               ? MirroredLight::sample(walk.mixture, u[2] / walk.mixture.share, u[0], u[1])
-               : walk.scattering->sample(u[0], u[1]);
-  }();
-  if (!wo) return false;
-  walk.wo = *wo;
+  if (!draw_mirrored(walk)) {
+    walk.wo = walk.scattering->sample(walk.u[0], walk.u[1]).value_or(Vec3d{});
+  }
+  if (walk.wo == Vec3d{}) return false;
   if constexpr (std::is_same_v<S, Dual>) {
     if (warper_) {
       const Rng key = walk.key.at(Purpose::kBsdf, walk.bounces).at(Purpose::kBsdf, 1);
-      walk.motion = warper_->motion(walk.surface, *wo, key);
+      walk.motion = warper_->motion(walk.surface, walk.wo, key);
     }
   }
   return true;
@@ -92,8 +97,14 @@ inline bool PathTracer<S, Visitor>::choose_direction(Walk& walk) {
 template <class S, class Visitor>
 inline bool PathTracer<S, Visitor>::scatter(Walk& walk) {
   walk.direction = detail::moving<S>(walk.wo, walk.motion);
-  const auto [f, scattered] =
-      detail::evaluate(*walk.scattering, walk.wo, walk.direction, walk.motion);
+  return scatter(walk, detail::evaluate(*walk.scattering, walk.wo, walk.direction, walk.motion));
+}
+
+// evaluation: at walk.direction, which is walk.wo as it moves.
+template <class S, class Visitor>
+[[gnu::always_inline]] inline bool PathTracer<S, Visitor>::scatter(Walk& walk,
+                                                                   const Evaluation& evaluation) {
+  const auto& [f, scattered] = evaluation;
   if (detail::stays_black(f)) return false;
   const double pdf = density(walk, walk.wo, scattered);
   walk.pdf = pdf;

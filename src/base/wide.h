@@ -84,6 +84,12 @@ template <class F>
 LIMN_WIDE Ints gather_ints(const F& of) {
   return Ints{of(0), of(1), of(2), of(3), of(4), of(5), of(6), of(7)};
 }
+// Lane i: *of(i).
+template <class F>
+LIMN_WIDE Vec gather_vectors(const F& of) {
+  return {gather([&](int i) { return of(i)->x; }), gather([&](int i) { return of(i)->y; }),
+          gather([&](int i) { return of(i)->z; })};
+}
 LIMN_WIDE Vec3d lane(const Vec& a, int i) { return {a.x[i], a.y[i], a.z[i]}; }
 
 // f(first, last) for every kWidth of `count` items, the last ones with fewer.

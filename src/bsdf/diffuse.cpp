@@ -1,6 +1,8 @@
 // Lambert's cosine law, black from behind.
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "src/base/angles.h"
 #include "src/bsdf/types.h"
 
@@ -25,6 +27,8 @@ class Diffuse final : public Bsdf {
     return {evaluate(n, wi, wo), pdf_solid_angle(n, wi, wo)};
   }
   std::optional<Vec3d> sample(const Vec3d& n, const Vec3d& wi, double u1, double u2) const override;
+  void eval_with_pdf_each(std::span<const Evaluation> evaluations) const override;
+  void sample_each(std::span<const Draw> draws) const override;
 
   bool is_still() const override { return limn::is_still(reflectance_); }
   LobeSummary lobe() const override { return {kHemisphere, 1, max_channel(value(reflectance_))}; }
@@ -38,6 +42,14 @@ class Diffuse final : public Bsdf {
   }
 
  private:
+  // Of height sqrt(1 - u1) above a uniform point of the disk.
+  template <class S>
+  static Vec3<S> draw(const Vec3<S>& n, const S& u1, const S& u2) {
+    using std::sqrt;
+    const S r = sqrt(u1);
+    const SinCosOf<S> phi = sin_cos_of_turns(u2);
+    return FrameOf<S>(n).to_world({r * phi.cos, r * phi.sin, sqrt(1.0 - u1)});
+  }
   template <class S>
   Rgb<S> evaluate(const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo) const {
     const S cos_o = dot(n, wo);
@@ -52,10 +64,25 @@ class Diffuse final : public Bsdf {
 // (Malley's method).
 std::optional<Vec3d> Diffuse::sample(const Vec3d& n, const Vec3d& wi, double u1, double u2) const {
   if (!(dot(n, wi) > 0)) return std::nullopt;
-  const double r = std::sqrt(u1);
-  const SinCos phi = sin_cos_of_turns(u2);
-  const Vec3d local{r * phi.cos, r * phi.sin, std::sqrt(1 - u1)};
-  return Frame(n).to_world(local);
+  return draw(n, u1, u2);
+}
+
+void Diffuse::sample_each(std::span<const Draw> draws) const {
+  wide::for_blocks(draws.size(), [&](size_t first, size_t last) {
+    const auto of = [&](int i) -> const Draw& { return draws[std::min(first + i, last - 1)]; };
+    const auto number = [&](int k) { return wide::gather([&](int i) { return of(i).u[k]; }); };
+    const wide::Vec n = wide::gather_vectors([&](int i) { return of(i).n; });
+    const wide::Vec wo = draw(n, number(0), number(1));
+    for (size_t i = first; i < last; ++i) {
+      const bool seen = dot(*draws[i].n, *draws[i].wi) > 0;
+      *draws[i].wo = seen ? wide::lane(wo, static_cast<int>(i - first)) : Vec3d{};
+    }
+  });
+}
+
+// Too little for lanes.
+void Diffuse::eval_with_pdf_each(std::span<const Evaluation> evaluations) const {
+  for (const Evaluation& e : evaluations) *e.value = eval_with_pdf(*e.n, *e.wi, *e.wo);
 }
 
 }  // namespace

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "src/base/angles.h"
-
 namespace limn::microfacet {
 namespace {
 
@@ -66,19 +64,7 @@ double beckmann_exact_g1_over_cos(double cos_v, double alpha) {
   return 2 / (cos_v * (1 + std::erf(a)) + scaled_sin * kInverseSqrtPi * std::exp(-a * a));
 }
 
-// The visible normals of the stretched surface (roughness 1: a hemisphere) are half vectors of v
-// and directions uniform on the cap of the sphere around it. Dupuy and Benyoub 2023, "Sampling
-// visible GGX normals with spherical caps".
-Vec3d ggx_sample_visible(const Vec3d& v, double alpha, double u1, double u2) {
-  const Vec3d stretched = normalize(Vec3d{alpha * v.x, alpha * v.y, v.z});
-  const SinCos phi = sin_cos_of_turns(u1);
-  const double z = (1 - u2) * (1 + stretched.z) - stretched.z;
-  const double r = std::sqrt(std::max(0.0, 1 - z * z));
-  const Vec3d h = stretched + Vec3d{r * phi.cos, r * phi.sin, z};
-  return normalize(Vec3d{alpha * h.x, alpha * h.y, h.z});
-}
-
-Vec3d beckmann_sample_visible(const Vec3d& v, double alpha, double u1, double u2) {
+Vec3d beckmann_visible(const Vec3d& v, double alpha, double u1, double u2) {
   const Vec3d stretched = normalize(Vec3d{alpha * v.x, alpha * v.y, v.z});
   const double sin_v = std::hypot(stretched.x, stretched.y);
   const double cos_phi = sin_v > 0 ? stretched.x / sin_v : 1;
@@ -87,7 +73,7 @@ Vec3d beckmann_sample_visible(const Vec3d& v, double alpha, double u1, double u2
   const double across = gaussian_slope(u2);
   const double slope_x = alpha * (cos_phi * along - sin_phi * across);
   const double slope_y = alpha * (sin_phi * along + cos_phi * across);
-  return normalize(Vec3d{-slope_x, -slope_y, 1});
+  return {-slope_x, -slope_y, 1};
 }
 
 }  // namespace limn::microfacet

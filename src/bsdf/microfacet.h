@@ -1,5 +1,6 @@
 #pragma once
-// Microfacet distributions in terms of cosines and squared sines, over double or Dual.
+// Microfacet distributions in terms of cosines and squared sines, over double, Dual or Var; GGX and
+// Fresnel's formula also over wide::Doubles.
 //
 // h is the half vector of wi (towards the viewer) and wo, alpha the roughness; v stands for either
 // direction, cos_v = n.v. D: density of facet normals; G1: Smith masking of one direction. Masking
@@ -7,13 +8,26 @@
 // Walter et al. 2007, "Microfacet models for refraction through rough surfaces".
 #include "limn/core/dual.h"
 #include "limn/core/vec.h"
+#include "src/base/angles.h"
+#include "src/base/wide.h"
 
 namespace limn::microfacet {
 
 using std::exp;
 using std::sqrt;
 
-// GGX: D = alpha^2 / (pi (alpha^2 cos^2 + sin^2)^2), cos and sin of the angle between n and h.
+// t < 0 ? a : b.
+template <class S>
+[[gnu::always_inline]] inline S below_zero(const S& t, const S& a, const S& b) {
+  if constexpr (std::is_same_v<S, wide::Doubles>) {
+    return select(t < 0, a, b);
+  } else {
+    return value(t) < 0 ? a : b;
+  }
+}
+
+// GGX: D = alpha^2 / (pi (alpha^2 cos^2 + sin^2)^2), cos and sin of the angle between n and h. Both
+// squares f times as large give D / f^2, here and below.
 template <class S>
 S ggx_d(const S& cos2, const S& sin2, const S& alpha) {
   const S a2 = alpha * alpha;
@@ -60,27 +74,41 @@ double beckmann_exact_g1_over_cos(double cos_v, double alpha);
 inline constexpr double kBeckmannRationalExcess = 1.0035;
 
 // Normals h visible from v (in the frame where n is +z, v.z > 0), with density
-// D(h) G1(v) max(0, v.h) / v.z per solid angle of h, from two numbers in [0, 1).
-Vec3d ggx_sample_visible(const Vec3d& v, double alpha, double u1, double u2);
-Vec3d beckmann_sample_visible(const Vec3d& v, double alpha, double u1, double u2);
+// D(h) G1(v) max(0, v.h) / v.z per solid angle of h, from two numbers in [0, 1). Of any length.
+Vec3d beckmann_visible(const Vec3d& v, double alpha, double u1, double u2);
+
+// The visible normals of the stretched surface (roughness 1: a hemisphere) are half vectors of v
+// and directions uniform on the cap of the sphere around it. Dupuy and Benyoub 2023, "Sampling
+// visible GGX normals with spherical caps".
+template <class S>
+Vec3<S> ggx_visible(const Vec3<S>& v, double alpha, const S& u1, const S& u2) {
+  const Vec3<S> longer{alpha * v.x, alpha * v.y, v.z};
+  const Vec3<S> stretched = longer * (1.0 / length(longer));
+  const SinCosOf<S> phi = sin_cos_of_turns(u1);
+  const S z = (1.0 - u2) * (1.0 + stretched.z) - stretched.z;
+  const S r2 = 1.0 - z * z;
+  const S r = sqrt(below_zero(r2, S(0.0), r2));
+  return {alpha * (stretched.x + r * phi.cos), alpha * (stretched.y + r * phi.sin),
+          stretched.z + z};
+}
 
 // Reflectance of a conductor for unpolarised light; refractive index eta + i k, relative to the
-// outside; cos of the angle of incidence.
+// outside; cos of the angle of incidence. With t = eta^2 - k^2 - sin^2, s = |(t, 2 eta k)| + |t| and
+// r = sqrt(2 s), the refracted wave has a = (t < 0 ? 2 eta k / r : r / 2), without cancellation; what
+// follows is extended by r, and has one division.
 template <class S>
 S fresnel_conductor(const S& cos_h, double eta, double k) {
+  constexpr double kTiny = 1e-300;  // s is 0 at the critical angle if k = 0
   const S c2 = cos_h * cos_h;
   const S s2 = 1.0 - c2;
   const double nk = eta * k;
   const S t = eta * eta - k * k - s2;
   const S a2b2 = sqrt(t * t + 4 * nk * nk);
-  // (a2b2 + t) / 2, without cancellation where t < 0.
-  const S difference = a2b2 - t;
-  const S a2 = value(t) < 0 ? S(2 * nk * nk / difference) : S((a2b2 + t) * 0.5);
-  const S two_ac = 2.0 * sqrt(a2) * cos_h;
-  const S rs = (a2b2 + c2 - two_ac) / (a2b2 + c2 + two_ac);
-  const S p = a2b2 * c2 + s2 * s2;
-  const S q = two_ac * s2;
-  return rs * (1.0 + (p - q) / (p + q)) * 0.5;
+  const S s = a2b2 + below_zero(t, S(-t), t) + kTiny;
+  const S r = sqrt(2.0 * s);
+  const S two_ac = cos_h * below_zero(t, S(4 * nk), S(2.0 * s));
+  const S m = (a2b2 + c2) * r, p = (a2b2 * c2 + s2 * s2) * r;
+  return (m - two_ac) * p / ((m + two_ac) * (p + two_ac * s2));
 }
 
 }  // namespace limn::microfacet

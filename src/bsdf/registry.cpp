@@ -18,6 +18,16 @@ constexpr BsdfType kTypes[] = {
 
 }  // namespace
 
+void Bsdf::eval_with_pdf_each(std::span<const Evaluation> evaluations) const {
+  for (const Evaluation& e : evaluations) *e.value = eval_with_pdf(*e.n, *e.wi, *e.wo);
+}
+
+void Bsdf::sample_each(std::span<const Draw> draws) const {
+  for (const Draw& draw : draws) {
+    *draw.wo = sample(*draw.n, *draw.wi, draw.u[0], draw.u[1]).value_or(Vec3d{});
+  }
+}
+
 std::shared_ptr<Bsdf> make_bsdf(Properties& properties) {
   for (const BsdfType& type : kTypes) {
     if (properties.type() == type.name) return type.read(properties);

@@ -35,10 +35,9 @@ constexpr Material kMaterials[] = {
 constexpr double kMinimumAlpha = 1e-4;  // as in Mitsuba
 constexpr double kMaximumAlpha = 1e6;
 
-// What value and density share at one pair of directions.
+// What value and density share at a pair of directions in front of the surface.
 template <class S>
 struct Reflection {
-  bool above = false;  // both directions in front of the surface; else nothing below is set
   S cos_i, cos_o;
   S cos_h;  // wi.h
   S d;      // D(h)
@@ -55,19 +54,22 @@ class RoughConductor final : public Bsdf {
 
   Rgb<double> eval(const Vec3<double>& n, const Vec3<double>& wi,
                    const Vec3<double>& wo) const override {
-    return evaluate(reflect(n, wi, wo));
+    return is_seen(n, wi, wo) ? evaluate(reflect(n, wi, wo)) : Rgb<double>();
   }
   Rgb<Dual> eval(const Vec3<Dual>& n, const Vec3<Dual>& wi, const Vec3<Dual>& wo) const override {
-    return evaluate(reflect(n, wi, wo));
+    return is_seen(value(n), value(wi), value(wo)) ? evaluate(reflect(n, wi, wo)) : Rgb<Dual>();
   }
   double pdf_solid_angle(const Vec3d& n, const Vec3d& wi, const Vec3d& wo) const override {
-    return density(reflect(n, wi, wo));
+    return is_seen(n, wi, wo) ? density(reflect(n, wi, wo)) : 0;
   }
   BsdfValue eval_with_pdf(const Vec3d& n, const Vec3d& wi, const Vec3d& wo) const override {
+    if (!is_seen(n, wi, wo)) return {};
     const Reflection<double> r = reflect(n, wi, wo);
     return {evaluate(r), density(r)};
   }
   std::optional<Vec3d> sample(const Vec3d& n, const Vec3d& wi, double u1, double u2) const override;
+  void eval_with_pdf_each(std::span<const Evaluation> evaluations) const override;
+  void sample_each(std::span<const Draw> draws) const override;
 
   bool is_still() const override {
     return limn::is_still(alpha_) && limn::is_still(specular_reflectance_);
@@ -87,11 +89,39 @@ class RoughConductor final : public Bsdf {
     const S a = as<S>(alpha_);
     return value(a) > kMinimumAlpha ? a : S(kMinimumAlpha);
   }
+  static bool is_seen(const Vec3d& n, const Vec3d& wi, const Vec3d& wo) {
+    return dot(n, wi) > 0 && dot(n, wo) > 0;
+  }
   template <class S>
   Reflection<S> reflect(const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo) const;
   template <class S>
   Rgb<S> evaluate(const Reflection<S>& r) const;
-  double density(const Reflection<double>& r) const;
+  template <class S>
+  S density(const Reflection<S>& r) const;
+  // As the functions of microfacet.h; wide::Doubles: GGX.
+  template <class S>
+  S distribution(const S& cos2, const S& sin2) const {
+    if constexpr (std::is_same_v<S, wide::Doubles>) {
+      return microfacet::ggx_d<S>(cos2, sin2, alpha<double>());
+    } else {
+      return is_ggx() ? microfacet::ggx_d(cos2, sin2, alpha<S>())
+                      : microfacet::beckmann_d(cos2, sin2, alpha<S>());
+    }
+  }
+  template <class S>
+  S masking_over_cos(const S& cos_v) const {
+    if constexpr (std::is_same_v<S, wide::Doubles>) {
+      return microfacet::ggx_g1_over_cos<S>(cos_v, alpha<double>());
+    } else {
+      return is_ggx() ? microfacet::ggx_g1_over_cos(cos_v, alpha<S>())
+                      : microfacet::beckmann_g1_over_cos(cos_v, alpha<S>());
+    }
+  }
+  // wi mirrored at the facet, whose normal may be of any length.
+  template <class S>
+  static Vec3<S> mirrored(const FrameOf<S>& frame, const Vec3<S>& v, const Vec3<S>& h) {
+    return normalize(frame.to_world(h * (2.0 * dot(v, h) / dot(h, h)) - v));
+  }
 
   Distribution distribution_;
   Dual alpha_;
@@ -108,52 +138,62 @@ Reflection<S> RoughConductor::reflect(const Vec3<S>& n, const Vec3<S>& wi,
   Reflection<S> r;
   r.cos_i = dot(n, wi);
   r.cos_o = dot(n, wo);
-  r.above = value(r.cos_i) > 0 && value(r.cos_o) > 0;
-  if (!r.above) return r;
   const Vec3<S> m = wi + wo;
   const S m2 = dot(m, m);
-  const S inverse_m2 = 1.0 / m2;
   const S cos_m = r.cos_i + r.cos_o;
-  const S cos2 = cos_m * cos_m * inverse_m2;
-  const S sin2 = length_squared(cross(n, m)) * inverse_m2;
+  const S cos2 = cos_m * cos_m, sin2 = length_squared(cross(n, m));  // times m2
   r.cos_h = 0.5 * sqrt(m2);
-  r.d = is_ggx() ? microfacet::ggx_d(cos2, sin2, alpha<S>())
-                 : microfacet::beckmann_d(cos2, sin2, alpha<S>());
+  r.d = distribution(cos2, sin2) * (m2 * m2);
   return r;
 }
 
 template <class S>
 Rgb<S> RoughConductor::evaluate(const Reflection<S>& r) const {
-  if (!r.above || value(r.d) == 0) return {};
-  const S a = alpha<S>();
-  const S masking =
-      is_ggx() ? microfacet::ggx_g1_over_cos(r.cos_i, a) * microfacet::ggx_g1_over_cos(r.cos_o, a)
-               : microfacet::beckmann_g1_over_cos(r.cos_i, a) *
-                     microfacet::beckmann_g1_over_cos(r.cos_o, a);
+  const S masking = masking_over_cos(r.cos_i) * masking_over_cos(r.cos_o);
   const S common = r.d * masking * r.cos_o * 0.25;
-  if constexpr (std::is_same_v<S, double>) {
-    // Arrays of four, so that plain numbers are worked on side by side.
-    const double eta[4] = {eta_.r, eta_.g, eta_.b, 1}, k[4] = {k_.r, k_.g, k_.b, 1};
-    double f[4];
-    for (int i = 0; i < 4; ++i) f[i] = microfacet::fresnel_conductor(r.cos_h, eta[i], k[i]);
-    return value(specular_reflectance_) * Rgb<double>{f[0], f[1], f[2]} * common;
+  // Arrays of four, so that plain numbers are worked on side by side.
+  const double eta[4] = {eta_.r, eta_.g, eta_.b, 1}, k[4] = {k_.r, k_.g, k_.b, 1};
+  constexpr int kCount = std::is_same_v<S, double> ? 4 : 3;
+  S f[kCount];
+  for (int i = 0; i < kCount; ++i) f[i] = microfacet::fresnel_conductor(r.cos_h, eta[i], k[i]);
+  const Rgb<S> reflectance{f[0], f[1], f[2]};
+  if constexpr (std::is_same_v<S, Dual>) {
+    return specular_reflectance_ * reflectance * common;
   } else {
-    const Rgb<S> f{microfacet::fresnel_conductor(r.cos_h, eta_.r, k_.r),
-                   microfacet::fresnel_conductor(r.cos_h, eta_.g, k_.g),
-                   microfacet::fresnel_conductor(r.cos_h, eta_.b, k_.b)};
-    return as<S>(specular_reflectance_) * f * common;
+    return value(specular_reflectance_) * reflectance * common;
   }
 }
 
 // Visible normals have the density D G1(wi) (wi.h) / cos_i per solid angle of h, and reflection
 // divides by 4 (wi.h). For Beckmann the exact G1 stands here, since the rational one of `evaluate`
 // does not integrate to 1.
-double RoughConductor::density(const Reflection<double>& r) const {
-  if (!r.above) return 0;
-  const double a = alpha<double>();
-  return 0.25 * r.d *
-         (is_ggx() ? microfacet::ggx_g1_over_cos(r.cos_i, a)
-                   : microfacet::beckmann_exact_g1_over_cos(r.cos_i, a));
+template <class S>
+S RoughConductor::density(const Reflection<S>& r) const {
+  if constexpr (std::is_same_v<S, double>) {
+    if (!is_ggx()) {
+      return 0.25 * r.d * microfacet::beckmann_exact_g1_over_cos(r.cos_i, alpha<double>());
+    }
+  }
+  return 0.25 * r.d * masking_over_cos(r.cos_i);
+}
+
+void RoughConductor::eval_with_pdf_each(std::span<const Evaluation> evaluations) const {
+  if (!is_ggx()) return Bsdf::eval_with_pdf_each(evaluations);
+  wide::for_blocks(evaluations.size(), [&](size_t first, size_t last) {
+    const auto vectors = [&](const Vec3d* Evaluation::*of) {
+      return wide::gather_vectors(
+          [&](int i) { return evaluations[std::min(first + i, last - 1)].*of; });
+    };
+    const Reflection<wide::Doubles> r =
+        reflect(vectors(&Evaluation::n), vectors(&Evaluation::wi), vectors(&Evaluation::wo));
+    const Rgb<wide::Doubles> f = evaluate(r);
+    const wide::Doubles pdf = density(r);
+    for (size_t i = first; i < last; ++i) {
+      const int k = static_cast<int>(i - first);
+      const bool seen = r.cos_i[k] > 0 && r.cos_o[k] > 0;
+      *evaluations[i].value = seen ? BsdfValue{{f.r[k], f.g[k], f.b[k]}, pdf[k]} : BsdfValue{};
+    }
+  });
 }
 
 std::optional<Vec3d> RoughConductor::sample(const Vec3d& n, const Vec3d& wi, double u1,
@@ -161,11 +201,30 @@ std::optional<Vec3d> RoughConductor::sample(const Vec3d& n, const Vec3d& wi, dou
   if (!(dot(n, wi) > 0)) return std::nullopt;
   const Frame frame(n);
   const Vec3d v = frame.to_local(wi);
-  const Vec3d h = is_ggx() ? microfacet::ggx_sample_visible(v, alpha<double>(), u1, u2)
-                           : microfacet::beckmann_sample_visible(v, alpha<double>(), u1, u2);
-  const Vec3d wo = normalize(frame.to_world(h * (2 * dot(v, h)) - v));
+  const Vec3d wo = mirrored(frame, v,
+                            is_ggx() ? microfacet::ggx_visible(v, alpha<double>(), u1, u2)
+                                     : microfacet::beckmann_visible(v, alpha<double>(), u1, u2));
   if (!(dot(n, wo) > 0)) return std::nullopt;
   return wo;
+}
+
+void RoughConductor::sample_each(std::span<const Draw> draws) const {
+  if (!is_ggx()) return Bsdf::sample_each(draws);
+  wide::for_blocks(draws.size(), [&](size_t first, size_t last) {
+    const auto draw = [&](int i) -> const Draw& { return draws[std::min(first + i, last - 1)]; };
+    const auto number = [&](int k) { return wide::gather([&](int i) { return draw(i).u[k]; }); };
+    const wide::Vec n = wide::gather_vectors([&](int i) { return draw(i).n; });
+    const wide::Vec wi = wide::gather_vectors([&](int i) { return draw(i).wi; });
+    const FrameOf<wide::Doubles> frame(n);
+    const wide::Vec v = frame.to_local(wi);
+    const wide::Vec wo =
+        mirrored(frame, v, microfacet::ggx_visible(v, alpha<double>(), number(0), number(1)));
+    const wide::Doubles cos_o = dot(n, wo);
+    for (size_t i = first; i < last; ++i) {
+      const int k = static_cast<int>(i - first);
+      *draws[i].wo = v.z[k] > 0 && cos_o[k] > 0 ? wide::lane(wo, k) : Vec3d{};
+    }
+  });
 }
 
 LobeSummary RoughConductor::lobe() const {

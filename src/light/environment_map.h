@@ -104,7 +104,11 @@ EnvironmentMap::Place<S> EnvironmentMap::locate(const Vec3<S>& d) const {
   using std::sqrt;
   const S x = angle_of(d.x, -d.z) * (width_ / (2 * kPi)) - 0.5;
   const S y = angle_of(sqrt(d.x * d.x + d.z * d.z), d.y) * ((height_ - 1) / kPi);
-  return {value(x) < 0 ? S(x + static_cast<double>(width_)) : x, y};
+  if constexpr (std::is_same_v<S, wide::Doubles>) {
+    return {select(x < 0, x + width_, x), y};
+  } else {
+    return {value(x) < 0 ? S(x + static_cast<double>(width_)) : x, y};
+  }
 }
 
 template <class S>

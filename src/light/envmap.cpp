@@ -35,6 +35,11 @@ class MapEnvironment final : public Environment {
     map_->fetch(place);
     return {place.x, place.y};
   }
+  void find_each(std::span<const Found> found) const override;
+  Rgb<double> radiance_at(const Vec3d& d, const std::array<double, 2>& place) const override {
+    DCHECK(is_place(d, place));
+    return map_->radiance<double>({place[0], place[1]}) * scale_.v;
+  }
   void look(const Vec3d& d, const std::array<double, 2>& place,
             Sight<double>& sight) const override {
     look(d, {place[0], place[1]}, scale_.v, sight);
@@ -103,9 +108,17 @@ class MapEnvironment final : public Environment {
   template <class S>
   void look(const Vec3d& d, const EnvironmentMap::Place<double>& place, const S& scale,
             Sight<S>& sight) const {
-    DCHECK(find(d) == (std::array<double, 2>{place.x, place.y}));
+    DCHECK(is_place(d, {place.x, place.y}));
     sight.radiance = map_->radiance(place) * scale;
     sight.pdf = map_->pdf_solid_angle(place, map_from_world(d));
+  }
+  // To rounding.
+  [[maybe_unused]] bool is_place(const Vec3d& d, const std::array<double, 2>& place) const {
+    const Vec3d v = map_from_world(d);
+    const auto there = map_->locate(v);
+    const double columns = std::remainder(place[0] - there.x, map_->width());
+    return std::fabs(columns) * std::hypot(v.x, v.z) < 1e-9 * map_->width() &&
+           std::fabs(place[1] - there.y) < 1e-9 * map_->height();
   }
   template <class S>
   Vec3<S> map_from_world(const Vec3<S>& d) const {
@@ -132,6 +145,19 @@ void MapEnvironment::sample_directions(std::span<const Numbers> u, std::span<Dra
     for (size_t i = first; i < last; ++i) {
       const int k = static_cast<int>(i - first);
       drawn[i] = {wide::lane(w, k), map.pdf[k], {map.place.x[k], map.place.y[k]}};
+    }
+  });
+}
+
+void MapEnvironment::find_each(std::span<const Found> found) const {
+  wide::for_blocks(found.size(), [&](size_t first, size_t last) {
+    const wide::Vec d =
+        wide::gather_vectors([&](int i) { return found[std::min(first + i, last - 1)].d; });
+    const auto place = map_->locate(map_from_world(d));
+    for (size_t i = first; i < last; ++i) {
+      const int k = static_cast<int>(i - first);
+      map_->fetch({place.x[k], place.y[k]});
+      *found[i].place = {place.x[k], place.y[k]};
     }
   });
 }

@@ -7,6 +7,7 @@
 
 #include "limn/core/check.h"
 #include "limn/core/renew.h"
+#include "src/base/wide.h"
 
 namespace limn {
 namespace {
@@ -77,11 +78,17 @@ double Lights::estimate(size_t light, const Vec3d& p) const {
     const auto arrival = all_[light]->delta()->arriving(p);
     return arrival ? std::fabs(luminance(arrival->irradiance)) : 0;
   }
-  const Reach& reach = reaches_[light];
+  return estimate(reaches_[light], p);
+}
+
+template <class S>
+S Lights::estimate(const Reach& reach, const Vec3<S>& p) {
+  using std::max, std::sqrt;
   if (reach.luminance == 0) return reach.constant;
-  const Vec3d to = p - reach.center;
-  const double squared = length_squared(to);
-  const double shown = squared > 0 ? std::max(dot(reach.facing, to), 0.0) / std::sqrt(squared) : 0;
+  const Vec3<S> to = p - reach.center;
+  const S squared = length_squared(to);
+  constexpr double kTiny = 1e-300;  // at the very center `shown` is 0
+  const S shown = max(dot(reach.facing, to), S(0.0)) / sqrt(squared + kTiny);
   return reach.constant +
          std::fabs(reach.luminance) * (shown + reach.rest) / (squared + reach.spread);
 }
@@ -96,6 +103,38 @@ Lights::Place Lights::at(const Vec3d& p) const {
   }
   if (!std::isfinite(place.sum)) place.sum = 0;
   return place;
+}
+
+void Lights::at(std::span<const Vec3d* const> p, std::span<Place* const> places) const {
+  if (chosen_by_) {
+    chosen_by_->at(p, places);
+    return;
+  }
+  if (all_.size() < 2) {
+    for (size_t i = 0; i < p.size(); ++i) *places[i] = Place{*p[i]};
+    return;
+  }
+  wide::for_blocks(p.size(), [&](size_t first, size_t last) {
+    const auto of = [&](int i) { return p[std::min(first + i, last - 1)]; };
+    const wide::Vec points = wide::gather_vectors(of);
+    Place some[wide::kWidth];
+    for (size_t k = 0; k < all_.size(); ++k) {
+      const auto of_light = [&] {
+        if (k < reaches_.size()) return estimate(reaches_[k], points);
+        return wide::gather([&](int i) { return estimate(k, *of(i)); });
+      }();
+      for (int i = 0; i < wide::kWidth; ++i) {
+        if (k < some[i].first.size()) some[i].first[k] = of_light[i];
+        some[i].sum += of_light[i];
+      }
+    }
+    for (size_t i = first; i < last; ++i) {
+      Place& place = some[i - first];
+      if (!std::isfinite(place.sum)) place.sum = 0;
+      place.p = *p[i];
+      *places[i] = place;
+    }
+  });
 }
 
 double Lights::choices(const Place& place, size_t light) const {

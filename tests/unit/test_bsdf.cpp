@@ -233,6 +233,60 @@ TEST(Bsdf, SeparateAndJointCallsAgree) {
   }
 }
 
+// To rounding those of calls for one; to the bit, however many go beside them.
+TEST(Bsdf, CallsForManyAgreeWithCallsForOne) {
+  struct Asked {
+    Vec3d n, wi, wo;
+    std::array<double, 2> u;
+    BsdfValue value;
+    Vec3d drawn;
+  };
+  Rng rng(5, 6, 7);
+  for (const BsdfCase& c : test::bsdf_cases(true)) {
+    std::vector<Asked> all(21);
+    for (Asked& a : all) {
+      a.n = around({0, 0, 1}, kPi * rng.uniform(), 2 * kPi * rng.uniform());
+      a.wi = around(a.n, 1.5 * rng.uniform(), 1);
+      a.u = {rng.uniform(), rng.uniform()};
+      a.wo = rng.uniform() < 0.2 ? around(a.n, kPi * rng.uniform(), 3)
+                                 : c.bsdf->sample(a.n, a.wi, a.u[0], a.u[1]).value_or(-a.n);
+    }
+    // count of them from `first` on.
+    const auto ask = [&](size_t first, size_t count) {
+      std::vector<Bsdf::Evaluation> evaluations;
+      std::vector<Bsdf::Draw> draws;
+      for (size_t i = first; i < first + count; ++i) {
+        Asked& a = all[i];
+        evaluations.push_back({&a.n, &a.wi, &a.wo, &a.value});
+        draws.push_back({&a.n, &a.wi, a.u.data(), &a.drawn});
+      }
+      c.bsdf->eval_with_pdf_each(evaluations);
+      c.bsdf->sample_each(draws);
+    };
+    ask(0, all.size());
+    const std::vector<Asked> together = all;
+    for (const size_t count : {1, 3}) {
+      for (size_t first = 0; first < all.size(); first += count) ask(first, count);
+      for (size_t i = 0; i < all.size(); ++i) {
+        for (int k = 0; k < 3; ++k) EXPECT_EQ(all[i].value.value[k], together[i].value.value[k]);
+        EXPECT_EQ(all[i].value.pdf, together[i].value.pdf);
+        EXPECT_EQ(all[i].drawn, together[i].drawn);
+      }
+    }
+    // A half vector loses what the roughness magnifies.
+    const double rounding = 1e-14 / c.alpha;
+    for (const Asked& a : all) {
+      const BsdfValue alone = c.bsdf->eval_with_pdf(a.n, a.wi, a.wo);
+      for (int k = 0; k < 3; ++k) {
+        EXPECT_NEAR(a.value.value[k], alone.value[k], rounding * alone.value[k]) << c.name;
+      }
+      EXPECT_NEAR(a.value.pdf, alone.pdf, rounding * alone.pdf) << c.name;
+      const Vec3d drawn = c.bsdf->sample(a.n, a.wi, a.u[0], a.u[1]).value_or(Vec3d{});
+      EXPECT_LT(length(a.drawn - drawn), 1e-13) << c.name;
+    }
+  }
+}
+
 TEST(Bsdf, IsReciprocal) {
   Rng rng(1, 1, 1);
   const Vec3d n = normalize(Vec3d{-1, 2, 0.5});

@@ -46,6 +46,34 @@ TEST(Environment, MapIsOrientedAsInMitsuba) {
   EXPECT_NEAR(map->radiance(Vec3d{0, -1, 0}).b, 32, 1e-12);
 }
 
+// To rounding; to the bit, however many go beside a direction. Radiance there is that of the
+// direction.
+TEST(Environment, DirectionsFoundAtOnceAreThoseAlone) {
+  const auto map = make_envmap(compass());
+  Rng rng(3, 4, 5);
+  std::vector<Vec3d> directions{{0, 0, -1}, {0, 1, 0}, {0, -1, 0}, {1, 0, 0}};
+  while (directions.size() < 21) {
+    directions.push_back(test::map_direction(rng.uniform(), rng.uniform()));
+  }
+  const auto find = [&](size_t first, size_t count) {
+    std::vector<std::array<double, 2>> places(count);
+    std::vector<Environment::Found> found;
+    for (size_t i = 0; i < count; ++i) found.push_back({&directions[first + i], &places[i]});
+    map->find_each(found);
+    return places;
+  };
+  const auto together = find(0, directions.size());
+  for (size_t i = 0; i < directions.size(); ++i) {
+    EXPECT_EQ(find(i, 1)[0], together[i]);
+    const auto alone = map->find(directions[i]);
+    EXPECT_NEAR(std::remainder(together[i][0] - alone[0], 64), 0, 1e-12);
+    EXPECT_NEAR(together[i][1], alone[1], 1e-12);
+    const Rgb<double> there = map->radiance_at(directions[i], together[i]);
+    const Rgb<double> radiance = map->radiance(directions[i]);
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(there[c], radiance[c], 1e-10);
+  }
+}
+
 TEST(Environment, TexelCentresGiveTexels) {
   const Image image = compass();
   const auto map = make_envmap(image);

@@ -178,6 +178,45 @@ TEST(Lights, DrawnAtOnceAreThoseDrawnAlone) {
   }
 }
 
+// To rounding, lights of every kind and more than are kept of a place; to the bit, however many
+// places go beside one, also right in a lamp's center.
+TEST(Lights, PlacesAtOnceAreThoseAlone) {
+  const TempFiles files;
+  std::string body = R"(<emitter type="constant"/><emitter type="point"/>)";
+  for (int i = 0; i < 4; ++i) {
+    body += square("lamp" + std::to_string(i), 1, 90, {i - 2.0, 3, 0},
+                   area_light("glow" + std::to_string(i), "2, 1, 1"));
+  }
+  const Scene scene = scene_with(files, body);
+  const Lights lights(scene), by_others(scene, &lights);
+  std::vector<Vec3d> points{{-2, 3, 0}};
+  for (int i = 0; i < 12; ++i) points.push_back({0.1 * i, 0.4 * i, 0.2});
+  for (const Lights* const asked : {&lights, &by_others}) {
+    const auto at_once = [&](size_t first, size_t count) {
+      std::vector<Lights::Place> found(count);
+      std::vector<const Vec3d*> p;
+      std::vector<Lights::Place*> places;
+      for (size_t i = 0; i < count; ++i) {
+        p.push_back(&points[first + i]);
+        places.push_back(&found[i]);
+      }
+      asked->at(p, places);
+      return found;
+    };
+    const auto together = at_once(0, points.size());
+    for (size_t i = 0; i < points.size(); ++i) {
+      const Lights::Place single = at_once(i, 1)[0], plain = asked->at(points[i]);
+      EXPECT_EQ(together[i].p, points[i]);
+      EXPECT_EQ(together[i].sum, single.sum);
+      EXPECT_EQ(together[i].first, single.first);
+      EXPECT_NEAR(single.sum, plain.sum, 1e-14 * plain.sum);
+      for (size_t k = 0; k < 4; ++k) {
+        EXPECT_NEAR(single.first[k], plain.first[k], 1e-14 * plain.first[k]);
+      }
+    }
+  }
+}
+
 // By irradiance on a surface that faces them: 1 / d^2 of points, the closed form of a small lamp from
 // its front, nothing from its back. What is expected to send nothing is drawn now and then.
 TEST(Lights, AreDrawnByWhatTheySend) {

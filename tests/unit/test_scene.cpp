@@ -131,6 +131,25 @@ TEST(SceneCamera, FovAxes) {
   }
 }
 
+// To rounding; to the bit, however many go beside a ray.
+TEST(SceneCamera, RaysFoundAtOnceAreThoseAlone) {
+  const CameraView<double> camera(with_sensor("").camera);
+  std::vector<Camera::FilmPoint<double>> positions;
+  for (int i = 0; i < 19; ++i) positions.push_back({31.7 * i, 5.3 * i - 10});
+  std::vector<CameraRay<double>> rays(positions.size()), one(1);
+  find_rays(camera, positions, rays);
+  for (size_t i = 0; i < rays.size(); ++i) {
+    const CameraRay<double> alone = camera.ray(positions[i].x, positions[i].y);
+    EXPECT_EQ(rays[i].origin, alone.origin);
+    EXPECT_LT(length(rays[i].direction - alone.direction), 1e-15);
+    EXPECT_NEAR(rays[i].t_min / alone.t_min, 1, 1e-15);
+    EXPECT_NEAR(rays[i].t_max / alone.t_max, 1, 1e-15);
+    find_rays(camera, {&positions[i], 1}, one);
+    EXPECT_EQ(one[0].direction, rays[i].direction);
+    EXPECT_EQ(one[0].t_max, rays[i].t_max);
+  }
+}
+
 TEST(SceneCamera, FocalLengthIsMeasuredAlongTheDiagonal) {
   const Camera by_default = with_sensor("").camera;
   const Camera c = with_sensor("<string name=\"focal_length\" value=\"50\"/>").camera;

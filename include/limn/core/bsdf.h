@@ -54,6 +54,20 @@ class Bsdf {
   virtual std::optional<Vec3d> sample(const Vec3d& n, const Vec3d& wi, double u1,
                                       double u2) const = 0;
 
+  // The same for many at once, some of them side by side. What one comes to does not depend on the
+  // others; it may differ from the above in rounding.
+  struct Evaluation {
+    const Vec3d *n, *wi, *wo;
+    BsdfValue* value;
+  };
+  virtual void eval_with_pdf_each(std::span<const Evaluation> evaluations) const;
+  struct Draw {
+    const Vec3d *n, *wi;
+    const double* u;  // two numbers in [0, 1)
+    Vec3d* wo;        // zero: none
+  };
+  virtual void sample_each(std::span<const Draw> draws) const;
+
   // The BSDF that acts on the front or on the back; null if that side is black. The back is then
   // treated as a front with reversed normals.
   virtual const Bsdf* side(bool front) const { return front ? this : nullptr; }

@@ -1,6 +1,8 @@
 #pragma once
 // The pinhole camera of Mitsuba 3: camera space has +X to the left of the image, +Y up, +Z along
 // the view.
+#include <span>
+
 #include "limn/core/dual.h"
 #include "limn/core/vec.h"
 
@@ -85,13 +87,20 @@ class CameraView {
   template <class X>
   CameraRay<S> ray(const X& x, const X& y) const {
     const Camera& c = camera_;
-    const X sx = 1.0 - 2.0 * (x / static_cast<double>(c.width) + c.offset_x);
-    const X sy = (1.0 - 2.0 * (y / static_cast<double>(c.height) + c.offset_y)) *
-                 static_cast<double>(c.height) / static_cast<double>(c.width);
-    const Vec3<S> d = left_ * (tan_x_ * sx) + up_ * (tan_x_ * sy) + forward_;
+    const auto d = towards(x, y);
     const double d_length = length(value(d));
     return {origin_, normalize(d), c.near_clip * d_length, c.far_clip * d_length};
   }
+  // Its direction, of depth 1.
+  template <class X>
+  Vec3<Product<S, X>> towards(const X& x, const X& y) const {
+    const Camera& c = camera_;
+    const X sx = 1.0 - 2.0 * (x / static_cast<double>(c.width) + c.offset_x);
+    const X sy = (1.0 - 2.0 * (y / static_cast<double>(c.height) + c.offset_y)) *
+                 static_cast<double>(c.height) / static_cast<double>(c.width);
+    return left_ * (tan_x_ * sx) + up_ * (tan_x_ * sy) + forward_;
+  }
+  const Camera& camera() const { return camera_; }
 
   // The direction of ray(x + dx, y + dy) is that of a + dx u + dy v, whose depth is 1.
   struct Plane {
@@ -131,5 +140,9 @@ template <class S>
 Camera::FilmPoint<S> Camera::project(const Vec3<S>& point) const {
   return CameraView<S>(*this).project(point);
 }
+
+// The rays through many positions, eight at a time.
+void find_rays(const CameraView<double>& view, std::span<const Camera::FilmPoint<double>> positions,
+               std::span<CameraRay<double>> rays);
 
 }  // namespace limn

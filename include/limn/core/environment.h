@@ -38,6 +38,19 @@ class Environment : public Light {
   // Where a unit direction lies, in an environment's own terms (see LightSample). What `look` reads
   // there is asked for, so that it is at hand some work later.
   virtual std::array<double, 2> find(const Vec3d& /*d*/) const { return {}; }
+  // The same for many at once, some of them side by side. What one comes to does not depend on the
+  // others; it may differ from the above in rounding.
+  struct Found {
+    const Vec3d* d;
+    std::array<double, 2>* place;
+  };
+  virtual void find_each(std::span<const Found> found) const {
+    for (const Found& f : found) *f.place = find(*f.d);
+  }
+  // `radiance` of a direction that has been found.
+  virtual Rgb<double> radiance_at(const Vec3d& d, const std::array<double, 2>& /*place*/) const {
+    return radiance(d);
+  }
   // Radiance from a unit direction that is held, and its density, found at once. place: that of
   // `find`.
   template <class S>

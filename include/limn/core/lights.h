@@ -34,6 +34,8 @@ class Lights {
     std::array<double, 4> first{};  // of the first lights, each by itself; how many is not tuned
   };
   Place at(const Vec3d& p) const;
+  // Eight at a time.
+  void at(std::span<const Vec3d* const> p, std::span<Place* const> places) const;
   // About what a surface at p that faces a light (its number in all()) would get from it, if
   // nothing were in the way [W / m^2, of luminance].
   double estimate(size_t light, const Vec3d& p) const;
@@ -79,6 +81,8 @@ class Lights {
     double constant = 0;   // irradiance, alike everywhere
   };
   static Reach reach_of(const Light& lamp);
+  template <class S>
+  static S estimate(const Reach& reach, const Vec3<S>& p);
   double estimate(size_t light, const Place& place) const {
     return light < place.first.size() ? place.first[light] : estimate(light, place.p);
   }

@@ -97,9 +97,11 @@ class Scattering {
     if constexpr (!std::is_same_v<S, double>) {
       if (!still_) return {eval(wo), pdf_solid_angle(wo)};
     }
-    const double factor = limited_ ? value(horizon_factor(wo)) : 1.0;
-    const BsdfValue f = bsdf_->eval_with_pdf(value(n_), value(wi_), wo);
-    const Rgb<double> c = f.value * factor;
+    return limited(wo, bsdf_->eval_with_pdf(value(n_), value(wi_), wo));
+  }
+  // The same from what the BSDF has there.
+  Evaluation limited(const Vec3d& wo, const BsdfValue& f) const {
+    const Rgb<double> c = f.value * (limited_ ? horizon_value(wo) : 1.0);
     return {{S(c.r), S(c.g), S(c.b)}, f.pdf};
   }
   std::optional<Vec3d> sample(double u1, double u2) const {

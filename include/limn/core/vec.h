@@ -97,18 +97,21 @@ Vec3<T> cast(const Vec3<S>& a) {
 
 // Two unit vectors that complete the unit vector n to a right-handed frame (Duff et al. 2017).
 // Not continuous in n: only for choices whose outcome is not differentiated.
-struct Frame {
-  Vec3d s, t, n;
-  explicit Frame(const Vec3d& normal) : n(normal) {
-    const double sign = std::copysign(1.0, n.z);
-    const double a = -1.0 / (sign + n.z);
-    const double b = n.x * n.y * a;
+template <class S>
+struct FrameOf {
+  Vec3<S> s, t, n;
+  explicit FrameOf(const Vec3<S>& normal) : n(normal) {
+    using std::copysign;
+    const S sign = copysign(S(1.0), n.z);
+    const S a = -1.0 / (sign + n.z);
+    const S b = n.x * n.y * a;
     s = {1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x};
     t = {b, sign + n.y * n.y * a, -n.y};
   }
-  Vec3d to_world(const Vec3d& v) const { return s * v.x + t * v.y + n * v.z; }
-  Vec3d to_local(const Vec3d& v) const { return {dot(s, v), dot(t, v), dot(n, v)}; }
+  Vec3<S> to_world(const Vec3<S>& v) const { return s * v.x + t * v.y + n * v.z; }
+  Vec3<S> to_local(const Vec3<S>& v) const { return {dot(s, v), dot(t, v), dot(n, v)}; }
 };
+using Frame = FrameOf<double>;
 
 // Linear Rec.709 colour: radiance [W / (m^2 sr)], reflectance or throughput, per channel.
 template <class S>

@@ -1,0 +1,26 @@
+// Camera rays, eight at a time.
+#include <algorithm>
+
+#include "limn/core/camera.h"
+#include "src/base/wide.h"
+
+namespace limn {
+
+void find_rays(const CameraView<double>& view, std::span<const Camera::FilmPoint<double>> positions,
+               std::span<CameraRay<double>> rays) {
+  const Camera& camera = view.camera();
+  wide::for_blocks(positions.size(), [&](size_t first, size_t last) {
+    const auto at = [&](int i) { return positions[std::min(first + i, last - 1)]; };
+    const auto d = view.towards(wide::gather([&](int i) { return at(i).x; }),
+                                wide::gather([&](int i) { return at(i).y; }));
+    const wide::Doubles size = length(d);
+    const wide::Vec unit = d * (1 / size);
+    for (size_t i = first; i < last; ++i) {
+      const int k = static_cast<int>(i - first);
+      rays[i] = {view.origin(), wide::lane(unit, k), camera.near_clip * size[k],
+                 camera.far_clip * size[k]};
+    }
+  });
+}
+
+}  // namespace limn
