@@ -148,9 +148,9 @@ class BatchRunner {
     for (const Chunk& chunk : chunks) {
       for (const auto& [number, sample] : chunk.samples) {
         splat(slot, sample, scale);
-        cost.largest.add(
-            SampleSink::squared_magnitude(sample.value, scale, estimator_.lanes(), lane_scale_),
-            {-1, -1, static_cast<int64_t>(number), ""});
+        cost.largest.add(SampleSink::squared_magnitude(own_value(sample), scale, estimator_.lanes(),
+                                                       lane_scale_),
+                         {-1, -1, static_cast<int64_t>(number), ""});
       }
       cost.merge(chunk.cost);
       sums_.non_finite.merge(chunk.bad);
@@ -164,7 +164,7 @@ class BatchRunner {
     for (size_t i = first; i < last; ++i) {
       FilmSample sample;
       if (!sample_film(estimator_, slot, batch_.seed, batch, i, rays, sample)) continue;
-      if (is_finite(sample.value)) {
+      if (is_finite(sample.value) && is_finite(sample.along_x) && is_finite(sample.along_y)) {
         chunk.samples.emplace_back(batch.first + i, sample);
       } else {
         chunk.bad.add({-1, -1, static_cast<int64_t>(batch.first + i), estimator_.slot_name(slot)});
@@ -178,10 +178,22 @@ class BatchRunner {
   // Adds a sample to the pixels whose filters reach it.
   void splat(size_t slot, const FilmSample& sample, double scale) {
     for_every_pixel_of(film_, sample.x, sample.y, [&](int x, int y, double weight) {
-      const FilmMotion* motion = estimator_.film_motion(x, y);
-      add(slot, pixel_index(film_, x, y), motion ? sample.value_for(*motion) : sample.value,
-          weight * scale);
+      add(slot, pixel_index(film_, x, y), value_for(x, y, sample), weight * scale);
     });
+  }
+
+  Rgb<Lanes> value_for(int x, int y, const FilmSample& sample) const {
+    const FilmMotion* motion = estimator_.film_motion(x, y);
+    return motion ? sample.value_for(tapered(*motion, film_, x, y, sample.x, sample.y))
+                  : sample.value;
+  }
+  // Of the pixel that it lies in, or the nearest to it.
+  Rgb<Lanes> own_value(const FilmSample& sample) const {
+    const auto nearest = [](double at, int first, int count) {
+      return std::clamp(static_cast<int>(std::floor(at)), first, first + count - 1);
+    };
+    return value_for(nearest(sample.x, film_.crop_x, film_.crop_width),
+                     nearest(sample.y, film_.crop_y, film_.crop_height), sample);
   }
 
   void add(size_t slot, size_t index, const Rgb<Lanes>& value, double weight) {

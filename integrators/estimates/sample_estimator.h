@@ -2,6 +2,8 @@
 // The contract of what a run estimates: what one sample of a pixel adds, and what one sample of the
 // film as a whole adds. Batches, tiles, threads, sums, progress and interruption are the same for
 // all estimators and stand in batches.h.
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -10,6 +12,7 @@
 
 #include "integrators/estimates/tiles.h"
 #include "limn/core/dual.h"
+#include "limn/core/film.h"
 #include "limn/core/rng.h"
 #include "limn/core/scene.h"
 #include "limn/integrators/run.h"
@@ -30,11 +33,32 @@ struct KeyedSample {
 // So many of them are worked on together at most, but for estimators that say otherwise.
 inline constexpr size_t kMostTogether = 16;
 
-// How the positions of a pixel's samples on the film move [pixels per unit of the parameter], see
-// film_motion.h.
+// How the positions of a pixel's samples on the film move [pixels per unit of the parameter]: by
+// `tapered`, see terms/filter.cpp.
 struct FilmMotion {
   Lanes x, y;
 };
+// Where a filter ends at once, a box or one that the film's border cuts, positions come to rest: over
+// so many pixels. What lies on the end itself, as an edge at rest may, is seen from both sides of
+// it by rounding alone. Not tuned.
+inline constexpr double kTaper = 1.0 / 16;
+// Whether a pixel's filter ends at once at this offset, an end of its range.
+inline bool ends_at_once(const Filter& filter, double end) {
+  return filter.kind == Filter::Kind::kBox || std::fabs(end) < filter.radius;
+}
+// 1 but near such ends, where it falls to 0.
+inline double taper(const Filter& filter, const Film::Range& range, double offset) {
+  double result = 1;
+  if (ends_at_once(filter, range.lower)) result = std::min(result, (offset - range.lower) / kTaper);
+  if (ends_at_once(filter, range.upper)) result = std::min(result, (range.upper - offset) / kTaper);
+  return std::max(result, 0.0);
+}
+// How the film position (x, y) moves for the pixel (px, py).
+inline FilmMotion tapered(const FilmMotion& motion, const Film& film, int px, int py, double x,
+                          double y) {
+  return {motion.x * taper(film.filter, film.range_x(px), x - (px + 0.5)),
+          motion.y * taper(film.filter, film.range_y(py), y - (py + 0.5))};
+}
 
 // Of a pixel of the full film; null where its positions are held.
 using FilmMotionAt = std::function<const FilmMotion*(int x, int y)>;

@@ -85,8 +85,7 @@ constexpr double kLeastSamples = 0.125;
 constexpr double kFilmConvincing = 0.9;
 
 constexpr int kHeldSamples = 6;  // of the pilot that this is compared with; not tuned
-// Samples per pixel, and the share of the time that one set-up takes, of runs that are long enough
-// for more estimators. Not tuned.
+// Of runs long enough for more estimators: samples, and a set-up's share of the time; not tuned.
 constexpr int kLongRun = 256;
 constexpr double kSetupShare = 1.0 / 32;
 
@@ -251,9 +250,9 @@ class TermJob {
       for (size_t t = 0; t < types_.size(); ++t) {
         means[t] += plan.uniform[t] / static_cast<double>(passes_.size());
       }
-      add_pixel_samples(plan, result);
       if (!options_.samples && !plan.film.empty()) describe_film(plan.film, result);
-      pass(p).set_plan(std::move(plan));
+      pass(p).set_plan(plan);
+      add_pixel_samples(pass(p), plan, result);
     }
     for (size_t t = 0; t < types_.size(); ++t) result.terms[t].samples = means[t];
     if (result.pilot_spp > 0) result.stats.setup.emplace_back("pilot", pilot_watch.seconds());
@@ -301,11 +300,12 @@ class TermJob {
     result.spp += samples;
   }
 
-  void add_pixel_samples(const SamplePlan& plan, GradientResult& result) const {
+  void add_pixel_samples(const TermEstimator& estimator, const SamplePlan& plan,
+                         GradientResult& result) const {
     const Film& film = scene_.film;
     if (plan.counts.empty()) return;
     for (size_t t = 0; t < types_.size(); ++t) {
-      if (!computed_[t] || !pass(0).adds_to_pixels(t)) continue;
+      if (!computed_[t] || !estimator.adds_to_pixels(t)) continue;
       std::vector<float>& samples = result.terms[t].pixel_samples;
       samples.resize(film_size(film) / 3);
       for (size_t i = 0; i < samples.size(); ++i) {
@@ -374,7 +374,8 @@ class TermJob {
                       const Stopwatch& watch) const {
     TermEstimator& estimator = pass(p);
     const int spp = film_pilot_samples(settings.spp);
-    if (spp == 0 || !can_move_film() || estimator.motion_rates().still()) {
+    if (spp == 0 || !can_move_film() || method_.random_directions ||
+        estimator.motion_rates().still()) {
       return {};
     }
     if (estimator.lanes() <= kMostFilmParameters) {
@@ -408,9 +409,8 @@ class TermJob {
 
   std::vector<Parameter> parameters_of(size_t p) const {
     std::vector<Parameter> parameters;
-    for (int k = 0; k < pass(p).lanes(); ++k) {
+    for (int k = 0; k < pass(p).lanes(); ++k)
       parameters.push_back(find_parameter(scene_, options_.parameters[p * kLanes + k]));
-    }
     return parameters;
   }
 

@@ -25,7 +25,7 @@ std::vector<DirectionField> random_fields(size_t count, const TermEstimator& est
 
 std::vector<FilmMotion> random_motions(size_t count, const TermEstimator& estimator,
                                        uint64_t seed) {
-  constexpr uint64_t kStream = 0xf117;  // any number
+  constexpr uint64_t kStream = 0xf1e2d;  // any number
   const Lanes steps = estimator.lane_scale();
   const double speed = film_speed(estimator);
   std::vector<FilmMotion> motions(count);

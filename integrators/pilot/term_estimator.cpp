@@ -383,9 +383,12 @@ TermEstimator::PathCosts TermEstimator::trace(std::span<const Place> places,
     const PixelSample& at = places[i].at;
     FilmPosition film = sample_pixel_filter(scene_.film, filter_, at.x, at.y, walks[i].key);
     if (places[i].mirrored) film = mirrored_in_pixel(scene_.film, at.x, at.y, film);
-    const FilmMotion* motion = plan_.film_motion(at.x, at.y);
-    const auto ray = motion ? camera_.ray(Dual(film.x, motion->x), Dual(film.y, motion->y))
-                            : camera_.ray(film.x, film.y);
+    const auto ray = [&] {
+      const FilmMotion* motion = plan_.film_motion(at.x, at.y);
+      if (!motion) return camera_.ray(film.x, film.y);
+      const FilmMotion here = tapered(*motion, scene_.film, at.x, at.y, film.x, film.y);
+      return camera_.ray(Dual(film.x, here.x), Dual(film.y, here.y));
+    }();
     starts[i] = {camera_ray(scene_, CameraRay<double>{value(ray.origin), value(ray.direction),
                                                       ray.t_min, ray.t_max}),
                  ray.origin, ray.direction};

@@ -65,9 +65,16 @@ class SpeedAgainstFilm {
     const auto square = [&](int x, int y) {
       Lanes along;
       if (const FilmMotion* m = motion_(x, y)) along = m->x * edge.nx + m->y * edge.ny;
-      Lanes fastest = larger(v0 - along, v1 - along);
-      for (int k = 0; k < kLanes; ++k) fastest[k] *= fastest[k];
-      return fastest;
+      const Lanes moving = larger(v0 - along, v1 - along), held = larger(v0, v1);
+      const bool rests = ends_at_once(film_.filter, film_.range_x(x).lower) ||
+                         ends_at_once(film_.filter, film_.range_x(x).upper) ||
+                         ends_at_once(film_.filter, film_.range_y(y).lower) ||
+                         ends_at_once(film_.filter, film_.range_y(y).upper);
+      Lanes result;
+      for (int k = 0; k < kLanes; ++k) {
+        result[k] = moving[k] * moving[k] + (rests ? kTaper * held[k] * held[k] : 0);
+      }
+      return result;
     };
     const auto [first_x, last_x] = pixels(x0, x1, film_.crop_x, film_.crop_width);
     const auto [first_y, last_y] = pixels(y0, y1, film_.crop_y, film_.crop_height);

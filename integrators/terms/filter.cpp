@@ -1,15 +1,16 @@
 // What moving positions on the film change in the pixels themselves. A pixel is the integral of
-// w f over the film, w its normalised filter, f the radiance there. Positions x may move with the
-// parameter, dx/dtheta = V, the same V for all of a pixel: the substitution changes no integral, so
-//   dI/dtheta = integral of w df/dtheta along (1, V)  +  integral of f V . grad w,
+// w f over the film, w its normalised filter, f the radiance there. Positions may move with the
+// parameter, dx/dtheta = V(x): the substitution changes no integral, so
+//   dI/dtheta = integral of w df/dtheta along (1, V)  +  integral of f div(w V),
 // where the first, edges included, is what the other terms add when the camera's rays move with x
-// and edges move with v - V. The second is this term. For V along x, with w = w_x w_y and w_x
-// rising up to its center and falling behind it, layer by layer:
+// and edges move with v - V. The second is this term. For a V along x, the same for all of a
+// pixel, with w = w_x w_y and w_x rising up to its center and falling behind it, layer by layer:
 //   integral of f dw_x/dx dx = w_x(0) * mean over u in [0, 1] of f(l(u)) - f(r(u)),
-// [l, r] being where w_x >= u w_x(0), cut by what the film has of it (where it ends, w_x falls at
-// once). Both paths of a pair take the same random numbers: the term is a difference of images a
-// pixel apart, without the bias of one. So where detail slides that is finer than a pixel, a V
-// that follows it leaves little noise.
+// [l, r] being where w_x >= u w_x(0), cut by what the film has of it. Where w_x ends at once V
+// comes to rest (FilmMotion), which is the mean over cuts d in [0, kTaper] before that end. Both
+// paths of a pair take the same random numbers: the term is a difference of images a pixel apart,
+// without the bias of one. So where detail slides that is finer than a pixel, a V that follows it
+// leaves little noise.
 #include "integrators/paths/camera_path.h"
 #include "integrators/paths/path_follow.h"
 #include "integrators/terms/term_table.h"
@@ -17,19 +18,37 @@
 namespace limn {
 namespace {
 
-// Where the filter, right of its center, is u of what it is there. u in [0, 1).
-double half_width(const Filter& filter, double u) {
+// Half the width of a layer, and its weight: the density of layers, uniform in u, over that of what
+// is drawn.
+struct Layer {
+  double half, weight = 1;
+};
+
+// A gaussian's layers are so few far out that single pixels would hardly ever meet the edges there
+// that other terms do: a tenth of them are drawn by width.
+Layer draw_gaussian(const Filter& filter, double u) {
+  constexpr double kByWidth = 0.1;  // not tuned
+  const double variance = filter.stddev * filter.stddev, radius = filter.radius;
+  const double floor = std::exp(-radius * radius / (2 * variance));
+  const double half =
+      u < kByWidth ? radius * (u / kByWidth)
+                   : std::sqrt(-2 * variance *
+                               std::log(floor + (u - kByWidth) / (1 - kByWidth) * (1 - floor)));
+  const double density = half / variance * std::exp(-half * half / (2 * variance)) / (1 - floor);
+  return {half, density / ((1 - kByWidth) * density + kByWidth / radius)};
+}
+
+// u in [0, 1).
+Layer draw_layer(const Filter& filter, double u) {
   switch (filter.kind) {
     case Filter::Kind::kBox:
-      return filter.radius;
+      return {filter.radius};
     case Filter::Kind::kTent:
-      return filter.radius * (1 - u);
+      return {filter.radius * (1 - u)};
     case Filter::Kind::kGaussian:
       break;
   }
-  const double variance = filter.stddev * filter.stddev;
-  const double floor = std::exp(-filter.radius * filter.radius / (2 * variance));
-  return std::sqrt(-2 * variance * std::log(floor + u * (1 - floor)));
+  return draw_gaussian(filter, u);
 }
 
 double weight_of(const Lanes& motion, const Lanes& scale) {
@@ -83,15 +102,18 @@ FilterTerm::Pair FilterTerm::draw(const MovedPixel& pixel) const {
   const auto columns = film_.range_x(pixel.at.x), rows = film_.range_y(pixel.at.y);
   const auto& along = is_x ? columns : rows;
   const auto& across = is_x ? rows : columns;
-  const double half = half_width(film_.filter, rng.uniform());
+  const Layer layer = draw_layer(film_.filter, rng.uniform());
   const double other = filter_.quantile(across.lower, across.upper, rng.uniform());
+  const double cut = kTaper * rng.uniform();
+  const double lower = along.lower + (ends_at_once(film_.filter, along.lower) ? cut : 0);
+  const double upper = along.upper - (ends_at_once(film_.filter, along.upper) ? cut : 0);
   const auto place = [&](double offset) {
     const double x = is_x ? offset : other, y = is_x ? other : offset;
     return FilmPosition{pixel.at.x + 0.5 + x, pixel.at.y + 0.5 + y};
   };
-  const double peak = film_.filter.eval(0) /
+  const double peak = layer.weight * film_.filter.eval(0) /
                       (film_.filter.integral(along.upper) - film_.filter.integral(along.lower));
-  return {place(std::max(-half, along.lower)), place(std::min(half, along.upper)),
+  return {place(std::max(-layer.half, lower)), place(std::min(layer.half, upper)),
           (is_x ? pixel.motion.x * (peak / share_x) : pixel.motion.y * (peak / (1 - share_x)))};
 }
 

@@ -96,12 +96,55 @@ TEST(FilmMotion, TakesBackWhatItAdds) {
   }
 }
 
+// z-scores of single pixels: errors that neighbours take back are seen.
+void expect_same_pixels(const Scene& scene, const std::vector<std::string>& parameters,
+                        const std::string& method, const std::string& other, int spp) {
+  const GradientResult first = run_method(scene, parameters, method, spp, 1);
+  const GradientResult second = run_method(scene, parameters, other, spp, 2);
+  for (size_t k = 0; k < parameters.size(); ++k) {
+    const Moments &a = first.parameters[k].total, &b = second.parameters[k].total;
+    std::vector<double> z;
+    for (size_t i = 0; i < a.size(); i += 3) {
+      const double error = std::sqrt(a.variance(i) + b.variance(i));
+      if (error > 0)
+        z.push_back(normal_from_student((a.mean(i) - b.mean(i)) / error, a.batches() - 1));
+    }
+    const ZSummary summary = summarize(z);
+    EXPECT_GT(summary.count, 20) << parameters[k];
+    EXPECT_GE(summary.p_largest, 1e-6)
+        << method << " " << other << " " << parameters[k] << ": " << summary.largest;
+  }
+}
+
 TEST(FilmMotion, KeepsTheMean) {
   const TempFiles files;
   for (const char* filter : kFilters) {
     const Scene scene = scene_with(files, filter, 8);
     expect_same_mean(scene, {"ball.translate.x", "sensor.rotate.y"}, {"random-directions"}, 128);
-    expect_same_mean(scene, {"bulb.translate.x"}, {"adaptive"}, 128);
+  }
+}
+
+// Edges at rest right on pixels' borders, and on the film's, where filters end at once: rays see
+// either side of them by rounding.
+TEST(FilmMotion, RestsWhereFiltersEnd) {
+  const TempFiles files;
+  const double half_film = 6 * std::tan(20 * kPi / 180);
+  struct Case {
+    const char* filter;
+    double half, x;
+  };
+  for (const Case& of : {Case{kFilters[0], 0.8, -0.8}, Case{kFilters[0], 0.8, 0.8},
+                         Case{kFilters[0], half_film, 0}, Case{kFilters[2], half_film, 0}}) {
+    SceneParts parts;
+    parts.film = of.filter;
+    parts.width = parts.height = 8;
+    parts.origin = {0, 0, 6};
+    parts.target = {0, 0, 0};
+    parts.body = square("panel", of.half, 0, {of.x, 0, 0}, area_light("glow", "1, 1, 1")) +
+                 square("bar", 0.4, 0, {0.7, -0.3, 1}, area_light("lit", "3, 2, 1")) +
+                 constant_light("sky", "0.2, 0.3, 0.4");
+    expect_same_pixels(make_scene(files, parts), {"bar.translate.x"}, "random-directions", "forest",
+                       2048);
   }
 }
 
@@ -128,15 +171,28 @@ Mesh bars(int count) {
   return make_mesh(positions, faces);
 }
 
-TEST(FilmMotion, TakesOutDetailThatSlides) {
-  const TempFiles files;
+Scene fence_scene(const TempFiles& files, int size) {
   SceneParts parts;
-  parts.width = parts.height = 24;
+  parts.width = parts.height = size;
   parts.body = fence() + obj_shape("bars", write_mesh(files, "bars.obj", bars(60)), true, 1,
                                    {0, 0, 0.5}, diffuse("wood", "0.3, 0.2, 0.1"));
-  const Scene scene = make_scene(files, parts);
+  return make_scene(files, parts);
+}
+
+double share_that_moves(const GradientResult& result) {
+  double share = 0;
+  for (const MethodSetting& setting : result.settings) {
+    if (setting.name == "pixels whose positions move") share = std::get<double>(setting.value);
+  }
+  return share;
+}
+
+TEST(FilmMotion, TakesOutDetailThatSlides) {
+  const TempFiles files;
+  const Scene scene = fence_scene(files, 24);
   const auto variance_times_rays = [&](const std::string& method) {
     const GradientResult result = run_method(scene, {"bars.translate.x"}, method, 64, 3);
+    EXPECT_EQ(share_that_moves(result) > 0.5, method == "adaptive");
     uint64_t rays = 0;
     for (const auto& term : result.terms) rays += term.cost.rays;
     const Moments& total = result.parameters[0].total;
@@ -144,7 +200,36 @@ TEST(FilmMotion, TakesOutDetailThatSlides) {
     for (size_t i = 0; i < total.size(); ++i) sum += total.variance(i);
     return sum * static_cast<double>(rays);
   };
-  EXPECT_LT(2 * variance_times_rays("adaptive"), variance_times_rays("moving-directions"));
+  EXPECT_LT(2 * variance_times_rays("adaptive"), variance_times_rays("held-positions"));
+}
+
+// Three parameters are looked at two by two.
+TEST(FilmMotion, HasTheMeanOfHeldPositions) {
+  const TempFiles files;
+  const Scene scene = fence_scene(files, 10);
+  expect_same_pixels(scene, {"bars.translate.x"}, "adaptive", "held-positions", 512);
+  expect_same_pixels(scene, {"floor.translate.x", "bars.translate.y", "bars.translate.x"},
+                     "adaptive", "held-positions", 512);
+}
+
+TEST(FilmMotion, HasTheSameBitsOnAnyNumberOfThreads) {
+  const TempFiles files;
+  const Scene scene = fence_scene(files, 16);
+  for (const std::vector<std::string>& parameters :
+       {std::vector<std::string>{"bars.translate.x"},
+        std::vector<std::string>{"floor.translate.x", "bars.translate.y", "bars.translate.x"}}) {
+    const int spp = parameters.size() == 1 ? 32 : 256;
+    const GradientResult one = run_method(scene, parameters, "adaptive", spp, 5, 1);
+    const GradientResult many = run_method(scene, parameters, "adaptive", spp, 5, 3);
+    EXPECT_GT(share_that_moves(one), 0.3);
+    for (size_t k = 0; k < parameters.size(); ++k) {
+      const Moments &a = one.parameters[k].total, &b = many.parameters[k].total;
+      for (size_t i = 0; i < a.size(); ++i) {
+        ASSERT_EQ(a.mean(i), b.mean(i));
+        ASSERT_EQ(a.variance(i), b.variance(i));
+      }
+    }
+  }
 }
 
 }  // namespace
