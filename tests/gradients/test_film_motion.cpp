@@ -104,13 +104,16 @@ void expect_same_pixels(const Scene& scene, const std::vector<std::string>& para
   for (size_t k = 0; k < parameters.size(); ++k) {
     const Moments &a = first.parameters[k].total, &b = second.parameters[k].total;
     std::vector<double> z;
+    double largest = 0;
+    for (size_t i = 0; i < a.size(); ++i) largest = std::max(largest, a.variance(i));
     for (size_t i = 0; i < a.size(); i += 3) {
       const double error = std::sqrt(a.variance(i) + b.variance(i));
-      if (error > 0)
+      // Far out in a filter few samples tell.
+      if (error > 0.02 * std::sqrt(largest))
         z.push_back(normal_from_student((a.mean(i) - b.mean(i)) / error, a.batches() - 1));
     }
     const ZSummary summary = summarize(z);
-    EXPECT_GT(summary.count, 20) << parameters[k];
+    EXPECT_GE(summary.count, 6) << parameters[k];
     EXPECT_GE(summary.p_largest, 1e-6)
         << method << " " << other << " " << parameters[k] << ": " << summary.largest;
   }
