@@ -44,7 +44,6 @@ class VertexAdjoints {
   void add_shadow(const AdjointVertex& vertex, Rng rng);
   void add_penumbras(const AdjointVertex& vertex, const Rng& key);
   void add_penumbra(const AdjointVertex& vertex, const Rng& key);
-  // One shadow ray.
 
   const AdjointContext& context_;
   Rgb<double> adjoint_;

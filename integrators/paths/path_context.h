@@ -1,5 +1,5 @@
 #pragma once
-// What paths are followed in, alike for all of them.
+// What paths are followed in, alike for all of them, and small things that all of them use.
 #include "integrators/edges/viewpoint.h"
 #include "integrators/lights/closed_light.h"
 #include "integrators/lights/mirrored_light.h"

@@ -27,7 +27,6 @@ class Diffuse final : public Bsdf {
     return {evaluate(n, wi, wo), pdf_solid_angle(n, wi, wo)};
   }
   std::optional<Vec3d> sample(const Vec3d& n, const Vec3d& wi, double u1, double u2) const override;
-  void eval_with_pdf_each(std::span<const Evaluation> evaluations) const override;
   void sample_each(std::span<const Draw> draws) const override;
 
   bool is_still() const override { return limn::is_still(reflectance_); }
@@ -81,10 +80,6 @@ void Diffuse::sample_each(std::span<const Draw> draws) const {
 }
 
 // Too little for lanes.
-void Diffuse::eval_with_pdf_each(std::span<const Evaluation> evaluations) const {
-  for (const Evaluation& e : evaluations) *e.value = eval_with_pdf(*e.n, *e.wi, *e.wo);
-}
-
 }  // namespace
 
 std::shared_ptr<Bsdf> make_diffuse(const Rgb<double>& reflectance) {

@@ -1,5 +1,5 @@
 #pragma once
-// Microfacet distributions in terms of cosines and squared sines, over double, Dual or Var; GGX and
+// Microfacet distributions in terms of cosines and squared sines, over double or Dual; GGX and
 // Fresnel's formula also over wide::Doubles.
 //
 // h is the half vector of wi (towards the viewer) and wo, alpha the roughness; v stands for either
@@ -98,7 +98,7 @@ Vec3<S> ggx_visible(const Vec3<S>& v, double alpha, const S& u1, const S& u2) {
 // follows is extended by r, and has one division.
 template <class S>
 S fresnel_conductor(const S& cos_h, double eta, double k) {
-  constexpr double kTiny = 1e-300;  // s is 0 at the critical angle if k = 0
+  constexpr double kTiny = 1e-100;  // s is 0 at the critical angle if k = 0
   const S c2 = cos_h * cos_h;
   const S s2 = 1.0 - c2;
   const double nk = eta * k;

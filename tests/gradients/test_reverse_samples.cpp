@@ -132,6 +132,38 @@ TEST(ReverseSamples, AnyNumberOfFilmPointsHasOneMean) {
   }
 }
 
+// Several edges of one vertex are drawn together.
+TEST(ReverseSamples, SeveralEdgesOfAVertexHaveTheMeanOfOne) {
+  const TempFiles files;
+  const Scene scene = scene_under(files, make_sky(files, "sky"));
+  Image adjoint(scene.film.crop_width, scene.film.crop_height, 3);
+  std::fill(adjoint.data.begin(), adjoint.data.end(), 1.0f);
+  BackwardOptions options;
+  options.parameters = {"body.translate.x", "body.translate.y", "body.translate.z", "body.scale"};
+  options.sampler = "forest";
+  options.terms = {"boundary"};
+  options.batches = 32;
+  RunSettings settings;
+  settings.spp = 256;
+  settings.threads = 2;
+  const auto moments_of = [&](int edges, uint64_t seed) {
+    options.edge_samples = edges;
+    settings.seed = seed;
+    std::vector<Moments> moments;
+    for (const ParameterAdjoint& p : backward(scene, adjoint, options, settings).parameters)
+      moments.push_back(p.moments);
+    return moments;
+  };
+  const auto one = moments_of(1, 1), seven = moments_of(7, 2);
+  double largest = 0;
+  for (size_t k = 0; k < one.size(); ++k) {
+    const double error = std::sqrt(one[k].variance(0) + seven[k].variance(0));
+    EXPECT_LE(std::fabs(one[k].mean(0) - seven[k].mean(0)), 4.5 * error) << options.parameters[k];
+    largest = std::max(largest, std::fabs(seven[k].mean(0)) / error);
+  }
+  EXPECT_GE(largest, 5);  // it says something
+}
+
 // A run tells how many points each term took on the film: for the camera's silhouettes a quarter of
 // the paths, for shadows as many, and for both where light itself has no noise.
 TEST(ReverseSamples, ShadowsInViewHaveANumberOfFilmPointsOfTheirOwn) {

@@ -84,7 +84,7 @@ class LeafForest final : public EdgeSampler {
     return edge.is_seen() ? edge.pdf_t(t) : 0;
   }
 
-  double draw_cost() const override { return 5; }  // the forest's: as many draws to measure
+  double draw_cost() const override { return 3; }  // the forest's: as many draws to measure
   SamplerSize size() const override {
     uint64_t bytes = forest_.inner.size() * sizeof(InnerNode) + leaves_.size() * sizeof(Leaf) +
                      edges_.size() * sizeof(uint32_t) + forest_.roots.size() * sizeof(NodeId);
