@@ -22,7 +22,7 @@ struct FilmFit {
 
 // A pilot of at most spp samples of every other probed pixel: a multiple of 8. The estimator has
 // kMostFilmParameters at most, and is left with a plan that is of no use. settings, watch: as of
-// run_pilot; it takes a sixteenth of a limit of time. Deterministic on any number of threads.
+// run_pilot; it takes an eighth of a limit of time. Deterministic on any number of threads.
 FilmFit fit_film(TermEstimator& estimator, const SamplePlan& plan, int spp,
                  const RunSettings& settings, const Stopwatch& watch);
 
