@@ -58,20 +58,20 @@ void MotionRates::add_camera(const Scene& scene, int lane, double share) {
       {value(camera.origin), camera.near_clip, share * speed, share * rotation, true});
 }
 
+double MotionRates::Source::rate_from(double distance) const {
+  return speed / std::max(distance, radius) + rotation;
+}
+
 double MotionRates::at(const Vec3d& p) const {
   double rate = 0;
-  for (const Source& source : sources_) {
-    const double distance = std::max(length(source.center - p), source.radius);
-    rate += source.speed / distance + source.rotation;
-  }
+  for (const Source& source : sources_) rate += source.rate_from(length(source.center - p));
   return rate;
 }
 
 double MotionRates::in_view(const Vec3d& p, double distance) const {
   double rate = 0;
   for (const Source& source : sources_) {
-    const double to = source.is_camera ? distance : length(source.center - p);
-    rate += source.speed / std::max(to, source.radius) + source.rotation;
+    rate += source.rate_from(source.is_camera ? distance : length(source.center - p));
   }
   return rate;
 }

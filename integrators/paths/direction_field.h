@@ -92,6 +92,7 @@ class MotionRates {
     double speed;     // root mean square over the object's vertices, or of the camera
     double rotation;  // of the camera [1 / unit of the parameter]
     bool is_camera;
+    double rate_from(double distance) const;
   };
   // share: the lane's step in those of the first.
   void add_object(const Scene& scene, int lane, double share);

@@ -354,9 +354,6 @@ class FilmPilot {
 
 }  // namespace
 
-FilmProbe::FilmProbe(const TermEstimator& terms, const PlanGrid& grid, int turn)
-    : terms_(terms), grid_(grid), turn_(turn) {}
-
 void FilmProbe::add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const {
   std::vector<KeyedSample> probes;
   for (const KeyedSample& sample : samples) {

@@ -7,8 +7,8 @@
 // what slides and is covered there, shadows and mirror images as well.
 #include <vector>
 
+#include "integrators/pilot/probing_estimator.h"
 #include "integrators/pilot/sample_plan.h"
-#include "integrators/pilot/term_estimator.h"
 
 namespace limn {
 
@@ -31,30 +31,17 @@ double film_speed(const TermEstimator& estimator);
 
 // All terms with two lanes more than there are parameters, at the pixels that a pilot probes: `turn`
 // samples at every other one, then as many at the rest, and so on.
-class FilmProbe final : public SampleEstimator {
+class FilmProbe final : public ProbingEstimator {
  public:
   // Both must outlive it.
-  FilmProbe(const TermEstimator& terms, const PlanGrid& grid, int turn);
+  FilmProbe(const TermEstimator& terms, const PlanGrid& grid, int turn)
+      : ProbingEstimator(terms), grid_(grid), turn_(turn) {}
 
-  const Scene& scene() const override { return terms_.scene(); }
-  size_t slots() const override { return terms_.slots(); }
-  const char* slot_name(size_t slot) const override { return terms_.slot_name(slot); }
   int lanes() const override { return terms_.lanes() + 2; }
-  Lanes lane_scale() const override { return terms_.lane_scale(); }
-  bool samples_pixels() const override { return terms_.samples_pixels(); }
-  size_t pixel_slot() const override { return terms_.pixel_slot(); }
   void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const override;
-  double film_samples(size_t slot) const override { return terms_.film_samples(slot); }
-  int film_stream(size_t slot) const override { return terms_.film_stream(slot); }
-  bool sample_film(size_t slot, double u, const Rng& key, RayCount& rays,
-                   FilmSample& sample) const override {
-    return terms_.sample_film(slot, u, key, rays, sample);
-  }
-  const FilmMotion* film_motion(int x, int y) const override { return terms_.film_motion(x, y); }
   bool looks_at(const PixelSample& at) const;
 
  private:
-  const TermEstimator& terms_;
   const PlanGrid& grid_;
   int turn_;
 };

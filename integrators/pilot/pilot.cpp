@@ -4,14 +4,16 @@
 #include <algorithm>
 #include <numeric>
 
+#include "integrators/pilot/probing_estimator.h"
+
 namespace limn {
 namespace {
 
 // The samples of probed pixels go into sums; only what belongs to the film goes on.
-class PilotEstimator final : public SampleEstimator {
+class PilotEstimator final : public ProbingEstimator {
  public:
   PilotEstimator(const TermEstimator& terms, bool turns)
-      : terms_(terms), grid_(terms.scene().film, kMostProbes), turns_(turns) {
+      : ProbingEstimator(terms), grid_(terms.scene().film, kMostProbes), turns_(turns) {
     for (size_t slot = 0; slot < terms.slots(); ++slot) {
       sums_.emplace_back(terms.adds_to_pixels(slot) ? grid_.size() : 0, terms.lanes());
     }
@@ -19,21 +21,6 @@ class PilotEstimator final : public SampleEstimator {
     later_lights_.resize(grid_.size());
   }
 
-  const Scene& scene() const override { return terms_.scene(); }
-  size_t slots() const override { return terms_.slots(); }
-  const char* slot_name(size_t slot) const override { return terms_.slot_name(slot); }
-  int lanes() const override { return terms_.lanes(); }
-  Lanes lane_scale() const override { return terms_.lane_scale(); }
-  bool samples_pixels() const override { return terms_.samples_pixels(); }
-  size_t pixel_slot() const override { return terms_.pixel_slot(); }
-  double film_samples(size_t slot) const override { return terms_.film_samples(slot); }
-  int film_stream(size_t slot) const override { return terms_.film_stream(slot); }
-  bool sample_film(size_t slot, double u, const Rng& key, RayCount& rays,
-                   FilmSample& sample) const override {
-    return terms_.sample_film(slot, u, key, rays, sample);
-  }
-
-  const FilmMotion* film_motion(int x, int y) const override { return terms_.film_motion(x, y); }
   void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const override {
     for (const KeyedSample& sample : samples) add_pixel(sample.at, sample.key, sink);
   }
@@ -62,7 +49,6 @@ class PilotEstimator final : public SampleEstimator {
     later_lights_[cell] += static_cast<uint32_t>(sample.later_lights);
   }
 
-  const TermEstimator& terms_;
   PlanGrid grid_;
   bool turns_;
   // Of every slot; a cell is written by the thread of its tile alone.

@@ -1,5 +1,5 @@
 #pragma once
-// Whether methods have the mean of the plain forest.
+// Runs of methods: whether they have the mean of the plain forest, or the same bits.
 #include <cmath>
 #include <string>
 #include <vector>
@@ -19,6 +19,16 @@ inline GradientResult run_method(const Scene& scene, const std::vector<std::stri
   options.samples = std::nullopt;
   options.terms = terms;
   return run_blocks(scene, options, spp, seed, threads);
+}
+
+inline void expect_same_bits(const GradientResult& a, const GradientResult& b) {
+  for (size_t k = 0; k < a.parameters.size(); ++k) {
+    const Moments &first = a.parameters[k].total, &second = b.parameters[k].total;
+    for (size_t i = 0; i < first.size(); ++i) {
+      ASSERT_EQ(first.mean(i), second.mean(i)) << a.parameters[k].name;
+      ASSERT_EQ(first.variance(i), second.variance(i)) << a.parameters[k].name;
+    }
+  }
 }
 
 // z-scores of the differences of block sums between a method and the plain forest.

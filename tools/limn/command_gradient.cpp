@@ -135,8 +135,9 @@ void print_terms(const GradientResult& result) {
   for (size_t t = 0; t < result.terms.size(); ++t) {
     const TermRun& term = result.terms[t];
     if (!term.computed && term.cost.samples == 0) continue;
-    fmt::print("{:{}} {:5.1f} % {:>12} {:>12}", term.name, width, 100 * term.cost.seconds / seconds,
-               term.cost.rays, term.cost.samples);
+    fmt::print("{:{}} {:5.1f} % {:>12} {:>12}", term.name, width,
+               seconds > 0 ? 100 * term.cost.seconds / seconds : 0, term.cost.rays,
+               term.cost.samples);
     for (const auto& g : result.parameters) {
       fmt::print("  {:>{}.1f} %", 100 * share_of(g, t), g.name.size() + 7);
     }
