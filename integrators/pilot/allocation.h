@@ -40,6 +40,10 @@ double trimmed_mean(std::vector<double> values);
 
 // Samples per pixel of a pilot for a job of `spp`, even; 0 if the job is too short for one.
 int pilot_samples(int spp);
+// How many of these where one took `each` seconds, in a job of so many, so many of which are left:
+// what an eighth of the job holds, or at least four, if these take no more than 0.3 of what is left;
+// 0 otherwise.
+int pilot_samples_in_time(int spp, double each, double seconds, double left);
 // The same of the pilot that finds how positions on the film move, of every other pixel.
 int film_pilot_samples(int spp);
 

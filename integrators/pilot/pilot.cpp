@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "integrators/pilot/allocation.h"
 #include "integrators/pilot/probing_estimator.h"
 
 namespace limn {
@@ -136,10 +137,9 @@ PilotFigures run_pilot(const TermEstimator& estimator, bool turns, int spp,
   const double began = watch.seconds();
   if (!run.run(settings, 0, 1, watch)) return figures;
   if (settings.seconds > 0) {
-    const double each = watch.seconds() - began;
-    const int fitting = static_cast<int>(std::min(settings.seconds / 8 / each, 1e6));
-    spp = std::min(spp, fitting) / 2 * 2;
-    if (spp < 4) return figures;
+    const double now = watch.seconds();
+    spp = pilot_samples_in_time(spp, now - began, settings.seconds, settings.seconds - now);
+    if (spp == 0) return figures;
   }
   const int half = spp / 2;
   if (half > 1 && !run.run(settings, 1, half, watch)) return figures;

@@ -18,37 +18,48 @@
 namespace limn {
 namespace {
 
-// Half the width of a layer, and its weight: the density of layers, uniform in u, over that of what
-// is drawn.
+// Half the width of a layer, a place across, and their weight: their density, layers uniform in u,
+// over that of what is drawn.
 struct Layer {
-  double half, weight = 1;
+  double half, across, weight = 1;
 };
 
-// A gaussian's layers are so few far out that single pixels would hardly ever meet the edges there
-// that other terms do: a tenth of them are drawn by width.
-Layer draw_gaussian(const Filter& filter, double u) {
+// Far out a gaussian holds so little that single pixels would hardly ever meet the edges there that
+// other terms do: a tenth is drawn by width.
+Layer draw_gaussian(const Filter& filter, const FilterTable& table, const Film::Range& range,
+                    double u, double v) {
   constexpr double kByWidth = 0.1;  // not tuned
   const double variance = filter.stddev * filter.stddev, radius = filter.radius;
   const double floor = std::exp(-radius * radius / (2 * variance));
-  const double half =
-      u < kByWidth ? radius * (u / kByWidth)
-                   : std::sqrt(-2 * variance *
-                               std::log(floor + (u - kByWidth) / (1 - kByWidth) * (1 - floor)));
-  const double density = half / variance * std::exp(-half * half / (2 * variance)) / (1 - floor);
-  return {half, density / ((1 - kByWidth) * density + kByWidth / radius)};
+  const double width = range.upper - range.lower;
+  Layer layer{};
+  if (u < kByWidth) {
+    layer.half = radius * (u / kByWidth);
+    layer.across = range.lower + width * v;
+  } else {
+    layer.half =
+        std::sqrt(-2 * variance * std::log(floor + (u - kByWidth) / (1 - kByWidth) * (1 - floor)));
+    layer.across = table.quantile(range.lower, range.upper, v);
+  }
+  const double density =
+      layer.half / variance * std::exp(-layer.half * layer.half / (2 * variance)) / (1 - floor) *
+      filter.eval(layer.across) / (filter.integral(range.upper) - filter.integral(range.lower));
+  layer.weight = density / ((1 - kByWidth) * density + kByWidth / (radius * width));
+  return layer;
 }
 
-// u in [0, 1).
-Layer draw_layer(const Filter& filter, double u) {
+// u, v in [0, 1); range: across the layers.
+Layer draw_layer(const Filter& filter, const FilterTable& table, const Film::Range& range, double u,
+                 double v) {
   switch (filter.kind) {
     case Filter::Kind::kBox:
-      return {filter.radius};
+      return {filter.radius, table.quantile(range.lower, range.upper, v)};
     case Filter::Kind::kTent:
-      return {filter.radius * (1 - u)};
+      return {filter.radius * (1 - u), table.quantile(range.lower, range.upper, v)};
     case Filter::Kind::kGaussian:
       break;
   }
-  return draw_gaussian(filter, u);
+  return draw_gaussian(filter, table, range, u, v);
 }
 
 double weight_of(const Lanes& motion, const Lanes& scale) {
@@ -102,13 +113,13 @@ FilterTerm::Pair FilterTerm::draw(const MovedPixel& pixel) const {
   const auto columns = film_.range_x(pixel.at.x), rows = film_.range_y(pixel.at.y);
   const auto& along = is_x ? columns : rows;
   const auto& across = is_x ? rows : columns;
-  const Layer layer = draw_layer(film_.filter, rng.uniform());
-  const double other = filter_.quantile(across.lower, across.upper, rng.uniform());
+  const double u = rng.uniform(), v = rng.uniform();
+  const Layer layer = draw_layer(film_.filter, filter_, across, u, v);
   const double cut = kTaper * rng.uniform();
   const double lower = along.lower + (ends_at_once(film_.filter, along.lower) ? cut : 0);
   const double upper = along.upper - (ends_at_once(film_.filter, along.upper) ? cut : 0);
   const auto place = [&](double offset) {
-    const double x = is_x ? offset : other, y = is_x ? other : offset;
+    const double x = is_x ? offset : layer.across, y = is_x ? layer.across : offset;
     return FilmPosition{pixel.at.x + 0.5 + x, pixel.at.y + 0.5 + y};
   };
   const double peak = layer.weight * film_.filter.eval(0) /

@@ -67,14 +67,24 @@ TEST(BestSamples, AreLimited) {
   EXPECT_EQ(best_samples({{4, 1}, {1, 1}, {1, 1}, {9, 1, 0.125}}), (SampleCounts{2, 1, 1, 3}));
 }
 
+TEST(PilotSamples, TakeAnEighthOfATimeAndFourWhereThatIsTooShort) {
+  EXPECT_EQ(pilot_samples_in_time(32, 0.01, 8, 7), 32);
+  EXPECT_EQ(pilot_samples_in_time(32, 0.1, 8, 7), 10);
+  EXPECT_EQ(pilot_samples_in_time(32, 0.5, 8, 7), 4);  // three more: 1.5 s of 7
+  EXPECT_EQ(pilot_samples_in_time(32, 0.8, 8, 7), 0);
+  EXPECT_EQ(pilot_samples_in_time(32, 0.5, 8, 4), 0);
+  EXPECT_EQ(pilot_samples_in_time(32, 0.1, 8, -1), 0);
+  EXPECT_EQ(pilot_samples_in_time(4, 0.01, 8, 7), 4);
+}
+
 TEST(PilotSamples, AreFewAndEvenAndNoneForShortJobs) {
-  EXPECT_EQ(pilot_samples(15), 0);
-  EXPECT_EQ(pilot_samples(16), 4);
+  EXPECT_EQ(pilot_samples(7), 0);
+  EXPECT_EQ(pilot_samples(8), 4);
   EXPECT_EQ(pilot_samples(128), 16);
   EXPECT_EQ(pilot_samples(1024), 32);
-  for (int spp = 16; spp < 100; ++spp) {
+  for (int spp = 8; spp < 100; ++spp) {
     EXPECT_EQ(pilot_samples(spp) % 2, 0);
-    EXPECT_LE(4 * pilot_samples(spp), spp);
+    EXPECT_LE(std::max(2, std::min(spp / 8, 4)) * pilot_samples(spp), spp);
     EXPECT_EQ(film_pilot_samples(spp) % 8, 0);
     EXPECT_LE(4 * film_pilot_samples(spp), spp);
   }

@@ -151,6 +151,28 @@ TEST(FilmMotion, RestsWhereFiltersEnd) {
   }
 }
 
+// Of a gaussian, in the corner of its support: edges on the film are met there again and again, so
+// `filter` must meet them, too, or what they add looks certain.
+TEST(FilmMotion, MeetsWhatIsFarOutInAFilter) {
+  const TempFiles files;
+  const double pixel = 12 * std::tan(20 * kPi / 180);  // where the panel is
+  SceneParts parts;
+  parts.film = kFilters[3];
+  parts.width = parts.height = 1;
+  parts.origin = {0, 0, 6};
+  parts.target = {0, 0, 0};
+  parts.body = square("panel", 0.15 * pixel, 0, {1.9 * pixel, 1.9 * pixel, 0},
+                      area_light("glow", "1, 1, 1")) +
+               square("unseen", 0.4, 0, {0, 0, 12}, diffuse("clay", "0.5, 0.5, 0.5"));
+  const GradientResult result =
+      run_method(make_scene(files, parts), {"unseen.translate.x"}, "random-directions", 1 << 15, 1);
+  const Moments& total = result.parameters[0].total;
+  ASSERT_GT(total.variance(0), 0);
+  EXPECT_LT(std::fabs(normal_from_student(total.mean(0) / std::sqrt(total.variance(0)),
+                                          total.batches() - 1)),
+            4);
+}
+
 // A fence of bars thinner than pixels, that slides before a floor.
 std::string fence() {
   std::string body = square("floor", 4, -90, {0, 0, 0}, diffuse("stone", "0.7, 0.7, 0.7")) +

@@ -106,7 +106,7 @@ def test_what_prints_say(scene, adjoint):
     fit = limn.Fit(scene, adjoint, name, spp=2)
     assert repr(fit) == "<limn.Fit: no steps>"
     loss = fit.step().loss
-    assert repr(fit).startswith(f"<limn.Fit: 1 steps, loss {loss:.4g} +- ")
+    assert repr(fit).startswith(f"<limn.Fit: 1 step, loss {loss:.4g} +- ")
 
 
 @pytest.mark.parametrize("call, text", [

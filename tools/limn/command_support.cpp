@@ -96,7 +96,7 @@ void add_term_options(CLI::App& app, std::string& terms, std::string& samples) {
   app.add_option("--samples", samples,
                  "What a sample per pixel holds of each term, in this order: paths, points on the "
                  "film (may be less than 1), edges per vertex of one path; auto: the best for the "
-                 "time by a short pilot, or 1 of each if --spp is less than 16; uniform: the same, "
+                 "time by a short pilot, or 1 of each if --spp is less than 8; uniform: the same, "
                  "but alike in all pixels")
       ->capture_default_str()
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)

@@ -246,8 +246,8 @@ void bind_fit(nb::module_& m) {
            [](const FitHandle& handle) {
              const std::vector<FitRecord>& done = handle.history;
              if (done.empty()) return std::string("<limn.Fit: no steps>");
-             return fmt::format("<limn.Fit: {} steps, loss {:.4g} +- {:.2g}>", done.size(),
-                                done.back().loss, done.back().error);
+             return fmt::format("<limn.Fit: {} step{}, loss {:.4g} +- {:.2g}>", done.size(),
+                                done.size() == 1 ? "" : "s", done.back().loss, done.back().error);
            })
       .def_ro("history", &FitHandle::history, "A FitRecord for each step that was done.")
       .def_prop_ro(

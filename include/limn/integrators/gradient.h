@@ -54,10 +54,9 @@ struct GradientOptions {
   std::string method;              // see methods.h; "": the default
   std::vector<std::string> terms;  // by name; none: all that the scene has
   // None: chosen for the least squared error after equal time, all parameters alike, by a pilot of
-  // two to eight samples per pixel with a seed of its own, which are then thrown away. One of each
-  // if spp is less than 16, for one term alone, or if less than two samples of the pilot fit into
-  // an eighth of the limit of time. The choice does not depend on clocks but for that; it does on
-  // the crop.
+  // 4 to 32 samples per pixel with a seed of its own, which are then thrown away. One of each if spp
+  // is less than 8, for one term alone, or if four samples of the pilot would take more than 0.3 of
+  // the limit of time. The choice does not depend on clocks but for that; it does on the crop.
   std::optional<SampleCounts> samples = SampleCounts{};
   // The same samples in every pixel, also where the method would spread them.
   bool uniform_samples = false;
