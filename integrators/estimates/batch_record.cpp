@@ -38,10 +38,10 @@ void RecordWriter::add(const std::vector<double>& numbers) {
 
 void RecordWriter::add(const TermCost& cost) {
   // All of its members: another one does not compile here until it is kept.
-  const auto& [seconds, rays, shadow_rays, samples, no_edge, zero_weight, occluded, counted, warped,
-               dominated, dropped, largest] = cost;
-  for (const uint64_t count : {rays, shadow_rays, samples, no_edge, zero_weight, occluded, counted,
-                               warped, dominated, dropped}) {
+  const auto& [seconds, rays, shadow_rays, samples, no_edge, zero_weight, left_out, occluded,
+               counted, warped, dominated, dropped, largest] = cost;
+  for (const uint64_t count : {rays, shadow_rays, samples, no_edge, zero_weight, left_out, occluded,
+                               counted, warped, dominated, dropped}) {
     add(static_cast<int64_t>(count));
   }
   add(int64_t{largest.place.x});
@@ -94,9 +94,9 @@ std::vector<double> RecordReader::numbers(size_t size) {
 
 TermCost RecordReader::cost() {
   TermCost cost;
-  for (uint64_t* to :
-       {&cost.rays, &cost.shadow_rays, &cost.samples, &cost.no_edge, &cost.zero_weight,
-        &cost.occluded, &cost.counted, &cost.warped, &cost.dominated, &cost.dropped}) {
+  for (uint64_t* to : {&cost.rays, &cost.shadow_rays, &cost.samples, &cost.no_edge,
+                       &cost.zero_weight, &cost.left_out, &cost.occluded, &cost.counted,
+                       &cost.warped, &cost.dominated, &cost.dropped}) {
     *to = static_cast<uint64_t>(count());
   }
   LargestSample& largest = cost.largest;

@@ -40,6 +40,7 @@ void TermCost::merge(const TermCost& other) {
   samples += other.samples;
   no_edge += other.no_edge;
   zero_weight += other.zero_weight;
+  left_out += other.left_out;
   occluded += other.occluded;
   counted += other.counted;
   warped += other.warped;

@@ -352,18 +352,10 @@ class TermJob {
     } else {
       probed = probe(estimator, probing, turns, spp, share, watch);
     }
-    const auto& [pilot, fit] = probed;
-    if (pilot.spp == 0) return plan;
-    result.pilot_spp = pilot.spp;
-    const std::vector<TermFigures> figures = figures_of(estimator, probed, plan);
-    if (method_.spreads_samples && !options_.uniform_samples) {
-      spread_samples(figures, pilot.grid, plan);
-    } else {
-      plan.uniform = best_samples(figures);
-    }
-    plan.grid = pilot.grid;
+    if (probed.pilot.spp == 0) return plan;
+    result.pilot_spp = probed.pilot.spp;
     plan.film = std::move(probing.film);
-    plan.fields = fit.fields;
+    share_out(estimator, probed, plan);
     return plan;
   }
 
@@ -460,23 +452,10 @@ class TermJob {
     return means;
   }
 
-  // The pilot's paths took two light samples at later vertices; `light` is half of what one adds.
-  static void choose_lights(size_t slot, const PilotFigures& pilot, const TermFigures& light,
-                            std::vector<TermFigures>& figures, SamplePlan& plan) {
-    TermFigures& paths = figures[slot];
-    const double bare = paths.cost - kPilotLights * pilot.light_work;
-    plan.light_samples = best_light_samples(paths.variance - light.variance, bare,
-                                            {kPilotLights * light.variance, pilot.light_work});
-    const double change = static_cast<double>(kPilotLights) / plan.light_samples - 1;
-    paths.cost = bare + plan.light_samples * pilot.light_work;
-    paths.variance += change * light.variance;
-    for (size_t i = 0; i < paths.cells.size(); ++i) paths.cells[i] += change * light.cells[i];
-  }
-
   // Each parameter counts alike: its variances are divided by their sum. Sets the plan's light
-  // samples.
+  // samples; units: to these sums.
   std::vector<TermFigures> figures_of(const TermEstimator& estimator, const Probed& probed,
-                                      SamplePlan& plan) const {
+                                      SamplePlan& plan, std::vector<double>& units) const {
     const auto& [pilot, fit] = probed;
     TermFigures light;
     light.cells.resize(pilot.grid.size());
@@ -491,6 +470,7 @@ class TermJob {
       std::vector<std::vector<double>> cells(figures.size());
       const std::vector<double> means = variances_of(probed, lane, cells);
       const double sum = std::accumulate(means.begin(), means.end(), 0.0);
+      units.push_back(sum);
       if (!(sum > 0)) continue;
       for (size_t t = 0; t < figures.size(); ++t) {
         figures[t].variance += means[t] / sum;
@@ -503,9 +483,28 @@ class TermJob {
     }
     // Paths that only lead to vertices take no more light than they must.
     if (method_.spreads_samples && computed_[estimator.pixel_slot()]) {
-      choose_lights(estimator.pixel_slot(), pilot, light, figures, plan);
+      light.cost = pilot.light_work;
+      plan.light_samples = choose_lights(kPilotLights, light, figures[estimator.pixel_slot()]);
     }
     return figures;
+  }
+
+  // By what a pilot found.
+  void share_out(const TermEstimator& estimator, const Probed& probed, SamplePlan& plan) const {
+    const auto& [pilot, fit] = probed;
+    std::vector<double> units;
+    const std::vector<TermFigures> figures = figures_of(estimator, probed, plan, units);
+    double price;
+    if (method_.spreads_samples && !options_.uniform_samples) {
+      price = spread_samples(figures, pilot.grid, plan);
+    } else {
+      plan.uniform = best_samples(figures);
+      price = price_of(figures, plan.uniform);
+    }
+    if (method_.spreads_samples || method_.random_directions)
+      plan.survival = survival_of(pilot.traced, price, units);
+    plan.grid = pilot.grid;
+    plan.fields = fit.fields;
   }
 
   const Scene& scene_;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 namespace limn {
@@ -118,10 +119,15 @@ double film_count(const TermFigures& term, double count) {
   return std::clamp(count, term.least, double{kMostInPixel});
 }
 
-// Squared error times cost with all wishes multiplied by `scale`.
-double product_at(const std::vector<TermFigures>& terms, const std::vector<Wish>& wishes,
-                  double scale) {
+struct Totals {
   double error = 0, cost = 0;
+  double product() const { return error * cost; }
+};
+
+// With all wishes multiplied by `scale`.
+Totals totals_at(const std::vector<TermFigures>& terms, const std::vector<Wish>& wishes,
+                 double scale) {
+  auto [error, cost] = Totals();
   for (size_t t = 0; t < terms.size(); ++t) {
     if (wishes[t].cells.empty()) {
       const double n = film_count(terms[t], scale * wishes[t].film);
@@ -136,7 +142,7 @@ double product_at(const std::vector<TermFigures>& terms, const std::vector<Wish>
       cost += each * terms[t].cost * n;
     }
   }
-  return error * cost;
+  return {error, cost};
 }
 
 double best_scale(const std::vector<TermFigures>& terms, const std::vector<Wish>& wishes) {
@@ -148,7 +154,7 @@ double best_scale(const std::vector<TermFigures>& terms, const std::vector<Wish>
   std::vector<double> scales, products;
   for (double most = 0.5; most <= kMostInPixel; most *= std::sqrt(2.0)) {
     scales.push_back(most / largest);
-    products.push_back(product_at(terms, wishes, scales.back()));
+    products.push_back(totals_at(terms, wishes, scales.back()).product());
   }
   const double least = *std::min_element(products.begin(), products.end());
   for (size_t i = 0; i < scales.size(); ++i) {
@@ -159,12 +165,12 @@ double best_scale(const std::vector<TermFigures>& terms, const std::vector<Wish>
 
 }  // namespace
 
-void spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& grid,
-                    SamplePlan& plan) {
+double spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& grid,
+                      SamplePlan& plan) {
   std::vector<Wish> wishes;
   for (const TermFigures& term : figures) wishes.push_back(wish_of(term, grid));
   const double scale = best_scale(figures, wishes);
-  if (!(scale > 0)) return;
+  if (!(scale > 0)) return 0;
   plan.grid = grid;
   plan.counts.assign(grid.size(), {});
   std::vector<double> means;
@@ -181,6 +187,28 @@ void spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& gri
     means.push_back(sum / static_cast<double>(grid.size()));
   }
   plan.uniform = SampleCounts(means);
+  const auto [error, cost] = totals_at(figures, wishes, scale);
+  return error / cost;
+}
+
+double price_of(const std::vector<TermFigures>& figures, const SampleCounts& counts) {
+  double error = 0, cost = 0;
+  for (size_t t = 0; t < figures.size(); ++t) {
+    error += figures[t].variance / counts[t];
+    cost += figures[t].cost * counts[t];
+  }
+  return cost > 0 ? error / cost : 0;
+}
+
+Lanes survival_of(const TracedDraws& traced, double price, std::span<const double> units) {
+  Lanes survival;
+  if (!(price > 0) || traced.rays == 0) return survival;
+  const double squared = traced.squared_jumps / (price * static_cast<double>(traced.rays));
+  for (size_t k = 0; k < units.size(); ++k) {
+    survival[static_cast<int>(k)] =
+        units[k] > 0 ? std::sqrt(squared / units[k]) : std::numeric_limits<double>::infinity();
+  }
+  return survival;
 }
 
 int best_light_samples(double variance, double cost, const LightFigures& light) {
@@ -192,6 +220,17 @@ int best_light_samples(double variance, double cost, const LightFigures& light) 
   for (const int n : {2, 4, 8}) {
     if (product(n) < kGain * product(best)) best = n;
   }
+  return best;
+}
+
+int choose_lights(int taken, const TermFigures& light, TermFigures& paths) {
+  const double bare = paths.cost - taken * light.cost;
+  const int best = best_light_samples(paths.variance - light.variance, bare,
+                                      {taken * light.variance, light.cost});
+  const double change = static_cast<double>(taken) / best - 1;
+  paths.cost = bare + best * light.cost;
+  paths.variance += change * light.variance;
+  for (size_t i = 0; i < paths.cells.size(); ++i) paths.cells[i] += change * light.cells[i];
   return best;
 }
 

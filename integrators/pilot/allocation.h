@@ -1,5 +1,6 @@
 #pragma once
 // How a job's work is shared among the terms of a derivative, and among the pixels.
+#include <span>
 #include <vector>
 
 #include "integrators/pilot/sample_plan.h"
@@ -24,8 +25,19 @@ SampleCounts best_samples(const std::vector<TermFigures>& figures);
 // pilot sees that too rarely in one cell, so the variance is the mean of those over 5 by 5 and 9 by
 // 9 cells, and a share is a quarter of the mean at least. Counts are whole; they are as small as
 // rounding allows.
-void spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& grid,
-                    SamplePlan& plan);
+// The result is the price of work: how much of the squared error a unit of it is worth in the plan,
+// 0 if there is none.
+double spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& grid,
+                      SamplePlan& plan);
+
+// The same where all pixels have these counts.
+double price_of(const std::vector<TermFigures>& figures, const SampleCounts& counts);
+
+// See SamplePlan. What a draw of weight w adds to the squared error is (w j)^2, j its jump. Traced
+// with the probability p it adds (w j)^2 / p, for p of its rays' work: p = w j / sqrt(price work) is
+// best. Jumps and work are those of all draws, means of squares and of rays. units: of the squared
+// error of every parameter; where one is 0, all draws are traced.
+Lanes survival_of(const TracedDraws& traced, double price, std::span<const double> units);
 
 // Light samples of a path: what one of them adds to its variance, and what it costs.
 struct LightFigures {
@@ -34,6 +46,10 @@ struct LightFigures {
 // How many light samples of each path, of 1, 2, 4 and 8, give the least product of what a path is
 // left with and what it costs. variance, cost: of a path without any.
 int best_light_samples(double variance, double cost, const LightFigures& light);
+
+// The same for the paths of a pilot that took `taken` of them: light.variance is what all of them
+// add there. The paths' figures become those with the result.
+int choose_lights(int taken, const TermFigures& light, TermFigures& paths);
 
 // Without the thousandth of the values that is largest: single bright samples would rule a choice.
 double trimmed_mean(std::vector<double> values);

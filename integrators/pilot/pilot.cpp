@@ -20,6 +20,7 @@ class PilotEstimator final : public ProbingEstimator {
     }
     sums_.emplace_back(grid_.size(), terms.lanes());
     later_lights_.resize(grid_.size());
+    traced_.resize(grid_.size());
   }
 
   void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const override {
@@ -29,6 +30,11 @@ class PilotEstimator final : public ProbingEstimator {
   const PlanGrid& grid() const { return grid_; }
   uint64_t later_lights() const {
     return std::accumulate(later_lights_.begin(), later_lights_.end(), uint64_t{0});
+  }
+  TracedDraws traced() const {
+    TracedDraws sum;
+    for (const TracedDraws& cell : traced_) sum.add(cell);
+    return sum;
   }
   // Of the samples since the last call.
   std::vector<CellCovariances> take_covariances(int samples) {
@@ -47,6 +53,7 @@ class PilotEstimator final : public ProbingEstimator {
       if (!sums_[slot].empty()) sums_[slot].add(cell, sample.terms[slot]);
     }
     sums_.back().add(cell, sample.light_difference);
+    traced_[cell].add(sample.traced);
     later_lights_[cell] += static_cast<uint32_t>(sample.later_lights);
   }
 
@@ -55,6 +62,7 @@ class PilotEstimator final : public ProbingEstimator {
   // Of every slot; a cell is written by the thread of its tile alone.
   mutable std::vector<CellSums> sums_;
   mutable std::vector<uint32_t> later_lights_;
+  mutable std::vector<TracedDraws> traced_;
 };
 
 // Sums up batches.
@@ -148,6 +156,7 @@ PilotFigures run_pilot(const TermEstimator& estimator, bool turns, int spp,
   figures.halves[1] = pilot.take_covariances(half);
   figures.spp = spp;
   figures.grid = pilot.grid();
+  figures.traced = pilot.traced();
   figures.work = run.work(spp, figures.grid.size());
   figures.light_work = static_cast<double>(pilot.later_lights()) /
                        (kPilotLights * static_cast<double>(spp) * figures.grid.size());

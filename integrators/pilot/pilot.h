@@ -27,6 +27,7 @@ struct PilotFigures {
   std::vector<Lanes> film_variance;
   // Of one sample of a slot, in every cell.
   std::vector<double> variances(size_t slot, int lane) const;
+  TracedDraws traced;        // of edges at vertices
   double light_work = 0;     // of one light sample at all later vertices of a path
   std::vector<double> work;  // of one sample of a pixel, of every slot, see Term::work
 

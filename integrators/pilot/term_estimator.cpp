@@ -143,9 +143,16 @@ class TermEstimator::VertexTerms {
  public:
   // held: how the vertices of the path move while its directions are held, if what turns change is
   // asked for; else null.
+  // traced: added to, unless it is null.
   VertexTerms(const TermEstimator& estimator, const PixelCounts& counts, const VertexMotions* held,
-              SampleSink& sink)
-      : estimator_(estimator), counts_(counts), held_(held), sink_(sink), sums_(), turned_() {}
+              TracedDraws* traced, SampleSink& sink)
+      : estimator_(estimator),
+        counts_(counts),
+        held_(held),
+        traced_(traced),
+        sink_(sink),
+        sums_(),
+        turned_() {}
 
   void operator()(const SurfacePoint<Dual>& surface, const Scattering<Dual>& scattering,
                   const Rgb<Dual>& throughput, const DirectionMotion* motion, const PathStep& step,
@@ -155,6 +162,7 @@ class TermEstimator::VertexTerms {
     PathVertex vertex{surface, scattering, weight, motion ? motion->turn : DirectionTurn{},
                       bounces, step,       key,    sink_.log()};
     vertex.warp = estimator_.warp_field_.get();
+    vertex.traced = traced_;
     if (held_) {
       turned = turned_at(surface, motion, bounces);
       vertex.turned = &turned;
@@ -170,6 +178,7 @@ class TermEstimator::VertexTerms {
       if (samples == 0) continue;
       const Stopwatch watch;
       TermCost& cost = sink_.cost(slot);
+      vertex.survival = estimator_.plan_.survival * (1 / (urgency * counts_[slot]));
       turned.sum = {};
       Rgb<Lanes> sum;
       try {
@@ -227,6 +236,7 @@ class TermEstimator::VertexTerms {
   const TermEstimator& estimator_;
   PixelCounts counts_;
   const VertexMotions* held_;
+  TracedDraws* traced_;
   SampleSink& sink_;
   std::array<Rgb<Lanes>, kMostTerms> sums_;
   std::array<Rgb<Lanes>, kMostTerms> turned_;
@@ -245,7 +255,7 @@ class TermEstimator::Convoy {
   // counts: of the terms at its vertices; null for a path without.
   void add(const Place& place, const Rng& key, double weight, const PixelCounts* counts) {
     if (walks_.size() == kMost) finish();
-    if (counts) vertices_.emplace_back(estimator_, *counts, nullptr, sink_);
+    if (counts) vertices_.emplace_back(estimator_, *counts, nullptr, nullptr, sink_);
     walks_.emplace_back(key, 0, counts ? &vertices_.back() : nullptr);
     walks_.back().field = estimator_.plan_.field_at(place.at);
     places_.push_back(place);
@@ -344,7 +354,7 @@ void TermEstimator::add_logged(const PixelSample& at, const Rng& key, SampleSink
   };
   for (int i = 0; i < all; ++i) {
     if (i == 0) {
-      VertexTerms vertices(*this, counts, nullptr, sink);
+      VertexTerms vertices(*this, counts, nullptr, nullptr, sink);
       add(vertices, i);
       add_vertices(at, vertices, sink);
     } else {
@@ -496,7 +506,8 @@ TermEstimator::Sample TermEstimator::sample(const PixelSample& at, const Rng& ke
     TermCost uncounted;
     held = trace_one({at}, key, &rest, motions, nullptr, uncounted, twice);
   }
-  VertexTerms vertices(*this, ones, twice ? &motions : nullptr, sink);
+  TracedDraws traced;
+  VertexTerms vertices(*this, ones, twice ? &motions : nullptr, &traced, sink);
   const auto trace_at = [&](bool mirrored) {
     return trace_one({at, mirrored}, key, turns ? &turning_ : nullptr, vertices, nullptr,
                      sink.cost(pixel_slot_), twice);
@@ -512,11 +523,8 @@ TermEstimator::Sample TermEstimator::sample(const PixelSample& at, const Rng& ke
     return TurnedSample{twice ? resting : turning, turned(turning, resting), {}};
   };
   const auto derivative = [](const Rgb<Dual>& x) { return Rgb<Lanes>{x.r.d, x.g.d, x.b.d}; };
-  Sample sample{value(path.found.radiance),
-                {},
-                {},
-                path.found.later_lights,
-                path.finite && (!twice || held.finite)};
+  Sample sample{value(path.found.radiance), {},     {},
+                path.found.later_lights,    traced, path.finite && (!twice || held.finite)};
   sample.light_difference =
       split(derivative(path.found.light_difference), derivative(held.found.light_difference));
   for (size_t slot = 0; slot < terms_.size(); ++slot) {

@@ -64,6 +64,7 @@ class TermEstimator final : public SampleEstimator {
     std::array<TurnedSample, kMostTerms> terms;  // of each slot; zero for those of the film
     TurnedSample light_difference;               // see PathTracer
     uint64_t later_lights;
+    TracedDraws traced;
     bool finite;
   };
   // Takes light_samples of the plan, which must be two for a light_difference. turns: whether turns

@@ -125,7 +125,7 @@ void BoundaryTerm::add_draw(const PathVertex& vertex, const EdgeQuery& query,
     return;
   }
   add_edge_point(context_, edges_.object(drawn->edge.object), vertex, query, *drawn, part_, key,
-                 cost, sum);
+                 cost, sum, 1, true);
 }
 
 }  // namespace

@@ -27,6 +27,18 @@ struct TurnedVertex {
   Rgb<Lanes> sum{};        // added to
 };
 
+// What a pilot learns of the draws that were traced.
+struct TracedDraws {
+  uint64_t count = 0, rays = 0;
+  double squared_jumps =
+      0;  // for all channels, over the square of the luminance they are weighed by
+  void add(const TracedDraws& other) {
+    count += other.count;
+    rays += other.rays;
+    squared_jumps += other.squared_jumps;
+  }
+};
+
 // Where a path scatters.
 struct PathVertex {
   const SurfacePoint<Dual>& surface;
@@ -38,6 +50,9 @@ struct PathVertex {
   const Rng& key;                  // of the path
   SampleLog* log = nullptr;        // null unless somebody reads it
   TurnedVertex* turned = nullptr;  // null unless a pilot asks
+  TracedDraws* traced = nullptr;   // the same
+  // Of what draws add here, see SamplePlan.
+  Lanes survival{};
   // How directions move here, in place of the turn; null where they are not warped.
   const WarpField* warp = nullptr;
 };

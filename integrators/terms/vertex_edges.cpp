@@ -40,9 +40,49 @@ void draw_edges(const EdgeSampler& sampler, const EdgeQuery& query, const Rng& k
   sampler.sample_several(query, rngs, drawn);
 }
 
+namespace {
+
+Lanes along(const Vec3<Lanes>& v, const Vec3d& side) {
+  return v.x * side.x + v.y * side.y + v.z * side.z;
+}
+
+void log_point(const EdgeSample& sample, double distance, SampleLog& log) {
+  log.push_back(fmt::format(
+      "  edge {} of shape {} at t = {:.6g}: probability {:.4g}, density of t {:.4g}, distance "
+      "{:.6g}",
+      sample.edge.edge.index(), sample.edge.object.index(), sample.t, sample.probability,
+      sample.pdf_t, distance));
+}
+
+// Whether a draw of a weight that scatters f is traced: always what weighs much, else by chance,
+// and then it counts for those that are not.
+bool survives(const PathVertex& vertex, const Rgb<double>& f, const Rng& key, Lanes& weight) {
+  double squares = 0;
+  for (int k = 0; k < kLanes; ++k) {
+    const double w = weight[k] * vertex.survival[k];
+    squares += w * w;
+  }
+  const double probability = std::sqrt(squares) * luminance(vertex.throughput * f);
+  if (!(probability < 1)) return true;
+  if (key.at(Purpose::kDrawRoulette, vertex.bounces).uniform() >= probability) return false;
+  weight = weight * (1 / probability);
+  return true;
+}
+
+void add_traced(const Rgb<double>& scattered, const RayCount& rays, const Rgb<double>& amount,
+                TracedDraws& traced) {
+  const double unit = luminance(scattered);
+  double squares = 0;
+  for (int c = 0; c < 3; ++c) squares += amount[c] * amount[c];
+  traced.add({1, rays.total(), unit > 0 ? squares / (unit * unit) : 0});
+}
+
+}  // namespace
+
 void add_edge_point(const PathContext& context, const EdgeMesh& mesh, const PathVertex& vertex,
                     const EdgeQuery& query, const EdgeSample& sample, const RadiancePart& part,
-                    const Rng& key, TermCost& cost, Rgb<Lanes>& sum, double share) {
+                    const Rng& key, TermCost& cost, Rgb<Lanes>& sum, double share,
+                    bool by_roulette) {
   EdgeView view;
   const bool seen = view_edge(mesh, sample.edge, sample.t, query.p, view);
   const auto [a, b] = mesh.edge(sample.edge.edge).vertices;
@@ -56,14 +96,8 @@ void add_edge_point(const PathContext& context, const EdgeMesh& mesh, const Path
   }
   const double measure =
       1 / (view.distance * view.distance * view.distance * sample.probability * sample.pdf_t);
-  const Lanes weight = (v.x * view.side.x + v.y * view.side.y + v.z * view.side.z) * measure;
-  if (vertex.log) {
-    vertex.log->push_back(fmt::format(
-        "  edge {} of shape {} at t = {:.6g}: probability {:.4g}, density of t {:.4g}, distance "
-        "{:.6g}",
-        sample.edge.edge.index(), sample.edge.object.index(), sample.t, sample.probability,
-        sample.pdf_t, view.distance));
-  }
+  Lanes weight = along(v, view.side) * measure;
+  if (vertex.log) log_point(sample, view.distance, *vertex.log);
   // A density may round to zero at the very horizon.
   const Rgb<double> f =
       seen && sample.pdf_t > 0 ? vertex.scattering.eval_value(view.omega) : Rgb<double>{};
@@ -72,24 +106,29 @@ void add_edge_point(const PathContext& context, const EdgeMesh& mesh, const Path
     if (vertex.log) vertex.log->push_back("    no weight");
     return;
   }
+  if (by_roulette && !is_zero(vertex.survival) && !survives(vertex, f, key, weight)) {
+    ++cost.left_out;
+    if (vertex.log) vertex.log->push_back("    left out by roulette");
+    return;
+  }
   RayCount rays;
   Rgb<double> jump;
   const bool visible =
       edge_jump(context, mesh, view, query.face, 0, std::numeric_limits<double>::infinity(),
                 vertex.bounces + 1, key, rays, jump, part);
   cost.add(rays);
+  const Rgb<double> amount = visible ? vertex.throughput * f * jump : Rgb<double>{};
+  if (by_roulette && vertex.traced) add_traced(vertex.throughput * f, rays, amount, *vertex.traced);
   if (!visible) {
     ++cost.occluded;
     if (vertex.log) vertex.log->push_back("    hidden");
     return;
   }
   ++cost.counted;
-  const Rgb<double> amount = vertex.throughput * f * jump;
   const Rgb<Lanes> added{weight * amount.r, weight * amount.g, weight * amount.b};
   if (TurnedVertex* turned = vertex.turned) {
     const Vec3<Lanes> moving = turned->velocity * -share - turned->turn.velocity(view.y - query.p);
-    const Lanes swept =
-        (moving.x * view.side.x + moving.y * view.side.y + moving.z * view.side.z) * measure;
+    const Lanes swept = along(moving, view.side) * measure;
     for (int c = 0; c < 3; ++c) turned->sum[c] += swept * amount[c];
   }
   if (vertex.log) {

@@ -21,10 +21,12 @@ void draw_edges(const EdgeSampler& sampler, const EdgeQuery& query, const Rng& k
 // Adds what a point on an edge contributes to the boundary integral at a vertex, over its density:
 // throughput dL(t) f_s det(w_0, w_1, v) / |w|^3 / (probability pdf_t), v against directions that
 // move. part: of the radiance; key: of the path and the sample; share: of what v is while
-// directions are held. Books rays and what became of the sample on `cost`.
+// directions are held; by_roulette: weak ones are traced by the vertex's `survival`. Books rays and
+// what became of the sample on `cost`.
 void add_edge_point(const PathContext& context, const EdgeMesh& mesh, const PathVertex& vertex,
                     const EdgeQuery& query, const EdgeSample& sample, const RadiancePart& part,
-                    const Rng& key, TermCost& cost, Rgb<Lanes>& sum, double share = 1);
+                    const Rng& key, TermCost& cost, Rgb<Lanes>& sum, double share = 1,
+                    bool by_roulette = false);
 
 // Whether something hides the face from the vertex in the unit direction omega, at that distance.
 // One shadow ray.

@@ -148,9 +148,12 @@ void print_terms(const GradientResult& result) {
     if (c.no_edge + c.zero_weight == 0) continue;
     const auto share = [&](uint64_t n) { return 100.0 * n / c.samples; };
     fmt::print(
-        "{} samples: {:.1f} % found no edge, {:.1f} % without weight, {:.1f} % occluded, {:.1f} % "
+        "{} samples: {:.1f} % found no edge, {:.1f} % without weight, {}{:.1f} % occluded, {:.1f} "
+        "% "
         "counted\n",
-        term.name, share(c.no_edge), share(c.zero_weight), share(c.occluded), share(c.counted));
+        term.name, share(c.no_edge), share(c.zero_weight),
+        c.left_out > 0 ? fmt::format("{:.1f} % left out, ", share(c.left_out)) : "",
+        share(c.occluded), share(c.counted));
   }
 }
 
@@ -218,15 +221,12 @@ json costs_json(const GradientResult& result) {
   json costs;
   for (const TermRun& term : result.terms) {
     const TermCost& c = term.cost;
-    costs[term.name] = {{"seconds", c.seconds},
-                        {"rays", c.rays},
-                        {"shadow_rays", c.shadow_rays},
-                        {"samples", c.samples},
-                        {"no_edge", c.no_edge},
-                        {"zero_weight", c.zero_weight},
-                        {"occluded", c.occluded},
-                        {"counted", c.counted},
-                        {"largest_sample_share", c.largest.share()}};
+    costs[term.name] = {
+        {"seconds", c.seconds},         {"rays", c.rays},
+        {"shadow_rays", c.shadow_rays}, {"samples", c.samples},
+        {"no_edge", c.no_edge},         {"zero_weight", c.zero_weight},
+        {"left_out", c.left_out},       {"occluded", c.occluded},
+        {"counted", c.counted},         {"largest_sample_share", c.largest.share()}};
   }
   return costs;
 }

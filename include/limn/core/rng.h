@@ -39,7 +39,8 @@ enum class Purpose : uint64_t {
   kDirect,
   kDirectCopy,
   kTermRoulette,
-  kVertexSplit
+  kVertexSplit,
+  kDrawRoulette
 };
 
 // SplitMix64 started from a hash of (seed, pixel, sample): a stream for one path. `at` derives the

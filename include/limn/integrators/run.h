@@ -75,6 +75,7 @@ struct TermCost {
   // Where samples of edges went.
   uint64_t no_edge = 0;      // the sampler ended without an edge
   uint64_t zero_weight = 0;  // below the horizon, or without relative motion
+  uint64_t left_out = 0;     // by roulette, for weighing little
   uint64_t occluded = 0;     // the edge point is hidden (or, for the camera, off the film)
   uint64_t counted = 0;
   // Where directions are warped (of paths).
