@@ -83,16 +83,16 @@ constexpr double kLeastSamples = 0.125;
 
 // Positions on the film move if, by pilots, that leaves less than this share of squared error times
 // work. Not tuned.
-constexpr double kFilmConvincing = 0.9;
+constexpr double kFilmConvincing = 0.97;
 // Their motion is tried if a fit of it leaves less than the first share, and, of what turns of
 // directions leave, not much more: together they may leave less. In view, where either leaves 0.3,
 // both leave 0.2; where turns left a third of what positions do (a soft shadow, a chandelier), both
 // left 1.3 to 1.8 times as much. Turns that leave less than the last share leave nothing to look for.
-constexpr double kFilmPromising = 0.98, kFilmAgainstTurns = 1.25, kTurnsAlone = 0.2;
+constexpr double kFilmPromising = 0.99, kFilmAgainstTurns = 1.25, kTurnsAlone = 0.2;
 // Of a pilot, before positions on the film are looked at; it goes on behind that. Not tuned.
 constexpr int kFirstLook = 8;
 // The most work of the pilot that looks at them, as a share of the run's.
-constexpr double kFilmShare = 1.0 / 8;
+constexpr double kFilmShare = 1.0 / 4;
 
 // Of runs long enough for more estimators: samples, and a set-up's share of the time; not tuned.
 constexpr int kLongRun = 256;
