@@ -16,6 +16,7 @@
 #include "integrators/pilot/field_fit.h"
 #include "integrators/pilot/film_fit.h"
 #include "integrators/pilot/pilot.h"
+#include "integrators/pilot/probed.h"
 #include "integrators/pilot/random_motion.h"
 #include "integrators/pilot/term_estimator.h"
 #include "limn/core/error.h"
@@ -80,11 +81,19 @@ struct TermMethod {
 // has not seen must not cost more than this. Not tuned.
 constexpr double kLeastSamples = 0.125;
 
-// Where turns of directions are looked at, too, positions on the film move if that leaves less than
-// this share of squared error times work. Not tuned.
-constexpr double kFilmConvincing = 0.9;
+// Positions on the film move if, by pilots, that leaves less than this share of squared error times
+// work. Not tuned.
+constexpr double kFilmConvincing = 0.97;
+// Their motion is tried if a fit of it leaves less than the first share, and, of what turns of
+// directions leave, not much more: together they may leave less. In view, where either leaves 0.3,
+// both leave 0.2; where turns left a third of what positions do (a soft shadow, a chandelier), both
+// left 1.3 to 1.8 times as much. Turns that leave less than the last share leave nothing to look for.
+constexpr double kFilmPromising = 0.99, kFilmAgainstTurns = 1.25, kTurnsAlone = 0.2;
+// Of a pilot, before positions on the film are looked at; it goes on behind that. Not tuned.
+constexpr int kFirstLook = 8;
+// The most work of the pilot that looks at them, as a share of the run's.
+constexpr double kFilmShare = 1.0 / 4;
 
-constexpr int kHeldSamples = 6;  // of the pilot that this is compared with; not tuned
 // Of runs long enough for more estimators: samples, and a set-up's share of the time; not tuned.
 constexpr int kLongRun = 256;
 constexpr double kSetupShare = 1.0 / 32;
@@ -332,25 +341,12 @@ class TermJob {
     if (method_.spreads_samples) probing.light_samples = kPilotLights;
     RunSettings share = settings;
     share.seconds /= static_cast<double>(passes_.size());
-    Probed probed;
-    const FilmFit film = fit_film_of(p, probing, share, watch);
-    if (!film.motion.empty()) {
-      probing.grid = film.grid;
-      probing.film = film.motion;
-      probed = probe(estimator, probing, turns, spp, share, watch);
-      SamplePlan held = probing;  // turns of directions may take out as much by themselves
-      held.film.clear();
-      share.seconds /= 2;
-      if (turns && probed.pilot.spp > 0) {
-        Probed other = probe(estimator, held, turns, std::min(spp, kHeldSamples), share, watch);
-        if (other.pilot.spp > 0 && error_times_work(estimator, probed) >
-                                       kFilmConvincing * error_times_work(estimator, other)) {
-          probed = std::move(other);
-          probing.film.clear();
-        }
-      }
-    } else {
-      probed = probe(estimator, probing, turns, spp, share, watch);
+    estimator.set_plan(probing);
+    const int first_look = std::min(spp, kFirstLook);
+    Probed probed = probe(estimator, turns, first_look, share, watch);
+    if (probed.pilot.spp == first_look) {
+      look_at_film(p, turns, share, watch, probing, probed);
+      extend(probed, estimator, turns, spp, share, watch);
     }
     if (probed.pilot.spp == 0) return plan;
     result.pilot_spp = probed.pilot.spp;
@@ -359,19 +355,47 @@ class TermJob {
     return plan;
   }
 
+  // Positions on the film move where pilots with them and without say so; what turns of directions
+  // take out is taken out by either.
+  void look_at_film(size_t p, bool turns, const RunSettings& settings, const Stopwatch& watch,
+                    SamplePlan& plan, Probed& probed) const {
+    TermEstimator& estimator = pass(p);
+    const int lanes = estimator.lanes();
+    const double held = probed.error_times_work(lanes);
+    const double not_turned = Probed{probed.pilot, {}}.error_times_work(lanes);
+    if (held < kTurnsAlone * not_turned) return;
+    const double pixels = static_cast<double>(film_size(scene_.film)) / 3;
+    const FilmLook look{film_pilot_samples(settings.spp),
+                        kFilmShare * settings.spp * probed.pilot.work_of_pixel() * pixels,
+                        std::min(kFilmPromising, kFilmAgainstTurns * held / not_turned)};
+    FilmFit film = fit_film_of(p, plan, look, settings, watch);
+    if (!film.motion.empty()) {
+      SamplePlan moving = plan;
+      moving.grid = film.grid;
+      moving.film = std::move(film.motion);
+      estimator.set_plan(moving);
+      Probed other = probe(estimator, turns, probed.pilot.spp, settings, watch);
+      if (other.pilot.spp > 0 && other.error_times_work(lanes) < kFilmConvincing * held) {
+        probed = std::move(other);
+        plan = std::move(moving);
+        return;
+      }
+    }
+    estimator.set_plan(plan);
+  }
+
   // Positions are held where the result is empty. More parameters than the film leaves lanes for
   // are looked at two by two, by estimators of their own: only in runs that are long against what
   // it takes to set them up.
-  FilmFit fit_film_of(size_t p, const SamplePlan& plan, const RunSettings& settings,
-                      const Stopwatch& watch) const {
+  FilmFit fit_film_of(size_t p, const SamplePlan& plan, const FilmLook& look,
+                      const RunSettings& settings, const Stopwatch& watch) const {
     TermEstimator& estimator = pass(p);
-    const int spp = film_pilot_samples(settings.spp);
-    if (spp == 0 || !can_move_film() || method_.random_directions ||
+    if (look.spp == 0 || !can_move_film() || method_.random_directions ||
         estimator.motion_rates().still()) {
       return {};
     }
     if (estimator.lanes() <= kMostFilmParameters) {
-      return fit_film(estimator, plan, spp, settings, watch);
+      return fit_film(estimator, plan, look, settings, watch);
     }
     const bool is_long = settings.seconds > 0 ? watch.seconds() < kSetupShare * settings.seconds
                                               : settings.spp >= kLongRun;
@@ -385,7 +409,7 @@ class TermJob {
       TermEstimator two(scene_, some, types_, computed_, method_.sampler, settings.threads, nullptr,
                         nullptr, false, true);
       if (two.motion_rates().still()) continue;
-      const FilmFit part = fit_film(two, plan, spp, settings, watch);
+      const FilmFit part = fit_film(two, plan, look, settings, watch);
       if (part.motion.empty()) continue;
       fit.grid = part.grid;
       fit.motion.resize(part.motion.size());
@@ -406,52 +430,6 @@ class TermJob {
     return parameters;
   }
 
-  // What a pilot found with a plan.
-  struct Probed {
-    PilotFigures pilot;
-    FieldFit fit;
-  };
-  static Probed probe(TermEstimator& estimator, const SamplePlan& plan, bool turns, int spp,
-                      const RunSettings& settings, const Stopwatch& watch) {
-    estimator.set_plan(plan);
-    Probed probed{run_pilot(estimator, turns, spp, settings, watch), {}};
-    if (turns && probed.pilot.spp > 0)
-      probed.fit = fit_fields(probed.pilot, estimator.lanes(), settings.threads);
-    return probed;
-  }
-
-  // Squared error after equal time, where samples are shared out best among terms: of every
-  // parameter, as a geometric mean.
-  double error_times_work(const TermEstimator& estimator, const Probed& probed) const {
-    double product = 1;
-    for (int lane = 0; lane < estimator.lanes(); ++lane) {
-      std::vector<std::vector<double>> cells(types_.size());
-      const std::vector<double> variances = variances_of(probed, lane, cells);
-      double sum = 0;
-      for (size_t t = 0; t < types_.size(); ++t)
-        sum += std::sqrt(std::max(variances[t], 0.0) * probed.pilot.work[t]);
-      if (sum > 0) product *= std::pow(sum, 2.0 / estimator.lanes());
-    }
-    return product;
-  }
-
-  // Of one sample of every term: means over the film, and in cells where it has them.
-  std::vector<double> variances_of(const Probed& probed, int lane,
-                                   std::vector<std::vector<double>>& cells) const {
-    const auto& [pilot, fit] = probed;
-    std::vector<double> means(types_.size());
-    for (size_t t = 0; t < types_.size(); ++t) {
-      const double film = pilot.film_variance[t][lane];
-      means[t] = film;
-      if (!pilot.in_cells(t)) continue;
-      // Some terms have samples of both kinds.
-      cells[t] = fit.variances.empty() ? pilot.variances(t, lane) : fit.variances[lane][t];
-      means[t] += trimmed_mean(cells[t]);
-      for (double& cell : cells[t]) cell += film;
-    }
-    return means;
-  }
-
   // Each parameter counts alike: its variances are divided by their sum. Sets the plan's light
   // samples; units: to these sums.
   std::vector<TermFigures> figures_of(const TermEstimator& estimator, const Probed& probed,
@@ -467,8 +445,8 @@ class TermJob {
       if (pilot.in_cells(t)) figures[t].cells.resize(pilot.grid.size());
     }
     for (int lane = 0; lane < estimator.lanes(); ++lane) {
-      std::vector<std::vector<double>> cells(figures.size());
-      const std::vector<double> means = variances_of(probed, lane, cells);
+      std::vector<std::vector<double>> cells;
+      const std::vector<double> means = probed.variances(lane, cells);
       const double sum = std::accumulate(means.begin(), means.end(), 0.0);
       units.push_back(sum);
       if (!(sum > 0)) continue;

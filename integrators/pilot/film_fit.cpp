@@ -2,8 +2,8 @@
 #include "integrators/pilot/film_fit.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <numeric>
 
 #include "integrators/pilot/allocation.h"
 #include "integrators/pilot/pilot.h"
@@ -12,19 +12,16 @@
 namespace limn {
 namespace {
 
-// So many samples are taken of every other cell, then of the rest. Even.
+// So many samples are taken of every other cell, then of the rest.
 constexpr int kTurn = 4;
+// Each of a turn's samples is judged by fits from the others.
+constexpr int kFolds = kTurn;
+constexpr int kAll = -1;  // but no fold
 constexpr int kRadii[] = {1, 2, 4};
 constexpr int kJudgeRadius = 4;
 // Motion must leave less than this share of what is left by positions that are held: over 9 by 9
 // cells of their variance. Not tuned.
 constexpr double kConvincing = 0.8;
-// The same over the film, of squared error times work. Fits from half of so few samples leave more
-// than those that are used: in the sun 0.97 was found where 0.7 is right, in the demo 0.81 where
-// 0.65 is.
-constexpr double kConvincingFilm = 0.92;
-// A pilot that has found more than this left after 4, 8 or 16 samples looks no further. Not tuned.
-constexpr double kHopeless = 0.99;
 // As in field_fit.cpp.
 constexpr double kRidge = 0.05, kLeast = 0.01;
 // What is left of a term decides how much of the work it gets, and so how much it counts.
@@ -46,47 +43,87 @@ class Entries {
   int parameters_;
 };
 
-// [entry][cell]: covariances of one sample, summed over channels, or weighted sums of some.
-using CellMatrices = std::vector<std::vector<double>>;
+// Covariances of one sample of a cell, summed over channels, or weighted sums of some.
+using Matrix = std::array<double, kLanes*(kLanes + 1) / 2>;
+using CellMatrices = std::vector<Matrix>;
 
-// Sums over samples of one slot.
+// Sums over the samples of one slot.
 class SlotSums {
  public:
   SlotSums(const Entries& entries, size_t cells)
-      : entries_(entries),
-        first_(3 * entries.figures(), std::vector<float>(cells)),
-        second_(entries.size(), std::vector<float>(cells)) {}
+      : entries_(entries), size_(3 * entries.figures() + entries.size()) {
+    sums_.resize(cells * kFolds * size_);
+  }
 
-  void add(size_t cell, const std::vector<Rgb<double>>& figures) {
+  void add(int fold, size_t cell, const std::vector<Rgb<double>>& figures) {
+    float* first = &sums_[(cell * kFolds + fold) * size_];
+    float* second = first + 3 * entries_.figures();
     for (int i = 0; i < entries_.figures(); ++i) {
       const Rgb<double>& a = figures[i];
-      for (int c = 0; c < 3; ++c) first_[3 * i + c][cell] += static_cast<float>(a[c]);
-      for (int j = 0; j <= i; ++j) {
+      for (int c = 0; c < 3; ++c) *first++ += static_cast<float>(a[c]);
+      for (int j = 0; j <= i; ++j) {  // in the order of entries
         const Rgb<double>& b = figures[j];
-        second_[entries_.of(i, j)][cell] += static_cast<float>(a.r * b.r + a.g * b.g + a.b * b.b);
+        *second++ += static_cast<float>(a.r * b.r + a.g * b.g + a.b * b.b);
       }
     }
   }
-  CellMatrices covariances(int samples) const {
-    CellMatrices result;
-    for (int i = 0; i < entries_.figures(); ++i) {
-      for (int j = 0; j <= i; ++j) {  // in the order of entries
-        const std::vector<float>& products = second_[entries_.of(i, j)];
-        std::vector<double>& cells = result.emplace_back(products.begin(), products.end());
-        for (size_t cell = 0; cell < cells.size(); ++cell) {
-          for (int c = 0; c < 3; ++c) {
-            cells[cell] -= double{first_[3 * i + c][cell]} * first_[3 * j + c][cell] / samples;
-          }
-          cells[cell] /= samples - 1;
-        }
+  // From the samples of all folds but one, so many in each.
+  Matrix covariances(size_t cell, int but, int samples) const {
+    const Sums sums = sum(cell, but);
+    const double n = samples * (but == kAll ? kFolds : kFolds - 1);
+    return each([&](int i, int j, size_t entry) {
+      double products = sums.second[entry];
+      for (int c = 0; c < 3; ++c) products -= sums.first[3 * i + c] * sums.first[3 * j + c] / n;
+      return products / (n - 1);
+    });
+  }
+  // From the samples of one fold, about the means of the others.
+  Matrix judged(size_t cell, int fold, int samples) const {
+    Sums own, others = sum(cell, fold);
+    add(cell, fold, own);
+    const double n = samples * (kFolds - 1);
+    for (double& mean : others.first) mean /= n;
+    return each([&](int i, int j, size_t entry) {
+      double products = own.second[entry];
+      for (int c = 0; c < 3; ++c) {
+        const double a = others.first[3 * i + c], b = others.first[3 * j + c];
+        products += samples * a * b - own.first[3 * i + c] * b - own.first[3 * j + c] * a;
       }
+      return products / samples * (n / (n + 1));  // a mean has a variance of its own
+    });
+  }
+
+ private:
+  struct Sums {
+    std::array<double, size_t{3} * kLanes> first{};
+    Matrix second{};
+  };
+  void add(size_t cell, int fold, Sums& to) const {
+    const float* from = &sums_[(cell * kFolds + fold) * size_];
+    const size_t firsts = size_t{3} * entries_.figures();
+    for (size_t i = 0; i < firsts; ++i) to.first[i] += from[i];
+    for (size_t i = firsts; i < size_; ++i) to.second[i - firsts] += from[i];
+  }
+  Sums sum(size_t cell, int but) const {
+    Sums sums;
+    for (int fold = 0; fold < kFolds; ++fold) {
+      if (fold != but) add(cell, fold, sums);
+    }
+    return sums;
+  }
+  template <class Entry>
+  Matrix each(const Entry& entry) const {
+    Matrix result{};
+    size_t number = 0;
+    for (int i = 0; i < entries_.figures(); ++i) {
+      for (int j = 0; j <= i; ++j, ++number) result[number] = entry(i, j, number);
     }
     return result;
   }
 
- private:
   Entries entries_;
-  std::vector<std::vector<float>> first_, second_;  // [figure and channel], [entry]
+  size_t size_;  // of the sums of a cell and fold: figures and channels, then entries
+  std::vector<float> sums_;
 };
 
 // Along x and y, in units of the probing motion.
@@ -94,49 +131,53 @@ struct Coefficients {
   double x = 0, y = 0;
 };
 
-// Of one cell: from either half of the samples, to be judged by the other, and from both.
+// Of one cell: from all samples but those of each fold, to be judged by these, and from all.
 struct CellFit {
-  std::array<Coefficients, 2> halves;
-  Coefficients both;
+  std::array<Coefficients, kFolds> folds;
+  Coefficients all;
 };
 using Fits = std::vector<std::vector<CellFit>>;  // [parameter][cell]
 
 // Variance of a derivative that moves so.
-double variance_with(const CellMatrices& c, const Entries& e, size_t cell, int parameter,
-                     const Coefficients& b) {
-  const auto of = [&](int i, int j) { return c[e.of(i, j)][cell]; };
+double variance_with(const Matrix& c, const Entries& e, int parameter, const Coefficients& b) {
+  const auto of = [&](int i, int j) { return c[e.of(i, j)]; };
   return of(parameter, parameter) + 2 * (b.x * of(parameter, e.x()) + b.y * of(parameter, e.y())) +
          b.x * b.x * of(e.x(), e.x()) + 2 * b.x * b.y * of(e.x(), e.y()) +
          b.y * b.y * of(e.y(), e.y());
 }
 
+void add_to(Matrix& sum, double weight, const Matrix& m) {
+  for (size_t i = 0; i < m.size(); ++i) sum[i] += weight * m[i];
+}
+
 // Finds the motion that leaves least squared error times work.
 class FilmFitter {
  public:
-  // slots: [half][slot]. work: of a sample of each slot.
-  FilmFitter(const PlanGrid& grid, const Entries& entries,
-             std::array<std::vector<CellMatrices>, 2> slots, std::vector<double> work, int threads)
+  // samples: of each cell and fold. work: of a sample of each slot.
+  FilmFitter(const PlanGrid& grid, const Entries& entries, const std::vector<SlotSums>& slots,
+             int samples, std::vector<double> work, int threads)
       : grid_(grid),
         entries_(entries),
-        slots_(std::move(slots)),
+        slots_(slots),
+        samples_(samples),
         work_(std::move(work)),
         threads_(threads) {}
 
   void run() {
-    const double held =
-        error_times_work(variances(Fits(entries_.parameters(), Fits::value_type(grid_.size()))));
+    fits_.assign(entries_.parameters(), Fits::value_type(grid_.size()));
+    const double held = error_times_work(variances());
     if (!(held > 0)) return;
     std::vector<double> left(work_.size(), 1);
     for (int round = 0; round < kRounds; ++round) {
       weigh(left);
-      fits_ = choose();
-      left = variances(fits_);
+      choose();
+      left = variances();
     }
     left_ = error_times_work(left) / held;
   }
   // What is left of squared error times work, cross-validated; 1 where nothing moves.
   double left() const { return left_; }
-  const Coefficients& of(int parameter, size_t cell) const { return fits_[parameter][cell].both; }
+  const Coefficients& of(int parameter, size_t cell) const { return fits_[parameter][cell].all; }
 
  private:
   // After equal time, where samples are shared out best.
@@ -150,56 +191,57 @@ class FilmFitter {
 
   // Of every slot over the film, cross-validated, summed over the parameters, each in units of all
   // that it has with positions held.
-  std::vector<double> variances(const Fits& fits) const {
-    std::vector<double> result(work_.size());
-    for (int k = 0; k < entries_.parameters(); ++k) {
-      std::vector<double> own(work_.size());
-      double held = 0;
-      for (size_t t = 0; t < work_.size(); ++t) {
-        std::vector<double> moving(grid_.size()), resting(grid_.size());
+  std::vector<double> variances() const {
+    std::vector<std::vector<double>> moving(work_.size()), resting(work_.size());  // of parameters
+    parallel_for(work_.size(), threads_, [&](size_t t) {
+      for (int k = 0; k < entries_.parameters(); ++k) {
+        std::vector<double> moved(grid_.size()), held(grid_.size());
         for (size_t cell = 0; cell < grid_.size(); ++cell) {
-          for (int half = 0; half < 2; ++half) {
-            const CellMatrices& other = slots_[1 - half][t];
-            moving[cell] +=
-                0.5 * variance_with(other, entries_, cell, k, fits[k][cell].halves[half]);
-            resting[cell] += 0.5 * other[entries_.of(k, k)][cell];
+          for (int fold = 0; fold < kFolds; ++fold) {
+            const Matrix c = slots_[t].judged(cell, fold, samples_);
+            moved[cell] += variance_with(c, entries_, k, fits_[k][cell].folds[fold]) / kFolds;
+            held[cell] += c[entries_.of(k, k)] / kFolds;
           }
         }
-        own[t] = trimmed_mean(moving);
-        held += trimmed_mean(resting);
+        moving[t].push_back(trimmed_mean(std::move(moved)));
+        resting[t].push_back(trimmed_mean(std::move(held)));
       }
+    });
+    std::vector<double> result(work_.size());
+    for (int k = 0; k < entries_.parameters(); ++k) {
+      double held = 0;
+      for (const std::vector<double>& of : resting) held += of[k];
       if (!(held > 0)) continue;
-      for (size_t t = 0; t < work_.size(); ++t) result[t] += own[t] / held;
+      for (size_t t = 0; t < work_.size(); ++t) result[t] += moving[t][k] / held;
     }
     return result;
   }
 
   // As in field_fit.cpp: by the derivative of squared error times work.
   void weigh(const std::vector<double>& variances) {
-    for (int half = 0; half < 2; ++half) {
-      total_[half].assign(entries_.size(), std::vector<double>(grid_.size()));
+    all_.assign(grid_.size(), {});
+    for (int fold = 0; fold < kFolds; ++fold) {
+      fitted_[fold].assign(grid_.size(), {});
+      judging_[fold].assign(grid_.size(), {});
+    }
+    parallel_for(grid_.size(), threads_, [&](size_t cell) {
       for (size_t t = 0; t < work_.size(); ++t) {
         if (!(variances[t] > 0) || !(work_[t] > 0)) continue;
         const double weight = std::sqrt(work_[t] / variances[t]);
-        for (size_t i = 0; i < entries_.size(); ++i) {
-          for (size_t cell = 0; cell < grid_.size(); ++cell) {
-            total_[half][i][cell] += weight * slots_[half][t][i][cell];
-          }
+        add_to(all_[cell], weight, slots_[t].covariances(cell, kAll, samples_));
+        for (int fold = 0; fold < kFolds; ++fold) {
+          add_to(fitted_[fold][cell], weight, slots_[t].covariances(cell, fold, samples_));
+          add_to(judging_[fold][cell], weight, slots_[t].judged(cell, fold, samples_));
         }
       }
-    }
-    usual_.assign(entries_.size(), 0);
-    for (const CellMatrices& total : total_) {
-      for (size_t i = 0; i < entries_.size(); ++i) {
-        usual_[i] += 0.5 * std::accumulate(total[i].begin(), total[i].end(), 0.0) /
-                     static_cast<double>(grid_.size());
-      }
-    }
+    });
+    usual_ = {};
+    for (const Matrix& m : all_) add_to(usual_, 1 / static_cast<double>(grid_.size()), m);
   }
 
   // Least squares.
-  Coefficients solve(const CellMatrices& c, size_t cell, int parameter) const {
-    const auto of = [&](int i, int j) { return c[entries_.of(i, j)][cell]; };
+  Coefficients solve(const Matrix& c, int parameter) const {
+    const auto of = [&](int i, int j) { return c[entries_.of(i, j)]; };
     const double usual = usual_[entries_.of(parameter, parameter)];
     const double size = usual > 0 ? std::max(of(parameter, parameter), 0.0) / usual : 0;
     const auto diagonal = [&](int i) {
@@ -214,60 +256,67 @@ class FilmFitter {
   }
 
   // Of windows of all sizes the one that leaves least, and none that does not convince.
-  Fits choose() const {
-    Fits fits(entries_.parameters(), Fits::value_type(grid_.size()));
+  void choose() {
+    fits_.assign(entries_.parameters(), Fits::value_type(grid_.size()));
     std::vector<std::vector<double>> least;
     for (int k = 0; k < entries_.parameters(); ++k) {
-      std::vector<double> held(grid_.size());
-      for (const CellMatrices& total : total_) {
-        const std::vector<double>& own = total[entries_.of(k, k)];
-        for (size_t cell = 0; cell < grid_.size(); ++cell) held[cell] += 0.5 * own[cell];
-      }
-      least.push_back(window_means(grid_, held, kJudgeRadius));
+      least.push_back(judged(k, Fits::value_type(grid_.size())));
       for (double& v : least[k]) v *= kConvincing;
     }
     for (const int radius : kRadii) {
-      std::array<CellMatrices, 3> windows;  // over either half, and over both
-      for (CellMatrices& matrices : windows) matrices.resize(entries_.size());
-      parallel_for(entries_.size(), threads_, [&](size_t i) {
-        for (int half = 0; half < 2; ++half)
-          windows[half][i] = window_means(grid_, total_[half][i], radius);
-        windows[2][i] = windows[0][i];
-        for (size_t cell = 0; cell < grid_.size(); ++cell)
-          windows[2][i][cell] += windows[1][i][cell];
-      });
-      for (int k = 0; k < entries_.parameters(); ++k) try_windows(windows, k, least[k], fits[k]);
+      const CellMatrices all = windows(all_, radius);
+      std::array<CellMatrices, kFolds> folds;
+      for (int fold = 0; fold < kFolds; ++fold) folds[fold] = windows(fitted_[fold], radius);
+      for (int k = 0; k < entries_.parameters(); ++k) {
+        std::vector<CellFit> fits(grid_.size());
+        parallel_for(grid_.size(), threads_, [&](size_t cell) {
+          for (int fold = 0; fold < kFolds; ++fold)
+            fits[cell].folds[fold] = solve(folds[fold][cell], k);
+          fits[cell].all = solve(all[cell], k);
+        });
+        const std::vector<double> left = judged(k, fits);
+        for (size_t cell = 0; cell < grid_.size(); ++cell) {
+          if (!(left[cell] < least[k][cell])) continue;
+          least[k][cell] = left[cell];
+          fits_[k][cell] = fits[cell];
+        }
+      }
     }
-    return fits;
   }
 
-  void try_windows(const std::array<CellMatrices, 3>& windows, int parameter,
-                   std::vector<double>& least, std::vector<CellFit>& best) const {
-    std::vector<CellFit> fits(grid_.size());
+  // What fits leave over 9 by 9 cells, cross-validated.
+  std::vector<double> judged(int parameter, const std::vector<CellFit>& fits) const {
     std::vector<double> left(grid_.size());
     for (size_t cell = 0; cell < grid_.size(); ++cell) {
-      for (int half = 0; half < 2; ++half) {
-        const Coefficients b = solve(windows[half], cell, parameter);
-        fits[cell].halves[half] = b;
-        left[cell] += 0.5 * variance_with(total_[1 - half], entries_, cell, parameter, b);
+      for (int fold = 0; fold < kFolds; ++fold) {
+        left[cell] +=
+            variance_with(judging_[fold][cell], entries_, parameter, fits[cell].folds[fold]);
       }
-      fits[cell].both = solve(windows[2], cell, parameter);
     }
-    const std::vector<double> judged = window_means(grid_, left, kJudgeRadius);
-    for (size_t cell = 0; cell < grid_.size(); ++cell) {
-      if (!(judged[cell] < least[cell])) continue;
-      least[cell] = judged[cell];
-      best[cell] = fits[cell];
-    }
+    return window_means(grid_, left, kJudgeRadius);
+  }
+
+  CellMatrices windows(const CellMatrices& cells, int radius) const {
+    CellMatrices result(grid_.size());
+    parallel_for(entries_.size(), threads_, [&](size_t i) {
+      std::vector<double> values(grid_.size());
+      for (size_t cell = 0; cell < grid_.size(); ++cell) values[cell] = cells[cell][i];
+      values = window_means(grid_, values, radius);
+      for (size_t cell = 0; cell < grid_.size(); ++cell) result[cell][i] = values[cell];
+    });
+    return result;
   }
 
   const PlanGrid& grid_;
   Entries entries_;
-  std::array<std::vector<CellMatrices>, 2> slots_;
+  const std::vector<SlotSums>& slots_;
+  int samples_;
   std::vector<double> work_;
   int threads_;
-  std::array<CellMatrices, 2> total_;  // of all slots, weighed
-  std::vector<double> usual_;          // its means over the film
+  // Of all slots, weighed: from all samples, from those of all folds but one, and about these.
+  CellMatrices all_;
+  std::array<CellMatrices, kFolds> fitted_, judging_;
+  Matrix usual_;  // the mean of all_
   Fits fits_;
   double left_ = 1;
 };
@@ -282,35 +331,35 @@ class FilmPilot {
     probe_ = probe.get();
     probes_.push_back(std::move(probe));
     costs_.resize(estimator.slots());
+    sums_.assign(estimator.slots(), SlotSums(entries_, grid.size()));
   }
 
   // False if interrupted.
-  bool run_sample(int number, const RunSettings& settings, const Stopwatch& watch) {
+  bool run_sample(const RunSettings& settings, const Stopwatch& watch) {
     constexpr uint64_t kStream = 0xf117;  // any number
     RunSettings quiet = settings;
     quiet.progress = nullptr;
     ProgressCounter progress(quiet, watch, 1);
-    const Batch batch{mix_bits(settings.seed + kStream), number, number + 1};
+    const Batch batch{mix_bits(settings.seed + kStream), samples_, samples_ + 1};
     const auto found = run_batch(probes_, batch, settings.threads, progress);
     if (found.empty()) return false;
-    auto& sums = sums_[number % 2];
-    if (sums.empty()) sums.assign(estimator_.slots(), SlotSums(entries_, grid_.size()));
     for (size_t slot = 0; slot < estimator_.slots(); ++slot) {
       costs_[slot].merge(found[0].costs[slot]);
-      add(number, &found[0].images[slot * entries_.figures()], sums[slot]);
+      add(&found[0].images[slot * entries_.figures()], sums_[slot]);
     }
     ++samples_;
     return true;
   }
   int samples() const { return samples_; }
+  double work() const {
+    double sum = 0;
+    for (size_t slot = 0; slot < estimator_.slots(); ++slot)
+      sum += estimator_.work(slot, costs_[slot]);
+    return sum;
+  }
 
-  // samples() must be 4, or a multiple of 8.
+  // samples() must be kTurn, or a multiple of twice as many.
   FilmFitter fit(int threads) const {
-    std::array<std::vector<CellMatrices>, 2> slots;
-    for (int half = 0; half < 2; ++half) {
-      for (const SlotSums& sums : sums_[half])
-        slots[half].push_back(sums.covariances(std::max(kTurn / 2, samples_ / 4)));
-    }
     std::vector<double> work;
     for (size_t slot = 0; slot < estimator_.slots(); ++slot) {
       const size_t pixels =
@@ -318,7 +367,8 @@ class FilmPilot {
       work.push_back(estimator_.work(slot, costs_[slot]) /
                      (static_cast<double>(samples_) * static_cast<double>(pixels)));
     }
-    FilmFitter fitter(grid_, entries_, std::move(slots), std::move(work), threads);
+    const int of_fold = std::max(1, samples_ / (2 * kFolds));
+    FilmFitter fitter(grid_, entries_, sums_, of_fold, std::move(work), threads);
     fitter.run();
     return fitter;
   }
@@ -326,18 +376,18 @@ class FilmPilot {
  private:
   const Film& film() const { return estimator_.scene().film; }
 
-  // images: of every figure.
-  void add(int number, const std::vector<double>* images, SlotSums& sums) const {
+  // images: of every figure, of the sample at hand.
+  void add(const std::vector<double>* images, SlotSums& sums) const {
     std::vector<Rgb<double>> figures(entries_.figures());
     for (int y = film().crop_y; y < film().crop_y + film().crop_height; ++y) {
       for (int x = film().crop_x; x < film().crop_x + film().crop_width; ++x) {
-        if (!probe_->looks_at({x, y, number})) continue;
+        if (!probe_->looks_at({x, y, samples_})) continue;
         const size_t index = pixel_index(film(), x, y);
         for (int i = 0; i < entries_.figures(); ++i) {
           const double* at = &images[i][index];
           figures[i] = {at[0], at[1], at[2]};
         }
-        sums.add(grid_.index(x, y), figures);
+        sums.add(samples_ % kFolds, grid_.index(x, y), figures);
       }
     }
   }
@@ -347,10 +397,21 @@ class FilmPilot {
   Entries entries_;
   std::vector<std::unique_ptr<SampleEstimator>> probes_;  // one
   const FilmProbe* probe_;
-  std::array<std::vector<SlotSums>, 2> sums_;  // of samples with even and with odd numbers
+  std::vector<SlotSums> sums_;
   std::vector<TermCost> costs_;
   int samples_ = 0;
 };
+
+// So many samples as each cell can have alike, at most; or those of the first turn.
+int whole_turns(double samples) {
+  const int each = 2 * kTurn;
+  return samples < each ? (samples < kTurn ? 0 : kTurn)
+                        : static_cast<int>(std::min(samples, 1e6)) / each * each;
+}
+
+bool looks_after(int samples, int last) {
+  return samples == last || samples == 4 || samples == 8 || samples == 16;
+}
 
 }  // namespace
 
@@ -376,7 +437,7 @@ double film_speed(const TermEstimator& estimator) {
   return pixels * estimator.motion_rates().in_view(eye, std::isfinite(distance) ? distance : 0);
 }
 
-FilmFit fit_film(TermEstimator& estimator, const SamplePlan& plan, int spp,
+FilmFit fit_film(TermEstimator& estimator, const SamplePlan& plan, const FilmLook& look,
                  const RunSettings& settings, const Stopwatch& watch) {
   FilmFit fit;
   fit.grid = PlanGrid(estimator.scene().film, kMostProbes);
@@ -392,24 +453,25 @@ FilmFit fit_film(TermEstimator& estimator, const SamplePlan& plan, int spp,
 
   FilmPilot pilot(estimator, fit.grid);
   const double began = watch.seconds();
-  while (pilot.samples() < spp) {
-    if (!pilot.run_sample(pilot.samples(), settings, watch)) return fit;
-    const int samples = pilot.samples();
-    if (samples == 1 && settings.seconds > 0) {
-      const double each = watch.seconds() - began;
-      spp = std::min(spp, static_cast<int>(std::min(settings.seconds / 8 / each, 1e6)) / 8 * 8);
-      if (spp == 0) return fit;
+  for (int last = kTurn; pilot.samples() < last;) {
+    if (!pilot.run_sample(settings, watch)) return fit;
+    if (pilot.samples() == 1) {
+      double most = std::min<double>(look.spp, look.work / pilot.work());
+      if (settings.seconds > 0)
+        most = std::min(most, settings.seconds / 8 / (watch.seconds() - began));
+      last = whole_turns(most);
     }
-    const bool looks = samples == 4 || samples == 8 || samples == 16;
-    if (looks && samples < spp && pilot.fit(settings.threads).left() > kHopeless) return fit;
-  }
-  const FilmFitter fitter = pilot.fit(settings.threads);
-  if (fitter.left() > kConvincingFilm) return fit;
-  fit.motion.resize(fit.grid.size());
-  for (size_t cell = 0; cell < fit.grid.size(); ++cell) {
-    for (int k = 0; k < parameters; ++k) {
-      fit.motion[cell].x[k] = fitter.of(k, cell).x * unit;
-      fit.motion[cell].y[k] = fitter.of(k, cell).y * unit;
+    if (!looks_after(pilot.samples(), last)) continue;
+    const FilmFitter fitter = pilot.fit(settings.threads);
+    const double left = fitter.left();
+    if (left > look.most_left) return fit;
+    if (pilot.samples() < last) continue;
+    fit.motion.resize(fit.grid.size());
+    for (size_t cell = 0; cell < fit.grid.size(); ++cell) {
+      for (int k = 0; k < parameters; ++k) {
+        fit.motion[cell].x[k] = fitter.of(k, cell).x * unit;
+        fit.motion[cell].y[k] = fitter.of(k, cell).y * unit;
+      }
     }
   }
   return fit;

@@ -20,10 +20,18 @@ struct FilmFit {
   std::vector<FilmMotion> motion;  // by cell; empty if positions are better held everywhere
 };
 
-// A pilot of at most spp samples of every other probed pixel: a multiple of 8. The estimator has
-// kMostFilmParameters at most, and is left with a plan that is of no use. settings, watch: as of
-// run_pilot; it takes an eighth of a limit of time. Deterministic on any number of threads.
-FilmFit fit_film(TermEstimator& estimator, const SamplePlan& plan, int spp,
+struct FilmLook {
+  int spp;      // of every other probed pixel, at most
+  double work;  // of these, at most: see TermEstimator::work
+  // Positions are held where motion leaves more than this share of squared error times work, while
+  // directions are held.
+  double most_left;
+};
+
+// By a pilot. The estimator has kMostFilmParameters at most, and is left with a plan that is of no
+// use. settings, watch: as of run_pilot; it takes an eighth of a limit of time. Deterministic on any
+// number of threads.
+FilmFit fit_film(TermEstimator& estimator, const SamplePlan& plan, const FilmLook& look,
                  const RunSettings& settings, const Stopwatch& watch);
 
 // How fast, about, what moves does so on the film [pixels per unit of the first parameter].

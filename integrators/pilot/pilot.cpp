@@ -136,23 +136,52 @@ std::vector<double> PilotFigures::variances(size_t slot, int lane) const {
   return result;
 }
 
-PilotFigures run_pilot(const TermEstimator& estimator, bool turns, int spp,
+// Covariances by their degrees of freedom.
+void PilotFigures::merge(const PilotFigures& more) {
+  const int sum = spp + more.spp;
+  const auto share = static_cast<double>(more.spp) / sum;
+  const auto of_cells = static_cast<float>(more.spp - 2) / static_cast<float>(sum - 4);
+  for (int half = 0; half < 2; ++half) {
+    for (size_t slot = 0; slot < halves[half].size(); ++slot) {
+      CellCovariances& to = halves[half][slot];
+      for (size_t cell = 0; !to.empty() && cell < grid.size(); ++cell) {
+        const float* from = more.halves[half][slot].entries(cell);
+        float* entries = to.entries(cell);
+        for (size_t i = 0; i < to.size(); ++i) entries[i] += of_cells * (from[i] - entries[i]);
+      }
+    }
+  }
+  const auto mix = [&](double& a, double b) { a += share * (b - a); };
+  for (size_t slot = 0; slot < work.size(); ++slot) {
+    mix(work[slot], more.work[slot]);
+    for (int k = 0; k < kLanes; ++k) mix(film_variance[slot][k], more.film_variance[slot][k]);
+  }
+  mix(light_work, more.light_work);
+  traced.add(more.traced);
+  spp = sum;
+}
+
+PilotFigures run_pilot(const TermEstimator& estimator, bool turns, PilotSamples samples,
                        const RunSettings& settings, const Stopwatch& watch) {
   PilotFigures figures;
   auto owned = std::make_unique<PilotEstimator>(estimator, turns);
   PilotEstimator& pilot = *owned;
   PilotRun run(estimator, std::move(owned));
   const double began = watch.seconds();
-  if (!run.run(settings, 0, 1, watch)) return figures;
+  const int first = samples.first;
+  if (!run.run(settings, first, first + 1, watch)) return figures;
+  int spp = samples.count();
   if (settings.seconds > 0) {
     const double now = watch.seconds();
-    spp = pilot_samples_in_time(spp, now - began, settings.seconds, settings.seconds - now);
-    if (spp == 0) return figures;
+    spp =
+        pilot_samples_in_time(samples.last, now - began, settings.seconds, settings.seconds - now) -
+        first;
+    if (spp < 4) return figures;
   }
   const int half = spp / 2;
-  if (half > 1 && !run.run(settings, 1, half, watch)) return figures;
+  if (half > 1 && !run.run(settings, first + 1, first + half, watch)) return figures;
   figures.halves[0] = pilot.take_covariances(half);
-  if (!run.run(settings, half, spp, watch)) return figures;
+  if (!run.run(settings, first + half, first + spp, watch)) return figures;
   figures.halves[1] = pilot.take_covariances(half);
   figures.spp = spp;
   figures.grid = pilot.grid();

@@ -3,6 +3,7 @@
 // for choices about the others. Its random numbers are its own, and its samples are thrown away: a
 // choice that depends on the samples it is made for would bias them.
 #include <array>
+#include <numeric>
 #include <vector>
 
 #include "integrators/estimates/batches.h"
@@ -31,14 +32,23 @@ struct PilotFigures {
   double light_work = 0;     // of one light sample at all later vertices of a path
   std::vector<double> work;  // of one sample of a pixel, of every slot, see Term::work
 
+  double work_of_pixel() const { return std::accumulate(work.begin(), work.end(), 0.0); }
   // Whether a slot's samples belong to pixels.
   bool in_cells(size_t slot) const { return !halves[0][slot].empty(); }
+  // Figures of other samples of the same pixels.
+  void merge(const PilotFigures& more);
 };
 
-// turns: whether turns of directions at first vertices are looked at. spp: even. settings: its
-// limit of time holds for the whole job, which `watch` has timed since it began: a pilot takes an
-// eighth of it at most.
-PilotFigures run_pilot(const TermEstimator& estimator, bool turns, int spp,
+// Of the samples of a probed pixel: an even number.
+struct PilotSamples {
+  int first, last;
+  int count() const { return last - first; }
+};
+
+// turns: whether turns of directions at first vertices are looked at. settings: its limit of time
+// holds for the whole job, which `watch` has timed since it began: a pilot takes an eighth of it at
+// most, the samples before these included.
+PilotFigures run_pilot(const TermEstimator& estimator, bool turns, PilotSamples samples,
                        const RunSettings& settings, const Stopwatch& watch);
 
 }  // namespace limn

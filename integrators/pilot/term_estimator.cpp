@@ -91,7 +91,7 @@ TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> para
       camera_(scene_.camera),
       filter_(scene_.film.filter),
       visible_(std::move(visible)),
-      input_(context_, lanes_, lane_scale_, sampler, threads, warping != nullptr, moved_film),
+      input_(context_, lanes_, lane_scale_, sampler, threads, warping != nullptr),
       types_(types),
       moves_film_(moved_film),
       rates_(scene_, lanes_, lane_scale_),

@@ -16,8 +16,7 @@ namespace {
 class CameraTerm final : public Term {
  public:
   explicit CameraTerm(TermInput& input)
-      : edges_(input.context, input.edges(), input.lanes, nullptr, input.visible,
-               input.moves_film) {}
+      : edges_(input.context, input.edges(), input.lanes, nullptr, input.visible) {}
 
   bool uses_film() const override { return !edges_.empty(); }
   bool sample_film(double u, const Rng& key, RayCount& rays, FilmSample& sample) const override {

@@ -120,23 +120,28 @@ std::span<const FaceRef> faces_that_move(const EdgeMesh& mesh, EdgeId edge) {
 }  // namespace
 
 CameraEdges::CameraEdges(const PathContext& context, const EdgeSamplerInput& input, int lanes,
-                         const FreeMotion* free, const FilmRegions* visible, bool all)
+                         const FreeMotion* free, const FilmRegions* visible)
     : context_(context),
       input_(input),
       lanes_(free ? 3 : lanes),
       free_(free),
-      all_(all),
+      visible_(visible),
       viewpoint_(context.viewpoints->camera),
       clips_(find_clip_segments(context.scene)) {
   const Stopwatch watch;
-  for (uint32_t o = 0; o < input_.objects.size(); ++o) add_object(ShapeId(o));
-  for (uint32_t c = 0; c < clips_.size(); ++c) add_clip(c);
-  find_in_line();
-  if (visible) keep_seen(*visible);
+  list();
   weigh({});
   moving_ = std::count_if(pieces_.begin(), pieces_.end(),
                           [](const Piece& piece) { return !is_zero(piece.weight); });
   list_seconds_ = watch.seconds();
+}
+
+void CameraEdges::list() {
+  edges_.clear();
+  for (uint32_t o = 0; o < input_.objects.size(); ++o) add_object(ShapeId(o));
+  for (uint32_t c = 0; c < clips_.size(); ++c) add_clip(c);
+  find_in_line();
+  if (visible_) keep_seen(*visible_);
 }
 
 void CameraEdges::find_in_line() {
@@ -305,8 +310,18 @@ bool CameraEdges::place_on_film(const Vec3<Dual>& x0, const Vec3<Dual>& x1, cons
 }
 
 void CameraEdges::move_film(const FilmMotionAt& motion) {
+  const Stopwatch watch;
   lanes_ = kLanes;
+  if (motion && !lists_all_) {
+    lists_all_ = true;
+    list();
+  } else if (!motion && lists_all_) {
+    lists_all_ = false;
+    std::erase_if(edges_, [](const FilmEdge& edge) { return !moves(edge); });
+    edges_.shrink_to_fit();
+  }
   weigh(motion);
+  list_seconds_ += watch.seconds();
 }
 
 void CameraEdges::add_pieces(uint32_t index, const FilmMotionAt& motion) {

@@ -50,14 +50,12 @@ class CameraEdges {
   // lanes (relative to the camera); null: what the scene's tangents move, with their speeds in
   // `lanes` lanes. visible: of the film, to list only what is seen of edges; null: hidden parts are
   // listed too, and found to be hidden by jump_at. Edges of faces seen edge-on, and edges
-  // behind others in one line: see Viewpoint. all: edges at rest are listed, too, for
-  // move_film.
+  // behind others in one line: see Viewpoint.
   CameraEdges(const PathContext& context, const EdgeSamplerInput& input, int lanes,
-              const FreeMotion* free = nullptr, const FilmRegions* visible = nullptr,
-              bool all = false);
+              const FreeMotion* free = nullptr, const FilmRegions* visible = nullptr);
 
   // Edges are drawn by how fast they move against positions on the film, which may move from now
-  // on; an empty function: they are held.
+  // on, and those at rest are listed, too; an empty function: positions are held.
   void move_film(const FilmMotionAt& motion);
 
   // Whether none moves.
@@ -77,12 +75,13 @@ class CameraEdges {
   bool jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& rays, Rgb<double>& jump) const;
 
  private:
+  static bool moves(const FilmEdge& edge) { return !is_zero(edge.speed0) || !is_zero(edge.speed1); }
+  void list();
   void add_object(ShapeId object);
   void add_clip(uint32_t index);
   // faces: that the edge moves with.
   void add(const FilmEdge& edge, std::span<const FaceRef> faces) {
-    const bool moves = free_ ? free_->moves(faces) : !is_zero(edge.speed0) || !is_zero(edge.speed1);
-    if (moves || all_) {
+    if (lists_all_ || (free_ ? free_->moves(faces) : moves(edge))) {
       edges_.push_back(edge);
     } else {
       resting_.push_back(edge);
@@ -110,9 +109,10 @@ class CameraEdges {
   const EdgeSamplerInput& input_;
   int lanes_;
   const FreeMotion* free_;
-  bool all_;
+  const FilmRegions* visible_;
   const Viewpoint& viewpoint_;
   std::vector<ClipSegment> clips_;
+  bool lists_all_ = false;
   std::vector<FilmEdge> edges_;  // that move, or all
   size_t moving_ = 0;
   std::vector<FilmLine> resting_;  // until what is in line with them is found

@@ -114,15 +114,13 @@ class FilmRegions;
 class TermInput {
  public:
   TermInput(const PathContext& path_context, int lane_count, const Lanes& lane_scales,
-            const EdgeSamplerType& sampler_type, int thread_count, bool warped = false,
-            bool film_moves = false)
+            const EdgeSamplerType& sampler_type, int thread_count, bool warped = false)
       : context(path_context),
         lanes(lane_count),
         lane_scale(lane_scales),
         sampler(sampler_type),
         threads(thread_count),
-        warps(warped),
-        moves_film(film_moves) {}
+        warps(warped) {}
 
   const PathContext& context;      // the scene with its parameters seeded
   int lanes;                       // how many derivative lanes are in use
@@ -130,7 +128,6 @@ class TermInput {
   const EdgeSamplerType& sampler;  // how shading points choose an edge
   int threads;
   bool warps;                            // whether directions are warped, see warp_field.h
-  bool moves_film;                       // whether Term::move_film may be called
   const FilmRegions* visible = nullptr;  // of the film; null: rays tell what is seen
 
   // Edges of all shapes (object i is shape i), light polygons and the environment, as an edge

@@ -4,6 +4,7 @@
 
 #include "integrators/estimates/batches.h"
 #include "integrators/pilot/film_fit.h"
+#include "integrators/pilot/pilot.h"
 #include "integrators/pilot/term_estimator.h"
 #include "limn/edgetree/edge_sampler_types.h"
 #include "support/meshes.h"
@@ -226,6 +227,58 @@ TEST(FilmMotion, TakesOutDetailThatSlides) {
     return sum * static_cast<double>(rays);
   };
   EXPECT_LT(2 * variance_times_rays("adaptive"), variance_times_rays("held-positions"));
+}
+
+// Detail at rest, before which a plain square slides: the pilots look, and leave nothing behind.
+TEST(FilmMotion, IsHeldWhereItDoesNotPay) {
+  const TempFiles files;
+  SceneParts parts;
+  parts.width = parts.height = 12;
+  parts.body = fence() +
+               obj_shape("bars", write_mesh(files, "bars.obj", bars(60)), true, 1, {0, 0, 0.5},
+                         diffuse("wood", "0.3, 0.2, 0.1")) +
+               square("plate", 0.4, 0, {0, 0.8, 0.8}, diffuse("tin", "0.5, 0.5, 0.5"));
+  const Scene scene = make_scene(files, parts);
+  const GradientResult chosen = run_method(scene, {"plate.translate.x"}, "adaptive", 128, 3);
+  const GradientResult held = run_method(scene, {"plate.translate.x"}, "held-positions", 128, 3);
+  EXPECT_EQ(share_that_moves(chosen), 0);
+  expect_same_bits(chosen, held);
+}
+
+// A pilot that goes on: as many degrees of freedom as samples of a half, less one, in either part.
+TEST(Pilot, MergesFiguresOfMoreSamples) {
+  const TempFiles files;
+  const Scene scene = scene_with(files, kFilters[1], 6);
+  const EdgeSamplerType& sampler = edge_sampler_type("silhouettes");
+  const auto terms = terms_of(scene, sampler);
+  const Parameter parameter = find_parameter(scene, "ball.translate.y");
+  const TermEstimator estimator(scene, {&parameter, 1}, terms,
+                                std::vector<bool>(terms.size(), true), sampler, 2);
+  const Stopwatch watch;
+  const RunSettings settings;
+  const auto run = [&](int first, int last) {
+    return run_pilot(estimator, false, {first, last}, settings, watch);
+  };
+  const PilotFigures few = run(0, 8), more = run(8, 24), all = run(0, 24);
+  PilotFigures merged = few;
+  merged.merge(more);
+  EXPECT_EQ(merged.spp, 24);
+  for (size_t slot = 0; slot < terms.size(); ++slot) {
+    // On the film samples are spread batch by batch.
+    if (!few.film_variance[slot][0]) {
+      EXPECT_NEAR(merged.work[slot], all.work[slot], 1e-9 * all.work[slot]) << slot;
+    }
+    if (!merged.in_cells(slot)) {
+      const double a = few.film_variance[slot][0], b = more.film_variance[slot][0];
+      EXPECT_NEAR(merged.film_variance[slot][0], (8 * a + 16 * b) / 24, 1e-9 * (a + b));
+      continue;
+    }
+    const auto a = few.variances(slot, 0), b = more.variances(slot, 0);
+    const auto sum = merged.variances(slot, 0);
+    for (size_t cell = 0; cell < sum.size(); ++cell)
+      EXPECT_NEAR(sum[cell], (3 * a[cell] + 7 * b[cell]) / 10, 1e-5 * (a[cell] + b[cell]));
+  }
+  EXPECT_NEAR(merged.light_work, all.light_work, 1e-9 * all.light_work);
 }
 
 // Three parameters are looked at two by two.

@@ -1,0 +1,57 @@
+// Figures of pilots and of fits together.
+#include "integrators/pilot/probed.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "integrators/pilot/allocation.h"
+
+namespace limn {
+
+std::vector<double> Probed::variances(int lane, std::vector<std::vector<double>>& cells) const {
+  const size_t slots = pilot.work.size();
+  std::vector<double> means(slots);
+  cells.assign(slots, {});
+  for (size_t slot = 0; slot < slots; ++slot) {
+    const double film = pilot.film_variance[slot][lane];
+    means[slot] = film;
+    if (!pilot.in_cells(slot)) continue;
+    // Some terms have samples of both kinds.
+    cells[slot] = fit.variances.empty() ? pilot.variances(slot, lane) : fit.variances[lane][slot];
+    means[slot] += trimmed_mean(cells[slot]);
+    for (double& cell : cells[slot]) cell += film;
+  }
+  return means;
+}
+
+double Probed::error_times_work(int parameters) const {
+  double product = 1;
+  for (int lane = 0; lane < parameters; ++lane) {
+    std::vector<std::vector<double>> cells;
+    const std::vector<double> means = variances(lane, cells);
+    double sum = 0;
+    for (size_t slot = 0; slot < means.size(); ++slot)
+      sum += std::sqrt(std::max(means[slot], 0.0) * pilot.work[slot]);
+    if (sum > 0) product *= std::pow(sum, 2.0 / parameters);
+  }
+  return product;
+}
+
+Probed probe(const TermEstimator& estimator, bool turns, int spp, const RunSettings& settings,
+             const Stopwatch& watch) {
+  Probed probed{run_pilot(estimator, turns, {0, spp}, settings, watch), {}};
+  if (turns && probed.pilot.spp > 0)
+    probed.fit = fit_fields(probed.pilot, estimator.lanes(), settings.threads);
+  return probed;
+}
+
+void extend(Probed& probed, const TermEstimator& estimator, bool turns, int spp,
+            const RunSettings& settings, const Stopwatch& watch) {
+  if (spp - probed.pilot.spp < 4) return;
+  const PilotFigures more = run_pilot(estimator, turns, {probed.pilot.spp, spp}, settings, watch);
+  if (more.spp == 0) return;
+  probed.pilot.merge(more);
+  if (turns) probed.fit = fit_fields(probed.pilot, estimator.lanes(), settings.threads);
+}
+
+}  // namespace limn
