@@ -86,12 +86,12 @@ constexpr double kLeastSamples = 0.125;
 constexpr double kFilmConvincing = 0.97;
 // Their motion is tried if a fit of it leaves less than the first share, and, of what turns of
 // directions leave, not much more: together they may leave less. In view, where either leaves 0.3,
-// both leave 0.2; where turns left a third of what positions do (a soft shadow, a chandelier), both
-// left 1.3 to 1.8 times as much. Turns that leave less than the last share leave nothing to look for.
+// both leave 0.2; in a chandelier, where turns leave 0.05 and motion 0.2, both leave 0.05 to 0.1.
+// Turns that leave less than the last share leave too little to look for.
 constexpr double kFilmPromising = 0.99, kFilmAgainstTurns = 1.25, kTurnsAlone = 0.2;
 // Of a pilot, before positions on the film are looked at; it goes on behind that. Not tuned.
 constexpr int kFirstLook = 8;
-// The most work of the pilot that looks at them, as a share of the run's.
+// The most work of the pilot that looks at them, as a share of the run's. Not tuned.
 constexpr double kFilmShare = 1.0 / 4;
 
 // Of runs long enough for more estimators: samples, and a set-up's share of the time; not tuned.
@@ -342,9 +342,11 @@ class TermJob {
     RunSettings share = settings;
     share.seconds /= static_cast<double>(passes_.size());
     estimator.set_plan(probing);
-    const int first_look = std::min(spp, kFirstLook);
+    const bool film = film_pilot_samples(settings.spp) > 0 && can_move_film() &&
+                      !method_.random_directions && !estimator.motion_rates().still();
+    const int first_look = film ? std::min(spp, kFirstLook) : spp;
     Probed probed = probe(estimator, turns, first_look, share, watch);
-    if (probed.pilot.spp == first_look) {
+    if (film && probed.pilot.spp == first_look) {
       look_at_film(p, turns, share, watch, probing, probed);
       extend(probed, estimator, turns, spp, share, watch);
     }
@@ -363,7 +365,7 @@ class TermJob {
     const int lanes = estimator.lanes();
     const double held = probed.error_times_work(lanes);
     const double not_turned = Probed{probed.pilot, {}}.error_times_work(lanes);
-    if (held < kTurnsAlone * not_turned) return;
+    if (!(held > kTurnsAlone * not_turned)) return;
     const double pixels = static_cast<double>(film_size(scene_.film)) / 3;
     const FilmLook look{film_pilot_samples(settings.spp),
                         kFilmShare * settings.spp * probed.pilot.work_of_pixel() * pixels,
@@ -390,10 +392,6 @@ class TermJob {
   FilmFit fit_film_of(size_t p, const SamplePlan& plan, const FilmLook& look,
                       const RunSettings& settings, const Stopwatch& watch) const {
     TermEstimator& estimator = pass(p);
-    if (look.spp == 0 || !can_move_film() || method_.random_directions ||
-        estimator.motion_rates().still()) {
-      return {};
-    }
     if (estimator.lanes() <= kMostFilmParameters) {
       return fit_film(estimator, plan, look, settings, watch);
     }

@@ -239,8 +239,8 @@ TEST(FilmMotion, IsHeldWhereItDoesNotPay) {
                          diffuse("wood", "0.3, 0.2, 0.1")) +
                square("plate", 0.4, 0, {0, 0.8, 0.8}, diffuse("tin", "0.5, 0.5, 0.5"));
   const Scene scene = make_scene(files, parts);
-  const GradientResult chosen = run_method(scene, {"plate.translate.x"}, "adaptive", 128, 3);
-  const GradientResult held = run_method(scene, {"plate.translate.x"}, "held-positions", 128, 3);
+  const GradientResult chosen = run_method(scene, {"plate.translate.x"}, "adaptive", 64, 3);
+  const GradientResult held = run_method(scene, {"plate.translate.x"}, "held-positions", 64, 3);
   EXPECT_EQ(share_that_moves(chosen), 0);
   expect_same_bits(chosen, held);
 }
