@@ -31,7 +31,7 @@ struct KeyedSample {
   Rng key;
 };
 // So many of them are worked on together at most, but for estimators that say otherwise.
-inline constexpr size_t kMostTogether = 16;
+inline constexpr size_t kMostTogether = 64;
 
 // How the positions of a pixel's samples on the film move [pixels per unit of the parameter]: by
 // `tapered`, see terms/filter.cpp.
@@ -106,8 +106,12 @@ class SampleSink {
         log_(log) {}
 
   void add_radiance(const PixelSample& at, const Rgb<double>& radiance, double weight) {
-    double* out = &sums_.radiance[pixel_index(film_, at.x, at.y)];
+    double* out = radiance_of(at);
     for (int c = 0; c < 3; ++c) out[c] += radiance[c] * weight;
+  }
+  // Three sums.
+  double* radiance_of(const PixelSample& at) {
+    return &sums_.radiance[pixel_index(film_, at.x, at.y)];
   }
   void add(size_t slot, const PixelSample& at, const Rgb<Lanes>& value, double weight) {
     const size_t index = pixel_index(film_, at.x, at.y);

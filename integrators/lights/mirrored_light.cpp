@@ -216,6 +216,9 @@ void MirroredLight::add(const FlatPart& part, const Bsdf& bsdf, const Vec3d& nor
   if (!(height > kLeastHeight * (image.infinite ? 1 : image.radius))) return;
   image.albedo = std::min(bsdf.lobe().albedo, 1.0);
   image.width = bsdf.lobe().model->width(bsdf.lobe());
+  const double spread = std::min(2 * image.width + image.size, 0.5 * kPi);
+  image.turn = std::sin(spread);
+  image.rest = std::cos(spread);
   if (image.lamp) image.irradiance = lights_.estimate(*image.lamp, image.center);
   image.light_in_part = image.irradiance * height / length(to) * image.radius * image.radius;
   images_.push_back(image);
@@ -257,7 +260,9 @@ bool MirroredLight::sees(const Image& image, const Vec3d& p, Glare& glare) const
   const auto is_inside = [&](const Vec3d& x) { return length(x - image.center) <= image.radius; };
   if (!is_inside(shown)) {
     // The steepest direction in which it is still bright.
-    const double sine = -dot(glare.toward, n), turn = std::sin(spread), rest = std::cos(spread);
+    const double sine = -dot(glare.toward, n);
+    const double turn = image.infinite ? image.turn : std::sin(spread);
+    const double rest = image.infinite ? image.rest : std::cos(spread);
     const Vec3d along = glare.toward + n * sine;
     const double cosine = length(along);
     const double level = cosine * rest - sine * turn;

@@ -38,11 +38,14 @@ class MirroredLight {
   };
   // The part that a vertex takes of its directions from each glare.
   struct Mixture {
+    Mixture() {}           // NOLINT: a path has hundreds of bytes here that are hardly ever used
     double share = 0;      // of all together; 0: from the scattering function alone
     double elsewhere = 0;  // luminance of what is seen beside them, about, if any is seen
     int count = 0;
-    std::array<Glare, kMostImages> glare{};
-    std::array<double, kMostImages> part{};  // sum to 1
+    union {  // so that what there is none of is not filled
+      std::array<Glare, kMostImages> glare;
+    };
+    std::array<double, kMostImages> part;  // sum to 1
   };
 
   // Both must outlive it. Null where the scene has no such light or surface.
@@ -95,6 +98,7 @@ class MirroredLight {
     double radius = 0;
     double width = 0, albedo = 0;  // of the lobe
     bool infinite = false;         // the light is
+    double turn = 0, rest = 1;     // sine and cosine of its spread (`sees`), if it is
     Vec3d light;                   // its center, or the unit direction towards it
     double size = 0;             // radius of a sphere around it; at infinity the sine of its angle
     std::optional<size_t> lamp;  // which of all lights it is; none: a patch

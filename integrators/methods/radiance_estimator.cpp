@@ -122,13 +122,27 @@ void RadianceEstimator::trace(std::span<const KeyedSample> samples, bool mirrore
   }
   sink.cost(0).add(rays);
   sink.cost(0).samples += samples.size();
+  // Samples of a pixel follow each other: its sum is in memory but before and after them, as each
+  // would wait for the one before.
+  double* pixel = nullptr;
+  Rgb<double> sum;
+  const auto leave_pixel = [&] {
+    for (int c = 0; pixel && c < 3; ++c) pixel[c] = sum[c];
+  };
   for (size_t i = 0; i < samples.size(); ++i) {
-    if (!walks[i].failed && is_finite(walks[i].sums.radiance)) {
-      sink.add_radiance(samples[i].at, walks[i].sums.radiance, weight);
-    } else {
+    const Rgb<double>& radiance = walks[i].sums.radiance;
+    if (walks[i].failed || !is_finite(radiance)) {
       sink.reject(samples[i].at, slot_name(0));
+      continue;
     }
+    if (double* const at = sink.radiance_of(samples[i].at); at != pixel) {
+      leave_pixel();
+      pixel = at;
+      sum = {at[0], at[1], at[2]};
+    }
+    sum = sum + radiance * weight;
   }
+  leave_pixel();
 }
 
 }  // namespace limn

@@ -36,5 +36,10 @@ inline double mis_weight(double pdf, double other) {
   const double ratio = other / pdf;
   return 1 / (1 + ratio * ratio);
 }
+// The same over pdf.
+inline double mis_weight_over_pdf(double pdf, double other) {
+  const double ratio = other / pdf;
+  return 1 / ((1 + ratio * ratio) * pdf);
+}
 
 }  // namespace limn

@@ -98,7 +98,7 @@ template <class S, class Visitor>
   const LightSample& light = *walk.light;
   const auto& [f, pdf] = evaluation;
   walk.light_share = detail::stretched(f, light.wo, walk.light_motion);
-  walk.light_weight = mis_weight(light.pdf, density(walk, light.wo, pdf)) / light.pdf;
+  walk.light_weight = mis_weight_over_pdf(light.pdf, density(walk, light.wo, pdf));
   if (detail::stays_black(f)) walk.light.reset();
 }
 
@@ -147,7 +147,7 @@ inline Rgb<S> PathTracer<S, Visitor>::warped_light(const Walk& walk, const Rng& 
   const DirectionMotion* motion = warper_->motion(surface, light.wo, key.at(Purpose::kEmitter, 1));
   const Vec3<S> direction = detail::moving<S>(light.wo, motion);
   const auto [f, bsdf_pdf] = detail::evaluate(scattering, light.wo, direction, motion);
-  const double weight = mis_weight(light.pdf, density(walk, light.wo, bsdf_pdf)) / light.pdf;
+  const double weight = mis_weight_over_pdf(light.pdf, density(walk, light.wo, bsdf_pdf));
   const Rgb<S> radiance = motion && !light.face ? light.light->radiance(direction)
                                                 : light.light->template drawn_radiance<S>(light);
   return detail::stretched(f, light.wo, motion) * radiance * weight;

@@ -33,9 +33,12 @@ inline bool PathTracer<S, Visitor>::begin_vertex(Walk& walk) {
   }
   // Copies have both from the path that they are of.
   if (!wide_) renew(walk.lights, [&] { return c_.lights.at(value(walk.surface.p)); });
-  renew(walk.mixture, [&] {
-    return mixture_at(c_.mirrored, walk.surface, *walk.scattering, !is_complete(walk.bounces + 1));
-  });
+  if (c_.mirrored) {
+    renew(walk.mixture, [&] {
+      return mixture_at(c_.mirrored, walk.surface, *walk.scattering,
+                        !is_complete(walk.bounces + 1));
+    });
+  }
   const int more = splits(walk.surface, walk.copies);
   const int lights = (walk.bounces > 0 ? light_samples_ : 1) * more;
   if (walk.bounces > 0) walk.sums.later_lights += lights;

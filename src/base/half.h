@@ -1,6 +1,7 @@
 #pragma once
 // Half floats as they lie in memory, decoded without branches on any processor: IEEE 754 binary16,
 // but that the last exponent stands for one more power of two instead of infinity.
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -26,5 +27,20 @@ class Half {
  private:
   uint16_t bits_ = 0;
 };
+
+// Four numbers side by side.
+using FourDoubles [[gnu::vector_size(32)]] = double;
+inline FourDoubles to_doubles(const std::array<Half, 4>& halves) {
+  using Shorts [[gnu::vector_size(8)]] = uint16_t;
+  using Words [[gnu::vector_size(16)]] = uint32_t;
+  using Floats [[gnu::vector_size(16)]] = float;
+  const Words bits = __builtin_convertvector(std::bit_cast<Shorts>(halves), Words);
+  const Floats size = (Floats)((bits & 0x7fff) << 13) * 0x1p112f;
+  return __builtin_convertvector((Floats)((Words)size | (bits & 0x8000) << 16), FourDoubles);
+}
+inline FourDoubles to_doubles(const std::array<float, 4>& floats) {
+  using Floats [[gnu::vector_size(16)]] = float;
+  return __builtin_convertvector(std::bit_cast<Floats>(floats), FourDoubles);
+}
 
 }  // namespace limn

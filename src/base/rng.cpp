@@ -17,6 +17,11 @@
 
 #include "src/base/wide.h"
 
+#if defined(__GFNI__) && defined(__AVX512VBMI__) && defined(__AVX512VL__)
+#define LIMN_BIT_MATRICES  // eight words times a matrix of bits are few instructions
+#include <immintrin.h>
+#endif
+
 namespace limn {
 namespace {
 
@@ -81,10 +86,72 @@ uint32_t point_of_bytes(uint32_t n, int dimension) {
   const auto& bytes = kBytes[dimension - 2];
   return bytes[0][n & 255] ^ bytes[1][n >> 8 & 255] ^ bytes[2][n >> 16 & 255] ^ bytes[3][n >> 24];
 }
+#ifdef LIMN_BIT_MATRICES
+// The same as products of bytes with 8 by 8 bits: word j holds what byte (j + turn) % 4 of a number
+// adds to byte j of its point; its rows, the last first, are the bits of a byte.
+using Matrix = std::array<uint64_t, 4>;
+constexpr Matrix make_matrix(int dimension, int turn) {
+  Matrix matrix{};
+  for (int j = 0; j < 4; ++j) {
+    for (int bit = 0; bit < 8; ++bit) {
+      const uint32_t column = kBytes[dimension - 2][(j + turn) % 4][size_t{1} << bit];
+      for (int row = 0; row < 8; ++row) {
+        matrix[j] |= uint64_t{column >> (8 * j + row) & 1} << (8 * (7 - row) + bit);
+      }
+    }
+  }
+  return matrix;
+}
+constexpr std::array<std::array<Matrix, 4>, kDimensions - 2> make_matrices() {
+  std::array<std::array<Matrix, 4>, kDimensions - 2> matrices{};
+  for (int d = 2; d < kDimensions; ++d) {
+    for (int turn = 0; turn < 4; ++turn) matrices[d - 2][turn] = make_matrix(d, turn);
+  }
+  return matrices;
+}
+alignas(32) constexpr auto kMatrices = make_matrices();
+// Where byte i of word k of eight numbers is byte 8 k + i, and back.
+constexpr std::array<uint8_t, 32> make_order(bool back) {
+  std::array<uint8_t, 32> order{};
+  for (uint8_t i = 0; i < 8; ++i) {
+    for (uint8_t k = 0; k < 4; ++k) {
+      const uint8_t apart = 8 * k + i, together = 4 * i + k;
+      (back ? order[together] : order[apart]) = back ? apart : together;
+    }
+  }
+  return order;
+}
+alignas(32) constexpr std::array<uint8_t, 32> kApart = make_order(false);
+alignas(32) constexpr std::array<uint8_t, 32> kTogether = make_order(true);
+
+[[gnu::always_inline]] inline HalfWords point_of_bytes(const HalfWords& n, int dimension) {
+  const auto load = [](const auto& from) {
+    return _mm256_load_si256(reinterpret_cast<const __m256i*>(from.data()));
+  };
+  const auto& matrices = kMatrices[dimension - 2];
+  const __m256i bytes = _mm256_maskz_permutexvar_epi8(~0u, load(kApart), (__m256i)n);
+  const __m256i one = _mm256_permute4x64_epi64(bytes, 0x39);
+  const __m256i two = _mm256_permute4x64_epi64(bytes, 0x4e);
+  const __m256i three = _mm256_permute4x64_epi64(bytes, 0x93);
+  const __m256i sum = _mm256_gf2p8affine_epi64_epi8(bytes, load(matrices[0]), 0) ^
+                      _mm256_gf2p8affine_epi64_epi8(one, load(matrices[1]), 0) ^
+                      _mm256_gf2p8affine_epi64_epi8(two, load(matrices[2]), 0) ^
+                      _mm256_gf2p8affine_epi64_epi8(three, load(matrices[3]), 0);
+  return (HalfWords)_mm256_maskz_permutexvar_epi8(~0u, load(kTogether), sum);
+}
+[[gnu::always_inline]] inline HalfWords reversed(const HalfWords& x) {
+  const __m256i swapped = _mm256_shuffle_epi8(
+      (__m256i)x,
+      _mm256_broadcastsi128_si256(_mm_set_epi32(0x0c0d0e0f, 0x08090a0b, 0x04050607, 0x00010203)));
+  return (HalfWords)_mm256_gf2p8affine_epi64_epi8(
+      swapped, _mm256_set1_epi64x(static_cast<int64_t>(0x8040201008040201)), 0);
+}
+#else
 [[gnu::always_inline]] inline HalfWords point_of_bytes(const HalfWords& n, int dimension) {
   const auto of = [&](int i) { return point_of_bytes(n[i], dimension); };
   return HalfWords{of(0), of(1), of(2), of(3), of(4), of(5), of(6), of(7)};
 }
+#endif
 
 // With its bits in reverse: the first dimension reverses a number, and the second multiplies it by
 // Pascal's triangle, which is to put 1 + x for x in the polynomial of its bits.
@@ -113,6 +180,12 @@ template <class T, class Key>
   x ^= x * 0x05526c56;
   x ^= x * 0x53a22864;
   return reversed(x);
+}
+
+// In [0, 1); by way of signed numbers, which every processor converts.
+[[gnu::always_inline]] inline wide::RawDoubles in_unit(const HalfWords& x) {
+  const auto shifted = (wide::Ints)(x ^ 0x80000000);
+  return (__builtin_convertvector(shifted, wide::RawDoubles) + 0x1p31) * 0x1p-32;
 }
 
 }  // namespace
@@ -144,16 +217,18 @@ void Rng::draw(Purpose purpose, std::span<const Stream> streams, size_t count, d
     };
     HalfWords place{};
     if (even) place = scrambled(reversed(low_half(sample)), next());
+    wide::RawDoubles u[kDimensions];
     for (size_t k = 0; k < count; ++k) {
       const Words word = next();
-      wide::RawDoubles u;
       if (even) {
         const HalfWords point = reversed_point(place, static_cast<int>(k));
-        u = __builtin_convertvector(scrambled(point, word), wide::RawDoubles) * 0x1.0p-32;
+        u[k] = in_unit(scrambled(point, word));
       } else {
-        u = __builtin_convertvector((wide::Mask)(word >> 11), wide::RawDoubles) * 0x1.0p-53;
+        u[k] = __builtin_convertvector((wide::Mask)(word >> 11), wide::RawDoubles) * 0x1.0p-53;
       }
-      for (size_t i = first; i < last; ++i) numbers[i * count + k] = u[i - first];
+    }
+    for (size_t i = first; i < last; ++i) {
+      for (size_t k = 0; k < count; ++k) numbers[i * count + k] = u[k][i - first];
     }
   });
 }

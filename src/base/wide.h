@@ -90,6 +90,8 @@ LIMN_WIDE Vec gather_vectors(const F& of) {
   return {gather([&](int i) { return of(i)->x; }), gather([&](int i) { return of(i)->y; }),
           gather([&](int i) { return of(i)->z; })};
 }
+// With one division: three wide ones take as long as most of what is around them.
+LIMN_WIDE Vec normalize(const Vec& a) { return a * (1 / sqrt(dot(a, a))); }
 LIMN_WIDE Vec3d lane(const Vec& a, int i) { return {a.x[i], a.y[i], a.z[i]}; }
 
 // f(first, last) for every kWidth of `count` items, the last ones with fewer.

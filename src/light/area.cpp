@@ -26,11 +26,12 @@ class AreaLight final : public Light {
     const Vec3d y = c[0] + (c[1] - c[0]) * (1 - root) + (c[2] - c[0]) * b2;
     const double distance = length(y - p);
     if (distance == 0) return {};
-    const Vec3d wo = (y - p) / distance;
+    const Vec3d wo = (y - p) * (1 / distance);
     const Vec3d n = cross(c[1] - c[0], c[2] - c[0]);
-    const double n_length = length(n);
-    if (n_length == 0 || dot(n, wo) >= 0) return {};
-    const double density = pdf({wo, distance, n / n_length}, choices);
+    const double facing = -dot(n, wo);
+    if (!(facing > 0)) return {};
+    // As `pdf` has it, without a unit normal.
+    const double density = distance * distance * inverse_area_ * length(n) / (facing * choices);
     return LightSample{wo, distance, density, FaceRef{id_, face}, this};
   }
   double pdf(const LightView& view, double choices) const override {

@@ -54,6 +54,20 @@ void EnvironmentMap::fetch_texels(int column, int row) const {
   });
 }
 
+void EnvironmentMap::fetch_texels(const Place<wide::Doubles>& place) const {
+  using wide::Ints, wide::Mask;
+  const Ints columns = wide::min(wide::truncated(place.x), Ints{} + (width_ - 1));
+  const Ints rows = wide::min(wide::truncated(place.y), Ints{} + (height_ - 2));
+  const Mask first =
+      __builtin_convertvector(rows, Mask) * width_ + __builtin_convertvector(columns, Mask);
+  with_texels([&](const auto* texels) {
+    for (int i = 0; i < wide::kWidth; ++i) {
+      __builtin_prefetch(&texels[first[i]]);
+      __builtin_prefetch(&texels[first[i] + width_]);
+    }
+  });
+}
+
 EnvironmentMap::Drawn EnvironmentMap::sample(const wide::Doubles& u1,
                                              const wide::Doubles& u2) const {
   using wide::Doubles;
@@ -62,9 +76,7 @@ EnvironmentMap::Drawn EnvironmentMap::sample(const wide::Doubles& u1,
   const auto [sine, cosine] = sin_cos_of_turns((x + 0.5) * (1.0 / width_));
   const Place<Doubles> place{select(x < width_, x, 0),
                              angle_of(sin_theta, cos_theta) * ((height_ - 1) / kPi)};
-  for (int i = 0; i < wide::kWidth; ++i) {
-    fetch_texels(column_of(place.x[i]), row_of(place.y[i]));
-  }
+  fetch_texels(place);
   return {{sine * sin_theta, cos_theta, -cosine * sin_theta}, place, pdf};
 }
 

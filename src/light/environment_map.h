@@ -84,6 +84,7 @@ class EnvironmentMap {
     return f(std::get<1>(texels_).data());
   }
   void fetch_texels(int column, int row) const;
+  void fetch_texels(const Place<wide::Doubles>& place) const;
   int next_column(int column) const { return column + 1 == width_ ? 0 : column + 1; }
   double polar_angle(int row) const { return kPi * row / (height_ - 1); }
   template <class Number>
@@ -121,6 +122,13 @@ Rgb<S> EnvironmentMap::radiance(const Place<S>& place) const {
   return with_texels([&](const auto* texels) {
     decltype(texels) corners[4] = {&texels[index(column, row)], &texels[index(next, row)],
                                    &texels[index(column, row + 1)], &texels[index(next, row + 1)]};
+    if constexpr (std::is_same_v<S, double>) {
+      const auto corner = [&](int i) { return to_doubles(*corners[i]); };
+      const FourDoubles top = corner(0) + s * (corner(1) - corner(0));
+      const FourDoubles bottom = corner(2) + s * (corner(3) - corner(2));
+      const FourDoubles c = top + t * (bottom - top);
+      return Rgb<S>{c[0], c[1], c[2]};
+    }
     Rgb<S> result;
     for (int c = 0; c < 3; ++c) {
       const auto corner = [&](int i) { return static_cast<double>((*corners[i])[c]); };

@@ -27,8 +27,8 @@ std::optional<LightSample> DeltaLight::sample(const Vec3d& p, double choices,
   return LightSample{arrival->wo, distance, 1 / choices, {}, this};
 }
 
-std::optional<LightSample> Environment::light_sample(const Drawn& drawn, double choices) const {
-  const double density = drawn.pdf / choices;
+std::optional<LightSample> Environment::light_sample(const Drawn& drawn, double probability) const {
+  const double density = drawn.pdf * probability;
   if (!(density > 0)) return {};
   return LightSample{drawn.direction, std::numeric_limits<double>::infinity(), density, {}, this,
                      drawn.place};
@@ -44,6 +44,7 @@ Lights::Lights(const Scene& scene, const Lights* chosen_by)
   }
   if (environment_) all_.push_back(environment_);
   for (const auto& light : scene.delta_lights) all_.push_back(light.get());
+  of_any_ = 1 / static_cast<double>(std::max<size_t>(1, all_.size()));
   for (const auto& lamp : area_lights_) reaches_.push_back(reach_of(*lamp));
   if (environment_) {
     Reach& reach = reaches_.emplace_back();
@@ -137,13 +138,13 @@ void Lights::at(std::span<const Vec3d* const> p, std::span<Place* const> places)
   });
 }
 
-double Lights::choices(const Place& place, size_t light) const {
-  const auto count = static_cast<double>(all_.size());
-  if (!(place.sum > 0)) return count;
-  return 1 / (kAny / count + (1 - kAny) * estimate(light, place) / place.sum);
+double Lights::probability(const Place& place, size_t light) const {
+  if (!(place.sum > 0)) return of_any_;
+  return kAny * of_any_ + (1 - kAny) * estimate(light, place) / place.sum;
 }
 
 size_t Lights::choose(const Place& place, double u) const {
+  if (all_.size() == 1) return 0;
   const double any = place.sum > 0 ? kAny : 1;
   const size_t last = all_.size() - 1;
   if (u < any) {
@@ -170,7 +171,8 @@ void Lights::sample(std::span<const Draw> draws, std::span<const Numbers> u) con
       numbers[count++] = {u[i][1], u[i][2]};
     } else {
       renew(*draws[i].sample, [&] {
-        return all_[light]->sample(place.p, choices(place, light), {u[i][1], u[i][2], u[i][3]});
+        return all_[light]->sample(place.p, 1 / probability(place, light),
+                                   {u[i][1], u[i][2], u[i][3]});
       });
     }
   }
@@ -178,7 +180,7 @@ void Lights::sample(std::span<const Draw> draws, std::span<const Numbers> u) con
   environment_->sample_directions({numbers, count}, {drawn, count});
   for (size_t k = 0; k < count; ++k) {
     const Draw& draw = draws[of[k]];
-    const double share = choices(*draw.place, area_lights_.size());
+    const double share = probability(*draw.place, area_lights_.size());
     renew(*draw.sample, [&] { return environment_->light_sample(drawn[k], share); });
   }
 }

@@ -205,7 +205,7 @@ Environment::Sight<Var> Lights::environment<Var>(const Place& place, const Vec3d
                                         seeded.look(wo, at, of);
                                         return of.radiance;
                                       });
-  return {with_texels(wo, radiance), sight.pdf / choices(place, area_lights_.size())};
+  return {with_texels(wo, radiance), sight.pdf * probability(place, area_lights_.size())};
 }
 
 template <>

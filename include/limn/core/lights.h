@@ -48,17 +48,17 @@ class Lights {
     std::optional<LightSample>* sample;
   };
   // draws[i] from u[i]; at most kMostDraws of them.
-  static constexpr size_t kMostDraws = 16;
+  static constexpr size_t kMostDraws = 64;
   void sample(std::span<const Draw> draws, std::span<const Numbers> u) const;
   std::optional<LightSample> sample(const Place& place, Rng& rng) const;
   // The density [1/sr] with which `sample` draws what a ray from there sees: an emitting shape, or,
   // where it leaves the scene, the environment (there must be one).
   double pdf(const Place& place, ShapeId shape, const LightView& view) const {
     const size_t light = of_shape_[shape.index()];
-    return all_[light]->pdf(view, choices(place, light));
+    return all_[light]->pdf(view, 1 / probability(place, light));
   }
   double pdf_environment(const Place& place, const Vec3d& wo) const {
-    return environment_->pdf_solid_angle(wo) / choices(place, area_lights_.size());
+    return environment_->pdf_solid_angle(wo) * probability(place, area_lights_.size());
   }
   // With the radiance that a ray along the held direction wo sees there. at: Environment::find.
   template <class S>
@@ -66,7 +66,7 @@ class Lights {
                                     const std::array<double, 2>& at) const {
     Environment::Sight<S> sight;
     environment_->look(wo, at, sight);
-    sight.pdf /= choices(place, area_lights_.size());
+    sight.pdf *= probability(place, area_lights_.size());
     return sight;
   }
 
@@ -87,13 +87,13 @@ class Lights {
     return light < place.first.size() ? place.first[light] : estimate(light, place.p);
   }
   size_t choose(const Place& place, double u) const;
-  // One over the probability of a light.
-  double choices(const Place& place, size_t light) const;
+  double probability(const Place& place, size_t light) const;
 
   std::vector<std::unique_ptr<Light>> area_lights_;
   std::vector<const Light*> all_;
   std::vector<Reach> reaches_;      // of all but delta lights
   std::vector<size_t> of_shape_;    // which light it is; any number where a shape emits nothing
+  double of_any_ = 1;               // one over how many they are
   const Environment* environment_;  // null if none
   const Lights* chosen_by_;         // null if these
 };

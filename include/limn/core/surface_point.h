@@ -87,22 +87,24 @@ void fetch_shading(const Mesh& mesh, FaceId face) {
 template <class S, class P>
 void place_on_plane(const Mesh& mesh, const Vec3<S>& origin, const Vec3<S>& direction,
                     SurfacePoint<S>& point) {
-  if (mesh.normal_source != NormalSource::kFace) fetch_shading<S>(mesh, point.face.face);
+  if constexpr (!std::is_same_v<S, double>) {
+    if (mesh.normal_source != NormalSource::kFace) fetch_shading<S>(mesh, point.face.face);
+  }
   const auto corners = face_corners<P>(mesh, point.face.face);
   const Vec3<P> e1 = corners[1] - corners[0];
   const Vec3<P> e2 = corners[2] - corners[0];
   const Vec3<P> n = cross(e1, e2);
   const S t = dot(corners[0] - origin, n) / dot(n, direction);
   point.p = origin + direction * t;
-  const P n_length = length(n);
-  point.n_g = value(n) / value(n_length);
+  const P over_length = 1.0 / length(n);
+  point.n_g = value(n) * value(over_length);
   if (mesh.normal_source == NormalSource::kFace) {
-    const Vec3<P> unit = n / n_length;
+    const Vec3<P> unit = n * over_length;
     point.n_s = {S(unit.x), S(unit.y), S(unit.z)};
     return;
   }
   const Vec3<S> q = point.p - corners[0];
-  const P inverse = 1.0 / dot(n, n);
+  const P inverse = over_length * over_length;
   interpolate_shading<S>(mesh, dot(cross(q, e2), n) * inverse, dot(cross(e1, q), n) * inverse,
                          point);
 }
