@@ -438,6 +438,7 @@ class TermJob {
     std::vector<TermFigures> figures(types_.size());
     for (size_t t = 0; t < figures.size(); ++t) {
       figures[t].cost = pilot.work[t];
+      figures[t].first = pilot.first_work[t];
       figures[t].least = types_[t]->least_samples;
       if (method_.spreads_samples && t != estimator.pixel_slot()) figures[t].least = kLeastSamples;
       if (pilot.in_cells(t)) figures[t].cells.resize(pilot.grid.size());

@@ -41,9 +41,11 @@ SampleCounts best_samples(const std::vector<TermFigures>& figures) {
     const std::vector<double> counts = counts_to_try(term);
     samples.push_back(counts.front());
     variance += term.variance / counts.front();
-    cost += term.cost * counts.front();
+    cost += term.cost_of(counts.front());
     for (size_t i = 1; i < counts.size(); ++i) {
-      steps.push_back({term.variance / (counts[i - 1] * counts[i] * term.cost), t, counts[i]});
+      const double fewer = counts[i - 1], more = counts[i];
+      const double lost = term.variance / fewer - term.variance / more;
+      steps.push_back({lost / (term.cost_of(more) - term.cost_of(fewer)), t, more});
     }
   }
   std::stable_sort(steps.begin(), steps.end(),
@@ -53,7 +55,7 @@ SampleCounts best_samples(const std::vector<TermFigures>& figures) {
   for (const Step& step : steps) {
     const TermFigures& term = figures[step.term];
     variance += term.variance * (1 / step.count - 1 / samples[step.term]);
-    cost += term.cost * (step.count - samples[step.term]);
+    cost += term.cost_of(step.count) - term.cost_of(samples[step.term]);
     samples[step.term] = step.count;
     if (variance * cost * kTie >= least) continue;
     least = variance * cost;
@@ -81,7 +83,8 @@ struct Wish {
 Wish wish_of(const TermFigures& term, const PlanGrid& grid) {
   Wish wish;
   const double deviation = std::sqrt(term.variance);
-  const double price = term.cost > 0 ? std::sqrt(term.cost) : 0;
+  // Of further samples.
+  const double price = term.cost > 0 ? std::sqrt(term.cost - term.first) : 0;
   if (term.cells.empty()) {
     wish.film = price > 0 ? deviation / price : 0;
     return wish;
@@ -111,7 +114,9 @@ Wish wish_of(const TermFigures& term, const PlanGrid& grid) {
 // The number nearest to `count` that a pixel can have.
 double possible(const TermFigures& term, double count) {
   if (!(term.variance > 0)) return 1;
-  if (count < 0.75) return std::max(count, term.least);
+  const double rare = term.cost > 0 ? count * std::sqrt(1 - term.first / term.cost) : count;
+  if (rare < 0.75) return std::max(rare, term.least);
+  if (rare < 1) return 1;
   return std::clamp(std::round(count), 1.0, double{kMostInPixel});
 }
 
@@ -139,7 +144,7 @@ Totals totals_at(const std::vector<TermFigures>& terms, const std::vector<Wish>&
     for (size_t i = 0; i < wishes[t].cells.size(); ++i) {
       const double n = possible(terms[t], scale * wishes[t].cells[i]);
       error += each * wishes[t].variance[i] / n;
-      cost += each * terms[t].cost * n;
+      cost += each * terms[t].cost_of(n);
     }
   }
   return {error, cost};
@@ -195,7 +200,7 @@ double price_of(const std::vector<TermFigures>& figures, const SampleCounts& cou
   double error = 0, cost = 0;
   for (size_t t = 0; t < figures.size(); ++t) {
     error += figures[t].variance / counts[t];
-    cost += figures[t].cost * counts[t];
+    cost += figures[t].cost_of(counts[t]);
   }
   return cost > 0 ? error / cost : 0;
 }

@@ -90,13 +90,13 @@ class PilotRun {
     return true;
   }
 
-  std::vector<double> work(int spp, size_t probes) const {
-    std::vector<double> work;
+  void add_work(int spp, size_t probes, PilotFigures& figures) const {
     for (size_t slot = 0; slot < costs_.size(); ++slot) {
       const size_t pixels = terms_.adds_to_pixels(slot) ? probes : film_size(film()) / 3;
-      work.push_back(terms_.work(slot, costs_[slot]) / (static_cast<double>(spp) * pixels));
+      const double samples = static_cast<double>(spp) * pixels;
+      figures.work.push_back(terms_.work(slot, costs_[slot]) / samples);
+      figures.first_work.push_back(terms_.first_work(slot, costs_[slot]) / samples);
     }
-    return work;
   }
 
   // A thousandth of the pixels, those with the largest variance, is left out: single bright samples
@@ -154,6 +154,7 @@ void PilotFigures::merge(const PilotFigures& more) {
   const auto mix = [&](double& a, double b) { a += share * (b - a); };
   for (size_t slot = 0; slot < work.size(); ++slot) {
     mix(work[slot], more.work[slot]);
+    mix(first_work[slot], more.first_work[slot]);
     for (int k = 0; k < kLanes; ++k) mix(film_variance[slot][k], more.film_variance[slot][k]);
   }
   mix(light_work, more.light_work);
@@ -186,7 +187,7 @@ PilotFigures run_pilot(const TermEstimator& estimator, bool turns, PilotSamples 
   figures.spp = spp;
   figures.grid = pilot.grid();
   figures.traced = pilot.traced();
-  figures.work = run.work(spp, figures.grid.size());
+  run.add_work(spp, figures.grid.size(), figures);
   figures.light_work = static_cast<double>(pilot.later_lights()) /
                        (kPilotLights * static_cast<double>(spp) * figures.grid.size());
   for (size_t slot = 0; slot < estimator.slots(); ++slot) {

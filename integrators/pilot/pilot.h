@@ -28,9 +28,10 @@ struct PilotFigures {
   std::vector<Lanes> film_variance;
   // Of one sample of a slot, in every cell.
   std::vector<double> variances(size_t slot, int lane) const;
-  TracedDraws traced;        // of edges at vertices
-  double light_work = 0;     // of one light sample at all later vertices of a path
-  std::vector<double> work;  // of one sample of a pixel, of every slot, see Term::work
+  TracedDraws traced;              // of edges at vertices
+  double light_work = 0;           // of one light sample at all later vertices of a path
+  std::vector<double> work;        // of one sample of a pixel, of every slot, see Term::work
+  std::vector<double> first_work;  // the same, see Term::first_work
 
   double work_of_pixel() const { return std::accumulate(work.begin(), work.end(), 0.0); }
   // Whether a slot's samples belong to pixels.

@@ -125,6 +125,10 @@ double TermEstimator::work(size_t slot, const TermCost& cost) const {
   return terms_[slot] ? terms_[slot]->work(cost) : static_cast<double>(cost.rays);
 }
 
+double TermEstimator::first_work(size_t slot, const TermCost& cost) const {
+  return terms_[slot] ? terms_[slot]->first_work(cost) : 0;
+}
+
 // How the vertices of a path move; the visitor of a path.
 class TermEstimator::VertexMotions {
  public:

@@ -44,8 +44,9 @@ class TermEstimator final : public SampleEstimator {
 
   // What samples hold from now on.
   void set_plan(SamplePlan plan);
-  // What samples of a slot cost, see Term::work.
+  // What samples of a slot cost, see Term::work and first_work.
   double work(size_t slot, const TermCost& cost) const;
+  double first_work(size_t slot, const TermCost& cost) const;
   // Adds what to tell of kinks that the parameters move the scene across: none twice.
   void warn_of_kinks(std::vector<std::string>& warnings) const;
   void describe(GradientStats& stats) const;

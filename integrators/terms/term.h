@@ -100,6 +100,8 @@ class Term {
   // What the samples behind `cost` cost, in units of one ray with the shading at its end: the same
   // on every machine, so that choices that follow from it are.
   virtual double work(const TermCost& cost) const { return static_cast<double>(cost.rays); }
+  // What of it is the first sample's at each vertex alone, where each took one.
+  virtual double first_work(const TermCost& /*cost*/) const { return 0; }
 
   // Adds what to tell of kinks that the parameters move this term across.
   virtual void warn_of_kinks(const Scene& /*scene*/, std::vector<std::string>& /*warnings*/) const {

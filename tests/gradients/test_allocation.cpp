@@ -112,6 +112,34 @@ TEST(SpreadSamples, GoWithTheDeviation) {
   EXPECT_DOUBLE_EQ(plan.uniform[0], sum / static_cast<double>(grid.size()));
 }
 
+// What the first sample of a vertex finds, further ones need not: from one on they are cheap, and
+// fewer than one save all of it.
+TEST(SpreadSamples, KnowWhatFurtherOnesCost) {
+  PlanGrid grid;
+  grid.columns = grid.rows = 10;
+  for (const double variance : {0.02, 0.2, 1.0, 5.0}) {
+    const auto cells = [&](double v) { return std::vector<double>(grid.size(), v); };
+    const std::vector<TermFigures> figures = {{1, 3, 1, cells(1)},
+                                              {variance, 10, 0.125, cells(variance), 8}};
+    SamplePlan plan;
+    const double price = spread_samples(figures, grid, plan);
+    const auto totals = [&](double a, double b) {
+      const double shared = b > 1 ? 8 * (b - 1) : 0;
+      return std::array{1 / a + variance / b, 3 * a + 10 * b - shared};
+    };
+    double least = 1e9;
+    for (int a = 1; a <= 24; ++a) {
+      for (const double b : {0.125, 0.25, 0.375, 0.5, 0.625, 0.75}) {
+        least = std::min(least, totals(a, b)[0] * totals(a, b)[1]);
+      }
+      for (int b = 1; b <= 24; ++b) least = std::min(least, totals(a, b)[0] * totals(a, b)[1]);
+    }
+    const auto [error, cost] = totals(plan.counts[0][0], plan.counts[0][1]);
+    EXPECT_LE(error * cost, 1.1 * least) << variance;
+    EXPECT_NEAR(price, error / cost, 1e-6 * price) << variance;
+  }
+}
+
 TEST(SpreadSamples, AreEvenWhereNothingVaries) {
   PlanGrid grid;
   grid.columns = grid.rows = 10;
