@@ -93,6 +93,8 @@ constexpr double kFilmPromising = 0.99, kFilmAgainstTurns = 1.25, kTurnsAlone = 
 constexpr int kFirstLook = 8;
 // The most work of the pilot that looks at them, as a share of the run's. Not tuned.
 constexpr double kFilmShare = 1.0 / 4;
+// Of a limit of time: what the first pilot may have taken of it, for the others to follow. Not tuned.
+constexpr double kLookShare = 1.0 / 6;
 
 // Of runs long enough for more estimators: samples, and a set-up's share of the time; not tuned.
 constexpr int kLongRun = 256;
@@ -246,11 +248,14 @@ class TermJob {
   // Plans every pass, by a pilot or as the options say.
   void plan(const RunSettings& settings, const Stopwatch& watch, GradientResult& result) const {
     const Stopwatch pilot_watch;
+    const bool is_long = settings.seconds > 0 ? watch.seconds() < kSetupShare * settings.seconds
+                                              : settings.spp >= kLongRun;
     std::vector<double> means(types_.size());
     for (size_t p = 0; p < passes_.size(); ++p) {
       SamplePlan plan;
       plan.uniform = options_.samples.value_or(SampleCounts{});
-      if (!options_.samples) plan = plan_by_pilot(p, settings, watch, result);
+      if (!options_.samples)
+        plan = plan_by_pilot(p, budget_of(p, settings, watch, is_long), result);
       if (method_.random_directions && can_move_directions()) {
         plan.grid = PlanGrid(scene_.film, film_size(scene_.film));
         plan.fields = random_fields(plan.grid.size(), pass(p), settings.seed);
@@ -326,10 +331,26 @@ class TermJob {
     }
   }
 
-  // watch: since the job began.
-  SamplePlan plan_by_pilot(size_t p, const RunSettings& settings, const Stopwatch& watch,
-                           GradientResult& result) const {
+  // What the pilots of a pass may take: its share of the time that is left, from now on.
+  struct Budget {
+    RunSettings settings;
+    Stopwatch watch;
+    bool is_long;  // against what it takes to set up an estimator
+
+    bool timed() const { return settings.seconds > 0; }
+  };
+  Budget budget_of(size_t p, const RunSettings& settings, const Stopwatch& watch,
+                   bool is_long) const {
+    Budget budget{settings, {}, is_long};
+    const auto passes = static_cast<double>(passes_.size() - p);
+    if (budget.timed())
+      budget.settings.seconds = std::max((settings.seconds - watch.seconds()) / passes, 1e-9);
+    return budget;
+  }
+
+  SamplePlan plan_by_pilot(size_t p, const Budget& budget, GradientResult& result) const {
     TermEstimator& estimator = pass(p);
+    const auto& [settings, watch, is_long] = budget;
     SamplePlan plan;
     plan.splits = method_.spreads_samples && !options_.uniform_samples;
     const int spp = pilot_samples(settings.spp);
@@ -339,16 +360,15 @@ class TermJob {
     SamplePlan probing;
     probing.splits = plan.splits;
     if (method_.spreads_samples) probing.light_samples = kPilotLights;
-    RunSettings share = settings;
-    share.seconds /= static_cast<double>(passes_.size());
     estimator.set_plan(probing);
     const bool film = film_pilot_samples(settings.spp) > 0 && can_move_film() &&
                       !method_.random_directions && !estimator.motion_rates().still();
     const int first_look = film ? std::min(spp, kFirstLook) : spp;
-    Probed probed = probe(estimator, turns, first_look, share, watch);
-    if (film && probed.pilot.spp == first_look) {
-      look_at_film(p, turns, share, watch, probing, probed);
-      extend(probed, estimator, turns, spp, share, watch);
+    Probed probed = probe(estimator, turns, first_look, settings, watch);
+    const bool in_time = !budget.timed() || watch.seconds() < kLookShare * settings.seconds;
+    if (film && probed.pilot.spp > 0 && in_time) {
+      look_at_film(p, turns, budget, probing, probed);
+      extend(probed, estimator, turns, spp, settings, watch);
     }
     if (probed.pilot.spp == 0) return plan;
     result.pilot_spp = probed.pilot.spp;
@@ -359,25 +379,27 @@ class TermJob {
 
   // Positions on the film move where pilots with them and without say so; what turns of directions
   // take out is taken out by either.
-  void look_at_film(size_t p, bool turns, const RunSettings& settings, const Stopwatch& watch,
-                    SamplePlan& plan, Probed& probed) const {
+  void look_at_film(size_t p, bool turns, const Budget& budget, SamplePlan& plan,
+                    Probed& probed) const {
     TermEstimator& estimator = pass(p);
+    const auto& [settings, watch, is_long] = budget;
     const int lanes = estimator.lanes();
     const double held = probed.error_times_work(lanes);
-    const double not_turned = Probed{probed.pilot, {}}.error_times_work(lanes);
+    const double not_turned = probed.error_times_work(lanes, false);
     if (!(held > kTurnsAlone * not_turned)) return;
     const double pixels = static_cast<double>(film_size(scene_.film)) / 3;
     const FilmLook look{film_pilot_samples(settings.spp),
                         kFilmShare * settings.spp * probed.pilot.work_of_pixel() * pixels,
                         std::min(kFilmPromising, kFilmAgainstTurns * held / not_turned)};
-    FilmFit film = fit_film_of(p, plan, look, settings, watch);
+    FilmFit film = fit_film_of(p, plan, look, budget);
     if (!film.motion.empty()) {
       SamplePlan moving = plan;
       moving.grid = film.grid;
       moving.film = std::move(film.motion);
       estimator.set_plan(moving);
       Probed other = probe(estimator, turns, probed.pilot.spp, settings, watch);
-      if (other.pilot.spp > 0 && other.error_times_work(lanes) < kFilmConvincing * held) {
+      const double left = other.pilot.spp > 0 ? other.error_times_work(lanes) : 0;
+      if (left > 0 && left < kFilmConvincing * held) {
         probed = std::move(other);
         plan = std::move(moving);
         return;
@@ -389,17 +411,18 @@ class TermJob {
   // Positions are held where the result is empty. More parameters than the film leaves lanes for
   // are looked at two by two, by estimators of their own: only in runs that are long against what
   // it takes to set them up.
-  FilmFit fit_film_of(size_t p, const SamplePlan& plan, const FilmLook& look,
-                      const RunSettings& settings, const Stopwatch& watch) const {
+  FilmFit fit_film_of(size_t p, const SamplePlan& plan, FilmLook look, const Budget& budget) const {
     TermEstimator& estimator = pass(p);
     if (estimator.lanes() <= kMostFilmParameters) {
-      return fit_film(estimator, plan, look, settings, watch);
+      return fit_film(estimator, plan, look, budget.settings, budget.watch);
     }
-    const bool is_long = settings.seconds > 0 ? watch.seconds() < kSetupShare * settings.seconds
-                                              : settings.spp >= kLongRun;
     FilmFit fit;
-    if (!is_long) return fit;
+    if (!budget.is_long) return fit;
     const auto parameters = parameters_of(p);
+    const double pairs = std::ceil(estimator.lanes() / double{kMostFilmParameters});
+    RunSettings settings = budget.settings;
+    settings.seconds /= pairs;
+    look.work /= pairs;
     for (int first = 0; first < estimator.lanes(); first += kMostFilmParameters) {
       const auto some =
           std::span(parameters)
@@ -407,7 +430,7 @@ class TermJob {
       TermEstimator two(scene_, some, types_, computed_, method_.sampler, settings.threads, nullptr,
                         nullptr, false, true);
       if (two.motion_rates().still()) continue;
-      const FilmFit part = fit_film(two, plan, look, settings, watch);
+      const FilmFit part = fit_film(two, plan, look, settings, budget.watch);
       if (part.motion.empty()) continue;
       fit.grid = part.grid;
       fit.motion.resize(part.motion.size());

@@ -464,7 +464,7 @@ FilmFit fit_film(TermEstimator& estimator, const SamplePlan& plan, const FilmLoo
     if (!looks_after(pilot.samples(), last)) continue;
     const FilmFitter fitter = pilot.fit(settings.threads);
     const double left = fitter.left();
-    if (left > look.most_left) return fit;
+    if (!(left <= look.most_left)) return fit;
     if (pilot.samples() < last) continue;
     fit.motion.resize(fit.grid.size());
     for (size_t cell = 0; cell < fit.grid.size(); ++cell) {

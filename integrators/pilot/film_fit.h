@@ -1,6 +1,6 @@
 #pragma once
-// How positions on the film move: chosen for every cell by a pilot of its own, which comes before
-// the other one. With positions that move by V (terms/filter.cpp) a derivative changes by V times
+// How positions on the film move: chosen for every cell by a pilot of its own, which comes behind
+// the first samples of the other one. With positions that move by V (terms/filter.cpp) a derivative changes by V times
 // an amount whose mean is zero: what all other terms add where the film moves under the scene,
 // edges at rest included, less what the pixels lose and gain at their rims. So V is the coefficient
 // of a control variate: any one is right, and one that follows what a pixel sees takes out most of

@@ -36,7 +36,7 @@ struct PilotFigures {
   double work_of_pixel() const { return std::accumulate(work.begin(), work.end(), 0.0); }
   // Whether a slot's samples belong to pixels.
   bool in_cells(size_t slot) const { return !halves[0][slot].empty(); }
-  // Figures of other samples of the same pixels.
+  // Figures of other samples of the same pixels; once.
   void merge(const PilotFigures& more);
 };
 
@@ -47,8 +47,8 @@ struct PilotSamples {
 };
 
 // turns: whether turns of directions at first vertices are looked at. settings: its limit of time
-// holds for the whole job, which `watch` has timed since it began: a pilot takes an eighth of it at
-// most, the samples before these included.
+// is what all pilots and the samples behind them share, which `watch` has timed since they began; a
+// pilot takes what pilot_samples_in_time says, the samples before these included.
 PilotFigures run_pilot(const TermEstimator& estimator, bool turns, PilotSamples samples,
                        const RunSettings& settings, const Stopwatch& watch);
 

@@ -8,7 +8,9 @@
 
 namespace limn {
 
-std::vector<double> Probed::variances(int lane, std::vector<std::vector<double>>& cells) const {
+std::vector<double> Probed::variances(int lane, std::vector<std::vector<double>>& cells,
+                                      bool turned) const {
+  const bool fitted = turned && !fit.variances.empty();
   const size_t slots = pilot.work.size();
   std::vector<double> means(slots);
   cells.assign(slots, {});
@@ -17,22 +19,23 @@ std::vector<double> Probed::variances(int lane, std::vector<std::vector<double>>
     means[slot] = film;
     if (!pilot.in_cells(slot)) continue;
     // Some terms have samples of both kinds.
-    cells[slot] = fit.variances.empty() ? pilot.variances(slot, lane) : fit.variances[lane][slot];
+    cells[slot] = fitted ? fit.variances[lane][slot] : pilot.variances(slot, lane);
     means[slot] += trimmed_mean(cells[slot]);
     for (double& cell : cells[slot]) cell += film;
   }
   return means;
 }
 
-double Probed::error_times_work(int parameters) const {
+double Probed::error_times_work(int parameters, bool turned) const {
   double product = 1;
   for (int lane = 0; lane < parameters; ++lane) {
     std::vector<std::vector<double>> cells;
-    const std::vector<double> means = variances(lane, cells);
+    const std::vector<double> means = variances(lane, cells, turned);
     double sum = 0;
     for (size_t slot = 0; slot < means.size(); ++slot)
       sum += std::sqrt(std::max(means[slot], 0.0) * pilot.work[slot]);
-    if (sum > 0) product *= std::pow(sum, 2.0 / parameters);
+    if (!(sum > 0)) return 0;
+    product *= std::pow(sum, 2.0 / parameters);
   }
   return product;
 }

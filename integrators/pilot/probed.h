@@ -13,10 +13,11 @@ struct Probed {
 
   // The variance of one sample of every slot, of a parameter: the mean over the film, and in cells
   // where it has them.
-  std::vector<double> variances(int lane, std::vector<std::vector<double>>& cells) const;
+  std::vector<double> variances(int lane, std::vector<std::vector<double>>& cells,
+                                bool turned = true) const;
   // After equal time, where samples are shared out best among terms: of so many parameters, as a
-  // geometric mean.
-  double error_times_work(int parameters) const;
+  // geometric mean; 0 where nothing of one was seen. turned: directions turn as fitted.
+  double error_times_work(int parameters, bool turned = true) const;
 };
 
 // Arguments: as of run_pilot. The estimator has the plan that is looked at.

@@ -167,6 +167,7 @@ class TermEstimator::VertexTerms {
                       bounces, step,       key,    sink_.log()};
     vertex.warp = estimator_.warp_field_.get();
     vertex.traced = traced_;
+    vertex.parameters = estimator_.lanes();
     if (held_) {
       turned = turned_at(surface, motion, bounces);
       vertex.turned = &turned;

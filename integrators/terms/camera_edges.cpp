@@ -341,7 +341,7 @@ void CameraEdges::add_pieces(uint32_t index, const FilmMotionAt& motion) {
 // Projected length times speed: exact but for the jump itself. Every parameter gets an equal
 // share of the samples, whatever its unit.
 void CameraEdges::weigh(const FilmMotionAt& motion) {
-  pieces_.clear();
+  pieces_ = {};
   choice_ = {};
   for (uint32_t e = 0; e < edges_.size(); ++e) add_pieces(e, motion);
   Lanes totals;

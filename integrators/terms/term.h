@@ -51,6 +51,7 @@ struct PathVertex {
   SampleLog* log = nullptr;        // null unless somebody reads it
   TurnedVertex* turned = nullptr;  // null unless a pilot asks
   TracedDraws* traced = nullptr;   // the same
+  int parameters = kLanes;         // the first lanes; others are a pilot's
   // Of what draws add here, see SamplePlan.
   Lanes survival{};
   // How directions move here, in place of the turn; null where they are not warped.

@@ -69,12 +69,16 @@ bool survives(const PathVertex& vertex, const Rgb<double>& f, const Rng& key, La
   return true;
 }
 
-void add_traced(const Rgb<double>& scattered, const RayCount& rays, const Rgb<double>& amount,
-                TracedDraws& traced) {
+// Of draws that a run would decide on: those that move for a parameter.
+void add_traced(const PathVertex& vertex, const Lanes& weight, const Rgb<double>& scattered,
+                const RayCount& rays, const Rgb<double>& amount) {
+  double moves = 0;
+  for (int k = 0; k < vertex.parameters; ++k) moves += std::fabs(weight[k]);
+  if (moves == 0) return;
   const double unit = luminance(scattered);
   double squares = 0;
   for (int c = 0; c < 3; ++c) squares += amount[c] * amount[c];
-  traced.add({1, rays.total(), unit > 0 ? squares / (unit * unit) : 0});
+  vertex.traced->add({1, rays.total(), unit > 0 ? squares / (unit * unit) : 0});
 }
 
 }  // namespace
@@ -106,7 +110,8 @@ void add_edge_point(const PathContext& context, const EdgeMesh& mesh, const Path
     if (vertex.log) vertex.log->push_back("    no weight");
     return;
   }
-  if (by_roulette && !is_zero(vertex.survival) && !survives(vertex, f, key, weight)) {
+  if (by_roulette && !vertex.turned && !is_zero(vertex.survival) &&
+      !survives(vertex, f, key, weight)) {
     ++cost.left_out;
     if (vertex.log) vertex.log->push_back("    left out by roulette");
     return;
@@ -118,7 +123,7 @@ void add_edge_point(const PathContext& context, const EdgeMesh& mesh, const Path
                 vertex.bounces + 1, key, rays, jump, part);
   cost.add(rays);
   const Rgb<double> amount = visible ? vertex.throughput * f * jump : Rgb<double>{};
-  if (by_roulette && vertex.traced) add_traced(vertex.throughput * f, rays, amount, *vertex.traced);
+  if (by_roulette && vertex.traced) add_traced(vertex, weight, vertex.throughput * f, rays, amount);
   if (!visible) {
     ++cost.occluded;
     if (vertex.log) vertex.log->push_back("    hidden");

@@ -243,7 +243,7 @@ TEST(Choice, LowersTheErrorForTheWork) {
 TEST(Choice, IsNotMadeForShortJobsOrOneTerm) {
   const TempFiles files;
   const Scene scene = shadow_scene(files);
-  const GradientResult brief = run(scene, {"ball.translate.y"}, {}, run_settings(15));
+  const GradientResult brief = run(scene, {"ball.translate.y"}, {}, run_settings(7));
   EXPECT_EQ(brief.samples(), SampleCounts{});
   EXPECT_EQ(brief.pilot_spp, 0);
   const GradientResult alone = run(scene, {"ball.translate.y"}, {}, run_settings(64), {"boundary"});

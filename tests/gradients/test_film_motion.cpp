@@ -245,6 +245,35 @@ TEST(FilmMotion, IsHeldWhereItDoesNotPay) {
   expect_same_bits(chosen, held);
 }
 
+// Edges at rest are listed while positions move, and then forgotten.
+TEST(FilmMotion, LeavesNothingBehind) {
+  const TempFiles files;
+  const Scene scene = scene_with(files, kFilters[1], 6);
+  const EdgeSamplerType& sampler = edge_sampler_type("silhouettes");
+  const auto terms = terms_of(scene, sampler, false, true);
+  const Parameter parameter = find_parameter(scene, "ball.translate.y");
+  SamplePlan held;
+  held.grid = PlanGrid(scene.film, film_size(scene.film));
+  SamplePlan moving = held;
+  FilmMotion motion;
+  motion.x[0] = 1;
+  moving.film.assign(moving.grid.size(), motion);
+  const auto images = [&](const std::vector<SamplePlan>& plans) {
+    auto estimator = std::make_unique<TermEstimator>(scene, std::span(&parameter, 1), terms,
+                                                     std::vector<bool>(terms.size(), true), sampler,
+                                                     1, nullptr, nullptr, false, true);
+    for (const SamplePlan& plan : plans) estimator->set_plan(plan);
+    std::vector<std::unique_ptr<SampleEstimator>> one;
+    one.push_back(std::move(estimator));
+    const Stopwatch watch;
+    RunSettings settings;
+    ProgressCounter progress(settings, watch, 1);
+    return run_batch(one, {11, 0, 4}, 1, progress).at(0).images;
+  };
+  EXPECT_EQ(images({held, moving, held}), images({held}));
+  EXPECT_NE(images({moving}), images({held}));
+}
+
 // A pilot that goes on: as many degrees of freedom as samples of a half, less one, in either part.
 TEST(Pilot, MergesFiguresOfMoreSamples) {
   const TempFiles files;
