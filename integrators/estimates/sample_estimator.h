@@ -109,7 +109,7 @@ class SampleSink {
     double* out = radiance_of(at);
     for (int c = 0; c < 3; ++c) out[c] += radiance[c] * weight;
   }
-  // Three sums.
+  // Three sums; they stay where they are until the batch ends.
   double* radiance_of(const PixelSample& at) {
     return &sums_.radiance[pixel_index(film_, at.x, at.y)];
   }

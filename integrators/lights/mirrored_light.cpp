@@ -48,6 +48,9 @@ double versine(double angle) {
   return 2 * sine * sine;
 }
 
+// Within which a light of that size is bright in a lobe: angles from its perfect mirror image [rad].
+double spread_of(double lobe, double size) { return std::min(lobe + size, 0.5 * kPi); }
+
 // The lesser of what a lamp sends to two near places of a face: it may hang just over one.
 double irradiance_of(const std::array<Vec3d, 3>& corners, size_t pair, size_t lamp,
                      const Lights& lights) {
@@ -216,9 +219,11 @@ void MirroredLight::add(const FlatPart& part, const Bsdf& bsdf, const Vec3d& nor
   if (!(height > kLeastHeight * (image.infinite ? 1 : image.radius))) return;
   image.albedo = std::min(bsdf.lobe().albedo, 1.0);
   image.width = bsdf.lobe().model->width(bsdf.lobe());
-  const double spread = std::min(2 * image.width + image.size, 0.5 * kPi);
-  image.turn = std::sin(spread);
-  image.rest = std::cos(spread);
+  if (image.infinite) {
+    const double spread = spread_of(2 * image.width, image.size);
+    image.turn = std::sin(spread);
+    image.rest = std::cos(spread);
+  }
   if (image.lamp) image.irradiance = lights_.estimate(*image.lamp, image.center);
   image.light_in_part = image.irradiance * height / length(to) * image.radius * image.radius;
   images_.push_back(image);
@@ -254,7 +259,7 @@ bool MirroredLight::sees(const Image& image, const Vec3d& p, Glare& glare) const
   }
   // A half vector that turns turns what is mirrored twice as far.
   const double lobe = 2 * image.width * glare.nearness;
-  const double spread = std::min(lobe + size, 0.5 * kPi);
+  const double spread = spread_of(lobe, size);
   const auto hit_of = [&](const Vec3d& w) { return p + w * (height / -dot(w, n)); };
   const Vec3d shown = hit_of(glare.toward);
   const auto is_inside = [&](const Vec3d& x) { return length(x - image.center) <= image.radius; };
@@ -297,14 +302,14 @@ double MirroredLight::pdf(const Glare& glare, const Vec3d& w) {
 double MirroredLight::pdf(const Mixture& mixture, const Vec3d& w, double scattered) {
   if (mixture.share == 0) return scattered;
   double sum = 0;
-  for (int i = 0; i < mixture.count; ++i) sum += mixture.part[i] * pdf(mixture.glare[i], w);
+  for (int i = 0; i < mixture.count; ++i) sum += mixture.part[i] * pdf(mixture.glare(i), w);
   return mixture.share * sum + (1 - mixture.share) * scattered;
 }
 
 std::optional<Vec3d> MirroredLight::sample(const Mixture& mixture, double u, double u1, double u2) {
   int i = 0;
   while (i + 1 < mixture.count && u >= mixture.part[i]) u -= mixture.part[i++];
-  const Glare& glare = mixture.glare[i];
+  const Glare& glare = mixture.glare(i);
   if (glare.cone > 0) {
     const double rise = u1 * glare.cone, sine = std::sqrt(rise * (2 - rise));
     const auto [a, b] = across(glare.toward);

@@ -10,9 +10,12 @@
 #include <array>
 #include <bitset>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <new>
 #include <optional>
+#include <type_traits>
 #include <vector>
 
 #include "integrators/lights/bright_patches.h"
@@ -42,10 +45,18 @@ class MirroredLight {
     double share = 0;      // of all together; 0: from the scattering function alone
     double elsewhere = 0;  // luminance of what is seen beside them, about, if any is seen
     int count = 0;
-    union {  // so that what there is none of is not filled
-      std::array<Glare, kMostImages> glare;
-    };
     std::array<double, kMostImages> part;  // sum to 1
+
+    Glare& glare(int i) { return std::launder(reinterpret_cast<Glare*>(glares_))[i]; }
+    const Glare& glare(int i) const {
+      return std::launder(reinterpret_cast<const Glare*>(glares_))[i];
+    }
+
+   private:
+    // In bytes such objects live as soon as they are written to: what there is none of is not
+    // filled.
+    static_assert(std::is_aggregate_v<Glare> && std::is_trivially_copyable_v<Glare>);
+    alignas(Glare) std::byte glares_[kMostImages * sizeof(Glare)];
   };
 
   // Both must outlive it. Null where the scene has no such light or surface.
@@ -58,7 +69,7 @@ class MirroredLight {
     double sum = 0, of_lamps = 0;
     const Bsdf& bsdf = *scene_.shape(surface.face.shape).bsdf->side(scattering.front());
     for (const Image& image : images_) {
-      Glare& glare = mixture.glare[mixture.count];
+      Glare& glare = mixture.glare(mixture.count);
       if (image.holds(surface.face) || !sees(image, value(surface.p), glare)) continue;
       const double power = luminance(scattering.eval_value(bsdf, glare.toward)) * glare.irradiance;
       if (!(power > 0)) continue;

@@ -122,6 +122,12 @@ void RadianceEstimator::trace(std::span<const KeyedSample> samples, bool mirrore
   }
   sink.cost(0).add(rays);
   sink.cost(0).samples += samples.size();
+  add(walks, samples, weight, sink);
+}
+
+template <class Walk>
+void RadianceEstimator::add(const std::vector<Walk>& walks, std::span<const KeyedSample> samples,
+                            double weight, SampleSink& sink) const {
   // Samples of a pixel follow each other: its sum is in memory but before and after them, as each
   // would wait for the one before.
   double* pixel = nullptr;

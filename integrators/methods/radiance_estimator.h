@@ -1,6 +1,8 @@
 #pragma once
 // The radiance of a scene as an estimator: images, and differences of images.
 #include <memory>
+#include <span>
+#include <vector>
 
 #include "integrators/estimates/sample_estimator.h"
 #include "integrators/film/film_regions.h"
@@ -39,6 +41,10 @@ class RadianceEstimator final : public SampleEstimator {
   template <class Visitor>
   void trace(std::span<const KeyedSample> samples, bool mirrored, double weight, Visitor* visitor,
              SampleSink& sink) const;
+  // What the walks of samples have come to.
+  template <class Walk>
+  void add(const std::vector<Walk>& walks, std::span<const KeyedSample> samples, double weight,
+           SampleSink& sink) const;
 
   const Scene& scene_;
   std::unique_ptr<RayTracer> tracer_;

@@ -28,7 +28,7 @@ void GlareEdges::list(const PathVertex& vertex, const EdgeQuery& query, View& vi
   view.pieces.clear();
   const MirroredLight::Mixture mixture = mirrored_.mixture(vertex.surface, vertex.scattering);
   for (int i = 0; i < mixture.count; ++i) {
-    const MirroredLight::Glare& glare = mixture.glare[i];
+    const MirroredLight::Glare& glare = mixture.glare(i);
     if (!(glare.half_angle > kNarrowest && glare.half_angle < kWidest)) continue;
     const DirectionCap cap{glare.toward, std::sin(glare.half_angle), std::cos(glare.half_angle)};
     const double solid_angle = 2 * kPi * cap.sine * cap.sine / (1 + cap.cosine);

@@ -17,7 +17,7 @@ class AreaLight final : public Light {
     inverse_area_ = 1 / faces_.sum();
   }
 
-  std::optional<LightSample> sample(const Vec3d& p, double choices,
+  std::optional<LightSample> sample(const Vec3d& p, double probability,
                                     const LightNumbers& u) const override {
     const FaceId face(static_cast<uint32_t>(faces_.sample(u[0]).index));
     const double root = std::sqrt(u[1]);
@@ -31,12 +31,13 @@ class AreaLight final : public Light {
     const double facing = -dot(n, wo);
     if (!(facing > 0)) return {};
     // As `pdf` has it, without a unit normal.
-    const double density = distance * distance * inverse_area_ * length(n) / (facing * choices);
+    const double density = distance * distance * inverse_area_ * length(n) * probability / facing;
+    if (!(density > 0)) return {};
     return LightSample{wo, distance, density, FaceRef{id_, face}, this};
   }
-  double pdf(const LightView& view, double choices) const override {
+  double pdf(const LightView& view, double probability) const override {
     const double cosine = std::fabs(dot(view.n_g, view.wo));
-    return view.distance * view.distance * inverse_area_ / (cosine * choices);
+    return view.distance * view.distance * inverse_area_ * probability / cosine;
   }
 
   Rgb<double> radiance(const Vec3<double>&) const override { return value(shape_.radiance); }

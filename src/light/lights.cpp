@@ -17,14 +17,14 @@ constexpr double kAny = 0.25;
 
 }  // namespace
 
-std::optional<LightSample> DeltaLight::sample(const Vec3d& p, double choices,
+std::optional<LightSample> DeltaLight::sample(const Vec3d& p, double probability,
                                               const LightNumbers&) const {
   const auto arrival = arriving(p);
   if (!arrival) return {};
   const LightOrigin from = origin();
   const double distance =
       from.infinite ? std::numeric_limits<double>::infinity() : length(value(from.v) - p);
-  return LightSample{arrival->wo, distance, 1 / choices, {}, this};
+  return LightSample{arrival->wo, distance, probability, {}, this};
 }
 
 std::optional<LightSample> Environment::light_sample(const Drawn& drawn, double probability) const {
@@ -171,8 +171,7 @@ void Lights::sample(std::span<const Draw> draws, std::span<const Numbers> u) con
       numbers[count++] = {u[i][1], u[i][2]};
     } else {
       renew(*draws[i].sample, [&] {
-        return all_[light]->sample(place.p, 1 / probability(place, light),
-                                   {u[i][1], u[i][2], u[i][3]});
+        return all_[light]->sample(place.p, probability(place, light), {u[i][1], u[i][2], u[i][3]});
       });
     }
   }

@@ -445,7 +445,7 @@ TEST(MirroredLight, OrderIsThatOfTheFile) {
     for (const size_t other : {size_t{0}, size_t{2}}) {
       ASSERT_EQ(found[other].count, found[1].count);
       for (int i = 0; i < found[1].count; ++i) {
-        EXPECT_LT(length(found[other].glare[i].toward - found[1].glare[i].toward), 1e-3) << i;
+        EXPECT_LT(length(found[other].glare(i).toward - found[1].glare(i).toward), 1e-3) << i;
       }
     }
     // The brightest is among them though it comes last.

@@ -1,6 +1,9 @@
 // Angles and half floats against the maths library and the format's definition; draws by weight.
 #include <gtest/gtest.h>
 
+#include <array>
+#include <bit>
+#include <cstdint>
 #include <limits>
 
 #include "limn/core/discrete_distribution.h"
@@ -92,6 +95,22 @@ TEST(Halves, HoldEveryFiniteHalfExactly) {
     const float found = Half(v);
     EXPECT_EQ(found, v);
     EXPECT_EQ(std::signbit(found), std::signbit(v));
+  }
+}
+
+// The largest exponent too, which means no infinity here.
+TEST(Halves, FourAtOnceAreThoseAlone) {
+  for (uint32_t i = 0; i < 65536; ++i) {
+    std::array<Half, 4> halves;
+    for (uint32_t k = 0; k < 4; ++k) {  // each differs from those beside it
+      halves[k] = std::bit_cast<Half>(static_cast<uint16_t>(i + 0x4321 * k));
+    }
+    const FourDoubles found = to_doubles(halves);
+    for (int k = 0; k < 4; ++k) {
+      EXPECT_EQ(std::bit_cast<uint64_t>(double{found[k]}),
+                std::bit_cast<uint64_t>(double{float{halves[k]}}))
+          << i << " " << k;
+    }
   }
 }
 

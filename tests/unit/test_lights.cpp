@@ -1,11 +1,14 @@
-// Lights by themselves: what arrives from each kind, and how one of them is chosen.
+// Lights by themselves: what arrives from each kind, how one of them is chosen, and weights of two
+// densities.
 #include "limn/core/lights.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <numeric>
 
+#include "integrators/paths/path_context.h"
 #include "limn/core/parameter.h"
 #include "support/scenes.h"
 
@@ -61,7 +64,9 @@ TEST(DeltaLights, ADirectionComesFromInfinity) {
     const auto a = light->arriving(Vec3d{100, -1e6, 3});
     EXPECT_NEAR(a->wo.y, 1, 1e-15);
     EXPECT_EQ(a->irradiance.r, 3);
-    EXPECT_TRUE(std::isinf(light->sample({0, 0, 0}, 2, {})->distance));
+    const auto sample = light->sample({0, 0, 0}, 0.3, {});
+    EXPECT_TRUE(std::isinf(sample->distance));
+    EXPECT_EQ(sample->pdf, 0.3);
   }
 }
 
@@ -258,6 +263,50 @@ TEST(Lights, AreDrawnByWhatLargeLampsSend) {
     const double lamp = 20 / (d * d + 1), sky = 1;
     EXPECT_NEAR(chance, 0.125 + 0.75 * sky / (lamp + sky), 1e-6) << d;
   }
+}
+
+// So near that the square of the distance rounds to nothing: a weight over it would be infinite.
+TEST(Lights, OfNoDensityDrawNothing) {
+  const TempFiles files;
+  Scene scene = scene_with(files, square("lamp", 1, 90, {}, area_light("glow", "1, 1, 1")));
+  Mesh& mesh = scene.shapes[0].mesh;
+  const FaceIndices& face = mesh.faces[0];
+  mesh.positions[face[0]] = {-8, 0, 0};
+  mesh.positions[face[1]] = {0, 0, 0};
+  mesh.positions[face[2]] = {0, 0, -8};
+  const std::unique_ptr<Light> lamp = make_area_light(scene, ShapeId(0));
+  const LightNumbers corner{};  // draws the second one
+  const auto near = lamp->sample({0, 1e-150, 0}, 1, corner);
+  ASSERT_TRUE(near);
+  EXPECT_GT(near->pdf, 0);
+  EXPECT_FALSE(lamp->sample({0, 3e-162, 0}, 1, corner));
+}
+
+// To rounding, also where densities or their ratio are beyond what squares can hold.
+TEST(MisWeights, OverADensityAreDividedByIt) {
+  const auto expect_divided = [](double pdf, double other) {
+    const double expected = mis_weight(pdf, other) / pdf;
+    const double found = mis_weight_over_pdf(pdf, other);
+    if (!std::isfinite(expected)) {
+      EXPECT_EQ(found, expected) << pdf << " " << other;
+      return;
+    }
+    // At most two epsilons of a weight or a product below the normal numbers, and half of one each of
+    // all else; a result below them may become nothing.
+    EXPECT_NEAR(
+        found, expected,
+        4 * std::numeric_limits<double>::epsilon() * expected + std::numeric_limits<double>::min())
+        << pdf << " " << other;
+  };
+  Rng rng(1, 2, 3);
+  for (int i = 0; i < 200000; ++i) {
+    const double pdf = std::pow(10, 630 * rng.uniform() - 322);
+    expect_divided(pdf, pdf * std::pow(10, 8 * rng.uniform() - 4));
+    expect_divided(pdf, std::pow(10, 630 * rng.uniform() - 322));
+    expect_divided(pdf, 0);
+  }
+  EXPECT_EQ(mis_weight_over_pdf(0.25, 0), 4);
+  EXPECT_EQ(mis_weight_over_pdf(1e-300, 1e300), 0);
 }
 
 TEST(Lights, OfASceneWithoutAnyAreEmpty) {

@@ -104,14 +104,14 @@ class Environment : public Light {
   virtual std::shared_ptr<Environment> clone() const = 0;
   virtual std::string describe() const = 0;
 
-  // As a sample of a light that is chosen so often; none where the density is 0.
+  // As a sample of a light that is chosen with that probability; none where the density is 0.
   std::optional<LightSample> light_sample(const Drawn& drawn, double probability) const;
-  std::optional<LightSample> sample(const Vec3d&, double choices,
+  std::optional<LightSample> sample(const Vec3d&, double probability,
                                     const LightNumbers& u) const final {
-    return light_sample(sample_direction(u[0], u[1]), 1 / choices);
+    return light_sample(sample_direction(u[0], u[1]), probability);
   }
-  double pdf(const LightView& view, double choices) const final {
-    return pdf_solid_angle(view.wo) / choices;
+  double pdf(const LightView& view, double probability) const final {
+    return pdf_solid_angle(view.wo) * probability;
   }
 };
 

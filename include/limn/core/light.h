@@ -51,12 +51,12 @@ class Light {
  public:
   virtual ~Light() = default;
 
-  // A direction from p to the light, where `choices` lights are equally likely. None if the point
-  // that was drawn does not shine on p: a sample of value zero.
-  virtual std::optional<LightSample> sample(const Vec3d& p, double choices,
+  // A direction from p to the light, which is chosen with that probability among all. None, a sample
+  // of value zero, if the point that was drawn does not shine on p, or rounding leaves no density.
+  virtual std::optional<LightSample> sample(const Vec3d& p, double probability,
                                             const LightNumbers& u) const = 0;
   // The density [1/sr] with which `sample` draws this view; 0 of a delta light.
-  virtual double pdf(const LightView& view, double choices) const = 0;
+  virtual double pdf(const LightView& view, double probability) const = 0;
 
   // Radiance that arrives from the unit direction wo at the points that the light shines on; none
   // of a delta light.
@@ -122,7 +122,7 @@ class DeltaLight : public Light {
   virtual std::shared_ptr<DeltaLight> clone() const = 0;
   virtual std::string describe() const = 0;  // one line for `limn info`
 
-  std::optional<LightSample> sample(const Vec3d& p, double choices,
+  std::optional<LightSample> sample(const Vec3d& p, double probability,
                                     const LightNumbers& u) const final;
   double pdf(const LightView&, double) const final { return 0; }
   Rgb<double> radiance(const Vec3<double>&) const final { return {}; }

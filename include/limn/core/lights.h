@@ -55,7 +55,7 @@ class Lights {
   // where it leaves the scene, the environment (there must be one).
   double pdf(const Place& place, ShapeId shape, const LightView& view) const {
     const size_t light = of_shape_[shape.index()];
-    return all_[light]->pdf(view, 1 / probability(place, light));
+    return all_[light]->pdf(view, probability(place, light));
   }
   double pdf_environment(const Place& place, const Vec3d& wo) const {
     return environment_->pdf_solid_angle(wo) * probability(place, area_lights_.size());
