@@ -93,8 +93,6 @@ constexpr double kFilmPromising = 0.99, kFilmAgainstTurns = 1.25, kTurnsAlone = 
 constexpr int kFirstLook = 8;
 // The most work of the pilot that looks at them, as a share of the run's. Not tuned.
 constexpr double kFilmShare = 1.0 / 4;
-// Of a limit of time: what the first pilot may have taken of it, for the others to follow. Not tuned.
-constexpr double kLookShare = 1.0 / 6;
 
 // Of runs long enough for more estimators: samples, and a set-up's share of the time; not tuned.
 constexpr int kLongRun = 256;
@@ -365,8 +363,8 @@ class TermJob {
                       !method_.random_directions && !estimator.motion_rates().still();
     const int first_look = film ? std::min(spp, kFirstLook) : spp;
     Probed probed = probe(estimator, turns, first_look, settings, watch);
-    const bool in_time = !budget.timed() || watch.seconds() < kLookShare * settings.seconds;
-    if (film && probed.pilot.spp > 0 && in_time) {
+    if (film && probed.pilot.spp > 0 &&
+        (!budget.timed() || is_time_for_film(estimator, probed.pilot.spp, settings, watch))) {
       look_at_film(p, turns, budget, probing, probed);
       extend(probed, estimator, turns, spp, settings, watch);
     }

@@ -21,6 +21,7 @@
 //
 // The score without radiance, f' along V + f div V over the density of w, has mean zero as well,
 // because f vanishes at the horizon: any multiple of it may be added.
+#include <algorithm>
 #include <vector>
 
 #include "limn/core/scene.h"
@@ -84,6 +85,10 @@ class MotionRates {
   double urgency(const Vec3d& p, const Vec3<Lanes>& velocity, const Vec3d& p0) const;
   // Nothing moves: turning would only add noise.
   bool still() const { return sources_.empty(); }
+  bool moves_camera() const {
+    return std::any_of(sources_.begin(), sources_.end(),
+                       [](const Source& source) { return source.is_camera; });
+  }
 
  private:
   struct Source {

@@ -28,6 +28,11 @@ struct FilmLook {
   double most_left;
 };
 
+// Whether looking for motion pays in a run with a limit of time, where a pilot took so many samples
+// since the watch began: it takes two pilots more.
+bool is_time_for_film(const TermEstimator& estimator, int spp, const RunSettings& settings,
+                      const Stopwatch& watch);
+
 // By a pilot. The estimator has kMostFilmParameters at most, and is left with a plan that is of no
 // use. settings, watch: as of run_pilot; it takes an eighth of a limit of time. Deterministic on any
 // number of threads.
