@@ -30,8 +30,8 @@ struct TurnedVertex {
 // What a pilot learns of the draws that were traced.
 struct TracedDraws {
   uint64_t count = 0, rays = 0;
-  double squared_jumps =
-      0;  // for all channels, over the square of the luminance they are weighed by
+  // For all channels, over the square of the luminance they are weighed by.
+  double squared_jumps = 0;
   void add(const TracedDraws& other) {
     count += other.count;
     rays += other.rays;
