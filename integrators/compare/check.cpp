@@ -112,7 +112,7 @@ Places score_places(const Residual& residual, const Windows& windows, const Grad
 }
 
 // The least part of an image (its means in the windows) that some probe finds.
-double visible_part(const Places& places, const std::vector<double>& image, int degrees) {
+double visible_part(const Places& places, const std::vector<double>& image, double degrees) {
   double visible = std::numeric_limits<double>::infinity();
   for (const Place& place : places.list) {
     double seen = 0;

@@ -77,7 +77,7 @@ std::optional<Bend> find_bend(const Scene& scene, const std::string& name, doubl
   bend.sum.value = moments.mean(0);
   bend.sum.error = std::sqrt(moments.variance(0));
   if (bend.sum.value != 0)
-    bend.sum.z = normal_from_student(bend.sum.value / bend.sum.error, moments.batches() - 1);
+    bend.sum.z = normal_from_student(bend.sum.value / bend.sum.error, moments.degrees());
   double variance = 0;
   for (size_t k = 0; k < weights.size(); ++k) {
     const double error = std::sqrt(single.variance(k));

@@ -162,8 +162,7 @@ std::vector<Moments> reverse_sums(const Scene& scene, const std::vector<Compared
 // The difference of two means as a standard normal z: Student's t with Welch's degrees of freedom.
 double score(const Moments& forward, const Moments& reverse) {
   const double a = forward.variance(0), b = reverse.variance(0), both = a + b;
-  const double degrees =
-      both * both / (a * a / (forward.batches() - 1) + b * b / (reverse.batches() - 1));
+  const double degrees = both * both / (a * a / forward.degrees() + b * b / reverse.degrees());
   return normal_from_student((reverse.mean(0) - forward.mean(0)) / std::sqrt(both), degrees);
 }
 

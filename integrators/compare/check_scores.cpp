@@ -117,6 +117,7 @@ Residual::Residual(const Windows& windows, const GradientResult& gradient,
   const ParameterGradient& g = gradient.parameters[0];
   gradient_ = gather(g.total_blocks);
   differences_ = gather(differences.blocks);
+  degrees_ = g.total_blocks.degrees();
   // Events of size x at such a rate that their mean is m have a variance of |m| x per sample, also
   // in places where none has come.
   const std::vector<double> of_differences = means(differences.blocks);

@@ -56,7 +56,7 @@ class Residual {
   Score score(const Probe& probe) const;
   // Of each window alone; those without any variance and value are left out.
   std::vector<Score> window_scores() const;
-  int degrees() const { return static_cast<int>(gradient_.size()) - 1; }
+  double degrees() const { return degrees_; }
 
   // Where the term would show best: its mean over the variance, from the other half of the batches.
   // Weights are zero where there are too few batches for that.
@@ -77,6 +77,7 @@ class Residual {
   const Windows& windows_;
   Batches gradient_, differences_;  // sums of windows
   Rare rare_gradient_, rare_differences_;
+  double degrees_;                // of freedom, of the gradient
   std::vector<double> rounding_;  // of each window, a standard deviation
 };
 

@@ -54,7 +54,7 @@ BlockSums block_sums(const GradientResult& result) {
   BlockSums sums;
   sums.sums = means(blocks);
   if (blocks.batches() > 1) sums.variances = variances(blocks);
-  sums.degrees = blocks.batches() - 1;
+  sums.degrees = blocks.degrees();
   if (blocks.samples() > 0) {
     sums.event = event_sizes(batches_of_edges(result)).mean / static_cast<double>(blocks.samples());
   }

@@ -17,10 +17,23 @@ namespace limn {
 
 namespace {
 
-Rng pixel_key(const SampleEstimator& estimator, uint64_t seed, const PixelSample& at) {
+// The numbers of all that is even in a batch, by a seed of its own.
+Rng even_in_batch(const Batch& batch, uint64_t pixel, size_t number, size_t count) {
+  return Rng::even(mix_bits(batch.seed) + batch.first, pixel, static_cast<uint32_t>(number),
+                   static_cast<uint32_t>(count));
+}
+
+Rng pixel_key(const SampleEstimator& estimator, const Batch& batch, const PixelSample& at) {
   const uint64_t pixel = static_cast<uint64_t>(at.y) * estimator.scene().camera.width + at.x;
-  if (estimator.is_even()) return Rng::even(seed, pixel, static_cast<uint32_t>(at.s));
-  return {seed, pixel, static_cast<uint64_t>(at.s)};
+  switch (estimator.numbers()) {
+    case Numbers::kEvenInBatches:
+      return even_in_batch(batch, pixel, at.s - batch.first, batch.count());
+    case Numbers::kEvenInRun:
+      return Rng::even(batch.seed, pixel, static_cast<uint32_t>(at.s));
+    case Numbers::kIndependent:
+      break;
+  }
+  return {batch.seed, pixel, static_cast<uint64_t>(at.s)};
 }
 
 // A slot's samples of the film over a batch: the same whole number per sample per pixel in every
@@ -29,21 +42,23 @@ struct FilmBatch {
   size_t per_sample;  // samples of the film for one sample per pixel
   size_t first, count;
 
-  FilmBatch(const SampleEstimator& estimator, size_t slot, int first_sample, int samples) {
+  FilmBatch(const SampleEstimator& estimator, size_t slot, const Batch& batch) {
     const Film& film = estimator.scene().film;
     per_sample = static_cast<size_t>(
         std::ceil(estimator.film_samples(slot) * film.crop_width * film.crop_height));
-    first = per_sample * first_sample;
-    count = per_sample * samples;
+    first = per_sample * batch.first;
+    count = per_sample * batch.count();
   }
 };
 
-// The i-th sample of a batch, in strata along [0, 1).
-bool sample_film(const SampleEstimator& estimator, size_t slot, uint64_t seed,
-                 const FilmBatch& batch, size_t i, RayCount& rays, FilmSample& sample) {
-  const Rng key =
-      Rng(seed, UINT64_MAX, batch.first + i).copy(Purpose::kFilmCopy, estimator.film_stream(slot));
-  const double u = (i + key.at(Purpose::kCamera, 0).uniform()) / batch.count;
+// The i-th sample of a batch, in strata along [0, 1): what is even is so along the curves, too.
+bool sample_film(const SampleEstimator& estimator, size_t slot, const Batch& batch,
+                 const FilmBatch& film, size_t i, RayCount& rays, FilmSample& sample) {
+  const Rng all = estimator.numbers() == Numbers::kEvenInBatches
+                      ? even_in_batch(batch, UINT64_MAX, i, 0)
+                      : Rng(batch.seed, UINT64_MAX, film.first + i);
+  const Rng key = all.copy(Purpose::kFilmCopy, estimator.film_stream(slot));
+  const double u = (i + key.at(Purpose::kCamera, 0).uniform()) / film.count;
   return estimator.sample_film(slot, u, key, rays, sample);
 }
 
@@ -69,7 +84,7 @@ class BatchRunner {
     for (size_t slot = 0; slot < estimator_.slots(); ++slot) {
       if (estimator_.film_samples(slot) > 0) run_film(slot);
     }
-    progress_.step();
+    progress_.step(batch_.count());
     return std::move(sums_);
   }
 
@@ -82,7 +97,7 @@ class BatchRunner {
       if (progress_.stopped()) return;
       costs[i].resize(estimator_.slots());
       run_tile(tiles[i], costs[i], bad[i]);
-      progress_.step();
+      progress_.step(batch_.count());
     });
     if (progress_.stopped()) return;
     for (size_t i = 0; i < tiles.size(); ++i) {
@@ -104,7 +119,7 @@ class BatchRunner {
       for (int x = tile.x0; x < tile.x1; ++x) {
         for (int s = batch_.first; s < batch_.last; ++s) {
           const PixelSample at{x, y, s};
-          together.push_back({at, pixel_key(estimator_, batch_.seed, at)});
+          together.push_back({at, pixel_key(estimator_, batch_, at)});
           if (together.size() == most) add();
         }
       }
@@ -125,7 +140,7 @@ class BatchRunner {
 
   void run_film(size_t slot) {
     constexpr size_t kHeld = 1024 * kChunk;  // samples in memory, 170 bytes each; not tuned
-    const FilmBatch batch(estimator_, slot, batch_.first, batch_.count());
+    const FilmBatch batch(estimator_, slot, batch_);
     for (size_t begin = 0; begin < batch.count && !progress_.stopped(); begin += kHeld) {
       add_film_samples(slot, batch, begin, std::min(batch.count, begin + kHeld));
     }
@@ -163,7 +178,7 @@ class BatchRunner {
     RayCount rays;
     for (size_t i = first; i < last; ++i) {
       FilmSample sample;
-      if (!sample_film(estimator_, slot, batch_.seed, batch, i, rays, sample)) continue;
+      if (!sample_film(estimator_, slot, batch_, batch, i, rays, sample)) continue;
       if (is_finite(sample.value) && is_finite(sample.along_x) && is_finite(sample.along_y)) {
         chunk.samples.emplace_back(batch.first + i, sample);
       } else {
@@ -229,14 +244,27 @@ void start(BatchStore& store, Estimators estimators, const RunSettings& settings
   store.start(settings.spp);
 }
 
-int batches_to_make(const RunSettings& settings, const Stopwatch& watch) {
-  if (!settings.store) return Schedule::batch_count(settings.spp);
+int samples_to_make(const RunSettings& settings, const Stopwatch& watch) {
+  if (!settings.store) return settings.spp;
   int count = 0;
   Schedule schedule(settings, watch);
   while (schedule.next()) {
-    if (task_of(settings, schedule.first_sample()) == BatchStore::Task::kMake) ++count;
+    if (task_of(settings, schedule.first_sample()) == BatchStore::Task::kMake) {
+      count += schedule.samples();
+    }
   }
   return std::max(1, count);
+}
+
+// Of a run without a limit of time, that has this sample.
+Batch batch_of(const RunSettings& settings, int sample) {
+  const Stopwatch watch;
+  RunSettings untimed = settings;
+  untimed.seconds = 0;
+  Schedule schedule(untimed, watch);
+  while (schedule.next() && schedule.end_sample() <= sample) {
+  }
+  return {settings.seed, schedule.first_sample(), schedule.end_sample()};
 }
 
 std::string to_text(const Rgb<Lanes>& value, int lanes) {
@@ -260,7 +288,7 @@ std::vector<BatchSums> run_batch(Estimators estimators, const Batch& batch, int 
   return sums;
 }
 
-size_t steps_per_batch(Estimators estimators) {
+size_t steps_per_sample(Estimators estimators) {
   size_t steps = 0;
   for (const auto& estimator : estimators) {
     steps += 1;
@@ -276,8 +304,8 @@ void check_memory(Estimators estimators) {
   }
   if (images == 0) return;
   const Scene& scene = (*estimators.begin())->scene();
-  // Of every image: the sums of a batch, of all batches, and their squares.
-  const double bytes = 3 * sizeof(double) * images * static_cast<double>(film_size(scene.film));
+  // Of every image: the sums of a batch, of all batches, and two of their squares.
+  const double bytes = 4 * sizeof(double) * images * static_cast<double>(film_size(scene.film));
   require_memory({scene.file}, bytes,
                  fmt::format("a run with {:.0f} images of {} x {} pixels (each term of each "
                              "parameter has one)",
@@ -292,7 +320,7 @@ void run_batches(Estimators estimators, const RunSettings& settings, const Stopw
   if (settings.interrupted && settings.interrupted->load()) return;
   if (settings.store) start(*settings.store, estimators, settings);
   ProgressCounter progress(settings, watch,
-                           steps_per_batch(estimators) * batches_to_make(settings, watch));
+                           steps_per_sample(estimators) * samples_to_make(settings, watch));
   Schedule schedule(settings, watch);
   while (!progress.stopped() && schedule.next()) {
     const Batch batch{settings.seed, schedule.first_sample(), schedule.end_sample()};
@@ -320,8 +348,8 @@ void check_pixel(const Film& film, const NonFinite::Place& place) {
       film.crop_y + film.crop_height - 1));
 }
 
-void run_pixel_sample(const SampleEstimator& estimator, uint64_t seed, const PixelSample& at,
-                      SampleLog& log) {
+void run_pixel_sample(const SampleEstimator& estimator, const RunSettings& settings,
+                      const PixelSample& at, SampleLog& log) {
   BatchSums sums;
   const Film& film = estimator.scene().film;
   sums.radiance.assign(film_size(film), 0.0);
@@ -330,7 +358,9 @@ void run_pixel_sample(const SampleEstimator& estimator, uint64_t seed, const Pix
   NonFinite bad;
   const Lanes lane_scale = estimator.lane_scale();
   SampleSink sink(film, estimator.lanes(), lane_scale, sums, costs, bad, &log);
-  const KeyedSample one{at, pixel_key(estimator, seed, at)};
+  RunSettings own = settings;
+  own.spp = static_cast<int>(std::max<int64_t>(own.spp, int64_t{at.s} + 1));
+  const KeyedSample one{at, pixel_key(estimator, batch_of(own, at.s), at)};
   estimator.add_pixels({&one, 1}, sink);
   const size_t index = pixel_index(film, at.x, at.y);
   const auto rgb = [&](const std::vector<double>& image) {
@@ -350,26 +380,21 @@ void run_pixel_sample(const SampleEstimator& estimator, uint64_t seed, const Pix
 bool run_film_sample(const SampleEstimator& estimator, const RunSettings& settings, size_t slot,
                      int64_t number, SampleLog& log) {
   if (estimator.film_samples(slot) <= 0 || number < 0) return false;
-  const Stopwatch watch;
-  RunSettings untimed = settings;
-  untimed.seconds = 0;
-  Schedule schedule(untimed, watch);
-  while (schedule.next()) {
-    const FilmBatch batch(estimator, slot, schedule.first_sample(), schedule.samples());
-    const auto n = static_cast<size_t>(number);
-    if (n >= batch.first + batch.count) continue;
-    RayCount rays;
-    FilmSample sample;
-    if (sample_film(estimator, slot, settings.seed, batch, n - batch.first, rays, sample)) {
-      log.push_back(fmt::format("film point ({:.6f}, {:.6f}), value over density {}", sample.x,
-                                sample.y, to_text(sample.value, estimator.lanes())));
-    } else {
-      log.push_back("adds nothing");
-    }
-    log.push_back(fmt::format("{} rays", rays.total()));
-    return true;
+  const auto n = static_cast<size_t>(number);
+  const size_t per_sample = FilmBatch(estimator, slot, {}).per_sample;
+  if (n / per_sample >= static_cast<size_t>(settings.spp)) return false;
+  const Batch batch = batch_of(settings, static_cast<int>(n / per_sample));
+  const FilmBatch film(estimator, slot, batch);
+  RayCount rays;
+  FilmSample sample;
+  if (sample_film(estimator, slot, batch, film, n - film.first, rays, sample)) {
+    log.push_back(fmt::format("film point ({:.6f}, {:.6f}), value over density {}", sample.x,
+                              sample.y, to_text(sample.value, estimator.lanes())));
+  } else {
+    log.push_back("adds nothing");
   }
-  return false;
+  log.push_back(fmt::format("{} rays", rays.total()));
+  return true;
 }
 
 }  // namespace limn

@@ -25,8 +25,8 @@ std::vector<BatchSums> run_batch(Estimators estimators, const Batch& batch, int 
 // InputError if memory does not hold the images of a run. To be called before any is made.
 void check_memory(Estimators estimators);
 
-// Steps that run_batch reports for one batch.
-size_t steps_per_batch(Estimators estimators);
+// Steps that run_batch reports for each sample of a batch.
+size_t steps_per_sample(Estimators estimators);
 
 // Runs batch after batch until all samples are done, the time is over or the run is interrupted.
 // collect(batch, sums) takes the sums of every finished batch.
@@ -36,9 +36,9 @@ void run_batches(Estimators estimators, const RunSettings& settings, const Stopw
 // InputError if the film has no such pixel.
 void check_pixel(const Film& film, const NonFinite::Place& place);
 
-// One sample of a pixel alone.
-void run_pixel_sample(const SampleEstimator& estimator, uint64_t seed, const PixelSample& at,
-                      SampleLog& log);
+// One sample of a pixel alone, also one that the run's number of samples does not reach.
+void run_pixel_sample(const SampleEstimator& estimator, const RunSettings& settings,
+                      const PixelSample& at, SampleLog& log);
 // One of a slot's samples of the film, by its number in the run; false if the run has none of this
 // number.
 bool run_film_sample(const SampleEstimator& estimator, const RunSettings& settings, size_t slot,

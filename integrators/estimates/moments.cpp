@@ -9,17 +9,26 @@ namespace limn {
 void Moments::add_batch(const std::vector<double>& sums, int64_t samples) {
   for (size_t i = 0; i < sums.size(); ++i) {
     sums_[i] += sums[i];
-    squares_[i] += sums[i] * sums[i] / samples;
+    squares_[i] += sums[i] * sums[i];
+    weighted_[i] += static_cast<double>(samples) * sums[i];
   }
   samples_ += samples;
+  squared_samples_ += static_cast<double>(samples) * static_cast<double>(samples);
   ++batches_;
   if (keep_) kept_.push_back({sums, samples});
 }
 
 double Moments::variance(size_t i) const {
   if (batches_ < 2) return std::numeric_limits<double>::quiet_NaN();
-  const double between = squares_[i] - sums_[i] * sums_[i] / samples_;
-  return std::fmax(0.0, between) / (batches_ - 1) / samples_;
+  const double m = mean(i);
+  const double between = squares_[i] - 2 * m * weighted_[i] + m * m * squared_samples_;
+  const auto all = static_cast<double>(samples_);
+  return std::fmax(0.0, between) / (all * all - squared_samples_);
+}
+
+double Moments::degrees() const {
+  const auto all = static_cast<double>(samples_);
+  return batches_ > 0 ? all * all / squared_samples_ - 1 : 0;
 }
 
 std::vector<double> means(const Moments& moments) {

@@ -20,7 +20,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little);
 
-constexpr const char* kTitle = "limn part 2";  // counts changes of what files hold
+constexpr const char* kTitle = "limn part 3";  // counts changes of what files hold
 constexpr const char* kMagic = "\x93NUMPY\x01";
 
 // A vector of N numbers in NumPy's format, version 1.0. type: as NumPy writes it, "<f8".

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 
 namespace limn {
 
@@ -66,15 +67,14 @@ std::string NonFinite::message() const {
 
 namespace {
 
-int batch_end(int done, int spp) { return std::min<int64_t>(spp, int64_t{done} + 1 + done / 32); }
+// Powers of two: what is even (Rng::even) is most so then.
+int batch_end(int done, int spp) {
+  const int wished = std::max({1, std::min(done / 4, 4), std::min(done / 8, 16), done / 32});
+  const auto samples = std::bit_floor(static_cast<unsigned>(wished));
+  return static_cast<int>(std::min<int64_t>(spp, int64_t{done} + samples));
+}
 
 }  // namespace
-
-int Schedule::batch_count(int spp) {
-  int count = 0;
-  for (int done = 0; done < spp; done = batch_end(done, spp)) ++count;
-  return count;
-}
 
 int Schedule::samples_in_time(double now) const {
   const double left = settings_.seconds - now;
@@ -102,9 +102,9 @@ bool Schedule::next() {
   return true;
 }
 
-void ProgressCounter::step() {
+void ProgressCounter::step(size_t count) {
   const std::scoped_lock lock(mutex_);
-  ++done_;
+  done_ += count;
   if (!settings_.progress) return;
   double done = static_cast<double>(done_) / steps_;
   if (settings_.seconds > 0) done = std::max(done, watch_.seconds() / settings_.seconds);

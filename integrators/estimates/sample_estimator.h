@@ -149,6 +149,13 @@ class SampleSink {
   SampleLog* log_;
 };
 
+// How the random numbers of a pixel's samples depend on each other.
+enum class Numbers {
+  kIndependent,
+  kEvenInBatches,  // Rng::even of a batch alone: batches are independent
+  kEvenInRun       // of all: what batches differ by is no error then, nor a bound of it
+};
+
 // Thread-safe: all of it is const.
 class SampleEstimator {
  public:
@@ -161,9 +168,7 @@ class SampleEstimator {
   virtual int lanes() const { return 0; }
   virtual Lanes lane_scale() const { return {}; }  // natural steps of the parameters
 
-  // Whether the numbers of a pixel's samples are even (Rng::even). What batches differ by is then
-  // no error, nor a bound of it.
-  virtual bool is_even() const { return false; }
+  virtual Numbers numbers() const { return Numbers::kIndependent; }
   // All that at most together() samples of one tile add, each to its own pixel alone. What goes
   // together changes no bit, nor does their number. Seconds that are not booked on a slot go to
   // pixel_slot().

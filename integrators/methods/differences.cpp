@@ -59,8 +59,8 @@ CentralDifferences central_differences(const Scene& scene, const std::vector<Dif
     for (const double step : job.steps) {
       for (const double h : {step, -step}) {
         moved.push_back(parameter.moved(scene, h));
-        estimators.push_back(
-            std::make_unique<RadianceEstimator>(moved.back(), choices, settings.threads));
+        estimators.push_back(std::make_unique<RadianceEstimator>(
+            moved.back(), choices, settings.threads, Numbers::kEvenInBatches));
       }
     }
     result.estimates.emplace_back(job.combinations.size(), DifferenceEstimate(scene.film, block));

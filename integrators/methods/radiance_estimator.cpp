@@ -36,7 +36,7 @@ bool is_glossy(const Scene& scene) {
 
 RadianceEstimator::RadianceEstimator(const Scene& scene, int threads,
                                      std::shared_ptr<const FilmRegions> visible, bool closed,
-                                     bool even)
+                                     Numbers numbers)
     : scene_(scene),
       tracer_(make_embree_tracer(scene_, threads, visible ? visible->faces() : nullptr)),
       lights_(scene_),
@@ -46,10 +46,11 @@ RadianceEstimator::RadianceEstimator(const Scene& scene, int threads,
       camera_(scene_.camera),
       filter_(scene_.film.filter),
       visible_(std::move(visible)),
-      even_(even),
+      numbers_(numbers),
       glossy_(is_glossy(scene_)) {}
 
-RadianceEstimator::RadianceEstimator(const Scene& moved, const Choices& choices, int threads)
+RadianceEstimator::RadianceEstimator(const Scene& moved, const Choices& choices, int threads,
+                                     Numbers numbers)
     : scene_(moved),
       tracer_(make_embree_tracer(scene_, threads)),
       lights_(scene_, &choices.lights),
@@ -57,7 +58,7 @@ RadianceEstimator::RadianceEstimator(const Scene& moved, const Choices& choices,
                &choices.unmoved},
       camera_(scene_.camera),
       filter_(scene_.film.filter),
-      even_(false),
+      numbers_(numbers),
       glossy_(is_glossy(scene_)) {}
 
 void RadianceEstimator::add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const {

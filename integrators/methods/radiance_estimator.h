@@ -13,10 +13,10 @@ namespace limn {
 class RadianceEstimator final : public SampleEstimator {
  public:
   // The scene must outlive the estimator. visible: what its film shows; null: rays tell. closed:
-  // what surfaces scatter is known in closed form, InputError if it is not. even: see is_even().
+  // what surfaces scatter is known in closed form, InputError if it is not.
   RadianceEstimator(const Scene& scene, int threads,
                     std::shared_ptr<const FilmRegions> visible = nullptr, bool closed = false,
-                    bool even = false);
+                    Numbers numbers = Numbers::kIndependent);
 
   // Which light and which share of the directions paths draw, and how they end, as a scene has it
   // before it moves.
@@ -29,12 +29,12 @@ class RadianceEstimator final : public SampleEstimator {
     std::unique_ptr<MirroredLight> mirrored;
   };
   // Of a scene that has moved, by the choices of the one that has not (limn/core/lights.h).
-  RadianceEstimator(const Scene& moved, const Choices& choices, int threads);
+  RadianceEstimator(const Scene& moved, const Choices& choices, int threads, Numbers numbers);
 
   const Scene& scene() const override { return scene_; }
   size_t slots() const override { return 1; }
   const char* slot_name(size_t) const override { return "radiance"; }
-  bool is_even() const override { return even_; }
+  Numbers numbers() const override { return numbers_; }
   void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const override;
 
  private:
@@ -55,7 +55,7 @@ class RadianceEstimator final : public SampleEstimator {
   CameraView<double> camera_;
   FilterTable filter_;
   std::shared_ptr<const FilmRegions> visible_;
-  bool even_;
+  Numbers numbers_;
   bool glossy_;
 };
 

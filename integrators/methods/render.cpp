@@ -42,9 +42,11 @@ std::vector<RenderMethod> looking_around() {
   return methods;
 }
 
-bool is_even(const std::string& sampler) {
+Numbers numbers_of(const std::string& sampler) {
   for (const char* name : kRenderSamplers) {
-    if (name == sampler) return name == kRenderSamplers[0];
+    if (name == sampler) {
+      return name == kRenderSamplers[0] ? Numbers::kEvenInRun : Numbers::kIndependent;
+    }
   }
   throw InputError(
       unknown_name("sampler", sampler, {std::begin(kRenderSamplers), std::end(kRenderSamplers)}));
@@ -53,7 +55,7 @@ bool is_even(const std::string& sampler) {
 std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSettings& settings,
                                                 const RenderOptions& options) {
   const RenderMethod& method = find_render_method(options.method);
-  const bool even = is_even(options.sampler);  // checked for all
+  const Numbers numbers = numbers_of(options.sampler);  // checked for all
   check_points(options.points, method.closed_light, options.method);
   if (!method.looks_around && options.what != RenderWhat::kImage) {
     throw InputError(
@@ -78,7 +80,7 @@ std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSet
     visible = std::make_shared<FilmRegions>(scene, settings.threads, settings.interrupted);
   }
   return std::make_unique<RadianceEstimator>(scene, settings.threads, std::move(visible),
-                                             method.closed_light, even);
+                                             method.closed_light, numbers);
 }
 
 // What the method reads of the options: parts that differ elsewhere are of one run.
@@ -180,7 +182,7 @@ std::vector<std::string> trace_sample(const Scene& scene, const RunSettings& set
   check_pixel(scene.film, place);
   const auto estimator = make_estimator(scene, settings, options);
   SampleLog log;
-  run_pixel_sample(*estimator, settings.seed, {place.x, place.y, place.sample}, log);
+  run_pixel_sample(*estimator, settings, {place.x, place.y, place.sample}, log);
   return log;
 }
 

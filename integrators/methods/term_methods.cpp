@@ -75,6 +75,7 @@ struct TermMethod {
   bool warps = false;     // directions follow the edges that they see, see warp_field.h
   bool unbiased = false;  // the same without the bias of few rays
   bool closed = false;    // light that is scattered once in closed form, see closed_light.h
+  Numbers numbers = Numbers::kIndependent;
 };
 
 // The fewest samples of a term in one of a pixel, where they are spread: a rare event that a pilot
@@ -163,7 +164,7 @@ class TermJob {
       }
       if (place.x >= 0) {
         check_pixel(scene_.film, place);
-        run_pixel_sample(pass(p), settings.seed, {place.x, place.y, place.sample}, log);
+        run_pixel_sample(pass(p), settings, {place.x, place.y, place.sample}, log);
       } else {
         trace_film(pass(p), settings, place, log);
       }
@@ -259,6 +260,7 @@ class TermJob {
         plan.fields = random_fields(plan.grid.size(), pass(p), settings.seed);
         if (can_move_film()) plan.film = random_motions(plan.grid.size(), pass(p), settings.seed);
       }
+      plan.numbers = method_.numbers;
       for (size_t t = 0; t < types_.size(); ++t) {
         means[t] += plan.uniform[t] / static_cast<double>(passes_.size());
       }
@@ -559,8 +561,17 @@ std::vector<MethodType> term_methods() {
                  {.sampler = silhouettes,
                   .moves_directions = true,
                   .spreads_samples = true,
-                  .moves_film = true}));
-  methods.push_back(method_row("held-positions", "adaptive, with positions on the film held",
+                  .moves_film = true,
+                  .numbers = Numbers::kEvenInBatches}));
+  methods.push_back(method_row("independent-numbers",
+                               "adaptive, with random numbers of samples that are independent",
+                               {.sampler = silhouettes,
+                                .moves_directions = true,
+                                .spreads_samples = true,
+                                .moves_film = true,
+                                .ablation = true}));
+  methods.push_back(method_row("held-positions",
+                               "independent-numbers, with positions on the film held",
                                {.sampler = silhouettes,
                                 .moves_directions = true,
                                 .spreads_samples = true,

@@ -23,7 +23,7 @@ class VisibilityEstimator final : public SampleEstimator {
 
   const Scene& scene() const override { return scene_; }
   size_t slots() const override { return 1; }
-  bool is_even() const override { return true; }
+  Numbers numbers() const override { return Numbers::kEvenInRun; }
   const char* slot_name(size_t) const override { return "radiance"; }
   void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const override;
 

@@ -50,6 +50,7 @@ struct SamplePlan {
   // Whether vertices that move fast take more samples of edges and lights and more directions, and
   // those that little light comes from fewer edges.
   bool splits = false;
+  Numbers numbers = Numbers::kIndependent;
 
   PixelCounts counts_at(const PixelSample& at) const;
   const DirectionField* field_at(const PixelSample& at) const {

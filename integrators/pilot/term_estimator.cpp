@@ -302,7 +302,7 @@ void TermEstimator::add_pixels(std::span<const KeyedSample> samples, SampleSink&
     const int paths = paths_ ? static_cast<int>(counts[pixel_slot_]) : 1;
     const int all = paths * places_of_path();
     for (int i = 0; i < all; ++i) {
-      convoy.add({at, i >= paths}, key.copy(Purpose::kPathCopy, i % paths), 1.0 / all,
+      convoy.add({at, i >= paths}, key.path(i % paths), 1.0 / all,
                  i == 0 && vertices_ ? &counts : nullptr);
     }
   }
@@ -353,8 +353,8 @@ void TermEstimator::add_logged(const PixelSample& at, const Rng& key, SampleSink
   const int paths = paths_ ? static_cast<int>(counts[pixel_slot_]) : 1;
   const int all = paths * places_of_path();
   const auto add = [&](auto& visitor, int i) {
-    const Path path = trace_one({at, i >= paths}, key.copy(Purpose::kPathCopy, i % paths),
-                                plan_.field_at(at), visitor, sink.log(), sink.cost(pixel_slot_));
+    const Path path = trace_one({at, i >= paths}, key.path(i % paths), plan_.field_at(at), visitor,
+                                sink.log(), sink.cost(pixel_slot_));
     add_path(at, path, 1.0 / all, sink);
   };
   for (int i = 0; i < all; ++i) {

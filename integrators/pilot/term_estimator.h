@@ -78,6 +78,7 @@ class TermEstimator final : public SampleEstimator {
   int lanes() const override { return lanes_; }
   Lanes lane_scale() const override { return lane_scale_; }
 
+  Numbers numbers() const override { return plan_.numbers; }
   bool samples_pixels() const override { return paths_ || vertices_; }
   size_t pixel_slot() const override { return pixel_slot_; }
   void add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const override;

@@ -193,13 +193,23 @@ template <class T, class Key>
   return (__builtin_convertvector(shifted, wide::RawDoubles) + 0x1p31) * 0x1p-32;
 }
 
+// What all of a stream have beyond 32 bits: without it an edge of a large mesh that is chosen by
+// less than 2^-32 would never be.
+[[gnu::always_inline]] inline double rest(uint64_t word) {
+  return static_cast<double>(word >> 43) * 0x1.0p-53;
+}
+[[gnu::always_inline]] inline wide::RawDoubles rest(const Words& word) {
+  return __builtin_convertvector((wide::Mask)(word >> 43), wide::RawDoubles) * 0x1.0p-53;
+}
+
 }  // namespace
 
 double Rng::even_uniform() {
   const int dimension = dimension_;
   dimension_ = (dimension + 1) % kDimensions;
   if (dimension == 0) place_ = scrambled(reversed(sample_), next());
-  return scrambled(reversed_point(place_, dimension), next()) * 0x1.0p-32;
+  const uint64_t word = next();
+  return scrambled(reversed_point(place_, dimension), word) * 0x1.0p-32 + rest(word);
 }
 
 void Rng::draw(Purpose purpose, std::span<const Stream> streams, size_t count, double* numbers) {
@@ -227,7 +237,7 @@ void Rng::draw(Purpose purpose, std::span<const Stream> streams, size_t count, d
       const Words word = next();
       if (even) {
         const HalfWords point = reversed_point(place, static_cast<int>(k));
-        u[k] = in_unit(scrambled(point, word));
+        u[k] = in_unit(scrambled(point, word)) + rest(word);
       } else {
         u[k] = __builtin_convertvector((wide::Mask)(word >> 11), wide::RawDoubles) * 0x1.0p-53;
       }

@@ -73,7 +73,7 @@ void compare(const Moments& estimate, const json& exact, double accuracy, const 
       EXPECT_LE(std::fabs(residual), 8 * floor) << name << " value " << i;
       continue;
     }
-    z.push_back(normal_from_student(residual / error, estimate.batches() - 1));
+    z.push_back(normal_from_student(residual / error, estimate.degrees()));
   }
   if (z.empty()) return;
   const ZSummary summary = summarize(z);

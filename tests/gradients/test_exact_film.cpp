@@ -264,7 +264,7 @@ TEST(ExactFilm, CameraTermIsExact) {
         if (error <= floor) {
           EXPECT_LE(std::fabs(residual), 8 * floor) << names[k] << " of " << reference["file"];
         } else {
-          z.push_back(normal_from_student(residual / error, total.batches() - 1));
+          z.push_back(normal_from_student(residual / error, total.degrees()));
         }
       }
     }

@@ -111,7 +111,7 @@ void expect_same_pixels(const Scene& scene, const std::vector<std::string>& para
       const double error = std::sqrt(a.variance(i) + b.variance(i));
       // Far out in a filter few samples tell.
       if (error > 0.02 * std::sqrt(largest))
-        z.push_back(normal_from_student((a.mean(i) - b.mean(i)) / error, a.batches() - 1));
+        z.push_back(normal_from_student((a.mean(i) - b.mean(i)) / error, a.degrees()));
     }
     const ZSummary summary = summarize(z);
     EXPECT_GE(summary.count, 6) << parameters[k];
@@ -169,9 +169,9 @@ TEST(FilmMotion, MeetsWhatIsFarOutInAFilter) {
       run_method(make_scene(files, parts), {"unseen.translate.x"}, "random-directions", 1 << 15, 1);
   const Moments& total = result.parameters[0].total;
   ASSERT_GT(total.variance(0), 0);
-  EXPECT_LT(std::fabs(normal_from_student(total.mean(0) / std::sqrt(total.variance(0)),
-                                          total.batches() - 1)),
-            4);
+  EXPECT_LT(
+      std::fabs(normal_from_student(total.mean(0) / std::sqrt(total.variance(0)), total.degrees())),
+      4);
 }
 
 // A fence of bars thinner than pixels, that slides before a floor.
@@ -218,7 +218,7 @@ TEST(FilmMotion, TakesOutDetailThatSlides) {
   const Scene scene = fence_scene(files, 24);
   const auto variance_times_rays = [&](const std::string& method) {
     const GradientResult result = run_method(scene, {"bars.translate.x"}, method, 64, 3);
-    EXPECT_EQ(share_that_moves(result) > 0.5, method == "adaptive");
+    EXPECT_EQ(share_that_moves(result) > 0.5, method == "independent-numbers");
     uint64_t rays = 0;
     for (const auto& term : result.terms) rays += term.cost.rays;
     const Moments& total = result.parameters[0].total;
@@ -226,7 +226,7 @@ TEST(FilmMotion, TakesOutDetailThatSlides) {
     for (size_t i = 0; i < total.size(); ++i) sum += total.variance(i);
     return sum * static_cast<double>(rays);
   };
-  EXPECT_LT(2 * variance_times_rays("adaptive"), variance_times_rays("held-positions"));
+  EXPECT_LT(2 * variance_times_rays("independent-numbers"), variance_times_rays("held-positions"));
 }
 
 // Detail at rest, before which a plain square slides: the pilots look, and leave nothing behind.
@@ -239,7 +239,8 @@ TEST(FilmMotion, IsHeldWhereItDoesNotPay) {
                          diffuse("wood", "0.3, 0.2, 0.1")) +
                square("plate", 0.4, 0, {0, 0.8, 0.8}, diffuse("tin", "0.5, 0.5, 0.5"));
   const Scene scene = make_scene(files, parts);
-  const GradientResult chosen = run_method(scene, {"plate.translate.x"}, "adaptive", 64, 3);
+  const GradientResult chosen =
+      run_method(scene, {"plate.translate.x"}, "independent-numbers", 64, 3);
   const GradientResult held = run_method(scene, {"plate.translate.x"}, "held-positions", 64, 3);
   EXPECT_EQ(share_that_moves(chosen), 0);
   expect_same_bits(chosen, held);

@@ -102,7 +102,7 @@ class TestPaper(unittest.TestCase):
         mirror, shadow, reject = self.calls()
         self.assertEqual(mirror[:2], ["compare", "scenes/rough_mirror.xml"])
         self.assertIn("alpha=0.2", mirror)
-        self.assertEqual(self.value(shadow, "--methods"), "forest,silhouettes,moving-directions,held-positions,adaptive,forest-no-lights,li2019,uniform,fd")
+        self.assertEqual(self.value(shadow, "--methods"), "forest,silhouettes,moving-directions,held-positions,independent-numbers,adaptive,forest-no-lights,li2019,uniform,fd")
         self.assertEqual(self.value(shadow, "--time"), self.value(mirror, "--time"))
         self.assertEqual(self.value(shadow, "--seed"), "7")
         self.assertEqual(reject[:2], ["reject", "build/generated/pebble.ply"])
@@ -140,19 +140,19 @@ class TestPaper(unittest.TestCase):
         self.assertEqual((done.returncode, done.stderr), (0, ""))
         shadow, sun = self.calls()
         self.assertEqual(self.value(shadow, "--methods"),
-                         "forest,silhouettes,moving-directions,held-positions,adaptive,fd,mitsuba-after-setup")
-        self.assertEqual(self.value(sun, "--methods"), "forest,silhouettes,moving-directions,held-positions,adaptive,fd")
+                         "forest,silhouettes,moving-directions,held-positions,independent-numbers,adaptive,fd,mitsuba-after-setup")
+        self.assertEqual(self.value(sun, "--methods"), "forest,silhouettes,moving-directions,held-positions,independent-numbers,adaptive,fd")
         self.assertAlmostEqual(float(self.value(sun, "--time")), 2.6, delta=0.1)
         with open(self.path("out", "levers.md")) as stream:
             text = stream.read()
         self.assertIn(text, done.stdout)
-        cells = "0.5 | 0.25 ± 0 (0.25) | 0.25 ± 0 (0.25) | 0.25 ± 0 (0.25) | 0.25 ± 0.025 (0.15) | 0.28 ± 0.028 (0.3) |"
+        cells = "0.5 | 0.25 ± 0 (0.25) | 0.25 ± 0 (0.25) | 0.25 ± 0 (0.25) | 0.25 ± 0 (0.25) | 0.25 ± 0.025 (0.15) | 0.28 ± 0.028 (0.3) |"
         for title in ("soft shadow", "strong sun"):
             self.assertIn(f"\n| {title} | {cells}\n", text)
         self.assertIn("ahead in 0 of 2 parts; even within two standard errors: soft shadow (0.91), strong sun (0.91)", text)
         self.assertIn("\n| soft shadow | 0.05 ± 0.0056 (0.05) | 2 | 16 | 30 |\n", text)
         self.assertIn("Against Mitsuba after its set-up `adaptive` is ahead in 1 of 1 parts (20 times).", text)
-        self.assertIn("(10) the smallest p is 0.25 (`adaptive`, soft shadow)", text)
+        self.assertIn("(12) the smallest p is 0.25 (`adaptive`, soft shadow)", text)
         self.assertIn("Marked are finite differences in soft shadow, finite differences in strong sun.", text)
         # 1 - 0.999 * 0.6 and 1 - 0.999: trimmed means are over the other pixels.
         self.assertIn("`adaptive` 0.4 (soft shadow) to 0.4 (strong sun); `forest` 0.001", text)

@@ -15,7 +15,7 @@ inline ZSummary compare_moments(const Moments& a, const Moments& b, double b_sca
     const double residual = a.mean(i) - b_scale * b.mean(i);
     const double variance = a.variance(i) + b_scale * b_scale * b.variance(i);
     if (residual == 0 && variance == 0) continue;
-    z.push_back(normal_from_student(residual / std::sqrt(variance), a.batches() - 1));
+    z.push_back(normal_from_student(residual / std::sqrt(variance), a.degrees()));
   }
   return summarize(z);
 }
@@ -25,7 +25,7 @@ inline ZSummary compare_moments(const Moments& a, const std::vector<double>& exa
   for (size_t i = 0; i < a.size(); ++i) {
     const double residual = a.mean(i) - exact[i];
     if (residual == 0 && a.variance(i) == 0) continue;
-    z.push_back(normal_from_student(residual / std::sqrt(a.variance(i)), a.batches() - 1));
+    z.push_back(normal_from_student(residual / std::sqrt(a.variance(i)), a.degrees()));
   }
   return summarize(z);
 }

@@ -1,5 +1,6 @@
 #pragma once
 // Runs of methods: whether they have the mean of the plain forest, or the same bits.
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -42,7 +43,9 @@ inline void expect_same_mean(const Scene& scene, const std::vector<std::string>&
       std::vector<double> z;
       for (size_t i = 0; i < a.size(); ++i) {
         const double variance = a.variance(i) + b.variance(i);
-        if (variance > 0) z.push_back((a.mean(i) - b.mean(i)) / std::sqrt(variance));
+        if (variance == 0) continue;
+        z.push_back(normal_from_student((a.mean(i) - b.mean(i)) / std::sqrt(variance),
+                                        std::min(a.degrees(), b.degrees())));
       }
       const ZSummary summary = summarize(z);
       const std::string label = method + " " + parameters[k];

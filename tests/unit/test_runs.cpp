@@ -124,6 +124,33 @@ TEST(EvenNumbers, FillBoxes) {
   }
 }
 
+// The paths of four samples, of which each has as many: one of all in every sixteenth, and of the
+// first paths one in every quarter.
+TEST(EvenNumbers, OfSeveralPathsFillBoxesTogether) {
+  constexpr int kCount = 4;
+  std::vector<int> boxes(kCount * kCount), of_first(kCount);
+  for (uint32_t s = 0; s < kCount; ++s) {
+    const Rng key = Rng::even(1, 2, s, kCount);
+    for (int path = 0; path < kCount; ++path) {
+      const double u = key.path(path).at(Purpose::kFilm, 0).uniform();
+      ++boxes[static_cast<size_t>(u * kCount * kCount)];
+      if (path == 0) ++of_first[static_cast<size_t>(u * kCount)];
+    }
+  }
+  EXPECT_EQ(boxes, std::vector<int>(kCount * kCount, 1));
+  EXPECT_EQ(of_first, std::vector<int>(kCount, 1));
+}
+
+// Edges of large meshes are chosen by less than 2^-32.
+TEST(EvenNumbers, LieBetweenThoseOf32Bits) {
+  RunningMean between;
+  for (uint64_t pixel = 0; pixel < 1000; ++pixel) {
+    const double u = Rng::even(4, pixel, 7).at(Purpose::kEdge, 1).uniform() * 0x1p32;
+    between.add(u - std::floor(u));
+  }
+  EXPECT_LT(std::fabs(between.z_score(0.5)), 4.5);
+}
+
 // Over pixels, a sample's numbers are those of independent streams: in their means, and by pairs
 // within a purpose, of two purposes, and of two depths.
 TEST(EvenNumbers, AreUniformAndUnrelated) {
@@ -147,6 +174,68 @@ TEST(EvenNumbers, AreUniformAndUnrelated) {
       EXPECT_LT(std::fabs(products[6 * i + j].z_score(i == j ? 1.0 / 12 : 0)), 4.5) << i << j;
     }
   }
+}
+
+std::vector<int> batch_ends(int spp) {
+  RunSettings settings;
+  settings.spp = spp;
+  const Stopwatch watch;
+  Schedule schedule(settings, watch);
+  std::vector<int> ends;
+  while (schedule.next()) {
+    EXPECT_EQ(schedule.first_sample(), ends.empty() ? 0 : ends.back());
+    ends.push_back(schedule.end_sample());
+  }
+  return ends;
+}
+
+// Longer runs begin as shorter ones do, and lose a quarter or less of what they have; they keep
+// enough degrees of freedom for a standard error.
+TEST(Batches, GrowWithTheRun) {
+  const std::vector<int> longest = batch_ends(5000);
+  for (const int spp : {1, 2, 8, 16, 33, 64, 100, 256, 1000, 5000}) {
+    const std::vector<int> ends = batch_ends(spp);
+    ASSERT_EQ(ends.back(), spp);
+    Moments moments(1);
+    for (size_t b = 0; b < ends.size(); ++b) {
+      const int first = b > 0 ? ends[b - 1] : 0;
+      if (b + 1 < ends.size()) {
+        EXPECT_EQ(ends[b], longest[b]);
+      }
+      EXPECT_LE(ends[b] - first, std::max(1, first / 4));
+      moments.add_batch({0}, ends[b] - first);
+    }
+    EXPECT_GE(moments.degrees(), std::min(spp - 1.0, spp < 64 ? 6.0 : 16.0)) << spp;
+  }
+}
+
+// Of variances v_b of batches the estimate is sum v_b c_b, where c_b is what a batch that is 1
+// beside others that are 0 comes to.
+TEST(Batches, TellTheVarianceOfTheirMean) {
+  const std::vector<int> samples = {1, 1, 1, 1, 2, 2, 4, 4, 8};
+  const auto expected = [&](const auto& variance_of_sample) {
+    double estimate = 0, truth = 0;
+    for (size_t b = 0; b < samples.size(); ++b) {
+      Moments moments(1);
+      for (size_t other = 0; other < samples.size(); ++other) {
+        moments.add_batch({other == b ? 1.0 : 0.0}, samples[other]);
+      }
+      const double v = samples[b] * variance_of_sample(samples[b]);
+      estimate += v * moments.variance(0);
+      truth += v / (24.0 * 24.0);
+    }
+    return estimate / truth;
+  };
+  EXPECT_NEAR(expected([](int) { return 1.0; }), 1, 1e-12);
+  // More even, the more samples: a is 108 / 24^2, b 24 / 9 / 24 of the mean's variance.
+  const double a = 108.0 / 576, b = 1.0 / 9;
+  EXPECT_NEAR(expected([](int n) { return 1.0 / n; }), 1 + 2 * (a - b) / (1 - a), 1e-12);
+}
+
+TEST(Batches, OfOneSizeHaveADegreeOfFreedomLess) {
+  Moments moments(1);
+  for (int b = 0; b < 5; ++b) moments.add_batch({0}, 3);
+  EXPECT_DOUBLE_EQ(moments.degrees(), 4);
 }
 
 // Images of other seeds are independent, so that they tell the true error: it is less than half of
@@ -260,7 +349,7 @@ TEST(NonFinite, IsCountedAndLocated) {
   }
 }
 
-// Stopped after some batches of one sample each: exactly the image of that many samples.
+// Stopped after some batches: exactly the image of that many samples.
 TEST(Interruption, KeepsWhatIsDone) {
   const TempFiles files;
   const Scene scene = make_scene(files, small_scene(files));

@@ -53,10 +53,12 @@ class Rng {
         state_(key_) {}
   // The same of a pixel's samples that fill their ranges evenly together: for every purpose and
   // depth, sample n takes the n-th of the Sobol' points of a pixel, scrambled by chance (rng.cpp).
-  // Any one sample is as random as that of another stream; several are not independent.
-  static Rng even(uint64_t seed, uint64_t pixel, uint32_t sample) {
+  // Any one sample is as random as that of another stream; several are not independent. count: of
+  // the samples, for `path`; 0 if it is not asked for.
+  static Rng even(uint64_t seed, uint64_t pixel, uint32_t sample, uint32_t count = 0) {
     Rng rng(mix_bits(mix_bits(seed + kGolden) + pixel + kGolden));
     rng.sample_ = sample;
+    rng.count_ = count;
     rng.dimension_ = 0;
     return rng;
   }
@@ -64,11 +66,20 @@ class Rng {
   Rng at(Purpose purpose, uint64_t depth) const {
     Rng rng(mix_bits(key_ + kGolden * place_of(purpose, depth)));
     rng.sample_ = sample_;
+    rng.count_ = count_;
     rng.dimension_ = dimension_ < 0 ? -1 : 0;
     return rng;
   }
   // The stream of one of several samples of the same kind; the first is this one itself.
   Rng copy(Purpose purpose, int index) const { return index == 0 ? *this : at(purpose, index); }
+  // The stream of one of several paths of a sample; the first is this one itself. The paths of all
+  // samples are even together: the second ones take the points behind those of the first.
+  Rng path(int index) const {
+    if (count_ == 0) return copy(Purpose::kPathCopy, index);
+    Rng rng(*this);
+    rng.sample_ += static_cast<uint32_t>(index) * count_;
+    return rng;
+  }
   // The stream key.at(purpose, depth).
   struct Stream {
     const Rng* key;
@@ -81,7 +92,7 @@ class Rng {
     static_assert(kCount <= kDimensions);
     if (!streams.empty()) draw(purpose, streams, kCount, numbers->data());
   }
-  // Uniform in [0, 1): 53 bits; 32 of what is even.
+  // Uniform in [0, 1): 53 bits, of which the last 21 are alike in all that is even together.
   double uniform() {
     if (dimension_ >= 0) return even_uniform();
     return static_cast<double>(next() >> 11) * 0x1.0p-53;
@@ -107,6 +118,7 @@ class Rng {
   uint64_t state_;
   // Of even streams alone.
   uint32_t sample_ = 0;
+  uint32_t count_ = 0;  // of the samples, or 0
   uint32_t place_ = 0;  // of the sample among the points of these dimensions
   int dimension_ = -1;  // the next; -1 for independent numbers
 };

@@ -8,14 +8,18 @@
 namespace limn {
 
 // Every value is an average over samples that come in batches. Batch b gives the sum S_b over its
-// n_b samples. With N = sum n_b and S = sum S_b the mean is S / N, and the variance of one sample
-// is estimated by (sum S_b^2 / n_b - S^2 / N) / (B - 1), which is unbiased for independent samples
-// and needs no equal batches.
+// n_b samples. With N = sum n_b the mean is m = sum S_b / N, and its variance is estimated by
+//   sum (S_b - n_b m)^2 / (N^2 - sum n_b^2),
+// which is unbiased if that of S_b is in proportion to n_b, as it is for independent samples. The
+// numbers of large batches may be more even than those of small ones, and S_b have less variance
+// for its samples: with a and b, the averages of n_b / N over samples and over the variance of the
+// mean, the estimate is then too large by 2 (a - b) / (1 - a), a few per cent, and not too small.
 class Moments {
  public:
   Moments() = default;
   // keep: remember the sums of every batch, for tests that need more than means and variances.
-  explicit Moments(size_t size, bool keep = false) : sums_(size), squares_(size), keep_(keep) {}
+  explicit Moments(size_t size, bool keep = false)
+      : sums_(size), squares_(size), weighted_(size), keep_(keep) {}
 
   size_t size() const { return sums_.size(); }
   int batches() const { return batches_; }
@@ -31,6 +35,9 @@ class Moments {
   double mean(size_t i) const { return samples_ > 0 ? sums_[i] / samples_ : 0; }
   // The variance of the mean; needs two batches.
   double variance(size_t i) const;
+  // Of freedom, behind the variances: N^2 / sum n_b^2 - 1, one less than there are batches if these
+  // are equal.
+  double degrees() const;
 
   // One batch, as it was added.
   struct Batch {
@@ -41,11 +48,12 @@ class Moments {
   const std::vector<Batch>& kept() const { return kept_; }
 
  private:
-  std::vector<double> sums_, squares_;
+  std::vector<double> sums_, squares_, weighted_;  // of S_b, S_b^2, n_b S_b
   std::vector<Batch> kept_;
   bool keep_ = false;
   int batches_ = 0;
   int64_t samples_ = 0;
+  double squared_samples_ = 0;  // sum of n_b^2
 };
 
 // Means and variances of every value; variances are NaN with fewer than two batches.

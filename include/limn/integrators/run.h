@@ -100,10 +100,11 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-// How the samples are split: batches of one sample per pixel at first, then of a thirty-second of
-// what is done, so that an interrupt always loses little, and there are always enough batches for a
-// standard error. Where time is limited, the last batch is cut to what is expected to fit, judged
-// by the two batches before.
+// How the samples are split: batches of one sample per pixel at first, then of more (4 from 16
+// samples on, 8 from 64, 16 from 128), in the end of a thirty-second of what is done, rounded down
+// to a power of two. The larger a batch, the more even its numbers may be; but an interrupt must
+// lose little, and a standard error needs many. Where time is limited, the last batch is cut to
+// what is expected to fit, judged by the two batches before.
 class Schedule {
  public:
   // `watch` runs since the job began.
@@ -114,8 +115,6 @@ class Schedule {
   int first_sample() const { return first_; }
   int end_sample() const { return end_; }
   int samples() const { return end_ - first_; }
-  // Batches of a run of that many samples.
-  static int batch_count(int spp);
 
  private:
   int samples_in_time(double now) const;
@@ -134,7 +133,7 @@ class ProgressCounter {
  public:
   ProgressCounter(const RunSettings& settings, const Stopwatch& watch, size_t steps)
       : settings_(settings), watch_(watch), steps_(steps) {}
-  void step();
+  void step(size_t count = 1);
   bool stopped() const {
     return settings_.interrupted && settings_.interrupted->load(std::memory_order_relaxed);
   }
