@@ -125,7 +125,8 @@ class PathTracer {
   bool scatter(Walk& walk);
   using Evaluation = typename Scattering<S>::Evaluation;
   bool scatter(Walk& walk, const Evaluation& evaluation);
-  bool escape(Walk& walk) const;
+  void escape(std::span<Walk* const> walks) const;
+  void escape(Walk& walk) const;
   bool arrive(Walk& walk);
   void set_motion(Walk& walk) const;
   int splits(const SurfacePoint<S>& surface, int copies) const;
@@ -137,13 +138,11 @@ class PathTracer {
     return c_.mirrored ? MirroredLight::pdf(walk.mixture, w, scattered) : scattered;
   }
   // path_wide.h. For plain numbers.
-  void weigh_lights_wide(std::span<Walk* const> walks) const;
+  size_t weigh_lights_wide(std::span<Walk* const> walks, Walk** lit) const;
   size_t scatter_wide(std::span<Walk*> walks);
   void place_lights_wide(std::span<Walk* const> walks) const;
   template <class Direction, class Then>
-  void evaluate_wide(std::span<Walk* const> walks, const Direction& direction,
-                     const Then& then) const;
-  void find_sky_wide(std::span<Walk* const> walks) const;
+  void evaluate_wide(std::span<Walk*> walks, const Direction& direction, const Then& then) const;
   template <class Rest>
   void see_sky_wide(std::span<const StartRay<S>> rays, std::span<Walk> walks,
                     const Rest& rest) const;
@@ -153,13 +152,14 @@ class PathTracer {
   void move_along_edge(SurfacePoint<S>& surface, FaceRef face) const;
   void fetch_face(FaceRef face) const;
   void fetch_corners(const Walk& walk) const;
-  void fetch_next(Walk& walk) const;
+  void find_sky(std::span<Walk* const> walks) const;
   // path_lights.h
   void draw_lights(std::span<Walk* const> walks) const;
   void draw_light(Walk& walk, const Rng& key) const;
-  void weigh_lights(std::span<Walk* const> walks) const;
+  void shine(std::span<Walk* const> walks);
+  size_t weigh_lights(std::span<Walk* const> walks, Walk** lit) const;
   void weigh_light(Walk& walk) const;
-  void weigh_light(Walk& walk, const Evaluation& evaluation) const;
+  bool weigh_light(Walk& walk, const Evaluation& evaluation) const;
   void draw_delta(Walk& walk, const DeltaLight& delta) const;
   Rgb<S> light_value(const Walk& walk) const;
   void add_light(Walk& walk) const;

@@ -68,7 +68,9 @@ inline void PathTracer<S, Visitor>::follow(std::span<Walk* const> walks) {
   const auto keep = [&](const auto& step) {
     size_t kept = 0;
     for (size_t i = 0; i < count; ++i) {
-      if (guarded(*going[i], [&] { return step(*going[i]); })) going[kept++] = going[i];
+      Walk* const walk = going[i];
+      going[kept] = walk;
+      kept += guarded(*walk, [&] { return step(*walk); });
     }
     count = kept;
   };
@@ -78,12 +80,8 @@ inline void PathTracer<S, Visitor>::follow(std::span<Walk* const> walks) {
     }
     keep([&](Walk& walk) { return begin_vertex(walk); });
     draw_lights({going, count});
-    weigh_lights({going, count});
-    keep([&](Walk& walk) {
-      if (walk.light && shadowed(walk)) walk.light.reset();
-      return true;
-    });
-    for (size_t i = 0; i < count; ++i) add_light(*going[i]);
+    shine({going, count});
+    keep([](const Walk& walk) { return !walk.failed; });
     draw_numbers({going, count});
     if constexpr (kPlain) {
       if (scatters_wide_) count = scatter_wide({going, count});
@@ -92,15 +90,16 @@ inline void PathTracer<S, Visitor>::follow(std::span<Walk* const> walks) {
       keep([&](Walk& walk) { return choose_direction(walk); });
       keep([&](Walk& walk) { return scatter(walk); });
     }
+    Walk* leaving[kMostWalks];
+    size_t left = 0;
     keep([&](Walk& walk) {
       walk.found = next_hit(walk);
-      return true;
+      leaving[left] = &walk;
+      left += !walk.found;
+      return walk.found;
     });
-    for (size_t i = 0; i < count; ++i) fetch_next(*going[i]);
-    if constexpr (kPlain) {
-      if (wide_) find_sky_wide({going, count});
-    }
-    keep([&](Walk& walk) { return walk.found || escape(walk); });
+    for (size_t i = 0; i < count; ++i) fetch_corners(*going[i]);
+    escape({leaving, left});
     keep([&](Walk& walk) { return arrive(walk); });
   }
 }

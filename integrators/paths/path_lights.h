@@ -25,9 +25,23 @@ inline void PathTracer<S, Visitor>::draw_lights(std::span<Walk* const> walks) co
   c_.lights.sample({draws, count}, {u, count});
 }
 
+// Adds what the lights that have been drawn send.
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::shine(std::span<Walk* const> walks) {
+  Walk* lit[kMostWalks];
+  const size_t count = weigh_lights(walks, lit);
+  size_t seen = 0;
+  for (size_t i = 0; i < count; ++i) {
+    Walk* const walk = lit[i];
+    lit[seen] = walk;
+    seen += guarded(*walk, [&] { return !shadowed(*walk); });
+  }
+  for (size_t i = 0; i < seen; ++i) add_light(*lit[i]);
+}
+
 template <class S, class Visitor>
 inline void PathTracer<S, Visitor>::add_light(Walk& walk) const {
-  if (walk.light) walk.sums.radiance += walk.throughput * light_value(walk);
+  walk.sums.radiance += walk.throughput * light_value(walk);
 }
 
 template <class S, class Visitor>
@@ -66,15 +80,19 @@ inline void PathTracer<S, Visitor>::draw_light(Walk& walk, const Rng& key) const
   renew(walk.light, [&] { return c_.lights.sample(walk.lights, rng); });
 }
 
+// How many get light, if nothing hides it: they are put into `lit`.
 template <class S, class Visitor>
-inline void PathTracer<S, Visitor>::weigh_lights(std::span<Walk* const> walks) const {
+inline size_t PathTracer<S, Visitor>::weigh_lights(std::span<Walk* const> walks, Walk** lit) const {
   if constexpr (kPlain) {
-    if (scatters_wide_) {
-      weigh_lights_wide(walks);
-      return;
-    }
+    if (scatters_wide_) return weigh_lights_wide(walks, lit);
   }
-  for (Walk* const walk : walks) weigh_light(*walk);
+  size_t count = 0;
+  for (Walk* const walk : walks) {
+    weigh_light(*walk);
+    lit[count] = walk;
+    count += walk->light.has_value();
+  }
+  return count;
 }
 
 // What the light that was drawn adds but for its radiance; none if that is black.
@@ -88,18 +106,20 @@ inline void PathTracer<S, Visitor>::weigh_light(Walk& walk) const {
   }
   walk.light_motion = light.face ? nullptr : walk.motion;  // a lamp: held
   const Vec3<S> direction = detail::moving<S>(light.wo, walk.light_motion);
-  weigh_light(walk, detail::evaluate(*walk.scattering, light.wo, direction, walk.light_motion));
+  const Evaluation evaluation =
+      detail::evaluate(*walk.scattering, light.wo, direction, walk.light_motion);
+  if (!weigh_light(walk, evaluation)) walk.light.reset();
 }
 
-// evaluation: at the light's direction as it moves.
+// evaluation: at the light's direction as it moves. False if nothing comes of it.
 template <class S, class Visitor>
-[[gnu::always_inline]] inline void PathTracer<S, Visitor>::weigh_light(
+[[gnu::always_inline]] inline bool PathTracer<S, Visitor>::weigh_light(
     Walk& walk, const Evaluation& evaluation) const {
   const LightSample& light = *walk.light;
   const auto& [f, pdf] = evaluation;
   walk.light_share = detail::stretched(f, light.wo, walk.light_motion);
   walk.light_weight = mis_weight_over_pdf(light.pdf, density(walk, light.wo, pdf));
-  if (detail::stays_black(f)) walk.light.reset();
+  return !detail::stays_black(f);
 }
 
 // No ray meets a delta light by chance, so it has the whole weight. Its direction follows the

@@ -62,14 +62,17 @@ inline void PathTracer<S, Visitor>::fetch_corners(const Walk& walk) const {
   if (mesh.normal_source != NormalSource::kFace) detail::fetch_shading<S>(mesh, face.face);
 }
 
-// What the next step reads of where the ray ends.
+// Where rays along walk.wo leave the scene, which has an environment; brings that into the cache.
 template <class S, class Visitor>
-inline void PathTracer<S, Visitor>::fetch_next(Walk& walk) const {
-  if (walk.found) {
-    fetch_corners(walk);
-  } else if (c_.scene.environment && !wide_) {
-    walk.sky = c_.scene.environment->find(walk.wo);
+inline void PathTracer<S, Visitor>::find_sky(std::span<Walk* const> walks) const {
+  const Environment& environment = *c_.scene.environment;
+  if (!wide_) {
+    for (Walk* const walk : walks) walk->sky = environment.find(walk->wo);
+    return;
   }
+  Environment::Found found[kMostWalks];
+  for (size_t i = 0; i < walks.size(); ++i) found[i] = {&walks[i]->wo, &walks[i]->sky};
+  environment.find_each({found, walks.size()});
 }
 
 template <class S, class Visitor>

@@ -120,16 +120,21 @@ template <class S, class Visitor>
   return !walk.last || c_.lights.on_shapes() || c_.scene.environment;
 }
 
-// Adds what a ray sees that leaves the scene; there the path ends.
+// Adds what rays see that leave the scene; there their paths end.
 template <class S, class Visitor>
-inline bool PathTracer<S, Visitor>::escape(Walk& walk) const {
-  if (!c_.scene.environment) return false;
+inline void PathTracer<S, Visitor>::escape(std::span<Walk* const> walks) const {
+  if (!c_.scene.environment) return;
+  find_sky(walks);
+  for (Walk* const walk : walks) escape(*walk);
+}
+
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::escape(Walk& walk) const {
   auto sight = c_.lights.template environment<S>(walk.lights, walk.wo, walk.sky);
   if (walk.motion) {
     sight.radiance = environment_radiance<S>(*c_.scene.environment, walk.direction);
   }
   walk.sums.radiance += walk.throughput * sight.radiance * mis_weight(walk.pdf, sight.pdf);
-  return false;
 }
 
 // Goes on to what the ray meets.

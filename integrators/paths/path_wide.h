@@ -20,42 +20,54 @@ inline void PathTracer<S, Visitor>::place_lights_wide(std::span<Walk* const> wal
   c_.lights.at({points, count}, {places, count});
 }
 
-// then(i, evaluation): of the direction *direction(walk) of the i-th walk.
+// then(walk, evaluation): of the direction *direction(walk) of each walk where that lies in front of
+// the surface, in a new order; nothing is scattered into the others.
 template <class S, class Visitor>
 template <class Direction, class Then>
-inline void PathTracer<S, Visitor>::evaluate_wide(std::span<Walk* const> walks,
+inline void PathTracer<S, Visitor>::evaluate_wide(std::span<Walk*> walks,
                                                   const Direction& direction,
                                                   const Then& then) const {
+  size_t count = 0;
+  for (Walk* const walk : walks) {
+    walks[count] = walk;
+    count += dot(walk->scattering->normal(), *direction(*walk)) > 0;
+  }
   Grouped<Bsdf, Bsdf::Evaluation, kMostWalks> asked;
   BsdfValue values[kMostWalks];
-  for (size_t i = 0; i < walks.size(); ++i) {
-    const Vec3d* const wo = direction(*walks[i]);
+  for (size_t i = 0; i < count; ++i) {
     const Scattering<S>& scattering = *walks[i]->scattering;
-    // Many lights lie behind a surface: lanes are not spent on them.
-    if (!(dot(scattering.normal(), *wo) > 0)) continue;
-    asked.add(scattering.bsdf(), {&scattering.normal(), &scattering.wi(), wo, &values[i]});
+    asked.add(scattering.bsdf(),
+              {&scattering.normal(), &scattering.wi(), direction(*walks[i]), &values[i]});
   }
   asked.for_each([](const Bsdf& bsdf, auto items) { bsdf.eval_with_pdf_each(items); });
-  for (size_t i = 0; i < walks.size(); ++i) {
-    then(i, walks[i]->scattering->limited(*direction(*walks[i]), values[i]));
+  for (size_t i = 0; i < count; ++i) {
+    Walk& walk = *walks[i];
+    then(walk, walk.scattering->limited(*direction(walk), values[i]));
   }
 }
 
 template <class S, class Visitor>
-inline void PathTracer<S, Visitor>::weigh_lights_wide(std::span<Walk* const> walks) const {
-  Walk* lit[kMostWalks];
-  size_t count = 0;
+inline size_t PathTracer<S, Visitor>::weigh_lights_wide(std::span<Walk* const> walks,
+                                                        Walk** lit) const {
+  Walk* weighed[kMostWalks];
+  size_t count = 0, shining = 0;
+  const auto keep = [&](Walk& walk, bool shines) {
+    lit[shining] = &walk;
+    shining += shines;
+  };
   for (Walk* const walk : walks) {
     if (!walk->light) continue;
     if (walk->light->light->delta()) {
       weigh_light(*walk);
+      keep(*walk, walk->light.has_value());
     } else {
-      lit[count++] = walk;
+      weighed[count++] = walk;
     }
   }
   evaluate_wide(
-      {lit, count}, [](const Walk& walk) { return &walk.light->wo; },
-      [&](size_t i, const Evaluation& evaluation) { weigh_light(*lit[i], evaluation); });
+      {weighed, count}, [](const Walk& walk) { return &walk.light->wo; },
+      [&](Walk& walk, const Evaluation& evaluation) { keep(walk, weigh_light(walk, evaluation)); });
+  return shining;
 }
 
 // Draws the next directions and scatters into them: how many go on, which are the first then.
@@ -71,27 +83,17 @@ inline size_t PathTracer<S, Visitor>::scatter_wide(std::span<Walk*> walks) {
   draws.for_each([](const Bsdf& bsdf, auto items) { bsdf.sample_each(items); });
   size_t drawn = 0, kept = 0;
   for (Walk* const walk : walks) {
-    if (!(walk->wo == Vec3d{})) walks[drawn++] = walk;
+    walks[drawn] = walk;
+    drawn += !(walk->wo == Vec3d{});
   }
   evaluate_wide(
       walks.first(drawn), [](const Walk& walk) { return &walk.wo; },
-      [&](size_t i, const Evaluation& evaluation) {
-        walks[i]->direction = walks[i]->wo;
-        if (scatter(*walks[i], evaluation)) walks[kept++] = walks[i];
+      [&](Walk& walk, const Evaluation& evaluation) {
+        walk.direction = walk.wo;
+        walks[kept] = &walk;
+        kept += scatter(walk, evaluation);
       });
   return kept;
-}
-
-// Where rays along walk.wo leave the scene.
-template <class S, class Visitor>
-inline void PathTracer<S, Visitor>::find_sky_wide(std::span<Walk* const> walks) const {
-  if (!c_.scene.environment) return;
-  Environment::Found found[kMostWalks];
-  size_t count = 0;
-  for (Walk* const walk : walks) {
-    if (!walk->found) found[count++] = {&walk->wo, &walk->sky};
-  }
-  c_.scene.environment->find_each({found, count});
 }
 
 // What the camera's rays see that meet nothing; `rest`, while that is fetched.
@@ -107,7 +109,7 @@ inline void PathTracer<S, Visitor>::see_sky_wide(std::span<const StartRay<S>> ra
     walk.wo = rays[i].direction;
     leaving[count++] = &walk;
   }
-  find_sky_wide({leaving, count});
+  if (count > 0) find_sky({leaving, count});
   rest();
   for (size_t i = 0; i < count; ++i) {
     Walk& walk = *leaving[i];

@@ -330,7 +330,7 @@ std::optional<Hit> FaceOverlaps::first_of(std::span<const FaceRef> faces, const 
   return first;
 }
 
-void FaceOverlaps::settle(const Ray& ray, Hit& hit) const {
+void FaceOverlaps::settle_among(const Ray& ray, Hit& hit) const {
   // One that is met before may itself have others before it; each is nearer than the last.
   for (;;) {
     const auto near = found_of(hit.face).second;
@@ -343,7 +343,7 @@ void FaceOverlaps::settle(const Ray& ray, Hit& hit) const {
   settle_in_plane(ray, hit);
 }
 
-bool FaceOverlaps::leave(const Ray& ray, Hit& hit) const {
+bool FaceOverlaps::leave_near(const Ray& ray, Hit& hit) const {
   const auto first = first_of(found_of(ray.start).second, ray, hit.t);
   if (!first) return false;
   hit = *first;

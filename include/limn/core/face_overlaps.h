@@ -53,10 +53,14 @@ class FaceOverlaps {
   Set in_place_of(std::span<const FaceRef> faces) const;
   // Of the faces in a hit's place, copies among them, that which the ray meets (is_met_first),
   // after near ones that are met before it.
-  void settle(const Ray& ray, Hit& hit) const;
+  void settle(const Ray& ray, Hit& hit) const {
+    if (has_others(hit.face) || !copies_->empty()) settle_among(ray, hit);
+  }
   // The first face that the ray meets of those near to the one where it starts; `hit` is changed
   // only if that is nearer. False if there is none.
-  bool leave(const Ray& ray, Hit& hit) const;
+  bool leave(const Ray& ray, Hit& hit) const {
+    return has_others(ray.start) && leave_near(ray, hit);
+  }
   // Whether the ray meets a face near to the one where it ends before it gets there.
   bool arrives_hidden(const Ray& ray) const;
   // Whether another face is met in the place where the ray would meet `face`.
@@ -68,13 +72,15 @@ class FaceOverlaps {
   }
   using Found = std::pair<std::span<const FaceRef>, std::span<const FaceRef>>;  // in plane, near
   Found found_of(FaceRef face) const {
-    if (!face.shape.valid() || !has_others_[number(face)]) return {};
-    return find(copies_->first(face));
+    return has_others(face) ? find(copies_->first(face)) : Found{};
   }
+  bool has_others(FaceRef face) const { return face.shape.valid() && has_others_[number(face)]; }
   size_t number(FaceRef face) const {
     return first_numbers_[face.shape.index()] + face.face.index();
   }
   Found find(FaceRef face) const;
+  void settle_among(const Ray& ray, Hit& hit) const;
+  bool leave_near(const Ray& ray, Hit& hit) const;
   void settle_in_plane(const Ray& ray, Hit& hit) const;
   std::optional<Hit> first_of(std::span<const FaceRef> faces, const Ray& ray, double before) const;
 
