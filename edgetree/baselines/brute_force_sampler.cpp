@@ -26,12 +26,6 @@ class BruteForceSampler final : public ListingSampler {
     for (const EdgeMesh& mesh : input.objects) packed_.push_back(pack(mesh));
   }
 
-  // It bounds every edge.
-  double draw_cost() const override {
-    size_t edges = 0;
-    for (const EdgeMesh& mesh : input_.objects) edges += mesh.edges.size();
-    return static_cast<double>(edges) / 200;
-  }
   SamplerSize size() const override {
     uint64_t bytes = 0;
     for (const Packed& p : packed_)

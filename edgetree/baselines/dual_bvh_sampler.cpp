@@ -237,12 +237,6 @@ class DualBvhSampler final : public ListingSampler {
     for (const EdgeMesh& mesh : input.objects) trees_.emplace_back(mesh);
   }
 
-  // It bounds every edge of E(p): 2 to 4 % of all (edgetree/FIGURES.md).
-  double draw_cost() const override {
-    size_t edges = 0;
-    for (const EdgeMesh& mesh : input_.objects) edges += mesh.edges.size();
-    return static_cast<double>(edges) / 1000;
-  }
   SamplerSize size() const override {
     SamplerSize size;
     for (const DualTree& tree : trees_) {

@@ -66,6 +66,12 @@ double ListingSampler::pdf_t(const EdgeQuery& query, EdgeRef id, double t) const
   return bound.total() > 0 ? bound.pdf_t(t) : 0;
 }
 
+double ListingSampler::query_cost() const {
+  size_t edges = 0;
+  for (const EdgeMesh& mesh : input_.objects) edges += mesh.edges.size();
+  return static_cast<double>(edges) / 200;
+}
+
 EdgeBound ListingSampler::bound_of(const EdgeQuery& query, EdgeRef id) const {
   return {LobeBound(query.n, query.wi, query.lobe),
           segment_of(input_.object(id.object), id.edge, query)};

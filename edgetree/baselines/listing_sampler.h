@@ -15,6 +15,12 @@ class ListingSampler : public EdgeSampler {
   double probability(const EdgeQuery& query, EdgeRef id) const final;
   double pdf_t(const EdgeQuery& query, EdgeRef id, double t) const final;
 
+  // What is listed holds for all draws of a query: further ones took less than a ray.
+  double draw_cost() const final { return 1; }
+  // Every edge of E(p) is bounded. Of both samplers first draws took 310 to 570, where scenes have
+  // 60000 and 104000 edges; 300 to 460 of 30000, a quarter of which are sharp.
+  double query_cost() const final;
+
  protected:
   explicit ListingSampler(const EdgeSamplerInput& input);
 

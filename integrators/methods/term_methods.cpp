@@ -366,7 +366,8 @@ class TermJob {
     const int first_look = film ? std::min(spp, kFirstLook) : spp;
     Probed probed = probe(estimator, turns, first_look, settings, watch);
     if (film && probed.pilot.spp > 0 &&
-        (!budget.timed() || is_time_for_film(estimator, probed.pilot.spp, settings, watch))) {
+        (!budget.timed() || is_time_for_film({probed.pilot.spp, watch.seconds(), settings.seconds},
+                                             estimator.motion_rates().moves_camera()))) {
       look_at_film(p, turns, budget, probing, probed);
       extend(probed, estimator, turns, spp, settings, watch);
     }

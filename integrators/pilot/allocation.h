@@ -15,8 +15,7 @@ struct TermFigures {
   double least = 1;  // the fewest samples it can have in a sample of a pixel
   // The variance in every cell of a grid; empty for a term of the film.
   std::vector<double> cells = {};
-  // Of the cost, three quarters at most: what further samples at the same vertices do not take
-  // again.
+  // Of the cost, never all: what further samples at the same vertices do not take again.
   double first = 0;
 
   double cost_of(double samples) const {

@@ -440,12 +440,10 @@ double film_speed(const TermEstimator& estimator) {
 // In runs of 2.8 s, 64 x 64 pixels, four samples took a tenth of the time. With the look squared
 // error was 0.8 times as large where the camera moves, which slides all that is seen, 0.95 (sun),
 // 1.05 (demo), 1.25 (concave, object in view) and 1.2 to 1.6 (plant, lights, CAD part).
-bool is_time_for_film(const TermEstimator& estimator, int spp, const RunSettings& settings,
-                      const Stopwatch& watch) {
+bool is_time_for_film(const PilotTime& pilot, bool moves_camera) {
   constexpr double kShare = 1.0 / 14, kCameraShare = 1.0 / 6;  // of the time
-  const double taken = watch.seconds();
-  return 4 * taken < kShare * settings.seconds * spp ||
-         (estimator.motion_rates().moves_camera() && taken < kCameraShare * settings.seconds);
+  return 4 * pilot.taken < kShare * pilot.seconds * pilot.spp ||
+         (moves_camera && pilot.taken < kCameraShare * pilot.seconds);
 }
 
 FilmFit fit_film(TermEstimator& estimator, const SamplePlan& plan, const FilmLook& look,

@@ -28,10 +28,14 @@ struct FilmLook {
   double most_left;
 };
 
-// Whether looking for motion pays in a run with a limit of time, where a pilot took so many samples
-// since the watch began: it takes two pilots more.
-bool is_time_for_film(const TermEstimator& estimator, int spp, const RunSettings& settings,
-                      const Stopwatch& watch);
+// What a pilot took of a limit of time.
+struct PilotTime {
+  int spp;  // samples of every probed pixel
+  double taken, seconds;
+};
+
+// Whether looking for motion pays: it takes two pilots more.
+bool is_time_for_film(const PilotTime& pilot, bool moves_camera);
 
 // By a pilot. The estimator has kMostFilmParameters at most, and is left with a plan that is of no
 // use. settings, watch: as of run_pilot; it takes an eighth of a limit of time. Deterministic on any

@@ -15,11 +15,6 @@
 namespace limn {
 namespace {
 
-// What it costs to ask the forest from a point, beside draw_cost of each draw, in the unit of
-// Term::work: with one or two draws of a query these took 3.2 to 12.4 together for each, 7 as a
-// median of sixteen scenes, further ones 2 to 4.
-constexpr double kQueryCost = 4;
-
 class BoundaryTerm final : public Term {
  public:
   explicit BoundaryTerm(TermInput& input)
@@ -49,7 +44,7 @@ class BoundaryTerm final : public Term {
            sampler_.draw_cost() * static_cast<double>(cost.samples) + first_work(cost);
   }
   double first_work(const TermCost& cost) const override {
-    return kQueryCost * static_cast<double>(cost.samples);
+    return sampler_.query_cost() * static_cast<double>(cost.samples);
   }
 
   void describe(GradientStats& stats) const override {

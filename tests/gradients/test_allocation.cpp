@@ -172,13 +172,13 @@ SceneParts base_scene(const TempFiles& files) {
 }
 
 // A black body over a floor under an even sky: nothing slides.
-Scene shadow_scene(const TempFiles& files) {
+Scene shadow_scene(const TempFiles& files, int ball = 1) {
   SceneParts parts;
   parts.max_depth = 2;
   parts.origin = {0, 3, 3};
   parts.target = {0, 0, 0};
   parts.body = square("floor", 2.5, -90, {0, 0, 0}, diffuse("chalk", "0.8, 0.8, 0.8")) +
-               obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(1)), true, 0.5,
+               obj_shape("ball", write_mesh(files, "ball.obj", icosphere_mesh(ball)), true, 0.5,
                          {0, 1, 0}, diffuse("soot", "0, 0, 0")) +
                constant_light("sky", "1, 1, 1");
   return make_scene(files, parts);
@@ -220,6 +220,14 @@ TEST(Choice, GoesTheRightWay) {
   EXPECT_GT(
       run(lit, {"ball.translate.x", "glow.radiance"}, {}, run_settings(64)).samples()[kInterior],
       1);
+}
+
+// Edges that are listed at a vertex are there for all of its draws, which are many then.
+TEST(Choice, KnowsWhatASamplerTakesBesideItsDraws) {
+  const TempFiles files;
+  const Scene scene = shadow_scene(files, 4);  // of 7680 edges and more
+  const GradientResult r = run(scene, {"ball.translate.y"}, {}, run_settings(8), {}, "brute");
+  EXPECT_GE(r.samples()[kBoundary], 5);
 }
 
 // A choice that is better by its own figures must be better by those of long runs, too.

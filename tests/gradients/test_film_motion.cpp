@@ -213,6 +213,20 @@ double share_that_moves(const GradientResult& result) {
   return share;
 }
 
+// Of four samples or eight, alike; longer where the camera moves.
+TEST(FilmMotion, IsLookedForWhereThereIsTime) {
+  for (const int spp : {4, 8}) {
+    const double limit = 2.8, each = limit / 56 / 1.01;  // a 14th for four samples
+    EXPECT_TRUE(is_time_for_film({spp, spp * each, limit}, false)) << spp;
+    EXPECT_FALSE(is_time_for_film({spp, spp * each * 1.03, limit}, false)) << spp;
+  }
+  EXPECT_TRUE(is_time_for_film({4, 0.46, 2.8}, true));
+  EXPECT_FALSE(is_time_for_film({4, 0.47, 2.8}, true));
+  EXPECT_FALSE(is_time_for_film({4, 0.46, 2.8}, false));
+  // What pays does not depend on the limit's unit.
+  EXPECT_TRUE(is_time_for_film({4, 46, 280}, true));
+}
+
 TEST(FilmMotion, TakesOutDetailThatSlides) {
   const TempFiles files;
   const Scene scene = fence_scene(files, 24);

@@ -238,10 +238,11 @@ void measure_draws(std::vector<Row>& rows, const std::vector<EdgeQuery>& queries
   for (int round = 0; round < kRounds; ++round) {
     for (Row& row : rows) {
       // Slow ones draw less often.
-      const double count = 1000.0 / kRounds / row.sampler->draw_cost();
+      const EdgeSampler& sampler = *row.sampler;
+      const double count = 1000.0 / kRounds / (sampler.query_cost() + sampler.draw_cost());
       const int repeat = static_cast<int>(std::clamp(count, 1.0, 40.0));
       const auto take = [&](const std::vector<EdgeQuery>& from, Draws& best) {
-        const Draws draws = measure_draws(*row.sampler, from, repeat);
+        const Draws draws = measure_draws(sampler, from, repeat);
         if (round == 0 || draws.nanoseconds < best.nanoseconds) best = draws;
       };
       take(queries, row.draws);

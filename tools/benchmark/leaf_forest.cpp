@@ -84,7 +84,9 @@ class LeafForest final : public EdgeSampler {
     return edge.is_seen() ? edge.pdf_t(t) : 0;
   }
 
-  double draw_cost() const override { return 3; }  // the forest's: as many draws to measure
+  // The forest's: as many draws to measure.
+  double draw_cost() const override { return 3; }
+  double query_cost() const override { return 4; }
   SamplerSize size() const override {
     uint64_t bytes = forest_.inner.size() * sizeof(InnerNode) + leaves_.size() * sizeof(Leaf) +
                      edges_.size() * sizeof(uint32_t) + forest_.roots.size() * sizeof(NodeId);

@@ -136,6 +136,8 @@ class EdgeSampler {
   // of 20000 triangles, where it was timed. A figure and not a clock, so that what follows from it
   // is the same on every machine.
   virtual double draw_cost() const = 0;
+  // What asking from a point takes beside its draws, however many these are, in the same unit.
+  virtual double query_cost() const = 0;
   virtual SamplerSize size() const { return {}; }
 
   // The tree whose nodes this sampler rejects, for looking at; null if it rejects none. The sampler
