@@ -1,0 +1,519 @@
+// Derivatives term by term: passes over the parameters, a pilot that shares the work among the
+// terms, and what batches add up to.
+#include "integrators/methods/term_job.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "integrators/estimates/batches.h"
+#include "integrators/film/film_regions.h"
+#include "integrators/methods/selection.h"
+#include "integrators/pilot/allocation.h"
+#include "integrators/pilot/field_fit.h"
+#include "integrators/pilot/film_fit.h"
+#include "integrators/pilot/pilot.h"
+#include "integrators/pilot/probed.h"
+#include "integrators/pilot/random_motion.h"
+#include "integrators/pilot/term_estimator.h"
+#include "limn/core/error.h"
+#include "limn/core/parameter.h"
+#include "limn/edgetree/edge_sampler_types.h"
+#include "limn/integrators/parts.h"
+
+namespace limn {
+namespace {
+
+// Collects sums of batches into the moments of one parameter. sums: of its lane, for each term
+// (empty for those that are not computed).
+void collect(const std::vector<const std::vector<double>*>& sums, const std::vector<TermRun>& terms,
+             int samples, const Film& film, int block, ParameterGradient& g) {
+  const int width = film.crop_width;
+  const int height = film.crop_height;
+  std::vector<double> edges(film_size(film));
+  std::vector<double> total(film_size(film));
+  // Terms of edges by themselves first: the order of a sum decides its last bits.
+  for (const bool of_edges : {true, false}) {
+    for (size_t t = 0; t < terms.size(); ++t) {
+      if (!sums[t] || terms[t].edges != of_edges) continue;
+      std::vector<double>& to = of_edges ? edges : total;
+      for (size_t i = 0; i < to.size(); ++i) to[i] += (*sums[t])[i];
+    }
+  }
+  for (size_t i = 0; i < total.size(); ++i) total[i] += edges[i];
+  for (size_t t = 0; t < terms.size(); ++t) {
+    if (!sums[t]) continue;
+    g.terms[t].add_batch(*sums[t], samples);
+    if (block > 0) g.term_blocks[t].add_batch(sum_blocks(*sums[t], width, height, block), samples);
+  }
+  g.total.add_batch(total, samples);
+  g.image_sum.add_batch(sum_blocks(total, width, height, std::max(width, height)), samples);
+  if (block > 0) g.total_blocks.add_batch(sum_blocks(total, width, height, block), samples);
+}
+
+// What a pilot chose: other machines must have chosen the same.
+void identify_plan(const std::vector<TermRun>& terms, BatchStore& store) {
+  std::vector<double> counts;
+  for (const TermRun& term : terms) {
+    counts.push_back(term.samples);
+    counts.insert(counts.end(), term.pixel_samples.begin(), term.pixel_samples.end());
+  }
+  store.identify("choice of the pilot", fingerprint(counts));
+}
+
+// The fewest samples of a term in one of a pixel, where they are spread: a rare event that a pilot
+// has not seen must not cost more than this. Not tuned.
+constexpr double kLeastSamples = 0.125;
+
+// Positions on the film move if, by pilots, that leaves less than this share of squared error times
+// work. Not tuned.
+constexpr double kFilmConvincing = 0.97;
+// Their motion is tried if a fit of it leaves less than the first share, and, of what turns of
+// directions leave, not much more: together they may leave less. In view, where either leaves 0.3,
+// both leave 0.2; in a chandelier, where turns leave 0.05 and motion 0.2, both leave 0.05 to 0.1.
+// Turns that leave less than the last share leave too little to look for.
+constexpr double kFilmPromising = 0.99, kFilmAgainstTurns = 1.25, kTurnsAlone = 0.2;
+// Of a pilot, before positions on the film are looked at; it goes on behind that. Not tuned.
+constexpr int kFirstLook = 8;
+// The most work of the pilot that looks at them, as a share of the run's. Not tuned.
+constexpr double kFilmShare = 1.0 / 4;
+
+// Of runs long enough for more estimators: samples, and a set-up's share of the time; not tuned.
+constexpr int kLongRun = 256;
+constexpr double kSetupShare = 1.0 / 32;
+
+// A whole run of one method.
+class TermJob {
+ public:
+  TermJob(const Scene& scene, const GradientOptions& options, const TermMethod& method,
+          const RunSettings& settings)
+      : scene_(scene),
+        options_(options),
+        method_(method),
+        moves_film_(method.moves_film && !options.exact_film),
+        types_(terms_of(scene, method.sampler, method.closed, moves_film_)) {
+    const std::vector<std::string> chosen = selected_terms(term_names(), options.terms, scene.file);
+    for (const TermType* type : types_) {
+      computed_.push_back(std::find(chosen.begin(), chosen.end(), type->name) != chosen.end());
+    }
+    if (options.samples) check_samples(*options.samples);
+    std::vector<Parameter> parameters;
+    for (const auto& name : options.parameters) parameters.push_back(find_parameter(scene, name));
+    std::shared_ptr<const FilmRegions> visible;
+    if (options.exact_film) {
+      visible = std::make_shared<FilmRegions>(scene, settings.threads, settings.interrupted);
+    }
+    const Warping warping{options.warp, method.unbiased};
+    for (size_t k = 0; k < parameters.size(); k += kLanes) {
+      const auto some =
+          std::span(parameters).subspan(k).first(std::min<size_t>(kLanes, parameters.size() - k));
+      passes_.push_back(std::make_unique<TermEstimator>(
+          scene, some, types_, computed_, method.sampler, settings.threads, visible,
+          method.warps ? &warping : nullptr, method.closed, moves_film_));
+    }
+  }
+
+  GradientResult run(const RunSettings& settings, const Stopwatch& watch) {
+    check_memory(passes_);
+    GradientResult result = empty_result();
+    const size_t warned = result.warnings.size();
+    for (size_t p = 0; p < passes_.size(); ++p) {
+      pass(p).describe(result.stats);
+      pass(p).warn_of_kinks(result.warnings);
+    }
+    result.at_kink = result.warnings.size() > warned;
+    warn_of_faces_edge_on(scene_, pass(0).viewpoints(), result.warnings);
+    for (size_t p = 0; p < passes_.size(); ++p)
+      result.at_kink = result.at_kink || pass(p).viewpoints().cross_planes();
+    plan(settings, watch, result);
+    if (settings.store) identify_plan(result.terms, *settings.store);
+    result.setup_seconds = watch.seconds();
+    run_batches(passes_, settings, watch, [&](const Batch& batch, const auto& sums) {
+      add_batch(batch.count(), sums, result);
+    });
+    result.seconds = watch.seconds();
+    if (method_.warps) describe_warping(result);
+    return result;
+  }
+
+  std::vector<std::string> trace(const RunSettings& settings, const NonFinite::Place& place) {
+    GradientResult unused = empty_result();
+    const Stopwatch watch;
+    plan(settings, watch, unused);
+    SampleLog log;
+    for (size_t p = 0; p < passes_.size(); ++p) {
+      for (size_t k = 0; k < static_cast<size_t>(pass(p).lanes()); ++k) {
+        log.push_back(fmt::format("parameter {}: {}", k + 1, options_.parameters[p * kLanes + k]));
+      }
+      if (place.x >= 0) {
+        check_pixel(scene_.film, place);
+        run_pixel_sample(pass(p), settings, {place.x, place.y, place.sample}, log);
+      } else {
+        trace_film(pass(p), settings, place, log);
+      }
+    }
+    return log;
+  }
+
+ private:
+  void describe_warping(GradientResult& result) const {
+    TermCost all;
+    for (const TermRun& term : result.terms) all.merge(term.cost);
+    const auto share = [](uint64_t part, uint64_t of) {
+      return of > 0 ? static_cast<double>(part) / static_cast<double>(of) : 0;
+    };
+    result.settings.push_back({"auxiliary rays", static_cast<double>(options_.warp.rays)});
+    result.settings.push_back({"kappa", options_.warp.kappa});
+    result.settings.push_back({"directions ruled by one ray", share(all.dominated, all.warped)});
+    result.settings.push_back({"rays on an edge", static_cast<double>(all.dropped)});
+  }
+
+  static void describe_film(const std::vector<FilmMotion>& film, GradientResult& result) {
+    const auto moving = std::count_if(film.begin(), film.end(), [](const FilmMotion& motion) {
+      return !is_zero(motion.x) || !is_zero(motion.y);
+    });
+    const double share = static_cast<double>(moving) / static_cast<double>(film.size());
+    result.settings.push_back({"pixels whose positions move", std::round(share * 100) / 100});
+  }
+
+  // What moving directions change in one term they take back in the others, and at every jump of
+  // radiance there must be an edge.
+  bool can_move_directions() const {
+    for (size_t t = 0; t < types_.size(); ++t) {
+      if (types_[t]->moved_with_directions && !computed_[t]) return false;
+    }
+    return scene_.shading == ShadingModel::kContinuous;
+  }
+  // The same of positions on the film, which change all terms.
+  bool can_move_film() const {
+    return moves_film_ && scene_.shading == ShadingModel::kContinuous &&
+           std::find(computed_.begin(), computed_.end(), false) == computed_.end();
+  }
+  int64_t terms_computed() const { return std::count(computed_.begin(), computed_.end(), true); }
+  TermEstimator& pass(size_t p) const { return static_cast<TermEstimator&>(*passes_[p]); }
+
+  std::vector<std::string> term_names() const {
+    std::vector<std::string> names;
+    for (const TermType* type : types_) names.emplace_back(type->name);
+    return names;
+  }
+
+  void trace_film(const TermEstimator& estimator, const RunSettings& settings,
+                  const NonFinite::Place& place, SampleLog& log) const {
+    for (size_t slot = 0; slot < types_.size(); ++slot) {
+      if (types_[slot]->name != place.term) continue;
+      if (run_film_sample(estimator, settings, slot, place.sample, log)) return;
+    }
+    throw InputError(fmt::format("there is no sample {} of the term \"{}\" on the film",
+                                 place.sample, place.term));
+  }
+
+  void check_samples(const SampleCounts& samples) const {
+    bool good = samples.size() <= types_.size();
+    for (size_t t = 0; t < types_.size(); ++t) {
+      const bool whole = types_[t]->least_samples == 1;
+      good = good && std::isfinite(samples[t]) && samples[t] > 0 &&
+             (!whole || samples[t] == std::floor(samples[t]));
+    }
+    if (good) return;
+    std::string wanted;
+    for (const TermType* type : types_) {
+      wanted += fmt::format("{}{}{}", wanted.empty() ? "" : ", ", type->name,
+                            type->least_samples == 1 ? "" : " (may be less than 1)");
+    }
+    throw InputError(
+        fmt::format("--samples: \"{}\": counts must be positive, and whole where "
+                    "paths are concerned, as in 3,0.5,1; the terms are {}",
+                    to_string(samples), wanted));
+  }
+
+  // Plans every pass, by a pilot or as the options say.
+  void plan(const RunSettings& settings, const Stopwatch& watch, GradientResult& result) const {
+    const Stopwatch pilot_watch;
+    const bool is_long = settings.seconds > 0 ? watch.seconds() < kSetupShare * settings.seconds
+                                              : settings.spp >= kLongRun;
+    std::vector<double> means(types_.size());
+    for (size_t p = 0; p < passes_.size(); ++p) {
+      SamplePlan plan;
+      plan.uniform = options_.samples.value_or(SampleCounts{});
+      if (!options_.samples)
+        plan = plan_by_pilot(p, budget_of(p, settings, watch, is_long), result);
+      if (method_.random_directions && can_move_directions()) {
+        plan.grid = PlanGrid(scene_.film, film_size(scene_.film));
+        plan.fields = random_fields(plan.grid.size(), pass(p), settings.seed);
+        if (can_move_film()) plan.film = random_motions(plan.grid.size(), pass(p), settings.seed);
+      }
+      plan.numbers = method_.numbers;
+      for (size_t t = 0; t < types_.size(); ++t) {
+        means[t] += plan.uniform[t] / static_cast<double>(passes_.size());
+      }
+      if (!options_.samples && !plan.film.empty()) describe_film(plan.film, result);
+      pass(p).set_plan(plan);
+      add_pixel_samples(pass(p), plan, result);
+    }
+    for (size_t t = 0; t < types_.size(); ++t) result.terms[t].samples = means[t];
+    if (result.pilot_spp > 0) result.stats.setup.emplace_back("pilot", pilot_watch.seconds());
+  }
+
+  GradientResult empty_result() const {
+    const Film& film = scene_.film;
+    const int block = options_.block;
+    const Moments blocks(block > 0 ? block_count(film.crop_width, film.crop_height, block) : 0,
+                         true);
+    GradientResult result;
+    for (size_t t = 0; t < types_.size(); ++t) {
+      result.terms.push_back({types_[t]->name, computed_[t], types_[t]->edges, 1, {}, {}});
+    }
+    for (const auto& name : options_.parameters) {
+      ParameterGradient& g = result.parameters.emplace_back();
+      g.name = name;
+      g.total = Moments(film_size(film));
+      g.image_sum = Moments(1);
+      g.total_blocks = blocks;
+      for (const bool computed : computed_) {
+        g.terms.push_back(computed ? Moments(film_size(film)) : Moments());
+        g.term_blocks.push_back(computed ? blocks : Moments());
+      }
+    }
+    result.radiance = Moments(film_size(film));
+    return result;
+  }
+
+  void add_batch(int samples, const std::vector<BatchSums>& sums, GradientResult& result) const {
+    for (size_t p = 0; p < passes_.size(); ++p) {
+      const auto lanes = static_cast<size_t>(pass(p).lanes());
+      for (size_t k = 0; k < lanes; ++k) {
+        std::vector<const std::vector<double>*> terms;
+        for (size_t t = 0; t < types_.size(); ++t) {
+          terms.push_back(computed_[t] ? &sums[p].images[t * lanes + k] : nullptr);
+        }
+        collect(terms, result.terms, samples, scene_.film, options_.block,
+                result.parameters[p * kLanes + k]);
+      }
+      for (size_t t = 0; t < types_.size(); ++t) result.terms[t].cost.merge(sums[p].costs[t]);
+      result.non_finite.merge(sums[p].non_finite);
+    }
+    result.radiance.add_batch(sums[0].radiance, samples);
+    result.spp += samples;
+  }
+
+  void add_pixel_samples(const TermEstimator& estimator, const SamplePlan& plan,
+                         GradientResult& result) const {
+    const Film& film = scene_.film;
+    if (plan.counts.empty()) return;
+    for (size_t t = 0; t < types_.size(); ++t) {
+      if (!computed_[t] || !estimator.adds_to_pixels(t)) continue;
+      std::vector<float>& samples = result.terms[t].pixel_samples;
+      samples.resize(film_size(film) / 3);
+      for (size_t i = 0; i < samples.size(); ++i) {
+        const PixelSample at{film.crop_x + static_cast<int>(i) % film.crop_width,
+                             film.crop_y + static_cast<int>(i) / film.crop_width, 0};
+        samples[i] +=
+            static_cast<float>(plan.counts_at(at)[t]) / static_cast<float>(passes_.size());
+      }
+    }
+  }
+
+  // What the pilots of a pass may take: its share of the time that is left, from now on.
+  struct Budget {
+    RunSettings settings;
+    Stopwatch watch;
+    bool is_long;  // against what it takes to set up an estimator
+
+    bool timed() const { return settings.seconds > 0; }
+  };
+  Budget budget_of(size_t p, const RunSettings& settings, const Stopwatch& watch,
+                   bool is_long) const {
+    Budget budget{settings, {}, is_long};
+    const auto passes = static_cast<double>(passes_.size() - p);
+    if (budget.timed())
+      budget.settings.seconds = std::max((settings.seconds - watch.seconds()) / passes, 1e-9);
+    return budget;
+  }
+
+  SamplePlan plan_by_pilot(size_t p, const Budget& budget, GradientResult& result) const {
+    TermEstimator& estimator = pass(p);
+    const auto& [settings, watch, is_long] = budget;
+    SamplePlan plan;
+    plan.splits = method_.spreads_samples && !options_.uniform_samples;
+    const int spp = pilot_samples(settings.spp);
+    if (spp == 0 || (!method_.spreads_samples && terms_computed() < 2)) return plan;
+    const bool turns =
+        method_.moves_directions && can_move_directions() && !estimator.motion_rates().still();
+    SamplePlan probing;
+    probing.splits = plan.splits;
+    if (method_.spreads_samples) probing.light_samples = kPilotLights;
+    estimator.set_plan(probing);
+    const bool film = film_pilot_samples(settings.spp) > 0 && can_move_film() &&
+                      !method_.random_directions && !estimator.motion_rates().still();
+    const int first_look = film ? std::min(spp, kFirstLook) : spp;
+    Probed probed = probe(estimator, turns, first_look, settings, watch);
+    if (film && probed.pilot.spp > 0 &&
+        (!budget.timed() || is_time_for_film({probed.pilot.spp, watch.seconds(), settings.seconds},
+                                             estimator.motion_rates().moves_camera()))) {
+      look_at_film(p, turns, budget, probing, probed);
+      extend(probed, estimator, turns, spp, settings, watch);
+    }
+    if (probed.pilot.spp == 0) return plan;
+    result.pilot_spp = probed.pilot.spp;
+    plan.film = std::move(probing.film);
+    share_out(estimator, probed, plan);
+    return plan;
+  }
+
+  // Positions on the film move where pilots with them and without say so; what turns of directions
+  // take out is taken out by either.
+  void look_at_film(size_t p, bool turns, const Budget& budget, SamplePlan& plan,
+                    Probed& probed) const {
+    TermEstimator& estimator = pass(p);
+    const auto& [settings, watch, is_long] = budget;
+    const int lanes = estimator.lanes();
+    const double held = probed.error_times_work(lanes);
+    const double not_turned = probed.error_times_work(lanes, false);
+    if (!(held > kTurnsAlone * not_turned)) return;
+    const double pixels = static_cast<double>(film_size(scene_.film)) / 3;
+    const FilmLook look{film_pilot_samples(settings.spp),
+                        kFilmShare * settings.spp * probed.pilot.work_of_pixel() * pixels,
+                        std::min(kFilmPromising, kFilmAgainstTurns * held / not_turned)};
+    FilmFit film = fit_film_of(p, plan, look, budget);
+    if (!film.motion.empty()) {
+      SamplePlan moving = plan;
+      moving.grid = film.grid;
+      moving.film = std::move(film.motion);
+      estimator.set_plan(moving);
+      Probed other = probe(estimator, turns, probed.pilot.spp, settings, watch);
+      const double left = other.pilot.spp > 0 ? other.error_times_work(lanes) : 0;
+      if (left > 0 && left < kFilmConvincing * held) {
+        probed = std::move(other);
+        plan = std::move(moving);
+        return;
+      }
+    }
+    estimator.set_plan(plan);
+  }
+
+  // Positions are held where the result is empty. More parameters than the film leaves lanes for
+  // are looked at two by two, by estimators of their own: only in runs that are long against what
+  // it takes to set them up.
+  FilmFit fit_film_of(size_t p, const SamplePlan& plan, FilmLook look, const Budget& budget) const {
+    TermEstimator& estimator = pass(p);
+    if (estimator.lanes() <= kMostFilmParameters) {
+      return fit_film(estimator, plan, look, budget.settings, budget.watch);
+    }
+    FilmFit fit;
+    if (!budget.is_long) return fit;
+    const auto parameters = parameters_of(p);
+    const double pairs = std::ceil(estimator.lanes() / double{kMostFilmParameters});
+    RunSettings settings = budget.settings;
+    settings.seconds /= pairs;
+    look.work /= pairs;
+    for (int first = 0; first < estimator.lanes(); first += kMostFilmParameters) {
+      const auto some =
+          std::span(parameters)
+              .subspan(first, std::min(kMostFilmParameters, estimator.lanes() - first));
+      TermEstimator two(scene_, some, types_, computed_, method_.sampler, settings.threads, nullptr,
+                        nullptr, false, true);
+      if (two.motion_rates().still()) continue;
+      const FilmFit part = fit_film(two, plan, look, settings, budget.watch);
+      if (part.motion.empty()) continue;
+      fit.grid = part.grid;
+      fit.motion.resize(part.motion.size());
+      for (size_t cell = 0; cell < fit.motion.size(); ++cell) {
+        for (size_t k = 0; k < some.size(); ++k) {
+          fit.motion[cell].x[first + k] = part.motion[cell].x[k];
+          fit.motion[cell].y[first + k] = part.motion[cell].y[k];
+        }
+      }
+    }
+    return fit;
+  }
+
+  std::vector<Parameter> parameters_of(size_t p) const {
+    std::vector<Parameter> parameters;
+    for (int k = 0; k < pass(p).lanes(); ++k)
+      parameters.push_back(find_parameter(scene_, options_.parameters[p * kLanes + k]));
+    return parameters;
+  }
+
+  // Each parameter counts alike: its variances are divided by their sum. Sets the plan's light
+  // samples; units: to these sums.
+  std::vector<TermFigures> figures_of(const TermEstimator& estimator, const Probed& probed,
+                                      SamplePlan& plan, std::vector<double>& units) const {
+    const auto& [pilot, fit] = probed;
+    TermFigures light;
+    light.cells.resize(pilot.grid.size());
+    std::vector<TermFigures> figures(types_.size());
+    for (size_t t = 0; t < figures.size(); ++t) {
+      figures[t].cost = pilot.work[t];
+      figures[t].first = pilot.first_work[t];
+      figures[t].least = types_[t]->least_samples;
+      if (method_.spreads_samples && t != estimator.pixel_slot()) figures[t].least = kLeastSamples;
+      if (pilot.in_cells(t)) figures[t].cells.resize(pilot.grid.size());
+    }
+    for (int lane = 0; lane < estimator.lanes(); ++lane) {
+      std::vector<std::vector<double>> cells;
+      const std::vector<double> means = probed.variances(lane, cells);
+      const double sum = std::accumulate(means.begin(), means.end(), 0.0);
+      units.push_back(sum);
+      if (!(sum > 0)) continue;
+      for (size_t t = 0; t < figures.size(); ++t) {
+        figures[t].variance += means[t] / sum;
+        for (size_t i = 0; i < cells[t].size(); ++i) figures[t].cells[i] += cells[t][i] / sum;
+      }
+      const auto lights = fit.variances.empty() ? pilot.variances(figures.size(), lane)
+                                                : fit.variances[lane][figures.size()];
+      light.variance += trimmed_mean(lights) / sum;
+      for (size_t i = 0; i < lights.size(); ++i) light.cells[i] += lights[i] / sum;
+    }
+    // Paths that only lead to vertices take no more light than they must.
+    if (method_.spreads_samples && computed_[estimator.pixel_slot()]) {
+      light.cost = pilot.light_work;
+      plan.light_samples = choose_lights(kPilotLights, light, figures[estimator.pixel_slot()]);
+    }
+    return figures;
+  }
+
+  // By what a pilot found.
+  void share_out(const TermEstimator& estimator, const Probed& probed, SamplePlan& plan) const {
+    const auto& [pilot, fit] = probed;
+    std::vector<double> units;
+    const std::vector<TermFigures> figures = figures_of(estimator, probed, plan, units);
+    double price;
+    if (method_.spreads_samples && !options_.uniform_samples) {
+      price = spread_samples(figures, pilot.grid, plan);
+    } else {
+      plan.uniform = best_samples(figures);
+      price = price_of(figures, plan.uniform);
+    }
+    if (method_.spreads_samples || method_.random_directions)
+      plan.survival = survival_of(pilot.traced, price, units);
+    plan.grid = pilot.grid;
+    plan.fields = fit.fields;
+  }
+
+  const Scene& scene_;
+  const GradientOptions& options_;
+  TermMethod method_;
+  bool moves_film_;  // whether positions on the film may move
+  std::vector<const TermType*> types_;
+  std::vector<bool> computed_;  // of each term
+  std::vector<std::unique_ptr<SampleEstimator>> passes_;
+};
+
+}  // namespace
+
+GradientResult run_terms(const TermMethod& method, const Scene& scene,
+                         const GradientOptions& options, const RunSettings& settings) {
+  const Stopwatch watch;
+  return TermJob(scene, options, method, settings).run(settings, watch);
+}
+
+std::vector<std::string> trace_terms(const TermMethod& method, const Scene& scene,
+                                     const GradientOptions& options, const RunSettings& settings,
+                                     const NonFinite::Place& place) {
+  return TermJob(scene, options, method, settings).trace(settings, place);
+}
+
+}  // namespace limn

@@ -1,0 +1,34 @@
+#pragma once
+// A whole run of one method that works term by term.
+#include <string>
+#include <vector>
+
+#include "integrators/estimates/sample_estimator.h"
+#include "limn/edgetree/edge_sampler_types.h"
+#include "limn/integrators/gradient.h"
+
+namespace limn {
+
+// What a method does beside sampling its terms.
+struct TermMethod {
+  const EdgeSamplerType& sampler;
+  bool moves_directions = false;   // see direction_field.h
+  bool spreads_samples = false;    // over pixels, see spread_samples
+  bool moves_film = false;         // positions on the film, see film_fit.h
+  bool random_directions = false;  // directions and positions move by chance: no mean may change
+  bool ablation = false;
+  bool warps = false;     // directions follow the edges that they see, see warp_field.h
+  bool unbiased = false;  // the same without the bias of few rays
+  bool closed = false;    // light that is scattered once in closed form, see closed_light.h
+  Numbers numbers = Numbers::kIndependent;
+};
+
+GradientResult run_terms(const TermMethod& method, const Scene& scene,
+                         const GradientOptions& options, const RunSettings& settings);
+
+// What one sample of a run meets, line by line.
+std::vector<std::string> trace_terms(const TermMethod& method, const Scene& scene,
+                                     const GradientOptions& options, const RunSettings& settings,
+                                     const NonFinite::Place& place);
+
+}  // namespace limn
