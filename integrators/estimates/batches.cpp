@@ -304,7 +304,7 @@ void check_memory(Estimators estimators) {
   }
   if (images == 0) return;
   const Scene& scene = (*estimators.begin())->scene();
-  // Of every image: the sums of a batch, of all batches, and two of their squares.
+  // Of every image: the sums of a batch, of all batches, and what variances are made of.
   const double bytes = 4 * sizeof(double) * images * static_cast<double>(film_size(scene.film));
   require_memory({scene.file}, bytes,
                  fmt::format("a run with {:.0f} images of {} x {} pixels (each term of each "

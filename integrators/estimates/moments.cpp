@@ -7,23 +7,26 @@
 namespace limn {
 
 void Moments::add_batch(const std::vector<double>& sums, int64_t samples) {
+  // Step by step (West 1979): a difference of two large sums would have lost small variances.
+  const auto n = static_cast<double>(samples);
+  squared_samples_ += n * n;
+  const double share = n * n / squared_samples_;
   for (size_t i = 0; i < sums.size(); ++i) {
     sums_[i] += sums[i];
-    squares_[i] += sums[i] * sums[i];
-    weighted_[i] += static_cast<double>(samples) * sums[i];
+    const double before = sums[i] / n - centers_[i];
+    centers_[i] += share * before;
+    squares_[i] += n * n * (1 - share) * before * before;
   }
   samples_ += samples;
-  squared_samples_ += static_cast<double>(samples) * static_cast<double>(samples);
   ++batches_;
   if (keep_) kept_.push_back({sums, samples});
 }
 
 double Moments::variance(size_t i) const {
   if (batches_ < 2) return std::numeric_limits<double>::quiet_NaN();
-  const double m = mean(i);
-  const double between = squares_[i] - 2 * m * weighted_[i] + m * m * squared_samples_;
+  const double aside = centers_[i] - mean(i);
   const auto all = static_cast<double>(samples_);
-  return std::fmax(0.0, between) / (all * all - squared_samples_);
+  return (squares_[i] + squared_samples_ * aside * aside) / (all * all - squared_samples_);
 }
 
 double Moments::degrees() const {

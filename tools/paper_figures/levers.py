@@ -12,7 +12,7 @@ METHODS = ["forest", "silhouettes", "moving-directions", "held-positions", "inde
 DEFAULT, DIFFERENCES, MITSUBA = "adaptive", "fd", "mitsuba-after-setup"
 HEADS = {DIFFERENCES: "finite differences"}
 # Seconds of limn's runs and beside them; of Mitsuba start, compilation, octree and pilot.
-MINUTES, MITSUBA_MINUTES, MITSUBA_SETUP = 20, 9, 45
+MINUTES, MITSUBA_MINUTES, MITSUBA_SETUP = 19, 8, 45
 WORST = 0.001  # share of the pixels that `trimmed_mse` leaves out
 BUNNY = "/usr/share/glmark2/models/bunny.obj"  # glmark2-data
 GENERATED = "../build/generated"

@@ -19,7 +19,7 @@ class Moments {
   Moments() = default;
   // keep: remember the sums of every batch, for tests that need more than means and variances.
   explicit Moments(size_t size, bool keep = false)
-      : sums_(size), squares_(size), weighted_(size), keep_(keep) {}
+      : sums_(size), centers_(size), squares_(size), keep_(keep) {}
 
   size_t size() const { return sums_.size(); }
   int batches() const { return batches_; }
@@ -48,7 +48,8 @@ class Moments {
   const std::vector<Batch>& kept() const { return kept_; }
 
  private:
-  std::vector<double> sums_, squares_, weighted_;  // of S_b, S_b^2, n_b S_b
+  // Of S_b; the mean c of S_b / n_b weighed by n_b^2; the sum of (S_b - n_b c)^2.
+  std::vector<double> sums_, centers_, squares_;
   std::vector<Batch> kept_;
   bool keep_ = false;
   int batches_ = 0;
