@@ -8,12 +8,12 @@ namespace limn {
 EventSizes event_sizes(const std::vector<Moments::Batch>& batches) {
   EventSizes events;
   if (batches.empty()) return events;
-  const double count = static_cast<double>(batches.size());
+  double samples = 0, squared_samples = 0;
   std::vector<double> means(batches[0].sums.size());
   if (batches.size() > 1) {
-    double samples = 0;
     for (const Moments::Batch& batch : batches) {
       samples += static_cast<double>(batch.samples);
+      squared_samples += static_cast<double>(batch.samples * batch.samples);
       for (size_t i = 0; i < means.size(); ++i) means[i] += batch.sums[i];
     }
     for (double& mean : means) mean /= samples;
@@ -28,7 +28,8 @@ EventSizes event_sizes(const std::vector<Moments::Batch>& batches) {
       cubes += d * d * d;
     }
   }
-  const double fewer = batches.size() > 1 ? count / (count - 1) : 1;
+  const double all = samples * samples;
+  const double fewer = batches.size() > 1 ? all / (all - squared_samples) : 1;
   if (sizes > 0) events.mean = squares * fewer / sizes;
   if (squares > 0) events.large = cubes / squares;
   return events;

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <climits>
 #include <cmath>
 
 #include "integrators/estimates/batch_record.h"
@@ -17,17 +18,25 @@ namespace limn {
 
 namespace {
 
+bool is_even(const SampleEstimator& estimator) {
+  return estimator.numbers() == Numbers::kEvenInBatches;
+}
+
 // The numbers of all that is even in a batch, by a seed of its own.
-Rng even_in_batch(const Batch& batch, uint64_t pixel, size_t number, size_t count) {
-  return Rng::even(mix_bits(batch.seed) + batch.first, pixel, static_cast<uint32_t>(number),
-                   static_cast<uint32_t>(count));
+Rng even_in_batch(const Batch& batch, uint64_t pixel, size_t number) {
+  constexpr uint64_t kStream = 0x62617463686573;  // apart from what has the run's own seed
+  const uint64_t seed =
+      mix_bits(mix_bits(batch.seed + kStream) + static_cast<uint64_t>(batch.first));
+  // Of the batch uncut: a sample is the same however many the run has.
+  return Rng::even(seed, pixel, static_cast<uint32_t>(number),
+                   static_cast<uint32_t>(Schedule::batch_size(batch.first, true)));
 }
 
 Rng pixel_key(const SampleEstimator& estimator, const Batch& batch, const PixelSample& at) {
   const uint64_t pixel = static_cast<uint64_t>(at.y) * estimator.scene().camera.width + at.x;
   switch (estimator.numbers()) {
     case Numbers::kEvenInBatches:
-      return even_in_batch(batch, pixel, at.s - batch.first, batch.count());
+      return even_in_batch(batch, pixel, at.s - batch.first);
     case Numbers::kEvenInRun:
       return Rng::even(batch.seed, pixel, static_cast<uint32_t>(at.s));
     case Numbers::kIndependent:
@@ -54,9 +63,8 @@ struct FilmBatch {
 // The i-th sample of a batch, in strata along [0, 1): what is even is so along the curves, too.
 bool sample_film(const SampleEstimator& estimator, size_t slot, const Batch& batch,
                  const FilmBatch& film, size_t i, RayCount& rays, FilmSample& sample) {
-  const Rng all = estimator.numbers() == Numbers::kEvenInBatches
-                      ? even_in_batch(batch, UINT64_MAX, i, 0)
-                      : Rng(batch.seed, UINT64_MAX, film.first + i);
+  const Rng all = is_even(estimator) ? even_in_batch(batch, UINT64_MAX, i)
+                                     : Rng(batch.seed, UINT64_MAX, film.first + i);
   const Rng key = all.copy(Purpose::kFilmCopy, estimator.film_stream(slot));
   const double u = (i + key.at(Purpose::kCamera, 0).uniform()) / film.count;
   return estimator.sample_film(slot, u, key, rays, sample);
@@ -244,10 +252,10 @@ void start(BatchStore& store, Estimators estimators, const RunSettings& settings
   store.start(settings.spp);
 }
 
-int samples_to_make(const RunSettings& settings, const Stopwatch& watch) {
+int samples_to_make(const RunSettings& settings, const Stopwatch& watch, bool even) {
   if (!settings.store) return settings.spp;
   int count = 0;
-  Schedule schedule(settings, watch);
+  Schedule schedule(settings, watch, even);
   while (schedule.next()) {
     if (task_of(settings, schedule.first_sample()) == BatchStore::Task::kMake) {
       count += schedule.samples();
@@ -256,15 +264,15 @@ int samples_to_make(const RunSettings& settings, const Stopwatch& watch) {
   return std::max(1, count);
 }
 
-// Of a run without a limit of time, that has this sample.
-Batch batch_of(const RunSettings& settings, int sample) {
-  const Stopwatch watch;
-  RunSettings untimed = settings;
-  untimed.seconds = 0;
-  Schedule schedule(untimed, watch);
-  while (schedule.next() && schedule.end_sample() <= sample) {
+// Of a run of `spp` samples without a limit of time, that has this sample.
+Batch batch_of(const SampleEstimator& estimator, uint64_t seed, int spp, int sample) {
+  Batch batch{seed, 0, 0};
+  while (batch.last <= sample) {
+    batch.first = batch.last;
+    const int64_t size = Schedule::batch_size(batch.first, is_even(estimator));
+    batch.last = static_cast<int>(std::min<int64_t>(batch.first + size, spp));
   }
-  return {settings.seed, schedule.first_sample(), schedule.end_sample()};
+  return batch;
 }
 
 std::string to_text(const Rgb<Lanes>& value, int lanes) {
@@ -319,9 +327,11 @@ void run_batches(Estimators estimators, const RunSettings& settings, const Stopw
   // What an interrupted pilot chose is no part of a run.
   if (settings.interrupted && settings.interrupted->load()) return;
   if (settings.store) start(*settings.store, estimators, settings);
+  const bool even = std::any_of(estimators.begin(), estimators.end(),
+                                [](const auto& one) { return is_even(*one); });
   ProgressCounter progress(settings, watch,
-                           steps_per_sample(estimators) * samples_to_make(settings, watch));
-  Schedule schedule(settings, watch);
+                           steps_per_sample(estimators) * samples_to_make(settings, watch, even));
+  Schedule schedule(settings, watch, even);
   while (!progress.stopped() && schedule.next()) {
     const Batch batch{settings.seed, schedule.first_sample(), schedule.end_sample()};
     const auto task = task_of(settings, batch.first);
@@ -341,15 +351,18 @@ void run_batches(Estimators estimators, const RunSettings& settings, const Stopw
 void check_pixel(const Film& film, const NonFinite::Place& place) {
   const int x = place.x - film.crop_x;
   const int y = place.y - film.crop_y;
-  if (x >= 0 && x < film.crop_width && y >= 0 && y < film.crop_height && place.sample >= 0) return;
+  if (x >= 0 && x < film.crop_width && y >= 0 && y < film.crop_height && place.sample >= 0 &&
+      place.sample < INT_MAX) {
+    return;
+  }
   throw InputError(fmt::format(
       "there is no sample {} of pixel ({}, {}): pixels of this film are ({}, {}) to ({}, {})",
       place.sample, place.x, place.y, film.crop_x, film.crop_y, film.crop_x + film.crop_width - 1,
       film.crop_y + film.crop_height - 1));
 }
 
-void run_pixel_sample(const SampleEstimator& estimator, const RunSettings& settings,
-                      const PixelSample& at, SampleLog& log) {
+void run_pixel_sample(const SampleEstimator& estimator, uint64_t seed, const PixelSample& at,
+                      SampleLog& log) {
   BatchSums sums;
   const Film& film = estimator.scene().film;
   sums.radiance.assign(film_size(film), 0.0);
@@ -358,9 +371,8 @@ void run_pixel_sample(const SampleEstimator& estimator, const RunSettings& setti
   NonFinite bad;
   const Lanes lane_scale = estimator.lane_scale();
   SampleSink sink(film, estimator.lanes(), lane_scale, sums, costs, bad, &log);
-  RunSettings own = settings;
-  own.spp = static_cast<int>(std::max<int64_t>(own.spp, int64_t{at.s} + 1));
-  const KeyedSample one{at, pixel_key(estimator, batch_of(own, at.s), at)};
+  const Batch batch = batch_of(estimator, seed, INT_MAX, static_cast<int>(at.s));
+  const KeyedSample one{at, pixel_key(estimator, batch, at)};
   estimator.add_pixels({&one, 1}, sink);
   const size_t index = pixel_index(film, at.x, at.y);
   const auto rgb = [&](const std::vector<double>& image) {
@@ -383,7 +395,8 @@ bool run_film_sample(const SampleEstimator& estimator, const RunSettings& settin
   const auto n = static_cast<size_t>(number);
   const size_t per_sample = FilmBatch(estimator, slot, {}).per_sample;
   if (n / per_sample >= static_cast<size_t>(settings.spp)) return false;
-  const Batch batch = batch_of(settings, static_cast<int>(n / per_sample));
+  const Batch batch =
+      batch_of(estimator, settings.seed, settings.spp, static_cast<int>(n / per_sample));
   const FilmBatch film(estimator, slot, batch);
   RayCount rays;
   FilmSample sample;

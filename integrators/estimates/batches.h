@@ -36,9 +36,9 @@ void run_batches(Estimators estimators, const RunSettings& settings, const Stopw
 // InputError if the film has no such pixel.
 void check_pixel(const Film& film, const NonFinite::Place& place);
 
-// One sample of a pixel alone, also one that the run's number of samples does not reach.
-void run_pixel_sample(const SampleEstimator& estimator, const RunSettings& settings,
-                      const PixelSample& at, SampleLog& log);
+// One sample of a pixel alone: the same whatever the number of samples.
+void run_pixel_sample(const SampleEstimator& estimator, uint64_t seed, const PixelSample& at,
+                      SampleLog& log);
 // One of a slot's samples of the film, by its number in the run; false if the run has none of this
 // number.
 bool run_film_sample(const SampleEstimator& estimator, const RunSettings& settings, size_t slot,

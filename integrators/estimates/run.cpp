@@ -65,16 +65,11 @@ std::string NonFinite::message() const {
   return text;
 }
 
-namespace {
-
-// Powers of two: what is even (Rng::even) is most so then.
-int batch_end(int done, int spp) {
-  const int wished = std::max({1, std::min(done / 4, 4), std::min(done / 8, 16), done / 32});
-  const auto samples = std::bit_floor(static_cast<unsigned>(wished));
-  return static_cast<int>(std::min<int64_t>(spp, int64_t{done} + samples));
+int Schedule::batch_size(int first, bool even) {
+  if (!even) return 1 + first / 32;
+  const int wished = std::max({1, std::min(first / 4, 4), std::min(first / 8, 16), first / 32});
+  return static_cast<int>(std::bit_floor(static_cast<unsigned>(wished)));
 }
-
-}  // namespace
 
 int Schedule::samples_in_time(double now) const {
   const double left = settings_.seconds - now;
@@ -87,7 +82,8 @@ int Schedule::samples_in_time(double now) const {
 bool Schedule::next() {
   if (last_) return false;
   const double now = watch_.seconds();
-  int end = batch_end(end_, settings_.spp);
+  const int64_t wished = int64_t{end_} + batch_size(end_, even_);
+  int end = static_cast<int>(std::min<int64_t>(wished, settings_.spp));
   if (settings_.seconds > 0 && end_ >= settings_.least_spp) {
     const int fitting = samples_in_time(now);
     last_ = fitting < end - end_;

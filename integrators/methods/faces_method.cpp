@@ -51,7 +51,7 @@ std::vector<std::string> trace_faces(const Scene& scene, const GradientOptions& 
   check_pixel(scene.film, place);
   const FacesEstimator estimator(scene, parameters_of(scene, options), 1);
   SampleLog log;
-  run_pixel_sample(estimator, RunSettings{}, {place.x, place.y, place.sample}, log);
+  run_pixel_sample(estimator, 0, {place.x, place.y, place.sample}, log);
   return log;
 }
 

@@ -182,7 +182,7 @@ std::vector<std::string> trace_sample(const Scene& scene, const RunSettings& set
   check_pixel(scene.film, place);
   const auto estimator = make_estimator(scene, settings, options);
   SampleLog log;
-  run_pixel_sample(*estimator, settings, {place.x, place.y, place.sample}, log);
+  run_pixel_sample(*estimator, settings.seed, {place.x, place.y, place.sample}, log);
   return log;
 }
 

@@ -149,7 +149,7 @@ class TermJob {
       }
       if (place.x >= 0) {
         check_pixel(scene_.film, place);
-        run_pixel_sample(pass(p), settings, {place.x, place.y, place.sample}, log);
+        run_pixel_sample(pass(p), settings.seed, {place.x, place.y, place.sample}, log);
       } else {
         trace_film(pass(p), settings, place, log);
       }

@@ -302,6 +302,33 @@ TEST_F(Program, RepeatsOneSample) {
       std::string::npos);
 }
 
+// Also those that are even together: what a pixel's samples add alone is what the run has, of which
+// the last batch is cut.
+TEST_F(Program, RepeatsEverySampleOfAPixel) {
+  constexpr int kSamples = 11;
+  const std::string gradient = "gradient " + scene_ + " --wrt blaze.radiance --samples 3" +
+                               " --terms interior -o " + out();
+  EXPECT_EQ(run(gradient + " --spp " + std::to_string(kSamples)).status, 0);
+  const Image image = read_exr(out());
+  size_t brightest = 0;
+  for (size_t i = 0; i < image.data.size(); i += 3) {
+    if (std::fabs(image.data[i]) > std::fabs(image.data[brightest])) brightest = i;
+  }
+  const double mean = image.data[brightest];
+  ASSERT_NE(mean, 0);
+  const size_t pixel = brightest / 3, width = static_cast<size_t>(image.width);
+  double sum = 0;
+  for (int s = 0; s < kSamples; ++s) {
+    const Outcome one = run(gradient + " --debug-sample " + std::to_string(pixel % width) + "," +
+                            std::to_string(pixel / width) + "," + std::to_string(s));
+    const std::string value = "sum: interior of parameter 1: (";
+    const size_t place = one.text.find(value);
+    ASSERT_NE(place, std::string::npos) << one.text;
+    sum += std::stod(one.text.substr(place + value.size()));
+  }
+  EXPECT_NEAR(sum / kSamples, mean, 1e-5 * std::fabs(mean));
+}
+
 // Samples that are not finite are an error, with the command that shows the first; what is finite
 // is kept. Here a corner touches the pinhole.
 TEST_F(Program, NonFiniteSamplesAreAnErrorThatCanBeRepeated) {

@@ -9,6 +9,7 @@
 #include "integrators/compare/edge_events.h"
 #include "integrators/methods/hair_gaps.h"
 #include "limn/core/rng.h"
+#include "limn/integrators/run.h"
 #include "support/meshes.h"
 #include "support/planted.h"
 #include "support/running_mean.h"
@@ -52,7 +53,7 @@ TEST(EventSizes, DoNotGrowWithTheBatches) {
     for (int run = 0; run < 40; ++run) {
       std::vector<Moments::Batch> batches;
       for (int64_t done = 0; done < 16384;) {
-        const int64_t samples = 1 + done / 32;
+        const int64_t samples = Schedule::batch_size(static_cast<int>(done), every == 2);
         double sum = 0;
         for (int64_t s = 0; s < samples; ++s) sum += rng.uniform() < rate ? 3 : 0;
         batches.push_back({{sum, 0, 0, 0}, samples});

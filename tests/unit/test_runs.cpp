@@ -2,6 +2,8 @@
 // honest counts when it is stopped or a sample is not finite.
 #include <gtest/gtest.h>
 
+#include <bit>
+
 #include "limn/integrators/differences.h"
 #include "limn/integrators/gradient.h"
 #include "limn/integrators/render.h"
@@ -176,11 +178,11 @@ TEST(EvenNumbers, AreUniformAndUnrelated) {
   }
 }
 
-std::vector<int> batch_ends(int spp) {
+std::vector<int> batch_ends(int spp, bool even) {
   RunSettings settings;
   settings.spp = spp;
   const Stopwatch watch;
-  Schedule schedule(settings, watch);
+  Schedule schedule(settings, watch, even);
   std::vector<int> ends;
   while (schedule.next()) {
     EXPECT_EQ(schedule.first_sample(), ends.empty() ? 0 : ends.back());
@@ -191,10 +193,14 @@ std::vector<int> batch_ends(int spp) {
 
 // Longer runs begin as shorter ones do, and lose a quarter or less of what they have; they keep
 // enough degrees of freedom for a standard error.
-TEST(Batches, GrowWithTheRun) {
-  const std::vector<int> longest = batch_ends(5000);
+class GrowingBatches : public testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(, GrowingBatches, testing::Bool());
+
+TEST_P(GrowingBatches, KeepDegreesOfFreedom) {
+  const bool even = GetParam();
+  const std::vector<int> longest = batch_ends(5000, even);
   for (const int spp : {1, 2, 8, 16, 33, 64, 100, 256, 1000, 5000}) {
-    const std::vector<int> ends = batch_ends(spp);
+    const std::vector<int> ends = batch_ends(spp, even);
     ASSERT_EQ(ends.back(), spp);
     Moments moments(1);
     for (size_t b = 0; b < ends.size(); ++b) {
@@ -203,9 +209,13 @@ TEST(Batches, GrowWithTheRun) {
         EXPECT_EQ(ends[b], longest[b]);
       }
       EXPECT_LE(ends[b] - first, std::max(1, first / 4));
+      if (even && b + 1 < ends.size()) {
+        EXPECT_TRUE(std::has_single_bit(static_cast<unsigned>(ends[b] - first)));
+      }
       moments.add_batch({0}, ends[b] - first);
     }
-    EXPECT_GE(moments.degrees(), std::min(spp - 1.0, spp < 64 ? 6.0 : 16.0)) << spp;
+    const double least = even ? (spp < 64 ? 6 : 16) : (spp < 64 ? 30 : 40);
+    EXPECT_GE(moments.degrees(), std::min(spp - 1.0, least)) << spp;
   }
 }
 
@@ -230,6 +240,18 @@ TEST(Batches, TellTheVarianceOfTheirMean) {
   // More even, the more samples: a is 108 / 24^2, b 24 / 9 / 24 of the mean's variance.
   const double a = 108.0 / 576, b = 1.0 / 9;
   EXPECT_NEAR(expected([](int n) { return 1.0 / n; }), 1 + 2 * (a - b) / (1 - a), 1e-12);
+}
+
+TEST(Batches, OfWhatIsExactDifferByNothing) {
+  Rng rng(1, 2, 3);
+  std::vector<double> values;
+  for (int i = 0; i < 300; ++i) values.push_back(rng.uniform() - 0.5);
+  Moments moments(values.size());
+  moments.add_exact(values);
+  for (size_t i = 0; i < values.size(); ++i) {
+    EXPECT_EQ(moments.mean(i), values[i]);
+    EXPECT_EQ(moments.variance(i), 0);
+  }
 }
 
 TEST(Batches, OfOneSizeHaveADegreeOfFreedomLess) {

@@ -358,7 +358,7 @@ class GradientCommand final : public Command {
   void check_memory(const Scene& scene) const {
     const double terms = static_cast<double>(find_method(options_.method).terms.size());
     const double parameters = static_cast<double>(options_.parameters.size());
-    const double numbers = parameters * (2 * (terms + 1) + terms) + 4;
+    const double numbers = parameters * (3 * (terms + 1) + terms) + 5;
     const double bytes = numbers * sizeof(double) * 3 * scene.film.crop_width *
                          static_cast<double>(scene.film.crop_height);
     const double available = available_memory();

@@ -53,8 +53,8 @@ class Rng {
         state_(key_) {}
   // The same of a pixel's samples that fill their ranges evenly together: for every purpose and
   // depth, sample n takes the n-th of the Sobol' points of a pixel, scrambled by chance (rng.cpp).
-  // Any one sample is as random as that of another stream; several are not independent. count: of
-  // the samples, for `path`; 0 if it is not asked for.
+  // Any one sample is as random as that of another stream; several are not independent. count: more
+  // than any sample, for `path`; 0 if it is not asked for.
   static Rng even(uint64_t seed, uint64_t pixel, uint32_t sample, uint32_t count = 0) {
     Rng rng(mix_bits(mix_bits(seed + kGolden) + pixel + kGolden));
     rng.sample_ = sample;
@@ -118,7 +118,7 @@ class Rng {
   uint64_t state_;
   // Of even streams alone.
   uint32_t sample_ = 0;
-  uint32_t count_ = 0;  // of the samples, or 0
+  uint32_t count_ = 0;  // more than any sample, or 0
   uint32_t place_ = 0;  // of the sample among the points of these dimensions
   int dimension_ = -1;  // the next; -1 for independent numbers
 };

@@ -100,16 +100,18 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-// How the samples are split: batches of one sample per pixel at first, then of more (4 from 16
-// samples on, 8 from 64, 16 from 128), in the end of a thirty-second of what is done, rounded down
-// to a power of two. The larger a batch, the more even its numbers may be; but an interrupt must
-// lose little, and a standard error needs many. Where time is limited, the last batch is cut to
-// what is expected to fit, judged by the two batches before.
+// How the samples are split: batches of one sample per pixel at first, then of a thirty-second of
+// what is done, so that an interrupt always loses little, and there are always enough batches for a
+// standard error. If they are even, of powers of two, and sooner of more: 4 from 16 samples on, 8
+// from 64, 16 from 128. The larger a batch, the more even its numbers are. Where time is limited,
+// the last batch is cut to what is expected to fit, judged by the two batches before.
 class Schedule {
  public:
-  // `watch` runs since the job began.
-  Schedule(const RunSettings& settings, const Stopwatch& watch)
-      : settings_(settings), watch_(watch) {}
+  // `watch` runs since the job began. even: whether batches are (Rng::even).
+  Schedule(const RunSettings& settings, const Stopwatch& watch, bool even)
+      : settings_(settings), watch_(watch), even_(even) {}
+  // Of the batch that begins with sample `first`, where it is not the last.
+  static int batch_size(int first, bool even);
   // Goes to the next batch; false if all samples are done or no other fits.
   bool next();
   int first_sample() const { return first_; }
@@ -121,6 +123,7 @@ class Schedule {
 
   const RunSettings& settings_;
   const Stopwatch& watch_;
+  bool even_;
   int first_ = 0, end_ = 0;
   bool last_ = false;
   // When the last batches began, and their samples: the latest first.
