@@ -58,7 +58,7 @@ Step find_step(const Scene& scene, const Parameter& parameter, size_t parameters
   for (int k = kTrials - 1; k >= 0; --k) {
     job.steps.push_back(parameter.natural_step * std::pow(kFactor, -k));
   }
-  const CentralDifferences r = central_differences(scene, {job}, 0, settings);
+  const CentralDifferences r = central_differences(scene, {job}, 0, settings, true);
   seconds += r.seconds;
   if (r.spp < kPilotSamples) return {parameter.natural_step, "interrupted"};
   std::vector<StepTrial> trials;
@@ -117,7 +117,7 @@ GradientResult run_differences(const MethodType& method, const Scene& scene,
   if (settings.seconds > 0) {
     rest.seconds = std::max(settings.seconds - watch.seconds(), kPilotShare * settings.seconds);
   }
-  CentralDifferences run = central_differences(scene, jobs, options.block, rest);
+  CentralDifferences run = central_differences(scene, jobs, options.block, rest, true);
   for (size_t k = 0; k < jobs.size(); ++k) {
     result.parameters.push_back(to_gradient(jobs[k].parameter, run.estimates[k][0]));
   }

@@ -48,8 +48,9 @@ void DifferenceEstimate::add_batch(const std::vector<double>& sums, const Film& 
 }
 
 CentralDifferences central_differences(const Scene& scene, const std::vector<DifferenceJob>& jobs,
-                                       int block, const RunSettings& settings) {
+                                       int block, const RunSettings& settings, bool even) {
   const Stopwatch watch;
+  const Numbers numbers = even ? Numbers::kEvenInBatches : Numbers::kIndependent;
   const RadianceEstimator::Choices choices(scene);
   std::deque<Scene> moved;  // keeps its elements where they are
   std::vector<std::unique_ptr<SampleEstimator>> estimators;
@@ -59,8 +60,8 @@ CentralDifferences central_differences(const Scene& scene, const std::vector<Dif
     for (const double step : job.steps) {
       for (const double h : {step, -step}) {
         moved.push_back(parameter.moved(scene, h));
-        estimators.push_back(std::make_unique<RadianceEstimator>(
-            moved.back(), choices, settings.threads, Numbers::kEvenInBatches));
+        estimators.push_back(
+            std::make_unique<RadianceEstimator>(moved.back(), choices, settings.threads, numbers));
       }
     }
     result.estimates.emplace_back(job.combinations.size(), DifferenceEstimate(scene.film, block));

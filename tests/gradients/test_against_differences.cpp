@@ -123,7 +123,7 @@ TEST_P(CoarseBall, DisagreesWhereShadingJumps) {
   const TempFiles files;
   Scene scene = make(files);
   scene.shading = ShadingModel::kMitsuba;
-  const CheckResult r = run_check(scene, "ball.scale", 1024);
+  const CheckResult r = run_check(scene, "ball.scale", 512);
   EXPECT_EQ(r.verdict, Verdict::kDisagree);
   EXPECT_GT(std::max(std::fabs(r.total.z), r.windows.largest), 6);
   ASSERT_EQ(r.gradient.warnings.size(), 1u);

@@ -306,8 +306,8 @@ TEST_F(Program, RepeatsOneSample) {
 // the last batch is cut.
 TEST_F(Program, RepeatsEverySampleOfAPixel) {
   constexpr int kSamples = 11;
-  const std::string gradient = "gradient " + scene_ + " --wrt blaze.radiance --samples 3" +
-                               " --terms interior -o " + out();
+  const std::string gradient =
+      "gradient " + scene_ + " --wrt blaze.radiance --samples 3" + " --terms interior -o " + out();
   EXPECT_EQ(run(gradient + " --spp " + std::to_string(kSamples)).status, 0);
   const Image image = read_exr(out());
   size_t brightest = 0;

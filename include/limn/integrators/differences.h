@@ -33,9 +33,10 @@ struct CentralDifferences {
   double setup_seconds = 0;  // moved scenes and their ray tracers
   NonFinite non_finite;
 };
-// All jobs and steps share their random numbers.
+// All jobs and steps share their random numbers. even: these are even in each batch (Rng::even),
+// for less error, mostly. What `check` tells of steps and of rare events is of independent ones.
 CentralDifferences central_differences(const Scene& scene, const std::vector<DifferenceJob>& jobs,
-                                       int block, const RunSettings& settings);
+                                       int block, const RunSettings& settings, bool even = false);
 
 // Central differences for the steps h and 2h, and their Richardson combination
 // (4 D_h - D_2h) / 3, whose bias is of order h^4. All from the same samples; standard errors from
