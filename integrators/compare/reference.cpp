@@ -135,6 +135,8 @@ void read_header(const Attributes& attributes, const Film& film, Reference& r) {
   r.blocks.variances = split_numbers(attributes.at("limn.block_variances"));
   r.edges = split_numbers(attributes.at("limn.block_edges"));
   r.blocks.degrees = std::stod(attributes.at("limn.block_degrees"));
+  const auto event = attributes.find("limn.block_event");  // older files have none
+  if (event != attributes.end()) r.blocks.event = std::stod(event->second);
 }
 
 Reference read_matching(const std::string& file, const Attributes& attributes, const Film& film) {
@@ -225,6 +227,7 @@ void write_reference(const std::string& file, const Reference& reference, const 
       {"limn.asked_seconds", fmt::format("{}", reference.asked_seconds)},
       {"limn.block", std::to_string(block)},
       {"limn.block_degrees", fmt::format("{}", reference.blocks.degrees)},
+      {"limn.block_event", fmt::format("{}", reference.blocks.event)},
       {"limn.block_variances", join_numbers(reference.blocks.variances)},
       {"limn.block_edges", join_numbers(reference.edges)}};
   for (const auto& [name, value] : identity) attributes.push_back({name, value});

@@ -116,6 +116,17 @@ TEST(Bias, OfOneBlockInNumbers) {
   EXPECT_NEAR(bias_scores({repeat, repeat}, reference, {10.0})[0], 3 / std::sqrt(3.75), 1e-4);
 }
 
+// A reference that has seen nothing of a block may have missed the few events that rule it.
+TEST(Bias, WhereTheReferenceSawNothingItsEventsCount) {
+  const BlockSums repeat{{0.002, 4}, {1e-8, 2}, 1e6, 0};
+  BlockSums reference{{0, 1}, {0, 0.25}, 1e6, 0};
+  const auto scores = [&] { return bias_scores({repeat, repeat}, reference, {0, 0}); };
+  EXPECT_GT(scores()[0], 20);
+  reference.event = 0.5;
+  EXPECT_NEAR(scores()[0], 0.002 / std::sqrt(0.5e-8 + 0.001), 1e-6);
+  EXPECT_NEAR(scores()[1], 3 / std::sqrt(1.25), 1e-4);
+}
+
 TEST(Bias, OfOneRunWithoutVarianceIsUnknown) {
   EXPECT_EQ(Blocks(1, 0, false).summary().count, 0);
   EXPECT_EQ(Blocks(1, 0, true).summary().count, static_cast<int>(kBlocks));

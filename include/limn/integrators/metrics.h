@@ -45,7 +45,8 @@ struct BlockSums {
 // repeats that agree by chance must not pass for precise (as they would with the degrees of Welch
 // and Satterthwaite). Blocks without any variance that are equal are left out. Empty if no variance
 // is known: one repeat without variances of its own.
-// edges: magnitude of what edges add to each block of the reference, for the variance of events.
+// edges: magnitude of what edges add to each block of the reference, for the variance of events; a
+// reference without variance in a block has that of events that add the mean over the repeats.
 std::vector<double> bias_scores(const std::vector<BlockSums>& repeats, const BlockSums& reference,
                                 const std::vector<double>& edges);
 
