@@ -216,7 +216,7 @@ double share_that_moves(const GradientResult& result) {
 // Of four samples or eight, alike; longer where the camera moves.
 TEST(FilmMotion, IsLookedForWhereThereIsTime) {
   for (const int spp : {4, 8}) {
-    const double limit = 2.8, each = limit / 56 / 1.01;  // a 14th for four samples
+    const double limit = 2.8, each = limit / 112 / 1.01;  // a 28th for four samples
     EXPECT_TRUE(is_time_for_film({spp, spp * each, limit}, false)) << spp;
     EXPECT_FALSE(is_time_for_film({spp, spp * each * 1.03, limit}, false)) << spp;
   }
