@@ -49,8 +49,9 @@ class Pages(unittest.TestCase):
 
     def test_pictures_are_small_and_shown(self):
         folder = os.path.join(ROOT, "scenes", "pictures")
-        shown = set(re.findall(r"scenes/pictures/([\w.]+)", read("README.md")))
-        shown |= set(re.findall(r"\.\./pictures/([\w.]+)", read("scenes/fits/README.md")))
+        shown = set()
+        for _, text in pages():
+            shown |= set(re.findall(r"!\[[^]]*\]\([^)]*pictures/([\w.]+)\)", text))
         self.assertEqual(shown, set(os.listdir(folder)))
         total = sum(os.path.getsize(os.path.join(folder, n)) for n in shown)
         self.assertLessEqual(total, MOST_PICTURE_BYTES)

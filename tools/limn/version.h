@@ -4,7 +4,7 @@
 
 namespace limn {
 
-// "limn 0.2.0 (commit 0123456789ab, Release)"; the commit is "unknown" outside a git checkout.
+// "limn 0.3.0 (commit 0123456789ab, Release)"; the commit is "unknown" outside a git checkout.
 std::string version_text();
 
 }  // namespace limn
