@@ -184,7 +184,7 @@ TEST(Fit, QuasiNewtonStopsAtBounds) {
     Descent descent;
     for (int i = 0, made = 0; i < 8; ++i) {
       const auto record = fit.step();
-      if (i > 0) EXPECT_LE(record->loss, descent.losses.back());
+      EXPECT_LE(record->loss, i > 0 ? descent.losses.back() : INFINITY);
       descent.losses.push_back(record->loss);
       descent.evaluations.push_back(made += record->evaluations);
       if (record->at_rest) break;
