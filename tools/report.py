@@ -13,23 +13,11 @@ import argparse
 import os
 import sys
 
-SYSTEM_PYTHON = (  # Where Debian's matplotlib is, when another python3 comes first.
-    "/usr/bin/python3"
-)
-
-
-def use_a_python_with_matplotlib():
-    """Starts anew under the system's Python where this one has no matplotlib."""
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError:
-        if os.environ.get("LIMN_REPORT_PYTHON") is None and os.access(SYSTEM_PYTHON, os.X_OK):
-            os.environ["LIMN_REPORT_PYTHON"] = SYSTEM_PYTHON
-            os.execv(SYSTEM_PYTHON, [SYSTEM_PYTHON, os.path.abspath(__file__), *sys.argv[1:]])
+from report.python import use_one_with_matplotlib
 
 
 def write(file, text):
-    from report.errors import ReportError
+    from report.records import ReportError
 
     try:
         with open(file, "w", encoding="utf-8") as stream:
@@ -40,53 +28,37 @@ def write(file, text):
 
 def run(arguments):
     from report import charts
-    from report.errors import ReportError
     from report.page import page
-    from report.records import read_folder
+    from report.records import ReportError, read_folder
 
+    folders, status = arguments.folders, 2
+    alone = os.path.join(folders[0], "report.html")
+    file = arguments.output or (alone if len(folders) == 1 else "report.html")
     try:
-        results = [result for folder in arguments.folders for result in read_folder(folder)]
-    except ReportError as error:
-        return fail(error, 2)
-    try:
+        results = [result for folder in folders for result in read_folder(folder)]
+        status = 3
         charts.require_matplotlib()
-    except ReportError as error:
-        return fail(error, 3)
-    one = len(arguments.folders) == 1
-    file = arguments.output or (
-        os.path.join(arguments.folders[0], "report.html") if one else "report.html"
-    )
-    try:
+        status = 2
         text, missing = page(results)
         write(file, text)
     except ReportError as error:
-        return fail(error, 2)
+        print(f"tools/report.py: {error}", file=sys.stderr)
+        return status
     for name in missing:
         print(f"tools/report.py: warning: picture missing: {name}", file=sys.stderr)
     print(f"{file}: {len(results)} {'section' if len(results) == 1 else 'sections'}")
     return 0
 
 
-def fail(error, status):
-    print(f"tools/report.py: {error}", file=sys.stderr)
-    return status
-
-
 def main():
     parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument(
-        "folders", nargs="+", metavar="FOLDER", help="where compare.json, reject.json or fit.json lies"
-    )
-    parser.add_argument(
-        "-o",
-        "--output",
-        metavar="FILE",
-        help="the page (default: FOLDER/report.html, or report.html for several folders)",
-    )
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folders", nargs="+", metavar="FOLDER",
+                        help="where compare.json, reject.json or fit.json lies")
+    parser.add_argument("-o", "--output", metavar="FILE", help="the page (default: "
+                        "FOLDER/report.html, or report.html for several folders)")
     arguments = parser.parse_args()
-    use_a_python_with_matplotlib()
+    use_one_with_matplotlib()
     return run(arguments)
 
 

@@ -128,22 +128,22 @@ class TestPaper(unittest.TestCase):
         self.paper("--figures", "--mesh", mesh, "--only", only)
         self.assertEqual(len(self.calls()), 4)
 
-    def levers(self, *arguments):
-        command = [word for word in self.command("--levers", *arguments) if word != "--no-report"]
+    def ablations(self, *arguments):
+        command = [word for word in self.command("--ablations", *arguments) if word != "--no-report"]
         return subprocess.run(command, capture_output=True, text=True)
 
-    def test_levers(self):
+    def test_ablations(self):
         """Method: squared error, its standard error, that without the worst pixels, p of the bias; 2 s each."""
         self.write("errors", json.dumps({"forest": [4, 0, 4, 0.5], "adaptive": [1, 0.1, 0.6, 0.25],
                                          "fd": [1.1, 0.11, 1.2, 1e-6], "mitsuba-after-setup": [20, 1, 12, 0.5]}))
-        done = self.levers("--only", "levers-shadow,levers-sun", "--mitsuba")
+        done = self.ablations("--only", "ablations-shadow,ablations-sun", "--mitsuba")
         self.assertEqual((done.returncode, done.stderr), (0, ""))
         shadow, sun = self.calls()
         self.assertEqual(self.value(shadow, "--methods"),
                          "forest,silhouettes,moving-directions,held-positions,independent-numbers,adaptive,fd,mitsuba-after-setup")
         self.assertEqual(self.value(sun, "--methods"), "forest,silhouettes,moving-directions,held-positions,independent-numbers,adaptive,fd")
         self.assertAlmostEqual(float(self.value(sun, "--time")), 2.6, delta=0.1)
-        with open(self.path("out", "levers.md")) as stream:
+        with open(self.path("out", "ablations.md")) as stream:
             text = stream.read()
         self.assertIn(text, done.stdout)
         cells = "0.5 | 0.25 ± 0 (0.25) | 0.25 ± 0 (0.25) | 0.25 ± 0 (0.25) | 0.25 ± 0 (0.25) | 0.25 ± 0.025 (0.15) | 0.28 ± 0.028 (0.3) |"
@@ -156,14 +156,14 @@ class TestPaper(unittest.TestCase):
         self.assertIn("Marked are finite differences in soft shadow, finite differences in strong sun.", text)
         # 1 - 0.999 * 0.6 and 1 - 0.999: trimmed means are over the other pixels.
         self.assertIn("`adaptive` 0.4 (soft shadow) to 0.4 (strong sun); `forest` 0.001", text)
-        again = self.levers("--only", "levers-shadow,levers-sun", "--mitsuba")
-        self.assertIn("levers-sun: finished before", again.stdout)
+        again = self.ablations("--only", "ablations-shadow,ablations-sun", "--mitsuba")
+        self.assertIn("ablations-sun: finished before", again.stdout)
         self.assertIn(text, again.stdout)
         self.assertEqual(len(self.calls()), 2)
 
-    def test_levers_in_the_order_that_a_default_has_them(self):
+    def test_ablations_in_the_order_that_a_default_has_them(self):
         self.paper("--only", "shadow")
-        self.paper("--levers", "--only", "levers-shadow")
+        self.paper("--ablations", "--only", "ablations-shadow")
         swept, table = self.calls()
         shown = self.value(swept, "--methods").split(",")
         self.assertEqual([m for m in shown if m in self.value(table, "--methods").split(",")],
@@ -173,9 +173,9 @@ class TestPaper(unittest.TestCase):
     @unittest.skipUnless(LIMN, "needs limn")
     def test_the_methods_have_their_names_of_today(self):
         sys.path.insert(0, os.path.join(ROOT, "tools"))
-        from paper_figures import figures, levers
+        from paper_figures import ablations, figures
         names = {m for figure in figures.FIGURES for part in figure.runs if part.kind == "compare" for m in part.methods}
-        names.update(m for part in levers.parts(True) for m in part.methods)
+        names.update(m for part in ablations.parts(True) for m in part.methods)
         self.paper()
         for call in self.calls():
             if call[0] == "compare":
@@ -244,8 +244,8 @@ class TestPaper(unittest.TestCase):
                                    (["--minutes", "-1"], "not a positive number: -1"),
                                    (["--mesh", "x.obj"], "--mesh: is for --figures"),
                                    (["--figures", "--mesh", "/no/such"], "--mesh: /no/such: no such file"),
-                                   (["--levers", "--figures"], "not allowed with argument"),
-                                   (["--levers", "--only", "cad"], "--only: no part is called \"cad\""),
+                                   (["--ablations", "--figures"], "not allowed with argument"),
+                                   (["--ablations", "--only", "cad"], "--only: no part is called \"cad\""),
                                    (["--figures", "--only", "cad"], "--only: no part is called \"cad\""),
                                    (["--limn", "/no/such"], "/no/such: no such program")):
             done = self.paper(*arguments)

@@ -1,6 +1,7 @@
 """tools/report.py on sample folders: what the page says, and what is said of faulty input."""
 
 import json
+import math
 import os
 import re
 import subprocess
@@ -19,7 +20,7 @@ sys.path.insert(0, TOOLS)
 from paper_figures import meshes  # noqa: E402
 from paper_figures import page as figure_page  # noqa: E402
 from paper_figures.figures import Figure  # noqa: E402
-from paper_figures.part import Part  # noqa: E402
+from paper_figures.parts import Part  # noqa: E402
 from report.markup import count, element, figures, percent, with_error  # noqa: E402
 from report.overview import relative_times  # noqa: E402
 from report.records import read_folder  # noqa: E402
@@ -105,7 +106,7 @@ class TestReport(unittest.TestCase):
     def test_only_the_biased_method_is_marked(self):
         times = section(self.page, "Time for equal error")
         self.assertEqual(times.count("⚠ biased</span>"), 1)
-        row = section(self.page, "At the longest time")
+        row = section(self.page, "At the longest time budget")
         marked = re.findall(
             r"<tr><th[^>]*><span.*?</span>([^<]*)</span>(?:(?!</tr>).)*implausible", row, re.S
         )
@@ -313,16 +314,23 @@ class TestFigures(unittest.TestCase):
         self.assertIn("limn compare scenes/mirror.xml", page)
         self.assertIn("limn reject meshes/bunny.ply", page)
         self.assertNotIn("Picture missing", page)
-        # Scene, reference and two of each method that ran; overview and three of each variant.
-        self.assertEqual(page.count("data:image/png;base64,"), 2 + 2 * 5 + 1 + 3 * 3)
+        # Scene, reference and two of each method that ran, and the reference behind them; overview
+        # and three of each variant.
+        self.assertEqual(page.count("data:image/png;base64,"), 3 + 2 * 5 + 1 + 3 * 3)
         self.assertIn("Mitsuba is not installed", page)
         self.assertEqual(page.count('class="bad"'), 1)  # the method that is made biased
         self.assertIn("<td>800</td><td>5.00</td><td>70 %</td><td>0.250</td><td>0.0500</td><td>70.0</td>", page)
         self.assertIn("<td>8</td><td>3.00</td><td>50 ± 5 %</td><td>10.0</td>", page)
         self.assertIn("<td>32</td><td>2.20</td><td>10 ± 5 %</td><td>2.00</td>", page)
-        # From 1 % to 100 % in 240 units: 10 % is in the middle, 50 % 120 log10(5) above it.
-        heights = re.findall(r'<circle cx="[\d.]+" cy="([\d.]+)"', page)
-        self.assertEqual([float(h) for h in heights], [52.1, 136.0])
+        (chart,) = re.findall(r'<svg role="img" aria-label="Bias over rays.*?</svg>', page, re.S)
+        self.assertEqual(re.findall(r"<text[^>]*>(\d+)</text>", chart)[:2], ["8", "32"])
+        places = {}
+        for mark, y in re.findall(r'<use href="#([^"]*)" [^>]*y="([\d.]+)" style="fill: currentColor; stroke: c', chart):
+            places.setdefault(mark, []).append(float(y))
+        marks, ends = sorted(places.values(), key=len)
+        # 50 % and 10 %; their bars are from 40 % to 60 % and from 0.5 % to 20 %.
+        self.assertEqual((len(marks), len(ends)), (2, 4))
+        self.assertAlmostEqual((marks[1] - marks[0]) / (max(ends) - min(ends)), math.log(5) / math.log(120), places=3)
         self.assertIn("rays a draw, 9 k edges: quadric 5.00", page)
         self.assertIn("cube.obj</th><td>12</td><td>9</td><td>75 %", page)
 

@@ -4,10 +4,9 @@ import copy
 import os
 from dataclasses import dataclass
 
-from .part import Part
-
-PAPER = "quadric"  # the paper's sampler, one sample of each term unless the pilot says otherwise
-DEFAULT = "adaptive"
+from .parts import (ASIDE, BUNNY, DEFAULT, DIFFERENCES, FOREST, FOREST_CONCAVE, FOREST_NO_LIGHTS,
+                    LI2019, LI2019_SOLID, MITSUBA, PAPER, PAPER_BOX, PAPER_CONCAVE, PAPER_NO_LIGHTS,
+                    UP, WARPED, WARPED_UNBIASED, Part)
 
 
 @dataclass
@@ -22,35 +21,24 @@ class Figure:
     table: str = "time"  # of comparisons: "time" (equal error) or "samples" (equal samples)
 
 
-BUNNY = "/usr/share/glmark2/models/bunny.obj"  # glmark2-data
-UP, ASIDE = "object.translate.y", "object.translate.x"
-DRAWS = ["quadric", "quadric-box", "forest", "li2019"]
-BOXES = ["quadric", "quadric-box", "li2019", "li2019-solid", "forest"]
+DRAWS = [PAPER, PAPER_BOX, FOREST, LI2019]
+BOXES = [PAPER, PAPER_BOX, LI2019, LI2019_SOLID, FOREST]
+AGAINST_LI = [PAPER, LI2019, FOREST, DEFAULT]
 
 
-def mirror(name, alpha, methods, mesh="", options=(), **more):
-    return Part(
-        name,
-        "compare",
-        "scenes/rough_mirror.xml",
-        UP,
-        methods,
-        {"alpha": str(alpha)},
-        options=list(options),
-        small_mesh=mesh,
-        **more,
-    )
+def mirror(name, alpha, methods, mesh="", options=(), given=None):
+    """given: defines of a mesh that there is; mesh: of one to make."""
+    return Part(name, "compare", "scenes/rough_mirror.xml", UP, methods,
+                {"alpha": str(alpha), **(given or {})}, options=list(options), small_mesh=mesh)
 
 
 def patch(name, mesh):
     """A patch of some hundred edges of a smooth mesh, and two slices of space beside it."""
-    return Part(
-        name, "reject", "", methods=BOXES, options=["--node-edges", "128"], small_mesh=mesh
-    )
+    return Part(name, "reject", "", methods=BOXES, options=["--node-edges", "128"], small_mesh=mesh)
 
 
 def bias(method, rays):
-    options = ["--method", method] + (["--aux", str(rays)] if method != "forest" else [])
+    options = ["--method", method] + (["--aux", str(rays)] if method != FOREST else [])
     return Part(f"fig10-bias-{method}-{rays}", "gradient", "scenes/closed_form/lamp_over_plane.xml",
                 "lamp.translate.x", options=options)
 
@@ -63,7 +51,7 @@ FIGURES = [
         "planes rejects, where box and quadrics do, Li 2019, and Li 2019 with the mistake of redner "
         "(a solid sphere in place of a hollow one). Quadrics gain most on the torus. For one shading "
         "point, the edges with a probability: far fewer than with Li 2019.",
-        "Orange is accepted in vain. A node of the paper's forest and the nearest one of each other "
+        "Orange: false positives. A node of the paper's forest and the nearest one of each other "
         "tree; the edge pictures are of one point of the whole mesh.",
         [patch("fig7-sphere", "sphere 8192"), patch("fig7-torus", "torus 8192"),
          Part("fig8-creature", "reject", "", methods=BOXES, small_mesh="creature 8000")],
@@ -75,7 +63,7 @@ FIGURES = [
         "translation, with 128 samples per pixel: those of Li 2019 drown in noise, the paper's are "
         "close to finite differences.",
         "Time that a method needs for the error of the first.",
-        [mirror(f"fig9-{name}", 0.01, [PAPER, "li2019", "forest", DEFAULT], f"{name} {faces}")
+        [mirror(f"fig9-{name}", 0.01, AGAINST_LI, f"{name} {faces}")
          for name, faces in (("creature", 8000), ("pretzel", 8000), ("knot", 8000),
                              ("tetrapod", 8000))],
     ),
@@ -88,11 +76,11 @@ FIGURES = [
         "roulette that takes the bias out. At the end the bias over rays, where the derivative is "
         "known.",
         [mirror(f"fig10-{rays}-rays-alpha-{alpha}", alpha,
-                [PAPER, "forest", DEFAULT, "was", "was-unbiased"],
+                [PAPER, FOREST, DEFAULT, WARPED, WARPED_UNBIASED],
                 options=["--aux", str(rays), "--kappa", "1e5"])
          for alpha in ("0.01", "0.05") for rays in (8, 32)]
-        + [bias("forest", "reference"), *(bias("was", rays) for rays in (2, 8, 32, 128)),
-           bias("was-unbiased", 8)],
+        + [bias(FOREST, "reference"), *(bias(WARPED, rays) for rays in (2, 8, 32, 128)),
+           bias(WARPED_UNBIASED, 8)],
     ),
     Figure(
         "Figure 11 and Table 1",
@@ -102,7 +90,7 @@ FIGURES = [
         "its runs 142 to 153 s, projective sampling 10 to 17 s and 18 to 32 s (16 threads).",
         "Equal time here, set-up included, which is reading, trees and a pilot. Trees alone are timed "
         "in the next section.",
-        [mirror("fig11", 0.01, [PAPER, DEFAULT, "mitsuba"], "creature 8000")],
+        [mirror("fig11", 0.01, [PAPER, DEFAULT, MITSUBA], "creature 8000")],
     ),
     Figure(
         "The paper's code",
@@ -123,7 +111,7 @@ FIGURES = [
         "term lowers the squared error 50 times for a harp and 20 times for an elephant.",
         "After equal samples, as in the paper, and after equal time.",
         [Part(f"fig12-{name}", "compare", "scenes/soft_shadow.xml", ASIDE,
-              [PAPER, "quadric-no-lights", "forest", "forest-no-lights", DEFAULT],
+              [PAPER, PAPER_NO_LIGHTS, FOREST, FOREST_NO_LIGHTS, DEFAULT],
               small_mesh=f"{name} {faces}")
          for name, faces in (("creature", 8000), ("harp", 30000))],
         table="samples",
@@ -135,7 +123,7 @@ FIGURES = [
         "less error without, by how much depends on the mesh.",
         "After equal samples, and after equal time.",
         [Part("fig13", "compare", "scenes/concave.xml", UP,
-              [PAPER, "quadric-concave", "forest", "forest-concave", DEFAULT])],
+              [PAPER, PAPER_CONCAVE, FOREST, FOREST_CONCAVE, DEFAULT])],
         table="samples",
     ),
     Figure(
@@ -144,9 +132,9 @@ FIGURES = [
         "An intricate object in a mirror: after as many samples the noise is larger by orders of "
         "magnitude. The paper calls it a failure.",
         "Here warped-area sampling has less error than plain edge sampling; finite differences less "
-        "than both; directions that move along (adaptive) less than plain edge sampling.",
+        "than both; reparameterised directions (adaptive) less than plain edge sampling.",
         [Part("fig15", "compare", "scenes/intricate.xml", UP,
-              [PAPER, "forest", DEFAULT, "was", "was-unbiased", "fd"], longer=3,
+              [PAPER, FOREST, DEFAULT, WARPED, WARPED_UNBIASED, DIFFERENCES], longer=3,
               options=["--aux", "32", "--kappa", "1e4"])],
     ),
     Figure(
@@ -171,9 +159,7 @@ def with_meshes(files):
         given = {"mesh": os.path.abspath(file), "format": os.path.splitext(file)[1][1:].lower()}
         for figure in figures:
             if figure.numbers == "Figures 1 and 9":
-                part = mirror(f"fig9-given-{name}", 0.01, [PAPER, "li2019", "forest", DEFAULT])
-                part.defines.update(given)
-                figure.runs.append(part)
+                figure.runs.append(mirror(f"fig9-given-{name}", 0.01, AGAINST_LI, given=given))
             if figure.numbers == "Table 2":
                 figure.runs.append(Part(f"table2-given-{name}", "edges", os.path.abspath(file)))
     return figures

@@ -5,52 +5,31 @@ import math
 import os
 import shlex
 
-from report.errors import ReportError
-from report.markup import (
-    Markup,
-    count,
-    document,
-    element,
-    figures,
-    join,
-    percent,
-    table,
-    times,
-    with_error,
-)
-from report.pictures import Pictures, figure
-from report.records import read_folder, read_record
+import numpy as np
+from report import charts
+from report.colours import Palette
+from report.comparison import (BIAS, EQUAL_ERROR, ERRORS, SECONDS, ComparisonSection, finished,
+                               longest, time_ratios)
+from report.markup import (Markup, command, count, document, element, figures, hint, join, notice,
+                           percent, table, times)
+from report.page import bias_threshold, palette_of
+from report.pictures import Pictures
+from report.records import ReportError, read_folder, read_record
+from report.rejection import RejectionSection
+from report.section import stem
 
-from . import bias_chart
-from .figures import DEFAULT, PAPER
+from .parts import DEFAULT, FOREST, MITSUBA, PAPER, WARPED
 
-# A page of unbiased methods marks one of them in one of a hundred pages.
-FALSE_ALARM = 0.01
-STYLE = """
+ROLES = {PAPER: "the paper's forest", DEFAULT: "limn's default", MITSUBA: "Zhang et al. 2023"}
+STYLE = Markup("""
 .paper { border-left: 4px solid var(--line); padding-left: 14px; max-width: 88ch; }
 .role { display: block; font-size: 12.5px; color: var(--soft); font-weight: 400; }
-.wins { background: var(--best); }
-td.verdict { white-space: normal; max-width: 52ch; }
+h4 .role { min-height: 1.5em; }
 .surface { max-width: 460px; }
 .surface .picture, .surface .picture img { image-rendering: auto; }
-"""
-
-
-def _style():
-    file = os.path.join(os.path.dirname(os.path.dirname(__file__)), "report", "style.css")
-    with open(file, encoding="utf-8") as stream:
-        rules = stream.read()
-    return Markup(rules.replace("/*light*/", "").replace("/*dark*/", "") + STYLE)
-
-
-def _role(name):
-    roles = {PAPER: "the paper's forest", DEFAULT: "limn's default", "mitsuba": "Zhang et al. 2023"}
-    return roles.get(name, "")
-
-
-def _head(name):
-    """Of a card; all are of one height."""
-    return element("h4", name, element("span", _role(name) or "\u00a0", class_="role"))
+""")
+GRID = 81  # points along each side of a surface
+MOST_WEDGES = 600  # More are a blot.
 
 
 def _words(text):
@@ -59,365 +38,258 @@ def _words(text):
     return join(*(element("code", t) if i % 2 else t for i, t in enumerate(pieces)))
 
 
-def _command(text):
-    return element("pre", element("code", text), class_="command")
+# Each of the following: markup and what it says in the summary, of one part of a figure.
 
 
-def _last(method):
-    rungs = method.records("summary") if method.text("status") != "missing" else []
-    return rungs[-1] if rungs else None
+def _comparison(result, part, kind, group, palette, threshold):
+    """kind: Figure.table."""
+    section = ComparisonSection(result, group, palette, threshold, ROLES)
+    ratios, best = time_ratios(result.data), _best(time_ratios(result.data))
+    base = next((longest(m) for m in section.methods if m.text("name") == PAPER and finished(m)),
+                None)
 
+    def time(_, method, summary):
+        return element("td", EQUAL_ERROR["time for equal error"](section, method, summary),
+                       class_="best" if method.text("name") in best else None)
 
-class _Comparison:
-    """One compare.json. level: a bias is marked where its p is below."""
-
-    def __init__(self, result, part, kind, level):
-        self.data, self.part, self.kind, self.level = result.data, part, kind, level
-        self.pictures = Pictures(result.folder)
-        self.methods = self.data.records("methods")
-        self.rungs = {m.text("name"): _last(m) for m in self.methods}
-
-    def _time(self, name):
-        method = next(m for m in self.methods if m.text("name") == name)
-        return method.number("time_ratio"), method.number("time_ratio_stderr")
-
-    def _per_sample(self, name):
-        """Squared error after equal samples, the paper's method being 1."""
-        rung, base = self.rungs[name], self.rungs.get(PAPER)
-        if not rung or not base or not base.number("mse"):
-            return None
-        share = rung.number("mse") * rung.number("spp") / (base.number("mse") * base.number("spp"))
-        return share
-
-    def factor(self):
-        """Time that the paper's method needs for the error of limn's default."""
-        mine, paper = (self._time(n)[0] if self.rungs.get(n) else None for n in (DEFAULT, PAPER))
-        return paper / mine if mine and paper else None
-
-    def best(self):
-        """The methods with the least time for equal error, but for two standard errors of the
-        logarithm of their quotient. The best comes first.
-        """
-        times_of = {n: self._time(n) for n, rung in self.rungs.items() if rung and self._time(n)[0]}
-        ranking = sorted(times_of, key=lambda n: times_of[n][0])
-        if not ranking:
-            return []
-        spread = {n: (error or 0) / ratio for n, (ratio, error) in times_of.items()}
-
-        def is_equal(name):
-            quotient = times_of[name][0] / times_of[ranking[0]][0]
-            return math.log(quotient) <= 2 * math.hypot(spread[name], spread[ranking[0]])
-
-        return [n for n in ranking if is_equal(n)]
-
-    def is_short(self):
-        """Whether some method spent most of its time on its set-up."""
-        return any(r.number("setup_seconds") > 0.5 * r.number("seconds")
-                   for r in self.rungs.values() if r)
-
-    def html(self):
-        shown = [
-            figure(self.pictures.picture("image.png", "the scene"), "the scene"),
-            figure(self.pictures.picture("reference.png", "reference"), "derivative, reference"),
-        ]
-        cards = [element("div", _head("scene"), *shown, class_="card")]
-        cards += [self._card(m) for m in self.methods if self.rungs[m.text("name")]]
-        return join(
-            element("h3", self._title()),
-            element("div", element("div", *cards, class_="cards"), class_="gallery"),
-            self._short() if self.is_short() else None,
-            self._table(),
-            _command(self.data.text("command")),
-        )
-
-    def _short(self):
-        words = "Most of the time went into set-up, which decides here: more --minutes tell more."
-        return element("p", words, class_="notice")
-
-    def _title(self):
-        defines = {
-            k: v for k, v in self.data.record("defines").items() if k not in ("width", "height")
-        }
-        words = [os.path.splitext(os.path.basename(self.data.text("scene")))[0]]
-        words += [f"{k} {os.path.splitext(os.path.basename(str(v)))[0] if k == 'mesh' else v}"
-                  for k, v in defines.items() if k != "format"]
-        options = self.part.options
-        words += [f"{options[i][2:]} {options[i + 1]}" for i in range(0, len(options), 2)]
-        return ", ".join(words)
-
-    def _card(self, method):
-        name = method.text("name")
-        rung = self.rungs[name]
-        return element(
-            "div",
-            _head(name),
-            figure(
-                self.pictures.picture(method.text("picture"), f"derivative by {name}"),
-                f"{figures(rung.number('seconds'))} s, {count(rung.number('spp'))} samples a pixel",
-            ),
-            figure(
-                self.pictures.picture(method.text("error_picture"), f"error of {name}"),
-                f"error, mse {figures(rung.number('mse'))}",
-            ),
-            class_="card",
-        )
-
-    def _table(self):
-        samples = self.kind == "samples"
-        head = ["method", "squared error"] + (["after equal samples"] if samples else [])
-        head += ["time for equal error", "set-up, s", "all, s", "bias"]
-        best = self.best()
-        rows = []
-        for method in self.methods:
-            name = method.text("name")
-            rung = self.rungs[name]
-            if not rung:
-                why = f"{method.text('status')}: {method.text('message', '') or 'no run finished'}"
-                rows.append([name, element("td", why, colspan=len(head) - 1)])
-                continue
-            row = [
-                join(name, element("span", _role(name), class_="role")),
-                with_error(rung.number("mse"), rung.number("mse_stderr")),
-            ]
-            if samples:
-                row.append(times(self._per_sample(name)))
-            ratio, error = self._time(name)
-            wins = "wins" if name in best else None
-            row.append(element("td", times(ratio, error), class_=wins))
-            row += [figures(rung.number("setup_seconds")), figures(rung.number("seconds"))]
-            row.append(self._bias(rung))
-            rows.append(row)
-        return table(head, rows, f"Methods, {self._title()}")
-
-    def _bias(self, rung):
-        bias = rung.record_or_none("bias")
-        if bias is None or bias.number("p") is None:
+    def per_sample(_, method, summary):
+        if base is None or not base.number("mse"):
             return "–"
-        text = f"p {figures(bias.number('p'), 2)}"
-        return element("td", "⚠ ", text, class_="bad") if bias.number("p") < self.level else text
+        return times(summary.number("mse") * summary.number("spp")
+                     / (base.number("mse") * base.number("spp")))
+
+    columns = {"mean squared error": ERRORS["mean squared error"],
+               **({"after equal samples": per_sample} if kind == "samples" else {}),
+               "time for equal error": time, **SECONDS, **BIAS}
+    short = any(longest(m).number("setup_seconds") > 0.5 * longest(m).number("seconds")
+                for m in section.methods if finished(m))
+    options = [f"{part.options[i][2:]} {part.options[i + 1]}" for i in range(0, len(part.options), 2)]
+    html = join(
+        element("h3", ", ".join([section.title, *options])), section.pictures_of_methods(),
+        notice("", "Most of the time went into set-up, which decides here: more --minutes tell"
+               " more.") if short else None,
+        section.method_table(columns, "Methods"), section.command())
+    factor = (ratios[PAPER][0] / ratios[DEFAULT][0] if PAPER in ratios and DEFAULT in ratios
+              else None)
+    return html, " or ".join(best) or "–", factor, section.style
 
 
-class _Rejection:
-    def __init__(self, result):
-        self.data, self.pictures = result.data, Pictures(result.folder)
-
-    def _chart(self):
-        """The bounding quadrics, where there are any and a Python drew them."""
-        chart = self.data.record_or_none("chart") if "chart" in self.data.values else None
-        if not chart:
-            return []
-        if self.pictures.uri("chart.png") is None:
-            return [element("p", "The surface plot of the quadrics needs matplotlib.", class_="hint")]
-        words = (
-            "the quadrics (blue, orange) that bound the planes of the node's edges (black"
-            f" segments), in the coordinates of the dual box; {chart.text('method')}"
-        )
-        picture = self.pictures.picture("chart.png", "bounding quadrics")
-        return [element("div", figure(picture, words), class_="surface")]
-
-    def verdict(self):
-        """Draws that end on an edge: limn's default, and the paper's."""
-        hits = {v.text("name"): v.number("hit_rate") for v in self.data.records("variants")}
-        mesh = os.path.basename(self.data.text("mesh")).split("_")[0]
-        shown = [f"{name} {percent(hits[name])}" for name in ("forest", PAPER) if name in hits]
-        return f"{mesh}: hits of {' and '.join(shown)}"
-
-    def html(self):
-        node = self.data.record("node")
-        mesh = os.path.splitext(os.path.basename(self.data.text("mesh")))[0]
-        overview = figure(
-            self.pictures.picture(self.data.text("overview"), "the mesh, the node, the slices"),
-            "mesh, node, slices",
-        )
-        cards = [element("div", _head("patch"), overview, class_="card")]
-        rows = []
-        for v in self.data.records("variants"):
-            name = v.text("name")
-            shown, shares = [], []
-            for i, s in enumerate(v.records("slices")):
-                wrong, right = s.number("false_accept"), s.number("true_reject")
-                shares.append(wrong / (wrong + right) if wrong + right else None)
-                shown.append(
-                    figure(
-                        self.pictures.picture(s.text("picture"), f"slice {i + 1} of {name}"),
-                        f"slice {i + 1}: {percent(shares[-1])} of what could be rejected is not",
-                    )
-                )
-            edges = f"{count(v.number('reachable_edges'))} edges reached from one point"
-            shown.append(figure(self.pictures.picture(v.text("edges_picture"), edges), edges))
-            cards.append(element("div", _head(name), *shown, class_="card"))
-            rows.append(
-                [
-                    name,
-                    *map(percent, shares),
-                    count(v.number("reachable_edges")),
-                    count(v.number("silhouettes")),
-                    percent(v.number("hit_rate"), v.number("hit_rate_stderr")),
-                ]
-            )
-        head = ["test", "slice 1 in vain", "slice 2 in vain", "edges reached", "silhouettes",
-                "hit rate"]
-        return join(
-            element(
-                "h3",
-                f"{mesh}: {count(self.data.number('edges'))} edges,"
-                f" {count(node.number('edges'))} of them in the node",
-            ),
-            element("div", element("div", *cards, class_="cards"), class_="gallery"),
-            *self._chart(),
-            table(head, rows, f"Rejection, {mesh}"),
-            _command(self.data.text("command")),
-        )
+def _best(ratios):
+    """The methods with the least time for equal error, but for two standard errors of the logarithm
+    of their quotient. The best comes first."""
+    ranking = sorted(ratios, key=lambda n: ratios[n][0])
+    spread = {n: error / ratio for n, (ratio, error) in ratios.items()}
+    return [n for n in ranking if math.log(ratios[n][0] / ratios[ranking[0]][0])
+            <= 2 * math.hypot(spread[n], spread[ranking[0]])]
 
 
-def _edges(parts, folder):
-    """A table and what it says; None where nothing was counted."""
-    rows, shares = [], []
-    for part in parts:
-        file = os.path.join(folder(part), "edges.json")
-        if part.kind != "edges" or not os.path.exists(file):
-            continue
-        record = read_record(file)
-        all_edges, without = record.number("edges"), record.number("without_concave")
-        name = os.path.basename(record.text("mesh"))
-        shares.append(without / all_edges)
-        rows.append([name, f"{all_edges:,}", f"{without:,}", percent(shares[-1])])
-    head = ["mesh", "edges", "without concave ones", "share"]
-    if not rows:
+def _rejection(result, group, palette):
+    section = RejectionSection(result, group, palette, ROLES)
+    mesh, node = stem(result.data.text("mesh")), result.data.record("node")
+    rates = {v.text("name"): v.number("hit_rate") for v in section.variants}
+    shown = [f"{name} {percent(rates[name])}" for name in (FOREST, PAPER) if name in rates]
+    html = join(
+        element("h3", f"{mesh}: {count(result.data.number('edges'))} edges,"
+                f" {count(node.number('edges'))} of them in the node"),
+        section.slices(), _surface(result), section.rates(), section.command())
+    return html, f"{mesh.split('_')[0]}: accepted by {' and '.join(shown)}"
+
+
+def _surface(result):
+    """The bounding quadrics of the node, where there are any."""
+    chart = result.data.record_or_none("chart")
+    if chart is None or not chart.values:
         return None
-    words = f"{percent(min(shares))} to {percent(max(shares))} are not concave"
-    return table(head, rows, "Edges with and without concave ones"), words
+    draw_quadrics(chart.values, os.path.join(result.folder, "chart.png"))
+    words = ("the quadrics (blue, orange) that bound the planes of the node's edges (black"
+             f" segments), in the coordinates of the dual box; {chart.text('method')}")
+    return element("div", Pictures(result.folder).figure("chart.png", "bounding quadrics", words),
+                   class_="surface")
 
 
-def _draws(part, folder):
-    """A table and what it says; None where nothing was measured."""
-    file = os.path.join(folder(part), "draws.json")
-    if part.kind != "draws" or not os.path.exists(file):
-        return None
-    record = read_record(file)
-    ray = record.number("ray_ns")
+def _heights(chart, level, up):
+    """u_up of the surface f = level over a grid of the two other axes; NaN outside of the box."""
+    i, j = [k for k in range(3) if k != up]
+    u, v = np.meshgrid(np.linspace(-1, 1, GRID), np.linspace(-1, 1, GRID), indexing="ij")
+    linear, square, product = chart["linear"], chart["square"], chart["product"]
+    # product_k belongs to the two axes other than k.
+    a = square[up] * np.ones_like(u)
+    b = linear[up] + product[j] * u + product[i] * v
+    c = (linear[i] * u + square[i] * u * u + linear[j] * v + square[j] * v * v
+         + product[up] * u * v - level)
+    with np.errstate(all="ignore"):
+        # The root that goes over into -c / b where a fades.
+        root = np.sqrt(b * b - 4 * a * c)
+        w = -2 * c / (b + np.where(b >= 0, root, -root))
+    return u, v, np.where(np.abs(w) <= 1, w, np.nan)
+
+
+def draw_quadrics(chart, file):
+    """A PNG of the two surfaces, with the wedges of the node's edges between them."""
+    up = max(range(3), key=lambda k: abs(chart["linear"][k]))
+    i, j = [k for k in range(3) if k != up]
+    figure = charts.pyplot.figure(figsize=(5, 5), dpi=150)
+    axes = figure.add_subplot(projection="3d")
+    for level, colour in ((chart["low"], "#2f6fb7"), (chart["high"], "#f28e2b")):
+        axes.plot_surface(*_heights(chart, level, up), color=colour, alpha=0.35, linewidth=0,
+                          rstride=2, cstride=2)
+    for a, b in chart["edges"][::max(1, len(chart["edges"]) // MOST_WEDGES)]:
+        axes.plot([a[i], b[i]], [a[j], b[j]], [a[up], b[up]], color="#202020", linewidth=0.6)
+    for axis, k in (("x", i), ("y", j), ("z", up)):
+        axes.set(**{f"{axis}lim": (-1, 1), f"{axis}ticks": [-1, 0, 1], f"{axis}label": f"u{k + 1}"})
+    axes.view_init(elev=24, azim=-56)
+    figure.savefig(file, bbox_inches="tight", pad_inches=0.4)
+    charts.pyplot.close(figure)
+
+
+def _draws(record):
+    ray, edges = record.number("ray_ns"), count(record.number("edges"))
     rows, rays = [], {}
     for row in record.records("rows"):
-        name = row.text("name")
-        rays[name] = row.number("draw_ns") / ray
-        rows.append(
-            [
-                join(name, element("span", _role(name), class_="role")),
-                figures(row.number("draw_ns")),
-                figures(rays[name]),
-                percent(row.number("hit_rate")),
-                figures(row.number("efficiency")),
-                figures(row.number("build_ms") / 1000),
-                figures(row.number("bytes_per_edge")),
-            ]
-        )
-    head = ["sampler", "draw, ns", "draw, rays", "hit rate", "efficiency", "build, s", "bytes per edge"]
-    title = f"{count(record.number('edges'))} edges; a ray takes {figures(ray)} ns"
-    shown = [f"{name} {figures(rays[name])}" for name in (PAPER, "forest") if name in rays]
-    html = join(element("h3", title), table(head, rows, "Draws"), _command(record.text("command")))
-    return html, f"rays a draw, {count(record.number('edges'))} edges: {', '.join(shown)}"
+        name, draw = row.text("name"), row.number("draw_ns")
+        rays[name] = figures(draw / ray)
+        rows.append([join(name, element("span", ROLES.get(name, ""), class_="role")),
+                     figures(draw), rays[name], percent(row.number("hit_rate")),
+                     figures(row.number("efficiency")), figures(row.number("build_ms") / 1000),
+                     figures(row.number("bytes_per_edge"))])
+    head = ["sampler", "draw, ns", "draw, rays", "acceptance rate", "efficiency", "build, s",
+            "bytes per edge"]
+    html = join(element("h3", f"{edges} edges; a ray takes {figures(ray)} ns"),
+                table(head, rows, "Draws"), command(record.text("command")))
+    shown = [f"{name} {rays[name]}" for name in (PAPER, FOREST) if name in rays]
+    return html, f"rays a draw, {edges} edges: {', '.join(shown)}"
 
 
-def _sections(paper_figures, folder, command):
-    """(id, entry, html, factors, verdicts) of every figure; how many have no results."""
-    missing = 0
-    results = {}
-    for entry in paper_figures:
-        for part in entry.runs:
+def _edges(records):
+    """All meshes of a figure in one table."""
+    counts = [(r, r.number("edges"), r.number("without_concave")) for r in records]
+    rows = [[os.path.basename(r.text("mesh")), f"{every:,}", f"{without:,}", percent(without / every)]
+            for r, every, without in counts]
+    shares = [without / every for _, every, without in counts]
+    html = table(["mesh", "edges", "without concave ones", "share"], rows,
+                 "Edges with and without concave ones")
+    return html, f"{percent(min(shares))} to {percent(max(shares))} are not concave"
+
+
+def _bias(records):
+    """The derivative summed over all pixels against that of the first record, whose method has no
+    bias: a table, and a chart over the rays of warped-area sampling."""
+    first, *others = [(r.text("method"), r.record("settings"), *r.records("parameters"))
+                      for r in records]
+    truth, truth_error = first[2].number("sum"), first[2].number("sum_stderr")
+    rows, points = [[first[0], "–", figures(truth), "–", "–"]], []
+    for method, settings, found in others:
+        rays, total = int(settings.number("auxiliary rays")), found.number("sum")
+        both = math.hypot(found.number("sum_stderr"), truth_error)
+        bias, spread = total / truth - 1, both / abs(truth)
+        rows.append([method, str(rays), figures(total), f"{100 * bias:.2g} ± {100 * spread:.1g} %",
+                     figures((total - truth) / both)])
+        if method == WARPED and bias > 0:
+            points.append((rays, bias, spread))
+    head = ["method", "rays", "derivative, all pixels", "bias", "in standard errors"]
+    return join(element("h3", "Bias over rays"),
+                element("p", "An area light of two triangles over a plane, moved sideways; bars are"
+                        " two standard errors."),
+                _bias_over_rays(Palette([WARPED]), points) if len(points) > 1 else None,
+                table(head, rows, "Bias of warped-area sampling"))
+
+
+@charts.chart(6, 3.4)
+def _bias_over_rays(figure, panel, palette, points):
+    """points: (rays, relative bias above 0, its standard error)."""
+    rays, bias, error = zip(*points)
+    low, high = [min(2 * e, 0.95 * b) for b, e in zip(bias, error)], [2 * e for e in error]
+    panel.errorbar(rays, [100 * b for b in bias], marker="o", color=charts.TEXT,
+                   yerr=[[100 * e for e in low], [100 * e for e in high]])
+    panel.set_xscale("log", base=2)
+    panel.set_yscale("log")
+    panel.set_xticks(rays, [str(r) for r in rays])
+    panel.set_xlabel("auxiliary rays")
+    panel.set_ylabel(f"bias of {WARPED}, %")
+    return "Bias over rays; the numbers are in the table"
+
+
+class _Page:
+    def __init__(self, paper_figures, folder, again):
+        self.figures, self.folder, self.again = paper_figures, folder, again
+        self.results = {}
+        for part in (p for f in paper_figures for p in f.runs if p.kind in ("compare", "reject")):
             try:
-                if part.kind in ("compare", "reject"):
-                    results[part.name] = read_folder(folder(part))[0]
+                self.results[part.name] = read_folder(folder(part))[0]
             except ReportError:
                 pass
-    tests = sum(
-        1
-        for r in results.values()
-        if r.kind == "compare"
-        for m in r.data.records("methods")
-        if _last(m) and (_last(m).record_or_none("bias") or None)
-    )
-    level = FALSE_ALARM / max(1, tests)
-    sections = []
-    for i, entry in enumerate(paper_figures):
-        parts, factors, verdicts = [], [], []
+        self.palette = palette_of(self.results.values())
+        self.threshold = bias_threshold(self.results.values())
+        self.missing, self.styles = 0, []
+
+    def _records(self, entry, kind):
+        files = [os.path.join(self.folder(part), kind + ".json") for part in entry.runs
+                 if part.kind == kind]
+        return [read_record(file) for file in files if os.path.exists(file)]
+
+    def _parts(self, entry, identifier):
+        """Markup, verdicts and times of the paper's method over limn's default."""
+        parts, verdicts, factors = [], [], []
         for part in entry.runs:
-            drawn = _draws(part, folder)
-            if drawn:
-                parts.append(drawn[0])
-                verdicts.append(drawn[1])
-            result = results.get(part.name)
+            result, group = self.results.get(part.name), f"{identifier}-{part.name}"
             if result is None:
                 continue
             if result.kind == "reject":
-                rejection = _Rejection(result)
-                parts.append(rejection.html())
-                verdicts.append(rejection.verdict())
-                continue
-            comparison = _Comparison(result, part, entry.table, level)
-            parts.append(comparison.html())
-            if comparison.factor():
-                factors.append(comparison.factor())
-            verdicts.append(" or ".join(comparison.best()) or "–")
-        parts += filter(None, [bias_chart.html(entry.runs, folder)])
-        counted = _edges(entry.runs, folder)
-        if counted:
-            parts.append(counted[0])
-            verdicts.append(counted[1])
-        if not parts:
-            missing += 1
-            parts = [element("p", "No results here yet.", class_="hint")]
-        again = shlex.join([*command, "--only", ",".join(p.name for p in entry.runs)])
+                shown = _rejection(result, group, self.palette)
+            else:
+                *shown, factor, style = _comparison(result, part, entry.table,
+                                                    group.replace(".", "-"), self.palette,
+                                                    self.threshold)
+                factors += [factor] if factor else []
+                self.styles.append(style)
+            parts.append(shown[0])
+            verdicts.append(shown[1])
+        drawn = [_draws(record) for record in self._records(entry, "draws")]
+        counted = self._records(entry, "edges")
+        drawn += [_edges(counted)] if counted else []
+        warped = self._records(entry, "gradient")
+        parts += [html for html, _ in drawn] + ([_bias(warped)] if len(warped) > 1 else [])
+        return parts, verdicts + [words for _, words in drawn], factors
+
+    def section(self, entry, identifier):
+        """Its markup, and its row of the summary."""
+        parts, verdicts, factors = self._parts(entry, identifier)
+        self.missing += not parts
+        again = shlex.join([*self.again, "--only", ",".join(p.name for p in entry.runs)])
         html = element(
-            "section",
-            element("h2", f"{entry.numbers}: {entry.title}"),
+            "section", element("h2", f"{entry.numbers}: {entry.title}"),
             element("p", element("strong", "The paper: "), _words(entry.shows), class_="paper"),
             element("p", element("strong", "Here: "), _words(entry.reading), class_="paper"),
-            *parts,
-            element("p", "All of it again:"),
-            _command(again),
-            id=f"figure-{i}",
-        )
-        sections.append((f"figure-{i}", entry, html, factors, verdicts))
-    return sections, missing
+            *parts or [hint("No results here yet.")],
+            command(again, "All of it again"), id=identifier)
+        link = element("a", f"{entry.numbers}: {entry.title}", href=f"#{identifier}")
+        ratio = " to ".join(times(f) for f in sorted({min(factors), max(factors)})) if factors else "–"
+        return html, [link, ratio, element("td", _joined(verdicts) or "–", class_="words")]
 
 
 def _joined(verdicts):
-    """Each once, and how often where that is not at once."""
-    if len(verdicts) < 2:
-        return "".join(verdicts)
+    """Each once, and how often where any comes again."""
     often = {v: verdicts.count(v) for v in verdicts}
-    return ", ".join(f"{v} ({n} of {len(verdicts)})" if max(often.values()) > 1 else v
-                     for v, n in often.items())
-
-
-def _summary(sections):
-    rows = []
-    for identifier, entry, _, factors, verdicts in sections:
-        link = element("a", f"{entry.numbers}: {entry.title}", href=f"#{identifier}")
-        text = " to ".join(times(f) for f in sorted({min(factors), max(factors)})) if factors else "–"
-        rows.append([link, text, element("td", _joined(verdicts) or "–", class_="verdict")])
-    head = ["figure", f"time of {PAPER} for the error of {DEFAULT}",
-            "least time for equal error, or what was counted"]
-    return table(head, rows, "Who is right, by figure")
+    if all(n == 1 for n in often.values()):
+        return ", ".join(verdicts)
+    return ", ".join(f"{v} ({n} of {len(verdicts)})" for v, n in often.items())
 
 
 def write(file, paper_figures, folder, again):
     """folder(part): where a part's results lie. again: the command, but for --only. Returns how many
     figures have no results."""
-    sections, missing = _sections(paper_figures, folder, again)
-    title = "The paper's figures"
-    intro = (
-        "Soroka, Peters and Marschner 2025, Quadric-Based Silhouette Sampling for Differentiable"
-        f" Rendering (doi 10.1145/3731146). {PAPER}: the paper's forest, complete; {DEFAULT}:"
-        " limn's default. Derivatives: red gets brighter, blue darker; methods of one comparison"
-        " have the same time, set-up included, and one scale."
-    )
-    page = document(
-        title,
-        _style(),
-        element("header", element("h1", title), element("p", intro), _summary(sections)),
-        element("main", *(html for _, _, html, _, _ in sections)),
-    )
+    page = _Page(paper_figures, folder, again)
+    sections = [page.section(entry, f"figure-{i}") for i, entry in enumerate(paper_figures)]
+    intro = element(
+        "p", "Soroka, Peters and Marschner 2025, Quadric-Based Silhouette Sampling for"
+        f" Differentiable Rendering (doi 10.1145/3731146). {PAPER}: the paper's forest, complete;"
+        f" {DEFAULT}: limn's default. Derivatives: red gets brighter, blue darker; methods of one"
+        " comparison have the same time, set-up included, and one scale.")
+    summary = table(["figure", f"time of {PAPER} for the error of {DEFAULT}",
+                     "least time for equal error, or what was counted"],
+                    [row for _, row in sections], "Who is right, by figure")
+    text = document("The paper's figures", page.palette, join(STYLE, *page.styles),
+                    [intro, summary], *(html for html, _ in sections))
     with open(file, "w", encoding="utf-8") as out:
-        out.write(page)
-    return missing
+        out.write(text)
+    return page.missing

@@ -1,6 +1,5 @@
-"""One colour and one marker per method, the same in every chart of a report. The colours differ in
-lightness as well as hue, and markers and names stand beside them: nothing rests on hue alone.
-"""
+"""One colour and one marker per method, the same in every chart of a page. The colours differ in
+lightness as well as hue, and markers and names stand beside them: nothing rests on hue alone."""
 
 # Method: (on white, on black, marker of matplotlib).
 KNOWN = {
@@ -21,7 +20,7 @@ OTHERS = [
     ("#4a4a4a", "#dddddd", "d"),
 ]
 
-# The colours of the page and of charts, name: (on white, on black).
+# Parts of a run's time, name: (on white, on black).
 SHADES = {
     "interior": ("#3f8fb5", "#5fb3da"),
     "camera": ("#d9a441", "#e5b95f"),
@@ -29,34 +28,33 @@ SHADES = {
     "rest": ("#b8bec6", "#59616b"),
 }
 
-# The colours of the pictures that `limn reject` draws, unless its file names others; equal in both modes
-# because the pictures are.
+# The colours of the pictures that `limn reject` draws, unless its file names others; equal in both
+# modes because the pictures are.
 SLICES = {
-    "true_reject": ("true reject", "#d9d9d9"),
-    "true_accept": ("true accept", "#2f6fb7"),
-    "false_accept": ("false accept", "#f28e2b"),
-    "missed": ("missed", "#d6006e"),
+    "true_reject": ("true negative", "#d9d9d9"),
+    "true_accept": ("true positive", "#2f6fb7"),
+    "false_accept": ("false positive", "#f28e2b"),
+    "missed": ("missed (false negative)", "#d6006e"),
 }
 EDGES = {
     "edge_silhouette": ("silhouettes", "#2f6fb7"),
-    "edge_false_accept": ("reachable in vain", "#f28e2b"),
-    "edge_dead_end": ("of dead ends", "#f8d3a6"),
+    "edge_false_accept": ("reachable, no silhouettes", "#f28e2b"),
+    "edge_dead_end": ("in nodes without reachable edges", "#f8d3a6"),
     "node": ("of the chosen node", "#b3261e"),
     "point": ("shading point", "#202020"),
 }
 
 
 class Palette:
-    """Methods to colours, for a whole report. A chart is drawn with `ink(name)`, a stand-in that
+    """Methods to colours, for a whole page. A chart is drawn with `ink(name)`, a stand-in that
     `page_colours` turns into the CSS variable `variable(name)`, which follows light and dark mode.
     """
 
-    def __init__(self, methods):
+    def __init__(self, methods=()):
         self.methods = list(dict.fromkeys(methods))
         others = [m for m in self.methods if m not in KNOWN]
-        self._looks = {
-            m: KNOWN.get(m) or OTHERS[others.index(m) % len(OTHERS)] for m in self.methods
-        }
+        self._looks = {m: KNOWN.get(m) or OTHERS[others.index(m) % len(OTHERS)]
+                       for m in self.methods}
 
     def variable(self, method):
         return f"var(--method-{self.methods.index(method)})"

@@ -1,7 +1,8 @@
-"""HTML elements and numbers as text."""
+"""HTML elements, whole pages, and numbers as text."""
 
 import html
 import math
+import os
 
 VOID = {"img", "meta", "br", "input"}
 
@@ -20,11 +21,8 @@ def join(*contents):
 
 def element(name, /, *contents, **attributes):
     """element("td", "1 < 2", class_="number"): None contents and None attributes are left out."""
-    text = "".join(
-        f' {key.rstrip("_").replace("_", "-")}="{html.escape(str(value))}"'
-        for key, value in attributes.items()
-        if value is not None
-    )
+    text = "".join(f' {key.rstrip("_").replace("_", "-")}="{html.escape(str(value))}"'
+                   for key, value in attributes.items() if value is not None)
     if name in VOID:
         return Markup(f"<{name}{text}>")
     return Markup(f"<{name}{text}>{join(*contents)}</{name}>")
@@ -34,8 +32,13 @@ def element(name, /, *contents, **attributes):
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 
 
-def document(title, style, *contents):
-    """A whole page: title and style as texts, contents: of the body."""
+def document(title, palette, style, header, *contents):
+    """A whole page. palette: of its charts (colours.py); style: rules beside those of style.css;
+    header: elements below the title."""
+    with open(os.path.join(os.path.dirname(__file__), "style.css"), encoding="utf-8") as stream:
+        rules = stream.read()
+    for mode, place in enumerate(("/*light*/", "/*dark*/")):
+        rules = rules.replace(place, palette.css(mode) + ";")
     head = element(
         "head",
         element("meta", charset="utf-8"),
@@ -43,34 +46,58 @@ def document(title, style, *contents):
         element("meta", name="viewport", content="width=device-width, initial-scale=1"),
         element("meta", name="color-scheme", content="light dark"),
         element("title", title),
-        element("style", style),
-    )
-    html_element = element("html", head, element("body", *contents), lang="en")
-    return Markup("<!DOCTYPE html>\n") + html_element
+        element("style", Markup(rules + style)))
+    body = element("body", element("header", element("h1", title), *header),
+                   element("main", *contents))
+    return Markup("<!DOCTYPE html>\n") + element("html", head, body, lang="en")
 
 
 def table(head, rows, label, class_=None):
     """head: texts; rows: lists of cells whose first is the row's header. A cell may be a <td>.
-    label: what it is, for those who cannot see what stands above it.
-    """
+    label: what it is, for those who cannot see what stands above it."""
 
     def cell(content):
         return content if str(content).startswith("<td") else element("td", content)
 
     body = [element("tr", element("th", row[0], scope="row"), *map(cell, row[1:])) for row in rows]
     whole = element(
-        "table",
-        element("thead", element("tr", *(element("th", h, scope="col") for h in head))),
-        element("tbody", *body),
-        class_=class_,
-        aria_label=label,
-    )
+        "table", element("thead", element("tr", *(element("th", h, scope="col") for h in head))),
+        element("tbody", *body), class_=class_, aria_label=label)
     # Focusable, so that the keyboard can scroll it.
     return element("div", whole, class_="scroll", tabindex="0", role="region", aria_label=label)
 
 
+def notice(strong, *text, danger=False):
+    return element("div", element("strong", strong), *text,
+                   class_="notice danger" if danger else "notice")
+
+
+def hint(*text):
+    return element("p", *text, class_="hint")
+
+
+def details(summary, *contents):
+    return element("details", element("summary", summary), *contents)
+
+
+def command(text, label="Command"):
+    return join(element("p", f"{label} (one click selects it):"),
+                element("pre", element("code", text), class_="command"))
+
+
+def how_to_read(entries):
+    """entries: (term, text)."""
+    texts = (join(element("dt", term), element("dd", text)) for term, text in entries)
+    return element("section", element("h2", "How to read this"), element("dl", *texts),
+                   id="reading")
+
+
 def superscript(number):
     return str(number).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def _decimals(value, decimals):
+    return f"{value:,.{decimals}f}".replace("-", "−").replace(",", "\u2009")
 
 
 def figures(value, digits=3):
@@ -81,10 +108,8 @@ def figures(value, digits=3):
         return "0"
     exponent = math.floor(math.log10(abs(value)))
     if -3 <= exponent < 5:
-        decimals = max(0, digits - 1 - exponent)
-        return f"{value:,.{decimals}f}".replace("-", "−").replace(",", "\u2009")
-    mantissa = f"{value / 10**exponent:.{digits - 1}f}".replace("-", "−")
-    return f"{mantissa}×10{superscript(exponent)}"
+        return _decimals(value, max(0, digits - 1 - exponent))
+    return f"{_decimals(value / 10**exponent, digits - 1)}×10{superscript(exponent)}"
 
 
 def with_error(value, error):
@@ -93,17 +118,10 @@ def with_error(value, error):
         return figures(value)
     exponent = math.floor(math.log10(max(abs(value), error)))
     last = max(math.floor(math.log10(error)) - 1, exponent - 2)
-    if -3 <= exponent < 5:
-        decimals = max(0, -last)
-        return f"{value:,.{decimals}f}\u00a0±\u00a0{error:,.{decimals}f}".replace("-", "−").replace(
-            ",", "\u2009"
-        )
-    decimals = max(0, exponent - last)
-    scale = 10.0**exponent
-    text = f"({value / scale:.{decimals}f}\u00a0±\u00a0{error / scale:.{decimals}f})".replace(
-        "-", "−"
-    )
-    return f"{text}×10{superscript(exponent)}"
+    plain = -3 <= exponent < 5
+    scale, decimals = (1, max(0, -last)) if plain else (10.0**exponent, max(0, exponent - last))
+    text = f"{_decimals(value / scale, decimals)}\u00a0±\u00a0{_decimals(error / scale, decimals)}"
+    return text if plain else f"({text})×10{superscript(exponent)}"
 
 
 def count(value):
@@ -116,6 +134,10 @@ def count(value):
     return f"{value:.4g}"
 
 
+def plural(number, word):
+    return f"{number} {word}{'' if number == 1 else 's'}"
+
+
 def percent(value, error=None):
     if value is None:
         return "–"
@@ -125,6 +147,11 @@ def percent(value, error=None):
     return f"{100 * value:.3g} %"
 
 
+def share(part, whole):
+    """part / whole as a percentage; a dash of nothing."""
+    return percent(part / whole if whole else None)
+
+
 def times(value, error=None):
     """A factor: ×12.3 ± 0.4."""
-    return "–" if value is None else f"×\u2009{with_error(value, error)}"
+    return "–" if value is None else f"×\u202f{with_error(value, error)}"

@@ -35,37 +35,33 @@ class Pictures:
     def uri(self, name):
         return _png(os.path.join(self.folder, name))[0]
 
-    def picture(self, name, alt, behind=None):
-        """An <img>, or a box that names the file. behind: CSS class that shows another picture
-        while the pointer (or the keyboard's focus) is on this one.
-        """
+    def figure(self, name, alt, caption, behind=None):
+        """A <figure>, or a box that names the file. behind: CSS class that shows another picture
+        while the pointer (or the keyboard's focus) is on this one."""
         file = os.path.join(self.folder, name)
         uri, width, height = _png(file)
         if uri is None:
             self.missing.append(f"{file}: {width}")
-            return element(
-                "div",
-                element("strong", "Picture missing"),
-                element("code", name),
-                element("span", width),
-                class_="missing-picture",
-                role="note",
-            )
-        image = element("img", src=uri, alt=alt, width=width, height=height)
-        if behind is None:
-            return element("span", image, class_="picture")
-        return element("span", image, class_=f"picture flips {behind}", tabindex="0")
+            shown = element("div", element("strong", "Picture missing"), element("code", name),
+                            element("span", width), class_="missing-picture", role="note")
+        else:
+            shown = element("span", element("img", src=uri, alt=alt, width=width, height=height),
+                            class_=f"picture flips {behind}" if behind else "picture",
+                            tabindex="0" if behind else None)
+        return element("figure", shown, element("figcaption", caption))
 
-
-def _srgb(linear):
-    value = 12.92 * linear if linear <= 0.0031308 else 1.055 * linear ** (1 / 2.4) - 0.055
-    return round(255 * max(0.0, min(1.0, value)))
+    def flip_style(self, behind, name):
+        """The rule of `figure(..., behind=behind)`, which shows the picture `name`."""
+        uri = self.uri(name)
+        return Markup(f".{behind}{{background-image:url({uri})}}") if uri else Markup("")
 
 
 def _signed_colour(t):
     """limn's signed pictures: linear (1 + min(t, 0), 1 - |t|, 1 - max(t, 0)), then the sRGB curve.
     """
-    return "rgb({},{},{})".format(*map(_srgb, (1 + min(t, 0), 1 - abs(t), 1 - max(t, 0))))
+    linear = (1 + min(t, 0), 1 - abs(t), 1 - max(t, 0))
+    srgb = (12.92 * c if c <= 0.0031308 else 1.055 * c ** (1 / 2.4) - 0.055 for c in linear)
+    return "rgb({},{},{})".format(*(round(255 * c) for c in srgb))
 
 
 def colour_bar(scale, unit, what):
@@ -79,46 +75,15 @@ def colour_bar(scale, unit, what):
         element("span", class_="bar", style=f"background:linear-gradient(to right,{stops})"),
         element("span", *ticks, class_="bar-ticks"),
         element("span", unit, class_="bar-unit"),
-        class_="colour-bar",
-        role="img",
-        aria_label=text,
-    )
-
-
-def figure(picture, caption):
-    return element("figure", picture, element("figcaption", caption))
-
-
-def flip_style(name, uri):
-    """The rule behind `Pictures.picture(..., behind=name)`."""
-    return Markup(f".{name}{{background-image:url({uri})}}") if uri else Markup("")
-
-
-def missing_notice(missing):
-    if not missing:
-        return None
-    return element(
-        "div",
-        element("strong", "Pictures that could not be shown: "),
-        element("ul", *(element("li", element("code", m)) for m in missing)),
-        class_="notice warning",
-    )
+        class_="colour-bar", role="img", aria_label=text)
 
 
 def size_choice(group):
     """Radio buttons that the style sheet ties to the size of the pictures after them; no script."""
     choices = []
     for i, label in enumerate(("small", "medium", "large")):
-        identifier = f"{group}-size-{i}"
-        choices += [
-            element(
-                "input",
-                type="radio",
-                name=f"{group}-size",
-                id=identifier,
-                class_=f"size-{i}",
-                checked="" if i == 1 else None,
-            ),
-            element("label", label, for_=identifier),
-        ]
+        name = f"{group}-size-{i}"
+        choices += [element("input", type="radio", name=f"{group}-size", id=name,
+                            class_=f"size-{i}", checked="" if i == 1 else None),
+                    element("label", label, for_=name)]
     return join(element("span", "Picture size", class_="size-label"), *choices)

@@ -1,16 +1,14 @@
-"""JSON files whose every access is checked, so that a faulty file is named together with the place
-in it.
-"""
+"""JSON files whose every access is checked: a faulty file is named together with the place in it."""
 
 import json
 import math
 import os
 
-from .errors import ReportError
+KINDS = ("compare", "reject", "fit")  # of results, each a file KIND.json
 
 
-# Of results, each a file KIND.json.
-KINDS = ("compare", "reject", "fit")
+class ReportError(Exception):
+    """A fault that the user can mend; the text says what is wrong, where, and what to do."""
 
 
 class Record:
@@ -22,12 +20,10 @@ class Record:
 
     def _fail(self, key, expected):
         found = "is missing" if key not in self.values else f"is not {expected}"
-        raise ReportError(
-            f'{self.place}: "{key}" {found}; was the file written by another '
-            "version of limn? Run its command again."
-        )
+        raise ReportError(f'{self.place}: "{key}" {found}; was the file written by another '
+                          "version of limn? Run its command again.")
 
-    def _get(self, key, kinds, expected, default):
+    def _get(self, key, kinds, expected, default=None):
         value = self.values.get(key, default)
         if not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds):
             self._fail(key, expected)
@@ -45,23 +41,27 @@ class Record:
     def number(self, key):
         if key not in self.values:
             self._fail(key, "a number")
-        value = self._get(key, (int, float, type(None)), "a number", None)
+        value = self._get(key, (int, float, type(None)), "a number")
         return value if value is not None and math.isfinite(value) else None
 
+    def total(self, keys):
+        """The sum of several numbers; None counts as zero."""
+        return sum(self.number(key) or 0 for key in keys)
+
     def numbers(self, key):
-        values = self._get(key, (list,), "a list of numbers", None)
+        values = self._get(key, (list,), "a list of numbers")
         if any(isinstance(v, bool) or not isinstance(v, (int, float)) for v in values):
             self._fail(key, "a list of numbers")
         return values
 
     def record(self, key):
-        return Record(self._get(key, (dict,), "an object", None), f"{self.place}: {key}")
+        return Record(self._get(key, (dict,), "an object"), f"{self.place}: {key}")
 
     def record_or_none(self, key):
         return self.record(key) if self.has(key) else None
 
     def records(self, key):
-        values = self._get(key, (list,), "a list of objects", None)
+        values = self._get(key, (list,), "a list of objects")
         if not all(isinstance(v, dict) for v in values):
             self._fail(key, "a list of objects")
         return [Record(v, f"{self.place}: {key}[{i}]") for i, v in enumerate(values)]
@@ -75,10 +75,10 @@ class Result:
 
     def __init__(self, folder, data):
         self.folder, self.data = folder, data
-
-    @property
-    def kind(self):
-        return self.data.text("kind")
+        self.kind = data.text("kind")
+        if self.kind not in KINDS:
+            known = ", ".join(KINDS)
+            raise ReportError(f'{data.place}: "kind" is "{self.kind}" (known: {known})')
 
 
 def read_record(file):
@@ -90,10 +90,8 @@ def read_record(file):
     except UnicodeDecodeError:
         raise ReportError(f"{file}: not a text file") from None
     except json.JSONDecodeError as error:
-        raise ReportError(
-            f"{file}:{error.lineno}:{error.colno}: not JSON: {error.msg}; "
-            "run the command that wrote it again"
-        ) from None
+        raise ReportError(f"{file}:{error.lineno}:{error.colno}: not JSON: {error.msg}; "
+                          "run the command that wrote it again") from None
     if not isinstance(values, dict):
         raise ReportError(f"{file}: not a JSON object")
     return Record(values, file)
@@ -109,10 +107,5 @@ def read_folder(folder):
         raise ReportError(
             f"{folder}: neither compare.json nor reject.json nor fit.json is here; "
             f"make one with `limn compare ... -o {folder}`, `limn reject ... -o {folder}` or "
-            f"`limn fit ... -o {folder}`"
-        )
-    for result, kind in ((r, k) for r in results for k in [r.kind]):
-        if kind not in KINDS:
-            known = ", ".join(KINDS)
-            raise ReportError(f'{result.data.place}: "kind" is "{kind}" (known: {known})')
+            f"`limn fit ... -o {folder}`")
     return results

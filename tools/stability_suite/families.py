@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import exr, meshes
+from .program import DIFFERENCES as FINITE_DIFFERENCES
+from .program import OURS
 from .scene import Scene, Shape, diffuse, glossy, twosided
 
 # Of differences: 5 % of a pixel on the table's film, in scene units. An edge is hardly blurred: a
@@ -30,7 +32,7 @@ class Reference:
 
     @property
     def method(self):
-        return CLOSED_FORM if self.closed_form else "fd" if self.step else "adaptive"
+        return CLOSED_FORM if self.closed_form else FINITE_DIFFERENCES if self.step else OURS
 
 
 @dataclass

@@ -2,15 +2,15 @@
 
 import os
 
-from report import page as report_page
 from report.colours import Palette
-from report.markup import Markup, document, element, figures, join, percent, table
+from report.markup import (details, document, element, figures, hint, how_to_read, join, notice,
+                           percent, table)
 
 from . import chart
 from .statistics import LEVEL, called
 from .suite import LONGER, REFERENCE, REPEATS, RESOLUTION
 from .table import (AHEAD, OURS, against_others_text, beaten, beaten_text, cells, markdown,
-                    methods_of, standing, who_breaks)
+                    methods_of, seconds_of, standing, who_breaks)
 from .verdicts import LATENESS, MEANING, ORDER, RIGHT, number
 
 READING = [
@@ -44,10 +44,7 @@ READING = [
         "called, too. A method that does not meet a rare event in all its runs cannot be told "
         "from a biased one.",
     ),
-    (
-        "Tail",
-        "The share of the squared error in the worst 0.1 % of the pixels of all repeats.",
-    ),
+    ("Tail", "The share of the squared error in the worst 0.1 % of the pixels of all repeats."),
     (
         "Verdict",
         "; ".join(f"{word}: {MEANING[word]}" for word in reversed(ORDER))
@@ -86,9 +83,8 @@ def _summary(records):
                              f": {word.split(': ', 1)[1]}.", ahead))
     text = (f"{OURS} is right at every point of {len(records) - len(items)} of {len(records)} "
             f"families, and another method is ahead where it is not in {lost}.")
-    notice = element("div", text, element("ul", *items), class_="notice") if items else element(
-        "p", text)
-    return join(notice, element("p", against_others_text(records),
+    whole = notice("", text, element("ul", *items)) if items else element("p", text)
+    return join(whole, element("p", against_others_text(records),
                                 " Geometric means; the time for equal error is its square."))
 
 
@@ -109,15 +105,13 @@ def _row(record, method, label):
 def _figures(family, records):
     head = [family.knob, "method", "verdict", "error", "tail", "p", "largest z", "too much",
             "visible", "p of longer runs", "s", "spp"]
-    rows = [_row(record, method, number(value)) for value, record in zip(family.values, records)
-            if record for method in methods_of([(family, records)])]
-    references = [_reference_row(number(v), r["reference"])
-                  for v, r in zip(family.values, records) if r]
-    return element("details", element("summary", "All figures"),
-                   table(head, [r for r in rows if r], f"Figures, {family.name}"),
+    known = [(number(value), record) for value, record in zip(family.values, records) if record]
+    rows = [_row(record, method, label) for label, record in known
+            for method in methods_of([(family, records)])]
+    references = [_reference_row(label, record["reference"]) for label, record in known]
+    return details("All figures", table(head, filter(None, rows), f"Figures, {family.name}"),
                    table([family.knob, "reference by", "status", "its own error", "spp", "s",
-                          "p against differences"],
-                         references, f"References, {family.name}"))
+                          "p against differences"], references, f"References, {family.name}"))
 
 
 def _reference_row(label, about):
@@ -134,7 +128,7 @@ def _warnings(records):
              for f in r["methods"].values() for w in f["warnings"]}
     if not texts:
         return None
-    return element("details", element("summary", f"{len(texts)} warnings of the program"),
+    return details(f"{len(texts)} warnings of the program",
                    element("ul", *(element("li", t) for t in sorted(texts))))
 
 
@@ -143,46 +137,38 @@ def _doubt(records):
     checks = [r["reference"].get("against_differences") for r in records if r]
     if not any(called(c) for c in checks):
         return None
-    return element("p", "The reference disagrees with differences of its own scene: trust nothing "
-                   "below.", class_="notice danger")
+    return notice("The reference disagrees with differences of its own scene. ",
+                  "Trust nothing below.", danger=True)
 
 
-def _section(output, family, records, palette):
-    methods = methods_of([(family, records)])
-    broken = [t for t in (who_breaks(family, records, m) for m in methods) if t]
+def _section(family, records, palette):
+    broken = [t for t in (who_breaks(family, records, m)
+                          for m in methods_of([(family, records)])) if t]
     sentence = " ".join(t for t in (
         standing(family, records), "; ".join(broken) + "." if broken else "",
         family.why if who_breaks(family, records, OURS) else "") if t)
     return element(
         "section", element("h2", family.name), element("p", family.what),
-        element("p", "Reference: ", family.truth, class_="hint"), _doubt(records),
-        chart.draw(output, family, records, palette), element("p", sentence),
+        hint("Reference: ", family.truth), _doubt(records),
+        chart.draw(palette, family, records), element("p", sentence),
         _figures(family, records), _warnings(records), id=family.name)
 
 
-def html(output, records):
+def html(records):
     palette = Palette(methods_of(records))
-    title = "limn: where methods break"
-    reading = element("section", element("h2", "How to read this"),
-                      element("dl", *(join(element("dt", t), element("dd", d))
-                                      for t, d in READING)), id="reading")
-    seconds = chart.records_seconds([r for _, rs in records for r in rs])
+    words = (f"Scenes that get harder by a knob until something breaks. Derivative images after"
+             f" {seconds_of(records)} s of one thread. ")
     return document(
-        title, Markup(report_page._style(palette)), element("header", element("h1", title)),
-        element("main",
-                element("p", "Scenes that get harder by a knob until something breaks. Derivative "
-                        f"images after {seconds} s of one thread. ",
-                        element("a", "How to read this", href="#reading"), "."),
-                _summary(records), _verdict_table(records),
-                *(_section(output, f, r, palette) for f, r in records), reading))
+        "limn: where methods break", palette, "", [],
+        element("p", words, element("a", "How to read this", href="#reading"), "."),
+        _summary(records), _verdict_table(records),
+        *(_section(f, r, palette) for f, r in records), how_to_read(READING))
 
 
 def write(output, records):
-    """The page, the charts and the table; returns the page's file."""
-    file = os.path.join(output, "report.html")
-    text = html(output, records)
-    with open(file, "w", encoding="utf-8") as out:
-        out.write(text)
-    with open(os.path.join(output, "table.md"), "w", encoding="utf-8") as out:
-        out.write(markdown(records))
-    return file
+    """The page and the table; returns the page's file."""
+    page = os.path.join(output, "report.html")
+    for file, text in ((page, html(records)), (os.path.join(output, "table.md"), markdown(records))):
+        with open(file, "w", encoding="utf-8") as out:
+            out.write(text)
+    return page

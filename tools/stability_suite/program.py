@@ -15,6 +15,9 @@ from . import exr
 from .statistics import Estimate
 
 DONE, REFUSED, NON_FINITE, CRASHED, TIMED_OUT = "done", "refused", "non-finite", "crash", "time-out"
+# Limn's methods in the suite: the one that the page asks about, and those that run by default.
+OURS, DIFFERENCES, MITSUBA = "adaptive", "fd", "mitsuba"
+DEFAULT_METHODS = [OURS, "forest", "li2019", "uniform", DIFFERENCES]
 BAD_INPUT, NOT_FINITE = 2, 3  # limn's exit status
 
 
@@ -36,7 +39,7 @@ def method_names(limn):
     text = subprocess.run([limn, "compare", "--help"], capture_output=True, text=True).stdout
     lines = text.split("the first is the measure of the others: ")[1].splitlines()[0]
     names = lines.split(" (")[0].split(", ")
-    return [name for name in names if name != "mitsuba"]
+    return [name for name in names if name != MITSUBA]
 
 
 @dataclass

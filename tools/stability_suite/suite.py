@@ -11,10 +11,11 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
+from common import read_json, write_json
 
 from . import closed_form, statistics
 from .families import CLOSED_FORM, FAMILIES, STEP
-from .program import DONE, Interrupted, Run
+from .program import DIFFERENCES, DONE, Interrupted, Run
 from .statistics import Estimate
 from .verdicts import verdict
 
@@ -28,7 +29,6 @@ SUSPECTED, OVERHEAD = 0.1, 1.15
 DRAWING_SECONDS = 30
 FORMULA_SECONDS = 5  # of one closed form
 LEAST_SECONDS = 0.02
-DEFAULT_METHODS = ["adaptive", "forest", "li2019", "uniform", "fd"]
 
 
 @dataclass
@@ -58,7 +58,7 @@ def run_seconds(minutes, jobs, methods, resolution=RESOLUTION):
     own = {reference_identity(f, v, resolution): f.point(v)[1].method
            for f in FAMILIES for v in f.values}
     formulas = sum(method == CLOSED_FORM for method in own.values())
-    references = len(own) - formulas + sum(method != "fd" for method in own.values())
+    references = len(own) - formulas + sum(method != DIFFERENCES for method in own.values())
     shares = points * methods * REPEATS * (1 + LONGER * SUSPECTED) + references * REFERENCE
     left = max(60 * minutes - DRAWING_SECONDS - FORMULA_SECONDS * formulas / jobs, 30 * minutes)
     return max(LEAST_SECONDS, float(f"{left * jobs / OVERHEAD / shares:.3g}"))
@@ -140,25 +140,10 @@ class References:
     def _check(self, scene, file, folder, estimate):
         """The bias of a reference that is not made of differences, against differences; None if
         those cannot be had."""
-        differences = self._run(scene, file, "fd", 104729, folder, STEP)
+        differences = self._run(scene, file, DIFFERENCES, 104729, folder, STEP)
         if differences.status != DONE:
             return None
         return statistics.bias([estimate], differences.estimate)
-
-
-def read_json(file):
-    try:
-        with open(file, encoding="utf-8") as stream:
-            return json.load(stream)
-    except (OSError, ValueError):
-        return None
-
-
-def write_json(file, value):
-    os.makedirs(os.path.dirname(file), exist_ok=True)
-    with open(file + ".partial", "w", encoding="utf-8") as out:
-        json.dump(value, out, indent=1)
-    os.replace(file + ".partial", file)
 
 
 def point_file(output, point):

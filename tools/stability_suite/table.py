@@ -5,11 +5,13 @@ import os
 import re
 import textwrap
 
+from common import read_json
+
 from .families import FAMILIES
-from .suite import Point, point_file, read_json
+from .program import OURS
+from .suite import Point, point_file
 from .verdicts import BIASED, MEANING, NOISY, ORDER, RIGHT, UNKNOWN, number, of_family
 
-OURS = "adaptive"
 AHEAD = 2  # so many times smaller an error is ahead; not tuned
 BEGIN, END = "<!-- stability: begin -->", "<!-- stability: end -->"
 
@@ -111,6 +113,12 @@ def who_breaks(family, records, method):
     return None if text in (RIGHT, "–") else f"{method}: {text}"
 
 
+def seconds_of(stored_records):
+    """Of a run."""
+    seconds = {r["settings"]["seconds"] for _, rs in stored_records for r in rs if r}
+    return ", ".join(f"{s:g}" for s in sorted(seconds))
+
+
 def markdown(stored_records):
     """The table, as it stands between the markers of scenes/STABILITY.md."""
     methods, text = methods_of(stored_records), cells(stored_records)
@@ -120,8 +128,7 @@ def markdown(stored_records):
         knob = f"{family.knob}: {number(family.values[0])} … {number(family.values[-1])}"
         lines.append(f"| {family.name} | {knob} | " +
                      " | ".join(text[family.name, m] for m in methods) + " |")
-    seconds = sorted({r["settings"]["seconds"] for _, rs in stored_records for r in rs if r})
-    lines += ["", "Seconds of a run: " + ", ".join(f"{s:g}" for s in seconds) + "."]
+    lines += ["", f"Seconds of a run: {seconds_of(stored_records)}."]
     lines += textwrap.wrap(against_others_text(stored_records), 100) + [""]
     used = [w for w in ORDER if any(w in verdicts(rs, m) for _, rs in stored_records
                                     for m in methods)]
@@ -140,7 +147,3 @@ def publish(file, stored_records):
         raise ValueError(f"{file}: not one pair of markers {BEGIN} {END}")
     with open(file, "w", encoding="utf-8") as out:
         out.write(whole)
-
-
-def chart_file(output, family):
-    return os.path.join(output, "charts", f"{family.name}.png")
