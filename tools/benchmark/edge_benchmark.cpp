@@ -2,9 +2,7 @@
 // of E(p)), cost of a draw, time of the build. One table to standard output; seeds are fixed.
 //   edge_benchmark [MESH.obj|MESH.ply ...] [--only SAMPLER ...] [--builds]
 // Without meshes: on tori of 1k to 1M edges, the default sampler if none is named. --builds: no
-// draws, and each build five times in turn, the least of which counts. --only also takes the
-// experiments that are no rows of the table: forest-quadrics-kept (pairs where they pay) and
-// forest-leaves-8, forest-leaves-64 and both with -look-ahead-none (leaf_forest.h).
+// draws, and each build five times in turn, the least of which counts.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -16,7 +14,6 @@
 #include <string>
 #include <vector>
 
-#include "edgetree/forest/edge_forest.h"
 #include "limn/core/error.h"
 #include "limn/core/mesh.h"
 #include "limn/core/names.h"
@@ -25,7 +22,6 @@
 #include "limn/edgetree/contribution_bound.h"
 #include "limn/edgetree/edge_sampler_types.h"
 #include "limn/edgetree/rejection.h"
-#include "tools/benchmark/leaf_forest.h"
 
 namespace limn {
 namespace {
@@ -147,41 +143,20 @@ double tests_per_silhouette(const EdgeSamplerInput& input, const EdgeSampler& sa
   return static_cast<double>(tests) / static_cast<double>(counts.silhouettes);
 }
 
-template <LeafSize kSize, int kLookAhead>
-std::unique_ptr<EdgeSampler> make_leaves(const EdgeSamplerInput& input, int threads) {
-  return make_leaf_forest(input, threads, kSize, {.look_ahead = kLookAhead, .most_open = 0});
-}
-
-std::unique_ptr<EdgeSampler> make_kept(const EdgeSamplerInput& input, int threads) {
-  return EdgeForest::build(input, threads, {.quadrics = ForestConfig::Quadrics::kWherePaid});
-}
-
-// What was tried and is in no table.
-std::vector<EdgeSamplerType> experiments() {
-  constexpr int kAhead = ForestConfig{}.look_ahead, kNone = ForestConfig::kNoHeight;
-  return {{"forest-quadrics-kept", "", make_kept},
-          {"forest-leaves-8", "", make_leaves<LeafSize::k8, kAhead>},
-          {"forest-leaves-64", "", make_leaves<LeafSize::k64, kAhead>},
-          {"forest-leaves-8-look-ahead-none", "", make_leaves<LeafSize::k8, kNone>},
-          {"forest-leaves-64-look-ahead-none", "", make_leaves<LeafSize::k64, kNone>}};
-}
-
-// The rows that are asked for, in the order of the table; `otherwise` if none is.
+// The rows that are named, in the order of the table; `otherwise` if none is.
 std::vector<EdgeSamplerType> rows_of(const std::vector<std::string>& only,
                                      std::span<const EdgeSamplerType> otherwise) {
-  if (only.empty()) return {otherwise.begin(), otherwise.end()};
   const auto table = edge_sampler_types();
-  std::vector<EdgeSamplerType> known(table.begin(), table.end());
-  for (const EdgeSamplerType& type : experiments()) known.push_back(type);
   for (const std::string& name : only) {
     const auto is_it = [&](const EdgeSamplerType& type) { return type.name == name; };
-    if (std::none_of(known.begin(), known.end(), is_it))
-      throw InputError(unknown_name("edge sampler", name, names_of(known)));
+    if (std::none_of(table.begin(), table.end(), is_it))
+      throw InputError(unknown_name("edge sampler", name, names_of(table)));
   }
-  std::erase_if(known, [&](const EdgeSamplerType& type) {
-    return std::count(only.begin(), only.end(), type.name) == 0;
-  });
-  return known;
+  std::vector<EdgeSamplerType> rows;
+  for (const EdgeSamplerType& type : only.empty() ? otherwise : table) {
+    if (only.empty() || std::count(only.begin(), only.end(), type.name) > 0) rows.push_back(type);
+  }
+  return rows;
 }
 
 double ray_nanoseconds(const Mesh& mesh) {
