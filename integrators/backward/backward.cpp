@@ -18,6 +18,7 @@
 #include "integrators/estimates/batch_record.h"
 #include "integrators/methods/hair_gaps.h"
 #include "integrators/methods/selection.h"
+#include "integrators/paths/traced_scene.h"
 #include "integrators/terms/term.h"
 #include "limn/core/error.h"
 #include "limn/core/names.h"
@@ -120,15 +121,9 @@ class BackwardPass {
         film_(scene.film, adjoint_pixels(scene, adjoint)),
         choice_(film_.pixels(), options.uniform_pixels),
         parameters_(scene, reverse_parameters(scene, options)),
-        tracer_(make_embree_tracer(parameters_.scene(), settings.threads)),
-        lights_(parameters_.scene()),
         method_(reverse_method(options.sampler)),
-        closed_(method_.closed
-                    ? std::make_unique<ClosedLight>(parameters_.scene(), settings.threads)
-                    : nullptr),
-        viewpoints_(parameters_.scene()),
-        mirrored_(closed_ ? nullptr : MirroredLight::make(parameters_.scene(), lights_)),
-        path_{parameters_.scene(), *tracer_, lights_, closed_.get(), &viewpoints_, mirrored_.get()},
+        traced_(parameters_.scene(), settings.threads, {.closed = method_.closed, .edges = true}),
+        path_(traced_.context()),
         input_(path_, 3, {1, 1, 1, 1}, method_.sampler, settings.threads),
         context_{path_, parameters_, input_.edges(),
                  EdgeMotion(parameters_.slots(), input_.edges()), FilterTable(scene.film.filter)} {
@@ -154,7 +149,7 @@ class BackwardPass {
   double film_samples(size_t term) const {
     if (term != kCamera) return options_.shadow_samples;
     if (options_.camera_samples > 0) return options_.camera_samples;
-    return closed_ ? 1 : 0.25;  // where nothing else is noisy, these points are what is
+    return method_.closed ? 1 : 0.25;  // where nothing else is noisy, these points are what is
   }
   size_t points_per_sample(size_t term) const {
     return static_cast<size_t>(
@@ -188,13 +183,9 @@ class BackwardPass {
   FilmAdjoint film_;
   PixelChoice choice_;
   ParameterSlots parameters_;
-  std::unique_ptr<RayTracer> tracer_;
-  Lights lights_;
   ReverseMethod method_;
-  std::unique_ptr<ClosedLight> closed_;  // null where paths are sampled
-  Viewpoints viewpoints_;
-  std::unique_ptr<MirroredLight> mirrored_;  // null where nothing mirrors
-  PathContext path_;
+  TracedScene traced_;
+  const PathContext& path_;
   TermInput input_;
   AdjointContext context_;
   std::unique_ptr<CameraEdges> camera_;
@@ -208,12 +199,12 @@ class BackwardPass {
 };
 
 void BackwardPass::select() {
+  const auto types = terms_of(parameters_.scene(), method_.sampler, method_.closed);
   std::vector<size_t> known;
   std::vector<std::string> names;
   for (size_t t = 0; t < kAdjointTerms; ++t) {
     const TermType& type = term_types()[t];
-    if (!type.applies(parameters_.scene()) || (type.regions && !input_.regions())) continue;
-    if (closed_ && type.moved_with_directions && !type.traces_paths) continue;
+    if (std::find(types.begin(), types.end(), &type) == types.end()) continue;
     known.push_back(t);
     names.emplace_back(type.name);
   }
@@ -254,7 +245,7 @@ void BackwardPass::select() {
         "normals is incomplete");
   }
   warn_of_contacts(parameters_.scene(), input_.made_edges(), result_.warnings);
-  warn_of_faces_edge_on(parameters_.scene(), viewpoints_, result_.warnings);
+  warn_of_faces_edge_on(parameters_.scene(), *path_.viewpoints, result_.warnings);
   for (const Parameter& p : parameters_.parameters()) {
     result_.parameters.push_back({p.name, p.unit, p.shape(), Moments(p.numbers())});
   }
@@ -411,7 +402,7 @@ void BackwardPass::run_tiles(size_t samples, ProgressCounter& progress, Contribu
     }
     // A point that sees a lamp past a mesh hangs on hundreds of numbers, most of which its
     // neighbours hang on, too.
-    if (closed_) join_slots(list);
+    if (method_.closed) join_slots(list);
     double inside = 0;
     for (const TermCost& cost : own.costs) inside += cost.seconds;
     own.costs[booked].seconds += watch.seconds() - inside;

@@ -10,6 +10,7 @@
 #include "integrators/methods/faces_estimator.h"
 #include "integrators/methods/selection.h"
 #include "integrators/paths/path_follow.h"
+#include "integrators/paths/traced_scene.h"
 #include "limn/core/error.h"
 
 namespace limn {
@@ -26,10 +27,7 @@ class FacesPass {
         parameters_(scene, reverse_parameters(scene, options)),
         faces_(std::make_shared<FacesInPlace>(parameters_.scene(), settings.threads)),
         pixels_(parameters_.scene(), *faces_, settings.threads, kFacesUser),
-        tracer_(make_embree_tracer(parameters_.scene(), settings.threads, faces_)),
-        lights_(parameters_.scene()),
-        closed_(parameters_.scene(), settings.threads),
-        path_{parameters_.scene(), *tracer_, lights_, &closed_} {
+        traced_(parameters_.scene(), settings.threads, {.closed = true, .faces = faces_}) {
     selected_terms({kFacesTerm}, options.terms, scene.file);
   }
 
@@ -113,7 +111,7 @@ class FacesPass {
     const FacePart<Var> part = parts.part(i, parameters_.scene(), view);
     const CameraRay<Var> ray = view.ray(part.x, part.y);
     RayCount rays;
-    PathTracer<Var, NoVisitor> tracer(path_, rays);
+    PathTracer<Var, NoVisitor> tracer(traced_.context(), rays);
     Walk<Var, NoVisitor> walk(Rng(0, 0, 0), 0, nullptr);
     const StartRay<Var> start{{}, ray.origin, ray.direction};
     tracer.follow_rays({&start, 1}, {&part.face, 1}, {&walk, 1});
@@ -133,10 +131,7 @@ class FacesPass {
   ParameterSlots parameters_;
   std::shared_ptr<const FacesInPlace> faces_;
   PixelRegions pixels_;
-  std::unique_ptr<RayTracer> tracer_;
-  Lights lights_;
-  ClosedLight closed_;
-  PathContext path_;
+  TracedScene traced_;
 };
 
 }  // namespace

@@ -173,11 +173,8 @@ void Fit::Impl::check_terms() const {
     if (std::none_of(parameters_.begin(), parameters_.end(), seen)) continue;
     std::vector<std::string> known;
     if (over_faces()) known.emplace_back(kFacesTerm);
-    for (const TermType& type : term_types().first(kAdjointTerms)) {
-      if (over_faces()) break;
-      if (!type.applies(views[v].scene) || (type.regions && !method.sampler.regions)) continue;
-      if (method.closed && type.moved_with_directions && !type.traces_paths) continue;
-      known.emplace_back(type.name);
+    for (const TermType* type : terms_of(views[v].scene, method.sampler, method.closed)) {
+      if (!over_faces()) known.emplace_back(type->name);
     }
     selected_terms(known, options_.backward.terms, views[v].scene.file);
   }

@@ -51,7 +51,7 @@ CentralDifferences central_differences(const Scene& scene, const std::vector<Dif
                                        int block, const RunSettings& settings, bool even) {
   const Stopwatch watch;
   const Numbers numbers = even ? Numbers::kEvenInBatches : Numbers::kIndependent;
-  const RadianceEstimator::Choices choices(scene);
+  const PathChoices choices(scene);
   std::deque<Scene> moved;  // keeps its elements where they are
   std::vector<std::unique_ptr<SampleEstimator>> estimators;
   CentralDifferences result;

@@ -14,17 +14,15 @@ namespace limn {
 void check_faces_film(const Film& film) { PixelRegions::check(film, kFacesUser); }
 
 struct FacesEstimator::Group {
-  // first: the group before all others, if there is one.
-  Group(const Scene& of, std::span<const Parameter> parameters, int threads, const Group* first,
-        const RayTracer& tracer, const Lights& lights)
-      : scene(deep_copy(of)) {
+  // all: the scene without the group's tangents.
+  Group(const PathContext& all, std::span<const Parameter> parameters)
+      : scene(deep_copy(all.scene)) {
     for (size_t k = 0; k < parameters.size(); ++k) {
       parameters[k].seed(scene, static_cast<int>(k));
     }
-    closed = first ? std::make_unique<ClosedLight>(scene, *first->closed)
-                   : std::make_unique<ClosedLight>(scene, threads);
+    closed = std::make_unique<ClosedLight>(scene, *all.closed);
     view = std::make_unique<CameraView<Dual>>(scene.camera);
-    context.reset(new PathContext{scene, tracer, lights, closed.get()});
+    context.reset(new PathContext{scene, all.tracer, all.lights, closed.get()});
   }
   Scene scene;
   std::unique_ptr<ClosedLight> closed;
@@ -38,16 +36,13 @@ FacesEstimator::FacesEstimator(const Scene& scene, std::span<const Parameter> pa
       lanes_(static_cast<int>(std::min<size_t>(parameters.size(), kLanes))),
       faces_(std::make_shared<FacesInPlace>(scene, threads)),
       pixels_(scene, *faces_, threads, kFacesUser),
-      tracer_(make_embree_tracer(scene, threads, faces_)),
-      lights_(scene),
+      traced_(scene, threads, {.closed = true, .faces = faces_}),
       view_(scene.camera) {
   for (size_t k = 0; k < parameters.size(); k += kLanes) {
     const auto some = parameters.subspan(k).first(std::min<size_t>(kLanes, parameters.size() - k));
-    const Group* first = groups_.empty() ? nullptr : groups_[0].get();
-    groups_.push_back(std::make_unique<Group>(scene, some, threads, first, *tracer_, lights_));
+    groups_.push_back(std::make_unique<Group>(traced_.context(), some));
   }
   for (int k = 0; k < lanes_; ++k) lane_scale_[k] = parameters[k].natural_step;
-  if (groups_.empty()) closed_ = std::make_unique<ClosedLight>(scene, threads);
 }
 
 FacesEstimator::~FacesEstimator() = default;
@@ -74,10 +69,9 @@ bool FacesEstimator::add_part(const PixelParts& parts, size_t i, const Scene& sc
 
 bool FacesEstimator::add_image(const PixelParts& parts, const PixelSample& at,
                                SampleSink& sink) const {
-  const PathContext context{scene_, *tracer_, lights_, closed_.get()};
   Rgb<double> sum;
   for (size_t i = 0; i < parts.size(); ++i) {
-    if (!add_part(parts, i, scene_, view_, context, sink.log(), sum)) return false;
+    if (!add_part(parts, i, scene_, view_, traced_.context(), sink.log(), sum)) return false;
   }
   if (!is_finite(sum)) return false;
   sink.add_radiance(at, sum, 1);

@@ -9,7 +9,7 @@
 
 #include "integrators/estimates/sample_estimator.h"
 #include "integrators/film/pixel_parts.h"
-#include "integrators/paths/path.h"
+#include "integrators/paths/traced_scene.h"
 #include "limn/core/parameter.h"
 
 namespace limn {
@@ -53,9 +53,7 @@ class FacesEstimator final : public SampleEstimator {
   Lanes lane_scale_;
   std::shared_ptr<const FacesInPlace> faces_;
   PixelRegions pixels_;
-  std::unique_ptr<RayTracer> tracer_;
-  Lights lights_;
-  std::unique_ptr<ClosedLight> closed_;  // without parameters
+  TracedScene traced_;
   CameraView<double> view_;
   std::vector<std::unique_ptr<Group>> groups_;
 };

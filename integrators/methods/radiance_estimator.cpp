@@ -38,24 +38,17 @@ RadianceEstimator::RadianceEstimator(const Scene& scene, int threads,
                                      std::shared_ptr<const FilmRegions> visible, bool closed,
                                      Numbers numbers)
     : scene_(scene),
-      tracer_(make_embree_tracer(scene_, threads, visible ? visible->faces() : nullptr)),
-      lights_(scene_),
-      closed_(closed ? std::make_unique<ClosedLight>(scene_, threads) : nullptr),
-      mirrored_(closed ? nullptr : MirroredLight::make(scene_, lights_)),
-      context_{scene_, *tracer_, lights_, closed_.get(), nullptr, mirrored_.get()},
+      traced_(scene_, threads, {.closed = closed, .faces = visible ? visible->faces() : nullptr}),
       camera_(scene_.camera),
       filter_(scene_.film.filter),
       visible_(std::move(visible)),
       numbers_(numbers),
       glossy_(is_glossy(scene_)) {}
 
-RadianceEstimator::RadianceEstimator(const Scene& moved, const Choices& choices, int threads,
+RadianceEstimator::RadianceEstimator(const Scene& moved, const PathChoices& choices, int threads,
                                      Numbers numbers)
     : scene_(moved),
-      tracer_(make_embree_tracer(scene_, threads)),
-      lights_(scene_, &choices.lights),
-      context_{scene_,          *tracer_, lights_, nullptr, nullptr, choices.mirrored.get(),
-               &choices.unmoved},
+      traced_(scene_, choices, threads),
       camera_(scene_.camera),
       filter_(scene_.film.filter),
       numbers_(numbers),
@@ -63,9 +56,10 @@ RadianceEstimator::RadianceEstimator(const Scene& moved, const Choices& choices,
 
 void RadianceEstimator::add_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const {
   // In closed form what is left to chance is where in its pixel a sample lies: it takes two places.
+  const bool closed = traced_.context().closed != nullptr;
   for (const bool mirrored : {false, true}) {
-    if (mirrored && !closed_) break;
-    const double weight = closed_ ? 0.5 : 1;
+    if (mirrored && !closed) break;
+    const double weight = closed ? 0.5 : 1;
     if (sink.log()) {
       PathLog visitor(*sink.log());
       for (const KeyedSample& sample : samples) {
@@ -83,7 +77,7 @@ void RadianceEstimator::trace(std::span<const KeyedSample> samples, bool mirrore
   using Tracer = PathTracer<double, Visitor>;
   static_assert(kMostTogether <= Tracer::kMostWalks);
   RayCount rays;
-  Tracer tracer(context_, rays);
+  Tracer tracer(traced_.context(), rays);
   tracer.work_wide(glossy_);
   DCHECK_LE(samples.size(), kMostTogether);
   // Step by step for all of them, like the paths themselves (path.h).

@@ -7,6 +7,7 @@
 #include "integrators/estimates/sample_estimator.h"
 #include "integrators/film/film_regions.h"
 #include "integrators/paths/path.h"
+#include "integrators/paths/traced_scene.h"
 
 namespace limn {
 
@@ -18,18 +19,8 @@ class RadianceEstimator final : public SampleEstimator {
                     std::shared_ptr<const FilmRegions> visible = nullptr, bool closed = false,
                     Numbers numbers = Numbers::kIndependent);
 
-  // Which light and which share of the directions paths draw, and how they end, as a scene has it
-  // before it moves.
-  // The scene must outlive it.
-  struct Choices {
-    explicit Choices(const Scene& scene)
-        : unmoved(scene), lights(scene), mirrored(MirroredLight::make(scene, lights)) {}
-    const Scene& unmoved;
-    Lights lights;
-    std::unique_ptr<MirroredLight> mirrored;
-  };
-  // Of a scene that has moved, by the choices of the one that has not (limn/core/lights.h).
-  RadianceEstimator(const Scene& moved, const Choices& choices, int threads, Numbers numbers);
+  // The radiance of a scene that has moved, by the choices of the one that has not.
+  RadianceEstimator(const Scene& moved, const PathChoices& choices, int threads, Numbers numbers);
 
   const Scene& scene() const override { return scene_; }
   size_t slots() const override { return 1; }
@@ -47,11 +38,7 @@ class RadianceEstimator final : public SampleEstimator {
            SampleSink& sink) const;
 
   const Scene& scene_;
-  std::unique_ptr<RayTracer> tracer_;
-  Lights lights_;
-  std::unique_ptr<ClosedLight> closed_;      // null where paths are sampled
-  std::unique_ptr<MirroredLight> mirrored_;  // null where nothing mirrors
-  PathContext context_;
+  TracedScene traced_;
   CameraView<double> camera_;
   FilterTable filter_;
   std::shared_ptr<const FilmRegions> visible_;

@@ -17,10 +17,8 @@ MethodType method_row(const std::string& name, const std::string& description,
   method.name = name;
   method.description = description;
   for (const TermType& type : term_types()) {
-    if (type.regions && !term_method.sampler.regions) continue;
-    if (type.moved_film && !term_method.moves_film) continue;
-    if (term_method.closed && type.moved_with_directions && !type.traces_paths) continue;
-    method.terms.emplace_back(type.name);
+    if (has_term(term_method.sampler, type, term_method.closed, term_method.moves_film))
+      method.terms.emplace_back(type.name);
   }
   method.terms_can_be_left_out = true;
   method.ablation = term_method.sampler.ablation || term_method.ablation;

@@ -51,24 +51,6 @@ DirectionField turning_about_axes(const Lanes& steps, int lanes) {
 
 }  // namespace
 
-std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler,
-                                      bool closed, bool moved_film) {
-  std::vector<const TermType*> types;
-  bool (*asked)(const Scene&) = nullptr;  // looks at the whole environment: once for rows alike
-  bool applies = false;
-  for (const TermType& type : term_types()) {
-    if (type.regions && !sampler.regions) continue;
-    if (type.moved_film && !moved_film) continue;
-    if (closed && type.moved_with_directions && !type.traces_paths) continue;
-    if (type.applies != asked) {
-      asked = type.applies;
-      applies = asked(scene);
-    }
-    if (applies) types.push_back(&type);
-  }
-  return types;
-}
-
 TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> parameters,
                              const std::vector<const TermType*>& types,
                              const std::vector<bool>& computed, const EdgeSamplerType& sampler,
@@ -77,21 +59,12 @@ TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> para
     : scene_(seeded(scene, parameters)),
       lanes_(static_cast<int>(parameters.size())),
       lane_scale_(natural_steps(parameters)),
-      tracer_([&] {
-        const Stopwatch watch;
-        auto tracer = make_embree_tracer(scene_, threads, visible ? visible->faces() : nullptr);
-        tracer_seconds_ = watch.seconds();
-        return tracer;
-      }()),
-      lights_(scene_),
-      closed_(closed ? std::make_unique<ClosedLight>(scene_, threads) : nullptr),
-      viewpoints_(scene_),
-      mirrored_(closed ? nullptr : MirroredLight::make(scene_, lights_)),
-      context_{scene_, *tracer_, lights_, closed_.get(), &viewpoints_, mirrored_.get()},
+      traced_(scene_, threads,
+              {.closed = closed, .edges = true, .faces = visible ? visible->faces() : nullptr}),
       camera_(scene_.camera),
       filter_(scene_.film.filter),
       visible_(std::move(visible)),
-      input_(context_, lanes_, lane_scale_, sampler, threads, warping != nullptr),
+      input_(traced_.context(), lanes_, lane_scale_, sampler, threads, warping != nullptr),
       types_(types),
       moves_film_(moved_film),
       rates_(scene_, lanes_, lane_scale_),
@@ -105,8 +78,8 @@ TermEstimator::TermEstimator(const Scene& scene, std::span<const Parameter> para
     vertices_ = vertices_ || terms_[slot]->uses_vertices();
   }
   if (warping) {
-    warp_field_ = std::make_unique<WarpField>(scene_, *tracer_, input_.edges(), warping->options,
-                                              warping->unbiased);
+    warp_field_ = std::make_unique<WarpField>(scene_, traced_.context().tracer, input_.edges(),
+                                              warping->options, warping->unbiased);
   }
 }
 
@@ -389,7 +362,7 @@ TermEstimator::PathCosts TermEstimator::trace(std::span<const Place> places,
                                               bool twice) const {
   PathCosts costs;
   using Tracer = PathTracer<Dual, Visitor>;
-  Tracer tracer(context_, costs.rays);
+  Tracer tracer(traced_.context(), costs.rays);
   tracer.move_directions(rates_);
   tracer.take_light_samples(plan_.light_samples);
   if (splits_now(twice)) tracer.split_by(&rates_);
@@ -571,7 +544,7 @@ void TermEstimator::warn_of_kinks(std::vector<std::string>& warnings) const {
 }
 
 void TermEstimator::describe(GradientStats& stats) const {
-  stats.setup.emplace_back("ray tracer", tracer_seconds_);
+  stats.setup.emplace_back("ray tracer", traced_.tracer_seconds());
   if (visible_) stats.setup.emplace_back("visible regions", visible_->seconds());
   if (const EdgeSamplerInput* edges = input_.made_edges()) {
     stats.setup.emplace_back("edges", input_.edges_seconds());

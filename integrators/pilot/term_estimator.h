@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "integrators/estimates/sample_estimator.h"
+#include "integrators/paths/traced_scene.h"
 #include "integrators/paths/walk.h"
 #include "integrators/paths/warp_field.h"
 #include "integrators/pilot/pilot_moments.h"
@@ -17,12 +18,6 @@ namespace limn {
 
 class FilmRegions;
 
-// The rows of term_types() that the sampler has and the scene has anything of. Slots are indices
-// into it. closed: with light in closed form, which holds whatever vertices see. moved_film:
-// positions on the film may move.
-std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler,
-                                      bool closed = false, bool moved_film = false);
-
 // How directions are warped, see warp_field.h.
 struct Warping {
   WarpOptions options;
@@ -31,7 +26,7 @@ struct Warping {
 
 class TermEstimator final : public SampleEstimator {
  public:
-  // parameters: at most kLanes. types: terms_of the scene. computed: for each of them, whether it
+  // parameters: at most kLanes. types: terms_of() the scene; slots are indices into it. computed: for each of them, whether it
   // is computed. visible: of the film, or null. warping: null where directions are not warped.
   // closed: what surfaces scatter is known in closed form, see closed_light.h.
   TermEstimator(const Scene& scene, std::span<const Parameter> parameters,
@@ -51,7 +46,7 @@ class TermEstimator final : public SampleEstimator {
   void warn_of_kinks(std::vector<std::string>& warnings) const;
   void describe(GradientStats& stats) const;
   const EdgeSamplerInput* edges() const { return input_.made_edges(); }
-  const Viewpoints& viewpoints() const { return viewpoints_; }
+  const Viewpoints& viewpoints() const { return *traced_.context().viewpoints; }
   const MotionRates& motion_rates() const { return rates_; }
   // Whether a slot's samples belong to pixels, not to the film.
   bool adds_to_pixels(size_t slot) const {
@@ -122,7 +117,7 @@ class TermEstimator final : public SampleEstimator {
                                 SampleSink& sink) const;
   void add_logged(const PixelSample& at, const Rng& key, SampleSink& sink) const;
   // How many places of its pixel a path takes: in closed form these alone are left to chance.
-  int places_of_path() const { return closed_ ? 2 : 1; }
+  int places_of_path() const { return traced_.context().closed ? 2 : 1; }
   // Paths that are traced twice must take the same samples, though their vertices move otherwise.
   bool splits_now(bool twice) const { return plan_.splits && !twice; }
   // What turns about the axes change, in the unit of MotionRates: from what lanes 1 to 3 have more
@@ -138,13 +133,7 @@ class TermEstimator final : public SampleEstimator {
   Scene scene_;  // with its parameters seeded
   int lanes_;
   Lanes lane_scale_;
-  double tracer_seconds_ = 0;
-  std::unique_ptr<RayTracer> tracer_;
-  Lights lights_;
-  std::unique_ptr<ClosedLight> closed_;  // null where paths are sampled
-  Viewpoints viewpoints_;
-  std::unique_ptr<MirroredLight> mirrored_;  // null where nothing mirrors
-  PathContext context_;
+  TracedScene traced_;
   CameraView<Dual> camera_;
   FilterTable filter_;
   std::shared_ptr<const FilmRegions> visible_;

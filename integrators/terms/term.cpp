@@ -10,6 +10,28 @@ static_assert(std::size(kTermTypes) <= kMostTerms);
 
 std::span<const TermType> term_types() { return kTermTypes; }
 
+bool has_term(const EdgeSamplerType& sampler, const TermType& type, bool closed, bool moved_film) {
+  if (type.regions && !sampler.regions) return false;
+  if (type.moved_film && !moved_film) return false;
+  return !closed || !type.moved_with_directions || type.traces_paths;
+}
+
+std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler,
+                                      bool closed, bool moved_film) {
+  std::vector<const TermType*> types;
+  bool (*asked)(const Scene&) = nullptr;  // looks at the whole environment: once for rows alike
+  bool applies = false;
+  for (const TermType& type : term_types()) {
+    if (!has_term(sampler, type, closed, moved_film)) continue;
+    if (type.applies != asked) {
+      asked = type.applies;
+      applies = asked(scene);
+    }
+    if (applies) types.push_back(&type);
+  }
+  return types;
+}
+
 const EdgeSamplerInput& TermInput::edges() {
   if (edges_) return *edges_;
   const Stopwatch watch;

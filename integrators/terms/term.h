@@ -8,6 +8,7 @@
 // used by all threads at once.
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "integrators/estimates/sample_estimator.h"
 #include "integrators/lights/light_regions.h"
@@ -177,6 +178,13 @@ struct TermType {
 };
 // In the order of --samples and of all tables.
 std::span<const TermType> term_types();
+// Whether a sampler has a term. closed: light is known in closed form, which holds whatever vertices
+// see. moved_film: positions on the film may move.
+bool has_term(const EdgeSamplerType& sampler, const TermType& type, bool closed, bool moved_film);
+// The rows that the sampler has and that apply to the scene, in their order: forward and reverse
+// mode, fits and comparisons ask here.
+std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler,
+                                      bool closed = false, bool moved_film = false);
 // Sums of all terms are kept on the stack.
 inline constexpr size_t kMostTerms = 7;
 

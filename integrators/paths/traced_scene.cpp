@@ -1,0 +1,27 @@
+// What paths need of a scene, in the order in which one part needs the other.
+#include "integrators/paths/traced_scene.h"
+
+#include "limn/integrators/run.h"
+
+namespace limn {
+
+TracedScene::TracedScene(const Scene& scene, int threads, const Options& options)
+    : tracer_([&] {
+        const Stopwatch watch;
+        auto tracer = make_embree_tracer(scene, threads, options.faces);
+        tracer_seconds_ = watch.seconds();
+        return tracer;
+      }()),
+      lights_(scene),
+      closed_(options.closed ? std::make_unique<ClosedLight>(scene, threads) : nullptr),
+      viewpoints_(options.edges ? std::make_unique<Viewpoints>(scene) : nullptr),
+      mirrored_(options.closed ? nullptr : MirroredLight::make(scene, lights_)),
+      context_{scene, *tracer_, lights_, closed_.get(), viewpoints_.get(), mirrored_.get()} {}
+
+TracedScene::TracedScene(const Scene& moved, const PathChoices& choices, int threads)
+    : tracer_(make_embree_tracer(moved, threads)),
+      lights_(moved, &choices.lights),
+      context_{moved,           *tracer_, lights_, nullptr, nullptr, choices.mirrored.get(),
+               &choices.unmoved} {}
+
+}  // namespace limn

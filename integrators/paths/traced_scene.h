@@ -1,0 +1,52 @@
+#pragma once
+// A scene made ready for paths, once for every pass: ray tracer, lights, viewpoints, and light in
+// closed form or mirrored light.
+#include <memory>
+
+#include "integrators/paths/path_context.h"
+#include "limn/core/faces_in_place.h"
+
+namespace limn {
+
+// Which light and which share of the directions paths draw, and how they end, as a scene has it
+// before it moves. The scene must outlive it.
+struct PathChoices {
+  explicit PathChoices(const Scene& scene)
+      : unmoved(scene), lights(scene), mirrored(MirroredLight::make(scene, lights)) {}
+  const Scene& unmoved;
+  Lights lights;
+  std::unique_ptr<MirroredLight> mirrored;
+};
+
+class TracedScene {
+ public:
+  struct Options {
+    // The light that surfaces scatter is known in closed form: InputError if it is not
+    // (closed_light.h).
+    bool closed = false;
+    // Paths start beside edges.
+    bool edges = false;
+    // The faces that overlap; null: they are found here.
+    std::shared_ptr<const FacesInPlace> faces = nullptr;
+  };
+  // scene: with its parameters seeded; it must outlive this.
+  TracedScene(const Scene& scene, int threads, const Options& options);
+  // A scene that has moved, traced by the choices of the one that has not (limn/core/lights.h).
+  TracedScene(const Scene& moved, const PathChoices& choices, int threads);
+  TracedScene(const TracedScene&) = delete;
+  TracedScene& operator=(const TracedScene&) = delete;
+
+  const PathContext& context() const { return context_; }
+  double tracer_seconds() const { return tracer_seconds_; }
+
+ private:
+  double tracer_seconds_ = 0;
+  std::unique_ptr<RayTracer> tracer_;
+  Lights lights_;
+  std::unique_ptr<ClosedLight> closed_;      // null where paths are sampled
+  std::unique_ptr<Viewpoints> viewpoints_;   // null where none starts beside an edge
+  std::unique_ptr<MirroredLight> mirrored_;  // null where nothing mirrors
+  PathContext context_;
+};
+
+}  // namespace limn
