@@ -1,7 +1,7 @@
 #pragma once
-// Eight lanes of float or int (vector extension of GCC and Clang): the children of a node side by
-// side. Arithmetic and comparisons work lane by lane; a comparison gives -1 (true) or 0 in integer
-// lanes.
+// Eight floats or ints in a SIMD vector (extension of GCC and Clang), one per child of a
+// node. Arithmetic and comparisons are element-wise; comparisons give integer masks, -1
+// (true) or 0.
 #include <cmath>
 #include <cstdint>
 #ifdef __AVX__
@@ -17,10 +17,10 @@ typedef int32_t Ints __attribute__((vector_size(4 * kWidth)));
 
 inline Floats splat(float a) { return Floats{} + a; }
 
-// a where the mask's lane is true, else b.
+// Element-wise: a where the mask is true, else b.
 inline Floats select(Ints mask, Floats a, Floats b) { return mask ? a : b; }
 
-// If a lane of a or b is not a number, the result is b's.
+// If an element of a or b is NaN, the result is b's.
 inline Floats min(Floats a, Floats b) { return a < b ? a : b; }
 inline Floats max(Floats a, Floats b) { return a > b ? a : b; }
 inline Floats abs(Floats a) { return (Floats)((Ints)a & 0x7fffffff); }
@@ -39,7 +39,7 @@ inline float sum(Floats a) {
   return ((a[0] + a[4]) + (a[2] + a[6])) + ((a[1] + a[5]) + (a[3] + a[7]));
 }
 
-// Bit i: the mask's lane i is true.
+// Bit i: element i of the mask is true.
 inline uint32_t bits(Ints mask) {
 #ifdef __AVX__
   return static_cast<uint32_t>(_mm256_movemask_ps((__m256)mask));
@@ -50,7 +50,7 @@ inline uint32_t bits(Ints mask) {
 #endif
 }
 
-// A three-vector per lane.
+// A SIMD vector of three-vectors.
 struct Floats3 {
   Floats x, y, z;
 };

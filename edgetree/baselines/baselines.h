@@ -1,5 +1,5 @@
 #pragma once
-// One factory per sampler of this folder, for the table in edge_sampler_types.cpp.
+// Factories of this folder's samplers, for the table in edge_sampler_types.cpp.
 #include <memory>
 
 #include "limn/edgetree/edge_sampler.h"

@@ -1,4 +1,4 @@
-// The oracle: finds E(p) by the sides of all faces on which p lies. Time grows with their number.
+// The reference sampler: finds E(p) by testing the planes of all faces, in linear time.
 #include <algorithm>
 #include <memory>
 
@@ -8,16 +8,16 @@
 namespace limn {
 namespace {
 
-// What listing needs of a mesh, packed. Planes: one array per coefficient, so that eight are tested
-// at once. Edges: the two faces, and the sides that p must be on, of either face, for the edge to
-// be a candidate (see is_candidate).
+// Packed data of a mesh. Planes: one array per coefficient, so that eight are tested at once.
+// Edges: the two faces, and for each the sides on which p makes the edge a candidate (see
+// is_candidate).
 struct Packed {
   std::vector<double> x, y, z, offset;
   std::vector<std::array<uint32_t, 2>> faces;
   std::vector<uint8_t> needed;
 };
 
-// Front and back at once: on the plane, to rounding.
+// Both kFront and kBack: on the plane, up to rounding.
 enum Side : uint8_t { kFront = 1, kBack = 2, kNever = 4 };
 
 class BruteForceSampler final : public ListingSampler {
@@ -35,7 +35,7 @@ class BruteForceSampler final : public ListingSampler {
   }
 
  private:
-  // Grows alone: what is resized anew is written twice.
+  // Only grows: a resize would initialise the memory again.
   struct Scratch {
     std::vector<uint8_t> sides;        // of the faces
     std::vector<uint32_t> candidates;  // and one more
@@ -80,7 +80,7 @@ class BruteForceSampler final : public ListingSampler {
     }
   }
 
-  // No branch depends on the data.
+  // Branch-free, independent of the data.
   void find_candidates(ShapeId object, const Vec3d& p,
                        std::vector<uint32_t>& found) const override {
     static thread_local const auto owned = std::make_unique<Scratch>();

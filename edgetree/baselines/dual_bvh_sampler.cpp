@@ -1,14 +1,14 @@
-// The contour query of Nowrouzezahrai, Baran, Mitchell, Jarosz 2014 (section 3.1), for all of E(p):
-// the planes of an edge's two faces are the ends of a segment in the space of planes, (n, offset),
-// and the planes through p are a hyperplane there, (p, 1) . q = 0. The edge is a silhouette where
-// the hyperplane cuts the segment, so none is below a node whose box of segments it misses:
-//   |c . x| > sum of h_i |x_i|,   x = (p, 1), c the box's center, h its half-widths.
-//
-// Where we depart: space is moved and scaled so that the mesh fills the unit ball, or the fourth
-// axis would rule all splits. Sharp edges of closed one-sided meshes, which need p in front of a
-// face, have a tree of their own, whose boxes are rejected if they lie behind; edges that are in
-// E(p) from everywhere have a list. Splits are at the median of the widest axis of the segments'
-// middles. Draws are those of `brute`, which finds the same edges.
+// The contour query of Nowrouzezahrai, Baran, Mitchell, Jarosz 2014 (section 3.1), for all of
+// E(p). In the space of planes (n, offset) an edge is the segment between the planes of its
+// faces, and the planes through p form the hyperplane (p, 1) . q = 0. The edge is a
+// silhouette if the hyperplane cuts the segment, so a node is rejected if the hyperplane
+// misses its box:
+// |c . x| > sum of h_i |x_i|, with x = (p, 1), the box's center c and half-widths h.
+// Differences: space is scaled so that the mesh fills the unit ball, or the fourth axis would
+// dominate all splits. Sharp edges of closed one-sided meshes, which need p in front of a
+// face, have a separate tree whose boxes are rejected from behind; edges that are always in
+// E(p) are in a list. Splits are at the median of the widest axis of segment midpoints. Draws
+// are those of `brute`, which finds the same edges.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -22,11 +22,11 @@ namespace {
 
 using Dual = std::array<double, 4>;
 
-// When an edge is in E(p).
+// The condition under which an edge is in E(p).
 enum class Kind : uint8_t {
   kNever,
-  kSilhouette,  // p is on either side of its planes
-  kFacing,      // p is in front of one
+  kSilhouette,  // p is between its planes
+  kFacing,      // p is in front of one of its faces
   kAlways
 };
 Kind kind_of(const EdgeMesh& mesh, const Edge& edge) {
@@ -43,19 +43,19 @@ Kind kind_of(const EdgeMesh& mesh, const Edge& edge) {
 }
 
 struct Node {
-  std::array<float, 4> center, half;  // the box is no smaller than its segments'
+  std::array<float, 4> center, half;  // contains its segments after rounding
   uint32_t begin = 0, end = 0;        // of the edges
   uint32_t right = 0;                 // second child; the first follows its parent; 0 for a leaf
   Kind kind = Kind::kAlways;
 };
 
-// A point as its hyperplane in the frame of a tree.
+// A point as a hyperplane in the frame of a tree.
 struct DualPoint {
   Dual x;
   double error;  // of a distance
 };
 
-// Of one mesh.
+// The trees over one mesh.
 class DualTree {
  public:
   explicit DualTree(const EdgeMesh& mesh) : mesh_(mesh) {
@@ -70,7 +70,7 @@ class DualTree {
 
   DualPoint at(const Vec3d& p) const {
     const Vec3d w = (p - center_) / radius_;
-    // Of the frame's own rounding, as much as of the distance's.
+    // The frame's rounding error equals that of the distance.
     return {{w.x, w.y, w.z, 1}, 2 * distance_error(mesh_, p) / radius_};
   }
 
@@ -142,7 +142,7 @@ class DualTree {
     return {plane.n.x, plane.n.y, plane.n.z, plane.distance(center_) / radius_};
   }
 
-  // Depth first, one edge a leaf. Returns the box.
+  // Builds in depth-first order, with one edge per leaf. Returns the box.
   Box build(uint32_t begin, uint32_t end, Kind kind, const std::vector<Dual>& middles) {
     const auto index = static_cast<uint32_t>(nodes_.size());
     nodes_.push_back({{}, {}, begin, end, 0, kind});
@@ -228,7 +228,7 @@ class DualRejectionTree final : public RejectionTree {
 
   const std::vector<DualTree>& trees_;
   std::vector<Place> places_;   // of each node
-  std::vector<uint32_t> open_;  // nodes around the next one, outermost first
+  std::vector<uint32_t> open_;  // ancestors of the next node, outermost first
 };
 
 class DualBvhSampler final : public ListingSampler {

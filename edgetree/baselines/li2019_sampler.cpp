@@ -1,21 +1,21 @@
-// The edge sampler of Li et al. 2018, as his thesis (2019) tells it: the baseline.
+// The edge sampler of Li et al. 2018, as described in Li's thesis (2019): a baseline.
 //
-// Binary trees over the edges' positions and the Hough transforms of their faces' planes. With an
-// origin o, a plane is the point h of it that is nearest to o. The planes through p are the points
-// of the sphere whose diameter is the segment from o to p: an edge is a silhouette where its two
-// points lie on either side of that sphere, and a node has none where the box of all its points
-// lies wholly inside or wholly outside the hollow sphere.
-// That holds for edges that are no silhouettes from o: with s the signed distance of o, a plane's
-// point lies inside the sphere where s and the signed distance of p agree, so the two planes of an
-// edge must have the same sign of s. All other edges, and those that matter from everywhere, are in
-// a tree of their own over positions alone, which rejects nothing. Importance of a node: summed
+// It uses binary trees over the edges' positions and the Hough transforms of their faces'
+// planes. With an origin o, a plane is represented by its point h closest to o. The planes
+// through p are the points of the sphere with the diameter from o to p. An edge is a
+// silhouette if its two points are on different sides of that sphere. A node is rejected
+// if the box of all its points is entirely inside or entirely outside of the hollow
+// sphere.
+// This requires edges that are no silhouettes from o: a plane's point is inside the sphere
+// if the signed distances s of o and of p agree, so both planes of an edge must have the
+// same sign of s. Other edges, and those that are always candidates, are in a separate
+// tree over positions alone, which rejects nothing. The importance of a node is its total
 // length times the largest cosine of the transformed box, divided by the distance.
-//
-// Where we depart: o is the center of the scene's edges (he takes the camera's place, which an edge
-// sampler does not know); the sphere-box test is exact; and a hundredth of the untransformed cosine
-// is added, so that no edge is lost where the transformed cosine is zero and the BSDF is not.
-// redner takes the sphere for solid, by mistake (Soroka et al. 2025, App. F), and so rejects less:
-// li2019-solid.
+// Differences: o is the center of the scene's edges (the thesis uses the camera, unknown
+// to an edge sampler); the sphere-box test is exact; and a hundredth of the untransformed
+// cosine is added, so that no edge is lost where only the transformed cosine is zero.
+// redner treats the sphere as solid by mistake (Soroka et al. 2025, App. F) and rejects
+// less: li2019-solid.
 #include <algorithm>
 #include <array>
 
@@ -29,7 +29,7 @@ namespace {
 struct Node {
   Bounds positions;
   Bounds planes;                // Hough points of all faces
-  bool always = false;          // the planes say nothing: may matter from everywhere
+  bool always = false;          // always a candidate: the planes are unused
   double length = 0;            // of all edges
   uint32_t begin = 0, end = 0;  // range of edges
   uint32_t right = 0;           // second child; the first follows its parent; 0 for a leaf
@@ -39,10 +39,10 @@ struct Item {
   EdgeRef id;
   Vec3d center;
   Vec3d plane;  // mean of the Hough points
-  bool always;  // in the tree over positions alone
+  bool always;  // belongs to the tree over positions alone
 };
 
-// Whether the sphere around `center` meets the box.
+// True if the sphere around `center` meets the box.
 bool meets_sphere(const Bounds& box, const Vec3d& center, double radius, bool solid) {
   double nearest = 0;
   double farthest = 0;
@@ -54,12 +54,12 @@ bool meets_sphere(const Bounds& box, const Vec3d& center, double radius, bool so
     nearest += near * near;
     farthest += far * far;
   }
-  // Rounding of squares: a box that touches the sphere is kept.
+  // Tolerance for rounding: a box that touches the sphere is kept.
   const double slack = 1e-12 * (farthest + radius * radius);
   return nearest <= radius * radius + slack && (solid || farthest >= radius * radius - slack);
 }
 
-// The planes through p, as Hough points.
+// The sphere of all planes through p, as Hough points.
 struct PlaneSphere {
   Vec3d center;
   double radius;
@@ -72,8 +72,8 @@ struct PlaneSphere {
   }
 };
 
-// Largest z / |w| over the axis-aligned box around eight corners; z grows with the cosine, x and y
-// with the distance.
+// Largest z / |w| over the box of eight corners: z increases with the cosine, x and y with the
+// distance.
 double largest_cosine(const std::array<Vec3d, 8>& corners) {
   Bounds box;
   for (const Vec3d& corner : corners) box.extend(corner);
@@ -84,7 +84,7 @@ double largest_cosine(const std::array<Vec3d, 8>& corners) {
   return z / std::sqrt(x * x + y * y + z * z);
 }
 
-// A query with what all nodes need of it.
+// Query data shared by all nodes.
 struct Descent {
   const EdgeQuery& query;
   LtcLobe lobe;
@@ -114,14 +114,14 @@ struct Descent {
   }
 };
 
-// The nodes but for the root, which no choice leads to.
+// All nodes except the root, to which no choice leads.
 class Li2019RejectionTree final : public RejectionTree {
  public:
   Li2019RejectionTree(const std::vector<Node>& nodes, const std::vector<Item>& items,
                       const Vec3d& origin, bool solid)
       : tree_(nodes), origin_(origin), solid_(solid), first_(nodes.size() > 1 ? 1 : 0) {
     for (const Item& item : items) edges_.push_back(item.id);
-    std::vector<uint32_t> open;  // nodes around the next one, outermost first
+    std::vector<uint32_t> open;  // ancestors of the next node, outermost first
     for (uint32_t i = first_; i < tree_.size(); ++i) {
       while (!open.empty() && nodes_[open.back()].end <= tree_[i].begin) close(open);
       const uint32_t parent = open.empty() ? kNoNode : open.back();
@@ -218,9 +218,9 @@ class Li2019Sampler final : public EdgeSampler {
     return transformed_edge(Descent(query, origin_, solid_), id).pdf_t(t);
   }
 
-  // A walk down the trees costs a handful of rays.
+  // A descent costs a few rays.
   double draw_cost() const override { return 5; }
-  // First draws took 1.1 to 1.2 more than further ones, which took 4 to 5.
+  // First draws cost 1.1 to 1.2 more than further ones, which cost 4 to 5.
   double query_cost() const override { return 1; }
   SamplerSize size() const override {
     uint64_t bytes = nodes_.size() * sizeof(Node) + items_.size() * sizeof(Item);
@@ -252,7 +252,7 @@ class Li2019Sampler final : public EdgeSampler {
     }
   }
 
-  // Also where o lies within rounding of a plane.
+  // Also true if o is within rounding of a plane.
   bool matters_everywhere(const EdgeMesh& mesh, EdgeId id) const {
     const Edge& edge = mesh.edge(id);
     if (edge.edge_class != EdgeClass::kSmooth && edge.edge_class != EdgeClass::kFlat) return true;
@@ -275,8 +275,8 @@ class Li2019Sampler final : public EdgeSampler {
     return box;
   }
 
-  // Splits the range at `first_split` if that lies inside (between the two trees), else at the
-  // median of the widest of the axes. Returns the node.
+  // Splits the range at `first_split` if that is inside (between the two trees), else at the median
+  // of the widest axis. Returns the node.
   uint32_t build(uint32_t begin, uint32_t end, uint32_t first_split = 0) {
     const auto index = static_cast<uint32_t>(nodes_.size());
     nodes_.emplace_back();
@@ -353,7 +353,7 @@ class Li2019Sampler final : public EdgeSampler {
     return widest;
   }
 
-  // Probability of the first child; negative if neither can hold a silhouette.
+  // Probability of the first child; negative if neither child can hold a silhouette.
   double first_share(const Descent& descent, uint32_t node) const {
     const double first = descent.importance(nodes_[node + 1]);
     const double second = descent.importance(nodes_[nodes_[node].right]);

@@ -1,4 +1,4 @@
-// Draws from all of E(p); the list of a thread's last query is kept for its next draw.
+// Draws from all of E(p). Each thread caches the list of its last query.
 #include "edgetree/baselines/listing_sampler.h"
 
 #include <algorithm>
@@ -26,7 +26,7 @@ std::atomic<uint64_t> serials{0};
 
 }  // namespace
 
-// The candidates of the last query that a thread asked; several draws of one query share it.
+// The candidates of a thread's last query, shared by further draws.
 struct ListingSampler::Listing {
   uint64_t sampler = 0;
   EdgeQuery query;
@@ -78,7 +78,7 @@ EdgeBound ListingSampler::bound_of(const EdgeQuery& query, EdgeRef id) const {
 }
 
 const ListingSampler::Listing& ListingSampler::list(const EdgeQuery& query) const {
-  // On the heap: a shared library has little room for what belongs to threads.
+  // On the heap: shared libraries have little thread-local storage.
   static thread_local const auto owned = std::make_unique<Listing>();
   Listing& listing = *owned;
   if (listing.sampler == serial_ && same(listing.query, query)) return listing;

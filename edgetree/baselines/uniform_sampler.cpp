@@ -1,4 +1,4 @@
-// The sampler that knows nothing: the least that any other must beat.
+// Uniform sampling of edges: the baseline that every other sampler must beat.
 #include <algorithm>
 
 #include "edgetree/baselines/baselines.h"
@@ -6,7 +6,7 @@
 namespace limn {
 namespace {
 
-// Every edge of the scene is drawn alike; one that is no candidate ends the draw.
+// Draws every edge with equal probability; rejects a draw that is no candidate.
 class UniformSampler final : public EdgeSampler {
  public:
   explicit UniformSampler(const EdgeSamplerInput& input) : input_(input) {
@@ -41,7 +41,7 @@ class UniformSampler final : public EdgeSampler {
   }
 
   double draw_cost() const override { return 1; }
-  // To make the query, of which samplers share none of what they do.
+  // The cost of setting up the query; draws share no work.
   double query_cost() const override { return 0.5; }
 
  private:

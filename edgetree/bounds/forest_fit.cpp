@@ -1,4 +1,4 @@
-// The dual box of a set of edges: the normaliser, the axes, the rows.
+// The dual box of a set of edges: normaliser, axes, rows.
 #include "edgetree/bounds/forest_fit.h"
 
 #include <Eigen/Dense>
@@ -10,11 +10,11 @@
 #include "edgetree/bounds/pair_fit.h"
 
 // A plane is q = (n, signed distance of the frame's center / radius), so that q . x is the signed
-// distance of p / radius. Dividing by Z . q > 0 puts all planes on the hyperplane Z . q = 1, an
-// affine 3-space (the chart), where a wedge is the segment between the planes of its two faces.
-// The chart points are Z + t_1 r_1 + t_2 r_2 + t_3 r_3 for an orthonormal basis (t_1, t_2, t_3, Z).
-// A box r = c + sum of e_k u_k a_k, |u_k| <= 1, along axes a_k, becomes in R^4
-//   row_0 = Z + sum of c_i t_i,   row_k = e_k sum of a_k,i t_i.
+// distance of p / radius. Division by Z . q > 0 projects all planes to the hyperplane Z . q = 1, an
+// affine 3-space (the chart), where a wedge is the segment between the planes of its faces. Chart
+// points are Z + t_1 r_1 + t_2 r_2 + t_3 r_3 with an orthonormal basis (t_1, t_2, t_3, Z). A box r
+// = c + sum of e_k u_k a_k, |u_k| <= 1, with axes a_k, becomes in R^4:
+// row_0 = Z + sum of c_i t_i,   row_k = e_k sum of a_k,i t_i.
 
 namespace limn {
 namespace {
@@ -23,7 +23,7 @@ using Eigen::Matrix;
 using Eigen::Vector3d;
 using Eigen::Vector4d;
 
-// Flat edges count a little, for the points on their plane. Not tuned.
+// Weight of flat edges, for points on their plane. Not tuned.
 constexpr double kFlat = 0x1.0p-12;
 
 // Principal axes of points, the widest first.
@@ -67,7 +67,7 @@ void sum_cover(std::span<const Wedge> wedges, const std::vector<Vector3d>& point
   }
 }
 
-// points: coordinates in the box whose rows are those of `fit`, not scaled yet.
+// points: coordinates in the box, whose rows are those of `fit` before scaling.
 PairFit pair_in(const NodeFrame& own, std::span<const Wedge> wedges, const NodeFrame& frame,
                 std::vector<Vector3d>& points, const DualFit& fit) {
   const Eigen::Matrix4d change = between(frame, own);
@@ -117,8 +117,8 @@ DualFit fit_dual(std::span<const Wedge> wedges, const NodeFrame& frame, const Fo
   return fit;
 }
 
-// p is in front of one plane and behind the other iff |(q_0 + q_1) . x| < |(q_0 - q_1) . x|,
-// whatever the planes: no Z is needed.
+// p is between the planes iff |(q_0 + q_1) . x| < |(q_0 - q_1) . x|, for any planes: Z is not
+// needed.
 DualFit fit_edge(const Wedge& wedge, const NodeFrame& frame) {
   const Vector4d a = dual_point(wedge.planes[0], frame), b = dual_point(wedge.planes[1], frame);
   DualFit fit{};

@@ -1,5 +1,5 @@
 #pragma once
-// What a set of edges looks like in the space of planes: the dual box of a child.
+// Dual boxes: bounds of a set of edges in the space of planes.
 #include <array>
 #include <cstdint>
 #include <span>
@@ -10,19 +10,19 @@
 
 namespace limn {
 
-// An edge as the build sees it.
+// An edge as input to the build.
 struct Wedge {
-  std::array<Plane, 2> planes;  // of its faces; both the same if only one matters
+  std::array<Plane, 2> planes;  // of its faces; equal if only one matters
   std::array<Vec3d, 2> ends;
   double length = 0;
   double angle = 0;  // exterior dihedral angle
-  double speed = 0;  // what ObjectMotion leaves: mean of the two ends, lanes added up
+  double speed = 0;  // residual of ObjectMotion: mean of both ends, sum over lanes
   EdgeId edge;
 };
 
-// The frame in which a node's children are described: x = ((p - center) * inverse_radius, 1).
+// The frame of a node's children: x = ((p - center) * inverse_radius, 1).
 struct NodeFrame {
-  Vec3d center;  // representable as floats, as is the inverse radius
+  Vec3d center;  // exactly representable as floats, as is the inverse radius
   double inverse_radius = 1;
 };
 
@@ -33,13 +33,13 @@ struct DualFit {
   PairFit pair;
 };
 
-// Never rejects. cover: what a random plane crosses.
+// A fit that never rejects. cover: the length that a random plane crosses.
 DualFit unrejectable_fit(double cover);
-// Holds all planes of all wedges. In double precision: rounding to float moves rows by a relative
-// 2^-24. own: the frame of the wedges themselves, for a pair of quadrics, too; null for none.
+// A box that holds all planes of all wedges, in double precision; rounding to float moves rows by a
+// relative 2^-24. own: the wedges' frame, for a pair of quadrics; null for none.
 DualFit fit_dual(std::span<const Wedge> wedges, const NodeFrame& frame, const ForestConfig& config,
                  const NodeFrame* own = nullptr);
-// The segment between the planes of one edge: rows 0 and 1.
+// The segment between the planes of an edge: rows 0 and 1.
 DualFit fit_edge(const Wedge& wedge, const NodeFrame& frame);
 
 }  // namespace limn

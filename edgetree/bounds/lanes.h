@@ -1,6 +1,6 @@
 #pragma once
-// Four lanes of double (vector extension of GCC and Clang): the children of a node side by side. A
-// comparison gives -1 (true) or 0 in integer lanes.
+// Four doubles in a SIMD vector (extension of GCC and Clang), one per child of a node. Comparisons
+// give integer masks: -1 (true) or 0.
 #include <cmath>
 #include <cstdint>
 
@@ -10,7 +10,7 @@ inline constexpr int kQuadricWidth = 4;
 
 typedef double Doubles __attribute__((vector_size(8 * kQuadricWidth)));
 typedef int64_t Longs __attribute__((vector_size(8 * kQuadricWidth)));
-// What is stored.
+// Storage type.
 typedef float FourFloats __attribute__((vector_size(4 * kQuadricWidth)));
 
 inline Doubles splat4(double a) { return Doubles{} + a; }
@@ -18,7 +18,7 @@ inline Doubles widen(FourFloats a) { return __builtin_convertvector(a, Doubles);
 
 inline Doubles select(Longs mask, Doubles a, Doubles b) { return mask ? a : b; }
 
-// If a lane of a or b is not a number, the result is b's.
+// If an element of a or b is NaN, the result is b's.
 inline Doubles min(Doubles a, Doubles b) { return a < b ? a : b; }
 inline Doubles max(Doubles a, Doubles b) { return a > b ? a : b; }
 inline Doubles abs(Doubles a) { return (Doubles)((Longs)a & INT64_MAX); }

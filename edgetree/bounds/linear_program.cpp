@@ -1,4 +1,4 @@
-// The one door to CLP.
+// Linear programs with CLP; the only file that includes it.
 #include "edgetree/bounds/linear_program.h"
 
 #include <array>
@@ -12,11 +12,11 @@ namespace {
 constexpr int kVariables = 5;  // D and rho
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// What a thread keeps from one program to the next: to make a model's tables of messages anew costs
-// a third of a solution.
+// Reused by a thread between programs: creating a model's message tables costs a third of a
+// solution.
 struct Workplace {
-  // Holds no program, and is copied for each: whatever a solution leaves in its model cannot reach
-  // the next one, so that the bits do not depend on which thread solves what.
+  // An empty program, copied for each solution. No state can leak between solutions, so results do
+  // not depend on the thread.
   ClpSimplex empty;
   std::vector<int> indices;
   std::vector<double> values, row_lower, row_upper;
@@ -24,7 +24,7 @@ struct Workplace {
   Workplace() { empty.setLogLevel(0); }
 };
 
-// Column by column, all at once: every row added by itself would copy the matrix.
+// Loads all columns at once: adding single rows would copy the matrix each time.
 void load(const std::vector<Eigen::Vector4d>& points, Workplace& place, ClpSimplex& simplex) {
   const size_t rows = points.size();
   std::array<CoinBigIndex, kVariables + 1> starts{};
@@ -49,7 +49,7 @@ void load(const std::vector<Eigen::Vector4d>& points, Workplace& place, ClpSimpl
 }  // namespace
 
 Eigen::Vector4d separating_direction(const std::vector<Eigen::Vector4d>& points) {
-  // On the heap: a shared library has little room for what belongs to threads.
+  // On the heap: shared libraries have little thread-local storage.
   static thread_local const auto owned = std::make_unique<Workplace>();
   Workplace& place = *owned;
   ClpSimplex simplex(place.empty);

@@ -1,4 +1,4 @@
-// The hyperplane that the planes of a node are projected to: by normals alone, or by a linear
+// The hyperplane onto which the planes of a node are projected, from normals alone or by a linear
 // program.
 #include "edgetree/bounds/normaliser.h"
 
@@ -15,8 +15,8 @@ using Eigen::Matrix;
 using Eigen::Vector3d;
 using Eigen::Vector4d;
 
-// Chart points are right to 2^-52 / (Z . q): with less than this of Z . q they could be off by a
-// rounding of floats, which the query's own bound must cover.
+// Chart points have the relative error 2^-52 / (Z . q). For smaller Z . q it could exceed a float's
+// rounding, which the bound of queries must cover.
 constexpr double kMinSeparation = 0x1.0p-20;
 
 struct Farthest {
@@ -32,15 +32,15 @@ Farthest least_product(const std::vector<Vector4d>& points, const Vector4d& z) {
   return least;
 }
 
-// The direction whose largest angle with all normals is smallest, roughly: the center of the
-// smallest enclosing ball of the normals by Badoiu and Clarkson's steps towards the farthest.
+// The direction with approximately the smallest maximum angle to all normals: the center of their
+// smallest enclosing ball, by the iteration of Badoiu and Clarkson.
 Vector4d central_direction(const std::vector<Vector4d>& points) {
   Vector3d mean = Vector3d::Zero();
   for (const Vector4d& q : points) mean += q.head<3>();
   Vector3d center = mean / static_cast<double>(points.size());
   constexpr int kSteps = 12;  // not tuned
   for (int i = 2; i < 2 + kSteps && points.size() > 2; ++i) {
-    // Normals are unit vectors: the farthest has the smallest product with the center.
+    // The farthest unit normal has the smallest product with the center.
     const Farthest far = least_product(points, Vector4d(center[0], center[1], center[2], 0));
     center += (points[far.index].head<3>() - center) / i;
   }
@@ -49,7 +49,7 @@ Vector4d central_direction(const std::vector<Vector4d>& points) {
   return Vector4d(center[0], center[1], center[2], 0) / norm;
 }
 
-// Up to five points, and weights of their mean.
+// Up to five points with weights of a convex combination.
 struct Hull {
   static constexpr int kMost = 5;  // as many as four dimensions need
   Vector4d points[kMost];
@@ -61,8 +61,8 @@ struct Hull {
     for (int i = 0; i < count; ++i) sum += weights[i] * points[i];
     return sum;
   }
-  // Weights, of any sign, of the shortest mean: in proportion to the solution of
-  // (Q^T Q + 1) w = 1. By elimination: the matrix is positive definite.
+  // Weights (of any sign) of the affine combination of least norm, in proportion to the solution of
+  // (Q^T Q + 1) w = 1. Gaussian elimination: the matrix is positive definite.
   void shortest(double (&w)[kMost]) const {
     double rows[kMost][kMost + 1];
     for (int i = 0; i < count; ++i) {
@@ -81,8 +81,8 @@ struct Hull {
     }
     for (int i = 0; i < count; ++i) w[i] /= sum;
   }
-  // Towards the shortest mean, until it is reached or a point has lost its weight, which leaves.
-  // True if one has left.
+  // Moves towards the point of least norm until it is reached or a weight becomes zero; removes
+  // that point and returns true.
   bool shorten() {
     double target[kMost];
     shortest(target);
@@ -105,10 +105,10 @@ struct Hull {
   }
 };
 
-// Whether some mean of the points, with weights that are not negative, is shorter than half of
-// kMinSeparation: then no unit Z has that much with all of them (half is far beyond rounding).
-// Wolfe's algorithm for the shortest vector of a hull. It may give up: the linear programs, many
-// for each such set, find the same.
+// True if a convex combination of the points is shorter than half of kMinSeparation: then no unit Z
+// has that product with all of them (half of it is far beyond rounding). Wolfe's algorithm for the
+// point of least norm in a convex hull. It may give up without an answer; the linear programs then
+// find the same result more slowly.
 bool surrounds_origin(const std::vector<Vector4d>& points) {
   constexpr int kSteps = 32;  // not tuned
   Hull hull;
@@ -127,7 +127,7 @@ bool surrounds_origin(const std::vector<Vector4d>& points) {
   return false;
 }
 
-// The linear program over all points, by adding the most violated ones until none is left.
+// Solves the linear program by adding the most violated constraints until none is left.
 Vector4d farthest_hyperplane(const std::vector<Vector4d>& points) {
   std::vector<Vector4d> active;
   for (int i = 0; i < 4; ++i) {
@@ -142,7 +142,7 @@ Vector4d farthest_hyperplane(const std::vector<Vector4d>& points) {
     if (z.norm() == 0) return z;
     const double rho = least_product(active, z).value;
     const Farthest least = least_product(points, z);
-    // Any Z that works will do: nearly optimal is enough.
+    // Any valid Z suffices: nearly optimal is enough.
     if (least.value > 0.5 * rho || round == kRounds) return z / z.norm();
     active.push_back(points[least.index]);
   }
@@ -153,7 +153,7 @@ Vector4d farthest_hyperplane(const std::vector<Vector4d>& points) {
 Vector4d normaliser_of(const std::vector<Vector4d>& points) {
   Vector4d z = central_direction(points);
   const double least = z.norm() > 0 ? least_product(points, z).value : 0;
-  // The chart would be five times as large as it needs to be. Not tuned.
+  // Below this, the chart would be five times larger than necessary. Not tuned.
   constexpr double kWide = 0.2;
   if (least >= kWide) return z;
   if (surrounds_origin(points)) return Vector4d::Zero();

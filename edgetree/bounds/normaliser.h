@@ -1,13 +1,13 @@
 #pragma once
-// The hyperplane that the planes of a node are projected to.
+// The hyperplane onto which the planes of a node are projected.
 #include <Eigen/Core>
 #include <vector>
 
 namespace limn {
 
-// Unit Z with Z . q > 0 for all points, far from zero; or zero, if no unit vector has 2^-20 or more
-// with all of them. points: at least one, of four coordinates (unit normal, distance), the latter
-// of the size of 1.
+// A unit vector Z with Z . q > 0 for all points, far from zero; or zero if no unit vector has Z . q
+// >= 2^-20 for all of them. points: at least one, (unit normal, distance), with distances of about
+// 1.
 Eigen::Vector4d normaliser_of(const std::vector<Eigen::Vector4d>& points);
 
 // Columns: orthonormal, and orthogonal to the unit vector z (a Householder reflection).

@@ -1,4 +1,4 @@
-// A pair of bounding quadrics as a polynomial of a dual box's coordinates, and its bounds.
+// A pair of bounding quadrics as a polynomial in a dual box's coordinates, with bounds.
 #include "edgetree/bounds/pair_fit.h"
 
 #include <Eigen/Dense>
@@ -13,15 +13,15 @@ using Eigen::Matrix4d;
 using Eigen::Vector3d;
 using Eigen::Vector4d;
 
-// Axes of a box below this share of its distance from the origin count as none. Coordinates along
-// them are rounding, and may lie far outside of [-1, 1]; along others they are right to 2^-24,
-// which is within kMargin (quadric_pair.cpp). What g loses with them is less than what queries
-// leave room for beyond the rounding of rows.
+// Box axes shorter than this, relative to the box's distance from the origin, are ignored.
+// Coordinates along them are rounding errors and may be far outside of [-1, 1]; along other axes
+// they are exact to 2^-24, within kMargin (quadric_pair.cpp). The effect on g is covered by the
+// margin of queries for the rounding of rows.
 constexpr double kThin = 0x1.0p-28;
 
 constexpr float kInfinite = std::numeric_limits<float>::infinity();
 
-// The polynomial of QuadricPairs for what `columns` makes of u; false if it is zero or no number.
+// The polynomial of QuadricPairs under the map `columns`; false if it is zero or NaN.
 bool put_polynomial(const Matrix4d& columns, const Matrix4d& quadric, PairFit& fit) {
   const Matrix4d g = columns.transpose() * quadric * columns;
   double values[9], sum = 0;
@@ -32,7 +32,7 @@ bool put_polynomial(const Matrix4d& columns, const Matrix4d& quadric, PairFit& f
   }
   for (const double value : values) sum += std::fabs(value);
   if (!(sum > 0x1.0p-500 && sum < 0x1.0p500)) return false;
-  // A little less than 1: rounding to floats must not raise the sum above it.
+  // Slightly less than 1 in total, since rounding to floats must not exceed 1.
   const double scale = (1 - 0x1.0p-20) / sum;
   for (int i = 0; i < 9; ++i) fit.coefficients[i] = static_cast<float>(values[i] * scale);
   return true;
@@ -45,8 +45,8 @@ double evaluate(const float (&c)[9], const Vector3d& u) {
   return sum;
 }
 
-// Of f over the segments between points 2 i and 2 i + 1: the ends, and the parabola's vertex where
-// that lies between them. (The paper's Appendix D has the same as a quotient of forms.)
+// Bounds of f over the segments between points 2 i and 2 i + 1: values at the ends, and at the
+// parabola's vertex if it is between. (Appendix D of the paper uses quotients of forms.)
 void put_bounds(const std::vector<Vector3d>& points, PairFit& fit) {
   double low = std::numeric_limits<double>::max(), high = -low;
   const auto add = [&](double value) {
@@ -64,7 +64,7 @@ void put_bounds(const std::vector<Vector3d>& points, PairFit& fit) {
     const double t = -c_1 / (2 * c_2);
     if (t > 0 && t < 1) add(f_0 + t * (c_1 + t * c_2));
   }
-  // More than the rounding of these values; then outward to floats.
+  // Covers the rounding of these values, then rounds outward to floats.
   constexpr double kRounding = 0x1.0p-40;
   fit.low = std::nextafter(static_cast<float>(low - kRounding), -kInfinite);
   fit.high = std::nextafter(static_cast<float>(high + kRounding), kInfinite);

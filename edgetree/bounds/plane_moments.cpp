@@ -1,4 +1,4 @@
-// Moments of planes in the frames of nodes, and the quadric that fits them.
+// Moments of planes in the frames of nodes, and the best-fitting quadric.
 #include "edgetree/bounds/plane_moments.h"
 
 #include <Eigen/Dense>
@@ -12,13 +12,13 @@ using Eigen::Vector4d;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Matrix64 = Eigen::Matrix<double, 6, 4>;
 
-// What is added to a singular matrix, as a share of its trace. Not tuned: far above rounding.
+// Regularisation of a singular matrix, as a share of its trace. Not tuned: far above rounding.
 constexpr double kRidge = 1e-12;
 
 Matrix6d with_ridge(const Matrix6d& m) { return m + Matrix6d::Identity() * (kRidge * m.trace()); }
 
-// Rows: w n and w w in the new frame, where w becomes scale w + n . shift; columns: the products of
-// normals alone.
+// Rows: w n and w w in the new frame, where w becomes scale w + n . shift; columns: products of
+// normals.
 Eigen::Matrix<double, 4, 6> products_of_shift(const Vector3d& shift) {
   const double x = shift[0], y = shift[1], z = shift[2];
   Eigen::Matrix<double, 4, 6> rows;

@@ -2,9 +2,9 @@
 // Moments of a set of planes, and the quadric that fits them best (Soroka, Peters, Marschner 2025,
 // Sec. 4.3).
 //
-// A plane q = (n, w) in the frame of a node has the unit normal n and the signed distance w of the
+// In the frame of a node a plane q = (n, w) has the unit normal n and the signed distance w of the
 // frame's center over its radius. The ten products of its coordinates are s = (n_x^2, n_y^2, n_z^2,
-// n_y n_z, n_x n_z, n_x n_y) and w (n, w); a symmetric Q has q . Q q = v . (s, w n, w w).
+// n_y n_z, n_x n_z, n_x n_y) and w (n, w). For a symmetric Q, q . Q q = v . (s, w n, w w).
 #include <Eigen/Core>
 
 #include "edgetree/bounds/forest_fit.h"
@@ -14,8 +14,8 @@ namespace limn {
 class PlaneMoments {
  public:
   void add(const Eigen::Vector4d& q);
-  // Those of another set, given in another frame. Children are smaller than their parents: nothing
-  // cancels on the way up.
+  // Adds the moments of another set, converted between frames. Children are smaller than their
+  // parents, so nothing cancels.
   void add(const PlaneMoments& other, const NodeFrame& from, const NodeFrame& to);
 
   // The Q that minimises sum (q . Q q)^2 / sum of 4 (Q q)_w^2: the generalized eigenproblem M v =
@@ -32,7 +32,7 @@ class PlaneMoments {
   Eigen::Matrix4d second_ = Eigen::Matrix4d::Zero();  // sum of q q^T
 };
 
-// The matrix that takes planes of the one frame to the other.
+// The matrix that transforms planes from one frame to the other.
 Eigen::Matrix4d between(const NodeFrame& from, const NodeFrame& to);
 
 }  // namespace limn

@@ -1,24 +1,24 @@
-// The range of a quadratic polynomial over the polygon in which a plane cuts a box, four at a time.
+// The range of a quadratic polynomial over the intersection polygon of a plane and a box, for
+// four children at once. Proof that the test is conservative:
 //
 // Let u be a point of the box with |g(u)| <= error, and G the largest of |g_1|, |g_2|, |g_3|.
-// Moving u along the axis of G by reach = error / G at most leads to a point v of the plane, and of
-// the box widened to |v_k| <= side = 1 + reach + kMargin. So it is enough to find the range of f
-// over the polygon C of that box, and to widen it by |f(u) - f(v)| <= 2 side reach: the
-// coefficients' moduli add up to 1. Where reach is above kFar this says nothing, and nothing is
-// rejected.
+// Moving u along the axis of G by at most reach = error / G leads to a point v of the plane in
+// the widened box |v_k| <= side = 1 + reach + kMargin. So it suffices to find the range of f over
+// the polygon C of that box and to widen it by |f(u) - f(v)| <= 2 side reach, as the moduli of
+// the coefficients sum to 1. If reach exceeds kFar, nothing is rejected.
 //
-// What is left is the rounding of doubles. C holds a disc of radius kMargin / 2 around v, and is
-// convex with six sides at most. Its plane is solved for the axis of G, u_2 = alpha + beta_0 u_0 +
-// beta_1 u_1 with |beta| <= 1 and |alpha| <= 4, after the axes were sorted by |g|; f becomes a
-// polynomial phi of two variables whose coefficients are at most 16, so that to evaluate it costs
-// 2^-44. C is the square of side `side` between two lines. The part of each of its six sides that
-// belongs to C has ends that are divided by beta_0 or beta_1, taken to be at least kSteep: that
-// moves u_2 by 2^-33, and the ends are right to 2^-52 * 8 / kSteep = 2^-15. Ends that are off still
-// lie in C to 2^-33 (only their place along the side is ill determined); what is lost between the
-// ends of two neighbours is 2^-14 long, on which a parabola whose ends are known rises by 2^-26
-// above them at most. Vertices and the critical point are evaluated wherever they seem to be, which
-// does no harm if they lie in C; where the division is so ill conditioned that they are missed, the
-// curvature is below 2^-26, and f is flat to that. All of it is far below kSlack.
+// Rounding of doubles: C is convex with at most six sides and contains a disc of radius kMargin /
+// 2 around v. Sort the axes by |g| and solve the plane for the axis of G: u_2 = alpha + beta_0
+// u_0 + beta_1 u_1 with |beta| <= 1 and |alpha| <= 4. Then f becomes a polynomial phi of two
+// variables with coefficients of at most 16, evaluated with the error 2^-44. C is the square of
+// half-width `side` between two lines. The ends of its sides are divided by beta_0 or beta_1,
+// taken to be at least kSteep: this moves u_2 by 2^-33, and the ends are exact to 2^-52 * 8 /
+// kSteep = 2^-15. Inexact ends still lie in C to 2^-33 (only their position along the side is
+// ill-conditioned). The gap between the ends of neighbouring sides is at most 2^-14 long; a
+// parabola with known ends exceeds them there by at most 2^-26. Vertices and the critical point
+// are evaluated at their computed positions, which is harmless inside of C; where an
+// ill-conditioned division misses them, the curvature is below 2^-26, and f is flat to that. All
+// errors are far below kSlack.
 #include "edgetree/bounds/quadric_pair.h"
 
 #include <initializer_list>
@@ -38,7 +38,7 @@ void exchange(Longs swap, Doubles& a, Doubles& b) {
   a = c;
 }
 
-// f and the plane, with the axes in the order of |g|: the largest last.
+// f and the plane, with axes sorted by |g|, the largest last.
 struct Sorted {
   Doubles g[3], linear[3], square[3], product[3];
 
@@ -73,11 +73,11 @@ struct Range {
   }
 };
 
-// c_0 + c_1 t + c_2 t^2 over t in [begin, end].
+// The parabola c_0 + c_1 t + c_2 t^2 over t in [begin, end].
 struct Parabola {
   Doubles c_0, c_1, c_2;
   Doubles operator()(Doubles t) const { return c_0 + t * (c_1 + t * c_2); }
-  // half_inverse: 1 / (2 c_2), whatever it is where that is no number.
+  // half_inverse: 1 / (2 c_2); any value where that is not finite.
   void add_range(Doubles begin, Doubles end, Doubles half_inverse, Range& range) const {
     const Longs valid = begin <= end;
     range.add(valid, (*this)(begin));
@@ -90,8 +90,8 @@ Doubles steep(Doubles beta) {
   return select(abs(beta) >= kSteep, beta, select(beta < 0, splat4(-kSteep), splat4(kSteep)));
 }
 
-// f on the plane, as a polynomial of the two coordinates s and t along which it is least steep:
-// the third is alpha + beta_s s + beta_t t.
+// f on the plane, as a polynomial of the two less steep coordinates s and t: the third is alpha +
+// beta_s s + beta_t t.
 struct OnPlane {
   Doubles alpha, beta_s, beta_t;
   Doubles c, c_s, c_t, c_ss, c_tt, c_st;
@@ -121,7 +121,7 @@ struct OnPlane {
     range.add(inside, c + s * (c_s + c_ss * s + c_st * t) + t * (c_t + c_tt * t));
   }
 
-  // The four sides s = +-side and t = +-side, cut off where the third coordinate is out of the box.
+  // Adds the sides s = +-side and t = +-side, clipped to the range of the third coordinate.
   void add_sides(Range& range) const {
     const Doubles over_s = 1.0 / steep(beta_s), over_t = 1.0 / steep(beta_t);
     const Doubles half_ss = 0.5 / c_ss, half_tt = 0.5 / c_tt;
@@ -139,20 +139,20 @@ struct OnPlane {
   }
 
  private:
-  // Where |offset + beta x| <= side and |x| <= side.
+  // Clips to |offset + beta x| <= side and |x| <= side.
   void cut(Doubles offset, Doubles over_beta, Doubles& begin, Doubles& end) const {
     const Doubles a = (-side - offset) * over_beta, b = (side - offset) * over_beta;
     begin = max(min(a, b), -side);
     end = min(max(a, b), side);
   }
 
-  // The two sides on which the third coordinate is +-side: t = m + n s.
+  // Adds the two sides on which the third coordinate is +-side: t = m + n s.
   void add_lines(Doubles over_s, Doubles over_t, Range& range) const {
     const Doubles n = -beta_s * over_t;
     const Doubles c_2 = c_ss + n * (c_st + c_tt * n), half_inverse = 0.5 / c_2;
     for (const double sign : {-1.0, 1.0}) {
       const Doubles level = sign * side - alpha, m = level * over_t;
-      // |t| <= side, as |beta_s s - level| <= |beta_t| side.
+      // |t| <= side is equivalent to |beta_s s - level| <= |beta_t| side.
       const Doubles wide = side * abs(beta_t);
       const Doubles a = (level - wide) * over_s, b = (level + wide) * over_s;
       const Doubles begin = max(min(a, b), -side), end = min(max(a, b), side);
@@ -187,7 +187,7 @@ Longs meet_pair(const QuadricPairs& pairs, const QueryPlanes& planes) {
   phi.add_sides(range);
   phi.add_inside(range);
   const Doubles slack = 2.0 * side * reach + kSlack;
-  // Also where no side was found, or a number is none.
+  // Also true if no side was found or a number is NaN.
   const Longs above = range.low - slack > widen(pairs.high);
   const Longs below = range.high + slack < widen(pairs.low);
   const Longs known = (reach <= kFar) & (range.low <= range.high);

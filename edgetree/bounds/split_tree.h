@@ -1,5 +1,5 @@
 #pragma once
-// The shape of a tree over edges, by any rule that divides a node's edges among its children.
+// The topology of a tree over edges, for any rule that splits a node's edges among children.
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -14,11 +14,11 @@ struct EdgeRange {
   uint32_t size() const { return end - begin; }
 };
 
-// A node of up to `Width` children, or of edges alone.
+// A node of up to `Width` children, or of edges only.
 template <size_t Width>
 struct SplitNode {
-  std::array<EdgeRange, Width> ranges;     // of the children; empty for none
-  std::array<uint32_t, Width> children{};  // 0 where there is no such node
+  std::array<EdgeRange, Width> ranges;     // of the children; empty if absent
+  std::array<uint32_t, Width> children{};  // 0 if absent
   EdgeRange range;
   bool has_edges = false;
 };
@@ -27,19 +27,19 @@ template <size_t Width>
 struct SplitTree {
   std::vector<SplitNode<Width>> nodes;  // the root first; parents before children
   std::vector<uint32_t> order;          // ranges refer to this permutation of the edges
-  // Subtrees that one thread made, next to each other behind all other nodes: their first nodes,
-  // and the number of all nodes.
+  // Subtrees made by one thread each, stored consecutively after all other nodes: their first
+  // nodes, and the number of all nodes.
   std::vector<uint32_t> parts;
 };
 
-// A child that is still to be made.
+// A child that is not built yet.
 struct PendingChild {
   uint32_t node;
   uint32_t lane;
 };
 
-// Appends the subtree over a range. Below its first node, ranges of at most `stop` edges are left
-// to `pending`.
+// Appends the subtree over a range. Below its first node, ranges of at most `stop` edges are
+// appended to `pending` instead.
 template <size_t Width, class NodeOver>
 void append_subtree(EdgeRange range, uint32_t stop, const NodeOver& node_over,
                     std::vector<SplitNode<Width>>& nodes, std::vector<PendingChild>* pending) {
@@ -58,12 +58,12 @@ void append_subtree(EdgeRange range, uint32_t stop, const NodeOver& node_over,
   }
 }
 
-// The tree over `edges` edges, at least one; the same on any number of threads. node_over(range)
-// returns a SplitNode<Width> without children's indices; it may reorder the edges of the range, and
-// is called for different ranges at once. `order` is left to the caller.
+// Builds the tree over `edges` >= 1 edges; the result does not depend on the number of threads.
+// node_over(range) returns a SplitNode<Width> without child indices. It may reorder the edges of
+// the range, and runs in parallel for disjoint ranges. The caller fills `order`.
 template <size_t Width, class NodeOver>
 SplitTree<Width> split_tree(uint32_t edges, int threads, const NodeOver& node_over) {
-  constexpr uint32_t kTask = 4096;  // edges that one thread splits alone; not tuned
+  constexpr uint32_t kTask = 4096;  // edges per thread task; not tuned
   SplitTree<Width> tree;
   std::vector<PendingChild> pending;
   append_subtree<Width>({0, edges}, edges > kTask ? kTask : 0, node_over, tree.nodes, &pending);

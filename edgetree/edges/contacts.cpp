@@ -1,4 +1,4 @@
-// Where edges lie on faces or near to them: tests of pairs in double precision.
+// Finds where edges lie on faces or near them, by tests of pairs in double precision.
 #include "edgetree/edges/contacts.h"
 
 #include <algorithm>
@@ -23,14 +23,14 @@ struct Interval {
   double t0, t1;
 };
 
-// Of an edge's length, what a face is near to at least.
+// The least share of an edge's length along which a near face must run.
 constexpr double kLeastNear = 1.0 / 16;
-// What touches a needle is off by no more than this share of its width: far beyond what rounding in
-// double precision explains.
+// Tolerance at slivers, as a share of their width: far above double
+// rounding.
 constexpr double kMostTouch = 0x1.0p-20;
 
-// The part of the segment that lies in the triangle, seen along its normal; its sides are moved
-// outward by at least `margin`, at most sqrt(3) times that.
+// The part of the segment inside of the triangle, seen along its normal. The triangle's sides are
+// moved outward by `margin` to sqrt(3) times `margin`.
 std::optional<Interval> clip(const Segment& segment, const Corners& corners, const Vec3d& normal,
                              double margin) {
   Interval part{0, 1};
@@ -48,7 +48,7 @@ std::optional<Interval> clip(const Segment& segment, const Corners& corners, con
   return part;
 }
 
-// The part of the segment that lies on the triangle, if it is more than a point.
+// The part of the segment on the triangle; nothing if it is only a point.
 std::optional<Interval> part_on_face(const Segment& segment, const Corners& corners,
                                      const Plane& plane, double tolerance, double margin) {
   const double d0 = dot(plane.n, segment.a - corners[0]);
@@ -62,13 +62,13 @@ std::optional<Interval> part_on_face(const Segment& segment, const Corners& corn
   return part;
 }
 
-// The part of `longer` along which `shorter` runs, or none; `other` becomes the part of `shorter`.
+// The part of `longer` along `shorter`, or nothing; `other` becomes the part of `shorter`.
 std::optional<Interval> common_part(const Segment& longer, const Segment& shorter, double tolerance,
                                     Interval& other) {
   const double squared = length_squared(longer.d);
   double s0 = dot(shorter.a - longer.a, longer.d) / squared;
   const double slope = dot(shorter.d, longer.d) / squared;
-  // Clipped to where it is beside the longer one.
+  // Clipped to the extent of the longer one.
   other = {0, 1};
   const double s1 = s0 + slope;
   if ((s0 <= 0 && s1 <= 0) || (s0 >= 1 && s1 >= 1) || slope == 0) return std::nullopt;
@@ -135,7 +135,7 @@ class ContactFinder {
     const size_t object = id.object.index();
     return size_around(objects_[object], *meshes_[object], id.edge);
   }
-  // How far two things that touch may be apart: the tolerance, but for needles.
+  // Largest distance at which things touch, reduced at slivers.
   double tolerance(EdgeRef a, EdgeRef b) const {
     return std::min({touch_tolerance(size(a), size(b)), most_touch(a), most_touch(b)});
   }
@@ -155,14 +155,14 @@ class ContactFinder {
       most = std::min(most, most_touch(face));
     return most;
   }
-  // Up to which distance faces are near to the edge, on its part.
+  // Largest distance of near faces, from the edge's faces.
   double reach(EdgeRef id, const Segment& s) const {
     double reach = 0;
     for (const FaceRef face : objects_[id.object.index()].faces_around(id.edge))
       reach = std::max(reach, blur_of(*meshes_[face.shape.index()], face.face, viewer_));
     return std::min(reach, kMostNear * length(s.d));
   }
-  // Edges by their first face: they lie in its box.
+  // Groups edges by their first face, whose box contains them.
   void collect_edges() {
     uint32_t faces = 0;
     for (const EdgeMesh& mesh : objects_) {
@@ -184,7 +184,7 @@ class ContactFinder {
     for_every_edge([&](uint32_t face, EdgeRef id) { edges_[next[face]++] = id; });
   }
 
-  // Pairs that may touch or are near, in an order that does not depend on threads.
+  // Pairs that may touch or are near; the order does not depend on threads.
   std::vector<Pair> find_pairs(std::span<const FacePair> candidates) const {
     constexpr size_t kBlock = 4096;  // not tuned
     std::vector<std::vector<Pair>> found((candidates.size() + kBlock - 1) / kBlock);
@@ -201,7 +201,7 @@ class ContactFinder {
     return pairs;
   }
 
-  // Of the edges that have `first` as their first face, with the other one.
+  // Pairs of the edges whose first face is `first` with the face `other`.
   void append_pairs(FaceRef first, FaceRef other, std::vector<Pair>& pairs) const {
     const size_t f = first_face_[first.shape.index()] + first.face.index();
     const Mesh& mesh = *meshes_[other.shape.index()];
@@ -237,7 +237,7 @@ class ContactFinder {
     return part->t1 - part->t0 >= kLeastNear;
   }
 
-  // Looser than what decides.
+  // A conservative test.
   bool may_touch(EdgeRef id, const Segment& s, double edge_size, FaceRef face) const {
     const Plane& p = plane(face);
     const Corners c = corners(face);
@@ -255,7 +255,7 @@ class ContactFinder {
            std::fabs(d0 + (d1 - d0) * part->t1) <= 4 * tolerance;
   }
 
-  // For every face of a pair, all edges that it is around.
+  // Lists all edges around every face of a pair.
   void list_edges_of_faces(std::span<const Pair> pairs) {
     std::vector<std::vector<bool>> wanted;
     for (const EdgeMesh& mesh : objects_) wanted.emplace_back(mesh.planes.size());
@@ -292,7 +292,7 @@ class ContactFinder {
       contacts.push_back({pair.edge, pair.face, part->t0, part->t1, EdgeId::none()});
   }
 
-  // The part of edge a along which edge b runs. Decided for both alike.
+  // The part of edge a along edge b; symmetric decision.
   std::optional<Interval> part_along(EdgeRef a, EdgeRef b) const {
     const Segment s = segment(a), r = segment(b);
     const double tolerance = this->tolerance(a, b);
@@ -311,8 +311,8 @@ class ContactFinder {
   std::span<const Mesh* const> meshes_;
   Vec3d viewer_;
   int threads_;
-  std::vector<uint32_t> first_face_;  // of each object, in a count over all
-  // Edges whose first face is the f-th of all: edges_[edge_offsets_[f], edge_offsets_[f + 1]).
+  std::vector<uint32_t> first_face_;  // first face number of each object
+  // Edges with the first face f (a global number): edges_[edge_offsets_[f], edge_offsets_[f + 1]).
   std::vector<uint32_t> edge_offsets_;
   std::vector<EdgeRef> edges_;
   std::vector<EdgeOfFace> edges_of_faces_;  // sorted

@@ -1,11 +1,11 @@
 #pragma once
-// Where edges of a scene lie on faces of it, to the rounding of positions, and which faces are
-// nearer to them than rays can tell.
+// Contacts: where edges lie on faces, up to the rounding of positions, and near faces, which rays
+// cannot resolve from an edge.
 //
-// What the rounding of positions of size M explains is touch_tolerance(M). M is the largest
-// coordinate of a face, not of a vertex: a vertex near the origin was rounded where its neighbours
-// are. Needles may be narrower than that, and would touch along both of their sides: they touch
-// what is in their place to a millionth of their width, and are near to the rest.
+// touch_tolerance(M) covers the rounding of positions of size M, the largest coordinate of a face
+// (not of a vertex, since a vertex near the origin is rounded with its neighbours). Slivers may be
+// narrower than that and would touch along both sides. They touch only what coincides with them to
+// a millionth of their width, and are near to the rest.
 #include <span>
 #include <vector>
 
@@ -15,37 +15,37 @@
 
 namespace limn {
 
-// A part [t0, t1] of an edge that lies on a face which is not among those around it.
+// A part [t0, t1] of an edge that lies on a face which is not adjacent to it.
 struct Contact {
   EdgeRef edge;
   FaceRef face;
   double t0, t1;
-  // The edge of the face's mesh that runs along there; none if the edge lies inside the face.
+  // The edge of the face's mesh along the part; none if the part is inside of the face.
   EdgeId along;
 };
 
-// Nearness ends at this share of an edge's length, or of a face's longest side.
+// Limit on nearness, as a share of an edge's length or a face's longest side.
 inline constexpr double kMostNear = 0x1.0p-8;
-// An edge, and a face that is near to at least a sixteenth of it, but is not around it: nearer than
-// the reach of either's faces (face_pairs.h). A near face lies along the edge, or leaves a common
-// corner at less than a sixteenth.
+// An edge and a non-adjacent face that is near to at least a sixteenth of it: closer than the reach
+// of either's faces (face_pairs.h). The face runs along the edge, or leaves a common corner at a
+// slope below a sixteenth.
 struct NearFace {
   EdgeRef edge;
   FaceRef face;
 };
 
 struct Contacts {
-  std::vector<Contact> contacts;  // by edge
-  std::vector<NearFace> near;     // by edge; also of edges that touch the face
+  std::vector<Contact> contacts;  // sorted by edge
+  std::vector<NearFace> near;     // sorted by edge; also for edges that touch the face
 };
 
-// Of edges with faces that have area; of flat edges with faces in other planes alone, and none
-// near. Whether two edges run along each other is decided for the two alike. meshes: of the
-// objects; pairs, viewer: as find_face_pairs has them.
+// Finds the contacts of all edges with non-degenerate faces; flat edges get only faces in other
+// planes, and no near faces. Two edges along each other get the same decision. meshes: of the
+// objects; pairs, viewer: as for find_face_pairs.
 Contacts find_contacts(std::span<const EdgeMesh> objects, std::span<const Mesh* const> meshes,
                        std::span<const FacePair> pairs, const Vec3d& viewer, int threads);
 
-// The size of the faces of `mesh` around an edge: M above.
+// The size M of the faces of `mesh` around an edge, see above.
 double size_around(const EdgeMesh& edges, const Mesh& mesh, EdgeId edge);
 
 }  // namespace limn

@@ -1,4 +1,4 @@
-// Pairs of faces that pass through each other, and the lines along which they do.
+// Finds intersecting faces and their intersection segments.
 #include "limn/edgetree/crossing_curves.h"
 
 #include <algorithm>
@@ -18,7 +18,7 @@ struct Triangle {
   FaceRef face;
 };
 
-// The largest coordinate.
+// The largest absolute coordinate.
 double size_of(const Triangle& triangle) {
   double size = 0;
   for (const Vec3f& x : triangle.corners)
@@ -26,9 +26,9 @@ double size_of(const Triangle& triangle) {
   return size;
 }
 
-// Heights of points over the plane of a triangle, times twice its area: six times the volume of the
-// tetrahedron over it. Corners are taken in the triangle's own order, so that a point has the same
-// bits whichever triangle of its own surface it is asked for.
+// Heights of points over the plane of a triangle, times twice its area: six times the volume of a
+// tetrahedron. Corners keep the triangle's order, so that a point gets the same bits from all faces
+// of its own surface.
 class HeightOver {
  public:
   explicit HeightOver(const Triangle& triangle)
@@ -41,9 +41,9 @@ class HeightOver {
   const Vec3d& normal() const { return normal_; }
   double of(const Vec3d& x) const { return dot(normal_, x - a_); }
 
-  // How much of it rounding can explain: of the three corners and x, wherever x is over the plane
-  // (the gradient's length times 2 * 2^-24 |x|, as in fold_of); no less than lets edges lie on a
-  // face (contacts.h), so that what touches does not cross. size: of x's triangle.
+  // Bound of the rounding error, for corners and x anywhere above the plane (the gradient's length
+  // times 2 * 2^-24 |x|, as in fold_of). At least the tolerance of contacts (contacts.h), so
+  // touching faces do not intersect. size: of x's triangle.
   double rounding(const Vec3d& x, double size) const {
     const double positions = fold_of(a_, b_, c_, x).rounding;
     return std::max(positions, touch_tolerance(size_of(triangle_), size) * length(normal_));
@@ -54,8 +54,8 @@ class HeightOver {
   const Triangle& triangle_;
 };
 
-// On which side of a plane the corners of a triangle lie: heights, 0 where rounding can explain
-// them.
+// Sides of a plane on which the corners of a triangle lie: heights, set to 0 within
+// rounding.
 struct Sides {
   std::array<double, 3> heights;
   bool both() const {
@@ -80,8 +80,8 @@ bool before(const Vec3f& a, const Vec3f& b) {
   return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
 }
 
-// Where an edge with its ends on different sides of a plane meets it: the same bits from either
-// face of the edge.
+// The intersection of an edge with a plane between its ends: the same bits from both faces of the
+// edge.
 Vec3d meet(Vec3f a, Vec3f b, double height_a, double height_b) {
   if (before(b, a)) {
     std::swap(a, b);
@@ -91,13 +91,13 @@ Vec3d meet(Vec3f a, Vec3f b, double height_a, double height_b) {
   return from + (cast<double>(b) - from) * (height_a / (height_a - height_b));
 }
 
-// A part of the line where two planes meet.
+// An interval of the line where two planes intersect.
 struct Interval {
   std::array<Vec3d, 2> ends;
-  std::array<double, 2> places;  // of the ends along the line, in ascending order
+  std::array<double, 2> places;  // positions of the ends along the line, ascending
 };
 
-// What a triangle with corners on both sides of the other's plane has of the line.
+// The interval inside of a triangle with corners on both sides of the other's plane.
 Interval interval_of(const Triangle& triangle, const Sides& sides, const Vec3d& along,
                      const Vec3d& origin) {
   Interval interval;
@@ -135,7 +135,7 @@ std::optional<CrossingSegment> cross_faces(const Triangle& first, const Triangle
   if (!((end ? b : a).places[1] > (begin ? b : a).places[0])) return std::nullopt;
   const CrossingSegment segment{{first.face, second.face},
                                 {(begin ? b : a).ends[0], (end ? b : a).ends[1]}};
-  // Sides that meet in a point have what rounding of either leaves of it in common.
+  // Sides that only meet in a point overlap by rounding errors.
   const double size = std::max(length(segment.ends[0]), length(segment.ends[1]));
   if (length(segment.ends[1] - segment.ends[0]) <= 0x1p-22 * size) return std::nullopt;
   return segment;
@@ -186,7 +186,7 @@ std::vector<CrossingSegment> find_crossings(std::span<const Mesh* const> meshes,
     const size_t begin = block * kBlock;
     for (const FacePair& pair : pairs.subspan(begin, std::min(kBlock, pairs.size() - begin))) {
       const Triangle a = triangle_of(meshes, pair.first), b = triangle_of(meshes, pair.second);
-      // Neighbours along an edge meet there and nowhere else, or in a plane.
+      // Faces with a common edge meet only there or in a plane.
       if (common_corners(a, b) > 1) continue;
       if (const auto segment = cross_faces(a, b)) blocks[block].push_back(*segment);
     }
@@ -224,7 +224,7 @@ Vec3<Lanes> crossing_velocity(std::span<const Mesh* const> meshes, const Crossin
 
 namespace {
 
-// The line where two faces of a segment meet, without the faces around it.
+// Appends the intersection line of a segment's faces, without its incident faces.
 void append_line(std::span<const Mesh* const> meshes, const CrossingSegment& segment, bool moves,
                  EdgeMesh& edges) {
   const auto first = static_cast<uint32_t>(edges.positions.size());

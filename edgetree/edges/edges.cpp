@@ -1,4 +1,4 @@
-// Edges from the sides of faces: pairing, classes, planes, and the exact test of E(p).
+// Builds edges from sides of faces: pairing, classes, planes; and the exact test of E(p).
 #include "limn/edgetree/edges.h"
 
 #include <algorithm>
@@ -13,7 +13,7 @@
 namespace limn {
 namespace {
 
-// In extended precision, so that needles get a normal that is right to double precision as well.
+// Computed in extended precision, so that normals of slivers are exact to double precision.
 Plane plane_of(const Mesh& mesh, const FaceIndices& face) {
   if (!has_area(mesh, face)) return {};
   const Vec3f &fa = mesh.positions[face[0]], &fb = mesh.positions[face[1]],
@@ -24,7 +24,7 @@ Plane plane_of(const Mesh& mesh, const FaceIndices& face) {
   return {cast<double>(n), static_cast<double>(-dot(n, a))};
 }
 
-// Builds one EdgeMesh; the steps are called in the order in which they stand.
+// Builds one EdgeMesh; its steps are called in the order of their definition.
 class Builder {
  public:
   Builder(const Mesh& mesh, bool black_behind, ShapeId shape)
@@ -61,7 +61,7 @@ class Builder {
     }
   }
 
-  // By the smaller of the two ends (counted, which is faster than to compare), the larger, the
+  // Sorts by the smaller end (counting sort, faster than comparisons), the larger end, the
   // face.
   void sort_sides(const std::vector<HalfEdge>& sides) {
     const auto low = [](const HalfEdge& s) { return std::min(s.from, s.to).index(); };
@@ -106,17 +106,17 @@ class Builder {
     return flat ? EdgeClass::kFlat : EdgeClass::kSmooth;
   }
 
-  // Coplanar to the rounding of the positions. The faces of a needle may be tilted far by rounding,
-  // and then two "flat" edges in a row could hide a crease: what counts as flat must also agree to
-  // half the digits of a float. Calling a flat edge sharp costs samples; the reverse costs a jump.
+  // Coplanar up to the rounding of positions. Rounding may tilt slivers far, and two "flat" edges
+  // could hide a crease: flat faces must also agree to half of a float's digits. An edge wrongly
+  // called sharp costs samples; one wrongly called flat loses a discontinuity.
   bool is_flat(const Edge& edge, const Fold& fold) const {
     const Vec3d &n0 = result_.plane(edge.faces[0]).n, &n1 = result_.plane(edge.faces[1]).n;
     return std::fabs(fold.volume) <= fold.rounding && dot(n0, n1) > 0 &&
            length(cross(n0, n1)) <= 0x1.0p-12;
   }
 
-  // Whether both faces have the same shading normals at both ends (then along the whole edge). An
-  // end that is no corner of a face (where a side was split) has a normal of its own.
+  // True if both faces have the same shading normals at both ends, hence along the whole edge. An
+  // end that is no corner of a face (a split side) counts as different.
   bool normals_continuous(const Edge& edge) const {
     for (const VertexId vertex : edge.vertices) {
       const Vec3d* a = corner_normal(edge.faces[0], vertex);
@@ -137,12 +137,12 @@ class Builder {
     return result_.count(EdgeClass::kBorder) == 0 && result_.count(EdgeClass::kIrregular) == 0;
   }
 
-  // Whether each part of a closed mesh encloses positive volume, beyond rounding.
+  // True if each connected part of a closed mesh encloses positive volume, beyond rounding.
   bool parts_have_volume() const {
     UnionFind parts(mesh_.faces.size());
     for (const Edge& edge : result_.edges) parts.join(edge.faces[0].index(), edge.faces[1].index());
     std::vector<double> volumes(mesh_.faces.size()), sizes(mesh_.faces.size());
-    // Three or more sides per face: its area, as a fan of triangles.
+    // A face has three or more sides; its area is that of a triangle fan.
     for (const HalfEdge& side : sides_) {
       const uint32_t part = parts.root(side.face.index());
       const Vec3d origin = position(VertexId(mesh_.faces[part][0])),
@@ -182,8 +182,8 @@ EdgeMesh build_edge_mesh(const Mesh& mesh, bool black_behind, ShapeId shape) {
   return Builder(mesh, black_behind, shape).take();
 }
 
-// Four roundings in n . p + offset, of terms no larger than |p| and the extent; three in the offset
-// and two in the normal, twice.
+// n . p + offset has four roundings of terms no larger than |p| and the extent; the offset has
+// three, the normal two, all doubled.
 double distance_error(const EdgeMesh& mesh, const Vec3d& p) {
   return 11 * 0x1.0p-53 * (length(p) + mesh.extent);
 }
@@ -196,7 +196,7 @@ Facing facing(const EdgeMesh& mesh, FaceId face, const Vec3d& p) {
 
 namespace {
 
-// Whether the class of an edge tells, wherever it is seen from; else its faces do.
+// Candidate or not, if the edge's class decides it; nothing if its faces must be tested.
 std::optional<bool> known_candidate(const EdgeMesh& mesh, const Edge& edge) {
   if (edge.edge_class == EdgeClass::kBorder || edge.edge_class == EdgeClass::kIrregular ||
       edge.edge_class == EdgeClass::kCrossing)

@@ -1,4 +1,4 @@
-// Faces near each other, from a tree over their boxes.
+// Finds pairs of nearby faces by a tree over bounding boxes.
 #include "limn/edgetree/face_pairs.h"
 
 #include <algorithm>
@@ -28,19 +28,19 @@ double blur_of(const Corners& corners, const Vec3d& viewer) {
   return 0x1.0p-20 * std::max(largest_coordinate(corners), std::sqrt(squared));
 }
 
-// What is near to both of its sides, at its middle.
+// A point near to both long sides exists, at the middle of the face.
 bool is_needle(double width, double blur) { return !(width > 16 * blur); }
 
-// How far edges may be from a face to be near to it.
+// Largest distance of an edge that counts as near to a face.
 double reach_of(double longest_side, double blur) {
   return std::min(blur, kMostNear * longest_side);
 }
 
-// V: whether the faces around a vertex form one closed fan that covers the directions around it
-// once, seen along the mean of their normals, none of them a needle.
+// V: true if the faces around a vertex form one closed fan that covers directions once, seen along
+// their mean normal, and none of them is a sliver.
 class SingleFans {
  public:
-  // ids: of the vertices; normals, needles: of the faces
+  // ids: vertex ids; normals, needles: of faces
   SingleFans(const Mesh& mesh, const std::vector<VertexId>& ids, std::span<const Vec3d> normals,
              const std::vector<bool>& needles)
       : fans_(mesh.positions.size()) {
@@ -51,10 +51,10 @@ class SingleFans {
         const auto id = [&](int corner) { return ids[mesh.faces[f][corner % 3]].index(); };
         const auto at = [&](int corner) { return cast<double>(mesh.positions[id(corner)]); };
         Fan& fan = fans_[id(k)];
-        // Closed, if its faces' second corners are their third ones in another order.
+        // A closed fan: the second corners of its faces are a permutation of the third corners.
         fan.open += mix_bits(id(k + 1) + 1) - mix_bits(id(k + 2) + 1);
         const double steep = dot(normals[f], fan.axis);
-        // Not upright: the two sides of a blade may be near to each other.
+        // Steep faces are excluded: the two sides of a thin blade may be near to each other.
         fan.bad |= needles[f] || !(steep > 0) ||
                    steep * steep * 256 < length_squared(normals[f]) * length_squared(fan.axis);
         const Vec3d across = fan.across();
@@ -75,8 +75,8 @@ class SingleFans {
     uint64_t open = 0;
     uint8_t covers = 0;
     bool bad = false;
-    // Turning around the axis, a half-plane is passed where the product with this changes its sign,
-    // the opposite one where it changes back.
+    // A rotation around the axis passes a half-plane where the product with this vector changes its
+    // sign, and the opposite one where it changes back.
     Vec3d across() const {
       return std::fabs(axis.x) < std::fabs(axis.y) ? Vec3d{0, axis.z, -axis.y}
                                                    : Vec3d{-axis.z, 0, axis.x};
@@ -85,11 +85,11 @@ class SingleFans {
   std::vector<Fan> fans_;
 };
 
-// The corners of a leaf's faces that are in single fans, counted over all meshes; else kNone.
+// Corners of a leaf's faces with single fans, as global numbers; else kNone.
 struct LeafFans {
   uint32_t corners[3][BoxTree::kLeaf];
 
-  // Bit i: the face of lane i has one of these.
+  // Bit i: face i of the leaf has one of these corners.
   uint32_t share(const FaceIndices& other) const {
     uint32_t same[BoxTree::kLeaf] = {};
     for (int k = 0; k < 3; ++k)
@@ -159,7 +159,7 @@ class PairFinder {
     }
   }
 
-  // Wider by twice the margin: a float's rounding is less than the second half.
+  // Enlarged by twice the margin, which covers its own rounding to floats.
   void add_box(const Corners& c, double margin) {
     FloatBox& box = boxes_.emplace_back();
     for (int k = 0; k < 3; ++k) {
@@ -168,7 +168,7 @@ class PairFinder {
     }
   }
 
-  // Of pairs within the leaf, and with faces of later ones.
+  // Appends pairs within the leaf, and with faces of later leaves.
   void append_pairs_of(const BoxTree& tree, std::span<const LeafFans> fans, uint32_t leaf,
                        std::vector<uint32_t>& leaves, std::vector<FacePair>& pairs) const {
     tree.find_leaves(tree.leaf_box(leaf), leaf, leaves);
@@ -190,8 +190,8 @@ class PairFinder {
   Vec3d viewer_;
   int threads_;
   std::vector<FaceRef> faces_;     // of all meshes
-  std::vector<FloatBox> boxes_;    // theirs
-  std::vector<FaceIndices> fans_;  // theirs, see LeafFans
+  std::vector<FloatBox> boxes_;    // boxes of the faces
+  std::vector<FaceIndices> fans_;  // see LeafFans
 };
 
 }  // namespace

@@ -1,14 +1,14 @@
 #pragma once
-// How far two faces fold over their common edge.
+// The fold between two faces across their common edge.
 #include "limn/core/vec.h"
 
 namespace limn {
 
-// Six times the signed volume of the tetrahedron over an edge (a, b) and the far corners c, d of
-// its two faces: positive if each face lies in front of the other's plane; and how much of it the
-// rounding of the positions can explain. A position is taken to have been rounded to float twice
-// (in the file, and after a rotation or scaling about the origin): it is off by at most
-// 2 * 2^-24 |x|, which changes the volume by at most the gradient's length times that.
+// Six times the signed volume of the tetrahedron of an edge (a, b) and the far corners c, d of
+// its two faces: positive if each face is in front of the other's plane. And a bound of its
+// rounding error: a position is rounded to float twice (in the file, and after a rotation or
+// scaling about the origin), so it is off by at most 2 * 2^-24 |x|, times the length of the
+// volume's gradient.
 struct Fold {
   double volume, rounding;
 };

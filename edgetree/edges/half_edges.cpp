@@ -1,4 +1,4 @@
-// Sides of faces over welded vertices; faces of zero area taken out.
+// Sides of faces over welded vertices, with degenerate faces removed.
 #include "edgetree/edges/half_edges.h"
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 namespace limn {
 namespace {
 
-// Whether copies of a vertex move alike.
+// Compares the motions of a vertex's copies.
 class Motions {
  public:
   explicit Motions(const Mesh& mesh) : mesh_(mesh), diagonal_(bounds_of(mesh).diagonal()) {
@@ -30,8 +30,8 @@ class Motions {
         size = std::max({size, std::fabs(a[k][i]), std::fabs(b[k][i])});
         difference = std::max(difference, std::fabs(a[k][i] - b[k][i]));
       }
-      // Each velocity was rounded to float once, and by the motion's own arithmetic. Copies that
-      // were rounded apart differ as the motion does between their places.
+      // A velocity is rounded to float once, after rounding in the motion's own arithmetic. Copies
+      // at different rounded positions differ by the motion between these.
       double allowed = 0x1.0p-22 * size;
       if (apart > 0) allowed += speeds_[i] * (0x1.0p-20 + 2 * apart / diagonal_);
       if (difference > allowed) return false;
@@ -52,8 +52,8 @@ uint64_t undirected_key(VertexId a, VertexId b) {
   return uint64_t{std::min(a, b).index()} << 32 | std::max(a, b).index();
 }
 
-// Sets of collinear vertices that faces of zero area tie together. Of needles, which only rounding
-// keeps from being lines, short sides say nothing of where the line runs.
+// Sets of collinear vertices that degenerate faces connect. Short sides of slivers (which are lines
+// up to rounding) carry no information about the direction of the line.
 class SliverLines {
  public:
   SliverLines(const Mesh& mesh, const std::vector<VertexId>& ids,
@@ -73,7 +73,7 @@ class SliverLines {
         vertices_[lines_.root(s)].push_back(ids[corner]);
   }
 
-  // Appends the parts of a side, split at the vertices of its line strictly between its ends.
+  // Appends a side, split at the vertices of its line that are strictly between its ends.
   void append_split(const HalfEdge& side, std::vector<HalfEdge>& sides) {
     const auto line = line_of_edge_.find(undirected_key(side.from, side.to));
     if (line == line_of_edge_.end()) {
@@ -92,7 +92,7 @@ class SliverLines {
   }
 
  private:
-  // Whether a side is no longer than 16 times the width of a needle.
+  // True if a side is at most 16 times as long as the sliver is wide.
   bool is_across(const FaceIndices& face, int k) const {
     Vec3d x[3];
     for (int i = 0; i < 3; ++i) x[i] = cast<double>(mesh_.positions[face[(k + i) % 3]]);
@@ -103,7 +103,7 @@ class SliverLines {
     return length_squared(x[1] - x[0]) * longest <= 256 * twice_area;
   }
 
-  // Whether v lies on the side: exactly, or to the rounding of positions and not at an end.
+  // True if v is on the side: exactly, or up to the rounding of positions away from the ends.
   bool is_on(VertexId v, VertexId from, VertexId to) const {
     const auto position = [&](VertexId id) { return cast<double>(mesh_.positions[id.index()]); };
     const Vec3d x = position(v), a = position(from), b = position(to);
@@ -116,7 +116,7 @@ class SliverLines {
            length(x - b) > rounding;
   }
 
-  // Points of one line are told apart, and ordered, by the axis along which it runs longest.
+  // Vertices of a line are compared and sorted along its longest axis.
   std::vector<VertexId> between(VertexId from, VertexId to,
                                 const std::vector<VertexId>& candidates) const {
     const auto position = [&](VertexId v) { return mesh_.positions[v.index()]; };
@@ -136,9 +136,9 @@ class SliverLines {
   }
 
   const Mesh& mesh_;
-  UnionFind lines_;                                      // over slivers
-  std::vector<std::vector<VertexId>> vertices_;          // of the line, at its root
-  std::unordered_map<uint64_t, uint32_t> line_of_edge_;  // to one sliver of the line
+  UnionFind lines_;                                      // of slivers
+  std::vector<std::vector<VertexId>> vertices_;          // of a line, at its root
+  std::unordered_map<uint64_t, uint32_t> line_of_edge_;  // to a sliver of the line
 };
 
 }  // namespace
@@ -147,7 +147,7 @@ std::vector<VertexId> edge_vertex_ids(const Mesh& mesh) {
   std::vector<VertexId> ids(mesh.weld.begin(), mesh.weld.end());
   if (mesh.position_tangents.empty()) return ids;
   const Motions motions(mesh);
-  std::unordered_map<uint32_t, std::vector<VertexId>> torn;  // weld to further representatives
+  std::unordered_map<uint32_t, std::vector<VertexId>> torn;  // weld: further representatives
   for (uint32_t v = 0; v < ids.size(); ++v) {
     const auto alike = [&](VertexId other) { return motions.are_alike(VertexId(v), other); };
     if (alike(ids[v])) continue;

@@ -1,5 +1,5 @@
 #pragma once
-// Directed sides of faces over welded vertices, with faces of zero area taken out.
+// Directed sides of faces over welded vertices, with degenerate faces removed.
 #include <cstdint>
 #include <vector>
 
@@ -7,22 +7,22 @@
 
 namespace limn {
 
-// A side of a face, or a part of one where a face of zero area met it.
+// A side of a face, or a part of one beside a degenerate face.
 struct HalfEdge {
-  VertexId from, to;  // welded, in the face's winding
+  VertexId from, to;  // welded, in the face's orientation
   FaceId face;
-  VertexId opposite;  // the corner of the face off this side, welded
+  VertexId opposite;  // the opposite corner of the face, welded
 };
 
-// V: the id under which a vertex takes part in edges: the smallest index of a vertex at the same
-// position that moves alike in every lane (to the rounding of floats). Copies that move apart tear
-// the surface: they keep ids of their own, so that both rims become borders.
+// V: the vertex id used in edges: the smallest index of a vertex at the same position with the same
+// motion in every lane (up to float rounding). Copies with different motions keep separate ids, so
+// both sides of the tear become boundary edges.
 std::vector<VertexId> edge_vertex_ids(const Mesh& mesh);
 
-// The sides of all faces that have area. A face of zero area is a line segment: it is invisible,
-// and only says that its long side equals its two short ones. So it is left out, and the sides of
-// its neighbours are split at the corners that lie on them: the real neighbours meet.
-// ids: V, from edge_vertex_ids
+// Sides of all non-degenerate faces. A degenerate face is an invisible line segment: its
+// long side equals its two short ones. It is removed, and the sides of its neighbours
+// are split at its corners, so that the real neighbours connect. ids: V, from
+// edge_vertex_ids
 std::vector<HalfEdge> half_edges_of(const Mesh& mesh, const std::vector<VertexId>& ids);
 
 }  // namespace limn

@@ -1,14 +1,14 @@
-// Edges that touch, united: an edge is cut into parts, each with all faces around it.
+// Unites touching edges: splits each into parts, each with all faces around it.
 //
-// Several boundaries in one place. Let rims 1 ... n lie in one line, seen from p, each the common
-// border of faces that move alike, and let s_k be the speed of rim k across the line. After a short
-// time they lie apart, in some order, and radiance is constant between neighbours, L_0 before the
-// first and L_n after the last. The integral of radiance over directions changes by
-//   sum over k of s_k (L_(k-1) - L_k),
-// which is s (L_0 - L_n) if all have one speed: then they are one edge. Else each rim is an edge of
-// its own, with its own velocity and with the jump between its two neighbourhoods: it has to know
-// all faces, and which of them move with it. The order differs before and after the moment of
-// contact; edge_jump takes the one in which surfaces part instead of passing through each other.
+// Coincident boundaries. Let boundaries 1 ... n coincide as seen from p, each that of a group of
+// faces that move alike, and let s_k be the speed of boundary k across its line. Shortly afterwards
+// they are separate, in some order, and radiance is constant between neighbours: L_0 before the
+// first and L_n after the last. The integral of radiance over directions changes at the rate
+//   sum over k of s_k (L_(k-1) - L_k).
+// If all have one speed s it is s (L_0 - L_n), and they are one edge. Otherwise each boundary is an
+// edge of its own, with its own velocity and the radiance difference between its neighbourhoods. It
+// needs all faces, and the group that moves with it. The order differs before and after contact;
+// edge_jump uses the one in which surfaces separate instead of interpenetrating.
 #include "limn/edgetree/touching.h"
 
 #include <algorithm>
@@ -28,10 +28,10 @@ namespace {
 // A face around a part of an edge.
 struct Neighbour {
   FaceRef face;
-  EdgeId along;             // the edge of its mesh that runs there, or none
-  bool own = false;         // around the edge before it was united
+  EdgeId along;             // the edge of its mesh along the part, or none
+  bool own = false;         // adjacent to the edge before it was united
   Vec3<Lanes> velocity[2];  // at the ends of the part
-  Lanes slack;              // by how much rounding of positions changes them
+  Lanes slack;              // uncertainty of `velocity` from the rounding of positions
   uint8_t rim = 0;
 };
 
@@ -69,7 +69,7 @@ class Unifier {
   }
 
  private:
-  // A part of an edge that stays, or (edge_class of the whole) an edge that is dropped: no faces.
+  // A part of an edge that stays; without faces (edge_class of the whole) for a removed edge.
   struct Part {
     EdgeId whole;
     Edge edge;
@@ -100,7 +100,7 @@ class Unifier {
     return size_around(before_[object], *shapes_[object].mesh, id.edge);
   }
 
-  // Velocity of the face's plane where x lies on it.
+  // Velocity of the point x of the face's plane.
   Vec3<Lanes> velocity(FaceRef face, const Vec3d& x) const {
     const Mesh& mesh = *shapes_[face.shape.index()].mesh;
     if (mesh.position_tangents.empty()) return {};
@@ -114,7 +114,7 @@ class Unifier {
            mesh.position_tangents[f[2]] * b2;
   }
 
-  // By how much the velocity of a face changes over what the rounding of its corners explains.
+  // Change of a face's velocity within the rounding of its corners.
   Lanes slack(FaceRef face) const {
     const Mesh& mesh = *shapes_[face.shape.index()].mesh;
     Lanes slack;
@@ -140,8 +140,8 @@ class Unifier {
         for (int k = 0; k < 3; ++k)
           for (int i = 0; i < kLanes; ++i) speeds_[i] = std::max(speeds_[i], std::fabs(v[k][i]));
   }
-  // To the rounding of floats, of the fastest that moves, and of the places where it is: velocities
-  // follow from positions, which far from the origin are coarse.
+  // Equal up to float rounding of the fastest velocity, and of the positions: velocities depend on
+  // positions, which are coarse far from the origin.
   bool moves_alike(const Neighbour& a, const Neighbour& b) const {
     for (int end = 0; end < 2; ++end)
       for (int k = 0; k < 3; ++k)
@@ -202,8 +202,8 @@ class Unifier {
     parts_[id.object.index()].push_back(std::move(part));
   }
 
-  // Where a plane of several faces passes through another one along their common edges, no face has
-  // corners on both sides (crossing_curves.h), and no edge is a border.
+  // Where a plane of several faces passes through another along common edges, no face has corners
+  // on both sides (crossing_curves.h), and no edge is a boundary edge.
   void add_crossing(EdgeRef id, const Edge& part, std::vector<Neighbour>& around) {
     number_rims(around);
     mark_planes(id, around);
@@ -212,10 +212,10 @@ class Unifier {
     const Neighbour* other = nullptr;
     for (Neighbour& n : around) {
       if (n.own) n.rim = kNoRim;
-      if (n.rim != kNoRim) return;  // its edge is a border
+      if (n.rim != kNoRim) return;  // its edge is a boundary edge
       const EdgeRef along{n.face.shape, n.along};
       if (n.along.valid() && std::tuple(along.object, along.edge) < std::tuple(id.object, id.edge))
-        return;  // added by the other
+        return;  // the other one adds it
       if (!n.own && !other && !parallel(n, *own)) other = &n;
     }
     if (!other) return;
@@ -225,9 +225,9 @@ class Unifier {
         contact_line(id, {mesh.position(a), mesh.position(b)}, {&*own, other}, around));
   }
 
-  // False if the part is no edge, or another one stands for it.
+  // Returns false if the part is no edge, or another edge represents it.
   bool unite_part(EdgeRef id, std::vector<Neighbour>& around, Part& part) {
-    // In an order that all edges in this place agree on.
+    // All edges at this place agree on this order.
     std::sort(around.begin(), around.end(), [](const Neighbour& a, const Neighbour& b) {
       return std::tuple(a.face.shape, a.face.face) < std::tuple(b.face.shape, b.face.face);
     });
@@ -252,7 +252,7 @@ class Unifier {
     part.edge.rim = rim;
     part.edge.edge_class = EdgeClass::kIrregular;
     part.edge.concave = false;
-    // Its own faces first, as they were; then others of its mesh.
+    // The edge's own faces first, in their order; then others of its mesh.
     const auto faces = before_[id.object.index()].faces_around(id.edge);
     std::stable_sort(around.begin(), around.end(), [&](const Neighbour& a, const Neighbour& b) {
       return rank(a, id, faces) < rank(b, id, faces);
@@ -275,9 +275,9 @@ class Unifier {
       }
   }
 
-  // Whether a gap opens between two faces to one side of the present, and they pass through each
-  // other to the other side: two borders that move differently across their line, or a border that
-  // moves against the plane of what has none there. What slides along that does not.
+  // True if a gap opens between two faces to one side of the present, and they interpenetrate to
+  // the other side: two boundaries with different motions across their line, or a boundary that
+  // moves relative to the plane of a face without one. Sliding along that plane does neither.
   bool part_from(const Neighbour& a, const Neighbour& b, const Vec3d& along) const {
     if (a.rim == b.rim) return false;
     const Neighbour* const plain = a.rim == kNoRim ? &a : b.rim == kNoRim ? &b : nullptr;
@@ -295,14 +295,14 @@ class Unifier {
     return false;
   }
 
-  // Of an edge's own faces the one that stands, and of others one that it stands on.
+  // The edge's own face that ends at the contact, and a face of another shape that it rests on.
   struct Pressed {
     const Neighbour *standing, *under;
   };
 
-  // Where what is around comes towards the edge's own faces or leaves them: these stand on the
-  // inside of all others, or end there half sunk in them, or stand on a body whose edge is in the
-  // same place.
+  // Contact that closes or opens: the edge's own faces stand on the interior of all
+  // others, or end there half sunk in them, or stand on a body whose edge is at the same
+  // place.
   std::optional<Pressed> find_pressed(EdgeRef id, const std::vector<Neighbour>& around) const {
     auto pressed = standing_inside(id, around);
     if (!pressed) pressed = standing_flush(id, around);
@@ -318,12 +318,12 @@ class Unifier {
   }
 
   bool parallel(const Neighbour& a, const Neighbour& b) const {
-    return length(cross(plane(a.face).n, plane(b.face).n)) <= 0x1.0p-12;  // as agree()
+    return length(cross(plane(a.face).n, plane(b.face).n)) <= 0x1.0p-12;  // as in agree()
   }
 
-  // One face stands, or one on either side of the others, which lie in one plane and have no rim:
-  // then that on the viewer's side, as seen from where the body is sunk. (Which way the plane's
-  // faces are wound does not matter: they may be seen from both sides.)
+  // One face stands on a plane of others without boundaries, or one on either side of it; then the
+  // one on the viewer's side counts, as seen from where the body is sunk. The orientation of the
+  // plane's faces is irrelevant, as they may be seen from both sides.
   std::optional<Pressed> standing_inside(EdgeRef id, const std::vector<Neighbour>& around) const {
     const auto under =
         std::find_if(around.begin(), around.end(), [](const auto& n) { return !n.own; });
@@ -342,9 +342,9 @@ class Unifier {
     return Pressed{standing[1] ? standing[1] : standing[0], &*under};
   }
 
-  // Two bodies with two faces each, one of them against one of the other's. An upright one on one
-  // that is upright or gets wider ends in the other's plane as they are pressed together: there
-  // both rims are one. Of two upright ones the later shape does, since faces in one place show the
+  // Two bodies with two faces each, one face of each in contact. When pressed, an upright
+  // body on an upright or widening one ends in the other's plane, and both boundaries are
+  // one. Of two upright bodies the later shape ends, since coincident faces show the
   // first.
   std::optional<Pressed> standing_flush(EdgeRef id, const std::vector<Neighbour>& around) const {
     if (around.size() != 4) return std::nullopt;
@@ -398,7 +398,7 @@ class Unifier {
     return n.face.shape == id.object ? faces.size() : faces.size() + 1;
   }
 
-  // Neighbours that move alike get the same number; the last number takes all that is left over.
+  // Assigns motion groups to neighbours; the last group takes all that are left.
   void number_rims(std::vector<Neighbour>& around) const {
     std::vector<const Neighbour*> rims;
     for (Neighbour& n : around) {
@@ -413,14 +413,14 @@ class Unifier {
     }
   }
 
-  // Whether the neighbour's edge here, which moves as edge `id` does, is kept instead of that.
+  // True if the neighbour's edge, which moves as edge `id` does, represents that edge.
   bool stands_for(const Neighbour& n, EdgeRef id) const {
     const EdgeRef other{n.face.shape, n.along};
     return edge(other).edge_class != EdgeClass::kFlat &&
            std::tuple(other.object, other.edge) < std::tuple(id.object, id.edge);
   }
 
-  // Pairs of faces that continue each other across the edge have no rim.
+  // Clears the groups of faces that continue each other across the edge.
   void mark_planes(EdgeRef id, std::vector<Neighbour>& around) const {
     for (size_t i = 0; i < around.size(); ++i)
       for (size_t j = 0; j < i; ++j) {
@@ -439,15 +439,15 @@ class Unifier {
     const Vec3d side = cross(plane(a).n, x1 - x0);
     if (dot(side, c - x0) * dot(side, d - x0) >= 0) return false;
     const Fold fold = fold_of(x0, x1, c, d);
-    return std::fabs(fold.volume) <= 2 * fold.rounding;  // of edges that were rounded apart
+    return std::fabs(fold.volume) <= 2 * fold.rounding;  // edges were rounded separately
   }
 
-  // As flat edges are decided (edges.cpp).
+  // The tolerance of flat edges (edges.cpp).
   static bool agree(const Vec3d& a, const Vec3d& b) {
     return dot(a, b) > 0 && length(cross(a, b)) <= 0x1.0p-12;
   }
 
-  // Of a face that has the same one everywhere.
+  // The shading normal of a face, if it is constant.
   std::optional<Vec3d> shading_normal(FaceRef face) const {
     const Mesh& mesh = *shapes_[face.shape.index()].mesh;
     if (mesh.normal_source == NormalSource::kFace) return plane(face).n;
@@ -465,7 +465,7 @@ class Unifier {
     });
   }
 
-  // The vertex at an end of the edge, or a new one on it.
+  // The vertex at parameter t of the edge; new unless t is an end.
   VertexId vertex_at(EdgeRef id, double t) {
     if (t == 0) return edge(id).vertices[0];
     if (t == 1) return edge(id).vertices[1];
@@ -486,7 +486,7 @@ class Unifier {
     return {begin, end};
   }
 
-  // Appends what is near to the whole edge and not around its part.
+  // Appends faces near to the whole edge that are not around its part.
   static void append_near(std::span<const NearFace> near, EdgeId whole,
                           std::span<const FaceRef> faces, EdgeMesh& mesh) {
     const size_t before = mesh.faces_and_near.size();
@@ -502,13 +502,13 @@ class Unifier {
     mesh.near_offsets.push_back(static_cast<uint32_t>(mesh.faces_and_near.size()));
   }
 
-  // parts: by edge, the whole edge before its parts.
+  // parts: sorted by edge, a whole edge before its parts.
   void rewrite(uint32_t object, std::span<const Part> parts, std::span<const NearFace> near) {
     const EdgeMesh& old = before_[object];
     EdgeMesh& mesh = objects_[object];
     struct Source {
       const Edge* edge;
-      const Part* part;  // null if the edge is as it was
+      const Part* part;  // null: the edge is unchanged
     };
     std::vector<Source> sources;
     sources.reserve(old.edges.size() + parts.size());
@@ -557,8 +557,8 @@ class Unifier {
   const Vec3d viewer_;
   std::vector<EdgeMesh>& objects_;
   const std::vector<EdgeMesh> before_;
-  Lanes speeds_;                                 // the largest component of a velocity
-  std::map<uint32_t, std::vector<Part>> parts_;  // by object
+  Lanes speeds_;                                 // largest component of a velocity
+  std::map<uint32_t, std::vector<Part>> parts_;  // of each object
   std::vector<ContactLine> lines_;
   std::set<std::array<ShapeId, 2>> parting_;
   std::map<std::tuple<ShapeId, EdgeId, double>, VertexId> cuts_;

@@ -1,4 +1,4 @@
-// What holds of every EdgeMesh, checked.
+// Checks the invariants of EdgeMesh.
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -35,7 +35,7 @@ const char* fault_of_sizes(const EdgeMesh& mesh) {
   return nullptr;
 }
 
-// Unit to the rounding of a normalisation, or zero altogether.
+// The normal is a unit vector up to rounding, or zero.
 const char* fault_of(const Plane& plane) {
   const double squared = length_squared(plane.n);
   if (squared == 0) return plane.offset == 0 ? nullptr : "a plane without a normal has an offset";
@@ -43,7 +43,7 @@ const char* fault_of(const Plane& plane) {
                                                  : "a plane's normal is not a unit vector";
 }
 
-// Copies of a vertex may be this far apart (contacts.h).
+// Largest distance between copies of a vertex (contacts.h).
 double welding_error(const EdgeMesh& mesh) { return touch_tolerance(mesh.extent, mesh.extent); }
 
 const char* fault_of_faces(const EdgeMesh& mesh, EdgeId id) {
@@ -66,8 +66,8 @@ const char* fault_of_faces(const EdgeMesh& mesh, EdgeId id) {
   return nullptr;
 }
 
-// Of curves where faces cross: both lie on both sides of it, whichever shapes they are of. Of lines
-// of contact the first ends there, and others may be around.
+// Intersection segments: both faces pass through the edge. Contact lines: the first face ends
+// there, and others may be around.
 const char* fault_of_crossing(const EdgeMesh& mesh, EdgeId id) {
   if (mesh.shape.valid()) return "a mesh has an edge where faces cross";
   const FacesAround around = mesh.around(id);

@@ -1,5 +1,5 @@
 #pragma once
-// The first choice of a descent: one tree among several.
+// The first choice of a descent: a tree.
 #include <algorithm>
 #include <span>
 
@@ -9,8 +9,8 @@ namespace limn {
 
 inline double below_one(double u) { return std::clamp(u, 0.0, 0x1.fffffffffffffp-1); }
 
-// Draws a tree in proportion to choice_at(root).total by the uniform number u, which is uniform
-// again afterwards; `chosen` is its choice. total: over all trees. False if none has weight.
+// Draws a tree in proportion to choice_at(root).total by the uniform number u, which is rescaled to
+// be uniform again; `chosen`: its choice; total: over all trees. False if all weights are zero.
 template <class Choice, class ChoiceAt>
 bool choose_root(std::span<const NodeId> roots, const ChoiceAt& choice_at, double& u,
                  Choice& chosen, double& total) {

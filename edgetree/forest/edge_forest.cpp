@@ -1,4 +1,4 @@
-// The edge forest as a sampler: descending the trees.
+// The edge forest as a sampler: descents.
 #include "edgetree/forest/edge_forest.h"
 
 #include <algorithm>
@@ -13,14 +13,14 @@
 namespace limn {
 namespace {
 
-// The edges of a query's own face lie in its plane: most others need no look at their mesh.
+// A fast test for the edges of the query's own face, by the distance from its plane.
 class OwnEdges {
  public:
   OwnEdges(const EdgeSamplerInput& input, const EdgeQuery& query, double extent)
       : input_(input), query_(query), any_(query.face.shape.valid()) {
     if (!any_) return;
     plane_ = input.object(query.face.shape).plane(query.face.face);
-    // Far beyond rounding. Not tuned.
+    // Far above rounding. Not tuned.
     near_ = 0x1.0p-16 * (extent + length(query.p));
   }
   bool holds(const ListedEdge& edge) const {
@@ -43,7 +43,7 @@ struct EdgeForest::Impl {
   ForestConfig config;
   LightClusters lights;
   Forest forest;
-  ShapeId crossings;  // the object whose ends are no floats, or none
+  ShapeId crossings;  // the object whose ends are not floats, or none
 
   ForestQuery prepare(const EdgeQuery& query) const {
     const bool lit = config.light_term && !lights.empty();
@@ -53,43 +53,43 @@ struct EdgeForest::Impl {
     prepared.any_direction = !config.normal_speed;
     return prepared;
   }
-  // The result holds until another query is opened by this thread.
+  // Valid until this thread opens another query.
   const OpenNodes& open(const ForestQuery& query) const {
     static thread_local OpenNodes nodes;
     nodes.open(forest, config, query);
     return nodes;
   }
 
-  // Ready to draw; holds until another query is asked about by this thread.
+  // Ready to draw; valid until this thread starts another query.
   ForestWalk& walk(const ForestQuery& query) const {
     static thread_local ForestWalk walk;
     walk.begin(forest, config, query, open(query));
     return walk;
   }
-  // The edge where a walk ends, if it is one of E(p), and the point on it.
+  // Tests the edge at the end of a descent, and samples a point on it.
   std::optional<EdgeSample> finish(const EdgeQuery& query, const ForestQuery& prepared,
                                    const ForestWalk::End& end, double u_t) const {
     if (!end.node) return std::nullopt;
     const EdgeRef id = end.edge();
     const EdgeMesh& mesh = input.object(id.object);
-    mesh.fetch_edge(id.edge);  // for what follows this draw
+    mesh.fetch_edge(id.edge);  // used after this draw
     if (!accepts(query, prepared.point, *end.node, end.lane)) return std::nullopt;
     const SeenEdge edge = seen_edge(prepared.lobe, query.p, *end.node, end.lane);
     if (!edge.is_seen()) return std::nullopt;
     EdgeSample sample{id, edge.sample_t(u_t), end.probability, 0};
     mesh.fetch_ends(id.edge);
     sample.pdf_t = edge.pdf_t(sample.t);
-    // Nothing where the density is lost to rounding, on an edge that lies in the horizon.
+    // Rejected where the density underflows, on an edge in the horizon.
     if (!(sample.pdf_t > 0)) return std::nullopt;
     return sample;
   }
 
-  // A node as one query reaches it: how likely, and which of the open ones it is, if any.
+  // A node with its probability for one query, and its index among expanded nodes, if any.
   struct Reached {
     double probability;
     int opened;
   };
-  // The child in a lane of a node; multiplied from the root on, as `draw` does, which has the same
+  // Descends to a child. Probabilities are multiplied from the root on, as in `draw`, with the same
   // bits.
   Reached reach(NodeId id, int lane, const ForestQuery& query, const OpenNodes& nodes) const {
     const uint32_t parent = forest.head(id).parent;
@@ -106,11 +106,11 @@ struct EdgeForest::Impl {
             is_open ? nodes.child(here.opened, lane) : OpenNodes::kClosed};
   }
 
-  // Exact test of a drawn edge; most pass without a look at the mesh.
+  // Exact test of a drawn edge; most pass without access to the mesh.
   bool accepts(const EdgeQuery& query, const ForestPoint& point, const EdgeNode& node,
                int lane) const {
     const EdgeRef id = node.edge_at(lane);
-    // Concave edges are in the forest only where they can be silhouettes, or for comparison.
+    // With culling, concave edges of the forest are candidates only as silhouettes.
     if (!config.cull_concave || !surely_candidate(node, lane, point)) {
       if (!is_candidate(input.object(id.object), id.edge, query.p)) return false;
     }
@@ -134,7 +134,7 @@ EdgeForest::~EdgeForest() = default;
 
 std::unique_ptr<EdgeForest> EdgeForest::build(const EdgeSamplerInput& input, int threads,
                                               const ForestConfig& config) {
-  // What is spread over directions weighs by itself.
+  // An environment that is not uniform has its own weight.
   const bool spread = config.environment_term && input.environment;
   const double uniform_luminance = spread ? 0 : input.environment_luminance;
   const bool crosses = !input.objects.empty() && !input.objects.back().shape.valid();
@@ -152,9 +152,9 @@ std::optional<EdgeSample> EdgeForest::sample(const EdgeQuery& query, Rng& rng) c
   return impl_->finish(query, prepared, impl_->walk(prepared).draw(u_edge), u_t);
 }
 
-// The numbers that choose edges are one for each of as many equal parts of [0, 1). What is left of
-// such a number on its edge is as even where several fall on that edge: with a shift by chance that
-// they have in common it chooses the point.
+// Random numbers that select edges are stratified over [0, 1). The remainder of a number on its
+// edge is stratified among the draws of that edge, and selects the point on it after a common
+// random shift.
 void EdgeForest::sample_several(const EdgeQuery& query, std::span<Rng> rngs,
                                 std::vector<std::optional<EdgeSample>>& samples) const {
   samples.clear();
@@ -244,7 +244,7 @@ bool EdgeForest::list_outlines(const EdgeQuery& query, const DirectionCone& dire
       continue;
     }
     const EdgeNode& node = forest.edges[~id];
-    // Concave smooth edges are in the forest only where they can be outlines, or for comparison.
+    // With culling, concave edges of the forest are outlines only as silhouettes.
     const bool smooth = impl_->config.cull_concave && node.head.group == ForestGroup::kSilhouette;
     for (uint32_t lanes = bits(may_hold_outlines(node, cone)); lanes != 0; lanes &= lanes - 1) {
       const int lane = std::countr_zero(lanes);

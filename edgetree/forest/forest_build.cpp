@@ -1,4 +1,4 @@
-// One tree per object and group: groups, node frames, heights, links.
+// Builds one tree per object and group: groups, node frames, heights, links.
 #include "edgetree/forest/forest_build.h"
 
 #include <algorithm>
@@ -13,8 +13,8 @@
 namespace limn {
 namespace {
 
-// The 24 leading bits: a number that a float holds. Not by a cast to float and back, because GCC 12
-// drops such a pair of casts where it makes vectors of them.
+// Keeps the 24 leading bits, so that the number is a float. Casts to float and back are not used,
+// because GCC 12 drops them when it vectorises.
 double truncated(double x) {
   return std::bit_cast<double>(std::bit_cast<uint64_t>(x) & ~((uint64_t{1} << 29) - 1));
 }
@@ -55,12 +55,12 @@ Bounds bounds_of(std::span<const Wedge> wedges) {
   return bounds;
 }
 
-// The cube around the center holds the box: children's boxes are cut off at it.
+// The cube around the center contains the box: boxes of children are clipped to it.
 NodeFrame frame_of(const Bounds& box) {
   const Vec3d middle = box.center();
   const Vec3d center{truncated(middle.x), truncated(middle.y), truncated(middle.z)};
   double radius = 0.5 * box.diagonal();
-  // Thin boxes reach as far as their diagonal, and the center was rounded.
+  // Covers the rounding of the center and the diagonal of thin boxes.
   for (int k = 0; k < 3; ++k)
     radius = std::max({radius, box.upper[k] - center[k], center[k] - box.lower[k]});
   return {center, truncated(1 / radius)};
@@ -78,16 +78,16 @@ float positive(double x) {
   return static_cast<float>(std::max(x, double{std::numeric_limits<float>::min()}));
 }
 
-// Motion too slow for a float still is motion.
+// Nonzero motion must not underflow.
 float speed_of(std::span<const Wedge> wedges) {
   double speed = 0;
   for (const Wedge& wedge : wedges) speed += wedge.length * wedge.speed;
   return speed > 0 ? positive(speed / length_of(wedges)) : 0;
 }
 
-// Outward to a step.
+// Rounds a box outward to a step.
 void put_box(const Bounds& box, const NodeFrame& frame, int lane, InnerNode& node) {
-  constexpr double kMargin = 0x1.0p-16;  // more than a query's rounding, in steps
+  constexpr double kMargin = 0x1.0p-16;  // in steps, above the rounding of a query
   const auto step = [](double x) {
     return static_cast<int32_t>(std::clamp(x, 0.0, double{kBoxSteps}));
   };
@@ -102,7 +102,7 @@ void put_box(const Bounds& box, const NodeFrame& frame, int lane, InnerNode& nod
   node.high[lane] = packed_high;
 }
 
-// Of a child of so many edges.
+// True if a child with that many edges gets quadrics.
 bool has_quadrics(size_t edges, const ForestConfig& config) {
   return config.quadrics != ForestConfig::Quadrics::kNone && edges >= config.quadrics_from &&
          edges <= ForestConfig::kMostQuadricEdges;
@@ -114,7 +114,7 @@ void put_rows(const DualFit& fit, int lane, Rows& rows) {
     for (int k = 0; k < 4; ++k) rows[i][k][lane] = static_cast<float>(fit.rows[i][k]);
 }
 
-// Fills the nodes of one tree, each on its own. ids: of the tree's nodes in the forest.
+// Fills the nodes of one tree independently. ids: of the tree's nodes in the forest.
 class TreeFiller {
  public:
   TreeFiller(const ForestShape& tree, std::span<const NodeId> ids, std::span<const Wedge> wedges,
@@ -141,7 +141,7 @@ class TreeFiller {
     return wedges_.subspan(range.begin, range.size());
   }
 
-  // All but the parent.
+  // All fields but the parent.
   void fill_head(const NodeFrame& frame, NodeHead& head) const {
     for (int k = 0; k < 3; ++k) head.center[k] = static_cast<float>(frame.center[k]);
     head.inverse_radius = static_cast<float>(frame.inverse_radius);
@@ -204,7 +204,7 @@ class TreeFiller {
   const ForestConfig& config_;
 };
 
-// Makes room for the nodes of a tree and gives them their places, and the pairs theirs.
+// Allocates the nodes of a tree and their pairs of quadrics; returns the ids.
 std::vector<NodeId> append_nodes(const ForestShape& tree, ForestGroup group,
                                  const ForestConfig& config, Forest& forest) {
   std::vector<NodeId> ids(tree.nodes.size());
@@ -226,7 +226,7 @@ std::vector<NodeId> append_nodes(const ForestShape& tree, ForestGroup group,
   return ids;
 }
 
-// Points around a tree, at 1.5 times its radius: evenly spread directions (a Fibonacci lattice).
+// Points at 1.5 times a tree's radius, in evenly distributed directions (Fibonacci lattice).
 std::vector<ForestPoint> points_around(const NodeFrame& tree, const Forest& forest) {
   constexpr int kPoints = 64;  // not tuned
   std::vector<ForestPoint> points;
@@ -239,7 +239,7 @@ std::vector<ForestPoint> points_around(const NodeFrame& tree, const Forest& fore
   return points;
 }
 
-// Share of the expected length of silhouettes below a node that its pairs reject.
+// The share of the expected silhouette length below a node that its quadrics reject.
 float rejected_share(InnerNode node, std::span<const ForestPoint> points,
                      const ForestConfig& config) {
   const auto length = [&](uint32_t pairs) {
@@ -280,7 +280,7 @@ void keep_what_pays(std::span<const NodeId> ids, const NodeFrame& tree, const Fo
   forest.pairs.resize(kept);
 }
 
-// Heights, from the last node, whose children are edges, to the root.
+// Computes heights bottom-up, from edge nodes to the root.
 void set_heights(std::span<const NodeId> ids, const ForestConfig& config, Forest& forest) {
   for (size_t i = ids.size(); i-- > 0;) {
     if (ids[i] < 0) {
@@ -300,7 +300,7 @@ void set_heights(std::span<const NodeId> ids, const ForestConfig& config, Forest
   }
 }
 
-// Parents of nodes and slots of edges, for the nodes that were just filled.
+// Sets parents of nodes and slots of edges for new nodes.
 void link(std::span<const NodeId> ids, Forest& forest) {
   forest.head(ids[0]).parent = kNoParent;
   for (const NodeId id : ids)
@@ -337,7 +337,7 @@ void append_tree(std::span<const Wedge> wedges, ShapeId object, ForestGroup grou
   link(ids, forest);
 }
 
-// Of what an object's motion leaves of a vertex's. Motion that is wholly in there still is motion.
+// Residual speed of a vertex after the object's linear motion, nonzero if the vertex moves.
 double speed_of(const EdgeMesh& mesh, VertexId vertex, const Lanes& scale,
                 const ObjectMotion& motion) {
   if (mesh.tangents.empty()) return 0;

@@ -1,5 +1,5 @@
 #pragma once
-// Building the trees of the edge forest.
+// Builds the trees of the edge forest.
 #include <algorithm>
 #include <optional>
 #include <span>
@@ -13,13 +13,13 @@
 
 namespace limn {
 
-// Nothing for an edge that no query needs.
+// The group of an edge; nothing if no query needs the edge.
 std::optional<ForestGroup> group_of(const EdgeMesh& mesh, const Edge& edge, bool cull_concave);
-// All but the speed.
+// The wedge of an edge, without its speed.
 Wedge wedge_of(const EdgeMesh& mesh, EdgeId id);
 Bounds bounds_of(std::span<const Wedge> wedges);
-// Calls append(wedges, object, group) for every object and group that has edges, in a fixed order;
-// trees get a slot for every edge of every object first (Forest, QuadricForest).
+// Calls append(wedges, object, group) for every object and group with edges, in a fixed order,
+// after giving `trees` (Forest, QuadricForest) a slot for every edge.
 template <class Trees, class Append>
 void for_every_tree(const EdgeSamplerInput& input, bool cull_concave, Trees& trees,
                     const Append& append) {
@@ -38,10 +38,10 @@ void for_every_tree(const EdgeSamplerInput& input, bool cull_concave, Trees& tre
     }
   }
 }
-// The frame of a node whose edges fill the box: the cube [-1, 1]^3 holds it.
+// The frame of a node: its cube [-1, 1]^3 contains the box of its edges.
 NodeFrame frame_of(const Bounds& box);
 
-// One tree per object and group that has edges. The result does not depend on `threads`.
+// Builds one tree per object and group with edges. The result does not depend on `threads`.
 Forest build_forest(const EdgeSamplerInput& input, int threads, const ForestConfig& config);
 
 }  // namespace limn

@@ -1,4 +1,4 @@
-// Choices of the edge forest: weights, looks ahead, and the nodes that a query opens.
+// Choices of the edge forest: weights, two-level importance, node expansion.
 #include "edgetree/forest/forest_choice.h"
 
 #include <algorithm>
@@ -9,17 +9,17 @@
 namespace limn {
 namespace {
 
-// Lobes with a larger det(M^-1) are narrow. Before wider ones opening costs what it gains: with it
-// the CAD part's error times time is 1.2 times what it is.
+// Lobes with a larger det(M^-1) count as narrow. For wider ones node expansion costs what it gains:
+// error times time of the CAD part is 1.2 times as high.
 constexpr double kNarrow = 50;
-// Children are opened if they may weigh this many times what they do, and if that could change the
-// choice: if it is this share of all that is known. With 3, 0.3 and twelve nodes errors are the
-// same within noise, and runs take a tenth longer.
+// Node expansion: children are expanded if their weight may be too small by this factor, and by
+// this share of the total. With 3, 0.3 and twelve nodes errors are equal within noise, and runs
+// take a tenth longer.
 constexpr float kDoubtful = 6;
 constexpr double kShare = 1;
-// Children whose own children are looked at anyway weigh by all of these children's weights if they
-// may weigh this many times what they do. Without it the harp's error times time is 1.4 times what
-// it is, the plant's 1.1; with 10 they are 0.8 and 1.0, that of all in view 1.09.
+// Children with two-level importance use the weights of all their own children if their weight may
+// be too small by this factor. Without it, error times time is 1.4 times as high for the harp and
+// 1.1 for the plant; with 10, 0.8 and 1.0, but 1.09 for the scene in view.
 constexpr float kFarOff = 3;
 
 void look_ahead(const Forest& forest, const ForestConfig& config, const InnerNode& node,
@@ -53,7 +53,7 @@ void Choice::add_up() {
   total = fours[0] + fours[1];
 }
 
-// By halves, and without branches, which would depend on chance.
+// Binary search without branches, which would be unpredictable.
 int Choice::draw(double& u) const {
   double rest = u * total;
   int lane = 0;
@@ -65,14 +65,14 @@ int Choice::draw(double& u) const {
   step(fours[0], 4);
   step(pairs[lane / 2], 2);
   step(weights[lane], 1);
-  while (!(weights[lane] > 0)) lane = (lane + kWidth - 1) % kWidth;  // by rounding
+  while (!(weights[lane] > 0)) lane = (lane + kWidth - 1) % kWidth;  // rounding
   u = below_one(rest / weights[lane]);
   return lane;
 }
 
 Choice choice_at(const Forest& forest, const ForestConfig& config, const ForestQuery& query,
                  NodeId id, Floats* doubt) {
-  forest.fetch(id);  // all lines at once
+  forest.fetch(id);  // all cache lines at once
   if (id < 0) {
     if (doubt) *doubt = Floats{};
     return {id, weigh_edges(forest.edges[~id], query)};
@@ -136,7 +136,7 @@ void OpenNodes::open(const Forest& forest, const ForestConfig& config, const For
     if (!(doubt.amount > kShare * sum)) break;
     std::pop_heap(doubts_.begin(), doubts_.end());
     doubts_.pop_back();
-    if (!doubts_.empty()) forest.fetch(child_of(doubts_.front()));  // presumably the next
+    if (!doubts_.empty()) forest.fetch(child_of(doubts_.front()));  // probably expanded next
     sum -= choice(doubt.node).weights[doubt.lane];
     const NodeId child = child_of(doubt);
     nodes_[static_cast<size_t>(doubt.node)].open[doubt.lane] = static_cast<int>(nodes_.size());
@@ -179,7 +179,7 @@ void ForestWalk::begin(const Forest& forest, const ForestConfig& config, const F
   for (Choice& known : way_) known.node = kNoChild;
 }
 
-// Holds until the next call.
+// The reference is valid until the next call.
 const Choice& ForestWalk::choice(size_t depth, NodeId id) {
   if (depth >= way_.size()) way_.resize(depth + 1);
   Choice& known = way_[depth];

@@ -1,6 +1,6 @@
 #pragma once
-// Choosing among the children of nodes: from their weights, and from looks further down where a
-// weight says little.
+// The choice among a node's children: by their weights, and by node expansion where a weight is
+// uncertain.
 #include <vector>
 
 #include "edgetree/bounds/forest_config.h"
@@ -9,7 +9,7 @@
 
 namespace limn {
 
-// A node, the weights of its children, and their sums in pairs, fours and all.
+// A node, the weights of its children, and their sums in pairs, in fours and in total.
 struct Choice {
   NodeId node = kNoChild;
   float weights[kWidth];
@@ -19,35 +19,35 @@ struct Choice {
   Choice(NodeId id, Floats w);
   void set(int lane, double weight);
 
-  // Draws a lane by the uniform number u and leaves another one in it; total > 0.
+  // Draws a child by the uniform number u, which is rescaled to be uniform again; total > 0.
   int draw(double& u) const;
 
  private:
   void add_up();
 };
 
-// By what children weigh, looking ahead as configured. doubt: as of weigh_children, of inner nodes;
-// zero of edges.
+// Weights the children, with two-level importance as configured. doubt: see weigh_children, for
+// inner nodes; zero for edges.
 Choice choice_at(const Forest& forest, const ForestConfig& config, const ForestQuery& query,
                  NodeId id, Floats* doubt = nullptr);
 
-// The top of the trees, as one query sees it. The weight of a wide box says little of what is
-// inside: a narrow lobe may pass beside most of it, or p is near some of it. Such children are
-// opened, the most doubtful first, and weigh what is found in them. A function of the query alone.
+// The expanded nodes at the top of the trees for one query. The weight of a wide box is uncertain
+// if a narrow lobe may miss most of its content, or if p is near. The most uncertain children are
+// expanded first, and get the total weight of their own children. A function of the query alone.
 class OpenNodes {
  public:
-  // Forgets what was opened for another query. No allocation once it has been as large.
+  // Expands nodes for a new query. Reuses memory.
   void open(const Forest& forest, const ForestConfig& config, const ForestQuery& query);
 
-  // Over all trees.
+  // Total weight over all trees.
   double total() const { return total_; }
-  // Draws a tree by u, which is uniform again afterwards: its root; total() > 0.
+  // Draws a root by u, which is rescaled to be uniform again; total() > 0.
   int draw_root(double& u) const;
   const Choice& choice(int node) const { return nodes_[static_cast<size_t>(node)].choice; }
   static constexpr int kClosed = -1;
-  // The child in a lane of an open node, if that is open, too.
+  // The expanded node of a child, or kClosed.
   int child(int node, int lane) const { return nodes_[static_cast<size_t>(node)].open[lane]; }
-  // A root, which is always open.
+  // A root; roots are always expanded.
   int find_root(NodeId id) const;
 
  private:
@@ -56,7 +56,7 @@ class OpenNodes {
     int open[kWidth];
     int parent, lane;
   };
-  // A child that may weigh more than it does, by about this amount at most.
+  // A child whose weight may be too small, by up to about this amount.
   struct Doubt {
     double amount;
     int node, lane;
@@ -69,27 +69,27 @@ class OpenNodes {
   };
   const Choice& add(const Trees& trees, NodeId id, int parent, int lane);
 
-  std::vector<Node> nodes_;  // roots first, parents before their children
+  std::vector<Node> nodes_;  // roots first, parents before children
   std::vector<Doubt> doubts_;
   size_t roots_ = 0;
   double total_ = 0;
 };
 
-// Draws of one query: from the roots down to an edge. Where a draw comes by nodes that the one
-// before it came by, their weights are known, so that draws in the order of the trees weigh no node
+// Draws of one query: descents from the roots to an edge. Weights of nodes that
+// the previous draw visited are reused, so draws in tree order weigh no node
 // twice.
 class ForestWalk {
  public:
-  // Where a draw ends: an edge, not yet tested, in a lane of an edge node; no node if it ends
-  // before.
+  // The end of a descent: an edge, not yet tested, as child `lane` of an edge node; no node if
+  // rejected.
   struct End {
     const EdgeNode* node = nullptr;
     int lane = 0;
     double probability = 1;
-    double rest = 0;  // uniform in [0, 1), whatever the edge
+    double rest = 0;  // uniform in [0, 1), independent of the edge
     EdgeRef edge() const { return node->edge_at(lane); }
   };
-  // All are kept.
+  // Keeps references to all arguments.
   void begin(const Forest& forest, const ForestConfig& config, const ForestQuery& query,
              const OpenNodes& open);
   // By the uniform number u.
@@ -102,7 +102,7 @@ class ForestWalk {
   const ForestConfig* config_ = nullptr;
   const ForestQuery* query_ = nullptr;
   const OpenNodes* open_ = nullptr;
-  std::vector<Choice> way_;  // of the last draw that came so deep, by depth
+  std::vector<Choice> way_;  // choices of the last descent, by depth
 };
 
 }  // namespace limn

@@ -1,4 +1,4 @@
-// The motion of objects as linear maps, and as seen from a point.
+// Motion of objects as linear maps, in world space and as seen from a point.
 #include "edgetree/forest/forest_motion.h"
 
 #include <Eigen/Dense>
@@ -10,7 +10,7 @@
 namespace limn {
 namespace {
 
-// A map that leaves more than this share of the squared speeds is not used. Not tuned.
+// A map with a larger residual, as a share of squared speeds, is not used. Not tuned.
 constexpr double kLinear = 0.25;
 
 double squares_of(const Vec3<Lanes>& v) {
@@ -20,8 +20,8 @@ double squares_of(const Vec3<Lanes>& v) {
   return sum;
 }
 
-// The linear part: of the least squares the smallest, since flat and straight objects say nothing
-// of what lies beside them; they are thicker than nothing by the rounding of positions alone.
+// The linear part: the least-squares map of least norm, since flat and straight objects do not
+// determine it in all directions. Rounding of positions gives them a small thickness.
 void fit_linear(const EdgeMesh& mesh, const Lanes& lane_scale, ObjectMotion& motion) {
   Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
   Eigen::Matrix<double, 3, 3 * kLanes> products = Eigen::Matrix<double, 3, 3 * kLanes>::Zero();
@@ -33,7 +33,7 @@ void fit_linear(const EdgeMesh& mesh, const Lanes& lane_scale, ObjectMotion& mot
     for (int k = 0; k < 3; ++k)
       for (int i = 0; i < kLanes; ++i) products.col(kLanes * k + i) += x * u[k][i];
   }
-  // Thin is what roundings of 2^-24 of the farthest position may explain, four times over.
+  // Thin means within four roundings of the farthest position (2^-24 each).
   const double rounding = 0x1p-22 * mesh.extent;
   Eigen::CompleteOrthogonalDecomposition<Eigen::Matrix3d> decomposition;
   const double explained = static_cast<double>(mesh.positions.size()) * rounding * rounding;
@@ -98,14 +98,14 @@ SeenMotion::SeenMotion(const ObjectMotion& object, const ViewerMotion& viewer) {
   for (int i = 0; i < kLanes; ++i) {
     double columns2[3] = {0, 0, 0}, largest = 0;
     for (int k = 0; k < 3; ++k) {
-      // Both, since it is they that are rounded.
+      // The sum of both moduli, since both are rounded.
       largest += std::fabs(viewer.velocity[k][i]) + std::fabs(there[k][i]);
       for (int column = 0; column < 3; ++column)
         columns2[column] += linear[column][k][i] * linear[column][k][i];
     }
     largest += std::sqrt(columns2[0] + columns2[1] + columns2[2]);
     if (!(largest >= FLT_MIN)) continue;
-    // The power of two below it.
+    // The largest power of two below it.
     const double size =
         std::bit_cast<double>(std::bit_cast<uint64_t>(largest) & (uint64_t{0x7ff} << 52));
     const double inverse = 1 / size;

@@ -1,8 +1,8 @@
 #pragma once
-// How edges move as seen from p. Points of an object that is moved, turned, scaled or sheared have
-// velocities linear in their position, and so has what directions that turn at p take off: one map
-// per query and object then holds how all its edges move, and nodes store nothing of it. What is
-// not linear in an object's motion nodes keep as a speed, which counts in every direction.
+// Motion of edges as seen from p. Rigid motion, scaling and shear of an object have velocities
+// linear in position, and so has the motion of directions at p. So one linear map per query and
+// object describes all its edges, and nodes store none of it. The residual of an object's motion is
+// stored in nodes as a speed in any direction.
 #include "edgetree/simd.h"
 #include "limn/edgetree/edge_sampler.h"
 
@@ -13,7 +13,7 @@ Vec3<Lanes> scaled_velocity(const Vec3<Lanes>& v, const Lanes& lane_scale);
 // Sum of the lanes' speeds.
 double sum_of_speeds(const Vec3<Lanes>& v);
 
-// v(x) = at_center + linear (x - center), scaled.
+// v(x) = at_center + linear (x - center), scaled by lane_scale.
 struct ObjectMotion {
   Vec3d center{};
   Vec3<Lanes> at_center{};
@@ -25,29 +25,29 @@ struct ObjectMotion {
   }
 };
 
-// The map of least squares over the vertices; at rest where there are no tangents, and where the
-// map leaves much of the motion.
+// Least-squares map over the vertices; static without tangents, or if the residual is
+// large.
 ObjectMotion motion_of(const EdgeMesh& mesh, const Lanes& lane_scale);
 
-// How p moves, and the directions there: what all objects of a query share.
+// Motion of p and of the directions there, shared by all objects of a query.
 struct ViewerMotion {
   // unit: ForestQuery::unit.
   ViewerMotion(const EdgeQuery& query, const Lanes& lane_scale, double unit);
   Vec3d p;
   double inverse_unit;
   Vec3<Lanes> velocity;   // of p, scaled
-  Vec3<Lanes> linear[3];  // of directions: as of ObjectMotion, per 1 / unit
+  Vec3<Lanes> linear[3];  // of directions: as in ObjectMotion, per 1 / unit
 };
 
-// An object's velocity relative to p and to directions that turn there, in the lanes where there is
-// any.
+// Velocity of an object relative to p and the directions there, in the lanes where it is not
+// zero.
 struct SeenMotion {
   // u(w) = size (at_p + linear w unit), w = x - p.
   struct Lane {
-    float size;  // a power of two: the rest is less than 2
+    float size;  // a power of two that normalises the rest to below 2
     float at_p[3];
     float linear[3][3];  // [row][column]
-    float column2[3];    // squared lengths of its columns
+    float column2[3];    // squared lengths of the columns
   };
   int count = 0;
   Lane lanes[kLanes];

@@ -1,6 +1,6 @@
 #pragma once
-// Data of the edge forest: nodes of up to eight children, side by side in SIMD lanes. Inner nodes
-// have nodes for children, edge nodes have edges.
+// Data of the edge forest: nodes of up to eight children in SIMD vectors. Children of inner nodes
+// are nodes, children of edge nodes are edges.
 #include <cstdint>
 #include <span>
 #include <string>
@@ -13,15 +13,15 @@
 
 namespace limn {
 
-// Edges are kept apart by how they can be rejected.
+// Groups of edges that are rejected by the same test.
 enum class ForestGroup : uint8_t {
-  kSilhouette,  // smooth and flat: where p lies between the planes of its faces
-  kFront,       // sharp, of closed one-sided meshes: where p is in front of a face
-  kAlways,      // borders, irregular edges, and sharp edges of other meshes: for every p
+  kSilhouette,  // smooth and flat: candidates if p is between their planes
+  kFront,       // sharp, of closed one-sided meshes: candidates if p is in front of a face
+  kAlways,      // boundary, irregular, and other sharp edges: always candidates
 };
 inline constexpr int kForestGroups = 3;
 
-// A node: >= 0 is an index of an inner node, < 0 is ~index of an edge node.
+// A node: >= 0 is the index of an inner node, < 0 is ~index of an edge node.
 using NodeId = int32_t;
 inline constexpr int32_t kNoChild = INT32_MIN;
 inline constexpr uint32_t kNoParent = UINT32_MAX;
@@ -31,49 +31,49 @@ inline constexpr uint32_t kNoPairs = UINT32_MAX;
 inline constexpr int kBoxBits = 10;
 inline constexpr int kBoxSteps = (1 << kBoxBits) - 1;
 
-// What both kinds of nodes have. In the frame of a node x = ((p - center) * inverse_radius, 1).
+// Common data of both kinds of nodes. In the node's frame x = ((p - center) * inverse_radius, 1).
 struct NodeHead {
   float center[3];
   float inverse_radius;
-  uint32_t parent;  // kWidth * inner node + lane
+  uint32_t parent;  // kWidth * inner node + index of the child
   ShapeId object;
   ForestGroup group;
-  uint8_t height;  // 0 for nodes of edges, else one more than the highest child's
+  uint8_t height;  // 0 for edge nodes, else 1 + the largest height of a child
 };
 
-// Planes of a child that pass through p satisfy row_0 . x + sum over k of u_k (row_k . x) = 0 for
-// some u in [-1, 1]^3: the dual box (README.md). Rows are scaled so that their lengths add up to 1.
+// Dual boxes (README.md): planes of a child that pass through p satisfy row_0 . x + sum over k of
+// u_k (row_k . x) = 0 for some u in [-1, 1]^3. Row lengths sum to 1.
 struct alignas(64) InnerNode {
   Floats rows[4][4];  // [row][component of x]
-  // Half the sum over edges of length * inverse_radius^2 times what their wedges cover of axis u_k:
-  // a plane that crosses the box at random along axis k crosses wedges of this length on average.
+  // Half the sum over edges of length * inverse_radius^2 times the wedge's extent along axis u_k:
+  // the expected length cut by a random plane that crosses the box along axis k.
   Floats cover[3];
   NodeHead head;
-  // Of what ObjectMotion leaves out, mean over the edges; 0 only if none moves.
+  // Mean over edges of the residual speed of ObjectMotion; 0 only if none moves.
   Floats speed;
   Ints child;  // NodeId or kNoChild
-  // Boxes around the children: the cube [-1, 1]^3 of the frame is kBoxSteps wide; bits 0 to 9 are
+  // Bounding boxes of the children: the frame's cube [-1, 1]^3 is kBoxSteps wide; bits 0 to 9 hold
   // x, then y, then z.
   Ints low, high;
-  uint8_t ahead;  // bit per lane: the child weighs by its own children, see ForestConfig
+  uint8_t ahead;              // one bit per child: weighted by its own children, see ForestConfig
   uint32_t pairs = kNoPairs;  // index in Forest::pairs
 };
 
-// Pairs of bounding quadrics of a node's children, in the coordinates of their dual boxes.
+// Bounding quadrics of a node's children, in the coordinates of their dual boxes.
 struct ForestPairs {
   QuadricPairs halves[kWidth / kQuadricWidth];
 };
 
-// An edge's dual box is the segment between the planes of its faces: u_0 in [-1, 1].
+// Dual boxes of edges: segments between the planes of their faces, u_0 in [-1, 1].
 struct alignas(64) EdgeNode {
   Floats rows[2][4];
-  Floats length;  // times inverse_radius^2; 0 where there is no edge
+  Floats length;  // times inverse_radius^2; 0 if absent
   NodeHead head;
   Floats speed;
-  Ints edge;          // index of an edge of the object, or kNoChild
-  Floats ends[2][3];  // world space: exactly; of crossing curves to the nearest float
+  Ints edge;          // index in the object, or kNoChild
+  Floats ends[2][3];  // world space: exact, or rounded for intersection curves
 
-  // In a lane that has one.
+  // The edge of a child that exists.
   EdgeRef edge_at(int lane) const {
     return {head.object, EdgeId(static_cast<uint32_t>(edge[lane]))};
   }
@@ -82,18 +82,18 @@ struct alignas(64) EdgeNode {
 struct Forest {
   std::vector<InnerNode> inner;
   std::vector<EdgeNode> edges;
-  std::vector<ForestPairs> pairs;  // of the inner nodes that have them
+  std::vector<ForestPairs> pairs;  // of inner nodes with quadrics
   std::vector<NodeId> roots;
   std::vector<ObjectMotion> motions;  // of the objects
   double extent = 0;                  // largest |x| of a position
-  // [object][edge]: kWidth * edge node + lane, or kNoParent.
+  // [object][edge]: kWidth * edge node + index of the child, or kNoParent.
   std::vector<std::vector<uint32_t>> slots;
 
-  // What does not hold of these trees over the edges of `objects`, in words; empty if all is well:
-  // every node has one parent, every edge one lane, boxes hold what is below, rows are scaled.
+  // Describes a violated invariant over the edges of `objects`; empty if all hold: unique parents
+  // and slots, boxes that hold their content, normalised rows.
   std::string validate(std::span<const EdgeMesh> objects) const;
 
-  // Brings the lines of a node into the cache.
+  // Prefetches the cache lines of a node.
   void fetch(NodeId id) const {
     const void* node = id < 0 ? static_cast<const void*>(&edges[~id]) : &inner[id];
     const size_t size = id < 0 ? sizeof(EdgeNode) : sizeof(InnerNode);

@@ -1,4 +1,4 @@
-// How the children of a node are rejected and weighed for a query: the inner loop of a draw.
+// Rejection and weights of a node's children: the inner loop of a draw.
 #include "edgetree/forest/forest_query.h"
 
 #include <algorithm>
@@ -11,38 +11,38 @@
 namespace limn {
 namespace {
 
-// A plane near a corner of a dual box is taken to meet this share of what one in the middle does,
-// at least. Tuned, together with the ramp's power in expected_length.
+// Least expected length at a corner of a dual box, as a share of that in the middle. Tuned together
+// with the exponent of the ramp in expected_length.
 constexpr float kShallow = 0.1f;
-// Points in or near a box see its edges at this share of its squared radius at least. Not tuned.
+// Lower bound of the squared distance of a box, as a share of its squared radius. Not tuned.
 constexpr float kNear = 0.25f;
-// Radiance of objects as a share of the mean of the environment that lights them. With a quarter,
-// rare bright samples were left (edgetree/FIGURES.md).
+// Radiance of objects, as a share of the environment's mean that lights them. A quarter left rare
+// bright samples (edgetree/FIGURES.md).
 constexpr float kScattered = 1.0f;
 
-// What moves along the line of sight or an edge counts this share at least. At nodes 0.2 gives the
-// same second moments of draws, within noise. Of edges: not tuned.
+// Lower bound of the speed across the line of sight, as a share of the total speed. For nodes 0.2
+// gives equal second moments, within noise; for edges it is not tuned.
 constexpr float kSlowest = 0.1f, kSlowestEdge = 0.01f;
-// Mean square of the cosine between motion across the line of sight and a normal that may have any
+// Mean squared cosine between a motion across the line of sight and a normal with a uniform
 // direction across it.
 constexpr float kAnyNormal = 0.5f;
-// Mean square of a coordinate of a dual box over what is in there: a third between its sides, and
-// one at them. With a third the plant's draws have 1.17 times the second moment.
+// Mean square of a coordinate over a dual box: 1/3 for a uniform distribution, 1 at the sides. With
+// 1/3 the second moment of the plant's draws is 1.17 times as high.
 constexpr float kSpread = 2 / 3.0f;
-// Where a dual box is far wider than planes in it are long, the normals may have any direction; the
-// square of that length, rows being 1 together. Without it such nodes seem at rest, and the
-// chandelier's draws have 2.6 times the second moment; from 0.01 to 0.05 all is the same.
+// Where a dual box is much wider than the planes in it are long, normals may have any direction;
+// this is the squared threshold on that length. Without it such nodes seem static, and the second
+// moment of the chandelier's draws is 2.6 times as high; any value from 0.01 to 0.05 works.
 constexpr float kVague = 0.02f;
-// What rounding adds to speeds in the lanes of SeenMotion, at most.
+// Bound of the rounding error of speeds in SeenMotion.
 constexpr float kMotionRounding = 0x1p-21f;
 
 constexpr float kLeast = std::numeric_limits<float>::min();
-// Far above any weight that means something, and sums of many still are finite.
+// Above every meaningful weight, yet sums of many stay finite.
 constexpr float kMost = 0x1p100f;
 
-// p in the frame of a node, and what rounding can add to row . x of all rows together: of the
-// entries of rows and of x by 2^-24 each, four roundings in a product and two in sums; rows have
-// unit length together.
+// p in the frame of a node, and a bound of the rounding error of row . x over all rows together:
+// entries of rows and of x have 2^-24 each, products four roundings and sums two; row lengths sum
+// to 1.
 struct FramePoint {
   float x[3];
   float error;
@@ -64,11 +64,11 @@ Floats row_product(const Floats row[4], const FramePoint& at) {
   return row[0] * at.x[0] + row[1] * at.x[1] + row[2] * at.x[2] + row[3];
 }
 
-// The query plane u -> g[0] + g[1] u_0 + g[2] u_1 + g[3] u_2 in the coordinates of each child's
-// dual box.
+// The query plane u -> g[0] + g[1] u_0 + g[2] u_1 + g[3] u_2 in each child's dual
+// box.
 struct DualPlane {
   Floats g[4];
-  Floats half;  // largest |g - g[0]| over the box, widened
+  Floats half;  // largest |g - g[0]| over the box, enlarged
 };
 DualPlane dual_plane(const InnerNode& node, const FramePoint& at) {
   DualPlane plane;
@@ -77,10 +77,10 @@ DualPlane dual_plane(const InnerNode& node, const FramePoint& at) {
   return plane;
 }
 
-// The same for the segments of edges.
+// The query plane in the dual segments of edges.
 struct DualSegment {
   Floats middle;
-  Floats half;  // widened
+  Floats half;  // enlarged
 };
 DualSegment dual_segment(const EdgeNode& node, const FramePoint& at) {
   return {row_product(node.rows[0], at), abs(row_product(node.rows[1], at)) + at.error};
@@ -92,7 +92,7 @@ Ints not_rejected(ForestGroup group, Floats middle, Floats half) {
   return Ints{} - 1;
 }
 
-// Lanes whose pairs of quadrics meet the query plane. Out of line: few nodes have any.
+// Mask of children whose quadrics meet the query plane. Not inlined: few nodes have quadrics.
 __attribute__((noinline)) Ints met_by_quadrics(const ForestPairs& pairs, const DualPlane& plane,
                                                float error) {
   Ints all;
@@ -113,10 +113,10 @@ void reject_by_quadrics(const InnerNode& node, const ForestPoint& point, const D
   if (node.pairs != kNoPairs) alive &= met_by_quadrics(point.pairs[node.pairs], plane, error);
 }
 
-// The length of silhouettes that a child is expected to hold, given the query plane. With planes
-// spread evenly over the dual box, the values of g - g[0] have nearly the density of the sum of two
-// uniform numbers, one of half-width a = max |g[k]| and one of what is left of half: flat, with
-// ramps at both ends.
+// Expected length of silhouettes below a child, given the query plane. For planes uniform in
+// the dual box, the values of g - g[0] have nearly the density of a sum of two uniform numbers,
+// of half-width a = max |g[k]| and of the remainder of `half`: constant, with ramps at both
+// ends.
 Floats expected_length(const InnerNode& node, const DualPlane& plane, float error, bool soft) {
   const Floats size[3] = {abs(plane.g[1]) + error, abs(plane.g[2]), abs(plane.g[3])};
   const Floats widest = max(size[0], max(size[1], size[2]));
@@ -126,11 +126,11 @@ Floats expected_length(const InnerNode& node, const DualPlane& plane, float erro
   const Floats rest = plane.half - widest;
   const Floats ramp = clamp(0.5f * (plane.half - abs(plane.g[0])) / max(rest, splat(kLeast)),
                             splat(kShallow), splat(1.0f));
-  // Not every box that is met holds a silhouette: the power makes up for part of that.
+  // Partially accounts for boxes that are cut but hold no silhouette.
   return length * (ramp * sqrt(ramp));
 }
 
-// Not positive for children that are rejected.
+// Not positive for rejected children.
 Floats length_of(const InnerNode& node, const ForestPoint& point, const FramePoint& at,
                  const DualPlane& plane, bool soft) {
   const ForestGroup group = node.head.group;
@@ -153,18 +153,18 @@ Floats length_of(const EdgeNode& node, const FramePoint& at) {
                 splat(0.0f));
 }
 
-// Radiance that may come from behind the boxes, from lights and environment.
+// Radiance that may arrive from behind the boxes: lights and environment.
 Floats brightness(const ForestQuery& query, const Floats3& d, const Floats3& half, Floats tangent,
                   Ints alive) {
   Floats sum = splat(0.0f);
   if (query.lights) sum = query.lights->mean_over_boxes(d, half);
   if (!query.environment) return sum;
   sum += select(alive, means(*query.environment, d, tangent), splat(0.0f));
-  // Where the environment is dark, edges still jump against the objects that it lights.
+  // In front of a dark environment, radiance still differs from that of lit objects.
   return sum + kScattered * query.environment->mean();
 }
 
-// The boxes of a node's children: centers minus p, and half extents.
+// Boxes of a node's children: centers minus p, and half extents.
 void boxes_of(const InnerNode& node, const FramePoint& at, Floats3& d, Floats3& half) {
   Floats* centers[3] = {&d.x, &d.y, &d.z};
   Floats* halves[3] = {&half.x, &half.y, &half.z};
@@ -189,8 +189,8 @@ Floats dot_n(const ForestQuery& query, const Floats3& d) {
   return d.x * query.n[0] + d.y * query.n[1] + d.z * query.n[2];
 }
 
-// Lanes of the edges that end at p exactly. They lie on lines through p, where the Jacobian is
-// zero, and rounding makes candidates of them all.
+// Mask of edges with an end exactly at p. Their Jacobian is zero, and rounding makes candidates of
+// all of them.
 Ints ends_at(const EdgeNode& node, const Vec3d& p) {
   Ints at = Ints{};
   for (const auto& end : node.ends) {
@@ -200,8 +200,8 @@ Ints ends_at(const EdgeNode& node, const Vec3d& p) {
   return at;
 }
 
-// Lanes of the edges of the query's own face. They lie in its plane: most others need no look at
-// their mesh. Ends minus p in the query's unit.
+// Mask of the edges of the query's own face, which lie in its plane: most others need no access to
+// the mesh. Arguments: ends minus p in the query's unit.
 Ints own_edges(const EdgeNode& node, const ForestQuery& query, const Floats3& w_0,
                const Floats3& w_1, Ints alive) {
   const Vec3d& normal = query.own_plane->n;
@@ -218,7 +218,7 @@ Ints own_edges(const EdgeNode& node, const ForestQuery& query, const Floats3& w_
   return own;
 }
 
-// The squared distance of the boxes from p; from inside, that to a tenth of their size.
+// Squared distance of the boxes from p; from inside, a lower bound relative to their size.
 Floats nearest2_of(const Floats3& d, const Floats3& half) {
   constexpr float kInside = 0.01f;  // not tuned
   const auto outside = [](Floats x, Floats h) { return max(abs(x) - h, splat(0.0f)); };
@@ -226,7 +226,7 @@ Floats nearest2_of(const Floats3& d, const Floats3& half) {
   return max(dot(to, to), kInside * dot(half, half));
 }
 
-// w: x - p, times what brings it to the query's unit.
+// w: (x - p) times the factor that converts it to the query's unit.
 Floats3 velocity_at(const SeenMotion::Lane& lane, const Floats3& w, float unit) {
   const auto row = [&](int k) {
     const float* a = lane.linear[k];
@@ -235,8 +235,8 @@ Floats3 velocity_at(const SeenMotion::Lane& lane, const Floats3& w, float unit) 
   return {row(0), row(1), row(2)};
 }
 
-// Where silhouettes below a child have the planes through p and them, in its dual box: the point of
-// the query plane nearest to the middle, and what is left of the box around it.
+// Normals of the planes through p and the silhouettes below a child, in its dual box: the center of
+// the box's intersection with the query plane, and the extent around it.
 struct Normals {
   Floats3 middle;
   Floats3 rows[3];
@@ -257,7 +257,7 @@ struct Normals {
     }
     inverse_n2 = 1 / (dot(middle, middle) + kVague);
   }
-  // Mean square of v along them; side2: of what of v is across the line of sight.
+  // Mean square of v along the normals; side2: squared component of v across the line of sight.
   Floats along2(const Floats3& v, Floats side2) const {
     const Floats in_middle = dot(v, middle);
     Floats squares{}, across{};
@@ -272,8 +272,8 @@ struct Normals {
   }
 };
 
-// Speed that counts, of edges below a child in the mean: along the normals of the planes through p
-// and them. d, half: its box, as of boxes_of.
+// Mean speed of edges below a child along the normals of the planes through p and them. d, half:
+// its box, from boxes_of.
 Floats speed_below(const InnerNode& node, const ForestQuery& query, const DualPlane& plane,
                    const Floats3& d, const Floats3& half) {
   const SeenMotion& motion = query.motion_of(node.head.object);
@@ -290,7 +290,7 @@ Floats speed_below(const InnerNode& node, const ForestQuery& query, const DualPl
     const Floats3 v = velocity_at(lane, d, unit);
     const Floats v2 = dot(v, v), towards = dot(v, d);
     const Floats side2 = v2 - towards * towards * inverse_d2;
-    // Mean square over the box of what the map adds to the velocity in its middle.
+    // Mean square over the box of the change of velocity from its center.
     const float third = unit * unit / 3;
     const Floats within2 = half_squares.x * (lane.column2[0] * third) +
                            half_squares.y * (lane.column2[1] * third) +
@@ -302,7 +302,7 @@ Floats speed_below(const InnerNode& node, const ForestQuery& query, const DualPl
   return sum;
 }
 
-// The same of edges with the ends w_0 and w_1 minus p, in the query's unit. normal: of the planes
+// The speed of edges with the ends w_0 and w_1 minus p, in the query's unit. normal: of the planes
 // through p and them, of any length.
 Floats speed_of(const EdgeNode& node, const ForestQuery& query, const Floats3& w_0,
                 const Floats3& w_1, const Floats3& normal) {
@@ -322,7 +322,7 @@ Floats speed_of(const EdgeNode& node, const ForestQuery& query, const Floats3& w
   return sum;
 }
 
-// Mean of f_s times luminance over boxes, given that of f_s.
+// Mean of f_s times luminance over boxes, given the mean of f_s.
 Floats light_through(const ForestQuery& query, Floats lobe, const Floats3& d, const Floats3& half,
                      Floats distance2, Ints alive) {
   if (!query.lights && !query.environment) return lobe;
@@ -331,8 +331,8 @@ Floats light_through(const ForestQuery& query, Floats lobe, const Floats3& d, co
 
 }  // namespace
 
-// The nearest float. Never inlined, because GCC 12 drops a cast to float and back where it makes
-// vectors of such pairs.
+// Rounds to the nearest float. Not inlined, because GCC 12 drops a cast to float and back when it
+// vectorises.
 __attribute__((noinline)) static double nearest_float(double x) { return static_cast<float>(x); }
 
 ForestPoint point_of(const Forest& forest, const Vec3d& p) {
@@ -402,7 +402,7 @@ bool surely_candidate(const EdgeNode& node, int lane, const ForestPoint& point) 
   if (node.head.group == ForestGroup::kAlways) return true;
   const FramePoint at = to_frame(node.head, point);
   const DualSegment segment = dual_segment(node, at);
-  // `half` was widened by the error once.
+  // Removes twice the error from `half`, which was enlarged by it once.
   return not_rejected(node.head.group, segment.middle, segment.half - 2 * at.error)[lane] != 0;
 }
 
@@ -422,7 +422,7 @@ ForestCone::ForestCone(const Forest& forest, const EdgeQuery& query, const Direc
   split(query.p, unit, p);
 }
 
-// Boxes are wider than their edges by more than is rounded here, but for the product.
+// Boxes are enlarged by more than the rounding here, except that of the product.
 Ints may_hold_outlines(const InnerNode& node, const ForestCone& cone) {
   const FramePoint at = to_frame(node.head, cone.point);
   Ints alive = node.child != kNoChild;
@@ -468,7 +468,7 @@ Ints may_hold_outlines(const EdgeNode& node, const ForestCone& cone) {
   return alive;
 }
 
-// Motion, light or length too little for a float still is some.
+// Nonzero motion, light or length must not underflow.
 Floats ChildWeights::product() const {
   return select((length > 0) & (rest > 0), max(length * rest, splat(kLeast)), splat(0.0f));
 }
@@ -485,11 +485,11 @@ ChildWeights weigh_children(const InnerNode& node, const ForestQuery& query, boo
   const Floats height = dot_n(query, d) + half.x * std::fabs(n[0]) + half.y * std::fabs(n[1]) +
                         half.z * std::fabs(n[2]);
   alive &= height >= -16 * 0x1.0p-24f * at.size;
-  // A child's box is a step wide at least in every direction: this is positive.
+  // Positive: a child's box is at least a step wide in every direction.
   const Floats distance2 = max(dot(d, d), kNear * dot(half, half));
   const Floats speed = speed_below(node, query, plane, d, half);
   alive &= speed > 0;
-  // What a look ahead reads comes in while light is weighed.
+  // Prefetches children for two-level importance while light is evaluated.
   for (uint32_t lanes = bits(alive) & node.ahead; lanes != 0; lanes &= lanes - 1)
     query.forest.fetch(node.child[std::countr_zero(lanes)]);
   const Floats lobe = query.lobe.mean_over_boxes(d, half);
@@ -501,10 +501,10 @@ ChildWeights weigh_children(const InnerNode& node, const ForestQuery& query, boo
   return {length, select(alive, max(rest, splat(kLeast)), splat(0.0f))};
 }
 
-// The integral over the edge of |w x w'| / |w|^3, w = (1 - t) w_0 + t w_1, is
-// tan(gamma / 2) (1 / l_0 + 1 / l_1), with the ends' distances l and the angle gamma between them.
-// It grows without bound as p comes close to an end. At an end it is zero; where only the rounding
-// of squares takes p for an end, the weight is kMost at most.
+// The integral over the edge of |w x w'| / |w|^3, w = (1 - t) w_0 + t w_1, is tan(gamma / 2) (1 /
+// l_0 + 1 / l_1), with the ends' distances l and the angle gamma between them. It is unbounded as p
+// approaches an end, and zero at the end. Where rounding of squares decides this wrongly, the
+// weight is at most kMost.
 Floats weigh_edges(const EdgeNode& node, const ForestQuery& query) {
   const FramePoint at = to_frame(node.head, query.point);
   const Floats3 w_0 = end_of(node, query, 0), w_1 = end_of(node, query, 1);

@@ -1,4 +1,4 @@
-// The edge forest as a tree of nodes that one test rejects or accepts.
+// The edge forest as a RejectionTree.
 #include "edgetree/forest/forest_rejection.h"
 
 #include "edgetree/forest/forest_query.h"
@@ -26,7 +26,7 @@ class ForestRejectionTree final : public RejectionTree {
     int lane;
   };
 
-  // The lanes of a node and all below them.
+  // Appends the children of a node and their descendants.
   void append(NodeId id, uint32_t parent, uint32_t depth) {
     const Ints& lanes = id < 0 ? forest_.edges[~id].edge : forest_.inner[id].child;
     for (int lane = 0; lane < kWidth; ++lane) {

@@ -1,5 +1,5 @@
 #pragma once
-// The edge forest as a tree of nodes that one test rejects or accepts.
+// The edge forest as a RejectionTree.
 #include <memory>
 
 #include "edgetree/forest/forest_node.h"
@@ -7,7 +7,7 @@
 
 namespace limn {
 
-// Its nodes are the lanes of the forest's nodes. The forest must outlive it.
+// Its nodes are the children of the forest's nodes. The forest must outlive it.
 std::unique_ptr<RejectionTree> make_forest_rejection_tree(const Forest& forest);
 
 }  // namespace limn

@@ -1,4 +1,4 @@
-// Binned splits of edges by where they are and where their normals point.
+// Binned splits of edges by position and direction of normals.
 #include "edgetree/forest/forest_split.h"
 
 #include <algorithm>
@@ -15,14 +15,14 @@ namespace {
 
 constexpr int kAxes = 6;
 
-// How much an extent of the mesh's radius counts against one of a radian in normals. With 1 listing
-// visits fewer nodes (1.63 per silhouette of spot, with 8 1.81), but draws are worse by far: edges
-// of one node then differ in distance and direction.
+// Weight of an extent of the mesh's radius relative to one radian of normals. With 1, listing
+// visits fewer nodes (1.63 per silhouette of spot; 1.81 with 8), but draws are much worse: edges of
+// a node then differ in distance and direction.
 constexpr float kPosition = 8;
 
-// Where an edge is, and where its normals point: close in both means rejected together.
+// Position and normal direction of an edge: edges close in both are rejected together.
 struct Item {
-  Floats key;  // of the axes; behind them the wedge's bits, and zero
+  Floats key;  // by axis; then the bits of the wedge index, and zero
 
   uint32_t wedge() const { return std::bit_cast<uint32_t>(key[kAxes]); }
 };
@@ -38,8 +38,8 @@ struct Extent {
     low = min(low, other.low);
     high = max(high, other.high);
   }
-  // Grows with the chance that a plane through a random point cuts the set, and with how much its
-  // edges differ in distance and direction from there.
+  // Increases with the probability that a plane through a random point cuts the set, and with the
+  // spread of its edges' distances and directions.
   float measure() const {
     if (low[0] > high[0]) return 0;
     float position = 0, normal = 0;
@@ -54,10 +54,10 @@ struct Extent {
 struct Cut {
   float cost = std::numeric_limits<float>::max();
   int axis = 0;
-  uint32_t bin = 0;  // or, where items are sorted, the number of items on the left
+  uint32_t bin = 0;  // or, for sorted items, the number on the left
 };
 
-// Not tuned: sets below this size are sorted along each axis instead of binned.
+// Smaller sets are sorted along each axis instead of binned. Not tuned.
 constexpr int kBins = 16;
 constexpr uint32_t kSortBelow = 96;
 
@@ -105,7 +105,7 @@ Cut best_bin(std::span<const Item> items, const Extent& extent) {
   return best;
 }
 
-// Few items in an order: numbers that rise with it, and in their low halves places.
+// Sort keys with the items' positions in their low halves.
 using Order = std::array<uint64_t, kSortBelow>;
 uint64_t numbered(uint32_t rising, uint32_t place) { return uint64_t{rising} << 32 | place; }
 uint32_t place_in(uint64_t number) { return static_cast<uint32_t>(number); }
@@ -117,7 +117,7 @@ class FewItems {
     for (uint32_t i = 0; i < items.size(); ++i) by_wedge_[i] = numbered(items[i].wedge(), i);
     std::sort(by_wedge_.begin(), by_wedge_.begin() + items.size());
   }
-  // By the key, ties by the wedge. The order's places are for `at`.
+  // Sorts by key, then by wedge index. Positions in the order are arguments of `at`.
   void sort_along(int axis, Order& order) const {
     for (uint32_t i = 0; i < items_.size(); ++i) {
       const auto bits = std::bit_cast<uint32_t>(at(i).key[axis] + 0.0f);  // -0 is 0
@@ -132,7 +132,7 @@ class FewItems {
   Order by_wedge_;
 };
 
-// Any place in the sorted order that leaves full nodes of edges.
+// The best cut of the sorted order that leaves full nodes of edges.
 Cut best_place(const FewItems& items, uint32_t n, uint32_t width) {
   Cut best;
   const uint32_t step = n > width ? width : 1;
@@ -167,14 +167,14 @@ uint32_t split_few(std::span<Item> items, uint32_t width) {
   return cut.bin;
 }
 
-// Reorders the items and returns how many go left: at least one, and not all.
+// Partitions the items and returns the number on the left: at least one, not all.
 uint32_t split(std::span<Item> items, uint32_t width) {
   const auto n = static_cast<uint32_t>(items.size());
   if (n < kSortBelow) return split_few(items, width);
   Extent extent;
   for (const Item& item : items) extent.add(item);
   const Cut cut = best_bin(items, extent);
-  if (cut.cost == std::numeric_limits<float>::max()) return n / 2;  // all alike
+  if (cut.cost == std::numeric_limits<float>::max()) return n / 2;  // all equal
   const Bins bin_of = bins_of(extent, cut.axis);
   const auto middle = std::partition(items.begin(), items.end(), [&](const Item& item) {
     return bin_of(item.key[cut.axis]) <= cut.bin;
@@ -182,7 +182,7 @@ uint32_t split(std::span<Item> items, uint32_t width) {
   return static_cast<uint32_t>(middle - items.begin());
 }
 
-// The largest part is split until there are `width` parts, or all fit into nodes of edges.
+// Splits the largest part until there are `width` parts, or each fits into a node of edges.
 class Splitter {
  public:
   Splitter(std::span<Item> items, uint32_t width) : items_(items), width_(width) {}

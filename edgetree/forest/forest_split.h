@@ -1,5 +1,5 @@
 #pragma once
-// The shape of a tree: which edges share a node.
+// The topology of a forest tree: which edges share a node.
 #include <cstdint>
 #include <span>
 
@@ -9,7 +9,7 @@
 
 namespace limn {
 
-// All children are nodes or, if a node has no more edges than `width`, all are edges, with a range
+// The children of a node are all nodes, or, if it has at most `width` edges, one edge
 // each.
 using ForestShape = SplitTree<kWidth>;
 

@@ -1,4 +1,4 @@
-// What holds of every forest, checked against the edges that it was built over.
+// Checks the invariants of a forest against the edges it was built over.
 #include <cmath>
 #include <string>
 
@@ -12,7 +12,7 @@ struct Fault {
   std::string text;
 };
 
-// Walks the trees from their roots; throws the first Fault.
+// Traverses the trees; throws the first Fault.
 class Walk {
  public:
   Walk(const Forest& forest, std::span<const EdgeMesh> objects)
@@ -47,7 +47,7 @@ class Walk {
     require(index < (id < 0 ? edges_seen_ : inner_seen_).size(), "a node is out of range");
   }
 
-  // An edge is in the lane that its slot names, or in none: then it is concave and culled.
+  // An edge is in the child that its slot names, or in none if it is concave and culled.
   void require_slot(EdgeRef id) const {
     const uint32_t slot = forest_.slot(id);
     if (slot == kNoParent) {
@@ -62,7 +62,7 @@ class Walk {
     require(node.edge_at(slot % kWidth) == id, "a slot does not lead to its edge");
   }
 
-  // Returns bounds of all edges below.
+  // Returns the bounds of all edges below.
   Bounds visit(NodeId id) {
     std::vector<bool>& seen = id < 0 ? edges_seen_ : inner_seen_;
     require(!seen[id < 0 ? ~id : id], "two ways lead to a node");
@@ -107,7 +107,7 @@ class Walk {
                 "an end is not the mesh's");
   }
 
-  // The rows' lengths add up to 1: a query's bound of its rounding relies on it.
+  // Row lengths sum to 1, as the rounding bound of queries requires.
   template <class Rows>
   static void require_rows(const Rows& rows, int lane) {
     double sum = 0;
@@ -151,7 +151,7 @@ class Walk {
     return bounds;
   }
 
-  // A child's box holds all edges below, and is a step wide at least: a query divides by its size.
+  // A child's box holds all edges below and is at least a step wide, as queries divide by its size.
   static void require_box(const InnerNode& node, int lane, const Bounds& below) {
     for (int k = 0; k < 3; ++k) {
       const int low = node.low[lane] >> (k * kBoxBits) & kBoxSteps;

@@ -1,4 +1,4 @@
-// Clusters of lights, and how bright it is behind a box seen from a point.
+// Clusters of lights, and the estimated radiance behind a box.
 #include "edgetree/light/light_term.h"
 
 #include <algorithm>
@@ -7,11 +7,11 @@
 namespace limn {
 namespace {
 
-// Objects are lit about as the shading point is: they scatter this share of the light that arrives
-// there, spread over the hemisphere. Not tuned.
+// Albedo of objects, which are assumed to receive the same light as the shading point and to
+// scatter it uniformly over the hemisphere. Not tuned.
 constexpr double kReflectance = 0.5;
-// Least weight, as a share of the brightest light's luminance: the light may reach objects that are
-// seen from here without reaching this point. Not tuned.
+// Lower bound of weights, as a share of the brightest light's luminance: visible objects may
+// receive light that does not reach this point. Not tuned.
 constexpr double kFloor = 1.0 / 4096;
 
 Vec3d centroid(const LightTriangle& t) {
@@ -31,7 +31,7 @@ LightClusters::LightClusters(std::span<const LightTriangle> lights, double envir
   if (shining.empty()) return;
   clusters_.push_back(make_cluster(lights, shining));
   while (clusters_.size() < kMaxClusters) {
-    // The one whose split promises most: power times extent squared.
+    // The cluster with the largest power times squared extent.
     Cluster* best = nullptr;
     double best_score = 0;
     for (Cluster& c : clusters_) {
@@ -71,14 +71,14 @@ LightClusters::Cluster LightClusters::make_cluster(std::span<const LightTriangle
   return cluster;
 }
 
-// One triangle, or a flat patch that fills half of the disc around it (a square: 0.64). Neither
-// that half nor what counts as flat is tuned.
+// A single triangle, or a flat patch that fills half of its bounding disc (a square: 0.64). Neither
+// the half nor the flatness is tuned.
 bool LightClusters::is_compact(const Cluster& c) {
   const bool flat = length(c.area_vector) >= 0.999 * c.area;
   return c.triangles.size() == 1 || (flat && c.area >= 0.5 * kPi * c.radius * c.radius);
 }
 
-// At the median along the longest axis of the centroids' bounds.
+// Splits at the median, along the longest axis of the centroids' bounds.
 std::array<LightClusters::Cluster, 2> LightClusters::split(std::span<const LightTriangle> lights,
                                                            const Cluster& cluster) {
   Bounds bounds;
@@ -94,8 +94,8 @@ std::array<LightClusters::Cluster, 2> LightClusters::split(std::span<const Light
           make_cluster(lights, {middle, order.end()})};
 }
 
-// A cluster's area seen from p: a flat one shows its area vector along the view; what cancels in
-// the area vector is taken for a closed surface, which shows a quarter of its area.
+// A cluster's projected area from p: a flat one shows its area vector; the part that cancels in the
+// area vector counts as a closed surface, which shows a quarter of its area.
 LightCones::LightCones(const LightClusters& lights, const Vec3d& p) {
   double scattered = 0;
   for (const LightClusters::Cluster& c : lights.clusters_) {
@@ -105,9 +105,9 @@ LightCones::LightCones(const LightClusters& lights, const Vec3d& p) {
     const double facing = distance > 0 ? -dot(c.area_vector, to) / distance : 0;
     const double visible =
         std::max(0.0, facing) + 0.25 * std::max(0.0, c.area - length(c.area_vector));
-    // Between those seen at the center's and at the rim's distance; at most a hemisphere.
+    // Between the values for the distances of center and boundary; at most a hemisphere.
     const double solid_angle = std::min(visible / (d2 + r2 / 8), 2 * kPi);
-    // Objects nearby may face the light where this point does not.
+    // Nearby objects may face the light even if this point does not.
     scattered += c.luminance * std::min(c.area / (d2 + r2 / 8), 2 * kPi);
     if (solid_angle <= 0) continue;
     // sin of the bounding cone is radius / distance: squared chord 2 - 2 cos; 4 from inside.
@@ -124,15 +124,15 @@ LightCones::LightCones(const LightClusters& lights, const Vec3d& p) {
                              std::max(kReflectance / kPi * scattered, lights.floor_));
 }
 
-// Two caps: the smaller lies in the other if the distance D of their centers is below the
-// difference of their chords, and they are apart if it is above the sum of the outer chords;
-// in between the overlap falls as the square of the remaining distance.
+// Overlap of two caps, with D the distance of their centers: the smaller is inside of the other if
+// D is below the difference of their chords; they are disjoint if D exceeds the sum of the outer
+// chords; between, the overlap is quadratic in the remaining distance.
 Floats LightCones::mean_over_boxes(Floats3 center, const Floats3& half) const {
   const Floats zero = splat(0.0f), one = splat(1.0f), tiny = splat(0x1p-60f);
   const Floats center2 = max(dot(center, center), splat(0x1p-126f)), half2 = dot(half, half);
   center = center * (1 / sqrt(center2));
-  // A box around p (share 1) is the whole sphere, chord 2; a distant cube has 2 |half|^2 and
-  // reaches |half| sideways.
+  // A box around p (share 1) is the whole sphere, chord 2; a distant cube has chord^2 = 2 |half|^2
+  // and extends |half| sideways.
   const Floats share = half2 / (center2 + half2);
   const Floats chord2 =
       share * (static_cast<float>(2 / kPi) + static_cast<float>(4 - 2 / kPi) * share) + tiny;

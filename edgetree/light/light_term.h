@@ -1,10 +1,10 @@
 #pragma once
-// How bright it is behind a box, seen from a shading point: the jump of radiance across an edge is
-// about the radiance of what lies behind, so nodes of the edge forest in front of lights weigh
-// more.
+// Estimated radiance behind a box as seen from a shading point. The radiance difference across an
+// edge is about the radiance behind it, so nodes of the edge forest in front of lights get larger
+// weights.
 //
-// Angles are measured by chords of the unit sphere: the cap whose rim is at the distance k from its
-// center has the solid angle pi k^2.
+// Angles are chords of the unit sphere: a cap whose boundary has the distance k from its center has
+// the solid angle pi k^2.
 #include <array>
 #include <cstdint>
 #include <span>
@@ -15,14 +15,14 @@
 
 namespace limn {
 
-// The lights of a scene as at most kMaxClusters groups of neighbouring triangles.
+// The area lights of a scene as at most kMaxClusters groups of neighbouring triangles.
 class LightClusters {
  public:
-  static constexpr int kMaxClusters = 8;  // not tuned: a query looks at all of them
+  static constexpr int kMaxClusters = 8;  // not tuned: a query visits all of them
 
   LightClusters(std::span<const LightTriangle> lights, double environment_luminance);
 
-  // Without area lights all boxes weigh alike, and no LightCones are needed.
+  // True without area lights: all boxes then have equal light weights, without LightCones.
   bool empty() const { return clusters_.empty(); }
 
  private:
@@ -30,7 +30,7 @@ class LightClusters {
   struct Cluster {
     std::vector<uint32_t> triangles;
     Vec3d center{};
-    double radius = 0;     // of a sphere around center that holds all corners
+    double radius = 0;     // of a bounding sphere around `center`
     Vec3d area_vector{};   // sum of area times normal
     double area = 0;       // sum
     double luminance = 0;  // mean over the area
@@ -46,21 +46,21 @@ class LightClusters {
   double floor_ = 0;
 };
 
-// What shines towards one shading point. Made once per query.
+// The light clusters as seen from one shading point. Created once per query.
 class LightCones {
  public:
   LightCones(const LightClusters& lights, const Vec3d& p);
 
-  // Estimate of the mean luminance over the directions of each box, with nothing in between:
-  // environment, lights, and light scattered by objects. Its center minus p and half extents
-  // (>= 0) are given. Positive everywhere if there is any light.
+  // Estimated mean luminance over the directions of each box, without occlusion: environment,
+  // lights, and light scattered by objects. Arguments: centers minus p and half extents (>= 0).
+  // Positive if there is any light.
   Floats mean_over_boxes(Floats3 center, const Floats3& half) const;
 
  private:
   struct Cone {
     float axis[3];
     float luminance;
-    float chord, chord_outer;  // of the cap with the light's solid angle, and of one that holds it
+    float chord, chord_outer;  // of the cap with the light's solid angle, and of a bounding cap
   };
   std::array<Cone, LightClusters::kMaxClusters> cones_;
   int count_ = 0;

@@ -1,4 +1,4 @@
-// Means of an environment over cones, by an octahedral pyramid.
+// Means of an environment over cones, by a pyramid of octahedral maps.
 #include "limn/edgetree/radiance_pyramid.h"
 
 #include <cmath>
@@ -8,8 +8,8 @@
 namespace limn {
 namespace {
 
-// The direction (not of unit length) at (u, v) in [-1, 1]^2: the octahedron |x| + |y| + |z| = 1,
-// its lower half folded out.
+// The (unnormalised) direction at (u, v) in [-1, 1]^2: the octahedron |x| + |y| + |z| = 1 with its
+// lower half unfolded.
 Vec3d octahedral_direction(double u, double v) {
   const double z = 1 - std::fabs(u) - std::fabs(v);
   if (z >= 0) return {u, v, z};
@@ -29,8 +29,8 @@ RadiancePyramid::RadiancePyramid(const std::function<double(const Vec3d&)>& lumi
       const double step = 2.0 / (size * samples);
       const Vec3d d = octahedral_direction((x + 0.5) * step - 1, (y + 0.5) * step - 1);
       const double r = length(d);
-      // Every face of the octahedron has the same distance from its center: solid angle goes with
-      // 1 / r^3.
+      // Faces of the octahedron have equal distances from its center, so the solid angle is
+      // proportional to 1 / r^3.
       const double weight = 1 / (r * r * r);
       const size_t texel = static_cast<size_t>(y / samples) * size + x / samples;
       sums[texel] += weight * luminance(d / r);

@@ -1,4 +1,4 @@
-// Bounds of what one edge contributes.
+// Upper bounds of an edge's contribution.
 #include "limn/edgetree/contribution_bound.h"
 
 #include <algorithm>
@@ -17,7 +17,7 @@
 namespace limn {
 namespace {
 
-// Largest cosine between an axis and the arc from u_a to u_b.
+// The largest cosine between an axis and the arc from u_a to u_b.
 double max_cosine(const Vec3d& axis, const Vec3d& u_a, const Vec3d& u_b) {
   const double a = dot(axis, u_a), b = dot(axis, u_b), c = dot(u_a, u_b);
   const double along_a = b - a * c, along_b = a - b * c;  // slopes into the arc, times sin gamma
@@ -85,8 +85,8 @@ bool EdgeBound::clip_to_horizon(const LobeBound& lobe, const EdgeSegment& s) {
   return sin_angle_ > 0;
 }
 
-// Cuts at distances step * (2^k - 1) from where the arc comes closest to the lobe's axis; the step
-// is half the lobe's width, or half the sine of that closest angle if it is larger.
+// Cuts at distances step * (2^k - 1) from the point closest to the lobe's axis. The step is half
+// the larger of the lobe's width and the sine of that closest angle.
 void EdgeBound::cut(const LobeBound& lobe) {
   cuts_[0] = 0;
   pieces_ = 1;
@@ -116,11 +116,11 @@ void EdgeBound::add_cut(double angle) {
 
 double EdgeBound::angle() const { return std::atan2(sin_angle_, dot(u_a_, u_b_)); }
 
-// A single piece has its end worked out only when it is needed: most bounds are never sampled.
+// The end of a single piece is computed on demand: most bounds are never sampled.
 double EdgeBound::piece_end(int i) const { return pieces_ == 1 ? angle() : cuts_[i + 1]; }
 
-// Fraction of the clipped segment (0 at w_a, 1 at w_b) that is seen at an angle from u_a; end: the
-// angle of the whole arc.
+// The fraction of the clipped segment (0 at w_a, 1 at w_b) seen at `angle` from u_a; end: the angle
+// of the whole arc.
 double EdgeBound::fraction_at(double angle, double end) const {
   if (angle >= end) return 1;
   const double near = length_a_ * std::sin(angle);

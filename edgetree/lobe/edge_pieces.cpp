@@ -1,4 +1,4 @@
-// Pieces of edges: cut so that directions hardly turn within one, weighed, drawn.
+// Pieces of edges with nearly constant directions: cutting, weights, sampling.
 #include "limn/edgetree/edge_pieces.h"
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 namespace limn {
 namespace {
 
-// The largest angle of a piece: of the hemisphere, and as a share of the lobe's width. Not tuned.
+// Largest angle of a piece: absolute, and as a share of the lobe's width. Not tuned.
 constexpr double kWidest = 0.3, kShareOfLobe = 0.5, kNarrowest = 0.02;
 
 constexpr double kGauss = 0.21132486540518712;  // (1 - 1 / sqrt(3)) / 2
@@ -18,16 +18,16 @@ double widest_of(const LobeSummary& lobe) {
   return std::clamp(kShareOfLobe * lobe.model->width(lobe), kNarrowest, kWidest);
 }
 
-// Edges whose mesh is fetched this many before they are looked at. Not tuned.
+// Prefetch distance in edges. Not tuned.
 constexpr size_t kAhead = 4;
 
 Lanes dot_lanes(const Vec3<Lanes>& v, const Vec3d& m) { return v.x * m.x + v.y * m.y + v.z * m.z; }
 
-// Cuts the edges that one query sees.
+// Cuts the edges seen by one query.
 class EdgeCutter {
  public:
   EdgeCutter(const EdgeQuery& query, const Lanes& lane_scale);
-  // The part [t0, t1] of an edge, which lies above the horizon.
+  // Adds the part [t0, t1] of an edge, which is above the horizon.
   void add(const ListedEdge& edge, const EdgeMesh& mesh, double t0, double t1,
            std::vector<EdgePiece>& pieces) const;
 
@@ -42,7 +42,7 @@ class EdgeCutter {
   bool turns_;
 };
 
-// Brings what `add` reads of the mesh into the cache.
+// Prefetches the mesh data that `add` reads.
 void fetch(const ListedEdge& edge, const EdgeMesh& mesh) {
   if (mesh.tangents.empty()) return;
   for (const VertexId vertex : mesh.edge(edge.id.edge).vertices) {
@@ -93,7 +93,7 @@ void EdgeCutter::add(const ListedEdge& edge, const EdgeMesh& mesh, double t0, do
   const int count = static_cast<int>(std::ceil(angle / widest_));
   double begin = t0, l_begin = l_a;
   for (int k = 1; k <= count; ++k) {
-    // Where the direction has turned by k / count of the angle.
+    // The point where the direction has turned by k / count of the angle.
     const double to_a = std::sin(angle * (count - k) / count) / l_a;
     const double to_b = std::sin(angle * k / count) / l_b;
     const double end = k < count ? t0 + (t1 - t0) * (to_b / (to_a + to_b)) : t1;
@@ -104,8 +104,8 @@ void EdgeCutter::add(const ListedEdge& edge, const EdgeMesh& mesh, double t0, do
   }
 }
 
-// Mean over u of f_s(z / |z|) |m . v(z)| / |z|^3, with v over the distance; m is normal to the
-// plane through p and the edge, v0 and v1 are m . v at the ends of the whole edge.
+// Mean over u of f_s(z / |z|) |m . v(z)| / |z|^3, with velocities divided by distance. m: normal of
+// the plane through p and the edge; v0, v1: m . v at the ends of the whole edge.
 double EdgeCutter::mean_over(const EdgePiece& piece, const Vec3d& w0, const Vec3d& along,
                              const Lanes& v0, const Lanes& v1) const {
   double sum = 0;
@@ -122,7 +122,7 @@ double EdgeCutter::mean_over(const EdgePiece& piece, const Vec3d& w0, const Vec3
 
 }  // namespace
 
-// z(u) meets the edge at s = (u / l_1) / ((1 - u) / l_0 + u / l_1) of the way between the ends.
+// z(u) meets the edge at the fraction s = (u / l_1) / ((1 - u) / l_0 + u / l_1) between the ends.
 EdgePiece::Place EdgePiece::place(double u) const {
   const double sum = (1 - u) * inverse_l0 + u * inverse_l1;
   const double s = u * inverse_l1 / sum;

@@ -1,4 +1,4 @@
-// A transformed cosine for a query: read from the table, its value, its means over boxes.
+// Transformed cosines of a query: lookup, values, means over boxes.
 #include "edgetree/lobe/ltc.h"
 
 #include <algorithm>
@@ -36,13 +36,13 @@ Floats mean_slope(Floats middle, Floats reach, Floats z) {
   const Floats x1 = middle - reach, x2 = middle + reach, z2 = z * z;
   const Floats s1 = sqrt(z2 + x1 * x1), s2 = sqrt(z2 + x2 * x2);
   const Floats a = x2 * s1, b = x1 * s2;
-  // Two forms of (a - b) / (2 reach): without cancellation for either sign of x1.
+  // Two forms of (a - b) / (2 reach) without cancellation, depending on the sign of x1.
   return (x1 > 0 ? 2 * middle * z2 / (a + b) : (a - b) / (2 * reach)) / (s1 * s2);
 }
 
-// How far a shape reaches along a row, and the square of the half width of the uniform distribution
-// that has its variance, from what its half extents are along the row, one by one. Boxes extend in
-// three directions, segments in one.
+// Extent of a box (three half extents) or a segment (one) along a row, and the squared
+// half-width of the uniform distribution with its variance, given its half extents along the
+// row.
 struct Box {
   static Floats reach(const float row[3], const Floats3& half) { return abs_dot3(row, half); }
   static Floats width2(Floats a, Floats b, Floats c) { return a * a + b * b + c * c; }
@@ -52,9 +52,9 @@ struct Segment {
   static Floats width2(Floats a, Floats b, Floats c) { return (a + b + c) * (a + b + c); }
 };
 
-// Half width of the uniform distribution whose variance the shape has along `row`, measured in the
-// slope to `axis` around the center's slope, times z. A floor of 3 % of the lobe's width (which has
-// z for its unit) changes no mean and avoids 0 / 0.
+// Half-width of the uniform distribution with the shape's variance along `row`, as a slope relative
+// to `axis` around the center's slope, times z. A floor of 3 % of the lobe's width (in units of z)
+// changes no mean and avoids 0 / 0.
 template <class Shape>
 Floats reach_across(const float row[3], const float axis[3], Floats slope, const Floats3& half,
                     Floats z) {
@@ -63,7 +63,7 @@ Floats reach_across(const float row[3], const float axis[3], Floats slope, const
   return sqrt(Shape::width2(a, b, c) + 1e-3f * z * z);
 }
 
-// Lengths relative to one between the distance and the size of a shape.
+// Divides lengths by a value between the distance and the size of the shape.
 void normalise(Floats3& center, Floats3& half) {
   const Floats size2 = dot(center, center) + dot(half, half);
   const Floats scale = 1 / sqrt(max(size2, splat(0x1p-126f)));
@@ -148,9 +148,9 @@ Floats LtcLobe::mean_over_segments(Floats3 center, Floats3 half) const {
 
 template <class Shape>
 Floats LtcLobe::mean_over(Floats3 center, Floats3 half) const {
-  // The cosine's mean is then about the mean height, from far away to a shape around p.
+  // The cosine's mean is then the mean height, for distant shapes and for those around p.
   normalise(center, half);
-  // Rounding stays below what is added here.
+  // This offset exceeds the rounding.
   const Floats middle = dot3(n_f_, center) + 0x1p-21f;
   const Floats reach = Shape::reach(n_f_, half) + 0x1p-21f;
   const Floats cosine = mean_above_zero(middle, reach) * kInversePi;
@@ -160,9 +160,9 @@ Floats LtcLobe::mean_over(Floats3 center, Floats3 half) const {
   return select(middle + reach > 0, mixed, splat(0.0f));
 }
 
-// Per box the slopes closest to the lobe's axis, and the height z above its horizon that is worst:
-// z / (r^2 + z^2)^2 is largest at z^2 = r^2 / 3. Lobes that are
-// not skewed are nowhere above their value at the axis.
+// For each box, the slopes closest to the lobe's axis and the height z above its horizon that
+// maximises z / (r^2 + z^2)^2: z^2 = r^2 / 3. Lobes without skew never exceed their value at the
+// axis.
 Floats LtcLobe::most_in_boxes(Floats3 center, Floats3 half) const {
   normalise(center, half);
   const Floats distance = sqrt(dot(center, center)), radius = sqrt(dot(half, half));
@@ -182,12 +182,12 @@ Floats LtcLobe::most_in_boxes(Floats3 center, Floats3 half) const {
   return static_cast<float>(1 - kLtcFloor) * peak + static_cast<float>(kLtcFloor) * cosine;
 }
 
-// Mean of `ltc` alone; |center|^2 + |half|^2 = 1.
+// Mean of `ltc` alone; requires |center|^2 + |half|^2 = 1.
 template <class Shape>
 Floats LtcLobe::ltc_mean(const Floats3& center, const Floats3& half) const {
   const Floats middle_z = dot3(rows_f_[2], center), reach_z = Shape::reach(rows_f_[2], half);
   const Floats z = mean_above_zero(middle_z, reach_z);
-  // 1 / z for boxes that are far from the lobe's horizon, 0 for those that meet it.
+  // 1 / z for boxes far from the lobe's horizon, 0 for those that meet it.
   const Floats inverse_z =
       max(middle_z - reach_z, splat(0.0f)) / max(middle_z * middle_z, splat(0x1p-126f));
   const Floats signed_x = dot3(rows_f_[0], center), signed_y = dot3(rows_f_[1], center);

@@ -15,34 +15,34 @@ namespace limn {
 
 class LtcLobe {
  public:
-  // n, wi: unit, world space, n.wi > 0. No table is read if the lobe is diffuse.
+  // n, wi: unit, world space, n.wi > 0. A diffuse lobe needs no table.
   LtcLobe(const LobeSummary& lobe, const Vec3d& n, const Vec3d& wi);
 
   // Densities [1/sr] for unit w; ltc integrates to 1 over the sphere, value to at most 1.
   double ltc(const Vec3d& w) const;
   double value(const Vec3d& w) const;
-  // value(w / |w|) / |w|^3 for w of any length but 0, without a root.
+  // value(w / |w|) / |w|^3 for w of any nonzero length, without a square root.
   double homogeneous_value(const Vec3d& w) const;
 
-  // Estimate of the mean of `value` over the directions of each box [1/sr], its center minus p and
-  // its half extents (>= 0) given. Positive, allowing for rounding here, wherever some point of the
-  // box is above the horizon.
+  // Estimated mean of `value` over the directions of each box [1/sr], given its center minus p and
+  // half extents (>= 0). Conservative with respect to rounding: positive if some point of the box
+  // is above the horizon.
   Floats mean_over_boxes(Floats3 center, Floats3 half) const;
-  // The same over segments, given their centers minus p and their ends minus their centers.
+  // Likewise for segments, given their centers minus p and their ends minus their centers.
   Floats mean_over_segments(Floats3 center, Floats3 half) const;
-  // About the largest `value` in each box [1/sr]; at grazing incidence it may be some times that.
-  // Tells where means say little, and is no bound.
+  // Approximate maximum of `value` in each box [1/sr]; several times too large at grazing
+  // incidence. Indicates where means are unreliable; not a bound.
   Floats most_in_boxes(Floats3 center, Floats3 half) const;
 
   bool diffuse() const { return diffuse_; }
   const Vec3d& n() const { return n_; }
-  // M^-1 w for any w; the identity in the frame of n if diffuse.
+  // M^-1 w for any w; for diffuse lobes w in the frame of n.
   Vec3d transform(const Vec3d& w) const {
     return {dot(rows_[0], w), dot(rows_[1], w), dot(rows_[2], w)};
   }
   double det() const { return det_; }  // of M^-1, > 0
-  // Integral of the scattering function over w, its albedo factor left out: about norm() ltc(w)
-  // approximates it.
+  // Integral of the scattering function over w without the albedo: norm() ltc(w) approximates
+  // it.
   double norm() const { return norm_; }
 
  private:
@@ -58,33 +58,33 @@ class LtcLobe {
   Vec3d rows_[3];
   double det_ = 1;
   double norm_ = 1;
-  // For boxes: n, the rows of M^-1, det.
+  // In floats, for boxes: n, the rows of M^-1, det.
   float n_f_[3], rows_f_[3][3], det_f_;
 };
 
-// The part of one edge above the horizon, and the density of points on it in proportion to
-// value(w_t) / |w_t|^3 per unit t: the scattering function times the Jacobian det(w_0, w_1, v) /
-// |w|^3 of an edge that moves uniformly.
+// The part of an edge above the horizon, with a density in proportion to value(w_t) / |w_t|^3 with
+// respect to t: the scattering function times the Jacobian det(w_0, w_1, v) / |w|^3 for a uniform
+// velocity.
 class LtcEdge {
  public:
   // w_0, w_1: the ends minus p.
   LtcEdge(const LtcLobe& lobe, const Vec3d& w_0, const Vec3d& w_1);
 
-  // Integral of value(w_t) / |w_t|^3 over t in [0, 1]; zero only where no part of the edge is above
-  // the horizon or p lies on the edge's line (where the Jacobian is zero). Always finite.
+  // Integral of value(w_t) / |w_t|^3 over t in [0, 1]. Zero only if the edge is below the horizon
+  // or on a line through p (where the Jacobian is zero). Always finite.
   double integral() const { return arcs_[0].integral + arcs_[1].integral; }
-  // The following need integral() > 0. u in [0, 1); the result is in [0, 1]. At the horizon itself
-  // the density is 0, which rounding may hit: such a draw counts as none.
+  // sample_t and pdf_t require integral() > 0. u in [0, 1), t in [0, 1]. The density at the horizon
+  // is 0; rounding may produce that t, and the sample then has value zero.
   double sample_t(double u) const;
   double pdf_t(double t) const;
 
  private:
-  // One of the two cosines over a part of the edge, in its own space. Seen from p, at the angle psi
-  // from the part's start, the unit direction's z is zeta = zeta_a cos psi + zeta_t sin psi, and
-  // the inverse distance is k = k_a cos psi + k_t sin psi (a line in polar coordinates). With
-  // z = zeta / k, |w'| = 1 / k and ds = |w'|^2 dpsi / area, area = |w'_a x w'_b|,
-  //   integral of z / |w'|^4 ds = 1 / area * integral of zeta k dpsi,
-  // which is elementary.
+  // One of the two cosines over a part of the edge, in its own space. At the angle psi from the
+  // part's start, as seen from p, the unit direction has the z coordinate zeta = zeta_a cos psi +
+  // zeta_t sin psi, and the inverse distance is k = k_a cos psi + k_t sin psi (a line in polar
+  // coordinates). With z = zeta / k, |w'| = 1 / k and ds = |w'|^2 dpsi / area, area = |w'_a x
+  // w'_b|:
+  // integral of z / |w'|^4 ds = 1 / area * integral of zeta k dpsi, which is elementary.
   struct Arc {
     double integral = 0;
     double t_begin = 0, t_end = 0;
@@ -93,7 +93,7 @@ class LtcEdge {
     double zeta_a = 0, zeta_t = 0, k_a = 0, k_t = 0;
     double angle = 0, area = 0;
 
-    // w_0, w_along: of the whole edge, in this space; needs t_begin < t_end.
+    // w_0, w_along: of the whole edge, in this space; requires t_begin < t_end.
     void set(const Vec3d& w_0, const Vec3d& w_along, double factor);
     double cumulative(double psi, double sine, double cosine) const;
     double sample_t(double u) const;

@@ -1,4 +1,4 @@
-// Integrals of a transformed cosine along an edge, and draws in proportion.
+// Integrals of a transformed cosine along an edge, and sampling in proportion.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,11 +9,11 @@
 namespace limn {
 namespace {
 
-// Newton's error is about the square of its last step, a bisection's the step itself; the bracket
-// alone takes 48 halvings to this precision.
+// The error after a Newton step is about its square, after a bisection the step itself; bisection
+// alone takes 48 steps to this precision.
 constexpr double kPrecision = 0x1p-48;
-constexpr int kMaxSteps = 60;  // never reached: the bracket ends it
-// Sine of the angle that a cross product of two vectors, each exact to rounding, cannot resolve.
+constexpr int kMaxSteps = 60;  // not reached: the bracket ends the iteration
+// Sine of the smallest angle that a cross product of rounded vectors resolves.
 constexpr double kParallel = 0x1p-50;
 
 // psi - sin(psi) cos(psi), without cancellation.
@@ -26,7 +26,7 @@ double angle_minus_product(double psi, double sine, double cosine) {
   return psi * sum;
 }
 
-// The part of [begin, end] where a linear function with the values h_0, h_1 at 0 and 1 is positive.
+// The part of [begin, end] where a linear function with values h_0, h_1 at 0 and 1 is positive.
 void clip(double h_0, double h_1, double& begin, double& end) {
   if (h_0 <= 0 && h_1 <= 0) end = begin;
   if (h_0 < 0 && h_1 > 0) begin = std::max(begin, h_0 / (h_0 - h_1));
@@ -59,7 +59,7 @@ void LtcEdge::Arc::set(const Vec3d& w_0, const Vec3d& w_along, double factor) {
   start = w_0 + w_along * t_begin;
   along = w_along * (t_end - t_begin);
   area = length(cross(start, along));
-  // On p's line to rounding: where the Jacobian is rounding, too.
+  // On p's line up to rounding, where the Jacobian is rounding, too.
   const double length_a = length(start);
   if (!(area > kParallel * length_a * length(along))) return;
   const double projection = dot(start, along) / length_a;
@@ -80,7 +80,7 @@ double LtcEdge::Arc::cumulative(double psi, double sine, double cosine) const {
                 zeta_t * k_t * angle_minus_product(psi, sine, cosine));
 }
 
-// Newton's method on the cumulative, safeguarded by a bracket. The start takes zeta k for linear.
+// Newton's method on the cumulative, safeguarded by a bracket; starts from a linear zeta k.
 double LtcEdge::Arc::sample_t(double u) const {
   const double target = u * integral * area / (scale * (t_end - t_begin));
   const double sin_end = std::sin(angle), cos_end = std::cos(angle);

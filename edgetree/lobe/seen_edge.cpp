@@ -1,4 +1,4 @@
-// A density along an edge that costs little where the edge is short.
+// An inexpensive density on short edges.
 #include "edgetree/lobe/seen_edge.h"
 
 #include <algorithm>
@@ -12,7 +12,7 @@ double density_at(const LtcLobe& lobe, const Vec3d& w) {
   return lobe.value(w / distance) / (distance2 * distance);
 }
 
-// The density varies over lengths of the order of |M^-1 w|.
+// The density varies over lengths of about |M^-1 w|.
 bool is_short(const LtcLobe& lobe, const Vec3d& w_0, const Vec3d& w_1) {
   constexpr double kShort = 0.25;  // not tuned
   const Vec3d a = lobe.transform(w_0), e = lobe.transform(w_1 - w_0);
@@ -33,7 +33,7 @@ SeenEdge::SeenEdge(const LtcLobe& lobe, const Vec3d& w_0, const Vec3d& w_1) {
   end_1_ = density_at(lobe, w_1);
 }
 
-// Inverts  (end_0 t + (end_1 - end_0) t^2 / 2) / mean = u.
+// Inverts (end_0 t + (end_1 - end_0) t^2 / 2) / mean = u.
 double SeenEdge::sample_t(double u) const {
   if (exact_) return exact_->sample_t(u);
   const double target = u * (end_0_ + end_1_);

@@ -1,21 +1,21 @@
 #pragma once
-// A density of points on an edge that costs little for the short edges that most are.
+// A density on an edge, with an inexpensive approximation for short edges.
 #include <optional>
 
 #include "edgetree/lobe/ltc.h"
 
 namespace limn {
 
-// In proportion to value(w_t) / |w_t|^3 (see LtcEdge); but linear between its values at the ends
-// if the edge is above the horizon and short against its distance, seen through the lobe.
+// In proportion to value(w_t) / |w_t|^3 (see LtcEdge). Linear between the values at the ends if the
+// edge is above the horizon and short relative to its distance and the lobe.
 class SeenEdge {
  public:
   // w_0, w_1: the ends minus p.
   SeenEdge(const LtcLobe& lobe, const Vec3d& w_0, const Vec3d& w_1);
 
-  // Whether there is a density: no, if the edge lies below the horizon or on a line through p.
+  // False if the edge is below the horizon or on a line through p: there is no density then.
   bool is_seen() const { return end_0_ + end_1_ > 0 || (exact_ && exact_->integral() > 0); }
-  // The following need is_seen(). u in [0, 1); the result is in [0, 1].
+  // sample_t and pdf_t require is_seen(). u in [0, 1), t in [0, 1].
   double sample_t(double u) const;
   double pdf_t(double t) const;
 

@@ -1,4 +1,4 @@
-// Boxes clipped to polygonal lights, and the transformed cosine's integral over what is left.
+// Clips boxes to polygonal lights and integrates the transformed cosine over the rest.
 #include "edgetree/quadric/polygon_light.h"
 
 #include <algorithm>
@@ -7,21 +7,21 @@
 namespace limn {
 namespace {
 
-// As in light_term.cpp: objects are lit about as the shading point is, and scatter this share of
-// what arrives over the hemisphere; at least this share of the brightest luminance. Not tuned.
+// As in light_term.cpp: objects receive the same light as the shading point and scatter this share
+// of it over the hemisphere; at least this share of the brightest luminance. Not tuned.
 constexpr double kReflectance = 0.5;
 constexpr double kFloor = 1.0 / 4096;
-// A box is at least this part of its longest half extent wide, so that it has a solid angle.
+// Minimum width of a box relative to its longest half extent, so that it has a solid angle.
 constexpr double kThin = 1.0 / 256;
 
-// A convex cone from p: vectors along its edges, in order.
+// A convex cone from p, given by vectors along its edges, in order.
 struct Cone {
   static constexpr int kMost = 9;  // of four, each of five planes adds one
   Vec3d w[kMost];
   int count = 0;
 
   void add(const Vec3d& v) { w[count++] = v; }
-  // Keeps what lies in front of the plane through p.
+  // Clips to the front of the plane through p.
   void clip(const Vec3d& plane) {
     Cone kept;
     for (int i = 0; i < count; ++i) {
@@ -34,7 +34,7 @@ struct Cone {
   }
 };
 
-// Of the triangle of three vectors, with the sign of their determinant (van Oosterom and Strackee).
+// Signed solid angle of the triangle of three vectors (van Oosterom and Strackee).
 double solid_angle(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
   const double l_a = length(a), l_b = length(b), l_c = length(c);
   const double under = l_a * l_b * l_c + dot(a, b) * l_c + dot(b, c) * l_a + dot(c, a) * l_b;
@@ -61,7 +61,7 @@ double integral(const LtcLobe& lobe, const Cone& cone) {
   return std::fabs(sum) / (2 * kPi);
 }
 
-// The up to three sides of a box that p sees; none from inside.
+// The sides of a box that p sees, at most three; none from inside.
 int sides_of(const Vec3d& center, const Vec3d& half, Cone (&sides)[3]) {
   int count = 0;
   for (int k = 0; k < 3; ++k) {

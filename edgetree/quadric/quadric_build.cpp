@@ -1,4 +1,4 @@
-// One tree of the paper's per object and group: frames, moments from the leaves up, fits, links.
+// Builds the paper's trees per object and group: frames, moments bottom-up, fits, links.
 #include "edgetree/quadric/quadric_build.h"
 
 #include <algorithm>
@@ -14,16 +14,16 @@ namespace limn {
 namespace {
 
 constexpr float kInfinite = std::numeric_limits<float>::infinity();
-// Flat edges count a little, for the points on their plane. Not tuned.
+// Weight of flat edges, for points on their plane. Not tuned.
 constexpr double kFlat = 0x1.0p-12;
 
-// Edges that matter from everywhere, or from in front, fill what a silhouette's angle is a part of.
+// Edges that are always candidates have the full angle, silhouettes their dihedral angle.
 double weight_of(const Wedge& wedge, ForestGroup group) {
   const bool turns = group == ForestGroup::kSilhouette;
   return wedge.length * (turns ? std::max(wedge.angle, kPi * kFlat) : kPi);
 }
 
-// A node as its parent needs it.
+// Data of a node that its parent needs.
 struct Summary {
   NodeFrame frame;
   PlaneMoments moments;  // in that frame
@@ -71,7 +71,7 @@ class Filler {
     return wedges_.subspan(range.begin, range.size());
   }
 
-  // of: the summaries of the children.
+  // of: summaries of the children.
   template <class Of>
   Summary summary(uint32_t index, const Of& of) const {
     const SplitNode<kQuadricWidth>& split = shape_.nodes[index];
@@ -145,7 +145,7 @@ class Filler {
       const double high = (box.upper[k] - frame.center[k]) * frame.inverse_radius;
       const float center = static_cast<float>(0.5 * (low + high));
       node.center[k][lane] = center;
-      // Far more than the rounding of the center, whose modulus is 1 at most.
+      // Far above the rounding of the center, whose modulus is at most 1.
       const double half = std::max(high - center, center - low) + 0x1.0p-20;
       node.half[k][lane] = std::nextafter(static_cast<float>(half), kInfinite);
     }
@@ -160,7 +160,7 @@ class Filler {
   QuadricForest& forest_;
 };
 
-// Makes room for the nodes of a tree and gives them their places.
+// Allocates the nodes of a tree; returns the ids.
 std::vector<NodeId> append_nodes(const QuadricShape& shape, bool quadrics, QuadricForest& forest) {
   std::vector<NodeId> ids(shape.nodes.size());
   auto nodes = static_cast<NodeId>(forest.nodes.size());
@@ -173,7 +173,7 @@ std::vector<NodeId> append_nodes(const QuadricShape& shape, bool quadrics, Quadr
   return ids;
 }
 
-// Parents of nodes and slots of edges, for the nodes that were just filled.
+// Sets parents of nodes and slots of edges for new nodes.
 void link(std::span<const NodeId> ids, QuadricForest& forest) {
   const auto set_parent = [&](NodeId id, uint32_t slot) {
     (id < 0 ? forest.leaves[~id].parent : forest.nodes[id].parent) = slot;

@@ -1,16 +1,16 @@
 #pragma once
-// The choices of the paper's forest.
+// Settings of the paper's forest.
 
 namespace limn {
 
-// The defaults are the paper's; the rest is for comparison (edgetree/FIGURES.md). No choice biases
-// an estimate.
+// The defaults are the paper's; other settings are for comparison (edgetree/FIGURES.md). None
+// biases an estimate.
 struct QuadricConfig {
-  // Nodes have pairs of bounding quadrics beside their dual boxes.
+  // Bound nodes by pairs of quadrics in addition to dual boxes.
   bool quadrics = true;
-  // Children weigh by the part of their solid angle that polygonal lights fill (Sec. 3.6).
+  // Weight children by the share of their solid angle covered by polygonal lights (Sec. 3.6).
   bool light_term = true;
-  // Concave smooth edges of closed one-sided meshes are left out (Sec. 4.1).
+  // Skip concave smooth edges of closed one-sided meshes (Sec. 4.1).
   bool cull_concave = true;
 };
 

@@ -1,4 +1,4 @@
-// Fitting the dual box and the pair of quadrics of a set of wedges.
+// Fits the dual box and the pair of quadrics of a set of wedges.
 #include "edgetree/quadric/quadric_fit.h"
 
 #include <Eigen/Dense>
@@ -16,8 +16,8 @@ using Eigen::Matrix4d;
 using Eigen::Vector3d;
 using Eigen::Vector4d;
 
-// Puts the points u = (chart point - center) / half in place of the chart points, and the rows into
-// the columns of the result.
+// Converts chart points to box coordinates u = (chart point - center) / half, and writes the rows
+// to the columns of the result.
 Matrix4d box_around(std::vector<Vector3d>& points, const Vector4d& z,
                     const Matrix<double, 4, 3>& basis) {
   Vector3d low = points[0], high = points[0];

@@ -1,4 +1,4 @@
-// How the children of a node of the paper's forest are rejected and weighed for a query.
+// Rejection and weights of a node's children in the paper's forest.
 #include "edgetree/quadric/quadric_query.h"
 
 #include <algorithm>
@@ -7,7 +7,7 @@
 namespace limn {
 namespace {
 
-// Points in or near a box see its edges at this share of its squared radius at least. Not tuned.
+// Lower bound of the squared distance of a box, as a share of its squared radius. Not tuned.
 constexpr double kNear = 0.25;
 
 // p in the frame of a node.
@@ -18,10 +18,10 @@ struct FramePoint {
   }
 };
 
-// Entries of rows are off by 2^-24 of themselves (they were rounded to floats), so that a row is by
-// 2^-24 of its length, and all rows together by 2^-24; rounding of doubles, here and where the box
-// was fitted (kMinSeparation), is far below as much again. A plane of the box is as long as the
-// rows together at most, and a unit plane is longer than 1: distance_error stands for itself.
+// Rows were rounded to floats, with a relative error of 2^-24 per entry, so all rows together are
+// off by 2^-24; the rounding of doubles, here and in the fit (kMinSeparation), is far below as much
+// again. A plane of the box is at most as long as the rows together, and a unit plane is longer
+// than 1, so distance_error applies unscaled.
 QueryPlanes planes_of(const QuadricNode& node, const FramePoint& at, double slack) {
   QueryPlanes planes;
   for (int i = 0; i < 4; ++i)
@@ -32,13 +32,13 @@ QueryPlanes planes_of(const QuadricNode& node, const FramePoint& at, double slac
   return planes;
 }
 
-// Boxes of up to four children or edges: centers minus p and half extents, all in one unit.
+// Boxes of up to four children or edges: centers minus p and half extents, in one unit.
 struct Boxes {
   Doubles d[3], half[3];
 };
 
-// Of the lanes that are alive and not below the horizon: base * mean of the lobe, over H^2.
-// unit: lengths of the boxes are those of the scene times this.
+// Weights of the children that are alive and not below the horizon: base * mean of the lobe / H^2.
+// unit: converts scene lengths to lengths of the boxes.
 void weigh_boxes(const Boxes& boxes, Longs alive, const QuadricQuery& query, double unit,
                  const Doubles& length, double (&weights)[kQuadricWidth]) {
   Floats3 center{}, half{};
@@ -58,7 +58,7 @@ void weigh_boxes(const Boxes& boxes, Longs alive, const QuadricQuery& query, dou
     double light = query.base * mean[lane];
     if (query.lights) light += query.lights->mean_over_box(query.lobe, query.point.p, d, h, unit);
     const double distance2 = std::max(length_squared(d), kNear * length_squared(h));
-    // Nothing underflows: distances in the unit are below 2^400.
+    // No underflow: distances in this unit are below 2^400.
     weights[lane] = distance2 > 0 ? length[lane] * light / distance2 : 0;
   }
 }

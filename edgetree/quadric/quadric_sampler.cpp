@@ -1,4 +1,4 @@
-// The paper's forest as a sampler: descending the trees.
+// The paper's forest as a sampler: descents.
 #include "edgetree/quadric/quadric_sampler.h"
 
 #include <Eigen/Dense>
@@ -24,18 +24,18 @@ struct Choice {
     total = 0;
     for (const double weight : weights) total += weight;
   }
-  // Draws a lane by the uniform number u and leaves another one in it; total > 0.
+  // Draws a child by the uniform number u, which is rescaled to be uniform again; total > 0.
   int draw(double& u) const {
     double rest = u * total;
     int lane = 0;
     while (lane + 1 < kQuadricWidth && rest >= weights[lane]) rest -= weights[lane++];
-    while (!(weights[lane] > 0)) lane = (lane + kQuadricWidth - 1) % kQuadricWidth;  // by rounding
+    while (!(weights[lane] > 0)) lane = (lane + kQuadricWidth - 1) % kQuadricWidth;  // rounding
     u = below_one(rest / weights[lane]);
     return lane;
   }
 };
 
-// Its nodes are the lanes of the forest's nodes, and the edges of leaves.
+// Its nodes are the children of the forest's nodes, and the edges of leaves.
 class QuadricRejectionTree final : public ChartedTree {
  public:
   QuadricRejectionTree(const EdgeSamplerInput& input, const QuadricForest& forest)
@@ -74,7 +74,7 @@ class QuadricRejectionTree final : public ChartedTree {
   }
 
  private:
-  // Whether the rounding of a lane's rows to floats is more than 2^-12 of its dual box' width.
+  // True if the rounding of a child's rows to floats exceeds 2^-12 of its dual box's width.
   bool is_thin(NodeId id, int lane) const {
     for (int r = 1; r < 4; ++r) {
       double square = 0;
@@ -83,7 +83,7 @@ class QuadricRejectionTree final : public ChartedTree {
     }
     return false;
   }
-  // The coordinates of a plane in a lane's dual box.
+  // The coordinates of a plane in a child's dual box.
   Vec3d in_chart(NodeId id, int lane, const Plane& plane) const {
     const QuadricNode& node = forest_.nodes[id];
     Eigen::Matrix4d rows;
@@ -102,7 +102,7 @@ class QuadricRejectionTree final : public ChartedTree {
     int lane;
   };
 
-  // The lanes of a node and all below them.
+  // Appends the children of a node and their descendants.
   void append(NodeId id, uint32_t parent, uint32_t depth) {
     for (int lane = 0; lane < kQuadricWidth; ++lane) {
       const int32_t child = forest_.lanes(id)[lane];
@@ -138,7 +138,7 @@ struct QuadricSampler::Impl {
     return {forest, lit ? &lights : nullptr, query};
   }
 
-  // Both sampling and evaluating a probability ask here, and get the same bits.
+  // Sampling and probabilities both use this function, so they agree bit for bit.
   Choice choice_at(NodeId id, const QuadricQuery& query) const {
     Choice choice;
     choice.node = id;
@@ -181,8 +181,8 @@ struct QuadricSampler::Impl {
     }
   }
 
-  // Probability of drawing the child in a lane of a node; multiplied from the root on, as `draw`
-  // does.
+  // Probability of drawing a child; multiplied from the root on, as in
+  // `draw`.
   double probability(NodeId id, int lane, const QuadricQuery& query) const {
     const uint32_t parent = forest.parent(id);
     const bool is_root = parent == kNoParent;
@@ -222,7 +222,7 @@ std::optional<EdgeSample> QuadricSampler::sample(const EdgeQuery& query, Rng& rn
   if (!edge.is_seen()) return std::nullopt;
   EdgeSample sample{draw->edge, edge.sample_t(u_t), draw->probability, 0};
   sample.pdf_t = edge.pdf_t(sample.t);
-  // Nothing where the density is lost to rounding, on an edge that lies in the horizon.
+  // Rejected where the density underflows, on an edge in the horizon.
   if (!(sample.pdf_t > 0)) return std::nullopt;
   return sample;
 }

@@ -1,6 +1,6 @@
 #pragma once
-// The forest of Soroka, Peters, Marschner 2025, as the paper has it: the baseline that the edge
-// forest comes from (edgetree/README.md says where they differ).
+// The paper's forest (Soroka, Peters, Marschner 2025): the baseline that the edge forest is derived
+// from (differences are listed in edgetree/README.md).
 #include <memory>
 #include <vector>
 
@@ -19,10 +19,10 @@ class QuadricSampler final : public EdgeSampler {
   std::optional<EdgeSample> sample(const EdgeQuery& query, Rng& rng) const override;
   double probability(const EdgeQuery& query, EdgeRef edge) const override;
   double pdf_t(const EdgeQuery& query, EdgeRef edge, double t) const override;
-  // A walk down the trees costs a handful of rays.
+  // A descent costs a few rays.
   double draw_cost() const override { return 5; }
-  // First draws took 2 (demo, near mirror) and 16 (CAD part) more than further ones, which took 5,
-  // 7 and 50: what is near by then.
+  // First draws cost 2 (demo, near mirror) to 16 (CAD part) more than further ones, which cost 5, 7
+  // and 50; their nodes are cached by then.
   double query_cost() const override { return 2; }
   SamplerSize size() const override;
   std::unique_ptr<RejectionTree> rejection_tree() const override;

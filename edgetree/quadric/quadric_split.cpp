@@ -1,4 +1,4 @@
-// Splits of edges by the surface area heuristic.
+// Splits edges by the surface area heuristic.
 #include "edgetree/quadric/quadric_split.h"
 
 #include <algorithm>
@@ -35,7 +35,7 @@ struct Item {
   uint32_t wedge;
 };
 
-// The bin between two planes that an item's center lies in.
+// The bin of an item's center between the planes.
 struct Bins {
   int axis;
   float low, scale;
@@ -45,7 +45,7 @@ struct Bins {
   }
 };
 
-// The number of bins on the left of the best plane; 0 if all have the same side.
+// Number of bins to the left of the best plane; 0 if all items are on one side.
 int best_plane(std::span<const Item> items, const Bins& bin_of) {
   Box boxes[kPlanes + 1];
   uint32_t counts[kPlanes + 1] = {};
@@ -79,7 +79,7 @@ int best_plane(std::span<const Item> items, const Bins& bin_of) {
   return best;
 }
 
-// Reorders the items and returns how many go left: at least one, and not all.
+// Partitions the items and returns the number on the left: at least one, not all.
 uint32_t split(std::span<Item> items) {
   Box box;
   for (const Item& item : items) box.add(item.box);
@@ -120,7 +120,7 @@ class Splitter {
   std::span<Item> items_;
 };
 
-// Around the center and in diagonals of all edges: areas neither overflow nor vanish.
+// Relative to the center and diagonal of all edges, so that areas neither overflow nor underflow.
 std::vector<Item> items_of(std::span<const Wedge> wedges) {
   Bounds bounds;
   for (const Wedge& wedge : wedges)

@@ -1,5 +1,5 @@
 #pragma once
-// The shape of the paper's trees: which edges share a node (Sec. 4.1).
+// The topology of the paper's trees: which edges share a node (Sec. 4.1).
 #include <span>
 
 #include "edgetree/bounds/forest_fit.h"
@@ -8,11 +8,11 @@
 
 namespace limn {
 
-// Nodes of at most kQuadricWidth edges are leaves.
+// Nodes with at most kQuadricWidth edges are leaves.
 using QuadricShape = SplitTree<kQuadricWidth>;
 
-// Three splits make a node's children: of the node, and of its two halves where they are no leaves.
-// Each is the best, by the surface area heuristic, of ten planes at equal distances along the
+// A node's children result from three splits: of the node, and of both halves unless they are
+// leaves. A split is the best, by the surface area heuristic, of ten equidistant planes along the
 // longest axis of the edges' box. wedges: at least one.
 QuadricShape shape_of(std::span<const Wedge> wedges, int threads);
 

@@ -1,4 +1,4 @@
-// Rejection trees against the exact test of every edge.
+// Compares rejection trees with the exact test of every edge.
 #include "limn/edgetree/rejection.h"
 
 #include <algorithm>
@@ -33,7 +33,7 @@ void add(std::vector<DepthCounts>& sums, const std::vector<DepthCounts>& counts)
   }
 }
 
-// E(p) in order, but for what was reached.
+// The edges of E(p) that were not reached, in order.
 std::vector<EdgeRef> not_reached(const EdgeSamplerInput& input, const std::vector<EdgeRef>& reached,
                                  const Vec3d& p) {
   std::vector<std::vector<bool>> known;
@@ -88,7 +88,7 @@ Reach reach_from(const EdgeSamplerInput& input, const RejectionTree& tree, const
   const std::vector<uint32_t> running = running_candidates(input, tree, p);
   const auto nodes = tree.nodes();
   Reach reach;
-  std::vector<bool> goes_on(nodes.size());  // accepted, and so is a node below
+  std::vector<bool> goes_on(nodes.size());  // accepted with an accepted child
   std::vector<uint32_t> inner;              // accepted, not edges
   for (uint32_t i = 0; i < nodes.size();) {
     const RejectionNode& node = nodes[i];

@@ -1,4 +1,4 @@
-// Where to look at a rejection test.
+// Chooses nodes and slices to inspect a rejection test.
 #include "limn/edgetree/rejection_places.h"
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 namespace limn {
 namespace {
 
-// Normals of the faces around the edges, once for each edge.
+// Normals of the faces around the edges, for each edge once.
 std::vector<Vec3d> normals_of(const EdgeSamplerInput& input, std::span<const EdgeRef> edges) {
   std::vector<Vec3d> normals;
   for (const EdgeRef id : edges) {
@@ -25,8 +25,8 @@ Vec3d mean(const std::vector<Vec3d>& vectors) {
   return sum / static_cast<double>(vectors.size());
 }
 
-// Unit vector at right angles to n along which the vectors vary most: the larger principal axis of
-// their second moments in the tangent plane.
+// The unit tangent along which the vectors vary most: the larger principal axis of their second
+// moments in the tangent plane of n.
 Vec3d widest_tangent(const std::vector<Vec3d>& vectors, const Vec3d& n) {
   const Frame frame(n);
   double ss = 0, st = 0, tt = 0;
@@ -40,10 +40,10 @@ Vec3d widest_tangent(const std::vector<Vec3d>& vectors, const Vec3d& n) {
   return frame.s * std::cos(angle) + frame.t * std::sin(angle);
 }
 
-// How far apart two counts are: the logarithm of their ratio, zero if equal.
+// Distance of two counts: the logarithm of their ratio.
 double misfit(uint32_t a, uint32_t b) { return std::fabs(std::log(static_cast<double>(a) / b)); }
 
-// Nodes within a factor of 3/2 of the number of edges, else those nearest to it.
+// Nodes within a factor of 3/2 of the number of edges, or else the closest.
 std::vector<uint32_t> nodes_of_size(const RejectionTree& tree, uint32_t edges) {
   const auto nodes = tree.nodes();
   double limit = std::log(1.5), nearest = std::numeric_limits<double>::infinity();

@@ -1,6 +1,6 @@
 #pragma once
-// Angles from vectors and back, for the inner loops: a few units in the last place from the maths
-// library, which spends several times as long on arguments that never occur here.
+// Fast trigonometric functions for inner loops, exact to a few units in the last place. The maths
+// library spends several times as long on arguments that never occur here.
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -19,8 +19,8 @@ template <int N, class T>
 }
 
 namespace detail {
-// Two numbers, of which the second does not matter: a choice between vectors is never made by a
-// branch, which for random directions is guessed wrongly every other time.
+// Two numbers, the second unused: a vector select avoids branches, which are mispredicted half of
+// the time for random directions.
 using Pair [[gnu::vector_size(16)]] = double;
 using Bits [[gnu::vector_size(16)]] = int64_t;
 }  // namespace detail
@@ -36,7 +36,7 @@ inline double choose_above(double a, double b, double more, double other) {
 template <class T>
 [[gnu::always_inline]] inline T angle_of(const T& y, const T& x) {
   using std::copysign, std::fabs;
-  // (atan(z) / z - 1) / z^2 in z^2 up to tan(pi / 8)^2, at Chebyshev's nodes: 7e-18 off.
+  // (atan(z) / z - 1) / z^2 in z^2 up to tan(pi / 8)^2, at Chebyshev nodes: error 7e-18.
   constexpr double kAtan[] = {-0x1.5555555555555p-2, 0x1.999999999934ap-3,  -0x1.24924924360cbp-3,
                               0x1.c71c7185314cbp-4,  -0x1.745d0b26b83e7p-4, 0x1.3b1262d95579ep-4,
                               -0x1.10fa75382537fp-4, 0x1.dfe61e80903d2p-5,  -0x1.a098bb6ba4941p-5,
@@ -44,7 +44,7 @@ template <class T>
   constexpr double kTanEighth = 0.41421356237309505;
   const T ax = fabs(x), ay = fabs(y);
   const T large = choose_above(ax, ay, ax, ay), small = choose_above(ax, ay, ay, ax);
-  // atan(q) = pi / 4 + atan((q - 1) / (q + 1)), beyond this.
+  // Beyond this, atan(q) = pi / 4 + atan((q - 1) / (q + 1)).
   const T limit = kTanEighth * large;
   const T numerator = choose_above(small, limit, small - large, small);
   const T denominator = choose_above(small, limit, small + large, large);
@@ -62,7 +62,7 @@ inline Dual angle_of(const Dual& y, const Dual& x) {
 }
 
 namespace detail {
-// sin(2 pi r) / r and cos(2 pi r) in r^2 up to 1/64, at Chebyshev's nodes: 3e-17 and 2e-17 off.
+// sin(2 pi r) / r and cos(2 pi r) in r^2 up to 1/64, at Chebyshev nodes: errors 3e-17 and 2e-17.
 inline constexpr double kSin[] = {
     0x1.921fb54442d18p+2, -0x1.4abbce625be41p+5, 0x1.466bc677587f8p+6, -0x1.32d2cce2e5b19p+6,
     0x1.50782fda12d96p+5, -0x1.e30071afc3e59p+3, 0x1.e3f38399551bfp+1};
@@ -76,7 +76,7 @@ struct SinCosOf {
   T sin, cos;
 };
 using SinCos = SinCosOf<double>;
-// Of an angle in turns, 0 to 1.5.
+// Sine and cosine of an angle in turns, 0 to 1.5.
 inline SinCos sin_cos_of_turns(double turns) {
   const int quarter = static_cast<int>(4 * turns + 0.5);
   const double r = turns - 0.25 * quarter, r2 = r * r;

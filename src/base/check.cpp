@@ -1,4 +1,4 @@
-// What a failed CHECK prints.
+// Reports a failed CHECK and aborts.
 #include "limn/core/check.h"
 
 #include <cstdio>

@@ -1,12 +1,12 @@
-// The words of errors and warnings.
+// Formatting of errors and warnings.
 #include "limn/core/error.h"
 
 namespace limn {
 
 namespace {
 
-// Quoted input may hold anything: what would end a message or move a terminal's cursor is written
-// as \x1b, and the middle of what nobody can read is left out.
+// Makes quoted input safe to print: control characters become \x1b, and the middle of an overlong
+// message is omitted.
 std::string printable(const std::string& message) {
   constexpr size_t kBegin = 1500, kEnd = 300;  // not tuned
   static const char* const kDigits = "0123456789abcdef";

@@ -1,6 +1,6 @@
 #pragma once
-// Half floats as they lie in memory, decoded without branches on any processor: IEEE 754 binary16,
-// but that the last exponent stands for one more power of two instead of infinity.
+// Half floats decoded without branches on any processor: IEEE 754 binary16, except that the largest
+// exponent means one more power of two instead of infinity.
 #include <array>
 #include <bit>
 #include <cmath>
@@ -11,13 +11,13 @@ namespace limn {
 class Half {
  public:
   Half() = default;
-  // The nearest towards zero; exact for what came from finite halves. Numbers beyond the range
-  // become something else: whoever needs to know compares.
+  // Rounds towards zero; exact for values that came from finite halves. Values out of range are not
+  // preserved: callers compare.
   explicit Half(float v) {
     const auto bits = std::bit_cast<uint32_t>(std::fabs(v) * 0x1p-112f);
     bits_ = static_cast<uint16_t>(((bits >> 13) & 0x7fff) | (std::signbit(v) ? 0x8000 : 0));
   }
-  // The exponent's field moves from 5 to 8 bits, and the factor corrects its bias.
+  // Shifts the exponent from 5 to 8 bits; the factor corrects the bias.
   operator float() const {  // NOLINT: a half is a float, implicitly
     const float size = std::bit_cast<float>(static_cast<uint32_t>(bits_ & 0x7fff) << 13) * 0x1p112f;
     return std::bit_cast<float>(std::bit_cast<uint32_t>(size) |
@@ -28,7 +28,7 @@ class Half {
   uint16_t bits_ = 0;
 };
 
-// Four numbers side by side.
+// Four numbers in a SIMD vector.
 using FourDoubles [[gnu::vector_size(32)]] = double;
 inline FourDoubles to_doubles(const std::array<Half, 4>& halves) {
   using Shorts [[gnu::vector_size(8)]] = uint16_t;

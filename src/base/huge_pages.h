@@ -1,6 +1,6 @@
 #pragma once
-// Memory for large tables that are read at random places: with pages of 4 KB nearly every such read
-// also misses the TLB, which on virtual machines costs more than all arithmetic around it.
+// An allocator for large tables with random access. With 4 KB pages nearly every access also misses
+// the TLB, which on virtual machines costs more than the arithmetic around it.
 #include <sys/mman.h>
 
 #include <cstdlib>
@@ -9,7 +9,7 @@
 
 namespace limn {
 
-// Asks the system for pages of 2 MB from that size on; nothing else changes if it declines.
+// Requests 2 MB pages for allocations of at least that size; harmless if the system declines.
 template <class T>
 struct HugePageAllocator {
   using value_type = T;

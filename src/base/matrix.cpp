@@ -31,8 +31,8 @@ Vec3d Matrix4::normal(const Vec3d& n) const {
   return r / determinant(a, b, c);
 }
 
-// Gauss-Jordan elimination with row pivoting. A pivot that is nothing but rounding error relative
-// to the entries of its column means a singular matrix, whatever the matrix' scale.
+// Gauss-Jordan elimination with row pivoting. A pivot within rounding error of zero, relative to
+// the entries of its column, means a singular matrix, at any scale.
 Matrix4 Matrix4::inverse() const {
   Matrix4 a = *this, r;
   double column_scale[4] = {};

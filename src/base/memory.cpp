@@ -1,4 +1,4 @@
-// How much memory is free, and the error where it is not enough.
+// Free memory, and the error for too large an allocation.
 #include "limn/core/memory.h"
 
 #include <sys/resource.h>
@@ -19,8 +19,8 @@ namespace {
 
 constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
-// The number after `key` in a file of lines "KEY NUMBER ..."; the first word's if `key` is "".
-// `absent` if there is none ("max" is none).
+// The number after `key` in a file of lines "KEY NUMBER ..."; the first word if `key` is "".
+// Returns `absent` if there is no number (for example "max").
 double number_in(const std::string& file, const std::string& key, double absent) {
   std::ifstream stream(file);
   std::string word;
@@ -32,7 +32,7 @@ double number_in(const std::string& file, const std::string& key, double absent)
 
 double machine_free() { return 1024 * number_in("/proc/meminfo", "MemAvailable:", kUnlimited); }
 
-// Pages of files count as taken there, but are given back on demand.
+// The page cache counts as used there, but is released on demand.
 double container_free() {
   const std::string folder = "/sys/fs/cgroup/";
   const double limit = number_in(folder + "memory.max", "", kUnlimited);
@@ -63,11 +63,11 @@ double free_memory() {
 
 void require_memory(const SourceLocation& where, double bytes, const std::string& what,
                     const std::string& remedy) {
-  constexpr double kWorthAsking = 0x1p26;  // not tuned: asking takes 50 microseconds
+  constexpr double kWorthAsking = 0x1p26;  // not tuned: a query takes 50 microseconds
   if (bytes < kWorthAsking) return;
   double free = free_memory();
 #ifdef __GLIBC__
-  // What this program has given back, the C library may still hold.
+  // The C library may still hold memory that this program has freed.
   if (bytes > free && malloc_trim(0) != 0) free = free_memory();
 #endif
   if (bytes <= free) return;

@@ -1,4 +1,4 @@
-// Lists of names in messages.
+// Lists of known names in messages.
 #include "limn/core/names.h"
 
 namespace limn {

@@ -1,4 +1,4 @@
-// Files that appear whole or not at all.
+// Output files that are written completely or not at all.
 #include "limn/core/output_file.h"
 
 #include <unistd.h>

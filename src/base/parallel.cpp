@@ -1,4 +1,4 @@
-// The one door to oneTBB.
+// Parallel loops over oneTBB; the only file that includes it.
 #include "limn/core/parallel.h"
 
 #include <oneapi/tbb/blocked_range.h>
@@ -17,8 +17,8 @@ int thread_count(int requested) {
 
 void parallel_for(size_t count, int threads, const std::function<void(size_t)>& work) {
   CHECK_LE(1, threads);
-  // More threads than cores are granted too: results must not depend on their number, and tests ask
-  // for seven.
+  // More threads than cores are allowed: results do not depend on their number, and tests request
+  // seven.
   const oneapi::tbb::global_control limit(oneapi::tbb::global_control::max_allowed_parallelism,
                                           threads);
   oneapi::tbb::task_arena arena(threads);

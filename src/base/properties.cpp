@@ -1,4 +1,4 @@
-// The errors of Properties.
+// Errors of Properties.
 #include "limn/core/properties.h"
 
 namespace limn {

@@ -1,14 +1,14 @@
-// Even numbers: Sobol' points, scrambled and in an order of chance (Burley 2020, "Practical
-// hash-based Owen scrambling"; what pbrt calls a padded Sobol' sampler).
+// Low-discrepancy numbers: Owen-scrambled Sobol' points with shuffled indices (Burley 2020,
+// "Practical hash-based Owen scrambling"; pbrt's padded Sobol' sampler).
 //
-// Every stream has its own points of four dimensions, Joe and Kuo's first: of the points 2^m k to
-// 2^m (k + 1) - 1 every box of volume 2^-m in dimensions 0 and 1 that is a product of halves of
-// halves holds exactly one, whatever the scrambling. Sample n takes the point whose number is n,
-// scrambled like a coordinate, so that streams of different purposes have nothing in common. A
-// scrambling chooses for every prefix of a number's bits whether the next bit is turned around
-// (Owen 1995); here a hash chooses, in which every bit depends on itself and those above it (Laine
-// and Karras 2011, with the constants of Vegdahl 2021). It adds a number that is uniform and
-// independent of all else, so that each coordinate by itself is exactly uniform.
+// Every stream has its own points in four dimensions, Joe and Kuo's first. Among the points 2^m
+// k to 2^m (k + 1) - 1 every elementary interval of volume 2^-m in dimensions 0 and 1 holds
+// exactly one, for any scrambling. Sample n uses the point whose index is n, scrambled like a
+// coordinate, so that streams of different purposes are uncorrelated. Owen scrambling (1995)
+// flips a bit depending on all bits above it. The flips come from a hash in which every bit
+// depends on itself and those above only (Laine and Karras 2011, with the constants of Vegdahl
+// 2021). The hash adds an independent uniform number first, so each coordinate is exactly
+// uniform.
 #include "limn/core/rng.h"
 
 #include <algorithm>
@@ -29,8 +29,8 @@ using wide::HalfWords, wide::Words;
 
 constexpr int kDimensions = 4;
 
-// v[i]: what bit i of a point's number turns around; the primitive polynomial has the degree and
-// the inner coefficients of a row of new-joe-kuo-6, whose first numbers are m.
+// v[i]: the direction number of index bit i. The primitive polynomial has the given degree and
+// inner coefficients (a row of new-joe-kuo-6, whose first numbers are m).
 constexpr std::array<uint32_t, 32> directions(int dimension) {
   struct Row {
     int degree;
@@ -53,7 +53,7 @@ constexpr std::array<uint32_t, 32> directions(int dimension) {
   return v;
 }
 
-// What follows is written once for one number (uint32_t) and for eight side by side.
+// The following functions work on one number (uint32_t) and on eight (SIMD).
 template <class T>
 [[gnu::always_inline]] constexpr T reversed(T x) {
   x = x << 24 | (x & 0xff00) << 8 | (x >> 8 & 0xff00) | x >> 24;
@@ -62,8 +62,8 @@ template <class T>
   return (x & 0x55555555) << 1 | (x >> 1 & 0x55555555);
 }
 
-// The points of the numbers below 256, those times 256, ..., in the dimensions from 2 on, as
-// `reversed` has them.
+// Points of the indices below 256, of those times 256, ..., in the dimensions from 2 on, as
+// `reversed` computes them.
 using Bytes = std::array<std::array<std::array<uint32_t, 256>, 4>, kDimensions - 2>;
 
 constexpr Bytes make_bytes() {
@@ -72,7 +72,7 @@ constexpr Bytes make_bytes() {
     const std::array<uint32_t, 32> v = directions(d);
     for (int k = 0; k < 4; ++k) {
       for (uint32_t n = 1; n < 256; ++n) {
-        // Without its lowest bit, and what that one turns around.
+        // The point without the lowest bit of n, and the direction number of that bit.
         const int low = std::countr_zero(n);
         bytes[d - 2][k][n] = bytes[d - 2][k][n & (n - 1)] ^ reversed(v[8 * k + low]);
       }
@@ -87,8 +87,8 @@ uint32_t point_of_bytes(uint32_t n, int dimension) {
   return bytes[0][n & 255] ^ bytes[1][n >> 8 & 255] ^ bytes[2][n >> 16 & 255] ^ bytes[3][n >> 24];
 }
 #ifdef LIMN_BIT_MATRICES
-// The same as products of bytes with 8 by 8 bits: word j holds what byte (j + turn) % 4 of a number
-// adds to byte j of its point; its rows, the last first, are the bits of a byte.
+// The same as products of bytes with 8 by 8 bit matrices: word j holds the contribution of byte (j
+// + turn) % 4 of an index to byte j of its point. Its rows, last first, are the bits of a byte.
 using Matrix = std::array<uint64_t, 4>;
 constexpr Matrix make_matrix(int dimension, int turn) {
   Matrix matrix{};
@@ -110,7 +110,7 @@ constexpr std::array<std::array<Matrix, 4>, kDimensions - 2> make_matrices() {
   return matrices;
 }
 alignas(32) constexpr auto kMatrices = make_matrices();
-// Where byte i of word k of eight numbers is byte 8 k + i, and back.
+// The permutation between byte i of word k of eight numbers and byte 8 k + i, or its inverse.
 constexpr std::array<uint8_t, 32> make_order(bool back) {
   std::array<uint8_t, 32> order{};
   for (uint8_t i = 0; i < 8; ++i) {
@@ -158,8 +158,8 @@ alignas(32) constexpr std::array<uint8_t, 32> kTogether = make_order(true);
 }
 #endif
 
-// With its bits in reverse: the first dimension reverses a number, and the second multiplies it by
-// Pascal's triangle, which is to put 1 + x for x in the polynomial of its bits.
+// Points with reversed bits. The first dimension reverses an index; the second multiplies it by
+// Pascal's triangle, that is, substitutes 1 + x in the polynomial of its bits.
 template <class T>
 [[gnu::always_inline]] inline T reversed_point(T n, int dimension) {
   if (dimension == 0) return n;
@@ -176,7 +176,7 @@ uint32_t low_half(uint64_t word) { return static_cast<uint32_t>(word); }
   return __builtin_convertvector(word, HalfWords);
 }
 
-// x: with its bits in reverse.
+// x: with reversed bits.
 template <class T, class Key>
 [[gnu::always_inline]] inline T scrambled(T x, const Key& key) {
   x ^= x * 0x3d20adea;
@@ -187,14 +187,14 @@ template <class T, class Key>
   return reversed(x);
 }
 
-// In [0, 1); by way of signed numbers, which every processor converts.
+// Maps to [0, 1) through signed integers, which every processor converts.
 [[gnu::always_inline]] inline wide::RawDoubles in_unit(const HalfWords& x) {
   const auto shifted = (wide::Ints)(x ^ 0x80000000);
   return (__builtin_convertvector(shifted, wide::RawDoubles) + 0x1p31) * 0x1p-32;
 }
 
-// What all of a stream have beyond 32 bits: without it an edge of a large mesh that is chosen by
-// less than 2^-32 would never be.
+// The bits beyond 32, equal for all points of a stream. Without them an edge of a large mesh with a
+// probability below 2^-32 could never be drawn.
 [[gnu::always_inline]] inline double rest(uint64_t word) {
   return static_cast<double>(word >> 43) * 0x1.0p-53;
 }

@@ -1,4 +1,4 @@
-// Numbers, words and whole files.
+// Parsing of numbers and words, and reading of whole files.
 #include "src/base/text.h"
 
 #include <charconv>
@@ -11,7 +11,7 @@ namespace limn {
 
 namespace {
 
-// from_chars knows no leading plus sign.
+// Removes a leading plus sign, which from_chars does not accept.
 std::string_view without_plus(std::string_view text) {
   if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
   return text;
@@ -25,7 +25,7 @@ std::optional<double> parse_double(std::string_view text) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
   if (end != text.data() + text.size()) return std::nullopt;
   if (error == std::errc::result_out_of_range) {
-    // Both "1e400" and "1e-400" come here; only the latter has a meaning.
+    // Both overflow ("1e400") and underflow ("1e-400") get here; only underflow is valid.
     if (text.find("e-") == text.npos && text.find("E-") == text.npos) return std::nullopt;
     return 0.0;
   }

@@ -1,14 +1,14 @@
 #pragma once
-// Eight numbers side by side (vector extension of GCC and Clang): the same step of eight paths.
-// Arithmetic works lane by lane, alike in each: what a lane comes to does not depend on the others,
-// which may hold anything. Without wide registers the compiler splits them: per lane the same steps.
+// Eight numbers in a SIMD vector (extension of GCC and Clang), one per path of a batch. Arithmetic
+// is element-wise: an element's result does not depend on the others, which may hold anything.
+// Without wide registers the compiler splits vectors; the steps per element are the same.
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 
 #include "limn/core/vec.h"
 
-// How such numbers are passed depends on the processor: none are, by value, between files.
+// The calling convention of vectors varies: never pass them by value between files.
 #pragma GCC diagnostic ignored "-Wpsabi"
 
 namespace limn::wide {
@@ -53,7 +53,7 @@ LIMN_WIDE Doubles choose_above(const Doubles& a, const Doubles& b, const Doubles
                                const Doubles& other) {
   return select(a > b, more, other);
 }
-// If a lane of a or b is not a number, the result is b's.
+// If an element of a or b is NaN, the result is b's.
 LIMN_WIDE Doubles min(const Doubles& a, const Doubles& b) { return select(a < b, a, b); }
 LIMN_WIDE Doubles max(const Doubles& a, const Doubles& b) { return select(a > b, a, b); }
 LIMN_WIDE Ints min(const Ints& a, const Ints& b) { return a < b ? a : b; }
@@ -74,7 +74,7 @@ LIMN_WIDE Doubles to_doubles(const Ints& a) {
   return Doubles(__builtin_convertvector(a, RawDoubles));
 }
 
-// Lane i: of(i), something that is read. Element by element, as a wide load would wait for narrow
+// Element i: of(i), read one at a time. A wide load would stall on preceding narrow
 // stores.
 template <class F>
 LIMN_WIDE Doubles gather(const F& of) {
@@ -84,17 +84,17 @@ template <class F>
 LIMN_WIDE Ints gather_ints(const F& of) {
   return Ints{of(0), of(1), of(2), of(3), of(4), of(5), of(6), of(7)};
 }
-// Lane i: *of(i).
+// Element i: *of(i).
 template <class F>
 LIMN_WIDE Vec gather_vectors(const F& of) {
   return {gather([&](int i) { return of(i)->x; }), gather([&](int i) { return of(i)->y; }),
           gather([&](int i) { return of(i)->z; })};
 }
-// With one division: three wide ones take as long as most of what is around them.
+// One division: three vector divisions would take as long as most code around them.
 LIMN_WIDE Vec normalize(const Vec& a) { return a * (1 / sqrt(dot(a, a))); }
 LIMN_WIDE Vec3d lane(const Vec& a, int i) { return {a.x[i], a.y[i], a.z[i]}; }
 
-// f(first, last) for every kWidth of `count` items, the last ones with fewer.
+// Calls f(first, last) for every kWidth of `count` items, fewer at the end.
 template <class F>
 LIMN_WIDE void for_blocks(size_t count, const F& f) {
   for (size_t first = 0; first < count; first += kWidth) {

@@ -1,4 +1,4 @@
-// Lambert's cosine law, black from behind.
+// The diffuse (Lambertian) BSDF; its back is black.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -79,7 +79,7 @@ void Diffuse::sample_each(std::span<const Draw> draws) const {
   });
 }
 
-// Too little for lanes.
+// Batches gain too little from SIMD here.
 }  // namespace
 
 std::shared_ptr<Bsdf> make_diffuse(const Rgb<double>& reflectance) {

@@ -1,4 +1,4 @@
-// Sampling of visible normals.
+// Sampling of visible microfacet normals.
 #include "src/bsdf/microfacet.h"
 
 #include <algorithm>

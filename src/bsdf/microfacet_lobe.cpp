@@ -1,9 +1,9 @@
-// Bounds of microfacet lobes, D G1(wi) G1(wo) F / (4 cos_i) with the cosine of wo included.
+// Upper bounds of microfacet lobes D G1(wi) G1(wo) F / (4 cos_i), which include the cosine of wo.
 //
-// With r the mirror image of wi about n, the turn from r to wo is the product of the reflections
-// about n and about h, a rotation by 2 theta_h, so the angle between r and wo is at most 2 theta_h:
-// D(theta_h) is at most the largest value of D from half that angle on. G is at most the smaller of
-// its two factors, and F at most the albedo bound.
+// Let r be the mirror image of wi about n. The rotation from r to wo is the product of the
+// reflections about n and h, a rotation by 2 theta_h. So the angle between r and wo is at most 2
+// theta_h, and D(theta_h) is at most the maximum of D from half that angle on. G is at most the
+// smaller of its two factors, and F at most the albedo.
 #include <algorithm>
 #include <cmath>
 
@@ -25,7 +25,7 @@ class MicrofacetLobe : public LobeModel {
   }
 
  protected:
-  // Largest value of D at angles from theta on, cos_squared = cos^2 theta.
+  // Maximum of D over angles >= theta, with cos_squared = cos^2 theta.
   virtual double distribution(double cos_squared, double alpha) const = 0;
   // Upper bound of Smith's G1, increasing with the cosine.
   virtual double masking(double cos_theta, double alpha) const = 0;

@@ -1,4 +1,4 @@
-// The BSDFs by the names of their types.
+// The table of BSDF types.
 #include "limn/core/names.h"
 #include "src/bsdf/types.h"
 

@@ -1,4 +1,4 @@
-// A rough metal: D G1(wi) G1(wo) F / (4 cos_i), the cosine of wo included.
+// A rough conductor: D G1(wi) G1(wo) F / (4 cos_i), which includes the cosine of wo.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -35,7 +35,7 @@ constexpr Material kMaterials[] = {
 constexpr double kMinimumAlpha = 1e-4;  // as in Mitsuba
 constexpr double kMaximumAlpha = 1e6;
 
-// What value and density share at a pair of directions in front of the surface.
+// Terms shared by value and density for a pair of directions in front of the surface.
 template <class S>
 struct Reflection {
   S cos_i, cos_o;
@@ -98,7 +98,7 @@ class RoughConductor final : public Bsdf {
   Rgb<S> evaluate(const Reflection<S>& r) const;
   template <class S>
   S density(const Reflection<S>& r) const;
-  // As the functions of microfacet.h; wide::Doubles: GGX.
+  // GGX or Beckmann functions of microfacet.h; only GGX for wide::Doubles.
   template <class S>
   S distribution(const S& cos2, const S& sin2) const {
     if constexpr (std::is_same_v<S, wide::Doubles>) {
@@ -117,7 +117,7 @@ class RoughConductor final : public Bsdf {
                       : microfacet::beckmann_g1_over_cos(cos_v, alpha<S>());
     }
   }
-  // wi mirrored at the facet, whose normal may be of any length.
+  // Reflects wi at a facet whose normal may have any length.
   template <class S>
   static Vec3<S> mirrored(const FrameOf<S>& frame, const Vec3<S>& v, const Vec3<S>& h) {
     return normalize(frame.to_world(h * (2.0 * dot(v, h) / dot(h, h)) - v));
@@ -129,8 +129,8 @@ class RoughConductor final : public Bsdf {
   Rgb<Dual> specular_reflectance_;
 };
 
-// The sine of the half vector comes from a cross product: 1 - cos^2 would leave nothing of it at
-// small roughness. With m = wi + wo, h = m / |m| and wi.h = |m| / 2.
+// The sine of the half vector is computed by a cross product: 1 - cos^2 would cancel at small
+// roughness. With m = wi + wo: h = m / |m| and wi.h = |m| / 2.
 template <class S>
 Reflection<S> RoughConductor::reflect(const Vec3<S>& n, const Vec3<S>& wi,
                                       const Vec3<S>& wo) const {
@@ -151,7 +151,7 @@ template <class S>
 Rgb<S> RoughConductor::evaluate(const Reflection<S>& r) const {
   const S masking = masking_over_cos(r.cos_i) * masking_over_cos(r.cos_o);
   const S common = r.d * masking * r.cos_o * 0.25;
-  // Arrays of four, so that plain numbers are worked on side by side.
+  // Arrays of four, so that the compiler vectorises doubles.
   const double eta[4] = {eta_.r, eta_.g, eta_.b, 1}, k[4] = {k_.r, k_.g, k_.b, 1};
   constexpr int kCount = std::is_same_v<S, double> ? 4 : 3;
   S f[kCount];
@@ -164,8 +164,8 @@ Rgb<S> RoughConductor::evaluate(const Reflection<S>& r) const {
   }
 }
 
-// Visible normals have the density D G1(wi) (wi.h) / cos_i per solid angle of h, and reflection
-// divides by 4 (wi.h). For Beckmann the exact G1 stands here, since the rational one of `evaluate`
+// The density of visible normals is D G1(wi) (wi.h) / cos_i per solid angle of h; reflection
+// divides it by 4 (wi.h). For Beckmann it uses the exact G1, since the rational fit in `evaluate`
 // does not integrate to 1.
 template <class S>
 S RoughConductor::density(const Reflection<S>& r) const {

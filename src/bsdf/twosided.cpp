@@ -1,10 +1,10 @@
-// One BSDF for both sides of a surface, or one for each.
+// The two-sided BSDF: one nested BSDF for both sides of a surface, or one for each.
 #include "src/bsdf/types.h"
 
 namespace limn {
 namespace {
 
-// The scattering functions are the front's; callers reach the back through side(false).
+// Scattering functions are those of the front; side(false) gives the back.
 class TwoSided final : public Bsdf {
  public:
   // sides: one or two.
@@ -32,7 +32,7 @@ class TwoSided final : public Bsdf {
   }
   LobeSummary lobe() const override { return front().lobe(); }
 
-  // Under the nested BSDF's own names; with two different sides, "front.NAME" and "back.NAME".
+  // Names of a single nested BSDF are unchanged; with two, they are "front.NAME" and "back.NAME".
   std::vector<ParameterRef> parameters() override;
   std::shared_ptr<Bsdf> clone() const override;
   std::span<std::shared_ptr<Bsdf>> nested() override { return sides_; }

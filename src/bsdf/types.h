@@ -1,5 +1,5 @@
 #pragma once
-// The factories that the registry lists, one per BSDF type.
+// Factories of the BSDF types in the registry.
 #include <memory>
 
 #include "limn/core/bsdf.h"
@@ -11,7 +11,7 @@ std::shared_ptr<Bsdf> read_diffuse(Properties& properties);
 std::shared_ptr<Bsdf> read_roughconductor(Properties& properties);
 std::shared_ptr<Bsdf> read_twosided(Properties& properties);
 
-// A colour whose channels lie in [0, 1], as Mitsuba demands of reflectances.
+// Reads a colour whose channels lie in [0, 1], as Mitsuba requires of reflectances.
 Rgb<double> read_reflectance(Properties& properties, const char* name, double absent);
 
 inline ParameterRef reflectance_parameter(const char* name, Rgb<Dual>& c) {

@@ -1,4 +1,4 @@
-// Reconstruction filters and the part of the film that a pixel sees.
+// Reconstruction filters and their support on the film.
 #include "limn/core/film.h"
 
 #include <algorithm>
@@ -12,7 +12,7 @@ namespace limn {
 
 namespace {
 
-// The gaussian is lowered by its value at the radius, so that it ends continuously.
+// The gaussian minus its value at the radius, so that it ends continuously.
 double gaussian_floor(const Filter& f) {
   return std::exp(-f.radius * f.radius / (2 * f.stddev * f.stddev));
 }
@@ -30,7 +30,7 @@ double Filter::integral(double x) const {
   x = std::clamp(x, -radius, radius);
   if (kind == Kind::kBox) return x + radius;
   if (kind == Kind::kTent) {
-    // Triangles of the two halves; the right half by symmetry.
+    // Integral over the triangle's left half; the right half by symmetry.
     const double to_end = radius - std::fabs(x);
     const double tail = to_end * to_end / (2 * radius);
     return x <= 0 ? tail : radius - tail;
@@ -41,7 +41,7 @@ double Filter::integral(double x) const {
          gaussian_floor(*this) * (x + radius);
 }
 
-// Inversion of the integral by Newton's method, kept inside a shrinking bracket: exact to rounding
+// Inverts the integral by Newton's method, safeguarded by a shrinking bracket: exact to rounding
 // for every filter.
 double Filter::quantile(double lower, double upper, double u) const {
   DCHECK_LT(integral(lower), integral(upper));
@@ -53,7 +53,7 @@ double Filter::quantile(double lower, double upper, double u) const {
     const double excess = integral(x) - target;
     const double slope = eval(x);
     const double newton = x - excess / slope;
-    // Newton's error squares with each step: after a step this small it is below rounding.
+    // Convergence is quadratic: after so small a step the error is below rounding.
     if (slope > 0 && std::fabs(newton - x) <= 0x1p-30 * radius) {
       return std::clamp(newton, lower, upper);
     }
@@ -65,7 +65,7 @@ double Filter::quantile(double lower, double upper, double u) const {
   return x;
 }
 
-// Chebyshev's, on [0, 1].
+// Chebyshev nodes on [0, 1].
 const FilterTable::Piece& FilterTable::nodes() {
   static const Piece kAll = [] {
     Piece all;
@@ -104,7 +104,7 @@ double FilterTable::quantile(double lower, double upper, double u) const {
   const double below = start + u * (integral(upper) - start);
   const bool left = below < total_ - below;
   const double part = std::min(2 * (left ? below : total_ - below) / total_, 1 - 0x1p-53);
-  // A piece is the exponent and the first bits after it.
+  // The piece is given by the exponent and the leading bits of the mantissa.
   constexpr int kRest = 52 - kPieceBits;
   const auto bits = std::bit_cast<uint64_t>(part);
   constexpr uint64_t kFirst = uint64_t{1023 - kPowers} << kPieceBits;

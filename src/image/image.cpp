@@ -1,4 +1,4 @@
-// The one door to OpenEXR.
+// Reading and writing of OpenEXR files; the only file that includes OpenEXR.
 #include "limn/core/image.h"
 
 #include <ImfChannelList.h>
@@ -34,7 +34,7 @@ std::vector<const char*> channel_names(int channels) {
   return {"Y"};
 }
 
-// Finite values beyond half's range become its largest, rather than infinite.
+// Finite values beyond half's range become its largest value instead of infinity.
 std::vector<half> to_half(const std::vector<float>& data) {
   constexpr float kLargest = HALF_MAX;
   std::vector<half> result;
@@ -45,7 +45,7 @@ std::vector<half> to_half(const std::vector<float>& data) {
   return result;
 }
 
-// Slices for interleaved channels whose top left pixel is at `origin` of the file's window.
+// Slices of interleaved channels; the top left pixel is at `origin` of the file's data window.
 template <class T>
 Imf::FrameBuffer interleaved(T* data, Imf::PixelType type, const std::vector<const char*>& names,
                              int width, const Imath::V2i& origin) {
@@ -55,7 +55,7 @@ Imf::FrameBuffer interleaved(T* data, Imf::PixelType type, const std::vector<con
       reinterpret_cast<intptr_t>(data) -
       (static_cast<intptr_t>(origin.y) * width + origin.x) * static_cast<intptr_t>(pixel);
   for (size_t c = 0; c < names.size(); ++c) {
-    // NOLINTNEXTLINE(performance-no-int-to-ptr): OpenEXR wants where pixel (0, 0) would be
+    // NOLINTNEXTLINE(performance-no-int-to-ptr): OpenEXR needs the address of pixel (0, 0)
     auto* const first = reinterpret_cast<char*>(base + c * sizeof(T));
     buffer.insert(names[c], Imf::Slice(type, first, pixel, pixel * width));
   }
@@ -77,8 +77,8 @@ void check_is_exr(const std::string& file) {
   }
 }
 
-// An open EXR. OpenEXR's reader in C checks sizes against the file before it believes them and
-// blocks against the size that they must have; the one in C++ does neither.
+// An open EXR file. OpenEXR's C reader validates sizes against the file and block sizes before use;
+// its C++ reader does not.
 class ExrFile {
  public:
   explicit ExrFile(const std::string& file) : file_(file) {
@@ -91,7 +91,7 @@ class ExrFile {
     options.max_tile_width = options.max_tile_height = kMaxTile;
     options.flags = EXR_CONTEXT_FLAG_DISABLE_CHUNK_RECONSTRUCTION;
     const exr_result_t result = exr_start_read(&context_, file.c_str(), &options);
-    // Where an attribute cannot be, it goes on, and what follows is chance.
+    // After a misplaced attribute the reader continues with undefined results.
     if (result == EXR_ERR_SUCCESS && complaint_.empty()) return;
     exr_finish(&context_);
     fail_damaged();
@@ -111,13 +111,13 @@ class ExrFile {
   }
 
  private:
-  static thread_local std::string complaint_;  // OpenEXR's first since a file was opened
+  static thread_local std::string complaint_;  // OpenEXR's first message since a file was opened
   std::string file_;
   exr_context_t context_ = nullptr;
 };
 thread_local std::string ExrFile::complaint_;
 
-// The first part of a file, as an image.
+// Reads the first part of a file as an image.
 class ExrReader {
  public:
   explicit ExrReader(const ExrFile& exr) : exr_(exr) {
@@ -172,7 +172,7 @@ class ExrReader {
     exr_.fail("needs channels R, G, B or Y in full resolution (found: " + found + ")");
   }
 
-  // What the file cannot hold is refused before anything is taken for it.
+  // Rejects sizes that the file cannot hold, before memory is allocated.
   void check_size() const {
     const std::string size =
         "the image of " + std::to_string(width_) + " x " + std::to_string(height_) + " pixels";
@@ -190,7 +190,7 @@ class ExrReader {
       exr_.fail(size + " cannot come out of a file of " +
                 std::to_string(static_cast<int64_t>(held)) + " bytes: it is truncated or damaged");
     }
-    // Floats here, what an environment map makes of them, and a block before and after unpacking.
+    // Memory for floats, for an environment map, and for a block before and after unpacking.
     uint64_t block = 0;
     exr_.check(exr_get_chunk_unpacked_size(exr_.context(), 0, &block));
     require_memory(
@@ -200,9 +200,9 @@ class ExrReader {
         size, "use a smaller one");
   }
 
-  // Bytes that may come out of one: a run of 128 equal ones from 2; deflate's 1032; a run of 255
-  // halves from 9 bits; four by four halves from 3 bytes; eight by eight floats from 4 bytes that
-  // are deflated.
+  // Largest compression ratio of a block, by method: run-length 128 bytes from 2; deflate
+  // 1032; 255 halves from 9 bits; 4 by 4 halves from 3 bytes; 8 by 8 floats from 4 deflated
+  // bytes.
   double largest_ratio() const {
     switch (compression_) {
       case EXR_COMPRESSION_NONE:
@@ -218,17 +218,17 @@ class ExrReader {
       case EXR_COMPRESSION_DWAB:
         return 64.0 * 1032;
       default:
-        return 4.0 / 3 * 1032;  // of floats PXR24 keeps three bytes
+        return 4.0 / 3 * 1032;  // PXR24 keeps three bytes of a float
     }
   }
 
-  // Memory is taken as lines come, so that no more is taken than the file makes up.
+  // Grows while lines are read, so that a small file cannot allocate much.
   void grow_to(int64_t lines) {
     image_.data.resize(static_cast<size_t>(lines * width_) * names_.size());
   }
 
-  // Blocks in the order of the image, those of full resolution: visit(block, x, y) with the pixel
-  // of the image where it begins.
+  // Visits the blocks of full resolution: visit(block, x, y) with the block's top left pixel in the
+  // image.
   template <class Visit>
   void for_each_block(const Visit& visit) const {
     const bool tiled = storage_ == EXR_STORAGE_TILED;
@@ -258,7 +258,7 @@ class ExrReader {
     bool begun = false;
   };
 
-  // A block whose top left pixel is (x, y) of the image.
+  // Decodes a block whose top left pixel is (x, y) of the image.
   void decode(BlockDecoder& decoder, const exr_chunk_info_t& block, int64_t x, int64_t y) {
     exr_decode_pipeline_t& pipeline = decoder.pipeline;
     exr_.check(decoder.begun ? exr_decoding_update(exr_.context(), 0, &block, &pipeline)
@@ -282,7 +282,7 @@ class ExrReader {
     exr_.check(exr_decoding_run(exr_.context(), 0, &pipeline));
   }
 
-  // The reader in C does not know this compression yet (OpenEXR 3.1).
+  // OpenEXR 3.1's C reader does not support this compression.
   void read_dwa() {
     for_each_block([](const exr_chunk_info_t&, int64_t, int64_t) {});
     try {
@@ -297,7 +297,7 @@ class ExrReader {
       grow_to(1);
       input.setFrameBuffer(
           interleaved(image_.data.data(), Imf::FLOAT, names, image_.width, window.min));
-      constexpr int64_t kLines = 256;  // as many as a block may have
+      constexpr int64_t kLines = 256;  // largest number of lines of a block
       for (int64_t y = 0; y < height_; y += kLines) {
         const int64_t end = std::min(height_, y + kLines);
         grow_to(end);
@@ -305,7 +305,7 @@ class ExrReader {
                          static_cast<int>(window.min.y + end) - 1);
       }
     } catch (const std::exception&) {
-      // OpenEXR's own words depend on where in the file it notices.
+      // OpenEXR's own message depends on where it detects the damage.
       exr_.fail_damaged();
     }
   }
@@ -315,7 +315,7 @@ class ExrReader {
   exr_compression_t compression_{};
   exr_attr_box2i_t window_{};
   const exr_attr_chlist_t* channels_ = nullptr;
-  std::vector<std::string> names_;  // of the channels that are read
+  std::vector<std::string> names_;  // names of the channels read
   int64_t width_ = 0, height_ = 0;
   Image image_;
 };
@@ -334,7 +334,7 @@ void write_exr(const std::string& file, const Image& image, bool half,
     header.insert(a.name, Imf::StringAttribute(a.value));
   }
   OutputFile output(file);
-  // In memory: a file that OpenEXR closes does not tell that the disk was full.
+  // Writes to memory first: OpenEXR does not report a full disk when it closes a file.
   Imf::StdOSStream stream;
   try {
     const Imath::V2i origin(0, 0);

@@ -1,4 +1,4 @@
-// The one door to libpng.
+// Writing of PNG files; the only file that includes libpng.
 #include <png.h>
 
 #include <algorithm>
@@ -26,12 +26,12 @@ void write_bytes(const std::string& file, int width, int height,
   output.commit();
 }
 
-// x in [0, 1]; what is not a number becomes 0.
+// x in [0, 1]; NaN becomes 0.
 png_byte to_byte(double x) {
   return x > 0 ? static_cast<png_byte>(std::lround(255 * std::min(x, 1.0))) : png_byte{0};
 }
 
-// IEC 61966-2-1.
+// The transfer function of sRGB, IEC 61966-2-1.
 double srgb_encode(double linear) {
   return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
 }

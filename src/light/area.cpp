@@ -1,4 +1,4 @@
-// Emitter "area": the surface of a shape shines from the front of every face.
+// Area lights: the front of every face of a shape emits.
 
 #include "limn/core/discrete_distribution.h"
 #include "limn/core/surface_point.h"
@@ -30,7 +30,7 @@ class AreaLight final : public Light {
     const Vec3d n = cross(c[1] - c[0], c[2] - c[0]);
     const double facing = -dot(n, wo);
     if (!(facing > 0)) return {};
-    // As `pdf` has it, without a unit normal.
+    // Equal to `pdf`, without normalising the normal.
     const double density = distance * distance * inverse_area_ * length(n) * probability / facing;
     if (!(density > 0)) return {};
     return LightSample{wo, distance, density, FaceRef{id_, face}, this};

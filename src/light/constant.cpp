@@ -1,4 +1,4 @@
-// Emitter "constant": the same radiance from all directions.
+// Constant environments: the same radiance from all directions.
 #include <fmt/format.h>
 
 #include "src/base/angles.h"

@@ -1,4 +1,4 @@
-// Emitter "directional": parallel light from infinity.
+// Directional lights: parallel light from infinity.
 #include <fmt/format.h>
 
 #include "src/light/types.h"
@@ -8,7 +8,7 @@ namespace {
 
 class DirectionalLight final : public DeltaLight {
  public:
-  // direction: unit, in which light travels.
+  // direction: unit, of light transport.
   DirectionalLight(const Vec3d& direction, const Rgb<Dual>& irradiance)
       : direction_(direction), irradiance_(irradiance) {}
 
@@ -38,7 +38,7 @@ class DirectionalLight final : public DeltaLight {
  private:
   Vec3d direction_;
   Vec3<Dual> turn_{};     // of the direction, see turned()
-  Rgb<Dual> irradiance_;  // [W / m^2], through an area across the direction
+  Rgb<Dual> irradiance_;  // [W / m^2], perpendicular to the direction
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Texels, what their density follows, and their mean.
+// Texels of an environment map, their sampling density, and their mean.
 #include "src/light/environment_map.h"
 
 #include <limits>
@@ -6,7 +6,7 @@
 namespace limn {
 namespace {
 
-// Luminance of the absolute values; above zero wherever a channel is not zero.
+// Importance of a texel: luminance of absolute values, positive unless the texel is black.
 float importance_of(const Rgb<double>& c) {
   const double v = luminance(Rgb<double>{std::fabs(c.r), std::fabs(c.g), std::fabs(c.b)});
   return v > 0 ? std::max(static_cast<float>(v), std::numeric_limits<float>::min()) : 0;
@@ -110,9 +110,9 @@ std::array<Environment::TexelWeight, 4> EnvironmentMap::weights(const Place<doub
            {at(next, row + 1), s * t}}};
 }
 
-// Along the azimuth a row's mean is its texels' mean; between two rows it is linear in theta, and
+// A row's mean over azimuth is the mean of its texels, and linear in theta between two rows:
 //   integral of (theta_1 - theta) / delta sin(theta) = cos(theta_0) - (sin(theta_1) -
-//   sin(theta_0)) / delta, and alike for the other row.
+//   sin(theta_0)) / delta, and likewise for the other row.
 double EnvironmentMap::mean_luminance() const {
   const auto row_mean = [this](int row) {
     return with_texels([&](const auto* texels) {

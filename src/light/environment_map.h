@@ -1,6 +1,6 @@
 #pragma once
-// A radiance map over the sphere in the direction space of the map itself (+Y up): look-up,
-// importance sampling, mean.
+// A radiance map over the sphere in its local frame (+Y up): lookup, importance sampling,
+// mean.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -28,12 +28,12 @@ namespace limn {
 // A cell is the patch between four neighbouring texels; there are W by H - 1.
 class EnvironmentMap {
  public:
-  // One or three channels; at least one texel, all finite. A single row stands for all. sampled:
-  // else directions cannot be drawn.
+  // One or three channels; at least one texel, all finite. A single row is used for all polar
+  // angles. sampled: false if no directions will be sampled.
   explicit EnvironmentMap(const Image& image, bool sampled = true);
 
-  // Where a direction lies: columns to the right of the center of column 0, in [0, W); rows below
-  // row 0, in [0, H - 1].
+  // Map coordinates of a direction: columns to the right of the center of column 0, in [0, W); rows
+  // below row 0, in [0, H - 1].
   template <class S>
   struct Place {
     S x, y;
@@ -42,27 +42,27 @@ class EnvironmentMap {
   Place<S> locate(const Vec3<S>& d) const;
   template <class S>
   Rgb<S> radiance(const Place<S>& place) const;
-  // Asks for what `radiance` and `pdf_solid_angle` read there.
+  // Prefetches the data that `radiance` and `pdf_solid_angle` will read.
   void fetch(const Place<double>& place) const;
 
-  // The density follows the luminance of the absolute values of the texels: it is positive
-  // wherever radiance is not zero, negative texels included. An all-black map is sampled uniformly.
-  // Of eight draws at once.
+  // Eight samples. The density follows the luminance of the texels' absolute values: it is
+  // positive wherever radiance is not zero, negative texels included. An all-black map is sampled
+  // uniformly.
   struct Drawn {
     wide::Vec direction;
     Place<wide::Doubles> place;
     wide::Doubles pdf;  // [1/sr]
   };
-  // Asks for the texels there.
+  // Also prefetches the texels.
   Drawn sample(const wide::Doubles& u1, const wide::Doubles& u2) const;
-  // place: of d. [1/sr]
+  // place: of d. Density with respect to solid angle [1/sr].
   double pdf_solid_angle(const Place<double>& place, const Vec3d& d) const;
 
-  // See Environment.
+  // Texels and texel weights as in Environment.
   Image texels() const;
   std::array<Environment::TexelWeight, 4> weights(const Place<double>& place) const;
 
-  // The exact mean over the sphere of the luminance of `radiance`.
+  // Exact mean of the luminance of `radiance` over the sphere.
   double mean_luminance() const;
 
   int width() const { return width_; }
@@ -70,14 +70,14 @@ class EnvironmentMap {
   double mean_magnitude() const { return mean_magnitude_; }  // of the texels' channels
 
  private:
-  // Red, green, blue; filled up so that a texel never lies across two lines of a cache.
+  // Red, green, blue, and padding, so that a texel never spans two cache lines.
   template <class Number>
   using Texel = std::array<Number, 4>;
-  // As half floats where all are exactly that, as in most files: half the misses.
+  // Half floats if all texels are representable, as in most files: half of the cache misses.
   using Texels = std::variant<HugePageVector<Texel<Half>>, HugePageVector<Texel<float>>>;
 
   size_t index(int column, int row) const { return static_cast<size_t>(row) * width_ + column; }
-  // f is called with the texels as they are kept.
+  // Calls f with the stored texels.
   template <class F>
   auto with_texels(F f) const {
     if (const auto* halves = std::get_if<0>(&texels_)) return f(halves->data());
@@ -89,7 +89,7 @@ class EnvironmentMap {
   double polar_angle(int row) const { return kPi * row / (height_ - 1); }
   template <class Number>
   void fill(const Image& image, bool sampled, HugePageVector<Texel<Number>>& texels);
-  // The cell's first column and row; rounding may put a place on the border behind it.
+  // The cell's first column and row; clamped, as rounding may put a position on the far border.
   int column_of(double x) const { return std::min(static_cast<int>(x), width_ - 1); }
   int row_of(double y) const { return std::clamp(static_cast<int>(y), 0, height_ - 2); }
 

@@ -1,4 +1,4 @@
-// Emitter "envmap": radiance from all directions, from an image.
+// Environment maps: radiance from an image.
 #include <fmt/format.h>
 
 #include "limn/core/check.h"
@@ -8,7 +8,7 @@
 namespace limn {
 namespace {
 
-// A map turned by the columns of a rotation. Copies share the texels, which never change.
+// A rotated map. Copies share the texels, which are immutable.
 class MapEnvironment final : public Environment {
  public:
   MapEnvironment(std::shared_ptr<const EnvironmentMap> map, const Vec3d axes[3], double scale,
@@ -95,7 +95,7 @@ class MapEnvironment final : public Environment {
   }
   static constexpr const char* kChanged = ", changed";
 
-  // What moves the texels, added.
+  // Adds the derivatives with respect to texels.
   Rgb<Dual> moving(const EnvironmentMap::Place<double>& place, Rgb<Dual> radiance) const {
     if (!texels_move_) return radiance;
     for (int lane = 0; lane < kLanes; ++lane) {
@@ -112,7 +112,7 @@ class MapEnvironment final : public Environment {
     sight.radiance = map_->radiance(place) * scale;
     sight.pdf = map_->pdf_solid_angle(place, map_from_world(d));
   }
-  // To rounding.
+  // Up to rounding.
   [[maybe_unused]] bool is_place(const Vec3d& d, const std::array<double, 2>& place) const {
     const Vec3d v = map_from_world(d);
     const auto there = map_->locate(v);
@@ -126,12 +126,11 @@ class MapEnvironment final : public Environment {
   }
 
   std::shared_ptr<const EnvironmentMap> map_;
-  Vec3d axes_[3];  // of the map, in the world
+  Vec3d axes_[3];  // the map's axes in world space
   Dual scale_;
   std::string file_;
   bool texels_move_ = false;
-  std::array<std::shared_ptr<const EnvironmentMap>, kLanes>
-      tangents_;  // none: that lane holds them
+  std::array<std::shared_ptr<const EnvironmentMap>, kLanes> tangents_;  // null: zero in that lane
 };
 
 void MapEnvironment::sample_directions(std::span<const Numbers> u, std::span<Drawn> drawn) const {

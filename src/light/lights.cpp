@@ -1,4 +1,4 @@
-// All lights of a scene, and what kinds of them share.
+// Light selection, and code shared by all kinds of lights.
 #include "limn/core/lights.h"
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 namespace limn {
 namespace {
 
-// How often any light is drawn, all alike: what would send most may be hidden.
+// Probability of a uniform choice: the light with the largest estimate may be occluded.
 constexpr double kAny = 0.25;
 
 }  // namespace
@@ -71,8 +71,8 @@ Lights::Reach Lights::reach_of(const Light& lamp) {
   return reach;
 }
 
-// What a surface that faces the light would get, if nothing were in the way: exact on the axis of a
-// disk and far from a sphere. Never negative, though finite differences about 0 make lights that are.
+// Estimated irradiance on a surface that faces the light, unoccluded. Exact on the axis of a disk
+// and far from a sphere. Clamped at 0, since finite differences may make radiance negative.
 double Lights::estimate(size_t light, const Vec3d& p) const {
   if (chosen_by_) return chosen_by_->estimate(light, p);
   if (light >= reaches_.size()) {
@@ -159,7 +159,7 @@ size_t Lights::choose(const Place& place, double u) const {
 void Lights::sample(std::span<const Draw> draws, std::span<const Numbers> u) const {
   DCHECK_LE(draws.size(), kMostDraws);
   DCHECK_EQ(draws.size(), u.size());
-  // What the environment draws, it draws at once.
+  // Samples of the environment are collected and drawn as one batch.
   Environment::Numbers numbers[kMostDraws];
   Environment::Drawn drawn[kMostDraws];
   size_t of[kMostDraws], count = 0;

@@ -1,4 +1,4 @@
-// The quadtree over the cells of a map, its alias table, and its density.
+// The quadtree over the cells of an environment map, its alias tables, and its density.
 #include "src/light/map_density.h"
 
 #include <algorithm>
@@ -13,11 +13,11 @@
 namespace limn {
 namespace {
 
-constexpr double kMeanShare = 1.0 / 16;  // see MapDensity
-// How much larger than the least a leaf may make the second moment of importance over density: that
-// of the whole sphere, and its own. A photographed sky at sunset, 1024 x 512, comes to 14,000 to
-// 24,000 leaves for an own share of 0.5 to 0.2 and adds 0.4 % in all; a painted one with a sun to
-// 600 leaves and 0.02 %. A third of the share of the whole gives 1.4 to 2 times the leaves.
+constexpr double kMeanShare = 1.0 / 16;  // share of the mean that is mixed in, see MapDensity
+// Limits on the excess of a leaf's second moment of importance over density: as a share of the
+// sphere's, and of its own. A photographed sunset sky, 1024 x 512, has 14,000 to 24,000 leaves for
+// an own share of 0.5 to 0.2, with 0.4 % excess in total; a painted sky with a sun has 600 leaves
+// and 0.02 %. A third of the whole's share makes 1.4 to 2 times as many leaves.
 constexpr double kExcessOfWhole = 3e-6;
 constexpr double kExcess = 0.3;
 
@@ -26,7 +26,7 @@ T mix(const std::type_identity_t<T>& a, const std::type_identity_t<T>& b, const 
   return a + (b - a) * t;
 }
 
-// Inverts the integral of the density a + (b - a) x on [0, 1], up to a factor; a + b > 0.
+// Samples the linear density a + (b - a) x on [0, 1], up to a factor; a + b > 0.
 wide::Doubles sample_linear(const wide::Doubles& a, const wide::Doubles& b,
                             const wide::Doubles& u) {
   return wide::min(u * (a + b) / (a + sqrt(a * a * (1 - u) + b * b * u)), 1);
@@ -36,7 +36,7 @@ int sum_of(const std::array<uint8_t, 4>& c) { return c[0] + c[1] + c[2] + c[3]; 
 
 }  // namespace
 
-// Decides which leaves there are, from the smallest squares up.
+// Builds the leaves bottom-up, from the smallest squares.
 class MapDensity::Builder {
  public:
   Builder(MapDensity& density, std::span<const float> importance)
@@ -71,12 +71,12 @@ class MapDensity::Builder {
     return importance_[static_cast<size_t>(y) * d_.width_ + x];
   }
 
-  // Of row y in the trapezoidal rule over cos(theta) between two rows.
+  // Weight of row y in the trapezoidal rule over cos(theta) between two rows.
   double row_weight(int y, int first, int last) const {
     return 0.5 * (d_.cos_theta_[std::max(y - 1, first)] - d_.cos_theta_[std::min(y + 1, last)]);
   }
-  // The integral of the importance over a leaf by the trapezoidal rule in azimuth and cos(theta),
-  // and by the same rule that of its square over the leaf's density.
+  // Quadrature over a leaf, by the trapezoidal rule in azimuth and cos(theta), of the importance
+  // and of its square over the leaf's density.
   struct Fit {
     double mass = 0;  // times columns per radian
     Corners corners{1, 1, 1, 1};
@@ -134,7 +134,7 @@ class MapDensity::Builder {
     return f.excess <= kExcess && f.excess * f.mass <= kExcessOfWhole * total_;
   }
 
-  // The largest side, up to the grid's, that all leaves of a square of the grid can have.
+  // The largest side, up to the grid's, that all leaves of a grid square can have.
   uint8_t uniform_leaves(int column, int row) const {
     const Patch square = d_.patch(column * kSide, row * kSide, kGridLog);
     for (int log = kGridLog; log > 0; --log) {
@@ -146,7 +146,7 @@ class MapDensity::Builder {
     }
     return 0;
   }
-  // Joins leaves of the side before.
+  // Merges leaves of the previous side.
   void merge(int log) {
     const int side = 1 << (log - kGridLog);
     for (int row = 0; row < rows_; row += side) {
@@ -194,7 +194,7 @@ class MapDensity::Builder {
       for (int x = column * kSide; x < (column + 1) * kSide; x += 1 << log) add_leaf(x, y, log);
     }
   }
-  // Beyond the border: a leaf that is never drawn, so that those of a square can be counted off.
+  // A square beyond the border gets an empty leaf, so that leaves can be indexed by position.
   void add_leaf(int x, int y, int log) {
     Leaf leaf{0,
               {1, 1, 1, 1},
@@ -209,7 +209,7 @@ class MapDensity::Builder {
       leaf.corners = f.corners;
       leaf.scale =
           static_cast<float>(f.mass * azimuth * 4 / (d_.solid_angle(leaf) * sum_of(f.corners)));
-      // Never 0 by rounding where there is something.
+      // Rounding must not make the scale of a leaf with mass 0.
       if (f.mass > 0) leaf.scale = std::max(leaf.scale, std::numeric_limits<float>::min());
     }
     d_.leaves_.push_back(leaf);
@@ -218,8 +218,8 @@ class MapDensity::Builder {
   MapDensity& d_;
   std::span<const float> importance_;
   int rows_;                     // of the grid
-  double total_ = 0;             // of `mass` over the sphere
-  std::vector<uint8_t> chosen_;  // the logarithm of the side of the leaves of each square
+  double total_ = 0;             // integral of `mass` over the sphere
+  std::vector<uint8_t> chosen_;  // log2 of the side of each square's leaves
 };
 
 MapDensity::MapDensity(int width, int height, std::span<const float> importance)
@@ -295,8 +295,8 @@ std::vector<MapDensity::Slot> MapDensity::make_slots(std::span<const double> wei
       small.push_back(rich);
     }
   }
-  // Slots left over are full but for rounding, which is far below one slot: so no item without
-  // weight is among them.
+  // The remaining slots are full up to rounding, which is far below one slot: so none of them
+  // belongs to an item of weight zero.
   for (const auto* rest : {&small, &large}) {
     for (const uint32_t i : *rest) slots[i] = {1, i};
   }
@@ -331,7 +331,7 @@ MapDensity::Drawn MapDensity::sample(const wide::Doubles& u1, const wide::Double
   const Ints l =
       choose([&](int i) { return leaves_[static_cast<size_t>(i)].slot; }, first, count, u);
   const auto leaf = [&](int i) { return leaves_[static_cast<size_t>(l[i])]; };
-  // As `patch` has it.
+  // The leaf's extent, as in `patch`.
   const Ints log = gather_ints([&](int i) { return static_cast<int32_t>(leaf(i).log); });
   const Ints side = (Ints{} + 1) << log;
   const Ints x0 = -side & gather_ints([&](int i) { return static_cast<int32_t>(leaf(i).column); });

@@ -1,6 +1,6 @@
 #pragma once
-// The density by which directions are drawn from a radiance map: few numbers, so that they stay in
-// the caches while the texels of a large map do not.
+// The sampling density of an environment map: compact enough to stay in the caches while the texels
+// of a large map do not.
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -12,35 +12,35 @@
 
 namespace limn {
 
-// Over a map of W by H texels: a point (x, y) lies x columns to the right of the center of column
-// 0, 0 <= x < W (wrapped), and y rows below the center of row 0, 0 <= y <= H - 1; rows are equally
-// spaced in the polar angle theta, from 0 to pi. The density is one in solid angle.
+// A density in solid angle over a map of W by H texels. A point (x, y) lies x columns to the right
+// of the center of column 0, 0 <= x < W (wrapped), and y rows below the center of row 0, 0 <= y <=
+// H - 1. Rows are equidistant in the polar angle theta, from 0 to pi.
 //
-// A quadtree over the cells between texels. A leaf is a square of 1 to 64 cells on a side (cut at
-// the border), drawn in proportion to the integral of the importance; within it the density is
-// bilinear in azimuth and cos(theta) through the importances at its corners, each mixed with a
-// little of the mean (where one side of a cell is black, radiance falls to zero with theta but the
-// density with cos(theta), and near a pole their ratio would grow without bound). Squares are as
-// large as the importance still follows that: a smooth sky of half a million cells has some
-// thousand leaves. The density is positive wherever the importance, bilinear between texels, is.
+// It is stored as a quadtree over the cells between texels. A leaf is a square of 1 to 64 cells per
+// side (clipped at the border), drawn in proportion to its integral of the importance. Inside, the
+// density is bilinear in azimuth and cos(theta), through the importance at the corners mixed with
+// some of the mean. (Beside a black texel radiance falls with theta, the density with cos(theta):
+// near a pole their ratio would be unbounded.) Leaves are as large as this permits. A smooth sky of
+// half a million cells has some thousand. Where the importance is positive, so is the density.
 //
-// A draw chooses a block of 64 by 64 cells, then a leaf there, each by an alias table: what is
-// bright is read often and stays at hand, while one table of all leaves would be read anywhere.
+// A draw selects a block of 64 by 64 cells, then one of its leaves, each by an alias table. The
+// data of bright blocks stay in the cache; a single table of all leaves would be accessed at
+// random.
 class MapDensity {
  public:
   // importance: height by width, finite, not negative, one at least positive; height at least 2.
   MapDensity(int width, int height, std::span<const float> importance);
 
-  // Of eight draws at once: a draw is a chain of reads, roots and divisions, most of which one
-  // alone would wait for.
+  // Eight samples at once: a single one is a chain of loads, roots and divisions with long
+  // latencies.
   struct Drawn {
     wide::Doubles x, cos_theta, pdf;  // pdf [1/sr]
   };
-  // From two numbers in [0, 1) for each.
+  // Samples from two uniform numbers in [0, 1) each.
   Drawn sample(const wide::Doubles& u1, const wide::Doubles& u2) const;
   // column, row: the cell of (x, y). cos_theta: that of y. [1/sr]
   double pdf(int column, int row, double x, double cos_theta) const;
-  // Asks for what `pdf` reads of that cell.
+  // Prefetches the data that `pdf` will read for the cell.
   void fetch(int column, int row) const {
     __builtin_prefetch(&leaf(square(column, row), column, row));
   }
@@ -48,37 +48,37 @@ class MapDensity {
   size_t leaf_count() const { return leaves_.size(); }
 
  private:
-  static constexpr int kGridLog = 3;     // the grid's squares: the smallest whose leaves may differ
-  static constexpr int kLargestLog = 6;  // the largest leaf. Both not tuned
+  static constexpr int kGridLog = 3;     // log2 of a grid square's side, the unit of leaf lookup
+  static constexpr int kLargestLog = 6;  // log2 of the largest leaf's side. Both not tuned
 
   using Corners = std::array<uint8_t, 4>;  // top left, top right, bottom left, bottom right
 
-  // One of as many equally likely slots as there are items: its first `share` belongs to the item
-  // of the slot's own index, the rest to `alias`.
+  // An alias table has as many equally likely slots as items. The first `share` of a slot belongs
+  // to the item of its index, the rest to the item `alias`.
   struct Slot {
     float share = 1;
     uint32_t alias = 0;
   };
-  // All that a draw reads of it, in one line of a cache mostly.
+  // All data of a leaf that a draw reads, mostly in one cache line.
   struct Leaf {
-    float scale;      // of `corners`, to the density before it is normalised
+    float scale;      // converts `corners` to the unnormalised density
     Corners corners;  // at least 1
     uint32_t column;  // of its first cell
     uint32_t row : 28;
-    uint32_t log : 4;  // of its side
-    Slot slot;         // of as many as its block has leaves; `alias` counts from the block's first
+    uint32_t log : 4;  // log2 of its side
+    Slot slot;         // in its block's alias table; `alias` is relative to the block
   };
-  // The leaves of a block follow each other.
+  // A block's leaves are consecutive.
   struct Block {
     uint32_t first, count;
   };
-  // A square of the grid: where its leaves begin, and the logarithm of their side. A leaf larger
-  // than the square is shared by all squares that it covers.
+  // A grid square: index of its first leaf, and log2 of its leaves' side. A leaf larger than the
+  // square is shared by all squares that it covers.
   struct Square {
     uint32_t first : 28;
     uint32_t log : 4;
   };
-  // What a leaf covers: cells [x0, x1) by [y0, y1).
+  // The extent of a leaf: cells [x0, x1) by [y0, y1).
   struct Patch {
     int x0, y0, x1, y1;
   };
@@ -89,11 +89,11 @@ class MapDensity {
   }
   const Leaf& leaf(const Square& square, int column, int row) const;
   double solid_angle(const Leaf& leaf) const;  // [sr]
-  double mass(const Leaf& leaf) const;         // its integral, before it is normalised
+  double mass(const Leaf& leaf) const;         // integral of the unnormalised density
   void build_aliases();
   static std::vector<Slot> make_slots(std::span<const double> weights, double total);
-  // The items that u chooses, from `first` on; u becomes uniform again. slot_of: the slot of an
-  // item.
+  // Items chosen by u, starting from `first`; u is rescaled to be uniform again. slot_of(item): its
+  // slot.
   template <class SlotOf>
   static wide::Ints choose(const SlotOf& slot_of, const wide::Ints& first, const wide::Ints& count,
                            wide::Doubles& u);
@@ -105,7 +105,7 @@ class MapDensity {
   HugePageVector<Leaf> leaves_;
   std::vector<Block> blocks_;
   std::vector<Slot> block_slots_;
-  double inverse_total_ = 0;  // 1 / integral over the sphere of the density before it is normalised
+  double inverse_total_ = 0;  // 1 / integral of the unnormalised density over the sphere
 };
 
 }  // namespace limn

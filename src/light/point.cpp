@@ -1,4 +1,4 @@
-// Emitter "point": the same intensity in all directions, from one point.
+// Point lights: the same intensity in all directions.
 #include <fmt/format.h>
 
 #include "src/light/types.h"

@@ -1,4 +1,4 @@
-// The list of emitter types, and what their readers share.
+// The table of emitter types, and helpers of their readers.
 #include <string>
 
 #include "src/light/types.h"
@@ -8,7 +8,7 @@ namespace {
 
 struct LightType {
   const char* name;
-  bool in_shape;  // stands inside a shape, else directly under <scene>
+  bool in_shape;  // nested in a shape, else directly under <scene>
   void (*read)(Properties& properties, Scene& scene, Shape* shape);
 };
 
@@ -55,7 +55,7 @@ void read_axes(Properties& properties, const char* what, Vec3d axes[3]) {
   const Matrix4 m = properties.transform("to_world");
   for (int c = 0; c < 3; ++c) axes[c] = {m.m[0][c], m.m[1][c], m.m[2][c]};
   const double size2 = length_squared(axes[0]);
-  constexpr double kDigits = 1e-4;  // of matrices written out by hand
+  constexpr double kDigits = 1e-4;  // tolerance for hand-written matrices
   for (int c = 0; c < 3; ++c) {
     const double across = dot(axes[c], axes[(c + 1) % 3]);
     if (!(std::fabs(across) <= kDigits * size2 &&

@@ -1,4 +1,4 @@
-// Emitter "spot": a cone of light from one point, along +Z of its own space.
+// Spot lights: a cone of light along the local +Z axis.
 #include <fmt/format.h>
 
 #include "src/light/types.h"
@@ -6,10 +6,10 @@
 namespace limn {
 namespace {
 
-// Angles are differentiable and in degrees, as in the file.
+// Differentiable angles in degrees, as in the file.
 struct Cone {
-  Dual cutoff;  // from the axis: black beyond
-  Dual beam;    // full intensity within, linear in the angle between the two
+  Dual cutoff;  // half-angle beyond which the light is black
+  Dual beam;    // half-angle of full intensity; linear falloff up to the cutoff
 };
 
 class SpotLight final : public DeltaLight {
@@ -29,7 +29,7 @@ class SpotLight final : public DeltaLight {
     std::vector<ParameterRef> list{power_parameter("intensity", intensity_),
                                    cone_parameter("cutoff_angle", cone_.cutoff),
                                    cone_parameter("beam_width", cone_.beam)};
-    // The beam stays narrower than the whole.
+    // The beam must stay narrower than the cutoff.
     list[1].least = std::nextafter(cone_.beam.v, 180);
     list[2].most = std::nextafter(cone_.cutoff.v, 0);
     append_vector_parameters("translate", position_, ParameterRef::Unit::kLength, list);

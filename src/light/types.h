@@ -1,6 +1,6 @@
 #pragma once
-// The readers that the registry lists, one per emitter type, and what they share. Each reads an
-// element into the scene; shape: the one around it, null directly under <scene>.
+// Readers of the emitter types in the registry, and their helpers. Each adds an element to the
+// scene; shape: the enclosing shape, null directly under <scene>.
 #include <optional>
 
 #include "limn/core/environment.h"
@@ -16,14 +16,14 @@ void read_envmap(Properties& properties, Scene& scene, Shape* shape);
 void read_point(Properties& properties, Scene& scene, Shape* shape);
 void read_spot(Properties& properties, Scene& scene, Shape* shape);
 
-// What leaves a delta light: 1 if absent; finite and not negative.
+// Reads the emitted power of a delta light: 1 if absent; finite and not negative.
 Rgb<Dual> read_power(Properties& properties, const char* name);
-// The columns of to_world, orthonormal: a rotation or a reflection, perhaps with one factor for all
-// axes. what: "a spot", for the error.
+// The columns of to_world, orthonormalised: a rotation or reflection with an optional uniform
+// scale. what: "a spot", for the error message.
 void read_axes(Properties& properties, const char* what, Vec3d axes[3]);
 
-// A vector turned by angles [radians] about the world's axes, x first. Angles are stored as
-// parameters that are 0 in the file, so that a rotation by any one of them is exact.
+// Rotates a vector by angles [radians] about the world axes, x first. The angles are parameters
+// that are 0 initially, so a rotation by any one of them is exact.
 template <class S>
 Vec3<S> turned(const Vec3d& v, const Vec3<Dual>& angles) {
   using std::cos;
@@ -40,7 +40,7 @@ Vec3<S> turned(const Vec3d& v, const Vec3<Dual>& angles) {
   return r;
 }
 
-// What a source of that intensity [W/sr] at `position` gives at p; none at the source itself.
+// Light arriving at p from a point source of that intensity [W/sr]; nothing at the source itself.
 template <class S>
 std::optional<Arrival<S>> arrival_from(const Vec3<S>& position, const Rgb<S>& intensity,
                                        const Vec3<S>& p) {
@@ -51,11 +51,11 @@ std::optional<Arrival<S>> arrival_from(const Vec3<S>& position, const Rgb<S>& in
   return Arrival<S>{w / sqrt(squared), intensity * (1.0 / squared)};
 }
 
-// What read_power() reads.
+// The parameter for a value that read_power() has read.
 inline ParameterRef power_parameter(const char* name, Rgb<Dual>& c) {
   return {name, {&c.r, &c.g, &c.b}, ParameterRef::Unit::kValue, 0};
 }
-// NAME.x, NAME.y, NAME.z
+// Appends NAME.x, NAME.y, NAME.z.
 void append_vector_parameters(const char* name, Vec3<Dual>& v, ParameterRef::Unit unit,
                               std::vector<ParameterRef>& parameters);
 

@@ -1,4 +1,4 @@
-// Normals of vertices for any shading.
+// Vertex normals for displacement, independent of the shading normals.
 #include "limn/core/displacement.h"
 
 namespace limn {

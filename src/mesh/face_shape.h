@@ -1,5 +1,5 @@
 #pragma once
-// What shading normals are made of: normals and angles of faces, tilts, and where sums cancel.
+// Building blocks of shading normals: face normals and angles, tilts, cancellation.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -39,7 +39,7 @@ template <class S>
 FaceShape<S> face_shape(const Mesh& mesh, FaceId face) {
   using std::atan2;
   const FaceIndices& f = mesh.face(face);
-  // Copies of a vertex move together: the first one stands for all.
+  // Welded vertices move together: positions are those of the first copy.
   std::array<Vec3<S>, 3> p;
   for (int i = 0; i < 3; ++i) p[i] = position_as<S>(mesh, VertexId(mesh.weld[f[i]]));
   const Vec3<S> a = p[1] - p[0], b = p[2] - p[0], c = p[2] - p[1];
@@ -54,15 +54,15 @@ FaceShape<S> face_shape(const Mesh& mesh, FaceId face) {
   return shape;
 }
 
-// How much of a sum of face normals may be rounding alone, or is too little to say a direction.
-// noise: the sum of angles times roundings; angles: their sum.
+// The share of a sum of face normals below which its direction is meaningless: rounding or
+// cancellation. noise: sum of angles times roundings; angles: their sum.
 inline double rest_of_cancelled(double noise, double angles) {
   return std::max(64 * std::numeric_limits<double>::epsilon(), std::min(noise, 0x1.0p-10 * angles));
 }
 
-// Sine of the tilt of a corner's normal against its face; 1 if it is no less than a right angle.
-// The sine is the length of the cross product, which is exact where sqrt(1 - cos^2) would lose all
-// digits.
+// Sine of the angle between a corner's normal and its face; 1 from a right angle on. It
+// is the length of the cross product, which is accurate where sqrt(1 - cos^2) would
+// cancel.
 template <class S>
 S sine_of_tilt(const Vec3<S>& normal, const Vec3<S>& face_normal) {
   if (value(dot(normal, face_normal)) <= 0) return S(1);
@@ -70,8 +70,8 @@ S sine_of_tilt(const Vec3<S>& normal, const Vec3<S>& face_normal) {
   return sine < 1.0 ? sine : S(1);
 }
 
-// How far rounding may have turned the normal of a face against that of a corner [rad]. At most
-// what leaves the derivative of a mesh far from the origin its meaning; not tuned.
+// Rounding error of the angle between a face and its corner normal [rad], limited so that
+// derivatives of meshes far from the origin stay meaningful; not tuned.
 inline double tilt_rounding(double face, double corner) {
   return std::min(0x1.0p-16, face + corner);
 }

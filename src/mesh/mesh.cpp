@@ -1,4 +1,4 @@
-// Welded positions, shading normals and horizons, with their derivatives.
+// Welding, shading normals and horizons, with their derivatives.
 #include "limn/core/mesh.h"
 
 #include <algorithm>
@@ -48,15 +48,15 @@ std::vector<FaceShape<S>> face_shapes(const Mesh& mesh) {
   return shapes;
 }
 
-// Shading normals as the scalar S carries them: N of them, and per vertex the horizon.
+// Shading normals (N) and horizons (V) in the scalar type S.
 template <class S>
 struct ShadingNormals {
   std::vector<Vec3<S>> normals;
   std::vector<S> horizon;
-  size_t cancelled = 0;  // see computed_normals
+  size_t cancelled = 0;  // number of cancelled sums, see computed_normals
 };
 
-// Slots of the computed normals: one per welded vertex that a face uses.
+// Normal indices of a mesh with computed normals: one per welded vertex in use.
 void assign_normal_ids(Mesh& mesh) {
   std::vector<uint32_t> slot(mesh.positions.size(), kUnused);
   mesh.normal_ids.resize(mesh.faces.size());
@@ -71,11 +71,11 @@ void assign_normal_ids(Mesh& mesh) {
   mesh.normals.assign(count, Vec3d{});
 }
 
-// Sums of face normals weighted by corner angles (Thuermer and Wuethrich 1998), normalised. Where
-// they cancel (fins around an axis, a sheet that is folded onto itself) to a thousandth and to what
-// rounding may have left of it, any face's normal serves: the direction of the rest says nothing,
-// and its derivative has no bound. A vertex of faces without area alone gets +Z, which nothing ever
-// reads. cancelled: how many cancel.
+// Angle-weighted sums of face normals (Thuermer and Wuethrich 1998), normalised. A sum may cancel
+// (fins around an axis, a sheet folded onto itself) to a thousandth, or to the rounding error. Its
+// direction is then arbitrary and its derivative unbounded, so the normal of one face is used. A
+// vertex with degenerate faces only gets +Z, which is never used. cancelled: number of such
+// vertices.
 template <class S>
 std::vector<Vec3<S>> computed_normals(const Mesh& mesh, const std::vector<FaceShape<S>>& shapes,
                                       size_t& cancelled) {
@@ -119,7 +119,7 @@ std::vector<Vec3<S>> stored_normals(const Mesh& mesh) {
   return normals;
 }
 
-// Calls visit(root, sine, rounding) for the tilt of each corner of a face, at each of its vertices.
+// Calls visit(root, sine, rounding) for the tilt of each corner of a face.
 template <class S, class Visit>
 void for_every_tilt(const Mesh& mesh, const std::vector<FaceShape<S>>& shapes,
                     const std::vector<Vec3<S>>& normals, const std::vector<double>& noise,
@@ -134,10 +134,10 @@ void for_every_tilt(const Mesh& mesh, const std::vector<FaceShape<S>>& shapes,
   }
 }
 
-// The derivative of a maximum at a tie depends on the side. The mean of both sides stands for it,
-// the middle between the least and the largest of those that tie: what central differences come to.
-// In symmetric meshes ties are everywhere, but for the rounding of positions: what may be the
-// largest, as far as that goes, ties.
+// At a tie the derivative of a maximum is one-sided. The mean of the least and the largest slope
+// among the tied corners replaces it, which is the limit of central differences. Symmetric
+// meshes have many ties up to the rounding of positions, so values within rounding of the
+// maximum tie.
 void average_tied_slopes(const Mesh& mesh, const std::vector<FaceShape<Dual>>& shapes,
                          const std::vector<Vec3<Dual>>& normals, std::vector<Dual>& horizon) {
   std::vector<double> noise(normals.size());
@@ -188,8 +188,8 @@ void store_tangents(Mesh& mesh, const ShadingNormals<Dual>& from) {
   for (size_t i = 0; i < from.horizon.size(); ++i) mesh.horizon_tangents[i] = from.horizon[i].d;
 }
 
-// Whether all vertices have one velocity, to the bit: then no face turns, and all derivatives of
-// normals and horizons are zero.
+// True if all vertices have the same velocity, bit for bit. Then all derivatives of normals and
+// horizons are zero.
 bool moves_as_one(const Mesh& mesh) {
   const auto& tangents = mesh.position_tangents;
   const auto alike = [&](const Vec3<Lanes>& t) {

@@ -1,4 +1,4 @@
-// From what a mesh file says to a checked mesh: transform, weld, mend, normals.
+// Converts a mesh as read from a file to a checked mesh: transform, weld, repair, normals.
 #include "src/mesh/mesh_build.h"
 
 #include <algorithm>
@@ -52,15 +52,15 @@ size_t keep_faces(Mesh& mesh, const Keep& keep) {
   return dropped;
 }
 
-// The vertex that stands for all that are welded to v, directly or not.
+// The representative of all vertices that are welded to v, directly or indirectly.
 uint32_t root_of(const Mesh& mesh, uint32_t v) {
   while (mesh.weld[v] != v) v = mesh.weld[v];
   return v;
 }
 
-// Corners of a face that are nearer to each other than a billionth of its longest side become one:
-// nobody sees such a face, and its sides cannot be told apart in double precision, so that its
-// edges would not cancel.
+// Merges corners of a face that are closer than a billionth of its longest side. Such a face
+// is invisible, and double precision cannot resolve its sides, so its edges would not
+// cancel.
 void weld_needles(Mesh& mesh) {
   constexpr double kThin = 0x1.0p-30;  // not tuned
   const auto position = [&](uint32_t v) { return cast<double>(mesh.positions[v]); };
@@ -81,7 +81,7 @@ void weld_needles(Mesh& mesh) {
   for (uint32_t v = 0; v < mesh.weld.size(); ++v) mesh.weld[v] = root_of(mesh, v);
 }
 
-// Keeps the faces whose corners are at three distinct positions.
+// Removes faces with two corners at one position.
 void drop_collapsed(Mesh& mesh) {
   mesh.collapsed_faces += keep_faces(mesh, [&](size_t f) {
     const FaceIndices& face = mesh.faces[f];
@@ -90,7 +90,7 @@ void drop_collapsed(Mesh& mesh) {
   });
 }
 
-// Faces with the corners and the winding of an earlier one: rays would meet either.
+// Removes faces with the corners and orientation of an earlier face: rays could hit either.
 size_t drop_repeated(Mesh& mesh) {
   std::vector<std::pair<FaceIndices, uint32_t>> faces;
   faces.reserve(mesh.faces.size());
@@ -113,8 +113,8 @@ Vec3d doubled_area(const Mesh& mesh, size_t face) {
   return cross(cast<double>(mesh.positions[f[1]]) - p, cast<double>(mesh.positions[f[2]]) - p);
 }
 
-// Normals in world space. A corner without one (or with one that is zero or not finite) gets the
-// normal of its face.
+// Normals in world space. A corner without a valid normal (missing, zero or not finite) gets the
+// face normal.
 void set_given_normals(Mesh& mesh, const RawMesh& raw, const MeshOptions& options,
                        std::vector<std::string>* warnings) {
   std::vector<bool> usable(raw.normals.size());
@@ -139,7 +139,7 @@ void set_given_normals(Mesh& mesh, const RawMesh& raw, const MeshOptions& option
       id = face_normal;
     }
   }
-  // What no corner refers to any more must still be a unit vector.
+  // Unused normals must be unit vectors, too.
   for (size_t i = 0; i < usable.size(); ++i) {
     if (!usable[i]) mesh.normals[i] = {0, 0, 1};
   }
@@ -151,8 +151,8 @@ void set_given_normals(Mesh& mesh, const RawMesh& raw, const MeshOptions& option
   }
 }
 
-// Normals that point away from their faces make a surface black or transparent-looking: a file
-// whose winding and normals disagree is worth a word.
+// Warns about normals that point away from their faces: the surface would look black or
+// transparent.
 void check_orientation(const Mesh& mesh, const SourceLocation& where,
                        std::vector<std::string>* warnings) {
   uint64_t opposed = 0, counted = 0;
@@ -172,7 +172,7 @@ void check_orientation(const Mesh& mesh, const SourceLocation& where,
                        : std::to_string(opposed) + " of " + std::to_string(counted) + " faces"));
 }
 
-// Welds, and leaves out what is no face: from positions, faces and ids of normals alone.
+// Welds vertices and removes invalid faces, given positions, faces and normal indices.
 void mend(Mesh& mesh, const SourceLocation& where, std::vector<std::string>* warnings) {
   const std::string all = std::to_string(mesh.faces.size());
   weld_positions(mesh);

@@ -1,5 +1,5 @@
 #pragma once
-// From what a mesh file says to a checked mesh in world space.
+// Converts a mesh as read from a file to a checked mesh in world space.
 #include <string>
 #include <vector>
 
@@ -10,37 +10,37 @@ namespace limn {
 
 inline constexpr uint32_t kNoNormal = UINT32_MAX;
 
-// A mesh as read: double precision, indices checked, polygons split into triangles.
+// A mesh as read: double precision, valid indices, polygons triangulated.
 struct RawMesh {
   SourceLocation where;                 // the file, or the element of a built-in shape
   std::vector<Vec3d> positions;         // V, finite
   std::vector<FaceIndices> faces;       // F by 3, into positions
-  std::vector<Vec3d> normals;           // N, of any length; not finite or zero: unusable
+  std::vector<Vec3d> normals;           // N, of any length; unusable if not finite or zero
   std::vector<FaceIndices> normal_ids;  // F by 3, into normals or kNoNormal; empty if no normals
-  // The first position with a coordinate beyond kLargestCoordinate, and where it stands, if the
-  // file has lines and such a one.
+  // The first position beyond kLargestCoordinate, if any, and its location, if the file has
+  // lines.
   size_t far_position = SIZE_MAX;
   SourceLocation far_where = {};
 };
 
-// update_shading_normals, and at how many vertices computed normals are none of their own because
-// the normals around them cancel.
+// update_shading_normals; returns the number of vertices whose adjacent normals cancel, so that a
+// face normal was used.
 size_t fill_shading_normals(Mesh& mesh);
 
 struct MeshOptions {
   Matrix4 to_world;           // invertible
   bool face_normals = false;  // ignore normals, flat shading
-  bool flip_normals = false;  // reverse faces and normals
+  bool flip_normals = false;  // reverse orientation and normals
 };
 
-// Whether the transform is a reflection, whatever it is beside that.
+// True if the transform is a reflection (possibly combined with other transforms).
 bool mirrors(const Matrix4& to_world);
 
-// The transform acts in double precision before positions are rounded to float. Where it mirrors,
-// computed normals and those of faces turn with the winding, so that the outside is inside, as in
-// Mitsuba up to 3.9; given normals keep their outside, and the faces are wound anew.
-// Faces whose corners coincide, to a billionth of their longest side, are left out. What was mended
-// is appended to `warnings` (may be null). InputError if no face is left or a position lies beyond
+// Transforms in double precision before positions are rounded to float. A reflection
+// turns computed normals and face orientation inside out, as in Mitsuba up to 3.9;
+// normals from a file keep their side, and faces are reoriented. Faces whose corners
+// coincide, up to a billionth of their longest side, are removed. Appends repairs to
+// `warnings` (may be null). InputError if no face is left or a position is beyond
 // kLargestCoordinate.
 Mesh build_mesh(const RawMesh& raw, const MeshOptions& options, std::vector<std::string>* warnings);
 

@@ -1,4 +1,4 @@
-// Mesh files by the ending of their names, and vector fields on the vertices of a mesh.
+// Mesh files by extension, and vector fields on a mesh's vertices.
 #include "src/mesh/mesh_file.h"
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// Polygons as triangles: fans, halves, or ears.
+// Triangulation of polygons: fans, bisection, or ear clipping.
 #include "src/mesh/polygon.h"
 
 #include <algorithm>
@@ -12,13 +12,13 @@ namespace {
 using Corners = std::vector<Vec3d>;
 using Triangles = std::vector<std::array<uint32_t, 3>>;
 
-// All triangles of a fan meet at a corner, and whoever looks for pairs that meet finds the square
-// of their number.
+// All triangles of a fan share a corner. Searches for touching pairs take quadratic time in their
+// number.
 constexpr size_t kLargestFan = 64;  // not tuned
 
 Vec3d doubled_area(const Vec3d& a, const Vec3d& b, const Vec3d& c) { return cross(b - a, c - a); }
 
-// Newell's normal: twice the area's vector.
+// Newell's normal: twice the area vector.
 Vec3d polygon_area(const Corners& p) {
   Vec3d area;
   for (size_t i = 2; i < p.size(); ++i) area += doubled_area(p[0], p[i - 1], p[i]);
@@ -46,8 +46,8 @@ Triangles halves(size_t count) {
   return triangles;
 }
 
-// Where no triangle is wound against the polygon, they cover it once. What is wound against it by
-// less than a billionth of its area is rounding.
+// If no triangle has the opposite orientation, the triangles cover the polygon once. Opposite area
+// below a billionth of the polygon's is rounding.
 bool folds(const Corners& p, const Triangles& triangles) {
   const Vec3d area = polygon_area(p);
   const double least = -1e-9 * dot(area, area);
@@ -56,8 +56,8 @@ bool folds(const Corners& p, const Triangles& triangles) {
   });
 }
 
-// Clips corners whose triangle holds no other corner (Meisters 1975), seen along the polygon's
-// normal.
+// Ear clipping, seen along the polygon's normal: removes corners whose triangle holds no other
+// corner (Meisters 1975).
 class EarClipper {
  public:
   explicit EarClipper(const Corners& corners) {
@@ -75,7 +75,7 @@ class EarClipper {
     Triangles triangles;
     size_t at = 0;
     while (left_.size() > 2) {
-      // A polygon that does not cross itself always has an ear: without one, any corner will do.
+      // A simple polygon always has an ear. Where none is found, any corner is clipped.
       size_t tries = simple_ ? 0 : left_.size();
       while (tries < left_.size() && !is_ear(at % left_.size())) ++at, ++tries;
       simple_ = tries < left_.size();

@@ -1,5 +1,5 @@
 #pragma once
-// Polygons as triangles.
+// Triangulation of polygons.
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -8,13 +8,13 @@
 
 namespace limn {
 
-// Ears take a time of their number's square.
+// Ear clipping takes quadratic time.
 inline constexpr size_t kMaxConcaveCorners = 4096;  // not tuned: some hundredths of a second
 
-// The corners.size() - 2 triangles of a polygon, as numbers of its corners, wound as it is; none if
-// it is concave and has more than kMaxConcaveCorners. Where that folds no triangle over, up to 64
-// corners are a fan from the first one, and more are halved again and again, so that few triangles
-// share a corner; else ears are clipped. A polygon that crosses itself gets some triangles.
+// The corners.size() - 2 triangles of a polygon, as indices of its corners, in its orientation;
+// none if it is concave with more than kMaxConcaveCorners corners. If no triangle folds over: a fan
+// up to 64 corners, recursive bisection above (so few triangles share a corner). Else ear clipping.
+// A self-intersecting polygon gets arbitrary triangles.
 std::vector<std::array<uint32_t, 3>> split_polygon(const std::vector<Vec3d>& corners);
 
 }  // namespace limn

@@ -1,12 +1,12 @@
 #pragma once
-// Derivatives of shading normals alone.
+// Derivatives of shading normals.
 #include "limn/core/mesh.h"
 
 namespace limn {
 
-// Fills normal_tangents and horizon_tangents after a change of position_tangents or, of normals
-// from the file, of theirs; the rest must be as update_shading_normals leaves it. Both are empty
-// where all vertices move as one.
+// Updates normal_tangents and horizon_tangents after a change of position_tangents (or of the
+// tangents of normals from a file); the rest must be up to date. Both are empty if all vertices
+// move alike.
 void update_shading_tangents(Mesh& mesh);
 
 }  // namespace limn

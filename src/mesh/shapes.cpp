@@ -1,4 +1,4 @@
-// Mitsuba's built-in shapes as meshes.
+// Mitsuba's built-in shapes as triangle meshes.
 #include <array>
 #include <cmath>
 #include <map>
@@ -9,13 +9,13 @@ namespace limn {
 
 namespace {
 
-// Sides of the polygon that stands for a disk: its area is 1e-4 less than the disk's.
+// Number of sides of a disk's polygon: its area is 1e-4 below the disk's.
 constexpr uint32_t kDiskSides = 256;
-// Times the icosahedron's faces are split in four: 5120 faces; the surface lies up to 1.2e-3 radii
-// inside the sphere.
+// Number of subdivisions of the icosahedron: 5120 faces, up to 1.2e-3 radii inside the
+// sphere.
 constexpr int kSphereSplits = 4;
 
-// A sphere of triangles whose vertices are their own normals.
+// A triangulated sphere whose vertices equal their normals.
 struct SphereBuilder {
   std::vector<Vec3d> points;
   std::vector<FaceIndices> faces;

@@ -1,4 +1,4 @@
-// Copies of a vertex along an open seam that differ by the rounding of their positions.
+// Welds vertices along open seams whose positions differ by rounding.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -21,8 +21,8 @@ uint64_t mixed(uint64_t x) {
   return x ^ x >> 33;
 }
 
-// Vertices (the first of their copies) at which some side of a face has no opposite. Opposite sides
-// cancel in a sum of random numbers, one for each edge, so nothing is sorted.
+// Vertices (first copies) at which some side of a face has no opposite side. Opposite sides cancel
+// in a sum of random numbers, one per edge, which avoids sorting.
 std::vector<uint32_t> open_vertices(const Mesh& mesh) {
   std::vector<uint64_t> sums(mesh.positions.size());
   for (const FaceIndices& face : mesh.faces) {
@@ -39,7 +39,7 @@ std::vector<uint32_t> open_vertices(const Mesh& mesh) {
   return open;
 }
 
-// Sets of open vertices that are within the rounding of their positions of one another.
+// Sets of open vertices that are equal up to the rounding of their positions.
 class SeamWelder {
  public:
   explicit SeamWelder(Mesh& mesh) : mesh_(mesh), open_(open_vertices(mesh)) {}
@@ -61,9 +61,9 @@ class SeamWelder {
  private:
   using Cell = std::array<int64_t, 3>;
 
-  // A position is taken to have been rounded to float twice (in the file, and after its transform),
-  // each time by half a step of a coordinate as large as its face's largest: it is off by at most
-  // sqrt(3) 2^-23 of that.
+  // The rounding error of a position: it is rounded to float twice (in the file, and after its
+  // transform), by half a unit in the last place of the face's largest coordinate each time; at
+  // most sqrt(3) 2^-23 of that coordinate.
   void measure() {
     tolerances_.assign(mesh_.positions.size(), 0);
     for (const FaceIndices& face : mesh_.faces) {
@@ -77,8 +77,8 @@ class SeamWelder {
     }
   }
 
-  // Cells of size 2^level are no smaller than the distance at which the vertex still meets others
-  // of its level or below.
+  // Grid level of a vertex: cells of size 2^level are at least as large as the distance at which it
+  // welds to vertices of its level or below.
   int level(uint32_t v) const { return std::ilogb(tolerances_[v]) + 2; }
 
   Cell cell(uint32_t v, int level) const {
@@ -89,7 +89,7 @@ class SeamWelder {
     return cell;
   }
 
-  // Joins vertices of this level with those of no higher level.
+  // Joins vertices of this level with those of the same or lower levels.
   void join_neighbours(int l) {
     std::vector<std::pair<Cell, uint32_t>> places;
     for (const uint32_t v : open_)
@@ -100,7 +100,7 @@ class SeamWelder {
       const Cell center = cell(u, l);
       for (int dx = -1; dx <= 1; ++dx)
         for (int dy = -1; dy <= 1; ++dy) {
-          // Cells of a row follow each other.
+          // Cells of a row are consecutive.
           const Cell row{center[0] + dx, center[1] + dy, center[2] - 1};
           for (auto i = std::lower_bound(places.begin(), places.end(), std::pair(row, 0u));
                i != places.end() && i->first[0] == row[0] && i->first[1] == row[1] &&
@@ -127,10 +127,10 @@ class SeamWelder {
     return v;
   }
 
-  // A face that collapses is a needle between copies of a pole, and its neighbours meet when it is
-  // gone. Where that is not so, faces are as small as the rounding, and their corners stay apart.
+  // A collapsing face is a sliver between copies of a pole, and its neighbours connect without it.
+  // Otherwise its faces are as small as the rounding, and their corners stay apart.
   void dissolve_small_faces() {
-    std::map<Side, bool> long_sides;  // of needles, and whether they have another face
+    std::map<Side, bool> long_sides;  // long sides of slivers: whether they have another face
     std::vector<std::pair<Side, uint32_t>> needles;
     std::vector<bool> small(mesh_.positions.size());
     for (const FaceIndices& face : mesh_.faces)
@@ -138,7 +138,7 @@ class SeamWelder {
         const uint32_t a = mesh_.weld[face[k]], b = mesh_.weld[face[(k + 1) % 3]];
         if (a == b || root(a) != root(b)) continue;
         const uint32_t tip = mesh_.weld[face[(k + 2) % 3]];
-        constexpr double kSharp = 1024;  // longer than wide; not tuned
+        constexpr double kSharp = 1024;  // length / width; not tuned
         if (distance(a, tip) <= kSharp * (tolerances_[a] + tolerances_[b])) small[root(a)] = true;
         needles.push_back({side(a, tip), root(a)});
         long_sides[side(a, tip)] = false;
@@ -168,7 +168,7 @@ class SeamWelder {
   Mesh& mesh_;
   std::vector<uint32_t> open_;
   std::vector<double> tolerances_;  // V
-  std::vector<uint32_t> roots_;     // V, a forest; roots are the smallest of their sets
+  std::vector<uint32_t> roots_;     // V; union-find parents, with the smallest index as root
 };
 
 }  // namespace

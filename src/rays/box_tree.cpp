@@ -1,4 +1,4 @@
-// A tree over boxes, to find pairs that overlap.
+// A bounding volume hierarchy over boxes that finds overlapping pairs.
 #include "limn/core/box_tree.h"
 
 #include <algorithm>
@@ -67,7 +67,7 @@ BoxTree::BoxTree(std::span<const FloatBox> boxes, int threads)
   packed_.resize(leaves_);
   order_.resize(boxes.size());
   const Part root{0, 0, leaves_};
-  const uint32_t smallest = std::max(leaves_ / 32, 1u);  // some parts for each thread; not tuned
+  const uint32_t smallest = std::max(leaves_ / 32, 1u);  // several parts per thread; not tuned
   std::vector<Part> parts;
   split(root, smallest, parts);
   parallel_for(parts.size(), threads, [&](size_t i) { build(parts[i]); });
@@ -85,7 +85,7 @@ void BoxTree::split(const Part& part, uint32_t smallest, std::vector<Part>& part
   split(part.right(), smallest, parts);
 }
 
-// At the median along the axis on which the centers spread most.
+// Splits at the median, along the axis on which the centers spread most.
 void BoxTree::halve(const Part& part) {
   const auto begin = items_.begin() + part.first * kLeaf;
   const auto end =
@@ -142,7 +142,7 @@ void BoxTree::find_leaves(const FloatBox& box, uint32_t first,
                           std::vector<uint32_t>& leaves) const {
   leaves.clear();
   if (leaves_ == 0) return;
-  std::array<Part, 64> stack;  // the tree is balanced: twice as many leaves, one more
+  std::array<Part, 64> stack;  // depth is bounded: the tree is balanced
   size_t depth = 0;
   stack[depth++] = {0, 0, leaves_};
   while (depth > 0) {

@@ -1,4 +1,4 @@
-// Every face tested in double precision: the oracle for Embree.
+// Brute-force ray tracing in double precision: the reference for Embree.
 #include <algorithm>
 
 #include "limn/core/face_overlaps.h"
@@ -6,8 +6,8 @@
 namespace limn {
 namespace {
 
-// Distance along the ray to the triangle, negative if it misses. Signs of three determinants, as in
-// Moeller and Trumbore 1997.
+// Distance along the ray to the triangle; negative for a miss. Uses the determinants of Moeller and
+// Trumbore 1997.
 double intersect(const Ray& ray, const Vec3d& a, const Vec3d& b, const Vec3d& c) {
   const Vec3d e1 = b - a;
   const Vec3d e2 = c - a;

@@ -1,4 +1,4 @@
-// The one door to Embree 3.
+// Ray tracing with Embree 3; the only file that includes it.
 #include <embree3/rtcore.h>
 
 #include <algorithm>
@@ -19,15 +19,15 @@ namespace limn {
 namespace {
 
 struct Context {
-  RTCIntersectContext base;  // first: Embree hands back a pointer to it
+  RTCIntersectContext base;  // must be first: Embree passes back a pointer to it
   const Ray* ray;
   const Scene* scene;
   const FaceCopies* copies;
-  // Faces that overlap the one where the ray starts, and the one where it ends, or are near to it.
+  // Coplanar and near faces of the ray's start face and of its end face.
   std::span<const FaceRef> beside_start, beside_end;
 };
 
-// Whether the ray skips a face that stands for copies: what skips one of them skips all.
+// True if the ray ignores the set of duplicates that `face` represents.
 bool is_skipped_place(const Context& context, FaceRef face) {
   const Ray& ray = *context.ray;
   const auto is_here = [&](FaceRef other) {
@@ -52,20 +52,20 @@ bool is_skipped(const Context& context, FaceRef face) {
 
 void reject_skipped(const RTCFilterFunctionNArguments* arguments) {
   const auto& context = *reinterpret_cast<const Context*>(arguments->context);
-  // Only single rays are traced.
+  // Rays are traced one at a time.
   const FaceRef face{ShapeId(RTCHitN_geomID(arguments->hit, 1, 0)),
                      FaceId(RTCHitN_primID(arguments->hit, 1, 0))};
   if (is_skipped(context, face)) arguments->valid[0] = 0;
 }
 
 RTCRay to_embree(const Ray& ray, const Vec3d& origin) {
-  // The only place where rays reach Embree, which may crash or abort on others.
+  // The only place where rays enter Embree, which may crash on invalid ones.
   if (!is_traceable(ray)) [[unlikely]]
     throw UntraceableRay();
-  // Float directions of unit length are this near to it.
+  // The rounding error of a unit direction in floats is below this.
   DCHECK_LE(std::fabs(length_squared(ray.direction) - 1), 0x1p-20);
-  // Four numbers at a time, as Embree reads them: four single stores would have to be in the cache
-  // before they could be read together.
+  // Writes four numbers at once, as Embree reads them: four narrow stores would stall its wide
+  // load.
   using Four [[gnu::vector_size(16)]] = float;
   const Four from = {static_cast<float>(ray.origin.x - origin.x),
                      static_cast<float>(ray.origin.y - origin.y),
@@ -83,15 +83,15 @@ RTCRay to_embree(const Ray& ray, const Vec3d& origin) {
   return r;
 }
 
-// Zero on every axis but those along which the scene lies far from the origin for its size. Floats
-// between half of this and twice this lose nothing when it is subtracted (Sterbenz 1974), and the
-// origins of rays are no longer rounded to steps as coarse as the positions'.
+// The origin of Embree's coordinates: nonzero on axes where the scene is far from 0 compared with
+// its size. Subtraction is exact for floats between half and twice this value (Sterbenz 1974). Ray
+// origins thus keep their precision.
 Vec3d origin_of(const Scene& scene) {
   const Bounds bounds = bounds_of(scene);
   Vec3d origin;
   if (scene.shapes.empty()) return origin;
   const Vec3d center = bounds.center();
-  constexpr double kFar = 8;  // diagonals; at least 1 for Sterbenz, beyond that not tuned
+  constexpr double kFar = 8;  // in diagonals; must be at least 1 (Sterbenz), else not tuned
   for (int k = 0; k < 3; ++k)
     if (std::fabs(center[k]) > kFar * bounds.diagonal()) origin[k] = static_cast<float>(center[k]);
   return origin;
@@ -105,10 +105,10 @@ struct Release {
 template <class Handle>
 using Owned = std::unique_ptr<std::remove_pointer_t<Handle>, Release>;
 
-// What Embree reported, first of all. It may report from any of its threads.
+// Embree's first error message. Any of its threads may report.
 class EmbreeErrors {
  public:
-  // The callback; `self` is an EmbreeErrors.
+  // Embree's callback; `self` is an EmbreeErrors.
   static void note(void* self, RTCError /*code*/, const char* text) {
     auto& errors = *static_cast<EmbreeErrors*>(self);
     const std::lock_guard lock(errors.mutex_);
@@ -186,7 +186,7 @@ class EmbreeTracer final : public RayTracer {
   }
 
  private:
-  // By a face in the place where it ends, or near to where it starts or ends.
+  // True if a coplanar or near face of the ray's end, or a near face of its start, occludes it.
   bool is_hidden_by_near(const Ray& ray) const {
     if (ray.end.shape.valid() &&
         (overlaps_.is_hidden(ray.end, ray) || overlaps_.arrives_hidden(ray)))
@@ -194,8 +194,8 @@ class EmbreeTracer final : public RayTracer {
     Hit hit{{}, ray.t_max};
     return overlaps_.leave(ray, hit);
   }
-  // Relative to a ray's origin Embree rounds corners, and might meet a line. Of copies the first
-  // one stands for all.
+  // Embree receives faces with area only (it rounds corners relative to the ray's origin and could
+  // hit a line), and of duplicates the representative.
   bool is_traced(const Mesh& mesh, FaceRef face) const {
     return has_area(mesh, mesh.face(face.face)) && copies_.first(face) == face;
   }
@@ -239,9 +239,9 @@ class EmbreeTracer final : public RayTracer {
   std::shared_ptr<const FacesInPlace> faces_;
   const FaceCopies& copies_;
   const FaceOverlaps& overlaps_;
-  bool settles_;         // whether faces lie in one place
-  Vec3d origin_;         // of Embree's coordinates
-  EmbreeErrors errors_;  // before what reports to it
+  bool settles_;         // duplicates, coplanar or near faces exist
+  Vec3d origin_;         // origin of Embree's coordinates
+  EmbreeErrors errors_;  // must be declared before the device that reports to it
   Owned<RTCDevice> device_;
   Owned<RTCScene> rtc_scene_;
 };

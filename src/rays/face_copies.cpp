@@ -1,4 +1,4 @@
-// Faces in one place, found by a number for their corners.
+// Finds duplicate faces by hashing their corners.
 #include "limn/core/face_copies.h"
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace {
 
 using Corners = std::array<Vec3f, 3>;
 
-// As a mesh's face lists them, from the least one on.
+// Corners in the face's order, starting with the least.
 Corners corners_of(const Scene& scene, FaceRef ref) {
   const Mesh& mesh = scene.shape(ref.shape).mesh;
   const FaceIndices& face = mesh.face(ref.face);
@@ -35,7 +35,7 @@ bool wind_opposite(const Corners& a, const Corners& b) {
   return a[0] == b[0] && a[1] == b[2] && a[2] == b[1];
 }
 
-// The same for the same corners in any order.
+// A hash that is independent of the order of corners.
 uint64_t number_of(const Corners& corners) {
   uint64_t sum = 0;
   for (const Vec3f& x : corners) {
@@ -77,7 +77,7 @@ FaceCopies::FaceCopies(const Scene& scene) : scene_(scene) {
   size_t count = 0;
   for (const Shape& shape : scene.shapes) count += shape.mesh.faces.size();
   numbers.reserve(count);
-  // Most numbers share their last bits with no other's, and need not be sorted.
+  // Most hashes are unique in their low bits, which bit sets detect without sorting.
   std::vector<bool> met(16 * std::bit_ceil(count)), met_again(met.size());
   const auto bits = [&](uint64_t number) { return number & (met.size() - 1); };
   for (uint32_t s = 0; s < scene.shapes.size(); ++s)
@@ -95,7 +95,7 @@ FaceCopies::FaceCopies(const Scene& scene) : scene_(scene) {
     end = begin + 1;
     while (end < numbers.size() && numbers[end].first == numbers[begin].first) ++end;
     if (end == begin + 1) continue;
-    std::vector<FaceRef> set;  // of those that have the number, all but strangers
+    std::vector<FaceRef> set;  // duplicates among faces of equal hash
     for (size_t i = begin; i < end; ++i)
       if (are_copies(scene, numbers[begin].second, numbers[i].second))
         set.push_back(numbers[i].second);

@@ -1,5 +1,5 @@
-// Faces that overlap in a plane or nearly, from a tree over their boxes: no line within the plane
-// parts them.
+// Finds coplanar and near faces by a tree over bounding boxes and separating lines within the
+// plane.
 #include "limn/core/face_overlaps.h"
 
 #include <algorithm>
@@ -35,7 +35,7 @@ bool lies_in_plane(const Corners& corners, const Vec3d& x, const Vec3d& n, doubl
   });
 }
 
-// Whether `b` lies beyond a side of `a`, but for what `tolerance` explains.
+// True if a side of `a` separates `b` from it, up to `tolerance`.
 bool lies_beside(const Corners& a, const Vec3d& n, const Corners& b, double tolerance) {
   for (int k = 0; k < 3; ++k) {
     const Vec3d inward = normalize(cross(n, a[(k + 1) % 3] - a[k]));
@@ -45,8 +45,8 @@ bool lies_beside(const Corners& a, const Vec3d& n, const Corners& b, double tole
   return false;
 }
 
-// Where the ray meets the triangle, its sides included: the volumes over these and the direction
-// have one sign.
+// The distance to the triangle, its boundary included: the volumes spanned by its sides and the
+// direction have equal signs.
 std::optional<double> meet(const Corners& corners, const Ray& ray) {
   const Vec3d a = corners[0] - ray.origin, b = corners[1] - ray.origin, c = corners[2] - ray.origin;
   const Vec3d& d = ray.direction;
@@ -62,18 +62,18 @@ double longest_side(const Corners& c) {
   return std::max({length(c[1] - c[0]), length(c[2] - c[1]), length(c[0] - c[2])});
 }
 
-// How far rays from the viewer may miss points of a face: twice 2^-20 of its distance, which is 16
-// roundings of origin, direction and products of both.
+// Distance at which rays from the viewer may miss points of a face: twice 2^-20 of the viewer's
+// distance, for 16 roundings of origin, direction and their products.
 double blur_of(const Corners& corners, const Vec3d& viewer) {
   double distance = largest_coordinate(corners);
   for (const Vec3d& x : corners) distance = std::max(distance, length(x - viewer));
   return 0x1p-19 * distance;
 }
-// Of its longest side, how far from a face others are near to it at most. Not tuned: what is
-// farther is no thin layer.
+// Limit on the distance of near faces, as a share of a face's longest side. Not tuned: faces
+// farther apart are no thin layer.
 constexpr double kMostNear = 0x1p-8;
 
-// Wider by twice what rounding explains, at least: a float's rounding is less than the second half.
+// A box enlarged by twice the rounding of positions, which covers its own rounding to floats.
 FloatBox box_around(const Vec3d& lower, const Vec3d& upper, double size, double reach) {
   const double margin = 2 * touch_tolerance(size, 0) + reach;
   FloatBox box;
@@ -98,7 +98,7 @@ FloatBox box_of(const Mesh& mesh) {
 
 struct FoundPair {
   FacePair faces;
-  bool near = false;  // not in one plane
+  bool near = false;  // near, not coplanar
 };
 
 class OverlapFinder {
@@ -149,12 +149,12 @@ class OverlapFinder {
 
  private:
   enum class Place { kElsewhere, kInPlane, kNear };
-  // With an area.
+  // A face with nonzero area.
   struct Face {
     FaceRef ref;
     Corners corners;
     Vec3d normal;             // unit
-    double blur, most, size;  // most: how far what is near to it is; size: see touch_tolerance
+    double blur, most, size;  // most: largest distance of near faces; size: see touch_tolerance
   };
 
   void reserve(const Scene& scene) {
@@ -180,7 +180,7 @@ class OverlapFinder {
     return reach > 0 ? Place::kNear : Place::kElsewhere;
   }
 
-  // Of pairs within the leaf, and with faces of later ones.
+  // Appends pairs within the leaf, and with faces of later leaves.
   void append_pairs_of(const BoxTree& tree, uint32_t leaf, std::vector<uint32_t>& leaves,
                        std::vector<FoundPair>& pairs) {
     tree.find_leaves(tree.leaf_box(leaf), leaf, leaves);
@@ -207,8 +207,8 @@ class OverlapFinder {
     }
   }
 
-  std::vector<Face> faces_;      // in the order of the file
-  std::vector<FloatBox> boxes_;  // theirs
+  std::vector<Face> faces_;      // in file order
+  std::vector<FloatBox> boxes_;  // boxes of the faces
   std::atomic<size_t> count_{0};
 };
 
@@ -317,7 +317,7 @@ void FaceOverlaps::settle_in_plane(const Ray& ray, Hit& hit) const {
   }
 }
 
-// The first of the faces that the ray meets between its t_min and `before`.
+// The closest hit among `faces` between the ray's t_min and `before`.
 std::optional<Hit> FaceOverlaps::first_of(std::span<const FaceRef> faces, const Ray& ray,
                                           double before) const {
   std::optional<Hit> first;
@@ -331,7 +331,7 @@ std::optional<Hit> FaceOverlaps::first_of(std::span<const FaceRef> faces, const 
 }
 
 void FaceOverlaps::settle_among(const Ray& ray, Hit& hit) const {
-  // One that is met before may itself have others before it; each is nearer than the last.
+  // A near face in front may itself have near faces in front of it; each is closer than the last.
   for (;;) {
     const auto near = found_of(hit.face).second;
     if (near.empty()) break;

@@ -1,4 +1,4 @@
-// Faces halved at the median of their centers, and found from the root.
+// A bounding volume hierarchy over faces, split at the median of their centers.
 #include "limn/core/face_tree.h"
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace {
 
 constexpr uint32_t kLeaf = 4;  // faces; not tuned
 
-// Three times the center along an axis.
+// Three times the coordinate of the center.
 float middle(const FaceTree::Item& item, int axis) {
   return item.corners[0][axis] + item.corners[1][axis] + item.corners[2][axis];
 }
@@ -38,7 +38,7 @@ FaceTree::FaceTree(const Scene& scene) {
 
 namespace {
 
-// A side of an item, by the places of its ends.
+// A side of an item, identified by the positions of its ends.
 struct ItemSide {
   Vec3f low, high;
   uint32_t item;
@@ -94,12 +94,12 @@ uint32_t FaceTree::build(uint32_t first, uint32_t last) {
 void FaceTree::list(std::span<const HalfSpace> set, std::vector<const Item*>& faces) const {
   if (nodes_.empty()) return;
   CHECK_LT(set.size(), 32u);
-  // What is not wholly inside of these half-spaces, by their bits.
+  // cut_by: bits of the half-spaces that do not contain the node entirely.
   struct Visit {
     uint32_t node, cut_by;
   };
   const auto bit = [](size_t k) { return uint32_t{1} << k; };
-  // False if the node is outside of one.
+  // Clears the bits of half-spaces that contain the node; false if it is outside of one.
   const auto reaches = [&](const Node& node, uint32_t& cut_by) {
     for (uint32_t left = cut_by; left != 0; left &= left - 1) {
       const auto k = static_cast<size_t>(std::countr_zero(left));

@@ -1,4 +1,4 @@
-// Cutting rings of lines: new corners are named by their lines, so nothing is ever rounded.
+// Splits rings of lines. New corners are represented by their lines, so nothing is rounded.
 #include "src/regions/convex_region.h"
 
 #include <array>
@@ -83,7 +83,7 @@ void cut_ring(const std::vector<GridLine>& lines, const Ring& ring, LineSide by,
     const RingCorner& after = ring[i + 1 < n ? i + 1 : 0];
     const int here = sides.of[i], next = sides.of[i + 1 < n ? i + 1 : 0];
     if (here * next < 0) {
-      // The part before the crossing ends there, with a new side; the other one begins there.
+      // The ring before the crossing ends there with a new side; the other ring begins there.
       const GridCorner crossing = meet(corner.side.in(lines), line);
       Ring& ends = here > 0 ? inside : outside;
       Ring& begins = here > 0 ? outside : inside;

@@ -1,5 +1,5 @@
 #pragma once
-// A convex polygon as a ring of lines on a grid, cut by further lines.
+// A convex polygon as a ring of grid lines, and its subdivision.
 #include <cstddef>
 #include <utility>
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace limn {
 
-// A line's number and whether the polygon lies on its negative side.
+// A line index, and whether the polygon is on the line's negative side.
 class LineSide {
  public:
   LineSide() = default;
@@ -24,26 +24,26 @@ class LineSide {
   uint32_t bits_ = 0;
 };
 
-// Where the side before ends and `side` begins, counter-clockwise. No side is a point: every
-// polygon has an area.
+// The corner where the previous side ends and `side` begins, counter-clockwise. All sides have a
+// positive length, and all polygons a positive area.
 struct RingCorner {
   GridCorner at;
   LineSide side;
 };
 using Ring = std::vector<RingCorner>;
 
-// A part of the window between lines along its axes.
+// A rectangle between axis-parallel lines of the window.
 struct GridCell {
   GridPoint lower, upper;
   LineSide bottom, right, top, left;
   void to_ring(Ring& ring) const;
-  // Cut in the middle, across its longer side, by a line that is appended.
+  // Bisects the longer side by a new line, appended to `lines`.
   std::pair<GridCell, GridCell> halves(std::vector<GridLine>& lines) const;
 };
-// The whole window, of lines that are appended.
+// The whole window; appends its lines.
 GridCell window_cell(std::vector<GridLine>& lines);
 
-// On which side of `by` each corner lies: 1, -1, or 0 on it.
+// The side of `by` on which each corner lies: 1, -1, or 0 on the line.
 struct RingSides {
   std::vector<int8_t> of;
   bool positive = false, negative = false;  // whether any lies there
@@ -51,7 +51,7 @@ struct RingSides {
 void find_sides(const std::vector<GridLine>& lines, const Ring& ring, LineSide by,
                 RingSides& sides);
 
-// The parts of a ring on either side of `by`, of which both must have an area.
+// Splits a ring by `by`; both parts must have a positive area.
 void cut_ring(const std::vector<GridLine>& lines, const Ring& ring, LineSide by,
               const RingSides& sides, Ring& inside, Ring& outside);
 

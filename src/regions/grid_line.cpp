@@ -1,5 +1,5 @@
-// Exact signs for lines on a grid: a 3 by 3 determinant in 128-bit integers, behind a filter in
-// doubles.
+// Exact signs for lines on a grid: a 3 by 3 determinant in 128-bit integers, with a floating-point
+// filter.
 #include "src/regions/grid_line.h"
 
 #include <bit>
@@ -9,7 +9,7 @@ namespace {
 
 using Wide = __int128;
 
-// The point where two lines meet, in homogeneous coordinates: |x|, |y| < 2^95, |w| <= 2^63.
+// The intersection of two lines in homogeneous coordinates: |x|, |y| < 2^95, |w| <= 2^63.
 struct Meeting {
   Wide x, y, w;
 };
@@ -18,8 +18,8 @@ Meeting exact_meeting(const GridLine& l, const GridLine& m) {
           Wide(l.a) * m.b - Wide(m.a) * l.b};
 }
 
-// As the compiler's own conversion, rounded once, in a fraction of its time: what is shifted out is
-// kept as one bit below the rounding.
+// Conversion with a single rounding, equal to the compiler's but faster: bits shifted out are kept
+// as one sticky bit.
 double to_double(Wide value) {
   using Unsigned = unsigned __int128;
   const bool negative = value < 0;
@@ -46,7 +46,7 @@ GridCorner meet(const GridLine& l, const GridLine& m) {
 }
 
 int exact_side(const GridLine& line, const GridLine& l, const GridLine& m) {
-  // A side of a face that its neighbour has brought already: most of the zeros.
+  // A side shared with a neighbour that was inserted earlier: the most frequent case of zero.
   const GridLine flipped = line.flipped();
   if (l == line || l == flipped || m == line || m == flipped) return 0;
   const Meeting p = exact_meeting(l, m);

@@ -1,5 +1,5 @@
 #pragma once
-// Lines through points of a grid, and on which side of one two others meet: exactly.
+// Lines through grid points, and the exact side of an intersection relative to a third line.
 #include <cmath>
 #include <cstdint>
 
@@ -22,7 +22,7 @@ struct GridLine {
   bool operator==(const GridLine&) const = default;
 };
 
-// What lies to the left of the way from p to q, two different points.
+// The half-plane to the left of the line from p to q, two distinct points.
 inline GridLine line_through(const GridPoint& p, const GridPoint& q) {
   const int64_t a = p.y - q.y, b = q.x - p.x;
   return {a, b, -(a * p.x + b * p.y)};
@@ -34,17 +34,17 @@ inline int64_t twice_area(const GridPoint& p, const GridPoint& q, const GridPoin
 }
 
 struct GridCorner {
-  double x, y;  // to three roundings each
+  double x, y;  // exact to three roundings each
 };
-// Where two lines meet that are not parallel.
+// The intersection of two lines that are not parallel.
 GridCorner meet(const GridLine& l, const GridLine& m);
 
-// The side of `line` on which the border of l turns left into that of m, within the window: 1, -1,
-// or 0 if it is on it.
+// The exact side of `line` on which the boundary of l turns left into that of m, within the window:
+// 1, -1, or 0 on the line.
 int exact_side(const GridLine& line, const GridLine& l, const GridLine& m);
 
-// The same by meet(l, m), where doubles suffice to tell; else 0. Each coordinate carries three
-// roundings, c one, each product and each sum another: at most seven of 2^-53 on each summand.
+// A floating-point filter for exact_side; 0 if it cannot decide. Coordinates carry three roundings,
+// c one, each product and sum another: at most seven of 2^-53 per summand.
 class SideFilter {
  public:
   SideFilter() = default;
@@ -52,13 +52,13 @@ class SideFilter {
       : a_(static_cast<double>(line.a)),
         b_(static_cast<double>(line.b)),
         c_(static_cast<double>(line.c)) {}
-  // Without a branch: corners at random would make it wrong every other time.
+  // Branch-free: branches would be mispredicted half of the time.
   int side_of(const GridCorner& corner) const {
     const double ax = a_ * corner.x, by = b_ * corner.y, value = ax + by + c_;
     const double error = 0x1.0p-50 * (std::fabs(ax) + std::fabs(by) + std::fabs(c_));
     return static_cast<int>(value > error) - static_cast<int>(value < -error);
   }
-  // The corner of a box that lies farthest from the positive side.
+  // The corner of a box that is farthest towards the negative side.
   GridCorner rearmost(const GridCorner& lower, const GridCorner& upper) const {
     return {a_ > 0 ? lower.x : upper.x, b_ > 0 ? lower.y : upper.y};
   }

@@ -1,4 +1,4 @@
-// Faces projected to the plane of a view, cut at its nearest depth.
+// Projects faces to the plane of a view and clips them at the near depth.
 #include <algorithm>
 #include <cmath>
 #include <tuple>
@@ -24,7 +24,7 @@ PlaneView::Corner PlaneView::project(const Vec3d& w) const {
   return {w, {dot(w, to_x_) / z, dot(w, to_y_) / z}, z};
 }
 
-// False if the side lies before the nearest depth: then the rest of the face has it nowhere.
+// Returns false if the side lies in front of the near depth, and with it the rest of the face.
 bool PlaneView::add_side(const Corner& a, const Corner& b, SeenFace& face) const {
   const auto key = [](const Corner& c) { return std::tuple(c.w.x, c.w.y, c.w.z); };
   const bool reversed = key(b) < key(a);

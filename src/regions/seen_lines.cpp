@@ -1,4 +1,4 @@
-// Lines of a window through points of its grid: those of a vertex are the same for all faces.
+// Lines through grid points of a window. Lines of a vertex are the same for all of its faces.
 #include "src/regions/seen_lines.h"
 
 #include <algorithm>
@@ -7,8 +7,8 @@
 namespace limn {
 namespace {
 
-// A line is told to miss the window if it does so by more than this part of the window's size:
-// far more than the rounding of its points to the grid, and far less than the band.
+// A line misses the window only if its distance exceeds this share of the window's size: far above
+// the rounding of its points, and far below the band.
 constexpr double kClear = 0x1p-20;
 
 bool in_band(const PlanePoint& p) {
@@ -20,7 +20,7 @@ GridPoint rounded(const PlanePoint& p) {
   return {whole(p.x), whole(p.y)};
 }
 
-// The two points where the line through p along d leaves the band; it meets the window.
+// The points where the line through p along d leaves the band, and whether it meets the window.
 struct Exits {
   PlanePoint back, front;
 };
@@ -49,7 +49,7 @@ HalfPlane flipped_if(bool flip, const HalfPlane& h) {
   return {h.reach == Reach::kHoldsAll ? Reach::kHoldsNone : Reach::kHoldsAll, {}};
 }
 
-// To the left of the way between two points; `whole`: whether they are corners of a face.
+// The half-plane to the left of two points; `whole`: both are corners of a face.
 HalfPlane left_of(const PlanePoint& from, bool from_corner, const PlanePoint& to, bool to_corner) {
   const PlanePoint d{to.x - from.x, to.y - from.y};
   const double at_center = d.y * from.x - d.x * from.y;
@@ -67,14 +67,14 @@ HalfPlane half_plane_of(const SeenFace::Side& side, bool counter_clockwise,
                         const WindowGrid& grid) {
   HalfPlane h =
       left_of(grid.to_grid(side.from), side.from_corner, grid.to_grid(side.to), side.to_corner);
-  // Both ends in one place: the two other sides meet there, and hold the face.
+  // Both ends round to one point: the two other sides meet there and bound the face.
   if (h.reach == Reach::kCuts && h.line.a == 0 && h.line.b == 0) return {Reach::kHoldsAll, {}};
   return flipped_if(side.reversed == counter_clockwise, h);
 }
 
-// How a line through two points of the grid meets the window.
+// Relation of a line through two grid points to the window.
 Reach reach_of(const GridLine& line) {
-  const int64_t most = (std::abs(line.a) + std::abs(line.b)) << 29;  // without c, in the window
+  const int64_t most = (std::abs(line.a) + std::abs(line.b)) << 29;  // of |a x + b y| inside
   if (line.c >= most) return Reach::kHoldsAll;
   return line.c <= -most ? Reach::kHoldsNone : Reach::kCuts;
 }
@@ -87,7 +87,7 @@ bool add(const HalfPlane& h, int number, FaceLines& lines) {
   return h.reach != Reach::kHoldsNone;
 }
 
-// The same as side by side, of a face with all corners in the band: all in whole numbers.
+// Sides of a face with all corners in the band, in integer arithmetic.
 bool add_sides(const SeenFace& face, const GridPoint (&corners)[3], FaceLines& lines) {
   const int64_t area = twice_area(corners[0], corners[1], corners[2]);
   if (area == 0) return false;
@@ -125,14 +125,14 @@ bool lines_of(const SeenFace& face, const WindowGrid& grid, FaceLines& lines) {
 }
 
 HalfPlane half_plane_of(const PlaneFunction& f) {
-  // One order for a function and its negative.
+  // A function and its negative use the same order.
   const bool flip = f.a < 0 || (f.a == 0 && f.b < 0);
   const PlaneFunction g = flip ? PlaneFunction{-f.a, -f.b, -f.c} : f;
   const Reach reach = reach_of(g.c, (std::fabs(g.a) + std::fabs(g.b)) * kGridHalf);
   if (reach != Reach::kCuts) return flipped_if(flip, {reach, {}});
   const double steepness = g.a * g.a + g.b * g.b;
   if (steepness == 0) return flipped_if(flip, {Reach::kHoldsAll, {}});
-  // The point nearest to the center; positive to the left of d.
+  // The point closest to the center; positive to the left of d.
   const PlanePoint p{-g.c * g.a / steepness, -g.c * g.b / steepness}, d{g.b, -g.a};
   const Exits exits = leave_band(p, d);
   return flipped_if(flip, {reach, line_through(rounded(exits.back), rounded(exits.front))});

@@ -1,5 +1,5 @@
 #pragma once
-// From a face on the plane to lines on the grid of one window.
+// Converts a projected face to grid lines of a window.
 #include <optional>
 
 #include "limn/core/visible_regions.h"
@@ -7,7 +7,7 @@
 
 namespace limn {
 
-// Coordinates of a window: its center at 0, its sides at +-kGridHalf.
+// Window coordinates: center at 0, sides at +-kGridHalf.
 class WindowGrid {
  public:
   explicit WindowGrid(const PlaneWindow& window)
@@ -34,23 +34,23 @@ class WindowGrid {
   double x_steps_, y_steps_;
 };
 
-// How a half-plane meets the window.
+// Relation of a half-plane to the window.
 enum class Reach { kHoldsAll, kHoldsNone, kCuts };
 struct HalfPlane {
   Reach reach;
-  GridLine line;  // if it cuts
+  GridLine line;  // if it cuts the window
 };
 
-// The lines of a face that cut the window.
+// The lines of a face that cross the window.
 struct FaceLines {
   GridLine lines[6];  // the face lies on their positive side
-  int8_t numbers[6];  // the side that it is, SeenFace::Side::number; of a cut -1 minus its index
+  int8_t numbers[6];  // SeenFace::Side::number, or -1 minus the index of a cut
   int count = 0;
 };
-// False if the face does not reach into the window, or has no area on its grid.
+// False if the face is outside of the window or has no area on its grid.
 bool lines_of(const SeenFace& face, const WindowGrid& grid, FaceLines& lines);
 
-// Where a function on the grid is not negative. Its negative gives the same line, flipped.
+// The half-plane where a function is not negative. Its negation gives the flipped line.
 HalfPlane half_plane_of(const PlaneFunction& f);
 
 }  // namespace limn

@@ -1,4 +1,4 @@
-// Which side lies above which, and what is between them.
+// Vertical order of polygon sides, and winding numbers between them.
 #include "limn/core/shadow_outlines.h"
 
 #include <algorithm>
@@ -10,10 +10,10 @@ namespace {
 using Point = ShadowOutlines::Point;
 using Wide = __int128;
 
-// Corners of a window's width around it and nearer: products of their differences are below 2^62.
+// Corners within a window's width of it: products of their differences are below 2^62.
 constexpr int64_t kNarrow = int64_t{1} << 30;
 
-// Twice the area of a triangle: positive if r lies to the left of the way from p to q.
+// Twice the signed area of a triangle: positive if r is to the left of the line from p to q.
 template <class Integer>
 Integer area(const Point& p, const Point& q, const Point& r) {
   return Integer(q.x - p.x) * (r.y - p.y) - Integer(q.y - p.y) * (r.x - p.x);
@@ -40,7 +40,7 @@ uint32_t& ShadowOutlines::slot_of(const Edge& edge) {
   }
 }
 
-// At most half of the slots are taken.
+// The load factor of the hash table is at most one half.
 void ShadowOutlines::grow() {
   table_.assign(2 * table_.size(), kEmpty);
   for (uint32_t i = 0; i < sides_.size(); ++i) slot_of(sides_[i]) = i;
@@ -62,7 +62,7 @@ void ShadowOutlines::add(std::span<const Point> corners, std::span<const uint32_
     const Point &a = corners[i], &b = corners[(i + 1) % corners.size()];
     if (a == b || (cancelled >> i & 1)) continue;
     const bool forward = a < b;
-    // Inside is to the left of the way round, and above a way to the right.
+    // The interior is to the left of a counter-clockwise side, and above one that goes right.
     const int change = (turn > 0) == forward ? -1 : 1;
     const bool narrow = is_narrow(a) && is_narrow(b);
     const Edge edge =
@@ -78,8 +78,8 @@ void ShadowOutlines::add(std::span<const Point> corners, std::span<const uint32_
   }
 }
 
-// What side t tells of s, whose first end it may lie above, and which it may cross or touch. later:
-// which one is taken for the upper one where both lie on one line.
+// Adds the winding numbers that t contributes at the first end of s, and the events where t meets
+// s. later: the side that counts as upper if both lie on one line.
 void ShadowOutlines::compare(const Edge& s, uint32_t index, bool later, int& lamp, int& cover) {
   const Edge& t = edges_[index];
   if (t.q <= s.p || s.q <= t.p) return;
@@ -98,18 +98,18 @@ void ShadowOutlines::compare(const Edge& s, uint32_t index, bool later, int& lam
   }
 }
 
-// Where neither lies wholly above the other.
+// compare() for sides of which neither is entirely above the other.
 template <class Integer>
 void ShadowOutlines::compare_ends(const Edge& s, uint32_t index, bool later, int& lamp,
                                   int& cover) {
   const Edge& t = edges_[index];
   const bool spans_start = t.p <= s.p;
-  // Of the ends of s to t, and of those of t to s.
+  // Positions of the ends of s relative to t, and of t relative to s.
   const Integer at_p = area<Integer>(t.p, t.q, s.p), at_q = area<Integer>(t.p, t.q, s.q);
   const int p_of_t = sign(area<Integer>(s.p, s.q, t.p)),
             q_of_t = sign(area<Integer>(s.p, s.q, t.q));
   const bool one_line = at_p == 0 && at_q == 0;
-  // Whether t is above s where both begin, and where the first of them ends.
+  // True if t is above s where both begin, or at the first end after that.
   const auto is_above = [&](int of_s, int of_s_else, bool from_s, int of_t, int of_t_else) {
     if (one_line) return later;
     if (from_s) return (of_s != 0 ? of_s : of_s_else) < 0;
@@ -118,7 +118,7 @@ void ShadowOutlines::compare_ends(const Edge& s, uint32_t index, bool later, int
   const bool begins = is_above(sign(at_p), sign(at_q), spans_start, p_of_t, q_of_t);
   const bool ends = is_above(sign(at_q), sign(at_p), s.q <= t.q, q_of_t, p_of_t);
   if (spans_start && begins) lamp += t.lamp, cover += t.cover;
-  // A side that begins or ends on s.
+  // Events at ends of t that lie on s.
   const auto along = [&](const Point& x) {
     const double dx = static_cast<double>(s.q.x - s.p.x), dy = static_cast<double>(s.q.y - s.p.y);
     return (static_cast<double>(x.x - s.p.x) * dx + static_cast<double>(x.y - s.p.y) * dy) /
@@ -137,8 +137,8 @@ void ShadowOutlines::compare_ends(const Edge& s, uint32_t index, bool later, int
   }
 }
 
-// Those whose bounds say that compare() may have something to tell, in their order. Rounding to
-// floats keeps the order of integers.
+// Sides whose bounds allow an effect in compare(), in order. Rounding integers to floats preserves
+// their order.
 void ShadowOutlines::find_candidates(uint32_t i) {
   const size_t size = edges_.size();
   const float x0 = bounds_.x0[i], x1 = bounds_.x1[i], y0 = bounds_.y0[i];
@@ -146,7 +146,7 @@ void ShadowOutlines::find_candidates(uint32_t i) {
   near_.resize(size);
   candidates_.resize(size);
   uint32_t* near = near_.data();
-  // Written so that it becomes a few instructions on whole registers.
+  // Written so that the compiler vectorises it.
   for (size_t j = 0; j < size; ++j) {
     near[j] = static_cast<uint32_t>((x1s[j] >= x0) & (x0s[j] <= x1) & (y1s[j] >= y0));
   }

@@ -1,4 +1,4 @@
-// Inserting faces: cut what they overlap, compare depths, split, merge.
+// Inserting a face: cut the regions it overlaps, compare depths, split, merge.
 #include "limn/core/visible_regions.h"
 
 #include <algorithm>
@@ -14,21 +14,21 @@ namespace {
 
 constexpr int kNone = -1;
 
-// A grid keeps regions from becoming long splinters, whose boxes many faces meet. Of a bumpy sphere
-// in one window each face takes, with 8192 and with 131072 of them, 4.8 and 63 us without a grid,
-// 2.5 and 3.1 us with 16 faces a cell, 2.4 and 3.5 us with 4.
+// A grid prevents long thin regions, whose boxes overlap many faces. For a bumpy sphere in one
+// window of 8192 and 131072 faces, a face takes 4.8 and 63 us without a grid, 2.5 and 3.1 us with
+// 16 faces per cell, 2.4 and 3.5 us with 4.
 constexpr size_t kFacesOfCell = 16;
 constexpr int kMostLevels = 24;
 
-// A face as the window holds it.
+// A face in grid coordinates of the window.
 struct Inserted {
   uint32_t label;
   PlaneFunction inverse_depth;  // on the grid
-  double error;                 // of it, where the face is
+  double error;                 // of inverse_depth on the face
   double nearest;
   bool ruled;
   LineSide lines[6];
-  SideFilter filters[6];   // of the lines
+  SideFilter filters[6];   // of `lines`
   int8_t numbers[6] = {};  // FaceLines::numbers
   int line_count = 0;
 };
@@ -48,20 +48,20 @@ struct Box {
   GridCorner upper() const { return {x1, y1}; }
 };
 
-// A region is a leaf.
+// A node of the tree over regions; leaves are regions.
 struct Node {
   Box box;
-  double least;  // inverse depth that is seen anywhere in it, lowered by its rounding
+  double least;  // least visible inverse depth in it, lowered by its rounding
   int left = kNone, right = kNone;
-  int face = kNone;  // that a leaf shows
+  int face = kNone;  // visible in a leaf
   Ring ring;         // of a leaf
   bool is_leaf() const { return left == kNone; }
 };
 
-// Where two faces are equally deep.
+// The line where two faces are equally deep.
 struct Crossing {
   int first, second;
-  HalfPlane half_plane;  // of `first`, where it is nearer
+  HalfPlane half_plane;  // where `first` is nearer
   size_t line;
 };
 
@@ -148,7 +148,7 @@ class VisibleRegions::Tree {
   }
 
  private:
-  // From left to right.
+  // Visits the leaves from left to right.
   template <class Visit>
   void for_each_leaf(const Visit& visit) const {
     std::vector<int>& stack = stack_;
@@ -188,7 +188,7 @@ class VisibleRegions::Tree {
     ++leaves_;
     return node;
   }
-  // Takes two nodes that are there; a leaf's number stays its own.
+  // Joins two existing nodes; the number of a leaf does not change.
   int join(int left, int right) {
     const int node = new_leaf(kNone);
     --leaves_;
@@ -202,7 +202,7 @@ class VisibleRegions::Tree {
     free_.push_back(node);
   }
 
-  // Box and least depth of a node, from its children or its ring.
+  // Computes box and least depth of a node from its children or its ring.
   void measure(int index) {
     Node& node = nodes_[index];
     node.box = {};
@@ -224,7 +224,7 @@ class VisibleRegions::Tree {
     node.least -= face.error;
   }
 
-  // Appends the face and its lines; false if it does not reach into the window.
+  // Appends the face and its lines; false if it is outside of the window.
   bool prepare(const SeenFace& seen) {
     const PlanePoint lower = grid_.to_grid(seen.lower), upper = grid_.to_grid(seen.upper);
     box_ = {lower.x, lower.y, upper.x, upper.y};
@@ -257,7 +257,7 @@ class VisibleRegions::Tree {
     if (!node.box.meets(box_)) return index;
     const Inserted& face = faces_.back();
     if (!face.ruled && face.nearest + face.error < node.least) {
-      lost_ = true;  // if it is there at all
+      lost_ = true;  // if it is visible at all
       return index;
     }
     if (node.is_leaf()) return insert_in_leaf(index);
@@ -271,7 +271,7 @@ class VisibleRegions::Tree {
     return index;
   }
 
-  // Whether two faces lie on either side of one line, as neighbours of a mesh do.
+  // True if a common line separates two faces, as for neighbours in a mesh.
   bool are_beside(const Inserted& f, const Inserted& g) const {
     for (int i = 0; i < f.line_count; ++i) {
       const GridLine line = f.lines[i].other().in(lines_);
@@ -282,7 +282,7 @@ class VisibleRegions::Tree {
     return false;
   }
 
-  // Depths at the corners of a ring: the new face's minus those of another.
+  // Differences of inverse depth at the corners of a ring: the new face minus another.
   struct Depths {
     double least = 1e300, most = -1e300;
     double rounding = 0;  // of these differences
@@ -299,8 +299,8 @@ class VisibleRegions::Tree {
       depths.most = std::max(depths.most, here - there);
       largest = std::max(largest, std::fabs(here));
     }
-    // Beyond the face errors grow with the value. Corners of faces are rounded to the grid: four
-    // steps of it are no depth.
+    // Outside of a face errors grow with the value. Corners are rounded to the grid: differences of
+    // four grid steps are not significant.
     depths.rounding = f.error * (1 + largest / f.nearest) + g.error +
                       4 * (std::fabs(p.a) + std::fabs(p.b) + std::fabs(q.a) + std::fabs(q.b));
     return depths;
@@ -341,14 +341,14 @@ class VisibleRegions::Tree {
     return split(index, face, pieces);
   }
 
-  // Whether a rule shows the first of two faces, and not the second.
+  // True if the rule shows the first of two faces rather than the second.
   std::optional<bool> rule_for(int face, int other) const {
     if (!rule_ || other == kNone || !faces_[face].ruled || !faces_[other].ruled) return {};
     return rule_(faces_[face].label, faces_[other].label);
   }
 
-  // Cuts by the lines of the new face: what is inside goes to ring_, what is outside to the first
-  // `pieces` of pieces_. False if nothing is inside.
+  // Cuts a leaf by the lines of the new face: the inside goes to ring_, the outside to the first
+  // `pieces` of pieces_. False if the inside is empty.
   bool cut_by_face(const Node& leaf, size_t& pieces) {
     const Inserted& face = faces_.back();
     for (int k = 0; k < face.line_count; ++k) {
@@ -376,14 +376,14 @@ class VisibleRegions::Tree {
     return true;
   }
 
-  // What is not on the positive side of the line goes from ring_ to the pieces.
+  // Moves what is not on the positive side of the line from ring_ to the pieces.
   void cut(LineSide line, const RingSides& sides, size_t& pieces) {
     if (pieces == pieces_.size()) pieces_.emplace_back();
     cut_ring(lines_, ring_, line, sides, inside_, pieces_[pieces++]);
     std::swap(ring_, inside_);
   }
 
-  // Where depths are equal; false if the new face is seen nowhere.
+  // Cuts where depths are equal; false if the new face is invisible.
   bool cut_at_crossing(int other, size_t& pieces) {
     const auto [line, half_plane] = crossing_with(other);
     if (half_plane.reach == Reach::kHoldsAll) return true;
@@ -395,7 +395,7 @@ class VisibleRegions::Tree {
     return sides.positive;
   }
 
-  // The same for both orders of two faces.
+  // Symmetric in the two faces.
   std::pair<LineSide, HalfPlane> crossing_with(int other) {
     const int face = static_cast<int>(faces_.size()) - 1;
     for (size_t i = crossings_.size(); i-- > 0 && crossings_[i].first == face;) {
@@ -409,7 +409,7 @@ class VisibleRegions::Tree {
     return {LineSide(lines_.size() - 1, false), h};
   }
 
-  // The leaf shows `face` in ring_, and what it showed in the pieces.
+  // The leaf shows `face` in ring_, and its former face in the pieces.
   int split(int index, int face, size_t pieces) {
     std::vector<int>& built = built_;
     built.clear();
@@ -434,7 +434,7 @@ class VisibleRegions::Tree {
     return built[0];
   }
 
-  // The newest face is seen whole: one region again, in its leaf nearest the root.
+  // If the newest face is entirely visible, merges its regions into the leaf nearest the root.
   void merge() {
     const Inserted& face = faces_.back();
     const std::vector<GridLine>& lines = lines_;
@@ -466,7 +466,7 @@ class VisibleRegions::Tree {
     find_highest(node.left, depth + 1, best, best_depth);
     find_highest(node.right, depth + 1, best, best_depth);
   }
-  // Drops the leaves of the newest face but for `kept`; kNone if nothing is left.
+  // Removes the leaves of the newest face except `kept`; kNone if none remains.
   int keep_one(int index, int kept) {
     const Node& node = nodes_[index];
     if (!node.box.meets(box_)) return index;
@@ -497,19 +497,19 @@ class VisibleRegions::Tree {
   std::vector<Crossing> crossings_;
   Rule rule_;
   std::vector<Node> nodes_;
-  size_t used_ = 0;        // the first of them, but for
-  std::vector<int> free_;  // these
+  size_t used_ = 0;        // nodes in use, with
+  std::vector<int> free_;  // these free among them
   int root_ = kNone;
   size_t leaves_ = 0;
-  // Of the insertion in progress, which is that of the last face.
+  // State of the current insertion.
   Box box_;
-  size_t gained_ = 0;  // regions that it has taken
-  bool lost_ = false;  // something may hide a part of it
+  size_t gained_ = 0;  // regions that it gained
+  bool lost_ = false;  // a part of it may be hidden
   RingSides sides_of_line_[6];
   Ring ring_, inside_;
   std::vector<Ring> pieces_;
   std::vector<int> built_;
-  // Of a visit.
+  // Scratch of a visit.
   mutable std::vector<PlanePoint> corners_;
   mutable std::vector<int> stack_;
 };

@@ -32,7 +32,7 @@ class CameraTranslation final : public Motion {
   int axis_;
 };
 
-// About the pinhole.
+// Rotation about the pinhole.
 class CameraRotation final : public Motion {
  public:
   explicit CameraRotation(int axis) : axis_(axis) {}
@@ -58,7 +58,7 @@ class CameraRotation final : public Motion {
 
 class FieldOfView final : public Motion {
  public:
-  // Between 0 and 180 degrees, neither included.
+  // The field of view lies strictly between 0 and 180 degrees.
   static constexpr double kLeast = std::numeric_limits<double>::min();
   static double most() { return std::nextafter(180.0, 0.0); }
 

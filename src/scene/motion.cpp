@@ -1,4 +1,4 @@
-// What most motions have in common: they move no shape and are no arrays; one number of an array.
+// Defaults of Motion, which suit most parameters, and the motion of one component of an array.
 #include "src/scene/motion.h"
 
 #include <fmt/format.h>

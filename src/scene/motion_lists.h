@@ -1,6 +1,6 @@
 #pragma once
-// What can move in a scene, one list per kind of thing (each appends to `list`). parameter.cpp
-// joins them: a new kind of thing is a .cpp, a line here and a line there.
+// Lists of the parameters of a scene, one function per kind (each appends to `list`). A new kind is
+// a .cpp file, a line here and a line in parameter.cpp.
 #include <vector>
 
 #include "limn/core/parameter.h"

@@ -1,4 +1,4 @@
-// Parameters by name: the lists of what can move, and what to say of a name that none has.
+// Parameters by name, and messages about unknown names.
 #include "limn/core/parameter.h"
 
 #include <algorithm>

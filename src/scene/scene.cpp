@@ -1,4 +1,4 @@
-// Copies of scenes.
+// Deep copies of scenes, and the choice of a sensor.
 #include "limn/core/scene.h"
 
 namespace limn {
@@ -7,7 +7,7 @@ namespace {
 
 using BsdfCopies = std::map<const Bsdf*, std::shared_ptr<Bsdf>>;
 
-// The one copy of `original`: shared where the original is shared, nested BSDFs included.
+// Copies a BSDF once, nested BSDFs included, so that sharing is preserved.
 std::shared_ptr<Bsdf> copy_once(const std::shared_ptr<Bsdf>& original, BsdfCopies& copies) {
   const auto found = copies.find(original.get());
   if (found != copies.end()) return found->second;
@@ -59,7 +59,7 @@ std::string sensor_name(const Scene& scene) {
 
 void use_sensor(Scene& scene, const std::string& name) {
   const std::vector<Sensor>& sensors = scene.sensors;
-  // Numbers first: every sensor has one, and an id may look like that of another.
+  // Indices take precedence: an id may look like the index of another sensor.
   size_t at = 0;
   while (at < sensors.size() && name != std::to_string(at)) ++at;
   if (at == sensors.size() && !name.empty()) {

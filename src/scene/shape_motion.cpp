@@ -1,4 +1,4 @@
-// Motions of a shape's vertices: rigid, scaled, along a field, one by one.
+// Motions of a shape's vertices: rigid, scaling, along a field, single vertices.
 #include <algorithm>
 #include <cmath>
 
@@ -13,7 +13,7 @@ namespace limn {
 
 namespace {
 
-// A shape that a fit scales does not shrink to a point, of which no step would bring it back.
+// A fit must not shrink a shape to a point, from which no step would recover.
 constexpr double kLeastScale = 0.01;  // not tuned
 
 void add_to_lane(std::vector<Vec3<Lanes>>& tangents, int lane,
@@ -24,7 +24,7 @@ void add_to_lane(std::vector<Vec3<Lanes>>& tangents, int lane,
   }
 }
 
-// Moves along straight lines, and leaves normals of the file alone, unless a kind says otherwise.
+// Linear motion that leaves normals from the file unchanged; subclasses override.
 class ShapeMotion : public Motion {
  public:
   explicit ShapeMotion(ShapeId shape) : shape_(shape) {}
@@ -77,11 +77,11 @@ class ShapeTranslation final : public ShapeMotion {
   int axis_;
 };
 
-// About a point that only translations take along, so that steps add up: the bounds of a shape that
-// turns have their center here and there.
+// Rotation about a pivot that only translations move, so that steps add up. The center of a shape's
+// bounds would change as it rotates.
 class ShapeRotation final : public ShapeMotion {
  public:
-  // center: at the start; pose: since then.
+  // center: initially; pose: the motion since.
   ShapeRotation(ShapeId shape, int axis, const Vec3d& center, const ShapePose& pose = {})
       : ShapeMotion(shape),
         shape_(shape),
@@ -121,10 +121,10 @@ class ShapeRotation final : public ShapeMotion {
   Vec3d start_, center_;
 };
 
-// About the same point, in sizes of the start.
+// Scaling about the same pivot, in units of the initial size.
 class ShapeScaling final : public ShapeMotion {
  public:
-  // center: at the start; pose: since then.
+  // center: initially; pose: the motion since.
   ShapeScaling(ShapeId shape, const Vec3d& center, const ShapePose& pose = {})
       : ShapeMotion(shape),
         shape_(shape),
@@ -166,7 +166,7 @@ class VertexField final : public ShapeMotion {
   std::vector<Vec3d> field_;  // V
 };
 
-// One vector per vertex of the mesh. Copies of a vertex must not come apart: the mesh would tear.
+// Reads one vector per vertex. Copies of a vertex must not separate and tear the mesh.
 std::vector<Vec3d> read_field(const Shape& shape, const std::string& file) {
   const Mesh& mesh = shape.mesh;
   std::vector<Vec3d> v = read_vertex_vectors(file);
@@ -190,8 +190,8 @@ void check_vertex(const Scene& scene, const std::string& name, int64_t vertex, s
                                      std::to_string(count - 1));
 }
 
-// All coordinates of all vertices. A component moves its vertex with all copies, so that the mesh
-// stays whole; the derivative along a field is the sum over first copies (weld[i] == i).
+// All vertex coordinates. A component moves its vertex with all copies; the derivative along a
+// field is the sum over first copies (weld[i] == i).
 class VertexArray final : public ShapeMotion {
  public:
   explicit VertexArray(ShapeId shape) : ShapeMotion(shape), shape_(shape) {}
@@ -259,10 +259,10 @@ class VertexArray final : public ShapeMotion {
   ShapeId shape_;
 };
 
-// All vertices, each along its normal. A component moves its vertex with all copies.
+// Displacement of all vertices along their normals. A component moves its vertex with all copies.
 class VertexDisplacement final : public ShapeMotion {
  public:
-  // held: the normals, V; empty: those that the mesh has by then.
+  // held: V fixed normals; if empty, those of the current mesh.
   explicit VertexDisplacement(ShapeId shape, std::vector<Vec3d> held = {})
       : ShapeMotion(shape), shape_(shape), held_(std::move(held)) {}
 

@@ -1,4 +1,4 @@
-// Motions of the texels of an environment's map: along a field, one by one.
+// Motions of the texels of an environment map: along a field, or single texels.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -14,9 +14,9 @@ namespace limn {
 
 namespace {
 
-constexpr double kLargest = std::numeric_limits<float>::max();  // of a texel
+constexpr double kLargest = std::numeric_limits<float>::max();  // of a texel's value
 
-// Radiance is linear in texels, so that moves are exact but for the rounding of a float.
+// Radiance is linear in texels, so moves are exact up to float rounding.
 class TexelMotion : public Motion {
  public:
   void seed(Scene& scene, int lane, size_t component) const final {
@@ -47,7 +47,7 @@ class TexelField final : public TexelMotion {
   Image field_;  // H by W by 3
 };
 
-// As many channels as a map has: grey moves all alike. A map of one row is kept as two.
+// Reads as many channels as the map has; grey changes all alike. A map of one row is stored as two.
 Image read_texel_field(const Environment::Map& map, const std::string& file) {
   const Image image = read_exr(file);
   const bool one_row = image.height == 1 && map.height == 2;
@@ -68,7 +68,7 @@ Image read_texel_field(const Environment::Map& map, const std::string& file) {
   return field;
 }
 
-// A hundredth of the mean magnitude of the texels: of the largest, a sun, it would be a new sky.
+// A hundredth of the texels' mean magnitude. The largest (a sun) would give too large a step.
 double natural_step_of(const Environment::Map& map) {
   return map.mean > 0 ? 0.01 * map.mean : 0.01;
 }

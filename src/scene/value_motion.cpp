@@ -1,4 +1,4 @@
-// Values of BSDFs and emitters: numbers that grow by the step.
+// Parameters of BSDFs and emitters: values to which the step is added.
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -10,7 +10,7 @@ namespace limn {
 
 namespace {
 
-// The values in any copy of the scene: one number, or three channels that grow together (grey).
+// Accesses the values in any copy of the scene: one number, or three channels that change together.
 using Values = std::function<ParameterRef(Scene&)>;
 
 class ValueMotion final : public Motion {
@@ -24,7 +24,7 @@ class ValueMotion final : public Motion {
   }
   std::vector<double> numbers(const Scene& scene) const override {
     std::vector<double> all;
-    // Only read: a ParameterRef of a scene that cannot change would be a second type.
+    // Read only: a const variant of ParameterRef would be a second type.
     for (const Dual* v : values_(const_cast<Scene&>(scene)).values) all.push_back(v->v);
     return all;
   }
@@ -57,7 +57,7 @@ class ValueMotion final : public Motion {
   Values values_;
 };
 
-// A step of a hundredth of the largest value, or 0.01 where all are 0.
+// The natural step is a hundredth of the largest value, or 0.01 if all are 0.
 Parameter value_parameter(const std::string& name, const std::vector<double>& now,
                           const Values& values) {
   double largest = 0;
@@ -68,7 +68,7 @@ Parameter value_parameter(const std::string& name, const std::vector<double>& no
   return parameter;
 }
 
-// size: of the scene; unused without lengths.
+// size: of the scene; used for lengths only.
 void set_unit(ParameterRef::Unit unit, double size, Parameter& parameter) {
   if (unit == ParameterRef::Unit::kValue) return;
   const bool length = unit == ParameterRef::Unit::kLength;
@@ -76,7 +76,7 @@ void set_unit(ParameterRef::Unit unit, double size, Parameter& parameter) {
   parameter.natural_step = length ? 0.01 * size : 0.01;
 }
 
-// The values of an object that has them under names. owner: finds that object in a copy.
+// Adds the named values of an object. owner: finds the object in a copy of the scene.
 template <class Owner>
 void add_values(const std::string& id, const std::vector<ParameterRef>& values, const Owner& owner,
                 std::vector<Parameter>& list, double size = 0) {

@@ -1,4 +1,4 @@
-// From the tree of a scene file to objects with typed properties: ids, aliases, references.
+// Converts the XML tree to objects with typed properties: ids, aliases, references.
 #include "src/scene_file/scene_description.h"
 
 #include <algorithm>
@@ -16,7 +16,7 @@ const std::vector<std::string> kObjectTags = {"bsdf",    "emitter", "film",   "i
 const std::vector<std::string> kSceneObjectTags = {"bsdf", "emitter", "integrator", "sensor",
                                                    "shape"};
 
-constexpr size_t kMaxAliases = 64;  // on the way to an object; not tuned
+constexpr size_t kMaxAliases = 64;  // in a chain of aliases; not tuned
 
 bool contains(const std::vector<std::string>& words, const std::string& word) {
   return std::find(words.begin(), words.end(), word) != words.end();
@@ -140,7 +140,7 @@ class Describer {
     }
   }
 
-  // Aliases may name aliases that come later in the file.
+  // An alias may name a later alias.
   std::shared_ptr<ObjectDescription> find(std::string id, SourceLocation where) const {
     for (size_t step = 0;; ++step) {
       if (step > aliases_.size()) throw InputError(where, "the alias \"" + id + "\" names itself");

@@ -1,5 +1,5 @@
 #pragma once
-// A scene file as objects with typed properties, before anything is made of them.
+// A scene file as objects with typed properties, before interpretation.
 #include <map>
 #include <memory>
 #include <string>
@@ -17,7 +17,7 @@ struct DescribedProperty {
 
 struct ObjectDescription;
 
-// An object inside another: written there, or referred to.
+// A nested object or a reference.
 struct ChildDescription {
   std::shared_ptr<ObjectDescription> object;  // null until a reference is resolved
   std::string reference;                      // "" if written in place
@@ -36,7 +36,7 @@ struct ObjectDescription {
 struct SceneDescription {
   SceneDescription() = default;
   SceneDescription(SceneDescription&&) = default;
-  // Objects that refer to each other in a circle (an error) would keep each other alive.
+  // Breaks reference cycles (an error in the file), which would never be freed.
   ~SceneDescription() {
     for (const auto& object : with_id) object->children.clear();
   }
@@ -49,8 +49,8 @@ struct SceneDescription {
   std::vector<std::string> files;  // the scene file and what it includes
 };
 
-// Every reference is resolved. InputError for unknown elements, attributes and references, and for
-// duplicate ids and properties. text: see load_scene_tree().
+// Parses a scene file and resolves all references. InputError for unknown elements, attributes and
+// references, and for duplicate ids and properties. text: see load_scene_tree().
 SceneDescription describe_scene(const std::string& file,
                                 const std::map<std::string, std::string>& defines,
                                 const std::string* text);

@@ -1,4 +1,4 @@
-// Typed access to the properties of one element, and what nobody asked for.
+// Typed access to the properties of one element, and detection of unused ones.
 #include "src/scene_file/scene_properties.h"
 
 #include <algorithm>
@@ -70,8 +70,8 @@ Vec3d DescribedProperties::point(const std::string& name, const Vec3d& absent) {
   fail_type(name, *p, "<point>");
 }
 
-// A constant spectrum is grey only where Mitsuba weighs it by a white illuminant, that is for
-// reflectances; lights and indices of refraction come out pinkish there.
+// A constant spectrum is grey for reflectances only. For lights and indices of refraction Mitsuba
+// gives a slightly pink colour, since it does not weight by a white illuminant.
 Rgb<double> DescribedProperties::rgb(const std::string& name, const Rgb<double>& absent) {
   const DescribedProperty* p = find(name);
   if (!p) return absent;
@@ -130,7 +130,7 @@ const ObjectDescription* DescribedProperties::nested(const std::string& wanted) 
 }
 
 void DescribedProperties::check_all_used() const {
-  // In the order of the file, so that the first mistake is the one reported.
+  // Visited in file order, so that the first mistake is reported.
   const DescribedProperty* first = nullptr;
   std::string first_name;
   const auto place = [](const SourceLocation& l) { return std::make_pair(l.line, l.column); };

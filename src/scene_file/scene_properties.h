@@ -1,5 +1,5 @@
 #pragma once
-// Properties over one described object.
+// Properties of a described object.
 #include <functional>
 #include <set>
 
@@ -12,7 +12,7 @@ using BsdfMaker = std::function<std::shared_ptr<Bsdf>(const ObjectDescription&)>
 
 class DescribedProperties final : public Properties {
  public:
-  // `make_nested` makes nested BSDFs. Description, scene and maker must outlive this object.
+  // make_nested creates nested BSDFs. All arguments must outlive this object.
   DescribedProperties(const ObjectDescription& object, const SceneDescription& scene,
                       const BsdfMaker& make_nested)
       : object_(object), scene_(scene), make_nested_(make_nested) {}
@@ -37,11 +37,11 @@ class DescribedProperties final : public Properties {
   // The nested object of this tag; null if there is none, InputError if there are several.
   const ObjectDescription* nested(const std::string& tag);
 
-  // InputError at the first property or nested object that nobody has asked for.
+  // InputError for the first property or nested object that was never read.
   void check_all_used() const;
 
  private:
-  // Null if absent. Remembers that the name is known.
+  // Null if absent. Records the name as known.
   const DescribedProperty* find(const std::string& name) const;
   [[noreturn]] void fail_type(const std::string& name, const DescribedProperty& property,
                               const std::string& expected) const;

@@ -1,4 +1,4 @@
-// From the description of a sensor to camera, film, filter and sampler.
+// Converts the description of a sensor to camera, film, filter and sampler.
 #include "src/scene_file/scene_sensor.h"
 
 #include <cmath>
@@ -37,7 +37,7 @@ double positive(Properties& properties, const std::string& name, double absent) 
   return number;
 }
 
-// A pixel reaches all others of the film long before.
+// Limits the radius: far smaller ones already cover the whole film.
 double radius_of_filter(Properties& properties, const std::string& name, double absent) {
   const double number = positive(properties, name, absent);
   if (number > 1000) properties.fail(name, "must be at most 1000 pixels");
@@ -59,7 +59,7 @@ void read_filter(const ObjectDescription& object, const SceneDescription& scene,
   p.check_all_used();
 }
 
-// A string that must be one of `known`.
+// Reads a string that must be one of `known`.
 std::string choice(Properties& properties, const std::string& name, const std::string& absent,
                    const std::vector<std::string>& known) {
   std::string word = lower_case(properties.string(name, absent));
@@ -69,7 +69,7 @@ std::string choice(Properties& properties, const std::string& name, const std::s
   properties.fail(name, unknown_name("value", word, known));
 }
 
-// Of an image alone, measured: films of 1, 4 and 16 million pixels; derivatives take more.
+// Memory of an image, measured on films of 1, 4 and 16 million pixels; derivatives take more.
 constexpr double kBytesPerPixel = 76;
 
 void read_crop(Properties& p, const Camera& camera, Film& film) {
@@ -106,7 +106,7 @@ void read_film(const ObjectDescription& object, const SceneDescription& descript
   choice(p, "file_format", "openexr", {"openexr", "exr"});
   film.luminance = choice(p, "pixel_format", "rgb", {"luminance", "rgb"}) == "luminance";
   film.half = choice(p, "component_format", "float16", {"float16", "float32"}) == "float16";
-  // Neither changes a picture here: sums are in double precision, and there is no banner.
+  // Ignored: sums are in double precision, and there is no banner.
   p.boolean("compensate", false);
   p.boolean("banner", false);
   if (const ObjectDescription* filter = p.nested("rfilter")) {
@@ -127,7 +127,7 @@ void read_sampler(const ObjectDescription& object, const SceneDescription& descr
   p.check_all_used();
 }
 
-// tan(x_fov / 2) over tan(fov / 2), for a field of view along `axis` of a film of this aspect.
+// tan(x_fov / 2) over tan(fov / 2) for a field of view along `axis` at this aspect ratio.
 double x_factor(Properties& p, const std::string& axis, double aspect) {
   if (axis == "x") return 1;
   if (axis == "y") return aspect;
@@ -137,7 +137,7 @@ double x_factor(Properties& p, const std::string& axis, double aspect) {
   p.fail("fov_axis", unknown_name("axis", axis, {"diagonal", "larger", "smaller", "x", "y"}));
 }
 
-// Field of view [degrees] of a focal length on 35 mm film, along its diagonal.
+// Diagonal field of view [degrees] of a focal length on 35 mm film.
 double fov_of_focal_length(Properties& p) {
   std::string text = p.string("focal_length", "50mm");
   if (text.ends_with("mm")) text.resize(text.size() - 2);
@@ -167,7 +167,7 @@ void read_fov(Properties& p, Camera& camera) {
 
 Vec3<Dual> dual(const Vec3d& v) { return {v.x, v.y, v.z}; }
 
-// The camera's axes, made exactly orthonormal. Mirrored cameras are allowed, as in Mitsuba.
+// Orthonormalises the camera's axes. Mirrored cameras are allowed, as in Mitsuba.
 void read_axes(Properties& p, Camera& camera) {
   constexpr double kDigits = 1e-3;  // Mitsuba's bound on scale factors
   const Matrix4 m = p.transform("to_world");
@@ -218,8 +218,8 @@ Sensor read_sensor(const ObjectDescription& sensor, const SceneDescription& desc
   if (!(camera.near_clip < camera.far_clip)) p.fail("far_clip", "must be larger than near_clip");
   camera.offset_x = p.number("principal_point_offset_x", 0);
   camera.offset_y = p.number("principal_point_offset_y", 0);
-  // Nothing here moves during an exposure and a pinhole has no focus: Mitsuba's files carry these,
-  // and they change nothing there either.
+  // Accepted and ignored: nothing moves during an exposure, and a pinhole has no focus. They have
+  // no effect in Mitsuba either.
   p.number("shutter_open", 0);
   p.number("shutter_close", 0);
   p.number("focus_distance", camera.far_clip);

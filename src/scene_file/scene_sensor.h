@@ -5,7 +5,7 @@
 
 namespace limn {
 
-// Reads `sensor`, with its film, filter and sampler.
+// Reads a sensor with its film, filter and sampler.
 Sensor read_sensor(const ObjectDescription& sensor, const SceneDescription& description);
 
 }  // namespace limn

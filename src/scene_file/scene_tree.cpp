@@ -1,4 +1,4 @@
-// What is resolved before any element has a meaning: <default>, <include>, <path>, $name.
+// Resolves <default>, <include>, <path> and $name.
 #include "src/scene_file/scene_tree.h"
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// A scene ends, whatever includes and refers to whatever. Not tuned: far above what scenes have.
+// Limits against endless includes and substitutions. Not tuned: far above real scenes.
 constexpr int kMaxIncludeDepth = 15;
 constexpr size_t kMaxFiles = 1000;
 constexpr size_t kMaxPaths = 64;
@@ -69,7 +69,7 @@ class TreeLoader {
   }
 
   std::string parameter_at(const std::string& text, size_t begin, const SourceLocation& where) {
-    // Every name that begins the text comes before it in order, the longest one last.
+    // Names that begin the text come before it in sorted order, the longest last.
     std::string_view rest = std::string_view(text).substr(begin);
     for (auto i = values_.upper_bound(rest); i != values_.begin();) {
       const std::string& name = (--i)->first;
@@ -103,7 +103,7 @@ class TreeLoader {
     }
   }
 
-  // Carries out <default>, <path> or <include>.
+  // Executes <default>, <path> or <include>.
   void obey(const XmlElement& order, XmlElement& parent, int include_depth) {
     if (order.name == "default") {
       check_attributes(order, {"name", "value"}, {"name", "value"});

@@ -1,5 +1,5 @@
 #pragma once
-// First pass over a scene file: parameters substituted, includes spliced in, search paths gathered.
+// First pass over a scene file: substitutes parameters, includes files, collects search paths.
 #include <map>
 #include <string>
 #include <vector>
@@ -8,27 +8,27 @@
 
 namespace limn {
 
-// The root with nothing left in it of <default>, <include>, <path> and $name.
+// The root element after <default>, <include>, <path> and $name are resolved.
 struct SceneTree {
   XmlElement root;
   std::vector<std::string> search_path;  // directories of <path>, the latest first
-  std::vector<std::string> files;        // all that were read, in order
+  std::vector<std::string> files;        // all files read, in order
 };
 
-// `defines` override <default>; one that nothing refers to is an error. An included file has the
-// root <scene>, whose content takes the include's place, or any other element.
-// text: stands for the content of `file`, which need not be there; null: it is read.
+// `defines` override <default>; unused ones are errors. An included file has the root <scene>,
+// whose content replaces the include, or any other element. text: the content of `file`, which then
+// need not exist; null: reads the file.
 SceneTree load_scene_tree(const std::string& file,
                           const std::map<std::string, std::string>& defines,
                           const std::string* text);
 
-// The first of these that exists: `name` itself if absolute; in the directory of the file that
-// mentions it; in the search path. "" if none does.
+// The first existing file of: `name` if absolute; in the directory of the referring file; in the
+// search path. "" if none exists.
 std::string find_input_file(const std::string& name, const std::string& mentioned_in,
                             const std::vector<std::string>& search_path);
 
-// InputError at the first attribute of `element` that is not among `known`, or at the element if
-// one of `required` is missing.
+// InputError at the first attribute of `element` that is not in `known`, or at the element if one
+// of `required` is missing.
 void check_attributes(const XmlElement& element, const std::vector<std::string>& known,
                       const std::vector<std::string>& required);
 

@@ -1,4 +1,4 @@
-// The values of property tags: numbers, colours, vectors, transforms.
+// Parses property tags: numbers, colours, vectors, transforms.
 #include "src/scene_file/scene_values.h"
 
 #include <algorithm>
@@ -20,7 +20,7 @@ namespace {
                                         expected + ", not \"" + attribute.value + "\"");
 }
 
-// `expected` of numbers; what no float holds is beyond any use here, and overflows on its way.
+// Parses a number; values beyond the range of floats are errors, as they overflow later.
 double parse_number(const XmlElement& element, const XmlAttribute& attribute, std::string_view word,
                     const std::string& expected) {
   const std::optional<double> number = parse_double(word);
@@ -35,7 +35,7 @@ double parse_number(const XmlElement& element, const XmlAttribute& attribute) {
   return parse_number(element, attribute, attribute.value, "a finite number");
 }
 
-// Numbers between commas and blanks, as many as one of `counts` allows.
+// Parses numbers separated by commas and blanks; `counts` lists the allowed numbers of them.
 std::vector<double> parse_numbers(const XmlElement& element, const XmlAttribute& attribute,
                                   const std::vector<size_t>& counts) {
   std::vector<double> numbers;
@@ -57,8 +57,8 @@ Vec3d three(const std::vector<double>& n) {
   return n.size() == 1 ? Vec3d{n[0], n[0], n[0]} : Vec3d{n[0], n[1], n[2]};
 }
 
-// A vector from value="..." or from x, y, z; what is missing of the latter is `absent`, or an error
-// if `all_needed`. Without any of them: nothing.
+// A vector from value="..." or from x, y, z. Missing coordinates are `absent`, or an error if
+// `all_needed`. Nothing if no attribute is present.
 std::optional<Vec3d> parse_vector(const XmlElement& element, double absent, bool all_needed) {
   const XmlAttribute* value = element.find("value");
   Vec3d v{absent, absent, absent};
@@ -109,7 +109,7 @@ Matrix4 parse_scale(const XmlElement& e) {
   return from_columns({s.x, 0, 0}, {0, s.y, 0}, {0, 0, s.z}, {});
 }
 
-// Rodrigues' formula on the three unit vectors.
+// Rodrigues' formula, applied to the unit vectors.
 Matrix4 parse_rotate(const XmlElement& e) {
   check_attributes(e, {"value", "x", "y", "z", "angle"}, {"angle"});
   Vec3d axis = parse_vector(e, 0, false).value_or(Vec3d{});
@@ -141,8 +141,8 @@ Matrix4 parse_matrix(const XmlElement& e) {
   return r;
 }
 
-// Camera to world: +X left, +Y up, +Z along the view. Without `up` some direction across the view
-// serves.
+// Camera to world: +X left, +Y up, +Z along the view. Without `up` an arbitrary perpendicular
+// direction is used.
 Matrix4 parse_lookat(const XmlElement& e) {
   check_attributes(e, {"origin", "target", "up"}, {"origin", "target"});
   const Vec3d origin = three(parse_numbers(e, *e.find("origin"), {3}));
@@ -156,7 +156,7 @@ Matrix4 parse_lookat(const XmlElement& e) {
   const double up_size = std::hypot(up.x, up.y, up.z);
   up = up_size > 0 ? up / up_size : Frame(forward).s;
   const Vec3d left = cross(up, forward);
-  // Sine of the angle: below this, rounding of the inputs decides where left is.
+  // The sine of the angle to `up`: below this, rounding decides the direction of left.
   if (length(left) < 1e-7) {
     throw InputError(e.where, "<lookat>: up points along the view");
   }

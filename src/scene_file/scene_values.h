@@ -1,5 +1,5 @@
 #pragma once
-// The property tags of a scene file and their values.
+// Property tags of a scene file and their values.
 #include <string>
 #include <variant>
 
@@ -8,7 +8,7 @@
 
 namespace limn {
 
-// <spectrum value="0.5">: the same at all wavelengths.
+// <spectrum value="0.5">: constant over wavelength.
 struct ConstantSpectrum {
   double value = 0;
 };
@@ -20,7 +20,7 @@ using PropertyValue =
 const std::vector<std::string>& property_tags();
 bool is_property_tag(const std::string& tag);
 
-// The value of a property element; InputError where an attribute is unknown, missing or malformed.
+// Parses a property element; InputError for an unknown, missing or malformed attribute.
 PropertyValue parse_property(const XmlElement& element);
 
 }  // namespace limn

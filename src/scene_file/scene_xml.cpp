@@ -1,4 +1,4 @@
-// From the description of a scene to the scene.
+// Builds the scene from its description.
 #include <cmath>
 #include <filesystem>
 #include <stdexcept>
@@ -31,7 +31,7 @@ class SceneBuilder {
       add(*object);
       note_data_file(*object);
     }
-    // BSDFs that no shape uses are made as well: their mistakes count, and so do their ids.
+    // Unused BSDFs are built, too, since they may contain errors and their ids count.
     for (const auto& object : description_.objects) {
       if (object->tag == "bsdf") bsdf(*object);
     }
@@ -90,7 +90,7 @@ class SceneBuilder {
     p.check_all_used();
   }
 
-  // One object per element, however often it is referred to.
+  // One object per element, shared by all references to it.
   std::shared_ptr<Bsdf> bsdf(const ObjectDescription& object) {
     const auto [entry, is_new] = bsdfs_.try_emplace(&object);
     if (!is_new) {
@@ -138,12 +138,12 @@ class SceneBuilder {
     options.flip_normals = p.boolean("flip_normals", false);
     if (from_file) {
       options.face_normals = p.boolean("face_normals", false);
-      p.boolean("flip_tex_coords", true);  // there are no textures to flip
+      p.boolean("flip_tex_coords", true);  // ignored: there are no textures
     }
     return options;
   }
 
-  // The shape's mesh in its own space; sets `options`.
+  // Reads the shape's mesh in object space; sets `options`.
   RawMesh read_geometry(DescribedProperties& p, MeshOptions& options) {
     const std::string& type = p.type();
     const bool from_file = type == "obj" || type == "ply";
@@ -153,8 +153,8 @@ class SceneBuilder {
       return type == "obj" ? parse_obj(file) : parse_ply(file);
     }
     options = read_mesh_options(p, false);
-    // Flat shapes have the normals of their faces. Where they are mirrored their outside stays
-    // outside, as in Mitsuba, which transforms their normals.
+    // Flat shapes use face normals. A mirrored flat shape keeps its outside, as in Mitsuba, which
+    // transforms the normals.
     options.face_normals = type != "sphere";
     if (options.face_normals && mirrors(options.to_world)) {
       options.flip_normals = !options.flip_normals;
@@ -184,9 +184,9 @@ class SceneBuilder {
     return make_sphere();
   }
 
-  // What shapes take beside what they have taken already, asked for now and then.
+  // Checks the free memory for shapes, at intervals.
   void check_memory(const RawMesh& raw) {
-    // Of mesh, ray tracer and image, measured: 0.2 and 1 million faces. Edges take more.
+    // Memory of mesh, ray tracer and image, measured at 0.2 and 1 million faces. Edges take more.
     constexpr double kBytesPerFace = 180;
     constexpr double kWorthAsking = 1e8;
     unasked_ += kBytesPerFace * static_cast<double>(raw.faces.size());
@@ -220,7 +220,7 @@ class SceneBuilder {
   Scene scene_;
   std::map<const ObjectDescription*, std::shared_ptr<Bsdf>> bsdfs_;
   int bsdf_depth_ = 0;
-  double unasked_ = 0;  // bytes of shapes since memory was asked for
+  double unasked_ = 0;  // bytes of shapes since the last check
   const ObjectDescription* integrator_ = nullptr;
   const ObjectDescription* environment_ = nullptr;
 };

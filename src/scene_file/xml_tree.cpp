@@ -1,4 +1,4 @@
-// The only file that knows pugixml.
+// XML parsing; the only file that includes pugixml.
 #include "src/scene_file/xml_tree.h"
 
 #include <algorithm>
@@ -8,10 +8,10 @@ namespace limn {
 
 namespace {
 
-constexpr int kMaxDepth = 64;          // of elements; not tuned: far below what the stack takes
-constexpr size_t kMaxAttributes = 64;  // of an element; not tuned: none knows more than eight
+constexpr int kMaxDepth = 64;          // of elements; not tuned: far below the stack's limit
+constexpr size_t kMaxAttributes = 64;  // of an element; not tuned: no element has more than eight
 
-// Lines and columns of byte offsets. A column counts bytes.
+// Converts byte offsets to lines and columns. A column counts bytes.
 class TextPlaces {
  public:
   TextPlaces(const std::string& file, const std::string& text) : file_(file), text_(text) {
@@ -33,7 +33,7 @@ class TextPlaces {
   std::vector<size_t> line_starts_{0};
 };
 
-// pugixml leaves what it does not know as it is; what a document defines itself is not read.
+// Rejects unknown entities, which pugixml leaves unchanged, and document type definitions.
 void check_entities(const TextPlaces& places, size_t begin, size_t end) {
   const std::string& text = places.text();
   for (size_t i = begin; i < end; ++i) {
@@ -46,8 +46,8 @@ void check_entities(const TextPlaces& places, size_t begin, size_t end) {
   }
 }
 
-// pugixml knows where elements begin but not where attributes do. The text is well-formed, so from
-// the element's name on it is `name = "value"` again and again.
+// Offsets of attributes, which pugixml does not report. The well-formed text after an element's
+// name is a sequence of `name = "value"`.
 std::vector<size_t> attribute_offsets(const TextPlaces& places, size_t offset, size_t count) {
   const std::string& text = places.text();
   static const char* const kSpace = " \t\r\n";
@@ -117,12 +117,12 @@ const XmlAttribute* XmlElement::find(const std::string& attribute) const {
 
 XmlElement parse_xml(const std::string& file, const std::string& text) {
   const TextPlaces places(file, text);
-  // pugixml would end there.
+  // pugixml would stop at a NUL character.
   if (const size_t nul = text.find('\0'); nul != text.npos) {
     throw InputError(places.at(nul), "malformed XML: a byte of value 0");
   }
   pugi::xml_document document;
-  // As a fragment, or text beside the root would be dropped without a word.
+  // Parsed as a fragment: otherwise text beside the root would be dropped silently.
   const pugi::xml_parse_result result = document.load_buffer(
       text.data(), text.size(), pugi::parse_default | pugi::parse_doctype | pugi::parse_fragment,
       pugi::encoding_utf8);

@@ -1,5 +1,5 @@
 #pragma once
-// XML as a plain tree with a place for everything in it.
+// XML as a plain tree with source locations.
 #include <string>
 #include <vector>
 
@@ -19,13 +19,13 @@ struct XmlElement {
   std::vector<XmlAttribute> attributes;
   std::vector<XmlElement> children;
 
-  // Null if there is none of this name.
+  // Null if absent.
   const XmlAttribute* find(const std::string& attribute) const;
 };
 
-// Parses `text`, the content of `file`, and returns its root. InputError at the place of what is
-// malformed: also for text between elements, repeated attributes, entities other than XML's five,
-// elements nested more than 64 deep, and more than 64 attributes.
+// Parses `text`, the content of `file`, and returns the root. InputError at the location of the
+// error: malformed XML, text between elements, repeated attributes, entities other than XML's five,
+// more than 64 levels of nesting, more than 64 attributes.
 XmlElement parse_xml(const std::string& file, const std::string& text);
 
 }  // namespace limn

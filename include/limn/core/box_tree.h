@@ -1,5 +1,5 @@
 #pragma once
-// A tree over boxes, to find pairs that overlap.
+// A bounding volume hierarchy over boxes that finds overlapping pairs.
 #include <array>
 #include <cstdint>
 #include <span>
@@ -18,19 +18,19 @@ struct FloatBox {
   void extend(const FloatBox& other);
 };
 
-// Boxes side by side, one in each lane; lanes without a box overlap nothing.
+// Eight boxes in structure-of-arrays layout for SIMD; an unused slot overlaps nothing.
 struct LeafBoxes {
   static constexpr uint32_t kLanes = 8;  // not tuned
   float lower[3][kLanes], upper[3][kLanes];
 
   LeafBoxes();
   void set(uint32_t lane, const FloatBox& box);
-  // Bit i: the box overlaps that of lane i.
+  // Bit i is set if `box` overlaps the box in slot i.
   uint32_t overlaps(const FloatBox& box) const;
 };
 
-// Halves the boxes at the median of their centers until leaves hold kLeaf of them at most. The
-// boxes must outlive it; they are finite.
+// Median splits along the axis of widest centers, until a leaf holds at most kLeaf boxes. The boxes
+// must be finite and outlive the tree.
 class BoxTree {
  public:
   static constexpr uint32_t kLeaf = LeafBoxes::kLanes;
@@ -39,10 +39,10 @@ class BoxTree {
 
   uint32_t leaf_count() const { return leaves_; }
   const FloatBox& leaf_box(uint32_t leaf) const { return leaf_boxes_[leaf]; }
-  // Indices of the boxes in a leaf, and these boxes.
+  // The indices of the boxes in a leaf, and the boxes themselves.
   std::span<const uint32_t> leaf(uint32_t leaf) const;
   const LeafBoxes& boxes(uint32_t leaf) const { return packed_[leaf]; }
-  // Sets `leaves` to those whose boxes overlap `box`, in rising order, from the leaf `first` on.
+  // Sets `leaves` to the leaves >= `first` whose bounds overlap `box`, in ascending order.
   void find_leaves(const FloatBox& box, uint32_t first, std::vector<uint32_t>& leaves) const;
 
  private:
@@ -50,14 +50,14 @@ class BoxTree {
     std::array<float, 3> center;  // twice the center
     uint32_t box;
   };
-  // A node over `count` leaves, from the leaf `first` on. It and all below it are
-  // nodes_[node, node + 2 count - 1): its first half of count / 2 leaves follows it at once.
+  // A subtree over `count` leaves, starting with the leaf `first`. It occupies nodes_[node, node +
+  // 2 count - 1); its left child, over count / 2 leaves, follows it directly.
   struct Part {
     uint32_t node, first, count;
     Part left() const { return {node + 1, first, count / 2}; }
     Part right() const { return {node + 2 * (count / 2), first + count / 2, count - count / 2}; }
   };
-  // Splits until parts hold `smallest` leaves at most; these go to `parts`.
+  // Splits `part` until each piece has at most `smallest` leaves; appends the pieces to `parts`.
   void split(const Part& part, uint32_t smallest, std::vector<Part>& parts);
   void halve(const Part& part);
   void build(const Part& part);

@@ -1,6 +1,6 @@
 #pragma once
-// The pinhole camera of Mitsuba 3: camera space has +X to the left of the image, +Y up, +Z along
-// the view.
+// The pinhole camera, with Mitsuba 3's conventions: in camera space +X points to the left of the
+// image, +Y up, and +Z along the view.
 #include <span>
 
 #include "limn/core/dual.h"
@@ -31,8 +31,8 @@ struct Camera {
   int width = 768;  // full film, pixels
   int height = 576;
 
-  // The ray through film position (x, y) [pixels of the full film, row 0 on top]. For many rays,
-  // see CameraView.
+  // The ray through the film position (x, y) [pixels of the full film, row 0 on top]. CameraView is
+  // faster for many rays.
   template <class S>
   CameraRay<S> ray(double x, double y) const;
 
@@ -50,7 +50,7 @@ struct Camera {
   }
 };
 
-// What all rays of a camera share, worked out once. The camera must stay as it is.
+// Values shared by all rays of a camera, precomputed. The camera must not change meanwhile.
 template <class S>
 class CameraView {
  public:
@@ -64,7 +64,7 @@ class CameraView {
     tan_x_ = tan(as<S>(camera.fov) * (kPi / 360)) * camera.x_factor;
   }
 
-  // With numbers of its own in place of the camera's.
+  // A view with the given origin and axes in place of the camera's own.
   CameraView(const Camera& camera, const Vec3<S>& origin, const Vec3<S>& left, const Vec3<S>& up,
              const Vec3<S>& forward, const S& fov)
       : camera_(camera), origin_(origin), left_(left), up_(up), forward_(forward) {
@@ -83,7 +83,7 @@ class CameraView {
            is_still(tan_x_);
   }
 
-  // As Camera::ray. X: S, or double where the film position is held.
+  // Camera::ray. X is S, or double if the film position is static.
   template <class X>
   CameraRay<S> ray(const X& x, const X& y) const {
     const Camera& c = camera_;
@@ -91,7 +91,7 @@ class CameraView {
     const double d_length = length(value(d));
     return {origin_, normalize(d), c.near_clip * d_length, c.far_clip * d_length};
   }
-  // Its direction, of depth 1.
+  // The unnormalised direction of `ray`, of depth 1.
   template <class X>
   Vec3<Product<S, X>> towards(const X& x, const X& y) const {
     const Camera& c = camera_;
@@ -102,7 +102,7 @@ class CameraView {
   }
   const Camera& camera() const { return camera_; }
 
-  // The direction of ray(x + dx, y + dy) is that of a + dx u + dy v, whose depth is 1.
+  // The direction of ray(x + dx, y + dy) is that of a + dx u + dy v, which has depth 1.
   struct Plane {
     Vec3<S> u, v, a;
   };
@@ -141,7 +141,7 @@ Camera::FilmPoint<S> Camera::project(const Vec3<S>& point) const {
   return CameraView<S>(*this).project(point);
 }
 
-// The rays through many positions, eight at a time.
+// Rays through many film positions, eight at a time (SIMD).
 void find_rays(const CameraView<double>& view, std::span<const Camera::FilmPoint<double>> positions,
                std::span<CameraRay<double>> rays);
 

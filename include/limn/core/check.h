@@ -1,11 +1,11 @@
 #pragma once
-// Preconditions: what only a mistake in the program can break. A failure prints the condition, its
-// operands and its place to stderr and aborts; what a user can get wrong is an InputError instead
-// (error.h). CHECK always looks, DCHECK in debug builds alone (without NDEBUG): for what is too
-// costly, or sits in an inner loop.
+// Preconditions that only a bug in the program can violate. A failure prints the condition, its
+// operands and its source location to stderr, and aborts. Errors that a user can cause are
+// InputErrors instead (error.h).
+// CHECK is always on. DCHECK is on in debug builds only (without NDEBUG), for costly checks and
+// inner loops.
 //
-// The names are the usual ones, so other libraries have them too: no public header includes this
-// one.
+// These names are common in other libraries, too. Therefore no public header includes this file.
 #include <iomanip>
 #include <limits>
 #include <sstream>

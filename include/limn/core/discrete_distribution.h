@@ -1,18 +1,18 @@
 #pragma once
-// Choosing one of many in proportion to weights.
+// A discrete distribution: draws an index in proportion to its weight.
 #include <algorithm>
 #include <cstddef>
 #include <vector>
 
 namespace limn {
 
-// Sums of weights that are not negative; draws search them, in the logarithm of their number.
+// Stores the cumulative sums of non-negative weights; a draw is a binary search.
 class DiscreteDistribution {
  public:
   struct Draw {
     size_t index;
     double probability;  // of the index
-    double fraction;     // what is left of the random number [0, 1]: uniform again
+    double fraction;     // position of u within the entry [0, 1]: uniform again
   };
 
   void add(double weight) { sums_.push_back(sum() + weight); }
@@ -20,7 +20,7 @@ class DiscreteDistribution {
   bool empty() const { return sums_.empty(); }
   double sum() const { return sums_.empty() ? 0 : sums_.back(); }
 
-  // u: in [0, 1). There is an entry, and one of them has a positive weight: none without is drawn.
+  // u in [0, 1). At least one weight must be positive; an entry of weight 0 is never drawn.
   Draw sample(double u) const {
     const double target = u * sums_.back();
     const auto found = std::upper_bound(sums_.begin(), sums_.end(), target);

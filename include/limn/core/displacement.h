@@ -1,13 +1,13 @@
 #pragma once
-// Where vertices go that are displaced along their normals.
+// Directions along which the displacement parameter moves vertices.
 #include <vector>
 
 #include "limn/core/mesh.h"
 
 namespace limn {
 
-// V unit vectors, the same for welded vertices: the angle-weighted means of the normals of the
-// faces around them, also where shading is flat or normals are given. 0 for vertices of no face.
+// V unit vectors, equal for welded vertices: angle-weighted means of the adjacent face normals,
+// also if shading is flat or normals are given. Zero for a vertex without faces.
 std::vector<Vec3d> displacement_directions(const Mesh& mesh);
 
 }  // namespace limn

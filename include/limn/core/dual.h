@@ -1,5 +1,5 @@
 #pragma once
-// Forward-mode derivatives: a value with its derivatives with respect to up to kLanes parameters.
+// Forward-mode automatic differentiation: a value and up to kLanes partial derivatives.
 #include <algorithm>
 #include <cmath>
 #include <type_traits>
@@ -8,7 +8,7 @@
 
 namespace limn {
 
-// Parameters that are differentiated in one pass: four doubles fill one AVX register.
+// Parameters differentiated in one pass. Four doubles fill one AVX register.
 inline constexpr int kLanes = 4;
 
 // Derivatives of one value with respect to the parameters of a pass.
@@ -88,14 +88,14 @@ struct Dual {
 }
 [[gnu::always_inline]] inline Dual& operator*=(Dual& a, const Dual& b) { return a = a * b; }
 
-// Comparisons look at the value alone.
+// Comparisons use the value alone.
 inline bool operator<(const Dual& a, const Dual& b) { return a.v < b.v; }
 inline bool operator>(const Dual& a, const Dual& b) { return a.v > b.v; }
 inline bool operator<=(const Dual& a, const Dual& b) { return a.v <= b.v; }
 inline bool operator>=(const Dual& a, const Dual& b) { return a.v >= b.v; }
 inline bool operator==(const Dual& a, const Dual& b) { return a.v == b.v; }
 
-// The derivative of sqrt at 0 is taken as 0.
+// The derivative of sqrt at 0 is defined as 0.
 [[gnu::always_inline]] inline Dual sqrt(const Dual& a) {
   const double r = std::sqrt(a.v);
   return {r, r > 0 ? a.d * (0.5 / r) : Lanes{}};
@@ -121,7 +121,7 @@ inline Dual atan2(const Dual& y, const Dual& x) {
 inline Dual max(const Dual& a, const Dual& b) { return a.v >= b.v ? a : b; }
 inline Dual min(const Dual& a, const Dual& b) { return a.v <= b.v ? a : b; }
 
-// Whether no parameter of the pass moves it.
+// True if all derivatives are zero.
 inline bool is_still(const Dual& a) { return is_zero(a.d); }
 inline bool is_still(const Vec3<Dual>& a) {
   return is_still(a.x) && is_still(a.y) && is_still(a.z);
@@ -139,7 +139,7 @@ Rgb<double> value(const Rgb<S>& a) {
   return {value(a.r), value(a.g), value(a.b)};
 }
 
-// A stored dual number read as the scalar S that a computation carries.
+// Converts a stored dual number to the scalar type S of a computation.
 template <class S>
 S as(const Dual& a) {
   if constexpr (std::is_same_v<S, double>) {

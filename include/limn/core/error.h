@@ -1,30 +1,30 @@
 #pragma once
-// Errors that a user can act on: what is wrong, where, and what to do.
+// Errors that a user can correct: each says what is wrong, where, and how to fix it.
 #include <stdexcept>
 #include <string>
 
 namespace limn {
 
-// A place in an input file; line and column count from 1, 0 where unknown.
+// A location in an input file. Line and column count from 1; 0 means unknown.
 struct SourceLocation {
   std::string file;
   int line = 0;
   int column = 0;
 };
 
-// "file:line:col: error: message"; the parts of the location that are unknown are left out.
+// "file:line:col: error: message", without those parts of the location that are unknown.
 std::string format_error(const SourceLocation& where, const std::string& message);
-// The same with "warning".
+// "file:line:col: warning: message", likewise.
 std::string format_warning(const SourceLocation& where, const std::string& message);
 
-// Bad input. what() is the whole line for the user.
+// Invalid input. what() is the complete line for the user.
 class InputError : public std::runtime_error {
  public:
   InputError(const SourceLocation& where, const std::string& message);
   explicit InputError(const std::string& message);
 };
 
-// A name that no parameter of the scene has; what() lists the nearest.
+// The scene has no parameter of this name. what() lists the nearest names.
 class UnknownParameter : public InputError {
  public:
   using InputError::InputError;

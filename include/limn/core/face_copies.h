@@ -1,6 +1,6 @@
 #pragma once
-// Faces in one place: with the same three corners, in one shape or in several, whichever way they
-// wind.
+// Duplicate faces: faces with the same three corners, in one shape or in several, of either
+// winding.
 #include <optional>
 #include <string>
 #include <unordered_map>
@@ -10,14 +10,14 @@
 
 namespace limn {
 
-// Whether two faces have the same corners.
+// True if two faces have the same three corners.
 bool are_copies(const Scene& scene, FaceRef a, FaceRef b);
 
-// Of two copies, whether a ray along `direction` meets `a`: that which faces it, then an emitter,
-// then the earlier one of the file.
+// True if a ray along `direction` hits `a` rather than its duplicate `b`: a front face wins over a
+// back face, then an emitter over a non-emitter, then the earlier face in the file.
 bool is_met_first(const Scene& scene, FaceRef a, FaceRef b, const Vec3d& direction);
 
-// All copies of a scene, each with its like.
+// All sets of duplicate faces of a scene.
 class FaceCopies {
  public:
   explicit FaceCopies(const Scene& scene);
@@ -26,12 +26,12 @@ class FaceCopies {
   const std::vector<std::vector<FaceRef>>& sets() const {
     return sets_;
   }  // each in the file's order
-  // The one that stands for a face and its copies: itself if it is alone.
+  // The representative of a face's duplicates: the first in the file. A unique face is its own.
   FaceRef first(FaceRef face) const {
     const std::vector<FaceRef>* set = set_of(face);
     return set ? set->front() : face;
   }
-  // Which of them a ray meets; none if emitters are skipped and there are no others.
+  // The duplicate that a ray hits; nothing if emitters are skipped and all duplicates are emitters.
   std::optional<FaceRef> met(FaceRef face, const Vec3d& direction, bool skip_emitters) const;
 
  private:
@@ -48,7 +48,7 @@ class FaceCopies {
   std::unordered_map<uint64_t, size_t> set_of_face_;
 };
 
-// One warning for every two shapes with copies that wind the same way: two surfaces in one place.
+// One warning for each pair of shapes with duplicate faces of equal winding.
 void warn_of_copies(const Scene& scene, const FaceCopies& copies,
                     std::vector<std::string>& warnings);
 // The shape's id in quotes, or its number.

@@ -1,6 +1,6 @@
 #pragma once
-// Faces that overlap in a plane, or lie one above the other so close that rays in floats meet
-// either of them: a rule has to say which one is met, or double precision.
+// Coplanar overlapping faces, and faces so close together that float rays cannot resolve which is
+// in front. A rule, or double precision, decides which of them a ray hits.
 #include <algorithm>
 #include <optional>
 #include <span>
@@ -13,32 +13,32 @@
 
 namespace limn {
 
-// Pairs of faces that lie in one plane, to the rounding of positions, and have more of it in common
-// than rounding explains: one of them is met, by a rule. And pairs that lie so above each other,
-// but with all of one within 2^-19 of the camera's distance from the other's plane, and within 2^-8
-// of either's longest side: they are *near*, and the nearer one is met, in double precision.
+// Pairs of *coplanar* faces overlap by more than the rounding of positions explains; a rule chooses
+// the face that is hit. Pairs of *near* faces overlap in projection, with all of one within 2^-19
+// of the camera's distance from the other's plane and within 2^-8 of either's longest side. Of
+// these the nearer one is hit, computed in double precision.
 class FaceOverlaps {
  public:
-  enum class Of { kAllFaces, kDifferentShapes };  // whether faces of one shape are looked for
-  // copies: of the scene; both must outlive it. Of copies the first alone is looked at, and near
-  // faces only among all faces. InputError if there are more than kMostPairs.
+  enum class Of { kAllFaces, kDifferentShapes };  // kDifferentShapes: no pairs within one shape
+  // copies: of the same scene; both must outlive this. Of duplicates only the first is tested.
+  // kDifferentShapes finds no near faces. InputError if there are more than kMostPairs.
   FaceOverlaps(const Scene& scene, const FaceCopies& copies, int threads, Of of = Of::kAllFaces);
 
   static constexpr size_t kMostPairs = 1 << 24;  // about 0.9 GB
 
   bool empty() const { return of_.empty(); }
-  // Those in one plane, each once, in the order of the file.
+  // Coplanar pairs, each once, in file order.
   std::vector<std::pair<FaceRef, FaceRef>> pairs() const;
-  // Those that overlap `face`, or the first of its copies, in its plane; none for no face.
+  // Faces coplanar with `face` (or with its first duplicate) that overlap it; none for no face.
   std::span<const FaceRef> of(FaceRef face) const { return found_of(face).first; }
-  // Those, and those that are near to it.
+  // Coplanar faces and near faces.
   std::span<const FaceRef> around(FaceRef face) const {
     const auto [in_plane, near] = found_of(face);
     return {in_plane.data(), in_plane.size() + near.size()};
   }
-  // Whether two faces lie in one place: copies, too.
+  // True if two faces are duplicates or overlap in a plane.
   bool contains(FaceRef a, FaceRef b) const;
-  // Faces that are asked for one by one: the time goes with the logarithm of their number.
+  // A set of faces with lookup by binary search.
   class Set {
    public:
     bool contains(FaceRef face) const {
@@ -49,28 +49,28 @@ class FaceOverlaps {
     friend FaceOverlaps;
     std::vector<uint64_t> keys_;  // sorted
   };
-  // Those that lie in one place with any of `faces`, as contains() says, and these themselves.
+  // `faces`, their duplicates, and all faces that overlap any of them in a plane.
   Set in_place_of(std::span<const FaceRef> faces) const;
-  // Of the faces in a hit's place, copies among them, that which the ray meets (is_met_first),
-  // after near ones that are met before it.
+  // Replaces the hit by the face that the rule (is_met_first) selects among its duplicates and
+  // coplanar faces, after near faces that lie in front of it.
   void settle(const Ray& ray, Hit& hit) const {
     if (has_others(hit.face) || !copies_->empty()) settle_among(ray, hit);
   }
-  // The first face that the ray meets of those near to the one where it starts; `hit` is changed
-  // only if that is nearer. False if there is none.
+  // Finds the first hit among the faces near the ray's start face. Updates `hit` and returns true
+  // only if that hit is nearer.
   bool leave(const Ray& ray, Hit& hit) const {
     return has_others(ray.start) && leave_near(ray, hit);
   }
-  // Whether the ray meets a face near to the one where it ends before it gets there.
+  // True if a face near the ray's end face occludes it.
   bool arrives_hidden(const Ray& ray) const;
-  // Whether another face is met in the place where the ray would meet `face`.
+  // True if the ray would hit a coplanar face or a duplicate instead of `face`.
   bool is_hidden(FaceRef face, const Ray& ray) const;
 
  private:
   static uint64_t key(FaceRef face) {
     return uint64_t{face.shape.index()} << 32 | face.face.index();
   }
-  using Found = std::pair<std::span<const FaceRef>, std::span<const FaceRef>>;  // in plane, near
+  using Found = std::pair<std::span<const FaceRef>, std::span<const FaceRef>>;  // coplanar, near
   Found found_of(FaceRef face) const {
     return has_others(face) ? find(copies_->first(face)) : Found{};
   }
@@ -86,19 +86,19 @@ class FaceOverlaps {
 
   const Scene* scene_;
   const FaceCopies* copies_;
-  std::vector<size_t> first_numbers_;  // of each shape's faces
-  // Whether a face, or one that it is a copy of, is in a pair: asked twice for every ray, mostly of
-  // faces that are in none.
+  std::vector<size_t> first_numbers_;  // first face number of each shape
+  // True for a face in any pair, or a duplicate of one. Queried twice per ray; most faces are in no
+  // pair.
   std::vector<bool> has_others_;
   std::vector<FaceRef> others_;
   struct Range {
-    size_t begin, near, end;  // in others_: those in the plane, then those near to it
+    size_t begin, near, end;  // in others_: coplanar faces, then near ones
   };
   std::unordered_map<uint64_t, Range> of_;
 };
 
-// One warning for every two shapes that have faces in one place, or in one plane where they
-// overlap, which face the same way: two surfaces in one place.
+// One warning for each pair of shapes with duplicate or coplanar overlapping faces that face the
+// same way.
 void warn_of_overlaps(const Scene& scene, std::vector<std::string>& warnings);
 
 }  // namespace limn

@@ -1,5 +1,5 @@
 #pragma once
-// A tree over all faces of a scene, to list those that reach into a convex set.
+// A bounding volume hierarchy over all faces that lists those intersecting a convex set.
 #include <span>
 #include <vector>
 
@@ -15,27 +15,27 @@ struct HalfSpace {
 
 class FaceTree {
  public:
-  // Faces without area are left out. It keeps nothing of the scene.
+  // Degenerate faces are skipped. The tree keeps no reference to the scene.
   explicit FaceTree(const Scene& scene);
 
   struct Item {
     FaceRef face;
     std::array<Vec3f, 3> corners;
-    // Indices of the items beyond its sides, from corner k to the next: none unless just one other
-    // item has the side, the other way round.
+    // Indices of the items across its sides (side k goes from corner k to the next). kNone unless
+    // exactly one other item shares the side, with consistent winding.
     std::array<uint32_t, 3> neighbours;
   };
   static constexpr uint32_t kNone = UINT32_MAX;
   size_t size() const { return items_.size(); }
   size_t index_of(const Item& item) const { return static_cast<size_t>(&item - items_.data()); }
-  // Appends every face with a point in all of the half-spaces, and some without: those that no
-  // single half-space leaves out. The order depends on the scene alone.
+  // Appends all faces that intersect the set, conservatively: every face that is not entirely
+  // outside of one half-space. The order depends on the scene alone.
   void list(std::span<const HalfSpace> set, std::vector<const Item*>& faces) const;
 
  private:
   struct Node {
-    Vec3d center, half;     // of its box
-    uint32_t first, count;  // of its items; 0: it has two children, the next node and `first`
+    Vec3d center, half;     // bounding box
+    uint32_t first, count;  // range of items; count 0: the children are the next node and `first`
   };
   uint32_t build(uint32_t first, uint32_t last);
   void find_neighbours();

@@ -1,5 +1,5 @@
 #pragma once
-// What is known of faces that lie in one place, found once for all who ask.
+// Duplicates and overlaps of a scene's faces, computed once and shared.
 #include <memory>
 
 #include "limn/core/face_copies.h"
@@ -17,7 +17,7 @@ struct FacesInPlace {
   FaceOverlaps overlaps;
 };
 
-// make_embree_tracer with these found before, for the same positions; null: it finds them.
+// make_embree_tracer with overlaps that were computed for the same positions; null: computes them.
 std::unique_ptr<RayTracer> make_embree_tracer(const Scene& scene, int threads,
                                               std::shared_ptr<const FacesInPlace> faces);
 

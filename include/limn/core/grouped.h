@@ -1,5 +1,5 @@
 #pragma once
-// Few things, put together by whom they are for.
+// A small list of items grouped by the object that each belongs to.
 #include <array>
 #include <cstddef>
 #include <span>
@@ -7,7 +7,7 @@
 
 namespace limn {
 
-// At most kMost items, each for an object of type Key.
+// At most kMost items, each with a key: an object of type Key.
 template <class Key, class Item, size_t kMost>
 class Grouped {
  public:
@@ -15,7 +15,7 @@ class Grouped {
     keys_[count_] = &key;
     items_[count_++] = item;
   }
-  // f(key, its items), for each key that has any. Changes their order.
+  // Calls f(key, items of that key) once per key. Reorders the items.
   template <class F>
   void for_each(const F& f) {
     for (size_t first = 0, last = 0; first < count_; first = last) {

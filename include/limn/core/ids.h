@@ -1,6 +1,6 @@
 #pragma once
-// Numbers of shapes, faces, edges and vertices, each a type of its own, so that none is taken for
-// another: nothing converts between them, or between them and integers, unless it is written out.
+// Strongly typed indices of shapes, faces, edges and vertices. They convert neither into one
+// another nor to or from integers implicitly.
 #include <compare>
 #include <cstdint>
 

@@ -6,7 +6,7 @@
 
 namespace limn {
 
-// Images that are read and films may have as many.
+// Upper limit for films and for images that are read.
 inline constexpr int64_t kMaxPixels = int64_t{1} << 28;  // not tuned: 3 GB in memory
 
 // H rows of W pixels of C interleaved channels, row 0 on top, linear.
@@ -27,27 +27,27 @@ struct Image {
   }
 };
 
-// OpenEXR, scanline, ZIP. Channels R G B for three channels, Y for one (no other number is).
-// Attributes are written as string attributes of the header. Files are written under a temporary
-// name and renamed, so that a crash never leaves half a file. Throw InputError with the file's
-// name.
+// Writes OpenEXR: scanline, ZIP; channels R G B for three channels, Y for one (no other number is
+// allowed). Attributes become string attributes of the header. Files are written under a
+// temporary name and renamed, so an interruption leaves no partial file. InputError names the
+// file.
 struct ImageAttribute {
   std::string name;
   std::string value;
 };
 void write_exr(const std::string& file, const Image& image, bool half,
                const std::vector<ImageAttribute>& attributes);
-// Any scanline or tiled EXR with channels R G B (or Y) of half or float: three channels (or one),
-// at most kMaxPixels pixels. Sizes are held against the file's before memory is taken.
+// Reads a scanline or tiled EXR with channels R G B (or Y), half or float, of at most kMaxPixels
+// pixels. Sizes in the header are checked against the file's size before memory is allocated.
 Image read_exr(const std::string& file);
-// The string attributes of its header.
+// The string attributes of the file's header.
 std::vector<ImageAttribute> read_exr_attributes(const std::string& file);
 
-// 8-bit sRGB picture of radiance: clamped to [0, 1] after multiplication with `exposure`.
+// Writes an 8-bit sRGB image: radiance times `exposure`, clamped to [0, 1].
 void write_png(const std::string& file, const Image& image, double exposure);
-// Blue-white-red picture of a signed image (mean over channels): white is 0, saturated is +-scale.
+// Writes a signed image (mean over channels) in blue-white-red: white is 0, saturation +-scale.
 void write_signed_png(const std::string& file, const Image& image, double scale);
-// The scale for write_signed_png: the 99.5th percentile of the non-zero |mean over channels|; 1 if
+// A scale for write_signed_png: the 99.5th percentile of the non-zero absolute channel means; 1 if
 // all are zero.
 double signed_scale(const Image& image);
 

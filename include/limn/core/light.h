@@ -1,10 +1,10 @@
 #pragma once
-// The contract of a light: what a path tracer, the edge samplers and the edges of shadows ask of
-// it.
+// The interface of a light for path tracing, edge samplers and shadow boundaries.
 //
-// Directions are what is sampled: while a parameter moves the scene they are held fixed, so
-// densities are constants. A delta light (a point, a spot, a direction) has no directions to choose
-// from: the one direction is a function of the parameters and carries their derivative.
+// Lights sample directions, and sampled directions are static (detached):
+// densities are constants. A delta light (point, spot, directional) has a single
+// direction per point, which is a function of the parameters and carries their
+// derivatives.
 #include <array>
 #include <memory>
 #include <optional>
@@ -25,44 +25,44 @@ class Properties;
 struct Scene;
 struct Shape;
 
-// A direction in which a point may see a light.
+// A sampled direction from a shading point towards a light.
 struct LightSample {
   Vec3d wo;             // unit, from the point towards the light
-  double distance = 0;  // infinite for light from infinity
-  // [1/sr], of this light among all and this direction; of a delta light the probability of the
-  // light alone.
+  double distance = 0;  // infinite for environment and directional lights
+  // Density of this light and direction [1/sr]. For a delta light: the probability of choosing the
+  // light.
   double pdf = 0;
   std::optional<FaceRef> face = {};  // of an area light
   const Light* light = nullptr;
-  std::array<double, 2> place = {};  // of the direction, in a light's own terms
+  std::array<double, 2> place = {};  // of the direction, in coordinates of the light's own
 };
 
-// A light as a ray meets it.
+// A light as hit by a ray.
 struct LightView {
   Vec3d wo;         // unit, of the ray
-  double distance;  // along it; infinite for light from infinity
-  Vec3d n_g;        // unit geometric normal there; unused for light from infinity
+  double distance;  // along the ray; infinite for an environment
+  Vec3d n_g;        // unit geometric normal at the hit; unused for an environment
 };
 
-// What one sample of a light is drawn from: in [0, 1).
+// The uniform numbers in [0, 1) that one light sample consumes.
 using LightNumbers = std::array<double, 3>;
 
 class Light {
  public:
   virtual ~Light() = default;
 
-  // A direction from p to the light, which is chosen with that probability among all. None, a sample
-  // of value zero, if the point that was drawn does not shine on p, or rounding leaves no density.
+  // Samples a direction from p towards the light. probability: of choosing this light. Nothing (a
+  // sample of value zero) if the sampled point does not face p, or its density underflows.
   virtual std::optional<LightSample> sample(const Vec3d& p, double probability,
                                             const LightNumbers& u) const = 0;
-  // The density [1/sr] with which `sample` draws this view; 0 of a delta light.
+  // The density [1/sr] of `sample` for this view; 0 for a delta light.
   virtual double pdf(const LightView& view, double probability) const = 0;
 
-  // Radiance that arrives from the unit direction wo at the points that the light shines on; none
-  // of a delta light.
+  // Radiance arriving from the unit direction wo at points that the light illuminates; zero for a
+  // delta light.
   virtual Rgb<double> radiance(const Vec3<double>& wo) const = 0;
   virtual Rgb<Dual> radiance(const Vec3<Dual>& wo) const = 0;
-  // The same from the direction of a sample that this light drew, which is held: derivatives are
+  // Radiance of a direction that this light sampled. The direction is static, so derivatives are
   // those of the light's own parameters alone.
   template <class S>
   Rgb<S> drawn_radiance(const LightSample& sample) const {
@@ -73,10 +73,10 @@ class Light {
     }
   }
 
-  // This light as a delta light; null if it is none.
+  // This light as a delta light, or null.
   virtual const DeltaLight* delta() const { return nullptr; }
-  // Appends its outline as triangles, for edge samplers; nothing for light from infinity and for
-  // delta lights.
+  // Appends the light's surface as triangles, for edge samplers. Appends nothing for environments
+  // and delta lights.
   virtual void add_triangles(std::vector<LightTriangle>& /*triangles*/) const {}
 
  protected:
@@ -86,19 +86,19 @@ class Light {
   }
 };
 
-// Light that arrives at a point from one direction.
+// Light arriving at a point from a single direction.
 template <class S>
 struct Arrival {
   Vec3<S> wo;         // unit, towards the light
-  Rgb<S> irradiance;  // through an area across wo [W / m^2]
+  Rgb<S> irradiance;  // on a surface perpendicular to wo [W / m^2]
 };
 
-// Where the light of a delta light comes from.
+// The origin of a delta light.
 struct LightOrigin {
-  Vec3<Dual> v;  // the position; at infinity the unit direction in which light travels
+  Vec3<Dual> v;  // position; if infinite, the unit direction of light transport
   bool infinite = false;
 
-  // The direction, not normalised, in which light passes through y.
+  // The unnormalised direction of light transport at y.
   template <class S>
   Vec3<S> through(const Vec3<S>& y) const {
     return infinite ? as<S>(v) : y - as<S>(v);
@@ -109,13 +109,13 @@ class DeltaLight : public Light {
  public:
   std::string id;  // "" if the file gives none
 
-  // What arrives at p if nothing is in the way. None if nothing ever does: outside the cone of a
-  // spot, or at the light's own position.
+  // Unoccluded light arriving at p. Nothing if p is outside the cone of a spot, or is the position
+  // of the light itself.
   virtual std::optional<Arrival<double>> arriving(const Vec3<double>& p) const = 0;
   virtual std::optional<Arrival<Dual>> arriving(const Vec3<Dual>& p) const = 0;
   virtual LightOrigin origin() const = 0;
-  // A bound of the luminance that leaves it: of the intensity [W/sr], at infinity of the
-  // irradiance [W / m^2].
+  // Upper bound of the luminance of the emitted intensity [W/sr], or of the irradiance [W / m^2] of
+  // a directional light.
   virtual double power() const = 0;
 
   virtual std::vector<ParameterRef> parameters() = 0;
@@ -130,11 +130,11 @@ class DeltaLight : public Light {
   const DeltaLight* delta() const final { return this; }
 };
 
-// Reads an emitter element into the scene: into `shape` if it stands inside one (else null).
-// InputError for an unknown type (listing the known ones), one in the wrong place, or bad values.
+// Reads an emitter element into the scene: into `shape` if it is nested in one (else null).
+// InputError for an unknown type (lists the known ones), a wrong place, or bad values.
 void read_light(Properties& properties, Scene& scene, Shape* shape);
 
-// The light of an emitting shape, uniform in area. The scene must outlive it.
+// The area light of an emitting shape; samples uniformly in area. The scene must outlive it.
 std::unique_ptr<Light> make_area_light(const Scene& scene, ShapeId shape);
 
 }  // namespace limn

@@ -1,5 +1,5 @@
 #pragma once
-// All lights of a scene, one of which is chosen at a time.
+// Light selection: all lights of a scene, one of which is chosen per sample.
 #include <array>
 #include <memory>
 #include <span>
@@ -10,49 +10,49 @@
 
 namespace limn {
 
-// Chooses one light at a point, mostly in proportion to what each would send there if nothing were
-// in the way, now and then any (lights.cpp). Every emitting shape is one, in their order, then the
-// environment, then the delta lights in the order of the file. The scene must outlive it.
+// Chooses one light at a shading point, mostly in proportion to its estimated unoccluded
+// irradiance, sometimes uniformly (lights.cpp). The order is: emitting shapes, the environment,
+// delta lights as in the file. The scene must outlive it.
 class Lights {
  public:
-  // chosen_by: lights of the same scene as it was before it moved, by which one is chosen; null: by
-  // these. Differences choose alike in both scenes: else a light is another one now and then, by
-  // much for one over the step, and what is as much in all other samples is the whole derivative
-  // as long as that has not happened. They must outlive it.
+  // chosen_by: lights of the unperturbed scene whose probabilities are used instead; null: its own.
+  // Finite differences use the same choice in both scenes. Otherwise a different light would be
+  // chosen in a few samples, and their large contributions, divided by the step, would carry all of
+  // that derivative (high variance). They must outlive it.
   explicit Lights(const Scene& scene, const Lights* chosen_by = nullptr);
 
   bool empty() const { return all_.empty(); }
-  // Whether any shape emits.
+  // True if any shape emits.
   bool on_shapes() const { return !area_lights_.empty(); }
   std::span<const Light* const> all() const { return all_; }
 
-  // A point, and what all lights together would send there [W / m^2, of luminance]. What is asked
-  // for often at one point needs it once.
+  // A shading point with the estimated unoccluded irradiance of all lights [W / m^2, luminance].
+  // Computed once per point.
   struct Place {
     Vec3d p;
     double sum = 0;
-    std::array<double, 4> first{};  // of the first lights, each by itself; how many is not tuned
+    std::array<double, 4> first{};  // estimates of the first lights; their number is not tuned
   };
   Place at(const Vec3d& p) const;
-  // Eight at a time.
+  // `at` for many points, eight at a time (SIMD).
   void at(std::span<const Vec3d* const> p, std::span<Place* const> places) const;
-  // About what a surface at p that faces a light (its number in all()) would get from it, if
-  // nothing were in the way [W / m^2, of luminance].
+  // Estimated unoccluded irradiance at p from a light (an index into all()), for a surface that
+  // faces it [W / m^2, luminance].
   double estimate(size_t light, const Vec3d& p) const;
 
-  // One number for the choice of a light, the others for what it draws.
+  // One number selects the light, the others sample it.
   using Numbers = std::array<double, 1 + std::tuple_size_v<LightNumbers>>;
-  // A light to be drawn at a place. None: a sample of value zero (see Light::sample).
+  // A request for a sample at a place. Nothing means a sample of value zero (see Light::sample).
   struct Draw {
     const Place* place;
     std::optional<LightSample>* sample;
   };
-  // draws[i] from u[i]; at most kMostDraws of them.
+  // draws[i] is sampled from u[i]; at most kMostDraws.
   static constexpr size_t kMostDraws = 64;
   void sample(std::span<const Draw> draws, std::span<const Numbers> u) const;
   std::optional<LightSample> sample(const Place& place, Rng& rng) const;
-  // The density [1/sr] with which `sample` draws what a ray from there sees: an emitting shape, or,
-  // where it leaves the scene, the environment (there must be one).
+  // The density [1/sr] with which `sample` draws a hit on an emitting shape, or, for a ray that
+  // leaves the scene, on the environment (which must exist).
   double pdf(const Place& place, ShapeId shape, const LightView& view) const {
     const size_t light = of_shape_[shape.index()];
     return all_[light]->pdf(view, probability(place, light));
@@ -60,7 +60,7 @@ class Lights {
   double pdf_environment(const Place& place, const Vec3d& wo) const {
     return environment_->pdf_solid_angle(wo) * probability(place, area_lights_.size());
   }
-  // With the radiance that a ray along the held direction wo sees there. at: Environment::find.
+  // Radiance and density of the environment in the static direction wo. at: Environment::find.
   template <class S>
   Environment::Sight<S> environment(const Place& place, const Vec3d& wo,
                                     const std::array<double, 2>& at) const {
@@ -71,14 +71,14 @@ class Lights {
   }
 
  private:
-  // What an estimate of a light's irradiance takes.
+  // What the irradiance estimate needs of a light.
   struct Reach {
-    Vec3d center;          // of its area
-    Vec3d facing;          // sum of its faces' normals times their areas
-    double rest = 0;       // a quarter of the area that this leaves: what all sides see of it
-    double spread = 0;     // its area over pi, so that nothing is infinite near it
+    Vec3d center;          // of the emitter's area
+    Vec3d facing;          // sum of face normals times areas
+    double rest = 0;       // a quarter of the area that cancels in `facing`
+    double spread = 0;     // area / pi; keeps the estimate finite close to the light
     double luminance = 0;  // of its radiance
-    double constant = 0;   // irradiance, alike everywhere
+    double constant = 0;   // irradiance that is the same everywhere
   };
   static Reach reach_of(const Light& lamp);
   template <class S>
@@ -91,11 +91,11 @@ class Lights {
 
   std::vector<std::unique_ptr<Light>> area_lights_;
   std::vector<const Light*> all_;
-  std::vector<Reach> reaches_;      // of all but delta lights
-  std::vector<size_t> of_shape_;    // which light it is; any number where a shape emits nothing
-  double of_any_ = 1;               // one over how many they are
+  std::vector<Reach> reaches_;      // of all lights but delta lights
+  std::vector<size_t> of_shape_;    // index of a shape's light; unspecified if it does not emit
+  double of_any_ = 1;               // 1 / number of lights
   const Environment* environment_;  // null if none
-  const Lights* chosen_by_;         // null if these
+  const Lights* chosen_by_;         // null: this
 };
 
 }  // namespace limn

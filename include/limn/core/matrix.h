@@ -1,5 +1,5 @@
 #pragma once
-// Transforms of scene files.
+// 4x4 transforms of scene files.
 #include "limn/core/vec.h"
 
 namespace limn {
@@ -9,7 +9,7 @@ struct Matrix4 {
   double m[4][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}};
   Vec3d point(const Vec3d& p) const;
   Vec3d vector(const Vec3d& v) const;
-  // Inverse transpose: transforms normals; not normalised. The matrix must be invertible.
+  // Transforms a normal by the inverse transpose, without normalisation. Requires an inverse.
   Vec3d normal(const Vec3d& n) const;
   Matrix4 inverse() const;  // throws std::domain_error if singular
   friend Matrix4 operator*(const Matrix4& a, const Matrix4& b);

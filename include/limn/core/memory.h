@@ -1,13 +1,13 @@
 #pragma once
-// Memory that is asked for before it is taken.
+// Memory checks before large allocations.
 #include <string>
 
 #include "limn/core/error.h"
 
 namespace limn {
 
-// Bytes that this process may still take: what the machine has free, or less where a container or
-// `ulimit -v` allows less. Infinity where the system does not tell.
+// Bytes that this process can still allocate: the machine's free memory, or less under a
+// container's limit or `ulimit -v`. Infinity if the system does not report it.
 double free_memory();
 
 // InputError at `where` if `bytes` (64 MB or more) exceed free_memory(): "WHAT takes 12.3 GB of

@@ -1,5 +1,5 @@
 #pragma once
-// Triangle meshes: what the ray tracer, the shading and the edge samplers all read.
+// Triangle meshes, as the ray tracer, shading and edge samplers use them.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -26,12 +26,12 @@ struct FaceRef {
   bool operator==(const FaceRef&) const = default;
 };
 
-// No coordinate may be larger. Embree multiplies three lengths in single precision (a distance and
-// two edges), and a product that does not fit is a miss, in silence: (2 sqrt(3) 2e12)^3 = 3.33e38
-// just fits. (At 1.844e18 Embree drops the triangle altogether.)
+// Largest coordinate allowed. Embree multiplies three lengths in single precision (a distance and
+// two edges) and misses without an error if the product overflows: (2 sqrt(3) 2e12)^3 = 3.33e38
+// just fits. (From 1.844e18 on Embree drops the triangle.)
 inline constexpr double kLargestCoordinate = 2e12;
 
-// A triangle of an emitter, wound counter-clockwise seen from where it shines.
+// A triangle of an emitter, counter-clockwise as seen from its emitting side.
 struct LightTriangle {
   Vec3d corners[3];
   double luminance = 0;
@@ -43,34 +43,34 @@ enum class NormalSource {
   kGiven,     // vertex normals from the file; they follow rigid motions and stay fixed otherwise
 };
 
-// One mesh in world space. Positions are stored as floats: Embree, shading and edges all see the
-// same vertices.
+// A mesh in world space. Positions are floats, so Embree, shading and edges use identical
+// vertices.
 struct Mesh {
-  std::vector<Vec3f> positions;    // V, scene units, as in the file (seam copies are kept)
+  std::vector<Vec3f> positions;    // V, scene units, as in the file (copies along seams are kept)
   std::vector<FaceIndices> faces;  // F by 3, into positions
   std::vector<uint32_t> weld;      // V: the smallest index of a vertex at the same position
 
   NormalSource normal_source = NormalSource::kFace;
   std::vector<Vec3d> normals;           // N unit vectors; empty for kFace
   std::vector<FaceIndices> normal_ids;  // F by 3, into normals; empty for kFace
-  // V: sine of the largest tilt between shading and geometric normal over the faces around the
-  // vertex, the same for welded vertices; empty for kFace. Its interpolation bounds the tilt at any
+  // V: sine of the largest angle between shading and geometric normal over the faces around the
+  // vertex, equal for welded vertices; empty for kFace. Its interpolation bounds that angle at any
   // point (see shading.h).
   std::vector<double> horizon;
 
-  // Derivatives of the above with respect to the parameters of the pass; empty where all are zero.
+  // Derivatives with respect to the parameters of the pass; empty where all are zero.
   std::vector<Vec3<Lanes>> position_tangents;  // V
   std::vector<Vec3<Lanes>> normal_tangents;    // N
   std::vector<Lanes> horizon_tangents;         // V
 
-  // What the loader mended: faces that were left out because two of their corners coincide.
+  // Number of faces that the loader removed because two of their corners coincide.
   uint64_t collapsed_faces = 0;
 
   const FaceIndices& face(FaceId id) const { return faces[id.index()]; }
   Vec3<Dual> position(VertexId id) const;
 };
 
-// Corners of a face as the scalar P.
+// The corners of a face in scalar type P.
 template <class P>
 std::array<Vec3<P>, 3> face_corners(const Mesh& mesh, FaceId face) {
   std::array<Vec3<P>, 3> corners;
@@ -85,42 +85,42 @@ std::array<Vec3<P>, 3> face_corners(const Mesh& mesh, FaceId face) {
   return corners;
 }
 
-// Fills `weld` from the positions: vertices at bitwise equal coordinates (with -0 = 0) share the
-// smallest index.
+// Fills `weld` from the positions: vertices with bitwise equal coordinates (-0 = 0) get the
+// smallest of their indices.
 void weld_positions(Mesh& mesh);
 
-// Welds copies of a vertex that differ by no more than the rounding of their positions (a float's,
-// twice, of the largest coordinate of a face around them), where sides of faces lie open: seams as
-// programs write them, -2.4e-16 here and 0 there. Needles between copies collapse; but where faces
-// are no larger than the rounding in any direction, their corners stay apart. `weld` must hold what
-// weld_positions says of the faces that are left.
+// Welds vertices along open seams whose positions differ by rounding only: two roundings to float
+// of the largest coordinate of an adjacent face (a program writes -2.4e-16 here and 0 there).
+// Slivers between such vertices collapse, but faces smaller than the rounding in both directions
+// keep their corners apart. `weld` must hold the result of weld_positions for the remaining
+// faces.
 void weld_seams(Mesh& mesh);
 
-// Fills normals (if kComputed), horizon and their tangents from positions, faces, weld and
-// tangents. Called at load and after every change of positions or position_tangents. Angle-weighted
-// normals after Thuermer and Wuethrich 1998, over welded positions, so that texture seams leave no
-// crease.
+// Computes normals (if kComputed), horizon and their tangents from positions, faces, weld and
+// tangents. Must be called after every change of positions or position_tangents. Normals are
+// angle-weighted (Thuermer and Wuethrich 1998) over welded positions, so texture seams do not
+// crease the shading.
 void update_shading_normals(Mesh& mesh);
 
-// The adjoint of update_shading_normals. normals (N), horizons (V): derivatives of some number with
-// respect to them. Adds what follows for the positions to `positions` (V), at the first copy of
-// each welded vertex. Normals of the file do not follow positions: what horizons do to them is
-// added to `normals`. Where several tilts tie for a horizon, each has an equal share in it (forward
-// mode takes the middle of the least and the largest slope, which depends on the motion in no
-// linear way).
+// The adjoint of update_shading_normals. Input: derivatives of a scalar with respect to normals (N)
+// and horizons (V). Adds its derivatives with respect to positions to `positions` (V), at the first
+// copy of each welded vertex. Normals from a file are independent of positions: derivatives through
+// horizons are added to `normals`. If several angles tie for a horizon, they share its derivative
+// equally. (Forward mode uses the mean of the least and the largest slope, which is not linear in
+// the motion.)
 void pull_back_shading_normals(const Mesh& mesh, std::vector<Vec3d>& normals,
                                const std::vector<double>& horizons, std::vector<Vec3d>& positions);
 
-// Whether a face has an area, and so a plane, as far as double precision can tell; else it is a
-// line, which no ray meets and which only ties other faces together (half_edges.h). Each product of
+// True if a face has a nonzero area in double precision. A face without area is a line segment: no
+// ray hits it, and it only connects other faces (half_edges.h). The error bound: each product of
 // the normal is rounded once, each difference of products once more.
 inline bool has_area(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
   const Vec3d e1 = b - a, e2 = c - a, n = cross(e1, e2);
   return dot(n, n) > 0x1.0p-100 * (dot(e1, e1) * dot(e2, e2));
 }
-// Of a mesh, needles are lines, too: faces that are narrower than what rounding their corners to
-// floats explains (four roundings of the largest coordinate) and 16 times longer than wide. Far
-// from the origin small faces are as narrow, and mean what they are.
+// For faces of a mesh slivers count as lines, too: narrower than the rounding of their corners to
+// floats (four roundings of the largest coordinate), and 16 times longer than wide. Small faces far
+// from the origin may be as narrow and still count as faces.
 inline bool has_area(const Mesh& mesh, const FaceIndices& face) {
   const auto corner = [&](int k) { return cast<double>(mesh.positions[face[k]]); };
   const Vec3d a = corner(0), b = corner(1), c = corner(2);
@@ -135,22 +135,22 @@ inline bool has_area(const Mesh& mesh, const FaceIndices& face) {
   return twice_area > 0x1.0p-44 * size * size * longest;
 }
 
-// A mesh from arrays, mended as one from a file is: vertices at one position are welded, faces that
-// repeat or have two corners at one position are left out, and `warnings` (may be null) says so.
-// face_normals: flat shading, else normals are computed. InputError (at `where`) for positions (V
-// by 3, scene units) that are not finite or beyond kLargestCoordinate, indices that are not below
-// V, and where no face is left.
+// Makes a mesh from arrays, with the same repairs as for files: vertices at one position are
+// welded; duplicate faces and faces with two coincident corners are removed, with a message in
+// `warnings` (may be null). face_normals: flat shading, else computed normals. InputError at
+// `where` if a position (V by 3, scene units) is not finite or beyond kLargestCoordinate, an index
+// is not below V, or no face is left.
 Mesh make_mesh(std::vector<Vec3f> positions, std::vector<FaceIndices> faces, bool face_normals,
                const SourceLocation& where, std::vector<std::string>* warnings);
-// The same from new positions and the faces of `mesh`; normals of a file stay as they are. As many
-// positions as the mesh has. Derivatives are zero.
+// A mesh with the faces of `mesh` and as many new positions. Normals from a file are unchanged.
+// Derivatives are zero.
 Mesh moved_mesh(const Mesh& mesh, std::vector<Vec3f> positions, const SourceLocation& where,
                 std::vector<std::string>* warnings);
 
-// Bounds of all positions referenced by faces.
+// Bounds of all positions that faces use.
 Bounds bounds_of(const Mesh& mesh);
 
-// Mesh files: obj or ply, by the ending of the file's name (in small or capital letters).
+// True if the file name ends in .obj or .ply (in any case).
 bool is_mesh_file(const std::string& file);
 
 // The mesh of a file (obj, unless the ending is ply). InputError (missing file, a word that is not
@@ -160,7 +160,7 @@ bool is_mesh_file(const std::string& file);
 // past: nothing in limn uses them. `face_normals` ignores normals of the file.
 Mesh read_mesh(const std::string& file, bool face_normals);
 
-// Positions of a mesh file, or of a text file with "x y z" lines, in file order: a velocity field.
+// Reads a velocity field: positions of a mesh file, or lines "x y z" of a text file, in order.
 std::vector<Vec3d> read_vertex_vectors(const std::string& file);
 
 }  // namespace limn

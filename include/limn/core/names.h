@@ -1,5 +1,5 @@
 #pragma once
-// Names that users write, and what is said of a name that nothing has.
+// Lists of known names, and messages about unknown ones.
 #include <string>
 #include <vector>
 
@@ -8,10 +8,10 @@ namespace limn {
 // "a, b, c"
 std::string join(const std::vector<std::string>& words);
 
-// Letters A to Z become small ones; all else stays.
+// Converts A to Z to lower case; leaves other characters unchanged.
 std::string lower_case(std::string text);
 
-// The names of rows (anything with a `name`), in order.
+// The names of a table's rows (any type with a `name`), in order.
 template <class Rows>
 std::vector<std::string> names_of(const Rows& rows) {
   std::vector<std::string> names;

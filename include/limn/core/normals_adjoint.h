@@ -1,5 +1,5 @@
 #pragma once
-// The adjoint of computed shading normals and horizons, for many gradients of one mesh.
+// The adjoint of computed shading normals and horizons, precomputed for many gradients of one mesh.
 #include <memory>
 #include <vector>
 
@@ -9,14 +9,14 @@ namespace limn {
 
 class ShadingNormalsAdjoint {
  public:
-  // What depends on the mesh alone, about as much work as update_shading_normals(). The mesh must
-  // outlive this, and stay as it is.
+  // Precomputes what depends on the mesh alone; costs about one update_shading_normals(). The mesh
+  // must outlive this object and must not change.
   explicit ShadingNormalsAdjoint(const Mesh& mesh);
   ShadingNormalsAdjoint(ShadingNormalsAdjoint&&) noexcept;
   ~ShadingNormalsAdjoint();
 
-  // As pull_back_shading_normals(). The work goes with the numbers that are not zero, but for one
-  // look at each.
+  // Equals pull_back_shading_normals(). Skips zero derivatives, so the cost is linear in the
+  // nonzero ones.
   void pull_back(std::vector<Vec3d>& normals, const std::vector<double>& horizons,
                  std::vector<Vec3d>& positions) const;
 

@@ -3,8 +3,8 @@
 
 namespace limn {
 
-// Writes under a temporary name in the same folder; commit() renames it to the wanted one. Without
-// commit nothing is left behind.
+// An output file that is written under a temporary name in the same folder. commit() renames it;
+// without commit() nothing remains.
 class OutputFile {
  public:
   explicit OutputFile(const std::string& file);
@@ -13,9 +13,9 @@ class OutputFile {
   OutputFile& operator=(const OutputFile&) = delete;
 
   const std::string& temporary() const { return temporary_; }
-  // All of the temporary file; InputError if it cannot be written, as on a full disk.
+  // Writes `bytes` to the temporary file; InputError if it fails, for example on a full disk.
   void write(const std::string& bytes) const;
-  void commit();  // InputError if the file cannot be put in place
+  void commit();  // InputError if the file cannot be renamed
 
  private:
   std::string file_, temporary_;

@@ -1,15 +1,15 @@
 #pragma once
-// Work on several threads. What is computed never depends on how it is spread.
+// Parallel loops. Results never depend on the number of threads or on scheduling.
 #include <cstddef>
 #include <functional>
 
 namespace limn {
 
-// Threads to use when the user asks for `requested`; 0 means all cores.
+// Number of threads for a user's request; 0 means all cores.
 int thread_count(int requested);
 
-// Calls work(i) for every i in [0, count), on at most `threads` threads. An exception in one stops
-// the rest and is thrown here.
+// Calls work(i) for every i in [0, count) on at most `threads` threads. The first exception stops
+// the remaining work and is rethrown.
 void parallel_for(size_t count, int threads, const std::function<void(size_t)>& work);
 
 }  // namespace limn

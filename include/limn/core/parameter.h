@@ -33,100 +33,100 @@ namespace limn {
 
 class Motion;
 
-// How a shape as a whole has moved since a parameter was found: the point that it turns about and
-// is scaled about by `moved` [scene units], and its size by the factor 1 + `grown`.
+// The accumulated motion of a shape since a parameter was found: `moved` translates its pivot (of
+// rotations and scaling) [scene units], and its size is multiplied by 1 + `grown`.
 struct ShapePose {
   Vec3d moved;
   double grown = 0;
 };
 
-// What a name stands for in a scene, resolved once. It holds indices and ids, no pointers into the
-// scene, so it serves every deep copy of that scene as well, also after it has moved on: what a
-// shape turns about (but see at()), and the normals that its vertices are displaced along, stay as
-// they were. Copies of a Parameter are cheap.
-// `component` counts the numbers of an array, row by row (vertex 2's y: 2 * 3 + 1); of a scalar it
-// is 0.
+// A differentiable parameter, resolved once from its name. It holds indices and
+// ids, no pointers into the scene. So it applies to every deep copy of that scene,
+// also after changes: the pivot of a shape (but see at()) and the normals of a
+// displacement stay those of the original. Copies are cheap. `component` is a
+// row-major index into an array's numbers (y of vertex 2: 2 * 3 + 1); 0 for
+// scalars.
 struct Parameter {
   std::string name;
   std::string unit;
-  double natural_step = 0;  // a small step: about a hundredth of what changes the picture a lot
-  size_t size = 1;  // numbers: 1 of a scalar, 3 V of vertex_positions, V of displacement, 3 H W of
-                    // texels
+  double natural_step = 0;  // of differences: about a hundredth of a large visible change
+  size_t size = 1;          // scalar: 1; vertex_positions: 3 V; displacement: V;
+                            // EMITTER.data: 3 H W
   std::shared_ptr<const Motion> motion;
-  // What its numbers may be, both ends included: what assign() takes.
+  // Range of valid values, inclusive; assign() enforces it.
   double least = -std::numeric_limits<double>::infinity();
   double most = std::numeric_limits<double>::infinity();
-  // Its value has three channels. They move alike (along grey), as one number; reverse mode tells
-  // them apart all the same. NAME.r, NAME.g and NAME.b move one of them each.
+  // The value is a colour. The parameter changes all channels alike (along grey); reverse mode
+  // returns one derivative per channel. NAME.r, NAME.g and NAME.b change one channel each.
   bool colour = false;
   std::vector<size_t> array = {};  // {V, 3}, {V}, {H, W, 3}; {} of scalars
-  // Its derivative is that of another array in other coordinates (displacement: of
-  // vertex_positions): where all parameters are asked for it is left out.
+  // True if the derivative repeats that of another array in different coordinates (displacement
+  // repeats vertex_positions). Such a parameter is skipped when all are requested.
   bool repeats = false;
 
-  // Of its derivative in reverse mode: {} of a number, {3} of a colour, `array` of an array.
+  // Shape of the reverse-mode derivative: {} for a number, {3} for a colour, else `array`.
   std::vector<size_t> shape() const;
-  size_t numbers() const { return colour ? 3 : size; }  // in that shape
+  size_t numbers() const { return colour ? 3 : size; }  // of the reverse-mode derivative
 
-  // Adds derivative lane `lane` of everything in the scene that the parameter moves.
+  // Seeds derivative `lane` of all quantities in the scene that depend on the parameter.
   void seed(Scene& scene, int lane, size_t component = 0) const;
 
-  // A deep copy of the scene with the parameter moved by `step`; exact for large steps (rotations
-  // rotate). Tangents are kept as they are.
+  // A deep copy of the scene with the parameter changed by `step`: exact also for large steps (a
+  // rotation rotates). Tangents are kept.
   Scene moved(const Scene& scene, double step, size_t component = 0) const;
 
-  // The same in place.
+  // Changes the parameter in place.
   void move(Scene& scene, double step, size_t component = 0) const;
 
-  // The numbers themselves, where the scene holds them: one, the three channels of a colour, all of
-  // an array. Empty for what only moves things from where they are: rotations, translations and
+  // The current value in the scene: one number, three channels of a colour, or all numbers of an
+  // array. Empty for parameters that are relative to the current state: rotations, translations and
   // scales of shapes, fields, single coordinates and texels.
   std::vector<double> value(const Scene& scene) const;
-  // Sets them in place, with all that depends on them; one number sets all channels of a colour.
-  // Positions make the mesh that a file with them would, see moved_mesh(). InputError if there are
-  // none, for another number of them, and for values that the reader of scenes would not take; the
-  // scene is then as it was.
+  // Sets the value in place, with everything that depends on it. One number sets all channels of a
+  // colour. Positions rebuild the mesh as if read from a file, see moved_mesh(). InputError, with
+  // the scene unchanged, if the parameter has no value, for a wrong count, and for values outside
+  // the valid range.
   void assign(Scene& scene, const std::vector<double>& value,
               std::vector<std::string>* warnings = nullptr) const;
 
-  // V by 3: the derivative of the positions of a shape's vertices; empty where the parameter moves
-  // none of that shape.
+  // V by 3: derivatives of the shape's vertex positions; empty if the parameter does not move the
+  // shape.
   std::vector<Vec3d> velocities(const Scene& scene, ShapeId shape, size_t component = 0) const;
 
-  // V vectors along which the vertices of the shape go that the parameter displaces; empty of
-  // others.
+  // V displacement directions, for a displacement parameter; else
+  // empty.
   std::vector<Vec3d> directions(const Scene& scene) const;
 
-  // How one unit of it moves the shape as a whole: the unit vector of translations, a grown of 1 of
-  // scales, else nothing.
+  // The rigid or scaling motion of the shape per unit of the parameter: a unit vector for
+  // translations, grown = 1 for scales, else nothing.
   ShapePose pose_per_unit(ShapeId shape) const;
-  // The same parameter where the shape that it moves has another pose than where it was found:
-  // rotations and scales go about the point that is taken along, scales in sizes of then. So steps
-  // of translations, of turns about one axis and of scales add up, in whatever order they come.
+  // This parameter for a shape in another pose. Rotations and scales use the pivot moved with the
+  // shape, and scales keep the original unit of size. Thus steps of translations, rotations about
+  // one axis and scales add up, in any order.
   Parameter at(const ShapePose& pose) const;
 
-  // H by W by 3: the derivative of the environment's texels; empty where the parameter moves none.
+  // H by W by 3: derivatives of the environment's texels; empty if the parameter changes none.
   Image texel_velocities(const Scene& scene, size_t component = 0) const;
 };
 
-// All parameters of the scene, scalars and arrays; a part (one component of an array, a field, a
-// channel of a colour) is not listed apart.
+// All scalar and array parameters of the scene. Components of arrays, fields and channels of
+// colours are not listed.
 std::vector<Parameter> list_parameters(const Scene& scene);
 
-// The scalar called `name`. UnknownParameter that lists the nearest known names if there is none;
-// InputError that says how to name a part if it is an array; also if FILE cannot be read or does
-// not fit the mesh.
+// Finds a scalar parameter. UnknownParameter lists the nearest known names if none is called
+// `name`. InputError for an array (the message says how to name a component), and if FILE cannot be
+// read or does not fit the mesh.
 Parameter find_parameter(const Scene& scene, const std::string& name);
 
-// The same, arrays included.
+// Like find_parameter, but accepts arrays, too.
 Parameter find_parameter_or_array(const Scene& scene, const std::string& name);
 
-// Moves every vertex of a shape by the parameter times its vector in `field` (V by 3), as
-// SHAPE.vertex_positions:FILE does. Copies of a vertex must have the same vector.
+// A parameter that moves every vertex of a shape by its vector in `field` (V by 3), like
+// SHAPE.vertex_positions:FILE. Copies of a vertex must have equal vectors.
 Parameter vertex_field(const Scene& scene, ShapeId shape, std::vector<Vec3d> field);
 
-// Moves every texel of the environment's map by the parameter times its value in `field` (H by W by
-// 3), as EMITTER.data:FILE does.
+// A parameter that changes every texel of the environment map by its value in `field` (H by W by
+// 3), like EMITTER.data:FILE.
 Parameter texel_field(const Scene& scene, const Image& field);
 
 }  // namespace limn

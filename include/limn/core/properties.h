@@ -1,7 +1,7 @@
 #pragma once
-// One element of a scene file with typed access to its properties. Every property that is never
-// asked for, and every nested object that is never taken, is an error that lists what is known
-// there.
+// Typed access to the properties of one element of a scene file. A property that is never
+// read, or a nested object that is never used, is an error; the message lists the known
+// names.
 #include <map>
 #include <memory>
 #include <string>
@@ -25,12 +25,12 @@ class Properties {
   virtual const std::string& type() const = 0;  // "diffuse", ...
   virtual const std::string& id() const = 0;    // "" if none
   virtual const SourceLocation& where() const = 0;
-  // Where the property `name` was written; the element itself if it was not.
+  // Location of the property `name`; of the element if the property is absent.
   virtual SourceLocation where(const std::string& name) const = 0;
 
   virtual bool has(const std::string& name) const = 0;
-  // Each returns the default when the property is absent, throws InputError at its place when it
-  // has another type.
+  // Returns `absent` if there is no such property. InputError at its location if it has another
+  // type.
   virtual double number(const std::string& name, double absent) = 0;
   virtual int64_t integer(const std::string& name, int64_t absent) = 0;
   virtual bool boolean(const std::string& name, bool absent) = 0;
@@ -39,13 +39,13 @@ class Properties {
   // <rgb>, or <float> as grey.
   virtual Rgb<double> rgb(const std::string& name, const Rgb<double>& absent) = 0;
   virtual Matrix4 transform(const std::string& name) = 0;  // identity when absent
-  // The value of a string property resolved against the search path; InputError if absent or no
-  // such file.
+  // A file name resolved against the search path. InputError if the property is absent or no such
+  // file exists.
   virtual std::string file(const std::string& name) = 0;
-  // Nested bsdf elements and refs to bsdfs, in order.
+  // Nested bsdf elements and references to bsdfs, in order.
   virtual std::vector<std::shared_ptr<Bsdf>> bsdfs() = 0;
 
-  // An error at this element, or at one of its properties.
+  // Throws an InputError at this element, or at one of its properties.
   [[noreturn]] void fail(const std::string& message) const;
   [[noreturn]] void fail(const std::string& property, const std::string& message) const;
 };

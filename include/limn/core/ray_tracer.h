@@ -1,5 +1,5 @@
 #pragma once
-// Rays against the triangles of a scene.
+// Ray tracing: closest hits and occlusion for the triangles of a scene.
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -17,12 +17,12 @@ struct Ray {
   Vec3d direction;  // unit
   double t_min = 0;
   double t_max = std::numeric_limits<double>::infinity();
-  // Faces that the ray never meets: the one it starts on, the one it ends on, and those around an
-  // edge that it grazes. By id, never by distance.
+  // Faces that the ray ignores: the faces of its start and end points, and those around a grazed
+  // edge. Identified by id, never by distance.
   FaceRef start = {};
   FaceRef end = {};
   std::span<const FaceRef> skip_faces = {};
-  bool skip_emitters = false;  // hide_emitters, for camera rays
+  bool skip_emitters = false;  // for camera rays with hide_emitters
 };
 
 struct Hit {
@@ -30,8 +30,8 @@ struct Hit {
   double t = 0;
 };
 
-// What a tracer throws at a ray that it cannot trace. The sample that asked for it is not finite,
-// and is reported as such: a miss in its stead would be wrong without a word.
+// Thrown for a ray that cannot be traced. The sample is then counted and reported as non-finite.
+// Returning a miss instead would hide the error.
 class UntraceableRay final : public std::exception {
  public:
   const char* what() const noexcept override {
@@ -39,12 +39,12 @@ class UntraceableRay final : public std::exception {
   }
 };
 
-// Whether Embree can trace it: all numbers are finite (t_max may be infinite), and no coordinate of
-// its origin is beyond 2^60, more than any point on a face and less than where Embree stops
-// (1.844e18).
+// True if Embree can trace the ray: all numbers are finite (t_max may be infinite), and the
+// origin's coordinates are within 2^60. That exceeds any point on a face and is below Embree's own
+// limit (1.844e18).
 inline bool is_traceable(const Ray& ray) {
   const Vec3d& o = ray.origin;
-  // Sums with NaN compare false, and so does the length of a direction that has one.
+  // A sum with NaN compares false, as does the length of a direction with NaN.
   return std::fabs(o.x) + std::fabs(o.y) + std::fabs(o.z) <= 0x1p60 &&
          length_squared(ray.direction) <= 2 && ray.t_min >= 0 && ray.t_max >= 0;
 }
@@ -52,23 +52,23 @@ inline bool is_traceable(const Ray& ray) {
 class RayTracer {
  public:
   virtual ~RayTracer() = default;
-  // The first hit in (t_min, t_max); false if none. Faces without area are never met. Thread-safe.
-  // Throws UntraceableRay unless is_traceable(ray).
+  // Finds the closest hit in (t_min, t_max); returns false for a miss. Degenerate faces are never
+  // hit. Thread-safe. Throws UntraceableRay unless is_traceable(ray).
   virtual bool closest(const Ray& ray, Hit& hit) const = 0;
   virtual bool occluded(const Ray& ray) const = 0;
-  // Whether two faces lie in one place: with the same corners, or overlapping in a plane
+  // True if two faces are duplicates or overlap in a plane
   // (face_overlaps.h).
   virtual bool overlap(FaceRef a, FaceRef b) const = 0;
-  // Puts the face that is met (face_overlaps.h) in the place of one that is in the same place where
-  // the ray passes: what closest() returns is settled.
+  // Replaces a hit by the duplicate or coplanar face that the rule selects (face_overlaps.h). Hits
+  // from closest() already follow the rule.
   virtual void settle(const Ray& /*ray*/, Hit& /*hit*/) const {}
 };
 
-// The scene must outlive the tracer. Far from the origin it traces in coordinates of its own: what
-// is met does not depend on where a scene lies, as far as floats hold its positions. InputError
-// with Embree's words if it fails (out of memory, unsupported machine).
+// Makes a tracer over Embree; the scene must outlive it. Scenes far from the origin are traced in
+// local coordinates, so that hits do not depend on their location, within the precision of float
+// positions. InputError with Embree's message if it fails (out of memory, unsupported machine).
 std::unique_ptr<RayTracer> make_embree_tracer(const Scene& scene, int threads);
-// Every face tested in double precision: the oracle for tests.
+// Tests every face in double precision: the reference for tests.
 std::unique_ptr<RayTracer> make_brute_force_tracer(const Scene& scene);
 
 }  // namespace limn

@@ -1,6 +1,6 @@
 #pragma once
-// Random streams keyed by what they are for, so that no result depends on threads or on the order
-// of work.
+// Random streams keyed by purpose, so that results depend neither on the number of threads nor on
+// the order of work.
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -9,7 +9,7 @@
 namespace limn {
 
 namespace detail {
-// Word: 64 bits, or several of them side by side.
+// Word: 64 bits, or a SIMD vector of them.
 template <class Word>
 [[gnu::always_inline]] inline Word mix_words(Word z) {
   z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
@@ -18,8 +18,8 @@ template <class Word>
 }
 }  // namespace detail
 
-// Bijective 64-bit finaliser (Stafford's variant 13, as in SplitMix64). No template, which would
-// take a shorter number as it is.
+// A bijective 64-bit finaliser (Stafford's variant 13, as in SplitMix64). Not a template, so that
+// narrower integers are converted.
 inline uint64_t mix_bits(uint64_t z) { return detail::mix_words(z); }
 
 enum class Purpose : uint64_t {
@@ -43,18 +43,18 @@ enum class Purpose : uint64_t {
   kDrawRoulette
 };
 
-// SplitMix64 started from a hash of (seed, pixel, sample): a stream for one path. `at` derives the
-// stream of one path vertex and one purpose, so that drawing more numbers at one place leaves all
-// others unchanged (finite differences with common random numbers rely on it).
+// SplitMix64, seeded by a hash of (seed, pixel, sample): the stream of one path. `at` derives the
+// stream of a path vertex and purpose. Drawing more numbers in one stream leaves the others
+// unchanged, as finite differences with common random numbers require.
 class Rng {
  public:
   Rng(uint64_t seed, uint64_t pixel, uint64_t sample)
       : key_(mix_bits(mix_bits(mix_bits(seed + kGolden) + pixel + kGolden) + sample + kGolden)),
         state_(key_) {}
-  // The same of a pixel's samples that fill their ranges evenly together: for every purpose and
-  // depth, sample n takes the n-th of the Sobol' points of a pixel, scrambled by chance (rng.cpp).
-  // Any one sample is as random as that of another stream; several are not independent. count: more
-  // than any sample, for `path`; 0 if it is not asked for.
+  // A low-discrepancy stream: for each purpose and depth, sample n uses the n-th point of an
+  // Owen-scrambled Sobol' sequence of the pixel (rng.cpp). A single sample is distributed as in an
+  // independent stream; several samples are correlated. count: an upper bound of all sample
+  // indices, for `path`; 0 if unused.
   static Rng even(uint64_t seed, uint64_t pixel, uint32_t sample, uint32_t count = 0) {
     Rng rng(mix_bits(mix_bits(seed + kGolden) + pixel + kGolden));
     rng.sample_ = sample;
@@ -70,29 +70,29 @@ class Rng {
     rng.dimension_ = dimension_ < 0 ? -1 : 0;
     return rng;
   }
-  // The stream of one of several samples of the same kind; the first is this one itself.
+  // The stream of the index-th sample of one kind; index 0 is this stream itself.
   Rng copy(Purpose purpose, int index) const { return index == 0 ? *this : at(purpose, index); }
-  // The stream of one of several paths of a sample; the first is this one itself. The paths of all
-  // samples are even together: the second ones take the points behind those of the first.
+  // The stream of the index-th path of a sample; index 0 is this stream itself. Together the paths
+  // of all samples are low-discrepancy: path i uses the points after those of path i - 1.
   Rng path(int index) const {
     if (count_ == 0) return copy(Purpose::kPathCopy, index);
     Rng rng(*this);
     rng.sample_ += static_cast<uint32_t>(index) * count_;
     return rng;
   }
-  // The stream key.at(purpose, depth).
+  // Identifies the stream key.at(purpose, depth).
   struct Stream {
     const Rng* key;
     uint64_t depth;
   };
-  // numbers[i]: the first that `uniform` of streams[i] gives. The keys are all even, or none is.
+  // numbers[i]: the first `uniform` of streams[i]. All keys are low-discrepancy, or none is.
   template <size_t kCount>
   static void draw(Purpose purpose, std::span<const Stream> streams,
                    std::array<double, kCount>* numbers) {
     static_assert(kCount <= kDimensions);
     if (!streams.empty()) draw(purpose, streams, kCount, numbers->data());
   }
-  // Uniform in [0, 1): 53 bits, of which the last 21 are alike in all that is even together.
+  // Uniform in [0, 1) with 53 bits; the last 21 are shared by all points of a sequence.
   double uniform() {
     if (dimension_ >= 0) return even_uniform();
     return static_cast<double>(next() >> 11) * 0x1.0p-53;
@@ -116,11 +116,11 @@ class Rng {
   static constexpr uint64_t kGolden = 0x9e3779b97f4a7c15ull;
   uint64_t key_;
   uint64_t state_;
-  // Of even streams alone.
+  // For low-discrepancy streams only.
   uint32_t sample_ = 0;
-  uint32_t count_ = 0;  // more than any sample, or 0
-  uint32_t place_ = 0;  // of the sample among the points of these dimensions
-  int dimension_ = -1;  // the next; -1 for independent numbers
+  uint32_t count_ = 0;  // upper bound of sample indices, or 0
+  uint32_t place_ = 0;  // index of the sample's point in these dimensions
+  int dimension_ = -1;  // next dimension; -1 for independent numbers
 };
 
 }  // namespace limn

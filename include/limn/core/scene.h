@@ -1,6 +1,6 @@
 #pragma once
-// A scene ready to render: plain data with checked values. Every differentiable number is stored as
-// a Dual whose derivative lanes are zero until a parameter is seeded (parameter.h).
+// A scene ready to render: plain data, validated. Differentiable numbers are stored as Duals whose
+// derivatives are zero until a parameter is seeded (parameter.h).
 #include <map>
 #include <memory>
 #include <optional>
@@ -16,10 +16,10 @@
 
 namespace limn {
 
-// How interpolated normals enter the scattering function, see shading.h.
+// How interpolated normals are used in scattering, see shading.h.
 enum class ShadingModel {
-  kContinuous,  // continuous in position and directions: gradients have no hidden jumps
-  kMitsuba,  // Mitsuba 3's convention, for comparing images; its jumps are missing from gradients
+  kContinuous,  // continuous in position and direction: gradients miss nothing
+  kMitsuba,     // Mitsuba 3's convention, to compare images; gradients miss its discontinuities
 };
 
 struct Shape {
@@ -28,34 +28,34 @@ struct Shape {
   Mesh mesh;
   std::shared_ptr<Bsdf> bsdf;  // never null; shared between shapes that refer to one element
   bool is_emitter = false;
-  Rgb<Dual> radiance;      // of an area emitter: from the front of every face
+  Rgb<Dual> radiance;      // of an area emitter: emitted from the front of every face
   std::string emitter_id;  // "" if none
 };
 
-// What a <sensor> element says.
+// The content of a <sensor> element.
 struct Sensor {
   std::string id;  // "" if none
   Camera camera;
   Film film;
-  int sample_count = 4;  // samples per pixel that it asks for
+  int sample_count = 4;  // samples per pixel requested
   uint64_t seed = 0;
 };
 
 struct Scene {
   std::string file;
-  std::vector<std::string> xml_files;   // the file and what it includes
-  std::vector<std::string> data_files;  // meshes and images that it mentions
+  std::vector<std::string> xml_files;   // the scene file and its includes
+  std::vector<std::string> data_files;  // referenced meshes and images
   Camera camera;
   Film film;
-  int max_depth = -1;  // as in Mitsuba: 1 emission only, 2 direct light, -1 no limit
-  int rr_depth = 5;    // Russian roulette from this depth on
+  int max_depth = -1;  // as in Mitsuba: 1 emission only, 2 direct light, -1 unlimited
+  int rr_depth = 5;    // depth at which Russian roulette starts
   bool hide_emitters = false;
-  int sample_count = 4;  // samples per pixel that the sensor asks for
+  int sample_count = 4;  // samples per pixel that the sensor requests
   uint64_t seed = 0;
-  // Of the file, as they were read: use_sensor() makes one of them the scene's, at first that in
-  // front.
+  // All sensors as read from the file. use_sensor() selects one as the scene's own; the first one
+  // is selected by default.
   std::vector<Sensor> sensors;
-  size_t sensor = 0;  // the one that is the scene's
+  size_t sensor = 0;  // index of the selected one
   ShadingModel shading = ShadingModel::kContinuous;
 
   std::vector<Shape> shapes;
@@ -67,38 +67,38 @@ struct Scene {
   const Shape& shape(ShapeId id) const { return shapes[id.index()]; }
 };
 
-// Of all shapes; empty if there is none.
+// Bounds of all shapes; empty without shapes.
 Bounds bounds_of(const Scene& scene);
 
-// A copy that shares nothing mutable with the original.
+// A copy that shares no mutable data with the original.
 Scene deep_copy(const Scene& scene);
 
-// Reads the subset of Mitsuba 3's XML that scenes/README.md describes. `defines` are the -D
-// name=value pairs. Throws InputError with file:line:col. Warnings (for example about faces left
-// out of a mesh) are appended to `warnings`.
+// Reads the subset of Mitsuba 3's XML format described in scenes/README.md. `defines` are the -D
+// name=value pairs. InputError with file:line:col. Appends warnings (for example about faces
+// removed from a mesh) to `warnings`.
 Scene read_scene(const std::string& file, const std::map<std::string, std::string>& defines,
                  std::vector<std::string>* warnings);
-// The same from the XML itself. Files that it names are looked for in `folder` ("": where the
-// program runs); the file of places in errors is FOLDER/string.
+// read_scene for XML in a string. File names are relative to `folder` ("": the working directory);
+// errors are located in FOLDER/string.
 Scene read_scene_text(const std::string& text, const std::string& folder,
                       const std::map<std::string, std::string>& defines,
                       std::vector<std::string>* warnings);
 
-// Camera, film, samples and seed become those of a sensor of the file, named by its number from 0
-// or its id; an id that is a sensor's number stands for that one. InputError that lists them if
-// there is none.
+// Selects a sensor of the file by index or id: replaces camera, film, sample count and seed. An id
+// that equals an index means the sensor of that index. InputError lists the sensors if there is
+// none of this name.
 void use_sensor(Scene& scene, const std::string& name);
-// Their numbers and ids, as in: 0, 1 or "side".
+// The indices and ids of all sensors, for example: 0, 1 or "side".
 std::string sensor_names(const Scene& scene);
-// Of the scene's own: its id, or its number where it has none.
+// The id of the selected sensor, or its index if it has no id.
 std::string sensor_name(const Scene& scene);
 
-// How many sensors a file has. InputError where it is no scene as far as that is looked at: no mesh
-// or image is read.
+// Number of sensors in a file. InputError for an invalid scene, without reading meshes or
+// images.
 size_t count_sensors(const std::string& file, const std::map<std::string, std::string>& defines);
 
-// Gives a shape another mesh: positions (V by 3, scene units) and faces (F by 3, into them). Flat
-// shapes stay flat, all others get computed normals. Warnings and InputError as make_mesh().
+// Replaces a shape's mesh by positions (V by 3, scene units) and faces (F by 3). Flat shapes stay
+// flat; others get computed normals. Warnings and InputError as in make_mesh().
 void set_mesh(Scene& scene, ShapeId shape, std::vector<Vec3f> positions,
               std::vector<FaceIndices> faces, std::vector<std::string>* warnings);
 

@@ -1,6 +1,6 @@
 #pragma once
-// Which numbers of a scene have a place (a slot) in a gradient, and how values that a Var carries
-// come from them. Tape::slots() names those of the scene that is traced.
+// Slots: indices into the gradient for the scene's differentiable numbers, and how Var values
+// depend on them. Tape::slots() refers to those of the current scene.
 #include <array>
 #include <memory>
 #include <optional>
@@ -11,21 +11,21 @@
 
 namespace limn {
 
-// The first slots of a mesh's numbers; 0: they are constants. Copies of a welded vertex have the
-// slots of the first, `weld`.
+// The first slots of a mesh's numbers; 0 if they are constant. Welded vertices share the slots of
+// the first copy, `weld`.
 struct MeshSlots {
   uint32_t positions = 0;  // of 3 V
   uint32_t normals = 0;    // of 3 N
   uint32_t horizons = 0;   // of V
 };
 
-// Of each channel. The three of a colour have one each, since channels never mix; a number that
-// enters all channels has the same one three times. 0: a constant.
+// A slot for each channel, since channels never mix. A number that affects all channels has the
+// same slot three times. 0: constant.
 using ChannelSlots = std::array<uint32_t, 3>;
 
-// A copy of an object whose k-th lane carries the derivative with respect to its parameter with the
-// k-th slots, all channels of a colour at once. Objects with more parameters than lanes have
-// several copies.
+// Copies of an object for differentiation: lane k of a copy carries the derivative with respect to
+// the parameter with the k-th slots, all channels of a colour at once. Objects with more parameters
+// than lanes need several copies.
 template <class T>
 struct SeededCopy {
   std::shared_ptr<T> object;
@@ -34,21 +34,21 @@ struct SeededCopy {
 template <class T>
 using SeededCopies = std::vector<SeededCopy<T>>;
 
-// The camera's own numbers: origin, left, up, forward (three each), fov.
+// The camera's values: origin, left, up, forward (three each), fov.
 inline constexpr uint32_t kCameraSlots = 13;
 
 struct SceneSlots {
-  const Scene* scene = nullptr;        // must outlive this
-  uint32_t count = 1;                  // all slots, with the unused first one
+  const Scene* scene = nullptr;        // must outlive this object
+  uint32_t count = 1;                  // number of slots, including the unused slot 0
   std::vector<MeshSlots> meshes;       // of each shape
   std::vector<ChannelSlots> radiance;  // of each shape's emitter
-  // Of what each shape shows behind and in front, null where it is constant.
+  // BSDF copies of each shape's back and front; null if constant.
   std::vector<std::array<const SeededCopies<Bsdf>*, 2>> bsdfs;
-  std::vector<std::unique_ptr<SeededCopies<Bsdf>>> bsdf_copies;  // what those point to
+  std::vector<std::unique_ptr<SeededCopies<Bsdf>>> bsdf_copies;  // owns the copies of `bsdfs`
   SeededCopies<Environment> environment;
   std::vector<std::pair<const DeltaLight*, SeededCopies<DeltaLight>>> lights;
   uint32_t camera = 0;  // the first of kCameraSlots
-  uint32_t texels = 0;  // the first of those of the environment's map, row by row; 0: constants
+  uint32_t texels = 0;  // first slot of the environment's texels, in row-major order; 0: constants
 
   const MeshSlots& mesh(ShapeId shape) const { return meshes[shape.index()]; }
   const SeededCopies<DeltaLight>* of(const DeltaLight& light) const {
@@ -61,7 +61,7 @@ struct SceneSlots {
 namespace detail {
 
 inline Vec3<Dual> held(const Vec3<Var>& v) { return {v.x.v, v.y.v, v.z.v}; }
-// Moving along the axes in the first three lanes.
+// `v` with derivatives along the three axes in the first three lanes.
 inline Vec3<Dual> along_axes(const Vec3<Var>& v) {
   return {{v.x.v, {1, 0, 0, 0}}, {v.y.v, {0, 1, 0, 0}}, {v.z.v, {0, 0, 1, 0}}};
 }
@@ -70,20 +70,20 @@ inline Vec3<Var> leaves(const Vec3d& v, uint32_t slot) {
   return {Var{v.x, tape.leaf(slot)}, Var{v.y, tape.leaf(slot + 1)}, Var{v.z, tape.leaf(slot + 2)}};
 }
 
-// Three numbers (a colour, a vector) as one statement each, with partial derivatives that Dual
-// numbers know.
+// Records a three-component function (colour or vector) as one statement per component, with
+// partial derivatives from Duals.
 class Jacobian {
  public:
-  static constexpr int kMost = 64;  // inputs; what has so many parameters needs more
+  static constexpr int kMost = 64;  // limit on inputs
 
   void add(uint32_t node, double a, double b, double c) {
     if (node != 0) inputs_[count_++] = {node, {a, b, c}};
   }
-  // f: with x moving along the axes.
+  // f: evaluated with x moving along the axes.
   void add(const Vec3<Var>& x, const Rgb<Dual>& f) {
     for (int k = 0; k < 3; ++k) add(x[k].node, f.r.d[k], f.g.d[k], f.b.d[k]);
   }
-  // f: of the seeded copy, everything else held. leaves: nodes of its slots.
+  // f: evaluated on the seeded copy, with all else constant. leaves: tape nodes of its slots.
   void add(const std::array<ChannelSlots, kLanes>& leaves, const Rgb<Dual>& f) {
     for (int k = 0; k < kLanes; ++k) {
       const ChannelSlots& node = leaves[k];
@@ -128,8 +128,8 @@ inline std::array<ChannelSlots, kLanes> leaves_of(const std::array<ChannelSlots,
   return nodes;
 }
 
-// Bsdf::eval with what the vectors and the BSDF's own parameters do to it; copies: null where they
-// are constants.
+// Bsdf::eval with derivatives with respect to its arguments and parameters. copies: null if the
+// parameters are constant.
 template <class S>
 Rgb<S> eval_bsdf(const Bsdf& bsdf, const SeededCopies<Bsdf>*, const Vec3<S>& n, const Vec3<S>& wi,
                  const Vec3<S>& wo) {
@@ -157,7 +157,7 @@ inline Rgb<Var> eval_bsdf<Var>(const Bsdf& bsdf, const SeededCopies<Bsdf>* copie
   return jacobian.result(f ? *f : bsdf.eval(value(n), value(wi), value(wo)));
 }
 
-// The radiance of a shape that emits.
+// Emitted radiance of a shape.
 template <class S>
 Rgb<S> emitter_radiance(const Shape& shape, ShapeId /*id*/) {
   return as<S>(shape.radiance);

@@ -1,11 +1,11 @@
 #pragma once
-// Reverse-mode derivatives: what a scalar (Var, var.h) writes down of how it was made, so that one
-// sweep back over it gives the derivative of one number with respect to all that it depends on.
+// The tape of reverse-mode differentiation: records how Vars (var.h) are computed. One backward
+// sweep gives the derivatives of one number with respect to all of its inputs.
 //
-// A node is a number that depends on some parameter; node 0 stands for all constants and writes
-// nothing. A leaf is a node that belongs to a slot, a place in the gradient. A statement makes one
-// node of some others with known partial derivatives; a composite statement makes several nodes at
-// once and brings its own adjoint.
+// A node is a number that depends on a parameter; node 0 stands for all constants. A leaf is a
+// node with a slot, an index into the gradient. A statement makes one node from others, given
+// the partial derivatives. A composite statement makes several nodes and provides its own
+// adjoint.
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -15,7 +15,7 @@ namespace limn {
 
 struct SceneSlots;
 
-// What a sweep adds to a slot of the gradient.
+// An increment to one slot of the gradient.
 struct Contribution {
   uint32_t slot;
   double value;
@@ -23,8 +23,8 @@ struct Contribution {
 
 class Tape {
  public:
-  // A statement with several outputs, the nodes from `first` on, and an adjoint written by hand.
-  // What it needs to know is kept with it; nothing here looks at it.
+  // A statement with several outputs, the nodes from `first` on, and a hand-written adjoint. Its
+  // data are opaque to the tape.
   struct Composite {
     uint32_t first, outputs;
     void (*pull)(Tape& tape, const Composite& statement);
@@ -33,14 +33,14 @@ class Tape {
     std::array<double, 6> values;
   };
 
-  // slots: of the scene that is traced; must outlive the tape. May be null where nothing asks.
+  // slots: of the current scene; must outlive the tape. May be null if no function needs them.
   explicit Tape(const SceneSlots* slots = nullptr) : slots_(slots) { clear(); }
   Tape(const Tape&) = delete;
   Tape& operator=(const Tape&) = delete;
 
   const SceneSlots* slots() const { return slots_; }
 
-  // Forgets everything but its memory.
+  // Removes all nodes but keeps the memory.
   void clear() {
     ends_.clear();
     ends_.push_back(0);
@@ -49,14 +49,14 @@ class Tape {
     composites_.clear();
     contributions_.clear();
   }
-  // A new node that belongs to the slot; the constant for slot 0.
+  // Adds a node with the given slot; returns the constant node for slot 0.
   uint32_t leaf(uint32_t slot) {
     if (slot == 0) return 0;
     const uint32_t node = end();
     leaves_.push_back({node, slot});
     return node;
   }
-  // The parts of a statement: d(result)/d(node), for each node, then the result.
+  // Statements are built from entries: d(result)/d(node) for each input node, then the result.
   void entry(uint32_t node, double weight) {
     if (node != 0) entries_.push_back({node, weight});
   }
@@ -64,7 +64,7 @@ class Tape {
     ends_.push_back(static_cast<uint32_t>(entries_.size()));
     return static_cast<uint32_t>(ends_.size() - 1);
   }
-  // Makes the outputs of a composite statement, all fields but `first` given. Returns the first.
+  // Adds the outputs of a composite statement (all fields but `first` are set). Returns the first.
   uint32_t add(Composite statement) {
     statement.first = static_cast<uint32_t>(ends_.size());
     ends_.insert(ends_.end(), statement.outputs, static_cast<uint32_t>(entries_.size()));
@@ -72,9 +72,9 @@ class Tape {
     return statement.first;
   }
 
-  // Adjoints are set between start() and sweep(), those of node 0 are of no account. After the
-  // sweep contributions() holds what it found, and what composite statements and contribute()
-  // added.
+  // Set adjoints between start() and sweep(); that of node 0 is ignored. After the sweep,
+  // contributions() holds all increments, including those of composite statements and
+  // contribute().
   void start() { adjoints_.assign(ends_.size(), 0.0); }
   double& adjoint(uint32_t node) { return adjoints_[node]; }
   void contribute(uint32_t slot, double value) {
@@ -83,14 +83,14 @@ class Tape {
   void sweep();
   const std::vector<Contribution>& contributions() const { return contributions_; }
 
-  // What is in use.
+  // Memory in use.
   size_t bytes() const {
     return ends_.size() * (sizeof(uint32_t) + sizeof(double)) + entries_.size() * sizeof(Entry) +
            leaves_.size() * sizeof(Leaf) + composites_.size() * sizeof(Composite) +
            contributions_.size() * sizeof(Contribution);
   }
 
-  // Where this thread writes; null where no scope is open.
+  // The tape of this thread; null outside of any scope.
   static Tape* current() { return current_; }
 
  private:
@@ -104,7 +104,7 @@ class Tape {
   };
   void sweep(uint32_t begin, uint32_t end);
 
-  // The one thread-local object of inner loops: in a shared library it would cost a call each time.
+  // Used in inner loops. With the default model, a shared library would access it by a call.
   [[gnu::tls_model("initial-exec")]] static inline constinit thread_local Tape* current_ = nullptr;
   const SceneSlots* slots_;
   std::vector<uint32_t> ends_;  // of the entries of each node
@@ -137,7 +137,7 @@ inline void Tape::sweep() {
   for (const Leaf& leaf : leaves_) contribute(leaf.slot, adjoints_[leaf.node]);
 }
 
-// While it lives, Var writes to this tape in this thread.
+// While it exists, Vars of this thread are recorded on this tape.
 class TapeScope {
  public:
   explicit TapeScope(Tape& tape) : before_(Tape::current_) { Tape::current_ = &tape; }

@@ -1,5 +1,5 @@
 #pragma once
-// What the rounding of positions explains.
+// Tolerances that account for the rounding of vertex positions.
 #include <algorithm>
 #include <cmath>
 #include <span>
@@ -8,7 +8,7 @@
 
 namespace limn {
 
-// The largest coordinate of points, without its sign.
+// The largest absolute coordinate of the points.
 inline double largest_coordinate(std::span<const Vec3d> points) {
   double largest = 0;
   for (const Vec3d& x : points)
@@ -16,13 +16,13 @@ inline double largest_coordinate(std::span<const Vec3d> points) {
   return largest;
 }
 
-// For points on two faces whose largest coordinates are these: a position is taken to have been
-// rounded to float twice, in a file and after its transform. sqrt(3) * 2 * 2^-24 for each of two
-// positions, rounded up.
+// Distance that rounding explains between points on two faces of these largest coordinates. Each
+// position is rounded to float twice, in the file and after its transform. The value is sqrt(3) * 2
+// * 2^-24 for each of two positions, rounded up.
 inline double touch_tolerance(double size_a, double size_b) {
   return 0x1.0p-22 * (size_a + size_b);
 }
-// What is no longer than this many tolerances is a point: ends of overlaps are off by some.
+// Overlaps no longer than this many tolerances count as points, as their ends are inexact.
 inline constexpr double kShortestTouch = 8;
 
 }  // namespace limn

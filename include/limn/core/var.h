@@ -1,5 +1,5 @@
 #pragma once
-// The scalar of reverse mode: a number that writes to this thread's tape how it was made.
+// The scalar of reverse-mode differentiation: records its computation on this thread's tape.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace limn {
 
-// A number and its node.
+// A value and its tape node.
 struct Var {
   double v = 0;
   uint32_t node = 0;
@@ -21,7 +21,7 @@ struct Var {
 };
 
 namespace detail {
-// The result of a statement of one or two Vars and their partial derivatives.
+// Records a function of one or two Vars with its partial derivatives.
 inline Var unary(double v, const Var& a, double da) {
   if (a.node == 0) return v;
   Tape& tape = *Tape::current();
@@ -61,14 +61,14 @@ inline Var operator-(const Var& a) { return detail::unary(-a.v, a, -1); }
 inline Var& operator+=(Var& a, const Var& b) { return a = a + b; }
 inline Var& operator*=(Var& a, const Var& b) { return a = a * b; }
 
-// Comparisons look at the value alone.
+// Comparisons use the value alone.
 inline bool operator<(const Var& a, const Var& b) { return a.v < b.v; }
 inline bool operator>(const Var& a, const Var& b) { return a.v > b.v; }
 inline bool operator<=(const Var& a, const Var& b) { return a.v <= b.v; }
 inline bool operator>=(const Var& a, const Var& b) { return a.v >= b.v; }
 inline bool operator==(const Var& a, const Var& b) { return a.v == b.v; }
 
-// Derivatives at the ends of their domains as for Dual.
+// Derivatives at the ends of the domain are those of Dual.
 inline Var sqrt(const Var& a) {
   const double r = std::sqrt(a.v);
   return detail::unary(r, a, r > 0 ? 0.5 / r : 0);
@@ -100,7 +100,7 @@ inline bool is_still(const Var& a) { return a.node == 0; }
 inline bool is_still(const Vec3<Var>& a) { return (a.x.node | a.y.node | a.z.node) == 0; }
 inline bool is_still(const Rgb<Var>& a) { return (a.r.node | a.g.node | a.b.node) == 0; }
 
-// One statement each for a product of vectors and for a unit vector, in place of five and of ten.
+// Dot product and normalisation as one statement each, instead of five and ten.
 inline Var dot(const Vec3<Var>& a, const Vec3<Var>& b) {
   const double v = dot(value(a), value(b));
   if (is_still(a) && is_still(b)) return v;

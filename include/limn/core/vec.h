@@ -1,5 +1,5 @@
 #pragma once
-// Three-vectors and colours over any scalar (double, or Dual: a value with derivatives).
+// Three-vectors and colours over any scalar (double, or Dual).
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -17,10 +17,10 @@ struct Vec3 {
 using Vec3d = Vec3<double>;
 using Vec3f = Vec3<float>;
 
-// What follows is always inlined: left to the compiler, a product of two numbers with derivatives
-// is a call that passes them through memory.
+// These operators are always inlined. Compilers otherwise call functions that pass numbers with
+// derivatives through memory.
 
-// The scalars of a sum and of a product of scalars A and B (double with Dual gives Dual).
+// Scalar types of a sum and a product of scalars A and B (double with Dual gives Dual).
 template <class A, class B>
 using Sum = decltype(A{} + B{});
 template <class A, class B>
@@ -79,7 +79,7 @@ S length(const Vec3<S>& a) {
   using std::sqrt;
   return sqrt(dot(a, a));
 }
-// The caller guarantees a non-zero vector.
+// Requires a nonzero vector.
 template <class S>
 Vec3<S> normalize(const Vec3<S>& a) {
   return a / length(a);
@@ -96,7 +96,7 @@ Vec3<T> cast(const Vec3<S>& a) {
 }
 
 // Two unit vectors that complete the unit vector n to a right-handed frame (Duff et al. 2017).
-// Not continuous in n: only for choices whose outcome is not differentiated.
+// Discontinuous in n: use only where the result is not differentiated.
 template <class S>
 struct FrameOf {
   Vec3<S> s, t, n;

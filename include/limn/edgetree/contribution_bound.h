@@ -1,6 +1,6 @@
 #pragma once
-// How much one edge can contribute to the boundary integral at a shading point at most, visibility
-// and radiance aside, and a density for the point on it that follows this bound.
+// An upper bound of an edge's contribution to the boundary integral at a shading point, without
+// visibility and radiance, and a density on the edge in proportion to it.
 #include <array>
 
 #include "limn/core/lobe.h"
@@ -8,20 +8,20 @@
 
 namespace limn {
 
-// An edge as seen from p.
+// An edge relative to a shading point p.
 struct EdgeSegment {
-  Vec3d w_0, w_1;        // ends minus p
+  Vec3d w_0, w_1;        // end points minus p
   Vec3<Lanes> v_0, v_1;  // velocities of the ends minus that of p
 };
 EdgeSegment segment_of(const EdgeMesh& mesh, EdgeId edge, const EdgeQuery& query);
 
-// Upper bound of the scattering function over an arc of directions, for one viewer.
+// Upper bound of the scattering function over an arc of directions, for a given viewer.
 class LobeBound {
  public:
   // n: unit; wi: unit, n.wi > 0
   LobeBound(const Vec3d& n, const Vec3d& wi, const LobeSummary& lobe);
 
-  // Over the shorter great arc from u_a to u_b (unit) [1/sr].
+  // Bound over the shorter great arc from u_a to u_b (unit) [1/sr].
   double over_arc(const Vec3d& u_a, const Vec3d& u_b) const;
   // See LobeModel.
   const Vec3d& axis() const { return axis_; }
@@ -34,23 +34,23 @@ class LobeBound {
   double width_, cos_i_;
 };
 
-// The part of an edge above the horizon n.w > 0, cut into pieces that are short against the lobe.
-// A piece weighs max f_s * max |det(w_0, w_1, v)| * integral of dt / |w|^3, lanes added up; inside
-// a piece the density is uniform in the angle at p.
+// The part of an edge above the horizon n.w > 0, cut into pieces that are short compared with the
+// lobe. A piece's weight is max f_s * max |det(w_0, w_1, v)| * integral of dt / |w|^3, summed over
+// lanes. Within a piece the density is uniform in the angle at p.
 class EdgeBound {
  public:
   EdgeBound(const LobeBound& lobe, const EdgeSegment& segment);
 
-  // Sum over lanes of a bound of the integral of f_s |J| over the edge [parameter unit^-1]; zero
-  // only where that integral is zero (or p lies on the edge's line).
+  // Sum over lanes of a bound of the integral of f_s |J| over the edge [1 / parameter unit]. Zero
+  // only where that integral is zero, or p lies on the edge's line.
   double total() const { return total_; }
-  // The following need total() > 0.
-  // u_piece, u_angle in [0, 1)
+  // sample_t and pdf_t require total() > 0. u_piece, u_angle in [0,
+  // 1)
   double sample_t(double u_piece, double u_angle) const;
-  double pdf_t(double t) const;  // per unit t
+  double pdf_t(double t) const;  // with respect to t
 
  private:
-  // Steps from the peak double from 2^-26 or more: 28 on either side exceed any arc.
+  // Steps double from at least 2^-26 at the peak: 28 on each side exceed any arc.
   static constexpr int kMaxPieces = 64;
 
   bool clip_to_horizon(const LobeBound& lobe, const EdgeSegment& segment);
@@ -64,7 +64,7 @@ class EdgeBound {
   double whole_bound(const LobeBound& lobe) const;
   double piece_bound(const LobeBound& lobe, int i) const;
   double jacobian_bound(const Point& a, const Point& b) const;
-  double angle() const;  // of the whole arc
+  double angle() const;  // angle of the whole arc
   double piece_end(int i) const;
   double fraction_at(double angle, double end) const;
 

@@ -1,5 +1,5 @@
 #pragma once
-// A convex set of directions at a point, for listing the edges that are seen inside it.
+// A convex cone of directions at a point, used to list the edges visible inside.
 #include <array>
 #include <cmath>
 
@@ -8,17 +8,17 @@
 namespace limn {
 
 // The directions w (of any length) with planes[i] . w >= -slack |w| for all i < count. Without
-// planes it is the whole sphere.
+// planes: the whole sphere.
 struct DirectionCone {
   static constexpr int kMostPlanes = 8;
 
   std::array<Vec3d, kMostPlanes> planes;  // unit normals, inward
   int count = 0;
-  double slack = 0;  // sine of the angle by which every plane is tilted outward
+  double slack = 0;  // sine of the outward tilt of every plane
 
   void add(const Vec3d& plane) { planes[count++] = plane; }
-  // Cuts the range [t0, t1] of the segment (1 - t) a + t b to the part that may lie inside: all of
-  // what does, and a little more where the slack differs at the ends. False if nothing is left.
+  // Clips the range [t0, t1] of the segment (1 - t) a + t b to the cone, conservatively: slightly
+  // too large where the slack differs at the ends. False if nothing remains.
   bool clip(const Vec3d& a, const Vec3d& b, double& t0, double& t1) const {
     const double widen = slack * std::fmax(length(a), length(b));
     for (int i = 0; i < count; ++i) {
@@ -26,7 +26,7 @@ struct DirectionCone {
     }
     return true;
   }
-  // Cuts it to where a function with these values at a and b, linear in t, is not negative.
+  // Clips to where a function, linear in t with these values at a and b, is not negative.
   static bool clip_by(double at_a, double at_b, double& t0, double& t1) {
     if (at_a < 0 && at_b < 0) return false;
     if (at_a < 0) t0 = std::fmax(t0, at_a / (at_a - at_b));

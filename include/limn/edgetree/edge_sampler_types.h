@@ -1,5 +1,5 @@
 #pragma once
-// The table of edge samplers. A new one is its .cpp and .h in edgetree/, and a row here.
+// The table of edge samplers. To add one: its .cpp and .h in edgetree/, and a row here.
 #include <memory>
 #include <span>
 #include <string>
@@ -13,18 +13,18 @@ struct EdgeSamplerType {
   std::string name;
   std::string description;
   std::unique_ptr<EdgeSampler> (*make)(const EdgeSamplerInput& input, int threads);
-  // A sampler with one idea taken out, which shows what the idea is worth: of no use but for that.
+  // True for an ablation: a sampler without one of its ideas, to measure what the idea is worth.
   bool ablation = false;
-  // Regions of light (lamps, bright patches of the environment) are kept apart from what it chooses
-  // by: its list of outlines serves them.
+  // True if light sets (area lights, bright environment patches) are sampled separately: its list
+  // of outlines serves them.
   bool regions = false;
 };
 std::span<const EdgeSamplerType> edge_sampler_types();
 
-// What is used where nothing else is asked for.
+// The default sampler.
 const EdgeSamplerType& default_edge_sampler();
 
-// InputError that lists the known names if there is none of this name.
+// Finds a sampler by name. InputError lists the known names.
 const EdgeSamplerType& edge_sampler_type(const std::string& name);
 std::unique_ptr<EdgeSampler> make_edge_sampler(const std::string& name,
                                                const EdgeSamplerInput& input, int threads);

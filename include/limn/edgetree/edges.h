@@ -1,6 +1,6 @@
 #pragma once
-// The edges of a mesh, their classes, and E(p): the set of edges across which radiance may jump as
-// seen from a point p.
+// The edges of a mesh, their classes, and E(p): the set of edges across which the radiance seen
+// from a point p may be discontinuous.
 #include <array>
 #include <cstdint>
 #include <span>
@@ -14,100 +14,100 @@
 namespace limn {
 
 enum class EdgeClass : uint8_t {
-  // Two faces, shading normals continuous: a jump only where it is a silhouette.
+  // Two faces with continuous shading normals: discontinuous only as a silhouette.
   kSmooth,
-  // Two faces, shading normals differ: a jump for every point that sees one of the faces.
+  // Two faces with different shading normals: discontinuous if p sees one of the faces.
   kSharp,
-  // One face: a jump for every point.
+  // A boundary edge, with one face: discontinuous from everywhere.
   kBorder,
-  // More than two faces, two that wind the same way, or faces of several edges that were united
-  // (touching.h): treated as a jump for every point.
+  // Non-manifold: more than two faces, two of opposite orientation, or united edges (touching.h).
+  // Treated as discontinuous from everywhere.
   kIrregular,
-  // Two coplanar faces (exactly, or to rounding) with equal shading normals: never a jump but on
-  // their common plane.
+  // Two coplanar faces (exactly, or to rounding) with equal shading normals: discontinuous only
+  // from their common plane.
   kFlat,
-  // Two faces of any shapes that pass through each other along it, see crossing_curves.h: treated
-  // as a jump for every point.
+  // An intersection segment of two faces of any shapes, see crossing_curves.h. Treated as
+  // discontinuous from everywhere.
   kCrossing,
 };
 
 const char* edge_class_name(EdgeClass edge_class);
 
 struct Edge {
-  // Welded vertices of the mesh; the first face runs from [0] to [1]. Where a face without area
-  // met a long side, an edge may be a part of that side.
+  // Welded vertices of the mesh; the first face runs from [0] to [1]. Next to a face without area
+  // an edge may be a part of a longer side.
   std::array<VertexId, 2> vertices;
-  std::array<FaceId, 2> faces;  // two of its own mesh's faces around it; [1] is none if it has one
+  std::array<FaceId, 2> faces;  // adjacent faces of its own mesh; [1] is none on a boundary edge
   EdgeClass edge_class = EdgeClass::kSmooth;
-  bool concave = false;  // two faces, each in front of the other's plane
-  uint8_t rim = 0;       // the edge moves with those faces around it that have this number
+  bool concave = false;  // each of the two faces is in front of the other's plane
+  uint8_t rim = 0;       // motion group: the edge moves with the faces of this number
 };
 
-// No border of what moves: the surface goes on across the edge.
+// Not in any motion group: the surface continues across the edge.
 inline constexpr uint8_t kNoRim = 255;
-// As many numbers of rims there are at most in one place; the last stands for all further ones.
+// Limit on motion groups at one place; the last one stands for all others.
 inline constexpr uint8_t kMostRims = 8;
 
-// How a face lies around an edge.
+// The relation of a face to an edge.
 struct Incidence {
-  // The edge runs through the inside of the face, which therefore lies on both sides of it; else
-  // the edge is on the face's border.
+  // True if the edge passes through the interior of the face, which then lies on both sides of it;
+  // else the edge is on the face's boundary.
   bool through = false;
-  // Faces whose common border moves as one share a number; where there are several numbers, each
-  // has an edge of its own in this place. kNoRim: a face that the edge runs through, or that
-  // another one continues in its plane, which looks and moves alike.
+  // The motion group: faces whose common boundary moves alike share a number. With several groups
+  // at one place, each has an edge of its own. kNoRim: the edge passes through the face, or a
+  // coplanar face of equal appearance and motion continues it.
   uint8_t rim = 0;
   bool operator==(const Incidence&) const = default;
 };
 
-// All faces of a scene that touch an edge along its whole length, and those so near to it that rays
-// cannot tell on which side of it they pass (touching.h).
+// All faces that touch an edge along its whole length, and near faces: float rays cannot resolve on
+// which side of the edge they are (touching.h).
 struct FacesAround {
   std::span<const FaceRef> faces;
-  std::span<const Incidence> incidences;  // of each; empty if all are as by default
-  std::span<const FaceRef> near = {};     // no face is in both
-  std::span<const FaceRef> all = faces;   // the faces, then the near ones
+  std::span<const Incidence> incidences;  // of each face; empty if all are defaults
+  std::span<const FaceRef> near = {};     // disjoint from `faces`
+  std::span<const FaceRef> all = faces;   // the faces, then the near faces
   Incidence incidence(size_t i) const { return incidences.empty() ? Incidence{} : incidences[i]; }
 };
 
-// n . x + offset is the signed distance of x, positive in front; n is zero for a face without area.
+// The signed distance of x is n . x + offset, positive in front; n = 0 for a degenerate face.
 struct Plane {
   Vec3d n;
   double offset = 0;
   double distance(const Vec3d& x) const { return dot(n, x) + offset; }
 };
 
-// A vertex on an edge of its mesh that was cut there: (1 - t) of its first end and t of the other.
+// A vertex that splits an edge of its mesh, at (1 - t) of its first end plus t of the other.
 struct CutVertex {
   std::array<VertexId, 2> ends;
   double t = 0;
 };
 
-// The edges of one mesh (an object), with all that a query needs. Welded: copies of a vertex along
-// a texture seam are one vertex.
+// The edges of one mesh with all data that queries need. Welded: copies of a vertex along a texture
+// seam are one vertex.
 struct EdgeMesh {
-  std::vector<Vec3d> positions;       // V, world space, the floats that Embree sees
-  std::vector<Vec3<Lanes>> tangents;  // V; empty where nothing moves
-  std::vector<CutVertex> cuts;        // the last of the V, where edges of other meshes end on them
-  std::vector<Plane> planes;          // F, outward, double precision
-  std::vector<Edge> edges;            // E
-  ShapeId shape;                      // whose faces `planes` are; none for crossing curves
-  // The faces around edge e: incident_faces[face_offsets[e], face_offsets[e + 1]), of any shape;
-  // those of `shape` come first.
+  std::vector<Vec3d> positions;       // V, world space, equal to Embree's floats
+  std::vector<Vec3<Lanes>> tangents;  // V; empty if nothing moves
+  std::vector<CutVertex> cuts;  // of the last vertices, where edges of other meshes split these
+  std::vector<Plane> planes;    // F, outward, double precision
+  std::vector<Edge> edges;      // E
+  ShapeId shape;                // the shape of `planes`; none for intersection curves
+  // Faces around edge e, of any shape: incident_faces[face_offsets[e], face_offsets[e + 1]). Those
+  // of `shape` come first.
   std::vector<uint32_t> face_offsets;  // E + 1
   std::vector<FaceRef> incident_faces;
-  std::vector<Incidence> incidences;  // of incident_faces; empty if all are as by default
-  // FacesAround::all of edge e, if faces are near to it, else nothing:
-  // faces_and_near[near_offsets[e], near_offsets[e + 1]). Both are empty if there are none at all.
+  std::vector<Incidence> incidences;  // of incident_faces; empty if all are defaults
+  // FacesAround::all of an edge e with near faces: faces_and_near[near_offsets[e], near_offsets[e +
+  // 1]), else empty. Both arrays are empty without near faces.
   std::vector<uint32_t> near_offsets;  // E + 1
   std::vector<FaceRef> faces_and_near;
-  // The mesh is closed and its surfaces are black from behind: a point that sees only back faces
-  // sees no jump at a sharp edge, and concave edges are never silhouettes from outside.
-  // United edges are irregular and stand outside of this rule.
-  // Holds if every connected part encloses positive volume (a part turned inside out, or the cavity
-  // of a hollow body, makes it false); parts that cross themselves are beyond this test.
+  // True if the mesh is closed and black from behind. Then a point that sees only back faces sees
+  // no discontinuity at a sharp edge, and concave edges are never silhouettes from outside. United
+  // edges are irregular and exempt from this rule. Requires that every connected component encloses
+  // positive volume (false for inverted components and for cavities). Self-intersections are not
+  // tested.
   bool one_sided_closed = false;
-  double extent = 0;  // largest |x| of a position that a face uses
+  double extent = 0;  // largest |x| of a position in use
 
   const Edge& edge(EdgeId id) const { return edges[id.index()]; }
   const Plane& plane(FaceId id) const { return planes[id.index()]; }
@@ -128,8 +128,8 @@ struct EdgeMesh {
     }
     return around;
   }
-  // For edges that are looked at soon: bring into the cache the edge itself; and once that is
-  // there, its ends and its faces.
+  // Prefetch for edges used soon: fetch_edge loads the edge, and the second function, once it is
+  // there, its ends and faces.
   void fetch_edge(EdgeId id) const {
     __builtin_prefetch(&edges[id.index()]);
     __builtin_prefetch(&face_offsets[id.index()]);
@@ -145,49 +145,49 @@ struct EdgeMesh {
     __builtin_prefetch(incident_faces.data() + face_offsets[id.index()]);
   }
   uint64_t count(EdgeClass edge_class) const;
-  // The first of the above that does not hold, in words; empty if all of it does.
+  // Describes the first violated invariant of the above; empty if all hold.
   std::string validate() const;
 };
 
 // An edge of a scene, or none.
 struct EdgeRef {
-  ShapeId object;  // whose EdgeMesh it is in
+  ShapeId object;  // which EdgeMesh
   EdgeId edge;
   bool operator==(const EdgeRef&) const = default;
 };
 
-// mesh.weld must be filled. black_behind: the mesh's BSDF is black from behind. shape: whose mesh
-// it is. Faces without area
-// stay in `planes` with a zero normal and have no edges: their neighbours' sides are split at the
-// corners that lie on them, so that the neighbours meet. Copies of a vertex that move differently
-// tear the surface: both rims are borders.
+// Builds the edges of a mesh; mesh.weld must be filled. black_behind: the mesh's BSDF is black
+// from behind. shape: the mesh's shape. Degenerate faces keep a zero normal in `planes` and
+// have no edges: adjacent sides are split at their corners, so that the real neighbours
+// connect. Copies of a vertex with different motions tear the surface: both sides become
+// boundary edges.
 EdgeMesh build_edge_mesh(const Mesh& mesh, bool black_behind, ShapeId shape = ShapeId(0));
 
-// Bound of the rounding error of Plane::distance(p) for the planes of a mesh: within it of zero, p
-// counts as lying on either side.
+// Bound of the rounding error of Plane::distance(p) for the planes of a mesh. Within it, p counts
+// as on both sides.
 double distance_error(const EdgeMesh& mesh, const Vec3d& p);
 
-// Whether incident radiance at p may jump across the edge: the set E(p), exactly, in double
-// precision, without regard to occlusion. Smooth edges: p lies in front of exactly one of the two
-// planes (a distance of zero, to rounding, counts as either side, so that an edge is rather listed
-// than lost); never, if concave and one_sided_closed: the mesh itself hides such an edge from every
-// point that lies between its planes. Sharp: p is in front of at least one face, or the mesh is not
-// one_sided_closed. Border, irregular, crossing: always. Flat: as smooth.
+// True if the edge is in E(p): incident radiance at p may be discontinuous across it, ignoring
+// occlusion. Exact in double precision. Smooth edges: p is in front of exactly one of the two
+// planes (within rounding of a plane it counts as on both sides, so no edge is lost); never if
+// concave and one_sided_closed, as the mesh itself then occludes the edge. Sharp: p is in front of
+// at least one face, or the mesh is not one_sided_closed. Boundary, irregular, intersection:
+// always. Flat: as smooth.
 bool is_candidate(const EdgeMesh& mesh, EdgeId edge, const Vec3d& p);
 
-// On which sides of a face's plane a point counts as lying: on both within the rounding of its
-// distance.
+// The sides of a face's plane on which a point counts as lying; both within rounding
+// error.
 struct Facing {
   bool front, back;
 };
 Facing facing(const EdgeMesh& mesh, FaceId face, const Vec3d& p);
-// is_candidate of an edge with two faces, from where these are turned like that.
+// is_candidate for an edge with two faces, given on which sides of them p lies.
 bool is_candidate(const EdgeMesh& mesh, EdgeId edge, Facing first, Facing second);
 
-// Whether the edge is in E(p) and its faces may leave one side of it free, so that what lies behind
-// it is seen there: silhouettes of all classes, borders, irregular edges. It is E(p) without sharp
-// edges that have a face on either side as seen from p, and without those that their own mesh
-// hides.
+// True if the edge is in E(p) and geometry behind it may be visible beside it: silhouettes
+// of all classes, boundary edges, irregular edges. It is E(p) without sharp edges that
+// have a face on both sides as seen from p, and without edges that their own mesh
+// occludes.
 bool is_outline(const EdgeMesh& mesh, EdgeId edge, const Vec3d& p);
 
 }  // namespace limn

@@ -1,6 +1,6 @@
 #pragma once
-// The planes that a node of the paper's forest holds, and the pair of quadrics that bounds them, in
-// the coordinates of the node's dual box: for drawing.
+// The planes of a node of the paper's forest and the quadrics that bound them, in the coordinates
+// of the node's dual box: for drawing.
 #include <array>
 #include <optional>
 #include <vector>
@@ -10,20 +10,20 @@
 
 namespace limn {
 
-// u in [-1, 1]^3. The planes of the family between the two quadrics are those with
-// low <= f(u) <= high, f(u) = sum of linear_k u_k + square_k u_k^2 + product_k u_i u_j with i, j
-// the two others than k.
+// With u in [-1, 1]^3, the planes between the two quadrics are those with low <= f(u) <= high. f(u)
+// = sum of linear_k u_k + square_k u_k^2 + product_k u_i u_j, with i, j the two indices other than
+// k.
 struct QuadricChart {
   std::array<double, 3> linear, square, product;
   double low, high;
-  // The two planes of each edge: its wedge is the segment between them.
+  // The face planes of each edge; the edge's wedge is the segment between them.
   std::vector<std::array<Vec3d, 2>> edges;
 };
 
 class ChartedTree : public RejectionTree {
  public:
-  // None for an edge by itself, where there are no quadrics, where they never reject, and where a
-  // box is so thin that its coordinates are rounding.
+  // Nothing for a single edge, for a node without quadrics or with quadrics that never reject, and
+  // for a box so thin that its coordinates are rounding errors.
   virtual std::optional<QuadricChart> chart(uint32_t node) const = 0;
 };
 

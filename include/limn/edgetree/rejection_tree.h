@@ -1,5 +1,5 @@
 #pragma once
-// The tree of an edge sampler as its rejection test sees it, for pictures, counts and tests.
+// A sampler's tree as its rejection test sees it, for images, statistics and tests.
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -9,11 +9,11 @@
 
 namespace limn {
 
-// A set of edges that one test rejects or accepts as a whole.
+// A set of edges that one test accepts or rejects as a whole.
 struct RejectionNode {
-  uint32_t parent;      // RejectionTree::kNoNode for those that the first choice is among
-  uint32_t after;       // those below node i are the nodes [i + 1, after); none below an edge
-  uint32_t depth;       // choices that lead here, from 1
+  uint32_t parent;      // kNoNode for the nodes of the first choice
+  uint32_t after;       // descendants of node i are [i + 1, after); none below an edge
+  uint32_t depth;       // number of choices that lead here, from 1
   uint32_t begin, end;  // its edges are RejectionTree::edges()[begin, end)
 };
 
@@ -23,15 +23,15 @@ class RejectionTree {
 
   virtual ~RejectionTree() = default;
 
-  // Depth first.
+  // In depth-first order.
   std::span<const RejectionNode> nodes() const { return nodes_; }
   std::span<const EdgeRef> edges() const { return edges_; }
   std::span<const EdgeRef> edges(uint32_t node) const {
     return edges().subspan(nodes_[node].begin, nodes_[node].end - nodes_[node].begin);
   }
 
-  // Whether the test finds that no edge of the node can be in E(p), by the code that sampling runs.
-  // Horizon, motion and the test of an edge after it is drawn are left out. Thread-safe.
+  // True if the test proves that no edge of the node is in E(p), with the code used for sampling.
+  // Excludes horizon, motion and the test of a drawn edge. Thread-safe.
   virtual bool rejects(uint32_t node, const Vec3d& p) const = 0;
 
  protected:

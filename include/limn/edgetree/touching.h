@@ -1,5 +1,5 @@
 #pragma once
-// Edges that touch faces or edges of any shape of a scene, united.
+// Edges that touch faces or edges of any shape are split and united.
 #include <array>
 #include <span>
 #include <vector>
@@ -10,37 +10,37 @@
 
 namespace limn {
 
-// One shape, as far as touching goes.
+// A shape as input to unite_touching_edges.
 struct TouchingShape {
   const Mesh* mesh = nullptr;
-  // Shapes of the same look are told apart by their geometry alone: same BSDF, no emission.
+  // Shapes with the same number look alike (same BSDF, no emission) and differ in geometry only.
   uint32_t look = 0;
 };
 
-// What touches and moves differently.
+// Touching shapes with different motions.
 struct TouchingMotion {
   std::vector<ContactLine> pressed;
-  std::vector<std::array<ShapeId, 2>> parting;  // ascending; twice the same: a shape from itself
+  std::vector<std::array<ShapeId, 2>> parting;  // ascending; {s, s}: parts of one shape separate
 };
 
-// Rewrites the edges of all objects (object i is shape i, as build_edge_mesh made it) so that edges
-// in one place are one edge, and every edge knows all faces that touch it:
-//  - an edge is split where faces that it lies on begin and end: at ends of other edges that run
-//    along it (T-junctions, tiles of different size), at borders of faces that it lies in;
-//  - each part lists all faces around it (Incidence), and is irregular if it was alone before;
-//  - of parts of several edges in one place that move alike, the one of the first shape stays. If
-//    they move differently each stays, as a rim of the faces that move with it;
-//  - a seam of two faces in one plane that look and move alike is no edge.
-// Parts on which one face stands on the inside of others, or on another body edge on edge, where
-// these come towards it or leave it, are left out of the objects and returned: contact that
-// tightens (ContactLine). Contact that loosens would open a gap, in which the light is another one.
-// Of a body half sunk in a face the part on the viewer's side of that counts.
-// Other shapes whose common edges part, or pass through each other, as they move are named: there
-// the image has a kink, and each rim keeps what it would add beside a gap (touching.cpp).
-// What touches is decided to the rounding of positions (edges/contacts.h). An edge also gets the
-// faces that do not touch it and are nearer to it than a ray in floats can tell, if it comes from
-// `viewer` (the camera) or from no farther away: FacesAround::near. Where nothing is so near
-// nothing changes. pairs: of the shapes' faces, from find_face_pairs with the same viewer.
+// Rewrites the edges of all objects (object i is shape i, from build_edge_mesh), so that coincident
+// edges become one edge that knows all faces touching it:
+// - An edge is split where the set of faces it lies on changes: at ends of other edges along it
+// (T-junctions, tiles of different size) and at boundaries of faces that it lies in.
+// - Each part lists all faces around it (Incidence). It is irregular if it was a single edge
+// before.
+// - Of coincident parts with equal motion only that of the first shape remains. With different
+// motions each remains, in a motion group with the faces that move alike.
+// - A seam between coplanar faces of equal appearance and motion is no edge.
+// Where faces rest on the interior of others, or edge on edge, and move towards or away from them,
+// the parts are removed and returned as ContactLines. They describe the derivative for closing
+// contact; opening contact would reveal a gap with different radiance. For a body sunk halfway into
+// a face, the part on the viewer's side counts. Other shapes whose common edges separate or
+// interpenetrate are listed in `parting`: the image is not differentiable there, and each edge
+// keeps its one-sided contribution beside a gap (touching.cpp). Touching is decided up to the
+// rounding of positions (edges/contacts.h). An edge also gets near faces, which float rays from
+// `viewer` (the camera) or closer cannot resolve: FacesAround::near. Nothing changes elsewhere.
+// pairs: of the shapes' faces, from find_face_pairs with the same viewer.
 TouchingMotion unite_touching_edges(std::span<const TouchingShape> shapes,
                                     std::span<const FacePair> pairs, const Vec3d& viewer,
                                     int threads, std::vector<EdgeMesh>& objects);
