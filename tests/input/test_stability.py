@@ -335,14 +335,16 @@ class TestTool(unittest.TestCase):
         page = os.path.join(self.folder, "PAGE.md")
         with open(page, "w") as out:
             out.write(f"before\n{table.BEGIN}\nold\n{table.END}\nafter\n")
-        records = [(families.find("seams"), [None] * 5 + [
-            {"settings": {"seconds": 0.25}, "methods": {"adaptive": {"verdict": "right"}}}])]
+        records = [(families.find(name), [None] * 5 + [
+            {"settings": {"seconds": 0.25}, "methods": {"adaptive": {"verdict": verdict}}}])
+            for name, verdict in (("seams", "noisy"), ("scale", "right"))]
         table.publish(page, records)
         with open(page) as stream:
             text = stream.read()
         self.assertTrue(text.startswith("before\n") and text.endswith("\nafter\n"))
         self.assertNotIn("old", text)
-        self.assertIn("| seams | distance of the copies, in radii: 0 … 1e-6 | right |", text)
+        self.assertIn("| seams | distance of the copies, in radii: 0 … 1e-6 | noisy |", text)
+        self.assertIn("Every method is right in: scale (size of the scene: 1e-10 … 1e10).", text)
 
     def test_bad_arguments(self):
         for arguments, message in ((["--family", "moon"], 'no family is called "moon"'),

@@ -124,10 +124,16 @@ def markdown(stored_records):
     methods, text = methods_of(stored_records), cells(stored_records)
     lines = ["| family | knob | " + " | ".join(f"`{m}`" for m in methods) + " |",
              "|---|---|" + "---|" * len(methods)]
-    for family, records in stored_records:
+    right = []
+    for family, _ in stored_records:
         knob = f"{family.knob}: {number(family.values[0])} … {number(family.values[-1])}"
-        lines.append(f"| {family.name} | {knob} | " +
-                     " | ".join(text[family.name, m] for m in methods) + " |")
+        row = [text[family.name, m] for m in methods]
+        if set(row) == {RIGHT}:
+            right.append(f"{family.name} ({knob})")
+        else:
+            lines.append(f"| {family.name} | {knob} | " + " | ".join(row) + " |")
+    if right:
+        lines += ["", *textwrap.wrap("Every method is right in: " + "; ".join(right) + ".", 100)]
     lines += ["", f"Seconds of a run: {seconds_of(stored_records)}."]
     lines += textwrap.wrap(against_others_text(stored_records), 100) + [""]
     used = [w for w in ORDER if any(w in verdicts(rs, m) for _, rs in stored_records
