@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""The pages: links that lead somewhere, prose within 100 columns, small pictures, one version."""
+"""The pages: links that lead somewhere, prose within 100 columns, few words and lines, the field's
+words, small pictures, one version.
+"""
 
 import os
 import re
@@ -8,6 +10,28 @@ import unittest
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 WIDTH = 100
 MOST_PICTURE_BYTES = 300_000
+MOST_WORDS = 20_000  # of all pages together, as wc -w counts them
+MOST_LINES = 150  # of a page
+# Words for which the field has its own, each with the field's (some are names in code, which may
+# stay).
+FOREIGN = {
+    r"convoys?": "wavefront",
+    r"dead ends?": "false positive",
+    r"even in batches|even numbers": "low-discrepancy points",
+    r"found no edge": "rejected by the sampler",
+    r"glare": "specular reflection of an emitter",
+    r"hair's gap": "infinitesimal gap",
+    r"hit rates?": "acceptance rate",
+    r"jumps?": "radiance difference",
+    r"kinks?": "non-differentiable point",
+    r"lamps?": "area light",
+    r"left out|left to roulette": "terminated by Russian roulette",
+    r"levers?": "ablation",
+    r"positions that move|directions that turn": "reparameterised",
+    r"rims?": "boundary edge",
+    r"squares of all": "sum of squares",
+    r"without extent": "delta light",
+}
 
 
 def pages():
@@ -24,6 +48,16 @@ def pages():
 def read(name):
     with open(os.path.join(ROOT, name), encoding="utf-8") as stream:
         return stream.read()
+
+
+def words_of(text):
+    """A page on one line, without code and without what links lead to."""
+    lines, fenced = [], False
+    for line in text.splitlines():
+        fenced ^= line.startswith("```")
+        if not fenced and not line.startswith("    "):
+            lines.append(line)
+    return re.sub(r"`[^`]*`|\]\([^)]*\)|\s+", " ", " ".join(lines))
 
 
 class Pages(unittest.TestCase):
@@ -46,6 +80,22 @@ class Pages(unittest.TestCase):
                 if not fenced and not exempt:
                     with self.subTest(page=name, line=number):
                         self.assertLessEqual(len(line), WIDTH)
+
+    def test_pages_are_short(self):
+        total = 0
+        for name, text in pages():
+            total += len(text.split())
+            with self.subTest(page=name):
+                self.assertLessEqual(text.count("\n"), MOST_LINES)
+        self.assertLessEqual(total, MOST_WORDS)
+
+    def test_words_are_the_field_s(self):
+        for name, text in pages():
+            prose = words_of(text)
+            for foreign, known in FOREIGN.items():
+                with self.subTest(page=name, known=known):
+                    found = re.search(rf"(?i)(?<![\w-])({foreign})(?![\w-])", prose)
+                    self.assertIsNone(found)
 
     def test_pictures_are_small_and_shown(self):
         folder = os.path.join(ROOT, "scenes", "pictures")

@@ -278,7 +278,7 @@ def distance(offset):
 
 
 @family(
-    "small-lamps", "size of the lamp", [1, 1e-1, 1e-2, 1e-3, 1e-4],
+    "small-lamps", "size of the light", [1, 1e-1, 1e-2, 1e-3, 1e-4],
     "A lamp of the same power that shrinks to a point.", FORMULA, NARROW,
 )
 def small_lamps(size):
