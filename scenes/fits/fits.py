@@ -23,271 +23,344 @@ import json
 import math
 import os
 import resource
-import struct
 import subprocess
 import sys
+from dataclasses import dataclass, field
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 ROOT = os.path.dirname(os.path.dirname(HERE))
+sys.path.insert(0, os.path.join(ROOT, "tools"))
+
+from common import read_json  # noqa: E402
+from report.python import use_one_with_matplotlib  # noqa: E402
+
 BUNNY = "/usr/share/glmark2/models/bunny.obj"
-TERMS = "interior,camera"  # A fit without the boundary term: what mirrors show has edges, too.
+CREATURE = os.path.join(ROOT, "build", "generated", "creature.ply")
+BALL = os.path.join(ROOT, "build", "generated", "ball.ply")
+
+# How limn fit names its methods.
+LI2019, SILHOUETTES, ANALYTIC = (f"--sampler {name}" for name in ("li2019", "silhouettes", "analytic"))
+NO_BOUNDARY = "--terms interior,camera"  # What mirrors show has edges, too.
+# A loss that is a function, without noise, and what L-BFGS makes of it. Steps of Adam are halved as
+# they go on, or it would end in circles.
+FUNCTION = f"{ANALYTIC} --points faces"
+NEWTON = f"{FUNCTION} --optimiser lbfgs"
 
 
 class Fits:
+    """Runs limn, and keeps what it wrote. Options are texts with spaces between."""
+
     def __init__(self, arguments):
         self.limn, self.out = arguments.limn, arguments.output
         self.threads, self.steps = arguments.threads, arguments.steps
         n = arguments.size
         self.size = [f"width={n}", f"height={n}"] if n else []
         self.only = arguments.only.split(",") if arguments.only else None
-        self.generated = os.path.join(ROOT, "build", "generated")
 
     def path(self, *names):
         return os.path.join(self.out, *names)
 
     def chosen(self, variants):
-        """Those of (name, options) that --only names."""
-        known = [name for name, _ in variants]
-        unknown = [name for name in self.only or [] if name not in known]
+        """The names that --only gives."""
+        unknown = [name for name in self.only or [] if name not in variants]
         if unknown:
-            sys.exit(f"--only: no fit {unknown[0]!r}; there are {', '.join(known)}")
-        return [v for v in variants if not self.only or v[0] in self.only]
+            sys.exit(f"--only: no fit {unknown[0]!r}; there are {', '.join(variants)}")
+        return [name for name in variants if not self.only or name in self.only]
 
     def run(self, *words):
         """Processor time [s]."""
-        command = [self.limn, *words]
-        if self.threads:
-            command += ["--threads", str(self.threads)]
+        threads = ["--threads", str(self.threads)] if self.threads else []
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        if subprocess.run(command, check=False).returncode != 0:
+        if subprocess.run([self.limn, *words, *threads], check=False).returncode != 0:
             sys.exit(1)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
 
-    def render(self, scene, file, *defines, spp=256, sensor=0, method="path", points=None):
-        if not os.path.exists(file):
-            words = [w for d in defines for w in ("-D", d)] + ["--sensor", str(sensor)]
-            words += ["--method", method, "--seed", "99"]
-            words += ["--points", points] if points else ["--spp", str(spp)]
-            self.run("render", scene, *words, "-o", file)
-        return file
+    def render(self, name, file, defines, options="--spp 256", sensor=0):
+        """The path of OUT/FILE, which is made if it is not there."""
+        if not os.path.exists(self.path(file)):
+            self.run("render", scene(name), *defined(defines), "--sensor", str(sensor), "--seed",
+                     "99", *options.split(), "-o", self.path(file))
+        return self.path(file)
 
-    def fit(self, folder, scene, target, steps, *words):
+    def fit(self, folder, name, targets, steps, options, defines):
         """The fit's figures; "seconds" are those of the processor, None where another ran it."""
-        file, times = self.path(folder, "fit.json"), self.path(folder, "seconds.json")
-        done = json.load(open(file, encoding="utf-8")) if os.path.exists(file) else None
-        steps, seconds = self.steps or steps, None
+        out, times = self.path(folder), self.path(folder, "seconds.json")
+        done, steps, seconds = read_json(self.path(folder, "fit.json")), self.steps or steps, None
         if done and os.path.exists(self.path(folder, "state.cbor")):
             if done["steps"] < steps:
-                seconds = self.run("fit", "--resume", self.path(folder), "--steps", str(steps))
+                seconds = self.run("fit", "--resume", out, "--steps", str(steps))
         else:
             # Four times the default: what the figures in README.md were taken with.
-            samples = [] if "--points" in words else ["--camera-samples", "1"]
-            seconds = self.run("fit", scene, "--target", target, "--steps", str(steps),
-                               *samples, "-o", self.path(folder), *words)  # fmt: skip
-        known = json.load(open(times, encoding="utf-8")) if os.path.exists(times) else None
+            samples = [] if "--points" in options else ["--camera-samples", "1"]
+            seconds = self.run("fit", scene(name), *repeated("--target", targets), "--steps",
+                               str(steps), *samples, "-o", out, *defined(defines), *options.split())
+        known = read_json(times)
         if seconds and (known is not None or not done):
             known = (known or 0) + seconds
-            json.dump(known, open(times, "w", encoding="utf-8"))
-        return json.load(open(file, encoding="utf-8")) | {"seconds": known}
+            with open(times, "w", encoding="utf-8") as stream:
+                json.dump(known, stream)
+        return read_json(self.path(folder, "fit.json")) | {"seconds": known}
 
 
 def scene(name):
-    return os.path.join(HERE, name)
+    return os.path.join(HERE, f"{name}.xml")
 
 
-SHAPE_HEAD = [
-    "fit", "steps", "chamfer", "95 %", "normals", "inside out", "crossings", "loss", "seconds"
-]
+def repeated(option, values):
+    return [word for value in values for word in (option, value)]
+
+
+def defined(defines):
+    return repeated("-D", defines)
+
+
+def folder_of(name, variant):
+    return f"{name}_{variant.replace(' ', '_')}"
 
 
 def seconds_of(fit):
     return "not known" if fit["seconds"] is None else f"{fit['seconds']:.0f}"
 
 
-def shape_row(name, fit, mesh, steps):
-    history = fit["history"][:steps]
-    loss = sum(h["loss"] for h in history[-5:]) / len(history[-5:]) if history else 0
-    return [name, steps, f"{mesh['chamfer']:.4f}", f"{mesh['hausdorff_95']:.4f}",
-            f"{mesh['normal_angle']:.1f}", mesh["inside_out"], mesh["crossings"],
-            f"{loss:.5f}" if history else "", seconds_of(fit) if history else ""]  # fmt: skip
+def seeds(options, names=("seed 1", "seed 2", "seed 3")):
+    return {name: f"{options} --seed {i}" for i, name in enumerate(names, 1)}
 
 
-def shape_rows(fits, name, base, targets, truth, steps, defines, words, variants, smoothing):
-    """Of a shape that is fitted from base_start.xml, by some variants of one command.
+@dataclass
+class Shape:
+    """A sphere, of BASE_start.xml, whose vertices move until its images meet those of BASE.xml."""
 
-    steps: in all; or of each variant those to show, the last in all.
-    """
-    own = [w for d in defines for w in ("-D", d)]
-    own += ["--wrt", "object.vertex_positions", "--truth", truth]
-    own += [w for t in targets[1:] for w in ("--target", t)]
+    base: str
+    size: list
+    truth: str
+    steps: object  # in all; or of each variant those to show, the last in all
+    options: str
+    variants: dict  # name: options
+    target: str = "--spp 256"  # options of its rendering
+    sensors: int = 1
+
+
+SHAPES = {
+    "mirrors": Shape(
+        "two_mirrors", ["width=64", "height=32"], CREATURE, 300, "--snapshots 25",
+        {**seeds("--spp 6 --remesh 75,150,225"),
+         "no remeshing": "--spp 6 --seed 1",
+         # As much time as the others: its draws cost less.
+         "edges of li2019": f"--spp 7 --remesh 75,150,225 --seed 1 {LI2019}",
+         "no boundary": f"--spp 6 --remesh 75,150,225 --seed 1 {NO_BOUNDARY}",
+         "small start": "--spp 6 --remesh 75,150,225 --seed 1 -D radius=0.15"}),
+    "shadows": Shape(
+        "hidden_object", ["width=64", "height=48"], CREATURE, 150,
+        "--spp 6 --remesh 50,100 --snapshots 25",
+        {**seeds(SILHOUETTES),
+         "edges of forest": "--seed 1",
+         "uniform pixels": f"{SILHOUETTES} --seed 1 --pixels uniform",
+         "no boundary": f"--seed 1 {NO_BOUNDARY}"}),
+    "exact": Shape(
+        "hidden_object", ["width=64", "height=48"], CREATURE,
+        {"lbfgs": [10, 20, 40], "lbfgs remeshed": [45], "adam": [20, 60]},
+        f"--spp 1 --snapshots 10 {ANALYTIC}",
+        {"lbfgs": "--optimiser lbfgs --step 1",
+         "lbfgs remeshed": "--optimiser lbfgs --step 1 --remesh 15,30",
+         "adam": ""},
+        target="--spp 8 --method analytic"),
+    "views": Shape(
+        "eight_views", ["width=40"], BUNNY, 160, "--spp 2 --snapshots 30",
+        {**seeds("--remesh 40,80,120"),
+         **seeds("", ("no remeshing", "no remeshing 2", "no remeshing 3"))}, sensors=8),
+}
+
+
+def fit_shape(fits, name):
+    shape = SHAPES[name]
+    file = "{}.exr" if shape.sensors == 1 else "{}_{}.exr"
+    targets = [fits.render(shape.base, file.format(name, i), shape.size, shape.target, i)
+               for i in range(shape.sensors)]
     rows = []
-    for variant, more in fits.chosen(variants):
-        folder = f"{name}_{variant.replace(' ', '_')}"
-        shown = steps[variant] if isinstance(steps, dict) else [steps]
-        step = [] if "--step" in more else ["--step", "2"]
-        fit = fits.fit(folder, scene(f"{base}_start.xml"), targets[0], shown[-1], *own, *words,
-                       *step, "--smoothing", str(smoothing), *more)  # fmt: skip
+    for variant in fits.chosen(shape.variants):
+        options = f"{shape.options} {shape.variants[variant]}"
+        step = "" if "--step" in options.split() else "--step 2"
+        shown = shape.steps[variant] if isinstance(shape.steps, dict) else [shape.steps]
+        fit = fits.fit(folder_of(name, variant), f"{shape.base}_start", targets, shown[-1],
+                       f"--wrt object.vertex_positions --truth {shape.truth} --smoothing 0.1 {step} "
+                       + options, shape.size)
         meshes = {s["step"]: s["meshes"][0] for s in fit["snapshots"]}
         if not rows:
-            rows.append(shape_row("start", fit, meshes[0], 0))
+            rows.append(_shape_row("start", fit, meshes[0], 0))
         for at in [s for s in shown[:-1] if s in meshes and s < fit["steps"]] + [fit["steps"]]:
-            rows.append(shape_row(variant, fit, meshes[at], at))
-    return SHAPE_HEAD, rows
+            rows.append(_shape_row(variant, fit, meshes[at], at))
+    return ["fit", "steps", "chamfer", "95 %", "normals", "inside out", "crossings", "loss",
+            "seconds"], rows
 
 
-def mirrors(fits):
+def _shape_row(name, fit, mesh, steps):
+    last = [h["loss"] for h in fit["history"][:steps][-5:]]
+    return [name, steps, f"{mesh['chamfer']:.4f}", f"{mesh['hausdorff_95']:.4f}",
+            f"{mesh['normal_angle']:.1f}", mesh["inside_out"], mesh["crossings"],
+            f"{sum(last) / len(last):.5f}" if last else "", seconds_of(fit) if last else ""]
+
+
+def pose(fits, _):
     size = ["width=64", "height=32"]
-    target = fits.render(scene("two_mirrors.xml"), fits.path("mirrors.exr"), *size)
-    words = ["--snapshots", "25"]
-    remesh = ["--spp", "6", "--remesh", "75,150,225"]
-    variants = [(f"seed {i}", [*remesh, "--seed", str(i)]) for i in (1, 2, 3)]
-    variants += [
-        ("no remeshing", ["--spp", "6", "--seed", "1"]),
-        # As much time as the others: its draws cost less.
-        ("edges of li2019", ["--spp", "7", *remesh[2:], "--seed", "1", "--sampler", "li2019"]),
-        ("no boundary", [*remesh, "--seed", "1", "--terms", TERMS]),
-        ("small start", [*remesh, "--seed", "1", "-D", "radius=0.15"]),
-    ]
-    truth = os.path.join(fits.generated, "creature.ply")
-    return shape_rows(
-        fits, "mirrors", "two_mirrors", [target], truth, 300, size, words, variants, 0.1
-    )
-
-
-def shadows(fits):
-    size = ["width=64", "height=48"]
-    target = fits.render(scene("hidden_object.xml"), fits.path("shadows.exr"), *size)
-    words = ["--spp", "6", "--remesh", "50,100", "--snapshots", "25"]
-    lamps = ["--sampler", "silhouettes"]  # regions of light apart
-    variants = [(f"seed {i}", [*lamps, "--seed", str(i)]) for i in (1, 2, 3)]
-    variants += [
-        ("edges of forest", ["--seed", "1"]),
-        ("uniform pixels", [*lamps, "--seed", "1", "--pixels", "uniform"]),
-        ("no boundary", ["--seed", "1", "--terms", TERMS]),
-    ]
-    truth = os.path.join(fits.generated, "creature.ply")
-    return shape_rows(
-        fits, "shadows", "hidden_object", [target], truth, 150, size, words, variants, 0.1
-    )
-
-
-def exact(fits):
-    size = ["width=64", "height=48"]
-    target = fits.render(
-        scene("hidden_object.xml"), fits.path("exact.exr"), *size, spp=8, method="analytic"
-    )
-    words = ["--spp", "1", "--snapshots", "10", "--sampler", "analytic"]
-    newton = ["--optimiser", "lbfgs", "--step", "1"]
-    steps = {"lbfgs": [10, 20, 40], "lbfgs remeshed": [45], "adam": [20, 60]}
-    variants = [
-        ("lbfgs", newton),
-        ("lbfgs remeshed", [*newton, "--remesh", "15,30"]),
-        ("adam", []),
-    ]
-    truth = os.path.join(fits.generated, "creature.ply")
-    return shape_rows(
-        fits, "exact", "hidden_object", [target], truth, steps, size, words, variants, 0.1
-    )
-
-
-def views(fits):
-    size = ["width=40"]
-    targets = [
-        fits.render(scene("eight_views.xml"), fits.path(f"view_{i}.exr"), *size, sensor=i)
-        for i in range(8)
-    ]
-    words = ["--spp", "2", "--snapshots", "30"]
-    remesh = ["--remesh", "40,80,120"]
-    variants = [(f"seed {i}", [*remesh, "--seed", str(i)]) for i in (1, 2, 3)]
-    variants += [
-        (f"no remeshing{seed}", ["--seed", i])
-        for seed, i in (("", "1"), (" 2", "2"), (" 3", "3"))
-    ]
-    truth = BUNNY
-    return shape_rows(
-        fits, "views", "eight_views", targets, truth, 160, size, words, variants, 0.1
-    )
-
-
-def pose(fits):
-    size = ["width=64", "height=32"]
-    target = fits.render(scene("two_mirrors.xml"), fits.path("pose.exr"), *size, spp=1024)
-    names = [f"object.translate.{a}" for a in "xyz"] + [f"object.rotate.{a}" for a in "xyz"]
+    target = fits.render("two_mirrors", "pose.exr", size, "--spp 1024")
+    names = [f"object.{move}.{a}" for move in ("translate", "rotate") for a in "xyz"]
     names += ["clay.reflectance", "sensor.translate.x"]
-    start = {"x": 0.15, "y": -0.1, "z": 0.2, "angle": 12, "clay": 0.4, "view": 0.2}
-    words = [w for n in names for w in ("--wrt", n)]
-    words += [w for n, v in start.items() for w in ("-D", f"{n}={v}")]
-    words += [w for d in size for w in ("-D", d)]
-    words += ["--spp", "8", "--step", "2", "--step-half-life", "30"]
-    words += ["--truth", os.path.join(fits.generated, "creature.ply")]
-    variants = fits.chosen([(f"seed {i}", ["--seed", str(i)]) for i in (1, 2, 3)])
+    start = ["x=0.15", "y=-0.1", "z=0.2", "angle=12", "clay=0.4", "view=0.2"]
     known = {f"clay.reflectance.{c}": (0.4, 0.6) for c in "rgb"} | {"sensor.translate.x": (0.2, 0)}
-    rows = []
-    for name, seed in variants:
-        folder = f"pose_{name.replace(' ', '_')}"
-        fit = fits.fit(folder, scene("two_mirrors.xml"), target, 160, *words, *seed)
+    variants, rows = seeds(""), []
+    for name in fits.chosen(variants):
+        options = (f"{' '.join(repeated('--wrt', names))} --spp 8 --step 2 --step-half-life 30"
+                   f" --truth {CREATURE} {variants[name]}")
+        fit = fits.fit(folder_of("pose", name), "two_mirrors", [target], 160, options, start + size)
         first, last = (fit["snapshots"][i]["meshes"][0] for i in (0, -1))
         if not rows:
-            rows = [["chamfer / diagonal", f"{first['chamfer']:.4f}", "0"]]
-            for s in fit["scalars"]:
-                rows.append([s["name"], *known.get(s["name"], (0, ""))])
-            rows.append(["seconds", "", ""])
-        found = [last["chamfer"], *(s["value"] for s in fit["scalars"])]
-        for row, number in zip(rows, found):
+            rows = [["chamfer / diagonal", f"{first['chamfer']:.4f}", "0"],
+                    *([s["name"], *known.get(s["name"], (0, ""))] for s in fit["scalars"]),
+                    ["seconds", "", ""]]
+        for row, number in zip(rows, [last["chamfer"], *(s["value"] for s in fit["scalars"])]):
             row.append(f"{number:.5f}")
         rows[-1].append(seconds_of(fit))
-    return ["what", "start", "truth", *(name for name, _ in variants)], rows
+    return ["what", "start", "truth", *fits.chosen(variants)], rows
 
 
-def positions(file):
-    """Flat list of coordinates of a binary PLY by limn."""
-    content = open(file, "rb").read()
-    end = content.index(b"end_header\n") + 11
-    count = int(content.split(b"element vertex ")[1].split()[0])
-    return struct.unpack(f"<{3 * count}f", content[end : end + 12 * count])
+def drift(fits, _):
+    import numpy as np
+    from paper_figures.meshes import read
 
-
-def drift(fits):
-    size = ["width=48", "height=24"]
-    truth = fits.path("coarse.ply")
+    truth = os.path.abspath(fits.path("coarse.ply"))
     if not os.path.exists(truth):
         generate = os.path.join(os.path.dirname(fits.limn), "limn_generate")
         subprocess.run([generate, "creature", truth, "--faces", "3000"], check=True)
-    size += [f"mesh={os.path.abspath(truth)}"]
-    target = fits.render(scene("two_mirrors.xml"), fits.path("drift.exr"), *size, spp=4096)
-    words = ["--wrt", "object.vertex_positions", "--truth", truth, "--spp", "4", "--step", "0.02"]
-    words += [w for d in size for w in ("-D", d)]
+    size = ["width=48", "height=24", f"mesh={truth}"]
+    target = fits.render("two_mirrors", "drift.exr", size, "--spp 4096")
     moved, rows = [], []
     for seed in (1, 2, 3):
         folder = f"drift_{seed}"
-        fit = fits.fit(folder, scene("two_mirrors.xml"), target, 60, *words, "--seed", str(seed))
+        fit = fits.fit(folder, "two_mirrors", [target], 60, "--wrt object.vertex_positions --truth"
+                       f" {truth} --spp 4 --step 0.02 --seed {seed}", size)
         first, last = (fit["snapshots"][i]["meshes"][0] for i in (0, -1))
-        start, end = (positions(fits.path(folder, m["file"])) for m in (first, last))
-        moved.append([b - a for a, b in zip(start, end)])
+        start, end = (read(fits.path(folder, m["file"]))[0].ravel() for m in (first, last))
+        moved.append((end - start) / np.linalg.norm(end - start))
         rows.append([f"seed {seed}", f"{last['chamfer']:.5f}", f"{last['normal_angle']:.2f}"])
     # Systematic drift would move all seeds the same way; random walks have no angle in common.
-    norm = [math.sqrt(sum(x * x for x in m)) for m in moved]
-    angles = [
-        sum(x * y for x, y in zip(moved[i], moved[k])) / (norm[i] * norm[k])
-        for i in range(len(moved))
-        for k in range(i)
-    ]
-    rows.append(["cosines of pairs", " ".join(f"{a:.2f}" for a in angles), ""])
+    cosines = [a @ b for i, a in enumerate(moved) for b in moved[:i]]
+    rows.append(["cosines of pairs", " ".join(f"{c:.2f}" for c in cosines), ""])
     return ["fit", "chamfer / diagonal", "normals"], rows
 
 
-# What the sampler "analytic" and the optimiser "lbfgs" make of a loss, beside Adam and beside
-# gradients with noise. Steps of Adam are halved as they go on, or it would end in circles.
-FUNCTION = ["--sampler", "analytic", "--points", "faces"]
-NEWTON = [*FUNCTION, "--optimiser", "lbfgs"]
+@dataclass
+class Function:
+    """A loss that is a function of the parameters, by L-BFGS, by Adam, and by Adam of gradients with
+    noise."""
+
+    scene: str
+    parameters: list
+    truth: list  # angles in degrees; of displacement the positions
+    variants: dict  # name: (steps, options)
+    start: list = field(default_factory=list)  # defines
+    target: list = field(default_factory=list)  # defines of its images, in place of these
+    sensors: int = 1
+
+    def error(self, fits, folder, fit):
+        """The root of the mean squared error of angles, in degrees."""
+        squares = [(math.degrees(s["value"]) - t) ** 2 for s, t in zip(fit["scalars"], self.truth)]
+        return f"{math.sqrt(sum(squares) / len(squares)):.3f} degrees"
+
+
+class Displacement(Function):
+    def error(self, fits, folder, fit):
+        """The same of positions."""
+        from paper_figures.meshes import read
+
+        found, _ = read(fits.path(folder, fit["snapshots"][-1]["meshes"][0]["file"]))
+        return f"{math.sqrt(((found - self.truth) ** 2).sum(axis=1).mean()):.4f}"
+
+
+TREE = 20  # degrees from the start to the truth
+# By how many degrees each gear is off at the start.
+GEARS = [11, -9, 12, -12, 8, 10, -11, 16, -18, 17, -15, 18, -17, 17, -16]
+
+
+def tree(_):
+    return Function("tree_shadow", ["object.rotate.y"], [TREE], {
+        "lbfgs": (8, f"{NEWTON} --step 5"),
+        "adam": (45, f"{FUNCTION} --optimiser adam --step 3 --step-half-life 12"),
+        "adam of forest": (60, "--spp 16 --step 3 --step-half-life 25 --seed 1"),
+    }, target=[f"turn={TREE}"])
+
+
+def gears(_):
+    return Function("gears", [f"gear_{i}.rotate.y" for i in range(len(GEARS))], [-a for a in GEARS], {
+        "lbfgs": (28, f"{NEWTON} --step 5"),
+        "adam": (80, f"{FUNCTION} --optimiser adam --step 4 --step-half-life 20"),
+        "adam of forest": (80, "--spp 16 --step 4 --step-half-life 20 --seed 1"),
+    }, start=[f"off_{i}={a}" for i, a in enumerate(GEARS)])
+
+
+def displacement(fits):
+    """The ball, and the mesh whose vertices lie elsewhere along its normals."""
+    import numpy as np
+    from paper_figures.meshes import read, write_obj
+
+    p, faces = read(BALL)
+    by = 0.16 * np.sin(3 * p[:, 0] + 1) * np.cos(2.5 * p[:, 1]) + 0.1 * np.sin(4 * p[:, 2] + 2)
+    moved, file = p + by[:, None] * vertex_normals(p, faces), fits.path("stone.obj")
+    write_obj(file, moved, faces)
+    return Displacement("displacement", ["object.displacement"], moved, {
+        "lbfgs": (40, f"--smoothing 0 {NEWTON} --step 1"),
+        "adam": (100, f"--smoothing 0 {FUNCTION} --step 2 --step-half-life 30"),
+        "adam of forest": (100, "--smoothing 0 --spp 4 --step 2 --step-half-life 40 --seed 1"),
+    }, target=[f"mesh={os.path.abspath(file)}", "format=obj"], sensors=8)
+
+
+def vertex_normals(positions, faces):
+    """The mean of those of the faces around, weighted by their angles there."""
+    import numpy as np
+
+    def unit(v):
+        return v / np.linalg.norm(v, axis=-1, keepdims=True)
+
+    sums = np.zeros_like(positions)
+    for k in range(3):
+        at, b, c = (positions[faces[:, (k + i) % 3]] for i in range(3))
+        u, v = unit(b - at), unit(c - at)
+        angle = np.arccos((u * v).sum(axis=1))
+        np.add.at(sums, faces[:, k], angle[:, None] * unit(np.cross(u, v)))
+    return unit(sums)
+
+
+FUNCTIONS = {"tree": tree, "gears": gears, "displacement": displacement}
+TARGETS = {"displacement": "stone"}  # names of their files
+
+
+def fit_function(fits, name):
+    """A row for each variant."""
+    function, rows = FUNCTIONS[name](fits), []
+    # For each sensor the image as a function of the scene, and what samples have in the mean.
+    exact, mean = ([fits.render(function.scene, f"{TARGETS.get(name, name)}{kind}_{i}.exr",
+                                fits.size + function.target, f"--method analytic {options}", i)
+                    for i in range(function.sensors)]
+                   for kind, options in (("", "--points faces"), ("_mean", "--spp 32")))
+    for variant in fits.chosen(function.variants):
+        steps, options = function.variants[variant]
+        folder = folder_of(name, variant)
+        fit = fits.fit(folder, function.scene, exact if FUNCTION in options else mean, steps,
+                       " ".join(repeated("--wrt", function.parameters)) + f" {options}",
+                       fits.size + function.start)
+        first = fit["history"][0]["loss"]
+        cells = [variant, fit["steps"], f"{fit['history'][-1]['loss'] / first:.1e}"]
+        for part in (0.1, 0.01, 0.001):
+            at = reached(fit, part)
+            cells.append(f"{at[0]}, {at[1]:.0f} s" if at else "not")
+        rows.append([*cells, function.error(fits, folder, fit), seconds_of(fit)])
+    return ["fit", "steps", "last / first loss", "to 1/10", "to 1/100", "to 1/1000", "error",
+            "seconds"], rows
 
 
 def curve(fit):
-    """At each step: losses and gradients so far, processor seconds, loss.
-
-    Every step takes one of both, but for those of L-BFGS, which say how many they took.
-    """
+    """At each step: losses and gradients so far, processor seconds, loss. Every step takes one of
+    both, but for those of L-BFGS, which say how many they took."""
     points, count = [], 0
     for number, step in enumerate(fit["history"], 1):
         points.append((max(number, count), step["loss"]))
@@ -297,10 +370,8 @@ def curve(fit):
 
 
 def reached(fit, part):
-    """Losses and gradients, and seconds, from which on the loss is at most that part of the first.
-
-    None where it never stays there.
-    """
+    """Losses and gradients, and seconds, from which on the loss is at most that part of the first;
+    None where it never stays there."""
     points, found = curve(fit), None
     for count, seconds, loss in reversed(points):
         if loss > part * points[0][2]:
@@ -309,247 +380,96 @@ def reached(fit, part):
     return found
 
 
-def targets_of(fits, name, base, defines, sensors=1):
-    """For each sensor the image as a function of the scene, and what samples have in the mean."""
-    lists = []
-    for kind, more in (("", {"points": "faces"}), ("_mean", {"spp": 32})):
-        lists.append([
-            fits.render(scene(base), fits.path(f"{name}{kind}_{i}.exr"), *fits.size, *defines,
-                        sensor=i, method="analytic", **more)
-            for i in range(sensors)
-        ])  # fmt: skip
-    return lists
-
-
-def compare(fits, name, base, targets, defines, parameters, variants, error):
-    """A row for each of (name, steps, options); error(folder, fit): of the parameters at last."""
-    rows = []
-    chosen = fits.chosen([(variant, (steps, more)) for variant, steps, more in variants])
-    for variant, (steps, more) in chosen:
-        folder = f"{name}_{variant.replace(' ', '_')}"
-        own = targets[0] if "analytic" in more else targets[1]
-        words = [w for p in parameters for w in ("--wrt", p)]
-        words += [w for d in [*fits.size, *defines] for w in ("-D", d)]
-        words += [w for t in own[1:] for w in ("--target", t)]
-        fit = fits.fit(folder, scene(base), own[0], steps, *words, *more)
-        first = fit["history"][0]["loss"]
-        cells = [variant, fit["steps"], f"{fit['history'][-1]['loss'] / first:.1e}"]
-        for part in (0.1, 0.01, 0.001):
-            at = reached(fit, part)
-            cells.append(f"{at[0]}, {at[1]:.0f} s" if at else "not")
-        rows.append([*cells, error(folder, fit), seconds_of(fit)])
-    return ["fit", "steps", "last / first loss", "to 1/10", "to 1/100", "to 1/1000", "error",
-            "seconds"], rows  # fmt: skip
-
-
-def angles(truths):
-    """The root of the mean squared error of angles, in degrees."""
-
-    def error(_, fit):
-        squares = [(s["value"] - t) ** 2 for s, t in zip(fit["scalars"], truths)]
-        return f"{math.degrees(math.sqrt(sum(squares) / len(squares))):.3f} degrees"
-
-    return error
-
-
-TREE = 20  # degrees from the start to the truth
-
-
-def tree(fits):
-    targets = targets_of(fits, "tree", "tree_shadow.xml", [f"turn={TREE}"])
-    noisy = ["--spp", "16", "--step", "3", "--step-half-life", "25", "--seed", "1"]
-    variants = [
-        ("lbfgs", 8, [*NEWTON, "--step", "5"]),
-        ("adam", 45, [*FUNCTION, "--optimiser", "adam", "--step", "3", "--step-half-life", "12"]),
-        ("adam of forest", 60, noisy),
-    ]
-    return compare(fits, "tree", "tree_shadow.xml", targets, [], ["object.rotate.y"], variants,
-                   angles([math.radians(TREE)]))  # fmt: skip
-
-
-# By how many degrees each gear is off at the start.
-GEARS = [11, -9, 12, -12, 8, 10, -11, 16, -18, 17, -15, 18, -17, 17, -16]
-
-
-def gears(fits):
-    targets = targets_of(fits, "gears", "gears.xml", [])
-    start = [f"off_{i}={a}" for i, a in enumerate(GEARS)]
-    names = [f"gear_{i}.rotate.y" for i in range(len(GEARS))]
-    noisy = ["--spp", "16", "--step", "4", "--step-half-life", "20", "--seed", "1"]
-    variants = [
-        ("lbfgs", 28, [*NEWTON, "--step", "5"]),
-        ("adam", 80, [*FUNCTION, "--optimiser", "adam", "--step", "4", "--step-half-life", "20"]),
-        ("adam of forest", 80, noisy),
-    ]
-    return compare(fits, "gears", "gears.xml", targets, start, names, variants,
-                   angles([math.radians(-a) for a in GEARS]))  # fmt: skip
-
-
-def stone(fits):
-    """The ball's vertices, and the mesh whose vertices lie elsewhere along its normals."""
-    ball = os.path.join(fits.generated, "ball.ply")
-    content = open(ball, "rb").read()
-    flat = positions(ball)
-    places = [flat[i : i + 3] for i in range(0, len(flat), 3)]
-    faces = [struct.unpack("<3i", content[i : i + 12])
-             for i in range(len(content) - 13 * 320 + 1, len(content), 13)]  # fmt: skip
-    directions = normals(places, faces)
-    moved = []
-    for p, n in zip(places, directions):
-        by = 0.16 * math.sin(3 * p[0] + 1) * math.cos(2.5 * p[1]) + 0.1 * math.sin(4 * p[2] + 2)
-        moved.append([x + by * d for x, d in zip(p, n)])
-    file = fits.path("stone.obj")
-    lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in moved]
-    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces]
-    open(file, "w", encoding="utf-8").write("\n".join(lines) + "\n")
-    return file, moved
-
-
-def normals(places, faces):
-    """Of vertices: the mean of those of the faces around, weighted by their angles there."""
-
-    def unit(v):
-        size = math.sqrt(sum(x * x for x in v))
-        return [x / size for x in v]
-
-    def cross(a, b):
-        return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-
-    sums = [[0, 0, 0] for _ in places]
-    for face in faces:
-        for k in range(3):
-            at, b, c = (places[face[(k + i) % 3]] for i in range(3))
-            u, v = (unit([x - y for x, y in zip(p, at)]) for p in (b, c))
-            angle = math.acos(sum(x * y for x, y in zip(u, v)))
-            for i, x in enumerate(unit(cross(u, v))):
-                sums[face[k]][i] += angle * x
-    return [unit(s) for s in sums]
-
-
-def displacement(fits):
-    mesh, truth = stone(fits)
-    shape = [f"mesh={os.path.abspath(mesh)}", "format=obj"]
-    targets = targets_of(fits, "stone", "displacement.xml", shape, 8)
-
-    def error(folder, fit):
-        found = positions(fits.path(folder, fit["snapshots"][-1]["meshes"][0]["file"]))
-        squares = [(a - b) ** 2 for a, b in zip(found, [x for v in truth for x in v])]
-        return f"{math.sqrt(sum(squares) / len(truth)):.4f}"
-
-    even = ["--smoothing", "0"]
-    noisy = ["--spp", "4", "--step", "2", "--step-half-life", "40", "--seed", "1"]
-    variants = [
-        ("lbfgs", 40, [*even, *NEWTON, "--step", "1"]),
-        ("adam", 100, [*even, *FUNCTION, "--step", "2", "--step-half-life", "30"]),
-        ("adam of forest", 100, [*even, *noisy]),
-    ]
-    return compare(fits, "displacement", "displacement.xml", targets, [],
-                   ["object.displacement"], variants, error)  # fmt: skip
-
-
-def curves(fits):
-    import matplotlib  # noqa: PLC0415
+def panels_of(rows, columns, height, **shared):
+    import matplotlib
 
     matplotlib.use("agg")
-    from matplotlib import pyplot  # noqa: PLC0415
+    from matplotlib import pyplot
 
-    names, rows = ["tree", "gears", "displacement"], []
-    figure, panels = pyplot.subplots(len(names), 2, figsize=(9, 8), sharey="row")
-    for name, (by_count, by_time) in zip(names, panels):
-        for variant in ("lbfgs", "adam", "adam of forest", "lbfgs of forest same"):
-            folder = fits.path(f"{name}_{variant.replace(' ', '_')}")
-            if not os.path.exists(folder):
+    return pyplot.subplots(rows, columns, figsize=(9, height), **shared)
+
+
+def save(figure, name, quality, pad=1.08):
+    figure.tight_layout(pad=pad)
+    figure.savefig(os.path.join(ROOT, "scenes", "pictures", name), dpi=90,
+                   pil_kwargs={"quality": quality, "method": 6})
+
+
+def curves(fits, _):
+    figure, panels = panels_of(len(FUNCTIONS), 2, 8, sharey="row")
+    rows = []
+    for name, pair in zip(FUNCTIONS, panels):
+        for variant in ("lbfgs", "adam", "adam of forest"):
+            folder = folder_of(name, variant)
+            fit = read_json(fits.path(folder, "fit.json"))
+            if fit is None:
                 continue
-            fit = json.load(open(os.path.join(folder, "fit.json"), encoding="utf-8"))
-            times = os.path.join(folder, "seconds.json")
-            fit["seconds"] = json.load(open(times, encoding="utf-8"))
-            points = [p for p in curve(fit) if p[2] > 0]
-            first = fit["history"][0]["loss"]
-            for panel, x in ((by_count, 0), (by_time, 1)):
+            points = curve(fit | {"seconds": read_json(fits.path(folder, "seconds.json"))})
+            points, first = [p for p in points if p[2] > 0], fit["history"][0]["loss"]
+            for x, panel in enumerate(pair):
                 panel.plot([p[x] for p in points], [p[2] / first for p in points], label=variant)
             rows.append([name, variant, f"{points[-1][2] / first:.1e}"])
-        by_count.set_ylabel(f"{name}: loss over the first")
-        for panel in (by_count, by_time):
-            panel.set_yscale("log")
-            panel.set_xscale("log")
+        for panel, label in zip(pair, ("losses and gradients", "seconds of the processor")):
+            panel.set(yscale="log", xscale="log", xlabel=label if name == "displacement" else "")
             panel.grid(alpha=0.3)
-    panels[-1][0].set_xlabel("losses and gradients")
-    panels[-1][1].set_xlabel("seconds of the processor")
+        pair[0].set_ylabel(f"{name}: loss over the first")
     panels[1][0].legend(frameon=False)
-    figure.tight_layout()
-    file = os.path.join(ROOT, "scenes", "pictures", "fit_curves.webp")
-    figure.savefig(file, dpi=90, pil_kwargs={"quality": 80, "method": 6})
+    save(figure, "fit_curves.webp", 80)
     return ["scene", "fit", "last / first loss"], rows
 
 
-def films(fits):
-    """What L-BFGS shows at some of its steps, and what it is to meet."""
-    import matplotlib  # noqa: PLC0415
-
-    matplotlib.use("agg")
-    from matplotlib import pyplot  # noqa: PLC0415
+def films(fits, _):
+    """What L-BFGS shows at some of its steps, and its target."""
+    from matplotlib import pyplot
 
     shown = {"tree": (0, 1, 2, 4, 8), "gears": (0, 8, 12, 16, 28), "displacement": (0, 4, 8, 16, 40)}
-    columns = max(map(len, shown.values())) + 1
-    figure, panels = pyplot.subplots(len(shown), columns, figsize=(9, 4.9))
+    figure, panels = panels_of(len(shown), max(map(len, shown.values())) + 1, 4.9)
     for (name, steps), row in zip(shown.items(), panels):
         files = [f"step_{step:05}_view_0.png" for step in steps] + ["view_0_target.png"]
         for panel, file, title in zip(row, files, [*(f"{name}, {s}" for s in steps), "target"]):
-            image = pyplot.imread(fits.path(f"{name}_lbfgs", file))
-            panel.imshow(image, interpolation="nearest")
+            panel.imshow(pyplot.imread(fits.path(f"{name}_lbfgs", file)), interpolation="nearest")
             panel.set_title(title, fontsize=8)
             panel.axis("off")
-    figure.tight_layout(pad=0.4)
-    file = os.path.join(ROOT, "scenes", "pictures", "fit_films.webp")
-    figure.savefig(file, dpi=90, pil_kwargs={"quality": 85, "method": 6})
+    save(figure, "fit_films.webp", 85, 0.4)
     return ["scene", "steps"], [[name, *steps] for name, steps in shown.items()]
 
 
 # A row for each: truth, start, and fits at some of their steps.
 SHOWN = [
-    ("creature.ply", [("mirrors_seed_1", 0), ("mirrors_seed_1", 75), ("mirrors_seed_1", 300),
-                      ("mirrors_edges_of_li2019", 300), ("mirrors_no_remeshing", 300),
-                      ("mirrors_no_boundary", 300)]),
-    ("creature.ply", [("shadows_seed_1", 0), ("shadows_seed_1", 50), ("shadows_seed_1", 150),
-                      ("shadows_edges_of_forest", 150), ("shadows_uniform_pixels", 150),
-                      ("shadows_no_boundary", 150)]),
-    ("bunny.obj", [("views_seed_1", 0), ("views_seed_1", 30), ("views_seed_1", 60),
-                   ("views_seed_1", 90), ("views_seed_1", 120), ("views_seed_1", 160)]),
-]  # fmt: skip
+    (CREATURE, [("mirrors_seed_1", 0), ("mirrors_seed_1", 75), ("mirrors_seed_1", 300),
+                ("mirrors_edges_of_li2019", 300), ("mirrors_no_remeshing", 300),
+                ("mirrors_no_boundary", 300)]),
+    (CREATURE, [("shadows_seed_1", 0), ("shadows_seed_1", 50), ("shadows_seed_1", 150),
+                ("shadows_edges_of_forest", 150), ("shadows_uniform_pixels", 150),
+                ("shadows_no_boundary", 150)]),
+    (BUNNY, [("views_seed_1", step) for step in (0, 30, 60, 90, 120, 160)]),
+]
 
 
-def picture(fits):
-    from PIL import Image  # noqa: PLC0415
+def picture(fits, _):
+    from PIL import Image
 
-    tile, rows, table = 128, [], []
-    for truth, shown in SHOWN:
-        true = os.path.join(fits.generated, truth) if truth.endswith("ply") else BUNNY
-        meshes = [true] + [fits.path(f, f"step_{step:05}_object.ply") for f, step in shown]
-        row = []
-        for k, mesh in enumerate(meshes):
-            file = fits.path("picture", f"{len(rows)}_{k}.exr")
+    tile, table = 128, []
+    whole = Image.new("RGB", (tile * 7, tile * len(SHOWN)), "white")
+    for y, (truth, shown) in enumerate(SHOWN):
+        meshes = [truth] + [fits.path(f, f"step_{step:05}_object.ply") for f, step in shown]
+        for x, mesh in enumerate(meshes):
             view = [f"mesh={os.path.abspath(mesh)}", f"format={mesh[-3:]}", f"width={tile}"]
-            fits.render(scene("eight_views.xml"), file, *view, spp=64, sensor=7)
-            row.append(Image.open(file[:-3] + "png").convert("RGB"))
-        rows.append(row)
-        table.append([truth, "truth", *(f"{f} {step}" for f, step in shown)])
-    whole = Image.new("RGB", (tile * max(map(len, rows)), tile * len(rows)), "white")
-    for y, row in enumerate(rows):
-        for x, shape in enumerate(row):
-            whole.paste(shape, (tile * x, tile * y))
+            file = fits.render("eight_views", f"picture/{y}_{x}.exr", view, "--spp 64", 7)
+            whole.paste(Image.open(file[:-3] + "png").convert("RGB"), (tile * x, tile * y))
+        table.append([os.path.basename(truth), "truth", *(f"{f} {step}" for f, step in shown)])
     whole.save(os.path.join(ROOT, "scenes", "pictures", "fits.webp"), quality=80, method=6)
     return ["row", *([""] * 7)], table
 
 
-EXPERIMENTS = {"mirrors": mirrors, "shadows": shadows, "exact": exact, "views": views, "pose": pose,
-               "drift": drift, "tree": tree, "gears": gears, "displacement": displacement,
-               "curves": curves, "films": films, "picture": picture}  # fmt: skip
+EXPERIMENTS = {**dict.fromkeys(SHAPES, fit_shape), "pose": pose, "drift": drift,
+               **dict.fromkeys(FUNCTIONS, fit_function), "curves": curves, "films": films,
+               "picture": picture}
 
 
 def main():
     parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("name", choices=EXPERIMENTS, metavar="NAME", help=", ".join(EXPERIMENTS))
     parser.add_argument("-o", "--output", default=os.path.join(ROOT, "out", "fits"))
     parser.add_argument("--steps", type=int, help="in place of the experiment's own number")
@@ -560,8 +480,9 @@ def main():
     arguments = parser.parse_args()
     if arguments.only and arguments.name in ("drift", "curves", "films", "picture"):
         parser.error(f"--only: {arguments.name} is one whole")
+    use_one_with_matplotlib()
     os.makedirs(arguments.output, exist_ok=True)
-    head, rows = EXPERIMENTS[arguments.name](Fits(arguments))
+    head, rows = EXPERIMENTS[arguments.name](Fits(arguments), arguments.name)
     for row in [head, *rows]:
         print("  ".join(f"{cell!s:>18}" for cell in row))
 
