@@ -33,9 +33,7 @@ import sys  # noqa: E402
 BAD_INPUT, NOT_INSTALLED, NOT_SUPPORTED = 2, 3, 4
 VARIANT = "llvm_ad_rgb"
 LIBRARIES = (
-    "/usr/lib/*/libLLVM*.so*",
-    "/usr/lib/llvm-*/lib/libLLVM*.so*",
-    "/usr/lib64/libLLVM*.so*",
+    "/usr/lib/*/libLLVM*.so*", "/usr/lib/llvm-*/lib/libLLVM*.so*", "/usr/lib64/libLLVM*.so*",
     "/opt/homebrew/opt/llvm/lib/libLLVM*.dylib",
 )
 # Term: the sample counts of prb_projective that switch the two others off.
@@ -52,35 +50,27 @@ class Failure(Exception):
 
 
 def find_llvm():
-    """Newest first: LLVM 15 aborts on some of Mitsuba 3.9.1's kernels where the processor has
-    AVX-512.
+    """The newest: LLVM 15 aborts on some of Mitsuba 3.9.1's kernels where the processor has AVX-512.
     """
 
     def version(file):
         return [int(n) for n in re.findall(r"\d+", os.path.basename(os.path.realpath(file)))]
 
-    found = sorted((f for pattern in LIBRARIES for f in glob.glob(pattern)), key=version)
-    return found[-1] if found else None
+    return max((f for pattern in LIBRARIES for f in glob.glob(pattern)), key=version, default=None)
 
 
 def load_mitsuba():
-    if "DRJIT_LIBLLVM_PATH" not in os.environ:
-        library = find_llvm()
-        if library is not None:
-            os.environ["DRJIT_LIBLLVM_PATH"] = library
+    library = os.environ.get("DRJIT_LIBLLVM_PATH") or find_llvm()
+    os.environ.update({"DRJIT_LIBLLVM_PATH": library} if library else {})
     try:
         import mitsuba
     except ImportError as error:
-        raise Failure(
-            NOT_INSTALLED,
-            f"Mitsuba is not installed for {sys.executable} ({error}): pip install mitsuba==3.9.1",
-        ) from None
-    if "DRJIT_LIBLLVM_PATH" not in os.environ:
-        raise Failure(
-            NOT_INSTALLED,
-            "LLVM, with which Mitsuba compiles its kernels, is not installed: on Debian apt-get "
-            "install libllvm19; elsewhere set DRJIT_LIBLLVM_PATH to its shared library",
-        )
+        raise Failure(NOT_INSTALLED, f"Mitsuba is not installed for {sys.executable} ({error}):"
+                      " pip install mitsuba==3.9.1") from None
+    if not library:
+        raise Failure(NOT_INSTALLED, "LLVM, with which Mitsuba compiles its kernels, is not"
+                      " installed: on Debian apt-get install libllvm19; elsewhere set"
+                      " DRJIT_LIBLLVM_PATH to its shared library")
     mitsuba.set_variant(VARIANT)
     mitsuba.set_log_level(mitsuba.LogLevel.Error)
     import drjit
@@ -89,9 +79,7 @@ def load_mitsuba():
 
 
 class Clock:
-    """Seconds since the start of the program, less what compilation took (`stop_counting` ends that
-    measurement).
-    """
+    """Seconds since the start of the program, less what compilation took until `stop_counting`."""
 
     def __init__(self, drjit):
         self._drjit, self.compilation = drjit, 0.0
@@ -99,9 +87,8 @@ class Clock:
 
     def seconds(self):
         if self._drjit.flag(self._drjit.JitFlag.KernelHistory):
-            self.compilation += (
-                sum(kernel.get("backend_time", 0) for kernel in self._drjit.kernel_history()) / 1000
-            )
+            kernels = self._drjit.kernel_history()
+            self.compilation += sum(k.get("backend_time", 0) for k in kernels) / 1000
         return time.monotonic() - START - self.compilation
 
     def stop_counting(self):
@@ -113,60 +100,45 @@ def parse_parameter(name):
     """(shape, operation, axis as 0, 1, 2 or None)."""
     match = re.fullmatch(r"(.+)\.(?:(translate|rotate)\.([xyz])|scale)", name)
     if not match:
-        raise Failure(
-            NOT_SUPPORTED,
-            f"{name}: not supported by this method (known: SHAPE.translate.x, .y, .z, "
-            "SHAPE.rotate.x, .y, .z, SHAPE.scale)",
-        )
+        raise Failure(NOT_SUPPORTED, f"{name}: not supported by this method (known:"
+                      " SHAPE.translate.x, .y, .z, SHAPE.rotate.x, .y, .z, SHAPE.scale)")
     shape, operation, axis = match.groups()
     return shape, operation or "scale", "xyz".index(axis) if axis else None
 
 
 class Motion:
     """The scene with one shape in motion. `attach()` puts the motion's velocity on the scene's
-    parameters; a pass of rendering uses it up.
-    """
+    parameters; a pass of rendering uses it up."""
 
     def __init__(self, mi, dr, scene, parameter):
         self._mi, self._dr = mi, dr
-        self._shape, self._operation, self._axis = parse_parameter(parameter)
-        shapes = [s for s in scene.shapes() if s.id() == self._shape]
-        if not shapes:
-            known = ", ".join(s.id() for s in scene.shapes())
-            raise Failure(
-                NOT_SUPPORTED,
-                f'{parameter}: not supported by this method: no shape "{self._shape}" (known:'
-                f" {known})",
-            )
+        self._shape, self._operation, axis = parse_parameter(parameter)
+        self._axis = mi.Vector3f(*(float(i == axis) for i in range(3)))
+        shapes = {s.id(): s for s in scene.shapes()}
+        no = f"{parameter}: not supported by this method: "
+        if self._shape not in shapes:
+            known = ", ".join(shapes)
+            raise Failure(NOT_SUPPORTED, f'{no}no shape "{self._shape}" (known: {known})')
         self._params = mi.traverse(scene)
-        self._center = mi.Point3f(shapes[0].bbox().center())
+        self._center = mi.Point3f(shapes[self._shape].bbox().center())
         self._velocities = None
         if f"{self._shape}.vertex_positions" in self._params:
             self._attach_mesh()
         elif f"{self._shape}.to_world" in self._params:
             self._rest = mi.Transform4f(self._params[f"{self._shape}.to_world"].matrix)
         else:
-            raise Failure(
-                NOT_SUPPORTED,
-                f"{parameter}: not supported by this method: the shape has neither vertices nor"
-                " to_world",
-            )
+            raise Failure(NOT_SUPPORTED, f"{no}the shape has neither vertices nor to_world")
 
     def _velocity(self, positions):
-        mi, axis = self._mi, self._axis
         if self._operation == "scale":
             return positions - self._center
-        direction = mi.Vector3f(*(float(i == axis) for i in range(3)))
-        return (
-            direction
-            if self._operation == "translate"
-            else self._dr.cross(direction, positions - self._center)
-        )
+        if self._operation == "rotate":
+            return self._dr.cross(self._axis, positions - self._center)
+        return self._axis
 
     def _attach_mesh(self):
         """Vertices move; what Mitsuba derives from them (computed normals) gets its velocity from
-        it, once.
-        """
+        it, once."""
         mi, dr, key = self._mi, self._dr, f"{self._shape}.vertex_positions"
         positions = dr.unravel(mi.Point3f, self._params[key])
         t = mi.Float(0)
@@ -176,27 +148,22 @@ class Motion:
         self._params.update()
         self._keep_normals_of_the_file(normals, t)
         dr.forward(t, dr.ADFlag.ClearEdges)
-        moving = [
-            k
-            for k in self._params.keys()
-            if k.startswith(f"{self._shape}.") and dr.grad_enabled(self._params[k])
-        ]
+        moving = [k for k in self._params.keys()
+                  if k.startswith(f"{self._shape}.") and dr.grad_enabled(self._params[k])]
         self._velocities = {k: mi.Float(dr.grad(self._params[k])) for k in moving}
         dr.eval(self._velocities)
 
     def _keep_normals_of_the_file(self, normals, t):
         """Mitsuba 3.9.1 computes a mesh's normals anew when its vertices move, those from a file too.
         Where that changed them by more than rounding, they are put back, and turn with the shape as
-        limn's do.
-        """
+        limn's do."""
         mi, dr, key = self._mi, self._dr, f"{self._shape}.vertex_normals"
         rounding = dr.epsilon(mi.Float) ** 0.5
         if len(normals) == 0 or dr.all(dr.abs(self._params[key] - normals) < rounding):
             return
         directions = dr.unravel(mi.Normal3f, normals)
         if self._operation == "rotate":
-            axis = mi.Vector3f(*(float(i == self._axis) for i in range(3)))
-            directions = directions + t * dr.cross(axis, mi.Vector3f(directions))
+            directions = directions + t * dr.cross(self._axis, mi.Vector3f(directions))
         self._params[key] = dr.ravel(mi.Normal3f(directions))
         self._params.update()
 
@@ -204,15 +171,10 @@ class Motion:
         mi, dr, c = self._mi, self._dr, self._center
         t = mi.Float(0)
         dr.enable_grad(t)
-        if self._operation == "scale":
-            step = mi.Transform4f().translate(c).scale(1 + t).translate(-c)
-        else:
-            direction = mi.Vector3f(*(float(i == self._axis) for i in range(3)))
-            step = (
-                mi.Transform4f().translate(t * direction)
-                if self._operation == "translate"
-                else mi.Transform4f().translate(c).rotate(direction, dr.rad2deg(t)).translate(-c)
-            )
+        about = {"scale": lambda at: at.scale(1 + t),
+                 "rotate": lambda at: at.rotate(self._axis, dr.rad2deg(t))}.get(self._operation)
+        step = (about(mi.Transform4f().translate(c)).translate(-c) if about else
+                mi.Transform4f().translate(t * self._axis))
         self._params[f"{self._shape}.to_world"] = step @ self._rest
         self._params.update()
         dr.forward(t, dr.ADFlag.ClearEdges)
@@ -246,9 +208,7 @@ class Term:
         self._integrator.proj_detail.init_indirect_silhouette = self._build_octree_once
 
     def _build_octree_once(self, *arguments):
-        """prb_projective builds its octree anew for every image; one serves all passes of the same
-        scene.
-        """
+        """prb_projective builds its octree anew for every image; one serves all passes."""
         self._build_octree(*arguments)
         self._integrator.proj_detail.init_indirect_silhouette = lambda *_: None
 
@@ -257,9 +217,8 @@ class Term:
         import numpy as np
 
         motion.attach()
-        image = np.array(
-            self._integrator.render_forward(scene, None, seed=seed, spp=spp), dtype=np.float64
-        )
+        image = np.array(self._integrator.render_forward(scene, None, seed=seed, spp=spp),
+                         dtype=np.float64)
         return image[..., :3] if image.shape[2] >= 3 else np.repeat(image[..., :1], 3, axis=2)
 
 
@@ -316,10 +275,7 @@ class Renderer:
         for term in self._terms:
             self._counted_pass(term)
         while True:
-            share, term = max(
-                zip((s / t.passes for s, t in zip(shares, self._terms)), self._terms),
-                key=lambda pair: pair[0],
-            )
+            _, term = max(zip(shares, self._terms), key=lambda pair: pair[0] / pair[1].passes)
             if self._clock.seconds() + term.pass_seconds / 2 > seconds:
                 return setup
             self._counted_pass(term)
@@ -336,8 +292,7 @@ class Renderer:
 
     def figures(self, setup, version, after_setup):
         samples = {term.name: term.passes * self._spp for term in self._terms}
-        seconds = self._clock.seconds()
-        compilation = self._clock.compilation
+        seconds, compilation = self._clock.seconds(), self._clock.compilation
         left_out = f"compilation of {compilation:.1f} s"
         if after_setup:
             left_out += f" and set-up of {setup:.1f} s"
@@ -352,18 +307,14 @@ class Renderer:
             "passes": sum(term.passes for term in self._terms),
             "version": version,
             "peak_memory_bytes": 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss,
-            "message": (
-                f"prb_projective, guiding {self._guiding}, {VARIANT}; {left_out} not counted"
-            ),
+            "message": f"prb_projective, guiding {self._guiding}, {VARIANT}; {left_out} not counted",
         }
 
 
 def write(mi, dr, image, file):
     import numpy as np
 
-    dr.set_thread_count(
-        2
-    )  # With one thread, Bitmap.write of Mitsuba 3.9.1 waits for itself for ever.
+    dr.set_thread_count(2)  # With one, Bitmap.write of Mitsuba 3.9.1 waits for itself for ever.
     try:
         mi.Bitmap(image.astype(np.float32), pixel_format=mi.Bitmap.PixelFormat.RGB).write(file)
     except RuntimeError as error:
@@ -374,23 +325,16 @@ def run(arguments):
     parse_parameter(arguments.wrt)
     mi, dr = load_mitsuba()
     renderer = Renderer(mi, dr, arguments)
-    setup = (
-        renderer.render_samples(arguments.spp)
-        if arguments.spp
-        else renderer.render_for(arguments.time, arguments.after_setup)
-    )
+    setup = (renderer.render_samples(arguments.spp) if arguments.spp else
+             renderer.render_for(arguments.time, arguments.after_setup))
     figures = renderer.figures(setup, mi.__version__, arguments.after_setup)
     write(mi, dr, renderer.image(), arguments.output)
     if arguments.json:
         with open(arguments.json, "w", encoding="utf-8") as stream:
             json.dump(figures, stream, indent=2)
-    print(
-        f"{arguments.output}: {figures['seconds']:.2f} s, of which {figures['setup_seconds']:.2f} s"
-        " set-up; samples"
-        " per pixel "
-        + ", ".join(f"{name} {count}" for name, count in figures["samples"].items())
-        + f"; {figures['message']}"
-    )
+    samples = ", ".join(f"{name} {count}" for name, count in figures["samples"].items())
+    print(f"{arguments.output}: {figures['seconds']:.2f} s, of which {figures['setup_seconds']:.2f} s"
+          f" set-up; samples per pixel {samples}; {figures['message']}")
 
 
 def define(text):
@@ -413,27 +357,19 @@ def positive(kind):
 
 def main():
     parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scene")
     parser.add_argument("--wrt", required=True, metavar="PARAM")
     budget = parser.add_mutually_exclusive_group(required=True)
-    budget.add_argument(
-        "--time", type=positive(float), metavar="SECONDS", help="set-up included, compilation not"
-    )
-    parser.add_argument(
-        "--after-setup",
-        action="store_true",
-        help="--time begins after the set-up, which is not counted either",
-    )
+    budget.add_argument("--time", type=positive(float), metavar="SECONDS",
+                        help="set-up included, compilation not")
+    parser.add_argument("--after-setup", action="store_true",
+                        help="--time begins after the set-up, which is not counted either")
     budget.add_argument("--spp", type=positive(int), help="samples per pixel of each term, instead")
     parser.add_argument("--threads", type=positive(int), help="default: all cores")
-    parser.add_argument(
-        "--guiding",
-        choices=("octree", "grid", "none"),
-        default="octree",
-        help="of the boundary term (default octree, which leaves out what it has not met)",
-    )
+    parser.add_argument("--guiding", choices=("octree", "grid", "none"), default="octree",
+                        help="of the boundary term (default octree, which leaves out what it has"
+                        " not met)")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("-D", action="append", type=define, default=[], metavar="NAME=VALUE")
     parser.add_argument("-o", "--output", required=True, metavar="FILE.exr")

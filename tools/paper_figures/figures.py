@@ -37,10 +37,9 @@ def patch(name, mesh):
     return Part(name, "reject", "", methods=BOXES, options=["--node-edges", "128"], small_mesh=mesh)
 
 
-def bias(method, rays):
-    options = ["--method", method] + (["--aux", str(rays)] if method != FOREST else [])
-    return Part(f"fig10-bias-{method}-{rays}", "gradient", "scenes/closed_form/lamp_over_plane.xml",
-                "lamp.translate.x", options=options)
+def bias(name, method, *options):
+    return Part(f"fig10-bias-{name}", "gradient", "scenes/closed_form/lamp_over_plane.xml",
+                "lamp.translate.x", options=["--method", method, *options])
 
 
 FIGURES = [
@@ -72,15 +71,16 @@ FIGURES = [
         "Warped-area sampling",
         "The same scene in equal time by warped-area sampling with 8 and 32 auxiliary rays "
         "(kappa 1e5): noise and bias where edge sampling has little of either. No numbers.",
-        "`was` is biased by design and marked where the scores see it; `was-unbiased` is the "
-        "roulette that takes the bias out. At the end the bias over rays, where the derivative is "
+        f"`{WARPED}` is biased by design and marked where the scores see it; `{WARPED_UNBIASED}` is "
+        "the roulette that takes the bias out. At the end the bias over rays, where the derivative is "
         "known.",
         [mirror(f"fig10-{rays}-rays-alpha-{alpha}", alpha,
                 [PAPER, FOREST, DEFAULT, WARPED, WARPED_UNBIASED],
                 options=["--aux", str(rays), "--kappa", "1e5"])
          for alpha in ("0.01", "0.05") for rays in (8, 32)]
-        + [bias(FOREST, "reference"), *(bias(WARPED, rays) for rays in (2, 8, 32, 128)),
-           bias(WARPED_UNBIASED, 8)],
+        + [bias("reference", FOREST),
+           *(bias(str(rays), WARPED, "--aux", str(rays)) for rays in (2, 8, 32, 128)),
+           bias("unbiased", WARPED_UNBIASED, "--aux", "8")],
     ),
     Figure(
         "Figure 11 and Table 1",
