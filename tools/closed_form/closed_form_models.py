@@ -17,22 +17,27 @@ from closed_form_radiance import (Filter, convex_vector, lobe, lobe_over_polygon
                                   polygon_vector)
 
 
+def pixels(camera, mean):
+    """An image of mean(corner): of the pixel that begins there on the film [pixels]."""
+    return np.array([[mean(np.array([column, row], dtype=float)) for column in range(camera.width)]
+                     for row in range(camera.height)])
+
+
 class FloorModel:
     """The camera sees nothing but the face of shape "floor": a mean of radiance() over pixels."""
 
     outlines_in_view = False
 
     def image(self, domain, shade, outline, shadow, order):
-        camera = domain.camera
         nodes, weights = square_rule(order)
-        result = np.zeros((camera.height, camera.width, 3))
-        for row in range(camera.height):
-            for column in range(camera.width):
-                film = nodes + [column, row]
-                p = hit_plane(outline.camera, film, outline.shapes["floor"].face(0))
-                viewer = -shade.camera.directions(film)
-                result[row, column] = weights @ self.radiance(shade, outline, p, viewer, order)
-        return result
+
+        def mean(corner):
+            film = nodes + corner
+            p = hit_plane(outline.camera, film, outline.shapes["floor"].face(0))
+            viewer = -shade.camera.directions(film)
+            return weights @ self.radiance(shade, outline, p, viewer, order)
+
+        return pixels(domain.camera, mean)
 
 
 def floor_normal(scene):
@@ -175,20 +180,17 @@ class SharpShadow(FloorModel):
     """
 
     def image(self, domain, shade, outline, shadow, order):
-        camera = domain.camera
         corners = shadow_on_plane(shadow.lights["lamp"], shadow.shapes["object"].face(0),
                                   shadow.shapes["floor"].face(0))
         dark = shadow.camera.project(corners)
-        result = np.zeros((camera.height, camera.width, 3))
-        for row in range(camera.height):
-            for column in range(camera.width):
-                lower = np.array([column, row], dtype=float)
-                square = lower + np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])
-                result[row, column] = self.light(shade, square, order)
-                part = clip_box(dark, lower, lower + 1)
-                if len(part):
-                    result[row, column] -= self.light(shade, part, order)
-        return result
+
+        def mean(lower):
+            square = lower + np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])
+            part = clip_box(dark, lower, lower + 1)
+            whole = self.light(shade, square, order)
+            return whole - self.light(shade, part, order) if len(part) else whole
+
+        return pixels(domain.camera, mean)
 
     def light(self, scene, polygon, order):
         film, weights = loop_rule(polygon, order)
@@ -213,20 +215,18 @@ class SharpShadowInGloss(FloorModel):
     """
 
     def image(self, domain, shade, outline, shadow, order):
-        camera, rest = domain.camera, domain
         nodes, weights = square_rule(order)
-        result = np.zeros((camera.height, camera.width, 3))
-        for row in range(camera.height):
-            for column in range(camera.width):
-                film = nodes + [column, row]
-                q = [hit_plane(s.camera, film, s.shapes["floor"].face(0))
-                     for s in (rest, shade, outline, shadow)]
-                viewer = -shade.camera.directions(film)
-                for k, weight in enumerate(weights):
-                    seen = self.radiance_at(shade, outline, shadow, rest, [p[k] for p in q],
-                                            viewer[k], order)
-                    result[row, column] += weight * seen
-        return result
+
+        def mean(corner):
+            film = nodes + corner
+            q = [hit_plane(s.camera, film, s.shapes["floor"].face(0))
+                 for s in (domain, shade, outline, shadow)]
+            viewer = -shade.camera.directions(film)
+            return sum(weight * self.radiance_at(shade, outline, shadow, domain, [p[k] for p in q],
+                                                 viewer[k], order)
+                       for k, weight in enumerate(weights))
+
+        return pixels(domain.camera, mean)
 
     def radiance_at(self, shade, outline, shadow, rest, q, viewer, order):
         chart = rest.shapes["panel"].face(0)
@@ -286,14 +286,14 @@ class LampsInView:
         near = film_loop(domain, domain.shapes["near"].face(0))
         far = film_loop(domain, domain.shapes["far"].face(0))
         both, cover = clip_convex(far, near), Filter(camera.filter).over_polygon
-        result = np.zeros((camera.height, camera.width, 3))
-        for row in range(camera.height):
-            for column in range(camera.width):
-                at = np.array([column + 0.5, row + 0.5])
-                shown = cover(far, at) - cover(both, at)
-                result[row, column] = (sky + (shade.shapes["near"].radiance - sky) * cover(near, at)
-                                       + (shade.shapes["far"].radiance - sky) * shown)
-        return result
+
+        def mean(corner):
+            at = corner + 0.5
+            shown = cover(far, at) - cover(both, at)
+            return (sky + (shade.shapes["near"].radiance - sky) * cover(near, at)
+                    + (shade.shapes["far"].radiance - sky) * shown)
+
+        return pixels(camera, mean)
 
 
 class CrossingInView:
@@ -309,14 +309,13 @@ class CrossingInView:
         for part in parts:
             assert polygon_area(clip_convex(part, plane)) > polygon_area(part) * (1 - 1e-9), "beyond"
         emitted, other = shade.shapes["plane"].radiance, shade.shapes["object"].radiance
-        result = np.zeros((camera.height, camera.width, 3))
-        for row in range(camera.height):
-            for column in range(camera.width):
-                box = np.array([column, row], dtype=float)
-                covered = sum(polygon_area(clip_box(part, box, box + 1)) for part in parts)
-                result[row, column] = (sky + (other - emitted) * covered
-                                       + (emitted - sky) * polygon_area(clip_box(plane, box, box + 1)))
-        return result
+
+        def mean(box):
+            covered = sum(polygon_area(clip_box(part, box, box + 1)) for part in parts)
+            return (sky + (other - emitted) * covered
+                    + (emitted - sky) * polygon_area(clip_box(plane, box, box + 1)))
+
+        return pixels(camera, mean)
 
 
 class ConvexInView:
@@ -334,13 +333,8 @@ class ConvexInView:
                  if np.dot(camera.pinhole() - shape.vertices[f][0],
                            loop_normal(shape.vertices[f])) > 0]
         rho = shade.shapes["object"].bsdf.reflectance
-        result = np.zeros((camera.height, camera.width, 3))
-        for row in range(camera.height):
-            for column in range(camera.width):
-                box = np.array([column, row])
-                covered = sum(polygon_area(clip_box(f, box, box + 1)) for f in front)
-                result[row, column] = sky + (rho - 1) * sky * covered
-        return result
+        return pixels(camera, lambda box: sky + (rho - 1) * sky * sum(
+            polygon_area(clip_box(f, box, box + 1)) for f in front))
 
 
 class ReceiverInView:
@@ -350,18 +344,17 @@ class ReceiverInView:
     outlines_in_view = True
 
     def image(self, domain, shade, outline, shadow, order):
-        camera = domain.camera
         seen = film_loop(domain, domain.shapes["receiver"].face(0))
         n = loop_normal(shade.shapes["receiver"].face(0))
         scale = shade.shapes["receiver"].bsdf.reflectance / np.pi * shade.shapes["lamp"].radiance
-        result = np.zeros((camera.height, camera.width, 3))
-        for row in range(camera.height):
-            for column in range(camera.width):
-                box = np.array([column, row])
-                part = clip_box(seen, box, box + 1)
-                if len(part):
-                    film, weights = loop_rule(part, order)
-                    p = hit_plane(outline.camera, film, outline.shapes["receiver"].face(0))
-                    phi = polygon_vector(p, lamp_loop(outline, p))
-                    result[row, column] = np.dot(weights, phi @ n) * scale
-        return result
+
+        def mean(box):
+            part = clip_box(seen, box, box + 1)
+            if len(part) == 0:
+                return np.zeros(3)
+            film, weights = loop_rule(part, order)
+            p = hit_plane(outline.camera, film, outline.shapes["receiver"].face(0))
+            phi = polygon_vector(p, lamp_loop(outline, p))
+            return np.dot(weights, phi @ n) * scale
+
+        return pixels(domain.camera, mean)

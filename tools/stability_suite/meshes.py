@@ -31,25 +31,33 @@ def ring(corners, z):
     return [(x, y, z) for x, y in corners]
 
 
-def prism(bottom=0.25, top=1.0, corners=CORNERS):
-    """Closed, over any convex polygon that turns counter-clockwise seen from above."""
-    n = len(corners)
-    positions = ring(corners, bottom) + ring(corners, top)
+def between(low, high):
+    """A closed surface between two convex rings of as many points: lid, floor and sides. The rings
+    turn counter-clockwise seen from the upper one."""
+    n = len(low)
     faces = [(0, i + 1, i) for i in range(1, n - 1)]
     faces += [(n, n + i, n + i + 1) for i in range(1, n - 1)]
     for i in range(n):
         j = (i + 1) % n
         faces += [(i, j, n + j), (i, n + j, n + i)]
-    return np.array(positions, float), np.array(faces)
+    return np.concatenate([np.asarray(low, float), np.asarray(high, float)]), np.array(faces)
+
+
+def prism(bottom=0.25, top=1.0, corners=CORNERS):
+    """Closed, over any convex polygon that turns counter-clockwise seen from above."""
+    return between(ring(corners, bottom), ring(corners, top))
+
+
+def band(low, high):
+    """Upright squares between two rings of four points."""
+    return [quad(low[i], low[j], high[j], high[i]) for i, j in SIDES]
 
 
 def prism_quads(bottom=0.25, top=1.0, out=0.0):
     """The six faces of the prism, each a mesh, moved outwards by `out`."""
     low, high = ring(CORNERS, bottom), ring(CORNERS, top)
-    faces = [quad(*low[::-1]), quad(*high)]
-    faces += [quad(low[i], low[j], high[j], high[i]) for i, j in SIDES]
     moved = []
-    for p, f in faces:
+    for p, f in [quad(*low[::-1]), quad(*high), *band(low, high)]:
         normal = np.cross(p[1] - p[0], p[2] - p[0])
         moved.append((p + out * normal / np.linalg.norm(normal), f))
     return moved
@@ -82,10 +90,9 @@ def slivers(width, bottom=0.25, top=1.0):
     next_low, next_high = ring(CORNERS, bottom + width), ring(CORNERS, top - width)
     inner_low, inner_high = ring(inner, bottom), ring(inner, top)
     parts = [quad(*inner_low[::-1]), quad(*inner_high)]
-    for i, j in SIDES:
-        for below, above in ((outer_low, next_low), (next_low, next_high), (next_high, outer_high),
-                             (outer_high, inner_high), (inner_low, outer_low)):
-            parts.append(quad(below[i], below[j], above[j], above[i]))
+    for below, above in ((outer_low, next_low), (next_low, next_high), (next_high, outer_high),
+                         (outer_high, inner_high), (inner_low, outer_low)):
+        parts += band(below, above)
     return join(*parts)
 
 
@@ -185,15 +192,9 @@ def rod(start, end, radius, sides=6):
     axis = (end - start) / np.linalg.norm(end - start)
     u = np.cross(axis, (0.3, 0.5, 0.8))
     u /= np.linalg.norm(u)
-    v = np.cross(axis, u)
     angles = 2 * np.pi * np.arange(sides) / sides
-    round_ = radius * (np.cos(angles)[:, None] * u + np.sin(angles)[:, None] * v)
-    faces = [(0, i + 1, i) for i in range(1, sides - 1)]
-    faces += [(sides, sides + i, sides + i + 1) for i in range(1, sides - 1)]
-    for i in range(sides):
-        j = (i + 1) % sides
-        faces += [(i, j, sides + j), (i, sides + j, sides + i)]
-    return np.concatenate([start + round_, end + round_]), np.array(faces)
+    around = radius * (np.cos(angles)[:, None] * u + np.sin(angles)[:, None] * np.cross(axis, u))
+    return between(start + around, end + around)
 
 
 def tray(thickness, bottom=0.3, top=0.9, half=0.4):
@@ -203,11 +204,8 @@ def tray(thickness, bottom=0.3, top=0.9, half=0.4):
     inside = outside * (inner / half)
     out_low, out_high = ring(outside, bottom), ring(outside, top)
     in_low, in_high = ring(inside, bottom + thickness), ring(inside, top)
-    parts = [quad(*out_low[::-1]), quad(*in_low)]
-    for i, j in SIDES:
-        parts.append(quad(out_low[i], out_low[j], out_high[j], out_high[i]))
-        parts.append(quad(out_high[i], out_high[j], in_high[j], in_high[i]))
-        parts.append(quad(in_high[i], in_high[j], in_low[j], in_low[i]))
+    parts = [quad(*out_low[::-1]), quad(*in_low), *band(out_low, out_high),
+             *band(out_high, in_high), *band(in_high, in_low)]
     return turned(join(*parts), 0.3)
 
 
