@@ -22,10 +22,11 @@ from needs import need_matplotlib  # noqa: E402
 
 need_matplotlib()
 
+import exr  # noqa: E402
 import numpy as np  # noqa: E402
 from common import read_json  # noqa: E402
 from stability_suite import (  # noqa: E402
-    closed_form, exr, families, statistics, suite, table, verdicts)
+    closed_form, families, statistics, suite, table, verdicts)
 from stability_suite.program import DEFAULT_METHODS, Program, method_names  # noqa: E402
 from stability_suite.statistics import Estimate  # noqa: E402
 

@@ -1,8 +1,7 @@
 // Measures edge samplers, all rows of their table: hit rate (the share of draws that end on an edge
 // of E(p)), cost of a draw, time of the build. One table to standard output; seeds are fixed.
-//   edge_benchmark [MESH.obj|MESH.ply ...] [--only SAMPLER ...] [--builds]
-// Without meshes: on tori of 1k to 1M edges, the default sampler if none is named. --builds: no
-// draws, and each build five times in turn, the least of which counts.
+//   edge_benchmark [MESH.obj|MESH.ply ...] [--only SAMPLER ...]
+// Without meshes: on tori of 1k to 1M edges, the default sampler if none is named.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -186,27 +185,19 @@ struct Row {
   EdgeSamplerType type;
   std::unique_ptr<EdgeSampler> sampler = nullptr;
   double build[2] = {};  // [ms], on one and two threads
-  double processor = 0;  // [ms], of all threads of the second
   Draws draws = {}, glossy = {};
 };
 
-// All rows in turn: what else the machine does then hits all alike. The least time of each counts.
-void build(std::vector<Row>& rows, const EdgeSamplerInput& input, int rounds) {
-  for (int round = 0; round < rounds; ++round)
-    for (Row& row : rows)
-      for (int threads = 1; threads <= 2; ++threads) {
-        const auto start = Clock::now();
-        const Stopwatch watch;
-        row.sampler = row.type.make(input, threads);
-        const double time = seconds_since(start) * 1e3, processor = watch.seconds() * 1e3;
-        double& best = row.build[threads - 1];
-        best = round == 0 ? time : std::min(best, time);
-        if (threads == 2)
-          row.processor = round == 0 ? processor : std::min(row.processor, processor);
-      }
+void build(std::vector<Row>& rows, const EdgeSamplerInput& input) {
+  for (Row& row : rows)
+    for (int threads = 1; threads <= 2; ++threads) {
+      const auto start = Clock::now();
+      row.sampler = row.type.make(input, threads);
+      row.build[threads - 1] = seconds_since(start) * 1e3;
+    }
 }
 
-// As `build`.
+// All rows in turn: what else the machine does then hits all alike. The least time of each counts.
 void measure_draws(std::vector<Row>& rows, const std::vector<EdgeQuery>& queries,
                    const std::vector<EdgeQuery>& glossy) {
   constexpr int kRounds = 5;
@@ -224,15 +215,6 @@ void measure_draws(std::vector<Row>& rows, const std::vector<EdgeQuery>& queries
       take(glossy, row.glossy);
     }
   }
-}
-
-void print_builds(const std::vector<Row>& rows, double count) {
-  const char* head = "  {:<34} {:>8} {:>8} {:>9} {:>6}\n";
-  fmt::print(fmt::runtime(head), "sampler", "build 1", "build 2", "processor", "B/edge");
-  fmt::print(fmt::runtime(head), "", "[ms]", "[ms]", "[ms]", "");
-  for (const Row& row : rows)
-    fmt::print("  {:<34} {:8.1f} {:8.1f} {:9.1f} {:6.2f}\n", row.type.name, row.build[0],
-               row.build[1], row.processor, static_cast<double>(row.sampler->size().bytes) / count);
 }
 
 void print_draws(const std::vector<Row>& rows, const EdgeSamplerInput& input,
@@ -253,8 +235,7 @@ void print_draws(const std::vector<Row>& rows, const EdgeSamplerInput& input,
   }
 }
 
-void measure(const std::string& name, const Mesh& mesh, std::span<const EdgeSamplerType> types,
-             bool only_builds) {
+void measure(const std::string& name, const Mesh& mesh, std::span<const EdgeSamplerType> types) {
   EdgeSamplerInput input;
   input.objects.push_back(build_edge_mesh(mesh, true));
   const EdgeMesh& edges = input.objects[0];
@@ -266,9 +247,7 @@ void measure(const std::string& name, const Mesh& mesh, std::span<const EdgeSamp
              edges.one_sided_closed ? "closed" : "not closed", ray_nanoseconds(mesh));
   std::vector<Row> rows;
   for (const EdgeSamplerType& type : types) rows.push_back({type});
-  constexpr int kBuilds = 5;
-  build(rows, input, only_builds ? kBuilds : 1);
-  if (only_builds) return print_builds(rows, count);
+  build(rows, input);
   const auto queries = queries_around(mesh, 500, {});
   const auto glossy = queries_around(mesh, 500, {ggx_lobe(), 0.1, 1});
   measure_draws(rows, queries, glossy);
@@ -281,24 +260,20 @@ void measure(const std::string& name, const Mesh& mesh, std::span<const EdgeSamp
 int main(int argc, char** argv) try {
   using namespace limn;
   std::vector<std::string> files, only;
-  bool only_builds = false;
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
     if (word == "--only" && i + 1 < argc)
       only.push_back(argv[++i]);
-    else if (word == "--builds")
-      only_builds = true;
     else
       files.push_back(word);
   }
   const auto rows =
       rows_of(only, files.empty() ? edge_sampler_types().first(1) : edge_sampler_types());
   for (const std::string& file : files)
-    measure(file.substr(file.find_last_of('/') + 1), smoothed(read_mesh(file, false)), rows,
-            only_builds);
+    measure(file.substr(file.find_last_of('/') + 1), smoothed(read_mesh(file, false)), rows);
   if (!files.empty()) return 0;
   for (int tube : {13, 41, 129, 408})
-    measure(fmt::format("torus {}", tube), smoothed(bumpy_torus(tube)), rows, only_builds);
+    measure(fmt::format("torus {}", tube), smoothed(bumpy_torus(tube)), rows);
 } catch (const std::exception& error) {
   fmt::print(stderr, "edge_benchmark: {}\n", error.what());
   return 2;

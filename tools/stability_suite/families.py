@@ -3,9 +3,10 @@ it. A new one is a function with its `@family` line: tests and the page loop ove
 
 from dataclasses import dataclass
 
+import exr
 import numpy as np
 
-from . import exr, meshes
+from . import meshes
 from .program import DIFFERENCES as FINITE_DIFFERENCES
 from .program import OURS
 from .scene import Scene, Shape, diffuse, glossy, twosided

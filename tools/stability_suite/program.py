@@ -9,9 +9,9 @@ import subprocess
 import time
 from dataclasses import dataclass, field
 
+import exr
 import numpy as np
 
-from . import exr
 from .statistics import Estimate
 
 DONE, REFUSED, NON_FINITE, CRASHED, TIMED_OUT = "done", "refused", "non-finite", "crash", "time-out"
