@@ -203,6 +203,7 @@ def _bias_over_rays(figure, panel, palette, points):
                    yerr=[[100 * e for e in low], [100 * e for e in high]])
     panel.set_xscale("log", base=2)
     panel.set_yscale("log")
+    charts.log_axis(panel.yaxis, *panel.get_ylim())
     panel.set_xticks(rays, [str(r) for r in rays])
     panel.set_xlabel("auxiliary rays")
     panel.set_ylabel(f"bias of {WARPED}, %")
