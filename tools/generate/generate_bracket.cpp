@@ -25,8 +25,7 @@ class Builder {
  public:
   void quad(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& d) {
     const uint32_t i = vertex(a), j = vertex(b), k = vertex(c), l = vertex(d);
-    mesh_.faces.push_back({i, j, k});
-    mesh_.faces.push_back({i, k, l});
+    add_quad(mesh_, i, j, k, l);
   }
   // Between two loops of as many points, cut into `pieces`; the outside is on the right of one who
   // walks along the loops with `to` on the left hand.

@@ -89,15 +89,11 @@ class Plate {
       std::swap(a, d);
       std::swap(b, e);
     }
-    mesh_.faces.push_back({a, b, e});
-    mesh_.faces.push_back({a, e, d});
+    add_quad(mesh_, a, b, e, d);
   }
 
   // From below to above, with the plate to the left of a to b as seen from above.
-  void add_wall(uint32_t a, uint32_t b) {
-    mesh_.faces.push_back({a, b, b + 1});
-    mesh_.faces.push_back({a, b + 1, a + 1});
-  }
+  void add_wall(uint32_t a, uint32_t b) { add_quad(mesh_, a, b, b + 1, a + 1); }
 
   Gear gear_;
   int columns_;

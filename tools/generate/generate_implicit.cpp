@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "tools/generate/generate_parts.h"
+
 namespace limn {
 namespace {
 
@@ -146,8 +148,7 @@ Triangles polygonise(const Implicit& surface, double h) {
   for (const auto& [a, b, c, d] : quads) {
     const auto& p = mesh.positions;
     if (length_squared(p[a] - p[c]) <= length_squared(p[b] - p[d])) {
-      mesh.faces.push_back({a, b, c});
-      mesh.faces.push_back({a, c, d});
+      add_quad(mesh, a, b, c, d);
     } else {
       mesh.faces.push_back({a, b, d});
       mesh.faces.push_back({b, c, d});

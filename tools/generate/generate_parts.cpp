@@ -12,6 +12,11 @@ void append(Triangles& mesh, const Triangles& part) {
   for (const auto& [a, b, c] : part.faces) mesh.faces.push_back({base + a, base + b, base + c});
 }
 
+void add_quad(Triangles& mesh, uint32_t a, uint32_t b, uint32_t c, uint32_t d) {
+  mesh.faces.push_back({a, b, c});
+  mesh.faces.push_back({a, c, d});
+}
+
 Triangles with_faces(int faces, double first_h, const std::function<Triangles(double h)>& make) {
   Triangles best;
   double best_ratio = 0;
@@ -46,11 +51,6 @@ int steps(double length, double h, int fewest) {
 }
 
 namespace {
-
-void add_quad(Triangles& mesh, uint32_t a, uint32_t b, uint32_t c, uint32_t d) {
-  mesh.faces.push_back({a, b, c});
-  mesh.faces.push_back({a, c, d});
-}
 
 // Unit vectors across the rings' axes, each the one before it turned as little as possible.
 std::vector<Vec3d> transport(const std::vector<Ring>& rings) {
@@ -256,7 +256,15 @@ Vec3d spline(const std::vector<Vec3d>& points, double t) {
          (b * 3.0 - a - c * 3.0 + d) * (0.5 * u * u * u);
 }
 
-void add_blade_faces(int rows, int columns, Triangles& mesh) {
+Triangles blade(int rows, int columns, const std::function<Vec3d(double s, double v)>& point) {
+  Triangles mesh;
+  mesh.positions.push_back(point(0, 0));
+  for (int i = 1; i < rows; ++i) {
+    for (int k = 0; k <= columns; ++k) {
+      mesh.positions.push_back(point(static_cast<double>(i) / rows, 2.0 * k / columns - 1));
+    }
+  }
+  mesh.positions.push_back(point(1, 0));
   const auto at = [&](int i, int k) {
     return static_cast<uint32_t>(1 + (i - 1) * (columns + 1) + k);
   };
@@ -264,11 +272,11 @@ void add_blade_faces(int rows, int columns, Triangles& mesh) {
   for (int k = 0; k < columns; ++k) {
     mesh.faces.push_back({0, at(1, k), at(1, k + 1)});
     for (int i = 1; i + 1 < rows; ++i) {
-      mesh.faces.push_back({at(i, k), at(i + 1, k), at(i + 1, k + 1)});
-      mesh.faces.push_back({at(i, k), at(i + 1, k + 1), at(i, k + 1)});
+      add_quad(mesh, at(i, k), at(i + 1, k), at(i + 1, k + 1), at(i, k + 1));
     }
     mesh.faces.push_back({at(rows - 1, k), tip, at(rows - 1, k + 1)});
   }
+  return mesh;
 }
 
 }  // namespace limn

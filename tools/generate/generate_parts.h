@@ -9,6 +9,7 @@
 namespace limn {
 
 void append(Triangles& mesh, const Triangles& part);
+void add_quad(Triangles& mesh, uint32_t a, uint32_t b, uint32_t c, uint32_t d);
 
 // The mesh make(h) whose number of faces is nearest to `faces`, over edge lengths h; the count must
 // go roughly as 1 / h^2. first_h: where the search starts.
@@ -63,8 +64,8 @@ double arc_length(const std::function<Vec3d(double)>& position);
 // As many steps as `h` fits into `length`, but at least `fewest`.
 int steps(double length, double h, int fewest);
 
-// Faces between two ends that are points, the first and the last position, and rows - 1 rows of
-// columns + 1 points between them: blades, leaves.
-void add_blade_faces(int rows, int columns, Triangles& mesh);
+// An open blade or leaf: point(s, v), s in [0, 1] along it in `rows` steps and v in [-1, 1] across
+// it in `columns`; its ends are points, at v = 0.
+Triangles blade(int rows, int columns, const std::function<Vec3d(double s, double v)>& point);
 
 }  // namespace limn

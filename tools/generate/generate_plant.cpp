@@ -50,21 +50,10 @@ Vec3d blade_point(const Growth& g, double s, double v) {
   return middle + Vec3d{0, 0, 1} * (v * half) + up * (fold + wave);
 }
 
-// One loop of border: ends that are points, and rows between them.
-Triangles blade(const Growth& g, double h) {
+Triangles leaf(const Growth& g, double h) {
   const int rows = steps(arc_length([&](double t) { return spline(g.blade, t); }), h, 5);
-  const int columns = 2 * steps(g.width, h, 1);
-  Triangles mesh;
-  mesh.positions.push_back(blade_point(g, 0, 0));
-  for (int i = 1; i < rows; ++i) {
-    for (int k = 0; k <= columns; ++k) {
-      mesh.positions.push_back(
-          blade_point(g, static_cast<double>(i) / rows, 2.0 * k / columns - 1));
-    }
-  }
-  mesh.positions.push_back(blade_point(g, 1, 0));
-  add_blade_faces(rows, columns, mesh);
-  return mesh;
+  return blade(rows, 2 * steps(g.width, h, 1),
+               [&](double s, double v) { return blade_point(g, s, v); });
 }
 
 Triangles plant(double h) {
@@ -87,7 +76,7 @@ Triangles plant(double h) {
                               [](double t) { return 0.014 - 0.005 * t; }, 2},
                              h),
                         g.angle));
-    append(mesh, turned(blade(g, h), g.angle));
+    append(mesh, turned(leaf(g, h), g.angle));
   }
   return mesh;
 }

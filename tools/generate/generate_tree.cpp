@@ -37,20 +37,10 @@ double branch_radius(double t) { return 0.012 * (1 - 0.7 * t); }
 // A leaf from its foot, a diamond that is folded along its middle and cut into steps.
 Triangles leaf(const Vec3d& foot, const Vec3d& along, const Vec3d& across, double size, double h) {
   const Vec3d up = cross(across, along);
-  const int rows = steps(size, h, 2);
-  Triangles mesh;
-  mesh.positions.push_back(foot);
-  for (int i = 1; i < rows; ++i) {
-    const double s = static_cast<double>(i) / rows;
+  return blade(steps(size, h, 2), 2, [&](double s, double v) {
     const double half = 0.19 * size * std::sin(kPi * std::pow(s, 0.8));
-    for (const int side : {-1, 0, 1}) {
-      mesh.positions.push_back(foot + along * (size * s) + across * (half * side) +
-                               up * (0.3 * half * std::abs(side)));
-    }
-  }
-  mesh.positions.push_back(foot + along * size);
-  add_blade_faces(rows, 2, mesh);
-  return mesh;
+    return foot + along * (size * s) + across * (half * v) + up * (0.3 * half * std::fabs(v));
+  });
 }
 
 // Leaves to both sides, and one at the end.
