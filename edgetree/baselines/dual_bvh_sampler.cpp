@@ -205,12 +205,12 @@ class DualRejectionTree final : public RejectionTree {
   }
 
   bool rejects(uint32_t node, const Vec3d& p) const override {
-    const auto [t, i] = places_[node];
+    const auto [t, i] = tree_nodes_[node];
     return trees_[t].rejects(trees_[t].nodes()[i], trees_[t].at(p));
   }
 
  private:
-  struct Place {
+  struct NodeIndex {
     uint32_t tree, node;
   };
 
@@ -223,12 +223,12 @@ class DualRejectionTree final : public RejectionTree {
     nodes_.push_back({parent, index + 2 * (node.end - node.begin) - 1,
                       static_cast<uint32_t>(open_.size()), first_edge + node.begin,
                       first_edge + node.end});
-    places_.push_back({t, i});
+    tree_nodes_.push_back({t, i});
   }
 
   const std::vector<DualTree>& trees_;
-  std::vector<Place> places_;   // of each node
-  std::vector<uint32_t> open_;  // ancestors of the next node, outermost first
+  std::vector<NodeIndex> tree_nodes_;  // of each node
+  std::vector<uint32_t> open_;         // ancestors of the next node, outermost first
 };
 
 class DualBvhSampler final : public ListingSampler {

@@ -122,17 +122,11 @@ class PairFinder {
     for (uint32_t leaf = 0; leaf < tree.leaf_count(); ++leaf)
       for (size_t i = 0; i < tree.leaf(leaf).size(); ++i)
         for (int k = 0; k < 3; ++k) fans[leaf].corners[k][i] = fans_[tree.leaf(leaf)[i]][k];
-    constexpr uint32_t kBlock = 256;  // leaves; not tuned
-    std::vector<std::vector<FacePair>> found((tree.leaf_count() + kBlock - 1) / kBlock);
-    parallel_for(found.size(), threads_, [&](size_t block) {
-      std::vector<uint32_t> leaves;
-      const auto begin = static_cast<uint32_t>(block) * kBlock;
-      for (uint32_t leaf = begin; leaf < std::min(begin + kBlock, tree.leaf_count()); ++leaf)
-        append_pairs_of(tree, fans, leaf, leaves, found[block]);
-    });
-    std::vector<FacePair> pairs;
-    for (const auto& some : found) pairs.insert(pairs.end(), some.begin(), some.end());
-    return pairs;
+    return tree.find_pairs<FacePair>(
+        threads_, [&](uint32_t i, uint32_t leaf) { return fans[leaf].share(fans_[i]); },
+        [&](uint32_t i, uint32_t j, std::vector<FacePair>& pairs) {
+          pairs.push_back({faces_[i], faces_[j]});
+        });
   }
 
  private:
@@ -165,25 +159,6 @@ class PairFinder {
     for (int k = 0; k < 3; ++k) {
       box.lower[k] = static_cast<float>(std::min({c[0][k], c[1][k], c[2][k]}) - 2 * margin);
       box.upper[k] = static_cast<float>(std::max({c[0][k], c[1][k], c[2][k]}) + 2 * margin);
-    }
-  }
-
-  // Appends pairs within the leaf, and with faces of later leaves.
-  void append_pairs_of(const BoxTree& tree, std::span<const LeafFans> fans, uint32_t leaf,
-                       std::vector<uint32_t>& leaves, std::vector<FacePair>& pairs) const {
-    tree.find_leaves(tree.leaf_box(leaf), leaf, leaves);
-    const auto own = tree.leaf(leaf);
-    for (const uint32_t other : leaves) {
-      for (size_t i = 0; i < own.size(); ++i) {
-        uint32_t lanes = tree.boxes(other).overlaps(boxes_[own[i]]);
-        if (other == leaf) lanes &= ~((2u << i) - 1);
-        if (lanes == 0) continue;
-        lanes &= ~fans[other].share(fans_[own[i]]);
-        for (; lanes != 0; lanes &= lanes - 1) {
-          const uint32_t j = tree.leaf(other)[std::countr_zero(lanes)];
-          pairs.push_back({faces_[std::min(own[i], j)], faces_[std::max(own[i], j)]});
-        }
-      }
     }
   }
 

@@ -53,17 +53,17 @@ struct EdgeForest::Impl {
     prepared.any_direction = !config.normal_speed;
     return prepared;
   }
-  // Valid until this thread opens another query.
-  const OpenNodes& open(const ForestQuery& query) const {
-    static thread_local OpenNodes nodes;
-    nodes.open(forest, config, query);
+  // Valid until this thread expands another query.
+  const ExpandedNodes& expand(const ForestQuery& query) const {
+    static thread_local ExpandedNodes nodes;
+    nodes.expand(forest, config, query);
     return nodes;
   }
 
   // Ready to draw; valid until this thread starts another query.
   ForestWalk& walk(const ForestQuery& query) const {
     static thread_local ForestWalk walk;
-    walk.begin(forest, config, query, open(query));
+    walk.begin(forest, config, query, expand(query));
     return walk;
   }
   // Tests the edge at the end of a descent, and samples a point on it.
@@ -87,23 +87,23 @@ struct EdgeForest::Impl {
   // A node with its probability for one query, and its index among expanded nodes, if any.
   struct Reached {
     double probability;
-    int opened;
+    int expanded;
   };
   // Descends to a child. Probabilities are multiplied from the root on, as in `draw`, with the same
   // bits.
-  Reached reach(NodeId id, int lane, const ForestQuery& query, const OpenNodes& nodes) const {
+  Reached reach(NodeId id, int lane, const ForestQuery& query, const ExpandedNodes& nodes) const {
     const uint32_t parent = forest.head(id).parent;
     const bool is_root = parent == kNoParent;
     const Reached here = is_root ? Reached{1, nodes.find_root(id)}
                                  : reach(static_cast<NodeId>(parent / kWidth),
                                          static_cast<int>(parent % kWidth), query, nodes);
-    if (here.probability == 0) return {0, OpenNodes::kClosed};
-    const bool is_open = here.opened != OpenNodes::kClosed;
+    if (here.probability == 0) return {0, ExpandedNodes::kNotExpanded};
+    const bool is_expanded = here.expanded != ExpandedNodes::kNotExpanded;
     const Choice choice =
-        is_open ? nodes.choice(here.opened) : choice_at(forest, config, query, id);
+        is_expanded ? nodes.choice(here.expanded) : choice_at(forest, config, query, id);
     const double scale = is_root ? nodes.total() : choice.total;
     return {scale > 0 ? here.probability * (choice.weights[lane] / scale) : 0,
-            is_open ? nodes.child(here.opened, lane) : OpenNodes::kClosed};
+            is_expanded ? nodes.child(here.expanded, lane) : ExpandedNodes::kNotExpanded};
   }
 
   // Exact test of a drawn edge; most pass without access to the mesh.
@@ -180,7 +180,7 @@ double EdgeForest::probability(const EdgeQuery& query, EdgeRef id) const {
   const ForestQuery prepared = impl_->prepare(query);
   if (!impl_->accepts(query, prepared.point, node, lane)) return 0;
   if (!impl_->seen_edge(prepared.lobe, query.p, node, lane).is_seen()) return 0;
-  return impl_->reach(~static_cast<NodeId>(slot / kWidth), lane, prepared, impl_->open(prepared))
+  return impl_->reach(~static_cast<NodeId>(slot / kWidth), lane, prepared, impl_->expand(prepared))
       .probability;
 }
 

@@ -15,7 +15,7 @@ constexpr double kNarrow = 50;
 // Node expansion: children are expanded if their weight may be too small by this factor, and by
 // this share of the total. With 3, 0.3 and twelve nodes errors are equal within noise, and runs
 // take a tenth longer.
-constexpr float kDoubtful = 6;
+constexpr float kUncertain = 6;
 constexpr double kShare = 1;
 // Children with two-level importance use the weights of all their own children if their weight may
 // be too small by this factor. Without it, error times time is 1.4 times as high for the harp and
@@ -71,76 +71,78 @@ int Choice::draw(double& u) const {
 }
 
 Choice choice_at(const Forest& forest, const ForestConfig& config, const ForestQuery& query,
-                 NodeId id, Floats* doubt) {
+                 NodeId id, Floats* uncertainty) {
   forest.fetch(id);  // all cache lines at once
   if (id < 0) {
-    if (doubt) *doubt = Floats{};
+    if (uncertainty) *uncertainty = Floats{};
     return {id, weigh_edges(forest.edges[~id], query)};
   }
   const InnerNode& node = forest.inner[id];
-  Floats doubts{};
-  ChildWeights children =
-      weigh_children(node, query, config.soft_weights, config.most_open > 0 ? &doubts : nullptr);
+  Floats uncertainties{};
+  ChildWeights children = weigh_children(node, query, config.soft_weights,
+                                         config.most_open > 0 ? &uncertainties : nullptr);
   look_ahead(forest, config, node, query.point, children);
   Floats weights = children.product();
-  const Ints far_off = (weights > 0) & (doubts > kFarOff);
+  const Ints far_off = (weights > 0) & (uncertainties > kFarOff);
   for (uint32_t lanes = bits(far_off) & node.ahead; lanes != 0; lanes &= lanes - 1) {
     const int lane = std::countr_zero(lanes);
     const NodeId child = node.child[lane];
     if (child < 0) {
       weights[lane] = sum(weigh_edges(forest.edges[~child], query));
-      doubts[lane] = 0;
+      uncertainties[lane] = 0;
     } else {
       weights[lane] =
           sum(weigh_children(forest.inner[child], query, config.soft_weights).product());
     }
   }
-  if (doubt) *doubt = doubts;
+  if (uncertainty) *uncertainty = uncertainties;
   return {id, weights};
 }
 
-bool OpenNodes::Doubt::operator<(const Doubt& other) const {
+bool ExpandedNodes::Uncertainty::operator<(const Uncertainty& other) const {
   return std::tie(amount, other.node, other.lane) < std::tie(other.amount, node, lane);
 }
 
-const Choice& OpenNodes::add(const Trees& trees, NodeId id, int parent, int lane) {
-  Floats doubt;
+const Choice& ExpandedNodes::add(const Trees& trees, NodeId id, int parent, int lane) {
+  Floats uncertainty;
   const int index = static_cast<int>(nodes_.size());
   Node& node = nodes_.emplace_back();
-  node.choice = choice_at(trees.forest, trees.config, trees.query, id, &doubt);
-  std::fill(std::begin(node.open), std::end(node.open), kClosed);
+  node.choice = choice_at(trees.forest, trees.config, trees.query, id, &uncertainty);
+  std::fill(std::begin(node.expanded), std::end(node.expanded), kNotExpanded);
   node.parent = parent;
   node.lane = lane;
   for (int i = 0; i < kWidth; ++i) {
     const double weight = node.choice.weights[i];
-    if (!(weight > 0) || !(doubt[i] > kDoubtful)) continue;
-    doubts_.push_back({weight * (doubt[i] - 1.0), index, i});
-    std::push_heap(doubts_.begin(), doubts_.end());
+    if (!(weight > 0) || !(uncertainty[i] > kUncertain)) continue;
+    uncertain_.push_back({weight * (uncertainty[i] - 1.0), index, i});
+    std::push_heap(uncertain_.begin(), uncertain_.end());
   }
   return node.choice;
 }
 
-void OpenNodes::open(const Forest& forest, const ForestConfig& config, const ForestQuery& query) {
+void ExpandedNodes::expand(const Forest& forest, const ForestConfig& config,
+                           const ForestQuery& query) {
   const Trees trees{forest, config, query};
   nodes_.clear();
-  doubts_.clear();
+  uncertain_.clear();
   double sum = 0;
-  for (const NodeId root : forest.roots) sum += add(trees, root, kClosed, 0).total;
+  for (const NodeId root : forest.roots) sum += add(trees, root, kNotExpanded, 0).total;
   roots_ = nodes_.size();
   const int most = query.lobe.det() > kNarrow ? config.most_open : 0;
-  const auto child_of = [&](const Doubt& doubt) {
-    return forest.inner[choice(doubt.node).node].child[doubt.lane];
+  const auto child_of = [&](const Uncertainty& uncertainty) {
+    return forest.inner[choice(uncertainty.node).node].child[uncertainty.lane];
   };
-  for (int i = 0; i < most && !doubts_.empty(); ++i) {
-    const Doubt doubt = doubts_.front();
-    if (!(doubt.amount > kShare * sum)) break;
-    std::pop_heap(doubts_.begin(), doubts_.end());
-    doubts_.pop_back();
-    if (!doubts_.empty()) forest.fetch(child_of(doubts_.front()));  // probably expanded next
-    sum -= choice(doubt.node).weights[doubt.lane];
-    const NodeId child = child_of(doubt);
-    nodes_[static_cast<size_t>(doubt.node)].open[doubt.lane] = static_cast<int>(nodes_.size());
-    sum += add(trees, child, doubt.node, doubt.lane).total;
+  for (int i = 0; i < most && !uncertain_.empty(); ++i) {
+    const Uncertainty uncertainty = uncertain_.front();
+    if (!(uncertainty.amount > kShare * sum)) break;
+    std::pop_heap(uncertain_.begin(), uncertain_.end());
+    uncertain_.pop_back();
+    if (!uncertain_.empty()) forest.fetch(child_of(uncertain_.front()));  // probably expanded next
+    sum -= choice(uncertainty.node).weights[uncertainty.lane];
+    const NodeId child = child_of(uncertainty);
+    nodes_[static_cast<size_t>(uncertainty.node)].expanded[uncertainty.lane] =
+        static_cast<int>(nodes_.size());
+    sum += add(trees, child, uncertainty.node, uncertainty.lane).total;
   }
   for (size_t i = nodes_.size(); i-- > roots_;) {
     nodes_[static_cast<size_t>(nodes_[i].parent)].choice.set(nodes_[i].lane,
@@ -150,7 +152,7 @@ void OpenNodes::open(const Forest& forest, const ForestConfig& config, const For
   for (size_t i = 0; i < roots_; ++i) total_ += nodes_[i].choice.total;
 }
 
-int OpenNodes::draw_root(double& u) const {
+int ExpandedNodes::draw_root(double& u) const {
   double rest = u * total_, weight = 0;
   int root = 0;
   for (size_t i = 0; i < roots_; ++i) {
@@ -164,18 +166,18 @@ int OpenNodes::draw_root(double& u) const {
   return root;
 }
 
-int OpenNodes::find_root(NodeId id) const {
+int ExpandedNodes::find_root(NodeId id) const {
   int root = 0;
   while (nodes_[static_cast<size_t>(root)].choice.node != id) ++root;
   return root;
 }
 
 void ForestWalk::begin(const Forest& forest, const ForestConfig& config, const ForestQuery& query,
-                       const OpenNodes& open) {
+                       const ExpandedNodes& expanded) {
   forest_ = &forest;
   config_ = &config;
   query_ = &query;
-  open_ = &open;
+  expanded_ = &expanded;
   for (Choice& known : way_) known.node = kNoChild;
 }
 
@@ -189,10 +191,10 @@ const Choice& ForestWalk::choice(size_t depth, NodeId id) {
 
 ForestWalk::End ForestWalk::draw(double u) {
   End end;
-  if (!(open_->total() > 0)) return end;
-  int opened = open_->draw_root(u);
-  const Choice* choice = &open_->choice(opened);
-  double scale = open_->total();
+  if (!(expanded_->total() > 0)) return end;
+  int expanded = expanded_->draw_root(u);
+  const Choice* choice = &expanded_->choice(expanded);
+  double scale = expanded_->total();
   for (size_t depth = 0;; ++depth) {
     const int lane = choice->draw(u);
     end.probability *= choice->weights[lane] / scale;
@@ -203,8 +205,9 @@ ForestWalk::End ForestWalk::draw(double u) {
       return end;
     }
     const NodeId child = forest_->inner[choice->node].child[lane];
-    if (opened != OpenNodes::kClosed) opened = open_->child(opened, lane);
-    choice = opened != OpenNodes::kClosed ? &open_->choice(opened) : &this->choice(depth, child);
+    if (expanded != ExpandedNodes::kNotExpanded) expanded = expanded_->child(expanded, lane);
+    choice = expanded != ExpandedNodes::kNotExpanded ? &expanded_->choice(expanded)
+                                                     : &this->choice(depth, child);
     scale = choice->total;
     if (!(scale > 0)) return end;
   }

@@ -26,41 +26,41 @@ struct Choice {
   void add_up();
 };
 
-// Weights the children, with two-level importance as configured. doubt: see weigh_children, for
+// Weights the children, with two-level importance as configured. uncertainty: see weigh_children, for
 // inner nodes; zero for edges.
 Choice choice_at(const Forest& forest, const ForestConfig& config, const ForestQuery& query,
-                 NodeId id, Floats* doubt = nullptr);
+                 NodeId id, Floats* uncertainty = nullptr);
 
 // The expanded nodes at the top of the trees for one query. The weight of a wide box is uncertain
 // if a narrow lobe may miss most of its content, or if p is near. The most uncertain children are
 // expanded first, and get the total weight of their own children. A function of the query alone.
-class OpenNodes {
+class ExpandedNodes {
  public:
   // Expands nodes for a new query. Reuses memory.
-  void open(const Forest& forest, const ForestConfig& config, const ForestQuery& query);
+  void expand(const Forest& forest, const ForestConfig& config, const ForestQuery& query);
 
   // Total weight over all trees.
   double total() const { return total_; }
   // Draws a root by u, which is rescaled to be uniform again; total() > 0.
   int draw_root(double& u) const;
   const Choice& choice(int node) const { return nodes_[static_cast<size_t>(node)].choice; }
-  static constexpr int kClosed = -1;
-  // The expanded node of a child, or kClosed.
-  int child(int node, int lane) const { return nodes_[static_cast<size_t>(node)].open[lane]; }
+  static constexpr int kNotExpanded = -1;
+  // The expanded node of a child, or kNotExpanded.
+  int child(int node, int lane) const { return nodes_[static_cast<size_t>(node)].expanded[lane]; }
   // A root; roots are always expanded.
   int find_root(NodeId id) const;
 
  private:
   struct Node {
     Choice choice;
-    int open[kWidth];
+    int expanded[kWidth];
     int parent, lane;
   };
   // A child whose weight may be too small, by up to about this amount.
-  struct Doubt {
+  struct Uncertainty {
     double amount;
     int node, lane;
-    bool operator<(const Doubt& other) const;
+    bool operator<(const Uncertainty& other) const;
   };
   struct Trees {
     const Forest& forest;
@@ -70,7 +70,7 @@ class OpenNodes {
   const Choice& add(const Trees& trees, NodeId id, int parent, int lane);
 
   std::vector<Node> nodes_;  // roots first, parents before children
-  std::vector<Doubt> doubts_;
+  std::vector<Uncertainty> uncertain_;
   size_t roots_ = 0;
   double total_ = 0;
 };
@@ -91,7 +91,7 @@ class ForestWalk {
   };
   // Keeps references to all arguments.
   void begin(const Forest& forest, const ForestConfig& config, const ForestQuery& query,
-             const OpenNodes& open);
+             const ExpandedNodes& expanded);
   // By the uniform number u.
   End draw(double u);
 
@@ -101,7 +101,7 @@ class ForestWalk {
   const Forest* forest_ = nullptr;
   const ForestConfig* config_ = nullptr;
   const ForestQuery* query_ = nullptr;
-  const OpenNodes* open_ = nullptr;
+  const ExpandedNodes* expanded_ = nullptr;
   std::vector<Choice> way_;  // choices of the last descent, by depth
 };
 

@@ -89,10 +89,6 @@ struct Forest {
   // [object][edge]: kWidth * edge node + index of the child, or kNoParent.
   std::vector<std::vector<uint32_t>> slots;
 
-  // Describes a violated invariant over the edges of `objects`; empty if all hold: unique parents
-  // and slots, boxes that hold their content, normalised rows.
-  std::string validate(std::span<const EdgeMesh> objects) const;
-
   // Prefetches the cache lines of a node.
   void fetch(NodeId id) const {
     const void* node = id < 0 ? static_cast<const void*>(&edges[~id]) : &inner[id];

@@ -474,7 +474,7 @@ Floats ChildWeights::product() const {
 }
 
 ChildWeights weigh_children(const InnerNode& node, const ForestQuery& query, bool soft,
-                            Floats* doubt) {
+                            Floats* uncertainty) {
   const FramePoint at = to_frame(node.head, query.point);
   const DualPlane plane = dual_plane(node, at);
   const Floats length = length_of(node, query.point, at, plane, soft);
@@ -494,9 +494,9 @@ ChildWeights weigh_children(const InnerNode& node, const ForestQuery& query, boo
     query.forest.fetch(node.child[std::countr_zero(lanes)]);
   const Floats lobe = query.lobe.mean_over_boxes(d, half);
   const Floats rest = speed / distance2 * light_through(query, lobe, d, half, distance2, alive);
-  if (doubt) {
+  if (uncertainty) {
     const Floats most = query.lobe.most_in_boxes(d, half) / max(lobe, splat(kLeast));
-    *doubt = most * max(distance2 / nearest2_of(d, half), splat(1.0f));
+    *uncertainty = most * max(distance2 / nearest2_of(d, half), splat(1.0f));
   }
   return {length, select(alive, max(rest, splat(kLeast)), splat(0.0f))};
 }

@@ -78,10 +78,10 @@ struct ChildWeights {
   Floats rest;    // speed, distance, lobe and light; 0 if rejected
   Floats product() const;
 };
-// doubt (optional): uncertainty, about the factor by which `rest` may be too small, since lobe and
+// uncertainty (optional): uncertainty, about the factor by which `rest` may be too small, since lobe and
 // distance vary over the box; below some hundreds.
 ChildWeights weigh_children(const InnerNode& node, const ForestQuery& query, bool soft,
-                            Floats* doubt = nullptr);
+                            Floats* uncertainty = nullptr);
 // Total expected length over all children, over the squared radius given by
 // `inverse_radius`.
 float length_below(const InnerNode& node, const ForestPoint& point, bool soft,

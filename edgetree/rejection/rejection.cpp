@@ -158,8 +158,8 @@ std::vector<EdgeQuery> queries_around(const EdgeMesh& mesh, int count, uint64_t 
   return queries;
 }
 
-HitRate hit_rate(const EdgeSampler& sampler, std::span<const EdgeQuery> queries, int draws,
-                 uint64_t seed, int threads) {
+AcceptanceRate acceptance_rate(const EdgeSampler& sampler, std::span<const EdgeQuery> queries,
+                               int draws, uint64_t seed, int threads) {
   std::vector<double> shares(queries.size());
   parallel_for(queries.size(), threads, [&](size_t i) {
     Rng rng(seed, i, 0);

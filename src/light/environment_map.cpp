@@ -54,7 +54,7 @@ void EnvironmentMap::fetch_texels(int column, int row) const {
   });
 }
 
-void EnvironmentMap::fetch_texels(const Place<wide::Doubles>& place) const {
+void EnvironmentMap::fetch_texels(const Point<wide::Doubles>& place) const {
   using wide::Ints, wide::Mask;
   const Ints columns = wide::min(wide::truncated(place.x), Ints{} + (width_ - 1));
   const Ints rows = wide::min(wide::truncated(place.y), Ints{} + (height_ - 2));
@@ -74,19 +74,19 @@ EnvironmentMap::Drawn EnvironmentMap::sample(const wide::Doubles& u1,
   const auto [x, cos_theta, pdf] = density_->sample(u1, u2);
   const Doubles sin_theta = sqrt(wide::max(1 - cos_theta * cos_theta, 0));
   const auto [sine, cosine] = sin_cos_of_turns((x + 0.5) * (1.0 / width_));
-  const Place<Doubles> place{select(x < width_, x, 0),
+  const Point<Doubles> place{select(x < width_, x, 0),
                              angle_of(sin_theta, cos_theta) * ((height_ - 1) / kPi)};
   fetch_texels(place);
   return {{sine * sin_theta, cos_theta, -cosine * sin_theta}, place, pdf};
 }
 
-void EnvironmentMap::fetch(const Place<double>& place) const {
+void EnvironmentMap::fetch(const Point<double>& place) const {
   const int column = column_of(place.x), row = row_of(place.y);
   fetch_texels(column, row);
   density_->fetch(column, row);
 }
 
-double EnvironmentMap::pdf_solid_angle(const Place<double>& place, const Vec3d& d) const {
+double EnvironmentMap::pdf_solid_angle(const Point<double>& place, const Vec3d& d) const {
   return density_->pdf(column_of(place.x), row_of(place.y), place.x, d.y);
 }
 
@@ -100,7 +100,7 @@ Image EnvironmentMap::texels() const {
   return image;
 }
 
-std::array<Environment::TexelWeight, 4> EnvironmentMap::weights(const Place<double>& place) const {
+std::array<Environment::TexelWeight, 4> EnvironmentMap::weights(const Point<double>& place) const {
   const int column = column_of(place.x), row = row_of(place.y), next = next_column(column);
   const double s = place.x - column, t = place.y - row;
   const auto at = [&](int x, int y) { return static_cast<uint32_t>(index(x, y)); };

@@ -35,32 +35,32 @@ class EnvironmentMap {
   // Map coordinates of a direction: columns to the right of the center of column 0, in [0, W); rows
   // below row 0, in [0, H - 1].
   template <class S>
-  struct Place {
+  struct Point {
     S x, y;
   };
   template <class S>
-  Place<S> locate(const Vec3<S>& d) const;
+  Point<S> locate(const Vec3<S>& d) const;
   template <class S>
-  Rgb<S> radiance(const Place<S>& place) const;
+  Rgb<S> radiance(const Point<S>& place) const;
   // Prefetches the data that `radiance` and `pdf_solid_angle` will read.
-  void fetch(const Place<double>& place) const;
+  void fetch(const Point<double>& place) const;
 
   // Eight samples. The density follows the luminance of the texels' absolute values: it is
   // positive wherever radiance is not zero, negative texels included. An all-black map is sampled
   // uniformly.
   struct Drawn {
     wide::Vec direction;
-    Place<wide::Doubles> place;
+    Point<wide::Doubles> place;
     wide::Doubles pdf;  // [1/sr]
   };
   // Also prefetches the texels.
   Drawn sample(const wide::Doubles& u1, const wide::Doubles& u2) const;
   // place: of d. Density with respect to solid angle [1/sr].
-  double pdf_solid_angle(const Place<double>& place, const Vec3d& d) const;
+  double pdf_solid_angle(const Point<double>& place, const Vec3d& d) const;
 
   // Texels and texel weights as in Environment.
   Image texels() const;
-  std::array<Environment::TexelWeight, 4> weights(const Place<double>& place) const;
+  std::array<Environment::TexelWeight, 4> weights(const Point<double>& place) const;
 
   // Exact mean of the luminance of `radiance` over the sphere.
   double mean_luminance() const;
@@ -84,7 +84,7 @@ class EnvironmentMap {
     return f(std::get<1>(texels_).data());
   }
   void fetch_texels(int column, int row) const;
-  void fetch_texels(const Place<wide::Doubles>& place) const;
+  void fetch_texels(const Point<wide::Doubles>& place) const;
   int next_column(int column) const { return column + 1 == width_ ? 0 : column + 1; }
   double polar_angle(int row) const { return kPi * row / (height_ - 1); }
   template <class Number>
@@ -101,7 +101,7 @@ class EnvironmentMap {
 };
 
 template <class S>
-EnvironmentMap::Place<S> EnvironmentMap::locate(const Vec3<S>& d) const {
+EnvironmentMap::Point<S> EnvironmentMap::locate(const Vec3<S>& d) const {
   using std::sqrt;
   const S x = angle_of(d.x, -d.z) * (width_ / (2 * kPi)) - 0.5;
   const S y = angle_of(sqrt(d.x * d.x + d.z * d.z), d.y) * ((height_ - 1) / kPi);
@@ -113,7 +113,7 @@ EnvironmentMap::Place<S> EnvironmentMap::locate(const Vec3<S>& d) const {
 }
 
 template <class S>
-Rgb<S> EnvironmentMap::radiance(const Place<S>& place) const {
+Rgb<S> EnvironmentMap::radiance(const Point<S>& place) const {
   const int column = column_of(value(place.x));
   const int row = row_of(value(place.y));
   const S s = place.x - static_cast<double>(column);

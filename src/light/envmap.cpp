@@ -90,13 +90,13 @@ class MapEnvironment final : public Environment {
     return map_->radiance<double>({sample.place[0], sample.place[1]}) * scale_.v;
   }
   Rgb<Dual> drawn_dual(const LightSample& sample) const override {
-    const EnvironmentMap::Place<double> place{sample.place[0], sample.place[1]};
+    const EnvironmentMap::Point<double> place{sample.place[0], sample.place[1]};
     return moving(place, map_->radiance<double>(place) * scale_);
   }
   static constexpr const char* kChanged = ", changed";
 
   // Adds the derivatives with respect to texels.
-  Rgb<Dual> moving(const EnvironmentMap::Place<double>& place, Rgb<Dual> radiance) const {
+  Rgb<Dual> moving(const EnvironmentMap::Point<double>& place, Rgb<Dual> radiance) const {
     if (!texels_move_) return radiance;
     for (int lane = 0; lane < kLanes; ++lane) {
       if (!tangents_[static_cast<size_t>(lane)]) continue;
@@ -106,7 +106,7 @@ class MapEnvironment final : public Environment {
     return radiance;
   }
   template <class S>
-  void look(const Vec3d& d, const EnvironmentMap::Place<double>& place, const S& scale,
+  void look(const Vec3d& d, const EnvironmentMap::Point<double>& place, const S& scale,
             Sight<S>& sight) const {
     DCHECK(is_place(d, {place.x, place.y}));
     sight.radiance = map_->radiance(place) * scale;

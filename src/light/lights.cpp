@@ -45,16 +45,16 @@ Lights::Lights(const Scene& scene, const Lights* chosen_by)
   if (environment_) all_.push_back(environment_);
   for (const auto& light : scene.delta_lights) all_.push_back(light.get());
   of_any_ = 1 / static_cast<double>(std::max<size_t>(1, all_.size()));
-  for (const auto& lamp : area_lights_) reaches_.push_back(reach_of(*lamp));
+  for (const auto& light : area_lights_) reaches_.push_back(reach_of(*light));
   if (environment_) {
     Reach& reach = reaches_.emplace_back();
     reach.constant = kPi * std::fabs(environment_->mean_luminance());
   }
 }
 
-Lights::Reach Lights::reach_of(const Light& lamp) {
+Lights::Reach Lights::reach_of(const Light& light) {
   std::vector<LightTriangle> triangles;
-  lamp.add_triangles(triangles);
+  light.add_triangles(triangles);
   Reach reach;
   double area = 0;
   for (const LightTriangle& triangle : triangles) {

@@ -81,8 +81,8 @@ void read_spot(Properties& properties, Scene& scene, Shape*) {
   const double beam = properties.number("beam_width", 0.75 * cutoff);
   if (!(beam >= 0 && beam < cutoff)) {
     properties.fail("beam_width",
-                    "must be at least 0 and less than cutoff_angle: a rim that is sharp moves "
-                    "without a term for it");
+                    "must be at least 0 and less than cutoff_angle: derivatives have no term for "
+                    "a cone with a sharp boundary");
   }
   Vec3d axes[3];
   read_axes(properties, "a spot", axes);

@@ -233,9 +233,8 @@ Mesh build_mesh(const RawMesh& raw, const MeshOptions& options,
   if (const size_t cancelled = fill_shading_normals(mesh); cancelled > 0) {
     warn(warnings, raw.where,
          "at " + std::to_string(cancelled) +
-             " vertices the normals of the faces around cancel: one of them serves, and its "
-             "derivative "
-             "says nothing of the others");
+             " vertices the normals of adjacent faces cancel: the normal of one face is used, and "
+             "the derivative ignores the others");
   }
   return mesh;
 }

@@ -135,11 +135,11 @@ void warn_of_copies(const Scene& scene, const FaceCopies& copies,
   for (const auto& [shapes, count] : counts) {
     warnings.push_back(format_warning(scene.shape(shapes.second).where,
                                       std::to_string(count) + " faces of " + name(shapes.second) +
-                                          " are in the place of faces of " + name(shapes.first) +
-                                          ": an emitter's are seen, else those of " +
+                                          " coincide with faces of " + name(shapes.first) +
+                                          ": those of an emitter are visible, else those of " +
                                           name(shapes.first) +
-                                          "; as one of the two moves alone the image has a kink, "
-                                          "and its derivative is one-sided"));
+                                          "; if one of the two moves alone the image is not "
+                                          "differentiable, and the derivative is one-sided"));
   }
 }
 

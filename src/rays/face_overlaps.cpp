@@ -133,22 +133,19 @@ class OverlapFinder {
   }
 
   std::vector<FoundPair> find(int threads) {
-    const BoxTree tree(boxes_, threads);
-    constexpr uint32_t kBlock = 256;  // leaves; not tuned
-    std::vector<std::vector<FoundPair>> found((tree.leaf_count() + kBlock - 1) / kBlock);
-    parallel_for(found.size(), threads, [&](size_t block) {
-      std::vector<uint32_t> leaves;
-      const auto begin = static_cast<uint32_t>(block) * kBlock;
-      for (uint32_t leaf = begin; leaf < std::min(begin + kBlock, tree.leaf_count()); ++leaf)
-        append_pairs_of(tree, leaf, leaves, found[block]);
-    });
-    std::vector<FoundPair> pairs;
-    for (const auto& some : found) pairs.insert(pairs.end(), some.begin(), some.end());
-    return pairs;
+    return BoxTree(boxes_, threads)
+        .find_pairs<FoundPair>(
+            threads, [](uint32_t, uint32_t) { return 0u; },
+            [&](uint32_t i, uint32_t j, std::vector<FoundPair>& pairs) {
+              const Relation relation = relation_of(faces_[i], faces_[j]);
+              if (relation == Relation::kApart) return;
+              pairs.push_back({{faces_[i].ref, faces_[j].ref}, relation == Relation::kNear});
+              check_count(++count_);
+            });
   }
 
  private:
-  enum class Place { kElsewhere, kInPlane, kNear };
+  enum class Relation { kApart, kCoplanar, kNear };
   // A face with nonzero area.
   struct Face {
     FaceRef ref;
@@ -164,47 +161,27 @@ class OverlapFinder {
     boxes_.reserve(count);
   }
 
-  static Place place_of(const Face& a, const Face& b) {
+  static Relation relation_of(const Face& a, const Face& b) {
     const double tolerance = touch_tolerance(a.size, b.size);
     const double reach = std::min({std::max(a.blur, b.blur), a.most, b.most});
     const auto in_plane = [](const Face& face, const Face& other, double distance) {
       return lies_in_plane(other.corners, face.corners[0], face.normal, distance);
     };
     const double near = std::max(reach, tolerance);
-    if (!in_plane(a, b, near) && !in_plane(b, a, near)) return Place::kElsewhere;
+    if (!in_plane(a, b, near) && !in_plane(b, a, near)) return Relation::kApart;
     const double most = kShortestTouch * tolerance;
     if (lies_beside(a.corners, a.normal, b.corners, most) ||
         lies_beside(b.corners, b.normal, a.corners, most))
-      return Place::kElsewhere;
-    if (in_plane(a, b, tolerance) && in_plane(b, a, tolerance)) return Place::kInPlane;
-    return reach > 0 ? Place::kNear : Place::kElsewhere;
+      return Relation::kApart;
+    if (in_plane(a, b, tolerance) && in_plane(b, a, tolerance)) return Relation::kCoplanar;
+    return reach > 0 ? Relation::kNear : Relation::kApart;
   }
 
-  // Appends pairs within the leaf, and with faces of later leaves.
-  void append_pairs_of(const BoxTree& tree, uint32_t leaf, std::vector<uint32_t>& leaves,
-                       std::vector<FoundPair>& pairs) {
-    tree.find_leaves(tree.leaf_box(leaf), leaf, leaves);
-    const auto own = tree.leaf(leaf);
-    const size_t before = pairs.size();
-    for (const uint32_t other : leaves) {
-      for (size_t i = 0; i < own.size(); ++i) {
-        uint32_t lanes = tree.boxes(other).overlaps(boxes_[own[i]]);
-        if (other == leaf) lanes &= ~((2u << i) - 1);
-        for (; lanes != 0; lanes &= lanes - 1) {
-          const uint32_t j = tree.leaf(other)[std::countr_zero(lanes)];
-          const Place place = place_of(faces_[own[i]], faces_[j]);
-          if (place == Place::kElsewhere) continue;
-          const auto [first, second] = std::minmax(own[i], j);
-          pairs.push_back({{faces_[first].ref, faces_[second].ref}, place == Place::kNear});
-        }
-      }
-    }
-    count_ += pairs.size() - before;
-    if (count_ > FaceOverlaps::kMostPairs) {
-      throw InputError("more than " + std::to_string(FaceOverlaps::kMostPairs) +
-                       " pairs of faces overlap in a plane, which is the limit: are shapes in the "
-                       "scene more than once?");
-    }
+  static void check_count(size_t count) {
+    if (count <= FaceOverlaps::kMostPairs) return;
+    throw InputError("more than " + std::to_string(FaceOverlaps::kMostPairs) +
+                     " pairs of faces overlap in a plane, which is the limit: are shapes in the "
+                     "scene more than once?");
   }
 
   std::vector<Face> faces_;      // in file order
@@ -382,8 +359,8 @@ void warn_of_overlaps(const Scene& scene, std::vector<std::string>& warnings) {
         std::to_string(count) + (count == 1 ? " pair" : " pairs") + " of faces of " +
             name_in_text(scene, a) + " and " + name_in_text(scene, b) +
             " overlap in a plane: those of " + name_in_text(scene, second ? b : a) +
-            " are seen there; as one of the two moves out of the plane alone the image jumps, "
-            "which no derivative tells"));
+            " are visible there; if one of the two moves out of the plane alone the image is "
+            "discontinuous, and no derivative accounts for it"));
   }
 }
 

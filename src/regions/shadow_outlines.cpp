@@ -52,7 +52,7 @@ void ShadowOutlines::clear() {
 }
 
 void ShadowOutlines::add(std::span<const Point> corners, std::span<const uint32_t> tags,
-                         bool of_lamp, uint32_t cancelled) {
+                         bool of_light, uint32_t cancelled) {
   Wide turn = 0;
   for (size_t i = 2; i < corners.size(); ++i) {
     turn += area<Wide>(corners[0], corners[i - 1], corners[i]);
@@ -73,14 +73,14 @@ void ShadowOutlines::add(std::span<const Point> corners, std::span<const uint32_
       sides_.push_back(edge);
     }
     Edge& sums = sides_[slot];
-    (of_lamp ? sums.lamp : sums.cover) += change;
+    (of_light ? sums.light : sums.cover) += change;
     if (2 * sides_.size() > table_.size()) grow();
   }
 }
 
 // Adds the winding numbers that t contributes at the first end of s, and the events where t meets
 // s. later: the side that counts as upper if both lie on one line.
-void ShadowOutlines::compare(const Edge& s, uint32_t index, bool later, int& lamp, int& cover) {
+void ShadowOutlines::compare(const Edge& s, uint32_t index, bool later, int& light, int& cover) {
   const Edge& t = edges_[index];
   if (t.q <= s.p || s.q <= t.p) return;
   const bool spans_start = t.p <= s.p;
@@ -88,19 +88,19 @@ void ShadowOutlines::compare(const Edge& s, uint32_t index, bool later, int& lam
   const auto [t_low, t_high] = std::minmax(t.p.y, t.q.y);
   if (t_high < s_low) return;
   if (t_low > s_high) {
-    if (spans_start) lamp += t.lamp, cover += t.cover;
+    if (spans_start) light += t.light, cover += t.cover;
     return;
   }
   if (s.narrow && t.narrow) {
-    compare_ends<int64_t>(s, index, later, lamp, cover);
+    compare_ends<int64_t>(s, index, later, light, cover);
   } else {
-    compare_ends<Wide>(s, index, later, lamp, cover);
+    compare_ends<Wide>(s, index, later, light, cover);
   }
 }
 
 // compare() for sides of which neither is entirely above the other.
 template <class Integer>
-void ShadowOutlines::compare_ends(const Edge& s, uint32_t index, bool later, int& lamp,
+void ShadowOutlines::compare_ends(const Edge& s, uint32_t index, bool later, int& light,
                                   int& cover) {
   const Edge& t = edges_[index];
   const bool spans_start = t.p <= s.p;
@@ -117,7 +117,7 @@ void ShadowOutlines::compare_ends(const Edge& s, uint32_t index, bool later, int
   };
   const bool begins = is_above(sign(at_p), sign(at_q), spans_start, p_of_t, q_of_t);
   const bool ends = is_above(sign(at_q), sign(at_p), s.q <= t.q, q_of_t, p_of_t);
-  if (spans_start && begins) lamp += t.lamp, cover += t.cover;
+  if (spans_start && begins) light += t.light, cover += t.cover;
   // Events at ends of t that lie on s.
   const auto along = [&](const Point& x) {
     const double dx = static_cast<double>(s.q.x - s.p.x), dy = static_cast<double>(s.q.y - s.p.y);
@@ -125,15 +125,15 @@ void ShadowOutlines::compare_ends(const Edge& s, uint32_t index, bool later, int
            (dx * dx + dy * dy);
   };
   if (s.p < t.p && p_of_t == 0 && begins) {
-    events_.push_back({along(t.p), index, Kind::kFirst, t.lamp, t.cover});
+    events_.push_back({along(t.p), index, Kind::kFirst, t.light, t.cover});
   }
   if (begins != ends) {
     const double a = static_cast<double>(at_p), b = static_cast<double>(at_q);
     const int up = ends ? 1 : -1;
-    events_.push_back({a / (a - b), index, Kind::kCrossing, up * t.lamp, up * t.cover});
+    events_.push_back({a / (a - b), index, Kind::kCrossing, up * t.light, up * t.cover});
   }
   if (t.q < s.q && q_of_t == 0 && ends) {
-    events_.push_back({along(t.q), index, Kind::kSecond, -t.lamp, -t.cover});
+    events_.push_back({along(t.q), index, Kind::kSecond, -t.light, -t.cover});
   }
 }
 
@@ -163,7 +163,7 @@ void ShadowOutlines::for_each(const std::function<void(const Piece&)>& visit) {
   edges_.clear();
   for (auto* bounds : {&bounds_.x0, &bounds_.x1, &bounds_.y0, &bounds_.y1}) bounds->clear();
   for (const Edge& side : sides_) {
-    if (side.lamp == 0 && side.cover == 0) continue;
+    if (side.light == 0 && side.cover == 0) continue;
     edges_.push_back(side);
     bounds_.x0.push_back(static_cast<float>(side.p.x));
     bounds_.x1.push_back(static_cast<float>(side.q.x));
@@ -172,16 +172,16 @@ void ShadowOutlines::for_each(const std::function<void(const Piece&)>& visit) {
   }
   for (uint32_t i = 0; i < edges_.size(); ++i) {
     const Edge& s = edges_[i];
-    int lamp = 0, cover = 0;  // above it
+    int light = 0, cover = 0;  // above it
     events_.clear();
     find_candidates(i);
-    for (const uint32_t j : candidates_) compare(s, j, j > i, lamp, cover);
+    for (const uint32_t j : candidates_) compare(s, j, j > i, light, cover);
     std::stable_sort(events_.begin(), events_.end(),
                      [](const Event& a, const Event& b) { return a.at < b.at; });
     End from{s.tag, Kind::kFirst, s.p};
     const auto finish = [&](const End& to) {
-      const bool above = lamp > 0 && cover == 0;
-      const bool below = lamp + s.lamp > 0 && cover + s.cover == 0;
+      const bool above = light > 0 && cover == 0;
+      const bool below = light + s.light > 0 && cover + s.cover == 0;
       if (above != below) visit({s.tag, s.p, s.q, from, to, above});
       from = to;
     };
@@ -194,7 +194,7 @@ void ShadowOutlines::for_each(const std::function<void(const Piece&)>& visit) {
               event.kind == Kind::kFirst    ? t.p
               : event.kind == Kind::kSecond ? t.q
                                             : Point{at(s.p.x, s.q.x), at(s.p.y, s.q.y)}});
-      lamp += event.lamp;
+      light += event.light;
       cover += event.cover;
     }
     finish({s.tag, Kind::kSecond, s.q});

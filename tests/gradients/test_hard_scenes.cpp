@@ -164,7 +164,7 @@ TEST_F(Copies, AreWarnedOf) {
   std::vector<std::string> warnings;
   read_scene(files.write("scene.xml", scene_text(parts)), {}, &warnings);
   ASSERT_EQ(warnings.size(), 1u);
-  EXPECT_NE(warnings[0].find("2 faces of \"two\" are in the place of faces of \"one\""),
+  EXPECT_NE(warnings[0].find("2 faces of \"two\" coincide with faces of \"one\""),
             std::string::npos)
       << warnings[0];
 }
@@ -330,7 +330,7 @@ TEST_F(OverlappingTiles, AreWarnedOfWhereTheyFaceTheSameWay) {
   const auto lines = warnings(first("") + second(""));
   ASSERT_EQ(lines.size(), 1u);
   EXPECT_NE(lines[0].find("pairs of faces of \"first\" and \"second\" overlap in a plane: those "
-                          "of \"first\" are seen there"),
+                          "of \"first\" are visible there"),
             std::string::npos)
       << lines[0];
   EXPECT_NE(warnings(first("") + second(area_light("b", "1, 1, 1")))[0].find("those of \"second\""),

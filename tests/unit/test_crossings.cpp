@@ -8,6 +8,7 @@
 
 #include "edgetree/forest/forest_build.h"
 #include "limn/edgetree/crossing_curves.h"
+#include "support/forest_fault.h"
 #include "support/meshes.h"
 
 namespace limn {
@@ -243,7 +244,7 @@ TEST(Crossings, AreEdges) {
   }
   const EdgeSamplerInput input{
       {build_edge_mesh(meshes[0], true), build_edge_mesh(meshes[1], true, ShapeId(1)), edges}};
-  EXPECT_EQ(build_forest(input, 2, {}).validate(input.objects), "");
+  EXPECT_EQ(fault_of(build_forest(input, 2, {}), input.objects), "");
   EdgeMesh broken = edges;
   broken.incidences[3].through = false;
   EXPECT_EQ(broken.validate(), "edge 1: a face that crosses ends there");

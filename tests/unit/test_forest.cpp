@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "../support/forest_fault.h"
 #include "../support/hard_meshes.h"
 #include "../support/meshes.h"
 #include "../support/running_mean.h"
@@ -238,12 +239,12 @@ TEST(Forest, IsValidForAllMeshes) {
     for (const EdgeMesh& object : input.objects) EXPECT_EQ(object.validate(), "") << name;
     for (const uint32_t width : {2u, 5u, 8u}) {
       const Forest forest = build_forest(input, 2, ForestConfig{.width = width});
-      EXPECT_EQ(forest.validate(input.objects), "") << name;
+      EXPECT_EQ(fault_of(forest, input.objects), "") << name;
     }
   }
 }
 
-// Each change breaks one thing that validate names.
+// Each change breaks one invariant, which fault_of names.
 TEST(Forest, CorruptedCopiesAreFound) {
   using Change = void (*)(Forest&);
   const std::pair<const char*, Change> changes[] = {
@@ -287,11 +288,11 @@ TEST(Forest, CorruptedCopiesAreFound) {
   const EdgeMesh mesh = build_edge_mesh(with_smooth_normals(icosphere_mesh(2)), true);
   const EdgeSamplerInput input{{mesh, mesh}};
   const Forest whole = build_forest(input, 1, {});
-  ASSERT_EQ(whole.validate(input.objects), "");
+  ASSERT_EQ(fault_of(whole, input.objects), "");
   for (const auto& [fault, change] : changes) {
     Forest copy = whole;
     change(copy);
-    EXPECT_EQ(copy.validate(input.objects), fault);
+    EXPECT_EQ(fault_of(copy, input.objects), fault);
   }
 }
 

@@ -233,13 +233,13 @@ TEST_P(RejectingSamplers, HitRateIsTheSumOfProbabilities) {
       expected += sum / queries.size();
       variance += sum * (1 - sum) / (kDraws * queries.size() * queries.size());
     }
-    const HitRate hits = hit_rate(*sampler, queries, kDraws, 3, 2);
+    const AcceptanceRate hits = acceptance_rate(*sampler, queries, kDraws, 3, 2);
     // Where every draw hits, probabilities add up to 1 but for the rounding of each.
     const double rounding = static_cast<double>(input.objects[0].edges.size()) * 0x1.0p-50;
     EXPECT_LE(std::fabs(hits.mean - expected),
               kLargestZ * std::sqrt(std::max(variance, 0.0)) + rounding)
         << name;
-    EXPECT_EQ(hit_rate(*sampler, queries, kDraws, 3, 1).mean, hits.mean) << name;
+    EXPECT_EQ(acceptance_rate(*sampler, queries, kDraws, 3, 1).mean, hits.mean) << name;
   }
 }
 

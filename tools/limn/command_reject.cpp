@@ -251,7 +251,7 @@ class Rejection {
     v.reach = reach_from(input_, tree, point_);
     v.counts = count_reach(input_, tree, queries_, threads_);
     if (!go_on(0.8)) return std::nullopt;
-    v.hits = hit_rate(*method.sampler, queries_, kDraws, seed_, threads_);
+    v.hits = acceptance_rate(*method.sampler, queries_, kDraws, seed_, threads_);
     if (!go_on(0.95)) return std::nullopt;
     return method;
   }

@@ -1,9 +1,13 @@
 #pragma once
 // A bounding volume hierarchy over boxes that finds overlapping pairs.
+#include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <span>
 #include <vector>
+
+#include "limn/core/parallel.h"
 
 namespace limn {
 
@@ -44,6 +48,11 @@ class BoxTree {
   const LeafBoxes& boxes(uint32_t leaf) const { return packed_[leaf]; }
   // Sets `leaves` to the leaves >= `first` whose bounds overlap `box`, in ascending order.
   void find_leaves(const FloatBox& box, uint32_t first, std::vector<uint32_t>& leaves) const;
+  // Calls append(i, j, found) for the indices i < j of every pair of overlapping boxes, in parallel,
+  // and returns all that it appended to `found`; the order does not depend on `threads`. skip(i,
+  // leaf): bits of boxes in the leaf whose pairs with box i are omitted.
+  template <class Item, class Skip, class Append>
+  std::vector<Item> find_pairs(int threads, const Skip& skip, const Append& append) const;
 
  private:
   struct Item {
@@ -70,5 +79,32 @@ class BoxTree {
   std::vector<FloatBox> nodes_, leaf_boxes_;
   std::vector<LeafBoxes> packed_;
 };
+
+template <class Item, class Skip, class Append>
+std::vector<Item> BoxTree::find_pairs(int threads, const Skip& skip, const Append& append) const {
+  constexpr uint32_t kBlock = 256;  // leaves; not tuned
+  std::vector<std::vector<Item>> found((leaves_ + kBlock - 1) / kBlock);
+  parallel_for(found.size(), threads, [&](size_t block) {
+    std::vector<uint32_t> others;
+    const auto begin = static_cast<uint32_t>(block) * kBlock;
+    for (uint32_t own = begin; own < std::min(begin + kBlock, leaves_); ++own) {
+      find_leaves(leaf_box(own), own, others);
+      for (const uint32_t other : others)
+        for (size_t k = 0; k < leaf(own).size(); ++k) {
+          const uint32_t i = leaf(own)[k];
+          uint32_t bits = boxes(other).overlaps(boxes_[i]);
+          if (other == own) bits &= ~((2u << k) - 1);
+          if (bits != 0) bits &= ~skip(i, other);
+          for (; bits != 0; bits &= bits - 1) {
+            const uint32_t j = leaf(other)[static_cast<size_t>(std::countr_zero(bits))];
+            append(std::min(i, j), std::max(i, j), found[block]);
+          }
+        }
+    }
+  });
+  std::vector<Item> all;
+  for (const auto& some : found) all.insert(all.end(), some.begin(), some.end());
+  return all;
+}
 
 }  // namespace limn

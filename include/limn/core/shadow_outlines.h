@@ -27,7 +27,7 @@ class ShadowOutlines {
   // Adds a convex polygon of either winding, of the emitter or an occluder. tags[i] names the side
   // from corner i to the next. Corners may coincide. Bit i of cancelled omits side i; it must
   // cancel against an omitted side of another polygon.
-  void add(std::span<const Point> corners, std::span<const uint32_t> tags, bool of_lamp,
+  void add(std::span<const Point> corners, std::span<const uint32_t> tags, bool of_light,
            uint32_t cancelled = 0);
 
   enum class Kind : uint8_t { kFirst, kSecond, kCrossing };
@@ -51,8 +51,8 @@ class ShadowOutlines {
   struct Edge {
     Point p, q;  // p < q
     uint32_t tag;
-    int lamp, cover;  // change of the winding numbers from above to below
-    bool narrow;      // coordinates are small: 64-bit arithmetic suffices
+    int light, cover;  // change of the winding numbers from above to below
+    bool narrow;       // coordinates are small: 64-bit arithmetic suffices
   };
   // Bounds of all sides, in structure-of-arrays layout for culling.
   struct Bounds {
@@ -62,11 +62,11 @@ class ShadowOutlines {
     double at;  // along the edge, 0 to 1
     uint32_t other;
     Kind kind;
-    int lamp, cover;  // change of the winding numbers above the edge
+    int light, cover;  // change of the winding numbers above the edge
   };
-  void compare(const Edge& s, uint32_t t, bool later, int& lamp, int& cover);
+  void compare(const Edge& s, uint32_t t, bool later, int& light, int& cover);
   template <class Integer>
-  void compare_ends(const Edge& s, uint32_t t, bool later, int& lamp, int& cover);
+  void compare_ends(const Edge& s, uint32_t t, bool later, int& light, int& cover);
   void find_candidates(uint32_t i);
 
   void grow();

@@ -66,10 +66,10 @@ std::vector<EdgeQuery> queries_around(const EdgeMesh& mesh, int count, uint64_t 
 
 // Acceptance rate: the fraction of draws that return an edge of E(p), and its standard error over
 // the queries, each with `draws` draws.
-struct HitRate {
+struct AcceptanceRate {
   double mean = 0, standard_error = 0;
 };
-HitRate hit_rate(const EdgeSampler& sampler, std::span<const EdgeQuery> queries, int draws,
-                 uint64_t seed, int threads);
+AcceptanceRate acceptance_rate(const EdgeSampler& sampler, std::span<const EdgeQuery> queries,
+                               int draws, uint64_t seed, int threads);
 
 }  // namespace limn

@@ -17,7 +17,7 @@ struct RejectVariant {
   std::vector<VerdictCounts> slices;
   Reach reach;         // from one point
   ReachCounts counts;  // from many points
-  HitRate hits;
+  AcceptanceRate hits;
 
   // How often a test rejected what holds an edge of E(p), and edges of E(p) that were not reached.
   uint64_t missed() const;

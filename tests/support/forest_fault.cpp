@@ -1,8 +1,8 @@
 // Checks the invariants of a forest against the edges it was built over.
-#include <cmath>
-#include <string>
+#include "support/forest_fault.h"
 
-#include "edgetree/forest/forest_node.h"
+#include <cmath>
+
 #include "limn/core/bounds.h"
 
 namespace limn {
@@ -174,9 +174,9 @@ class Walk {
 
 }  // namespace
 
-std::string Forest::validate(std::span<const EdgeMesh> objects) const {
+std::string fault_of(const Forest& forest, std::span<const EdgeMesh> objects) {
   try {
-    Walk(*this, objects).all();
+    Walk(forest, objects).all();
   } catch (const Fault& fault) {
     return fault.text;
   }
