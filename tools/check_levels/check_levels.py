@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""How often `limn check` accuses a right gradient: many small runs on scenes that are right.
+"""How often `limn check` rejects a correct gradient: many small runs with correct gradients.
 
     tools/check_levels/check_levels.py [--limn build/limn] [--runs 200] [--keep FILE.json]
 
-Scenes of its own (huge floors, long shapes, tiny lamps, gloss) and those of scenes/closed_form, each
+Scenes of its own (huge floors, long shapes, tiny emitters, gloss) and those of scenes/closed_form, each
 with several parameters, every run with a seed and a number of samples of its own. Prints the
 verdicts, and how p-values and the z-scores of the whole image are spread: a level of 1e-4 shows
 nothing in 200 runs, but p < 0.05 must come in about 5 % of them or less.
@@ -137,7 +137,7 @@ def report(rows):
         print(f'{name}: {sum(r["status"] == status for r in right)} of {len(right)}')
     for r in right:
         if r['status'] == 1:
-            print('  accused:', r['scene'], r['wrt'], 'seed', r['seed'], 'spp', r['spp'])
+            print('  rejected:', r['scene'], r['wrt'], 'seed', r['seed'], 'spp', r['spp'])
     for name, values in (
             ('p', [r['p'] for r in right if 'p' in r]),
             ('p of the whole image', [math.erfc(abs(r['z_sum']) / math.sqrt(2)) for r in right])):

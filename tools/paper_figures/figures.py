@@ -106,8 +106,8 @@ FIGURES = [
     ),
     Figure(
         "Figure 12",
-        "Weights that know where the lamp is",
-        "The soft shadow of an object before a small lamp, after 64 samples per pixel: the light "
+        "Weights by the position of the light",
+        "The soft shadow of an object before a small area light, after 64 samples per pixel: the light "
         "term lowers the squared error 50 times for a harp and 20 times for an elephant.",
         "After equal samples, as in the paper, and after equal time.",
         [Part(f"fig12-{name}", "compare", "scenes/soft_shadow.xml", ASIDE,

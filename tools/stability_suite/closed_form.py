@@ -1,9 +1,9 @@
 """The derivative of a scene whose image follows from a formula: a convex body above a matt floor
-under a square lamp, direct light alone. No random number enters.
+under a square area light, direct light alone. No random number enters.
 
-From one point of the lamp the body's shadow on the floor is a convex polygon, and so are its
+From one point of the light the body's shadow on the floor is a convex polygon, and so are its
 outline and its faces on the film: a pixel's radiance is a sum of integrals of smooth functions over
-intersections of convex polygons. What is left is the mean over the lamp, by Gauss-Legendre nodes.
+intersections of convex polygons. What is left is the mean over the light, by Gauss-Legendre nodes.
 The derivative is a central difference of that, whose step is far below a pixel.
 """
 
@@ -12,7 +12,7 @@ import numpy as np
 from .statistics import Estimate
 
 STEP = 1e-5  # of the difference, in scene units: 1e-4 of a pixel of the suite's film
-NODES = 8  # of the lamp along each side
+NODES = 8  # of the light along each side
 # A rule of degree 4 on a triangle (Strang and Fix 1973): barycentric coordinates and weights.
 _A, _B = 0.445948490915965, 0.091576213509771
 _CORNERS = np.array([p for a in (_A, _B)

@@ -76,7 +76,7 @@ def lamp(size=0.5, at=(1.0, -0.5, 3.0), power=12.0):
 
 
 def table(mesh, bsdf=None, **more):
-    """A thing above a matt floor under a square lamp that is out of view."""
+    """A thing above a diffuse floor under a square area light that is out of view."""
     return Scene([Shape("object", mesh, bsdf or diffuse(0.5)), floor(), lamp()], **more)
 
 
@@ -165,7 +165,7 @@ def contact(gap):
     "Two boxes side by side, ever closer; the camera moves.",
     "Up to a gap of 1e-3 differences; beyond, one box, by a long run of adaptive.",
     "What is seen in the gap changes over its width, and hardly a sample falls into it, without "
-    "which the jumps at its two sides do not cancel. Finite differences do not see the gap.",
+    "which the radiance differences at its two sides do not cancel. Finite differences do not see the gap.",
 )
 def hair_gaps(gap):
     plain = table(meshes.block((0, 0, 0.5), (0.5, 0.25, 0.25)), parameter="sensor.translate.x",
@@ -280,7 +280,7 @@ def distance(offset):
 
 @family(
     "small-lamps", "size of the light", [1, 1e-1, 1e-2, 1e-3, 1e-4],
-    "A lamp of the same power that shrinks to a point.", FORMULA, NARROW,
+    "An area light of constant power that shrinks to a point.", FORMULA, NARROW,
 )
 def small_lamps(size):
     scene = table(meshes.prism(), depth=2)
@@ -432,7 +432,7 @@ def in_plane(step):
 
 @family(
     "inside", "squares along each wall", [1, 2, 4, 8, 16, 32],
-    "The mesh is the room around camera, lamp and block: every point is in it, or on its planes.",
+    "The mesh is the room around camera, light and block: every point is in it, or on its planes.",
     "The room of six squares, by a long run of adaptive.",
     "Every wall moves, and with it the light on it: the whole picture is noise of the term direct, "
     "which holds 0.94 of the squared error.",

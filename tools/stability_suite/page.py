@@ -14,44 +14,35 @@ from .table import (AHEAD, OURS, against_others_text, beaten, beaten_text, cells
 from .verdicts import LATENESS, MEANING, ORDER, RIGHT, number
 
 READING = [
-    (
-        "Error",
-        "The root of the mean squared error of one run over that of the derivative, over all "
-        f"pixels ({RESOLUTION} × {RESOLUTION}, box filter, one channel): 1 is the error of a black "
-        "image. A run takes the same seconds for every method, set-up included, on one thread; "
-        f"{REPEATS} repeats, interleaved.",
-    ),
-    (
-        "Reference",
-        "A closed form, whose error is told by a coarser one; or a run "
-        f"{REFERENCE} times as long, with seeds of its own, of the same shape made otherwise, or of "
-        "differences with a small fixed step. What is not made of differences is itself held "
-        "against them. Every family says which it has. The noise of runs is known, pixel by pixel, "
-        "from their independent batches, and is taken off the squared error. Where methods are "
-        "better than that noise, their error is the spread of the repeats, which needs no "
-        "reference; what the mean of the repeats misses beyond it is added where it is more than "
-        "the reference's noise explains (by three standard errors).",
-    ),
-    (
-        "Bias",
-        "Sums over 6 × 6 blocks of pixels, the mean of the repeats minus the reference, in "
-        "standard errors of both. p: the chance of scores as large as these (sum of squares, and "
-        f"the largest; doubled). Called where p is below {LEVEL:g}, and below it again in new runs "
-        f"{LONGER} times as long, whose scores must not be weaker than chance allows: what rare "
-        "samples pretend before they are met fades. Too much: the share of the derivative that "
-        "the method adds (negative: loses). Visible: the smallest share that would have been "
-        "called. Differences are biased by their step; where their error is ruled by it, they are "
-        "called, too. A method that does not meet a rare event in all its runs cannot be told "
-        "from a biased one.",
-    ),
+    ("Error",
+     "The root of the mean squared error of one run over that of the derivative, over all pixels"
+     f" ({RESOLUTION} × {RESOLUTION}, box filter, one channel): 1 is the error of a black image. A"
+     " run takes the same seconds for every method, set-up included, on one thread;"
+     f" {REPEATS} repeats, interleaved."),
+    ("Reference",
+     "A closed form, whose error is estimated by a coarser one; or a run"
+     f" {REFERENCE} times as long, with its own seeds, of the same shape made otherwise, or of"
+     " finite differences with a small fixed step. References of other kinds are compared with"
+     " finite differences. The noise of runs is known, pixel by pixel, from their independent"
+     " batches, and is subtracted from the squared error. Where a method's error is below that"
+     " noise, it is the spread of the repeats, which needs no reference. The difference of their"
+     " mean to the reference is added where it exceeds the reference's noise by three standard"
+     " errors."),
+    ("Bias",
+     "Sums over 6 × 6 blocks of pixels: the mean of the repeats minus the reference, in standard"
+     " errors of both. p is the probability of scores as large as these (sum of squares, and the"
+     f" largest; doubled). A bias is reported where p is below {LEVEL:g}, and below it again in new"
+     f" runs {LONGER} times as long, whose scores must not be weaker than chance allows: what rare"
+     " samples pretend fades with time. Too much: the share of the derivative that the method adds"
+     " (negative: loses). Visible: the smallest share that would have been reported. Finite"
+     " differences are biased by their step, and are reported where it rules their error. A method"
+     " that never samples a rare event in all its runs cannot be distinguished from a biased one."),
     ("Tail", "The share of the squared error in the worst 0.1 % of the pixels of all repeats."),
-    (
-        "Verdict",
-        "; ".join(f"{word}: {MEANING[word]}" for word in reversed(ORDER))
-        + f". Late: more than {LATENESS:g} times the seconds. Ahead of {OURS} where it is not "
-        "right: a method that is right where it fails or is late; that has less error where it is "
-        f"biased; less than 1/{AHEAD} of its error where it is noisy.",
-    ),
+    ("Verdict",
+     "; ".join(f"{word}: {MEANING[word]}" for word in reversed(ORDER))
+     + f". Late: more than {LATENESS:g} times the seconds. Ahead of {OURS} where it is not right: a"
+     " method that is right where it fails or is late; that has less error where it is biased;"
+     f" less than 1/{AHEAD} of its error where it is noisy."),
 ]
 
 
