@@ -9,8 +9,10 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <sstream>
 
+#include "integrators/estimates/checksum.h"
 #include "limn/core/check.h"
 #include "limn/core/error.h"
 
@@ -20,25 +22,44 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little);
 
-constexpr const char* kTitle = "limn part 3";  // counts changes of what files hold
-constexpr const char* kMagic = "\x93NUMPY\x01";
+constexpr const char* kTitle = "limn part 4";    // counts changes of what files hold
+constexpr const char* kMagic = "\x93NUMPY\x01";  // and the byte 0 that ends it
 
-// A vector of N numbers in NumPy's format, version 1.0. type: as NumPy writes it, "<f8".
-template <class T>
-std::string npy(const std::string& type, const T* values, size_t count) {
+constexpr size_t kBefore = 10;  // bytes of an array before its header: magic, version, length
+constexpr const char* kSum = "checksum: ";
+
+// What describes a vector in NumPy's format, version 1.0. type: as NumPy writes it, "<f8".
+std::string npy_header(const std::string& type, size_t count) {
   std::string header =
       fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({},), }}", type, count);
-  constexpr size_t kBefore = 10;  // magic, version, length
   header.append(63 - (kBefore + header.size()) % 64, ' ');
-  header += '\n';
-  std::string bytes(kMagic, 7);
-  bytes += '\0';
+  return header + '\n';
+}
+
+template <class T>
+std::string_view bytes_of(const T* values, size_t count) {
+  return {reinterpret_cast<const char*>(values), count * sizeof(T)};
+}
+
+template <class T>
+std::string npy(const std::string& type, const T* values, size_t count) {
+  const std::string header = npy_header(type, count);
+  std::string bytes(kMagic, 8);
   bytes += static_cast<char>(header.size() % 256);
   bytes += static_cast<char>(header.size() / 256);
   bytes += header;
-  bytes.append(reinterpret_cast<const char*>(values), count * sizeof(T));
-  return bytes;
+  return bytes.append(bytes_of(values, count));
 }
+
+// The numbers of a batch as files hold them, but for their checksum, the third count.
+constexpr size_t kBeforeCounts = 3;
+int64_t checksum_of(const std::vector<int64_t>& counts, const std::vector<double>& sums) {
+  std::string bytes(bytes_of(counts.data(), 2));
+  bytes += bytes_of(counts.data() + kBeforeCounts, counts.size() - kBeforeCounts);
+  return checksum(bytes.append(bytes_of(sums.data(), sums.size())));
+}
+
+std::string text_of(Part part) { return fmt::format("{}/{}", part.index, part.count); }
 
 std::string one_line(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
@@ -94,13 +115,10 @@ class PartFile {
   BatchRecord read(int64_t first) {
     stream_->clear();
     stream_->seekg(batches_.at(first));
-    BatchRecord batch;
     const std::vector<int64_t> counts = array<int64_t>("<i8");
-    batch.first = counts[0];
-    batch.last = counts[1];
-    batch.counts.assign(counts.begin() + 2, counts.end());
+    BatchRecord batch{counts[0], counts[1], {counts.begin() + kBeforeCounts, counts.end()}, {}};
     batch.sums = array<double>("<f8");
-    if (!*stream_) throw InputError({name_}, "cannot be read");
+    if (!*stream_ || checksum_of(counts, batch.sums) != counts[2]) fail();
     return batch;
   }
 
@@ -108,18 +126,27 @@ class PartFile {
   // Numbers of the array that begins here, whose places come next; -1 where the file ends sooner.
   int64_t header(const std::string& type, size_t bytes);
   template <class T>
-  std::vector<T> array(const std::string& type) {
+  std::optional<std::vector<T>> array_if_whole(const std::string& type) {
     const int64_t count = header(type, sizeof(T));
-    if (count < 0) fail();
+    if (count < 0) return std::nullopt;
     std::vector<T> values(static_cast<size_t>(count));
     stream_->read(reinterpret_cast<char*>(values.data()),
                   static_cast<std::streamsize>(values.size() * sizeof(T)));
     return values;
   }
+  template <class T>
+  std::vector<T> array(const std::string& type) {
+    auto values = array_if_whole<T>(type);
+    if (!values) fail();
+    return std::move(*values);
+  }
   void read_text();
   bool find_batch();
   [[noreturn]] void fail() const {
-    throw InputError({name_}, "is no part of a run, as --part makes it");
+    if (end_ == 0) throw InputError({name_}, "is no part of a run, as --part makes it");
+    throw InputError({name_}, fmt::format("is damaged after {} whole batches: make part {} again; "
+                                          "with the same -o it goes on from there",
+                                          batches_.size(), text_of(part_)));
   }
 
   std::unique_ptr<std::istream> stream_;
@@ -134,29 +161,33 @@ class PartFile {
 int64_t PartFile::header(const std::string& type, size_t bytes) {
   char before[10];
   if (!stream_->read(before, sizeof(before))) return -1;
-  if (std::memcmp(before, kMagic, 7) != 0) fail();
+  if (std::memcmp(before, kMagic, 8) != 0) fail();
   const size_t size = static_cast<unsigned char>(before[8]) +
                       256 * static_cast<size_t>(static_cast<unsigned char>(before[9]));
   std::string text(size, ' ');
   if (!stream_->read(text.data(), static_cast<std::streamsize>(size))) return -1;
-  const std::string begin =
-      fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': (", type);
+  const size_t digits = text.find('(');
   int64_t count = 0;
-  if (!text.starts_with(begin)) fail();
-  const char* digits = text.data() + begin.size();
-  if (std::from_chars(digits, text.data() + size, count).ec != std::errc() || count < 0) fail();
+  if (digits == std::string::npos) fail();
+  std::from_chars(text.data() + digits + 1, text.data() + size, count);
+  if (count < 0 || text != npy_header(type, static_cast<size_t>(count))) fail();
   const int64_t left = size_ - static_cast<int64_t>(stream_->tellg());
   return count <= left / static_cast<int64_t>(bytes) ? count : -1;
 }
 
 void PartFile::read_text() {
-  const std::vector<char> text = array<char>("|u1");
+  const std::vector<char> bytes = array<char>("|u1");
   if (!*stream_) fail();
-  end_ = stream_->tellg();
-  std::istringstream lines(std::string(text.begin(), text.end()));
+  const std::string text(bytes.begin(), bytes.end());
+  std::istringstream lines(text);
   std::string line;
   if (!std::getline(lines, line) || line != kTitle) fail();
-  while (std::getline(lines, line)) {
+  const size_t told = text.rfind(kSum);
+  if (told == std::string::npos ||
+      text.substr(told) != fmt::format("{}{:08x}\n", kSum, checksum(text.substr(0, told)))) {
+    throw InputError({name_}, "is damaged at its beginning: make this part again");
+  }
+  while (std::getline(lines, line) && !line.starts_with(kSum)) {
     const size_t colon = line.find(": ");
     if (colon == std::string::npos) fail();
     const std::string name = line.substr(0, colon), value = line.substr(colon + 2);
@@ -168,20 +199,24 @@ void PartFile::read_text() {
       identity_.emplace_back(name, value);
     }
   }
+  end_ = stream_->tellg();
 }
 
 bool PartFile::find_batch() {
   stream_->seekg(end_);
-  const int64_t counts = header("<i8", sizeof(int64_t));
-  if (counts == 0) complete_ = true;
-  if (counts < 2) return false;
-  int64_t first = 0;
-  stream_->read(reinterpret_cast<char*>(&first), sizeof(first));
-  stream_->seekg((counts - 1) * static_cast<int64_t>(sizeof(int64_t)), std::ios::cur);
-  const int64_t sums = header("<f8", sizeof(double));
-  if (sums < 0) return false;
-  batches_[first] = end_;
-  end_ = static_cast<int64_t>(stream_->tellg()) + sums * static_cast<int64_t>(sizeof(double));
+  const auto counts = array_if_whole<int64_t>("<i8");
+  if (!counts) return false;
+  if (counts->empty()) {
+    complete_ = stream_->tellg() == size_;
+    if (!complete_) fail();
+    return false;
+  }
+  if (counts->size() < kBeforeCounts) fail();
+  const auto sums = array_if_whole<double>("<f8");
+  if (!sums) return false;
+  if (checksum_of(*counts, *sums) != (*counts)[2]) fail();
+  batches_[counts->front()] = end_;
+  end_ = stream_->tellg();
   return true;
 }
 
@@ -206,8 +241,6 @@ std::unique_ptr<Difference> difference(const Identity& here, const Identity& the
   return nullptr;
 }
 
-std::string text_of(Part part) { return fmt::format("{}/{}", part.index, part.count); }
-
 std::unique_ptr<PartFile> open_part(const std::string& file, bool damaged = false) {
   auto stream = std::make_unique<std::ifstream>(file, std::ios::binary);
   if (!*stream) throw InputError({file}, "cannot be read");
@@ -225,6 +258,7 @@ void PartWriter::start(int spp) {
   std::string text =
       fmt::format("{}\narguments: {}\npart: {}\n", kTitle, arguments_, text_of(part_));
   for (const auto& [name, value] : identity()) text += name + ": " + value + "\n";
+  text += fmt::format("{}{:08x}\n", kSum, checksum(text));
   if (!file_.empty() && std::filesystem::exists(file_) && std::filesystem::file_size(file_) > 0) {
     try {
       before_ = open_part(file_, true);
@@ -270,8 +304,9 @@ BatchRecord PartWriter::read(int64_t first) {
 }
 
 void PartWriter::write(const BatchRecord& batch) {
-  std::vector<int64_t> counts{batch.first, batch.last};
+  std::vector<int64_t> counts{batch.first, batch.last, 0};
   counts.insert(counts.end(), batch.counts.begin(), batch.counts.end());
+  counts[2] = checksum_of(counts, batch.sums);
   append(npy("<i8", counts.data(), counts.size()) +
          npy("<f8", batch.sums.data(), batch.sums.size()));
   samples_ += batch.last - batch.first;

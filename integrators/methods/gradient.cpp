@@ -25,6 +25,11 @@ void check_shading(const Scene& scene, GradientResult& result) {
 }
 
 void check_selection(const MethodType& method, const Scene& scene, const GradientOptions& options) {
+  if (options.parameters.empty()) throw InputError("names: at least one parameter must be named");
+  if (!(options.step >= 0) || std::isinf(options.step)) {
+    throw InputError(fmt::format(
+        "step: {:g} is neither a positive number nor 0, by which a pilot finds it", options.step));
+  }
   if (options.exact_film) check_exact_film(scene, method.name);
   if (method.check) method.check(scene);
   check_warp(options.warp, {method.name});

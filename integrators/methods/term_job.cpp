@@ -211,10 +211,11 @@ class TermJob {
   }
 
   void check_samples(const SampleCounts& samples) const {
+    constexpr double kMostSamples = 1024;  // as the program's --samples
     bool good = samples.size() <= types_.size();
     for (size_t t = 0; t < types_.size(); ++t) {
       const bool whole = types_[t]->least_samples == 1;
-      good = good && std::isfinite(samples[t]) && samples[t] > 0 &&
+      good = good && samples[t] > 0 && samples[t] <= kMostSamples &&
              (!whole || samples[t] == std::floor(samples[t]));
     }
     if (good) return;
@@ -224,9 +225,9 @@ class TermJob {
                             type->least_samples == 1 ? "" : " (may be less than 1)");
     }
     throw InputError(
-        fmt::format("--samples: \"{}\": counts must be positive, and whole where "
+        fmt::format("--samples: \"{}\": counts must be positive, at most {:g}, and whole where "
                     "paths are concerned, as in 3,0.5,1; the terms are {}",
-                    to_string(samples), wanted));
+                    to_string(samples), kMostSamples, wanted));
   }
 
   // Plans every pass, by a pilot or as the options say.

@@ -11,9 +11,25 @@
 
 namespace limn {
 
+namespace {
+
+// What a link leads to, if there is a file or not.
+std::filesystem::path behind_links(std::filesystem::path file) {
+  constexpr int kMostLinks = 40;  // Linux's own
+  std::error_code failed;
+  for (int i = 0; i < kMostLinks && std::filesystem::is_symlink(file, failed); ++i) {
+    const std::filesystem::path target = std::filesystem::read_symlink(file, failed);
+    file = file.parent_path() / target;  // the target itself where it is absolute
+  }
+  return file;
+}
+
+}  // namespace
+
 OutputFile::OutputFile(const std::string& file)
-    : file_(file), temporary_(file + "." + std::to_string(getpid()) + ".tmp") {
-  const std::filesystem::path folder = std::filesystem::path(file).parent_path();
+    : file_(behind_links(file).string()),
+      temporary_(file_ + "." + std::to_string(getpid()) + ".tmp") {
+  const std::filesystem::path folder = std::filesystem::path(file_).parent_path();
   std::error_code ignored;
   if (!folder.empty() && !std::filesystem::is_directory(folder, ignored)) {
     throw InputError(SourceLocation{file}, "cannot write: no such folder");

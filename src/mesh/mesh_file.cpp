@@ -1,6 +1,7 @@
 // Mesh files by extension, and vector fields on a mesh's vertices.
 #include "src/mesh/mesh_file.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -16,9 +17,12 @@ std::string ending(const std::string& file) {
   return lower_case(std::filesystem::path(file).extension().string());
 }
 
+// A line without any number may be of a file that no message should quote.
 Vec3d parse_vector(const SourceLocation& where, std::string_view line) {
   const std::vector<std::string_view> words = split(line, " \t\r,");
-  if (words.size() != 3) throw InputError(where, "expected three numbers \"x y z\"");
+  if (words.size() != 3 || std::none_of(words.begin(), words.end(), parse_double)) {
+    throw InputError(where, "expected three numbers \"x y z\"");
+  }
   Vec3d v;
   for (int k = 0; k < 3; ++k) {
     const int column = static_cast<int>(words[k].data() - line.data()) + 1;

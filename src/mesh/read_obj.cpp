@@ -145,6 +145,10 @@ class ObjReader {
       std::vector<std::string> known = kSkipped;
       known.insert(known.end(), {"f", "v", "vn", "vt"});
       std::sort(known.begin(), known.end());
+      // What is no OBJ file may be none that a message should quote.
+      if (mesh_.positions.empty()) {
+        words_.fail("this is no statement of an OBJ file (" + known_names(known) + ")");
+      }
       words_.fail(unknown_name("statement", std::string(keyword), known));
     }
   }

@@ -1,7 +1,10 @@
 // Parameters by name, and messages about unknown names.
 #include "limn/core/parameter.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include "limn/core/check.h"
@@ -71,6 +74,35 @@ Scene Parameter::moved(const Scene& scene, double step, size_t component) const 
 void Parameter::move(Scene& scene, double step, size_t component) const {
   CHECK_LT(component, size);
   motion->move(scene, step, component);
+}
+
+void Parameter::move_checked(Scene& scene, double step) const {
+  CHECK_EQ(size, 1u);
+  if (!std::isfinite(step)) {
+    throw InputError({scene.file},
+                     fmt::format("parameter \"{}\": the step {:g} is not finite", name, step));
+  }
+  std::vector<double> numbers = value(scene);
+  if (!numbers.empty()) {
+    for (double& x : numbers) x += step;
+    return assign(scene, numbers);
+  }
+  Scene there = moved(scene, step);
+  for (uint32_t i = 0; i < there.shapes.size(); ++i) {
+    if (velocities(scene, ShapeId(i)).empty()) continue;
+    double largest = 0;
+    for (const Vec3f& p : there.shapes[i].mesh.positions) {
+      for (int k = 0; k < 3; ++k) largest = std::max(largest, std::fabs(double{p[k]}));
+    }
+    if (largest <= kLargestCoordinate && bounds_of(there.shapes[i].mesh).diagonal() > 0) continue;
+    throw InputError(
+        {scene.file},
+        fmt::format("parameter \"{}\": a step of {:g} is too long: the shape would {}", name, step,
+                    largest <= kLargestCoordinate
+                        ? "be a point"
+                        : fmt::format("go beyond {:g}", kLargestCoordinate)));
+  }
+  scene = std::move(there);
 }
 
 std::vector<double> Parameter::value(const Scene& scene) const { return motion->numbers(scene); }

@@ -102,6 +102,11 @@ const std::vector<Mistake>& mistakes() {
        "a.obj:4:1: error: unknown statement \"F\" (known: bevel, c_interp, ctech, d_interp, f, g, "
        "l, lod, maplib, mg, mtllib, o, p, s, shadow_obj, stech, trace_obj, usemap, usemtl, v, vn, "
        "vp, vt)"},
+      // Of a file that is none nothing is quoted.
+      {"ObjOther", "a.obj", "root:x:0:0:root:/root:/bin/sh\n",
+       "a.obj:1:1: error: this is no statement of an OBJ file (known: bevel, c_interp, ctech, "
+       "d_interp, f, g, l, lod, maplib, mg, mtllib, o, p, s, shadow_obj, stech, trace_obj, usemap, "
+       "usemtl, v, vn, vp, vt)"},
       {"ObjConcave", "a.obj", comb(4098),
        "a.obj:4099:1: error: a concave face of 4098 corners (at most 4096): split it"},
       {"ObjNormalIndex", "a.obj", kTriangle + "vn 0 0 1\nf 1//1 2//1 3//2\n",
@@ -251,6 +256,7 @@ TEST(BadMesh, Vectors) {
       {"0 0 0\n 1, nan 0\n", ":2:5: error: the vector is not finite"},
       {"1e39 0 0\n", ":1:1: error: a number is beyond a float's range (3.4e38)"},
       {std::string("0 0 0\0\n", 7), ":1:5: error: not a number: \"0\\x00\""},
+      {"user:x:8: Jane Doe:/home\n", ":1: error: expected three numbers \"x y z\""},
       {"1 2 3 4\n", ":1: error: expected three numbers \"x y z\""}};
   for (const auto& [content, message] : cases) {
     files.write("v.txt", content);

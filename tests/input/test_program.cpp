@@ -460,7 +460,10 @@ TEST_F(Program, OutputsThatCollide) {
   EXPECT_NE(refused("check " + scene_ + " --wrt screen.translate.x --json " + files_.path("."))
                 .find("it is a folder"),
             std::string::npos);
-  EXPECT_NE(refused("info " + scene_ + " --json " + files_.path("none/x.json")).find("no folder"),
+  // Folders are made for --json as for -o.
+  EXPECT_EQ(run("info " + scene_ + " --json " + files_.path("new/x.json")).status, 0);
+  EXPECT_TRUE(std::filesystem::exists(files_.path("new/x.json")));
+  EXPECT_NE(refused("info " + scene_ + " --json " + scene_ + "/x.json").find("cannot be written"),
             std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(out()));
 }
@@ -495,12 +498,38 @@ TEST_F(Program, FullDisksAreAnError) {
   EXPECT_FALSE(std::filesystem::exists(out()));
 }
 
-TEST_F(Program, SigtermWritesWhatIsDone) {
-  const Outcome outcome = run(
-      "gradient " + scene_ + " --quiet --spp 1000000000 --wrt " + "screen.translate.x -o " + out(),
-      "timeout --preserve-status -s TERM 2 ");
+// A link to a file that is not there yet is written through.
+TEST_F(Program, LinksStay) {
+  const std::string link = files_.path("link.exr");
+  std::filesystem::create_symlink(out(), link);
+  ASSERT_EQ(run("render " + scene_ + " --spp 1 -o " + link).status, 0);
+  EXPECT_TRUE(std::filesystem::is_symlink(link));
+  EXPECT_EQ(read_exr(out()).width, 8);
+}
+
+// Of a scheduler, or of a terminal that closes.
+TEST_F(Program, SignalsThatEndItLeaveWhatIsDone) {
+  for (const std::string signal : {"TERM", "HUP"}) {
+    const Outcome outcome =
+        run("gradient " + scene_ + " --quiet --spp 1000000000 --wrt screen.translate.x -o " + out(),
+            "env --default-signal=HUP timeout --preserve-status -s " + signal + " 2 ");
+    EXPECT_EQ(outcome.status, 130) << outcome.text;
+    EXPECT_TRUE(std::filesystem::remove(out())) << signal;
+  }
+}
+
+// The loss is there before the first batch of its derivative.
+TEST_F(Program, InterruptedReversePassesKeepTheLoss) {
+  const std::string target = files_.path("target.exr"), folder = files_.path("back");
+  ASSERT_EQ(run("render " + scene_ + " --spp 1 -o " + target).status, 0);
+  // All derivatives in one batch, which takes longer than both images.
+  const Outcome outcome =
+      call(std::string("{ ") + LIMN_PROGRAM + " backward " + scene_ +
+           " --spp 20000 --batches 1 --target " + target + " -o " + folder + " & while [ ! -e " +
+           folder + "/adjoint.exr ]; do sleep 0.02; done; " + "kill -TERM $!; wait $!; }");
   EXPECT_EQ(outcome.status, 130) << outcome.text;
-  EXPECT_TRUE(std::filesystem::exists(out()));
+  EXPECT_NE(outcome.text.find("the loss alone is written"), std::string::npos) << outcome.text;
+  EXPECT_TRUE(std::filesystem::exists(folder + "/adjoint.exr"));
 }
 
 // Every warning of `info` stands in the figures of a run, too.

@@ -201,6 +201,26 @@ TEST_F(Program, FitsOfLaterViewsAndFields) {
   }
 }
 
+// Who works in the folder is named, and what is there stays.
+TEST_F(Program, FitsOfTwoProcessesDoNotShareAFolder) {
+  const std::string target = files_.path("target.exr"), folder = files_.path("fit");
+  ASSERT_EQ(run("render " + scene_ + " --spp 1 -o " + target).status, 0);
+  const std::string fit = "fit " + scene_ + " --target " + target +
+                          " --wrt blaze.radiance --spp 1 --steps 1 --no-report -o " + folder;
+  std::filesystem::create_directory(folder);
+  const std::string held = "flock " + folder + "/limn.lock ";
+  files_.write("fit/limn.lock", "process 7 on far");
+  const Outcome outcome = run(fit, held);
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_NE(outcome.text.find("error: process 7 on far works in this folder"), std::string::npos)
+      << outcome.text;
+  EXPECT_EQ(run(fit).status, 0);
+  EXPECT_FALSE(std::filesystem::exists(folder + "/limn.lock"));
+  EXPECT_NE(call(held + LIMN_PROGRAM + " fit --no-report --resume " + folder)
+                .text.find("works in this folder"),
+            std::string::npos);
+}
+
 // Steps take twice as long each, so that the interrupt comes within one, after a snapshot.
 // `timeout` and job schedulers send a process its signal, and then to its group.
 TEST_F(Program, SignalsThatComeAtOnceAreOneInterrupt) {

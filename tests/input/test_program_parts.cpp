@@ -1,6 +1,7 @@
 // Parts of runs, and what joins them.
 #include <filesystem>
 
+#include "integrators/estimates/checksum.h"
 #include "support/program.h"
 
 namespace limn {
@@ -93,11 +94,34 @@ TEST_F(Parts, OfAGradientJoinToTheBitsOfOneRun) {
   const std::string whole = bytes_of(part(2));
   std::filesystem::resize_file(part(2), whole.size() - 128);
   std::ofstream(part(2), std::ios::binary | std::ios::app) << std::string(300, '\0');
-  EXPECT_NE(refused("merge " + all_parts() + " -o " + out()).find("is no part of a run"),
+  EXPECT_NE(refused("merge " + all_parts() + " -o " + out()).find("make part 2/3 again"),
             std::string::npos);
   ASSERT_EQ(run(command + " --part 2/3 -o " + part(2)).status, 0);
   EXPECT_TRUE(bytes_of(part(2)) == whole);
   expect_same(command, out(), files);
+}
+
+// Wherever a bit flips, parts are not joined, and the part made again joins to the same bits.
+TEST_F(Parts, WithAFlippedBitAreRefused) {
+  const std::string command = "gradient " + scene_ + " --spp 9 --method fd --wrt blaze.radiance";
+  make_parts(command);
+  const std::string whole = bytes_of(part(2));
+  const auto flip = [&](size_t byte, int bit) {
+    std::string bytes = whole;
+    bytes[byte] = static_cast<char>(bytes[byte] ^ 1 << bit);
+    std::ofstream(part(2), std::ios::binary) << bytes;
+  };
+  size_t batches = 0;
+  for (int i = 0; i < 40; ++i) {
+    flip(whole.size() * i / 40 + i % 7, i % 8);
+    const std::string message = refused("merge " + all_parts() + " -o " + out());
+    EXPECT_NE(message.find(part(2) + ": error: is "), std::string::npos) << i << ": " << message;
+    batches += message.find("whole batches: make part 2/3 again") != std::string::npos;
+  }
+  EXPECT_GT(batches, 20u);
+  flip(whole.size() / 2, 3);
+  ASSERT_EQ(run(command + " --part 2/3 -o " + part(2)).status, 0);
+  expect_same(command, out(), {out()});
 }
 
 TEST_F(Parts, OfAReversePassAndAnImageJoinToTheBitsOfOneRun) {
@@ -138,6 +162,8 @@ TEST_F(Parts, OfSilhouettesHaveOnePlan) {
     ASSERT_NE(at, std::string::npos);
     char& digit = bytes[at + name.size()];
     digit = digit == '0' ? '1' : '0';
+    const size_t text = bytes.find("limn part"), sum = bytes.find("checksum: ");
+    bytes.replace(sum + 10, 8, fmt::format("{:08x}", checksum(bytes.substr(text, sum - text))));
     std::ofstream(part(k), std::ios::binary) << bytes;
   };
   choose_otherwise(2);

@@ -99,6 +99,18 @@ def test_methods_and_films_are_known_by_name(scene, folder):
         limn.render(limn.load_string(text, folder), film="exact")
 
 
+@pytest.mark.parametrize("call, text", [
+    (lambda s, a: limn.gradient(s, []), "names: at least one"),
+    (lambda s, a: limn.backward(s, a, []), "names: none are given"),
+    (lambda s, a: limn.gradient(s, "tent.scale", method="fd", step=-1), "step: -1 is neither"),
+    (lambda s, a: limn.gradient(s, "tent.scale", method="fd", step=float("nan")), "step: "),
+    (lambda s, a: limn.gradient(s, "tent.scale", samples=[1e9] * 3), "at most 1024"),
+])
+def test_arguments_that_mean_nothing_are_refused_at_once(scene, call, text):
+    with pytest.raises(limn.InputError, match=text):
+        call(scene, np.ones((scene.height, scene.width, 3)))
+
+
 def test_several_parameters_are_one_run(scene):
     names = ["ball.translate.x", "metal.alpha", "sensor.fov", "bulb.intensity", "tent.scale"]
     together = limn.gradient(scene, names, spp=2)

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from conftest import SCENE, TENT
 
+TENT_POINTS = [[0, 1, 0], [1, 0, 0], [0, 0, 1]]
+
 
 def image(scene):
     return limn.render(scene, spp=2, seed=5).value
@@ -181,6 +183,40 @@ def test_moving_is_what_positions_do(scene):
     assert same(image(scene), image(other))
     scene.move("sensor.fov", 2)
     assert scene["sensor.fov"] == 42
+
+
+@pytest.mark.parametrize("name, step, text", [
+    ("tent.translate.x", float("nan"), "the step nan is not finite"),
+    ("tent.translate.x", float("-inf"), "the step -inf is not finite"),
+    ("tent.translate.x", 1e30, "a step of 1e+30 is too long: the shape would go beyond 2e+12"),
+    ("tent.scale", -1, "a step of -1 is too long: the shape would be a point"),
+    ("lamp.radiance", -100, "cannot be -96: it must be finite and lie in"),
+    ("sensor.fov", 200, "cannot be 240: it must be finite and lie in"),
+    ("sensor.translate.x", 1e30, "cannot be 1e+30"),
+])
+def test_no_move_leads_out_of_what_a_scene_can_be(scene, name, step, text):
+    before = image(scene)
+    with pytest.raises(limn.InputError, match=re.escape(f'parameter "{name}"') + ".*" +
+                       re.escape(text)):
+        scene.move(name, step)
+    assert same(image(scene), before)
+
+
+@pytest.mark.parametrize("call", [
+    lambda p, i: limn.load(p), lambda p, i: limn.load_string(SCENE, p),
+    lambda p, i: limn.read_exr(p), lambda p, i: limn.write_exr(p, i),
+    lambda p, i: limn.write_png(p, i), lambda p, i: limn.write_ply(p, TENT_POINTS, [[0, 1, 2]]),
+])
+def test_bytes_are_no_path(call):
+    with pytest.raises(TypeError, match="(file|folder): a path is a str"):
+        call(b"a", np.zeros((2, 2, 3)))
+
+
+def test_a_mesh_is_written_through_a_link(tmp_path):
+    (tmp_path / "link.ply").symlink_to("there.ply")
+    limn.write_ply(tmp_path / "link.ply", TENT_POINTS, [[0, 1, 2]])
+    assert (tmp_path / "link.ply").is_symlink()
+    assert (tmp_path / "there.ply").stat().st_size > 50
 
 
 def test_shading_is_the_programs(scene, program):

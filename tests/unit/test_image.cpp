@@ -114,6 +114,20 @@ TEST(Image, BrokenFilesAreExplained) {
             "/no/such/folder/a.png: error: cannot write: no such folder");
 }
 
+// A link stays a link, to a file that is there and to one that is not.
+TEST(Image, LinksAreWrittenThrough) {
+  const TempFiles files;
+  std::filesystem::create_directory(files.path("far"));
+  const std::string link = files.path("link.exr"), second = files.path("second.exr");
+  std::filesystem::create_symlink("far/image.exr", link);
+  std::filesystem::create_symlink(link, second);
+  for (const int width : {2, 3}) {
+    write_exr(second, ramp(width, 2, 3), false, {});
+    EXPECT_TRUE(std::filesystem::is_symlink(link) && std::filesystem::is_symlink(second));
+    EXPECT_EQ(read_exr(files.path("far/image.exr")).width, width);
+  }
+}
+
 // Any prefix of a file is an error, never a crash or a picture.
 TEST(Image, EveryTruncationIsAnError) {
   const TempFiles files;

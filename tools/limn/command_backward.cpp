@@ -82,19 +82,25 @@ class BackwardCommand final : public Command {
     check_outputs(files_.planned(common_.json), scene, {adjoint_.empty() ? target_ : adjoint_});
     const RunSettings settings = settings_of(scene);
     const LossResult loss = loss_of(scene, kind, settings);
-    if (interrupted(settings) && !target_.empty()) return report_interrupted();
+    if (interrupted(settings) && !target_.empty()) return report_interrupted(scene, settings, loss);
     if (loss_only_) return write_loss_alone(scene, settings, loss);
     const BackwardResult result = backward(scene, loss.adjoint, options_, rest_of(settings));
     warnings_.add_all(result.warnings);
-    if (result.spp == 0) return report_interrupted();
+    if (result.spp == 0) return report_interrupted(scene, settings, loss);
     write(scene, settings, loss, result);
     const bool all = seconds_ > 0 && !interrupted(settings);
     return finish_status(result.non_finite, result.spp, all ? result.spp : settings.spp, "");
   }
 
  private:
-  static int report_interrupted() {
-    fmt::print(stderr, "interrupted before the first batch was done: nothing is written\n");
+  // A loss stays, and a run from its adjoint on needs no images.
+  int report_interrupted(const Scene& scene, const RunSettings& settings,
+                         const LossResult& loss) const {
+    const bool kept = loss.spp > 0;
+    if (kept) write_loss_alone(scene, settings, loss);
+    fmt::print(stderr, "interrupted before the first batch was done: {}\n",
+               kept ? "the loss alone is written; --adjoint " + files_.adjoint + " goes on from it"
+                    : "nothing is written");
     return kInterrupted;
   }
 

@@ -13,6 +13,7 @@
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
 #include "tools/limn/fit_folder.h"
+#include "tools/limn/folder_lock.h"
 #include "tools/limn/report_script.h"
 
 namespace limn {
@@ -290,6 +291,7 @@ int FitCommand::run(const std::string&) {
   FitFolder folder = open_folder();
   std::vector<FitView> views = read_views(folder.arguments());
   RunSettings settings = make_settings(common_, views[0].scene, name());
+  const FolderLock lock(folder.name());
   if (resume_.empty()) {
     folder.set_samples(settings.spp, settings.seed);
     folder.prepare(views);

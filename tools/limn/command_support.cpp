@@ -269,14 +269,7 @@ void check_output(const std::string& file) {
   if (std::filesystem::path(file).extension() != ".exr") {
     throw InputError({file}, "the output is an OpenEXR image: its name must end in .exr");
   }
-  const auto folder = std::filesystem::absolute(file).parent_path();
-  std::error_code failed;
-  std::filesystem::create_directories(folder, failed);
-  const bool existed = std::filesystem::exists(file);
-  if (failed || !std::ofstream(file, std::ios::app)) {
-    throw InputError({file}, "cannot be written");
-  }
-  if (!existed) std::filesystem::remove(file);
+  check_writable(file);
 }
 
 void write_json(const std::string& file, const std::string& text) {

@@ -26,18 +26,6 @@ bool is_device(const std::string& file) {
          !fs::is_directory(file, failed);
 }
 
-void check_writable(const std::string& file) {
-  std::error_code failed;
-  if (fs::is_directory(file, failed)) throw InputError({file}, "cannot be written: it is a folder");
-  const auto folder = fs::absolute(file).parent_path();
-  if (!fs::is_directory(folder, failed)) {
-    throw InputError({file}, "cannot be written: there is no folder " + folder.string());
-  }
-  const bool existed = fs::exists(file, failed);
-  if (!std::ofstream(file, std::ios::app)) throw InputError({file}, "cannot be written");
-  if (!existed) fs::remove(file, failed);
-}
-
 std::string stem_of(const std::string& file) { return fs::path(file).stem().string(); }
 
 // Whether limn wrote it for this -o. Older versions of limn only tell of themselves, so that the
@@ -68,6 +56,16 @@ void write_file(const std::string& file, const std::string& bytes) {
   OutputFile output(file);
   output.write(bytes);
   output.commit();
+}
+
+void check_writable(const std::string& file) {
+  std::error_code failed;
+  if (fs::is_directory(file, failed)) throw InputError({file}, "cannot be written: it is a folder");
+  fs::create_directories(fs::absolute(file).parent_path(), failed);
+  if (failed) throw InputError({file}, "cannot be written");
+  const bool existed = fs::exists(file, failed);
+  if (!std::ofstream(file, std::ios::app)) throw InputError({file}, "cannot be written");
+  if (!existed) fs::remove(fs::canonical(file, failed), failed);  // what a link leads to
 }
 
 void check_json(const std::string& file) {
@@ -108,11 +106,6 @@ void check_outputs(const std::vector<PlannedFile>& files, const Scene& scene,
         if (!same_file(file, input)) continue;
         throw InputError({file}, option + " would write over a file that is read");
       }
-    }
-    if (option != "--json") {
-      std::error_code failed;
-      fs::create_directories(fs::absolute(file).parent_path(), failed);
-      if (failed) throw InputError({file}, "cannot be written");
     }
     check_writable(file);
   }

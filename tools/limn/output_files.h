@@ -15,7 +15,7 @@ struct PlannedFile {
   std::string option, file;
 };
 // InputError where two of the files are one, one is a file that the scene is made of, or one cannot
-// be written. Folders of images are made; that of --json must be there.
+// be written. Their folders are made where they are not there.
 // inputs: further files that are read.
 void check_outputs(const std::vector<PlannedFile>& files, const Scene& scene,
                    const std::vector<std::string>& inputs = {});
@@ -23,7 +23,9 @@ void check_outputs(const std::vector<PlannedFile>& files, const Scene& scene,
 std::vector<std::string> field_files(const std::vector<std::string>& parameters);
 // A name of the scene as a part of a file's: what is no letter, digit, dot or minus becomes "_".
 std::string file_part(const std::string& name);
-// InputError if the file cannot be written; nothing for "".
+// InputError if the file cannot be written. Its folder is made.
+void check_writable(const std::string& file);
+// The same unless it is a device or "".
 void check_json(const std::string& file);
 
 // All of a file, which appears whole or not at all; a device (/dev/stdout) takes the bytes as they

@@ -1,4 +1,4 @@
-// Progress on a terminal, and Ctrl-C.
+// Progress on a terminal, Ctrl-C, and a terminal that closes.
 #include "tools/limn/terminal.h"
 
 #include <fmt/format.h>
@@ -48,6 +48,8 @@ const std::atomic<bool>& interrupt_flag() { return g_interrupted; }
 void watch_interrupt() {
   std::signal(SIGINT, on_interrupt);
   std::signal(SIGTERM, on_interrupt);
+  // Under nohup a terminal that closes ends nothing.
+  if (std::signal(SIGHUP, on_interrupt) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
 }
 
 std::function<void(double)> progress_bar(const std::string& label, bool quiet) {

@@ -6,8 +6,8 @@
 
 namespace limn {
 
-// A flag that the first Ctrl-C or SIGTERM sets; a second one, half a second later or more, ends the
-// program at once.
+// A flag that the first Ctrl-C, SIGTERM or SIGHUP sets; a second one, half a second later or more,
+// ends the program at once.
 const std::atomic<bool>& interrupt_flag();
 void watch_interrupt();
 

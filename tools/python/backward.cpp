@@ -122,6 +122,9 @@ void bind_backward(nb::module_& m) {
         BackwardOptions options;
         options.sampler = sampler;
         if (names) options.parameters = to_list(*names);
+        if (names && options.parameters.empty()) {
+          throw InputError("names: none are given; None stands for all parameters");
+        }
         options.terms = terms;
         options.uniform_pixels = uniform_pixels;
         options.edge_samples = edge_samples;
@@ -156,8 +159,7 @@ void bind_backward(nb::module_& m) {
       "(another "
       "seed than that of the image it came from), else the gradient is biased.\n"
       "names: arrays as well (\"object.vertex_positions\"); None for all parameters but "
-      "displacements, "
-      "which repeat them.\n"
+      "displacements, which repeat them; limn.InputError if there are none in it.\n"
       "Values are float64: (V, 3) of an array, (3,) of a colour, () of a number, of the loss per "
       "unit of the parameter. "
       "Copies of a vertex have equal shares. Pixels are sampled in proportion to the adjoint "

@@ -61,6 +61,9 @@ void bind_images(nb::module_& m);
 // The shape called `id`; InputError that lists the known ones.
 ShapeId find_shape(const Scene& scene, const std::string& id);
 
+// Of a str or an os.PathLike; TypeError that names the argument.
+std::string to_path(const char* argument, nb::handle path);
+
 using Pixels = nb::ndarray<nb::numpy, float, nb::shape<-1, -1, -1>, nb::c_contig>;
 using Positions = nb::ndarray<nb::numpy, const float, nb::shape<-1, 3>, nb::c_contig>;
 

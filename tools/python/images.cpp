@@ -9,13 +9,12 @@
 
 namespace limn::python {
 
-namespace {
-
-std::string to_path(nb::handle file) {
-  return nb::cast<std::string>(nb::module_::import_("os").attr("fspath")(file));
+std::string to_path(const char* argument, nb::handle path) {
+  const nb::object text = nb::module_::import_("os").attr("fspath")(path);
+  if (nb::isinstance<nb::str>(text)) return nb::cast<std::string>(text);
+  throw nb::type_error(
+      (std::string(argument) + ": a path is a str or an os.PathLike of one, not bytes").c_str());
 }
-
-}  // namespace
 
 Image to_image(nb::handle array) {
   const auto pixels =
@@ -46,13 +45,13 @@ Pixels to_array(Image image) {
 
 void bind_images(nb::module_& m) {
   m.def(
-      "read_exr", [](nb::handle file) { return to_array(read_exr(to_path(file))); },
+      "read_exr", [](nb::handle file) { return to_array(read_exr(to_path("file", file))); },
       nb::arg("file"), nb::sig("def read_exr(file: str | os.PathLike[str]) -> numpy.ndarray"),
       "Pixels of an OpenEXR image: float32, (H, W, 3), or (H, W, 1) if it has channel Y alone.");
   m.def(
       "write_exr",
       [](nb::handle file, nb::handle image, bool half) {
-        write_exr(to_path(file), to_image(image), half, {});
+        write_exr(to_path("file", file), to_image(image), half, {});
       },
       nb::arg("file"), nb::arg("image"), nb::arg("half") = false,
       nb::sig("def write_exr(file: str | os.PathLike[str], image: numpy.typing.ArrayLike, half: "
@@ -61,7 +60,7 @@ void bind_images(nb::module_& m) {
   m.def(
       "write_png",
       [](nb::handle file, nb::handle image, double exposure) {
-        write_png(to_path(file), to_image(image), exposure);
+        write_png(to_path("file", file), to_image(image), exposure);
       },
       nb::arg("file"), nb::arg("image"), nb::arg("exposure") = 1.0,
       nb::sig(
@@ -72,7 +71,7 @@ void bind_images(nb::module_& m) {
       "write_signed_png",
       [](nb::handle file, nb::handle image, std::optional<double> scale) {
         const Image picture = to_image(image);
-        write_signed_png(to_path(file), picture, scale.value_or(signed_scale(picture)));
+        write_signed_png(to_path("file", file), picture, scale.value_or(signed_scale(picture)));
       },
       nb::arg("file"), nb::arg("image"), nb::arg("scale") = nb::none(),
       nb::sig("def write_signed_png(file: str | os.PathLike[str], image: numpy.typing.ArrayLike, "

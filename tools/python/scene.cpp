@@ -87,7 +87,7 @@ SceneHandle read(const Read& read_it) {
 }
 
 SceneHandle load(nb::handle file, const nb::kwargs& substitutions) {
-  const auto path = nb::cast<std::string>(nb::module_::import_("os").attr("fspath")(file));
+  const std::string path = to_path("file", file);
   const auto defines = to_defines(substitutions);
   return read(
       [&](std::vector<std::string>* warnings) { return read_scene(path, defines, warnings); });
@@ -95,7 +95,7 @@ SceneHandle load(nb::handle file, const nb::kwargs& substitutions) {
 
 SceneHandle load_string(const std::string& xml, nb::handle folder,
                         const nb::kwargs& substitutions) {
-  const auto path = nb::cast<std::string>(nb::module_::import_("os").attr("fspath")(folder));
+  const std::string path = to_path("folder", folder);
   const auto defines = to_defines(substitutions);
   return read([&](std::vector<std::string>* warnings) {
     return read_scene_text(xml, path, defines, warnings);
@@ -173,10 +173,12 @@ void bind_changes(nb::class_<SceneHandle>& scene) {
           "move",
           [](SceneHandle& s, const std::string& name, double step) {
             const Parameter parameter = find_parameter(s.get(), name);
-            parameter.move(s.edit(), step);
+            parameter.move_checked(s.edit(), step);
           },
           nb::arg("name"), nb::arg("step"),
-          "Moves a parameter by `step`, in its unit, from where it is; exact for large steps.")
+          "Moves a parameter by `step`, in its unit, from where it is; exact for large steps.\n\n"
+          "Raises limn.InputError, and moves nothing, for a step that is not finite or leads where "
+          "no scene can be.")
       .def(
           "view",
           [](const SceneHandle& s, const std::variant<int, std::string>& sensor) {

@@ -4,7 +4,7 @@
 namespace limn {
 
 // An output file that is written under a temporary name in the same folder. commit() renames it;
-// without commit() nothing remains.
+// without commit() nothing remains. A symbolic link remains, and its target is written.
 class OutputFile {
  public:
   explicit OutputFile(const std::string& file);

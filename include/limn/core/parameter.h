@@ -78,6 +78,11 @@ struct Parameter {
   // Changes the parameter in place.
   void move(Scene& scene, double step, size_t component = 0) const;
 
+  // The same for a step that a user gives. InputError, with the scene unchanged, if the step is not
+  // finite, if the value would leave the valid range, or if the shape would collapse to a point or
+  // reach beyond kLargestCoordinate.
+  void move_checked(Scene& scene, double step) const;
+
   // The current value in the scene: one number, three channels of a colour, or all numbers of an
   // array. Empty for parameters that are relative to the current state: rotations, translations and
   // scales of shapes, fields, single coordinates and texels.

@@ -5,9 +5,8 @@
 //             + camera   (silhouettes on the film)
 //             + boundary (silhouettes that shading points see)
 //             + shadow   (edges of sharp shadows, where the scene has lights without extent)
-//             + direct + penumbra (silhouettes that shading points see before lamps and the sun:
-//             the
-//                         edges of soft shadows; of methods that keep this apart from boundary)
+//             + direct + penumbra (silhouettes that shading points see before lamps and the sun,
+//                                  the edges of soft shadows; of methods that keep this apart)
 // after Li et al. 2018 with directions held fixed in solid angle everywhere.
 #include <initializer_list>
 #include <optional>
@@ -136,9 +135,9 @@ void check_exact_film(const Scene& scene, const std::string& method);
 // The same unless one of them does, at least: others take rays.
 void check_exact_films(const Scene& scene, const std::vector<std::string>& methods);
 
-// Parameters are differentiated in passes of kLanes over the same samples. InputError for unknown
-// parameters, methods or terms, for a method that cannot leave terms out, and for counts that are
-// not positive.
+// Parameters are differentiated in passes of kLanes over the same samples. InputError for no
+// parameters, unknown parameters, methods or terms, for a method that cannot leave terms out, for
+// a step that is negative or not finite, and for counts that are not positive or beyond 1024.
 GradientResult gradient(const Scene& scene, const GradientOptions& options,
                         const RunSettings& settings);
 

@@ -8,7 +8,9 @@
 //
 // A part is kept as a sequence of NumPy arrays, as numpy.save appends them to one file: a text
 // (uint8) that says what it is a part of, then two arrays for each batch, its counts (int64, the
-// first two being its samples [first, last)) and its sums (float64), then an empty array of int64.
+// first two being its samples [first, last), the third the CRC-32 of all other counts, then all
+// sums) and its sums (float64), then an empty array of int64. The last line of the text is the
+// CRC-32 of the others. So a flipped bit anywhere is an error.
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -99,8 +101,8 @@ class PartWriter final : public BatchStore {
   std::unique_ptr<std::iostream> out_;
 };
 
-// All parts of a run. InputError that says which part is missing, there twice, not complete, or of
-// another run, and how that differs.
+// All parts of a run. InputError that says which part is missing, there twice, not complete,
+// damaged, or of another run, and how that differs.
 class PartReader final : public BatchStore {
  public:
   explicit PartReader(const std::vector<std::string>& files);

@@ -30,11 +30,15 @@ def write_ply(
     rows = np.empty(len(corners), dtype=[("count", "u1"), ("corners", "<u4", 3)])
     rows["count"], rows["corners"] = 3, corners
     # Under another name first: nobody reads half a file.
-    unfinished = f"{os.fspath(file)}.{os.getpid()}.tmp"
+    path = os.fspath(file)
+    if not isinstance(path, str):
+        raise TypeError("file: a path is a str or an os.PathLike of one, not bytes")
+    path = os.path.realpath(path)  # a link stays
+    unfinished = f"{path}.{os.getpid()}.tmp"
     try:
         with open(unfinished, "wb") as stream:
             stream.write(_header(len(points), len(rows)) + points.tobytes() + rows.tobytes())
-        os.replace(unfinished, file)
+        os.replace(unfinished, path)
     finally:
         if os.path.exists(unfinished):
             os.remove(unfinished)
