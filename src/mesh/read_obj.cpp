@@ -1,9 +1,17 @@
-// Wavefront OBJ. Every word of a vertex, a normal or a face is read, and one that is not understood
-// is an error: what is skipped in silence is a surface that is missing.
+// Wavefront OBJ, parsed by tinyobjloader: this file is the one door to it. A check in front of it
+// reads every word of a vertex, a normal and a face: what a parser skips in silence is a surface
+// that is missing. Polygons are split here, in linear time.
+#define TINYOBJLOADER_IMPLEMENTATION
+#define TINYOBJLOADER_USE_DOUBLE
+#include <fmt/format.h>
+#include <tiny_obj_loader.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+#include <span>
+#include <sstream>
 
 #include "limn/core/names.h"
 #include "src/base/text.h"
@@ -98,185 +106,209 @@ struct Elements {
   ObjWords::Place place;
 };
 
-constexpr size_t kMostVertices = std::numeric_limits<uint32_t>::max() - 1;
+// Of tinyobjloader's indices.
+constexpr size_t kMostElements = std::numeric_limits<int>::max();
 
-class ObjReader {
+// What the check leaves for the parser: lines with v, vn, vt and f alone, none continued, all of
+// them sound; and where the faces stand in the file.
+class ObjCheck {
  public:
-  ObjReader(const std::string& file, const std::string& text) : words_(file, text) {
-    mesh_.where = {file};
-  }
-
-  RawMesh read() {
+  ObjCheck(const std::string& file, const std::string& text) : words_(file, text) {
     while (!words_.at_end()) {
-      read_statement(words_.next());
+      check_statement(words_.next());
       words_.skip_line();
     }
     for (const Elements* e : {&vertices_, &textures_, &normals_}) {
       if (e->largest <= static_cast<int64_t>(e->count)) continue;
-      words_.fail(e->place, "a face refers to " + std::string(e->name) + " " +
-                                std::to_string(e->largest) + ", but there are " +
-                                std::to_string(e->count));
+      words_.fail(e->place, fmt::format("a face refers to {} {}, but there are {}", e->name,
+                                        e->largest, e->count));
     }
-    split_faces();
-    return std::move(mesh_);
   }
 
- private:
-  struct Face {
-    uint32_t corners;
-    ObjWords::Place place;
-  };
+  std::string take_lines() { return std::move(lines_); }
+  const std::vector<ObjWords::Place>& faces() const { return faces_; }
+  const ObjWords& words() const { return words_; }
+  // The first vertex beyond kLargestCoordinate; SIZE_MAX if there is none.
+  size_t far_position() const { return far_position_; }
+  SourceLocation far_where() const { return words_.location(far_place_); }
 
-  void read_statement(std::string_view keyword) {
+ private:
+  void check_statement(std::string_view keyword) {
     if (keyword == "v") {
-      mesh_.positions.push_back(read_position());
-      if (++vertices_.count > kMostVertices) words_.fail("too many vertices");
+      check_position();
+      count(vertices_);
     } else if (keyword == "vn") {
-      const std::vector<double>& n = read_numbers("normal", 3, 3);
-      mesh_.normals.push_back({n[0], n[1], n[2]});
-      if (++normals_.count > kMostVertices) words_.fail("too many normals");
+      const std::vector<double>& n = check_numbers("normal", 3, 3);
+      // Normals that are not finite are not used: zero is such a one.
+      lines_ += "vn" + (std::isfinite(n[0] + n[1] + n[2]) ? rest_ : " 0 0 0") + "\n";
+      count(normals_);
     } else if (keyword == "vt") {
-      read_numbers("texture coordinate", 1, 3);
-      ++textures_.count;
+      check_numbers("texture coordinate", 1, 3);
+      lines_ += "vt" + rest_ + "\n";
+      count(textures_);
     } else if (keyword == "f") {
-      read_face();
+      check_face();
     } else if (!keyword.empty() &&
                std::find(kSkipped.begin(), kSkipped.end(), keyword) == kSkipped.end()) {
       std::vector<std::string> known = kSkipped;
       known.insert(known.end(), {"f", "v", "vn", "vt"});
       std::sort(known.begin(), known.end());
       // What is no OBJ file may be none that a message should quote.
-      if (mesh_.positions.empty()) {
+      if (vertices_.count == 0) {
         words_.fail("this is no statement of an OBJ file (" + known_names(known) + ")");
       }
       words_.fail(unknown_name("statement", std::string(keyword), known));
     }
   }
 
-  // The numbers of the rest of the line, as many as that.
-  const std::vector<double>& read_numbers(const std::string& what, size_t least, size_t most) {
+  void count(Elements& of) const {
+    if (++of.count > kMostElements) words_.fail("more of a kind than 2147483647: split the file");
+  }
+
+  // The numbers of the rest of the line, as many as that; their words in rest_.
+  const std::vector<double>& check_numbers(const std::string& what, size_t least, size_t most) {
     numbers_.clear();
+    rest_.clear();
     for (std::string_view word = words_.next(); !word.empty(); word = words_.next()) {
       const std::optional<double> number = parse_double(word);
       if (!number) words_.fail("not a number: \"" + std::string(word) + "\"");
-      if (numbers_.size() == most) {
-        words_.fail(what + ": more than " + std::to_string(most) + " numbers");
-      }
+      if (numbers_.size() == most) words_.fail(fmt::format("{}: more than {} numbers", what, most));
       numbers_.push_back(*number);
+      (rest_ += ' ') += word;
     }
     if (numbers_.size() < least) {
-      words_.fail(what + " needs " + std::to_string(least) + " numbers, not " +
-                  std::to_string(numbers_.size()));
+      words_.fail(fmt::format("{} needs {} numbers, not {}", what, least, numbers_.size()));
     }
     return numbers_;
   }
 
   // x y z, then a weight, a colour, or both, which nothing here uses.
-  Vec3d read_position() {
+  void check_position() {
     const ObjWords::Place begin = words_.where();
-    const std::vector<double>& n = read_numbers("vertex", 3, 7);
+    const std::vector<double>& n = check_numbers("vertex", 3, 7);
     if (n.size() == 5) words_.fail(begin, "vertex: 5 numbers are neither x y z w nor x y z r g b");
     for (const double v : n) {
       if (!std::isfinite(v)) words_.fail(begin, "vertex is not finite");
       if (std::fabs(v) > std::numeric_limits<float>::max()) {
         words_.fail(begin, "vertex: a number is beyond a float's range (3.4e38)");
       }
-      if (std::fabs(v) > kLargestCoordinate && mesh_.far_position == SIZE_MAX) {
-        mesh_.far_position = mesh_.positions.size();
-        mesh_.far_where = words_.location(begin);
+      if (std::fabs(v) > kLargestCoordinate && far_position_ == SIZE_MAX) {
+        far_position_ = vertices_.count;
+        far_place_ = begin;
       }
     }
-    return {n[0], n[1], n[2]};
+    lines_ += "v" + rest_ + "\n";
   }
 
-  void read_face() {
-    const ObjWords::Place begin = words_.where();
-    uint32_t corners = 0;
-    for (std::string_view word = words_.next(); !word.empty(); word = words_.next()) {
-      read_corner(word);
-      ++corners;
+  void check_face() {
+    faces_.push_back(words_.where());
+    lines_ += 'f';
+    int corners = 0;
+    for (std::string_view word = words_.next(); !word.empty(); word = words_.next(), ++corners) {
+      check_corner(word);
+      (lines_ += ' ') += word;
     }
-    if (corners < 3) words_.fail(begin, "a face needs at least three corners");
-    faces_.push_back({corners, begin});
+    lines_ += '\n';
+    if (corners < 3) words_.fail(faces_.back(), "a face needs at least three corners");
   }
 
   // v, v/vt, v//vn or v/vt/vn.
-  void read_corner(std::string_view word) {
+  void check_corner(std::string_view word) {
     std::array<std::string_view, 3> parts;
-    size_t count = 0;
-    for (std::string_view rest = word; count < 3; ++count) {
-      const size_t slash = std::min(rest.find('/'), rest.size());
-      parts[count] = count < 2 ? rest.substr(0, slash) : rest;
+    size_t last = 0;
+    for (std::string_view rest = word;; ++last) {
+      const size_t slash = last < 2 ? std::min(rest.find('/'), rest.size()) : rest.size();
+      parts[last] = rest.substr(0, slash);
       if (slash == rest.size()) break;
       rest.remove_prefix(slash + 1);
     }
-    const size_t last = std::min<size_t>(count, 2);
-    corner_vertices_.push_back(index(word, parts[0], vertices_));
-    if (last == 1 || !parts[1].empty()) index(word, parts[1], textures_);
-    corner_normals_.push_back(last == 2 ? index(word, parts[2], normals_) : kNoNormal);
+    check_index(word, parts[0], vertices_);
+    if (last == 1 || !parts[1].empty()) check_index(word, parts[1], textures_);
+    if (last == 2) check_index(word, parts[2], normals_);
   }
 
-  // From 0. Indices of files count from 1 and may point ahead (checked at the end), or, if
-  // negative, backwards from the latest element.
-  uint32_t index(std::string_view word, std::string_view part, Elements& of) {
+  // Indices count from 1 and may point ahead (checked at the end), or, if negative, backwards from
+  // the latest element.
+  void check_index(std::string_view word, std::string_view part, Elements& of) {
     const std::optional<int64_t> number = parse_integer(part);
+    const auto refers = [&](const std::string& what) {
+      words_.fail(fmt::format("a face refers to {} {}, but {}", of.name, *number, what));
+    };
     if (!number) {
-      words_.fail("a corner is v, v/vt, v//vn or v/vt/vn in whole numbers, not \"" +
-                  std::string(word) + "\"");
+      words_.fail(
+          fmt::format("a corner is v, v/vt, v//vn or v/vt/vn in whole numbers, not \"{}\"", word));
     }
-    if (*number == 0)
-      words_.fail("a face refers to " + std::string(of.name) + " 0, but they count from 1");
-    if (*number < 0) {
-      const auto count = static_cast<int64_t>(of.count);
-      if (*number < -count) {
-        words_.fail("a face refers to " + std::string(of.name) + " " + std::to_string(*number) +
-                    ", but there are " + std::to_string(count) + " before it");
-      }
-      return static_cast<uint32_t>(count + *number);
+    if (*number == 0) refers("they count from 1");
+    if (*number < -static_cast<int64_t>(of.count)) {
+      refers(fmt::format("there are {} before it", of.count));
     }
-    if (*number > of.largest) {
-      of.largest = *number;
-      of.place = words_.where();
-    }
-    return static_cast<uint32_t>(*number - 1);
-  }
-
-  void split_faces() {
-    const bool has_normals = std::any_of(corner_normals_.begin(), corner_normals_.end(),
-                                         [](uint32_t n) { return n != kNoNormal; });
-    size_t first = 0;
-    std::vector<Vec3d> corners;
-    for (const Face& face : faces_) {
-      corners.clear();
-      for (size_t i = first; i < first + face.corners; ++i) {
-        corners.push_back(mesh_.positions[corner_vertices_[i]]);
-      }
-      const auto triangles = split_polygon(corners);
-      if (triangles.empty()) {
-        words_.fail(face.place, "a concave face of " + std::to_string(corners.size()) +
-                                    " corners (at most " + std::to_string(kMaxConcaveCorners) +
-                                    "): split it");
-      }
-      for (const auto& t : triangles) {
-        mesh_.faces.push_back(picked(corner_vertices_, first, t));
-        if (has_normals) mesh_.normal_ids.push_back(picked(corner_normals_, first, t));
-      }
-      first += face.corners;
-    }
-  }
-
-  static FaceIndices picked(const std::vector<uint32_t>& from, size_t first,
-                            const std::array<uint32_t, 3>& triangle) {
-    return {from[first + triangle[0]], from[first + triangle[1]], from[first + triangle[2]]};
+    if (*number <= of.largest) return;
+    of.largest = *number;
+    of.place = words_.where();
   }
 
   ObjWords words_;
-  RawMesh mesh_;
   Elements vertices_{"vertex", 0, 0, {}}, textures_{"texture coordinate", 0, 0, {}},
       normals_{"normal", 0, 0, {}};
   std::vector<double> numbers_;  // of the line at hand
-  std::vector<Face> faces_;
-  std::vector<uint32_t> corner_vertices_, corner_normals_;  // of all faces
+  std::string rest_, lines_;
+  std::vector<ObjWords::Place> faces_;
+  size_t far_position_ = SIZE_MAX;
+  ObjWords::Place far_place_;
+};
+
+// What the parser calls back with: elements as they come, faces with all their corners.
+struct Parsed {
+  RawMesh mesh;
+  std::vector<uint32_t> vertices, normals;  // of all corners
+  std::vector<size_t> ends{0};              // of each face's corners
+
+  static uint32_t from_zero(int index, size_t count) {
+    return static_cast<uint32_t>(index > 0 ? index - 1 : static_cast<int64_t>(count) + index);
+  }
+  static Parsed& of(void* parsed) { return *static_cast<Parsed*>(parsed); }
+  static tinyobj::callback_t callbacks() {
+    tinyobj::callback_t calls;
+    calls.vertex_cb = [](void* to, double x, double y, double z, double) {
+      of(to).mesh.positions.push_back({x, y, z});
+    };
+    calls.normal_cb = [](void* to, double x, double y, double z) {
+      of(to).mesh.normals.push_back({x, y, z});
+    };
+    calls.index_cb = [](void* to, tinyobj::index_t* corners, int count) {
+      Parsed& p = of(to);
+      for (const tinyobj::index_t& c : std::span(corners, static_cast<size_t>(count))) {
+        p.vertices.push_back(from_zero(c.vertex_index, p.mesh.positions.size()));
+        p.normals.push_back(c.normal_index == 0 ? kNoNormal
+                                                : from_zero(c.normal_index, p.mesh.normals.size()));
+      }
+      p.ends.push_back(p.vertices.size());
+    };
+    return calls;
+  }
+
+  void split_faces(const ObjCheck& check) {
+    const bool has_normals =
+        std::any_of(normals.begin(), normals.end(), [](uint32_t n) { return n != kNoNormal; });
+    std::vector<Vec3d> corners;
+    for (size_t f = 0; f + 1 < ends.size(); ++f) {
+      corners.clear();
+      for (size_t i = ends[f]; i < ends[f + 1]; ++i) corners.push_back(mesh.positions[vertices[i]]);
+      const auto triangles = split_polygon(corners);
+      if (triangles.empty()) {
+        check.words().fail(check.faces()[f],
+                           fmt::format("a concave face of {} corners (at most {}): split it",
+                                       corners.size(), kMaxConcaveCorners));
+      }
+      for (const auto& t : triangles) {
+        const auto picked = [&, first = ends[f]](const std::vector<uint32_t>& from) {
+          return FaceIndices{from[first + t[0]], from[first + t[1]], from[first + t[2]]};
+        };
+        mesh.faces.push_back(picked(vertices));
+        if (has_normals) mesh.normal_ids.push_back(picked(normals));
+      }
+    }
+  }
 };
 
 }  // namespace
@@ -284,7 +316,17 @@ class ObjReader {
 RawMesh parse_obj(const std::string& file) {
   const std::optional<std::string> text = read_whole_file(file);
   if (!text) throw InputError({file}, "cannot read the file");
-  return ObjReader(file, *text).read();
+  ObjCheck check(file, *text);
+  Parsed parsed;
+  std::istringstream lines(check.take_lines());
+  if (!tinyobj::LoadObjWithCallback(lines, Parsed::callbacks(), &parsed)) {
+    throw InputError({file}, "cannot be parsed");
+  }
+  parsed.mesh.where = {file};
+  parsed.mesh.far_position = check.far_position();
+  if (check.far_position() != SIZE_MAX) parsed.mesh.far_where = check.far_where();
+  parsed.split_faces(check);
+  return std::move(parsed.mesh);
 }
 
 }  // namespace limn

@@ -215,6 +215,7 @@ TEST(Includes, OneDoorPerThirdParty) {
       {"OpenEXR", std::regex("^(Imf|Iex|half\\.h|openexr|OpenEXR/).*")},
       {"libpng", std::regex("^png.*")},
       {"pugixml", std::regex("^pugixml.*")},
+      {"tinyobjloader", std::regex("^tiny_obj_loader.*")},
       {"TBB", std::regex("^(oneapi/)?tbb/.*")},
       {"OpenMesh", std::regex("^OpenMesh/.*")},
       {"CLP", std::regex("^(coin/|Clp|Coin).*")},
@@ -227,7 +228,7 @@ TEST(Includes, OneDoorPerThirdParty) {
       }
     }
   }
-  for (const char* library : {"Embree", "OpenEXR", "libpng", "pugixml", "TBB"}) {
+  for (const char* library : {"Embree", "OpenEXR", "libpng", "pugixml", "TBB", "tinyobjloader"}) {
     ASSERT_EQ(doors[library].size(), 1u) << library;
   }
   for (const auto& [library, files] : doors) {
