@@ -26,8 +26,8 @@ struct Choice {
   void add_up();
 };
 
-// Weights the children, with two-level importance as configured. uncertainty: see weigh_children, for
-// inner nodes; zero for edges.
+// Weights the children, with two-level importance as configured. uncertainty: see weigh_children,
+// for inner nodes; zero for edges.
 Choice choice_at(const Forest& forest, const ForestConfig& config, const ForestQuery& query,
                  NodeId id, Floats* uncertainty = nullptr);
 

@@ -78,8 +78,8 @@ struct ChildWeights {
   Floats rest;    // speed, distance, lobe and light; 0 if rejected
   Floats product() const;
 };
-// uncertainty (optional): uncertainty, about the factor by which `rest` may be too small, since lobe and
-// distance vary over the box; below some hundreds.
+// uncertainty (optional): uncertainty, about the factor by which `rest` may be too small, since
+// lobe and distance vary over the box; below some hundreds.
 ChildWeights weigh_children(const InnerNode& node, const ForestQuery& query, bool soft,
                             Floats* uncertainty = nullptr);
 // Total expected length over all children, over the squared radius given by

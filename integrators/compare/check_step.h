@@ -18,8 +18,8 @@ double find_check_step(const Scene& scene, const std::string& parameter, const W
 // small enough, else a smaller one.
 double reduced_step(const DifferenceResult& differences, double step, const Windows& windows);
 
-// What the rounding of moved positions and texels, which are floats, makes of differences at a step,
-// over the derivative: about 2^-24 of what moves over its way. 0 where nothing of these moves.
+// The error that rounding moved positions and texels to float causes in differences at a step,
+// over the derivative: about 2^-24 of what moves over its way. 0 if none of these moves.
 double rounding_of_moves(const Scene& scene, const Parameter& parameter, double step);
 
 }  // namespace limn

@@ -22,7 +22,8 @@ RenderOptions with_method(RenderOptions options, const std::string& name) {
   return options;
 }
 
-// Set-up, a pilot's with it, and one sample of one pixel: InputError if the method does not know the scene.
+// Set-up, a pilot's with it, and one sample of one pixel: InputError if the method does not know
+// the scene.
 void try_method(const Scene& scene, const RunSettings& settings, const RenderOptions& given,
                 const std::string& method) {
   const RenderOptions options = with_method(given, method);

@@ -14,16 +14,16 @@ namespace limn {
 namespace {
 
 // A lamp is worth so many times fewer lines than the sky, where listing contours takes longer. With
-// 4, 8, 16, 32 lines the relative error of soft_lamp.xml (64 x 64) after 1.5 s is 5.8, 3.9, 2.5, 2.8
-// parts in 1000; that of ambient occlusion under the pebble after 3 s with 8, 16, 32, 64 lines is
-// 4.6, 1.3, 0.7, 0.2 parts.
+// 4, 8, 16, 32 lines the relative error of soft_lamp.xml (64 x 64) after 1.5 s is 5.8, 3.9, 2.5,
+// 2.8 parts in 1000; that of ambient occlusion under the pebble after 3 s with 8, 16, 32, 64 lines
+// is 4.6, 1.3, 0.7, 0.2 parts.
 constexpr int kSkyLines = 4;
 // Lamps that are no polygon are cut into their faces. Not tuned.
 constexpr size_t kMostFaces = 64;
 
-// Few lines can miss the same thing and agree: a tolerance asks for as many at least. Of a cube that
-// fills a tenth of the azimuths the largest error of 100 offsets at a tolerance of 1e-3 is 0.13 from
-// one line, and 1.1e-3 from 8 (test_line_light).
+// Few lines can miss the same thing and agree: a tolerance asks for as many at least. Of a cube
+// that fills a tenth of the azimuths the largest error of 100 offsets at a tolerance of 1e-3 is
+// 0.13 from one line, and 1.1e-3 from 8 (test_line_light).
 constexpr int kFewestLines = 8;
 
 // A place on a line, by cot theta.

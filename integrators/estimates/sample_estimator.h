@@ -38,9 +38,9 @@ inline constexpr size_t kMostTogether = 64;
 struct FilmMotion {
   Lanes x, y;
 };
-// Where a filter ends at once, a box or one that the film's border cuts, positions come to rest: over
-// so many pixels. What lies on the end itself, as an edge at rest may, is seen from both sides of
-// it by rounding alone. Not tuned.
+// Where a filter ends at once, a box or one that the film's border cuts, positions come to rest:
+// over so many pixels. What lies on the end itself, as an edge at rest may, is seen from both sides
+// of it by rounding alone. Not tuned.
 inline constexpr double kTaper = 1.0 / 64;
 // Whether a pixel's filter ends at once at this offset, an end of its range.
 inline bool ends_at_once(const Filter& filter, double end) {

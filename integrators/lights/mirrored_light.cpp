@@ -13,7 +13,8 @@ namespace {
 // None of these is tuned.
 constexpr double kWidest = 0.35;   // of a lobe that is worth it [rad]
 constexpr double kFlat = 0x1p-16;  // how far a plane's points may lie off, over the mesh's size
-// Of the light over the plane: the sine of its elevation, or its height over the flat part's radius.
+// Of the light over the plane: the sine of its elevation, or its height over the flat part's
+// radius.
 constexpr double kLeastHeight = 1e-3;
 // What is seen of surfaces in the light of lamps, over what these send to the mean one without what
 // hides them. What stands in the light is more in view than the mean: with 0.5 edges of a teapot
@@ -48,7 +49,8 @@ double versine(double angle) {
   return 2 * sine * sine;
 }
 
-// Within which a light of that size is bright in a lobe: angles from its perfect mirror image [rad].
+// Within which a light of that size is bright in a lobe: angles from its perfect mirror image
+// [rad].
 double spread_of(double lobe, double size) { return std::min(lobe + size, 0.5 * kPi); }
 
 // The lesser of what a lamp sends to two near places of a face: it may hang just over one.

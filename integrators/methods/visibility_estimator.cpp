@@ -19,8 +19,8 @@ namespace {
 constexpr int kLampPoints = 16;
 constexpr int kMostRays = 1 << 20;
 // What a pilot counts, in units of a ray (0.17 us): a point of the film besides its ray, and
-// LineWork, as fitted to the times of the points of cad.xml, plant.xml, sun.xml, soft_shadow.xml and
-// soft_lamp.xml; means over each of these come out within a quarter.
+// LineWork, as fitted to the times of the points of cad.xml, plant.xml, sun.xml, soft_shadow.xml
+// and soft_lamp.xml; means over each of these come out within a quarter.
 constexpr double kPointCost = 1.5, kListCost = 12, kArcCost = 0.7, kCrossingCost = 1.8,
                  kEvaluationCost = 0.45;
 constexpr uint64_t kPilotSeed = 0x9170;

@@ -20,8 +20,8 @@ inline void PathTracer<S, Visitor>::place_lights_wide(std::span<Walk* const> wal
   c_.lights.at({points, count}, {places, count});
 }
 
-// then(walk, evaluation): of the direction *direction(walk) of each walk where that lies in front of
-// the surface, in a new order; nothing is scattered into the others.
+// then(walk, evaluation): of the direction *direction(walk) of each walk where that lies in front
+// of the surface, in a new order; nothing is scattered into the others.
 template <class S, class Visitor>
 template <class Direction, class Then>
 inline void PathTracer<S, Visitor>::evaluate_wide(std::span<Walk*> walks,

@@ -41,9 +41,9 @@ double spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& g
 double price_of(const std::vector<TermFigures>& figures, const SampleCounts& counts);
 
 // See SamplePlan. What a draw of weight w adds to the squared error is (w j)^2, j its jump. Traced
-// with the probability p it adds (w j)^2 / p, for p of its rays' work: p = w j / sqrt(price work) is
-// best. Jumps and work are those of all draws, means of squares and of rays. units: of the squared
-// error of every parameter; where one is 0, all draws are traced.
+// with the probability p it adds (w j)^2 / p, for p of its rays' work: p = w j / sqrt(price work)
+// is best. Jumps and work are those of all draws, means of squares and of rays. units: of the
+// squared error of every parameter; where one is 0, all draws are traced.
 Lanes survival_of(const TracedDraws& traced, double price, std::span<const double> units);
 
 // Light samples of a path: what one of them adds to its variance, and what it costs.
@@ -64,8 +64,8 @@ double trimmed_mean(std::vector<double> values);
 // Samples per pixel of a pilot for a job of `spp`, even; 0 if the job is too short for one.
 int pilot_samples(int spp);
 // How many of these where one took `each` seconds, in a job of so many, so many of which are left:
-// what an eighth of the job holds, or at least four, if these take no more than 0.3 of what is left;
-// 0 otherwise.
+// what an eighth of the job holds, or at least four, if these take no more than 0.3 of what is
+// left; 0 otherwise.
 int pilot_samples_in_time(int spp, double each, double seconds, double left);
 // The same of the pilot that finds how positions on the film move, of every other pixel.
 int film_pilot_samples(int spp);

@@ -27,8 +27,8 @@ constexpr double kRidge = 0.05, kLeast = 0.01;
 // What is left of a term decides how much of the work it gets, and so how much it counts.
 constexpr int kRounds = 3;
 
-// Numbers the entries of symmetric matrices: over the parameters' derivatives, which come first, and
-// what the film's motions along x and y add.
+// Numbers the entries of symmetric matrices: over the parameters' derivatives, which come first,
+// and what the film's motions along x and y add.
 class Entries {
  public:
   explicit Entries(int parameters) : parameters_(parameters) {}

@@ -1,10 +1,10 @@
 #pragma once
 // How positions on the film move: chosen for every cell by a pilot of its own, which comes behind
-// the first samples of the other one. With positions that move by V (terms/filter.cpp) a derivative changes by V times
-// an amount whose mean is zero: what all other terms add where the film moves under the scene,
-// edges at rest included, less what the pixels lose and gain at their rims. So V is the coefficient
-// of a control variate: any one is right, and one that follows what a pixel sees takes out most of
-// what slides and is covered there, shadows and mirror images as well.
+// the first samples of the other one. With positions that move by V (terms/filter.cpp) a derivative
+// changes by V times an amount whose mean is zero: what all other terms add where the film moves
+// under the scene, edges at rest included, less what the pixels lose and gain at their rims. So V
+// is the coefficient of a control variate: any one is right, and one that follows what a pixel sees
+// takes out most of what slides and is covered there, shadows and mirror images as well.
 #include <vector>
 
 #include "integrators/pilot/probing_estimator.h"
@@ -38,16 +38,16 @@ struct PilotTime {
 bool is_time_for_film(const PilotTime& pilot, bool moves_camera);
 
 // By a pilot. The estimator has kMostFilmParameters at most, and is left with a plan that is of no
-// use. settings, watch: as of run_pilot; it takes an eighth of a limit of time. Deterministic on any
-// number of threads.
+// use. settings, watch: as of run_pilot; it takes an eighth of a limit of time. Deterministic on
+// any number of threads.
 FilmFit fit_film(TermEstimator& estimator, const SamplePlan& plan, const FilmLook& look,
                  const RunSettings& settings, const Stopwatch& watch);
 
 // How fast, about, what moves does so on the film [pixels per unit of the first parameter].
 double film_speed(const TermEstimator& estimator);
 
-// All terms with two lanes more than there are parameters, at the pixels that a pilot probes: `turn`
-// samples at every other one, then as many at the rest, and so on.
+// All terms with two lanes more than there are parameters, at the pixels that a pilot probes:
+// `turn` samples at every other one, then as many at the rest, and so on.
 class FilmProbe final : public ProbingEstimator {
  public:
   // Both must outlive it.

@@ -26,8 +26,8 @@ struct Warping {
 
 class TermEstimator final : public SampleEstimator {
  public:
-  // parameters: at most kLanes. types: terms_of() the scene; slots are indices into it. computed: for each of them, whether it
-  // is computed. visible: of the film, or null. warping: null where directions are not warped.
+  // parameters: at most kLanes. types: terms_of() the scene; slots are indices into it. computed:
+  // one per type. visible: of the film, or null. warping: null where directions are not warped.
   // closed: what surfaces scatter is known in closed form, see closed_light.h.
   TermEstimator(const Scene& scene, std::span<const Parameter> parameters,
                 const std::vector<const TermType*>& types, const std::vector<bool>& computed,

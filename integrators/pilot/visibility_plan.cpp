@@ -4,11 +4,11 @@
 // look around adds: v_l by lines, v_r / n by n rays. Of v_f what is linear over the pixel does not
 // count: even points, two already, have little of it.
 //
-// Lines look from a point, its mirror image and the center of the pixel: of the square of the second
-// difference a sixth is v_f + v_l. But much of v_f may be that of few points, at edges, and three
-// that saw none of them mean little. Rays are cheap and tell it as well: of two looks from each of
-// many points the covariance is v_f, half the squared difference v_r / n. So what rays know to be
-// there is the least that lines can have.
+// Lines look from a point, its mirror image and the center of the pixel: of the square of the
+// second difference a sixth is v_f + v_l. But much of v_f may be that of few points, at edges, and
+// three that saw none of them mean little. Rays are cheap and tell it as well: of two looks from
+// each of many points the covariance is v_f, half the squared difference v_r / n. So what rays know
+// to be there is the least that lines can have.
 #include "integrators/pilot/visibility_plan.h"
 
 #include <algorithm>
@@ -22,8 +22,8 @@
 namespace limn {
 namespace {
 
-// The squared error of even points falls like this power of their number, and so of their time: that
-// of what jumps over a square.
+// The squared error of even points falls like this power of their number, and so of their time:
+// that of what jumps over a square.
 constexpr double kEven = 1.5;
 constexpr int kCell = 8;  // the side of a cell [pixels]; not tuned
 // Rays of a look in the pilot; its points are as many as take the time of two looks by lines,
@@ -32,9 +32,9 @@ constexpr int kPilotRays = 4;
 constexpr double kPatchCost = 512;  // in place of that time where there are no lines
 constexpr double kFewestPoints = 32, kMostPilotPoints = 1024;
 constexpr std::array<int, 4> kRays = {1, 2, 4, 8};  // that a point may have
-// Means are over windows of 5 by 5 and 9 by 9 cells: the few edges that make most of what a pilot by
-// lines has not seen are mostly near others. With 3 by 3 cells single ones of sun.xml took lines, and
-// with 10 times the standard error at the end doubled that of the image.
+// Means are over windows of 5 by 5 and 9 by 9 cells: the few edges that make most of what a pilot
+// by lines has not seen are mostly near others. With 3 by 3 cells single ones of sun.xml took
+// lines, and with 10 times the standard error at the end doubled that of the image.
 constexpr int kRadii[] = {2, 4};
 constexpr double kWindow = 25;
 constexpr double kSurely = 2;  // standard errors; not tuned

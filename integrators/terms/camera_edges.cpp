@@ -38,8 +38,8 @@ double fraction_in_space(double s, double depth0, double depth1) {
 
 // Where positions move, edges are drawn in pieces of so many pixels at most. Not tuned.
 constexpr double kPieceLength = 2;
-// The share of its motion against all pixels around it in how likely a piece is drawn; the rest goes
-// by those that see its middle. Not tuned.
+// The share of its motion against all pixels around it in how likely a piece is drawn; the rest
+// goes by those that see its middle. Not tuned.
 constexpr double kAllAround = 0.1;
 
 Lanes larger(const Lanes& a, const Lanes& b) {

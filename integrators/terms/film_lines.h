@@ -24,9 +24,9 @@ struct FilmLine {
 struct EdgesInLine {
   // Of each edge whether it is in one line with another one.
   std::vector<bool> in_line;
-  // Whose they are, of two that move past each other, across their line, and have a sixteenth of the
-  // film's width in common: the image has a kink if both are seen. In order; faces that are seen
-  // edge-on are left out.
+  // Whose they are, of two that move past each other, across their line, and have a sixteenth of
+  // the film's width in common: the image has a kink if both are seen. In order; faces that are
+  // seen edge-on are left out.
   std::optional<std::array<ShapeId, 2>> parting;
 };
 

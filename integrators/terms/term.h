@@ -178,8 +178,8 @@ struct TermType {
 };
 // In the order of --samples and of all tables.
 std::span<const TermType> term_types();
-// Whether a sampler has a term. closed: light is known in closed form, which holds whatever vertices
-// see. moved_film: positions on the film may move.
+// Whether a sampler has a term. closed: light is known in closed form, which holds whatever
+// vertices see. moved_film: positions on the film may move.
 bool has_term(const EdgeSamplerType& sampler, const TermType& type, bool closed, bool moved_film);
 // The rows that the sampler has and that apply to the scene, in their order: forward and reverse
 // mode, fits and comparisons ask here.

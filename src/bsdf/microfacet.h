@@ -93,9 +93,9 @@ Vec3<S> ggx_visible(const Vec3<S>& v, double alpha, const S& u1, const S& u2) {
 }
 
 // Reflectance of a conductor for unpolarised light; refractive index eta + i k, relative to the
-// outside; cos of the angle of incidence. With t = eta^2 - k^2 - sin^2, s = |(t, 2 eta k)| + |t| and
-// r = sqrt(2 s), the refracted wave has a = (t < 0 ? 2 eta k / r : r / 2), without cancellation; what
-// follows is extended by r, and has one division.
+// outside; cos of the angle of incidence. With t = eta^2 - k^2 - sin^2, s = |(t, 2 eta k)| + |t|
+// and r = sqrt(2 s), the refracted wave has a = (t < 0 ? 2 eta k / r : r / 2), without
+// cancellation; what follows is extended by r, and has one division.
 template <class S>
 S fresnel_conductor(const S& cos_h, double eta, double k) {
   constexpr double kTiny = 1e-100;  // s is 0 at the critical angle if k = 0

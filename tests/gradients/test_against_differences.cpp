@@ -214,8 +214,8 @@ INSTANTIATE_TEST_SUITE_P(, CrossingSurfaces,
                                          "sensor.translate.x"),
                          name_of_string);
 
-// The largest difference of any pixel at the wider of two steps, and the largest change from there to
-// the other.
+// The largest difference of any pixel at the wider of two steps, and the largest change from there
+// to the other.
 struct Steps {
   double largest = 0, apart = 0;
 };
@@ -234,8 +234,8 @@ Steps at_two_steps(const Scene& scene, const std::string& name, double wide, dou
   return steps;
 }
 
-// Light is linear in a lamp's radiance, and so is what few samples make of it, whatever the step: the
-// lights and the glare that they draw are those of the scene as it is.
+// Light is linear in a lamp's radiance, and so is what few samples make of it, whatever the step:
+// the lights and the glare that they draw are those of the scene as it is.
 TEST(Differences, DrawLightsAlike) {
   const TempFiles files;
   SceneParts parts = mixed_scene(files);
@@ -264,8 +264,9 @@ TEST(Differences, GoAlikeWhateverTheMaterials) {
   }
 }
 
-// The image begins to shine as the reflectance of black surfaces grows: by lamps, the sky and lights
-// without extent, straight and by way of others, whatever roulette makes of paths that end there.
+// The image begins to shine as the reflectance of black surfaces grows: by lamps, the sky and
+// lights without extent, straight and by way of others, whatever roulette makes of paths that end
+// there.
 TEST(Paths, BlackSurfacesBeginToShine) {
   const TempFiles files;
   SceneParts parts;

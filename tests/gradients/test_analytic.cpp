@@ -57,8 +57,8 @@ TEST(Analytic, LampsFlushInLargeSurfaces) {
   }
 }
 
-// The back of a lamp, and a panel in its place that looks the other way, see nothing of it, whichever
-// side of its plane their points are rounded to.
+// The back of a lamp, and a panel in its place that looks the other way, see nothing of it,
+// whichever side of its plane their points are rounded to.
 TEST(Analytic, LampsFromBehindAreBlack) {
   const std::string glow = R"(<emitter type="area"><rgb name="radiance" value="2"/></emitter>)";
   const std::string matt = R"(<bsdf type="twosided"><bsdf type="diffuse"/></bsdf>)";
@@ -101,7 +101,8 @@ TEST(Analytic, LampsFromBehindAreBlack) {
   }
 }
 
-// Normals of a file at a right angle to their face, and past it: it sees no light, which is a number.
+// Normals of a file at a right angle to their face, and past it: it sees no light, which is a
+// number.
 TEST(Analytic, NormalsAtRightAnglesToTheirFace) {
   const TempFiles files;
   for (const double up : {0.0, -0.5, 0.5}) {

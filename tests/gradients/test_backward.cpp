@@ -344,8 +344,8 @@ TEST(Backward, AgreesInMirrors) {
   expect_agreement(mirror_scene(files, false), 32);
 }
 
-// The image is linear in a lamp's radiance, so that its derivative does not depend on it: no less of a
-// lamp that is black, as fits may begin.
+// The image is linear in a lamp's radiance, so that its derivative does not depend on it: no less
+// of a lamp that is black, as fits may begin.
 TEST(Backward, OfABlackLamp) {
   const TempFiles files;
   const auto scene_of = [&](const char* radiance) {

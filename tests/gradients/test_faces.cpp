@@ -560,8 +560,8 @@ TEST(Faces, ChecksTellWhatIsOff) {
   EXPECT_EQ(checked(1, 1e-12).verdict, Verdict::kCannotTell);
 }
 
-// Light is linear in a reflectance, and about black two steps agree to the last bit: what the gradient
-// is rounded to is no error.
+// Light is linear in a reflectance, and about black two steps agree to the last bit: what the
+// gradient is rounded to is no error.
 TEST(Faces, ChecksAllowForRounding) {
   const TempFiles files;
   Scene scene = crowd(files, 12, 0, false);

@@ -169,8 +169,8 @@ TEST(MirroredLight, ChangesNoMean) {
   }
 }
 
-// With the same samples reverse mode has the interior term of forward mode, to rounding: it draws the
-// same directions with the same densities.
+// With the same samples reverse mode has the interior term of forward mode, to rounding: it draws
+// the same directions with the same densities.
 TEST(MirroredLight, InReverse) {
   const TempFiles files;
   for (const bool sun : {true, false}) {
@@ -226,9 +226,9 @@ std::string gloss_floor(const TempFiles& files, bool coarse, double alpha) {
                    conductor("gloss", alpha));
 }
 
-// Lines from the sun share with points of a shadow by the density of directions before it. The floor
-// as a mesh of too many faces to be looked through has none of the glare's: where a wall sees the
-// shadow of a body in it, what both terms find together must be the same (with lines that know
+// Lines from the sun share with points of a shadow by the density of directions before it. The
+// floor as a mesh of too many faces to be looked through has none of the glare's: where a wall sees
+// the shadow of a body in it, what both terms find together must be the same (with lines that know
 // nothing of the glare z is 6.6).
 TEST(MirroredLight, LinesFromTheSunKnowOfIt) {
   const TempFiles files;
@@ -302,9 +302,10 @@ double length_held(const GlareEdges& glare, const EdgeSamplerInput& edges,
   return sum;
 }
 
-// Where points of outlines are drawn before glare and where they are left out elsewhere is the same:
-// the length of all that is left out, in parts of edges, by draws and by looking everywhere. Caps of
-// two lamps overlap; a cube has sharp edges both of whose faces are seen, which are left to others.
+// Where points of outlines are drawn before glare and where they are left out elsewhere is the
+// same: the length of all that is left out, in parts of edges, by draws and by looking everywhere.
+// Caps of two lamps overlap; a cube has sharp edges both of whose faces are seen, which are left to
+// others.
 TEST(MirroredLight, EdgesAreDrawnWhereTheyAreLeftOut) {
   const TempFiles files;
   SceneParts parts;
@@ -400,7 +401,8 @@ std::string spot(const Vec3d& p, const Vec3d& target, double cutoff, double inte
       intensity, cutoff, p.x, p.y, p.z, target.x, target.y, target.z);
 }
 
-// The share that a glare takes follows what lamps light about the point, wherever they hang or look.
+// The share that a glare takes follows what lamps light about the point, wherever they hang or
+// look.
 TEST(MirroredLight, ShareFollowsWhatIsLitAround) {
   const TempFiles files;
   // (0, 1, 0) is the middle of the scene: no place is special.
@@ -409,8 +411,8 @@ TEST(MirroredLight, ShareFollowsWhatIsLitAround) {
   EXPECT_GT(in_middle, 0.02);
   EXPECT_LT(in_middle, 0.45);
   EXPECT_NEAR(beside, in_middle, 1e-3);
-  // A lamp that lights where the glare is, and neither the middle nor the point: more than of a bulb
-  // in the same place, and yet no more than of what its light makes of other surfaces.
+  // A lamp that lights where the glare is, and neither the middle nor the point: more than of a
+  // bulb in the same place, and yet no more than of what its light makes of other surfaces.
   const Vec3d high{0.2, 1.2, 1};
   const std::string down = spot(high, {0.2, 0, -0.2}, 15, 5);
   const MirroredLight::Mixture lit = WallPoint(files, down).mixture;
@@ -453,8 +455,8 @@ TEST(MirroredLight, OrderIsThatOfTheFile) {
   }
 }
 
-// The scenes of a finite difference draw by the glare of the one between them: a panel that has left
-// its old plane by the step must not see what its other side mirrored there.
+// The scenes of a finite difference draw by the glare of the one between them: a panel that has
+// left its old plane by the step must not see what its other side mirrored there.
 TEST(MirroredLight, PanelsSeeNothingInThemselves) {
   const TempFiles files;
   const auto panel_at = [&](double height) {

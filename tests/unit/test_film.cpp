@@ -71,8 +71,8 @@ TEST(Filter, SamplesFollowTheFilter) {
   }
 }
 
-// The inverse is exact: integrating up to a quantile gives the part back, of the whole filter and of
-// pieces of it, by Newton's method and from the table.
+// The inverse is exact: integrating up to a quantile gives the part back, of the whole filter and
+// of pieces of it, by Newton's method and from the table.
 TEST(Filter, QuantilesInvertTheIntegral) {
   for (const Filter& f : filters()) {
     const FilterTable table(f);

@@ -70,8 +70,8 @@ TEST(DeltaLights, ADirectionComesFromInfinity) {
   }
 }
 
-// `lamps` shapes in their order, all squares that face down, the environment, then delta lights; each
-// as often as its density says, which is the one that is asked for.
+// `lamps` shapes in their order, all squares that face down, the environment, then delta lights;
+// each as often as its density says, which is the one that is asked for.
 void expect_draws_of_densities(const Scene& scene, size_t lamps) {
   const Lights lights(scene);
   const size_t all = lights.all().size();
@@ -222,8 +222,8 @@ TEST(Lights, PlacesAtOnceAreThoseAlone) {
   }
 }
 
-// By irradiance on a surface that faces them: 1 / d^2 of points, the closed form of a small lamp from
-// its front, nothing from its back. What is expected to send nothing is drawn now and then.
+// By irradiance on a surface that faces them: 1 / d^2 of points, the closed form of a small lamp
+// from its front, nothing from its back. What is expected to send nothing is drawn now and then.
 TEST(Lights, AreDrawnByWhatTheySend) {
   const TempFiles files;
   const Scene scene = scene_with(
@@ -249,7 +249,8 @@ TEST(Lights, AreDrawnByWhatTheySend) {
   EXPECT_NEAR(chance(2), expected(20 * area, 0.25), 1e-5);
 }
 
-// Of a lamp as large as a disk of radius 1, also right in front of it: pi L / (d^2 + 1) on its axis.
+// Of a lamp as large as a disk of radius 1, also right in front of it: pi L / (d^2 + 1) on its
+// axis.
 TEST(Lights, AreDrawnByWhatLargeLampsSend) {
   const TempFiles files;
   const Scene scene = scene_with(
@@ -291,8 +292,8 @@ TEST(MisWeights, OverADensityAreDividedByIt) {
       EXPECT_EQ(found, expected) << pdf << " " << other;
       return;
     }
-    // At most two epsilons of a weight or a product below the normal numbers, and half of one each of
-    // all else; a result below them may become nothing.
+    // At most two epsilons of a weight or a product below the normal numbers, and half of one each
+    // of all else; a result below them may become nothing.
     EXPECT_NEAR(
         found, expected,
         4 * std::numeric_limits<double>::epsilon() * expected + std::numeric_limits<double>::min())

@@ -16,7 +16,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What rounding of a difference, or a reference that is no better, leaves below zero counts as zero.
+// What rounding of a difference, or a reference that is no better, leaves below zero counts as
+// zero.
 double relative_error(double squared) { return std::sqrt(std::fmax(squared, 0)); }
 
 // With its standard error, from that of its square.

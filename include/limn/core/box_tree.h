@@ -48,9 +48,9 @@ class BoxTree {
   const LeafBoxes& boxes(uint32_t leaf) const { return packed_[leaf]; }
   // Sets `leaves` to the leaves >= `first` whose bounds overlap `box`, in ascending order.
   void find_leaves(const FloatBox& box, uint32_t first, std::vector<uint32_t>& leaves) const;
-  // Calls append(i, j, found) for the indices i < j of every pair of overlapping boxes, in parallel,
-  // and returns all that it appended to `found`; the order does not depend on `threads`. skip(i,
-  // leaf): bits of boxes in the leaf whose pairs with box i are omitted.
+  // Calls append(i, j, found) for the indices i < j of every pair of overlapping boxes, in
+  // parallel, and returns all that it appended to `found`; the order does not depend on `threads`.
+  // skip(i, leaf): bits of boxes in the leaf whose pairs with box i are omitted.
   template <class Item, class Skip, class Append>
   std::vector<Item> find_pairs(int threads, const Skip& skip, const Append& append) const;
 

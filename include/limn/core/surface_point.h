@@ -88,8 +88,8 @@ void fetch_shading(const Mesh& mesh, FaceId face) {
 template <class S, class P>
 void place_on_plane(const Mesh& mesh, const Vec3<S>& origin, const Vec3<S>& direction,
                     SurfacePoint<S>& point) {
-  // In plain numbers paths alone come here often, and have fetched it ahead (path_rays.h): once more
-  // images of the demo took 0.99 of the time, by which two runs of one program differ, too.
+  // In plain numbers paths alone come here often, and have fetched it ahead (path_rays.h): once
+  // more images of the demo took 0.99 of the time, by which two runs of one program differ, too.
   if constexpr (!std::is_same_v<S, double>) {
     if (mesh.normal_source != NormalSource::kFace) fetch_shading<S>(mesh, point.face.face);
   }

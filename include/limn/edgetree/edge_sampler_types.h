@@ -1,5 +1,5 @@
 #pragma once
-// The table of edge samplers. To add one: its .cpp and .h in edgetree/, and a row here.
+// The table of edge samplers. CONTRIBUTING.md lists the files that a new one touches.
 #include <memory>
 #include <span>
 #include <string>

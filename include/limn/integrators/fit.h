@@ -3,7 +3,7 @@
 // vertices of a shape included.
 //
 // The loss is the mean over views. Each step renders every view twice for the loss and its adjoint
-// image and takes the gradient with samples of their own (loss.h, backward.h), so that the
+// image and takes the gradient with samples of their own (see backward.h), so that the
 // gradients of l2 and relative-l2 are unbiased. Vertices are moved through u = (I + lambda L) v,
 // which spreads each step over a neighbourhood (Nicolet, Jacobson, Jakob 2021, "Large Steps in
 // Inverse Rendering of Geometry", Sec. 3).

@@ -53,10 +53,10 @@ struct GradientOptions {
   std::string method;              // see methods.h; "": the default
   std::vector<std::string> terms;  // by name; none: all that the scene has
   // None: chosen for the least squared error after equal time, all parameters alike, by a pilot of
-  // 4 to 32 samples per pixel with a seed of its own, which are then thrown away. One of each if spp
-  // is less than 8, for one term alone, or if four samples of the pilot would take more than 0.3 of
-  // what a limit of time leaves behind the set-up. The choice does not depend on clocks but for
-  // that; it does on the crop.
+  // 4 to 32 samples per pixel with a seed of its own, which are then thrown away. One of each if
+  // spp is less than 8, for one term alone, or if four samples of the pilot would take more than
+  // 0.3 of what a limit of time leaves behind the set-up. The choice does not depend on clocks but
+  // for that; it does on the crop.
   std::optional<SampleCounts> samples = SampleCounts{};
   // The same samples in every pixel, also where the method would spread them.
   bool uniform_samples = false;
