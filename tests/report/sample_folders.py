@@ -88,7 +88,7 @@ def method(
                     "mse": mse,
                     "relative_mse": mse / 0.3,
                     "trimmed_mse": 0.4 * mse,
-                    "terms": {"interior": 0.3 * time, "camera": 0.2 * time, "boundary": 0.4 * time},
+                    "terms": {"interior": 0.3 * time, "camera": 0.2 * time, "boundary": 0.4 * time, "direct": 0.05 * time},
                     "peak_memory_bytes": 123456789,
                 }
             )

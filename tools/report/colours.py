@@ -20,11 +20,16 @@ OTHERS = [
     ("#4a4a4a", "#dddddd", "d"),
 ]
 
-# Parts of a run's time, name: (on white, on black).
+# Parts of a run's time: terms, and what none of them accounts for; (on white, on black).
 SHADES = {
     "interior": ("#3f8fb5", "#5fb3da"),
     "camera": ("#d9a441", "#e5b95f"),
     "boundary": ("#8c5a9e", "#b584c8"),
+    "direct": ("#3f9b6c", "#63c493"),
+    "penumbra": ("#b5523f", "#dd8571"),
+    "shadow": ("#3c4f76", "#7d93c4"),
+    "filter": ("#8f8a2c", "#c6c05a"),
+    "differences": ("#c2255c", "#ff80ab"),
     "rest": ("#b8bec6", "#59616b"),
 }
 

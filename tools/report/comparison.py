@@ -3,12 +3,13 @@
 import os
 
 from . import charts
+from .colours import SHADES
 from .markup import (count, details, element, figures, hint, join, percent, plural, table, times,
                      with_error)
 from .pictures import colour_bar
 from .section import Section, legend, status_notice, stem, swatch
 
-TERMS = ("interior", "camera", "boundary")
+TERMS = [name for name in SHADES if name != "rest"]
 SINGULAR = {"scene units": "scene unit", "radians": "radian", "degrees": "degree"}
 
 
@@ -101,7 +102,7 @@ class ComparisonSection(Section):
             charts.error_against_time(self.palette, self.data), note,
             element("h3", "At the longest time budget"),
             self.method_table(AT_LONGEST, "Methods at the longest time budget"),
-            legend((swatch(class_=f"swatch term-{t}"), t) for t in (*TERMS, "rest")),
+            legend((swatch(f"var(--term-{t})"), t) for t in SHADES),
             self._factors(),
             details("All time budgets", self.method_table(AT_EACH, "All time budgets", budgets)),
             element("h3", "Settings"), self.command(), self._settings()]
@@ -194,7 +195,7 @@ class ComparisonSection(Section):
         shares["rest"] = max(0.0, 1 - sum(shares.values()))
         whole = max(1.0, sum(shares.values()))
         text = ", ".join(f"{term} {percent(part)}" for term, part in shares.items())
-        pieces = [element("span", class_=f"term-{t}", style=f"width:{100 * part / whole:.2f}%")
+        pieces = [element("span", style=f"width:{100 * part / whole:.2f}%;background:var(--term-{t})")
                   for t, part in shares.items()]
         return element("td", element("span", *pieces, class_="stack", role="img", aria_label=text,
                                      title=text))

@@ -10,8 +10,8 @@ def stem(file):
     return os.path.splitext(os.path.basename(file))[0]
 
 
-def swatch(colour=None, class_="swatch"):
-    return element("span", class_=class_, style=f"background:{colour}" if colour else None)
+def swatch(colour):
+    return element("span", class_="swatch", style=f"background:{colour}")
 
 
 def legend(entries, *before):
