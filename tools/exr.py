@@ -1,4 +1,4 @@
-"""OpenEXR images as limn writes them (scan lines, zipped or plain), and plain ones that it reads."""
+"""OpenEXR images as limn writes them (scan lines, zipped or plain), and plain ones to read."""
 
 import struct
 import zlib

@@ -27,6 +27,10 @@ def parallelogram(corner, a, b):
     return Shape(np.stack([c, c + a, c + a + b, c + b]), [[0, 1, 2, 3]])
 
 
+def triangle(*corners):
+    return Shape(vector(*corners).reshape(3, 3), [[0, 1, 2]])
+
+
 def floor(kind="diffuse", alpha=0.0):
     """The rectangle [-8, 8]^2 at y = 0, normal +y."""
     shape = Shape(vector(-8, 0, 8, 8, 0, 8, 8, 0, -8, -8, 0, -8).reshape(4, 3), [[0, 1, 2, 3]])
@@ -85,12 +89,11 @@ def convex_over_plane():
 
 
 def triangle_over_plane():
-    triangle = Shape(vector(-0.5, 1.25, -0.5, 0.25, 1.5, 0.75, 0.75, 1, -0.25).reshape(3, 3),
-                     [[0, 1, 2]])
-    triangle.hole = [[0, 2, 1]]
-    scene, model, names = hidden_sky("triangle_over_plane", triangle)
-    scene.velocities["triangle_over_plane_velocity.txt"] = vector(0, 0, 0, 1, 0.5, 0, 0, 0,
-                                                                  -1).reshape(3, 3)
+    occluder = triangle(-0.5, 1.25, -0.5, 0.25, 1.5, 0.75, 0.75, 1, -0.25)
+    occluder.hole = [[0, 2, 1]]
+    scene, model, names = hidden_sky("triangle_over_plane", occluder)
+    velocity = vector(0, 0, 0, 1, 0.5, 0, 0, 0, -1).reshape(3, 3)
+    scene.velocities["triangle_over_plane_velocity.txt"] = velocity
     names.append("object.vertex_positions:triangle_over_plane_velocity.txt")
     return scene, model, names
 
@@ -113,18 +116,18 @@ LAMP_NAMES = (moves_of("lamp") + FLOOR_MOVES + SENSOR
               + ["floor_bsdf.reflectance", "lamp_emitter.radiance"])
 
 
-def lamp_over_plane():
-    scene = Scene("lamp_over_plane.xml", floor_camera(), {"floor": floor(), "lamp": tilted_lamp()},
-                  2)
+def lamp_on_floor(name, shape):
+    scene = Scene(f"{name}.xml", floor_camera(), {"floor": floor(), "lamp": shape}, 2)
     return scene, models.LampOnFloor(), LAMP_NAMES
+
+
+def lamp_over_plane():
+    return lamp_on_floor("lamp_over_plane", tilted_lamp())
 
 
 def triangle_lamp_over_plane():
-    shape = lamp(Shape(vector(-1, 1.5, 0.75, -0.75, 2, -0.75, 0.25, 1.75, 0.25).reshape(3, 3),
-                       [[0, 1, 2]]), (4, 2, 1))
-    scene = Scene("triangle_lamp_over_plane.xml", floor_camera(), {"floor": floor(), "lamp": shape},
-                  2)
-    return scene, models.LampOnFloor(), LAMP_NAMES
+    return lamp_on_floor("triangle_lamp_over_plane", lamp(
+        triangle(-1, 1.5, 0.75, -0.75, 2, -0.75, 0.25, 1.75, 0.25), (4, 2, 1)))
 
 
 def half_hidden_lamp():
@@ -221,9 +224,8 @@ def moves_of_light(light):
 
 def sharp_shadow(name, light):
     """The light and the corner of the triangle that shades the middle of the view are in line."""
-    triangle = Shape(vector(0.296875, 1.25, -0.046875, -1.0625, 1.5, -0.25, 0.1875, 1.5, -2).reshape(3, 3),
-                     [[0, 1, 2]])
-    scene = Scene(f"{name}.xml", floor_camera(), {"floor": floor(), "object": triangle}, 2,
+    occluder = triangle(0.296875, 1.25, -0.046875, -1.0625, 1.5, -0.25, 0.1875, 1.5, -2)
+    scene = Scene(f"{name}.xml", floor_camera(), {"floor": floor(), "object": occluder}, 2,
                   lights={"lamp": light})
     names = moves_of("object") + moves_of_light(light) + FLOOR_MOVES + SENSOR
     return scene, models.SharpShadow(), names + ["floor_bsdf.reflectance"]
@@ -241,13 +243,12 @@ def shadow_in_gloss():
     """A spot beside the floor lights a panel above it past a small triangle; it misses the floor."""
     panel = parallelogram((-1.5, 2, -1.25), (3, 0.5, 0), (0, 0.125, 2.5))
     panel.bsdf = Bsdf("panel_bsdf", "diffuse", vector(0.75, 0.5, 0.25))
-    triangle = Shape(vector(-1.5, 1.25, -0.25, -1.25, 1.375, 0.25, -1.5625, 1.625, 0).reshape(3, 3),
-                     [[0, 1, 2]])
-    triangle.bsdf = Bsdf("object_bsdf", "diffuse", vector(0, 0, 0))
+    occluder = triangle(-1.5, 1.25, -0.25, -1.25, 1.375, 0.25, -1.5625, 1.625, 0)
+    occluder.bsdf = Bsdf("object_bsdf", "diffuse", vector(0, 0, 0))
     position = vector(-3, 0.5, 0)
     light = Light("spot", vector(64, 32, 16), position, unit(vector(2.625, 1.75, 0)), 38, 34)
     scene = Scene("shadow_in_gloss.xml", floor_camera((1, 1)),
-                  {"floor": floor("ggx", 0.375), "object": triangle, "panel": panel}, 3,
+                  {"floor": floor("ggx", 0.375), "object": occluder, "panel": panel}, 3,
                   lights={"lamp": light})
     names = ["object.translate.x", "object.translate.y", "object.rotate.z", "object.scale",
              "lamp.translate.x", "lamp.translate.z", "lamp.rotate.z", "lamp.intensity",

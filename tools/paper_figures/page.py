@@ -63,7 +63,7 @@ def _comparison(result, part, kind, group, palette, threshold):
                "time for equal error": time, **SECONDS, **BIAS}
     short = any(longest(m).number("setup_seconds") > 0.5 * longest(m).number("seconds")
                 for m in section.methods if finished(m))
-    options = [f"{part.options[i][2:]} {part.options[i + 1]}" for i in range(0, len(part.options), 2)]
+    options = [f"{name[2:]} {value}" for name, value in zip(part.options[::2], part.options[1::2])]
     html = join(
         element("h3", ", ".join([section.title, *options])), section.pictures_of_methods(),
         notice("", "Most of the time went into set-up, which decides here: more --minutes tell"
@@ -163,8 +163,8 @@ def _draws(record):
 def _edges(records):
     """All meshes of a figure in one table."""
     counts = [(r, r.number("edges"), r.number("without_concave")) for r in records]
-    rows = [[os.path.basename(r.text("mesh")), f"{every:,}", f"{without:,}", percent(without / every)]
-            for r, every, without in counts]
+    rows = [[os.path.basename(r.text("mesh")), f"{every:,}", f"{without:,}",
+             percent(without / every)] for r, every, without in counts]
     shares = [without / every for _, every, without in counts]
     html = table(["mesh", "edges", "without concave ones", "share"], rows,
                  "Edges with and without concave ones")
@@ -264,7 +264,8 @@ class _Page:
             *parts or [hint("No results here yet.")],
             command(again, "All of it again"), id=identifier)
         link = element("a", f"{entry.numbers}: {entry.title}", href=f"#{identifier}")
-        ratio = " to ".join(times(f) for f in sorted({min(factors), max(factors)})) if factors else "–"
+        ends = sorted({min(factors), max(factors)}) if factors else []
+        ratio = " to ".join(map(times, ends)) or "–"
         return html, [link, ratio, element("td", _joined(verdicts) or "–", class_="words")]
 
 

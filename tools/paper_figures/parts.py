@@ -70,8 +70,10 @@ def _alpha(alpha):
 WIDE = {"wide": True}
 SMALL = {"small_mesh": "pebble 1500"}  # Brute force evaluates every edge: it needs a mesh of few.
 COMPARISONS = [
-    Comparison("mirror-0.01", "rough mirror, alpha 0.01", "rough_mirror", UP, [], True, _alpha(0.01)),
-    Comparison("mirror-0.05", "rough mirror, alpha 0.05", "rough_mirror", UP, [], True, _alpha(0.05)),
+    Comparison("mirror-0.01", "rough mirror, alpha 0.01", "rough_mirror", UP, [], True,
+               _alpha(0.01)),
+    Comparison("mirror-0.05", "rough mirror, alpha 0.05", "rough_mirror", UP, [], True,
+               _alpha(0.05)),
     Comparison("mirror-0.2", "rough mirror, alpha 0.2", "rough_mirror", UP, [], False, _alpha(0.2)),
     Comparison("mirror-bunny", "", "rough_mirror", UP, [], False,
                {"defines": {"mesh": BUNNY, "format": "obj"}, "needs": BUNNY}),

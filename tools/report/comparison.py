@@ -63,7 +63,8 @@ def _number(key, text=figures):
 
 
 # Columns of tables, head: text of (section, method, summary at one time budget).
-ERRORS = {"mean squared error": _error("mse"), "relative to the mean square": _error("relative_mse"),
+ERRORS = {"mean squared error": _error("mse"),
+          "relative to the mean square": _error("relative_mse"),
           "trimmed mean (0.1 %)": _error("trimmed_mse")}
 EQUAL_ERROR = {"time for equal error": lambda self, m, s: times(m.number("time_ratio"),
                                                                 m.number("time_ratio_stderr"))}
@@ -116,8 +117,8 @@ class ComparisonSection(Section):
             element("code", data.text("parameter")),
             f" in radiance per {self.unit}, {data.number('width')} × {data.number('height')}"
             f" pixels, by {plural(len(self.methods), 'method')} in {budgets} s each on"
-            f" {plural(data.number('threads'), 'thread')}, {plural(data.number('repeats'), 'repeat')}."
-            f" Reference: {reference.text('method')},"
+            f" {plural(data.number('threads'), 'thread')},"
+            f" {plural(data.number('repeats'), 'repeat')}. Reference: {reference.text('method')},"
             f" {count(reference.number('spp'))} samples per pixel,"
             f" {figures(reference.number('seconds'))} s{kept}; its own mean squared error is"
             f" {figures(reference.number('mean_squared_error'))}.")
@@ -195,8 +196,9 @@ class ComparisonSection(Section):
         shares["rest"] = max(0.0, 1 - sum(shares.values()))
         whole = max(1.0, sum(shares.values()))
         text = ", ".join(f"{term} {percent(part)}" for term, part in shares.items())
-        pieces = [element("span", style=f"width:{100 * part / whole:.2f}%;background:var(--term-{t})")
-                  for t, part in shares.items()]
+        widths = {t: f"width:{100 * part / whole:.2f}%" for t, part in shares.items()}
+        pieces = [element("span", style=f"{width};background:var(--term-{t})")
+                  for t, width in widths.items()]
         return element("td", element("span", *pieces, class_="stack", role="img", aria_label=text,
                                      title=text))
 

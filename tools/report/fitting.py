@@ -42,7 +42,7 @@ class FitSection(Section):
             status_notice(self.data, "", "limn fit --resume with this folder goes on."),
             self._strip(),
             element("h3", "Loss"),
-            charts.loss_over_steps(self.palette, losses) if losses else element("p", "No step yet."),
+            charts.loss_over_steps(self.palette, losses) if losses else "No step yet.",
             self._distances(),
             element("h3", "Snapshots"), self._table(),
             element("h3", "Settings"), self._settings()]
@@ -56,8 +56,8 @@ class FitSection(Section):
         halved = sum(1 for h in self.history if h.number("halvings"))
         if halved:
             words += f" {halved} steps were halved, so that no face lost its area."
-        found = [element("li", f"{s.text('name')}: {figures(s.number('value'), 5)} {s.text('unit')}")
-                 for s in self.data.records("scalars")]
+        found = [element("li", f"{s.text('name')}: {figures(s.number('value'), 5)}",
+                         f" {s.text('unit')}") for s in self.data.records("scalars")]
         return join(element("p", words), element("ul", *found) if found else None)
 
     def _strip(self):

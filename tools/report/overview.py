@@ -60,7 +60,8 @@ class Overview:
     def _link(self, section):
         data, text, note = section.data, section.title, None
         if section in self.comparisons:
-            text, baseline = f"{scene_name(data)}, {data.text('parameter')}", relative_times(data)[1]
+            text = f"{scene_name(data)}, {data.text('parameter')}"
+            baseline = relative_times(data)[1]
             note = None if baseline == BASELINE else f" (against {baseline})"
         return join(element("a", text, href=f"#{section.group}"), note)
 

@@ -1,4 +1,4 @@
-"""JSON files whose every access is checked: a faulty file is named together with the place in it."""
+"""JSON files whose every access is checked: a faulty file is named, and the place in it."""
 
 import json
 import math

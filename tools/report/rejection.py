@@ -59,8 +59,8 @@ class RejectionSection(Section):
         name, shown = variant.text("name"), []
         for i, s in enumerate(variant.records("slices"), 1):
             wrong = s.number("false_accept")
-            caption = (f"slice {i}: false positive at {share(wrong, wrong + s.number('true_reject'))}"
-                       " of the points without a silhouette")
+            caption = (f"slice {i}: of the points without a silhouette"
+                       f" {share(wrong, wrong + s.number('true_reject'))} are false positives")
             if s.number("missed"):
                 caption += f"; {count(s.number('missed'))} missed"
             shown.append(self.figure(s.text("picture"), f"slice {i} of {name}", caption))
@@ -72,8 +72,8 @@ class RejectionSection(Section):
 
     def rates(self):
         head = ["variant", "acceptance rate", "reachable edges", "silhouettes", "false positives",
-                "reachable per silhouette", *(f"{label}, all slices" for label, _ in SLICES.values()),
-                "description"]
+                "reachable per silhouette",
+                *(f"{label}, all slices" for label, _ in SLICES.values()), "description"]
         rows = []
         for v in self.variants:
             slices = v.records("slices")

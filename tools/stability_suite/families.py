@@ -165,7 +165,8 @@ def contact(gap):
     "Two boxes side by side, ever closer; the camera moves.",
     "Up to a gap of 1e-3 differences; beyond, one box, by a long run of adaptive.",
     "What is seen in the gap changes over its width, and hardly a sample falls into it, without "
-    "which the radiance differences at its two sides do not cancel. Finite differences do not see the gap.",
+    "which the radiance differences at its two sides do not cancel. Finite differences do not see "
+    "the gap.",
 )
 def hair_gaps(gap):
     plain = table(meshes.block((0, 0, 0.5), (0.5, 0.25, 0.25)), parameter="sensor.translate.x",
