@@ -42,6 +42,7 @@ double sum_of(const std::vector<double>& values) {
 // Differences at two steps tell what either misses: those change least that know most.
 FacesCheck check_faces(const Scene& scene, const CheckOptions& options, const RunSettings& settings,
                        const GradientRun& run) {
+  check_given_step(options.step);
   const Parameter parameter = find_parameter(scene, options.parameter);
   RunSettings own = settings;
   own.progress = nullptr;

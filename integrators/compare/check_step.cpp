@@ -1,10 +1,13 @@
 // The step at which a gradient is checked: small against what moves in the image, by a pilot.
 #include "integrators/compare/check_step.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
 #include "integrators/compare/edge_events.h"
+#include "limn/core/error.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/differences.h"
 #include "limn/integrators/statistics.h"
@@ -210,6 +213,12 @@ double reduced_step(const DifferenceResult& differences, double step, const Wind
   const double ratio = larger_ratio(windows, differences.at_step, changes, kExtrapolation,
                                     static_cast<double>(differences.spp), kShows);
   return ratio > kAllowedBias ? power_of_two_below(step_for_ratio(step, ratio)) : step;
+}
+
+void check_given_step(double step) {
+  if (step >= 0 && std::isfinite(step)) return;
+  throw InputError(
+      fmt::format("step: {:g} is neither a positive number nor 0, by which one is found", step));
 }
 
 }  // namespace limn
