@@ -11,7 +11,7 @@
 
 #include "integrators/backward/contributions.h"
 #include "integrators/backward/faces_pass.h"
-#include "integrators/backward/film_adjoint.h"
+#include "integrators/backward/parameter_slots.h"
 #include "integrators/backward/path_adjoint.h"
 #include "integrators/backward/pixel_choice.h"
 #include "integrators/edges/scene_edges.h"
@@ -47,9 +47,6 @@ const ParameterAdjoint& BackwardResult::of(const std::string& name) const {
 
 namespace {
 
-// AdjointTerm has the rows of the table, in their order.
-const char* name_of(size_t term) { return term_types()[term].name; }
-
 constexpr size_t kTile = 256;  // paths, or points on the film; not tuned
 
 // What tiles, or batches, cost and found beside sums, joined in their order.
@@ -59,7 +56,7 @@ struct Figures {
   size_t tape_bytes = 0;
 
   void merge(const Figures& other) {
-    for (int t = 0; t < kAdjointTerms; ++t) costs[t].merge(other.costs[t]);
+    for (size_t slot = 0; slot < costs.size(); ++slot) costs[slot].merge(other.costs[slot]);
     bad.merge(other.bad);
     tape_bytes = std::max(tape_bytes, other.tape_bytes);
   }
@@ -125,8 +122,10 @@ class BackwardPass {
         traced_(parameters_.scene(), settings.threads, {.closed = method_.closed, .edges = true}),
         path_(traced_.context()),
         input_(path_, 3, {1, 1, 1, 1}, method_.sampler, settings.threads),
-        context_{path_, parameters_, input_.edges(),
-                 EdgeMotion(parameters_.slots(), input_.edges()), FilterTable(scene.film.filter)} {
+        types_(terms_of(parameters_.scene(), method_.sampler, method_.closed)),
+        context_{path_, EdgeMotion(parameters_.slots(), input_.edges()),
+                 FilterTable(scene.film.filter)} {
+    input_.free = &parameters_.free();
     select();
   }
 
@@ -144,16 +143,17 @@ class BackwardPass {
 
  private:
   void select();
-  void select_regions();
-  // Of a term with points on the film: how many, for each path.
-  double film_samples(size_t term) const {
-    if (term != kCamera) return options_.shadow_samples;
+  double camera_samples() const {
     if (options_.camera_samples > 0) return options_.camera_samples;
     return method_.closed ? 1 : 0.25;  // where nothing else is noisy, these points are what is
   }
-  size_t points_per_sample(size_t term) const {
+  // Of a term with points on the film: how many, for each path.
+  double film_samples(size_t slot) const {
+    return types_[slot]->on_film_alone() ? camera_samples() : options_.shadow_samples;
+  }
+  size_t points_per_sample(size_t slot) const {
     return static_cast<size_t>(
-        std::ceil(film_samples(term) * static_cast<double>(film_.pixels().size())));
+        std::ceil(film_samples(slot) * static_cast<double>(film_.pixels().size())));
   }
   static size_t tiles_of(size_t samples) { return (samples + kTile - 1) / kTile; }
   std::vector<PathBatch> batches() const;
@@ -168,13 +168,13 @@ class BackwardPass {
   std::optional<BatchResult> run_batch(const PathBatch& batch, ProgressCounter& progress);
   void collect(const PathBatch& batch, const BatchResult& made);
   void run_paths(const PathBatch& batch, ProgressCounter& progress, ContributionSum& sum);
-  void run_film(AdjointTerm term, const PathBatch& batch, ProgressCounter& progress,
+  void run_film(size_t slot, const PathBatch& batch, ProgressCounter& progress,
                 ContributionSum& sum);
   // make(sample, tape, figures, list): adds one sample; false if it was not finite. place: of a
   // sample.
   template <class Make, class Place>
-  void run_tiles(size_t samples, ProgressCounter& progress, ContributionSum& sum,
-                 AdjointTerm booked, const Make& make, const Place& place);
+  void run_tiles(size_t samples, ProgressCounter& progress, ContributionSum& sum, size_t booked,
+                 const Make& make, const Place& place);
   void finish();
 
   Stopwatch watch_;
@@ -187,57 +187,32 @@ class BackwardPass {
   TracedScene traced_;
   const PathContext& path_;
   TermInput input_;
+  std::vector<const TermType*> types_;  // of each slot
   AdjointContext context_;
-  std::unique_ptr<CameraEdges> camera_;
-  std::unique_ptr<ShadowEdges> shadows_;
-  std::unique_ptr<AdjointRegions> regions_;
-  bool computed_[kAdjointTerms] = {};
-  bool on_film_[kAdjointTerms] = {};
+  bool paths_ = false;  // whether some term uses them
+  std::array<bool, kMostTerms> on_film_{};
   Figures batch_;  // of the batch in progress
   Figures all_;
   BackwardResult result_;
 };
 
 void BackwardPass::select() {
-  const auto types = terms_of(parameters_.scene(), method_.sampler, method_.closed);
-  std::vector<size_t> known;
   std::vector<std::string> names;
-  for (size_t t = 0; t < kAdjointTerms; ++t) {
-    const TermType& type = term_types()[t];
-    if (std::find(types.begin(), types.end(), &type) == types.end()) continue;
-    known.push_back(t);
-    names.emplace_back(type.name);
-  }
+  for (const TermType* type : types_) names.emplace_back(type->name);
   const auto chosen = selected_terms(names, options_.terms, parameters_.scene().file);
-  for (const size_t t : known) {
-    computed_[t] = std::find(chosen.begin(), chosen.end(), name_of(t)) != chosen.end();
-    result_.terms.push_back({name_of(t), computed_[t], t != kInterior, 1, {}, {}});
-  }
-  context_.interior = computed_[kInterior];
-  context_.edge_samples = options_.edge_samples;
   check_samples(options_);
-  if (computed_[kCamera]) {
-    camera_ = std::make_unique<CameraEdges>(path_, input_.edges(), 3, &parameters_.free());
-    context_.camera = camera_.get();
-    on_film_[kCamera] = !camera_->empty();
-    result_.stats.edges.emplace_back("moving on the film", camera_->size());
-    result_.stats.setup.emplace_back("edges on the film", camera_->list_seconds());
+  for (size_t slot = 0; slot < types_.size(); ++slot) {
+    const TermType& type = *types_[slot];
+    const bool computed = std::find(chosen.begin(), chosen.end(), type.name) != chosen.end();
+    result_.terms.push_back({type.name, computed, type.edges, 1, {}, {}});
+    if (type.traces_paths) context_.pixel_slot = slot;
+    const auto& term = context_.terms.emplace_back(computed ? type.make(input_) : nullptr);
+    if (!term) continue;
+    on_film_[slot] = term->uses_film();
+    paths_ = paths_ || term->uses_paths() || term->uses_vertices();
+    term->describe(result_.stats);
   }
-  if (computed_[kBoundary]) {
-    const EdgeSampler& sampler = input_.edge_sampler();
-    context_.sampler = &sampler;
-    result_.stats.setup.emplace_back("edge sampler", input_.edge_sampler_seconds());
-    result_.stats.sampler_nodes = sampler.size().nodes;
-    result_.stats.sampler_bytes = sampler.size().bytes;
-  }
-  if (computed_[kShadow]) {
-    shadows_ = std::make_unique<ShadowEdges>(path_, input_.edges(), 3);
-    if (!shadows_->empty()) context_.shadows = shadows_.get();
-    const int max_depth = parameters_.scene().max_depth;
-    on_film_[kShadow] = !shadows_->empty() && (max_depth < 0 || max_depth > 1);
-    result_.stats.edges.emplace_back("of sharp shadows", shadows_->size());
-  }
-  if (input_.regions()) select_regions();
+  context_.edge_samples = options_.edge_samples;
   result_.stats.setup.emplace_back("edges", input_.edges_seconds());
   if (parameters_.scene().shading == ShadingModel::kMitsuba) {
     result_.warnings.push_back(
@@ -249,21 +224,6 @@ void BackwardPass::select() {
   for (const Parameter& p : parameters_.parameters()) {
     result_.parameters.push_back({p.name, p.unit, p.shape(), Moments(p.numbers())});
   }
-}
-
-void BackwardPass::select_regions() {
-  const EdgeSamplerInput& edges = input_.edges();
-  const LightRegions& regions = *input_.regions();
-  const LampEdges& lamp_edges = *input_.lamp_edges();
-  regions_.reset(new AdjointRegions{regions, lamp_edges,
-                                    DirectEdges(edges, input_.edge_sampler(), regions),
-                                    PenumbraLines(path_, edges, regions, lamp_edges)});
-  context_.regions = regions_.get();
-  context_.direct = computed_[kDirect];
-  context_.penumbra = computed_[kPenumbra] && lamp_edges.size() > 0;
-  const int max_depth = parameters_.scene().max_depth;
-  on_film_[kPenumbra] = context_.penumbra && (max_depth < 0 || max_depth > 1);
-  result_.stats.edges.emplace_back("before lamps", lamp_edges.size());
 }
 
 std::vector<PathBatch> BackwardPass::batches() const {
@@ -279,8 +239,8 @@ size_t BackwardPass::steps() const {
   for (const PathBatch& batch : batches()) {
     if (task(batch) != BatchStore::Task::kMake) continue;
     steps += tiles_of(choice_.paths(batch));
-    for (size_t t = 0; t < kAdjointTerms; ++t) {
-      if (on_film_[t]) steps += tiles_of(points_per_sample(t) * batch.count());
+    for (size_t slot = 0; slot < types_.size(); ++slot) {
+      if (on_film_[slot]) steps += tiles_of(points_per_sample(slot) * batch.count());
     }
   }
   return steps;
@@ -307,7 +267,7 @@ void BackwardPass::start(BatchStore& store) const {
   store.identify("samples",
                  fmt::format("{} pixels, {} edges, {} on the film, {} of shadows, {} batches",
                              options_.uniform_pixels ? "uniform" : "adjoint", options_.edge_samples,
-                             film_samples(kCamera), options_.shadow_samples, options_.batches));
+                             camera_samples(), options_.shadow_samples, options_.batches));
   store.start(settings_.spp);
 }
 
@@ -358,12 +318,9 @@ std::optional<BatchResult> BackwardPass::run_batch(const PathBatch& batch,
                                                    ProgressCounter& progress) {
   ContributionSum sum(parameters_.slots().count);
   batch_ = {};
-  if (computed_[kInterior] || computed_[kBoundary] || context_.shadows || context_.direct ||
-      context_.penumbra) {
-    run_paths(batch, progress, sum);
-  }
-  for (const AdjointTerm term : {kCamera, kShadow, kPenumbra}) {
-    if (on_film_[term]) run_film(term, batch, progress, sum);
+  if (paths_) run_paths(batch, progress, sum);
+  for (size_t slot = 0; slot < types_.size(); ++slot) {
+    if (on_film_[slot]) run_film(slot, batch, progress, sum);
   }
   if (progress.stopped()) return std::nullopt;
   BatchResult made{parameters_.gather(sum.sums()), batch_, sum.added()};
@@ -386,7 +343,7 @@ void BackwardPass::collect(const PathBatch& batch, const BatchResult& made) {
 
 template <class Make, class Place>
 void BackwardPass::run_tiles(size_t samples, ProgressCounter& progress, ContributionSum& sum,
-                             AdjointTerm booked, const Make& make, const Place& place) {
+                             size_t booked, const Make& make, const Place& place) {
   const size_t tiles = tiles_of(samples);
   size_t first = 0;  // of the wave
   std::vector<Figures> figures;
@@ -425,7 +382,7 @@ void BackwardPass::run_paths(const PathBatch& batch, ProgressCounter& progress,
                                film.crop_y + static_cast<int>(pixel / film.crop_width));
   };
   run_tiles(
-      choice_.paths(batch), progress, sum, kInterior,
+      choice_.paths(batch), progress, sum, context_.pixel_slot,
       [&](size_t i, Tape& tape, Figures& own, std::vector<Contribution>& list) {
         const PixelPath path = choice_.path(batch, i);
         const Rgb<double> adjoint = film_.pixels()[path.pixel] * (1 / path.expected);
@@ -437,44 +394,41 @@ void BackwardPass::run_paths(const PathBatch& batch, ProgressCounter& progress,
       [&](size_t i) {
         const PixelPath path = choice_.path(batch, i);
         const auto [x, y] = position(path.pixel);
-        return NonFinite::Place{x, y, static_cast<int64_t>(path.sample), name_of(kInterior)};
+        return NonFinite::Place{x, y, static_cast<int64_t>(path.sample),
+                                types_[context_.pixel_slot]->name};
       });
 }
 
-void BackwardPass::run_film(AdjointTerm term, const PathBatch& batch, ProgressCounter& progress,
+void BackwardPass::run_film(size_t slot, const PathBatch& batch, ProgressCounter& progress,
                             ContributionSum& sum) {
-  const size_t count = points_per_sample(term) * batch.count();
-  const size_t first = points_per_sample(term) * batch.first;
+  const size_t count = points_per_sample(slot) * batch.count();
+  const size_t first = points_per_sample(slot) * batch.first;
   const double share = 1 / static_cast<double>(count);
-  const auto add = term == kCamera   ? add_camera_adjoint
-                   : term == kShadow ? add_shadow_adjoint
-                                     : add_penumbra_adjoint;
   run_tiles(
-      count, progress, sum, term,
+      count, progress, sum, slot,
       [&](size_t i, Tape& tape, Figures& own, std::vector<Contribution>& list) {
         const Rng key = Rng(batch.seed, UINT64_MAX, first + i)
-                            .copy(Purpose::kFilmCopy, term_types()[term].film_stream);
+                            .copy(Purpose::kFilmCopy, types_[slot]->film_stream);
         const double u = (i + key.at(Purpose::kCamera, 0).uniform()) / count;
         try {
-          return add(context_, film_, u, key, share, tape, own.costs[term], list);
+          return add_film_adjoint(context_, film_, {slot, u, key, share}, tape, own.costs[slot],
+                                  list);
         } catch (const UntraceableRay&) {
           return false;
         }
       },
       [&](size_t i) {
-        return NonFinite::Place{-1, -1, static_cast<int64_t>(first + i), name_of(term)};
+        return NonFinite::Place{-1, -1, static_cast<int64_t>(first + i), types_[slot]->name};
       });
 }
 
 void BackwardPass::finish() {
-  size_t next = 0;
-  for (size_t t = 0; t < kAdjointTerms && next < result_.terms.size(); ++t) {
-    if (result_.terms[next].name != name_of(t)) continue;
-    TermRun& term = result_.terms[next++];
-    term.cost = all_.costs[t];
-    if (on_film_[t] || t == kCamera) {
-      term.samples = film_samples(t);
-    } else if (t != kInterior) {
+  for (size_t slot = 0; slot < types_.size(); ++slot) {
+    TermRun& term = result_.terms[slot];
+    term.cost = all_.costs[slot];
+    if (on_film_[slot] || types_[slot]->on_film_alone()) {
+      term.samples = film_samples(slot);
+    } else if (slot != context_.pixel_slot) {
       term.samples = options_.edge_samples;
     }
   }

@@ -1,16 +1,63 @@
-// Edges of meshes hang on their vertices; where edges were cut, on the ends of the whole edge;
-// curves where two faces cross, on the corners of both.
+// Points of faces hang on their corners, and edges of meshes on their vertices; where edges were cut,
+// on the ends of the whole edge; curves where two faces cross, on the corners of both.
 #include "integrators/backward/edge_motion.h"
 
+#include <algorithm>
+
+#include "limn/core/reverse.h"
 #include "limn/core/surface_point.h"
 
 namespace limn {
 
 bool EdgeMotion::moves(EdgeRef id) const {
-  if (!is_crossing(id)) return slots_.mesh(id.object).positions != 0;
+  if (!is_crossing(id)) return moves(id.object);
   for (const FaceRef face : input_.object(id.object).faces_around(id.edge))
-    if (slots_.mesh(face.shape).positions != 0) return true;
+    if (moves(face.shape)) return true;
   return false;
+}
+
+bool EdgeMotion::moves(const MovingPoint& point) const {
+  switch (point.of) {
+    case MovingPoint::Of::kEdge:
+      return moves(point.edge);
+    case MovingPoint::Of::kFace:
+      return moves(point.face.shape);
+    case MovingPoint::Of::kLight:
+      break;
+  }
+  return slots_.of(*point.light) != nullptr;
+}
+
+bool EdgeMotion::moves(const BoundaryForm& form) const {
+  return std::ranges::any_of(form.all(), [&](const MovingPoint& point) { return moves(point); });
+}
+
+void EdgeMotion::contribute(Tape& tape, Seeds& seeds, const BoundaryForm& form,
+                            double weight) const {
+  for (const MovingPoint& point : form.all()) {
+    if (!moves(point)) continue;
+    const Vec3d g = point.g * weight;
+    switch (point.of) {
+      case MovingPoint::Of::kEdge:
+        contribute_end(tape, point.edge, 0, g * (1 - point.t));
+        contribute_end(tape, point.edge, 1, g * point.t);
+        break;
+      case MovingPoint::Of::kFace:
+        contribute_face(tape, point.face, form.x, g);
+        break;
+      case MovingPoint::Of::kLight:
+        seeds.add(light_origin(*point.light), g);
+        break;
+    }
+  }
+}
+
+void EdgeMotion::contribute_face(Tape& tape, FaceRef face, const Vec3d& x, const Vec3d& g) const {
+  const Mesh& mesh = slots_.scene->shape(face.shape).mesh;
+  const auto b = barycentric(face_corners<double>(mesh, face.face), x);
+  for (int k = 0; k < 3; ++k) {
+    contribute_vertex(tape, face.shape, mesh.face(face.face)[k], g * b[k]);
+  }
 }
 
 void EdgeMotion::contribute_end(Tape& tape, EdgeRef id, int end, const Vec3d& g) const {

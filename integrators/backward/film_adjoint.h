@@ -1,12 +1,15 @@
 #pragma once
-// What points on the film add to a gradient: of silhouettes, of edges of shadows, and ends of lines
-// from lamps.
-#include "integrators/backward/adjoint_context.h"
+// dLoss/dI as points of the film see it.
+#include <vector>
+
+#include "limn/core/film.h"
+#include "limn/core/image.h"
+#include "limn/core/scene.h"
 
 namespace limn {
 
-// dLoss/dI, crop_height by crop_width, as points of the film see it.
-// Of the crop's pixels, row by row. InputError for an image of another size, or not finite.
+// dLoss/dI, of the crop's pixels, row by row. InputError for an image of another size, or not
+// finite.
 std::vector<Rgb<double>> adjoint_pixels(const Scene& scene, const Image& adjoint);
 
 class FilmAdjoint {
@@ -21,18 +24,5 @@ class FilmAdjoint {
   const Film& film_;
   std::vector<Rgb<double>> pixels_;
 };
-
-// One sample: u in [0, 1), stratified over a batch, chooses the point; `key` is for everything
-// else. share: of the batch's samples, one over their number for each pixel and path. As
-// add_path_adjoint.
-bool add_camera_adjoint(const AdjointContext& context, const FilmAdjoint& film, double u,
-                        const Rng& key, double share, Tape& tape, TermCost& cost,
-                        std::vector<Contribution>& contributions);
-bool add_penumbra_adjoint(const AdjointContext& context, const FilmAdjoint& film, double u,
-                          const Rng& key, double share, Tape& tape, TermCost& cost,
-                          std::vector<Contribution>& contributions);
-bool add_shadow_adjoint(const AdjointContext& context, const FilmAdjoint& film, double u,
-                        const Rng& key, double share, Tape& tape, TermCost& cost,
-                        std::vector<Contribution>& contributions);
 
 }  // namespace limn

@@ -2,15 +2,17 @@
 // knows no motion.
 #include "integrators/backward/path_adjoint.h"
 
-#include "integrators/backward/edge_adjoint.h"
+#include <algorithm>
+#include <cmath>
+
+#include "integrators/backward/adjoint_sinks.h"
 #include "integrators/paths/camera_path.h"
 #include "integrators/paths/path_follow.h"
-#include "integrators/terms/vertex_edges.h"
 
 namespace limn {
 namespace {
 
-// The terms of edges, as the visitor of a path.
+// The terms at vertices, as the visitor of a path.
 class VertexAdjoints {
  public:
   VertexAdjoints(const AdjointContext& context, const Rgb<double>& adjoint, Tape& tape,
@@ -20,31 +22,29 @@ class VertexAdjoints {
         tape_(tape),
         costs_(costs) {}
 
+  // The vertices of all that moves have unit tangents along the axes, and this one their opposites,
+  // if it moves, so that an edge never seems to rest beside it.
   void operator()(const SurfacePoint<Var>& surface, const Scattering<Var>& scattering,
                   const Rgb<Var>& throughput, const DirectionMotion*, const PathStep& step,
                   int bounces, const Rng& key) {
-    const AdjointVertex vertex{surface, scattering, adjoint_ * value(throughput), bounces};
-    const EdgeQuery query = query_at(vertex);
-    const int max_depth = context_.scene().max_depth;
-    const bool scatters_on = max_depth < 0 || bounces + 2 < max_depth;
-    const bool regions_alone = context_.regions && context_.regions->regions.hold_all();
-    if (context_.sampler && (scatters_on || !regions_alone)) add_edges(vertex, query, key);
-    if (context_.direct) add_direct(vertex, query, step, key);
-    if (context_.shadows && scatters_on) add_shadows(vertex, key);
-    if (context_.penumbra && scatters_on) add_penumbras(vertex, key);
+    PathVertex vertex =
+        plain_vertex(surface, scattering, context_.scene().shading, bounces, step, key);
+    vertex.throughput = value(throughput);
+    if (!is_still(surface.p)) vertex.velocity = {{-1, 0, 0, 0}, {0, -1, 0, 0}, {0, 0, -1, 0}};
+    VertexAdjoint sink(context_.motion, adjoint_, surface.p, tape_, seeds_);
+    for (size_t slot = 0; slot < context_.terms.size(); ++slot) {
+      const Term* term = context_.terms[slot].get();
+      if (!term || !term->uses_vertices()) continue;
+      const Stopwatch watch;
+      sink.book_on(costs_[slot]);
+      term->add_at_vertex(vertex, context_.edge_samples, sink);
+      costs_[slot].seconds += watch.seconds();
+    }
   }
 
   Seeds& seeds() { return seeds_; }
 
  private:
-  void add_edges(const AdjointVertex& vertex, const EdgeQuery& query, const Rng& key);
-  void add_direct(const AdjointVertex& vertex, const EdgeQuery& query, const PathStep& step,
-                  const Rng& key);
-  void add_shadows(const AdjointVertex& vertex, const Rng& key);
-  void add_shadow(const AdjointVertex& vertex, Rng rng);
-  void add_penumbras(const AdjointVertex& vertex, const Rng& key);
-  void add_penumbra(const AdjointVertex& vertex, const Rng& key);
-
   const AdjointContext& context_;
   Rgb<double> adjoint_;
   Tape& tape_;
@@ -52,106 +52,10 @@ class VertexAdjoints {
   Seeds seeds_;
 };
 
-void VertexAdjoints::add_edges(const AdjointVertex& vertex, const EdgeQuery& query,
-                               const Rng& key) {
-  static thread_local std::vector<std::optional<EdgeSample>> drawn;
-  const Stopwatch watch;
-  const RadiancePart part = context_.rest();
-  TermCost& cost = costs_[kBoundary];
-  draw_edges(*context_.sampler, query, key, vertex.bounces, context_.edge_samples, drawn);
-  cost.samples += drawn.size();
-  for (size_t i = 0; i < drawn.size(); ++i) {
-    if (drawn[i]) {
-      const Rng own = key.copy(Purpose::kEdgeCopy, static_cast<int>(i));
-      add_edge_point(context_, vertex, query, *drawn[i], part, own, 1, tape_, seeds_, cost);
-    } else {
-      ++cost.no_edge;
-    }
-  }
-  cost.seconds += watch.seconds();
-}
-
-void VertexAdjoints::add_direct(const AdjointVertex& vertex, const EdgeQuery& query,
-                                const PathStep& step, const Rng& key) {
-  static thread_local DirectPieces pieces;
-  static thread_local std::vector<DirectPoint> points;
-  const Stopwatch watch;
-  TermCost& cost = costs_[kDirect];
-  const AdjointRegions& r = *context_.regions;
-  r.direct.list(query, query, pieces);
-  r.direct.draw(pieces, key, vertex.bounces, context_.edge_samples, cost, points);
-  for (const DirectPoint& point : points) {
-    const double share =
-        direct_share(context_.scene(), context_.edges, r.regions, r.lamp_edges, point.sample,
-                     point.region, query.p, vertex.surface.n_g, step, vertex.bounces);
-    add_edge_point(context_, vertex, query, point.sample, {&r.regions, point.region}, key, share,
-                   tape_, seeds_, cost);
-  }
-  cost.seconds += watch.seconds();
-}
-
-void VertexAdjoints::add_penumbras(const AdjointVertex& vertex, const Rng& key) {
-  const Stopwatch watch;
-  for (int i = 0; i < context_.edge_samples; ++i) {
-    add_penumbra(vertex, key.copy(Purpose::kShadowCopy, i));
-  }
-  costs_[kPenumbra].seconds += watch.seconds();
-}
-
-void VertexAdjoints::add_penumbra(const AdjointVertex& vertex, const Rng& key) {
-  TermCost& cost = costs_[kPenumbra];
-  const auto seen = context_.regions->lines.seen_from(vertex, key, cost);
-  if (!seen) return;
-  const auto& [drawn, omega, f] = *seen;
-  add_penumbra_line(context_, drawn, vertex.surface.p, {omega.x, omega.y, omega.z},
-                    vertex.weight * f, vertex.bounces + 1, key, tape_, seeds_, cost);
-}
-
-void VertexAdjoints::add_shadows(const AdjointVertex& vertex, const Rng& key) {
-  const Stopwatch watch;
-  for (int i = 0; i < context_.edge_samples; ++i) {
-    add_shadow(vertex, key.copy(Purpose::kShadowCopy, i).at(Purpose::kShadow, vertex.bounces));
-  }
-  costs_[kShadow].seconds += watch.seconds();
-}
-
-void VertexAdjoints::add_shadow(const AdjointVertex& vertex, Rng rng) {
-  TermCost& cost = costs_[kShadow];
-  ++cost.samples;
-  double probability;
-  const ShadowEdge& edge = context_.shadows->choose(rng.uniform(), probability);
-  RayCount rays;
-  const auto point = context_.shadows->cast(edge, rng.uniform(), rays);
-  cost.add(rays);
-  if (!point) {
-    ++cost.occluded;
-    return;
-  }
-  const Vec3d q = value(vertex.surface.p);
-  const double distance = length(point->x - q);
-  const Vec3d omega = (point->x - q) / distance;
-  const bool apart = distance > 0 && point->face != vertex.surface.face;
-  const Rgb<double> f = apart ? vertex.scattering.eval_value(omega) : Rgb<double>{};
-  const Rgb<double> amount = is_black(f) ? f : f * context_.shadows->jump(edge, *point, q, omega);
-  if (is_black(amount)) {
-    ++cost.zero_weight;
-    return;
-  }
-  const Vec3d way = point->target(q) - q;
-  if (is_hidden_from(context_.path, vertex, point->face, normalize(way), length(way), cost)) {
-    ++cost.occluded;
-    return;
-  }
-  ++cost.counted;
-  const Var swept = shadow_sweep(context_, edge, *point, vertex.surface.p,
-                                 {omega.x, omega.y, omega.z}, distance, seeds_);
-  seeds_.add(swept.node, weighed(vertex.weight, amount) / probability);
-}
-
 // The ray through a film position, moving with the camera where that has slots.
 CameraRay<Var> moving_ray(const AdjointContext& context, const FilmPosition& film,
                           const CameraRay<double>& ray) {
-  if (context.parameters.slots().camera != 0) {
+  if (context.motion.slots().camera != 0) {
     return camera_leaves(context.scene().camera).ray(film.x, film.y);
   }
   const Vec3d &o = ray.origin, &d = ray.direction;
@@ -172,6 +76,7 @@ bool add_path_adjoint(const AdjointContext& context, int x, int y, const Rng& ke
                       const Rgb<double>& adjoint, Tape& tape, AdjointCosts& costs,
                       std::vector<Contribution>& contributions) {
   tape.clear();
+  TermCost& cost = costs[context.pixel_slot];
   VertexAdjoints vertices(context, adjoint, tape, costs);
   // As in forward mode: in closed form a path takes two places of its pixel.
   const int places = context.path.closed ? 2 : 1;
@@ -181,19 +86,36 @@ bool add_path_adjoint(const AdjointContext& context, int x, int y, const Rng& ke
     const auto still = context.scene().camera.ray<double>(film.x, film.y);
     const auto ray = moving_ray(context, film, still);
     RayCount rays;
-    ++costs[kInterior].samples;
+    ++cost.samples;
     PathTracer<Var, VertexAdjoints> tracer(context.path, rays);
     Walk<Var, VertexAdjoints> walk(key, 0, &vertices);
     const StartRay<Var> start{camera_ray(context.scene(), still), ray.origin, ray.direction};
     tracer.follow_rays({&start, 1}, {&walk, 1});
     const Rgb<Var>& radiance = walk.sums.radiance;
     if (walk.failed || !is_finite(value(radiance))) return false;
-    if (context.interior) {
+    if (context.terms[context.pixel_slot]) {
       for (int c = 0; c < 3; ++c) vertices.seeds().add(radiance[c].node, adjoint[c] / places);
     }
-    costs[kInterior].add(rays);
+    cost.add(rays);
   }
-  if (!vertices.seeds().empty()) vertices.seeds().sweep(context, tape);
+  if (!vertices.seeds().empty()) vertices.seeds().sweep(tape);
+  return append_finite(tape, contributions);
+}
+
+bool add_film_adjoint(const AdjointContext& context, const FilmAdjoint& film, const FilmDraw& draw,
+                      Tape& tape, TermCost& cost, std::vector<Contribution>& contributions) {
+  tape.clear();
+  ++cost.samples;
+  FilmPointAdjoint sink(context.motion, film, draw.share, tape);
+  context.terms[draw.slot]->sample_film(draw.u, draw.key, sink);
+  cost.rays += sink.cost().rays;
+  cost.shadow_rays += sink.cost().shadow_rays;
+  if (!sink.added()) {
+    ++(sink.asked() ? cost.occluded : cost.zero_weight);
+    return true;
+  }
+  ++cost.counted;
+  if (!sink.seeds().empty()) sink.seeds().sweep(tape);
   return append_finite(tape, contributions);
 }
 

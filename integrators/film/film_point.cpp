@@ -21,11 +21,11 @@ std::optional<FilmPoint> film_point(const Scene& scene, FaceRef face, const Vec3
   return point;
 }
 
-CameraRay<Dual> shifted_ray(const Camera& camera, const FilmPoint& point) {
+CameraRay<Dual> shifted_ray(const Camera& camera, double x, double y) {
   const auto at_rest = [](const Vec3<Dual>& v) { return Vec3<Dual>{v.x.v, v.y.v, v.z.v}; };
   const CameraView<Dual> view(camera, at_rest(camera.origin), at_rest(camera.left),
                               at_rest(camera.up), at_rest(camera.forward), Dual(camera.fov.v));
-  return view.ray(Dual(point.x, {1, 0, 0, 0}), Dual(point.y, {0, 1, 0, 0}));
+  return view.ray(Dual(x, {1, 0, 0, 0}), Dual(y, {0, 1, 0, 0}));
 }
 
 bool is_hidden(const PathContext& context, const FilmPoint& point, FaceRef face, RayCount& rays) {

@@ -25,9 +25,9 @@ inline FilmPoint aimed_at(FilmPoint point, const Vec3d& x) {
   point.omega = way / point.distance;
   return point;
 }
-// The camera's ray through it, at rest but for its position on the film, which moves by a pixel
-// along x in lane 0, and along y in lane 1.
-CameraRay<Dual> shifted_ray(const Camera& camera, const FilmPoint& point);
+// The camera's ray through a film position, at rest but for that, which moves by a pixel along x in
+// lane 0, and along y in lane 1.
+CameraRay<Dual> shifted_ray(const Camera& camera, double x, double y);
 // One shadow ray.
 bool is_hidden(const PathContext& context, const FilmPoint& point, FaceRef face, RayCount& rays);
 

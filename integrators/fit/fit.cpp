@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "integrators/backward/adjoint_context.h"
 #include "integrators/fit/fit_impl.h"
 #include "integrators/fit/remesh.h"
 #include "integrators/methods/faces_estimator.h"
@@ -150,7 +149,7 @@ void Fit::Impl::check_channels() const {
 bool Fit::Impl::moves_on_film(size_t view) const {
   const Scene& scene = views[view].scene;
   BackwardOptions options = options_.backward;
-  options.terms = {term_types()[kCamera].name};
+  options.terms = {film_term().name};
   for (const FitParameter& p : parameters_) {
     if (p.in_view(view)) options.parameters.push_back(p.name());
   }

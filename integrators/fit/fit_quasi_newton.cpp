@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "integrators/backward/adjoint_context.h"
 #include "integrators/fit/fit_impl.h"
 #include "integrators/terms/term.h"
 #include "limn/core/error.h"
@@ -30,8 +29,8 @@ void Fit::Impl::check_exact() {
   }
   if (over_faces()) return;  // all silhouettes are in the losses and their gradients
   const std::vector<std::string>& terms = options_.backward.terms;
-  const bool camera = terms.empty() || std::find(terms.begin(), terms.end(),
-                                                 term_types()[kCamera].name) != terms.end();
+  const bool camera =
+      terms.empty() || std::find(terms.begin(), terms.end(), film_term().name) != terms.end();
   for (size_t v = 0; v < views.size(); ++v) {
     if (!moves_on_film(v)) continue;
     warnings.push_back(

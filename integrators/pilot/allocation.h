@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "integrators/pilot/sample_plan.h"
+#include "integrators/terms/lane_sinks.h"
 
 namespace limn {
 

@@ -126,7 +126,8 @@ class TermEstimator::VertexTerms {
       : estimator_(estimator),
         counts_(counts),
         held_(held),
-        traced_(traced),
+        setting_{estimator.scene_, estimator.warp_field_.get(), estimator.lanes(), traced,
+                 sink.log()},
         sink_(sink),
         sums_(),
         turned_() {}
@@ -135,17 +136,14 @@ class TermEstimator::VertexTerms {
                   const Rgb<Dual>& throughput, const DirectionMotion* motion, const PathStep& step,
                   int bounces, const Rng& key) {
     const Rgb<double> weight = value(throughput);
+    PathVertex vertex =
+        plain_vertex(surface, scattering, estimator_.scene_.shading, bounces, step, key);
+    vertex.throughput = weight;
+    if (motion) vertex.turn = motion->turn;
     TurnedVertex turned;
-    PathVertex vertex{surface, scattering, weight, motion ? motion->turn : DirectionTurn{},
-                      bounces, step,       key,    sink_.log()};
-    vertex.warp = estimator_.warp_field_.get();
-    vertex.traced = traced_;
-    vertex.parameters = estimator_.lanes();
-    if (held_) {
-      turned = turned_at(surface, motion, bounces);
-      vertex.turned = &turned;
-    }
-    if (vertex.log) log_vertex(*vertex.log, surface, scattering, weight, bounces);
+    if (held_) turned = turned_at(surface, motion, bounces);
+    VertexLanes lanes(setting_, vertex, surface, held_ ? &turned : nullptr);
+    if (sink_.log()) log_vertex(*sink_.log(), surface, scattering, weight, bounces);
     const double urgency = urgency_at(surface, weight, bounces);
     for (size_t slot = 0; slot < estimator_.slots(); ++slot) {
       const Term* term = estimator_.terms_[slot].get();
@@ -156,11 +154,11 @@ class TermEstimator::VertexTerms {
       if (samples == 0) continue;
       const Stopwatch watch;
       TermCost& cost = sink_.cost(slot);
-      vertex.survival = estimator_.plan_.survival * (1 / (urgency * counts_[slot]));
-      turned.sum = {};
+      lanes.start(cost, estimator_.plan_.survival * (1 / (urgency * counts_[slot])));
       Rgb<Lanes> sum;
       try {
-        term->add_at_vertex(vertex, samples, cost, sum);
+        term->add_at_vertex(vertex, samples, lanes);
+        sum = lanes.sum();
       } catch (const UntraceableRay&) {
         sum = grey(kNotFinite);
       }
@@ -214,7 +212,7 @@ class TermEstimator::VertexTerms {
   const TermEstimator& estimator_;
   PixelCounts counts_;
   const VertexMotions* held_;
-  TracedDraws* traced_;
+  VertexLanes::Setting setting_;
   SampleSink& sink_;
   std::array<Rgb<Lanes>, kMostTerms> sums_;
   std::array<Rgb<Lanes>, kMostTerms> turned_;
@@ -444,7 +442,11 @@ void TermEstimator::add_path(const PixelSample& at, const Path& path, double wei
 bool TermEstimator::sample_film(size_t slot, double u, const Rng& key, RayCount& rays,
                                 FilmSample& sample) const {
   try {
-    return terms_[slot]->sample_film(u, key, rays, sample);
+    FilmLanes lanes(scene_, !plan_.film.empty(), sample);
+    terms_[slot]->sample_film(u, key, lanes);
+    rays.closest += lanes.cost().rays - lanes.cost().shadow_rays;
+    rays.shadow += lanes.cost().shadow_rays;
+    return lanes.added();
   } catch (const UntraceableRay&) {
     sample.value = grey(kNotFinite);
     return true;

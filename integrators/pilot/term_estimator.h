@@ -11,6 +11,7 @@
 #include "integrators/paths/warp_field.h"
 #include "integrators/pilot/pilot_moments.h"
 #include "integrators/pilot/sample_plan.h"
+#include "integrators/terms/lane_sinks.h"
 #include "integrators/terms/term.h"
 #include "limn/core/parameter.h"
 

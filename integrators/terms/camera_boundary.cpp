@@ -16,21 +16,29 @@ namespace {
 class CameraTerm final : public Term {
  public:
   explicit CameraTerm(TermInput& input)
-      : edges_(input.context, input.edges(), input.lanes, nullptr, input.visible) {}
+      : input_(input.edges()),
+        edges_(input.context, input_, input.lanes, input.free, input.visible) {}
 
   bool uses_film() const override { return !edges_.empty(); }
-  bool sample_film(double u, const Rng& key, RayCount& rays, FilmSample& sample) const override {
+  void sample_film(double u, const Rng& key, FilmSink& sink) const override {
     const FilmEdgePoint point = edges_.choose(u);
+    if (!sink.at(point.x, point.y)) return;
+    RayCount rays;
     Rgb<double> jump;
-    if (!edges_.jump_at(point, key, rays, jump)) return false;
-    sample.x = point.x;
-    sample.y = point.y;
+    const bool visible = edges_.jump_at(point, key, rays, jump);
+    sink.cost().add(rays);
+    if (!visible) return;
     const FilmEdge& edge = *point.edge;
-    const Lanes speed = (edge.speed0 * (1 - point.s) + edge.speed1 * point.s) / point.density;
-    sample.value = {speed * jump.r, speed * jump.g, speed * jump.b};
-    sample.along_x = jump * (edge.nx / point.density);
-    sample.along_y = jump * (edge.ny / point.density);
-    return true;
+    const Lanes speed = edge.speed0 * (1 - point.s) + edge.speed1 * point.s;
+    FilmLineSample line{edge.nx, edge.ny, speed, point.density};
+    line.t = edges_.t_of(point);
+    if (edge.clip == FilmEdge::kNoClip) {
+      line.mesh = &input_.object(edge.id.object);
+      line.edge = edge.id;
+    } else {
+      line.clip = &edges_.clip_of(edge);
+    }
+    sink.add_line(line, jump);
   }
   void move_film(const FilmMotionAt& motion) override { edges_.move_film(motion); }
   void warn_of_kinks(const Scene& scene, std::vector<std::string>& warnings) const override {
@@ -52,6 +60,7 @@ class CameraTerm final : public Term {
   }
 
  private:
+  const EdgeSamplerInput& input_;
   CameraEdges edges_;
 };
 

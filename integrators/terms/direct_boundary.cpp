@@ -21,25 +21,6 @@ namespace {
 // shadow), 1.9 (CAD part), 3.3 (plant), 3.5 (four lamps), against draws of the forest.
 constexpr double kListCost = 1;
 
-// A vertex whose directions are held, and the same with directions that turn. What lamps emit is
-// seen with the first, see path.h.
-struct Viewers {
-  explicit Viewers(const PathVertex& turning) : vertices{turning, turning} {
-    vertices[0].turn = {};
-    if (turning.turned) {
-      held = *turning.turned;
-      held.turn = {};
-      held.sum = {};
-      vertices[0].turned = &held;
-    }
-    queries[0] = query_at(vertices[0]);
-    queries[1] = query_at(vertices[1]);
-  }
-  PathVertex vertices[2];
-  TurnedVertex held;
-  EdgeQuery queries[2];
-};
-
 class DirectTerm final : public Term {
  public:
   explicit DirectTerm(TermInput& input)
@@ -50,15 +31,12 @@ class DirectTerm final : public Term {
         direct_(edges_, input.edge_sampler(), regions_) {}
 
   bool uses_vertices() const override { return true; }
-  void add_at_vertex(const PathVertex& vertex, int samples, TermCost& cost,
-                     Rgb<Lanes>& sum) const override;
+  void add_at_vertex(const PathVertex& vertex, int samples, BoundarySink& sink) const override;
   double work(const TermCost& cost) const override {
     return static_cast<double>(cost.rays) + kListCost * static_cast<double>(cost.samples);
   }
 
  private:
-  size_t turns(uint32_t region) const { return regions_.shape(region).valid() ? 0 : 1; }
-
   const PathContext& context_;
   const EdgeSamplerInput& edges_;
   const LightRegions& regions_;
@@ -66,30 +44,32 @@ class DirectTerm final : public Term {
   DirectEdges direct_;
 };
 
-void DirectTerm::add_at_vertex(const PathVertex& vertex, int samples, TermCost& cost,
-                               Rgb<Lanes>& sum) const {
+void DirectTerm::add_at_vertex(const PathVertex& vertex, int samples, BoundarySink& sink) const {
   static thread_local DirectPieces pieces;
   static thread_local std::vector<DirectPoint> points;
-  Viewers viewers(vertex);
-  direct_.list(viewers.queries[0], viewers.queries[1], pieces);
-  if (vertex.log) {
-    vertex.log->push_back(fmt::format("  direct: {} pieces of silhouettes before {} regions",
+  // The light of lamps is seen in directions that are held, see path.h.
+  const EdgeQuery turning = query_at(vertex);
+  EdgeQuery held = turning;
+  held.turn = {};
+  direct_.list(held, turning, pieces);
+  if (sink.log()) {
+    sink.log()->push_back(fmt::format("  direct: {} pieces of silhouettes before {} regions",
                                       pieces.others.size() + pieces.outlines.size(),
                                       regions_.size()));
   }
-  direct_.draw(pieces, vertex.key, vertex.bounces, samples, cost, points);
+  direct_.draw(pieces, vertex.key, vertex.bounces, samples, sink.cost(), points);
   for (const DirectPoint& point : points) {
-    const size_t turning = turns(point.region);
-    const PathVertex& viewer = viewers.vertices[turning];
-    // Of what the edge adds, but for what turning directions change.
     const double share =
         direct_share(context_.scene, edges_, regions_, lamp_edges_, point.sample, point.region,
-                     value(vertex.surface.p), vertex.surface.n_g, vertex.step, vertex.bounces);
-    add_edge_point(context_, edges_.object(point.sample.edge.object), viewer,
-                   viewers.queries[turning], point.sample, {&regions_, point.region}, viewer.key,
-                   cost, sum, share);
+                     vertex.surface.p, vertex.surface.n_g, vertex.step, vertex.bounces);
+    const EdgeDraw draw{edges_.object(point.sample.edge.object),
+                        point.sample,
+                        {&regions_, point.region},
+                        vertex.key,
+                        share,
+                        regions_.shape(point.region).valid()};
+    add_edge_point(context_, vertex, draw, sink);
   }
-  if (vertex.turned) vertex.turned->sum = vertex.turned->sum + viewers.held.sum;
 }
 
 }  // namespace

@@ -35,111 +35,75 @@ class PenumbraTerm final : public Term {
     const int max_depth = context_.scene.max_depth;
     return lamp_edges_.size() > 0 && (max_depth < 0 || max_depth > 1);
   }
-  bool sample_film(double u, const Rng& key, RayCount& rays, FilmSample& sample) const override;
+  void sample_film(double u, const Rng& key, FilmSink& sink) const override;
   bool uses_vertices() const override { return lamp_edges_.size() > 0; }
-  void add_at_vertex(const PathVertex& vertex, int samples, TermCost& cost,
-                     Rgb<Lanes>& sum) const override {
+  void add_at_vertex(const PathVertex& vertex, int samples, BoundarySink& sink) const override {
     const int max_depth = context_.scene.max_depth;
     if (max_depth >= 0 && vertex.bounces + 2 >= max_depth) return;
     for (int i = 0; i < samples; ++i) {
-      const Rng key = vertex.key.copy(Purpose::kShadowCopy, i);
-      add_sample(vertex, key, cost, sum);
+      add_sample(vertex, vertex.key.copy(Purpose::kShadowCopy, i), sink);
     }
   }
   double work(const TermCost& cost) const override {
     return static_cast<double>(cost.rays) + kLineCost * static_cast<double>(cost.samples);
   }
-  void move_film(const FilmMotionAt& motion) override { moves_film_ = motion != nullptr; }
   void describe(GradientStats& stats) const override {
     stats.edges.emplace_back("before lamps", lamp_edges_.size());
   }
 
  private:
-  // What a viewer sees that is no camera: the vertex before.
-  void add_sample(const PathVertex& viewer, const Rng& key, TermCost& cost, Rgb<Lanes>& sum) const;
-  // What the drawn line adds for a path that comes along the ray with the throughput.
-  void add(const DrawnLine& drawn, const Vec3<Dual>& origin, const Vec3<Dual>& direction,
-           const Rgb<double>& throughput, int bounces, const Rng& key, SampleLog* log,
-           TurnedVertex* turned, TermCost& cost, Rgb<Lanes>& sum) const;
-  // How the point that the line meets slides if the viewer's ray moves so, but for what it does if
-  // the ray rests.
-  Vec3<Lanes> sliding(const DrawnLine& drawn, const Vec3<Dual>& q, const Vec3<Dual>& omega) const;
+  // viewer: the vertex before.
+  void add_sample(const PathVertex& viewer, const Rng& key, BoundarySink& sink) const;
+  // The line seen from q, for a path of this throughput.
+  void add(const DrawnLine& drawn, const Vec3d& q, const SeenAlong& along,
+           const Rgb<double>& throughput, int bounces, const Rng& key, BoundarySink& sink) const;
 
   const PathContext& context_;
   const EdgeSamplerInput& edges_;
   const LightRegions& regions_;
   const LampEdges& lamp_edges_;
   PenumbraLines lines_;
-  bool moves_film_ = false;
 };
 
-bool PenumbraTerm::sample_film(double u, const Rng& key, RayCount& rays, FilmSample& sample) const {
+void PenumbraTerm::sample_film(double u, const Rng& key, FilmSink& sink) const {
   Rng rng = key.at(Purpose::kShadow, 0);
+  RayCount rays;
   auto drawn = lines_.draw(u, rng, rays);
-  if (!drawn) return false;
+  sink.cost().add(rays);
+  if (!drawn) return;
   const auto seen = film_point(context_.scene, drawn->face, drawn->line.p);
-  if (!seen || !lines_.complete(*drawn, {}, 0, rng)) return false;
-  if (is_hidden(context_, *seen, drawn->face, rays)) return false;
+  if (!seen || !sink.at(seen->x, seen->y) || !lines_.complete(*drawn, {}, 0, rng)) return;
+  RayCount shadow;
+  const bool hidden = is_hidden(context_, *seen, drawn->face, shadow);
+  sink.cost().add(shadow);
+  if (hidden) return;
   drawn->edge.probability /= film_per_solid_angle(context_.scene.camera, seen->omega);
-  TermCost cost;
-  Rgb<Lanes> sum;
-  TurnedVertex shifted;
-  if (moves_film_) {
-    const auto ray = shifted_ray(context_.scene.camera, *seen);
-    shifted.velocity = sliding(*drawn, ray.origin, ray.direction);
-  }
-  add(*drawn, seen->ray.origin, seen->ray.direction, grey(1.0), 0, key, nullptr,
-      moves_film_ ? &shifted : nullptr, cost, sum);
-  rays.closest += cost.rays - cost.shadow_rays;
-  rays.shadow += cost.shadow_rays;
-  sample = {seen->x, seen->y, sum};
-  for (int c = 0; c < 3; ++c) {
-    sample.along_x[c] = -shifted.sum[c][0];
-    sample.along_y[c] = -shifted.sum[c][1];
-  }
-  return cost.counted > 0;
+  add(*drawn, value(seen->ray.origin), {seen->omega, seen->distance}, grey(1.0), 0, key, sink);
 }
 
-void PenumbraTerm::add_sample(const PathVertex& viewer, const Rng& key, TermCost& cost,
-                              Rgb<Lanes>& sum) const {
-  const auto seen = lines_.seen_from(viewer, key, cost);
+void PenumbraTerm::add_sample(const PathVertex& viewer, const Rng& key, BoundarySink& sink) const {
+  const auto seen = lines_.seen_from(viewer, key, sink.cost());
   if (!seen) return;
-  const auto& [drawn, omega, f] = *seen;
-  if (viewer.log) {
-    viewer.log->push_back(fmt::format("  penumbra on face {} of shape {}:", drawn.face.face.index(),
+  const auto& [drawn, along, f] = *seen;
+  if (sink.log()) {
+    sink.log()->push_back(fmt::format("  penumbra on face {} of shape {}:", drawn.face.face.index(),
                                       drawn.face.shape.index()));
   }
-  TurnedVertex turned;
-  if (viewer.turned) {
-    const Vec3<Lanes>& v = viewer.turned->velocity;
-    const Vec3d q = value(viewer.surface.p);
-    turned.velocity =
-        sliding(drawn, {{q.x, v.x}, {q.y, v.y}, {q.z, v.z}}, turning(omega, viewer.turned->turn));
-  }
-  add(drawn, viewer.surface.p, turning(omega, viewer.turn), viewer.throughput * f,
-      viewer.bounces + 1, key, viewer.log, viewer.turned ? &turned : nullptr, cost, sum);
-  if (viewer.turned) viewer.turned->sum = viewer.turned->sum + turned.sum;
+  add(drawn, viewer.surface.p, along, viewer.throughput * f, viewer.bounces + 1, key, sink);
 }
 
-Vec3<Lanes> PenumbraTerm::sliding(const DrawnLine& drawn, const Vec3<Dual>& q,
-                                  const Vec3<Dual>& omega) const {
-  const auto at_rest = [](const Vec3<Dual>& v) { return Vec3<Dual>{v.x.v, v.y.v, v.z.v}; };
-  const auto moves = surface_on_ray<Dual>(context_.scene, drawn.face, q, omega);
-  const auto rests = surface_on_ray<Dual>(context_.scene, drawn.face, at_rest(q), at_rest(omega));
-  return {moves.p.x.d - rests.p.x.d, moves.p.y.d - rests.p.y.d, moves.p.z.d - rests.p.z.d};
-}
-
-void PenumbraTerm::add(const DrawnLine& drawn, const Vec3<Dual>& origin,
-                       const Vec3<Dual>& direction, const Rgb<double>& throughput, int bounces,
-                       const Rng& key, SampleLog* log, TurnedVertex* turned, TermCost& cost,
-                       Rgb<Lanes>& sum) const {
+void PenumbraTerm::add(const DrawnLine& drawn, const Vec3d& q, const SeenAlong& along,
+                       const Rgb<double>& throughput, int bounces, const Rng& key,
+                       BoundarySink& sink) const {
   const Scene& scene = context_.scene;
-  const auto surface = surface_on_ray<Dual>(scene, drawn.face, origin, direction);
-  const Scattering<Dual> scattering(surface, -direction, scene.shading);
+  const auto surface = surface_on_ray<double>(scene, drawn.face, q, along.omega);
+  const Scattering<double> scattering(surface, -along.omega, scene.shading);
   if (scattering.black()) return;
-  const PathVertex vertex{surface, scattering, throughput, {}, bounces, {}, key, log, turned};
-  add_edge_point(context_, edges_.object(drawn.edge.edge.object), vertex, query_at(vertex),
-                 drawn.edge, {&regions_, drawn.line.region}, key, cost, sum);
+  const PathVertex vertex{surface, scattering, throughput, {}, {}, bounces, {}, key};
+  EdgeDraw draw{
+      edges_.object(drawn.edge.edge.object), drawn.edge, {&regions_, drawn.line.region}, key};
+  draw.along = &along;
+  add_edge_point(context_, vertex, draw, sink);
 }
 
 }  // namespace

@@ -40,4 +40,38 @@ bool PenumbraLines::complete(DrawnLine& drawn, const PathStep& step, int bounces
   return true;
 }
 
+std::optional<SeenLine> PenumbraLines::seen_from(const PathVertex& vertex, const Rng& key,
+                                                 TermCost& cost) const {
+  ++cost.samples;
+  RayCount rays;
+  // Not the numbers of the term `shadow` there.
+  Rng rng = key.at(Purpose::kShadow, vertex.bounces).at(Purpose::kDirect, 0);
+  const double u = rng.uniform();
+  auto drawn = draw(u, rng, rays);
+  cost.add(rays);
+  if (!drawn) {
+    ++cost.no_edge;
+    return {};
+  }
+  const Vec3d q = vertex.surface.p;
+  const Vec3d to = drawn->line.p - q;
+  const double distance = length(to);
+  const bool apart = distance > 0 && drawn->face != vertex.surface.face;
+  const Vec3d omega = apart ? to / distance : Vec3d{};
+  double pdf = apart ? vertex.scattering.pdf_solid_angle(omega) : 0;
+  if (const MirroredLight* mirrored = context_.mirrored; mirrored && pdf > 0) {
+    pdf = MirroredLight::pdf(mirrored->mixture(vertex.surface, vertex.scattering), omega, pdf);
+  }
+  const Rgb<double> f = pdf > 0 ? vertex.scattering.eval_value(omega) : Rgb<double>{};
+  if (is_black(f) || !complete(*drawn, {q, pdf}, vertex.bounces + 1, rng)) {
+    ++cost.zero_weight;
+    return {};
+  }
+  if (is_hidden_from(context_, vertex, drawn->face, omega, distance, cost)) {
+    ++cost.occluded;
+    return {};
+  }
+  return SeenLine{*drawn, {omega, distance}, f};
+}
+
 }  // namespace limn

@@ -17,8 +17,8 @@ struct DrawnLine {
 // The same, complete, and as a vertex of a path sees where it ends.
 struct SeenLine {
   DrawnLine drawn;
-  Vec3d omega;    // unit, from the vertex
-  Rgb<double> f;  // of the vertex's scattering
+  SeenAlong along;  // from the vertex
+  Rgb<double> f;    // of the vertex's scattering
 };
 
 class PenumbraLines {
@@ -34,41 +34,8 @@ class PenumbraLines {
   // where the line belongs to `direct`; where nearly all does, mostly.
   bool complete(DrawnLine& drawn, const PathStep& step, int bounces, Rng& rng) const;
 
-  // One drawn for a vertex (PathVertex, or that of reverse mode); books what becomes of it. None if
-  // it adds nothing there.
-  template <class Vertex>
-  std::optional<SeenLine> seen_from(const Vertex& vertex, const Rng& key, TermCost& cost) const {
-    ++cost.samples;
-    RayCount rays;
-    // Not the numbers of the term `shadow` there.
-    Rng rng = key.at(Purpose::kShadow, vertex.bounces).at(Purpose::kDirect, 0);
-    const double u = rng.uniform();
-    auto drawn = draw(u, rng, rays);
-    cost.add(rays);
-    if (!drawn) {
-      ++cost.no_edge;
-      return {};
-    }
-    const Vec3d q = value(vertex.surface.p);
-    const Vec3d to = drawn->line.p - q;
-    const double distance = length(to);
-    const bool apart = distance > 0 && drawn->face != vertex.surface.face;
-    const Vec3d omega = apart ? to / distance : Vec3d{};
-    double pdf = apart ? vertex.scattering.pdf_solid_angle(omega) : 0;
-    if (const MirroredLight* mirrored = context_.mirrored; mirrored && pdf > 0) {
-      pdf = MirroredLight::pdf(mirrored->mixture(vertex.surface, vertex.scattering), omega, pdf);
-    }
-    const Rgb<double> f = pdf > 0 ? vertex.scattering.eval_value(omega) : Rgb<double>{};
-    if (is_black(f) || !complete(*drawn, {q, pdf}, vertex.bounces + 1, rng)) {
-      ++cost.zero_weight;
-      return {};
-    }
-    if (is_hidden_from(context_, vertex, drawn->face, omega, distance, cost)) {
-      ++cost.occluded;
-      return {};
-    }
-    return SeenLine{*drawn, omega, f};
-  }
+  // One drawn for a vertex; books what becomes of it. None if it adds nothing there.
+  std::optional<SeenLine> seen_from(const PathVertex& vertex, const Rng& key, TermCost& cost) const;
 
  private:
   const PathContext& context_;

@@ -29,14 +29,13 @@ class BoundaryTerm final : public Term {
   }
 
   bool uses_vertices() const override { return !nothing_; }
-  void add_at_vertex(const PathVertex& vertex, int samples, TermCost& cost,
-                     Rgb<Lanes>& sum) const override {
+  void add_at_vertex(const PathVertex& vertex, int samples, BoundarySink& sink) const override {
     if (is_left_out(vertex.bounces)) return;
     static thread_local GlareEdges::View view;
     const EdgeQuery query = query_at(vertex);
     const bool looks = glare_ && scatters_again(vertex.bounces);
-    if (looks) add_before_glare(vertex, query, samples, view, cost, sum);
-    add_draws(vertex, query, samples, looks ? &view : nullptr, cost, sum);
+    if (looks) add_before_glare(vertex, query, samples, view, sink);
+    add_draws(vertex, query, samples, looks ? &view : nullptr, sink);
   }
 
   double work(const TermCost& cost) const override {
@@ -67,13 +66,13 @@ class BoundaryTerm final : public Term {
   }
   // view: replaced.
   void add_before_glare(const PathVertex& vertex, const EdgeQuery& query, int samples,
-                        GlareEdges::View& view, TermCost& cost, Rgb<Lanes>& sum) const;
+                        GlareEdges::View& view, BoundarySink& sink) const;
   // view: what is left out, if anything.
   void add_draws(const PathVertex& vertex, const EdgeQuery& query, int samples,
-                 const GlareEdges::View* view, TermCost& cost, Rgb<Lanes>& sum) const;
-  void add_draw(const PathVertex& vertex, const EdgeQuery& query,
-                const std::optional<EdgeSample>& drawn, const Rng& key,
-                const GlareEdges::View* view, TermCost& cost, Rgb<Lanes>& sum) const;
+                 const GlareEdges::View* view, BoundarySink& sink) const;
+  EdgeDraw drawn_at(const EdgeSample& sample, const Rng& key) const {
+    return {edges_.object(sample.edge.object), sample, part_, key};
+  }
 
   const PathContext& context_;
   const EdgeSamplerInput& edges_;
@@ -85,50 +84,42 @@ class BoundaryTerm final : public Term {
 };
 
 void BoundaryTerm::add_before_glare(const PathVertex& vertex, const EdgeQuery& query, int samples,
-                                    GlareEdges::View& view, TermCost& cost, Rgb<Lanes>& sum) const {
+                                    GlareEdges::View& view, BoundarySink& sink) const {
   static thread_local std::vector<DirectPoint> points;
   glare_->list(vertex, query, view);
   if (view.count == 0) return;
-  if (vertex.log) {
-    vertex.log->push_back(
+  if (sink.log()) {
+    sink.log()->push_back(
         fmt::format("  {} pieces of silhouettes before glare", view.pieces.size()));
   }
   // Not the numbers of `direct`, whose copies begin with the first.
   const Rng key = vertex.key.at(Purpose::kDirectCopy, 0);
-  glare_->draw(view, query, key.at(Purpose::kDirect, vertex.bounces), samples, cost, points);
+  glare_->draw(view, query, key.at(Purpose::kDirect, vertex.bounces), samples, sink.cost(), points);
   for (size_t i = 0; i < points.size(); ++i) {
-    const EdgeSample& sample = points[i].sample;
-    add_edge_point(context_, edges_.object(sample.edge.object), vertex, query, sample, part_,
-                   key.copy(Purpose::kEdgeCopy, static_cast<int>(i)), cost, sum);
+    const Rng own = key.copy(Purpose::kEdgeCopy, static_cast<int>(i));
+    add_edge_point(context_, vertex, drawn_at(points[i].sample, own), sink);
   }
 }
 
 void BoundaryTerm::add_draws(const PathVertex& vertex, const EdgeQuery& query, int samples,
-                             const GlareEdges::View* view, TermCost& cost, Rgb<Lanes>& sum) const {
+                             const GlareEdges::View* view, BoundarySink& sink) const {
   static thread_local std::vector<std::optional<EdgeSample>> drawn;
   draw_edges(sampler_, query, vertex.key, vertex.bounces, samples, drawn);
+  TermCost& cost = sink.cost();
   cost.samples += drawn.size();
   for (int i = 0; i < samples; ++i) {
-    const Rng key = vertex.key.copy(Purpose::kEdgeCopy, i);
-    add_draw(vertex, query, drawn[i], key, view, cost, sum);
+    if (!drawn[i]) {
+      ++cost.no_edge;
+      if (sink.log()) sink.log()->push_back("  edge: none found");
+    } else if (view && glare_->hold(*view, query, *drawn[i])) {
+      ++cost.zero_weight;
+      if (sink.log()) sink.log()->push_back("  edge: before glare, left to others");
+    } else {
+      EdgeDraw draw = drawn_at(*drawn[i], vertex.key.copy(Purpose::kEdgeCopy, i));
+      draw.roulette = true;
+      add_edge_point(context_, vertex, draw, sink);
+    }
   }
-}
-
-void BoundaryTerm::add_draw(const PathVertex& vertex, const EdgeQuery& query,
-                            const std::optional<EdgeSample>& drawn, const Rng& key,
-                            const GlareEdges::View* view, TermCost& cost, Rgb<Lanes>& sum) const {
-  if (!drawn) {
-    ++cost.no_edge;
-    if (vertex.log) vertex.log->push_back("  edge: none found");
-    return;
-  }
-  if (view && glare_->hold(*view, query, *drawn)) {
-    ++cost.zero_weight;
-    if (vertex.log) vertex.log->push_back("  edge: before glare, left to others");
-    return;
-  }
-  add_edge_point(context_, edges_.object(drawn->edge.object), vertex, query, *drawn, part_, key,
-                 cost, sum, 1, true);
 }
 
 }  // namespace

@@ -24,11 +24,10 @@
 namespace limn {
 namespace {
 
-// A ray from a viewer that meets the shadow's edge.
-struct Viewer {
-  Vec3<Dual> origin;
-  Vec3<Dual> direction;  // unit; held fixed, or turning with the camera or the directions of a path
-  double distance;       // to the shadow's edge
+// Where a viewer's ray meets a shadow's edge.
+struct Sight {
+  Vec3d omega;  // unit, from the viewer
+  double distance;
 };
 
 class ShadowTerm final : public Term {
@@ -37,13 +36,12 @@ class ShadowTerm final : public Term {
       : context_(input.context), input_(input.edges()), edges_(context_, input_, input.lanes) {}
 
   bool uses_vertices() const override { return !edges_.empty(); }
-  void add_at_vertex(const PathVertex& vertex, int samples, TermCost& cost,
-                     Rgb<Lanes>& sum) const override {
+  void add_at_vertex(const PathVertex& vertex, int samples, BoundarySink& sink) const override {
     const int max_depth = context_.scene.max_depth;
     if (max_depth >= 0 && vertex.bounces + 2 >= max_depth) return;
     for (int i = 0; i < samples; ++i) {
       const Rng key = vertex.key.copy(Purpose::kShadowCopy, i);
-      add_sample(vertex, key.at(Purpose::kShadow, vertex.bounces), cost, sum);
+      add_sample(vertex, key.at(Purpose::kShadow, vertex.bounces), sink);
     }
   }
 
@@ -51,39 +49,46 @@ class ShadowTerm final : public Term {
     const int max_depth = context_.scene.max_depth;
     return !edges_.empty() && (max_depth < 0 || max_depth > 1);
   }
-  bool sample_film(double u, const Rng& key, RayCount& rays, FilmSample& sample) const override;
+  void sample_film(double u, const Rng& key, FilmSink& sink) const override;
 
-  void move_film(const FilmMotionAt& motion) override { moves_film_ = motion != nullptr; }
   void describe(GradientStats& stats) const override {
     stats.setup.emplace_back("edges of sharp shadows", edges_.list_seconds());
     stats.edges.emplace_back("of sharp shadows", edges_.size());
   }
 
  private:
-  // dG/dtheta times delta(G) domega / dt.
-  Lanes sweep(const ShadowEdge& edge, const ShadowPoint& point, const Viewer& viewer) const;
-  void add_sample(const PathVertex& vertex, Rng rng, TermCost& cost, Rgb<Lanes>& sum) const;
+  // dG/dtheta times delta(G) domega / dt, times `scale`.
+  BoundaryForm sweep(const ShadowEdge& edge, const ShadowPoint& point, const Sight& sight,
+                     double scale) const;
+  void add_sample(const PathVertex& vertex, Rng rng, BoundarySink& sink) const;
 
   const PathContext& context_;
   const EdgeSamplerInput& input_;
   ShadowEdges edges_;
-  bool moves_film_ = false;
 };
 
-Lanes ShadowTerm::sweep(const ShadowEdge& edge, const ShadowPoint& point,
-                        const Viewer& viewer) const {
+// With e = y1 - y0 and r = x - y0, dG = dw . (e x r) + de . (r x w) + N . (dx - dy0).
+BoundaryForm ShadowTerm::sweep(const ShadowEdge& edge, const ShadowPoint& point, const Sight& sight,
+                               double scale) const {
   const EdgeMesh& mesh = input_.object(edge.id.object);
   const auto& ends = mesh.edge(edge.id.edge).vertices;
-  const Vec3<Dual> y0 = moving_vertex(mesh, ends[0]);
-  const Vec3<Dual> normal =
-      cross(edge.light->origin().through(y0), moving_vertex(mesh, ends[1]) - y0);
-  const auto x = surface_on_ray<Dual>(context_.scene, point.face, viewer.origin, viewer.direction);
-  const double cosine = std::fabs(dot(x.n_g, value(viewer.direction)));
-  return dot(normal, x.p - y0).d * (point.m * cosine / (viewer.distance * viewer.distance));
+  const Vec3d y0 = mesh.position(ends[0]), e = mesh.position(ends[1]) - y0, r = point.x - y0;
+  const LightOrigin origin = edge.light->origin();
+  const Vec3d w = origin.through(y0);
+  const Vec3d normal = cross(w, e), of_w = cross(e, r), of_e = cross(r, w);
+  BoundaryForm form;
+  form.x = point.x;
+  form.distance = sight.distance;
+  form.add_edge(mesh, edge.id, 0, origin.infinite ? -of_e - normal : of_w - of_e - normal);
+  form.add_edge(mesh, edge.id, 1, of_e);
+  form.add_light(*edge.light, origin.infinite ? of_w : -of_w);
+  const double cosine = form.add_seen_point(context_.scene, point.face, sight.omega, normal);
+  form.scale = point.m * cosine / (sight.distance * sight.distance) * scale;
+  return form;
 }
 
-void ShadowTerm::add_sample(const PathVertex& vertex, Rng rng, TermCost& cost,
-                            Rgb<Lanes>& sum) const {
+void ShadowTerm::add_sample(const PathVertex& vertex, Rng rng, BoundarySink& sink) const {
+  TermCost& cost = sink.cost();
   ++cost.samples;
   double probability;
   const ShadowEdge& edge = edges_.choose(rng.uniform(), probability);
@@ -94,21 +99,16 @@ void ShadowTerm::add_sample(const PathVertex& vertex, Rng rng, TermCost& cost,
     ++cost.occluded;
     return;
   }
-  const Vec3d q = value(vertex.surface.p);
+  const Vec3d q = vertex.surface.p;
   const double distance = length(point->x - q);
   const Vec3d omega = (point->x - q) / distance;
   const bool apart = distance > 0 && point->face != vertex.surface.face;
   const Rgb<double> f = apart ? vertex.scattering.eval_value(omega) : Rgb<double>{};
-  if (is_black(f)) {
-    ++cost.zero_weight;
-    return;
-  }
-  const Lanes swept =
-      sweep(edge, *point,
-            {vertex.surface.p, moving_direction(vertex, omega, rng.at(Purpose::kShadow, 1), cost),
-             distance});
-  const Rgb<double> amount = vertex.throughput * f * edges_.jump(edge, *point, q, omega);
-  if (is_zero(swept) || is_black(amount)) {
+  const Rgb<double> amount =
+      is_black(f) ? f : vertex.throughput * f * edges_.jump(edge, *point, q, omega);
+  BoundaryForm form;
+  if (!is_black(amount)) form = sweep(edge, *point, {omega, distance}, 1 / probability);
+  if (is_black(amount) || !sink.takes(form, rng)) {
     ++cost.zero_weight;
     return;
   }
@@ -118,56 +118,34 @@ void ShadowTerm::add_sample(const PathVertex& vertex, Rng rng, TermCost& cost,
     return;
   }
   ++cost.counted;
-  const Lanes weight = swept * (1 / probability);
-  const Rgb<Lanes> added{weight * amount.r, weight * amount.g, weight * amount.b};
-  if (TurnedVertex* turned = vertex.turned) {
-    // What does not turn is in both.
-    const Vec3<Lanes>& v = turned->velocity;
-    const Viewer turns{
-        {{q.x, v.x}, {q.y, v.y}, {q.z, v.z}}, turning(omega, turned->turn), distance};
-    const Viewer rests{{q.x, q.y, q.z}, turning(omega, {}), distance};
-    const Lanes of_turns = sweep(edge, *point, turns) - sweep(edge, *point, rests);
-    for (int c = 0; c < 3; ++c) turned->sum[c] += of_turns * (amount[c] / probability);
+  if (sink.log()) {
+    sink.log()->push_back(
+        fmt::format("  shadow of edge {} of shape {} on face {} of shape {}: probability {:.4g}",
+                    edge.id.edge.index(), edge.id.object.index(), point->face.face.index(),
+                    point->face.shape.index(), probability));
   }
-  if (vertex.log) {
-    vertex.log->push_back(fmt::format(
-        "  shadow of edge {} of shape {} on face {} of shape {}: probability {:.4g}, adds "
-        "({:.6g}, {:.6g}, {:.6g}) to the first parameter",
-        edge.id.edge.index(), edge.id.object.index(), point->face.face.index(),
-        point->face.shape.index(), probability, added.r[0], added.g[0], added.b[0]));
-  }
-  sum = sum + added;
+  sink.add(amount);
 }
 
-bool ShadowTerm::sample_film(double u, const Rng& key, RayCount& rays, FilmSample& sample) const {
+void ShadowTerm::sample_film(double u, const Rng& key, FilmSink& sink) const {
   double probability;
   const ShadowEdge& edge = edges_.choose(u, probability);
+  RayCount rays;
   const auto point = edges_.cast(edge, key.at(Purpose::kShadow, 0).uniform(), rays);
-  if (!point) return false;
+  sink.cost().add(rays);
+  if (!point) return;
   const auto seen = film_point(context_.scene, point->face, point->x);
-  if (!seen) return false;
-  const Lanes swept = sweep(edge, *point, {seen->ray.origin, seen->ray.direction, seen->distance});
-  const Rgb<double> amount = edges_.jump(edge, *point, value(seen->ray.origin), seen->omega);
-  if ((is_zero(swept) && !moves_film_) || is_black(amount)) return false;
-  if (is_hidden(context_, aimed_at(*seen, point->target(value(seen->ray.origin))), point->face,
-                rays))
-    return false;
-  sample.x = seen->x;
-  sample.y = seen->y;
-  const double share = film_per_solid_angle(context_.scene.camera, seen->omega) / probability;
-  const Lanes weight = swept * share;
-  sample.value = {weight * amount.r, weight * amount.g, weight * amount.b};
-  if (moves_film_) {
-    const auto ray = shifted_ray(context_.scene.camera, *seen);
-    const auto at_rest = [](const Vec3<Dual>& v) { return Vec3<Dual>{v.x.v, v.y.v, v.z.v}; };
-    // What moves by itself is in both.
-    const Lanes by_film =
-        sweep(edge, *point, {at_rest(ray.origin), at_rest(ray.direction), seen->distance}) -
-        sweep(edge, *point, {ray.origin, ray.direction, seen->distance});
-    sample.along_x = amount * (by_film[0] * share);
-    sample.along_y = amount * (by_film[1] * share);
-  }
-  return true;
+  if (!seen || !sink.at(seen->x, seen->y)) return;
+  const Vec3d q = value(seen->ray.origin);
+  const Rgb<double> amount = edges_.jump(edge, *point, q, seen->omega);
+  const double scale = film_per_solid_angle(context_.scene.camera, seen->omega) / probability;
+  if (is_black(amount)) return;
+  const BoundaryForm form = sweep(edge, *point, {seen->omega, seen->distance}, scale);
+  if (!sink.takes(form, key)) return;
+  RayCount shadow;
+  const bool hidden = is_hidden(context_, aimed_at(*seen, point->target(q)), point->face, shadow);
+  sink.cost().add(shadow);
+  if (!hidden) sink.add(amount);
 }
 
 }  // namespace

@@ -1,6 +1,8 @@
 // The table of terms, and what they are made from.
 #include "integrators/terms/term.h"
 
+#include <algorithm>
+
 #include "integrators/edges/scene_edges.h"
 #include "integrators/terms/term_table.h"
 
@@ -9,6 +11,8 @@ namespace limn {
 static_assert(std::size(kTermTypes) <= kMostTerms);
 
 std::span<const TermType> term_types() { return kTermTypes; }
+
+const TermType& film_term() { return *std::ranges::find_if(kTermTypes, &TermType::on_film_alone); }
 
 bool has_term(const EdgeSamplerType& sampler, const TermType& type, bool closed, bool moved_film) {
   if (type.regions && !sampler.regions) return false;

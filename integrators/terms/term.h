@@ -4,8 +4,8 @@
 //   what finished paths add (add_path), what the vertices of the first path add (add_at_vertex),
 //   and what points on curves of the film add (sample_film), splatted through the filter.
 // A term does what it needs of the three. All are unbiased on their own, so terms can be left out
-// and can have any number of samples. Objects are made once per pass (up to kLanes parameters) and
-// used by all threads at once.
+// and can have any number of samples. Boundary samples go to sinks: forward and reverse mode take
+// the same terms. Objects are made once per pass and used by all threads at once.
 #include <memory>
 #include <span>
 #include <vector>
@@ -13,6 +13,7 @@
 #include "integrators/estimates/sample_estimator.h"
 #include "integrators/lights/light_regions.h"
 #include "integrators/paths/path.h"
+#include "integrators/terms/boundary_sample.h"
 #include "integrators/terms/penumbra.h"
 #include "limn/core/dual.h"
 #include "limn/edgetree/edge_sampler_types.h"
@@ -20,44 +21,28 @@
 
 namespace limn {
 
-// What a pilot asks of a vertex: what it would add if directions at the path's first vertex turned
-// about the axes x, y and z, on the same samples. Lanes 0 to 2 are the axes.
-struct TurnedVertex {
-  Vec3<Lanes> velocity{};  // of the vertex as it then slides [scene units per unit of the turn]
-  DirectionTurn turn;      // of directions here, in the same unit; zero but at the first vertex
-  Rgb<Lanes> sum{};        // added to
-};
-
-// What a pilot learns of the draws that were traced.
-struct TracedDraws {
-  uint64_t count = 0, rays = 0;
-  // For all channels, over the square of the luminance they are weighed by.
-  double squared_jumps = 0;
-  void add(const TracedDraws& other) {
-    count += other.count;
-    rays += other.rays;
-    squared_jumps += other.squared_jumps;
-  }
-};
-
-// Where a path scatters.
+// Where a path scatters, in plain numbers, with how it moves as edges are drawn by it.
 struct PathVertex {
-  const SurfacePoint<Dual>& surface;
-  const Scattering<Dual>& scattering;
-  const Rgb<double>& throughput;   // of the path up to here
-  DirectionTurn turn;              // how directions move here, see direction_field.h
-  int bounces;                     // how often it has scattered before
-  PathStep step;                   // how it came here
-  const Rng& key;                  // of the path
-  SampleLog* log = nullptr;        // null unless somebody reads it
-  TurnedVertex* turned = nullptr;  // null unless a pilot asks
-  TracedDraws* traced = nullptr;   // the same
-  int parameters = kLanes;         // the first lanes; others are a pilot's
-  // Of what draws add here, see SamplePlan.
-  Lanes survival{};
-  // How directions move here, in place of the turn; null where they are not warped.
-  const WarpField* warp = nullptr;
+  SurfacePoint<double> surface;
+  Scattering<double> scattering;
+  Rgb<double> throughput;  // of the path up to here
+  Vec3<Lanes> velocity;    // of the surface point
+  DirectionTurn turn;      // of directions here, see direction_field.h
+  int bounces;             // how often the path has scattered before
+  PathStep step;           // how it came here
+  const Rng& key;          // of the path
 };
+// A vertex of a path over any scalar, of throughput one.
+template <class S>
+PathVertex plain_vertex(const SurfacePoint<S>& at, const Scattering<S>& scattering,
+                        ShadingModel model, int bounces, const PathStep& step, const Rng& key) {
+  const SurfacePoint<double> surface{at.shape, at.face,       value(at.p),
+                                     at.n_g,   value(at.n_s), value(at.horizon)};
+  PathVertex vertex{
+      surface, {surface, value(scattering.wi()), model}, grey(1.0), {}, {}, bounces, step, key};
+  if constexpr (std::is_same_v<S, Dual>) vertex.velocity = {at.p.x.d, at.p.y.d, at.p.z.d};
+  return vertex;
+}
 
 // A sample of a pixel whose positions on the film move.
 struct MovedPixel {
@@ -77,10 +62,10 @@ class Term {
   virtual Rgb<Lanes> add_path(const Rgb<Dual>& /*radiance*/) const { return {}; }
 
   // Whether the vertices of a sample's first path add something. add_at_vertex takes `samples`
-  // samples there and adds their sum (not their mean) to `sum`, their cost to `cost`.
+  // samples there and hands them on, to be summed (not averaged).
   virtual bool uses_vertices() const { return false; }
-  virtual void add_at_vertex(const PathVertex& /*vertex*/, int /*samples*/, TermCost& /*cost*/,
-                             Rgb<Lanes>& /*sum*/) const {}
+  virtual void add_at_vertex(const PathVertex& /*vertex*/, int /*samples*/,
+                             BoundarySink& /*sink*/) const {}
 
   // Whether moving positions of a pixel's samples add something by themselves. add_at_pixels takes
   // one sample for each of at most kMostMovedPixels pixels, and sets sums[i] to that of pixels[i].
@@ -90,14 +75,11 @@ class Term {
   // How positions on the film move from now on; an empty function: they are held.
   virtual void move_film(const FilmMotionAt& /*motion*/) {}
 
-  // Whether the film holds curves to sample. sample_film draws a point: u in [0, 1), stratified
-  // over a batch, chooses the curve and the point on it; `key` is for everything else. False if
-  // the sample adds nothing.
+  // Whether the film holds curves to sample. sample_film draws a point and hands it on, if it adds
+  // anything: u in [0, 1), stratified over a batch, chooses the curve and the point on it; `key` is
+  // for everything else.
   virtual bool uses_film() const { return false; }
-  virtual bool sample_film(double /*u*/, const Rng& /*key*/, RayCount& /*rays*/,
-                           FilmSample& /*sample*/) const {
-    return false;
-  }
+  virtual void sample_film(double /*u*/, const Rng& /*key*/, FilmSink& /*sink*/) const {}
 
   // What the samples behind `cost` cost, in units of one ray with the shading at its end: the same
   // on every machine, so that choices that follow from it are.
@@ -113,6 +95,7 @@ class Term {
 };
 
 class FilmRegions;
+struct FreeMotion;
 
 // What the terms of a pass are made from. It outlives them.
 class TermInput {
@@ -133,6 +116,8 @@ class TermInput {
   int threads;
   bool warps;                            // whether directions are warped, see warp_field.h
   const FilmRegions* visible = nullptr;  // of the film; null: rays tell what is seen
+  // In reverse mode: what may move, each vertex by itself. Else null.
+  const FreeMotion* free = nullptr;
 
   // Edges of all shapes (object i is shape i), light polygons and the environment, as an edge
   // sampler takes them; without the regions of light. Made when a term first asks.
@@ -175,6 +160,9 @@ struct TermType {
   bool regions;     // it is of samplers that keep regions of light apart, and of no others
   bool moved_film;  // it is of methods that move positions on the film, and of no others
   std::unique_ptr<Term> (*make)(TermInput& input);
+
+  // None of its samples belongs to a path.
+  bool on_film_alone() const { return least_samples < 1; }
 };
 // In the order of --samples and of all tables.
 std::span<const TermType> term_types();
@@ -185,6 +173,8 @@ bool has_term(const EdgeSamplerType& sampler, const TermType& type, bool closed,
 // mode, fits and comparisons ask here.
 std::vector<const TermType*> terms_of(const Scene& scene, const EdgeSamplerType& sampler,
                                       bool closed = false, bool moved_film = false);
+// The row that is on the film alone.
+const TermType& film_term();
 // Sums of all terms are kept on the stack.
 inline constexpr size_t kMostTerms = 7;
 

@@ -55,6 +55,21 @@ class Contributing(unittest.TestCase):
                 for name in names:
                     self.assertTrue(any(name in code[file] for file in files), name)
 
+    def test_no_mode_names_a_term(self):
+        """Forward and reverse mode, fits and comparisons take their terms from the table."""
+        table = "integrators/terms/term_table.h"
+        code = dict(code_files())
+        terms = re.findall(r'\{("\w+"), "[^;]*?(make_\w+_term)\}', code[table], re.S)
+        self.assertGreater(len(terms), 6)
+        for name, factory in terms:
+            own = {file for file, text in code.items() if re.search(rf"\b{factory}\b", text)}
+            self.assertEqual(len(own), 2, factory)
+            for file in code:
+                if file.startswith("integrators/") and file not in own:
+                    self.assertNotIn(name, code[file], file)
+        for driver in ("integrators/methods/term_job.cpp", "integrators/backward/backward.cpp"):
+            self.assertIn("terms_of(", code[driver])
+
     def test_every_kind_has_its_row(self):
         kinds = " ".join(kind for kind, *_ in rows())
         for kind in ("sampler", "method", "term", "command", "BSDF", "light", "shape"):

@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "integrators/terms/edge_jump.h"
+#include "integrators/terms/lane_sinks.h"
 #include "integrators/terms/term_table.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/statistics.h"
@@ -227,11 +228,14 @@ TEST_P(ExactDirectOf, IsWhatIsDrawn) {
       query.face = surface.face;
       for (int r = 0; r < kRepeats; ++r) {
         const Rng key(43, static_cast<uint64_t>(g * kPoints + k), static_cast<uint64_t>(r));
-        const Rgb<double> one = grey(1.0);
+        const PathVertex vertex =
+            plain_vertex(surface, scattering, world.scene.shading, 1, {}, key);
         TermCost cost;
-        Rgb<Lanes> sum;
-        world.term->add_at_vertex({surface, scattering, one, {}, 1, {}, key}, 1, cost, sum);
-        values[r] = sum.g[0];
+        const VertexLanes::Setting setting{world.scene};
+        VertexLanes lanes(setting, vertex, surface, nullptr);
+        lanes.start(cost, {});
+        world.term->add_at_vertex(vertex, 1, lanes);
+        values[r] = lanes.sum().g[0];
         mean += values[r] / kRepeats;
       }
       for (const double v : values)

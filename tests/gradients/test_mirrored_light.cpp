@@ -340,8 +340,7 @@ TEST(MirroredLight, EdgesAreDrawnWhereTheyAreLeftOut) {
       continue;
     const auto surface = surface_on_ray<Dual>(scene, hit.face, origin, forward);
     const Scattering<Dual> scattering(surface, -forward, scene.shading);
-    const Rgb<double> one = grey(1.0);
-    const PathVertex vertex{surface, scattering, one, {}, 0, {}, rng};
+    const PathVertex vertex = plain_vertex(surface, scattering, scene.shading, 0, {}, rng);
     const EdgeQuery query = query_at(vertex);
     GlareEdges::View view;
     glare.list(vertex, query, view);

@@ -1,0 +1,102 @@
+// Weights of boundary samples on what moves their points.
+#include "integrators/backward/adjoint_sinks.h"
+
+#include "integrators/film/clip_curves.h"
+#include "limn/core/reverse.h"
+
+namespace limn {
+
+bool VertexAdjoint::takes(const BoundaryForm& form, const Rng&) {
+  form_ = &form;
+  return form.share > 0 && (motion_.moves(form) || !is_still(p_));
+}
+
+void VertexAdjoint::add(const Rgb<double>& amount) {
+  const double weight = weighed(adjoint_, amount) * form_->scale * form_->share;
+  if (weight == 0) return;
+  motion_.contribute(tape_, seeds_, *form_, weight);
+  seeds_.add(p_, form_->of_ray() * weight);
+}
+
+bool FilmPointAdjoint::at(double x, double y) {
+  x_ = x;
+  y_ = y;
+  adjoint_ = film_.at(x, y);
+  return asked_ = !is_black(adjoint_);
+}
+
+bool FilmPointAdjoint::takes(const BoundaryForm& form, const Rng&) {
+  form_ = &form;
+  return motion_.moves(form) || motion_.slots().camera != 0;
+}
+
+void FilmPointAdjoint::add(const Rgb<double>& amount) {
+  added_ = true;
+  const double weight = weighed(adjoint_, amount) * form_->scale * share_;
+  motion_.contribute(tape_, seeds_, *form_, weight);
+  if (motion_.slots().camera == 0) return;
+  const auto ray = camera_leaves(motion_.scene().camera).ray(x_, y_);
+  const Vec3d g = form_->of_ray() * weight;
+  seeds_.add(ray.origin, g);
+  seeds_.add(ray.direction, g * form_->distance);
+}
+
+// With J the derivative of the film position of a point of the scene, the normal speed of the line
+// is n . J (v - v_ray).
+void FilmPointAdjoint::add_line(const FilmLineSample& line, const Rgb<double>& jump) {
+  added_ = true;
+  if (line.clip) {
+    add_clip(line, weighed(adjoint_, jump) * share_ / line.density);
+    return;
+  }
+  const Camera& camera = motion_.scene().camera;
+  const auto [a, b] = line.mesh->edge(line.edge.edge).vertices;
+  BoundaryForm form;
+  form.x = line.mesh->position(a) * (1 - line.t) + line.mesh->position(b) * line.t;
+  form.distance = length(form.x - value(camera.origin));
+  form.scale = 1 / line.density;
+  const auto at = camera.project(
+      Vec3<Dual>{{form.x.x, {1, 0, 0, 0}}, {form.x.y, {0, 1, 0, 0}}, {form.x.z, {0, 0, 1, 0}}});
+  Vec3d g;
+  for (int k = 0; k < 3; ++k) g[k] = line.nx * at.x.d[k] + line.ny * at.y.d[k];
+  form.add_edge(*line.mesh, line.edge, line.t, g);
+  form_ = &form;
+  add(jump);
+}
+
+namespace {
+
+// A point of a face on a clip plane, between two corners.
+Vec3<Var> meet_clip_plane(const CameraView<Var>& camera, const Vec3<Var>& a, const Vec3<Var>& b,
+                          double clip) {
+  const Var depth_a = camera.depth(a), depth_b = camera.depth(b);
+  return a + (b - a) * ((clip - depth_a) / (depth_b - depth_a));
+}
+
+// The point at t of where the face meets the plane, as clip_curves.cpp lists its ends.
+Vec3<Var> clip_point(const Scene& scene, const CameraView<Var>& view, const ClipSegment& segment,
+                     double t) {
+  const Camera& camera = scene.camera;
+  const double clip = segment.at_far_plane ? camera.far_clip : camera.near_clip;
+  const auto corners = corner_leaves(scene, segment.face);
+  Vec3<Var> ends[2];
+  int count = 0;
+  for (int k = 0; k < 3; ++k) {
+    const Vec3<Var>&a = corners[k], &b = corners[(k + 1) % 3];
+    const bool beyond_a = camera.depth(value(a)) > clip, beyond_b = camera.depth(value(b)) > clip;
+    if (beyond_a != beyond_b) ends[count++] = meet_clip_plane(view, a, b, clip);
+  }
+  return ends[0] + (ends[1] - ends[0]) * t;
+}
+
+}  // namespace
+
+// The cut moves with the camera and the face: that is easier on the tape.
+void FilmPointAdjoint::add_clip(const FilmLineSample& line, double weight) {
+  const CameraView<Var> view = camera_leaves(motion_.scene().camera);
+  const auto position = view.project(clip_point(motion_.scene(), view, *line.clip, line.t));
+  seeds_.add(position.x.node, weight * line.nx);
+  seeds_.add(position.y.node, weight * line.ny);
+}
+
+}  // namespace limn
