@@ -7,21 +7,30 @@
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
 
+#include <algorithm>
+
 #include "limn/core/check.h"
 
 namespace limn {
+namespace {
+
+// More threads than cores are allowed: results do not depend on their number, and tests request
+// seven. One limit for the whole process, set before TBB or Embree starts its workers: TBB
+// warns of every arena that asks for more than the limit of the moment.
+constexpr int kMostThreads = 1024;
+const oneapi::tbb::global_control limit(oneapi::tbb::global_control::max_allowed_parallelism,
+                                        kMostThreads);
+
+}  // namespace
 
 int thread_count(int requested) {
-  return requested > 0 ? requested : oneapi::tbb::info::default_concurrency();
+  return std::min(requested > 0 ? requested : oneapi::tbb::info::default_concurrency(),
+                  kMostThreads);
 }
 
 void parallel_for(size_t count, int threads, const std::function<void(size_t)>& work) {
   CHECK_LE(1, threads);
-  // More threads than cores are allowed: results do not depend on their number, and tests request
-  // seven.
-  const oneapi::tbb::global_control limit(oneapi::tbb::global_control::max_allowed_parallelism,
-                                          threads);
-  oneapi::tbb::task_arena arena(threads);
+  oneapi::tbb::task_arena arena(std::min(threads, kMostThreads));
   arena.execute([&] {
     oneapi::tbb::parallel_for(
         oneapi::tbb::blocked_range<size_t>(0, count, 1),

@@ -13,6 +13,7 @@
 #include "limn/core/check.h"
 #include "limn/core/error.h"
 #include "limn/core/faces_in_place.h"
+#include "limn/core/parallel.h"
 #include "limn/core/ray_tracer.h"
 
 namespace limn {
@@ -133,8 +134,8 @@ class EmbreeTracer final : public RayTracer {
         overlaps_(faces_->overlaps),
         settles_(!copies_.empty() || !overlaps_.empty()),
         origin_(origin_of(scene)) {
-    const std::string config = "threads=" + std::to_string(threads);
-    device_.reset(rtcNewDevice(config.c_str()));
+    // Without a number of threads: Embree would limit all of TBB to the machine's cores by it.
+    device_.reset(rtcNewDevice(nullptr));
     if (!device_) throw InputError("Embree cannot start on this machine");
     rtcSetDeviceErrorFunction(device_.get(), EmbreeErrors::note, &errors_);
     rtc_scene_.reset(rtcNewScene(device_.get()));
@@ -145,7 +146,8 @@ class EmbreeTracer final : public RayTracer {
     rtcSetSceneBuildQuality(rtc_scene_.get(), RTC_BUILD_QUALITY_HIGH);
     for (size_t i = 0; i < scene.shapes.size(); ++i)
       attach(scene.shapes[i].mesh, ShapeId(static_cast<uint32_t>(i)));
-    rtcCommitScene(rtc_scene_.get());
+    // On the threads of this call alone.
+    parallel_for(1, threads, [&](size_t) { rtcJoinCommitScene(rtc_scene_.get()); });
     errors_.check();
   }
 
