@@ -35,12 +35,12 @@ std::string percent(double part) {
   return part < 10 ? two_digits(100 * part) + " %" : "more than all";
 }
 
-// "2.1 % of the whole; 1.9 % of interior, 6 % of camera"
+// "2.1 % of the total, 1.9 % of interior, 6 % of camera"
 std::string power_text(const CheckResult& r) {
   std::string text;
   for (const CheckPower& power : r.power) {
     if (!power.term.empty() && power.negligible()) continue;
-    const std::string of = power.term.empty() ? "the whole" : power.term;
+    const std::string of = power.term.empty() ? "the total" : power.term;
     text += (text.empty() ? "" : ", ") + percent(power.visible) + " of " + of;
   }
   return text;
@@ -71,21 +71,24 @@ void print_verdict(const CheckResult& r, int spp) {
 void print_check(const std::string& name, const CheckResult& r, int spp) {
   std::string samples;
   for (const TermRun& term : r.gradient.terms) {
-    samples += fmt::format("{}{:.3g} {}", samples.empty() ? "" : ", ", term.samples, term.name);
+    samples += fmt::format("{}{} {:.3g}", samples.empty() ? "" : ", ", term.name, term.samples);
   }
-  fmt::print("{}: {} samples per pixel ({}), {} windows of {} pixels, step {:.3g}\n", name, spp,
-             samples, r.windows.count, r.block, r.step);
-  fmt::print("  whole image: gradient {:.6g} +- {:.2g}, differences {:.6g} +- {:.2g}, z = {:.2f}\n",
-             r.total.gradient, r.total.gradient_error, r.total.difference, r.total.difference_error,
-             r.total.z);
-  fmt::print("  windows: z has mean {:.2f}, deviation {:.2f}, largest {:.2f}\n", r.windows.mean,
+  fmt::print("{}: {} samples per pixel, {} windows of {} pixels, step {:.3g}\n", name, spp,
+             r.windows.count, r.block, r.step);
+  fmt::print("  samples per spp    {}\n", samples);
+  fmt::print("  gradient           {:.6g} +- {:.2g} (sum over the image)\n", r.total.gradient,
+             r.total.gradient_error);
+  fmt::print("  differences        {:.6g} +- {:.2g}, z = {:.2f}\n", r.total.difference,
+             r.total.difference_error, r.total.z);
+  fmt::print("  z of windows       mean {:.2f}, deviation {:.2f}, largest {:.2f}\n", r.windows.mean,
              r.windows.deviation, r.windows.largest);
-  fmt::print("  p = {:.2g} for windows, image and terms together, smallest at {}\n", r.p, r.found);
+  fmt::print("  p                  {:.2g} (windows, image and terms together), smallest at {}\n",
+             r.p, r.found);
   if (r.confirmation) {
-    fmt::print("  second run there, {} samples per pixel, step {:.3g}: p = {:.2g}\n",
+    fmt::print("  second run there   p = {2:.2g} ({0} samples per pixel, step {1:.3g})\n",
                r.confirmation->spp, r.confirmation->step, r.confirmation->p);
   }
-  fmt::print("  found with 95 %: an error of {}\n", power_text(r));
+  fmt::print("  detectable error   {} (95 % power)\n", power_text(r));
   print_verdict(r, spp);
 }
 

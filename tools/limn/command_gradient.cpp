@@ -18,7 +18,7 @@ namespace {
 
 using nlohmann::json;
 
-// From this share of the squares of a term's samples on, one of them rules its error. Not tuned.
+// From this share of the sum of squares of a term's samples on, one is an outlier. Not tuned.
 constexpr double kRulingShare = 0.1;
 
 // From this share of the squared error in a thousandth of the pixels on. Not tuned.
@@ -86,17 +86,19 @@ json write_parameter(const Scene& scene, const ParameterGradient& g,
               attributes);
   }
   const Sum sum = image_sum(g.image_sum);
-  if (const double share = worst_share(g.total); share >= kRulingPixels) {
+  const size_t pixels = g.total.size() / 3;
+  if (const double share = worst_share(g.total); pixels >= 1000 && share >= kRulingPixels) {
     warnings.add_all({fmt::format(
-        "{}: {:.0f} % of the squared error lie in a thousandth of the pixels: few samples rule the "
-        "standard errors",
-        g.name, 100 * share)});
+        "{}: {} of {} pixels have {:.0f} % of the squared error: few samples dominate the standard "
+        "errors",
+        g.name, pixels / 1000, pixels, 100 * share)});
   }
   if (!common.quiet) {
-    fmt::print("{}: {}, {}, standard error {}\n", g.name, output, picture, errors);
-    fmt::print(
-        "  picture: blue -{0:.4g}, white 0, red +{0:.4g}; sum over the image {1:.6g} +- {2:.2g}\n",
-        scale, sum.value, sum.error);
+    fmt::print("{}\n", g.name);
+    fmt::print("  derivative      {}\n", output);
+    fmt::print("  picture         {0} (blue -{1:.4g}, white 0, red +{1:.4g})\n", picture, scale);
+    fmt::print("  standard error  {}\n", errors);
+    fmt::print("  image sum       {:.6g} +- {:.2g}\n", sum.value, sum.error);
   }
   json term_figures = json::object();
   for (size_t t = 0; t < terms.size(); ++t) {
@@ -122,51 +124,61 @@ double share_of(const ParameterGradient& g, size_t term) {
   return all > 0 ? mean_magnitude(g.terms[term]) / all : 0;
 }
 
+size_t term_width(const GradientResult& result) {
+  size_t width = 10;
+  for (const TermRun& term : result.terms) width = std::max(width, term.name.size());
+  return width;
+}
+
+// Where time, rays and samples went, and each term's share of the sum of mean magnitudes.
 void print_terms(const GradientResult& result) {
   double seconds = 0;
-  size_t width = 10;
-  for (const TermRun& term : result.terms) {
-    seconds += term.cost.seconds;
-    width = std::max(width, term.name.size());
+  for (const TermRun& term : result.terms) seconds += term.cost.seconds;
+  const size_t width = term_width(result);
+  fmt::print("\n{:{}} {:>8} {:>12} {:>12} {:>10}", "term", width, "time", "rays", "samples",
+             "per spp");
+  for (const auto& g : result.parameters) {
+    fmt::print("  {:>{}}", "of " + g.name, std::max<size_t>(10, g.name.size() + 3));
   }
-  fmt::print("{:{}} {:>7} {:>12} {:>12}", "term", width, "time", "rays", "samples");
-  for (const auto& g : result.parameters) fmt::print("  share of {}", g.name);
   fmt::print("\n");
   for (size_t t = 0; t < result.terms.size(); ++t) {
     const TermRun& term = result.terms[t];
     if (!term.computed && term.cost.samples == 0) continue;
-    fmt::print("{:{}} {:5.1f} % {:>12} {:>12}", term.name, width,
+    fmt::print("{:{}} {:6.1f} % {:>12} {:>12} {:>10.3g}", term.name, width,
                seconds > 0 ? 100 * term.cost.seconds / seconds : 0, term.cost.rays,
-               term.cost.samples);
+               term.cost.samples, term.samples);
     for (const auto& g : result.parameters) {
-      fmt::print("  {:>{}.1f} %", 100 * share_of(g, t), g.name.size() + 7);
+      fmt::print("  {:>{}.1f} %", 100 * share_of(g, t),
+                 std::max<size_t>(10, g.name.size() + 3) - 2);
     }
     fmt::print("\n");
   }
+}
+
+// What became of the samples of each term that draws edges.
+void print_boundary_samples(const GradientResult& result) {
+  const size_t width = term_width(result);
+  bool first = true;
   for (const TermRun& term : result.terms) {
     const TermCost& c = term.cost;
     if (c.no_edge + c.zero_weight == 0) continue;
+    if (first) {
+      fmt::print("\n{:{}} {:>9} {:>18} {:>9} {:>9} {:>13}\n", "samples", width, "rejected",
+                 "zero contribution", "roulette", "occluded", "contributing");
+    }
+    first = false;
     const auto share = [&](uint64_t n) { return 100.0 * n / c.samples; };
-    fmt::print(
-        "{} samples: {:.1f} % found no edge, {:.1f} % without weight, {}{:.1f} % occluded, {:.1f} "
-        "% "
-        "counted\n",
-        term.name, share(c.no_edge), share(c.zero_weight),
-        c.left_out > 0 ? fmt::format("{:.1f} % left out, ", share(c.left_out)) : "",
-        share(c.occluded), share(c.counted));
+    fmt::print("{:{}} {:7.1f} % {:16.1f} % {:7.1f} % {:7.1f} % {:11.1f} %\n", term.name, width,
+               share(c.no_edge), share(c.zero_weight), share(c.left_out), share(c.occluded),
+               share(c.counted));
   }
 }
 
-// "3,0.25,1 of interior, camera, boundary"
-std::string samples_of_terms(const GradientResult& result) {
-  return to_string(result.samples()) + " of " + join(names_of(result.terms));
-}
-
 void print_samples(const GradientResult& r) {
-  fmt::print("{} samples per pixel, {:.2f} s, of which {:.2f} s set-up\n", r.spp, r.seconds,
+  fmt::print("\n{} samples per pixel in {:.2f} s (set-up {:.2f} s)", r.spp, r.seconds,
              r.setup_seconds);
-  fmt::print("each holds {}{}\n", samples_of_terms(r),
-             r.pilot_spp > 0 ? fmt::format(", chosen by {} samples per pixel", r.pilot_spp) : "");
+  if (r.pilot_spp > 0) fmt::print("; terms allocated from a pilot of {} spp", r.pilot_spp);
+  fmt::print("\n");
   for (const MethodSetting& setting : r.settings) {
     std::visit([&](const auto& value) { fmt::print("{}: {}\n", setting.name, value); },
                setting.value);
@@ -179,14 +191,14 @@ std::string text_of(const GradientResult& result, const LargestSample& largest) 
                       : fmt::format("sample {} of {} samples per pixel", place.sample, result.spp);
 }
 
-// Single samples that rule a term's error, each with the command that does it again.
+// Single samples that dominate a term's error, each with the command that traces it.
 void print_largest(const GradientResult& result, const std::string& command_line, bool all) {
   for (const TermRun& term : result.terms) {
     LargestSample largest = term.cost.largest;
     if (!term.computed || largest.square == 0) continue;
     if (!all && largest.share() < kRulingShare) continue;
     if (largest.place.x < 0) largest.place.term = term.name;
-    fmt::print("{}: one sample holds {:.2g} % of the squares of all: {}\n  to see it: {}\n",
+    fmt::print("{}: one sample is {:.0f} % of the sum of squares (an outlier): {}\n  trace: {}\n",
                term.name, 100 * largest.share(), text_of(result, largest),
                repeat_command(command_line, largest.place));
   }
@@ -317,6 +329,7 @@ class GradientCommand final : public Command {
     write(scene, settings, result);
     if (!common_.quiet) {
       print_terms(result);
+      print_boundary_samples(result);
       print_samples(result);
       print_largest(result, command_line, stats_);
     }

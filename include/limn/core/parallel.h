@@ -5,7 +5,7 @@
 
 namespace limn {
 
-// Number of threads for a user's request, at most 1024; 0 means all cores.
+// Number of threads for a user's request; 0 means all cores.
 int thread_count(int requested);
 
 // Calls work(i) for every i in [0, count) on at most `threads` threads. The first exception stops
