@@ -15,7 +15,7 @@
 // to an edge sampler); the sphere-box test is exact; and a hundredth of the untransformed
 // cosine is added, so that no edge is lost where only the transformed cosine is zero.
 // redner treats the sphere as solid by mistake (Soroka et al. 2025, App. F) and rejects
-// less: li2019-solid.
+// less: sphere=solid.
 #include <algorithm>
 #include <array>
 
@@ -384,12 +384,8 @@ class Li2019Sampler final : public EdgeSampler {
 
 }  // namespace
 
-std::unique_ptr<EdgeSampler> make_li2019_sampler(const EdgeSamplerInput& input, int) {
-  return std::make_unique<Li2019Sampler>(input, false);
-}
-
-std::unique_ptr<EdgeSampler> make_li2019_solid_sampler(const EdgeSamplerInput& input, int) {
-  return std::make_unique<Li2019Sampler>(input, true);
+std::unique_ptr<EdgeSampler> make_li2019_sampler(const EdgeSamplerInput& input, bool solid) {
+  return std::make_unique<Li2019Sampler>(input, solid);
 }
 
 }  // namespace limn

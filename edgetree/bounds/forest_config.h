@@ -26,13 +26,6 @@ struct ForestConfig {
   // nodes are read.
   static constexpr int kNoHeight = -1, kEdgesOnly = 0, kAnyHeight = 255;
   int look_ahead = 2;
-  // Inner nodes have a pair of bounding quadrics beside their dual boxes, of all children that hold
-  // `quadrics_from` to kMostQuadricEdges edges: nowhere, where it pays, or everywhere. More edges
-  // are nearly never rejected, and fewer leave a box too little.
-  enum class Quadrics : uint8_t { kNone, kWherePaid, kAll };
-  static constexpr uint32_t kMostQuadricEdges = 8192;
-  Quadrics quadrics = Quadrics::kNone;
-  uint32_t quadrics_from = 32;
   // Node expansion: a child's box tells little of its weight if the lobe is narrow or p is near.
   // Then its own children are evaluated, and for narrow lobes up to this many nodes at the top are
   // expanded. 0 disables both.

@@ -67,17 +67,6 @@ void sum_cover(std::span<const Wedge> wedges, const std::vector<Vector3d>& point
   }
 }
 
-// points: coordinates in the box, whose rows are those of `fit` before scaling.
-PairFit pair_in(const NodeFrame& own, std::span<const Wedge> wedges, const NodeFrame& frame,
-                std::vector<Vector3d>& points, const DualFit& fit) {
-  const Eigen::Matrix4d change = between(frame, own);
-  const Eigen::Matrix4d quadric =
-      change.transpose() * moments_of(wedges, own).best_quadric() * change;
-  Eigen::Matrix4d columns;
-  for (int k = 0; k < 4; ++k) columns.col(k) = Vector4d::Map(fit.rows[k]);
-  return fit_pair(columns, quadric, points);
-}
-
 void scale_rows(DualFit& fit) {
   double sum = 0;
   for (const auto& row : fit.rows) sum += Vector4d::Map(row).norm();
@@ -94,8 +83,8 @@ DualFit unrejectable_fit(double cover) {
   return fit;
 }
 
-DualFit fit_dual(std::span<const Wedge> wedges, const NodeFrame& frame, const ForestConfig& config,
-                 const NodeFrame* own) {
+DualFit fit_dual(std::span<const Wedge> wedges, const NodeFrame& frame,
+                 const ForestConfig& config) {
   static thread_local std::vector<Vector4d> planes;
   static thread_local std::vector<Vector3d> points;
   planes.clear();
@@ -112,7 +101,6 @@ DualFit fit_dual(std::span<const Wedge> wedges, const NodeFrame& frame, const Fo
   for (const Vector4d& q : planes) points.push_back(basis.transpose() * q);
   fit_box(points, z, config, fit);
   sum_cover(wedges, points, fit);
-  if (own) fit.pair = pair_in(*own, wedges, frame, points, fit);
   scale_rows(fit);
   return fit;
 }

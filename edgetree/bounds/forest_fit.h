@@ -5,7 +5,6 @@
 #include <span>
 
 #include "edgetree/bounds/forest_config.h"
-#include "edgetree/bounds/quadric_pair.h"
 #include "limn/edgetree/edges.h"
 
 namespace limn {
@@ -30,15 +29,13 @@ struct NodeFrame {
 struct DualFit {
   double rows[4][4];
   double cover[3];  // times radius^2
-  PairFit pair;
 };
 
 // A fit that never rejects. cover: the length that a random plane crosses.
 DualFit unrejectable_fit(double cover);
 // A box that holds all planes of all wedges, in double precision; rounding to float moves rows by a
-// relative 2^-24. own: the wedges' frame, for a pair of quadrics; null for none.
-DualFit fit_dual(std::span<const Wedge> wedges, const NodeFrame& frame, const ForestConfig& config,
-                 const NodeFrame* own = nullptr);
+// relative 2^-24.
+DualFit fit_dual(std::span<const Wedge> wedges, const NodeFrame& frame, const ForestConfig& config);
 // The segment between the planes of an edge: rows 0 and 1.
 DualFit fit_edge(const Wedge& wedge, const NodeFrame& frame);
 

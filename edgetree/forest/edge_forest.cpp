@@ -264,10 +264,9 @@ bool EdgeForest::list_outlines(const EdgeQuery& query, const DirectionCone& dire
 
 SamplerSize EdgeForest::size() const {
   const Forest& forest = impl_->forest;
-  uint64_t bytes =
-      forest.inner.size() * sizeof(InnerNode) + forest.edges.size() * sizeof(EdgeNode) +
-      forest.pairs.size() * sizeof(ForestPairs) + forest.roots.size() * sizeof(NodeId) +
-      forest.motions.size() * sizeof(ObjectMotion);
+  uint64_t bytes = forest.inner.size() * sizeof(InnerNode) +
+                   forest.edges.size() * sizeof(EdgeNode) + forest.roots.size() * sizeof(NodeId) +
+                   forest.motions.size() * sizeof(ObjectMotion);
   for (const auto& slots : forest.slots) bytes += slots.size() * sizeof(uint32_t);
   return {forest.inner.size() + forest.edges.size(), bytes};
 }

@@ -102,12 +102,6 @@ void put_box(const Bounds& box, const NodeFrame& frame, int lane, InnerNode& nod
   node.high[lane] = packed_high;
 }
 
-// True if a child with that many edges gets quadrics.
-bool has_quadrics(size_t edges, const ForestConfig& config) {
-  return config.quadrics != ForestConfig::Quadrics::kNone && edges >= config.quadrics_from &&
-         edges <= ForestConfig::kMostQuadricEdges;
-}
-
 template <class Rows>
 void put_rows(const DualFit& fit, int lane, Rows& rows) {
   for (size_t i = 0; i < std::size(rows); ++i)
@@ -131,8 +125,7 @@ class TreeFiller {
     } else {
       InnerNode& node = forest.inner[ids_[index]];
       fill_head(frame, node.head);
-      fill_children(split, frame, node,
-                    node.pairs == kNoPairs ? nullptr : &forest.pairs[node.pairs]);
+      fill_children(split, frame, node);
     }
   }
 
@@ -150,11 +143,7 @@ class TreeFiller {
   }
 
   DualFit fit(std::span<const Wedge> wedges, const NodeFrame& frame) const {
-    if (group_ == ForestGroup::kSilhouette) {
-      if (!has_quadrics(wedges.size(), config_)) return fit_dual(wedges, frame, config_);
-      const NodeFrame own = frame_of(bounds_of(wedges));
-      return fit_dual(wedges, frame, config_, &own);
-    }
+    if (group_ == ForestGroup::kSilhouette) return fit_dual(wedges, frame, config_);
     const double length = length_of(wedges);
     if (group_ == ForestGroup::kAlways) return unrejectable_fit(length);
     DualFit fit = fit_dual(wedges, frame, config_);
@@ -162,15 +151,13 @@ class TreeFiller {
     return fit;
   }
 
-  // pairs: null for none.
-  void fill_children(const SplitNode<kWidth>& split, const NodeFrame& frame, InnerNode& node,
-                     ForestPairs* pairs) const {
+  void fill_children(const SplitNode<kWidth>& split, const NodeFrame& frame,
+                     InnerNode& node) const {
     node.child = Ints{} + kNoChild;
     const double scale = frame.inverse_radius * frame.inverse_radius;
     for (int lane = 0; lane < kWidth; ++lane) {
       const std::span<const Wedge> wedges = edges(split.ranges[lane]);
       const DualFit dual = wedges.empty() ? DualFit{} : fit(wedges, frame);
-      if (pairs) put_pair(dual.pair, lane % kQuadricWidth, pairs->halves[lane / kQuadricWidth]);
       if (wedges.empty()) continue;
       put_rows(dual, lane, node.rows);
       for (int k = 0; k < 3; ++k) node.cover[k][lane] = positive(dual.cover[k] * scale);
@@ -204,9 +191,8 @@ class TreeFiller {
   const ForestConfig& config_;
 };
 
-// Allocates the nodes of a tree and their pairs of quadrics; returns the ids.
-std::vector<NodeId> append_nodes(const ForestShape& tree, ForestGroup group,
-                                 const ForestConfig& config, Forest& forest) {
+// Allocates the nodes of a tree; returns their ids.
+std::vector<NodeId> append_nodes(const ForestShape& tree, Forest& forest) {
   std::vector<NodeId> ids(tree.nodes.size());
   auto inner = static_cast<NodeId>(forest.inner.size());
   auto edges = static_cast<NodeId>(forest.edges.size());
@@ -214,70 +200,7 @@ std::vector<NodeId> append_nodes(const ForestShape& tree, ForestGroup group,
   forest.inner.resize(inner);
   forest.edges.resize(edges);
   forest.roots.push_back(ids[0]);
-  if (group != ForestGroup::kSilhouette) return ids;
-  auto pairs = static_cast<uint32_t>(forest.pairs.size());
-  for (size_t i = 0; i < ids.size(); ++i) {
-    const auto& ranges = tree.nodes[i].ranges;
-    const auto has = [&](EdgeRange range) { return has_quadrics(range.size(), config); };
-    if (ids[i] >= 0 && std::any_of(ranges.begin(), ranges.end(), has))
-      forest.inner[ids[i]].pairs = pairs++;
-  }
-  forest.pairs.resize(pairs);
   return ids;
-}
-
-// Points at 1.5 times a tree's radius, in evenly distributed directions (Fibonacci lattice).
-std::vector<ForestPoint> points_around(const NodeFrame& tree, const Forest& forest) {
-  constexpr int kPoints = 64;  // not tuned
-  std::vector<ForestPoint> points;
-  for (int i = 0; i < kPoints; ++i) {
-    const double z = (2 * i + 1.0) / kPoints - 1, r = std::sqrt(1 - z * z);
-    const double turn = kPi * (3 - std::sqrt(5.0)) * i;
-    const Vec3d direction{r * std::cos(turn), r * std::sin(turn), z};
-    points.push_back(point_of(forest, tree.center + direction * (1.5 / tree.inverse_radius)));
-  }
-  return points;
-}
-
-// The share of the expected silhouette length below a node that its quadrics reject.
-float rejected_share(InnerNode node, std::span<const ForestPoint> points,
-                     const ForestConfig& config) {
-  const auto length = [&](uint32_t pairs) {
-    node.pairs = pairs;
-    float sum = 0;
-    for (const ForestPoint& point : points)
-      sum += length_below(node, point, config.soft_weights, node.head.inverse_radius);
-    return sum;
-  };
-  const float with = length(node.pairs), without = length(kNoPairs);
-  return without > 0 ? 1 - with / without : 0;
-}
-
-// A draw that a pair turns away from a dead end is worth the time of a sample, of which a draw is
-// two fifths, and a pair costs its test whenever its node is looked at. Both in nanoseconds, about
-// as edge_benchmark has them: no clock may decide here, or one seed would not give the same bits.
-constexpr float kPairTime = 100, kSampleTime = 2000;
-
-void keep_what_pays(std::span<const NodeId> ids, const NodeFrame& tree, const ForestConfig& config,
-                    int threads, Forest& forest) {
-  const std::vector<ForestPoint> points = points_around(tree, forest);
-  std::vector<uint8_t> pays(ids.size());
-  parallel_for(ids.size(), threads, [&](size_t i) {
-    if (ids[i] < 0 || forest.inner[ids[i]].pairs == kNoPairs) return;
-    const float share = rejected_share(forest.inner[ids[i]], points, config);
-    pays[i] = share * kSampleTime > kPairTime;
-  });
-  // What is kept closes up: places only fall.
-  auto kept = static_cast<uint32_t>(forest.pairs.size());
-  for (const NodeId id : ids)
-    if (id >= 0) kept = std::min(kept, forest.inner[id].pairs);
-  for (size_t i = 0; i < ids.size(); ++i) {
-    if (ids[i] < 0) continue;
-    uint32_t& place = forest.inner[ids[i]].pairs;
-    if (pays[i]) forest.pairs[kept] = forest.pairs[place];
-    place = pays[i] ? kept++ : kNoPairs;
-  }
-  forest.pairs.resize(kept);
 }
 
 // Computes heights bottom-up, from edge nodes to the root.
@@ -323,16 +246,13 @@ void append_tree(std::span<const Wedge> wedges, ShapeId object, ForestGroup grou
     for (size_t i = 4096 * block; i < std::min(wedges.size(), 4096 * (block + 1)); ++i)
       sorted[i] = wedges[tree.order[i]];
   });
-  const std::vector<NodeId> ids = append_nodes(tree, group, config, forest);
+  const std::vector<NodeId> ids = append_nodes(tree, forest);
   const TreeFiller filler(tree, ids, sorted, object, group, config);
   constexpr size_t kBlock = 64;  // nodes; not tuned
   parallel_for((tree.nodes.size() + kBlock - 1) / kBlock, threads, [&](size_t block) {
     const size_t end = std::min(tree.nodes.size(), kBlock * (block + 1));
     for (size_t i = kBlock * block; i < end; ++i) filler.fill(static_cast<uint32_t>(i), forest);
   });
-  if (config.quadrics == ForestConfig::Quadrics::kWherePaid) {
-    keep_what_pays(ids, frame_of(bounds_of(wedges)), config, threads, forest);
-  }
   set_heights(ids, config, forest);
   link(ids, forest);
 }

@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "edgetree/bounds/quadric_pair.h"
 #include "edgetree/forest/forest_motion.h"
 #include "edgetree/simd.h"
 #include "limn/edgetree/edges.h"
@@ -25,8 +24,6 @@ inline constexpr int kForestGroups = 3;
 using NodeId = int32_t;
 inline constexpr int32_t kNoChild = INT32_MIN;
 inline constexpr uint32_t kNoParent = UINT32_MAX;
-
-inline constexpr uint32_t kNoPairs = UINT32_MAX;
 
 inline constexpr int kBoxBits = 10;
 inline constexpr int kBoxSteps = (1 << kBoxBits) - 1;
@@ -55,13 +52,7 @@ struct alignas(64) InnerNode {
   // Bounding boxes of the children: the frame's cube [-1, 1]^3 is kBoxSteps wide; bits 0 to 9 hold
   // x, then y, then z.
   Ints low, high;
-  uint8_t ahead;              // one bit per child: weighted by its own children, see ForestConfig
-  uint32_t pairs = kNoPairs;  // index in Forest::pairs
-};
-
-// Bounding quadrics of a node's children, in the coordinates of their dual boxes.
-struct ForestPairs {
-  QuadricPairs halves[kWidth / kQuadricWidth];
+  uint8_t ahead;  // one bit per child: weighted by its own children, see ForestConfig
 };
 
 // Dual boxes of edges: segments between the planes of their faces, u_0 in [-1, 1].
@@ -82,7 +73,6 @@ struct alignas(64) EdgeNode {
 struct Forest {
   std::vector<InnerNode> inner;
   std::vector<EdgeNode> edges;
-  std::vector<ForestPairs> pairs;  // of inner nodes with quadrics
   std::vector<NodeId> roots;
   std::vector<ObjectMotion> motions;  // of the objects
   double extent = 0;                  // largest |x| of a position

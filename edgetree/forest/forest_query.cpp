@@ -92,27 +92,6 @@ Ints not_rejected(ForestGroup group, Floats middle, Floats half) {
   return Ints{} - 1;
 }
 
-// Mask of children whose quadrics meet the query plane. Not inlined: few nodes have quadrics.
-__attribute__((noinline)) Ints met_by_quadrics(const ForestPairs& pairs, const DualPlane& plane,
-                                               float error) {
-  Ints all;
-  for (int half = 0; half < kWidth / kQuadricWidth; ++half) {
-    QueryPlanes planes;
-    planes.error = error;
-    for (int i = 0; i < 4; ++i)
-      for (int k = 0; k < kQuadricWidth; ++k) planes.g[i][k] = plane.g[i][kQuadricWidth * half + k];
-    const Longs met = meet_pair(pairs.halves[half], planes);
-    for (int k = 0; k < kQuadricWidth; ++k)
-      all[kQuadricWidth * half + k] = static_cast<int32_t>(met[k]);
-  }
-  return all;
-}
-
-void reject_by_quadrics(const InnerNode& node, const ForestPoint& point, const DualPlane& plane,
-                        float error, Ints& alive) {
-  if (node.pairs != kNoPairs) alive &= met_by_quadrics(point.pairs[node.pairs], plane, error);
-}
-
 // Expected length of silhouettes below a child, given the query plane. For planes uniform in
 // the dual box, the values of g - g[0] have nearly the density of a sum of two uniform numbers,
 // of half-width a = max |g[k]| and of the remainder of `half`: constant, with ramps at both
@@ -131,8 +110,7 @@ Floats expected_length(const InnerNode& node, const DualPlane& plane, float erro
 }
 
 // Not positive for rejected children.
-Floats length_of(const InnerNode& node, const ForestPoint& point, const FramePoint& at,
-                 const DualPlane& plane, bool soft) {
+Floats length_of(const InnerNode& node, const FramePoint& at, const DualPlane& plane, bool soft) {
   const ForestGroup group = node.head.group;
   if (group == ForestGroup::kAlways) return node.cover[0];
   Floats length = node.cover[0];
@@ -142,7 +120,6 @@ Floats length_of(const InnerNode& node, const ForestPoint& point, const FramePoi
     length *= clamp(0.5f + 0.5f * plane.g[0] / plane.half, splat(kShallow), splat(1.0f));
   }
   Ints alive = not_rejected(group, plane.g[0], plane.half);
-  reject_by_quadrics(node, point, plane, at.error, alive);
   return select(alive, length, splat(0.0f));
 }
 
@@ -340,7 +317,7 @@ ForestPoint point_of(const Forest& forest, const Vec3d& p) {
   farthest.extent = forest.extent;
   bool is_float = true;
   for (int k = 0; k < 3; ++k) is_float = is_float && nearest_float(p[k]) == p[k];
-  return {p, distance_error(farthest, p), is_float, forest.pairs.data()};
+  return {p, distance_error(farthest, p), is_float};
 }
 
 static float unit_of(const Forest& forest, const Vec3d& p) {
@@ -389,7 +366,6 @@ Ints may_hold_candidates(const InnerNode& node, const ForestPoint& point) {
   const FramePoint at = to_frame(node.head, point);
   const DualPlane plane = dual_plane(node, at);
   Ints alive = not_rejected(node.head.group, plane.g[0], plane.half);
-  reject_by_quadrics(node, point, plane, at.error, alive);
   return (node.child != kNoChild) & alive;
 }
 
@@ -429,7 +405,6 @@ Ints may_hold_outlines(const InnerNode& node, const ForestCone& cone) {
   if (node.head.group != ForestGroup::kAlways) {
     const DualPlane plane = dual_plane(node, at);
     alive &= abs(plane.g[0]) <= plane.half;
-    reject_by_quadrics(node, cone.point, plane, at.error, alive);
   }
   if (cone.at_rest) alive &= node.speed > 0;
   if (bits(alive) == 0) return alive;
@@ -477,7 +452,7 @@ ChildWeights weigh_children(const InnerNode& node, const ForestQuery& query, boo
                             Floats* uncertainty) {
   const FramePoint at = to_frame(node.head, query.point);
   const DualPlane plane = dual_plane(node, at);
-  const Floats length = length_of(node, query.point, at, plane, soft);
+  const Floats length = length_of(node, at, plane, soft);
   Ints alive = length > 0;
   Floats3 d, half;
   boxes_of(node, at, d, half);
@@ -538,7 +513,7 @@ float length_below(const InnerNode& node, const ForestPoint& point, bool soft,
                    float inverse_radius) {
   const float ratio = inverse_radius / node.head.inverse_radius;
   const FramePoint at = to_frame(node.head, point);
-  return sum(length_of(node, point, at, dual_plane(node, at), soft)) * ratio * ratio;
+  return sum(length_of(node, at, dual_plane(node, at), soft)) * ratio * ratio;
 }
 float length_below(const EdgeNode& node, const ForestPoint& point, float inverse_radius) {
   const float ratio = inverse_radius / node.head.inverse_radius;

@@ -15,7 +15,6 @@ struct ForestPoint {
   double slack;  // error of distances from planes, see distance_error
   // True if p is representable in floats and may coincide with a vertex.
   bool may_be_vertex = false;
-  const ForestPairs* pairs = nullptr;  // of the forest
 };
 ForestPoint point_of(const Forest& forest, const Vec3d& p);
 

@@ -23,21 +23,10 @@
 #include "limn/core/error.h"
 #include "limn/core/names.h"
 #include "limn/core/parallel.h"
-#include "limn/edgetree/edge_sampler_types.h"
+#include "limn/integrators/methods.h"
 #include "limn/integrators/parts.h"
 
 namespace limn {
-
-ReverseMethod reverse_method(const std::string& name) {
-  // It chooses among few edges, where surfaces cross and touch: any will do.
-  if (name == "analytic") return {edge_sampler_type("uniform"), true};
-  for (const EdgeSamplerType& type : edge_sampler_types()) {
-    if (type.name == name) return {type};
-  }
-  std::vector<std::string> known = names_of(edge_sampler_types());
-  known.emplace_back("analytic");
-  throw InputError(unknown_name("edge sampler", name, known));
-}
 
 const ParameterAdjoint& BackwardResult::of(const std::string& name) const {
   for (const ParameterAdjoint& parameter : parameters)
@@ -118,7 +107,7 @@ class BackwardPass {
         film_(scene.film, adjoint_pixels(scene, adjoint)),
         choice_(film_.pixels(), options.uniform_pixels),
         parameters_(scene, reverse_parameters(scene, options)),
-        method_(reverse_method(options.sampler)),
+        method_(*options.method->reverse),
         traced_(parameters_.scene(), settings.threads, {.closed = method_.closed, .edges = true}),
         path_(traced_.context()),
         input_(path_, 3, {1, 1, 1, 1}, method_.sampler, settings.threads),
@@ -253,7 +242,7 @@ void BackwardPass::start(BatchStore& store) const {
   std::vector<double> pixels;
   for (const Rgb<double>& a : film_.pixels()) pixels.insert(pixels.end(), {a.r, a.g, a.b});
   store.identify("method", "backward");
-  store.identify("sampler", options_.sampler);
+  store.identify("sampling", options_.method.name());
   store.identify("samples per pixel", std::to_string(settings_.spp));
   store.identify("seed", std::to_string(settings_.seed));
   store.identify("adjoint", fingerprint(pixels));
@@ -445,7 +434,8 @@ void BackwardPass::finish() {
 
 BackwardResult backward(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
                         const RunSettings& settings) {
-  check_points(options.points, reverse_method(options.sampler).closed, options.sampler);
+  check_task(options.method, Task::kBackward);
+  check_points(options.points, options.method->closed_light, options.method.name());
   if (options.points == FilmPoints::kFaces) {
     return backward_over_faces(scene, adjoint, options, settings_for(options.points, settings));
   }

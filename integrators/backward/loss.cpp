@@ -9,6 +9,7 @@
 #include "limn/core/error.h"
 #include "limn/core/names.h"
 #include "limn/integrators/backward.h"
+#include "limn/integrators/methods.h"
 
 namespace limn {
 
@@ -159,15 +160,19 @@ void add_level(const Level& level, const Level& finest, int doublings, LossKind 
   }
 }
 
-void check_method(const std::string& name) {
+void check_method(const Method& method) {
+  if (method->image && !method->image->looks_around) return;
   std::vector<std::string> known;
-  for (const RenderMethod& method : render_methods())
-    if (!method.looks_around) known.emplace_back(method.name);
-  if (std::ranges::find(known, name) != known.end()) return;
-  throw InputError(unknown_name("method for the images of a loss", name, known));
+  for (const MethodType& type : method_types())
+    if (type.image && !type.image->looks_around) known.push_back(type.name);
+  throw InputError(unknown_name("method for the images of a loss", method.name(), known));
 }
 
 }  // namespace
+
+Method loss_method(const Method& backward) {
+  return backward->closed_light ? backward : Method(Task::kImage);
+}
 
 int most_pyramid_levels(const Scene& scene) {
   int levels = 1;

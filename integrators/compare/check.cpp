@@ -385,12 +385,13 @@ class Checker {
 
 CheckResult check(const Scene& scene, const CheckOptions& options, const RunSettings& settings,
                   const GradientRun& run) {
-  const MethodType& method = find_method(options.method);
+  const Method& method = options.method;
   check_given_step(options.step);
   // Before the search for a step.
-  if (method.check) method.check(scene);
-  if (options.exact_film) check_exact_film(scene, method.name);
-  check_warp(options.warp, {method.name});
+  check_task(method, Task::kGradient);
+  if (method->check) method->check(scene);
+  if (options.exact_film) check_exact_film(scene, method);
+  check_warp(options.warp, {method});
   return Checker(scene, options, settings, run).check();
 }
 

@@ -8,8 +8,8 @@
 #include "integrators/pilot/term_estimator.h"
 #include "limn/core/error.h"
 #include "limn/core/parameter.h"
-#include "limn/edgetree/edge_sampler_types.h"
 #include "limn/integrators/backward.h"
+#include "limn/integrators/methods.h"
 #include "limn/integrators/statistics.h"
 
 namespace limn {
@@ -108,7 +108,8 @@ std::vector<Compared> compared(const Scene& scene, const Parameter& parameter, s
 std::vector<Moments> forward_sums(const Scene& scene, std::span<const Parameter> parameters,
                                   const BackwardOptions& options, const Image& adjoint,
                                   const RunSettings& settings) {
-  const auto [sampler, closed] = reverse_method(options.sampler);
+  check_task(options.method, Task::kBackward);
+  const auto& [sampler, closed] = *options.method->reverse;
   const std::vector<std::string>& terms = options.terms;
   const std::vector<const TermType*> types = terms_of(scene, sampler, closed);
   std::vector<bool> computed;

@@ -7,6 +7,7 @@
 
 #include "limn/core/error.h"
 #include "limn/core/rng.h"
+#include "limn/integrators/methods.h"
 
 namespace limn {
 namespace {
@@ -14,18 +15,17 @@ namespace {
 constexpr int kReferenceRuns = 8;  // whose differences tell their error; not tuned
 
 // The exact film is for those that take it.
-RenderOptions with_method(RenderOptions options, const std::string& name) {
-  options.method = name;
-  for (const RenderMethod& method : render_methods()) {
-    if (method.name == name && method.looks_around) options.exact_film = false;
-  }
+RenderOptions with_method(RenderOptions options, const Method& method) {
+  check_task(method, Task::kImage);
+  options.method = method;
+  if (method->image->looks_around) options.exact_film = false;
   return options;
 }
 
 // Set-up, a pilot's with it, and one sample of one pixel: InputError if the method does not know
 // the scene.
 void try_method(const Scene& scene, const RunSettings& settings, const RenderOptions& given,
-                const std::string& method) {
+                const Method& method) {
   const RenderOptions options = with_method(given, method);
   RunSettings one = settings;
   one.progress = nullptr;
@@ -37,7 +37,7 @@ class ImageComparer {
  public:
   ImageComparer(const Scene& scene, const ImageCompareOptions& options, const RunSettings& settings)
       : scene_(scene), options_(options), settings_(settings) {
-    for (const std::string& method : options.methods) {
+    for (const Method& method : options.methods) {
       try_method(scene, settings, options.render, method);
     }
     result_.reference_method = "rays";
@@ -68,8 +68,7 @@ class ImageComparer {
  private:
   bool stopped() const { return settings_.interrupted && settings_.interrupted->load(); }
   size_t place(const std::string& method) const {
-    return std::find(options_.methods.begin(), options_.methods.end(), method) -
-           options_.methods.begin();
+    return std::ranges::find(options_.methods, method, &Method::name) - options_.methods.begin();
   }
 
   RenderResult one(const RenderOptions& options, double seconds, uint64_t number) {
@@ -88,7 +87,7 @@ class ImageComparer {
     result_.non_finite.merge(result.non_finite);
     for (const std::string& warning : result.warnings) {
       const auto& told = result_.warnings;
-      const std::string line = options.method + ": " + warning;
+      const std::string line = options.method.name() + ": " + warning;
       if (std::find(told.begin(), told.end(), line) == told.end()) {
         result_.warnings.push_back(line);
       }
@@ -135,7 +134,7 @@ class ImageComparer {
       ComparedImage& row = rows[m];
       const auto count = static_cast<double>(errors[m].size());
       if (count == 0) continue;
-      row.method = options_.methods[m];
+      row.method = options_.methods[m].name();
       row.time = time;
       row.seconds /= count;
       row.spp /= count;

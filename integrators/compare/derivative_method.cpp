@@ -8,13 +8,14 @@ namespace {
 
 class TableMethod final : public DerivativeMethod {
  public:
-  TableMethod(const MethodInput& input, const MethodType& type) : input_(input), type_(type) {}
+  TableMethod(const MethodInput& input, Method method)
+      : input_(input), method_(std::move(method)) {}
 
-  std::string name() const override { return type_.name; }
-  std::string description() const override { return type_.description; }
+  std::string name() const override { return method_.name(); }
+  std::string description() const override { return method_->description; }
 
   MethodRun run(const RunSettings& settings) override {
-    const GradientOptions options = input_.options(type_);
+    const GradientOptions options = input_.options(method_);
     GradientResult result = gradient(input_.scene, options, settings);
     MethodRun run;
     run.image = means(result.parameters[0].total);
@@ -36,27 +37,28 @@ class TableMethod final : public DerivativeMethod {
 
  private:
   const MethodInput& input_;
-  const MethodType& type_;
+  Method method_;
   std::vector<MethodSetting> settings_;
 };
 
 }  // namespace
 
-GradientOptions MethodInput::options(const MethodType& method) const {
+GradientOptions MethodInput::options(const Method& method) const {
   GradientOptions options;
   options.parameters = {parameter};
-  options.method = method.name;
+  options.method = method;
   options.terms = terms;
   options.samples = samples;
   options.step = step;
-  if (method.warps) options.warp = warp;
+  if (method->warps) options.warp = warp;
   options.block = block;
-  options.exact_film = exact_film && method.terms_can_be_left_out;
+  options.exact_film = exact_film && method->terms_can_be_left_out;
   return options;
 }
 
-std::unique_ptr<DerivativeMethod> make_method(const MethodInput& input, const std::string& name) {
-  return std::make_unique<TableMethod>(input, find_method(name));
+std::unique_ptr<DerivativeMethod> make_method(const MethodInput& input, const Method& method) {
+  check_task(method, Task::kGradient);
+  return std::make_unique<TableMethod>(input, method);
 }
 
 }  // namespace limn

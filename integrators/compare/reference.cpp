@@ -190,7 +190,7 @@ Identity identify(const MethodInput& input, const std::map<std::string, std::str
 }
 
 Reference make_reference(const MethodInput& input, const RunSettings& settings) {
-  const MethodType& method = find_method("");
+  const Method method(Task::kCompare);
   RunSettings at_least_two = settings;
   at_least_two.least_spp = 2;  // for variances
   GradientOptions options = input.options(method);
@@ -207,7 +207,7 @@ Reference make_reference(const MethodInput& input, const RunSettings& settings) 
   for (size_t b = 0; b < r.blocks.variances.size(); ++b) {
     r.blocks.variances[b] = std::max(r.blocks.variances[b], r.edges[b] * r.blocks.event);
   }
-  r.method = method.name;
+  r.method = method.name();
   r.spp = result.spp;
   r.seed = settings.seed;
   r.seconds = result.seconds;

@@ -22,7 +22,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little);
 
-constexpr const char* kTitle = "limn part 4";    // counts changes of what files hold
+constexpr const char* kTitle = "limn part 5";    // counts changes of what files hold
 constexpr const char* kMagic = "\x93NUMPY\x01";  // and the byte 0 that ends it
 
 constexpr size_t kBefore = 10;  // bytes of an array before its header: magic, version, length
@@ -181,7 +181,11 @@ void PartFile::read_text() {
   const std::string text(bytes.begin(), bytes.end());
   std::istringstream lines(text);
   std::string line;
-  if (!std::getline(lines, line) || line != kTitle) fail();
+  if (!std::getline(lines, line)) fail();
+  if (line.starts_with("limn part ") && line != kTitle) {
+    throw InputError({name_}, "was written by another version of limn: make the part again");
+  }
+  if (line != kTitle) fail();
   const size_t told = text.rfind(kSum);
   if (told == std::string::npos ||
       text.substr(told) != fmt::format("{}{:08x}\n", kSum, checksum(text.substr(0, told)))) {

@@ -14,6 +14,7 @@
 #include "integrators/terms/term.h"
 #include "limn/core/error.h"
 #include "limn/core/rng.h"
+#include "limn/integrators/methods.h"
 
 namespace limn {
 
@@ -165,8 +166,9 @@ bool Fit::Impl::moves_on_film(size_t view) const {
 
 // Those of backward(), which would tell at the first step.
 void Fit::Impl::check_terms() const {
-  const ReverseMethod method = reverse_method(options_.backward.sampler);
-  check_points(options_.backward.points, method.closed, options_.backward.sampler);
+  check_task(options_.backward.method, Task::kFit);
+  const ReverseMethod& method = *options_.backward.method->reverse;
+  check_points(options_.backward.points, method.closed, options_.backward.method.name());
   for (size_t v = 0; v < views.size(); ++v) {
     const auto seen = [&](const FitParameter& p) { return p.in_view(v) != nullptr; };
     if (std::none_of(parameters_.begin(), parameters_.end(), seen)) continue;
@@ -242,8 +244,8 @@ bool Fit::Impl::add_view(size_t view, FitRecord& record,
   const double share = 1 / static_cast<double>(views.size());
   RunSettings own = view_settings(view);
   own.spp = samples_of(options_.loss_spp > 0 ? options_.loss_spp : settings_.spp);
-  const LossImages images{reverse_method(options_.backward.sampler).closed ? "analytic" : "path",
-                          options_.backward.points, is_exact()};
+  const LossImages images{loss_method(options_.backward.method), options_.backward.points,
+                          is_exact()};
   LossResult loss =
       image_loss(v.scene, v.target, options_.loss, own, v.mask, options_.pyramid, images);
   if (loss.spp < own.spp) return false;

@@ -8,15 +8,16 @@
 #include "integrators/fit/fit_impl.h"
 #include "integrators/terms/term.h"
 #include "limn/core/error.h"
+#include "limn/integrators/methods.h"
 
 namespace limn {
 
 void Fit::Impl::check_exact() {
-  if (!reverse_method(options_.backward.sampler).closed) {
+  if (!options_.backward.method->closed_light) {
     throw InputError(fmt::format(
-        "the optimiser lbfgs compares gradients of different steps, and those of the sampler {} "
-        "are noisy: take the sampler analytic, or the optimiser adam-uniform",
-        options_.backward.sampler));
+        "the optimiser lbfgs compares gradients of different steps, and those of the method {} "
+        "are noisy: take the method analytic, or the optimiser adam-uniform",
+        options_.backward.method.name()));
   }
   if (options_.loss == LossKind::kL1) {
     throw InputError("the optimiser lbfgs needs a smooth loss: take l2 or relative-l2, not l1");

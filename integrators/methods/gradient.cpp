@@ -9,6 +9,7 @@
 #include "integrators/film/film_regions.h"
 #include "integrators/methods/hair_gaps.h"
 #include "limn/core/error.h"
+#include "limn/core/field_error.h"
 #include "limn/core/names.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/methods.h"
@@ -24,27 +25,29 @@ void check_shading(const Scene& scene, GradientResult& result) {
       "is incomplete");
 }
 
-void check_selection(const MethodType& method, const Scene& scene, const GradientOptions& options) {
+void check_selection(const Scene& scene, const GradientOptions& options) {
+  const Method& method = options.method;
+  check_task(method, Task::kGradient);
   if (options.parameters.empty()) throw InputError("names: at least one parameter must be named");
-  if (!(options.step >= 0) || std::isinf(options.step)) {
-    throw InputError(fmt::format(
-        "step: {:g} is neither a positive number nor 0, by which a pilot finds it", options.step));
+  if (!(options.step >= 0) || options.step > 1e12) {
+    throw FieldError("step", fmt::format("{:g} is neither a positive number of at most 1e12 nor 0, "
+                                         "by which a pilot finds it",
+                                         options.step));
   }
-  if (options.exact_film) check_exact_film(scene, method.name);
-  if (method.check) method.check(scene);
-  check_warp(options.warp, {method.name});
-  check_points(options.points, method.closed_light, method.name);
-  if (options.terms.empty() || method.terms_can_be_left_out) return;
-  throw InputError("terms: the method \"" + method.name + "\" has all terms in one");
+  if (options.exact_film) check_exact_film(scene, method);
+  if (method->check) method->check(scene);
+  check_warp(options.warp, {method});
+  check_points(options.points, method->closed_light, method.name());
+  if (options.terms.empty() || method->terms_can_be_left_out) return;
+  throw InputError("terms: the method \"" + method.name() + "\" has all terms in one");
 }
 
-void identify(const MethodType& method, const Scene& scene, const GradientOptions& options,
-              BatchStore& store) {
+void identify(const Scene& scene, const GradientOptions& options, BatchStore& store) {
   std::vector<Parameter> parameters;
   for (const std::string& name : options.parameters) {
     parameters.push_back(find_parameter(scene, name));
   }
-  store.identify("method", method.name);
+  store.identify("method", options.method.name());
   store.identify("parameters", join(options.parameters));
   store.identify("velocities", fingerprint(scene, parameters));
   store.identify("terms", join(options.terms));
@@ -57,22 +60,22 @@ void identify(const MethodType& method, const Scene& scene, const GradientOption
 
 }  // namespace
 
-void check_exact_film(const Scene& scene, const std::string& name) {
-  const MethodType& method = find_method(name);
-  if (!method.terms_can_be_left_out) {
+void check_exact_film(const Scene& scene, const Method& method) {
+  if (!method->terms_can_be_left_out) {
     throw InputError("the exact film is for methods that sample edges on it: the method \"" +
-                     method.name + "\" does not");
+                     method.name() + "\" does not");
   }
   FilmRegions::check(scene.film);
 }
 
-void check_exact_films(const Scene& scene, const std::vector<std::string>& methods) {
-  for (const MethodType& type : method_types()) {
-    const bool asked = std::find(methods.begin(), methods.end(), type.name) != methods.end();
-    if (asked && type.terms_can_be_left_out) return FilmRegions::check(scene.film);
+void check_exact_films(const Scene& scene, const std::vector<Method>& methods) {
+  std::vector<std::string> names;
+  for (const Method& method : methods) {
+    if (method->terms_can_be_left_out) return FilmRegions::check(scene.film);
+    names.push_back(method.name());
   }
   throw InputError("the exact film is for methods that sample edges on it: none of these does: " +
-                   join(methods));
+                   join(names));
 }
 
 bool SampleCounts::operator==(const SampleCounts& other) const {
@@ -115,9 +118,9 @@ double edge_magnitude(const GradientResult& result, const ParameterGradient& g, 
 
 GradientResult gradient(const Scene& scene, const GradientOptions& options,
                         const RunSettings& settings) {
-  const MethodType& method = find_method(options.method);
-  check_selection(method, scene, options);
-  if (settings.store) identify(method, scene, options, *settings.store);
+  const MethodType& method = *options.method;
+  check_selection(scene, options);
+  if (settings.store) identify(scene, options, *settings.store);
   GradientResult result = method.run(method, scene, options, settings);
   result.method = method.name;
   check_shading(scene, result);
@@ -128,8 +131,8 @@ GradientResult gradient(const Scene& scene, const GradientOptions& options,
 
 std::vector<std::string> trace_sample(const Scene& scene, const GradientOptions& options,
                                       const RunSettings& settings, const NonFinite::Place& place) {
-  const MethodType& method = find_method(options.method);
-  check_selection(method, scene, options);
+  const MethodType& method = *options.method;
+  check_selection(scene, options);
   if (!method.trace) {
     throw InputError("the method \"" + method.name + "\" cannot trace single samples");
   }

@@ -8,12 +8,22 @@ namespace limn {
 GradientResult run_differences(const MethodType& method, const Scene& scene,
                                const GradientOptions& options, const RunSettings& settings);
 
-// Those beside one for every edge sampler.
+// All but those that work term by term.
 inline std::vector<MethodType> other_methods() {
   return {{.name = "fd",
            .description = "central finite differences with common random numbers",
            .terms = {"differences"},
-           .run = run_differences}};
+           .run = run_differences},
+          {.name = "path",
+           .description = "path tracing: light and BSDF samples, combined",
+           .defaults = {Task::kImage},
+           .image = ImageMethod{}},
+          {.name = "lines",
+           .description = "direct light and open sky, by lines between silhouettes",
+           .image = ImageMethod{.looks_around = true, .by_lines = true}},
+          {.name = "rays",
+           .description = "direct light and open sky, by quasi-random rays",
+           .image = ImageMethod{.looks_around = true}}};
 }
 
 }  // namespace limn

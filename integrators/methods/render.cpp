@@ -13,67 +13,52 @@
 #include "limn/core/check.h"
 #include "limn/core/error.h"
 #include "limn/core/names.h"
+#include "limn/integrators/methods.h"
 #include "limn/integrators/parts.h"
 
 namespace limn {
 
 namespace {
 
-constexpr RenderMethod kMethods[] = {
-    {"path", "paths, with light and BSDF samples", false},
-    {"analytic", "direct light of flat lamps on diffuse surfaces in closed form", true},
-    {"silhouettes", "as lines, and as rays where these are better", false, true, true, true},
-    {"lines", "direct light and open sky, by lines between silhouettes", false, true, true},
-    {"rays", "direct light and open sky, by quasi-random rays", false, true},
-};
-
-const RenderMethod& find_render_method(const std::string& name) {
-  for (const RenderMethod& method : kMethods) {
-    if (method.name == name) return method;
+std::vector<std::string> names_looking_around() {
+  std::vector<std::string> names;
+  for (const MethodType& type : method_types()) {
+    if (type.image && type.image->looks_around) names.push_back(type.name);
   }
-  throw InputError(unknown_name("method", name, names_of(render_methods())));
+  return names;
 }
 
-std::vector<RenderMethod> looking_around() {
-  std::vector<RenderMethod> methods;
-  for (const RenderMethod& method : kMethods) {
-    if (method.looks_around) methods.push_back(method);
-  }
-  return methods;
-}
-
-Numbers numbers_of(const std::string& sampler) {
-  for (const char* name : kRenderSamplers) {
-    if (name == sampler) {
-      return name == kRenderSamplers[0] ? Numbers::kEvenInRun : Numbers::kIndependent;
+Numbers numbers_of(const std::string& generator) {
+  for (const char* name : kGenerators) {
+    if (name == generator) {
+      return name == kGenerators[0] ? Numbers::kEvenInRun : Numbers::kIndependent;
     }
   }
   throw InputError(
-      unknown_name("sampler", sampler, {std::begin(kRenderSamplers), std::end(kRenderSamplers)}));
+      unknown_name("generator", generator, {std::begin(kGenerators), std::end(kGenerators)}));
 }
 
 std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSettings& settings,
                                                 const RenderOptions& options) {
-  const RenderMethod& method = find_render_method(options.method);
-  const Numbers numbers = numbers_of(options.sampler);  // checked for all
-  check_points(options.points, method.closed_light, options.method);
+  check_task(options.method, Task::kImage);
+  const ImageMethod& method = *options.method->image;
+  const Numbers numbers = numbers_of(options.generator);  // checked for all
+  check_points(options.points, method.closed_light, options.method.name());
   if (!method.looks_around && options.what != RenderWhat::kImage) {
     throw InputError(
         fmt::format("the method \"{}\" knows radiance alone: how open the sky is say {}",
-                    options.method, join(names_of(looking_around()))));
+                    options.method.name(), join(names_looking_around())));
   }
   if (options.points == FilmPoints::kFaces) {
     if (options.exact_film)
-      throw InputError(
-          "--film exact is for random points: --points faces "
-          "has its own");
+      throw InputError("the exact film is for random points: points \"faces\" have their own");
     return std::make_unique<FacesEstimator>(scene, std::span<const Parameter>(), settings.threads);
   }
   if (method.looks_around) {
     if (options.exact_film) {
-      throw InputError(fmt::format("--film exact: not with the method \"{}\"", options.method));
+      throw InputError("the exact film is not for the method \"" + options.method.name() + "\"");
     }
-    return std::make_unique<VisibilityEstimator>(scene, settings, method, options);
+    return std::make_unique<VisibilityEstimator>(scene, settings, options);
   }
   std::shared_ptr<const FilmRegions> visible;
   if (options.exact_film) {
@@ -85,10 +70,10 @@ std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSet
 
 // What the method reads of the options: parts that differ elsewhere are of one run.
 void identify(BatchStore& store, const RenderOptions& options) {
-  const RenderMethod& method = find_render_method(options.method);
-  store.identify("method", options.method);
+  const ImageMethod& method = *options.method->image;
+  store.identify("method", options.method.name());
   if (!method.looks_around) {
-    store.identify("sampler", options.sampler);
+    store.identify("generator", options.generator);
     store.identify("film", options.exact_film ? "exact" : "rays");
     return;
   }
@@ -99,12 +84,6 @@ void identify(BatchStore& store, const RenderOptions& options) {
     store.identify("rays", fmt::format("{}", options.rays));
   }
 }
-
-}  // namespace
-
-std::span<const RenderMethod> render_methods() { return kMethods; }
-
-namespace {
 
 using EstimatorList = std::vector<std::unique_ptr<SampleEstimator>>;
 
@@ -140,6 +119,7 @@ RenderResult run(const EstimatorList& estimators, const RunSettings& settings,
 RenderResult render(const Scene& scene, const RunSettings& asked, const RenderOptions& options) {
   const Stopwatch watch;
   const RunSettings settings = settings_for(options.points, asked);
+  check_task(options.method, Task::kImage);
   if (settings.store) identify(*settings.store, options);
   const EstimatorList estimators = estimators_of(scene, settings, options);
   const auto* around = dynamic_cast<const VisibilityEstimator*>(estimators[0].get());
@@ -160,7 +140,7 @@ std::vector<RenderResult> render_seeds(const Scene& scene, const RunSettings& se
                                        std::span<const uint64_t> seeds,
                                        const RenderOptions& options) {
   // The estimators of others hold their seed.
-  CHECK(!find_render_method(options.method).looks_around);
+  CHECK(!options.method->image->looks_around);
   const Stopwatch watch;
   RunSettings own = settings_for(options.points, settings);
   own.store = nullptr;

@@ -11,15 +11,14 @@ namespace limn {
 
 // What a method does beside sampling its terms.
 struct TermMethod {
-  const EdgeSamplerType& sampler;
+  EdgeSamplerType sampler = {};
   bool moves_directions = false;   // see direction_field.h
   bool spreads_samples = false;    // over pixels, see spread_samples
   bool moves_film = false;         // positions on the film, see film_fit.h
   bool random_directions = false;  // directions and positions move by chance: no mean may change
-  bool ablation = false;
-  bool warps = false;     // directions follow the edges that they see, see warp_field.h
-  bool unbiased = false;  // the same without the bias of few rays
-  bool closed = false;    // light that is scattered once in closed form, see closed_light.h
+  bool warps = false;              // directions follow the edges that they see, see warp_field.h
+  bool unbiased = false;           // the same without the bias of few rays
+  bool closed = false;  // light that is scattered once in closed form, see closed_light.h
   Numbers numbers = Numbers::kIndependent;
 };
 

@@ -11,89 +11,126 @@
 namespace limn {
 namespace {
 
-MethodType method_row(const std::string& name, const std::string& description,
-                      const TermMethod& term_method) {
-  MethodType method;
-  method.name = name;
-  method.description = description;
-  for (const TermType& type : term_types()) {
-    if (has_term(term_method.sampler, type, term_method.closed, term_method.moves_film))
-      method.terms.emplace_back(type.name);
+// Their first values are those of `adaptive`, or of `silhouettes`.
+Settings motion_settings(bool adaptive) {
+  const auto values = [&](std::vector<std::string> all) {
+    if (!adaptive) std::swap(all[0], all[1]);
+    return all;
+  };
+  return {
+      {"directions",
+       "Directions move along with what they see (moving), are fixed in solid angle, or move at "
+       "random, which adds noise and changes no mean",
+       values({"moving", "fixed", "random"})},
+      {"film", "Positions of samples on the film move along with what they see, or are fixed",
+       values({"moving", "fixed"})},
+      {"spread", "Samples of a pixel go where the error is", values({"on", "off"})},
+      {"generator",
+       "Random numbers: Owen-scrambled Sobol' points, rescrambled for every batch, or "
+       "independent",
+       values({"sobol", "independent"})},
+  };
+}
+
+// What the settings make of a method.
+TermMethod with_settings(TermMethod method, const Settings& settings) {
+  method.sampler.settings.copy_from(settings);
+  for (const Setting& setting : settings.list()) {
+    const std::string& value = setting.value();
+    if (setting.name == "directions") {
+      method.moves_directions = value == "moving";
+      method.random_directions = value == "random";
+    }
+    if (setting.name == "film") method.moves_film = value == "moving";
+    if (setting.name == "spread") method.spreads_samples = value == "on";
+    if (setting.name == "generator") {
+      method.numbers = value == "sobol" ? Numbers::kEvenInBatches : Numbers::kIndependent;
+    }
+    if (setting.name == "bias") method.unbiased = value == "off";
   }
-  method.terms_can_be_left_out = true;
-  method.ablation = term_method.sampler.ablation || term_method.ablation;
-  method.only_sum_fixed = term_method.moves_directions || term_method.random_directions ||
-                          term_method.warps || term_method.closed;
-  method.closed_light = term_method.closed;
-  method.warps = term_method.warps;
-  method.biased = term_method.warps && !term_method.unbiased;
-  method.run = [term_method](const MethodType&, const Scene& scene, const GradientOptions& options,
-                             const RunSettings& settings) {
-    if (options.points == FilmPoints::kFaces) return run_faces(scene, options, settings);
-    return run_terms(term_method, scene, options, settings);
-  };
-  method.trace = [term_method](const MethodType&, const Scene& scene,
-                               const GradientOptions& options, const RunSettings& settings,
-                               const NonFinite::Place& place) {
-    if (options.points == FilmPoints::kFaces) return trace_faces(scene, options, place);
-    return trace_terms(term_method, scene, options, settings, place);
-  };
   return method;
+}
+
+// Fills in what a row computes.
+void set_up(MethodType& row, const TermMethod& given) {
+  const TermMethod method = with_settings(given, row.settings);
+  row.terms.clear();
+  for (const TermType& type : term_types()) {
+    if (has_term(method.sampler, type, method.closed, method.moves_film)) {
+      row.terms.emplace_back(type.name);
+    }
+  }
+  row.terms_can_be_left_out = true;
+  row.only_sum_fixed = method.moves_directions || method.random_directions || method.moves_film ||
+                       method.warps || method.closed;
+  row.closed_light = method.closed;
+  row.warps = method.warps;
+  row.biased = method.warps && !method.unbiased;
+  row.run = [method](const MethodType&, const Scene& scene, const GradientOptions& options,
+                     const RunSettings& settings) {
+    if (options.points == FilmPoints::kFaces) return run_faces(scene, options, settings);
+    return run_terms(method, scene, options, settings);
+  };
+  row.trace = [method](const MethodType&, const Scene& scene, const GradientOptions& options,
+                       const RunSettings& settings, const NonFinite::Place& place) {
+    if (options.points == FilmPoints::kFaces) return trace_faces(scene, options, place);
+    return trace_terms(method, scene, options, settings, place);
+  };
+  row.reverse.reset();
+  const bool plain = !method.moves_directions && !method.random_directions && !method.moves_film &&
+                     !method.spreads_samples && method.numbers == Numbers::kIndependent;
+  if (plain && !method.warps) row.reverse = ReverseMethod{method.sampler, method.closed};
+}
+
+MethodType method_row(const std::string& name, const std::string& description,
+                      const std::string& sampler, TermMethod method, const Settings& own = {}) {
+  MethodType row{.name = name, .description = description, .settings = own};
+  method.sampler = edge_sampler_type(sampler);
+  row.settings.add(method.sampler.settings);
+  row.set_up = [method](MethodType& to) { set_up(to, method); };
+  return row;
 }
 
 }  // namespace
 
 std::vector<MethodType> term_methods() {
-  const EdgeSamplerType& silhouettes = edge_sampler_type("silhouettes");
   std::vector<MethodType> methods;
-  methods.push_back(
-      method_row("adaptive",
-                 "silhouettes, with directions and positions on the film that move along with what "
-                 "they see and samples where the error is",
-                 {.sampler = silhouettes,
-                  .moves_directions = true,
-                  .spreads_samples = true,
-                  .moves_film = true,
-                  .numbers = Numbers::kEvenInBatches}));
-  methods.push_back(method_row("independent-numbers",
-                               "adaptive, with random numbers of samples that are independent",
-                               {.sampler = silhouettes,
-                                .moves_directions = true,
-                                .spreads_samples = true,
-                                .moves_film = true,
-                                .ablation = true}));
-  methods.push_back(method_row("held-positions",
-                               "independent-numbers, with positions on the film held",
-                               {.sampler = silhouettes,
-                                .moves_directions = true,
-                                .spreads_samples = true,
-                                .ablation = true}));
-  methods.push_back(method_row("moving-directions",
-                               "silhouettes, with directions that move along with what they see",
-                               {.sampler = silhouettes, .moves_directions = true}));
+  methods.push_back(method_row("adaptive",
+                               "silhouettes, with reparameterised directions and film samples, and "
+                               "samples where the error is",
+                               "silhouettes", {}, motion_settings(true)));
+  methods.back().defaults = {Task::kGradient, Task::kCompare};
   for (const EdgeSamplerType& type : edge_sampler_types()) {
-    methods.push_back(method_row(type.name, type.description, {type}));
+    const bool lists = type.regions;
+    methods.push_back(method_row(type.name, type.description, type.name, {},
+                                 lists ? motion_settings(false) : Settings()));
   }
-  // It chooses among few edges, where surfaces cross and touch: any will do, also one at rest.
-  const EdgeSamplerType& uniform = edge_sampler_type("uniform");
-  methods.push_back(method_row("was",
-                               "warped-area sampling (Bangaru et al. 2020): auxiliary rays in "
-                               "place of edges; biased, the less the more rays",
-                               {.sampler = uniform, .warps = true}));
-  methods.push_back(method_row("was-unbiased",
-                               "warped-area sampling without bias, by roulette over numbers of "
-                               "auxiliary rays",
-                               {.sampler = uniform, .warps = true, .unbiased = true}));
-  methods.push_back(method_row("analytic",
-                               "direct light of flat lamps on diffuse surfaces in closed form: "
-                               "soft shadows without noise",
-                               {.sampler = uniform, .closed = true}));
-  methods.back().check = check_closed_light;
+  // Of few edges, where surfaces cross and touch, it chooses: any will do, also a static one.
   methods.push_back(method_row(
-      "random-directions",
-      "silhouettes, with directions and positions on the film that move by "
-      "chance: noise, but the same mean",
-      {.sampler = silhouettes, .moves_film = true, .random_directions = true, .ablation = true}));
+      "was", "warped-area sampling (Bangaru et al. 2020): auxiliary rays in place of edges",
+      "uniform", {.warps = true},
+      {{"bias",
+        "Few auxiliary rays bias the result; off: roulette over their number takes the "
+        "bias out",
+        {"on", "off"}}}));
+  methods.push_back(method_row(
+      "analytic",
+      "direct light of flat area lights on diffuse surfaces in closed form: soft shadows without "
+      "noise",
+      "uniform", {.closed = true}));
+  methods.back().check = check_closed_light;
+  methods.back().image = ImageMethod{.closed_light = true};
+  for (MethodType& row : methods) {
+    if (row.name == "forest") row.defaults = {Task::kBackward, Task::kFit};
+    if (row.name != "silhouettes") continue;
+    row.description += "; images: lines between silhouettes, or rays where these need less time";
+    row.set_up = [gradients = row.set_up](MethodType& to) {
+      gradients(to);
+      to.image.reset();
+      if (!to.is_variant())
+        to.image = ImageMethod{.looks_around = true, .by_lines = true, .chooses = true};
+    };
+  }
   return methods;
 }
 

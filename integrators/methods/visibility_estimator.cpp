@@ -9,6 +9,7 @@
 #include "integrators/lights/direct_light_check.h"
 #include "integrators/paths/camera_path.h"
 #include "limn/core/error.h"
+#include "limn/integrators/methods.h"
 
 namespace limn {
 namespace {
@@ -44,7 +45,7 @@ void check_options(const RenderOptions& options, bool by_lines) {
 }  // namespace
 
 VisibilityEstimator::VisibilityEstimator(const Scene& scene, const RunSettings& settings,
-                                         const RenderMethod& method, const RenderOptions& options)
+                                         const RenderOptions& options)
     : scene_(scene),
       tracer_(make_embree_tracer(scene, settings.threads)),
       seed_(settings.seed),
@@ -52,16 +53,17 @@ VisibilityEstimator::VisibilityEstimator(const Scene& scene, const RunSettings& 
       camera_(scene.camera),
       filter_(scene.film.filter) {
   const bool direct = options.what == RenderWhat::kImage;
+  const ImageMethod& method = *options.method->image;
   check_options(options, method.by_lines);
   const bool chooses = method.chooses && options.tolerance == 0;
   std::shared_ptr<const Environment> sky = scene.environment;
   if (chooses && direct && sky) split_ = split_environment(*sky, settings.threads);
   if (split_) sky = split_->rest;
   if (method.by_lines) {
-    const LineOptions lines{options.lines, options.tolerance, method.name};
+    const LineOptions lines{options.lines, options.tolerance, options.method.name()};
     lines_ = std::make_unique<LineLight>(scene, *tracer_, settings.threads, lines, direct, sky);
   } else if (direct) {
-    check_direct_light(scene, method.name);
+    check_direct_light(scene, options.method.name());
   }
   if (direct) add_lamps();
   if (!chooses) {

@@ -18,7 +18,7 @@ class VisibilityEstimator final : public SampleEstimator {
  public:
   // The scene must outlive it. InputError where the method does not know the scene's light, see
   // LineLight::check, by rays check_direct_light; and for options out of range.
-  VisibilityEstimator(const Scene& scene, const RunSettings& settings, const RenderMethod& method,
+  VisibilityEstimator(const Scene& scene, const RunSettings& settings,
                       const RenderOptions& options);
 
   const Scene& scene() const override { return scene_; }

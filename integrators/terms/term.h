@@ -109,10 +109,10 @@ class TermInput {
         threads(thread_count),
         warps(warped) {}
 
-  const PathContext& context;      // the scene with its parameters seeded
-  int lanes;                       // how many derivative lanes are in use
-  Lanes lane_scale;                // what makes speeds of the parameters comparable
-  const EdgeSamplerType& sampler;  // how shading points choose an edge
+  const PathContext& context;  // the scene with its parameters seeded
+  int lanes;                   // how many derivative lanes are in use
+  Lanes lane_scale;            // what makes speeds of the parameters comparable
+  EdgeSamplerType sampler;     // how shading points choose an edge
   int threads;
   bool warps;                            // whether directions are warped, see warp_field.h
   const FilmRegions* visible = nullptr;  // of the film; null: rays tell what is seen

@@ -40,7 +40,7 @@ BALL = os.path.join(ROOT, "build", "generated", "ball.ply")
 
 # How limn fit names its methods.
 LI2019, SILHOUETTES, ANALYTIC = (
-    f"--sampler {name}" for name in ("li2019", "silhouettes", "analytic"))
+    f"--method {name}" for name in ("li2019", "silhouettes", "analytic"))
 NO_BOUNDARY = "--terms interior,camera"  # What mirrors show has edges, too.
 # A loss that is a function, without noise, and what L-BFGS makes of it. Steps of Adam are halved as
 # they go on, or it would end in circles.

@@ -172,7 +172,7 @@ Image random_field(const Scene& scene) {
 void expect_same_interior(const Scene& scene, const std::string& sampler = "forest",
                           FilmPoints points = FilmPoints::kRandom) {
   BackwardOptions options;
-  options.sampler = sampler;
+  options.method = sampler;
   options.points = points;
   options.terms = {points == FilmPoints::kFaces ? "faces" : "interior"};
   options.uniform_pixels = true;
@@ -382,7 +382,7 @@ TEST(Backward, AgreesWithOtherSamplers) {
   RunSettings settings;
   settings.spp = 64;
   const BackwardResult one = backward(scene, adjoint, options, settings);
-  options.sampler = "li2019";
+  options.method = "li2019";
   settings.seed = 1;
   const BackwardResult other = backward(scene, adjoint, options, settings);
   for (const std::string& name : options.parameters) {
@@ -391,7 +391,8 @@ TEST(Backward, AgreesWithOtherSamplers) {
     EXPECT_LT(std::fabs(a.mean(0) - b.mean(0)), 5 * std::sqrt(a.variance(0) + b.variance(0)))
         << name;
   }
-  options.sampler = "oak";
+  EXPECT_THROW(options.method = "oak", InputError);
+  options.method = "adaptive";  // in forward mode alone
   EXPECT_THROW(backward(scene, adjoint, options, settings), InputError);
 }
 
@@ -399,7 +400,7 @@ TEST(Backward, AgreesWithOtherSamplers) {
 TEST(Backward, AgreesWithLightInClosedForm) {
   const TempFiles files;
   BackwardOptions options;
-  options.sampler = "analytic";
+  options.method = "analytic";
   expect_agreement(lamps_scene(files), 16, options);
 }
 
@@ -430,14 +431,14 @@ TEST(Backward, AgreesWithRegionsOfLight) {
   const TempFiles files;
   const Scene large = mirror_scene(files, true);
   BackwardOptions options;
-  options.sampler = "silhouettes";
+  options.method = "silhouettes";
   expect_agreement(large, 16, options);
   options.terms = {"direct", "penumbra"};
   options.parameters = {"body.translate.x", "body.translate.y", "body.translate.z", "body.scale"};
   expect_agreement(penumbra_scene(files, 0.02), 256, options);
   options.parameters = {"body.translate.y"};
   expect_agreement(penumbra_scene(files, 0.1), 1024, options);
-  options.sampler = "forest";
+  options.method = "forest";
   EXPECT_THROW(backward(large, random_adjoint(large, 1), options, RunSettings{}), InputError);
 }
 
@@ -458,7 +459,7 @@ TEST(Backward, AgreesWithBrightPatches) {
                files.path("sun.exr") + R"("/></emitter>)";
   const Scene scene = make_scene(files, parts);
   BackwardOptions options;
-  options.sampler = "silhouettes";
+  options.method = "silhouettes";
   expect_agreement(scene, 32, options);
   options.terms = {"direct"};
   options.parameters = {"body.translate.x", "body.translate.y", "body.translate.z", "body.scale"};

@@ -101,7 +101,7 @@ void expect_exact(const std::string& method, const std::string& file,
   GradientOptions options;
   options.method = method;
   options.samples = samples;
-  if (find_method(method).warps) options.warp = warp;
+  if (Method(method)->warps) options.warp = warp;
   for (const json& p : reference["parameters"]) {
     std::string name = p["name"];
     const size_t colon = name.find(':');
@@ -120,8 +120,9 @@ void expect_exact(const std::string& method, const std::string& file,
     const json& exact = reference["parameters"][k];
     const ParameterGradient& g = result.parameters[k];
     const std::string name = exact["name"];
-    compare(g.total, exact["total"], accuracy, name, fewest, method == "random-directions");
-    if (find_method(method).only_sum_fixed) continue;
+    compare(g.total, exact["total"], accuracy, name, fewest,
+            method.find("directions=random") != method.npos);
+    if (Method(method)->only_sum_fixed) continue;
     for (size_t t = 0; t < result.terms.size(); ++t) {
       const std::string& term = result.terms[t].name;
       // Where regions of light are apart, the boundary term is three.
@@ -134,10 +135,10 @@ void expect_exact(const std::string& method, const std::string& file,
 
 TEST_P(ClosedForm, GradientIsExact) {
   const auto& [method, file] = GetParam();
-  const int spp = samples_per_pixel() / (find_method(method).warps ? 2 : 1);  // dear ones
+  const int spp = samples_per_pixel() / (Method(method)->warps ? 2 : 1);  // dear ones
   // A wide kernel: its tails, and with them the largest samples, come often enough to be seen.
   const WarpOptions warp{8, 100};
-  const bool chooses = find_method(method).only_sum_fixed && !find_method(method).ablation;
+  const bool chooses = Method(method)->only_sum_fixed && !Method(method)->is_variant();
   expect_exact(method, file, chooses ? std::nullopt : std::optional(SampleCounts{}), spp, warp);
 }
 
@@ -186,24 +187,45 @@ bool takes(const MethodType& type, const std::string& file) {
   }
 }
 
+// The rows of the table and, of each setting, the values that are not the default. `adaptive` and
+// `silhouettes` choose edges by the code of `forest`, which stands for what all three have.
+std::vector<std::string> all_methods() {
+  const MethodType& forest = *Method("forest");
+  std::vector<std::string> names;
+  for (const MethodType& type : method_types()) {
+    if (!type.terms_can_be_left_out) continue;
+    names.push_back(type.name);
+    for (const std::string& name : variants_of(type)) {
+      const std::string setting = split_name(name)[1];
+      const std::vector<std::string> known = variants_of(forest);
+      const bool again = type.name != "forest" &&
+                         std::find(known.begin(), known.end(), "forest:" + setting) != known.end();
+      if (!again || type.name == "quadric") names.push_back(name);
+    }
+  }
+  return names;
+}
+
 std::vector<std::tuple<std::string, std::string>> all_cases() {
   std::vector<std::tuple<std::string, std::string>> cases;
   size_t variants = 0;
-  for (const MethodType& type : method_types()) {
-    if (!type.terms_can_be_left_out || type.biased) continue;
-    variants += type.ablation ? 1 : 0;
+  for (const std::string& name : all_methods()) {
+    const Method method(name);
+    const MethodType& type = *method;
+    if (type.biased) continue;
+    variants += type.is_variant() ? 1 : 0;
     size_t at = 0;
     for (const json& reference : references()) {
       // Where shading points see no edge move, a variant of a sampler has nothing to show, nor
       // have warped directions. How variants draw is tested edge by edge (test_edge_samplers); that
       // a term takes what they say is the same code for all, and each is held against one scene in
       // four, another four than the one before.
-      const bool variant = type.ablation && !type.only_sum_fixed;
+      const bool variant = type.is_variant() && !type.only_sum_fixed;
       if ((variant || type.warps) && !has_boundary(reference)) continue;
       const std::string file = reference["file"];
       if (variant && (++at + variants) % 4 != 0) continue;
       if (!takes(type, file)) continue;
-      cases.emplace_back(type.name, file);
+      cases.emplace_back(name, file);
     }
   }
   return cases;

@@ -56,7 +56,7 @@ TEST(EvenDerivatives, HaveLessErrorWhichTheyTell) {
     EXPECT_GT(errors.squares.mean(), 0) << even;
     EXPECT_LT(std::fabs(errors.surplus.z_score(0)), 4) << even;
     if (even != "adaptive") continue;
-    const Errors independent = errors_of(scene, "independent-numbers");
+    const Errors independent = errors_of(scene, "adaptive:generator=independent");
     EXPECT_LT(std::fabs(independent.surplus.z_score(0)), 4);
     EXPECT_LT(1.3 * errors.squares.mean(), independent.squares.mean());
   }
@@ -65,7 +65,7 @@ TEST(EvenDerivatives, HaveLessErrorWhichTheyTell) {
 TEST(EvenDerivatives, HaveTheMeanOfOthers) {
   const TempFiles files;
   expect_same_mean(soft_shadow(files), {"blocker.translate.x", "lamp.translate.y"},
-                   {"adaptive", "independent-numbers"});
+                   {"adaptive", "adaptive:generator=independent"});
 }
 
 }  // namespace

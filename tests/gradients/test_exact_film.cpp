@@ -315,7 +315,7 @@ TEST(ExactFilm, IsCompared) {
     input.exact_film = exact;
     for (const std::string name : {"forest", "fd"}) {
       const bool takes = exact && name == "forest";
-      EXPECT_EQ(input.options(find_method(name)).exact_film, takes);
+      EXPECT_EQ(input.options(Method(name)).exact_film, takes);
       const auto method = make_method(input, name);
       EXPECT_GT(method->run(settings).spp, 0);
       bool told = false;

@@ -142,7 +142,7 @@ Loss loss_and_gradient(const Scene& scene, const Image& target,
   BackwardOptions options;
   options.parameters = names;
   options.terms = {"interior"};
-  options.sampler = "analytic";
+  options.method = "analytic";
   options.uniform_pixels = true;
   options.batches = 1;
   result.gradient = backward(scene, result.loss.adjoint, options, settings);
@@ -249,7 +249,7 @@ TEST(Analytic, OverFacesSilhouettesInViewAreInTheLoss) {
   const LossResult at = image_loss(scene, target, LossKind::kL2, {}, {}, 1, images);
   EXPECT_EQ(at.error, 0);
   BackwardOptions options;
-  options.sampler = "analytic";
+  options.method = "analytic";
   options.points = FilmPoints::kFaces;
   const BackwardResult d = backward(scene, at.adjoint, options, {});
   for (const char* name : {"sensor.translate.x", "sensor.translate.y", "sensor.rotate.z",
@@ -275,7 +275,7 @@ TEST(Fit, QuasiNewtonOverFacesFindsWhatIsInView) {
   FitOptions options;
   options.parameters = {"body.translate.x", "body.translate.z", "glow.radiance"};
   options.optimiser = OptimiserKind::kLbfgs;
-  options.backward.sampler = "analytic";
+  options.backward.method = "analytic";
   options.backward.points = FilmPoints::kFaces;
   options.step = 2;
   RunSettings settings;
@@ -323,7 +323,7 @@ TEST(Fit, QuasiNewtonOverFacesLeavesBordersOfPixels) {
   FitOptions options;
   options.parameters = {"lamp.translate.x", "lamp.translate.y"};
   options.optimiser = OptimiserKind::kLbfgs;
-  options.backward.sampler = "analytic";
+  options.backward.method = "analytic";
   options.backward.points = FilmPoints::kFaces;
   for (const double x : {0.3, -0.3}) {
     const double y = -0.7 * x;
@@ -348,7 +348,7 @@ FitOptions exact_options() {
   FitOptions options;
   options.parameters = {"body.translate.x", "body.translate.z", "glow.radiance"};
   options.optimiser = OptimiserKind::kLbfgs;
-  options.backward.sampler = "analytic";
+  options.backward.method = "analytic";
   options.step = 5;
   return options;
 }
@@ -407,9 +407,9 @@ TEST(Fit, QuasiNewtonRefusesNoise) {
     }
   };
   FitOptions options = exact_options();
-  options.backward.sampler = "forest";
-  refuses(options, "sampler forest");
-  options.backward.sampler = "analitic";
+  options.backward.method = "forest";
+  refuses(options, "method forest");
+  options.backward.method = "adaptive";
   refuses(options, ", analytic");
   options = exact_options();
   options.loss = LossKind::kL1;

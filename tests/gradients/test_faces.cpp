@@ -401,7 +401,7 @@ TEST_P(ForwardAndReverse, AreOne) {
     adjoint.data[i] = static_cast<float>(Rng(5, i, 0).uniform() - 0.5);
   }
   BackwardOptions options;
-  options.sampler = "analytic";
+  options.method = "analytic";
   options.points = FilmPoints::kFaces;
   const BackwardResult one = backward(scene, adjoint, options, threads(1));
   const BackwardResult three = backward(scene, adjoint, options, threads(3));
@@ -607,7 +607,7 @@ TEST(Faces, NothingIsAddedOfPixelsThatAreNotFinite) {
   for (float& v : adjoint.data) v = 1;
   for (int c = 0; c < 3; ++c) adjoint.data[c] = 1e38F;
   BackwardOptions reverse;
-  reverse.sampler = "analytic";
+  reverse.method = "analytic";
   reverse.points = FilmPoints::kFaces;
   const BackwardResult r = backward(scene, adjoint, reverse, threads(1));
   EXPECT_EQ(r.non_finite.count, 1u);
@@ -650,7 +650,7 @@ TEST(Faces, RefusesWhatHasNone) {
           kNoParts);
   refuses([&] { gradient(scene, options, part); }, kNoParts);
   BackwardOptions reverse;
-  reverse.sampler = "analytic";
+  reverse.method = "analytic";
   reverse.points = FilmPoints::kFaces;
   refuses([&] { backward(scene, Image(2, 2, 3), reverse, part); }, kNoParts);
   options.terms = {"camera"};

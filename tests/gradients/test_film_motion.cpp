@@ -124,7 +124,8 @@ TEST(FilmMotion, KeepsTheMean) {
   const TempFiles files;
   for (const char* filter : kFilters) {
     const Scene scene = scene_with(files, filter, 8);
-    expect_same_mean(scene, {"ball.translate.x", "sensor.rotate.y"}, {"random-directions"}, 128);
+    expect_same_mean(scene, {"ball.translate.x", "sensor.rotate.y"},
+                     {"silhouettes:directions=random:film=moving"}, 128);
   }
 }
 
@@ -147,8 +148,8 @@ TEST(FilmMotion, RestsWhereFiltersEnd) {
     parts.body = square("panel", of.half, 0, {of.x, 0, 0}, area_light("glow", "1, 1, 1")) +
                  square("bar", 0.4, 0, {0.7, -0.3, 1}, area_light("lit", "3, 2, 1")) +
                  constant_light("sky", "0.2, 0.3, 0.4");
-    expect_same_pixels(make_scene(files, parts), {"bar.translate.x"}, "random-directions", "forest",
-                       2048);
+    expect_same_pixels(make_scene(files, parts), {"bar.translate.x"},
+                       "silhouettes:directions=random:film=moving", "forest", 2048);
   }
 }
 
@@ -165,8 +166,8 @@ TEST(FilmMotion, MeetsWhatIsFarOutInAFilter) {
   parts.body = square("panel", 0.15 * pixel, 0, {1.9 * pixel, 1.9 * pixel, 0},
                       area_light("glow", "1, 1, 1")) +
                square("unseen", 0.4, 0, {0, 0, 12}, diffuse("clay", "0.5, 0.5, 0.5"));
-  const GradientResult result =
-      run_method(make_scene(files, parts), {"unseen.translate.x"}, "random-directions", 1 << 15, 1);
+  const GradientResult result = run_method(make_scene(files, parts), {"unseen.translate.x"},
+                                           "silhouettes:directions=random:film=moving", 1 << 15, 1);
   const Moments& total = result.parameters[0].total;
   ASSERT_GT(total.variance(0), 0);
   EXPECT_LT(
@@ -232,7 +233,7 @@ TEST(FilmMotion, TakesOutDetailThatSlides) {
   const Scene scene = fence_scene(files, 24);
   const auto variance_times_rays = [&](const std::string& method) {
     const GradientResult result = run_method(scene, {"bars.translate.x"}, method, 64, 3);
-    EXPECT_EQ(share_that_moves(result) > 0.5, method == "independent-numbers");
+    EXPECT_EQ(share_that_moves(result) > 0.5, method == "adaptive:generator=independent");
     uint64_t rays = 0;
     for (const auto& term : result.terms) rays += term.cost.rays;
     const Moments& total = result.parameters[0].total;
@@ -240,7 +241,8 @@ TEST(FilmMotion, TakesOutDetailThatSlides) {
     for (size_t i = 0; i < total.size(); ++i) sum += total.variance(i);
     return sum * static_cast<double>(rays);
   };
-  EXPECT_LT(2 * variance_times_rays("independent-numbers"), variance_times_rays("held-positions"));
+  EXPECT_LT(2 * variance_times_rays("adaptive:generator=independent"),
+            variance_times_rays("adaptive:film=fixed:generator=independent"));
 }
 
 // Detail at rest, before which a plain square slides: the pilots look, and leave nothing behind.
@@ -254,8 +256,9 @@ TEST(FilmMotion, IsHeldWhereItDoesNotPay) {
                square("plate", 0.4, 0, {0, 0.8, 0.8}, diffuse("tin", "0.5, 0.5, 0.5"));
   const Scene scene = make_scene(files, parts);
   const GradientResult chosen =
-      run_method(scene, {"plate.translate.x"}, "independent-numbers", 64, 3);
-  const GradientResult held = run_method(scene, {"plate.translate.x"}, "held-positions", 64, 3);
+      run_method(scene, {"plate.translate.x"}, "adaptive:generator=independent", 64, 3);
+  const GradientResult held =
+      run_method(scene, {"plate.translate.x"}, "adaptive:film=fixed:generator=independent", 64, 3);
   EXPECT_EQ(share_that_moves(chosen), 0);
   expect_same_bits(chosen, held);
 }
@@ -329,9 +332,10 @@ TEST(Pilot, MergesFiguresOfMoreSamples) {
 TEST(FilmMotion, HasTheMeanOfHeldPositions) {
   const TempFiles files;
   const Scene scene = fence_scene(files, 10);
-  expect_same_pixels(scene, {"bars.translate.x"}, "adaptive", "held-positions", 512);
+  expect_same_pixels(scene, {"bars.translate.x"}, "adaptive",
+                     "adaptive:film=fixed:generator=independent", 512);
   expect_same_pixels(scene, {"floor.translate.x", "bars.translate.y", "bars.translate.x"},
-                     "adaptive", "held-positions", 512);
+                     "adaptive", "adaptive:film=fixed:generator=independent", 512);
 }
 
 TEST(FilmMotion, HasTheSameBitsOnAnyNumberOfThreads) {

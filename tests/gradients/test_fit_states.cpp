@@ -139,7 +139,7 @@ FitOptions exact_options(const std::vector<std::string>& parameters) {
   FitOptions options;
   options.parameters = parameters;
   options.optimiser = OptimiserKind::kLbfgs;
-  options.backward.sampler = "analytic";
+  options.backward.method = "analytic";
   options.step = 5;
   return options;
 }

@@ -497,7 +497,7 @@ TEST_P(StandsOnAFloor, AsIfPressed) {
 TEST_P(StandsOnAFloor, InReverse) {
   BackwardOptions options;
   options.parameters = {"thing.translate.y"};
-  if (GetParam().analytic) options.sampler = "analytic";
+  if (GetParam().analytic) options.method = "analytic";
   RunSettings settings;
   settings.spp = 64;
   settings.threads = 1;

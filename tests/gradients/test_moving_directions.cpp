@@ -30,17 +30,20 @@ TEST(MovingDirections, KeepTheMean) {
   const TempFiles files;
   const Scene scene = gloss_scene(files, 0.2);
   for (const char* parameter : {"ball.translate.x", "lamp.translate.x", "sensor.rotate.x"}) {
-    expect_same_mean(scene, {parameter}, {"random-directions", "moving-directions", "adaptive"});
+    expect_same_mean(
+        scene, {parameter},
+        {"silhouettes:directions=random:film=moving", "silhouettes:directions=moving", "adaptive"});
   }
 }
 
 // Four of them share a pass; one of the others moves nothing.
 TEST(MovingDirections, KeepTheMeanOfSeveralParameters) {
   const TempFiles files;
-  expect_same_mean(gloss_scene(files, 0.2),
-                   {"ball.translate.x", "ball.rotate.y", "lamp.translate.x", "sensor.translate.y",
-                    "floor.translate.y", "glow.radiance"},
-                   {"random-directions", "moving-directions", "adaptive"});
+  expect_same_mean(
+      gloss_scene(files, 0.2),
+      {"ball.translate.x", "ball.rotate.y", "lamp.translate.x", "sensor.translate.y",
+       "floor.translate.y", "glow.radiance"},
+      {"silhouettes:directions=random:film=moving", "silhouettes:directions=moving", "adaptive"});
 }
 
 // The edges of a point light's shadows, seen in gloss, move against directions that turn. One
@@ -61,7 +64,7 @@ TEST(MovingDirections, KeepTheMeanOfSharpShadows) {
   const Moments held = estimate("forest", 32768, 1);
   std::vector<double> z;
   for (uint64_t seed = 1; seed <= 6; ++seed) {
-    const Moments turned = estimate("random-directions", 16384, seed);
+    const Moments turned = estimate("silhouettes:directions=random:film=moving", 16384, seed);
     z.push_back((turned.mean(0) - held.mean(0)) / std::sqrt(turned.variance(0) + held.variance(0)));
   }
   EXPECT_GE(summarize(z).p_largest, 1e-4) << summarize(z).largest;
@@ -131,7 +134,8 @@ TEST(MovingDirections, TakeOutWhatSlides) {
     for (size_t i = total.size() / 2; i < total.size(); ++i) sum += total.variance(i);
     return sum * static_cast<double>(rays);
   };
-  EXPECT_LT(2 * variance_times_rays("moving-directions"), variance_times_rays("forest"));
+  EXPECT_LT(2 * variance_times_rays("silhouettes:directions=moving"),
+            variance_times_rays("forest"));
 }
 
 // What a pilot learns of a parameter does not depend on the others: asked for twice or four times
@@ -221,7 +225,7 @@ TEST(MovingDirections, TakeOutWhatSlidesForEveryParameter) {
     }
     return sums;
   };
-  const auto moving = variances_times_rays("moving-directions");
+  const auto moving = variances_times_rays("silhouettes:directions=moving");
   const auto held = variances_times_rays("silhouettes");
   for (size_t k = 0; k < parameters.size(); ++k) {
     EXPECT_LT(moving[k], held[k]) << parameters[k];
@@ -237,7 +241,7 @@ TEST(MovingDirections, RestWhereTermsAreLeftOut) {
         run_method(scene, {"ball.translate.y"}, method, 64, 3, 2, {"interior", "camera"});
     return result.parameters[0].total;
   };
-  const Moments a = interior("forest"), b = interior("random-directions");
+  const Moments a = interior("forest"), b = interior("silhouettes:directions=random:film=moving");
   for (size_t i = 0; i < a.size(); ++i) ASSERT_EQ(a.mean(i), b.mean(i));
 }
 

@@ -140,7 +140,7 @@ TEST(ReverseSamples, SeveralEdgesOfAVertexHaveTheMeanOfOne) {
   std::fill(adjoint.data.begin(), adjoint.data.end(), 1.0f);
   BackwardOptions options;
   options.parameters = {"body.translate.x", "body.translate.y", "body.translate.z", "body.scale"};
-  options.sampler = "forest";
+  options.method = "forest";
   options.terms = {"boundary"};
   options.batches = 32;
   RunSettings settings;
@@ -178,7 +178,7 @@ TEST(ReverseSamples, ShadowsInViewHaveANumberOfFilmPointsOfTheirOwn) {
     const Scene scene = scene_under(files, of.light);
     BackwardOptions options;
     options.parameters = {"body.translate.x"};
-    options.sampler = of.sampler;
+    options.method = of.sampler;
     options.edge_samples = 3;
     RunSettings settings;
     settings.spp = 8;
@@ -215,7 +215,7 @@ TEST(ReverseSamples, LightInClosedFormTakesAFilmPointForEachPath) {
   BackwardOptions options;
   options.parameters = {"body.translate.x"};
   options.terms = {"camera"};
-  options.sampler = "analytic";
+  options.method = "analytic";
   RunSettings settings;
   settings.spp = 4;
   const BackwardResult result = backward(scene, steep_adjoint(scene), options, settings);

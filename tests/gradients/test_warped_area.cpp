@@ -208,7 +208,7 @@ TEST(WarpedArea, HoldsDirectionsWhereNothingMoves) {
 TEST(WarpedArea, HasTheSameBitsOnAnyThreads) {
   const TempFiles files;
   const Scene scene = gloss_scene(files, 1);
-  for (const char* method : {"was", "was-unbiased"}) {
+  for (const char* method : {"was", "was:bias=off"}) {
     const GradientResult one = run(scene, {"ball.translate.x"}, method, 2, {}, 1);
     const GradientResult three = run(scene, {"ball.translate.x"}, method, 2, {}, 3);
     for (size_t i = 0; i < one.radiance.size(); ++i) {

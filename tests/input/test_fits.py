@@ -48,7 +48,7 @@ class FitsOfFunctions(unittest.TestCase):
                 words += ["--target", os.path.join(folder, f"stone_{i}.exr")]
             defines = [f"mesh={folder}/stone.obj", "format=obj", "width=8", "height=8"]
             words += [w for d in defines for w in ("-D", d)]
-            words += ["--wrt", "object.displacement", "--sampler", "analytic", "--points", "faces",
+            words += ["--wrt", "object.displacement", "--method", "analytic", "--points", "faces",
                       "--steps", "1", "--no-report", "-o", f"{folder}/at_truth"]  # fmt: skip
             subprocess.run(words, check=True, capture_output=True)
             with open(os.path.join(folder, "at_truth", "fit.json")) as file:

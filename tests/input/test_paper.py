@@ -102,7 +102,7 @@ class TestPaper(unittest.TestCase):
         mirror, shadow, reject = self.calls()
         self.assertEqual(mirror[:2], ["compare", "scenes/rough_mirror.xml"])
         self.assertIn("alpha=0.2", mirror)
-        self.assertEqual(self.value(shadow, "--methods"), "forest,silhouettes,moving-directions,held-positions,independent-numbers,adaptive,forest-no-lights,li2019,uniform,fd")
+        self.assertEqual(self.value(shadow, "--methods"), "forest,silhouettes,silhouettes:directions=moving,adaptive:film=fixed:generator=independent,adaptive:generator=independent,adaptive,forest:lights=off,li2019,uniform,fd")
         self.assertEqual(self.value(shadow, "--time"), self.value(mirror, "--time"))
         self.assertEqual(self.value(shadow, "--seed"), "7")
         self.assertEqual(reject[:2], ["reject", "build/generated/pebble.ply"])
@@ -120,7 +120,7 @@ class TestPaper(unittest.TestCase):
         self.assertAlmostEqual(float(self.value(chandelier, "--time")), 3 * float(self.value(given, "--time")), places=4)
         self.assertEqual((torus[0], self.value(torus, "--node-edges")), ("reject", "128"))
         self.assertTrue(os.path.exists(torus[1]))
-        self.assertIn("li2019-solid", self.value(torus, "--methods").split(","))
+        self.assertIn("li2019:sphere=solid", self.value(torus, "--methods").split(","))
         self.assertIn(f"mesh={mesh}", given)
         self.assertIn("format=obj", given)
         self.assertEqual((self.value(warped, "--aux"), self.value(warped, "--kappa")), ("32", "1e5"))
@@ -140,8 +140,8 @@ class TestPaper(unittest.TestCase):
         self.assertEqual((done.returncode, done.stderr), (0, ""))
         shadow, sun = self.calls()
         self.assertEqual(self.value(shadow, "--methods"),
-                         "forest,silhouettes,moving-directions,held-positions,independent-numbers,adaptive,fd,mitsuba-after-setup")
-        self.assertEqual(self.value(sun, "--methods"), "forest,silhouettes,moving-directions,held-positions,independent-numbers,adaptive,fd")
+                         "forest,silhouettes,silhouettes:directions=moving,adaptive:film=fixed:generator=independent,adaptive:generator=independent,adaptive,fd,mitsuba-after-setup")
+        self.assertEqual(self.value(sun, "--methods"), "forest,silhouettes,silhouettes:directions=moving,adaptive:film=fixed:generator=independent,adaptive:generator=independent,adaptive,fd")
         self.assertAlmostEqual(float(self.value(sun, "--time")), 2.6, delta=0.1)
         with open(self.path("out", "ablations.md")) as stream:
             text = stream.read()

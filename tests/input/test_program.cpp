@@ -193,7 +193,7 @@ TEST_F(Program, OptionsOfOthersAreRefused) {
            {"render " + scene_ + " --lines 8 -o " + out(), "--lines"},
            {render + " --method rays --tolerance 0.1", "--tolerance"},
            {render + " --method silhouettes --rays 2", "--rays"},
-           {render + " --method rays --sampler independent", "--sampler"},
+           {render + " --method rays --generator independent", "--generator"},
            {fields + " --what ao", "--what"},
            {fields + " --rays 2", "--rays"},
            {images + " --methods rays --lines 2", "--lines"},
@@ -353,12 +353,34 @@ TEST_F(Program, NonFiniteSamplesAreAnErrorThatCanBeRepeated) {
   EXPECT_TRUE(std::filesystem::exists(out()));
 }
 
-TEST_F(Program, AblationsStandInTheLongHelp) {
-  const std::string brief = run("gradient --help").text;
-  const std::string all = run("gradient --help-all").text;
-  EXPECT_EQ(brief.find("forest-concave"), std::string::npos) << brief;
-  EXPECT_NE(brief.find("li2019"), std::string::npos) << brief;
-  EXPECT_NE(all.find("forest-concave"), std::string::npos) << all;
+TEST_F(Program, MethodsAndTheirSettingsAreListed) {
+  const std::string brief = run("methods").text;
+  const std::string all = run("methods --all").text;
+  for (const std::string& text : {brief, run("gradient --help").text}) {
+    EXPECT_EQ(text.find("concave"), std::string::npos) << text;
+    EXPECT_NE(text.find("li2019"), std::string::npos) << text;
+  }
+  EXPECT_NE(all.find("    concave=off|on: "), std::string::npos) << all;
+}
+
+// Names of earlier versions tell those of today.
+TEST_F(Program, OldSpellingsNameTheNew) {
+  const std::string wrt = scene_ + " --wrt screen.translate.x -o " + out();
+  const auto tells = [&](const std::string& command, const std::string& text) {
+    const std::string told = refused(command);
+    EXPECT_NE(told.find(text), std::string::npos) << told;
+  };
+  tells("render " + scene_ + " --sampler padded-sobol -o " + out(), "--generator sobol");
+  for (const char* command : {"gradient ", "backward ", "fit "}) {
+    tells(command + wrt + " --sampler forest", "this option is now --method NAME");
+  }
+  tells("gradient " + wrt + " --method forest-concave",
+        "the method \"forest-concave\" is called forest:concave=on");
+  tells("gradient " + wrt + " --method path",
+        "the method \"path\" cannot do the task gradient (known: adaptive, ");
+  tells("backward " + wrt + " --method silhouettes:directions=moving", "the task backward");
+  tells("compare " + wrt + " --time 1 --methods forest,forest:width=3", "one of 8, 4, 2");
+  tells("compare " + wrt + " --time 1 --methods forest,forest:width=8", "is given twice");
 }
 
 TEST_F(Program, UnknownParameterListsTheNearest) {
@@ -370,13 +392,13 @@ TEST_F(Program, UnknownParameterListsTheNearest) {
 
 TEST_F(Program, UnknownNamesListTheKnown) {
   const std::string gradient = "gradient " + scene_ + " --wrt screen.translate.x -o " + out();
-  EXPECT_NE(refused(gradient + " --sampler forrest").find("brute"), std::string::npos);
+  EXPECT_NE(refused(gradient + " --method forrest").find("brute"), std::string::npos);
   EXPECT_NE(refused(gradient + " --terms interior,border").find("boundary"), std::string::npos);
   EXPECT_NE(refused("render " + scene_ + " --shading phong -o " + out()).find("continuous"),
             std::string::npos);
   EXPECT_NE(refused("paint " + scene_)
                 .find("limn paint: no such command (known: info, render, gradient, backward, fit, "
-                      "merge, check, compare, reject; limn --help tells more)"),
+                      "merge, check, compare, reject, methods; limn --help tells more)"),
             std::string::npos);
   EXPECT_NE(refused("").find("limn: a command is needed (known: info"), std::string::npos);
 }
@@ -396,11 +418,11 @@ TEST_F(Program, BadNumbers) {
 // The options of a method that is not asked for are a mistake, whatever the command.
 TEST_F(Program, AuxiliaryRaysAreForMethodsThatTraceThem) {
   const std::string where = scene_ + " --wrt screen.translate.x --aux 4";
-  const std::string whose = "(--aux, --kappa) are for the methods was, was-unbiased: ";
+  const std::string whose = "(kappa) are for the method was: ";
   const std::pair<std::string, std::string> mistakes[] = {
       {"gradient " + where + " -o " + out(), "the method \"adaptive\" has none"},
       {"check " + where + " --method fd", "the method \"fd\" has none"},
-      {"check " + where + " --reverse", "the method \"reverse mode\" has none"},
+      {"check " + where + " --reverse", "the method \"forest\" has none"},
       {"compare " + where + " --time 0.1 --methods forest,fd -o " + files_.path("folder"),
        "none of the methods forest, fd has any"}};
   for (const auto& [command, text] : mistakes) {
@@ -413,12 +435,12 @@ TEST_F(Program, AuxiliaryRaysAreForMethodsThatTraceThem) {
 // Whose samplers are other ones than the default method.
 TEST_F(Program, ACheckOfReverseModeNeedsNoSampler) {
   const std::string check = "check " + scene_ + " --wrt screen.translate.x --spp 16 --reverse";
-  for (const char* more : {"", " --sampler uniform"}) {
+  for (const char* more : {"", " --method uniform"}) {
     const auto [status, text] = run(check + more);
     EXPECT_EQ(status, 0) << text;
     EXPECT_NE(text.find("screen.translate.x: forward"), std::string::npos) << text;
   }
-  EXPECT_NE(refused(check + " --sampler fd").find("unknown edge sampler"), std::string::npos);
+  EXPECT_NE(refused(check + " --method fd").find("the task backward"), std::string::npos);
 }
 
 TEST_F(Program, BadSamples) {

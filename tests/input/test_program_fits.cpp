@@ -85,7 +85,7 @@ TEST_F(Program, FitsByLbfgsGoOn) {
   ASSERT_EQ(run("render " + scene + " -D glow=3 --spp 4 -o " + target).status, 0);
   const std::string fit = "fit " + scene + " --target " + target +
                           " --wrt blaze.radiance --wrt clay.reflectance --spp 1 --no-report "
-                          "--sampler analytic --optimiser lbfgs -o ";
+                          "--method analytic --optimiser lbfgs -o ";
   const std::string whole = files_.path("whole"), broken = files_.path("broken");
   const Outcome outcome = run(fit + whole + " --steps 5");
   ASSERT_EQ(outcome.status, 0) << outcome.text;
@@ -104,7 +104,7 @@ TEST_F(Program, FitsByLbfgsGoOn) {
   const std::string held = files_.path("held");
   const std::string rests = "fit " + scene + " -D glow=3 --target " + target +
                             " --wrt blaze.radiance --bounds blaze.radiance=3,3 --spp 1 "
-                            "--no-report --sampler analytic --optimiser lbfgs --steps 9 -o " +
+                            "--no-report --method analytic --optimiser lbfgs --steps 9 -o " +
                             held;
   ASSERT_EQ(run(rests).status, 0);
   const json end = read_json(held + "/fit.json");

@@ -77,11 +77,11 @@ def test_it_has_the_programs_bits(folder, scene, adjoint, threads):
     output, told = run_program(folder, "--target", str(folder / "target.exr"), "--loss",
                                "relative-l2", "--spp", "4", "--wrt", POSITIONS, "--terms",
                                "interior,boundary", "--pixels", "uniform", "--edge-samples", "2",
-                               "--sampler", "uniform")
+                               "--method", "uniform")
     loss = limn.image_loss(scene, target, "relative-l2", spp=4, threads=threads)
     assert (loss.value, loss.stderr) == (told["loss"]["value"], told["loss"]["stderr"])
     found = limn.backward(scene, loss.adjoint, POSITIONS, spp=4, terms=["interior", "boundary"],
-                          uniform_pixels=True, edge_samples=2, threads=threads, sampler="uniform")
+                          uniform_pixels=True, edge_samples=2, threads=threads, method="uniform")
     assert np.array_equal(np.load(output / f"{POSITIONS}.npy"), found[POSITIONS].value)
 
 

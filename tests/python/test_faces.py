@@ -11,7 +11,7 @@ from test_scene import same
 
 FACES = {"method": "analytic", "points": "faces"}
 WORDS = ["--method", "analytic", "--points", "faces"]
-REVERSE = {"sampler": "analytic", "points": "faces"}
+REVERSE = {"method": "analytic", "points": "faces"}
 POSITIONS = "tent.vertex_positions"
 
 SCENE = """<scene version="3.0.0">
@@ -86,7 +86,7 @@ def test_a_reverse_pass_is_the_derivative_of_the_loss(lit, run, folder):
     limn.write_exr(folder / "target.exr", target)
     loss = limn.image_loss(lit, target, **FACES)
     slopes = limn.backward(lit, loss.adjoint, [POSITIONS, "tent.translate.x"], **REVERSE)
-    output = run("backward", "--sampler", "analytic", "--points", "faces", "--wrt", POSITIONS,
+    output = run("backward", "--method", "analytic", "--points", "faces", "--wrt", POSITIONS,
                  "--target", str(folder / "target.exr"), "-o", str(folder / "faces"))  # fmt: skip
     assert loss.value == json.loads((output / "gradient.json").read_text())["loss"]["value"]
     assert np.array_equal(np.load(output / f"{POSITIONS}.npy"), slopes[POSITIONS].value)
@@ -114,7 +114,7 @@ def test_a_fit_goes_the_programs_way(lit, run, folder):
     fit.run(3)
     limn.write_exr(folder / "target.exr", limn.read_exr(folder / "target.exr") * 1.1)
     output = run("fit", "--no-report", "--target", str(folder / "target.exr"), "--wrt", name,
-                 "--sampler", "analytic", "--points", "faces", "--optimiser", "lbfgs", "--steps",
+                 "--method", "analytic", "--points", "faces", "--optimiser", "lbfgs", "--steps",
                  "3", "-o", str(folder / "faces_fit")).parent / "faces_fit"  # fmt: skip
     told = json.loads((output / "fit.json").read_text())
     assert [r.loss for r in fit.history] == [r["loss"] for r in told["history"]]
@@ -128,7 +128,7 @@ def test_a_fit_goes_the_programs_way(lit, run, folder):
     (lambda s, a: limn.render(s, points="face"), 'unknown kind of points on the film "face"'),
     (lambda s, a: limn.render(s, points="faces"), 'needs light in closed form.*"path"'),
     (lambda s, a: limn.render(s, spp=4, **FACES), 'spp: points "faces" take no samples'),
-    (lambda s, a: limn.render(s, sampler="padded-sobol", **FACES), "error: sampler: "),
+    (lambda s, a: limn.render(s, generator="sobol", **FACES), "error: generator: "),
     (lambda s, a: limn.gradient(s, "lamp.radiance", spp=4, **FACES), "error: spp: "),
     (lambda s, a: limn.gradient(s, "lamp.radiance", seconds=1, **FACES), "error: seconds: "),
     (lambda s, a: limn.gradient(s, "lamp.radiance", samples=[1, 1], **FACES), "error: samples: "),

@@ -76,7 +76,7 @@ BOUNDS = {"clay.reflectance": (0.25, 0.75), "lamp.radiance": (3.99, 7)}
 # Every option changes what three steps find: the first loss, which has no step, the values at last.
 @pytest.mark.parametrize("names, options, words", [
     (["tent.vertex_positions"], {}, []),
-    (["tent.vertex_positions"], {"sampler": "uniform"}, ["--sampler", "uniform"]),
+    (["tent.vertex_positions"], {"method": "uniform"}, ["--method", "uniform"]),
     (["tent.vertex_positions"], {"camera_samples": 2}, ["--camera-samples", "2"]),
     (["tent.vertex_positions"], {"shadow_samples": 2}, ["--shadow-samples", "2"]),
     (["tent.vertex_positions"], {"edge_samples": 3}, ["--edge-samples", "3"]),
@@ -133,8 +133,8 @@ def test_errors_and_interrupts(scene):
         limn.Fit(scene, target, "clay.reflectance", optimiser="sgd")
     with pytest.raises(limn.UnknownParameterError, match="clay.reflectance"):
         limn.Fit(scene, target, "clay.reflectanse")
-    with pytest.raises(limn.InputError, match='unknown edge sampler "tree"'):
-        limn.Fit(scene, target, "clay.reflectance", sampler="tree")
+    with pytest.raises(limn.InputError, match='unknown method "tree"'):
+        limn.Fit(scene, target, "clay.reflectance", method="tree")
     with pytest.raises(limn.InputError, match='bounds of "lamp.radiance", which is not fitted'):
         limn.Fit(scene, target, "clay.reflectance", bounds={"lamp.radiance": (0, 1)})
     fit = limn.Fit(scene, target, "clay.reflectance", spp=64)

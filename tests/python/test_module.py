@@ -68,7 +68,7 @@ def test_the_stubs_defaults_are_those_of_the_code(scene):
     own = {"spp": 4, "seed": 3}
     adjoint = np.random.default_rng(3).normal(size=(scene.height, scene.width, 3))
     told = stub_defaults("backward", "backward") | own
-    assert {"edge_samples", "camera_samples", "shadow_samples", "batches", "sampler"} <= set(told)
+    assert {"edge_samples", "camera_samples", "shadow_samples", "batches", "method"} <= set(told)
     plain, said = limn.backward(scene, adjoint, **own), limn.backward(scene, adjoint, **told)
     for name in plain:
         np.testing.assert_array_equal(plain[name].value, said[name].value)

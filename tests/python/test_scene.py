@@ -223,7 +223,7 @@ def test_shading_is_the_programs(scene, program):
     scene.shading = "mitsuba"
     assert scene.shading == "mitsuba"
     assert same(image(scene), program("render", "--spp", "2", "--seed", "5", "--shading", "mitsuba",
-                                      "--sampler", "independent"))
+                                      "--generator", "independent"))
 
 
 def test_images_come_back(tmp_path):

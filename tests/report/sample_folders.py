@@ -222,7 +222,7 @@ def rejection(folder, mesh, missed=0):
     write_png(os.path.join(folder, "overview.png"), np.full((SIZE, SIZE, 3), 0.7))
     variants = [
         variant(folder, "forest", 0.91, 0.22),
-        variant(folder, "forest-any-axes", 0.66, 0.3),
+        variant(folder, "forest:axes=any", 0.66, 0.3),
         variant(folder, "li2019", 0.31, 0.45, missed),
     ]
     data = {
@@ -306,7 +306,7 @@ def write_samples(folder):
             {"name": "forest", "error": 0.02},
             {"name": "li2019", "error": 0.9, "ratio": 45.0},
             {"name": "uniform", "error": 1.8, "ratio": 90.0},
-            {"name": "forest-any-axes", "error": 0.03, "ratio": 1.5},
+            {"name": "forest:axes=any", "error": 0.03, "ratio": 1.5},
             {"name": "fd", "error": 0.3, "floor": 0.05, "p": 1e-9, "ratio": 17.0},
             {"name": "mitsuba", "message": "Mitsuba is not installed: pip install mitsuba==3.9.1"},
         ],

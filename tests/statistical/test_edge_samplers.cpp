@@ -197,6 +197,8 @@ TEST(EdgeBound, StillEdgesAndEdgesBelowTheHorizonCount0) {
   EXPECT_EQ(EdgeBound(lobe, s).total(), 0);
 }
 
+bool is_variant(const std::string& name) { return name.find(':') != name.npos; }
+
 class EdgeSamplers : public testing::TestWithParam<std::string> {
  protected:
   std::unique_ptr<EdgeSampler> make(const EdgeSamplerInput& input) const {
@@ -213,7 +215,7 @@ TEST_P(EdgeSamplers, DrawAsTheyState) {
       const EdgeQuery q = random_query(rng);
       // An ablation draws by the code of its sampler, from weights of its own: each draw's
       // probability is compared exactly, and how often it comes at all needs fewer.
-      const int draws = edge_sampler_type(GetParam()).ablation ? 5000 : 20000;
+      const int draws = is_variant(GetParam()) ? 5000 : 20000;
       std::vector<double> stated, expected, observed;
       std::vector<size_t> begin;  // of an object's cells
       double sum = 0;
@@ -259,7 +261,7 @@ TEST_P(EdgeSamplers, SeveralAtOnceAreDrawnAsTheyState) {
     const auto sampler = make(input);
     for (const int several : {2, 7}) {
       const EdgeQuery q = random_query(rng);
-      const int rounds = (edge_sampler_type(GetParam()).ablation ? 5000 : 20000) / several;
+      const int rounds = (is_variant(GetParam()) ? 5000 : 20000) / several;
       std::vector<double> stated, expected;
       std::vector<size_t> begin;  // of an object's cells
       double sum = 0;
@@ -346,7 +348,7 @@ TEST_P(EdgeSamplers, DensityAlongTheEdge) {
   const EdgeSamplerInput input = test_input(cube_mesh());
   const auto sampler = make(input);
   // Ablations draw along edges as their samplers do.
-  const bool ablation = edge_sampler_type(GetParam()).ablation;
+  const bool ablation = is_variant(GetParam());
   const int queries = ablation ? 10 : 40, draws = ablation ? 1250 : 5000;
   for (int i = 0; i < queries; ++i) {
     const EdgeQuery q = random_query(rng);
@@ -488,16 +490,41 @@ TEST(EdgeForestDraws, AreSpreadEvenly) {
   }
 }
 
+// Rows, and each of their settings at each value; `silhouettes` draws by the code of `forest`.
 std::vector<std::string> sampler_names() {
   std::vector<std::string> names;
-  for (const EdgeSamplerType& type : edge_sampler_types()) names.push_back(type.name);
+  for (const EdgeSamplerType& type : edge_sampler_types()) {
+    names.push_back(type.name);
+    if (type.name == "silhouettes") continue;
+    for (const std::string& name : variants_of(type)) names.push_back(name);
+  }
+  // Settings combine.
+  names.emplace_back("forest:width=4:look-ahead=none");
+  names.emplace_back("forest:look-ahead=none:expansion=off:axes=any:weights=hard");
   return names;
 }
 INSTANTIATE_TEST_SUITE_P(All, EdgeSamplers, testing::ValuesIn(sampler_names()), name_of_string);
 
-TEST(EdgeSamplerTable, TheDefaultIsARowAndNoAblation) {
-  EXPECT_FALSE(default_edge_sampler().ablation);
-  EXPECT_NO_THROW(make_edge_sampler(default_edge_sampler().name, {}, 1));
+TEST(EdgeSamplerTable, SettingsAreInTheName) {
+  const EdgeSamplerType type = edge_sampler_type("forest:look-ahead=none:width=4");
+  EXPECT_EQ(type.name, "forest:width=4:look-ahead=none");
+  EXPECT_EQ(edge_sampler_type("forest:width=8").name, "forest");
+  const auto refused = [](const std::string& name) -> std::string {
+    try {
+      edge_sampler_type(name);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "taken";
+  };
+  EXPECT_EQ(refused("li2019:width=4"),
+            "error: \"li2019\" has no setting \"width\" (known: sphere)");
+  EXPECT_EQ(refused("uniform:width=4"),
+            "error: \"uniform\" has no setting \"width\" (it has none)");
+  EXPECT_EQ(refused("forest:width=3"),
+            "error: \"forest\": the setting width is one of 8, 4, 2, not \"3\"");
+  EXPECT_EQ(refused("forest:width=4:width=2"), "error: \"forest\": width is given twice");
+  EXPECT_NE(refused("forest:"), "taken");
 }
 
 TEST(EdgeSamplerTable, UnknownNamesListTheKnown) {

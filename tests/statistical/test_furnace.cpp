@@ -64,7 +64,7 @@ TEST_P(Furnace, RadianceByEvenNumbersIsKnown) {
   settings.spp = 32;
   Moments images(12);
   for (settings.seed = 0; settings.seed < 16; ++settings.seed) {
-    images.add_batch(means(render(scene, settings, {.sampler = "padded-sobol"}).radiance), 1);
+    images.add_batch(means(render(scene, settings, {.generator = "sobol"}).radiance), 1);
   }
   const ZSummary z =
       compare_moments(images, std::vector<double>(images.size(), GetParam().radiance()));

@@ -122,8 +122,6 @@ class Walk {
 
   Bounds visit_children(uint32_t index) {
     const InnerNode& node = forest_.inner[index];
-    require(node.pairs == kNoPairs || node.pairs < forest_.pairs.size(),
-            "a pair of quadrics is out of range");
     Bounds bounds;
     int highest = -1;
     for (int lane = 0; lane < kWidth; ++lane) {

@@ -59,15 +59,6 @@ TEST_P(Forests, ListWhatTheExactTestLists) {
   EXPECT_GT(expect_no_edge_lost(GetParam(), 21, 60), 1000000u);
 }
 
-// Minutes: --gtest_also_run_disabled_tests.
-TEST(Forest, DISABLED_QuadricsLoseNoEdgeOfManyPairs) {
-  const ForestConfig config{.quadrics = ForestConfig::Quadrics::kAll, .quadrics_from = 1};
-  uint64_t pairs = 0;
-  for (uint64_t seed = 45; pairs < 100000000 && !HasFailure(); ++seed)
-    pairs += expect_no_edge_lost(config, seed, 400);
-  fmt::print("{} pairs\n", pairs);
-}
-
 // The planes of a cone around an axis, a pyramid of three to eight sides, sometimes a sliver.
 DirectionCone random_cone(const Vec3d& axis, Rng& rng) {
   DirectionCone cone;
@@ -180,39 +171,11 @@ ForestConfig without(bool ForestConfig::*option) {
   config.*option = false;
   return config;
 }
-INSTANTIATE_TEST_SUITE_P(
-    Variants, Forests,
-    testing::Values(ForestConfig{}, without(&ForestConfig::principal_axes),
-                    without(&ForestConfig::cull_concave), ForestConfig{.width = 2},
-                    ForestConfig{.quadrics = ForestConfig::Quadrics::kAll, .quadrics_from = 1},
-                    ForestConfig{.soft_weights = false,
-                                 .quadrics = ForestConfig::Quadrics::kWherePaid,
-                                 .quadrics_from = 8}));
-
-// On a sphere, whose planes fit a quadric, pairs reject much of what weighs by length alone; near
-// the root, where all boxes are met, nothing. What is kept is what the forest with all has there.
-// With the default weights, which know how deep a box is cut, not even here a pair pays.
-TEST(Forest, KeepsQuadricsWhereTheyPay) {
-  const EdgeSamplerInput input{{build_edge_mesh(with_smooth_normals(icosphere_mesh(4)), true)}};
-  const auto with = [&](ForestConfig::Quadrics quadrics, int threads, bool soft = false) {
-    return build_forest(input, threads,
-                        {.soft_weights = soft, .quadrics = quadrics, .quadrics_from = 32});
-  };
-  EXPECT_TRUE(with(ForestConfig::Quadrics::kWherePaid, 1, true).pairs.empty());
-  const Forest all = with(ForestConfig::Quadrics::kAll, 1);
-  const Forest kept = with(ForestConfig::Quadrics::kWherePaid, 1);
-  EXPECT_GT(kept.pairs.size(), all.pairs.size() / 10);
-  EXPECT_LT(kept.pairs.size(), all.pairs.size());
-  ASSERT_EQ(kept.inner.size(), all.inner.size());
-  const Forest again = with(ForestConfig::Quadrics::kWherePaid, 3);
-  for (size_t i = 0; i < kept.inner.size(); ++i) {
-    const uint32_t at = kept.inner[i].pairs;
-    EXPECT_EQ(again.inner[i].pairs, at);
-    if (at == kNoPairs) continue;
-    const ForestPairs &a = kept.pairs[at], &b = all.pairs[all.inner[i].pairs];
-    EXPECT_EQ(std::memcmp(&a, &b, sizeof a), 0) << i;
-  }
-}
+INSTANTIATE_TEST_SUITE_P(Variants, Forests,
+                         testing::Values(ForestConfig{}, without(&ForestConfig::principal_axes),
+                                         without(&ForestConfig::cull_concave),
+                                         ForestConfig{.width = 2},
+                                         without(&ForestConfig::soft_weights)));
 
 TEST(Forest, DoesNotDependOnThreads) {
   Rng rng(22, 0, 0);
@@ -260,7 +223,6 @@ TEST(Forest, CorruptedCopiesAreFound) {
        [](Forest& f) { f.head(f.inner[0].child[1]).object = ShapeId(1); }},
       {"a height is not its children's", [](Forest& f) { ++f.inner[0].head.height; }},
       {"a node of edges is not at height 0", [](Forest& f) { f.edges[0].head.height = 1; }},
-      {"a pair of quadrics is out of range", [](Forest& f) { f.inner[0].pairs = 0; }},
       {"a speed is negative", [](Forest& f) { f.inner[0].speed[0] = -1; }},
       {"a cover is negative", [](Forest& f) { f.inner[0].cover[2][0] = -1; }},
       {"a child's box is empty", [](Forest& f) { f.inner[0].high[0] = 0; }},

@@ -246,8 +246,14 @@ TEST_P(RejectingSamplers, HitRateIsTheSumOfProbabilities) {
 std::vector<EdgeSamplerType> rejecting_samplers() {
   std::vector<EdgeSamplerType> types;
   const EdgeSamplerInput input = {{build_edge_mesh(cube_mesh(), true)}};
-  for (const EdgeSamplerType& type : edge_sampler_types())
-    if (type.make(input, 1)->rejection_tree()) types.push_back(type);
+  for (const EdgeSamplerType& row : edge_sampler_types()) {
+    std::vector<std::string> names = variants_of(row);
+    names.insert(names.begin(), row.name);
+    for (const std::string& name : names) {
+      const EdgeSamplerType type = edge_sampler_type(name);
+      if (type.make(input, 1)->rejection_tree()) types.push_back(type);
+    }
+  }
   return types;
 }
 INSTANTIATE_TEST_SUITE_P(All, RejectingSamplers, testing::ValuesIn(rejecting_samplers()),
@@ -258,7 +264,7 @@ TEST(RejectionTree, ForestsAndLiHaveOneOthersDoNot) {
   for (const EdgeSamplerType& type : rejecting_samplers()) names.push_back(type.name);
   EXPECT_NE(std::find(names.begin(), names.end(), "forest"), names.end());
   EXPECT_NE(std::find(names.begin(), names.end(), "li2019"), names.end());
-  EXPECT_NE(std::find(names.begin(), names.end(), "dual-bvh"), names.end());
+  EXPECT_NE(std::find(names.begin(), names.end(), "brute:search=dual-bvh"), names.end());
   EXPECT_EQ(std::find(names.begin(), names.end(), "brute"), names.end());
 }
 

@@ -58,7 +58,7 @@ TEST_P(Threads, SameBits) {
   const Scene scene = make_scene(files, small_scene(files));
   expect_same(render(scene, run_settings(4)).radiance,
               render(scene, run_settings(4, GetParam())).radiance);
-  const RenderOptions even{.sampler = "padded-sobol"};
+  const RenderOptions even{.generator = "sobol"};
   expect_same(render(scene, run_settings(4), even).radiance,
               render(scene, run_settings(4, GetParam()), even).radiance);
   const GradientResult a = run_gradient(scene, run_settings(4));
@@ -268,7 +268,7 @@ TEST(EvenNumbers, MakeImagesWithLessError) {
   RunSettings settings = run_settings(16);
   Moments images(size_t{3} * scene.film.crop_width * scene.film.crop_height), others = images;
   for (; settings.seed < 11; ++settings.seed) {
-    images.add_batch(means(render(scene, settings, {.sampler = "padded-sobol"}).radiance), 1);
+    images.add_batch(means(render(scene, settings, {.generator = "sobol"}).radiance), 1);
     others.add_batch(means(render(scene, settings).radiance), 1);
   }
   double true_one = 0, independent = 0;

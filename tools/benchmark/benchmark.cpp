@@ -210,7 +210,7 @@ void add_gradient_benchmarks(const Bench& bench, const std::string& parameter) {
   options.parameters = {parameter};
   const GradientResult by_default = gradient(bench.scene, options, one_thread(1));
   for (const MethodType& method : method_types()) {
-    if (method.ablation || !method.terms_can_be_left_out || method.check) continue;
+    if (!method.terms_can_be_left_out || method.check) continue;
     for (const TermRun& term : by_default.terms) {
       add_term_benchmark(bench, method.name, term.name, parameter);
     }

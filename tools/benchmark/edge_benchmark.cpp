@@ -142,19 +142,12 @@ double tests_per_silhouette(const EdgeSamplerInput& input, const EdgeSampler& sa
   return static_cast<double>(tests) / static_cast<double>(counts.silhouettes);
 }
 
-// The rows that are named, in the order of the table; `otherwise` if none is.
+// The rows that are named, which may carry settings; `otherwise` if none is.
 std::vector<EdgeSamplerType> rows_of(const std::vector<std::string>& only,
                                      std::span<const EdgeSamplerType> otherwise) {
-  const auto table = edge_sampler_types();
-  for (const std::string& name : only) {
-    const auto is_it = [&](const EdgeSamplerType& type) { return type.name == name; };
-    if (std::none_of(table.begin(), table.end(), is_it))
-      throw InputError(unknown_name("edge sampler", name, names_of(table)));
-  }
+  if (only.empty()) return {otherwise.begin(), otherwise.end()};
   std::vector<EdgeSamplerType> rows;
-  for (const EdgeSamplerType& type : only.empty() ? otherwise : table) {
-    if (only.empty() || std::count(only.begin(), only.end(), type.name) > 0) rows.push_back(type);
-  }
+  for (const std::string& name : only) rows.push_back(edge_sampler_type(name));
   return rows;
 }
 

@@ -24,9 +24,8 @@ class Command {
   virtual ~Command() = default;
   virtual const char* name() const = 0;
   virtual const char* description() const = 0;
-  // What the command line says goes into the command itself. all: the help also tells of variants
-  // that only those who build methods need.
-  virtual void add_options(CLI::App& app, bool all) = 0;
+  // What the command line says goes into the command itself.
+  virtual void add_options(CLI::App& app) = 0;
   // After parsing. command_line: what was typed, for a shell. Returns an exit status.
   virtual int run(const std::string& command_line) = 0;
   // Before run(): the batches of the run are those of the store. False for commands that no part is

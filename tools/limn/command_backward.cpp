@@ -26,7 +26,7 @@ class BackwardCommand final : public Command {
     return "Derivatives of a loss with respect to all parameters at once";
   }
 
-  void add_options(CLI::App& app, bool) override {
+  void add_options(CLI::App& app) override {
     app_ = &app;
     add_common_options(app, common_);
     auto* adjoint =
@@ -42,7 +42,7 @@ class BackwardCommand final : public Command {
     app.add_option("--wrt", options_.parameters,
                    "Parameter, an array (SHAPE.vertex_positions) or a scalar; may be repeated "
                    "(default: all of the scene but displacements, which repeat vertex_positions)");
-    add_reverse_options(app, options_);
+    add_reverse_options(app, options_, Task::kBackward);
     app.add_option("--batches", options_.batches,
                    "At most, for standard errors; each costs some time per vertex")
         ->check(CLI::Range(1, 1 << 16));
@@ -71,7 +71,7 @@ class BackwardCommand final : public Command {
     if (adjoint_.empty() && target_.empty()) throw InputError("give --adjoint or --target");
     const LossKind kind = loss_kind(loss_);
     // Told before the loss is rendered.
-    check_points(options_.points, reverse_method(options_.sampler).closed, options_.sampler);
+    check_points(options_.points, options_.method->closed_light, options_.method.name());
     refuse_samples(*app_, options_.points,
                    {"--spp", "--time", "--batches", "--pixels", "--edge-samples",
                     "--camera-samples", "--shadow-samples", "--part"});
@@ -150,8 +150,7 @@ class BackwardCommand final : public Command {
     const Image target = read_exr(target_);
     check_loss_images(scene, target, {}, target_);
     loss = image_loss(scene, target, kind, settings, {}, levels_,
-                      {.method = reverse_method(options_.sampler).closed ? "analytic" : "path",
-                       .points = options_.points});
+                      {.method = loss_method(options_.method), .points = options_.points});
     if (kind == LossKind::kL1 && !over_faces()) {
       warnings_.add_all(
           {"the gradient of l1 is biased where the image's noise is not small beside "
@@ -200,7 +199,7 @@ class BackwardCommand final : public Command {
                    {"threads", settings.threads},
                    {"seconds", result.seconds},
                    {"setup_seconds", result.setup_seconds},
-                   {"sampler", options_.sampler},
+                   {"method", options_.method.name()},
                    {"points", name_of(options_.points)},
                    {"warnings", warnings_.lines()},
                    {"non_finite", result.non_finite.count}};

@@ -140,10 +140,11 @@ class CheckCommand final : public Command {
   const char* name() const override { return "check"; }
   const char* description() const override { return "Compare a gradient with finite differences"; }
 
-  void add_options(CLI::App& app, bool all) override {
+  void add_options(CLI::App& app) override {
     app_ = &app;
     add_common_options(app, common_);
-    add_parameter_options(app, parameters_, options_.method, all);
+    add_parameter_options(app, parameters_);
+    add_method_option(app, options_.method, Task::kGradient);
     add_term_options(app, terms_, samples_);
     add_warp_options(app, options_.warp);
     add_film_option(app, film_);
@@ -155,18 +156,17 @@ class CheckCommand final : public Command {
                    "Compare windows this many pixels apart (default: an eighth of the longer side, "
                    "at least 4)")
         ->check(CLI::Range(1, 1 << 20));
-    app.add_flag(
-        "--reverse", reverse_,
-        "Compare reverse mode with forward mode instead: the sum over pixels of a random "
-        "image times the derivative; an array stands for a random field. --sampler is then "
-        "that of backward");
+    app.add_flag("--reverse", reverse_,
+                 "Compare reverse mode with forward mode instead: the sum over pixels of a random "
+                 "image times the derivative; an array stands for a random field. --method is then "
+                 "that of backward");
   }
 
   int run(const std::string&) override {
     const Scene scene = load_scene(common_, warnings_);
     check_outputs({{"--json", common_.json}}, scene, field_files(parameters_));
     options_.terms = parse_terms(terms_);
-    check_warp(options_.warp, {reverse_ ? "reverse mode" : find_method(options_.method).name});
+    check_warp(options_.warp, {reverse_ ? reverse_method() : options_.method});
     options_.exact_film = film_ == "exact";
     if (reverse_ && options_.exact_film) {
       throw InputError("--film exact: reverse mode has its film by rays");
@@ -243,12 +243,16 @@ class CheckCommand final : public Command {
     return status;
   }
 
+  // The one that was asked for, else the default of reverse mode.
+  Method reverse_method() const {
+    return app_->count("--method") > 0 ? options_.method : Method(Task::kBackward);
+  }
+
   int run_reverse(const Scene& scene) {
     BackwardOptions options;
     options.parameters = parameters_;
     options.terms = options_.terms;
-    // The default method moves directions, which reverse mode does not.
-    if (options_.method != method_types().front().name) options.sampler = options_.method;
+    options.method = reverse_method();
     const RunSettings settings = make_settings(common_, scene, "check --reverse");
     const std::vector<ReverseCheck> checks = check_reverse(scene, options, settings);
     if (checks.empty()) {

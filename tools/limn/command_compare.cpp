@@ -2,12 +2,12 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <set>
 
 #include "limn/core/error.h"
 #include "limn/core/names.h"
 #include "limn/core/parallel.h"
 #include "limn/core/parameter.h"
+#include "limn/integrators/methods.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
 #include "tools/limn/compare_images.h"
@@ -43,49 +43,36 @@ struct CompareArguments {
   RenderOptions render;
 };
 
-// A way to compare: a row of the table of methods, or Mitsuba, which lives outside.
-struct Row {
-  std::string name;
-  bool terms_can_be_left_out;
-  bool ablation;
-};
-
-std::vector<Row> rows() {
-  std::vector<Row> rows;
-  for (const MethodType& type : method_types()) {
-    rows.push_back({type.name, type.terms_can_be_left_out, type.ablation});
-  }
-  rows.push_back({kMitsubaAfterSetup, false, true});
-  rows.push_back({kMitsuba, false, false});
-  return rows;
-}
-
-std::string row_names(bool all) {
-  std::vector<std::string> names;
-  for (const Row& row : rows()) {
-    if (all || !row.ablation) names.push_back(row.name);
-  }
-  return join(names);
-}
-
-// Names are checked before any work.
-void check_methods(const std::vector<std::string>& names, const std::vector<std::string>& terms) {
-  const std::vector<Row> known = rows();
-  std::set<std::string> seen;
+// The methods of limn among these, or those of Mitsuba, which live outside.
+std::vector<std::string> own_names(const std::vector<std::string>& names) {
+  std::vector<std::string> own;
   for (const std::string& name : names) {
-    const auto row =
-        std::find_if(known.begin(), known.end(), [&](const Row& r) { return r.name == name; });
-    if (row == known.end()) {
-      throw InputError("--methods: " + unknown_name("method", name, names_of(known)));
-    }
-    if (!seen.insert(name).second) {
-      throw InputError("--methods: \"" + name + "\" is given twice");
-    }
-    if (!terms.empty() && !row->terms_can_be_left_out) {
-      throw InputError("--terms: \"" + name +
-                       "\" has all terms in one: leave it out of --methods, or leave out --terms");
+    if (!is_mitsuba(name)) own.push_back(name);
+  }
+  return own;
+}
+
+// Before any work.
+std::vector<Method> check_methods(const std::vector<std::string>& names,
+                                  const std::vector<std::string>& terms) {
+  for (size_t i = 0; i < names.size(); ++i) {
+    if (is_mitsuba(names[i]) && std::count(names.begin(), names.end(), names[i]) > 1) {
+      throw InputError("--methods: \"" + names[i] + "\" is given twice");
     }
   }
+  const std::vector<Method> own = parse_methods(own_names(names), Task::kGradient);
+  if (terms.empty()) return own;
+  const auto refuse = [](const std::string& name) {
+    throw InputError("--terms: \"" + name +
+                     "\" has all terms in one: leave it out of --methods, or leave out --terms");
+  };
+  for (const std::string& name : names) {
+    if (is_mitsuba(name)) refuse(name);
+  }
+  for (const Method& method : own) {
+    if (!method->terms_can_be_left_out) refuse(method.name());
+  }
+  return own;
 }
 
 void make_folder(const std::string& folder) {
@@ -262,7 +249,7 @@ class CompareCommand final : public Command {
   const char* description() const override {
     return "Derivative images of several methods at equal time, with a report";
   }
-  void add_options(CLI::App& app, bool all) override;
+  void add_options(CLI::App& app) override;
   int run(const std::string& command_line) override;
 
  private:
@@ -273,21 +260,24 @@ class CompareCommand final : public Command {
   CLI::App* app_ = nullptr;
 };
 
-void CompareCommand::add_options(CLI::App& app, bool all) {
+void CompareCommand::add_options(CLI::App& app) {
   app_ = &app;
   add_common_options(app, common_);
   app.remove_option(app.get_option("--sensor"));  // Mitsuba's methods take the first
   auto* wrt =
       app.add_option("--wrt", command_.parameter, "Parameter to differentiate")->type_name("PARAM");
-  app.add_flag(
-         "--image", command_.images,
-         "Compare images, not derivatives; methods are those of render: " + image_method_names())
+  app.add_flag("--image", command_.images,
+               "Compare images, not derivatives; methods are those of render: " +
+                   limn::join(method_names(Task::kImage)))
       ->excludes(wrt);
   add_image_options(app, command_.what, command_.render);
-  command_.render.sampler = kRenderSamplers[0];
+  command_.render.generator = kGenerators[0];
   app.add_option("--methods", command_.methods,
-                 "Methods to compare, the first is the measure of the others: " + row_names(all) +
-                     " (Mitsuba's where it is installed)")
+                 "Methods to compare, the first is the measure of the others: " +
+                     limn::join(method_names(Task::kGradient)) + ", " + kMitsuba + ", " +
+                     kMitsubaAfterSetup +
+                     " (Mitsuba's where it is installed); settings follow a colon, as in "
+                     "forest:width=4 (limn methods --all)")
       ->delimiter(',')
       ->required()
       ->type_name("A,B,...");
@@ -330,10 +320,11 @@ int CompareCommand::run_images(const std::string& command_line) {
       "derivatives alone have that: not with --image");
   // The reference is made by rays.
   command_.render.exact_film = command_.film == "exact";
-  std::vector<std::string> methods = command_.methods;
-  methods.emplace_back("rays");
-  check_image_options(*app_, methods);
-  check_image_methods(command_.methods, command_.render.exact_film);
+  const std::vector<Method> methods = parse_methods(command_.methods, Task::kImage);
+  std::vector<Method> with_reference = methods;
+  with_reference.emplace_back("rays");
+  check_image_options(*app_, with_reference);
+  if (command_.render.exact_film) check_exact_film(methods);
   if (common_.spp > 0) {
     throw InputError("--spp: methods are compared at equal time: say how long with --time");
   }
@@ -345,8 +336,8 @@ int CompareCommand::run_images(const std::string& command_line) {
       scene);
   return compare_images_command(
       common_,
-      {command_.methods, command_.what, command_.render, make_options(command_).times,
-       command_.repeats, command_.reference_time, command_.output},
+      {methods, command_.what, command_.render, make_options(command_).times, command_.repeats,
+       command_.reference_time, command_.output},
       scene, make_settings(common_, scene, name()), warnings, command_line);
 }
 
@@ -357,15 +348,15 @@ int CompareCommand::run(const std::string& command_line) {
   if (command_.parameter.empty()) {
     throw InputError("--wrt: say which parameter's derivatives to compare, or --image");
   }
-  check_methods(command_.methods, parse_terms(command_.terms));
-  check_warp(command_.warp, command_.methods);
+  const std::vector<Method> methods = check_methods(command_.methods, parse_terms(command_.terms));
+  check_warp(command_.warp, methods);
   if (common_.spp > 0) {
     throw InputError("--spp: methods are compared at equal time: say how long with --time");
   }
   Warnings warnings;
   const Scene scene = load_scene(common_, warnings);
   find_parameter(scene, command_.parameter);
-  if (command_.film == "exact") check_exact_films(scene, command_.methods);
+  if (command_.film == "exact") check_exact_films(scene, methods);
   make_folder(command_.output);
   check_outputs(
       {{"-o", (fs::path(command_.output) / "compare.json").string()}, {"--json", common_.json}},

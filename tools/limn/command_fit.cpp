@@ -54,7 +54,7 @@ class FitCommand final : public Command {
   const char* description() const override {
     return "Find parameters, vertices included, from target images";
   }
-  void add_options(CLI::App& app, bool all) override;
+  void add_options(CLI::App& app) override;
   int run(const std::string&) override;
 
  private:
@@ -78,7 +78,7 @@ class FitCommand final : public Command {
   bool no_report_ = false;
 };
 
-void FitCommand::add_options(CLI::App& app, bool) {
+void FitCommand::add_options(CLI::App& app) {
   app_ = &app;
   add_common_options(app, common_);
   app.get_option("scene")->required(false);
@@ -115,7 +115,7 @@ void FitCommand::add_options(CLI::App& app, bool) {
       ->capture_default_str();
   app.add_option("--optimiser,--optimizer", given_.optimiser,
                  "adam-uniform (one scale for all vertices of a shape), adam, gradient-descent; "
-                 "with --sampler analytic lbfgs: the loss as a function, without noise")
+                 "with --method analytic lbfgs: the loss as a function, without noise")
       ->capture_default_str();
   app.add_option("--step", given_.options.step,
                  "Of the first step, in natural steps: 1 % of a shape's diagonal, 0.01 radians, "
@@ -161,7 +161,7 @@ void FitCommand::add_sampling_options(CLI::App& app) {
   app.add_option("--spp-doubling", given_.options.spp_doubling,
                  "After so many steps there are twice the samples (default: never)")
       ->check(CLI::Range(1, 1 << 30));
-  add_reverse_options(app, given_.options.backward);
+  add_reverse_options(app, given_.options.backward, Task::kFit);
 }
 
 // The scene and those of --view, each with all its sensors, in turn: a target for each.

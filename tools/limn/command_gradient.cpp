@@ -258,10 +258,11 @@ class GradientCommand final : public Command {
   const char* name() const override { return "gradient"; }
   const char* description() const override { return "Derivative images, with standard errors"; }
 
-  void add_options(CLI::App& app, bool all) override {
+  void add_options(CLI::App& app) override {
     app_ = &app;
     add_common_options(app, common_);
-    add_parameter_options(app, options_.parameters, options_.method, all);
+    add_parameter_options(app, options_.parameters);
+    add_method_option(app, options_.method, Task::kGradient);
     add_term_options(app, terms_, samples_);
     app.add_option("--step", options_.step,
                    "Step of finite differences (default: found by a pilot)")
@@ -359,7 +360,7 @@ class GradientCommand final : public Command {
       }
     }
     if (sample_images_) {
-      for (const std::string& term : find_method(options_.method).terms) {
+      for (const std::string& term : options_.method->terms) {
         files.push_back({"--sample-images", samples_file(term)});
       }
     }
@@ -369,7 +370,7 @@ class GradientCommand final : public Command {
 
   // Moments and sums of batches: numbers of each pixel and channel.
   void check_memory(const Scene& scene) const {
-    const double terms = static_cast<double>(find_method(options_.method).terms.size());
+    const double terms = static_cast<double>(options_.method->terms.size());
     const double parameters = static_cast<double>(options_.parameters.size());
     const double numbers = parameters * (3 * (terms + 1) + terms) + 5;
     const double bytes = numbers * sizeof(double) * 3 * scene.film.crop_width *

@@ -148,7 +148,7 @@ class InfoCommand final : public Command {
   const char* description() const override {
     return "What the scene holds, and what can be differentiated";
   }
-  void add_options(CLI::App& app, bool) override { add_common_options(app, common_); }
+  void add_options(CLI::App& app) override { add_common_options(app, common_); }
   int run(const std::string&) override { return run_info(common_); }
 
  private:

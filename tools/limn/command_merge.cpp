@@ -17,7 +17,7 @@ class MergeCommand final : public Command {
   const char* description() const override {
     return "Join the parts of a run (--part) into the files of one run";
   }
-  void add_options(CLI::App& app, bool) override {
+  void add_options(CLI::App& app) override {
     app.add_option("parts", parts_, "All parts, in any order")->required()->type_name("PART...");
     app.add_option("-o,--output", output_, "As of the command that made the parts")->required();
     app.add_option("--json", json_, "Write the figures for machines to this file");
@@ -36,7 +36,7 @@ class MergeCommand final : public Command {
       const auto command = make();
       if (command->name() != request.command || !command->join(reader)) continue;
       CLI::App app;
-      command->add_options(app, true);
+      command->add_options(app);
       std::vector<std::string> asked = request.words;
       asked.insert(asked.end(), {"-o", output_});
       if (!json_.empty()) asked.insert(asked.end(), {"--json", json_});

@@ -86,27 +86,20 @@ Sphere sphere_around(const EdgeMesh& mesh) {
 
 // ---- Methods.
 
-std::vector<const EdgeSamplerType*> types_with_rejection() {
-  std::vector<const EdgeSamplerType*> types;
-  const EdgeSamplerInput nothing;
-  for (const EdgeSamplerType& type : edge_sampler_types())
-    if (type.make(nothing, 1)->rejection_tree()) types.push_back(&type);
-  return types;
-}
-
-std::vector<const EdgeSamplerType*> chosen_types(const std::vector<std::string>& names) {
-  const std::vector<const EdgeSamplerType*> known = types_with_rejection();
-  std::vector<const EdgeSamplerType*> types;
+std::vector<EdgeSamplerType> chosen_types(const std::vector<std::string>& names) {
+  const auto has_test = [](const EdgeSamplerType& type) {
+    return type.make({}, 1)->rejection_tree() != nullptr;
+  };
+  std::vector<EdgeSamplerType> types;
   for (const std::string& name : names) {
-    const auto type = std::find_if(known.begin(), known.end(),
-                                   [&](const EdgeSamplerType* t) { return t->name == name; });
-    if (type == known.end()) {
-      std::string list;
-      for (const EdgeSamplerType* t : known) list += (list.empty() ? "" : ", ") + t->name;
-      throw InputError(fmt::format(
-          "--methods: \"{}\" is no sampler with a rejection test (those are {})", name, list));
+    types.push_back(edge_sampler_type(name));
+    if (has_test(types.back())) continue;
+    std::vector<std::string> known;
+    for (const EdgeSamplerType& type : edge_sampler_types()) {
+      if (has_test(type)) known.push_back(type.name);
     }
-    types.push_back(*type);
+    throw InputError("--methods: \"" + name + "\" is no sampler with a rejection test (" +
+                     known_names(known) + ")");
   }
   return types;
 }
@@ -173,7 +166,7 @@ class Rejection {
     if (count == 0) throw InputError({common_.scene}, "the mesh has no edges");
     if (command_.node && *command_.node >= count)
       throw InputError(fmt::format("--node {}: {} has nodes 0 to {}", *command_.node,
-                                   types_[0]->name, count - 1));
+                                   types_[0].name, count - 1));
     const auto few = std::span(queries_).first(std::min<size_t>(queries_.size(), 64));
     node_ = command_.node ? *command_.node : balanced_node(input_, tree, command_.node_edges, few);
     const auto edges = tree.edges(node_);
@@ -223,8 +216,8 @@ class Rejection {
   };
 
   void measure_all() {
-    for (const EdgeSamplerType* type : types_) {
-      std::optional<Measured> method = measure(*type);
+    for (const EdgeSamplerType& type : types_) {
+      std::optional<Measured> method = measure(type);
       if (!method) break;
       measured_.push_back(std::move(*method));
     }
@@ -349,7 +342,7 @@ class Rejection {
 
   void print() const {
     fmt::print("{}: {} edges; node {} of {}, at depth {}, has {}\n", common_.scene,
-               mesh().edges.size(), node_, types_[0]->name, node_depth_, node_edges_.size());
+               mesh().edges.size(), node_, types_[0].name, node_depth_, node_edges_.size());
     print_tables(variants());
   }
 
@@ -373,7 +366,7 @@ class Rejection {
   const CommonOptions& common_;
   const RejectCommand& command_;
   int threads_;
-  std::vector<const EdgeSamplerType*> types_;
+  std::vector<EdgeSamplerType> types_;
   Warnings warnings_;
   Scene scene_;
   std::function<void(double)> progress_;
@@ -398,7 +391,7 @@ class RejectProgram final : public Command {
   const char* description() const override {
     return "Pictures and figures of what edge samplers reject, accept and wrongly accept";
   }
-  void add_options(CLI::App& app, bool) override {
+  void add_options(CLI::App& app) override {
     add_input_options(app, common_, "Scene file, or a mesh (.obj, .ply)", "SCENE|MESH");
     add_reject_options(app, command_);
   }

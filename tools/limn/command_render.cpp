@@ -1,7 +1,7 @@
 // `limn render`: an image as EXR and PNG.
 #include <algorithm>
 
-#include "limn/core/names.h"
+#include "limn/integrators/methods.h"
 #include "limn/integrators/render.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
@@ -16,19 +16,18 @@ class RenderCommand final : public Command {
  public:
   const char* name() const override { return "render"; }
   const char* description() const override { return "Render the image"; }
-  void add_options(CLI::App& app, bool) override {
+  void add_options(CLI::App& app) override {
     app_ = &app;
     add_common_options(app, common_);
     app.add_option("-o,--output", output_, "Image to write (.exr; a .png is put beside it)")
         ->required();
-    app.add_option("--method", options_.method, "How: " + limn::join(names_of(render_methods())))
-        ->capture_default_str();
+    add_method_option(app, options_.method, Task::kImage);
     add_image_options(app, what_, options_);
-    options_.sampler = kRenderSamplers[0];
-    app.add_option("--sampler", options_.sampler,
-                   "Numbers of a pixel's samples: even (Sobol' points, scrambled), or independent")
-        ->check(CLI::IsMember(
-            std::vector<std::string>(std::begin(kRenderSamplers), std::end(kRenderSamplers))))
+    options_.generator = kGenerators[0];
+    app.add_option("--generator", options_.generator,
+                   "Sample generator: Owen-scrambled Sobol' points, or independent numbers")
+        ->check(
+            CLI::IsMember(std::vector<std::string>(std::begin(kGenerators), std::end(kGenerators))))
         ->capture_default_str();
     add_film_option(app, film_);
     add_points_option(app, options_.points);
@@ -74,32 +73,23 @@ class RenderCommand final : public Command {
  private:
   void check_options() const {
     check_image_options(*app_, {options_.method});
-    refuse_samples(*app_, options_.points, {"--spp", "--sampler", "--part"});
-    if (!has_sampler() && options_.points == FilmPoints::kRandom) {
-      refuse_options(*app_, {"--sampler"},
-                     fmt::format("the method {} has its own", options_.method));
+    refuse_samples(*app_, options_.points, {"--spp", "--generator", "--part"});
+    if (!has_generator() && options_.points == FilmPoints::kRandom) {
+      refuse_options(*app_, {"--generator"},
+                     fmt::format("the method {} has its own", options_.method.name()));
     }
   }
-  const RenderMethod& method() const {
-    const auto methods = render_methods();
-    return *std::ranges::find_if(
-        methods, [&](const RenderMethod& method) { return method.name == options_.method; });
-  }
-  bool has_points() const { return method().closed_light; }
-  // Of a method that is not known yet render() tells.
-  bool has_sampler() const {
-    if (options_.points == FilmPoints::kFaces) return false;
-    return std::ranges::none_of(render_methods(), [&](const RenderMethod& method) {
-      return method.name == options_.method && method.looks_around;
-    });
+  bool has_points() const { return options_.method->image->closed_light; }
+  bool has_generator() const {
+    return options_.points != FilmPoints::kFaces && !options_.method->image->looks_around;
   }
   void write(const Scene& scene, const RunSettings& settings, const RenderResult& result) const {
     const Image image = mean_image(result.radiance, scene.film.crop_width, scene.film.crop_height);
     const std::string picture = with_ending(output_, ".png");
     auto attributes = provenance(scene, settings, result.spp);
-    attributes.push_back({"limn.method", options_.method});
+    attributes.push_back({"limn.method", options_.method.name()});
     if (what_ != "image") attributes.push_back({"limn.what", what_});
-    if (has_sampler()) attributes.push_back({"limn.sampler", options_.sampler});
+    if (has_generator()) attributes.push_back({"limn.generator", options_.generator});
     if (has_points()) attributes.push_back({"limn.points", name_of(options_.points)});
     attributes.push_back({kOutputAttribute, output_name(output_)});
     remove_stale(output_, {output_});
@@ -116,7 +106,7 @@ class RenderCommand final : public Command {
     nlohmann::json report = {{"scene", scene.file},
                              {"sensor", sensor_name(scene)},
                              {"spp", result.spp},
-                             {"method", options_.method},
+                             {"method", options_.method.name()},
                              {"what", what_},
                              {"seed", settings.seed},
                              {"threads", settings.threads},
@@ -124,7 +114,7 @@ class RenderCommand final : public Command {
                              {"rays", result.rays},
                              {"warnings", warnings_.lines()},
                              {"non_finite", result.non_finite.count}};
-    if (has_sampler()) report["sampler"] = options_.sampler;
+    if (has_generator()) report["generator"] = options_.generator;
     if (has_points()) report["points"] = name_of(options_.points);
     write_json(common_.json, report.dump(2));
   }

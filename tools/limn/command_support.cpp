@@ -70,28 +70,51 @@ void add_common_options(CLI::App& app, CommonOptions& common) {
       ->capture_default_str();
 }
 
-std::string method_list(bool all) {
-  std::vector<std::string> names;
-  for (const MethodType& type : method_types()) {
-    if (all || !type.ablation) names.push_back(type.name);
-  }
-  return join(names);
-}
-
-void add_parameter_options(CLI::App& app, std::vector<std::string>& parameters, std::string& method,
-                           bool all) {
+void add_parameter_options(CLI::App& app, std::vector<std::string>& parameters) {
   app.add_option("--wrt", parameters, "Parameter to differentiate (repeatable)")
       ->required()
       ->type_name("PARAM")
       ->allow_extra_args(false);
-  method = method_types().front().name;
-  app.add_option("--method,--sampler", method, "How: " + method_list(all))->capture_default_str();
+}
+
+void add_method_option(CLI::App& app, Method& method, Task task) {
+  app.add_option_function<std::string>(
+         "--method",
+         [&method, task](const std::string& name) {
+           method = name;
+           check_task(method, task);
+         },
+         "How it is computed: " + join(method_names(task)) +
+             "; settings follow a colon, as in forest:width=4 (limn methods --all)")
+      ->default_str(Method(task).name())
+      ->type_name("NAME");
+  const std::string instead =
+      task == Task::kImage ? "--generator sobol or independent" : "--method NAME";
+  app.add_option_function<std::string>(
+         "--sampler",
+         [instead](const std::string& value) {
+           throw InputError("--sampler " + value + ": this option is now " + instead);
+         })
+      ->group("");  // not in the help
+}
+
+std::vector<Method> parse_methods(const std::vector<std::string>& names, Task task) {
+  std::vector<Method> methods;
+  for (const std::string& name : names) {
+    const Method method(name);
+    check_task(method, task);
+    if (std::ranges::find(methods, method.name(), &Method::name) != methods.end()) {
+      throw InputError("--methods: \"" + name + "\" is given twice");
+    }
+    methods.push_back(method);
+  }
+  return methods;
 }
 
 void add_term_options(CLI::App& app, std::string& terms, std::string& samples) {
-  app.add_option(
-         "--terms", terms,
-         "Terms to compute, of " + join(method_types().front().terms) + " (default: all there are)")
+  app.add_option("--terms", terms,
+                 "Terms to compute, of " + join(Method(Task::kGradient)->terms) +
+                     " (default: all there are)")
       ->type_name("A,B,...");
   app.add_option("--samples", samples,
                  "What a sample per pixel holds of each term, in this order: paths, points on the "
@@ -132,7 +155,7 @@ void add_film_option(CLI::App& app, std::string& film) {
       ->capture_default_str();
 }
 
-void add_reverse_options(CLI::App& app, BackwardOptions& options) {
+void add_reverse_options(CLI::App& app, BackwardOptions& options, Task task) {
   app.add_option_function<std::string>(
       "--terms", [&options](const std::string& list) { options.terms = parse_terms(list); },
       "Only these terms, as in interior,camera");
@@ -144,36 +167,32 @@ void add_reverse_options(CLI::App& app, BackwardOptions& options) {
          "Where paths go: adjoint (where the loss depends on the image) or uniform")
       ->check(CLI::IsMember({kAdjointPixels, kUniformPixels}))
       ->default_str(kAdjointPixels);
-  app.add_option("--sampler", options.sampler,
-                 "Of edges: forest; silhouettes, which is better where shadows are soft; analytic: "
-                 "no edges, but the light of flat lamps in closed form (diffuse surfaces, "
-                 "max_depth 2); or to compare with them quadric, li2019, uniform, brute or a "
-                 "variant of these")
-      ->capture_default_str();
+  add_method_option(app, options.method, task);
   add_points_option(app, options.points);
-  app.add_option("--edge-samples", options.edge_samples, "At every vertex of a path")
+  app.add_option("--edge-samples", options.edge_samples, "Boundary samples per path vertex")
       ->check(CLI::Range(1, 1 << 16))
       ->capture_default_str();
   app.add_option("--camera-samples", options.camera_samples,
-                 "Points on silhouettes of the film, for each path")
+                 "Boundary samples on the film (term camera) per path")
       ->check(CLI::PositiveNumber)
-      ->default_str("0.25, 1 with --sampler analytic");
-  app.add_option("--shadow-samples", options.shadow_samples,
-                 "Points on edges of shadows in view (terms shadow, penumbra), for each path")
+      ->default_str("0.25, 1 with --method analytic");
+  app.add_option(
+         "--shadow-samples", options.shadow_samples,
+         "Boundary samples on the edges of shadows in view (terms shadow, penumbra) per path")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
 }
 
 void add_warp_options(CLI::App& app, WarpOptions& warp) {
-  app.add_option("--aux", warp.rays,
-                 "Auxiliary rays of a direction (methods was, was-unbiased): an even number; the "
-                 "more, the smaller the bias of was")
+  app.add_option(
+         "--aux", warp.rays,
+         "Auxiliary rays per direction (method was): an even number; the more, the smaller the "
+         "bias")
       ->check(CLI::Range(2, 1 << 20))
       ->capture_default_str()
       ->type_name("N");
   app.add_option("--kappa", warp.kappa,
-                 "Concentration of their kernel, which is K^(-1/2) radians wide (methods was, "
-                 "was-unbiased)")
+                 "Concentration of their kernel, which is K^(-1/2) radians wide (method was)")
       ->check(CLI::Range(1.0, 1e12))
       ->capture_default_str()
       ->type_name("K");

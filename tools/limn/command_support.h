@@ -37,17 +37,18 @@ void add_input_options(CLI::App& app, CommonOptions& common, const std::string& 
                        const std::string& type);
 // These and --spp, --json, --shading.
 void add_common_options(CLI::App& app, CommonOptions& common);
-// Names of methods as help text; all: of ablations, too.
-std::string method_list(bool all);
-// --wrt; --method, which --sampler says as well
-void add_parameter_options(CLI::App& app, std::vector<std::string>& parameters, std::string& method,
-                           bool all);
+// --wrt
+void add_parameter_options(CLI::App& app, std::vector<std::string>& parameters);
+// --method, and --sampler as it once was, which now says so
+void add_method_option(CLI::App& app, Method& method, Task task);
+// "a,b": each once, all of which do the task. InputError that names the option.
+std::vector<Method> parse_methods(const std::vector<std::string>& names, Task task);
 // --terms and --samples
 void add_term_options(CLI::App& app, std::string& terms, std::string& samples);
 // --aux and --kappa
 void add_warp_options(CLI::App& app, WarpOptions& warp);
-// --terms, --pixels, --sampler, --edge-samples, --camera-samples and --shadow-samples
-void add_reverse_options(CLI::App& app, BackwardOptions& options);
+// --terms, --pixels, --method, --edge-samples, --camera-samples and --shadow-samples
+void add_reverse_options(CLI::App& app, BackwardOptions& options, Task task);
 inline constexpr const char *kAdjointPixels = "adjoint", *kUniformPixels = "uniform";
 // --points, for light in closed form
 void add_points_option(CLI::App& app, FilmPoints& points);

@@ -4,10 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <set>
 
 #include "limn/core/error.h"
-#include "limn/core/names.h"
 #include "limn/integrators/compare_images.h"
 #include "tools/limn/output_files.h"
 
@@ -82,7 +80,7 @@ void write_images(const ImageCompareArguments& arguments, const Scene& scene,
   const nlohmann::json report = {{"command", command_line},
                                  {"scene", scene.file},
                                  {"what", arguments.what},
-                                 {"sampler", arguments.render.sampler},
+                                 {"generator", arguments.render.generator},
                                  {"film", arguments.render.exact_film ? "exact" : "rays"},
                                  {"lines", arguments.render.lines},
                                  {"tolerance", arguments.render.tolerance},
@@ -102,8 +100,6 @@ void write_images(const ImageCompareArguments& arguments, const Scene& scene,
 }
 
 }  // namespace
-
-std::string image_method_names() { return join(names_of(render_methods())); }
 
 void add_image_options(CLI::App& app, std::string& what, RenderOptions& options) {
   app.add_option("--what", what,
@@ -132,35 +128,25 @@ void refuse_options(const CLI::App& app, const std::vector<std::string>& names,
   }
 }
 
-void check_image_options(const CLI::App& app, const std::vector<std::string>& methods) {
-  const auto has = [&](const char* name) {
-    return std::find(methods.begin(), methods.end(), name) != methods.end();
+void check_image_options(const CLI::App& app, const std::vector<Method>& methods) {
+  const auto any = [&](auto&& has) {
+    return std::ranges::any_of(methods, [&](const Method& m) { return has(*m->image); });
   };
-  if (!has("silhouettes") && !has("lines")) {
+  if (!any([](const ImageMethod& image) { return image.by_lines; })) {
     refuse_options(app, {"--lines", "--tolerance"},
                    "an option of the methods silhouettes and lines alone");
   }
-  if (!has("rays")) refuse_options(app, {"--rays"}, "an option of the method rays alone");
+  const auto by_rays = [](const ImageMethod& image) {
+    return image.looks_around && !image.by_lines;
+  };
+  if (!any(by_rays)) refuse_options(app, {"--rays"}, "an option of the method rays alone");
 }
 
-void check_image_methods(const std::vector<std::string>& methods, bool exact_film) {
-  std::set<std::string> seen;
-  bool any_film = false;
-  for (const std::string& name : methods) {
-    const auto known = render_methods();
-    const auto method = std::find_if(known.begin(), known.end(),
-                                     [&](const RenderMethod& row) { return row.name == name; });
-    if (method == known.end()) {
-      throw InputError("--methods: " + unknown_name("method", name, names_of(known)));
-    }
-    if (!seen.insert(name).second) {
-      throw InputError("--methods: \"" + name + "\" is given twice");
-    }
-    any_film = any_film || !method->looks_around;
+void check_exact_film(const std::vector<Method>& methods) {
+  for (const Method& method : methods) {
+    if (!method->image->looks_around) return;
   }
-  if (exact_film && !any_film) {
-    throw InputError("--film exact: none of --methods takes it; path and analytic do");
-  }
+  throw InputError("--film exact: none of --methods takes it; path and analytic do");
 }
 
 void show(const std::string& what, Scene& scene, RenderOptions& options) {

@@ -9,7 +9,7 @@
 namespace limn {
 
 struct ImageCompareArguments {
-  std::vector<std::string> methods;
+  std::vector<Method> methods;
   std::string what = "image";
   RenderOptions render;  // how methods are set up
   std::vector<double> times;
@@ -18,14 +18,12 @@ struct ImageCompareArguments {
   std::string output;         // folder, which is there
 };
 
-// Names of methods, for help.
-std::string image_method_names();
 // Options of `render` that say what an image shows and how methods are set up.
 void add_image_options(CLI::App& app, std::string& what, RenderOptions& options);
 // InputError for options of methods that are not among `methods` and do not make the reference.
-void check_image_options(const CLI::App& app, const std::vector<std::string>& methods);
-// InputError for methods that are unknown or given twice, and for the exact film if none takes it.
-void check_image_methods(const std::vector<std::string>& methods, bool exact_film);
+void check_image_options(const CLI::App& app, const std::vector<Method>& methods);
+// InputError if none of the methods takes the exact film.
+void check_exact_film(const std::vector<Method>& methods);
 // InputError if any of these was given; why: the rest of the sentence.
 void refuse_options(const CLI::App& app, const std::vector<std::string>& names,
                     const std::string& why);

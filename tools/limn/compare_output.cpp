@@ -72,7 +72,7 @@ void write_pictures(const std::string& folder, const Scene& scene, const Compari
                    scales.derivative);
   for (const ComparedMethod& m : c.methods) {
     if (m.image.empty()) continue;
-    const std::string stem = in_folder(folder, m.name);
+    const std::string stem = in_folder(folder, file_part(m.name));
     const Image image = to_image(m.image, film);
     write_exr(stem + ".exr", film_channels(scene, image), false, image_attributes(scene, c, m));
     write_signed_png(stem + ".png", image, scales.derivative);
@@ -139,7 +139,9 @@ const char* status_name(MethodStatus status) {
 }
 
 json method_json(const ComparedMethod& m, const std::vector<double>& times) {
-  const auto file = [&](const char* ending) { return m.image.empty() ? "" : m.name + ending; };
+  const auto file = [&](const char* ending) {
+    return m.image.empty() ? "" : file_part(m.name) + ending;
+  };
   json object = {{"name", m.name},
                  {"description", m.description},
                  {"status", status_name(m.status)},

@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 static_assert(std::endian::native == std::endian::little);
 
-constexpr int kFormat = 2;                  // of fit.json and state.cbor; 1 did not say so
+constexpr int kFormat = 3;                  // of fit.json and state.cbor
 constexpr size_t kDistanceSamples = 10000;  // on each surface; not tuned
 
 template <class T>
@@ -71,7 +71,6 @@ void visit_arguments(Arguments& a, const Visit& visit) {
   visit("loss", a.loss);
   visit("pyramid", options.pyramid);
   visit("optimiser", a.optimiser);
-  visit("sampler", options.backward.sampler);
   visit("shading", a.shading);
   visit("step", options.step);
   visit("smoothing", options.smoothing);
@@ -94,18 +93,18 @@ void visit_arguments(Arguments& a, const Visit& visit) {
 json to_json(const FitArguments& a) {
   json j;
   visit_arguments(a, [&](const char* name, const auto& member) { j[name] = member; });
+  j["method"] = a.options.backward.method.name();
   j["points"] = name_of(a.options.backward.points);
   j["pixels"] = a.options.backward.uniform_pixels ? kUniformPixels : kAdjointPixels;
   for (const ViewArguments& view : a.views) j["views"].push_back(to_json(view));
   return j;
 }
 
-FitArguments arguments_from(json j) {
-  // Of fits from before shadows had a number of their own: that of the camera was theirs.
-  if (!j.contains("shadow_samples")) j["shadow_samples"] = j.at("camera_samples");
+FitArguments arguments_from(const json& j) {
   FitArguments a;
   visit_arguments(a, [&](const char* name, auto& member) { j.at(name).get_to(member); });
-  if (j.contains("points")) a.options.backward.points = film_points(j.at("points"));
+  a.options.backward.method = j.at("method").get<std::string>();
+  a.options.backward.points = film_points(j.at("points"));
   a.options.backward.uniform_pixels = j.at("pixels") == kUniformPixels;
   for (const json& view : j.at("views")) {
     a.views.push_back({view.at("scene"), view.at("defines"), view.at("sensor"), view.at("target"),
@@ -481,7 +480,7 @@ void FitFolder::add_snapshot(const Fit& fit, const RunSettings& settings, int sp
     RenderOptions seen;
     seen.points = arguments_.options.backward.points;
     const bool faces = seen.points == FilmPoints::kFaces;
-    if (faces) seen.method = "analytic";
+    if (faces) seen.method = loss_method(arguments_.options.backward.method);
     const RenderResult image = render(view.scene, own, seen);
     if (image.spp < (faces ? 1 : spp)) break;  // interrupted
     const Film& film = view.scene.film;

@@ -76,18 +76,15 @@ void use_huge_pages([[maybe_unused]] char** argv) {
 }
 
 int run(int argc, char** argv) {
-  constexpr const char* kHelpAll = "--help-all";
-  const bool all = std::find(argv, argv + argc, std::string(kHelpAll)) != argv + argc;
   CLI::App app("limn: a path tracer that also computes how its image changes when the scene moves");
   app.require_subcommand(1);
   app.set_version_flag("--version", limn::version_text(), "Print version, commit and build type");
-  app.set_help_all_flag(kHelpAll, "The help of all commands, with variants of methods");
+  app.set_help_all_flag("--help-all", "The help of all commands");
   std::vector<std::pair<CLI::App*, std::unique_ptr<limn::Command>>> commands;
   for (const limn::CommandMaker make : limn::kCommands) {
     auto command = make();
     CLI::App* sub = app.add_subcommand(command->name(), command->description());
-    sub->set_help_all_flag(kHelpAll, "This help with variants of methods");
-    command->add_options(*sub, all);
+    command->add_options(*sub);
     commands.emplace_back(sub, std::move(command));
   }
   check_command(app, argc, argv);

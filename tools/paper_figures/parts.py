@@ -6,15 +6,16 @@ from dataclasses import dataclass, field
 FOREST, DEFAULT = "forest", "adaptive"
 PAPER = "quadric"  # the paper's sampler, one sample of each term unless the pilot says otherwise
 LI2019, UNIFORM, BRUTE, DIFFERENCES = "li2019", "uniform", "brute", "fd"
-WARPED, WARPED_UNBIASED = "was", "was-unbiased"
+WARPED, WARPED_UNBIASED = "was", "was:bias=off"
 MITSUBA, MITSUBA_AFTER_SETUP = "mitsuba", "mitsuba-after-setup"
 # Ablations of the default: each with those before it, from the forest to all of them.
-ABLATIONS = ["silhouettes", "moving-directions", "held-positions", "independent-numbers", DEFAULT]
+ABLATIONS = ["silhouettes", "silhouettes:directions=moving",
+             "adaptive:film=fixed:generator=independent", "adaptive:generator=independent", DEFAULT]
 # Ablations of the forest and of the paper's sampler.
-FOREST_NO_LIGHTS, FOREST_NO_ENVIRONMENT = "forest-no-lights", "forest-no-environment"
-FOREST_CONCAVE = "forest-concave"
-PAPER_NO_LIGHTS, PAPER_CONCAVE, PAPER_BOX = "quadric-no-lights", "quadric-concave", "quadric-box"
-LI2019_SOLID = "li2019-solid"
+FOREST_NO_LIGHTS, FOREST_NO_ENVIRONMENT = "forest:lights=off", "forest:environment=off"
+FOREST_CONCAVE = "forest:concave=on"
+PAPER_NO_LIGHTS, PAPER_CONCAVE, PAPER_BOX = "quadric:lights=off", "quadric:concave=on", "quadric:quadrics=off"
+LI2019_SOLID = "li2019:sphere=solid"
 
 GENERATED = "build/generated"
 BUNNY = "/usr/share/glmark2/models/bunny.obj"  # glmark2-data

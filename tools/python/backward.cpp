@@ -117,10 +117,11 @@ void bind_backward(nb::module_& m) {
          std::optional<int> spp, std::optional<uint64_t> seed,
          const std::vector<std::string>& terms, bool uniform_pixels, int edge_samples,
          double camera_samples, double shadow_samples, int batches, double seconds, int threads,
-         const nb::object& progress, const std::string& sampler, const std::string& points,
-         BatchStore* store) {
+         const nb::object& progress, const std::string& method, const std::string& points,
+         BatchStore* store, const nb::object& sampler) {
+        refuse_sampler(sampler, "method");
         BackwardOptions options;
-        options.sampler = sampler;
+        options.method = to_method(method, Task::kBackward);
         if (names) options.parameters = to_list(*names);
         if (names && options.parameters.empty()) {
           throw InputError("names: none are given; None stands for all parameters");
@@ -144,8 +145,8 @@ void bind_backward(nb::module_& m) {
       nb::arg("edge_samples") = 1, nb::arg("camera_samples") = BackwardOptions{}.camera_samples,
       nb::arg("shadow_samples") = BackwardOptions{}.shadow_samples, nb::arg("batches") = 16,
       nb::arg("seconds") = 0.0, nb::arg("threads") = 0, nb::arg("progress") = nb::none(),
-      nb::arg("sampler") = BackwardOptions{}.sampler, nb::arg("points") = "random",
-      nb::arg("_store").none() = nb::none(),
+      nb::arg("method") = Method(Task::kBackward).name(), nb::arg("points") = "random",
+      nb::arg("_store").none() = nb::none(), nb::arg("sampler") = nb::none(),
       nb::sig(
           "def backward(scene: Scene, adjoint: numpy.typing.ArrayLike, names: str | "
           "collections.abc.Sequence[str] | None = None, spp: int | None = None, seed: int | None "
@@ -153,7 +154,7 @@ void bind_backward(nb::module_& m) {
           "edge_samples: int = 1, camera_samples: float = 0, shadow_samples: float = 1, "
           "batches: int = 16, seconds: float = 0, threads: int = 0, progress: "
           "collections.abc.Callable[[float], object] | None = None, "
-          "sampler: str = 'forest', points: str = 'random') -> dict[str, Estimate]"),
+          "method: str = 'forest', points: str = 'random') -> dict[str, Estimate]"),
       "Reverse mode: dLoss/dparameter of every parameter at once, from dLoss/dImage.\n\n"
       "adjoint: (H, W, 3), or (H, W) of the luminance; independent of the samples made here "
       "(another "
@@ -163,14 +164,14 @@ void bind_backward(nb::module_& m) {
       "Values are float64: (V, 3) of an array, (3,) of a colour, () of a number, of the loss per "
       "unit of the parameter. "
       "Copies of a vertex have equal shares. Pixels are sampled in proportion to the adjoint "
-      "unless uniform_pixels. edge_samples: at every vertex of a path; camera_samples: points on "
-      "silhouettes of the film, for each path (0: a quarter, one with \"analytic\"); "
-      "shadow_samples: on edges of shadows there. sampler: of edges, \"forest\"; \"silhouettes\", "
-      "which is better "
-      "where shadows are soft; \"analytic\": none, but the light of flat lamps in closed form; or "
-      "to compare with them \"quadric\", \"li2019\", \"uniform\", "
-      "\"brute\". batches: at most, for standard errors.\n"
-      "points: \"faces\", with the sampler analytic: of the image that limn.render makes with "
+      "unless uniform_pixels. edge_samples: boundary samples per path vertex; camera_samples: "
+      "boundary samples on the film per path (0: a quarter, one with \"analytic\"); "
+      "shadow_samples: on the edges of shadows there. method: \"forest\"; \"silhouettes\", which "
+      "has less noise where shadows are soft; \"analytic\": the light of flat area lights in "
+      "closed "
+      "form; or to compare with them \"quadric\", \"li2019\", \"uniform\", \"brute\". batches: at "
+      "most, for standard errors.\n"
+      "points: \"faces\", with the method analytic: of the image that limn.render makes with "
       "these "
       "points, exactly, without samples. The rest as limn.gradient.");
 }

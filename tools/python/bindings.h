@@ -21,6 +21,7 @@
 #include "limn/integrators/backward.h"
 #include "limn/integrators/film_points.h"
 #include "limn/integrators/gradient.h"
+#include "limn/integrators/method.h"
 #include "limn/integrators/moments.h"
 #include "limn/integrators/parts.h"
 #include "limn/integrators/run.h"
@@ -91,6 +92,10 @@ Estimate to_estimate(const Moments& moments, const Film& film, int64_t spp, doub
 
 using Names = std::variant<std::string, std::vector<std::string>>;
 std::vector<std::string> to_list(const Names& names);
+// A method that does the task. InputError, also where `sampler`, as keywords of earlier versions
+// were called, is given; instead: what to write in its place.
+Method to_method(const std::string& name, Task task);
+void refuse_sampler(const nb::object& sampler, const char* instead);
 // "auto", "uniform" or counts.
 using Samples = std::variant<std::string, std::vector<double>>;
 bool is_auto(const Samples& samples);

@@ -149,16 +149,24 @@ void bind_check(nb::module_& m) {
          int aux, double kappa, int threads, const nb::object& progress, const std::string& film,
          const std::string& points) {
         return check_scene(scene,
-                           {name, method, terms, step, block, {}, {aux, kappa}, is_exact(film)},
+                           {name,
+                            to_method(method, Task::kGradient),
+                            terms,
+                            step,
+                            block,
+                            {},
+                            {aux, kappa},
+                            is_exact(film)},
                            samples, points, {spp, seed, 0, threads}, progress);
       },
       nb::arg("scene"), nb::arg("name"), nb::arg("spp") = nb::none(), nb::arg("seed") = nb::none(),
-      nb::arg("method") = "", nb::arg("terms") = nb::make_tuple(), nb::arg("samples") = "auto",
-      nb::arg("step") = 0.0, nb::arg("block") = 0, nb::arg("aux") = WarpOptions{}.rays,
-      nb::arg("kappa") = WarpOptions{}.kappa, nb::arg("threads") = 0,
-      nb::arg("progress") = nb::none(), nb::arg("film") = "rays", nb::arg("points") = "random",
+      nb::arg("method") = Method(Task::kGradient).name(), nb::arg("terms") = nb::make_tuple(),
+      nb::arg("samples") = "auto", nb::arg("step") = 0.0, nb::arg("block") = 0,
+      nb::arg("aux") = WarpOptions{}.rays, nb::arg("kappa") = WarpOptions{}.kappa,
+      nb::arg("threads") = 0, nb::arg("progress") = nb::none(), nb::arg("film") = "rays",
+      nb::arg("points") = "random",
       nb::sig("def check(scene: Scene, name: str, spp: int | None = None, seed: int | None = None, "
-              "method: str = '', terms: collections.abc.Sequence[str] = (), samples: str | "
+              "method: str = 'adaptive', terms: collections.abc.Sequence[str] = (), samples: str | "
               "collections.abc.Sequence[float] = 'auto', step: float = 0, block: int = 0, aux: int "
               "= 8, "
               "kappa: float = 1e4, threads: int = 0, progress: collections.abc.Callable[[float], "

@@ -42,7 +42,7 @@ Estimate to_estimate(const Reference& reference, int width, int height) {
 
 struct CompareArguments {
   std::string name;
-  std::vector<std::string> methods;
+  std::vector<Method> methods;
   std::vector<double> times;
   int repeats = 4;
   double reference_seconds = 0;
@@ -52,7 +52,7 @@ struct CompareArguments {
 
 void check_arguments(const Scene& scene, const CompareArguments& arguments) {
   find_parameter(scene, arguments.name);
-  for (const std::string& method : arguments.methods) find_method(method);
+  for (const Method& method : arguments.methods) check_task(method, Task::kGradient);
   if (arguments.methods.empty()) throw InputError("compare needs a method or more");
   check_warp(arguments.warp, arguments.methods);
   if (arguments.exact_film) check_exact_films(scene, arguments.methods);
@@ -92,7 +92,7 @@ Comparison compare_of(const SceneHandle& handle, const CompareArguments& argumen
     reference = make_reference(input, first);
     if (reference.spp < 2) return;
     std::vector<std::unique_ptr<DerivativeMethod>> methods;
-    for (const std::string& name : arguments.methods) methods.push_back(make_method(input, name));
+    for (const Method& method : arguments.methods) methods.push_back(make_method(input, method));
     compared = compare({arguments.times, arguments.repeats}, reference, methods, settings);
   });
   Comparison result{to_estimate(reference, width, height), compared, width, height};
@@ -165,7 +165,7 @@ void bind_compare(nb::module_& m) {
         for (const double time : times) runs += time * repeats;
         return compare_of(scene,
                           {name,
-                           methods,
+                           {methods.begin(), methods.end()},
                            times,
                            repeats,
                            reference_seconds.value_or(4 * runs),

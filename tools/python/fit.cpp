@@ -150,13 +150,15 @@ void bind_fit(nb::module_& m) {
              const std::vector<std::string>& terms, std::optional<uint64_t> seed, int threads,
              int pyramid, int spp_doubling, double remesh_edge, double remesh_shrink,
              const std::map<std::string, std::pair<double, double>>& bounds,
-             const std::string& sampler, bool uniform_pixels, int edge_samples,
-             double camera_samples, double shadow_samples, const std::string& points) {
+             const std::string& method, bool uniform_pixels, int edge_samples,
+             double camera_samples, double shadow_samples, const std::string& points,
+             const nb::object& sampler) {
+            refuse_sampler(sampler, "method");
             FitOptions options;
             for (const auto& [name, range] : bounds) {
               options.bounds.push_back({name, range.first, range.second});
             }
-            options.backward.sampler = sampler;
+            options.backward.method = to_method(method, Task::kFit);
             options.backward.uniform_pixels = uniform_pixels;
             options.backward.edge_samples = edge_samples;
             options.backward.camera_samples = camera_samples;
@@ -194,10 +196,10 @@ void bind_fit(nb::module_& m) {
           nb::arg("terms") = nb::make_tuple(), nb::arg("seed") = nb::none(), nb::arg("threads") = 0,
           nb::arg("pyramid") = 1, nb::arg("spp_doubling") = 0, nb::arg("remesh_edge") = 0.75,
           nb::arg("remesh_shrink") = 0.65, nb::arg("bounds") = nb::dict(),
-          nb::arg("sampler") = BackwardOptions{}.sampler, nb::arg("uniform_pixels") = false,
+          nb::arg("method") = Method(Task::kFit).name(), nb::arg("uniform_pixels") = false,
           nb::arg("edge_samples") = 1, nb::arg("camera_samples") = BackwardOptions{}.camera_samples,
           nb::arg("shadow_samples") = BackwardOptions{}.shadow_samples,
-          nb::arg("points") = "random",
+          nb::arg("points") = "random", nb::arg("sampler") = nb::none(),
           nb::sig(
               "def __init__(self, scene: Scene, target: numpy.typing.ArrayLike, names: str | "
               "collections.abc.Sequence[str], mask: numpy.typing.ArrayLike | None = None, "
@@ -208,7 +210,7 @@ void bind_fit(nb::module_& m) {
               "collections.abc.Sequence[int] = (), terms: collections.abc.Sequence[str] = (), "
               "seed: int | None = None, threads: int = 0, pyramid: int = 1, spp_doubling: int = "
               "0, remesh_edge: float = 0.75, remesh_shrink: float = 0.65, bounds: "
-              "collections.abc.Mapping[str, tuple[float, float]] = {}, sampler: str = 'forest', "
+              "collections.abc.Mapping[str, tuple[float, float]] = {}, method: str = 'forest', "
               "uniform_pixels: bool = False, edge_samples: int = 1, camera_samples: float = 0, "
               "shadow_samples: float = 1, points: str = 'random') -> None"),
           "Copies the scene; it stays as it is.\n\n"
@@ -218,7 +220,7 @@ void bind_fit(nb::module_& m) {
           "mask) that share the parameters.\n"
           "loss: \"l2\", \"relative-l2\", \"l1\", over `pyramid` levels, see image_loss. "
           "optimiser: \"adam-uniform\", \"adam\", "
-          "\"gradient-descent\", or with the sampler \"analytic\" \"lbfgs\", which takes the loss "
+          "\"gradient-descent\", or with the method \"analytic\" \"lbfgs\", which takes the loss "
           "as "
           "a function without noise.\n"
           "step: in natural steps (1 % of a shape's diagonal, 0.01 radians, 1 % of a value), half "
@@ -228,9 +230,9 @@ void bind_fit(nb::module_& m) {
           "loss_spp says otherwise; twice as many after each spp_doubling steps (0: never).\n"
           "remesh: steps after which vertices get new triangles, with edges remesh_edge times as "
           "long, steps and smoothing remesh_shrink times what they were.\n"
-          "bounds: {name: (least, most)} that scalars may not leave. sampler, uniform_pixels, "
+          "bounds: {name: (least, most)} that scalars may not leave. method, uniform_pixels, "
           "edge_samples, camera_samples, shadow_samples: of the gradient, see limn.backward.\n"
-          "points: \"faces\", with the sampler analytic: losses and gradients of images made of "
+          "points: \"faces\", with the method analytic: losses and gradients of images made of "
           "their "
           "visible faces, without samples; lbfgs gets farthest with them.")
       .def("step", &step, nb::arg("progress") = nb::none(),

@@ -13,6 +13,17 @@ std::vector<std::string> to_list(const Names& names) {
   return one ? std::vector<std::string>{*one} : std::get<std::vector<std::string>>(names);
 }
 
+Method to_method(const std::string& name, Task task) {
+  const Method method(name);
+  check_task(method, task);
+  return method;
+}
+
+void refuse_sampler(const nb::object& sampler, const char* instead) {
+  if (sampler.is_none()) return;
+  throw InputError(std::string("sampler: this argument is now ") + instead);
+}
+
 bool is_auto(const Samples& samples) {
   const std::string* word = std::get_if<std::string>(&samples);
   return word && *word == "auto";
@@ -34,7 +45,7 @@ using Gradients = nb::typed<nb::dict, std::string, Estimate>;
 
 struct GradientArguments {
   Names names;
-  std::string method;
+  Method method;
   std::vector<std::string> terms;
   Samples samples;
   double step;
@@ -89,18 +100,26 @@ void bind_gradient(nb::module_& m) {
         const FilmPoints over = to_points(
             points,
             {{"spp", spp.has_value()}, {"seconds", seconds != 0}, {"samples", !is_auto(samples)}});
-        return gradient_of(scene, {names, method, terms, samples, step, {aux, kappa}, film, over},
+        return gradient_of(scene,
+                           {names,
+                            to_method(method, Task::kGradient),
+                            terms,
+                            samples,
+                            step,
+                            {aux, kappa},
+                            film,
+                            over},
                            {spp, seed, seconds, threads, store}, progress);
       },
       nb::arg("scene"), nb::arg("names"), nb::arg("spp") = nb::none(), nb::arg("seed") = nb::none(),
-      nb::arg("method") = "", nb::arg("terms") = nb::make_tuple(), nb::arg("samples") = "auto",
-      nb::arg("step") = 0.0, nb::arg("aux") = WarpOptions{}.rays,
+      nb::arg("method") = Method(Task::kGradient).name(), nb::arg("terms") = nb::make_tuple(),
+      nb::arg("samples") = "auto", nb::arg("step") = 0.0, nb::arg("aux") = WarpOptions{}.rays,
       nb::arg("kappa") = WarpOptions{}.kappa, nb::arg("seconds") = 0.0, nb::arg("threads") = 0,
       nb::arg("progress") = nb::none(), nb::arg("film") = "rays", nb::arg("points") = "random",
       nb::arg("_store").none() = nb::none(),
       nb::sig(
           "def gradient(scene: Scene, names: str | collections.abc.Sequence[str], spp: int | None "
-          "= None, seed: int | None = None, method: str = '', terms: "
+          "= None, seed: int | None = None, method: str = 'adaptive', terms: "
           "collections.abc.Sequence[str] = (), samples: str | collections.abc.Sequence[float] = "
           "'auto', step: float = 0, aux: int = 8, kappa: float = 1e4, seconds: float = 0, threads: "
           "int = 0, progress: "
@@ -111,12 +130,14 @@ void bind_gradient(nb::module_& m) {
       "names: of numbers; a vertex is \"object.vertex_positions.7.x\", a field of vectors "
       "\"object.vertex_positions:FILE\".\n"
       "spp, seed: of the scene's file if None. seconds: as many samples as fit, at most spp.\n"
-      "method: see limn.methods(); \"\" is the first. terms: of those, by name; () for all.\n"
+      "method: see limn.methods(); its settings follow a colon, as in \"forest:width=4\". terms: "
+      "of "
+      "those, by name; () for all.\n"
       "samples: \"auto\" (a pilot chooses), \"uniform\" (alike in all pixels), or what a sample of "
       "a "
       "pixel holds of each term. step: of finite differences; 0: found by a pilot.\n"
-      "aux, kappa: auxiliary rays of a direction and the concentration of their kernel (methods "
-      "was, was-unbiased).\n"
+      "aux, kappa: auxiliary rays of a direction and the concentration of their kernel (method "
+      "was).\n"
       "film: \"rays\", or \"exact\": edges on the film are drawn from what is seen of them alone "
       "(box "
       "filter).\n"
@@ -128,11 +149,12 @@ void bind_gradient(nb::module_& m) {
       [] {
         nb::dict methods;
         for (const MethodType& type : method_types()) {
-          if (!type.ablation) methods[nb::cast(type.name)] = nb::cast(type.description);
+          methods[nb::cast(type.name)] = nb::cast(type.description);
         }
         return nb::typed<nb::dict, std::string, std::string>(methods);
       },
-      "Ways to a derivative image, the default first: names and what they are.");
+      "All methods: names and what they are (limn methods says which of them compute images, "
+      "derivatives, reverse mode and fits, and lists their settings).");
 }
 
 }  // namespace limn::python

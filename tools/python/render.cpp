@@ -50,14 +50,16 @@ void show(const std::string& what, std::shared_ptr<const Scene>& scene, RenderOp
 Estimate render_scene(const SceneHandle& handle, std::optional<int> spp,
                       std::optional<uint64_t> seed, int threads, const nb::object& progress,
                       const std::string& method, const std::string& film,
-                      const std::string& sampler, const std::string& what, int lines,
-                      double tolerance, int rays, const std::string& points, BatchStore* store) {
+                      const std::string& generator, const std::string& what, int lines,
+                      double tolerance, int rays, const std::string& points, BatchStore* store,
+                      const nb::object& sampler) {
+  refuse_sampler(sampler, "generator: \"sobol\" or \"independent\"");
   RenderOptions options;
   options.points = to_points(
-      points, {{"spp", spp.has_value()}, {"sampler", sampler != RenderOptions().sampler}});
-  options.method = method;
+      points, {{"spp", spp.has_value()}, {"generator", generator != RenderOptions().generator}});
+  options.method = to_method(method, Task::kImage);
   options.exact_film = is_exact(film);
-  options.sampler = sampler;
+  options.generator = generator;
   options.lines = lines;
   options.tolerance = tolerance;
   options.rays = rays;
@@ -161,13 +163,14 @@ void bind_render(nb::module_& m) {
       "render", render_scene, nb::arg("scene"), nb::arg("spp") = nb::none(),
       nb::arg("seed") = nb::none(), nb::arg("threads") = 0, nb::arg("progress") = nb::none(),
       nb::arg("method") = "path", nb::arg("film") = "rays",
-      nb::arg("sampler") = RenderOptions().sampler, nb::arg("what") = "image",
+      nb::arg("generator") = RenderOptions().generator, nb::arg("what") = "image",
       nb::arg("lines") = 64, nb::arg("tolerance") = 0.0, nb::arg("rays") = 4,
       nb::arg("points") = "random", nb::arg("_store").none() = nb::none(),
+      nb::arg("sampler") = nb::none(),
       nb::sig(
           "def render(scene: Scene, spp: int | None = None, seed: int | None = None, threads: "
           "int = 0, progress: collections.abc.Callable[[float], object] | None = None, method: "
-          "str = 'path', film: str = 'rays', sampler: str = 'independent', what: str = 'image', "
+          "str = 'path', film: str = 'rays', generator: str = 'independent', what: str = 'image', "
           "lines: int = 64, tolerance: float = 0.0, rays: int = 4, points: str = 'random') -> "
           "Estimate"),
       "The image of a scene: linear RGB radiance, (H, W, 3).\n\n"
@@ -188,7 +191,8 @@ void bind_render(nb::module_& m) {
       "each lamp and the sky.\n"
       "film: \"rays\", or \"exact\": what every pixel sees by its exact visible regions (box "
       "filter).\n"
-      "sampler: \"independent\", or \"padded-sobol\", even numbers: a third of the squared error, "
+      "generator: \"independent\", or \"sobol\", Owen-scrambled Sobol' points: a third of the "
+      "squared error, "
       "mostly, but stderr is then neither the error nor a bound of it (compare images of several "
       "seeds instead). silhouettes, lines and rays always have even numbers.\n"
       "points: of analytic, \"random\", or \"faces\": a pixel is made of the faces that it shows, "

@@ -4,6 +4,7 @@
 #include <span>
 #include <string>
 
+#include "limn/core/settings.h"
 #include "limn/edgetree/edge_sampler.h"
 
 namespace limn {
@@ -12,20 +13,22 @@ namespace limn {
 struct EdgeSamplerType {
   std::string name;
   std::string description;
-  std::unique_ptr<EdgeSampler> (*make)(const EdgeSamplerInput& input, int threads);
-  // True for an ablation: a sampler without one of its ideas, to measure what the idea is worth.
-  bool ablation = false;
+  std::unique_ptr<EdgeSampler> (*maker)(const Settings& settings, const EdgeSamplerInput& input,
+                                        int threads);
+  Settings settings = {};  // ablations: each turns one of its ideas off or changes it
   // True if light sets (area lights, bright environment patches) are sampled separately: its list
   // of outlines serves them.
   bool regions = false;
+
+  std::unique_ptr<EdgeSampler> make(const EdgeSamplerInput& input, int threads) const {
+    return maker(settings, input, threads);
+  }
 };
+// The first is used where nothing else is asked for.
 std::span<const EdgeSamplerType> edge_sampler_types();
 
-// The default sampler.
-const EdgeSamplerType& default_edge_sampler();
-
-// Finds a sampler by name. InputError lists the known names.
-const EdgeSamplerType& edge_sampler_type(const std::string& name);
+// Finds a sampler by name, which may carry settings. InputError lists the known names.
+EdgeSamplerType edge_sampler_type(const std::string& name);
 std::unique_ptr<EdgeSampler> make_edge_sampler(const std::string& name,
                                                const EdgeSamplerInput& input, int threads);
 

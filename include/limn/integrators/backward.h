@@ -14,7 +14,6 @@
 #include "limn/core/image.h"
 #include "limn/core/parameter.h"
 #include "limn/core/scene.h"
-#include "limn/edgetree/edge_sampler_types.h"
 #include "limn/integrators/gradient.h"
 #include "limn/integrators/moments.h"
 #include "limn/integrators/run.h"
@@ -33,11 +32,11 @@ struct BackwardOptions {
   // Every pixel gets the same number of paths. Else a quarter of them is spread evenly and the rest
   // in proportion to |A|, summed over channels.
   bool uniform_pixels = false;
-  // Of edges: a row of edge_sampler_types(). Or "analytic": no edges at vertices of paths, but
-  // light in closed form, as the method of that name in forward mode, with its scenes.
-  std::string sampler = "forest";
+  // How edges are sampled at vertices of paths, or (analytic) light in closed form in their place,
+  // in the scenes that the method takes. InputError for one that has no reverse mode.
+  Method method{Task::kBackward};
   // With "analytic" and faces there is one term, `faces`, and no numbers of samples, no batches and
-  // no standard errors but 0; InputError for faces with another sampler, and in parts.
+  // no standard errors but 0; InputError for faces with another method, and in parts.
   FilmPoints points = FilmPoints::kRandom;
   int edge_samples = 1;  // at every vertex of a path, of each term of edges; 65536 at most
   // Points on the film, per path, of `camera`; 65536 at most. 0: a quarter, and with "analytic" one
@@ -52,14 +51,6 @@ struct BackwardOptions {
   // follow each other need it once.
   bool find_gaps = true;
 };
-
-// What a name of BackwardOptions::sampler stands for. InputError that lists the known names if
-// there is none of this name.
-struct ReverseMethod {
-  const EdgeSamplerType& sampler;
-  bool closed = false;  // light in closed form
-};
-ReverseMethod reverse_method(const std::string& name);
 
 // dLoss/dtheta of one parameter, per unit of the parameter (that of the loss over `unit`).
 struct ParameterAdjoint {
@@ -133,7 +124,7 @@ struct LossResult {
 
 // What a loss is told from.
 struct LossImages {
-  std::string method = "path";              // of render(), but for those that look around
+  Method method{Task::kImage};              // of render(), but for those that look around
   FilmPoints points = FilmPoints::kRandom;  // of faces there is one image
   // One image in place of two, of the samples of settings.seed: those that backward() takes, too,
   // with uniform pixels and one batch. Where light is known in closed form the loss is then a
@@ -142,6 +133,9 @@ struct LossImages {
   bool same_samples = false;
   bool one_image() const { return same_samples || points == FilmPoints::kFaces; }
 };
+
+// The way to the images of a loss whose derivative is `backward`'s: the same where it makes images.
+Method loss_method(const Method& backward);
 
 // Renders the scene twice with settings.spp samples per pixel each, with seeds of their own that
 // are derived from settings.seed. For l2 and relative-l2 the loss is the mean of w (I - T)(I' - T),

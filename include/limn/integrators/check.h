@@ -10,7 +10,7 @@ namespace limn {
 
 struct CheckOptions {
   std::string parameter;
-  std::string method;              // see methods.h; "": the default
+  Method method{Task::kGradient};
   std::vector<std::string> terms;  // by name; none: all that the scene has
   double step = 0;                 // of the finite differences; 0: found by a pilot
   int block = 0;                   // pixels between windows; 0: an eighth of the longer side

@@ -8,11 +8,11 @@
 namespace limn {
 
 struct ImageCompareOptions {
-  std::vector<std::string> methods;  // of render_methods(), each once
-  RenderOptions render;              // but for the method
-  std::vector<double> times;         // seconds of a run, set-up included
-  int repeats = 4;                   // runs of each method and time, with seeds of their own
-  double reference_seconds = 0;      // of all runs of the reference together
+  std::vector<Method> methods;   // that make images, each once
+  RenderOptions render;          // but for the method
+  std::vector<double> times;     // seconds of a run, set-up included
+  int repeats = 4;               // runs of each method and time, with seeds of their own
+  double reference_seconds = 0;  // of all runs of the reference together
 };
 
 // The mean of independent runs' images, the squared error that it is expected to have by their

@@ -60,10 +60,10 @@ struct MethodInput {
   // rays.
   bool exact_film = false;
 
-  GradientOptions options(const MethodType& method) const;
+  GradientOptions options(const Method& method) const;
 };
 
-// A row of the table. InputError that lists the known names if there is none of this name.
-std::unique_ptr<DerivativeMethod> make_method(const MethodInput& input, const std::string& name);
+// A row of the table. InputError for one without derivatives.
+std::unique_ptr<DerivativeMethod> make_method(const MethodInput& input, const Method& method);
 
 }  // namespace limn

@@ -29,7 +29,7 @@ enum class OptimiserKind {
   kGradientDescent,  // g itself: the size of a step is that of the loss
   // Limited-memory BFGS (Nocedal and Wright 2006, 7.2), with a line search to Wolfe's conditions.
   // It compares losses and gradients of different steps, which noise would make worthless: so it
-  // needs light in closed form (the sampler "analytic"), takes the same samples at every step,
+  // needs light in closed form (the method "analytic"), takes the same samples at every step,
   // alike in all pixels, one image for the loss, and minimises that function of the parameters. Its
   // derivative is the term "interior"; where silhouettes that the camera sees are moved, their term
   // adds an estimate of their part of the mean image's, which the function itself does not have.

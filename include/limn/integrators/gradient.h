@@ -18,6 +18,7 @@
 #include "limn/core/scene.h"
 #include "limn/edgetree/edges.h"
 #include "limn/integrators/film_points.h"
+#include "limn/integrators/method.h"
 #include "limn/integrators/moments.h"
 #include "limn/integrators/run.h"
 
@@ -50,7 +51,7 @@ struct WarpOptions {
 
 struct GradientOptions {
   std::vector<std::string> parameters;
-  std::string method;              // see methods.h; "": the default
+  Method method{Task::kGradient};
   std::vector<std::string> terms;  // by name; none: all that the scene has
   // None: chosen for the least squared error after equal time, all parameters alike, by a pilot of
   // 4 to 32 samples per pixel with a seed of its own, which are then thrown away. One of each if
@@ -131,9 +132,9 @@ struct GradientResult {
 double edge_magnitude(const GradientResult& result, const ParameterGradient& g, size_t block);
 
 // InputError unless the method draws edges on the film and the film has a box filter.
-void check_exact_film(const Scene& scene, const std::string& method);
+void check_exact_film(const Scene& scene, const Method& method);
 // The same unless one of them does, at least: others take rays.
-void check_exact_films(const Scene& scene, const std::vector<std::string>& methods);
+void check_exact_films(const Scene& scene, const std::vector<Method>& methods);
 
 // Parameters are differentiated in passes of kLanes over the same samples. InputError for no
 // parameters, unknown parameters, methods or terms, for a method that cannot leave terms out, for

@@ -1,43 +1,71 @@
 #pragma once
-// The ways to a derivative image that limn has: one row each. `limn gradient`, `check` and
-// `compare` take all of them, and know none by its name.
+// The table of methods: one row for each way to an image or to a derivative. `--method` names a row
+// in all commands, `method=` in Python; none of them knows a row by its name.
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "limn/core/settings.h"
+#include "limn/edgetree/edge_sampler_types.h"
 #include "limn/integrators/gradient.h"
+#include "limn/integrators/method.h"
+#include "limn/integrators/render.h"
 
 namespace limn {
 
+// How a method makes images.
+struct ImageMethod {
+  bool closed_light = false;  // light that is scattered once, in closed form
+  // One vertex that looks around: direct light, and how open its sky is.
+  bool looks_around = false;
+  bool by_lines = false;  // between silhouettes
+  bool chooses = false;   // between these and rays
+};
+
+// How a method computes in reverse mode.
+struct ReverseMethod {
+  EdgeSamplerType sampler;
+  bool closed = false;  // light in closed form
+};
+
 struct MethodType {
-  std::string name;
+  std::string name;  // with the settings that are not the defaults
   std::string description;
-  std::vector<std::string> terms;  // what it can compute, in the order of --samples and all tables
+  std::vector<Task> defaults = {};  // of these tasks it is the default
+  Settings settings = {};
+  // Fills in all below from the settings.
+  std::function<void(MethodType&)> set_up = nullptr;
+
+  std::vector<std::string> terms = {};  // in the order of --samples and all tables
   bool terms_can_be_left_out = false;
-  // What terms hold by themselves depends on choices that the run makes; their sum does not.
+  // The single terms depend on choices that the run makes; their sum does not.
   bool only_sum_fixed = false;
   bool closed_light = false;  // it takes GradientOptions::points
   bool warps = false;         // it takes GradientOptions::warp
   bool biased = false;        // its mean is not the derivative, however many samples it takes
-  bool ablation = false;      // a variant that shows what a part of a method is worth
   // InputError, with the place, for a scene that the method cannot take; null: it takes all.
   void (*check)(const Scene&) = nullptr;
+  // What it can do: images, derivative images, reverse mode (and fits by it).
+  std::optional<ImageMethod> image = std::nullopt;
   std::function<GradientResult(const MethodType&, const Scene&, const GradientOptions&,
                                const RunSettings&)>
-      run;
+      run = nullptr;
+  std::optional<ReverseMethod> reverse = std::nullopt;
   // As trace_sample() in gradient.h; none for methods that cannot.
   std::function<std::vector<std::string>(const MethodType&, const Scene&, const GradientOptions&,
                                          const RunSettings&, const NonFinite::Place&)>
       trace = nullptr;
+
+  bool can(Task task) const;
+  bool is_variant() const { return !settings.text().empty(); }
 };
 
-// The first is the default.
 const std::vector<MethodType>& method_types();
+// Names of those that do a task.
+std::vector<std::string> method_names(Task task);
 
-// InputError if the options are not the defaults and none of the methods, by name, takes them.
-void check_warp(const WarpOptions& warp, const std::vector<std::string>& methods);
-
-// The default for ""; InputError that lists the known names if there is none of this name.
-const MethodType& find_method(const std::string& name);
+// InputError if the options are not the defaults and none of the methods takes them.
+void check_warp(const WarpOptions& warp, const std::vector<Method>& methods);
 
 }  // namespace limn

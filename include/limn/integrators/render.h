@@ -6,6 +6,7 @@
 
 #include "limn/core/scene.h"
 #include "limn/integrators/film_points.h"
+#include "limn/integrators/method.h"
 #include "limn/integrators/moments.h"
 #include "limn/integrators/run.h"
 
@@ -20,19 +21,6 @@ struct RenderResult {
   std::vector<std::string> warnings;
 };
 
-// The ways to an image.
-struct RenderMethod {
-  const char* name;
-  const char* description;
-  bool closed_light;  // light that is scattered once, in closed form (analytic)
-  // One vertex that looks around: direct light, and how open its sky is (silhouettes, lines, rays).
-  bool looks_around = false;
-  bool by_lines = false;  // between silhouettes
-  bool chooses = false;   // between these and rays
-};
-// The first is the default.
-std::span<const RenderMethod> render_methods();
-
 // What an image shows.
 enum class RenderWhat {
   kImage,  // radiance [W / (m^2 sr)]
@@ -43,13 +31,12 @@ enum class RenderWhat {
   kOpenness
 };
 
-// Where the random numbers of a pixel's samples come from, by Mitsuba's and pbrt's names. The first
-// is what `limn render` takes, the second that of RenderOptions and Python, where variances are
-// asked for.
-inline constexpr const char* kRenderSamplers[] = {"padded-sobol", "independent"};
+// Where the random numbers of a pixel's samples come from. The first is what `limn render` takes,
+// the second that of RenderOptions and Python, where variances are asked for.
+inline constexpr const char* kGenerators[] = {"sobol", "independent"};
 
 struct RenderOptions {
-  std::string method = "path";  // InputError for others than render_methods()
+  Method method{Task::kImage};  // InputError for one that makes no images
   // Paths start at points of the visible regions of every pixel, which are found once, exactly
   // (limn/core/visible_regions.h), in place of rays from the camera. InputError unless the film has
   // a box filter.
@@ -64,12 +51,12 @@ struct RenderOptions {
   int lines = 64;
   double tolerance = 0;
   int rays = 4;  // rays: of each point for each lamp and the sky, 1 to 2^20
-  // InputError for others than kRenderSamplers. Scrambled Sobol' points fill a pixel's ranges
+  // InputError for others than kGenerators. Owen-scrambled Sobol' points fill a pixel's ranges
   // evenly: a third of the squared error, mostly; but batches are then not independent, and the
   // variances of `radiance` are no error, nor a bound of it: mostly too large, at times too small.
   // Images of other seeds are independent. Methods that look around take no notice of it: all their
   // numbers are even, with the same variances.
-  std::string sampler = "independent";
+  std::string generator = "independent";
 };
 
 RenderResult render(const Scene& scene, const RunSettings& settings,

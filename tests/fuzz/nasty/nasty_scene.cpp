@@ -246,7 +246,7 @@ Request nasty_request(Die& die, const Scene& scene, const std::string& folder) {
   const std::vector<Parameter> all = list_parameters(scene);
   for (int i = die.mostly({1, 2, 4, 5}); i > 0; --i)
     request.options.parameters.push_back(scalar_of(die, die.pick(all), folder));
-  if (die.chance(0.5)) request.options.method = die.pick(method_types()).name;
+  if (die.chance(0.5)) request.options.method = die.pick(method_names(Task::kGradient));
   if (die.chance(0.5)) request.options.samples = std::nullopt;
   request.settings.spp = die.mostly({2, 1, 4, 16, 17});
   request.settings.seed = static_cast<uint64_t>(die.integer(0, 1 << 20));

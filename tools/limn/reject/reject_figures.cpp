@@ -1,5 +1,6 @@
 // The figures of limn reject as JSON, CSV and tables.
 #include "tools/limn/reject/reject_figures.h"
+#include "tools/limn/output_files.h"
 
 #include <fmt/format.h>
 
@@ -104,9 +105,9 @@ uint64_t RejectVariant::missed() const {
 }
 
 std::string slice_file(const std::string& variant, size_t slice) {
-  return fmt::format("{}_slice_{}.png", variant, slice);
+  return fmt::format("{}_slice_{}.png", file_part(variant), slice);
 }
-std::string edges_file(const std::string& variant) { return variant + "_edges.png"; }
+std::string edges_file(const std::string& variant) { return file_part(variant) + "_edges.png"; }
 
 json to_json(const RejectVariant& v) {
   return {{"name", v.name},

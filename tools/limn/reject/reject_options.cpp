@@ -27,7 +27,7 @@ void add_vector(CLI::App& app, const std::string& name, const std::string& text,
 
 void add_reject_options(CLI::App& app, RejectCommand& command) {
   // Those whose rejection differs.
-  command.methods = {"forest", "quadric", "quadric-box", "li2019"};
+  command.methods = {"forest", "quadric", "quadric:quadrics=off", "li2019"};
   app.add_option("-o,--output", command.output, "Folder for pictures, figures and report")
       ->required();
   app.add_option("--methods", command.methods,
