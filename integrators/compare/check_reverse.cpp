@@ -7,6 +7,7 @@
 #include "integrators/estimates/batches.h"
 #include "integrators/pilot/term_estimator.h"
 #include "limn/core/error.h"
+#include "limn/core/field_error.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/backward.h"
 #include "limn/integrators/methods.h"
@@ -171,7 +172,8 @@ double score(const Moments& forward, const Moments& reverse) {
 
 std::vector<ReverseCheck> check_reverse(const Scene& scene, const BackwardOptions& options,
                                         const RunSettings& settings) {
-  if (settings.spp < 2) throw InputError("check --reverse needs two samples per pixel");
+  if (settings.spp < 2)
+    throw FieldError("spp", "a check of reverse mode needs 2 or more, for standard errors");
   const Image adjoint = random_adjoint(scene.film, mix_bits(settings.seed));
   std::vector<Compared> list;
   std::vector<Parameter> parameters;

@@ -21,10 +21,10 @@ namespace fs = std::filesystem;
 const std::vector<std::pair<std::string, std::string>> kNames = {
     {"limn.identity.scene", "content of the scene file"},
     {"limn.identity.data", "content of the scene's meshes and maps"},
-    {"limn.identity.defines", "defines (-D)"},
-    {"limn.identity.parameter", "parameter (--wrt)"},
-    {"limn.identity.terms", "terms (--terms)"},
-    {"limn.identity.shading", "shading (--shading)"},
+    {"limn.identity.defines", "defines"},
+    {"limn.identity.parameter", "parameter"},
+    {"limn.identity.terms", "terms"},
+    {"limn.identity.shading", "shading"},
     {"limn.identity.film", "film and crop"},
 };
 

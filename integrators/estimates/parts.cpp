@@ -143,7 +143,7 @@ class PartFile {
   void read_text();
   bool find_batch();
   [[noreturn]] void fail() const {
-    if (end_ == 0) throw InputError({name_}, "is no part of a run, as --part makes it");
+    if (end_ == 0) throw InputError({name_}, "is no part of a run");
     throw InputError({name_}, fmt::format("is damaged after {} whole batches: make part {} again; "
                                           "with the same -o it goes on from there",
                                           batches_.size(), text_of(part_)));

@@ -11,7 +11,7 @@
 namespace limn {
 namespace {
 
-constexpr RegionsUser kUser{"the exact film", "--film rays"};
+constexpr RegionsUser kUser{"the exact film", "film \"rays\""};
 
 }  // namespace
 

@@ -41,7 +41,7 @@ void Fit::Impl::check_exact() {
     if (camera) {
       warnings.back() +=
           ". The gradient has their part of the mean image's, an estimate of the term camera, "
-          "which no difference of these losses shows; --terms interior leaves it out";
+          "which no difference of these losses shows; the term interior alone leaves it out";
     }
     return;
   }

@@ -51,8 +51,9 @@ void check_closed_light(const Scene& scene) {
     }
     const bool interpolates = shape.mesh.normal_source != NormalSource::kFace;
     if (scene.shading == ShadingModel::kMitsuba && interpolates) {
-      refuse(shape.where, fmt::format("{}: its interpolated normals need --shading continuous",
-                                      shape_in_text(shape)));
+      refuse(shape.where,
+             fmt::format("{}: its interpolated normals need the shading \"continuous\"",
+                         shape_in_text(shape)));
     }
   }
 }

@@ -33,7 +33,7 @@ void check_direct_light(const Scene& scene, const std::string& method) {
   for (const Shape& shape : scene.shapes) {
     if (shape.mesh.normal_source == NormalSource::kFace) continue;
     refuse_light(method, shape.where,
-                 fmt::format("{}: its interpolated normals need --shading continuous",
+                 fmt::format("{}: its interpolated normals need the shading \"continuous\"",
                              shape_in_text(shape)));
   }
 }

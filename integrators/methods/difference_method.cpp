@@ -106,7 +106,7 @@ GradientResult run_differences(const MethodType& method, const Scene& scene,
   double pilot_seconds = 0;
   for (const Parameter& parameter : parameters) {
     const Step step = options.step > 0
-                          ? Step{options.step, "--step"}
+                          ? Step{options.step, "the user"}
                           : find_step(scene, parameter, parameters.size(), settings, pilot_seconds);
     jobs.push_back({parameter.name, {step.value}, {{1}}});
     const std::string of = parameters.size() > 1 ? " of " + parameter.name : "";

@@ -15,7 +15,7 @@
 namespace limn {
 
 inline constexpr const char* kFacesTerm = "faces";
-inline constexpr RegionsUser kFacesUser{"a film seen by its faces", "--points random",
+inline constexpr RegionsUser kFacesUser{"a film seen by its faces", "points \"random\"",
                                         kPixelMargin};
 
 // InputError unless the film has a box filter.

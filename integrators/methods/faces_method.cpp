@@ -5,6 +5,7 @@
 #include "integrators/methods/faces_estimator.h"
 #include "integrators/methods/selection.h"
 #include "limn/core/error.h"
+#include "limn/core/field_error.h"
 #include "limn/core/names.h"
 #include "limn/integrators/parts.h"
 
@@ -20,15 +21,15 @@ FilmPoints film_points(const std::string& name) {
 
 void check_points(FilmPoints points, bool closed_light, const std::string& method) {
   if (points == FilmPoints::kRandom || closed_light) return;
-  throw InputError(std::string("--points ") + name_of(points) +
-                   " needs light in closed form, that of \"analytic\": \"" + method +
-                   "\" samples it");
+  throw FieldError("points", std::string(name_of(points)) +
+                                 " needs light in closed form, that of \"analytic\": \"" + method +
+                                 "\" samples it");
 }
 
 RunSettings settings_for(FilmPoints points, RunSettings settings) {
   if (points != FilmPoints::kFaces) return settings;
   if (settings.store) {
-    throw InputError("--points faces is one pass without samples: it has no parts");
+    throw FieldError("points", "faces is one pass without samples: it has no parts");
   }
   settings.spp = 1;
   settings.least_spp = 1;
@@ -61,7 +62,8 @@ GradientResult run_faces(const Scene& scene, const GradientOptions& options,
   const Stopwatch watch;
   selected_terms({kFacesTerm}, options.terms, scene.file);
   if (options.exact_film) {
-    throw InputError("--film exact chooses the edges of random points: --points faces has none");
+    throw FieldError("film",
+                     "exact chooses the edges of random points, and points \"faces\" has none");
   }
   const std::vector<Parameter> parameters = parameters_of(scene, options);
   std::vector<std::unique_ptr<SampleEstimator>> estimators;

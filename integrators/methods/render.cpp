@@ -12,6 +12,7 @@
 #include "integrators/methods/visibility_estimator.h"
 #include "limn/core/check.h"
 #include "limn/core/error.h"
+#include "limn/core/field_error.h"
 #include "limn/core/names.h"
 #include "limn/integrators/methods.h"
 #include "limn/integrators/parts.h"
@@ -51,12 +52,12 @@ std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSet
   }
   if (options.points == FilmPoints::kFaces) {
     if (options.exact_film)
-      throw InputError("the exact film is for random points: points \"faces\" have their own");
+      throw FieldError("film", "exact is for random points: faces have their own");
     return std::make_unique<FacesEstimator>(scene, std::span<const Parameter>(), settings.threads);
   }
   if (method.looks_around) {
     if (options.exact_film) {
-      throw InputError("the exact film is not for the method \"" + options.method.name() + "\"");
+      throw FieldError("film", "exact is not for the method \"" + options.method.name() + "\"");
     }
     return std::make_unique<VisibilityEstimator>(scene, settings, options);
   }

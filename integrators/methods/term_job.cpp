@@ -19,6 +19,7 @@
 #include "integrators/pilot/random_motion.h"
 #include "integrators/pilot/term_estimator.h"
 #include "limn/core/error.h"
+#include "limn/core/field_error.h"
 #include "limn/core/parameter.h"
 #include "limn/edgetree/edge_sampler_types.h"
 #include "limn/integrators/parts.h"
@@ -224,10 +225,10 @@ class TermJob {
       wanted += fmt::format("{}{}{}", wanted.empty() ? "" : ", ", type->name,
                             type->least_samples == 1 ? "" : " (may be less than 1)");
     }
-    throw InputError(
-        fmt::format("--samples: \"{}\": counts must be positive, at most {:g}, and whole where "
-                    "paths are concerned, as in 3,0.5,1; the terms are {}",
-                    to_string(samples), kMostSamples, wanted));
+    throw FieldError("samples",
+                     fmt::format("\"{}\": counts must be positive, at most {:g}, and whole where "
+                                 "paths are concerned, as in 3,0.5,1; the terms are {}",
+                                 to_string(samples), kMostSamples, wanted));
   }
 
   // Plans every pass, by a pilot or as the options say.

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "limn/core/error.h"
+#include "limn/core/field_error.h"
 
 namespace limn {
 namespace {
@@ -33,14 +34,15 @@ Vec3<Lanes> velocity_of(const Vec3<Dual>& p) { return {p.x.d, p.y.d, p.z.d}; }
 
 void check(const WarpOptions& options) {
   if (options.rays < 2 || options.rays % 2 != 0) {
-    throw InputError(
-        fmt::format("--aux: {} auxiliary rays: an even number is needed, since they come in pairs",
-                    options.rays));
+    throw FieldError(
+        "auxiliary rays",
+        fmt::format("{}: an even number is needed, since they come in pairs", options.rays));
   }
   if (!(options.kappa >= 1) || !(options.kappa <= 1e12)) {
-    throw InputError(fmt::format(
-        "--kappa: {:.6g}: it must lie between 1 and 1e12 (the kernel is kappa^(-1/2) radians wide)",
-        options.kappa));
+    throw FieldError(
+        "kappa",
+        fmt::format("{:.6g} is outside of 1 to 1e12 (the kernel is kappa^(-1/2) radians wide)",
+                    options.kappa));
   }
 }
 

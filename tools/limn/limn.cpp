@@ -10,6 +10,7 @@
 #include <filesystem>
 
 #include "limn/core/error.h"
+#include "limn/core/field_error.h"
 #include "limn/core/names.h"
 #include "tools/limn/commands.h"
 #include "tools/limn/version.h"
@@ -75,6 +76,14 @@ void use_huge_pages([[maybe_unused]] char** argv) {
 #endif
 }
 
+// How the command line spells a field of the library.
+std::string option_of(std::string field) {
+  if (field == "auxiliary rays") return "--aux";
+  if (field == "seconds") return "--time";
+  std::replace(field.begin(), field.end(), '_', '-');
+  return "--" + field;
+}
+
 int run(int argc, char** argv) {
   CLI::App app("limn: a path tracer that also computes how its image changes when the scene moves");
   app.require_subcommand(1);
@@ -107,6 +116,8 @@ int main(int argc, char** argv) {
   use_huge_pages(argv);
   try {
     return run(argc, argv);
+  } catch (const limn::FieldError& error) {
+    fmt::print(stderr, "error: {}: {}\n", option_of(error.field), error.message);
   } catch (const limn::InputError& error) {
     fmt::print(stderr, "{}\n", error.what());
   } catch (const std::exception& error) {
