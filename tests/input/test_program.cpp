@@ -408,6 +408,15 @@ TEST_F(Program, BadNumbers) {
   EXPECT_NE(refused(render + " --spp many").find("--spp"), std::string::npos);
   EXPECT_NE(refused(render + " --threads 0").find("--threads"), std::string::npos);
   EXPECT_NE(refused(render + " --seed -1").find("--seed"), std::string::npos);
+  const std::string gradient = "gradient " + scene_ + " --wrt screen.translate.x -o " + out();
+  for (const char* bad : {"--step nan", "--step 1e300", "--step -1", "--time nan", "--time inf",
+                          "--seed 12345678901234567890123", "--kappa nan"}) {
+    const std::string text = refused(gradient + " --method fd " + bad);
+    const std::string option = std::string(bad).substr(0, std::string(bad).find(' '));
+    EXPECT_NE(text.find(option + ": "), std::string::npos) << bad << '\n' << text;
+    EXPECT_NE(text.find(" is not a number from "), std::string::npos) << bad << '\n' << text;
+  }
+  EXPECT_EQ(run(render + " --spp 1 --seed 18446744073709551615").status, 0);
   EXPECT_NE(refused("check " + scene_ + " --wrt screen.translate.x --step 0").find("--step"),
             std::string::npos);
   EXPECT_EQ(refused("check " + scene_ + " --wrt screen.translate.x --spp 1"),

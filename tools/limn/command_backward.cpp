@@ -37,7 +37,7 @@ class BackwardCommand final : public Command {
     app.add_option("--pyramid", levels_,
                    "With --target: the mean over the loss of the image as it is, at half its size, "
                    "a quarter, ...: as many levels")
-        ->check(CLI::Range(1, 32))
+        ->check(within(1, 32))
         ->needs(target);
     app.add_option("--wrt", options_.parameters,
                    "Parameter, an array (SHAPE.vertex_positions) or a scalar; may be repeated "
@@ -45,11 +45,11 @@ class BackwardCommand final : public Command {
     add_reverse_options(app, options_, Task::kBackward);
     app.add_option("--batches", options_.batches,
                    "At most, for standard errors; each costs some time per vertex")
-        ->check(CLI::Range(1, 1 << 16));
+        ->check(within(1, 1 << 16));
     app.add_option("--time", seconds_,
                    "Seconds, set-up and the images of a loss included: as many samples as fit, "
                    "instead of --spp")
-        ->check(CLI::PositiveNumber)
+        ->check(within(1e-6, 1e7))
         ->type_name("SECONDS")
         ->excludes("--spp");
     app.add_flag("--loss-only", loss_only_,

@@ -151,11 +151,11 @@ class CheckCommand final : public Command {
     add_points_option(app, points_);
     app.add_option("--step", options_.step,
                    "Step of the differences (default: found in the image, by a pilot)")
-        ->check(CLI::PositiveNumber);
+        ->check(within(1e-12, 1e12));
     app.add_option("--block", options_.block,
                    "Compare windows this many pixels apart (default: an eighth of the longer side, "
                    "at least 4)")
-        ->check(CLI::Range(1, 1 << 20));
+        ->check(within(1, 1 << 20));
     app.add_flag("--reverse", reverse_,
                  "Compare reverse mode with forward mode instead: the sum over pixels of a random "
                  "image times the derivative; an array stands for a random field. --method is then "

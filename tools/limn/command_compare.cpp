@@ -283,17 +283,17 @@ void CompareCommand::add_options(CLI::App& app) {
       ->type_name("A,B,...");
   app.add_option("--time", command_.time, "Seconds of each run, set-up included")
       ->required()
-      ->check(CLI::PositiveNumber)
+      ->check(within(1e-6, 1e7))
       ->type_name("SECONDS");
   app.add_option("--sweep", command_.rungs,
                  "Error against time: this many times, each twice the one before, up to --time (5 "
                  "if no number is given)")
       ->expected(0, 1)
       ->default_str("5")
-      ->check(CLI::Range(1, 30))
+      ->check(within(1, 30))
       ->type_name("N");
   app.add_option("--repeats", command_.repeats, "Runs of each method and time, for error bars")
-      ->check(CLI::Range(1, 1 << 20))
+      ->check(within(1, 1 << 20))
       ->capture_default_str();
   app.add_option("--reference", command_.reference,
                  "Reference that limn compare wrote for the same scene and parameter (default: "
@@ -301,11 +301,11 @@ void CompareCommand::add_options(CLI::App& app) {
       ->type_name("FILE.exr");
   app.add_option("--reference-time", command_.reference_time,
                  "Seconds for a new reference (default: four times all runs of one method)")
-      ->check(CLI::PositiveNumber)
+      ->check(within(1e-6, 1e7))
       ->type_name("SECONDS");
   add_term_options(app, command_.terms, command_.samples);
   app.add_option("--step", command_.step, "Step of finite differences (default: found by a pilot)")
-      ->check(CLI::PositiveNumber);
+      ->check(within(1e-12, 1e12));
   add_warp_options(app, command_.warp);
   add_film_option(app, command_.film);
   app.add_option("-o,--output", command_.output, "Folder to write")

@@ -105,13 +105,13 @@ void FitCommand::add_options(CLI::App& app) {
       ->type_name("PARAM=LEAST,MOST")
       ->allow_extra_args(false);
   steps_option_ = app.add_option("--steps", given_.steps, "Steps in all")
-                      ->check(CLI::Range(int64_t{1}, int64_t{1} << 40));
+                      ->check(within(int64_t{1}, int64_t{1} << 40));
   app.add_option("--loss", given_.loss, "l2, relative-l2 or l1")->capture_default_str();
   app.add_option(
          "--pyramid", given_.options.pyramid,
          "Levels: the mean over the loss of the image as it is, at half its size, a quarter, "
          "...")
-      ->check(CLI::Range(1, 32))
+      ->check(within(1, 32))
       ->capture_default_str();
   app.add_option("--optimiser,--optimizer", given_.optimiser,
                  "adam-uniform (one scale for all vertices of a shape), adam, gradient-descent; "
@@ -120,31 +120,31 @@ void FitCommand::add_options(CLI::App& app) {
   app.add_option("--step", given_.options.step,
                  "Of the first step, in natural steps: 1 % of a shape's diagonal, 0.01 radians, "
                  "1 % of a value")
-      ->check(CLI::PositiveNumber)
+      ->check(within(1e-12, 1e12))
       ->capture_default_str();
   app.add_option("--step-half-life", given_.options.step_half_life,
                  "After so many steps they are half as long (default: all are alike)")
-      ->check(CLI::Range(1, 1 << 30));
+      ->check(within(1, 1 << 30));
   app.add_option("--smoothing", given_.options.smoothing,
                  "How far a step of a vertex spreads, over the shape's diagonal; 0: not at all")
-      ->check(CLI::Range(0.0, 100.0))
+      ->check(within(0.0, 100.0))
       ->capture_default_str();
   app.add_option("--remesh", given_.options.remesh,
                  "After these steps, vertices that are fitted get new triangles, as in 100,200")
       ->delimiter(',')
-      ->check(CLI::PositiveNumber);
+      ->check(within(1, 1 << 30));
   app.add_option("--remesh-edge", given_.options.remesh_edge,
                  "Length of edges then, over what it was")
-      ->check(CLI::Range(0.1, 10.0))
+      ->check(within(0.1, 10.0))
       ->capture_default_str();
   app.add_option("--remesh-shrink", given_.options.remesh_shrink,
                  "After each remeshing steps and smoothing are so many times what they were")
-      ->check(CLI::Range(0.01, 1.0))
+      ->check(within(0.01, 1.0))
       ->capture_default_str();
   add_sampling_options(app);
   app.add_option("--snapshots", given_.snapshots,
                  "Steps between snapshots: meshes, pictures, state (default: ten in all)")
-      ->check(CLI::Range(1, 1 << 30));
+      ->check(within(1, 1 << 30));
   app.add_option("--truth", truth_, "The true mesh, to tell distances to it (.obj, .ply)");
   app.add_option("-o,--output", output_, "Folder to write (made if it is not there)");
   app.add_option("--resume", resume_,
@@ -157,10 +157,10 @@ void FitCommand::add_options(CLI::App& app) {
 void FitCommand::add_sampling_options(CLI::App& app) {
   app.add_option("--loss-spp", given_.options.loss_spp,
                  "Samples per pixel of each of the loss's two images (default: --spp)")
-      ->check(CLI::Range(1, 1 << 30));
+      ->check(within(1, 1 << 30));
   app.add_option("--spp-doubling", given_.options.spp_doubling,
                  "After so many steps there are twice the samples (default: never)")
-      ->check(CLI::Range(1, 1 << 30));
+      ->check(within(1, 1 << 30));
   add_reverse_options(app, given_.options.backward, Task::kFit);
 }
 

@@ -266,11 +266,11 @@ class GradientCommand final : public Command {
     add_term_options(app, terms_, samples_);
     app.add_option("--step", options_.step,
                    "Step of finite differences (default: found by a pilot)")
-        ->check(CLI::PositiveNumber);
+        ->check(within(1e-12, 1e12));
     add_warp_options(app, options_.warp);
     app.add_option("--time", seconds_,
                    "Seconds, set-up included: as many samples as fit, instead of --spp")
-        ->check(CLI::PositiveNumber)
+        ->check(within(1e-6, 1e7))
         ->type_name("SECONDS")
         ->excludes("--spp");
     app.add_option("-o,--output", output_,

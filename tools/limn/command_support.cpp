@@ -2,8 +2,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <sstream>
 
 #include "limn/core/error.h"
@@ -37,6 +39,20 @@ std::vector<std::string> split(const std::string& list) {
 
 }  // namespace
 
+CLI::Validator within(long double least, long double most) {
+  const std::string range = fmt::format("{:.10g} to {:.10g}", least, most);
+  return {[=](const std::string& text) {
+            char* end = nullptr;
+            const long double value = std::strtold(text.c_str(), &end);
+            // As doubles, which 0.1 is; seeds have more digits.
+            const bool enough = static_cast<double>(value) >= static_cast<double>(least);
+            return !text.empty() && *end == 0 && enough && value <= most
+                       ? std::string()
+                       : text + " is not a number from " + range;
+          },
+          range};
+}
+
 void add_input_options(CLI::App& app, CommonOptions& common, const std::string& text,
                        const std::string& type) {
   app.add_option("scene", common.scene, text)->required()->type_name(type);
@@ -49,9 +65,9 @@ void add_input_options(CLI::App& app, CommonOptions& common, const std::string& 
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false);
   app.add_option("--seed", common.seed, "Seed of all random numbers (default: the scene's)")
-      ->check(CLI::NonNegativeNumber);
+      ->check(within(0, std::numeric_limits<uint64_t>::max()));
   app.add_option("--threads", common.threads, "Threads (default: all cores)")
-      ->check(CLI::Range(1, 4096));
+      ->check(within(1, 4096));
   app.add_flag("--quiet", common.quiet, "Print nothing but errors and warnings");
 }
 
@@ -61,7 +77,7 @@ void add_common_options(CLI::App& app, CommonOptions& common) {
                  "Of several in the scene, this one (default: the first)")
       ->type_name("ID|NUMBER");
   app.add_option("--spp", common.spp, "Samples per pixel (default: the scene's)")
-      ->check(CLI::Range(1, 1 << 30));
+      ->check(within(1, 1 << 30));
   app.add_option("--json", common.json, "Write the figures for machines to this file");
   app.add_option("--shading", common.shading,
                  "How interpolated normals shade: continuous, or as Mitsuba does (its jumps are "
@@ -170,16 +186,16 @@ void add_reverse_options(CLI::App& app, BackwardOptions& options, Task task) {
   add_method_option(app, options.method, task);
   add_points_option(app, options.points);
   app.add_option("--edge-samples", options.edge_samples, "Boundary samples per path vertex")
-      ->check(CLI::Range(1, 1 << 16))
+      ->check(within(1, 1 << 16))
       ->capture_default_str();
   app.add_option("--camera-samples", options.camera_samples,
                  "Boundary samples on the film (term camera) per path")
-      ->check(CLI::PositiveNumber)
+      ->check(within(1e-6, 1 << 16))
       ->default_str("0.25, 1 with --method analytic");
   app.add_option(
          "--shadow-samples", options.shadow_samples,
          "Boundary samples on the edges of shadows in view (terms shadow, penumbra) per path")
-      ->check(CLI::PositiveNumber)
+      ->check(within(1e-6, 1 << 16))
       ->capture_default_str();
 }
 
@@ -188,12 +204,12 @@ void add_warp_options(CLI::App& app, WarpOptions& warp) {
          "--aux", warp.rays,
          "Auxiliary rays per direction (method was): an even number; the more, the smaller the "
          "bias")
-      ->check(CLI::Range(2, 1 << 20))
+      ->check(within(2, 1 << 20))
       ->capture_default_str()
       ->type_name("N");
   app.add_option("--kappa", warp.kappa,
                  "Concentration of their kernel, which is K^(-1/2) radians wide (method was)")
-      ->check(CLI::Range(1.0, 1e12))
+      ->check(within(1.0, 1e12))
       ->capture_default_str()
       ->type_name("K");
 }

@@ -32,6 +32,8 @@ struct CommonOptions {
   BatchStore* store = nullptr;  // of `limn merge`
 };
 
+// A number from least to most. Nothing else is, nor what is no number.
+CLI::Validator within(long double least, long double most);
 // Scene or mesh, -D, --seed, --threads, --quiet. text, type: of the input.
 void add_input_options(CLI::App& app, CommonOptions& common, const std::string& text,
                        const std::string& type);

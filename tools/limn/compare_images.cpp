@@ -109,15 +109,15 @@ void add_image_options(CLI::App& app, std::string& what, RenderOptions& options)
       ->capture_default_str();
   app.add_option("--lines", options.lines,
                  "silhouettes, lines: lines through the sky, a quarter of them through a lamp")
-      ->check(CLI::Range(1, 1 << 14))
+      ->check(within(1, 1 << 14))
       ->capture_default_str();
   app.add_option("--tolerance", options.tolerance,
                  "silhouettes, lines: lines are doubled until halves differ by twice this part of "
                  "the result (0: never)")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(within(0.0, 1.0))
       ->capture_default_str();
   app.add_option("--rays", options.rays, "rays: of each point, and each lamp")
-      ->check(CLI::Range(1, 1 << 20))
+      ->check(within(1, 1 << 20))
       ->capture_default_str();
 }
 

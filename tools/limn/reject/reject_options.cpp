@@ -38,15 +38,15 @@ void add_reject_options(CLI::App& app, RejectCommand& command) {
                  "Id of the scene's shape (default: the one with the most edges)");
   app.add_option("--node-edges", command.node_edges,
                  "Choose a node of about this many edges, one that is often accepted and often not")
-      ->check(CLI::Range(1, 1 << 30))
+      ->check(within(1, 1 << 30))
       ->capture_default_str();
   app.add_option("--node", command.node, "Look at this node of the first method's tree")
-      ->check(CLI::NonNegativeNumber);
+      ->check(within(0, 1u << 31));
   app.add_option("--extent", command.extent, "Half-width of the slices, in radii of the mesh")
-      ->check(CLI::Range(1e-3, 1e3))
+      ->check(within(1e-3, 1e3))
       ->capture_default_str();
   app.add_option("--distance", command.distance, "Distance of the slices, in radii of the mesh")
-      ->check(CLI::Range(0.0, 1e3))
+      ->check(within(0.0, 1e3))
       ->capture_default_str();
   add_vector(app, "--point", "Shading point whose reachable edges are drawn", VectorKind::kPoint,
              [&](const Vec3d& v) { command.point = v; });
@@ -55,11 +55,11 @@ void add_reject_options(CLI::App& app, RejectCommand& command) {
   add_vector(app, "--up", "Direction that is up in it (default: 0,1,0)", VectorKind::kDirection,
              [&](const Vec3d& v) { command.up = v; });
   app.add_option("--size", command.size, "Width and height of pictures, in pixels")
-      ->check(CLI::Range(16, 8192))
+      ->check(within(16, 8192))
       ->capture_default_str();
   app.add_option("--points", command.points,
                  "Points around the mesh for hit rate and counts by depth")
-      ->check(CLI::Range(2, 1 << 24))
+      ->check(within(2, 1 << 24))
       ->capture_default_str();
   app.add_flag("!--no-report", command.report, "Write no report.html");
 }
