@@ -99,7 +99,7 @@ TEST_F(Program, SharesTheWorkAmongTerms) {
 
   const auto [chosen, chosen_text] = report(" --spp 16");
   EXPECT_EQ(chosen["pilot_spp"], 4);
-  EXPECT_NE(chosen_text.find("chosen by 4"), std::string::npos) << chosen_text;
+  EXPECT_NE(chosen_text.find("pilot of 4 spp"), std::string::npos) << chosen_text;
   const auto [brief, brief_text] = report(" --spp 7");
   EXPECT_EQ(brief["pilot_spp"], 0);
   EXPECT_EQ(brief["samples"], (nlohmann::json{{"interior", 1}, {"camera", 1}, {"boundary", 1}}));
