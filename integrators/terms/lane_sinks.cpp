@@ -35,7 +35,8 @@ Vec3<Lanes> relative_velocity(const Scene& scene, const BoundaryForm& form,
       const auto end = [&](VertexId vertex) {
         const Vec3<Lanes> own =
             point.mesh->tangents.empty() ? Vec3<Lanes>{} : point.mesh->tangent(vertex);
-        return against_ray(own, point.mesh->position(vertex), ray);
+        // The point of a single edge is x itself: the mean of its ends' turns is that at x.
+        return against_ray(own, form.count == 1 ? point.mesh->position(vertex) : form.x, ray);
       };
       const auto [a, b] = point.mesh->edge(point.edge.edge).vertices;
       if (point.t == 0 || point.t == 1) return end(point.t == 0 ? a : b);
@@ -63,7 +64,9 @@ Lanes rate_of(const Scene& scene, const BoundaryForm& form, const RayMotion& ray
     if (form.share != 1) {
       v = v * form.share - ray.turn.velocity(form.x - ray.origin) * (1 - form.share);
     }
-    return along(v - ray.direction * form.distance, point.g);
+    // A light at infinity is no point that the ray carries.
+    const bool infinite = point.light && point.light->origin().infinite;
+    return along(infinite ? v : v - ray.direction * form.distance, point.g);
   };
   Lanes sum = of_point(form.points[0]);
   for (const MovingPoint& point : form.all().subspan(1)) sum += of_point(point);
