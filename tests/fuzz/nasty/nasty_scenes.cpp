@@ -45,7 +45,7 @@ Outcome run_scene(uint64_t seed, const std::string& folder) {
     if (die.chance(0.1)) scene.shading = ShadingModel::kMitsuba;
     const Request request = nasty_request(die, scene, folder);
     const RenderResult image = render(scene, request.settings);
-    asked = fmt::format("gradient, method \"{}\", {} samples, wrt", request.options.method,
+    asked = fmt::format("gradient, method \"{}\", {} samples, wrt", request.options.method.name(),
                         request.settings.spp);
     for (const auto& parameter : request.options.parameters) asked += " " + parameter;
     const GradientResult result = gradient(scene, request.options, request.settings);
