@@ -1,5 +1,5 @@
-// Points of faces hang on their corners, and edges of meshes on their vertices; where edges were cut,
-// on the ends of the whole edge; curves where two faces cross, on the corners of both.
+// Points of faces hang on their corners, and edges of meshes on their vertices; where edges were
+// cut, on the ends of the whole edge; curves where two faces cross, on the corners of both.
 #include "integrators/backward/edge_motion.h"
 
 #include <algorithm>

@@ -73,7 +73,8 @@ Step find_step(const Scene& scene, const Parameter& parameter, size_t parameters
   const double per_second =
       kTrials * static_cast<double>(r.spp) / std::max(r.seconds - r.setup_seconds, 1e-9);
   const double left = (run.seconds - r.setup_seconds / kTrials) / parameters - r.seconds;
-  const double samples = run.seconds > 0 ? per_second * left : run.spp;
+  const double samples =
+      run.seconds > 0 ? samples_behind_pilot(per_second, left, run.least_spp) : run.spp;
   return {
       best_step(trials, samples),
       fmt::format("a pilot of {} samples per pixel at {} steps from {:.3g} to {:.3g}: least sum "
@@ -129,6 +130,10 @@ GradientResult run_differences(const MethodType& method, const Scene& scene,
   result.stats.setup = {{"pilot", pilot_seconds}, {"moved scenes", run.setup_seconds}};
   result.non_finite = std::move(run.non_finite);
   return result;
+}
+
+double samples_behind_pilot(double per_second, double left, int least) {
+  return std::max(per_second * left, static_cast<double>(least));
 }
 
 void extrapolate_variances(std::span<StepTrial> trials) {

@@ -20,4 +20,8 @@ void extrapolate_variances(std::span<StepTrial> trials);
 // from the second's; around the best trial the variance is taken for a power of h.
 double best_step(std::span<const StepTrial> trials, double samples);
 
+// The samples per pixel of a run that takes `per_second` and has `left` seconds behind its pilot,
+// below 0 if the pilot took them all: at least `least`, which a run takes whatever they cost.
+double samples_behind_pilot(double per_second, double left, int least);
+
 }  // namespace limn

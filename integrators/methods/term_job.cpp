@@ -361,7 +361,7 @@ class TermJob {
     if (probed.pilot.spp == 0) return plan;
     result.pilot_spp = probed.pilot.spp;
     plan.film = std::move(probing.film);
-    share_out(estimator, probed, plan);
+    share_out(estimator, probed, most_work_of(budget, probed.pilot), plan);
     return plan;
   }
 
@@ -477,16 +477,24 @@ class TermJob {
     return figures;
   }
 
-  // By what a pilot found.
-  void share_out(const TermEstimator& estimator, const Probed& probed, SamplePlan& plan) const {
+  // Of a sample of one pixel: a run makes the first `least_spp` of them, whatever they cost.
+  double most_work_of(const Budget& budget, const PilotFigures& pilot) const {
+    if (!budget.timed()) return kNoLimit;
+    return most_work(budget.settings.seconds - budget.watch.seconds(), pilot.seconds_of_work,
+                     budget.settings.least_spp, film_size(scene_.film) / 3);
+  }
+
+  // By what a pilot found. most: work of a sample of one pixel.
+  void share_out(const TermEstimator& estimator, const Probed& probed, double most,
+                 SamplePlan& plan) const {
     const auto& [pilot, fit] = probed;
     std::vector<double> units;
     const std::vector<TermFigures> figures = figures_of(estimator, probed, plan, units);
     double price;
     if (method_.spreads_samples && !options_.uniform_samples) {
-      price = spread_samples(figures, pilot.grid, plan);
+      price = spread_samples(figures, pilot.grid, plan, most);
     } else {
-      plan.uniform = best_samples(figures);
+      plan.uniform = best_samples(figures, most);
       price = price_of(figures, plan.uniform);
     }
     if (method_.spreads_samples || method_.random_directions)

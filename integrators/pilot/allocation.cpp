@@ -24,10 +24,15 @@ std::vector<double> counts_to_try(const TermFigures& term) {
 
 }  // namespace
 
+double most_work(double left, double each, int samples, size_t pixels) {
+  if (!(each > 0)) return kNoLimit;
+  return std::max(left, 0.0) / (each * std::max(samples, 1) * static_cast<double>(pixels));
+}
+
 // The least product of two sums lies on the lower hull of all choices, where every term has its own
 // least of variance / n + price * cost * n for one price. As the price falls, counts rise one by
 // one: each step is taken where both of its counts are alike.
-SampleCounts best_samples(const std::vector<TermFigures>& figures) {
+SampleCounts best_samples(const std::vector<TermFigures>& figures, double most) {
   struct Step {
     double price;
     size_t term;
@@ -57,6 +62,7 @@ SampleCounts best_samples(const std::vector<TermFigures>& figures) {
     variance += term.variance * (1 / step.count - 1 / samples[step.term]);
     cost += term.cost_of(step.count) - term.cost_of(samples[step.term]);
     samples[step.term] = step.count;
+    if (cost > most) break;
     if (variance * cost * kTie >= least) continue;
     least = variance * cost;
     best = samples;
@@ -150,6 +156,19 @@ Totals totals_at(const std::vector<TermFigures>& terms, const std::vector<Wish>&
   return {error, cost};
 }
 
+// The largest scale up to `scale` where a sample costs no more than `most`; 0, which leaves every
+// term the fewest samples that it can have, where none is that cheap. Costs grow with the scale.
+double fitting_scale(const std::vector<TermFigures>& terms, const std::vector<Wish>& wishes,
+                     double scale, double most) {
+  if (totals_at(terms, wishes, scale).cost <= most) return scale;
+  double fits = 0, exceeds = scale;
+  for (int i = 0; i < 20; ++i) {
+    const double middle = (fits + exceeds) / 2;
+    (totals_at(terms, wishes, middle).cost <= most ? fits : exceeds) = middle;
+  }
+  return fits;
+}
+
 double best_scale(const std::vector<TermFigures>& terms, const std::vector<Wish>& wishes) {
   double largest = 0;
   for (const Wish& wish : wishes) {
@@ -171,11 +190,12 @@ double best_scale(const std::vector<TermFigures>& terms, const std::vector<Wish>
 }  // namespace
 
 double spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& grid,
-                      SamplePlan& plan) {
+                      SamplePlan& plan, double most) {
   std::vector<Wish> wishes;
   for (const TermFigures& term : figures) wishes.push_back(wish_of(term, grid));
-  const double scale = best_scale(figures, wishes);
-  if (!(scale > 0)) return 0;
+  const double best = best_scale(figures, wishes);
+  if (!(best > 0)) return 0;
+  const double scale = fitting_scale(figures, wishes, best, most);
   plan.grid = grid;
   plan.counts.assign(grid.size(), {});
   std::vector<double> means;

@@ -1,6 +1,7 @@
 #pragma once
 // How a job's work is shared among the terms of a derivative, and among the pixels.
 #include <algorithm>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -8,6 +9,12 @@
 #include "integrators/terms/lane_sinks.h"
 
 namespace limn {
+
+inline constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+
+// The most work of a sample of one pixel, so that `samples` of all `pixels` fit into the seconds
+// that are left, where a unit of work takes `each`: kNoLimit if no work was met.
+double most_work(double left, double each, int samples, size_t pixels);
 
 // What a pilot tells of one sample of a term, in units that all terms share.
 struct TermFigures {
@@ -27,16 +34,18 @@ struct TermFigures {
 // After equal time, the squared error goes with (sum of variance / samples) times (sum of cost *
 // samples). Its minimum is at samples ~ sqrt(variance / cost); this is the best of the small counts
 // in use: at most eight, so that a pilot that saw too little of a term starves it no further.
-SampleCounts best_samples(const std::vector<TermFigures>& figures);
+// most: the most that a sample of a pixel may cost; where no choice is that cheap, the result is
+// the cheapest.
+SampleCounts best_samples(const std::vector<TermFigures>& figures, double most = kNoLimit);
 
 // The same for every cell. The ideal share of a cell goes with the standard deviation there; a
 // pilot sees that too rarely in one cell, so the variance is the mean of those over 5 by 5 and 9 by
 // 9 cells, and a share is a quarter of the mean at least. Counts are whole; they are as small as
 // rounding allows.
 // The result is the price of work: how much of the squared error a unit of it is worth in the plan,
-// 0 if there is none.
+// 0 if there is none. most: see best_samples; the mean over cells.
 double spread_samples(const std::vector<TermFigures>& figures, const PlanGrid& grid,
-                      SamplePlan& plan);
+                      SamplePlan& plan, double most = kNoLimit);
 
 // The same where all pixels have these counts.
 double price_of(const std::vector<TermFigures>& figures, const SampleCounts& counts);

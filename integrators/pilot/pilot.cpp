@@ -90,13 +90,18 @@ class PilotRun {
     return true;
   }
 
-  void add_work(int spp, size_t probes, PilotFigures& figures) const {
+  // seconds: of all batches.
+  void add_work(int spp, size_t probes, double seconds, PilotFigures& figures) const {
+    double all = 0;
     for (size_t slot = 0; slot < costs_.size(); ++slot) {
       const size_t pixels = terms_.adds_to_pixels(slot) ? probes : film_size(film()) / 3;
       const double samples = static_cast<double>(spp) * pixels;
-      figures.work.push_back(terms_.work(slot, costs_[slot]) / samples);
+      const double work = terms_.work(slot, costs_[slot]);
+      figures.work.push_back(work / samples);
       figures.first_work.push_back(terms_.first_work(slot, costs_[slot]) / samples);
+      all += work;
     }
+    figures.seconds_of_work = all > 0 ? seconds / all : 0;
   }
 
   // A thousandth of the pixels, those with the largest variance, is left out: single bright samples
@@ -158,6 +163,7 @@ void PilotFigures::merge(const PilotFigures& more) {
     for (int k = 0; k < kLanes; ++k) mix(film_variance[slot][k], more.film_variance[slot][k]);
   }
   mix(light_work, more.light_work);
+  mix(seconds_of_work, more.seconds_of_work);
   traced.add(more.traced);
   spp = sum;
 }
@@ -187,7 +193,7 @@ PilotFigures run_pilot(const TermEstimator& estimator, bool turns, PilotSamples 
   figures.spp = spp;
   figures.grid = pilot.grid();
   figures.traced = pilot.traced();
-  run.add_work(spp, figures.grid.size(), figures);
+  run.add_work(spp, figures.grid.size(), watch.seconds() - began, figures);
   figures.light_work = static_cast<double>(pilot.later_lights()) /
                        (kPilotLights * static_cast<double>(spp) * figures.grid.size());
   for (size_t slot = 0; slot < estimator.slots(); ++slot) {

@@ -32,6 +32,7 @@ struct PilotFigures {
   double light_work = 0;           // of one light sample at all later vertices of a path
   std::vector<double> work;        // of one sample of a pixel, of every slot, see Term::work
   std::vector<double> first_work;  // the same, see Term::first_work
+  double seconds_of_work = 0;      // what a unit of work took; 0: there was no work
 
   double work_of_pixel() const { return std::accumulate(work.begin(), work.end(), 0.0); }
   // Whether a slot's samples belong to pixels.

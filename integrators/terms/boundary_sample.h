@@ -1,12 +1,12 @@
 #pragma once
-// A boundary sample. An edge moves against the rays of a viewer (a vertex of a path, or the camera),
-// and the radiance changes across it. The sample adds
+// A boundary sample. An edge moves against the rays of a viewer (a vertex of a path, or the
+// camera), and the radiance changes across it. The sample adds
 //   amount * rate,   rate = scale * sum_i g_i . (v(X_i) - v_ray)
 // to the derivative: amount (rgb) is the radiance difference times what carries it to the sensor,
-// v(X_i) are velocities of points of the scene, and v_ray is that of the point x as the viewer's ray
-// carries it along. The rate is linear in velocities. So one record serves all modes: forward mode
-// puts velocities in, reverse mode hands amount * scale * g_i on to what moves the points, and a
-// pilot asks what other motions of the viewer would add. A term draws, tests visibility and hands
+// v(X_i) are velocities of points of the scene, and v_ray is that of the point x as the viewer's
+// ray carries it along. The rate is linear in velocities. So one record serves all modes: forward
+// mode puts velocities in, reverse mode hands amount * scale * g_i on to what moves the points, and
+// a pilot asks what other motions of the viewer would add. A term draws, tests visibility and hands
 // the record to a sink; it does not know the mode.
 #include <array>
 #include <vector>

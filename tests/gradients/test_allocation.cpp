@@ -67,6 +67,25 @@ TEST(BestSamples, AreLimited) {
   EXPECT_EQ(best_samples({{4, 1}, {1, 1}, {1, 1}, {9, 1, 0.125}}), (SampleCounts{2, 1, 1, 3}));
 }
 
+TEST(BestSamples, CostNoMoreThanTheyMay) {
+  const PilotFigures figures = three({1, 1}, {1, 4}, {9, 1});
+  const auto cost = [&](const SampleCounts& n) { return n[0] + 4 * n[1] + n[2]; };
+  EXPECT_EQ(best_samples(figures, 6), (SampleCounts{1, 0.5, 3}));  // what they cost anyway
+  for (const double most : {5.9, 4.0, 3.0, 2.5}) {
+    const SampleCounts best = best_samples(figures, most);
+    EXPECT_LE(cost(best), most);
+    EXPECT_GT(cost(best), 0.5 * most);
+  }
+  EXPECT_EQ(best_samples(figures, 2.4), (SampleCounts{1, 0.125, 1}));  // nothing is cheaper
+}
+
+TEST(MostWork, IsWhatTheSamplesOfAllPixelsHaveLeft) {
+  // 2 samples of 1000 pixels in 3 s, where a unit of work takes 1 ms.
+  EXPECT_DOUBLE_EQ(most_work(3, 1e-3, 2, 1000), 1.5);
+  EXPECT_EQ(most_work(-1, 1e-3, 2, 1000), 0);
+  EXPECT_EQ(most_work(3, 0, 2, 1000), kNoLimit);
+}
+
 TEST(PilotSamples, TakeAnEighthOfATimeAndFourWhereThatIsTooShort) {
   EXPECT_EQ(pilot_samples_in_time(32, 0.01, 8, 7), 32);
   EXPECT_EQ(pilot_samples_in_time(32, 0.1, 8, 7), 10);
@@ -138,6 +157,31 @@ TEST(SpreadSamples, KnowWhatFurtherOnesCost) {
     EXPECT_LE(error * cost, 1.1 * least) << variance;
     EXPECT_NEAR(price, error / cost, 1e-6 * price) << variance;
   }
+}
+
+TEST(SpreadSamples, CostNoMoreThanTheyMay) {
+  PlanGrid grid;
+  grid.columns = grid.rows = 10;
+  // A few cells of large variance, and a term of the film.
+  TermFigures paths{1, 3, 1, std::vector<double>(grid.size(), 1.0)};
+  TermFigures edges{20, 10, 0.125, std::vector<double>(grid.size(), 1.0)};
+  for (size_t i = 0; i < 20; ++i) edges.cells[i] = 96;
+  const std::vector<TermFigures> figures = {paths, edges, {0.5, 1, 0.125}};
+  const auto cost_of = [&](double most) {
+    SamplePlan plan;
+    spread_samples(figures, grid, plan, most);
+    double cost = plan.uniform[2];
+    for (const PixelCounts& n : plan.counts) cost += 0.01 * (3 * n[0] + 10 * n[1]);
+    return cost;
+  };
+  const double free = cost_of(kNoLimit), least = 3 + 10 * 0.125 + 0.125;
+  ASSERT_GT(free, 3 * least);
+  EXPECT_DOUBLE_EQ(cost_of(1.001 * free), free);
+  for (const double most : {0.9 * free, 0.5 * free, 1.5 * least}) {
+    EXPECT_LE(cost_of(most), most * (1 + 1e-6));
+    EXPECT_GT(cost_of(most), 0.7 * most);
+  }
+  EXPECT_NEAR(cost_of(0.5 * least), least, 1e-6);  // nothing is cheaper
 }
 
 TEST(SpreadSamples, AreEvenWhereNothingVaries) {

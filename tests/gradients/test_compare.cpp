@@ -291,6 +291,12 @@ TEST(Differences, BestStepIsTheMinimum) {
   EXPECT_LT(best_step(trials, 100), 0.256);
 }
 
+TEST(Differences, APilotThatTookAllTheTimeLeavesTheFewestSamples) {
+  EXPECT_DOUBLE_EQ(samples_behind_pilot(80, 0.5, 2), 40);
+  EXPECT_DOUBLE_EQ(samples_behind_pilot(80, 0.01, 2), 2);
+  EXPECT_DOUBLE_EQ(samples_behind_pilot(80, -0.43, 2), 2);
+}
+
 TEST(Differences, VarianceThatAPilotHasNotMetIsExtrapolated) {
   // An exact law stays as it is.
   for (const double power : {0.0, 1.0, 2.0}) {

@@ -1,5 +1,5 @@
 #pragma once
-// Errors of options. The library names the field; the program adds the spelling of its command line.
+// Errors of options. The library names the field; the program adds its command line's spelling.
 #include <string>
 
 #include "limn/core/error.h"
