@@ -378,7 +378,7 @@ TEST_F(ReferenceFile, OfSomethingElseIsRefused) {
 
   const MethodInput edges{job_.scene, kParameter, {"camera", "boundary"}, 0, 1};
   EXPECT_NE(refusal(identify(edges, {})).find("terms: "), std::string::npos);
-  EXPECT_NE(refusal(identify(job_.input, {{"spp", "3"}})).find("defines (-D)"), std::string::npos);
+  EXPECT_NE(refusal(identify(job_.input, {{"spp", "3"}})).find("defines: "), std::string::npos);
   job_.scene = read_scene(kFolder + "lamp_in_beckmann.xml", {}, nullptr);
   text = refusal(identity());
   EXPECT_NE(text.find("content of the scene file"), std::string::npos) << text;

@@ -7,7 +7,7 @@
 namespace limn {
 
 CheckResult run_check(const Scene& scene, const std::string& parameter, int spp,
-                      const std::vector<std::string>& terms, const std::string& method) {
+                      const std::vector<std::string>& terms, const Method& method) {
   CheckOptions options;
   options.method = method;
   options.parameter = parameter;

@@ -9,7 +9,8 @@ namespace limn {
 
 // By blocks of four pixels. Expects that all is finite.
 CheckResult run_check(const Scene& scene, const std::string& parameter, int spp,
-                      const std::vector<std::string>& terms = {}, const std::string& method = "");
+                      const std::vector<std::string>& terms = {},
+                      const Method& method = Method(Task::kGradient));
 // Expects some blocks and no disagreement in them.
 void expect_agreement(const Scene& scene, const std::string& parameter, int spp);
 
