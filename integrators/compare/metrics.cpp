@@ -66,6 +66,8 @@ double squared(double x) { return x * x; }
 
 }  // namespace
 
+size_t trimmed_pixels(size_t pixels) { return (pixels + 500) / 1000; }
+
 ImageErrors image_errors(const std::vector<double>& image, const std::vector<double>& reference,
                          const std::vector<double>& reference_variance) {
   std::vector<PixelError> pixels = pixel_errors(image, reference, reference_variance);
@@ -73,7 +75,7 @@ ImageErrors image_errors(const std::vector<double>& image, const std::vector<dou
   errors.mse = mean_without_floor(pixels, pixels.size());
   const double power = mean_square(reference);
   errors.relative_mse = power > 0 ? errors.mse / power : kNaN;
-  const size_t kept = pixels.size() - (pixels.size() + 500) / 1000;
+  const size_t kept = pixels.size() - trimmed_pixels(pixels.size());
   std::nth_element(pixels.begin(), pixels.begin() + static_cast<std::ptrdiff_t>(kept), pixels.end(),
                    [](const PixelError& a, const PixelError& b) { return a.error < b.error; });
   errors.trimmed_mse = mean_without_floor(pixels, kept);

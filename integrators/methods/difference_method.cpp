@@ -77,8 +77,8 @@ Step find_step(const Scene& scene, const Parameter& parameter, size_t parameters
       run.seconds > 0 ? samples_behind_pilot(per_second, left, run.least_spp) : run.spp;
   return {
       best_step(trials, samples),
-      fmt::format("a pilot of {} samples per pixel at {} steps from {:.3g} to {:.3g}: least sum "
-                  "of squared bias and variance for {:.3g} samples per pixel",
+      fmt::format("a pilot of {} spp at {} steps from {:.3g} to {:.3g}: least sum of squared bias "
+                  "and variance for a run of {:.3g} spp",
                   r.spp, kTrials, job.steps.front(), job.steps.back(), samples)};
 }
 

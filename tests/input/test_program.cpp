@@ -160,6 +160,9 @@ TEST_F(Program, WithoutPythonTheDataIsWritten) {
   EXPECT_NE(outcome.text.find("no report.html: "), std::string::npos) << outcome.text;
   EXPECT_NE(outcome.text.find("All data is in " + folder), std::string::npos) << outcome.text;
   EXPECT_NE(outcome.text.find("mitsuba missing: "), std::string::npos) << outcome.text;
+  for (const char* text : {"MSE +- std. error", "error of forest, over its time"}) {
+    EXPECT_NE(outcome.text.find(text), std::string::npos) << outcome.text;
+  }
   EXPECT_FALSE(std::filesystem::exists(folder + "/report.html"));
   std::ifstream stream(folder + "/compare.json");
   const auto methods = nlohmann::json::parse(stream)["methods"];
@@ -359,7 +362,7 @@ TEST_F(Program, MethodsAndTheirSettingsAreListed) {
     EXPECT_EQ(text.find("concave"), std::string::npos) << text;
     EXPECT_NE(text.find("li2019"), std::string::npos) << text;
   }
-  EXPECT_NE(all.find("    concave=off|on: "), std::string::npos) << all;
+  EXPECT_NE(all.find("    concave=off|on  "), std::string::npos) << all;
 }
 
 // Names of earlier versions tell those of today.

@@ -14,6 +14,7 @@
 #include "limn/core/parameter.h"
 #include "limn/core/surface_point.h"
 #include "tools/limn/command_support.h"
+#include "tools/limn/table.h"
 
 namespace limn {
 
@@ -166,16 +167,20 @@ double error_of(const Moments& g) {
 // JSON has no NaN.
 json number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
 
+std::string six_digits(double value) { return fmt::format("{:.6g}", value); }
+std::string error_cell(double error) {
+  return std::isfinite(error) ? fmt::format("{:.2g}", error) : "-";
+}
+
 // A number, or the channels of a colour.
-json write_numbers(const ParameterAdjoint& p, bool quiet) {
+json write_numbers(const ParameterAdjoint& p, Table& table) {
   json values = json::array(), errors = json::array();
   for (size_t i = 0; i < p.moments.size(); ++i) {
     const double value = p.moments.mean(i), error = std::sqrt(p.moments.variance(i));
     values.push_back(value);
     errors.push_back(number(error));
-    if (quiet) continue;
-    const std::string name = p.shape.empty() ? p.name : p.name + "." + "rgb"[i];
-    fmt::print("{:32} {:14.6g} +- {:.2g}\n", name, value, error);
+    table.add({p.shape.empty() ? p.name : p.name + "." + "rgb"[i], p.unit, six_digits(value),
+               error_cell(error), ""});
   }
   const bool one = p.shape.empty();
   json entry = {{"name", p.name},
@@ -237,11 +242,9 @@ namespace {
 
 // What both kinds of arrays have.
 json describe_array(const ParameterAdjoint& p, const BackwardFiles::Array& array, double scale,
-                    const std::string& main_file, bool quiet) {
-  if (!quiet) {
-    fmt::print("{:32} {:14.6g} +- {:.2g} (length of the array), {}\n", p.name, norm(p.moments),
-               error_of(p.moments), main_file);
-  }
+                    const std::string& main_file, Table& table) {
+  table.add({p.name, p.unit, six_digits(norm(p.moments)), error_cell(error_of(p.moments)),
+             main_file + " (norm of the array)"});
   return {{"name", p.name},
           {"unit", p.unit},
           {"shape", p.shape},
@@ -253,7 +256,7 @@ json describe_array(const ParameterAdjoint& p, const BackwardFiles::Array& array
 }
 
 json write_vertices(const Scene& scene, const ParameterAdjoint& p,
-                    const BackwardFiles::Array& array, const RayTracer& tracer, bool quiet) {
+                    const BackwardFiles::Array& array, const RayTracer& tracer, Table& table) {
   const VertexGradient gradient = of_vertices(scene.shape(array.shape).mesh, p);
   const Image image = picture(scene, array.shape, gradient, tracer);
   const double scale = signed_scale(image);
@@ -261,21 +264,21 @@ json write_vertices(const Scene& scene, const ParameterAdjoint& p,
   write_file(array.npy, npy_text(p));
   write_file(array.txt, field_text(gradient));
   write_signed_png(array.png, image, scale);
-  json entry = describe_array(p, array, scale, array.ply, quiet);
+  json entry = describe_array(p, array, scale, array.ply, table);
   entry["mesh"] = array.ply;
   entry["field"] = array.txt;
   return entry;
 }
 
 // A field that --wrt EMITTER.data:FILE reads.
-json write_texels(const ParameterAdjoint& p, const BackwardFiles::Array& array, bool quiet) {
+json write_texels(const ParameterAdjoint& p, const BackwardFiles::Array& array, Table& table) {
   const Image map = to_map(p, false);
   const double scale = signed_scale(map);
   write_exr(array.exr, map, false, {});
   if (p.moments.batches() > 1) write_exr(array.stderr_exr, to_map(p, true), false, {});
   write_file(array.npy, npy_text(p));
   write_signed_png(array.png, map, scale);
-  json entry = describe_array(p, array, scale, array.exr, quiet);
+  json entry = describe_array(p, array, scale, array.exr, table);
   entry["field"] = array.exr;
   return entry;
 }
@@ -285,18 +288,21 @@ json write_texels(const ParameterAdjoint& p, const BackwardFiles::Array& array, 
 json write_parameters(const Scene& scene, const BackwardFiles& files, const BackwardResult& result,
                       bool quiet) {
   const auto tracer = make_embree_tracer(scene, 1);
+  Table table(
+      {{"parameter", true}, {"unit", true}, {"derivative"}, {"std. error"}, {"file", true}});
   json list = json::array();
   for (const ParameterAdjoint& p : result.parameters) {
     const auto array = std::find_if(files.arrays.begin(), files.arrays.end(),
                                     [&](const auto& a) { return a.parameter == p.name; });
     if (array == files.arrays.end()) {
-      list.push_back(write_numbers(p, quiet));
+      list.push_back(write_numbers(p, table));
     } else if (array->shape.valid()) {
-      list.push_back(write_vertices(scene, p, *array, *tracer, quiet));
+      list.push_back(write_vertices(scene, p, *array, *tracer, table));
     } else {
-      list.push_back(write_texels(p, *array, quiet));
+      list.push_back(write_texels(p, *array, table));
     }
   }
+  if (!quiet) fmt::print("\n{}\n", table.text());
   return list;
 }
 

@@ -13,6 +13,7 @@
 #include "tools/limn/commands.h"
 #include "tools/limn/output_files.h"
 #include "tools/limn/run_part.h"
+#include "tools/limn/table.h"
 
 namespace limn {
 namespace {
@@ -106,7 +107,7 @@ class BackwardCommand final : public Command {
 
   bool over_faces() const { return options_.points == FilmPoints::kFaces; }
   std::string work_of(int64_t spp) const {
-    return over_faces() ? "of visible faces" : fmt::format("{} samples per pixel", spp);
+    return over_faces() ? "visible faces" : fmt::format("{} samples per pixel", spp);
   }
 
   static bool interrupted(const RunSettings& settings) { return settings.interrupted->load(); }
@@ -175,7 +176,8 @@ class BackwardCommand final : public Command {
             {"adjoint", files_.adjoint}};
   }
   void print_loss(const LossResult& loss) const {
-    if (!common_.quiet) fmt::print("{}: {:.6g} +- {:.2g}\n", loss_, loss.value, loss.error);
+    if (common_.quiet) return;
+    fmt::print("loss ({})  {}\n", loss_, with_error(loss.value, loss.error));
   }
 
   int write_loss_alone(const Scene& scene, const RunSettings& settings,
@@ -185,7 +187,7 @@ class BackwardCommand final : public Command {
                          {"spp", loss.spp},         {"seed", settings.seed},
                          {"loss", loss_json(loss)}, {"warnings", warnings_.lines()}};
     write_json(common_.json, report.dump(2));
-    if (!common_.quiet) fmt::print("{}: {}\n", files_.adjoint, work_of(loss.spp));
+    if (!common_.quiet) fmt::print("adjoint  {}\n{}\n", files_.adjoint, work_of(loss.spp));
     return kSuccess;
   }
 
@@ -215,8 +217,8 @@ class BackwardCommand final : public Command {
     write_json(files_.json, report.dump(2));
     if (!common_.json.empty()) write_json(common_.json, report.dump(2));
     if (!common_.quiet) {
-      fmt::print("{}: {}, {:.2f} s, of which {:.2f} s set-up\n", files_.json, work_of(result.spp),
-                 result.seconds, result.setup_seconds);
+      fmt::print("figures: {}\n{} in {:.2f} s (set-up {:.2f} s)\n", files_.json,
+                 work_of(result.spp), result.seconds, result.setup_seconds);
     }
     if (stats_) print_stats(result);
   }
@@ -239,17 +241,20 @@ class BackwardCommand final : public Command {
 
   static void print_stats(const BackwardResult& result) {
     for (const auto& [name, count] : result.stats.edges) fmt::print("edges {}: {}\n", name, count);
+    Table terms({{"term", true}, {"samples"}, {"rays"}, {"time of all threads [s]"}});
     for (const TermRun& term : result.terms) {
       const TermCost& c = term.cost;
       if (c.samples == 0) continue;
-      fmt::print("{}: {} samples, {} rays, {:.3g} s of all threads\n", term.name, c.samples, c.rays,
-                 c.seconds);
+      terms.add({term.name, std::to_string(c.samples), std::to_string(c.rays),
+                 fmt::format("{:.3g}", c.seconds)});
     }
+    fmt::print("\n{}\n", terms.text());
     fmt::print("{} numbers added to the gradient; the longest tape: {} bytes\n",
                result.contributions, result.tape_bytes);
-    for (const auto& [name, seconds] : result.stats.setup) {
-      fmt::print("set-up, {}: {:.3g} s\n", name, seconds);
-    }
+    Table setup({{"set-up", true}, {"time [s]"}});
+    for (const auto& [name, seconds] : result.stats.setup)
+      setup.add({name, fmt::format("{:.3g}", seconds)});
+    fmt::print("\n{}", setup.text());
   }
 
   // Of the time, for each of the two images of a loss; not tuned.

@@ -324,7 +324,7 @@ int FitCommand::run(const std::string&) {
 int FitCommand::loop(Fit& fit, FitFolder& folder, const RunSettings& settings) {
   const FitArguments& a = folder.arguments();
   if (fit.steps() == 0) folder.add_snapshot(fit, settings, kPictureSamples, common_.quiet);
-  if (folder.at_rest(fit)) fmt::print(stderr, "the fit is at rest: no step is left to take\n");
+  if (folder.at_rest(fit)) fmt::print(stderr, "the fit has converged: no step is left to take\n");
   while (fit.steps() < a.steps && !folder.at_rest(fit)) {
     std::optional<FitRecord> record;
     try {
@@ -354,7 +354,7 @@ int FitCommand::loop(Fit& fit, FitFolder& folder, const RunSettings& settings) {
 void FitCommand::tell(const FitRecord& record) const {
   if (common_.quiet) return;
   if (record.at_rest) {
-    fmt::print("step {}: at rest, no lower loss was found along the gradient\n", record.step);
+    fmt::print("step {}: converged, no lower loss was found along the gradient\n", record.step);
   }
   if (record.halvings > 0) {
     fmt::print(stderr, "step {}: halved {} times, so that no face loses its area\n", record.step,

@@ -179,10 +179,7 @@ void print_samples(const GradientResult& r) {
              r.setup_seconds);
   if (r.pilot_spp > 0) fmt::print("; terms allocated from a pilot of {} spp", r.pilot_spp);
   fmt::print("\n");
-  for (const MethodSetting& setting : r.settings) {
-    std::visit([&](const auto& value) { fmt::print("{}: {}\n", setting.name, value); },
-               setting.value);
-  }
+  for (const MethodSetting& setting : r.settings) fmt::print("{}\n", setting_line(setting));
 }
 
 std::string text_of(const GradientResult& result, const LargestSample& largest) {

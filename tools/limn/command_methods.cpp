@@ -1,8 +1,11 @@
 // `limn methods`: the table of methods, and what each can do.
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "limn/integrators/methods.h"
 #include "tools/limn/commands.h"
+#include "tools/limn/table.h"
 
 namespace limn {
 namespace {
@@ -10,17 +13,24 @@ namespace {
 constexpr Task kTasks[] = {Task::kImage, Task::kGradient, Task::kBackward, Task::kFit,
                            Task::kCompare};
 
+std::string text_of(const Setting& setting) {
+  return fmt::format("{}={}", setting.name, fmt::join(setting.values, "|"));
+}
+
 // "default" where the task takes the method unless another one is named.
 std::string cell(const MethodType& type, Task task) {
   if (!type.can(task)) return "-";
   return task != Task::kCompare && Method(task).name() == type.name ? "default" : "yes";
 }
 
-void print_settings(const MethodType& type) {
-  for (const Setting& setting : type.settings.list()) {
-    fmt::print("    {}={}: {}\n", setting.name, fmt::join(setting.values, "|"),
-               setting.description);
+// Their longest name with values, of all methods.
+size_t settings_width() {
+  size_t width = 0;
+  for (const MethodType& type : method_types()) {
+    for (const Setting& setting : type.settings.list())
+      width = std::max(width, text_of(setting).size());
   }
+  return width;
 }
 
 class MethodsCommand final : public Command {
@@ -33,15 +43,21 @@ class MethodsCommand final : public Command {
                  "forest:width=4:look-ahead=none");
   }
   int run(const std::string&) override {
-    fmt::print("{:12}", "method");
-    for (const Task task : kTasks) fmt::print(" {:8}", kTaskNames[static_cast<int>(task)]);
-    fmt::print("\n");
+    std::vector<Table::Column> columns = {{"method", true}};
+    for (const Task task : kTasks) columns.push_back({kTaskNames[static_cast<int>(task)], true});
+    columns.push_back({"what it computes", true});
+    Table table(columns);
+    const size_t width = settings_width();
     for (const MethodType& type : method_types()) {
-      fmt::print("{:12}", type.name);
-      for (const Task task : kTasks) fmt::print(" {:8}", cell(type, task));
-      fmt::print(" {}\n", type.description);
-      if (all_) print_settings(type);
+      Table::Row row = {type.name};
+      for (const Task task : kTasks) row.push_back(cell(type, task));
+      row.emplace_back(type.description);
+      table.add(row);
+      if (!all_) continue;
+      for (const Setting& setting : type.settings.list())
+        table.add_line(fmt::format("    {:{}}  {}", text_of(setting), width, setting.description));
     }
+    fmt::print("{}", table.text());
     return kSuccess;
   }
 

@@ -95,13 +95,7 @@ class RenderCommand final : public Command {
     remove_stale(output_, {output_});
     write_exr(output_, film_channels(scene, image), scene.film.half, attributes);
     write_png(picture, image, 1);
-    if (!common_.quiet && options_.points == FilmPoints::kFaces) {
-      fmt::print("{} and {}: of visible faces, {:.2f} s\n", output_, picture, result.seconds);
-    } else if (!common_.quiet) {
-      fmt::print("{} and {}: {} samples per pixel, {:.2f} s, {:.3g} million rays per second\n",
-                 output_, picture, result.spp, result.seconds,
-                 static_cast<double>(result.rays) / result.seconds / 1e6);
-    }
+    if (!common_.quiet) print(picture, result);
     if (common_.json.empty()) return;
     nlohmann::json report = {{"scene", scene.file},
                              {"sensor", sensor_name(scene)},
@@ -117,6 +111,16 @@ class RenderCommand final : public Command {
     if (has_generator()) report["generator"] = options_.generator;
     if (has_points()) report["points"] = name_of(options_.points);
     write_json(common_.json, report.dump(2));
+  }
+
+  void print(const std::string& picture, const RenderResult& result) const {
+    fmt::print("image    {}\npicture  {}\n", output_, picture);
+    if (options_.points == FilmPoints::kFaces) {
+      fmt::print("visible faces in {:.2f} s\n", result.seconds);
+      return;
+    }
+    fmt::print("{} samples per pixel in {:.2f} s, {:.3g} million rays per second\n", result.spp,
+               result.seconds, static_cast<double>(result.rays) / result.seconds / 1e6);
   }
 
   CommonOptions common_;

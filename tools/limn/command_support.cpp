@@ -276,6 +276,17 @@ std::vector<ImageAttribute> settings_attributes(const std::vector<MethodSetting>
   return {{"limn.settings", text}};
 }
 
+std::string with_error(double value, double error) {
+  return std::isfinite(error) ? fmt::format("{:.6g} +- {:.2g}", value, error)
+                              : fmt::format("{:.6g}", value);
+}
+
+std::string setting_line(const MethodSetting& setting) {
+  const auto* number = std::get_if<double>(&setting.value);
+  return setting.name + ": " +
+         (number ? fmt::format("{:.6g}", *number) : std::get<std::string>(setting.value));
+}
+
 nlohmann::json settings_json(const std::vector<MethodSetting>& settings) {
   nlohmann::json object = nlohmann::json::object();
   for (const MethodSetting& s : settings) {

@@ -70,6 +70,10 @@ Image film_channels(const Scene& scene, const Image& image);
 // What the method was set up with, as "name value, ..."; none where there is nothing to say.
 std::vector<ImageAttribute> settings_attributes(const std::vector<MethodSetting>& settings);
 nlohmann::json settings_json(const std::vector<MethodSetting>& settings);
+// "1.5 +- 0.02", without the standard error where there is none.
+std::string with_error(double value, double error);
+// For people, "NAME: VALUE"; numbers to six digits, those of JSON are exact.
+std::string setting_line(const MethodSetting& setting);
 // output with another ending: "a/b.exr", "_stderr.exr" gives "a/b_stderr.exr".
 std::string with_ending(const std::string& output, const std::string& ending);
 // Made before long work starts: InputError if the file cannot be written.

@@ -8,6 +8,7 @@
 #include "limn/core/error.h"
 #include "limn/integrators/compare_images.h"
 #include "tools/limn/output_files.h"
+#include "tools/limn/table.h"
 
 namespace limn {
 namespace {
@@ -32,8 +33,12 @@ void print_images(const ImageComparison& result) {
              result.reference_method, result.reference_spp,
              relative_error(result.reference_squared_error));
   if (!result.not_by_rays.empty()) fmt::print("(not rays: {})\n", result.not_by_rays);
-  fmt::print("{:12} {:>8} {:>8} {:>8} {:>18} {:>10}\n", "method", "time", "seconds", "spp",
-             "relative error", "of first");
+  Table table({{"method", true},
+               {"given [s]"},
+               {"taken [s]"},
+               {"spp"},
+               {"relative error +- std. error"},
+               {"over that of " + result.rows[0].method}});
   for (const ComparedImage& row : result.rows) {
     double first = 0;
     for (const ComparedImage& other : result.rows) {
@@ -42,10 +47,11 @@ void print_images(const ImageComparison& result) {
       }
     }
     const bool known = first > 0 && row.squared_error > 0;
-    fmt::print("{:12} {:8.3g} {:8.3g} {:8.3g} {:>18} {:>10}\n", row.method, row.time, row.seconds,
-               row.spp, error_in_text(result, row),
-               known ? fmt::format("{:.3g}", relative_error(row.squared_error / first)) : "-");
+    table.add({row.method, fmt::format("{:.3g}", row.time), fmt::format("{:.3g}", row.seconds),
+               fmt::format("{:.3g}", row.spp), error_in_text(result, row),
+               known ? fmt::format("{:.3g}", relative_error(row.squared_error / first)) : "-"});
   }
+  fmt::print("\n{}", table.text());
 }
 
 void write_images(const ImageCompareArguments& arguments, const Scene& scene,

@@ -11,6 +11,7 @@
 
 #include "tools/limn/command_support.h"
 #include "tools/limn/output_files.h"
+#include "tools/limn/table.h"
 
 namespace limn {
 namespace {
@@ -241,26 +242,45 @@ std::string uncertain(const Uncertain& u) {
                              : fmt::format("{:.3g} +- {:.1g}", u.value, u.error);
 }
 
-void print_method(const ComparedMethod& m, size_t rungs, size_t width) {
-  if (m.summary.empty() || m.summary.back().rung + 1 != rungs) {
-    const bool missing = m.status == MethodStatus::kMissing;
-    fmt::print("{:{}} {}{}\n", m.name, width, missing ? "missing: " : "", m.message);
-    return;
-  }
+Table::Row row_of(const ComparedMethod& m) {
   const RungSummary& s = m.summary.back();
   const std::string bias =
       s.bias.count > 0 ? fmt::format("{:.2g} ({:.2g})", p_value(s.bias), s.bias.largest) : "-";
-  fmt::print(
-      "{:{}} {:>7.3g} {:>7.2g} {:>8.4g} {:>9} {:>20} {:>9.3g} {:>9.3g} {:>14} {:>16} {:>15}\n",
-      m.name, width, s.seconds, s.setup_seconds, s.spp,
-      s.rays > 0 ? fmt::format("{:.3g}", s.rays) : "-", uncertain(s.mse), s.relative_mse.value,
-      s.trimmed_mse.value, bias, m.time_ratio ? uncertain(*m.time_ratio) : "-",
-      m.slope ? uncertain(*m.slope) : "-");
-  if (m.status != MethodStatus::kDone) fmt::print("  {}\n", m.message);
-  for (const MethodSetting& setting : m.settings) {
-    std::visit([&](const auto& value) { fmt::print("  {}: {}\n", setting.name, value); },
-               setting.value);
+  return {m.name,
+          fmt::format("{:.3g}", s.seconds),
+          fmt::format("{:.2g}", s.setup_seconds),
+          fmt::format("{:.4g}", s.spp),
+          s.rays > 0 ? fmt::format("{:.3g}", s.rays / 1e6) : "-",
+          uncertain(s.mse),
+          fmt::format("{:.3g}", s.relative_mse.value),
+          fmt::format("{:.3g}", s.trimmed_mse.value),
+          bias,
+          m.time_ratio ? uncertain(*m.time_ratio) : "-",
+          m.slope ? uncertain(*m.slope) : "-"};
+}
+
+void add_method(const ComparedMethod& m, size_t rungs, Table& table) {
+  if (m.summary.empty() || m.summary.back().rung + 1 != rungs) {
+    const bool missing = m.status == MethodStatus::kMissing;
+    table.add_line(m.name + (missing ? " missing: " : ": ") + m.message);
+    return;
   }
+  table.add(row_of(m));
+  if (m.status != MethodStatus::kDone) table.add_line("  " + m.message);
+  for (const MethodSetting& setting : m.settings) table.add_line("  " + setting_line(setting));
+}
+
+// What the columns are.
+void print_legend(const Comparison& c) {
+  const size_t pixels = c.reference.image.size() / 3, left_out = trimmed_pixels(pixels);
+  fmt::print(
+      "\nMSE: mean squared error against the reference; relative: over its mean square; trimmed:\n"
+      "without the {} of {} pixels with the largest errors ({:.2g} %). Bias: p of no bias, and "
+      "the\n"
+      "largest |z| of blocks of pixels. Time ratio: time for the error of {}, over its time.\n"
+      "Slope: of log MSE over log time.\n",
+      left_out, pixels, 100.0 * static_cast<double>(left_out) / static_cast<double>(pixels),
+      c.methods[0].name);
 }
 
 }  // namespace
@@ -275,15 +295,23 @@ void write_comparison(const std::string& folder, const Scene& scene, const Compa
 }
 
 void print_comparison(const Comparison& c) {
-  size_t width = 6;
-  for (const ComparedMethod& m : c.methods) width = std::max(width, m.name.size());
-  fmt::print("reference: {}, {} samples per pixel, {:.3g} s{}, its own error {:.3g}\n",
+  fmt::print("reference: {}, {} samples per pixel, {:.3g} s{}, MSE of its own {:.3g}\n",
              c.reference.method, c.reference.spp, c.reference.seconds,
              c.reference.cached ? " (kept)" : "", mean_of(c.reference.variance));
-  fmt::print("{:{}} {:>7} {:>7} {:>8} {:>9} {:>20} {:>9} {:>9} {:>14} {:>16} {:>15}\n", "method",
-             width, "s", "set-up", "spp", "rays", "mse", "relative", "trimmed", "bias p (|z|)",
-             "time, 1st = 1", "slope");
-  for (const ComparedMethod& m : c.methods) print_method(m, c.options.times.size(), width);
+  Table table({{"method", true},
+               {"time [s]"},
+               {"set-up [s]"},
+               {"spp"},
+               {"million rays"},
+               {"MSE +- std. error"},
+               {"relative MSE"},
+               {"trimmed MSE"},
+               {"bias: p (max |z|)"},
+               {"time ratio"},
+               {"slope"}});
+  for (const ComparedMethod& m : c.methods) add_method(m, c.options.times.size(), table);
+  fmt::print("\n{}", table.text());
+  print_legend(c);
 }
 
 }  // namespace limn

@@ -18,6 +18,7 @@
 #include "limn/integrators/parts.h"
 #include "limn/integrators/render.h"
 #include "tools/limn/command_support.h"
+#include "tools/limn/table.h"
 
 namespace limn {
 
@@ -430,36 +431,47 @@ json FitFolder::mesh_figures(const Shape& s, const std::string& name, int thread
   return figures;
 }
 
+void FitFolder::print_snapshot(const Fit& fit, const json& meshes) {
+  std::vector<Table::Column> columns;
+  Table::Row cells;
+  const auto add = [&](const std::string& heading, size_t width, const std::string& cell) {
+    columns.push_back({heading, false, width});
+    cells.push_back(cell);
+  };
+  const json last = history_.empty() ? json::object() : history_.back();
+  const auto figure = [](const json& of, const char* key, auto format) {
+    const auto at = of.find(key);
+    return at == of.end() || at->is_null() ? "-" : fmt::format(format, at->template get<double>());
+  };
+  add("step", 6, std::to_string(fit.steps()));
+  add("loss", 10, figure(last, "loss", FMT_STRING("{:.4g}")));
+  add("std. error", 10, figure(last, "stderr", FMT_STRING("{:.1g}")));
+  for (const FitScalar& s : fit.scalars()) add(s.name, 12, fmt::format("{:.6g}", s.value));
+  for (const json& mesh : meshes) {
+    const std::string shape = mesh.at("shape").get<std::string>();
+    add(shape + ": crossings", 0, figure(mesh, "crossings", FMT_STRING("{:.0f}")));
+    add("inside out", 0, figure(mesh, "inside_out", FMT_STRING("{:.0f}")));
+    if (!mesh.contains("chamfer")) continue;
+    add("chamfer / diagonal", 0, figure(mesh, "chamfer", FMT_STRING("{:.4f}")));
+    add("normals [degrees]", 0, figure(mesh, "normal_angle", FMT_STRING("{:.1f}")));
+  }
+  const Table table(columns);
+  const std::string headings = table.heading_line();
+  if (headings != headings_) fmt::print("{}", headings);
+  headings_ = headings;
+  fmt::print("{}", table.line(cells));
+}
+
 void FitFolder::add_snapshot(const Fit& fit, const RunSettings& settings, int spp, bool quiet) {
   const bool again = !snapshots_.empty() && snapshots_.back().at("step") == fit.steps();
   if (again && spp == 0) return;  // its pictures stay
   json snapshot = {{"step", fit.steps()}, {"meshes", json::array()}, {"pictures", json::array()}};
-  std::string line = fmt::format("step {}", fit.steps());
-  if (!history_.empty()) {
-    const json& last = history_.back();
-    line += fmt::format(": loss {:.4g}", last.at("loss").get<double>());
-    if (!last.at("stderr").is_null()) {
-      line += fmt::format(" +- {:.1g}", last.at("stderr").get<double>());
-    }
-  }
-  for (const FitScalar& s : fit.scalars()) line += fmt::format(", {} {:.6g}", s.name, s.value);
   std::set<std::string> names;
   for (const Shape* shape : fitted_shapes(fit, arguments_.options.parameters)) {
     std::string name = fmt::format("step_{:05}_{}", fit.steps(), file_part(shape->id));
     // Ids that differ may be one as names of files.
     while (!names.insert(name).second) name += "_";
-    const json figures = mesh_figures(*shape, name + ".ply", settings.threads);
-    line += fmt::format(", {}: {} crossings", figures.at("shape").get<std::string>(),
-                        figures.at("crossings").get<size_t>());
-    if (!figures.at("inside_out").is_null()) {
-      line += fmt::format(", {} faces inside out", figures.at("inside_out").get<size_t>());
-    }
-    if (figures.contains("chamfer")) {
-      line += fmt::format(", chamfer {:.4f}, normals {:.1f} degrees",
-                          figures.at("chamfer").get<double>(),
-                          figures.at("normal_angle").get<double>());
-    }
-    snapshot["meshes"].push_back(figures);
+    snapshot["meshes"].push_back(mesh_figures(*shape, name + ".ply", settings.threads));
   }
   for (const std::string& name : arguments_.options.parameters) {
     const Scene* scene = with_map(fit, name);
@@ -493,7 +505,7 @@ void FitFolder::add_snapshot(const Fit& fit, const RunSettings& settings, int sp
   if (again) snapshots_.erase(snapshots_.size() - 1);
   snapshots_.push_back(snapshot);
   if (quiet) return;
-  fmt::print("{}\n", line);
+  print_snapshot(fit, snapshot["meshes"]);
   std::fflush(stdout);  // also where it goes to a file: the next one may be an hour away
 }
 

@@ -76,7 +76,11 @@ class FitFolder {
   std::string file(const std::string& name) const;
   nlohmann::json mesh_figures(const Shape& shape, const std::string& name, int threads) const;
 
+  // Headings where they are not those of the last snapshot.
+  void print_snapshot(const Fit& fit, const nlohmann::json& meshes);
+
   std::string folder_;
+  std::string headings_;  // that were printed last
   FitArguments arguments_;
   nlohmann::json history_ = nlohmann::json::array(), snapshots_ = nlohmann::json::array();
 };

@@ -14,9 +14,11 @@ struct ImageErrors {
   // zero now and then for an image that is nearly as good as the reference.
   double mse = 0;
   double relative_mse = 0;  // mse / mean of reference^2; NaN for a black reference
-  // The same as mse without the pixels of the largest errors: a thousandth of them, rounded.
+  // The same as mse without the trimmed_pixels() of the largest errors.
   double trimmed_mse = 0;
 };
+// A thousandth of the pixels, rounded.
+size_t trimmed_pixels(size_t pixels);
 ImageErrors image_errors(const std::vector<double>& image, const std::vector<double>& reference,
                          const std::vector<double>& reference_variance);
 
