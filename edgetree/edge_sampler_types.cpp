@@ -13,26 +13,31 @@ namespace {
 Settings forest_settings() {
   const ForestConfig standard;
   return {
-      {"width", "Children of a node", {"8", "4", "2"}},
+      {"width", "Children per node", {"8", "4", "2"}},
       {"look-ahead",
-       fmt::format("Which children weigh by the lengths that their own children expect: those of "
-                   "height up to {} (low), none, those that hold edges, or all",
+       fmt::format("Two-level importance: which children are weighted by their own children. low: "
+                   "those of height at most {}; edges: those whose children are edges",
                    standard.look_ahead),
        {"low", "none", "edges", "all"}},
-      {"expansion", "Nodes are expanded where the lobe is narrow or the point near", {"on", "off"}},
+      {"expansion",
+       "Expand top nodes per query where the lobe is narrow or the shading point is near",
+       {"on", "off"}},
       {"axes",
-       "Dual boxes along the principal axes of a node's planes, or along any",
+       "Orientation of dual boxes: the principal axes of a node's planes, or arbitrary axes",
        {"principal", "any"}},
       {"weights",
-       "Children weigh by how deep the query plane cuts their dual box (soft); or by "
-       "length and distance alone unless rejected (hard)",
+       "Weight of children that are not rejected. soft: by how the query plane cuts the dual box; "
+       "hard: by length and distance only",
        {"soft", "hard"}},
       {"motion",
-       "Weights count motion across the line of sight, or in any direction",
+       "Speed of edges in weights: normal to the plane through edge and shading point (across), or "
+       "of any direction",
        {"across", "any"}},
-      {"concave", "Concave edges of closed one-sided meshes are kept", {"off", "on"}},
-      {"lights", "Weights follow where the lights are", {"on", "off"}},
-      {"environment", "Weights follow an environment that is not uniform", {"on", "off"}},
+      {"concave",
+       "Keep concave edges of closed one-sided meshes, which cannot be silhouettes",
+       {"off", "on"}},
+      {"lights", "Weights include the radiance of emitters behind the edges", {"on", "off"}},
+      {"environment", "Weights include the radiance of a non-uniform environment", {"on", "off"}},
   };
 }
 
@@ -83,33 +88,34 @@ std::unique_ptr<EdgeSampler> make_uniform(const Settings&, const EdgeSamplerInpu
 
 std::span<const EdgeSamplerType> edge_sampler_types() {
   static const EdgeSamplerType types[] = {
-      {"forest", "8-wide trees that reject nodes without a silhouette", make_forest,
-       forest_settings()},
+      {"forest", "limn's trees of edges, 8-wide, which reject nodes without a silhouette",
+       make_forest, forest_settings()},
       {"silhouettes",
-       "the edge forest, which also lists all silhouettes in front of area lights and bright "
-       "environment patches",
+       "forest, and a list of all silhouettes in front of area lights and bright environment "
+       "patches",
        make_forest, forest_settings(), true},
       {"brute",
-       "lists every candidate and draws by a bound of its contribution (the oracle)",
+       "tests every edge, and samples candidates by a bound on their contribution (the oracle)",
        make_brute_force,
        {{"search",
-         "How candidates are found: one by one, or by a hierarchy over pairs of planes",
+         "Search for candidates: all edges in turn, or the hierarchy of Nowrouzezahrai et al. 2014",
          {"list", "dual-bvh"}}}},
       {"li2019",
-       "the tree of Li et al. 2018 over positions and Hough-transformed planes",
+       "the edge trees of Li et al. 2018, over positions and Hough-transformed planes",
        make_li2019,
        {{"sphere",
-         "The planes through a point are a sphere's surface; solid is redner's mistake",
+         "Hough test of a node: against the sphere's surface, or against the solid sphere as "
+         "redner does by mistake",
          {"surface", "solid"}}}},
       {"quadric",
-       "the forest of Soroka et al. 2025: 4-wide, dual boxes and pairs of quadrics",
+       "the forest of Soroka et al. 2025: 4-wide, with dual boxes and pairs of quadrics",
        make_quadric,
-       {{"quadrics",
-         "Nodes have pairs of bounding quadrics beside their dual boxes",
-         {"on", "off"}},
-        {"lights", "Weights follow where the lights are", {"on", "off"}},
-        {"concave", "Concave edges of closed one-sided meshes are kept", {"off", "on"}}}},
-      {"uniform", "any edge of the scene, any point on it", make_uniform},
+       {{"quadrics", "Bound nodes by pairs of quadrics in addition to dual boxes", {"on", "off"}},
+        {"lights", "Weights include the radiance of emitters behind the edges", {"on", "off"}},
+        {"concave",
+         "Keep concave edges of closed one-sided meshes, which cannot be silhouettes",
+         {"off", "on"}}}},
+      {"uniform", "all edges of the scene alike, and all points on an edge alike", make_uniform},
   };
   return types;
 }

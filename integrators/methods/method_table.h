@@ -15,14 +15,15 @@ inline std::vector<MethodType> other_methods() {
            .terms = {"differences"},
            .run = run_differences},
           {.name = "path",
-           .description = "path tracing: light and BSDF samples, combined",
+           .description = "path tracing with multiple importance sampling of emitters and BSDFs",
            .defaults = {Task::kImage},
            .image = ImageMethod{}},
           {.name = "lines",
-           .description = "direct light and open sky, by lines between silhouettes",
+           .description = "direct light, ambient occlusion and open sky, integrated along lines "
+                          "between silhouettes",
            .image = ImageMethod{.looks_around = true, .by_lines = true}},
           {.name = "rays",
-           .description = "direct light and open sky, by quasi-random rays",
+           .description = "direct light, ambient occlusion and open sky, by quasi-random rays",
            .image = ImageMethod{.looks_around = true}}};
 }
 

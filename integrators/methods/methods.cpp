@@ -114,7 +114,7 @@ std::vector<std::string> method_names(Task task) {
 
 void check_task(const Method& method, Task task) {
   if (method->can(task)) return;
-  throw InputError("the method \"" + method.name() + "\" cannot do the task " +
+  throw InputError("the method \"" + method.name() + "\" is not available for " +
                    kTaskNames[static_cast<int>(task)] + " (" + known_names(method_names(task)) +
                    ")");
 }

@@ -176,7 +176,8 @@ class TermJob {
       return !is_zero(motion.x) || !is_zero(motion.y);
     });
     const double share = static_cast<double>(moving) / static_cast<double>(film.size());
-    result.settings.push_back({"pixels whose positions move", std::round(share * 100) / 100});
+    result.settings.push_back(
+        {"share of pixels with reparameterised film samples", std::round(share * 100) / 100});
   }
 
   // What moving directions change in one term they take back in the others, and at every jump of

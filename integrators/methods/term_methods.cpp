@@ -19,15 +19,14 @@ Settings motion_settings(bool adaptive) {
   };
   return {
       {"directions",
-       "Directions move along with what they see (moving), are fixed in solid angle, or move at "
-       "random, which adds noise and changes no mean",
+       "Path directions: reparameterised (moving), detached (fixed), or with random motion, which "
+       "adds noise but no bias",
        values({"moving", "fixed", "random"})},
-      {"film", "Positions of samples on the film move along with what they see, or are fixed",
+      {"film", "Film samples: reparameterised to follow the image motion (moving), or fixed",
        values({"moving", "fixed"})},
-      {"spread", "Samples of a pixel go where the error is", values({"on", "off"})},
+      {"spread", "Allocate samples to pixels by their error", values({"on", "off"})},
       {"generator",
-       "Random numbers: Owen-scrambled Sobol' points, rescrambled for every batch, or "
-       "independent",
+       "Sample generator: Owen-scrambled Sobol' points, rescrambled per batch, or independent",
        values({"sobol", "independent"})},
   };
 }
@@ -97,7 +96,7 @@ std::vector<MethodType> term_methods() {
   std::vector<MethodType> methods;
   methods.push_back(method_row("adaptive",
                                "silhouettes, with reparameterised directions and film samples, and "
-                               "samples where the error is",
+                               "samples allocated by error",
                                "silhouettes", {}, motion_settings(true)));
   methods.back().defaults = {Task::kGradient, Task::kCompare};
   for (const EdgeSamplerType& type : edge_sampler_types()) {
@@ -110,20 +109,19 @@ std::vector<MethodType> term_methods() {
       "was", "warped-area sampling (Bangaru et al. 2020): auxiliary rays in place of edges",
       "uniform", {.warps = true},
       {{"bias",
-        "Few auxiliary rays bias the result; off: roulette over their number takes the "
-        "bias out",
+        "Use a fixed number of auxiliary rays, which biases the result (on), or remove the bias by "
+        "Russian roulette over their number (off)",
         {"on", "off"}}}));
-  methods.push_back(method_row(
-      "analytic",
-      "direct light of flat area lights on diffuse surfaces in closed form: soft shadows without "
-      "noise",
-      "uniform", {.closed = true}));
+  methods.push_back(method_row("analytic",
+                               "direct light of flat area lights on diffuse surfaces, in closed "
+                               "form: soft shadows without noise",
+                               "uniform", {.closed = true}));
   methods.back().check = check_closed_light;
   methods.back().image = ImageMethod{.closed_light = true};
   for (MethodType& row : methods) {
     if (row.name == "forest") row.defaults = {Task::kBackward, Task::kFit};
     if (row.name != "silhouettes") continue;
-    row.description += "; images: lines between silhouettes, or rays where these need less time";
+    row.description += "; images: as lines, or as rays where these take less time";
     row.set_up = [gradients = row.set_up](MethodType& to) {
       gradients(to);
       to.image.reset();

@@ -19,19 +19,19 @@ inline bool has_delta_lights(const Scene& scene) { return !scene.delta_lights.em
 inline constexpr double kLeastFilmSamples = 0.125;  // not tuned
 
 inline constexpr TermType kTermTypes[] = {
-    {"interior", "what slides within continuous regions", 1, true, false, true, 0, always, false,
-     false, make_interior_term},
-    {"camera", "silhouettes on the film", kLeastFilmSamples, false, true, false, 0, always, false,
-     false, make_camera_term},
-    {"boundary", "silhouettes that shading points see", 1, false, true, true, 0, always, false,
+    {"interior", "derivative of the integrand away from discontinuities", 1, true, false, true, 0,
+     always, false, false, make_interior_term},
+    {"camera", "silhouettes as the camera sees them", kLeastFilmSamples, false, true, false, 0,
+     always, false, false, make_camera_term},
+    {"boundary", "silhouettes as path vertices see them", 1, false, true, true, 0, always, false,
      false, make_boundary_term},
-    {"shadow", "edges of sharp shadows", 1, false, true, true, 1, has_delta_lights, false, false,
-     make_shadow_term},
-    {"direct", "silhouettes that shading points see before lamps and the sun", 1, false, true, true,
-     0, LightRegions::any_in, true, false, make_direct_term},
-    {"penumbra", "of these, what has a thin penumbra", 1, false, true, true, 2,
-     LightRegions::any_in, true, false, make_penumbra_term},
-    {"filter", "what pixels lose and gain at their rims, where positions follow what they see", 1,
+    {"shadow", "edges of the hard shadows of delta lights", 1, false, true, true, 1,
+     has_delta_lights, false, false, make_shadow_term},
+    {"direct", "silhouettes in front of emitters and bright environment patches", 1, false, true,
+     true, 0, LightRegions::any_in, true, false, make_direct_term},
+    {"penumbra", "boundary samples generated from the emitter, combined with direct by MIS", 1,
+     false, true, true, 2, LightRegions::any_in, true, false, make_penumbra_term},
+    {"filter", "derivative of the reconstruction filter with reparameterised film samples", 1,
      false, false, false, 0, always, false, true, make_filter_term},
 };
 

@@ -252,8 +252,10 @@ double read_alpha(Properties& properties) {
     }
   }
   const double alpha = properties.number(name, 0.1);
-  if (!(alpha >= 0 && alpha < kMaximumAlpha))
-    properties.fail(name, "the roughness must not be negative");
+  if (!(alpha >= 0)) properties.fail(name, "the roughness must not be negative");
+  if (!(alpha < kMaximumAlpha)) {
+    properties.fail(name, fmt::format("the roughness must be less than {:g}", kMaximumAlpha));
+  }
   return std::max(alpha, kMinimumAlpha);
 }
 

@@ -118,6 +118,10 @@ class Describer {
       add_property(element, object);
     } else if (contains(kObjectTags, element.name)) {
       object.children.push_back({describe_object(element), "", element.where});
+    } else if (element.name == "texture") {
+      throw InputError(element.where, object.tag + " \"" + object.type +
+                                          "\": textures are not supported (a constant colour is "
+                                          "<rgb name=... value=...>)");
     } else {
       std::vector<std::string> known = kObjectTags;
       known.insert(known.end(), property_tags().begin(), property_tags().end());

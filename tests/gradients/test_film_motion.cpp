@@ -209,7 +209,8 @@ Scene fence_scene(const TempFiles& files, int size) {
 double share_that_moves(const GradientResult& result) {
   double share = 0;
   for (const MethodSetting& setting : result.settings) {
-    if (setting.name == "pixels whose positions move") share = std::get<double>(setting.value);
+    if (setting.name == "share of pixels with reparameterised film samples")
+      share = std::get<double>(setting.value);
   }
   return share;
 }

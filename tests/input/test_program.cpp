@@ -379,8 +379,9 @@ TEST_F(Program, OldSpellingsNameTheNew) {
   tells("gradient " + wrt + " --method forest-concave",
         "the method \"forest-concave\" is called forest:concave=on");
   tells("gradient " + wrt + " --method path",
-        "the method \"path\" cannot do the task gradient (known: adaptive, ");
-  tells("backward " + wrt + " --method silhouettes:directions=moving", "the task backward");
+        "the method \"path\" is not available for gradient (known: adaptive, ");
+  tells("backward " + wrt + " --method silhouettes:directions=moving",
+        "is not available for backward");
   tells("compare " + wrt + " --time 1 --methods forest,forest:width=3", "one of 8, 4, 2");
   tells("compare " + wrt + " --time 1 --methods forest,forest:width=8", "is given twice");
 }
@@ -420,6 +421,8 @@ TEST_F(Program, BadNumbers) {
     EXPECT_NE(text.find(" is not a number from "), std::string::npos) << bad << '\n' << text;
   }
   EXPECT_EQ(run(render + " --spp 1 --seed 18446744073709551615").status, 0);
+  const std::string seed = refused(render + " --seed 12345678901234567890123");
+  EXPECT_NE(seed.find("from 0 to 18446744073709551615\n"), std::string::npos) << seed;
   EXPECT_NE(refused("check " + scene_ + " --wrt screen.translate.x --step 0").find("--step"),
             std::string::npos);
   EXPECT_EQ(refused("check " + scene_ + " --wrt screen.translate.x --spp 1"),
@@ -451,7 +454,8 @@ TEST_F(Program, ACheckOfReverseModeNeedsNoSampler) {
     EXPECT_EQ(status, 0) << text;
     EXPECT_NE(text.find("screen.translate.x: forward"), std::string::npos) << text;
   }
-  EXPECT_NE(refused(check + " --method fd").find("the task backward"), std::string::npos);
+  EXPECT_NE(refused(check + " --method fd").find("is not available for backward"),
+            std::string::npos);
 }
 
 TEST_F(Program, BadSamples) {

@@ -24,42 +24,47 @@ class BackwardCommand final : public Command {
  public:
   const char* name() const override { return "backward"; }
   const char* description() const override {
-    return "Derivatives of a loss with respect to all parameters at once";
+    return "Compute the derivatives of a loss with respect to all parameters (reverse mode)";
   }
 
   void add_options(CLI::App& app) override {
     app_ = &app;
     add_common_options(app, common_);
     auto* adjoint =
-        app.add_option("--adjoint", adjoint_, "Derivative of the loss for every pixel (.exr)");
-    auto* target = app.add_option("--target", target_, "Image that the loss compares with (.exr)");
+        app.add_option("--adjoint", adjoint_, "Image of dLoss/dpixel (.exr), in place of --target");
+    auto* target = app.add_option("--target", target_, "Image with which the loss compares (.exr)");
     adjoint->excludes(target);
-    app.add_option("--loss", loss_, "With --target: l2, relative-l2 or l1")->needs(target);
+    app.add_option("--loss", loss_, "Loss with --target: l2 (default), relative-l2 or l1")
+        ->needs(target);
     app.add_option("--pyramid", levels_,
-                   "With --target: the mean over the loss of the image as it is, at half its size, "
-                   "a quarter, ...: as many levels")
+                   "With --target: levels of an image pyramid, each half as large as the one "
+                   "before. The loss is the mean over the levels (default 1)")
         ->check(within(1, 32))
         ->needs(target);
     app.add_option("--wrt", options_.parameters,
-                   "Parameter, an array (SHAPE.vertex_positions) or a scalar; may be repeated "
-                   "(default: all of the scene but displacements, which repeat vertex_positions)");
+                   "Parameter, a scalar or an array such as SHAPE.vertex_positions (repeatable; "
+                   "default: all parameters except displacements)");
     add_reverse_options(app, options_, Task::kBackward);
     app.add_option("--batches", options_.batches,
-                   "At most, for standard errors; each costs some time per vertex")
+                   "Most batches, from which standard errors come; each takes some time per vertex "
+                   "(default 16)")
         ->check(within(1, 1 << 16));
     app.add_option("--time", seconds_,
-                   "Seconds, set-up and the images of a loss included: as many samples as fit, "
-                   "instead of --spp")
+                   "Time budget in seconds, instead of --spp; set-up and the images of the loss "
+                   "are included")
         ->check(within(1e-6, 1e7))
         ->type_name("SECONDS")
         ->excludes("--spp");
     app.add_flag("--loss-only", loss_only_,
-                 "With --target: write the loss and its derivative for every pixel alone")
+                 "With --target: write only the loss and its derivative per pixel (an image for "
+                 "--adjoint)")
         ->needs(target);
-    app.add_option("-o,--output", output_, "Folder to write (made if it is not there)")->required();
+    app.add_option("-o,--output", output_, "Folder for the results (created if missing)")
+        ->required();
     add_part_option(app, common_);
     app.get_option("--part")->excludes("--time");
-    app.add_flag("--stats", stats_, "Print edges, nodes, bytes, rays by kind, where the time went");
+    app.add_flag("--stats", stats_,
+                 "Print statistics: edges, nodes, bytes, rays by kind, time by phase");
   }
 
   bool join(BatchStore& store) override {

@@ -82,7 +82,7 @@ void print_check(const std::string& name, const CheckResult& r, int spp) {
              r.total.difference_error, r.total.z);
   fmt::print("  z of windows       mean {:.2f}, deviation {:.2f}, largest {:.2f}\n", r.windows.mean,
              r.windows.deviation, r.windows.largest);
-  fmt::print("  p                  {:.2g} (windows, image and terms together), smallest at {}\n",
+  fmt::print("  p                  {:.2g} (windows, image and terms together), smallest for {}\n",
              r.p, r.found);
   if (r.confirmation) {
     fmt::print("  second run there   p = {2:.2g} ({0} samples per pixel, step {1:.3g})\n",
@@ -149,17 +149,18 @@ class CheckCommand final : public Command {
     add_warp_options(app, options_.warp);
     add_film_option(app, film_);
     add_points_option(app, points_);
-    app.add_option("--step", options_.step,
-                   "Step of the differences (default: found in the image, by a pilot)")
+    app.add_option(
+           "--step", options_.step,
+           "Step of the finite differences, in the parameter's unit (default: a pilot finds it)")
         ->check(within(1e-12, 1e12));
     app.add_option("--block", options_.block,
-                   "Compare windows this many pixels apart (default: an eighth of the longer side, "
-                   "at least 4)")
+                   "Spacing in pixels of the windows whose sums are compared (default: an eighth "
+                   "of the longer side, at least 4)")
         ->check(within(1, 1 << 20));
     app.add_flag("--reverse", reverse_,
-                 "Compare reverse mode with forward mode instead: the sum over pixels of a random "
-                 "image times the derivative; an array stands for a random field. --method is then "
-                 "that of backward");
+                 "Compare reverse mode with forward mode instead, by the sum over pixels of the "
+                 "derivative times a random image. An array parameter moves along a random "
+                 "direction. --method is then a method of backward");
   }
 
   int run(const std::string&) override {

@@ -247,7 +247,7 @@ class CompareCommand final : public Command {
  public:
   const char* name() const override { return "compare"; }
   const char* description() const override {
-    return "Derivative images of several methods at equal time, with a report";
+    return "Compare methods at equal time, and write a report";
   }
   void add_options(CLI::App& app) override;
   int run(const std::string& command_line) override;
@@ -267,51 +267,55 @@ void CompareCommand::add_options(CLI::App& app) {
   auto* wrt =
       app.add_option("--wrt", command_.parameter, "Parameter to differentiate")->type_name("PARAM");
   app.add_flag("--image", command_.images,
-               "Compare images, not derivatives; methods are those of render: " +
+               "Compare images instead of derivatives. The methods are then: " +
                    limn::join(method_names(Task::kImage)))
       ->excludes(wrt);
   add_image_options(app, command_.what, command_.render);
   command_.render.generator = kGenerators[0];
   app.add_option("--methods", command_.methods,
-                 "Methods to compare, the first is the measure of the others: " +
+                 "Methods to compare; ratios are relative to the first: " +
                      limn::join(method_names(Task::kGradient)) + ", " + kMitsuba + ", " +
                      kMitsubaAfterSetup +
-                     " (Mitsuba's where it is installed); settings follow a colon, as in "
-                     "forest:width=4 (limn methods --all)")
+                     " (the last two run Mitsuba 3 if it is installed); settings follow a colon, "
+                     "as in forest:width=4 (limn methods --all)")
       ->delimiter(',')
       ->required()
       ->type_name("A,B,...");
-  app.add_option("--time", command_.time, "Seconds of each run, set-up included")
+  app.add_option("--time", command_.time, "Time budget of each run in seconds, set-up included")
       ->required()
       ->check(within(1e-6, 1e7))
       ->type_name("SECONDS");
   app.add_option("--sweep", command_.rungs,
-                 "Error against time: this many times, each twice the one before, up to --time (5 "
-                 "if no number is given)")
+                 "Measure error against time with N time budgets, each twice the one before, up to "
+                 "--time (N is 5 if not given)")
       ->expected(0, 1)
       ->default_str("5")
       ->check(within(1, 30))
       ->type_name("N");
-  app.add_option("--repeats", command_.repeats, "Runs of each method and time, for error bars")
+  app.add_option("--repeats", command_.repeats,
+                 "Runs of each method and time budget, from which error bars come")
       ->check(within(1, 1 << 20))
       ->capture_default_str();
   app.add_option("--reference", command_.reference,
-                 "Reference that limn compare wrote for the same scene and parameter (default: "
-                 "that of the folder, or a new one)")
+                 "Reference that limn compare wrote for the same scene and parameter (default: the "
+                 "one in the output folder, else a new one)")
       ->type_name("FILE.exr");
-  app.add_option("--reference-time", command_.reference_time,
-                 "Seconds for a new reference (default: four times all runs of one method)")
+  app.add_option(
+         "--reference-time", command_.reference_time,
+         "Time budget of a new reference in seconds (default: four times all runs of one method)")
       ->check(within(1e-6, 1e7))
       ->type_name("SECONDS");
   add_term_options(app, command_.terms, command_.samples);
-  app.add_option("--step", command_.step, "Step of finite differences (default: found by a pilot)")
+  app.add_option("--step", command_.step,
+                 "Step of finite differences (method fd), in the parameter's unit (default: a "
+                 "pilot finds it)")
       ->check(within(1e-12, 1e12));
   add_warp_options(app, command_.warp);
   add_film_option(app, command_.film);
-  app.add_option("-o,--output", command_.output, "Folder to write")
+  app.add_option("-o,--output", command_.output, "Folder for images, report and results")
       ->required()
       ->type_name("FOLDER");
-  app.add_flag("!--no-report", command_.report, "Do not make report.html");
+  app.add_flag("!--no-report", command_.report, "Write no report.html");
 }
 
 int CompareCommand::run_images(const std::string& command_line) {

@@ -52,7 +52,7 @@ class FitCommand final : public Command {
  public:
   const char* name() const override { return "fit"; }
   const char* description() const override {
-    return "Find parameters, vertices included, from target images";
+    return "Optimise parameters, vertices included, towards target images";
   }
   void add_options(CLI::App& app) override;
   int run(const std::string&) override;
@@ -84,82 +84,85 @@ void FitCommand::add_options(CLI::App& app) {
   app.get_option("scene")->required(false);
   app.remove_option(app.get_option("--json"));
   app.remove_option(app.get_option("--sensor"));
-  app.add_option("--target", targets_,
-                 "Image to reach (.exr): one for each sensor of the scene, then of each --view")
+  app.add_option(
+         "--target", targets_,
+         "Target image (.exr), one for each sensor of the scene, then of each --view (repeatable)")
       ->type_name("EXR")
       ->allow_extra_args(false);
-  app.add_option("--mask", masks_,
-                 "Weights of its pixels (.exr), for each target in turn; \"-\" for none")
+  app.add_option(
+         "--mask", masks_,
+         "Image of pixel weights (.exr), one for each target in turn; \"-\" for none (repeatable)")
       ->type_name("EXR")
       ->allow_extra_args(false);
-  app.add_option("--view", views_, "A further scene that shares the parameters (repeatable)")
+  app.add_option("--view", views_, "Further scene that shares the parameters (repeatable)")
       ->type_name("SCENE[;NAME=VALUE...]")
       ->allow_extra_args(false);
   app.add_option("--wrt", given_.options.parameters,
-                 "What to fit: scalars, SHAPE.vertex_positions, SHAPE.displacement (along "
-                 "normals), the texels "
-                 "EMITTER.data (repeatable)")
+                 "Parameter to optimise: a scalar, SHAPE.vertex_positions, SHAPE.displacement "
+                 "(along normals) or the texels EMITTER.data (repeatable)")
       ->type_name("PARAM")
       ->allow_extra_args(false);
-  app.add_option("--bounds", given_.bounds, "What a scalar or the texels may be (repeatable)")
+  app.add_option("--bounds", given_.bounds, "Bounds of a scalar or of texels (repeatable)")
       ->type_name("PARAM=LEAST,MOST")
       ->allow_extra_args(false);
-  steps_option_ = app.add_option("--steps", given_.steps, "Steps in all")
+  steps_option_ = app.add_option("--steps", given_.steps, "Total number of steps")
                       ->check(within(int64_t{1}, int64_t{1} << 40));
-  app.add_option("--loss", given_.loss, "l2, relative-l2 or l1")->capture_default_str();
-  app.add_option(
-         "--pyramid", given_.options.pyramid,
-         "Levels: the mean over the loss of the image as it is, at half its size, a quarter, "
-         "...")
+  app.add_option("--loss", given_.loss, "Loss: l2, relative-l2 or l1")->capture_default_str();
+  app.add_option("--pyramid", given_.options.pyramid,
+                 "Levels of an image pyramid, each half as large as the one before. The loss is "
+                 "the mean over the levels")
       ->check(within(1, 32))
       ->capture_default_str();
   app.add_option("--optimiser,--optimizer", given_.optimiser,
-                 "adam-uniform (one scale for all vertices of a shape), adam, gradient-descent; "
-                 "with --method analytic lbfgs: the loss as a function, without noise")
+                 "Optimiser: adam-uniform (Adam with one scale for all vertices of a shape), adam, "
+                 "gradient-descent, or lbfgs, which needs a loss without noise (--method analytic)")
       ->capture_default_str();
   app.add_option("--step", given_.options.step,
-                 "Of the first step, in natural steps: 1 % of a shape's diagonal, 0.01 radians, "
-                 "1 % of a value")
+                 "Length of the first step in natural steps: 1 % of a shape's diagonal, 0.01 "
+                 "radians, 1 % of a value")
       ->check(within(1e-12, 1e12))
       ->capture_default_str();
   app.add_option("--step-half-life", given_.options.step_half_life,
-                 "After so many steps they are half as long (default: all are alike)")
+                 "Halve the step length every so many steps (default: never)")
       ->check(within(1, 1 << 30));
   app.add_option("--smoothing", given_.options.smoothing,
-                 "How far a step of a vertex spreads, over the shape's diagonal; 0: not at all")
+                 "How far the step of a vertex spreads over the mesh, as a share of the shape's "
+                 "diagonal (0: no smoothing)")
       ->check(within(0.0, 100.0))
       ->capture_default_str();
   app.add_option("--remesh", given_.options.remesh,
-                 "After these steps, vertices that are fitted get new triangles, as in 100,200")
+                 "Steps after which optimised meshes are remeshed, as in 100,200")
       ->delimiter(',')
       ->check(within(1, 1 << 30));
   app.add_option("--remesh-edge", given_.options.remesh_edge,
-                 "Length of edges then, over what it was")
+                 "Edge length after remeshing, relative to the mean length before")
       ->check(within(0.1, 10.0))
       ->capture_default_str();
   app.add_option("--remesh-shrink", given_.options.remesh_shrink,
-                 "After each remeshing steps and smoothing are so many times what they were")
+                 "Factor on the lengths of steps and smoothing after each remeshing")
       ->check(within(0.01, 1.0))
       ->capture_default_str();
   add_sampling_options(app);
-  app.add_option("--snapshots", given_.snapshots,
-                 "Steps between snapshots: meshes, pictures, state (default: ten in all)")
+  app.add_option(
+         "--snapshots", given_.snapshots,
+         "Steps between snapshots of meshes, images and state (default: ten snapshots in all)")
       ->check(within(1, 1 << 30));
-  app.add_option("--truth", truth_, "The true mesh, to tell distances to it (.obj, .ply)");
-  app.add_option("-o,--output", output_, "Folder to write (made if it is not there)");
+  app.add_option("--truth", truth_, "True mesh (.obj, .ply); distances to it are reported");
+  app.add_option("-o,--output", output_, "Folder for the results (created if missing)");
   app.add_option("--resume", resume_,
-                 "Go on with the fit in this folder, as if it had never stopped; takes --steps, "
-                 "--threads, --quiet and --no-report alone")
+                 "Continue the fit in this folder with the same results as one run. Allows only "
+                 "--steps, --threads, --quiet and --no-report")
       ->type_name("FOLDER");
-  app.add_flag("--no-report", no_report_, "Leave out report.html");
+  app.add_flag("--no-report", no_report_, "Write no report.html");
 }
 
 void FitCommand::add_sampling_options(CLI::App& app) {
   app.add_option("--loss-spp", given_.options.loss_spp,
-                 "Samples per pixel of each of the loss's two images (default: --spp)")
+                 "Samples per pixel of each of the two images from which the loss is computed "
+                 "(default: --spp)")
       ->check(within(1, 1 << 30));
   app.add_option("--spp-doubling", given_.options.spp_doubling,
-                 "After so many steps there are twice the samples (default: never)")
+                 "Double the samples per pixel every so many steps (default: never)")
       ->check(within(1, 1 << 30));
   add_reverse_options(app, given_.options.backward, Task::kFit);
 }

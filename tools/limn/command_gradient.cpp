@@ -253,7 +253,9 @@ json stats_json(const GradientStats& stats) {
 class GradientCommand final : public Command {
  public:
   const char* name() const override { return "gradient"; }
-  const char* description() const override { return "Derivative images, with standard errors"; }
+  const char* description() const override {
+    return "Compute derivative images with standard errors (forward mode)";
+  }
 
   void add_options(CLI::App& app) override {
     app_ = &app;
@@ -262,21 +264,22 @@ class GradientCommand final : public Command {
     add_method_option(app, options_.method, Task::kGradient);
     add_term_options(app, terms_, samples_);
     app.add_option("--step", options_.step,
-                   "Step of finite differences (default: found by a pilot)")
+                   "Step of finite differences (method fd), in the parameter's unit (default: a "
+                   "pilot finds it)")
         ->check(within(1e-12, 1e12));
     add_warp_options(app, options_.warp);
-    app.add_option("--time", seconds_,
-                   "Seconds, set-up included: as many samples as fit, instead of --spp")
+    app.add_option("--time", seconds_, "Time budget in seconds, set-up included, instead of --spp")
         ->check(within(1e-6, 1e7))
         ->type_name("SECONDS")
         ->excludes("--spp");
     app.add_option("-o,--output", output_,
-                   "Image to write (.exr; _stderr.exr and .png are put beside it)")
+                   "Derivative image to write (.exr); _stderr.exr and .png are written beside it. "
+                   "With several --wrt each name gets a suffix")
         ->required();
     app.add_flag("--sample-images", sample_images_,
-                 "Also write how many samples of each term a sample of every pixel holds, to "
-                 "OUTPUT_samples_TERM.exr");
-    app.add_flag("--stats", stats_, "Print edges, nodes, bytes, rays by kind, where the time went");
+                 "Also write the samples of each term per pixel sample to OUTPUT_samples_TERM.exr");
+    app.add_flag("--stats", stats_,
+                 "Print statistics: edges, nodes, bytes, rays by kind, time by phase");
     add_film_option(app, film_);
     add_points_option(app, options_.points);
     add_debug_option(app, debug_);

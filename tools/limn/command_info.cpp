@@ -146,7 +146,7 @@ class InfoCommand final : public Command {
  public:
   const char* name() const override { return "info"; }
   const char* description() const override {
-    return "What the scene holds, and what can be differentiated";
+    return "Describe a scene and list the parameters that can be differentiated";
   }
   void add_options(CLI::App& app) override { add_common_options(app, common_); }
   int run(const std::string&) override { return run_info(common_); }

@@ -15,14 +15,17 @@ class MergeCommand final : public Command {
  public:
   const char* name() const override { return "merge"; }
   const char* description() const override {
-    return "Join the parts of a run (--part) into the files of one run";
+    return "Join the shards of a run (--part K/N) into the files of one run";
   }
   void add_options(CLI::App& app) override {
-    app.add_option("parts", parts_, "All parts, in any order")->required()->type_name("PART...");
-    app.add_option("-o,--output", output_, "As of the command that made the parts")->required();
-    app.add_option("--json", json_, "Write the figures for machines to this file");
-    app.add_option("--threads", threads_, "Threads of what comes before samples (default: all)");
-    app.add_flag("--quiet", quiet_, "Print nothing but errors and warnings");
+    app.add_option("parts", parts_, "All .part files of the run, in any order")
+        ->required()
+        ->type_name("PART...");
+    app.add_option("-o,--output", output_, "Output of the run, as -o of its command without --part")
+        ->required();
+    app.add_option("--json", json_, "Write all results as JSON to this file");
+    app.add_option("--threads", threads_, "Number of threads for the set-up (default: all cores)");
+    app.add_flag("--quiet", quiet_, "Print only errors and warnings");
   }
 
   int run(const std::string&) override {

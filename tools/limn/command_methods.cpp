@@ -36,11 +36,11 @@ size_t settings_width() {
 class MethodsCommand final : public Command {
  public:
   const char* name() const override { return "methods"; }
-  const char* description() const override { return "The methods, and what each can do"; }
+  const char* description() const override { return "List the methods and what each can compute"; }
   void add_options(CLI::App& app) override {
     app.add_flag("--all", all_,
-                 "Also list their settings, the default value first; a name carries them as in "
-                 "forest:width=4:look-ahead=none");
+                 "Also list the settings of each method, with the default value first. Append "
+                 "settings to a name, as in forest:width=4:look-ahead=none");
   }
   int run(const std::string&) override {
     std::vector<Table::Column> columns = {{"method", true}};

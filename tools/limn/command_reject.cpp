@@ -389,7 +389,7 @@ class RejectProgram final : public Command {
  public:
   const char* name() const override { return "reject"; }
   const char* description() const override {
-    return "Pictures and figures of what edge samplers reject, accept and wrongly accept";
+    return "Draw and measure which edges the samplers reject, accept and falsely accept";
   }
   void add_options(CLI::App& app) override {
     add_input_options(app, common_, "Scene file, or a mesh (.obj, .ply)", "SCENE|MESH");

@@ -15,17 +15,17 @@ namespace {
 class RenderCommand final : public Command {
  public:
   const char* name() const override { return "render"; }
-  const char* description() const override { return "Render the image"; }
+  const char* description() const override { return "Render an image"; }
   void add_options(CLI::App& app) override {
     app_ = &app;
     add_common_options(app, common_);
-    app.add_option("-o,--output", output_, "Image to write (.exr; a .png is put beside it)")
+    app.add_option("-o,--output", output_, "Image to write (.exr); a .png is written beside it")
         ->required();
     add_method_option(app, options_.method, Task::kImage);
     add_image_options(app, what_, options_);
     options_.generator = kGenerators[0];
     app.add_option("--generator", options_.generator,
-                   "Sample generator: Owen-scrambled Sobol' points, or independent numbers")
+                   "Sample generator: Owen-scrambled Sobol' points, or independent random numbers")
         ->check(
             CLI::IsMember(std::vector<std::string>(std::begin(kGenerators), std::end(kGenerators))))
         ->capture_default_str();

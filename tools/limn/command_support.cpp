@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -37,10 +38,17 @@ std::vector<std::string> split(const std::string& list) {
   return parts;
 }
 
+// Short where that is exact, as 1e+12; else with all digits, as the largest seed.
+std::string bound_text(long double bound) {
+  const std::string text = fmt::format("{:.10g}", bound);
+  const bool exact = std::strtold(text.c_str(), nullptr) == bound || std::floor(bound) != bound;
+  return exact ? text : fmt::format("{:.0f}", bound);
+}
+
 }  // namespace
 
 CLI::Validator within(long double least, long double most) {
-  const std::string range = fmt::format("{:.10g} to {:.10g}", least, most);
+  const std::string range = bound_text(least) + " to " + bound_text(most);
   return {[=](const std::string& text) {
             char* end = nullptr;
             const long double value = std::strtold(text.c_str(), &end);
@@ -61,33 +69,36 @@ void add_input_options(CLI::App& app, CommonOptions& common, const std::string& 
          [&common](const std::vector<std::string>& defines) {
            common.defines = parse_defines(defines);
          },
-         "Value of a $name in the scene")
+         "Set the value of $NAME in the scene (repeatable)")
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false);
-  app.add_option("--seed", common.seed, "Seed of all random numbers (default: the scene's)")
+  app.add_option("--seed", common.seed,
+                 "Seed of the random numbers (default: seed of the scene's sampler)")
       ->check(within(0, std::numeric_limits<uint64_t>::max()));
-  app.add_option("--threads", common.threads, "Threads (default: all cores)")
+  app.add_option("--threads", common.threads, "Number of threads (default: all cores)")
       ->check(within(1, 4096));
-  app.add_flag("--quiet", common.quiet, "Print nothing but errors and warnings");
+  app.add_flag("--quiet", common.quiet, "Print only errors and warnings");
 }
 
 void add_common_options(CLI::App& app, CommonOptions& common) {
   add_input_options(app, common, "Scene file (Mitsuba 3 XML)", "SCENE");
   app.add_option("--sensor", common.sensor,
-                 "Of several in the scene, this one (default: the first)")
+                 "Sensor to render: its id, or its number from 0 (default: the first)")
       ->type_name("ID|NUMBER");
-  app.add_option("--spp", common.spp, "Samples per pixel (default: the scene's)")
+  app.add_option("--spp", common.spp,
+                 "Samples per pixel (default: sample_count of the scene's sampler)")
       ->check(within(1, 1 << 30));
-  app.add_option("--json", common.json, "Write the figures for machines to this file");
+  app.add_option("--json", common.json, "Write all results as JSON to this file");
   app.add_option("--shading", common.shading,
-                 "How interpolated normals shade: continuous, or as Mitsuba does (its jumps are "
-                 "missing from gradients)")
+                 "Shading with interpolated normals: continuous, or as in Mitsuba 3, whose shading "
+                 "has discontinuities that gradients miss")
       ->check(CLI::IsMember({"continuous", "mitsuba"}))
       ->capture_default_str();
 }
 
 void add_parameter_options(CLI::App& app, std::vector<std::string>& parameters) {
-  app.add_option("--wrt", parameters, "Parameter to differentiate (repeatable)")
+  app.add_option("--wrt", parameters,
+                 "Parameter to differentiate; limn info lists them (repeatable)")
       ->required()
       ->type_name("PARAM")
       ->allow_extra_args(false);
@@ -100,8 +111,8 @@ void add_method_option(CLI::App& app, Method& method, Task task) {
            method = name;
            check_task(method, task);
          },
-         "How it is computed: " + join(method_names(task)) +
-             "; settings follow a colon, as in forest:width=4 (limn methods --all)")
+         "Method: " + join(method_names(task)) + "; settings follow a colon, as in " +
+             (task == Task::kImage ? "silhouettes" : "forest") + ":width=4 (limn methods --all)")
       ->default_str(Method(task).name())
       ->type_name("NAME");
   const std::string instead =
@@ -129,14 +140,14 @@ std::vector<Method> parse_methods(const std::vector<std::string>& names, Task ta
 
 void add_term_options(CLI::App& app, std::string& terms, std::string& samples) {
   app.add_option("--terms", terms,
-                 "Terms to compute, of " + join(Method(Task::kGradient)->terms) +
-                     " (default: all there are)")
+                 "Terms to compute, among " + join(Method(Task::kGradient)->terms) +
+                     " (default: all that the scene has)")
       ->type_name("A,B,...");
   app.add_option("--samples", samples,
-                 "What a sample per pixel holds of each term, in this order: paths, points on the "
-                 "film (may be less than 1), edges per vertex of one path; auto: the best for the "
-                 "time by a short pilot, or 1 of each if --spp is less than 8; uniform: the same, "
-                 "but alike in all pixels")
+                 "Samples of each term per pixel sample, in the order in which --terms lists them, "
+                 "without terms that the scene lacks (1 for those not given; camera may be less "
+                 "than 1). auto: a short pilot allocates them for the least error in equal time (1 "
+                 "each if --spp is below 8). uniform: as auto, but the same in all pixels")
       ->capture_default_str()
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
       ->type_name("N,N,...");
@@ -145,10 +156,10 @@ void add_term_options(CLI::App& app, std::string& terms, std::string& samples) {
 void add_points_option(CLI::App& app, FilmPoints& points) {
   app.add_option_function<std::string>(
          "--points", [&points](const std::string& name) { points = film_points(name); },
-         "Where light in closed form (analytic) is looked for: at random points of a pixel, or "
-         "once for each face that it shows, times the area of that: no noise, and the exact "
-         "derivative of its own image, which differs from the true one by what happens within "
-         "pixels (box filter; takes no samples)")
+         "Points at which the method analytic evaluates light. random: random points of each "
+         "pixel. faces: one point per visible face of each pixel, weighted by its visible area. "
+         "Faces has no noise and needs a box filter; its gradient is exact for its own image, "
+         "which ignores how light varies within a pixel's part of a face")
       ->check(
           CLI::IsMember(std::vector<std::string>(std::begin(kFilmPoints), std::end(kFilmPoints))))
       ->default_str(kFilmPoints[0]);
@@ -165,8 +176,8 @@ void refuse_samples(const CLI::App& app, FilmPoints points,
 
 void add_film_option(CLI::App& app, std::string& film) {
   app.add_option("--film", film,
-                 "What the camera sees, of a gradient its edges: by rays, or by the exact visible "
-                 "regions of every pixel (box filter)")
+                 "Visibility from the camera (in gradients, of the edges that it sees): by rays, "
+                 "or by the exact visible regions of every pixel, which needs a box filter")
       ->check(CLI::IsMember({"rays", "exact"}))
       ->capture_default_str();
 }
@@ -174,13 +185,14 @@ void add_film_option(CLI::App& app, std::string& film) {
 void add_reverse_options(CLI::App& app, BackwardOptions& options, Task task) {
   app.add_option_function<std::string>(
       "--terms", [&options](const std::string& list) { options.terms = parse_terms(list); },
-      "Only these terms, as in interior,camera");
+      "Terms to compute, as in interior,camera (default: all that the scene has)");
   app.add_option_function<std::string>(
          "--pixels",
          [&options](const std::string& pixels) {
            options.uniform_pixels = pixels == kUniformPixels;
          },
-         "Where paths go: adjoint (where the loss depends on the image) or uniform")
+         "Pixels in which paths start: adjoint (more where the loss depends more on the pixel) or "
+         "uniform")
       ->check(CLI::IsMember({kAdjointPixels, kUniformPixels}))
       ->default_str(kAdjointPixels);
   add_method_option(app, options.method, task);
@@ -189,12 +201,12 @@ void add_reverse_options(CLI::App& app, BackwardOptions& options, Task task) {
       ->check(within(1, 1 << 16))
       ->capture_default_str();
   app.add_option("--camera-samples", options.camera_samples,
-                 "Boundary samples on the film (term camera) per path")
+                 "Boundary samples on the film per path (term camera)")
       ->check(within(1e-6, 1 << 16))
       ->default_str("0.25, 1 with --method analytic");
   app.add_option(
          "--shadow-samples", options.shadow_samples,
-         "Boundary samples on the edges of shadows in view (terms shadow, penumbra) per path")
+         "Boundary samples on the edges of visible shadows per path (terms shadow and penumbra)")
       ->check(within(1e-6, 1 << 16))
       ->capture_default_str();
 }
@@ -202,13 +214,13 @@ void add_reverse_options(CLI::App& app, BackwardOptions& options, Task task) {
 void add_warp_options(CLI::App& app, WarpOptions& warp) {
   app.add_option(
          "--aux", warp.rays,
-         "Auxiliary rays per direction (method was): an even number; the more, the smaller the "
-         "bias")
+         "Auxiliary rays per direction (method was): an even number. More rays reduce the bias")
       ->check(within(2, 1 << 20))
       ->capture_default_str()
       ->type_name("N");
   app.add_option("--kappa", warp.kappa,
-                 "Concentration of their kernel, which is K^(-1/2) radians wide (method was)")
+                 "Concentration K of the kernel of auxiliary rays, which is K^(-1/2) radians wide "
+                 "(method was)")
       ->check(within(1.0, 1e12))
       ->capture_default_str()
       ->type_name("K");
@@ -216,8 +228,8 @@ void add_warp_options(CLI::App& app, WarpOptions& warp) {
 
 void add_debug_option(CLI::App& app, std::string& place) {
   app.add_option("--debug-sample", place,
-                 "Do one sample alone and print all it meets: pixel and sample, or a term and its "
-                 "sample on the film")
+                 "Trace one sample and print its path. Give pixel and sample number, or a term and "
+                 "the number of its film sample")
       ->type_name("X,Y,S|TERM,N");
 }
 

@@ -109,20 +109,22 @@ void write_images(const ImageCompareArguments& arguments, const Scene& scene,
 
 void add_image_options(CLI::App& app, std::string& what, RenderOptions& options) {
   app.add_option("--what", what,
-                 "What an image shows: all light; direct light alone; ambient occlusion and "
-                 "openness of the sky (methods silhouettes, lines and rays)")
+                 "What the image shows: all light (image), direct light, ambient occlusion (ao) or "
+                 "openness of the sky. The last two need the method silhouettes, lines or rays")
       ->check(CLI::IsMember({"image", "direct", "ao", "openness"}))
       ->capture_default_str();
   app.add_option("--lines", options.lines,
-                 "silhouettes, lines: lines through the sky, a quarter of them through a lamp")
+                 "Methods silhouettes and lines: lines through the sky per point; each area light "
+                 "gets a quarter as many")
       ->check(within(1, 1 << 14))
       ->capture_default_str();
   app.add_option("--tolerance", options.tolerance,
-                 "silhouettes, lines: lines are doubled until halves differ by twice this part of "
-                 "the result (0: never)")
+                 "Methods silhouettes and lines: double the lines until two halves differ by at "
+                 "most twice this share of the result (0: never)")
       ->check(within(0.0, 1.0))
       ->capture_default_str();
-  app.add_option("--rays", options.rays, "rays: of each point, and each lamp")
+  app.add_option("--rays", options.rays,
+                 "Method rays: rays per point for the sky and for each area light")
       ->check(within(1, 1 << 20))
       ->capture_default_str();
 }

@@ -85,10 +85,11 @@ std::string option_of(std::string field) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app("limn: a path tracer that also computes how its image changes when the scene moves");
+  CLI::App app(
+      "limn: a differentiable path tracer. limn COMMAND --help lists the options of a command");
   app.require_subcommand(1);
   app.set_version_flag("--version", limn::version_text(), "Print version, commit and build type");
-  app.set_help_all_flag("--help-all", "The help of all commands");
+  app.set_help_all_flag("--help-all", "Print the help of all commands");
   std::vector<std::pair<CLI::App*, std::unique_ptr<limn::Command>>> commands;
   for (const limn::CommandMaker make : limn::kCommands) {
     auto command = make();

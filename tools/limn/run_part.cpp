@@ -41,8 +41,8 @@ std::vector<std::string> without_own(const std::vector<std::string>& words) {
 
 void add_part_option(CLI::App& app, CommonOptions& common) {
   app.add_option("--part", common.part,
-                 "Make part K of N of the run alone, which other machines can make the rest of; -o "
-                 "names its file (.part), limn merge joins all")
+                 "Compute only shard K of N of this run, and write it to the .part file that -o "
+                 "names. Any machine can compute the others; limn merge joins them")
       ->type_name("K/N")
       ->excludes("--json");
 }

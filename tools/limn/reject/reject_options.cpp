@@ -31,16 +31,19 @@ void add_reject_options(CLI::App& app, RejectCommand& command) {
   app.add_option("-o,--output", command.output, "Folder for pictures, figures and report")
       ->required();
   app.add_option("--methods", command.methods,
-                 "Samplers to look at; the first one chooses the node")
+                 "Edge samplers to examine; the first one's tree chooses the node")
       ->delimiter(',')
       ->capture_default_str();
   app.add_option("--shape", command.shape,
-                 "Id of the scene's shape (default: the one with the most edges)");
-  app.add_option("--node-edges", command.node_edges,
-                 "Choose a node of about this many edges, one that is often accepted and often not")
+                 "Id of the shape to examine (default: the shape with the most edges)");
+  app.add_option(
+         "--node-edges", command.node_edges,
+         "Choose a node of about this many edges that is accepted about as often as rejected")
       ->check(within(1, 1 << 30))
       ->capture_default_str();
-  app.add_option("--node", command.node, "Look at this node of the first method's tree")
+  app.add_option(
+         "--node", command.node,
+         "Number of the node to examine in the first method's tree, in place of --node-edges")
       ->check(within(0, 1u << 31));
   app.add_option("--extent", command.extent, "Half-width of the slices, in radii of the mesh")
       ->check(within(1e-3, 1e3))
@@ -52,13 +55,14 @@ void add_reject_options(CLI::App& app, RejectCommand& command) {
              [&](const Vec3d& v) { command.point = v; });
   add_vector(app, "--view", "Direction from the mesh to the camera of that picture",
              VectorKind::kDirection, [&](const Vec3d& v) { command.view = v; });
-  add_vector(app, "--up", "Direction that is up in it (default: 0,1,0)", VectorKind::kDirection,
+  add_vector(app, "--up", "Up direction of that picture (default: 0,1,0)", VectorKind::kDirection,
              [&](const Vec3d& v) { command.up = v; });
   app.add_option("--size", command.size, "Width and height of pictures, in pixels")
       ->check(within(16, 8192))
       ->capture_default_str();
-  app.add_option("--points", command.points,
-                 "Points around the mesh for hit rate and counts by depth")
+  app.add_option(
+         "--points", command.points,
+         "Points around the mesh from which acceptance rates and counts by depth are measured")
       ->check(within(2, 1 << 24))
       ->capture_default_str();
   app.add_flag("!--no-report", command.report, "Write no report.html");
