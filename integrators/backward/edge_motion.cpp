@@ -50,6 +50,20 @@ void EdgeMotion::contribute(Tape& tape, Seeds& seeds, const BoundaryForm& form,
         break;
     }
   }
+  if (form.lift) contribute_lift(tape, *form.lift, weight);
+}
+
+void EdgeMotion::contribute_lift(Tape& tape, const MovingLift& lift, double weight) const {
+  const Mesh& mesh = slots_.scene->shape(lift.face.shape).mesh;
+  const uint32_t first = slots_.mesh(lift.face.shape).normals;
+  for (int k = 0; k < 3; ++k) {
+    const Vec3d of_normal = lift.of_normals[k] * weight;
+    contribute_vertex(tape, lift.face.shape, mesh.face(lift.face.face)[k],
+                      lift.of_corners[k] * weight);
+    if (first == 0) continue;
+    const uint32_t id = mesh.normal_ids[lift.face.face.index()][k];
+    for (int c = 0; c < 3; ++c) tape.contribute(first + 3 * id + c, of_normal[c]);
+  }
 }
 
 void EdgeMotion::contribute_face(Tape& tape, FaceRef face, const Vec3d& x, const Vec3d& g) const {

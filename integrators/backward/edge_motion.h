@@ -52,6 +52,7 @@ class EdgeMotion {
   void contribute_end(Tape& tape, EdgeRef id, int end, const Vec3d& g) const;
   void contribute_crossing(Tape& tape, EdgeRef id, const Vec3d& x, const Vec3d& g) const;
   void contribute_face(Tape& tape, FaceRef face, const Vec3d& x, const Vec3d& g) const;
+  void contribute_lift(Tape& tape, const MovingLift& lift, double weight) const;
   void contribute_vertex(Tape& tape, ShapeId shape, uint32_t vertex, const Vec3d& g) const;
 
   const SceneSlots& slots_;

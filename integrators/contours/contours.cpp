@@ -50,13 +50,15 @@ Contours::Contours(const Scene& scene, const RayTracer& tracer, int threads)
 }
 
 ContourPoint Contours::at(const SurfacePoint<double>& surface, const Vec3d& up) const {
+  if (surface.lifted) return {surface.p, up, {}};
   const Plane& plane = input_.object(surface.face.shape).plane(surface.face.face);
   return {surface.p - plane.n * plane.distance(surface.p), up, surface.face};
 }
 
 double Contours::rounding(const ContourPoint& at, ShapeId shape) const {
-  return distance_error(input_.object(at.face.shape), at.p) +
-         distance_error(input_.object(shape), at.p);
+  const double of_shape = distance_error(input_.object(shape), at.p);
+  if (!at.face.shape.valid()) return of_shape;
+  return distance_error(input_.object(at.face.shape), at.p) + of_shape;
 }
 
 int Contours::sign(FaceRef face, const ContourPoint& at) const {

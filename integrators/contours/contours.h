@@ -19,11 +19,11 @@
 
 namespace limn {
 
-// A point on a face that looks around.
+// A point on a face, or lifted from one with interpolated normals, that looks around.
 struct ContourPoint {
   Vec3d p;
-  Vec3d up;  // unit normal of the face, to the side that looks
-  FaceRef face;
+  Vec3d up;      // unit normal to the side that looks: of the face, or the shading normal if lifted
+  FaceRef face;  // that it lies on, if any
 };
 
 // A side that W changes across, as seen from p: by `jump` on the side s . w > 0, s = w0 x w1,
@@ -52,7 +52,7 @@ class Contours {
   // The scene and its tracer must outlive it.
   Contours(const Scene& scene, const RayTracer& tracer, int threads);
 
-  // The point on the plane of its own face, as near as numbers allow.
+  // The point on the plane of its own face, as near as numbers allow, or lifted from it.
   ContourPoint at(const SurfacePoint<double>& surface, const Vec3d& up) const;
   // What rounding may add to distances of the point from planes of a shape, and to those of the
   // shape's corners from the plane of the point's face.

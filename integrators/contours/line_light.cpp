@@ -53,57 +53,6 @@ double cosine_piece(double along, double across, const Place& from, const Place&
   return sum;
 }
 
-// Angles between which nothing on a line has a kink: from, to, and kinks in between.
-struct Breaks {
-  Breaks(const Vec3d& pole, const Vec3d& r, double from, double to, std::span<const Kink> kinks) {
-    angles[count++] = from;
-    for (const Kink& kink : kinks) {
-      const double a = dot(kink.axis, pole), b = dot(kink.axis, r), size = std::hypot(a, b);
-      if (!(std::fabs(kink.level) < size)) continue;
-      const double middle = std::atan2(b, a), half = std::acos(kink.level / size);
-      for (const double theta : {middle - half, middle + half, middle - half + 2 * kPi}) {
-        if (theta > from && theta < to) angles[count++] = theta;
-      }
-    }
-    angles[count++] = to;
-    std::sort(angles.begin(), angles.begin() + count);
-  }
-  std::array<double, 16> angles;
-  int count = 0;
-};
-
-// The integral of f(w) sin theta along the line between two angles, by quadrature between
-// multiples of `step`. Counts how often it asks f.
-template <class F>
-Rgb<double> smooth_piece(const Vec3d& pole, const Vec3d& r, double from, double to, double step,
-                         int64_t& asked, const F& f) {
-  Rgb<double> sum;
-  double start = from;
-  for (double k = std::floor(start / step) + 1; start < to; ++k) {
-    const double end = std::min(k * step, to), width = end - start;
-    for (const auto& q : detail::quadrature()) {
-      const double theta = start + width * q.at;
-      const double c = std::cos(theta), s = std::sin(theta);
-      sum += f(pole * c + r * s) * (width * q.weight * s);
-      ++asked;
-    }
-    start = end;
-  }
-  return sum;
-}
-
-// The same where f has kinks.
-template <class F>
-Rgb<double> quadrature_piece(const Vec3d& pole, const Vec3d& r, double from, double to, double step,
-                             std::span<const Kink> kinks, int64_t& asked, const F& f) {
-  const Breaks breaks(pole, r, from, to, kinks);
-  Rgb<double> sum;
-  for (int i = 0; i + 1 < breaks.count; ++i) {
-    sum += smooth_piece(pole, r, breaks.angles[i], breaks.angles[i + 1], step, asked, f);
-  }
-  return sum;
-}
-
 double size_of(double x) { return std::fabs(x); }
 double size_of(const Rgb<double>& x) {
   return std::max({std::fabs(x.r), std::fabs(x.g), std::fabs(x.b)});
@@ -153,32 +102,11 @@ Pencil pencil_inside(std::span<const Vec3d> corners) {
 
 }  // namespace
 
+// What is scattered goes with n . w.
 struct LineLight::Receiver {
-  Receiver(const SurfacePoint<double>& surface, const Scattering<double>& s, const ContourPoint& a)
-      : at(a), scattering(s), n(s.normal()), horizon(surface.horizon) {
-    const bool front = dot(surface.n_g, s.wi()) > 0;
-    n_s = front ? surface.n_s : -surface.n_s;
-    bent = !(n == n_s);
-    plain = !bent && horizon == 0;
-    kinks = {{{n, 0}, {n_s, horizon}, {n_s, ramp_end()}}};
-  }
-  // What is scattered of a lamp of radiance 1 that nothing hides. sides: of what it shows above the
-  // horizon; pole: inside.
-  Rgb<double> all_of(std::span<const PolygonSide<double>> sides, const Vec3d& pole) const {
-    if (bent) {
-      return polygon_integral<double>(sides, pole, kinks,
-                                      [&](const Vec3d& w) { return scattering.eval(w); });
-    }
-    const double sum = plain ? cosine_integral(sides, n) : ramp_integral(sides, n, horizon);
-    return scattering.eval(n) * sum;
-  }
-  double ramp_end() const { return horizon * (2 - horizon); }
   ContourPoint at;
   const Scattering<double>& scattering;
-  Vec3d n, n_s;
-  double horizon;
-  bool bent, plain;  // plain: what is scattered goes with n . w alone
-  std::array<Kink, 3> kinks;
+  Vec3d n;  // at.up but for rounding
 };
 
 struct LineLight::Scratch {
@@ -407,22 +335,12 @@ Rgb<double> LineLight::sky_light(const Receiver& receiver, double offset) const 
   const Pencil pencil = pencil_around(pole_between(at.up, receiver.n));
   const int w = contours_.count(at, pencil.pole, nullptr);
   const Rgb<double> radiance = sky_->radiance(at.up);
-  if (receiver.plain) {
-    const double sum =
-        sum_over_lines<double>(at, pencil, planes, w, nullptr, options_.lines, offset,
-                               [&](const Isolines::Line&, const Place& from, const Place& to) {
-                                 return cosine_piece(1, 0, from, to);
-                               });
-    return receiver.scattering.eval(receiver.n) * radiance * sum;
-  }
-  const Rgb<double> sum = sum_over_lines<Rgb<double>>(
-      at, pencil, planes, w, nullptr, options_.lines, offset,
-      [&](const Isolines::Line& line, const Place& from, const Place& to) {
-        return quadrature_piece(pencil.pole, line.r, from.theta(), to.theta(), kPi, receiver.kinks,
-                                scratch().work.evaluations,
-                                [&](const Vec3d& d) { return receiver.scattering.eval(d); });
-      });
-  return sum * radiance;
+  const double sum =
+      sum_over_lines<double>(at, pencil, planes, w, nullptr, options_.lines, offset,
+                             [&](const Isolines::Line&, const Place& from, const Place& to) {
+                               return cosine_piece(1, 0, from, to);
+                             });
+  return receiver.scattering.eval(receiver.n) * radiance * sum;
 }
 
 // Of a map, along its own meridians.
@@ -443,37 +361,12 @@ Rgb<double> LineLight::map_light(const Receiver& receiver, double offset) const 
   };
   const Rgb<double> scale = receiver.scattering.eval(receiver.n);
   const Vec3d planes[] = {at.up};
-  if (receiver.plain) {
-    const Rgb<double> sum = sum_over_lines<Rgb<double>>(
-        at, pencil, planes, w, nullptr, options_.lines, offset,
-        [&](const Isolines::Line& line, const Place& a, const Place& b) {
-          return cosine(columns_->meridian(line.r), line.r, a, b);
-        });
-    return scale * sum;
-  }
-  // What interpolated normals see is the cosine but for a narrow ramp at their horizon, and for all
-  // of it where they are bent.
-  const Environment& sky = *sky_;
-  const double row = kPi / (grid.rows - 1);
-  const auto piece = [&](const Isolines::Line& line, const Place& a, const Place& b) {
-    const auto meridian = columns_->meridian(line.r);
-    const Breaks breaks(pencil.pole, line.r, a.theta(), b.theta(), receiver.kinks);
-    Rgb<double> sum;
-    for (int i = 0; i + 1 < breaks.count; ++i) {
-      const double from = breaks.angles[i], to = breaks.angles[i + 1], middle = 0.5 * (from + to);
-      const double c =
-          dot(receiver.n_s, pencil.pole * std::cos(middle) + line.r * std::sin(middle));
-      if (receiver.bent || (c > receiver.horizon && c < receiver.ramp_end())) {
-        sum += smooth_piece(
-            pencil.pole, line.r, from, to, row, scratch().work.evaluations,
-            [&](const Vec3d& d) { return receiver.scattering.eval(d) * sky.radiance(d); });
-      } else if (c > receiver.horizon) {
-        sum += scale * cosine(meridian, line.r, Place::at(from), Place::at(to));
-      }
-    }
-    return sum;
-  };
-  return sum_over_lines<Rgb<double>>(at, pencil, planes, w, nullptr, options_.lines, offset, piece);
+  const Rgb<double> sum =
+      sum_over_lines<Rgb<double>>(at, pencil, planes, w, nullptr, options_.lines, offset,
+                                  [&](const Isolines::Line& line, const Place& a, const Place& b) {
+                                    return cosine(columns_->meridian(line.r), line.r, a, b);
+                                  });
+  return scale * sum;
 }
 
 Rgb<double> LineLight::lamp_light(const Lamp& lamp, const Receiver& receiver, double offset) const {
@@ -493,7 +386,6 @@ Rgb<double> LineLight::lamp_light(const Lamp& lamp, const Receiver& receiver, do
   own.polygon.clear();
   for (const Vec3d& x : lamp.hull.points) own.polygon.push_back(normalize(x - at.p));
   cut(own.polygon, at.up);
-  if (!receiver.plain) cut(own.polygon, receiver.n);
   if (own.polygon.size() < 3) return {};
   // Corners run so that the inside is on the right, as directions are looked at from outside.
   own.planes.clear();
@@ -508,36 +400,24 @@ Rgb<double> LineLight::lamp_light(const Lamp& lamp, const Receiver& receiver, do
     own.sides.push_back({inward, b, a});
   }
   const Pencil pencil = pencil_inside(own.polygon);
-  const auto all = receiver.all_of(own.sides, pencil.pole);
+  const Rgb<double> f = receiver.scattering.eval(receiver.n);
+  const double all = cosine_integral(own.sides, receiver.n);
   list(at, *cone, &lamp.screen);
   const int w = contours_.count(at, pencil.pole, &lamp.screen);
   const int lamp_lines = std::max(1, options_.lines / kSkyLines);
-  if (own.arcs.empty()) return w == 0 ? all * lamp.radiance : Rgb<double>{};
-  if (receiver.plain) {
-    const Rgb<double> f = receiver.scattering.eval(receiver.n);
-    const double whole = max_channel(f) > 0 ? max_channel(all) / max_channel(f) : 0;
-    const double along = dot(receiver.n, pencil.pole);
-    const double sum =
-        sum_over_lines<double>(at, pencil, own.planes, w, &whole, lamp_lines, offset,
-                               [&](const Isolines::Line& line, const Place& from, const Place& to) {
-                                 return cosine_piece(along, dot(receiver.n, line.r), from, to);
-                               });
-    return f * lamp.radiance * sum;
-  }
-  return lamp.radiance *
-         sum_over_lines<Rgb<double>>(
-             at, pencil, own.planes, w, &all, lamp_lines, offset,
-             [&](const Isolines::Line& line, const Place& from, const Place& to) {
-               return quadrature_piece(pencil.pole, line.r, from.theta(), to.theta(), kPi,
-                                       receiver.kinks, own.work.evaluations,
-                                       [&](const Vec3d& d) { return receiver.scattering.eval(d); });
-             });
+  if (own.arcs.empty()) return w == 0 ? f * lamp.radiance * all : Rgb<double>{};
+  const double along = dot(receiver.n, pencil.pole);
+  const double sum =
+      sum_over_lines<double>(at, pencil, own.planes, w, &all, lamp_lines, offset,
+                             [&](const Isolines::Line& line, const Place& from, const Place& to) {
+                               return cosine_piece(along, dot(receiver.n, line.r), from, to);
+                             });
+  return f * lamp.radiance * sum;
 }
 
 LineLight::Receiver LineLight::receiver_at(const SurfacePoint<double>& surface,
                                            const Scattering<double>& scattering) const {
-  const bool front = dot(surface.n_g, scattering.wi()) > 0;
-  return {surface, scattering, at(surface, front ? surface.n_g : -surface.n_g)};
+  return {at(surface, scattering.normal()), scattering, scattering.normal()};
 }
 
 Rgb<double> LineLight::lamps(const SurfacePoint<double>& surface,

@@ -486,15 +486,9 @@ Rgb<S> ClosedLight::scattered(const RayTracer& tracer, const SurfacePoint<S>& su
   };
   static thread_local const auto space = std::make_unique<Space>();
   static thread_local std::vector<PolygonSide<S>> sides;
-  const bool front = dot(surface.n_g, value(scattering.wi())) > 0;
-  Receiver receiver{value(surface.p), front ? surface.n_g : -surface.n_g, surface.face, edge};
+  const Vec3d n = value(scattering.normal());
+  Receiver receiver{value(surface.p), n, surface.start(), edge};
   if (edge) receiver.wedge = wedge_at(scene_, tracer, *edge, receiver.up);
-  const Vec3d n_s = front ? value(surface.n_s) : -value(surface.n_s);
-  // At the rim of smooth surfaces normals are bent, and two of them enter the scattering function.
-  const bool bent = !(value(scattering.normal()) == n_s);
-  const double horizon = value(surface.horizon);
-  const std::array<Kink, 3> kinks = {
-      {{value(scattering.normal()), 0}, {n_s, horizon}, {n_s, horizon * (2 - horizon)}}};
   Rgb<S> sum;
   for (size_t i = 0; i < lamps_.size(); ++i) {
     const LampPlane& lamp = lamps_[i];
@@ -510,16 +504,7 @@ Rgb<S> ClosedLight::scattered(const RayTracer& tracer, const SurfacePoint<S>& su
       view.add_regions(sides);
     }
     const std::span<const PolygonSide<S>> lit(sides);
-    Rgb<S> light;
-    if (!bent) {
-      light = scattering.eval(value(scattering.normal())) *
-              ramp_integral(lit, scattering.normal(), surface.horizon);
-    } else {
-      const Vec3d middle = lamp.u * (0.5 * (lamp.x0 + lamp.x1)) +
-                           lamp.v * (0.5 * (lamp.y0 + lamp.y1)) - lamp.plane.n * lamp.plane.offset;
-      light = polygon_integral<S>(lit, normalize(middle - receiver.p), kinks,
-                                  [&](const Vec3d& w) { return scattering.eval(w); });
-    }
+    const Rgb<S> light = scattering.eval(n) * cosine_integral(lit, scattering.normal());
     sum += light * detail::emitter_radiance<S>(shape, lamp.shape);
   }
   return sum;

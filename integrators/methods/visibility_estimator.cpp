@@ -216,9 +216,9 @@ Rgb<double> VisibilityEstimator::film_point(const Point& point, SampleLog* log,
   const auto surface = surface_on_ray<double>(scene_, hit.face, origin, direction);
   const Scattering<double> scattering(surface, -direction, scene_.shading);
   const bool front = dot(surface.n_g, direction) < 0;
-  const Seen seen{
-      point,      surface, front ? surface.n_g : -surface.n_g, front ? surface.n_s : -surface.n_s,
-      scattering, rays};
+  const Vec3d n_s = front ? surface.n_s : -surface.n_s;
+  const Vec3d n_g = front ? surface.n_g : -surface.n_g;
+  const Seen seen{point, surface, surface.lifted ? n_s : n_g, n_s, scattering, rays};
   if (log) {
     log->push_back(fmt::format("film {:.6f} {:.6f}: a point at ({:.9g}, {:.9g}, {:.9g}), {}",
                                film.x, film.y, surface.p.x, surface.p.y, surface.p.z,
@@ -279,7 +279,7 @@ Rgb<double> VisibilityEstimator::by_rays(const Seen& seen) const {
 bool VisibilityEstimator::is_open(const Seen& seen, const Vec3d& direction) const {
   if (!(dot(seen.up, direction) > 0)) return false;
   Ray ray{seen.surface.p, direction};
-  ray.start = seen.surface.face;
+  ray.start = seen.surface.start();
   ++seen.rays.shadow;
   return !tracer_->occluded(ray);
 }
@@ -338,7 +338,7 @@ Rgb<double> VisibilityEstimator::lamp_ray(const RayLamp& lamp, const Seen& seen,
   const Rgb<double> f = seen.scattering.eval(direction);
   if (is_black(f)) return {};
   Ray ray{seen.surface.p, direction};
-  ray.start = seen.surface.face;
+  ray.start = seen.surface.start();
   ray.end = {lamp.shape, face};
   ray.t_max = distance * (1 - 0x1p-20);
   ++seen.rays.shadow;

@@ -149,7 +149,8 @@ class PathTracer {
   // path_rays.h
   bool next_hit(Walk& walk);
   bool shadowed(const Walk& walk);
-  void move_along_edge(SurfacePoint<S>& surface, FaceRef face) const;
+  std::optional<FaceSide> blocked_at_start(const Walk& walk, const Vec3d& direction) const;
+  void move_along_edge(SurfacePoint<S>& surface, FaceRef face, const Vec3d& direction) const;
   void fetch_face(FaceRef face) const;
   void fetch_corners(const Walk& walk) const;
   void find_sky(std::span<Walk* const> walks) const;

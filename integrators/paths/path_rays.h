@@ -10,9 +10,9 @@ namespace limn {
 template <class S, class Visitor>
 inline bool PathTracer<S, Visitor>::next_hit(Walk& walk) {
   Ray ray{value(walk.surface.p), walk.wo};
-  ray.start = walk.surface.face;
-  if (EdgeStart* edge = walk.edge) {
-    if (const auto side = blocked_at_edge(c_.scene, c_.tracer, *edge, walk.wo)) {
+  ray.start = walk.surface.start();
+  if (EdgeStart* edge = walk.start_edge()) {
+    if (const auto side = blocked_at_start(walk, walk.wo)) {
       edge->start = *side;
       walk.hit = {side->face, 0};
       return true;
@@ -30,12 +30,25 @@ inline bool PathTracer<S, Visitor>::next_hit(Walk& walk) {
   return found;
 }
 
+// The side of a face around walk.start_edge() that the ray meets at once, if any. Below its own face
+// a ray leaves a smooth surface (surface_point.h), and meets none of them.
 template <class S, class Visitor>
-inline void PathTracer<S, Visitor>::move_along_edge(SurfacePoint<S>& surface, FaceRef face) const {
+inline std::optional<FaceSide> PathTracer<S, Visitor>::blocked_at_start(
+    const Walk& walk, const Vec3d& direction) const {
+  const Vec3d& n = walk.surface.n_g;
+  if ((dot(n, direction) > 0) != (dot(n, value(walk.wi)) > 0)) return {};
+  return blocked_at_edge(c_.scene, c_.tracer, *walk.start_edge(), direction);
+}
+
+// Onto the face that a ray along `direction` meets at once.
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::move_along_edge(SurfacePoint<S>& surface, FaceRef face,
+                                                    const Vec3d& direction) const {
   // Only primal paths start on edges, so the point itself does not change.
   const Vec3<S> p = surface.p;
   const auto corners = face_corners<double>(c_.scene.shape(face.shape).mesh, face.face);
-  const Vec3d n = cross(corners[1] - corners[0], corners[2] - corners[0]);
+  Vec3d n = cross(corners[1] - corners[0], corners[2] - corners[0]);
+  if (dot(n, direction) < 0) n = -n;
   surface = surface_on_ray<S>(c_.scene, face, p, Vec3<S>{n.x, n.y, n.z});
 }
 
@@ -78,8 +91,8 @@ inline void PathTracer<S, Visitor>::find_sky(std::span<Walk* const> walks) const
 template <class S, class Visitor>
 inline bool PathTracer<S, Visitor>::shadowed(const Walk& walk) {
   const LightSample& light = *walk.light;
-  const FaceRef start = walk.surface.face;
-  const EdgeStart* edge = walk.edge;
+  const FaceRef start = walk.surface.start();
+  const EdgeStart* edge = walk.start_edge();
   if (light.face == start) return true;
   Ray ray{value(walk.surface.p), light.wo};
   ray.start = start;
@@ -91,7 +104,7 @@ inline bool PathTracer<S, Visitor>::shadowed(const Walk& walk) {
     ray.direction = c_.viewpoints->of(*delta).towards(ray.origin);
   }
   if (edge) {
-    if (blocked_at_edge(c_.scene, c_.tracer, *edge, ray.direction)) return true;
+    if (blocked_at_start(walk, ray.direction)) return true;
     ray.skip_faces = edge->around.all;
   }
   // Ends a float's rounding before the light, so that neighbours of the chosen face do not hide

@@ -28,7 +28,7 @@ inline bool PathTracer<S, Visitor>::begin_vertex(Walk& walk) {
   }
   if (c_.closed) {
     walk.sums.radiance +=
-        c_.closed->scattered(c_.tracer, walk.surface, *walk.scattering, walk.edge);
+        c_.closed->scattered(c_.tracer, walk.surface, *walk.scattering, walk.start_edge());
     return false;
   }
   // Copies have both from the path that they are of.
@@ -152,7 +152,7 @@ inline bool PathTracer<S, Visitor>::arrive(Walk& walk) {
     walk.edge = nullptr;
     walk.beside_edge = false;
   } else {
-    move_along_edge(walk.surface, face);
+    move_along_edge(walk.surface, face, walk.wo);
   }
   walk.wi = -walk.direction;
   const Rgb<S> lamp = emitted(walk);

@@ -42,7 +42,7 @@ inline void PathTracer<S, Visitor>::evaluate_wide(std::span<Walk*> walks,
   asked.for_each([](const Bsdf& bsdf, auto items) { bsdf.eval_with_pdf_each(items); });
   for (size_t i = 0; i < count; ++i) {
     Walk& walk = *walks[i];
-    then(walk, walk.scattering->limited(*direction(walk), values[i]));
+    then(walk, Scattering<S>::held(values[i]));
   }
 }
 

@@ -81,6 +81,8 @@ struct Walk {
   Hit hit;
   std::array<double, 2> sky{};  // where it leaves the scene: Environment::find
 
+  // Where the next ray starts on an edge.
+  EdgeStart* start_edge() const { return surface.lifted ? nullptr : edge; }
   // Throws as RayTracer does.
   const Rgb<S>& radiance() const {
     if (failed) throw UntraceableRay();

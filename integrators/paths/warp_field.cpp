@@ -110,7 +110,7 @@ AuxiliaryRay WarpField::look(const SurfacePoint<Dual>& surface, const Vec3d& w) 
   AuxiliaryRay result;
   result.direction = w;
   Ray ray{value(surface.p), w};
-  ray.start = surface.face;
+  ray.start = surface.start();
   Hit hit;
   if (!tracer_.closest(ray, hit)) return result;
   const Mesh& mesh = scene_.shape(hit.face.shape).mesh;

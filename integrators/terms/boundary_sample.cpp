@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "limn/core/surface_point.h"
+#include "limn/core/reverse.h"
 
 namespace limn {
 
@@ -19,12 +19,21 @@ std::array<double, 3> barycentric(const std::array<Vec3d, 3>& corners, const Vec
 
 // With a = v_ray, c the velocity of the face at x and n its normal, x moves with
 //   a + omega n . (c - a) / (n . omega).
+// What x is lifted to moves as x, its face's corners c_k and their normals make it. Moved together,
+// they carry it along, so the derivatives of g . p with respect to x and c_k sum up to g, and
+//   g . v_p = g . a + g_x . (v_x - a) + sum_k (g_k . (v_k - a) + m_k . dn_k).
 double BoundaryForm::add_seen_point(const Scene& scene, FaceRef face, const Vec3d& omega,
                                     const Vec3d& g) {
   const auto c = face_corners<double>(scene.shape(face.shape).mesh, face.face);
   const Vec3d n = cross(c[1] - c[0], c[2] - c[0]);
   const double slope = dot(n, omega);
-  const Vec3d across = n * (dot(g, omega) / slope);
+  Vec3d of_x = g;
+  if (is_lifted(scene, face.shape)) {
+    const ShadingAdjoint of = pull_back_shading(scene, face, x, omega, g, {});
+    of_x = of.x;
+    lift = {face, of.corners, of.normals};
+  }
+  const Vec3d across = n * (dot(of_x, omega) / slope);
   points[count++] = {MovingPoint::Of::kFace, nullptr, {}, 0, face, nullptr, across};
   return std::fabs(slope) / length(n);
 }
@@ -34,6 +43,9 @@ Vec3d BoundaryForm::of_ray() const {
   for (const MovingPoint& point : all()) {
     if (point.light && point.light->origin().infinite) continue;
     sum = sum - point.g;
+  }
+  if (lift) {
+    for (const Vec3d& g : lift->of_corners) sum = sum - g;
   }
   return sum;
 }

@@ -9,6 +9,7 @@
 // a pilot asks what other motions of the viewer would add. A term draws, tests visibility and hands
 // the record to a sink; it does not know the mode.
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "integrators/estimates/sample_estimator.h"
@@ -28,6 +29,12 @@ struct MovingPoint {
   Vec3d g;
 };
 
+// What the point that x is lifted to (surface_point.h) hangs on besides x.
+struct MovingLift {
+  FaceRef face;
+  std::array<Vec3d, 3> of_corners, of_normals;
+};
+
 struct BoundaryForm {
   Vec3d x;              // on the viewer's ray
   double distance = 0;  // of x from the viewer
@@ -36,6 +43,7 @@ struct BoundaryForm {
   bool held = false;  // the ray's direction does not turn with those of the path
   std::array<MovingPoint, 4> points;
   int count = 0;
+  std::optional<MovingLift> lift;
 
   void add_edge(const EdgeMesh& mesh, EdgeRef edge, double t, const Vec3d& g) {
     points[count++] = {MovingPoint::Of::kEdge, &mesh, edge, t, {}, nullptr, g};
@@ -43,11 +51,13 @@ struct BoundaryForm {
   void add_light(const DeltaLight& light, const Vec3d& g) {
     points[count++] = {MovingPoint::Of::kLight, nullptr, {}, 0, {}, &light, g};
   }
-  // Adds g . v of the point x where the ray of unit direction omega meets a face: the face moves it
-  // across its plane, the ray carries it along. Returns |cos| between omega and the face's normal.
+  // Adds g . v of the point x where the ray of unit direction omega meets a face, or of what x is
+  // lifted to: the face moves x across its plane, the ray carries it along. Returns |cos| between
+  // omega and the face's normal.
   double add_seen_point(const Scene& scene, FaceRef face, const Vec3d& omega, const Vec3d& g);
   std::span<const MovingPoint> all() const { return {points.data(), static_cast<size_t>(count)}; }
-  // What v_ray has: minus the sum of g. The direction of a light at infinity is no point.
+  // What v_ray has: minus the sum of g. Normals, and the direction of a light at infinity, are no
+  // points.
   Vec3d of_ray() const;
 };
 

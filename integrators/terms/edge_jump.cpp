@@ -102,7 +102,8 @@ class RadianceBeside {
 
   void start_on_face(int i, const FacesAround& around, const FaceSide& side) {
     const auto corners = face_corners<double>(scene_.shape(side.face.shape).mesh, side.face.face);
-    const Vec3d n = cross(corners[1] - corners[0], corners[2] - corners[0]);
+    Vec3d n = cross(corners[1] - corners[0], corners[2] - corners[0]);
+    if (dot(n, view_.omega) < 0) n = -n;
     edges_[i] = {around, view_.x0, view_.x1, side};
     walks_[i].edge = &edges_[i];
     start(i, surface_on_ray(scene_, side.face, view_.y, n));

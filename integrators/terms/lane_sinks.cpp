@@ -58,6 +58,21 @@ Vec3<Lanes> relative_velocity(const Scene& scene, const BoundaryForm& form,
   return origin.infinite ? own : against_ray(own, form.x, ray);
 }
 
+// What the corners of the face and their normals add to g . v of a lifted point, but for the velocity
+// of the unit direction.
+Lanes rate_of_lift(const Scene& scene, const BoundaryForm& form, const RayMotion& ray) {
+  const Mesh& mesh = scene.shape(form.lift->face.shape).mesh;
+  const auto corners = face_corners<Dual>(mesh, form.lift->face.face);
+  const auto normals = detail::corner_normals<Dual>(mesh, form.lift->face.face);
+  Lanes sum{};
+  for (int k = 0; k < 3; ++k) {
+    const Vec3<Lanes> v = against_ray(velocity_of(corners[k]), form.x, ray);
+    sum += along(v - ray.direction * form.distance, form.lift->of_corners[k]);
+    sum += along(velocity_of(normals[k]), form.lift->of_normals[k]);
+  }
+  return sum;
+}
+
 Lanes rate_of(const Scene& scene, const BoundaryForm& form, const RayMotion& ray) {
   const auto of_point = [&](const MovingPoint& point) {
     Vec3<Lanes> v = relative_velocity(scene, form, point, ray);
@@ -70,6 +85,7 @@ Lanes rate_of(const Scene& scene, const BoundaryForm& form, const RayMotion& ray
   };
   Lanes sum = of_point(form.points[0]);
   for (const MovingPoint& point : form.all().subspan(1)) sum += of_point(point);
+  if (form.lift) sum += rate_of_lift(scene, form, ray);
   return sum * form.scale;
 }
 

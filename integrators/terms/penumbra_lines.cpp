@@ -23,6 +23,7 @@ std::optional<DrawnLine> PenumbraLines::draw(double u, Rng& rng, RayCount& rays)
   Hit hit;
   ++rays.closest;
   if (!closest_at_edge(context_.tracer, context_.scene, around, e, 0, ray, hit)) return {};
+  if (is_lifted(context_.scene, hit.face.shape)) return {};
   const auto corners =
       face_corners<double>(context_.scene.shape(hit.face.shape).mesh, hit.face.face);
   const Vec3d n = normalize(cross(corners[1] - corners[0], corners[2] - corners[0]));

@@ -14,6 +14,8 @@
 // the normal at x, r = |x - q| and cos_x = n . omega,
 //   delta(G) domega = m(t) |cos_x| / r^2 dt,   m(t) = |x - l| / (|w| |n . w|),   1 / |n . d| at
 // infinity, which follows from dx/dt = m n x (dw/dt x w) (and |n x N| is G's slope on the surface).
+// Where rays start above the surface, L H(G) has G of the point that x is lifted to, and m is
+// |dx/dt| over G's slope by x.
 #include <fmt/format.h>
 
 #include "integrators/film/film_point.h"
@@ -72,7 +74,7 @@ BoundaryForm ShadowTerm::sweep(const ShadowEdge& edge, const ShadowPoint& point,
                                double scale) const {
   const EdgeMesh& mesh = input_.object(edge.id.object);
   const auto& ends = mesh.edge(edge.id.edge).vertices;
-  const Vec3d y0 = mesh.position(ends[0]), e = mesh.position(ends[1]) - y0, r = point.x - y0;
+  const Vec3d y0 = mesh.position(ends[0]), e = mesh.position(ends[1]) - y0, r = point.lit - y0;
   const LightOrigin origin = edge.light->origin();
   const Vec3d w = origin.through(y0);
   const Vec3d normal = cross(w, e), of_w = cross(e, r), of_e = cross(r, w);
@@ -102,7 +104,7 @@ void ShadowTerm::add_sample(const PathVertex& vertex, Rng rng, BoundarySink& sin
   const Vec3d q = vertex.surface.p;
   const double distance = length(point->x - q);
   const Vec3d omega = (point->x - q) / distance;
-  const bool apart = distance > 0 && point->face != vertex.surface.face;
+  const bool apart = distance > 0 && point->face != vertex.surface.start();
   const Rgb<double> f = apart ? vertex.scattering.eval_value(omega) : Rgb<double>{};
   const Rgb<double> amount =
       is_black(f) ? f : vertex.throughput * f * edges_.jump(edge, *point, q, omega);

@@ -24,8 +24,9 @@ struct ShadowEdge {
 // Where the shadow of a point of an edge falls.
 struct ShadowPoint {
   FaceRef face;
-  Vec3d x;
-  double m;  // see above
+  Vec3d x;    // on the face
+  Vec3d lit;  // where the shadow meets what rays start from at x (surface_point.h): x, or above it
+  double m;   // see above; of x while the shadow is at `lit`
   // A point of the face hardly aside of x, how far it is from the nearest side, and the same of the
   // face's center.
   Vec3d inside;
@@ -40,6 +41,14 @@ struct ShadowPoint {
     return depth >= wanted ? inside
                            : inside + (center - inside) * std::min(1.0, wanted / center_depth);
   }
+};
+
+// The line from a light through a point y of an edge, on behind it: y + s w.
+struct ShadowLine {
+  Vec3d y, w;
+  Vec3d along;    // the edge
+  Vec3d w0;       // w at its first end
+  bool infinite;  // w is the same all along the edge
 };
 
 // Of an edge mesh, with its tangents.
@@ -62,6 +71,8 @@ class ShadowEdges {
                    const Vec3d& omega) const;
 
  private:
+  std::optional<ShadowPoint> cast_on_lifted(const ShadowLine& line, const Ray& ray, FaceRef face,
+                                            RayCount& rays) const;
   void list(uint32_t light, ShapeId object);
   void weigh(size_t first, int lanes);
 

@@ -15,7 +15,7 @@ EdgeQuery query_at(const PathVertex& vertex) {
   query.lobe = vertex.scattering.bsdf().lobe();
   query.velocity = vertex.velocity;
   query.turn = vertex.turn;
-  query.face = vertex.surface.face;
+  query.face = vertex.surface.start();
   return query;
 }
 
@@ -32,7 +32,7 @@ void draw_edges(const EdgeSampler& sampler, const EdgeQuery& query, const Rng& k
 bool is_hidden_from(const PathContext& context, const PathVertex& vertex, FaceRef face,
                     const Vec3d& omega, double distance, TermCost& cost) {
   Ray ray{vertex.surface.p, omega};
-  ray.start = vertex.surface.face;
+  ray.start = vertex.surface.start();
   ray.end = face;
   ray.t_max = distance * (1 - 0x1p-20);  // as shadow rays end
   cost.add(RayCount{0, 1});
@@ -96,7 +96,7 @@ void add_edge_point(const PathContext& context, const PathVertex& vertex, const 
   }
   RayCount rays;
   Rgb<double> jump;
-  const bool visible = edge_jump(context, draw.mesh, view, vertex.surface.face, 0,
+  const bool visible = edge_jump(context, draw.mesh, view, vertex.surface.start(), 0,
                                  std::numeric_limits<double>::infinity(), vertex.bounces + 1,
                                  draw.key, rays, jump, draw.part);
   cost.add(rays);

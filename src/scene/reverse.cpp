@@ -5,111 +5,55 @@ namespace limn {
 
 namespace {
 
-// The corners' normals and horizons of a face.
-struct Corners {
-  std::array<uint32_t, 3> vertices, normal_ids;
-  std::array<Vec3d, 3> normals;
-  std::array<double, 3> horizons;
-
-  Corners(const Mesh& mesh, FaceId face)
-      : vertices(mesh.face(face)), normal_ids(mesh.normal_ids[face.index()]) {
-    for (int k = 0; k < 3; ++k) {
-      normals[k] = mesh.normals[normal_ids[k]];
-      horizons[k] = mesh.horizon[vertices[k]];
-    }
-  }
-};
-
-// Derivatives of the plane of a face: with respect to a point q of it, taken from the first corner,
-// to its sides e1 and e2 and to N = e1 x e2.
-struct PlaneAdjoint {
-  Vec3d q, e1, e2, n;
-};
-
 void contribute(Tape& tape, uint32_t slot, const Vec3d& g) {
   for (int k = 0; k < 3; ++k) tape.contribute(slot + k, g[k]);
 }
 
-// Of the interpolated normal and horizon, as detail::interpolate_shading makes them.
-PlaneAdjoint pull_back_shading(Tape& tape, const Mesh& mesh, const MeshSlots& slots, FaceId face,
-                               const Vec3d& q, const Vec3d& e1, const Vec3d& e2,
-                               const Vec3d& of_normal, double of_horizon) {
-  const Corners corners(mesh, face);
-  const Vec3d n = cross(e1, e2);
-  const double inverse = 1 / dot(n, n);
-  const Vec3d x1 = cross(q, e2), x2 = cross(e1, q);
-  double b1 = dot(x1, n) * inverse, b2 = dot(x2, n) * inverse;
-  const bool middle = !(std::fabs(b1) <= 2 && std::fabs(b2) <= 2);
-  if (middle) b1 = b2 = 1.0 / 3;
-  const double b[3] = {1 - b1 - b2, b1, b2};
-  const Vec3d sum =
-      corners.normals[0] * b[0] + corners.normals[1] * b[1] + corners.normals[2] * b[2];
-  const double size = length(sum);
-  const Vec3d unit = sum / size;
-  const Vec3d of_sum = (of_normal - unit * dot(unit, of_normal)) / size;
-  double of_b[3];
-  for (int k = 0; k < 3; ++k) {
-    if (slots.normals != 0) {
-      contribute(tape, slots.normals + 3 * corners.normal_ids[k], of_sum * b[k]);
-      tape.contribute(slots.horizons + mesh.weld[corners.vertices[k]], of_horizon * b[k]);
-    }
-    of_b[k] = dot(of_sum, corners.normals[k]) + of_horizon * corners.horizons[k];
-  }
-  if (middle) return {};
-  const double of_b1 = of_b[1] - of_b[0], of_b2 = of_b[2] - of_b[0];
-  const double of_inverse = of_b1 * dot(x1, n) + of_b2 * dot(x2, n);
-  const Vec3d of_x1 = n * (of_b1 * inverse), of_x2 = n * (of_b2 * inverse);
-  PlaneAdjoint of;
-  of.q = cross(e2, of_x1) + cross(of_x2, e1);
-  of.e1 = cross(q, of_x2);
-  of.e2 = cross(of_x1, q);
-  of.n = x1 * (of_b1 * inverse) + x2 * (of_b2 * inverse) - n * (2 * of_inverse * inverse * inverse);
-  return of;
-}
-
-// The adjoint of surface_on_ray: of p = o + t d, t = (c0 - o) . N / (d . N), and of what is found
-// at p. Nodes and values: of o, then of d.
+// The adjoint of surface_on_ray: of x = o + t d, t = (c0 - o) . N / (d . N), and of what is found
+// at x. Nodes and values: of o, then of d.
 void pull_back_surface(Tape& tape, const Tape::Composite& s) {
   const auto read = [&](int first) {
     return Vec3d{tape.adjoint(s.first + first), tape.adjoint(s.first + first + 1),
                  tape.adjoint(s.first + first + 2)};
   };
-  Vec3d of_p = read(0);
-  const Vec3d of_normal = read(3);
-  const double of_horizon = tape.adjoint(s.first + 6);
-  if (of_p == Vec3d{} && of_normal == Vec3d{} && of_horizon == 0) return;
-  const ShapeId shape(s.shape);
-  const FaceId face(s.part);
-  const Mesh& mesh = tape.slots()->scene->shape(shape).mesh;
-  const MeshSlots& slots = tape.slots()->mesh(shape);
-  const auto c = face_corners<double>(mesh, face);
+  const Vec3d of_p = read(0), of_normal = read(3);
+  if (of_p == Vec3d{} && of_normal == Vec3d{}) return;
+  const FaceRef face{ShapeId(s.shape), FaceId(s.part)};
+  const Scene& scene = *tape.slots()->scene;
+  const Mesh& mesh = scene.shape(face.shape).mesh;
+  const MeshSlots& slots = tape.slots()->mesh(face.shape);
+  const auto c = face_corners<double>(mesh, face.face);
   const Vec3d o{s.values[0], s.values[1], s.values[2]}, d{s.values[3], s.values[4], s.values[5]};
   const Vec3d e1 = c[1] - c[0], e2 = c[2] - c[0], n = cross(e1, e2);
   const double slope = dot(n, d);
   const double t = dot(c[0] - o, n) / slope;
-  PlaneAdjoint of;
+  ShadingAdjoint of{of_p, {}, {}};
+  Vec3d of_n;
   if (mesh.normal_source == NormalSource::kFace) {
     const double size = length(n);
     const Vec3d unit = n / size;
-    of.n = (of_normal - unit * dot(unit, of_normal)) / size;
+    of_n = (of_normal - unit * dot(unit, of_normal)) / size;
   } else {
-    of =
-        pull_back_shading(tape, mesh, slots, face, o + d * t - c[0], e1, e2, of_normal, of_horizon);
+    of = pull_back_shading(scene, face, o + d * t, d, of_p, of_normal);
+    for (int k = 0; k < 3 && slots.normals != 0; ++k) {
+      const uint32_t id = mesh.normal_ids[face.face.index()][k];
+      contribute(tape, slots.normals + 3 * id, of.normals[k]);
+    }
   }
-  of_p += of.q;
-  const double k = dot(of_p, d) / slope;
-  const Vec3d of_o = of_p - n * k, of_d = of_p * t - n * (k * t);
+  const double k = dot(of.x, d) / slope;
+  const Vec3d of_o = of.x - n * k, of_d = of.x * t - n * (k * t);
   for (int i = 0; i < 3; ++i) {
     tape.adjoint(s.nodes[i]) += of_o[i];
     tape.adjoint(s.nodes[3 + i]) += of_d[i];
   }
   if (slots.positions == 0) return;
-  of.n += (c[0] - o) * k - d * (k * t);
-  of.e1 += cross(e2, of.n);
-  of.e2 += cross(of.n, e1);
-  const Vec3d of_corners[3] = {n * k - of.q - of.e1 - of.e2, of.e1, of.e2};
+  of_n += (c[0] - o) * k - d * (k * t);
+  const Vec3d of_e1 = cross(e2, of_n), of_e2 = cross(of_n, e1);
+  of.corners[0] += n * k - of_e1 - of_e2;
+  of.corners[1] += of_e1;
+  of.corners[2] += of_e2;
   for (int i = 0; i < 3; ++i) {
-    contribute(tape, slots.positions + 3 * mesh.weld[mesh.face(face)[i]], of_corners[i]);
+    contribute(tape, slots.positions + 3 * mesh.weld[mesh.face(face.face)[i]], of.corners[i]);
   }
 }
 
@@ -155,17 +99,66 @@ Rgb<S> as_colour(const Vec3<S>& v) {
 
 }  // namespace
 
+ShadingAdjoint pull_back_shading(const Scene& scene, FaceRef face, const Vec3d& x,
+                                 const Vec3d& direction, const Vec3d& of_p,
+                                 const Vec3d& of_normal) {
+  const Mesh& mesh = scene.shape(face.shape).mesh;
+  const auto c = face_corners<double>(mesh, face.face);
+  const Vec3d e1 = c[1] - c[0], e2 = c[2] - c[0], n = cross(e1, e2);
+  const double inverse = 1 / dot(n, n), size = length(n);
+  const Vec3d q = x - c[0], x1 = cross(q, e2), x2 = cross(e1, q);
+  double b1 = dot(x1, n) * inverse, b2 = dot(x2, n) * inverse;
+  const bool wide = std::fabs(b1) <= 2 && std::fabs(b2) <= 2;
+  if (!wide) b1 = b2 = 1.0 / 3;
+  const std::array<double, 3> b = {1 - b1 - b2, b1, b2};
+  const std::array<Vec3d, 3> normals = detail::corner_normals<double>(mesh, face.face);
+  const Vec3d sum = normals[0] * b[0] + normals[1] * b[1] + normals[2] * b[2];
+  const Vec3d unit = normalize(sum);
+  const Vec3d of_sum = (of_normal - unit * dot(unit, of_normal)) / length(sum);
+  std::array<double, 3> depth{};
+  detail::Lift lift;
+  if (wide && is_lifted(scene, face.shape)) {
+    for (int k = 0; k < 3; ++k) depth[k] = dot(x - c[k], normals[k]);
+    const Vec3d n_g = n / size;
+    lift = detail::lift_of(normals, b, depth, n_g, dot(n_g, direction) < 0 ? 1 : -1, size, x);
+  }
+  ShadingAdjoint of{of_p, {}, {}};
+  double of_b[3];
+  for (int k = 0; k < 3; ++k) {
+    // What lifts x is gain b depth n, depth = (x - corner) . n.
+    const double along = dot(of_p, normals[k]) * lift.gain[k], of_depth = along * b[k];
+    of_b[k] = dot(of_sum, normals[k]) + along * depth[k];
+    of.x += normals[k] * of_depth;
+    of.corners[k] += normals[k] * -of_depth;
+    of.normals[k] =
+        of_sum * b[k] + of_p * (lift.gain[k] * b[k] * depth[k]) + (x - c[k]) * of_depth;
+  }
+  if (!wide) return of;
+  const double of_b1 = of_b[1] - of_b[0], of_b2 = of_b[2] - of_b[0];
+  const double of_inverse = of_b1 * dot(x1, n) + of_b2 * dot(x2, n);
+  const Vec3d of_x1 = n * (of_b1 * inverse), of_x2 = n * (of_b2 * inverse);
+  const Vec3d of_q = cross(e2, of_x1) + cross(of_x2, e1);
+  const Vec3d of_n =
+      x1 * (of_b1 * inverse) + x2 * (of_b2 * inverse) - n * (2 * of_inverse * inverse * inverse);
+  const Vec3d of_e1 = cross(q, of_x2) + cross(e2, of_n), of_e2 = cross(of_x1, q) + cross(of_n, e1);
+  of.x += of_q;
+  of.corners[0] += -of_q - of_e1 - of_e2;
+  of.corners[1] += of_e1;
+  of.corners[2] += of_e2;
+  return of;
+}
+
 template <>
 SurfacePoint<Var> surface_on_ray<Var>(const Scene& scene, FaceRef face, const Vec3<Var>& origin,
                                       const Vec3<Var>& direction) {
   const auto point = surface_on_ray<double>(scene, face, value(origin), value(direction));
   const auto fixed = [](const Vec3d& v) { return Vec3<Var>{v.x, v.y, v.z}; };
   SurfacePoint<Var> moving{point.shape, point.face,       fixed(point.p),
-                           point.n_g,   fixed(point.n_s), point.horizon};
+                           point.n_g,   fixed(point.n_s), point.lifted};
   Tape& tape = *Tape::current();
   const MeshSlots& slots = tape.slots()->mesh(face.shape);
   if (slots.positions == 0 && is_still(origin) && is_still(direction)) return moving;
-  Tape::Composite statement{0, 7, pull_back_surface, face.shape.index(), face.face.index(), {}, {}};
+  Tape::Composite statement{0, 6, pull_back_surface, face.shape.index(), face.face.index(), {}, {}};
   for (int k = 0; k < 3; ++k) {
     statement.nodes[k] = origin[k].node;
     statement.nodes[3 + k] = direction[k].node;
@@ -178,7 +171,6 @@ SurfacePoint<Var> surface_on_ray<Var>(const Scene& scene, FaceRef face, const Ve
     moving.p[k].node = first + k;
     if (!flat || slots.positions != 0) moving.n_s[k].node = first + 3 + k;
   }
-  if (!flat) moving.horizon.node = first + 6;
   return moving;
 }
 

@@ -205,7 +205,7 @@ void expect_same_interior(const Scene& scene, const std::string& sampler = "fore
   GradientOptions forward_options;
   for (const ParameterAdjoint& p : reverse.parameters) {
     const Parameter parameter = find_parameter_or_array(scene, p.name);
-    // Of one vertex alone forward mode takes the middle of horizons that tie, see mesh.h.
+    // Displacements of one vertex are held against the array above.
     if (parameter.size > 1 || p.name.find(".displacement.") != p.name.npos) continue;
     const bool colour = parameter.colour;
     for (const char* part : {".r", ".g", ".b"}) {

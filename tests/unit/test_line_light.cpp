@@ -368,8 +368,8 @@ TEST(LineLight, LampsOfNoExtent) {
   EXPECT_NEAR(sum / (0.7 / kPi * 8 * seen), 1, 1e-4);
 }
 
-// Interpolated normals under a map, against a sum over the whole sphere: rows of the map, where it
-// has kinks, end pieces of the quadrature.
+// Interpolated normals under a map, against a sum over the whole sphere, of which the point's own
+// face hides a part: the point lies above it (surface_point.h).
 TEST(LineLight, MapsOverTurnedNormals) {
   const TempFiles files;
   const std::string file =
@@ -384,7 +384,7 @@ TEST(LineLight, MapsOverTurnedNormals) {
   const auto surface =
       surface_on_ray<double>(scene, {ShapeId(1), FaceId(0)}, Vec3d{0.1, 6, -0.2}, down);
   const Scattering<double> scattering(surface, -down, scene.shading);
-  ASSERT_GT(surface.horizon, 0.1);
+  ASSERT_TRUE(surface.lifted);
   const Looking look(scene, {.lines = 512}, true);
   double found = 0;
   for (int k = 0; k < 64; ++k) {
@@ -398,13 +398,15 @@ TEST(LineLight, MapsOverTurnedNormals) {
       const double phi = 2 * kPi * (i + 0.5) / kColumns;
       const Vec3d d{s * std::cos(phi), c, s * std::sin(phi)};
       const double f = scattering.eval(d).g;
-      if (f > 0) sum += f * scene.environment->radiance(d).g * s;
+      const bool open = f > 0 && !look.tracer->occluded(Ray{surface.p, d});
+      if (open) sum += f * scene.environment->radiance(d).g * s;
     }
   }
   sum *= 2 * kPi * kPi / kRows / kColumns;
   fmt::print("map over turned normals: {:.8g} and {:.8g}\n", found, sum);
-  // The sum over the sphere is right to 1e-7; what lines leave is far less than a mistake.
-  EXPECT_NEAR(found / sum, 1, 1e-5);
+  // The sum over the sphere is right to a step's width along the face's outline, of which little of
+  // the light comes.
+  EXPECT_NEAR(found / sum, 1, 1e-3);
 }
 
 // Faces behind a lamp, in its plane and through it.

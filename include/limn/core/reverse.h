@@ -1,6 +1,7 @@
 #pragma once
 // Overloads for Var of the functions that path tracing calls on surfaces, lights and cameras. They
 // write derivatives with respect to the scene's slots to the tape.
+#include <array>
 #include <optional>
 
 #include "limn/core/camera.h"
@@ -10,8 +11,18 @@
 
 namespace limn {
 
-// A composite statement with seven outputs (p, n_s, horizon), from the derivatives of
-// surface_on_ray<Dual>.
+// The adjoint of detail::interpolate_shading at a point x of a face: derivatives with respect to x,
+// the face's corners and their normals.
+struct ShadingAdjoint {
+  Vec3d x;
+  std::array<Vec3d, 3> corners, normals;
+};
+// of_p, of_normal: of the point that x is lifted to, seen along `direction`, and of the unit shading
+// normal there.
+ShadingAdjoint pull_back_shading(const Scene& scene, FaceRef face, const Vec3d& x,
+                                 const Vec3d& direction, const Vec3d& of_p, const Vec3d& of_normal);
+
+// A composite statement with six outputs (p, n_s), from the derivatives of surface_on_ray<Dual>.
 template <>
 SurfacePoint<Var> surface_on_ray<Var>(const Scene& scene, FaceRef face, const Vec3<Var>& origin,
                                       const Vec3<Var>& direction);

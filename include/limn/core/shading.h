@@ -3,22 +3,17 @@
 //
 // The default scattering function is continuous in position and in both directions wherever normals
 // are interpolated, so that a gradient needs no edges but those of edges.h. With n_s the
-// interpolated and n_g the geometric normal, and s = `horizon`:
+// interpolated and n_g the geometric normal:
 //
 //  - the side of the surface follows n_g, which changes sides only at silhouettes;
 //  - where n_s turns away from the viewer (n_s.wi < e) the BSDF is evaluated with the normal
 //        n = normalize(n_s + (e - n_s.wi) wi),
 //    which meets n_s at n_s.wi = e and keeps n.wi > 0;
-//  - a factor reaches zero before wo does reach the geometric horizon n_g.wo = 0, below which the
-//    ray would start inside the mesh:
-//        clamp((n_s.wo - s) / (s (1 - s)), 0, 1).
-//    The usual factors (Chiang, Li and Burley 2019) are functions of n_g and jump from triangle to
-//    triangle. Here every vertex stores the sine of the largest tilt between n_s and n_g over the
-//    faces around it. Its interpolation s is continuous and at any point at least the sine of the
-//    tilt there, so n_s.wo > s implies n_g.wo > 0.
+//  - what lies below the face but above the shading normal's plane, n_g.wo <= 0 < n_s.wo, is seen
+//    from a point above the face (surface_point.h), so that rays never start inside the mesh and no
+//    factor has to hide them.
 //
-// Flat-shaded meshes have n_s = n_g and s = 0, and are left as they are.
-#include <algorithm>
+// Flat-shaded meshes have n_s = n_g, and are left as they are.
 #include <optional>
 
 #include "limn/core/slots.h"
@@ -32,20 +27,18 @@ class Scattering {
  public:
   // wi: unit, towards the viewer.
   Scattering(const SurfacePoint<S>& point, const Vec3<S>& wi, ShadingModel model)
-      : wi_(wi), n_s_(point.n_s), horizon_(point.horizon) {
+      : wi_(wi), n_(point.n_s) {
     const bool mitsuba = model == ShadingModel::kMitsuba;
     front_ = dot(mitsuba ? value(point.n_s) : point.n_g, value(wi)) > 0;
     bsdf_ = point.shape->bsdf->side(front_);
-    if (!front_) n_s_ = -n_s_;
-    n_ = n_s_;
-    limited_ = !mitsuba && point.shape->mesh.normal_source != NormalSource::kFace;
-    if (limited_) bend();
+    if (!front_) n_ = -n_;
+    if (!mitsuba && point.shape->mesh.normal_source != NormalSource::kFace) bend();
     if constexpr (std::is_same_v<S, Dual>) {
-      still_ = is_still(n_s_) && is_still(wi_) && is_still(horizon_) && bsdf_ && bsdf_->is_still();
+      still_ = is_still(n_) && is_still(wi_) && bsdf_ && bsdf_->is_still();
     }
     if constexpr (std::is_same_v<S, Var>) {
       copies_ = Tape::current()->slots()->bsdfs[point.face.shape.index()][front_];
-      still_ = is_still(n_s_) && is_still(wi_) && is_still(horizon_) && !copies_;
+      still_ = is_still(n_) && is_still(wi_) && !copies_;
     }
   }
 
@@ -60,17 +53,13 @@ class Scattering {
   template <class W>
   Rgb<S> eval(const Vec3<W>& wo) const {
     const Vec3<S> w{wo.x, wo.y, wo.z};
-    if (!limited_) return detail::eval_bsdf<S>(*bsdf_, copies_, n_, wi_, w);
-    const S factor = horizon_factor(wo);
-    if (value(factor) == 0) return {};
-    return detail::eval_bsdf<S>(*bsdf_, copies_, n_, wi_, w) * factor;
+    return detail::eval_bsdf<S>(*bsdf_, copies_, n_, wi_, w);
   }
   // The value of eval for a direction that is held, at the cost of plain numbers; to rounding.
   Rgb<double> eval_value(const Vec3d& wo) const { return eval_value(*bsdf_, wo); }
   // The same if the surface were of another material.
   Rgb<double> eval_value(const Bsdf& bsdf, const Vec3d& wo) const {
-    const double factor = limited_ ? horizon_value(wo) : 1;
-    return factor == 0 ? Rgb<double>{} : bsdf.eval(value(n_), value(wi_), wo) * factor;
+    return bsdf.eval(value(n_), value(wi_), wo);
   }
   // The part of eval's derivative that comes from the motion of wo alone.
   Rgb<Lanes> eval_derivative(const Vec3<Dual>& wo) const {
@@ -97,12 +86,11 @@ class Scattering {
     if constexpr (!std::is_same_v<S, double>) {
       if (!still_) return {eval(wo), pdf_solid_angle(wo)};
     }
-    return limited(wo, bsdf_->eval_with_pdf(value(n_), value(wi_), wo));
+    return held(bsdf_->eval_with_pdf(value(n_), value(wi_), wo));
   }
-  // The same from what the BSDF has there.
-  Evaluation limited(const Vec3d& wo, const BsdfValue& f) const {
-    const Rgb<double> c = f.value * (limited_ ? horizon_value(wo) : 1.0);
-    return {{S(c.r), S(c.g), S(c.b)}, f.pdf};
+  // From what the BSDF has there, without derivatives.
+  static Evaluation held(const BsdfValue& f) {
+    return {{S(f.value.r), S(f.value.g), S(f.value.b)}, f.pdf};
   }
   std::optional<Vec3d> sample(double u1, double u2) const {
     return bsdf_->sample(value(n_), value(wi_), u1, u2);
@@ -115,38 +103,18 @@ class Scattering {
       return Vec3<S>{value(v.x), value(v.y), value(v.z)};
     };
     wi_ = constant(wi_);
-    n_s_ = constant(n_s_);
     n_ = constant(n_);
-    horizon_ = S(value(horizon_));
   }
   void bend() {
     const double limit = 0.01;  // e above; not tuned: any small number is continuous
-    const S c = dot(n_s_, wi_);
-    if (value(c) < limit) n_ = normalize(n_s_ + wi_ * (limit - c));
-  }
-  template <class W>
-  S horizon_factor(const Vec3<W>& wo) const {
-    const S c = dot(n_s_, wo);
-    if (value(c) <= value(horizon_)) return S(0.0);
-    const S width = horizon_ * (1.0 - horizon_);
-    const S above = c - horizon_;
-    if (value(above) >= value(width)) return S(1.0);
-    return above / width;
+    const S c = dot(n_, wi_);
+    if (value(c) < limit) n_ = normalize(n_ + wi_ * (limit - c));
   }
 
-  // horizon_factor without derivatives.
-  double horizon_value(const Vec3d& wo) const {
-    const double c = dot(value(n_s_), wo), h = value(horizon_);
-    if (c <= h) return 0;
-    return std::min(1.0, (c - h) / (h * (1 - h)));
-  }
-
-  Vec3<S> wi_, n_s_, n_;
-  S horizon_;
+  Vec3<S> wi_, n_;
   const Bsdf* bsdf_ = nullptr;
   const SeededCopies<Bsdf>* copies_ = nullptr;  // Var: of bsdf_, if its parameters have slots
   bool front_ = false;
-  bool limited_ = false;
   bool still_ = false;  // no parameter of the pass moves it while wo is held (not for double)
 };
 

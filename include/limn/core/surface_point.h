@@ -1,5 +1,19 @@
 #pragma once
-// A point on a surface, over any scalar: where a ray meets a face, with its normals.
+// A point on a surface, over any scalar: where a ray meets a face, with its normals, and where the
+// rays start that leave it.
+//
+// Interpolated normals n_s mean a smooth surface, but rays meet flat faces: of the directions above
+// the smooth surface, n_s.wo > 0, some lie below the face, and a ray that started on the face would
+// begin inside the mesh, on this face and not on its neighbour. So rays start above the face, after
+// J. Hanika, Hacking the Shadow Terminator, Ray Tracing Gems II, 2021: with c_k the corners, n_k
+// their normals, b_k the barycentric coordinates of the hit x and d_k = (x - c_k).n_k,
+//     p = x + sum over k of g_k b_k d_k n_k.
+// Seen from outside, g_k = -1 where x lies below the tangent plane of a corner (d_k < 0), which is
+// Hanika's point. Where x lies above it, in a hollow, Hanika has 0; here g_k = kHollowLift, so that
+// no ray starts inside there either: what lies below the face sees the face itself. p is continuous
+// across edges, as it depends on the corners of an edge alone there, and faces whose corners have
+// their own normal stay as they are.
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -13,10 +27,14 @@ template <class S>
 struct SurfacePoint {
   const Shape* shape = nullptr;
   FaceRef face;
-  Vec3<S> p;
+  Vec3<S> p;    // where rays start: on the face, or above it on the side that is seen
   Vec3d n_g;    // unit geometric normal, outward by the winding
   Vec3<S> n_s;  // unit shading normal, on the side of n_g unless the file's normals say otherwise
-  S horizon{};  // s of shading.h; 0 for flat shading
+  // p is so far above the face that rays from there meet the face as any other.
+  bool lifted = false;
+
+  // The face that rays from p skip, if any.
+  FaceRef start() const { return lifted ? FaceRef{} : face; }
 
   // Radiance that the surface itself emits towards the unit direction wi.
   Rgb<S> emission(const Vec3d& wi, ShadingModel model) const {
@@ -33,34 +51,82 @@ S interpolate(const S& b0, const S& b1, const S& b2, const S& a0, const S& a1, c
   return b0 * a0 + b1 * a1 + b2 * a2;
 }
 
-// Shading normal and horizon from the barycentric coordinates (b1, b2) of the second and third
-// corner.
+// The less, the nearer is the start to the face, and the noisier are derivatives where the faces of a
+// hollow are seen from themselves. Not tuned.
+inline constexpr double kHollowLift = 0.125;
+
+// How far each corner lifts a point (the factors g_k above), and whether it comes clear of the face.
+struct Lift {
+  std::array<double, 3> gain{};
+  bool clear = false;
+};
+
+// b, depth: b_k and d_k above; side: 1 if the face is seen from outside, else -1; size: twice the
+// area of the face.
+inline Lift lift_of(const std::array<Vec3d, 3>& normals, const std::array<double, 3>& b,
+                    const std::array<double, 3>& depth, const Vec3d& n_g, double side, double size,
+                    const Vec3d& p) {
+  // Relative to the face. Less is rounding: a tie, where the mean of both sides' slopes stands.
+  constexpr double kTie = 0x1p-20, kClear = 0x1p-17;
+  Lift lift;
+  double height = 0;
+  for (int k = 0; k < 3; ++k) {
+    if (!(b[k] > 0)) continue;  // rounding puts points beyond a side
+    const double above = side * depth[k];
+    const bool tie = above * above <= kTie * kTie * size;
+    lift.gain[k] = tie ? 0.5 * (kHollowLift - 1) : above < 0 ? -1 : kHollowLift;
+    height += side * lift.gain[k] * b[k] * depth[k] * dot(normals[k], n_g);
+  }
+  // Normals that point to the other side of the face do not lift.
+  if (height < -kClear * std::sqrt(size)) return {};
+  const double coordinate = std::max({std::fabs(p.x), std::fabs(p.y), std::fabs(p.z)});
+  lift.clear = height > 0 && height * height > kClear * kClear * size &&
+               height > 0x1p-21 * coordinate;  // the rounding of rays
+  return lift;
+}
+
 template <class S>
-void interpolate_shading(const Mesh& mesh, S b1, S b2, SurfacePoint<S>& point) {
-  // A face that is narrower than the rounding of its points has no coordinates across: its middle
-  // stands for all.
-  if (!(std::fabs(value(b1)) <= 2 && std::fabs(value(b2)) <= 2)) b1 = b2 = S(1.0 / 3);
-  const S b0 = 1.0 - b1 - b2;
-  const FaceIndices& ids = mesh.normal_ids[point.face.face.index()];
-  const FaceIndices& vertices = mesh.face(point.face.face);
-  Vec3<S> n[3];
-  S h[3];
+std::array<Vec3<S>, 3> corner_normals(const Mesh& mesh, FaceId face) {
+  const FaceIndices& ids = mesh.normal_ids[face.index()];
+  std::array<Vec3<S>, 3> n;
   for (int k = 0; k < 3; ++k) {
     const Vec3d& a = mesh.normals[ids[k]];
     n[k] = {a.x, a.y, a.z};
-    h[k] = mesh.horizon[vertices[k]];
     if constexpr (!std::is_same_v<S, double>) {
-      if (!mesh.normal_tangents.empty()) {
-        const Vec3<Lanes>& d = mesh.normal_tangents[ids[k]];
-        n[k] = {{a.x, d.x}, {a.y, d.y}, {a.z, d.z}};
-      }
-      if (!mesh.horizon_tangents.empty()) h[k].d = mesh.horizon_tangents[vertices[k]];
+      if (mesh.normal_tangents.empty()) continue;
+      const Vec3<Lanes>& d = mesh.normal_tangents[ids[k]];
+      n[k] = {{a.x, d.x}, {a.y, d.y}, {a.z, d.z}};
     }
   }
-  point.n_s = normalize(Vec3<S>{interpolate(b0, b1, b2, n[0].x, n[1].x, n[2].x),
-                                interpolate(b0, b1, b2, n[0].y, n[1].y, n[2].y),
-                                interpolate(b0, b1, b2, n[0].z, n[1].z, n[2].z)});
-  point.horizon = interpolate(b0, b1, b2, h[0], h[1], h[2]);
+  return n;
+}
+
+// Shading normal, and p lifted from the face if `lifts`, from the barycentric coordinates (b1, b2)
+// of the second and third corner. size: twice the area of the face; direction: of the ray that
+// meets it.
+template <class S, class P>
+void interpolate_shading(const Mesh& mesh, const std::array<Vec3<P>, 3>& corners, S b1, S b2,
+                         double size, const Vec3d& direction, bool lifts, SurfacePoint<S>& point) {
+  // A face that is narrower than the rounding of its points has no coordinates across: its middle
+  // stands for all.
+  const bool wide = std::fabs(value(b1)) <= 2 && std::fabs(value(b2)) <= 2;
+  if (!wide) b1 = b2 = S(1.0 / 3);
+  const std::array<S, 3> b = {1.0 - b1 - b2, b1, b2};
+  const std::array<Vec3<S>, 3> n = corner_normals<S>(mesh, point.face.face);
+  point.n_s = normalize(Vec3<S>{interpolate(b[0], b[1], b[2], n[0].x, n[1].x, n[2].x),
+                                interpolate(b[0], b[1], b[2], n[0].y, n[1].y, n[2].y),
+                                interpolate(b[0], b[1], b[2], n[0].z, n[1].z, n[2].z)});
+  if (!wide || !lifts) return;
+  std::array<S, 3> d;
+  for (int k = 0; k < 3; ++k) d[k] = dot(point.p - corners[k], n[k]);
+  const double side = dot(point.n_g, direction) < 0 ? 1 : -1;
+  const Lift lift =
+      lift_of({value(n[0]), value(n[1]), value(n[2])}, {value(b[0]), value(b[1]), value(b[2])},
+              {value(d[0]), value(d[1]), value(d[2])}, point.n_g, side, size, value(point.p));
+  for (int k = 0; k < 3; ++k) {
+    if (lift.gain[k] != 0) point.p = point.p + n[k] * (b[k] * d[k] * lift.gain[k]);
+  }
+  point.lifted = lift.clear;
 }
 
 // Brings what interpolate_shading reads into the cache, while the plane is still to be met.
@@ -75,18 +141,17 @@ void fetch_shading(const Mesh& mesh, FaceId face) {
   const FaceIndices& vertices = mesh.face(face);
   for (int k = 0; k < 3; ++k) {
     fetch(mesh.normals, ids[k]);
-    fetch(mesh.horizon, vertices[k]);
     // Plain numbers read no tangents.
     if constexpr (!std::is_same_v<S, double>) {
       if (!mesh.position_tangents.empty()) fetch(mesh.position_tangents, vertices[k]);
       if (!mesh.normal_tangents.empty()) fetch(mesh.normal_tangents, ids[k]);
-      if (!mesh.horizon_tangents.empty()) fetch(mesh.horizon_tangents, vertices[k]);
     }
   }
 }
 
+// lifts: above faces with interpolated normals.
 template <class S, class P>
-void place_on_plane(const Mesh& mesh, const Vec3<S>& origin, const Vec3<S>& direction,
+void place_on_plane(const Mesh& mesh, const Vec3<S>& origin, const Vec3<S>& direction, bool lifts,
                     SurfacePoint<S>& point) {
   // In plain numbers paths alone come here often, and have fetched it ahead (path_rays.h): once
   // more images of the demo took 0.99 of the time, by which two runs of one program differ, too.
@@ -108,20 +173,28 @@ void place_on_plane(const Mesh& mesh, const Vec3<S>& origin, const Vec3<S>& dire
   }
   const Vec3<S> q = point.p - corners[0];
   const P inverse = over_length * over_length;
-  interpolate_shading<S>(mesh, dot(cross(q, e2), n) * inverse, dot(cross(e1, q), n) * inverse,
-                         point);
+  interpolate_shading<S, P>(mesh, corners, dot(cross(q, e2), n) * inverse,
+                            dot(cross(e1, q), n) * inverse, 1 / value(over_length),
+                            value(direction), lifts, point);
 }
 
 // A point that no parameter moves.
 inline SurfacePoint<Dual> as_dual(const SurfacePoint<double>& point) {
   const auto still = [](const Vec3d& v) { return Vec3<Dual>{v.x, v.y, v.z}; };
-  return {point.shape, point.face, still(point.p), point.n_g, still(point.n_s), point.horizon};
+  return {point.shape, point.face, still(point.p), point.n_g, still(point.n_s), point.lifted};
 }
 
 }  // namespace detail
 
+// Whether points of a shape are lifted: rays do not start on its faces.
+inline bool is_lifted(const Scene& scene, ShapeId shape) {
+  return scene.shading != ShadingModel::kMitsuba &&
+         scene.shape(shape).mesh.normal_source != NormalSource::kFace;
+}
+
 // Where the line origin + t direction meets the plane of the face: the point that slides along the
-// ray while the face moves and the ray is held (or moves as its Dual says).
+// ray while the face moves and the ray is held (or moves as its Dual says), lifted as above but for
+// Mitsuba's shading.
 template <class S>
 SurfacePoint<S> surface_on_ray(const Scene& scene, FaceRef face, const Vec3<S>& origin,
                                const Vec3<S>& direction) {
@@ -129,9 +202,10 @@ SurfacePoint<S> surface_on_ray(const Scene& scene, FaceRef face, const Vec3<S>& 
   point.shape = &scene.shape(face.shape);
   point.face = face;
   const Mesh& mesh = point.shape->mesh;
+  const bool lifts = is_lifted(scene, face.shape);
   if constexpr (std::is_same_v<S, Dual>) {
     if (!mesh.position_tangents.empty()) {
-      detail::place_on_plane<S, Dual>(mesh, origin, direction, point);
+      detail::place_on_plane<S, Dual>(mesh, origin, direction, lifts, point);
       return point;
     }
     if (is_still(origin) && is_still(direction) && mesh.normal_tangents.empty()) {
@@ -139,7 +213,7 @@ SurfacePoint<S> surface_on_ray(const Scene& scene, FaceRef face, const Vec3<S>& 
       return point;
     }
   }
-  detail::place_on_plane<S, double>(mesh, origin, direction, point);
+  detail::place_on_plane<S, double>(mesh, origin, direction, lifts, point);
   return point;
 }
 
