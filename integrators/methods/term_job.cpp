@@ -8,6 +8,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "integrators/edges/scene_edges.h"
 #include "integrators/estimates/batches.h"
 #include "integrators/film/film_regions.h"
 #include "integrators/methods/selection.h"
@@ -102,6 +103,7 @@ class TermJob {
     if (options.samples) check_samples(*options.samples);
     std::vector<Parameter> parameters;
     for (const auto& name : options.parameters) parameters.push_back(find_parameter(scene, name));
+    moves_ = !std::all_of(parameters.begin(), parameters.end(), [](auto& p) { return p.colour; });
     std::shared_ptr<const FilmRegions> visible;
     if (options.exact_film) {
       visible = std::make_shared<FilmRegions>(scene, settings.threads, settings.interrupted);
@@ -126,6 +128,7 @@ class TermJob {
     }
     result.at_kink = result.warnings.size() > warned;
     warn_of_faces_edge_on(scene_, pass(0).viewpoints(), result.warnings);
+    if (moves_) warn_of_shadows_in_hollows(scene_, result.warnings);
     for (size_t p = 0; p < passes_.size(); ++p)
       result.at_kink = result.at_kink || pass(p).viewpoints().cross_planes();
     plan(settings, watch, result);
@@ -507,7 +510,8 @@ class TermJob {
   const Scene& scene_;
   const GradientOptions& options_;
   TermMethod method_;
-  bool moves_film_;  // whether positions on the film may move
+  bool moves_film_;     // whether positions on the film may move
+  bool moves_ = false;  // whether any parameter is more than a colour
   std::vector<const TermType*> types_;
   std::vector<bool> computed_;  // of each term
   std::vector<std::unique_ptr<SampleEstimator>> passes_;

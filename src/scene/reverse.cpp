@@ -130,8 +130,7 @@ ShadingAdjoint pull_back_shading(const Scene& scene, FaceRef face, const Vec3d& 
     of_b[k] = dot(of_sum, normals[k]) + along * depth[k];
     of.x += normals[k] * of_depth;
     of.corners[k] += normals[k] * -of_depth;
-    of.normals[k] =
-        of_sum * b[k] + of_p * (lift.gain[k] * b[k] * depth[k]) + (x - c[k]) * of_depth;
+    of.normals[k] = of_sum * b[k] + of_p * (lift.gain[k] * b[k] * depth[k]) + (x - c[k]) * of_depth;
   }
   if (!wide) return of;
   const double of_b1 = of_b[1] - of_b[0], of_b2 = of_b[2] - of_b[0];
