@@ -212,7 +212,7 @@ void BackwardPass::select() {
   warn_of_faces_edge_on(parameters_.scene(), *path_.viewpoints, result_.warnings);
   const auto& all = parameters_.parameters();
   if (!std::all_of(all.begin(), all.end(), [](const auto& p) { return p.colour; })) {
-    warn_of_shadows_in_hollows(parameters_.scene(), result_.warnings);
+    warn_of_shadows_on_lifted_points(parameters_.scene(), result_.warnings);
   }
   for (const Parameter& p : parameters_.parameters()) {
     result_.parameters.push_back({p.name, p.unit, p.shape(), Moments(p.numbers())});

@@ -125,32 +125,15 @@ void warn_of_contacts(const Scene& scene, const EdgeSamplerInput* edges,
     warn(fmt::format("{} more pairs of shapes touch and part like that", told - kMost));
 }
 
-namespace {
-
-// Whether a corner of some face lies above the tangent plane of another: rays start above the face.
-bool has_hollows(const Mesh& mesh) {
-  constexpr double kFlat = 1e-3;  // relative to the length of a side: rounding of positions is less
-  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
-    const auto c = face_corners<double>(mesh, FaceId(f));
-    const auto n = detail::corner_normals<double>(mesh, FaceId(f));
-    for (int k = 0; k < 3; ++k) {
-      for (const Vec3d& side : {c[(k + 1) % 3] - c[k], c[(k + 2) % 3] - c[k]})
-        if (dot(side, n[k]) > kFlat * length(side)) return true;
-    }
-  }
-  return false;
-}
-
-}  // namespace
-
-void warn_of_shadows_in_hollows(const Scene& scene, std::vector<std::string>& warnings) {
+void warn_of_shadows_on_lifted_points(const Scene& scene, std::vector<std::string>& warnings) {
   if (scene.delta_lights.empty()) return;
   for (uint32_t i = 0; i < scene.shapes.size(); ++i) {
-    if (!is_lifted(scene, ShapeId(i)) || !has_hollows(scene.shapes[i].mesh)) continue;
+    if (!is_lifted(scene, ShapeId(i))) continue;
     warnings.push_back(fmt::format(
-        "the derivative of hard shadows that fall on {} in its hollows is incomplete: where its "
-        "normals are interpolated, shadows of its own faces there are not followed; lights with "
-        "extent have no such limit",
+        "the derivative of hard shadows that fall on {} is incomplete: its normals are "
+        "interpolated, "
+        "and shadows that its own faces cast in hollows and beside the rim of its lit side are not "
+        "followed; finer meshes and lights with extent have less of that",
         name_in_text(scene, ShapeId(i))));
   }
 }
