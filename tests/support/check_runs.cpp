@@ -9,7 +9,7 @@ namespace limn {
 CheckResult run_check(const Scene& scene, const std::string& parameter, int spp,
                       const std::vector<std::string>& terms, const Method& method) {
   CheckOptions options;
-  if (!method.empty()) options.method = method;
+  options.method = method;
   options.parameter = parameter;
   options.terms = terms;
   options.block = 4;
