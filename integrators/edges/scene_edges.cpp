@@ -130,10 +130,9 @@ void warn_of_shadows_on_lifted_points(const Scene& scene, std::vector<std::strin
   for (uint32_t i = 0; i < scene.shapes.size(); ++i) {
     if (!is_lifted(scene, ShapeId(i))) continue;
     warnings.push_back(fmt::format(
-        "the derivative of hard shadows that fall on {} is incomplete: its normals are "
-        "interpolated, "
-        "and shadows that its own faces cast in hollows and beside the rim of its lit side are not "
-        "followed; finer meshes and lights with extent have less of that",
+        "the derivative of hard shadows on {} is incomplete: its normals are interpolated, and "
+        "shadows that its own faces cast in hollows and at its terminator are not differentiated; "
+        "a finer mesh or area lights make the missing part smaller",
         name_in_text(scene, ShapeId(i))));
   }
 }

@@ -30,8 +30,8 @@ inline bool PathTracer<S, Visitor>::next_hit(Walk& walk) {
   return found;
 }
 
-// The side of a face around walk.start_edge() that the ray meets at once, if any. Below its own face
-// a ray leaves a smooth surface (surface_point.h), and meets none of them.
+// The side of a face around walk.start_edge() that the ray meets at once, if any. Below its own
+// face a ray leaves a smooth surface (surface_point.h), and meets none of them.
 template <class S, class Visitor>
 inline std::optional<FaceSide> PathTracer<S, Visitor>::blocked_at_start(
     const Walk& walk, const Vec3d& direction) const {

@@ -58,8 +58,8 @@ Vec3<Lanes> relative_velocity(const Scene& scene, const BoundaryForm& form,
   return origin.infinite ? own : against_ray(own, form.x, ray);
 }
 
-// What the corners of the face and their normals add to g . v of a lifted point, but for the velocity
-// of the unit direction.
+// What the corners of the face and their normals add to g . v of a lifted point, but for the
+// velocity of the unit direction.
 Lanes rate_of_lift(const Scene& scene, const BoundaryForm& form, const RayMotion& ray) {
   const Mesh& mesh = scene.shape(form.lift->face.shape).mesh;
   const auto corners = face_corners<Dual>(mesh, form.lift->face.face);

@@ -5,8 +5,8 @@
 // ends: `direct` itself lists edges at the vertices that paths come to; `penumbra` draws lines from
 // a lamp through a point of an edge to a vertex, and asks who sees that (penumbra_boundary.cpp).
 // Each contribution is shared between the two by how densely they are expected to meet it (the
-// power heuristic; any shares that add up to one are right). Surfaces with interpolated normals look
-// from above their faces (surface_point.h), where lines do not end: all of theirs is in `direct`.
+// power heuristic; any shares that add up to one are right). Rays leave surfaces with interpolated
+// normals above their faces (surface_point.h), where lines do not end: `direct` has all of theirs.
 #include <span>
 #include <vector>
 
