@@ -487,6 +487,7 @@ Rgb<S> ClosedLight::scattered(const RayTracer& tracer, const SurfacePoint<S>& su
   static thread_local const auto space = std::make_unique<Space>();
   static thread_local std::vector<PolygonSide<S>> sides;
   const Vec3d n = value(scattering.normal());
+  if (surface.lifted) edge = nullptr;  // rays start off it
   Receiver receiver{value(surface.p), n, surface.start(), edge};
   if (edge) receiver.wedge = wedge_at(scene_, tracer, *edge, receiver.up);
   Rgb<S> sum;

@@ -101,8 +101,7 @@ TEST(Analytic, LampsFromBehindAreBlack) {
   }
 }
 
-// Normals of a file at a right angle to their face, and past it: it sees no light, which is a
-// number.
+// Normals of a file at a right angle to their face, and past it.
 TEST(Analytic, NormalsAtRightAnglesToTheirFace) {
   const TempFiles files;
   for (const double up : {0.0, -0.5, 0.5}) {
@@ -131,13 +130,12 @@ TEST(Analytic, NormalsAtRightAnglesToTheirFace) {
     const auto [sampled, variance] = sum("path", 64);
     for (const std::string method : {"analytic", "lines"}) {
       const auto [closed, of_film] = sum(method, 4);
-      // Channels are alike: three times the variance of their sum if they were not. Up to 0 all is
-      // black.
+      // Channels are alike: three times the variance of their sum if they were not.
       const double error = std::sqrt(3 * (variance + of_film));
       fmt::print("{:4}: {:8} {:.5g} +- {:.2g}, by paths {:.5g}\n", up, method, closed, error,
                  sampled);
       EXPECT_LE(std::fabs(closed - sampled), 4 * error + 1e-12) << method << ", " << up;
-      EXPECT_EQ(sampled > 0, up > 0);
+      EXPECT_GT(sampled, 0);
     }
   }
 }
