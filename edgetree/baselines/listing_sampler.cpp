@@ -20,7 +20,7 @@ bool same(const EdgeQuery& a, const EdgeQuery& b) {
          a.turn.axis == b.turn.axis && a.face == b.face;
 }
 
-bool is_still(const Vec3<Lanes>& v) { return is_zero(v.x) && is_zero(v.y) && is_zero(v.z); }
+bool is_constant(const Vec3<Lanes>& v) { return is_zero(v.x) && is_zero(v.y) && is_zero(v.z); }
 
 std::atomic<uint64_t> serials{0};
 
@@ -86,7 +86,7 @@ const ListingSampler::Listing& ListingSampler::list(const EdgeQuery& query) cons
   listing.query = query;
   listing.edges.clear();
   listing.cumulative.clear();
-  const bool still = is_still(query.velocity) && is_still(query.turn.rate);
+  const bool still = is_constant(query.velocity) && is_constant(query.turn.rate);
   for (uint32_t o = 0; o < input_.objects.size(); ++o) {
     if (input_.objects[o].tangents.empty() && still) continue;
     list_object(ShapeId(o), query, listing);

@@ -120,7 +120,7 @@ Interval interval_of(const Triangle& triangle, const Sides& sides, const Vec3d& 
   return interval;
 }
 
-std::optional<CrossingSegment> cross_faces(const Triangle& first, const Triangle& second) {
+std::optional<IntersectionSegment> cross_faces(const Triangle& first, const Triangle& second) {
   const HeightOver over_first(first);
   const Sides of_second = sides_of(second, over_first);
   if (!of_second.both()) return std::nullopt;
@@ -133,8 +133,8 @@ std::optional<CrossingSegment> cross_faces(const Triangle& first, const Triangle
   const Interval b = interval_of(second, of_second, along, origin);
   const int begin = b.places[0] > a.places[0], end = b.places[1] < a.places[1];
   if (!((end ? b : a).places[1] > (begin ? b : a).places[0])) return std::nullopt;
-  const CrossingSegment segment{{first.face, second.face},
-                                {(begin ? b : a).ends[0], (end ? b : a).ends[1]}};
+  const IntersectionSegment segment{{first.face, second.face},
+                                    {(begin ? b : a).ends[0], (end ? b : a).ends[1]}};
   // Sides that only meet in a point overlap by rounding errors.
   const double size = std::max(length(segment.ends[0]), length(segment.ends[1]));
   if (length(segment.ends[1] - segment.ends[0]) <= 0x1p-22 * size) return std::nullopt;
@@ -178,10 +178,10 @@ Vec3d normal_of(const Mesh& mesh, FaceId id) {
 
 }  // namespace
 
-std::vector<CrossingSegment> find_crossings(std::span<const Mesh* const> meshes,
-                                            std::span<const FacePair> pairs, int threads) {
+std::vector<IntersectionSegment> find_intersections(std::span<const Mesh* const> meshes,
+                                                    std::span<const FacePair> pairs, int threads) {
   constexpr size_t kBlock = 4096;  // not tuned
-  std::vector<std::vector<CrossingSegment>> blocks((pairs.size() + kBlock - 1) / kBlock);
+  std::vector<std::vector<IntersectionSegment>> blocks((pairs.size() + kBlock - 1) / kBlock);
   parallel_for(blocks.size(), threads, [&](size_t block) {
     const size_t begin = block * kBlock;
     for (const FacePair& pair : pairs.subspan(begin, std::min(kBlock, pairs.size() - begin))) {
@@ -191,10 +191,10 @@ std::vector<CrossingSegment> find_crossings(std::span<const Mesh* const> meshes,
       if (const auto segment = cross_faces(a, b)) blocks[block].push_back(*segment);
     }
   });
-  std::vector<CrossingSegment> segments;
+  std::vector<IntersectionSegment> segments;
   for (const auto& block : blocks) segments.insert(segments.end(), block.begin(), block.end());
   std::sort(segments.begin(), segments.end(),
-            [](const CrossingSegment& a, const CrossingSegment& b) {
+            [](const IntersectionSegment& a, const IntersectionSegment& b) {
               return std::pair(key(a.faces[0]), key(a.faces[1])) <
                      std::pair(key(b.faces[0]), key(b.faces[1]));
             });
@@ -203,8 +203,8 @@ std::vector<CrossingSegment> find_crossings(std::span<const Mesh* const> meshes,
 
 // With unit normals n and m, speeds s and t along them, and l = n x m: v . n = s, v . m = t and
 // v . l = 0 hold for v = (s m x l + t l x n) / |l|^2.
-Vec3<Lanes> crossing_velocity(std::span<const Mesh* const> meshes, const CrossingSegment& segment,
-                              const Vec3d& x) {
+Vec3<Lanes> intersection_velocity(std::span<const Mesh* const> meshes,
+                                  const IntersectionSegment& segment, const Vec3d& x) {
   Vec3d normals[2];
   Lanes speeds[2];
   for (int i = 0; i < 2; ++i) {
@@ -225,11 +225,11 @@ Vec3<Lanes> crossing_velocity(std::span<const Mesh* const> meshes, const Crossin
 namespace {
 
 // Appends the intersection line of a segment's faces, without its incident faces.
-void append_line(std::span<const Mesh* const> meshes, const CrossingSegment& segment, bool moves,
-                 EdgeMesh& edges) {
+void append_line(std::span<const Mesh* const> meshes, const IntersectionSegment& segment,
+                 bool moves, EdgeMesh& edges) {
   const auto first = static_cast<uint32_t>(edges.positions.size());
   Edge edge;
-  edge.edge_class = EdgeClass::kCrossing;
+  edge.edge_class = EdgeClass::kIntersection;
   for (int i = 0; i < 2; ++i) {
     const Vec3d& x = segment.ends[i];
     const FaceRef face = segment.faces[i];
@@ -237,7 +237,7 @@ void append_line(std::span<const Mesh* const> meshes, const CrossingSegment& seg
     edge.vertices[i] = VertexId(first + i);
     edge.faces[i] = FaceId(first + i);
     edges.positions.push_back(x);
-    if (moves) edges.tangents.push_back(crossing_velocity(meshes, segment, x));
+    if (moves) edges.tangents.push_back(intersection_velocity(meshes, segment, x));
     edges.planes.push_back({n, -dot(n, x)});
     edges.extent = std::max(edges.extent, length(x));
   }
@@ -251,9 +251,9 @@ void append(std::vector<typename Items::value_type>& list, const Items& items) {
 
 }  // namespace
 
-EdgeMesh crossing_edges(std::span<const Mesh* const> meshes,
-                        std::span<const CrossingSegment> segments,
-                        std::span<const ContactLine> contacts) {
+EdgeMesh intersection_edges(std::span<const Mesh* const> meshes,
+                            std::span<const IntersectionSegment> segments,
+                            std::span<const ContactLine> contacts) {
   EdgeMesh result;
   const bool moves = std::any_of(meshes.begin(), meshes.end(),
                                  [](const Mesh* mesh) { return !mesh->position_tangents.empty(); });
@@ -261,11 +261,11 @@ EdgeMesh crossing_edges(std::span<const Mesh* const> meshes,
     result.face_offsets.push_back(static_cast<uint32_t>(result.incident_faces.size()));
   };
   end_faces();
-  for (const CrossingSegment& segment : segments) {
+  for (const IntersectionSegment& segment : segments) {
     append_line(meshes, segment, moves, result);
     for (const FaceRef face : segment.faces) {
       result.incident_faces.push_back(face);
-      result.incidences.push_back({.through = true, .rim = kNoRim});
+      result.incidences.push_back({.through = true, .motion_group = kNoMotionGroup});
     }
     end_faces();
   }
@@ -274,7 +274,7 @@ EdgeMesh crossing_edges(std::span<const Mesh* const> meshes,
   if (near) result.near_offsets.assign(segments.size() + 1, 0);
   for (const ContactLine& line : contacts) {
     append_line(meshes, {{line.faces[0], line.faces[1]}, line.ends}, moves, result);
-    result.edges.back().rim = line.rim;
+    result.edges.back().motion_group = line.motion_group;
     append(result.incident_faces, line.faces);
     append(result.incidences, line.incidences);
     end_faces();

@@ -86,7 +86,7 @@ class Builder {
     edge.vertices = {first.from, first.to};
     edge.faces = {first.face, around.size() > 1 ? around[1].face : FaceId::none()};
     if (around.size() == 1) {
-      edge.edge_class = EdgeClass::kBorder;
+      edge.edge_class = EdgeClass::kBoundary;
     } else if (around.size() > 2 || around[1].from == first.from) {
       edge.edge_class = EdgeClass::kIrregular;
     } else {
@@ -134,7 +134,7 @@ class Builder {
   }
 
   bool is_closed() const {
-    return result_.count(EdgeClass::kBorder) == 0 && result_.count(EdgeClass::kIrregular) == 0;
+    return result_.count(EdgeClass::kBoundary) == 0 && result_.count(EdgeClass::kIrregular) == 0;
   }
 
   // True if each connected part of a closed mesh encloses positive volume, beyond rounding.
@@ -198,8 +198,8 @@ namespace {
 
 // Candidate or not, if the edge's class decides it; nothing if its faces must be tested.
 std::optional<bool> known_candidate(const EdgeMesh& mesh, const Edge& edge) {
-  if (edge.edge_class == EdgeClass::kBorder || edge.edge_class == EdgeClass::kIrregular ||
-      edge.edge_class == EdgeClass::kCrossing)
+  if (edge.edge_class == EdgeClass::kBoundary || edge.edge_class == EdgeClass::kIrregular ||
+      edge.edge_class == EdgeClass::kIntersection)
     return true;
   if (edge.edge_class == EdgeClass::kSharp && !mesh.one_sided_closed) return true;
   if (edge.edge_class == EdgeClass::kSmooth && edge.concave && mesh.one_sided_closed) return false;

@@ -8,7 +8,7 @@
 // If all have one speed s it is s (L_0 - L_n), and they are one edge. Otherwise each boundary is an
 // edge of its own, with its own velocity and the radiance difference between its neighbourhoods. It
 // needs all faces, and the group that moves with it. The order differs before and after contact;
-// edge_jump uses the one in which surfaces separate instead of interpenetrating.
+// edge_difference uses the one in which surfaces separate instead of interpenetrating.
 #include "limn/edgetree/touching.h"
 
 #include <algorithm>
@@ -32,7 +32,7 @@ struct Neighbour {
   bool own = false;         // adjacent to the edge before it was united
   Vec3<Lanes> velocity[2];  // at the ends of the part
   Lanes slack;              // uncertainty of `velocity` from the rounding of positions
-  uint8_t rim = 0;
+  uint8_t motion_group = 0;
 };
 
 using Corners = std::array<Vec3d, 3>;
@@ -211,8 +211,8 @@ class Unifier {
         std::find_if(around.begin(), around.end(), [](const auto& n) { return n.own; });
     const Neighbour* other = nullptr;
     for (Neighbour& n : around) {
-      if (n.own) n.rim = kNoRim;
-      if (n.rim != kNoRim) return;  // its edge is a boundary edge
+      if (n.own) n.motion_group = kNoMotionGroup;
+      if (n.motion_group != kNoMotionGroup) return;  // its edge is a boundary edge
       const EdgeRef along{n.face.shape, n.along};
       if (n.along.valid() && std::tuple(along.object, along.edge) < std::tuple(id.object, id.edge))
         return;  // the other one adds it
@@ -234,11 +234,12 @@ class Unifier {
     number_rims(around);
     const auto own =
         std::find_if(around.begin(), around.end(), [](const auto& n) { return n.own; });
-    const uint8_t rim = own->rim;
+    const uint8_t motion_group = own->motion_group;
     for (const Neighbour& n : around)
-      if (n.rim == rim && stands_for(n, id)) return false;
+      if (n.motion_group == motion_group && stands_for(n, id)) return false;
     mark_planes(id, around);
-    if (std::none_of(around.begin(), around.end(), [&](const auto& n) { return n.rim == rim; })) {
+    if (std::none_of(around.begin(), around.end(),
+                     [&](const auto& n) { return n.motion_group == motion_group; })) {
       add_crossing(id, part.edge, around);
       return false;
     }
@@ -249,7 +250,7 @@ class Unifier {
       return false;
     }
     add_parting(id, around);
-    part.edge.rim = rim;
+    part.edge.motion_group = motion_group;
     part.edge.edge_class = EdgeClass::kIrregular;
     part.edge.concave = false;
     // The edge's own faces first, in their order; then others of its mesh.
@@ -259,7 +260,7 @@ class Unifier {
     });
     for (const Neighbour& n : around) {
       part.faces.push_back(n.face);
-      part.incidences.push_back({!n.along.valid(), n.rim});
+      part.incidences.push_back({!n.along.valid(), n.motion_group});
     }
     const bool has_second = around[1].face.shape == id.object;
     part.edge.faces[1] = has_second ? around[1].face.face : FaceId::none();
@@ -279,8 +280,10 @@ class Unifier {
   // the other side: two boundaries with different motions across their line, or a boundary that
   // moves relative to the plane of a face without one. Sliding along that plane does neither.
   bool part_from(const Neighbour& a, const Neighbour& b, const Vec3d& along) const {
-    if (a.rim == b.rim) return false;
-    const Neighbour* const plain = a.rim == kNoRim ? &a : b.rim == kNoRim ? &b : nullptr;
+    if (a.motion_group == b.motion_group) return false;
+    const Neighbour* const plain = a.motion_group == kNoMotionGroup   ? &a
+                                   : b.motion_group == kNoMotionGroup ? &b
+                                                                      : nullptr;
     for (int end = 0; end < 2; ++end) {
       const Vec3<Lanes> apart = a.velocity[end] - b.velocity[end];
       const Lanes normal = plain ? dot(apart, plane(plain->face).n) : Lanes{};
@@ -332,7 +335,7 @@ class Unifier {
     const Vec3d up = dot(n_under, viewer_ - x0) < 0 ? -n_under : n_under;
     const Neighbour* standing[2] = {nullptr, nullptr};  // behind, in front
     for (const Neighbour& n : around) {
-      if (!n.own && (n.rim != kNoRim || !parallel(n, *under))) return std::nullopt;
+      if (!n.own && (n.motion_group != kNoMotionGroup || !parallel(n, *under))) return std::nullopt;
       if (!n.own || parallel(n, *under)) continue;
       const bool in_front = dot(up, far_corner(n.face, x0, x1) - x0) > 0;
       if (standing[in_front]) return std::nullopt;
@@ -358,14 +361,16 @@ class Unifier {
     };
     for (const Neighbour& cap : around) {
       for (const Neighbour& under : around) {
-        if (!cap.own || under.own || cap.rim == under.rim || !meet(cap, under)) continue;
+        if (!cap.own || under.own || cap.motion_group == under.motion_group || !meet(cap, under))
+          continue;
         const Neighbour *standing = nullptr, *other = nullptr;
         for (const Neighbour& n : around) {
           if (&n == &cap || &n == &under) continue;
           (n.own ? standing : other) = &n;
         }
-        if (!standing || !other || standing->rim != cap.rim || other->rim != under.rim ||
-            other->face.shape != under.face.shape || under.face.shape == id.object)
+        if (!standing || !other || standing->motion_group != cap.motion_group ||
+            other->motion_group != under.motion_group || other->face.shape != under.face.shape ||
+            under.face.shape == id.object)
           return std::nullopt;
         const double own_lean = dot(plane(standing->face).n, plane(under.face).n);
         const double lean = dot(plane(other->face).n, plane(cap.face).n);
@@ -381,10 +386,10 @@ class Unifier {
 
   static ContactLine contact_line(EdgeRef id, const std::array<Vec3d, 2>& ends,
                                   const Pressed& pressed, const std::vector<Neighbour>& around) {
-    ContactLine line{id, ends, pressed.standing->rim, {}, {}};
+    ContactLine line{id, ends, pressed.standing->motion_group, {}, {}};
     const auto add = [&](const Neighbour& n) {
       line.faces.push_back(n.face);
-      line.incidences.push_back({!n.along.valid(), n.rim});
+      line.incidences.push_back({!n.along.valid(), n.motion_group});
     };
     add(*pressed.standing);
     add(*pressed.under);
@@ -400,16 +405,19 @@ class Unifier {
 
   // Assigns motion groups to neighbours; the last group takes all that are left.
   void number_rims(std::vector<Neighbour>& around) const {
-    std::vector<const Neighbour*> rims;
+    std::vector<const Neighbour*> motion_groups;
     for (Neighbour& n : around) {
       if (!n.along.valid()) {
-        n.rim = kNoRim;
+        n.motion_group = kNoMotionGroup;
         continue;
       }
-      const auto same = [&](const Neighbour* rim) { return moves_alike(n, *rim); };
-      const auto found = std::find_if(rims.begin(), rims.end(), same);
-      n.rim = static_cast<uint8_t>(std::min<size_t>(found - rims.begin(), kMostRims - 1));
-      if (found == rims.end()) rims.push_back(&n);
+      const auto same = [&](const Neighbour* motion_group) {
+        return moves_alike(n, *motion_group);
+      };
+      const auto found = std::find_if(motion_groups.begin(), motion_groups.end(), same);
+      n.motion_group = static_cast<uint8_t>(
+          std::min<size_t>(found - motion_groups.begin(), kMostMotionGroups - 1));
+      if (found == motion_groups.end()) motion_groups.push_back(&n);
     }
   }
 
@@ -424,8 +432,11 @@ class Unifier {
   void mark_planes(EdgeRef id, std::vector<Neighbour>& around) const {
     for (size_t i = 0; i < around.size(); ++i)
       for (size_t j = 0; j < i; ++j) {
-        if (around[i].rim != around[j].rim || around[i].rim == kNoRim) continue;
-        if (continues(id, around[i].face, around[j].face)) around[i].rim = around[j].rim = kNoRim;
+        if (around[i].motion_group != around[j].motion_group ||
+            around[i].motion_group == kNoMotionGroup)
+          continue;
+        if (continues(id, around[i].face, around[j].face))
+          around[i].motion_group = around[j].motion_group = kNoMotionGroup;
       }
   }
 

@@ -76,7 +76,8 @@ const char* fault_of_crossing(const EdgeMesh& mesh, EdgeId id) {
   if (!contact && around.faces.size() > 2) return "more than two faces cross";
   for (size_t i = 0; i < 2; ++i) {
     if (!around.faces[i].shape.valid()) return "a face that crosses is of no shape";
-    if (!contact && around.incidence(i) != Incidence{.through = true, .rim = kNoRim})
+    if (!contact &&
+        around.incidence(i) != Incidence{.through = true, .motion_group = kNoMotionGroup})
       return "a face that crosses ends there";
     if (mesh.edge(id).faces[i].index() >= mesh.planes.size()) return "a plane is out of range";
   }
@@ -88,10 +89,11 @@ const char* fault_of_rims(const EdgeMesh& mesh, EdgeId id) {
   bool moves_with_it = false;
   for (size_t i = 0; i < around.faces.size(); ++i) {
     const Incidence incidence = around.incidence(i);
-    if (incidence.through && incidence.rim != kNoRim)
-      return "a face that it runs through has a rim";
-    if (incidence.rim >= kMostRims && incidence.rim != kNoRim) return "a rim is out of range";
-    moves_with_it |= incidence.rim == mesh.edge(id).rim;
+    if (incidence.through && incidence.motion_group != kNoMotionGroup)
+      return "a face that it runs through has a motion_group";
+    if (incidence.motion_group >= kMostMotionGroups && incidence.motion_group != kNoMotionGroup)
+      return "a motion_group is out of range";
+    moves_with_it |= incidence.motion_group == mesh.edge(id).motion_group;
   }
   return moves_with_it ? nullptr : "no face around it moves with it";
 }
@@ -100,7 +102,7 @@ const char* fault_of_class(const EdgeMesh& mesh, EdgeId id) {
   const Edge& edge = mesh.edge(id);
   const size_t faces = mesh.faces_around(id).size();
   const bool irregular = edge.edge_class == EdgeClass::kIrregular;
-  if ((edge.edge_class == EdgeClass::kBorder) != (faces == 1)) return "a border has one face";
+  if ((edge.edge_class == EdgeClass::kBoundary) != (faces == 1)) return "a border has one face";
   if (faces > 2 && !irregular) return "more than two faces make it irregular";
   if (edge.concave && (faces != 2 || irregular || edge.edge_class == EdgeClass::kFlat))
     return "only smooth and sharp edges are concave";
@@ -116,7 +118,7 @@ const char* fault_of_edge(const EdgeMesh& mesh, EdgeId id) {
     return "edges are not sorted by their vertices";
   for (const VertexId vertex : edge.vertices)
     if (!(length(mesh.position(vertex)) <= mesh.extent)) return "an end lies beyond the extent";
-  if (edge.edge_class == EdgeClass::kCrossing) return fault_of_crossing(mesh, id);
+  if (edge.edge_class == EdgeClass::kIntersection) return fault_of_crossing(mesh, id);
   if (const char* fault = fault_of_faces(mesh, id)) return fault;
   if (const char* fault = fault_of_rims(mesh, id)) return fault;
   return fault_of_class(mesh, id);

@@ -123,7 +123,7 @@ double EdgeCutter::mean_over(const EdgePiece& piece, const Vec3d& w0, const Vec3
 }  // namespace
 
 // z(u) meets the edge at the fraction s = (u / l_1) / ((1 - u) / l_0 + u / l_1) between the ends.
-EdgePiece::Place EdgePiece::place(double u) const {
+EdgePiece::Sample EdgePiece::place(double u) const {
   const double sum = (1 - u) * inverse_l0 + u * inverse_l1;
   const double s = u * inverse_l1 / sum;
   return {t0 + (t1 - t0) * s, sum * sum / (inverse_l0 * inverse_l1 * (t1 - t0))};

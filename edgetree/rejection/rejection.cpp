@@ -111,7 +111,7 @@ Reach reach_from(const EdgeSamplerInput& input, const RejectionTree& tree, const
   for (const uint32_t i : inner) {
     if (goes_on[i]) continue;
     const auto edges = tree.edges(i);
-    reach.dead_ends.insert(reach.dead_ends.end(), edges.begin(), edges.end());
+    reach.false_positives.insert(reach.false_positives.end(), edges.begin(), edges.end());
   }
   reach.missed = not_reached(input, reach.silhouettes, p);
   return reach;

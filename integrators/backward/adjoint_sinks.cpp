@@ -8,7 +8,7 @@ namespace limn {
 
 bool VertexAdjoint::takes(const BoundaryForm& form, const Rng&) {
   form_ = &form;
-  return form.share > 0 && (motion_.moves(form) || !is_still(p_));
+  return form.share > 0 && (motion_.moves(form) || !is_constant(p_));
 }
 
 void VertexAdjoint::add(const Rgb<double>& amount) {

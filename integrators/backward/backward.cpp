@@ -350,7 +350,7 @@ void BackwardPass::run_tiles(size_t samples, ProgressCounter& progress, Contribu
       if (!make(i, tape, own, list)) own.bad.add(place(i));
       own.tape_bytes = std::max(own.tape_bytes, tape.bytes());
     }
-    // A point that sees a lamp past a mesh hangs on hundreds of numbers, most of which its
+    // A point that sees an emitter past a mesh hangs on hundreds of numbers, most of which its
     // neighbours hang on, too.
     if (method_.closed) join_slots(list);
     double inside = 0;
@@ -387,8 +387,8 @@ void BackwardPass::run_paths(const PathBatch& batch, ProgressCounter& progress,
       [&](size_t i) {
         const PixelPath path = choice_.path(batch, i);
         const auto [x, y] = position(path.pixel);
-        return NonFinite::Place{x, y, static_cast<int64_t>(path.sample),
-                                types_[context_.pixel_slot]->name};
+        return NonFinite::SampleId{x, y, static_cast<int64_t>(path.sample),
+                                   types_[context_.pixel_slot]->name};
       });
 }
 
@@ -411,7 +411,7 @@ void BackwardPass::run_film(size_t slot, const PathBatch& batch, ProgressCounter
         }
       },
       [&](size_t i) {
-        return NonFinite::Place{-1, -1, static_cast<int64_t>(first + i), types_[slot]->name};
+        return NonFinite::SampleId{-1, -1, static_cast<int64_t>(first + i), types_[slot]->name};
       });
 }
 

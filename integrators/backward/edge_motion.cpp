@@ -91,9 +91,9 @@ void EdgeMotion::contribute_end(Tape& tape, EdgeRef id, int end, const Vec3d& g)
   contribute_vertex(tape, id.object, cut.ends[1].index(), g * cut.t);
 }
 
-// See crossing_velocity(): a point x of the line moves with v = (s m x l + t l x n) / |l|^2, l = n
-// x m, with the speeds s and t of the planes along their unit normals n and m, and those are linear
-// in the corners' velocities, each with its barycentric coordinate of x.
+// See intersection_velocity(): a point x of the line moves with v = (s m x l + t l x n) / |l|^2, l
+// = n x m, with the speeds s and t of the planes along their unit normals n and m, and those are
+// linear in the corners' velocities, each with its barycentric coordinate of x.
 void EdgeMotion::contribute_crossing(Tape& tape, EdgeRef id, const Vec3d& x, const Vec3d& g) const {
   const auto faces = input_.object(id.object).faces_around(id.edge);
   std::array<std::array<Vec3d, 3>, 2> corners;

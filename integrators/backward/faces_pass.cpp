@@ -25,7 +25,7 @@ class FacesPass {
         film_((check_faces_film(scene.film), scene.film)),
         adjoint_(adjoint_pixels(scene, adjoint)),
         parameters_(scene, reverse_parameters(scene, options)),
-        faces_(std::make_shared<FacesInPlace>(parameters_.scene(), settings.threads)),
+        faces_(std::make_shared<CoincidentFaces>(parameters_.scene(), settings.threads)),
         pixels_(parameters_.scene(), *faces_, settings.threads, kFacesUser),
         traced_(parameters_.scene(), settings.threads, {.closed = true, .faces = faces_}) {
     selected_terms({kFacesTerm}, options.terms, scene.file);
@@ -129,7 +129,7 @@ class FacesPass {
   const Film& film_;
   std::vector<Rgb<double>> adjoint_;
   ParameterSlots parameters_;
-  std::shared_ptr<const FacesInPlace> faces_;
+  std::shared_ptr<const CoincidentFaces> faces_;
   PixelRegions pixels_;
   TracedScene traced_;
 };

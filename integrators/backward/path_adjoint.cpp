@@ -30,7 +30,7 @@ class VertexAdjoints {
     PathVertex vertex =
         plain_vertex(surface, scattering, context_.scene().shading, bounces, step, key);
     vertex.throughput = value(throughput);
-    if (!is_still(surface.p)) vertex.velocity = {{-1, 0, 0, 0}, {0, -1, 0, 0}, {0, 0, -1, 0}};
+    if (!is_constant(surface.p)) vertex.velocity = {{-1, 0, 0, 0}, {0, -1, 0, 0}, {0, 0, -1, 0}};
     VertexAdjoint sink(context_.motion, adjoint_, surface.p, tape_, seeds_);
     for (size_t slot = 0; slot < context_.terms.size(); ++slot) {
       const Term* term = context_.terms[slot].get();

@@ -33,7 +33,7 @@ struct Runs {
 };
 
 // What accuses, and what its score must exceed.
-struct Place {
+struct ProbeScore {
   std::string name;
   Probe probe;
   Score score;
@@ -41,8 +41,8 @@ struct Place {
 };
 
 // All probes of one run. Half of the level is the windows', half that of the image and the terms.
-struct Places {
-  std::vector<Place> list;
+struct ProbeScores {
+  std::vector<ProbeScore> list;
   size_t windows = 0;  // the first of the list
   double p = 1;
   size_t smallest = 0;
@@ -69,14 +69,14 @@ bool is_zero(const Probe& probe) {
          std::all_of(probe[1].begin(), probe[1].end(), zero);
 }
 
-void judge(Places& places) {
+void judge(ProbeScores& places) {
   const size_t windows = places.windows, others = places.list.size() - windows;
   const double limits[2] = {
       limit_of_level(share_of_level(0.5 * kCheckStageLevel, windows)),
       limit_of_level(share_of_level(0.5 * kCheckStageLevel, others)),
   };
   for (size_t i = 0; i < places.list.size(); ++i) {
-    Place& place = places.list[i];
+    ProbeScore& place = places.list[i];
     place.limit = limits[i < windows ? 0 : 1];
     const double one = normal_p_value(place.score.z);
     const double n = static_cast<double>(i < windows ? windows : others);
@@ -88,8 +88,9 @@ void judge(Places& places) {
   }
 }
 
-Places score_places(const Residual& residual, const Windows& windows, const GradientResult& run) {
-  Places places;
+ProbeScores score_places(const Residual& residual, const Windows& windows,
+                         const GradientResult& run) {
+  ProbeScores places;
   const auto scores = residual.window_scores();
   for (size_t k = 0; k < scores.size(); ++k) {
     if (scores[k].value == 0 && scores[k].error == 0) continue;
@@ -112,9 +113,9 @@ Places score_places(const Residual& residual, const Windows& windows, const Grad
 }
 
 // The least part of an image (its means in the windows) that some probe finds.
-double visible_part(const Places& places, const std::vector<double>& image, double degrees) {
+double visible_part(const ProbeScores& places, const std::vector<double>& image, double degrees) {
   double visible = std::numeric_limits<double>::infinity();
-  for (const Place& place : places.list) {
+  for (const ProbeScore& place : places.list) {
     double seen = 0;
     for (size_t k = 0; k < image.size(); ++k) {
       seen += 0.5 * (place.probe[0][k] + place.probe[1][k]) * image[k];
@@ -131,7 +132,7 @@ double magnitude(const std::vector<double>& values) {
   return sum;
 }
 
-void find_power(const Places& places, const Residual& residual, const GradientResult& run,
+void find_power(const ProbeScores& places, const Residual& residual, const GradientResult& run,
                 CheckResult& result) {
   const ParameterGradient& g = run.parameters[0];
   result.power = {{"", 1, visible_part(places, residual.mean(g.total_blocks), residual.degrees())}};
@@ -189,7 +190,7 @@ class Checker {
     result.step = run_at_small_step(windows, result.step, runs);
     if (!complete(runs, settings_.spp)) return interrupted(std::move(runs), result);
     const Residual residual = residual_of(windows, runs, result.step);
-    const Places places = score_places(residual, windows, runs.gradient);
+    const ProbeScores places = score_places(residual, windows, runs.gradient);
     std::vector<double> z;
     for (size_t k = 0; k < places.windows; ++k) z.push_back(-places.list[k].score.z);
     result.windows = summarize(z);
@@ -197,7 +198,7 @@ class Checker {
         compare_totals(runs.gradient.parameters[0].image_sum,
                        runs.differences.extrapolated.image_sum, places.list[places.windows].score);
     result.p = places.p;
-    const Place& found = places.list[places.smallest];
+    const ProbeScore& found = places.list[places.smallest];
     result.found = found.name;
     find_power(places, residual, runs.gradient, result);
     if (result.p < kCheckStageLevel) {
@@ -272,7 +273,7 @@ class Checker {
   }
 
   // The second run, which takes the first one's place. False if it was interrupted.
-  bool confirm(const Windows& windows, const Place& found, Runs& runs, CheckResult& result) {
+  bool confirm(const Windows& windows, const ProbeScore& found, Runs& runs, CheckResult& result) {
     const double step = options_.step > 0 ? options_.step : 0.5 * result.step;
     const int64_t spp = 2 * static_cast<int64_t>(settings_.spp);
     NonFinite bad[2] = {runs.gradient.non_finite, runs.differences.non_finite};

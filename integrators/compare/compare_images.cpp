@@ -29,7 +29,7 @@ void try_method(const Scene& scene, const RunSettings& settings, const RenderOpt
   const RenderOptions options = with_method(given, method);
   RunSettings one = settings;
   one.progress = nullptr;
-  const NonFinite::Place corner{scene.film.crop_x, scene.film.crop_y, 0, ""};
+  const NonFinite::SampleId corner{scene.film.crop_x, scene.film.crop_y, 0, ""};
   trace_sample(scene, one, corner, options);
 }
 

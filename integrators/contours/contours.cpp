@@ -80,7 +80,7 @@ int Contours::jump_of(EdgeRef id, const ContourPoint& at) const {
     case EdgeClass::kSmooth:
     case EdgeClass::kFlat:
       return sign({id.object, edge.faces[1]}, at) - sign({id.object, edge.faces[0]}, at);
-    case EdgeClass::kBorder:
+    case EdgeClass::kBoundary:
       return -sign({id.object, edge.faces[0]}, at);
     default:
       break;

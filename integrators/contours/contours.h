@@ -33,7 +33,7 @@ struct ContourArc {
   int jump;
 };
 
-// Faces of a scene that a polygon cuts: what lies before a flat lamp ends at its plane.
+// Faces of a scene that a polygon cuts: what lies before a flat emitter ends at its plane.
 struct ContourScreen {
   Plane plane;        // of the polygon, positive before it
   double margin = 0;  // what is nearer to the plane does not count

@@ -1,4 +1,4 @@
-// Sums over lines: the sky, maps, lamps.
+// Sums over lines: the sky, maps, emitters.
 #include "integrators/contours/line_light.h"
 
 #include <fmt/format.h>
@@ -13,12 +13,12 @@
 namespace limn {
 namespace {
 
-// A lamp is worth so many times fewer lines than the sky, where listing contours takes longer. With
-// 4, 8, 16, 32 lines the relative error of soft_lamp.xml (64 x 64) after 1.5 s is 5.8, 3.9, 2.5,
-// 2.8 parts in 1000; that of ambient occlusion under the pebble after 3 s with 8, 16, 32, 64 lines
-// is 4.6, 1.3, 0.7, 0.2 parts.
+// An emitter is worth so many times fewer lines than the sky, where listing contours takes longer.
+// With 4, 8, 16, 32 lines the relative error of soft_lamp.xml (64 x 64) after 1.5 s is 5.8, 3.9,
+// 2.5, 2.8 parts in 1000; that of ambient occlusion under the pebble after 3 s with 8, 16, 32, 64
+// lines is 4.6, 1.3, 0.7, 0.2 parts.
 constexpr int kSkyLines = 4;
-// Lamps that are no polygon are cut into their faces. Not tuned.
+// Emitters that are no polygon are cut into their faces. Not tuned.
 constexpr size_t kMostFaces = 64;
 
 // Few lines can miss the same thing and agree: a tolerance asks for as many at least. Of a cube
@@ -27,8 +27,8 @@ constexpr size_t kMostFaces = 64;
 constexpr int kFewestLines = 8;
 
 // A place on a line, by cot theta.
-struct Place {
-  explicit Place(double cot) {
+struct Azimuth {
+  explicit Azimuth(double cot) {
     if (std::fabs(cot) > 1e100) {
       c = cot > 0 ? 1 : -1, s = 0;
     } else {
@@ -36,16 +36,16 @@ struct Place {
       c = cot * s;
     }
   }
-  static Place at(double theta) { return {std::cos(theta), std::sin(theta)}; }
+  static Azimuth at(double theta) { return {std::cos(theta), std::sin(theta)}; }
   double theta() const { return std::atan2(s, c); }
   double c, s;
 
  private:
-  Place(double cosine, double sine) : c(cosine), s(sine) {}
+  Azimuth(double cosine, double sine) : c(cosine), s(sine) {}
 };
 
 // The integral of n . w sin theta between two places of a line.
-double cosine_piece(double along, double across, const Place& from, const Place& to) {
+double cosine_piece(double along, double across, const Azimuth& from, const Azimuth& to) {
   double sum = along * 0.5 * (to.s * to.s - from.s * from.s);
   if (across != 0) {
     sum += across * 0.5 * ((to.theta() - to.s * to.c) - (from.theta() - from.s * from.c));
@@ -155,12 +155,12 @@ void LineLight::check(const Scene& scene, const std::string& method) {
   }
 }
 
-// What lies in a lamp's place; an error if that is another lamp: rays meet one of them, while here
-// each would shine whole.
+// What lies in an emitter's place; an error if that is another emitter: rays meet one of them,
+// while here each would shine whole.
 void LineLight::find_overlaps(int threads) {
-  const FaceCopies copies(scene_);
+  const DuplicateFaces copies(scene_);
   const FaceOverlaps overlaps(scene_, copies, threads);
-  for (Lamp& lamp : lamps_) lamp.in_place = overlaps.in_place_of(lamp.faces);
+  for (Emitter& emitter : emitters_) emitter.in_place = overlaps.in_place_of(emitter.faces);
   for (uint32_t s = 0; s < scene_.shapes.size(); ++s) {
     const Shape& shape = scene_.shapes[s];
     if (!shape.is_emitter) continue;
@@ -173,7 +173,7 @@ void LineLight::find_overlaps(int threads) {
       FaceRef first = copy;
       for (const FaceRef other : overlaps.of(face)) {
         const FaceRef met = copies.met(other, towards, false).value_or(other);
-        if (is_met_first(scene_, met, first, towards)) first = met;
+        if (is_hit_first(scene_, met, first, towards)) first = met;
       }
       if (first == face) continue;
       refuse_light(options_.method, shape.where,
@@ -192,9 +192,9 @@ LineLight::LineLight(const Scene& scene, const RayTracer& tracer, int threads,
   if (!direct) return;
   check(scene, options_.method);
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
-    if (scene.shapes[s].is_emitter) add_lamp(ShapeId(s));
+    if (scene.shapes[s].is_emitter) add_emitter(ShapeId(s));
   }
-  if (has_lamps()) find_overlaps(threads);
+  if (has_emitters()) find_overlaps(threads);
   if (!sky_ || !sky_->grid()) return;
   columns_ = std::make_unique<RadianceColumns>(*sky_, threads);
   std::vector<double> brightness = columns_->brightness();
@@ -204,9 +204,9 @@ LineLight::LineLight(const Scene& scene, const RayTracer& tracer, int threads,
   }
 }
 
-void LineLight::add_lamp(ShapeId id) {
+void LineLight::add_emitter(ShapeId id) {
   const Shape& shape = scene_.shape(id);
-  const LampHull whole = make_lamp_hull(shape.mesh, scene_.shading);
+  const EmitterHull whole = make_emitter_hull(shape.mesh, scene_.shading);
   std::vector<FaceRef> faces;
   double area = 0;
   for (uint32_t f = 0; f < shape.mesh.faces.size(); ++f) {
@@ -219,12 +219,13 @@ void LineLight::add_lamp(ShapeId id) {
     return add_polygon(whole, id, std::move(faces));
   }
   if (shape.mesh.faces.size() > kMostFaces) {
-    refuse_light(options_.method, shape.where,
-                 fmt::format("{}: this lamp is no flat convex polygon of at most {} corners, so it "
-                             "is taken face by face, and has {} of these where at most {} are "
-                             "integrated: use another method (rays, path)",
-                             shape_in_text(shape), DirectionCone::kMostPlanes,
-                             shape.mesh.faces.size(), kMostFaces));
+    refuse_light(
+        options_.method, shape.where,
+        fmt::format("{}: this emitter is no flat convex polygon of at most {} corners, so it "
+                    "is taken face by face, and has {} of these where at most {} are "
+                    "integrated: use another method (rays, path)",
+                    shape_in_text(shape), DirectionCone::kMostPlanes, shape.mesh.faces.size(),
+                    kMostFaces));
   }
   for (const FaceRef ref : faces) {
     const FaceIndices& face = shape.mesh.face(ref.face);
@@ -233,24 +234,24 @@ void LineLight::add_lamp(ShapeId id) {
     for (const uint32_t vertex : face) one.positions.push_back(shape.mesh.positions[vertex]);
     one.faces = {{0, 1, 2}};
     one.weld = {0, 1, 2};
-    const LampHull hull = make_lamp_hull(one, scene_.shading);
+    const EmitterHull hull = make_emitter_hull(one, scene_.shading);
     if (hull.flat) add_polygon(hull, id, {ref});
   }
 }
 
-void LineLight::add_polygon(const LampHull& hull, ShapeId id, std::vector<FaceRef> faces) {
+void LineLight::add_polygon(const EmitterHull& hull, ShapeId id, std::vector<FaceRef> faces) {
   double size = 0;
   for (const Vec3d& x : hull.points) {
     size = std::max({size, std::fabs(x.x), std::fabs(x.y), std::fabs(x.z)});
   }
-  // What is nearer than rounding of positions to floats lies in the lamp's plane, wherever the
+  // What is nearer than rounding of positions to floats lies in the emitter's plane, wherever the
   // scene lies: at 1e4 from the origin that is 5e-3. Not tuned.
   const double margin = 2 * hull.deviation + 0x1p-21 * size;
-  lamps_.push_back({value(scene_.shape(id).radiance),
-                    hull,
-                    contours_.make_screen(hull.plane, margin, hull.points),
-                    std::move(faces),
-                    {}});
+  emitters_.push_back({value(scene_.shape(id).radiance),
+                       hull,
+                       contours_.make_screen(hull.plane, margin, hull.points),
+                       std::move(faces),
+                       {}});
 }
 
 // Over the contours in scratch(), along lines of the pencil as far as they are before all planes:
@@ -282,7 +283,7 @@ V LineLight::sum_over_lines(const ContourPoint& at, const Pencil& pencil,
         }
       }
       lines.for_ranges(j, w, start, end, open, [&](double from, double to) {
-        sum += piece(line, Place(from), Place(to)) * line.weight;
+        sum += piece(line, Azimuth(from), Azimuth(to)) * line.weight;
       });
     }
     return open ? sum : *all - sum;
@@ -310,7 +311,7 @@ double LineLight::openness(const ContourPoint& at, double offset) const {
   const int w = contours_.count(at, at.up, nullptr);
   const double sum = sum_over_lines<double>(
       at, pencil_around(at.up), {&at.up, 1}, w, nullptr, options_.lines, offset,
-      [](const Isolines::Line&, const Place& from, const Place& to) { return from.c - to.c; });
+      [](const Isolines::Line&, const Azimuth& from, const Azimuth& to) { return from.c - to.c; });
   return sum / (2 * kPi);
 }
 
@@ -322,7 +323,7 @@ double LineLight::ambient_occlusion(const ContourPoint& at, const Vec3d& n, doub
   const double along = dot(n, pencil.pole);
   const double sum = sum_over_lines<double>(
       at, pencil, planes, w, nullptr, options_.lines, offset,
-      [&](const Isolines::Line& line, const Place& from, const Place& to) {
+      [&](const Isolines::Line& line, const Azimuth& from, const Azimuth& to) {
         return cosine_piece(along, pencil.pole == n ? 0 : dot(n, line.r), from, to);
       });
   return sum / kPi;
@@ -337,7 +338,7 @@ Rgb<double> LineLight::sky_light(const Receiver& receiver, double offset) const 
   const Rgb<double> radiance = sky_->radiance(at.up);
   const double sum =
       sum_over_lines<double>(at, pencil, planes, w, nullptr, options_.lines, offset,
-                             [&](const Isolines::Line&, const Place& from, const Place& to) {
+                             [&](const Isolines::Line&, const Azimuth& from, const Azimuth& to) {
                                return cosine_piece(1, 0, from, to);
                              });
   return receiver.scattering.eval(receiver.n) * radiance * sum;
@@ -353,7 +354,7 @@ Rgb<double> LineLight::map_light(const Receiver& receiver, double offset) const 
   const Pencil pencil{pole, grid.zero, quarter, 1, 1, &warps_[dot(quarter, grid.quarter) < 0]};
   const int w = contours_.count(at, pencil.pole, nullptr);
   const auto cosine = [&](const RadianceColumns::Meridian& meridian, const Vec3d& r,
-                          const Place& from, const Place& to) {
+                          const Azimuth& from, const Azimuth& to) {
     const auto a = columns_->sum(meridian, from.c * turned, from.s);
     const auto b = columns_->sum(meridian, to.c * turned, to.s);
     const double along = dot(receiver.n, grid.pole), across = dot(receiver.n, r);
@@ -361,30 +362,31 @@ Rgb<double> LineLight::map_light(const Receiver& receiver, double offset) const 
   };
   const Rgb<double> scale = receiver.scattering.eval(receiver.n);
   const Vec3d planes[] = {at.up};
-  const Rgb<double> sum =
-      sum_over_lines<Rgb<double>>(at, pencil, planes, w, nullptr, options_.lines, offset,
-                                  [&](const Isolines::Line& line, const Place& a, const Place& b) {
-                                    return cosine(columns_->meridian(line.r), line.r, a, b);
-                                  });
+  const Rgb<double> sum = sum_over_lines<Rgb<double>>(
+      at, pencil, planes, w, nullptr, options_.lines, offset,
+      [&](const Isolines::Line& line, const Azimuth& a, const Azimuth& b) {
+        return cosine(columns_->meridian(line.r), line.r, a, b);
+      });
   return scale * sum;
 }
 
-Rgb<double> LineLight::lamp_light(const Lamp& lamp, const Receiver& receiver, double offset) const {
+Rgb<double> LineLight::emitter_light(const Emitter& emitter, const Receiver& receiver,
+                                     double offset) const {
   Scratch& own = scratch();
   const ContourPoint& at = receiver.at;
-  // What lies in the lamp's own plane, as its back does, gets nothing of it, however it is rounded;
-  // nor does a point above whose horizon no more than rounding of the lamp is seen.
-  const double rounding = contours_.rounding(at, lamp.faces[0].shape);
-  if (!(lamp.hull.plane.distance(at.p) > rounding)) return {};
-  if (std::none_of(lamp.hull.points.begin(), lamp.hull.points.end(),
+  // What lies in the emitter's own plane, as its back does, gets nothing of it, however it is
+  // rounded; nor does a point above whose horizon no more than rounding of the emitter is seen.
+  const double rounding = contours_.rounding(at, emitter.faces[0].shape);
+  if (!(emitter.hull.plane.distance(at.p) > rounding)) return {};
+  if (std::none_of(emitter.hull.points.begin(), emitter.hull.points.end(),
                    [&](const Vec3d& x) { return dot(at.up, x - at.p) > rounding; })) {
     return {};
   }
-  if (lamp.in_place.contains(at.face)) return {};
-  const auto cone = cone_around(lamp.hull, at.p, at.up);
+  if (emitter.in_place.contains(at.face)) return {};
+  const auto cone = cone_around(emitter.hull, at.p, at.up);
   if (!cone) return {};
   own.polygon.clear();
-  for (const Vec3d& x : lamp.hull.points) own.polygon.push_back(normalize(x - at.p));
+  for (const Vec3d& x : emitter.hull.points) own.polygon.push_back(normalize(x - at.p));
   cut(own.polygon, at.up);
   if (own.polygon.size() < 3) return {};
   // Corners run so that the inside is on the right, as directions are looked at from outside.
@@ -402,17 +404,17 @@ Rgb<double> LineLight::lamp_light(const Lamp& lamp, const Receiver& receiver, do
   const Pencil pencil = pencil_inside(own.polygon);
   const Rgb<double> f = receiver.scattering.eval(receiver.n);
   const double all = cosine_integral(own.sides, receiver.n);
-  list(at, *cone, &lamp.screen);
-  const int w = contours_.count(at, pencil.pole, &lamp.screen);
-  const int lamp_lines = std::max(1, options_.lines / kSkyLines);
-  if (own.arcs.empty()) return w == 0 ? f * lamp.radiance * all : Rgb<double>{};
+  list(at, *cone, &emitter.screen);
+  const int w = contours_.count(at, pencil.pole, &emitter.screen);
+  const int emitter_lines = std::max(1, options_.lines / kSkyLines);
+  if (own.arcs.empty()) return w == 0 ? f * emitter.radiance * all : Rgb<double>{};
   const double along = dot(receiver.n, pencil.pole);
-  const double sum =
-      sum_over_lines<double>(at, pencil, own.planes, w, &all, lamp_lines, offset,
-                             [&](const Isolines::Line& line, const Place& from, const Place& to) {
-                               return cosine_piece(along, dot(receiver.n, line.r), from, to);
-                             });
-  return f * lamp.radiance * sum;
+  const double sum = sum_over_lines<double>(
+      at, pencil, own.planes, w, &all, emitter_lines, offset,
+      [&](const Isolines::Line& line, const Azimuth& from, const Azimuth& to) {
+        return cosine_piece(along, dot(receiver.n, line.r), from, to);
+      });
+  return f * emitter.radiance * sum;
 }
 
 LineLight::Receiver LineLight::receiver_at(const SurfacePoint<double>& surface,
@@ -420,11 +422,11 @@ LineLight::Receiver LineLight::receiver_at(const SurfacePoint<double>& surface,
   return {at(surface, scattering.normal()), scattering, scattering.normal()};
 }
 
-Rgb<double> LineLight::lamps(const SurfacePoint<double>& surface,
-                             const Scattering<double>& scattering, double offset) const {
+Rgb<double> LineLight::emitters(const SurfacePoint<double>& surface,
+                                const Scattering<double>& scattering, double offset) const {
   const Receiver receiver = receiver_at(surface, scattering);
   Rgb<double> sum;
-  for (const Lamp& lamp : lamps_) sum += lamp_light(lamp, receiver, offset);
+  for (const Emitter& emitter : emitters_) sum += emitter_light(emitter, receiver, offset);
   return sum;
 }
 

@@ -1,7 +1,7 @@
 #pragma once
 // Light that a point receives past all that is in the way, integrated along lines between contours
 // without a ray (after Nowrouzezahrai, Baran, Mitchell, Jarosz 2014): how open its sky is, and
-// direct light of area lamps, of constant environments and of maps.
+// direct light of area emitters, of constant environments and of maps.
 //
 // One dimension is exact, the other a sum over lines at equal distances whose offset is given:
 // uniform in [0, 1) it makes all results unbiased. Their standard error falls as lines^-1.5.
@@ -21,7 +21,7 @@
 namespace limn {
 
 struct LineOptions {
-  int lines = 64;  // through the sky; a quarter of them through a lamp
+  int lines = 64;  // through the sky; a quarter of them through an emitter
   // Above 0: lines, 8 at least, are doubled until the results of two halves differ by at most twice
   // this part of the result, or until there are kMostLines. That is no more unbiased.
   double tolerance = 0;
@@ -31,7 +31,7 @@ inline constexpr int kMostLines = 1 << 14;
 
 // What sums over lines have to do, in numbers that are the same on all machines.
 struct LineWork {
-  int64_t lists = 0;        // of contours, in the sky or before a lamp
+  int64_t lists = 0;        // of contours, in the sky or before an emitter
   int64_t arcs = 0;         // that these have
   int64_t crossings = 0;    // of arcs and lines
   int64_t evaluations = 0;  // by quadrature
@@ -39,8 +39,8 @@ struct LineWork {
 
 class LineLight {
  public:
-  // The scene and its tracer must outlive it. direct: whether lamps() and environment() are to be
-  // asked; InputError where check() says so, and for lamps that lie in one place. sky: what
+  // The scene and its tracer must outlive it. direct: whether emitters() and environment() are to
+  // be asked; InputError where check() says so, and for emitters that lie in one place. sky: what
   // environment() is to integrate, the scene's own or a part of it; none: nothing.
   LineLight(const Scene& scene, const RayTracer& tracer, int threads, const LineOptions& options,
             bool direct, std::shared_ptr<const Environment> sky);
@@ -55,13 +55,13 @@ class LineLight {
   // The same weighed by the cosine to the shading normal n, over pi; with n = up it is 1 in the
   // open.
   double ambient_occlusion(const ContourPoint& at, const Vec3d& n, double offset) const;
-  // Radiance that the surface scatters towards the viewer of `scattering`, of all lamps, or of the
-  // environment, seen directly [W / (m^2 sr)].
-  Rgb<double> lamps(const SurfacePoint<double>& surface, const Scattering<double>& scattering,
-                    double offset) const;
+  // Radiance that the surface scatters towards the viewer of `scattering`, of all emitters, or of
+  // the environment, seen directly [W / (m^2 sr)].
+  Rgb<double> emitters(const SurfacePoint<double>& surface, const Scattering<double>& scattering,
+                       double offset) const;
   Rgb<double> environment(const SurfacePoint<double>& surface, const Scattering<double>& scattering,
                           double offset) const;
-  bool has_lamps() const { return !lamps_.empty(); }
+  bool has_emitters() const { return !emitters_.empty(); }
   // How many sums ended at kMostLines above the tolerance, so far.
   int64_t missed() const { return missed_; }
   // What the calling thread has done so far, for all of them.
@@ -72,9 +72,9 @@ class LineLight {
   }
 
  private:
-  struct Lamp {
+  struct Emitter {
     Rgb<double> radiance;
-    LampHull hull;  // flat
+    EmitterHull hull;  // flat
     ContourScreen screen;
     std::vector<FaceRef> faces;
     FaceOverlaps::Set in_place;  // these, and what overlaps them in their plane
@@ -88,9 +88,9 @@ class LineLight {
   // All contours into scratch(), counted.
   void list(const ContourPoint& at, const DirectionCone& cone, const ContourScreen* screen) const;
   void find_overlaps(int threads);
-  void add_lamp(ShapeId id);
-  void add_polygon(const LampHull& hull, ShapeId id, std::vector<FaceRef> faces);
-  Rgb<double> lamp_light(const Lamp& lamp, const Receiver& receiver, double offset) const;
+  void add_emitter(ShapeId id);
+  void add_polygon(const EmitterHull& hull, ShapeId id, std::vector<FaceRef> faces);
+  Rgb<double> emitter_light(const Emitter& emitter, const Receiver& receiver, double offset) const;
   Rgb<double> sky_light(const Receiver& receiver, double offset) const;
   Rgb<double> map_light(const Receiver& receiver, double offset) const;
   template <class V, class Piece>
@@ -100,7 +100,7 @@ class LineLight {
   const Scene& scene_;
   Contours contours_;
   LineOptions options_;
-  std::vector<Lamp> lamps_;
+  std::vector<Emitter> emitters_;
   std::shared_ptr<const Environment> sky_;
   std::unique_ptr<RadianceColumns> columns_;  // of a map
   // Lines from its pole, and from the opposite one, dense where it is bright.

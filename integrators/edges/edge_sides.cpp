@@ -3,7 +3,7 @@
 
 #include <tuple>
 
-#include "limn/core/face_copies.h"
+#include "limn/core/duplicate_faces.h"
 
 namespace limn {
 
@@ -30,19 +30,19 @@ bool overlap(const RayTracer& tracer, const FaceSide& a, const FaceSide& b) {
          (dot(a.into, b.into) > 0 && tracer.overlap(a.face, b.face));
 }
 
-void RimOrder::add(uint8_t rim, bool positive, double slope) {
-  if (rim == kNoRim) return;
-  Rim& r = rims_[rim];
+void RimOrder::add(uint8_t motion_group, bool positive, double slope) {
+  if (motion_group == kNoMotionGroup) return;
+  MotionGroup& r = motion_groups_[motion_group];
   r.slope[positive] = r.has[positive] ? std::min(r.slope[positive], slope) : slope;
   r.has[positive] = true;
 }
 
 bool RimOrder::comes_before(uint8_t a, uint8_t b) const {
-  const auto place = [&](uint8_t rim) {
-    const Rim& r = rims_[rim];
+  const auto place = [&](uint8_t motion_group) {
+    const MotionGroup& r = motion_groups_[motion_group];
     const int group = r.has[0] == r.has[1] ? 1 : r.has[0] ? 0 : 2;
     const double within = group == 0 ? -r.slope[0] : group == 2 ? r.slope[1] : 0;
-    return std::tuple(group, within, rim);
+    return std::tuple(group, within, motion_group);
   };
   return place(a) < place(b);
 }
@@ -66,7 +66,7 @@ std::optional<FaceSide> blocked_at_edge(const Scene& scene, const RayTracer& tra
     const double s = turn(f, direction) / gw;
     if (gw == 0 || !(r > 0) || !(s > 0)) return;
     const bool first = !nearest || (overlap(tracer, side, *nearest)
-                                        ? is_met_first(scene, side.face, nearest->face, direction)
+                                        ? is_hit_first(scene, side.face, nearest->face, direction)
                                         : r < nearest_r);
     if (first) {
       nearest = side;

@@ -34,7 +34,8 @@ FaceSide side_of_face(const Scene& scene, FaceRef face, const Vec3d& x0, const V
 
 // Whether two sides lie in one place: those of faces that the tracer knows to overlap, and those
 // that double precision cannot tell apart (faces in one plane, with less in common than rounding
-// explains). Which of them is seen is_met_first says (limn/core/face_copies.h), as for all rays.
+// explains). Which of them is seen is_hit_first says (limn/core/duplicate_faces.h), as for all
+// rays.
 bool overlap(const RayTracer& tracer, const FaceSide& a, const FaceSide& b);
 
 // Calls visit(side, incidence) for every side of the faces around an edge.
@@ -50,30 +51,30 @@ void for_every_side(const Scene& scene, const FacesAround& around, const Vec3d& 
   }
 }
 
-// In which order the rims in one place part as their faces move, seen across them from the negative
-// side to the positive one: those of faces on the negative side alone come first, the rear ones
-// before those that hide them; those of faces on the positive side alone last, the front ones
+// In which order the motion_groups in one place part as their faces move, seen across them from the
+// negative side to the positive one: those of faces on the negative side alone come first, the rear
+// ones before those that hide them; those of faces on the positive side alone last, the front ones
 // first. So surfaces leave gaps and do not pass through each other.
 class RimOrder {
  public:
   // A face lies on this side; smaller slopes are nearer.
-  void add(uint8_t rim, bool positive, double slope);
-  // Whether a face is seen just beside the rim `own`, on its positive side or the other: one of the
-  // same rim on its own side only, one of a rim that comes later (or has come before) on both, if
-  // it lies on the negative (or the positive) side.
-  bool is_seen(uint8_t rim, bool positive, uint8_t own, bool on_positive_side) const {
-    if (rim == own || rim == kNoRim) return positive == on_positive_side;
-    return positive == comes_before(rim, own);
+  void add(uint8_t motion_group, bool positive, double slope);
+  // Whether a face is seen just beside the motion_group `own`, on its positive side or the other:
+  // one of the same motion_group on its own side only, one of a motion_group that comes later (or
+  // has come before) on both, if it lies on the negative (or the positive) side.
+  bool is_seen(uint8_t motion_group, bool positive, uint8_t own, bool on_positive_side) const {
+    if (motion_group == own || motion_group == kNoMotionGroup) return positive == on_positive_side;
+    return positive == comes_before(motion_group, own);
   }
 
  private:
   bool comes_before(uint8_t a, uint8_t b) const;
 
-  struct Rim {
+  struct MotionGroup {
     bool has[2] = {false, false};  // faces on the negative and on the positive side
     double slope[2];               // of the nearest
   };
-  std::array<Rim, kMostRims> rims_;
+  std::array<MotionGroup, kMostMotionGroups> motion_groups_;
 };
 
 // The side that a ray meets at once when it leaves edge.start infinitely close to the edge, if any.

@@ -7,7 +7,7 @@
 #include <map>
 #include <set>
 
-#include "limn/core/face_copies.h"
+#include "limn/core/duplicate_faces.h"
 #include "limn/core/lights.h"
 #include "limn/core/surface_point.h"
 #include "limn/edgetree/crossing_curves.h"
@@ -45,9 +45,9 @@ EdgeSamplerInput make_scene_edges(const Scene& scene, int threads) {
   const std::vector<FacePair> pairs = find_face_pairs(meshes, pinhole, threads);
   const auto [contacts, parting] =
       unite_touching_edges(touching_shapes(scene), pairs, pinhole, threads, input.objects);
-  const std::vector<CrossingSegment> crossings = find_crossings(meshes, pairs, threads);
+  const std::vector<IntersectionSegment> crossings = find_intersections(meshes, pairs, threads);
   if (!crossings.empty() || !contacts.empty())
-    input.objects.push_back(crossing_edges(meshes, crossings, contacts));
+    input.objects.push_back(intersection_edges(meshes, crossings, contacts));
   input.parting = parting;
   if (scene.environment) input.environment_luminance = scene.environment->mean_luminance();
   return input;
@@ -80,7 +80,7 @@ std::set<ShapePair> pressed_pairs(const EdgeSamplerInput& edges) {
   const EdgeMesh& lines = edges.objects.back();
   for (uint32_t e = 0; e < lines.edges.size(); ++e) {
     const FacesAround around = lines.around(EdgeId(e));
-    if (around.incidence(0).rim == kNoRim) continue;
+    if (around.incidence(0).motion_group == kNoMotionGroup) continue;
     const auto [first, second] = std::minmax(around.faces[0].shape, around.faces[1].shape);
     pairs.insert({first, second});
   }
@@ -88,9 +88,9 @@ std::set<ShapePair> pressed_pairs(const EdgeSamplerInput& edges) {
 }
 
 std::string pair_in_text(const Scene& scene, const ShapePair& pair) {
-  const std::string first = name_in_text(scene, pair[0]);
+  const std::string first = quoted_name(scene, pair[0]);
   if (pair[0] == pair[1]) return fmt::format("faces of {}", first);
-  return fmt::format("{} and {}", first, name_in_text(scene, pair[1]));
+  return fmt::format("{} and {}", first, quoted_name(scene, pair[1]));
 }
 
 }  // namespace
@@ -133,7 +133,7 @@ void warn_of_shadows_on_lifted_points(const Scene& scene, std::vector<std::strin
         "the derivative of hard shadows on {} is incomplete: its normals are interpolated, and "
         "shadows that its own faces cast in hollows and at its terminator are not differentiated; "
         "a finer mesh or area lights make the missing part smaller",
-        name_in_text(scene, ShapeId(i))));
+        quoted_name(scene, ShapeId(i))));
   }
 }
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "limn/core/face_copies.h"
+#include "limn/core/duplicate_faces.h"
 #include "limn/core/shading.h"
 
 namespace limn {
@@ -199,7 +199,7 @@ void warn_of_faces_edge_on(const Scene& scene, const Viewpoints& viewpoints,
         "{} lies in the plane of faces ({} of them, the first of {}): there the derivative has a "
         "kink, and is that of the side from which such a face is not seen; differences take the "
         "mean of both sides; a little off the plane there is no kink",
-        what, viewpoint.flat_faces(), name_in_text(scene, viewpoint.first_shape())));
+        what, viewpoint.flat_faces(), quoted_name(scene, viewpoint.first_shape())));
   };
   look("the camera", viewpoints.camera);
   for (size_t i = 0; i < scene.delta_lights.size(); ++i) {

@@ -56,7 +56,7 @@ void RecordWriter::add(const TermCost& cost) {
 void RecordWriter::add(const NonFinite& bad) {
   add(static_cast<int64_t>(bad.count));
   add(static_cast<int64_t>(bad.first.size()));
-  for (const NonFinite::Place& place : bad.first) {
+  for (const NonFinite::SampleId& place : bad.first) {
     add(int64_t{place.x});
     add(int64_t{place.y});
     add(place.sample);
@@ -114,7 +114,7 @@ NonFinite RecordReader::non_finite() {
   NonFinite bad;
   bad.count = static_cast<uint64_t>(count());
   for (int64_t left = count(); left > 0; --left) {
-    NonFinite::Place& place = bad.first.emplace_back();
+    NonFinite::SampleId& place = bad.first.emplace_back();
     place.x = static_cast<int>(count());
     place.y = static_cast<int>(count());
     place.sample = count();

@@ -348,7 +348,7 @@ void run_batches(Estimators estimators, const RunSettings& settings, const Stopw
   }
 }
 
-void check_pixel(const Film& film, const NonFinite::Place& place) {
+void check_pixel(const Film& film, const NonFinite::SampleId& place) {
   const int x = place.x - film.crop_x;
   const int y = place.y - film.crop_y;
   if (x >= 0 && x < film.crop_width && y >= 0 && y < film.crop_height && place.sample >= 0 &&

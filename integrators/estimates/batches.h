@@ -34,7 +34,7 @@ void run_batches(Estimators estimators, const RunSettings& settings, const Stopw
                  const std::function<void(const Batch&, const std::vector<BatchSums>&)>& collect);
 
 // InputError if the film has no such pixel.
-void check_pixel(const Film& film, const NonFinite::Place& place);
+void check_pixel(const Film& film, const NonFinite::SampleId& place);
 
 // One sample of a pixel alone: the same whatever the number of samples.
 void run_pixel_sample(const SampleEstimator& estimator, uint64_t seed, const PixelSample& at,

@@ -8,19 +8,19 @@
 
 namespace limn {
 
-void NonFinite::add(const Place& place) {
+void NonFinite::add(const SampleId& place) {
   ++count;
   if (first.size() < 10) first.push_back(place);
 }
 
 void NonFinite::merge(const NonFinite& other) {
   count += other.count;
-  for (const Place& place : other.first) {
+  for (const SampleId& place : other.first) {
     if (first.size() < 10) first.push_back(place);
   }
 }
 
-void LargestSample::add(double squared_magnitude, const NonFinite::Place& where) {
+void LargestSample::add(double squared_magnitude, const NonFinite::SampleId& where) {
   squares += squared_magnitude;
   if (!(squared_magnitude > square)) return;
   square = squared_magnitude;
@@ -53,7 +53,7 @@ void TermCost::merge(const TermCost& other) {
 std::string NonFinite::message() const {
   std::string text =
       fmt::format("{} non-finite sample{} counted as zero:", count, count == 1 ? "" : "s");
-  for (const Place& place : first) {
+  for (const SampleId& place : first) {
     if (place.x < 0) {
       text += fmt::format(" (sample {}, {})", place.sample, place.term);
     } else {

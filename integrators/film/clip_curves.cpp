@@ -57,8 +57,8 @@ std::vector<ClipSegment> find_clip_segments(const Scene& scene) {
   return segments;
 }
 
-bool clip_jump(const PathContext& context, const ClipSegment& segment, const Vec3d& y,
-               const Rng& key, RayCount& rays, Rgb<double>& jump) {
+bool clip_difference(const PathContext& context, const ClipSegment& segment, const Vec3d& y,
+                     const Rng& key, RayCount& rays, Rgb<double>& jump) {
   const Scene& scene = context.scene;
   const Vec3d pinhole = value(scene.camera.origin);
   const double distance = length(y - pinhole);
@@ -77,7 +77,7 @@ bool clip_jump(const PathContext& context, const ClipSegment& segment, const Vec
   if (found && segment.at_far_plane) return false;
 
   PathTracer<double, NoVisitor> path(context, rays);
-  const Rng side_key = key.at(Purpose::kEdgeSide, 0);  // of both sides, as in edge_jump
+  const Rng side_key = key.at(Purpose::kEdgeSide, 0);  // of both sides, as in edge_difference
   const auto leaving = [&](FaceRef face) {
     Walk<double, NoVisitor> walk(side_key, 0, nullptr);
     path.place(walk, surface_on_ray<double>(scene, face, pinhole, ray.direction), -ray.direction);

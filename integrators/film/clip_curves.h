@@ -20,7 +20,7 @@ std::vector<ClipSegment> find_clip_segments(const Scene& scene);
 
 // Estimates the radiance that arrives at the pinhole from where the face is cut off, just beside
 // the point `y` of the segment, minus that where the face is seen. False if y is hidden.
-bool clip_jump(const PathContext& context, const ClipSegment& segment, const Vec3d& y,
-               const Rng& key, RayCount& rays, Rgb<double>& jump);
+bool clip_difference(const PathContext& context, const ClipSegment& segment, const Vec3d& y,
+                     const Rng& key, RayCount& rays, Rgb<double>& jump);
 
 }  // namespace limn

@@ -20,7 +20,7 @@ void FilmRegions::check(const Film& film) { PixelRegions::check(film, kUser); }
 FilmRegions::FilmRegions(const Scene& scene, int threads, const std::atomic<bool>* interrupted)
     : film_(scene.film) {
   const Stopwatch watch;
-  faces_ = std::make_shared<FacesInPlace>(scene, threads);
+  faces_ = std::make_shared<CoincidentFaces>(scene, threads);
   const PixelRegions pixels(scene, *faces_, threads, kUser);
   tiles_.resize(pixels.tiles().size());
   parallel_for(tiles_.size(), threads, [&](size_t t) {

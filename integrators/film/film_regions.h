@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "limn/core/faces_in_place.h"
+#include "limn/core/coincident_faces.h"
 #include "limn/core/scene.h"
 #include "limn/core/visible_regions.h"
 
@@ -19,7 +19,7 @@ class FilmRegions {
   FilmRegions(const Scene& scene, int threads, const std::atomic<bool>* interrupted = nullptr);
   static void check(const Film& film);  // the filter
   // What it had to find of the scene's faces, for a tracer to share.
-  std::shared_ptr<const FacesInPlace> faces() const { return faces_; }
+  std::shared_ptr<const CoincidentFaces> faces() const { return faces_; }
 
   // The face that is seen at a film position in the pixel (x, y) of the crop window [all in pixels
   // of the full film]; none where nothing is.
@@ -61,7 +61,7 @@ class FilmRegions {
   void for_each_region(int x, int y, const Visit& visit) const;
 
   const Film& film_;
-  std::shared_ptr<const FacesInPlace> faces_;
+  std::shared_ptr<const CoincidentFaces> faces_;
   std::vector<Tile> tiles_;  // as make_tiles lists them
   double seconds_ = 0;
 };

@@ -240,7 +240,7 @@ FacePart<S> PixelParts::part(size_t i, const Scene& seeded, const CameraView<S>&
   FacePart<S> result{pixels_.face_of(part.label), area, center_.x + x, center_.y + y};
   if constexpr (!std::is_same_v<S, double>) {
     const double inverse = 1 / area;
-    const bool still_camera = view.is_still();
+    const bool still_camera = view.is_constant();
     const auto plane = view.plane(center_.x, center_.y);
     std::vector<std::pair<Vec3<S>, const Weights*>> lines;
     for (size_t k = part.first_side; k < part.end_side; ++k) {

@@ -95,7 +95,7 @@ void PixelRegions::check(const Film& film, const RegionsUser& user) {
                                user.name, user.instead));
 }
 
-PixelRegions::PixelRegions(const Scene& scene, const FacesInPlace& faces, int threads,
+PixelRegions::PixelRegions(const Scene& scene, const CoincidentFaces& faces, int threads,
                            const RegionsUser& user)
     : scene_((check(scene.film, user), scene)),
       copies_(faces.copies),
@@ -169,7 +169,7 @@ std::optional<bool> PixelRegions::rule(uint32_t a, uint32_t b) const {
   const FaceRef first = face_of(a), second = face_of(b);
   if (!overlaps_.contains(first, second)) return {};
   const Vec3d corner = face_corners<double>(scene_.shape(first.shape).mesh, first.face)[0];
-  return is_met_first(scene_, first, second, corner - value(scene_.camera.origin));
+  return is_hit_first(scene_, first, second, corner - value(scene_.camera.origin));
 }
 
 void PixelRegions::refuse(int x, int y) const {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "integrators/estimates/tiles.h"
-#include "limn/core/faces_in_place.h"
+#include "limn/core/coincident_faces.h"
 #include "limn/core/scene.h"
 #include "limn/core/visible_regions.h"
 
@@ -25,7 +25,8 @@ class PixelRegions {
  public:
   // Finds which faces may be seen in which tile of make_tiles(). Scene and faces must outlive it.
   // InputError, with the filter's place, unless the filter is a box.
-  PixelRegions(const Scene& scene, const FacesInPlace& faces, int threads, const RegionsUser& user);
+  PixelRegions(const Scene& scene, const CoincidentFaces& faces, int threads,
+               const RegionsUser& user);
   static void check(const Film& film, const RegionsUser& user);  // the filter
 
   const std::vector<Tile>& tiles() const { return tiles_; }
@@ -51,7 +52,7 @@ class PixelRegions {
   void bin_faces(int threads);
 
   const Scene& scene_;
-  const FaceCopies& copies_;
+  const DuplicateFaces& copies_;
   const FaceOverlaps& overlaps_;
   RegionsUser user_;
   PlaneView view_;

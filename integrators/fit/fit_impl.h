@@ -73,7 +73,7 @@ class Fit::Impl {
   void finish_step(FitRecord& record);
 
   // Of kLbfgs, in fit_quasi_newton.cpp.
-  struct Place {
+  struct Iterate {
     FitRecord record;              // its losses
     std::vector<double> gradient;  // of all parameters in turn, per natural step
   };
@@ -83,7 +83,7 @@ class Fit::Impl {
     std::vector<double> lengths;    // along it, after which a bound holds a number
     bool fresh = false;             // the direction is minus the gradient
   };
-  std::optional<Place> place();
+  std::optional<Iterate> place();
   // Along a direction, for each number; infinite where no bound is met.
   std::vector<double> lengths_to_bounds(const std::vector<double>& direction) const;
   Line downwards() const;
@@ -93,11 +93,11 @@ class Fit::Impl {
   enum class Search { kFound, kNone, kInterrupted };
   Search search_along(const Line& line, double first, FitRecord& record);
   // Of it nothing is left where it throws.
-  std::optional<std::pair<Place, std::vector<double>>> search_from(const Place& start,
-                                                                   const FitState& before,
-                                                                   const Line& line, double first,
-                                                                   FitRecord& record,
-                                                                   bool& interrupted);
+  std::optional<std::pair<Iterate, std::vector<double>>> search_from(const Iterate& start,
+                                                                     const FitState& before,
+                                                                     const Line& line, double first,
+                                                                     FitRecord& record,
+                                                                     bool& interrupted);
   // At rest: on to the next remeshing, if one is left.
   void skip_to_remeshing();
   std::optional<FitRecord> quasi_newton_step();
@@ -106,7 +106,7 @@ class Fit::Impl {
   RunSettings settings_;
   std::vector<FitParameter> parameters_;
   QuasiNewton quasi_newton_;
-  std::optional<Place> here_;  // of the parameters as they are, if known
+  std::optional<Iterate> here_;  // of the parameters as they are, if known
 };
 
 }  // namespace limn

@@ -47,8 +47,8 @@ void Fit::Impl::check_exact() {
   }
 }
 
-std::optional<Fit::Impl::Place> Fit::Impl::place() {
-  Place place;
+std::optional<Fit::Impl::Iterate> Fit::Impl::place() {
+  Iterate place;
   std::vector<std::vector<double>> gradients;
   if (!evaluate(place.record, gradients)) return std::nullopt;
   for (size_t i = 0; i < parameters_.size(); ++i) {
@@ -110,10 +110,10 @@ std::optional<std::vector<double>> Fit::Impl::advance(const std::vector<double>&
   return added;
 }
 
-std::optional<std::pair<Fit::Impl::Place, std::vector<double>>> Fit::Impl::search_from(
-    const Place& start, const FitState& before, const Line& line, double first, FitRecord& record,
+std::optional<std::pair<Fit::Impl::Iterate, std::vector<double>>> Fit::Impl::search_from(
+    const Iterate& start, const FitState& before, const Line& line, double first, FitRecord& record,
     bool& interrupted) {
-  std::optional<Place> there;
+  std::optional<Iterate> there;
   std::vector<double> moved;
   double last = 0;
   const double slope = inner_product(start.gradient, line.direction);
@@ -151,13 +151,13 @@ std::optional<std::pair<Fit::Impl::Place, std::vector<double>>> Fit::Impl::searc
 // Moves to a lower place along the line, from here_.
 Fit::Impl::Search Fit::Impl::search_along(const Line& line, double first, FitRecord& record) {
   const FitState before = state();
-  const Place start = *here_;
+  const Iterate start = *here_;
   const auto go_back = [&] {
     put(before);
     here_ = start;
   };
   bool interrupted = false;
-  std::optional<std::pair<Place, std::vector<double>>> found;
+  std::optional<std::pair<Iterate, std::vector<double>>> found;
   try {
     found = search_from(start, before, line, first, record, interrupted);
   } catch (...) {

@@ -109,7 +109,7 @@ std::optional<size_t> count_inside_out(const Mesh& mesh, int threads) {
 size_t count_crossings(const Mesh& mesh, int threads) {
   const Mesh* meshes[] = {&mesh};
   const auto pairs = find_face_pairs(meshes, bounds_of(mesh).center(), threads);
-  return find_crossings(meshes, pairs, threads).size();
+  return find_intersections(meshes, pairs, threads).size();
 }
 
 }  // namespace limn

@@ -1,4 +1,4 @@
-// Lamps as polygons, what lies before them, and the sums over what is left.
+// Emitters as polygons, what lies before them, and the sums over what is left.
 #include "integrators/lights/closed_light.h"
 
 #include <algorithm>
@@ -13,14 +13,14 @@
 namespace limn {
 namespace {
 
-// What is nearer to a point than this part of its distance from the lamp's plane does not shade it:
-// about the rounding of positions. Not tuned.
+// What is nearer to a point than this part of its distance from the emitter's plane does not shade
+// it: about the rounding of positions. Not tuned.
 constexpr double kNear = 0x1p-26;
 // A window of outlines reaches so many steps of their grid from its middle.
 constexpr double kGridHalf = 0x1p29;
-// A window is wider than its lamp, so that the lamp's sides are inside. Not tuned.
+// A window is wider than its emitter, so that the emitter's sides are inside. Not tuned.
 constexpr double kMargin = 0x1p-10;
-// Lamps of which is kept what a point has seen. Not tuned.
+// Emitters of which is kept what a point has seen. Not tuned.
 constexpr size_t kHeld = 8;
 
 }  // namespace
@@ -37,39 +37,41 @@ bool ClosedLight::is_skipped(FaceRef face, const Receiver& receiver) const {
                      [&](FaceRef other) { return in_one_place(other, face); });
 }
 
-// Lists the faces that may shade the lamp, after its own; false if it cannot be seen.
-bool ClosedLight::list(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const {
-  const Vec3d &p = receiver.p, a = -lamp.plane.n;
-  const double height = lamp.plane.distance(p);
+// Lists the faces that may shade the emitter, after its own; false if it cannot be seen.
+bool ClosedLight::list(const EmitterPlane& emitter, const Receiver& receiver,
+                       Scratch& scratch) const {
+  const Vec3d &p = receiver.p, a = -emitter.plane.n;
+  const double height = emitter.plane.distance(p);
   if (!(height > 0)) return false;
-  const bool above = std::any_of(lamp.hull.begin(), lamp.hull.end(),
+  const bool above = std::any_of(emitter.hull.begin(), emitter.hull.end(),
                                  [&](const Vec3d& x) { return dot(receiver.up, x - p) > 0; });
   if (!above) return false;
-  // What lies in the lamp's own plane, as its back does, gets nothing of it, however it is rounded.
-  if (lamp.in_place.contains(receiver.face)) return false;
+  // What lies in the emitter's own plane, as its back does, gets nothing of it, however it is
+  // rounded.
+  if (emitter.in_place.contains(receiver.face)) return false;
 
-  const double px = dot(lamp.u, p), py = dot(lamp.v, p);
+  const double px = dot(emitter.u, p), py = dot(emitter.v, p);
   PlaneWindow& window = scratch.window;
-  window.center = {(0.5 * (lamp.x0 + lamp.x1) - px) / height,
-                   (0.5 * (lamp.y0 + lamp.y1) - py) / height};
-  window.half_width = (1 + kMargin) * 0.5 * (lamp.x1 - lamp.x0) / height;
-  window.half_height = (1 + kMargin) * 0.5 * (lamp.y1 - lamp.y0) / height;
+  window.center = {(0.5 * (emitter.x0 + emitter.x1) - px) / height,
+                   (0.5 * (emitter.y0 + emitter.y1) - py) / height};
+  window.half_width = (1 + kMargin) * 0.5 * (emitter.x1 - emitter.x0) / height;
+  window.half_height = (1 + kMargin) * 0.5 * (emitter.y1 - emitter.y0) / height;
   scratch.near = kNear * height;
-  scratch.far = height - lamp.deviation;
+  scratch.far = height - emitter.deviation;
 
-  scratch.faces = lamp.faces;
-  scratch.lamp_faces = lamp.faces.size();
-  scratch.faces.insert(scratch.faces.end(), lamp.before.begin(), lamp.before.end());
+  scratch.faces = emitter.faces;
+  scratch.emitter_faces = emitter.faces.size();
+  scratch.faces.insert(scratch.faces.end(), emitter.before.begin(), emitter.before.end());
   scratch.uncut = scratch.first_item = scratch.faces.size();
   scratch.items.clear();
   if (!(scratch.far > scratch.near)) return true;
   std::array<HalfSpace, 8> set;
   size_t count = 0;
   const auto bound = [&](const Vec3d& n, double offset) { set[count++] = {n, offset - dot(n, p)}; };
-  bound(a * (window.center.x + window.half_width) - lamp.u, 0);
-  bound(lamp.u - a * (window.center.x - window.half_width), 0);
-  bound(a * (window.center.y + window.half_height) - lamp.v, 0);
-  bound(lamp.v - a * (window.center.y - window.half_height), 0);
+  bound(a * (window.center.x + window.half_width) - emitter.u, 0);
+  bound(emitter.u - a * (window.center.x - window.half_width), 0);
+  bound(a * (window.center.y + window.half_height) - emitter.v, 0);
+  bound(emitter.v - a * (window.center.y - window.half_height), 0);
   bound(receiver.up, 0);
   bound(a, 0);
   bound(-a, scratch.far);
@@ -84,8 +86,9 @@ bool ClosedLight::list(const LampPlane& lamp, const Receiver& receiver, Scratch&
     };
     const auto& x = item->corners;
     if (!rises(x[0]) && !rises(x[1]) && !rises(x[2])) continue;
-    // What lies in the lamp's plane is before it by the rule, not by how its corners are rounded.
-    if (lamp.in_place.contains(item->face) || is_skipped(item->face, receiver)) continue;
+    // What lies in the emitter's plane is before it by the rule, not by how its corners are
+    // rounded.
+    if (emitter.in_place.contains(item->face) || is_skipped(item->face, receiver)) continue;
     scratch.faces.push_back(item->face);
     scratch.items[kept++] = item;
   }
@@ -93,14 +96,14 @@ bool ClosedLight::list(const LampPlane& lamp, const Receiver& receiver, Scratch&
   return true;
 }
 
-// The largest first: what is covered already is left at once. Those before the lamp are no nearer
-// than each other: each has a depth of its own, in the order of insertion.
-void ClosedLight::find_regions(const LampPlane& lamp, const Receiver& receiver,
+// The largest first: what is covered already is left at once. Those before the emitter are no
+// nearer than each other: each has a depth of its own, in the order of insertion.
+void ClosedLight::find_regions(const EmitterPlane& emitter, const Receiver& receiver,
                                Scratch& scratch) const {
-  const Vec3d a = -lamp.plane.n;
-  const PlaneView lamp_view(receiver.p, lamp.u, lamp.v, a, scratch.near,
-                            std::numeric_limits<double>::max());
-  const PlaneView view(receiver.p, lamp.u, lamp.v, a, scratch.near,
+  const Vec3d a = -emitter.plane.n;
+  const PlaneView emitter_view(receiver.p, emitter.u, emitter.v, a, scratch.near,
+                               std::numeric_limits<double>::max());
+  const PlaneView view(receiver.p, emitter.u, emitter.v, a, scratch.near,
                        std::max(scratch.far, scratch.near));
   scratch.seen.assign(scratch.faces.size(), {});
   std::vector<uint32_t>& order = scratch.order;
@@ -108,10 +111,10 @@ void ClosedLight::find_regions(const LampPlane& lamp, const Receiver& receiver,
   for (uint32_t i = 0; i < scratch.faces.size(); ++i) {
     const FaceRef ref = scratch.faces[i];
     const auto corners = face_corners<double>(scene_.shape(ref.shape).mesh, ref.face);
-    const auto face = (i < scratch.uncut ? lamp_view : view).face(i, corners);
+    const auto face = (i < scratch.uncut ? emitter_view : view).face(i, corners);
     if (!face) continue;
     scratch.seen[i] = *face;
-    if (i >= scratch.lamp_faces) order.push_back(i);
+    if (i >= scratch.emitter_faces) order.push_back(i);
   }
   const PlaneWindow& window = scratch.window;
   const auto extent = [&](uint32_t i) {
@@ -131,11 +134,11 @@ void ClosedLight::find_regions(const LampPlane& lamp, const Receiver& receiver,
     face.depth_error = 0;
     scratch.regions.insert(face);
   };
-  for (size_t i = 0; i < scratch.lamp_faces; ++i) {
+  for (size_t i = 0; i < scratch.emitter_faces; ++i) {
     SeenFace& face = scratch.seen[i];
     if (face.side_count == 0) continue;
     const auto cut = [&](const Vec3d& n) {
-      face.cuts[face.cut_count++] = {dot(n, lamp.u), dot(n, lamp.v), dot(n, a)};
+      face.cuts[face.cut_count++] = {dot(n, emitter.u), dot(n, emitter.v), dot(n, a)};
     };
     cut(receiver.up);
     if (receiver.wedge) cut(*receiver.wedge);
@@ -148,9 +151,9 @@ void ClosedLight::find_regions(const LampPlane& lamp, const Receiver& receiver,
 
 // Which way round faces are seen on the grid, where doubles tell. A side between two that are
 // turned alike cancels, so that most faces need not be looked at any closer.
-void ClosedLight::find_turns(const LampPlane& lamp, const Receiver& receiver,
+void ClosedLight::find_turns(const EmitterPlane& emitter, const Receiver& receiver,
                              const Scratch& scratch, Turns& turns) const {
-  const Vec3d a = -lamp.plane.n, &p = receiver.p;
+  const Vec3d a = -emitter.plane.n, &p = receiver.p;
   const double x_steps = kGridHalf / scratch.window.half_width,
                y_steps = kGridHalf / scratch.window.half_height;
   const double steps = std::max(x_steps, y_steps), both = x_steps * y_steps;
@@ -206,24 +209,24 @@ uint32_t ClosedLight::cancelled_sides(const FaceTree::Item& item, const Turns& t
 }
 
 // False if a corner is too far out.
-bool ClosedLight::find_outlines(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch,
-                                Turns& turns) const {
+bool ClosedLight::find_outlines(const EmitterPlane& emitter, const Receiver& receiver,
+                                Scratch& scratch, Turns& turns) const {
   using Point = ShadowOutlines::Point;
-  const Vec3d a = -lamp.plane.n;
+  const Vec3d a = -emitter.plane.n;
   const PlaneWindow& window = scratch.window;
   const double x_steps = kGridHalf / window.half_width, y_steps = kGridHalf / window.half_height;
   bool within = true;
   const auto on_grid = [&](const Vec3d& w) {
     const double z = dot(w, a);
-    const double x = (dot(w, lamp.u) / z - window.center.x) * x_steps;
-    const double y = (dot(w, lamp.v) / z - window.center.y) * y_steps;
+    const double x = (dot(w, emitter.u) / z - window.center.x) * x_steps;
+    const double y = (dot(w, emitter.v) / z - window.center.y) * y_steps;
     within = within && std::fabs(x) < 0x1p60 && std::fabs(y) < 0x1p60;
     return within ? Point{std::llround(x), std::llround(y)} : Point{0, 0};
   };
   const auto clip = [&](const auto& height, uint32_t line) { scratch.clip(height, line, on_grid); };
   scratch.outlines.clear();
   scratch.cut_points.clear();
-  find_turns(lamp, receiver, scratch, turns);
+  find_turns(emitter, receiver, scratch, turns);
   for (uint32_t label = 0; label < scratch.faces.size(); ++label) {
     const bool listed = label >= scratch.first_item;
     const FaceTree::Item* item = listed ? scratch.items[label - scratch.first_item] : nullptr;
@@ -246,8 +249,8 @@ bool ClosedLight::find_outlines(const LampPlane& lamp, const Receiver& receiver,
     if (!whole && label >= scratch.uncut && farthest > far) {
       clip([&](const Vec3d& w) { return far - dot(w, a); }, line + Scratch::kFarCut);
     }
-    const bool of_lamp = label < scratch.lamp_faces;
-    if (of_lamp) {
+    const bool of_emitter = label < scratch.emitter_faces;
+    if (of_emitter) {
       clip([&](const Vec3d& w) { return dot(w, receiver.up); }, line + Scratch::kHorizon);
       if (receiver.wedge) {
         clip([&](const Vec3d& w) { return dot(w, *receiver.wedge); }, line + Scratch::kWedge);
@@ -261,28 +264,28 @@ bool ClosedLight::find_outlines(const LampPlane& lamp, const Receiver& receiver,
     }
     if (!within) return false;
     if (scratch.points.size() > 2) {
-      scratch.outlines.add(scratch.points, scratch.lines, of_lamp, cancelled);
+      scratch.outlines.add(scratch.points, scratch.lines, of_emitter, cancelled);
     }
   }
   scratch.sort_cut_points();
   return true;
 }
 
-// The polygons of a lamp that a point sees, of their true lines.
+// The polygons of an emitter that a point sees, of their true lines.
 template <class S>
 class ClosedLight::View {
  public:
-  View(const ClosedLight& light, const LampPlane& lamp, const Receiver& receiver, const Vec3<S>& p,
-       Scratch& scratch)
-      : light_(light), lamp_(lamp), receiver_(receiver), p_(p), scratch_(scratch) {}
+  View(const ClosedLight& light, const EmitterPlane& emitter, const Receiver& receiver,
+       const Vec3<S>& p, Scratch& scratch)
+      : light_(light), emitter_(emitter), receiver_(receiver), p_(p), scratch_(scratch) {}
 
   // Appends the sides of all regions: their sum is that of the whole.
   void add_regions(std::vector<PolygonSide<S>>& all) const {
     std::vector<PolygonSide<S>> polygon;
     std::vector<Vec3d> units;
     scratch_.regions.for_each_below(
-        scratch_.lamp_faces, [&](uint32_t shown, std::span<const PlanePoint> corners,
-                                 std::span<const VisibleRegions::Side> sides) {
+        scratch_.emitter_faces, [&](uint32_t shown, std::span<const PlanePoint> corners,
+                                    std::span<const VisibleRegions::Side> sides) {
           polygon.resize(sides.size());
           units.resize(sides.size());
           for (size_t i = 0; i < sides.size(); ++i) {
@@ -313,7 +316,9 @@ class ClosedLight::View {
   }
 
  private:
-  Vec3d towards(const PlanePoint& x) const { return lamp_.u * x.x + lamp_.v * x.y - lamp_.plane.n; }
+  Vec3d towards(const PlanePoint& x) const {
+    return emitter_.u * x.x + emitter_.v * x.y - emitter_.plane.n;
+  }
 
   Vec3d towards(const ShadowOutlines::Point& x) const {
     const PlaneWindow& window = scratch_.window;
@@ -324,7 +329,7 @@ class ClosedLight::View {
 
   // Unit direction to an end of a piece.
   Vec3d end_of(const ShadowOutlines::Piece& piece, const ShadowOutlines::End& end) const {
-    if (end.kind == ShadowOutlines::Kind::kCrossing)
+    if (end.kind == ShadowOutlines::Kind::kIntersection)
       return meet(piece.tag, end.tag, piece, towards(end.at));
     if (const Scratch::CutPoint* cut = scratch_.cut_point_at(end.at)) {
       return meet(cut->lines[0], cut->lines[1], piece, cut->w);
@@ -349,7 +354,7 @@ class ClosedLight::View {
   FaceRef face_of(uint32_t line) const { return scratch_.faces[line / Scratch::kLines]; }
   const Mesh& mesh_of(uint32_t line) const { return light_.scene_.shape(face_of(line).shape).mesh; }
 
-  // Of the plane through p and a line. hint: a direction on it, to tell faces of the lamp apart.
+  // Of the plane through p and a line. hint: a direction on it, to tell faces of the emitter apart.
   template <class T>
   Vec3<T> normal_of_line(uint32_t line, const Vec3d& hint) const {
     const uint32_t k = line % Scratch::kLines;
@@ -358,14 +363,15 @@ class ClosedLight::View {
     if (k == Scratch::kWedge) return constant(*receiver_.wedge);
     if (k == Scratch::kNearCut) return {};
     const auto x = corners_of<T>(face_of(line));
-    if (k == Scratch::kFarCut) return normal_of_crossing<T>(x, corners_of<T>(lamp_face_at(hint)));
+    if (k == Scratch::kFarCut)
+      return normal_of_crossing<T>(x, corners_of<T>(emitter_face_at(hint)));
     return plane_normal<T>(x[k], x[(k + 1) % 3]);
   }
-  // The face of the lamp that is seen there, or the nearest.
-  FaceRef lamp_face_at(const Vec3d& w) const {
-    FaceRef best = lamp_.faces[0];
+  // The face of the emitter that is seen there, or the nearest.
+  FaceRef emitter_face_at(const Vec3d& w) const {
+    FaceRef best = emitter_.faces[0];
     double deepest = -std::numeric_limits<double>::infinity();
-    for (const FaceRef face : lamp_.faces) {
+    for (const FaceRef face : emitter_.faces) {
       const auto x = face_corners<double>(light_.scene_.shape(face.shape).mesh, face.face);
       double depth = std::numeric_limits<double>::infinity();
       for (int k = 0; k < 3; ++k) {  // its corners run clockwise as seen from p
@@ -376,7 +382,7 @@ class ClosedLight::View {
     }
     return best;
   }
-  // Where a face goes through the lamp's plane: of all planes through their common line that
+  // Where a face goes through the emitter's plane: of all planes through their common line that
   // through p.
   template <class T>
   Vec3<T> normal_of_crossing(const std::array<Vec3<T>, 3>& x,
@@ -396,11 +402,11 @@ class ClosedLight::View {
     return dot(here, there) > kAway ? here : there;
   }
 
-  // Of the plane through p and a side of a region that shows the lamp's face `shown`, positive
+  // Of the plane through p and a side of a region that shows the emitter's face `shown`, positive
   // inside.
   Vec3<S> normal_of(const VisibleRegions::Side& side, uint32_t shown) const {
     const PlaneFunction& f = side.line;
-    const Vec3d rounded = lamp_.u * f.a + lamp_.v * f.b - lamp_.plane.n * f.c;
+    const Vec3d rounded = emitter_.u * f.a + emitter_.v * f.b - emitter_.plane.n * f.c;
     Vec3<S> n;
     if (side.side >= 0) {
       const auto x = corners_of<S>(scratch_.faces[side.label]);
@@ -415,7 +421,7 @@ class ClosedLight::View {
   Vec3<S> normal_of_cut(const VisibleRegions::Side& side, uint32_t shown) const {
     const SeenFace& face = scratch_.seen[side.label];
     if (!face.whole && side.cut == 0) return {};  // just before p
-    if (side.label < scratch_.lamp_faces) {
+    if (side.label < scratch_.emitter_faces) {
       const Vec3d& n = side.cut == (face.whole ? 0 : 1) ? receiver_.up : *receiver_.wedge;
       return {S(n.x), S(n.y), S(n.z)};
     }
@@ -449,31 +455,32 @@ class ClosedLight::View {
   }
 
   const ClosedLight& light_;
-  const LampPlane& lamp_;
+  const EmitterPlane& emitter_;
   const Receiver& receiver_;
   const Vec3<S>& p_;
   Scratch& scratch_;
 };
 
-// What the point sees of the lamp, in the scratch; as it is there if the same was asked for last.
-void ClosedLight::find(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch,
+// What the point sees of the emitter, in the scratch; as it is there if the same was asked for
+// last.
+void ClosedLight::find(const EmitterPlane& emitter, const Receiver& receiver, Scratch& scratch,
                        Turns& turns) const {
   Scratch::Found& last = scratch.last;
   const bool held = holds() && !receiver.edge;
   if (held && last.places == places_->number && last.by == by_ && last.p == receiver.p &&
-      last.up == receiver.up && last.face == receiver.face && last.lamp == lamp.faces) {
+      last.up == receiver.up && last.face == receiver.face && last.emitter == emitter.faces) {
     return;
   }
   last.places = 0;
   if (held) {
     last.places = places_->number;
     last.by = by_, last.p = receiver.p, last.up = receiver.up, last.face = receiver.face;
-    last.lamp.assign(lamp.faces.begin(), lamp.faces.end());
+    last.emitter.assign(emitter.faces.begin(), emitter.faces.end());
   }
-  scratch.seen_at_all = list(lamp, receiver, scratch);
+  scratch.seen_at_all = list(emitter, receiver, scratch);
   if (!scratch.seen_at_all) return;
-  scratch.by_outlines = by_ != By::kRegions && find_outlines(lamp, receiver, scratch, turns);
-  if (!scratch.by_outlines) find_regions(lamp, receiver, scratch);
+  scratch.by_outlines = by_ != By::kRegions && find_outlines(emitter, receiver, scratch, turns);
+  if (!scratch.by_outlines) find_regions(emitter, receiver, scratch);
 }
 
 template <class S>
@@ -481,7 +488,7 @@ Rgb<S> ClosedLight::scattered(const RayTracer& tracer, const SurfacePoint<S>& su
                               const Scattering<S>& scattering, const EdgeStart* edge) const {
   // On the heap: a shared library has little room for what belongs to threads.
   struct Space {
-    std::array<Scratch, kHeld> of_lamps;
+    std::array<Scratch, kHeld> of_emitters;
     Turns turns;
   };
   static thread_local const auto space = std::make_unique<Space>();
@@ -491,13 +498,13 @@ Rgb<S> ClosedLight::scattered(const RayTracer& tracer, const SurfacePoint<S>& su
   Receiver receiver{value(surface.p), n, surface.start(), edge};
   if (edge) receiver.wedge = wedge_at(scene_, tracer, *edge, receiver.up);
   Rgb<S> sum;
-  for (size_t i = 0; i < lamps_.size(); ++i) {
-    const LampPlane& lamp = lamps_[i];
-    const Shape& shape = scene_.shape(lamp.shape);
-    Scratch& scratch = space->of_lamps[holds() ? i % kHeld : 0];
-    find(lamp, receiver, scratch, space->turns);
+  for (size_t i = 0; i < emitters_.size(); ++i) {
+    const EmitterPlane& emitter = emitters_[i];
+    const Shape& shape = scene_.shape(emitter.shape);
+    Scratch& scratch = space->of_emitters[holds() ? i % kHeld : 0];
+    find(emitter, receiver, scratch, space->turns);
     if (!scratch.seen_at_all) continue;
-    const View<S> view(*this, lamp, receiver, surface.p, scratch);
+    const View<S> view(*this, emitter, receiver, surface.p, scratch);
     sides.clear();
     if (scratch.by_outlines) {
       view.add_outlines(sides);
@@ -506,7 +513,7 @@ Rgb<S> ClosedLight::scattered(const RayTracer& tracer, const SurfacePoint<S>& su
     }
     const std::span<const PolygonSide<S>> lit(sides);
     const Rgb<S> light = scattering.eval(n) * cosine_integral(lit, scattering.normal());
-    sum += light * detail::emitter_radiance<S>(shape, lamp.shape);
+    sum += light * detail::emitter_radiance<S>(shape, emitter.shape);
   }
   return sum;
 }

@@ -1,9 +1,9 @@
 #pragma once
-// Direct light of flat lamps on diffuse surfaces in closed form: what a lamp's polygon sends to a
-// point past all that is in between, without a ray and without chance. The value is a continuous
-// function of the scene, and its derivative that of the same function.
+// Direct light of flat emitters on diffuse surfaces in closed form: what an emitter's polygon sends
+// to a point past all that is in between, without a ray and without chance. The value is a
+// continuous function of the scene, and its derivative that of the same function.
 //
-// The part of a lamp that a point sees is found by exact regions of the lamp's plane
+// The part of an emitter that a point sees is found by exact regions of the emitter's plane
 // (limn/core/visible_regions.h). Lines decide there on a grid; what is added up are the true lines,
 // planes through the point and an edge, and the points where these meet. So differences of values
 // are clean, and cuts between regions cancel. Flat-shaded receivers have Lambert's formula,
@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "integrators/edges/edge_sides.h"
-#include "limn/core/face_copies.h"
+#include "limn/core/duplicate_faces.h"
 #include "limn/core/face_overlaps.h"
 #include "limn/core/face_tree.h"
 #include "limn/core/shading.h"
@@ -31,27 +31,27 @@ void check_closed_light(const Scene& scene);
 
 class ClosedLight {
  public:
-  // The scene must outlive it. InputError as above, and for a lamp of more than kMostPlanes planes.
-  // by: how the visible part of a lamp is found; regions take much longer; they are the oracle, and
-  // step in where a corner is too far out.
+  // The scene must outlive it. InputError as above, and for an emitter of more than kMostPlanes
+  // planes. by: how the visible part of an emitter is found; regions take much longer; they are the
+  // oracle, and step in where a corner is too far out.
   enum class By { kOutlines, kRegions };
   ClosedLight(const Scene& scene, int threads, By by = By::kOutlines);
   // Of the same scene with other tangents: what is where is known already. A point that one of both
   // was asked for last costs the other little.
   ClosedLight(const Scene& scene, const ClosedLight& same);
 
-  static constexpr size_t kMostPlanes = 64;  // of one lamp
+  static constexpr size_t kMostPlanes = 64;  // of one emitter
 
-  // Radiance that the surface scatters towards the viewer of `scattering`, of all lamps [W / (m^2
-  // sr)]; with its derivative where S is Dual or Var. edge: where the point lies, if on an edge:
-  // the limit from its own face.
+  // Radiance that the surface scatters towards the viewer of `scattering`, of all emitters [W /
+  // (m^2 sr)]; with its derivative where S is Dual or Var. edge: where the point lies, if on an
+  // edge: the limit from its own face.
   template <class S>
   Rgb<S> scattered(const RayTracer& tracer, const SurfacePoint<S>& surface,
                    const Scattering<S>& scattering, const EdgeStart* edge) const;
 
  private:
-  // Faces of one lamp in one plane.
-  struct LampPlane {
+  // Faces of one emitter in one plane.
+  struct EmitterPlane {
     ShapeId shape;
     std::vector<FaceRef> faces;
     FaceOverlaps::Set in_place;   // these, and what overlaps them in their plane
@@ -63,10 +63,10 @@ class ClosedLight {
     std::vector<Vec3d> hull;  // corners of the faces
   };
   // What does not depend on tangents.
-  struct Places {
-    Places(const Scene& scene, int threads);
+  struct SharedGeometry {
+    SharedGeometry(const Scene& scene, int threads);
     uint64_t number;  // no other has it
-    FaceCopies copies;
+    DuplicateFaces copies;
     FaceOverlaps overlaps;
     FaceTree tree;
   };
@@ -76,30 +76,31 @@ class ClosedLight {
   template <class S>
   class View;
 
-  void add_lamps();
-  void add_lamp(ShapeId shape);
-  void finish(LampPlane& lamp) const;
+  void add_emitters();
+  void add_emitter(ShapeId shape);
+  void finish(EmitterPlane& emitter) const;
   bool in_one_place(FaceRef a, FaceRef b) const;
   bool is_skipped(FaceRef face, const Receiver& receiver) const;
-  bool list(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;
-  void find_regions(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch) const;
-  void find_turns(const LampPlane& lamp, const Receiver& receiver, const Scratch& scratch,
+  bool list(const EmitterPlane& emitter, const Receiver& receiver, Scratch& scratch) const;
+  void find_regions(const EmitterPlane& emitter, const Receiver& receiver, Scratch& scratch) const;
+  void find_turns(const EmitterPlane& emitter, const Receiver& receiver, const Scratch& scratch,
                   Turns& turns) const;
   bool has_turn(const FaceTree::Item& item, const Turns& turns) const;
   uint32_t cancelled_sides(const FaceTree::Item& item, const Turns& turns) const;
-  bool find_outlines(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch,
+  bool find_outlines(const EmitterPlane& emitter, const Receiver& receiver, Scratch& scratch,
                      Turns& turns) const;
-  // Whether what a point has seen of a lamp is kept: for others of the same scene.
+  // Whether what a point has seen of an emitter is kept: for others of the same scene.
   bool holds() const { return places_.use_count() > 1; }
-  void find(const LampPlane& lamp, const Receiver& receiver, Scratch& scratch, Turns& turns) const;
+  void find(const EmitterPlane& emitter, const Receiver& receiver, Scratch& scratch,
+            Turns& turns) const;
 
   const Scene& scene_;
-  std::shared_ptr<const Places> places_;
-  const FaceCopies& copies_;
+  std::shared_ptr<const SharedGeometry> places_;
+  const DuplicateFaces& copies_;
   const FaceOverlaps& overlaps_;
   const FaceTree& tree_;
   By by_;
-  std::vector<LampPlane> lamps_;
+  std::vector<EmitterPlane> emitters_;
 };
 
 }  // namespace limn

@@ -13,7 +13,7 @@ namespace limn {
 inline Vec3<Var> triangle_normal(const Vec3<Var>& a, const Vec3<Var>& b, const Vec3<Var>& c) {
   const Vec3d x = value(a), y = value(b), z = value(c);
   const Vec3d n = cross(y - x, z - x);
-  if (is_still(a) && is_still(b) && is_still(c)) return {n.x, n.y, n.z};
+  if (is_constant(a) && is_constant(b) && is_constant(c)) return {n.x, n.y, n.z};
   Tape& tape = *Tape::current();
   const std::pair<const Vec3<Var>*, Vec3d> parts[] = {{&a, y - z}, {&b, z - x}, {&c, x - y}};
   Vec3<Var> normal;

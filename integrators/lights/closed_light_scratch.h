@@ -21,7 +21,7 @@ struct ClosedLight::Receiver {
 };
 
 // Which way round faces are seen, while outlines are found: as large as the tree, so there is one
-// for all lamps.
+// for all emitters.
 struct ClosedLight::Turns {
   // Of each item of the tree twice the query that last told it, and one more if it is seen from
   // behind.
@@ -30,13 +30,13 @@ struct ClosedLight::Turns {
 };
 
 struct ClosedLight::Scratch {
-  // What the rest holds: of the lamp whose faces are the first of `faces`, as seen by a point.
+  // What the rest holds: of the emitter whose faces are the first of `faces`, as seen by a point.
   struct Found {
     uint64_t places = 0;  // 0: nothing that may be looked up
     By by = By::kOutlines;
     Vec3d p, up;
     FaceRef face;
-    std::vector<FaceRef> lamp;
+    std::vector<FaceRef> emitter;
   } last;
   bool seen_at_all = false, by_outlines = false;
 
@@ -56,12 +56,12 @@ struct ClosedLight::Scratch {
   };
 
   std::vector<const FaceTree::Item*> items;
-  std::vector<FaceRef> faces;  // by label: first the lamp's, then those before it
+  std::vector<FaceRef> faces;  // by label: first the emitter's, then those before it
   size_t first_item = 0;       // from this label on they are those of `items`
-  size_t lamp_faces = 0;
-  size_t uncut = 0;  // of these, those that the lamp's plane does not cut
+  size_t emitter_faces = 0;
+  size_t uncut = 0;  // of these, those that the emitter's plane does not cut
   PlaneWindow window;
-  double near = 0, far = 0;  // depths, towards the lamp's plane, of what is before it
+  double near = 0, far = 0;  // depths, towards the emitter's plane, of what is before it
 
   // By regions.
   std::vector<SeenFace> seen;

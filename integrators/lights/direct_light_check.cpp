@@ -9,11 +9,11 @@ void refuse_light(const std::string& method, const SourceLocation& where, const 
   throw InputError(where, fmt::format("the method \"{}\": {}", method, what));
 }
 
-std::string name_in_text(const std::string& kind, const std::string& id) {
+std::string quoted_name(const std::string& kind, const std::string& id) {
   return id.empty() ? kind : fmt::format("{} \"{}\"", kind, id);
 }
 
-std::string shape_in_text(const Shape& shape) { return name_in_text("shape", shape.id); }
+std::string shape_in_text(const Shape& shape) { return quoted_name("shape", shape.id); }
 
 void check_direct_light(const Scene& scene, const std::string& method) {
   const SourceLocation whole{scene.file};
@@ -25,9 +25,9 @@ void check_direct_light(const Scene& scene, const std::string& method) {
   }
   for (const auto& light : scene.delta_lights) {
     refuse_light(method, whole,
-                 fmt::format("{}: only lamps with an area and environments are known: use the "
+                 fmt::format("{}: only emitters with an area and environments are known: use the "
                              "method path",
-                             name_in_text("emitter", light->id)));
+                             quoted_name("emitter", light->id)));
   }
   if (scene.shading != ShadingModel::kMitsuba) return;
   for (const Shape& shape : scene.shapes) {

@@ -11,7 +11,7 @@ namespace limn {
 [[noreturn]] void refuse_light(const std::string& method, const SourceLocation& where,
                                const std::string& what);
 // A kind, and its id in quotes if it has one.
-std::string name_in_text(const std::string& kind, const std::string& id);
+std::string quoted_name(const std::string& kind, const std::string& id);
 std::string shape_in_text(const Shape& shape);
 
 // InputError, with what to do, for a scene of other than direct light, for delta lights, and for

@@ -1,4 +1,4 @@
-// Lamps as regions of light: their hulls, and cones around these.
+// Emitters as regions of light: their hulls, and cones around these.
 #include "integrators/lights/light_regions.h"
 
 #include <algorithm>
@@ -9,12 +9,12 @@
 namespace limn {
 namespace {
 
-// Lamps of more faces are not asked whether p is behind all of them. Not tuned.
+// Emitters of more faces are not asked whether p is behind all of them. Not tuned.
 constexpr size_t kFewFaces = 16;
-// Lamps of more corners are taken for the box around them. Not tuned.
+// Emitters of more corners are taken for the box around them. Not tuned.
 constexpr size_t kFewCorners = 64;
-// Cones are wider than lamps by this angle [rad], which is beyond rounding: edges on their
-// boundary, a lamp's own among them, are inside. Not tuned.
+// Cones are wider than emitters by this angle [rad], which is beyond rounding: edges on their
+// boundary, an emitter's own among them, are inside. Not tuned.
 constexpr double kSlack = 1e-8;
 
 Vec3d corner(const Mesh& mesh, uint32_t vertex) { return cast<double>(mesh.positions[vertex]); }
@@ -82,8 +82,8 @@ double reach_out(const std::vector<Point2>& points, const std::vector<Point2>& p
   return reach;
 }
 
-// Makes a flat lamp a polygon; leaves the others as they are.
-void flatten(const std::vector<Plane>& faces, LampHull& hull) {
+// Makes a flat emitter a polygon; leaves the others as they are.
+void flatten(const std::vector<Plane>& faces, EmitterHull& hull) {
   constexpr double kFlat = 1e-5;  // of the radius; not tuned
   if (faces.empty() || hull.radius == 0) return;
   const Frame frame(faces[0].n);
@@ -113,12 +113,12 @@ void flatten(const std::vector<Plane>& faces, LampHull& hull) {
   for (const Point2& p : polygon) hull.points.push_back(middle + frame.s * p.x + frame.t * p.y);
 }
 
-DirectionCone around_polygon(const LampHull& lamp, const Vec3d& p, double height) {
+DirectionCone around_polygon(const EmitterHull& emitter, const Vec3d& p, double height) {
   DirectionCone cone;
-  const double nearest = std::max(height, length(lamp.center - p) - lamp.radius);
-  cone.slack = kSlack + 2 * lamp.deviation / nearest;
-  for (size_t i = 0; i < lamp.points.size(); ++i) {
-    const Vec3d a = lamp.points[i] - p, b = lamp.points[(i + 1) % lamp.points.size()] - p;
+  const double nearest = std::max(height, length(emitter.center - p) - emitter.radius);
+  cone.slack = kSlack + 2 * emitter.deviation / nearest;
+  for (size_t i = 0; i < emitter.points.size(); ++i) {
+    const Vec3d a = emitter.points[i] - p, b = emitter.points[(i + 1) % emitter.points.size()] - p;
     const Vec3d m = cross(b, a);
     const double m_length = length(m);
     // Where a side points at p its plane is not known, and left out.
@@ -128,10 +128,10 @@ DirectionCone around_polygon(const LampHull& lamp, const Vec3d& p, double height
 }
 
 // The octagon around the points as seen from p; no planes where they fill nearly a hemisphere.
-DirectionCone around_points(const LampHull& lamp, const Vec3d& p) {
+DirectionCone around_points(const EmitterHull& emitter, const Vec3d& p) {
   DirectionCone cone;
   cone.slack = kSlack;
-  const Vec3d to = lamp.center - p;
+  const Vec3d to = emitter.center - p;
   const double distance = length(to);
   if (distance == 0) return cone;
   const Frame frame(to / distance);
@@ -140,7 +140,7 @@ DirectionCone around_points(const LampHull& lamp, const Vec3d& p) {
   std::fill_n(support, kSides, -1e300);
   const double d = std::sqrt(0.5);
   const double cosines[kSides] = {1, d, 0, -d, -1, -d, 0, d};
-  for (const Vec3d& x : lamp.points) {
+  for (const Vec3d& x : emitter.points) {
     const Vec3d w = frame.to_local(x - p);
     if (w.z <= 0.05 * length(w)) return cone;
     for (int k = 0; k < kSides; ++k) {
@@ -157,8 +157,8 @@ DirectionCone around_points(const LampHull& lamp, const Vec3d& p) {
 
 }  // namespace
 
-LampHull make_lamp_hull(const Mesh& mesh, ShadingModel shading) {
-  LampHull hull;
+EmitterHull make_emitter_hull(const Mesh& mesh, ShadingModel shading) {
+  EmitterHull hull;
   hull.points = distinct_corners(mesh);
   Bounds bounds;
   for (const Vec3d& x : hull.points) bounds.extend(x);
@@ -169,7 +169,7 @@ LampHull make_lamp_hull(const Mesh& mesh, ShadingModel shading) {
     hull.area += 0.5 * length(cross(corner(mesh, face[1]) - a, corner(mesh, face[2]) - a));
   }
   const std::vector<Plane> faces = face_planes(mesh);
-  // Interpolated normals let a lamp shine behind its faces.
+  // Interpolated normals let an emitter shine behind its faces.
   const bool by_planes =
       shading == ShadingModel::kContinuous || mesh.normal_source == NormalSource::kFace;
   if (by_planes && faces.size() <= kFewFaces) hull.faces = faces;
@@ -183,14 +183,16 @@ LampHull make_lamp_hull(const Mesh& mesh, ShadingModel shading) {
   return hull;
 }
 
-std::optional<DirectionCone> cone_around(const LampHull& lamp, const Vec3d& p, const Vec3d& n) {
+std::optional<DirectionCone> cone_around(const EmitterHull& emitter, const Vec3d& p,
+                                         const Vec3d& n) {
   const auto behind = [&](const Plane& face) { return face.distance(p) <= 0; };
-  if (!lamp.faces.empty() && std::all_of(lamp.faces.begin(), lamp.faces.end(), behind)) return {};
-  const auto below = [&](const Vec3d& x) { return dot(n, x - p) + lamp.deviation <= 0; };
-  if (std::all_of(lamp.points.begin(), lamp.points.end(), below)) return {};
-  if (!lamp.flat) return around_points(lamp, p);
-  const double height = lamp.plane.distance(p);
-  return height > 0 ? around_polygon(lamp, p, height) : DirectionCone{};
+  if (!emitter.faces.empty() && std::all_of(emitter.faces.begin(), emitter.faces.end(), behind))
+    return {};
+  const auto below = [&](const Vec3d& x) { return dot(n, x - p) + emitter.deviation <= 0; };
+  if (std::all_of(emitter.points.begin(), emitter.points.end(), below)) return {};
+  if (!emitter.flat) return around_points(emitter, p);
+  const double height = emitter.plane.distance(p);
+  return height > 0 ? around_polygon(emitter, p, height) : DirectionCone{};
 }
 
 // The octagon around the cap.
@@ -215,14 +217,14 @@ LightRegions::LightRegions(const Scene& scene) : scene_(scene) {
     Region& region = regions_.emplace_back();
     region.shape = ShapeId(s);
     region.luminance = mean;
-    region.hull = make_lamp_hull(shape.mesh, scene.shading);
+    region.hull = make_emitter_hull(shape.mesh, scene.shading);
     if (!region.hull.flat || shape.mesh.faces.size() > kFewFaces) continue;
     for (uint32_t f = 0; f < shape.mesh.faces.size(); ++f) {
       region.flat_faces.push_back({region.shape, FaceId(f)});
     }
   }
   hold_all_ = !scene.environment;
-  leave_out_dim_lamps();
+  leave_out_dim_emitters();
   if (!scene.environment) return;
   for (const BrightPatch& patch : find_bright_patches(*scene.environment)) {
     Region& region = regions_.emplace_back();
@@ -231,7 +233,7 @@ LightRegions::LightRegions(const Scene& scene) : scene_(scene) {
   }
 }
 
-void LightRegions::leave_out_dim_lamps() {
+void LightRegions::leave_out_dim_emitters() {
   constexpr size_t kMost = 16;  // not tuned
   if (regions_.size() <= kMost) return;
   const auto light = [](const Region& region) { return region.luminance * region.hull.area; };
@@ -255,13 +257,13 @@ double cap_solid_angle(const DirectionCap& cap) {
 }
 
 // A point of a convex polygon, uniform: of a fan of triangles.
-Vec3d draw_in_polygon(const LampHull& lamp, double u1, double u2) {
-  const Vec3d& a = lamp.points[0];
-  double left = u1 * lamp.area;
+Vec3d draw_in_polygon(const EmitterHull& emitter, double u1, double u2) {
+  const Vec3d& a = emitter.points[0];
+  double left = u1 * emitter.area;
   for (size_t i = 2;; ++i) {
-    const Vec3d b = lamp.points[i - 1] - a, c = lamp.points[i] - a;
+    const Vec3d b = emitter.points[i - 1] - a, c = emitter.points[i] - a;
     const double part = 0.5 * length(cross(b, c));
-    if (left >= part && i + 1 < lamp.points.size()) {
+    if (left >= part && i + 1 < emitter.points.size()) {
       left -= part;
       continue;
     }
@@ -270,10 +272,10 @@ Vec3d draw_in_polygon(const LampHull& lamp, double u1, double u2) {
   }
 }
 
-bool is_in_polygon(const LampHull& lamp, const Vec3d& y) {
-  for (size_t i = 0; i < lamp.points.size(); ++i) {
-    const Vec3d &a = lamp.points[i], &b = lamp.points[(i + 1) % lamp.points.size()];
-    if (dot(cross(b - a, y - a), lamp.plane.n) < 0) return false;
+bool is_in_polygon(const EmitterHull& emitter, const Vec3d& y) {
+  for (size_t i = 0; i < emitter.points.size(); ++i) {
+    const Vec3d &a = emitter.points[i], &b = emitter.points[(i + 1) % emitter.points.size()];
+    if (dot(cross(b - a, y - a), emitter.plane.n) < 0) return false;
   }
   return true;
 }

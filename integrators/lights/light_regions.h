@@ -13,28 +13,29 @@
 
 namespace limn {
 
-// A convex set of points that a lamp lies in, for cones around it.
-struct LampHull {
-  // A convex polygon, counter-clockwise seen from where it shines; else points around the lamp.
+// A convex set of points that an emitter lies in, for cones around it.
+struct EmitterHull {
+  // A convex polygon, counter-clockwise seen from where it shines; else points around the emitter.
   bool flat = false;
   std::vector<Vec3d> points;
   Plane plane;           // of the polygon
-  double deviation = 0;  // how far the lamp reaches out of the polygon [scene units]
+  double deviation = 0;  // how far the emitter reaches out of the polygon [scene units]
   Vec3d center;
   double radius = 0;         // of a sphere around the center that holds all points
-  double area = 0;           // of the lamp; of a flat one that of the polygon
+  double area = 0;           // of the emitter; of a flat one that of the polygon
   std::vector<Plane> faces;  // it shines in front of one of these; none: it may shine everywhere
 };
-LampHull make_lamp_hull(const Mesh& mesh, ShadingModel shading);
+EmitterHull make_emitter_hull(const Mesh& mesh, ShadingModel shading);
 
-// The directions from p in which the lamp may be seen above the horizon of n; none if there are
+// The directions from p in which the emitter may be seen above the horizon of n; none if there are
 // none.
-std::optional<DirectionCone> cone_around(const LampHull& lamp, const Vec3d& p, const Vec3d& n);
+std::optional<DirectionCone> cone_around(const EmitterHull& emitter, const Vec3d& p,
+                                         const Vec3d& n);
 std::optional<DirectionCone> cone_around(const DirectionCap& cap, const Vec3d& n);
 
 class LightRegions {
  public:
-  // Every lamp is a region, and every bright patch of the environment.
+  // Every emitter is a region, and every bright patch of the environment.
   explicit LightRegions(const Scene& scene);
   // Whether the scene has any.
   static bool any_in(const Scene& scene);
@@ -51,18 +52,19 @@ class LightRegions {
     return region.shape.valid() ? cone_around(region.hull, p, n) : cone_around(region.patch.cap, n);
   }
 
-  // A direction from x in which the region may be: uniform on the polygon of a flat lamp, else over
-  // the sphere or the cap that the region lies in. None where direction_pdf is zero everywhere.
+  // A direction from x in which the region may be: uniform on the polygon of a flat emitter, else
+  // over the sphere or the cap that the region lies in. None where direction_pdf is zero
+  // everywhere.
   std::optional<Vec3d> draw_direction(size_t k, const Vec3d& x, double u1, double u2) const;
-  // Its density [1/sr] at the unit direction w; zero where it is never drawn: behind a flat lamp,
-  // inside the sphere around others.
+  // Its density [1/sr] at the unit direction w; zero where it is never drawn: behind a flat
+  // emitter, inside the sphere around others.
   double direction_pdf(size_t k, const Vec3d& x, const Vec3d& w) const;
-  // Whether edges before it are listed, see penumbra.h: not before all of many lamps.
+  // Whether edges before it are listed, see penumbra.h: not before all of many emitters.
   bool lists_edges(size_t k) const { return regions_[k].lists_edges; }
-  // The shape of a lamp; none of a patch.
+  // The shape of an emitter; none of a patch.
   ShapeId shape(size_t k) const { return regions_[k].shape; }
-  const LampHull& hull(size_t k) const { return regions_[k].hull; }
-  // All faces of a flat lamp of few: a line meets one of them at most, also where rounding lets
+  const EmitterHull& hull(size_t k) const { return regions_[k].hull; }
+  // All faces of a flat emitter of few: a line meets one of them at most, also where rounding lets
   // rays meet neighbours. Else empty.
   std::span<const FaceRef> flat_faces(size_t k) const { return regions_[k].flat_faces; }
   const BrightPatch& patch(size_t k) const { return regions_[k].patch; }
@@ -83,13 +85,13 @@ class LightRegions {
   struct Region {
     ShapeId shape;  // none: a patch of the environment
     double luminance;
-    LampHull hull;
+    EmitterHull hull;
     BrightPatch patch;
     std::vector<FaceRef> flat_faces;
     bool lists_edges = true;
   };
-  void leave_out_dim_lamps();
-  // The cap of directions from x that holds region k, unless that is a flat lamp.
+  void leave_out_dim_emitters();
+  // The cap of directions from x that holds region k, unless that is a flat emitter.
   std::optional<DirectionCap> cap_around(const Region& region, const Vec3d& x) const;
 
   const Scene& scene_;

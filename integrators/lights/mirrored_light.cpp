@@ -1,4 +1,4 @@
-// Where flat glossy surfaces mirror lamps and the bright patches of an environment.
+// Where flat glossy surfaces mirror emitters and the bright patches of an environment.
 #include "integrators/lights/mirrored_light.h"
 
 #include <algorithm>
@@ -16,12 +16,12 @@ constexpr double kFlat = 0x1p-16;  // how far a plane's points may lie off, over
 // Of the light over the plane: the sine of its elevation, or its height over the flat part's
 // radius.
 constexpr double kLeastHeight = 1e-3;
-// What is seen of surfaces in the light of lamps, over what these send to the mean one without what
-// hides them. What stands in the light is more in view than the mean: with 0.5 edges of a teapot
-// under two lamps on gloss were listed where it does not pay, and the squared error times time was
-// 9 times as large (5 seeds; without the noisiest hundredth 1.6 times).
+// What is seen of surfaces in the light of emitters, over what these send to the mean one without
+// what hides them. What stands in the light is more in view than the mean: with 0.5 edges of a
+// teapot under two emitters on gloss were listed where it does not pay, and the squared error times
+// time was 9 times as large (5 seeds; without the noisiest hundredth 1.6 times).
 constexpr double kLit = 1.5;
-// Of a shape, where it is asked what lamps send there; of few faces each has several.
+// Of a shape, where it is asked what emitters send there; of few faces each has several.
 constexpr size_t kPairs = 32;
 constexpr double kApart = 0.1;  // two of a pair, over an edge
 // What is rounding of a point in the plane, over the flat part's radius.
@@ -53,8 +53,8 @@ double versine(double angle) {
 // [rad].
 double spread_of(double lobe, double size) { return std::min(lobe + size, 0.5 * kPi); }
 
-// The lesser of what a lamp sends to two near places of a face: it may hang just over one.
-double irradiance_of(const std::array<Vec3d, 3>& corners, size_t pair, size_t lamp,
+// The lesser of what an emitter sends to two near places of a face: it may hang just over one.
+double irradiance_of(const std::array<Vec3d, 3>& corners, size_t pair, size_t emitter,
                      const Lights& lights) {
   // The additive recurrence of the plastic number.
   const auto n = static_cast<double>(pair);
@@ -66,12 +66,13 @@ double irradiance_of(const std::array<Vec3d, 3>& corners, size_t pair, size_t la
   }
   const Vec3d edge = corners[1] - corners[0];
   const Vec3d p = corners[0] + edge * u + (corners[2] - corners[0]) * v;
-  return std::min(lights.estimate(lamp, p), lights.estimate(lamp, p + edge * kApart));
+  return std::min(lights.estimate(emitter, p), lights.estimate(emitter, p + edge * kApart));
 }
 
-// What lamps send to surfaces, in the mean over the shapes: a wide ground counts no more than what
-// stands on it. Places move with the faces, so that it is continuous in what moves these.
-double mean_irradiance(const Scene& scene, const Lights& lights, const std::vector<size_t>& lamps) {
+// What emitters send to surfaces, in the mean over the shapes: a wide ground counts no more than
+// what stands on it. Places move with the faces, so that it is continuous in what moves these.
+double mean_irradiance(const Scene& scene, const Lights& lights,
+                       const std::vector<size_t>& emitters) {
   double sum = 0;
   size_t count = 0;
   for (const Shape& shape : scene.shapes) {
@@ -82,8 +83,8 @@ double mean_irradiance(const Scene& scene, const Lights& lights, const std::vect
     for (size_t f = 0; f < faces; f += step) {
       const auto corners = face_corners<double>(shape.mesh, FaceId(static_cast<uint32_t>(f)));
       for (size_t pair = 0; pair < pairs; ++pair) {
-        for (const size_t lamp : lamps) {
-          sum += irradiance_of(corners, pair, lamp, lights) / places;
+        for (const size_t emitter : emitters) {
+          sum += irradiance_of(corners, pair, emitter, lights) / places;
         }
       }
     }
@@ -164,14 +165,14 @@ std::unique_ptr<MirroredLight> MirroredLight::make(const Scene& scene, const Lig
 // All that is small and bright, in no surface yet; sets what else is seen.
 std::vector<MirroredLight::Image> MirroredLight::find_lights(const Scene& scene) {
   std::vector<Image> found;
-  std::vector<size_t> lamps;
-  const auto add_lamp = [&](size_t number, bool infinite, const Vec3d& light, double size) {
+  std::vector<size_t> emitters;
+  const auto add_emitter = [&](size_t number, bool infinite, const Vec3d& light, double size) {
     Image& image = found.emplace_back();
     image.infinite = infinite;
     image.light = light;
     image.size = size;
-    image.lamp = number;
-    lamps.push_back(number);
+    image.emitter = number;
+    emitters.push_back(number);
   };
   size_t number = 0;
   for (const Shape& shape : scene.shapes) {
@@ -182,14 +183,14 @@ std::vector<MirroredLight::Image> MirroredLight::find_lights(const Scene& scene)
     for (const Vec3f& x : shape.mesh.positions) {
       squared = std::max(squared, length_squared(cast<double>(x) - bounds.center()));
     }
-    add_lamp(number++, false, bounds.center(), std::sqrt(squared));
+    add_emitter(number++, false, bounds.center(), std::sqrt(squared));
   }
   if (scene.environment) ++number;
   for (const auto& delta : scene.delta_lights) {
     const LightOrigin origin = delta->origin();
-    add_lamp(number++, origin.infinite, origin.infinite ? -value(origin.v) : value(origin.v), 0);
+    add_emitter(number++, origin.infinite, origin.infinite ? -value(origin.v) : value(origin.v), 0);
   }
-  lit_ = kLit / kPi * mean_irradiance(scene, lights_, lamps);
+  lit_ = kLit / kPi * mean_irradiance(scene, lights_, emitters);
   if (!scene.environment) return found;
   environment_ = scene.environment->mean_luminance();
   for (const BrightPatch& patch : find_bright_patches(*scene.environment)) {
@@ -206,7 +207,7 @@ std::vector<MirroredLight::Image> MirroredLight::find_lights(const Scene& scene)
 
 // Keeps those that mirror the most light; of what is about alike the first. Neither the choice nor
 // the order may hang on small differences: with the same numbers images of nearly the same scene
-// are to draw directions of the same lamps.
+// are to draw directions of the same emitters.
 void MirroredLight::add(const FlatPart& part, const Bsdf& bsdf, const Vec3d& normal,
                         const Image& source) {
   Image image = source;
@@ -226,7 +227,7 @@ void MirroredLight::add(const FlatPart& part, const Bsdf& bsdf, const Vec3d& nor
     image.turn = std::sin(spread);
     image.rest = std::cos(spread);
   }
-  if (image.lamp) image.irradiance = lights_.estimate(*image.lamp, image.center);
+  if (image.emitter) image.irradiance = lights_.estimate(*image.emitter, image.center);
   image.light_in_part = image.irradiance * height / length(to) * image.radius * image.radius;
   images_.push_back(image);
   if (images_.size() <= kMostImages) return;
@@ -237,9 +238,9 @@ void MirroredLight::add(const FlatPart& part, const Bsdf& bsdf, const Vec3d& nor
   images_.erase(images_.begin() + static_cast<std::ptrdiff_t>(least));
 }
 
-// Whether p may see the image within the flat part. A near lamp's is that of a far one from a
+// Whether p may see the image within the flat part. A near emitter's is that of a far one from a
 // nearer point: where w meets the plane, the half vector turns with w as seen from p and as seen
-// from the lamp, at the distances a and b, together as for a far light at the distance
+// from the emitter, at the distances a and b, together as for a far light at the distance
 // a b / (a + b).
 bool MirroredLight::sees(const Image& image, const Vec3d& p, Glare& glare) const {
   const Vec3d& n = image.normal;
@@ -251,12 +252,12 @@ bool MirroredLight::sees(const Image& image, const Vec3d& p, Glare& glare) const
     glare.nearness = 1;
     glare.toward = image.light - n * (2 * dot(image.light, n));
   } else {
-    const double lamp_height = dot(image.light - image.center, n);
-    const Vec3d to = image.light - n * (2 * lamp_height) - p;
+    const double emitter_height = dot(image.light - image.center, n);
+    const Vec3d to = image.light - n * (2 * emitter_height) - p;
     const double distance = length(to);
     glare.toward = to / distance;
     glare.light = glare.toward - n * (2 * dot(glare.toward, n));
-    glare.nearness = lamp_height / (lamp_height + height);
+    glare.nearness = emitter_height / (emitter_height + height);
     size /= distance;
   }
   // A half vector that turns turns what is mirrored twice as far.
@@ -283,7 +284,7 @@ bool MirroredLight::sees(const Image& image, const Vec3d& p, Glare& glare) const
   // Where the light is wider than the lobe, its image is about as wide as the light.
   glare.cone = lobe < 2 * size ? versine(std::max(spread, kLeastCone)) : 0;
   glare.irradiance = image.albedo * glare.nearness * glare.nearness *
-                     (image.lamp ? lights_.estimate(*image.lamp, shown) : image.irradiance);
+                     (image.emitter ? lights_.estimate(*image.emitter, shown) : image.irradiance);
   return true;
 }
 

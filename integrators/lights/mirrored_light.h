@@ -1,10 +1,10 @@
 #pragma once
 // Small bright lights as flat glossy surfaces show them. A diffuse point sees the glare of the sun,
-// or of a lamp, on a glossy floor within a few degrees; its own scattering finds these once in a
-// hundred samples, and each is then a hundred times as bright as the rest: they ruled the squared
+// or of an emitter, on a glossy floor within a few degrees; its own scattering finds these once in
+// a hundred samples, and each is then a hundred times as bright as the rest: they ruled the squared
 // error of whole images. Scattering functions are reciprocal, so the directions of the glare are
 // those into which the floor scatters the light; where it is far away they are the same from all
-// points, and a near lamp is seen as a far one would be from a nearer point. So a share of a
+// points, and a near emitter is seen as a far one would be from a nearer point. So a share of a
 // vertex's directions is drawn from there: a mixture of densities, which changes no mean.
 #include <algorithm>
 #include <array>
@@ -66,7 +66,7 @@ class MirroredLight {
   template <class S>
   Mixture mixture(const SurfacePoint<S>& surface, const Scattering<S>& scattering) const {
     Mixture mixture;
-    double sum = 0, of_lamps = 0;
+    double sum = 0, of_emitters = 0;
     const Bsdf& bsdf = *scene_.shape(surface.face.shape).bsdf->side(scattering.front());
     for (const Image& image : images_) {
       Glare& glare = mixture.glare(mixture.count);
@@ -75,11 +75,11 @@ class MirroredLight {
       if (!(power > 0)) continue;
       mixture.part[mixture.count++] = power;
       sum += power;
-      if (image.lamp) of_lamps += glare.irradiance;
+      if (image.emitter) of_emitters += glare.irradiance;
     }
     if (!(sum > 0)) return mixture;
     for (int i = 0; i < mixture.count; ++i) mixture.part[i] /= sum;
-    mixture.elsewhere = environment_ + std::max(lit_, kScattered / kPi * of_lamps);
+    mixture.elsewhere = environment_ + std::max(lit_, kScattered / kPi * of_emitters);
     // Five times as much gave the same error in the demo.
     const double share = sum / (sum + mixture.elsewhere);
     if (std::isfinite(share)) mixture.share = std::min(share, kMostShare);
@@ -94,7 +94,7 @@ class MirroredLight {
 
  private:
   static constexpr double kMostShare = 0.5;  // not tuned
-  // What lamps send comes back from other surfaces with this share of it. Not tuned.
+  // What emitters send comes back from other surfaces with this share of it. Not tuned.
   static constexpr double kScattered = 0.5;
   static constexpr size_t kMostFaces = 256;  // of a mesh that is looked through for flat parts
   // A light in a flat part of a surface.
@@ -111,10 +111,10 @@ class MirroredLight {
     bool infinite = false;         // the light is
     double turn = 0, rest = 1;     // sine and cosine of its spread (`sees`), if it is
     Vec3d light;                   // its center, or the unit direction towards it
-    double size = 0;             // radius of a sphere around it; at infinity the sine of its angle
-    std::optional<size_t> lamp;  // which of all lights it is; none: a patch
-    double irradiance = 0;       // across it, at the part's center
-    double light_in_part = 0;    // how much of it falls on the part
+    double size = 0;  // radius of a sphere around it; at infinity the sine of its angle
+    std::optional<size_t> emitter;  // which of all lights it is; none: a patch
+    double irradiance = 0;          // across it, at the part's center
+    double light_in_part = 0;       // how much of it falls on the part
   };
   struct FlatPart;
   MirroredLight(const Scene& scene, const Lights& lights) : scene_(scene), lights_(lights) {}
@@ -127,7 +127,7 @@ class MirroredLight {
   const Lights& lights_;
   std::vector<Image> images_;  // in the order in which they are found
   double environment_ = 0;     // mean luminance of it
-  double lit_ = 0;             // and of surfaces by lamps, about
+  double lit_ = 0;             // and of surfaces by emitters, about
 };
 
 // Of a vertex behind which the path scatters again; none at others.

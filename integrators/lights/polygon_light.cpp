@@ -82,7 +82,7 @@ Vec3d half_angles(std::span<const PolygonSide<S>> sides, const Vec3d& n, const A
     const detail::Arc arc(value(side.normal), side.begin, side.end);
     sum += arc.s * (0.5 * arc.angle);
     if constexpr (!std::is_same_v<S, double>) {
-      if (!is_still(side.normal)) add_side(side, cosine_slope(arc, n));
+      if (!is_constant(side.normal)) add_side(side, cosine_slope(arc, n));
     }
   }
   return sum;

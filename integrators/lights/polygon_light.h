@@ -173,7 +173,7 @@ Rgb<S> polygon_integral(std::span<const PolygonSide<S>> sides, const Vec3d& pole
     const Vec3d &a = side.begin, &b = side.end;
     sum += detail::triangle_integral<S>(pole, a, b, kinks, f);
     if constexpr (!std::is_same_v<S, double>) {
-      if (is_still(side.normal)) continue;
+      if (is_constant(side.normal)) continue;
       const detail::Arc arc(value(side.normal), a, b);
       detail::add_motion(side.normal, detail::side_slopes(arc, a, b, kinks, f), sum);
     }

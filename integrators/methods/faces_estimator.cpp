@@ -34,7 +34,7 @@ FacesEstimator::FacesEstimator(const Scene& scene, std::span<const Parameter> pa
                                int threads)
     : scene_((check_faces_film(scene.film), scene)),
       lanes_(static_cast<int>(std::min<size_t>(parameters.size(), kLanes))),
-      faces_(std::make_shared<FacesInPlace>(scene, threads)),
+      faces_(std::make_shared<CoincidentFaces>(scene, threads)),
       pixels_(scene, *faces_, threads, kFacesUser),
       traced_(scene, threads, {.closed = true, .faces = faces_}),
       view_(scene.camera) {

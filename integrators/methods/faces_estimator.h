@@ -51,7 +51,7 @@ class FacesEstimator final : public SampleEstimator {
   const Scene& scene_;
   int lanes_;
   Lanes lane_scale_;
-  std::shared_ptr<const FacesInPlace> faces_;
+  std::shared_ptr<const CoincidentFaces> faces_;
   PixelRegions pixels_;
   TracedScene traced_;
   CameraView<double> view_;

@@ -48,7 +48,7 @@ std::vector<Parameter> parameters_of(const Scene& scene, const GradientOptions& 
 }  // namespace
 
 std::vector<std::string> trace_faces(const Scene& scene, const GradientOptions& options,
-                                     const NonFinite::Place& place) {
+                                     const NonFinite::SampleId& place) {
   check_pixel(scene.film, place);
   const FacesEstimator estimator(scene, parameters_of(scene, options), 1);
   SampleLog log;

@@ -10,6 +10,6 @@ GradientResult run_faces(const Scene& scene, const GradientOptions& options,
 
 // As trace_sample() in gradient.h.
 std::vector<std::string> trace_faces(const Scene& scene, const GradientOptions& options,
-                                     const NonFinite::Place& place);
+                                     const NonFinite::SampleId& place);
 
 }  // namespace limn

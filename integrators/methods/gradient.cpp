@@ -130,7 +130,8 @@ GradientResult gradient(const Scene& scene, const GradientOptions& options,
 }
 
 std::vector<std::string> trace_sample(const Scene& scene, const GradientOptions& options,
-                                      const RunSettings& settings, const NonFinite::Place& place) {
+                                      const RunSettings& settings,
+                                      const NonFinite::SampleId& place) {
   const MethodType& method = *options.method;
   check_selection(scene, options);
   if (!method.trace) {

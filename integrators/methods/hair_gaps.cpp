@@ -13,7 +13,7 @@
 #include <optional>
 
 #include "limn/core/box_tree.h"
-#include "limn/core/face_copies.h"
+#include "limn/core/duplicate_faces.h"
 #include "limn/core/parallel.h"
 #include "limn/core/touch.h"
 
@@ -274,9 +274,9 @@ void warn_of_hair_gaps(const Scene& scene, double spp, int threads,
         "{} a gap of {:.2g} between {}, {:.2g} of a pixel, which {:.0f} samples per pixel can "
         "miss: derivatives there may be off by more than their errors say; close the gap, or take "
         "many more samples",
-        shapes.first == shapes.second ? name_in_text(scene, shapes.first) + " has"
-                                      : name_in_text(scene, shapes.first) + " and " +
-                                            name_in_text(scene, shapes.second) + " have",
+        shapes.first == shapes.second ? quoted_name(scene, shapes.first) + " has"
+                                      : quoted_name(scene, shapes.first) + " and " +
+                                            quoted_name(scene, shapes.second) + " have",
         gap.width, shapes.first == shapes.second ? "its own faces" : "them", gap.pixels, spp));
   }
   if (finder.gaps().size() > kMost) {

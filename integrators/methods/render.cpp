@@ -159,7 +159,8 @@ std::vector<RenderResult> render_seeds(const Scene& scene, const RunSettings& se
 }
 
 std::vector<std::string> trace_sample(const Scene& scene, const RunSettings& settings,
-                                      const NonFinite::Place& place, const RenderOptions& options) {
+                                      const NonFinite::SampleId& place,
+                                      const RenderOptions& options) {
   check_pixel(scene.film, place);
   const auto estimator = make_estimator(scene, settings, options);
   SampleLog log;

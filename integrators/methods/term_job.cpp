@@ -142,7 +142,7 @@ class TermJob {
     return result;
   }
 
-  std::vector<std::string> trace(const RunSettings& settings, const NonFinite::Place& place) {
+  std::vector<std::string> trace(const RunSettings& settings, const NonFinite::SampleId& place) {
     GradientResult unused = empty_result();
     const Stopwatch watch;
     plan(settings, watch, unused);
@@ -206,7 +206,7 @@ class TermJob {
   }
 
   void trace_film(const TermEstimator& estimator, const RunSettings& settings,
-                  const NonFinite::Place& place, SampleLog& log) const {
+                  const NonFinite::SampleId& place, SampleLog& log) const {
     for (size_t slot = 0; slot < types_.size(); ++slot) {
       if (types_[slot]->name != place.term) continue;
       if (run_film_sample(estimator, settings, slot, place.sample, log)) return;
@@ -527,7 +527,7 @@ GradientResult run_terms(const TermMethod& method, const Scene& scene,
 
 std::vector<std::string> trace_terms(const TermMethod& method, const Scene& scene,
                                      const GradientOptions& options, const RunSettings& settings,
-                                     const NonFinite::Place& place) {
+                                     const NonFinite::SampleId& place) {
   return TermJob(scene, options, method, settings).trace(settings, place);
 }
 

@@ -28,6 +28,6 @@ GradientResult run_terms(const TermMethod& method, const Scene& scene,
 // What one sample of a run meets, line by line.
 std::vector<std::string> trace_terms(const TermMethod& method, const Scene& scene,
                                      const GradientOptions& options, const RunSettings& settings,
-                                     const NonFinite::Place& place);
+                                     const NonFinite::SampleId& place);
 
 }  // namespace limn

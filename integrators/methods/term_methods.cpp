@@ -71,7 +71,7 @@ void set_up(MethodType& row, const TermMethod& given) {
     return run_terms(method, scene, options, settings);
   };
   row.trace = [method](const MethodType&, const Scene& scene, const GradientOptions& options,
-                       const RunSettings& settings, const NonFinite::Place& place) {
+                       const RunSettings& settings, const NonFinite::SampleId& place) {
     if (options.points == FilmPoints::kFaces) return trace_faces(scene, options, place);
     return trace_terms(method, scene, options, settings, place);
   };

@@ -14,10 +14,10 @@
 namespace limn {
 namespace {
 
-// By lines alone: points of the film for lamps for one for the sky, where there are both. Lines
-// through the sky take the time of some tens of those through lamps, while most of what is left to
-// the film is the rims of shadows of lamps. Not tuned.
-constexpr int kLampPoints = 16;
+// By lines alone: points of the film for emitters for one for the sky, where there are both. Lines
+// through the sky take the time of some tens of those through emitters, while most of what is left
+// to the film is the rims of shadows of emitters. Not tuned.
+constexpr int kEmitterPoints = 16;
 constexpr int kMostRays = 1 << 20;
 // What a pilot counts, in units of a ray (0.17 us): a point of the film besides its ray, and
 // LineWork, as fitted to the times of the points of cad.xml, plant.xml, sun.xml, soft_shadow.xml
@@ -65,7 +65,7 @@ VisibilityEstimator::VisibilityEstimator(const Scene& scene, const RunSettings& 
   } else if (direct) {
     check_direct_light(scene, options.method.name());
   }
-  if (direct) add_lamps();
+  if (direct) add_emitters();
   if (!chooses) {
     plan_ = fixed_plan(method.by_lines);
     return;
@@ -83,7 +83,7 @@ VisibilityEstimator::VisibilityEstimator(const Scene& scene, const RunSettings& 
 std::vector<VisibilityPart> VisibilityEstimator::parts() const {
   if (options_.what != RenderWhat::kImage) return {VisibilityPart::kSky};
   std::vector<VisibilityPart> parts;
-  if (!lamps_.empty() || !scene_.environment) parts.push_back(VisibilityPart::kLamps);
+  if (!emitters_.empty() || !scene_.environment) parts.push_back(VisibilityPart::kEmitters);
   if (split_) parts.push_back(VisibilityPart::kPatches);
   if (scene_.environment) parts.push_back(VisibilityPart::kSky);
   return parts;
@@ -101,7 +101,7 @@ VisibilityPlan VisibilityEstimator::fixed_plan(bool by_lines) const {
   }
   plan.parts = parts();
   plan.looks.assign(plan.parts.size(), {});
-  if (plan.parts.size() > 1) plan.looks[0].points = kLampPoints;
+  if (plan.parts.size() > 1) plan.looks[0].points = kEmitterPoints;
   return plan;
 }
 
@@ -134,17 +134,17 @@ VisibilityProbe VisibilityEstimator::probe(const Point& point) const {
   return result;
 }
 
-void VisibilityEstimator::add_lamps() {
+void VisibilityEstimator::add_emitters() {
   for (uint32_t s = 0; s < scene_.shapes.size(); ++s) {
     const Shape& shape = scene_.shapes[s];
     if (!shape.is_emitter) continue;
-    RayLamp& lamp = lamps_.emplace_back();
-    lamp.shape = ShapeId(s);
+    RayEmitter& emitter = emitters_.emplace_back();
+    emitter.shape = ShapeId(s);
     double sum = 0;
     for (uint32_t f = 0; f < shape.mesh.faces.size(); ++f) {
       const auto c = face_corners<double>(shape.mesh, FaceId(f));
       sum += 0.5 * length(cross(c[1] - c[0], c[2] - c[0]));
-      lamp.areas.push_back(sum);
+      emitter.areas.push_back(sum);
     }
   }
 }
@@ -238,8 +238,8 @@ Rgb<double> VisibilityEstimator::by_lines(const Seen& seen) const {
       even(point, point.seed_of_look, point.number).at(Purpose::kDirect, 0).uniform();
   if (options_.what == RenderWhat::kImage) {
     Rgb<double> sum;
-    if (point.has(VisibilityPart::kLamps)) {
-      sum = lines_->lamps(seen.surface, seen.scattering, offset);
+    if (point.has(VisibilityPart::kEmitters)) {
+      sum = lines_->emitters(seen.surface, seen.scattering, offset);
     }
     if (point.has(VisibilityPart::kSky)) {
       sum += lines_->environment(seen.surface, seen.scattering, offset);
@@ -260,17 +260,17 @@ Rgb<double> VisibilityEstimator::by_rays(const Seen& seen) const {
     const bool patches = point.part == VisibilityPart::kPatches;
     sky = patches ? split_->patches.get() : split_->rest.get();
   }
-  const bool looks_up = point.part != VisibilityPart::kLamps &&
+  const bool looks_up = point.part != VisibilityPart::kEmitters &&
                         (options_.what != RenderWhat::kImage || sky != nullptr);
-  const size_t end = point.has(VisibilityPart::kLamps) ? lamps_.size() + 1 : 1;
+  const size_t end = point.has(VisibilityPart::kEmitters) ? emitters_.size() + 1 : 1;
   Rgb<double> sum;
   for (int k = 0; k < count; ++k) {
     const Rng key = even(point, point.seed_of_look, point.number * count + k);
-    // The sky and every lamp have points of their own.
+    // The sky and every emitter have points of their own.
     for (size_t i = looks_up ? 0 : 1; i < end; ++i) {
       Rng rng = key.at(Purpose::kEmitter, i);
       const double u1 = rng.uniform(), u2 = rng.uniform();
-      sum += i == 0 ? sky_ray(sky, seen, u1, u2) : lamp_ray(lamps_[i - 1], seen, u1, u2);
+      sum += i == 0 ? sky_ray(sky, seen, u1, u2) : emitter_ray(emitters_[i - 1], seen, u1, u2);
     }
   }
   return sum * (1.0 / count);
@@ -316,15 +316,15 @@ Rgb<double> VisibilityEstimator::sky_ray(const Environment* sky, const Seen& see
   return f * sky->radiance(direction) * (1 / pdf);
 }
 
-// Uniform over the lamp's area.
-Rgb<double> VisibilityEstimator::lamp_ray(const RayLamp& lamp, const Seen& seen, double u1,
-                                          double u2) const {
-  const Shape& shape = scene_.shape(lamp.shape);
-  const double total = lamp.areas.back(), place = u1 * total;
-  const auto above = std::upper_bound(lamp.areas.begin(), lamp.areas.end() - 1, place);
-  const auto index = static_cast<uint32_t>(above - lamp.areas.begin());
-  const double first = index > 0 ? lamp.areas[index - 1] : 0;
-  const double u = (place - first) / (lamp.areas[index] - first);
+// Uniform over the emitter's area.
+Rgb<double> VisibilityEstimator::emitter_ray(const RayEmitter& emitter, const Seen& seen, double u1,
+                                             double u2) const {
+  const Shape& shape = scene_.shape(emitter.shape);
+  const double total = emitter.areas.back(), place = u1 * total;
+  const auto above = std::upper_bound(emitter.areas.begin(), emitter.areas.end() - 1, place);
+  const auto index = static_cast<uint32_t>(above - emitter.areas.begin());
+  const double first = index > 0 ? emitter.areas[index - 1] : 0;
+  const double u = (place - first) / (emitter.areas[index] - first);
   const FaceId face(index);
   const auto c = face_corners<double>(shape.mesh, face);
   const double root = std::sqrt(u);
@@ -339,7 +339,7 @@ Rgb<double> VisibilityEstimator::lamp_ray(const RayLamp& lamp, const Seen& seen,
   if (is_black(f)) return {};
   Ray ray{seen.surface.p, direction};
   ray.start = seen.surface.start();
-  ray.end = {lamp.shape, face};
+  ray.end = {emitter.shape, face};
   ray.t_max = distance * (1 - 0x1p-20);
   ++seen.rays.shadow;
   if (tracer_->occluded(ray)) return {};

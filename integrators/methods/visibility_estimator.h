@@ -52,11 +52,11 @@ class VisibilityEstimator final : public SampleEstimator {
     const Scattering<double>& scattering;
     RayCount& rays;
   };
-  struct RayLamp {
+  struct RayEmitter {
     ShapeId shape;
     std::vector<double> areas;  // summed over its faces
   };
-  void add_lamps();
+  void add_emitters();
   std::vector<VisibilityPart> parts() const;
   VisibilityPlan fixed_plan(bool by_lines) const;
   VisibilityProbe probe(const Point& point) const;
@@ -67,7 +67,7 @@ class VisibilityEstimator final : public SampleEstimator {
   static Rng even(const Point& point, uint64_t seed, uint64_t number);
   Rgb<double> by_lines(const Seen& seen) const;
   Rgb<double> by_rays(const Seen& seen) const;
-  Rgb<double> lamp_ray(const RayLamp& lamp, const Seen& seen, double u1, double u2) const;
+  Rgb<double> emitter_ray(const RayEmitter& emitter, const Seen& seen, double u1, double u2) const;
   // sky: of an image.
   Rgb<double> sky_ray(const Environment* sky, const Seen& seen, double u1, double u2) const;
   bool is_open(const Seen& seen, const Vec3d& direction) const;
@@ -78,7 +78,7 @@ class VisibilityEstimator final : public SampleEstimator {
   RenderOptions options_;
   std::optional<SplitEnvironment> split_;
   std::unique_ptr<LineLight> lines_;  // null: by rays alone
-  std::vector<RayLamp> lamps_;
+  std::vector<RayEmitter> emitters_;
   CameraView<double> camera_;
   FilterTable filter_;
   VisibilityPlan plan_;

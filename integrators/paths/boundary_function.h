@@ -15,15 +15,15 @@ namespace limn {
 // do edges of several surfaces that touch, in general: no field that is made of what surfaces do
 // goes over into their velocity.
 inline bool is_followed(const Edge& edge) {
-  return edge.edge_class != EdgeClass::kCrossing && edge.edge_class != EdgeClass::kIrregular;
+  return edge.edge_class != EdgeClass::kIntersection && edge.edge_class != EdgeClass::kIrregular;
 }
 // Takes them out of the mesh's edges; what is left is numbered anew.
 void leave_out_followed(EdgeMesh& mesh);
 
 // On a face B is linear between its vertices: 0 at a vertex that touches an edge of E(p), elsewhere
 // the least |sine| between the view of the vertex and the planes of the faces around it. Where this
-// is 0 at all three (a lamp of two triangles, needles) it would vanish on the whole face, and no
-// number of rays would make the field right: there it is the least barycentric height over the
+// is 0 at all three (an emitter of two triangles, needles) it would vanish on the whole face, and
+// no number of rays would make the field right: there it is the least barycentric height over the
 // face's own edges in E(p), or 1 without any. So B vanishes on curves only.
 //
 // Edges that run through the inside of a face are none of the face's, nor are those that fields do

@@ -15,9 +15,9 @@
 //     V = (a . w) (e - w (e . w)),   div V = a . e - 3 (a . w) (e . w).
 //     A plane through the circle where p sees a sphere's silhouette follows all of that, however
 //     wide it is; a turn follows its middle alone.
-// What lamps emit, seen from the vertex, is left out: those directions are held. They are the
+// What emitters emit, seen from the vertex, is left out: those directions are held. They are the
 // regions of light (light_regions.h), whose edges have terms of their own; so nothing that follows
-// an object moves the outlines of lamps.
+// an object moves the outlines of emitters.
 //
 // The score without radiance, f' along V + f div V over the density of w, has mean zero as well,
 // because f vanishes at the horizon: any multiple of it may be added.

@@ -16,7 +16,7 @@ inline bool stays_black(const Rgb<S>& c) {
   if constexpr (std::is_same_v<S, double>) {
     return is_black(c);
   } else {
-    return is_black(value(c)) && is_still(c);
+    return is_black(value(c)) && is_constant(c);
   }
 }
 

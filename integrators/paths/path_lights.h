@@ -104,7 +104,7 @@ inline void PathTracer<S, Visitor>::weigh_light(Walk& walk) const {
     draw_delta(walk, *delta);
     return;
   }
-  walk.light_motion = light.face ? nullptr : walk.motion;  // a lamp: held
+  walk.light_motion = light.face ? nullptr : walk.motion;  // an emitter: held
   const Vec3<S> direction = detail::moving<S>(light.wo, walk.light_motion);
   const Evaluation evaluation =
       detail::evaluate(*walk.scattering, light.wo, direction, walk.light_motion);

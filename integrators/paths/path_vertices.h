@@ -155,11 +155,11 @@ inline bool PathTracer<S, Visitor>::arrive(Walk& walk) {
     move_along_edge(walk.surface, face, walk.wo);
   }
   walk.wi = -walk.direction;
-  const Rgb<S> lamp = emitted(walk);
-  if (motion && !motion->warp && !is_black(value(lamp))) {
-    radiance += walk.before * walk.scattering->eval(walk.wo) * lamp * (1 / walk.pdf);  // held
+  const Rgb<S> emitter = emitted(walk);
+  if (motion && !motion->warp && !is_black(value(emitter))) {
+    radiance += walk.before * walk.scattering->eval(walk.wo) * emitter * (1 / walk.pdf);  // held
   } else {
-    radiance += walk.throughput * lamp;
+    radiance += walk.throughput * emitter;
   }
   ++walk.bounces;
   return survives_roulette(walk);

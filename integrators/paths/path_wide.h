@@ -10,7 +10,7 @@ template <class S, class Visitor>
 inline void PathTracer<S, Visitor>::place_lights_wide(std::span<Walk* const> walks) const {
   if (c_.closed) return;
   const Vec3d* points[kMostWalks];
-  Lights::Place* places[kMostWalks];
+  Lights::Point* places[kMostWalks];
   size_t count = 0;
   for (Walk* const walk : walks) {
     if (is_complete(walk->bounces)) continue;

@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "integrators/paths/path_context.h"
-#include "limn/core/faces_in_place.h"
+#include "limn/core/coincident_faces.h"
 
 namespace limn {
 
@@ -27,7 +27,7 @@ class TracedScene {
     // Paths start beside edges.
     bool edges = false;
     // The faces that overlap; null: they are found here.
-    std::shared_ptr<const FacesInPlace> faces = nullptr;
+    std::shared_ptr<const CoincidentFaces> faces = nullptr;
   };
   // scene: with its parameters seeded; it must outlive this.
   TracedScene(const Scene& scene, int threads, const Options& options);

@@ -62,7 +62,7 @@ struct Walk {
   struct Nothing {};
   std::conditional_t<std::is_same_v<S, Dual>, DirectionMotion, Nothing> field_motion;
 
-  Lights::Place lights;  // the vertex, for them
+  Lights::Point lights;  // the vertex, for them
   // A light that may be seen: all of what it adds but its radiance.
   std::optional<LightSample> light;
   const DirectionMotion* light_motion = nullptr;

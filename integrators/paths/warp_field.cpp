@@ -93,7 +93,7 @@ WarpField::WarpField(const Scene& scene, const RayTracer& tracer, const EdgeSamp
 }
 
 bool WarpField::may_move(const SurfacePoint<Dual>& surface, const Vec3d& w) const {
-  if (!is_still(surface.p)) return true;
+  if (!is_constant(surface.p)) return true;
   const double reach = kReach / std::sqrt(options_.kappa);
   const Vec3d p = value(surface.p);
   for (const Sphere& sphere : moving_) {

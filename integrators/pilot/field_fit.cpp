@@ -34,8 +34,9 @@ constexpr double kRidge = 0.05;
 constexpr double kLeast = 0.01;
 // A term counts for the choice if turns change so much of it, as a share of what they change in all
 // terms over its own share of the variance. In a soft shadow, where most of the noise is that of
-// `direct` and turns change next to none of it (5e-5), no fit can halve the whole; among four lamps
-// and in the sun they do (2, 5e-3), and leaving it out costs a tenth. Not tuned in between.
+// `direct` and turns change next to none of it (5e-5), no fit can halve the whole; among four
+// emitters and in the sun they do (2, 5e-3), and leaving it out costs a tenth. Not tuned in
+// between.
 constexpr double kChanged = 1e-3;
 
 // Variance of the derivative plus the combination of the unknowns.

@@ -229,7 +229,7 @@ class TermEstimator::Convoy {
   }
 
   // counts: of the terms at its vertices; null for a path without.
-  void add(const Place& place, const Rng& key, double weight, const PixelCounts* counts) {
+  void add(const PathStart& place, const Rng& key, double weight, const PixelCounts* counts) {
     if (walks_.size() == kMost) finish();
     if (counts) vertices_.emplace_back(estimator_, *counts, nullptr, nullptr, sink_);
     walks_.emplace_back(key, 0, counts ? &vertices_.back() : nullptr);
@@ -258,7 +258,7 @@ class TermEstimator::Convoy {
   SampleSink& sink_;
   std::vector<Walk<Dual, VertexTerms>> walks_;
   std::vector<VertexTerms> vertices_;  // of the paths that have them
-  std::vector<Place> places_;
+  std::vector<PathStart> places_;
   std::vector<double> weights_;
 };
 
@@ -355,7 +355,7 @@ void TermEstimator::add_vertices(const PixelSample& at, const VertexTerms& verti
 }
 
 template <class Visitor>
-TermEstimator::PathCosts TermEstimator::trace(std::span<const Place> places,
+TermEstimator::PathCosts TermEstimator::trace(std::span<const PathStart> places,
                                               std::span<Walk<Dual, Visitor>> walks, SampleLog* log,
                                               bool twice) const {
   PathCosts costs;
@@ -406,7 +406,7 @@ TermEstimator::Path TermEstimator::path_of(const Walk<Dual, Visitor>& walk) cons
 }
 
 template <class Visitor>
-TermEstimator::Path TermEstimator::trace_one(const Place& place, const Rng& key,
+TermEstimator::Path TermEstimator::trace_one(const PathStart& place, const Rng& key,
                                              const DirectionField* field, Visitor& visitor,
                                              SampleLog* log, TermCost& cost, bool twice) const {
   Walk<Dual, Visitor> walk(key, 0, &visitor);
@@ -550,8 +550,8 @@ void TermEstimator::describe(GradientStats& stats) const {
   if (visible_) stats.setup.emplace_back("visible regions", visible_->seconds());
   if (const EdgeSamplerInput* edges = input_.made_edges()) {
     stats.setup.emplace_back("edges", input_.edges_seconds());
-    for (const EdgeClass c : {EdgeClass::kSmooth, EdgeClass::kSharp, EdgeClass::kBorder,
-                              EdgeClass::kIrregular, EdgeClass::kFlat, EdgeClass::kCrossing}) {
+    for (const EdgeClass c : {EdgeClass::kSmooth, EdgeClass::kSharp, EdgeClass::kBoundary,
+                              EdgeClass::kIrregular, EdgeClass::kFlat, EdgeClass::kIntersection}) {
       uint64_t count = 0;
       for (const EdgeMesh& object : edges->objects) count += object.count(c);
       stats.edges.emplace_back(edge_class_name(c), count);

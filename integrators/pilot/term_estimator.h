@@ -100,17 +100,17 @@ class TermEstimator final : public SampleEstimator {
     WarpCount warped;
   };
   // Where a path starts; mirrored: see mirrored_in_pixel.
-  struct Place {
+  struct PathStart {
     PixelSample at;
     bool mirrored = false;
   };
   // walks[i] is a path of places[i]; at most as many as a PathTracer takes.
   template <class Visitor>
-  PathCosts trace(std::span<const Place> places, std::span<Walk<Dual, Visitor>> walks,
+  PathCosts trace(std::span<const PathStart> places, std::span<Walk<Dual, Visitor>> walks,
                   SampleLog* log, bool twice) const;
   template <class Visitor>
-  Path trace_one(const Place& place, const Rng& key, const DirectionField* field, Visitor& visitor,
-                 SampleLog* log, TermCost& cost, bool twice = false) const;
+  Path trace_one(const PathStart& place, const Rng& key, const DirectionField* field,
+                 Visitor& visitor, SampleLog* log, TermCost& cost, bool twice = false) const;
   template <class Visitor>
   Path path_of(const Walk<Dual, Visitor>& walk) const;
   void add_moved_pixels(std::span<const KeyedSample> samples, SampleSink& sink) const;

@@ -14,13 +14,13 @@ namespace limn {
 // What of an image has points of the film of its own.
 enum class VisibilityPart {
   kAll,
-  kLamps,    // and what shines at the camera
-  kPatches,  // what surfaces scatter of small bright patches of the environment: by rays
-  kSky       // of all else of it, or how open it is
+  kEmitters,  // and what shines at the camera
+  kPatches,   // what surfaces scatter of small bright patches of the environment: by rays
+  kSky        // of all else of it, or how open it is
 };
 
 struct VisibilityLook {
-  int rays = 0;    // of each point, for each lamp and the sky; 0: by lines
+  int rays = 0;    // of each point, for each emitter and the sky; 0: by lines
   int points = 1;  // of the film in a sample of a pixel
 };
 

@@ -8,7 +8,7 @@
 
 #include "integrators/terms/camera_edges.h"
 #include "integrators/terms/term_table.h"
-#include "limn/core/face_copies.h"
+#include "limn/core/duplicate_faces.h"
 
 namespace limn {
 namespace {
@@ -45,9 +45,9 @@ class CameraTerm final : public Term {
     if (!edges_.parting()) return;
     const auto [first, second] = *edges_.parting();
     const std::string whose = first == second
-                                  ? fmt::format("edges of {}", name_in_text(scene, first))
-                                  : fmt::format("edges of {} and {}", name_in_text(scene, first),
-                                                name_in_text(scene, second));
+                                  ? fmt::format("edges of {}", quoted_name(scene, first))
+                                  : fmt::format("edges of {} and {}", quoted_name(scene, first),
+                                                quoted_name(scene, second));
     warnings.push_back(fmt::format(
         "the camera sees {} in one line, one behind the other, and they move past each other: "
         "where both are seen the derivative has a kink, and is that of a camera a little aside; "

@@ -2,7 +2,7 @@
 #include "integrators/terms/camera_edges.h"
 
 #include "integrators/estimates/splat.h"
-#include "integrators/terms/edge_jump.h"
+#include "integrators/terms/edge_difference.h"
 
 namespace limn {
 namespace {
@@ -380,7 +380,7 @@ bool CameraEdges::jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& 
   if (edge.clip != FilmEdge::kNoClip) {
     const ClipSegment& segment = clips_[edge.clip];
     const Vec3d a = value(segment.ends[0]), b = value(segment.ends[1]);
-    return clip_jump(context_, segment, a + (b - a) * t, key, rays, jump);
+    return clip_difference(context_, segment, a + (b - a) * t, key, rays, jump);
   }
   const Camera& camera = context_.scene.camera;
   const EdgeMesh& mesh = input_.object(edge.id.object);
@@ -392,8 +392,9 @@ bool CameraEdges::jump_at(const FilmEdgePoint& point, const Rng& key, RayCount& 
   EdgeView view;
   if (!view_edge(mesh, edge.id, t, p, view)) return false;
   const double cosine = dot(view.omega, value(camera.forward));
-  return edge_jump(context_, mesh, view, {}, camera.near_clip / cosine, camera.far_clip / cosine, 0,
-                   key, rays, jump, {}, edge.beside ? &*edge.beside : nullptr);
+  return edge_difference(context_, mesh, view, {}, camera.near_clip / cosine,
+                         camera.far_clip / cosine, 0, key, rays, jump, {},
+                         edge.beside ? &*edge.beside : nullptr);
 }
 
 }  // namespace limn

@@ -3,10 +3,10 @@
 //   dL_o/dtheta  +=  sum over regions k of the sum over edges of
 //                    the integral over t of dL_k(t) f_s(w_t) J(t) dt
 // dL_k, the jump of what region k emits and p sees directly, is not zero but on outlines inside the
-// cone of directions around the region (those of the lamp itself are on its boundary). With weights
-// W_i of the pieces i of these, W their sum, N points u_j = (j + xi) / N of the cumulated weights,
-// in the order of the list, estimate the sum: each piece is drawn N W_i / W times on average. The
-// order is the trees': points that follow each other lie near each other in the scene.
+// cone of directions around the region (those of the emitter itself are on its boundary). With
+// weights W_i of the pieces i of these, W their sum, N points u_j = (j + xi) / N of the cumulated
+// weights, in the order of the list, estimate the sum: each piece is drawn N W_i / W times on
+// average. The order is the trees': points that follow each other lie near each other in the scene.
 #include <fmt/format.h>
 
 #include "integrators/terms/direct_edges.h"
@@ -18,7 +18,7 @@ namespace limn {
 namespace {
 
 // What a list costs per point, in the unit of Term::work: timed as 0.2 (the sun), 1.0 (soft
-// shadow), 1.9 (CAD part), 3.3 (plant), 3.5 (four lamps), against draws of the forest.
+// shadow), 1.9 (CAD part), 3.3 (plant), 3.5 (four emitters), against draws of the forest.
 constexpr double kListCost = 1;
 
 class DirectTerm final : public Term {
@@ -27,7 +27,7 @@ class DirectTerm final : public Term {
       : context_(input.context),
         edges_(input.edges()),
         regions_(*input.regions()),
-        lamp_edges_(*input.lamp_edges()),
+        emitter_edges_(*input.emitter_edges()),
         direct_(edges_, input.edge_sampler(), regions_) {}
 
   bool uses_vertices() const override { return true; }
@@ -40,14 +40,14 @@ class DirectTerm final : public Term {
   const PathContext& context_;
   const EdgeSamplerInput& edges_;
   const LightRegions& regions_;
-  const LampEdges& lamp_edges_;
+  const EmitterEdges& emitter_edges_;
   DirectEdges direct_;
 };
 
 void DirectTerm::add_at_vertex(const PathVertex& vertex, int samples, BoundarySink& sink) const {
   static thread_local DirectPieces pieces;
   static thread_local std::vector<DirectPoint> points;
-  // The light of lamps is seen in directions that are held, see path.h.
+  // The light of emitters is seen in directions that are held, see path.h.
   const EdgeQuery turning = query_at(vertex);
   EdgeQuery held = turning;
   held.turn = {};
@@ -61,7 +61,7 @@ void DirectTerm::add_at_vertex(const PathVertex& vertex, int samples, BoundarySi
   for (const DirectPoint& point : points) {
     const double share = is_lifted(context_.scene, vertex.surface.face.shape)
                              ? 1
-                             : direct_share(context_.scene, edges_, regions_, lamp_edges_,
+                             : direct_share(context_.scene, edges_, regions_, emitter_edges_,
                                             point.sample, point.region, vertex.surface.p,
                                             vertex.surface.n_g, vertex.step, vertex.bounces);
     const EdgeDraw draw{edges_.object(point.sample.edge.object),

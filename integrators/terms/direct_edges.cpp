@@ -1,4 +1,4 @@
-// Lists of silhouettes before lamps and patches, and points on them.
+// Lists of silhouettes before emitters and patches, and points on them.
 #include "integrators/terms/direct_edges.h"
 
 #include <algorithm>
@@ -8,9 +8,9 @@ namespace limn {
 namespace {
 
 // Points for one sample. Sixteen instead took 1.6 times the time for 0.57 of the squared error with
-// four lamps on gloss, where the list is long: what is left is the error of p within its pixel.
+// four emitters on gloss, where the list is long: what is left is the error of p within its pixel.
 constexpr int kPoints = 4;
-// Lamps are small below this angle [rad], and have few sides up to this number. Not tuned.
+// Emitters are small below this angle [rad], and have few sides up to this number. Not tuned.
 constexpr double kSmall = 0.1;
 constexpr int kMostSides = 8;
 
@@ -45,7 +45,8 @@ void draw_pieces(const EdgeSamplerInput& edges, const std::vector<DirectPieces::
   }
 }
 
-void DirectEdges::list(const EdgeQuery& lamps, const EdgeQuery& patches, DirectPieces& to) const {
+void DirectEdges::list(const EdgeQuery& emitters, const EdgeQuery& patches,
+                       DirectPieces& to) const {
   static thread_local std::vector<ListedEdge> listed;
   static thread_local std::vector<EdgePiece> pieces;
   const auto append = [](std::vector<DirectPieces::Piece>& list, uint32_t k, const EdgePiece& piece,
@@ -54,7 +55,7 @@ void DirectEdges::list(const EdgeQuery& lamps, const EdgeQuery& patches, DirectP
   };
   to.clear();
   for (uint32_t k = 0; k < regions_.size(); ++k) {
-    const EdgeQuery& query = regions_.shape(k).valid() ? lamps : patches;
+    const EdgeQuery& query = regions_.shape(k).valid() ? emitters : patches;
     const std::optional<DirectionCone> cone = regions_.cone(k, query.p, query.n);
     if (!cone) continue;
     listed.clear();
@@ -70,7 +71,7 @@ void DirectEdges::list(const EdgeQuery& lamps, const EdgeQuery& patches, DirectP
   }
 }
 
-// Whether the edge is a side of the lamp itself.
+// Whether the edge is a side of the emitter itself.
 bool DirectEdges::is_own_edge(uint32_t region, EdgeRef edge) const {
   const auto faces = edges_.object(edge.object).faces_around(edge.edge);
   return std::any_of(faces.begin(), faces.end(),
@@ -92,7 +93,7 @@ void DirectEdges::draw(const DirectPieces& pieces, const Rng& key, int bounces, 
   }
 }
 
-// What the sides of a small lamp add cancels but for its size: none of them is left out, and all
+// What the sides of a small emitter add cancels but for its size: none of them is left out, and all
 // are met at the same place. Of many, each is met as often as it weighs.
 void DirectEdges::draw_outline(const DirectPieces::Piece* begin, const DirectPieces::Piece* end,
                                double u, TermCost& cost, std::vector<DirectPoint>& drawn) const {

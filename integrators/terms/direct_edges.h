@@ -19,7 +19,7 @@ struct DirectPieces {
     double sum;  // of the weights up to here
   };
   std::vector<Piece> others;
-  std::vector<Piece> outlines;  // sides of small lamps, one lamp after the other
+  std::vector<Piece> outlines;  // sides of small emitters, one emitter after the other
   void clear() { others.clear(), outlines.clear(); }
 };
 
@@ -42,9 +42,9 @@ class DirectEdges {
               const LightRegions& regions)
       : edges_(edges), sampler_(sampler), regions_(regions) {}
 
-  // Replaces what is in `pieces`. Both queries are of the same point: directions towards lamps are
-  // held, those towards patches may turn.
-  void list(const EdgeQuery& lamps, const EdgeQuery& patches, DirectPieces& pieces) const;
+  // Replaces what is in `pieces`. Both queries are of the same point: directions towards emitters
+  // are held, those towards patches may turn.
+  void list(const EdgeQuery& emitters, const EdgeQuery& patches, DirectPieces& pieces) const;
   // Replaces what is in `points`. key: of the path; books samples on `cost`.
   void draw(const DirectPieces& pieces, const Rng& key, int bounces, int samples, TermCost& cost,
             std::vector<DirectPoint>& points) const;

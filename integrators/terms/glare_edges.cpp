@@ -16,7 +16,7 @@ constexpr double kNarrowest = 1e-6;
 // What a piece weighs at least, over what it would if the glare filled its cap evenly.
 constexpr double kEven = 0.1;
 // Glare is looked for if it is this many times as bright as what else is seen. With any
-// the error times time of a teapot under two lamps on gloss was 1.5 times as large.
+// the error times time of a teapot under two emitters on gloss was 1.5 times as large.
 constexpr double kBright = 4;
 
 }  // namespace

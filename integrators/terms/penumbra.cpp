@@ -1,4 +1,4 @@
-// Which edges lines from lamps pass, and who finds what they add.
+// Which edges lines from emitters pass, and who finds what they add.
 #include "integrators/terms/penumbra.h"
 
 #include <algorithm>
@@ -9,14 +9,14 @@
 
 namespace limn {
 
-LampEdges::LampEdges(const Scene& scene, const EdgeSamplerInput& edges, const LightRegions& regions,
-                     int lanes)
+EmitterEdges::EmitterEdges(const Scene& scene, const EdgeSamplerInput& edges,
+                           const LightRegions& regions, int lanes)
     : edges_(edges), lanes_(lanes) {
   reach_ = bounds_of(scene).diagonal();
   list(regions);
 }
 
-void LampEdges::list(const LightRegions& regions) {
+void EmitterEdges::list(const LightRegions& regions) {
   size_t blocks = 0;
   for (const EdgeMesh& object : edges_.objects) {
     first_block_.push_back(blocks);
@@ -25,7 +25,7 @@ void LampEdges::list(const LightRegions& regions) {
   std::vector<Weight> weights;
   for (size_t k = 0; k < regions.size(); ++k) {
     sights_.push_back(sight_of(regions, k));
-    lamps_.push_back(regions.shape(k));
+    emitters_.push_back(regions.shape(k));
     if (!sights_.back().listed) continue;
     sights_.back().first_block = blocks_.size();
     blocks_.resize(blocks_.size() + blocks);
@@ -44,7 +44,7 @@ void LampEdges::list(const LightRegions& regions) {
   }
 }
 
-void LampEdges::list_object(size_t k, ShapeId object, std::vector<Weight>& weights) {
+void EmitterEdges::list_object(size_t k, ShapeId object, std::vector<Weight>& weights) {
   const size_t count = edges_.object(object).edges.size();
   Block* block = &blocks_[sights_[k].first_block + first_block_[object.index()]];
   block->before = static_cast<uint32_t>(listed_.size());
@@ -61,11 +61,11 @@ void LampEdges::list_object(size_t k, ShapeId object, std::vector<Weight>& weigh
   }
 }
 
-LampEdges::Sight LampEdges::sight_of(const LightRegions& regions, size_t k) const {
+EmitterEdges::Sight EmitterEdges::sight_of(const LightRegions& regions, size_t k) const {
   Sight sight;
   sight.listed = regions.lists_edges(k);
   if (regions.shape(k).valid()) {
-    const LampHull& hull = regions.hull(k);
+    const EmitterHull& hull = regions.hull(k);
     sight.v = hull.center;
     sight.radius = hull.radius;
     sight.light = regions.luminance(k) * hull.area;
@@ -81,7 +81,7 @@ LampEdges::Sight LampEdges::sight_of(const LightRegions& regions, size_t k) cons
   return sight;
 }
 
-std::optional<LampEdges::Weight> LampEdges::weigh(size_t k, EdgeRef id) const {
+std::optional<EmitterEdges::Weight> EmitterEdges::weigh(size_t k, EdgeRef id) const {
   const Sight& sight = sights_[k];
   const EdgeMesh& mesh = edges_.object(id.object);
   const Edge& edge = mesh.edge(id.edge);
@@ -97,7 +97,7 @@ std::optional<LampEdges::Weight> LampEdges::weigh(size_t k, EdgeRef id) const {
     if (side != 0 && side == side_of(mesh.plane(edge.faces[1]))) return {};
   }
   for (const FaceRef face : mesh.faces_around(id.edge)) {
-    if (face.shape == lamps_[k]) return {};
+    if (face.shape == emitters_[k]) return {};
   }
   const Vec3d x0 = mesh.position(edge.vertices[0]), x1 = mesh.position(edge.vertices[1]);
   const double edge_length = length(x1 - x0);
@@ -123,7 +123,7 @@ std::optional<LampEdges::Weight> LampEdges::weigh(size_t k, EdgeRef id) const {
 
 // As for the edges of sharp shadows: half of the lines follow length times speed, half length
 // alone, since a surface or a camera that moves makes all edges count. Not tuned.
-double LampEdges::share_of(const Weight& weight) const {
+double EmitterEdges::share_of(const Weight& weight) const {
   const double own = weight.length / length_;
   double share = 0;
   for (int k = 0; k < lanes_; ++k) {
@@ -132,7 +132,7 @@ double LampEdges::share_of(const Weight& weight) const {
   return share / (2 * lanes_);
 }
 
-LampEdges::Drawn LampEdges::draw(double u) const {
+EmitterEdges::Drawn EmitterEdges::draw(double u) const {
   const double target = u * cumulative_.back();
   const size_t last = listed_.size() - 1;
   size_t i = guide_[std::min(static_cast<size_t>(u * static_cast<double>(listed_.size())), last)];
@@ -142,7 +142,7 @@ LampEdges::Drawn LampEdges::draw(double u) const {
   return listed_[i];
 }
 
-double LampEdges::probability(size_t k, EdgeRef edge) const {
+double EmitterEdges::probability(size_t k, EdgeRef edge) const {
   if (!sights_[k].listed) return 0;
   const uint32_t e = edge.edge.index();
   const Block& block = blocks_[sights_[k].first_block + first_block_[edge.object.index()] + e / 64];
@@ -152,10 +152,10 @@ double LampEdges::probability(size_t k, EdgeRef edge) const {
 }
 
 PenumbraShare penumbra_share(const Scene& scene, const EdgeSamplerInput& edges,
-                             const LightRegions& regions, const LampEdges& lamp_edges,
-                             const LampLine& line, const PathStep& step, int bounces) {
+                             const LightRegions& regions, const EmitterEdges& emitter_edges,
+                             const EmitterLine& line, const PathStep& step, int bounces) {
   if (bounces > 0 && !(step.pdf > 0)) return {};
-  const double probability = lamp_edges.probability(line.region, line.edge);
+  const double probability = emitter_edges.probability(line.region, line.edge);
   const Vec3d through = line.e - line.p;
   const double behind = length(through);
   if (!(probability > 0 && behind > 0)) return {};
@@ -171,7 +171,7 @@ PenumbraShare penumbra_share(const Scene& scene, const EdgeSamplerInput& edges,
   result.density = pdf * std::fabs(dot(line.n, omega)) / (behind * behind * seen);
 
   // Per sample of a pixel, each way: how many of its points lie here, per length of the edge. Lines
-  // are drawn for the whole film; at p, four points on the edges that cross a lamp that is seen
+  // are drawn for the whole film; at p, four points on the edges that cross an emitter that is seen
   // beside e with a width of |p - e| / sqrt(pdf), or less.
   double lines = probability * result.density, points = step.pdf;
   if (bounces == 0) {
@@ -190,13 +190,13 @@ PenumbraShare penumbra_share(const Scene& scene, const EdgeSamplerInput& edges,
 }
 
 double direct_share(const Scene& scene, const EdgeSamplerInput& edges, const LightRegions& regions,
-                    const LampEdges& lamp_edges, const EdgeSample& sample, size_t k, const Vec3d& p,
-                    const Vec3d& n, const PathStep& step, int bounces) {
+                    const EmitterEdges& emitter_edges, const EdgeSample& sample, size_t k,
+                    const Vec3d& p, const Vec3d& n, const PathStep& step, int bounces) {
   const EdgeMesh& mesh = edges.object(sample.edge.object);
   const auto& ends = mesh.edge(sample.edge.edge).vertices;
   const Vec3d e = mesh.position(ends[0]) * (1 - sample.t) + mesh.position(ends[1]) * sample.t;
-  const LampLine line{k, sample.edge, e, p, n};
-  return 1 - penumbra_share(scene, edges, regions, lamp_edges, line, step, bounces).share;
+  const EmitterLine line{k, sample.edge, e, p, n};
+  return 1 - penumbra_share(scene, edges, regions, emitter_edges, line, step, bounces).share;
 }
 
 }  // namespace limn

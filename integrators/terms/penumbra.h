@@ -1,12 +1,13 @@
 #pragma once
-// Thin penumbras. In the shadow of an edge before a small lamp, or close behind an edge, the place
-// where the edge cuts into the lamp is small, and what the edge adds there is as large: samples of
-// pixels and of directions meet it ever more rarely. So what `direct` holds is found from both
-// ends: `direct` itself lists edges at the vertices that paths come to; `penumbra` draws lines from
-// a lamp through a point of an edge to a vertex, and asks who sees that (penumbra_boundary.cpp).
-// Each contribution is shared between the two by how densely they are expected to meet it (the
-// power heuristic; any shares that add up to one are right). Rays leave surfaces with interpolated
-// normals above their faces (surface_point.h), where lines do not end: `direct` has all of theirs.
+// Thin penumbras. In the shadow of an edge before a small emitter, or close behind an edge, the
+// place where the edge cuts into the emitter is small, and what the edge adds there is as large:
+// samples of pixels and of directions meet it ever more rarely. So what `direct` holds is found
+// from both ends: `direct` itself lists edges at the vertices that paths come to; `penumbra` draws
+// lines from an emitter through a point of an edge to a vertex, and asks who sees that
+// (penumbra_boundary.cpp). Each contribution is shared between the two by how densely they are
+// expected to meet it (the power heuristic; any shares that add up to one are right). Rays leave
+// surfaces with interpolated normals above their faces (surface_point.h), where lines do not end:
+// `direct` has all of theirs.
 #include <span>
 #include <vector>
 
@@ -18,11 +19,11 @@ namespace limn {
 class LightRegions;
 
 // The edges that lines from regions of light may pass, with how likely each is drawn.
-class LampEdges {
+class EmitterEdges {
  public:
   // All must outlive it. lanes: in use.
-  LampEdges(const Scene& scene, const EdgeSamplerInput& edges, const LightRegions& regions,
-            int lanes);
+  EmitterEdges(const Scene& scene, const EdgeSamplerInput& edges, const LightRegions& regions,
+               int lanes);
 
   size_t size() const { return listed_.size(); }
   struct Drawn {
@@ -32,7 +33,7 @@ class LampEdges {
   };
   // u in [0, 1); there must be edges.
   Drawn draw(double u) const;
-  // Of this edge before region k; 0 if lines from there never pass it: a lamp's own edges, and
+  // Of this edge before region k; 0 if lines from there never pass it: an emitter's own edges, and
   // edges whose two faces all of the region sees from the same side.
   double probability(size_t k, EdgeRef edge) const;
 
@@ -65,7 +66,7 @@ class LampEdges {
   int lanes_;
   double reach_ = 0;  // the scene's diagonal
   std::vector<Sight> sights_;
-  std::vector<ShapeId> lamps_;  // of the regions; none of patches
+  std::vector<ShapeId> emitters_;  // of the regions; none of patches
   // In the order of regions, objects and edges, so that a few bits per edge find them again: to
   // weigh an edge anew would fetch ten lines of the mesh.
   std::vector<Drawn> listed_;
@@ -78,7 +79,7 @@ class LampEdges {
 };
 
 // A line from region k through the point e of an edge that meets a surface of unit normal n at p.
-struct LampLine {
+struct EmitterLine {
   size_t region;
   EdgeRef edge;
   Vec3d e, p, n;
@@ -91,11 +92,11 @@ struct PenumbraShare {
 // step: how a path came to p, after how many bounces: by the density of directions, or of positions
 // in a pixel if it comes from the camera.
 PenumbraShare penumbra_share(const Scene& scene, const EdgeSamplerInput& edges,
-                             const LightRegions& regions, const LampEdges& lamp_edges,
-                             const LampLine& line, const PathStep& step, int bounces);
+                             const LightRegions& regions, const EmitterEdges& emitter_edges,
+                             const EmitterLine& line, const PathStep& step, int bounces);
 // The share of `direct` in what a point of an edge before region k adds at a vertex.
 double direct_share(const Scene& scene, const EdgeSamplerInput& edges, const LightRegions& regions,
-                    const LampEdges& lamp_edges, const EdgeSample& sample, size_t k, const Vec3d& p,
-                    const Vec3d& n, const PathStep& step, int bounces);
+                    const EmitterEdges& emitter_edges, const EdgeSample& sample, size_t k,
+                    const Vec3d& p, const Vec3d& n, const PathStep& step, int bounces);
 
 }  // namespace limn

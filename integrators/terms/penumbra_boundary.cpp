@@ -4,8 +4,8 @@
 // with C its integrand. Here a point e(t) of an edge is drawn first, then a line through it from a
 // direction where region k lies; behind e it meets p, in whose direction omega its density is
 //   pdf(line) (|n . line| / |p - e|^2) / (|n . omega| / |p - q|^2) :
-// the estimate C over all densities stays bounded where lamp and distance vanish. What the turn of
-// directions at p changes is left to `direct`.
+// the estimate C over all densities stays bounded where emitter and distance vanish. What the turn
+// of directions at p changes is left to `direct`.
 #include <fmt/format.h>
 
 #include "integrators/film/film_point.h"
@@ -18,7 +18,7 @@ namespace limn {
 namespace {
 
 // What a line costs beside its rays, which go anywhere in the scene, in the unit of Term::work:
-// timed as 1.9 (the sun), 2.1 (soft shadow, plant), 3.0 (CAD part), 3.9 (four lamps), 5.0
+// timed as 1.9 (the sun), 2.1 (soft shadow, plant), 3.0 (CAD part), 3.9 (four emitters), 5.0
 // (concave).
 constexpr double kLineCost = 3;
 
@@ -28,15 +28,15 @@ class PenumbraTerm final : public Term {
       : context_(input.context),
         edges_(input.edges()),
         regions_(*input.regions()),
-        lamp_edges_(*input.lamp_edges()),
-        lines_(context_, edges_, regions_, lamp_edges_) {}
+        emitter_edges_(*input.emitter_edges()),
+        lines_(context_, edges_, regions_, emitter_edges_) {}
 
   bool uses_film() const override {
     const int max_depth = context_.scene.max_depth;
-    return lamp_edges_.size() > 0 && (max_depth < 0 || max_depth > 1);
+    return emitter_edges_.size() > 0 && (max_depth < 0 || max_depth > 1);
   }
   void sample_film(double u, const Rng& key, FilmSink& sink) const override;
-  bool uses_vertices() const override { return lamp_edges_.size() > 0; }
+  bool uses_vertices() const override { return emitter_edges_.size() > 0; }
   void add_at_vertex(const PathVertex& vertex, int samples, BoundarySink& sink) const override {
     const int max_depth = context_.scene.max_depth;
     if (max_depth >= 0 && vertex.bounces + 2 >= max_depth) return;
@@ -48,7 +48,7 @@ class PenumbraTerm final : public Term {
     return static_cast<double>(cost.rays) + kLineCost * static_cast<double>(cost.samples);
   }
   void describe(GradientStats& stats) const override {
-    stats.edges.emplace_back("before lamps", lamp_edges_.size());
+    stats.edges.emplace_back("before emitters", emitter_edges_.size());
   }
 
  private:
@@ -61,7 +61,7 @@ class PenumbraTerm final : public Term {
   const PathContext& context_;
   const EdgeSamplerInput& edges_;
   const LightRegions& regions_;
-  const LampEdges& lamp_edges_;
+  const EmitterEdges& emitter_edges_;
   PenumbraLines lines_;
 };
 

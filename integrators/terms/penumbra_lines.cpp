@@ -1,4 +1,4 @@
-// Draws lines from lamps through edges to what lies behind.
+// Draws lines from emitters through edges to what lies behind.
 #include "integrators/terms/penumbra_lines.h"
 
 #include <algorithm>
@@ -9,13 +9,13 @@
 namespace limn {
 
 std::optional<DrawnLine> PenumbraLines::draw(double u, Rng& rng, RayCount& rays) const {
-  const LampEdges::Drawn lamp_edge = lamp_edges_.draw(u);
+  const EmitterEdges::Drawn emitter_edge = emitter_edges_.draw(u);
   const double t = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
-  const EdgeRef id = lamp_edge.edge;
+  const EdgeRef id = emitter_edge.edge;
   const EdgeMesh& mesh = edges_.object(id.object);
   const auto& ends = mesh.edge(id.edge).vertices;
   const Vec3d e = mesh.position(ends[0]) * (1 - t) + mesh.position(ends[1]) * t;
-  const auto omega = regions_.draw_direction(lamp_edge.region, e, u1, u2);
+  const auto omega = regions_.draw_direction(emitter_edge.region, e, u1, u2);
   if (!omega) return {};
   Ray ray{e, -*omega};
   const FacesAround around = mesh.around(id.edge);
@@ -29,13 +29,14 @@ std::optional<DrawnLine> PenumbraLines::draw(double u, Rng& rng, RayCount& rays)
   const Vec3d n = normalize(cross(corners[1] - corners[0], corners[2] - corners[0]));
   // More exactly than the ray's floats.
   const Vec3d p = e - *omega * (dot(n, e - corners[0]) / dot(n, *omega));
-  return DrawnLine{{id, t, lamp_edge.probability, 1}, hit.face, {lamp_edge.region, id, e, p, n}};
+  return DrawnLine{
+      {id, t, emitter_edge.probability, 1}, hit.face, {emitter_edge.region, id, e, p, n}};
 }
 
 bool PenumbraLines::complete(DrawnLine& drawn, const PathStep& step, int bounces, Rng& rng) const {
   constexpr double kLeastShare = 0.1;  // lines of less go on by roulette; not tuned
   const auto [density, share] =
-      penumbra_share(context_.scene, edges_, regions_, lamp_edges_, drawn.line, step, bounces);
+      penumbra_share(context_.scene, edges_, regions_, emitter_edges_, drawn.line, step, bounces);
   if (!(rng.uniform() * kLeastShare < share)) return false;
   drawn.edge.probability *= density / std::max(share, kLeastShare);
   return true;

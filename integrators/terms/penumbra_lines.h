@@ -11,7 +11,7 @@ namespace limn {
 struct DrawnLine {
   EdgeSample edge;  // probability: of the edge, times the line's density once that is complete
   FaceRef face;     // that the line meets
-  LampLine line;
+  EmitterLine line;
 };
 
 // The same, complete, and as a vertex of a path sees where it ends.
@@ -25,8 +25,8 @@ class PenumbraLines {
  public:
   // All must outlive it.
   PenumbraLines(const PathContext& context, const EdgeSamplerInput& edges,
-                const LightRegions& regions, const LampEdges& lamp_edges)
-      : context_(context), edges_(edges), regions_(regions), lamp_edges_(lamp_edges) {}
+                const LightRegions& regions, const EmitterEdges& emitter_edges)
+      : context_(context), edges_(edges), regions_(regions), emitter_edges_(emitter_edges) {}
 
   // u: in [0, 1), chooses the edge and its region. None if the line meets nothing.
   std::optional<DrawnLine> draw(double u, Rng& rng, RayCount& rays) const;
@@ -41,7 +41,7 @@ class PenumbraLines {
   const PathContext& context_;
   const EdgeSamplerInput& edges_;
   const LightRegions& regions_;
-  const LampEdges& lamp_edges_;
+  const EmitterEdges& emitter_edges_;
 };
 
 }  // namespace limn

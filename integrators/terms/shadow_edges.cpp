@@ -21,7 +21,7 @@ double lit_side(const Scene& scene, const EdgeMesh& edges, EdgeId edge,
   const Vec3d w = viewpoint.seeing(around, x0).through(x0);
   const Vec3d n = cross(w, along);
   const double scale = 8 * 0x1p-53 * length(w) * length(along);
-  const uint8_t own = edges.edge(edge).rim;
+  const uint8_t own = edges.edge(edge).motion_group;
   bool blocked[2] = {false, false};
   const auto for_every_face = [&](const auto& visit) {
     for (size_t i = 0; i < around.faces.size(); ++i) {
@@ -40,12 +40,12 @@ double lit_side(const Scene& scene, const EdgeMesh& edges, EdgeId edge,
   if (!around.incidences.empty()) {
     for_every_face([&](FaceRef face, Incidence incidence, bool positive) {
       const Vec3d into = side_of_face(scene, face, x0, normalize(along)).into;
-      order.add(incidence.rim, positive, dot(into, w) / std::fabs(dot(into, n)));
+      order.add(incidence.motion_group, positive, dot(into, w) / std::fabs(dot(into, n)));
     });
   }
   for_every_face([&](FaceRef, Incidence incidence, bool positive) {
     for (const bool place : {false, true}) {
-      if (incidence.through || order.is_seen(incidence.rim, positive, own, place))
+      if (incidence.through || order.is_seen(incidence.motion_group, positive, own, place))
         blocked[place] = true;
     }
   });

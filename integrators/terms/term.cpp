@@ -68,13 +68,13 @@ const LightRegions* TermInput::regions() {
   return regions_.get();
 }
 
-const LampEdges* TermInput::lamp_edges() {
-  if (!lamp_edges_ && regions()) {
+const EmitterEdges* TermInput::emitter_edges() {
+  if (!emitter_edges_ && regions()) {
     const Stopwatch watch;
-    lamp_edges_ = std::make_unique<LampEdges>(context.scene, edges(), *regions_, lanes);
+    emitter_edges_ = std::make_unique<EmitterEdges>(context.scene, edges(), *regions_, lanes);
     edges_seconds_ += watch.seconds();
   }
-  return lamp_edges_.get();
+  return emitter_edges_.get();
 }
 
 const EdgeSampler& TermInput::edge_sampler() {

@@ -125,7 +125,7 @@ class TermInput {
   // The regions of light; null if the sampler has none apart, or the scene has none.
   const LightRegions* regions();
   // The edges before them; null if there are no regions.
-  const LampEdges* lamp_edges();
+  const EmitterEdges* emitter_edges();
   // The edges that shading points choose among: all, but for those that warped directions follow.
   const EdgeSamplerInput& chosen_edges();
   // What shading points choose edges by, shared by all terms. Made when a term first asks.
@@ -138,7 +138,7 @@ class TermInput {
  private:
   std::unique_ptr<EdgeSamplerInput> edges_, unfollowed_;
   std::unique_ptr<LightRegions> regions_;
-  std::unique_ptr<LampEdges> lamp_edges_;
+  std::unique_ptr<EmitterEdges> emitter_edges_;
   std::unique_ptr<EdgeSampler> edge_sampler_;
   double edges_seconds_ = 0, edge_sampler_seconds_ = 0;
 };

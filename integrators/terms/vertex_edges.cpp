@@ -96,9 +96,9 @@ void add_edge_point(const PathContext& context, const PathVertex& vertex, const 
   }
   RayCount rays;
   Rgb<double> jump;
-  const bool visible = edge_jump(context, draw.mesh, view, vertex.surface.start(), 0,
-                                 std::numeric_limits<double>::infinity(), vertex.bounces + 1,
-                                 draw.key, rays, jump, draw.part);
+  const bool visible = edge_difference(context, draw.mesh, view, vertex.surface.start(), 0,
+                                       std::numeric_limits<double>::infinity(), vertex.bounces + 1,
+                                       draw.key, rays, jump, draw.part);
   cost.add(rays);
   const Rgb<double> amount = visible ? scattered * jump : Rgb<double>{};
   if (draw.roulette) sink.traced(scattered, rays, amount);

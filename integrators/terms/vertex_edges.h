@@ -1,6 +1,6 @@
 #pragma once
 // A vertex of a path as edge samplers see it, and what a point on an edge adds there.
-#include "integrators/terms/edge_jump.h"
+#include "integrators/terms/edge_difference.h"
 #include "integrators/terms/term.h"
 #include "limn/edgetree/edge_sampler.h"
 

@@ -29,7 +29,7 @@ class Diffuse final : public Bsdf {
   std::optional<Vec3d> sample(const Vec3d& n, const Vec3d& wi, double u1, double u2) const override;
   void sample_each(std::span<const Draw> draws) const override;
 
-  bool is_still() const override { return limn::is_still(reflectance_); }
+  bool is_constant() const override { return limn::is_constant(reflectance_); }
   LobeSummary lobe() const override { return {kHemisphere, 1, max_channel(value(reflectance_))}; }
   std::vector<ParameterRef> parameters() override {
     return {reflectance_parameter("reflectance", reflectance_)};

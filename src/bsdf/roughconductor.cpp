@@ -71,8 +71,8 @@ class RoughConductor final : public Bsdf {
   void eval_with_pdf_each(std::span<const Evaluation> evaluations) const override;
   void sample_each(std::span<const Draw> draws) const override;
 
-  bool is_still() const override {
-    return limn::is_still(alpha_) && limn::is_still(specular_reflectance_);
+  bool is_constant() const override {
+    return limn::is_constant(alpha_) && limn::is_constant(specular_reflectance_);
   }
   LobeSummary lobe() const override;
   std::vector<ParameterRef> parameters() override {

@@ -94,8 +94,8 @@ S Lights::estimate(const Reach& reach, const Vec3<S>& p) {
          std::fabs(reach.luminance) * (shown + reach.rest) / (squared + reach.spread);
 }
 
-Lights::Place Lights::at(const Vec3d& p) const {
-  Place place{p};
+Lights::Point Lights::at(const Vec3d& p) const {
+  Point place{p};
   if (all_.size() < 2) return place;
   for (size_t k = 0; k < all_.size(); ++k) {
     const double of_light = estimate(k, p);
@@ -106,19 +106,19 @@ Lights::Place Lights::at(const Vec3d& p) const {
   return place;
 }
 
-void Lights::at(std::span<const Vec3d* const> p, std::span<Place* const> places) const {
+void Lights::at(std::span<const Vec3d* const> p, std::span<Point* const> places) const {
   if (chosen_by_) {
     chosen_by_->at(p, places);
     return;
   }
   if (all_.size() < 2) {
-    for (size_t i = 0; i < p.size(); ++i) *places[i] = Place{*p[i]};
+    for (size_t i = 0; i < p.size(); ++i) *places[i] = Point{*p[i]};
     return;
   }
   wide::for_blocks(p.size(), [&](size_t first, size_t last) {
     const auto of = [&](int i) { return p[std::min(first + i, last - 1)]; };
     const wide::Vec points = wide::gather_vectors(of);
-    Place some[wide::kWidth];
+    Point some[wide::kWidth];
     for (size_t k = 0; k < all_.size(); ++k) {
       const auto of_light = [&] {
         if (k < reaches_.size()) return estimate(reaches_[k], points);
@@ -130,7 +130,7 @@ void Lights::at(std::span<const Vec3d* const> p, std::span<Place* const> places)
       }
     }
     for (size_t i = first; i < last; ++i) {
-      Place& place = some[i - first];
+      Point& place = some[i - first];
       if (!std::isfinite(place.sum)) place.sum = 0;
       place.p = *p[i];
       *places[i] = place;
@@ -138,12 +138,12 @@ void Lights::at(std::span<const Vec3d* const> p, std::span<Place* const> places)
   });
 }
 
-double Lights::probability(const Place& place, size_t light) const {
+double Lights::probability(const Point& place, size_t light) const {
   if (!(place.sum > 0)) return of_any_;
   return kAny * of_any_ + (1 - kAny) * estimate(light, place) / place.sum;
 }
 
-size_t Lights::choose(const Place& place, double u) const {
+size_t Lights::choose(const Point& place, double u) const {
   if (all_.size() == 1) return 0;
   const double any = place.sum > 0 ? kAny : 1;
   const size_t last = all_.size() - 1;
@@ -164,7 +164,7 @@ void Lights::sample(std::span<const Draw> draws, std::span<const Numbers> u) con
   Environment::Drawn drawn[kMostDraws];
   size_t of[kMostDraws], count = 0;
   for (size_t i = 0; i < draws.size(); ++i) {
-    const Place& place = *draws[i].place;
+    const Point& place = *draws[i].place;
     const size_t light = choose(place, u[i][0]);
     if (environment_ && light == area_lights_.size()) {
       of[count] = i;
@@ -184,7 +184,7 @@ void Lights::sample(std::span<const Draw> draws, std::span<const Numbers> u) con
   }
 }
 
-std::optional<LightSample> Lights::sample(const Place& place, Rng& rng) const {
+std::optional<LightSample> Lights::sample(const Point& place, Rng& rng) const {
   Numbers u;
   for (double& number : u) number = rng.uniform();
   std::optional<LightSample> sample;

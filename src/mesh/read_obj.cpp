@@ -65,13 +65,13 @@ class ObjWords {
     end_line();
   }
 
-  struct Place {
+  struct Position {
     int line = 1, column = 1;
   };
   // Of the word that next() gave last, or of the end that it met.
-  Place where() const { return where_; }
-  SourceLocation location(const Place& place) const { return {file_, place.line, place.column}; }
-  [[noreturn]] void fail(const Place& place, const std::string& message) const {
+  Position where() const { return where_; }
+  SourceLocation location(const Position& place) const { return {file_, place.line, place.column}; }
+  [[noreturn]] void fail(const Position& place, const std::string& message) const {
     throw InputError(location(place), message);
   }
   [[noreturn]] void fail(const std::string& message) const { fail(where_, message); }
@@ -95,7 +95,7 @@ class ObjWords {
   const std::string& text_;
   size_t next_ = 0, line_begin_ = 0;
   int line_ = 1;
-  Place where_;
+  Position where_;
 };
 
 // Vertices, texture coordinates and normals, and what faces ask of them.
@@ -103,7 +103,7 @@ struct Elements {
   const char* name;
   size_t count = 0;
   int64_t largest = 0;  // index from 1 that any face has
-  ObjWords::Place place;
+  ObjWords::Position place;
 };
 
 // Of tinyobjloader's indices.
@@ -126,7 +126,7 @@ class ObjCheck {
   }
 
   std::string take_lines() { return std::move(lines_); }
-  const std::vector<ObjWords::Place>& faces() const { return faces_; }
+  const std::vector<ObjWords::Position>& faces() const { return faces_; }
   const ObjWords& words() const { return words_; }
   // The first vertex beyond kLargestCoordinate; SIZE_MAX if there is none.
   size_t far_position() const { return far_position_; }
@@ -184,7 +184,7 @@ class ObjCheck {
 
   // x y z, then a weight, a colour, or both, which nothing here uses.
   void check_position() {
-    const ObjWords::Place begin = words_.where();
+    const ObjWords::Position begin = words_.where();
     const std::vector<double>& n = check_numbers("vertex", 3, 7);
     if (n.size() == 5) words_.fail(begin, "vertex: 5 numbers are neither x y z w nor x y z r g b");
     for (const double v : n) {
@@ -252,9 +252,9 @@ class ObjCheck {
       normals_{"normal", 0, 0, {}};
   std::vector<double> numbers_;  // of the line at hand
   std::string rest_, lines_;
-  std::vector<ObjWords::Place> faces_;
+  std::vector<ObjWords::Position> faces_;
   size_t far_position_ = SIZE_MAX;
-  ObjWords::Place far_place_;
+  ObjWords::Position far_place_;
 };
 
 // What the parser calls back with: elements as they come, faces with all their corners.

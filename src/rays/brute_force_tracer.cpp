@@ -62,7 +62,7 @@ class BruteForceTracer final : public RayTracer {
   }
 
   const Scene& scene_;
-  FaceCopies copies_;
+  DuplicateFaces copies_;
   FaceOverlaps overlaps_;
 };
 

@@ -11,8 +11,8 @@
 #include <type_traits>
 
 #include "limn/core/check.h"
+#include "limn/core/coincident_faces.h"
 #include "limn/core/error.h"
-#include "limn/core/faces_in_place.h"
 #include "limn/core/parallel.h"
 #include "limn/core/ray_tracer.h"
 
@@ -23,7 +23,7 @@ struct Context {
   RTCIntersectContext base;  // must be first: Embree passes back a pointer to it
   const Ray* ray;
   const Scene* scene;
-  const FaceCopies* copies;
+  const DuplicateFaces* copies;
   // Coplanar and near faces of the ray's start face and of its end face.
   std::span<const FaceRef> beside_start, beside_end;
 };
@@ -127,9 +127,9 @@ class EmbreeErrors {
 
 class EmbreeTracer final : public RayTracer {
  public:
-  EmbreeTracer(const Scene& scene, int threads, std::shared_ptr<const FacesInPlace> faces)
+  EmbreeTracer(const Scene& scene, int threads, std::shared_ptr<const CoincidentFaces> faces)
       : scene_(scene),
-        faces_(faces ? std::move(faces) : std::make_shared<FacesInPlace>(scene, threads)),
+        faces_(faces ? std::move(faces) : std::make_shared<CoincidentFaces>(scene, threads)),
         copies_(faces_->copies),
         overlaps_(faces_->overlaps),
         settles_(!copies_.empty() || !overlaps_.empty()),
@@ -238,8 +238,8 @@ class EmbreeTracer final : public RayTracer {
   }
 
   const Scene& scene_;
-  std::shared_ptr<const FacesInPlace> faces_;
-  const FaceCopies& copies_;
+  std::shared_ptr<const CoincidentFaces> faces_;
+  const DuplicateFaces& copies_;
   const FaceOverlaps& overlaps_;
   bool settles_;         // duplicates, coplanar or near faces exist
   Vec3d origin_;         // origin of Embree's coordinates
@@ -255,7 +255,7 @@ std::unique_ptr<RayTracer> make_embree_tracer(const Scene& scene, int threads) {
 }
 
 std::unique_ptr<RayTracer> make_embree_tracer(const Scene& scene, int threads,
-                                              std::shared_ptr<const FacesInPlace> faces) {
+                                              std::shared_ptr<const CoincidentFaces> faces) {
   return std::make_unique<EmbreeTracer>(scene, threads, std::move(faces));
 }
 

@@ -103,7 +103,7 @@ struct FoundPair {
 
 class OverlapFinder {
  public:
-  OverlapFinder(const Scene& scene, const FaceCopies& copies, FaceOverlaps::Of of) {
+  OverlapFinder(const Scene& scene, const DuplicateFaces& copies, FaceOverlaps::Of of) {
     if (of == FaceOverlaps::Of::kAllFaces) reserve(scene);
     std::vector<FloatBox> shapes;
     for (const Shape& shape : scene.shapes) shapes.push_back(box_of(shape.mesh));
@@ -191,7 +191,7 @@ class OverlapFinder {
 
 }  // namespace
 
-FaceOverlaps::FaceOverlaps(const Scene& scene, const FaceCopies& copies, int threads, Of of)
+FaceOverlaps::FaceOverlaps(const Scene& scene, const DuplicateFaces& copies, int threads, Of of)
     : scene_(&scene), copies_(&copies) {
   size_t faces = 0;
   for (const Shape& shape : scene.shapes) {
@@ -289,7 +289,7 @@ void FaceOverlaps::settle_in_plane(const Ray& ray, Hit& hit) const {
   for (const FaceRef other : others) {
     const auto face = met(other);
     if (!face || is_skipped(*face, ray)) continue;
-    if (!is_met_first(*scene_, *face, hit.face, ray.direction)) continue;
+    if (!is_hit_first(*scene_, *face, hit.face, ray.direction)) continue;
     if (const auto t = meet(corners_of(*scene_, *face), ray)) hit = {*face, *t};
   }
 }
@@ -342,8 +342,8 @@ bool FaceOverlaps::is_hidden(FaceRef face, const Ray& ray) const {
 }
 
 void warn_of_overlaps(const Scene& scene, std::vector<std::string>& warnings) {
-  const FaceCopies copies(scene);
-  warn_of_copies(scene, copies, warnings);
+  const DuplicateFaces copies(scene);
+  warn_of_duplicates(scene, copies, warnings);
   std::map<std::pair<ShapeId, ShapeId>, int> counts;
   const FaceOverlaps overlaps(scene, copies, thread_count(0), FaceOverlaps::Of::kDifferentShapes);
   for (const auto& [a, b] : overlaps.pairs()) {
@@ -357,8 +357,8 @@ void warn_of_overlaps(const Scene& scene, std::vector<std::string>& warnings) {
     warnings.push_back(format_warning(
         scene.shape(b).where,
         std::to_string(count) + (count == 1 ? " pair" : " pairs") + " of faces of " +
-            name_in_text(scene, a) + " and " + name_in_text(scene, b) +
-            " overlap in a plane: those of " + name_in_text(scene, second ? b : a) +
+            quoted_name(scene, a) + " and " + quoted_name(scene, b) +
+            " overlap in a plane: those of " + quoted_name(scene, second ? b : a) +
             " are visible there; if one of the two moves out of the plane alone the image is "
             "discontinuous, and no derivative accounts for it"));
   }

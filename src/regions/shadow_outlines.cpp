@@ -130,7 +130,7 @@ void ShadowOutlines::compare_ends(const Edge& s, uint32_t index, bool later, int
   if (begins != ends) {
     const double a = static_cast<double>(at_p), b = static_cast<double>(at_q);
     const int up = ends ? 1 : -1;
-    events_.push_back({a / (a - b), index, Kind::kCrossing, up * t.light, up * t.cover});
+    events_.push_back({a / (a - b), index, Kind::kIntersection, up * t.light, up * t.cover});
   }
   if (t.q < s.q && q_of_t == 0 && ends) {
     events_.push_back({along(t.q), index, Kind::kSecond, -t.light, -t.cover});

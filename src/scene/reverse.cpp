@@ -156,7 +156,7 @@ SurfacePoint<Var> surface_on_ray<Var>(const Scene& scene, FaceRef face, const Ve
                            point.n_g,   fixed(point.n_s), point.lifted};
   Tape& tape = *Tape::current();
   const MeshSlots& slots = tape.slots()->mesh(face.shape);
-  if (slots.positions == 0 && is_still(origin) && is_still(direction)) return moving;
+  if (slots.positions == 0 && is_constant(origin) && is_constant(direction)) return moving;
   Tape::Composite statement{0, 6, pull_back_surface, face.shape.index(), face.face.index(), {}, {}};
   for (int k = 0; k < 3; ++k) {
     statement.nodes[k] = origin[k].node;
@@ -186,7 +186,7 @@ Rgb<Var> Light::drawn_radiance<Var>(const LightSample& sample) const {
 }
 
 template <>
-Environment::Sight<Var> Lights::environment<Var>(const Place& place, const Vec3d& wo,
+Environment::Sight<Var> Lights::environment<Var>(const Point& place, const Vec3d& wo,
                                                  const std::array<double, 2>& at) const {
   Environment::Sight<double> sight;
   environment_->look(wo, at, sight);
@@ -203,7 +203,7 @@ template <>
 Rgb<Var> environment_radiance<Var>(const Environment& environment, const Vec3<Var>& d) {
   const SeededCopies<Environment>& copies = Tape::current()->slots()->environment;
   detail::Jacobian jacobian;
-  if (!is_still(d)) jacobian.add(d, environment.radiance(detail::along_axes(d)));
+  if (!is_constant(d)) jacobian.add(d, environment.radiance(detail::along_axes(d)));
   for (const auto& copy : copies) {
     jacobian.add(detail::leaves_of(copy.slots), copy.object->radiance(detail::held(d)));
   }
@@ -215,7 +215,7 @@ std::optional<Arrival<Var>> arrival<Var>(const DeltaLight& light, const Vec3<Var
   const auto at = light.arriving(value(p));
   if (!at) return {};
   detail::Jacobian direction, irradiance;
-  if (!is_still(p)) {
+  if (!is_constant(p)) {
     const auto moving = *light.arriving(detail::along_axes(p));
     direction.add(p, as_colour(moving.wo));
     irradiance.add(p, moving.irradiance);

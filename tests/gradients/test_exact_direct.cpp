@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "integrators/terms/edge_jump.h"
+#include "integrators/terms/edge_difference.h"
 #include "integrators/terms/lane_sinks.h"
 #include "integrators/terms/term_table.h"
 #include "limn/core/parameter.h"
@@ -156,9 +156,9 @@ class ExactDirect {
     RayCount rays;
     Rgb<double> result;
     if (!view_edge(mesh, part.id, 0.5 * (part.t0 + part.t1), query.p, view)) return {};
-    const bool seen =
-        edge_jump(context_, mesh, view, query.face, 0, std::numeric_limits<double>::infinity(), 1,
-                  Rng(0, 0, 0), rays, result, {&regions_, region});
+    const bool seen = edge_difference(context_, mesh, view, query.face, 0,
+                                      std::numeric_limits<double>::infinity(), 1, Rng(0, 0, 0),
+                                      rays, result, {&regions_, region});
     return seen ? result : Rgb<double>{};
   }
 

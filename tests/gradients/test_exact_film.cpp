@@ -9,7 +9,7 @@
 
 #include "integrators/film/film_regions.h"
 #include "integrators/paths/camera_path.h"
-#include "limn/core/face_copies.h"
+#include "limn/core/duplicate_faces.h"
 #include "limn/core/ray_tracer.h"
 #include "limn/integrators/check.h"
 #include "limn/integrators/compare.h"
@@ -53,7 +53,7 @@ SceneParts crowded(const TempFiles& files) {
 
 size_t wrong_faces(const Scene& scene, const FilmRegions& regions, int points) {
   const auto tracer = make_brute_force_tracer(scene);
-  const FaceCopies copies(scene);
+  const DuplicateFaces copies(scene);
   const Film& film = scene.film;
   size_t wrong = 0;
   Rng rng(7, 0, 0);

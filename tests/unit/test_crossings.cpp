@@ -14,7 +14,7 @@
 namespace limn {
 namespace {
 
-using Segments = std::vector<CrossingSegment>;
+using Segments = std::vector<IntersectionSegment>;
 
 std::vector<const Mesh*> pointers(const std::vector<Mesh>& meshes) {
   std::vector<const Mesh*> result;
@@ -24,12 +24,12 @@ std::vector<const Mesh*> pointers(const std::vector<Mesh>& meshes) {
 
 Segments found(const std::vector<Mesh>& meshes, int threads = 1) {
   const auto all = pointers(meshes);
-  return find_crossings(all, find_face_pairs(all, {}, threads), threads);
+  return find_intersections(all, find_face_pairs(all, {}, threads), threads);
 }
 
 double length_of(const Segments& segments) {
   double sum = 0;
-  for (const CrossingSegment& s : segments) sum += length(s.ends[1] - s.ends[0]);
+  for (const IntersectionSegment& s : segments) sum += length(s.ends[1] - s.ends[0]);
   return sum;
 }
 
@@ -156,7 +156,7 @@ TEST(Crossings, OfFacesWithACommonCorner) {
 // Every end of a closed curve is the end of two segments, bit by bit.
 void expect_closed(const Segments& segments) {
   std::map<std::tuple<double, double, double>, int> ends;
-  for (const CrossingSegment& s : segments)
+  for (const IntersectionSegment& s : segments)
     for (const Vec3d& x : s.ends) ++ends[{x.x, x.y, x.z}];
   for (const auto& [x, count] : ends) EXPECT_EQ(count, 2);
 }
@@ -235,9 +235,9 @@ TEST(Crossings, AreEdges) {
                               placed(cube_mesh(), 2, 0.8, {0.7, 0.4, 0.1})};
   for (Mesh& mesh : meshes) set_test_tangents(mesh);
   const Segments segments = found(meshes);
-  const EdgeMesh edges = crossing_edges(pointers(meshes), segments);
+  const EdgeMesh edges = intersection_edges(pointers(meshes), segments);
   EXPECT_EQ(edges.validate(), "");
-  ASSERT_EQ(edges.count(EdgeClass::kCrossing), segments.size());
+  ASSERT_EQ(edges.count(EdgeClass::kIntersection), segments.size());
   for (size_t i = 0; i < segments.size(); ++i) {
     const auto faces = edges.faces_around(EdgeId(static_cast<uint32_t>(i)));
     EXPECT_TRUE(std::ranges::equal(faces, segments[i].faces));
@@ -272,12 +272,12 @@ TEST(Crossings, MoveWithBothPlanes) {
   };
   const Segments segments = found(meshes);
   ASSERT_GT(segments.size(), 20u);
-  for (const CrossingSegment& s : segments) {
+  for (const IntersectionSegment& s : segments) {
     const Vec3d x = s.ends[0] * 0.3 + s.ends[1] * 0.7;
     const auto pointed = pointers(meshes);
-    const Vec3<Lanes> v = crossing_velocity(pointed, s, x);
-    const Vec3<Lanes> v0 = crossing_velocity(pointed, s, s.ends[0]);
-    const Vec3<Lanes> v1 = crossing_velocity(pointed, s, s.ends[1]);
+    const Vec3<Lanes> v = intersection_velocity(pointed, s, x);
+    const Vec3<Lanes> v0 = intersection_velocity(pointed, s, s.ends[0]);
+    const Vec3<Lanes> v1 = intersection_velocity(pointed, s, s.ends[1]);
     const Vec3d along = normalize(s.ends[1] - s.ends[0]);
     for (int lane = 0; lane < kLanes; ++lane) {
       const auto of = [&](const Vec3<Lanes>& a) { return Vec3d{a.x[lane], a.y[lane], a.z[lane]}; };
@@ -291,18 +291,18 @@ TEST(Crossings, MoveWithBothPlanes) {
   const double h = 0x1p-10;
   for (int lane = 0; lane < 3; ++lane) {
     const Segments plus = found(moved(h, lane)), minus = found(moved(-h, lane));
-    for (const CrossingSegment& s : segments) {
-      const auto same = [&](const CrossingSegment& other) { return other.faces == s.faces; };
+    for (const IntersectionSegment& s : segments) {
+      const auto same = [&](const IntersectionSegment& other) { return other.faces == s.faces; };
       const auto p = std::ranges::find_if(plus, same), m = std::ranges::find_if(minus, same);
       if (p == plus.end() || m == minus.end()) continue;
       const Vec3d x = (s.ends[0] + s.ends[1]) * 0.5;
       const Vec3d along = normalize(s.ends[1] - s.ends[0]);
       // Where a line meets the plane across the old one at x.
-      const auto at = [&](const CrossingSegment& line) {
+      const auto at = [&](const IntersectionSegment& line) {
         const Vec3d d = line.ends[1] - line.ends[0];
         return line.ends[0] + d * (dot(along, x - line.ends[0]) / dot(along, d));
       };
-      const Vec3<Lanes> v = crossing_velocity(pointers(meshes), s, x);
+      const Vec3<Lanes> v = intersection_velocity(pointers(meshes), s, x);
       const Vec3d expected = (at(*p) - at(*m)) / (2 * h);
       const Vec3d velocity{v.x[lane], v.y[lane], v.z[lane]};
       // Rounding to float over the step, larger by the angle between planes and for short lines.

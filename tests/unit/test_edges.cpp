@@ -16,7 +16,7 @@ namespace {
 // Border, irregular, sharp, smooth, flat.
 using Counts = std::array<uint64_t, 5>;
 Counts counts_of(const EdgeMesh& mesh) {
-  return {mesh.count(EdgeClass::kBorder), mesh.count(EdgeClass::kIrregular),
+  return {mesh.count(EdgeClass::kBoundary), mesh.count(EdgeClass::kIrregular),
           mesh.count(EdgeClass::kSharp), mesh.count(EdgeClass::kSmooth),
           mesh.count(EdgeClass::kFlat)};
 }
@@ -175,7 +175,7 @@ TEST(Edges, FacesWithoutAreaLetTheirNeighboursMeet) {
   // Vertex 8 lies on the edge from 4 to 5, in use by the top alone.
   const std::vector<FaceIndices> top{{4, 8, 6}, {8, 7, 6}, {8, 5, 7}};
   const EdgeMesh open = build_edge_mesh(cube_with_t_junction({{0.3f, -1, 1}}, top, {}), true);
-  EXPECT_EQ(open.count(EdgeClass::kBorder), 3u);
+  EXPECT_EQ(open.count(EdgeClass::kBoundary), 3u);
   const EdgeMesh mended =
       build_edge_mesh(cube_with_t_junction({{0.3f, -1, 1}}, top, {{4, 5, 8}}), true);
   EXPECT_EQ(counts_of(mended), (Counts{0, 0, 13, 0, 7}));
@@ -369,19 +369,19 @@ TEST(EdgeMesh, CorruptedCopiesAreFound) {
          for (size_t e = 3; e < m.face_offsets.size(); ++e) ++m.face_offsets[e];
          m.edges[2].faces[1] = FaceId::none();
        }},
-      {"edge 1: a face that it runs through has a rim",
+      {"edge 1: a face that it runs through has a motion_group",
        [](EdgeMesh& m) {
          m.incidences.resize(m.incident_faces.size());
          m.incidences[m.face_offsets[1]].through = true;
        }},
-      {"edge 1: a rim is out of range",
+      {"edge 1: a motion_group is out of range",
        [](EdgeMesh& m) {
          m.incidences.resize(m.incident_faces.size());
-         m.incidences[m.face_offsets[1]].rim = kMostRims;
+         m.incidences[m.face_offsets[1]].motion_group = kMostMotionGroups;
        }},
-      {"edge 7: no face around it moves with it", [](EdgeMesh& m) { m.edges[7].rim = 1; }},
+      {"edge 7: no face around it moves with it", [](EdgeMesh& m) { m.edges[7].motion_group = 1; }},
       {"edge 5: a border has one face",
-       [](EdgeMesh& m) { m.edges[5].edge_class = EdgeClass::kBorder; }},
+       [](EdgeMesh& m) { m.edges[5].edge_class = EdgeClass::kBoundary; }},
       {"edge 5: a closed mesh has neither borders nor irregular edges",
        [](EdgeMesh& m) { m.edges[5].edge_class = EdgeClass::kIrregular; }},
       {"edge 5: only smooth and sharp edges are concave",

@@ -100,7 +100,7 @@ TEST_P(GeneratedMesh, IsClosedWhereItSaysSo) {
   const EdgeMesh edges = build_edge_mesh(mesh, true);
   EXPECT_EQ(edges.count(EdgeClass::kIrregular), 0u);
   EXPECT_EQ(edges.count(EdgeClass::kSharp), 0u);
-  EXPECT_EQ(edges.count(EdgeClass::kBorder) == 0, kind().closed);
+  EXPECT_EQ(edges.count(EdgeClass::kBoundary) == 0, kind().closed);
   EXPECT_EQ(edges.one_sided_closed, kind().closed);
 }
 
@@ -139,7 +139,7 @@ TEST_P(GeneratedMesh, DoesNotCrossItself) {
   write_triangles(files.path("mesh.obj"), mesh_);
   const Mesh mesh = read_mesh(files.path("mesh.obj"), true);
   const Mesh* meshes[] = {&mesh};
-  EXPECT_TRUE(find_crossings(meshes, find_face_pairs(meshes, {}, 1), 1).empty());
+  EXPECT_TRUE(find_intersections(meshes, find_face_pairs(meshes, {}, 1), 1).empty());
 }
 
 INSTANTIATE_TEST_SUITE_P(, GeneratedMesh, testing::ValuesIn(cases()), [](const auto& test) {

@@ -72,7 +72,7 @@ TEST(LightRegions, ConesHoldTheirLamps) {
       random_rotation(rng, rows);
       const double scale = std::exp(std::log(1e-3) + std::log(1e6) * rng.uniform());
       const Mesh mesh = transformed(shape, rows, scale, random_direction(rng) * (scale * i));
-      const LampHull hull = make_lamp_hull(mesh, ShadingModel::kContinuous);
+      const EmitterHull hull = make_emitter_hull(mesh, ShadingModel::kContinuous);
       for (int k = 0; k < 100; ++k) {
         const Vec3d p = random_place(mesh, scale, rng), n = random_direction(rng);
         const auto cone = cone_around(hull, p, n);
@@ -97,7 +97,7 @@ TEST(LightRegions, ConesHoldTheirLamps) {
 // A square of half-width 1 as seen from a height of 2 above its middle: four planes through its
 // sides, none further out. The octagon around a ball is nowhere wider than the octagon's corners.
 TEST(LightRegions, ConesAreTight) {
-  const LampHull square = make_lamp_hull(grid_mesh(2), ShadingModel::kContinuous);
+  const EmitterHull square = make_emitter_hull(grid_mesh(2), ShadingModel::kContinuous);
   EXPECT_TRUE(square.flat);
   EXPECT_EQ(square.points.size(), 4u);
   const auto cone = cone_around(square, {0, 0, 2}, {0, 0, -1});
@@ -110,7 +110,7 @@ TEST(LightRegions, ConesAreTight) {
   EXPECT_FALSE(cone_around(square, {0, 0, -2}, {0, 0, 1})) << "from behind";
   EXPECT_FALSE(cone_around(square, {3, 0, 0}, {-1, 0, 0})) << "on its plane";
   EXPECT_FALSE(cone_around(square, {0, 0, 2}, {0, 0, 1})) << "below the horizon";
-  const LampHull ball = make_lamp_hull(icosphere_mesh(1), ShadingModel::kContinuous);
+  const EmitterHull ball = make_emitter_hull(icosphere_mesh(1), ShadingModel::kContinuous);
   const auto around = cone_around(ball, {0, 0, 10}, {0, 0, -1});
   ASSERT_TRUE(around);
   EXPECT_EQ(around->count, 8);

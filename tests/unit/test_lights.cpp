@@ -78,7 +78,7 @@ void expect_draws_of_densities(const Scene& scene, size_t lamps) {
   ASSERT_EQ(all, lamps + 1 + scene.delta_lights.size());
   EXPECT_EQ(lights.all()[lamps], scene.environment.get());
   EXPECT_EQ(lights.all()[lamps + 1], scene.delta_lights[0].get());
-  const Lights::Place place = lights.at({0.3, 1, 0.2});
+  const Lights::Point place = lights.at({0.3, 1, 0.2});
   const int draws = 40000;
   std::vector<int> counts(all);
   std::vector<double> expected(all);
@@ -154,7 +154,7 @@ TEST(Lights, DrawnAtOnceAreThoseDrawnAlone) {
     const Scene scene = scene_with(files, body);
     const Lights lights(scene);
     const size_t most = 16;
-    std::vector<Lights::Place> places;
+    std::vector<Lights::Point> places;
     for (size_t i = 0; i < most; ++i) {  // some above the lamp, which does not shine on them
       places.push_back(lights.at({0.1 * i, 0.4 * i, 0.2}));
     }
@@ -198,9 +198,9 @@ TEST(Lights, PlacesAtOnceAreThoseAlone) {
   for (int i = 0; i < 12; ++i) points.push_back({0.1 * i, 0.4 * i, 0.2});
   for (const Lights* const asked : {&lights, &by_others}) {
     const auto at_once = [&](size_t first, size_t count) {
-      std::vector<Lights::Place> found(count);
+      std::vector<Lights::Point> found(count);
       std::vector<const Vec3d*> p;
-      std::vector<Lights::Place*> places;
+      std::vector<Lights::Point*> places;
       for (size_t i = 0; i < count; ++i) {
         p.push_back(&points[first + i]);
         places.push_back(&found[i]);
@@ -210,7 +210,7 @@ TEST(Lights, PlacesAtOnceAreThoseAlone) {
     };
     const auto together = at_once(0, points.size());
     for (size_t i = 0; i < points.size(); ++i) {
-      const Lights::Place single = at_once(i, 1)[0], plain = asked->at(points[i]);
+      const Lights::Point single = at_once(i, 1)[0], plain = asked->at(points[i]);
       EXPECT_EQ(together[i].p, points[i]);
       EXPECT_EQ(together[i].sum, single.sum);
       EXPECT_EQ(together[i].first, single.first);
@@ -232,7 +232,7 @@ TEST(Lights, AreDrawnByWhatTheySend) {
   const Lights lights(scene);
   const auto chance = [&](double y) {  // of the lamp
     Rng rng(7, 8, 9);
-    const Lights::Place place = lights.at({0, y, 0});
+    const Lights::Point place = lights.at({0, y, 0});
     while (true) {
       const auto sample = lights.sample(place, rng);
       if (sample && !sample->face) return 1 - sample->pdf;
@@ -258,7 +258,7 @@ TEST(Lights, AreDrawnByWhatLargeLampsSend) {
                                                       area_light("glow", "20, 20, 20")));
   const Lights lights(scene);
   for (const double d : {3.0, 1.0, 0.1, 0.001}) {
-    const Lights::Place place = lights.at({0, 3 - d, 0});
+    const Lights::Point place = lights.at({0, 3 - d, 0});
     const double chance =
         lights.pdf_environment(place, {0, 1, 0}) / lights.all()[1]->pdf({{0, 1, 0}, 1, {}}, 1);
     const double lamp = 20 / (d * d + 1), sky = 1;

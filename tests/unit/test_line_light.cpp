@@ -306,7 +306,7 @@ void expect_closed_form(const Scene& scene) {
     const Scattering<double> scattering(surface, -Vec3d(ray.direction), scene.shading);
     if (scattering.black()) continue;
     const double exact = closed.scattered(*look.tracer, surface, scattering, nullptr).g;
-    const double found = look.light.lamps(surface, scattering, 0.3).g;
+    const double found = look.light.emitters(surface, scattering, 0.3).g;
     worst = std::max(worst, std::fabs(found - exact));
     apart += std::fabs(found - exact), sum += exact;
   }
@@ -361,7 +361,7 @@ TEST(LineLight, LampsOfNoExtent) {
   const Looking look(scene, {.lines = 1024}, true);
   double sum = 0;
   for (int k = 0; k < 16; ++k) {
-    sum += look.light.lamps(surface, scattering, (k + 0.5) / 16).g / 16;
+    sum += look.light.emitters(surface, scattering, (k + 0.5) / 16).g / 16;
   }
   // What is seen past the screen, at twice its distance.
   const double seen = (size - 2 * edge) * 2 * size / 100;

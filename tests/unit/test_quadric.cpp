@@ -138,8 +138,8 @@ TEST(QuadricPair, FindsTheRangeOverThePolygon) {
     }
     EXPECT_TRUE(c.accepts(range.low - 1e-7, range.low + 1e-7, error)) << i;
     EXPECT_TRUE(c.accepts(range.high - 1e-7, range.high + 1e-7, error)) << i;
-    // Slabs beside the range, as far as a grid may miss: a cell at the polygon's rim, where the
-    // third axis is as steep as the others, times the slope (moduli add up to 1).
+    // Slabs beside the range, as far as a grid may miss: a cell at the polygon's motion_group,
+    // where the third axis is as steep as the others, times the slope (moduli add up to 1).
     const double beyond = 3 * 2.0 / kSteps;
     EXPECT_FALSE(c.accepts(range.high + beyond, range.high + 1, error)) << i;
     EXPECT_FALSE(c.accepts(range.low - 1, range.low - beyond, error)) << i;

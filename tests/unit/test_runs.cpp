@@ -356,7 +356,7 @@ TEST(NonFinite, IsCountedAndLocated) {
   const RenderResult r = render(scene, run_settings(16));
   EXPECT_GT(r.non_finite.count, 0u);
   ASSERT_FALSE(r.non_finite.first.empty());
-  const NonFinite::Place place = r.non_finite.first[0];
+  const NonFinite::SampleId place = r.non_finite.first[0];
   EXPECT_GE(place.x, 0);
   EXPECT_LT(place.x, 8);
   EXPECT_LT(place.sample, 16);

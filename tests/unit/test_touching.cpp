@@ -68,7 +68,7 @@ TEST(Touching, SidesOfACubeShareItsEdges) {
       std::vector<Mesh> sides;
       for (const Mesh& side : cube_sides()) sides.push_back(transformed(side, rows, scale, offset));
       const auto objects = united(sides);
-      EXPECT_EQ(count(objects, EdgeClass::kBorder), 0u) << scale;
+      EXPECT_EQ(count(objects, EdgeClass::kBoundary), 0u) << scale;
       EXPECT_EQ(count(objects, EdgeClass::kIrregular), 12u) << scale;
       EXPECT_NEAR(length_with(objects, 2), 24 * scale, 1e-5 * scale);
     }
@@ -95,10 +95,10 @@ TEST(Touching, AGapIsNoContact) {
     return united({quad({-1, 0, 0}, {1, 0, 0}, {0, 1, 0}), quad({gap, 0, 0}, {1, 0, 0}, {0, 1, 0})},
                   {0, 1});
   };
-  EXPECT_EQ(count(tiles(0), EdgeClass::kBorder), 6u);
+  EXPECT_EQ(count(tiles(0), EdgeClass::kBoundary), 6u);
   EXPECT_EQ(count(tiles(0), EdgeClass::kIrregular), 1u);
-  EXPECT_EQ(count(tiles(1e-7f), EdgeClass::kBorder), 6u);
-  EXPECT_EQ(count(tiles(1e-5f), EdgeClass::kBorder), 8u);
+  EXPECT_EQ(count(tiles(1e-7f), EdgeClass::kBoundary), 6u);
+  EXPECT_EQ(count(tiles(1e-5f), EdgeClass::kBoundary), 8u);
 }
 
 TEST(Touching, TilesOfOneLookHaveNoSeam) {
@@ -121,7 +121,7 @@ TEST(Overlaps, AreInOnePlaneAndMoreThanASide) {
     scene.shapes.resize(2);
     scene.shapes[0].mesh = a;
     scene.shapes[1].mesh = b;
-    const FaceCopies copies(scene);
+    const DuplicateFaces copies(scene);
     return FaceOverlaps(scene, copies, 1).pairs().size();
   };
   Rng rng(4, 0, 0);
@@ -133,7 +133,7 @@ TEST(Overlaps, AreInOnePlaneAndMoreThanASide) {
     EXPECT_EQ(count(tile, turned(quad({1, 0, 0}, {1, 0, 0}, {0, 1, 0}))), 0u);
     EXPECT_EQ(count(tile, turned(quad({0.5f, 0, 1e-3f}, {1, 0, 0}, {0, 1, 0}))), 0u);
     EXPECT_EQ(count(tile, turned(quad({0.5f, 0, 0}, {1, 0, 0}, {0, 0, 1}))), 0u);
-    EXPECT_EQ(count(tile, tile), 0u);  // copies: FaceCopies has them
+    EXPECT_EQ(count(tile, tile), 0u);  // copies: DuplicateFaces has them
     EXPECT_GE(count(tile, turned(quad({0.5f, 0.25f, 0}, {1, 0, 0}, {0, 1, 0}))), 2u);
     EXPECT_GE(count(tile, turned(quad({0.25f, 0.25f, 0}, {0.5f, 0, 0}, {0, 0.5f, 0}))), 2u);
   }
@@ -147,7 +147,7 @@ TEST(Overlaps, InOnePlaceWithSome) {
   const Vec3d rows[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   scene.shapes[2].mesh = transformed(grid_mesh(3), rows, 1, {0.1, 0.3, 0});
   scene.shapes[3].mesh = transformed(grid_mesh(3), rows, 1, {0.1, 0.3, 1});
-  const FaceCopies copies(scene);
+  const DuplicateFaces copies(scene);
   const FaceOverlaps overlaps(scene, copies, 1);
   std::vector<FaceRef> all;
   for (uint32_t s = 0; s < 4; ++s)
@@ -219,8 +219,8 @@ TEST(Touching, WhatMovesApartKeepsBothRims) {
       if (mesh.edges[e].edge_class != EdgeClass::kIrregular) continue;
       const FacesAround around = mesh.around(EdgeId(e));
       ASSERT_EQ(around.faces.size(), 2u);
-      EXPECT_NE(around.incidence(0).rim, around.incidence(1).rim);
-      EXPECT_EQ(around.incidence(0).rim, mesh.edges[e].rim);
+      EXPECT_NE(around.incidence(0).motion_group, around.incidence(1).motion_group);
+      EXPECT_EQ(around.incidence(0).motion_group, mesh.edges[e].motion_group);
     }
   for (auto& v : tiles[0].position_tangents) v.z[2] = 1;
   EXPECT_EQ(irregular(), 0u);
@@ -267,7 +267,7 @@ TEST(Touching, SeamsThatWereRoundedApartAreWelded) {
     x[5].z = std::nextafter(1.0f, 2.0f);
     for (Vec3f& p : x) p = p * scale;
     Mesh mesh = make_mesh(x, {{0, 2, 1}, {0, 1, 3}, {1, 4, 5}, {0, 3, 2}});
-    EXPECT_EQ(build_edge_mesh(mesh, true).count(EdgeClass::kBorder), 6u);
+    EXPECT_EQ(build_edge_mesh(mesh, true).count(EdgeClass::kBoundary), 6u);
     weld_seams(mesh);
     EXPECT_EQ(build_edge_mesh(mesh, true).count(EdgeClass::kSharp), 6u);
     EXPECT_TRUE(build_edge_mesh(mesh, true).one_sided_closed);

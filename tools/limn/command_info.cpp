@@ -36,10 +36,10 @@ json describe_shape(const Scene& scene, ShapeId id) {
           {"edges",
            {{"smooth", edges.count(EdgeClass::kSmooth)},
             {"sharp", edges.count(EdgeClass::kSharp)},
-            {"border", edges.count(EdgeClass::kBorder)},
+            {"border", edges.count(EdgeClass::kBoundary)},
             {"irregular", edges.count(EdgeClass::kIrregular)},
             {"flat", edges.count(EdgeClass::kFlat)}}},
-          {"closed", edges.count(EdgeClass::kBorder) + edges.count(EdgeClass::kIrregular) == 0},
+          {"closed", edges.count(EdgeClass::kBoundary) + edges.count(EdgeClass::kIrregular) == 0},
           {"bsdf", shape.bsdf->describe()},
           {"emitter", shape.is_emitter}};
 }
@@ -87,9 +87,9 @@ void print_parameter(const Parameter& parameter) {
 
 json describe_crossings(const Scene& scene, std::span<const Mesh* const> meshes,
                         std::span<const FacePair> pairs, int threads) {
-  const std::vector<CrossingSegment> segments = find_crossings(meshes, pairs, threads);
+  const std::vector<IntersectionSegment> segments = find_intersections(meshes, pairs, threads);
   std::set<ShapeId> shapes;
-  for (const CrossingSegment& segment : segments)
+  for (const IntersectionSegment& segment : segments)
     for (const FaceRef face : segment.faces) shapes.insert(face.shape);
   json names = json::array();
   for (const ShapeId shape : shapes) names.push_back(shape_name(scene, shape));

@@ -116,7 +116,7 @@ Vec3d turned(const Vec3d& v, double degrees) {
 json colors_json() {
   json colors = {{"edge_silhouette", css(kSilhouetteColor)},
                  {"edge_false_accept", css(kFalseAcceptColor)},
-                 {"edge_dead_end", css(kDeadEndColor)},
+                 {"edge_false_positive", css(kDeadEndColor)},
                  {"node", css(kNodeColor)},
                  {"point", css(kPointColor)}};
   const char* verdicts[] = {"true_reject", "true_accept", "false_accept", "missed"};

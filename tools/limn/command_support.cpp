@@ -364,7 +364,7 @@ std::optional<SampleCounts> parse_samples(const std::string& list) {
       list, kMost));
 }
 
-NonFinite::Place parse_place(const std::string& text) {
+NonFinite::SampleId parse_place(const std::string& text) {
   const std::vector<std::string> parts = split(text);
   const auto number = [&](size_t i) {
     size_t used = 0;
@@ -383,7 +383,7 @@ NonFinite::Place parse_place(const std::string& text) {
                    "\" is neither X,Y,S (a pixel and the number of its sample) nor TERM,N");
 }
 
-std::string repeat_command(const std::string& command_line, const NonFinite::Place& place) {
+std::string repeat_command(const std::string& command_line, const NonFinite::SampleId& place) {
   return command_line + " --debug-sample " +
          (place.x >= 0 ? fmt::format("{},{},{}", place.x, place.y, place.sample)
                        : fmt::format("{},{}", place.term, place.sample));

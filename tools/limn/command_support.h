@@ -86,7 +86,7 @@ std::vector<std::string> parse_terms(const std::string& list);
 // The counts of --samples; none for "auto".
 std::optional<SampleCounts> parse_samples(const std::string& list);
 // "X,Y,S", or "TERM,N" for a term's samples on the film.
-NonFinite::Place parse_place(const std::string& text);
+NonFinite::SampleId parse_place(const std::string& text);
 // What is told once on standard error and again under "warnings" of --json, by every command whose
 // result it concerns.
 class Warnings {
@@ -106,7 +106,7 @@ RunSettings make_settings(const CommonOptions& common, const Scene& scene,
                           const std::string& label);
 
 // The command that does one sample again.
-std::string repeat_command(const std::string& command_line, const NonFinite::Place& place);
+std::string repeat_command(const std::string& command_line, const NonFinite::SampleId& place);
 // Prints a warning about non-finite samples and the command that does the first again, and turns
 // the status into kNonFinite or kInterrupted where that is due. command_line: "" for commands that
 // cannot do one sample alone.

@@ -21,7 +21,7 @@ nb::dict describe_edges(const EdgeMesh& edges) {
   nb::dict counts;
   counts["smooth"] = edges.count(EdgeClass::kSmooth);
   counts["sharp"] = edges.count(EdgeClass::kSharp);
-  counts["border"] = edges.count(EdgeClass::kBorder);
+  counts["border"] = edges.count(EdgeClass::kBoundary);
   counts["irregular"] = edges.count(EdgeClass::kIrregular);
   counts["flat"] = edges.count(EdgeClass::kFlat);
   return counts;
@@ -41,7 +41,7 @@ nb::dict describe_shape(const Scene& scene, ShapeId id) {
   row["normals"] = kNormals[static_cast<int>(shape.mesh.normal_source)];
   row["bounds"] = std::vector{vector(bounds.lower), vector(bounds.upper)};
   row["edges"] = describe_edges(edges);
-  row["closed"] = edges.count(EdgeClass::kBorder) + edges.count(EdgeClass::kIrregular) == 0;
+  row["closed"] = edges.count(EdgeClass::kBoundary) + edges.count(EdgeClass::kIrregular) == 0;
   row["bsdf"] = shape.bsdf->describe();
   row["emitter"] = shape.is_emitter;
   return row;
@@ -51,9 +51,9 @@ nb::dict describe_crossings(const Scene& scene, int threads) {
   std::vector<const Mesh*> meshes;
   for (const Shape& shape : scene.shapes) meshes.push_back(&shape.mesh);
   const std::vector<FacePair> pairs = find_face_pairs(meshes, value(scene.camera.origin), threads);
-  const std::vector<CrossingSegment> segments = find_crossings(meshes, pairs, threads);
+  const std::vector<IntersectionSegment> segments = find_intersections(meshes, pairs, threads);
   std::set<ShapeId> shapes;
-  for (const CrossingSegment& segment : segments) {
+  for (const IntersectionSegment& segment : segments) {
     for (const FaceRef face : segment.faces) shapes.insert(face.shape);
   }
   std::vector<std::string> names;

@@ -74,7 +74,7 @@ class Bsdf {
 
   // True if no parameter of the pass changes this BSDF: `eval` on doubles is then exact where its
   // arguments are constant, too. False is always a safe answer.
-  virtual bool is_still() const { return false; }
+  virtual bool is_constant() const { return false; }
 
   // The summary that edge samplers use as importance. By default the hemisphere with albedo 1.
   virtual LobeSummary lobe() const { return {}; }

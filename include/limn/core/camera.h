@@ -77,10 +77,10 @@ class CameraView {
   S depth(const Vec3<S>& point) const { return dot(point - origin_, forward_); }
 
   const Vec3<S>& forward() const { return forward_; }
-  bool is_still() const {
-    using limn::is_still;
-    return is_still(origin_) && is_still(left_) && is_still(up_) && is_still(forward_) &&
-           is_still(tan_x_);
+  bool is_constant() const {
+    using limn::is_constant;
+    return is_constant(origin_) && is_constant(left_) && is_constant(up_) &&
+           is_constant(forward_) && is_constant(tan_x_);
   }
 
   // Camera::ray. X is S, or double if the film position is static.

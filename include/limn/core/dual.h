@@ -122,11 +122,13 @@ inline Dual max(const Dual& a, const Dual& b) { return a.v >= b.v ? a : b; }
 inline Dual min(const Dual& a, const Dual& b) { return a.v <= b.v ? a : b; }
 
 // True if all derivatives are zero.
-inline bool is_still(const Dual& a) { return is_zero(a.d); }
-inline bool is_still(const Vec3<Dual>& a) {
-  return is_still(a.x) && is_still(a.y) && is_still(a.z);
+inline bool is_constant(const Dual& a) { return is_zero(a.d); }
+inline bool is_constant(const Vec3<Dual>& a) {
+  return is_constant(a.x) && is_constant(a.y) && is_constant(a.z);
 }
-inline bool is_still(const Rgb<Dual>& a) { return is_still(a.r) && is_still(a.g) && is_still(a.b); }
+inline bool is_constant(const Rgb<Dual>& a) {
+  return is_constant(a.r) && is_constant(a.g) && is_constant(a.b);
+}
 
 inline double value(double a) { return a; }
 inline double value(const Dual& a) { return a.v; }

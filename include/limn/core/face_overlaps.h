@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "limn/core/face_copies.h"
+#include "limn/core/duplicate_faces.h"
 #include "limn/core/ray_tracer.h"
 
 namespace limn {
@@ -22,7 +22,8 @@ class FaceOverlaps {
   enum class Of { kAllFaces, kDifferentShapes };  // kDifferentShapes: no pairs within one shape
   // copies: of the same scene; both must outlive this. Of duplicates only the first is tested.
   // kDifferentShapes finds no near faces. InputError if there are more than kMostPairs.
-  FaceOverlaps(const Scene& scene, const FaceCopies& copies, int threads, Of of = Of::kAllFaces);
+  FaceOverlaps(const Scene& scene, const DuplicateFaces& copies, int threads,
+               Of of = Of::kAllFaces);
 
   static constexpr size_t kMostPairs = 1 << 24;  // about 0.9 GB
 
@@ -51,7 +52,7 @@ class FaceOverlaps {
   };
   // `faces`, their duplicates, and all faces that overlap any of them in a plane.
   Set in_place_of(std::span<const FaceRef> faces) const;
-  // Replaces the hit by the face that the rule (is_met_first) selects among its duplicates and
+  // Replaces the hit by the face that the rule (is_hit_first) selects among its duplicates and
   // coplanar faces, after near faces that lie in front of it.
   void settle(const Ray& ray, Hit& hit) const {
     if (has_others(hit.face) || !copies_->empty()) settle_among(ray, hit);
@@ -85,7 +86,7 @@ class FaceOverlaps {
   std::optional<Hit> first_of(std::span<const FaceRef> faces, const Ray& ray, double before) const;
 
   const Scene* scene_;
-  const FaceCopies* copies_;
+  const DuplicateFaces* copies_;
   std::vector<size_t> first_numbers_;  // first face number of each shape
   // True for a face in any pair, or a duplicate of one. Queried twice per ray; most faces are in no
   // pair.

@@ -28,14 +28,14 @@ class Lights {
 
   // A shading point with the estimated unoccluded irradiance of all lights [W / m^2, luminance].
   // Computed once per point.
-  struct Place {
+  struct Point {
     Vec3d p;
     double sum = 0;
     std::array<double, 4> first{};  // estimates of the first lights; their number is not tuned
   };
-  Place at(const Vec3d& p) const;
+  Point at(const Vec3d& p) const;
   // `at` for many points, eight at a time (SIMD).
-  void at(std::span<const Vec3d* const> p, std::span<Place* const> places) const;
+  void at(std::span<const Vec3d* const> p, std::span<Point* const> places) const;
   // Estimated unoccluded irradiance at p from a light (an index into all()), for a surface that
   // faces it [W / m^2, luminance].
   double estimate(size_t light, const Vec3d& p) const;
@@ -44,25 +44,25 @@ class Lights {
   using Numbers = std::array<double, 1 + std::tuple_size_v<LightNumbers>>;
   // A request for a sample at a place. Nothing means a sample of value zero (see Light::sample).
   struct Draw {
-    const Place* place;
+    const Point* place;
     std::optional<LightSample>* sample;
   };
   // draws[i] is sampled from u[i]; at most kMostDraws.
   static constexpr size_t kMostDraws = 64;
   void sample(std::span<const Draw> draws, std::span<const Numbers> u) const;
-  std::optional<LightSample> sample(const Place& place, Rng& rng) const;
+  std::optional<LightSample> sample(const Point& place, Rng& rng) const;
   // The density [1/sr] with which `sample` draws a hit on an emitting shape, or, for a ray that
   // leaves the scene, on the environment (which must exist).
-  double pdf(const Place& place, ShapeId shape, const LightView& view) const {
+  double pdf(const Point& place, ShapeId shape, const LightView& view) const {
     const size_t light = of_shape_[shape.index()];
     return all_[light]->pdf(view, probability(place, light));
   }
-  double pdf_environment(const Place& place, const Vec3d& wo) const {
+  double pdf_environment(const Point& place, const Vec3d& wo) const {
     return environment_->pdf_solid_angle(wo) * probability(place, area_lights_.size());
   }
   // Radiance and density of the environment in the static direction wo. at: Environment::find.
   template <class S>
-  Environment::Sight<S> environment(const Place& place, const Vec3d& wo,
+  Environment::Sight<S> environment(const Point& place, const Vec3d& wo,
                                     const std::array<double, 2>& at) const {
     Environment::Sight<S> sight;
     environment_->look(wo, at, sight);
@@ -80,14 +80,14 @@ class Lights {
     double luminance = 0;  // of its radiance
     double constant = 0;   // irradiance that is the same everywhere
   };
-  static Reach reach_of(const Light& lamp);
+  static Reach reach_of(const Light& emitter);
   template <class S>
   static S estimate(const Reach& reach, const Vec3<S>& p);
-  double estimate(size_t light, const Place& place) const {
+  double estimate(size_t light, const Point& place) const {
     return light < place.first.size() ? place.first[light] : estimate(light, place.p);
   }
-  size_t choose(const Place& place, double u) const;
-  double probability(const Place& place, size_t light) const;
+  size_t choose(const Point& place, double u) const;
+  double probability(const Point& place, size_t light) const;
 
   std::vector<std::unique_ptr<Light>> area_lights_;
   std::vector<const Light*> all_;

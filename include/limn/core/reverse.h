@@ -17,8 +17,8 @@ struct ShadingAdjoint {
   Vec3d x;
   std::array<Vec3d, 3> corners, normals;
 };
-// of_p, of_normal: of the point that x is lifted to, seen along `direction`, and of the unit shading
-// normal there.
+// of_p, of_normal: of the point that x is lifted to, seen along `direction`, and of the unit
+// shading normal there.
 ShadingAdjoint pull_back_shading(const Scene& scene, FaceRef face, const Vec3d& x,
                                  const Vec3d& direction, const Vec3d& of_p, const Vec3d& of_normal);
 
@@ -30,7 +30,7 @@ SurfacePoint<Var> surface_on_ray<Var>(const Scene& scene, FaceRef face, const Ve
 template <>
 Rgb<Var> Light::drawn_radiance<Var>(const LightSample& sample) const;
 template <>
-Environment::Sight<Var> Lights::environment<Var>(const Place& place, const Vec3d& wo,
+Environment::Sight<Var> Lights::environment<Var>(const Point& place, const Vec3d& wo,
                                                  const std::array<double, 2>& at) const;
 
 // Radiance from the environment in a direction that may depend on parameters.

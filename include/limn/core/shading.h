@@ -34,11 +34,11 @@ class Scattering {
     if (!front_) n_ = -n_;
     if (!mitsuba && point.shape->mesh.normal_source != NormalSource::kFace) bend();
     if constexpr (std::is_same_v<S, Dual>) {
-      still_ = is_still(n_) && is_still(wi_) && bsdf_ && bsdf_->is_still();
+      still_ = is_constant(n_) && is_constant(wi_) && bsdf_ && bsdf_->is_constant();
     }
     if constexpr (std::is_same_v<S, Var>) {
       copies_ = Tape::current()->slots()->bsdfs[point.face.shape.index()][front_];
-      still_ = is_still(n_) && is_still(wi_) && !copies_;
+      still_ = is_constant(n_) && is_constant(wi_) && !copies_;
     }
   }
 
@@ -66,7 +66,7 @@ class Scattering {
     Scattering<Dual> still(*this);
     still.hold();
     Rgb<Dual> f = still.eval(wo);
-    if (!bsdf_->is_still()) f = f - still.eval(value(wo));
+    if (!bsdf_->is_constant()) f = f - still.eval(value(wo));
     Rgb<Lanes> result;
     for (int k = 0; k < kLanes; ++k) {
       if (wo.x.d[k] == 0 && wo.y.d[k] == 0 && wo.z.d[k] == 0) continue;

@@ -30,7 +30,7 @@ class ShadowOutlines {
   void add(std::span<const Point> corners, std::span<const uint32_t> tags, bool of_light,
            uint32_t cancelled = 0);
 
-  enum class Kind : uint8_t { kFirst, kSecond, kCrossing };
+  enum class Kind : uint8_t { kFirst, kSecond, kIntersection };
   // An end of a piece: the first or second end (in lexicographic order) of the side `tag`, or the
   // intersection of the piece's own side with it.
   struct End {

@@ -141,7 +141,7 @@ inline Rgb<Var> eval_bsdf<Var>(const Bsdf& bsdf, const SeededCopies<Bsdf>* copie
   Jacobian jacobian;
   std::optional<Rgb<double>> f;
   const auto add = [&](const Vec3<Var>& x, const auto& eval) {
-    if (is_still(x)) return;
+    if (is_constant(x)) return;
     const Rgb<Dual> moving = eval(along_axes(x));
     jacobian.add(x, moving);
     f = value(moving);

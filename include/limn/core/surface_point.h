@@ -51,11 +51,12 @@ S interpolate(const S& b0, const S& b1, const S& b2, const S& a0, const S& a1, c
   return b0 * a0 + b1 * a1 + b2 * a2;
 }
 
-// The less, the nearer is the start to the face, and the noisier are derivatives where the faces of a
-// hollow are seen from themselves. Not tuned.
+// The less, the nearer is the start to the face, and the noisier are derivatives where the faces of
+// a hollow are seen from themselves. Not tuned.
 inline constexpr double kHollowLift = 0.125;
 
-// How far each corner lifts a point (the factors g_k above), and whether it comes clear of the face.
+// How far each corner lifts a point (the factors g_k above), and whether it comes clear of the
+// face.
 struct Lift {
   std::array<double, 3> gain{};
   bool clear = false;
@@ -208,7 +209,7 @@ SurfacePoint<S> surface_on_ray(const Scene& scene, FaceRef face, const Vec3<S>& 
       detail::place_on_plane<S, Dual>(mesh, origin, direction, lifts, point);
       return point;
     }
-    if (is_still(origin) && is_still(direction) && mesh.normal_tangents.empty()) {
+    if (is_constant(origin) && is_constant(direction) && mesh.normal_tangents.empty()) {
       point = detail::as_dual(surface_on_ray<double>(scene, face, value(origin), value(direction)));
       return point;
     }

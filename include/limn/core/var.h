@@ -96,14 +96,14 @@ inline Var max(const Var& a, const Var& b) { return a.v >= b.v ? a : b; }
 inline Var min(const Var& a, const Var& b) { return a.v <= b.v ? a : b; }
 
 inline double value(const Var& a) { return a.v; }
-inline bool is_still(const Var& a) { return a.node == 0; }
-inline bool is_still(const Vec3<Var>& a) { return (a.x.node | a.y.node | a.z.node) == 0; }
-inline bool is_still(const Rgb<Var>& a) { return (a.r.node | a.g.node | a.b.node) == 0; }
+inline bool is_constant(const Var& a) { return a.node == 0; }
+inline bool is_constant(const Vec3<Var>& a) { return (a.x.node | a.y.node | a.z.node) == 0; }
+inline bool is_constant(const Rgb<Var>& a) { return (a.r.node | a.g.node | a.b.node) == 0; }
 
 // Dot product and normalisation as one statement each, instead of five and ten.
 inline Var dot(const Vec3<Var>& a, const Vec3<Var>& b) {
   const double v = dot(value(a), value(b));
-  if (is_still(a) && is_still(b)) return v;
+  if (is_constant(a) && is_constant(b)) return v;
   Tape& tape = *Tape::current();
   for (int k = 0; k < 3; ++k) tape.entry(a[k].node, b[k].v);
   for (int k = 0; k < 3; ++k) tape.entry(b[k].node, a[k].v);
@@ -111,7 +111,7 @@ inline Var dot(const Vec3<Var>& a, const Vec3<Var>& b) {
 }
 inline Var dot(const Vec3<Var>& a, const Vec3d& b) {
   const double v = dot(value(a), b);
-  if (is_still(a)) return v;
+  if (is_constant(a)) return v;
   Tape& tape = *Tape::current();
   for (int k = 0; k < 3; ++k) tape.entry(a[k].node, b[k]);
   return {v, tape.end()};
@@ -121,7 +121,7 @@ inline Vec3<Var> normalize(const Vec3<Var>& a) {
   const Vec3d v = value(a);
   const double size = length(v);
   const Vec3d u = v / size;
-  if (is_still(a)) return {u.x, u.y, u.z};
+  if (is_constant(a)) return {u.x, u.y, u.z};
   Tape& tape = *Tape::current();
   Vec3<Var> unit;
   for (int k = 0; k < 3; ++k) {

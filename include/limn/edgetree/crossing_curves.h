@@ -11,7 +11,7 @@
 namespace limn {
 
 // The segment in which two faces intersect.
-struct CrossingSegment {
+struct IntersectionSegment {
   std::array<FaceRef, 2> faces;
   // In double precision, on both planes to rounding. Where the curve continues across an edge, the
   // adjacent segments share the end bit for bit.
@@ -24,33 +24,33 @@ struct CrossingSegment {
 // not intersect. Faces with a common corner may intersect. meshes: of the scene's shapes, in order;
 // pairs: from find_face_pairs, for any viewer. The result is sorted by faces and does not depend on
 // `threads`.
-std::vector<CrossingSegment> find_crossings(std::span<const Mesh* const> meshes,
-                                            std::span<const FacePair> pairs, int threads);
+std::vector<IntersectionSegment> find_intersections(std::span<const Mesh* const> meshes,
+                                                    std::span<const FacePair> pairs, int threads);
 
 // Velocity of the intersection line of two faces at a point x of it: the vector in the span of both
 // normals that has each plane's normal velocity. Linear in x along the line, since velocities are
 // linear over a face. Zero in lanes where neither face moves.
-Vec3<Lanes> crossing_velocity(std::span<const Mesh* const> meshes, const CrossingSegment& segment,
-                              const Vec3d& x);
+Vec3<Lanes> intersection_velocity(std::span<const Mesh* const> meshes,
+                                  const IntersectionSegment& segment, const Vec3d& x);
 
 // A part of an edge that rests on faces of other shapes which move towards it or away from it: the
 // bottom edge of a box on a floor that is raised, or on an equal box. When pressed, the box ends at
-// its intersection with the floor, which moves by crossing_velocity.
+// its intersection with the floor, which moves by intersection_velocity.
 struct ContactLine {
   EdgeRef edge;
   std::array<Vec3d, 2> ends;
-  uint8_t rim = 0;
+  uint8_t motion_group = 0;
   // All faces around it (edges.h): first the face that ends here, then one that it rests on.
   std::vector<FaceRef> faces;
   std::vector<Incidence> incidences;
   std::vector<FaceRef> near = {};  // FacesAround::near
 };
 
-// Converts the segments, then the contact lines, to edges: class kCrossing, each with its own two
-// vertices, planes and faces; a segment lies inside of both faces. Edges move by crossing_velocity;
-// `shape` is none.
-EdgeMesh crossing_edges(std::span<const Mesh* const> meshes,
-                        std::span<const CrossingSegment> segments,
-                        std::span<const ContactLine> contacts = {});
+// Converts the segments, then the contact lines, to edges: class kIntersection, each with its own
+// two vertices, planes and faces; a segment lies inside of both faces. Edges move by
+// intersection_velocity; `shape` is none.
+EdgeMesh intersection_edges(std::span<const Mesh* const> meshes,
+                            std::span<const IntersectionSegment> segments,
+                            std::span<const ContactLine> contacts = {});
 
 }  // namespace limn

@@ -26,10 +26,10 @@ struct EdgePiece {
   double weight;                  // > 0
 
   // A point for u uniform in [0, 1), and its density with respect to the edge's parameter t.
-  struct Place {
+  struct Sample {
     double t, density;
   };
-  Place place(double u) const;
+  Sample place(double u) const;
 };
 
 // Appends the parts of the edges inside of the cone and above the query's horizon, in pieces of at

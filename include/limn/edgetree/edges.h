@@ -19,7 +19,7 @@ enum class EdgeClass : uint8_t {
   // Two faces with different shading normals: discontinuous if p sees one of the faces.
   kSharp,
   // A boundary edge, with one face: discontinuous from everywhere.
-  kBorder,
+  kBoundary,
   // Non-manifold: more than two faces, two of opposite orientation, or united edges (touching.h).
   // Treated as discontinuous from everywhere.
   kIrregular,
@@ -28,7 +28,7 @@ enum class EdgeClass : uint8_t {
   kFlat,
   // An intersection segment of two faces of any shapes, see crossing_curves.h. Treated as
   // discontinuous from everywhere.
-  kCrossing,
+  kIntersection,
 };
 
 const char* edge_class_name(EdgeClass edge_class);
@@ -39,14 +39,14 @@ struct Edge {
   std::array<VertexId, 2> vertices;
   std::array<FaceId, 2> faces;  // adjacent faces of its own mesh; [1] is none on a boundary edge
   EdgeClass edge_class = EdgeClass::kSmooth;
-  bool concave = false;  // each of the two faces is in front of the other's plane
-  uint8_t rim = 0;       // motion group: the edge moves with the faces of this number
+  bool concave = false;      // each of the two faces is in front of the other's plane
+  uint8_t motion_group = 0;  // motion group: the edge moves with the faces of this number
 };
 
 // Not in any motion group: the surface continues across the edge.
-inline constexpr uint8_t kNoRim = 255;
+inline constexpr uint8_t kNoMotionGroup = 255;
 // Limit on motion groups at one place; the last one stands for all others.
-inline constexpr uint8_t kMostRims = 8;
+inline constexpr uint8_t kMostMotionGroups = 8;
 
 // The relation of a face to an edge.
 struct Incidence {
@@ -54,9 +54,9 @@ struct Incidence {
   // else the edge is on the face's boundary.
   bool through = false;
   // The motion group: faces whose common boundary moves alike share a number. With several groups
-  // at one place, each has an edge of its own. kNoRim: the edge passes through the face, or a
-  // coplanar face of equal appearance and motion continues it.
-  uint8_t rim = 0;
+  // at one place, each has an edge of its own. kNoMotionGroup: the edge passes through the face, or
+  // a coplanar face of equal appearance and motion continues it.
+  uint8_t motion_group = 0;
   bool operator==(const Incidence&) const = default;
 };
 

@@ -5,7 +5,7 @@
 //             + camera   (silhouettes on the film)
 //             + boundary (silhouettes that shading points see)
 //             + shadow   (edges of sharp shadows, where the scene has lights without extent)
-//             + direct + penumbra (silhouettes that shading points see before lamps and the sun,
+//             + direct + penumbra (silhouettes that shading points see before emitters and the sun,
 //                                  the edges of soft shadows; of methods that keep this apart)
 // after Li et al. 2018 with directions held fixed in solid angle everywhere.
 #include <initializer_list>
@@ -147,6 +147,7 @@ GradientResult gradient(const Scene& scene, const GradientOptions& options,
 // those of the run, which matter for points on the film. InputError as above and if there is no
 // such sample.
 std::vector<std::string> trace_sample(const Scene& scene, const GradientOptions& options,
-                                      const RunSettings& settings, const NonFinite::Place& place);
+                                      const RunSettings& settings,
+                                      const NonFinite::SampleId& place);
 
 }  // namespace limn

@@ -26,7 +26,7 @@ MeshDistance mesh_distance(const Mesh& mesh, const Mesh& truth, size_t samples, 
 // no outside.
 std::optional<size_t> count_inside_out(const Mesh& mesh, int threads);
 
-// Pairs of the mesh's faces that pass through each other (find_crossings).
+// Pairs of the mesh's faces that pass through each other (find_intersections).
 size_t count_crossings(const Mesh& mesh, int threads);
 
 }  // namespace limn

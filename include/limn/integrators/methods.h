@@ -54,7 +54,7 @@ struct MethodType {
   std::optional<ReverseMethod> reverse = std::nullopt;
   // As trace_sample() in gradient.h; none for methods that cannot.
   std::function<std::vector<std::string>(const MethodType&, const Scene&, const GradientOptions&,
-                                         const RunSettings&, const NonFinite::Place&)>
+                                         const RunSettings&, const NonFinite::SampleId&)>
       trace = nullptr;
 
   bool can(Task task) const;

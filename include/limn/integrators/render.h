@@ -43,14 +43,14 @@ struct RenderOptions {
   bool exact_film = false;
   FilmPoints points = FilmPoints::kRandom;  // InputError for others where light is sampled
   RenderWhat what = RenderWhat::kImage;     // InputError where the method does not know it
-  // silhouettes, lines: lines through the sky, 1 to 16384; a quarter of them through a lamp. With a
+  // silhouettes, lines: lines through the sky, 1 to 16384; a quarter of them through a emitter. With a
   // tolerance above 0 (at most 1) they, 8 at least, are doubled until two halves differ by at most
   // twice this part of the result, or until there are 16384, which RenderResult::warnings tells;
   // what is left of the error is no longer without bias, and silhouettes takes lines everywhere.
   // InputError for others.
   int lines = 64;
   double tolerance = 0;
-  int rays = 4;  // rays: of each point for each lamp and the sky, 1 to 2^20
+  int rays = 4;  // rays: of each point for each emitter and the sky, 1 to 2^20
   // InputError for others than kGenerators. Owen-scrambled Sobol' points fill a pixel's ranges
   // evenly: a third of the squared error, mostly; but batches are then not independent, and the
   // variances of `radiance` are no error, nor a bound of it: mostly too large, at times too small.
@@ -65,7 +65,7 @@ RenderResult render(const Scene& scene, const RunSettings& settings,
 // One sample done again with all it meets written down, line by line. InputError if the image has
 // no such pixel.
 std::vector<std::string> trace_sample(const Scene& scene, const RunSettings& settings,
-                                      const NonFinite::Place& place,
+                                      const NonFinite::SampleId& place,
                                       const RenderOptions& options = {});
 
 }  // namespace limn

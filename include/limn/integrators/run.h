@@ -34,14 +34,14 @@ struct RunSettings {
 // Samples that came out infinite or not a number. They count as zero, and the run must end with an
 // error.
 struct NonFinite {
-  struct Place {
+  struct SampleId {
     int x, y;  // pixel of the full film; -1 for samples that do not belong to one
     int64_t sample;
     std::string term;
   };
   uint64_t count = 0;
-  std::vector<Place> first;  // at most ten
-  void add(const Place& place);
+  std::vector<SampleId> first;  // at most ten
+  void add(const SampleId& place);
   void merge(const NonFinite& other);
   // "3 non-finite samples, first at pixel (x, y), sample s, term t; ..."
   std::string message() const;
@@ -59,8 +59,8 @@ struct LargestSample {
   double square = 0;   // its squared magnitude: over channels and parameters, each in units of its
                        // natural step
   double squares = 0;  // the same, summed over all samples
-  NonFinite::Place place{-1, -1, 0, ""};
-  void add(double squared_magnitude, const NonFinite::Place& where);
+  NonFinite::SampleId place{-1, -1, 0, ""};
+  void add(double squared_magnitude, const NonFinite::SampleId& where);
   void merge(const LargestSample& other);
   // The share of the sum that this one sample makes, in [0, 1].
   double share() const { return squares > 0 ? square / squares : 0; }

@@ -69,7 +69,7 @@ void print_summary(std::span<const RejectVariant> variants) {
            {Verdict::kTrueReject, Verdict::kTrueAccept, Verdict::kFalseAccept})
         fmt::print(" {:7.2f}", 100 * share(of(counts, verdict), points_of(counts)));
     fmt::print(" {:>8} {:>7} {:>8} {:8.2f}  {:.4f} +- {:.4f}\n", v.reach.silhouettes.size(),
-               v.reach.false_accepts.size(), v.reach.dead_ends.size(),
+               v.reach.false_accepts.size(), v.reach.false_positives.size(),
                reached_per_silhouette(v.counts), v.hits.mean, v.hits.standard_error);
   }
 }
@@ -122,7 +122,7 @@ json to_json(const RejectVariant& v) {
           {"reachable_edges", v.reach.silhouettes.size() + v.reach.false_accepts.size()},
           {"silhouettes", v.reach.silhouettes.size()},
           {"false_accepts", v.reach.false_accepts.size()},
-          {"dead_end_edges", v.reach.dead_ends.size()},
+          {"false_positive_edges", v.reach.false_positives.size()},
           {"missed", v.missed()},
           {"reached_per_silhouette", reached_per_silhouette(v.counts)},
           {"hit_rate", v.hits.mean},
@@ -133,7 +133,7 @@ json to_json(const RejectVariant& v) {
 std::string summary_csv(std::span<const RejectVariant> variants) {
   std::string text =
       "variant,node_edges,node_overlap,slice,true_reject,true_accept,false_accept,missed,hit_rate,"
-      "hit_rate_stderr,reached_per_silhouette,silhouettes,false_accepts,dead_end_edges\n";
+      "hit_rate_stderr,reached_per_silhouette,silhouettes,false_accepts,false_positive_edges\n";
   for (const RejectVariant& v : variants) {
     for (size_t i = 0; i < v.slices.size(); ++i) {
       const VerdictCounts& c = v.slices[i];
@@ -141,7 +141,7 @@ std::string summary_csv(std::span<const RejectVariant> variants) {
                           v.node.end - v.node.begin, v.match.overlap, i, fmt::join(c, ","),
                           v.hits.mean, v.hits.standard_error, reached_per_silhouette(v.counts),
                           v.reach.silhouettes.size(), v.reach.false_accepts.size(),
-                          v.reach.dead_ends.size());
+                          v.reach.false_positives.size());
     }
   }
   return text;

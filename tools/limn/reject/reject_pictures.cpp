@@ -170,7 +170,7 @@ Image reach_picture(const MeshView& view, Image clay, const EdgeMesh& edges, con
     paint(clay, hidden, srgb(color), faint);
     paint(clay, visible, srgb(color));
   };
-  draw(reach.dead_ends, 1.8, kDeadEndColor, 0.15);
+  draw(reach.false_positives, 1.8, kDeadEndColor, 0.15);
   draw(reach.false_accepts, 2.6, kFalseAcceptColor, 0.15);
   draw(reach.silhouettes, 4.0, kSilhouetteColor, 0.3);
   draw(reach.missed, 6.0, kVerdictColors[static_cast<int>(Verdict::kMissed)], 1);

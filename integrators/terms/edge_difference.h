@@ -28,9 +28,9 @@ bool view_edge(const EdgeMesh& mesh, EdgeRef id, double t, const Vec3d& p, EdgeV
 // the path has scattered, p included; part: of the radiance; known_behind: y is seen, and what lies
 // behind the edge is this face, or none (null: a ray tells both). The unit directions and both
 // faces are exact, nothing is offset.
-bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView& view,
-               FaceRef start, double t_min, double t_max, int bounces, const Rng& key,
-               RayCount& rays, Rgb<double>& jump, const RadiancePart& part = {},
-               const FaceRef* known_behind = nullptr);
+bool edge_difference(const PathContext& context, const EdgeMesh& mesh, const EdgeView& view,
+                     FaceRef start, double t_min, double t_max, int bounces, const Rng& key,
+                     RayCount& rays, Rgb<double>& jump, const RadiancePart& part = {},
+                     const FaceRef* known_behind = nullptr);
 
 }  // namespace limn

@@ -11,16 +11,16 @@
 namespace limn {
 
 // True if two faces have the same three corners.
-bool are_copies(const Scene& scene, FaceRef a, FaceRef b);
+bool are_duplicates(const Scene& scene, FaceRef a, FaceRef b);
 
 // True if a ray along `direction` hits `a` rather than its duplicate `b`: a front face wins over a
 // back face, then an emitter over a non-emitter, then the earlier face in the file.
-bool is_met_first(const Scene& scene, FaceRef a, FaceRef b, const Vec3d& direction);
+bool is_hit_first(const Scene& scene, FaceRef a, FaceRef b, const Vec3d& direction);
 
 // All sets of duplicate faces of a scene.
-class FaceCopies {
+class DuplicateFaces {
  public:
-  explicit FaceCopies(const Scene& scene);
+  explicit DuplicateFaces(const Scene& scene);
 
   bool empty() const { return sets_.empty(); }
   const std::vector<std::vector<FaceRef>>& sets() const {
@@ -49,9 +49,9 @@ class FaceCopies {
 };
 
 // One warning for each pair of shapes with duplicate faces of equal winding.
-void warn_of_copies(const Scene& scene, const FaceCopies& copies,
-                    std::vector<std::string>& warnings);
+void warn_of_duplicates(const Scene& scene, const DuplicateFaces& copies,
+                        std::vector<std::string>& warnings);
 // The shape's id in quotes, or its number.
-std::string name_in_text(const Scene& scene, ShapeId shape);
+std::string quoted_name(const Scene& scene, ShapeId shape);
 
 }  // namespace limn

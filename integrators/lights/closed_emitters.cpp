@@ -1,4 +1,4 @@
-// Which scenes have their light in closed form, and the planes of their lamps.
+// Which scenes have their light in closed form, and the planes of their emitters.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,7 +10,8 @@
 namespace limn {
 namespace {
 
-// Planes of a lamp are told apart beyond so many roundings of its coordinates to floats. Not tuned.
+// Planes of an emitter are told apart beyond so many roundings of its coordinates to floats. Not
+// tuned.
 constexpr double kRoundings = 8 * 0x1p-24;
 constexpr const char* kInstead = "use another method (render: path)";
 
@@ -35,11 +36,11 @@ void check_closed_light(const Scene& scene) {
   }
   if (scene.environment) {
     refuse(whole, fmt::format("{}: light from all around has no closed form here: {}",
-                              name_in_text("emitter", scene.environment_id), kInstead));
+                              quoted_name("emitter", scene.environment_id), kInstead));
   }
   for (const auto& light : scene.delta_lights) {
     refuse(whole, fmt::format("{}: only area lights are integrated: {}",
-                              name_in_text("emitter", light->id), kInstead));
+                              quoted_name("emitter", light->id), kInstead));
   }
   for (const Shape& shape : scene.shapes) {
     for (const bool front : {true, false}) {
@@ -67,17 +68,17 @@ uint64_t next_number() {
 
 }  // namespace
 
-ClosedLight::Places::Places(const Scene& scene, int threads)
+ClosedLight::SharedGeometry::SharedGeometry(const Scene& scene, int threads)
     : number(next_number()), copies(scene), overlaps(scene, copies, threads), tree(scene) {}
 
 ClosedLight::ClosedLight(const Scene& scene, int threads, By by)
     : scene_((check_closed_light(scene), scene)),
-      places_(std::make_shared<Places>(scene, threads)),
+      places_(std::make_shared<SharedGeometry>(scene, threads)),
       copies_(places_->copies),
       overlaps_(places_->overlaps),
       tree_(places_->tree),
       by_(by) {
-  add_lamps();
+  add_emitters();
 }
 
 ClosedLight::ClosedLight(const Scene& scene, const ClosedLight& same)
@@ -87,12 +88,12 @@ ClosedLight::ClosedLight(const Scene& scene, const ClosedLight& same)
       overlaps_(places_->overlaps),
       tree_(places_->tree),
       by_(same.by_) {
-  add_lamps();
+  add_emitters();
 }
 
-void ClosedLight::add_lamps() {
+void ClosedLight::add_emitters() {
   for (uint32_t s = 0; s < scene_.shapes.size(); ++s) {
-    if (scene_.shapes[s].is_emitter && scene_.max_depth == 2) add_lamp(ShapeId(s));
+    if (scene_.shapes[s].is_emitter && scene_.max_depth == 2) add_emitter(ShapeId(s));
   }
 }
 
@@ -118,7 +119,7 @@ bool move_alike(const Mesh& mesh, FaceRef first, FaceRef second) {
 
 }  // namespace
 
-void ClosedLight::add_lamp(ShapeId id) {
+void ClosedLight::add_emitter(ShapeId id) {
   const Shape& shape = scene_.shape(id);
   const Mesh& mesh = shape.mesh;
   struct Face {
@@ -142,56 +143,58 @@ void ClosedLight::add_lamp(ShapeId id) {
   // The largest face knows its plane best.
   std::stable_sort(faces.begin(), faces.end(),
                    [](const Face& a, const Face& b) { return a.area > b.area; });
-  const size_t before = lamps_.size();
+  const size_t before = emitters_.size();
   for (const Face& face : faces) {
-    const auto fits = [&](const LampPlane& lamp) {
-      return dot(lamp.plane.n, face.normal) > 0.5 && move_alike(mesh, lamp.faces[0], face.ref) &&
+    const auto fits = [&](const EmitterPlane& emitter) {
+      return dot(emitter.plane.n, face.normal) > 0.5 &&
+             move_alike(mesh, emitter.faces[0], face.ref) &&
              std::all_of(face.corners.begin(), face.corners.end(), [&](const Vec3d& x) {
-               return std::fabs(lamp.plane.distance(x)) <= kRoundings * size;
+               return std::fabs(emitter.plane.distance(x)) <= kRoundings * size;
              });
     };
-    auto lamp = std::find_if(lamps_.begin() + static_cast<ptrdiff_t>(before), lamps_.end(), fits);
-    if (lamp == lamps_.end()) {
-      LampPlane& added = lamps_.emplace_back();
+    auto emitter =
+        std::find_if(emitters_.begin() + static_cast<ptrdiff_t>(before), emitters_.end(), fits);
+    if (emitter == emitters_.end()) {
+      EmitterPlane& added = emitters_.emplace_back();
       added.shape = id;
       added.plane = {face.normal, -dot(face.normal, face.corners[0])};
       added.deviation = 2 * kRoundings * size;
-      lamp = lamps_.end() - 1;
+      emitter = emitters_.end() - 1;
     }
-    lamp->faces.push_back(face.ref);
-    lamp->hull.insert(lamp->hull.end(), face.corners.begin(), face.corners.end());
+    emitter->faces.push_back(face.ref);
+    emitter->hull.insert(emitter->hull.end(), face.corners.begin(), face.corners.end());
   }
-  if (lamps_.size() - before > kMostPlanes) {
+  if (emitters_.size() - before > kMostPlanes) {
     refuse(shape.where,
            fmt::format("{} has {} planes, at most {} are integrated: {}", shape_in_text(shape),
-                       lamps_.size() - before, kMostPlanes, kInstead));
+                       emitters_.size() - before, kMostPlanes, kInstead));
   }
-  for (size_t i = before; i < lamps_.size(); ++i) finish(lamps_[i]);
+  for (size_t i = before; i < emitters_.size(); ++i) finish(emitters_[i]);
 }
 
-// The axes along which the lamp's box is smallest, and what lies in its plane before it.
-void ClosedLight::finish(LampPlane& lamp) const {
+// The axes along which the emitter's box is smallest, and what lies in its plane before it.
+void ClosedLight::finish(EmitterPlane& emitter) const {
   double least = std::numeric_limits<double>::infinity();
-  for (size_t i = 0; i < lamp.hull.size(); ++i) {
+  for (size_t i = 0; i < emitter.hull.size(); ++i) {
     const size_t next = i % 3 == 2 ? i - 2 : i + 1;
-    const Vec3d side = lamp.hull[next] - lamp.hull[i];
-    const Vec3d u = normalize(side - lamp.plane.n * dot(side, lamp.plane.n));
-    const Vec3d v = cross(u, lamp.plane.n);  // (u x v) . (-n) = 1
+    const Vec3d side = emitter.hull[next] - emitter.hull[i];
+    const Vec3d u = normalize(side - emitter.plane.n * dot(side, emitter.plane.n));
+    const Vec3d v = cross(u, emitter.plane.n);  // (u x v) . (-n) = 1
     double x0 = 1e300, x1 = -1e300, y0 = 1e300, y1 = -1e300;
-    for (const Vec3d& x : lamp.hull) {
+    for (const Vec3d& x : emitter.hull) {
       x0 = std::min(x0, dot(u, x)), x1 = std::max(x1, dot(u, x));
       y0 = std::min(y0, dot(v, x)), y1 = std::max(y1, dot(v, x));
     }
     if (!((x1 - x0) * (y1 - y0) < least)) continue;
     least = (x1 - x0) * (y1 - y0);
-    lamp.u = u, lamp.v = v;
-    lamp.x0 = x0, lamp.x1 = x1, lamp.y0 = y0, lamp.y1 = y1;
+    emitter.u = u, emitter.v = v;
+    emitter.x0 = x0, emitter.x1 = x1, emitter.y0 = y0, emitter.y1 = y1;
   }
-  lamp.in_place = overlaps_.in_place_of(lamp.faces);
-  for (const FaceRef face : lamp.faces) {
+  emitter.in_place = overlaps_.in_place_of(emitter.faces);
+  for (const FaceRef face : emitter.faces) {
     for (const FaceRef other : overlaps_.of(face)) {
-      const FaceRef met = copies_.met(other, -lamp.plane.n, false).value_or(other);
-      if (is_met_first(scene_, met, face, -lamp.plane.n)) lamp.before.push_back(met);
+      const FaceRef met = copies_.met(other, -emitter.plane.n, false).value_or(other);
+      if (is_hit_first(scene_, met, face, -emitter.plane.n)) emitter.before.push_back(met);
     }
   }
 }

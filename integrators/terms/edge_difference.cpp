@@ -1,11 +1,11 @@
 // The jump of radiance across an edge: which faces lie on either side, and a path from each.
-#include "integrators/terms/edge_jump.h"
+#include "integrators/terms/edge_difference.h"
 
 #include <algorithm>
 
 #include "integrators/edges/near_faces.h"
 #include "integrators/paths/path_follow.h"
-#include "limn/core/face_copies.h"
+#include "limn/core/duplicate_faces.h"
 
 namespace limn {
 
@@ -34,7 +34,7 @@ struct Sides {
 // Whether a face is seen before another one on the same side.
 bool hides(const PathContext& context, const FaceSide& a, double slope_a, const FaceSide& b,
            double slope_b, const Vec3d& omega) {
-  if (overlap(context.tracer, a, b)) return is_met_first(context.scene, a.face, b.face, omega);
+  if (overlap(context.tracer, a, b)) return is_hit_first(context.scene, a.face, b.face, omega);
   return slope_a < slope_b;
 }
 
@@ -64,21 +64,21 @@ Sides nearest_faces(const PathContext& context, const EdgeMesh& mesh, const Edge
     for_every_side(scene, around, view.x0, along, [&](const FaceSide& side, Incidence incidence) {
       const double alpha = dot(side.into, view.side);
       if (alpha == 0 || (hide_emitters && scene.shape(side.face.shape).is_emitter)) return;
-      visit(side, incidence.rim, alpha > 0, dot(side.into, across) / std::fabs(alpha));
+      visit(side, incidence.motion_group, alpha > 0, dot(side.into, across) / std::fabs(alpha));
     });
   };
   RimOrder order;
   if (!around.incidences.empty()) {
-    for_every_seen_side([&](const FaceSide&, uint8_t rim, bool positive, double slope) {
-      order.add(rim, positive, slope);
+    for_every_seen_side([&](const FaceSide&, uint8_t motion_group, bool positive, double slope) {
+      order.add(motion_group, positive, slope);
     });
   }
   Sides sides;
   double slopes[2] = {0, 0};
-  const uint8_t own = mesh.edge(view.id.edge).rim;
-  for_every_seen_side([&](const FaceSide& side, uint8_t rim, bool positive, double slope) {
+  const uint8_t own = mesh.edge(view.id.edge).motion_group;
+  for_every_seen_side([&](const FaceSide& side, uint8_t motion_group, bool positive, double slope) {
     for (const bool place : {false, true}) {
-      if (!order.is_seen(rim, positive, own, place)) continue;
+      if (!order.is_seen(motion_group, positive, own, place)) continue;
       auto& nearest = place ? sides.positive : sides.negative;
       if (nearest && !hides(context, side, slope, *nearest, slopes[place], view.omega)) continue;
       nearest = side;
@@ -154,10 +154,10 @@ class RadianceBeside {
 
 }  // namespace
 
-bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView& view,
-               FaceRef start, double t_min, double t_max, int bounces, const Rng& key,
-               RayCount& rays, Rgb<double>& jump, const RadiancePart& part,
-               const FaceRef* known_behind) {
+bool edge_difference(const PathContext& context, const EdgeMesh& mesh, const EdgeView& view,
+                     FaceRef start, double t_min, double t_max, int bounces, const Rng& key,
+                     RayCount& rays, Rgb<double>& jump, const RadiancePart& part,
+                     const FaceRef* known_behind) {
   Ray ray{view.p, view.omega};
   ray.t_min = t_min;
   ray.t_max = t_max;
@@ -166,9 +166,12 @@ bool edge_jump(const PathContext& context, const EdgeMesh& mesh, const EdgeView&
   fetch_faces(context.scene, around);
   ray.skip_faces = around.all;
   if (part.region && around.near.empty()) {
-    const auto lamp = part.regions->flat_faces(*part.region);
-    const auto is_of_lamp = [&](FaceRef f) { return !lamp.empty() && f.shape == lamp[0].shape; };
-    if (std::all_of(around.faces.begin(), around.faces.end(), is_of_lamp)) ray.skip_faces = lamp;
+    const auto emitter = part.regions->flat_faces(*part.region);
+    const auto is_of_emitter = [&](FaceRef f) {
+      return !emitter.empty() && f.shape == emitter[0].shape;
+    };
+    if (std::all_of(around.faces.begin(), around.faces.end(), is_of_emitter))
+      ray.skip_faces = emitter;
   }
   ray.skip_emitters = bounces == 0 && context.scene.hide_emitters;
   fetch_corners(context.scene, around);  // while the ray is traced

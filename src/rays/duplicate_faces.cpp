@@ -1,5 +1,5 @@
 // Finds duplicate faces by hashing their corners.
-#include "limn/core/face_copies.h"
+#include "limn/core/duplicate_faces.h"
 
 #include <algorithm>
 #include <bit>
@@ -59,12 +59,12 @@ auto place(FaceRef face) { return std::pair(face.shape, face.face); }
 
 }  // namespace
 
-bool are_copies(const Scene& scene, FaceRef a, FaceRef b) {
+bool are_duplicates(const Scene& scene, FaceRef a, FaceRef b) {
   const Corners ca = corners_of(scene, a), cb = corners_of(scene, b);
   return wind_alike(ca, cb) || wind_opposite(ca, cb);
 }
 
-bool is_met_first(const Scene& scene, FaceRef a, FaceRef b, const Vec3d& direction) {
+bool is_hit_first(const Scene& scene, FaceRef a, FaceRef b, const Vec3d& direction) {
   const bool faces_a = faces(scene, a, direction), faces_b = faces(scene, b, direction);
   if (faces_a != faces_b) return faces_a;
   const bool shines_a = scene.shape(a.shape).is_emitter, shines_b = scene.shape(b.shape).is_emitter;
@@ -72,7 +72,7 @@ bool is_met_first(const Scene& scene, FaceRef a, FaceRef b, const Vec3d& directi
   return place(a) < place(b);
 }
 
-FaceCopies::FaceCopies(const Scene& scene) : scene_(scene) {
+DuplicateFaces::DuplicateFaces(const Scene& scene) : scene_(scene) {
   std::vector<std::pair<uint64_t, FaceRef>> numbers;
   size_t count = 0;
   for (const Shape& shape : scene.shapes) count += shape.mesh.faces.size();
@@ -97,7 +97,7 @@ FaceCopies::FaceCopies(const Scene& scene) : scene_(scene) {
     if (end == begin + 1) continue;
     std::vector<FaceRef> set;  // duplicates among faces of equal hash
     for (size_t i = begin; i < end; ++i)
-      if (are_copies(scene, numbers[begin].second, numbers[i].second))
+      if (are_duplicates(scene, numbers[begin].second, numbers[i].second))
         set.push_back(numbers[i].second);
     if (set.size() < 2) continue;
     for (const FaceRef face : set) set_of_face_[key(face)] = sets_.size();
@@ -105,24 +105,24 @@ FaceCopies::FaceCopies(const Scene& scene) : scene_(scene) {
   }
 }
 
-std::optional<FaceRef> FaceCopies::met(FaceRef face, const Vec3d& direction,
-                                       bool skip_emitters) const {
+std::optional<FaceRef> DuplicateFaces::met(FaceRef face, const Vec3d& direction,
+                                           bool skip_emitters) const {
   const auto skipped = [&](FaceRef f) { return skip_emitters && scene_.shape(f.shape).is_emitter; };
   const std::vector<FaceRef>* set = set_of(face);
   if (!set) return skipped(face) ? std::nullopt : std::optional(face);
   std::optional<FaceRef> best;
   for (const FaceRef f : *set)
-    if (!skipped(f) && (!best || is_met_first(scene_, f, *best, direction))) best = f;
+    if (!skipped(f) && (!best || is_hit_first(scene_, f, *best, direction))) best = f;
   return best;
 }
 
-std::string name_in_text(const Scene& scene, ShapeId shape) {
+std::string quoted_name(const Scene& scene, ShapeId shape) {
   const std::string& id = scene.shape(shape).id;
   return id.empty() ? "shape " + std::to_string(shape.index()) : "\"" + id + "\"";
 }
 
-void warn_of_copies(const Scene& scene, const FaceCopies& copies,
-                    std::vector<std::string>& warnings) {
+void warn_of_duplicates(const Scene& scene, const DuplicateFaces& copies,
+                        std::vector<std::string>& warnings) {
   std::map<std::pair<ShapeId, ShapeId>, int> counts;
   for (const auto& set : copies.sets())
     for (size_t i = 0; i < set.size(); ++i)
@@ -131,7 +131,7 @@ void warn_of_copies(const Scene& scene, const FaceCopies& copies,
         if (wind_alike(corners_of(scene, set[i]), corners_of(scene, set[j])))
           ++counts[{set[j].shape, set[i].shape}];
       }
-  const auto name = [&](ShapeId id) { return name_in_text(scene, id); };
+  const auto name = [&](ShapeId id) { return quoted_name(scene, id); };
   for (const auto& [shapes, count] : counts) {
     warnings.push_back(format_warning(scene.shape(shapes.second).where,
                                       std::to_string(count) + " faces of " + name(shapes.second) +
