@@ -43,11 +43,11 @@ struct RenderOptions {
   bool exact_film = false;
   FilmPoints points = FilmPoints::kRandom;  // InputError for others where light is sampled
   RenderWhat what = RenderWhat::kImage;     // InputError where the method does not know it
-  // silhouettes, lines: lines through the sky, 1 to 16384; a quarter of them through a emitter. With a
-  // tolerance above 0 (at most 1) they, 8 at least, are doubled until two halves differ by at most
-  // twice this part of the result, or until there are 16384, which RenderResult::warnings tells;
-  // what is left of the error is no longer without bias, and silhouettes takes lines everywhere.
-  // InputError for others.
+  // silhouettes, lines: lines through the sky, 1 to 16384; a quarter of them through an emitter.
+  // With a tolerance above 0 (at most 1) they, 8 at least, are doubled until two halves differ by
+  // at most twice this part of the result, or until there are 16384, which RenderResult::warnings
+  // tells; what is left of the error is no longer without bias, and silhouettes takes lines
+  // everywhere. InputError for others.
   int lines = 64;
   double tolerance = 0;
   int rays = 4;  // rays: of each point for each emitter and the sky, 1 to 2^20
