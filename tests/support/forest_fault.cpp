@@ -162,6 +162,10 @@ class Walk {
       require(
           in_frame(below.lower[k]) >= low - rounding && in_frame(below.upper[k]) <= high + rounding,
           "a child's box does not hold its edges");
+      // Sides are rounded outward to whole steps.
+      constexpr double step = 1 + 0x1.0p-10;
+      require(in_frame(below.lower[k]) - low <= step && high - in_frame(below.upper[k]) <= step,
+              "a child's box is wider than its edges");
     }
   }
 

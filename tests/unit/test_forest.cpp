@@ -227,6 +227,7 @@ TEST(Forest, CorruptedCopiesAreFound) {
       {"a cover is negative", [](Forest& f) { f.inner[0].cover[2][0] = -1; }},
       {"a child's box is empty", [](Forest& f) { f.inner[0].high[0] = 0; }},
       {"a child's box does not hold its edges", [](Forest& f) { f.inner[0].low[0] += 200; }},
+      {"a child's box is wider than its edges", [](Forest& f) { f.inner[0].high[1] += 3; }},
       {"the rows of a dual box are not of unit length",
        [](Forest& f) { f.inner[0].rows[0][1][0] *= 2; }},
       {"a lane without an edge has a length", [](Forest& f) { f.edges[0].edge[0] = kNoChild; }},

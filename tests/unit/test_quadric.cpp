@@ -216,6 +216,100 @@ TEST(PlaneMoments, FindAnEllipsoid) {
   }
 }
 
+// The coordinates u of a plane in a box of rows: q = s (row_0 + sum of u_k row_(k+1)).
+Eigen::Vector3d coordinates_of(const double (&rows)[4][4], const Eigen::Vector4d& q) {
+  Eigen::Matrix4d columns;
+  for (int i = 0; i < 4; ++i) columns.col(i) = Eigen::Vector4d::Map(rows[i]);
+  const Eigen::Vector4d all = columns.partialPivLu().solve(q);
+  return all.tail<3>() / all[0];
+}
+
+// Planes of each set reach all six sides of its boxes, and both of its quadrics: a bound that were
+// wider by a hundredth would fail.
+TEST(Fits, AreTight) {
+  Rng rng(47, 0, 0);
+  for (int i = 0; i < 200; ++i) {
+    const NodeFrame frame{random_direction(rng), 0.5};
+    const Vec3d lean = random_direction(rng) * 1.5;
+    std::vector<Wedge> wedges(8);
+    for (Wedge& wedge : wedges) {
+      wedge = random_wedge(frame, rng);
+      for (Plane& plane : wedge.planes) {
+        const Vec3d n = normalize(plane.n + lean);
+        plane.offset += dot(plane.n - n, frame.center);
+        plane.n = n;
+      }
+    }
+    const PlaneMoments moments = moments_of(wedges, frame);
+    const QuadricFit pair = fit_quadrics(wedges, frame, &moments, frame);
+    const DualFit box = fit_dual(wedges, frame, {});
+    double low = 1e300, high = -low;
+    Eigen::Vector3d lower[2], upper[2];
+    for (int k = 0; k < 2; ++k) lower[k].setConstant(1e300), upper[k].setConstant(-1e300);
+    for (const Wedge& wedge : wedges) {
+      Eigen::Vector3d ends[2];
+      for (int e = 0; e < 2; ++e) {
+        const Eigen::Vector4d q = dual_point(wedge.planes[e], frame);
+        ends[e] = coordinates_of(pair.rows, q);
+        const Eigen::Vector3d other = coordinates_of(box.rows, q);
+        lower[0] = lower[0].cwiseMin(ends[e]), upper[0] = upper[0].cwiseMax(ends[e]);
+        lower[1] = lower[1].cwiseMin(other), upper[1] = upper[1].cwiseMax(other);
+      }
+      constexpr int kSteps = 100;
+      for (int step = 0; step <= kSteps; ++step) {
+        const Eigen::Vector3d u = ends[0] + (ends[1] - ends[0]) * (step / double{kSteps});
+        const auto& c = pair.pair.coefficients;
+        double f = 0;
+        for (int k = 0; k < 3; ++k)
+          f += u[k] * (c[k] + c[3 + k] * u[k]) + c[6 + k] * u[(k + 1) % 3] * u[(k + 2) % 3];
+        low = std::min(low, f), high = std::max(high, f);
+      }
+    }
+    for (int k = 0; k < 2; ++k) {
+      EXPECT_LT((lower[k].array() + 1).abs().maxCoeff(), 1e-9) << i;
+      EXPECT_LT((upper[k].array() - 1).abs().maxCoeff(), 1e-9) << i;
+    }
+    const double slack = 0.01 * (high - low);
+    EXPECT_NEAR(pair.pair.low, low, slack) << i;
+    EXPECT_NEAR(pair.pair.high, high, slack) << i;
+  }
+}
+
+// The bounds of all edges below a child.
+Bounds edges_below(const EdgeSamplerInput& input, const QuadricForest& forest, NodeId id) {
+  Bounds bounds;
+  for (int lane = 0; lane < kQuadricWidth; ++lane) {
+    const int32_t child = forest.lanes(id)[lane];
+    if (child == kNoChild) continue;
+    if (id >= 0) {
+      const Bounds below = edges_below(input, forest, child);
+      bounds.extend(below.lower);
+      bounds.extend(below.upper);
+      continue;
+    }
+    const EdgeMesh& mesh = input.object(forest.leaves[~id].object);
+    for (const VertexId end : mesh.edge(EdgeId(static_cast<uint32_t>(child))).vertices) {
+      bounds.extend(mesh.position(end));
+    }
+  }
+  return bounds;
+}
+
+TEST(Quadric, BoxesOfEdgesAreTight) {
+  const EdgeSamplerInput input{{build_edge_mesh(with_smooth_normals(torus_mesh(40, 20)), true)}};
+  const QuadricForest forest = build_quadric_forest(input, 1, {});
+  for (const QuadricNode& node : forest.nodes) {
+    for (int lane = 0; lane < kQuadricWidth; ++lane) {
+      if (node.child[lane] == kNoChild) continue;
+      const Bounds below = edges_below(input, forest, node.child[lane]);
+      for (int k = 0; k < 3; ++k) {
+        const double half = 0.5 * (below.upper[k] - below.lower[k]) * node.inverse_radius;
+        EXPECT_NEAR(node.half[k][lane], half, 0x1p-18);
+      }
+    }
+  }
+}
+
 // All edges that descents can reach, by the trees alone, against the exact test of every edge.
 // Returns the number of pairs of point and edge.
 uint64_t expect_complete(const EdgeSamplerInput& input, const QuadricForest& forest, const Vec3d& p,
