@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "limn/core/names.h"
+#include "src/bsdf/indices.h"
 #include "src/bsdf/microfacet.h"
 #include "src/bsdf/types.h"
 
@@ -11,26 +12,6 @@ namespace limn {
 namespace {
 
 using Distribution = RoughConductorValues::Distribution;
-
-// Mitsuba 3.9.1's presets: spectra integrated against the CIE 1931 observer, per channel.
-struct Material {
-  const char* name;
-  Rgb<double> eta, k;
-};
-constexpr Material kMaterials[] = {
-    {"Ag", {0.155276, 0.116728, 0.138388}, {4.82835, 3.12222, 2.1469}},
-    {"Al", {1.6575, 0.880405, 0.521244}, {9.22381, 6.2695, 4.837}},
-    {"Au", {0.143036, 0.375307, 1.44205}, {3.983, 2.38556, 1.60336}},
-    {"Cu", {0.201005, 0.92375, 1.10222}, {3.91326, 2.45305, 2.14209}},
-    {"Cr", {4.36967, 2.91651, 1.6549}, {5.20655, 4.23131, 3.7547}},
-    {"W", {4.37082, 3.30025, 2.99841}, {3.50064, 2.60487, 2.27323}},
-    {"Hg", {2.39894, 1.44003, 0.90957}, {6.32759, 4.37192, 3.42176}},
-    {"Ir", {3.0863, 2.08219, 1.61791}, {5.59215, 4.06709, 3.26731}},
-    {"K", {0.0640432, 0.0464098, 0.0381849}, {2.1042, 1.34894, 0.913126}},
-    {"Li", {0.265791, 0.195618, 0.220949}, {3.54015, 2.31112, 1.66861}},
-    {"Ni_palik", {2.3673, 1.66337, 1.46708}, {4.49881, 3.05015, 2.34544}},
-    {"TiN", {1.64845, 1.15052, 1.37982}, {3.36833, 1.9435, 1.10207}},
-};
 
 constexpr double kMinimumAlpha = 1e-4;  // as in Mitsuba
 constexpr double kMaximumAlpha = 1e6;
@@ -266,35 +247,6 @@ Distribution read_distribution(Properties& properties) {
   properties.fail("distribution", unknown_name("distribution", name, {"beckmann", "ggx"}));
 }
 
-void read_material(Properties& properties, RoughConductorValues& values) {
-  const std::string name = properties.string("material", "none");
-  values.eta = properties.rgb("eta", grey(0.0));
-  values.k = properties.rgb("k", grey(1.0));
-  if (name == "none") {
-    for (int i = 0; i < 3; ++i) {
-      if (!(values.eta[i] >= 0)) properties.fail("eta", "must not be negative");
-      if (!(values.k[i] >= 0)) properties.fail("k", "must not be negative");
-      if (values.eta[i] == 0 && values.k[i] == 0) {
-        properties.fail("k", "eta and k are both 0 in a channel");
-      }
-    }
-    return;
-  }
-  if (properties.has("eta") || properties.has("k")) {
-    properties.fail("material", "give either a material or (eta, k), not both");
-  }
-  for (const Material& m : kMaterials) {
-    if (name == m.name) {
-      values.eta = m.eta;
-      values.k = m.k;
-      return;
-    }
-  }
-  std::vector<std::string> known = names_of(kMaterials);
-  known.insert(known.begin(), "none");
-  properties.fail("material", unknown_name("material", name, known));
-}
-
 }  // namespace
 
 std::shared_ptr<Bsdf> make_roughconductor(const RoughConductorValues& values) {
@@ -306,7 +258,9 @@ std::shared_ptr<Bsdf> read_roughconductor(Properties& properties) {
   values.distribution = read_distribution(properties);
   values.alpha = read_alpha(properties);
   values.specular_reflectance = read_reflectance(properties, "specular_reflectance", 1);
-  read_material(properties, values);
+  const ConductorIndices indices = read_conductor_indices(properties);
+  values.eta = indices.eta;
+  values.k = indices.k;
   if (!properties.boolean("sample_visible", true)) {
     properties.fail("sample_visible",
                     "only sampling of visible normals is supported (it changes the noise alone)");

@@ -9,8 +9,8 @@ namespace limn {
 
 namespace {
 
-// Number of sides of a disk's polygon: its area is 1e-4 below the disk's.
-constexpr uint32_t kDiskSides = 256;
+// Number of sides of the polygon of a disk or cylinder: its area is 1e-4 below the disk's.
+constexpr uint32_t kSides = 256;
 // Number of subdivisions of the icosahedron: 5120 faces, up to 1.2e-3 radii inside the
 // sphere.
 constexpr int kSphereSplits = 4;
@@ -92,10 +92,10 @@ RawMesh make_cube() {
 
 RawMesh make_disk() {
   RawMesh disk{{}, {{0, 0, 0}}, {}, {}, {}};
-  for (uint32_t i = 0; i < kDiskSides; ++i) {
-    const double angle = 2 * kPi * i / kDiskSides;
+  for (uint32_t i = 0; i < kSides; ++i) {
+    const double angle = 2 * kPi * i / kSides;
     disk.positions.push_back({std::cos(angle), std::sin(angle), 0});
-    disk.faces.push_back({0, i + 1, (i + 1) % kDiskSides + 1});
+    disk.faces.push_back({0, i + 1, (i + 1) % kSides + 1});
   }
   return disk;
 }
@@ -104,6 +104,23 @@ RawMesh make_sphere() {
   SphereBuilder sphere = icosahedron();
   for (int i = 0; i < kSphereSplits; ++i) sphere.split();
   return {{}, sphere.points, sphere.faces, sphere.points, sphere.faces};
+}
+
+RawMesh make_cylinder() {
+  RawMesh cylinder{{}, {}, {}, {}, {}};
+  for (uint32_t i = 0; i < kSides; ++i) {
+    const double angle = 2 * kPi * i / kSides;
+    const Vec3d outward{std::cos(angle), std::sin(angle), 0};
+    cylinder.normals.push_back(outward);
+    cylinder.positions.push_back(outward);
+    cylinder.positions.push_back(outward + Vec3d{0, 0, 1});
+    const uint32_t next = (i + 1) % kSides;
+    cylinder.faces.push_back({2 * i, 2 * next, 2 * next + 1});
+    cylinder.normal_ids.push_back({i, next, next});
+    cylinder.faces.push_back({2 * i, 2 * next + 1, 2 * i + 1});
+    cylinder.normal_ids.push_back({i, next, i});
+  }
+  return cylinder;
 }
 
 }  // namespace limn

@@ -4,17 +4,15 @@
 #include <algorithm>
 
 #include "limn/core/names.h"
-#include "src/base/text.h"
-#include "src/scene_file/scene_tree.h"
 
 namespace limn {
 
 namespace {
 
-const std::vector<std::string> kObjectTags = {"bsdf",    "emitter", "film",   "integrator",
-                                              "rfilter", "sampler", "sensor", "shape"};
-const std::vector<std::string> kSceneObjectTags = {"bsdf", "emitter", "integrator", "sensor",
-                                                   "shape"};
+// Directly under <scene> or nested. Those that a scene cannot hold wait there for a <ref>.
+const std::vector<std::string> kObjectTags = {"bsdf",     "emitter", "film",   "integrator",
+                                              "rfilter",  "sampler", "sensor", "shape",
+                                              "spectrum", "texture"};
 
 constexpr size_t kMaxAliases = 64;  // in a chain of aliases; not tuned
 
@@ -29,43 +27,29 @@ class Describer {
     if (root.name != "scene") {
       throw InputError(root.where, "the root element must be <scene>, not <" + root.name + ">");
     }
-    check_version(root);
     scene_.file = file;
     scene_.where = root.where;
     scene_.search_path = tree.search_path;
     scene_.files = tree.files;
+    scene_.warnings = tree.warnings;
     for (const XmlElement& child : root.children) add_to_scene(child);
     for (const auto& object : all_objects_) resolve(*object);
+    for (const XmlAttribute& id : root_references_) add_reference(find(id.value, id.where));
     for (const auto& [name, id] : aliases_) find(id.value, id.where);
     return std::move(scene_);
   }
 
  private:
-  static void check_version(const XmlElement& root) {
-    check_attributes(root, {"version"}, {"version"});
-    const XmlAttribute& version = *root.find("version");
-    const std::vector<std::string_view> parts = split(version.value, ".");
-    bool ok = parts.size() == 3;
-    for (std::string_view part : parts) ok = ok && parse_integer(part).value_or(-1) >= 0;
-    if (!ok) {
-      throw InputError(version.where,
-                       "<scene>: version must be like \"3.0.0\", not \"" + version.value + "\"");
-    }
-    const int64_t major = *parse_integer(parts[0]);
-    if (major < 2 || major > 3) {
-      throw InputError(version.where, "<scene>: version " + version.value +
-                                          " is not supported (known: 2.0.0 to 3.x)");
-    }
-  }
-
   void add_to_scene(const XmlElement& element) {
     if (element.name == "alias") {
       add_alias(element);
-    } else if (contains(kSceneObjectTags, element.name)) {
+    } else if (element.name == "ref") {
+      root_references_.push_back(reference_of(element));
+    } else if (contains(kObjectTags, element.name)) {
       scene_.objects.push_back(describe_object(element));
     } else {
-      std::vector<std::string> known = kSceneObjectTags;
-      known.insert(known.end(), {"alias", "default", "include", "path"});
+      std::vector<std::string> known = kObjectTags;
+      known.insert(known.end(), {"alias", "default", "include", "path", "ref"});
       std::sort(known.begin(), known.end());
       throw InputError(element.where, "<scene>: unknown element <" + element.name + "> (" +
                                           known_names(known) + ")");
@@ -92,7 +76,7 @@ class Describer {
     check_attributes(element, {"id", "name", "type"}, {"type"});
     auto object = std::make_shared<ObjectDescription>();
     object->tag = element.name;
-    object->type = element.find("type")->value;
+    object->type = type_of(element);
     object->where = element.where;
     if (const XmlAttribute* id = element.find("id")) {
       if (id->value.empty()) throw InputError(id->where, "the id is empty");
@@ -107,29 +91,60 @@ class Describer {
     return object;
   }
 
+  // The name of a type in lower case: Mitsuba finds "Sphere" where file names ignore case.
+  std::string type_of(const XmlElement& element) {
+    const XmlAttribute& type = *element.find("type");
+    const std::string name = lower_case(type.value);
+    if (name != type.value) {
+      scene_.warnings.push_back(
+          format_warning(type.where, element.name + " type \"" + type.value + "\" is read as \"" +
+                                         name + "\", which Mitsuba finds on some systems only"));
+    }
+    return name;
+  }
+
+  static const XmlAttribute& reference_of(const XmlElement& element) {
+    check_attributes(element, {"id", "name"}, {"id"});
+    if (!element.children.empty()) {
+      throw InputError(element.children[0].where, "<ref> takes no elements");
+    }
+    return *element.find("id");
+  }
+
+  // A <ref> under <scene>: what stands there already is there once.
+  void add_reference(const std::shared_ptr<ObjectDescription>& object) {
+    if (std::find(scene_.objects.begin(), scene_.objects.end(), object) == scene_.objects.end()) {
+      scene_.objects.push_back(object);
+    }
+  }
+
   void add_to_object(const XmlElement& element, ObjectDescription& object) {
     if (element.name == "ref") {
-      check_attributes(element, {"id", "name"}, {"id"});
-      if (!element.children.empty()) {
-        throw InputError(element.children[0].where, "<ref> takes no elements");
-      }
-      object.children.push_back({nullptr, element.find("id")->value, element.find("id")->where});
-    } else if (is_property_tag(element.name)) {
+      const XmlAttribute& id = reference_of(element);
+      object.children.push_back({nullptr, id.value, id.where, name_of(element)});
+    } else if (is_property_tag(element.name) && !is_object(element)) {
       add_property(element, object);
     } else if (contains(kObjectTags, element.name)) {
-      object.children.push_back({describe_object(element), "", element.where});
-    } else if (element.name == "texture") {
-      throw InputError(element.where, object.tag + " \"" + object.type +
-                                          "\": textures are not supported (a constant colour is "
-                                          "<rgb name=... value=...>)");
+      object.children.push_back({describe_object(element), "", element.where, name_of(element)});
     } else {
       std::vector<std::string> known = kObjectTags;
       known.insert(known.end(), property_tags().begin(), property_tags().end());
       known.push_back("ref");
       std::sort(known.begin(), known.end());
+      known.erase(std::unique(known.begin(), known.end()), known.end());
       throw InputError(element.where, object.tag + " \"" + object.type + "\": unknown element <" +
                                           element.name + "> (" + known_names(known) + ")");
     }
+  }
+
+  static std::string name_of(const XmlElement& element) {
+    const XmlAttribute* name = element.find("name");
+    return name ? name->value : "";
+  }
+
+  // <spectrum> is an object where it has a type, else a property.
+  static bool is_object(const XmlElement& element) {
+    return element.name == "spectrum" && element.find("type");
   }
 
   static void add_property(const XmlElement& element, ObjectDescription& object) {
@@ -173,14 +188,14 @@ class Describer {
   std::map<std::string, std::shared_ptr<ObjectDescription>> by_id_;
   std::map<std::string, SourceLocation> id_places_;
   std::map<std::string, XmlAttribute> aliases_;
+  std::vector<XmlAttribute> root_references_;
 };
 
 }  // namespace
 
-SceneDescription describe_scene(const std::string& file,
-                                const std::map<std::string, std::string>& defines,
+SceneDescription describe_scene(const std::string& file, const SceneInput& input,
                                 const std::string* text) {
-  return Describer().describe(load_scene_tree(file, defines, text), file);
+  return Describer().describe(load_scene_tree(file, input, text), file);
 }
 
 }  // namespace limn

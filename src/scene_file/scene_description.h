@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "src/scene_file/scene_tree.h"
 #include "src/scene_file/scene_values.h"
 
 namespace limn {
@@ -22,6 +23,7 @@ struct ChildDescription {
   std::shared_ptr<ObjectDescription> object;  // null until a reference is resolved
   std::string reference;                      // "" if written in place
   SourceLocation where;
+  std::string name;  // of the parameter that it gives; "" if none
 };
 
 struct ObjectDescription {
@@ -46,13 +48,13 @@ struct SceneDescription {
   std::vector<std::shared_ptr<ObjectDescription>> objects;  // directly under <scene>, in order
   std::vector<std::shared_ptr<ObjectDescription>> with_id;  // every object that has one, in order
   std::vector<std::string> search_path;
+  std::vector<std::string> warnings;
   std::vector<std::string> files;  // the scene file and what it includes
 };
 
 // Parses a scene file and resolves all references. InputError for unknown elements, attributes and
 // references, and for duplicate ids and properties. text: see load_scene_tree().
-SceneDescription describe_scene(const std::string& file,
-                                const std::map<std::string, std::string>& defines,
+SceneDescription describe_scene(const std::string& file, const SceneInput& input,
                                 const std::string* text);
 
 }  // namespace limn

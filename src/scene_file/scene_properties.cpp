@@ -5,10 +5,20 @@
 
 #include "limn/core/names.h"
 #include "src/scene_file/scene_tree.h"
+#include "src/scene_file/spectrum_objects.h"
 
 namespace limn {
 
 namespace {
+
+bool is_value(const ObjectDescription& object) {
+  return object.tag == "spectrum" || object.tag == "texture";
+}
+
+ColourUse use_of(const std::string& tag, const std::string& name) {
+  if (tag == "emitter") return ColourUse::kEmission;
+  return name == "eta" || name == "k" ? ColourUse::kUnbounded : ColourUse::kReflectance;
+}
 
 std::vector<std::string> sorted(const std::set<std::string>& names) {
   return {names.begin(), names.end()};
@@ -18,7 +28,9 @@ std::vector<std::string> sorted(const std::set<std::string>& names) {
 
 SourceLocation DescribedProperties::where(const std::string& name) const {
   const auto found = object_.properties.find(name);
-  return found == object_.properties.end() ? object_.where : found->second.where;
+  if (found != object_.properties.end()) return found->second.where;
+  const ObjectDescription* object = find_object(name);
+  return object ? object->where : object_.where;
 }
 
 const DescribedProperty* DescribedProperties::find(const std::string& name) const {
@@ -32,11 +44,28 @@ void DescribedProperties::fail_type(const std::string& name, const DescribedProp
   fail(name, "must be given as " + expected + ", not <" + property.tag + ">");
 }
 
-bool DescribedProperties::has(const std::string& name) const { return find(name) != nullptr; }
+const ObjectDescription* DescribedProperties::find_object(const std::string& name) const {
+  for (const ChildDescription& child : object_.children) {
+    if (child.name == name && is_value(*child.object)) return child.object.get();
+  }
+  return nullptr;
+}
+
+bool DescribedProperties::has(const std::string& name) const {
+  return find(name) != nullptr || find_object(name) != nullptr;
+}
+
+bool DescribedProperties::has_text(const std::string& name) const {
+  const DescribedProperty* p = find(name);
+  return p && std::holds_alternative<std::string>(p->value);
+}
 
 double DescribedProperties::number(const std::string& name, double absent) {
   const DescribedProperty* p = find(name);
-  if (!p) return absent;
+  if (!p) {
+    const ObjectDescription* object = find_object(name);
+    return object ? luminance(rgb_of(*object, name, ColourUse::kReflectance)) : absent;
+  }
   if (const double* v = std::get_if<double>(&p->value)) return *v;
   if (const int64_t* v = std::get_if<int64_t>(&p->value)) return static_cast<double>(*v);
   fail_type(name, *p, "<float>");
@@ -70,19 +99,38 @@ Vec3d DescribedProperties::point(const std::string& name, const Vec3d& absent) {
   fail_type(name, *p, "<point>");
 }
 
-// A constant spectrum is grey for reflectances only. For lights and indices of refraction Mitsuba
-// gives a slightly pink colour, since it does not weight by a white illuminant.
 Rgb<double> DescribedProperties::rgb(const std::string& name, const Rgb<double>& absent) {
   const DescribedProperty* p = find(name);
-  if (!p) return absent;
+  const ColourUse use = use_of(tag(), name);
+  if (!p) {
+    const ObjectDescription* object = find_object(name);
+    return object ? rgb_of(*object, name, use) : absent;
+  }
   if (const Rgb<double>* v = std::get_if<Rgb<double>>(&p->value)) return *v;
   if (const double* v = std::get_if<double>(&p->value)) return grey(*v);
   if (const int64_t* v = std::get_if<int64_t>(&p->value)) return grey(static_cast<double>(*v));
-  if (const ConstantSpectrum* v = std::get_if<ConstantSpectrum>(&p->value)) {
-    if (name.ends_with("reflectance")) return grey(v->value);
-    fail(name, "a constant <spectrum> is not grey here (Mitsuba makes it pinkish): use <rgb>");
+  if (const SpectrumValue* v = std::get_if<SpectrumValue>(&p->value)) {
+    if (v->constant) return constant_spectrum(*v->constant, use);
+    if (v->filename.empty()) return integrate_spectrum(v->samples, use);
+    return integrate_spectrum(read_spectrum_file(existing_file(name, v->filename, p->where)), use);
   }
-  fail_type(name, *p, "<rgb> or <float>");
+  fail_type(name, *p, "<rgb>, <spectrum> or <float>");
+}
+
+Rgb<double> DescribedProperties::rgb_of(const ObjectDescription& object, const std::string& name,
+                                        ColourUse use) {
+  if (!is_spectrum_type(object.type)) {
+    fail(name, "a <" + object.tag + " type=\"" + object.type + "\"> is not supported here");
+  }
+  DescribedProperties p(object, scene_, make_nested_);
+  return read_spectrum_object(p, use);
+}
+
+Rgb<double> DescribedProperties::triple(const std::string& name) {
+  const DescribedProperty* p = find(name);
+  if (!p) fail("parameter \"" + name + "\" is missing");
+  if (const Vec3d* v = std::get_if<Vec3d>(&p->value)) return {v->x, v->y, v->z};
+  return rgb(name, {});
 }
 
 Matrix4 DescribedProperties::transform(const std::string& name) {
@@ -97,10 +145,15 @@ std::string DescribedProperties::file(const std::string& name) {
   if (!p) fail("parameter \"" + name + "\" is missing");
   const std::string* text = std::get_if<std::string>(&p->value);
   if (!text) fail_type(name, *p, "<string>");
-  std::string found = find_input_file(*text, p->where.file, scene_.search_path);
+  return existing_file(name, *text, p->where);
+}
+
+std::string DescribedProperties::existing_file(const std::string& name, const std::string& text,
+                                               const SourceLocation& mentioned) const {
+  std::string found = find_input_file(text, mentioned.file, scene_.search_path);
   if (found.empty()) {
-    const bool from_build = text->find("build/generated/") != std::string::npos;
-    fail(name, "no such file: \"" + *text + "\"" +
+    const bool from_build = text.find("build/generated/") != std::string::npos;
+    fail(name, "no such file: \"" + text + "\"" +
                    (from_build ? " (the build makes it: run tools/build)" : ""));
   }
   return found;
@@ -129,6 +182,15 @@ const ObjectDescription* DescribedProperties::nested(const std::string& wanted) 
   return found;
 }
 
+std::vector<const ObjectDescription*> DescribedProperties::all_nested(const std::string& wanted) {
+  known_tags_.insert(wanted);
+  std::vector<const ObjectDescription*> found;
+  for (const ChildDescription& child : object_.children) {
+    if (child.object->tag == wanted) found.push_back(child.object.get());
+  }
+  return found;
+}
+
 void DescribedProperties::check_all_used() const {
   // Visited in file order, so that the first mistake is reported.
   const DescribedProperty* first = nullptr;
@@ -146,6 +208,11 @@ void DescribedProperties::check_all_used() const {
   }
   for (const ChildDescription& child : object_.children) {
     if (known_tags_.count(child.object->tag)) continue;
+    if (is_value(*child.object) && known_.count(child.name)) continue;
+    if (is_value(*child.object) && !child.name.empty()) {
+      throw InputError(child.where, tag() + " \"" + type() + "\": " +
+                                        unknown_name("parameter", child.name, sorted(known_)));
+    }
     throw InputError(child.where, tag() + " \"" + type() + "\": takes no " + child.object->tag +
                                       " (" + known_names(sorted(known_tags_)) + ")");
   }

@@ -5,6 +5,7 @@
 
 #include "limn/core/properties.h"
 #include "src/scene_file/scene_description.h"
+#include "src/scene_file/spectrum.h"
 
 namespace limn {
 
@@ -24,6 +25,7 @@ class DescribedProperties final : public Properties {
   SourceLocation where(const std::string& name) const override;
 
   bool has(const std::string& name) const override;
+  bool has_text(const std::string& name) const override;
   double number(const std::string& name, double absent) override;
   int64_t integer(const std::string& name, int64_t absent) override;
   bool boolean(const std::string& name, bool absent) override;
@@ -37,12 +39,23 @@ class DescribedProperties final : public Properties {
   // The nested object of this tag; null if there is none, InputError if there are several.
   const ObjectDescription* nested(const std::string& tag);
 
+  // All nested objects of this tag, in order.
+  std::vector<const ObjectDescription*> all_nested(const std::string& tag);
+  // One number as three, a colour or a vector, as it stands in the file.
+  Rgb<double> triple(const std::string& name);
+
   // InputError for the first property or nested object that was never read.
   void check_all_used() const;
 
  private:
   // Null if absent. Records the name as known.
   const DescribedProperty* find(const std::string& name) const;
+  // The texture or spectrum with this name; null if absent.
+  const ObjectDescription* find_object(const std::string& name) const;
+  // The path of a file that the scene names at `mentioned`. InputError if it does not exist.
+  std::string existing_file(const std::string& name, const std::string& text,
+                            const SourceLocation& mentioned) const;
+  Rgb<double> rgb_of(const ObjectDescription& object, const std::string& name, ColourUse use);
   [[noreturn]] void fail_type(const std::string& name, const DescribedProperty& property,
                               const std::string& expected) const;
 

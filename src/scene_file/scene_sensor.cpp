@@ -1,6 +1,7 @@
 // Converts the description of a sensor to camera, film, filter and sampler.
 #include "src/scene_file/scene_sensor.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -93,8 +94,21 @@ void read_crop(Properties& p, const Camera& camera, Film& film) {
   require_memory(p.where(), kBytesPerPixel * static_cast<double>(pixels), size, remedy);
 }
 
-void read_film(const ObjectDescription& object, const SceneDescription& description,
-               Sensor& sensor) {
+// True for one channel. Only rgb and luminance are written.
+bool read_pixel_format(Properties& p, std::vector<std::string>& warnings) {
+  const std::string format = choice(p, "pixel_format", "rgb",
+                                    {"luminance", "luminance_alpha", "rgb", "rgba", "xyz", "xyza"});
+  const bool luminance = format.starts_with("luminance");
+  const std::string written = luminance ? "luminance" : "rgb";
+  if (format != written) {
+    warnings.push_back(format_warning(p.where("pixel_format"),
+                                      "pixel_format " + format + " is written as " + written));
+  }
+  return luminance;
+}
+
+void read_film(const ObjectDescription& object, const SceneDescription& description, Sensor& sensor,
+               std::vector<std::string>& warnings) {
   if (object.type != "hdrfilm") fail_unknown_type(object, {"hdrfilm"});
   DescribedProperties p(object, description, kNoBsdfs);
   Film& film = sensor.film;
@@ -103,8 +117,12 @@ void read_film(const ObjectDescription& object, const SceneDescription& descript
   sensor.camera.height = bounded_integer(p, "height", 576, 1);
   read_crop(p, sensor.camera, film);
   film.sample_border = p.boolean("sample_border", false);
-  choice(p, "file_format", "openexr", {"openexr", "exr"});
-  film.luminance = choice(p, "pixel_format", "rgb", {"luminance", "rgb"}) == "luminance";
+  const std::string file = choice(p, "file_format", "openexr", {"exr", "openexr", "pfm", "rgbe"});
+  if (file == "pfm" || file == "rgbe") {
+    warnings.push_back(
+        format_warning(p.where("file_format"), "file_format " + file + " is written as openexr"));
+  }
+  film.luminance = read_pixel_format(p, warnings);
   film.half = choice(p, "component_format", "float16", {"float16", "float32"}) == "float16";
   // Ignored: sums are in double precision, and there is no banner.
   p.boolean("compensate", false);
@@ -116,10 +134,22 @@ void read_film(const ObjectDescription& object, const SceneDescription& descript
   p.check_all_used();
 }
 
+// Samplers of other types are read as independent: limn's points are its own (--generator).
 void read_sampler(const ObjectDescription& object, const SceneDescription& description,
-                  Sensor& sensor) {
-  if (object.type != "independent") fail_unknown_type(object, {"independent"});
+                  Sensor& sensor, std::vector<std::string>& warnings) {
+  static const std::vector<std::string> kTypes = {"independent", "ldsampler", "multijitter",
+                                                  "orthogonal", "stratified"};
+  if (std::find(kTypes.begin(), kTypes.end(), object.type) == kTypes.end()) {
+    fail_unknown_type(object, kTypes);
+  }
   DescribedProperties p(object, description, kNoBsdfs);
+  if (object.type != "independent") {
+    warnings.push_back(format_warning(
+        object.where,
+        "sampler \"" + object.type + "\" is read as independent: --generator chooses"));
+    p.boolean("jitter", true);
+    p.integer("strength", 2);
+  }
   sensor.sample_count = bounded_integer(p, "sample_count", 4, 1);
   const int64_t seed = p.integer("seed", 0);
   if (seed < 0) p.fail("seed", "must not be negative");
@@ -199,17 +229,18 @@ void read_axes(Properties& p, Camera& camera) {
 
 }  // namespace
 
-Sensor read_sensor(const ObjectDescription& sensor, const SceneDescription& description) {
+Sensor read_sensor(const ObjectDescription& sensor, const SceneDescription& description,
+                   std::vector<std::string>& warnings) {
   Sensor read;
   read.id = sensor.id;
   if (sensor.type != "perspective") fail_unknown_type(sensor, {"perspective"});
   DescribedProperties p(sensor, description, kNoBsdfs);
   Camera& camera = read.camera;
   if (const ObjectDescription* film = p.nested("film")) {
-    read_film(*film, description, read);
+    read_film(*film, description, read, warnings);
   }
   if (const ObjectDescription* sampler = p.nested("sampler")) {
-    read_sampler(*sampler, description, read);
+    read_sampler(*sampler, description, read, warnings);
   }
   read_fov(p, camera);
   read_axes(p, camera);

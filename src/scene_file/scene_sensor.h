@@ -6,6 +6,8 @@
 namespace limn {
 
 // Reads a sensor with its film, filter and sampler.
-Sensor read_sensor(const ObjectDescription& sensor, const SceneDescription& description);
+// Appends whole lines to `warnings`.
+Sensor read_sensor(const ObjectDescription& sensor, const SceneDescription& description,
+                   std::vector<std::string>& warnings);
 
 }  // namespace limn

@@ -7,6 +7,7 @@
 
 #include "limn/core/names.h"
 #include "src/base/text.h"
+#include "src/scene_file/old_format.h"
 
 namespace limn {
 
@@ -31,13 +32,29 @@ std::string known_parameters(const std::map<std::string, std::string, std::less<
   return known_names(names, "none are defined");
 }
 
+template <class IsThere>
+std::string find_input(const std::string& name, const std::string& mentioned_in,
+                       const std::vector<std::string>& search_path, const IsThere& is_there) {
+  std::error_code error;
+  std::vector<fs::path> candidates{fs::path(mentioned_in).parent_path() / name};
+  for (const std::string& directory : search_path) candidates.push_back(fs::path(directory) / name);
+  for (const fs::path& path : candidates) {  // an absolute name replaces what it is appended to
+    if (is_there(path, error)) return path.string();
+  }
+  return "";
+}
+
 class TreeLoader {
  public:
-  explicit TreeLoader(const std::map<std::string, std::string>& defines)
-      : defines_(defines), values_(defines.begin(), defines.end()) {}
+  explicit TreeLoader(const SceneInput& input)
+      : defines_(input.defines), values_(input.defines.begin(), input.defines.end()) {
+    tree_.search_path = input.paths;
+  }
 
   SceneTree load(const std::string& file, const std::string* text) {
+    tree_.search_path.insert(tree_.search_path.begin(), fs::path(file).parent_path().string());
     tree_.root = text ? parse_xml(file, *text) : parse_file(file, {file});
+    upgrade(tree_.root, tree_.warnings);
     expand(tree_.root, 0, true);
     check_defines(file);
     return std::move(tree_);
@@ -120,16 +137,14 @@ class TreeLoader {
   void add_path(const XmlElement& order) {
     check_attributes(order, {"value"}, {"value"});
     const XmlAttribute& value = *order.find("value");
-    fs::path directory = value.value;
-    if (directory.is_relative()) directory = fs::path(value.where.file).parent_path() / directory;
-    std::error_code error;
-    if (!fs::is_directory(directory, error)) {
+    const std::string directory = find_input(
+        value.value, value.where.file, tree_.search_path,
+        [](const fs::path& path, std::error_code& e) { return fs::is_directory(path, e); });
+    if (directory.empty()) {
       throw InputError(value.where, "no such directory: \"" + value.value + "\"");
     }
-    if (tree_.search_path.size() == kMaxPaths) {
-      throw InputError(order.where, "more than 64 of <path>");
-    }
-    tree_.search_path.insert(tree_.search_path.begin(), directory.string());
+    if (++path_elements_ > kMaxPaths) throw InputError(order.where, "more than 64 of <path>");
+    tree_.search_path.insert(tree_.search_path.begin(), directory);
   }
 
   void include(const XmlElement& order, XmlElement& parent, int depth) {
@@ -142,12 +157,12 @@ class TreeLoader {
     }
     XmlElement root = parse_file(file, name.where);
     const bool is_scene = root.name == "scene";
+    if (is_scene) upgrade(root, tree_.warnings);
     expand(root, depth + 1, is_scene);
     if (!is_scene) {
       parent.children.push_back(std::move(root));
       return;
     }
-    check_attributes(root, {"version"}, {"version"});
     std::move(root.children.begin(), root.children.end(), std::back_inserter(parent.children));
   }
 
@@ -182,7 +197,7 @@ class TreeLoader {
   const std::map<std::string, std::string>& defines_;
   std::map<std::string, std::string, std::less<>> values_;
   std::set<std::string> used_;
-  size_t text_ = 0, substituted_ = 0;
+  size_t text_ = 0, substituted_ = 0, path_elements_ = 0;
   SceneTree tree_;
 };
 
@@ -206,19 +221,14 @@ void check_attributes(const XmlElement& element, const std::vector<std::string>&
 
 std::string find_input_file(const std::string& name, const std::string& mentioned_in,
                             const std::vector<std::string>& search_path) {
-  std::error_code error;
-  std::vector<fs::path> candidates{fs::path(mentioned_in).parent_path() / name};
-  for (const std::string& directory : search_path) candidates.push_back(fs::path(directory) / name);
-  for (const fs::path& path : candidates) {  // an absolute name replaces what it is appended to
-    if (fs::is_regular_file(path, error)) return path.string();
-  }
-  return "";
+  return find_input(name, mentioned_in, search_path, [](const fs::path& path, std::error_code& e) {
+    return fs::is_regular_file(path, e);
+  });
 }
 
-SceneTree load_scene_tree(const std::string& file,
-                          const std::map<std::string, std::string>& defines,
+SceneTree load_scene_tree(const std::string& file, const SceneInput& input,
                           const std::string* text) {
-  return TreeLoader(defines).load(file, text);
+  return TreeLoader(input).load(file, text);
 }
 
 }  // namespace limn

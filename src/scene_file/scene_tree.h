@@ -11,15 +11,22 @@ namespace limn {
 // The root element after <default>, <include>, <path> and $name are resolved.
 struct SceneTree {
   XmlElement root;
-  std::vector<std::string> search_path;  // directories of <path>, the latest first
-  std::vector<std::string> files;        // all files read, in order
+  // Directories of <path>, the latest first; the scene's own; those of the command line.
+  std::vector<std::string> search_path;
+  std::vector<std::string> files;     // all files read, in order
+  std::vector<std::string> warnings;  // whole lines
 };
 
-// `defines` override <default>; unused ones are errors. An included file has the root <scene>,
+// What a user adds to a scene file.
+struct SceneInput {
+  const std::map<std::string, std::string>& defines;  // of -D
+  const std::vector<std::string>& paths;              // directories to search last
+};
+
+// Defines override <default>; unused ones are errors. An included file has the root <scene>,
 // whose content replaces the include, or any other element. text: the content of `file`, which then
 // need not exist; null: reads the file.
-SceneTree load_scene_tree(const std::string& file,
-                          const std::map<std::string, std::string>& defines,
+SceneTree load_scene_tree(const std::string& file, const SceneInput& input,
                           const std::string* text);
 
 // The first existing file of: `name` if absolute; in the directory of the referring file; in the

@@ -231,13 +231,16 @@ PropertyValue parse_rgb(const XmlElement& e) {
 
 PropertyValue parse_spectrum(const XmlElement& e) {
   check_attributes(e, {"name", "value", "filename"}, {"name"});
-  const XmlAttribute* a = e.find("value");
-  if (!a || !parse_double(a->value)) {
-    throw InputError(e.where,
-                     "<spectrum>: only one constant value is read; give other colours as "
-                     "<rgb>");
+  const XmlAttribute* value = e.find("value");
+  const XmlAttribute* file = e.find("filename");
+  if ((value != nullptr) == (file != nullptr)) {
+    throw InputError(e.where, "<spectrum>: give either value or filename");
   }
-  return ConstantSpectrum{parse_number(e, *a)};
+  if (file) return SpectrumValue{{}, {}, file->value};
+  if (value->value.find(':') == std::string::npos) {
+    return SpectrumValue{parse_number(e, *value), {}, {}};
+  }
+  return SpectrumValue{{}, parse_spectrum(value->value, value->where), {}};
 }
 
 using PropertyParser = PropertyValue (*)(const XmlElement&);

@@ -1,20 +1,24 @@
 #pragma once
 // Property tags of a scene file and their values.
+#include <optional>
 #include <string>
 #include <variant>
 
 #include "limn/core/properties.h"
+#include "src/scene_file/spectrum.h"
 #include "src/scene_file/xml_tree.h"
 
 namespace limn {
 
-// <spectrum value="0.5">: constant over wavelength.
-struct ConstantSpectrum {
-  double value = 0;
+// <spectrum>: one value for all wavelengths, a list of samples, or a file of them.
+struct SpectrumValue {
+  std::optional<double> constant;
+  std::vector<SpectrumSample> samples;
+  std::string filename;
 };
 
 using PropertyValue =
-    std::variant<bool, int64_t, double, std::string, Vec3d, Rgb<double>, ConstantSpectrum, Matrix4>;
+    std::variant<bool, int64_t, double, std::string, Vec3d, Rgb<double>, SpectrumValue, Matrix4>;
 
 // Names of the property tags: boolean, integer, ...
 const std::vector<std::string>& property_tags();

@@ -10,6 +10,7 @@
 #include "src/mesh/mesh_build.h"
 #include "src/mesh/mesh_file.h"
 #include "src/mesh/shapes.h"
+#include "src/scene_file/integrators.h"
 #include "src/scene_file/scene_properties.h"
 #include "src/scene_file/scene_sensor.h"
 
@@ -21,12 +22,13 @@ class SceneBuilder {
  public:
   SceneBuilder(const SceneDescription& description, std::vector<std::string>* warnings)
       : description_(description),
-        warnings_(warnings),
+        warnings_(warnings ? *warnings : unread_warnings_),
         make_nested_([this](const ObjectDescription& object) { return bsdf(object); }) {}
 
   Scene build() {
     scene_.file = description_.file;
     scene_.xml_files = description_.files;
+    warnings_.insert(warnings_.end(), description_.warnings.begin(), description_.warnings.end());
     for (const auto& object : description_.objects) {
       add(*object);
       note_data_file(*object);
@@ -39,7 +41,7 @@ class SceneBuilder {
       throw InputError(description_.where, "<scene>: there is no sensor");
     }
     use_sensor(scene_, "0");
-    if (warnings_) warn_of_overlaps(scene_, *warnings_);
+    if (&warnings_ != &unread_warnings_) warn_of_overlaps(scene_, warnings_);
     return std::move(scene_);
   }
 
@@ -47,14 +49,25 @@ class SceneBuilder {
   void add(const ObjectDescription& object) {
     if (object.tag == "integrator") {
       only_one(object, "integrator", integrator_);
-      read_integrator(object);
+      read_integrator(object, description_, scene_, warnings_);
     } else if (object.tag == "sensor") {
-      scene_.sensors.push_back(read_sensor(object, description_));
+      scene_.sensors.push_back(read_sensor(object, description_, warnings_));
+    } else if (object.tag == "shape" && object.type == "shapegroup") {
+      check_group(object);
+    } else if (object.tag == "shape" && object.type == "instance") {
+      add_instance(object);
     } else if (object.tag == "shape") {
-      add_shape(object);
-    } else if (object.tag == "emitter") {
+      add_shape(object, object.id);
+    } else if (object.tag == "emitter" && !is_for_shapes(object)) {
       add_light(object);
+    } else if (object.tag != "bsdf" && object.id.empty()) {
+      throw InputError(object.where, "<scene>: a " + object.tag + " here needs an id, for <ref>");
     }
+  }
+
+  // An area emitter with an id may stand under <scene> for shapes that refer to it.
+  static bool is_for_shapes(const ObjectDescription& object) {
+    return object.type == "area" && !object.id.empty();
   }
 
   void note_data_file(const ObjectDescription& object) {
@@ -71,23 +84,6 @@ class SceneBuilder {
                                          std::to_string(earlier->where.column));
     }
     earlier = &object;
-  }
-
-  void read_integrator(const ObjectDescription& object) {
-    if (object.type != "path") {
-      throw InputError(object.where, unknown_name("integrator type", object.type, {"path"}));
-    }
-    DescribedProperties p(object, description_, make_nested_);
-    const int64_t depth = p.integer("max_depth", -1);
-    if (depth < -1) p.fail("max_depth", "must be -1 (no limit) or 0 and more");
-    if (depth > INT32_MAX) p.fail("max_depth", "must be at most 2147483647");
-    const int64_t rr_depth = p.integer("rr_depth", 5);
-    if (rr_depth < 1) p.fail("rr_depth", "must be 1 or more");
-    if (rr_depth > INT32_MAX) p.fail("rr_depth", "must be at most 2147483647");
-    scene_.max_depth = static_cast<int>(depth);
-    scene_.rr_depth = static_cast<int>(rr_depth);
-    scene_.hide_emitters = p.boolean("hide_emitters", false);
-    p.check_all_used();
   }
 
   // One object per element, shared by all references to it.
@@ -129,7 +125,7 @@ class SceneBuilder {
 
   MeshOptions read_mesh_options(DescribedProperties& p, bool from_file) {
     MeshOptions options;
-    options.to_world = p.transform("to_world");
+    options.to_world = instance_ * p.transform("to_world");
     try {
       options.to_world.inverse();
     } catch (const std::domain_error&) {
@@ -146,28 +142,51 @@ class SceneBuilder {
   // Reads the shape's mesh in object space; sets `options`.
   RawMesh read_geometry(DescribedProperties& p, MeshOptions& options) {
     const std::string& type = p.type();
-    const bool from_file = type == "obj" || type == "ply";
-    if (from_file) {
-      const std::string file = p.file("filename");
-      options = read_mesh_options(p, true);
-      return type == "obj" ? parse_obj(file) : parse_ply(file);
-    }
+    if (type == "obj" || type == "ply" || type == "serialized") return read_file(p, options);
     options = read_mesh_options(p, false);
     // Flat shapes use face normals. A mirrored flat shape keeps its outside, as in Mitsuba, which
     // transforms the normals.
-    options.face_normals = type != "sphere";
+    options.face_normals = type != "sphere" && type != "cylinder";
     if (options.face_normals && mirrors(options.to_world)) {
       options.flip_normals = !options.flip_normals;
     }
     if (type == "rectangle") return make_rectangle();
     if (type == "cube") return make_cube();
     if (type == "disk") return make_disk();
-    if (type != "sphere") {
-      throw InputError(
-          p.where(),
-          unknown_name("shape type", type, {"cube", "disk", "obj", "ply", "rectangle", "sphere"}));
+    if (type == "cylinder") return read_cylinder(p, options);
+    if (type == "sphere") return read_sphere(p, options);
+    throw InputError(p.where(), unknown_name("shape type", type,
+                                             {"cube", "cylinder", "disk", "instance", "obj", "ply",
+                                              "rectangle", "serialized", "shapegroup", "sphere"}));
+  }
+
+  RawMesh read_file(DescribedProperties& p, MeshOptions& options) {
+    const std::string file = p.file("filename");
+    options = read_mesh_options(p, true);
+    if (p.type() == "obj") return parse_obj(file);
+    if (p.type() == "ply") return parse_ply(file);
+    const int64_t index = p.integer("shape_index", 0);
+    if (index < 0) p.fail("shape_index", "must not be negative");
+    SerializedMesh read = parse_serialized(file, index);
+    options.face_normals = options.face_normals || read.face_normals;
+    return std::move(read.mesh);
+  }
+
+  // A cylinder about the axis from p0 to p1.
+  static RawMesh read_cylinder(DescribedProperties& p, MeshOptions& options) {
+    const double radius = p.number("radius", 1);
+    if (!(radius > 0)) p.fail("radius", "must be positive");
+    const Vec3d p0 = p.point("p0", {}), axis = p.point("p1", {0, 0, 1}) - p0;
+    if (!(length(axis) > 0)) p.fail("p0 and p1 coincide");
+    const Frame frame(normalize(axis));
+    const Vec3d columns[4] = {frame.s * radius, frame.t * radius, axis, p0};
+    Matrix4 place;
+    for (int column = 0; column < 4; ++column) {
+      for (int row = 0; row < 3; ++row) place.m[row][column] = columns[column][row];
     }
-    return read_sphere(p, options);
+    if (mirrors(options.to_world)) options.flip_normals = !options.flip_normals;  // as in Mitsuba
+    options.to_world = options.to_world * place;
+    return make_cylinder();
   }
 
   static RawMesh read_sphere(DescribedProperties& p, MeshOptions& options) {
@@ -195,10 +214,44 @@ class SceneBuilder {
     unasked_ = 0;
   }
 
-  void add_shape(const ObjectDescription& object) {
+  // The shapes of a group wait for instances.
+  std::vector<const ObjectDescription*> check_group(const ObjectDescription& group) {
+    DescribedProperties p(group, description_, make_nested_);
+    const std::vector<const ObjectDescription*> shapes = p.all_nested("shape");
+    p.check_all_used();
+    for (const ObjectDescription* shape : shapes) {
+      if (shape->type == "shapegroup" || shape->type == "instance") {
+        throw InputError(shape->where, "a shapegroup takes no " + shape->type);
+      }
+    }
+    return shapes;
+  }
+
+  // Copies the shapes of a group. Those of its second instance have ids that end in ".2", ...
+  void add_instance(const ObjectDescription& object) {
+    DescribedProperties p(object, description_, make_nested_);
+    const Matrix4 to_world = p.transform("to_world");
+    const std::vector<const ObjectDescription*> groups = p.all_nested("shape");
+    p.check_all_used();
+    if (groups.size() != 1 || groups[0]->type != "shapegroup") p.fail("needs one shapegroup");
+    const int number = ++instances_[groups[0]];
+    instance_ = to_world;
+    for (const ObjectDescription* shape : check_group(*groups[0])) {
+      const std::string suffix = number == 1 ? "" : "." + std::to_string(number);
+      add_shape(*shape, shape->id.empty() ? "" : shape->id + suffix);
+      if (scene_.shapes.back().is_emitter) p.fail("a shapegroup with an emitter");
+      instanced_faces_ += scene_.shapes.back().mesh.faces.size();
+      if (instanced_faces_ > kMostInstancedFaces) {
+        p.fail("instances are copied: more than 10000000 faces");
+      }
+    }
+    instance_ = {};
+  }
+
+  void add_shape(const ObjectDescription& object, const std::string& id) {
     DescribedProperties p(object, description_, make_nested_);
     Shape shape;
-    shape.id = object.id;
+    shape.id = id;
     shape.where = object.where;
     MeshOptions options;
     RawMesh raw = read_geometry(p, options);
@@ -208,18 +261,23 @@ class SceneBuilder {
     if (const ObjectDescription* emitter = p.nested("emitter")) read_nested_light(*emitter, shape);
     p.check_all_used();
     check_memory(raw);
-    shape.mesh = build_mesh(raw, options, warnings_);
+    shape.mesh = build_mesh(raw, options, &warnings_);
     const double grey_value = shape.is_emitter ? 0.0 : 0.5;
     shape.bsdf = bsdfs.empty() ? make_diffuse(grey(grey_value)) : bsdfs[0];
     scene_.shapes.push_back(std::move(shape));
   }
 
   const SceneDescription& description_;
-  std::vector<std::string>* warnings_;
+  std::vector<std::string> unread_warnings_;
+  std::vector<std::string>& warnings_;
   BsdfMaker make_nested_;
   Scene scene_;
   std::map<const ObjectDescription*, std::shared_ptr<Bsdf>> bsdfs_;
   int bsdf_depth_ = 0;
+  static constexpr size_t kMostInstancedFaces = 10000000;  // not tuned
+  Matrix4 instance_;                                       // of the shapes that are added
+  std::map<const ObjectDescription*, int> instances_;
+  size_t instanced_faces_ = 0;
   double unasked_ = 0;  // bytes of shapes since the last check
   const ObjectDescription* integrator_ = nullptr;
   const ObjectDescription* environment_ = nullptr;
@@ -228,14 +286,15 @@ class SceneBuilder {
 }  // namespace
 
 Scene read_scene(const std::string& file, const std::map<std::string, std::string>& defines,
-                 std::vector<std::string>* warnings) {
-  const SceneDescription description = describe_scene(file, defines, nullptr);
+                 std::vector<std::string>* warnings, const std::vector<std::string>& paths) {
+  const SceneDescription description = describe_scene(file, {defines, paths}, nullptr);
   return SceneBuilder(description, warnings).build();
 }
 
-size_t count_sensors(const std::string& file, const std::map<std::string, std::string>& defines) {
+size_t count_sensors(const std::string& file, const std::map<std::string, std::string>& defines,
+                     const std::vector<std::string>& paths) {
   size_t count = 0;
-  for (const auto& object : describe_scene(file, defines, nullptr).objects) {
+  for (const auto& object : describe_scene(file, {defines, paths}, nullptr).objects) {
     count += object->tag == "sensor" ? 1 : 0;
   }
   return count;
@@ -245,7 +304,7 @@ Scene read_scene_text(const std::string& text, const std::string& folder,
                       const std::map<std::string, std::string>& defines,
                       std::vector<std::string>* warnings) {
   const std::string file = (std::filesystem::path(folder) / "string").string();
-  const SceneDescription description = describe_scene(file, defines, &text);
+  const SceneDescription description = describe_scene(file, {defines, {}}, &text);
   return SceneBuilder(description, warnings).build();
 }
 

@@ -14,6 +14,8 @@
 #include "limn/core/mesh.h"
 #include "limn/core/scene.h"
 #include "src/light/environment_map.h"
+#include "src/mesh/mesh_file.h"
+#include "src/scene_file/spectrum.h"
 
 namespace limn {
 
@@ -116,6 +118,33 @@ void run_mesh(const char* name, Bytes bytes) {
 void run_obj(Bytes bytes) { run_mesh("mesh.obj", bytes); }
 void run_ply(Bytes bytes) { run_mesh("mesh.ply", bytes); }
 
+// The first meshes of a file.
+void run_serialized(Bytes bytes) {
+  const std::string file = written("mesh.serialized", bytes);
+  for (const int64_t index : {0, 1, 2}) {
+    try {
+      check_mesh(build_mesh(parse_serialized(file, index).mesh, {}, nullptr));
+    } catch (const InputError&) {
+    }
+  }
+}
+
+void run_spectrum(Bytes bytes) {
+  const std::string text(bytes.begin(), bytes.end());
+  const std::string file = written("a.spd", bytes);
+  for (const bool from_file : {false, true}) {
+    try {
+      const auto samples = from_file ? read_spectrum_file(file) : parse_spectrum(text, {"a"});
+      for (const ColourUse use :
+           {ColourUse::kReflectance, ColourUse::kUnbounded, ColourUse::kEmission}) {
+        const Rgb<double> c = integrate_spectrum(samples, use);
+        for (int i = 0; i < 3; ++i) demand(std::isfinite(c[i]) && c[i] >= 0, "colours are finite");
+      }
+    } catch (const InputError&) {
+    }
+  }
+}
+
 void run_velocity(Bytes bytes) {
   const std::string file = written("velocity.txt", bytes);
   try {
@@ -166,9 +195,14 @@ void run_environment(Bytes bytes) {
 
 }  // namespace
 
-const FuzzTarget kAllFuzzTargets[kFuzzTargets] = {
-    {"xml", run_xml}, {"obj", run_obj},           {"ply", run_ply},
-    {"exr", run_exr}, {"velocity", run_velocity}, {"environment", run_environment}};
+const FuzzTarget kAllFuzzTargets[kFuzzTargets] = {{"xml", run_xml},
+                                                  {"obj", run_obj},
+                                                  {"ply", run_ply},
+                                                  {"exr", run_exr},
+                                                  {"velocity", run_velocity},
+                                                  {"environment", run_environment},
+                                                  {"serialized", run_serialized},
+                                                  {"spectrum", run_spectrum}};
 
 const FuzzTarget& fuzz_target(const std::string& name) {
   for (const FuzzTarget& target : kAllFuzzTargets)

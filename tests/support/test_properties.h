@@ -30,6 +30,10 @@ class TestProperties final : public Properties {
   SourceLocation where(const std::string&) const override { return where_; }
 
   bool has(const std::string& name) const override { return values_.count(name) > 0; }
+  bool has_text(const std::string& name) const override {
+    const auto found = values_.find(name);
+    return found != values_.end() && std::holds_alternative<std::string>(found->second);
+  }
   double number(const std::string& name, double absent) override { return get(name, absent); }
   int64_t integer(const std::string& name, int64_t absent) override {
     return static_cast<int64_t>(get(name, static_cast<double>(absent)));

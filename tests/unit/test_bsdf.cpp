@@ -496,7 +496,7 @@ TEST(Bsdf, BadInputIsExplained) {
   expect_error("either alpha or alpha_u, alpha_v", "roughconductor",
                {{"alpha", 0.1}, {"alpha_u", 0.1}, {"alpha_v", 0.1}});
   expect_error("not both", "roughconductor", {{"material", "Cu"}, {"eta", 1.0}});
-  expect_error("unknown material \"Cheese\" (known: none, Ag, Al, Au,", "roughconductor",
+  expect_error("unknown material \"Cheese\" (known: none, a-C, Ag, Al,", "roughconductor",
                {{"material", "Cheese"}});
   expect_error("must not be negative", "roughconductor", {{"k", -1.0}});
   expect_error("eta and k are both 0", "roughconductor", {{"k", 0.0}});

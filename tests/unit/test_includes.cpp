@@ -216,6 +216,7 @@ TEST(Includes, OneDoorPerThirdParty) {
       {"Embree", std::regex("^embree[34]/.*")},
       {"OpenEXR", std::regex("^(Imf|Iex|half\\.h|openexr|OpenEXR/).*")},
       {"libpng", std::regex("^png.*")},
+      {"zlib", std::regex("^zlib.*")},
       {"pugixml", std::regex("^pugixml.*")},
       {"tinyobjloader", std::regex("^tiny_obj_loader.*")},
       {"TBB", std::regex("^(oneapi/)?tbb/.*")},
@@ -230,7 +231,8 @@ TEST(Includes, OneDoorPerThirdParty) {
       }
     }
   }
-  for (const char* library : {"Embree", "OpenEXR", "libpng", "pugixml", "TBB", "tinyobjloader"}) {
+  for (const char* library :
+       {"Embree", "OpenEXR", "libpng", "pugixml", "TBB", "tinyobjloader", "zlib"}) {
     ASSERT_EQ(doors[library].size(), 1u) << library;
   }
   for (const auto& [library, files] : doors) {

@@ -186,7 +186,7 @@ std::vector<ViewArguments> FitCommand::view_arguments() const {
   }
   std::vector<ViewArguments> views;
   for (const ViewArguments& scene : scenes) {
-    const size_t sensors = count_sensors(scene.scene, scene.defines);
+    const size_t sensors = count_sensors(scene.scene, scene.defines, common_.paths);
     for (size_t i = 0; i < sensors; ++i) {
       views.push_back(scene);
       views.back().sensor = std::to_string(i);

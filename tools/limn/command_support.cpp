@@ -82,6 +82,10 @@ void add_input_options(CLI::App& app, CommonOptions& common, const std::string& 
 
 void add_common_options(CLI::App& app, CommonOptions& common) {
   add_input_options(app, common, "Scene file (Mitsuba 3 XML)", "SCENE");
+  app.add_option("--path", common.paths,
+                 "Directory where files of the scene are searched last (repeatable)")
+      ->type_name("DIR")
+      ->allow_extra_args(false);
   app.add_option("--sensor", common.sensor,
                  "Sensor to render: its id, or its number from 0 (default: the first)")
       ->type_name("ID|NUMBER");
@@ -246,7 +250,7 @@ void Warnings::add_all(const std::vector<std::string>& texts) {
 Scene load_scene(const CommonOptions& common, Warnings& shown) {
   check_json(common.json);
   std::vector<std::string> warnings;
-  Scene scene = read_scene(common.scene, common.defines, &warnings);
+  Scene scene = read_scene(common.scene, common.defines, &warnings, common.paths);
   for (const std::string& warning : warnings) shown.add(warning);
   if (!common.sensor.empty()) use_sensor(scene, common.sensor);
   if (common.shading == "mitsuba") scene.shading = ShadingModel::kMitsuba;

@@ -21,8 +21,9 @@ namespace limn {
 struct CommonOptions {
   std::string scene;
   std::map<std::string, std::string> defines;
-  std::string sensor;  // "": the first of the scene
-  int spp = 0;         // 0: the scene's
+  std::vector<std::string> paths;  // directories where files are searched last
+  std::string sensor;              // "": the first of the scene
+  int spp = 0;                     // 0: the scene's
   std::optional<uint64_t> seed;
   int threads = 0;  // 0: all cores
   std::string json;

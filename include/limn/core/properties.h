@@ -29,6 +29,8 @@ class Properties {
   virtual SourceLocation where(const std::string& name) const = 0;
 
   virtual bool has(const std::string& name) const = 0;
+  // True if the property is a <string>.
+  virtual bool has_text(const std::string& name) const = 0;
   // Returns `absent` if there is no such property. InputError at its location if it has another
   // type.
   virtual double number(const std::string& name, double absent) = 0;
@@ -36,7 +38,7 @@ class Properties {
   virtual bool boolean(const std::string& name, bool absent) = 0;
   virtual std::string string(const std::string& name, const std::string& absent) = 0;
   virtual Vec3d point(const std::string& name, const Vec3d& absent) = 0;
-  // <rgb>, or <float> as grey.
+  // <rgb>, <float> as grey, or a spectrum, by what the property is used for.
   virtual Rgb<double> rgb(const std::string& name, const Rgb<double>& absent) = 0;
   virtual Matrix4 transform(const std::string& name) = 0;  // identity when absent
   // A file name resolved against the search path. InputError if the property is absent or no such

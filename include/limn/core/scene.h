@@ -75,9 +75,9 @@ Scene deep_copy(const Scene& scene);
 
 // Reads the subset of Mitsuba 3's XML format described in scenes/README.md. `defines` are the -D
 // name=value pairs. InputError with file:line:col. Appends warnings (for example about faces
-// removed from a mesh) to `warnings`.
+// removed from a mesh) to `warnings`. paths: directories where files are searched last.
 Scene read_scene(const std::string& file, const std::map<std::string, std::string>& defines,
-                 std::vector<std::string>* warnings);
+                 std::vector<std::string>* warnings, const std::vector<std::string>& paths = {});
 // read_scene for XML in a string. File names are relative to `folder` ("": the working directory);
 // errors are located in FOLDER/string.
 Scene read_scene_text(const std::string& text, const std::string& folder,
@@ -95,7 +95,8 @@ std::string sensor_name(const Scene& scene);
 
 // Number of sensors in a file. InputError for an invalid scene, without reading meshes or
 // images.
-size_t count_sensors(const std::string& file, const std::map<std::string, std::string>& defines);
+size_t count_sensors(const std::string& file, const std::map<std::string, std::string>& defines,
+                     const std::vector<std::string>& paths = {});
 
 // Replaces a shape's mesh by positions (V by 3, scene units) and faces (F by 3). Flat shapes stay
 // flat; others get computed normals. Warnings and InputError as in make_mesh().

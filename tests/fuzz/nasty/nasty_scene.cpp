@@ -129,7 +129,7 @@ class SceneWriter {
     std::string text;
     if (die_.chance(0.3)) {
       text = fmt::format("<shape type=\"{}\" id=\"{}\">",
-                         die_.pick({"rectangle", "cube", "sphere", "disk"}), "ID");
+                         die_.pick({"rectangle", "cube", "sphere", "disk", "cylinder"}), "ID");
     } else {
       const std::string name = fmt::format("mesh{}.obj", count_++);
       std::ofstream(folder_ + "/" + name) << obj_text(nasty_mesh(die_));

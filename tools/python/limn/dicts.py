@@ -17,12 +17,14 @@ from .errors import InputError
 
 # The element that each type is written as: the types that the reader of files knows.
 TYPES = {
-    "integrator": ["path"],
+    "integrator": ["aov", "direct", "direct_projective", "moment", "path", "prb", "prb_basic",
+                   "prb_projective", "ptracer", "volpath", "volpathmis"],
     "sensor": ["perspective"],
     "film": ["hdrfilm"],
     "rfilter": ["box", "gaussian", "tent"],
-    "sampler": ["independent"],
-    "shape": ["cube", "disk", "obj", "ply", "rectangle", "sphere"],
+    "sampler": ["independent", "ldsampler", "multijitter", "orthogonal", "stratified"],
+    "shape": ["cube", "cylinder", "disk", "instance", "obj", "ply", "rectangle", "serialized",
+              "shapegroup", "sphere"],
     "bsdf": ["diffuse", "roughconductor", "twosided"],
     "emitter": ["area", "constant", "directional", "envmap", "point", "spot"],
 }

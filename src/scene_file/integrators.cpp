@@ -1,0 +1,93 @@
+// The table of integrator types that are read as paths.
+#include "src/scene_file/integrators.h"
+
+#include <algorithm>
+
+#include "limn/core/names.h"
+
+namespace limn {
+
+namespace {
+
+const BsdfMaker kNoBsdfs;
+
+struct IntegratorType {
+  const char* name;
+  int max_depth = -1;                       // if absent
+  bool is_depth_fixed = false;              // max_depth cannot be given
+  bool passes_null = false;                 // goes straight through masks where limn does not
+  bool is_wrapper = false;                  // its first nested integrator decides
+  std::vector<std::string> ignored = {};    // parameters that change no expectation
+  std::vector<std::string> unwritten = {};  // parameters that ask for images that limn lacks
+};
+
+const std::vector<IntegratorType>& types() {
+  const std::vector<std::string> projective = {"guiding", "guiding_proj", "guiding_rounds",
+                                               "sppc",    "sppi",         "sppp"};
+  static const std::vector<IntegratorType> all = {
+      {"aov", -1, false, false, true, {}, {"aovs"}},
+      {"direct", 2, true, false, false, {"bsdf_samples", "emitter_samples", "shading_samples"}},
+      {"direct_projective", 2, true, false, false, projective},
+      {"moment", -1, false, false, true},
+      {"path", -1},
+      {"prb", 6},
+      {"prb_basic", 6},
+      {"prb_projective", 6, false, false, false, projective},
+      {"ptracer", -1, false, false, false, {"samples_per_pass"}},
+      {"volpath", -1, false, true},
+      {"volpathmis", -1, false, true, false, {"use_spectral_mis"}},
+  };
+  return all;
+}
+
+int depth(Properties& p, const std::string& name, int absent, int least, const char* range) {
+  const int64_t read = p.integer(name, absent);
+  if (read < least) p.fail(name, range);
+  if (read > INT32_MAX) p.fail(name, "must be at most 2147483647");
+  return static_cast<int>(read);
+}
+
+void check_no_null(const ObjectDescription& object, const std::string& integrator) {
+  static const std::vector<std::string> kNull = {"mask", "null", "thindielectric"};
+  if (object.tag == "bsdf" && std::find(kNull.begin(), kNull.end(), object.type) != kNull.end()) {
+    throw InputError(object.where, "bsdf \"" + object.type + "\": " + integrator +
+                                       " passes it where path does not: change the integrator");
+  }
+  for (const ChildDescription& child : object.children) check_no_null(*child.object, integrator);
+}
+
+}  // namespace
+
+void read_integrator(const ObjectDescription& object, const SceneDescription& description,
+                     Scene& scene, std::vector<std::string>& warnings) {
+  const auto type = std::find_if(types().begin(), types().end(),
+                                 [&](const IntegratorType& t) { return object.type == t.name; });
+  if (type == types().end()) {
+    throw InputError(object.where, unknown_name("integrator type", object.type, names_of(types())));
+  }
+  DescribedProperties p(object, description, kNoBsdfs);
+  for (const std::string& name : type->unwritten) {
+    if (!p.has(name)) continue;
+    warnings.push_back(format_warning(p.where(name), name + " are not written"));
+  }
+  if (type->is_wrapper) {
+    const ObjectDescription* nested = p.nested("integrator");
+    p.check_all_used();
+    if (!nested) p.fail("takes one integrator");
+    read_integrator(*nested, description, scene, warnings);
+    return;
+  }
+  scene.max_depth = type->max_depth;
+  if (!type->is_depth_fixed) {
+    scene.max_depth =
+        depth(p, "max_depth", type->max_depth, -1, "must be -1 (no limit) or 0 and more");
+  }
+  if (!type->is_depth_fixed) scene.rr_depth = depth(p, "rr_depth", 5, 1, "must be 1 or more");
+  scene.hide_emitters = p.boolean("hide_emitters", false);
+  for (const std::string& name : type->ignored) p.has(name);
+  p.check_all_used();
+  if (!type->passes_null) return;
+  for (const auto& root : description.objects) check_no_null(*root, object.type);
+}
+
+}  // namespace limn

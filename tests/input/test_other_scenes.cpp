@@ -1,0 +1,236 @@
+// Scenes that were written for Mitsuba are read with Mitsuba's meaning.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "limn/core/scene.h"
+#include "support/temp_files.h"
+
+namespace limn {
+namespace {
+
+std::string scene_text(const std::string& body, const std::string& version = "3.0.0") {
+  return "<scene version=\"" + version + "\"><sensor type=\"perspective\"/>\n" + body + "</scene>";
+}
+
+Scene read(const std::string& body, std::vector<std::string>* warnings = nullptr) {
+  return read_scene_text(scene_text(body), "", {}, warnings);
+}
+
+std::string message_of(const std::string& body) {
+  try {
+    read(body);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(OtherScenes, IntegratorsThatEstimateTheSame) {
+  const std::vector<std::pair<std::string, int>> known = {
+      {"path", -1}, {"ptracer", -1},  {"volpath", -1},       {"volpathmis", -1},      {"direct", 2},
+      {"prb", 6},   {"prb_basic", 6}, {"prb_projective", 6}, {"direct_projective", 2}};
+  for (const auto& [type, depth] : known) {
+    EXPECT_EQ(read("<integrator type=\"" + type + "\"/>").max_depth, depth) << type;
+  }
+  EXPECT_EQ(read("<integrator type=\"moment\"><integrator type=\"prb\">"
+                 "<integer name=\"max_depth\" value=\"4\"/></integrator></integrator>")
+                .max_depth,
+            4);
+  EXPECT_EQ(read("<integrator type=\"direct\"><integer name=\"bsdf_samples\" value=\"0\"/>"
+                 "<boolean name=\"hide_emitters\" value=\"true\"/></integrator>")
+                .hide_emitters,
+            true);
+  std::vector<std::string> warnings;
+  EXPECT_EQ(read("<integrator type=\"aov\"><string name=\"aovs\" value=\"d:depth\"/>\n"
+                 "<integrator type=\"path\" name=\"image\"/></integrator>",
+                 &warnings)
+                .max_depth,
+            -1);
+  EXPECT_EQ(warnings, std::vector<std::string>{"string:2:24: warning: aovs are not written"});
+}
+
+TEST(OtherScenes, VolpathWithoutWhatItPasses) {
+  EXPECT_NE(message_of("<integrator type=\"volpath\"/><bsdf id=\"a\" type=\"mask\"/>")
+                .find("bsdf \"mask\": volpath passes it where path does not"),
+            std::string::npos);
+}
+
+TEST(OtherScenes, SamplersFilmsAndTypesWithRemarks) {
+  std::vector<std::string> warnings;
+  const Scene scene = read_scene_text(
+      "<scene version=\"2.1.0\"><sensor type=\"Perspective\">\n"
+      "<sampler type=\"multijitter\"><integer name=\"sample_count\" value=\"9\"/></sampler>\n"
+      "<film type=\"hdrfilm\"><string name=\"pixel_format\" value=\"rgba\"/></film>\n"
+      "</sensor></scene>",
+      "", {}, &warnings);
+  EXPECT_EQ(scene.sample_count, 9);
+  EXPECT_FALSE(scene.film.luminance);
+  EXPECT_EQ(warnings,
+            (std::vector<std::string>{
+                "string:1:32: warning: sensor type \"Perspective\" is read as \"perspective\", "
+                "which Mitsuba finds on some systems only",
+                "string:3:22: warning: pixel_format rgba is written as rgb",
+                "string:2:1: warning: sampler \"multijitter\" is read as independent: --generator "
+                "chooses"}));
+}
+
+TEST(OtherScenes, ObjectsUnderTheSceneByReference) {
+  const Scene scene = read_scene_text(
+      "<scene version=\"3.0.0\"><film id=\"f\" type=\"hdrfilm\">"
+      "<integer name=\"width\" value=\"7\"/></film><sampler id=\"s\" type=\"independent\">"
+      "<integer name=\"sample_count\" value=\"3\"/></sampler>"
+      "<emitter id=\"e\" type=\"area\"><rgb name=\"radiance\" value=\"5\"/></emitter>"
+      "<sensor type=\"perspective\"><ref id=\"f\"/><ref name=\"sampler\" id=\"s\"/></sensor>"
+      "<shape type=\"cube\"><ref id=\"e\"/></shape><shape type=\"disk\" id=\"d\"><ref id=\"e\"/>"
+      "</shape><ref id=\"d\"/></scene>",
+      "", {}, nullptr);
+  EXPECT_EQ(scene.camera.width, 7);
+  EXPECT_EQ(scene.sample_count, 3);
+  ASSERT_EQ(scene.shapes.size(), 2u);
+  for (const Shape& shape : scene.shapes) EXPECT_EQ(shape.radiance.g.v, 5);
+}
+
+TEST(OtherScenes, SpectraAsProperties) {
+  const Scene scene = read(
+      "<shape type=\"cube\"><emitter type=\"area\"><spectrum name=\"radiance\" value=\"2\"/>"
+      "</emitter></shape>"
+      "<shape type=\"cube\"><emitter type=\"area\"><spectrum name=\"radiance\" "
+      "value=\"400:0, 500:8, 600:15.6, 700:18.4\"/></emitter></shape>"
+      "<shape type=\"cube\"><emitter type=\"area\"><spectrum name=\"radiance\" type=\"d65\">"
+      "<float name=\"scale\" value=\"3\"/></spectrum></emitter></shape>"
+      "<shape type=\"cube\"><emitter type=\"area\"><texture name=\"radiance\" "
+      "type=\"rawconstant\"><vector name=\"value\" value=\"1,2,3\"/></texture></emitter></shape>"
+      "<shape type=\"cube\"><emitter type=\"area\"><spectrum name=\"radiance\" "
+      "type=\"irregular\"><string name=\"wavelengths\" value=\"400,500,600,700\"/>"
+      "<string name=\"values\" value=\"0,8,15.6,18.4\"/></spectrum></emitter></shape>");
+  const double known[5][3] = {{2.409588, 1.896582, 1.817832},
+                              {20.711, 10.855, 2.771},
+                              {3, 3, 3},
+                              {1, 2, 3},
+                              {20.711, 10.855, 2.771}};
+  for (int s = 0; s < 5; ++s) {
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(scene.shapes[s].radiance[c].v, known[s][c], 1e-3) << s;
+  }
+  // A constant for eta and k is grey.
+  const auto described = [](const std::string& tag) {
+    const std::string eta = "<" + tag + " name=\"eta\" value=\"0.5\"/>";
+    const std::string k = "<" + tag + " name=\"k\" value=\"3\"/>";
+    return read("<shape type=\"cube\"><bsdf type=\"roughconductor\">" + eta + k + "</bsdf></shape>")
+        .shapes[0]
+        .bsdf->describe();
+  };
+  EXPECT_EQ(described("spectrum"), described("float"));
+}
+
+// A file that an included file names: beside that file, in <path>, beside the scene, in --path.
+TEST(OtherScenes, FilesAreSearchedInOrder) {
+  const TempFiles files;
+  for (const char* folder : {"scene", "scene/parts", "common", "last"}) {
+    std::filesystem::create_directories(files.path(folder));
+  }
+  const std::string main =
+      files.write("scene/main.xml",
+                  scene_text("<path value=\"../common\"/><include filename=\"parts/a.xml\"/>"));
+  files.write("scene/parts/a.xml",
+              "<scene version=\"3.0.0\"><shape type=\"obj\"><string name=\"filename\" "
+              "value=\"m.obj\"/></shape></scene>");
+  const std::vector<std::string> paths = {files.path("last")};
+  EXPECT_THROW(read_scene(main, {}, nullptr, paths), InputError);
+  std::string faces;
+  // From the last place that is searched to the first, each with a face more.
+  for (const char* folder : {"last", "scene", "common", "scene/parts"}) {
+    faces += "v 0 0 0\nv 1 0 0\nv 0 1 " + std::to_string(faces.size()) + "\nf -1 -2 -3\n";
+    files.write(std::string(folder) + "/m.obj", faces);
+    const Scene scene = read_scene(main, {}, nullptr, paths);
+    EXPECT_EQ(scene.shapes[0].mesh.faces.size(), std::ranges::count(faces, 'f')) << folder;
+  }
+}
+
+TEST(OtherScenes, AnIncludedFileFindsAPathBesideTheScene) {
+  const TempFiles files;
+  std::filesystem::create_directories(files.path("parts"));
+  std::filesystem::create_directories(files.path("meshes"));
+  files.write("meshes/m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  files.write("parts/a.xml",
+              "<scene version=\"3.0.0\"><path value=\"meshes\"/><shape type=\"obj\"><string "
+              "name=\"filename\" value=\"m.obj\"/></shape></scene>");
+  const std::string main = files.write("s.xml", scene_text("<include filename=\"parts/a.xml\"/>"));
+  EXPECT_EQ(read_scene(main, {}, nullptr).shapes.size(), 1u);
+}
+
+TEST(OtherScenes, NamesOfEarlierFormats) {
+  std::vector<std::string> warnings;
+  const Scene scene = read_scene_text(
+      "<scene version=\"0.6.0\">\n<integrator type=\"sppm\"><integer name=\"maxDepth\" "
+      "value=\"7\"/>"
+      "<float name=\"initialRadius\" value=\"1\"/></integrator>"
+      "<sensor type=\"perspective\"><string name=\"fovAxis\" value=\"y\"/>"
+      "<float name=\"fov\" value=\"40\"/><transform name=\"toWorld\">"
+      "<lookAt origin=\"0,0,5\" target=\"0,0,0\" up=\"0,1,0\"/></transform>"
+      "<sampler type=\"independent\"><integer name=\"sampleCount\" value=\"8\"/></sampler></sensor>"
+      "<bsdf id=\"b\" type=\"diffuse\"><rgb name=\"diffuseReflectance\" value=\"0.25\"/></bsdf>"
+      "<shape type=\"rectangle\"><transform name=\"toWorld\"><scale value=\"2\"/></transform>"
+      "<ref id=\"b\"/></shape></scene>",
+      "", {}, &warnings);
+  EXPECT_EQ(scene.max_depth, 7);
+  EXPECT_EQ(scene.sample_count, 8);
+  EXPECT_EQ(scene.camera.origin.z.v, 5);
+  EXPECT_EQ(scene.shapes[0].bsdf->describe(), "diffuse, reflectance 0.25 0.25 0.25");
+  EXPECT_EQ(warnings,
+            std::vector<std::string>{"string:2:1: warning: integrator \"sppm\" is read as "
+                                     "path, without its parameters"});
+}
+
+TEST(OtherScenes, InstancesAreCopies) {
+  const std::string group =
+      "<shape type=\"shapegroup\" id=\"g\"><shape type=\"cube\" id=\"a\"><transform "
+      "name=\"to_world\"><translate x=\"1\"/></transform></shape><shape type=\"disk\"/></shape>";
+  const std::string instance =
+      "<shape type=\"instance\"><ref id=\"g\"/><transform name=\"to_world\">"
+      "<rotate z=\"1\" angle=\"90\"/></transform></shape>";
+  const Scene scene = read(group + "<shape type=\"instance\"><ref id=\"g\"/></shape>" + instance);
+  ASSERT_EQ(scene.shapes.size(), 4u);
+  EXPECT_EQ(scene.shapes[0].id, "a");
+  EXPECT_EQ(scene.shapes[2].id, "a.2");
+  const Bounds first = bounds_of(scene.shapes[0].mesh), second = bounds_of(scene.shapes[2].mesh);
+  EXPECT_EQ(first.upper.x, 2);
+  EXPECT_NEAR(second.upper.y, 2, 1e-6);
+  EXPECT_NEAR(second.upper.x, 1, 1e-6);
+  EXPECT_EQ(read(group).shapes.size(), 0u);
+  EXPECT_NE(message_of("<shape type=\"instance\"><ref id=\"c\"/></shape>"
+                       "<shape type=\"cube\" id=\"c\"/>")
+                .find("shape \"instance\": needs one shapegroup"),
+            std::string::npos);
+}
+
+TEST(OtherScenes, Cylinders) {
+  const Scene scene = read(
+      "<shape type=\"cylinder\"><point name=\"p0\" value=\"1,2,3\"/><point name=\"p1\" "
+      "value=\"1,6,3\"/><float name=\"radius\" value=\"0.5\"/></shape>"
+      "<shape type=\"cylinder\"><boolean name=\"flip_normals\" value=\"true\"/></shape>");
+  const Mesh& mesh = scene.shapes[0].mesh;
+  double area = 0;
+  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+    const auto c = face_corners<double>(mesh, FaceId(f));
+    const Vec3d n = cross(c[1] - c[0], c[2] - c[0]);
+    area += 0.5 * length(n);
+    EXPECT_GT(dot(n, c[0] - Vec3d{1, c[0].y, 3}), 0);
+  }
+  EXPECT_NEAR(area, 2 * kPi * 0.5 * 4, 1e-3 * area);
+  for (const Vec3f& p : mesh.positions) {
+    EXPECT_NEAR(std::hypot(p.x - 1, p.z - 3), 0.5, 1e-6);
+    EXPECT_TRUE(p.y == 2 || p.y == 6);
+  }
+  const Mesh& inside = scene.shapes[1].mesh;
+  EXPECT_LT(dot(inside.normals[inside.normal_ids[0][0]],
+                cast<double>(inside.positions[inside.faces[0][0]])),
+            0);
+  EXPECT_NE(message_of("<shape type=\"cylinder\"><point name=\"p1\" value=\"0,0,0\"/></shape>")
+                .find("shape \"cylinder\": p0 and p1 coincide"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace limn
