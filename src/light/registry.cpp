@@ -18,6 +18,7 @@ constexpr LightType kTypes[] = {
     {"directional", false, read_directional},
     {"envmap", false, read_envmap},
     {"point", false, read_point},
+    {"projector", false, read_projector},
     {"spot", false, read_spot},
 };
 

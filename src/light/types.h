@@ -14,6 +14,7 @@ void read_constant(Properties& properties, Scene& scene, Shape* shape);
 void read_directional(Properties& properties, Scene& scene, Shape* shape);
 void read_envmap(Properties& properties, Scene& scene, Shape* shape);
 void read_point(Properties& properties, Scene& scene, Shape* shape);
+void read_projector(Properties& properties, Scene& scene, Shape* shape);
 void read_spot(Properties& properties, Scene& scene, Shape* shape);
 
 // Reads the emitted power of a delta light: 1 if absent; finite and not negative.

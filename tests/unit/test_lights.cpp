@@ -55,6 +55,27 @@ TEST(DeltaLights, ASpotFallsOffLinearlyInTheAngle) {
   }
 }
 
+// The irradiance of a plane at distance z before it is pi / z^2 on the axis, and falls off as the
+// cosine of the angle there (Mitsuba 3).
+TEST(DeltaLights, AProjectorLightsAFrame) {
+  const auto light = only_light(
+      R"(<emitter type="projector"><float name="fov" value="90"/><float name="scale" value="2"/>
+         <rgb name="irradiance" value="3,2,1"/><transform name="to_world">
+         <lookat origin="0,5,0" target="0,0,0" up="1,0,0"/></transform></emitter>)");
+  for (const double x : {0.0, -1.5, 1.99, 2.01}) {
+    const auto a = light->arriving(Vec3d{x, 3, 1.98});
+    ASSERT_EQ(a.has_value(), std::fabs(x) < 2) << x;
+    if (!a) continue;
+    const double distance = std::sqrt(x * x + 1.98 * 1.98 + 4);
+    // On a surface that faces the light; that of the plane is this times 2 / distance.
+    EXPECT_NEAR(a->irradiance.r, 2 * 3 * kPi / 4 * (distance / 2), 1e-12);
+    EXPECT_NEAR(a->wo.y, 2 / distance, 1e-15);
+    EXPECT_LE(a->irradiance.g * distance * distance,
+              light->power() / luminance(Rgb<double>{3, 2, 1}) * 2 * (1 + 1e-12));
+  }
+  EXPECT_FALSE(light->arriving(Vec3d{0, 6, 0}));
+}
+
 TEST(DeltaLights, ADirectionComesFromInfinity) {
   for (const char* place : {R"(<vector name="direction" value="0,-3,0"/>)",
                             R"(<transform name="to_world"><lookat origin="1,2,3" target="1,1,3"

@@ -26,7 +26,8 @@ TYPES = {
     "shape": ["cube", "cylinder", "disk", "instance", "obj", "ply", "rectangle", "serialized",
               "shapegroup", "sphere"],
     "bsdf": ["diffuse", "roughconductor", "twosided"],
-    "emitter": ["area", "constant", "directional", "envmap", "point", "spot"],
+    "emitter": ["area", "constant", "directional", "envmap", "point", "projector",
+                "spot"],
 }
 _TAGS = {type_: tag for tag, types in TYPES.items() for type_ in types}
 # What has parameters to be named.
