@@ -16,10 +16,17 @@
 // infinity, which follows from dx/dt = m n x (dw/dt x w) (and |n x N| is G's slope on the surface).
 // Where rays start above the surface, L H(G) has G of the point that x is lifted to, and m is
 // |dx/dt| over G's slope by x.
+//
+// Near a vertex q samples go with 1 / r^2, and points drawn as the light sees the edges would make
+// them rare and huge. So most points are drawn as the vertex sees the shadows (shadow_pieces.h),
+// the others as the light sees the edges, and all are weighed by the density of both together.
 #include <fmt/format.h>
+
+#include <optional>
 
 #include "integrators/film/film_point.h"
 #include "integrators/terms/shadow_edges.h"
+#include "integrators/terms/shadow_pieces.h"
 #include "integrators/terms/term_table.h"
 #include "integrators/terms/vertex_edges.h"
 
@@ -32,19 +39,34 @@ struct Sight {
   double distance;
 };
 
+// The share of draws by pieces. Not tuned.
+constexpr double kPieceShare = 0.75;
+
 class ShadowTerm final : public Term {
  public:
   explicit ShadowTerm(TermInput& input)
-      : context_(input.context), input_(input.edges()), edges_(context_, input_, input.lanes) {}
+      : context_(input.context), input_(input.edges()), edges_(context_, input_, input.lanes) {
+    if (edges_.empty() || !is_seen_again()) return;
+    const Stopwatch watch;
+    pieces_.emplace(context_, input_, edges_.edges(), input.free != nullptr, input.threads);
+    if (pieces_->empty()) pieces_.reset();
+    piece_seconds_ = watch.seconds();
+  }
 
   bool uses_vertices() const override { return !edges_.empty(); }
   void add_at_vertex(const PathVertex& vertex, int samples, BoundarySink& sink) const override {
     const int max_depth = context_.scene.max_depth;
     if (max_depth >= 0 && vertex.bounces + 2 >= max_depth) return;
-    for (int i = 0; i < samples; ++i) {
-      const Rng key = vertex.key.copy(Purpose::kShadowCopy, i);
-      add_sample(vertex, key.at(Purpose::kShadow, vertex.bounces), sink);
-    }
+    if (samples > 0) add_samples(vertex, samples, sink);
+  }
+  double work(const TermCost& cost) const override {
+    const double draw = pieces_ ? kPieceShare * pieces_->sampler().draw_cost() : 0;
+    return static_cast<double>(cost.rays) + draw * static_cast<double>(cost.samples) +
+           first_work(cost);
+  }
+  double first_work(const TermCost& cost) const override {
+    const double query = pieces_ ? pieces_->sampler().query_cost() : 0;
+    return query * static_cast<double>(cost.samples);
   }
 
   bool uses_film() const override {
@@ -56,17 +78,33 @@ class ShadowTerm final : public Term {
   void describe(GradientStats& stats) const override {
     stats.setup.emplace_back("edges of sharp shadows", edges_.list_seconds());
     stats.edges.emplace_back("of sharp shadows", edges_.size());
+    if (!pieces_) return;
+    stats.setup.emplace_back("sharp shadows on faces", piece_seconds_);
+    stats.edges.emplace_back("of sharp shadows on faces", pieces_->pieces().size());
   }
 
  private:
   // dG/dtheta times delta(G) domega / dt, times `scale`.
   BoundaryForm sweep(const ShadowEdge& edge, const ShadowPoint& point, const Sight& sight,
                      double scale) const;
-  void add_sample(const PathVertex& vertex, Rng rng, BoundarySink& sink) const;
+  // Whether vertices of paths see what is lit.
+  bool is_seen_again() const {
+    return context_.scene.max_depth < 0 || context_.scene.max_depth > 2;
+  }
+  void add_samples(const PathVertex& vertex, int samples, BoundarySink& sink) const;
+  void add_sample(const PathVertex& vertex, const EdgeQuery& query, const ShadowDraw& draw,
+                  const Rng& key, BoundarySink& sink) const;
+  // Of a draw with this density by the pieces.
+  double density(const ShadowDraw& draw, double by_pieces) const {
+    const double by_edges = edges_.probability(draw.edge);
+    return pieces_ ? kPieceShare * by_pieces + (1 - kPieceShare) * by_edges : by_edges;
+  }
 
   const PathContext& context_;
   const EdgeSamplerInput& input_;
   ShadowEdges edges_;
+  std::optional<ShadowPieces> pieces_;
+  double piece_seconds_ = 0;
 };
 
 // With e = y1 - y0 and r = x - y0, dG = dw . (e x r) + de . (r x w) + N . (dx - dy0).
@@ -89,13 +127,45 @@ BoundaryForm ShadowTerm::sweep(const ShadowEdge& edge, const ShadowPoint& point,
   return form;
 }
 
-void ShadowTerm::add_sample(const PathVertex& vertex, Rng rng, BoundarySink& sink) const {
+void ShadowTerm::add_samples(const PathVertex& vertex, int samples, BoundarySink& sink) const {
+  static thread_local std::vector<Rng> by_edges, by_pieces;
+  static thread_local std::vector<std::optional<ShadowDraw>> draws;
+  by_edges.clear();
+  by_pieces.clear();
+  double share = 0;
+  for (int i = 0; i < samples; ++i) {
+    const Rng key = vertex.key.copy(Purpose::kShadowCopy, i);
+    Rng rng = key.at(Purpose::kShadow, vertex.bounces);
+    if (i == 0) share = rng.uniform();
+    share += pieces_ ? kPieceShare : 0;
+    (share >= 1 ? by_pieces : by_edges).push_back(rng);
+    if (share >= 1) share -= 1;
+  }
+  sink.cost().samples += static_cast<uint64_t>(samples);
+  const EdgeQuery query = query_at(vertex);
+  for (Rng& rng : by_edges) {
+    const uint32_t edge = edges_.choose(rng.uniform());
+    const double t = rng.uniform();
+    add_sample(vertex, query, {edge, t, -1}, rng, sink);
+  }
+  if (by_pieces.empty()) return;
+  pieces_->draw(query, by_pieces, draws);
+  for (size_t i = 0; i < by_pieces.size(); ++i) {
+    if (draws[i]) {
+      add_sample(vertex, query, *draws[i], by_pieces[i], sink);
+    } else {
+      ++sink.cost().no_edge;
+    }
+  }
+}
+
+// draw.density: by pieces; negative if it is not known.
+void ShadowTerm::add_sample(const PathVertex& vertex, const EdgeQuery& query,
+                            const ShadowDraw& draw, const Rng& key, BoundarySink& sink) const {
   TermCost& cost = sink.cost();
-  ++cost.samples;
-  double probability;
-  const ShadowEdge& edge = edges_.choose(rng.uniform(), probability);
+  const ShadowEdge& edge = edges_.edge(draw.edge);
   RayCount rays;
-  const auto point = edges_.cast(edge, rng.uniform(), rays);
+  const auto point = edges_.cast(edge, draw.t, rays);
   cost.add(rays);
   if (!point) {
     ++cost.occluded;
@@ -109,8 +179,12 @@ void ShadowTerm::add_sample(const PathVertex& vertex, Rng rng, BoundarySink& sin
   const Rgb<double> amount =
       is_black(f) ? f : vertex.throughput * f * edges_.jump(edge, *point, q, omega);
   BoundaryForm form;
-  if (!is_black(amount)) form = sweep(edge, *point, {omega, distance}, 1 / probability);
-  if (is_black(amount) || !sink.takes(form, rng)) {
+  double by_pieces = draw.density;
+  if (!is_black(amount)) {
+    if (pieces_ && by_pieces < 0) by_pieces = pieces_->density(query, draw.edge, draw.t);
+    form = sweep(edge, *point, {omega, distance}, 1 / density(draw, by_pieces));
+  }
+  if (is_black(amount) || !sink.takes(form, key)) {
     ++cost.zero_weight;
     return;
   }
@@ -122,16 +196,16 @@ void ShadowTerm::add_sample(const PathVertex& vertex, Rng rng, BoundarySink& sin
   ++cost.counted;
   if (sink.log()) {
     sink.log()->push_back(
-        fmt::format("  shadow of edge {} of shape {} on face {} of shape {}: probability {:.4g}",
+        fmt::format("  shadow of edge {} of shape {} on face {} of shape {}: density {:.4g}",
                     edge.id.edge.index(), edge.id.object.index(), point->face.face.index(),
-                    point->face.shape.index(), probability));
+                    point->face.shape.index(), density(draw, by_pieces)));
   }
   sink.add(amount);
 }
 
 void ShadowTerm::sample_film(double u, const Rng& key, FilmSink& sink) const {
-  double probability;
-  const ShadowEdge& edge = edges_.choose(u, probability);
+  const uint32_t chosen = edges_.choose(u);
+  const ShadowEdge& edge = edges_.edge(chosen);
   RayCount rays;
   const auto point = edges_.cast(edge, key.at(Purpose::kShadow, 0).uniform(), rays);
   sink.cost().add(rays);
@@ -140,7 +214,8 @@ void ShadowTerm::sample_film(double u, const Rng& key, FilmSink& sink) const {
   if (!seen || !sink.at(seen->x, seen->y)) return;
   const Vec3d q = value(seen->ray.origin);
   const Rgb<double> amount = edges_.jump(edge, *point, q, seen->omega);
-  const double scale = film_per_solid_angle(context_.scene.camera, seen->omega) / probability;
+  const double scale =
+      film_per_solid_angle(context_.scene.camera, seen->omega) / edges_.probability(chosen);
   if (is_black(amount)) return;
   const BoundaryForm form = sweep(edge, *point, {seen->omega, seen->distance}, scale);
   if (!sink.takes(form, key)) return;

@@ -218,12 +218,6 @@ void ShadowEdges::weigh(size_t first, int lanes) {
   }
 }
 
-const ShadowEdge& ShadowEdges::choose(double u, double& probability) const {
-  const DiscreteDistribution::Draw draw = choice_.sample(u);
-  probability = draw.probability;
-  return edges_[draw.index];
-}
-
 std::optional<ShadowPoint> ShadowEdges::cast(const ShadowEdge& edge, double t,
                                              RayCount& rays) const {
   const EdgeMesh& mesh = input_.object(edge.id.object);

@@ -3,6 +3,7 @@
 // fall. The formulas stand in shadow_boundary.cpp.
 #include <algorithm>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "integrators/paths/path.h"
@@ -63,8 +64,12 @@ class ShadowEdges {
   size_t size() const { return edges_.size(); }
   double list_seconds() const { return list_seconds_; }
 
-  // The edge at u in [0, 1), and its probability.
-  const ShadowEdge& choose(double u, double& probability) const;
+  const ShadowEdge& edge(uint32_t i) const { return edges_[i]; }
+  std::span<const ShadowEdge> edges() const { return edges_; }
+  // The edge at u in [0, 1), in proportion to how long it is and how fast it moves as the light
+  // sees it.
+  uint32_t choose(double u) const { return static_cast<uint32_t>(choice_.sample(u).index); }
+  double probability(uint32_t i) const { return choice_.probability(i); }
   std::optional<ShadowPoint> cast(const ShadowEdge& edge, double t, RayCount& rays) const;
   // dL of the point as it is seen from q along the unit direction omega.
   Rgb<double> jump(const ShadowEdge& edge, const ShadowPoint& point, const Vec3d& q,

@@ -29,6 +29,10 @@ class DiscreteDistribution {
     const double weight = sums_[index] - below;
     return {index, weight / sums_.back(), std::clamp((target - below) / weight, 0.0, 1.0)};
   }
+  // Of an index; some weight must be positive.
+  double probability(size_t index) const {
+    return (sums_[index] - (index == 0 ? 0 : sums_[index - 1])) / sums_.back();
+  }
 
  private:
   std::vector<double> sums_;
