@@ -10,6 +10,9 @@ namespace limn {
 
 std::vector<Parameter> reverse_parameters(const Scene& scene, const BackwardOptions& options) {
   if (!options.found.empty()) return options.found;
+  if (scene.camera.is_orthographic()) {
+    throw InputError({scene.file}, "orthographic: there are images, no derivatives");
+  }
   std::vector<Parameter> parameters;
   if (options.parameters.empty()) {
     parameters = list_parameters(scene);

@@ -45,6 +45,10 @@ std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSet
   const ImageMethod& method = *options.method->image;
   const Numbers numbers = numbers_of(options.generator);  // checked for all
   check_points(options.points, method.closed_light, options.method.name());
+  if (scene.camera.is_orthographic() &&
+      (method.looks_around || options.exact_film || options.points == FilmPoints::kFaces)) {
+    throw InputError("orthographic: only rays make images (--method rays, --film rays)");
+  }
   if (!method.looks_around && options.what != RenderWhat::kImage) {
     throw InputError(
         fmt::format("the method \"{}\" knows radiance alone: how open the sky is say {}",

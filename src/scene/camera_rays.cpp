@@ -9,6 +9,12 @@ namespace limn {
 void find_rays(const CameraView<double>& view, std::span<const Camera::FilmPoint<double>> positions,
                std::span<CameraRay<double>> rays) {
   const Camera& camera = view.camera();
+  if (camera.is_orthographic()) {
+    for (size_t i = 0; i < positions.size(); ++i) {
+      rays[i] = view.parallel(positions[i].x, positions[i].y);
+    }
+    return;
+  }
   wide::for_blocks(positions.size(), [&](size_t first, size_t last) {
     const auto at = [&](int i) { return positions[std::min(first + i, last - 1)]; };
     const auto d = view.towards(wide::gather([&](int i) { return at(i).x; }),

@@ -137,6 +137,7 @@ Image Parameter::texel_velocities(const Scene& scene, size_t component) const {
 
 std::vector<Parameter> list_parameters(const Scene& scene) {
   std::vector<Parameter> list;
+  if (scene.camera.is_orthographic()) return list;
   add_shape_parameters(scene, list);
   add_camera_parameters(scene, list);
   add_bsdf_parameters(scene, list);
@@ -146,6 +147,9 @@ std::vector<Parameter> list_parameters(const Scene& scene) {
 }
 
 Parameter find_parameter_or_array(const Scene& scene, const std::string& name) {
+  if (scene.camera.is_orthographic()) {
+    throw InputError({scene.file}, "orthographic: there are images, no derivatives");
+  }
   const std::vector<Parameter> list = list_parameters(scene);
   for (const Parameter& p : list) {
     if (p.name == name) {

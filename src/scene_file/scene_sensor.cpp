@@ -197,10 +197,19 @@ void read_fov(Properties& p, Camera& camera) {
 
 Vec3<Dual> dual(const Vec3d& v) { return {v.x, v.y, v.z}; }
 
+// Divides the axes of a transform by their lengths, which it returns.
+Vec3d normalize_axes(Matrix4& m) {
+  Vec3d lengths;
+  for (int column = 0; column < 3; ++column) {
+    lengths[column] = std::hypot(m.m[0][column], m.m[1][column], m.m[2][column]);
+    for (int row = 0; row < 3; ++row) m.m[row][column] /= lengths[column];
+  }
+  return lengths;
+}
+
 // Orthonormalises the camera's axes. Mirrored cameras are allowed, as in Mitsuba.
-void read_axes(Properties& p, Camera& camera) {
+void set_axes(Properties& p, const Matrix4& m, Camera& camera) {
   constexpr double kDigits = 1e-3;  // Mitsuba's bound on scale factors
-  const Matrix4 m = p.transform("to_world");
   Vec3d row[3], column[3];
   for (int i = 0; i < 3; ++i) {
     row[i] = {m.m[i][0], m.m[i][1], m.m[i][2]};
@@ -233,7 +242,10 @@ Sensor read_sensor(const ObjectDescription& sensor, const SceneDescription& desc
                    std::vector<std::string>& warnings) {
   Sensor read;
   read.id = sensor.id;
-  if (sensor.type != "perspective") fail_unknown_type(sensor, {"perspective"});
+  const bool orthographic = sensor.type == "orthographic";
+  if (!orthographic && sensor.type != "perspective") {
+    fail_unknown_type(sensor, {"orthographic", "perspective"});
+  }
   DescribedProperties p(sensor, description, kNoBsdfs);
   Camera& camera = read.camera;
   if (const ObjectDescription* film = p.nested("film")) {
@@ -242,13 +254,25 @@ Sensor read_sensor(const ObjectDescription& sensor, const SceneDescription& desc
   if (const ObjectDescription* sampler = p.nested("sampler")) {
     read_sampler(*sampler, description, read, warnings);
   }
-  read_fov(p, camera);
-  read_axes(p, camera);
+  Matrix4 to_world = p.transform("to_world");
+  Vec3d size{1, 1, 1};
+  if (orthographic) {
+    size = normalize_axes(to_world);
+    camera.half_width = size.x;
+    camera.half_height = size.y * camera.height / camera.width;
+  } else {
+    read_fov(p, camera);
+  }
+  set_axes(p, to_world, camera);
   camera.near_clip = positive(p, "near_clip", 0.01);
   camera.far_clip = positive(p, "far_clip", 10000);
   if (!(camera.near_clip < camera.far_clip)) p.fail("far_clip", "must be larger than near_clip");
-  camera.offset_x = p.number("principal_point_offset_x", 0);
-  camera.offset_y = p.number("principal_point_offset_y", 0);
+  camera.far_clip += (size.z - 1) * camera.near_clip;
+  camera.near_clip *= size.z;
+  if (!orthographic) {
+    camera.offset_x = p.number("principal_point_offset_x", 0);
+    camera.offset_y = p.number("principal_point_offset_y", 0);
+  }
   // Accepted and ignored: nothing moves during an exposure, and a pinhole has no focus. They have
   // no effect in Mitsuba either.
   p.number("shutter_open", 0);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "limn/core/parameter.h"
 #include "limn/core/scene.h"
 #include "support/temp_files.h"
 
@@ -203,6 +204,28 @@ TEST(OtherScenes, InstancesAreCopies) {
                        "<shape type=\"cube\" id=\"c\"/>")
                 .find("shape \"instance\": needs one shapegroup"),
             std::string::npos);
+}
+
+// The film is [-1, 1] across and square pixels high, scaled by to_world.
+TEST(OtherScenes, OrthographicSensors) {
+  const Scene scene = read_scene_text(
+      "<scene version=\"3.0.0\"><sensor type=\"orthographic\"><transform name=\"to_world\">"
+      "<scale x=\"3\" y=\"3\"/><lookat origin=\"0,0,5\" target=\"0,0,0\" up=\"0,1,0\"/></transform>"
+      "<film type=\"hdrfilm\"><integer name=\"width\" value=\"8\"/><integer name=\"height\" "
+      "value=\"4\"/></film></sensor><shape type=\"cube\" id=\"a\"/></scene>",
+      "", {}, nullptr);
+  const CameraRay<double> corner = scene.camera.ray<double>(0, 0);
+  EXPECT_NEAR(corner.origin.x, -3, 1e-12);  // +X is to the left as seen from +Z
+  EXPECT_NEAR(corner.origin.y, 1.5, 1e-12);
+  EXPECT_NEAR(corner.direction.z, -1, 1e-12);
+  const std::array<Camera::FilmPoint<double>, 2> places = {{{8, 4}, {6, 1}}};
+  std::array<CameraRay<double>, 2> rays;
+  find_rays(CameraView<double>(scene.camera), places, rays);
+  EXPECT_NEAR(rays[0].origin.x, 3, 1e-12);
+  EXPECT_NEAR(rays[1].origin.y, 0.75, 1e-12);
+  EXPECT_EQ(rays[1].t_min, 0.01);
+  EXPECT_TRUE(list_parameters(scene).empty());
+  EXPECT_THROW(find_parameter(scene, "a.translate.x"), InputError);
 }
 
 TEST(OtherScenes, Cylinders) {

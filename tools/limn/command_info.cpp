@@ -62,9 +62,11 @@ void print_shape(const json& shape) {
 void print_camera(const Scene& scene) {
   const Camera& camera = scene.camera;
   const Film& film = scene.film;
-  fmt::print("camera: at ({:.6g}, {:.6g}, {:.6g}), fov {:.6g} degrees, film {} x {}",
-             camera.origin.x.v, camera.origin.y.v, camera.origin.z.v, camera.fov.v, camera.width,
-             camera.height);
+  const std::string lens = camera.is_orthographic()
+                               ? fmt::format("orthographic, {:.6g} wide", 2 * camera.half_width)
+                               : fmt::format("fov {:.6g} degrees", camera.fov.v);
+  fmt::print("camera: at ({:.6g}, {:.6g}, {:.6g}), {}, film {} x {}", camera.origin.x.v,
+             camera.origin.y.v, camera.origin.z.v, lens, camera.width, camera.height);
   if (film.crop_width != camera.width || film.crop_height != camera.height) {
     fmt::print(", crop {} x {} at ({}, {})", film.crop_width, film.crop_height, film.crop_x,
                film.crop_y);

@@ -1,5 +1,5 @@
 #pragma once
-// The pinhole camera, with Mitsuba 3's conventions: in camera space +X points to the left of the
+// The camera, a pinhole unless said otherwise, with Mitsuba 3's conventions: in camera space +X points to the left of the
 // image, +Y up, and +Z along the view.
 #include <span>
 
@@ -30,6 +30,11 @@ struct Camera {
   double offset_y = 0;
   int width = 768;  // full film, pixels
   int height = 576;
+  // Of an orthographic camera, whose rays are parallel to `forward` and start on a film around
+  // `origin`: half of its extent along `left` and `up` [scene units]. It has rays, no derivatives.
+  double half_width = 0;
+  double half_height = 0;
+  bool is_orthographic() const { return half_width > 0; }
 
   // The ray through the film position (x, y) [pixels of the full film, row 0 on top]. CameraView is
   // faster for many rays.
@@ -87,9 +92,17 @@ class CameraView {
   template <class X>
   CameraRay<S> ray(const X& x, const X& y) const {
     const Camera& c = camera_;
+    if (c.is_orthographic()) return parallel(value(x), value(y));
     const auto d = towards(x, y);
     const double d_length = length(value(d));
     return {origin_, normalize(d), c.near_clip * d_length, c.far_clip * d_length};
+  }
+  // `ray` of an orthographic camera.
+  CameraRay<S> parallel(double x, double y) const {
+    const Camera& c = camera_;
+    const Vec3<S> across = left_ * S(c.half_width * (1 - 2 * x / c.width));
+    const Vec3<S> along = up_ * S(c.half_height * (1 - 2 * y / c.height));
+    return {origin_ + across + along, forward_, c.near_clip, c.far_clip};
   }
   // The unnormalised direction of `ray`, of depth 1.
   template <class X>
