@@ -43,7 +43,7 @@ void EdgeMotion::contribute(Tape& tape, Seeds& seeds, const BoundaryForm& form,
         contribute_end(tape, point.edge, 1, g * point.t);
         break;
       case MovingPoint::Of::kFace:
-        contribute_face(tape, point.face, form.x, g);
+        contribute_face(tape, point.face, point.x, g);
         break;
       case MovingPoint::Of::kLight:
         seeds.add(light_origin(*point.light), g);

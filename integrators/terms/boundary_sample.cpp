@@ -34,7 +34,7 @@ double BoundaryForm::add_seen_point(const Scene& scene, FaceRef face, const Vec3
     lift = {face, of.corners, of.normals};
   }
   const Vec3d across = n * (dot(of_x, omega) / slope);
-  points[count++] = {MovingPoint::Of::kFace, nullptr, {}, 0, face, nullptr, across};
+  points[count++] = {MovingPoint::Of::kFace, nullptr, {}, 0, face, nullptr, across, x};
   return std::fabs(slope) / length(n);
 }
 

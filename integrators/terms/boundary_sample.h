@@ -24,9 +24,10 @@ struct MovingPoint {
   const EdgeMesh* mesh;  // kEdge: the point at t of an edge of this mesh
   EdgeRef edge;
   double t;
-  FaceRef face;             // kFace: where the ray meets this face, at the form's x
+  FaceRef face;             // kFace: where a ray meets this face, at `x`
   const DeltaLight* light;  // kLight: its position, or at infinity its direction
   Vec3d g;
+  Vec3d x = {};
 };
 
 // What the point that x is lifted to (surface_point.h) hangs on besides x.
@@ -41,7 +42,7 @@ struct BoundaryForm {
   double scale = 1;
   double share = 1;   // counts for velocities, not for what turning directions change
   bool held = false;  // the ray's direction does not turn with those of the path
-  std::array<MovingPoint, 4> points;
+  std::array<MovingPoint, 5> points;
   int count = 0;
   std::optional<MovingLift> lift;
 

@@ -45,7 +45,8 @@ Vec3<Lanes> relative_velocity(const Scene& scene, const BoundaryForm& form,
     case MovingPoint::Of::kFace: {
       const Mesh& mesh = scene.shape(point.face.shape).mesh;
       const auto corners = face_corners<Dual>(mesh, point.face.face);
-      const auto b = barycentric({value(corners[0]), value(corners[1]), value(corners[2])}, form.x);
+      const auto b =
+          barycentric({value(corners[0]), value(corners[1]), value(corners[2])}, point.x);
       Vec3<Lanes> sum;
       for (int k = 0; k < 3; ++k) sum = sum + velocity_of(corners[k]) * b[k];
       return against_ray(sum, form.x, ray);

@@ -20,12 +20,14 @@
 // Near a vertex q samples go with 1 / r^2, and points drawn as the light sees the edges would make
 // them rare and huge. So most points are drawn as the vertex sees the shadows (shadow_pieces.h),
 // the others as the light sees the edges, and all are weighed by the density of both together.
+// Vertices that the camera sees are found from the shadow, too (shadow_lines.h).
 #include <fmt/format.h>
 
 #include <optional>
 
 #include "integrators/film/film_point.h"
 #include "integrators/terms/shadow_edges.h"
+#include "integrators/terms/shadow_lines.h"
 #include "integrators/terms/shadow_pieces.h"
 #include "integrators/terms/term_table.h"
 #include "integrators/terms/vertex_edges.h"
@@ -45,7 +47,10 @@ constexpr double kPieceShare = 0.75;
 class ShadowTerm final : public Term {
  public:
   explicit ShadowTerm(TermInput& input)
-      : context_(input.context), input_(input.edges()), edges_(context_, input_, input.lanes) {
+      : context_(input.context),
+        input_(input.edges()),
+        edges_(context_, input_, input.lanes),
+        lines_(context_, input_) {
     if (edges_.empty() || !is_seen_again()) return;
     const Stopwatch watch;
     pieces_.emplace(context_, input_, edges_.edges(), input.free != nullptr, input.threads);
@@ -92,8 +97,17 @@ class ShadowTerm final : public Term {
     return context_.scene.max_depth < 0 || context_.scene.max_depth > 2;
   }
   void add_samples(const PathVertex& vertex, int samples, BoundarySink& sink) const;
-  void add_sample(const PathVertex& vertex, const EdgeQuery& query, const ShadowDraw& draw,
-                  const Rng& key, BoundarySink& sink) const;
+  // A vertex of a path, and what of it lines may find.
+  struct Viewer {
+    const PathVertex& vertex;
+    const EdgeQuery query;
+    std::optional<SeenVertex> by_lines;
+  };
+  void add_sample(const Viewer& viewer, const ShadowDraw& draw, const Rng& key,
+                  BoundarySink& sink) const;
+  // Of the film: shadows that the camera sees, and vertices that lines find.
+  void add_seen(double u, double share, const Rng& key, FilmSink& sink) const;
+  void add_line(double u, const Rng& key, FilmSink& sink) const;
   // Of a draw with this density by the pieces.
   double density(const ShadowDraw& draw, double by_pieces) const {
     const double by_edges = edges_.probability(draw.edge);
@@ -103,6 +117,7 @@ class ShadowTerm final : public Term {
   const PathContext& context_;
   const EdgeSamplerInput& input_;
   ShadowEdges edges_;
+  ShadowLines lines_;
   std::optional<ShadowPieces> pieces_;
   double piece_seconds_ = 0;
 };
@@ -142,17 +157,20 @@ void ShadowTerm::add_samples(const PathVertex& vertex, int samples, BoundarySink
     if (share >= 1) share -= 1;
   }
   sink.cost().samples += static_cast<uint64_t>(samples);
-  const EdgeQuery query = query_at(vertex);
+  Viewer viewer{vertex, query_at(vertex), {}};
+  if (pieces_ && vertex.bounces == 0) {
+    viewer.by_lines = lines_.vertex(vertex.surface.face, vertex.surface.p);
+  }
   for (Rng& rng : by_edges) {
     const uint32_t edge = edges_.choose(rng.uniform());
     const double t = rng.uniform();
-    add_sample(vertex, query, {edge, t, -1}, rng, sink);
+    add_sample(viewer, {edge, t, -1}, rng, sink);
   }
   if (by_pieces.empty()) return;
-  pieces_->draw(query, by_pieces, draws);
+  pieces_->draw(viewer.query, by_pieces, draws);
   for (size_t i = 0; i < by_pieces.size(); ++i) {
     if (draws[i]) {
-      add_sample(vertex, query, *draws[i], by_pieces[i], sink);
+      add_sample(viewer, *draws[i], by_pieces[i], sink);
     } else {
       ++sink.cost().no_edge;
     }
@@ -160,8 +178,9 @@ void ShadowTerm::add_samples(const PathVertex& vertex, int samples, BoundarySink
 }
 
 // draw.density: by pieces; negative if it is not known.
-void ShadowTerm::add_sample(const PathVertex& vertex, const EdgeQuery& query,
-                            const ShadowDraw& draw, const Rng& key, BoundarySink& sink) const {
+void ShadowTerm::add_sample(const Viewer& viewer, const ShadowDraw& draw, const Rng& key,
+                            BoundarySink& sink) const {
+  const PathVertex& vertex = viewer.vertex;
   TermCost& cost = sink.cost();
   const ShadowEdge& edge = edges_.edge(draw.edge);
   RayCount rays;
@@ -181,8 +200,11 @@ void ShadowTerm::add_sample(const PathVertex& vertex, const EdgeQuery& query,
   BoundaryForm form;
   double by_pieces = draw.density;
   if (!is_black(amount)) {
-    if (pieces_ && by_pieces < 0) by_pieces = pieces_->density(query, draw.edge, draw.t);
+    if (pieces_ && by_pieces < 0) by_pieces = pieces_->density(viewer.query, draw.edge, draw.t);
     form = sweep(edge, *point, {omega, distance}, 1 / density(draw, by_pieces));
+    if (viewer.by_lines) {
+      form.share -= lines_.share(edge, edges_.probability(draw.edge), *point, *viewer.by_lines);
+    }
   }
   if (is_black(amount) || !sink.takes(form, key)) {
     ++cost.zero_weight;
@@ -204,6 +226,15 @@ void ShadowTerm::add_sample(const PathVertex& vertex, const EdgeQuery& query,
 }
 
 void ShadowTerm::sample_film(double u, const Rng& key, FilmSink& sink) const {
+  const double share = pieces_ ? ShadowLines::kShare : 0;
+  if (u < share) {
+    add_line(u / share, key, sink);
+  } else {
+    add_seen((u - share) / (1 - share), 1 - share, key, sink);
+  }
+}
+
+void ShadowTerm::add_seen(double u, double share, const Rng& key, FilmSink& sink) const {
   const uint32_t chosen = edges_.choose(u);
   const ShadowEdge& edge = edges_.edge(chosen);
   RayCount rays;
@@ -214,13 +245,50 @@ void ShadowTerm::sample_film(double u, const Rng& key, FilmSink& sink) const {
   if (!seen || !sink.at(seen->x, seen->y)) return;
   const Vec3d q = value(seen->ray.origin);
   const Rgb<double> amount = edges_.jump(edge, *point, q, seen->omega);
-  const double scale =
-      film_per_solid_angle(context_.scene.camera, seen->omega) / edges_.probability(chosen);
+  const double scale = film_per_solid_angle(context_.scene.camera, seen->omega) /
+                       (edges_.probability(chosen) * share);
   if (is_black(amount)) return;
   const BoundaryForm form = sweep(edge, *point, {seen->omega, seen->distance}, scale);
   if (!sink.takes(form, key)) return;
   RayCount shadow;
   const bool hidden = is_hidden(context_, aimed_at(*seen, point->target(q)), point->face, shadow);
+  sink.cost().add(shadow);
+  if (!hidden) sink.add(amount);
+}
+
+// The viewer q of the shadow is itself a point of a face, as the camera's ray carries it.
+void ShadowTerm::add_line(double u, const Rng& key, FilmSink& sink) const {
+  const Scene& scene = context_.scene;
+  const uint32_t chosen = edges_.choose(u);
+  const ShadowEdge& edge = edges_.edge(chosen);
+  Rng rng = key.at(Purpose::kShadow, 0);
+  const double t = rng.uniform(), u_0 = rng.uniform(), u_1 = rng.uniform();
+  RayCount rays;
+  const auto point = edges_.cast(edge, t, rays);
+  const auto vertex = point ? lines_.draw(edge, *point, u_0, u_1, rays) : std::nullopt;
+  sink.cost().add(rays);
+  if (!vertex || !sink.at(vertex->seen.x, vertex->seen.y)) return;
+  const Vec3d omega = vertex->seen.omega;
+  const auto surface =
+      surface_on_ray<double>(scene, vertex->face, value(vertex->seen.ray.origin), omega);
+  const Scattering<double> scattering(surface, -omega, scene.shading);
+  if (scattering.black()) return;
+  const double distance = length(point->x - vertex->q);
+  const Vec3d way = (point->x - vertex->q) / distance;
+  const Rgb<double> f = scattering.eval_value(way);
+  if (!(distance > 0) || is_black(f)) return;
+  const double probability = edges_.probability(chosen);
+  const double share = lines_.share(edge, probability, *point, *vertex);
+  const double density = ShadowLines::kShare * probability * lines_.density(edge, *point, *vertex);
+  const Rgb<double> amount = f * edges_.jump(edge, *point, vertex->q, way);
+  if (is_black(amount) || !(density > 0)) return;
+  BoundaryForm form = sweep(edge, *point, {way, distance}, share / density);
+  form.x = vertex->q;
+  form.distance = vertex->seen.distance;
+  form.add_seen_point(scene, vertex->face, omega, form.of_ray());
+  if (!sink.takes(form, key)) return;
+  RayCount shadow;
+  const bool hidden = is_hidden(context_, vertex->seen, vertex->face, shadow);
   sink.cost().add(shadow);
   if (!hidden) sink.add(amount);
 }

@@ -1,0 +1,52 @@
+#pragma once
+// Points of shadows that light up a surface close by, found from the shadow's side. At a vertex q
+// at the distance r from a shadow's edge what the edge adds goes with 1 / r, and pixels may be much
+// larger than r. So a share of the samples of the film draws a point x of a shadow first, then a
+// direction from x by the cosine, which meets q: this density goes with 1 / r^2, as the sample
+// does. Both ways to x and q share them by the power heuristic; any shares that add up to one are
+// right. Rays leave surfaces with interpolated normals above their faces (surface_point.h), where
+// these lines do not end: vertices have all of theirs.
+#include <optional>
+
+#include "integrators/film/film_point.h"
+#include "integrators/terms/shadow_edges.h"
+
+namespace limn {
+
+// A point q of a face, and where the camera sees it.
+struct SeenVertex {
+  FaceRef face;
+  Vec3d q;
+  FilmPoint seen;
+};
+
+class ShadowLines {
+ public:
+  // The share of the samples of the film that draw lines. With 0.5 instead of 0.2 a thin plate on a
+  // floor has 0.5 of the variance, and shadows that the camera itself sees have 1.6 of it.
+  static constexpr double kShare = 0.25;
+
+  // Both must outlive it.
+  ShadowLines(const PathContext& context, const EdgeSamplerInput& input)
+      : context_(context), input_(input) {}
+
+  // A vertex that lines may find, if it is one.
+  std::optional<SeenVertex> vertex(FaceRef face, const Vec3d& q) const;
+  // The vertex that a line from a point meets by uniform numbers, which may be hidden from the
+  // camera.
+  std::optional<SeenVertex> draw(const ShadowEdge& edge, const ShadowPoint& point, double u_0,
+                                 double u_1, RayCount& rays) const;
+  // Density on the film of `draw` [1 / pixel^2].
+  double density(const ShadowEdge& edge, const ShadowPoint& point, const SeenVertex& vertex) const;
+  // What lines have of the point and the vertex. probability: of the edge.
+  double share(const ShadowEdge& edge, double probability, const ShadowPoint& point,
+               const SeenVertex& vertex) const;
+
+ private:
+  Vec3d normal(FaceRef face) const;
+
+  const PathContext& context_;
+  const EdgeSamplerInput& input_;
+};
+
+}  // namespace limn
