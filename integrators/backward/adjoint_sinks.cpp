@@ -1,6 +1,8 @@
 // Weights of boundary samples on what moves their points.
 #include "integrators/backward/adjoint_sinks.h"
 
+#include <fmt/format.h>
+
 #include "integrators/film/clip_curves.h"
 #include "limn/core/reverse.h"
 
@@ -16,6 +18,7 @@ void VertexAdjoint::add(const Rgb<double>& amount) {
   if (weight == 0) return;
   motion_.contribute(tape_, seeds_, *form_, weight);
   seeds_.add(p_, form_->of_ray() * weight);
+  if (log()) log()->push_back(fmt::format("    adds with weight {:.6g}", weight));
 }
 
 bool FilmPointAdjoint::at(double x, double y) {

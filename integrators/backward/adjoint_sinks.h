@@ -18,8 +18,8 @@ inline double weighed(const Rgb<double>& adjoint, const Rgb<double>& value) {
 class VertexAdjoint final : public BoundarySink {
  public:
   VertexAdjoint(const EdgeMotion& motion, const Rgb<double>& adjoint, const Vec3<Var>& p,
-                Tape& tape, Seeds& seeds)
-      : motion_(motion), adjoint_(adjoint), p_(p), tape_(tape), seeds_(seeds) {}
+                Tape& tape, Seeds& seeds, SampleLog* log)
+      : BoundarySink(log), motion_(motion), adjoint_(adjoint), p_(p), tape_(tape), seeds_(seeds) {}
 
   bool takes(const BoundaryForm& form, const Rng& key) override;
   void add(const Rgb<double>& amount) override;
@@ -44,6 +44,8 @@ class FilmPointAdjoint final : public FilmSink {
   // Whether its pixels have an adjoint, and whether it added something.
   bool asked() const { return asked_; }
   bool added() const { return added_; }
+  double x() const { return x_; }
+  double y() const { return y_; }
   const Seeds& seeds() const { return seeds_; }
 
   bool at(double x, double y) override;

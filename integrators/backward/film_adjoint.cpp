@@ -38,11 +38,8 @@ std::vector<Rgb<double>> adjoint_pixels(const Scene& scene, const Image& adjoint
 
 Rgb<double> FilmAdjoint::at(double x, double y) const {
   Rgb<double> sum;
-  for_every_pixel_of(film_, x, y, [&](int px, int py, double weight) {
-    sum +=
-        pixels_[static_cast<size_t>(py - film_.crop_y) * film_.crop_width + (px - film_.crop_x)] *
-        weight;
-  });
+  for_every_pixel_of(film_, x, y,
+                     [&](int px, int py, double weight) { sum += of_pixel(px, py) * weight; });
   return sum;
 }
 

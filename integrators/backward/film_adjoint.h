@@ -17,6 +17,9 @@ class FilmAdjoint {
   FilmAdjoint(const Film& film, std::vector<Rgb<double>> pixels)
       : film_(film), pixels_(std::move(pixels)) {}
   const std::vector<Rgb<double>>& pixels() const { return pixels_; }
+  const Rgb<double>& of_pixel(int x, int y) const {
+    return pixels_[static_cast<size_t>(y - film_.crop_y) * film_.crop_width + (x - film_.crop_x)];
+  }
   // Of the pixels whose filters reach a film position, weighed by them.
   Rgb<double> at(double x, double y) const;
 

@@ -98,7 +98,9 @@ class ParameterSlots::Values {
 };
 
 ParameterSlots::ParameterSlots(const Scene& scene, std::vector<Parameter> parameters)
-    : parameters_(std::move(parameters)), scene_(deep_copy(scene)) {
+    : parameters_(std::move(parameters)),
+      scene_(deep_copy(scene)),
+      size_(scene.shapes.empty() ? 1 : bounds_of(scene).diagonal()) {
   slots_.scene = &scene_;
   slots_.meshes.resize(scene.shapes.size());
   free_.shapes.assign(scene.shapes.size(), false);
@@ -110,9 +112,16 @@ ParameterSlots::ParameterSlots(const Scene& scene, std::vector<Parameter> parame
   add_texels(scene);
 }
 
-uint32_t ParameterSlots::take(uint32_t count) {
+std::vector<size_t> ParameterSlots::sizes() const {
+  std::vector<size_t> sizes;
+  for (const Parameter& parameter : parameters_) sizes.push_back(parameter.numbers());
+  return sizes;
+}
+
+uint32_t ParameterSlots::take(uint32_t count, double unit) {
   const uint32_t first = slots_.count;
   slots_.count += count;
+  units_.resize(slots_.count, static_cast<float>(unit));
   return first;
 }
 
@@ -162,7 +171,7 @@ void ParameterSlots::add_shapes(const Scene& scene) {
     const auto count = static_cast<uint32_t>(mesh.positions.size());
     mesh.position_tangents.assign(count, axes);
     MeshSlots& slots = slots_.meshes[s];
-    slots.positions = take(3 * count);
+    slots.positions = take(3 * count, size_);
     gathers_[s].copies.resize(count);
     for (const uint32_t root : mesh.weld) ++gathers_[s].copies[root];
     if (mesh.normal_source == NormalSource::kFace) continue;
@@ -185,7 +194,10 @@ void ParameterSlots::add_values(const Scene& scene) {
     for (size_t k = 0; k < values.size(); ++k) {
       if (values[k]->d[0] == 0) continue;
       if (k < kCameraSlots) {
-        if (slots_.camera == 0) slots_.camera = take(kCameraSlots);
+        if (slots_.camera == 0) {
+          slots_.camera = take(kCameraSlots);
+          std::fill_n(units_.begin() + slots_.camera, 3, static_cast<float>(size_));
+        }
         slot_of[k] = slots_.camera + static_cast<uint32_t>(k);
       }
       if (slot_of[k] == 0) slot_of[k] = take(1);

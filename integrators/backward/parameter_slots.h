@@ -30,6 +30,10 @@ class ParameterSlots {
   const Scene& scene() const { return scene_; }
   const SceneSlots& slots() const { return slots_; }
   const FreeMotion& free() const { return free_; }
+  // How many numbers each parameter has.
+  std::vector<size_t> sizes() const;
+  // By which magnitudes of different slots compare: the scene's size for a length, else 1.
+  double unit(uint32_t slot) const { return units_[slot]; }
 
   // sums: by slot. The derivatives of each parameter's numbers.
   std::vector<std::vector<double>> gather(const std::vector<double>& sums) const;
@@ -59,7 +63,7 @@ class ParameterSlots {
   };
   class Values;
 
-  uint32_t take(uint32_t count);
+  uint32_t take(uint32_t count, double unit = 1);
   void add_shapes(const Scene& scene);
   void add_values(const Scene& scene);
   void add_texels(const Scene& scene);
@@ -70,8 +74,10 @@ class ParameterSlots {
   std::vector<Parameter> parameters_;
   std::vector<Dependence> dependences_;  // of each
   Scene scene_;
+  double size_;  // of the scene
   SceneSlots slots_;
   FreeMotion free_;
+  std::vector<float> units_{1};       // of each slot
   std::vector<ShapeGather> gathers_;  // of each shape
 };
 

@@ -19,7 +19,7 @@ PixelChoice::PixelChoice(const std::vector<Rgb<double>>& adjoint, bool uniform)
   }
 }
 
-PixelPath PixelChoice::path(const PathBatch& batch, size_t index) const {
+PixelPath PixelChoice::path(const Batch& batch, size_t index) const {
   if (uniform_) {
     return {index / batch.count(), batch.first + index % batch.count(),
             static_cast<double>(batch.count())};

@@ -3,20 +3,13 @@
 #include <cstdint>
 #include <vector>
 
+#include "integrators/estimates/batches.h"
 #include "limn/core/discrete_distribution.h"
 #include "limn/core/film.h"
 #include "limn/core/rng.h"
 #include "limn/core/vec.h"
 
 namespace limn {
-
-// The paths of a batch: samples [first, last) of every pixel, or as many paths spread over the
-// pixels.
-struct PathBatch {
-  uint64_t seed;
-  int first, last;
-  int count() const { return last - first; }
-};
 
 // A path with the number of paths that its pixel has on average in the batch.
 struct PixelPath {
@@ -31,8 +24,18 @@ class PixelChoice {
   // spread evenly and the rest in proportion to the adjoint's magnitude, in strata along the rows.
   PixelChoice(const std::vector<Rgb<double>>& adjoint, bool uniform);
 
-  size_t paths(const PathBatch& batch) const { return choice_.size() * batch.count(); }
-  PixelPath path(const PathBatch& batch, size_t index) const;
+  // Of a batch: its samples of every pixel, or as many paths spread over the pixels.
+  size_t paths(const Batch& batch) const { return choice_.size() * batch.count(); }
+  PixelPath path(const Batch& batch, size_t index) const;
+  // The sample per pixel that the path of this number belongs to, and the index in its batch of
+  // that path of a pixel.
+  int64_t sample_of(int64_t number) const {
+    return uniform_ ? number : number / static_cast<int64_t>(choice_.size());
+  }
+  size_t index_of(const Batch& batch, size_t pixel, int64_t number) const {
+    return uniform_ ? pixel * batch.count() + number - batch.first
+                    : number - choice_.size() * batch.first;
+  }
 
  private:
   bool uniform_;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 
+#include "integrators/estimates/gradient_estimator.h"
 #include "limn/core/error.h"
 
 namespace limn {
@@ -143,12 +144,16 @@ std::vector<BatchSums> to_sums(const BatchRecord& record, Estimators estimators)
   RecordReader from(record);
   std::vector<BatchSums> sums;
   for (const auto& estimator : estimators) {
-    const size_t size = film_size(estimator->scene().film);
-    BatchSums& pass = sums.emplace_back();
-    pass.radiance = from.numbers(size);
-    for (size_t i = 0; i < estimator->slots() * estimator->lanes(); ++i) {
-      pass.images.push_back(from.numbers(size));
+    const auto* gradient = dynamic_cast<const GradientEstimator*>(estimator.get());
+    const size_t film = film_size(estimator->scene().film);
+    std::vector<size_t> sizes(estimator->slots() * estimator->lanes(), film);
+    if (gradient) {
+      sizes = gradient->sizes();
+      sizes.push_back(GradientEstimator::kCounts);
     }
+    BatchSums& pass = sums.emplace_back();
+    pass.radiance = from.numbers(gradient ? 0 : film);
+    for (const size_t size : sizes) pass.images.push_back(from.numbers(size));
     for (size_t slot = 0; slot < estimator->slots(); ++slot) pass.costs.push_back(from.cost());
     pass.non_finite = from.non_finite();
   }

@@ -8,6 +8,9 @@
 #include <cmath>
 
 #include "integrators/estimates/batch_record.h"
+#include "integrators/estimates/equal_batches.h"
+#include "integrators/estimates/film_batch.h"
+#include "integrators/estimates/gradient_estimator.h"
 #include "integrators/estimates/splat.h"
 #include "limn/core/error.h"
 #include "limn/core/memory.h"
@@ -18,18 +21,9 @@ namespace limn {
 
 namespace {
 
-bool is_even(const SampleEstimator& estimator) {
-  return estimator.numbers() == Numbers::kEvenInBatches;
-}
-
-// The numbers of all that is even in a batch, by a seed of its own.
-Rng even_in_batch(const Batch& batch, uint64_t pixel, size_t number) {
-  constexpr uint64_t kStream = 0x62617463686573;  // apart from what has the run's own seed
-  const uint64_t seed =
-      mix_bits(mix_bits(batch.seed + kStream) + static_cast<uint64_t>(batch.first));
-  // Of the batch uncut: a sample is the same however many the run has.
-  return Rng::even(seed, pixel, static_cast<uint32_t>(number),
-                   static_cast<uint32_t>(Schedule::batch_size(batch.first, true)));
+// Null where an estimator adds to images.
+const GradientEstimator* gradient_of(const SampleEstimator& estimator) {
+  return dynamic_cast<const GradientEstimator*>(&estimator);
 }
 
 Rng pixel_key(const SampleEstimator& estimator, const Batch& batch, const PixelSample& at) {
@@ -43,31 +37,6 @@ Rng pixel_key(const SampleEstimator& estimator, const Batch& batch, const PixelS
       break;
   }
   return {batch.seed, pixel, static_cast<uint64_t>(at.s)};
-}
-
-// A slot's samples of the film over a batch: the same whole number per sample per pixel in every
-// batch, so that all batches weigh alike.
-struct FilmBatch {
-  size_t per_sample;  // samples of the film for one sample per pixel
-  size_t first, count;
-
-  FilmBatch(const SampleEstimator& estimator, size_t slot, const Batch& batch) {
-    const Film& film = estimator.scene().film;
-    per_sample = static_cast<size_t>(
-        std::ceil(estimator.film_samples(slot) * film.crop_width * film.crop_height));
-    first = per_sample * batch.first;
-    count = per_sample * batch.count();
-  }
-};
-
-// The i-th sample of a batch, in strata along [0, 1): what is even is so along the curves, too.
-bool sample_film(const SampleEstimator& estimator, size_t slot, const Batch& batch,
-                 const FilmBatch& film, size_t i, RayCount& rays, FilmSample& sample) {
-  const Rng all = is_even(estimator) ? even_in_batch(batch, UINT64_MAX, i)
-                                     : Rng(batch.seed, UINT64_MAX, film.first + i);
-  const Rng key = all.copy(Purpose::kFilmCopy, estimator.film_stream(slot));
-  const double u = (i + key.at(Purpose::kCamera, 0).uniform()) / film.count;
-  return estimator.sample_film(slot, u, key, rays, sample);
 }
 
 // One estimator over one batch.
@@ -186,7 +155,8 @@ class BatchRunner {
     RayCount rays;
     for (size_t i = first; i < last; ++i) {
       FilmSample sample;
-      if (!sample_film(estimator_, slot, batch_, batch, i, rays, sample)) continue;
+      const FilmDraw draw = batch.draw(estimator_, slot, batch_, i);
+      if (!estimator_.sample_film(slot, draw.u, draw.key, rays, sample)) continue;
       if (is_finite(sample.value) && is_finite(sample.along_x) && is_finite(sample.along_y)) {
         chunk.samples.emplace_back(batch.first + i, sample);
       } else {
@@ -252,17 +222,32 @@ void start(BatchStore& store, Estimators estimators, const RunSettings& settings
   store.start(settings.spp);
 }
 
-int samples_to_make(const RunSettings& settings, const Stopwatch& watch, bool even) {
-  if (!settings.store) return settings.spp;
-  int count = 0;
-  Schedule schedule(settings, watch, even);
-  while (schedule.next()) {
-    if (task_of(settings, schedule.first_sample()) == BatchStore::Task::kMake) {
-      count += schedule.samples();
+// Batch after batch of a run.
+class Batches {
+ public:
+  Batches(Estimators estimators, const RunSettings& settings, const Stopwatch& watch)
+      : seed_(settings.seed),
+        growing_(settings, watch,
+                 std::any_of(estimators.begin(), estimators.end(),
+                             [](const auto& one) { return is_even(*one); })) {
+    for (const auto& estimator : estimators) {
+      const auto* gradient = gradient_of(*estimator);
+      if (gradient) equal_.emplace(settings, watch, gradient->most_batches());
     }
   }
-  return std::max(1, count);
-}
+  // See EqualBatches.
+  EqualBatches* needs_size() { return equal_ && equal_->needs_size() ? &*equal_ : nullptr; }
+  bool next() { return equal_ ? equal_->next() : growing_.next(); }
+  Batch batch() const {
+    return equal_ ? Batch{seed_, equal_->first_sample(), equal_->end_sample()}
+                  : Batch{seed_, growing_.first_sample(), growing_.end_sample()};
+  }
+
+ private:
+  uint64_t seed_;
+  Schedule growing_;
+  std::optional<EqualBatches> equal_;  // of reverse mode
+};
 
 // Of a run of `spp` samples without a limit of time, that has this sample.
 Batch batch_of(const SampleEstimator& estimator, uint64_t seed, int spp, int sample) {
@@ -290,7 +275,9 @@ std::vector<BatchSums> run_batch(Estimators estimators, const Batch& batch, int 
                                  ProgressCounter& progress) {
   std::vector<BatchSums> sums;
   for (const auto& estimator : estimators) {
-    sums.push_back(BatchRunner(*estimator, batch, threads, progress).run());
+    const auto* gradient = gradient_of(*estimator);
+    sums.push_back(gradient ? run_batch(*gradient, batch, threads, progress)
+                            : BatchRunner(*estimator, batch, threads, progress).run());
     if (progress.stopped()) return {};
   }
   return sums;
@@ -308,7 +295,8 @@ size_t steps_per_sample(Estimators estimators) {
 void check_memory(Estimators estimators) {
   double images = 0;
   for (const auto& estimator : estimators) {
-    images += 1 + static_cast<double>(estimator->slots()) * estimator->lanes();
+    if (!gradient_of(*estimator))
+      images += 1 + static_cast<double>(estimator->slots()) * estimator->lanes();
   }
   if (images == 0) return;
   const Scene& scene = (*estimators.begin())->scene();
@@ -322,23 +310,50 @@ void check_memory(Estimators estimators) {
                  "for fewer parameters at once");
 }
 
+namespace {
+
+// Of the progress, for what is made here.
+size_t steps_to_make(Estimators estimators, RunSettings settings) {
+  settings.seconds = 0;
+  size_t steps = 0;
+  const Stopwatch watch;
+  Batches batches(estimators, settings, watch);
+  while (batches.next()) {
+    const Batch batch = batches.batch();
+    if (task_of(settings, batch.first) != BatchStore::Task::kMake) continue;
+    for (size_t i = 0; i < estimators.size(); ++i) {
+      const auto* gradient = gradient_of(*estimators[i]);
+      steps += gradient ? steps_of(*gradient, batch)
+                        : steps_per_sample(estimators.subspan(i, 1)) * batch.count();
+    }
+  }
+  return std::max<size_t>(1, steps);
+}
+
+}  // namespace
+
 void run_batches(Estimators estimators, const RunSettings& settings, const Stopwatch& watch,
                  const std::function<void(const Batch&, const std::vector<BatchSums>&)>& collect) {
   // What an interrupted pilot chose is no part of a run.
   if (settings.interrupted && settings.interrupted->load()) return;
   if (settings.store) start(*settings.store, estimators, settings);
-  const bool even = std::any_of(estimators.begin(), estimators.end(),
-                                [](const auto& one) { return is_even(*one); });
-  ProgressCounter progress(settings, watch,
-                           steps_per_sample(estimators) * samples_to_make(settings, watch, even));
-  Schedule schedule(settings, watch, even);
-  while (!progress.stopped() && schedule.next()) {
-    const Batch batch{settings.seed, schedule.first_sample(), schedule.end_sample()};
+  ProgressCounter progress(settings, watch, steps_to_make(estimators, settings));
+  Batches batches(estimators, settings, watch);
+  std::vector<BatchSums> first;  // one sample, by which the size of batches is chosen
+  if (EqualBatches* equal = batches.needs_size()) {
+    const Stopwatch one;
+    first = run_batch(estimators, {settings.seed, 0, 1}, settings.threads, progress);
+    equal->set_size(one.seconds());
+  }
+  while (!progress.stopped() && batches.next()) {
+    const Batch batch = batches.batch();
     const auto task = task_of(settings, batch.first);
     if (task == BatchStore::Task::kLeave) continue;
     std::vector<BatchSums> sums;
     if (task == BatchStore::Task::kRead) {
       sums = to_sums(settings.store->read(batch.first), estimators);
+    } else if (!first.empty() && batch.last == 1) {
+      sums = std::move(first);
     } else {
       sums = run_batch(estimators, batch, settings.threads, progress);
       if (progress.stopped()) break;
@@ -398,9 +413,10 @@ bool run_film_sample(const SampleEstimator& estimator, const RunSettings& settin
   const Batch batch =
       batch_of(estimator, settings.seed, settings.spp, static_cast<int>(n / per_sample));
   const FilmBatch film(estimator, slot, batch);
+  const FilmDraw draw = film.draw(estimator, slot, batch, n - film.first);
   RayCount rays;
   FilmSample sample;
-  if (sample_film(estimator, slot, batch, film, n - film.first, rays, sample)) {
+  if (estimator.sample_film(slot, draw.u, draw.key, rays, sample)) {
     log.push_back(fmt::format("film point ({:.6f}, {:.6f}), value over density {}", sample.x,
                               sample.y, to_text(sample.value, estimator.lanes())));
   } else {

@@ -67,8 +67,8 @@ class Contributing(unittest.TestCase):
             for file in code:
                 if file.startswith("integrators/") and file not in own:
                     self.assertNotIn(name, code[file], file)
-        for driver in ("integrators/methods/term_job.cpp", "integrators/backward/backward.cpp"):
-            self.assertIn("terms_of(", code[driver])
+        for mode in ("methods/term_job.cpp", "backward/reverse_estimator.cpp"):
+            self.assertIn("terms_of(", code["integrators/" + mode])
 
     def test_every_kind_has_its_row(self):
         kinds = " ".join(kind for kind, *_ in rows())

@@ -8,9 +8,11 @@
 #include <filesystem>
 
 #include "limn/core/error.h"
+#include "limn/integrators/trace_backward.h"
 #include "tools/limn/backward_output.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
+#include "tools/limn/largest_samples.h"
 #include "tools/limn/output_files.h"
 #include "tools/limn/run_part.h"
 #include "tools/limn/table.h"
@@ -63,6 +65,8 @@ class BackwardCommand final : public Command {
         ->required();
     add_part_option(app, common_);
     app.get_option("--part")->excludes("--time");
+    add_debug_option(app, debug_);
+    app.get_option("--debug-sample")->excludes("--time");
     app.add_flag("--stats", stats_,
                  "Print statistics: edges, nodes, bytes, rays by kind, time by phase");
   }
@@ -81,6 +85,7 @@ class BackwardCommand final : public Command {
     refuse_samples(*app_, options_.points,
                    {"--spp", "--time", "--batches", "--pixels", "--edge-samples",
                     "--camera-samples", "--shadow-samples", "--part"});
+    if (!debug_.empty()) return trace(scene, kind);
     if (!common_.part.empty()) return make_part(scene, command_line);
     files_ = plan_files(scene, options_.parameters, output_);
     if (target_.empty()) files_.adjoint = files_.adjoint_picture = "";
@@ -94,8 +99,11 @@ class BackwardCommand final : public Command {
     warnings_.add_all(result.warnings);
     if (result.spp == 0) return report_interrupted(scene, settings, loss);
     write(scene, settings, loss, result);
+    // No other run has the batches of one in limited time.
+    const std::string line = seconds_ > 0 ? "" : command_line;
+    if (!common_.quiet) print_largest(result.terms, result.spp, line, stats_);
     const bool all = seconds_ > 0 && !interrupted(settings);
-    return finish_status(result.non_finite, result.spp, all ? result.spp : settings.spp, "");
+    return finish_status(result.non_finite, result.spp, all ? result.spp : settings.spp, line);
   }
 
  private:
@@ -132,6 +140,16 @@ class BackwardCommand final : public Command {
                     });
   }
 
+  int trace(const Scene& scene, LossKind kind) {
+    const RunSettings settings = settings_of(scene);
+    const LossResult loss = loss_of(scene, kind, settings);
+    const auto place = parse_place(debug_);
+    for (const auto& line : trace_backward(scene, loss.adjoint, options_, settings, place)) {
+      fmt::print("{}\n", line);
+    }
+    return kSuccess;
+  }
+
   RunSettings settings_of(const Scene& scene) const {
     RunSettings settings = settings_for(options_.points, make_settings(common_, scene, name()));
     if (seconds_ == 0) return settings;
@@ -162,7 +180,7 @@ class BackwardCommand final : public Command {
           {"the gradient of l1 is biased where the image's noise is not small beside "
            "its difference from the target"});
     }
-    if (loss.spp == 0) return loss;
+    if (loss.spp == 0 || !debug_.empty()) return loss;
     auto attributes = provenance(scene, settings, loss.spp);
     attributes.push_back({"limn.loss", loss_});
     attributes.push_back({"limn.target", target_});
@@ -232,10 +250,11 @@ class BackwardCommand final : public Command {
     json terms = json::object();
     for (const TermRun& term : result.terms) {
       const TermCost& c = term.cost;
-      terms[term.name] = {{"seconds", c.seconds},         {"rays", c.rays},
-                          {"samples", c.samples},         {"no_edge", c.no_edge},
-                          {"zero_weight", c.zero_weight}, {"occluded", c.occluded},
-                          {"counted", c.counted}};
+      terms[term.name] = {
+          {"seconds", c.seconds},         {"rays", c.rays},
+          {"samples", c.samples},         {"no_edge", c.no_edge},
+          {"zero_weight", c.zero_weight}, {"occluded", c.occluded},
+          {"counted", c.counted},         {"largest_sample_share", c.largest.share()}};
     }
     return {{"terms", terms},
             {"contributions", result.contributions},
@@ -271,7 +290,7 @@ class BackwardCommand final : public Command {
   Warnings warnings_;
   BackwardOptions options_;
   BackwardFiles files_;
-  std::string adjoint_, target_, output_;
+  std::string adjoint_, target_, output_, debug_;
   std::string loss_ = "l2";
   int levels_ = 1;
   double seconds_ = 0;  // 0: as many samples as are asked for

@@ -10,6 +10,7 @@
 #include "limn/core/parameter.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
+#include "tools/limn/largest_samples.h"
 #include "tools/limn/output_files.h"
 #include "tools/limn/run_part.h"
 
@@ -17,9 +18,6 @@ namespace limn {
 namespace {
 
 using nlohmann::json;
-
-// From this share of the sum of squares of a term's samples on, one is an outlier. Not tuned.
-constexpr double kRulingShare = 0.1;
 
 // From this share of the squared error in a thousandth of the pixels on. Not tuned.
 constexpr double kRulingPixels = 0.5;
@@ -182,25 +180,6 @@ void print_samples(const GradientResult& r) {
   for (const MethodSetting& setting : r.settings) fmt::print("{}\n", setting_line(setting));
 }
 
-std::string text_of(const GradientResult& result, const LargestSample& largest) {
-  const auto& place = largest.place;
-  return place.x >= 0 ? fmt::format("pixel ({}, {}), sample {}", place.x, place.y, place.sample)
-                      : fmt::format("sample {} of {} samples per pixel", place.sample, result.spp);
-}
-
-// Single samples that dominate a term's error, each with the command that traces it.
-void print_largest(const GradientResult& result, const std::string& command_line, bool all) {
-  for (const TermRun& term : result.terms) {
-    LargestSample largest = term.cost.largest;
-    if (!term.computed || largest.square == 0) continue;
-    if (!all && largest.share() < kRulingShare) continue;
-    if (largest.place.x < 0) largest.place.term = term.name;
-    fmt::print("{}: one sample is {:.0f} % of the sum of squares (an outlier): {}\n  trace: {}\n",
-               term.name, 100 * largest.share(), text_of(result, largest),
-               repeat_command(command_line, largest.place));
-  }
-}
-
 void print_stats(const GradientResult& result) {
   if (!result.stats.edges.empty()) {
     std::string edges;
@@ -332,7 +311,7 @@ class GradientCommand final : public Command {
       print_terms(result);
       print_boundary_samples(result);
       print_samples(result);
-      print_largest(result, command_line, stats_);
+      print_largest(result.terms, result.spp, command_line, stats_);
     }
     if (stats_) print_stats(result);
     const bool all = seconds_ > 0 && !settings.interrupted->load();

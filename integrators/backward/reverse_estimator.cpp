@@ -1,0 +1,273 @@
+// One path, or one point of the film, on the tape. At vertices of paths edges are drawn as in
+// forward mode, with an importance that knows no motion.
+#include "integrators/backward/reverse_estimator.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "integrators/backward/adjoint_sinks.h"
+#include "integrators/edges/scene_edges.h"
+#include "integrators/estimates/contributions.h"
+#include "integrators/methods/selection.h"
+#include "integrators/paths/camera_path.h"
+#include "integrators/paths/path_follow.h"
+#include "integrators/paths/path_log.h"
+#include "limn/core/error.h"
+
+namespace limn {
+namespace {
+
+constexpr int kMostSamples = 1 << 16;  // so that their products with paths are numbers
+
+void check_samples(const BackwardOptions& options) {
+  if (options.edge_samples < 1 || options.edge_samples > kMostSamples) {
+    throw InputError(fmt::format("{} edges at a vertex of a path: there may be 1 to {}",
+                                 options.edge_samples, kMostSamples));
+  }
+  const double camera = options.camera_samples == 0 ? 1 : options.camera_samples;
+  for (const double samples : {camera, options.shadow_samples}) {
+    if (samples > 0 && samples <= kMostSamples) continue;
+    throw InputError(fmt::format("{:g} points on the film for a path: more than 0, {} at most",
+                                 samples, kMostSamples));
+  }
+}
+
+}  // namespace
+
+ReverseEstimator::ReverseEstimator(const Scene& scene, const Image& adjoint,
+                                   const BackwardOptions& options, int threads)
+    : options_(options),
+      film_(scene.film, adjoint_pixels(scene, adjoint)),
+      choice_(film_.pixels(), options.uniform_pixels),
+      parameters_(scene, reverse_parameters(scene, options)),
+      method_(*options.method->reverse),
+      traced_(parameters_.scene(), threads, {.closed = method_.closed, .edges = true}),
+      input_(traced_.context(), 3, {1, 1, 1, 1}, method_.sampler, threads),
+      filter_(scene.film.filter),
+      motion_(parameters_.slots(), input_.edges()),
+      types_(terms_of(parameters_.scene(), method_.sampler, method_.closed)) {
+  input_.free = &parameters_.free();
+  std::vector<std::string> names;
+  for (const TermType* type : types_) names.emplace_back(type->name);
+  const auto chosen = selected_terms(names, options.terms, scene.file);
+  check_samples(options);
+  for (size_t slot = 0; slot < types_.size(); ++slot) {
+    if (types_[slot]->traces_paths) pixel_slot_ = slot;
+    const bool computed = std::find(chosen.begin(), chosen.end(), names[slot]) != chosen.end();
+    terms_.push_back(computed ? types_[slot]->make(input_) : nullptr);
+    if (computed) paths_ = paths_ || terms_[slot]->uses_paths() || terms_[slot]->uses_vertices();
+  }
+}
+
+double ReverseEstimator::camera_samples() const {
+  if (options_.camera_samples > 0) return options_.camera_samples;
+  return method_.closed ? 1 : 0.25;  // where nothing else is noisy, these points are what is
+}
+
+double ReverseEstimator::samples_of(size_t slot) const {
+  if (film_samples(slot) > 0 || types_[slot]->on_film_alone()) return film_points(slot);
+  return slot == pixel_slot_ ? 1 : options_.edge_samples;
+}
+
+void ReverseEstimator::describe(BackwardResult& result) const {
+  for (size_t slot = 0; slot < types_.size(); ++slot) {
+    const auto& term = terms_[slot];
+    result.terms.push_back(
+        {types_[slot]->name, term != nullptr, types_[slot]->edges, samples_of(slot), {}, {}});
+    if (term) term->describe(result.stats);
+  }
+  result.stats.setup.emplace_back("edges", input_.edges_seconds());
+  if (scene().shading == ShadingModel::kMitsuba) {
+    result.warnings.push_back(
+        "shading 'mitsuba' is discontinuous where no edge is: the derivative of interpolated "
+        "normals is incomplete");
+  }
+  warn_of_contacts(scene(), input_.made_edges(), result.warnings);
+  warn_of_faces_edge_on(scene(), *traced_.context().viewpoints, result.warnings);
+  const auto& all = parameters_.parameters();
+  if (!std::all_of(all.begin(), all.end(), [](const auto& p) { return p.colour; })) {
+    warn_of_shadows_on_lifted_points(scene(), result.warnings);
+  }
+}
+
+// A point that sees an emitter past a mesh hangs on hundreds of numbers, most of which its
+// neighbours hang on, too.
+void ReverseEstimator::end_tile(std::vector<Contribution>& contributions) const {
+  if (method_.closed) join_slots(contributions);
+}
+
+// The terms at vertices, as the visitor of a path.
+class ReverseEstimator::VertexAdjoints {
+ public:
+  VertexAdjoints(const ReverseEstimator& estimator, const Rgb<double>& adjoint, Tape& tape,
+                 GradientTile& to)
+      : estimator_(estimator),
+        adjoint_(adjoint * (1.0 / estimator.options_.edge_samples)),
+        tape_(tape),
+        to_(to) {}
+
+  // The vertices of all that moves have unit tangents along the axes, and this one their opposites,
+  // if it moves, so that an edge never seems to rest beside it.
+  void operator()(const SurfacePoint<Var>& surface, const Scattering<Var>& scattering,
+                  const Rgb<Var>& throughput, const DirectionMotion*, const PathStep& step,
+                  int bounces, const Rng& key) {
+    PathVertex vertex =
+        plain_vertex(surface, scattering, estimator_.scene().shading, bounces, step, key);
+    vertex.throughput = value(throughput);
+    if (!is_constant(surface.p)) vertex.velocity = {{-1, 0, 0, 0}, {0, -1, 0, 0}, {0, 0, -1, 0}};
+    if (to_.log) log_vertex(*to_.log, surface, scattering, vertex.throughput, bounces);
+    VertexAdjoint sink(estimator_.motion_, adjoint_, surface.p, tape_, seeds_, to_.log);
+    for (size_t slot = 0; slot < estimator_.slots(); ++slot) {
+      const Term* term = estimator_.terms_[slot].get();
+      if (!term || !term->uses_vertices()) continue;
+      const Stopwatch watch;
+      sink.book_on(to_.costs[slot]);
+      term->add_at_vertex(vertex, estimator_.options_.edge_samples, sink);
+      to_.costs[slot].seconds += watch.seconds();
+    }
+  }
+
+  Seeds& seeds() { return seeds_; }
+
+ private:
+  const ReverseEstimator& estimator_;
+  Rgb<double> adjoint_;
+  Tape& tape_;
+  GradientTile& to_;
+  Seeds seeds_;
+};
+
+// Moves with the camera where that has slots.
+CameraRay<Var> ReverseEstimator::moving_ray(const FilmPosition& film,
+                                            const CameraRay<double>& ray) const {
+  if (parameters_.slots().camera != 0) return camera_leaves(scene().camera).ray(film.x, film.y);
+  const Vec3d &o = ray.origin, &d = ray.direction;
+  return {{o.x, o.y, o.z}, {d.x, d.y, d.z}, ray.t_min, ray.t_max};
+}
+
+ReverseEstimator::Path ReverseEstimator::path(const Batch& batch, size_t index) const {
+  const PixelPath path = choice_.path(batch, index);
+  const Film& film = scene().film;
+  return {{film.crop_x + static_cast<int>(path.pixel % film.crop_width),
+           film.crop_y + static_cast<int>(path.pixel / film.crop_width),
+           static_cast<int64_t>(path.sample)},
+          path.expected};
+}
+
+bool ReverseEstimator::trace(const Path& path, const Rng& key, Tape& tape, GradientTile& to) const {
+  const PixelSample& at = path.at;
+  const Rgb<double> adjoint = film_.of_pixel(at.x, at.y) * (1 / path.expected);
+  if (is_black(adjoint)) return true;
+  TermCost& cost = to.costs[pixel_slot_];
+  VertexAdjoints vertices(*this, adjoint, tape, to);
+  // As in forward mode: in closed form a path takes two places of its pixel.
+  const int places = method_.closed ? 2 : 1;
+  for (int i = 0; i < places; ++i) {
+    FilmPosition film = sample_pixel_filter(scene().film, filter_, at.x, at.y, key);
+    if (i > 0) film = mirrored_in_pixel(scene().film, at.x, at.y, film);
+    const auto still = scene().camera.ray<double>(film.x, film.y);
+    if (to.log) log_camera_ray(*to.log, film.x, film.y, still.origin, still.direction);
+    const auto ray = moving_ray(film, still);
+    RayCount rays;
+    ++cost.samples;
+    PathTracer<Var, VertexAdjoints> tracer(traced_.context(), rays);
+    Walk<Var, VertexAdjoints> walk(key, 0, &vertices);
+    const StartRay<Var> start{camera_ray(scene(), still), ray.origin, ray.direction};
+    tracer.follow_rays({&start, 1}, {&walk, 1});
+    const Rgb<Var>& radiance = walk.sums.radiance;
+    if (walk.failed || !is_finite(value(radiance))) return false;
+    if (terms_[pixel_slot_]) {
+      for (int c = 0; c < 3; ++c) vertices.seeds().add(radiance[c].node, adjoint[c] / places);
+    }
+    cost.add(rays);
+  }
+  if (!vertices.seeds().empty()) vertices.seeds().sweep(tape);
+  return true;
+}
+
+void ReverseEstimator::add_path(const Path& path, uint64_t seed, Tape& tape,
+                                GradientTile& to) const {
+  const auto& [x, y, number] = path.at;
+  const auto pixel = static_cast<uint64_t>(y) * scene().camera.width + x;
+  tape.clear();
+  const bool finite = trace(path, Rng(seed, pixel, static_cast<uint64_t>(number)), tape, to) &&
+                      add_tape(tape, {x, y, number, ""}, parameters_, to.costs[pixel_slot_], to);
+  if (!finite) to.non_finite.add({x, y, number, slot_name(pixel_slot_)});
+}
+
+void ReverseEstimator::add_tile(const Batch& batch, size_t tile, GradientTile& to) const {
+  Tape tape(&parameters_.slots());
+  const TapeScope scope(tape);
+  const size_t first = tile * kTileSamples;
+  for (size_t i = first; i < std::min(samples(batch), first + kTileSamples); ++i) {
+    add_path(path(batch, i), batch.seed, tape, to);
+  }
+}
+
+void ReverseEstimator::add_sample(const Batch& batch, const PixelSample& at,
+                                  GradientTile& to) const {
+  const size_t pixel = pixel_index(scene().film, at.x, at.y) / 3;
+  const Path one = path(batch, choice_.index_of(batch, pixel, at.s));
+  if (one.at.x != at.x || one.at.y != at.y) {
+    throw InputError(fmt::format("sample {} of this run is of pixel ({}, {}), not of ({}, {})",
+                                 at.s, one.at.x, one.at.y, at.x, at.y));
+  }
+  Tape tape(&parameters_.slots());
+  const TapeScope scope(tape);
+  add_path(one, batch.seed, tape, to);
+}
+
+bool ReverseEstimator::trace(size_t slot, const FilmDraw& draw, Tape& tape,
+                             GradientTile& to) const {
+  TermCost& cost = to.costs[slot];
+  ++cost.samples;
+  FilmPointAdjoint point(motion_, film_, draw.share, tape);
+  try {
+    terms_[slot]->sample_film(draw.u, draw.key, point);
+  } catch (const UntraceableRay&) {
+    return false;
+  }
+  cost.rays += point.cost().rays;
+  cost.shadow_rays += point.cost().shadow_rays;
+  if (to.log) to.log->push_back(fmt::format("film point ({:.6f}, {:.6f})", point.x(), point.y()));
+  if (!point.added()) {
+    ++(point.asked() ? cost.occluded : cost.zero_weight);
+    return true;
+  }
+  ++cost.counted;
+  if (!point.seeds().empty()) point.seeds().sweep(tape);
+  return true;
+}
+
+void ReverseEstimator::add_film(size_t slot, std::span<const FilmDraw> draws,
+                                GradientTile& to) const {
+  Tape tape(&parameters_.slots());
+  const TapeScope scope(tape);
+  for (const FilmDraw& draw : draws) {
+    tape.clear();
+    const bool finite = trace(slot, draw, tape, to) &&
+                        add_tape(tape, {-1, -1, draw.number, ""}, parameters_, to.costs[slot], to);
+    if (!finite) to.non_finite.add({-1, -1, draw.number, slot_name(slot)});
+  }
+}
+
+bool add_tape(const Tape& tape, const NonFinite::SampleId& place, const ParameterSlots& parameters,
+              TermCost& cost, GradientTile& to) {
+  const std::vector<Contribution>& list = tape.contributions();
+  double square = 0;
+  bool finite = true;
+  for (const Contribution& c : list) {
+    const double v = c.value * parameters.unit(c.slot);
+    square += v * v;
+    finite = finite && std::isfinite(c.value);
+  }
+  to.tape_bytes = std::max<uint64_t>(to.tape_bytes, tape.bytes());
+  if (!finite) return false;
+  to.contributions.insert(to.contributions.end(), list.begin(), list.end());
+  cost.largest.add(square, place);
+  return true;
+}
+
+}  // namespace limn

@@ -1,0 +1,96 @@
+#pragma once
+// What one path, or one point of the film, adds to a gradient. Terms are those of forward mode.
+#include <memory>
+#include <vector>
+
+#include "integrators/backward/edge_motion.h"
+#include "integrators/backward/film_adjoint.h"
+#include "integrators/backward/parameter_slots.h"
+#include "integrators/backward/pixel_choice.h"
+#include "integrators/estimates/gradient_estimator.h"
+#include "integrators/paths/traced_scene.h"
+#include "integrators/terms/term.h"
+#include "limn/integrators/methods.h"
+
+namespace limn {
+
+class ReverseEstimator final : public GradientEstimator {
+ public:
+  // InputError as backward().
+  ReverseEstimator(const Scene& scene, const Image& adjoint, const BackwardOptions& options,
+                   int threads);
+  ReverseEstimator(const ReverseEstimator&) = delete;
+  ReverseEstimator& operator=(const ReverseEstimator&) = delete;
+
+  const ParameterSlots& parameters() const { return parameters_; }
+  double camera_samples() const;
+  // Adds the terms, statistics of the set-up, and warnings.
+  void describe(BackwardResult& result) const;
+
+  const Scene& scene() const override { return parameters_.scene(); }
+  size_t slots() const override { return types_.size(); }
+  const char* slot_name(size_t slot) const override { return types_[slot]->name; }
+  uint32_t gradient_slots() const override { return parameters_.slots().count; }
+  std::vector<std::vector<double>> gather(const std::vector<double>& sums) const override {
+    return parameters_.gather(sums);
+  }
+  std::vector<size_t> sizes() const override { return parameters_.sizes(); }
+  int most_batches() const override { return std::max(1, options_.batches); }
+  void end_tile(std::vector<Contribution>& contributions) const override;
+
+  bool samples_pixels() const override { return paths_; }
+  size_t pixel_slot() const override { return pixel_slot_; }
+  size_t samples(const Batch& batch) const override { return choice_.paths(batch); }
+  void add_tile(const Batch& batch, size_t tile, GradientTile& to) const override;
+  int64_t sample_of(int64_t number) const override { return choice_.sample_of(number); }
+  void add_sample(const Batch& batch, const PixelSample& at, GradientTile& to) const override;
+
+  double film_samples(size_t slot) const override {
+    return terms_[slot] && terms_[slot]->uses_film() ? film_points(slot) : 0;
+  }
+  int film_stream(size_t slot) const override { return types_[slot]->film_stream; }
+  void add_film(size_t slot, std::span<const FilmDraw> draws, GradientTile& to) const override;
+
+ private:
+  class VertexAdjoints;
+
+  // Of a term: how many for each path.
+  double samples_of(size_t slot) const;
+  // Of a term with points on the film.
+  double film_points(size_t slot) const {
+    return types_[slot]->on_film_alone() ? camera_samples() : options_.shadow_samples;
+  }
+  CameraRay<Var> moving_ray(const Camera::FilmPoint<double>& film,
+                            const CameraRay<double>& ray) const;
+  // The path of a pixel. expected: how many paths it has in the batch, on average.
+  struct Path {
+    PixelSample at;
+    double expected;
+  };
+  Path path(const Batch& batch, size_t index) const;
+  void add_path(const Path& path, uint64_t seed, Tape& tape, GradientTile& to) const;
+  // Leaves on the tape what a sample contributes; false if it is not finite.
+  bool trace(const Path& path, const Rng& key, Tape& tape, GradientTile& to) const;
+  bool trace(size_t slot, const FilmDraw& draw, Tape& tape, GradientTile& to) const;
+
+  const BackwardOptions& options_;
+  FilmAdjoint film_;
+  PixelChoice choice_;
+  ParameterSlots parameters_;
+  ReverseMethod method_;
+  TracedScene traced_;
+  TermInput input_;
+  FilterTable filter_;
+  EdgeMotion motion_;
+  std::vector<const TermType*> types_;        // of each slot
+  std::vector<std::unique_ptr<Term>> terms_;  // null where not computed
+  size_t pixel_slot_ = 0;                     // of the term that traces paths
+  bool paths_ = false;                        // whether some term uses them
+};
+
+// Adds what the tape of a sample contributes, and its magnitude: squares are summed over all
+// contributions, in the units of their slots. False if one is not finite; then nothing is added.
+bool add_tape(const Tape& tape, const NonFinite::SampleId& place, const ParameterSlots& parameters,
+              TermCost& cost, GradientTile& to);
+
+}  // namespace limn
