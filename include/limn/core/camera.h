@@ -1,6 +1,6 @@
 #pragma once
-// The camera, a pinhole unless said otherwise, with Mitsuba 3's conventions: in camera space +X points to the left of the
-// image, +Y up, and +Z along the view.
+// The camera, a pinhole unless said otherwise. As in Mitsuba 3, +X of camera space points to the
+// left of the image, +Y up, and +Z along the view.
 #include <span>
 
 #include "limn/core/dual.h"
