@@ -109,7 +109,7 @@ ParameterSlots::ParameterSlots(const Scene& scene, std::vector<Parameter> parame
   }
   add_shapes(scene);
   add_values(scene);
-  add_texels(scene);
+  add_texels();
 }
 
 std::vector<size_t> ParameterSlots::sizes() const {
@@ -128,13 +128,10 @@ uint32_t ParameterSlots::take(uint32_t count, double unit) {
 ParameterSlots::Dependence ParameterSlots::dependence_of(const Scene& scene,
                                                          const Parameter& parameter) const {
   Dependence dependence;
-  if (parameter.array.size() == 3) {
-    dependence.texels = true;
-    return dependence;
-  }
+  dependence.texels = parameter.texel_map(scene_);
+  if (parameter.array.size() == 3) return dependence;
   if (parameter.array.empty()) {
     const Image velocity = parameter.texel_velocities(scene);
-    dependence.texels = !velocity.data.empty();
     for (uint32_t k = 0; k < velocity.data.size(); ++k) {
       if (velocity.data[k] != 0) dependence.texel_velocity.emplace_back(k, velocity.data[k]);
     }
@@ -243,12 +240,13 @@ void ParameterSlots::add_values(const Scene& scene) {
   CHECK_EQ(next, slot_of.size());
 }
 
-void ParameterSlots::add_texels(const Scene& scene) {
-  bool any = false;
-  for (const Dependence& dependence : dependences_) any |= dependence.texels;
-  if (!any) return;
-  const Environment::Map map = scene.environment->map();
-  slots_.texels = take(3 * static_cast<uint32_t>(map.width * map.height));
+void ParameterSlots::add_texels() {
+  for (const Dependence& dependence : dependences_) {
+    if (!dependence.texels || slots_.of(dependence.texels) != 0) continue;
+    const TexelMap::Map map = dependence.texels->map();
+    const uint32_t first = take(3 * static_cast<uint32_t>(map.width * map.height));
+    slots_.texels.emplace_back(dependence.texels, first);
+  }
 }
 
 std::vector<std::vector<double>> ParameterSlots::gather(const std::vector<double>& sums) const {
@@ -257,7 +255,7 @@ std::vector<std::vector<double>> ParameterSlots::gather(const std::vector<double
   for (size_t i = 0; i < parameters_.size(); ++i) {
     for (const Weight& w : dependences_[i].weights) values[i][w.number] += sums[w.slot] * w.weight;
     if (!dependences_[i].texels) continue;
-    const double* texels = &sums[slots_.texels];
+    const double* texels = &sums[slots_.of(dependences_[i].texels)];
     if (parameters_[i].size > 1) values[i].assign(texels, texels + parameters_[i].size);
     for (const auto& [k, v] : dependences_[i].texel_velocity) values[i][0] += texels[k] * v;
   }

@@ -53,7 +53,7 @@ class ParameterSlots {
     std::vector<Vec3d> normal_velocity;  // N, of normals of the file; empty if they stay
     std::vector<Vec3d> directions;       // V, of displacements
     std::vector<Weight> weights;
-    bool texels = false;                                      // all of the environment's map
+    const TexelMap* texels = nullptr;                         // of scene(): the map that it moves
     std::vector<std::pair<uint32_t, double>> texel_velocity;  // of a scalar: of those it moves
   };
   // What takes the slots of a shape to its vertices.
@@ -66,7 +66,7 @@ class ParameterSlots {
   uint32_t take(uint32_t count, double unit = 1);
   void add_shapes(const Scene& scene);
   void add_values(const Scene& scene);
-  void add_texels(const Scene& scene);
+  void add_texels();
   Dependence dependence_of(const Scene& scene, const Parameter& parameter) const;
   void gather_shape(ShapeId shape, const std::vector<double>& sums,
                     std::vector<std::vector<double>>& values) const;

@@ -89,6 +89,7 @@ void ReverseEstimator::describe(BackwardResult& result) const {
   const auto& all = parameters_.parameters();
   if (!std::all_of(all.begin(), all.end(), [](const auto& p) { return p.colour; })) {
     warn_of_shadows_on_lifted_points(scene(), result.warnings);
+    warn_of_texture_edges(scene(), result.warnings);
   }
 }
 

@@ -46,7 +46,7 @@ std::vector<Vec3d> random_field(const Mesh& mesh, uint64_t seed) {
 }
 
 // As smooth over the map's rows and columns, positive and negative; channels differ.
-Image random_texels(const Environment::Map& map, uint64_t seed) {
+Image random_texels(const TexelMap::Map& map, uint64_t seed) {
   Rng rng(seed, UINT64_MAX, 1);
   Image field(map.width, map.height, 3);
   for (int c = 0; c < 3; ++c) {
@@ -83,9 +83,11 @@ std::vector<Compared> compared(const Scene& scene, const Parameter& parameter, s
   }
   if (parameter.size == 1) return {{parameter.name, parameter, place, {1.0}}};
   if (parameter.array.size() == 3) {
-    const Image field = random_texels(scene.environment->map(), seed);
-    return {
-        {parameter.name, texel_field(scene, field), place, {field.data.begin(), field.data.end()}}};
+    const Image field = random_texels(parameter.texel_map(scene)->map(), seed);
+    return {{parameter.name,
+             texel_field(scene, parameter, field),
+             place,
+             {field.data.begin(), field.data.end()}}};
   }
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     if (parameter.velocities(scene, ShapeId(s)).empty()) continue;

@@ -38,7 +38,7 @@ constexpr double kLeastMove = 0x1p-14, kRounding = 0x1p-10;
 double least_texel_step(const Scene& scene, const Parameter& parameter) {
   const Image velocities = parameter.texel_velocities(scene);
   if (velocities.data.empty()) return 0;
-  const Image texels = scene.environment->texels();
+  const Image texels = parameter.texel_map(scene)->texels();
   double moving = 0, speed = 0;
   for (size_t i = 0; i < velocities.data.size(); ++i) {
     const double v = std::fabs(double{velocities.data[i]});

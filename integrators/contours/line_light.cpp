@@ -139,11 +139,13 @@ void LineLight::check(const Scene& scene, const std::string& method) {
   for (const Shape& shape : scene.shapes) {
     for (const bool front : {true, false}) {
       const Bsdf* side = shape.bsdf->side(front);
-      if (!side || side->lobe().model == &kHemisphere) continue;
-      refuse_light(method, shape.where,
-                   fmt::format("{}: only diffuse surfaces are integrated, this is {}: use another "
-                               "method (rays, path)",
-                               shape_in_text(shape), side->describe()));
+      if (!side || (side->lobe().model == &kHemisphere && side->texture_count() == 0)) continue;
+      refuse_light(
+          method, shape.where,
+          fmt::format(
+              "{}: only diffuse surfaces without textures are integrated, this is {}: use another "
+              "method (rays, path)",
+              shape_in_text(shape), side->describe()));
     }
   }
   const Environment* sky = scene.environment.get();

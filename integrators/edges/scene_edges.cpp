@@ -9,6 +9,7 @@
 
 #include "limn/core/duplicate_faces.h"
 #include "limn/core/lights.h"
+#include "limn/core/names.h"
 #include "limn/core/surface_point.h"
 #include "limn/edgetree/crossing_curves.h"
 #include "limn/edgetree/touching.h"
@@ -135,6 +136,21 @@ void warn_of_shadows_on_lifted_points(const Scene& scene, std::vector<std::strin
         "a finer mesh or area lights make the missing part smaller",
         quoted_name(scene, ShapeId(i))));
   }
+}
+
+void warn_of_texture_edges(const Scene& scene, std::vector<std::string>& warnings) {
+  std::vector<std::string> names;
+  for (uint32_t i = 0; i < scene.shapes.size(); ++i) {
+    if (scene.shapes[i].mesh.textured) names.push_back(quoted_name(scene, ShapeId(i)));
+  }
+  if (names.empty()) return;
+  constexpr size_t kMost = 8;
+  const size_t more = names.size() > kMost ? names.size() - kMost : 0;
+  names.resize(names.size() - more);
+  warnings.push_back(fmt::format(
+      "derivatives with respect to what moves are incomplete: edges inside textures and at their "
+      "seams are not differentiated, on {}{}",
+      join(names), more > 0 ? fmt::format(" and {} more", more) : ""));
 }
 
 }  // namespace limn

@@ -24,4 +24,7 @@ void warn_of_contacts(const Scene& scene, const EdgeSamplerInput* edges,
 // lights see them are not all that parts light from shadow on points that are lifted from faces.
 void warn_of_shadows_on_lifted_points(const Scene& scene, std::vector<std::string>& warnings);
 
+// One that names the shapes whose textures jump, inside faces or at seams: edges that no term has.
+void warn_of_texture_edges(const Scene& scene, std::vector<std::string>& warnings);
+
 }  // namespace limn

@@ -135,6 +135,8 @@ void Fit::Impl::check_channels() const {
       for (size_t v = 0; v < views.size(); ++v) {
         if (&whole == &part || !whole.is_map()) break;
         if (!whole.moves_texels(v) || !part.moves_texels(v)) continue;
+        const Scene& scene = views[v].scene;
+        if (whole.in_view(v)->texel_map(scene) != part.in_view(v)->texel_map(scene)) continue;
         throw InputError({views[v].scene.file},
                          fmt::format("\"{}\" and \"{}\" move the same texels: fit one of them",
                                      whole.name(), part.name()));
@@ -344,9 +346,14 @@ std::vector<FitScalar> Fit::Impl::scalars() const {
   return list;
 }
 
-bool Fit::Impl::moves_texels(size_t view) const {
-  return std::any_of(parameters_.begin(), parameters_.end(),
-                     [&](const FitParameter& p) { return p.moves_texels(view) && !p.is_map(); });
+std::vector<const TexelMap*> Fit::Impl::texel_maps(size_t view) const {
+  std::vector<const TexelMap*> maps;
+  for (const FitParameter& p : parameters_) {
+    if (p.is_map() || !p.moves_texels(view)) continue;
+    const TexelMap* map = p.in_view(view)->texel_map(views[view].scene);
+    if (std::find(maps.begin(), maps.end(), map) == maps.end()) maps.push_back(map);
+  }
+  return maps;
 }
 
 std::vector<double> Fit::Impl::values_in(size_t view, const FitParameter& parameter) const {
@@ -368,7 +375,10 @@ FitState Fit::Impl::state() const {
       view.shapes.push_back({mesh.positions, mesh.normals, mesh.faces});
     }
     for (const FitParameter& p : parameters_) view.values.push_back(values_in(v, p));
-    if (moves_texels(v)) view.texels = scene.environment->texels().data;
+    for (const TexelMap* map : texel_maps(v)) {
+      const std::vector<float> texels = map->texels().data;
+      view.texels.insert(view.texels.end(), texels.begin(), texels.end());
+    }
     state.views.push_back(std::move(view));
   }
   return state;
@@ -411,8 +421,9 @@ void Fit::Impl::check_state(const FitState& state) const {
       check(shape.positions.size() == mesh.positions.size() &&
             shape.normals.size() == mesh.normals.size());
     }
-    check(view.texels.size() ==
-          (moves_texels(v) ? views[v].scene.environment->texels().data.size() : 0));
+    size_t texels = 0;
+    for (const TexelMap* map : texel_maps(v)) texels += map->texels().data.size();
+    check(view.texels.size() == texels);
   }
 }
 
@@ -450,10 +461,14 @@ void Fit::Impl::put(const FitState& state) {
     for (size_t i = 0; i < parameters_.size(); ++i) {
       if (!view.values[i].empty()) parameters_[i].in_view(v)->assign(scene, view.values[i]);
     }
-    if (!view.texels.empty()) {
-      Image texels = scene.environment->texels();
-      texels.data = view.texels;
-      scene.environment->set_texels(texels);
+    auto next = view.texels.begin();
+    for (const TexelMap* of : texel_maps(v)) {
+      auto* map = const_cast<TexelMap*>(of);  // the views are this object's own
+      Image texels = map->texels();
+      const auto end = next + static_cast<std::ptrdiff_t>(texels.data.size());
+      texels.data.assign(next, end);
+      map->set_texels(texels);
+      next = end;
     }
     set_camera(scene.camera, view.camera);
   }

@@ -42,8 +42,8 @@ class Fit::Impl {
   void check_exact();
   // Of a scalar; none where the view does not have it, and of motions.
   std::vector<double> values_in(size_t view, const FitParameter& parameter) const;
-  // Whether a parameter without values (a field of texels, one of them) moves the view's map.
-  bool moves_texels(size_t view) const;
+  // What parameters without values (a field of texels, one of them) move, each map once.
+  std::vector<const TexelMap*> texel_maps(size_t view) const;
   // Half done where it throws.
   void put(const FitState& state);
   // Whether the shape may have other triangles than at the start.

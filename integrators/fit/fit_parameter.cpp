@@ -54,7 +54,7 @@ FitParameter::FitParameter(const std::string& name, const std::vector<FitView>& 
       continue;
     }
     first_view_ = std::min(first_view_, v);
-    moves_texels_[v] = !in_view_[v]->texel_velocities(scene).data.empty();
+    moves_texels_[v] = in_view_[v]->texel_map(scene) != nullptr;
     for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
       if (!in_view_[v]->velocities(scene, ShapeId(s)).empty()) shapes_[v] = ShapeId(s);
     }

@@ -27,7 +27,7 @@ class FitParameter {
   const Parameter* in_view(size_t view) const {
     return in_view_[view] ? &*in_view_[view] : nullptr;
   }
-  // Whether it moves texels of that view's environment.
+  // Whether it moves texels in that view.
   bool moves_texels(size_t view) const { return moves_texels_[view]; }
   // The shape of that view that it moves; none if it moves none.
   ShapeId shape(size_t view) const { return shapes_[view]; }

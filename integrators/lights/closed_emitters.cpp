@@ -17,7 +17,7 @@ constexpr const char* kInstead = "use another method (render: path)";
 
 bool is_diffuse(const Bsdf& bsdf) {
   const LobeSummary lobe = bsdf.lobe();
-  return lobe.model == &kHemisphere;
+  return lobe.model == &kHemisphere && bsdf.texture_count() == 0;
 }
 
 [[noreturn]] void refuse(const SourceLocation& where, const std::string& what) {
@@ -46,9 +46,10 @@ void check_closed_light(const Scene& scene) {
     for (const bool front : {true, false}) {
       const Bsdf* side = shape.bsdf->side(front);
       if (!side || is_diffuse(*side)) continue;
-      refuse(shape.where, fmt::format("{}: only diffuse surfaces have a closed form, this is "
-                                      "{}: {}",
-                                      shape_in_text(shape), side->describe(), kInstead));
+      refuse(shape.where,
+             fmt::format("{}: only diffuse surfaces without textures have a closed form, this is "
+                         "{}: {}",
+                         shape_in_text(shape), side->describe(), kInstead));
     }
     const bool interpolates = shape.mesh.normal_source != NormalSource::kFace;
     if (scene.shading == ShadingModel::kMitsuba && interpolates) {

@@ -36,8 +36,8 @@ inline void PathTracer<S, Visitor>::evaluate_wide(std::span<Walk*> walks,
   BsdfValue values[kMostWalks];
   for (size_t i = 0; i < count; ++i) {
     const Scattering<S>& scattering = *walks[i]->scattering;
-    asked.add(scattering.bsdf(),
-              {&scattering.normal(), &scattering.wi(), direction(*walks[i]), &values[i]});
+    asked.add(scattering.bsdf(), {&scattering.normal(), &scattering.wi(), direction(*walks[i]),
+                                  &values[i], scattering.at()});
   }
   asked.for_each([](const Bsdf& bsdf, auto items) { bsdf.eval_with_pdf_each(items); });
   for (size_t i = 0; i < count; ++i) {
@@ -78,7 +78,7 @@ inline size_t PathTracer<S, Visitor>::scatter_wide(std::span<Walk*> walks) {
     if (draw_mirrored(*walk)) continue;
     const Scattering<S>& scattering = *walk->scattering;
     draws.add(scattering.bsdf(),
-              {&scattering.normal(), &scattering.wi(), walk->u.data(), &walk->wo});
+              {&scattering.normal(), &scattering.wi(), walk->u.data(), &walk->wo, scattering.at()});
   }
   draws.for_each([](const Bsdf& bsdf, auto items) { bsdf.sample_each(items); });
   size_t drawn = 0, kept = 0;

@@ -12,7 +12,7 @@ EdgeQuery query_at(const PathVertex& vertex) {
   query.p = vertex.surface.p;
   query.n = vertex.scattering.normal();
   query.wi = vertex.scattering.wi();
-  query.lobe = vertex.scattering.bsdf().lobe();
+  query.lobe = vertex.scattering.lobe();
   query.velocity = vertex.velocity;
   query.turn = vertex.turn;
   query.face = vertex.surface.start();

@@ -1,6 +1,4 @@
 // The diffuse (Lambertian) BSDF; its back is black.
-#include <fmt/format.h>
-
 #include <algorithm>
 
 #include "src/base/angles.h"
@@ -11,34 +9,40 @@ namespace {
 
 class Diffuse final : public Bsdf {
  public:
-  explicit Diffuse(const Rgb<double>& reflectance) : reflectance_(constant(reflectance)) {}
+  explicit Diffuse(const ConstantOrTexture& reflectance)
+      : reflectance_(colour("reflectance", reflectance)) {}
 
-  Rgb<double> eval(const Vec3<double>& n, const Vec3<double>& wi,
-                   const Vec3<double>& wo) const override {
-    return evaluate(n, wi, wo);
+  Rgb<double> eval(const Vec3<double>& n, const Vec3<double>& wi, const Vec3<double>& wo,
+                   const Rgb<double>* at) const override {
+    return evaluate(n, wi, wo, at);
   }
-  Rgb<Dual> eval(const Vec3<Dual>& n, const Vec3<Dual>& wi, const Vec3<Dual>& wo) const override {
-    return evaluate(n, wi, wo);
+  Rgb<Dual> eval(const Vec3<Dual>& n, const Vec3<Dual>& wi, const Vec3<Dual>& wo,
+                 const Rgb<Dual>* at) const override {
+    return evaluate(n, wi, wo, at);
   }
-  double pdf_solid_angle(const Vec3d& n, const Vec3d& wi, const Vec3d& wo) const override {
+  double pdf_solid_angle(const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
+                         const Rgb<double>* /*at*/) const override {
     return dot(n, wi) > 0 ? std::fmax(0.0, dot(n, wo)) / kPi : 0;
   }
-  BsdfValue eval_with_pdf(const Vec3d& n, const Vec3d& wi, const Vec3d& wo) const override {
-    return {evaluate(n, wi, wo), pdf_solid_angle(n, wi, wo)};
+  BsdfValue eval_with_pdf(const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
+                          const Rgb<double>* at) const override {
+    return {evaluate(n, wi, wo, at), pdf_solid_angle(n, wi, wo, at)};
   }
-  std::optional<Vec3d> sample(const Vec3d& n, const Vec3d& wi, double u1, double u2) const override;
+  std::optional<Vec3d> sample(const Vec3d& n, const Vec3d& wi, double u1, double u2,
+                              const Rgb<double>* at) const override;
   void sample_each(std::span<const Draw> draws) const override;
 
-  bool is_constant() const override { return limn::is_constant(reflectance_); }
-  LobeSummary lobe() const override { return {kHemisphere, 1, max_channel(value(reflectance_))}; }
+  bool is_constant() const override { return limn::is_constant(reflectance_.constant); }
+  LobeSummary lobe(const Rgb<double>* at) const override {
+    return {kHemisphere, 1, reflectance_.bound(at)};
+  }
   std::vector<ParameterRef> parameters() override {
-    return {reflectance_parameter("reflectance", reflectance_)};
+    std::vector<ParameterRef> list;
+    add_parameter("reflectance", reflectance_, 0, 1, list);
+    return list;
   }
   std::shared_ptr<Bsdf> clone() const override { return std::make_shared<Diffuse>(*this); }
-  std::string describe() const override {
-    return fmt::format("diffuse, reflectance {:g} {:g} {:g}", reflectance_.r.v, reflectance_.g.v,
-                       reflectance_.b.v);
-  }
+  std::string describe() const override { return "diffuse, reflectance " + text_of(reflectance_); }
 
  private:
   // Of height sqrt(1 - u1) above a uniform point of the disk.
@@ -50,18 +54,19 @@ class Diffuse final : public Bsdf {
     return FrameOf<S>(n).to_world({r * phi.cos, r * phi.sin, sqrt(1.0 - u1)});
   }
   template <class S>
-  Rgb<S> evaluate(const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo) const {
+  Rgb<S> evaluate(const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo, const Rgb<S>* at) const {
     const S cos_o = dot(n, wo);
     if (!(value(cos_o) > 0 && dot(value(n), value(wi)) > 0)) return {};
-    return as<S>(reflectance_) * (cos_o * (1 / kPi));
+    return reflectance_.of(at) * (cos_o * (1 / kPi));
   }
 
-  Rgb<Dual> reflectance_;
+  BsdfColour reflectance_;
 };
 
 // A uniform point of the unit disk, lifted to the hemisphere, is distributed as the cosine
 // (Malley's method).
-std::optional<Vec3d> Diffuse::sample(const Vec3d& n, const Vec3d& wi, double u1, double u2) const {
+std::optional<Vec3d> Diffuse::sample(const Vec3d& n, const Vec3d& wi, double u1, double u2,
+                                     const Rgb<double>* /*at*/) const {
   if (!(dot(n, wi) > 0)) return std::nullopt;
   return draw(n, u1, u2);
 }
@@ -82,7 +87,7 @@ void Diffuse::sample_each(std::span<const Draw> draws) const {
 // Batches gain too little from SIMD here.
 }  // namespace
 
-std::shared_ptr<Bsdf> make_diffuse(const Rgb<double>& reflectance) {
+std::shared_ptr<Bsdf> make_diffuse(const ConstantOrTexture& reflectance) {
   return std::make_shared<Diffuse>(reflectance);
 }
 

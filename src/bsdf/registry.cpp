@@ -19,12 +19,12 @@ constexpr BsdfType kTypes[] = {
 }  // namespace
 
 void Bsdf::eval_with_pdf_each(std::span<const Evaluation> evaluations) const {
-  for (const Evaluation& e : evaluations) *e.value = eval_with_pdf(*e.n, *e.wi, *e.wo);
+  for (const Evaluation& e : evaluations) *e.value = eval_with_pdf(*e.n, *e.wi, *e.wo, e.at);
 }
 
 void Bsdf::sample_each(std::span<const Draw> draws) const {
   for (const Draw& draw : draws) {
-    *draw.wo = sample(*draw.n, *draw.wi, draw.u[0], draw.u[1]).value_or(Vec3d{});
+    *draw.wo = sample(*draw.n, *draw.wi, draw.u[0], draw.u[1], draw.at).value_or(Vec3d{});
   }
 }
 
@@ -36,7 +36,8 @@ std::shared_ptr<Bsdf> make_bsdf(Properties& properties) {
                    unknown_name("bsdf type", properties.type(), names_of(kTypes)));
 }
 
-Rgb<double> read_reflectance(Properties& properties, const char* name, double absent) {
+ConstantOrTexture read_reflectance(Properties& properties, const char* name, double absent) {
+  if (auto texture = properties.texture(name)) return texture;
   const Rgb<double> c = properties.rgb(name, grey(absent));
   for (int i = 0; i < 3; ++i) {
     if (!(c[i] >= 0 && c[i] <= 1)) properties.fail(name, "a reflectance must lie in [0, 1]");

@@ -8,32 +8,43 @@ namespace {
 class TwoSided final : public Bsdf {
  public:
   // sides: one or two.
-  explicit TwoSided(std::vector<std::shared_ptr<Bsdf>> sides) : sides_(std::move(sides)) {}
+  explicit TwoSided(std::vector<std::shared_ptr<Bsdf>> sides) : sides_(std::move(sides)) {
+    for (const auto& side : sides_) texture_count_ += side->texture_count();
+  }
 
-  Rgb<double> eval(const Vec3<double>& n, const Vec3<double>& wi,
-                   const Vec3<double>& wo) const override {
-    return front().eval(n, wi, wo);
+  Rgb<double> eval(const Vec3<double>& n, const Vec3<double>& wi, const Vec3<double>& wo,
+                   const Rgb<double>* at) const override {
+    return front().eval(n, wi, wo, at);
   }
-  Rgb<Dual> eval(const Vec3<Dual>& n, const Vec3<Dual>& wi, const Vec3<Dual>& wo) const override {
-    return front().eval(n, wi, wo);
+  Rgb<Dual> eval(const Vec3<Dual>& n, const Vec3<Dual>& wi, const Vec3<Dual>& wo,
+                 const Rgb<Dual>* at) const override {
+    return front().eval(n, wi, wo, at);
   }
-  double pdf_solid_angle(const Vec3d& n, const Vec3d& wi, const Vec3d& wo) const override {
-    return front().pdf_solid_angle(n, wi, wo);
+  double pdf_solid_angle(const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
+                         const Rgb<double>* at) const override {
+    return front().pdf_solid_angle(n, wi, wo, at);
   }
-  BsdfValue eval_with_pdf(const Vec3d& n, const Vec3d& wi, const Vec3d& wo) const override {
-    return front().eval_with_pdf(n, wi, wo);
+  BsdfValue eval_with_pdf(const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
+                          const Rgb<double>* at) const override {
+    return front().eval_with_pdf(n, wi, wo, at);
   }
-  std::optional<Vec3d> sample(const Vec3d& n, const Vec3d& wi, double u1,
-                              double u2) const override {
-    return front().sample(n, wi, u1, u2);
+  std::optional<Vec3d> sample(const Vec3d& n, const Vec3d& wi, double u1, double u2,
+                              const Rgb<double>* at) const override {
+    return front().sample(n, wi, u1, u2, at);
   }
   const Bsdf* side(bool is_front) const override {
     return (is_front ? sides_.front() : sides_.back()).get();
   }
-  LobeSummary lobe() const override { return front().lobe(); }
+  LobeSummary lobe(const Rgb<double>* at) const override { return front().lobe(at); }
 
   // Names of a single nested BSDF are unchanged; with two, they are "front.NAME" and "back.NAME".
   std::vector<ParameterRef> parameters() override;
+  // Of the front, then of the back.
+  Texture& texture(int k) const override {
+    const int first = front().texture_count();
+    return k < first ? front().texture(k) : sides_[1]->texture(k - first);
+  }
+  std::string texture_name(int k) const override;
   std::shared_ptr<Bsdf> clone() const override;
   std::span<std::shared_ptr<Bsdf>> nested() override { return sides_; }
   std::string describe() const override {
@@ -58,6 +69,13 @@ std::vector<ParameterRef> TwoSided::parameters() {
     }
   }
   return all;
+}
+
+std::string TwoSided::texture_name(int k) const {
+  if (sides_.size() == 1) return front().texture_name(k);
+  const int first = front().texture_count();
+  return k < first ? "front." + front().texture_name(k)
+                   : "back." + sides_[1]->texture_name(k - first);
 }
 
 std::shared_ptr<Bsdf> TwoSided::clone() const {

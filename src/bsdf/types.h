@@ -11,13 +11,7 @@ std::shared_ptr<Bsdf> read_diffuse(Properties& properties);
 std::shared_ptr<Bsdf> read_roughconductor(Properties& properties);
 std::shared_ptr<Bsdf> read_twosided(Properties& properties);
 
-// Reads a colour whose channels lie in [0, 1], as Mitsuba requires of reflectances.
-Rgb<double> read_reflectance(Properties& properties, const char* name, double absent);
-
-inline ParameterRef reflectance_parameter(const char* name, Rgb<Dual>& c) {
-  return {name, {&c.r, &c.g, &c.b}, ParameterRef::Unit::kValue, 0, 1};
-}
-
-inline Rgb<Dual> constant(const Rgb<double>& c) { return {c.r, c.g, c.b}; }
+// Reads a colour whose channels lie in [0, 1], as Mitsuba requires of reflectances, or a texture.
+ConstantOrTexture read_reflectance(Properties& properties, const char* name, double absent);
 
 }  // namespace limn

@@ -28,12 +28,26 @@ void set_positions(Mesh& mesh, const RawMesh& raw, const Matrix4& to_world) {
   }
 }
 
+// uv_places may hold what no face uses.
+void check_uv(const RawMesh& raw) {
+  constexpr float kLargest = 1e9;  // far beyond where floats have a fraction
+  for (const FaceIndices& face : raw.uv_ids) {
+    for (const uint32_t i : face) {
+      const Vec3f& uv = raw.uv_places[i];
+      if (std::fabs(uv.x) <= kLargest && std::fabs(uv.y) <= kLargest) continue;
+      throw InputError(raw.where, "texture coordinate " + std::to_string(i) +
+                                      " (counted from 0) is not finite or beyond 1e9");
+    }
+  }
+}
+
 void set_faces(Mesh& mesh, const RawMesh& raw, bool flip) {
   mesh.faces = raw.faces;
   if (mesh.normal_source == NormalSource::kGiven) mesh.normal_ids = raw.normal_ids;
   if (!flip) return;
-  for (FaceIndices& face : mesh.faces) std::swap(face[1], face[2]);
-  for (FaceIndices& ids : mesh.normal_ids) std::swap(ids[1], ids[2]);
+  for (auto* corners : {&mesh.faces, &mesh.normal_ids, &mesh.uv_ids}) {
+    for (FaceIndices& ids : *corners) std::swap(ids[1], ids[2]);
+  }
 }
 
 // Returns how many faces were dropped.
@@ -42,13 +56,15 @@ size_t keep_faces(Mesh& mesh, const Keep& keep) {
   size_t kept = 0;
   for (size_t f = 0; f < mesh.faces.size(); ++f) {
     if (!keep(f)) continue;
-    mesh.faces[kept] = mesh.faces[f];
-    if (!mesh.normal_ids.empty()) mesh.normal_ids[kept] = mesh.normal_ids[f];
+    for (auto* corners : {&mesh.faces, &mesh.normal_ids, &mesh.uv_ids}) {
+      if (!corners->empty()) (*corners)[kept] = (*corners)[f];
+    }
     ++kept;
   }
   const size_t dropped = mesh.faces.size() - kept;
-  mesh.faces.resize(kept);
-  if (!mesh.normal_ids.empty()) mesh.normal_ids.resize(kept);
+  for (auto* corners : {&mesh.faces, &mesh.normal_ids, &mesh.uv_ids}) {
+    if (!corners->empty()) corners->resize(kept);
+  }
   return dropped;
 }
 
@@ -223,6 +239,13 @@ Mesh build_mesh(const RawMesh& raw, const MeshOptions& options,
   if (raw.positions.empty()) throw InputError(raw.where, "the mesh has no vertices");
   if (raw.faces.empty()) throw InputError(raw.where, "the mesh has no faces");
   set_positions(mesh, raw, options.to_world);
+  mesh.textured = options.textured;
+  if (mesh.textured) {
+    check_uv(raw);
+    mesh.uv_source = raw.uv_source;
+    mesh.uv_places = raw.uv_places;
+    mesh.uv_ids = raw.uv_ids;
+  }
   const bool given = mesh.normal_source == NormalSource::kGiven;
   set_faces(mesh, raw, options.flip_normals != (given && mirrors(options.to_world)));
   mend(mesh, raw.where, warnings);
@@ -262,6 +285,10 @@ Mesh moved_mesh(const Mesh& mesh, std::vector<Vec3f> positions, const SourceLoca
   moved.normal_source = mesh.normal_source;
   moved.positions = std::move(positions);
   moved.faces = mesh.faces;
+  moved.textured = mesh.textured;
+  moved.uv_source = mesh.uv_source;
+  moved.uv_places = mesh.uv_places;
+  moved.uv_ids = mesh.uv_ids;
   if (mesh.normal_source == NormalSource::kGiven) {
     moved.normals = mesh.normals;
     moved.normal_ids = mesh.normal_ids;

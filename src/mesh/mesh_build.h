@@ -21,6 +21,10 @@ struct RawMesh {
   // lines.
   size_t far_position = SIZE_MAX;
   SourceLocation far_where = {};
+  // Texture coordinates, as in Mesh; kNone if there are none.
+  UvSource uv_source = UvSource::kNone;
+  std::vector<Vec3f> uv_places = {};
+  std::vector<FaceIndices> uv_ids = {};  // F by 3, into uv_places
 };
 
 // update_shading_normals; returns the number of vertices whose adjacent normals cancel, so that a
@@ -31,6 +35,7 @@ struct MeshOptions {
   Matrix4 to_world;           // invertible
   bool face_normals = false;  // ignore normals, flat shading
   bool flip_normals = false;  // reverse orientation and normals
+  bool textured = false;      // keep texture coordinates, see Mesh::textured
 };
 
 // True if the transform is a reflection (possibly combined with other transforms).

@@ -143,8 +143,10 @@ class ObjCheck {
       lines_ += "vn" + (std::isfinite(n[0] + n[1] + n[2]) ? rest_ : " 0 0 0") + "\n";
       count(normals_);
     } else if (keyword == "vt") {
-      check_numbers("texture coordinate", 1, 3);
-      lines_ += "vt" + rest_ + "\n";
+      const std::vector<double>& uv = check_numbers("texture coordinate", 1, 3);
+      const bool finite = std::isfinite(uv[0]) && (uv.size() < 2 || std::isfinite(uv[1]));
+      // The parser would read others as 0; what is so far off is refused where it is used.
+      lines_ += "vt" + (finite ? rest_ : " 1e38 1e38") + "\n";
       count(textures_);
     } else if (keyword == "f") {
       check_face();
@@ -260,8 +262,10 @@ class ObjCheck {
 // What the parser calls back with: elements as they come, faces with all their corners.
 struct Parsed {
   RawMesh mesh;
-  std::vector<uint32_t> vertices, normals;  // of all corners
-  std::vector<size_t> ends{0};              // of each face's corners
+  std::vector<uint32_t> vertices, normals, uvs;  // of all corners
+  std::vector<size_t> ends{0};                   // of each face's corners
+
+  static constexpr uint32_t kNoUv = UINT32_MAX;
 
   static uint32_t from_zero(int index, size_t count) {
     return static_cast<uint32_t>(index > 0 ? index - 1 : static_cast<int64_t>(count) + index);
@@ -275,19 +279,37 @@ struct Parsed {
     calls.normal_cb = [](void* to, double x, double y, double z) {
       of(to).mesh.normals.push_back({x, y, z});
     };
+    calls.texcoord_cb = [](void* to, double u, double v, double) {
+      of(to).mesh.uv_places.push_back({static_cast<float>(u), static_cast<float>(v), 0});
+    };
     calls.index_cb = [](void* to, tinyobj::index_t* corners, int count) {
       Parsed& p = of(to);
       for (const tinyobj::index_t& c : std::span(corners, static_cast<size_t>(count))) {
         p.vertices.push_back(from_zero(c.vertex_index, p.mesh.positions.size()));
         p.normals.push_back(c.normal_index == 0 ? kNoNormal
                                                 : from_zero(c.normal_index, p.mesh.normals.size()));
+        p.uvs.push_back(
+            c.texcoord_index == 0 ? kNoUv : from_zero(c.texcoord_index, p.mesh.uv_places.size()));
       }
       p.ends.push_back(p.vertices.size());
     };
     return calls;
   }
 
+  // Corners without texture coordinates have (0, 0) where others have some, as in Mitsuba.
+  void complete_uv() {
+    if (std::all_of(uvs.begin(), uvs.end(), [](uint32_t t) { return t == kNoUv; })) {
+      mesh.uv_places.clear();
+      return;
+    }
+    mesh.uv_source = UvSource::kPlane;
+    const auto none = static_cast<uint32_t>(mesh.uv_places.size());
+    mesh.uv_places.push_back({});
+    for (uint32_t& t : uvs) t = std::min(t, none);
+  }
+
   void split_faces(const ObjCheck& check) {
+    complete_uv();
     const bool has_normals =
         std::any_of(normals.begin(), normals.end(), [](uint32_t n) { return n != kNoNormal; });
     std::vector<Vec3d> corners;
@@ -306,6 +328,7 @@ struct Parsed {
         };
         mesh.faces.push_back(picked(vertices));
         if (has_normals) mesh.normal_ids.push_back(picked(normals));
+        if (!mesh.uv_places.empty()) mesh.uv_ids.push_back(picked(uvs));
       }
     }
   }

@@ -352,6 +352,16 @@ void read_element(PlyCursor& in, const PlyElement& element, uint64_t index,
   in.end_element();
 }
 
+// Of the texture coordinates, by any of their names.
+std::optional<std::array<size_t, 2>> uv_indices(const PlyElement& element) {
+  constexpr const char* kNames[][2] = {{"u", "v"}, {"s", "t"}, {"texture_u", "texture_v"}};
+  for (const auto& name : kNames) {
+    const auto u = scalar_index(element, name[0]), v = scalar_index(element, name[1]);
+    if (u && v) return std::array<size_t, 2>{*u, *v};
+  }
+  return std::nullopt;
+}
+
 void read_vertices(PlyCursor& in, const PlyElement& element, RawMesh& mesh) {
   std::array<std::optional<size_t>, 3> p, n;
   for (int k = 0; k < 3; ++k) {
@@ -361,6 +371,7 @@ void read_vertices(PlyCursor& in, const PlyElement& element, RawMesh& mesh) {
     if (!p[k]) in.fail_at(element.line, "element vertex has no property " + axis);
   }
   const bool has_normals = n[0] && n[1] && n[2];
+  const auto uv = uv_indices(element);
   std::vector<std::vector<double>> values;
   for (uint64_t i = 0; i < element.count; ++i) {
     read_element(in, element, i, values);
@@ -376,6 +387,9 @@ void read_vertices(PlyCursor& in, const PlyElement& element, RawMesh& mesh) {
     }
     mesh.positions.push_back(position);
     if (has_normals) mesh.normals.push_back(normal);
+    if (!uv) continue;
+    mesh.uv_places.push_back(
+        {static_cast<float>(values[(*uv)[0]][0]), static_cast<float>(values[(*uv)[1]][0]), 0});
   }
 }
 
@@ -438,6 +452,10 @@ RawMesh parse_ply(const std::string& file) {
   }
   in.end_body();
   if (!mesh.normals.empty()) mesh.normal_ids = mesh.faces;
+  if (!mesh.uv_places.empty()) {
+    mesh.uv_source = UvSource::kPlane;
+    mesh.uv_ids = mesh.faces;
+  }
   return mesh;
 }
 

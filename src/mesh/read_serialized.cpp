@@ -91,12 +91,20 @@ class MeshReader {
         mesh.normals.push_back({v[0], v[1], v[2]});
       });
     }
-    if (flags & kHasUv) for_numbers(vertices, 2, [](const double*) {});
+    if (flags & kHasUv) {
+      for_numbers(vertices, 2, [&](const double* v) {
+        mesh.uv_places.push_back({static_cast<float>(v[0]), static_cast<float>(v[1]), 0});
+      });
+    }
     if (flags & kHasColours) for_numbers(vertices, 3, [](const double*) {});
     mesh.faces.resize(faces);
     take(mesh.faces.data(), faces * sizeof(FaceIndices));
     check_faces(mesh.faces, vertices);
     if (flags & kHasNormals) mesh.normal_ids = mesh.faces;
+    if (flags & kHasUv) {
+      mesh.uv_source = UvSource::kPlane;
+      mesh.uv_ids = mesh.faces;
+    }
     result.face_normals = (flags & kFaceNormals) != 0;
     return result;
   }

@@ -69,10 +69,21 @@ SphereBuilder icosahedron() {
   return sphere;
 }
 
+// Texture coordinates that follow from where a point lies in the shape.
+void add_places(UvSource source, RawMesh& raw) {
+  raw.uv_source = source;
+  for (const Vec3d& p : raw.positions) raw.uv_places.push_back(cast<float>(p));
+  raw.uv_ids = raw.faces;
+}
+
 }  // namespace
 
 RawMesh make_rectangle() {
-  return {{}, {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}, {}, {}};
+  RawMesh raw{{}, {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}, {}, {}};
+  raw.uv_source = UvSource::kPlane;
+  raw.uv_places = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+  raw.uv_ids = raw.faces;
+  return raw;
 }
 
 // Vertex i has the coordinate +1 where bit k of i is set.
@@ -81,11 +92,27 @@ RawMesh make_cube() {
   for (int i = 0; i < 8; ++i) {
     cube.positions.push_back({i & 1 ? 1. : -1., i & 2 ? 1. : -1., i & 4 ? 1. : -1.});
   }
-  const std::array<uint32_t, 4> sides[6] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
-                                            {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
-  for (const auto& s : sides) {
-    cube.faces.push_back({s[0], s[1], s[2]});
-    cube.faces.push_back({s[0], s[2], s[3]});
+  // Its corners, and where u and v grow: axis 0 to 2, or ~axis against it.
+  struct Side {
+    std::array<uint32_t, 4> corners;
+    int u, v;
+  };
+  const Side sides[6] = {{{0, 4, 6, 2}, 1, 2},   {{1, 3, 7, 5}, 1, ~2}, {{0, 1, 5, 4}, 2, 0},
+                         {{2, 6, 7, 3}, ~0, ~2}, {{0, 2, 3, 1}, ~1, 0}, {{4, 5, 7, 6}, 1, 0}};
+  cube.uv_source = UvSource::kPlane;
+  for (const Side& s : sides) {
+    const auto first = static_cast<uint32_t>(cube.uv_places.size());
+    for (const uint32_t corner : s.corners) {
+      const auto along = [&](int axis) {
+        return axis >= 0 ? static_cast<float>(corner >> axis & 1)
+                         : 1 - static_cast<float>(corner >> ~axis & 1);
+      };
+      cube.uv_places.push_back({along(s.u), along(s.v), 0});
+    }
+    for (const uint32_t k : {1, 2}) {
+      cube.faces.push_back({s.corners[0], s.corners[k], s.corners[k + 1]});
+      cube.uv_ids.push_back({first, first + k, first + k + 1});
+    }
   }
   return cube;
 }
@@ -97,17 +124,25 @@ RawMesh make_disk() {
     disk.positions.push_back({std::cos(angle), std::sin(angle), 0});
     disk.faces.push_back({0, i + 1, (i + 1) % kSides + 1});
   }
+  add_places(UvSource::kDisk, disk);
   return disk;
 }
 
 RawMesh make_sphere() {
   SphereBuilder sphere = icosahedron();
   for (int i = 0; i < kSphereSplits; ++i) sphere.split();
-  return {{}, sphere.points, sphere.faces, sphere.points, sphere.faces};
+  RawMesh raw{{}, sphere.points, sphere.faces, sphere.points, sphere.faces};
+  add_places(UvSource::kSphere, raw);
+  return raw;
 }
 
 RawMesh make_cylinder() {
   RawMesh cylinder{{}, {}, {}, {}, {}};
+  cylinder.uv_source = UvSource::kPlane;
+  for (uint32_t i = 0; i <= kSides; ++i) {
+    const float turn = static_cast<float>(i) / kSides;
+    cylinder.uv_places.insert(cylinder.uv_places.end(), {{turn, 0, 0}, {turn, 1, 0}});
+  }
   for (uint32_t i = 0; i < kSides; ++i) {
     const double angle = 2 * kPi * i / kSides;
     const Vec3d outward{std::cos(angle), std::sin(angle), 0};
@@ -117,8 +152,10 @@ RawMesh make_cylinder() {
     const uint32_t next = (i + 1) % kSides;
     cylinder.faces.push_back({2 * i, 2 * next, 2 * next + 1});
     cylinder.normal_ids.push_back({i, next, next});
+    cylinder.uv_ids.push_back({2 * i, 2 * i + 2, 2 * i + 3});
     cylinder.faces.push_back({2 * i, 2 * next + 1, 2 * i + 1});
     cylinder.normal_ids.push_back({i, next, i});
+    cylinder.uv_ids.push_back({2 * i, 2 * i + 3, 2 * i + 1});
   }
   return cylinder;
 }

@@ -23,6 +23,7 @@ class OneComponent final : public Motion {
   std::vector<Vec3d> velocities(const Scene& scene, ShapeId shape, size_t) const override {
     return array_->velocities(scene, shape, component_);
   }
+  TexelMap* texel_map(Scene& scene) const override { return array_->texel_map(scene); }
   Image texel_velocities(const Scene& scene, size_t) const override {
     return array_->texel_velocities(scene, component_);
   }

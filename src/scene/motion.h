@@ -21,6 +21,7 @@ class Motion {
   virtual void assign(Scene& scene, const std::string& name, const std::vector<double>& value,
                       std::vector<std::string>* warnings) const;
   virtual std::vector<Vec3d> velocities(const Scene& scene, ShapeId shape, size_t component) const;
+  virtual TexelMap* texel_map(Scene&) const { return nullptr; }
   virtual Image texel_velocities(const Scene& scene, size_t component) const;
 
   // A copy that stores what it needs of the current scene; null if it needs nothing.

@@ -130,6 +130,12 @@ Parameter Parameter::at(const ShapePose& pose) const {
   return there;
 }
 
+TexelMap* Parameter::texel_map(Scene& scene) const { return motion->texel_map(scene); }
+
+const TexelMap* Parameter::texel_map(const Scene& scene) const {
+  return motion->texel_map(const_cast<Scene&>(scene));  // it is looked up alone
+}
+
 Image Parameter::texel_velocities(const Scene& scene, size_t component) const {
   CHECK_LT(component, size);
   return motion->texel_velocities(scene, component);

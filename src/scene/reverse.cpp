@@ -9,6 +9,27 @@ void contribute(Tape& tape, uint32_t slot, const Vec3d& g) {
   for (int k = 0; k < 3; ++k) tape.contribute(slot + k, g[k]);
 }
 
+// The adjoint of the barycentric coordinates b1 = (q x e2).n / n^2, b2 = (e1 x q).n / n^2 of x on
+// the face with corners c, where q = x - c0: adds to `of`. Slivers take constant coordinates in
+// interpolate_shading; on flat meshes, too, their derivatives are left out.
+void pull_back_barycentrics(const std::array<Vec3d, 3>& c, const Vec3d& x,
+                            const std::array<double, 2>& of_b, ShadingAdjoint& of) {
+  const Vec3d e1 = c[1] - c[0], e2 = c[2] - c[0], q = x - c[0], n = cross(e1, e2);
+  const double inverse = 1 / dot(n, n);
+  const Vec3d x1 = cross(q, e2), x2 = cross(e1, q);
+  const double b1 = dot(x1, n) * inverse, b2 = dot(x2, n) * inverse;
+  if (!(std::fabs(b1) <= 2 && std::fabs(b2) <= 2)) return;
+  const Vec3d of_x1 = n * (of_b[0] * inverse), of_x2 = n * (of_b[1] * inverse);
+  const Vec3d of_n =
+      (x1 * of_b[0] + x2 * of_b[1] - n * (2 * (b1 * of_b[0] + b2 * of_b[1]))) * inverse;
+  const Vec3d of_q = cross(e2, of_x1) + cross(of_x2, e1);
+  const Vec3d of_e1 = cross(q, of_x2) + cross(e2, of_n), of_e2 = cross(of_x1, q) + cross(of_n, e1);
+  of.x += of_q;
+  of.corners[0] += -of_q - of_e1 - of_e2;
+  of.corners[1] += of_e1;
+  of.corners[2] += of_e2;
+}
+
 // The adjoint of surface_on_ray: of x = o + t d, t = (c0 - o) . N / (d . N), and of what is found
 // at x. Nodes and values: of o, then of d.
 void pull_back_surface(Tape& tape, const Tape::Composite& s) {
@@ -17,7 +38,10 @@ void pull_back_surface(Tape& tape, const Tape::Composite& s) {
                  tape.adjoint(s.first + first + 2)};
   };
   const Vec3d of_p = read(0), of_normal = read(3);
-  if (of_p == Vec3d{} && of_normal == Vec3d{}) return;
+  std::array<double, 2> of_b{};
+  for (uint32_t k = 0; k + 6 < s.outputs; ++k) of_b[k] = tape.adjoint(s.first + 6 + k);
+  const bool looked_up = of_b[0] != 0 || of_b[1] != 0;
+  if (of_p == Vec3d{} && of_normal == Vec3d{} && !looked_up) return;
   const FaceRef face{ShapeId(s.shape), FaceId(s.part)};
   const Scene& scene = *tape.slots()->scene;
   const Mesh& mesh = scene.shape(face.shape).mesh;
@@ -40,6 +64,7 @@ void pull_back_surface(Tape& tape, const Tape::Composite& s) {
       contribute(tape, slots.normals + 3 * id, of.normals[k]);
     }
   }
+  if (looked_up) pull_back_barycentrics(c, o + d * t, of_b, of);
   const double k = dot(of.x, d) / slope;
   const Vec3d of_o = of.x - n * k, of_d = of.x * t - n * (k * t);
   for (int i = 0; i < 3; ++i) {
@@ -72,15 +97,17 @@ void pull_back_texels(Tape& tape, const Tape::Composite& s) {
   const SceneSlots& slots = *tape.slots();
   const Vec3d d{s.values[0], s.values[1], s.values[2]};
   for (uint32_t c = 0; c < 3; ++c) tape.adjoint(s.nodes[c]) += a[c];
-  for (const auto& [texel, weight] : slots.scene->environment->texel_weights(d)) {
-    for (uint32_t c = 0; c < 3; ++c) tape.contribute(slots.texels + 3 * texel + c, weight * a[c]);
+  const Environment& environment = *slots.scene->environment;
+  const uint32_t first = slots.of(&environment);
+  for (const auto& [texel, weight] : environment.texel_weights(d)) {
+    for (uint32_t c = 0; c < 3; ++c) tape.contribute(first + 3 * texel + c, weight * a[c]);
   }
 }
 
 // Radiance of the environment from d, which is held, as its texels make it besides.
 Rgb<Var> with_texels(const Vec3d& d, Rgb<Var> radiance) {
   Tape& tape = *Tape::current();
-  if (tape.slots()->texels == 0) return radiance;
+  if (tape.slots()->of(tape.slots()->scene->environment.get()) == 0) return radiance;
   const uint32_t first = tape.add({0,
                                    3,
                                    pull_back_texels,
@@ -147,17 +174,122 @@ ShadingAdjoint pull_back_shading(const Scene& scene, FaceRef face, const Vec3d& 
   return of;
 }
 
+namespace {
+
+// A texture's value: it follows the barycentric coordinates, and its texels.
+Rgb<Var> texture_value(const Texture& texture, const TexturePoint<Dual>& point,
+                       const std::array<Var, 2>& b) {
+  const Rgb<Dual> f = texture.eval(point);
+  detail::Jacobian jacobian;
+  for (int k = 0; k < 2; ++k) jacobian.add(b[k].node, f.r.d[k], f.g.d[k], f.b.d[k]);
+  Tape& tape = *Tape::current();
+  if (const uint32_t slot = tape.slots()->of(&texture)) {
+    const TexturePoint<double> here{
+        point.mesh, point.face, {b[0].v, b[1].v}, {point.uv[0].v, point.uv[1].v}};
+    for (const auto& [texel, weight] : texture.texel_weights(here)) {
+      for (uint32_t c = 0; c < 3; ++c) {
+        Rgb<double> of;
+        of[static_cast<int>(c)] = weight;
+        if (texture.of_numbers()) of = grey(luminance(of));
+        jacobian.add(tape.leaf(slot + 3 * texel + c), of.r, of.g, of.b);
+      }
+    }
+  }
+  const Rgb<Var> v = jacobian.result(value(f));
+  return texture.of_numbers() ? Rgb<Var>{v.r, v.r, v.r} : v;
+}
+
+}  // namespace
+
+template <>
+void TexturesAt<Var>::resolve(const Bsdf& bsdf, const SurfacePoint<Var>& point) {
+  count_ = bsdf.texture_count();
+  const std::array<Dual, 2> b = {Dual(point.b[0].v, {1, 0, 0, 0}),
+                                 Dual(point.b[1].v, {0, 1, 0, 0})};
+  point_ = texture_point<Dual>(point.shape->mesh, point.face.face, b);
+  for (int k = 0; k < count_; ++k) {
+    moving_.values[k] = texture_value(bsdf.texture(k), point_, point.b);
+    held_.values[k] = value(moving_.values[k]);
+  }
+}
+
+namespace detail {
+
+namespace {
+
+Rgb<Dual> held(const Rgb<double>& c) { return {c.r, c.g, c.b}; }
+
+// Adds derivatives with respect to the values of textures, four at a time. eval(at): the BSDF.
+template <class Eval>
+void add_textures(const TexturesAt<Var>& textures, Rgb<Dual>* at, const Eval& eval,
+                  Jacobian& jacobian) {
+  for (int first = 0; first < textures.count();) {
+    std::array<ChannelSlots, kLanes> nodes{};
+    int lane = 0, k = first;
+    for (; k < textures.count() && lane < kLanes; ++k) {
+      const Rgb<Var>& v = textures.moving()[k];
+      if (is_constant(v)) continue;
+      nodes[lane] = {v.r.node, v.g.node, v.b.node};
+      for (int c = 0; c < 3; ++c) at[k][c].d[lane] = 1;
+      ++lane;
+    }
+    if (lane > 0) jacobian.add(nodes, eval(at));
+    for (int i = first; i < k; ++i) at[i] = held(textures.held()[i]);
+    first = k;
+  }
+}
+
+}  // namespace
+
+template <>
+Rgb<Var> eval_bsdf<Var>(const Bsdf& bsdf, const SeededCopies<Bsdf>* copies, const Vec3<Var>& n,
+                        const Vec3<Var>& wi, const Vec3<Var>& wo, const TexturesAt<Var>& textures) {
+  Jacobian jacobian;
+  std::optional<Rgb<double>> f;
+  Rgb<Dual> at[kMostTextures];
+  for (int k = 0; k < textures.count(); ++k) at[k] = held(textures.held()[k]);
+  const auto add = [&](const Vec3<Var>& x, const auto& eval) {
+    if (is_constant(x)) return;
+    const Rgb<Dual> moving = eval(along_axes(x));
+    jacobian.add(x, moving);
+    f = value(moving);
+  };
+  add(n, [&](const Vec3<Dual>& x) { return bsdf.eval(x, held(wi), held(wo), at); });
+  add(wi, [&](const Vec3<Dual>& x) { return bsdf.eval(held(n), x, held(wo), at); });
+  add(wo, [&](const Vec3<Dual>& x) { return bsdf.eval(held(n), held(wi), x, at); });
+  add_textures(
+      textures, at,
+      [&](const Rgb<Dual>* seeded) { return bsdf.eval(held(n), held(wi), held(wo), seeded); },
+      jacobian);
+  if (copies) {
+    TexturePoint<Dual> still = textures.point();
+    for (int k = 0; k < 2; ++k) {
+      still.b[k] = still.b[k].v;
+      still.uv[k] = still.uv[k].v;
+    }
+    for (const auto& copy : *copies) {
+      copy.object->resolve(still, at);
+      jacobian.add(leaves_of(copy.slots), copy.object->eval(held(n), held(wi), held(wo), at));
+    }
+  }
+  return jacobian.result(f ? *f : bsdf.eval(value(n), value(wi), value(wo), textures.held()));
+}
+
+}  // namespace detail
+
 template <>
 SurfacePoint<Var> surface_on_ray<Var>(const Scene& scene, FaceRef face, const Vec3<Var>& origin,
                                       const Vec3<Var>& direction) {
   const auto point = surface_on_ray<double>(scene, face, value(origin), value(direction));
   const auto fixed = [](const Vec3d& v) { return Vec3<Var>{v.x, v.y, v.z}; };
-  SurfacePoint<Var> moving{point.shape, point.face,       fixed(point.p),
-                           point.n_g,   fixed(point.n_s), point.lifted};
+  SurfacePoint<Var> moving{point.shape,      point.face,   fixed(point.p),          point.n_g,
+                           fixed(point.n_s), point.lifted, {point.b[0], point.b[1]}};
   Tape& tape = *Tape::current();
   const MeshSlots& slots = tape.slots()->mesh(face.shape);
   if (slots.positions == 0 && is_constant(origin) && is_constant(direction)) return moving;
-  Tape::Composite statement{0, 6, pull_back_surface, face.shape.index(), face.face.index(), {}, {}};
+  const bool textured = point.shape->mesh.textured;
+  Tape::Composite statement{
+      0, textured ? 8u : 6u, pull_back_surface, face.shape.index(), face.face.index(), {}, {}};
   for (int k = 0; k < 3; ++k) {
     statement.nodes[k] = origin[k].node;
     statement.nodes[3 + k] = direction[k].node;
@@ -170,6 +302,7 @@ SurfacePoint<Var> surface_on_ray<Var>(const Scene& scene, FaceRef face, const Ve
     moving.p[k].node = first + k;
     if (!flat || slots.positions != 0) moving.n_s[k].node = first + 3 + k;
   }
+  for (uint32_t k = 0; k < 2 && textured; ++k) moving.b[k].node = first + 6 + k;
   return moving;
 }
 

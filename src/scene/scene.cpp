@@ -82,6 +82,11 @@ void use_sensor(Scene& scene, const std::string& name) {
 void set_mesh(Scene& scene, ShapeId shape, std::vector<Vec3f> positions,
               std::vector<FaceIndices> faces, std::vector<std::string>* warnings) {
   Shape& changed = scene.shapes[shape.index()];
+  if (changed.mesh.textured) {
+    throw InputError(changed.where,
+                     "a new mesh has no texture coordinates, which the material of "
+                     "this shape needs");
+  }
   changed.mesh =
       make_mesh(std::move(positions), std::move(faces),
                 changed.mesh.normal_source == NormalSource::kFace, changed.where, warnings);

@@ -1,7 +1,8 @@
-// Motions of the texels of an environment map: along a field, or single texels.
+// Motions of the texels of an environment map or a texture: along a field, or single texels.
 #include <fmt/format.h>
 
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "limn/core/check.h"
@@ -16,31 +17,46 @@ namespace {
 
 constexpr double kLargest = std::numeric_limits<float>::max();  // of a texel's value
 
-// Radiance is linear in texels, so moves are exact up to float rounding.
+// Texels in any copy of a scene, and the name of their array.
+struct Texels {
+  std::function<TexelMap*(Scene&)> find;
+  std::string name;
+
+  const TexelMap& in(const Scene& scene) const { return *find(const_cast<Scene&>(scene)); }
+};
+
+// What is looked up is linear in texels, so moves are exact up to float rounding.
 class TexelMotion : public Motion {
  public:
+  explicit TexelMotion(Texels texels) : texels_(std::move(texels)) {}
+
+  TexelMap* texel_map(Scene& scene) const final { return texels_.find(scene); }
   void seed(Scene& scene, int lane, size_t component) const final {
-    scene.environment->add_texel_tangents(texel_velocities(scene, component), lane);
+    texel_map(scene)->add_texel_tangents(texel_velocities(scene, component), lane);
   }
   void move(Scene& scene, double step, size_t component) const final {
-    Image texels = scene.environment->texels();
+    Image texels = texel_map(scene)->texels();
     const Image velocities = texel_velocities(scene, component);
     for (size_t i = 0; i < texels.data.size(); ++i) {
       const double moved = double{texels.data[i]} + step * velocities.data[i];
       if (!(std::fabs(moved) <= kLargest)) {
-        throw InputError({scene.file}, fmt::format("a step of {:g} along texels of \"{}.data\" is "
+        throw InputError({scene.file}, fmt::format("a step of {:g} along texels of \"{}\" is "
                                                    "too long: their values must be finite",
-                                                   step, scene.environment_id));
+                                                   step, texels_.name));
       }
       texels.data[i] = static_cast<float>(moved);
     }
-    scene.environment->set_texels(texels);
+    texel_map(scene)->set_texels(texels);
   }
+
+ protected:
+  const Texels texels_;
 };
 
 class TexelField final : public TexelMotion {
  public:
-  explicit TexelField(Image field) : field_(std::move(field)) {}
+  TexelField(Texels texels, Image field)
+      : TexelMotion(std::move(texels)), field_(std::move(field)) {}
   Image texel_velocities(const Scene&, size_t) const override { return field_; }
 
  private:
@@ -48,11 +64,11 @@ class TexelField final : public TexelMotion {
 };
 
 // Reads as many channels as the map has; grey changes all alike. A map of one row is stored as two.
-Image read_texel_field(const Environment::Map& map, const std::string& file) {
+Image read_texel_field(const TexelMap::Map& map, const std::string& file) {
   const Image image = read_exr(file);
   const bool one_row = image.height == 1 && map.height == 2;
   if (image.width != map.width || (image.height != map.height && !one_row)) {
-    throw InputError({file}, fmt::format("the field has {} x {} texels, but the environment's map "
+    throw InputError({file}, fmt::format("the field has {} x {} texels, but the map "
                                          "{} x {}",
                                          image.width, image.height, map.width, map.height));
   }
@@ -69,18 +85,18 @@ Image read_texel_field(const Environment::Map& map, const std::string& file) {
 }
 
 // A hundredth of the texels' mean magnitude. The largest (a sun) would give too large a step.
-double natural_step_of(const Environment::Map& map) {
-  return map.mean > 0 ? 0.01 * map.mean : 0.01;
-}
+double natural_step_of(const TexelMap::Map& map) { return map.mean > 0 ? 0.01 * map.mean : 0.01; }
 
 class TexelArray final : public TexelMotion {
  public:
+  using TexelMotion::TexelMotion;
+
   std::optional<Parameter> part(const Scene& scene, const Parameter& whole,
                                 const std::string& rest) const override {
     if (rest.size() < 2) return std::nullopt;
     if (rest[0] == ':') {
       const std::string file = rest.substr(1);
-      Parameter field = texel_field(scene, read_texel_field(scene.environment->map(), file));
+      Parameter field = texel_field(scene, whole, read_texel_field(texels_.in(scene).map(), file));
       field.name = whole.name + rest;
       field.unit = "times the texels in FILE";
       return field;
@@ -88,24 +104,33 @@ class TexelArray final : public TexelMotion {
     return rest[0] == '.' ? component(scene, whole, rest.substr(1)) : std::nullopt;
   }
   std::vector<double> numbers(const Scene& scene) const override {
-    const Image texels = scene.environment->texels();
+    const Image texels = texels_.in(scene).texels();
     return {texels.data.begin(), texels.data.end()};
   }
   void assign(Scene& scene, const std::string& name, const std::vector<double>& value,
               std::vector<std::string>*) const override {
-    Image texels = scene.environment->texels();
-    check_numbers(scene, name, value, texels.data.size(), -kLargest, kLargest);
+    Image texels = texel_map(scene)->texels();
+    const TexelMap::Map map = texel_map(scene)->map();
+    check_numbers(scene, name, value, texels.data.size(), map.least, map.most);
     for (size_t i = 0; i < value.size(); ++i) texels.data[i] = static_cast<float>(value[i]);
-    scene.environment->set_texels(texels);
+    texel_map(scene)->set_texels(texels);
   }
   std::string parts(const std::string& name) const override {
     return "\"" + name + ":FILE\" for a map of changes, \"" + name + ".0.0.r\" for one number";
   }
   Image texel_velocities(const Scene& scene, size_t component) const override {
-    const Environment::Map map = scene.environment->map();
+    const TexelMap::Map map = texels_.in(scene).map();
     Image unit(map.width, map.height, 3);
     unit.data[component] = 1;
     return unit;
+  }
+
+  Parameter field(const Parameter& whole, const Image& field) const {
+    const double step = whole.natural_step;
+    double largest = 0;
+    for (const float v : field.data) largest = std::max(largest, std::fabs(double{v}));
+    return {whole.name + ":", "times the texels of the field", largest > 0 ? step / largest : 0.01,
+            1, std::make_shared<TexelField>(texels_, field)};
   }
 
  private:
@@ -132,24 +157,39 @@ class TexelArray final : public TexelMotion {
 
 }  // namespace
 
-Parameter texel_field(const Scene& scene, const Image& field) {
-  const Environment::Map map = scene.environment->map();
+Parameter texel_field(const Scene& scene, const Parameter& texels, const Image& field) {
+  const TexelMap::Map map = texels.texel_map(scene)->map();
   CHECK_EQ(field.data.size(), 3 * static_cast<size_t>(map.width) * map.height);
-  double largest = 0;
-  for (const float v : field.data) largest = std::max(largest, std::fabs(double{v}));
-  return {scene.environment_id + ".data:", "times the texels of the field",
-          largest > 0 ? natural_step_of(map) / largest : 0.01, 1,
-          std::make_shared<TexelField>(field)};
+  return dynamic_cast<const TexelArray&>(*texels.motion).field(texels, field);
 }
 
-void add_texel_parameters(const Scene& scene, std::vector<Parameter>& list) {
-  if (!scene.environment || scene.environment_id.empty()) return;
-  const Environment::Map map = scene.environment->map();
+namespace {
+
+void add_map(const Scene& scene, const Texels& texels, std::vector<Parameter>& list) {
+  const TexelMap::Map map = texels.in(scene).map();
   if (map.width == 0) return;
   const auto height = static_cast<size_t>(map.height), width = static_cast<size_t>(map.width);
-  list.push_back({scene.environment_id + ".data", "", natural_step_of(map), 3 * height * width,
-                  std::make_shared<TexelArray>()});
+  list.push_back({texels.name, "", natural_step_of(map), 3 * height * width,
+                  std::make_shared<TexelArray>(texels)});
   list.back().array = {height, width, 3};
+  list.back().least = map.least;
+  list.back().most = map.most;
+}
+
+}  // namespace
+
+void add_texel_parameters(const Scene& scene, std::vector<Parameter>& list) {
+  for (const auto& [id, bsdf] : scene.bsdfs_by_id) {
+    for (int k = 0; k < bsdf->texture_count(); ++k) {
+      const auto find = [id = id, k](Scene& copy) -> TexelMap* {
+        return &copy.bsdfs_by_id.at(id)->texture(k);
+      };
+      add_map(scene, {find, id + "." + bsdf->texture_name(k) + ".data"}, list);
+    }
+  }
+  if (!scene.environment || scene.environment_id.empty()) return;
+  const auto find = [](Scene& copy) -> TexelMap* { return copy.environment.get(); };
+  add_map(scene, {find, scene.environment_id + ".data"}, list);
 }
 
 }  // namespace limn

@@ -9,7 +9,7 @@ namespace limn {
 
 namespace {
 
-const BsdfMaker kNoBsdfs;
+const Makers kNoMakers;
 
 struct IntegratorType {
   const char* name;
@@ -65,7 +65,7 @@ void read_integrator(const ObjectDescription& object, const SceneDescription& de
   if (type == types().end()) {
     throw InputError(object.where, unknown_name("integrator type", object.type, names_of(types())));
   }
-  DescribedProperties p(object, description, kNoBsdfs);
+  DescribedProperties p(object, description, kNoMakers);
   for (const std::string& name : type->unwritten) {
     if (!p.has(name)) continue;
     warnings.push_back(format_warning(p.where(name), name + " are not written"));

@@ -159,11 +159,18 @@ std::string DescribedProperties::existing_file(const std::string& name, const st
   return found;
 }
 
+std::shared_ptr<Texture> DescribedProperties::texture(const std::string& name) {
+  known_.insert(name);
+  const ObjectDescription* object = find_object(name);
+  if (!object || object->tag != "texture" || is_spectrum_type(object->type)) return nullptr;
+  return make_nested_.texture(*object);
+}
+
 std::vector<std::shared_ptr<Bsdf>> DescribedProperties::bsdfs() {
   known_tags_.insert("bsdf");
   std::vector<std::shared_ptr<Bsdf>> made;
   for (const ChildDescription& child : object_.children) {
-    if (child.object->tag == "bsdf") made.push_back(make_nested_(*child.object));
+    if (child.object->tag == "bsdf") made.push_back(make_nested_.bsdf(*child.object));
   }
   return made;
 }

@@ -9,13 +9,17 @@
 
 namespace limn {
 
-using BsdfMaker = std::function<std::shared_ptr<Bsdf>(const ObjectDescription&)>;
+// Make nested objects.
+struct Makers {
+  std::function<std::shared_ptr<Bsdf>(const ObjectDescription&)> bsdf;
+  std::function<std::shared_ptr<Texture>(const ObjectDescription&)> texture;
+};
 
 class DescribedProperties final : public Properties {
  public:
-  // make_nested creates nested BSDFs. All arguments must outlive this object.
+  // All arguments must outlive this object.
   DescribedProperties(const ObjectDescription& object, const SceneDescription& scene,
-                      const BsdfMaker& make_nested)
+                      const Makers& make_nested)
       : object_(object), scene_(scene), make_nested_(make_nested) {}
 
   const std::string& tag() const override { return object_.tag; }
@@ -34,6 +38,7 @@ class DescribedProperties final : public Properties {
   Rgb<double> rgb(const std::string& name, const Rgb<double>& absent) override;
   Matrix4 transform(const std::string& name) override;
   std::string file(const std::string& name) override;
+  std::shared_ptr<Texture> texture(const std::string& name) override;
   std::vector<std::shared_ptr<Bsdf>> bsdfs() override;
 
   // The nested object of this tag; null if there is none, InputError if there are several.
@@ -61,7 +66,7 @@ class DescribedProperties final : public Properties {
 
   const ObjectDescription& object_;
   const SceneDescription& scene_;
-  const BsdfMaker& make_nested_;
+  const Makers& make_nested_;
   mutable std::set<std::string> known_;
   std::set<std::string> known_tags_;
 };

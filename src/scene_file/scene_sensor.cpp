@@ -13,7 +13,7 @@ namespace limn {
 
 namespace {
 
-const BsdfMaker kNoBsdfs;
+const Makers kNoMakers;
 
 [[noreturn]] void fail_unknown_type(const ObjectDescription& object,
                                     const std::vector<std::string>& known) {
@@ -46,7 +46,7 @@ double radius_of_filter(Properties& properties, const std::string& name, double 
 }
 
 void read_filter(const ObjectDescription& object, const SceneDescription& scene, Filter& filter) {
-  DescribedProperties p(object, scene, kNoBsdfs);
+  DescribedProperties p(object, scene, kNoMakers);
   if (object.type == "box") {
     filter = {Filter::Kind::kBox, 0.5, 0};
   } else if (object.type == "tent") {
@@ -110,7 +110,7 @@ bool read_pixel_format(Properties& p, std::vector<std::string>& warnings) {
 void read_film(const ObjectDescription& object, const SceneDescription& description, Sensor& sensor,
                std::vector<std::string>& warnings) {
   if (object.type != "hdrfilm") fail_unknown_type(object, {"hdrfilm"});
-  DescribedProperties p(object, description, kNoBsdfs);
+  DescribedProperties p(object, description, kNoMakers);
   Film& film = sensor.film;
   film.where = object.where;
   sensor.camera.width = bounded_integer(p, "width", 768, 1);
@@ -142,7 +142,7 @@ void read_sampler(const ObjectDescription& object, const SceneDescription& descr
   if (std::find(kTypes.begin(), kTypes.end(), object.type) == kTypes.end()) {
     fail_unknown_type(object, kTypes);
   }
-  DescribedProperties p(object, description, kNoBsdfs);
+  DescribedProperties p(object, description, kNoMakers);
   if (object.type != "independent") {
     warnings.push_back(format_warning(
         object.where,
@@ -246,7 +246,7 @@ Sensor read_sensor(const ObjectDescription& sensor, const SceneDescription& desc
   if (!orthographic && sensor.type != "perspective") {
     fail_unknown_type(sensor, {"orthographic", "perspective"});
   }
-  DescribedProperties p(sensor, description, kNoBsdfs);
+  DescribedProperties p(sensor, description, kNoMakers);
   Camera& camera = read.camera;
   if (const ObjectDescription* film = p.nested("film")) {
     read_film(*film, description, read, warnings);

@@ -23,7 +23,8 @@ class SceneBuilder {
   SceneBuilder(const SceneDescription& description, std::vector<std::string>* warnings)
       : description_(description),
         warnings_(warnings ? *warnings : unread_warnings_),
-        make_nested_([this](const ObjectDescription& object) { return bsdf(object); }) {}
+        make_nested_{[this](const ObjectDescription& object) { return bsdf(object); },
+                     [this](const ObjectDescription& object) { return texture(object); }} {}
 
   Scene build() {
     scene_.file = description_.file;
@@ -107,6 +108,15 @@ class SceneBuilder {
     return made;
   }
 
+  // A new object each time: every BSDF has textures of its own.
+  std::shared_ptr<Texture> texture(const ObjectDescription& object) {
+    note_data_file(object);
+    DescribedProperties p(object, description_, make_nested_);
+    std::shared_ptr<Texture> made = make_texture(p);
+    p.check_all_used();
+    return made;
+  }
+
   void add_light(const ObjectDescription& object) {
     DescribedProperties p(object, description_, make_nested_);
     const auto before = scene_.environment;
@@ -138,7 +148,6 @@ class SceneBuilder {
     options.flip_normals = p.boolean("flip_normals", false);
     if (from_file) {
       options.face_normals = p.boolean("face_normals", false);
-      p.boolean("flip_tex_coords", true);  // ignored: there are no textures
     }
     return options;
   }
@@ -167,13 +176,20 @@ class SceneBuilder {
   RawMesh read_file(DescribedProperties& p, MeshOptions& options) {
     const std::string file = p.file("filename");
     options = read_mesh_options(p, true);
-    if (p.type() == "obj") return parse_obj(file);
-    if (p.type() == "ply") return parse_ply(file);
-    const int64_t index = p.integer("shape_index", 0);
-    if (index < 0) p.fail("shape_index", "must not be negative");
-    SerializedMesh read = parse_serialized(file, index);
-    options.face_normals = options.face_normals || read.face_normals;
-    return std::move(read.mesh);
+    RawMesh raw;
+    if (p.type() == "serialized") {
+      const int64_t index = p.integer("shape_index", 0);
+      if (index < 0) p.fail("shape_index", "must not be negative");
+      SerializedMesh read = parse_serialized(file, index);
+      options.face_normals = options.face_normals || read.face_normals;
+      raw = std::move(read.mesh);
+    } else {
+      raw = p.type() == "obj" ? parse_obj(file) : parse_ply(file);
+    }
+    if (p.boolean("flip_tex_coords", p.type() == "obj")) {
+      for (Vec3f& uv : raw.uv_places) uv.y = 1 - uv.y;
+    }
+    return raw;
   }
 
   // A cylinder about the axis from p0 to p1.
@@ -252,6 +268,16 @@ class SceneBuilder {
     instance_ = {};
   }
 
+  static void check_needs_no_uv(const Bsdf& bsdf, const RawMesh& raw,
+                                const ObjectDescription& object) {
+    for (int k = 0; k < bsdf.texture_count(); ++k) {
+      if (!bsdf.texture(k).needs_uv()) continue;
+      throw InputError(object.where, "no texture coordinates in " + raw.where.file +
+                                         ", needed by the texture of \"" + bsdf.texture_name(k) +
+                                         "\"");
+    }
+  }
+
   void add_shape(const ObjectDescription& object, const std::string& id) {
     DescribedProperties p(object, description_, make_nested_);
     Shape shape;
@@ -265,16 +291,18 @@ class SceneBuilder {
     if (const ObjectDescription* emitter = p.nested("emitter")) read_nested_light(*emitter, shape);
     p.check_all_used();
     check_memory(raw);
-    shape.mesh = build_mesh(raw, options, &warnings_);
     const double grey_value = shape.is_emitter ? 0.0 : 0.5;
     shape.bsdf = bsdfs.empty() ? make_diffuse(grey(grey_value)) : bsdfs[0];
+    options.textured = shape.bsdf->texture_count() > 0;
+    if (raw.uv_source == UvSource::kNone) check_needs_no_uv(*shape.bsdf, raw, object);
+    shape.mesh = build_mesh(raw, options, &warnings_);
     scene_.shapes.push_back(std::move(shape));
   }
 
   const SceneDescription& description_;
   std::vector<std::string> unread_warnings_;
   std::vector<std::string>& warnings_;
-  BsdfMaker make_nested_;
+  Makers make_nested_;
   Scene scene_;
   std::map<const ObjectDescription*, std::shared_ptr<Bsdf>> bsdfs_;
   int bsdf_depth_ = 0;

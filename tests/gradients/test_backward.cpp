@@ -160,7 +160,7 @@ std::vector<std::string> texel_names(const Scene& scene, const Image& field,
 }
 
 Image random_field(const Scene& scene) {
-  const Environment::Map map = scene.environment ? scene.environment->map() : Environment::Map{};
+  const TexelMap::Map map = scene.environment ? scene.environment->map() : TexelMap::Map{};
   Image field(map.width, map.height, 3);
   for (size_t i = 0; i < field.data.size(); ++i) {
     field.data[i] = static_cast<float>(Rng(8, i, 0).uniform() - 0.5);

@@ -228,6 +228,60 @@ TEST(OtherScenes, OrthographicSensors) {
   EXPECT_THROW(find_parameter(scene, "a.translate.x"), InputError);
 }
 
+// A checkerboard asks for texture coordinates.
+std::string textured(const std::string& type, const std::string& file, const std::string& more) {
+  return "<shape type=\"" + type + "\"><string name=\"filename\" value=\"" + file + "\"/>" + more +
+         "<bsdf type=\"diffuse\"><texture name=\"reflectance\" "
+         "type=\"checkerboard\"/></bsdf></shape>";
+}
+
+std::array<float, 6> uv_of_face(const Mesh& mesh, size_t face) {
+  std::array<float, 6> uv;
+  for (size_t k = 0; k < 3; ++k) {
+    uv[2 * k] = mesh.uv_places[mesh.uv_ids[face][k]].x;
+    uv[2 * k + 1] = mesh.uv_places[mesh.uv_ids[face][k]].y;
+  }
+  return uv;
+}
+
+TEST(OtherScenes, TextureCoordinatesOfFiles) {
+  const TempFiles files;
+  const std::string corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
+  const std::string obj =
+      files.write("a.obj", corners + "vt 0.25 0.25\nvt 0.5 0.125 7\nf 1/1 2/-1 3/2\nf 1 2 4\n");
+  const std::string ply = files.write(
+      "a.ply",
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float "
+      "z\nproperty float t\nproperty float s\nelement face 1\nproperty list uchar int "
+      "vertex_index\nend_header\n0 0 0 0.5 0.25\n1 0 0 0 1\n0 1 0 2 3\n3 0 1 2\n");
+  const Scene scene =
+      read(textured("obj", obj, "") +
+           textured("obj", obj, "<boolean name=\"flip_tex_coords\" value=\"false\"/>") +
+           textured("ply", ply, "") +
+           textured("ply", ply, "<boolean name=\"flip_normals\" value=\"true\"/>") +
+           "<shape type=\"ply\"><string name=\"filename\" value=\"" + ply + "\"/></shape>");
+  using Uv = std::array<float, 6>;
+  EXPECT_EQ(uv_of_face(scene.shapes[0].mesh, 0), (Uv{0.25f, 0.75f, 0.5f, 0.875f, 0.5f, 0.875f}));
+  EXPECT_EQ(uv_of_face(scene.shapes[1].mesh, 0), (Uv{0.25f, 0.25f, 0.5f, 0.125f, 0.5f, 0.125f}));
+  EXPECT_EQ(uv_of_face(scene.shapes[1].mesh, 1), (Uv{}));  // corners without any
+  EXPECT_EQ(uv_of_face(scene.shapes[2].mesh, 0), (Uv{0.25f, 0.5f, 1, 0, 3, 2}));
+  EXPECT_EQ(uv_of_face(scene.shapes[3].mesh, 0), (Uv{0.25f, 0.5f, 3, 2, 1, 0}));
+  EXPECT_TRUE(scene.shapes[4].mesh.uv_ids.empty());  // nothing asks for them
+}
+
+TEST(OtherScenes, TextureCoordinatesThatCannotBe) {
+  const TempFiles files;
+  for (const char* number : {"nan", "inf", "1e38", "-1e300"}) {
+    const std::string obj = files.write(
+        "a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 " + std::string(number) + "\nf 1/1 2/1 3/1\n");
+    EXPECT_EQ(message_of(textured("obj", obj, "")),
+              obj + ": error: texture coordinate 0 (counted from 0) is not finite or beyond 1e9");
+    EXPECT_EQ(
+        message_of("<shape type=\"obj\"><string name=\"filename\" value=\"" + obj + "\"/></shape>"),
+        "no error");
+  }
+}
+
 TEST(OtherScenes, Cylinders) {
   const Scene scene = read(
       "<shape type=\"cylinder\"><point name=\"p0\" value=\"1,2,3\"/><point name=\"p1\" "

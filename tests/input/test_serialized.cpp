@@ -77,15 +77,19 @@ TEST(Serialized, FindsMeshesOfBothVersions) {
 
 TEST(Serialized, ReadsPastWhatIsNotUsed) {
   const TempFiles files;
-  const std::string arrays =
-      bytes(kCorners) + bytes(std::vector<float>{0, 0, 1, 0, 0, 1, 0, 0, 2}) +
-      bytes(std::vector<float>(6, 0.5f)) + bytes(std::vector<float>(9, 0.25f)) + kFace;
+  const std::string arrays = bytes(kCorners) +
+                             bytes(std::vector<float>{0, 0, 1, 0, 0, 1, 0, 0, 2}) +
+                             bytes(std::vector<float>{0, 0, 0.25f, 0.5f, 1, 1}) +
+                             bytes(std::vector<float>(9, 0.25f)) + kFace;
   const SerializedMesh read = parse_serialized(
       files.write("a", header(4) + compressed(body(4, 0x1000 | 1 | 2 | 8 | 16, 3, 1, arrays))), 0);
   EXPECT_TRUE(read.face_normals);
   ASSERT_EQ(read.mesh.normals.size(), 3u);
   EXPECT_EQ(read.mesh.normals[2].z, 2);
   EXPECT_EQ(read.mesh.normal_ids, read.mesh.faces);
+  EXPECT_EQ(read.mesh.uv_ids, read.mesh.faces);
+  ASSERT_EQ(read.mesh.uv_places.size(), 3u);
+  EXPECT_EQ(read.mesh.uv_places[1].x, 0.25f);
 }
 
 std::string message_of(const std::string& content, int64_t index = 0) {

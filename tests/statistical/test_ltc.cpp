@@ -102,7 +102,7 @@ TEST(LtcLobe, IntegratesToOne) {
 }
 
 std::shared_ptr<Bsdf> bsdf_of(const Case& c) {
-  if (c.lobe.model == &kHemisphere) return make_diffuse({1, 1, 1});
+  if (c.lobe.model == &kHemisphere) return make_diffuse(Rgb<double>{1, 1, 1});
   RoughConductorValues v;
   v.alpha = c.lobe.alpha;
   v.distribution = c.lobe.model == &ggx_lobe() ? RoughConductorValues::Distribution::kGgx

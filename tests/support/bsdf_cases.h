@@ -19,7 +19,7 @@ struct BsdfCase {
 // (F = 1) or as copper.
 inline std::vector<BsdfCase> bsdf_cases(bool copper) {
   std::vector<BsdfCase> cases;
-  cases.push_back({"diffuse", make_diffuse({0.2, 0.5, 0.9}), 1, false});
+  cases.push_back({"diffuse", make_diffuse(Rgb<double>{0.2, 0.5, 0.9}), 1, false});
   for (double alpha : {0.001, 0.01, 0.1, 0.5, 1.0}) {
     for (bool beckmann : {false, true}) {
       using Distribution = RoughConductorValues::Distribution;
@@ -29,7 +29,7 @@ inline std::vector<BsdfCase> bsdf_cases(bool copper) {
       if (copper) {
         v.eta = {0.2010, 0.9237, 1.1022};
         v.k = {3.9133, 2.4530, 2.1421};
-        v.specular_reflectance = {0.9, 0.7, 0.8};
+        v.specular_reflectance = Rgb<double>{0.9, 0.7, 0.8};
       }
       cases.push_back({(beckmann ? "beckmann " : "ggx ") + std::to_string(alpha),
                        make_roughconductor(v), alpha, beckmann});

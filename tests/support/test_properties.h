@@ -52,6 +52,7 @@ class TestProperties final : public Properties {
   }
   Matrix4 transform(const std::string& name) override { return get(name, Matrix4{}); }
   std::string file(const std::string& name) override { return get(name, std::string{}); }
+  std::shared_ptr<Texture> texture(const std::string&) override { return nullptr; }
   std::vector<std::shared_ptr<Bsdf>> bsdfs() override { return bsdfs_; }
 
  private:

@@ -425,7 +425,7 @@ TEST(Bsdf, DerivativesOfParametersMatchDifferences) {
 }
 
 TEST(Bsdf, CloneIsIndependent) {
-  const auto inner = make_diffuse({0.5, 0.5, 0.5});
+  const auto inner = make_diffuse(Rgb<double>{0.5, 0.5, 0.5});
   TestProperties properties("bsdf", "twosided", {}, {inner});
   const auto original = make_bsdf(properties);
   const auto copy = original->clone();
@@ -439,17 +439,17 @@ TEST(Bsdf, CloneIsIndependent) {
 }
 
 TEST(Bsdf, TwoSidedHasTwoSides) {
-  TestProperties single("bsdf", "twosided", {}, {make_diffuse({0.5, 0.5, 0.5})});
+  TestProperties single("bsdf", "twosided", {}, {make_diffuse(Rgb<double>{0.5, 0.5, 0.5})});
   const auto same = make_bsdf(single);
   EXPECT_EQ(same->side(true), same->side(false));
   EXPECT_EQ(same->parameters()[0].name, "reflectance");
   TestProperties pair("bsdf", "twosided", {},
-                      {make_diffuse({0.5, 0.5, 0.5}), make_roughconductor({})});
+                      {make_diffuse(Rgb<double>{0.5, 0.5, 0.5}), make_roughconductor({})});
   const auto both = make_bsdf(pair);
   EXPECT_EQ(both->side(true)->lobe().model, &kHemisphere);
   EXPECT_EQ(both->side(false)->lobe().model, &beckmann_lobe());
   EXPECT_EQ(both->parameters()[1].name, "back.alpha");
-  EXPECT_EQ(make_diffuse({})->side(false), nullptr);
+  EXPECT_EQ(make_diffuse(Rgb<double>{})->side(false), nullptr);
 }
 
 std::shared_ptr<Bsdf> read(const std::string& type,

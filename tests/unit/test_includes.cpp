@@ -103,7 +103,9 @@ struct Rooms {
 };
 const std::vector<Rooms>& all_rooms() {
   static const std::vector<Rooms> rooms = {
-      {"src", {"base", "regions", "mesh", "image", "bsdf", "light", "rays", "scene", "scene_file"}},
+      {"src",
+       {"base", "regions", "mesh", "image", "texture", "bsdf", "light", "rays", "scene",
+        "scene_file"}},
       {"edgetree",
        {"edges", "lobe", "light", "bounds", "forest", "quadric", "baselines", "rejection"}},
       {"integrators",
@@ -164,6 +166,9 @@ const Strings kContracts = {"check.h",
                             "displacement.h",
                             "normals_adjoint.h",
                             "lobe.h",
+                            "parameter_ref.h",
+                            "texel_map.h",
+                            "texture.h",
                             "bsdf.h",
                             "properties.h",
                             "image.h",
@@ -179,14 +184,16 @@ const Strings kContracts = {"check.h",
                             "coincident_faces.h",
                             "face_tree.h",
                             "surface_point.h",
+                            "textures_at.h",
                             "shading.h",
                             "lights.h",
                             "reverse.h",
                             "parameter.h"};
 const std::map<std::string, std::string> kSeenFrom = {
-    {"base", "properties.h"}, {"regions", "shadow_outlines.h"}, {"mesh", "normals_adjoint.h"},
-    {"image", "film.h"},      {"bsdf", "properties.h"},         {"light", "lights.h"},
-    {"rays", "face_tree.h"},  {"scene", "parameter.h"},         {"scene_file", "lights.h"}};
+    {"base", "properties.h"},  {"regions", "shadow_outlines.h"}, {"mesh", "normals_adjoint.h"},
+    {"image", "film.h"},       {"texture", "image.h"},           {"bsdf", "properties.h"},
+    {"light", "lights.h"},     {"rays", "face_tree.h"},          {"scene", "parameter.h"},
+    {"scene_file", "lights.h"}};
 
 TEST(Includes, ContractsOfCoreStandInOrder) {
   const std::string core = "limn/core/";

@@ -78,7 +78,7 @@ TEST(MeshView, TellsHiddenEdges) {
   Scene scene;
   scene.shapes.resize(1);
   scene.shapes[0].mesh = with_smooth_normals(icosphere_mesh(2));
-  scene.shapes[0].bsdf = make_diffuse({0.5, 0.5, 0.5});
+  scene.shapes[0].bsdf = make_diffuse(Rgb<double>{0.5, 0.5, 0.5});
   const EdgeMesh edges = build_edge_mesh(scene.shapes[0].mesh, true);
   const auto tracer = make_embree_tracer(scene, 1);
   const MeshView view(scene, *tracer, camera_for(edges.positions, {1, 2, 3}, {0, 1, 0}, 64), 1);

@@ -155,7 +155,7 @@ double ray_nanoseconds(const Mesh& mesh) {
   Scene scene;
   scene.shapes.resize(1);
   scene.shapes[0].mesh = mesh;
-  scene.shapes[0].bsdf = make_diffuse({0.5, 0.5, 0.5});
+  scene.shapes[0].bsdf = make_diffuse(Rgb<double>{0.5, 0.5, 0.5});
   const auto tracer = make_embree_tracer(scene, 1);
   Rng rng(3, 0, 0);
   const Bounds bounds = bounds_of(mesh);

@@ -36,7 +36,7 @@ Scene scene_of_mesh(const std::string& file) {
   scene.file = file;
   Shape shape;
   shape.mesh = read_mesh(file, false);
-  shape.bsdf = make_diffuse({0.5, 0.5, 0.5});
+  shape.bsdf = make_diffuse(Rgb<double>{0.5, 0.5, 0.5});
   scene.shapes.push_back(std::move(shape));
   return scene;
 }

@@ -227,11 +227,12 @@ std::map<std::string, std::string> fingerprints_of(const FitView& view,
   return all;
 }
 
-// The first view with that map of texels; null if the name is another kind of parameter.
-const Scene* with_map(const Fit& fit, const std::string& name) {
+// That map of texels in the first view that has it; null if the name is another kind of parameter.
+const TexelMap* with_map(const Fit& fit, const std::string& name) {
   for (const FitView& view : fit.views()) {
     try {
-      if (find_parameter_or_array(view.scene, name).array.size() == 3) return &view.scene;
+      const Parameter parameter = find_parameter_or_array(view.scene, name);
+      if (parameter.array.size() == 3) return parameter.texel_map(view.scene);
     } catch (const UnknownParameter&) {  // of another view
     }
   }
@@ -474,11 +475,11 @@ void FitFolder::add_snapshot(const Fit& fit, const RunSettings& settings, int sp
     snapshot["meshes"].push_back(mesh_figures(*shape, name + ".ply", settings.threads));
   }
   for (const std::string& name : arguments_.options.parameters) {
-    const Scene* scene = with_map(fit, name);
-    if (!scene) continue;
+    const TexelMap* map = with_map(fit, name);
+    if (!map) continue;
     std::string base = fmt::format("step_{:05}_{}", fit.steps(), file_part(name));
     while (!names.insert(base).second) base += "_";
-    const Image texels = scene->environment->texels();
+    const Image texels = map->texels();
     write_exr(file(base + ".exr"), texels, false, {});
     write_png(file(base + ".png"), texels, 1);
     snapshot["maps"].push_back({{"name", name}, {"file", base + ".exr"}});

@@ -1,8 +1,11 @@
 #pragma once
 // Scattering at a surface, seen from the front. All BSDFs are isotropic and opaque. They are
-// functions of world-space directions and the shading normal alone. No tangent frame enters, so
+// functions of world-space directions and the shading normal. No tangent frame enters, so
 // none can introduce a discontinuity.
-#include <limits>
+//
+// What varies over the surface comes as an argument `at`: the values of the BSDF's textures at the
+// point, texture_count() of them, texture(k) at index k. Constants are no part of it. A null `at`
+// lets the textures' means stand for them, where a density is wanted and the point is unknown.
 #include <memory>
 #include <optional>
 #include <span>
@@ -11,22 +14,44 @@
 
 #include "limn/core/dual.h"
 #include "limn/core/lobe.h"
+#include "limn/core/parameter_ref.h"
+#include "limn/core/texture.h"
 #include "limn/core/vec.h"
 
 namespace limn {
 
 class Properties;
 
-// A differentiable value of an object: "alpha", "reflectance", "radiance", ... A colour is
-// differentiated along grey: all channels change by the same amount. Channels never mix, so channel
-// c of the derivative image is the derivative with respect to channel c.
-struct ParameterRef {
-  std::string name;
-  std::vector<Dual*> values;  // one, or the three channels
-  enum class Unit { kValue, kLength, kRadians } unit = Unit::kValue;
-  // Range of valid values, inclusive; equal to the range that the scene reader accepts.
-  double least = -std::numeric_limits<double>::infinity();
-  double most = std::numeric_limits<double>::infinity();
+// At most so many textures of one BSDF.
+inline constexpr int kMostTextures = 12;
+
+// A colour of a BSDF. The BSDF asks for its value and does not know whether that is a constant,
+// which derivatives take, or a texture's.
+struct BsdfColour {
+  Rgb<Dual> constant;  // of a texture: its mean
+  double most = 1;     // of a texture: its largest value
+  int texture = -1;    // where its value stands in `at`; -1: it is constant
+
+  // at: see Bsdf; null: the mean.
+  template <class S>
+  Rgb<S> of(const Rgb<S>* at) const {
+    return at && texture >= 0 ? at[texture] : as<S>(constant);
+  }
+  // Upper bound of its channels.
+  double bound(const Rgb<double>* at = nullptr) const {
+    return texture >= 0 && !at ? most : max_channel(of<double>(at));
+  }
+};
+
+// The same of a number.
+struct BsdfNumber {
+  Dual constant;
+  int texture = -1;
+
+  template <class S>
+  S of(const Rgb<S>* at) const {
+    return at && texture >= 0 ? at[texture].r : as<S>(constant);
+  }
 };
 
 // The value of a BSDF and the density of `sample` for one pair of directions.
@@ -41,30 +66,35 @@ class Bsdf {
 
   // Value times |cos(n, wo)| [1/sr]. n: unit shading normal; wi: unit, towards the viewer,
   // n.wi > 0; wo: unit, towards the light. Zero if n.wo <= 0, and continuous there.
-  virtual Rgb<double> eval(const Vec3<double>& n, const Vec3<double>& wi,
-                           const Vec3<double>& wo) const = 0;
-  virtual Rgb<Dual> eval(const Vec3<Dual>& n, const Vec3<Dual>& wi, const Vec3<Dual>& wo) const = 0;
+  virtual Rgb<double> eval(const Vec3<double>& n, const Vec3<double>& wi, const Vec3<double>& wo,
+                           const Rgb<double>* at = nullptr) const = 0;
+  virtual Rgb<Dual> eval(const Vec3<Dual>& n, const Vec3<Dual>& wi, const Vec3<Dual>& wo,
+                         const Rgb<Dual>* at = nullptr) const = 0;
 
   // Density of `sample` with respect to solid angle [1/sr]; 0 if n.wo <= 0.
-  virtual double pdf_solid_angle(const Vec3d& n, const Vec3d& wi, const Vec3d& wo) const = 0;
+  virtual double pdf_solid_angle(const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
+                                 const Rgb<double>* at = nullptr) const = 0;
   // Both of the above, at little more than the cost of one.
-  virtual BsdfValue eval_with_pdf(const Vec3d& n, const Vec3d& wi, const Vec3d& wo) const = 0;
+  virtual BsdfValue eval_with_pdf(const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
+                                  const Rgb<double>* at = nullptr) const = 0;
   // Samples wo from two uniform numbers in [0, 1). Returns nothing if the sample falls below the
   // surface; pdf_solid_angle then integrates to less than 1 by that probability.
-  virtual std::optional<Vec3d> sample(const Vec3d& n, const Vec3d& wi, double u1,
-                                      double u2) const = 0;
+  virtual std::optional<Vec3d> sample(const Vec3d& n, const Vec3d& wi, double u1, double u2,
+                                      const Rgb<double>* at = nullptr) const = 0;
 
   // Batched versions for SIMD. An element's result does not depend on the other elements; it may
   // differ from the scalar functions by rounding.
   struct Evaluation {
     const Vec3d *n, *wi, *wo;
     BsdfValue* value;
+    const Rgb<double>* at = nullptr;
   };
   virtual void eval_with_pdf_each(std::span<const Evaluation> evaluations) const;
   struct Draw {
     const Vec3d *n, *wi;
     const double* u;  // two numbers in [0, 1)
     Vec3d* wo;        // zero if nothing was sampled
+    const Rgb<double>* at = nullptr;
   };
   virtual void sample_each(std::span<const Draw> draws) const;
 
@@ -73,32 +103,71 @@ class Bsdf {
   virtual const Bsdf* side(bool front) const { return front ? this : nullptr; }
 
   // True if no parameter of the pass changes this BSDF: `eval` on doubles is then exact where its
-  // arguments are constant, too. False is always a safe answer.
+  // arguments are constant, too (what `at` holds is one of them). False is always a safe answer.
   virtual bool is_constant() const { return false; }
 
-  // The summary that edge samplers use as importance. By default the hemisphere with albedo 1.
-  virtual LobeSummary lobe() const { return {}; }
+  // The summary that edge samplers use as importance. By default the hemisphere with albedo 1. With
+  // a null `at` its albedo bounds that at all points.
+  virtual LobeSummary lobe(const Rgb<double>* /*at*/ = nullptr) const { return {}; }
+  // Constants, and the values of textures that are not texels ("reflectance.color0").
   virtual std::vector<ParameterRef> parameters() = 0;
+
+  int texture_count() const { return texture_count_; }
+  // 0 <= k < texture_count(). Nested BSDFs' textures follow the BSDF's own.
+  virtual Texture& texture(int k) const { return *textures_[k]; }
+  // The name of the colour or number that texture k gives ("reflectance").
+  virtual std::string texture_name(int k) const { return texture_names_[k]; }
+  // at: of texture_count() elements.
+  template <class S>
+  void resolve(const TexturePoint<S>& point, Rgb<S>* at) const {
+    for (int k = 0; k < texture_count_; ++k) at[k] = texture(k).eval(point);
+  }
+
   virtual std::shared_ptr<Bsdf> clone() const = 0;  // deep
   // Nested BSDFs. deep_copy() uses them to preserve sharing.
   virtual std::span<std::shared_ptr<Bsdf>> nested() { return {}; }
   // One line of description, printed by `limn info`.
   virtual std::string describe() const = 0;
+
+ protected:
+  Bsdf() = default;
+  Bsdf(const Bsdf& other);  // copies textures
+  Bsdf& operator=(const Bsdf&) = delete;
+
+  // For constructors: keep the texture, if it is one, under this name.
+  BsdfColour colour(const char* name, const ConstantOrTexture& source);
+  BsdfNumber number(const char* name, const ConstantOrTexture& source);
+  // For parameters(): the constant, or what the texture has in its place.
+  void add_parameter(const char* name, BsdfColour& colour, double least, double most,
+                     std::vector<ParameterRef>& list);
+  void add_parameter(const char* name, BsdfNumber& number, double least, double most,
+                     std::vector<ParameterRef>& list);
+  // For describe(): "0.5 0.5 0.5", or what the texture says.
+  std::string text_of(const BsdfColour& colour) const;
+  std::string text_of(const BsdfNumber& number) const;
+
+  int texture_count_ = 0;  // those of nested BSDFs included
+
+ private:
+  void add_texture_parameters(int texture, std::vector<ParameterRef>& list);
+
+  std::vector<std::shared_ptr<Texture>> textures_;
+  std::vector<std::string> texture_names_;
 };
 
 // Creates the BSDF that an element describes. InputError for bad values and for an unknown type
 // (the message lists the known ones).
 std::shared_ptr<Bsdf> make_bsdf(Properties& properties);
-std::shared_ptr<Bsdf> make_diffuse(const Rgb<double>& reflectance);
+std::shared_ptr<Bsdf> make_diffuse(const ConstantOrTexture& reflectance);
 
 // A rough conductor. The defaults are Mitsuba's: eta = 0, k = 1 reflects all light at every angle.
 struct RoughConductorValues {
   enum class Distribution { kBeckmann, kGgx };
   Distribution distribution = Distribution::kBeckmann;
-  double alpha = 0.1;  // roughness of the microfacet distribution, not squared
+  ConstantOrTexture alpha = 0.1;  // roughness of the microfacet distribution, not squared
   Rgb<double> eta{0, 0, 0};
   Rgb<double> k{1, 1, 1};
-  Rgb<double> specular_reflectance{1, 1, 1};
+  ConstantOrTexture specular_reflectance = 1;
 };
 std::shared_ptr<Bsdf> make_roughconductor(const RoughConductorValues& values);
 

@@ -8,10 +8,11 @@
 
 #include "limn/core/image.h"
 #include "limn/core/light.h"
+#include "limn/core/texel_map.h"
 
 namespace limn {
 
-class Environment : public Light {
+class Environment : public Light, public TexelMap {
  public:
   // Radiance arriving from the unit direction d. The Dual version includes the derivatives of d (a
   // rotating camera) and of the environment's parameters. It is continuous in d.
@@ -79,27 +80,8 @@ class Environment : public Light {
 
   virtual std::vector<ParameterRef> parameters() = 0;  // constant: radiance; envmap: scale
 
-  // The texel map, in which radiance is linear; 0 by 0 if the environment has none, and then none
-  // of the functions below may be called. A map of a single row is stored as two equal rows.
-  struct Map {
-    int width = 0, height = 0;
-    double mean = 0;  // mean magnitude of the texels
-  };
-  virtual Map map() const { return {}; }
-  // Height by width by 3 texels, row 0 on top, without the map's scale factor.
-  virtual Image texels() const { return {}; }
-  // Replaces the texels, and the sampling density with them, as if read from a file. texels: of the
-  // same size, all finite.
-  virtual void set_texels(const Image& /*texels*/) {}
-  // Adds the texel derivatives `velocity` to derivative `lane` of the radiance.
-  virtual void add_texel_tangents(const Image& /*velocity*/, int /*lane*/) {}
-  // The radiance from the unit direction d is a weighted sum of four texels, with the same weights
-  // in all channels. texel: index in row-major order, from the top.
-  struct TexelWeight {
-    uint32_t texel;
-    double weight;
-  };
-  virtual std::array<TexelWeight, 4> texel_weights(const Vec3d& /*d*/) const { return {}; }
+  // The radiance from the unit direction d as a sum of texels, where there is a map.
+  virtual TexelWeights texel_weights(const Vec3d& /*d*/) const { return {}; }
 
   virtual std::shared_ptr<Environment> clone() const = 0;
   virtual std::string describe() const = 0;

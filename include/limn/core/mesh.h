@@ -43,6 +43,14 @@ enum class NormalSource {
   kGiven,     // vertex normals from the file; they follow rigid motions and stay fixed otherwise
 };
 
+// How texture coordinates follow from a mesh's `uv_places`, interpolated over a face.
+enum class UvSource : uint8_t {
+  kNone,    // there are none
+  kPlane,   // u = x, v = y
+  kSphere,  // place in the unit sphere: azimuth from +x over 2 pi, polar angle from +z over pi
+  kDisk,    // place in the unit disk: distance from the center, azimuth over 2 pi
+};
+
 // A mesh in world space. Positions are floats, so Embree, shading and edges use identical
 // vertices.
 struct Mesh {
@@ -57,6 +65,12 @@ struct Mesh {
   // vertex, equal for welded vertices; empty for kFace. Its interpolation bounds that angle at any
   // point (see shading.h).
   std::vector<double> horizon;
+
+  // Whether the shape's material reads textures. Where it does not, the next three are empty.
+  bool textured = false;
+  UvSource uv_source = UvSource::kNone;
+  std::vector<Vec3f> uv_places;
+  std::vector<FaceIndices> uv_ids;  // F by 3, into uv_places
 
   // Derivatives with respect to the parameters of the pass; empty where all are zero.
   std::vector<Vec3<Lanes>> position_tangents;  // V

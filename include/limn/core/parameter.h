@@ -17,6 +17,7 @@
 //   EMITTER.data                  an array, the H by W by 3 texels of an envmap, without its scale
 //   EMITTER.data.ROW.COLUMN.r|g|b one of them, counted from 0, row 0 on top
 //   EMITTER.data:FILE             moves every texel by the parameter times that of an EXR
+//   BSDF.NAME.data, ...           the same of the texture that gives a colour or number of a BSDF
 //   BSDF.NAME, EMITTER.NAME       see their parameters(); a colour: all channels alike
 //   BSDF.NAME.r|g|b, EMITTER.NAME.r|g|b  one channel of a colour
 //
@@ -110,7 +111,10 @@ struct Parameter {
   // one axis and scales add up, in any order.
   Parameter at(const ShapePose& pose) const;
 
-  // H by W by 3: derivatives of the environment's texels; empty if the parameter changes none.
+  // The texels that the parameter changes: of the environment or of a texture; null if none.
+  TexelMap* texel_map(Scene& scene) const;
+  const TexelMap* texel_map(const Scene& scene) const;
+  // H by W by 3: their derivatives; empty if the parameter changes none.
   Image texel_velocities(const Scene& scene, size_t component = 0) const;
 };
 
@@ -130,8 +134,8 @@ Parameter find_parameter_or_array(const Scene& scene, const std::string& name);
 // SHAPE.vertex_positions:FILE. Copies of a vertex must have equal vectors.
 Parameter vertex_field(const Scene& scene, ShapeId shape, std::vector<Vec3d> field);
 
-// A parameter that changes every texel of the environment map by its value in `field` (H by W by
-// 3), like EMITTER.data:FILE.
-Parameter texel_field(const Scene& scene, const Image& field);
+// A parameter that changes every texel of the array `texels` by its value in `field` (H by W by 3),
+// like EMITTER.data:FILE.
+Parameter texel_field(const Scene& scene, const Parameter& texels, const Image& field);
 
 }  // namespace limn

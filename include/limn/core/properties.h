@@ -16,6 +16,7 @@
 namespace limn {
 
 class Bsdf;
+class Texture;
 
 class Properties {
  public:
@@ -44,6 +45,8 @@ class Properties {
   // A file name resolved against the search path. InputError if the property is absent or no such
   // file exists.
   virtual std::string file(const std::string& name) = 0;
+  // The nested texture (or reference to one) of this name, made anew; null if there is none.
+  virtual std::shared_ptr<Texture> texture(const std::string& name) = 0;
   // Nested bsdf elements and references to bsdfs, in order.
   virtual std::vector<std::shared_ptr<Bsdf>> bsdfs() = 0;
 

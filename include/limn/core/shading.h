@@ -18,6 +18,7 @@
 
 #include "limn/core/slots.h"
 #include "limn/core/surface_point.h"
+#include "limn/core/textures_at.h"
 
 namespace limn {
 
@@ -33,12 +34,14 @@ class Scattering {
     bsdf_ = point.shape->bsdf->side(front_);
     if (!front_) n_ = -n_;
     if (!mitsuba && point.shape->mesh.normal_source != NormalSource::kFace) bend();
+    if (bsdf_ && bsdf_->texture_count() > 0) textures_.resolve(*bsdf_, point);
     if constexpr (std::is_same_v<S, Dual>) {
-      still_ = is_constant(n_) && is_constant(wi_) && bsdf_ && bsdf_->is_constant();
+      still_ = is_constant(n_) && is_constant(wi_) && bsdf_ && bsdf_->is_constant() &&
+               textures_.constant();
     }
     if constexpr (std::is_same_v<S, Var>) {
       copies_ = Tape::current()->slots()->bsdfs[point.face.shape.index()][front_];
-      still_ = is_constant(n_) && is_constant(wi_) && !copies_;
+      still_ = is_constant(n_) && is_constant(wi_) && !copies_ && textures_.constant();
     }
   }
 
@@ -47,19 +50,22 @@ class Scattering {
   const Bsdf& bsdf() const { return *bsdf_; }
   const Vec3<S>& normal() const { return n_; }
   const Vec3<S>& wi() const { return wi_; }
+  // The values of the BSDF's textures here (see Bsdf).
+  const Rgb<double>* at() const { return textures_.held(); }
+  LobeSummary lobe() const { return bsdf_->lobe(at()); }
 
   // Value times cosine [1/sr] for the unit direction wo towards the light: held fixed (double), or
   // moving as its Dual says (towards a delta light).
   template <class W>
   Rgb<S> eval(const Vec3<W>& wo) const {
     const Vec3<S> w{wo.x, wo.y, wo.z};
-    return detail::eval_bsdf<S>(*bsdf_, copies_, n_, wi_, w);
+    return detail::eval_bsdf<S>(*bsdf_, copies_, n_, wi_, w, textures_);
   }
   // The value of eval for a direction that is held, at the cost of plain numbers; to rounding.
   Rgb<double> eval_value(const Vec3d& wo) const { return eval_value(*bsdf_, wo); }
   // The same if the surface were of another material.
   Rgb<double> eval_value(const Bsdf& bsdf, const Vec3d& wo) const {
-    return bsdf.eval(value(n_), value(wi_), wo);
+    return bsdf.eval(value(n_), value(wi_), wo, at());
   }
   // The part of eval's derivative that comes from the motion of wo alone.
   Rgb<Lanes> eval_derivative(const Vec3<Dual>& wo) const {
@@ -75,7 +81,7 @@ class Scattering {
     return result;
   }
   double pdf_solid_angle(const Vec3d& wo) const {
-    return bsdf_->pdf_solid_angle(value(n_), value(wi_), wo);
+    return bsdf_->pdf_solid_angle(value(n_), value(wi_), wo, at());
   }
   // Both at once.
   struct Evaluation {
@@ -86,14 +92,14 @@ class Scattering {
     if constexpr (!std::is_same_v<S, double>) {
       if (!still_) return {eval(wo), pdf_solid_angle(wo)};
     }
-    return held(bsdf_->eval_with_pdf(value(n_), value(wi_), wo));
+    return held(bsdf_->eval_with_pdf(value(n_), value(wi_), wo, at()));
   }
   // From what the BSDF has there, without derivatives.
   static Evaluation held(const BsdfValue& f) {
     return {{S(f.value.r), S(f.value.g), S(f.value.b)}, f.pdf};
   }
   std::optional<Vec3d> sample(double u1, double u2) const {
-    return bsdf_->sample(value(n_), value(wi_), u1, u2);
+    return bsdf_->sample(value(n_), value(wi_), u1, u2, at());
   }
 
  private:
@@ -104,6 +110,7 @@ class Scattering {
     };
     wi_ = constant(wi_);
     n_ = constant(n_);
+    textures_.hold();
   }
   void bend() {
     const double limit = 0.01;  // e above; not tuned: any small number is continuous
@@ -113,6 +120,7 @@ class Scattering {
 
   Vec3<S> wi_, n_;
   const Bsdf* bsdf_ = nullptr;
+  TexturesAt<S> textures_;
   const SeededCopies<Bsdf>* copies_ = nullptr;  // Var: of bsdf_, if its parameters have slots
   bool front_ = false;
   bool still_ = false;  // no parameter of the pass moves it while wo is held (not for double)

@@ -48,9 +48,16 @@ struct SceneSlots {
   SeededCopies<Environment> environment;
   std::vector<std::pair<const DeltaLight*, SeededCopies<DeltaLight>>> lights;
   uint32_t camera = 0;  // the first of kCameraSlots
-  uint32_t texels = 0;  // first slot of the environment's texels, in row-major order; 0: constants
+  // Maps of which texels have slots, and the first of those (row-major order).
+  std::vector<std::pair<const TexelMap*, uint32_t>> texels;
 
   const MeshSlots& mesh(ShapeId shape) const { return meshes[shape.index()]; }
+  // The first slot of the map's texels; 0 if they are constants.
+  uint32_t of(const TexelMap* map) const {
+    for (const auto& [other, first] : texels)
+      if (other == map) return first;
+    return 0;
+  }
   const SeededCopies<DeltaLight>* of(const DeltaLight& light) const {
     for (const auto& [other, copies] : lights)
       if (other == &light) return &copies;
@@ -74,7 +81,7 @@ inline Vec3<Var> leaves(const Vec3d& v, uint32_t slot) {
 // partial derivatives from Duals.
 class Jacobian {
  public:
-  static constexpr int kMost = 64;  // limit on inputs
+  static constexpr int kMost = 128;  // limit on inputs
 
   void add(uint32_t node, double a, double b, double c) {
     if (node != 0) inputs_[count_++] = {node, {a, b, c}};
@@ -126,35 +133,6 @@ inline std::array<ChannelSlots, kLanes> leaves_of(const std::array<ChannelSlots,
   std::array<ChannelSlots, kLanes> nodes;
   for (int k = 0; k < kLanes; ++k) nodes[k] = leaves_of(slots[k]);
   return nodes;
-}
-
-// Bsdf::eval with derivatives with respect to its arguments and parameters. copies: null if the
-// parameters are constant.
-template <class S>
-Rgb<S> eval_bsdf(const Bsdf& bsdf, const SeededCopies<Bsdf>*, const Vec3<S>& n, const Vec3<S>& wi,
-                 const Vec3<S>& wo) {
-  return bsdf.eval(n, wi, wo);
-}
-template <>
-inline Rgb<Var> eval_bsdf<Var>(const Bsdf& bsdf, const SeededCopies<Bsdf>* copies,
-                               const Vec3<Var>& n, const Vec3<Var>& wi, const Vec3<Var>& wo) {
-  Jacobian jacobian;
-  std::optional<Rgb<double>> f;
-  const auto add = [&](const Vec3<Var>& x, const auto& eval) {
-    if (is_constant(x)) return;
-    const Rgb<Dual> moving = eval(along_axes(x));
-    jacobian.add(x, moving);
-    f = value(moving);
-  };
-  add(n, [&](const Vec3<Dual>& x) { return bsdf.eval(x, held(wi), held(wo)); });
-  add(wi, [&](const Vec3<Dual>& x) { return bsdf.eval(held(n), x, held(wo)); });
-  add(wo, [&](const Vec3<Dual>& x) { return bsdf.eval(held(n), held(wi), x); });
-  if (copies) {
-    for (const auto& copy : *copies) {
-      jacobian.add(leaves_of(copy.slots), copy.object->eval(held(n), held(wi), held(wo)));
-    }
-  }
-  return jacobian.result(f ? *f : bsdf.eval(value(n), value(wi), value(wo)));
 }
 
 // Emitted radiance of a shape.

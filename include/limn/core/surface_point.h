@@ -32,6 +32,8 @@ struct SurfacePoint {
   Vec3<S> n_s;  // unit shading normal, on the side of n_g unless the file's normals say otherwise
   // p is so far above the face that rays from there meet the face as any other.
   bool lifted = false;
+  // Barycentric coordinates of the face's second and third corner; set on textured meshes alone.
+  std::array<S, 2> b;
 
   // The face that rays from p skip, if any.
   FaceRef start() const { return lifted ? FaceRef{} : face; }
@@ -112,6 +114,7 @@ void interpolate_shading(const Mesh& mesh, const std::array<Vec3<P>, 3>& corners
   // stands for all.
   const bool wide = std::fabs(value(b1)) <= 2 && std::fabs(value(b2)) <= 2;
   if (!wide) b1 = b2 = S(1.0 / 3);
+  if (mesh.textured) point.b = {b1, b2};
   const std::array<S, 3> b = {1.0 - b1 - b2, b1, b2};
   const std::array<Vec3<S>, 3> n = corner_normals<S>(mesh, point.face.face);
   point.n_s = normalize(Vec3<S>{interpolate(b[0], b[1], b[2], n[0].x, n[1].x, n[2].x),
@@ -167,13 +170,18 @@ void place_on_plane(const Mesh& mesh, const Vec3<S>& origin, const Vec3<S>& dire
   point.p = origin + direction * t;
   const P over_length = 1.0 / length(n);
   point.n_g = value(n) * value(over_length);
-  if (mesh.normal_source == NormalSource::kFace) {
+  const bool flat = mesh.normal_source == NormalSource::kFace;
+  if (flat) {
     const Vec3<P> unit = n * over_length;
     point.n_s = {S(unit.x), S(unit.y), S(unit.z)};
-    return;
+    if (!mesh.textured) return;
   }
   const Vec3<S> q = point.p - corners[0];
   const P inverse = over_length * over_length;
+  if (flat) {
+    point.b = {dot(cross(q, e2), n) * inverse, dot(cross(e1, q), n) * inverse};
+    return;
+  }
   interpolate_shading<S, P>(mesh, corners, dot(cross(q, e2), n) * inverse,
                             dot(cross(e1, q), n) * inverse, 1 / value(over_length),
                             value(direction), lifts, point);
@@ -182,7 +190,8 @@ void place_on_plane(const Mesh& mesh, const Vec3<S>& origin, const Vec3<S>& dire
 // A point that no parameter moves.
 inline SurfacePoint<Dual> as_dual(const SurfacePoint<double>& point) {
   const auto still = [](const Vec3d& v) { return Vec3<Dual>{v.x, v.y, v.z}; };
-  return {point.shape, point.face, still(point.p), point.n_g, still(point.n_s), point.lifted};
+  return {point.shape,      point.face,   still(point.p),          point.n_g,
+          still(point.n_s), point.lifted, {point.b[0], point.b[1]}};
 }
 
 }  // namespace detail

@@ -131,7 +131,8 @@ struct FitState {
     std::vector<double> camera;               // origin, left, up, forward, fov
     std::vector<Shape> shapes;                // of those that are moved, in the scene's order
     std::vector<std::vector<double>> values;  // of each parameter but vertices; empty: it has none
-    std::vector<float> texels;  // H by W by 3, of a map that motions without values move
+    // H by W by 3 each, of the maps that motions without values move.
+    std::vector<float> texels;
   };
   std::vector<View> views;
 };

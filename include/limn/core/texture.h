@@ -1,0 +1,93 @@
+#pragma once
+// A number or colour that varies over a surface: looked up by texture coordinates, or interpolated
+// from attributes of the mesh.
+#include <array>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "limn/core/ids.h"
+#include "limn/core/mesh.h"
+#include "limn/core/parameter_ref.h"
+#include "limn/core/texel_map.h"
+
+namespace limn {
+
+class Properties;
+
+// A point of a face of a textured mesh. S: double or Dual.
+template <class S>
+struct TexturePoint {
+  const Mesh* mesh = nullptr;
+  FaceId face;
+  std::array<S, 2> b;   // barycentric coordinates of the face's second and third corner
+  std::array<S, 2> uv;  // texture coordinates of the surface, before a texture's own to_uv
+};
+
+// The point with its texture coordinates (0, 0 if the mesh has none).
+template <class S>
+TexturePoint<S> texture_point(const Mesh& mesh, FaceId face, const std::array<S, 2>& b);
+
+class Texture : public TexelMap {
+ public:
+  // Three channels; a texture of numbers (see for_numbers) gives one number three times.
+  virtual Rgb<double> eval(const TexturePoint<double>& point) const = 0;
+  virtual Rgb<Dual> eval(const TexturePoint<Dual>& point) const = 0;
+
+  // The same texture where one number is asked for (a roughness, a weight): colours give their
+  // luminance. It shares no mutable data with this one.
+  virtual std::shared_ptr<Texture> for_numbers() const = 0;
+  bool of_numbers() const { return of_numbers_; }
+
+  // The mean over texture coordinates, a stand-in where the point is unknown.
+  virtual Rgb<double> mean() const = 0;
+  // Range of the values over all channels and points.
+  struct Range {
+    double least, most;
+  };
+  virtual Range range() const = 0;
+  // Whether `eval` reads texture coordinates, not only barycentric ones.
+  virtual bool needs_uv() const { return true; }
+
+  // The weights of texels at a point, where there are texels. For numbers the luminance of the
+  // weighted sum is looked up.
+  virtual TexelWeights texel_weights(const TexturePoint<double>& /*point*/) const { return {}; }
+
+  // Where `eval` jumps on a face whose corners have these texture coordinates: adds line segments
+  // by their ends' barycentric coordinates (of the second and third corner). False if there would
+  // be more than `most` in the list.
+  struct Jump {
+    std::array<double, 2> from, to;
+  };
+  virtual bool add_jumps(const std::array<std::array<double, 2>, 3>& /*uv*/, size_t /*most*/,
+                         std::vector<Jump>& /*jumps*/) const {
+    return true;
+  }
+  // Whether texture coordinates that differ by integers look up the same value.
+  virtual bool has_period_one() const { return false; }
+
+  // Values other than texels that derivatives take.
+  virtual std::vector<ParameterRef> parameters() = 0;
+  virtual std::shared_ptr<Texture> clone() const = 0;
+  // One phrase, part of what `limn info` prints of a BSDF.
+  virtual std::string describe() const = 0;
+
+ protected:
+  bool of_numbers_ = false;
+};
+
+// Creates the texture that an element describes. InputError for bad values and for an unknown type
+// (the message lists the known ones).
+std::shared_ptr<Texture> make_texture(Properties& properties);
+
+// What a scene gives for a colour or a number: a constant, or a texture (then `constant` is
+// unused).
+struct ConstantOrTexture {
+  ConstantOrTexture(const Rgb<double>& c) : constant(c) {}                  // NOLINT: either is one
+  ConstantOrTexture(double c) : constant(grey(c)) {}                        // NOLINT
+  ConstantOrTexture(std::shared_ptr<Texture> t) : texture(std::move(t)) {}  // NOLINT
+  Rgb<double> constant;
+  std::shared_ptr<Texture> texture;
+};
+
+}  // namespace limn
