@@ -15,7 +15,8 @@
 //   delta(G) domega = m(t) |cos_x| / r^2 dt,   m(t) = |x - l| / (|w| |n . w|),   1 / |n . d| at
 // infinity, which follows from dx/dt = m n x (dw/dt x w) (and |n x N| is G's slope on the surface).
 // Where rays start above the surface, L H(G) has G of the point that x is lifted to, and m is
-// |dx/dt| over G's slope by x.
+// |dx/dt| over G's slope by x. The line through y meets lifted points several times before a face
+// blocks it (lifted_faces.h); each is a shadow's edge.
 //
 // Near a vertex q samples go with 1 / r^2, and points drawn as the light sees the edges would make
 // them rare and huge. So most points are drawn as the vertex sees the shadows (shadow_pieces.h),
@@ -138,7 +139,7 @@ BoundaryForm ShadowTerm::sweep(const ShadowEdge& edge, const ShadowPoint& point,
   form.add_edge(mesh, edge.id, 1, of_e);
   form.add_light(*edge.light, origin.infinite ? of_w : -of_w);
   const double cosine = form.add_seen_point(context_.scene, point.face, sight.omega, normal);
-  form.scale = point.m * cosine / (sight.distance * sight.distance) * scale;
+  form.scale = point.m * cosine / (sight.distance * sight.distance * point.probability) * scale;
   return form;
 }
 
@@ -184,7 +185,7 @@ void ShadowTerm::add_sample(const Viewer& viewer, const ShadowDraw& draw, const 
   TermCost& cost = sink.cost();
   const ShadowEdge& edge = edges_.edge(draw.edge);
   RayCount rays;
-  const auto point = edges_.cast(edge, draw.t, rays);
+  const auto point = edges_.cast(edge, draw.t, key, rays);
   cost.add(rays);
   if (!point) {
     ++cost.occluded;
@@ -238,7 +239,7 @@ void ShadowTerm::add_seen(double u, double share, const Rng& key, FilmSink& sink
   const uint32_t chosen = edges_.choose(u);
   const ShadowEdge& edge = edges_.edge(chosen);
   RayCount rays;
-  const auto point = edges_.cast(edge, key.at(Purpose::kShadow, 0).uniform(), rays);
+  const auto point = edges_.cast(edge, key.at(Purpose::kShadow, 0).uniform(), key, rays);
   sink.cost().add(rays);
   if (!point) return;
   const auto seen = film_point(context_.scene, point->face, point->x);
@@ -264,7 +265,7 @@ void ShadowTerm::add_line(double u, const Rng& key, FilmSink& sink) const {
   Rng rng = key.at(Purpose::kShadow, 0);
   const double t = rng.uniform(), u_0 = rng.uniform(), u_1 = rng.uniform();
   RayCount rays;
-  const auto point = edges_.cast(edge, t, rays);
+  const auto point = edges_.cast(edge, t, key, rays);
   const auto vertex = point ? lines_.draw(edge, *point, u_0, u_1, rays) : std::nullopt;
   sink.cost().add(rays);
   if (!vertex || !sink.at(vertex->seen.x, vertex->seen.y)) return;

@@ -62,89 +62,6 @@ double depth_of(const std::array<Vec3d, 3>& corners, const Vec3d& x) {
   return least;
 }
 
-// A face with what its points are lifted to on the side that light along w comes from.
-class LiftedFace {
- public:
-  // A point of the face and what it is lifted to, with derivatives of that by the barycentric
-  // coordinates b1 and b2 of x, and the line's parameter there.
-  struct Point {
-    double b1, b2, s;
-    Vec3d x, p, by_1, by_2;
-    bool inside;
-  };
-
-  LiftedFace(const Mesh& mesh, FaceId face, const Vec3d& w)
-      : corners_(face_corners<double>(mesh, face)),
-        normals_(detail::corner_normals<double>(mesh, face)),
-        e1_(corners_[1] - corners_[0]),
-        e2_(corners_[2] - corners_[0]),
-        size_(length(cross(e1_, e2_))),
-        n_(cross(e1_, e2_) / size_),
-        side_(dot(n_, w) < 0 ? 1 : -1) {}
-
-  const std::array<Vec3d, 3>& corners() const { return corners_; }
-
-  // By Newton's method from the middle; none if it does not end.
-  std::optional<Point> meet(const ShadowLine& line) const {
-    constexpr int kMostSteps = 20;
-    constexpr double kStep = 1e-12, kBeyond = 1e-9;  // of barycentric coordinates
-    double b1 = 1.0 / 3, b2 = 1.0 / 3;
-    for (int i = 0; i < kMostSteps; ++i) {
-      Point at = point(b1, b2);
-      const Vec3d step = solve(at, line.w, line.y - at.p);
-      if (!std::isfinite(step.x + step.y + step.z)) return {};
-      at.s = -step.z;
-      at.inside = b1 >= -kBeyond && b2 >= -kBeyond && b1 + b2 <= 1 + kBeyond;
-      if (std::fabs(step.x) + std::fabs(step.y) <= kStep) return at;
-      // Lifts mean nothing far from the face.
-      b1 = std::clamp(b1 + step.x, -0.5, 1.5);
-      b2 = std::clamp(b2 + step.y, -0.5, 1.5);
-      if (i + 1 == kMostSteps) {
-        at.inside = false;
-        return at;
-      }
-    }
-    return {};
-  }
-
-  // The m of ShadowPoint: |dx/dt| over the slope of G on the face.
-  double measure(const ShadowLine& line, const Point& at) const {
-    const Vec3d moves = solve(at, line.w, line.along * (line.infinite ? 1 : 1 + at.s));
-    const Vec3d normal = cross(line.w0, line.along);
-    return size_ * std::hypot(moves.x, moves.y) /
-           std::hypot(dot(normal, at.by_1), dot(normal, at.by_2));
-  }
-
- private:
-  Point point(double b1, double b2) const {
-    const std::array<double, 3> b = {1 - b1 - b2, b1, b2};
-    Point at{b1, b2, 0, corners_[0] + e1_ * b1 + e2_ * b2, {}, e1_, e2_, false};
-    std::array<double, 3> depth;
-    for (int k = 0; k < 3; ++k) depth[k] = dot(at.x - corners_[k], normals_[k]);
-    const detail::Lift lift = detail::lift_of(normals_, b, depth, n_, side_, size_, at.x);
-    at.p = at.x;
-    for (int k = 0; k < 3; ++k) {
-      const Vec3d n = normals_[k] * lift.gain[k];
-      at.p += n * (b[k] * depth[k]);
-      at.by_1 += n * ((k == 0 ? -1 : k == 1) * depth[k] + b[k] * dot(normals_[k], e1_));
-      at.by_2 += n * ((k == 0 ? -1 : k == 2) * depth[k] + b[k] * dot(normals_[k], e2_));
-    }
-    return at;
-  }
-  // (a, b, c) with by_1 a + by_2 b + w c = v.
-  static Vec3d solve(const Point& at, const Vec3d& w, const Vec3d& v) {
-    const double d = determinant(at.by_1, at.by_2, w);
-    return {determinant(v, at.by_2, w) / d, determinant(at.by_1, v, w) / d,
-            determinant(at.by_1, at.by_2, v) / d};
-  }
-
-  std::array<Vec3d, 3> corners_, normals_;
-  Vec3d e1_, e2_;
-  double size_;  // twice the area
-  Vec3d n_;
-  double side_;
-};
-
 }  // namespace
 
 Vec3<Dual> moving_vertex(const EdgeMesh& mesh, VertexId vertex) {
@@ -155,7 +72,7 @@ Vec3<Dual> moving_vertex(const EdgeMesh& mesh, VertexId vertex) {
 }
 
 ShadowEdges::ShadowEdges(const PathContext& context, const EdgeSamplerInput& input, int lanes)
-    : context_(context), input_(input) {
+    : context_(context), input_(input), lifted_(context.scene) {
   const Stopwatch watch;
   reach_ = 2 * bounds_of(context_.scene).diagonal();
   for (uint32_t i = 0; i < context_.scene.delta_lights.size(); ++i) {
@@ -218,7 +135,7 @@ void ShadowEdges::weigh(size_t first, int lanes) {
   }
 }
 
-std::optional<ShadowPoint> ShadowEdges::cast(const ShadowEdge& edge, double t,
+std::optional<ShadowPoint> ShadowEdges::cast(const ShadowEdge& edge, double t, const Rng& key,
                                              RayCount& rays) const {
   const EdgeMesh& mesh = input_.object(edge.id.object);
   const auto& ends = mesh.edge(edge.id.edge).vertices;
@@ -238,50 +155,70 @@ std::optional<ShadowPoint> ShadowEdges::cast(const ShadowEdge& edge, double t,
   // Where the edge touches what it shades, to a float's rounding, the shadow starts behind the edge
   // for every viewer, who sees the edge itself.
   const bool found = closest_at_edge(context_.tracer, context_.scene, around, y, before, ray, hit);
-  if (!found || hit.t <= before * (1 + 0x1p-20)) return {};
-  if (is_lifted(context_.scene, hit.face.shape)) {
-    const Vec3d along = mesh.position(ends[1]) - mesh.position(ends[0]);
-    ray.t_min = before;
-    return cast_on_lifted({y, w, along, origin.through(mesh.position(ends[0])), origin.infinite},
-                          ray, hit.face, rays);
+  if (found && hit.t <= before * (1 + 0x1p-20)) return {};
+  if (!found && lifted_.empty()) return {};
+  std::optional<ShadowPoint> on_face;
+  const Vec3d y0 = mesh.position(ends[0]);
+  const ShadowLine line{y, w, mesh.position(ends[1]) - y0, origin.through(y0), origin.infinite};
+  if (found && !lifted_.has(hit.face)) {
+    on_face = cast_on_face(line, hit.face, ray.origin + ray.direction * hit.t);
   }
-  const auto c = face_corners<double>(context_.scene.shape(hit.face.shape).mesh, hit.face.face);
-  const Vec3d n = normalize(cross(c[1] - c[0], c[2] - c[0]));
-  const double slope = dot(n, w);
-  const double s = dot(n, c[0] - y) / slope;
-  const double m = (origin.infinite ? 1 : 1 + s) / std::fabs(slope);
-  if (!std::isfinite(m)) return {};
-  const Vec3d inside = ray.origin + ray.direction * hit.t;
-  const Vec3d center = (c[0] + c[1] + c[2]) * (1.0 / 3);
-  const Vec3d x = y + w * s;
-  return ShadowPoint{hit.face, x, x, m, inside, depth_of(c, inside), center, depth_of(c, center)};
+  if (lifted_.empty()) return on_face;
+  const double end = found ? hit.t * (1 + 0x1p-20) : before + reach_;
+  return choose_crossing(line, (end - before) / length(w), on_face,
+                         key.at(Purpose::kShadow, 1).uniform());
 }
 
-// Where the line meets the lifted points of a face or of one near it: by Newton's method on a face,
-// and on the face that a ray meets from where the lift is taken back.
-std::optional<ShadowPoint> ShadowEdges::cast_on_lifted(const ShadowLine& line, const Ray& ray,
-                                                       FaceRef face, RayCount& rays) const {
-  constexpr int kMostFaces = 4;
-  for (int i = 0; i < kMostFaces; ++i) {
-    const LiftedFace lifted(context_.scene.shape(face.shape).mesh, face.face, line.w);
-    const auto found = lifted.meet(line);
-    if (!found) return {};
-    if (found->inside) {
-      const double m = lifted.measure(line, *found);
-      if (!std::isfinite(m)) return {};
-      const auto& c = lifted.corners();
-      const Vec3d x = found->x, center = (c[0] + c[1] + c[2]) * (1.0 / 3);
-      return ShadowPoint{face, x, found->p, m, x, depth_of(c, x), center, depth_of(c, center)};
-    }
-    Ray back = ray;
-    back.origin = ray.origin - (found->p - found->x);
-    Hit hit;
-    ++rays.closest;
-    if (!context_.tracer.closest(back, hit) || hit.face == face) return {};
-    if (!is_lifted(context_.scene, hit.face.shape)) return {};
-    face = hit.face;
+std::optional<ShadowPoint> ShadowEdges::cast_on_face(const ShadowLine& line, FaceRef face,
+                                                     const Vec3d& inside) const {
+  const auto c = face_corners<double>(context_.scene.shape(face.shape).mesh, face.face);
+  const Vec3d n = normalize(cross(c[1] - c[0], c[2] - c[0]));
+  const double slope = dot(n, line.w);
+  const double s = dot(n, c[0] - line.y) / slope;
+  const double m = (line.infinite ? 1 : 1 + s) / std::fabs(slope);
+  if (!std::isfinite(m)) return {};
+  const Vec3d center = (c[0] + c[1] + c[2]) * (1.0 / 3);
+  const Vec3d x = line.y + line.w * s;
+  return ShadowPoint{face, x, x, m, inside, depth_of(c, inside), center, depth_of(c, center), 0};
+}
+
+// Light grazes lifted points without meeting a face, and leaves those behind the edge itself: the
+// shadow falls on all that the line meets before a face blocks it. One of them is taken by what it
+// receives of the light, a tenth by chance alone. Not tuned.
+std::optional<ShadowPoint> ShadowEdges::choose_crossing(const ShadowLine& line, double s_max,
+                                                        std::optional<ShadowPoint> on_face,
+                                                        double u) const {
+  static thread_local std::vector<LiftedCrossing> found;
+  lifted_.cross(line, s_max, found);
+  if (found.empty()) return on_face;
+  double sum = 0;
+  // m times the cosine of light on a flat face.
+  const double plain = on_face
+                           ? (line.infinite ? 1 : length(on_face->x - line.y) + length(line.w)) /
+                                 length_squared(line.w)
+                           : 0;
+  const auto received = [](const LiftedCrossing& c) { return c.m * std::max(c.cosine, 0.0); };
+  for (const LiftedCrossing& crossing : found) sum += received(crossing);
+  sum += plain;
+  const double each = 1.0 / static_cast<double>(found.size() + (on_face ? 1 : 0));
+  const auto share = [&](double amount) {
+    return sum > 0 ? 0.9 * amount / sum + 0.1 * each : each;
+  };
+  u -= (on_face ? share(plain) : 0);
+  if (on_face && u < 0) {
+    on_face->probability = share(plain);
+    return on_face;
   }
-  return {};
+  size_t i = 0;
+  while (i + 1 < found.size() && (u -= share(received(found[i]))) >= 0) ++i;
+  const LiftedCrossing& at = found[i];
+  const auto c = face_corners<double>(context_.scene.shape(at.face.shape).mesh, at.face.face);
+  const Vec3d center = (c[0] + c[1] + c[2]) * (1.0 / 3);
+  return ShadowPoint{at.face, at.x,
+                     at.p,    at.m,
+                     at.x,    depth_of(c, at.x),
+                     center,  depth_of(c, center),
+                     at.side, share(received(at))};
 }
 
 Rgb<double> ShadowEdges::jump(const ShadowEdge& edge, const ShadowPoint& point, const Vec3d& q,
@@ -291,6 +228,8 @@ Rgb<double> ShadowEdges::jump(const ShadowEdge& edge, const ShadowPoint& point, 
   const Scattering<double> scattering(surface, -omega, scene.shading);
   const auto arrival = edge.light->arriving(point.lit);
   if (scattering.black() || !arrival) return {};
+  const double along = dot(surface.n_g, omega);
+  if (point.side * along > 0) return {};  // the other side is lifted otherwise
   if (std::fabs(dot(surface.n_g, arrival->wo)) <= kEdgeOn) return {};
   return scattering.eval(arrival->wo) * arrival->irradiance * edge.sign;
 }

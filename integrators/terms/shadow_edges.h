@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "integrators/paths/path.h"
+#include "integrators/terms/lifted_faces.h"
 #include "limn/core/discrete_distribution.h"
 #include "limn/edgetree/edge_sampler.h"
 
@@ -34,6 +35,8 @@ struct ShadowPoint {
   double depth;
   Vec3d center;
   double center_depth;
+  double side;             // 1, -1: seen from outside, inside alone; 0: from both
+  double probability = 1;  // of this point, among all where the shadow of the edge's point falls
 
   // Where a viewer at q sends a ray to learn whether x is seen: on the face, and off its sides by
   // more than a ray ends before it, so that a neighbour at whose edge x lies may hide it.
@@ -42,14 +45,6 @@ struct ShadowPoint {
     return depth >= wanted ? inside
                            : inside + (center - inside) * std::min(1.0, wanted / center_depth);
   }
-};
-
-// The line from a light through a point y of an edge, on behind it: y + s w.
-struct ShadowLine {
-  Vec3d y, w;
-  Vec3d along;    // the edge
-  Vec3d w0;       // w at its first end
-  bool infinite;  // w is the same all along the edge
 };
 
 // Of an edge mesh, with its tangents.
@@ -70,19 +65,24 @@ class ShadowEdges {
   // sees it.
   uint32_t choose(double u) const { return static_cast<uint32_t>(choice_.sample(u).index); }
   double probability(uint32_t i) const { return choice_.probability(i); }
-  std::optional<ShadowPoint> cast(const ShadowEdge& edge, double t, RayCount& rays) const;
+  // One of the points where the shadow of the edge's point at t falls. key: chooses it.
+  std::optional<ShadowPoint> cast(const ShadowEdge& edge, double t, const Rng& key,
+                                  RayCount& rays) const;
   // dL of the point as it is seen from q along the unit direction omega.
   Rgb<double> jump(const ShadowEdge& edge, const ShadowPoint& point, const Vec3d& q,
                    const Vec3d& omega) const;
 
  private:
-  std::optional<ShadowPoint> cast_on_lifted(const ShadowLine& line, const Ray& ray, FaceRef face,
-                                            RayCount& rays) const;
+  std::optional<ShadowPoint> cast_on_face(const ShadowLine& line, FaceRef face,
+                                          const Vec3d& inside) const;
+  std::optional<ShadowPoint> choose_crossing(const ShadowLine& line, double s_max,
+                                             std::optional<ShadowPoint> on_face, double u) const;
   void list(uint32_t light, ShapeId object);
   void weigh(size_t first, int lanes);
 
   const PathContext& context_;
   const EdgeSamplerInput& input_;
+  LiftedFaces lifted_;
   double reach_ = 0;  // longer than any line through the scene
   std::vector<ShadowEdge> edges_;
   DiscreteDistribution choice_;  // of an edge

@@ -138,8 +138,8 @@ std::span<const uint32_t> BoxTree::leaf(uint32_t leaf) const {
   return {&order_[begin], end - begin};
 }
 
-void BoxTree::find_leaves(const FloatBox& box, uint32_t first,
-                          std::vector<uint32_t>& leaves) const {
+template <class Meets>
+void BoxTree::find_leaves(uint32_t first, const Meets& meets, std::vector<uint32_t>& leaves) const {
   leaves.clear();
   if (leaves_ == 0) return;
   std::array<Part, 64> stack;  // depth is bounded: the tree is balanced
@@ -147,7 +147,7 @@ void BoxTree::find_leaves(const FloatBox& box, uint32_t first,
   stack[depth++] = {0, 0, leaves_};
   while (depth > 0) {
     const Part part = stack[--depth];
-    if (part.first + part.count <= first || !nodes_[part.node].overlaps(box)) continue;
+    if (part.first + part.count <= first || !meets(nodes_[part.node])) continue;
     if (part.count == 1) {
       leaves.push_back(part.first);
       continue;
@@ -155,6 +155,31 @@ void BoxTree::find_leaves(const FloatBox& box, uint32_t first,
     stack[depth++] = part.right();
     stack[depth++] = part.left();
   }
+}
+
+void BoxTree::find_leaves(const FloatBox& box, uint32_t first,
+                          std::vector<uint32_t>& leaves) const {
+  find_leaves(
+      first, [&](const FloatBox& node) { return node.overlaps(box); }, leaves);
+}
+
+void BoxTree::find_leaves(const Vec3d& from, const Vec3d& along, double s_max,
+                          std::vector<uint32_t>& leaves) const {
+  const auto meets = [&](const FloatBox& node) {
+    double low = 0, high = s_max;
+    for (int k = 0; k < 3; ++k) {
+      if (along[k] == 0) {
+        if (from[k] < node.lower[k] || from[k] > node.upper[k]) return false;
+        continue;
+      }
+      const double a = (node.lower[k] - from[k]) / along[k];
+      const double b = (node.upper[k] - from[k]) / along[k];
+      low = std::max(low, std::min(a, b));
+      high = std::min(high, std::max(a, b));
+    }
+    return low <= high;
+  };
+  find_leaves(0, meets, leaves);
 }
 
 }  // namespace limn

@@ -57,14 +57,15 @@ Scene penumbra_scene(const TempFiles& files, double size) {
 }
 
 // Lights without extent, over a floor.
-Scene shadow_scene(const TempFiles& files) {
+Scene shadow_scene(const TempFiles& files, bool face_normals) {
   SceneParts parts;
   parts.max_depth = 3;
   parts.origin = {0, 3, 4};
   const std::string mesh = write_mesh(files, "body.obj", shaken(torus_mesh(8, 5)));
-  parts.body = square("floor", 3, -90, {0, 0, 0}, conductor("gloss", 0.4)) +
-               obj_shape("body", mesh, true, 0.6, {0, 0.9, 0}, diffuse("clay", ".6, .5, .4")) +
-               R"(<emitter type="point" id="bulb"><point name="position" value="1, 4, 1"/>
+  parts.body =
+      square("floor", 3, -90, {0, 0, 0}, conductor("gloss", 0.4)) +
+      obj_shape("body", mesh, face_normals, 0.6, {0, 0.9, 0}, diffuse("clay", ".6, .5, .4")) +
+      R"(<emitter type="point" id="bulb"><point name="position" value="1, 4, 1"/>
                     <rgb name="intensity" value="20, 18, 16"/></emitter>
                   <emitter type="spot" id="spot"><float name="cutoff_angle" value="40"/>
                     <transform name="to_world"><lookat origin="-2, 3, 1" target="0, 0, 0" up="0, 0, 1"/>
@@ -245,7 +246,7 @@ TEST(Backward, InteriorIsThatOfForwardMode) {
   const TempFiles files;
   expect_same_interior(mirror_scene(files, true));
   expect_same_interior(mirror_scene(files, false));
-  expect_same_interior(shadow_scene(files));
+  expect_same_interior(shadow_scene(files, true));
   expect_same_interior(crossing_scene(files));
   expect_same_interior(lamps_scene(files), "analytic");
 }
@@ -468,7 +469,8 @@ TEST(Backward, AgreesWithBrightPatches) {
 
 TEST(Backward, AgreesInSharpShadows) {
   const TempFiles files;
-  expect_agreement(shadow_scene(files), 64);
+  for (const bool face_normals : {true, false})
+    expect_agreement(shadow_scene(files, face_normals), 64);
 }
 
 TEST(Backward, AgreesWhereShapesCrossAndAreCut) {
@@ -527,7 +529,7 @@ void expect_the_same_bits(const Scene& scene) {
 
 TEST(Backward, ThreadsChangeNoBit) {
   const TempFiles files;
-  expect_the_same_bits(shadow_scene(files));
+  expect_the_same_bits(shadow_scene(files, false));
   expect_the_same_bits(mirror_scene(files, false, 2));
 }
 

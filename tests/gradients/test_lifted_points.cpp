@@ -156,6 +156,33 @@ TEST(LiftedPoints, MeetAtEdges) {
   EXPECT_GT(edges, 50);
 }
 
+// Flat strips with narrow grooves: normals are upright at two corners of a face and lean at the
+// third, and rays meet faces at their very sides.
+TEST(LiftedPoints, NoPixelIsNegative) {
+  const TempFiles files;
+  std::string text;
+  constexpr int kColumns = 31;
+  for (const int z : {1, -1})
+    for (int i = 0; i < kColumns; ++i)
+      text += fmt::format("v {} {} {}\n", (i - 15) / 15.0, i % 5 == 4 ? -0.03 : 0, z);
+  for (int i = 1; i < kColumns; ++i) {
+    text += fmt::format("f {} {} {}\nf {} {} {}\n", i, i + 1, i + kColumns + 1, i, i + kColumns + 1,
+                        i + kColumns);
+  }
+  SceneParts parts;
+  parts.origin = {0.03, 4, 0.5};
+  parts.target = {0, 0, 0};
+  parts.fov = 25;
+  parts.width = parts.height = 32;
+  parts.body = obj_shape("strips", files.write("strips.obj", text), false, 1, {},
+                         diffuse("grey", "0.5, 0.5, 0.5")) +
+               constant_light("sky", "1, 1, 1");
+  RunSettings settings;
+  settings.spp = 64;
+  const Moments image = render(make_scene(files, parts), settings).radiance;
+  for (size_t i = 0; i < image.size(); ++i) EXPECT_GE(image.mean(i), 0) << i;
+}
+
 // kind: which body; both over a floor, between sky, lamp and bulb.
 Scene round_scene(const TempFiles& files, const std::string& kind, const std::string& lights) {
   SceneParts parts;
@@ -163,9 +190,12 @@ Scene round_scene(const TempFiles& files, const std::string& kind, const std::st
   parts.origin = {1.6, 2.4, 4.2};
   parts.target = {0, 0.5, 0};
   const std::string clay = diffuse("clay", "0.7, 0.5, 0.3");
+  if (kind == "back") parts.origin = {-0.6, 0.5, -3.4};
   const std::string body =
-      kind == "box"
-          ? obj_shape("body", bevelled_box(files), false, 0.6, {0, 0.8, 0}, clay)
+      kind == "box" ? obj_shape("body", bevelled_box(files), false, 0.6, {0, 0.8, 0}, clay)
+      : kind == "ball"
+          ? obj_shape("body", write_mesh(files, "ball.obj", icosphere_mesh(1)), false, 0.8,
+                      {0, 1, 0}, clay)
           : obj_shape(
                 "body",
                 write_mesh(
@@ -178,6 +208,9 @@ Scene round_scene(const TempFiles& files, const std::string& kind, const std::st
   return make_scene(files, parts);
 }
 
+const char* kSun =
+    R"(<emitter type="directional" id="sun"><vector name="direction" value="-0.6, -1, 0.5"/>
+       <rgb name="irradiance" value="3,2.8,2.5"/></emitter>)";
 const char* kBulb =
     R"(<emitter type="point" id="bulb"><point name="position" value="1.2,2.6,1.1"/>
        <rgb name="intensity" value="9,8,7"/></emitter>)";
@@ -190,6 +223,7 @@ TEST_P(LiftedDerivatives, AgreeWithDifferences) {
   const TempFiles files;
   const std::string lights =
       light == "bulb"  ? std::string(kBulb)
+      : light == "sun" ? std::string(kSun)
       : light == "sky" ? constant_light("sky", "1, 0.9, 0.8")
                        : square("lamp", 0.5, 90, {0.8, 2.6, 0.6}, area_light("glow", "9, 8, 7"));
   std::string name = parameter;
@@ -214,7 +248,11 @@ INSTANTIATE_TEST_SUITE_P(
         Case("waves", "sky", "body.rotate.x"), Case("waves", "lamp", "body.rotate.y"),
         Case("waves", "lamp", "body.translate.y"), Case("waves", "lamp", "lamp.translate.x"),
         Case("waves", "sky", "body.vertex_positions:"), Case("waves", "bulb", "body.translate.x"),
-        Case("waves", "bulb", "sensor.translate.x")),
+        Case("waves", "bulb", "sensor.translate.x"), Case("waves", "bulb", "body.rotate.z"),
+        Case("waves", "bulb", "body.vertex_positions:"), Case("waves", "sun", "body.rotate.y"),
+        Case("ball", "bulb", "bulb.translate.x"), Case("ball", "bulb", "sensor.translate.x"),
+        Case("ball", "bulb", "body.vertex_positions:"), Case("ball", "sun", "body.rotate.x"),
+        Case("back", "lamp", "body.rotate.y"), Case("back", "bulb", "bulb.translate.x")),
     [](const auto& of) {
       std::string name =
           std::get<0>(of.param) + "_" + std::get<1>(of.param) + "_" + std::get<2>(of.param);
@@ -222,6 +260,40 @@ INSTANTIATE_TEST_SUITE_P(
         if (!std::isalnum(static_cast<unsigned char>(c))) c = '_';
       return name;
     });
+
+// Light in closed form, and lines and regions of the sky, from where paths start, too: the sums of
+// images agree.
+TEST(LiftedPoints, MethodsShareAnImage) {
+  const TempFiles files;
+  for (const std::string kind : {"waves", "back", "ball"}) {
+    for (const std::string method : {"analytic", "lines", "silhouettes"}) {
+      const bool lamp = method == "analytic";
+      Scene scene =
+          round_scene(files, kind,
+                      lamp ? square("lamp", 0.5, 90, {0.8, 2.6, 0.6}, area_light("glow", "9, 8, 7"))
+                           : constant_light("sky", "1, 0.9, 0.8"));
+      scene.max_depth = 2;
+      const auto sum = [&](const std::string& by, int spp) {
+        RunSettings settings;
+        settings.spp = spp;
+        RenderOptions options;
+        options.method = by;
+        const Moments image = render(scene, settings, options).radiance;
+        double total = 0, variance = 0;
+        for (size_t i = 0; i < image.size(); ++i) {
+          total += image.mean(i);
+          variance += image.variance(i);
+        }
+        return std::pair(total, 3 * variance);  // channels are alike
+      };
+      const auto [paths, of_paths] = sum("path", 256);
+      const auto [other, of_other] = sum(method, 16);
+      const double z = (other - paths) / std::sqrt(of_paths + of_other);
+      fmt::print("{:6} {:12} {:.6g}, by paths {:.6g}, z {:.2f}\n", kind, method, other, paths, z);
+      EXPECT_LT(std::fabs(z), 4.5) << kind << ", " << method;
+    }
+  }
+}
 
 }  // namespace
 }  // namespace limn

@@ -1,5 +1,5 @@
 #pragma once
-// A bounding volume hierarchy over boxes that finds overlapping pairs.
+// A bounding volume hierarchy over boxes that finds overlapping pairs, and boxes along lines.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "limn/core/parallel.h"
+#include "limn/core/vec.h"
 
 namespace limn {
 
@@ -48,6 +49,9 @@ class BoxTree {
   const LeafBoxes& boxes(uint32_t leaf) const { return packed_[leaf]; }
   // Sets `leaves` to the leaves >= `first` whose bounds overlap `box`, in ascending order.
   void find_leaves(const FloatBox& box, uint32_t first, std::vector<uint32_t>& leaves) const;
+  // The same with leaves whose bounds the line from + s along meets for some s in [0, s_max].
+  void find_leaves(const Vec3d& from, const Vec3d& along, double s_max,
+                   std::vector<uint32_t>& leaves) const;
   // Calls append(i, j, found) for the indices i < j of every pair of overlapping boxes, in
   // parallel, and returns all that it appended to `found`; the order does not depend on `threads`.
   // skip(i, leaf): bits of boxes in the leaf whose pairs with box i are omitted.
@@ -68,6 +72,8 @@ class BoxTree {
   };
   // Splits `part` until each piece has at most `smallest` leaves; appends the pieces to `parts`.
   void split(const Part& part, uint32_t smallest, std::vector<Part>& parts);
+  template <class Meets>
+  void find_leaves(uint32_t first, const Meets& meets, std::vector<uint32_t>& leaves) const;
   void halve(const Part& part);
   void build(const Part& part);
   void join_boxes(const Part& part, uint32_t smallest);
