@@ -114,7 +114,7 @@ TEST(ShadowPieces, AreWhereShadowsFall) {
     const uint32_t edge = shadows.edges.choose(rng.uniform());
     const double t = rng.uniform();
     RayCount rays;
-    const auto point = shadows.edges.cast(shadows.edges.edge(edge), t, rays);
+    const auto point = shadows.edges.cast(shadows.edges.edge(edge), t, rng, rays);
     const ShadowPiece* piece = shadows.piece_at(edge, t);
     if (!point != !piece || (point && point->face != piece->face)) {
       ++other;
