@@ -31,7 +31,8 @@ std::shared_ptr<Bsdf> object_of(const std::shared_ptr<Bsdf>& bsdf, const Bsdf* s
   if (bsdf.get() == side) return bsdf;
   for (const std::shared_ptr<Bsdf>& nested : bsdf->nested())
     if (auto found = object_of(nested, side)) return found;
-  return nullptr;
+  Bsdf* const back = const_cast<Bsdf*>(bsdf->side(false));  // NOLINT: a part of it
+  return back == side ? std::shared_ptr<Bsdf>(bsdf, back) : nullptr;
 }
 
 // What scatters in a scene, each once: copies of the scene have them in the same order.

@@ -114,11 +114,12 @@ class ReverseEstimator::VertexAdjoints {
   void operator()(const SurfacePoint<Var>& surface, const Scattering<Var>& scattering,
                   const Rgb<Var>& throughput, const DirectionMotion*, const PathStep& step,
                   int bounces, const Rng& key) {
+    if (to_.log) log_vertex(*to_.log, surface, scattering, value(throughput), bounces);
+    if (!scattering.is_rough()) return;
     PathVertex vertex =
         plain_vertex(surface, scattering, estimator_.scene().shading, bounces, step, key);
     vertex.throughput = value(throughput);
     if (!is_constant(surface.p)) vertex.velocity = {{-1, 0, 0, 0}, {0, -1, 0, 0}, {0, 0, -1, 0}};
-    if (to_.log) log_vertex(*to_.log, surface, scattering, vertex.throughput, bounces);
     VertexAdjoint sink(estimator_.motion_, adjoint_, surface.p, tape_, seeds_, to_.log);
     for (size_t slot = 0; slot < estimator_.slots(); ++slot) {
       const Term* term = estimator_.terms_[slot].get();

@@ -139,7 +139,7 @@ void LineLight::check(const Scene& scene, const std::string& method) {
   for (const Shape& shape : scene.shapes) {
     for (const bool front : {true, false}) {
       const Bsdf* side = shape.bsdf->side(front);
-      if (!side || (side->lobe().model == &kHemisphere && side->texture_count() == 0)) continue;
+      if (!side || side->is_lambertian()) continue;
       refuse_light(
           method, shape.where,
           fmt::format(

@@ -15,11 +15,6 @@ namespace {
 constexpr double kRoundings = 8 * 0x1p-24;
 constexpr const char* kInstead = "use another method (render: path)";
 
-bool is_diffuse(const Bsdf& bsdf) {
-  const LobeSummary lobe = bsdf.lobe();
-  return lobe.model == &kHemisphere && bsdf.texture_count() == 0;
-}
-
 [[noreturn]] void refuse(const SourceLocation& where, const std::string& what) {
   refuse_light("analytic", where, what);
 }
@@ -45,7 +40,7 @@ void check_closed_light(const Scene& scene) {
   for (const Shape& shape : scene.shapes) {
     for (const bool front : {true, false}) {
       const Bsdf* side = shape.bsdf->side(front);
-      if (!side || is_diffuse(*side)) continue;
+      if (!side || side->is_lambertian()) continue;
       refuse(shape.where,
              fmt::format("{}: only diffuse surfaces without textures have a closed form, this is "
                          "{}: {}",

@@ -29,6 +29,12 @@ void check_direct_light(const Scene& scene, const std::string& method) {
                              "method path",
                              quoted_name("emitter", light->id)));
   }
+  if (const Shape* shape = find_smooth(scene)) {
+    refuse_light(method, shape->where,
+                 fmt::format("{}: smooth and transparent surfaces are not known, this is {}: use "
+                             "the method path",
+                             shape_in_text(*shape), shape->bsdf->describe()));
+  }
   if (scene.shading != ShadingModel::kMitsuba) return;
   for (const Shape& shape : scene.shapes) {
     if (shape.mesh.normal_source == NormalSource::kFace) continue;

@@ -185,16 +185,19 @@ class TermJob {
   }
 
   // What moving directions change in one term they take back in the others, and at every jump of
-  // radiance there must be an edge.
+  // radiance there must be an edge: of what smooth lobes see there are none.
+  bool has_all_edges() const {
+    return scene_.shading == ShadingModel::kContinuous && !find_smooth(scene_);
+  }
   bool can_move_directions() const {
     for (size_t t = 0; t < types_.size(); ++t) {
       if (types_[t]->moved_with_directions && !computed_[t]) return false;
     }
-    return scene_.shading == ShadingModel::kContinuous;
+    return has_all_edges();
   }
   // The same of positions on the film, which change all terms.
   bool can_move_film() const {
-    return moves_film_ && scene_.shading == ShadingModel::kContinuous &&
+    return moves_film_ && has_all_edges() &&
            std::find(computed_.begin(), computed_.end(), false) == computed_.end();
   }
   int64_t terms_computed() const { return std::count(computed_.begin(), computed_.end(), true); }

@@ -1,9 +1,12 @@
 // The table of methods that work term by term.
 #include "integrators/methods/term_methods.h"
 
+#include <fmt/format.h>
+
 #include <string>
 
 #include "integrators/lights/closed_light.h"
+#include "integrators/lights/direct_light_check.h"
 #include "integrators/methods/faces_method.h"
 #include "integrators/methods/term_job.h"
 #include "integrators/terms/term.h"
@@ -29,6 +32,16 @@ Settings motion_settings(bool adaptive) {
        "Sample generator: Owen-scrambled Sobol' points, rescrambled per batch, or independent",
        values({"sobol", "independent"})},
   };
+}
+
+// Auxiliary rays go no further than the next surface.
+void check_warped(const Scene& scene) {
+  const Shape* shape = find_smooth(scene);
+  if (!shape) return;
+  refuse_light("was", shape->where,
+               fmt::format("{}: warped directions are not for smooth or transparent surfaces, this "
+                           "is {}: use another method",
+                           shape_in_text(*shape), shape->bsdf->describe()));
 }
 
 // What the settings make of a method.
@@ -112,6 +125,7 @@ std::vector<MethodType> term_methods() {
         "Use a fixed number of auxiliary rays, which biases the result (on), or remove the bias by "
         "Russian roulette over their number (off)",
         {"on", "off"}}}));
+  methods.back().check = check_warped;
   methods.push_back(method_row("analytic",
                                "direct light of flat area lights on diffuse surfaces, in closed "
                                "form: soft shadows without noise",

@@ -2,8 +2,9 @@
 // The path tracer, written once for any scalar: double gives radiance, Dual gives radiance and the
 // interior term of its derivative, Var writes a tape of it. Sampled directions, their densities and
 // MIS weights are constants while the parameters move (solid-angle measure, everywhere), but for
-// directions that move on purpose (direction_field.h, warp_field.h) and the one direction of a
-// light without extent, which follows the parameters.
+// directions that move on purpose (direction_field.h, warp_field.h), the one direction of a light
+// without extent and the rays of smooth lobes, which follow the parameters. No light is drawn for
+// what smooth lobes see: there an emitter counts fully where a path meets it.
 //
 // Paths are followed side by side where there are several: each waits for its own divisions, roots
 // and reads, and a processor fills such gaps with the work of the next. A path's own steps, and so
@@ -120,6 +121,11 @@ class PathTracer {
   // path_vertices.h. Those that return bool say whether the path goes on.
   bool begin_vertex(Walk& walk);
   void draw_numbers(std::span<Walk* const> walks) const;
+  bool turns_smoothly(Walk& walk) const;
+  bool turn_smoothly(Walk& walk) const;
+  size_t turn_smoothly(Walk** walks, size_t& count, Walk** turned) const;
+  void leave_surface(Walk& walk, double eta) const;
+  bool goes_on(Walk& walk, double pdf) const;
   bool draw_mirrored(Walk& walk) const;
   bool choose_direction(Walk& walk);
   bool scatter(Walk& walk);
@@ -135,7 +141,9 @@ class PathTracer {
   bool survives_roulette(Walk& walk) const;
   // The density of the next direction at w, of which scattering alone has this one.
   double density(const Walk& walk, const Vec3d& w, double scattered) const {
-    return c_.mirrored ? MirroredLight::pdf(walk.mixture, w, scattered) : scattered;
+    const double rough = walk.scattering->rough_share();
+    if (!c_.mirrored || rough == 0) return scattered;
+    return rough * MirroredLight::pdf(walk.mixture, w, scattered / rough);
   }
   // path_wide.h. For plain numbers.
   size_t weigh_lights_wide(std::span<Walk* const> walks, Walk** lit) const;
@@ -155,6 +163,9 @@ class PathTracer {
   void fetch_corners(const Walk& walk) const;
   void find_sky(std::span<Walk* const> walks) const;
   // path_lights.h
+  void choose_side(Walk& walk) const;
+  void keep_side(Walk& walk) const;
+  double light_pdf(const Walk& walk, double pdf) const { return walk.two_sided ? 0.5 * pdf : pdf; }
   void draw_lights(std::span<Walk* const> walks) const;
   void draw_light(Walk& walk, const Rng& key) const;
   void shine(std::span<Walk* const> walks);

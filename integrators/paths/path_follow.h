@@ -83,6 +83,8 @@ inline void PathTracer<S, Visitor>::follow(std::span<Walk* const> walks) {
     shine({going, count});
     keep([](const Walk& walk) { return !walk.failed; });
     draw_numbers({going, count});
+    Walk* turned[kMostWalks];
+    const size_t turns = turn_smoothly(going, count, turned);
     if constexpr (kPlain) {
       if (scatters_wide_) count = scatter_wide({going, count});
     }
@@ -90,6 +92,8 @@ inline void PathTracer<S, Visitor>::follow(std::span<Walk* const> walks) {
       keep([&](Walk& walk) { return choose_direction(walk); });
       keep([&](Walk& walk) { return scatter(walk); });
     }
+    std::copy_n(turned, turns, going + count);
+    count += turns;
     Walk* leaving[kMostWalks];
     size_t left = 0;
     keep([&](Walk& walk) {

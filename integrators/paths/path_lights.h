@@ -7,6 +7,32 @@
 
 namespace limn {
 
+// Chooses the side of a surface that light passes for which lights are drawn, where the sides have
+// starting points of their own. Both ways to find a light count with the density of the same way to
+// draw it.
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::choose_side(Walk& walk) const {
+  walk.two_sided =
+      walk.scattering->bsdf().lobes().below && is_lifted(c_.scene, walk.surface.face.shape);
+  if (!walk.two_sided) return;
+  Rng rng = walk.key.at(Purpose::kEmitter, walk.bounces).at(Purpose::kEmitter, 2);
+  walk.beyond = rng.uniform() < 0.5;
+  if (walk.beyond) {
+    walk.lights = c_.lights.at(beyond(c_.scene, value(walk.surface), value(walk.wi)).p);
+  }
+}
+
+// Leaves a light that was drawn only if it is on the side that was chosen.
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::keep_side(Walk& walk) const {
+  if (!walk.two_sided || !walk.light) return;
+  if (walk.scattering->passes(walk.light->wo) == walk.beyond) {
+    walk.light->pdf *= 0.5;
+  } else {
+    walk.light.reset();
+  }
+}
+
 // One light for each, if there is any, where there have been no others.
 template <class S, class Visitor>
 inline void PathTracer<S, Visitor>::draw_lights(std::span<Walk* const> walks) const {
@@ -23,6 +49,9 @@ inline void PathTracer<S, Visitor>::draw_lights(std::span<Walk* const> walks) co
   Lights::Numbers u[kMostWalks];
   Rng::draw(Purpose::kEmitter, {streams, count}, u);
   c_.lights.sample({draws, count}, {u, count});
+  for (Walk* const walk : walks) {
+    if (!walk->lit) keep_side(*walk);
+  }
 }
 
 // Adds what the lights that have been drawn send.
@@ -78,6 +107,7 @@ inline void PathTracer<S, Visitor>::draw_light(Walk& walk, const Rng& key) const
   if (c_.lights.empty()) return;
   Rng rng = key.at(Purpose::kEmitter, walk.bounces);
   renew(walk.light, [&] { return c_.lights.sample(walk.lights, rng); });
+  keep_side(walk);
 }
 
 // How many get light, if nothing hides it: they are put into `lit`.
@@ -127,7 +157,9 @@ template <class S, class Visitor>
 // have it: rounding would tell which half of the face begins to be lit as the scene moves.
 template <class S, class Visitor>
 inline void PathTracer<S, Visitor>::draw_delta(Walk& walk, const DeltaLight& delta) const {
-  const auto arriving = limn::arrival<S>(delta, walk.surface.p);
+  const bool passes = walk.two_sided && walk.beyond;
+  const Vec3<S> p = passes ? beyond(c_.scene, walk.surface, walk.wi).p : walk.surface.p;
+  const auto arriving = limn::arrival<S>(delta, p);
   if (arriving) {
     const Rgb<S> f = walk.scattering->eval(arriving->wo);
     walk.light_share = f * arriving->irradiance * (1 / walk.light->pdf);

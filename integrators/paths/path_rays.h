@@ -31,12 +31,13 @@ inline bool PathTracer<S, Visitor>::next_hit(Walk& walk) {
 }
 
 // The side of a face around walk.start_edge() that the ray meets at once, if any. Below its own
-// face a ray leaves a smooth surface (surface_point.h), and meets none of them.
+// face a ray that is reflected leaves a smooth surface (surface_point.h), and meets none of them.
 template <class S, class Visitor>
 inline std::optional<FaceSide> PathTracer<S, Visitor>::blocked_at_start(
     const Walk& walk, const Vec3d& direction) const {
   const Vec3d& n = walk.surface.n_g;
-  if ((dot(n, direction) > 0) != (dot(n, value(walk.wi)) > 0)) return {};
+  const bool below = (dot(n, direction) > 0) != (dot(n, value(walk.wi)) > 0);
+  if (below && !walk.scattering->bsdf().lobes().through) return {};
   return blocked_at_edge(c_.scene, c_.tracer, *walk.start_edge(), direction);
 }
 
@@ -91,10 +92,16 @@ inline void PathTracer<S, Visitor>::find_sky(std::span<Walk* const> walks) const
 template <class S, class Visitor>
 inline bool PathTracer<S, Visitor>::shadowed(const Walk& walk) {
   const LightSample& light = *walk.light;
-  const FaceRef start = walk.surface.start();
+  FaceRef start = walk.surface.start();
   const EdgeStart* edge = walk.start_edge();
-  if (light.face == start) return true;
   Ray ray{value(walk.surface.p), light.wo};
+  if (walk.two_sided && walk.beyond) {
+    const auto other = beyond(c_.scene, value(walk.surface), value(walk.wi));
+    ray.origin = other.p;
+    start = other.start();
+    if (other.lifted) edge = nullptr;
+  }
+  if (light.face == start) return true;
   ray.start = start;
   ray.end = light.face.value_or(FaceRef{});
   // Beside an edge a shadow may end to the very rounding, if the light has no extent.

@@ -2,6 +2,8 @@
 // The path tracer at a vertex: what is scattered there, the next direction, what emits where it
 // ends, roulette. Included by path_follow.h.
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "integrators/paths/path.h"
 #include "integrators/paths/path_directions.h"
@@ -14,6 +16,9 @@ inline bool PathTracer<S, Visitor>::begin_vertex(Walk& walk) {
   if (is_complete(walk.bounces)) return false;
   walk.scattering.emplace(walk.surface, walk.wi, c_.scene.shading);
   if (walk.scattering->black()) return false;
+  if (c_.unmoved && walk.scattering->is_smooth()) {
+    walk.scattering->share_by(SmoothShares::By::kNone);
+  }
   set_motion(walk);
   walk.light.reset();
   walk.lit = walk.again;
@@ -31,8 +36,15 @@ inline bool PathTracer<S, Visitor>::begin_vertex(Walk& walk) {
         c_.closed->scattered(c_.tracer, walk.surface, *walk.scattering, walk.start_edge());
     return false;
   }
+  if (!walk.scattering->is_rough()) {
+    walk.lit = true;
+    walk.two_sided = false;
+    walk.mixture.share = 0;
+    return true;
+  }
   // Copies have both from the path that they are of.
   if (!wide_) renew(walk.lights, [&] { return c_.lights.at(value(walk.surface.p)); });
+  choose_side(walk);
   if (c_.mirrored) {
     renew(walk.mixture, [&] {
       return mixture_at(c_.mirrored, walk.surface, *walk.scattering,
@@ -55,7 +67,7 @@ inline void PathTracer<S, Visitor>::draw_numbers(std::span<Walk* const> walks) c
   bool mixed = false;
   for (size_t i = 0; i < walks.size(); ++i) {
     streams[i] = {&walks[i]->key, static_cast<uint64_t>(walks[i]->bounces)};
-    mixed |= walks[i]->mixture.share != 0;
+    mixed |= walks[i]->mixture.share != 0 || walks[i]->scattering->is_smooth();
   }
   const auto draw = [&]<size_t kCount>(std::integral_constant<size_t, kCount>) {
     std::array<double, kCount> u[kMostWalks];
@@ -69,6 +81,75 @@ inline void PathTracer<S, Visitor>::draw_numbers(std::span<Walk* const> walks) c
   } else {
     draw(std::integral_constant<size_t, 2>());
   }
+}
+
+// Whether the path takes a smooth ray: which one, then. Else what is left of the third number is as
+// it was.
+template <class S, class Visitor>
+inline bool PathTracer<S, Visitor>::turns_smoothly(Walk& walk) const {
+  if (!walk.scattering->is_smooth()) return false;
+  const SmoothShares shares = walk.scattering->shares();
+  double u = walk.u[2];
+  if (u < shares.rough) {
+    walk.u[2] = u / shares.rough;
+    return false;
+  }
+  u -= shares.rough;
+  int k = 0;
+  while (k + 1 < shares.count && u >= shares.ray[k]) u -= shares.ray[k++];
+  walk.smooth_ray = k;
+  walk.smooth_share = shares.ray[k];
+  return true;
+}
+
+// Along the smooth ray that was chosen; false where the path ends. Its direction moves with the
+// vertex, and what holds directions of rough lobes does not hold this one.
+template <class S, class Visitor>
+inline bool PathTracer<S, Visitor>::turn_smoothly(Walk& walk) const {
+  const SmoothRay<S> ray = walk.scattering->smooth_ray(walk.smooth_ray);
+  if (!(walk.smooth_share > 0) || detail::stays_black(ray.weight)) return false;
+  walk.motion = nullptr;
+  walk.direction = ray.wo;
+  walk.wo = value(ray.wo);
+  walk.pdf = std::numeric_limits<double>::infinity();
+  walk.throughput = walk.throughput * ray.weight * (1 / walk.smooth_share);
+  if (walk.scattering->passes(walk.wo)) leave_surface(walk, ray.eta);
+  return goes_on(walk, 0);
+}
+
+// Of `count` walks those that take smooth rays and go on: they are put into `turned`, and how many
+// they are is returned. The others stay, and are counted.
+template <class S, class Visitor>
+inline size_t PathTracer<S, Visitor>::turn_smoothly(Walk** walks, size_t& count,
+                                                    Walk** turned) const {
+  size_t kept = 0, turns = 0;
+  for (size_t i = 0; i < count; ++i) {
+    Walk* const walk = walks[i];
+    if (turns_smoothly(*walk)) {
+      turned[turns] = walk;
+      turns += guarded(*walk, [&] { return turn_smoothly(*walk); });
+    } else {
+      walks[kept++] = walk;
+    }
+  }
+  count = kept;
+  return turns;
+}
+
+// To the other side of the surface. eta: the index of refraction there over that on this side.
+template <class S, class Visitor>
+inline void PathTracer<S, Visitor>::leave_surface(Walk& walk, double eta) const {
+  walk.eta *= eta;
+  walk.surface = beyond(c_.scene, walk.surface, walk.wi);
+  if (walk.two_sided) walk.lights = c_.lights.at(value(walk.surface.p));
+}
+
+// After a path has been given its next direction, of this density (see PathStep).
+template <class S, class Visitor>
+inline bool PathTracer<S, Visitor>::goes_on(Walk& walk, double pdf) const {
+  walk.step = {value(walk.surface.p), pdf};
+  walk.last = is_complete(walk.bounces + 1);
+  return !walk.last || c_.lights.on_shapes() || c_.scene.environment;
 }
 
 // Draws the next direction towards what is mirrored, if its turn has come.
@@ -115,9 +196,12 @@ template <class S, class Visitor>
   walk.before = walk.throughput;
   walk.throughput = walk.throughput * detail::stretched(f, walk.wo, walk.motion) * (1 / pdf);
   if (c_.unmoved) walk.albedo *= unmoved_albedo(walk);
-  walk.step = {value(walk.surface.p), pdf};
-  walk.last = is_complete(walk.bounces + 1);
-  return !walk.last || c_.lights.on_shapes() || c_.scene.environment;
+  if (walk.scattering->passes(walk.wo)) {
+    leave_surface(walk, walk.scattering->bsdf().eta(walk.scattering->at()));
+  } else if (walk.two_sided && walk.beyond) {
+    walk.lights = c_.lights.at(value(walk.surface.p));
+  }
+  return goes_on(walk, pdf);
 }
 
 // Adds what rays see that leave the scene; there their paths end.
@@ -130,11 +214,17 @@ inline void PathTracer<S, Visitor>::escape(std::span<Walk* const> walks) const {
 
 template <class S, class Visitor>
 inline void PathTracer<S, Visitor>::escape(Walk& walk) const {
+  if (std::isinf(walk.pdf)) {
+    walk.sums.radiance +=
+        walk.throughput * environment_radiance<S>(*c_.scene.environment, walk.direction);
+    return;
+  }
   auto sight = c_.lights.template environment<S>(walk.lights, walk.wo, walk.sky);
   if (walk.motion) {
     sight.radiance = environment_radiance<S>(*c_.scene.environment, walk.direction);
   }
-  walk.sums.radiance += walk.throughput * sight.radiance * mis_weight(walk.pdf, sight.pdf);
+  const double other = light_pdf(walk, sight.pdf);
+  walk.sums.radiance += walk.throughput * sight.radiance * mis_weight(walk.pdf, other);
 }
 
 // Goes on to what the ray meets.
@@ -196,9 +286,10 @@ inline Rgb<S> PathTracer<S, Visitor>::emitted(const Walk& walk) const {
   const Rgb<S> radiance = surface.emission(-walk.wo, c_.scene.shading);
   if (detail::stays_black(radiance)) return radiance;
   // A face around an edge that is met at distance 0 is never drawn by light sampling.
+  if (std::isinf(walk.pdf)) return radiance;
   const LightView view{walk.wo, distance, surface.n_g};
   const double other = distance > 0 ? c_.lights.pdf(walk.lights, surface.face.shape, view) : 0;
-  return radiance * mis_weight(walk.pdf, other);
+  return radiance * mis_weight(walk.pdf, light_pdf(walk, other));
 }
 
 // A surface that is black before it moves need not be afterwards.
@@ -210,12 +301,13 @@ inline double PathTracer<S, Visitor>::unmoved_albedo(const Walk& walk) const {
   return std::clamp(bsdf->lobe().albedo, kLeast, 1.0);
 }
 
-// As in Mitsuba: from rr_depth bounces on, survival with the largest throughput, at most 0.95.
+// As in Mitsuba: from rr_depth bounces on, survival with the largest throughput, at most 0.95,
+// without what refraction scales it by.
 template <class S, class Visitor>
 inline bool PathTracer<S, Visitor>::survives_roulette(Walk& walk) const {
   if (walk.bounces < c_.scene.rr_depth) return true;
   constexpr double kBlack = 0.5;  // of a path that is not bright yet; not tuned
-  const double throughput = max_channel(value(walk.throughput));
+  const double throughput = max_channel(value(walk.throughput)) * (walk.eta * walk.eta);
   const double largest = c_.unmoved ? walk.albedo : throughput != 0 ? throughput : kBlack;
   const double survival = std::min(largest, 0.95);
   Rng rng = walk.key.at(Purpose::kRoulette, walk.bounces);

@@ -21,7 +21,7 @@ inline void PathTracer<S, Visitor>::place_lights_wide(std::span<Walk* const> wal
 }
 
 // then(walk, evaluation): of the direction *direction(walk) of each walk where that lies in front
-// of the surface, in a new order; nothing is scattered into the others.
+// of the surface, or light passes, in a new order; nothing is scattered into the others.
 template <class S, class Visitor>
 template <class Direction, class Then>
 inline void PathTracer<S, Visitor>::evaluate_wide(std::span<Walk*> walks,
@@ -30,7 +30,8 @@ inline void PathTracer<S, Visitor>::evaluate_wide(std::span<Walk*> walks,
   size_t count = 0;
   for (Walk* const walk : walks) {
     walks[count] = walk;
-    count += dot(walk->scattering->normal(), *direction(*walk)) > 0;
+    const Scattering<S>& scattering = *walk->scattering;
+    count += scattering.bsdf().lobes().below || dot(scattering.normal(), *direction(*walk)) > 0;
   }
   Grouped<Bsdf, Bsdf::Evaluation, kMostWalks> asked;
   BsdfValue values[kMostWalks];
@@ -42,7 +43,7 @@ inline void PathTracer<S, Visitor>::evaluate_wide(std::span<Walk*> walks,
   asked.for_each([](const Bsdf& bsdf, auto items) { bsdf.eval_with_pdf_each(items); });
   for (size_t i = 0; i < count; ++i) {
     Walk& walk = *walks[i];
-    then(walk, Scattering<S>::held(values[i]));
+    then(walk, walk.scattering->held(values[i]));
   }
 }
 

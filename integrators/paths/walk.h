@@ -18,8 +18,9 @@ namespace limn {
 
 // How a path came to a vertex.
 struct PathStep {
-  Vec3d from;      // the vertex before
-  double pdf = 0;  // of the direction from there [1/sr]; 0 for what the camera or an edge sees
+  Vec3d from;  // the vertex before
+  // Of the direction from there [1/sr]; 0 for what the camera, an edge or a smooth lobe sees.
+  double pdf = 0;
 };
 
 // What a path has found.
@@ -54,6 +55,7 @@ struct Walk {
   Vec3<S> wi;
   Rgb<S> throughput = grey(S(1.0));
   double albedo = 1;  // bounds it, by the materials of PathContext::unmoved
+  double eta = 1;     // the index of refraction here over that where it started
   PathStep step;
   PathSums<S> sums;
 
@@ -63,6 +65,9 @@ struct Walk {
   std::conditional_t<std::is_same_v<S, Dual>, DirectionMotion, Nothing> field_motion;
 
   Lights::Point lights;  // the vertex, for them
+  // The vertex passes light roughly and is lifted: lights are drawn for one of its sides, with
+  // probability 1/2 each; here for that which wi is not on.
+  bool two_sided = false, beyond = false;
   // A light that may be seen: all of what it adds but its radiance.
   std::optional<LightSample> light;
   const DirectionMotion* light_motion = nullptr;
@@ -73,10 +78,12 @@ struct Walk {
   std::array<double, 3> u{};       // from which its direction is drawn
   MirroredLight::Mixture mixture;  // that its direction is drawn from
   Vec3d wo;
-  Vec3<S> direction;  // the same as it moves
-  double pdf = 0;     // [1/sr]
-  Rgb<S> before;      // the throughput before it
-  bool last = false;  // only what emits counts behind it
+  Vec3<S> direction;        // the same as it moves
+  double pdf = 0;           // [1/sr]; infinite of a smooth ray
+  int smooth_ray = 0;       // which one, if it is
+  double smooth_share = 0;  // the probability of that
+  Rgb<S> before;            // the throughput before it
+  bool last = false;        // only what emits counts behind it
   bool found = false;
   Hit hit;
   std::array<double, 2> sky{};  // where it leaves the scene: Environment::find

@@ -136,6 +136,8 @@ class TermEstimator::VertexTerms {
                   const Rgb<Dual>& throughput, const DirectionMotion* motion, const PathStep& step,
                   int bounces, const Rng& key) {
     const Rgb<double> weight = value(throughput);
+    if (sink_.log()) log_vertex(*sink_.log(), surface, scattering, weight, bounces);
+    if (!scattering.is_rough()) return;
     PathVertex vertex =
         plain_vertex(surface, scattering, estimator_.scene_.shading, bounces, step, key);
     vertex.throughput = weight;
@@ -143,7 +145,6 @@ class TermEstimator::VertexTerms {
     TurnedVertex turned;
     if (held_) turned = turned_at(surface, motion, bounces);
     VertexLanes lanes(setting_, vertex, surface, held_ ? &turned : nullptr);
-    if (sink_.log()) log_vertex(*sink_.log(), surface, scattering, weight, bounces);
     const double urgency = urgency_at(surface, weight, bounces);
     for (size_t slot = 0; slot < estimator_.slots(); ++slot) {
       const Term* term = estimator_.terms_[slot].get();

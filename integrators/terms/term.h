@@ -36,15 +36,10 @@ struct PathVertex {
 template <class S>
 PathVertex plain_vertex(const SurfacePoint<S>& at, const Scattering<S>& scattering,
                         ShadingModel model, int bounces, const PathStep& step, const Rng& key) {
-  const SurfacePoint<double> surface{at.shape,
-                                     at.face,
-                                     value(at.p),
-                                     at.n_g,
-                                     value(at.n_s),
-                                     at.lifted,
-                                     {value(at.b[0]), value(at.b[1])}};
+  const SurfacePoint<double> surface = value(at);
   PathVertex vertex{
       surface, {surface, value(scattering.wi()), model}, grey(1.0), {}, {}, bounces, step, key};
+  vertex.scattering.share_as(scattering.rough_share());
   if constexpr (std::is_same_v<S, Dual>) vertex.velocity = {at.p.x.d, at.p.y.d, at.p.z.d};
   return vertex;
 }

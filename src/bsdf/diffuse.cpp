@@ -32,6 +32,7 @@ class Diffuse final : public Bsdf {
                               const Rgb<double>* at) const override;
   void sample_each(std::span<const Draw> draws) const override;
 
+  bool is_lambertian() const override { return texture_count() == 0; }
   bool is_constant() const override { return limn::is_constant(reflectance_.constant); }
   LobeSummary lobe(const Rgb<double>* at) const override {
     return {kHemisphere, 1, reflectance_.bound(at)};

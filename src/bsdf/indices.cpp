@@ -1,6 +1,8 @@
 // Named indices of refraction.
 #include "src/bsdf/indices.h"
 
+#include <fmt/format.h>
+
 #include "limn/core/names.h"
 
 namespace limn {
@@ -123,6 +125,16 @@ double read_ior(Properties& properties, const char* property, const std::string&
   const std::optional<double> ior = named_ior(name);
   if (!ior) properties.fail(property, unknown_name("medium", name, names_of(kDielectrics)));
   return *ior;
+}
+
+double read_relative_ior(Properties& properties, const std::string& inside) {
+  const double ior =
+      read_ior(properties, "int_ior", inside) / read_ior(properties, "ext_ior", "air");
+  if (!(ior >= kLeastIor && ior <= kMostIor)) {
+    properties.fail("int_ior", fmt::format("int_ior / ext_ior is {:g}: it must lie in [{:g}, {:g}]",
+                                           ior, kLeastIor, kMostIor));
+  }
+  return ior;
 }
 
 ConductorIndices read_conductor_indices(Properties& properties) {

@@ -96,12 +96,12 @@ Vec3<S> ggx_visible(const Vec3<S>& v, double alpha, const S& u1, const S& u2) {
 // outside; cos of the angle of incidence. With t = eta^2 - k^2 - sin^2, s = |(t, 2 eta k)| + |t|
 // and r = sqrt(2 s), the refracted wave has a = (t < 0 ? 2 eta k / r : r / 2), without
 // cancellation; what follows is extended by r, and has one division.
-template <class S>
-S fresnel_conductor(const S& cos_h, double eta, double k) {
+template <class S, class E>
+S fresnel_conductor(const S& cos_h, const E& eta, const E& k) {
   constexpr double kTiny = 1e-100;  // s is 0 at the critical angle if k = 0
   const S c2 = cos_h * cos_h;
   const S s2 = 1.0 - c2;
-  const double nk = eta * k;
+  const E nk = eta * k;
   const S t = eta * eta - k * k - s2;
   const S a2b2 = sqrt(t * t + 4 * nk * nk);
   const S s = a2b2 + below_zero(t, S(-t), t) + kTiny;

@@ -9,7 +9,9 @@
 namespace limn {
 
 Bsdf::Bsdf(const Bsdf& other)
-    : texture_count_(other.texture_count_), texture_names_(other.texture_names_) {
+    : texture_count_(other.texture_count_),
+      lobes_(other.lobes_),
+      texture_names_(other.texture_names_) {
   for (const auto& texture : other.textures_) textures_.push_back(texture->clone());
 }
 

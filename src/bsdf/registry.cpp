@@ -11,8 +11,15 @@ struct BsdfType {
 };
 
 constexpr BsdfType kTypes[] = {
+    {"blendbsdf", read_blendbsdf},
+    {"conductor", read_conductor},
+    {"dielectric", read_dielectric},
     {"diffuse", read_diffuse},
+    {"mask", read_mask},
+    {"null", read_null},
+    {"plastic", read_plastic},
     {"roughconductor", read_roughconductor},
+    {"thindielectric", read_thindielectric},
     {"twosided", read_twosided},
 };
 

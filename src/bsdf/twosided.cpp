@@ -10,6 +10,7 @@ class TwoSided final : public Bsdf {
   // sides: one or two.
   explicit TwoSided(std::vector<std::shared_ptr<Bsdf>> sides) : sides_(std::move(sides)) {
     for (const auto& side : sides_) texture_count_ += side->texture_count();
+    lobes_ = front().lobes();
   }
 
   Rgb<double> eval(const Vec3<double>& n, const Vec3<double>& wi, const Vec3<double>& wo,
@@ -34,6 +35,14 @@ class TwoSided final : public Bsdf {
   }
   const Bsdf* side(bool is_front) const override {
     return (is_front ? sides_.front() : sides_.back()).get();
+  }
+  int smooth_rays(const Vec3<double>& n, const Vec3<double>& wi, SmoothRays<double>& rays,
+                  const Rgb<double>* at) const override {
+    return front().smooth_rays(n, wi, rays, at);
+  }
+  int smooth_rays(const Vec3<Dual>& n, const Vec3<Dual>& wi, SmoothRays<Dual>& rays,
+                  const Rgb<Dual>* at) const override {
+    return front().smooth_rays(n, wi, rays, at);
   }
   LobeSummary lobe(const Rgb<double>* at) const override { return front().lobe(at); }
 
@@ -92,6 +101,9 @@ std::shared_ptr<Bsdf> read_twosided(Properties& properties) {
     properties.fail("twosided needs one or two nested bsdfs, not " + std::to_string(sides.size()));
   }
   for (const auto& side : sides) {
+    if (side->lobes().through) {
+      properties.fail("transmission inside twosided: " + side->describe());
+    }
     if (side->side(false)) properties.fail("twosided cannot hold another twosided");
   }
   if (sides.size() == 2 && sides[0] == sides[1]) sides.pop_back();

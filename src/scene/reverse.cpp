@@ -217,12 +217,11 @@ namespace detail {
 
 namespace {
 
-Rgb<Dual> held(const Rgb<double>& c) { return {c.r, c.g, c.b}; }
+Rgb<Dual> held_colour(const Rgb<double>& c) { return {c.r, c.g, c.b}; }
 
-// Adds derivatives with respect to the values of textures, four at a time. eval(at): the BSDF.
-template <class Eval>
-void add_textures(const TexturesAt<Var>& textures, Rgb<Dual>* at, const Eval& eval,
-                  Jacobian& jacobian) {
+// Calls visit(nodes) for values of textures that move, four at a time, while these move in `at`.
+template <class Visit>
+void for_textures(const TexturesAt<Var>& textures, Rgb<Dual>* at, const Visit& visit) {
   for (int first = 0; first < textures.count();) {
     std::array<ChannelSlots, kLanes> nodes{};
     int lane = 0, k = first;
@@ -233,9 +232,33 @@ void add_textures(const TexturesAt<Var>& textures, Rgb<Dual>* at, const Eval& ev
       for (int c = 0; c < 3; ++c) at[k][c].d[lane] = 1;
       ++lane;
     }
-    if (lane > 0) jacobian.add(nodes, eval(at));
-    for (int i = first; i < k; ++i) at[i] = held(textures.held()[i]);
+    if (lane > 0) visit(nodes);
+    for (int i = first; i < k; ++i) at[i] = held_colour(textures.held()[i]);
     first = k;
+  }
+}
+
+// Calls eval(bsdf, n, wi, wo, at) with each argument in turn moving, and add(nodes, what it gives).
+template <class Eval, class Add>
+void along_each(const Bsdf& bsdf, const SeededCopies<Bsdf>* copies, const Vec3<Var>& n,
+                const Vec3<Var>& wi, const Vec3<Var>& wo, const TexturesAt<Var>& textures,
+                const Eval& eval, const Add& add) {
+  Rgb<Dual> at[kMostTextures];
+  for (int k = 0; k < textures.count(); ++k) at[k] = held_colour(textures.held()[k]);
+  if (!is_constant(n)) add(n, eval(bsdf, along_axes(n), held(wi), held(wo), at));
+  if (!is_constant(wi)) add(wi, eval(bsdf, held(n), along_axes(wi), held(wo), at));
+  if (!is_constant(wo)) add(wo, eval(bsdf, held(n), held(wi), along_axes(wo), at));
+  for_textures(textures, at,
+               [&](const auto& nodes) { add(nodes, eval(bsdf, held(n), held(wi), held(wo), at)); });
+  if (!copies) return;
+  TexturePoint<Dual> still = textures.point();
+  for (int k = 0; k < 2; ++k) {
+    still.b[k] = still.b[k].v;
+    still.uv[k] = still.uv[k].v;
+  }
+  for (const auto& copy : *copies) {
+    copy.object->resolve(still, at);
+    add(leaves_of(copy.slots), eval(*copy.object, held(n), held(wi), held(wo), at));
   }
 }
 
@@ -246,33 +269,38 @@ Rgb<Var> eval_bsdf<Var>(const Bsdf& bsdf, const SeededCopies<Bsdf>* copies, cons
                         const Vec3<Var>& wi, const Vec3<Var>& wo, const TexturesAt<Var>& textures) {
   Jacobian jacobian;
   std::optional<Rgb<double>> f;
-  Rgb<Dual> at[kMostTextures];
-  for (int k = 0; k < textures.count(); ++k) at[k] = held(textures.held()[k]);
-  const auto add = [&](const Vec3<Var>& x, const auto& eval) {
-    if (is_constant(x)) return;
-    const Rgb<Dual> moving = eval(along_axes(x));
-    jacobian.add(x, moving);
-    f = value(moving);
-  };
-  add(n, [&](const Vec3<Dual>& x) { return bsdf.eval(x, held(wi), held(wo), at); });
-  add(wi, [&](const Vec3<Dual>& x) { return bsdf.eval(held(n), x, held(wo), at); });
-  add(wo, [&](const Vec3<Dual>& x) { return bsdf.eval(held(n), held(wi), x, at); });
-  add_textures(
-      textures, at,
-      [&](const Rgb<Dual>* seeded) { return bsdf.eval(held(n), held(wi), held(wo), seeded); },
-      jacobian);
-  if (copies) {
-    TexturePoint<Dual> still = textures.point();
-    for (int k = 0; k < 2; ++k) {
-      still.b[k] = still.b[k].v;
-      still.uv[k] = still.uv[k].v;
-    }
-    for (const auto& copy : *copies) {
-      copy.object->resolve(still, at);
-      jacobian.add(leaves_of(copy.slots), copy.object->eval(held(n), held(wi), held(wo), at));
-    }
-  }
+  along_each(
+      bsdf, copies, n, wi, wo, textures,
+      [](const Bsdf& of, const auto&... arguments) { return of.eval(arguments...); },
+      [&](const auto& nodes, const Rgb<Dual>& moving) {
+        jacobian.add(nodes, moving);
+        if constexpr (std::is_same_v<decltype(nodes), const Vec3<Var>&>) f = value(moving);
+      });
   return jacobian.result(f ? *f : bsdf.eval(value(n), value(wi), value(wo), textures.held()));
+}
+
+template <>
+SmoothRay<Var> smooth_ray<Var>(const Bsdf& bsdf, const SeededCopies<Bsdf>* copies,
+                               const Vec3<Var>& n, const Vec3<Var>& wi, int k,
+                               const TexturesAt<Var>& textures) {
+  SmoothRays<double> rays;
+  bsdf.smooth_rays(value(n), value(wi), rays, textures.held());
+  Jacobian direction, weight;
+  along_each(
+      bsdf, copies, n, wi, {}, textures,
+      [k](const Bsdf& of, const Vec3<Dual>& normal, const Vec3<Dual>& from, const Vec3<Dual>&,
+          const Rgb<Dual>* at) {
+        SmoothRays<Dual> moving;
+        of.smooth_rays(normal, from, moving, at);
+        return moving[k];
+      },
+      [&](const auto& nodes, const SmoothRay<Dual>& moving) {
+        direction.add(nodes, as_colour(moving.wo));
+        weight.add(nodes, moving.weight);
+      });
+  const SmoothRay<double>& ray = rays[k];
+  const Rgb<Var> wo = direction.result(as_colour(ray.wo));
+  return {{wo.r, wo.g, wo.b}, weight.result(ray.weight), ray.eta, ray.total};
 }
 
 }  // namespace detail
@@ -282,11 +310,19 @@ SurfacePoint<Var> surface_on_ray<Var>(const Scene& scene, FaceRef face, const Ve
                                       const Vec3<Var>& direction) {
   const auto point = surface_on_ray<double>(scene, face, value(origin), value(direction));
   const auto fixed = [](const Vec3d& v) { return Vec3<Var>{v.x, v.y, v.z}; };
-  SurfacePoint<Var> moving{point.shape,      point.face,   fixed(point.p),          point.n_g,
-                           fixed(point.n_s), point.lifted, {point.b[0], point.b[1]}};
+  const auto& x = point.on_face;
+  SurfacePoint<Var> moving{
+      point.shape,      point.face,   fixed(point.p),           point.n_g,
+      fixed(point.n_s), point.lifted, {point.b[0], point.b[1]}, {x[0], x[1], x[2]}};
   Tape& tape = *Tape::current();
   const MeshSlots& slots = tape.slots()->mesh(face.shape);
   if (slots.positions == 0 && is_constant(origin) && is_constant(direction)) return moving;
+  if (is_lifted(scene, face.shape) && point.shape->bsdf->lobes().through) {
+    const auto c = corner_leaves(scene, face);
+    const Vec3<Var> n = cross(c[1] - c[0], c[2] - c[0]);
+    const Vec3<Var> on_face = origin + direction * (dot(c[0] - origin, n) / dot(n, direction));
+    moving.on_face = {on_face.x, on_face.y, on_face.z};
+  }
   const bool textured = point.shape->mesh.textured;
   Tape::Composite statement{
       0, textured ? 8u : 6u, pull_back_surface, face.shape.index(), face.face.index(), {}, {}};

@@ -31,6 +31,16 @@ Bounds bounds_of(const Scene& scene) {
   return bounds;
 }
 
+const Shape* find_smooth(const Scene& scene) {
+  for (const Shape& shape : scene.shapes) {
+    for (const bool front : {true, false}) {
+      const Bsdf* side = shape.bsdf->side(front);
+      if (side && (side->lobes().smooth || side->lobes().through)) return &shape;
+    }
+  }
+  return nullptr;
+}
+
 Scene deep_copy(const Scene& scene) {
   Scene copy = scene;
   BsdfCopies copies;

@@ -484,8 +484,7 @@ void expect_error(const std::string& part, const std::string& type,
 }
 
 TEST(Bsdf, BadInputIsExplained) {
-  expect_error("unknown bsdf type \"glass\" (known: diffuse, roughconductor, twosided)", "glass",
-               {});
+  expect_error("unknown bsdf type \"glass\" (known: ", "glass", {});
   expect_error("a reflectance must lie in [0, 1]", "diffuse", {{"reflectance", 1.5}});
   expect_error("the roughness must not be negative", "roughconductor", {{"alpha", -0.1}});
   expect_error("unknown distribution \"phong\" (known: beckmann, ggx)", "roughconductor",

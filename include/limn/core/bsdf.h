@@ -1,7 +1,11 @@
 #pragma once
-// Scattering at a surface, seen from the front. All BSDFs are isotropic and opaque. They are
-// functions of world-space directions and the shading normal. No tangent frame enters, so
-// none can introduce a discontinuity.
+// Scattering at a surface, seen from the front. All BSDFs are isotropic. They are functions of
+// world-space directions and the shading normal. No tangent frame enters, so none can introduce a
+// discontinuity.
+//
+// A BSDF has rough lobes, of which eval, pdf and sample are, smooth (delta) ones, which turn a ray
+// into rays, or both. Radiance that passes from an index of refraction eta_t into eta_i, the
+// viewer's, is scaled by (eta_i / eta_t)^2.
 //
 // What varies over the surface comes as an argument `at`: the values of the BSDF's textures at the
 // point, texture_count() of them, texture(k) at index k. Constants are no part of it. A null `at`
@@ -54,6 +58,21 @@ struct BsdfNumber {
   }
 };
 
+// What a smooth lobe sees: radiance that arrives from wo counts times the weight, without a cosine
+// or a density.
+template <class S>
+struct SmoothRay {
+  Vec3<S> wo;  // unit; n.wo < 0 behind the surface
+  Rgb<S> weight;
+  double eta = 1;  // the index of refraction where wo lies over that where wi lies
+  // Nothing passes, nor begins to as a parameter moves: total reflection. The weight is 0.
+  bool total = false;
+};
+// At most so many of one BSDF.
+inline constexpr int kMostSmoothRays = 4;
+template <class S>
+using SmoothRays = std::array<SmoothRay<S>, kMostSmoothRays>;
+
 // The value of a BSDF and the density of `sample` for one pair of directions.
 struct BsdfValue {
   Rgb<double> value;
@@ -64,21 +83,32 @@ class Bsdf {
  public:
   virtual ~Bsdf() = default;
 
-  // Value times |cos(n, wo)| [1/sr]. n: unit shading normal; wi: unit, towards the viewer,
-  // n.wi > 0; wo: unit, towards the light. Zero if n.wo <= 0, and continuous there.
+  // Which lobes there are, of all points and directions.
+  struct Lobes {
+    bool above = true;     // rough ones in front, n.wo > 0
+    bool below = false;    // rough ones behind
+    bool smooth = false;   // smooth ones
+    bool through = false;  // any behind
+  };
+  const Lobes& lobes() const { return lobes_; }
+  bool is_rough() const { return lobes_.above || lobes_.below; }
+
+  // Value of the rough lobes times |cos(n, wo)| [1/sr]. n: unit shading normal; wi: unit, towards
+  // the viewer, n.wi > 0; wo: unit, towards the light. Zero if n.wo <= 0 unless lobes().below, and
+  // continuous there.
   virtual Rgb<double> eval(const Vec3<double>& n, const Vec3<double>& wi, const Vec3<double>& wo,
                            const Rgb<double>* at = nullptr) const = 0;
   virtual Rgb<Dual> eval(const Vec3<Dual>& n, const Vec3<Dual>& wi, const Vec3<Dual>& wo,
                          const Rgb<Dual>* at = nullptr) const = 0;
 
-  // Density of `sample` with respect to solid angle [1/sr]; 0 if n.wo <= 0.
+  // Density of `sample` with respect to solid angle [1/sr]; 0 where eval is.
   virtual double pdf_solid_angle(const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
                                  const Rgb<double>* at = nullptr) const = 0;
   // Both of the above, at little more than the cost of one.
   virtual BsdfValue eval_with_pdf(const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
                                   const Rgb<double>* at = nullptr) const = 0;
-  // Samples wo from two uniform numbers in [0, 1). Returns nothing if the sample falls below the
-  // surface; pdf_solid_angle then integrates to less than 1 by that probability.
+  // Samples wo from two uniform numbers in [0, 1). Returns nothing if the sample falls where eval
+  // is 0; pdf_solid_angle then integrates to less than 1 by that probability.
   virtual std::optional<Vec3d> sample(const Vec3d& n, const Vec3d& wi, double u1, double u2,
                                       const Rgb<double>* at = nullptr) const = 0;
 
@@ -98,6 +128,21 @@ class Bsdf {
   };
   virtual void sample_each(std::span<const Draw> draws) const;
 
+  // What the smooth lobes see from wi: their number, which is the same for all points and
+  // directions. Arguments as of eval.
+  virtual int smooth_rays(const Vec3<double>& /*n*/, const Vec3<double>& /*wi*/,
+                          SmoothRays<double>& /*rays*/, const Rgb<double>* /*at*/ = nullptr) const {
+    return 0;
+  }
+  virtual int smooth_rays(const Vec3<Dual>& /*n*/, const Vec3<Dual>& /*wi*/,
+                          SmoothRays<Dual>& /*rays*/, const Rgb<Dual>* /*at*/ = nullptr) const {
+    return 0;
+  }
+  // Of what the rough lobes pass: the index of refraction behind the surface over that in front.
+  virtual double eta(const Rgb<double>* /*at*/ = nullptr) const { return 1; }
+  // Lambert's law with a constant reflectance, and nothing else.
+  virtual bool is_lambertian() const { return false; }
+
   // The BSDF of the front or the back; null if that side is black. The back is evaluated as a front
   // with reversed normals.
   virtual const Bsdf* side(bool front) const { return front ? this : nullptr; }
@@ -106,8 +151,8 @@ class Bsdf {
   // arguments are constant, too (what `at` holds is one of them). False is always a safe answer.
   virtual bool is_constant() const { return false; }
 
-  // The summary that edge samplers use as importance. By default the hemisphere with albedo 1. With
-  // a null `at` its albedo bounds that at all points.
+  // The summary of the rough lobes that edge samplers use as importance. By default the hemisphere
+  // with albedo 1. With a null `at` its albedo bounds that at all points.
   virtual LobeSummary lobe(const Rgb<double>* /*at*/ = nullptr) const { return {}; }
   // Constants, and the values of textures that are not texels ("reflectance.color0").
   virtual std::vector<ParameterRef> parameters() = 0;
@@ -147,6 +192,7 @@ class Bsdf {
   std::string text_of(const BsdfNumber& number) const;
 
   int texture_count_ = 0;  // those of nested BSDFs included
+  Lobes lobes_;
 
  private:
   void add_texture_parameters(int texture, std::vector<ParameterRef>& list);
@@ -154,6 +200,21 @@ class Bsdf {
   std::vector<std::shared_ptr<Texture>> textures_;
   std::vector<std::string> texture_names_;
 };
+
+// With which probabilities a path takes the smooth rays of a BSDF, or its rough lobes.
+struct SmoothShares {
+  enum class By {
+    kWeight,  // in proportion to what they scatter
+    kSlope,   // also what scatters little: its derivative need not be small
+    kNone,    // all alike: independent of parameters
+  };
+  int count = 0;  // of rays
+  std::array<double, kMostSmoothRays> ray{};
+  double rough = 1;
+};
+// Arguments as of Bsdf::eval.
+SmoothShares smooth_shares(const Bsdf& bsdf, const Vec3d& n, const Vec3d& wi, const Rgb<double>* at,
+                           SmoothShares::By by);
 
 // Creates the BSDF that an element describes. InputError for bad values and for an unknown type
 // (the message lists the known ones).

@@ -67,6 +67,9 @@ struct Scene {
   const Shape& shape(ShapeId id) const { return shapes[id.index()]; }
 };
 
+// The first shape that has smooth lobes or that light passes; null if there is none.
+const Shape* find_smooth(const Scene& scene);
+
 // Bounds of all shapes; empty without shapes.
 Bounds bounds_of(const Scene& scene);
 

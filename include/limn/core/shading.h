@@ -11,7 +11,8 @@
 //    which meets n_s at n_s.wi = e and keeps n.wi > 0;
 //  - what lies below the face but above the shading normal's plane, n_g.wo <= 0 < n_s.wo, is seen
 //    from a point above the face (surface_point.h), so that rays never start inside the mesh and no
-//    factor has to hide them.
+//    factor has to hide them. What passes the surface is seen from a point on its other side in
+//    the same way.
 //
 // Flat-shaded meshes have n_s = n_g, and are left as they are.
 #include <optional>
@@ -35,6 +36,7 @@ class Scattering {
     if (!front_) n_ = -n_;
     if (!mitsuba && point.shape->mesh.normal_source != NormalSource::kFace) bend();
     if (bsdf_ && bsdf_->texture_count() > 0) textures_.resolve(*bsdf_, point);
+    if (bsdf_ && is_smooth()) share_by(by_);
     if constexpr (std::is_same_v<S, Dual>) {
       still_ = is_constant(n_) && is_constant(wi_) && bsdf_ && bsdf_->is_constant() &&
                textures_.constant();
@@ -53,6 +55,25 @@ class Scattering {
   // The values of the BSDF's textures here (see Bsdf).
   const Rgb<double>* at() const { return textures_.held(); }
   LobeSummary lobe() const { return bsdf_->lobe(at()); }
+  // Whether there is more than smooth lobes.
+  bool is_rough() const { return bsdf_->is_rough(); }
+  bool is_smooth() const { return bsdf_->lobes().smooth; }
+  // Whether wo leaves on the other side than that which wi is on.
+  bool passes(const Vec3d& wo) const { return bsdf_->lobes().through && dot(value(n_), wo) < 0; }
+
+  // The probability with which a path goes by the rough lobes: 1 where there are no others.
+  double rough_share() const { return rough_share_; }
+  SmoothShares shares() const { return smooth_shares(*bsdf_, value(n_), value(wi_), at(), by_); }
+  void share_by(SmoothShares::By by) {
+    by_ = by;
+    rough_share_ = shares().rough;
+  }
+  // Where shares() is not asked: as another has it.
+  void share_as(double rough_share) { rough_share_ = rough_share; }
+  // Of the smooth rays the k-th.
+  SmoothRay<S> smooth_ray(int k) const {
+    return detail::smooth_ray<S>(*bsdf_, copies_, n_, wi_, k, textures_);
+  }
 
   // Value times cosine [1/sr] for the unit direction wo towards the light: held fixed (double), or
   // moving as its Dual says (towards a delta light).
@@ -80,8 +101,9 @@ class Scattering {
     }
     return result;
   }
+  // Of directions that a path takes by the rough lobes: integrates to rough_share(), or less.
   double pdf_solid_angle(const Vec3d& wo) const {
-    return bsdf_->pdf_solid_angle(value(n_), value(wi_), wo, at());
+    return rough_share_ * bsdf_->pdf_solid_angle(value(n_), value(wi_), wo, at());
   }
   // Both at once.
   struct Evaluation {
@@ -95,9 +117,10 @@ class Scattering {
     return held(bsdf_->eval_with_pdf(value(n_), value(wi_), wo, at()));
   }
   // From what the BSDF has there, without derivatives.
-  static Evaluation held(const BsdfValue& f) {
-    return {{S(f.value.r), S(f.value.g), S(f.value.b)}, f.pdf};
+  Evaluation held(const BsdfValue& f) const {
+    return {{S(f.value.r), S(f.value.g), S(f.value.b)}, rough_share_ * f.pdf};
   }
+  // By the rough lobes.
   std::optional<Vec3d> sample(double u1, double u2) const {
     return bsdf_->sample(value(n_), value(wi_), u1, u2, at());
   }
@@ -122,6 +145,9 @@ class Scattering {
   const Bsdf* bsdf_ = nullptr;
   TexturesAt<S> textures_;
   const SeededCopies<Bsdf>* copies_ = nullptr;  // Var: of bsdf_, if its parameters have slots
+  SmoothShares::By by_ =
+      std::is_same_v<S, double> ? SmoothShares::By::kWeight : SmoothShares::By::kSlope;
+  double rough_share_ = 1;
   bool front_ = false;
   bool still_ = false;  // no parameter of the pass moves it while wo is held (not for double)
 };

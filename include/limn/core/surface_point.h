@@ -34,6 +34,8 @@ struct SurfacePoint {
   bool lifted = false;
   // Barycentric coordinates of the face's second and third corner; set on textured meshes alone.
   std::array<S, 2> b;
+  // The place on the face itself; set where points are lifted from a surface that light passes.
+  std::array<S, 3> on_face;
 
   // The face that rays from p skip, if any.
   FaceRef start() const { return lifted ? FaceRef{} : face; }
@@ -45,6 +47,19 @@ struct SurfacePoint {
     return side > 0 ? detail::emitter_radiance<S>(*shape, face.shape) : Rgb<S>{};
   }
 };
+
+template <class S>
+SurfacePoint<double> value(const SurfacePoint<S>& point) {
+  const auto& x = point.on_face;
+  return {point.shape,
+          point.face,
+          value(point.p),
+          point.n_g,
+          value(point.n_s),
+          point.lifted,
+          {value(point.b[0]), value(point.b[1])},
+          {value(x[0]), value(x[1]), value(x[2])}};
+}
 
 namespace detail {
 
@@ -176,6 +191,9 @@ void place_on_plane(const Mesh& mesh, const Vec3<S>& origin, const Vec3<S>& dire
     point.n_s = {S(unit.x), S(unit.y), S(unit.z)};
     if (!mesh.textured) return;
   }
+  if (lifts && point.shape->bsdf->lobes().through) {
+    point.on_face = {point.p.x, point.p.y, point.p.z};
+  }
   const Vec3<S> q = point.p - corners[0];
   const P inverse = over_length * over_length;
   if (flat) {
@@ -190,8 +208,9 @@ void place_on_plane(const Mesh& mesh, const Vec3<S>& origin, const Vec3<S>& dire
 // A point that no parameter moves.
 inline SurfacePoint<Dual> as_dual(const SurfacePoint<double>& point) {
   const auto still = [](const Vec3d& v) { return Vec3<Dual>{v.x, v.y, v.z}; };
-  return {point.shape,      point.face,   still(point.p),          point.n_g,
-          still(point.n_s), point.lifted, {point.b[0], point.b[1]}};
+  const auto& x = point.on_face;
+  return {point.shape,      point.face,   still(point.p),           point.n_g,
+          still(point.n_s), point.lifted, {point.b[0], point.b[1]}, {x[0], x[1], x[2]}};
 }
 
 }  // namespace detail
@@ -225,6 +244,15 @@ SurfacePoint<S> surface_on_ray(const Scene& scene, FaceRef face, const Vec3<S>& 
   }
   detail::place_on_plane<S, double>(mesh, origin, direction, lifts, point);
   return point;
+}
+
+// The point where what leaves `point`, seen along wi, on the other side of the surface starts.
+// Light must pass the surface.
+template <class S>
+SurfacePoint<S> beyond(const Scene& scene, const SurfacePoint<S>& point, const Vec3<S>& wi) {
+  if (!is_lifted(scene, point.face.shape)) return point;
+  const auto& x = point.on_face;
+  return surface_on_ray<S>(scene, point.face, Vec3<S>{x[0], x[1], x[2]}, wi);
 }
 
 }  // namespace limn

@@ -83,6 +83,19 @@ template <>
 Rgb<Var> eval_bsdf<Var>(const Bsdf& bsdf, const SeededCopies<Bsdf>* copies, const Vec3<Var>& n,
                         const Vec3<Var>& wi, const Vec3<Var>& wo, const TexturesAt<Var>& textures);
 
+// The k-th of Bsdf::smooth_rays in the same way.
+template <class S>
+SmoothRay<S> smooth_ray(const Bsdf& bsdf, const SeededCopies<Bsdf>*, const Vec3<S>& n,
+                        const Vec3<S>& wi, int k, const TexturesAt<S>& textures) {
+  SmoothRays<S> rays;
+  bsdf.smooth_rays(n, wi, rays, textures.moving());
+  return rays[k];
+}
+template <>
+SmoothRay<Var> smooth_ray<Var>(const Bsdf& bsdf, const SeededCopies<Bsdf>* copies,
+                               const Vec3<Var>& n, const Vec3<Var>& wi, int k,
+                               const TexturesAt<Var>& textures);
+
 }  // namespace detail
 
 }  // namespace limn

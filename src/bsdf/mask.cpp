@@ -1,0 +1,111 @@
+// A surface that lets some of the light pass straight on: opacity times another BSDF. With opacity
+// 0 it is not seen at all (`null`), but ends shadow rays, as in Mitsuba's path tracer.
+#include "src/bsdf/nested.h"
+
+namespace limn {
+namespace {
+
+class Mask final : public NestingBsdf {
+ public:
+  Mask(std::vector<std::shared_ptr<Bsdf>> nested, const ConstantOrTexture& opacity)
+      : NestingBsdf(std::move(nested)), opacity_(number("opacity", opacity)) {
+    add_nested(true);
+  }
+
+  std::vector<ParameterRef> parameters() override {
+    std::vector<ParameterRef> list;
+    add_parameter("opacity", opacity_, 0, 1, list);
+    add_nested_parameters(list);
+    return list;
+  }
+  std::shared_ptr<Bsdf> clone() const override { return std::make_shared<Mask>(*this); }
+  std::string describe() const override {
+    return "mask, opacity " + text_of(opacity_) + " (" + inside().describe() + ")";
+  }
+
+ private:
+  const Bsdf& inside() const { return *const_cast<Mask*>(this)->nested()[0]; }  // NOLINT
+  bool own_is_constant() const override { return limn::is_constant(opacity_.constant); }
+  template <class S>
+  S opacity(const Rgb<S>* at) const {
+    return within_unit(opacity_.of(at));
+  }
+
+  Rgb<double> eval_from(bool front, const Vec3<double>& n, const Vec3<double>& wi,
+                        const Vec3<double>& wo, const Rgb<double>* at) const override {
+    return evaluate(front, n, wi, wo, at);
+  }
+  Rgb<Dual> eval_from(bool front, const Vec3<Dual>& n, const Vec3<Dual>& wi, const Vec3<Dual>& wo,
+                      const Rgb<Dual>* at) const override {
+    return evaluate(front, n, wi, wo, at);
+  }
+  double pdf_from(bool front, const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
+                  const Rgb<double>* at) const override {
+    const Bsdf* const bsdf = side_of(0, front);
+    return bsdf ? bsdf->pdf_solid_angle(n, wi, wo, at_of(0, at)) : 0;
+  }
+  std::optional<Vec3d> sample_from(bool front, const Vec3d& n, const Vec3d& wi, double u1,
+                                   double u2, const Rgb<double>* at) const override {
+    const Bsdf* const bsdf = side_of(0, front);
+    return bsdf ? bsdf->sample(n, wi, u1, u2, at_of(0, at)) : std::nullopt;
+  }
+  int smooth_from(bool front, const Vec3<double>& n, const Vec3<double>& wi,
+                  SmoothRays<double>& rays, const Rgb<double>* at) const override {
+    return pass(front, n, wi, rays, at);
+  }
+  int smooth_from(bool front, const Vec3<Dual>& n, const Vec3<Dual>& wi, SmoothRays<Dual>& rays,
+                  const Rgb<Dual>* at) const override {
+    return pass(front, n, wi, rays, at);
+  }
+  double eta_from(bool front, const Rgb<double>* at) const override {
+    const Bsdf* const bsdf = side_of(0, front);
+    return bsdf ? bsdf->eta(at_of(0, at)) : 1;
+  }
+  LobeSummary lobe_from(bool front, const Rgb<double>* at) const override {
+    const Bsdf* const bsdf = side_of(0, front);
+    LobeSummary lobe = bsdf ? bsdf->lobe(at_of(0, at)) : LobeSummary(kHemisphere, 1, 0);
+    if (at || opacity_.texture < 0) lobe.albedo *= opacity(at);
+    return lobe;
+  }
+
+  template <class S>
+  Rgb<S> evaluate(bool front, const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo,
+                  const Rgb<S>* at) const {
+    const Bsdf* const bsdf = side_of(0, front);
+    return bsdf ? bsdf->eval(n, wi, wo, at_of(0, at)) * opacity(at) : Rgb<S>{};
+  }
+  // What is nested, then straight on.
+  template <class S>
+  int pass(bool front, const Vec3<S>& n, const Vec3<S>& wi, SmoothRays<S>& rays,
+           const Rgb<S>* at) const {
+    const Bsdf* const bsdf = side_of(0, front);
+    const int count = bsdf ? bsdf->smooth_rays(n, wi, rays, at_of(0, at)) : 0;
+    const S o = opacity(at);
+    for (int k = 0; k < count; ++k) rays[k].weight = rays[k].weight * o;
+    rays[count] = {-wi, grey(S(1.0 - o))};
+    return count + 1;
+  }
+
+  BsdfNumber opacity_;
+};
+
+// A texture or a number in [0, 1].
+ConstantOrTexture read_opacity(Properties& properties) {
+  if (auto texture = properties.texture("opacity")) return texture;
+  const double opacity = properties.number("opacity", 0.5);
+  return std::clamp(opacity, 0.0, 1.0);
+}
+
+}  // namespace
+
+std::shared_ptr<Bsdf> read_mask(Properties& properties) {
+  const ConstantOrTexture opacity = read_opacity(properties);
+  return std::make_shared<Mask>(read_nested(properties, 1, opacity.texture ? 1 : 0, 1), opacity);
+}
+
+std::shared_ptr<Bsdf> read_null(Properties& /*properties*/) {
+  std::vector<std::shared_ptr<Bsdf>> nothing{make_diffuse(grey(0.0))};
+  return std::make_shared<Mask>(std::move(nothing), 0.0);
+}
+
+}  // namespace limn
