@@ -51,7 +51,7 @@ class BruteForceSampler final : public ListingSampler {
     }
     for (const Edge& edge : mesh.edges) {
       const auto [a, b] = edge.faces;
-      packed.faces.push_back({a.index(), b.valid() ? b.index() : 0});
+      packed.faces.push_back({a.index(), b.valid() ? b.index() : a.index()});
       packed.needed.push_back(needed_sides(mesh, edge));
     }
     return packed;
@@ -64,6 +64,7 @@ class BruteForceSampler final : public ListingSampler {
       case EdgeClass::kFlat:
         return kFront | kBack;
       case EdgeClass::kSharp:
+      case EdgeClass::kTexture:
         return mesh.one_sided_closed ? kFront : 0;
       default:
         return 0;

@@ -36,6 +36,7 @@ Kind kind_of(const EdgeMesh& mesh, const Edge& edge) {
     case EdgeClass::kFlat:
       return Kind::kSilhouette;
     case EdgeClass::kSharp:
+    case EdgeClass::kTexture:
       return mesh.one_sided_closed ? Kind::kFacing : Kind::kAlways;
     default:
       return Kind::kAlways;
@@ -133,7 +134,8 @@ class DualTree {
   };
   Box box_of(uint32_t e) const {
     const auto [a, b] = mesh_.edges[e].faces;
-    const Dual first = dual_of(mesh_.plane(a)), second = dual_of(mesh_.plane(b));
+    const Dual first = dual_of(mesh_.plane(a)),
+               second = b.valid() ? dual_of(mesh_.plane(b)) : first;
     Box box{first, first};
     box.extend({second, second});
     return box;

@@ -27,8 +27,8 @@ Plane plane_of(const Mesh& mesh, const FaceIndices& face) {
 // Builds one EdgeMesh; its steps are called in the order of their definition.
 class Builder {
  public:
-  Builder(const Mesh& mesh, bool black_behind, ShapeId shape)
-      : mesh_(mesh), ids_(edge_vertex_ids(mesh)) {
+  Builder(const Mesh& mesh, bool black_behind, ShapeId shape, const TextureSeams* seams)
+      : mesh_(mesh), seams_(seams), ids_(edge_vertex_ids(mesh)) {
     result_.shape = shape;
     copy_vertices();
     for (const FaceIndices& face : mesh.faces) result_.planes.push_back(plane_of(mesh, face));
@@ -102,8 +102,43 @@ class Builder {
     const bool flat = is_flat(edge, fold);
     const bool continuous =
         mesh_.normal_source == NormalSource::kFace ? flat : normals_continuous(edge);
-    if (!continuous) return EdgeClass::kSharp;
+    if (!continuous || (seams_ && is_seam(edge))) return EdgeClass::kSharp;
     return flat ? EdgeClass::kFlat : EdgeClass::kSmooth;
+  }
+
+  // An end that is no corner of a face (a split side) counts as a seam.
+  bool is_seam(const Edge& edge) const {
+    if (seams_->everywhere) return true;
+    std::array<std::array<int, 2>, 2> corners;  // [face][end]
+    for (int f = 0; f < 2; ++f) {
+      for (int e = 0; e < 2; ++e) {
+        corners[f][e] = corner_of(edge.faces[f], edge.vertices[e]);
+        if (corners[f][e] < 0) return true;
+      }
+      const auto [a, b] = corners[f];
+      const int side = (a + 1) % 3 == b ? a : b;
+      if (!seams_->sides.empty() && (seams_->sides[edge.faces[f].index()] >> side & 1) != 0)
+        return true;
+    }
+    if (!seams_->coordinates) return false;
+    std::array<Vec3f, 2> shift;
+    for (int e = 0; e < 2; ++e) {
+      const auto place = [&](int f) {
+        return mesh_.uv_places[mesh_.uv_ids[edge.faces[f].index()][corners[f][e]]];
+      };
+      const Vec3f a = place(0), b = place(1);
+      shift[e] = {b.x - a.x, b.y - a.y, b.z - a.z};
+    }
+    if (!(shift[0] == shift[1])) return true;
+    if (!seams_->period_one || mesh_.uv_source != UvSource::kPlane) return !(shift[0] == Vec3f{});
+    return shift[0].x != std::round(shift[0].x) || shift[0].y != std::round(shift[0].y);
+  }
+
+  // Of the face, at the welded vertex; -1 if there is none.
+  int corner_of(FaceId face, VertexId vertex) const {
+    for (int k = 0; k < 3; ++k)
+      if (ids_[mesh_.face(face)[k]] == vertex) return k;
+    return -1;
   }
 
   // Coplanar up to the rounding of positions. Rounding may tilt slivers far, and two "flat" edges
@@ -127,10 +162,8 @@ class Builder {
   }
 
   const Vec3d* corner_normal(FaceId face, VertexId vertex) const {
-    for (int k = 0; k < 3; ++k)
-      if (ids_[mesh_.face(face)[k]] == vertex)
-        return &mesh_.normals[mesh_.normal_ids[face.index()][k]];
-    return nullptr;
+    const int k = corner_of(face, vertex);
+    return k < 0 ? nullptr : &mesh_.normals[mesh_.normal_ids[face.index()][k]];
   }
 
   bool is_closed() const {
@@ -161,6 +194,7 @@ class Builder {
   const Vec3d& position(VertexId vertex) const { return result_.position(vertex); }
 
   const Mesh& mesh_;
+  const TextureSeams* seams_;
   std::vector<VertexId> ids_;    // V
   std::vector<HalfEdge> sides_;  // sorted by edge
   EdgeMesh result_;
@@ -169,7 +203,8 @@ class Builder {
 }  // namespace
 
 const char* edge_class_name(EdgeClass edge_class) {
-  constexpr const char* kNames[] = {"smooth", "sharp", "border", "irregular", "flat", "crossing"};
+  constexpr const char* kNames[] = {"smooth", "sharp",    "border", "irregular",
+                                    "flat",   "crossing", "texture"};
   return kNames[static_cast<int>(edge_class)];
 }
 
@@ -178,8 +213,9 @@ uint64_t EdgeMesh::count(EdgeClass edge_class) const {
                        [&](const Edge& e) { return e.edge_class == edge_class; });
 }
 
-EdgeMesh build_edge_mesh(const Mesh& mesh, bool black_behind, ShapeId shape) {
-  return Builder(mesh, black_behind, shape).take();
+EdgeMesh build_edge_mesh(const Mesh& mesh, bool black_behind, ShapeId shape,
+                         const TextureSeams* seams) {
+  return Builder(mesh, black_behind, shape, seams).take();
 }
 
 // n . p + offset has four roundings of terms no larger than |p| and the extent; the offset has
@@ -201,13 +237,15 @@ std::optional<bool> known_candidate(const EdgeMesh& mesh, const Edge& edge) {
   if (edge.edge_class == EdgeClass::kBoundary || edge.edge_class == EdgeClass::kIrregular ||
       edge.edge_class == EdgeClass::kIntersection)
     return true;
-  if (edge.edge_class == EdgeClass::kSharp && !mesh.one_sided_closed) return true;
+  const bool seen = edge.edge_class == EdgeClass::kSharp || edge.edge_class == EdgeClass::kTexture;
+  if (seen && !mesh.one_sided_closed) return true;
   if (edge.edge_class == EdgeClass::kSmooth && edge.concave && mesh.one_sided_closed) return false;
   return {};
 }
 
 bool is_candidate(EdgeClass edge_class, Facing first, Facing second) {
   if (edge_class == EdgeClass::kSharp) return first.front || second.front;
+  if (edge_class == EdgeClass::kTexture) return first.front;
   return (first.front && second.back) || (first.back && second.front);
 }
 
@@ -218,8 +256,10 @@ bool is_candidate(const EdgeMesh& mesh, EdgeId id, const Vec3d& p) {
   if (const auto known = known_candidate(mesh, edge)) return *known;
   const double error = distance_error(mesh, p);
   const double d0 = mesh.plane(edge.faces[0]).distance(p);
+  const Facing first{d0 >= -error, d0 <= error};
+  if (edge.edge_class == EdgeClass::kTexture) return is_candidate(edge.edge_class, first, first);
   const double d1 = mesh.plane(edge.faces[1]).distance(p);
-  return is_candidate(edge.edge_class, {d0 >= -error, d0 <= error}, {d1 >= -error, d1 <= error});
+  return is_candidate(edge.edge_class, first, {d1 >= -error, d1 <= error});
 }
 
 bool is_candidate(const EdgeMesh& mesh, EdgeId id, Facing first, Facing second) {
@@ -230,6 +270,7 @@ bool is_candidate(const EdgeMesh& mesh, EdgeId id, Facing first, Facing second) 
 
 bool is_outline(const EdgeMesh& mesh, EdgeId id, const Vec3d& p) {
   const Edge& edge = mesh.edge(id);
+  if (edge.edge_class == EdgeClass::kTexture) return false;
   if (edge.edge_class != EdgeClass::kSharp) return is_candidate(mesh, id, p);
   if (edge.concave && mesh.one_sided_closed) return false;
   const double error = distance_error(mesh, p);

@@ -442,7 +442,8 @@ class Unifier {
 
   bool continues(EdgeRef id, FaceRef a, FaceRef b) const {
     const TouchingShape &shape_a = shapes_[a.shape.index()], &shape_b = shapes_[b.shape.index()];
-    if (shape_a.look != shape_b.look || !agree(plane(a).n, plane(b).n)) return false;
+    if (shape_a.look != shape_b.look || shape_a.textured || !agree(plane(a).n, plane(b).n))
+      return false;
     const auto normal_a = shading_normal(a), normal_b = shading_normal(b);
     if (!normal_a || !normal_b || !agree(*normal_a, *normal_b)) return false;
     const Vec3d x0 = position(id, 0), x1 = position(id, 1);

@@ -84,6 +84,16 @@ const char* fault_of_crossing(const EdgeMesh& mesh, EdgeId id) {
   return nullptr;
 }
 
+// Of a texture: it runs through one face.
+const char* fault_of_texture(const EdgeMesh& mesh, EdgeId id) {
+  const FacesAround around = mesh.around(id);
+  if (mesh.places.size() != mesh.positions.size()) return "there are other than V places";
+  if (around.faces.size() != 1) return "it is inside of other than one face";
+  if (around.incidence(0) != Incidence{.through = true, .motion_group = kNoMotionGroup})
+    return "its face ends there";
+  return fault_of_faces(mesh, id);
+}
+
 const char* fault_of_rims(const EdgeMesh& mesh, EdgeId id) {
   const FacesAround around = mesh.around(id);
   bool moves_with_it = false;
@@ -119,6 +129,7 @@ const char* fault_of_edge(const EdgeMesh& mesh, EdgeId id) {
   for (const VertexId vertex : edge.vertices)
     if (!(length(mesh.position(vertex)) <= mesh.extent)) return "an end lies beyond the extent";
   if (edge.edge_class == EdgeClass::kIntersection) return fault_of_crossing(mesh, id);
+  if (edge.edge_class == EdgeClass::kTexture) return fault_of_texture(mesh, id);
   if (const char* fault = fault_of_faces(mesh, id)) return fault;
   if (const char* fault = fault_of_rims(mesh, id)) return fault;
   return fault_of_class(mesh, id);

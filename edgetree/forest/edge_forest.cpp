@@ -43,7 +43,7 @@ struct EdgeForest::Impl {
   ForestConfig config;
   LightClusters lights;
   Forest forest;
-  ShapeId crossings;  // the object whose ends are not floats, or none
+  ShapeId crossings;  // the first object whose ends are not floats, or none: after all shapes
 
   ForestQuery prepare(const EdgeQuery& query) const {
     const bool lit = config.light_term && !lights.empty();
@@ -118,8 +118,8 @@ struct EdgeForest::Impl {
     return !OwnEdges(input, query, forest.extent).holds(edge);
   }
   Vec3d end_of(const EdgeNode& node, int lane, int e) const {
-    if (node.head.object == crossings) {
-      const EdgeMesh& mesh = input.object(crossings);
+    if (crossings.valid() && node.head.object.index() >= crossings.index()) {
+      const EdgeMesh& mesh = input.object(node.head.object);
       return mesh.position(mesh.edge(node.edge_at(lane).edge).vertices[e]);
     }
     return {node.ends[e][0][lane], node.ends[e][1][lane], node.ends[e][2][lane]};
@@ -137,9 +137,12 @@ std::unique_ptr<EdgeForest> EdgeForest::build(const EdgeSamplerInput& input, int
   // An environment that is not uniform has its own weight.
   const bool spread = config.environment_term && input.environment;
   const double uniform_luminance = spread ? 0 : input.environment_luminance;
-  const bool crosses = !input.objects.empty() && !input.objects.back().shape.valid();
-  const ShapeId crossings =
-      crosses ? ShapeId(static_cast<uint32_t>(input.objects.size() - 1)) : ShapeId::none();
+  uint32_t first = 0;  // of the objects that are no shapes
+  while (first < input.objects.size() && input.objects[first].shape.valid() &&
+         !input.objects[first].of_texture()) {
+    ++first;
+  }
+  const ShapeId crossings = first < input.objects.size() ? ShapeId(first) : ShapeId::none();
   auto impl =
       std::unique_ptr<Impl>(new Impl{input, config, LightClusters(input.lights, uniform_luminance),
                                      build_forest(input, threads, config), crossings});
@@ -231,7 +234,10 @@ bool EdgeForest::list_outlines(const EdgeQuery& query, const DirectionCone& dire
   const ForestCone cone(forest, query, directions, input.lane_scale);
   const OwnEdges own(input, query, forest.extent);
   static thread_local std::vector<NodeId> stack;
-  stack.assign(forest.roots.rbegin(), forest.roots.rend());
+  stack.clear();
+  for (auto root = forest.roots.rbegin(); root != forest.roots.rend(); ++root) {
+    if (!input.object(forest.head(*root).object).of_texture()) stack.push_back(*root);
+  }
   while (!stack.empty()) {
     const NodeId id = stack.back();
     stack.pop_back();

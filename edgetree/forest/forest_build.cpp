@@ -28,6 +28,7 @@ std::optional<ForestGroup> group_of(const EdgeMesh& mesh, const Edge& edge, bool
       if (cull_concave && edge.concave && mesh.one_sided_closed) return std::nullopt;
       return ForestGroup::kSilhouette;
     case EdgeClass::kSharp:
+    case EdgeClass::kTexture:
       return mesh.one_sided_closed ? ForestGroup::kFront : ForestGroup::kAlways;
     default:
       return ForestGroup::kAlways;

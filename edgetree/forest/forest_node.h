@@ -61,8 +61,9 @@ struct alignas(64) EdgeNode {
   Floats length;  // times inverse_radius^2; 0 if absent
   NodeHead head;
   Floats speed;
-  Ints edge;          // index in the object, or kNoChild
-  Floats ends[2][3];  // world space: exact, or rounded for intersection curves
+  Ints edge;  // index in the object, or kNoChild
+  Floats ends[2]
+             [3];  // world space: exact, or rounded where no ends are floats (crossings, textures)
 
   // The edge of a child that exists.
   EdgeRef edge_at(int lane) const {

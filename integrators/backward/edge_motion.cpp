@@ -1,5 +1,6 @@
-// Points of faces hang on their corners, and edges of meshes on their vertices; where edges were
-// cut, on the ends of the whole edge; curves where two faces cross, on the corners of both.
+// Points of faces hang on their corners, as do edges of textures, and edges of meshes on their
+// vertices; where edges were cut, on the ends of the whole edge; curves where two faces cross, on
+// the corners of both.
 #include "integrators/backward/edge_motion.h"
 
 #include <algorithm>
@@ -10,7 +11,7 @@
 namespace limn {
 
 bool EdgeMotion::moves(EdgeRef id) const {
-  if (!is_crossing(id)) return moves(id.object);
+  if (!is_crossing(id)) return moves(shape_of(id));
   for (const FaceRef face : input_.object(id.object).faces_around(id.edge))
     if (moves(face.shape)) return true;
   return false;
@@ -79,6 +80,14 @@ void EdgeMotion::contribute_end(Tape& tape, EdgeRef id, int end, const Vec3d& g)
   const VertexId vertex = mesh.edge(id.edge).vertices[end];
   if (is_crossing(id)) {
     contribute_crossing(tape, id, mesh.position(vertex), g);
+    return;
+  }
+  if (mesh.of_texture()) {
+    const auto [b1, b2] = mesh.places[vertex.index()];
+    const double weights[3] = {1 - b1 - b2, b1, b2};
+    const FaceId face = mesh.edge(id.edge).faces[0];
+    const FaceIndices& corners = slots_.scene->shape(mesh.shape).mesh.face(face);
+    for (int k = 0; k < 3; ++k) contribute_vertex(tape, mesh.shape, corners[k], g * weights[k]);
     return;
   }
   const size_t own = mesh.positions.size() - mesh.cuts.size();

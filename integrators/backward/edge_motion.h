@@ -45,6 +45,7 @@ class EdgeMotion {
 
  private:
   bool is_crossing(EdgeRef id) const { return !input_.object(id.object).shape.valid(); }
+  ShapeId shape_of(EdgeRef id) const { return input_.object(id.object).shape; }
   bool moves(ShapeId shape) const { return slots_.mesh(shape).positions != 0; }
   bool moves(EdgeRef id) const;
   bool moves(const MovingPoint& point) const;

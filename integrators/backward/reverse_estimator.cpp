@@ -9,6 +9,7 @@
 
 #include "integrators/backward/adjoint_sinks.h"
 #include "integrators/edges/scene_edges.h"
+#include "integrators/edges/texture_jumps.h"
 #include "integrators/estimates/contributions.h"
 #include "integrators/methods/selection.h"
 #include "integrators/paths/camera_path.h"
@@ -89,7 +90,7 @@ void ReverseEstimator::describe(BackwardResult& result) const {
   const auto& all = parameters_.parameters();
   if (!std::all_of(all.begin(), all.end(), [](const auto& p) { return p.colour; })) {
     warn_of_shadows_on_lifted_points(scene(), result.warnings);
-    warn_of_texture_edges(scene(), result.warnings);
+    check_texture_edges(scene(), result.warnings);
   }
 }
 

@@ -7,6 +7,7 @@
 #include <map>
 #include <set>
 
+#include "integrators/edges/texture_jumps.h"
 #include "limn/core/duplicate_faces.h"
 #include "limn/core/lights.h"
 #include "limn/core/names.h"
@@ -26,20 +27,23 @@ std::vector<TouchingShape> touching_shapes(const Scene& scene) {
     const Shape& shape = scene.shapes[s];
     const uint32_t look =
         shape.is_emitter ? s : first_of_bsdf.emplace(shape.bsdf.get(), s).first->second;
-    shapes.push_back({&shape.mesh, look});
+    shapes.push_back({&shape.mesh, look, shape.mesh.textured});
   }
   return shapes;
 }
+
+bool is_black_behind(const Shape& shape) { return shape.bsdf->side(false) == nullptr; }
 
 }  // namespace
 
 EdgeSamplerInput make_scene_edges(const Scene& scene, int threads) {
   EdgeSamplerInput input;
   std::vector<const Mesh*> meshes;
+  const TextureJumps textures(scene);
   for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
     const Shape& shape = scene.shapes[s];
-    const bool black_behind = shape.bsdf->side(false) == nullptr;
-    input.objects.push_back(build_edge_mesh(shape.mesh, black_behind, ShapeId(s)));
+    input.objects.push_back(build_edge_mesh(shape.mesh, is_black_behind(shape), ShapeId(s),
+                                            textures.seams(ShapeId(s))));
     meshes.push_back(&shape.mesh);
   }
   const Vec3d pinhole = value(scene.camera.origin);
@@ -49,6 +53,12 @@ EdgeSamplerInput make_scene_edges(const Scene& scene, int threads) {
   const std::vector<IntersectionSegment> crossings = find_intersections(meshes, pairs, threads);
   if (!crossings.empty() || !contacts.empty())
     input.objects.push_back(intersection_edges(meshes, crossings, contacts));
+  for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+    const auto segments = textures.segments(ShapeId(s));
+    if (segments.empty()) continue;
+    input.objects.push_back(
+        texture_edges(*meshes[s], input.objects[s], is_black_behind(scene.shapes[s]), segments));
+  }
   input.parting = parting;
   if (scene.environment) input.environment_luminance = scene.environment->mean_luminance();
   return input;
@@ -77,8 +87,10 @@ using ShapePair = std::array<ShapeId, 2>;
 // Those of lines of contact, not of crossings.
 std::set<ShapePair> pressed_pairs(const EdgeSamplerInput& edges) {
   std::set<ShapePair> pairs;
-  if (edges.objects.empty() || edges.objects.back().shape.valid()) return pairs;
-  const EdgeMesh& lines = edges.objects.back();
+  const auto is_of_lines = [](const EdgeMesh& mesh) { return !mesh.shape.valid(); };
+  const auto found = std::find_if(edges.objects.begin(), edges.objects.end(), is_of_lines);
+  if (found == edges.objects.end()) return pairs;
+  const EdgeMesh& lines = *found;
   for (uint32_t e = 0; e < lines.edges.size(); ++e) {
     const FacesAround around = lines.around(EdgeId(e));
     if (around.incidence(0).motion_group == kNoMotionGroup) continue;
@@ -136,21 +148,6 @@ void warn_of_shadows_on_lifted_points(const Scene& scene, std::vector<std::strin
         "a finer mesh or area lights make the missing part smaller",
         quoted_name(scene, ShapeId(i))));
   }
-}
-
-void warn_of_texture_edges(const Scene& scene, std::vector<std::string>& warnings) {
-  std::vector<std::string> names;
-  for (uint32_t i = 0; i < scene.shapes.size(); ++i) {
-    if (scene.shapes[i].mesh.textured) names.push_back(quoted_name(scene, ShapeId(i)));
-  }
-  if (names.empty()) return;
-  constexpr size_t kMost = 8;
-  const size_t more = names.size() > kMost ? names.size() - kMost : 0;
-  names.resize(names.size() - more);
-  warnings.push_back(fmt::format(
-      "derivatives with respect to what moves are incomplete: edges inside textures and at their "
-      "seams are not differentiated, on {}{}",
-      join(names), more > 0 ? fmt::format(" and {} more", more) : ""));
 }
 
 }  // namespace limn

@@ -10,7 +10,7 @@ namespace limn {
 
 // Edges of all shapes (object i is shape i), united where they touch, after them the curves where
 // surfaces cross (if any do), light polygons and the environment's mean. The result does not depend
-// on `threads`.
+// on `threads`. Edges of textures come last, an object for each shape that has some.
 EdgeSamplerInput make_sampler_input(const Scene& scene, int threads);
 // The same in two steps: all but light polygons and the environment over directions; and these.
 EdgeSamplerInput make_scene_edges(const Scene& scene, int threads);
@@ -23,8 +23,5 @@ void warn_of_contacts(const Scene& scene, const EdgeSamplerInput* edges,
 // One for each shape with interpolated normals on which hard shadows fall: silhouettes as delta
 // lights see them are not all that parts light from shadow on points that are lifted from faces.
 void warn_of_shadows_on_lifted_points(const Scene& scene, std::vector<std::string>& warnings);
-
-// One that names the shapes whose textures jump, inside faces or at seams: edges that no term has.
-void warn_of_texture_edges(const Scene& scene, std::vector<std::string>& warnings);
 
 }  // namespace limn

@@ -173,9 +173,10 @@ Facing Viewpoint::facing(const EdgeMesh& mesh, FaceId face) const {
 
 bool Viewpoint::is_candidate(const EdgeMesh& mesh, EdgeId id) const {
   const Edge& edge = mesh.edge(id);
-  if (edge_on_count_ == 0 || !edge.faces[1].valid())
-    return limn::is_candidate(mesh, id, value(origin_.v));
-  return limn::is_candidate(mesh, id, facing(mesh, edge.faces[0]), facing(mesh, edge.faces[1]));
+  if (edge_on_count_ == 0) return limn::is_candidate(mesh, id, value(origin_.v));
+  const Facing first = facing(mesh, edge.faces[0]);
+  const FaceId second = edge.faces[1];
+  return limn::is_candidate(mesh, id, first, second.valid() ? facing(mesh, second) : first);
 }
 
 Viewpoints::Viewpoints(const Scene& scene) : camera(scene, {scene.camera.origin}) {

@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "integrators/edges/scene_edges.h"
+#include "integrators/edges/texture_jumps.h"
 #include "integrators/estimates/batches.h"
 #include "integrators/film/film_regions.h"
 #include "integrators/methods/selection.h"
@@ -129,7 +130,7 @@ class TermJob {
     result.at_kink = result.warnings.size() > warned;
     warn_of_faces_edge_on(scene_, pass(0).viewpoints(), result.warnings);
     if (moves_) warn_of_shadows_on_lifted_points(scene_, result.warnings);
-    if (moves_) warn_of_texture_edges(scene_, result.warnings);
+    if (moves_) check_texture_edges(scene_, result.warnings);
     for (size_t p = 0; p < passes_.size(); ++p)
       result.at_kink = result.at_kink || pass(p).viewpoints().cross_planes();
     plan(settings, watch, result);

@@ -11,11 +11,12 @@
 
 namespace limn {
 
-// Whether an edge moves as all faces do that it belongs to. Lines where surfaces cross do not, nor
-// do edges of several surfaces that touch, in general: no field that is made of what surfaces do
-// goes over into their velocity.
+// Whether an edge moves as all faces do that it belongs to, and is on the border of these. Lines
+// where surfaces cross do not, nor do edges of several surfaces that touch, in general: no field
+// that is made of what surfaces do goes over into their velocity. (Edges of textures are inside.)
 inline bool is_followed(const Edge& edge) {
-  return edge.edge_class != EdgeClass::kIntersection && edge.edge_class != EdgeClass::kIrregular;
+  return edge.edge_class != EdgeClass::kIntersection && edge.edge_class != EdgeClass::kIrregular &&
+         edge.edge_class != EdgeClass::kTexture;
 }
 // Takes them out of the mesh's edges; what is left is numbered anew.
 void leave_out_followed(EdgeMesh& mesh);

@@ -551,8 +551,9 @@ void TermEstimator::describe(GradientStats& stats) const {
   if (visible_) stats.setup.emplace_back("visible regions", visible_->seconds());
   if (const EdgeSamplerInput* edges = input_.made_edges()) {
     stats.setup.emplace_back("edges", input_.edges_seconds());
-    for (const EdgeClass c : {EdgeClass::kSmooth, EdgeClass::kSharp, EdgeClass::kBoundary,
-                              EdgeClass::kIrregular, EdgeClass::kFlat, EdgeClass::kIntersection}) {
+    for (const EdgeClass c :
+         {EdgeClass::kSmooth, EdgeClass::kSharp, EdgeClass::kBoundary, EdgeClass::kIrregular,
+          EdgeClass::kFlat, EdgeClass::kIntersection, EdgeClass::kTexture}) {
       uint64_t count = 0;
       for (const EdgeMesh& object : edges->objects) count += object.count(c);
       stats.edges.emplace_back(edge_class_name(c), count);

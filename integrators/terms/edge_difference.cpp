@@ -88,6 +88,16 @@ Sides nearest_faces(const PathContext& context, const EdgeMesh& mesh, const Edge
   return sides;
 }
 
+// Textures may jump at the edge: they are looked up beside it, where one that is smooth changes by
+// 2^-26 of what it does over the face. No jump that is told from this one (texture_jumps.cpp) is as
+// near.
+void step_aside(const std::array<Vec3d, 3>& corners, const Vec3d& into, std::array<double, 2>& b) {
+  const Vec3d e1 = corners[1] - corners[0], e2 = corners[2] - corners[0], n = cross(e1, e2);
+  const double slope[2] = {dot(cross(into, e2), n), dot(cross(e1, into), n)};
+  const double step = 0x1p-26 / (std::fabs(slope[0]) + std::fabs(slope[1]));
+  for (int k = 0; k < 2; ++k) b[k] += slope[k] * step;
+}
+
 // Radiance on both sides of an edge, by paths that go side by side: from the nearest face, or from
 // what lies behind.
 class RadianceBeside {
@@ -106,7 +116,9 @@ class RadianceBeside {
     if (dot(n, view_.omega) < 0) n = -n;
     edges_[i] = {around, view_.x0, view_.x1, side};
     walks_[i].edge = &edges_[i];
-    start(i, surface_on_ray(scene_, side.face, view_.y, n));
+    SurfacePoint<double> surface = surface_on_ray(scene_, side.face, view_.y, n);
+    if (surface.shape->mesh.textured) step_aside(corners, side.into, surface.b);
+    start(i, surface);
   }
   void start_behind(int i, FaceRef face) {
     start(i, surface_on_ray(scene_, face, view_.p, view_.omega));
@@ -152,6 +164,27 @@ class RadianceBeside {
   size_t count_ = 0;
 };
 
+// Across an edge inside of a face, where the face's texture jumps.
+bool texture_difference(const PathContext& context, const FacesAround& around, const EdgeView& view,
+                        const Ray& ray, bool known_to_be_seen, RadianceBeside& beside,
+                        RayCount& rays, Rgb<double>& jump) {
+  const FaceRef face = around.faces[0];
+  if (ray.skip_emitters && context.scene.shape(face.shape).is_emitter) return false;
+  if (!known_to_be_seen) {
+    Ray to_face = ray;
+    to_face.end = face;
+    to_face.t_max = view.distance * (1 - 0x1p-20);  // as shadow rays end
+    ++rays.shadow;
+    if (context.tracer.occluded(to_face)) return false;
+  }
+  const FaceSide side = side_of_face(context.scene, face, view.x0, normalize(view.x1 - view.x0));
+  const bool positive = dot(side.into, view.side) > 0;
+  beside.start_on_face(positive ? 1 : 0, around, side);
+  beside.start_on_face(positive ? 0 : 1, around, {face, -side.into, side.rounding});
+  jump = beside.jump();
+  return true;
+}
+
 }  // namespace
 
 bool edge_difference(const PathContext& context, const EdgeMesh& mesh, const EdgeView& view,
@@ -162,7 +195,14 @@ bool edge_difference(const PathContext& context, const EdgeMesh& mesh, const Edg
   ray.t_min = t_min;
   ray.t_max = t_max;
   ray.start = start;
+  ray.skip_emitters = bounces == 0 && context.scene.hide_emitters;
   const FacesAround around = mesh.around(view.id.edge);
+  // Both sides share their random numbers: where they hardly differ, so do their estimates.
+  RadianceBeside beside(context, view, bounces, key.at(Purpose::kEdgeSide, bounces), rays, part);
+  if (mesh.of_texture()) {
+    return texture_difference(context, around, view, ray, known_behind != nullptr, beside, rays,
+                              jump);
+  }
   fetch_faces(context.scene, around);
   ray.skip_faces = around.all;
   if (part.region && around.near.empty()) {
@@ -173,7 +213,6 @@ bool edge_difference(const PathContext& context, const EdgeMesh& mesh, const Edg
     if (std::all_of(around.faces.begin(), around.faces.end(), is_of_emitter))
       ray.skip_faces = emitter;
   }
-  ray.skip_emitters = bounces == 0 && context.scene.hide_emitters;
   fetch_corners(context.scene, around);  // while the ray is traced
   Hit behind;
   bool found;
@@ -188,8 +227,6 @@ bool edge_difference(const PathContext& context, const EdgeMesh& mesh, const Edg
   }
 
   const Sides sides = nearest_faces(context, mesh, view, ray.skip_emitters);
-  // Both sides share their random numbers: where they hardly differ, so do their estimates.
-  RadianceBeside beside(context, view, bounces, key.at(Purpose::kEdgeSide, bounces), rays, part);
   for (int i = 0; i < 2; ++i) {
     if (const auto& side = i == 0 ? sides.negative : sides.positive) {
       beside.start_on_face(i, around, *side);

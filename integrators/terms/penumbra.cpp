@@ -92,6 +92,7 @@ std::optional<EmitterEdges::Weight> EmitterEdges::weigh(size_t k, EdgeRef id) co
     return d > slack ? 1 : d < -slack ? -1 : 0;
   };
   const EdgeClass kind = edge.edge_class;
+  if (kind == EdgeClass::kTexture) return {};  // it hides nothing
   if (kind == EdgeClass::kSmooth || kind == EdgeClass::kSharp || kind == EdgeClass::kFlat) {
     const int side = side_of(mesh.plane(edge.faces[0]));
     if (side != 0 && side == side_of(mesh.plane(edge.faces[1]))) return {};

@@ -85,6 +85,7 @@ ShadowEdges::ShadowEdges(const PathContext& context, const EdgeSamplerInput& inp
 
 void ShadowEdges::list(uint32_t light, ShapeId object) {
   const EdgeMesh& mesh = input_.object(object);
+  if (mesh.of_texture()) return;  // they hide nothing
   const DeltaLight& of = *context_.scene.delta_lights[light];
   const LightOrigin origin = of.origin();
   for (uint32_t e = 0; e < mesh.edges.size(); ++e) {

@@ -1,6 +1,8 @@
 // The table of texture types, and what they share.
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "limn/core/image.h"
 #include "limn/core/names.h"
 #include "src/texture/types.h"
@@ -32,6 +34,13 @@ std::shared_ptr<Texture> make_texture(Properties& properties) {
 bool UvTransform::is_identity() const {
   return m[0][0] == 1 && m[0][1] == 0 && m[0][2] == 0 && m[1][0] == 0 && m[1][1] == 1 &&
          m[1][2] == 0;
+}
+
+bool UvTransform::keeps_integers() const {
+  for (const auto& row : m) {
+    if (row[0] != std::round(row[0]) || row[1] != std::round(row[1])) return false;
+  }
+  return true;
 }
 
 std::string UvTransform::describe() const {

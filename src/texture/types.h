@@ -21,6 +21,8 @@ struct UvTransform {
             m[1][0] * uv[0] + m[1][1] * uv[1] + m[1][2]};
   }
   bool is_identity() const;
+  // Whether coordinates that differ by integers are mapped to such.
+  bool keeps_integers() const;
   std::string describe() const;  // ", to_uv ..."; "" for the identity
 };
 

@@ -17,6 +17,14 @@ def rgb(name, values):
 def obj_text(shape):
     """A "split" shape repeats each face's corners and gives the face's normal."""
     lines = []
+    if shape.uv is not None:
+        lines += ["v " + " ".join(f"{x:.9g}" for x in v) for v in shape.vertices]
+        lines += [f"vt {u:.9g} {v:.9g}" for uv in shape.uv for u, v in uv]
+        first = 1
+        for face in shape.faces:
+            lines.append("f " + " ".join(f"{k + 1}/{first + m}" for m, k in enumerate(face)))
+            first += len(face)
+        return "\n".join(lines) + "\n"
     if shape.writer != "split":
         lines += ["v " + " ".join(f"{x:.9g}" for x in v) for v in shape.vertices]
         lines += ["f " + " ".join(str(k + 1) for k in face) for face in shape.faces]
@@ -34,6 +42,10 @@ def obj_text(shape):
 
 
 def bsdf_xml(bsdf):
+    if bsdf.colors is not None:
+        colors = "".join(rgb(f"color{k}", color) for k, color in enumerate(bsdf.colors))
+        return (f'  <bsdf type="diffuse" id="{bsdf.id}">\n    <texture name="reflectance" '
+                f'type="checkerboard">{colors}</texture>\n  </bsdf>\n')
     if bsdf.kind == "diffuse":
         return (f'  <bsdf type="diffuse" id="{bsdf.id}">'
                 f'{rgb("reflectance", bsdf.reflectance)}</bsdf>\n')
@@ -48,6 +60,8 @@ def shape_xml(name, shape, mesh_file):
         head = (f'  <shape type="obj" id="{name}">\n'
                 f'    <string name="filename" value="{mesh_file}"/>'
                 f'<boolean name="face_normals" value="{str(shape.face_normals).lower()}"/>\n')
+        if shape.uv is not None:
+            head += '    <boolean name="flip_tex_coords" value="false"/>\n'
     else:
         head = (f'  <shape type="rectangle" id="{name}">\n    <transform name="to_world">'
                 f'<scale value="8"/><rotate x="1" angle="-90"/></transform>\n')

@@ -21,6 +21,7 @@ class Shape:
     writer: str = "obj"  # "obj", "split" (24-vertex style with normals), "floor" (a rectangle)
     face_normals: bool = True
     hole: list = field(default_factory=list)  # loops that would close an open convex mesh
+    uv: list = None  # texture coordinates: for every face K by 2, affine over it
 
     def face(self, k):
         return self.vertices[self.faces[k]]
@@ -31,12 +32,16 @@ class Shape:
 
 @dataclass
 class Bsdf:
-    """kind: diffuse, ggx or beckmann (roughconductor with eta 0, k 1, so Fresnel = 1)."""
+    """kind: diffuse, ggx or beckmann (roughconductor with eta 0, k 1, so Fresnel = 1).
+
+    colors: 2 by 3, of a checkerboard in the place of the reflectance; its squares are halves of uv.
+    """
 
     id: str
     kind: str = "diffuse"
     reflectance: np.ndarray = None
     alpha: float = 0.0
+    colors: np.ndarray = None
 
 
 @dataclass
@@ -146,7 +151,10 @@ def moved(scene, name, step):
         move_light(scene.lights[owner], what, axis, step)
     elif what in ("reflectance", "alpha"):
         bsdf = next(s.bsdf for s in scene.shapes.values() if s.bsdf and s.bsdf.id == owner)
-        setattr(bsdf, what, getattr(bsdf, what) + step)
+        if rest:  # color0 or color1
+            bsdf.colors[int(rest[0][-1])] += step
+        else:
+            setattr(bsdf, what, getattr(bsdf, what) + step)
     elif what == "radiance":
         if owner == "environment":
             scene.environment = scene.environment + step
@@ -236,6 +244,21 @@ def clip_box(polygon, lower, upper):
         normal = np.eye(2)[axis]
         polygon = clip(clip(polygon, normal, lower[axis]), -normal, -upper[axis])
     return polygon
+
+
+def squares(shape, k):
+    """The squares of a checkerboard on face k of a shape: (loop, which colour) of each."""
+    loop, uv = shape.face(k), np.asarray(shape.uv[k], dtype=float)
+    to_space = np.linalg.lstsq(np.column_stack([uv, np.ones(len(uv))]), loop, rcond=None)[0]
+    first, end = np.floor(2 * uv.min(axis=0)), np.ceil(2 * uv.max(axis=0))
+    found = []
+    for i in range(int(first[0]), int(end[0])):
+        for j in range(int(first[1]), int(end[1])):
+            part = clip_box(uv, np.array([i, j]) / 2, np.array([i + 1, j + 1]) / 2)
+            if len(part):
+                found.append((np.column_stack([part, np.ones(len(part))]) @ to_space,
+                              0 if i % 2 == j % 2 else 1))
+    return found
 
 
 def clip_convex(polygon, clipper):

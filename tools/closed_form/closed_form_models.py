@@ -12,7 +12,7 @@ All three moved together give the picture of the moved scene, so the terms add u
 import numpy as np
 
 from closed_form_geometry import (clip, clip_box, clip_convex, hit_plane, loop_normal, loop_rule,
-                                  shadow_on_plane, square_rule, unit)
+                                  shadow_on_plane, square_rule, squares, unit)
 from closed_form_radiance import (Filter, convex_vector, lobe, lobe_over_polygon, polygon_area,
                                   polygon_vector)
 
@@ -171,6 +171,26 @@ class WedgeInGloss(FloorModel):
 
         return lobe_over_polygon(p, floor_normal(shade), viewer, shade.shapes["floor"].bsdf, lit,
                                  4 * order, reflected)
+
+
+class BoardInGloss(FloorModel):
+    """A checkerboard that a lamp lights, over a glossy floor, which sees the lamp's back.
+
+    A square's radiance is rho / pi L_e n.Phi_lamp(x): L is the sum over squares of its integral.
+    """
+
+    def radiance(self, shade, outline, p, viewer, order):
+        board, bsdf = outline.shapes["board"], shade.shapes["board"].bsdf
+        lamp, n = outline.shapes["lamp"].face(0), loop_normal(shade.shapes["board"].face(0))
+        assert np.all((p - lamp[0]) @ loop_normal(lamp) < 0), "the floor sees the lamp's front"
+        emitted = shade.shapes["lamp"].radiance
+
+        def irradiance(x):
+            return (polygon_vector(x, lamp_loop(outline, x)) @ n)[:, None] * emitted
+
+        return sum(lobe_over_polygon(p, floor_normal(shade), viewer, shade.shapes["floor"].bsdf, loop,
+                                     4 * order, irradiance) * bsdf.colors[color] / np.pi
+                   for loop, color in squares(board, 0))
 
 
 class SharpShadow(FloorModel):
@@ -335,6 +355,21 @@ class ConvexInView:
         rho = shade.shapes["object"].bsdf.reflectance
         return pixels(camera, lambda box: sky + (rho - 1) * sky * sum(
             polygon_area(clip_box(f, box, box + 1)) for f in front))
+
+
+class BoardInView:
+    """Flat checkerboards under a constant sky of radiance L_e, which is the background too: the
+    radiance of a square is rho L_e, and I = L_e + sum over squares of (rho - 1) L_e c(square)."""
+
+    outlines_in_view = True
+
+    def image(self, domain, shade, outline, shadow, order):
+        camera, sky, shape = domain.camera, shade.environment, domain.shapes["board"]
+        colors = shade.shapes["board"].bsdf.colors
+        parts = [(film_loop(domain, loop), (colors[color] - 1) * sky)
+                 for k in range(len(shape.faces)) for loop, color in squares(shape, k)]
+        return pixels(camera, lambda box: sky + sum(
+            excess * polygon_area(clip_box(loop, box, box + 1)) for loop, excess in parts))
 
 
 class ReceiverInView:

@@ -257,6 +257,58 @@ def shadow_in_gloss():
     return scene, models.SharpShadowInGloss(), names
 
 
+COLORS = [[0.875, 0.5, 0.125], [0.125, 0.25, 0.75]]
+
+
+def board(shape, uv):
+    """A checkerboard; uv: of every face."""
+    shape.bsdf = Bsdf("board_bsdf", colors=vector(*np.ravel(COLORS)).reshape(2, 3))
+    shape.uv = [vector(*np.ravel(corners)).reshape(-1, 2) for corners in uv]
+    return shape
+
+
+def boards_in_view(name, vertices, faces, uv):
+    camera = Camera(vector(0.125, 2.5, -2.0625), vector(0.3125, -0.125, -0.25), vector(0, 1, 0), 39,
+                    4, 4)
+    shape = board(Shape(vector(*np.ravel(vertices)).reshape(-1, 3), faces), uv)
+    scene = Scene(f"{name}.xml", camera, {"board": shape}, 2, vector(1, 1, 1))
+    names = moves_of("board") + SENSOR + ["environment.radiance"]
+    return scene, models.BoardInView(), names + [f"board_bsdf.reflectance.color{k}" for k in (0, 1)]
+
+
+def board_in_sky():
+    corner, a, b = vector(-0.5, 0, -0.5), vector(0.125, 0.25, 1), vector(1, 0.125, -0.125)
+    return boards_in_view("board_in_sky", [corner, corner + a, corner + a + b, corner + b],
+                          [[0, 1, 2, 3]], [[[0, 0.4375], [1, 0.9375], [0.75, 1.9375], [-0.25, 1.4375]]])
+
+
+def seam_in_sky():
+    """Three boards in one plane. Squares end exactly at the first's borders and at its common edge
+    with the second; the edge of the second and the third is a seam."""
+    o, a = vector(-0.5625, 0, -0.5), vector(0.125, 0.25, 1)
+    b = vector(0.375, 0.046875, -0.046875) * (33 / 32)
+    vertices = [o + k * b + side * a for k in range(4) for side in (0, 1)]
+    faces = [[2 * k, 2 * k + 1, 2 * k + 3, 2 * k + 2] for k in range(3)]
+
+    def uv(u, v):
+        return [[u, v], [u, v + 1], [u + 0.5, v + 1], [u + 0.5, v]]
+
+    return boards_in_view("seam_in_sky", vertices, faces,
+                          [uv(0, 0), uv(0.5, 0), uv(0.25, 0.125)])
+
+
+def board_in_gloss():
+    shape = board(parallelogram((-1, 2.75, -0.75), (1, -0.625, 0.0625), (0.125, 0.125, 1.5)),
+                  [[[0.125, 0.25], [0.75, 0.375], [0.625, 1.125], [0, 1]]])
+    shapes = {"floor": floor("ggx", 0.375), "board": shape,
+              "lamp": lamp(parallelogram((-3, 1, -0.5), (0, 0, 1), (0.75, -0.125, 0)), (16, 8, 4))}
+    scene = Scene("board_in_gloss.xml", floor_camera((1, 1)), shapes, 3)
+    names = ["board.translate.x", "board.translate.y", "board.rotate.z", "board.scale",
+             "lamp.translate.x", "floor.translate.y", "floor.rotate.x", "sensor.translate.x",
+             "board_bsdf.reflectance.color0", "board_bsdf.reflectance.color1"]
+    return scene, models.BoardInGloss(), names
+
+
 SCENES = {
     "convex_over_plane": convex_over_plane,
     "lamp_over_plane": lamp_over_plane,
@@ -284,4 +336,7 @@ SCENES = {
     "shadow_of_spot": lambda: shadow_of_spot("shadow_of_spot", 30, 20),
     "shadow_in_falloff": lambda: shadow_of_spot("shadow_in_falloff", 30, 1),
     "shadow_in_gloss": shadow_in_gloss,
+    "board_in_sky": board_in_sky,
+    "seam_in_sky": seam_in_sky,
+    "board_in_gloss": board_in_gloss,
 }

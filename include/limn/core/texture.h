@@ -53,16 +53,22 @@ class Texture : public TexelMap {
   // weighted sum is looked up.
   virtual TexelWeights texel_weights(const TexturePoint<double>& /*point*/) const { return {}; }
 
-  // Where `eval` jumps on a face whose corners have these texture coordinates: adds line segments
-  // by their ends' barycentric coordinates (of the second and third corner). False if there would
-  // be more than `most` in the list.
+  // Where `eval` jumps on a face.
   struct Jump {
-    std::array<double, 2> from, to;
+    std::array<double, 2> from, to;  // barycentric coordinates of the second and third corner
   };
+  struct Jumps {
+    std::vector<Jump> inside;  // line segments
+    uint8_t sides = 0;         // bit k: along the side from corner k to the next
+  };
+  // Adds those of a face over which texture coordinates are linear, from these of its corners.
+  // False if there would be more than `most` inside; then what is added is not all.
   virtual bool add_jumps(const std::array<std::array<double, 2>, 3>& /*uv*/, size_t /*most*/,
-                         std::vector<Jump>& /*jumps*/) const {
+                         Jumps& /*jumps*/) const {
     return true;
   }
+  // Whether `eval` may jump at every edge of the mesh.
+  virtual bool jumps_between_faces() const { return false; }
   // Whether texture coordinates that differ by integers look up the same value.
   virtual bool has_period_one() const { return false; }
 

@@ -29,6 +29,9 @@ enum class EdgeClass : uint8_t {
   // An intersection segment of two faces of any shapes, see crossing_curves.h. Treated as
   // discontinuous from everywhere.
   kIntersection,
+  // A segment inside of a face across which its texture jumps, see texture_edges.h: discontinuous
+  // where p sees the face. It hides nothing.
+  kTexture,
 };
 
 const char* edge_class_name(EdgeClass edge_class);
@@ -92,6 +95,9 @@ struct EdgeMesh {
   std::vector<Plane> planes;    // F, outward, double precision
   std::vector<Edge> edges;      // E
   ShapeId shape;                // the shape of `planes`; none for intersection curves
+  // Of the edges of a texture, an object of their own: V, where vertices lie on their edge's first
+  // face, by the barycentric coordinates of its second and third corner. Else empty.
+  std::vector<std::array<double, 2>> places;
   // Faces around edge e, of any shape: incident_faces[face_offsets[e], face_offsets[e + 1]). Those
   // of `shape` come first.
   std::vector<uint32_t> face_offsets;  // E + 1
@@ -105,10 +111,11 @@ struct EdgeMesh {
   // no discontinuity at a sharp edge, and concave edges are never silhouettes from outside. United
   // edges are irregular and exempt from this rule. Requires that every connected component encloses
   // positive volume (false for inverted components and for cavities). Self-intersections are not
-  // tested.
+  // tested. Of the edges of a texture: true if faces are black from behind.
   bool one_sided_closed = false;
   double extent = 0;  // largest |x| of a position in use
 
+  bool of_texture() const { return !places.empty(); }
   const Edge& edge(EdgeId id) const { return edges[id.index()]; }
   const Plane& plane(FaceId id) const { return planes[id.index()]; }
   const Vec3d& position(VertexId id) const { return positions[id.index()]; }
@@ -156,12 +163,24 @@ struct EdgeRef {
   bool operator==(const EdgeRef&) const = default;
 };
 
+// Where a textured surface may jump at edges between two faces: these are sharp then.
+struct TextureSeams {
+  bool everywhere = false;  // at all of them
+  // Where the faces' texture coordinates differ, or (period_one) differ by other than integers.
+  bool coordinates = false;
+  bool period_one = false;
+  // F: bit k is set where the texture jumps along the face's side from corner k to the next; or
+  // empty.
+  std::vector<uint8_t> sides = {};
+};
+
 // Builds the edges of a mesh; mesh.weld must be filled. black_behind: the mesh's BSDF is black
 // from behind. shape: the mesh's shape. Degenerate faces keep a zero normal in `planes` and
 // have no edges: adjacent sides are split at their corners, so that the real neighbours
 // connect. Copies of a vertex with different motions tear the surface: both sides become
-// boundary edges.
-EdgeMesh build_edge_mesh(const Mesh& mesh, bool black_behind, ShapeId shape = ShapeId(0));
+// boundary edges. seams: across which of its edges the surface's texture jumps; null: none.
+EdgeMesh build_edge_mesh(const Mesh& mesh, bool black_behind, ShapeId shape = ShapeId(0),
+                         const TextureSeams* seams = nullptr);
 
 // Bound of the rounding error of Plane::distance(p) for the planes of a mesh. Within it, p counts
 // as on both sides.
@@ -172,7 +191,7 @@ double distance_error(const EdgeMesh& mesh, const Vec3d& p);
 // planes (within rounding of a plane it counts as on both sides, so no edge is lost); never if
 // concave and one_sided_closed, as the mesh itself then occludes the edge. Sharp: p is in front of
 // at least one face, or the mesh is not one_sided_closed. Boundary, irregular, intersection:
-// always. Flat: as smooth.
+// always. Flat: as smooth. Texture: p is in front of the face, or the mesh is not one_sided_closed.
 bool is_candidate(const EdgeMesh& mesh, EdgeId edge, const Vec3d& p);
 
 // The sides of a face's plane on which a point counts as lying; both within rounding
@@ -181,7 +200,7 @@ struct Facing {
   bool front, back;
 };
 Facing facing(const EdgeMesh& mesh, FaceId face, const Vec3d& p);
-// is_candidate for an edge with two faces, given on which sides of them p lies.
+// is_candidate for an edge, given on which sides of its two faces p lies; twice the same for one.
 bool is_candidate(const EdgeMesh& mesh, EdgeId edge, Facing first, Facing second);
 
 // True if the edge is in E(p) and geometry behind it may be visible beside it: silhouettes

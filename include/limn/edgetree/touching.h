@@ -15,6 +15,7 @@ struct TouchingShape {
   const Mesh* mesh = nullptr;
   // Shapes with the same number look alike (same BSDF, no emission) and differ in geometry only.
   uint32_t look = 0;
+  bool textured = false;  // its faces look different from one another
 };
 
 // Touching shapes with different motions.

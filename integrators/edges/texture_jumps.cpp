@@ -1,0 +1,150 @@
+// Which textures jump where.
+#include "integrators/edges/texture_jumps.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "limn/core/duplicate_faces.h"
+#include "limn/core/names.h"
+
+namespace limn {
+namespace {
+
+std::vector<const Texture*> textures_of(const Shape& shape) {
+  std::vector<const Texture*> textures;
+  for (int k = 0; k < shape.bsdf->texture_count(); ++k) {
+    textures.push_back(&shape.bsdf->texture(k));
+  }
+  return textures;
+}
+
+// Where texture coordinates are not linear over faces: jumps inside of the unit square, or at its
+// ends, where an angle comes back to its beginning.
+bool jumps_anywhere(const Texture& texture) {
+  Texture::Jumps jumps;
+  const bool few = texture.add_jumps({{{0, 0}, {1, 0}, {1, 1}}}, 1, jumps) &&
+                   texture.add_jumps({{{0, 0}, {1, 1}, {0, 1}}}, 1, jumps);
+  return !few || !jumps.inside.empty() || !texture.has_period_one();
+}
+
+bool is_near(const std::array<double, 2>& a, const std::array<double, 2>& b) {
+  constexpr double kNear = 0x1p-22;
+  return std::fabs(a[0] - b[0]) <= kNear && std::fabs(a[1] - b[1]) <= kNear;
+}
+
+// Lines that two textures have in common.
+void leave_out_copies(std::vector<Texture::Jump>& jumps) {
+  std::vector<Texture::Jump> kept;
+  for (const Texture::Jump& jump : jumps) {
+    const bool known = std::any_of(kept.begin(), kept.end(), [&](const Texture::Jump& other) {
+      return (is_near(jump.from, other.from) && is_near(jump.to, other.to)) ||
+             (is_near(jump.from, other.to) && is_near(jump.to, other.from));
+    });
+    if (!known) kept.push_back(jump);
+  }
+  jumps = std::move(kept);
+}
+
+}  // namespace
+
+TextureJumps::TextureJumps(const Scene& scene) {
+  for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+    if (scene.shapes[s].mesh.textured) look_at(scene, ShapeId(s));
+  }
+}
+
+void TextureJumps::look_at(const Scene& scene, ShapeId id) {
+  const Shape& shape = scene.shape(id);
+  const Mesh& mesh = shape.mesh;
+  shapes_.resize(scene.shapes.size());
+  OfShape& result = shapes_[id.index()];
+  TextureSeams& seams = result.seams;
+  std::vector<const Texture*> textures;
+  seams.period_one = true;
+  for (const Texture* texture : textures_of(shape)) {
+    seams.everywhere = seams.everywhere || texture->jumps_between_faces();
+    if (!texture->needs_uv()) continue;
+    textures.push_back(texture);
+    seams.coordinates = true;
+    seams.period_one = seams.period_one && texture->has_period_one();
+  }
+  result.has_seams = seams.everywhere || seams.coordinates;
+  if (textures.empty()) return;
+  if (mesh.uv_source != UvSource::kPlane) {
+    if (std::any_of(textures.begin(), textures.end(),
+                    [](const Texture* texture) { return jumps_anywhere(*texture); }))
+      curved_.push_back(id);
+    return;
+  }
+  seams.sides.resize(mesh.faces.size());
+  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+    if (add_face(textures, mesh, FaceId(f), result)) continue;
+    result.segments.clear();
+    if (!first_without_.valid()) first_without_ = id;
+    return;
+  }
+}
+
+bool TextureJumps::add_face(const std::vector<const Texture*>& textures, const Mesh& mesh,
+                            FaceId face, OfShape& result) {
+  const FaceIndices& ids = mesh.uv_ids[face.index()];
+  std::array<std::array<double, 2>, 3> uv;
+  for (int k = 0; k < 3; ++k) {
+    const Vec3f& place = mesh.uv_places[ids[k]];
+    uv[k] = {place.x, place.y};
+  }
+  Texture::Jumps jumps;
+  size_t of_one = 0;  // how many textures jump
+  for (const Texture* texture : textures) {
+    const size_t before = jumps.inside.size();
+    if (!texture->add_jumps(uv, kMost - std::min(count_, kMost), jumps)) {
+      count_ = kMost + 1;
+      return false;
+    }
+    of_one += jumps.inside.size() > before;
+  }
+  if (of_one > 1) leave_out_copies(jumps.inside);
+  result.seams.sides[face.index()] = jumps.sides;
+  for (const Texture::Jump& jump : jumps.inside) {
+    result.segments.push_back({face, jump.from, jump.to});
+  }
+  count_ += jumps.inside.size();
+  return true;
+}
+
+const TextureSeams* TextureJumps::seams(ShapeId shape) const {
+  if (shapes_.empty() || !shapes_[shape.index()].has_seams) return nullptr;
+  return &shapes_[shape.index()].seams;
+}
+
+std::span<const FaceSegment> TextureJumps::segments(ShapeId shape) const {
+  if (shapes_.empty()) return {};
+  return shapes_[shape.index()].segments;
+}
+
+void check_texture_edges(const Scene& scene, std::vector<std::string>& warnings) {
+  const TextureJumps jumps(scene);
+  if (jumps.first_without().valid()) {
+    throw InputError(
+        scene.shape(jumps.first_without()).where,
+        fmt::format("{}: its texture jumps along more than {} edges in all, which derivatives with "
+                    "respect to what moves need: scale to_uv by less",
+                    quoted_name(scene, jumps.first_without()), TextureJumps::kMost));
+  }
+  if (jumps.curved().empty()) return;
+  std::vector<std::string> names;
+  for (const ShapeId shape : jumps.curved()) names.push_back(quoted_name(scene, shape));
+  constexpr size_t kMostNames = 8;
+  const size_t more = names.size() > kMostNames ? names.size() - kMostNames : 0;
+  names.resize(names.size() - more);
+  warnings.push_back(fmt::format(
+      "derivatives with respect to what moves are incomplete: the textures of {}{} jump along "
+      "curves, as their coordinates are those of a sphere or disk; a mesh with coordinates has "
+      "straight edges there, which count",
+      join(names), more > 0 ? fmt::format(" and {} more", more) : ""));
+}
+
+}  // namespace limn

@@ -1,0 +1,50 @@
+#pragma once
+// Where the textures of a scene jump: inside of faces, and at edges of meshes.
+#include <span>
+#include <string>
+#include <vector>
+
+#include "limn/core/scene.h"
+#include "limn/edgetree/texture_edges.h"
+
+namespace limn {
+
+class TextureJumps {
+ public:
+  // Looks at the faces of textured shapes; nothing is done for others.
+  explicit TextureJumps(const Scene& scene);
+
+  // Null where the shape's textures jump at no edge of the mesh.
+  const TextureSeams* seams(ShapeId shape) const;
+  // By faces; those of two textures that coincide once.
+  std::span<const FaceSegment> segments(ShapeId shape) const;
+  // How many there are in the whole scene, or more than kMost: then the last shapes lack theirs.
+  size_t count() const { return count_; }
+  static constexpr size_t kMost = 1000000;
+  // The first shape that lacks segments, if any.
+  ShapeId first_without() const { return first_without_; }
+  // Shapes whose textures jump along curves, which are not found: on spheres and disks.
+  const std::vector<ShapeId>& curved() const { return curved_; }
+
+ private:
+  struct OfShape {
+    TextureSeams seams;
+    bool has_seams = false;
+    std::vector<FaceSegment> segments;
+  };
+  void look_at(const Scene& scene, ShapeId shape);
+  // Of all textures on one face; false if there are too many.
+  bool add_face(const std::vector<const Texture*>& textures, const Mesh& mesh, FaceId face,
+                OfShape& result);
+
+  std::vector<OfShape> shapes_;  // none without textures
+  std::vector<ShapeId> curved_;
+  size_t count_ = 0;
+  ShapeId first_without_ = ShapeId::none();
+};
+
+// InputError if there are more than TextureJumps::kMost segments. Adds one warning that names the
+// shapes whose textures jump along curves.
+void check_texture_edges(const Scene& scene, std::vector<std::string>& warnings);
+
+}  // namespace limn

@@ -1,0 +1,358 @@
+// Where textures jump: the segments, their edges and samplers, and derivatives with them.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "edgetree/forest/forest_build.h"
+#include "integrators/edges/texture_jumps.h"
+#include "limn/edgetree/edge_sampler_types.h"
+#include "limn/integrators/backward.h"
+#include "limn/integrators/gradient.h"
+#include "limn/integrators/statistics.h"
+#include "support/check_runs.h"
+#include "support/chi_square.h"
+#include "support/forest_fault.h"
+#include "support/meshes.h"
+#include "support/scenes.h"
+#include "support/test_properties.h"
+
+namespace limn {
+namespace {
+
+using Place = std::array<double, 2>;
+
+std::shared_ptr<Texture> checkerboard(const Matrix4& to_uv = {}) {
+  test::TestProperties properties("texture", "checkerboard", {{"to_uv", to_uv}});
+  return make_texture(properties);
+}
+
+bool on_left(const Place& a, const Place& b, const Place& x) {
+  return (b[0] - a[0]) * (x[1] - a[1]) - (b[1] - a[1]) * (x[0] - a[0]) > 0;
+}
+bool cross(const Texture::Jump& jump, const Place& a, const Place& b) {
+  return on_left(jump.from, jump.to, a) != on_left(jump.from, jump.to, b) &&
+         on_left(a, b, jump.from) != on_left(a, b, jump.to);
+}
+
+// Between two points of a face the colour changes as often as segments lie between them.
+TEST(Checkerboard, JumpsAtItsSegments) {
+  Rng rng(1, 0, 0);
+  Matrix4 turned;
+  turned.m[0][0] = 1.5, turned.m[0][1] = -0.5, turned.m[0][3] = 0.3, turned.m[1][0] = 0.7;
+  for (const Matrix4& to_uv : {Matrix4{}, turned}) {
+    const auto texture = checkerboard(to_uv);
+    for (int i = 0; i < 50; ++i) {
+      std::array<Place, 3> uv;
+      for (Place& corner : uv) corner = {4 * rng.uniform() - 2, 4 * rng.uniform() - 2};
+      Texture::Jumps jumps;
+      ASSERT_TRUE(texture->add_jumps(uv, 1000, jumps));
+      EXPECT_EQ(jumps.sides, 0);
+      const auto draw = [&] {
+        const double u = std::sqrt(rng.uniform()), v = rng.uniform();
+        return Place{u * v, u * (1 - v)};
+      };
+      for (int k = 0; k < 50; ++k) {
+        const Place a = draw(), b = draw();
+        size_t count = 0;
+        for (const Texture::Jump& jump : jumps.inside) count += cross(jump, a, b);
+        const auto color = [&](const Place& p) {
+          TexturePoint<double> point;
+          for (int c = 0; c < 2; ++c) {
+            point.uv[c] = uv[0][c] + p[0] * (uv[1][c] - uv[0][c]) + p[1] * (uv[2][c] - uv[0][c]);
+          }
+          return texture->eval(point).r;
+        };
+        EXPECT_EQ(color(a) != color(b), count % 2 == 1) << i << " " << k;
+      }
+    }
+  }
+}
+
+TEST(Checkerboard, LinesAlongSidesAreNotInside) {
+  const auto texture = checkerboard();
+  Texture::Jumps jumps;
+  ASSERT_TRUE(texture->add_jumps({{{0, 0.25}, {0.5, 0.25}, {0.5, 0.75}}}, 10, jumps));
+  EXPECT_EQ(jumps.sides, 2);           // u = 1/2 from the second corner to the third
+  ASSERT_EQ(jumps.inside.size(), 1u);  // v = 1/2
+  EXPECT_FALSE(texture->add_jumps({{{0, 0}, {9, 0}, {9, 9}}}, 10, jumps));
+  EXPECT_TRUE(texture->has_period_one());
+  Matrix4 scaled;
+  scaled.m[0][0] = 1.5;
+  EXPECT_FALSE(checkerboard(scaled)->has_period_one());
+}
+
+// A closed body, whose faces have segments at random, and its edges.
+EdgeSamplerInput textured_input(const Mesh& mesh, bool black_behind) {
+  Mesh moving = mesh;
+  set_test_tangents(moving);
+  EdgeSamplerInput input{.objects = {build_edge_mesh(moving, true)}, .environment_luminance = 1};
+  Rng rng(2, 0, 0);
+  std::vector<FaceSegment> segments;
+  for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
+    const double a = rng.uniform(), b = rng.uniform();
+    segments.push_back({FaceId(f), {a, 0}, {0, b}});
+    if (f % 3 == 0) segments.push_back({FaceId(f), {1 - b, b}, {0, 0.5 * b}});
+  }
+  input.objects.push_back(texture_edges(moving, input.objects[0], black_behind, segments));
+  return input;
+}
+
+TEST(TextureEdges, AreEdges) {
+  for (const bool black_behind : {true, false}) {
+    const EdgeSamplerInput input = textured_input(torus_mesh(9, 6), black_behind);
+    const EdgeMesh& edges = input.objects[1];
+    EXPECT_EQ(edges.validate(), "");
+    EXPECT_EQ(edges.count(EdgeClass::kTexture), edges.edges.size());
+    EXPECT_EQ(fault_of(build_forest(input, 2, {}), input.objects), "");
+    Rng rng(3, 0, 0);
+    size_t seen = 0;
+    for (uint32_t e = 0; e < edges.edges.size(); ++e) {
+      const Vec3d p = random_direction(rng) * 3;
+      const Edge& edge = edges.edges[e];
+      const bool front = edges.plane(edge.faces[0]).distance(p) > 0;
+      seen += front;
+      EXPECT_EQ(is_candidate(edges, EdgeId(e), p), front || !black_behind);
+      EXPECT_FALSE(is_outline(edges, EdgeId(e), p));
+    }
+    EXPECT_GT(seen, 0u);
+    EXPECT_LT(seen, edges.edges.size());
+    EdgeMesh broken = edges;
+    broken.incidences[3].through = false;
+    EXPECT_EQ(broken.validate(), "edge 3: its face ends there");
+    broken = edges;
+    broken.places.pop_back();
+    EXPECT_EQ(broken.validate(), "edge 0: there are other than V places");
+  }
+}
+
+TEST(TextureEdges, MoveWithTheirFaces) {
+  Mesh mesh = icosphere_mesh(0);
+  Vec3<Lanes> v;
+  v.x = Lanes{0.1, 0.3, 0, 0}, v.z = Lanes{0.7, 0, 0, 1.0 / 3};
+  mesh.position_tangents.assign(mesh.positions.size(), v);
+  const FaceSegment segment{FaceId(0), {0.3, 0.1}, {0.1, 0.7}};
+  const EdgeMesh edges = texture_edges(mesh, build_edge_mesh(mesh, true), true, {&segment, 1});
+  // Exactly: relative to what moves along they are at rest.
+  for (const Vec3<Lanes>& tangent : edges.tangents) {
+    for (int k = 0; k < kLanes; ++k) {
+      EXPECT_EQ(tangent.x[k], v.x[k]);
+      EXPECT_EQ(tangent.z[k], v.z[k]);
+    }
+  }
+}
+
+TEST(TextureEdges, SamplersDrawThemAsTheyState) {
+  Rng rng(4, 0, 0);
+  for (const EdgeSamplerType& type : edge_sampler_types()) {
+    for (const bool black_behind : {true, false}) {
+      const EdgeSamplerInput input = textured_input(icosphere_mesh(1), black_behind);
+      const auto sampler = type.make(input, 1);
+      EdgeQuery query;
+      query.p = random_direction(rng) * 2;
+      query.n = normalize(-query.p);
+      query.wi = normalize(query.n + random_direction(rng) * 0.7);
+      constexpr int kDraws = 20000;
+      std::vector<double> expected, observed;
+      double sum = 0, of_textures = 0;
+      const size_t first = input.objects[0].edges.size();
+      for (uint32_t o = 0; o < 2; ++o) {
+        for (uint32_t e = 0; e < input.objects[o].edges.size(); ++e) {
+          const double p = sampler->probability(query, {ShapeId(o), EdgeId(e)});
+          if (o == 1) of_textures += p;
+          sum += p;
+          expected.push_back(p * kDraws);
+        }
+      }
+      EXPECT_GT(of_textures, 0.05) << type.name;
+      EXPECT_LE(sum, 1 + 1e-12) << type.name;
+      expected.push_back(std::max(0.0, 1 - sum) * kDraws);
+      if (expected.back() < 1e-6) expected.back() = 0;
+      observed.assign(expected.size(), 0);
+      for (int i = 0; i < kDraws; ++i) {
+        const auto s = sampler->sample(query, rng);
+        if (!s) {
+          ++observed.back();
+          continue;
+        }
+        const size_t cell = (s->edge.object.index() == 1 ? first : 0) + s->edge.edge.index();
+        ++observed[cell];
+        ASSERT_EQ(s->pdf_t, sampler->pdf_t(query, s->edge, s->t)) << type.name;
+      }
+      EXPECT_GT(test::chi_square_test(observed, expected).p_value, 1e-6) << type.name;
+    }
+  }
+}
+
+TEST(TextureEdges, AreNotListedAsOutlines) {
+  const EdgeSamplerInput input = textured_input(icosphere_mesh(1), false);
+  const auto sampler = make_edge_sampler("forest", input, 1);
+  EdgeQuery query;
+  query.p = {0, 0, 3};
+  query.n = query.wi = {0, 0, -1};
+  std::vector<ListedEdge> listed;
+  ASSERT_TRUE(sampler->list_outlines(query, {}, listed));
+  EXPECT_FALSE(listed.empty());
+  for (const ListedEdge& edge : listed) EXPECT_EQ(edge.id.object, ShapeId(0));
+}
+
+// Edges of a smooth and of a flat surface become sharp where coordinates differ, by other than
+// integers if these make none, where a line runs along a side, and everywhere if asked for.
+TEST(TextureEdges, Seams) {
+  Mesh grid = grid_mesh(1);  // two faces
+  grid.uv_source = UvSource::kPlane;
+  const auto classes = [&](const TextureSeams& seams) {
+    return build_edge_mesh(grid, true, ShapeId(0), &seams).count(EdgeClass::kSharp);
+  };
+  grid.uv_places = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+  grid.uv_places.resize(8);
+  const FaceIndices& a = grid.faces[0];
+  const FaceIndices& b = grid.faces[1];
+  const auto coordinates = [&](float shift) {
+    grid.uv_places.assign(2 * grid.positions.size(), {});
+    for (size_t v = 0; v < grid.positions.size(); ++v) {
+      const Vec3f x = grid.positions[v];
+      grid.uv_places[v] = {x.x, x.y, 0};
+      grid.uv_places[grid.positions.size() + v] = {x.x + shift, x.y, 0};
+    }
+    const auto n = static_cast<uint32_t>(grid.positions.size());
+    grid.uv_ids = {a, {b[0] + n, b[1] + n, b[2] + n}};
+  };
+  coordinates(0);
+  EXPECT_EQ(classes({.coordinates = true}), 0u);
+  EXPECT_EQ(classes({.everywhere = true}), 1u);
+  EXPECT_EQ(build_edge_mesh(grid, true).count(EdgeClass::kSharp), 0u);
+  coordinates(1);
+  EXPECT_EQ(classes({.coordinates = true}), 1u);
+  EXPECT_EQ(classes({.coordinates = true, .period_one = true}), 0u);
+  coordinates(0.5);
+  EXPECT_EQ(classes({.coordinates = true, .period_one = true}), 1u);
+  coordinates(0);
+  size_t along = 0;
+  for (int k = 0; k < 3; ++k) {
+    along += classes({.sides = {static_cast<uint8_t>(1 << k), 0}});
+    along += classes({.sides = {0, static_cast<uint8_t>(1 << k)}});
+  }
+  EXPECT_EQ(along, 2u);
+}
+
+// A cylinder with interpolated normals, and a board, both checkered, over gloss that mirrors them.
+Scene still_life(const TempFiles& files, double scale) {
+  SceneParts parts;
+  parts.origin = {0, 2, 4};
+  parts.film = R"(<rfilter type="tent"/>)";
+  const std::string board = fmt::format(
+      R"(<bsdf type="diffuse"><texture type="checkerboard" name="reflectance">
+         <rgb name="color0" value=".8, .7, .6"/><rgb name="color1" value=".1, .2, .3"/>
+         <transform name="to_uv"><scale x="{}" y="{}"/></transform></texture></bsdf>)",
+      scale, scale);
+  parts.body =
+      square("floor", 2, -90, {0, 0, 0}, conductor("gloss", 0.3)) +
+      square("board", 0.8, -60, {0.6, 0.8, -0.6}, board) +
+      R"(<shape type="cylinder" id="can"><transform name="to_world"><rotate x="1" angle="-75"/>
+                  <scale value="0.6"/><translate x="-0.5" y="0.3"/></transform>)" +
+      board + "</shape>" + square("lamp", 0.8, 90, {0.5, 3.5, 1}, area_light("glow", "6, 6, 6")) +
+      constant_light("sky", "0.5, 0.5, 0.5");
+  return make_scene(files, parts);
+}
+
+TEST(TextureEdges, DerivativesAgreeWithDifferences) {
+  const TempFiles files;
+  const Scene scene = still_life(files, 2);
+  for (const char* name : {"board.translate.x", "can.rotate.y", "can.scale", "floor.translate.y",
+                           "sensor.translate.x", "sensor.fov"})
+    expect_agreement(scene, name, 256);
+}
+
+TEST(TextureEdges, TooManyAndCurvesAreTold) {
+  const TempFiles files;
+  GradientOptions options;
+  RunSettings settings;
+  settings.spp = 1;
+  const Scene scene = still_life(files, 2);
+  options.parameters = {"board.translate.x"};
+  for (const std::string& warning : gradient(scene, options, settings).warnings)
+    EXPECT_EQ(warning.find("incomplete"), warning.npos) << warning;
+  const Scene fine = still_life(files, 1e6);
+  try {
+    gradient(fine, options, settings);
+    FAIL();
+  } catch (const InputError& e) {
+    EXPECT_NE(std::string(e.what()).find("its texture jumps along more than 1000000 edges"),
+              std::string::npos)
+        << e.what();
+  }
+  // What moves nothing needs no edges.
+  options.parameters = {"glow.radiance"};
+  EXPECT_NO_THROW(gradient(fine, options, settings));
+  SceneParts parts;
+  parts.body = R"(<shape type="sphere" id="ball"><bsdf type="diffuse">
+                  <texture type="checkerboard" name="reflectance"/></bsdf></shape>)" +
+               constant_light("sky", "1, 1, 1");
+  const Scene ball = make_scene(files, parts);
+  options.parameters = {"ball.translate.x"};
+  bool told = false;
+  for (const std::string& warning : gradient(ball, options, settings).warnings) {
+    told = told || warning.find("the textures of \"ball\" jump along curves") != warning.npos;
+  }
+  EXPECT_TRUE(told);
+}
+
+// Reverse mode, term by term, against closed forms.
+class TextureEdgesBackward : public testing::TestWithParam<const char*> {};
+
+TEST_P(TextureEdgesBackward, IsExact) {
+  const std::string folder = std::string(LIMN_SOURCE_DIR) + "/scenes/closed_form/";
+  std::ifstream file(folder + "references.json");
+  const auto scenes = nlohmann::json::parse(file)["scenes"];
+  const auto reference = *std::find_if(scenes.begin(), scenes.end(), [](const auto& entry) {
+    return entry["file"] == std::string(GetParam()) + ".xml";
+  });
+  const Scene scene = read_scene(folder + std::string(GetParam()) + ".xml", {}, nullptr);
+  Image adjoint(scene.film.crop_width, scene.film.crop_height, 3);
+  for (size_t i = 0; i < adjoint.data.size(); ++i) {
+    adjoint.data[i] = static_cast<float>(Rng(6, i, 0).uniform());
+  }
+  RunSettings settings;
+  settings.spp = 4096;
+  settings.seed = 9;
+  BackwardOptions options;
+  options.batches = 64;
+  for (const auto& p : reference["parameters"]) options.parameters.push_back(p["name"]);
+  for (const char* term : {"interior", "camera", "boundary"}) {
+    options.terms = {term};
+    const BackwardResult result = backward(scene, adjoint, options, settings);
+    std::vector<double> z;
+    for (const auto& p : reference["parameters"]) {
+      const Moments& m = result.of(p["name"]).moments;
+      double found = 0, variance = 0, exact = 0;
+      for (size_t i = 0; i < m.size(); ++i) {
+        found += m.mean(i);
+        variance += std::sqrt(m.variance(i));
+      }
+      for (size_t i = 0; i < adjoint.data.size(); ++i) {
+        exact += adjoint.data[i] * p[term][i].template get<double>();
+      }
+      const double error = variance;  // channels share samples: their errors add up at most
+      if (error <= 1e-9 * (1 + std::fabs(exact))) {
+        EXPECT_NEAR(found, exact, 1e-8 * (1 + std::fabs(exact))) << term << " " << p["name"];
+        continue;
+      }
+      z.push_back(normal_from_student((found - exact) / error, m.degrees()));
+    }
+    if (z.empty()) continue;
+    const ZSummary summary = summarize(z);
+    fmt::print("{:16} {:9} {:3} values, mean z {:6.2f}, largest |z| {:5.2f}\n", GetParam(), term,
+               summary.count, summary.mean, summary.largest);
+    EXPECT_GE(summary.p_largest, 1e-6) << term;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(, TextureEdgesBackward,
+                         testing::Values("board_in_sky", "seam_in_sky", "board_in_gloss"),
+                         [](const auto& test) { return std::string(test.param); });
+
+}  // namespace
+}  // namespace limn
