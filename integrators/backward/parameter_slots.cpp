@@ -174,7 +174,6 @@ void ParameterSlots::add_shapes(const Scene& scene) {
     for (const uint32_t root : mesh.weld) ++gathers_[s].copies[root];
     if (mesh.normal_source == NormalSource::kFace) continue;
     slots.normals = take(3 * static_cast<uint32_t>(mesh.normals.size()));
-    slots.horizons = take(count);
     gathers_[s].normals.emplace(mesh);
   }
 }
@@ -281,9 +280,7 @@ void ParameterSlots::gather_shape(ShapeId shape, const std::vector<double>& sums
   std::vector<Vec3d> positions = vectors(slots.positions, mesh.positions.size()), normals;
   if (slots.normals != 0) {
     normals = vectors(slots.normals, mesh.normals.size());
-    const auto first = sums.begin() + slots.horizons;
-    const std::vector<double> horizons(first, first + static_cast<long>(mesh.horizon.size()));
-    gathers_[shape.index()].normals->pull_back(normals, horizons, positions);
+    gathers_[shape.index()].normals->pull_back(normals, positions);
   }
   const std::vector<uint32_t>& copies = gathers_[shape.index()].copies;
   for (size_t i = 0; i < parameters_.size(); ++i) {

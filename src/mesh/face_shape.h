@@ -1,5 +1,5 @@
 #pragma once
-// Building blocks of shading normals: face normals and angles, tilts, cancellation.
+// Building blocks of shading normals: face normals and angles, cancellation.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -58,22 +58,6 @@ FaceShape<S> face_shape(const Mesh& mesh, FaceId face) {
 // cancellation. noise: sum of angles times roundings; angles: their sum.
 inline double rest_of_cancelled(double noise, double angles) {
   return std::max(64 * std::numeric_limits<double>::epsilon(), std::min(noise, 0x1.0p-10 * angles));
-}
-
-// Sine of the angle between a corner's normal and its face; 1 from a right angle on. It
-// is the length of the cross product, which is accurate where sqrt(1 - cos^2) would
-// cancel.
-template <class S>
-S sine_of_tilt(const Vec3<S>& normal, const Vec3<S>& face_normal) {
-  if (value(dot(normal, face_normal)) <= 0) return S(1);
-  const S sine = length(cross(normal, face_normal));
-  return sine < 1.0 ? sine : S(1);
-}
-
-// Rounding error of the angle between a face and its corner normal [rad], limited so that
-// derivatives of meshes far from the origin stay meaningful; not tuned.
-inline double tilt_rounding(double face, double corner) {
-  return std::min(0x1.0p-16, face + corner);
 }
 
 }  // namespace limn

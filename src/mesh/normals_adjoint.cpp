@@ -1,4 +1,4 @@
-// The adjoint of shading normals and horizons: from them back to the positions of the one-ring.
+// The adjoint of computed shading normals: from them back to the positions of the one-ring.
 #include "limn/core/normals_adjoint.h"
 
 #include "limn/core/check.h"
@@ -14,28 +14,21 @@ struct FaceAdjoint {
   std::array<double, 3> angles{};
 };
 
-// The sine of the tilt of a corner's normal against its face, and how far rounding reaches.
-struct Tilt {
-  double sine = -1, rounding = 0;
-};
-
-// The faces around each of some items (vertices, normals), those of one item in their order.
+// The faces around each normal, those of one normal in their order.
 class FacesAround {
  public:
-  // items_of(face): three of them.
-  template <class ItemsOf>
-  FacesAround(size_t items, size_t faces, const ItemsOf& items_of) : begins_(items + 1) {
-    for (size_t f = 0; f < faces; ++f)
-      for (const uint32_t i : items_of(f)) ++begins_[i + 1];
-    for (size_t i = 0; i < items; ++i) begins_[i + 1] += begins_[i];
+  explicit FacesAround(const Mesh& mesh) : begins_(mesh.normals.size() + 1) {
+    for (const FaceIndices& ids : mesh.normal_ids)
+      for (const uint32_t n : ids) ++begins_[n + 1];
+    for (size_t n = 0; n < mesh.normals.size(); ++n) begins_[n + 1] += begins_[n];
     faces_.resize(begins_.back());
     std::vector<uint32_t> next(begins_.begin(), begins_.end() - 1);
-    for (uint32_t f = 0; f < faces; ++f)
-      for (const uint32_t i : items_of(f)) faces_[next[i]++] = f;
+    for (uint32_t f = 0; f < mesh.normal_ids.size(); ++f)
+      for (const uint32_t n : mesh.normal_ids[f]) faces_[next[n]++] = f;
   }
   template <class Visit>
-  void for_each(uint32_t item, const Visit& visit) const {
-    for (uint32_t k = begins_[item]; k < begins_[item + 1]; ++k) visit(faces_[k]);
+  void for_each(uint32_t normal, const Visit& visit) const {
+    for (uint32_t k = begins_[normal]; k < begins_[normal + 1]; ++k) visit(faces_[k]);
   }
 
  private:
@@ -53,70 +46,27 @@ struct ShadingNormalsAdjoint::OfMesh {
     const FaceIndices& v = mesh.faces[f];
     return {mesh.weld[v[0]], mesh.weld[v[1]], mesh.weld[v[2]]};
   }
-  // Those of faces without area are never the largest.
-  Tilt tilt(uint32_t f, int corner) const {
-    const uint32_t n = mesh.normal_ids[f][corner];
-    return {sine_of_tilt(mesh.normals[n], shapes[f].normal),
-            tilt_rounding(shapes[f].rounding, noise[n])};
-  }
-  bool ties_with(const Tilt& tilt, uint32_t root) const {
-    return tilt.sine + tilt.rounding >= largest[root];
-  }
-  void find_largest_tilts();
   void add_up_normals();
 
-  std::vector<uint32_t> touched(const std::vector<double>& at_root,
-                                const std::vector<Vec3d>& of_normals) const;
-  void pull_back_horizons(const std::vector<uint32_t>& faces, const std::vector<double>& at_root,
-                          std::vector<FaceAdjoint>& adjoints, std::vector<Vec3d>& of_normals) const;
+  std::vector<uint32_t> touched(const std::vector<Vec3d>& of_normals) const;
   void pull_back_sums(const std::vector<uint32_t>& faces, const std::vector<Vec3d>& of_normals,
                       std::vector<FaceAdjoint>& adjoints) const;
 
   const Mesh& mesh;
   std::vector<FaceShape<double>> shapes;
-  FacesAround around_root, around_normal;
-  // Of normals: the largest rounding around each.
-  std::vector<double> noise;
-  // Of roots: a horizon is the largest tilt of all corners of the faces around its vertex.
-  std::vector<double> largest;
-  std::vector<uint32_t> ties;
-  // Of computed normals: their sums, normalised, and the lengths of these, 0 where they cancel; a
-  // face around each.
+  FacesAround around;
+  // The sums of face normals, normalised, and the lengths of these, 0 where they cancel; a face
+  // around each.
   std::vector<Vec3d> units;
   std::vector<double> sizes;
   std::vector<uint32_t> any_face;
 };
 
-ShadingNormalsAdjoint::OfMesh::OfMesh(const Mesh& of)
-    : mesh(of),
-      around_root(of.positions.size(), of.faces.size(), [this](size_t f) { return roots(f); }),
-      around_normal(of.normals.size(), of.normal_ids.size(),
-                    [this](size_t f) { return mesh.normal_ids[f]; }),
-      noise(of.normals.size()) {
+ShadingNormalsAdjoint::OfMesh::OfMesh(const Mesh& of) : mesh(of), around(of) {
   for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
     shapes.push_back(face_shape<double>(mesh, FaceId(f)));
-    if (!shapes[f].has_area) continue;
-    for (const uint32_t n : mesh.normal_ids[f]) noise[n] = std::max(noise[n], shapes[f].rounding);
   }
-  find_largest_tilts();
-  if (mesh.normal_source == NormalSource::kComputed) add_up_normals();
-}
-
-void ShadingNormalsAdjoint::OfMesh::find_largest_tilts() {
-  largest.resize(mesh.positions.size());
-  ties.resize(mesh.positions.size());
-  const auto for_every_tilt = [&](const auto& visit) {
-    for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
-      if (!shapes[f].has_area) continue;
-      for (int c = 0; c < 3; ++c) {
-        const Tilt t = tilt(f, c);
-        for (const uint32_t v : roots(f)) visit(t, v);
-      }
-    }
-  };
-  for_every_tilt(
-      [&](const Tilt& t, uint32_t v) { largest[v] = std::max(largest[v], t.sine - t.rounding); });
-  for_every_tilt([&](const Tilt& t, uint32_t v) { ties[v] += ties_with(t, v); });
+  add_up_normals();
 }
 
 void ShadingNormalsAdjoint::OfMesh::add_up_normals() {
@@ -146,20 +96,11 @@ void ShadingNormalsAdjoint::OfMesh::add_up_normals() {
 
 // The faces that derivatives reach, in order.
 std::vector<uint32_t> ShadingNormalsAdjoint::OfMesh::touched(
-    const std::vector<double>& at_root, const std::vector<Vec3d>& of_normals) const {
-  std::vector<uint8_t> face(mesh.faces.size()), normal(of_normals.size());
-  for (uint32_t v = 0; v < at_root.size(); ++v) {
-    if (at_root[v] == 0) continue;
-    around_root.for_each(v, [&](uint32_t f) {
-      face[f] = true;
-      for (const uint32_t n : mesh.normal_ids[f]) normal[n] = true;
-    });
-  }
-  if (mesh.normal_source == NormalSource::kComputed) {
-    for (uint32_t n = 0; n < of_normals.size(); ++n) {
-      if (!normal[n] && is_zero(of_normals[n])) continue;
-      around_normal.for_each(n, [&](uint32_t f) { face[f] = true; });
-    }
+    const std::vector<Vec3d>& of_normals) const {
+  std::vector<uint8_t> face(mesh.faces.size());
+  for (uint32_t n = 0; n < of_normals.size(); ++n) {
+    if (is_zero(of_normals[n])) continue;
+    around.for_each(n, [&](uint32_t f) { face[f] = true; });
   }
   std::vector<uint32_t> list;
   for (uint32_t f = 0; f < face.size(); ++f) {
@@ -199,35 +140,10 @@ void pull_back_face(const Mesh& mesh, const std::array<uint32_t, 3>& roots,
 }  // namespace
 
 ShadingNormalsAdjoint::ShadingNormalsAdjoint(const Mesh& mesh)
-    : of_mesh_(mesh.normal_source == NormalSource::kFace ? nullptr
-                                                         : std::make_unique<OfMesh>(mesh)) {}
+    : of_mesh_(mesh.normal_source == NormalSource::kComputed ? std::make_unique<OfMesh>(mesh)
+                                                             : nullptr) {}
 ShadingNormalsAdjoint::ShadingNormalsAdjoint(ShadingNormalsAdjoint&&) noexcept = default;
 ShadingNormalsAdjoint::~ShadingNormalsAdjoint() = default;
-
-// The horizon is |n x N| of a corner's normal n and a face's N.
-void ShadingNormalsAdjoint::OfMesh::pull_back_horizons(const std::vector<uint32_t>& faces,
-                                                       const std::vector<double>& at_root,
-                                                       std::vector<FaceAdjoint>& adjoints,
-                                                       std::vector<Vec3d>& of_normals) const {
-  for (size_t i = 0; i < faces.size(); ++i) {
-    const uint32_t f = faces[i];
-    const Vec3d& face_normal = shapes[f].normal;
-    for (const uint32_t v : roots(f)) {
-      if (at_root[v] == 0) continue;
-      for (int c = 0; c < 3; ++c) {
-        const Tilt t = tilt(f, c);
-        if (!ties_with(t, v) || t.sine >= 1) continue;
-        const uint32_t n = mesh.normal_ids[f][c];
-        const Vec3d across = cross(mesh.normals[n], face_normal);
-        const double size = length(across);
-        if (size == 0) continue;
-        const Vec3d u = across * (at_root[v] / (ties[v] * size));
-        of_normals[n] += cross(face_normal, u);
-        adjoints[i].normal += cross(u, mesh.normals[n]);
-      }
-    }
-  }
-}
 
 // From normals of vertices to those of faces and their angles.
 void ShadingNormalsAdjoint::OfMesh::pull_back_sums(const std::vector<uint32_t>& faces,
@@ -249,27 +165,18 @@ void ShadingNormalsAdjoint::OfMesh::pull_back_sums(const std::vector<uint32_t>& 
   }
 }
 
-void ShadingNormalsAdjoint::pull_back(std::vector<Vec3d>& normals,
-                                      const std::vector<double>& horizons,
+void ShadingNormalsAdjoint::pull_back(const std::vector<Vec3d>& normals,
                                       std::vector<Vec3d>& positions) const {
   if (!of_mesh_) return;
   const OfMesh& m = *of_mesh_;
   CHECK_EQ(normals.size(), m.mesh.normals.size());
   CHECK_EQ(positions.size(), m.mesh.positions.size());
-  std::vector<double> at_root(horizons.size());
-  for (size_t v = 0; v < horizons.size(); ++v) at_root[m.mesh.weld[v]] += horizons[v];
-  const std::vector<uint32_t> faces = m.touched(at_root, normals);
+  const std::vector<uint32_t> faces = m.touched(normals);
   std::vector<FaceAdjoint> adjoints(faces.size());
-  m.pull_back_horizons(faces, at_root, adjoints, normals);
-  if (m.mesh.normal_source == NormalSource::kComputed) m.pull_back_sums(faces, normals, adjoints);
+  m.pull_back_sums(faces, normals, adjoints);
   for (size_t i = 0; i < faces.size(); ++i) {
     pull_back_face(m.mesh, m.roots(faces[i]), m.shapes[faces[i]], adjoints[i], positions);
   }
-}
-
-void pull_back_shading_normals(const Mesh& mesh, std::vector<Vec3d>& normals,
-                               const std::vector<double>& horizons, std::vector<Vec3d>& positions) {
-  ShadingNormalsAdjoint(mesh).pull_back(normals, horizons, positions);
 }
 
 }  // namespace limn

@@ -88,7 +88,6 @@ void check_mesh(const Mesh& mesh) {
   demand(mesh.normals.empty() || mesh.normal_ids.size() == mesh.faces.size(), "normals of faces");
   for (const FaceIndices& ids : mesh.normal_ids)
     for (const uint32_t n : ids) demand(n < mesh.normals.size(), "normals exist");
-  for (const double h : mesh.horizon) demand(h >= 0 && h <= 1, "a horizon is a sine");
 }
 
 void run_xml(Bytes bytes) {

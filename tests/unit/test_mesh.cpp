@@ -97,7 +97,7 @@ const std::string kSeamPyramid =
     "v 0 0 2\nv 1 1 0\nv -1 1 0\nv -1 -1 0\nv 1 -1 0\nv -0 0 2\nv 1 1 -0\n"
     "f 1 2 3\nf 1 3 4\nf 6 4 5\nf 6 5 7\n";
 
-TEST(Weld, SeamCopiesShareNormalsAndHorizon) {
+TEST(Weld, SeamCopiesShareNormals) {
   const TempFiles files;
   const Mesh whole = read_mesh(files.write("a.obj", kPyramid), false);
   const Mesh seam = read_mesh(files.write("b.obj", kSeamPyramid), false);
@@ -106,7 +106,6 @@ TEST(Weld, SeamCopiesShareNormalsAndHorizon) {
   for (size_t f = 0; f < whole.faces.size(); ++f) {
     for (int c = 0; c < 3; ++c) {
       EXPECT_EQ(seam.normals[seam.normal_ids[f][c]], whole.normals[whole.normal_ids[f][c]]);
-      EXPECT_EQ(seam.horizon[seam.faces[f][c]], whole.horizon[whole.faces[f][c]]);
     }
   }
 }
@@ -127,11 +126,9 @@ TEST(Normals, OfAPyramid) {
   const TempFiles files;
   const Mesh mesh = read_mesh(files.write("a.obj", kPyramid), false);
   EXPECT_NEAR(length(mesh.normals[mesh.normal_ids[0][0]] - Vec3d{0, 0, 1}), 0, 1e-15);
-  // Faces have normals (0, 2, 1)/sqrt(5) and so on: the tip tilts by acos(1/sqrt(5)). At a corner
-  // two such faces meet: the normal (2, 2, 2)/.. has the cosine 3/sqrt(15) with each.
-  EXPECT_NEAR(mesh.horizon[0], std::sqrt(0.8), 1e-15);
-  // The horizon of a vertex covers whole faces, and each face has the tip.
-  for (double h : mesh.horizon) EXPECT_NEAR(h, std::sqrt(0.8), 1e-15);
+  // Faces have normals (0, 2, 1)/sqrt(5) and so on. Two of equal angles meet at a corner.
+  const Vec3d corner = mesh.normals[mesh.normal_ids[0][1]];
+  EXPECT_NEAR(length(corner - normalize(Vec3d{1, 1, 1})), 0, 1e-15);
 }
 
 TEST(Normals, DoNotDependOnTheScale) {
@@ -142,13 +139,11 @@ TEST(Normals, DoNotDependOnTheScale) {
     for (Vec3f& p : scaled.positions) p = {p.x * scale, p.y * scale, p.z * scale};
     update_shading_normals(scaled);
     EXPECT_EQ(scaled.normals, mesh.normals);
-    EXPECT_EQ(scaled.horizon, mesh.horizon);
   }
 }
 
 TEST(Normals, TangentsMatchDifferences) {
   const TempFiles files;
-  // Without symmetry, so that no maximum over faces is tied.
   Mesh mesh = read_mesh(files.write("a.obj",
                                     "v 0.1 0.2 2\nv 1 1.3 0\nv -1 1 0.1\nv -1.2 -1 0\n"
                                     "v 1 -0.8 0.3\nf 1 2 3\nf 1 3 4\nf 1 4 5\nf 1 5 2\n"),
@@ -177,11 +172,6 @@ TEST(Normals, TangentsMatchDifferences) {
                   bound);
     }
   }
-  for (size_t i = 0; i < mesh.horizon.size(); ++i) {
-    const double difference = (up.horizon[i] - down.horizon[i]) / (2 * h);
-    EXPECT_NEAR(mesh.horizon_tangents[i][1], difference, bound);
-    EXPECT_GT(std::fabs(difference), 10 * bound);
-  }
 }
 
 // Where a mesh moves as one its derivatives are not worked out. They are what they come to where a
@@ -192,7 +182,6 @@ TEST(Normals, StayWhereAllMovesAsOne) {
   mesh.position_tangents.assign(8, {{1, 2, 3, 4}, {0.1, 0.7, 0, 0}, {-1, 0, 0, 1}});
   update_shading_normals(mesh);
   EXPECT_TRUE(mesh.normal_tangents.empty());
-  EXPECT_TRUE(mesh.horizon_tangents.empty());
   for (const float x : {5, 6, 5}) {
     mesh.positions.push_back({x, mesh.positions.size() == 10 ? 1.0f : 0.0f, 0});
     mesh.position_tangents.push_back({{}, {}, {x, 0, 0, 0}});
@@ -204,56 +193,7 @@ TEST(Normals, StayWhereAllMovesAsOne) {
   for (size_t n = 0; n < 8; ++n)
     for (int k = 0; k < 3; ++k)
       for (int lane = 0; lane < kLanes; ++lane) EXPECT_EQ(mesh.normal_tangents[n][k][lane], 0);
-  for (size_t v = 0; v < 8; ++v)
-    for (int lane = 0; lane < kLanes; ++lane) EXPECT_EQ(mesh.horizon_tangents[v][lane], 0);
   EXPECT_NE(mesh.normal_tangents[8].x[0], 0);
-}
-
-// The cube of four vertices up and four down; all faces around a vertex tilt alike.
-Mesh moving_cube(const Vec3d (&rows)[3]) {
-  Mesh mesh = transformed(with_smooth_normals(cube_mesh()), rows, 1, {});
-  mesh.normal_source = NormalSource::kComputed;
-  mesh.position_tangents.resize(8);
-  for (int v = 0; v < 8; ++v) {
-    const Vec3d velocity{0.5, v % 2 == 0 ? -0.25 : 0.25, v % 4 < 2 ? 0.5 : -0.5};
-    for (int k = 0; k < 3; ++k) mesh.position_tangents[v][k][1] = dot(rows[k], velocity);
-  }
-  update_shading_normals(mesh);
-  return mesh;
-}
-
-TEST(Normals, TiesHaveTheMeanOfBothSides) {
-  const Vec3d straight[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  const Mesh mesh = moving_cube(straight);
-  const auto differences = [&](double h) {
-    std::vector<double> horizon[2];
-    for (const int side : {0, 1}) {
-      Mesh copy = mesh;
-      for (size_t v = 0; v < 8; ++v)
-        for (int k = 0; k < 3; ++k)
-          copy.positions[v][k] +=
-              static_cast<float>((side ? h : -h) * mesh.position_tangents[v][k][1]);
-      update_shading_normals(copy);
-      horizon[side] = copy.horizon;
-    }
-    for (size_t v = 0; v < 8; ++v) horizon[1][v] = (horizon[1][v] - horizon[0][v]) / (2 * h);
-    return horizon[1];
-  };
-  // Positions are exact. Either side is smooth: the error falls with h, so it is at most the
-  // change.
-  const auto coarse = differences(0x1p-10), fine = differences(0x1p-11);
-  for (size_t v = 0; v < 8; ++v) {
-    EXPECT_NEAR(mesh.horizon_tangents[v][1], fine[v], 2 * std::fabs(coarse[v] - fine[v]) + 0x1p-40);
-  }
-  // Rounding breaks the ties of a turned cube.
-  Rng rng(1, 2, 3);
-  for (int i = 0; i < 10; ++i) {
-    Vec3d rows[3];
-    random_rotation(rng, rows);
-    const Mesh turned = moving_cube(rows);
-    for (size_t v = 0; v < 8; ++v)
-      EXPECT_NEAR(turned.horizon_tangents[v][1], mesh.horizon_tangents[v][1], 0x1p-18);
-  }
 }
 
 // Fins around an axis, as a file rounds them: normals along the axis cancel.

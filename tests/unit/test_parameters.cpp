@@ -60,9 +60,6 @@ std::vector<Dual> numbers(const Scene& scene) {
       for (int k = 0; k < 3 && !m.normal_tangents.empty(); ++k) n[k].d = m.normal_tangents[i][k];
       add(n);
     }
-    for (size_t i = 0; i < m.horizon.size(); ++i) {
-      all.emplace_back(m.horizon[i], m.horizon_tangents.empty() ? Lanes{} : m.horizon_tangents[i]);
-    }
     all.insert(all.end(), {shape.radiance.r, shape.radiance.g, shape.radiance.b});
     for (const ParameterRef& p : shape.bsdf->parameters()) {
       for (const Dual* v : p.values) all.push_back(*v);

@@ -88,7 +88,7 @@ Vec3d random_vector(Rng& rng) {
   return {2 * rng.uniform() - 1, 2 * rng.uniform() - 1, 2 * rng.uniform() - 1};
 }
 
-// A scene of one mesh, and slots for its positions, normals and horizons.
+// A scene of one mesh, and slots for its positions and normals.
 struct MeshScene {
   Scene scene;
   SceneSlots slots;
@@ -102,9 +102,8 @@ struct MeshScene {
     MeshSlots of;
     of.positions = 1;
     of.normals = 1 + 3 * v;
-    of.horizons = of.normals + 3 * static_cast<uint32_t>(mesh.normals.size());
     slots.meshes.push_back(of);
-    slots.count = of.horizons + v;
+    slots.count = of.normals + 3 * static_cast<uint32_t>(mesh.normals.size());
   }
   Mesh& mesh() { return scene.shapes[0].mesh; }
 };
@@ -136,7 +135,6 @@ void expect_surface(const Mesh& mesh, Rng& rng) {
   const MeshSlots& slots = of.slots.meshes[0];
   for (uint32_t i = 0; i < m.positions.size(); ++i) {
     m.position_tangents.push_back(lanes_of(vector_at(slots.positions + 3 * m.weld[i])));
-    m.horizon_tangents.push_back({velocity[slots.horizons + m.weld[i]], 0, 0, 0});
   }
   for (uint32_t i = 0; i < m.normals.size(); ++i) {
     m.normal_tangents.push_back(lanes_of(vector_at(slots.normals + 3 * i)));
@@ -186,7 +184,7 @@ TEST(Tape, SurfacePointsMatchDual) {
   }
 }
 
-// Derivatives of positions from those of normals and horizons, along random velocities.
+// Derivatives of positions from those of normals, along random velocities.
 void expect_normals(Mesh mesh, Rng& rng) {
   std::vector<Vec3d> velocity(mesh.positions.size());
   for (size_t i = 0; i < velocity.size(); ++i) {
@@ -196,31 +194,21 @@ void expect_normals(Mesh mesh, Rng& rng) {
   }
   update_shading_normals(mesh);
   std::vector<Vec3d> of_normals, of_positions(mesh.positions.size());
-  std::vector<double> of_horizons;
   double forward = 0;
   for (const Vec3<Lanes>& n : mesh.normal_tangents) {
     const Vec3d w = random_vector(rng);
     of_normals.push_back(w);
     forward += w.x * n.x[0] + w.y * n.y[0] + w.z * n.z[0];
   }
-  for (const Lanes& h : mesh.horizon_tangents) {
-    of_horizons.push_back(rng.uniform());
-    forward += of_horizons.back() * h[0];
-  }
   const ShadingNormalsAdjoint adjoint(mesh);
   // Number by number, so that each reaches all that hangs on it by itself.
   std::vector<Vec3d> one_by_one(mesh.positions.size());
-  for (size_t i = 0; i < of_normals.size() + of_horizons.size(); ++i) {
+  for (size_t i = 0; i < of_normals.size(); ++i) {
     std::vector<Vec3d> normals(of_normals.size());
-    std::vector<double> horizons(of_horizons.size());
-    if (i < normals.size()) {
-      normals[i] = of_normals[i];
-    } else {
-      horizons[i - normals.size()] = of_horizons[i - normals.size()];
-    }
-    adjoint.pull_back(normals, horizons, one_by_one);
+    normals[i] = of_normals[i];
+    adjoint.pull_back(normals, one_by_one);
   }
-  adjoint.pull_back(of_normals, of_horizons, of_positions);
+  adjoint.pull_back(of_normals, of_positions);
   double reverse = 0, size = 0;
   for (size_t i = 0; i < velocity.size(); ++i) {
     reverse += dot(of_positions[i], velocity[i]);
@@ -232,7 +220,6 @@ void expect_normals(Mesh mesh, Rng& rng) {
   EXPECT_NEAR(summed, forward, 1e-12 * size);
 }
 
-// No two tilts tie in a mesh whose vertices are shaken.
 TEST(ShadingNormals, AdjointMatchesDual) {
   Rng rng(2, 7, 1);
   for (int i = 0; i < 50; ++i) {

@@ -61,10 +61,6 @@ struct Mesh {
   NormalSource normal_source = NormalSource::kFace;
   std::vector<Vec3d> normals;           // N unit vectors; empty for kFace
   std::vector<FaceIndices> normal_ids;  // F by 3, into normals; empty for kFace
-  // V: sine of the largest angle between shading and geometric normal over the faces around the
-  // vertex, equal for welded vertices; empty for kFace. Its interpolation bounds that angle at any
-  // point (see shading.h).
-  std::vector<double> horizon;
 
   // Whether the shape's material reads textures. Where it does not, the next three are empty.
   bool textured = false;
@@ -75,7 +71,6 @@ struct Mesh {
   // Derivatives with respect to the parameters of the pass; empty where all are zero.
   std::vector<Vec3<Lanes>> position_tangents;  // V
   std::vector<Vec3<Lanes>> normal_tangents;    // N
-  std::vector<Lanes> horizon_tangents;         // V
 
   // Number of faces that the loader removed because two of their corners coincide.
   uint64_t collapsed_faces = 0;
@@ -110,20 +105,11 @@ void weld_positions(Mesh& mesh);
 // faces.
 void weld_seams(Mesh& mesh);
 
-// Computes normals (if kComputed), horizon and their tangents from positions, faces, weld and
+// Computes normals (if kComputed) and their tangents from positions, faces, weld and
 // tangents. Must be called after every change of positions or position_tangents. Normals are
 // angle-weighted (Thuermer and Wuethrich 1998) over welded positions, so texture seams do not
 // crease the shading.
 void update_shading_normals(Mesh& mesh);
-
-// The adjoint of update_shading_normals. Input: derivatives of a scalar with respect to normals (N)
-// and horizons (V). Adds its derivatives with respect to positions to `positions` (V), at the first
-// copy of each welded vertex. Normals from a file are independent of positions: derivatives through
-// horizons are added to `normals`. If several angles tie for a horizon, they share its derivative
-// equally. (Forward mode uses the mean of the least and the largest slope, which is not linear in
-// the motion.)
-void pull_back_shading_normals(const Mesh& mesh, std::vector<Vec3d>& normals,
-                               const std::vector<double>& horizons, std::vector<Vec3d>& positions);
 
 // True if a face has a nonzero area in double precision. A face without area is a line segment: no
 // ray hits it, and it only connects other faces (half_edges.h). The error bound: each product of

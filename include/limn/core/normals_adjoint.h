@@ -1,5 +1,5 @@
 #pragma once
-// The adjoint of computed shading normals and horizons, precomputed for many gradients of one mesh.
+// The adjoint of computed shading normals, precomputed for many gradients of one mesh.
 #include <memory>
 #include <vector>
 
@@ -15,10 +15,10 @@ class ShadingNormalsAdjoint {
   ShadingNormalsAdjoint(ShadingNormalsAdjoint&&) noexcept;
   ~ShadingNormalsAdjoint();
 
-  // Equals pull_back_shading_normals(). Skips zero derivatives, so the cost is linear in the
-  // nonzero ones.
-  void pull_back(std::vector<Vec3d>& normals, const std::vector<double>& horizons,
-                 std::vector<Vec3d>& positions) const;
+  // Adds to `positions` (V) the derivatives of a scalar with respect to positions, at the first copy
+  // of each welded vertex, from those with respect to normals (N). Normals of a file or of faces
+  // add nothing. Skips zero derivatives, so the cost is linear in the nonzero ones.
+  void pull_back(const std::vector<Vec3d>& normals, std::vector<Vec3d>& positions) const;
 
  private:
   struct OfMesh;

@@ -16,7 +16,6 @@ namespace limn {
 struct MeshSlots {
   uint32_t positions = 0;  // of 3 V
   uint32_t normals = 0;    // of 3 N
-  uint32_t horizons = 0;   // of V
 };
 
 // A slot for each channel, since channels never mix. A number that affects all channels has the
