@@ -5,8 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
 
+#include "integrators/edges/face_jumps.h"
 #include "limn/core/duplicate_faces.h"
 #include "limn/core/names.h"
 
@@ -19,15 +19,6 @@ std::vector<const Texture*> textures_of(const Shape& shape) {
     textures.push_back(&shape.bsdf->texture(k));
   }
   return textures;
-}
-
-// Where texture coordinates are not linear over faces: jumps inside of the unit square, or at its
-// ends, where an angle comes back to its beginning.
-bool jumps_anywhere(const Texture& texture) {
-  Texture::Jumps jumps;
-  const bool few = texture.add_jumps({{{0, 0}, {1, 0}, {1, 1}}}, 1, jumps) &&
-                   texture.add_jumps({{{0, 0}, {1, 1}, {0, 1}}}, 1, jumps);
-  return !few || !jumps.inside.empty() || !texture.has_period_one();
 }
 
 bool is_near(const std::array<double, 2>& a, const std::array<double, 2>& b) {
@@ -73,12 +64,7 @@ void TextureJumps::look_at(const Scene& scene, ShapeId id) {
   }
   result.has_seams = seams.everywhere || seams.coordinates;
   if (textures.empty()) return;
-  if (mesh.uv_source != UvSource::kPlane) {
-    if (std::any_of(textures.begin(), textures.end(),
-                    [](const Texture* texture) { return jumps_anywhere(*texture); }))
-      curved_.push_back(id);
-    return;
-  }
+  if (mesh.uv_source != UvSource::kPlane && !seams.period_one) with_meridian_.push_back(id);
   seams.sides.resize(mesh.faces.size());
   for (uint32_t f = 0; f < mesh.faces.size(); ++f) {
     if (add_face(textures, mesh, FaceId(f), result)) continue;
@@ -90,17 +76,11 @@ void TextureJumps::look_at(const Scene& scene, ShapeId id) {
 
 bool TextureJumps::add_face(const std::vector<const Texture*>& textures, const Mesh& mesh,
                             FaceId face, OfShape& result) {
-  const FaceIndices& ids = mesh.uv_ids[face.index()];
-  std::array<std::array<double, 2>, 3> uv;
-  for (int k = 0; k < 3; ++k) {
-    const Vec3f& place = mesh.uv_places[ids[k]];
-    uv[k] = {place.x, place.y};
-  }
   Texture::Jumps jumps;
   size_t of_one = 0;  // how many textures jump
   for (const Texture* texture : textures) {
     const size_t before = jumps.inside.size();
-    if (!texture->add_jumps(uv, kMost - std::min(count_, kMost), jumps)) {
+    if (!add_face_jumps(*texture, mesh, face, kMost - std::min(count_, kMost), jumps)) {
       count_ = kMost + 1;
       return false;
     }
@@ -134,16 +114,16 @@ void check_texture_edges(const Scene& scene, std::vector<std::string>& warnings)
                     "respect to what moves need: scale to_uv by less",
                     quoted_name(scene, jumps.first_without()), TextureJumps::kMost));
   }
-  if (jumps.curved().empty()) return;
+  if (jumps.with_meridian().empty()) return;
   std::vector<std::string> names;
-  for (const ShapeId shape : jumps.curved()) names.push_back(quoted_name(scene, shape));
+  for (const ShapeId shape : jumps.with_meridian()) names.push_back(quoted_name(scene, shape));
   constexpr size_t kMostNames = 8;
   const size_t more = names.size() > kMostNames ? names.size() - kMostNames : 0;
   names.resize(names.size() - more);
   warnings.push_back(fmt::format(
-      "derivatives with respect to what moves are incomplete: the textures of {}{} jump along "
-      "curves, as their coordinates are those of a sphere or disk; a mesh with coordinates has "
-      "straight edges there, which count",
+      "derivatives with respect to what moves are incomplete: the textures of {}{} jump where the "
+      "angle of a sphere or disk comes back to its beginning, which is no edge (where to_uv has "
+      "whole numbers they do not)",
       join(names), more > 0 ? fmt::format(" and {} more", more) : ""));
 }
 

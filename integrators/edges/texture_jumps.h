@@ -23,8 +23,9 @@ class TextureJumps {
   static constexpr size_t kMost = 1000000;
   // The first shape that lacks segments, if any.
   ShapeId first_without() const { return first_without_; }
-  // Shapes whose textures jump along curves, which are not found: on spheres and disks.
-  const std::vector<ShapeId>& curved() const { return curved_; }
+  // Spheres and disks whose textures jump where an angle comes back to its beginning: along a
+  // meridian that is not found.
+  const std::vector<ShapeId>& with_meridian() const { return with_meridian_; }
 
  private:
   struct OfShape {
@@ -38,13 +39,13 @@ class TextureJumps {
                 OfShape& result);
 
   std::vector<OfShape> shapes_;  // none without textures
-  std::vector<ShapeId> curved_;
+  std::vector<ShapeId> with_meridian_;
   size_t count_ = 0;
   ShapeId first_without_ = ShapeId::none();
 };
 
 // InputError if there are more than TextureJumps::kMost segments. Adds one warning that names the
-// shapes whose textures jump along curves.
+// shapes with such a meridian.
 void check_texture_edges(const Scene& scene, std::vector<std::string>& warnings);
 
 }  // namespace limn

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "integrators/edges/face_jumps.h"
 #include "integrators/edges/near_faces.h"
 #include "integrators/paths/path_follow.h"
 #include "limn/core/duplicate_faces.h"
@@ -88,13 +89,13 @@ Sides nearest_faces(const PathContext& context, const EdgeMesh& mesh, const Edge
   return sides;
 }
 
-// Textures may jump at the edge: they are looked up beside it, where one that is smooth changes by
-// 2^-26 of what it does over the face. No jump that is told from this one (texture_jumps.cpp) is as
-// near.
-void step_aside(const std::array<Vec3d, 3>& corners, const Vec3d& into, std::array<double, 2>& b) {
+// Textures may jump at the edge: they are looked up beside it. by: in barycentric coordinates; more
+// than lines may be off the edge that they are taken for.
+void step_aside(const std::array<Vec3d, 3>& corners, const Vec3d& into, double by,
+                std::array<double, 2>& b) {
   const Vec3d e1 = corners[1] - corners[0], e2 = corners[2] - corners[0], n = cross(e1, e2);
   const double slope[2] = {dot(cross(into, e2), n), dot(cross(e1, into), n)};
-  const double step = 0x1p-26 / (std::fabs(slope[0]) + std::fabs(slope[1]));
+  const double step = by / (std::fabs(slope[0]) + std::fabs(slope[1]));
   for (int k = 0; k < 2; ++k) b[k] += slope[k] * step;
 }
 
@@ -102,10 +103,11 @@ void step_aside(const std::array<Vec3d, 3>& corners, const Vec3d& into, std::arr
 // what lies behind.
 class RadianceBeside {
  public:
-  RadianceBeside(const PathContext& context, const EdgeView& view, int bounces, const Rng& key,
-                 RayCount& rays, const RadiancePart& part)
+  RadianceBeside(const PathContext& context, const EdgeView& view, bool of_texture, int bounces,
+                 const Rng& key, RayCount& rays, const RadiancePart& part)
       : scene_(context.scene),
         view_(view),
+        of_texture_(of_texture),
         part_(part),
         path_(context, rays),
         walks_{{key, bounces, nullptr}, {key, bounces, nullptr}} {}
@@ -117,7 +119,10 @@ class RadianceBeside {
     edges_[i] = {around, view_.x0, view_.x1, side};
     walks_[i].edge = &edges_[i];
     SurfacePoint<double> surface = surface_on_ray(scene_, side.face, view_.y, n);
-    if (surface.shape->mesh.textured) step_aside(corners, side.into, surface.b);
+    if (const Mesh& mesh = surface.shape->mesh; mesh.textured) {
+      const bool curved = of_texture_ && mesh.uv_source != UvSource::kPlane;
+      step_aside(corners, side.into, curved ? 4 * kOffCurve : 0x1p-21, surface.b);
+    }
     start(i, surface);
   }
   void start_behind(int i, FaceRef face) {
@@ -155,6 +160,7 @@ class RadianceBeside {
 
   const Scene& scene_;
   const EdgeView& view_;
+  bool of_texture_;
   const RadiancePart& part_;
   Tracer path_;
   Tracer::Walk walks_[2];
@@ -198,7 +204,8 @@ bool edge_difference(const PathContext& context, const EdgeMesh& mesh, const Edg
   ray.skip_emitters = bounces == 0 && context.scene.hide_emitters;
   const FacesAround around = mesh.around(view.id.edge);
   // Both sides share their random numbers: where they hardly differ, so do their estimates.
-  RadianceBeside beside(context, view, bounces, key.at(Purpose::kEdgeSide, bounces), rays, part);
+  RadianceBeside beside(context, view, mesh.of_texture(), bounces,
+                        key.at(Purpose::kEdgeSide, bounces), rays, part);
   if (mesh.of_texture()) {
     return texture_difference(context, around, view, ray, known_behind != nullptr, beside, rays,
                               jump);

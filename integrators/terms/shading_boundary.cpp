@@ -26,6 +26,9 @@ class BoundaryTerm final : public Term {
         nothing_(input.warps && std::all_of(edges_.objects.begin(), edges_.objects.end(),
                                             [](const EdgeMesh& m) { return m.edges.empty(); })) {
     if (context_.mirrored) glare_.emplace(edges_, sampler_, *context_.mirrored);
+    emitters_jump_ = std::ranges::any_of(edges_.objects, [&](const EdgeMesh& mesh) {
+      return is_textured_emitter(mesh) && (mesh.of_texture() || mesh.count(EdgeClass::kSharp) > 0);
+    });
   }
 
   bool uses_vertices() const override { return !nothing_; }
@@ -57,7 +60,8 @@ class BoundaryTerm final : public Term {
   // Whether what arrives at a vertex is what regions emit, and nothing else.
   bool is_left_out(int bounces) const {
     const int max_depth = context_.scene.max_depth;
-    return part_.regions && part_.regions->hold_all() && max_depth >= 0 && bounces + 2 >= max_depth;
+    return part_.regions && part_.regions->hold_all() && !emitters_jump_ && max_depth >= 0 &&
+           bounces + 2 >= max_depth;
   }
   // Whether what a direction from a vertex meets is lit by what it scatters.
   bool scatters_again(int bounces) const {
@@ -70,8 +74,18 @@ class BoundaryTerm final : public Term {
   // view: what is left out, if anything.
   void add_draws(const PathVertex& vertex, const EdgeQuery& query, int samples,
                  const GlareEdges::View* view, BoundarySink& sink) const;
-  EdgeDraw drawn_at(const EdgeSample& sample, const Rng& key) const {
-    return {edges_.object(sample.edge.object), sample, part_, key};
+  bool is_textured_emitter(const EdgeMesh& mesh) const {
+    if (!mesh.shape.valid()) return false;
+    const Shape& shape = context_.scene.shape(mesh.shape);
+    return shape.is_emitter && shape.mesh.textured;
+  }
+  // Lists of outlines before regions have no edges at which the texture of a region's own light
+  // jumps: there all radiance counts.
+  EdgeDraw drawn_at(const PathVertex& vertex, const EdgeSample& sample, const Rng& key) const {
+    const EdgeMesh& mesh = edges_.object(sample.edge.object);
+    const bool inside = emitters_jump_ && is_textured_emitter(mesh) &&
+                        !is_outline(mesh, sample.edge.edge, vertex.surface.p);
+    return {mesh, sample, inside ? RadiancePart{} : part_, key};
   }
 
   const PathContext& context_;
@@ -81,6 +95,7 @@ class BoundaryTerm final : public Term {
   RadiancePart part_;
   std::optional<GlareEdges> glare_;  // none where nothing mirrors
   bool nothing_;                     // warped directions follow all edges
+  bool emitters_jump_;               // some may, by their textures
 };
 
 void BoundaryTerm::add_before_glare(const PathVertex& vertex, const EdgeQuery& query, int samples,
@@ -97,7 +112,7 @@ void BoundaryTerm::add_before_glare(const PathVertex& vertex, const EdgeQuery& q
   glare_->draw(view, query, key.at(Purpose::kDirect, vertex.bounces), samples, sink.cost(), points);
   for (size_t i = 0; i < points.size(); ++i) {
     const Rng own = key.copy(Purpose::kEdgeCopy, static_cast<int>(i));
-    add_edge_point(context_, vertex, drawn_at(points[i].sample, own), sink);
+    add_edge_point(context_, vertex, drawn_at(vertex, points[i].sample, own), sink);
   }
 }
 
@@ -115,7 +130,7 @@ void BoundaryTerm::add_draws(const PathVertex& vertex, const EdgeQuery& query, i
       ++cost.zero_weight;
       if (sink.log()) sink.log()->push_back("  edge: before glare, left to others");
     } else {
-      EdgeDraw draw = drawn_at(*drawn[i], vertex.key.copy(Purpose::kEdgeCopy, i));
+      EdgeDraw draw = drawn_at(vertex, *drawn[i], vertex.key.copy(Purpose::kEdgeCopy, i));
       draw.roulette = true;
       add_edge_point(context_, vertex, draw, sink);
     }

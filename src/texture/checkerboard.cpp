@@ -73,8 +73,8 @@ class Checkerboard final : public Texture {
   // Where t, linear over the face from these values at its corners, is a multiple of one half.
   static bool add_lines(const std::array<double, 3>& t, size_t most, Jumps& jumps) {
     const auto [least, greatest] = std::minmax({t[0], t[1], t[2]});
-    // Lines so near to a side or corner are along it. Positions of the corners are rounded by more.
-    const double near = 0x1p-22 * (greatest - least);
+    // Lines so near to a side or corner are along it: texture coordinates are rounded to floats.
+    const double near = 0x1p-24 * (greatest - least);
     for (int k = 0; k < 3; ++k) {
       const double a = t[k], b = t[(k + 1) % 3], line = 0.5 * std::round(2 * a);
       if (std::fabs(a - line) <= near && std::fabs(b - line) <= near) jumps.sides |= 1 << k;

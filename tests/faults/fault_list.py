@@ -39,7 +39,11 @@ FAULTS = [
     Fault("camera", "edges of clip planes lost", TERMS + "camera_edges.cpp",
           "for (uint32_t c = 0; c < clips_.size(); ++c) add_clip(c);", "",
           "test_crossings"),
+    Fault("camera", "edges inside textures lost", "integrators/edges/scene_edges.cpp",
+          "if (segments.empty()) continue;", "continue;", "test_texture_edges"),
 
+    Fault("boundary", "texture looked up on its edge", TERMS + "edge_difference.cpp",
+          "const double step = by / (", "const double step = 0 * by / (", "test_texture_edges"),
     Fault("boundary", "density x 1.1", TERMS + "vertex_edges.cpp",
           "1 / (view.distance * view.distance * view.distance *",
           "1 / (1.1 * view.distance * view.distance * view.distance *", POWER, "*/boundary"),

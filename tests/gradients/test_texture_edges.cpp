@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "edgetree/forest/forest_build.h"
+#include "integrators/edges/face_jumps.h"
 #include "integrators/edges/texture_jumps.h"
 #include "limn/edgetree/edge_sampler_types.h"
 #include "limn/integrators/backward.h"
@@ -32,42 +33,104 @@ std::shared_ptr<Texture> checkerboard(const Matrix4& to_uv = {}) {
 bool on_left(const Place& a, const Place& b, const Place& x) {
   return (b[0] - a[0]) * (x[1] - a[1]) - (b[1] - a[1]) * (x[0] - a[0]) > 0;
 }
-bool cross(const Texture::Jump& jump, const Place& a, const Place& b) {
-  return on_left(jump.from, jump.to, a) != on_left(jump.from, jump.to, b) &&
-         on_left(a, b, jump.from) != on_left(a, b, jump.to);
+bool cross(const Texture::Jump& line, const Place& a, const Place& b) {
+  return on_left(line.from, line.to, a) != on_left(line.from, line.to, b) &&
+         on_left(a, b, line.from) != on_left(a, b, line.to);
+}
+bool is_near(const Texture::Jump& line, const Place& x) {
+  const double dx = line.to[0] - line.from[0], dy = line.to[1] - line.from[1];
+  const double across = (x[0] - line.from[0]) * dy - (x[1] - line.from[1]) * dx;
+  return std::fabs(across) <= 2 * kOffCurve * std::hypot(dx, dy);
 }
 
-// Between two points of a face the colour changes as often as segments lie between them.
-TEST(Checkerboard, JumpsAtItsSegments) {
+// There angles change too fast for segments.
+bool is_by_axis(const Mesh& mesh, FaceId face, const Place& b) {
+  if (mesh.uv_source == UvSource::kPlane) return false;
+  const FaceIndices& ids = mesh.uv_ids[face.index()];
+  Vec3d place = cast<double>(mesh.uv_places[ids[0]]) * (1 - b[0] - b[1]);
+  for (int k = 0; k < 2; ++k) place = place + cast<double>(mesh.uv_places[ids[k + 1]]) * b[k];
+  return std::hypot(place.x, place.y) < 1.0 / 16;
+}
+
+Texture::Jumps jumps_of(const Texture& texture, const Mesh& mesh, FaceId face) {
+  Texture::Jumps jumps;
+  EXPECT_TRUE(add_face_jumps(texture, mesh, face, 1000, jumps));
+  return jumps;
+}
+
+// Between two points of a face the colour changes as often as segments lie between them. How often
+// segments that stand for curves are too near to tell.
+int expect_jumps_at_segments(const Texture& texture, const Mesh& mesh, FaceId face, Rng& rng) {
+  const Texture::Jumps lines = jumps_of(texture, mesh, face);
+  const auto draw = [&] {
+    const double u = std::sqrt(rng.uniform()), v = rng.uniform();
+    return Place{u * v, u * (1 - v)};
+  };
+  int left_out = 0;
+  for (int k = 0; k < 50; ++k) {
+    const Place a = draw(), b = draw();
+    size_t count = 0;
+    bool near = is_by_axis(mesh, face, a) || is_by_axis(mesh, face, b);
+    for (const Texture::Jump& line : lines.inside) {
+      count += cross(line, a, b);
+      near = near || is_near(line, a) || is_near(line, b);
+    }
+    left_out += near;
+    if (near && mesh.uv_source != UvSource::kPlane) continue;
+    const auto color = [&](const Place& p) {
+      return texture.eval(texture_point<double>(mesh, face, p)).r;
+    };
+    EXPECT_EQ(color(a) != color(b), count % 2 == 1) << face.index() << " " << k;
+  }
+  return left_out;
+}
+
+Mesh mesh_of_face(const std::array<Place, 3>& uv) {
+  Mesh mesh = make_mesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}});
+  mesh.uv_source = UvSource::kPlane;
+  for (const Place& corner : uv) {
+    mesh.uv_places.push_back({static_cast<float>(corner[0]), static_cast<float>(corner[1]), 0});
+  }
+  mesh.uv_ids = mesh.faces;
+  return mesh;
+}
+
+Matrix4 turned_uv() {
+  Matrix4 m;
+  m.m[0][0] = 1.5, m.m[0][1] = -0.5, m.m[0][3] = 0.3, m.m[1][0] = 0.7;
+  return m;
+}
+
+TEST(FaceJumps, AreWhereACheckerboardJumps) {
   Rng rng(1, 0, 0);
-  Matrix4 turned;
-  turned.m[0][0] = 1.5, turned.m[0][1] = -0.5, turned.m[0][3] = 0.3, turned.m[1][0] = 0.7;
-  for (const Matrix4& to_uv : {Matrix4{}, turned}) {
-    const auto texture = checkerboard(to_uv);
+  for (const Matrix4& to_uv : {Matrix4{}, turned_uv()}) {
     for (int i = 0; i < 50; ++i) {
       std::array<Place, 3> uv;
       for (Place& corner : uv) corner = {4 * rng.uniform() - 2, 4 * rng.uniform() - 2};
-      Texture::Jumps jumps;
-      ASSERT_TRUE(texture->add_jumps(uv, 1000, jumps));
-      EXPECT_EQ(jumps.sides, 0);
-      const auto draw = [&] {
-        const double u = std::sqrt(rng.uniform()), v = rng.uniform();
-        return Place{u * v, u * (1 - v)};
-      };
-      for (int k = 0; k < 50; ++k) {
-        const Place a = draw(), b = draw();
-        size_t count = 0;
-        for (const Texture::Jump& jump : jumps.inside) count += cross(jump, a, b);
-        const auto color = [&](const Place& p) {
-          TexturePoint<double> point;
-          for (int c = 0; c < 2; ++c) {
-            point.uv[c] = uv[0][c] + p[0] * (uv[1][c] - uv[0][c]) + p[1] * (uv[2][c] - uv[0][c]);
-          }
-          return texture->eval(point).r;
-        };
-        EXPECT_EQ(color(a) != color(b), count % 2 == 1) << i << " " << k;
-      }
+      expect_jumps_at_segments(*checkerboard(to_uv), mesh_of_face(uv), FaceId(0), rng);
     }
+  }
+}
+
+// On spheres and disks all lines but meridians are curves; the equator runs along sides of faces.
+TEST(FaceJumps, AreCurvesOnSpheresAndDisks) {
+  const TempFiles files;
+  Matrix4 scaled;
+  scaled.m[0][0] = 2, scaled.m[1][1] = 6;
+  const auto texture = checkerboard(scaled);
+  Rng rng(5, 0, 0);
+  for (const char* type : {"sphere", "disk"}) {
+    SceneParts parts;
+    parts.body = fmt::format(R"(<shape type="{}"><bsdf type="diffuse">
+                 <texture type="checkerboard" name="reflectance"/></bsdf></shape>)",
+                             type);
+    const Scene scene = make_scene(files, parts);
+    const Mesh& mesh = scene.shapes[0].mesh;
+    int left_out = 0, all = 0;
+    for (uint32_t f = 0; f < mesh.faces.size(); f += 7, all += 50) {
+      left_out += expect_jumps_at_segments(*texture, mesh, FaceId(f), rng);
+    }
+    EXPECT_LT(left_out, all / 5) << type;
   }
 }
 
@@ -79,9 +142,14 @@ TEST(Checkerboard, LinesAlongSidesAreNotInside) {
   ASSERT_EQ(jumps.inside.size(), 1u);  // v = 1/2
   EXPECT_FALSE(texture->add_jumps({{{0, 0}, {9, 0}, {9, 9}}}, 10, jumps));
   EXPECT_TRUE(texture->has_period_one());
-  Matrix4 scaled;
-  scaled.m[0][0] = 1.5;
-  EXPECT_FALSE(checkerboard(scaled)->has_period_one());
+  EXPECT_FALSE(checkerboard(turned_uv())->has_period_one());
+  // Coordinates of files are floats: one tenth is none.
+  Matrix4 five;
+  five.m[0][0] = 5;
+  jumps = {};
+  ASSERT_TRUE(checkerboard(five)->add_jumps({{{0, 0.25}, {0.1f, 0.25}, {0.1f, 0.3}}}, 10, jumps));
+  EXPECT_EQ(jumps.sides, 2);
+  EXPECT_TRUE(jumps.inside.empty());
 }
 
 // A closed body, whose faces have segments at random, and its edges.
@@ -258,6 +326,26 @@ Scene still_life(const TempFiles& files, double scale) {
   return make_scene(files, parts);
 }
 
+Scene checkered_ball(const TempFiles& files, double scale) {
+  SceneParts parts;
+  parts.body = fmt::format(
+                   R"(<shape type="sphere" id="ball"><transform name="to_world">
+                   <rotate x="1" angle="30"/></transform><bsdf type="diffuse">
+                   <texture type="checkerboard" name="reflectance"><rgb name="color0" value=".9"/>
+                   <transform name="to_uv"><scale x="{}" y="{}"/></transform></texture>
+                   </bsdf></shape>)",
+                   scale, scale) +
+               constant_light("sky", "1, 1, 1");
+  return make_scene(files, parts);
+}
+
+TEST(TextureEdges, OfASphereAgreeWithDifferences) {
+  const TempFiles files;
+  const Scene scene = checkered_ball(files, 4);
+  for (const char* name : {"ball.rotate.y", "ball.rotate.x", "ball.translate.y", "sensor.fov"})
+    expect_agreement(scene, name, 1024);
+}
+
 TEST(TextureEdges, DerivativesAgreeWithDifferences) {
   const TempFiles files;
   const Scene scene = still_life(files, 2);
@@ -266,7 +354,7 @@ TEST(TextureEdges, DerivativesAgreeWithDifferences) {
     expect_agreement(scene, name, 256);
 }
 
-TEST(TextureEdges, TooManyAndCurvesAreTold) {
+TEST(TextureEdges, TooManyAndMeridiansAreTold) {
   const TempFiles files;
   GradientOptions options;
   RunSettings settings;
@@ -287,17 +375,15 @@ TEST(TextureEdges, TooManyAndCurvesAreTold) {
   // What moves nothing needs no edges.
   options.parameters = {"glow.radiance"};
   EXPECT_NO_THROW(gradient(fine, options, settings));
-  SceneParts parts;
-  parts.body = R"(<shape type="sphere" id="ball"><bsdf type="diffuse">
-                  <texture type="checkerboard" name="reflectance"/></bsdf></shape>)" +
-               constant_light("sky", "1, 1, 1");
-  const Scene ball = make_scene(files, parts);
-  options.parameters = {"ball.translate.x"};
-  bool told = false;
-  for (const std::string& warning : gradient(ball, options, settings).warnings) {
-    told = told || warning.find("the textures of \"ball\" jump along curves") != warning.npos;
+  for (const double scale : {2.0, 2.5}) {
+    const Scene ball = checkered_ball(files, scale);
+    options.parameters = {"ball.translate.x"};
+    bool told = false;
+    for (const std::string& warning : gradient(ball, options, settings).warnings) {
+      told = told || warning.find("the textures of \"ball\" jump where the angle") != warning.npos;
+    }
+    EXPECT_EQ(told, scale == 2.5);
   }
-  EXPECT_TRUE(told);
 }
 
 // Reverse mode, term by term, against closed forms.
