@@ -165,6 +165,20 @@ TotalComparison compare_totals(const Moments& gradient, const Moments& differenc
   return total;
 }
 
+WidenedErrors widened_errors(const ProbeScores& places) {
+  WidenedErrors widened;
+  const auto factor = [](const Score& score) { return score.error / score.batch_error; };
+  for (size_t k = 0; k < places.windows; ++k) {
+    const Score& score = places.list[k].score;
+    if (!score.widened()) continue;
+    ++widened.windows;
+    widened.most = std::max(widened.most, factor(score));
+  }
+  const Score& total = places.list[places.windows].score;
+  if (total.widened()) widened.total = factor(total);
+  return widened;
+}
+
 class Checker {
  public:
   Checker(const Scene& scene, const CheckOptions& options, const RunSettings& settings,
@@ -197,6 +211,7 @@ class Checker {
     result.total =
         compare_totals(runs.gradient.parameters[0].image_sum,
                        runs.differences.extrapolated.image_sum, places.list[places.windows].score);
+    result.widened = widened_errors(places);
     result.p = places.p;
     const ProbeScore& found = places.list[places.smallest];
     result.found = found.name;

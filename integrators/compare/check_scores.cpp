@@ -175,6 +175,7 @@ Score Residual::score(const Probe& probe) const {
   for (size_t i = 0; i < rounding_.size(); ++i) rounding += std::fabs(probe[0][i]) * rounding_[i];
   Score score;
   score.value = d.mean - g.mean;
+  score.batch_error = std::sqrt(g.variance + d.variance + rounding * rounding);
   score.error =
       std::sqrt(std::max(g.variance, rare(probe, rare_gradient_)) +
                 std::max(d.variance, rare(probe, rare_differences_)) + rounding * rounding);

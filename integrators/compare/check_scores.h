@@ -43,7 +43,9 @@ using Probe = std::array<std::vector<double>, 2>;
 struct Score {
   double value = 0;  // differences minus gradient
   double error = 0;
+  double batch_error = 0;  // without what rare events that have not come would add
   double z = 0;
+  bool widened() const { return error > batch_error; }
 };
 
 // Gradient and differences of one parameter, from independent runs of at least two batches.

@@ -10,6 +10,7 @@ ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)
 sys.path.insert(0, os.path.join(ROOT, "tests", "faults"))
 
 from fault_list import FAULTS  # noqa: E402
+from faults import BEGIN, END  # noqa: E402
 
 
 def read(*names):
@@ -32,6 +33,11 @@ class Faults(unittest.TestCase):
     def test_programs_exist(self):
         programs = set(re.findall(r"limn_test\((\w+)", read("tests", "CMakeLists.txt")))
         self.assertLessEqual({f.program for f in FAULTS}, programs)
+
+    def test_page_has_a_place_for_the_table(self):
+        page = read("tests", "README.md")
+        self.assertEqual(page.count(BEGIN), 1)
+        self.assertEqual(page.split(BEGIN)[1].count(END), 1)
 
 
 if __name__ == "__main__":

@@ -155,12 +155,19 @@ def run(faults, tree, results):
     return caught
 
 
+def listed(faults, caught):
+    """Each fault with the test that caught it."""
+    return "".join(f"{f.part}: {f.name}: {caught[f] or 'NOT CAUGHT'}\n" for f in faults)
+
+
 def table(faults, caught):
-    lines = ["| part | faults, each with the test that caught it |", "|---|---|"]
+    """Of every part, how many of its faults its tests caught, and their programs."""
+    lines = ["| part | caught | by |", "|---|---|---|"]
     for part in dict.fromkeys(f.part for f in faults):
-        cells = [f"{f.name}: " + (f"`{caught[f]}`" if caught[f] else "**not caught**")
-                 for f in faults if f.part == part]
-        lines.append(f"| {part} | {'; '.join(cells)} |")
+        own = [f for f in faults if f.part == part]
+        programs = dict.fromkeys(f"`{f.program}`" for f in own if caught[f])
+        found = sum(bool(caught[f]) for f in own)
+        lines.append(f"| {part} | {found} of {len(own)} | {', '.join(programs)} |")
     return "\n".join(lines) + "\n"
 
 
@@ -187,8 +194,10 @@ def main():
         caught = run(faults, tree, results)
     except KeyboardInterrupt:
         sys.exit("interrupted; what is done is kept")
-    print(table(faults, caught), end="")
+    print(listed(faults, caught), end="")
     if options.write:
+        if options.only:
+            sys.exit("--write takes all faults, not --only some")
         write(table(faults, caught))
     missed = [fault for fault, test in caught.items() if not test]
     print(f"{len(caught) - len(missed)} of {len(caught)} faults caught")

@@ -74,6 +74,9 @@ TEST(CheckVerdict, FewSamplesCannotTell) {
   EXPECT_EQ(r.verdict, Verdict::kCannotTell);
   EXPECT_GT(r.needed_spp, 8);
   EXPECT_GT(r.power[0].visible, kCheckWanted);
+  // Some windows have met no event yet.
+  EXPECT_GT(r.widened.windows, 0);
+  EXPECT_GT(r.widened.most, 1);
 }
 
 TEST(CheckVerdict, DefectsAreFoundAndNamed) {

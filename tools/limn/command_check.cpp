@@ -68,6 +68,16 @@ void print_verdict(const CheckResult& r, int spp) {
   }
 }
 
+// "errors of 9 of 64 windows for rare events, up to 3.2 times; of the sum 1.4 times"
+std::string widened_text(const CheckResult& r) {
+  const auto times = [](double factor) {
+    return std::isfinite(factor) ? fmt::format("{:.2g} times", factor) : "from 0";
+  };
+  return fmt::format("errors of {} of {} windows for rare events, up to {}; of the sum {}",
+                     r.widened.windows, r.windows.count, times(r.widened.most),
+                     times(r.widened.total));
+}
+
 void print_check(const std::string& name, const CheckResult& r, int spp) {
   std::string samples;
   for (const TermRun& term : r.gradient.terms) {
@@ -82,6 +92,9 @@ void print_check(const std::string& name, const CheckResult& r, int spp) {
              r.total.difference_error, r.total.z);
   fmt::print("  z of windows       mean {:.2f}, deviation {:.2f}, largest {:.2f}\n", r.windows.mean,
              r.windows.deviation, r.windows.largest);
+  if (r.widened.windows > 0 || r.widened.total > 1) {
+    fmt::print("  widened            {}\n", widened_text(r));
+  }
   fmt::print("  p                  {:.2g} (windows, image and terms together), smallest for {}\n",
              r.p, r.found);
   if (r.confirmation) {
@@ -122,6 +135,10 @@ json figures_json(const std::string& name, const std::string& film, const CheckR
                  {"difference_sum", r.total.difference},
                  {"difference_sum_stderr", r.total.difference_error},
                  {"z_sum", r.total.z},
+                 {"widened",
+                  {{"windows", r.widened.windows},
+                   {"most", number(r.widened.most)},
+                   {"sum", number(r.widened.total)}}},
                  {"windows",
                   {{"count", r.windows.count},
                    {"mean", r.windows.mean},

@@ -36,6 +36,14 @@ struct TotalComparison {
   double z = 0;
 };
 
+// Where few events make an error up, those that rule it may not have come: such errors are widened
+// by events as large as any that came elsewhere. Factors are over the errors of batches.
+struct WidenedErrors {
+  int windows = 0;   // how many
+  double most = 1;   // the largest factor of a window; infinite where batches do not differ at all
+  double total = 1;  // of the whole image
+};
+
 // How much of a term the residual (differences minus gradient) looks like: the residual's
 // regression on the term's image.
 struct Suspicion {
@@ -73,6 +81,7 @@ struct CheckResult {
   // both smoothly, and a step keeps its bias small.
   ZSummary windows;
   TotalComparison total;
+  WidenedErrors widened;
   double p = 1;       // of the whole first run: windows, image and terms, paid for all of them
   std::string found;  // where it is smallest: "the whole image", "the camera term", ...
   std::vector<CheckPower> power;             // all terms together, then each
