@@ -56,19 +56,19 @@ Vec3d random_direction(Rng& rng) {
 
 }  // namespace
 
-Verdict judge(const EdgeSamplerInput& input, const RejectionTree& tree, uint32_t node,
-              const Vec3d& p) {
+NodeVerdict judge(const EdgeSamplerInput& input, const RejectionTree& tree, uint32_t node,
+                  const Vec3d& p) {
   const auto edges = tree.edges(node);
   const bool holds = std::any_of(edges.begin(), edges.end(),
                                  [&](EdgeRef id) { return is_candidate(input, id, p); });
-  if (tree.rejects(node, p)) return holds ? Verdict::kMissed : Verdict::kTrueReject;
-  return holds ? Verdict::kTrueAccept : Verdict::kFalseAccept;
+  if (tree.rejects(node, p)) return holds ? NodeVerdict::kMissed : NodeVerdict::kTrueReject;
+  return holds ? NodeVerdict::kTrueAccept : NodeVerdict::kFalseAccept;
 }
 
-std::vector<Verdict> judge_slice(const EdgeSamplerInput& input, const RejectionTree& tree,
-                                 uint32_t node, const Slice& slice, int threads) {
+std::vector<NodeVerdict> judge_slice(const EdgeSamplerInput& input, const RejectionTree& tree,
+                                     uint32_t node, const Slice& slice, int threads) {
   const auto size = static_cast<size_t>(slice.size);
-  std::vector<Verdict> verdicts(size * size);
+  std::vector<NodeVerdict> verdicts(size * size);
   parallel_for(size, threads, [&](size_t y) {
     for (size_t x = 0; x < size; ++x) {
       const Vec3d p = slice.point(static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5);
@@ -78,9 +78,9 @@ std::vector<Verdict> judge_slice(const EdgeSamplerInput& input, const RejectionT
   return verdicts;
 }
 
-VerdictCounts count(std::span<const Verdict> verdicts) {
+VerdictCounts count(std::span<const NodeVerdict> verdicts) {
   VerdictCounts counts{};
-  for (const Verdict verdict : verdicts) ++counts[static_cast<int>(verdict)];
+  for (const NodeVerdict verdict : verdicts) ++counts[static_cast<int>(verdict)];
   return counts;
 }
 

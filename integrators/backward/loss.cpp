@@ -15,13 +15,6 @@ namespace limn {
 
 namespace {
 
-struct LossName {
-  const char* name;
-  LossKind kind;
-};
-constexpr LossName kLosses[] = {
-    {"l2", LossKind::kL2}, {"relative-l2", LossKind::kRelativeL2}, {"l1", LossKind::kL1}};
-
 // Of one value: the loss of two independent estimates, and the derivative of what their mean makes.
 struct ValueLoss {
   double loss, adjoint;
@@ -63,12 +56,6 @@ std::vector<double> pixel_weights(const Scene& scene, const Image& mask) {
 }
 
 }  // namespace
-
-LossKind loss_kind(const std::string& name) {
-  for (const LossName& loss : kLosses)
-    if (name == loss.name) return loss.kind;
-  throw InputError(unknown_name("loss", name, names_of(kLosses)));
-}
 
 void check_loss_images(const Scene& scene, const Image& target, const Image& mask,
                        const std::string& target_place, const std::string& mask_place) {
@@ -141,15 +128,16 @@ Level halved(const Level& level) {
   return half;
 }
 
-// Adds `share` of the loss of a level to `loss`, and its derivative with respect to the pixels of
+// Adds the share of a level to `loss`, and its derivative with respect to the pixels of
 // the finest level, `finest` and twice as wide `doublings` times, to `adjoint`.
-void add_level(const Level& level, const Level& finest, int doublings, LossKind kind, double share,
+void add_level(const Level& level, const Level& finest, int doublings, const LossOptions& options,
                double& loss, std::vector<double>& adjoint) {
+  const double share = 1.0 / options.levels;
   std::vector<double> slopes(level.a.size());
   for (size_t i = 0; i < slopes.size(); ++i) {
     const double weight = level.weights[i / 3];
     if (weight == 0) continue;
-    const ValueLoss value = value_loss(kind, level.a[i], level.b[i], level.target[i]);
+    const ValueLoss value = value_loss(options.kind, level.a[i], level.b[i], level.target[i]);
     loss += share * weight * value.loss;
     slopes[i] = share * value.adjoint;
   }
@@ -183,21 +171,20 @@ int most_pyramid_levels(const Scene& scene) {
   return levels;
 }
 
-LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
-                      const RunSettings& settings, const Image& mask, int levels,
-                      const LossImages& of) {
+LossResult image_loss(const Scene& scene, const Image& target, const LossOptions& options,
+                      const RunSettings& settings, const Image& mask) {
   check_loss_images(scene, target, mask);
-  if (levels < 1 || levels > most_pyramid_levels(scene)) {
-    throw InputError(fmt::format("a pyramid of {} levels: the film has 1 to {}", levels,
+  if (options.levels < 1 || options.levels > most_pyramid_levels(scene)) {
+    throw InputError(fmt::format("a pyramid of {} levels: the film has 1 to {}", options.levels,
                                  most_pyramid_levels(scene)));
   }
-  check_method(of.method);
+  check_method(options.method);
   std::vector<uint64_t> seeds{settings.seed};
   // Of streams that no other seed has.
   const uint64_t stream = mix_bits(settings.seed);
-  if (!of.one_image()) seeds = {mix_bits(stream + 1), mix_bits(stream + 2)};
+  if (!options.one_image()) seeds = {mix_bits(stream + 1), mix_bits(stream + 2)};
   const auto rendered =
-      render_seeds(scene, settings, seeds, {.method = of.method, .points = of.points});
+      render_seeds(scene, settings, seeds, {.method = options.method, .points = options.points});
   const RenderResult &a = rendered.front(), &b = rendered.back();
   LossResult result;
   result.spp = std::min(a.spp, b.spp);
@@ -214,9 +201,9 @@ LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
   }
   std::vector<double> adjoint(values);
   Level level = finest;
-  for (int k = 0; k < levels; ++k) {
+  for (int k = 0; k < options.levels; ++k) {
     if (k > 0) level = halved(level);
-    add_level(level, finest, k, kind, 1.0 / levels, result.value, adjoint);
+    add_level(level, finest, k, options, result.value, adjoint);
   }
   result.adjoint = Image(target.width, target.height, 3);
   double variance = 0;
@@ -225,7 +212,7 @@ LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
     // To first order, with half of the adjoint for each image.
     const double slope = 0.5 * adjoint[i];
     const double both = a.radiance.variance(i) + b.radiance.variance(i);
-    variance += slope * slope * (of.one_image() ? 2 * both : both);
+    variance += slope * slope * (options.one_image() ? 2 * both : both);
   }
   result.error = std::sqrt(variance);
   return result;

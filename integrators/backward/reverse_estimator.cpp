@@ -16,26 +16,9 @@
 #include "integrators/paths/path_follow.h"
 #include "integrators/paths/path_log.h"
 #include "limn/core/error.h"
+#include "limn/integrators/options.h"
 
 namespace limn {
-namespace {
-
-constexpr int kMostSamples = 1 << 16;  // so that their products with paths are numbers
-
-void check_samples(const BackwardOptions& options) {
-  if (options.edge_samples < 1 || options.edge_samples > kMostSamples) {
-    throw InputError(fmt::format("{} edges at a vertex of a path: there may be 1 to {}",
-                                 options.edge_samples, kMostSamples));
-  }
-  const double camera = options.camera_samples == 0 ? 1 : options.camera_samples;
-  for (const double samples : {camera, options.shadow_samples}) {
-    if (samples > 0 && samples <= kMostSamples) continue;
-    throw InputError(fmt::format("{:g} points on the film for a path: more than 0, {} at most",
-                                 samples, kMostSamples));
-  }
-}
-
-}  // namespace
 
 ReverseEstimator::ReverseEstimator(const Scene& scene, const Image& adjoint,
                                    const BackwardOptions& options, int threads)
@@ -53,7 +36,7 @@ ReverseEstimator::ReverseEstimator(const Scene& scene, const Image& adjoint,
   std::vector<std::string> names;
   for (const TermType* type : types_) names.emplace_back(type->name);
   const auto chosen = selected_terms(names, options.terms, scene.file);
-  check_samples(options);
+  check_options(options);
   for (size_t slot = 0; slot < types_.size(); ++slot) {
     if (types_[slot]->traces_paths) pixel_slot_ = slot;
     const bool computed = std::find(chosen.begin(), chosen.end(), names[slot]) != chosen.end();

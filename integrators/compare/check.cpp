@@ -13,6 +13,7 @@
 #include "integrators/compare/check_step.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/methods.h"
+#include "limn/integrators/options.h"
 
 namespace limn {
 namespace {
@@ -402,7 +403,7 @@ class Checker {
 CheckResult check(const Scene& scene, const CheckOptions& options, const RunSettings& settings,
                   const GradientRun& run) {
   const Method& method = options.method;
-  check_given_step(options.step);
+  check_options(options);
   // Before the search for a step.
   check_task(method, Task::kGradient);
   if (method->check) method->check(scene);

@@ -10,23 +10,15 @@
 namespace limn {
 namespace {
 
-// Adds `factor` times (I(reach) - I(0)) / reach to the batches, with negative reach on the side
-// before: a central difference around half the way. False if the run was interrupted.
-bool add_slope(const Scene& scene, const std::string& name, double reach, double factor, int block,
-               const RunSettings& settings, std::vector<Moments::Batch>& batches) {
+// (I(reach) - I(0)) / reach in batches, with negative reach on the side before: a central difference
+// around half the way. No batches if the run was interrupted.
+std::vector<Moments::Batch> slope_of_blocks(const Scene& scene, const std::string& name,
+                                            double reach, int block, const RunSettings& settings) {
   const DifferenceJob job{name, {0.5 * std::fabs(reach)}, {{1}}};
   const CentralDifferences run = central_differences(
       find_parameter(scene, name).moved(scene, 0.5 * reach), {job}, block, settings);
-  const auto& more = run.estimates[0][0].blocks.kept();
-  if (run.spp < settings.spp || (!batches.empty() && batches.size() != more.size())) return false;
-  if (batches.empty()) {
-    batches = more;
-    for (Moments::Batch& batch : batches) batch.sums.assign(batch.sums.size(), 0.0);
-  }
-  for (size_t b = 0; b < batches.size(); ++b)
-    for (size_t i = 0; i < batches[b].sums.size(); ++i)
-      batches[b].sums[i] += factor * more[b].sums[i];
-  return true;
+  if (run.spp < settings.spp) return {};
+  return run.estimates[0][0].blocks.kept();
 }
 
 // With X(r) the slope over the way r after the value minus that over r before it, X is K + c r for
@@ -42,8 +34,15 @@ std::vector<Moments::Batch> bend_of_blocks(const Scene& scene, const std::string
   }
   for (const auto& [reach, factor] : {std::pair{step, 2.0}, {2 * step, -1.0}}) {
     for (const double side : {1.0, -1.0}) {
-      if (!add_slope(scene, name, side * reach, side * factor, block, own, batches)) return {};
-      ++done;
+      auto more = slope_of_blocks(scene, name, side * reach, block, own);
+      if (more.empty() || (done > 0 && batches.size() != more.size())) return {};
+      if (done++ == 0) {
+        batches = more;
+        for (Moments::Batch& batch : batches) batch.sums.assign(batch.sums.size(), 0.0);
+      }
+      for (size_t b = 0; b < batches.size(); ++b)
+        for (size_t i = 0; i < batches[b].sums.size(); ++i)
+          batches[b].sums[i] += side * factor * more[b].sums[i];
     }
   }
   return batches;

@@ -1,10 +1,12 @@
 // A gradient without noise against differences of its own image.
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "integrators/compare/check_step.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/check.h"
+#include "limn/integrators/options.h"
 #include "limn/integrators/render.h"
 
 namespace limn {
@@ -37,66 +39,84 @@ double sum_of(const std::vector<double>& values) {
   return sum;
 }
 
-}  // namespace
+GradientOptions gradient_options(const CheckOptions& options) {
+  GradientOptions gradient;
+  gradient.parameters = {options.parameter};
+  gradient.method = options.method;
+  gradient.terms = options.terms;
+  gradient.exact_film = options.exact_film;
+  gradient.points = FilmPoints::kFaces;
+  return gradient;
+}
 
-// Differences at two steps tell what either misses: those change least that know most.
-FacesCheck check_faces(const Scene& scene, const CheckOptions& options, const RunSettings& settings,
-                       const GradientRun& run) {
-  check_given_step(options.step);
-  const Parameter parameter = find_parameter(scene, options.parameter);
+bool interrupted(const RunSettings& settings) {
+  return settings.interrupted && settings.interrupted->load();
+}
+
+struct Differences {
+  std::vector<double> best;
+  double step = 0;          // by which these were found
+  double least = INFINITY;  // how much they changed, or their rounding
+};
+
+// Differences at two steps tell what either misses: those change least that know most. Nothing if
+// interrupted.
+std::optional<Differences> find_differences(const Scene& scene, const Parameter& parameter,
+                                            double step, double size, const RunSettings& settings,
+                                            NonFinite& non_finite) {
   RunSettings own = settings;
   own.progress = nullptr;
-  FacesCheck result;
-  const auto image_at = [&](double step) {
-    const RenderResult image = render(parameter.moved(scene, step), own,
+  const auto image_at = [&](double way) {
+    const RenderResult image = render(parameter.moved(scene, way), own,
                                       {.method = "analytic", .points = FilmPoints::kFaces});
-    result.non_finite.merge(image.non_finite);
+    non_finite.merge(image.non_finite);
     return means(image.radiance);
   };
-  GradientOptions gradient_options;
-  gradient_options.parameters = {options.parameter};
-  gradient_options.method = options.method;
-  gradient_options.terms = options.terms;
-  gradient_options.exact_film = options.exact_film;
-  gradient_options.points = FilmPoints::kFaces;
-  result.gradient = run(scene, gradient_options, own);
-  result.non_finite = result.gradient.non_finite;
-  const auto interrupted = [&] { return settings.interrupted && settings.interrupted->load(); };
-  if (result.gradient.spp == 0 || interrupted()) {
-    result.interrupted = true;
-    return result;
-  }
-  const std::vector<double> told = means(result.gradient.parameters[0].total);
-  double step = options.step > 0 ? options.step : parameter.natural_step;
-  std::vector<double> before, best;
-  double least = INFINITY;
+  Differences found;
+  std::vector<double> before;
   for (int i = 0; i < kSteps; ++i, step *= kShrink) {
     std::vector<double> differences = image_at(step);
     // Steps at which nothing moves any more do not change either.
     const double rounding = kImageRounding * size_of(differences) / step +
-                            rounding_of_moves(scene, parameter, step) * size_of(told);
+                            rounding_of_moves(scene, parameter, step) * size;
     differences = minus(std::move(differences), image_at(-step));
     for (double& d : differences) d /= 2 * step;
-    if (interrupted()) {
-      result.interrupted = true;
-      return result;
-    }
+    if (interrupted(settings)) return std::nullopt;
     if (settings.progress) settings.progress((i + 1.0) / kSteps);
     const double change =
         before.empty() ? INFINITY : std::max(size_of(minus(differences, before)), rounding);
-    if (best.empty() || change < least) {
-      least = change;
-      best = differences;
-      result.step = step;
-    }
+    if (found.best.empty() || change < found.least) found = {differences, step, change};
     before = std::move(differences);
   }
+  return found;
+}
+
+}  // namespace
+
+FacesCheck check_faces(const Scene& scene, const CheckOptions& options, const RunSettings& settings,
+                       const GradientRun& run) {
+  check_options(options);
+  const Parameter parameter = find_parameter(scene, options.parameter);
+  RunSettings own = settings;
+  own.progress = nullptr;
+  FacesCheck result;
+  result.gradient = run(scene, gradient_options(options), own);
+  result.non_finite = result.gradient.non_finite;
+  result.interrupted = result.gradient.spp == 0 || interrupted(settings);
+  if (result.interrupted) return result;
+  const std::vector<double> told = means(result.gradient.parameters[0].total);
+  const auto found =
+      find_differences(scene, parameter, options.step > 0 ? options.step : parameter.natural_step,
+                       size_of(told), settings, result.non_finite);
+  result.interrupted = !found;
+  if (!found) return result;
+  result.step = found->step;
   result.gradient_sum = sum_of(told);
-  result.difference_sum = sum_of(best);
-  const double size = std::max(size_of(told), size_of(best));
+  result.difference_sum = sum_of(found->best);
+  const double size = std::max(size_of(told), size_of(found->best));
   const double scale = size > 0 ? 1 / size : 0;
-  result.error = scale * size_of(minus(told, best));
-  result.known = scale * least;
+  result.error = scale * size_of(minus(told, found->best));
+  result.known = scale * found->least;
   // Of the last two steps the smaller one has a fifteenth of the change as its error where the
   // image is smooth, all of it where rounding rules.
   if (result.error <= 2 * result.known) {

@@ -215,10 +215,4 @@ double reduced_step(const DifferenceResult& differences, double step, const Wind
   return ratio > kAllowedBias ? power_of_two_below(step_for_ratio(step, ratio)) : step;
 }
 
-void check_given_step(double step) {
-  if (step >= 0 && std::isfinite(step)) return;
-  throw InputError(
-      fmt::format("step: {:g} is neither a positive number nor 0, by which one is found", step));
-}
-
 }  // namespace limn

@@ -18,9 +18,6 @@ double find_check_step(const Scene& scene, const std::string& parameter, const W
 // small enough, else a smaller one.
 double reduced_step(const DifferenceResult& differences, double step, const Windows& windows);
 
-// InputError for a step that is negative or not finite; 0 stands for one that is found.
-void check_given_step(double step);
-
 // The error that rounding moved positions and texels to float causes in differences at a step,
 // over the derivative: about 2^-24 of what moves over its way. 0 if none of these moves.
 double rounding_of_moves(const Scene& scene, const Parameter& parameter, double step);

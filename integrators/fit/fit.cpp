@@ -15,6 +15,7 @@
 #include "limn/core/error.h"
 #include "limn/core/rng.h"
 #include "limn/integrators/methods.h"
+#include "limn/integrators/options.h"
 
 namespace limn {
 
@@ -73,14 +74,12 @@ Fit::Impl::Impl(std::vector<FitView> all, const FitOptions& options, const RunSe
     : views(std::move(all)), options_(options), settings_(settings) {
   if (views.empty()) throw InputError("a fit needs a view: a scene and its target");
   if (options.parameters.empty()) throw InputError("a fit needs a parameter");
-  if (!(options.step > 0 && std::isfinite(options.step))) {
-    throw InputError(fmt::format("the step {:g} must be positive", options.step));
-  }
+  check_options(options);
   for (FitView& view : views) {
     view.scene = deep_copy(view.scene);
     check_loss_images(view.scene, view.target, view.mask);
     const int most = most_pyramid_levels(view.scene);
-    if (options.pyramid < 1 || options.pyramid > most) {
+    if (options.pyramid > most) {
       throw InputError(
           {view.scene.file},
           fmt::format("a pyramid of {} levels: the film has 1 to {}", options.pyramid, most));
@@ -185,17 +184,6 @@ void Fit::Impl::check_terms() const {
 
 // What would fail after hours is told at once.
 void Fit::Impl::check_remeshing() {
-  if (!(options_.remesh_edge > 0.1 && options_.remesh_edge < 10)) {
-    throw InputError(
-        fmt::format("edges {:g} times as long are not within 0.1 and 10", options_.remesh_edge));
-  }
-  if (!(options_.remesh_shrink > 0 && options_.remesh_shrink <= 1)) {
-    throw InputError(
-        fmt::format("steps cannot shrink by {:g}: not within 0 and 1", options_.remesh_shrink));
-  }
-  for (const int64_t step : options_.remesh) {
-    if (step < 1) throw InputError(fmt::format("remeshing after {} steps: one at least", step));
-  }
   bool any = false;
   for (const FitParameter& p : parameters_) {
     if (p.is_displacement()) {
@@ -246,10 +234,10 @@ bool Fit::Impl::add_view(size_t view, FitRecord& record,
   const double share = 1 / static_cast<double>(views.size());
   RunSettings own = view_settings(view);
   own.spp = samples_of(options_.loss_spp > 0 ? options_.loss_spp : settings_.spp);
-  const LossImages images{loss_method(options_.backward.method), options_.backward.points,
-                          is_exact()};
-  LossResult loss =
-      image_loss(v.scene, v.target, options_.loss, own, v.mask, options_.pyramid, images);
+  const LossOptions loss_options{options_.loss, options_.pyramid,
+                                 loss_method(options_.backward.method), options_.backward.points,
+                                 is_exact()};
+  LossResult loss = image_loss(v.scene, v.target, loss_options, own, v.mask);
   if (loss.spp < own.spp) return false;
   record.view_losses.push_back(loss.value);
   record.loss += share * loss.value;

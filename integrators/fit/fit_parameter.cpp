@@ -102,9 +102,6 @@ void FitParameter::find_array(const std::vector<FitView>& views, double smoothin
                                  "show the same vertices and faces",
                                  name_, views[first_view_].scene.file));
   }
-  if (!(smoothing >= 0 && smoothing < 1e3)) {
-    throw InputError(fmt::format("the smoothing {:g} is not in [0, 1000)", smoothing));
-  }
   const double in_edges = smoothing * bounds_of(first).diagonal() / mean_edge_length(first);
   large_steps_ = std::make_unique<LargeSteps>(first, in_edges * in_edges);
   if (in_view_[first_view_]->array.size() == 1) {

@@ -46,15 +46,20 @@ std::vector<SurfacePoint> points_on(const Mesh& mesh, const std::vector<uint32_t
   return points;
 }
 
+struct Surface {
+  const Mesh& mesh;
+  SurfaceTree tree{mesh};
+};
+
 // Of points on one surface to the other.
-MeshDistance one_way(const Mesh& from, const SurfaceTree& from_tree, const Mesh& to,
-                     const SurfaceTree& to_tree, size_t samples, uint64_t seed, int threads) {
-  const auto points = points_on(from, from_tree.faces(), samples, seed);
+MeshDistance one_way(const Surface& from, const Surface& to, size_t samples, uint64_t seed,
+                     int threads) {
+  const auto points = points_on(from.mesh, from.tree.faces(), samples, seed);
   std::vector<double> distances(samples), angles(samples);
   parallel_for(samples, threads, [&](size_t i) {
-    const SurfaceTree::Nearest nearest = to_tree.nearest(points[i].p);
-    const Vec3d a = unit_normal(from, points[i].face);
-    const Vec3d b = unit_normal(to, static_cast<uint32_t>(nearest.face.index()));
+    const SurfaceTree::Nearest nearest = to.tree.nearest(points[i].p);
+    const Vec3d a = unit_normal(from.mesh, points[i].face);
+    const Vec3d b = unit_normal(to.mesh, static_cast<uint32_t>(nearest.face.index()));
     distances[i] = nearest.distance;
     angles[i] = std::atan2(length(cross(a, b)), dot(a, b));
   });
@@ -85,9 +90,9 @@ bool is_closed(const Mesh& mesh) {
 
 MeshDistance mesh_distance(const Mesh& mesh, const Mesh& truth, size_t samples, uint64_t seed,
                            int threads) {
-  const SurfaceTree tree(mesh), true_tree(truth);
-  const MeshDistance a = one_way(mesh, tree, truth, true_tree, samples, seed, threads);
-  const MeshDistance b = one_way(truth, true_tree, mesh, tree, samples, seed + 1, threads);
+  const Surface found{mesh}, wanted{truth};
+  const MeshDistance a = one_way(found, wanted, samples, seed, threads);
+  const MeshDistance b = one_way(wanted, found, samples, seed + 1, threads);
   return {0.5 * (a.chamfer + b.chamfer), std::max(a.hausdorff_95, b.hausdorff_95),
           std::max(a.hausdorff, b.hausdorff), 0.5 * (a.normal_angle + b.normal_angle)};
 }

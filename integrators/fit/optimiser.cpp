@@ -5,21 +5,10 @@
 #include <cmath>
 
 #include "limn/core/check.h"
-#include "limn/core/error.h"
-#include "limn/core/names.h"
 
 namespace limn {
 
 namespace {
-
-struct OptimiserName {
-  const char* name;
-  OptimiserKind kind;
-};
-constexpr OptimiserName kOptimisers[] = {{"adam-uniform", OptimiserKind::kAdamUniform},
-                                         {"adam", OptimiserKind::kAdam},
-                                         {"gradient-descent", OptimiserKind::kGradientDescent},
-                                         {"lbfgs", OptimiserKind::kLbfgs}};
 
 // Of the running means. With Kingma and Ba's 0.999 one heavy sample among the first sets the scale
 // of a thousand steps: of the shape before two mirrors (scenes/fits), the chamfer distance after
@@ -28,12 +17,6 @@ constexpr OptimiserName kOptimisers[] = {{"adam-uniform", OptimiserKind::kAdamUn
 constexpr double kBeta1 = 0.9, kBeta2 = 0.95;
 
 }  // namespace
-
-OptimiserKind optimiser_kind(const std::string& name) {
-  for (const OptimiserName& optimiser : kOptimisers)
-    if (name == optimiser.name) return optimiser.kind;
-  throw InputError(unknown_name("optimiser", name, names_of(kOptimisers)));
-}
 
 Optimiser::Optimiser(OptimiserKind kind, size_t size) : kind_(kind) {
   if (kind == OptimiserKind::kGradientDescent || kind == OptimiserKind::kLbfgs) return;

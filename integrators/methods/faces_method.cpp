@@ -6,18 +6,9 @@
 #include "integrators/methods/selection.h"
 #include "limn/core/error.h"
 #include "limn/core/field_error.h"
-#include "limn/core/names.h"
 #include "limn/integrators/parts.h"
 
 namespace limn {
-
-FilmPoints film_points(const std::string& name) {
-  for (const FilmPoints points : {FilmPoints::kRandom, FilmPoints::kFaces}) {
-    if (name == name_of(points)) return points;
-  }
-  throw InputError(unknown_name("kind of points on the film", name,
-                                {std::begin(kFilmPoints), std::end(kFilmPoints)}));
-}
 
 void check_points(FilmPoints points, bool closed_light, const std::string& method) {
   if (points == FilmPoints::kRandom || closed_light) return;

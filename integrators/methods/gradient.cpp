@@ -13,6 +13,7 @@
 #include "limn/core/names.h"
 #include "limn/core/parameter.h"
 #include "limn/integrators/methods.h"
+#include "limn/integrators/options.h"
 #include "limn/integrators/parts.h"
 
 namespace limn {
@@ -29,11 +30,7 @@ void check_selection(const Scene& scene, const GradientOptions& options) {
   const Method& method = options.method;
   check_task(method, Task::kGradient);
   if (options.parameters.empty()) throw InputError("names: at least one parameter must be named");
-  if (!(options.step >= 0) || options.step > 1e12) {
-    throw FieldError("step", fmt::format("{:g} is neither a positive number of at most 1e12 nor 0, "
-                                         "by which a pilot finds it",
-                                         options.step));
-  }
+  check_options(options);
   if (options.exact_film) check_exact_film(scene, method);
   if (method->check) method->check(scene);
   check_warp(options.warp, {method});

@@ -15,6 +15,7 @@
 #include "limn/core/field_error.h"
 #include "limn/core/names.h"
 #include "limn/integrators/methods.h"
+#include "limn/integrators/options.h"
 #include "limn/integrators/parts.h"
 
 namespace limn {
@@ -30,13 +31,17 @@ std::vector<std::string> names_looking_around() {
 }
 
 Numbers numbers_of(const std::string& generator) {
-  for (const char* name : kGenerators) {
-    if (name == generator) {
-      return name == kGenerators[0] ? Numbers::kEvenInRun : Numbers::kIndependent;
-    }
-  }
-  throw InputError(
-      unknown_name("generator", generator, {std::begin(kGenerators), std::end(kGenerators)}));
+  return number_of(kGeneratorOption, generator) == 0 ? Numbers::kEvenInRun : Numbers::kIndependent;
+}
+
+Scene with_direct_light_alone(const Scene& scene) {
+  Scene direct = scene;
+  direct.max_depth = 2;
+  return direct;
+}
+RenderOptions of_radiance(RenderOptions options) {
+  options.what = RenderWhat::kImage;
+  return options;
 }
 
 std::unique_ptr<SampleEstimator> make_estimator(const Scene& scene, const RunSettings& settings,
@@ -82,7 +87,7 @@ void identify(BatchStore& store, const RenderOptions& options) {
     store.identify("film", options.exact_film ? "exact" : "rays");
     return;
   }
-  store.identify("what", fmt::format("{}", static_cast<int>(options.what)));
+  store.identify("what", kRenderWhat[static_cast<int>(options.what)]);
   if (method.by_lines) {
     store.identify("lines", fmt::format("{}, tolerance {}", options.lines, options.tolerance));
   } else {
@@ -122,6 +127,10 @@ RenderResult run(const EstimatorList& estimators, const RunSettings& settings,
 }  // namespace
 
 RenderResult render(const Scene& scene, const RunSettings& asked, const RenderOptions& options) {
+  check_options(options);
+  if (options.what == RenderWhat::kDirect) {
+    return render(with_direct_light_alone(scene), asked, of_radiance(options));
+  }
   const Stopwatch watch;
   const RunSettings settings = settings_for(options.points, asked);
   check_task(options.method, Task::kImage);
@@ -165,6 +174,10 @@ std::vector<RenderResult> render_seeds(const Scene& scene, const RunSettings& se
 std::vector<std::string> trace_sample(const Scene& scene, const RunSettings& settings,
                                       const NonFinite::SampleId& place,
                                       const RenderOptions& options) {
+  check_options(options);
+  if (options.what == RenderWhat::kDirect) {
+    return trace_sample(with_direct_light_alone(scene), settings, place, of_radiance(options));
+  }
   check_pixel(scene.film, place);
   const auto estimator = make_estimator(scene, settings, options);
   SampleLog log;

@@ -18,7 +18,6 @@ namespace {
 // through the sky take the time of some tens of those through emitters, while most of what is left
 // to the film is the rims of shadows of emitters. Not tuned.
 constexpr int kEmitterPoints = 16;
-constexpr int kMostRays = 1 << 20;
 // What a pilot counts, in units of a ray (0.17 us): a point of the film besides its ray, and
 // LineWork, as fitted to the times of the points of cad.xml, plant.xml, sun.xml, soft_shadow.xml
 // and soft_lamp.xml; means over each of these come out within a quarter.
@@ -26,14 +25,7 @@ constexpr double kPointCost = 1.5, kListCost = 12, kArcCost = 0.7, kCrossingCost
                  kEvaluationCost = 0.45;
 constexpr uint64_t kPilotSeed = 0x9170;
 
-void check_options(const RenderOptions& options, bool by_lines) {
-  const auto check = [](const char* name, auto value, auto least, auto most) {
-    if (value >= least && value <= most) return;
-    throw InputError(fmt::format("{}: {} is not from {} to {}", name, value, least, most));
-  };
-  if (!by_lines) return check("rays", options.rays, 1, kMostRays);
-  check("lines", options.lines, 1, kMostLines);
-  check("tolerance", options.tolerance, 0.0, 1.0);
+void check_doubling(const RenderOptions& options) {
   if (options.tolerance > 0 && 2 * options.lines > kMostLines) {
     throw InputError(
         fmt::format("tolerance: {} lines can not be doubled (there are {} at most): "
@@ -54,7 +46,7 @@ VisibilityEstimator::VisibilityEstimator(const Scene& scene, const RunSettings& 
       filter_(scene.film.filter) {
   const bool direct = options.what == RenderWhat::kImage;
   const ImageMethod& method = *options.method->image;
-  check_options(options, method.by_lines);
+  if (method.by_lines) check_doubling(options);
   const bool chooses = method.chooses && options.tolerance == 0;
   std::shared_ptr<const Environment> sky = scene.environment;
   if (chooses && direct && sky) split_ = split_environment(*sky, settings.threads);

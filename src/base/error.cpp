@@ -29,12 +29,6 @@ std::string printable(const std::string& message) {
   return text;
 }
 
-std::string short_number(double x) {
-  std::ostringstream text;
-  text << x;
-  return text.str();
-}
-
 std::string format(const SourceLocation& where, const std::string& kind,
                    const std::string& message) {
   std::string text;
@@ -63,11 +57,5 @@ InputError::InputError(const SourceLocation& where, const std::string& message)
     : std::runtime_error(format_error(where, message)) {}
 
 InputError::InputError(const std::string& message) : InputError(SourceLocation{}, message) {}
-
-void check_range(const std::string& field, double value, double least, double most) {
-  if (value >= least && value <= most) return;
-  throw FieldError(field, short_number(value) + " is outside of " + short_number(least) + " to " +
-                              short_number(most));
-}
 
 }  // namespace limn

@@ -72,7 +72,7 @@ class Contributing(unittest.TestCase):
 
     def test_every_kind_has_its_row(self):
         kinds = " ".join(kind for kind, *_ in rows())
-        for kind in ("sampler", "method", "term", "command", "BSDF", "light", "shape"):
+        for kind in ("sampler", "method", "term", "command", "BSDF", "texture", "light", "shape"):
             self.assertIn(kind, kinds)
 
 

@@ -136,9 +136,12 @@ Loss loss_and_gradient(const Scene& scene, const Image& target,
   settings.spp = 2;
   settings.seed = 4;
   settings.threads = 2;
-  Loss result{image_loss(scene, target, LossKind::kRelativeL2, settings, {}, 3,
-                         {.method = "analytic", .same_samples = true}),
-              {}};
+  Loss result{
+      image_loss(
+          scene, target,
+          {.kind = LossKind::kRelativeL2, .levels = 3, .method = "analytic", .same_samples = true},
+          settings),
+      {}};
   BackwardOptions options;
   options.parameters = names;
   options.terms = {"interior"};
@@ -245,8 +248,8 @@ TEST(Analytic, OverFacesSilhouettesInViewAreInTheLoss) {
   const TempFiles files;
   const Image target = faces_image(seen_scene(files, 0.1));
   const Scene scene = seen_scene(files);
-  const LossImages images{.method = "analytic", .points = FilmPoints::kFaces};
-  const LossResult at = image_loss(scene, target, LossKind::kL2, {}, {}, 1, images);
+  const LossOptions images{.method = "analytic", .points = FilmPoints::kFaces};
+  const LossResult at = image_loss(scene, target, images, {});
   EXPECT_EQ(at.error, 0);
   BackwardOptions options;
   options.method = "analytic";
@@ -256,7 +259,7 @@ TEST(Analytic, OverFacesSilhouettesInViewAreInTheLoss) {
                            "sensor.fov", "clay.reflectance", "glow.radiance"}) {
     const Parameter p = find_parameter(scene, name);
     const auto loss_at = [&](double h) {
-      return image_loss(p.moved(scene, h), target, LossKind::kL2, {}, {}, 1, images).value;
+      return image_loss(p.moved(scene, h), target, images, {}).value;
     };
     const double h = 0x1p-14;
     const double expected = (loss_at(h) - loss_at(-h)) / (2 * h);

@@ -658,7 +658,6 @@ TEST(Faces, RefusesWhatHasNone) {
   parts.film = R"(<rfilter type="gaussian"/>)";
   const Scene wide = make_scene(files, parts);
   refuses([&] { image_of(wide); }, "needs a box filter");
-  refuses([&] { film_points("face"); }, "faces");
 }
 
 }  // namespace

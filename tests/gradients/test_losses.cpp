@@ -27,13 +27,14 @@ TEST(Losses, AreUnbiasedAtTheirTarget) {
   settings.threads = 2;
   const RenderResult truth = render(scene, settings);
   const Image target = mean_image(truth.radiance, scene.film.crop_width, scene.film.crop_height);
-  for (const char* name : {"l2", "relative-l2"}) {
+  for (const LossKind kind : {LossKind::kL2, LossKind::kRelativeL2}) {
+    const std::string name = kLosses[static_cast<int>(kind)];
     Moments values(2);
     BackwardOptions options;
     options.parameters = {"clay.reflectance"};
     settings.spp = 2;
     for (settings.seed = 100; settings.seed < 164; ++settings.seed) {
-      const LossResult loss = image_loss(scene, target, loss_kind(name), settings);
+      const LossResult loss = image_loss(scene, target, {kind}, settings);
       const BackwardResult result = backward(scene, loss.adjoint, options, settings);
       values.add_batch({loss.value, result.parameters[0].moments.mean(0)}, 1);
     }
@@ -99,7 +100,7 @@ TEST(Losses, OfAPyramidAreThoseOfItsBlocks) {
   for (const bool relative : {false, true}) {
     for (const int levels : {1, 2, 4}) {
       const LossKind kind = relative ? LossKind::kRelativeL2 : LossKind::kL2;
-      const LossResult loss = image_loss(scene, target, kind, settings, mask, levels);
+      const LossResult loss = image_loss(scene, target, {kind, levels}, settings, mask);
       const auto exact = [&](size_t at, double step) {
         std::vector<std::vector<double>> moved = images;
         for (auto& image : moved) image[at] += step;
@@ -113,10 +114,9 @@ TEST(Losses, OfAPyramidAreThoseOfItsBlocks) {
       }
     }
   }
-  EXPECT_THROW(image_loss(scene, target, LossKind::kL2, settings, mask, 5), InputError);
-  EXPECT_THROW(image_loss(scene, target, LossKind::kL2, settings, mask, 0), InputError);
-  EXPECT_THROW(image_loss(scene, target, LossKind::kL2, settings, mask, 1, {.method = "rays"}),
-               InputError);
+  EXPECT_THROW(image_loss(scene, target, {.levels = 5}, settings, mask), InputError);
+  EXPECT_THROW(image_loss(scene, target, {.levels = 0}, settings, mask), InputError);
+  EXPECT_THROW(image_loss(scene, target, {.method = "rays"}, settings, mask), InputError);
 }
 
 TEST(Losses, ImagesThatDoNotFitAreNamed) {

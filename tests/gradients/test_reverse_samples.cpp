@@ -245,7 +245,7 @@ TEST(ReverseSamples, SetUpIsPartOfALossTime) {
   settings.least_spp = 2;
   settings.seconds = setup / 8;
   const Image target(1, 1, 3);
-  EXPECT_EQ(image_loss(scene, target, LossKind::kL2, settings).spp, 2);
+  EXPECT_EQ(image_loss(scene, target, {}, settings).spp, 2);
 }
 
 // Half a million texels in 64 batches: 200 MB if batches were kept.

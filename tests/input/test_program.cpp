@@ -227,7 +227,7 @@ TEST_F(Program, GradientsByAnyMethod) {
         run("gradient " + scene_ + " --wrt screen.translate.x --wrt screen.translate.y --spp 8" +
             " --method " + method + " --stats --json " + files_.path("g.json") + " -o " + out());
     EXPECT_EQ(outcome.status, 0) << outcome.text;
-    EXPECT_NE(outcome.text.find("set-up, "), std::string::npos) << outcome.text;
+    EXPECT_NE(outcome.text.find("\nset-up "), std::string::npos) << outcome.text;
     for (const char* parameter : {"screen.translate.x", "screen.translate.y"}) {
       const std::string stem = files_.path("out_" + std::string(parameter));
       for (const char* ending : {".exr", ".png", "_stderr.exr"}) {

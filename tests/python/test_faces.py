@@ -125,7 +125,7 @@ def test_a_fit_goes_the_programs_way(lit, run, folder):
 
 
 @pytest.mark.parametrize("call, text", [
-    (lambda s, a: limn.render(s, points="face"), 'unknown kind of points on the film "face"'),
+    (lambda s, a: limn.render(s, points="face"), 'unknown points "face"'),
     (lambda s, a: limn.render(s, points="faces"), 'needs light in closed form.*"path"'),
     (lambda s, a: limn.render(s, spp=4, **FACES), 'spp: points "faces" take no samples'),
     (lambda s, a: limn.render(s, generator="sobol", **FACES), "error: generator: "),

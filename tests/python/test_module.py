@@ -59,8 +59,10 @@ def stub_defaults(name, function):
             break
         nodes = found[0].body
     arguments = found[0].args
-    names = [a.arg for a in arguments.args][-len(arguments.defaults):]
-    return {n: ast.literal_eval(d) for n, d in zip(names, arguments.defaults)}
+    names = [a.arg for a in arguments.args][len(arguments.args) - len(arguments.defaults):]
+    names += [a.arg for a in arguments.kwonlyargs]
+    defaults = arguments.defaults + arguments.kw_defaults
+    return {n: ast.literal_eval(d) for n, d in zip(names, defaults)}
 
 
 # A signature is a text beside the code: what it says must be what is done without a word.

@@ -102,10 +102,10 @@ def test_methods_and_films_are_known_by_name(scene, folder):
 @pytest.mark.parametrize("call, text", [
     (lambda s, a: limn.gradient(s, []), "names: at least one"),
     (lambda s, a: limn.backward(s, a, []), "names: none are given"),
-    (lambda s, a: limn.gradient(s, "tent.scale", method="fd", step=-1), "step: -1 is neither"),
+    (lambda s, a: limn.gradient(s, "tent.scale", method="fd", step=-1), "step: -1 is not a number from"),
     (lambda s, a: limn.gradient(s, "tent.scale", method="fd", step=float("nan")), "step: "),
     (lambda s, a: limn.gradient(s, "tent.scale", samples=[1e9] * 3), "at most 1024"),
-    (lambda s, a: limn.check(s, "tent.scale", step=-1, spp=2), "step: -1 is neither"),
+    (lambda s, a: limn.check(s, "tent.scale", step=-1, spp=2), "step: -1 is not a number from"),
 ])
 def test_arguments_that_mean_nothing_are_refused_at_once(scene, call, text):
     with pytest.raises(limn.InputError, match=text):

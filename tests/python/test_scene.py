@@ -68,8 +68,8 @@ def test_text_is_as_good_as_a_file(folder, scene):
      "{f}/scene.xml:15:3: error: face 0 (counted from 0) names vertex 3 of 3"),
     (lambda s, f: setattr(s, "shading", "flat"),
      'error: unknown shading "flat" (known: continuous, mitsuba)'),
-    (lambda s, f: limn.render(s, spp=0), "error: spp must be 1 or more"),
-    (lambda s, f: limn.render(s, threads=-1), "error: threads must be 0 (all cores) to 4096"),
+    (lambda s, f: limn.render(s, spp=0), "error: spp: 0 is not a number from 1 to 1073741824"),
+    (lambda s, f: limn.render(s, threads=-1), "error: threads: -1 is not a number from 1 to 4096"),
     (lambda s, f: limn.gradient(s, "tent.vertex_positions"),
      '{f}/scene.xml: error: parameter "tent.vertex_positions" is an array of 18 numbers, and one is '
      'wanted: "tent.vertex_positions:FILE" for a field of vectors, "tent.vertex_positions.0.x" for '

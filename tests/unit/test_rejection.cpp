@@ -84,8 +84,8 @@ TEST(Slice, RowZeroIsOnTop) {
   const EdgeRef ridge = ridge_of(input);
   const PairTree tree(ridge, ridge, [](uint32_t, const Vec3d& p) { return p.z > 4 && p.x < 0; });
   const auto verdicts = judge_slice(input, tree, 0, slice, 1);
-  EXPECT_EQ(verdicts[0], Verdict::kTrueReject);
-  for (const int i : {1, 4, 15}) EXPECT_NE(verdicts[i], Verdict::kTrueReject) << i;
+  EXPECT_EQ(verdicts[0], NodeVerdict::kTrueReject);
+  for (const int i : {1, 4, 15}) EXPECT_NE(verdicts[i], NodeVerdict::kTrueReject) << i;
 }
 
 TEST(Reach, TellsEndsFromDeadEndsAndLosses) {

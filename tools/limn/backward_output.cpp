@@ -4,9 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 
 #include "limn/core/displacement.h"
@@ -21,14 +19,6 @@ namespace limn {
 namespace {
 
 using nlohmann::json;
-static_assert(std::endian::native == std::endian::little);
-
-template <class T>
-void append(std::string& bytes, const T& value) {
-  char raw[sizeof(T)];
-  std::memcpy(raw, &value, sizeof(T));
-  bytes.append(raw, sizeof(T));
-}
 
 // V vectors and their standard errors; those of displacements lie along the vertices' normals.
 struct VertexGradient {
@@ -54,27 +44,6 @@ VertexGradient of_vertices(const Mesh& mesh, const ParameterAdjoint& p) {
         {std::sqrt(g.variance(v)), std::sqrt(g.variance(v + 1)), std::sqrt(g.variance(v + 2))});
   }
   return vectors;
-}
-
-// The mesh with its gradient (gx gy gz) and standard errors (ex ey ez) as properties of vertices.
-std::string ply_text(const Mesh& mesh, const VertexGradient& g) {
-  std::string bytes = fmt::format("ply\nformat binary_little_endian 1.0\nelement vertex {}\n",
-                                  mesh.positions.size());
-  for (const char* name : {"x", "y", "z"}) bytes += fmt::format("property float {}\n", name);
-  for (const char* name : {"gx", "gy", "gz", "ex", "ey", "ez"})
-    bytes += fmt::format("property double {}\n", name);
-  bytes += fmt::format("element face {}\nproperty list uchar uint vertex_indices\nend_header\n",
-                       mesh.faces.size());
-  for (size_t v = 0; v < mesh.positions.size(); ++v) {
-    for (int k = 0; k < 3; ++k) append(bytes, mesh.positions[v][k]);
-    for (int k = 0; k < 3; ++k) append(bytes, g.mean[v][k]);
-    for (int k = 0; k < 3; ++k) append(bytes, g.error[v][k]);
-  }
-  for (const FaceIndices& face : mesh.faces) {
-    append(bytes, uint8_t{3});
-    for (const uint32_t v : face) append(bytes, v);
-  }
-  return bytes;
 }
 
 // Doubles in NumPy's format, version 1.0.
@@ -163,9 +132,6 @@ double error_of(const Moments& g) {
   for (size_t i = 0; i < g.size(); ++i) sum += g.variance(i);
   return std::sqrt(sum);
 }
-
-// JSON has no NaN.
-json number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
 
 std::string six_digits(double value) { return fmt::format("{:.6g}", value); }
 std::string error_cell(double error) {
@@ -260,7 +226,8 @@ json write_vertices(const Scene& scene, const ParameterAdjoint& p,
   const VertexGradient gradient = of_vertices(scene.shape(array.shape).mesh, p);
   const Image image = picture(scene, array.shape, gradient, tracer);
   const double scale = signed_scale(image);
-  write_file(array.ply, ply_text(scene.shape(array.shape).mesh, gradient));
+  write_file(array.ply, ply_text(scene.shape(array.shape).mesh,
+                                 {{"g", gradient.mean}, {"e", gradient.error}}));
   write_file(array.npy, npy_text(p));
   write_file(array.txt, field_text(gradient));
   write_signed_png(array.png, image, scale);

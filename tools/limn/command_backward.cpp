@@ -12,10 +12,9 @@
 #include "tools/limn/backward_output.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
-#include "tools/limn/largest_samples.h"
 #include "tools/limn/output_files.h"
 #include "tools/limn/run_part.h"
-#include "tools/limn/table.h"
+#include "tools/limn/run_stats.h"
 
 namespace limn {
 namespace {
@@ -36,27 +35,14 @@ class BackwardCommand final : public Command {
         app.add_option("--adjoint", adjoint_, "Image of dLoss/dpixel (.exr), in place of --target");
     auto* target = app.add_option("--target", target_, "Image with which the loss compares (.exr)");
     adjoint->excludes(target);
-    app.add_option("--loss", loss_, "Loss with --target: l2 (default), relative-l2 or l1")
-        ->needs(target);
-    app.add_option("--pyramid", levels_,
-                   "With --target: levels of an image pyramid, each half as large as the one "
-                   "before. The loss is the mean over the levels (default 1)")
-        ->check(within(1, 32))
-        ->needs(target);
+    const OptionAdder add(app);
+    visit_options(loss_, all_but({"method", "points"}, add));
+    for (const char* name : {"--loss", "--pyramid"}) app.get_option(name)->needs(target);
     app.add_option("--wrt", options_.parameters,
                    "Parameter, a scalar or an array such as SHAPE.vertex_positions (repeatable; "
                    "default: all parameters except displacements)");
-    add_reverse_options(app, options_, Task::kBackward);
-    app.add_option("--batches", options_.batches,
-                   "Most batches, from which standard errors come; each takes some time per vertex "
-                   "(default 16)")
-        ->check(within(1, 1 << 16));
-    app.add_option("--time", seconds_,
-                   "Time budget in seconds, instead of --spp; set-up and the images of the loss "
-                   "are included")
-        ->check(within(1e-6, 1e7))
-        ->type_name("SECONDS")
-        ->excludes("--spp");
+    visit_options(options_, add);
+    add_time_option(app, common_);
     app.add_flag("--loss-only", loss_only_,
                  "With --target: write only the loss and its derivative per pixel (an image for "
                  "--adjoint)")
@@ -72,27 +58,24 @@ class BackwardCommand final : public Command {
   }
 
   bool join(BatchStore& store) override {
-    common_.store = &store;
+    common_.run.store = &store;
     return true;
   }
 
   int run(const std::string& command_line) override {
     const Scene scene = load_scene(common_, warnings_);
     if (adjoint_.empty() && target_.empty()) throw InputError("give --adjoint or --target");
-    const LossKind kind = loss_kind(loss_);
     // Told before the loss is rendered.
     check_points(options_.points, options_.method->closed_light, options_.method.name());
-    refuse_samples(*app_, options_.points,
-                   {"--spp", "--time", "--batches", "--pixels", "--edge-samples",
-                    "--camera-samples", "--shadow-samples", "--part"});
-    if (!debug_.empty()) return trace(scene, kind);
+    refuse_samples(*app_, options_.points, {"--spp", "--time", "--part"}, options_);
+    if (!debug_.empty()) return trace(scene);
     if (!common_.part.empty()) return make_part(scene, command_line);
     files_ = plan_files(scene, options_.parameters, output_);
     if (target_.empty()) files_.adjoint = files_.adjoint_picture = "";
     std::filesystem::create_directories(output_);
     check_outputs(files_.planned(common_.json), scene, {adjoint_.empty() ? target_ : adjoint_});
     const RunSettings settings = settings_of(scene);
-    const LossResult loss = loss_of(scene, kind, settings);
+    const LossResult loss = loss_of(scene, settings);
     if (interrupted(settings) && !target_.empty()) return report_interrupted(scene, settings, loss);
     if (loss_only_) return write_loss_alone(scene, settings, loss);
     const BackwardResult result = backward(scene, loss.adjoint, options_, rest_of(settings));
@@ -100,9 +83,9 @@ class BackwardCommand final : public Command {
     if (result.spp == 0) return report_interrupted(scene, settings, loss);
     write(scene, settings, loss, result);
     // No other run has the batches of one in limited time.
-    const std::string line = seconds_ > 0 ? "" : command_line;
+    const std::string line = settings.seconds > 0 ? "" : command_line;
     if (!common_.quiet) print_largest(result.terms, result.spp, line, stats_);
-    const bool all = seconds_ > 0 && !interrupted(settings);
+    const bool all = settings.seconds > 0 && !interrupted(settings);
     return finish_status(result.non_finite, result.spp, all ? result.spp : settings.spp, line);
   }
 
@@ -118,6 +101,7 @@ class BackwardCommand final : public Command {
     return kInterrupted;
   }
 
+  std::string loss_name() const { return word_of(loss_.kind, kLossOption); }
   bool over_faces() const { return options_.points == FilmPoints::kFaces; }
   std::string work_of(int64_t spp) const {
     return over_faces() ? "visible faces" : fmt::format("{} samples per pixel", spp);
@@ -140,9 +124,9 @@ class BackwardCommand final : public Command {
                     });
   }
 
-  int trace(const Scene& scene, LossKind kind) {
+  int trace(const Scene& scene) {
     const RunSettings settings = settings_of(scene);
-    const LossResult loss = loss_of(scene, kind, settings);
+    const LossResult loss = loss_of(scene, settings);
     const auto place = parse_place(debug_);
     for (const auto& line : trace_backward(scene, loss.adjoint, options_, settings, place)) {
       fmt::print("{}\n", line);
@@ -151,20 +135,16 @@ class BackwardCommand final : public Command {
   }
 
   RunSettings settings_of(const Scene& scene) const {
-    RunSettings settings = settings_for(options_.points, make_settings(common_, scene, name()));
-    if (seconds_ == 0) return settings;
-    settings.seconds = seconds_;
-    settings.spp = 1 << 30;
-    settings.least_spp = 2;  // for standard errors
-    return settings;
+    return settings_for(options_.points, make_settings(common_, scene, name()));
   }
   // Of the time what the loss has left.
   RunSettings rest_of(RunSettings settings) const {
-    if (seconds_ > 0) settings.seconds = std::max(1e-3, seconds_ - watch_.seconds());
+    const double all = settings.seconds;
+    if (all > 0) settings.seconds = std::max(1e-3, all - watch_.seconds());
     return settings;
   }
 
-  LossResult loss_of(const Scene& scene, LossKind kind, RunSettings settings) {
+  LossResult loss_of(const Scene& scene, RunSettings settings) {
     LossResult loss;
     if (target_.empty()) {
       loss.adjoint = read_exr(adjoint_);
@@ -173,26 +153,27 @@ class BackwardCommand final : public Command {
     settings.seconds *= kImageShare;
     const Image target = read_exr(target_);
     check_loss_images(scene, target, {}, target_);
-    loss = image_loss(scene, target, kind, settings, {}, levels_,
-                      {.method = loss_method(options_.method), .points = options_.points});
-    if (kind == LossKind::kL1 && !over_faces()) {
+    loss_.method = loss_method(options_.method);
+    loss_.points = options_.points;
+    loss = image_loss(scene, target, loss_, settings);
+    if (loss_.kind == LossKind::kL1 && !over_faces()) {
       warnings_.add_all(
           {"the gradient of l1 is biased where the image's noise is not small beside "
            "its difference from the target"});
     }
     if (loss.spp == 0 || !debug_.empty()) return loss;
     auto attributes = provenance(scene, settings, loss.spp);
-    attributes.push_back({"limn.loss", loss_});
+    attributes.push_back({"limn.loss", loss_name()});
     attributes.push_back({"limn.target", target_});
-    attributes.push_back({"limn.pyramid", std::to_string(levels_)});
+    attributes.push_back({"limn.pyramid", std::to_string(loss_.levels)});
     write_exr(files_.adjoint, loss.adjoint, false, attributes);
     write_signed_png(files_.adjoint_picture, loss.adjoint, signed_scale(loss.adjoint));
     return loss;
   }
 
   json loss_json(const LossResult& loss) const {
-    return {{"kind", loss_},
-            {"pyramid", levels_},
+    return {{"kind", loss_name()},
+            {"pyramid", loss_.levels},
             {"target", target_},
             {"value", loss.value},
             {"stderr", std::isfinite(loss.error) ? json(loss.error) : json(nullptr)},
@@ -200,7 +181,7 @@ class BackwardCommand final : public Command {
   }
   void print_loss(const LossResult& loss) const {
     if (common_.quiet) return;
-    fmt::print("loss ({})  {}\n", loss_, with_error(loss.value, loss.error));
+    fmt::print("loss ({})  {}\n", loss_name(), with_error(loss.value, loss.error));
   }
 
   int write_loss_alone(const Scene& scene, const RunSettings& settings,
@@ -229,56 +210,30 @@ class BackwardCommand final : public Command {
                    {"warnings", warnings_.lines()},
                    {"non_finite", result.non_finite.count}};
     if (!over_faces()) {  // of a film seen by its faces every pixel is looked at
-      report["pixels"] = options_.uniform_pixels ? kUniformPixels : kAdjointPixels;
+      report["pixels"] = kPixels[options_.uniform_pixels];
     }
     if (!target_.empty()) {
       report["loss"] = loss_json(loss);
       print_loss(loss);
     }
     report["parameters"] = write_parameters(scene, files_, result, common_.quiet);
-    if (stats_) report["stats"] = stats_json(result);
+    if (stats_) {
+      json stats = stats_json(result.stats);
+      stats["terms"] = costs_json(result.terms);
+      stats["contributions"] = result.contributions;
+      stats["tape_bytes"] = result.tape_bytes;
+      report["stats"] = stats;
+    }
     write_json(files_.json, report.dump(2));
     if (!common_.json.empty()) write_json(common_.json, report.dump(2));
     if (!common_.quiet) {
       fmt::print("figures: {}\n{} in {:.2f} s (set-up {:.2f} s)\n", files_.json,
                  work_of(result.spp), result.seconds, result.setup_seconds);
     }
-    if (stats_) print_stats(result);
-  }
-
-  static json stats_json(const BackwardResult& result) {
-    json terms = json::object();
-    for (const TermRun& term : result.terms) {
-      const TermCost& c = term.cost;
-      terms[term.name] = {
-          {"seconds", c.seconds},         {"rays", c.rays},
-          {"samples", c.samples},         {"no_edge", c.no_edge},
-          {"zero_weight", c.zero_weight}, {"occluded", c.occluded},
-          {"counted", c.counted},         {"largest_sample_share", c.largest.share()}};
-    }
-    return {{"terms", terms},
-            {"contributions", result.contributions},
-            {"tape_bytes", result.tape_bytes},
-            {"sampler_nodes", result.stats.sampler_nodes},
-            {"sampler_bytes", result.stats.sampler_bytes}};
-  }
-
-  static void print_stats(const BackwardResult& result) {
-    for (const auto& [name, count] : result.stats.edges) fmt::print("edges {}: {}\n", name, count);
-    Table terms({{"term", true}, {"samples"}, {"rays"}, {"time of all threads [s]"}});
-    for (const TermRun& term : result.terms) {
-      const TermCost& c = term.cost;
-      if (c.samples == 0) continue;
-      terms.add({term.name, std::to_string(c.samples), std::to_string(c.rays),
-                 fmt::format("{:.3g}", c.seconds)});
-    }
-    fmt::print("\n{}\n", terms.text());
+    if (!stats_) return;
+    print_stats(result.stats, result.terms);
     fmt::print("{} numbers added to the gradient; the longest tape: {} bytes\n",
                result.contributions, result.tape_bytes);
-    Table setup({{"set-up", true}, {"time [s]"}});
-    for (const auto& [name, seconds] : result.stats.setup)
-      setup.add({name, fmt::format("{:.3g}", seconds)});
-    fmt::print("\n{}", setup.text());
   }
 
   // Of the time, for each of the two images of a loss; not tuned.
@@ -291,9 +246,7 @@ class BackwardCommand final : public Command {
   BackwardOptions options_;
   BackwardFiles files_;
   std::string adjoint_, target_, output_, debug_;
-  std::string loss_ = "l2";
-  int levels_ = 1;
-  double seconds_ = 0;  // 0: as many samples as are asked for
+  LossOptions loss_;
   bool stats_ = false, loss_only_ = false;
 };
 

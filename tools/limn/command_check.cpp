@@ -105,9 +105,6 @@ void print_check(const std::string& name, const CheckResult& r, int spp) {
   print_verdict(r, spp);
 }
 
-// JSON has no infinity.
-json number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
-
 json figures_json(const std::string& name, const std::string& film, const CheckResult& r, int spp) {
   json samples = json::object(), visible = json::object(), shares = json::object();
   for (const TermRun& term : r.gradient.terms) samples[term.name] = term.samples;
@@ -161,19 +158,8 @@ class CheckCommand final : public Command {
     app_ = &app;
     add_common_options(app, common_);
     add_parameter_options(app, parameters_);
-    add_method_option(app, options_.method, Task::kGradient);
-    add_term_options(app, terms_, samples_);
-    add_warp_options(app, options_.warp);
-    add_film_option(app, film_);
-    add_points_option(app, points_);
-    app.add_option(
-           "--step", options_.step,
-           "Step of the finite differences, in the parameter's unit (default: a pilot finds it)")
-        ->check(within(1e-12, 1e12));
-    app.add_option("--block", options_.block,
-                   "Spacing in pixels of the windows whose sums are compared (default: an eighth "
-                   "of the longer side, at least 4)")
-        ->check(within(1, 1 << 20));
+    visit_options(options_, OptionAdder(app));
+    add_samples_option(app, samples_);
     app.add_flag("--reverse", reverse_,
                  "Compare reverse mode with forward mode instead, by the sum over pixels of the "
                  "derivative times a random image. An array parameter moves along a random "
@@ -183,14 +169,12 @@ class CheckCommand final : public Command {
   int run(const std::string&) override {
     const Scene scene = load_scene(common_, warnings_);
     check_outputs({{"--json", common_.json}}, scene, field_files(parameters_));
-    options_.terms = parse_terms(terms_);
     check_warp(options_.warp, {reverse_ ? reverse_method() : options_.method});
-    options_.exact_film = film_ == "exact";
     if (reverse_ && options_.exact_film) {
       throw InputError("--film exact: reverse mode has its film by rays");
     }
-    refuse_samples(*app_, points_, {"--spp", "--samples", "--block", "--reverse"});
-    if (points_ == FilmPoints::kFaces) return run_faces(scene);
+    refuse_samples(*app_, options_.points, {"--spp", "--samples", "--reverse"}, options_);
+    if (options_.points == FilmPoints::kFaces) return run_faces(scene);
     if (reverse_) return run_reverse(scene);
     options_.samples = parse_samples(samples_);
     for (const auto& parameter : parameters_) find_parameter(scene, parameter);
@@ -209,7 +193,7 @@ class CheckCommand final : public Command {
       }
       warnings_.add_all(r.gradient.warnings);
       print_check(parameter, r, settings.spp);
-      report.push_back(figures_json(parameter, film_, r, settings.spp));
+      report.push_back(figures_json(parameter, kFilms[options_.exact_film], r, settings.spp));
       report.back()["sensor"] = sensor_name(scene);
       report.back()["warnings"] = warnings_.lines();
       // What is wrong comes before what is not known.
@@ -244,7 +228,7 @@ class CheckCommand final : public Command {
           verdict_name(r.verdict));
       report.push_back({{"parameter", parameter},
                         {"method", r.gradient.method},
-                        {"points", name_of(points_)},
+                        {"points", name_of(options_.points)},
                         {"step", r.step},
                         {"verdict", verdict_name(r.verdict)},
                         {"gradient_sum", r.gradient_sum},
@@ -303,11 +287,10 @@ class CheckCommand final : public Command {
   CommonOptions common_;
   Warnings warnings_;
   CLI::App* app_ = nullptr;
-  FilmPoints points_ = FilmPoints::kRandom;
   CheckOptions options_;
   bool reverse_ = false;
   std::vector<std::string> parameters_;
-  std::string terms_, samples_ = "auto", film_ = "rays";
+  std::string samples_ = "auto";
 };
 
 }  // namespace

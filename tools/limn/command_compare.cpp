@@ -29,17 +29,13 @@ struct CompareArguments {
   double time = 0;  // seconds of a run, on the longest rung
   int rungs = 1;    // of the ladder of times
   int repeats = 4;
-  std::string reference;      // "": made
-  double reference_time = 0;  // 0: four times all runs of one method
-  std::string terms;
+  std::string reference;         // "": made
+  double reference_time = 0;     // 0: four times all runs of one method
+  GradientOptions gradient;      // but for parameter and method
   std::string samples = "auto";  // of each term
-  double step = 0;               // of finite differences; 0: found by a pilot
-  WarpOptions warp;
-  std::string film = "rays";
   std::string output;
   bool report = true;
   bool images = false;  // not derivatives
-  std::string what = "image";
   RenderOptions render;
 };
 
@@ -141,16 +137,21 @@ class Comparer {
         command_(command),
         scene_(scene),
         settings_(settings),
-        input_{scene,        command.parameter,      parse_terms(command.terms),
-               command.step, block_size(scene.film), parse_samples(command.samples),
-               command.warp, command.film == "exact"},
+        input_{scene,
+               command.parameter,
+               command.gradient.terms,
+               command.gradient.step,
+               block_size(scene.film),
+               parse_samples(command.samples),
+               command.gradient.warp,
+               command.gradient.exact_film},
         identity_(identify(input_, common.defines)),
         kept_file_((fs::path(command.output) / "reference.exr").string()) {
     result_.command = command_line;
     result_.defines = common.defines;
     result_.parameter = command.parameter;
     result_.unit = find_parameter(scene, command.parameter).unit;
-    result_.terms = command.terms.empty() ? "all" : command.terms;
+    result_.terms = input_.terms.empty() ? "all" : fmt::format("{}", fmt::join(input_.terms, ","));
     result_.seed = settings.seed;
     result_.threads = settings.threads;
     result_.options = make_options(command);
@@ -270,8 +271,9 @@ void CompareCommand::add_options(CLI::App& app) {
                "Compare images instead of derivatives. The methods are then: " +
                    limn::join(method_names(Task::kImage)))
       ->excludes(wrt);
-  add_image_options(app, command_.what, command_.render);
+  const OptionAdder add(app);
   command_.render.generator = kGenerators[0];
+  visit_options(command_.render, all_but({"method", "generator", "film", "points"}, add));
   app.add_option("--methods", command_.methods,
                  "Methods to compare; ratios are relative to the first: " +
                      limn::join(method_names(Task::kGradient)) + ", " + kMitsuba + ", " +
@@ -305,13 +307,8 @@ void CompareCommand::add_options(CLI::App& app) {
          "Time budget of a new reference in seconds (default: four times all runs of one method)")
       ->check(within(1e-6, 1e7))
       ->type_name("SECONDS");
-  add_term_options(app, command_.terms, command_.samples);
-  app.add_option("--step", command_.step,
-                 "Step of finite differences (method fd), in the parameter's unit (default: a "
-                 "pilot finds it)")
-      ->check(within(1e-12, 1e12));
-  add_warp_options(app, command_.warp);
-  add_film_option(app, command_.film);
+  visit_options(command_.gradient, all_but({"method", "points"}, add));
+  add_samples_option(app, command_.samples);
   app.add_option("-o,--output", command_.output, "Folder for images, report and results")
       ->required()
       ->type_name("FOLDER");
@@ -323,13 +320,13 @@ int CompareCommand::run_images(const std::string& command_line) {
       *app_, {"--reference", "--terms", "--samples", "--step", "--aux", "--kappa", "--no-report"},
       "derivatives alone have that: not with --image");
   // The reference is made by rays.
-  command_.render.exact_film = command_.film == "exact";
+  command_.render.exact_film = command_.gradient.exact_film;
   const std::vector<Method> methods = parse_methods(command_.methods, Task::kImage);
   std::vector<Method> with_reference = methods;
   with_reference.emplace_back("rays");
   check_image_options(*app_, with_reference);
   if (command_.render.exact_film) check_exact_film(methods);
-  if (common_.spp > 0) {
+  if (common_.run.spp) {
     throw InputError("--spp: methods are compared at equal time: say how long with --time");
   }
   Warnings warnings;
@@ -338,11 +335,11 @@ int CompareCommand::run_images(const std::string& command_line) {
   check_outputs(
       {{"-o", (fs::path(command_.output) / "compare.json").string()}, {"--json", common_.json}},
       scene);
-  return compare_images_command(
-      common_,
-      {methods, command_.what, command_.render, make_options(command_).times, command_.repeats,
-       command_.reference_time, command_.output},
-      scene, make_settings(common_, scene, name()), warnings, command_line);
+  return compare_images_command(common_,
+                                {methods, command_.render, make_options(command_).times,
+                                 command_.repeats, command_.reference_time, command_.output},
+                                scene, make_settings(common_, scene, name()), warnings,
+                                command_line);
 }
 
 int CompareCommand::run(const std::string& command_line) {
@@ -352,15 +349,15 @@ int CompareCommand::run(const std::string& command_line) {
   if (command_.parameter.empty()) {
     throw InputError("--wrt: say which parameter's derivatives to compare, or --image");
   }
-  const std::vector<Method> methods = check_methods(command_.methods, parse_terms(command_.terms));
-  check_warp(command_.warp, methods);
-  if (common_.spp > 0) {
+  const std::vector<Method> methods = check_methods(command_.methods, command_.gradient.terms);
+  check_warp(command_.gradient.warp, methods);
+  if (common_.run.spp) {
     throw InputError("--spp: methods are compared at equal time: say how long with --time");
   }
   Warnings warnings;
   const Scene scene = load_scene(common_, warnings);
   find_parameter(scene, command_.parameter);
-  if (command_.film == "exact") check_exact_films(scene, methods);
+  if (command_.gradient.exact_film) check_exact_films(scene, methods);
   make_folder(command_.output);
   check_outputs(
       {{"-o", (fs::path(command_.output) / "compare.json").string()}, {"--json", common_.json}},
@@ -373,10 +370,7 @@ int CompareCommand::run(const std::string& command_line) {
   }
   comparer.write(warnings.lines());
   if (!common_.quiet) print_comparison(comparer.result());
-  if (!common_.json.empty()) {
-    fs::copy_file(fs::path(command_.output) / "compare.json", common_.json,
-                  fs::copy_options::overwrite_existing);
-  }
+  copy_json((fs::path(command_.output) / "compare.json").string(), common_.json);
   const NonFinite non_finite = comparer.non_finite();
   if (command_.report) write_report(command_.output, common_.quiet);
   if (non_finite.count > 0) return finish_status(non_finite, 0, 0, "");

@@ -58,7 +58,6 @@ class FitCommand final : public Command {
   int run(const std::string&) override;
 
  private:
-  void add_sampling_options(CLI::App& app);
   std::vector<ViewArguments> view_arguments() const;
   FitArguments arguments() const;
   std::vector<FitView> read_views(const FitArguments& arguments);
@@ -107,42 +106,7 @@ void FitCommand::add_options(CLI::App& app) {
       ->allow_extra_args(false);
   steps_option_ = app.add_option("--steps", given_.steps, "Total number of steps")
                       ->check(within(int64_t{1}, int64_t{1} << 40));
-  app.add_option("--loss", given_.loss, "Loss: l2, relative-l2 or l1")->capture_default_str();
-  app.add_option("--pyramid", given_.options.pyramid,
-                 "Levels of an image pyramid, each half as large as the one before. The loss is "
-                 "the mean over the levels")
-      ->check(within(1, 32))
-      ->capture_default_str();
-  app.add_option("--optimiser,--optimizer", given_.optimiser,
-                 "Optimiser: adam-uniform (Adam with one scale for all vertices of a shape), adam, "
-                 "gradient-descent, or lbfgs, which needs a loss without noise (--method analytic)")
-      ->capture_default_str();
-  app.add_option("--step", given_.options.step,
-                 "Length of the first step in natural steps: 1 % of a shape's diagonal, 0.01 "
-                 "radians, 1 % of a value")
-      ->check(within(1e-12, 1e12))
-      ->capture_default_str();
-  app.add_option("--step-half-life", given_.options.step_half_life,
-                 "Halve the step length every so many steps (default: never)")
-      ->check(within(1, 1 << 30));
-  app.add_option("--smoothing", given_.options.smoothing,
-                 "How far the step of a vertex spreads over the mesh, as a share of the shape's "
-                 "diagonal (0: no smoothing)")
-      ->check(within(0.0, 100.0))
-      ->capture_default_str();
-  app.add_option("--remesh", given_.options.remesh,
-                 "Steps after which optimised meshes are remeshed, as in 100,200")
-      ->delimiter(',')
-      ->check(within(1, 1 << 30));
-  app.add_option("--remesh-edge", given_.options.remesh_edge,
-                 "Edge length after remeshing, relative to the mean length before")
-      ->check(within(0.1, 10.0))
-      ->capture_default_str();
-  app.add_option("--remesh-shrink", given_.options.remesh_shrink,
-                 "Factor on the lengths of steps and smoothing after each remeshing")
-      ->check(within(0.01, 1.0))
-      ->capture_default_str();
-  add_sampling_options(app);
+  visit_options(given_.options, OptionAdder(app));
   app.add_option(
          "--snapshots", given_.snapshots,
          "Steps between snapshots of meshes, images and state (default: ten snapshots in all)")
@@ -154,17 +118,6 @@ void FitCommand::add_options(CLI::App& app) {
                  "--steps, --threads, --quiet and --no-report")
       ->type_name("FOLDER");
   app.add_flag("--no-report", no_report_, "Write no report.html");
-}
-
-void FitCommand::add_sampling_options(CLI::App& app) {
-  app.add_option("--loss-spp", given_.options.loss_spp,
-                 "Samples per pixel of each of the two images from which the loss is computed "
-                 "(default: --spp)")
-      ->check(within(1, 1 << 30));
-  app.add_option("--spp-doubling", given_.options.spp_doubling,
-                 "Double the samples per pixel every so many steps (default: never)")
-      ->check(within(1, 1 << 30));
-  add_reverse_options(app, given_.options.backward, Task::kFit);
 }
 
 // The scene and those of --view, each with all its sensors, in turn: a target for each.
@@ -221,13 +174,11 @@ FitArguments FitCommand::arguments() const {
     text = with_absolute_field(text, std::min(text.size(), text.rfind('=')));
   }
   a.views = view_arguments();
-  refuse_samples(*app_, a.options.backward.points,
-                 {"--spp", "--loss-spp", "--spp-doubling", "--pixels", "--edge-samples",
-                  "--camera-samples", "--shadow-samples"});
-  if (a.optimiser == "lbfgs") {
+  refuse_samples(*app_, a.options.backward.points, {"--spp"}, a.options);
+  if (a.options.optimiser == OptimiserKind::kLbfgs) {
     if (app_->get_option("--pixels")->count() > 0 && !a.options.backward.uniform_pixels) {
       throw InputError("--pixels adjoint: lbfgs takes the same samples in all pixels, --pixels " +
-                       std::string(kUniformPixels));
+                       std::string(kPixels[1]));
     }
     a.options.backward.uniform_pixels = true;
   }

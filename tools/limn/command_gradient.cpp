@@ -10,9 +10,10 @@
 #include "limn/core/parameter.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/commands.h"
-#include "tools/limn/largest_samples.h"
 #include "tools/limn/output_files.h"
 #include "tools/limn/run_part.h"
+#include "tools/limn/run_stats.h"
+#include "tools/limn/table.h"
 
 namespace limn {
 namespace {
@@ -21,8 +22,6 @@ using nlohmann::json;
 
 // From this share of the squared error in a thousandth of the pixels on. Not tuned.
 constexpr double kRulingPixels = 0.5;
-
-constexpr int kUnlimited = 1 << 30;  // samples per pixel
 
 // 0 for a term that is not computed.
 double mean_magnitude(const Moments& moments) {
@@ -63,58 +62,7 @@ Sum image_sum(const Moments& sum) { return {sum.mean(0), std::sqrt(sum.variance(
 
 std::string stderr_file(const std::string& output) { return with_ending(output, "_stderr.exr"); }
 
-// Writes the images of one parameter; returns its figures.
-json write_parameter(const Scene& scene, const ParameterGradient& g,
-                     const std::vector<TermRun>& terms, const std::string& output,
-                     std::vector<ImageAttribute> attributes, const CommonOptions& common,
-                     Warnings& warnings) {
-  attributes.push_back({"limn.parameter", g.name});
-  const int width = scene.film.crop_width;
-  const int height = scene.film.crop_height;
-  const Image image = mean_image(g.total, width, height);
-  const double scale = signed_scale(image);
-  // Signed derivatives are always written in full precision.
-  write_exr(output, film_channels(scene, image), false, attributes);
-  const std::string picture = with_ending(output, ".png");
-  write_signed_png(picture, image, scale);
-  std::string errors = "none (one batch only)";
-  if (g.total.batches() > 1) {
-    errors = stderr_file(output);
-    write_exr(errors, film_channels(scene, standard_error_image(g.total, width, height)), false,
-              attributes);
-  }
-  const Sum sum = image_sum(g.image_sum);
-  const size_t pixels = g.total.size() / 3;
-  if (const double share = worst_share(g.total); pixels >= 1000 && share >= kRulingPixels) {
-    warnings.add_all({fmt::format(
-        "{}: {} of {} pixels have {:.0f} % of the squared error: few samples dominate the standard "
-        "errors",
-        g.name, pixels / 1000, pixels, 100 * share)});
-  }
-  if (!common.quiet) {
-    fmt::print("{}\n", g.name);
-    fmt::print("  derivative      {}\n", output);
-    fmt::print("  picture         {0} (blue -{1:.4g}, white 0, red +{1:.4g})\n", picture, scale);
-    fmt::print("  standard error  {}\n", errors);
-    fmt::print("  image sum       {:.6g} +- {:.2g}\n", sum.value, sum.error);
-  }
-  json term_figures = json::object();
-  for (size_t t = 0; t < terms.size(); ++t) {
-    if (!terms[t].computed) continue;
-    term_figures[terms[t].name] = {{"mean_magnitude", mean_magnitude(g.terms[t])},
-                                   {"mean_squared_error", mean_squared_error(g.terms[t])}};
-  }
-  return {{"name", g.name},
-          {"image", output},
-          {"picture", picture},
-          {"stderr", errors},
-          {"scale", scale},
-          {"sum", sum.value},
-          {"sum_stderr", sum.error},
-          {"mean_squared_error", mean_squared_error(g.total)},
-          {"worst_share", worst_share(g.total)},
-          {"terms", term_figures}};
-}
+std::string percent(double share) { return fmt::format("{:.1f} %", 100 * share); }
 
 double share_of(const ParameterGradient& g, size_t term) {
   double all = 0;
@@ -122,54 +70,45 @@ double share_of(const ParameterGradient& g, size_t term) {
   return all > 0 ? mean_magnitude(g.terms[term]) / all : 0;
 }
 
-size_t term_width(const GradientResult& result) {
-  size_t width = 10;
-  for (const TermRun& term : result.terms) width = std::max(width, term.name.size());
-  return width;
-}
-
 // Where time, rays and samples went, and each term's share of the sum of mean magnitudes.
 void print_terms(const GradientResult& result) {
   double seconds = 0;
   for (const TermRun& term : result.terms) seconds += term.cost.seconds;
-  const size_t width = term_width(result);
-  fmt::print("\n{:{}} {:>8} {:>12} {:>12} {:>10}", "term", width, "time", "rays", "samples",
-             "per spp");
-  for (const auto& g : result.parameters) {
-    fmt::print("  {:>{}}", "of " + g.name, std::max<size_t>(10, g.name.size() + 3));
-  }
-  fmt::print("\n");
+  std::vector<Table::Column> columns{{"term", true}, {"time"}, {"rays"}, {"samples"}, {"per spp"}};
+  for (const auto& g : result.parameters) columns.push_back({"of " + g.name});
+  Table table(columns);
   for (size_t t = 0; t < result.terms.size(); ++t) {
     const TermRun& term = result.terms[t];
     if (!term.computed && term.cost.samples == 0) continue;
-    fmt::print("{:{}} {:6.1f} % {:>12} {:>12} {:>10.3g}", term.name, width,
-               seconds > 0 ? 100 * term.cost.seconds / seconds : 0, term.cost.rays,
-               term.cost.samples, term.samples);
-    for (const auto& g : result.parameters) {
-      fmt::print("  {:>{}.1f} %", 100 * share_of(g, t),
-                 std::max<size_t>(10, g.name.size() + 3) - 2);
-    }
-    fmt::print("\n");
+    Table::Row row{term.name, percent(seconds > 0 ? term.cost.seconds / seconds : 0),
+                   std::to_string(term.cost.rays), std::to_string(term.cost.samples),
+                   fmt::format("{:.3g}", term.samples)};
+    for (const auto& g : result.parameters) row.push_back(percent(share_of(g, t)));
+    table.add(row);
   }
+  fmt::print("\n{}", table.text());
 }
 
 // What became of the samples of each term that draws edges.
 void print_boundary_samples(const GradientResult& result) {
-  const size_t width = term_width(result);
-  bool first = true;
+  Table table({{"samples", true},
+               {"rejected"},
+               {"zero contribution"},
+               {"roulette"},
+               {"occluded"},
+               {"contributing"}});
+  bool any = false;
   for (const TermRun& term : result.terms) {
     const TermCost& c = term.cost;
     if (c.no_edge + c.zero_weight == 0) continue;
-    if (first) {
-      fmt::print("\n{:{}} {:>9} {:>18} {:>9} {:>9} {:>13}\n", "samples", width, "rejected",
-                 "zero contribution", "roulette", "occluded", "contributing");
+    Table::Row row{term.name};
+    for (const uint64_t n : {c.no_edge, c.zero_weight, c.left_out, c.occluded, c.counted}) {
+      row.push_back(percent(static_cast<double>(n) / static_cast<double>(c.samples)));
     }
-    first = false;
-    const auto share = [&](uint64_t n) { return 100.0 * n / c.samples; };
-    fmt::print("{:{}} {:7.1f} % {:16.1f} % {:7.1f} % {:7.1f} % {:11.1f} %\n", term.name, width,
-               share(c.no_edge), share(c.zero_weight), share(c.left_out), share(c.occluded),
-               share(c.counted));
+    table.add(row);
+    any = true;
   }
+  if (any) fmt::print("\n{}", table.text());
 }
 
 void print_samples(const GradientResult& r) {
@@ -178,55 +117,6 @@ void print_samples(const GradientResult& r) {
   if (r.pilot_spp > 0) fmt::print("; terms allocated from a pilot of {} spp", r.pilot_spp);
   fmt::print("\n");
   for (const MethodSetting& setting : r.settings) fmt::print("{}\n", setting_line(setting));
-}
-
-void print_stats(const GradientResult& result) {
-  if (!result.stats.edges.empty()) {
-    std::string edges;
-    for (const auto& [name, count] : result.stats.edges) {
-      edges += fmt::format("{}{} {}", edges.empty() ? "" : ", ", count, name);
-    }
-    fmt::print("edges: {}\n", edges);
-  }
-  if (result.stats.sampler_nodes > 0) {
-    fmt::print("edge sampler: {} nodes, {:.3g} MB\n", result.stats.sampler_nodes,
-               static_cast<double>(result.stats.sampler_bytes) / 1e6);
-  }
-  for (const TermRun& term : result.terms) {
-    const TermCost& c = term.cost;
-    if (c.samples == 0) continue;
-    fmt::print(
-        "{}: {} samples, {} rays to the next surface, {} shadow rays, {:.3g} s of all "
-        "threads\n",
-        term.name, c.samples, c.rays - c.shadow_rays, c.shadow_rays, c.seconds);
-  }
-  for (const auto& [name, seconds] : result.stats.setup) {
-    fmt::print("set-up, {}: {:.3g} s\n", name, seconds);
-  }
-}
-
-json costs_json(const GradientResult& result) {
-  json costs;
-  for (const TermRun& term : result.terms) {
-    const TermCost& c = term.cost;
-    costs[term.name] = {
-        {"seconds", c.seconds},         {"rays", c.rays},
-        {"shadow_rays", c.shadow_rays}, {"samples", c.samples},
-        {"no_edge", c.no_edge},         {"zero_weight", c.zero_weight},
-        {"left_out", c.left_out},       {"occluded", c.occluded},
-        {"counted", c.counted},         {"largest_sample_share", c.largest.share()}};
-  }
-  return costs;
-}
-
-json stats_json(const GradientStats& stats) {
-  json edges = json::object(), setup = json::object();
-  for (const auto& [name, count] : stats.edges) edges[name] = count;
-  for (const auto& [name, seconds] : stats.setup) setup[name] = seconds;
-  return {{"edges", edges},
-          {"sampler_nodes", stats.sampler_nodes},
-          {"sampler_bytes", stats.sampler_bytes},
-          {"setup_seconds", setup}};
 }
 
 class GradientCommand final : public Command {
@@ -240,17 +130,9 @@ class GradientCommand final : public Command {
     app_ = &app;
     add_common_options(app, common_);
     add_parameter_options(app, options_.parameters);
-    add_method_option(app, options_.method, Task::kGradient);
-    add_term_options(app, terms_, samples_);
-    app.add_option("--step", options_.step,
-                   "Step of finite differences (method fd), in the parameter's unit (default: a "
-                   "pilot finds it)")
-        ->check(within(1e-12, 1e12));
-    add_warp_options(app, options_.warp);
-    app.add_option("--time", seconds_, "Time budget in seconds, set-up included, instead of --spp")
-        ->check(within(1e-6, 1e7))
-        ->type_name("SECONDS")
-        ->excludes("--spp");
+    visit_options(options_, OptionAdder(app));
+    add_samples_option(app, samples_);
+    add_time_option(app, common_);
     app.add_option("-o,--output", output_,
                    "Derivative image to write (.exr); _stderr.exr and .png are written beside it. "
                    "With several --wrt each name gets a suffix")
@@ -259,25 +141,21 @@ class GradientCommand final : public Command {
                  "Also write the samples of each term per pixel sample to OUTPUT_samples_TERM.exr");
     app.add_flag("--stats", stats_,
                  "Print statistics: edges, nodes, bytes, rays by kind, time by phase");
-    add_film_option(app, film_);
-    add_points_option(app, options_.points);
     add_debug_option(app, debug_);
     add_part_option(app, common_);
     app.get_option("--part")->excludes("--time");
   }
   bool join(BatchStore& store) override {
-    common_.store = &store;
+    common_.run.store = &store;
     return true;
   }
 
   int run(const std::string& command_line) override {
     const Scene scene = load_scene(common_, warnings_);
     refuse_samples(*app_, options_.points,
-                   {"--spp", "--time", "--samples", "--sample-images", "--part"});
-    options_.terms = parse_terms(terms_);
+                   {"--spp", "--time", "--samples", "--sample-images", "--part"}, options_);
     options_.samples = parse_samples(samples_);
     options_.uniform_samples = samples_ == "uniform";
-    options_.exact_film = film_ == "exact";
     if (!debug_.empty()) return trace(scene);
     for (const auto& parameter : options_.parameters) find_parameter(scene, parameter);
     if (!common_.part.empty()) {
@@ -294,12 +172,8 @@ class GradientCommand final : public Command {
     }
     check_outputs(planned_files(), scene, field_files(options_.parameters));
     check_memory(scene);
-    RunSettings settings = settings_for(options_.points, make_settings(common_, scene, name()));
-    if (seconds_ > 0) {
-      settings.seconds = seconds_;
-      settings.spp = kUnlimited;
-      settings.least_spp = 2;  // for standard errors
-    }
+    const RunSettings settings =
+        settings_for(options_.points, make_settings(common_, scene, name()));
     const GradientResult result = gradient(scene, options_, settings);
     warnings_.add_all(result.warnings);
     if (result.spp == 0) {
@@ -313,14 +187,15 @@ class GradientCommand final : public Command {
       print_samples(result);
       print_largest(result.terms, result.spp, command_line, stats_);
     }
-    if (stats_) print_stats(result);
-    const bool all = seconds_ > 0 && !settings.interrupted->load();
+    if (stats_) print_stats(result.stats, result.terms);
+    const bool all = settings.seconds > 0 && !settings.interrupted->load();
     return finish_status(result.non_finite, result.spp, all ? result.spp : settings.spp,
                          command_line);
   }
 
  private:
   int trace(const Scene& scene) {
+    common_.run.seconds = 0;
     const RunSettings settings = make_settings(common_, scene, name());
     for (const auto& line : trace_sample(scene, options_, settings, parse_place(debug_))) {
       fmt::print("{}\n", line);
@@ -395,8 +270,8 @@ class GradientCommand final : public Command {
     attributes.push_back({kOutputAttribute, output_name(output_)});
     json parameters = json::array();
     for (size_t k = 0; k < outputs_.size(); ++k) {
-      parameters.push_back(write_parameter(scene, result.parameters[k], result.terms, outputs_[k],
-                                           attributes, common_, warnings_));
+      parameters.push_back(
+          write_parameter(scene, result.parameters[k], result.terms, outputs_[k], attributes));
     }
     if (sample_images_) write_sample_images(scene, result, attributes);
     const json report = {{"scene", scene.file},
@@ -411,12 +286,65 @@ class GradientCommand final : public Command {
                          {"pilot_spp", result.pilot_spp},
                          {"seconds", result.seconds},
                          {"setup_seconds", result.setup_seconds},
-                         {"costs", costs_json(result)},
+                         {"costs", costs_json(result.terms)},
                          {"stats", stats_json(result.stats)},
                          {"non_finite", result.non_finite.count},
                          {"parameters", parameters},
                          {"warnings", warnings_.lines()}};
     write_json(common_.json, report.dump(2));
+  }
+
+  // Writes the images of one parameter; returns its figures.
+  json write_parameter(const Scene& scene, const ParameterGradient& g,
+                       const std::vector<TermRun>& terms, const std::string& output,
+                       std::vector<ImageAttribute> attributes) {
+    attributes.push_back({"limn.parameter", g.name});
+    const int width = scene.film.crop_width;
+    const int height = scene.film.crop_height;
+    const Image image = mean_image(g.total, width, height);
+    const double scale = signed_scale(image);
+    // Signed derivatives are always written in full precision.
+    write_exr(output, film_channels(scene, image), false, attributes);
+    const std::string picture = with_ending(output, ".png");
+    write_signed_png(picture, image, scale);
+    std::string errors = "none (one batch only)";
+    if (g.total.batches() > 1) {
+      errors = stderr_file(output);
+      write_exr(errors, film_channels(scene, standard_error_image(g.total, width, height)), false,
+                attributes);
+    }
+    const Sum sum = image_sum(g.image_sum);
+    const size_t pixels = g.total.size() / 3;
+    if (const double share = worst_share(g.total); pixels >= 1000 && share >= kRulingPixels) {
+      warnings_.add_all(
+          {fmt::format("{}: {} of {} pixels have {:.0f} % of the squared error: few samples "
+                       "dominate the standard "
+                       "errors",
+                       g.name, pixels / 1000, pixels, 100 * share)});
+    }
+    if (!common_.quiet) {
+      fmt::print("{}\n", g.name);
+      fmt::print("  derivative      {}\n", output);
+      fmt::print("  picture         {0} (blue -{1:.4g}, white 0, red +{1:.4g})\n", picture, scale);
+      fmt::print("  standard error  {}\n", errors);
+      fmt::print("  image sum       {:.6g} +- {:.2g}\n", sum.value, sum.error);
+    }
+    json term_figures = json::object();
+    for (size_t t = 0; t < terms.size(); ++t) {
+      if (!terms[t].computed) continue;
+      term_figures[terms[t].name] = {{"mean_magnitude", mean_magnitude(g.terms[t])},
+                                     {"mean_squared_error", mean_squared_error(g.terms[t])}};
+    }
+    return {{"name", g.name},
+            {"image", output},
+            {"picture", picture},
+            {"stderr", errors},
+            {"scale", scale},
+            {"sum", sum.value},
+            {"sum_stderr", sum.error},
+            {"mean_squared_error", mean_squared_error(g.total)},
+            {"worst_share", worst_share(g.total)},
+            {"terms", term_figures}};
   }
 
   void write_sample_images(const Scene& scene, const GradientResult& result,
@@ -435,9 +363,7 @@ class GradientCommand final : public Command {
   Warnings warnings_;
   CLI::App* app_ = nullptr;
   GradientOptions options_;
-  std::string terms_, samples_ = "auto";
-  std::string output_, debug_, film_ = "rays";
-  double seconds_ = 0;  // 0: as many samples as are asked for
+  std::string samples_ = "auto", output_, debug_;
   bool stats_ = false, sample_images_ = false;
   std::vector<std::string> outputs_;  // of each parameter
 };

@@ -129,7 +129,7 @@ int run_info(const CommonOptions& common) {
   }
   std::vector<const Mesh*> meshes;
   for (const Shape& shape : scene.shapes) meshes.push_back(&shape.mesh);
-  const int threads = thread_count(common.threads);
+  const int threads = thread_count(common.run.threads);
   const std::vector<FacePair> pairs = find_face_pairs(meshes, value(scene.camera.origin), threads);
   report["crossings"] = describe_crossings(scene, meshes, pairs, threads);
   print_crossings(report["crossings"]);

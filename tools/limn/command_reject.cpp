@@ -129,7 +129,7 @@ class Rejection {
   Rejection(const CommonOptions& common, const RejectCommand& command)
       : common_(common),
         command_(command),
-        threads_(thread_count(common.threads)),
+        threads_(thread_count(common.run.threads)),
         types_(chosen_types(command.methods)),
         scene_(is_mesh_file(common.scene) ? scene_of_mesh(common.scene)
                                           : load_scene(common, warnings_)),
@@ -137,7 +137,7 @@ class Rejection {
     input_.objects.push_back(keep_one_shape(scene_, command.shape));
     tracer_ = make_embree_tracer(scene_, threads_);
     sphere_ = sphere_around(input_.objects[0]);
-    seed_ = common.seed.value_or(scene_.seed);
+    seed_ = common.run.seed.value_or(scene_.seed);
     queries_ = queries_around(input_.objects[0], command.points, seed_);
   }
 

@@ -21,31 +21,21 @@ class RenderCommand final : public Command {
     add_common_options(app, common_);
     app.add_option("-o,--output", output_, "Image to write (.exr); a .png is written beside it")
         ->required();
-    add_method_option(app, options_.method, Task::kImage);
-    add_image_options(app, what_, options_);
     options_.generator = kGenerators[0];
-    app.add_option("--generator", options_.generator,
-                   "Sample generator: Owen-scrambled Sobol' points, or independent random numbers")
-        ->check(
-            CLI::IsMember(std::vector<std::string>(std::begin(kGenerators), std::end(kGenerators))))
-        ->capture_default_str();
-    add_film_option(app, film_);
-    add_points_option(app, options_.points);
+    visit_options(options_, OptionAdder(app));
     add_debug_option(app, debug_);
     add_part_option(app, common_);
   }
   bool join(BatchStore& store) override {
-    common_.store = &store;
+    common_.run.store = &store;
     return true;
   }
 
   int run(const std::string& command_line) override {
     check_options();
-    Scene scene = load_scene(common_, warnings_);
+    const Scene scene = load_scene(common_, warnings_);
     const RunSettings settings =
         settings_for(options_.points, make_settings(common_, scene, name()));
-    show(what_, scene, options_);
-    options_.exact_film = film_ == "exact";
     if (!debug_.empty()) {
       for (const auto& line : trace_sample(scene, settings, parse_place(debug_), options_)) {
         fmt::print("{}\n", line);
@@ -73,12 +63,13 @@ class RenderCommand final : public Command {
  private:
   void check_options() const {
     check_image_options(*app_, {options_.method});
-    refuse_samples(*app_, options_.points, {"--spp", "--generator", "--part"});
+    refuse_samples(*app_, options_.points, {"--spp", "--part"}, options_);
     if (!has_generator() && options_.points == FilmPoints::kRandom) {
       refuse_options(*app_, {"--generator"},
                      fmt::format("the method {} has its own", options_.method.name()));
     }
   }
+  const char* what() const { return kRenderWhat[static_cast<int>(options_.what)]; }
   bool has_points() const { return options_.method->image->closed_light; }
   bool has_generator() const {
     return options_.points != FilmPoints::kFaces && !options_.method->image->looks_around;
@@ -88,7 +79,7 @@ class RenderCommand final : public Command {
     const std::string picture = with_ending(output_, ".png");
     auto attributes = provenance(scene, settings, result.spp);
     attributes.push_back({"limn.method", options_.method.name()});
-    if (what_ != "image") attributes.push_back({"limn.what", what_});
+    if (what() != kRenderWhat[0]) attributes.push_back({"limn.what", what()});
     if (has_generator()) attributes.push_back({"limn.generator", options_.generator});
     if (has_points()) attributes.push_back({"limn.points", name_of(options_.points)});
     attributes.push_back({kOutputAttribute, output_name(output_)});
@@ -101,7 +92,7 @@ class RenderCommand final : public Command {
                              {"sensor", sensor_name(scene)},
                              {"spp", result.spp},
                              {"method", options_.method.name()},
-                             {"what", what_},
+                             {"what", what()},
                              {"seed", settings.seed},
                              {"threads", settings.threads},
                              {"seconds", result.seconds},
@@ -127,7 +118,7 @@ class RenderCommand final : public Command {
   Warnings warnings_;
   RenderOptions options_;
   CLI::App* app_ = nullptr;
-  std::string output_, debug_, film_ = "rays", what_ = "image";
+  std::string output_, debug_;
 };
 
 }  // namespace

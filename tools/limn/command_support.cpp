@@ -38,28 +38,7 @@ std::vector<std::string> split(const std::string& list) {
   return parts;
 }
 
-// Short where that is exact, as 1e+12; else with all digits, as the largest seed.
-std::string bound_text(long double bound) {
-  const std::string text = fmt::format("{:.10g}", bound);
-  const bool exact = std::strtold(text.c_str(), nullptr) == bound || std::floor(bound) != bound;
-  return exact ? text : fmt::format("{:.0f}", bound);
-}
-
 }  // namespace
-
-CLI::Validator within(long double least, long double most) {
-  const std::string range = bound_text(least) + " to " + bound_text(most);
-  return {[=](const std::string& text) {
-            char* end = nullptr;
-            const long double value = std::strtold(text.c_str(), &end);
-            // As doubles, which 0.1 is; seeds have more digits.
-            const bool enough = static_cast<double>(value) >= static_cast<double>(least);
-            return !text.empty() && *end == 0 && enough && value <= most
-                       ? std::string()
-                       : text + " is not a number from " + range;
-          },
-          range};
-}
 
 void add_input_options(CLI::App& app, CommonOptions& common, const std::string& text,
                        const std::string& type) {
@@ -72,11 +51,7 @@ void add_input_options(CLI::App& app, CommonOptions& common, const std::string& 
          "Set the value of $NAME in the scene (repeatable)")
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false);
-  app.add_option("--seed", common.seed,
-                 "Seed of the random numbers (default: seed of the scene's sampler)")
-      ->check(within(0, std::numeric_limits<uint64_t>::max()));
-  app.add_option("--threads", common.threads, "Number of threads (default: all cores)")
-      ->check(within(1, 4096));
+  visit_options(common.run, all_but({"spp", "seconds"}, OptionAdder(app)));
   app.add_flag("--quiet", common.quiet, "Print only errors and warnings");
 }
 
@@ -89,9 +64,7 @@ void add_common_options(CLI::App& app, CommonOptions& common) {
   app.add_option("--sensor", common.sensor,
                  "Sensor to render: its id, or its number from 0 (default: the first)")
       ->type_name("ID|NUMBER");
-  app.add_option("--spp", common.spp,
-                 "Samples per pixel (default: sample_count of the scene's sampler)")
-      ->check(within(1, 1 << 30));
+  visit_options(common.run, only("spp", OptionAdder(app)));
   app.add_option("--json", common.json, "Write all results as JSON to this file");
   app.add_option("--shading", common.shading,
                  "Shading with interpolated normals: continuous, or as in Mitsuba 3, whose shading "
@@ -108,27 +81,6 @@ void add_parameter_options(CLI::App& app, std::vector<std::string>& parameters) 
       ->allow_extra_args(false);
 }
 
-void add_method_option(CLI::App& app, Method& method, Task task) {
-  app.add_option_function<std::string>(
-         "--method",
-         [&method, task](const std::string& name) {
-           method = name;
-           check_task(method, task);
-         },
-         "Method: " + join(method_names(task)) + "; settings follow a colon, as in " +
-             (task == Task::kImage ? "silhouettes" : "forest") + ":width=4 (limn methods --all)")
-      ->default_str(Method(task).name())
-      ->type_name("NAME");
-  const std::string instead =
-      task == Task::kImage ? "--generator sobol or independent" : "--method NAME";
-  app.add_option_function<std::string>(
-         "--sampler",
-         [instead](const std::string& value) {
-           throw InputError("--sampler " + value + ": this option is now " + instead);
-         })
-      ->group("");  // not in the help
-}
-
 std::vector<Method> parse_methods(const std::vector<std::string>& names, Task task) {
   std::vector<Method> methods;
   for (const std::string& name : names) {
@@ -142,11 +94,12 @@ std::vector<Method> parse_methods(const std::vector<std::string>& names, Task ta
   return methods;
 }
 
-void add_term_options(CLI::App& app, std::string& terms, std::string& samples) {
-  app.add_option("--terms", terms,
-                 "Terms to compute, among " + join(Method(Task::kGradient)->terms) +
-                     " (default: all that the scene has)")
-      ->type_name("A,B,...");
+void add_time_option(CLI::App& app, CommonOptions& common) {
+  visit_options(common.run, only("seconds", OptionAdder(app)));
+  app.get_option("--time")->excludes("--spp");
+}
+
+void add_samples_option(CLI::App& app, std::string& samples) {
   app.add_option("--samples", samples,
                  "Samples of each term per pixel sample, in the order in which --terms lists them, "
                  "without terms that the scene lacks (1 for those not given; camera may be less "
@@ -155,79 +108,6 @@ void add_term_options(CLI::App& app, std::string& terms, std::string& samples) {
       ->capture_default_str()
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
       ->type_name("N,N,...");
-}
-
-void add_points_option(CLI::App& app, FilmPoints& points) {
-  app.add_option_function<std::string>(
-         "--points", [&points](const std::string& name) { points = film_points(name); },
-         "Points at which the method analytic evaluates light. random: random points of each "
-         "pixel. faces: one point per visible face of each pixel, weighted by its visible area. "
-         "Faces has no noise and needs a box filter; its gradient is exact for its own image, "
-         "which ignores how light varies within a pixel's part of a face")
-      ->check(
-          CLI::IsMember(std::vector<std::string>(std::begin(kFilmPoints), std::end(kFilmPoints))))
-      ->default_str(kFilmPoints[0]);
-}
-
-void refuse_samples(const CLI::App& app, FilmPoints points,
-                    const std::vector<std::string>& options) {
-  if (points != FilmPoints::kFaces) return;
-  for (const std::string& name : options) {
-    if (app.count(name) == 0) continue;
-    throw InputError(name + ": --points faces takes no samples");
-  }
-}
-
-void add_film_option(CLI::App& app, std::string& film) {
-  app.add_option("--film", film,
-                 "Visibility from the camera (in gradients, of the edges that it sees): by rays, "
-                 "or by the exact visible regions of every pixel, which needs a box filter")
-      ->check(CLI::IsMember({"rays", "exact"}))
-      ->capture_default_str();
-}
-
-void add_reverse_options(CLI::App& app, BackwardOptions& options, Task task) {
-  app.add_option_function<std::string>(
-      "--terms", [&options](const std::string& list) { options.terms = parse_terms(list); },
-      "Terms to compute, as in interior,camera (default: all that the scene has)");
-  app.add_option_function<std::string>(
-         "--pixels",
-         [&options](const std::string& pixels) {
-           options.uniform_pixels = pixels == kUniformPixels;
-         },
-         "Pixels in which paths start: adjoint (more where the loss depends more on the pixel) or "
-         "uniform")
-      ->check(CLI::IsMember({kAdjointPixels, kUniformPixels}))
-      ->default_str(kAdjointPixels);
-  add_method_option(app, options.method, task);
-  add_points_option(app, options.points);
-  app.add_option("--edge-samples", options.edge_samples, "Boundary samples per path vertex")
-      ->check(within(1, 1 << 16))
-      ->capture_default_str();
-  app.add_option("--camera-samples", options.camera_samples,
-                 "Boundary samples on the film per path (term camera)")
-      ->check(within(1e-6, 1 << 16))
-      ->default_str("0.25, 1 with --method analytic");
-  app.add_option(
-         "--shadow-samples", options.shadow_samples,
-         "Boundary samples on the edges of visible shadows per path (terms shadow and penumbra)")
-      ->check(within(1e-6, 1 << 16))
-      ->capture_default_str();
-}
-
-void add_warp_options(CLI::App& app, WarpOptions& warp) {
-  app.add_option(
-         "--aux", warp.rays,
-         "Auxiliary rays per direction (method was): an even number. More rays reduce the bias")
-      ->check(within(2, 1 << 20))
-      ->capture_default_str()
-      ->type_name("N");
-  app.add_option("--kappa", warp.kappa,
-                 "Concentration K of the kernel of auxiliary rays, which is K^(-1/2) radians wide "
-                 "(method was)")
-      ->check(within(1.0, 1e12))
-      ->capture_default_str()
-      ->type_name("K");
 }
 
 void add_debug_option(CLI::App& app, std::string& place) {
@@ -259,13 +139,9 @@ Scene load_scene(const CommonOptions& common, Warnings& shown) {
 
 RunSettings make_settings(const CommonOptions& common, const Scene& scene,
                           const std::string& label) {
-  RunSettings settings;
-  settings.spp = common.spp > 0 ? common.spp : scene.sample_count;
-  settings.seed = common.seed.value_or(scene.seed);
-  settings.threads = thread_count(common.threads);
+  RunSettings settings = settings_of(common.run, scene);
   settings.progress = progress_bar(label, common.quiet);
   settings.interrupted = &interrupt_flag();
-  settings.store = common.store;
   watch_interrupt();
   return settings;
 }
@@ -303,6 +179,10 @@ std::string setting_line(const MethodSetting& setting) {
          (number ? fmt::format("{:.6g}", *number) : std::get<std::string>(setting.value));
 }
 
+nlohmann::json number(double value) {
+  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
+}
+
 nlohmann::json settings_json(const std::vector<MethodSetting>& settings) {
   nlohmann::json object = nlohmann::json::object();
   for (const MethodSetting& s : settings) {
@@ -336,6 +216,11 @@ void check_output(const std::string& file) {
 
 void write_json(const std::string& file, const std::string& text) {
   if (!file.empty()) write_file(file, text + "\n");
+}
+
+void copy_json(const std::string& from, const std::string& to) {
+  if (to.empty()) return;
+  std::filesystem::copy_file(from, to, std::filesystem::copy_options::overwrite_existing);
 }
 
 double available_memory() {

@@ -10,11 +10,10 @@
 
 #include "limn/core/image.h"
 #include "limn/core/scene.h"
-#include "limn/integrators/backward.h"
-#include "limn/integrators/gradient.h"
 #include "limn/integrators/methods.h"
 #include "limn/integrators/run.h"
 #include "tools/limn/command.h"
+#include "tools/limn/option_adder.h"
 
 namespace limn {
 
@@ -23,18 +22,13 @@ struct CommonOptions {
   std::map<std::string, std::string> defines;
   std::vector<std::string> paths;  // directories where files are searched last
   std::string sensor;              // "": the first of the scene
-  int spp = 0;                     // 0: the scene's
-  std::optional<uint64_t> seed;
-  int threads = 0;  // 0: all cores
+  RunRequest run;
   std::string json;
   bool quiet = false;
   std::string shading = "continuous";
-  std::string part;             // "K/N" of --part; "": the whole run
-  BatchStore* store = nullptr;  // of `limn merge`
+  std::string part;  // "K/N" of --part; "": the whole run
 };
 
-// A number from least to most. Nothing else is, nor what is no number.
-CLI::Validator within(long double least, long double most);
 // Scene or mesh, -D, --seed, --threads, --quiet. text, type: of the input.
 void add_input_options(CLI::App& app, CommonOptions& common, const std::string& text,
                        const std::string& type);
@@ -42,24 +36,12 @@ void add_input_options(CLI::App& app, CommonOptions& common, const std::string& 
 void add_common_options(CLI::App& app, CommonOptions& common);
 // --wrt
 void add_parameter_options(CLI::App& app, std::vector<std::string>& parameters);
-// --method, and --sampler as it once was, which now says so
-void add_method_option(CLI::App& app, Method& method, Task task);
 // "a,b": each once, all of which do the task. InputError that names the option.
 std::vector<Method> parse_methods(const std::vector<std::string>& names, Task task);
-// --terms and --samples
-void add_term_options(CLI::App& app, std::string& terms, std::string& samples);
-// --aux and --kappa
-void add_warp_options(CLI::App& app, WarpOptions& warp);
-// --terms, --pixels, --method, --edge-samples, --camera-samples and --shadow-samples
-void add_reverse_options(CLI::App& app, BackwardOptions& options, Task task);
-inline constexpr const char *kAdjointPixels = "adjoint", *kUniformPixels = "uniform";
-// --points, for light in closed form
-void add_points_option(CLI::App& app, FilmPoints& points);
-// InputError if one of the options was given, which faces have no use for.
-void refuse_samples(const CLI::App& app, FilmPoints points,
-                    const std::vector<std::string>& options);
-// --film: "rays" or "exact"
-void add_film_option(CLI::App& app, std::string& film);
+// --time, in place of --spp
+void add_time_option(CLI::App& app, CommonOptions& common);
+// --samples
+void add_samples_option(CLI::App& app, std::string& samples);
 // --debug-sample
 void add_debug_option(CLI::App& app, std::string& place);
 
@@ -70,6 +52,7 @@ std::vector<ImageAttribute> provenance(const Scene& scene, const RunSettings& se
 Image film_channels(const Scene& scene, const Image& image);
 // What the method was set up with, as "name value, ..."; none where there is nothing to say.
 std::vector<ImageAttribute> settings_attributes(const std::vector<MethodSetting>& settings);
+nlohmann::json number(double value);  // null for what JSON has not: infinities, NaN
 nlohmann::json settings_json(const std::vector<MethodSetting>& settings);
 // "1.5 +- 0.02", without the standard error where there is none.
 std::string with_error(double value, double error);
@@ -80,6 +63,7 @@ std::string with_ending(const std::string& output, const std::string& ending);
 // Made before long work starts: InputError if the file cannot be written.
 void check_output(const std::string& file);
 void write_json(const std::string& file, const std::string& text);  // nothing for ""
+void copy_json(const std::string& from, const std::string& to);     // likewise
 // Bytes that can be taken without paging, as the system tells; 0 if it does not.
 double available_memory();
 // "a,b" of --terms; none for "".

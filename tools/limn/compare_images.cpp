@@ -56,17 +56,17 @@ void print_images(const ImageComparison& result) {
 
 void write_images(const ImageCompareArguments& arguments, const Scene& scene,
                   const RunSettings& settings, const ImageComparison& result,
-                  const CommonOptions& common, const Warnings& warnings,
-                  const std::string& command_line) {
+                  const Warnings& warnings, const std::string& command_line) {
   const auto path = [&](const std::string& name) {
     return (fs::path(arguments.output) / name).string();
   };
+  const std::string what = kRenderWhat[static_cast<int>(arguments.render.what)];
   const auto write_image = [&](const std::string& name, const std::vector<double>& values,
                                const std::string& method, int64_t spp) {
     const Image image = to_image(values, scene.film);
     auto attributes = provenance(scene, settings, spp);
     attributes.push_back({"limn.method", method});
-    attributes.push_back({"limn.what", arguments.what});
+    attributes.push_back({"limn.what", what});
     write_exr(path(name + ".exr"), film_channels(scene, image), false, attributes);
     write_png(path(name + ".png"), image, 1);
   };
@@ -85,9 +85,9 @@ void write_images(const ImageCompareArguments& arguments, const Scene& scene,
   }
   const nlohmann::json report = {{"command", command_line},
                                  {"scene", scene.file},
-                                 {"what", arguments.what},
+                                 {"what", what},
                                  {"generator", arguments.render.generator},
-                                 {"film", arguments.render.exact_film ? "exact" : "rays"},
+                                 {"film", kFilms[arguments.render.exact_film]},
                                  {"lines", arguments.render.lines},
                                  {"tolerance", arguments.render.tolerance},
                                  {"rays", arguments.render.rays},
@@ -102,39 +102,9 @@ void write_images(const ImageCompareArguments& arguments, const Scene& scene,
                                  {"warnings", warnings.lines()},
                                  {"non_finite", result.non_finite.count}};
   write_json(path("compare.json"), report.dump(2));
-  write_json(common.json, report.dump(2));
 }
 
 }  // namespace
-
-void add_image_options(CLI::App& app, std::string& what, RenderOptions& options) {
-  app.add_option("--what", what,
-                 "What the image shows: all light (image), direct light, ambient occlusion (ao) or "
-                 "openness of the sky. The last two need the method silhouettes, lines or rays")
-      ->check(CLI::IsMember({"image", "direct", "ao", "openness"}))
-      ->capture_default_str();
-  app.add_option("--lines", options.lines,
-                 "Methods silhouettes and lines: lines through the sky per point; each area light "
-                 "gets a quarter as many")
-      ->check(within(1, 1 << 14))
-      ->capture_default_str();
-  app.add_option("--tolerance", options.tolerance,
-                 "Methods silhouettes and lines: double the lines until two halves differ by at "
-                 "most twice this share of the result (0: never)")
-      ->check(within(0.0, 1.0))
-      ->capture_default_str();
-  app.add_option("--rays", options.rays,
-                 "Method rays: rays per point for the sky and for each area light")
-      ->check(within(1, 1 << 20))
-      ->capture_default_str();
-}
-
-void refuse_options(const CLI::App& app, const std::vector<std::string>& names,
-                    const std::string& why) {
-  for (const std::string& name : names) {
-    if (app.count(name) > 0) throw InputError(name + ": " + why);
-  }
-}
 
 void check_image_options(const CLI::App& app, const std::vector<Method>& methods) {
   const auto any = [&](auto&& has) {
@@ -157,16 +127,9 @@ void check_exact_film(const std::vector<Method>& methods) {
   throw InputError("--film exact: none of --methods takes it; path and analytic do");
 }
 
-void show(const std::string& what, Scene& scene, RenderOptions& options) {
-  if (what == "direct") scene.max_depth = 2;
-  if (what == "ao") options.what = RenderWhat::kAmbientOcclusion;
-  if (what == "openness") options.what = RenderWhat::kOpenness;
-}
-
 int compare_images_command(const CommonOptions& common, ImageCompareArguments arguments,
-                           Scene scene, const RunSettings& settings, Warnings& warnings,
+                           const Scene& scene, const RunSettings& settings, Warnings& warnings,
                            const std::string& command_line) {
-  show(arguments.what, scene, arguments.render);
   ImageCompareOptions options;
   options.methods = arguments.methods;
   options.render = arguments.render;
@@ -185,7 +148,8 @@ int compare_images_command(const CommonOptions& common, ImageCompareArguments ar
     return kInterrupted;
   }
   if (!common.quiet) print_images(result);
-  write_images(arguments, scene, settings, result, common, warnings, command_line);
+  write_images(arguments, scene, settings, result, warnings, command_line);
+  copy_json((fs::path(arguments.output) / "compare.json").string(), common.json);
   if (result.non_finite.count > 0) return finish_status(result.non_finite, 0, 0, "");
   if (interrupted) {
     fmt::print(stderr, "interrupted: {} holds all runs that were finished\n", arguments.output);

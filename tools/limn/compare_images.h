@@ -10,7 +10,6 @@ namespace limn {
 
 struct ImageCompareArguments {
   std::vector<Method> methods;
-  std::string what = "image";
   RenderOptions render;  // how methods are set up
   std::vector<double> times;
   int repeats = 4;
@@ -18,22 +17,15 @@ struct ImageCompareArguments {
   std::string output;         // folder, which is there
 };
 
-// Options of `render` that say what an image shows and how methods are set up.
-void add_image_options(CLI::App& app, std::string& what, RenderOptions& options);
 // InputError for options of methods that are not among `methods` and do not make the reference.
 void check_image_options(const CLI::App& app, const std::vector<Method>& methods);
 // InputError if none of the methods takes the exact film.
 void check_exact_film(const std::vector<Method>& methods);
-// InputError if any of these was given; why: the rest of the sentence.
-void refuse_options(const CLI::App& app, const std::vector<std::string>& names,
-                    const std::string& why);
-// Makes the scene and the options show what --what says.
-void show(const std::string& what, Scene& scene, RenderOptions& options);
 
 // Writes reference.exr, METHOD.exr of the longest time, all with PNG, and compare.json; prints a
 // table. The status of the program.
 int compare_images_command(const CommonOptions& common, ImageCompareArguments arguments,
-                           Scene scene, const RunSettings& settings, Warnings& warnings,
+                           const Scene& scene, const RunSettings& settings, Warnings& warnings,
                            const std::string& command_line);
 
 }  // namespace limn

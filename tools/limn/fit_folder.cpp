@@ -4,8 +4,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -20,166 +18,91 @@
 #include "tools/limn/command_support.h"
 #include "tools/limn/table.h"
 
+// Vectors as a list of their numbers.
+template <class T>
+struct nlohmann::adl_serializer<std::vector<limn::Vec3<T>>> {
+  static void to_json(json& list, const std::vector<limn::Vec3<T>>& vectors) {
+    list = json::array();
+    for (const limn::Vec3<T>& v : vectors) {
+      for (int k = 0; k < 3; ++k) list.push_back(static_cast<double>(v[k]));
+    }
+  }
+  static void from_json(const json& list, std::vector<limn::Vec3<T>>& vectors) {
+    vectors.resize(list.size() / 3);
+    for (size_t i = 0; i < 3 * vectors.size(); ++i) {
+      vectors[i / 3][static_cast<int>(i % 3)] = static_cast<T>(list[i].get<double>());
+    }
+  }
+};
+
 namespace limn {
+
+// Fields by their names, for writing and reading.
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ViewArguments, scene, defines, sensor, target, mask,
+                                   fingerprints)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FitState::Numbers, values, first, second, natural_step, lambda)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FitState::Shape, positions, normals, faces)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FitState::View, camera, shapes, values, texels)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FitState, steps, parameters, moves, changes, views)
 
 namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
-static_assert(std::endian::native == std::endian::little);
 
-constexpr int kFormat = 3;                  // of fit.json and state.cbor
+constexpr int kFormat = 4;                  // of fit.json and state.cbor
 constexpr size_t kDistanceSamples = 10000;  // on each surface; not tuned
 
-template <class T>
-void append(std::string& bytes, const T& value) {
-  const auto raw = std::bit_cast<std::array<char, sizeof(T)>>(value);
-  bytes.append(raw.data(), raw.size());
-}
-
-std::string ply_text(const Mesh& mesh) {
-  std::string bytes = fmt::format(
-      "ply\nformat binary_little_endian 1.0\nelement vertex {}\n"
-      "property float x\nproperty float y\nproperty float z\nelement face {}\n"
-      "property list uchar uint vertex_indices\nend_header\n",
-      mesh.positions.size(), mesh.faces.size());
-  for (const Vec3f& p : mesh.positions) {
-    for (int k = 0; k < 3; ++k) append(bytes, p[k]);
-  }
-  for (const FaceIndices& face : mesh.faces) {
-    append(bytes, uint8_t{3});
-    for (const uint32_t v : face) append(bytes, v);
-  }
-  return bytes;
-}
-
-// JSON has no NaN.
-json number(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
-
-json to_json(const ViewArguments& v) {
-  return {{"scene", v.scene},   {"defines", v.defines}, {"sensor", v.sensor},
-          {"target", v.target}, {"mask", v.mask},       {"fingerprints", v.fingerprints}};
-}
-
-// Calls visit(name, member) for all but the views and the pixels: reading and writing go over one
-// list.
+// Calls visit(name, member) for what is no row of the table of options: reading and writing go over
+// one list.
 template <class Arguments, class Visit>
 void visit_arguments(Arguments& a, const Visit& visit) {
-  auto& options = a.options;
-  visit("parameters", options.parameters);
+  visit("views", a.views);
+  visit("parameters", a.options.parameters);
   visit("bounds", a.bounds);
-  visit("terms", options.backward.terms);
-  visit("loss", a.loss);
-  visit("pyramid", options.pyramid);
-  visit("optimiser", a.optimiser);
   visit("shading", a.shading);
-  visit("step", options.step);
-  visit("smoothing", options.smoothing);
-  visit("remesh", options.remesh);
-  visit("remesh_edge", options.remesh_edge);
-  visit("remesh_shrink", options.remesh_shrink);
-  visit("camera_samples", options.backward.camera_samples);
-  visit("shadow_samples", options.backward.shadow_samples);
-  visit("step_half_life", options.step_half_life);
-  visit("spp_doubling", options.spp_doubling);
   visit("spp", a.spp);
-  visit("loss_spp", options.loss_spp);
-  visit("edge_samples", options.backward.edge_samples);
   visit("seed", a.seed);
   visit("steps", a.steps);
   visit("snapshots", a.snapshots);
   visit("truth", a.truth);
 }
 
+struct OptionWriter {
+  json& to;
+  void operator()(const auto& value, const Option& option) const { to[option.name] = value; }
+  void operator()(const Method& method, const Option& option) const {
+    to[option.name] = method.name();
+  }
+  template <Choice T>
+  void operator()(const T& value, const Option& option) const {
+    to[option.name] = word_of(value, option);
+  }
+};
+struct OptionReader {
+  const json& from;
+  void operator()(auto& value, const Option& option) const { from.at(option.name).get_to(value); }
+  void operator()(Method& method, const Option& option) const {
+    method = from.at(option.name).get<std::string>();
+  }
+  template <Choice T>
+  void operator()(T& value, const Option& option) const {
+    set_word(value, option, from.at(option.name).get<std::string>());
+  }
+};
+
 json to_json(const FitArguments& a) {
   json j;
   visit_arguments(a, [&](const char* name, const auto& member) { j[name] = member; });
-  j["method"] = a.options.backward.method.name();
-  j["points"] = name_of(a.options.backward.points);
-  j["pixels"] = a.options.backward.uniform_pixels ? kUniformPixels : kAdjointPixels;
-  for (const ViewArguments& view : a.views) j["views"].push_back(to_json(view));
+  visit_options(a.options, OptionWriter{j});
   return j;
 }
 
 FitArguments arguments_from(const json& j) {
   FitArguments a;
   visit_arguments(a, [&](const char* name, auto& member) { j.at(name).get_to(member); });
-  a.options.backward.method = j.at("method").get<std::string>();
-  a.options.backward.points = film_points(j.at("points"));
-  a.options.backward.uniform_pixels = j.at("pixels") == kUniformPixels;
-  for (const json& view : j.at("views")) {
-    a.views.push_back({view.at("scene"), view.at("defines"), view.at("sensor"), view.at("target"),
-                       view.at("mask"), view.at("fingerprints")});
-  }
+  visit_options(a.options, OptionReader{j});
   return a;
-}
-
-template <class T>
-json flat(const std::vector<Vec3<T>>& vectors) {
-  json list = json::array();
-  for (const Vec3<T>& v : vectors) {
-    for (int k = 0; k < 3; ++k) list.push_back(static_cast<double>(v[k]));
-  }
-  return list;
-}
-
-template <class T>
-std::vector<Vec3<T>> vectors(const json& list) {
-  std::vector<Vec3<T>> all(list.size() / 3);
-  for (size_t i = 0; i < 3 * all.size(); ++i) {
-    all[i / 3][static_cast<int>(i % 3)] = static_cast<T>(list[i].get<double>());
-  }
-  return all;
-}
-
-json to_json(const FitState& state) {
-  json j = {{"steps", state.steps},
-            {"parameters", json::array()},
-            {"views", json::array()},
-            {"moves", state.moves},
-            {"changes", state.changes}};
-  for (const FitState::Numbers& p : state.parameters) {
-    j["parameters"].push_back({{"values", p.values},
-                               {"first", p.first},
-                               {"second", p.second},
-                               {"natural_step", p.natural_step},
-                               {"lambda", p.lambda}});
-  }
-  for (const FitState::View& view : state.views) {
-    json shapes = json::array();
-    for (const FitState::Shape& s : view.shapes) {
-      shapes.push_back(
-          {{"positions", flat(s.positions)}, {"normals", flat(s.normals)}, {"faces", s.faces}});
-    }
-    j["views"].push_back({{"sensor", view.camera},
-                          {"shapes", shapes},
-                          {"values", view.values},
-                          {"texels", view.texels}});
-  }
-  return j;
-}
-
-FitState state_from(const json& j) {
-  FitState state;
-  state.steps = j.at("steps");
-  // Folders of before there was lbfgs have none.
-  state.moves = j.value("moves", state.moves);
-  state.changes = j.value("changes", state.changes);
-  for (const json& p : j.at("parameters")) {
-    state.parameters.push_back(
-        {p.at("values"), p.at("first"), p.at("second"), p.at("natural_step"), p.at("lambda")});
-  }
-  for (const json& v : j.at("views")) {
-    // Folders of before texels were fitted have none.
-    FitState::View view{
-        v.at("sensor"), {}, v.at("values"), v.value("texels", std::vector<float>())};
-    for (const json& s : v.at("shapes")) {
-      view.shapes.push_back(
-          {vectors<float>(s.at("positions")), vectors<double>(s.at("normals")), s.at("faces")});
-    }
-    state.views.push_back(std::move(view));
-  }
-  return state;
 }
 
 std::string read_whole(const std::string& file) {
@@ -288,8 +211,6 @@ std::string csv_text(const json& history, const std::vector<FitScalar>& scalars)
 FitOptions FitArguments::all_options() const {
   FitOptions all = options;
   for (const std::string& text : bounds) all.bounds.push_back(parse_bounds(text));
-  all.loss = loss_kind(loss);
-  all.optimiser = optimiser_kind(optimiser);
   // A fit at rest goes on to its next remeshing: it must not go past its end.
   std::erase_if(all.remesh, [&](int64_t step) { return step > steps; });
   return all;
@@ -368,7 +289,7 @@ void FitFolder::restore(Fit& fit) {
   const std::string name = file("state.cbor");
   const std::string bytes = read_whole(name);
   try {
-    fit.restore(state_from(json::from_cbor(bytes)));
+    fit.restore(json::from_cbor(bytes).get<FitState>());
   } catch (const json::exception& error) {
     throw InputError({name}, std::string("is not the state of a fit: ") + error.what());
   } catch (const InputError&) {
@@ -526,7 +447,7 @@ void FitFolder::write(const Fit& fit, const std::string& status,
                     {"history", history_},  {"snapshots", snapshots_}};
   write_file(file("fit.json"), all.dump(1) + "\n");
   write_file(file("history.csv"), csv_text(history_, fit.scalars()));
-  const std::vector<uint8_t> state = json::to_cbor(to_json(fit.state()));
+  const std::vector<uint8_t> state = json::to_cbor(json(fit.state()));
   write_file(file("state.cbor"), std::string(state.begin(), state.end()));
 }
 

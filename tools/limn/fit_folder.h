@@ -29,9 +29,9 @@ struct ViewArguments {
 // What fixes the bits of a fit, and what is kept of it. Files have absolute names.
 struct FitArguments {
   std::vector<ViewArguments> views;
-  FitOptions options;  // but for what is said in words:
-  std::vector<std::string> bounds;
-  std::string loss = "l2", optimiser = "adam-uniform", shading = "continuous";
+  FitOptions options;               // but for the bounds:
+  std::vector<std::string> bounds;  // as texts
+  std::string shading = "continuous";
   int spp = 0;
   uint64_t seed = 0;
   int64_t steps = 0;

@@ -13,6 +13,7 @@
 #include "limn/core/field_error.h"
 #include "limn/core/names.h"
 #include "tools/limn/commands.h"
+#include "tools/limn/option_adder.h"
 #include "tools/limn/version.h"
 
 namespace {
@@ -76,14 +77,6 @@ void use_huge_pages([[maybe_unused]] char** argv) {
 #endif
 }
 
-// How the command line spells a field of the library.
-std::string option_of(std::string field) {
-  if (field == "auxiliary rays") return "--aux";
-  if (field == "seconds") return "--time";
-  std::replace(field.begin(), field.end(), '_', '-');
-  return "--" + field;
-}
-
 int run(int argc, char** argv) {
   CLI::App app(
       "limn: a differentiable path tracer. limn COMMAND --help lists the options of a command");
@@ -118,7 +111,7 @@ int main(int argc, char** argv) {
   try {
     return run(argc, argv);
   } catch (const limn::FieldError& error) {
-    fmt::print(stderr, "error: {}: {}\n", option_of(error.field), error.message);
+    fmt::print(stderr, "error: {}: {}\n", limn::option_name(error.field), error.message);
   } catch (const limn::InputError& error) {
     fmt::print(stderr, "{}\n", error.what());
   } catch (const std::exception& error) {

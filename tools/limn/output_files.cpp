@@ -26,6 +26,14 @@ bool is_device(const std::string& file) {
          !fs::is_directory(file, failed);
 }
 
+std::string properties(const char* type, const std::string& prefix) {
+  std::string text;
+  for (const char axis : {'x', 'y', 'z'}) {
+    text += std::string("property ") + type + " " + prefix + axis + "\n";
+  }
+  return text;
+}
+
 std::string stem_of(const std::string& file) { return fs::path(file).stem().string(); }
 
 // Whether limn wrote it for this -o. Older versions of limn only tell of themselves, so that the
@@ -112,6 +120,25 @@ void check_outputs(const std::vector<PlannedFile>& files, const Scene& scene,
 }
 
 std::string output_name(const std::string& output) { return stem_of(output); }
+
+std::string ply_text(const Mesh& mesh, const std::vector<VertexVectors>& vectors) {
+  std::string bytes = "ply\nformat binary_little_endian 1.0\nelement vertex " +
+                      std::to_string(mesh.positions.size()) + "\n" + properties("float", "");
+  for (const VertexVectors& v : vectors) bytes += properties("double", v.prefix);
+  bytes += "element face " + std::to_string(mesh.faces.size()) +
+           "\nproperty list uchar uint vertex_indices\nend_header\n";
+  for (size_t v = 0; v < mesh.positions.size(); ++v) {
+    for (int k = 0; k < 3; ++k) append(bytes, mesh.positions[v][k]);
+    for (const VertexVectors& of : vectors) {
+      for (int k = 0; k < 3; ++k) append(bytes, of.values[v][k]);
+    }
+  }
+  for (const FaceIndices& face : mesh.faces) {
+    append(bytes, uint8_t{3});
+    for (const uint32_t v : face) append(bytes, v);
+  }
+  return bytes;
+}
 
 void remove_stale(const std::string& output, const std::vector<std::string>& written) {
   const std::string stem = stem_of(output);

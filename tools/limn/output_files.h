@@ -1,5 +1,7 @@
 #pragma once
 // The files that a command writes: checked before long work, and none of an older run beside them.
+#include <array>
+#include <bit>
 #include <string>
 #include <vector>
 
@@ -31,6 +33,20 @@ void check_json(const std::string& file);
 // All of a file, which appears whole or not at all; a device (/dev/stdout) takes the bytes as they
 // come. InputError if it cannot be written.
 void write_file(const std::string& file, const std::string& bytes);
+
+// The number's bytes as they lie in memory, which is little-endian.
+template <class T>
+void append(std::string& bytes, const T& value) {
+  static_assert(std::endian::native == std::endian::little);
+  const auto raw = std::bit_cast<std::array<char, sizeof(T)>>(value);
+  bytes.append(raw.data(), raw.size());
+}
+// A PLY file of the mesh, with further vectors of its vertices as properties PREFIXx, ...
+struct VertexVectors {
+  std::string prefix;
+  const std::vector<Vec3d>& values;  // V
+};
+std::string ply_text(const Mesh& mesh, const std::vector<VertexVectors>& vectors = {});
 
 // Images beside `output` that an earlier run wrote for the same -o, and that are not among
 // `written`: standard errors, other parameters, counts of samples; with their pictures. Files that

@@ -116,17 +116,18 @@ def scene(folder, name, **parts):
 
 def cases(folder):
     """(name, parts of the scene, options of limn)."""
-    sphere = os.path.join(folder, "sphere.obj")
     sky = os.path.join(folder, "sky.exr")
-    write_sphere(sphere, 5, 8)
-    smooth = os.path.join(folder, "smooth.obj")
-    write_sphere(smooth, 5, 8, normals=True)
-    octahedron = os.path.join(folder, "octahedron.ply")
-    write_octahedron(octahedron)
     write_sky(sky, 32, 16)
     envmap = f"""<emitter type="envmap"><string name="filename" value="{sky}"/>
         <float name="scale" value="1.5"/><transform name="to_world"><rotate x="1" angle="50"/>
         <rotate z="1" angle="25"/><rotate y="1" angle="20"/></transform></emitter>"""
+    yield from sensors_and_films()
+    yield from materials(envmap)
+    yield from kinds_of_light(envmap)
+    yield from shapes_of_all_kinds(folder, envmap)
+
+
+def sensors_and_films():
     yield "base", {}, []
     for depth in (1, 2, 4, 5):
         yield f"max_depth {depth}", {"integrator": DEPTH.format(depth, 1000),
@@ -154,6 +155,9 @@ def cases(folder):
     yield "focal length", {"sensor": '<string name="focal_length" value="40mm"/>'}, []
     yield "clip planes", {"sensor": FOV + '<float name="near_clip" value="5.5"/>'
                           '<float name="far_clip" value="7.5"/>'}, []
+
+
+def materials(envmap):
     for distribution, alpha in itertools.product(("ggx", "beckmann"), (0.05, 0.2, 0.6)):
         bsdf = CONDUCTOR.format(distribution=distribution, alpha=alpha)
         yield f"{distribution} {alpha} envmap", {"floor": bsdf, "lights": envmap}, []
@@ -164,6 +168,9 @@ def cases(folder):
     yield "twosided", {"objects": CUBE.replace("rotate y", "rotate x"), "floor":
                        f'<bsdf type="twosided">{CONDUCTOR.format(distribution="ggx", alpha=0.3)}{GREY}</bsdf>',
                        "sensor": FOV, "lights": VISIBLE_LAMP.replace('y="1.2"', 'y="-1.5"') + envmap}, []
+
+
+def kinds_of_light(envmap):
     for name, lights in (("point", POINT), ("placed point", PLACED_POINT), ("spot", SPOT),
                          ("wide spot", WIDE_SPOT), ("directional", DIRECTIONAL),
                          ("turned directional", TURNED_DIRECTIONAL),
@@ -176,6 +183,14 @@ def cases(folder):
     yield "hide_emitters", {"integrator": DEPTH.format(3, 1000) +
                             '<boolean name="hide_emitters" value="true"/>',
                             "objects": CUBE + VISIBLE_LAMP}, []
+
+
+def shapes_of_all_kinds(folder, envmap):
+    sphere, smooth, octahedron = (os.path.join(folder, name) for name in
+                                  ("sphere.obj", "smooth.obj", "octahedron.ply"))
+    write_sphere(sphere, 5, 8)
+    write_sphere(smooth, 5, 8, normals=True)
+    write_octahedron(octahedron)
     shapes = {kind: f'<shape type="{kind}">' for kind in ("rectangle", "disk", "cube", "sphere")}
     for kind, file in (("obj", sphere), ("obj with normals", smooth),
                        ("ply with normals", octahedron)):

@@ -92,38 +92,6 @@ Estimate to_estimate(const Moments& moments, const Film& film, int64_t spp, doub
 
 using Names = std::variant<std::string, std::vector<std::string>>;
 std::vector<std::string> to_list(const Names& names);
-// A method that does the task. InputError, also where `sampler`, as keywords of earlier versions
-// were called, is given; instead: what to write in its place.
-Method to_method(const std::string& name, Task task);
-void refuse_sampler(const nb::object& sampler, const char* instead);
-// "auto", "uniform" or counts.
-using Samples = std::variant<std::string, std::vector<double>>;
-bool is_auto(const Samples& samples);
-void set_samples(const Samples& samples, std::optional<SampleCounts>& counts);
-
-// "rays": false, "exact": true; InputError for other words.
-bool is_exact(const std::string& film);
-
-// A keyword that tells of samples, and whether it was given.
-struct SampleKeyword {
-  const char* name;
-  bool given;
-};
-// "random" or "faces"; InputError for other words, and for faces with one of these keywords.
-FilmPoints to_points(const std::string& name, const std::vector<SampleKeyword>& samples);
-// The same of a reverse pass, with the keywords that its options are from.
-FilmPoints to_points(const std::string& name, const BackwardOptions& options,
-                     std::vector<SampleKeyword> samples);
-
-// What every run takes; none: what the scene asks for.
-struct RunArguments {
-  std::optional<int> spp;
-  std::optional<uint64_t> seed;
-  double seconds = 0;
-  int threads = 0;  // 0: all cores
-  BatchStore* store = nullptr;
-};
-RunSettings make_settings(const Scene& scene, const RunArguments& arguments);
 
 // Runs job(settings) on a thread of its own without the GIL, while this one looks for signals and
 // calls progress(fraction) every 50 ms. Ctrl-C, or an exception of `progress`, interrupts the job

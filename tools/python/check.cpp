@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "limn/core/error.h"
-#include "tools/python/bindings.h"
+#include "tools/python/arguments.h"
 
 namespace limn::python {
 
@@ -15,10 +15,10 @@ struct Check {
   Estimate gradient, differences;
 };
 
-Check check_of(const SceneHandle& handle, const CheckOptions& options, const RunArguments& run,
+Check check_of(const SceneHandle& handle, const CheckOptions& options, const RunRequest& request,
                const nb::object& progress) {
   const auto scene = handle.share();
-  const RunSettings asked = make_settings(*scene, run);
+  const RunSettings asked = settings_of(request, *scene);
   if (asked.spp < 2) throw InputError("check needs spp of at least 2, for standard errors");
   Check check;
   run_job(asked, progress, [&](const RunSettings& settings) {
@@ -44,10 +44,10 @@ struct ExactCheck {
 };
 
 ExactCheck check_exactly(const SceneHandle& handle, const CheckOptions& options,
-                         const RunArguments& run, const nb::object& progress) {
+                         const RunRequest& request, const nb::object& progress) {
   const auto scene = handle.share();
   ExactCheck check;
-  run_job(make_settings(*scene, run), progress, [&](const RunSettings& settings) {
+  run_job(settings_of(request, *scene), progress, [&](const RunSettings& settings) {
     check.result = check_faces(*scene, options, settings);
   });
   const GradientResult& gradient = check.result.gradient;
@@ -125,58 +125,39 @@ void bind_exact_result(nb::module_& m) {
       });
 }
 
-nb::object check_scene(const SceneHandle& scene, CheckOptions options, const Samples& samples,
-                       const std::string& points, const RunArguments& run,
-                       const nb::object& progress) {
-  set_samples(samples, options.samples);
-  const FilmPoints over = to_points(points, {{"spp", run.spp.has_value()},
-                                             {"samples", !is_auto(samples)},
-                                             {"block", options.block != 0}});
-  if (over == FilmPoints::kFaces) return nb::cast(check_exactly(scene, options, run, progress));
-  return nb::cast(check_of(scene, options, run, progress));
-}
+struct CheckCall {
+  const SceneHandle* scene = nullptr;
+  CheckOptions options;
+  RunRequest request;
+  nb::object progress = nb::none();
+
+  void take(Arguments& a) {
+    add_scene(a, scene);
+    a.add("name", "str", "", options.parameter, "of the parameter.");
+    add_run(a, request, progress);
+    visit_options(options, a);
+    add_samples(a, options.samples);
+  }
+
+  nb::object run(const Arguments& given) const {
+    given.refuse_samples(options.points, {"spp", "samples"});
+    if (options.points == FilmPoints::kFaces) {
+      return nb::cast(check_exactly(*scene, options, request, progress));
+    }
+    return nb::cast(check_of(*scene, options, request, progress));
+  }
+};
 
 }  // namespace
 
 void bind_check(nb::module_& m) {
   bind_result(m);
   bind_exact_result(m);
-  m.def(
-      "check",
-      [](const SceneHandle& scene, const std::string& name, std::optional<int> spp,
-         std::optional<uint64_t> seed, const std::string& method,
-         const std::vector<std::string>& terms, const Samples& samples, double step, int block,
-         int aux, double kappa, int threads, const nb::object& progress, const std::string& film,
-         const std::string& points) {
-        return check_scene(scene,
-                           {name,
-                            to_method(method, Task::kGradient),
-                            terms,
-                            step,
-                            block,
-                            {},
-                            {aux, kappa},
-                            is_exact(film)},
-                           samples, points, {spp, seed, 0, threads}, progress);
-      },
-      nb::arg("scene"), nb::arg("name"), nb::arg("spp") = nb::none(), nb::arg("seed") = nb::none(),
-      nb::arg("method") = Method(Task::kGradient).name(), nb::arg("terms") = nb::make_tuple(),
-      nb::arg("samples") = "auto", nb::arg("step") = 0.0, nb::arg("block") = 0,
-      nb::arg("aux") = WarpOptions{}.rays, nb::arg("kappa") = WarpOptions{}.kappa,
-      nb::arg("threads") = 0, nb::arg("progress") = nb::none(), nb::arg("film") = "rays",
-      nb::arg("points") = "random",
-      nb::sig("def check(scene: Scene, name: str, spp: int | None = None, seed: int | None = None, "
-              "method: str = 'adaptive', terms: collections.abc.Sequence[str] = (), samples: str | "
-              "collections.abc.Sequence[float] = 'auto', step: float = 0, block: int = 0, aux: int "
-              "= 8, "
-              "kappa: float = 1e4, threads: int = 0, progress: collections.abc.Callable[[float], "
-              "object] | None = None, film: str = 'rays', points: str = 'random') -> Check | "
-              "FacesCheck"),
+  def<CheckCall>(
+      m, "check", "Check | FacesCheck",
       "Compares a gradient with finite differences, both with their errors.\n\n"
-      "A right gradient is accused once in ten thousand times. step, block: of the differences and "
-      "of the windows [pixels]; 0: chosen.\n"
-      "points: \"faces\", with the method analytic: the exact gradient of that image against "
-      "differences of it; what comes back is then a FacesCheck. The rest as limn.gradient.");
+      "A right gradient is accused once in ten thousand times. With points \"faces\" the exact "
+      "gradient of that image is compared with differences of it, and a FacesCheck comes back.");
 }
 
 }  // namespace limn::python

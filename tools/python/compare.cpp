@@ -6,7 +6,7 @@
 #include "limn/core/error.h"
 #include "limn/core/names.h"
 #include "limn/core/parameter.h"
-#include "tools/python/bindings.h"
+#include "tools/python/arguments.h"
 
 namespace limn::python {
 
@@ -40,29 +40,49 @@ Estimate to_estimate(const Reference& reference, int width, int height) {
           {}};
 }
 
-struct CompareArguments {
+struct CompareCall {
+  const SceneHandle* scene = nullptr;
   std::string name;
-  std::vector<Method> methods;
+  std::vector<std::string> methods;
   std::vector<double> times;
   int repeats = 4;
-  double reference_seconds = 0;
-  WarpOptions warp;
-  bool exact_film = false;
+  std::optional<double> reference_seconds;
+  GradientOptions options;  // but for parameters and method
+  RunRequest request;
+  nb::object progress = nb::none();
+
+  void take(Arguments& a);
+  Comparison run(const Arguments& given) const;
 };
 
-void check_arguments(const Scene& scene, const CompareArguments& arguments) {
-  find_parameter(scene, arguments.name);
-  for (const Method& method : arguments.methods) check_task(method, Task::kGradient);
-  if (arguments.methods.empty()) throw InputError("compare needs a method or more");
-  check_warp(arguments.warp, arguments.methods);
-  if (arguments.exact_film) check_exact_films(scene, arguments.methods);
-  if (arguments.repeats < 1) throw InputError("repeats must be 1 or more");
+void CompareCall::take(Arguments& a) {
+  add_scene(a, scene);
+  a.add("name", "str", "", name, "of the parameter.");
+  a.add("methods", "collections.abc.Sequence[str]", "", methods,
+        "the first is the measure of the others.");
+  a.add("times", "collections.abc.Sequence[float]", "", times, "seconds of a run, ascending.");
+  a.end_positional();
+  a.add("repeats", "int", "4", repeats, "runs of each method and time.");
+  a.add("reference_seconds", "float | None", "None", reference_seconds,
+        "None: four times all runs of one method.");
+  visit_options(request, all_but({"spp", "seconds"}, a));
+  a.add("progress", "collections.abc.Callable[[float], object] | None", "None", progress);
+  visit_options(options, all_but({"method", "terms", "step", "points"}, a));
+}
+
+void check_call(const Scene& scene, const CompareCall& call, const std::vector<Method>& methods) {
+  find_parameter(scene, call.name);
+  for (const Method& method : methods) check_task(method, Task::kGradient);
+  if (methods.empty()) throw InputError("compare needs a method or more");
+  check_warp(call.options.warp, methods);
+  if (call.options.exact_film) check_exact_films(scene, methods);
+  if (call.repeats < 1) throw InputError("repeats must be 1 or more");
   double before = 0;
-  for (const double time : arguments.times) {
+  for (const double time : call.times) {
     if (!(time > before)) throw InputError("times must be positive and ascending");
     before = time;
   }
-  if (arguments.times.empty()) throw InputError("compare needs a time or more");
+  if (call.times.empty()) throw InputError("compare needs a time or more");
 }
 
 NonFinite non_finite(const Reference& reference, const std::vector<ComparedMethod>& methods) {
@@ -73,27 +93,29 @@ NonFinite non_finite(const Reference& reference, const std::vector<ComparedMetho
   return all;
 }
 
-Comparison compare_of(const SceneHandle& handle, const CompareArguments& arguments,
-                      const RunArguments& run, const nb::object& progress) {
-  const auto scene = handle.share();
-  check_arguments(*scene, arguments);
-  const int width = scene->film.crop_width, height = scene->film.crop_height;
+Comparison CompareCall::run(const Arguments& /*given*/) const {
+  const auto shared = scene->share();
+  const std::vector<Method> chosen(methods.begin(), methods.end());
+  check_call(*shared, *this, chosen);
+  const int width = shared->film.crop_width, height = shared->film.crop_height;
   const int block = std::max(1, (std::max(width, height) + 7) / 8);
-  const MethodInput input{*scene,         arguments.name,      {}, 0, block, std::nullopt,
-                          arguments.warp, arguments.exact_film};
+  const MethodInput input{*shared, name,         {},           0,
+                          block,   std::nullopt, options.warp, options.exact_film};
+  double all = 0;
+  for (const double time : times) all += time * repeats;
   Reference reference;
   std::vector<ComparedMethod> compared;
-  run_job(make_settings(*scene, run), progress, [&](const RunSettings& settings) {
+  run_job(settings_of(request, *shared), progress, [&](const RunSettings& settings) {
     RunSettings first = settings;
     first.spp = 1 << 30;
-    first.seconds = arguments.reference_seconds;
+    first.seconds = reference_seconds.value_or(4 * all);
     first.seed = derived_seed(settings.seed, "reference");
     first.progress = nullptr;
     reference = make_reference(input, first);
     if (reference.spp < 2) return;
-    std::vector<std::unique_ptr<DerivativeMethod>> methods;
-    for (const Method& method : arguments.methods) methods.push_back(make_method(input, method));
-    compared = compare({arguments.times, arguments.repeats}, reference, methods, settings);
+    std::vector<std::unique_ptr<DerivativeMethod>> list;
+    for (const Method& method : chosen) list.push_back(make_method(input, method));
+    compared = compare({times, repeats}, reference, list, settings);
   });
   Comparison result{to_estimate(reference, width, height), compared, width, height};
   check_finite(non_finite(reference, compared), nb::cast(result));
@@ -155,40 +177,10 @@ void bind_compare(nb::module_& m) {
             return views;
           },
           "One limn.ComparedMethod each, in the order asked for.");
-  m.def(
-      "compare",
-      [](const SceneHandle& scene, const std::string& name, const std::vector<std::string>& methods,
-         const std::vector<double>& times, int repeats, std::optional<double> reference_seconds,
-         int aux, double kappa, std::optional<uint64_t> seed, int threads,
-         const nb::object& progress, const std::string& film) {
-        double runs = 0;
-        for (const double time : times) runs += time * repeats;
-        return compare_of(scene,
-                          {name,
-                           {methods.begin(), methods.end()},
-                           times,
-                           repeats,
-                           reference_seconds.value_or(4 * runs),
-                           {aux, kappa},
-                           is_exact(film)},
-                          {{}, seed, 0, threads}, progress);
-      },
-      nb::arg("scene"), nb::arg("name"), nb::arg("methods"), nb::arg("times"),
-      nb::arg("repeats") = 4, nb::arg("reference_seconds") = nb::none(),
-      nb::arg("aux") = WarpOptions{}.rays, nb::arg("kappa") = WarpOptions{}.kappa,
-      nb::arg("seed") = nb::none(), nb::arg("threads") = 0, nb::arg("progress") = nb::none(),
-      nb::arg("film") = "rays",
-      nb::sig(
-          "def compare(scene: Scene, name: str, methods: collections.abc.Sequence[str], times: "
-          "collections.abc.Sequence[float], repeats: int = 4, reference_seconds: float | None = "
-          "None, aux: int = 8, kappa: float = 1e4, seed: int | None = None, threads: int = 0, "
-          "progress: "
-          "collections.abc.Callable[[float], object] | None = None, film: str = 'rays') -> "
-          "Comparison"),
-      "Derivative images of several methods at equal time against one long run.\n\n"
-      "methods: the first is the measure of the others. times: seconds of a run, ascending.\n"
-      "reference_seconds: None for four times all runs of one method. aux, kappa, film: as "
-      "limn.gradient, of the methods that take them; references have their film by rays.");
+  def<CompareCall>(m, "compare", "Comparison",
+                   "Derivative images of several methods at equal time against one long run.\n\n"
+                   "aux, kappa and film are for the methods that take them; references have their "
+                   "film by rays.");
 }
 
 }  // namespace limn::python

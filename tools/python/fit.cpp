@@ -9,7 +9,7 @@
 #include "limn/core/error.h"
 #include "limn/core/parallel.h"
 #include "limn/integrators/mesh_distance.h"
-#include "tools/python/bindings.h"
+#include "tools/python/arguments.h"
 
 namespace limn::python {
 
@@ -49,6 +49,43 @@ std::vector<FitView> to_views(const SceneHandle& scene, nb::handle target, nb::h
   return views;
 }
 
+struct FitCall {
+  const SceneHandle* scene = nullptr;
+  nb::object target, mask = nb::none();
+  Names names;
+  nb::object views = nb::make_tuple();
+  std::map<std::string, std::pair<double, double>> bounds;
+  FitOptions options;
+  RunRequest request;
+
+  void take(Arguments& a) {
+    add_scene(a, scene);
+    a.add("target", kArrayType, "", target, "(H, W, 3) or (H, W).");
+    a.add("names", kNamesType, "", names, "scalars and arrays, as \"object.vertex_positions\".");
+    a.add("mask", kArrayOrNoneType, "None", mask, "weights of the pixels, (H, W).");
+    a.add("views", "collections.abc.Sequence[tuple[object, ...]]", "()", views,
+          "further (scene, target) or (scene, target, mask) that share the parameters.");
+    a.end_positional();
+    a.add("bounds", "collections.abc.Mapping[str, tuple[float, float]]", "{}", bounds,
+          "{name: (least, most)} that scalars and texels may not leave.");
+    visit_options(request, all_but({"seconds"}, a));
+    visit_options(options, a);
+    a.add_former("sampler", "method");
+  }
+
+  Fit make(const Arguments& given) {
+    given.refuse_samples(options.backward.points, {"spp"});
+    for (const auto& [name, range] : bounds) {
+      options.bounds.push_back({name, range.first, range.second});
+    }
+    options.parameters = to_list(names);
+    Fit fit(to_views(*scene, target, mask, nb::cast<nb::sequence>(views)), options,
+            settings_of(request, scene->get()));
+    warn_all(fit.warnings());
+    return fit;
+  }
+};
+
 // One step on a thread of its own; Ctrl-C leaves what was done: if it came too late, the step.
 FitRecord step(FitHandle& handle, const nb::object& progress) {
   handle.check_idle();
@@ -70,6 +107,28 @@ FitRecord step(FitHandle& handle, const nb::object& progress) {
   }
   end();
   return record.value();
+}
+
+nb::list scenes_of(const FitHandle& h) {
+  h.check_idle();
+  nb::list scenes;
+  for (const FitView& view : h.fit.views()) {
+    scenes.append(nb::cast(SceneHandle(deep_copy(view.scene))));
+  }
+  return scenes;
+}
+
+nb::dict values_of(const FitHandle& h) {
+  h.check_idle();
+  std::map<std::string, std::vector<double>> numbers;
+  for (const FitScalar& s : h.fit.scalars()) numbers[s.parameter].push_back(s.value);
+  nb::dict values;
+  for (const FitScalar& s : h.fit.scalars()) {
+    const std::vector<double>& all = numbers[s.parameter];
+    values[nb::cast(s.parameter)] =
+        all.size() == 1 ? nb::cast(all[0]) : as_array(nb::cast(all), "float64");
+  }
+  return values;
 }
 
 void run(FitHandle& handle, int steps, const nb::object& callback) {
@@ -140,101 +199,21 @@ void bind_distance(nb::module_& m) {
 void bind_fit(nb::module_& m) {
   bind_record(m);
   bind_distance(m);
+  FitCall example;
+  Arguments arguments("Fit");
+  example.take(arguments);
   nb::class_<FitHandle>(m, "Fit", "Parameters of scenes, moved until images meet their targets.")
       .def(
           "__init__",
-          [](FitHandle* self, const SceneHandle& scene, nb::handle target, const Names& names,
-             nb::handle mask, const nb::sequence& views, const std::string& loss,
-             const std::string& optimiser, double step, int step_half_life, double smoothing,
-             std::optional<int> spp, int loss_spp, const std::vector<int64_t>& remesh,
-             const std::vector<std::string>& terms, std::optional<uint64_t> seed, int threads,
-             int pyramid, int spp_doubling, double remesh_edge, double remesh_shrink,
-             const std::map<std::string, std::pair<double, double>>& bounds,
-             const std::string& method, bool uniform_pixels, int edge_samples,
-             double camera_samples, double shadow_samples, const std::string& points,
-             const nb::object& sampler) {
-            refuse_sampler(sampler, "method");
-            FitOptions options;
-            for (const auto& [name, range] : bounds) {
-              options.bounds.push_back({name, range.first, range.second});
-            }
-            options.backward.method = to_method(method, Task::kFit);
-            options.backward.uniform_pixels = uniform_pixels;
-            options.backward.edge_samples = edge_samples;
-            options.backward.camera_samples = camera_samples;
-            options.backward.shadow_samples = shadow_samples;
-            options.backward.points = to_points(points, options.backward,
-                                                {{"spp", spp.has_value()},
-                                                 {"loss_spp", loss_spp != 0},
-                                                 {"spp_doubling", spp_doubling != 0}});
-            options.parameters = to_list(names);
-            options.loss = loss_kind(loss);
-            options.optimiser = optimiser_kind(optimiser);
-            options.step = step;
-            options.step_half_life = step_half_life;
-            options.smoothing = smoothing;
-            options.loss_spp = loss_spp;
-            options.remesh = remesh;
-            options.remesh_edge = remesh_edge;
-            options.remesh_shrink = remesh_shrink;
-            options.pyramid = pyramid;
-            options.spp_doubling = spp_doubling;
-            options.backward.terms = terms;
-            if (step_half_life < 0 || loss_spp < 0 || spp_doubling < 0) {
-              throw InputError("step_half_life, spp_doubling and loss_spp must not be negative");
-            }
-            const RunSettings settings = make_settings(scene.get(), {spp, seed, 0, threads});
-            Fit fit(to_views(scene, target, mask, views), options, settings);
-            warn_all(fit.warnings());
-            new (self) FitHandle{std::move(fit), {}, false};
+          [](FitHandle* self, const nb::args& positional, const nb::kwargs& named) {
+            FitCall call;
+            Arguments given("Fit");
+            call.take(given);
+            given.read(positional, named);
+            new (self) FitHandle{call.make(given), {}, false};
           },
-          nb::arg("scene"), nb::arg("target"), nb::arg("names"), nb::arg("mask") = nb::none(),
-          nb::arg("views") = nb::make_tuple(), nb::arg("loss") = "l2",
-          nb::arg("optimiser") = "adam-uniform", nb::arg("step") = 1.0,
-          nb::arg("step_half_life") = 0, nb::arg("smoothing") = 0.08, nb::arg("spp") = nb::none(),
-          nb::arg("loss_spp") = 0, nb::arg("remesh") = nb::make_tuple(),
-          nb::arg("terms") = nb::make_tuple(), nb::arg("seed") = nb::none(), nb::arg("threads") = 0,
-          nb::arg("pyramid") = 1, nb::arg("spp_doubling") = 0, nb::arg("remesh_edge") = 0.75,
-          nb::arg("remesh_shrink") = 0.65, nb::arg("bounds") = nb::dict(),
-          nb::arg("method") = Method(Task::kFit).name(), nb::arg("uniform_pixels") = false,
-          nb::arg("edge_samples") = 1, nb::arg("camera_samples") = BackwardOptions{}.camera_samples,
-          nb::arg("shadow_samples") = BackwardOptions{}.shadow_samples,
-          nb::arg("points") = "random", nb::arg("sampler") = nb::none(),
-          nb::sig(
-              "def __init__(self, scene: Scene, target: numpy.typing.ArrayLike, names: str | "
-              "collections.abc.Sequence[str], mask: numpy.typing.ArrayLike | None = None, "
-              "views: collections.abc.Sequence[tuple[object, ...]] = (), loss: str = 'l2', "
-              "optimiser: str = "
-              "'adam-uniform', step: float = 1, step_half_life: int = 0, smoothing: float = "
-              "0.08, spp: int | None = None, loss_spp: int = 0, remesh: "
-              "collections.abc.Sequence[int] = (), terms: collections.abc.Sequence[str] = (), "
-              "seed: int | None = None, threads: int = 0, pyramid: int = 1, spp_doubling: int = "
-              "0, remesh_edge: float = 0.75, remesh_shrink: float = 0.65, bounds: "
-              "collections.abc.Mapping[str, tuple[float, float]] = {}, method: str = 'forest', "
-              "uniform_pixels: bool = False, edge_samples: int = 1, camera_samples: float = 0, "
-              "shadow_samples: float = 1, points: str = 'random') -> None"),
-          "Copies the scene; it stays as it is.\n\n"
-          "target: (H, W, 3) or (H, W). names: scalars and arrays "
-          "(\"object.vertex_positions\").\n"
-          "mask: weights of the pixels, (H, W). views: further (scene, target) or (scene, target, "
-          "mask) that share the parameters.\n"
-          "loss: \"l2\", \"relative-l2\", \"l1\", over `pyramid` levels, see image_loss. "
-          "optimiser: \"adam-uniform\", \"adam\", "
-          "\"gradient-descent\", or with the method \"analytic\" \"lbfgs\", which takes the loss "
-          "as "
-          "a function without noise.\n"
-          "step: in natural steps (1 % of a shape's diagonal, 0.01 radians, 1 % of a value), half "
-          "as long after each step_half_life steps (0: never).\n"
-          "smoothing: how far a step of a vertex spreads, over the shape's diagonal.\n"
-          "spp: samples per pixel of the gradient, and of each of the loss's two images unless "
-          "loss_spp says otherwise; twice as many after each spp_doubling steps (0: never).\n"
-          "remesh: steps after which vertices get new triangles, with edges remesh_edge times as "
-          "long, steps and smoothing remesh_shrink times what they were.\n"
-          "bounds: {name: (least, most)} that scalars may not leave. method, uniform_pixels, "
-          "edge_samples, camera_samples, shadow_samples: of the gradient, see limn.backward.\n"
-          "points: \"faces\", with the method analytic: losses and gradients of images made of "
-          "their "
-          "visible faces, without samples; lbfgs gets farthest with them.")
+          nb::sig(arguments.method_signature("__init__", "None").c_str()),
+          ("Copies the scene; it stays as it is.\n\n" + arguments.documentation()).c_str())
       .def("step", &step, nb::arg("progress") = nb::none(),
            nb::sig("def step(self, progress: collections.abc.Callable[[float], object] | None = "
                    "None) -> FitRecord"),
@@ -252,33 +231,10 @@ void bind_fit(nb::module_& m) {
                                 done.size() == 1 ? "" : "s", done.back().loss, done.back().error);
            })
       .def_ro("history", &FitHandle::history, "A FitRecord for each step that was done.")
+      .def_prop_ro("scenes", &scenes_of, nb::sig("def scenes(self) -> list[Scene]"),
+                   "Copies of the scenes as they are now, the first one first.")
       .def_prop_ro(
-          "scenes",
-          [](const FitHandle& h) {
-            h.check_idle();
-            nb::list scenes;
-            for (const FitView& view : h.fit.views()) {
-              scenes.append(nb::cast(SceneHandle(deep_copy(view.scene))));
-            }
-            return scenes;
-          },
-          nb::sig("def scenes(self) -> list[Scene]"),
-          "Copies of the scenes as they are now, the first one first.")
-      .def_prop_ro(
-          "values",
-          [](const FitHandle& h) {
-            h.check_idle();
-            std::map<std::string, std::vector<double>> numbers;
-            for (const FitScalar& s : h.fit.scalars()) numbers[s.parameter].push_back(s.value);
-            nb::dict values;
-            for (const FitScalar& s : h.fit.scalars()) {
-              const std::vector<double>& all = numbers[s.parameter];
-              values[nb::cast(s.parameter)] =
-                  all.size() == 1 ? nb::cast(all[0]) : as_array(nb::cast(all), "float64");
-            }
-            return values;
-          },
-          nb::sig("def values(self) -> dict[str, float | numpy.ndarray]"),
+          "values", &values_of, nb::sig("def values(self) -> dict[str, float | numpy.ndarray]"),
           "What is fitted, but for arrays (vertices, texels: see scenes): numbers, colours (3,), "
           "and for "
           "motions the sum of all steps.");

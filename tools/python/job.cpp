@@ -14,7 +14,6 @@ namespace limn::python {
 namespace {
 
 constexpr auto kPoll = std::chrono::milliseconds(50);
-constexpr int kUnlimited = 1 << 30;  // samples per pixel
 
 // A job on a thread, and what came of it.
 class Worker {
@@ -60,34 +59,6 @@ void attend(const nb::object& progress, double done, double& told) {
 }
 
 }  // namespace
-
-FilmPoints to_points(const std::string& name, const std::vector<SampleKeyword>& samples) {
-  const FilmPoints points = film_points(name);
-  if (points == FilmPoints::kRandom) return points;
-  for (const SampleKeyword& keyword : samples) {
-    if (!keyword.given) continue;
-    throw InputError(std::string(keyword.name) + ": points \"" + name + "\" take no samples");
-  }
-  return points;
-}
-
-RunSettings make_settings(const Scene& scene, const RunArguments& arguments) {
-  if (arguments.spp && *arguments.spp < 1) throw InputError("spp must be 1 or more");
-  if (!(arguments.seconds >= 0)) throw InputError("seconds must not be negative");
-  if (arguments.threads < 0 || arguments.threads > 4096) {
-    throw InputError("threads must be 0 (all cores) to 4096");
-  }
-  RunSettings settings;
-  settings.spp = arguments.spp.value_or(scene.sample_count);
-  settings.seed = arguments.seed.value_or(scene.seed);
-  settings.threads = thread_count(arguments.threads);
-  settings.store = arguments.store;
-  if (arguments.seconds == 0) return settings;
-  settings.seconds = arguments.seconds;
-  settings.spp = arguments.spp.value_or(kUnlimited);
-  settings.least_spp = 2;  // for standard errors
-  return settings;
-}
 
 void run_job(RunSettings settings, const nb::object& progress,
              const std::function<void(const RunSettings&)>& job) {

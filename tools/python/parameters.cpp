@@ -116,10 +116,7 @@ void bind_parameter(nb::module_& m) {
       .def("__repr__", repr);
 }
 
-}  // namespace
-
-void bind_parameters(nb::module_& m, nb::class_<SceneHandle>& scene) {
-  bind_parameter(m);
+void bind_mapping(nb::module_& m) {
   nb::class_<ParametersView>(m, "Parameters", "Mapping of names to limn.Parameter.")
       .def("__getitem__",
            [](const ParametersView& v, const std::string& name) { return find(*v.scene, name); })
@@ -161,6 +158,13 @@ void bind_parameters(nb::module_& m, nb::class_<SceneHandle>& scene) {
         for (const std::string& name : names_of(v)) text += "\n  " + name;
         return text;
       });
+}
+
+}  // namespace
+
+void bind_parameters(nb::module_& m, nb::class_<SceneHandle>& scene) {
+  bind_parameter(m);
+  bind_mapping(m);
   scene
       .def_prop_ro(
           "parameters", [](SceneHandle& s) { return ParametersView{&s}; }, nb::keep_alive<0, 1>(),

@@ -3,9 +3,7 @@
 
 #include <fmt/format.h>
 
-#include "limn/core/error.h"
-#include "limn/core/names.h"
-#include "tools/python/bindings.h"
+#include "tools/python/arguments.h"
 
 namespace limn::python {
 
@@ -17,13 +15,6 @@ Estimate to_estimate(const Moments& moments, const Film& film, int64_t spp, doub
           {}};
 }
 
-bool is_exact(const std::string& film) {
-  if (film != "rays" && film != "exact") {
-    throw InputError(unknown_name("film", film, {"exact", "rays"}));
-  }
-  return film == "exact";
-}
-
 namespace {
 
 // numpy's protocol: the values themselves unless another type or a copy is asked for.
@@ -33,47 +24,33 @@ nb::object to_numpy(const Estimate& e, const nb::object& dtype, const nb::object
   return copy.is_none() || !nb::cast<bool>(copy) ? value : value.attr("copy")();
 }
 
-void show(const std::string& what, std::shared_ptr<const Scene>& scene, RenderOptions& options) {
-  if (what == "ao") {
-    options.what = RenderWhat::kAmbientOcclusion;
-  } else if (what == "openness") {
-    options.what = RenderWhat::kOpenness;
-  } else if (what == "direct") {
-    auto direct = std::make_shared<Scene>(*scene);
-    direct->max_depth = 2;
-    scene = std::move(direct);
-  } else if (what != "image") {
-    throw InputError(unknown_name("what", what, {"image", "direct", "ao", "openness"}));
-  }
-}
-
-Estimate render_scene(const SceneHandle& handle, std::optional<int> spp,
-                      std::optional<uint64_t> seed, int threads, const nb::object& progress,
-                      const std::string& method, const std::string& film,
-                      const std::string& generator, const std::string& what, int lines,
-                      double tolerance, int rays, const std::string& points, BatchStore* store,
-                      const nb::object& sampler) {
-  refuse_sampler(sampler, "generator: \"sobol\" or \"independent\"");
+struct RenderCall {
+  const SceneHandle* scene = nullptr;
   RenderOptions options;
-  options.points = to_points(
-      points, {{"spp", spp.has_value()}, {"generator", generator != RenderOptions().generator}});
-  options.method = to_method(method, Task::kImage);
-  options.exact_film = is_exact(film);
-  options.generator = generator;
-  options.lines = lines;
-  options.tolerance = tolerance;
-  options.rays = rays;
-  auto scene = handle.share();
-  show(what, scene, options);
-  RenderResult result;
-  run_job(make_settings(*scene, {spp, seed, 0, threads, store}), progress,
-          [&](const RunSettings& settings) { result = render(*scene, settings, options); });
-  Estimate image = to_estimate(result.radiance, scene->film, result.spp, result.seconds);
-  image.warnings = result.warnings;
-  warn_all(result.warnings);
-  check_finite(result.non_finite, nb::cast(image));
-  return image;
-}
+  RunRequest request;
+  nb::object progress = nb::none();
+
+  void take(Arguments& a) {
+    add_scene(a, scene);
+    add_run(a, request, progress);
+    visit_options(options, a);
+    a.add_former("sampler", "generator: \"sobol\" or \"independent\"");
+    add_store(a, request);
+  }
+
+  Estimate run(const Arguments& given) const {
+    given.refuse_samples(options.points, {"spp"});
+    const auto shared = scene->share();
+    RenderResult result;
+    run_job(settings_of(request, *shared), progress,
+            [&](const RunSettings& settings) { result = render(*shared, settings, options); });
+    Estimate image = to_estimate(result.radiance, shared->film, result.spp, result.seconds);
+    image.warnings = result.warnings;
+    warn_all(result.warnings);
+    check_finite(result.non_finite, nb::cast(image));
+    return image;
+  }
+};
 
 // What arrays do, done to the value: an Estimate may stand wherever its mean is meant.
 struct Operator {
@@ -159,46 +136,15 @@ void bind_render(nb::module_& m) {
         }
         return fmt::format("<limn.Estimate: ({}), {} spp, {:.3g} s>", shape, e.spp, e.seconds);
       });
-  m.def(
-      "render", render_scene, nb::arg("scene"), nb::arg("spp") = nb::none(),
-      nb::arg("seed") = nb::none(), nb::arg("threads") = 0, nb::arg("progress") = nb::none(),
-      nb::arg("method") = "path", nb::arg("film") = "rays",
-      nb::arg("generator") = RenderOptions().generator, nb::arg("what") = "image",
-      nb::arg("lines") = 64, nb::arg("tolerance") = 0.0, nb::arg("rays") = 4,
-      nb::arg("points") = "random", nb::arg("_store").none() = nb::none(),
-      nb::arg("sampler") = nb::none(),
-      nb::sig(
-          "def render(scene: Scene, spp: int | None = None, seed: int | None = None, threads: "
-          "int = 0, progress: collections.abc.Callable[[float], object] | None = None, method: "
-          "str = 'path', film: str = 'rays', generator: str = 'independent', what: str = 'image', "
-          "lines: int = 64, tolerance: float = 0.0, rays: int = 4, points: str = 'random') -> "
-          "Estimate"),
+  def<RenderCall>(
+      m, "render", "Estimate",
       "The image of a scene: linear RGB radiance, (H, W, 3).\n\n"
-      "spp, seed: of the scene's file if None. threads: 0 for all cores; they change no bit.\n"
-      "progress: called with the fraction done. Ctrl-C raises KeyboardInterrupt; samples that are "
-      "not finite raise limn.NonFiniteError.\n"
-      "method: \"path\", or \"analytic\": direct light of flat lamps on diffuse surfaces in closed "
-      "form; \"lines\" and \"rays\": what the camera sees looks around, by lines between "
-      "silhouettes or by rays; \"silhouettes\": by what a pilot finds to be better, part by part "
-      "of "
-      "the image.\n"
-      "what: \"image\", \"direct\" (direct light alone), \"ao\" and \"openness\" (of the sky; "
-      "silhouettes, lines and rays). lines, tolerance: of lines and silhouettes, through the sky "
-      "(a "
-      "quarter through a lamp), doubled until halves differ by twice this part of the result (0: "
-      "never; above it silhouettes takes lines alone). rays: of the method rays, from each point "
-      "for "
-      "each lamp and the sky.\n"
-      "film: \"rays\", or \"exact\": what every pixel sees by its exact visible regions (box "
-      "filter).\n"
-      "generator: \"independent\", or \"sobol\", Owen-scrambled Sobol' points: a third of the "
-      "squared error, "
-      "mostly, but stderr is then neither the error nor a bound of it (compare images of several "
-      "seeds instead). silhouettes, lines and rays always have even numbers.\n"
-      "points: of analytic, \"random\", or \"faces\": a pixel is made of the faces that it shows, "
-      "without samples and noise (stderr is 0), and its image has an exact derivative: that of "
-      "limn.gradient, limn.image_loss, limn.backward and limn.Fit with the same points (box "
-      "filter).");
+      "Samples that are not finite raise limn.NonFiniteError. With the generator \"sobol\" stderr "
+      "is "
+      "neither the error nor a bound of it: compare images of several seeds instead. With points "
+      "\"faces\" an image has no noise (stderr is 0) and an exact derivative: that of "
+      "limn.gradient, "
+      "limn.image_loss, limn.backward and limn.Fit with the same points.");
 }
 
 }  // namespace limn::python

@@ -14,7 +14,4 @@ class FieldError : public InputError {
   std::string field, message;
 };
 
-// FieldError unless least <= value <= most; not a number is outside.
-void check_range(const std::string& field, double value, double least, double most);
-
 }  // namespace limn

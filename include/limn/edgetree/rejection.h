@@ -12,13 +12,13 @@ namespace limn {
 
 // The outcome for a node. True or false: whether the verdict agrees with the exact test of its
 // edges. kMissed: rejected although it holds an edge of E(p), an error of the sampler.
-enum class Verdict : uint8_t { kTrueReject, kTrueAccept, kFalseAccept, kMissed };
+enum class NodeVerdict : uint8_t { kTrueReject, kTrueAccept, kFalseAccept, kMissed };
 inline constexpr int kVerdicts = 4;
 using VerdictCounts = std::array<uint64_t, kVerdicts>;
 
 // Applies the node's own test, regardless of its ancestors.
-Verdict judge(const EdgeSamplerInput& input, const RejectionTree& tree, uint32_t node,
-              const Vec3d& p);
+NodeVerdict judge(const EdgeSamplerInput& input, const RejectionTree& tree, uint32_t node,
+                  const Vec3d& p);
 
 // A square of points: center + a * right + b * up with a, b in [-1, 1]; b = 1 is the top.
 struct Slice {
@@ -30,9 +30,9 @@ struct Slice {
   }
 };
 // Verdicts at the pixel centers, row 0 on top.
-std::vector<Verdict> judge_slice(const EdgeSamplerInput& input, const RejectionTree& tree,
-                                 uint32_t node, const Slice& slice, int threads);
-VerdictCounts count(std::span<const Verdict> verdicts);
+std::vector<NodeVerdict> judge_slice(const EdgeSamplerInput& input, const RejectionTree& tree,
+                                     uint32_t node, const Slice& slice, int threads);
+VerdictCounts count(std::span<const NodeVerdict> verdicts);
 
 // Counts of nodes at one depth. A node is tested if its parent was accepted.
 struct DepthCounts {

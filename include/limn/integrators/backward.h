@@ -112,8 +112,7 @@ enum class LossKind {
   kL1,  // |I - T|: its adjoint sign(I - T) is biased where the noise of I is not small beside
         // I - T
 };
-// InputError that lists the known names (l2, relative-l2, l1) if there is none of this name.
-LossKind loss_kind(const std::string& name);
+inline constexpr const char* kLosses[] = {"l2", "relative-l2", "l1"};  // by their numbers
 
 struct LossResult {
   double value = 0;  // may be negative where the loss is near zero: it is unbiased, but for l1
@@ -122,8 +121,12 @@ struct LossResult {
   int64_t spp = 0;   // of each of the two images; 0: interrupted before there was one
 };
 
-// What a loss is told from.
-struct LossImages {
+struct LossOptions {
+  LossKind kind = LossKind::kL2;
+  // Of a pyramid: the mean over the loss of the images as they are, at half the size, a quarter, ...
+  // The coarse levels tell a shape far away where to go, and noise less. Their pixels are means of
+  // those below, weighed by the mask; so what is unbiased stays so.
+  int levels = 1;
   Method method{Task::kImage};              // of render(), but for those that look around
   FilmPoints points = FilmPoints::kRandom;  // of faces there is one image
   // One image in place of two, of the samples of settings.seed: those that backward() takes, too,
@@ -143,14 +146,10 @@ Method loss_method(const Method& backward);
 // settings.seed itself is independent of both, so that the product of both is unbiased. target:
 // crop_height by crop_width, of three channels or one. mask: what the pixels weigh in the mean, of
 // the same size with one channel, or three that are alike; without pixels: all alike.
-// levels: of a pyramid, the mean over the loss of the images as they are, at half the size, a
-// quarter, ...: the coarse ones tell a shape far away where to go, and noise less. Pixels of coarse
-// levels are means of those below, weighed by the mask; so what is unbiased stays so.
 // InputError as check_loss_images(), for other methods, and for fewer levels than 1 or more than
 // most_pyramid_levels(). settings.seconds: of each image, with half of the set-up.
-LossResult image_loss(const Scene& scene, const Image& target, LossKind kind,
-                      const RunSettings& settings, const Image& mask = {}, int levels = 1,
-                      const LossImages& of = {});
+LossResult image_loss(const Scene& scene, const Image& target, const LossOptions& options,
+                      const RunSettings& settings, const Image& mask = {});
 // Down to one pixel.
 int most_pyramid_levels(const Scene& scene);
 

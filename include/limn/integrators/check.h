@@ -17,6 +17,7 @@ struct CheckOptions {
   std::optional<SampleCounts> samples = SampleCounts{};  // of the gradient
   WarpOptions warp;
   bool exact_film = false;  // of the gradient, see GradientOptions; differences take rays
+  FilmPoints points = FilmPoints::kRandom;  // faces: for check_faces() alone
 };
 
 // A disagreement needs a p-value below kCheckStageLevel in two runs of their own, the second one in

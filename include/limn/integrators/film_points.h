@@ -16,8 +16,6 @@ enum class FilmPoints {
   kFaces
 };
 inline constexpr const char* kFilmPoints[] = {"random", "faces"};  // by their numbers
-// InputError that lists the known names if there is none of this name.
-FilmPoints film_points(const std::string& name);
 inline const char* name_of(FilmPoints points) { return kFilmPoints[static_cast<int>(points)]; }
 
 // InputError for others than random where light is not in closed form. method: the one asked for.

@@ -38,9 +38,8 @@ enum class OptimiserKind {
   // as steps go on.
   kLbfgs,
 };
-// InputError that lists the known names (adam-uniform, adam, gradient-descent, lbfgs) if there is
-// none of this name.
-OptimiserKind optimiser_kind(const std::string& name);
+inline constexpr const char* kOptimisers[] = {"adam-uniform", "adam", "gradient-descent",
+                                              "lbfgs"};  // by their numbers
 
 struct FitView {
   Scene scene;

@@ -23,13 +23,15 @@ struct RenderResult {
 
 // What an image shows.
 enum class RenderWhat {
-  kImage,  // radiance [W / (m^2 sr)]
+  kImage,   // radiance [W / (m^2 sr)]
+  kDirect,  // of light that was scattered once at most: by paths of two segments
   // Of what the camera sees, the part of the sky that nothing hides, weighed by the cosine to the
   // shading normal over pi, and unweighed over 2 pi, both over the half sphere above the face; 1
   // where the camera sees the sky. The same in all channels. By methods that look around alone.
   kAmbientOcclusion,
   kOpenness
 };
+inline constexpr const char* kRenderWhat[] = {"image", "direct", "ao", "openness"};
 
 // Where the random numbers of a pixel's samples come from. The first is what `limn render` takes,
 // the second that of RenderOptions and Python, where variances are asked for.

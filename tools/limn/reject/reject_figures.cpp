@@ -16,7 +16,7 @@ double share(uint64_t part, uint64_t whole) {
   return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0;
 }
 
-uint64_t of(const VerdictCounts& counts, Verdict verdict) {
+uint64_t of(const VerdictCounts& counts, NodeVerdict verdict) {
   return counts[static_cast<int>(verdict)];
 }
 uint64_t points_of(const VerdictCounts& counts) {
@@ -33,10 +33,10 @@ json slices_json(const RejectVariant& variant) {
   for (size_t i = 0; i < variant.slices.size(); ++i) {
     const VerdictCounts& counts = variant.slices[i];
     slices.push_back({{"picture", slice_file(variant.name, i)},
-                      {"true_reject", of(counts, Verdict::kTrueReject)},
-                      {"true_accept", of(counts, Verdict::kTrueAccept)},
-                      {"false_accept", of(counts, Verdict::kFalseAccept)},
-                      {"missed", of(counts, Verdict::kMissed)},
+                      {"true_reject", of(counts, NodeVerdict::kTrueReject)},
+                      {"true_accept", of(counts, NodeVerdict::kTrueAccept)},
+                      {"false_accept", of(counts, NodeVerdict::kFalseAccept)},
+                      {"missed", of(counts, NodeVerdict::kMissed)},
                       {"points", points_of(counts)}});
   }
   return slices;
@@ -65,8 +65,8 @@ void print_summary(std::span<const RejectVariant> variants) {
   for (const RejectVariant& v : variants) {
     fmt::print("{:<16} {:>6}", v.name, v.node.end - v.node.begin);
     for (const VerdictCounts& counts : v.slices)
-      for (const Verdict verdict :
-           {Verdict::kTrueReject, Verdict::kTrueAccept, Verdict::kFalseAccept})
+      for (const NodeVerdict verdict :
+           {NodeVerdict::kTrueReject, NodeVerdict::kTrueAccept, NodeVerdict::kFalseAccept})
         fmt::print(" {:7.2f}", 100 * share(of(counts, verdict), points_of(counts)));
     fmt::print(" {:>8} {:>7} {:>8} {:8.2f}  {:.4f} +- {:.4f}\n", v.reach.silhouettes.size(),
                v.reach.false_accepts.size(), v.reach.false_positives.size(),
@@ -99,7 +99,7 @@ void print_depths(std::span<const RejectVariant> variants) {
 
 uint64_t RejectVariant::missed() const {
   uint64_t sum = counts.missed + reach.missed.size();
-  for (const VerdictCounts& slice : slices) sum += of(slice, Verdict::kMissed);
+  for (const VerdictCounts& slice : slices) sum += of(slice, NodeVerdict::kMissed);
   for (const DepthCounts& depth : counts.by_depth) sum += depth.missed;
   return sum;
 }

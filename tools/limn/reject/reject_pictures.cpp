@@ -17,7 +17,7 @@ constexpr uint32_t kCutColor = 0x39424a;
 // Strokes are given for pictures of this many pixels.
 double stroke(double width, int size) { return width * std::max(size, 256) / 768; }
 
-Color verdict_color(Verdict verdict) { return srgb(kVerdictColors[static_cast<int>(verdict)]); }
+Color verdict_color(NodeVerdict verdict) { return srgb(kVerdictColors[static_cast<int>(verdict)]); }
 
 PixelPoint place_on(const Slice& slice, const Vec3d& x) {
   const Vec3d w = x - slice.center;
@@ -68,7 +68,7 @@ std::vector<FaceId> faces_around(const EdgeMesh& mesh, std::span<const EdgeRef> 
 class SlicePainter {
  public:
   SlicePainter(const Subject& subject, const RejectionTree& tree, uint32_t node, const Slice& slice,
-               const std::vector<Verdict>& verdicts)
+               const std::vector<NodeVerdict>& verdicts)
       : subject_(subject), tree_(tree), node_(node), slice_(slice), verdicts_(verdicts) {}
 
   Image paint() const {
@@ -86,12 +86,12 @@ class SlicePainter {
  private:
   static constexpr int kPointsPerSide = 4;
 
-  Verdict at(int x, int y) const { return verdicts_[static_cast<size_t>(y) * slice_.size + x]; }
-  bool differs(int x, int y, Verdict verdict) const {
+  NodeVerdict at(int x, int y) const { return verdicts_[static_cast<size_t>(y) * slice_.size + x]; }
+  bool differs(int x, int y, NodeVerdict verdict) const {
     return x >= 0 && y >= 0 && x < slice_.size && y < slice_.size && at(x, y) != verdict;
   }
   bool borders(int x, int y) const {
-    const Verdict own = at(x, y);
+    const NodeVerdict own = at(x, y);
     return differs(x - 1, y, own) || differs(x + 1, y, own) || differs(x, y - 1, own) ||
            differs(x, y + 1, own);
   }
@@ -119,7 +119,7 @@ class SlicePainter {
   const RejectionTree& tree_;
   uint32_t node_;
   const Slice& slice_;
-  const std::vector<Verdict>& verdicts_;
+  const std::vector<NodeVerdict>& verdicts_;
 };
 
 // A pane's colour and opacity where a ray crosses it.
@@ -137,15 +137,15 @@ std::optional<Crossing> cross_pane(const PlacedSlice& pane, const Ray& ray) {
   if (!(at.x >= 0 && at.y >= 0 && at.x < slice.size && at.y < slice.size)) return std::nullopt;
   const double rim = std::min(std::min(at.x, at.y), slice.size - std::max(at.x, at.y));
   if (rim < 0.006 * slice.size) return Crossing{t, srgb(kCutColor), 0.9};
-  const Verdict verdict =
+  const NodeVerdict verdict =
       pane.verdicts[static_cast<size_t>(at.y) * slice.size + static_cast<size_t>(at.x)];
-  return Crossing{t, verdict_color(verdict), verdict == Verdict::kTrueReject ? 0.35 : 0.7};
+  return Crossing{t, verdict_color(verdict), verdict == NodeVerdict::kTrueReject ? 0.35 : 0.7};
 }
 
 }  // namespace
 
 Image slice_picture(const Subject& subject, const RejectionTree& tree, uint32_t node,
-                    const Slice& slice, const std::vector<Verdict>& verdicts) {
+                    const Slice& slice, const std::vector<NodeVerdict>& verdicts) {
   Image image = SlicePainter(subject, tree, node, slice, verdicts).paint();
   const Mesh& mesh = subject.scene.shapes[0].mesh;
   std::vector<FaceId> all;
@@ -173,7 +173,7 @@ Image reach_picture(const MeshView& view, Image clay, const EdgeMesh& edges, con
   draw(reach.false_positives, 1.8, kDeadEndColor, 0.15);
   draw(reach.false_accepts, 2.6, kFalseAcceptColor, 0.15);
   draw(reach.silhouettes, 4.0, kSilhouetteColor, 0.3);
-  draw(reach.missed, 6.0, kVerdictColors[static_cast<int>(Verdict::kMissed)], 1);
+  draw(reach.missed, 6.0, kVerdictColors[static_cast<int>(NodeVerdict::kMissed)], 1);
   Layer rim(size, size), dot(size, size);
   rim.disc(view.project(p), stroke(22, size));
   dot.disc(view.project(p), stroke(16, size));

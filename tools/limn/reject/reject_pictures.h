@@ -24,7 +24,7 @@ struct Subject {
 // The verdicts over a slice (judge_slice), smoothed along their borders, with the cut through the
 // mesh; the cut through faces around the node's edges is thick.
 Image slice_picture(const Subject& subject, const RejectionTree& tree, uint32_t node,
-                    const Slice& slice, const std::vector<Verdict>& verdicts);
+                    const Slice& slice, const std::vector<NodeVerdict>& verdicts);
 
 // All that descents from p can meet; what the mesh hides is faint. clay: view.picture().
 Image reach_picture(const MeshView& view, Image clay, const EdgeMesh& edges, const Reach& reach,
@@ -33,7 +33,7 @@ Image reach_picture(const MeshView& view, Image clay, const EdgeMesh& edges, con
 // A slice with its picture's colours, placed in space.
 struct PlacedSlice {
   Slice slice;
-  std::vector<Verdict> verdicts;
+  std::vector<NodeVerdict> verdicts;
 };
 // The mesh, the edges of the node, and the slices as panes.
 Image overview_picture(const MeshView& view, const EdgeMesh& mesh, std::span<const EdgeRef> edges,

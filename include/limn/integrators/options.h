@@ -1,0 +1,199 @@
+#pragma once
+// The options of runs: one row for each field, with its name, range and help. What the command line
+// takes, the arguments and documentation of Python's functions, the checks of ranges and the JSON
+// of fits are made from these rows.
+#include <limits>
+
+#include "limn/integrators/check.h"
+#include "limn/integrators/fit.h"
+#include "limn/integrators/gradient.h"
+#include "limn/integrators/option.h"
+#include "limn/integrators/render.h"
+
+namespace limn {
+
+inline constexpr const char* kFilms[] = {"rays", "exact"};
+inline constexpr const char* kPixels[] = {"adjoint", "uniform"};
+
+inline constexpr Option kPointsOption = choice(
+    "points", kFilmPoints,
+    "Points at which the method analytic evaluates light. random: random points of each pixel. "
+    "faces: one point per visible face of each pixel, weighted by its visible area. Faces has no "
+    "noise and needs a box filter; its gradient is exact for its own image, which ignores how "
+    "light varies within a pixel's part of a face");
+inline constexpr Option kFilmOption = choice(
+    "film", kFilms,
+    "Visibility from the camera (in gradients, of the edges that it sees): by rays, or by the "
+    "exact visible regions of every pixel, which needs a box filter");
+inline constexpr Option kGeneratorOption =
+    choice("generator", kGenerators,
+           "Sample generator: Owen-scrambled Sobol' points (a third of the squared error, mostly, "
+           "but no standard errors), or independent random numbers")
+        .samples();
+inline constexpr Option kLossOption = choice("loss", kLosses, "Loss: l2, relative-l2 or l1");
+inline constexpr Option kPyramidOption{
+    "pyramid",
+    "Levels of an image pyramid, each half as large as the one before. The loss is the mean over "
+    "the levels",
+    1, 32};
+
+// What is asked of a run; the scene's file says the rest.
+struct RunRequest {
+  std::optional<int> spp;
+  std::optional<uint64_t> seed;
+  int threads = 0;     // 0: all cores
+  double seconds = 0;  // 0: no limit; else as many samples as fit, spp at most if that is given
+  BatchStore* store = nullptr;
+};
+// FieldError for numbers out of range.
+RunSettings settings_of(const RunRequest& request, const Scene& scene);
+
+void visit_options(Like<RunRequest> auto& o, auto&& visit) {
+  visit(o.spp, Option{"spp", "Samples per pixel (default: sample_count of the scene's sampler)", 1,
+                      1 << 30}
+                   .samples());
+  visit(o.seed, Option{"seed", "Seed of the random numbers (default: seed of the scene's sampler)",
+                       0, std::numeric_limits<uint64_t>::max()});
+  visit(o.threads, Option{"threads", "Number of threads", 1, 4096}.or_zero("all cores"));
+  visit(o.seconds,
+        Option{"seconds", "Time budget in seconds, set-up included, instead of `spp`", 1e-6L, 1e7L}
+            .or_zero("none")
+            .typed("SECONDS")
+            .samples());
+}
+
+void visit_options(Like<WarpOptions> auto& o, auto&& visit) {
+  visit(o.rays, Option{"aux",
+                       "Auxiliary rays per direction (method was): an even number. More rays "
+                       "reduce the bias",
+                       2, 1 << 20}
+                    .typed("N"));
+  visit(o.kappa, Option{"kappa",
+                        "Concentration K of the kernel of auxiliary rays, which is K^(-1/2) "
+                        "radians wide (method was)",
+                        1, 1e12L}
+                     .typed("K"));
+}
+
+void visit_options(Like<RenderOptions> auto& o, auto&& visit) {
+  visit(o.method, method_option(Task::kImage));
+  visit(o.what, choice("what", kRenderWhat,
+                       "What the image shows: all light (image), direct light, ambient occlusion "
+                       "(ao) or openness of the sky. The last two need the method silhouettes, "
+                       "lines or rays"));
+  visit(o.lines, Option{"lines",
+                        "Methods silhouettes and lines: lines through the sky per point; each area "
+                        "light gets a quarter as many",
+                        1, 1 << 14});
+  visit(o.tolerance, Option{"tolerance",
+                            "Methods silhouettes and lines: double the lines until two halves "
+                            "differ by at most twice this share of the result (0: never)",
+                            0, 1});
+  visit(o.rays, Option{"rays", "Method rays: rays per point for the sky and for each area light", 1,
+                       1 << 20});
+  visit(o.generator, kGeneratorOption);
+  visit(o.exact_film, kFilmOption);
+  visit(o.points, kPointsOption);
+}
+
+void visit_options(Like<GradientOptions> auto& o, auto&& visit) {
+  visit(o.method, method_option(Task::kGradient));
+  visit(o.terms, terms_option(Task::kGradient));
+  visit(o.step, step_option("Step of finite differences (method fd), in the parameter's unit"));
+  visit_options(o.warp, visit);
+  visit(o.exact_film, kFilmOption);
+  visit(o.points, kPointsOption);
+}
+
+void visit_options(Like<CheckOptions> auto& o, auto&& visit) {
+  visit(o.method, method_option(Task::kGradient));
+  visit(o.terms, terms_option(Task::kGradient));
+  visit(o.step, step_option("Step of the finite differences, in the parameter's unit"));
+  visit(o.block,
+        Option{"block", "Spacing in pixels of the windows whose sums are compared", 1, 1 << 20}
+            .or_zero("an eighth of the longer side, at least 4")
+            .samples());
+  visit_options(o.warp, visit);
+  visit(o.exact_film, kFilmOption);
+  visit(o.points, kPointsOption);
+}
+
+void visit_options(Like<BackwardOptions> auto& o, auto&& visit, Task task = Task::kBackward) {
+  visit(o.method, method_option(task));
+  visit(o.terms, terms_option(task));
+  visit(o.uniform_pixels,
+        choice("pixels", kPixels,
+               "Pixels in which paths start: adjoint (more where the loss depends more on the "
+               "pixel) or uniform")
+            .with(&Option::flag, "uniform_pixels")
+            .samples());
+  visit(o.points, kPointsOption);
+  visit(o.edge_samples,
+        Option{"edge_samples", "Boundary samples per path vertex", 1, 1 << 16}.samples());
+  visit(o.camera_samples,
+        Option{"camera_samples", "Boundary samples on the film per path (term camera)", 1e-6L,
+               1 << 16}
+            .or_zero("0.25, 1 with the method analytic")
+            .samples());
+  visit(o.shadow_samples,
+        Option{"shadow_samples",
+               "Boundary samples on the edges of visible shadows per path (terms shadow and "
+               "penumbra)",
+               1e-6L, 1 << 16}
+            .samples());
+  if (task == Task::kFit) return;
+  visit(o.batches, Option{"batches",
+                          "Most batches, from which standard errors come; each takes some time per "
+                          "vertex",
+                          1, 1 << 16}
+                       .samples());
+}
+
+void visit_options(Like<LossOptions> auto& o, auto&& visit) {
+  visit(o.kind, kLossOption);
+  visit(o.levels, kPyramidOption);
+  visit(o.method, method_option(Task::kImage));
+  visit(o.points, kPointsOption);
+}
+
+void visit_options(Like<FitOptions> auto& o, auto&& visit) {
+  visit(o.loss, kLossOption);
+  visit(o.pyramid, kPyramidOption);
+  visit(o.optimiser,
+        choice("optimiser", kOptimisers,
+               "Optimiser: adam-uniform (Adam with one scale for all vertices of a shape), adam, "
+               "gradient-descent, or lbfgs, which needs a loss without noise (the method "
+               "analytic)"));
+  visit(o.step, Option{"step",
+                       "Length of the first step in natural steps: 1 % of a shape's diagonal, 0.01 "
+                       "radians, 1 % of a value",
+                       1e-12L, 1e12L});
+  visit(o.step_half_life,
+        Option{"step_half_life", "Halve the step length every so many steps", 1, 1 << 30}.or_zero(
+            "never"));
+  visit(o.smoothing, Option{"smoothing",
+                            "How far the step of a vertex spreads over the mesh, as a share of the "
+                            "shape's diagonal (0: no smoothing)",
+                            0, 100});
+  visit(o.remesh, Option{"remesh", "Steps after which optimised meshes are remeshed, as in 100,200",
+                         1, 1 << 30});
+  visit(o.remesh_edge,
+        Option{"remesh_edge", "Edge length after remeshing, relative to the mean length before",
+               0.1L, 10});
+  visit(o.remesh_shrink,
+        Option{"remesh_shrink", "Factor on the lengths of steps and smoothing after each remeshing",
+               0.01L, 1});
+  visit(o.loss_spp, Option{"loss_spp",
+                           "Samples per pixel of each of the two images from which the loss is "
+                           "computed",
+                           1, 1 << 30}
+                        .or_zero("`spp`")
+                        .samples());
+  visit(o.spp_doubling,
+        Option{"spp_doubling", "Double the samples per pixel every so many steps", 1, 1 << 30}
+            .or_zero("never")
+            .samples());
+  visit_options(o.backward, visit, Task::kFit);
+}
+
+}  // namespace limn
