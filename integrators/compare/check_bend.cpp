@@ -10,8 +10,8 @@
 namespace limn {
 namespace {
 
-// (I(reach) - I(0)) / reach in batches, with negative reach on the side before: a central difference
-// around half the way. No batches if the run was interrupted.
+// (I(reach) - I(0)) / reach in batches, with negative reach on the side before: a central
+// difference around half the way. No batches if the run was interrupted.
 std::vector<Moments::Batch> slope_of_blocks(const Scene& scene, const std::string& name,
                                             double reach, int block, const RunSettings& settings) {
   const DifferenceJob job{name, {0.5 * std::fabs(reach)}, {{1}}};

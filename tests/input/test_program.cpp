@@ -603,7 +603,7 @@ TEST_F(Program, ShowsRejection) {
   const Outcome outcome =
       run("reject " + mesh + " --no-report --size 32 --points 8 --node-edges 40 -o " + folder);
   EXPECT_EQ(outcome.status, 0) << outcome.text;
-  EXPECT_NE(outcome.text.find("hit rate"), std::string::npos) << outcome.text;
+  EXPECT_NE(outcome.text.find("acceptance rate"), std::string::npos) << outcome.text;
   const nlohmann::json report = read_json(folder + "/reject.json");
   EXPECT_EQ(report["kind"], "reject");
   EXPECT_EQ(report["edges"], 3 * 16 * 8);

@@ -187,18 +187,13 @@ class CheckCommand final : public Command {
       }
       options_.parameter = parameter;
       const CheckResult r = check(scene, options_, settings);
-      if (r.interrupted) {
-        fmt::print(stderr, "interrupted: no verdict\n");
-        return kInterrupted;
-      }
+      if (r.interrupted) return no_verdict();
       warnings_.add_all(r.gradient.warnings);
       print_check(parameter, r, settings.spp);
       report.push_back(figures_json(parameter, kFilms[options_.exact_film], r, settings.spp));
       report.back()["sensor"] = sensor_name(scene);
       report.back()["warnings"] = warnings_.lines();
-      // What is wrong comes before what is not known.
-      if (r.verdict == Verdict::kDisagree) status = kDisagree;
-      if (r.verdict == Verdict::kCannotTell && status == kSuccess) status = kCannotTell;
+      add_verdict(r.verdict, status);
       NonFinite bad = r.gradient.non_finite;
       bad.merge(r.differences.non_finite);
       if (const int s = finish_status(bad, settings.spp, settings.spp, "")) status = s;
@@ -208,6 +203,16 @@ class CheckCommand final : public Command {
   }
 
  private:
+  static int no_verdict() {
+    fmt::print(stderr, "interrupted: no verdict\n");
+    return kInterrupted;
+  }
+  // What is wrong comes before what is not known.
+  static void add_verdict(Verdict verdict, int& status) {
+    if (verdict == Verdict::kDisagree) status = kDisagree;
+    if (verdict == Verdict::kCannotTell && status == kSuccess) status = kCannotTell;
+  }
+
   int run_faces(const Scene& scene) {
     json report = json::array();
     int status = kSuccess;
@@ -215,10 +220,7 @@ class CheckCommand final : public Command {
       options_.parameter = parameter;
       const FacesCheck r =
           check_faces(scene, options_, make_settings(common_, scene, "check " + parameter));
-      if (r.interrupted) {
-        fmt::print(stderr, "interrupted: no verdict\n");
-        return kInterrupted;
-      }
+      if (r.interrupted) return no_verdict();
       warnings_.add_all(r.gradient.warnings);
       fmt::print(
           "{}: sum over the image: gradient {:.8g}, differences {:.8g} (step {:.3g})\n"
@@ -237,8 +239,7 @@ class CheckCommand final : public Command {
                         {"known", number(r.known)},
                         {"sensor", sensor_name(scene)},
                         {"warnings", warnings_.lines()}});
-      if (r.verdict == Verdict::kDisagree) status = kDisagree;
-      if (r.verdict == Verdict::kCannotTell && status == kSuccess) status = kCannotTell;
+      add_verdict(r.verdict, status);
       if (const int s = finish_status(r.non_finite, 1, 1, "")) status = s;
     }
     write_json(common_.json, report.dump(2));
@@ -257,10 +258,7 @@ class CheckCommand final : public Command {
     options.method = reverse_method();
     const RunSettings settings = make_settings(common_, scene, "check --reverse");
     const std::vector<ReverseCheck> checks = check_reverse(scene, options, settings);
-    if (checks.empty()) {
-      fmt::print(stderr, "interrupted: no verdict\n");
-      return kInterrupted;
-    }
+    if (checks.empty()) return no_verdict();
     json report = json::array();
     bool agree = true;
     for (const ReverseCheck& c : checks) {

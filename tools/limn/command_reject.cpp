@@ -25,7 +25,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kDraws = 100;  // per point, for the hit rate
+constexpr int kDraws = 100;  // per point, for the acceptance rate
 
 json to_json(const Vec3d& v) { return {v.x, v.y, v.z}; }
 

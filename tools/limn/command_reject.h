@@ -21,7 +21,7 @@ struct RejectCommand {
   std::optional<Vec3d> view;  // from the mesh towards the camera
   Vec3d up{0, 1, 0};
   int size = 768;    // of pictures, pixels
-  int points = 400;  // for the counts by depth and the hit rate
+  int points = 400;  // for the counts by depth and the acceptance rate
   bool report = true;
   std::string command_line;
 };

@@ -123,9 +123,9 @@ struct LossResult {
 
 struct LossOptions {
   LossKind kind = LossKind::kL2;
-  // Of a pyramid: the mean over the loss of the images as they are, at half the size, a quarter, ...
-  // The coarse levels tell a shape far away where to go, and noise less. Their pixels are means of
-  // those below, weighed by the mask; so what is unbiased stays so.
+  // Of a pyramid: the mean over the loss of the images as they are, at half the size, a quarter,
+  // and so on. The coarse levels tell a shape far away where to go, and noise less. Their pixels
+  // are means of those below, weighed by the mask; so what is unbiased stays so.
   int levels = 1;
   Method method{Task::kImage};              // of render(), but for those that look around
   FilmPoints points = FilmPoints::kRandom;  // of faces there is one image

@@ -61,7 +61,7 @@ void print_summary(std::span<const RejectVariant> variants) {
       "{:<16} {:>6} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>8} {:>7} {:>8} {:>8}  {}\n";
   fmt::print(kHead, "", "node's", "slice 0 (%)", "slice 1 (%)", "one point: edges", "reached/",
              "method", "edges", "reject", "accept", "false", "reject", "accept", "false", "silhou.",
-             "false", "dead end", "silhou.", "hit rate");
+             "false", "positive", "silhou.", "acceptance rate");
   for (const RejectVariant& v : variants) {
     fmt::print("{:<16} {:>6}", v.name, v.node.end - v.node.begin);
     for (const VerdictCounts& counts : v.slices)

@@ -58,7 +58,7 @@ class _Render(torch.autograd.Function):
             scene[name] = tensor.detach().to("cpu", torch.float64).numpy()
         ctx.run = _Held(scene), names, spp_grad, 2 * seed + 1, threads
         ctx.save_for_backward(*tensors)
-        return torch.from_numpy(_render(scene, spp, 2 * seed, threads).value)
+        return torch.from_numpy(_render(scene, spp, 2 * seed, threads=threads).value)
 
     @staticmethod
     @torch.autograd.function.once_differentiable
