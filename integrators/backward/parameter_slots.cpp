@@ -198,8 +198,9 @@ void ParameterSlots::add_values(const Scene& scene) {
         slot_of[k] = slots_.camera + static_cast<uint32_t>(k);
       }
       if (slot_of[k] == 0) slot_of[k] = take(1);
-      // The channels of a colour are the values that it moves, in their order.
-      const size_t number = parameters_[i].colour ? dependences_[i].weights.size() : 0;
+      // The channels of a colour are the values that it moves, in their order; once for each object
+      // that has them, as the two sides of glass do.
+      const size_t number = parameters_[i].colour ? dependences_[i].weights.size() % 3 : 0;
       dependences_[i].weights.push_back({slot_of[k], values[k]->d[0], number});
     }
   }

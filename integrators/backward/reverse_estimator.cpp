@@ -13,6 +13,7 @@
 #include "integrators/estimates/contributions.h"
 #include "integrators/methods/selection.h"
 #include "integrators/paths/camera_path.h"
+#include "integrators/paths/chain_light.h"
 #include "integrators/paths/path_follow.h"
 #include "integrators/paths/path_log.h"
 #include "limn/core/error.h"
@@ -75,6 +76,8 @@ void ReverseEstimator::describe(BackwardResult& result) const {
     warn_of_shadows_on_lifted_points(scene(), result.warnings);
     check_texture_edges(scene(), result.warnings);
   }
+  const std::string missing = missing_by_chains(traced_.context(), scene(), all);
+  if (!missing.empty()) result.warnings.push_back(missing);
 }
 
 // A point that sees an emitter past a mesh hangs on hundreds of numbers, most of which its
@@ -99,9 +102,21 @@ class ReverseEstimator::VertexAdjoints {
                   const Rgb<Var>& throughput, const DirectionMotion*, const PathStep& step,
                   int bounces, const Rng& key) {
     if (to_.log) log_vertex(*to_.log, surface, scattering, value(throughput), bounces);
-    if (!scattering.is_rough()) return;
+    const Bsdf::Lobes& lobes = scattering.bsdf().lobes();
+    if (lobes.above) add_side(surface, scattering, throughput, step, bounces, key, false);
+    if (!lobes.below) return;
+    const auto other = beyond(estimator_.scene(), surface, scattering.wi());
+    add_side(other, scattering, throughput, step, bounces, key, true);
+  }
+
+  Seeds& seeds() { return seeds_; }
+
+ private:
+  void add_side(const SurfacePoint<Var>& surface, const Scattering<Var>& scattering,
+                const Rgb<Var>& throughput, const PathStep& step, int bounces, const Rng& key,
+                bool below) {
     PathVertex vertex =
-        plain_vertex(surface, scattering, estimator_.scene().shading, bounces, step, key);
+        plain_vertex(surface, scattering, estimator_.scene().shading, bounces, step, key, below);
     vertex.throughput = value(throughput);
     if (!is_constant(surface.p)) vertex.velocity = {{-1, 0, 0, 0}, {0, -1, 0, 0}, {0, 0, -1, 0}};
     VertexAdjoint sink(estimator_.motion_, adjoint_, surface.p, tape_, seeds_, to_.log);
@@ -115,9 +130,6 @@ class ReverseEstimator::VertexAdjoints {
     }
   }
 
-  Seeds& seeds() { return seeds_; }
-
- private:
   const ReverseEstimator& estimator_;
   Rgb<double> adjoint_;
   Tape& tape_;

@@ -223,7 +223,7 @@ class Checker {
     if (result.confirmation && result.confirmation->p < kCheckStageLevel) {
       if (!result.bends) result.verdict = Verdict::kDisagree;
     } else if (result.needed_spp <= static_cast<double>(settings_.spp)) {
-      result.verdict = Verdict::kAgree;
+      result.verdict = runs.gradient.incomplete ? Verdict::kNotComplete : Verdict::kAgree;
     }
     result.gradient = std::move(runs.gradient);
     result.differences = std::move(runs.differences);
@@ -418,6 +418,8 @@ const char* verdict_name(Verdict verdict) {
       return "agree";
     case Verdict::kDisagree:
       return "disagree";
+    case Verdict::kNotComplete:
+      return "not complete";
     case Verdict::kCannotTell:
       break;
   }

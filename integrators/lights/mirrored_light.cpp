@@ -306,7 +306,7 @@ double MirroredLight::pdf(const Mixture& mixture, const Vec3d& w, double scatter
   if (mixture.share == 0) return scattered;
   double sum = 0;
   for (int i = 0; i < mixture.count; ++i) sum += mixture.part[i] * pdf(mixture.glare(i), w);
-  return mixture.share * sum + (1 - mixture.share) * scattered;
+  return mixture.rough * mixture.share * sum + (1 - mixture.share) * scattered;
 }
 
 std::optional<Vec3d> MirroredLight::sample(const Mixture& mixture, double u, double u1, double u2) {

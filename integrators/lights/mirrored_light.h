@@ -44,6 +44,7 @@ class MirroredLight {
     Mixture() {}           // NOLINT: a path has hundreds of bytes here that are hardly ever used
     double share = 0;      // of all together; 0: from the scattering function alone
     double elsewhere = 0;  // luminance of what is seen beside them, about, if any is seen
+    double rough = 1;  // the probability of directions from here, or from the scattering function
     int count = 0;
     std::array<double, kMostImages> part;  // sum to 1
 
@@ -66,6 +67,7 @@ class MirroredLight {
   template <class S>
   Mixture mixture(const SurfacePoint<S>& surface, const Scattering<S>& scattering) const {
     Mixture mixture;
+    mixture.rough = scattering.rough_share();
     double sum = 0, of_emitters = 0;
     const Bsdf& bsdf = *scene_.shape(surface.face.shape).bsdf->side(scattering.front());
     for (const Image& image : images_) {
@@ -85,7 +87,8 @@ class MirroredLight {
     if (std::isfinite(share)) mixture.share = std::min(share, kMostShare);
     return mixture;
   }
-  // The density at the unit direction w [1/sr], of which scattering alone has this one there.
+  // The density at the unit direction w [1/sr], of which scattering alone has this one there; both
+  // integrate to mixture.rough.
   static double pdf(const Mixture& mixture, const Vec3d& w, double scattered);
   // Of directions of one glare.
   static double pdf(const Glare& glare, const Vec3d& w);

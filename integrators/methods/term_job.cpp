@@ -13,6 +13,7 @@
 #include "integrators/estimates/batches.h"
 #include "integrators/film/film_regions.h"
 #include "integrators/methods/selection.h"
+#include "integrators/paths/chain_light.h"
 #include "integrators/pilot/allocation.h"
 #include "integrators/pilot/field_fit.h"
 #include "integrators/pilot/film_fit.h"
@@ -102,17 +103,16 @@ class TermJob {
       computed_.push_back(std::find(chosen.begin(), chosen.end(), type->name) != chosen.end());
     }
     if (options.samples) check_samples(*options.samples);
-    std::vector<Parameter> parameters;
-    for (const auto& name : options.parameters) parameters.push_back(find_parameter(scene, name));
-    moves_ = !std::all_of(parameters.begin(), parameters.end(), [](auto& p) { return p.colour; });
+    for (const auto& name : options.parameters) parameters_.push_back(find_parameter(scene, name));
+    moves_ = !std::ranges::all_of(parameters_, [](const Parameter& p) { return p.colour; });
     std::shared_ptr<const FilmRegions> visible;
     if (options.exact_film) {
       visible = std::make_shared<FilmRegions>(scene, settings.threads, settings.interrupted);
     }
     const Warping warping{options.warp, method.unbiased};
-    for (size_t k = 0; k < parameters.size(); k += kLanes) {
+    for (size_t k = 0; k < parameters_.size(); k += kLanes) {
       const auto some =
-          std::span(parameters).subspan(k).first(std::min<size_t>(kLanes, parameters.size() - k));
+          std::span(parameters_).subspan(k).first(std::min<size_t>(kLanes, parameters_.size() - k));
       passes_.push_back(std::make_unique<TermEstimator>(
           scene, some, types_, computed_, method.sampler, settings.threads, visible,
           method.warps ? &warping : nullptr, method.closed, moves_film_));
@@ -131,6 +131,9 @@ class TermJob {
     warn_of_faces_edge_on(scene_, pass(0).viewpoints(), result.warnings);
     if (moves_) warn_of_shadows_on_lifted_points(scene_, result.warnings);
     if (moves_) check_texture_edges(scene_, result.warnings);
+    const std::string missing = missing_by_chains(pass(0).context(), scene_, parameters_);
+    result.incomplete = !missing.empty();
+    if (result.incomplete) result.warnings.push_back(missing);
     for (size_t p = 0; p < passes_.size(); ++p)
       result.at_kink = result.at_kink || pass(p).viewpoints().cross_planes();
     plan(settings, watch, result);
@@ -515,7 +518,8 @@ class TermJob {
   const Scene& scene_;
   const GradientOptions& options_;
   TermMethod method_;
-  bool moves_film_;     // whether positions on the film may move
+  bool moves_film_;  // whether positions on the film may move
+  std::vector<Parameter> parameters_;
   bool moves_ = false;  // whether any parameter is more than a colour
   std::vector<const TermType*> types_;
   std::vector<bool> computed_;  // of each term

@@ -121,10 +121,6 @@ class PathTracer {
   // path_vertices.h. Those that return bool say whether the path goes on.
   bool begin_vertex(Walk& walk);
   void draw_numbers(std::span<Walk* const> walks) const;
-  bool turns_smoothly(Walk& walk) const;
-  bool turn_smoothly(Walk& walk) const;
-  size_t turn_smoothly(Walk** walks, size_t& count, Walk** turned) const;
-  void leave_surface(Walk& walk, double eta) const;
   bool goes_on(Walk& walk, double pdf) const;
   bool draw_mirrored(Walk& walk) const;
   bool choose_direction(Walk& walk);
@@ -141,10 +137,13 @@ class PathTracer {
   bool survives_roulette(Walk& walk) const;
   // The density of the next direction at w, of which scattering alone has this one.
   double density(const Walk& walk, const Vec3d& w, double scattered) const {
-    const double rough = walk.scattering->rough_share();
-    if (!c_.mirrored || rough == 0) return scattered;
-    return rough * MirroredLight::pdf(walk.mixture, w, scattered / rough);
+    return c_.mirrored ? MirroredLight::pdf(walk.mixture, w, scattered) : scattered;
   }
+  // path_smooth.h
+  bool turns_smoothly(Walk& walk) const;
+  bool turn_smoothly(Walk& walk) const;
+  size_t turn_smoothly(Walk** walks, size_t& count, Walk** turned) const;
+  void leave_surface(Walk& walk, double eta) const;
   // path_wide.h. For plain numbers.
   size_t weigh_lights_wide(std::span<Walk* const> walks, Walk** lit) const;
   size_t scatter_wide(std::span<Walk*> walks);

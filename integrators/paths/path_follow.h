@@ -6,6 +6,7 @@
 #include "integrators/paths/path.h"
 #include "integrators/paths/path_lights.h"
 #include "integrators/paths/path_rays.h"
+#include "integrators/paths/path_smooth.h"
 #include "integrators/paths/path_vertices.h"
 #include "integrators/paths/path_wide.h"
 #include "limn/core/check.h"

@@ -3,7 +3,6 @@
 // ends, roulette. Included by path_follow.h.
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "integrators/paths/path.h"
 #include "integrators/paths/path_directions.h"
@@ -81,67 +80,6 @@ inline void PathTracer<S, Visitor>::draw_numbers(std::span<Walk* const> walks) c
   } else {
     draw(std::integral_constant<size_t, 2>());
   }
-}
-
-// Whether the path takes a smooth ray: which one, then. Else what is left of the third number is as
-// it was.
-template <class S, class Visitor>
-inline bool PathTracer<S, Visitor>::turns_smoothly(Walk& walk) const {
-  if (!walk.scattering->is_smooth()) return false;
-  const SmoothShares shares = walk.scattering->shares();
-  double u = walk.u[2];
-  if (u < shares.rough) {
-    walk.u[2] = u / shares.rough;
-    return false;
-  }
-  u -= shares.rough;
-  int k = 0;
-  while (k + 1 < shares.count && u >= shares.ray[k]) u -= shares.ray[k++];
-  walk.smooth_ray = k;
-  walk.smooth_share = shares.ray[k];
-  return true;
-}
-
-// Along the smooth ray that was chosen; false where the path ends. Its direction moves with the
-// vertex, and what holds directions of rough lobes does not hold this one.
-template <class S, class Visitor>
-inline bool PathTracer<S, Visitor>::turn_smoothly(Walk& walk) const {
-  const SmoothRay<S> ray = walk.scattering->smooth_ray(walk.smooth_ray);
-  if (!(walk.smooth_share > 0) || detail::stays_black(ray.weight)) return false;
-  walk.motion = nullptr;
-  walk.direction = ray.wo;
-  walk.wo = value(ray.wo);
-  walk.pdf = std::numeric_limits<double>::infinity();
-  walk.throughput = walk.throughput * ray.weight * (1 / walk.smooth_share);
-  if (walk.scattering->passes(walk.wo)) leave_surface(walk, ray.eta);
-  return goes_on(walk, 0);
-}
-
-// Of `count` walks those that take smooth rays and go on: they are put into `turned`, and how many
-// they are is returned. The others stay, and are counted.
-template <class S, class Visitor>
-inline size_t PathTracer<S, Visitor>::turn_smoothly(Walk** walks, size_t& count,
-                                                    Walk** turned) const {
-  size_t kept = 0, turns = 0;
-  for (size_t i = 0; i < count; ++i) {
-    Walk* const walk = walks[i];
-    if (turns_smoothly(*walk)) {
-      turned[turns] = walk;
-      turns += guarded(*walk, [&] { return turn_smoothly(*walk); });
-    } else {
-      walks[kept++] = walk;
-    }
-  }
-  count = kept;
-  return turns;
-}
-
-// To the other side of the surface. eta: the index of refraction there over that on this side.
-template <class S, class Visitor>
-inline void PathTracer<S, Visitor>::leave_surface(Walk& walk, double eta) const {
-  walk.eta *= eta;
-  walk.surface = beyond(c_.scene, walk.surface, walk.wi);
-  if (walk.two_sided) walk.lights = c_.lights.at(value(walk.surface.p));
 }
 
 // After a path has been given its next direction, of this density (see PathStep).

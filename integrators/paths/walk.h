@@ -54,8 +54,10 @@ struct Walk {
   SurfacePoint<S> surface;
   Vec3<S> wi;
   Rgb<S> throughput = grey(S(1.0));
-  double albedo = 1;  // bounds it, by the materials of PathContext::unmoved
-  double eta = 1;     // the index of refraction here over that where it started
+  double albedo = 1;        // bounds it, by the materials of PathContext::unmoved
+  double eta = 1;           // the index of refraction here over that where it started
+  ShapeId turned_by;        // the first shape whose smooth lobe it took, if any
+  Rgb<double> before_turn;  // what it had found until there
   PathStep step;
   PathSums<S> sums;
 

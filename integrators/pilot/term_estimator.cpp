@@ -137,9 +137,24 @@ class TermEstimator::VertexTerms {
                   int bounces, const Rng& key) {
     const Rgb<double> weight = value(throughput);
     if (sink_.log()) log_vertex(*sink_.log(), surface, scattering, weight, bounces);
-    if (!scattering.is_rough()) return;
+    const Bsdf::Lobes& lobes = scattering.bsdf().lobes();
+    if (lobes.above) add_side(surface, scattering, weight, motion, step, bounces, key, false);
+    if (!lobes.below) return;
+    const auto other = beyond(estimator_.scene_, surface, scattering.wi());
+    add_side(other, scattering, weight, motion, step, bounces, key, true);
+  }
+
+  const PixelCounts& counts() const { return counts_; }
+  const Rgb<Lanes>& sum(size_t slot) const { return sums_[slot]; }
+  const Rgb<Lanes>& turned(size_t slot) const { return turned_[slot]; }
+
+ private:
+  // below: what passes the surface, from beyond() it.
+  void add_side(const SurfacePoint<Dual>& surface, const Scattering<Dual>& scattering,
+                const Rgb<double>& weight, const DirectionMotion* motion, const PathStep& step,
+                int bounces, const Rng& key, bool below) {
     PathVertex vertex =
-        plain_vertex(surface, scattering, estimator_.scene_.shading, bounces, step, key);
+        plain_vertex(surface, scattering, estimator_.scene_.shading, bounces, step, key, below);
     vertex.throughput = weight;
     if (motion) vertex.turn = motion->turn;
     TurnedVertex turned;
@@ -171,12 +186,6 @@ class TermEstimator::VertexTerms {
       cost.seconds += watch.seconds();
     }
   }
-
-  const PixelCounts& counts() const { return counts_; }
-  const Rgb<Lanes>& sum(size_t slot) const { return sums_[slot]; }
-  const Rgb<Lanes>& turned(size_t slot) const { return turned_[slot]; }
-
- private:
   TurnedVertex turned_at(const SurfacePoint<Dual>& surface, const DirectionMotion* motion,
                          int bounces) const {
     TurnedVertex turned;

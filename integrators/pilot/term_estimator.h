@@ -47,6 +47,7 @@ class TermEstimator final : public SampleEstimator {
   void warn_of_kinks(std::vector<std::string>& warnings) const;
   void describe(GradientStats& stats) const;
   const EdgeSamplerInput* edges() const { return input_.made_edges(); }
+  const PathContext& context() const { return traced_.context(); }
   const Viewpoints& viewpoints() const { return *traced_.context().viewpoints; }
   const MotionRates& motion_rates() const { return rates_; }
   // Whether a slot's samples belong to pixels, not to the film.

@@ -99,7 +99,8 @@ void PenumbraTerm::add(const DrawnLine& drawn, const Vec3d& q, const SeenAlong& 
   const auto surface = surface_on_ray<double>(scene, drawn.face, q, along.omega);
   const Scattering<double> scattering(surface, -along.omega, scene.shading);
   if (scattering.black()) return;
-  const PathVertex vertex{surface, scattering, throughput, {}, {}, bounces, {}, key};
+  PathVertex vertex{surface, scattering, throughput, {}, {}, bounces, {}, key};
+  vertex.below = scattering.passes(drawn.line.e - drawn.line.p);
   EdgeDraw draw{
       edges_.object(drawn.edge.edge.object), drawn.edge, {&regions_, drawn.line.region}, key};
   draw.along = &along;

@@ -64,7 +64,7 @@ std::optional<SeenLine> PenumbraLines::seen_from(const PathVertex& vertex, const
   if (const MirroredLight* mirrored = context_.mirrored; mirrored && pdf > 0) {
     pdf = MirroredLight::pdf(mirrored->mixture(vertex.surface, vertex.scattering), omega, pdf);
   }
-  const Rgb<double> f = pdf > 0 ? vertex.scattering.eval_value(omega) : Rgb<double>{};
+  const Rgb<double> f = pdf > 0 ? vertex.scattered(omega) : Rgb<double>{};
   if (is_black(f) || !complete(*drawn, {q, pdf}, vertex.bounces + 1, rng)) {
     ++cost.zero_weight;
     return {};

@@ -195,7 +195,7 @@ void ShadowTerm::add_sample(const Viewer& viewer, const ShadowDraw& draw, const 
   const double distance = length(point->x - q);
   const Vec3d omega = (point->x - q) / distance;
   const bool apart = distance > 0 && point->face != vertex.surface.start();
-  const Rgb<double> f = apart ? vertex.scattering.eval_value(omega) : Rgb<double>{};
+  const Rgb<double> f = apart ? vertex.scattered(omega) : Rgb<double>{};
   const Rgb<double> amount =
       is_black(f) ? f : vertex.throughput * f * edges_.jump(edge, *point, q, omega);
   BoundaryForm form;

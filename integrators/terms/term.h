@@ -31,14 +31,24 @@ struct PathVertex {
   int bounces;             // how often the path has scattered before
   PathStep step;           // how it came here
   const Rng& key;          // of the path
+  // It stands for what passes the surface, which it lies beyond; else for what is reflected.
+  bool below = false;
+
+  // Value times cosine [1/sr], of the directions that it stands for.
+  Rgb<double> scattered(const Vec3d& wo) const {
+    return scattering.passes(wo) == below ? scattering.eval_value(wo) : Rgb<double>{};
+  }
 };
-// A vertex of a path over any scalar, of throughput one.
+// A vertex of a path over any scalar, of throughput one. at: beyond() the surface of `scattering`,
+// with `below` set then.
 template <class S>
 PathVertex plain_vertex(const SurfacePoint<S>& at, const Scattering<S>& scattering,
-                        ShadingModel model, int bounces, const PathStep& step, const Rng& key) {
+                        ShadingModel model, int bounces, const PathStep& step, const Rng& key,
+                        bool below = false) {
   const SurfacePoint<double> surface = value(at);
   PathVertex vertex{
       surface, {surface, value(scattering.wi()), model}, grey(1.0), {}, {}, bounces, step, key};
+  vertex.below = below;
   vertex.scattering.share_as(scattering.rough_share());
   if constexpr (std::is_same_v<S, Dual>) vertex.velocity = {at.p.x.d, at.p.y.d, at.p.z.d};
   return vertex;

@@ -13,6 +13,12 @@ EdgeQuery query_at(const PathVertex& vertex) {
   query.n = vertex.scattering.normal();
   query.wi = vertex.scattering.wi();
   query.lobe = vertex.scattering.lobe();
+  if (vertex.below) {
+    const Bsdf::PassedLobe passed = vertex.scattering.passed_lobe();
+    query.n = -query.n;
+    query.wi = passed.wi;
+    query.lobe = passed.lobe;
+  }
   query.velocity = vertex.velocity;
   query.turn = vertex.turn;
   query.face = vertex.surface.start();
@@ -82,7 +88,7 @@ void add_edge_point(const PathContext& context, const PathVertex& vertex, const 
   const BoundaryForm form = form_of(context.scene, vertex, draw, view);
   // A density may round to zero at the very horizon.
   const bool counts = seen && sample.pdf_t > 0 && sink.takes(form, draw.key);
-  const Rgb<double> f = counts ? vertex.scattering.eval_value(view.omega) : Rgb<double>{};
+  const Rgb<double> f = counts ? vertex.scattered(view.omega) : Rgb<double>{};
   if (is_black(f)) {
     ++cost.zero_weight;
     if (sink.log()) sink.log()->push_back("    no weight");

@@ -104,6 +104,17 @@ class Blend final : public NestingBsdf {
     }
     return all;
   }
+  PassedLobe passed_lobe_from(bool front, const Vec3d& n, const Vec3d& wi,
+                              const Rgb<double>* at) const override {
+    PassedLobe all{-n, {kHemisphere, 1, 0}};
+    for (size_t i = 0; i < 2; ++i) {
+      const Bsdf* const bsdf = side_of(i, front);
+      if (!bsdf || !bsdf->lobes().below) continue;
+      const PassedLobe of = bsdf->passed_lobe(n, wi, at_of(i, at));
+      all = all.lobe.albedo == 0 ? of : PassedLobe{-n, {kHemisphere, 1, 1}};
+    }
+    return all;
+  }
 
   template <class S>
   Rgb<S> evaluate(bool front, const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo,

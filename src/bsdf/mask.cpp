@@ -67,6 +67,12 @@ class Mask final : public NestingBsdf {
     if (at || opacity_.texture < 0) lobe.albedo *= opacity(at);
     return lobe;
   }
+  PassedLobe passed_lobe_from(bool front, const Vec3d& n, const Vec3d& wi,
+                              const Rgb<double>* at) const override {
+    PassedLobe passed = side_of(0, front)->passed_lobe(n, wi, at_of(0, at));
+    if (at || opacity_.texture < 0) passed.lobe.albedo *= opacity(at);
+    return passed;
+  }
 
   template <class S>
   Rgb<S> evaluate(bool front, const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo,

@@ -19,6 +19,7 @@ constexpr BsdfType kTypes[] = {
     {"null", read_null},
     {"plastic", read_plastic},
     {"roughconductor", read_roughconductor},
+    {"roughdielectric", read_roughdielectric},
     {"thindielectric", read_thindielectric},
     {"twosided", read_twosided},
 };

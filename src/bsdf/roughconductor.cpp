@@ -242,6 +242,8 @@ std::string RoughConductor::describe() const {
   return text;
 }
 
+}  // namespace
+
 ConstantOrTexture read_alpha(Properties& properties) {
   if (auto texture = properties.texture("alpha")) return texture;
   const char* name = "alpha";
@@ -269,8 +271,6 @@ Distribution read_distribution(Properties& properties) {
   if (name == "ggx") return Distribution::kGgx;
   properties.fail("distribution", unknown_name("distribution", name, {"beckmann", "ggx"}));
 }
-
-}  // namespace
 
 std::shared_ptr<Bsdf> make_roughconductor(const RoughConductorValues& values) {
   return std::make_shared<RoughConductor>(values);

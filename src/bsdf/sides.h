@@ -40,6 +40,9 @@ class SidedBsdf : public Bsdf {
   }
   double eta(const Rgb<double>* at) const final { return eta_from(true, at); }
   LobeSummary lobe(const Rgb<double>* at) const final { return lobe_from(true, at); }
+  PassedLobe passed_lobe(const Vec3d& n, const Vec3d& wi, const Rgb<double>* at) const final {
+    return passed_lobe_from(true, n, wi, at);
+  }
   const Bsdf* side(bool front) const final {
     if (front) return this;
     return has_back_ ? &back_ : nullptr;
@@ -87,6 +90,10 @@ class SidedBsdf : public Bsdf {
   virtual LobeSummary lobe_from(bool /*front*/, const Rgb<double>* /*at*/) const {
     return {kHemisphere, 1, 0};  // none
   }
+  virtual PassedLobe passed_lobe_from(bool /*front*/, const Vec3d& n, const Vec3d& /*wi*/,
+                                      const Rgb<double>* /*at*/) const {
+    return {-n, {}};
+  }
 
  private:
   // The same from behind.
@@ -127,6 +134,9 @@ class SidedBsdf : public Bsdf {
     }
     double eta(const Rgb<double>* at) const override { return of_.eta_from(false, at); }
     LobeSummary lobe(const Rgb<double>* at) const override { return of_.lobe_from(false, at); }
+    PassedLobe passed_lobe(const Vec3d& n, const Vec3d& wi, const Rgb<double>* at) const override {
+      return of_.passed_lobe_from(false, n, wi, at);
+    }
     const Bsdf* side(bool front) const override { return of_.side(front); }
     bool is_constant() const override { return of_.is_constant(); }
     std::vector<ParameterRef> parameters() override { return of_.parameters(); }

@@ -15,9 +15,23 @@ std::shared_ptr<Bsdf> read_mask(Properties& properties);
 std::shared_ptr<Bsdf> read_null(Properties& properties);
 std::shared_ptr<Bsdf> read_plastic(Properties& properties);
 std::shared_ptr<Bsdf> read_roughconductor(Properties& properties);
+std::shared_ptr<Bsdf> read_roughdielectric(Properties& properties);
 std::shared_ptr<Bsdf> read_thindielectric(Properties& properties);
 std::shared_ptr<Bsdf> read_twosided(Properties& properties);
 
+// A rough dielectric, see roughdielectric.cpp.
+struct RoughDielectricValues {
+  RoughConductorValues::Distribution distribution = RoughConductorValues::Distribution::kBeckmann;
+  ConstantOrTexture alpha = 0.1;
+  double eta = 1.5;  // index of refraction, inside over outside; not 1
+  ConstantOrTexture specular_reflectance = 1;
+  ConstantOrTexture specular_transmittance = 1;
+};
+std::shared_ptr<Bsdf> make_roughdielectric(const RoughDielectricValues& values);
+
+// Read alpha (0.1), and a distribution (beckmann).
+ConstantOrTexture read_alpha(Properties& properties);
+RoughConductorValues::Distribution read_distribution(Properties& properties);
 // Reads a colour whose channels lie in [0, 1], as Mitsuba requires of reflectances, or a texture.
 ConstantOrTexture read_reflectance(Properties& properties, const char* name, double absent);
 

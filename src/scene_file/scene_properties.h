@@ -13,6 +13,7 @@ namespace limn {
 struct Makers {
   std::function<std::shared_ptr<Bsdf>(const ObjectDescription&)> bsdf;
   std::function<std::shared_ptr<Texture>(const ObjectDescription&)> texture;
+  double smooth_as = 0;  // see Properties
 };
 
 class DescribedProperties final : public Properties {
@@ -40,6 +41,7 @@ class DescribedProperties final : public Properties {
   std::string file(const std::string& name) override;
   std::shared_ptr<Texture> texture(const std::string& name) override;
   std::vector<std::shared_ptr<Bsdf>> bsdfs() override;
+  double smooth_as() const override { return make_nested_.smooth_as; }
 
   // The nested object of this tag; null if there is none, InputError if there are several.
   const ObjectDescription* nested(const std::string& tag);

@@ -20,15 +20,18 @@ namespace {
 
 class SceneBuilder {
  public:
-  SceneBuilder(const SceneDescription& description, std::vector<std::string>* warnings)
+  SceneBuilder(const SceneDescription& description, std::vector<std::string>* warnings,
+               double smooth_as = 0)
       : description_(description),
         warnings_(warnings ? *warnings : unread_warnings_),
         make_nested_{[this](const ObjectDescription& object) { return bsdf(object); },
-                     [this](const ObjectDescription& object) { return texture(object); }} {}
+                     [this](const ObjectDescription& object) { return texture(object); },
+                     smooth_as} {}
 
   Scene build() {
     scene_.file = description_.file;
     scene_.xml_files = description_.files;
+    scene_.smooth_as = make_nested_.smooth_as;
     warnings_.insert(warnings_.end(), description_.warnings.begin(), description_.warnings.end());
     for (const auto& object : description_.objects) {
       add(*object);
@@ -318,9 +321,10 @@ class SceneBuilder {
 }  // namespace
 
 Scene read_scene(const std::string& file, const std::map<std::string, std::string>& defines,
-                 std::vector<std::string>* warnings, const std::vector<std::string>& paths) {
+                 std::vector<std::string>* warnings, const std::vector<std::string>& paths,
+                 double smooth_as) {
   const SceneDescription description = describe_scene(file, {defines, paths}, nullptr);
-  return SceneBuilder(description, warnings).build();
+  return SceneBuilder(description, warnings, smooth_as).build();
 }
 
 size_t count_sensors(const std::string& file, const std::map<std::string, std::string>& defines,

@@ -15,7 +15,7 @@ enum Status {
   kDisagree = 1,
   kBadInput = 2,
   kNonFinite = 3,
-  kCannotTell = 4,  // a check whose samples were too few for a verdict
+  kCannotTell = 4,  // a check whose samples were too few for a verdict, or that is not complete
   kInterrupted = 130
 };
 

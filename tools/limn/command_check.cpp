@@ -56,6 +56,8 @@ void print_verdict(const CheckResult& r, int spp) {
     fmt::print(": the differences hold {:.3g} times of it (z = {:.1f})\n", 1 + s.factor, s.z);
   } else if (r.verdict == Verdict::kAgree) {
     fmt::print("  agree\n");
+  } else if (r.verdict == Verdict::kNotComplete) {
+    fmt::print("  NOT COMPLETE: no error was found, but terms are missing (see the warning)\n");
   } else if (r.bends) {
     fmt::print(
         "  CANNOT TELL: the image bends here, as where shapes that touch part or a face is edge-on "
@@ -210,7 +212,8 @@ class CheckCommand final : public Command {
   // What is wrong comes before what is not known.
   static void add_verdict(Verdict verdict, int& status) {
     if (verdict == Verdict::kDisagree) status = kDisagree;
-    if (verdict == Verdict::kCannotTell && status == kSuccess) status = kCannotTell;
+    const bool open = verdict == Verdict::kCannotTell || verdict == Verdict::kNotComplete;
+    if (open && status == kSuccess) status = kCannotTell;
   }
 
   int run_faces(const Scene& scene) {

@@ -71,6 +71,11 @@ void add_common_options(CLI::App& app, CommonOptions& common) {
                  "has discontinuities that gradients miss")
       ->check(CLI::IsMember({"continuous", "mitsuba"}))
       ->capture_default_str();
+  app.add_option("--smooth-as", common.smooth_as,
+                 "Make smooth conductors and dielectrics rough (GGX), so that derivatives have all "
+                 "edges: another image, by about this roughness (0.003)")
+      ->check(within(1e-4, 1))
+      ->type_name("ALPHA");
 }
 
 void add_parameter_options(CLI::App& app, std::vector<std::string>& parameters) {
@@ -130,8 +135,12 @@ void Warnings::add_all(const std::vector<std::string>& texts) {
 Scene load_scene(const CommonOptions& common, Warnings& shown) {
   check_json(common.json);
   std::vector<std::string> warnings;
-  Scene scene = read_scene(common.scene, common.defines, &warnings, common.paths);
+  Scene scene = read_scene(common.scene, common.defines, &warnings, common.paths, common.smooth_as);
   for (const std::string& warning : warnings) shown.add(warning);
+  if (scene.smooth_as > 0) {
+    shown.add(fmt::format("warning: smooth lobes are rough, of alpha {:g} (--smooth-as)",
+                          scene.smooth_as));
+  }
   if (!common.sensor.empty()) use_sensor(scene, common.sensor);
   if (common.shading == "mitsuba") scene.shading = ShadingModel::kMitsuba;
   return scene;
@@ -152,6 +161,7 @@ std::vector<ImageAttribute> provenance(const Scene& scene, const RunSettings& se
           {"limn.sensor", sensor_name(scene)},
           {"limn.spp", std::to_string(spp)},
           {"limn.seed", std::to_string(settings.seed)},
+          {"limn.smooth_as", fmt::format("{:g}", scene.smooth_as)},
           {"limn.shading", scene.shading == ShadingModel::kMitsuba ? "mitsuba" : "continuous"}};
 }
 

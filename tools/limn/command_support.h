@@ -26,13 +26,14 @@ struct CommonOptions {
   std::string json;
   bool quiet = false;
   std::string shading = "continuous";
-  std::string part;  // "K/N" of --part; "": the whole run
+  double smooth_as = 0;  // 0: smooth
+  std::string part;      // "K/N" of --part; "": the whole run
 };
 
 // Scene or mesh, -D, --seed, --threads, --quiet. text, type: of the input.
 void add_input_options(CLI::App& app, CommonOptions& common, const std::string& text,
                        const std::string& type);
-// These and --spp, --json, --shading.
+// These and --spp, --json, --shading, --smooth-as.
 void add_common_options(CLI::App& app, CommonOptions& common);
 // --wrt
 void add_parameter_options(CLI::App& app, std::vector<std::string>& parameters);

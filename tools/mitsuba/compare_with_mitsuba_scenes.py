@@ -54,6 +54,27 @@ TURNED_DIRECTIONAL = f"""<emitter type="directional">{TILTED}
 CONDUCTOR = """<bsdf type="roughconductor"><string name="distribution" value="{distribution}"/>
     <float name="alpha" value="{alpha}"/><rgb name="eta" value="0.2,0.92,1.1"/>
     <rgb name="k" value="3.9,2.4,2.1"/></bsdf>"""
+COLOURED = """<rgb name="specular_reflectance" value="0.8,0.6,0.9"/>
+    <rgb name="specular_transmittance" value="0.5,0.9,0.7"/>"""
+ROUGH_GLASS = """<bsdf type="roughdielectric"><string name="distribution" value="{}"/>
+    <float name="alpha" value="{}"/></bsdf>"""
+BUBBLE = '<string name="int_ior" value="air"/><string name="ext_ior" value="water"/>'
+TRANSPARENT = {
+    "conductor": '<bsdf type="conductor"><string name="material" value="Cu"/></bsdf>',
+    "dielectric": '<bsdf type="dielectric"/>',
+    "coloured dielectric": f'<bsdf type="dielectric">{COLOURED}</bsdf>',
+    "bubble": f'<bsdf type="dielectric">{BUBBLE}</bsdf>',
+    "thindielectric": f'<bsdf type="thindielectric">{COLOURED}</bsdf>',
+    "plastic": '<bsdf type="plastic"><rgb name="diffuse_reflectance" value="0.7,0.5,0.3"/></bsdf>',
+    "nonlinear plastic": '<bsdf type="plastic"><boolean name="nonlinear" value="true"/></bsdf>',
+    "ggx glass": ROUGH_GLASS.format("ggx", 0.2),
+    "beckmann glass": ROUGH_GLASS.format("beckmann", 0.4),
+    "rough bubble": f'<bsdf type="roughdielectric">{BUBBLE}</bsdf>',
+    "mask": f'<bsdf type="mask"><float name="opacity" value="0.3"/>{CLAY}</bsdf>',
+    "null": '<bsdf type="null"/>',
+    "blendbsdf": f'<bsdf type="blendbsdf"><float name="weight" value="0.3"/>{CLAY}'
+                 + CONDUCTOR.format(distribution="ggx", alpha=0.2) + "</bsdf>",
+}
 MESH = """<shape type="obj"><string name="filename" value="{file}"/>
     <boolean name="face_normals" value="{flat}"/><transform name="to_world"><scale value="{scale}"/>
     <translate x="0.8" y="0.9"/></transform>{bsdf}</shape>"""
@@ -210,6 +231,11 @@ def shapes_of_all_kinds(folder, envmap):
         mesh = MESH.format(file=sphere, flat="false", scale=0.8, bsdf=bsdf)
         yield f"smooth {kind}", {"objects": CUBE + mesh, "lights": ONE_LAMP + envmap}, \
             ["--shading", "mitsuba"]
+    for kind, bsdf in TRANSPARENT.items():
+        cube = CUBE.replace('<bsdf type="diffuse"/>', bsdf)
+        mesh = MESH.format(file=sphere, flat="false", scale=0.8, bsdf=bsdf)
+        yield f"{kind} cube", {"objects": cube + VISIBLE_LAMP, "lights": CONSTANT}, []
+        yield f"{kind} ball", {"objects": mesh, "lights": envmap}, ["--shading", "mitsuba"]
     flat = MESH.format(file=sphere, flat="true", scale=0.8, bsdf=GREY)
     yield "flat sphere", {"objects": flat, "lights": envmap}, []
 

@@ -73,7 +73,7 @@ void bind_result(nb::module_& m) {
   nb::class_<Check>(m, "Check", "What limn.check found.")
       .def_prop_ro(
           "verdict", [](const Check& c) { return verdict_name(c.result.verdict); },
-          "\"agree\", \"disagree\" or \"cannot tell\".")
+          "\"agree\", \"disagree\", \"cannot tell\" or \"not complete\".")
       .def_prop_ro("p", field(&CheckResult::p),
                    "Of the first run: windows, image and terms together.")
       .def_prop_ro("found", field(&CheckResult::found), "Where the first run's p is smallest.")

@@ -19,6 +19,7 @@
 #include "limn/core/dual.h"
 #include "limn/core/lobe.h"
 #include "limn/core/parameter_ref.h"
+#include "limn/core/smooth_ray.h"
 #include "limn/core/texture.h"
 #include "limn/core/vec.h"
 
@@ -57,21 +58,6 @@ struct BsdfNumber {
     return at && texture >= 0 ? at[texture].r : as<S>(constant);
   }
 };
-
-// What a smooth lobe sees: radiance that arrives from wo counts times the weight, without a cosine
-// or a density.
-template <class S>
-struct SmoothRay {
-  Vec3<S> wo;  // unit; n.wo < 0 behind the surface
-  Rgb<S> weight;
-  double eta = 1;  // the index of refraction where wo lies over that where wi lies
-  // Nothing passes, nor begins to as a parameter moves: total reflection. The weight is 0.
-  bool total = false;
-};
-// At most so many of one BSDF.
-inline constexpr int kMostSmoothRays = 4;
-template <class S>
-using SmoothRays = std::array<SmoothRay<S>, kMostSmoothRays>;
 
 // The value of a BSDF and the density of `sample` for one pair of directions.
 struct BsdfValue {
@@ -154,6 +140,16 @@ class Bsdf {
   // The summary of the rough lobes that edge samplers use as importance. By default the hemisphere
   // with albedo 1. With a null `at` its albedo bounds that at all points.
   virtual LobeSummary lobe(const Rgb<double>* /*at*/ = nullptr) const { return {}; }
+  // The same of the rough lobes behind the surface, where there are any, as if they lay in front of
+  // the reversed normal for another viewer.
+  struct PassedLobe {
+    Vec3d wi;  // unit, towards that viewer
+    LobeSummary lobe;
+  };
+  virtual PassedLobe passed_lobe(const Vec3d& n, const Vec3d& /*wi*/,
+                                 const Rgb<double>* /*at*/) const {
+    return {-n, {}};
+  }
   // Constants, and the values of textures that are not texels ("reflectance.color0").
   virtual std::vector<ParameterRef> parameters() = 0;
 
@@ -200,21 +196,6 @@ class Bsdf {
   std::vector<std::shared_ptr<Texture>> textures_;
   std::vector<std::string> texture_names_;
 };
-
-// With which probabilities a path takes the smooth rays of a BSDF, or its rough lobes.
-struct SmoothShares {
-  enum class By {
-    kWeight,  // in proportion to what they scatter
-    kSlope,   // also what scatters little: its derivative need not be small
-    kNone,    // all alike: independent of parameters
-  };
-  int count = 0;  // of rays
-  std::array<double, kMostSmoothRays> ray{};
-  double rough = 1;
-};
-// Arguments as of Bsdf::eval.
-SmoothShares smooth_shares(const Bsdf& bsdf, const Vec3d& n, const Vec3d& wi, const Rgb<double>* at,
-                           SmoothShares::By by);
 
 // Creates the BSDF that an element describes. InputError for bad values and for an unknown type
 // (the message lists the known ones).

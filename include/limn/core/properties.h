@@ -50,6 +50,9 @@ class Properties {
   // Nested bsdf elements and references to bsdfs, in order.
   virtual std::vector<std::shared_ptr<Bsdf>> bsdfs() = 0;
 
+  // The roughness that smooth lobes are asked to have; 0: they are smooth.
+  virtual double smooth_as() const { return 0; }
+
   // Throws an InputError at this element, or at one of its properties.
   [[noreturn]] void fail(const std::string& message) const;
   [[noreturn]] void fail(const std::string& property, const std::string& message) const;

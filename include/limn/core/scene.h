@@ -57,6 +57,7 @@ struct Scene {
   std::vector<Sensor> sensors;
   size_t sensor = 0;  // index of the selected one
   ShadingModel shading = ShadingModel::kContinuous;
+  double smooth_as = 0;  // the roughness that smooth lobes were read with; 0: they are smooth
 
   std::vector<Shape> shapes;
   std::shared_ptr<Environment> environment;  // null if none
@@ -78,9 +79,11 @@ Scene deep_copy(const Scene& scene);
 
 // Reads the subset of Mitsuba 3's XML format described in scenes/README.md. `defines` are the -D
 // name=value pairs. InputError with file:line:col. Appends warnings (for example about faces
-// removed from a mesh) to `warnings`. paths: directories where files are searched last.
+// removed from a mesh) to `warnings`. paths: directories where files are searched last. smooth_as:
+// the roughness (GGX) of BSDFs whose lobes are smooth; 0: they stay so.
 Scene read_scene(const std::string& file, const std::map<std::string, std::string>& defines,
-                 std::vector<std::string>* warnings, const std::vector<std::string>& paths = {});
+                 std::vector<std::string>* warnings, const std::vector<std::string>& paths = {},
+                 double smooth_as = 0);
 // read_scene for XML in a string. File names are relative to `folder` ("": the working directory);
 // errors are located in FOLDER/string.
 Scene read_scene_text(const std::string& text, const std::string& folder,

@@ -55,6 +55,7 @@ class Scattering {
   // The values of the BSDF's textures here (see Bsdf).
   const Rgb<double>* at() const { return textures_.held(); }
   LobeSummary lobe() const { return bsdf_->lobe(at()); }
+  Bsdf::PassedLobe passed_lobe() const { return bsdf_->passed_lobe(value(n_), value(wi_), at()); }
   // Whether there is more than smooth lobes.
   bool is_rough() const { return bsdf_->is_rough(); }
   bool is_smooth() const { return bsdf_->lobes().smooth; }

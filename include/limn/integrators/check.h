@@ -68,8 +68,9 @@ struct Confirmation {
   double p = 1;  // one-sided
 };
 
-enum class Verdict { kAgree, kDisagree, kCannotTell };
-// "agree", "disagree" or "cannot tell".
+// kNotComplete: in place of kAgree, where the gradient lacks edges that smooth lobes show.
+enum class Verdict { kAgree, kDisagree, kCannotTell, kNotComplete };
+// "agree", "disagree", "cannot tell" or "not complete".
 const char* verdict_name(Verdict verdict);
 
 struct CheckResult {

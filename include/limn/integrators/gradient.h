@@ -121,6 +121,8 @@ struct GradientResult {
   std::vector<std::string> warnings;
   // A parameter moves the scene across a kink (see warnings): the derivative is one of a side.
   bool at_kink = false;
+  // It lacks edges that smooth lobes show (see warnings).
+  bool incomplete = false;
   GradientStats stats;
 
   SampleCounts samples() const;

@@ -1,0 +1,115 @@
+// How much light comes by chains of smooth lobes, and whether a parameter moves what it shows.
+#include "integrators/paths/chain_light.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+
+#include "integrators/estimates/tiles.h"
+#include "integrators/paths/camera_path.h"
+#include "integrators/paths/path_follow.h"
+#include "limn/core/duplicate_faces.h"
+#include "limn/core/names.h"
+
+namespace limn {
+
+ChainLight find_chain_light(const PathContext& context, uint64_t seed) {
+  ChainLight result;
+  const Scene& scene = context.scene;
+  if (!find_smooth(scene)) return result;
+  const FilterTable filter(scene.film.filter);
+  const CameraView<double> camera(scene.camera);
+  std::map<ShapeId, double> by_shape;
+  double all = 0, by_chains = 0;
+  RayCount rays;
+  PathTracer<double, NoVisitor> tracer(context, rays);
+  for (int i = 0; i < kChainPaths; ++i) {
+    const Rng key(seed, UINT64_MAX, static_cast<uint64_t>(i));
+    Rng rng = key.at(Purpose::kCamera, 0);
+    const Film& film = scene.film;
+    const int x = film.crop_x + static_cast<int>(rng.uniform() * film.crop_width);
+    const int y = film.crop_y + static_cast<int>(rng.uniform() * film.crop_height);
+    const FilmPosition at = sample_pixel_filter(film, filter, x, y, key);
+    const CameraRay<double> ray = camera.ray(at.x, at.y);
+    const StartRay<double> start{camera_ray(scene, ray), ray.origin, ray.direction};
+    Walk<double, NoVisitor> walk(key, 0, nullptr);
+    tracer.follow_rays({&start, 1}, {&walk, 1});
+    if (walk.failed || !is_finite(walk.sums.radiance)) continue;
+    const double found = luminance(walk.sums.radiance);
+    all += found;
+    if (!walk.turned_by.valid()) continue;
+    const double turned = found - luminance(walk.before_turn);
+    by_chains += turned;
+    by_shape[walk.turned_by] += turned;
+  }
+  if (all > 0) result.share = by_chains / all;
+  for (const auto& [shape, light] : by_shape) {
+    if (light > 0) result.shapes.push_back(shape);
+  }
+  std::stable_sort(result.shapes.begin(), result.shapes.end(),
+                   [&](ShapeId a, ShapeId b) { return by_shape[a] > by_shape[b]; });
+  return result;
+}
+
+namespace {
+
+// Of a scene without meshes whose first lane is seeded.
+bool values_move(const Scene& seeded) {
+  const Camera& c = seeded.camera;
+  const bool camera = !is_constant(c.origin) || !is_constant(c.left) || !is_constant(c.up) ||
+                      !is_constant(c.forward) || !is_constant(c.fov);
+  if (camera) return true;
+  for (const auto& light : seeded.delta_lights) {
+    if (!is_constant(light->origin().v)) return true;
+  }
+  const Vec3<Dual> n{0.0, 0.0, 1.0}, wi{0.6, 0.0, 0.8};
+  for (const Shape& shape : seeded.shapes) {
+    for (const bool front : {true, false}) {
+      const Bsdf* const side = shape.bsdf->side(front);
+      if (!side || !side->lobes().smooth || side->texture_count() > 0) continue;
+      SmoothRays<Dual> rays;
+      const int count = side->smooth_rays(n, wi, rays);
+      for (int k = 0; k < count; ++k) {
+        if (!is_constant(rays[k].wo)) return true;
+      }
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+bool moves_what_is_seen(const Scene& scene, std::span<const Parameter> parameters) {
+  Scene hull = deep_copy(scene);
+  for (Shape& shape : hull.shapes) shape.mesh = {};
+  return std::ranges::any_of(parameters, [&](const Parameter& parameter) {
+    if (parameter.texel_map(scene)) return false;
+    for (uint32_t s = 0; s < scene.shapes.size(); ++s) {
+      if (!parameter.velocities(scene, ShapeId(s)).empty()) return true;
+    }
+    Scene copy = deep_copy(hull);
+    parameter.seed(copy, 0);
+    return values_move(copy);
+  });
+}
+
+std::string missing_by_chains(const PathContext& context, const Scene& scene,
+                              std::span<const Parameter> parameters) {
+  if (!find_smooth(scene) || !moves_what_is_seen(scene, parameters)) return "";
+  const ChainLight light = find_chain_light(context, 0);
+  if (light.shapes.empty()) return "";
+  constexpr size_t kMost = 8;
+  std::vector<std::string> names;
+  for (const ShapeId shape : light.shapes) {
+    if (names.size() < kMost) names.push_back(quoted_name(scene, shape));
+  }
+  const size_t more = light.shapes.size() - names.size();
+  return fmt::format(
+      "the derivative is not complete: edges seen by way of smooth lobes of {}{} are missing; "
+      "{:.2g} "
+      "% of the image's light comes that way (--smooth-as 0.003 makes them rough)",
+      join(names), more > 0 ? fmt::format(" and {} more", more) : "", 100 * light.share);
+}
+
+}  // namespace limn

@@ -1,0 +1,255 @@
+// A rough border between two media without absorption (Walter et al. 2007): reflection at
+// microfacets, F D G1(wi) G1(wo) / (4 cos_i), and refraction. With eta the index of refraction
+// behind the surface over that in front, m = -(wi + eta wo) (its negative for eta < 1), h = m / |m|
+// and the radiance that passes scaled by 1 / eta^2,
+//   (1 - F) |wi.h| |wo.h| D G1(wi) G1(wo) / (cos_i |m|^2).
+// Both include the cosine of wo.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "src/bsdf/fresnel.h"
+#include "src/bsdf/indices.h"
+#include "src/bsdf/microfacet.h"
+#include "src/bsdf/sides.h"
+#include "src/bsdf/types.h"
+
+namespace limn {
+namespace {
+
+using Distribution = RoughConductorValues::Distribution;
+
+constexpr double kMinimumAlpha = 1e-4;  // as in Mitsuba
+constexpr double kMaximumAlpha = 1e6;
+
+template <class S>
+struct Facets {
+  Distribution distribution;
+  S alpha;
+
+  bool is_ggx() const { return distribution == Distribution::kGgx; }
+  // D(h) for h along m, over |m|^4. cos_m: n.m.
+  S density(const Vec3<S>& n, const Vec3<S>& m, const S& cos_m) const {
+    const S cos2 = cos_m * cos_m, sin2 = length_squared(cross(n, m));
+    return is_ggx() ? microfacet::ggx_d(cos2, sin2, alpha)
+                    : microfacet::beckmann_d(cos2, sin2, alpha);
+  }
+  // G1 / cos_v.
+  S masking_over_cos(const S& cos_v) const {
+    return is_ggx() ? microfacet::ggx_g1_over_cos(cos_v, alpha)
+                    : microfacet::beckmann_g1_over_cos(cos_v, alpha);
+  }
+  // The normalisation of the density of visible normals.
+  double exact_masking_over_cos(double cos_v) const {
+    return is_ggx() ? microfacet::ggx_g1_over_cos(cos_v, alpha)
+                    : microfacet::beckmann_exact_g1_over_cos(cos_v, alpha);
+  }
+  Vec3d visible(const Vec3d& v, double u1, double u2) const {
+    return is_ggx() ? microfacet::ggx_visible(v, alpha, u1, u2)
+                    : microfacet::beckmann_visible(v, alpha, u1, u2);
+  }
+};
+
+// What value and density have in common: of reflection if wo lies above the surface, else of
+// refraction.
+template <class S>
+struct Facet {
+  S cos_i, cos_o;  // cos_o < 0 below
+  S cos_h;         // wi.h
+  // D(h) / 4 for reflection; |wi.m| |wo.m| D(h) / |m|^4 for refraction.
+  S d;
+  bool above, possible;  // possible: some facet scatters so
+
+  Facet(const Facets<S>& facets, const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo,
+        const S& eta)
+      : cos_i(dot(n, wi)), cos_o(dot(n, wo)), above(value(cos_o) > 0) {
+    possible = value(cos_i) > 0 && value(cos_o) != 0;
+    if (!possible) return;
+    const Vec3<S> m = above ? wi + wo : (wi + wo * eta) * (value(eta) > 1 ? -1.0 : 1.0);
+    const S cos_m = dot(n, m), i = dot(wi, m), o = dot(wo, m), m2 = dot(m, m);
+    possible = value(cos_m) > 0 && value(i) > 0 && (above || value(o) < 0);
+    if (!possible) return;
+    using std::sqrt;
+    cos_h = i / sqrt(m2);
+    d = facets.density(n, m, cos_m) * (above ? 0.25 * m2 * m2 : -(i * o));
+  }
+};
+
+class RoughDielectric final : public SidedBsdf {
+ public:
+  explicit RoughDielectric(const RoughDielectricValues& v)
+      : distribution_(v.distribution),
+        alpha_(number("alpha", v.alpha)),
+        eta_(v.eta),
+        specular_reflectance_(colour("specular_reflectance", v.specular_reflectance)),
+        specular_transmittance_(colour("specular_transmittance", v.specular_transmittance)) {
+    lobes_ = {.below = true, .through = true};
+    set_back(lobes_);
+  }
+
+  bool is_constant() const override {
+    return limn::is_constant(alpha_.constant) && limn::is_constant(eta_) &&
+           limn::is_constant(specular_reflectance_.constant) &&
+           limn::is_constant(specular_transmittance_.constant);
+  }
+  std::vector<ParameterRef> parameters() override {
+    std::vector<ParameterRef> list;
+    list.push_back({"eta", {&eta_}, ParameterRef::Unit::kValue, kLeastIor, kMostIor});
+    add_parameter("alpha", alpha_, 0, kMaximumAlpha, list);
+    add_parameter("specular_reflectance", specular_reflectance_, 0, 1, list);
+    add_parameter("specular_transmittance", specular_transmittance_, 0, 1, list);
+    return list;
+  }
+  std::shared_ptr<Bsdf> clone() const override { return std::make_shared<RoughDielectric>(*this); }
+  std::string describe() const override {
+    return fmt::format(
+        "roughdielectric, {}, alpha {}, eta {:g}, specular_reflectance {}, specular_transmittance "
+        "{}",
+        is_ggx() ? "ggx" : "beckmann", text_of(alpha_), eta_.v, text_of(specular_reflectance_),
+        text_of(specular_transmittance_));
+  }
+
+ private:
+  bool is_ggx() const { return distribution_ == Distribution::kGgx; }
+  template <class S>
+  S alpha(const Rgb<S>* at) const {
+    const S a = alpha_.of(at);
+    return value(a) > kMinimumAlpha ? a : S(kMinimumAlpha);
+  }
+  template <class S>
+  Facets<S> facets(const Rgb<S>* at) const {
+    return {distribution_, alpha(at)};
+  }
+  template <class S>
+  S eta_of(bool front) const {
+    return front ? as<S>(eta_) : 1.0 / as<S>(eta_);
+  }
+  double reflected_share(bool front, double cos_i, const Rgb<double>* at) const;
+
+  Rgb<double> eval_from(bool front, const Vec3<double>& n, const Vec3<double>& wi,
+                        const Vec3<double>& wo, const Rgb<double>* at) const override {
+    return evaluate(front, n, wi, wo, at);
+  }
+  Rgb<Dual> eval_from(bool front, const Vec3<Dual>& n, const Vec3<Dual>& wi, const Vec3<Dual>& wo,
+                      const Rgb<Dual>* at) const override {
+    return evaluate(front, n, wi, wo, at);
+  }
+  double pdf_from(bool front, const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
+                  const Rgb<double>* at) const override;
+  std::optional<Vec3d> sample_from(bool front, const Vec3d& n, const Vec3d& wi, double u1,
+                                   double u2, const Rgb<double>* at) const override;
+  double eta_from(bool front, const Rgb<double>*) const override { return eta_of<double>(front); }
+  LobeSummary lobe_from(bool, const Rgb<double>* at) const override {
+    const double bound =
+        std::max(specular_reflectance_.bound(at), specular_transmittance_.bound(at));
+    if (is_ggx()) return {ggx_lobe(), alpha(at), bound};
+    return {beckmann_lobe(), alpha(at), bound * microfacet::kBeckmannRationalExcess};
+  }
+  PassedLobe passed_lobe_from(bool front, const Vec3d& n, const Vec3d& wi,
+                              const Rgb<double>* at) const override;
+  template <class S>
+  Rgb<S> evaluate(bool front, const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo,
+                  const Rgb<S>* at) const;
+
+  Distribution distribution_;
+  BsdfNumber alpha_;
+  Dual eta_;  // the index of refraction inside over that outside, not 1
+  BsdfColour specular_reflectance_, specular_transmittance_;
+};
+
+template <class S>
+Rgb<S> RoughDielectric::evaluate(bool front, const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo,
+                                 const Rgb<S>* at) const {
+  const S eta = eta_of<S>(front);
+  const Facets<S> facets = this->facets(at);
+  const Facet<S> facet(facets, n, wi, wo, eta);
+  if (!facet.possible) return {};
+  const S f = fresnel_dielectric(facet.cos_h, eta).reflected;
+  const S cos_o = facet.above ? facet.cos_o : -facet.cos_o;
+  const S common =
+      facet.d * facets.masking_over_cos(facet.cos_i) * facets.masking_over_cos(cos_o) * cos_o;
+  return facet.above ? specular_reflectance_.of(at) * (common * f)
+                     : specular_transmittance_.of(at) * (common * (1.0 - f));
+}
+
+// Of the visible facets' light about that of the one they lean to: grazing rays see facets that are
+// turned towards them by about their roughness. Neither lobe is left out where it is dim, as its
+// derivative need not be small. Not tuned.
+double RoughDielectric::reflected_share(bool front, double cos_i, const Rgb<double>* at) const {
+  const double a = std::min(1.0, alpha(at)), square = cos_i * cos_i;
+  const double f =
+      fresnel_dielectric(std::sqrt(square + a * a * (1 - square)), eta_of<double>(front)).reflected;
+  const double reflects = f * luminance(specular_reflectance_.of(at));
+  const double passes = (1 - f) * luminance(specular_transmittance_.of(at));
+  const double sum = reflects + passes;
+  return sum > 0 ? std::clamp(reflects / sum, 0.1, 0.9) : 0.5;
+}
+
+double RoughDielectric::pdf_from(bool front, const Vec3d& n, const Vec3d& wi, const Vec3d& wo,
+                                 const Rgb<double>* at) const {
+  const double eta = eta_of<double>(front);
+  const Facets<double> facets = this->facets(at);
+  const Facet<double> facet(facets, n, wi, wo, eta);
+  if (!facet.possible) return 0;
+  const double share = reflected_share(front, facet.cos_i, at);
+  return facet.d * facets.exact_masking_over_cos(facet.cos_i) *
+         (facet.above ? share : (1 - share) * (eta * eta));
+}
+
+std::optional<Vec3d> RoughDielectric::sample_from(bool front, const Vec3d& n, const Vec3d& wi,
+                                                  double u1, double u2,
+                                                  const Rgb<double>* at) const {
+  const double cos_i = dot(n, wi);
+  if (!(cos_i > 0)) return std::nullopt;
+  const double share = reflected_share(front, cos_i, at);
+  const bool above = u1 < share;
+  const Frame frame(n);
+  const Vec3d v = frame.to_local(wi);
+  const double rest = above ? u1 / share : (u1 - share) / (1 - share);
+  const Vec3d h = normalize(facets(at).visible(v, rest, u2));
+  Vec3d wo = reflected(v, h);
+  if (!above) {
+    const double eta = eta_of<double>(front);
+    const auto f = fresnel_dielectric(dot(v, h), eta);
+    if (f.total) return std::nullopt;
+    wo = refracted(v, h, eta, f.cos_t);
+  }
+  wo = normalize(frame.to_world(wo));
+  if ((dot(n, wo) > 0) != above || dot(n, wo) == 0) return std::nullopt;
+  return wo;
+}
+
+// The lobe lies about the direction in which a smooth surface would pass the light; half vectors
+// turn it |1 - cos_i / (eta cos_t)| times as far as they turn, in place of twice.
+Bsdf::PassedLobe RoughDielectric::passed_lobe_from(bool front, const Vec3d& n, const Vec3d& wi,
+                                                   const Rgb<double>* at) const {
+  constexpr double kGrazing = 0.05, kNarrowest = 1e-3;  // not tuned
+  const double cos_i = dot(n, wi), eta = eta_of<double>(front);
+  const double cos_t = std::max(kGrazing, fresnel_dielectric(cos_i, eta).cos_t);
+  const Vec3d along = n * cos_i - wi;
+  const double sine = std::sqrt(1 - cos_t * cos_t), size = length(along);
+  const Vec3d axis = size > 0 ? along * (sine / size) - n * cos_t : -n;
+  const double turn = 0.5 * std::fabs(1 - cos_i / (eta * cos_t));
+  PassedLobe passed{reflected(axis, -n), lobe_from(front, at)};
+  passed.lobe.alpha = std::min(1.0, alpha(at) * turn + kNarrowest);
+  return passed;
+}
+
+}  // namespace
+
+std::shared_ptr<Bsdf> make_roughdielectric(const RoughDielectricValues& values) {
+  return std::make_shared<RoughDielectric>(values);
+}
+
+std::shared_ptr<Bsdf> read_roughdielectric(Properties& properties) {
+  RoughDielectricValues values;
+  values.eta = read_relative_ior(properties, "bk7");
+  if (values.eta == 1) properties.fail("int_ior", "int_ior and ext_ior must differ");
+  values.distribution = read_distribution(properties);
+  values.alpha = read_alpha(properties);
+  values.specular_reflectance = read_reflectance(properties, "specular_reflectance", 1);
+  values.specular_transmittance = read_reflectance(properties, "specular_transmittance", 1);
+  return make_roughdielectric(values);
+}
+
+}  // namespace limn
