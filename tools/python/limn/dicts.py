@@ -25,7 +25,8 @@ TYPES = {
     "sampler": ["independent", "ldsampler", "multijitter", "orthogonal", "stratified"],
     "shape": ["cube", "cylinder", "disk", "instance", "obj", "ply", "rectangle", "serialized",
               "shapegroup", "sphere"],
-    "bsdf": ["diffuse", "roughconductor", "twosided"],
+    "bsdf": ["blendbsdf", "conductor", "dielectric", "diffuse", "mask", "null", "plastic",
+             "roughconductor", "roughdielectric", "thindielectric", "twosided"],
     "emitter": ["area", "constant", "directional", "envmap", "point", "projector",
                 "spot"],
 }
