@@ -86,6 +86,7 @@ LtcLobe::LtcLobe(const LobeSummary& lobe, const Vec3d& n, const Vec3d& wi) : n_(
     rows_[2] = n;
   } else {
     read_table(*row, wi);
+    cosine_ = lobe.cosine_share(dot(n, wi));
   }
   prepare_boxes();
 }
@@ -112,6 +113,8 @@ void LtcLobe::read_table(const LtcRow& row, const Vec3d& wi) {
 
 void LtcLobe::prepare_boxes() {
   det_f_ = static_cast<float>(det_);
+  cosine_f_ = static_cast<float>(cosine_);
+  rest_f_ = static_cast<float>(1 - cosine_);
   for (int i = 0; i < 3; ++i) {
     n_f_[i] = static_cast<float>(n_[i]);
     for (int k = 0; k < 3; ++k) rows_f_[k][i] = static_cast<float>(rows_[k][i]);
@@ -129,14 +132,14 @@ double LtcLobe::value(const Vec3d& w) const {
   const double height = dot(n_, w);
   if (height <= 0) return 0;
   if (diffuse_) return height / kPi;
-  return (1 - kLtcFloor) * ltc(w) + kLtcFloor * height / kPi;
+  return (1 - cosine_) * ltc(w) + cosine_ * height / kPi;
 }
 
 double LtcLobe::homogeneous_value(const Vec3d& w) const {
   const double height = dot(n_, w);
   if (height <= 0) return 0;
   const double w2 = length_squared(w), cosine = height / (kPi * w2 * w2);
-  return diffuse_ ? cosine : (1 - kLtcFloor) * ltc(w) + kLtcFloor * cosine;
+  return diffuse_ ? cosine : (1 - cosine_) * ltc(w) + cosine_ * cosine;
 }
 
 Floats LtcLobe::mean_over_boxes(Floats3 center, Floats3 half) const {
@@ -155,8 +158,7 @@ Floats LtcLobe::mean_over(Floats3 center, Floats3 half) const {
   const Floats reach = Shape::reach(n_f_, half) + 0x1p-21f;
   const Floats cosine = mean_above_zero(middle, reach) * kInversePi;
   if (diffuse_) return cosine;
-  const Floats mixed = static_cast<float>(1 - kLtcFloor) * ltc_mean<Shape>(center, half) +
-                       static_cast<float>(kLtcFloor) * cosine;
+  const Floats mixed = rest_f_ * ltc_mean<Shape>(center, half) + cosine_f_ * cosine;
   return select(middle + reach > 0, mixed, splat(0.0f));
 }
 
@@ -179,7 +181,7 @@ Floats LtcLobe::most_in_boxes(Floats3 center, Floats3 half) const {
   const Floats z = max(low, min(sqrt(r2 * (1.0f / 3)), middle_z + reach_z));
   const Floats l2 = r2 + z * z, far = distance + radius;
   const Floats peak = min(far * far * far * z / (l2 * l2), splat(1.0f)) * (det_f_ * kInversePi);
-  return static_cast<float>(1 - kLtcFloor) * peak + static_cast<float>(kLtcFloor) * cosine;
+  return rest_f_ * peak + cosine_f_ * cosine;
 }
 
 // Mean of `ltc` alone; requires |center|^2 + |half|^2 = 1.

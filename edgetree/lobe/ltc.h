@@ -3,9 +3,10 @@
 // is cheap over boxes and can be sampled along edges (Peters 2021).
 //
 //   ltc(w) = max(0, z') |det M^-1| / (pi |w'|^4),   w' = M^-1 w, w unit,
-//   value(w) = (1 - kLtcFloor) ltc(w) + kLtcFloor (n.w) / pi   where n.w > 0, else 0  [1/sr].
+//   value(w) = (1 - cosine) ltc(w) + cosine (n.w) / pi   where n.w > 0, else 0  [1/sr].
 //
-// The floor keeps the value positive wherever the scattering function is. Diffuse: M = identity,
+// with the share of the cosine that the lobe has (LobeSummary::cosine_share), which keeps the value
+// positive wherever the scattering function is. Diffuse: M = identity,
 // and value is the scattering function over its albedo. Which transformed cosine it is the lobe
 // says (LobeModel::ltc); one that says none is taken for diffuse.
 #include "edgetree/simd.h"
@@ -40,7 +41,8 @@ class LtcLobe {
   Vec3d transform(const Vec3d& w) const {
     return {dot(rows_[0], w), dot(rows_[1], w), dot(rows_[2], w)};
   }
-  double det() const { return det_; }  // of M^-1, > 0
+  double det() const { return det_; }        // of M^-1, > 0
+  double cosine() const { return cosine_; }  // its share; 1 if diffuse
   // Integral of the scattering function over w without the albedo: norm() ltc(w) approximates
   // it.
   double norm() const { return norm_; }
@@ -58,8 +60,9 @@ class LtcLobe {
   Vec3d rows_[3];
   double det_ = 1;
   double norm_ = 1;
-  // In floats, for boxes: n, the rows of M^-1, det.
-  float n_f_[3], rows_f_[3][3], det_f_;
+  double cosine_ = 1;
+  // In floats, for boxes: n, the rows of M^-1, det, the shares of cosine and ltc.
+  float n_f_[3], rows_f_[3][3], det_f_, cosine_f_, rest_f_;
 };
 
 // The part of an edge above the horizon, with a density in proportion to value(w_t) / |w_t|^3 with

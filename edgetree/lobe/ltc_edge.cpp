@@ -43,8 +43,7 @@ LtcEdge::LtcEdge(const LtcLobe& lobe, const Vec3d& w_0, const Vec3d& w_1) {
   const Frame frame(lobe.n());
   arcs_[1].t_begin = begin;
   arcs_[1].t_end = end;
-  const double floor = lobe.diffuse() ? 1 : kLtcFloor;
-  arcs_[1].set(frame.to_local(w_0), frame.to_local(along), floor / kPi);
+  arcs_[1].set(frame.to_local(w_0), frame.to_local(along), lobe.cosine() / kPi);
   if (lobe.diffuse()) return;
 
   const Vec3d v_0 = lobe.transform(w_0), v_along = lobe.transform(along);
@@ -52,7 +51,7 @@ LtcEdge::LtcEdge(const LtcLobe& lobe, const Vec3d& w_0, const Vec3d& w_1) {
   if (!(end > begin)) return;
   arcs_[0].t_begin = begin;
   arcs_[0].t_end = end;
-  arcs_[0].set(v_0, v_along, (1 - kLtcFloor) * lobe.det() / kPi);
+  arcs_[0].set(v_0, v_along, (1 - lobe.cosine()) * lobe.det() / kPi);
 }
 
 void LtcEdge::Arc::set(const Vec3d& w_0, const Vec3d& w_along, double factor) {

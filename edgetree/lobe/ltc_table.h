@@ -4,11 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "limn/core/lobe.h"
+
 namespace limn {
 
-// Every lobe is evaluated as (1 - kLtcFloor) LTC + kLtcFloor cos / pi, so the importance stays
+// Every lobe was fitted as (1 - kLtcFloor) LTC + kLtcFloor cos / pi, so the importance stays
 // positive where the fit is zero. The floor is not tuned.
-inline constexpr double kLtcFloor = 0.1;
 
 // A matrix M = R [width_x 0 skew; 0 width_y 0; 0 0 1]; R turns +z by theta_i + tilt from the normal
 // towards the mirror direction, in the plane of incidence. Any M of Heitz et al. 2016 is of this

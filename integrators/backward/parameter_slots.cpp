@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "limn/core/check.h"
+#include "limn/core/tangent.h"
 
 namespace limn {
 
@@ -60,15 +61,29 @@ template <class T>
 SeededCopies<T> seeded_copies(const T& object, const std::vector<ChannelSlots>& slots) {
   SeededCopies<T> copies;
   int lane = kLanes;
-  for (size_t k = 0; k < slots.size(); ++k) {
-    if (slots[k] == ChannelSlots{}) continue;
+  const auto seed = [&](size_t k, const std::vector<size_t>& channels, const ChannelSlots& to) {
+    if (to == ChannelSlots{}) return;
     if (lane == kLanes) {
       copies.push_back({object.clone(), {}});
       lane = 0;
     }
     const std::vector<ParameterRef> parameters = copies.back().object->parameters();
-    for (Dual* v : parameters[k].values) v->d[lane] = 1;
-    copies.back().slots[lane++] = slots[k];
+    for (const size_t channel : channels) parameters[k].values[channel]->d[lane] = 1;
+    copies.back().slots[lane++] = to;
+  };
+  if (std::all_of(slots.begin(), slots.end(), [](const auto& s) { return s == ChannelSlots{}; })) {
+    return copies;
+  }
+  const std::shared_ptr<T> unseeded = object.clone();
+  const std::vector<ParameterRef> parameters = unseeded->parameters();
+  for (size_t k = 0; k < slots.size(); ++k) {
+    if (parameters[k].values.size() == 1) {
+      seed(k, {0}, slots[k]);
+    } else if (!parameters[k].mixes_channels) {
+      seed(k, {0, 1, 2}, slots[k]);
+    } else {
+      for (size_t c = 0; c < 3; ++c) seed(k, {c}, {slots[k][c], slots[k][c], slots[k][c]});
+    }
   }
   CHECK_LE(9 + 3 * kLanes * static_cast<int>(copies.size()), detail::Jacobian::kMost);
   return copies;
@@ -172,6 +187,7 @@ void ParameterSlots::add_shapes(const Scene& scene) {
     slots.positions = take(3 * count, size_);
     gathers_[s].copies.resize(count);
     for (const uint32_t root : mesh.weld) ++gathers_[s].copies[root];
+    slots.directions = take(3 * static_cast<uint32_t>(mesh.u_directions.size()));
     if (mesh.normal_source == NormalSource::kFace) continue;
     slots.normals = take(3 * static_cast<uint32_t>(mesh.normals.size()));
     gathers_[s].normals.emplace(mesh);
@@ -283,6 +299,7 @@ void ParameterSlots::gather_shape(ShapeId shape, const std::vector<double>& sums
     normals = vectors(slots.normals, mesh.normals.size());
     gathers_[shape.index()].normals->pull_back(normals, positions);
   }
+  pull_back_u_directions(mesh, vectors(slots.directions, mesh.u_directions.size()), positions);
   const std::vector<uint32_t>& copies = gathers_[shape.index()].copies;
   for (size_t i = 0; i < parameters_.size(); ++i) {
     const Dependence& dependence = dependences_[i];

@@ -10,7 +10,7 @@ namespace limn {
 EdgeQuery query_at(const PathVertex& vertex) {
   EdgeQuery query;
   query.p = vertex.surface.p;
-  query.n = vertex.scattering.normal();
+  query.n = vertex.scattering.lobe_normal();
   query.wi = vertex.scattering.wi();
   query.lobe = vertex.scattering.lobe();
   if (vertex.below) {

@@ -1,7 +1,7 @@
 // The diffuse (Lambertian) BSDF; its back is black.
 #include <algorithm>
 
-#include "src/base/angles.h"
+#include "src/bsdf/cosine.h"
 #include "src/bsdf/types.h"
 
 namespace limn {
@@ -46,14 +46,6 @@ class Diffuse final : public Bsdf {
   std::string describe() const override { return "diffuse, reflectance " + text_of(reflectance_); }
 
  private:
-  // Of height sqrt(1 - u1) above a uniform point of the disk.
-  template <class S>
-  static Vec3<S> draw(const Vec3<S>& n, const S& u1, const S& u2) {
-    using std::sqrt;
-    const S r = sqrt(u1);
-    const SinCosOf<S> phi = sin_cos_of_turns(u2);
-    return FrameOf<S>(n).to_world({r * phi.cos, r * phi.sin, sqrt(1.0 - u1)});
-  }
   template <class S>
   Rgb<S> evaluate(const Vec3<S>& n, const Vec3<S>& wi, const Vec3<S>& wo, const Rgb<S>* at) const {
     const S cos_o = dot(n, wo);
@@ -64,12 +56,10 @@ class Diffuse final : public Bsdf {
   BsdfColour reflectance_;
 };
 
-// A uniform point of the unit disk, lifted to the hemisphere, is distributed as the cosine
-// (Malley's method).
 std::optional<Vec3d> Diffuse::sample(const Vec3d& n, const Vec3d& wi, double u1, double u2,
                                      const Rgb<double>* /*at*/) const {
   if (!(dot(n, wi) > 0)) return std::nullopt;
-  return draw(n, u1, u2);
+  return sample_cosine(n, u1, u2);
 }
 
 void Diffuse::sample_each(std::span<const Draw> draws) const {
@@ -77,7 +67,7 @@ void Diffuse::sample_each(std::span<const Draw> draws) const {
     const auto of = [&](int i) -> const Draw& { return draws[std::min(first + i, last - 1)]; };
     const auto number = [&](int k) { return wide::gather([&](int i) { return of(i).u[k]; }); };
     const wide::Vec n = wide::gather_vectors([&](int i) { return of(i).n; });
-    const wide::Vec wo = draw(n, number(0), number(1));
+    const wide::Vec wo = sample_cosine(n, number(0), number(1));
     for (size_t i = first; i < last; ++i) {
       const bool seen = dot(*draws[i].n, *draws[i].wi) > 0;
       *draws[i].wo = seen ? wide::lane(wo, static_cast<int>(i - first)) : Vec3d{};

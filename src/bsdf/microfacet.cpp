@@ -21,19 +21,19 @@ double inverse_erfc(double q) {
   return x;
 }
 
-// Quantile of the density exp(-x^2) / sqrt(pi).
+}  // namespace
+
 double gaussian_slope(double u) {
   constexpr double kTiny = 0x1.0p-60;  // u = 0 would be minus infinity
   return u < 0.5 ? -inverse_erfc(2 * std::max(u, kTiny)) : inverse_erfc(2 * (1 - u));
 }
 
-// A slope x (towards v, roughness 1) of the visible facets of a Beckmann surface. Its density is
-// (c - x s)^+ exp(-x^2) up to a factor, with c, s the cosine and sine of v; its integral up to x,
+// The density is (c - x s)^+ exp(-x^2) up to a factor; its integral up to x,
 //   F(x) = c erfc(-x) + s exp(-x^2) / sqrt(pi)   (times sqrt(pi) / 2),
 // is inverted by Newton's method, safeguarded by a bracket.
 // Heitz and d'Eon 2014, "Importance sampling microfacet-based BSDFs using the distribution of
 // visible normals".
-double visible_slope(double c, double s, double u) {
+double beckmann_slope(double c, double s, double u) {
   const auto integral = [=](double x) {
     return c * std::erfc(-x) + s * kInverseSqrtPi * std::exp(-x * x);
   };
@@ -54,25 +54,22 @@ double visible_slope(double c, double s, double u) {
   return x;
 }
 
-}  // namespace
-
-double beckmann_exact_g1_over_cos(double cos_v, double alpha) {
-  const double scaled_sin = alpha * std::sqrt(std::max(0.0, 1 - cos_v * cos_v));
+double beckmann_exact_g1_over_cos(double cos_v, double scaled_sin) {
   // erfc(6) and exp(-36) vanish beside 1 in double precision.
   if (cos_v > 6 * scaled_sin) return 1 / cos_v;
   const double a = cos_v / scaled_sin;
   return 2 / (cos_v * (1 + std::erf(a)) + scaled_sin * kInverseSqrtPi * std::exp(-a * a));
 }
 
-Vec3d beckmann_visible(const Vec3d& v, double alpha, double u1, double u2) {
-  const Vec3d stretched = normalize(Vec3d{alpha * v.x, alpha * v.y, v.z});
+Vec3d beckmann_visible(const Vec3d& v, double alpha_x, double alpha_y, double u1, double u2) {
+  const Vec3d stretched = normalize(Vec3d{alpha_x * v.x, alpha_y * v.y, v.z});
   const double sin_v = std::hypot(stretched.x, stretched.y);
   const double cos_phi = sin_v > 0 ? stretched.x / sin_v : 1;
   const double sin_phi = sin_v > 0 ? stretched.y / sin_v : 0;
-  const double along = visible_slope(stretched.z, sin_v, u1);
+  const double along = beckmann_slope(stretched.z, sin_v, u1);
   const double across = gaussian_slope(u2);
-  const double slope_x = alpha * (cos_phi * along - sin_phi * across);
-  const double slope_y = alpha * (sin_phi * along + cos_phi * across);
+  const double slope_x = alpha_x * (cos_phi * along - sin_phi * across);
+  const double slope_y = alpha_y * (sin_phi * along + cos_phi * across);
   return {-slope_x, -slope_y, 1};
 }
 

@@ -66,29 +66,49 @@ S beckmann_g1_over_cos(const S& cos_v, const S& alpha) {
   return cot_scale * (3.535 + 2.181 * a) / (1.0 + a * (2.276 + 2.577 * a));
 }
 
+// Both with alpha^2 sin^2 in place of alpha, for roughness that depends on the direction.
+template <class S>
+S ggx_g1_over_cos_scaled(const S& cos_v, const S& scaled_sin2) {
+  return 2.0 / (cos_v + sqrt(cos_v * cos_v + scaled_sin2));
+}
+template <class S>
+S beckmann_g1_over_cos_scaled(const S& cos_v, const S& scaled_sin2) {
+  const S cos2 = cos_v * cos_v, sum = cos2 + scaled_sin2;
+  // The roughness 1 at the angle whose tangent is as large.
+  const S length = sqrt(sum);
+  return beckmann_g1_over_cos(S(cos_v / length), S(1.0)) / length;
+}
+
 // The exact G1(v) / cos_v = 2 / (cos (1 + erf a) + alpha sin exp(-a^2) / sqrt(pi)): the
-// normalisation of the density of visible normals.
-double beckmann_exact_g1_over_cos(double cos_v, double alpha);
+// normalisation of the density of visible normals. scaled_sin: alpha sin.
+double beckmann_exact_g1_over_cos(double cos_v, double scaled_sin);
 
 // The largest ratio of the rational to the exact G1.
 inline constexpr double kBeckmannRationalExcess = 1.0035;
 
+// Quantile of the density exp(-x^2) / sqrt(pi).
+double gaussian_slope(double u);
+// A slope, towards v, of the visible facets of a Beckmann surface of roughness 1, from a number in
+// [0, 1); c, s: cosine and sine of v.
+double beckmann_slope(double c, double s, double u);
+
 // Normals h visible from v (in the frame where n is +z, v.z > 0), with density
-// D(h) G1(v) max(0, v.h) / v.z per solid angle of h, from two numbers in [0, 1). Of any length.
-Vec3d beckmann_visible(const Vec3d& v, double alpha, double u1, double u2);
+// D(h) G1(v) max(0, v.h) / v.z per solid angle of h, from two numbers in [0, 1). Of any length. The
+// roughness is alpha_x along x, alpha_y along y.
+Vec3d beckmann_visible(const Vec3d& v, double alpha_x, double alpha_y, double u1, double u2);
 
 // The visible normals of the stretched surface (roughness 1: a hemisphere) are half vectors of v
 // and directions uniform on the cap of the sphere around it. Dupuy and Benyoub 2023, "Sampling
 // visible GGX normals with spherical caps".
 template <class S>
-Vec3<S> ggx_visible(const Vec3<S>& v, double alpha, const S& u1, const S& u2) {
-  const Vec3<S> longer{alpha * v.x, alpha * v.y, v.z};
+Vec3<S> ggx_visible(const Vec3<S>& v, double alpha_x, double alpha_y, const S& u1, const S& u2) {
+  const Vec3<S> longer{alpha_x * v.x, alpha_y * v.y, v.z};
   const Vec3<S> stretched = longer * (1.0 / length(longer));
   const SinCosOf<S> phi = sin_cos_of_turns(u1);
   const S z = (1.0 - u2) * (1.0 + stretched.z) - stretched.z;
   const S r2 = 1.0 - z * z;
   const S r = sqrt(below_zero(r2, S(0.0), r2));
-  return {alpha * (stretched.x + r * phi.cos), alpha * (stretched.y + r * phi.sin),
+  return {alpha_x * (stretched.x + r * phi.cos), alpha_y * (stretched.y + r * phi.sin),
           stretched.z + z};
 }
 

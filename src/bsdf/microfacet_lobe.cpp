@@ -3,7 +3,7 @@
 // Let r be the mirror image of wi about n. The rotation from r to wo is the product of the
 // reflections about n and h, a rotation by 2 theta_h. So the angle between r and wo is at most 2
 // theta_h, and D(theta_h) is at most the maximum of D from half that angle on. G is at most the
-// smaller of its two factors, and F at most the albedo.
+// smaller of its two factors, and F at most the albedo. Diffuse light beside it adds its own bound.
 #include <algorithm>
 #include <cmath>
 
@@ -21,7 +21,9 @@ class MicrofacetLobe : public LobeModel {
   double bound(const LobeSummary& lobe, double cos_i, double cos_o,
                double cos_axis) const override {
     const double masked = std::min(masking(cos_i, lobe.alpha), masking(cos_o, lobe.alpha));
-    return lobe.albedo / (4 * cos_i) * distribution(0.5 * (1 + cos_axis), lobe.alpha) * masked;
+    return (lobe.albedo - lobe.diffuse) / (4 * cos_i) *
+               distribution(0.5 * (1 + cos_axis), lobe.alpha) * masked +
+           lobe.diffuse / kPi * cos_o;
   }
 
  protected:

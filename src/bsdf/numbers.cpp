@@ -5,6 +5,7 @@
 
 #include "limn/core/bsdf.h"
 #include "limn/core/check.h"
+#include "limn/core/tangent.h"
 
 namespace limn {
 
@@ -36,9 +37,23 @@ BsdfNumber Bsdf::number(const char* name, const ConstantOrTexture& source) {
   return {grey.constant.r, grey.texture};
 }
 
+bool Bsdf::needs_tangent() const {
+  for (int k = 0; k < texture_count_; ++k) {
+    if (texture(k).is_tangent()) return true;
+  }
+  return false;
+}
+
+int Bsdf::add_tangent(const char* name) {
+  const int k = colour(name, make_tangent()).texture;
+  textures_[k]->set_mixes_channels();
+  return k;
+}
+
 void Bsdf::add_texture_parameters(int texture, std::vector<ParameterRef>& list) {
   for (ParameterRef& p : textures_[texture]->parameters()) {
     p.name = texture_names_[texture] + "." + p.name;
+    p.mixes_channels = textures_[texture]->mixes_channels();
     list.push_back(std::move(p));
   }
 }

@@ -12,14 +12,19 @@ struct BsdfType {
 
 constexpr BsdfType kTypes[] = {
     {"blendbsdf", read_blendbsdf},
+    {"bumpmap", read_bumpmap},
     {"conductor", read_conductor},
     {"dielectric", read_dielectric},
     {"diffuse", read_diffuse},
     {"mask", read_mask},
+    {"normalmap", read_normalmap},
     {"null", read_null},
     {"plastic", read_plastic},
+    {"principled", read_principled},
+    {"principledthin", read_principledthin},
     {"roughconductor", read_roughconductor},
     {"roughdielectric", read_roughdielectric},
+    {"roughplastic", read_roughplastic},
     {"thindielectric", read_thindielectric},
     {"twosided", read_twosided},
 };

@@ -42,11 +42,12 @@ struct Facets {
   // The normalisation of the density of visible normals.
   double exact_masking_over_cos(double cos_v) const {
     return is_ggx() ? microfacet::ggx_g1_over_cos(cos_v, alpha)
-                    : microfacet::beckmann_exact_g1_over_cos(cos_v, alpha);
+                    : microfacet::beckmann_exact_g1_over_cos(
+                          cos_v, alpha * std::sqrt(std::max(0.0, 1 - cos_v * cos_v)));
   }
   Vec3d visible(const Vec3d& v, double u1, double u2) const {
-    return is_ggx() ? microfacet::ggx_visible(v, alpha, u1, u2)
-                    : microfacet::beckmann_visible(v, alpha, u1, u2);
+    return is_ggx() ? microfacet::ggx_visible(v, alpha, alpha, u1, u2)
+                    : microfacet::beckmann_visible(v, alpha, alpha, u1, u2);
   }
 };
 

@@ -8,14 +8,19 @@
 namespace limn {
 
 std::shared_ptr<Bsdf> read_blendbsdf(Properties& properties);
+std::shared_ptr<Bsdf> read_bumpmap(Properties& properties);
 std::shared_ptr<Bsdf> read_conductor(Properties& properties);
 std::shared_ptr<Bsdf> read_dielectric(Properties& properties);
 std::shared_ptr<Bsdf> read_diffuse(Properties& properties);
 std::shared_ptr<Bsdf> read_mask(Properties& properties);
+std::shared_ptr<Bsdf> read_normalmap(Properties& properties);
 std::shared_ptr<Bsdf> read_null(Properties& properties);
 std::shared_ptr<Bsdf> read_plastic(Properties& properties);
+std::shared_ptr<Bsdf> read_principled(Properties& properties);
+std::shared_ptr<Bsdf> read_principledthin(Properties& properties);
 std::shared_ptr<Bsdf> read_roughconductor(Properties& properties);
 std::shared_ptr<Bsdf> read_roughdielectric(Properties& properties);
+std::shared_ptr<Bsdf> read_roughplastic(Properties& properties);
 std::shared_ptr<Bsdf> read_thindielectric(Properties& properties);
 std::shared_ptr<Bsdf> read_twosided(Properties& properties);
 
@@ -32,6 +37,7 @@ std::shared_ptr<Bsdf> make_roughdielectric(const RoughDielectricValues& values);
 // Read alpha (0.1), and a distribution (beckmann).
 ConstantOrTexture read_alpha(Properties& properties);
 RoughConductorValues::Distribution read_distribution(Properties& properties);
+
 // Reads a colour whose channels lie in [0, 1], as Mitsuba requires of reflectances, or a texture.
 ConstantOrTexture read_reflectance(Properties& properties, const char* name, double absent);
 

@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "limn/core/check.h"
+#include "limn/core/tangent.h"
 #include "src/mesh/face_shape.h"
 #include "src/mesh/mesh_build.h"
 #include "src/mesh/shading_tangents.h"
@@ -114,6 +115,7 @@ void update_shading_normals(Mesh& mesh) { fill_shading_normals(mesh); }
 
 size_t fill_shading_normals(Mesh& mesh) {
   CHECK_EQ(mesh.weld.size(), mesh.positions.size());
+  update_u_directions(mesh);
   if (mesh.normal_source != NormalSource::kComputed) return 0;
   assign_normal_ids(mesh);
   size_t cancelled = 0;
@@ -123,6 +125,7 @@ size_t fill_shading_normals(Mesh& mesh) {
 }
 
 void update_shading_tangents(Mesh& mesh) {
+  update_u_tangents(mesh);
   if (mesh.normal_source != NormalSource::kComputed) return;
   mesh.normal_tangents.clear();
   if (moves_as_one(mesh)) return;

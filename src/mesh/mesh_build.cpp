@@ -240,6 +240,7 @@ Mesh build_mesh(const RawMesh& raw, const MeshOptions& options,
   if (raw.faces.empty()) throw InputError(raw.where, "the mesh has no faces");
   set_positions(mesh, raw, options.to_world);
   mesh.textured = options.textured;
+  mesh.has_tangents = options.tangents;
   if (mesh.textured) {
     check_uv(raw);
     mesh.uv_source = raw.uv_source;
@@ -286,6 +287,7 @@ Mesh moved_mesh(const Mesh& mesh, std::vector<Vec3f> positions, const SourceLoca
   moved.positions = std::move(positions);
   moved.faces = mesh.faces;
   moved.textured = mesh.textured;
+  moved.has_tangents = mesh.has_tangents;
   moved.uv_source = mesh.uv_source;
   moved.uv_places = mesh.uv_places;
   moved.uv_ids = mesh.uv_ids;

@@ -36,6 +36,7 @@ struct MeshOptions {
   bool face_normals = false;  // ignore normals, flat shading
   bool flip_normals = false;  // reverse orientation and normals
   bool textured = false;      // keep texture coordinates, see Mesh::textured
+  bool tangents = false;      // see Mesh::has_tangents; requires texture coordinates
 };
 
 // True if the transform is a reflection (possibly combined with other transforms).

@@ -177,13 +177,15 @@ ShadingAdjoint pull_back_shading(const Scene& scene, FaceRef face, const Vec3d& 
 namespace {
 
 // A texture's value: it follows the barycentric coordinates, and its texels.
-Rgb<Var> texture_value(const Texture& texture, const TexturePoint<Dual>& point,
+Rgb<Var> texture_value(const Texture& texture, const TexturePoint<Dual>& point, ShapeId shape,
                        const std::array<Var, 2>& b) {
   const Rgb<Dual> f = texture.eval(point);
   detail::Jacobian jacobian;
   for (int k = 0; k < 2; ++k) jacobian.add(b[k].node, f.r.d[k], f.g.d[k], f.b.d[k]);
   Tape& tape = *Tape::current();
-  if (const uint32_t slot = tape.slots()->of(&texture)) {
+  const SceneSlots& slots = *tape.slots();
+  if (const uint32_t slot =
+          texture.is_tangent() ? slots.mesh(shape).directions : slots.of(&texture)) {
     const TexturePoint<double> here{
         point.mesh, point.face, {b[0].v, b[1].v}, {point.uv[0].v, point.uv[1].v}};
     for (const auto& [texel, weight] : texture.texel_weights(here)) {
@@ -208,7 +210,7 @@ void TexturesAt<Var>::resolve(const Bsdf& bsdf, const SurfacePoint<Var>& point) 
                                  Dual(point.b[1].v, {0, 1, 0, 0})};
   point_ = texture_point<Dual>(point.shape->mesh, point.face.face, b);
   for (int k = 0; k < count_; ++k) {
-    moving_.values[k] = texture_value(bsdf.texture(k), point_, point.b);
+    moving_.values[k] = texture_value(bsdf.texture(k), point_, point.face.shape, point.b);
     held_.values[k] = value(moving_.values[k]);
   }
 }
@@ -221,21 +223,30 @@ Rgb<Dual> held_colour(const Rgb<double>& c) { return {c.r, c.g, c.b}; }
 
 // Calls visit(nodes) for values of textures that move, four at a time, while these move in `at`.
 template <class Visit>
-void for_textures(const TexturesAt<Var>& textures, Rgb<Dual>* at, const Visit& visit) {
-  for (int first = 0; first < textures.count();) {
-    std::array<ChannelSlots, kLanes> nodes{};
-    int lane = 0, k = first;
-    for (; k < textures.count() && lane < kLanes; ++k) {
-      const Rgb<Var>& v = textures.moving()[k];
-      if (is_constant(v)) continue;
-      nodes[lane] = {v.r.node, v.g.node, v.b.node};
-      for (int c = 0; c < 3; ++c) at[k][c].d[lane] = 1;
-      ++lane;
-    }
+void for_textures(const Bsdf& bsdf, const TexturesAt<Var>& textures, Rgb<Dual>* at,
+                  const Visit& visit) {
+  std::array<ChannelSlots, kLanes> nodes{};
+  int lane = 0, first = 0;
+  const auto end_at = [&](int end) {
     if (lane > 0) visit(nodes);
-    for (int i = first; i < k; ++i) at[i] = held_colour(textures.held()[i]);
-    first = k;
+    for (; first < end; ++first) at[first] = held_colour(textures.held()[first]);
+    nodes = {};
+    lane = 0;
+  };
+  for (int k = 0; k < textures.count(); ++k) {
+    const Rgb<Var>& v = textures.moving()[k];
+    if (is_constant(v)) continue;
+    const bool mixes = bsdf.texture(k).mixes_channels();
+    if (lane + (mixes ? 3 : 1) > kLanes) end_at(k);
+    for (int c = 0; c < 3; ++c) {
+      const uint32_t node = v[c].node;
+      nodes[lane] =
+          mixes ? ChannelSlots{node, node, node} : ChannelSlots{v.r.node, v.g.node, v.b.node};
+      at[k][c].d[lane] = 1;
+      if (mixes || c == 2) ++lane;
+    }
   }
+  end_at(textures.count());
 }
 
 // Calls eval(bsdf, n, wi, wo, at) with each argument in turn moving, and add(nodes, what it gives).
@@ -248,7 +259,7 @@ void along_each(const Bsdf& bsdf, const SeededCopies<Bsdf>* copies, const Vec3<V
   if (!is_constant(n)) add(n, eval(bsdf, along_axes(n), held(wi), held(wo), at));
   if (!is_constant(wi)) add(wi, eval(bsdf, held(n), along_axes(wi), held(wo), at));
   if (!is_constant(wo)) add(wo, eval(bsdf, held(n), held(wi), along_axes(wo), at));
-  for_textures(textures, at,
+  for_textures(bsdf, textures, at,
                [&](const auto& nodes) { add(nodes, eval(bsdf, held(n), held(wi), held(wo), at)); });
   if (!copies) return;
   TexturePoint<Dual> still = textures.point();

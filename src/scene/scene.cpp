@@ -1,6 +1,8 @@
 // Deep copies of scenes, and the choice of a sensor.
 #include "limn/core/scene.h"
 
+#include "limn/core/set_shading.h"
+
 namespace limn {
 
 namespace {
@@ -87,6 +89,12 @@ void use_sensor(Scene& scene, const std::string& name) {
   }
   throw InputError({scene.file},
                    "there is no sensor \"" + name + "\" (known: " + sensor_names(scene) + ")");
+}
+
+void set_shading(Scene& scene, ShadingModel model) {
+  scene.shading = model;
+  const bool mitsuba = model == ShadingModel::kMitsuba;
+  for (const Shape& shape : scene.shapes) shape.bsdf->set_mitsuba_shading(mitsuba);
 }
 
 void set_mesh(Scene& scene, ShapeId shape, std::vector<Vec3f> positions,

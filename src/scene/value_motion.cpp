@@ -20,7 +20,9 @@ class ValueMotion final : public Motion {
     for (Dual* v : values_(scene).values) v->d[lane] += 1;
   }
   void move(Scene& scene, double step, size_t) const override {
-    for (Dual* v : values_(scene).values) v->v += step;
+    const ParameterRef here = values_(scene);
+    for (Dual* v : here.values) v->v += step;
+    if (here.changed) here.changed();
   }
   std::vector<double> numbers(const Scene& scene) const override {
     std::vector<double> all;
@@ -35,6 +37,7 @@ class ValueMotion final : public Motion {
     if (numbers.size() == 1) numbers.resize(here.values.size(), numbers[0]);
     check_numbers(scene, name, numbers, here.values.size(), here.least, here.most);
     for (size_t k = 0; k < numbers.size(); ++k) here.values[k]->v = numbers[k];
+    if (here.changed) here.changed();
   }
   std::optional<Parameter> part(const Scene&, const Parameter& whole,
                                 const std::string& rest) const override {

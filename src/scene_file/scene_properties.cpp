@@ -166,6 +166,11 @@ std::shared_ptr<Texture> DescribedProperties::texture(const std::string& name) {
   return make_nested_.texture(*object);
 }
 
+std::shared_ptr<Texture> DescribedProperties::only_texture() {
+  const ObjectDescription* object = nested("texture");
+  return object ? make_nested_.texture(*object) : nullptr;
+}
+
 std::vector<std::shared_ptr<Bsdf>> DescribedProperties::bsdfs() {
   known_tags_.insert("bsdf");
   std::vector<std::shared_ptr<Bsdf>> made;

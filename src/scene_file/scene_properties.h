@@ -40,6 +40,7 @@ class DescribedProperties final : public Properties {
   Matrix4 transform(const std::string& name) override;
   std::string file(const std::string& name) override;
   std::shared_ptr<Texture> texture(const std::string& name) override;
+  std::shared_ptr<Texture> only_texture() override;
   std::vector<std::shared_ptr<Bsdf>> bsdfs() override;
   double smooth_as() const override { return make_nested_.smooth_as; }
 

@@ -105,6 +105,10 @@ class SceneBuilder {
     DescribedProperties p(object, description_, make_nested_);
     std::shared_ptr<Bsdf> made = make_bsdf(p);
     p.check_all_used();
+    if (object.type == "bumpmap") {
+      warnings_.push_back(format_warning(
+          object.where, "bumpmap: derivatives of what moves take its normals as constants"));
+    }
     --bsdf_depth_;
     if (!object.id.empty()) scene_.bsdfs_by_id[object.id] = made;
     bsdfs_[&object] = made;
@@ -297,6 +301,7 @@ class SceneBuilder {
     const double grey_value = shape.is_emitter ? 0.0 : 0.5;
     shape.bsdf = bsdfs.empty() ? make_diffuse(grey(grey_value)) : bsdfs[0];
     options.textured = shape.bsdf->texture_count() > 0;
+    options.tangents = shape.bsdf->needs_tangent();
     if (raw.uv_source == UvSource::kNone) check_needs_no_uv(*shape.bsdf, raw, object);
     shape.mesh = build_mesh(raw, options, &warnings_);
     scene_.shapes.push_back(std::move(shape));

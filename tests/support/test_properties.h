@@ -9,6 +9,7 @@
 
 #include "limn/core/bsdf.h"
 #include "limn/core/properties.h"
+#include "limn/core/texture.h"
 
 namespace limn::test {
 
@@ -52,8 +53,16 @@ class TestProperties final : public Properties {
   }
   Matrix4 transform(const std::string& name) override { return get(name, Matrix4{}); }
   std::string file(const std::string& name) override { return get(name, std::string{}); }
-  std::shared_ptr<Texture> texture(const std::string&) override { return nullptr; }
+  std::shared_ptr<Texture> texture(const std::string& name) override {
+    const auto found = textures.find(name);
+    return found == textures.end() ? nullptr : found->second;
+  }
+  std::shared_ptr<Texture> only_texture() override {
+    return textures.empty() ? nullptr : textures.begin()->second;
+  }
   std::vector<std::shared_ptr<Bsdf>> bsdfs() override { return bsdfs_; }
+
+  std::map<std::string, std::shared_ptr<Texture>> textures;
 
  private:
   template <class T>

@@ -45,8 +45,8 @@ SampledLobe sample_lobe(bool ggx, double alpha, double cos_i) {
   };
   for (int i = 0; i < kPoints; ++i) {
     const double u1 = std::fmod((i + 0.5) * kR2[0], 1.0), u2 = std::fmod((i + 0.5) * kR2[1], 1.0);
-    const Vec3d h = normalize(ggx ? microfacet::ggx_visible(v, alpha, u1, u2)
-                                  : microfacet::beckmann_visible(v, alpha, u1, u2));
+    const Vec3d h = normalize(ggx ? microfacet::ggx_visible(v, alpha, alpha, u1, u2)
+                                  : microfacet::beckmann_visible(v, alpha, alpha, u1, u2));
     const Vec3d w = normalize(h * (2 * dot(v, h)) - v);
     if (!(w.z > 0)) continue;
     const double cos2 = h.z * h.z, sin2 = h.x * h.x + h.y * h.y;

@@ -12,6 +12,7 @@
 #include "limn/core/error.h"
 #include "limn/core/names.h"
 #include "limn/core/parallel.h"
+#include "limn/core/set_shading.h"
 #include "tools/limn/command_support.h"
 #include "tools/limn/output_files.h"
 #include "tools/limn/terminal.h"
@@ -142,7 +143,7 @@ Scene load_scene(const CommonOptions& common, Warnings& shown) {
                           scene.smooth_as));
   }
   if (!common.sensor.empty()) use_sensor(scene, common.sensor);
-  if (common.shading == "mitsuba") scene.shading = ShadingModel::kMitsuba;
+  if (common.shading == "mitsuba") set_shading(scene, ShadingModel::kMitsuba);
   return scene;
 }
 

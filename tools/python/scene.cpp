@@ -9,6 +9,7 @@
 #include "limn/core/error.h"
 #include "limn/core/names.h"
 #include "limn/core/parameter.h"
+#include "limn/core/set_shading.h"
 #include "tools/python/bindings.h"
 
 namespace limn::python {
@@ -110,7 +111,8 @@ void set_shading(SceneHandle& scene, const std::string& name) {
   if (name != "mitsuba" && name != "continuous") {
     throw InputError(unknown_name("shading", name, {"continuous", "mitsuba"}));
   }
-  scene.edit().shading = name == "mitsuba" ? ShadingModel::kMitsuba : ShadingModel::kContinuous;
+  limn::set_shading(scene.edit(),
+                    name == "mitsuba" ? ShadingModel::kMitsuba : ShadingModel::kContinuous);
 }
 
 std::vector<std::string> shape_ids(const SceneHandle& scene) {

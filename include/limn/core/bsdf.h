@@ -1,7 +1,7 @@
 #pragma once
-// Scattering at a surface, seen from the front. All BSDFs are isotropic. They are functions of
-// world-space directions and the shading normal. No tangent frame enters, so none can introduce a
-// discontinuity.
+// Scattering at a surface, seen from the front. BSDFs are functions of world-space
+// directions and the shading normal. A tangent enters as a value of `at` (tangent.h), of those that
+// ask for one alone.
 //
 // A BSDF has rough lobes, of which eval, pdf and sample are, smooth (delta) ones, which turn a ray
 // into rays, or both. Radiance that passes from an index of refraction eta_t into eta_i, the
@@ -137,6 +137,11 @@ class Bsdf {
   // arguments are constant, too (what `at` holds is one of them). False is always a safe answer.
   virtual bool is_constant() const { return false; }
 
+  // The unit normal about which it scatters, and its lobe lies: n but for mapped normals.
+  virtual Vec3d scattering_normal(const Vec3d& n, const Vec3d& /*wi*/,
+                                  const Rgb<double>* /*at*/) const {
+    return n;
+  }
   // The summary of the rough lobes that edge samplers use as importance. By default the hemisphere
   // with albedo 1. With a null `at` its albedo bounds that at all points.
   virtual LobeSummary lobe(const Rgb<double>* /*at*/ = nullptr) const { return {}; }
@@ -158,6 +163,8 @@ class Bsdf {
   virtual Texture& texture(int k) const { return *textures_[k]; }
   // The name of the colour or number that texture k gives ("reflectance").
   virtual std::string texture_name(int k) const { return texture_names_[k]; }
+  // Whether one of them is the tangent of the surface.
+  bool needs_tangent() const;
   // at: of texture_count() elements.
   template <class S>
   void resolve(const TexturePoint<S>& point, Rgb<S>* at) const {
@@ -167,6 +174,10 @@ class Bsdf {
   virtual std::shared_ptr<Bsdf> clone() const = 0;  // deep
   // Nested BSDFs. deep_copy() uses them to preserve sharing.
   virtual std::span<std::shared_ptr<Bsdf>> nested() { return {}; }
+  // Whether mapped normals are used as in Mitsuba (see ShadingModel), also by nested BSDFs.
+  virtual void set_mitsuba_shading(bool mitsuba) {
+    for (const auto& bsdf : nested()) bsdf->set_mitsuba_shading(mitsuba);
+  }
   // One line of description, printed by `limn info`.
   virtual std::string describe() const = 0;
 
@@ -178,6 +189,8 @@ class Bsdf {
   // For constructors: keep the texture, if it is one, under this name.
   BsdfColour colour(const char* name, const ConstantOrTexture& source);
   BsdfNumber number(const char* name, const ConstantOrTexture& source);
+  // Likewise, the tangent of the surface (tangent.h), for the parameter of this name: its index.
+  int add_tangent(const char* name);
   // For parameters(): the constant, or what the texture has in its place.
   void add_parameter(const char* name, BsdfColour& colour, double least, double most,
                      std::vector<ParameterRef>& list);
@@ -206,11 +219,25 @@ std::shared_ptr<Bsdf> make_diffuse(const ConstantOrTexture& reflectance);
 struct RoughConductorValues {
   enum class Distribution { kBeckmann, kGgx };
   Distribution distribution = Distribution::kBeckmann;
-  ConstantOrTexture alpha = 0.1;  // roughness of the microfacet distribution, not squared
+  // Roughness of the microfacet distribution, not squared; with alpha_v, alpha is that along the
+  // tangent and alpha_v that across.
+  ConstantOrTexture alpha = 0.1;
+  std::optional<ConstantOrTexture> alpha_v;
   Rgb<double> eta{0, 0, 0};
   Rgb<double> k{1, 1, 1};
   ConstantOrTexture specular_reflectance = 1;
 };
 std::shared_ptr<Bsdf> make_roughconductor(const RoughConductorValues& values);
+
+// A rough plastic. The defaults are Mitsuba's.
+struct RoughPlasticValues {
+  RoughConductorValues::Distribution distribution = RoughConductorValues::Distribution::kBeckmann;
+  double alpha = 0.1;
+  double eta = 1.49 / 1.000277;  // index of refraction, inside over outside
+  bool nonlinear = false;        // whether colours shift by light that is reflected inside
+  ConstantOrTexture diffuse_reflectance = 0.5;
+  ConstantOrTexture specular_reflectance = 1;
+};
+std::shared_ptr<Bsdf> make_roughplastic(const RoughPlasticValues& values);
 
 }  // namespace limn

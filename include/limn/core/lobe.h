@@ -2,6 +2,7 @@
 // A summary of a BSDF for edge samplers: an upper bound of its albedo, and a linearly transformed
 // cosine that approximates it. It is used as importance only: estimates stay unbiased as long as
 // its bound is positive wherever the scattering function is.
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 
@@ -11,14 +12,29 @@ namespace limn {
 
 class LobeModel;
 
+// The least share of the cosine in a glossy lobe's importance: positive wherever the lobe is. Not
+// tuned.
+inline constexpr double kLtcFloor = 0.1;
+
 // The lobe of a BSDF at a point: a model and its parameters. Compared by value.
 struct LobeSummary {
   const LobeModel* model;  // never null; static storage duration
   double alpha = 1;        // roughness, for the models that have one
   double albedo = 1;       // upper bound of the directional albedo over channels and directions
-  LobeSummary();           // the hemisphere, see below
+  // Diffuse light beside a glossy lobe: its part of the albedo, and the reflectance of the glossy
+  // part at normal incidence, which rises towards 1 at grazing angles (Fresnel).
+  double diffuse = 0;
+  double facing = 1;
+  LobeSummary();  // the hemisphere, see below
   LobeSummary(const LobeModel& m, double a, double bound) : model(&m), alpha(a), albedo(bound) {}
   bool operator==(const LobeSummary&) const = default;
+
+  // The share of the plain cosine in the importance, for a viewer at cos_i: at least kLtcFloor.
+  double cosine_share(double cos_i) const {
+    const double away = 1 - cos_i, squared = away * away;
+    const double glossy = facing + (1 - facing) * (squared * squared * away);  // Schlick 1994
+    return std::max(kLtcFloor, diffuse / (diffuse + glossy));
+  }
 };
 
 // An entry of a table of linearly transformed cosines (Heitz et al. 2016), fitted by tools/fit_ltc.

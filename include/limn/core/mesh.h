@@ -68,6 +68,13 @@ struct Mesh {
   std::vector<Vec3f> uv_places;
   std::vector<FaceIndices> uv_ids;  // F by 3, into uv_places
 
+  // Whether the shape's material asks for tangents (tangent.h). Where it does not, the next three
+  // are empty.
+  bool has_tangents = false;
+  std::vector<Vec3d> u_directions;      // sums of unit vectors along which u grows, times angles
+  std::vector<FaceIndices> u_ids;       // F by 3, into u_directions
+  std::vector<Vec3<Lanes>> u_tangents;  // their derivatives; empty where all are zero
+
   // Derivatives with respect to the parameters of the pass; empty where all are zero.
   std::vector<Vec3<Lanes>> position_tangents;  // V
   std::vector<Vec3<Lanes>> normal_tangents;    // N

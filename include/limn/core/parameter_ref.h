@@ -1,5 +1,6 @@
 #pragma once
 // A differentiable value of an object of the scene.
+#include <functional>
 #include <limits>
 #include <string>
 #include <vector>
@@ -9,8 +10,8 @@
 namespace limn {
 
 // A differentiable value of an object: "alpha", "reflectance", "radiance", ... A colour is
-// differentiated along grey: all channels change by the same amount. Channels never mix, so channel
-// c of the derivative image is the derivative with respect to channel c.
+// differentiated along grey: all channels change by the same amount. Channels do not
+// mix unless it says so: channel c of the derivative image is that with respect to channel c.
 struct ParameterRef {
   std::string name;
   std::vector<Dual*> values;  // one, or the three channels
@@ -18,6 +19,10 @@ struct ParameterRef {
   // Range of valid values, inclusive; equal to the range that the scene reader accepts.
   double least = -std::numeric_limits<double>::infinity();
   double most = std::numeric_limits<double>::infinity();
+  // Whether a channel of a colour acts on all channels of what is scattered.
+  bool mixes_channels = false;
+  // To be called after the values have changed, if there is something to update.
+  std::function<void()> changed = {};
 };
 
 }  // namespace limn

@@ -47,6 +47,8 @@ class Properties {
   virtual std::string file(const std::string& name) = 0;
   // The nested texture (or reference to one) of this name, made anew; null if there is none.
   virtual std::shared_ptr<Texture> texture(const std::string& name) = 0;
+  // The only nested texture, of any name; null if there is none. InputError if there are several.
+  virtual std::shared_ptr<Texture> only_texture() = 0;
   // Nested bsdf elements and references to bsdfs, in order.
   virtual std::vector<std::shared_ptr<Bsdf>> bsdfs() = 0;
 

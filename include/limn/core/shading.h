@@ -55,6 +55,8 @@ class Scattering {
   // The values of the BSDF's textures here (see Bsdf).
   const Rgb<double>* at() const { return textures_.held(); }
   LobeSummary lobe() const { return bsdf_->lobe(at()); }
+  // About which the lobe lies: that of `normal`, or a mapped one.
+  Vec3d lobe_normal() const { return bsdf_->scattering_normal(value(n_), value(wi_), at()); }
   Bsdf::PassedLobe passed_lobe() const { return bsdf_->passed_lobe(value(n_), value(wi_), at()); }
   // Whether there is more than smooth lobes.
   bool is_rough() const { return bsdf_->is_rough(); }

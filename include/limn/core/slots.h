@@ -14,8 +14,9 @@ namespace limn {
 // The first slots of a mesh's numbers; 0 if they are constant. Welded vertices share the slots of
 // the first copy, `weld`.
 struct MeshSlots {
-  uint32_t positions = 0;  // of 3 V
-  uint32_t normals = 0;    // of 3 N
+  uint32_t positions = 0;   // of 3 V
+  uint32_t normals = 0;     // of 3 N
+  uint32_t directions = 0;  // of 3 u_directions
 };
 
 // A slot for each channel, since channels never mix. A number that affects all channels has the

@@ -49,6 +49,12 @@ class Texture : public TexelMap {
   // Whether `eval` reads texture coordinates, not only barycentric ones.
   virtual bool needs_uv() const { return true; }
 
+  // Whether it is the tangent of the surface (tangent.h), which no file names.
+  virtual bool is_tangent() const { return false; }
+  // Whether a channel of the value acts on all channels of what is scattered, as a vector's does.
+  bool mixes_channels() const { return mixes_channels_; }
+  void set_mixes_channels() { mixes_channels_ = true; }
+
   // The weights of texels at a point, where there are texels. For numbers the luminance of the
   // weighted sum is looked up.
   virtual TexelWeights texel_weights(const TexturePoint<double>& /*point*/) const { return {}; }
@@ -80,6 +86,9 @@ class Texture : public TexelMap {
 
  protected:
   bool of_numbers_ = false;
+
+ private:
+  bool mixes_channels_ = false;
 };
 
 // Creates the texture that an element describes. InputError for bad values and for an unknown type

@@ -25,8 +25,9 @@ TYPES = {
     "sampler": ["independent", "ldsampler", "multijitter", "orthogonal", "stratified"],
     "shape": ["cube", "cylinder", "disk", "instance", "obj", "ply", "rectangle", "serialized",
               "shapegroup", "sphere"],
-    "bsdf": ["blendbsdf", "conductor", "dielectric", "diffuse", "mask", "null", "plastic",
-             "roughconductor", "roughdielectric", "thindielectric", "twosided"],
+    "bsdf": ["blendbsdf", "bumpmap", "conductor", "dielectric", "diffuse", "mask", "normalmap",
+             "null", "plastic", "principled", "principledthin", "roughconductor",
+             "roughdielectric", "roughplastic", "thindielectric", "twosided"],
     "emitter": ["area", "constant", "directional", "envmap", "point", "projector",
                 "spot"],
 }

@@ -1,0 +1,77 @@
+// Normal maps: normals from a texture, in the frame of tangent, bitangent and shading normal.
+#include "limn/core/tangent.h"
+#include "src/bsdf/mapped_normal.h"
+#include "src/bsdf/nested.h"
+#include "src/bsdf/tangent_frame.h"
+
+namespace limn {
+namespace {
+
+class NormalMap final : public MappedNormal<NormalMap> {
+ public:
+  NormalMap(std::shared_ptr<Texture> map, std::shared_ptr<Bsdf> nested,
+            const MappedNormalOptions& options)
+      : MappedNormal(std::move(nested), options) {
+    map->set_mixes_channels();
+    map_ = colour("normalmap", map);
+    tangent_ = add_tangent("normalmap");
+    outward_ = colour("normalmap", make_outward()).texture;
+    add_nested_textures();
+  }
+
+  // The colour t stands for 2 t - 1. Seen from the back, the bitangent stays.
+  template <class S>
+  Vec3<S> normal(const Vec3<S>& n, const Rgb<S>* at) const {
+    const auto vector_at = [&](int k) { return Vec3<S>{at[k].r, at[k].g, at[k].b}; };
+    const Vec3<S> m = vector_at(map_.texture) * 2.0 - Vec3<S>{1.0, 1.0, 1.0};
+    const Vec3<S> s = along_surface(n, vector_at(tangent_));
+    const double side = dot(value(n), value(vector_at(outward_))) < 0 ? -1 : 1;
+    const Vec3<S> sum = s * m.x + cross(n, s) * (m.y * side) + n * m.z;
+    return value(length_squared(sum)) > 0 ? normalize(sum) : n;
+  }
+
+  std::vector<ParameterRef> parameters() override {
+    std::vector<ParameterRef> list = nested()[0]->parameters();
+    add_parameter("normalmap", map_, 0, 1, list);
+    return list;
+  }
+  std::shared_ptr<Bsdf> clone() const override {
+    const auto copy = std::make_shared<NormalMap>(*this);
+    copy->clone_nested();
+    return copy;
+  }
+  std::string describe() const override {
+    return "normalmap, " + text_of(map_) + " (" + inside().describe() + ")";
+  }
+
+ private:
+  BsdfColour map_;
+  int tangent_, outward_;  // where they stand in `at`
+};
+
+}  // namespace
+
+MappedNormalOptions read_mapped_normal_options(Properties& properties) {
+  MappedNormalOptions options;
+  options.flips = properties.boolean("flip_invalid_normals", true);
+  options.shadows = properties.boolean("use_shadowing_function", true);
+  return options;
+}
+
+std::shared_ptr<Bsdf> read_mapped_bsdf(Properties& properties, int own) {
+  const std::shared_ptr<Bsdf> nested = read_nested(properties, 1, own, 0)[0];
+  if (nested->lobes().through) {
+    properties.fail("takes no bsdf that passes light: " + nested->describe());
+  }
+  if (nested->side(false)) properties.fail("takes no bsdf of two sides: put it inside twosided");
+  return nested;
+}
+
+std::shared_ptr<Bsdf> read_normalmap(Properties& properties) {
+  auto map = properties.texture("normalmap");
+  if (!map) properties.fail("normalmap", "a normalmap needs a texture \"normalmap\"");
+  return std::make_shared<NormalMap>(std::move(map), read_mapped_bsdf(properties, 3),
+                                     read_mapped_normal_options(properties));
+}
+
+}  // namespace limn
