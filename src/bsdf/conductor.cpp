@@ -65,9 +65,13 @@ class Conductor final : public SidedBsdf {
 std::shared_ptr<Bsdf> read_conductor(Properties& properties) {
   const ConductorIndices indices = read_conductor_indices(properties);
   if (properties.smooth_as() > 0) {
-    return make_roughconductor({RoughConductorValues::Distribution::kGgx, properties.smooth_as(),
-                                indices.eta, indices.k,
-                                read_reflectance(properties, "specular_reflectance", 1)});
+    RoughConductorValues rough;
+    rough.distribution = RoughConductorValues::Distribution::kGgx;
+    rough.alpha = properties.smooth_as();
+    rough.eta = indices.eta;
+    rough.k = indices.k;
+    rough.specular_reflectance = read_reflectance(properties, "specular_reflectance", 1);
+    return make_roughconductor(rough);
   }
   return std::make_shared<Conductor>(indices,
                                      read_reflectance(properties, "specular_reflectance", 1));
